@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Fill the marked sections of docs/errors.md from a report, and from one of full size.
 
-    halfshell report -o docs/report
+    halfshell report --scenes all --patience 3 -o docs/report
     halfshell report --size full -o docs/report/full
     python benchmarks/fill_errors.py docs/report/report.csv --full docs/report/full/report.csv
 

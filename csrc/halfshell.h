@@ -732,6 +732,24 @@ hs_status hs_box_measure(const hs_box *box, double *heights, double *volume, hs_
 hs_status hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped, int64_t *shift,
                       hs_failure *failure);
 
+/* What the places of points along the axes of a short basis of a box, and open axes, mean. */
+typedef struct hs_box_axes {
+    bool   repeats[HS_MAX_DIM]; /* places are from 0 to 1, which is the same place as 0 */
+    double reach[HS_MAX_DIM];   /* places of a pair differ by no more; infinity if not known */
+    double width[HS_MAX_DIM];   /* about what 1 is in a common unit, to compare sides by */
+} hs_box_axes;
+
+/*
+ * For dividing points into parts that see each other's edges: where points are along the axes of a
+ * box (NULL: none), and how far places can be apart where some image of a pair is within the
+ * cutoff; rounding is in the reach. places, or NULL: places[k * stride + i] of point i along axis k,
+ * 0 where the reach is infinite. They do not depend on the other points: largest is at least the
+ * largest |coordinate| of all points that are ever compared, so that several calls agree. No box,
+ * size of numbers or distance from the box makes the reach too small.
+ */
+hs_status hs_box_places(const hs_box *box, const hs_points *points, double cutoff, double largest,
+                        double *places, int64_t stride, hs_box_axes *axes, hs_failure *failure);
+
 /*
  * Memory of results that are gone, and a megabyte that a call has worked in, is kept for the next
  * ones, up to a limit: the one thing that outlives a call. No answer depends on it. Bytes kept at

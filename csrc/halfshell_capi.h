@@ -188,6 +188,10 @@ typedef struct hs_capi {
                                int64_t *n_clusters, hs_failure *failure);
     hs_status (*measure)(const hs_points *points, const hs_box *box, const hs_pair_numbers *pairs,
                          const hs_options *options, hs_pairs **result, hs_failure *failure);
+    void (*dynamic_hook)(hs_dynamic *list, const hs_dynamic_hooks *hooks);
+    hs_status (*box_places)(const hs_box *box, const hs_points *points, double cutoff,
+                            double largest, double *places, int64_t stride, hs_box_axes *axes,
+                            hs_failure *failure);
 } hs_capi;
 
 /* The table, or NULL with an ImportError (also that of halfshell itself) when halfshell is not

@@ -5,7 +5,8 @@
  * hold; docs/dynamic.md explains the rest.
  *
  * Threads: any number of calls that take a `const hs_dynamic *` may run at once; one that changes
- * the list waits for them, and they for it. hs_dynamic_hold is the exception.
+ * the list waits for them, and they for it, as all do for the thread that holds it. A child process
+ * goes on with its copy, unless another thread was changing the list when it was forked off.
  */
 #ifndef HALFSHELL_DYNAMIC_H
 #define HALFSHELL_DYNAMIC_H
@@ -69,8 +70,9 @@ hs_status hs_dynamic_copy(const hs_dynamic *list, hs_dynamic **copy);
 /*
  * Adds a point, or moves the one of this key. position: ndim numbers, anywhere; NULL, with
  * HS_STORE_ALL_PAIRS only: none. HS_ERR_NOT_FINITE names the column; HS_ERR_SHIFT_RANGE: 2^51 boxes
- * away or more; HS_ERR_CAPACITY: the dense cells would take failure->expected_bytes. On failure the
- * list is as it was.
+ * away or more, also along directions in which the box does not repeat, where these are oblique to
+ * the coordinate axes; HS_ERR_CAPACITY: the dense cells would take failure->expected_bytes.
+ * On failure the list is as it was.
  */
 hs_status hs_dynamic_insert(hs_dynamic *list, hs_key key, const double *position,
                             hs_failure *failure);
@@ -115,9 +117,11 @@ hs_status hs_dynamic_cell(const hs_dynamic *list, hs_key key, int64_t *cell);
 typedef int (*hs_dynamic_fn)(hs_key key, const double *position, const int64_t *shift, void *user);
 
 /*
- * All keys that have an image within the closed ball, each once, and others that are not far: no
- * distance is computed. 0 <= radius <= max_radius, or HS_ERR_CUTOFF. Nothing is allocated, as for
- * the next two.
+ * The keys of all points in cells that the closed ball meets in some image, each once: no distance
+ * is computed. With HS_STORE_ALL_PAIRS there is one cell, else they are the same for each storage.
+ * 0 <= radius <= max_radius, or HS_ERR_CUTOFF; HS_ERR_SHIFT_RANGE as for hs_dynamic_insert, and
+ * where the ball spans more than 2^24 images; HS_ERR_INTERRUPTED. Nothing is allocated, as for the
+ * next two.
  */
 hs_status hs_dynamic_near(const hs_dynamic *list, const double *position, double radius,
                           hs_dynamic_fn visit, void *user, hs_failure *failure);
@@ -140,11 +144,29 @@ hs_status hs_dynamic_any_within(const hs_dynamic *list, const double *position, 
 int64_t hs_dynamic_keys(const hs_dynamic *list, int64_t *cursor, hs_key *keys, int64_t n);
 
 /*
- * Until hs_dynamic_release only the calling thread may use the list, and rounds to nearest without
- * flushing: its calls need not see to either, which is a good part of their time. Not nested.
+ * Until hs_dynamic_release calls of other threads wait, and this thread rounds to nearest without
+ * flushing: its own calls need not see to either, which is a good part of their time. A second
+ * hs_dynamic_hold does nothing, nor does hs_dynamic_release in a thread that does not hold it.
  */
 void hs_dynamic_hold(hs_dynamic *list);
 void hs_dynamic_release(hs_dynamic *list);
+
+/*
+ * poll: queries that take long call it every now and then, with the `user` of the visit (NULL for
+ * hs_dynamic_any_within) and 0; false: they end with HS_ERR_INTERRUPTED. Changes wait meanwhile,
+ * and the list must not be used. A change that has to wait for queries calls `pause` before each
+ * wait, and then `resume` with what that returned: for a lock that `poll` needs, as that of an
+ * interpreter.
+ * Any may be NULL, `resume` with `pause`. Copies have none.
+ */
+typedef struct hs_dynamic_hooks {
+    hs_poll_fn poll;
+    void *(*pause)(void);
+    void (*resume)(void *paused);
+} hs_dynamic_hooks;
+
+/* hooks: copied; NULL: none. Not while the list is in use. */
+void hs_dynamic_hook(hs_dynamic *list, const hs_dynamic_hooks *hooks);
 
 typedef struct hs_dynamic_state {
     int     ndim;

@@ -9,7 +9,8 @@ by accident.
 Each scene has two hashes. "sorted" is that of the answer: pairs, shifts, and every bit of d and D.
 "unsorted" also depends on the order in which the search meets the pairs, that is on the sizes of
 cells and groups. So --write refuses to touch the file if an answer differs. Run it only when the
-order was meant to change.
+order was meant to change. Scenes that have "rows" or "blocks" are also asked for the rows of all
+points, which have one order, and for streams in blocks of these sizes.
 
 Scenes are made by Python's own random numbers, multiplication and addition, so they are the same
 bits everywhere.
@@ -31,7 +32,9 @@ import halfshell as hs
 FILE = Path(__file__).with_name("golden.json")
 ABOUT = "SHA-256 of results; written by tests/golden.py, which says when it may be written again"
 
-Scene = dict[str, Any]  # the arguments of hs.pairs that belong to the scene
+# The arguments of hs.pairs that belong to the scene; "rows": hs.neighbors as well;
+# "blocks": hs.iter_pairs as well, for each of these numbers of pairs a block.
+Scene = dict[str, Any]
 
 
 def cloud(n: int, ndim: int, seed: int, size: float = 1.0) -> np.ndarray:
@@ -52,6 +55,11 @@ def scenes() -> dict[str, Scene]:
     tilted = np.array([[1.0, 0.0, 0.0], [0.375, 0.875, 0.0], [-0.25, 0.125, 1.125]])
     sheared = np.array([[1.0, 0.0, 0.0], [7.25, 1.0, 0.0], [-3.5, 5.0, 1.0]])
     steep = np.eye(5) + 0.125 * np.eye(5, k=-1)
+    systems = {
+        "points": cloud(900, 3, 19),
+        "box": np.stack([cube, tilted, 0.5 * cube] * 10),
+        "batch": np.arange(900) // 30,
+    }
     return {
         "open": {"points": cloud(5000, 3, 1), "cutoff": 0.09},
         "open, far away": {"points": cloud(900, 3, 2) + 2.0**40, "cutoff": 0.2},
@@ -94,6 +102,43 @@ def scenes() -> dict[str, Scene]:
             "box": cube,
             "index_dtype": np.int32,
         },
+        "rows and streams": {
+            "points": cloud(4000, 3, 14),
+            "cutoff": 0.09,
+            "box": tilted,
+            "rows": True,
+            "blocks": (50, 3000, 1 << 20),
+        },
+        "rows and streams of images": {
+            "points": cloud(40, 3, 15),
+            "cutoff": 1.3,
+            "box": sheared,
+            "periodic": (True, True, False),
+            "rows": True,
+            "blocks": (50, 3000, 1 << 20),
+        },
+        "rows and streams by radii": {
+            "points": cloud(1500, 3, 16),
+            "cutoff": None,
+            "box": cube,
+            "radii": 0.005 * 20.0 ** cloud(1500, 1, 17)[:, 0],
+            "rows": True,
+            "blocks": (50, 3000, 1 << 20),
+        },
+        "rows and streams by types": {
+            "points": cloud(2000, 3, 18),
+            "cutoff": {(0, 0): 0.05, (0, 1): 0.15, (1, 1): 0.03, (2, 2): 0.2},
+            "types": np.arange(2000) % 3,
+            "rows": True,
+            "blocks": (50, 3000, 1 << 20),
+        },
+        "systems": {**systems, "cutoff": 0.25, "rows": True},
+        "systems by radii": {
+            **systems,
+            "cutoff": None,
+            "radii": 0.02 * 8.0 ** cloud(900, 1, 20)[:, 0],
+            "rows": True,
+        },
     }
 
 
@@ -108,8 +153,15 @@ def digest(arrays: tuple[np.ndarray, ...]) -> str:
 
 def hashes(scene: Scene, **how: Any) -> dict[str, Any]:
     """The entry of a scene in the file; `how` must not matter."""
-    unsorted = hs.pairs(**scene, quantities="ijdDSP", **how)
-    ascending = hs.pairs(**scene, quantities="ijdDSP", sort=True, **how)
+    given = {key: scene[key] for key in scene.keys() - {"rows", "blocks"}} | how
+    unsorted = hs.pairs(**given, quantities="ijdDSP")
+    ascending = hs.pairs(**given, quantities="ijdDSP", sort=True)
+    if "rows" in scene:
+        table = hs.neighbors(**given, quantities="jdDS")
+        ascending += (table.offsets, table.indices, table.distances, table.vectors, table.shifts)
+    for most in scene.get("blocks", ()):
+        for block in hs.iter_pairs(**given, quantities="ijdDSP", max_pairs=most):
+            unsorted += block
     return {"pairs": len(unsorted[0]), "sorted": digest(ascending), "unsorted": digest(unsorted)}
 
 

@@ -97,6 +97,8 @@ static const hs_capi table = {
     .dynamic_count = hs_dynamic_count,
     .clusters_find = hs_clusters_find,
     .measure = hs_measure,
+    .dynamic_hook = hs_dynamic_hook,
+    .box_places = hs_box_places,
 };
 
 int

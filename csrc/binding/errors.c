@@ -215,7 +215,7 @@ hs_raise_capacity(int64_t capacity, int64_t needed)
 static PyObject *
 raise_capacity(const hs_failure *failure)
 {
-    hs_raise_capacity(0, (int64_t)failure->expected_pairs);
+    hs_raise_capacity(0, hs_pairs_needed(failure));
     return NULL;
 }
 

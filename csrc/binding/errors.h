@@ -11,6 +11,13 @@
  * HS_ERR_INTERRUPTED expects that poll() has set one. options may be NULL. */
 PyObject *hs_raise(hs_status status, const hs_failure *failure, const hs_options *options);
 
+/* The pairs that a failure speaks of; INT64_MAX where they are more. */
+static inline int64_t
+hs_pairs_needed(const hs_failure *failure)
+{
+    return failure->expected_pairs < 0x1p63 ? (int64_t)failure->expected_pairs : INT64_MAX;
+}
+
 /* CapacityError, of `out`, or of a capacity where that is not 0. */
 void hs_raise_capacity(int64_t capacity, int64_t needed);
 

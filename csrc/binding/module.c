@@ -59,6 +59,7 @@ static PyMethodDef methods[] = {
     {"cache_held", hs_py_cache_held, METH_NOARGS, "Bytes that the cache holds."},
     {"box_measure", FASTCALL(hs_py_box_measure), METH_FASTCALL, "See halfshell.Box."},
     {"box_wrap", FASTCALL(hs_py_box_wrap), METH_FASTCALL, "See halfshell.Box.wrap."},
+    {"box_places", FASTCALL(hs_py_box_places), METH_FASTCALL, "See halfshell.bricks."},
     {"verlet_new", hs_py_verlet_new, METH_NOARGS, "See halfshell.VerletList."},
     {"verlet_update", FASTCALL(hs_py_verlet_update), METH_FASTCALL,
      "See halfshell.VerletList.update."},

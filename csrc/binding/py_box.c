@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* py_box.c: _core.box_measure and _core.box_wrap. */
+/* py_box.c: _core.box_measure, _core.box_wrap and _core.box_places. */
 #include "py_functions.h"
 
 #include "convert.h"
@@ -119,4 +119,82 @@ hs_py_box_wrap(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argume
         return NULL;
     }
     return Py_BuildValue("(NN)", wrapped, shifts);
+}
+
+/* As wrap_in_parts. Without points it is called once, for the axes. */
+static bool
+places_in_parts(const hs_box *box, const hs_points *points, double cutoff, double largest,
+                double *places, hs_box_axes *axes)
+{
+    hs_points  part = *points;
+    hs_failure failure;
+    int64_t    first = 0;
+    do {
+        hs_status status;
+        part.n = points->n - first < POINTS_PER_CALL ? points->n - first : POINTS_PER_CALL;
+        part.data = (const char *)points->data + first * points->row_stride;
+        Py_BEGIN_ALLOW_THREADS
+        status =
+            hs_box_places(box, &part, cutoff, largest, places + first, points->n, axes, &failure);
+        Py_END_ALLOW_THREADS
+        if (status != HS_OK) {
+            const hs_options options = {.cutoff = cutoff};
+            failure.row += failure.row >= 0 && is_of_point(status) ? first : 0;
+            hs_raise(status, &failure, &options);
+            return false;
+        }
+        if (PyErr_CheckSignals() != 0) {
+            return false;
+        }
+        first += part.n;
+    } while (first < points->n);
+    return true;
+}
+
+PyObject *
+hs_py_box_places(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_points     points;
+    hs_box        box;
+    hs_box_axes   axes;
+    bool          given;
+    unsigned long repeats;
+    (void)module;
+    if (n_arguments != 5) {
+        PyErr_SetString(PyExc_TypeError,
+                        "box_places takes points, a box, periodic bits, a cutoff and the largest "
+                        "coordinate");
+        return NULL;
+    }
+    const double cutoff = PyFloat_AsDouble(arguments[3]);
+    const double largest = PyErr_Occurred() ? 0.0 : PyFloat_AsDouble(arguments[4]);
+    if (PyErr_Occurred() || !hs_repeats_of(arguments[2], &repeats) ||
+        !hs_points_of(arguments[0], "points", &points) ||
+        !hs_box_of(arguments[1], repeats, points.ndim, &box, &given)) {
+        return NULL;
+    }
+    npy_intp  shape[2] = {points.ndim, (npy_intp)points.n};
+    PyObject *places = PyArray_SimpleNew(2, shape, NPY_DOUBLE);
+    if (places == NULL || !places_in_parts(given ? &box : NULL, &points, cutoff, largest,
+                                           PyArray_DATA((PyArrayObject *)places), &axes)) {
+        Py_XDECREF(places);
+        return NULL;
+    }
+    PyObject *of_axes[3] = {PyTuple_New(points.ndim), PyTuple_New(points.ndim),
+                            PyTuple_New(points.ndim)};
+    bool      made = of_axes[0] != NULL && of_axes[1] != NULL && of_axes[2] != NULL;
+    for (int k = 0; made && k < points.ndim; k++) {
+        PyTuple_SET_ITEM(of_axes[0], k, PyBool_FromLong(axes.repeats[k]));
+        PyTuple_SET_ITEM(of_axes[1], k, PyFloat_FromDouble(axes.reach[k]));
+        PyTuple_SET_ITEM(of_axes[2], k, PyFloat_FromDouble(axes.width[k]));
+        made = !PyErr_Occurred();
+    }
+    if (!made) {
+        Py_DECREF(places);
+        for (int k = 0; k < 3; k++) {
+            Py_XDECREF(of_axes[k]);
+        }
+        return NULL;
+    }
+    return Py_BuildValue("(NNNN)", places, of_axes[0], of_axes[1], of_axes[2]);
 }

@@ -123,9 +123,12 @@ any_within(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
         !hs_position_of(self, arguments[0], position)) {
         return NULL;
     }
-    const bool      skips = arguments[2] != Py_None;
-    const hs_status status =
-        hs_dynamic_any_within(self->list, position, radius, skips ? &skip : NULL, &any, &failure);
+    const bool skips = arguments[2] != Py_None;
+    hs_status  status;
+    do {
+        status = hs_dynamic_any_within(self->list, position, radius, skips ? &skip : NULL, &any,
+                                       &failure);
+    } while (hs_py_dynamic_again(status));
     if (status != HS_OK) {
         const bool absent = skips && !hs_dynamic_has(self->list, skip);
         return hs_raise_dynamic(self, status, &failure, absent ? arguments[2] : NULL);
@@ -169,6 +172,7 @@ copy(PyObject *object, PyObject *ignored)
         return NULL;
     }
     made->list = list;
+    hs_dynamic_hook(list, &hs_py_dynamic_hooks);
     made->convert = Py_NewRef(self->convert);
     made->ndim = self->ndim;
     made->tagged = self->tagged;

@@ -21,6 +21,13 @@ typedef struct py_dynamic {
     double      max_radius;
 } py_dynamic;
 
+/* For queries that take long, and changes that wait for them: Ctrl-C, and the GIL. */
+extern const hs_dynamic_hooks hs_py_dynamic_hooks;
+
+/* Whether the query must be made again: it ended for a signal, whose handler has returned. Else the
+ * status stays, with an exception where that is HS_ERR_INTERRUPTED. */
+bool hs_py_dynamic_again(hs_status status);
+
 /* Each returns false with an exception set. */
 bool hs_key_of(const py_dynamic *self, PyObject *object, hs_key *key);
 bool hs_position_of(const py_dynamic *self, PyObject *object, double *position);

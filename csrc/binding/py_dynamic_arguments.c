@@ -163,7 +163,9 @@ raise_far(const hs_failure *failure)
         PyOS_snprintf(name, sizeof name, "positions[%lld]", (long long)failure->row);
     }
     PyErr_Format(PyExc_OverflowError,
-                 "%s lies 2**51 boxes away, or more: wrap it into the box first", name);
+                 "%s lies 2**51 boxes away, or more, if only in a direction in which a box that "
+                 "is oblique to it does not repeat: wrap it into the box first",
+                 name);
     return NULL;
 }
 

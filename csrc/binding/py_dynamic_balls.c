@@ -24,7 +24,53 @@ typedef struct gathered {
     int64_t           n, capacity;
     bool              with_shift;
     hs_status         status; /* why the visit ended, if early */
+    PyThreadState    *thread; /* NULL: this thread has the GIL */
+    clock_t           looked; /* for signals, where it has not */
 } gathered;
+
+/* An hs_poll_fn: false on Ctrl-C. No handler is run, as that might use the list: it is left first.
+ * user: a gathered, or NULL. */
+static bool
+poll_signals(void *user, double fraction)
+{
+    gathered *found = user;
+    (void)fraction;
+    if (found != NULL && found->thread != NULL) {
+        if (clock() - found->looked < CLOCKS_PER_SEC / SIGNALS_PER_SECOND) {
+            return true;
+        }
+        found->looked = clock();
+        PyEval_RestoreThread(found->thread);
+    }
+    const bool is_interrupted = PyOS_InterruptOccurred() != 0;
+    if (is_interrupted) {
+        PyErr_SetInterrupt(); /* for the look at signals that follows */
+    }
+    if (found != NULL && found->thread != NULL) {
+        found->thread = PyEval_SaveThread();
+    }
+    return !is_interrupted;
+}
+
+static void *
+give_up_gil(void)
+{
+    return PyEval_SaveThread();
+}
+
+static void
+take_gil(void *thread)
+{
+    PyEval_RestoreThread(thread);
+}
+
+const hs_dynamic_hooks hs_py_dynamic_hooks = {poll_signals, give_up_gil, take_gil};
+
+bool
+hs_py_dynamic_again(hs_status status)
+{
+    return status == HS_ERR_INTERRUPTED && PyErr_CheckSignals() == 0;
+}
 
 static bool
 grow(gathered *found)
@@ -125,10 +171,13 @@ ask(const py_dynamic *self, PyObject *const *arguments, bool is_near, bool with_
         !hs_position_of(self, arguments[0], position)) {
         return NULL;
     }
-    const hs_status status =
-        is_near
-            ? hs_dynamic_near(self->list, position, radius, take, &found, &failure)
-            : hs_dynamic_within(self->list, position, radius, with_shift, take, &found, &failure);
+    hs_status status;
+    do {
+        found.n = 0;
+        status = is_near ? hs_dynamic_near(self->list, position, radius, take, &found, &failure)
+                         : hs_dynamic_within(self->list, position, radius, with_shift, take, &found,
+                                             &failure);
+    } while (hs_py_dynamic_again(status));
     PyObject *result = result_of(&found, status, &failure);
     free_found(&found);
     return result;
@@ -155,24 +204,30 @@ static hs_status
 ask_rows(const py_dynamic *self, const double *rows, int64_t n, double radius, int64_t *offsets,
          gathered *found, hs_failure *failure)
 {
-    hs_status      status = HS_OK;
-    clock_t        looked = clock();
-    PyThreadState *thread = PyEval_SaveThread();
+    hs_status status = HS_OK;
+    found->looked = clock();
+    found->thread = PyEval_SaveThread();
     offsets[0] = 0;
     for (int64_t q = 0; q < n && status == HS_OK && found->status == HS_OK; q++) {
         status = hs_dynamic_within(self->list, rows + q * self->ndim, radius, found->with_shift,
                                    take, found, failure);
         failure->row = status != HS_OK ? q : failure->row;
         offsets[q + 1] = found->n;
-        if (q % CLOCK_ROWS == CLOCK_ROWS - 1 &&
-            clock() - looked > CLOCKS_PER_SEC / SIGNALS_PER_SECOND) {
-            looked = clock();
-            PyEval_RestoreThread(thread);
-            status = PyErr_CheckSignals() == 0 ? status : HS_ERR_INTERRUPTED;
-            thread = PyEval_SaveThread();
+        const bool is_time = q % CLOCK_ROWS == CLOCK_ROWS - 1 &&
+                             clock() - found->looked > CLOCKS_PER_SEC / SIGNALS_PER_SECOND;
+        if (is_time || status == HS_ERR_INTERRUPTED) {
+            found->looked = clock();
+            PyEval_RestoreThread(found->thread);
+            if (PyErr_CheckSignals() != 0) {
+                status = HS_ERR_INTERRUPTED;
+            } else if (status == HS_ERR_INTERRUPTED) { /* this row once more */
+                status = HS_OK;
+                found->n = offsets[q--];
+            }
+            found->thread = PyEval_SaveThread();
         }
     }
-    PyEval_RestoreThread(thread);
+    PyEval_RestoreThread(found->thread);
     return status;
 }
 

@@ -63,6 +63,7 @@ hs_py_dynamic_new(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
         return NULL;
     }
     self->list = list;
+    hs_dynamic_hook(list, &hs_py_dynamic_hooks);
     self->convert = Py_NewRef(arguments[8]);
     self->ndim = options.ndim;
     self->tagged = PyObject_IsTrue(arguments[7]) == 1;

@@ -122,6 +122,8 @@ hs_py_single hs_py_cache_held;
 hs_py_search hs_py_box_measure;
 /* points, box, periodic -> (wrapped, shifts). */
 hs_py_search hs_py_box_wrap;
+/* points, box or None, periodic, cutoff, largest -> (places, repeats, reach, width). */
+hs_py_search hs_py_box_places;
 
 /* py_verlet.c. A new list. */
 hs_py_single hs_py_verlet_new;

@@ -66,7 +66,7 @@ padded(hs_py_call *call, hs_status status, int64_t n_pairs)
 {
     const int64_t capacity = call->arrays.capacity;
     const bool    fits = status == HS_OK, is_one = strlen(call->letters) == 1;
-    const int64_t needed = fits ? n_pairs : (int64_t)call->failure.expected_pairs;
+    const int64_t needed = fits ? n_pairs : hs_pairs_needed(&call->failure);
     PyObject     *result = NULL;
     if (fits || (status == HS_ERR_CAPACITY && call->capacity < 0)) {
         const hs_points *asking = call->among.queries != NULL ? &call->queries : &call->points;

@@ -112,7 +112,7 @@ def pairs(
     cutoff : float
         As in `halfshell.bricks`; in the unit of `points`.
     n : int, optional
-        Number of bricks. Default: the number of chunks of `points`.
+        Number of bricks, 1 to 2**20. Default: the number of chunks of `points`.
     box, periodic
         As in `halfshell.pairs`.
     quantities : str, default "ij"

@@ -27,6 +27,9 @@ __all__ = ["neighbor_list", "radius", "radius_graph"]
 
 Tensor = Any  # torch.Tensor, also for type checkers where torch is not installed
 
+_HALVES = (torch.float16, torch.bfloat16)
+_FLOATS = (*_HALVES, torch.float32, torch.float64)
+
 
 def neighbor_list(
     positions: Tensor,
@@ -43,9 +46,9 @@ def neighbor_list(
 
     Parameters
     ----------
-    positions : Tensor of float32 or float64, shape (n, d)
-        Coordinates on the CPU, any length unit, 1 <= d <= 8. They are searched as they are,
-        without a copy if they are contiguous.
+    positions : Tensor of float64, float32, float16 or bfloat16, shape (n, d)
+        Coordinates on the CPU, any length unit, 1 <= d <= 8. They are searched as they are, without
+        a copy if they are contiguous and not halves, which float32 holds exactly.
     cutoff : float
         Largest distance of a pair, in the unit of `positions`; finite, not negative.
     box : float, array_like or Tensor, shape (d,), (d, d) or (s, d, d), or Box, optional
@@ -135,8 +138,8 @@ def radius_graph(
 
     Parameters
     ----------
-    x : Tensor of float32 or float64, shape (n, d) or (n,)
-        Coordinates on the CPU.
+    x : Tensor of floats, shape (n, d) or (n,)
+        Coordinates on the CPU, as `positions` of `neighbor_list`.
     r : float
         A distance, in the unit of `x`; edges are shorter than this.
     batch : Tensor of int, shape (n,), optional
@@ -144,8 +147,9 @@ def radius_graph(
     loop : bool, default False
         Whether each point has an edge to itself.
     max_num_neighbors : int, optional
-        Maximum number of edges of a point, not counting loops. If a point has more, this raises an
-        error; edges are never dropped. Default: any number.
+        Maximum number of edges of a point, not counting loops. If a point has more, this raises
+        `CapacityError`; edges are never dropped, while PyTorch Geometric keeps some. Default: any
+        number.
     flow : {"source_to_target", "target_to_source"}, default "source_to_target"
         The row of the result that holds the points, while the other holds their neighbours: the
         second row for "source_to_target", the first for "target_to_source".
@@ -190,8 +194,8 @@ def radius(
 
     Parameters
     ----------
-    x, y : Tensor of float32 or float64, shape (n, d) and (q, d), or (n,) and (q,)
-        Coordinates on the CPU.
+    x, y : Tensor of floats, shape (n, d) and (q, d), or (n,) and (q,)
+        Coordinates on the CPU, as `positions` of `neighbor_list`.
     r : float
         A distance, in the unit of `x`.
     batch_x, batch_y : Tensor of int, shape (n,) and (q,), optional
@@ -234,10 +238,16 @@ def _check_tensor(value: Any, name: str) -> None:
         raise TypeError(f"{name} must be dense, got layout {value.layout}")
 
 
+def _check_floats(value: Tensor, name: str) -> None:
+    if value.dtype not in _FLOATS:
+        raise TypeError(
+            f"{name} must be of float64, float32, float16 or bfloat16, got {value.dtype}"
+        )
+
+
 def _check_points(value: Any, name: str) -> None:
     _check_tensor(value, name)
-    if value.dtype not in (torch.float32, torch.float64):
-        raise TypeError(f"{name} must be of float32 or float64, got {value.dtype}")
+    _check_floats(value, name)
     if value.ndim != 2:
         raise ValueError(f"{name} must have shape (n, d), got {tuple(value.shape)}")
 
@@ -274,8 +284,7 @@ def _as_box(box: Any) -> Tensor | None:
         return None
     if isinstance(box, torch.Tensor):
         _check_tensor(box, "box")
-        if box.dtype not in (torch.float32, torch.float64):
-            raise TypeError(f"box must be of float32 or float64, got {box.dtype}")
+        _check_floats(box, "box")
         return box
     return torch.tensor(np.asarray(box.vectors if isinstance(box, Box) else box, np.float64))
 
@@ -304,7 +313,10 @@ def _lengths(D: Tensor) -> Tensor:
 
 
 def _array(tensor: Tensor | None) -> Any:
-    return None if tensor is None else tensor.detach().numpy()
+    if tensor is None:
+        return None
+    tensor = tensor.detach()
+    return (tensor.float() if tensor.dtype in _HALVES else tensor).numpy()
 
 
 def _find_neighbors(
@@ -318,9 +330,7 @@ def _find_neighbors(
     return tuple(torch.from_numpy(x if x.flags.writeable else x.copy()) for x in found)
 
 
-def _find_graph(
-    x: Tensor, r: float, batch: Tensor | None, loop: bool, most: int | None
-) -> Tensor:
+def _find_graph(x: Tensor, r: float, batch: Tensor | None, loop: bool, most: int | None) -> Tensor:
     i, j, _ = entries_of(_array(x), r, None, None, _array(batch), False, False)
     check_rows(i, most)
     if loop:

@@ -11,7 +11,7 @@ changed, and judged by the C tests that reach its function, quick ones first, th
 that reach its file, until one fails, crashes or takes far longer than it should. --binding changes
 csrc/binding instead: mutants_python.py has the Python tests judge. Uses $CC, or cc; "ccache gcc"
 makes the first build quick. $MUTANT_FLAGS: further flags for the core; with
--fsanitize=address,undefined the sanitizers judge too, in several times as long.
+-fsanitize=address,undefined,float-cast-overflow the sanitizers judge too, in several times as long.
 
 Prints a line for each mutant, and the rate at the end:
 

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* api_box.c: the public functions of a box alone: measure and wrap. */
+/* api_box.c: the public functions of a box alone: measure, wrap and places. */
 #include "../../halfshell.h"
 
 #include "arguments.h"
 #include "../box/lattice.h"
 #include "../scene/points.h"
+#include "../scene/unit.h"
 #include "../threads/call.h"
 #include "../box/wrap.h"
 
@@ -173,6 +174,191 @@ hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped, int64_t
         status = wrap_rows(&lattice, scale, &cloud, NULL, NULL, failure);
         if (status == HS_OK) {
             status = wrap_rows(&lattice, scale, &cloud, wrapped, shift, failure);
+        }
+        hs_cloud_free(NULL, &cloud);
+    }
+    hs_leave(&entry);
+    return status;
+}
+
+/* Places are computed with an error of less than this part of their terms, at most nine products.
+ * So are sums of a place and a reach. */
+#define PLACE_ERROR 0x1p-46
+/* More than what is lost where products vanish. */
+#define PLACE_LOSS 0x1p-1000
+/* Entries of a box that lie further apart are not scaled together without loss. */
+#define SCALED_TOGETHER 1000
+/* Widths only say which side is longer. */
+#define LARGEST_WIDTH 0x1p900
+
+/* Along grid axis k a point is at the fractional part of `along[k]` . point, or, on an open axis,
+ * at that product itself. An aligned lattice divides, which loses nothing far from the box. */
+typedef struct place_axes {
+    const hs_lattice *lattice;
+    hs_scale          scale[HS_MAX_DIM]; /* of points, for each axis */
+    double            along[HS_MAX_DIM][HS_MAX_DIM];
+    double            size[HS_MAX_DIM];   /* the sum of the |along[k][c]| */
+    double            length[HS_MAX_DIM]; /* not scaled; aligned lattices only */
+} place_axes;
+
+/* A bound on |along[k] . B_r|, which is 0 but for rounding, or on its difference from 1. */
+static double
+rest_along(const place_axes *axes, int k, int r)
+{
+    const hs_lattice *lattice = axes->lattice;
+    double            sum = lattice->row_of_axis[k] == r ? -1.0 : 0.0;
+    double            terms = fabs(sum);
+    for (int c = 0; c < lattice->ndim; c++) {
+        const double term = axes->along[k][c] * lattice->rows[r][c];
+        sum += term;
+        terms += fabs(term);
+    }
+    return fabs(sum) + PLACE_ERROR * terms + axes->size[k] * lattice->row_error[r] + PLACE_LOSS;
+}
+
+/*
+ * How far shifts may move the places of a pair, in the unit of box vectors, because along[k] is
+ * rounded: the sum over rows r of |S_r| rest(k, r). For D = x_j - x_i + sum_r S_r B_r with
+ * |D| <= cutoff and |x| <= largest, |S_r| <= a_r + sum_m rest(r, m) |S_m| with a_r = size_r (cutoff + 2 largest).
+ * Where the sum over m of rest(r, m) 2 a_m is at most a_r, as is checked, |S_r| <= 2 a_r follows.
+ */
+static void
+bound_drifts(const place_axes *axes, double cutoff, double largest, double *drift)
+{
+    const hs_lattice *lattice = axes->lattice;
+    double            turns[HS_MAX_DIM] = {0}; /* 2 a_r; less than 1 turn is none */
+    bool              holds = true;
+    for (int k = 0; k < lattice->ndim; k++) {
+        if (lattice->row_of_axis[k] >= 0) {
+            turns[lattice->row_of_axis[k]] = 2.0 * axes->size[k] * (cutoff + 2.0 * largest);
+        }
+    }
+    for (int k = 0; k < lattice->ndim; k++) {
+        double of_all = 0.0;
+        drift[k] = 0.0;
+        for (int r = 0; r < lattice->n_periodic; r++) {
+            const double moved = rest_along(axes, k, r) * turns[r];
+            of_all += moved;
+            drift[k] += turns[r] < 0.5 ? 0.0 : moved;
+        }
+        holds = holds &&
+                (lattice->row_of_axis[k] < 0 || of_all <= 0.25 * turns[lattice->row_of_axis[k]]);
+    }
+    for (int k = 0; k < lattice->ndim; k++) {
+        drift[k] = holds ? drift[k] : INFINITY;
+    }
+}
+
+/* box_exponent, unit: lengths of the lattice and of open axes are scaled by these. */
+static void
+set_place_axes(const hs_lattice *lattice, int box_exponent, int unit, double cutoff, double largest,
+               place_axes *axes, hs_box_axes *found)
+{
+    const hs_scale to_box = hs_scale_of(box_exponent), to_unit = hs_scale_of(unit);
+    double         drift[HS_MAX_DIM] = {0};
+    axes->lattice = lattice;
+    for (int k = 0; k < lattice->ndim; k++) {
+        const bool   repeats = lattice->row_of_axis[k] >= 0;
+        const double over = repeats ? lattice->period[k] : 1.0;
+        axes->scale[k] = repeats ? to_box : to_unit;
+        axes->length[k] = hs_scale_apply(hs_scale_of(-box_exponent), lattice->period[k]);
+        axes->size[k] = 0.0;
+        for (int c = 0; c < lattice->ndim; c++) {
+            axes->along[k][c] = lattice->normal[k][c] / over;
+            axes->size[k] += fabs(axes->along[k][c]);
+        }
+    }
+    if (!lattice->aligned) {
+        bound_drifts(axes, hs_scale_apply(to_box, cutoff), hs_scale_apply(to_box, largest), drift);
+    }
+    for (int k = 0; k < lattice->ndim; k++) {
+        const bool   repeats = lattice->row_of_axis[k] >= 0;
+        const double far = hs_scale_apply(axes->scale[k], largest) * axes->size[k];
+        const double terms = repeats && lattice->aligned ? 1.0 : far + 1.0;
+        double       reach = hs_scale_apply(axes->scale[k], cutoff), square = 0.0;
+        for (int c = 0; c < lattice->ndim; c++) {
+            square += lattice->normal[k][c] * lattice->normal[k][c];
+        }
+        if (repeats && lattice->aligned) {
+            reach = cutoff / axes->length[k];
+        } else {
+            reach *= sqrt(square);
+            reach /= repeats ? lattice->period[k] : 1.0;
+        }
+        reach = reach * (1.0 + PLACE_ERROR) + PLACE_ERROR * terms;
+        reach += repeats ? drift[k] : ldexp(drift[k], box_exponent - unit);
+        found->repeats[k] = repeats;
+        found->reach[k] = isfinite(reach) ? reach : INFINITY;
+        found->width[k] = repeats ? ldexp(lattice->period[k], box_exponent - unit) : 1.0;
+        found->width[k] = fmin(fmax(found->width[k], 1.0 / LARGEST_WIDTH), LARGEST_WIDTH);
+    }
+}
+
+/* The places of all points along axis k. */
+static void
+set_places(const place_axes *axes, const hs_cloud *cloud, int k, double *places)
+{
+    const hs_lattice *lattice = axes->lattice;
+    const bool        repeats = lattice->row_of_axis[k] >= 0;
+    const double      length = axes->length[k];
+    for (int64_t i = 0; i < cloud->n; i++) {
+        double place = 0.0;
+        if (repeats && lattice->aligned) {
+            const double x = cloud->x[k][i];
+            place = (fabs(x) < length ? x : fmod(x, length)) / length;
+        } else {
+            for (int c = 0; c < lattice->ndim; c++) {
+                place += axes->along[k][c] * hs_scale_apply(axes->scale[k], cloud->x[c][i]);
+            }
+        }
+        places[i] = repeats && !(place >= 0.0 && place < 1.0) ? place - floor(place) : place;
+    }
+}
+
+hs_status
+hs_box_places(const hs_box *box, const hs_points *points, double cutoff, double largest,
+              double *places, int64_t stride, hs_box_axes *found, hs_failure *failure)
+{
+    hs_options options = hs_options_default();
+    hs_entry   entry;
+    hs_lattice lattice;
+    hs_cloud   cloud;
+    place_axes axes;
+    options.cutoff = cutoff;
+    failure = hs_enter(failure, &entry);
+    hs_status status = found != NULL && largest >= 0.0 && isfinite(largest)
+                           ? hs_check_arguments(points, NULL, box, &options, failure)
+                           : HS_ERR_ARGUMENT;
+    if (status == HS_OK && !(cutoff >= 0.0 && isfinite(cutoff))) {
+        failure->value = cutoff;
+        status = HS_ERR_CUTOFF;
+    }
+    if (status == HS_OK) {
+        status = hs_box_check(box, failure);
+    }
+    if (status == HS_OK) {
+        status = hs_cloud_load(NULL, NULL, points, &options, &cloud, failure);
+    }
+    if (status == HS_OK && cloud.largest > largest) {
+        hs_cloud_free(NULL, &cloud);
+        status = HS_ERR_ARGUMENT;
+    }
+    if (status == HS_OK) {
+        const hs_box_size size = hs_box_size_of(box);
+        const double      longest = largest > 0.0 ? largest : cutoff;
+        const int         exponent = size.is_coupled ? hs_exponent_of(size.largest) : 0;
+        const int         unit = longest > 0.0 ? hs_exponent_of(longest) : 0;
+        const bool        is_lost = size.is_coupled &&
+                             exponent - hs_exponent_of(size.smallest) > SCALED_TOGETHER;
+        hs_lattice_init(is_lost ? NULL : box, points->ndim, hs_scale_of(exponent), &lattice);
+        set_place_axes(&lattice, exponent, unit, cutoff, largest, &axes, found);
+        for (int k = 0; k < points->ndim; k++) {
+            found->reach[k] = is_lost ? INFINITY : found->reach[k];
+            if (places != NULL && isfinite(found->reach[k])) {
+                set_places(&axes, &cloud, k, places + k * stride);
+            } else if (places != NULL) {
+                memset(places + k * stride, 0, (size_t)cloud.n * sizeof *places);
+            }
         }
         hs_cloud_free(NULL, &cloud);
     }

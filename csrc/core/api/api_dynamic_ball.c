@@ -36,9 +36,10 @@ hs_dynamic_near(const hs_dynamic *list, const double *position, double radius, h
         return HS_ERR_ARGUMENT;
     }
     const hs_dynamic_call call = hs_dynamic_enter(list, false);
-    const hs_status       status = open_ball(list, position, radius, own, &ball, failure);
+    hs_status             status = open_ball(list, position, radius, own, &ball, failure);
     if (status == HS_OK) {
         hs_ball_near(&ball, &each);
+        status = ball.status;
     }
     hs_dynamic_leave(list, call);
     return status;
@@ -60,6 +61,7 @@ hs_dynamic_within(const hs_dynamic *list, const double *position, double radius,
     hs_status             status = open_exact(list, position, radius, own, &ball, failure);
     if (status == HS_OK) {
         (void)hs_ball_within(&ball, &each);
+        status = ball.status;
     }
     hs_dynamic_leave(list, call);
     return status;
@@ -89,6 +91,7 @@ hs_dynamic_any_within(const hs_dynamic *list, const double *position, double rad
     }
     if (status == HS_OK) {
         *any = hs_ball_within(&ball, &first);
+        status = ball.status;
     }
     hs_dynamic_leave(list, call);
     return status;

@@ -112,20 +112,28 @@ hs_dynamic_keys(const hs_dynamic *list, int64_t *cursor, hs_key *keys, int64_t n
 void
 hs_dynamic_hold(hs_dynamic *list)
 {
-    if (list != NULL) {
-        hs_gate_write(&list->gate);
+    if (list != NULL && hs_gate_hold(&list->gate)) {
         list->held_env = hs_fpenv_enter();
-        list->is_held = true;
     }
 }
 
 void
 hs_dynamic_release(hs_dynamic *list)
 {
-    if (list != NULL && list->is_held) {
-        list->is_held = false;
-        hs_fpenv_leave(list->held_env);
-        hs_gate_write_end(&list->gate);
+    if (list != NULL && hs_gate_is_mine(&list->gate)) {
+        const hs_fpenv env = list->held_env;
+        hs_gate_release(&list->gate);
+        hs_fpenv_leave(env);
+    }
+}
+
+void
+hs_dynamic_hook(hs_dynamic *list, const hs_dynamic_hooks *hooks)
+{
+    if (list != NULL) {
+        list->hooks = hooks != NULL ? *hooks : (hs_dynamic_hooks){.poll = NULL};
+        list->gate.pause = list->hooks.pause;
+        list->gate.resume = list->hooks.resume;
     }
 }
 

@@ -10,20 +10,17 @@
 typedef struct hs_dynamic_call {
     hs_fpenv env;
     bool     writes;
+    bool     went_in; /* false: this thread holds the list */
 } hs_dynamic_call;
 
 /* Waits until the list may be used, and sets the rounding mode. */
 HS_ALWAYS_INLINE hs_dynamic_call
 hs_dynamic_enter(const hs_dynamic *list, bool writes)
 {
+    hs_gate        *gate = &((hs_dynamic *)list)->gate; /* it changes, the list does not */
     hs_dynamic_call call = {.writes = writes};
-    hs_dynamic     *self = (hs_dynamic *)list; /* its gate changes, the list does not */
-    if (!list->is_held) {
-        if (writes) {
-            hs_gate_write(&self->gate);
-        } else {
-            hs_gate_read(&self->gate);
-        }
+    call.went_in = writes ? hs_gate_write(gate) : hs_gate_read(gate);
+    if (call.went_in) {
         call.env = hs_fpenv_enter();
     }
     return call;
@@ -32,13 +29,13 @@ hs_dynamic_enter(const hs_dynamic *list, bool writes)
 HS_ALWAYS_INLINE void
 hs_dynamic_leave(const hs_dynamic *list, hs_dynamic_call call)
 {
-    hs_dynamic *self = (hs_dynamic *)list;
-    if (!list->is_held) {
+    hs_gate *gate = &((hs_dynamic *)list)->gate;
+    if (call.went_in) {
         hs_fpenv_leave(call.env);
         if (call.writes) {
-            hs_gate_write_end(&self->gate);
+            hs_gate_write_end(gate);
         } else {
-            hs_gate_read_end(&self->gate);
+            hs_gate_read_end(gate);
         }
     }
 }

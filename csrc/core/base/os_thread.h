@@ -26,6 +26,9 @@ typedef unsigned           hs_thread_result;
 #define HS_THREAD_CALL __stdcall
 typedef hs_thread_result(HS_THREAD_CALL *hs_thread_fn)(void *);
 
+#define HS_MUTEX_INIT     SRWLOCK_INIT
+#define HS_CONDITION_INIT CONDITION_VARIABLE_INIT
+
 #define hs_mutex_init(mutex)         InitializeSRWLock(mutex)
 #define hs_mutex_lock(mutex)         AcquireSRWLockExclusive(mutex)
 #define hs_mutex_unlock(mutex)       ReleaseSRWLockExclusive(mutex)
@@ -52,9 +55,10 @@ hs_thread_join(hs_thread thread)
     (void)CloseHandle(thread);
 }
 
-#define hs_nap()         Sleep(HS_NAP_MS)
-#define hs_thread_self() GetCurrentThreadId()
-#define hs_thread_is(id) (GetCurrentThreadId() == (id))
+#define hs_nap()           Sleep(HS_NAP_MS)
+#define hs_thread_self()   GetCurrentThreadId()
+#define hs_thread_is(id)   (GetCurrentThreadId() == (id))
+#define HS_THREAD_NUMBER() ((int64_t)GetCurrentThreadId()) /* not 0 */
 
 /* Windows has no signals to block. */
 typedef int hs_signals;
@@ -74,6 +78,9 @@ typedef pthread_t       hs_thread_id;
 typedef void           *hs_thread_result;
 #define HS_THREAD_CALL
 typedef hs_thread_result (*hs_thread_fn)(void *);
+
+#define HS_MUTEX_INIT     PTHREAD_MUTEX_INITIALIZER
+#define HS_CONDITION_INIT PTHREAD_COND_INITIALIZER
 
 #define hs_mutex_init(mutex)                ((void)pthread_mutex_init(mutex, NULL))
 #define hs_mutex_lock(mutex)                ((void)pthread_mutex_lock(mutex))
@@ -103,8 +110,9 @@ hs_nap(void)
     (void)nanosleep(&nap, NULL);
 }
 
-#define hs_thread_self() pthread_self()
-#define hs_thread_is(id) (pthread_equal(pthread_self(), (id)) != 0)
+#define hs_thread_self()   pthread_self()
+#define hs_thread_is(id)   (pthread_equal(pthread_self(), (id)) != 0)
+#define HS_THREAD_NUMBER() ((int64_t)(uintptr_t)pthread_self()) /* an address: not 0 */
 
 HS_ALWAYS_INLINE void
 hs_condition_wait_briefly(hs_condition *condition, hs_mutex *mutex)
@@ -136,6 +144,25 @@ hs_signals_restore(const hs_signals *saved)
     (void)pthread_sigmask(SIG_SETMASK, saved, NULL);
 }
 
+#endif
+
+/*
+ * How many forks lie between the process that loaded the library and this one. What outlives a call
+ * and is locked says by this number in which process: threads that were inside at a fork do not
+ * exist in the child, so there a lock with another number is free.
+ */
+extern volatile int64_t hs_n_forks;
+
+/* Sleeps until try_enter(lock) has succeeded, which is tried whenever a thread says that it has
+ * left one, and now and then: a wake-up that comes too early costs time only. All locks share a
+ * queue. */
+void hs_wait_for(bool (*try_enter)(void *lock), void *lock);
+void hs_wake_waiting(void);
+
+extern volatile int64_t hs_n_waiting; /* threads; hs_wake_waiting has nothing to do where it is 0 */
+
+#ifdef HS_TESTING
+void hs_test_fork(void); /* as if this process had just been forked off */
 #endif
 
 /* Numbers that several threads change, each function in one step. All threads see the steps of the

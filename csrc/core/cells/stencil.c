@@ -182,9 +182,14 @@ reach_along_row(const hs_scene *scene, const hs_grid *grid, const frame *axes, h
     }
     const double cells = grid->cells_per_length[0];
     const double reach = (double)grid->reach[0];
-    row->first = (int32_t)hs_larger(ceil(low * cells - 1.0 - 1e-5), -reach);
-    row->last = (int32_t)hs_smaller(floor(high * cells + 1.0 + 1e-5), reach);
-    return row->first <= row->last;
+    const double first = hs_larger(ceil(low * cells - 1.0 - 1e-5), -reach);
+    const double last = hs_smaller(floor(high * cells + 1.0 + 1e-5), reach);
+    if (!(first <= last)) { /* they may be beyond any integer */
+        return false;
+    }
+    row->first = (int32_t)first;
+    row->last = (int32_t)last;
+    return true;
 }
 
 /* The next offset in the order of the axes, the last axis slowest; false after the last one. */

@@ -36,19 +36,36 @@ set_thresholds(const hs_ball *ball, double a, hs_ball_image *image)
 }
 
 /*
- * What coordinates along the axes of a general box may be wrong by. X and P are rounded, by v of
- * themselves and what wrap.h says of their terms; so is the product with a normal, and the radius
- * by the normal's length. All of it together stays below 2^-44 of what goes into it.
+ * What coordinates in general boxes may be wrong by. X and P are rounded, by v of themselves and
+ * what wrap.h says of their terms; so is the product with a normal, and the radius by the normal's
+ * length. Far points must not matter to other balls: X is that of a point of which an image is
+ * within. Across the box it is within R of P then, and along its rows a few of them away at most,
+ * so |X_c| <= |P_c| + R + ROWS_AWAY sum_r |B_rc|, the last of which the leak stands for. In
+ * directions that the box does not move, X and P are what was given.
  */
 static double
-axis_error(const hs_ball *ball)
+wrapping_error(const hs_ball *ball)
+{
+    return 0x1p-90 * (ball->list->magnitude + ball->centre.magnitude);
+}
+
+static double
+coordinate_error(const hs_ball *ball)
 {
     const hs_dynamic *list = ball->list;
-    double            size = list->largest + list->spread + ball->radius;
-    for (int k = 0; k < list->lattice.ndim; k++) {
-        size += fabs(ball->centre.x[k]);
+    double            size = list->spread + ball->radius;
+    for (int c = 0; c < list->lattice.ndim; c++) {
+        size += list->moves[c] ? fabs(ball->centre.x[c]) : 0.0;
     }
-    return 0x1p-44 * size + 0x1p-90 * (list->magnitude + ball->centre.magnitude);
+    return 0x1p-48 * size + wrapping_error(ball);
+}
+
+static double
+axis_error(const hs_ball *ball, int k)
+{
+    const double size = 2.0 * ball->centre.terms[k] + HS_MAX_DIM * ball->radius;
+    return hs_axis_rounding(ball->list->lattice.ndim) * size + wrapping_error(ball) +
+           ball->list->axes.axis[k].leak;
 }
 
 HS_ALWAYS_INLINE hs_status
@@ -60,17 +77,18 @@ init_in(hs_ball *ball, const hs_dynamic *list, const double *position, hs_failur
         return status;
     }
     const double least = hs_larger(ball->radius, HS_LEAST_BALL);
-    ball->error = list->lattice.aligned ? 0.0 : axis_error(ball);
+    double       images = 1.0;
+    ball->error = list->lattice.aligned ? 0.0 : coordinate_error(ball);
     for (int k = 0; k < ndim; k++) {
-        const hs_axis *axis = &list->axes.axis[k];
-        const double   error = ball->error + axis->leak;
-        hs_axis_span(axis, ball->centre.t[k], ball->centre.index[k], least + error, error,
-                     &ball->span[k]);
+        const double error = list->lattice.aligned ? 0.0 : axis_error(ball, k);
+        hs_axis_span(&list->axes.axis[k], ball->centre.t[k], ball->centre.index[k], least + error,
+                     error, &ball->span[k]);
+        images *= (double)(ball->span[k].most - ball->span[k].least) + 1.0;
         ball->home.centre[k] = ball->centre.x[k];
         ball->home.image[k] = 0;
     }
     set_thresholds(ball, list->lattice.aligned ? 0.0 : ndim * ball->error, &ball->home);
-    return HS_OK;
+    return images <= HS_MOST_BALL_IMAGES ? HS_OK : HS_ERR_SHIFT_RANGE;
 }
 
 hs_status
@@ -80,6 +98,7 @@ hs_ball_init(hs_ball *ball, const hs_dynamic *list, const double *position, doub
     ball->list = list;
     ball->radius = radius;
     ball->skip = HS_NO_PLACE;
+    ball->status = HS_OK;
     if (!(radius >= 0.0 && radius <= list->max_radius)) {
         failure->value = radius;
         return HS_ERR_CUTOFF;
@@ -136,34 +155,38 @@ hs_ball_turn(const hs_ball *ball, const int64_t *image, hs_ball_image *turned)
             terms += fabs(term);
         }
         turned->centre[k] = sum;
-        size = hs_larger(terms, size);
+        size = list->moves[k] ? hs_larger(terms, size) : size;
     }
     /* Up to 2 d roundings of partial sums and products, each at most v of the terms. */
     const double error = 0x1p-48 * size + ball->error + times * list->row_error;
     set_thresholds(ball, d * error, turned);
 }
 
-void
-hs_ball_shift(const hs_ball *ball, const hs_ball_image *image, uint32_t place, int64_t *shift)
+bool
+hs_ball_shift(hs_ball *ball, const hs_ball_image *image, uint32_t place, int64_t *shift)
 {
     const hs_lattice *lattice = &ball->list->lattice;
     int64_t           reduced[HS_MAX_DIM], given[HS_MAX_DIM];
     memset(shift, 0, (size_t)lattice->ndim * sizeof *shift);
     if (lattice->n_periodic == 0) {
-        return;
+        return true;
     }
     turns_of(ball->list, place, reduced);
     for (int r = 0; r < lattice->n_periodic; r++) {
         reduced[r] = image->image[r] + ball->centre.turns[r] - reduced[r];
     }
-    (void)hs_lattice_shift(lattice, reduced, given); /* each term was a turn that had one */
+    if (!hs_lattice_shift(lattice, reduced, given)) {
+        ball->status = HS_ERR_SHIFT_RANGE;
+        return false;
+    }
     for (int l = 0; l < lattice->n_periodic; l++) {
         shift[lattice->vector_of_row[l]] = given[l];
     }
+    return true;
 }
 
 bool
-hs_ball_settle(const hs_ball *ball, const hs_ball_image *image, uint32_t place)
+hs_ball_settle(hs_ball *ball, const hs_ball_image *image, uint32_t place)
 {
     const hs_dynamic *list = ball->list;
     const hs_lattice *lattice = &list->lattice;
@@ -179,7 +202,9 @@ hs_ball_settle(const hs_ball *ball, const hs_ball_image *image, uint32_t place)
                                 image->image, &stages);
     }
     int64_t over_box[HS_MAX_DIM], shift[HS_MAX_DIM];
-    hs_ball_shift(ball, image, place, over_box);
+    if (!hs_ball_shift(ball, image, place, over_box)) {
+        return false;
+    }
     for (int l = 0; l < lattice->n_periodic; l++) {
         shift[l] = over_box[lattice->vector_of_row[l]];
     }

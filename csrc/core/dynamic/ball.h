@@ -12,6 +12,9 @@
 /* Radius for cells in place of a smaller one: its square is not 0. */
 #define HS_LEAST_BALL 0x1p-400
 
+/* That one ball looks at: those of new_list.c, and the images that a far centre adds. */
+#define HS_MOST_BALL_IMAGES 0x1p24
+
 /* The centre as entries see it that have been moved by `image`: centre - image * B. */
 typedef struct hs_ball_image {
     double  centre[HS_MAX_DIM];
@@ -23,8 +26,9 @@ typedef struct hs_ball {
     const hs_dynamic *list;
     double            radius;
     hs_placed         centre;
-    double            error; /* of coordinates along the axes; 0 in aligned boxes */
-    uint32_t          skip;  /* place of an entry, or HS_NO_PLACE */
+    double            error;  /* of each coordinate of X and P together; 0 in aligned boxes */
+    uint32_t          skip;   /* place of an entry, or HS_NO_PLACE */
+    hs_status         status; /* of the walk: HS_ERR_SHIFT_RANGE, HS_ERR_INTERRUPTED */
     hs_span_of_cells  span[HS_MAX_DIM];
     hs_ball_image     home; /* no image */
 } hs_ball;
@@ -48,9 +52,10 @@ bool hs_ball_skips(const hs_ball *ball, const hs_ball_image *image);
 void hs_ball_turn(const hs_ball *ball, const int64_t *image, hs_ball_image *turned);
 
 /* Decides for an entry that the thresholds left open. */
-bool hs_ball_settle(const hs_ball *ball, const hs_ball_image *image, uint32_t place);
+bool hs_ball_settle(hs_ball *ball, const hs_ball_image *image, uint32_t place);
 
-/* S of an entry over the box vectors: ndim integers, 0 where the box does not repeat. */
-void hs_ball_shift(const hs_ball *ball, const hs_ball_image *image, uint32_t place, int64_t *shift);
+/* S of an entry over the box vectors: ndim integers, 0 where the box does not repeat. False where
+ * it passes 2^62: ball->status says so then. */
+bool hs_ball_shift(hs_ball *ball, const hs_ball_image *image, uint32_t place, int64_t *shift);
 
 #endif

@@ -6,7 +6,7 @@
 
 #include "ball.h"
 
-#include <float.h>
+#include "../base/poll.h"
 
 /* What is known of one index along one axis. */
 typedef struct part {
@@ -21,10 +21,31 @@ typedef struct ball_walk {
     const hs_ball_visit *visit;
     double               limit;   /* cells with larger gaps are beyond the radius */
     bool                 is_near; /* no distances: each entry once */
+    bool                 filters; /* cells may hold entries that are none of the ball's cells */
+    unsigned             cut;     /* bit k: each cell in one image, where it is nearest */
+    int64_t              work;    /* entries and cells since the last poll */
     bool                 meets_images;
     hs_ball_image        turned; /* the last image but home, if there is one */
     bool                 has_turned;
 } ball_walk;
+
+/* At most the square of the distance to cell u along axis k. */
+HS_ALWAYS_INLINE double
+gap_of(const ball_walk *walk, int k, int64_t u)
+{
+    const hs_axis *axis = &walk->ball->list->axes.axis[k];
+    const double   t = walk->ball->centre.t[k];
+    const int64_t  centre = walk->ball->span[k].centre;
+    if (!walk->ball->list->lattice.aligned) {
+        return 0.0;
+    }
+    double gap = hs_axis_gap(axis, t, u, centre);
+    if (HS_UNLIKELY(walk->cut >> k & 1u)) {
+        gap = hs_smaller(hs_axis_gap(axis, t, u - axis->n, centre), gap);
+        gap = hs_smaller(hs_axis_gap(axis, t, u + axis->n, centre), gap);
+    }
+    return gap;
+}
 
 HS_ALWAYS_INLINE part
 part_of(const ball_walk *walk, int k, int64_t u)
@@ -33,15 +54,49 @@ part_of(const ball_walk *walk, int k, int64_t u)
     const hs_axis    *axis = &list->axes.axis[k];
     part              p = {.image = hs_axis_image(axis, u)};
     p.index = u - p.image * axis->n;
-    if (list->lattice.aligned && walk->limit < DBL_MAX) {
-        p.gap = hs_axis_gap(axis, walk->ball->centre.t[k], u, walk->ball->span[k].centre);
-    }
+    p.gap = gap_of(walk, k, u);
     if (!list->cells.dense) {
         p.number = hs_cell_part(k, p.index);
     } else { /* the span of the ball has been cut to the table's */
         p.number = (uint64_t)((p.index - list->cells.lowest[k]) * list->cells.stride[k]);
     }
     return p;
+}
+
+/* Whether the cell of an entry is one that the ball meets: sparse cells may hold those of others,
+ * whose indices are the same modulo 2^32. */
+static bool
+is_met(const ball_walk *walk, uint32_t place)
+{
+    const hs_dynamic *list = walk->ball->list;
+    const double     *x = hs_entry_at(&list->entries, place);
+    double            gap = 0.0;
+    for (int k = 0; k < list->lattice.ndim; k++) {
+        const hs_axis          *axis = &list->axes.axis[k];
+        const hs_span_of_cells *span = &walk->ball->span[k];
+        int64_t                 u = hs_axis_cell(axis, hs_lattice_coordinate(&list->lattice, x, k));
+        u += axis->n * hs_axis_image(axis, span->first - u + axis->n - 1);
+        if (u < span->first || u > span->last) {
+            return false;
+        }
+        gap += gap_of(walk, k, u);
+    }
+    return gap <= walk->limit;
+}
+
+/* Whether to go on, after so much more work. */
+HS_ALWAYS_INLINE bool
+goes_on(ball_walk *walk, int64_t work)
+{
+    const hs_dynamic *list = walk->ball->list;
+    walk->work += work;
+    if (HS_UNLIKELY(walk->work > HS_POLL_POINTS)) {
+        walk->work = 0;
+        if (list->hooks.poll != NULL && !list->hooks.poll(walk->visit->user, 0.0)) {
+            walk->ball->status = HS_ERR_INTERRUPTED;
+        }
+    }
+    return walk->ball->status == HS_OK;
 }
 
 HS_ALWAYS_INLINE bool
@@ -51,8 +106,8 @@ tell(const ball_walk *walk, const hs_ball_image *image, uint32_t place)
     const hs_entry_tail *tail = hs_entry_tail_at(&list->entries, place);
     const double        *given = hs_entry_given(&list->entries, place);
     int64_t              shift[HS_MAX_DIM];
-    if (walk->visit->with_shift) {
-        hs_ball_shift(walk->ball, image, place, shift);
+    if (walk->visit->with_shift && !hs_ball_shift(walk->ball, image, place, shift)) {
+        return true;
     }
     return walk->visit->fn((hs_key){tail->id, tail->tag}, isnan(given[0]) ? NULL : given,
                            walk->visit->with_shift ? shift : NULL, walk->visit->user) != 0;
@@ -63,10 +118,10 @@ tell(const ball_walk *walk, const hs_ball_image *image, uint32_t place)
 HS_ALWAYS_INLINE bool
 scan_entry(const ball_walk *walk, const hs_ball_image *image, uint32_t place, const int ndim)
 {
-    const hs_ball *ball = walk->ball;
-    const double  *x = hs_entry_at(&ball->list->entries, place);
-    double         square = 0.0;
-    int            k = 0;
+    hs_ball      *ball = walk->ball;
+    const double *x = hs_entry_at(&ball->list->entries, place);
+    double        square = 0.0;
+    int           k = 0;
     do {
         const double difference = x[k] - image->centre[k];
         square += difference * difference;
@@ -78,21 +133,22 @@ scan_entry(const ball_walk *walk, const hs_ball_image *image, uint32_t place, co
         return false;
     }
     if (!(square < image->in) && !hs_ball_settle(ball, image, place)) {
-        return false;
+        return ball->status != HS_OK;
     }
     return walk->visit->fn == NULL || tell(walk, image, place);
 }
 
 /* Entries of one cell in one image; whether to stop. */
 HS_ALWAYS_INLINE bool
-scan_cell(const ball_walk *walk, const hs_ball_image *image, hs_cell cell, const int ndim)
+scan_cell(ball_walk *walk, const hs_ball_image *image, hs_cell cell, const int ndim)
 {
     for (uint32_t place = cell.start; place < cell.start + cell.count; place++) {
-        if (walk->is_near ? tell(walk, image, place) : scan_entry(walk, image, place, ndim)) {
+        if (walk->is_near ? !(walk->filters && !is_met(walk, place)) && tell(walk, image, place)
+                          : scan_entry(walk, image, place, ndim)) {
             return true;
         }
     }
-    return false;
+    return !goes_on(walk, 1 + (int64_t)cell.count);
 }
 
 /* The image of these parts. */

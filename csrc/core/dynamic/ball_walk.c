@@ -140,7 +140,8 @@ walk_by_index(ball_walk *walk)
             index[k] = parts[k].index;
             along[k] = parts[k].image;
         }
-        if (gap <= walk->limit && scan_number(walk, number, index, along, d)) {
+        if ((gap <= walk->limit && scan_number(walk, number, index, along, d)) ||
+            !goes_on(walk, 1)) {
             return true;
         }
         int k = d - 1;
@@ -175,9 +176,11 @@ static bool
 walk_all(ball_walk *walk)
 {
     const hs_span_of_cells *span = walk->ball->span;
-    const int               d = walk->ball->list->lattice.ndim;
+    const hs_dynamic       *list = walk->ball->list;
+    const int               d = list->lattice.ndim;
     int64_t                 along[HS_MAX_DIM];
     if (walk->is_near) {
+        walk->filters = list->storage != HS_STORE_ALL_PAIRS;
         return scan_all(walk, &walk->ball->home);
     }
     for (int k = 0; k < d; k++) {
@@ -231,7 +234,7 @@ take_cells(ball_walk *walk)
     for (int k = 0; k < list->lattice.ndim; k++) {
         const int64_t below = span[k].centre - span[k].first, above = span[k].last - span[k].centre;
         wanted *= (double)(span[k].last - span[k].first) + 1.0;
-        stored *= (double)(span[k].most - span[k].least) + 1.0;
+        stored *= walk->is_near ? 1.0 : (double)(span[k].most - span[k].least) + 1.0;
         walk->meets_images = walk->meets_images || span[k].least != 0 || span[k].most != 0;
         reach = below > reach ? below : reach;
         reach = above > reach ? above : reach;
@@ -239,7 +242,7 @@ take_cells(ball_walk *walk)
     if (reach > 1 && wanted > stored) {
         return walk_all(walk);
     }
-    if (reach > list->offsets.reach) {
+    if (reach > list->offsets.reach || walk->cut != 0) {
         return walk_by_index(walk);
     }
     switch (list->lattice.ndim) {
@@ -264,25 +267,42 @@ hs_ball_within(hs_ball *ball, const hs_ball_visit *visit)
     return cut_spans(ball->list, ball->span) && take_cells(&walk);
 }
 
+/* Each cell once: those of one period around the centre's cell. */
+static void
+cut_to_a_period(ball_walk *walk)
+{
+    for (int k = 0; k < walk->ball->list->lattice.ndim; k++) {
+        const int64_t     n = walk->ball->list->axes.axis[k].n;
+        hs_span_of_cells *span = &walk->ball->span[k];
+        if (n > 0 && span->last - span->first >= n) {
+            span->first = span->centre - n / 2;
+            span->last = span->first + n - 1;
+            walk->cut |= 1u << k;
+        }
+    }
+}
+
+static bool
+passes_int32(const hs_span_of_cells *span, int ndim)
+{
+    bool passes = false;
+    for (int k = 0; k < ndim; k++) {
+        passes = passes || span[k].first < INT32_MIN || span[k].last > INT32_MAX;
+    }
+    return passes;
+}
+
 void
 hs_ball_near(hs_ball *ball, const hs_ball_visit *visit)
 {
     const hs_dynamic *list = ball->list;
-    bool              twice = false;
     ball_walk walk = {.ball = ball, .visit = visit, .limit = limit_of(ball), .is_near = true};
-    for (int k = 0; k < list->lattice.ndim; k++) {
-        const int64_t n = list->axes.axis[k].n;
-        if (n > 0 && ball->span[k].last - ball->span[k].first >= n) {
-            ball->span[k].last = ball->span[k].first + n - 1; /* each cell in one image */
-            twice = true;
-        }
-    }
+    cut_to_a_period(&walk);
+    walk.filters = !list->cells.dense &&
+                   (list->cells.is_wide || passes_int32(ball->span, list->lattice.ndim));
     if (list->storage == HS_STORE_ALL_PAIRS) {
         (void)walk_all(&walk);
-    } else if (!twice) {
-        (void)(cut_spans(list, ball->span) && take_cells(&walk));
     } else if (cut_spans(list, ball->span)) {
-        walk.limit = DBL_MAX; /* other images may be nearer than those that were kept */
-        (void)walk_by_index(&walk);
+        (void)take_cells(&walk);
     }
 }

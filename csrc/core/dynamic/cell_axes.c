@@ -2,15 +2,31 @@
 /* cell_axes.c: cells of at least the width that was given; periods hold a whole number of them. */
 #include "cell_axes.h"
 
+#include "../box/wrap.h"
+
 #define MOST_CELLS 0x1p30 /* in a period: their numbers and images are int32 and int64 */
+
+/* Wrapped points are so many rows away at most, where they are far along open axes. */
+#define ROWS_AWAY 16
+
+bool
+hs_moves_column(const hs_lattice *lattice, int c)
+{
+    bool moves = false;
+    for (int l = 0; l < lattice->n_periodic; l++) {
+        moves = moves || lattice->given[l][c] != 0.0;
+    }
+    return moves;
+}
 
 /*
  * By how much the images of a ball may miss whole periods along axis k: a row of B that should not
  * move along it does so by normal . row, as rounded, and by the roundings of these; the row that
- * should moves by its height as rounded. So often as a query can meet the row: within R / h + 2.
+ * should moves by its height as rounded. So often as a query can meet the row: R and what
+ * coordinates are wrong by, in heights. Points that are ROWS_AWAY are rounded besides.
  */
 static double
-leak_of(const hs_lattice *lattice, int k, double max_radius)
+leak_of(const hs_lattice *lattice, int k, double max_radius, const hs_axes *so_far)
 {
     double leak = 0.0;
     for (int j = 0; j < lattice->ndim; j++) {
@@ -25,9 +41,30 @@ leak_of(const hs_lattice *lattice, int k, double max_radius)
         }
         const double miss =
             (j == k ? 0.0 : fabs(along)) + 0x1p-44 * size + lattice->ndim * lattice->row_error[r];
-        leak += (max_radius / lattice->period[j] + 2.0) * miss;
+        leak += ((max_radius + so_far->axis[j].leak) / lattice->period[j] + ROWS_AWAY) * miss;
+        leak += hs_axis_rounding(lattice->ndim) * ROWS_AWAY *
+                hs_axis_terms(lattice, lattice->rows[r], k);
     }
     return leak;
+}
+
+/* Leaks twice: those along one axis lead to more images along others. */
+static void
+set_leaks(hs_axes *axes, const hs_lattice *lattice, double max_radius)
+{
+    for (int pass = 0; pass < 2 && !lattice->aligned; pass++) {
+        const hs_axes so_far = *axes;
+        for (int k = 0; k < lattice->ndim; k++) {
+            axes->axis[k].leak = leak_of(lattice, k, max_radius, &so_far);
+        }
+    }
+    for (int k = 0; k < lattice->ndim; k++) {
+        hs_axis *axis = &axes->axis[k];
+        axis->farthest = axis->row >= 0 ? HS_WRAP_LIMIT * axis->period : INFINITY;
+        for (int r = 0; r < lattice->n_periodic; r++) {
+            axis->farthest += hs_axis_terms(lattice, lattice->rows[r], k);
+        }
+    }
 }
 
 void
@@ -52,10 +89,11 @@ hs_axes_init(hs_axes *axes, const hs_lattice *lattice, double cell_size, bool on
             axis->width = axis->n > 0 ? axis->period / (double)axis->n : cell_size;
             axis->inverse = 1.0 / axis->width;
         }
-        axis->lowest = axis->n > 0 ? 0.0 : -HS_FARTHEST_CELL;
-        axis->highest = axis->n > 0 ? (double)(axis->n - 1) : HS_FARTHEST_CELL;
-        axis->leak = lattice->aligned ? 0.0 : leak_of(lattice, k, max_radius);
+        const double farthest = one_cell ? 0.0 : HS_FARTHEST_CELL;
+        axis->lowest = axis->n > 0 ? 0.0 : -farthest;
+        axis->highest = axis->n > 0 ? (double)(axis->n - 1) : farthest;
     }
+    set_leaks(axes, lattice, max_radius);
 }
 
 /* The number of periods times their length; beyond one it may be rounded, by less than `*slack`. */
@@ -75,6 +113,7 @@ hs_axis_images(const hs_axis *axis, double low, double high, double error, hs_sp
     const double least = floor((low - error) / axis->period + 0.5 - 0x1p-40);
     const double most = floor((high + error) / axis->period + 0.5 + 0x1p-40);
     double       slack;
+    HS_ASSERT(least > -0x1p30 && most < 0x1p30); /* new_list.c, place_point.h */
     span->least = (int64_t)least - (fabs(least) > 0x1p8);
     span->most = (int64_t)most + (fabs(most) > 0x1p8);
     const double first = hs_below(low, shift_of(axis, span->least, &slack));

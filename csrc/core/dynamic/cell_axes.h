@@ -26,8 +26,10 @@ typedef struct hs_axis {
     double  half;            /* half a period; 0: open */
     double  lowest, highest; /* cells of a period, or as far as there are any */
     double  period;          /* 0: open */
-    double  leak; /* by how much images that a query can meet may move along this axis otherwise
-                      * than by whole periods; 0 in aligned boxes */
+    double  leak;     /* by how much images that a query can meet may move along this axis otherwise
+                      * than by whole periods, and what wrapped points are rounded by however near
+                      * they are; 0 in aligned boxes */
+    double  farthest; /* sum of absolute terms of coordinates that are too far away; as above */
 } hs_axis;
 
 typedef struct hs_axes {
@@ -43,17 +45,42 @@ typedef struct hs_span_of_cells {
     int64_t centre;      /* u of the centre's cell */
 } hs_span_of_cells;
 
+/*
+ * Coordinates of X along the axes of general boxes are rounded sums of products with X, which is
+ * rounded itself: by less than this of the sum of absolute products.
+ */
+HS_ALWAYS_INLINE double
+hs_axis_rounding(int ndim)
+{
+    return (ndim + 4) * 0x1p-53;
+}
+
+/* Sum of absolute products that t_k of X is made of. */
+HS_ALWAYS_INLINE double
+hs_axis_terms(const hs_lattice *lattice, const double *x, int k)
+{
+    double terms = 0.0;
+    for (int c = 0; c < lattice->ndim; c++) {
+        terms += fabs(lattice->normal[k][c] * x[c]);
+    }
+    return terms;
+}
+
+/* Whether the box moves points along coordinate axis c. */
+bool hs_moves_column(const hs_lattice *lattice, int c);
+
 /* cell_size: least width, where `one_cell` is false. max_radius: of queries. */
 void hs_axes_init(hs_axes *axes, const hs_lattice *lattice, double cell_size, bool one_cell,
                   double max_radius);
 
 /* The cell of a coordinate: any integer up to HS_FARTHEST_CELL, or from 0 to n - 1. Rounded down by
- * way of an integer: floor() is a call where the CPU may lack an instruction for it. */
+ * way of an integer, once it is bounded, also where infinity times 0 is no number: floor() is a
+ * call where the CPU may lack an instruction for it. */
 HS_ALWAYS_INLINE int64_t
 hs_axis_cell(const hs_axis *axis, double t)
 {
-    const double  place = hs_smaller(axis->highest, (t + axis->half) * axis->inverse);
-    const double  bounded = hs_larger(axis->lowest, place);
+    const double  place = hs_smaller((t + axis->half) * axis->inverse, axis->highest);
+    const double  bounded = hs_larger(place, axis->lowest);
     const int64_t whole = (int64_t)bounded;
     return axis->n > 0 ? whole : whole - ((double)whole > bounded);
 }
@@ -73,8 +100,8 @@ hs_above(double x, double y)
     return sum + fabs(sum) * 0x1p-52;
 }
 
-/* The cells of a ball that meets other images. low, high: its ends, rounded outwards; error: what
- * coordinates may be wrong by. Sets all but the centre. */
+/* The cells of a ball that meets other images: less than 2^30 of them. low, high: its ends, rounded
+ * outwards; error: what coordinates may be wrong by. Sets all but the centre. */
 void hs_axis_images(const hs_axis *axis, double low, double high, double error,
                     hs_span_of_cells *span);
 

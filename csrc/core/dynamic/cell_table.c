@@ -60,6 +60,9 @@ uint32_t
 hs_cell_table_add(hs_cell_table *table, hs_entries *entries, const int64_t *index)
 {
     const uint32_t found = hs_cell_table_find(table, index);
+    for (int k = 0; k < table->ndim; k++) {
+        table->is_wide = table->is_wide || index[k] < INT32_MIN || index[k] > INT32_MAX;
+    }
     if (found != HS_NO_CELL || table->dense) {
         return found;
     }

@@ -35,6 +35,7 @@ typedef struct hs_cell_table {
     hs_cell_row *rows;    /* owned */
     int64_t      n_rows;  /* 0, or a power of two */
     int64_t      n_empty; /* cells without entries */
+    bool         is_wide; /* some index was beyond int32, so that cells may be shared */
     /* dense */
     int64_t lowest[HS_MAX_DIM], shape[HS_MAX_DIM], stride[HS_MAX_DIM];
 } hs_cell_table;

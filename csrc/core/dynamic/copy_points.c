@@ -57,7 +57,7 @@ hs_copy_points(const hs_dynamic *list, hs_dynamic *copy)
         }
     }
     copy->n_without = list->n_without;
-    copy->largest = list->largest;
+    copy->cells.is_wide = list->cells.is_wide;
     copy->magnitude = list->magnitude;
     return HS_OK;
 }

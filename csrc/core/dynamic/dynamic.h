@@ -21,27 +21,28 @@
 #include "offsets.h"
 
 struct hs_dynamic {
-    hs_storage    storage;
-    bool          inclusive;
-    bool          is_held; /* hs_dynamic_hold */
-    hs_fpenv      held_env;
-    bool          keeps_blocks; /* empty cells keep their blocks: others are about to come */
-    double        cell_size, max_radius, grid_bytes;
-    bool          has_box;
-    hs_box        box; /* as given */
-    hs_lattice    lattice;
-    double        spread;    /* sum of all |entries| of B */
-    double        row_error; /* sum of the errors of B */
-    double        largest;   /* at least every |X_k| that was ever here; not in aligned boxes */
-    double        magnitude; /* as hs_wrap_point raises it, of all points that were ever here */
-    hs_axes       axes;
-    hs_offsets    offsets;
-    hs_entries    entries;
-    hs_key_map    map;
-    hs_cell_table cells;
-    int64_t       n_without; /* entries without a position, whose coordinates are NaN */
-    int64_t       changes;
-    hs_gate       gate;
+    hs_storage storage;
+    bool       inclusive;
+    hs_fpenv   held_env;     /* hs_dynamic_hold */
+    bool       keeps_blocks; /* empty cells keep their blocks: others are about to come */
+    double     cell_size, max_radius, grid_bytes;
+    bool       has_box;
+    hs_box     box; /* as given */
+    hs_lattice lattice;
+    double     spread;            /* sum of all |entries| of B */
+    double     row_error;         /* sum of the errors of B */
+    bool       moves[HS_MAX_DIM]; /* whether B does, along each coordinate axis */
+    double     most_terms;        /* of wrapping: beyond, X errs by a period or so */
+    double     magnitude; /* of wrapping, of all points that were ever here: at most most_terms */
+    hs_axes    axes;
+    hs_offsets offsets;
+    hs_entries entries;
+    hs_key_map map;
+    hs_cell_table        cells;
+    int64_t              n_without; /* entries without a position, whose coordinates are NaN */
+    int64_t              changes;
+    hs_gate              gate;
+    hs_dynamic_hooks     hooks;
     hs_dynamic_counters *counters; /* borrowed, or NULL */
 };
 

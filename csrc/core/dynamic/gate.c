@@ -6,119 +6,136 @@
 #include "gate.h"
 
 #include "../base/os_thread.h"
-#include "../memory/account.h"
 
-#if defined(_WIN32)
-#define CURRENT_PROCESS() 0 /* no fork */
-#else
-#include <unistd.h>
-#define CURRENT_PROCESS() ((int64_t)getpid())
-#endif
+#define WRITER      (INT64_C(1) << 31)
+#define PER_PROCESS (INT64_C(1) << 32)
 
-typedef struct hs_queue {
-    hs_mutex     mutex;
-    hs_condition changed;
-} hs_queue;
+/* The state where no thread of this process is inside. */
+static int64_t
+empty(void)
+{
+    return hs_atomic_load(&hs_n_forks) * PER_PROCESS;
+}
 
-bool
+/* Adds to what is inside, unless that is too much; threads of a parent are not. */
+static bool
+try_enter(hs_gate *gate, int64_t most, int64_t more)
+{
+    const int64_t state = hs_atomic_load(&gate->state), none = empty();
+    const int64_t inside = state < none ? 0 : state - none;
+    return inside <= most && hs_atomic_swap_if(&gate->state, state, none + inside + more);
+}
+
+static bool
+try_read(void *gate)
+{
+    return try_enter(gate, WRITER - 2, 1);
+}
+
+static bool
+try_write(void *gate)
+{
+    return try_enter(gate, 0, WRITER);
+}
+
+static bool
+is_free(void *context)
+{
+    hs_gate *gate = context;
+    return hs_atomic_load(&gate->state) <= empty();
+}
+
+static void
+wake(void)
+{
+    if (hs_atomic_load(&hs_n_waiting) > 0) {
+        hs_wake_waiting();
+    }
+}
+
+void
 hs_gate_init(hs_gate *gate)
 {
-    gate->state = gate->waiting = 0;
-    gate->process = CURRENT_PROCESS();
-    gate->queue = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *gate->queue);
-    if (gate->queue != NULL) {
-        hs_mutex_init(&gate->queue->mutex);
-        hs_condition_init(&gate->queue->changed);
-    }
-    return gate->queue != NULL;
+    *gate = (hs_gate){.state = empty()};
 }
 
-void
-hs_gate_destroy(hs_gate *gate)
+bool
+hs_gate_is_mine(hs_gate *gate)
 {
-    hs_condition_destroy(&gate->queue->changed);
-    hs_mutex_destroy(&gate->queue->mutex);
-    hs_free(NULL, gate->queue);
+    const int64_t holder = hs_atomic_load(&gate->holder);
+    return holder != 0 && holder == HS_THREAD_NUMBER() &&
+           gate->held_at == hs_atomic_load(&hs_n_forks);
 }
 
-/* One more reader, or the writer. */
-static bool
-try_read(hs_gate *gate)
-{
-    const int64_t state = hs_atomic_load(&gate->state);
-    return state >= 0 && hs_atomic_swap_if(&gate->state, state, state + 1);
-}
-
-static bool
-try_write(hs_gate *gate)
-{
-    return hs_atomic_swap_if(&gate->state, 0, -1);
-}
-
-/* Where threads of a parent were inside when this process was forked off, they never leave. */
-static void
-forget_the_parent(hs_gate *gate)
-{
-    const int64_t process = CURRENT_PROCESS();
-    if (gate->process != process) {
-        gate->process = process;
-        gate->state = gate->waiting = 0;
-        hs_mutex_init(&gate->queue->mutex);
-        hs_condition_init(&gate->queue->changed);
-    }
-}
-
-/* A wait ends on its own after a while, so that a wake-up that came too early costs time only. */
-static HS_NO_INLINE void
-wait_for(hs_gate *gate, bool (*try_enter)(hs_gate *))
-{
-    forget_the_parent(gate);
-    hs_mutex_lock(&gate->queue->mutex);
-    (void)hs_atomic_add(&gate->waiting, 1);
-    while (!try_enter(gate)) {
-        hs_condition_wait_briefly(&gate->queue->changed, &gate->queue->mutex);
-    }
-    (void)hs_atomic_add(&gate->waiting, -1);
-    hs_mutex_unlock(&gate->queue->mutex);
-}
-
-static void
-wake(hs_gate *gate)
-{
-    if (hs_atomic_load(&gate->waiting) > 0) {
-        hs_mutex_lock(&gate->queue->mutex);
-        hs_condition_wake(&gate->queue->changed);
-        hs_mutex_unlock(&gate->queue->mutex);
-    }
-}
-
-void
+bool
 hs_gate_read(hs_gate *gate)
 {
-    if (!try_read(gate) && !try_read(gate)) {
-        wait_for(gate, try_read);
+    if (hs_gate_is_mine(gate)) {
+        return false;
     }
+    if (!try_read(gate) && !try_read(gate)) {
+        hs_wait_for(try_read, gate);
+    }
+    return true;
 }
 
 void
 hs_gate_read_end(hs_gate *gate)
 {
-    if (hs_atomic_add(&gate->state, -1) == 1) {
-        wake(gate);
+    if (hs_atomic_add(&gate->state, -1) % WRITER == 1) {
+        wake();
     }
 }
 
-void
+/* A writer that waits gives up what readers may need to get out, and takes it back before it goes
+ * in: never the other way round. */
+static HS_NO_INLINE void
+wait_to_write(hs_gate *gate)
+{
+    if (gate->pause == NULL) {
+        hs_wait_for(try_write, gate);
+        return;
+    }
+    do {
+        void *const paused = gate->pause();
+        hs_wait_for(is_free, gate);
+        gate->resume(paused);
+    } while (!try_write(gate));
+}
+
+bool
 hs_gate_write(hs_gate *gate)
 {
-    if (!try_write(gate)) {
-        wait_for(gate, try_write);
+    if (hs_gate_is_mine(gate)) {
+        return false;
     }
+    if (!try_write(gate) && !try_write(gate)) {
+        wait_to_write(gate);
+    }
+    return true;
 }
 
 void
 hs_gate_write_end(hs_gate *gate)
 {
-    hs_atomic_store(&gate->state, 0);
-    wake(gate);
+    hs_atomic_store(&gate->state, empty());
+    wake();
+}
+
+bool
+hs_gate_hold(hs_gate *gate)
+{
+    const bool went_in = hs_gate_write(gate);
+    if (went_in) {
+        gate->held_at = hs_atomic_load(&hs_n_forks);
+        hs_atomic_store(&gate->holder, HS_THREAD_NUMBER());
+    }
+    return went_in;
+}
+
+void
+hs_gate_release(hs_gate *gate)
+{
+    hs_atomic_store(&gate->holder, 0);
+    hs_gate_write_end(gate);
 }

@@ -62,14 +62,15 @@ hs_list_check(const hs_dynamic_options *options, hs_failure *failure)
     return check_box(options->box, options->ndim, failure);
 }
 
-/* Images of a ball that a query may have to look at. */
+/* Images of a ball that a query may have to look at, as far as its centre does not add to them. */
 static double
-count_images(const hs_lattice *lattice, double max_radius)
+count_images(const hs_axes *axes, double max_radius)
 {
     double n = 1.0;
-    for (int k = 0; k < lattice->ndim; k++) {
-        if (lattice->row_of_axis[k] >= 0) {
-            n *= 2.0 * ceil(max_radius / lattice->period[k]) + 1.0;
+    for (int k = 0; k < axes->ndim; k++) {
+        const hs_axis *axis = &axes->axis[k];
+        if (axis->row >= 0) {
+            n *= 2.0 * ceil((max_radius + axis->leak) / axis->period) + 1.0;
         }
     }
     return n;
@@ -79,12 +80,18 @@ count_images(const hs_lattice *lattice, double max_radius)
 static void
 measure_box(hs_dynamic *list)
 {
+    double least = INFINITY;
     for (int r = 0; r < list->lattice.n_periodic; r++) {
         list->row_error += list->lattice.row_error[r];
         for (int k = 0; k < list->lattice.ndim; k++) {
             list->spread += fabs(list->lattice.rows[r][k]);
         }
     }
+    for (int k = 0; k < list->lattice.ndim; k++) {
+        list->moves[k] = hs_moves_column(&list->lattice, k);
+        least = list->axes.axis[k].row >= 0 ? hs_smaller(list->axes.axis[k].period, least) : least;
+    }
+    list->most_terms = 0x1p90 * least;
 }
 
 hs_status
@@ -107,17 +114,14 @@ hs_list_new(const hs_dynamic_options *options, hs_dynamic **list, hs_failure *fa
     }
     hs_lattice_init(options->box, options->ndim, hs_scale_of(0), &made->lattice);
     hs_status status = hs_skew_is_left(&made->lattice) ? HS_ERR_BOX_SKEWED : HS_OK;
-    if (status == HS_OK && !(count_images(&made->lattice, made->max_radius) <= MOST_IMAGES)) {
-        status = refuse_length(failure, HS_LENGTH_MAX_RADIUS, made->max_radius);
-    }
     if (status == HS_OK) {
-        measure_box(made);
         hs_axes_init(&made->axes, &made->lattice, made->cell_size, one_cell, made->max_radius);
-        if (!hs_gate_init(&made->gate)) {
-            status = HS_ERR_MEMORY;
+        measure_box(made);
+        hs_gate_init(&made->gate);
+        if (!(count_images(&made->axes, made->max_radius) <= MOST_IMAGES)) {
+            status = refuse_length(failure, HS_LENGTH_MAX_RADIUS, made->max_radius);
         } else if (!hs_offsets_init(&made->offsets, &made->axes, &made->lattice,
                                     made->max_radius)) {
-            hs_gate_destroy(&made->gate);
             status = HS_ERR_MEMORY;
         }
     }
@@ -144,7 +148,6 @@ hs_list_free(hs_dynamic *list)
 {
     free_points(list);
     hs_offsets_free(&list->offsets);
-    hs_gate_destroy(&list->gate);
     hs_free(NULL, list);
 }
 
@@ -179,7 +182,7 @@ hs_list_clear(hs_dynamic *list)
     free_points(list);
     hs_cell_table_init(&list->cells, &list->axes, list->cells.dense);
     list->n_without = 0;
-    list->largest = list->magnitude = 0.0;
+    list->magnitude = 0.0;
 }
 
 hs_status
@@ -196,7 +199,6 @@ hs_list_shrink(hs_dynamic *list)
     list->entries = copy->entries;
     list->map = copy->map;
     list->cells = copy->cells;
-    list->largest = copy->largest;
     list->magnitude = copy->magnitude;
     list->changes++;
     copy->entries = entries;

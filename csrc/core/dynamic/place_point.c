@@ -13,14 +13,39 @@ hs_dynamic_place(const hs_dynamic *list, const double *given, hs_placed *placed,
     }
 }
 
-/* Takes note of how large the coordinates of a point are that is stored now. */
-static void
-raise_bounds(hs_dynamic *list, const hs_placed *placed)
+/* The largest sum of absolute terms that a coordinate is wrapped by, of those that the box moves:
+ * others are what was given. */
+static double
+terms_of_wrapping(const hs_dynamic *list, const hs_placed *placed)
 {
-    for (int k = 0; k < list->lattice.ndim; k++) {
-        list->largest = hs_larger(fabs(placed->x[k]), list->largest);
+    const hs_lattice *lattice = &list->lattice;
+    int64_t           given_turns[HS_MAX_DIM];
+    double            largest = 0.0;
+    (void)hs_lattice_shift(lattice, placed->turns, given_turns); /* as when it was wrapped */
+    for (int c = 0; c < lattice->ndim; c++) {
+        double terms = list->moves[c] ? fabs(placed->given[c]) : 0.0;
+        for (int l = 0; l < lattice->n_periodic; l++) {
+            terms += fabs((double)given_turns[l] * lattice->given[l][c]);
+        }
+        largest = hs_larger(terms, largest);
     }
-    list->magnitude = hs_larger(placed->magnitude, list->magnitude);
+    return largest;
+}
+
+bool
+hs_dynamic_is_known(const hs_dynamic *list, hs_placed *placed)
+{
+    const hs_lattice *lattice = &list->lattice;
+    bool              known = true;
+    if (placed->magnitude > 0x1p-50 * list->most_terms) {
+        placed->magnitude = terms_of_wrapping(list, placed);
+        known = placed->magnitude <= list->most_terms;
+    }
+    for (int k = 0; k < lattice->ndim; k++) {
+        placed->terms[k] = hs_axis_terms(lattice, placed->x, k);
+        known = known && placed->terms[k] < list->axes.axis[k].farthest;
+    }
+    return known;
 }
 
 /* In line: a call of memcpy for two or three numbers takes longer than they do. */
@@ -48,6 +73,6 @@ hs_dynamic_write(hs_dynamic *list, uint32_t place, const hs_placed *placed)
         copy_numbers(hs_entry_given(&list->entries, place), placed->given, d);
     }
     if (!list->lattice.aligned) {
-        raise_bounds(list, placed);
+        list->magnitude = hs_larger(placed->magnitude, list->magnitude);
     }
 }

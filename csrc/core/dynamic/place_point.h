@@ -11,9 +11,11 @@ struct hs_placed {
     const double *given;             /* borrowed; ndim finite numbers */
     double        x[HS_MAX_DIM];     /* X, in the middle period; not rounded in aligned boxes */
     double        t[HS_MAX_DIM];     /* coordinates along the grid axes */
+    double        terms[HS_MAX_DIM]; /* sums of absolute products in them; not in aligned boxes */
     int64_t       turns[HS_MAX_DIM]; /* over the rows of B */
     int64_t       index[HS_MAX_DIM]; /* of the cell */
-    double        magnitude;         /* as hs_wrap_point raises it; not in aligned boxes */
+    double        magnitude; /* as hs_wrap_point raises it, of the coordinates that the box moves;
+                              * not in aligned boxes */
 };
 
 /*
@@ -49,6 +51,10 @@ hs_dynamic_wrap(const hs_dynamic *list, const double *given, double *wrapped, in
     return fits;
 }
 
+/* In general boxes: whether X and its coordinates are known to within a few periods, so that a ball
+ * meets few images. Sets the magnitude and the terms. */
+bool hs_dynamic_is_known(const hs_dynamic *list, hs_placed *placed);
+
 /* HS_OK, HS_ERR_NOT_FINITE with column and value, HS_ERR_SHIFT_RANGE. ndim: that of the list, for
  * callers that let the compiler unroll loops. */
 HS_ALWAYS_INLINE hs_status
@@ -68,6 +74,9 @@ hs_dynamic_place_in(const hs_dynamic *list, const double *given, hs_placed *plac
         list->counters->wraps++;
     }
     if (!hs_dynamic_wrap(list, given, placed->x, placed->turns, &placed->magnitude, ndim)) {
+        return HS_ERR_SHIFT_RANGE;
+    }
+    if (!list->lattice.aligned && !hs_dynamic_is_known(list, placed)) {
         return HS_ERR_SHIFT_RANGE;
     }
     for (int k = 0; k < ndim; k++) {

@@ -18,12 +18,21 @@ static struct {
     void  *data[HS_POOL_CHUNKS]; /* oldest first */
 } pool = {.limit = HS_POOL_LIMIT};
 
-static volatile int64_t lock; /* 1: a thread has it */
+static volatile int64_t lock; /* 0: free; else a thread has it, after lock - 1 forks */
 
+/* A thread that had the lock when this process was forked off left the pool in any state. */
 static bool
 try_lock(void)
 {
-    return hs_atomic_swap_if(&lock, 0, 1);
+    const int64_t was = hs_atomic_load(&lock), now = hs_atomic_load(&hs_n_forks) + 1;
+    if (was == now || !hs_atomic_swap_if(&lock, was, now)) {
+        return false;
+    }
+    if (was != 0) {
+        pool.held = 0;
+        pool.n = 0;
+    }
+    return true;
 }
 
 static void
@@ -33,9 +42,8 @@ unlock(void)
 }
 
 /* For work that should not be skipped. A thread holds the lock for some hundred instructions: it is
- * free again as soon as that thread has a processor, or never. Naps bound the wait: a quarter of a
- * second, or up to four on Windows. Yields do not, since each may last a time slice of every busy
- * thread. */
+ * free again as soon as that thread has a processor. Naps bound the wait: a quarter of a second, or
+ * up to four on Windows. Yields do not, since each may last a time slice of every busy thread. */
 static bool
 lock_patiently(void)
 {

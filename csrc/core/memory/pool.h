@@ -9,11 +9,10 @@
  * hs_pool_clear gives everything back.
  *
  * All functions may be called from many threads at once and after fork. The pool is guarded by a
- * lock that no thread waits for: a lock that another thread holds at the moment of a fork stays
- * taken in the child for ever. A thread that finds it taken does without the pool: it takes new
+ * lock that no thread waits for. A thread that finds it taken does without the pool: it takes new
  * memory, and gives old memory straight back to the system. Only the four functions of halfshell.h
  * try again for a quarter of a second; where the lock does not come free they do nothing and return
- * 0, for such a pool gives and takes no more.
+ * 0. Where another thread had the lock at the moment of a fork, the child's pool is empty at first.
  */
 #ifndef HS_POOL_H
 #define HS_POOL_H
@@ -41,7 +40,7 @@ void *hs_pool_take_arena(void);
 bool hs_pool_give(void *data);
 
 #ifdef HS_TESTING
-/* Takes the lock for good, as a fork at the wrong moment does, or frees it. */
+/* Takes the lock for good, or frees it. */
 void hs_test_pool_hold(bool hold);
 #endif
 

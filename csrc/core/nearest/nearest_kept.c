@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_kept.c: a mutex guards two flags, is_building and is_built; the tree is built without
- * holding it. */
+/* nearest_kept.c: who may build is decided by one compare-and-swap. */
 #if !defined(_WIN32)
 #define _POSIX_C_SOURCE 200809L /* for os_thread.h */
 #endif
@@ -9,13 +8,15 @@
 #include "tree_build.h"
 #include "../base/os_thread.h"
 
+#define NOTHING 0
+#define BUILT   1 /* and does not change any more */
+#define BUILDS  2 /* a thread, after state - BUILDS forks */
+
 struct hs_nearest_kept {
-    hs_mutex   mutex; /* guards the next two; what is built does not change any more */
-    bool       is_building;
-    bool       is_built;
-    hs_nearest near;
-    hs_search  search; /* its own, as is its call */
-    hs_call    call;
+    volatile int64_t state;
+    hs_nearest       near;
+    hs_search        search; /* its own, as is its call */
+    hs_call          call;
 };
 
 hs_nearest_kept *
@@ -23,8 +24,7 @@ hs_nearest_kept_new(void)
 {
     hs_nearest_kept *kept = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *kept);
     if (kept != NULL) {
-        kept->is_building = kept->is_built = false;
-        hs_mutex_init(&kept->mutex);
+        kept->state = NOTHING;
     }
     return kept;
 }
@@ -35,22 +35,21 @@ hs_nearest_kept_free(hs_nearest_kept *kept)
     if (kept == NULL) {
         return;
     }
-    if (kept->is_built) {
+    if (hs_atomic_load(&kept->state) == BUILT) {
         hs_tree_free(&kept->call.account, &kept->near.tree);
         hs_search_close(&kept->search);
         hs_account_close(&kept->call.account);
     }
-    hs_mutex_destroy(&kept->mutex);
     hs_free(NULL, kept);
 }
 
 const hs_nearest *
 hs_nearest_kept_get(hs_nearest_kept *kept, hs_nearest **room)
 {
-    hs_mutex_lock(&kept->mutex);
-    const bool is_built = kept->is_built, builds = !is_built && !kept->is_building;
-    kept->is_building = kept->is_building || builds;
-    hs_mutex_unlock(&kept->mutex);
+    const int64_t state = hs_atomic_load(&kept->state), now = BUILDS + hs_atomic_load(&hs_n_forks);
+    const bool    is_built = state == BUILT;
+    /* What a thread that does not exist in this process has begun is lost, and built anew. */
+    const bool builds = !is_built && state != now && hs_atomic_swap_if(&kept->state, state, now);
     *room = NULL;
     if (builds) {
         *room = &kept->near;
@@ -63,8 +62,5 @@ hs_nearest_kept_get(hs_nearest_kept *kept, hs_nearest **room)
 void
 hs_nearest_kept_end(hs_nearest_kept *kept, bool done)
 {
-    hs_mutex_lock(&kept->mutex);
-    kept->is_building = false;
-    kept->is_built = done;
-    hs_mutex_unlock(&kept->mutex);
+    hs_atomic_store(&kept->state, done ? BUILT : NOTHING);
 }

@@ -21,7 +21,7 @@ sort_by_counting(hs_nearest_key **keys, hs_nearest_key **spare, int64_t n, doubl
     const int32_t padded = ((int32_t)n + 7) / 8 * 8;
     const int32_t numbers = n <= HS_NEAREST_COUNTED / 2 ? HS_NEAREST_COUNTED / 2
                                                         : HS_NEAREST_COUNTED;
-    const double  steps = (double)(INT16_MAX / numbers) / largest;
+    const double  steps = largest > 0x1p-1000 ? (double)(INT16_MAX / numbers) / largest : 0.0;
     int16_t       rough[HS_NEAREST_COUNTED];
     for (int32_t e = 0; e < n; e++) {
         rough[e] = (int16_t)((int32_t)((*keys)[e].square * steps) * numbers + e);

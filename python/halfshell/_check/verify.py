@@ -51,6 +51,8 @@ class Verdict:
         Pairs as rows (i, j, \\*S), or (i, j) when no shifts were given: not in the list, in the
         list but beyond the cutoff, and listed more often than they should be (once for each
         surplus row).
+    is_full : bool
+        Whether the list is a full list, with a row for each direction: then these are counted too.
     """
 
     n_expected: int
@@ -58,23 +60,29 @@ class Verdict:
     missed: IntArray
     spurious: IntArray
     duplicate: IntArray
+    is_full: bool = False
 
-    _shown = ("ok", "n_expected", "n_given", "missed", "spurious", "duplicate")
+    _shown = ("ok", "n_expected", "n_given", "missed", "spurious", "duplicate", "is_full")
     __repr__ = _show.line
     _repr_html_ = _show.html
 
     @property
     def ok(self) -> bool:
         """Whether nothing is missed, spurious or duplicate."""
-        return not (len(self.missed) or len(self.spurious) or len(self.duplicate))
+        return self._n_wrong == 0
+
+    @property
+    def _n_wrong(self) -> int:
+        return len(self.missed) + len(self.spurious) + len(self.duplicate)
 
     def __bool__(self) -> bool:
         return self.ok
 
     def __str__(self) -> str:
+        what = " of a full list" if self.is_full else ""
         if self.ok:
-            return f"correct: {self.n_expected} pairs"
-        lines = [f"wrong: {self.n_given} rows for {self.n_expected} pairs"]
+            return f"correct: {self.n_expected} pairs{what}"
+        lines = [f"wrong: {self.n_given} rows for {self.n_expected} pairs{what}"]
         for name in ("missed", "spurious", "duplicate"):
             rows = getattr(self, name)
             if len(rows):
@@ -125,8 +133,9 @@ def verify(
         As in `neighbors`. A list for the rules "gather" or "scatter" has a direction, like a list
         of two sets.
     full : bool, default False
-        Whether the list should have both (i, j, S) and (j, i, -S). Only for arrays, one set of
-        points and a rule without direction.
+        Whether the list must have both (i, j, S) and (j, i, -S). A list that has both is known for
+        a full list without this: where it is wrong as a half list, and less so as a full one. Only
+        for arrays, one set of points and a rule without direction.
 
     Returns
     -------
@@ -156,7 +165,7 @@ def verify(
     >>> verdict.missed.tolist(), verdict.spurious.tolist()
     ([[0, 1], [1, 2]], [[0, 2]])
     >>> print(hs.verify(points, 2.0, hs.neighbors(points, 2.0)))
-    correct: 4 pairs
+    correct: 4 pairs of a full list
     """
     if unknown:
         refuse_unknown(verify, unknown)
@@ -192,6 +201,10 @@ def verify(
     right = _right(array, asking, bound, reach, how)
     expected = right.rows(with_shifts=S is not None)
     verdict = compare(expected, rows, kind)
+    if kind == "half" and not verdict.ok and len(rows) > len(expected):
+        as_full = compare(expected, rows, "full")
+        if as_full._n_wrong < verdict._n_wrong:
+            verdict = as_full
     if S is not None:
         _confirm(verdict, right, flags)
     return verdict
@@ -222,6 +235,7 @@ def compare(
         missed=missed,
         spurious=surplus[~twice],
         duplicate=surplus[twice],
+        is_full=kind == "full",
     )
 
 

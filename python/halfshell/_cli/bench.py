@@ -9,11 +9,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from halfshell._cli.errors import InputError, missing_extra
-from halfshell._cli.scene import load_scene, unit_suffix
+from halfshell._cli.scene import describe_source, load_scene, unit_suffix
 from halfshell._machine import cpu_name, unknown_kernel, usable_cpus
 from halfshell._terminal import printable
 
 if TYPE_CHECKING:
+    from halfshell._cli.files import Scene
     from halfshell._report.page.rows import ReportRow
 
 __all__ = ["run"]
@@ -43,7 +44,7 @@ def run(args: Namespace) -> int:
     if args.peers in (("all",), ("none",)):
         peers = args.peers[0]
     try:
-        plan = plan_of((), ("exact",), peers, "quick", args.patience)
+        plan = plan_of((), ("exact",), peers, "quick", args.patience or 3.0)
     except ValueError as error:
         raise InputError(f"{error} (halfshell report --list names them)") from None
     given = scenes.Scene(
@@ -56,9 +57,9 @@ def run(args: Namespace) -> int:
     if args.peers is None:
         rows = [row for row in rows if row.status != "not installed"]
     if args.json:
-        print(json.dumps(_facts(rows, args), indent=2))
+        print(json.dumps(describe_source(scene) | _facts(rows, args), indent=2))
     else:
-        _print(rows, reason)
+        _print(rows, reason, scene)
     return int(bool(rows[0].wrong))
 
 
@@ -81,13 +82,13 @@ def _facts(rows: Sequence[ReportRow], args: Namespace) -> dict[str, Any]:
     )  # fmt: skip
     first = rows[0]
     return {
-        "file": first.scene, "points": first.points, "cutoff": first.cutoff,
+        "cutoff": first.cutoff,
         "cutoff_chosen": args.cutoff is None, "cpu": cpu_name(), "cpus_usable": usable_cpus(),
         "methods": [{name: getattr(row, name) for name in names} for row in rows],
     }  # fmt: skip
 
 
-def _print(rows: Sequence[ReportRow], reason: str) -> None:
+def _print(rows: Sequence[ReportRow], reason: str, scene: Scene) -> None:
     from rich.console import Console
 
     from halfshell._report.page.table import scene_table
@@ -104,6 +105,8 @@ def _print(rows: Sequence[ReportRow], reason: str) -> None:
                      "times our time")  # fmt: skip
     if reason:
         lines.append(f"the cutoff was chosen: {reason}; --cutoff sets it")
+    read = f"read by {scene.reader}: " if scene.reader else ""
+    lines.append(f"{read}points in {scene.points.shape[1]}-D")
     lines.append(f"medians, one thread for each, on {cpu_name()}")
     for line in lines:
         console.print(f"* {printable(line)}", markup=False, soft_wrap=True)

@@ -1,6 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Files of the command line: read a scene, replace an output only when it is complete.
 
+What reads a file is decided by one rule. Each reader that may know the format is tried, and the
+first that yields sensible points wins: at least one point, finite coordinates, a box of the same
+dimensions. A box that is a placeholder is left out, and elements that a residue cannot have are
+told from the names of its atoms instead. The summary names the reader, and what it took for
+coordinates or left out. If no reader wins, the error says what each of them said.
+
+=========================================  ====================================================
+file                                       readers, in this order
+=========================================  ====================================================
+NumPy's, by name, or without one content   NumPy
+.csv, .tsv, .pts, or with --columns        text, by columns
+.ply; .pcd; .vtk, .vtp, .vtu ...           plyfile, pyvista; pypcd4; pyvista
+.txt, .dat, or a name without a suffix     text, ASE, MDAnalysis
+any other; --format is for these two       ASE, MDAnalysis, then text if neither knows the format
+                                           (or if it is .xyz, as clouds are named too)
+=========================================  ====================================================
+
+What stands in a header is compared with the size of the file before any of them demands memory.
+Standard input, ``-``, and pipes are copied to a file first.
+
 Everything that a person at a keyboard can get wrong here raises `InputError` with one line
 that says what and where.
 """
@@ -8,10 +28,17 @@ that says what and where.
 from __future__ import annotations
 
 import os
+import re
 import secrets
-from collections.abc import Iterator
+import shutil
+import struct
+import sys
+import tempfile
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
@@ -19,16 +46,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 import halfshell as hs
+from halfshell._cli.cloud_files import CLOUDS, read_cloud
 from halfshell._cli.errors import InputError, one_line
-from halfshell._cli.numpy_files import Unreadable, read_arrays
-from halfshell._cli.structure_files import read_structures
+from halfshell._cli.numpy_files import Unreadable, is_numpy, read_arrays
+from halfshell._cli.pair_files import refuse_list
+from halfshell._cli.structure_files import (
+    Structure,
+    UnknownFormat,
+    by_ase,
+    by_mdanalysis,
+    kind_of_file,
+)
 from halfshell._cli.text_files import BadLine, read_points
 from halfshell._terminal import printable
 
 __all__ = ["Scene", "read_frames", "read_scene", "replacing"]
 
-_NUMPY, _TEXT = (".npy", ".npz"), (".csv", ".txt", ".dat", ".tsv")
+_TEXT_ALONE, _TEXT_FIRST = (".csv", ".tsv", ".pts"), (".txt", ".dat", "")
 ROWS_CHECKED = 1 << 16  # at a time: some megabytes
+
+_LAST = "as text"
+
+Frames = int | slice | None
+_Reader = Callable[[str], Iterable[Structure]]  # the frames of a file, one by one
 
 
 @dataclass(frozen=True)
@@ -51,6 +91,12 @@ class Scene:
         ``"angstrom"`` where it is known, else empty.
     remarks : tuple of str
         What the reader of the file warned of.
+    reader : str
+        What read the file, and what of it; empty for what ships with the package.
+    no_box : str
+        Why the box that the file has is none, or nothing.
+    frame : str
+        Which of several frames this is, for messages.
     """
 
     points: NDArray[Any]
@@ -60,6 +106,14 @@ class Scene:
     species: NDArray[np.str_] | None = None
     unit: str = ""
     remarks: tuple[str, ...] = ()
+    reader: str = ""
+    no_box: str = ""
+    frame: str = ""
+
+    @property
+    def where(self) -> str:
+        """The file, and the frame of several."""
+        return f"{self.source}: {self.frame}" if self.frame else self.source
 
     @property
     def box_rows(self) -> NDArray[np.float64] | None:
@@ -78,21 +132,26 @@ def read_scene(
     *,
     file_format: str | None = None,
     index: int | None = None,
+    columns: Sequence[str] | None = None,
+    trajectory: str | None = None,
     box: NDArray[np.float64] | None = None,
     periodic: tuple[bool, ...] | None = None,
 ) -> Scene:
-    """Read points and box from a file.
+    """Read points and box from a file, by the rule above.
 
     Parameters
     ----------
     file : str or None
-        A ``.npy`` file with an array (n, d), a ``.npz`` file with ``points`` and perhaps
-        ``box`` and ``periodic``, text with one point a line (.csv, .txt, .dat, .tsv), or anything
-        that `ase.io.read` reads. None: the block of alpha-quartz that ships with the package.
+        Its name, or ``-`` for standard input. None: the block of alpha-quartz that ships with the
+        package.
     file_format : str, optional
-        Name of an ASE format; default: told from the file.
+        Name of a format of ASE or MDAnalysis; default: told from the file.
     index : int, optional
         Frame, for formats with several; default: the last.
+    columns : sequence of str, optional
+        Of a text file, the columns that are coordinates: names, or numbers from 1 on.
+    trajectory : str, optional
+        A file with frames, of which `file` is the topology, as MDAnalysis reads both.
     box : ndarray, shape (d,) or (d, d), optional
         Takes the place of the file's box; all axes repeat unless `periodic` says otherwise.
     periodic : tuple of bool, length 1 or d, optional
@@ -104,28 +163,13 @@ def read_scene(
         With the reason in one line.
     """
     if file is None:
-        for option, value in (("--index", index), ("--format", file_format)):
+        options = (("--index", index), ("--format", file_format), ("--columns", columns),
+                   ("--trajectory", trajectory))  # fmt: skip
+        for option, value in options:
             if value is not None:
                 raise InputError(f"{option} needs a file: give one")
-        scene = _shipped_scene()
-    elif not os.path.exists(file):
-        raise InputError(f"{file}: no such file")
-    elif os.path.isdir(file) and file_format is None and not Path(file).suffix:
-        raise InputError(f"{file}: is a folder")
-    elif os.path.isfile(file) and os.path.getsize(file) == 0:
-        raise InputError(f"{file}: is empty")
-    else:
-        suffix = Path(file).suffix.lower()
-        try:
-            if file_format is None and suffix in _NUMPY:
-                scene = _read_numpy(file, index)
-            elif file_format is None and suffix in _TEXT:
-                scene = _read_text(file, index)
-            else:
-                (scene,) = _read_structures(file, file_format, index)
-        except MemoryError:
-            raise InputError(f"{file}: does not fit in memory") from None
-    _check(scene)
+        return _with_overrides(_shipped_scene(), box, periodic)
+    (scene,) = _read(file, file_format, index, columns, trajectory)
     return _with_overrides(scene, box, periodic)
 
 
@@ -134,29 +178,23 @@ def read_frames(
     frames: slice,
     *,
     file_format: str | None = None,
+    columns: Sequence[str] | None = None,
+    trajectory: str | None = None,
     box: NDArray[np.float64] | None = None,
     periodic: tuple[bool, ...] | None = None,
-) -> list[Scene]:
-    """Read some frames of a file, at least one, as `read_scene` reads one.
+) -> Iterator[Scene]:
+    """Read some frames of a file one by one, at least one, as `read_scene` reads one.
+
+    None is kept. The reader is chosen by the first; one that fails later is an error that names
+    the frame.
 
     Raises
     ------
     InputError
         With the reason in one line.
     """
-    if not os.path.exists(file):
-        raise InputError(f"{file}: no such file")
-    if file_format is None and Path(file).suffix.lower() in (*_NUMPY, *_TEXT):
-        raise InputError(f"{file}: --index is for formats with several frames")
-    try:
-        scenes = _read_structures(file, file_format, frames)
-    except MemoryError:
-        raise InputError(f"{file}: does not fit in memory") from None
-    if not scenes:
-        raise InputError(f"{file}: has none of these frames")
-    for scene in scenes:
-        _check(scene)
-    return [_with_overrides(scene, box, periodic) for scene in scenes]
+    for scene in _read(file, file_format, frames, columns, trajectory):
+        yield _with_overrides(scene, box, periodic)
 
 
 def _shipped_scene() -> Scene:
@@ -167,83 +205,276 @@ def _shipped_scene() -> Scene:
     return Scene(positions, box, (True,) * 3, source, species, "angstrom")
 
 
-def _read_numpy(file: str, index: int | None) -> Scene:
-    if index is not None:
-        raise InputError(f"{file}: --index is for files with several frames, not for NumPy's")
-    if not os.path.isfile(file) and not os.path.isdir(file):  # a pipe may keep us waiting
-        raise InputError(f"{file}: cannot be read: not a regular file")
+def _read(
+    file: str,
+    file_format: str | None,
+    frames: Frames,
+    columns: Sequence[str] | None,
+    trajectory: str | None,
+) -> Iterator[Scene]:
+    """The frames of the first reader that yields a sensible one."""
+    with _as_path(file, file_format) as (path, name_of_path):
+        source = name_of_path
+        claimed = _refuse_claims(path, source)
+        if file_format is None and columns is None:
+            refuse_list(path, source)
+        readers = _readers(path, file_format, frames, columns)
+        if trajectory is not None:
+            if not os.path.exists(trajectory):
+                raise InputError(f"{trajectory}: no such file")
+            _refuse_claims(trajectory, trajectory)
+            source = f"{source} with {trajectory}"
+            whole = partial(by_mdanalysis, file_format=file_format, frames=frames,
+                            trajectory=trajectory)  # fmt: skip
+            readers = [("MDAnalysis", whole)]
+        said: dict[str, str] = {}
+        unknown: list[str] = []
+        for name, read in readers:
+            if name == _LAST and said and kind_of_file(path) != ".xyz":
+                continue
+            is_chosen = False
+            try:
+                for one in read(path):
+                    scene = Scene(
+                        one.points, one.box, one.periodic, source, one.species, one.unit,
+                        one.remarks, one.reader, one.no_box, one.frame,
+                    )  # fmt: skip
+                    _check(scene)
+                    is_chosen = True
+                    yield _with_claim(scene, claimed)
+                if is_chosen:
+                    return
+                raise InputError("has none of these frames")
+            except UnknownFormat:
+                unknown.append(name)
+            except (Exception, SystemExit) as error:  # a reader may fail in any way
+                said[name] = _reason(error).replace(path, name_of_path)
+                _forget(error)
+                if is_chosen or isinstance(error, MemoryError):
+                    raise InputError(f"{source}: {said[name]}") from None
+    if kind_of_file(path) == "" and len(said) > 1:
+        del said["text"]  # which other formats are as well
+    raise InputError(f"{source}: {_refusal(said, unknown, file_format)}")
+
+
+def _reason(error: BaseException) -> str:
+    """Why a reader failed, in one line."""
+    if isinstance(error, MemoryError):
+        return one_line(error) if str(error) else "does not fit in memory"
+    if isinstance(error, (InputError, BadLine, Unreadable)):
+        return one_line(error)
+    kind = "" if isinstance(error, OSError) else f"{type(error).__name__}: "
+    return f"cannot be read: {kind}{one_line(error)}"
+
+
+def _forget(error: BaseException) -> None:
+    """Drop what a reader left behind; Python would print how that, half made, fails to end."""
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
-        content, names = read_arrays(file)
-    except Unreadable as error:
-        raise InputError(f"{file}: {error}") from None
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {one_line(error)}") from None
-    except MemoryError as error:
-        reason = one_line(error) if str(error) else "it does not fit in memory"
-        raise InputError(f"{file}: {reason}") from None
+        traceback.clear_frames(error.__traceback__)
+    finally:
+        sys.unraisablehook = hook
+
+
+def _with_claim(scene: Scene, claimed: int) -> Scene:
+    """The scene with a remark if it has fewer points than the header of its file says."""
+    if len(scene.points) >= claimed:
+        return scene
+    remark = f"its header says {claimed:,} points, {len(scene.points):,} were read"
+    return replace(scene, remarks=(*scene.remarks, remark))
+
+
+def _refusal(said: dict[str, str], unknown: list[str], file_format: str | None) -> str:
+    """What each reader said, in one line."""
+    reasons = list(dict.fromkeys(said.values()))
+    if not unknown and len(reasons) == 1:
+        return reasons[0]
+    told = [f"{name}: {reason}" for name, reason in said.items()]
+    if not unknown:
+        return "; ".join(told)
+    form = "the format" if file_format is None else f"the format {file_format!r}"
+    many = f"{' and '.join(unknown)} {'do' if len(unknown) > 1 else 'does'} not know {form}"
+    if set(said) <= {_LAST}:
+        many = f"unknown format: {many} (see `ase info --formats`; force one with --format)"
+        return "; ".join([many, *told])
+    return "; ".join([*told, many])
+
+
+@contextmanager
+def _as_path(file: str, file_format: str | None) -> Iterator[tuple[str, str]]:
+    """The path of a file, which standard input and pipes are copied to, and its name for people."""
+    is_input = file == "-"
+    if not is_input and not os.path.exists(file):
+        raise InputError(f"{file}: no such file")
+    if not is_input and os.path.isdir(file) and file_format is None and not Path(file).suffix:
+        raise InputError(f"{file}: is a folder")
+    source = "standard input" if is_input else file
+    if not is_input and (os.path.isfile(file) or os.path.isdir(file) or is_numpy(file)):
+        yield file, source
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "input" + ("" if is_input else Path(file).suffix))
+        try:
+            with open(path, "xb") as copy:
+                if is_input:
+                    shutil.copyfileobj(sys.stdin.buffer, copy)
+                else:
+                    with open(file, "rb") as stream:
+                        shutil.copyfileobj(stream, copy)
+        except OSError as error:
+            raise InputError(f"{source}: cannot be read: {one_line(error)}") from None
+        yield path, source
+
+
+def _readers(
+    path: str, file_format: str | None, frames: Frames, columns: Sequence[str] | None
+) -> list[tuple[str, _Reader]]:
+    """The readers that may know a file, by name, in the order in which they are tried."""
+    suffix = kind_of_file(path)
+    by_text = partial(_by_text, columns=columns or (), is_pts=suffix == ".pts")
+    text = ("text", by_text)
+    structures: list[tuple[str, _Reader]] = [
+        ("ASE", partial(by_ase, file_format=file_format, frames=frames)),
+        ("MDAnalysis", partial(by_mdanalysis, file_format=file_format, frames=frames)),
+    ]
+    if columns:
+        readers: list[tuple[str, _Reader]] = [text]
+    elif file_format is not None:
+        return structures
+    elif is_numpy(path):
+        readers = [("NumPy", _by_numpy)]
+    elif suffix in CLOUDS:
+        readers = [(one[0], partial(_by_cloud, reader=one)) for one in CLOUDS[suffix]]
+    elif suffix in _TEXT_ALONE:
+        readers = [text]
+    elif suffix in _TEXT_FIRST:
+        return [text, *structures]
+    else:
+        return [*structures, (_LAST, partial(by_text, least=2))]
+    if frames is not None:
+        raise InputError(f"{path}: --index is for formats with several frames")
+    return readers
+
+
+def _by_numpy(path: str) -> list[Structure]:
+    if not os.path.isfile(path) and not os.path.isdir(path):  # a pipe may keep us waiting
+        raise InputError("cannot be read: not a regular file")
+    try:
+        content, names = read_arrays(path)
+    except (Unreadable, OSError, MemoryError):
+        raise
     except Exception as error:  # a broken file may fail in any part of zipfile, zlib and NumPy
         reason = one_line(error)
         if "Object arrays" in reason:
             reason = "it holds Python objects"
         elif "pickled" in reason:  # NumPy's guess where it knows no better
             reason = "it is not one"
-        raise InputError(f"{file}: cannot be read as a NumPy file: {reason}") from None
+        raise InputError(f"cannot be read as a NumPy file: {reason}") from None
     if "points" not in content:
         held = ", ".join(map(printable, names)) or "nothing"
-        raise InputError(f"{file}: has no array 'points' (it holds {held})")
+        raise InputError(f"has no array 'points' (it holds {held})")
     points, box = content["points"], content.get("box")
     if points.ndim != 2:
-        raise InputError(f"{file}: points have shape {points.shape}; they must be (n, d)")
+        raise InputError(f"points have shape {points.shape}; they must be (n, d)")
     periodic = np.asarray(content.get("periodic", box is not None))
     if periodic.dtype.kind != "b" or periodic.shape not in ((), (points.shape[1],)):
-        raise InputError(f"{file}: 'periodic' must be one bool, or one for each column of points")
+        raise InputError("'periodic' must be one bool, or one for each column of points")
     flags = np.broadcast_to(periodic, points.shape[1])
-    return Scene(points, box, tuple(bool(flag) for flag in flags), file)
+    reader = f"NumPy, {' and '.join(content)}"
+    return [Structure(points, box, tuple(bool(flag) for flag in flags), reader=reader)]
 
 
-def _read_text(file: str, index: int | None) -> Scene:
-    if index is not None:
-        raise InputError(f"{file}: --index is for formats with several frames")
+def _by_text(
+    path: str, columns: Sequence[str], is_pts: bool, least: int = 1
+) -> list[Structure]:
     try:
-        points = read_points(file)
-    except (BadLine, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: {one_line(error)}") from None
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {one_line(error)}") from None
-    return Scene(points, None, (False,) * points.shape[1], file)
+        points, what = read_points(path, columns, is_pts, least)
+    except UnicodeDecodeError:
+        raise InputError("is not text") from None
+    return [Structure(points, None, (False,) * points.shape[1], reader=f"text, {what}")]
 
 
-def _read_structures(file: str, file_format: str | None, index: int | slice | None) -> list[Scene]:
-    found = read_structures(file, file_format, index)
-    return [
-        Scene(one.points, one.box, one.periodic, file, one.species, "angstrom", one.remarks)
-        for one in found
-    ]
+def _by_cloud(path: str, reader: Any) -> list[Structure]:
+    points, name = read_cloud(path, reader)
+    return [Structure(points, reader=name)]
+
+
+# What headers say of the number of points, the least number of bytes for each of them, and the
+# suffixes of the format where others may have a number in this place.
+_CLAIMS = (
+    (re.compile(rb"\s*(\d+)\s"), 2, (".xyz", ".extxyz", ".txyz", ".arc", ".pts")),
+    (re.compile(rb"[^\n]*\n\s*(\d+)\s"), 2, (".gro",)),
+    (re.compile(rb"(?:\*[^\n]*\n)+\s*(\d+)\b"), 2, (".crd", ".cor")),
+    (re.compile(rb"(?:[^\n]*\n){1,4}?\s*(\d+)\s+atoms\b"), 2, ()),  # LAMMPS data
+    (re.compile(rb"ITEM: .{,1000}?ITEM: NUMBER OF ATOMS\s+(\d+)", re.S), 2, ()),  # LAMMPS dump
+    (re.compile(rb"ply\b.{,20000}?\nelement vertex (\d+)", re.S), 1, ()),
+    (re.compile(rb"(?:#[^\n]*\n)*VERSION.{,20000}?\nPOINTS (\d+)", re.S), 1, (".pcd",)),
+    (re.compile(rb"# vtk DataFile.{,20000}?\nPOINTS (\d+)", re.S), 2, ()),
+)
+
+
+def _refuse_claims(path: str, source: str) -> int:
+    """How many points a header says, or 0; InputError if a file is empty, or cannot hold these."""
+    if not os.path.isfile(path):
+        return 0
+    size = os.path.getsize(path)
+    if size == 0:
+        raise InputError(f"{source}: is empty")
+    try:
+        with open(path, "rb") as stream:
+            head = stream.read(1 << 16)
+        if head[4:8] == b"CORD" or head[8:12] == b"CORD":
+            claimed, least = _claim_of_dcd(head), 12
+        else:
+            kind = kind_of_file(path)
+            found = (
+                (pattern.match(head), least) for pattern, least, kinds in _CLAIMS
+                if not kinds or kind in kinds
+            )  # fmt: skip
+            claimed, least = next(((int(m[1]), least) for m, least in found if m), (0, 1))
+    except (OSError, ValueError, struct.error):
+        return 0  # which its reader will say
+    if claimed > size // least:
+        raise InputError(
+            f"{source}: says that it holds {claimed:,} points, more than its {size:,} bytes can"
+        )
+    return claimed
+
+
+def _claim_of_dcd(head: bytes) -> int:
+    """The number of atoms in the third record of a DCD file, of either order and width."""
+    width = 4 if head[4:8] == b"CORD" else 8
+    order = "<" if head[0] == 84 else ">"
+    at = 0
+    for _ in range(2):
+        at += struct.unpack_from(f"{order}i", head, at if order == "<" else at + width - 4)[0]
+        at += 2 * width
+    return int(struct.unpack_from(f"{order}i", head, at + width)[0])
 
 
 def _check(scene: Scene) -> None:
     """Say what is wrong with points or box before anything is computed from them."""
-    points, source = scene.points, scene.source
+    points, frame = scene.points, scene.frame and f"{scene.frame}: "
     if points.dtype.kind not in "fiub":
-        raise InputError(f"{source}: points are of type {points.dtype}; they must be numbers")
+        raise InputError(f"{frame}points are of type {points.dtype}; they must be numbers")
     if not len(points):
-        raise InputError(f"{source}: holds no points")
+        raise InputError(f"{frame}holds no points")
     if points.shape[1] == 0:
-        raise InputError(f"{source}: points have shape {points.shape}; they must be (n, d)")
+        raise InputError(f"{frame}points have shape {points.shape}; they must be (n, d)")
     for first in range(0, len(points), ROWS_CHECKED):
         block = points[first : first + ROWS_CHECKED]
         if not np.isfinite(block).all():
             row, column = (int(k) for k in np.argwhere(~np.isfinite(block))[0])
             value = block[row, column]
-            raise InputError(f"{source}: point {first + row}, coordinate {column} is {value}")
+            raise InputError(f"{frame}point {first + row}, coordinate {column} is {value}")
     if scene.box is None:
         return
     ndim = points.shape[1]
     if scene.box.dtype.kind not in "fiu" or not np.isfinite(scene.box).all():
-        raise InputError(f"{source}: the box must be finite numbers, it is {scene.box.tolist()}")
+        raise InputError(f"{frame}the box must be finite numbers, it is {scene.box.tolist()}")
     if scene.box.shape not in ((ndim,), (ndim, ndim)):
         raise InputError(
-            f"{source}: the box has shape {scene.box.shape}; "
+            f"{frame}the box has shape {scene.box.shape}; "
             f"it must be ({ndim},) or ({ndim}, {ndim})"
         )
 
@@ -276,7 +507,7 @@ def _with_overrides(
             )
         scene = replace(scene, periodic=periodic * (ndim // len(periodic)))
     if scene.box is None and any(scene.periodic):
-        raise InputError(f"{scene.source}: has periodic axes but no box (give --box)")
+        raise InputError(f"{scene.where}: has periodic axes but no box (give --box)")
     return scene
 
 

@@ -22,6 +22,8 @@ from halfshell._cli.files import Scene, read_scene
 from halfshell._cli.output import check_size, open_output, write_columns
 from halfshell._cli.scene import (
     describe_box,
+    describe_points,
+    describe_source,
     load_frames,
     load_scene,
     read_points,
@@ -116,19 +118,24 @@ def run_nearest(args: Namespace) -> int:
 def run_rdf(args: Namespace) -> int:
     """Carry out ``halfshell rdf``."""
 
-    def find(frames: list[Scene], cutoff: float) -> Found:
-        found = [_distribution(frame, cutoff, args) for frame in frames]
-        result = sum(found[1:], start=found[0])
+    def find() -> Found:
+        result: Any = None
+        sizes: set[int] = set()
+        n_frames = 0
+        for frame in frames:
+            found = _distribution(frame, cutoff, args)
+            result = found if result is None else result + found
+            sizes.add(len(frame.points))
+            n_frames += 1
         columns: Columns = {"r": result.r, "g": result.g, "counts": result.counts}
         highest = int(result.g.argmax())
         peak = [float(result.r[highest]), float(result.g[highest])]
-        facts: dict[str, Any] = {"frames": len(frames), "bins": args.bins, "highest": peak}
+        facts: dict[str, Any] = {"frames": n_frames, "bins": args.bins, "highest": peak}
         facts["pairs"] = int(result.counts.sum())
-        unit = unit_suffix(frames[0])
-        all_frames = f", of {len(frames):,} frames" if len(frames) > 1 else ""
-        sizes = sorted({len(frame.points) for frame in frames})
+        unit = unit_suffix(first)
+        all_frames = f", of {n_frames:,} frames" if n_frames > 1 else ""
         if len(sizes) > 1:
-            all_frames += f" of {sizes[0]:,} to {sizes[-1]:,} points"
+            all_frames += f" of {min(sizes):,} to {max(sizes):,} points"
         lines = [
             ("bins", f"{args.bins:,}, of {cutoff / args.bins:.6g}{unit}"),
             ("pairs", f"{facts['pairs']:,}   (each once{all_frames})"),
@@ -136,16 +143,16 @@ def run_rdf(args: Namespace) -> int:
         ]
         return Found(columns, facts, lines)
 
-    frames, cutoff, reason = load_frames(args)
-    return _run_loaded(args, frames[0], cutoff, reason, lambda: find(frames, cutoff))
+    first, frames, cutoff, reason = load_frames(args)
+    return _run_loaded(args, first, cutoff, reason, find)
 
 
 def _distribution(scene: Scene, cutoff: float, args: Namespace) -> Any:
     if scene.box is None or not all(scene.periodic):
-        raise InputError(f"{scene.source}: g(r) needs a box that is periodic along every axis")
+        raise InputError(f"{scene.where}: g(r) needs a box that is periodic along every axis")
     options = _options(scene, scene, args)
     del options["inclusive"]
-    return hs.rdf(scene.points, cutoff, args.bins, **options)
+    return _call(scene, lambda: hs.rdf(scene.points, cutoff, args.bins, **options))
 
 
 # ---- what they share -------------------------------------------------------------------------
@@ -207,7 +214,7 @@ def _call(scene: Scene, function: Callable[[], Any]) -> Any:
     try:
         return function()
     except (ValueError, TypeError, OverflowError, MemoryError) as error:
-        raise InputError(f"{scene.source}: {one_line(error)}") from None
+        raise InputError(f"{scene.where}: {one_line(error)}") from None
 
 
 def _of_counts(
@@ -248,14 +255,15 @@ def _print(
     if args.output == "-":
         return
     if args.json:
-        first: dict[str, Any] = {"file": scene.source, "points": len(scene.points)}
+        first = describe_source(scene) | ({"no_box": scene.no_box} if scene.no_box else {})
         if getattr(args, "queries", None) is not None:
             first["queries"] = args.queries
         print(json.dumps({**first, **facts, "seconds": took, "output": args.output}, indent=2))
         return
-    shown = [("points", f"{len(scene.points):,}"), ("box", describe_box(scene)), *lines]
+    shown = describe_points(scene)
     if getattr(args, "queries", None) is not None:
-        shown.insert(1, ("queries", args.queries))
+        shown.append(("queries", args.queries))
+    shown += [("box", describe_box(scene)), *lines]
     shown.append(("time", f"{took:.3g} s" if took >= 1 else f"{took * 1e3:.3g} ms"))
     if args.output:
         shown.append(("written to", args.output))

@@ -75,6 +75,8 @@ class _Parser(argparse.ArgumentParser):
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         found, rest = super().parse_known_args(args, namespace)
+        if rest and not rest[0].startswith("-") and getattr(found, "list", "") is None:
+            found.list = rest.pop(0)  # argparse leaves a file that comes after options
         if rest:  # here, where the options of the command are known
             self.error(f"unrecognized arguments: {' '.join(rest)}{self._hint(rest)}")
         return found, rest
@@ -133,8 +135,8 @@ def _add_scene_options(
         "file",
         nargs="?",
         metavar="FILE",
-        help=".npy, .npz, text with one point per line, or anything that ase.io.read reads; "
-        "default: alpha-quartz",
+        help=".npy, .npz, text with one point per line, point clouds, or anything that ASE or "
+        "MDAnalysis reads; - for standard input; default: alpha-quartz",
     )
     if has_cutoff:
         command.add_argument(
@@ -156,7 +158,17 @@ def _add_scene_options(
         metavar="TTF",
         help="which axes are periodic, T or F for each, or one letter for all",
     )
-    command.add_argument("--format", metavar="NAME", help="ase format, if it is not recognised")
+    command.add_argument(
+        "--columns", type=values.columns, metavar="X,Y,Z",
+        help="of text, the coordinates: names of columns, or numbers from 1 on"
+    )  # fmt: skip
+    command.add_argument(
+        "--trajectory", metavar="FILE",
+        help="frames of which the first FILE is the topology, as MDAnalysis reads both"
+    )  # fmt: skip
+    command.add_argument(
+        "--format", metavar="NAME", help="format of ASE or MDAnalysis, if it is not recognised"
+    )
     if has_frames:
         command.add_argument(
             "--index", type=values.frames, metavar="N",
@@ -269,6 +281,10 @@ def _add_verify(commands: Any) -> None:
         "verify", help="check a list of pairs, of halfshell or another library, exactly"
     )
     _add_scene_options(command)
+    command.add_argument(
+        "list", nargs="?", metavar="LIST",
+        help="a saved list: .csv, .npz, .parquet with columns i and j, or the like, and shifts"
+    )  # fmt: skip
     command.add_argument(
         "--against",
         metavar="LIBRARY",

@@ -12,6 +12,7 @@ import math
 import os
 import warnings
 import zipfile
+from collections.abc import Sequence
 from typing import IO, Any
 
 import numpy as np
@@ -20,8 +21,9 @@ from numpy.typing import NDArray
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.scene import MAX_DIM, MAX_POINTS
 
-__all__ = ["Unreadable", "read_arrays"]
+__all__ = ["Unreadable", "is_numpy", "read_arrays"]
 
+_SCENE = ("points", "box", "periodic")
 _MAGIC = np.lib.format.MAGIC_PREFIX
 MOST_HEADER = 10_000  # bytes, as np.load has it
 _COPIES = 2  # of the points: what is read, and the search's own
@@ -31,13 +33,25 @@ class Unreadable(Exception):
     """A file that is not read, with the reason."""
 
 
-def read_arrays(file: str) -> tuple[dict[str, NDArray[Any]], list[str]]:
-    """Read `points`, `box` and `periodic`, as far as they are there.
+def is_numpy(file: str) -> bool:
+    """Whether a file is one by its name, or without one by what it begins with."""
+    suffix = os.path.splitext(file)[1]
+    if suffix or not os.path.isfile(file):
+        return suffix.lower() in (".npy", ".npz")
+    with open(file, "rb") as stream:
+        start = stream.read(len(_MAGIC))
+    return start == _MAGIC or start.startswith(b"PK\x03\x04")
+
+
+def read_arrays(
+    file: str, wanted: Sequence[str] = _SCENE
+) -> tuple[dict[str, NDArray[Any]], list[str]]:
+    """Read some arrays, as far as they are there.
 
     Returns
     -------
     arrays : dict
-        The arrays by name; that of a ``.npy`` file is `points`.
+        The arrays by name; that of a ``.npy`` file is `points`, or ``alone`` if others are wanted.
     names : list of str
         All that the file holds.
 
@@ -52,15 +66,18 @@ def read_arrays(file: str) -> tuple[dict[str, NDArray[Any]], list[str]]:
     """
     with open(file, "rb") as stream, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of headers that Python 2 wrote
+        alone = "points" if "points" in wanted else "alone"
         if stream.peek(len(_MAGIC)).startswith(_MAGIC):
-            _check_header("points", stream, os.fstat(stream.fileno()).st_size)
+            _check_header(alone, stream, os.fstat(stream.fileno()).st_size)
+            if alone not in wanted:
+                return {}, [alone]
             stream.seek(0)
         loaded = np.load(stream, allow_pickle=False, max_header_size=MOST_HEADER)
         if isinstance(loaded, np.ndarray):
-            return {"points": loaded}, ["points"]
+            return {alone: loaded}, [alone]
         names = list(loaded.files)
-        wanted = [name for name in ("points", "box", "periodic") if name in names]
-        return {name: loaded[name] for name in wanted if _is_array(name, loaded.zip)}, names
+        held = [name for name in wanted if name in names]
+        return {name: loaded[name] for name in held if _is_array(name, loaded.zip)}, names
 
 
 def _is_array(name: str, archive: zipfile.ZipFile) -> bool:
@@ -85,9 +102,11 @@ def _check_header(name: str, stream: IO[bytes], n_bytes: int) -> None:
         raise Unreadable(f"{name!r} has shape {shape}; no length is negative")
     needed = math.prod(shape) * dtype.itemsize
     what = f"{name!r} of shape {shape} and dtype {dtype}"
-    if name != "points":
+    if name in ("box", "periodic"):
         if math.prod(shape) > MAX_DIM**2:
             raise Unreadable(f"{name!r} has shape {shape}, more than a box has")
+    elif name != "points":
+        pass
     elif len(shape) != 2:
         raise Unreadable(f"points have shape {shape}; they must be (n, d)")
     elif shape[1] > MAX_DIM:

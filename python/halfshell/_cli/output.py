@@ -47,7 +47,8 @@ def open_output(
         raise InputError(f"{target}: the name must end in {', '.join(first)} or {last}")
     if target.lower().endswith(".parquet") and find_spec("pyarrow") is None:
         raise missing_extra(f"{target}: writing Parquet", "pyarrow")
-    if source is not None and os.path.exists(target) and os.path.samefile(target, source):
+    exist = source is not None and os.path.exists(target) and os.path.exists(source)
+    if source is not None and exist and os.path.samefile(target, source):
         raise InputError(f"{target}: is the input; it is not overwritten")
     return stack.enter_context(replacing(target))
 

@@ -22,6 +22,8 @@ from halfshell._cli.output import check_size, open_output, write_columns
 from halfshell._cli.progress import progress_bar
 from halfshell._cli.scene import (
     describe_box,
+    describe_points,
+    describe_source,
     load_scene,
     plot_distribution,
     require_matplotlib,
@@ -38,11 +40,13 @@ class Summary:
     """What the command found out; written as text or as JSON."""
 
     file: str
+    reader: str
     points: int
     dimensions: int
     species: dict[str, int]
     unit: str
     box: list[list[float]] | None
+    no_box: str
     periodic: list[bool]
     cutoff: float
     cutoff_chosen: bool
@@ -92,12 +96,11 @@ def run(args: Namespace) -> int:
     box = scene.box_rows
     names, counts = np.unique([] if scene.species is None else scene.species, return_counts=True)
     summary = Summary(
-        file=scene.source,
-        points=len(scene.points),
-        dimensions=scene.points.shape[1],
+        **describe_source(scene),
         species=dict(zip(names.tolist(), counts.tolist(), strict=True)),
         unit=scene.unit,
         box=box.tolist() if box is not None else None,
+        no_box=scene.no_box,
         periodic=list(scene.periodic),
         cutoff=cutoff,
         cutoff_chosen=args.cutoff is None,
@@ -159,12 +162,11 @@ def _text(summary: Summary, scene: Scene, reason: str) -> str:
     """Return the summary for a person: one aligned line an item."""
     unit = unit_suffix(scene)
     rule = "d <= cutoff" if summary.inclusive else "d < cutoff"
-    species = "  ".join(f"{name} {count:,}" for name, count in summary.species.items())
     chosen = f"   (chosen: {reason}; --cutoff sets it)" if reason else ""
     nearest = summary.nearest_distance
     speed = summary.pairs / summary.seconds / 1e6 if summary.seconds else 0.0
     lines = [
-        ("points", f"{summary.points:,}" + (f"   {species}" if species else "")),
+        *describe_points(scene),
         ("box", describe_box(scene)),
         ("cutoff", f"{summary.cutoff:.6g}{unit}{chosen}"),
         ("pairs", f"{summary.pairs:,}   ({rule}, each pair once)"),

@@ -22,23 +22,24 @@ __all__ = ["PEERS", "PairList", "Peer", "ask_peer", "find_peer"]
 
 @dataclass(frozen=True)
 class PairList:
-    """Somebody's list of pairs.
+    """A list of pairs that is to be checked.
 
     Attributes
     ----------
     i, j : ndarray of int64, shape (m,)
-    S : ndarray of int64, shape (m, d)
+    S : ndarray of int64, shape (m, d), or None
+        None of a file that has no shifts.
     inclusive : bool
         The rule of its author: ``d <= cutoff``, or ``d < cutoff``.
-    full : bool
-        Whether it has both directions of every pair.
+    full : bool or None
+        Whether it has both directions of every pair; None as long as this is not known.
     """
 
     i: NDArray[np.int64]
     j: NDArray[np.int64]
-    S: NDArray[np.int64]
+    S: NDArray[np.int64] | None
     inclusive: bool
-    full: bool
+    full: bool | None
 
     def among(self, rows: NDArray[np.intp] | None, n: int) -> PairList:
         """Return the pairs among some of n points, numbered by their place among these."""
@@ -48,7 +49,8 @@ class PairList:
         place[rows] = np.arange(len(rows))
         i, j = place[self.i], place[self.j]
         kept = (i >= 0) & (j >= 0)
-        return PairList(i[kept], j[kept], self.S[kept], self.inclusive, self.full)
+        shifts = None if self.S is None else self.S[kept]
+        return PairList(i[kept], j[kept], shifts, self.inclusive, self.full)
 
 
 def _ask(library: Library, scene: Scene, cutoff: float) -> PairList:

@@ -23,32 +23,30 @@ if TYPE_CHECKING:
 
 __all__ = ["add_options", "add_peers", "run"]
 
-#: What ``--quick`` runs unless scenes are named: one of each kind, under a minute in all.
-QUICK = (
-    "uniform", "fcc-shell", "silicon-shell", "fcc-rotated", "near-ties", "hair-ties",
-    "float32-ulp", "half-box", "offset-1e9", "many-boxes", "needle", "angle-5", "sheared-1000",
-    "slab", "lognormal", "coincident", "subnormal", "plane-2d", "head-on", "stiff-chain",
-    "balls-decades", "balls-ties", "balls-rounded", "balls-giant", "needles",
-)  # fmt: skip
 _FULL_SECONDS = 10.0  # of a processor, a scene of full size by all methods of ours
 _DETAILED = 4  # scenes at most whose tables are printed unasked
 
 
 def add_options(command: ArgumentParser) -> None:
     """Add the options of the command."""
-    command.add_argument("--quick", action="store_true", help="under a minute: small, few scenes")
-    command.add_argument(
-        "--size",
-        choices=("small", "quick", "full"),
+    sizes = command.add_mutually_exclusive_group()
+    sizes.add_argument(
+        "--size", choices=("small", "quick", "full"), default="quick",
         help="size of the scenes: some hundred, some thousand, about 100,000 points; "
         "default: quick",
+    )  # fmt: skip
+    sizes.add_argument(
+        "--quick", action="store_const", const="quick", dest="size", help="the same as --size quick"
     )
-    command.add_argument("--scenes", type=_names, metavar="A,B", help="which; default: all")
+    command.add_argument(
+        "--scenes", type=_names, metavar="A,B",
+        help="which, or 'all'; default: with --size quick one of each kind, about 20 s, else all",
+    )  # fmt: skip
     command.add_argument(
         "--methods", type=_names, metavar="A,B",
         help="of exact, double, single, float32, verlet, stale; default: all",
     )  # fmt: skip
-    add_peers(command, "; default: 60, with --quick 3, and 4 for all scenes together")
+    add_peers(command, "; default: 60; with --size quick 1, and 2 for all scenes")
     command.add_argument(
         "-o", "--output", metavar="DIR", default="halfshell-report",
         help="folder for report.csv and report.html; default: halfshell-report",
@@ -142,9 +140,7 @@ def _list() -> int:
 def _plan(args: Namespace) -> Plan:
     from halfshell._report.measure.run import plan_of
 
-    scenes: Sequence[str] | None = args.scenes
-    if scenes is None and args.quick:
-        scenes = QUICK
+    scenes: Sequence[str] | str | None = "all" if args.scenes == ("all",) else args.scenes
     peers: Sequence[str] | str | None = "all" if args.peers is None else args.peers
     if args.peers in (("all",), ("none",)):
         peers = args.peers[0]
@@ -153,7 +149,7 @@ def _plan(args: Namespace) -> Plan:
         if names == ():
             raise InputError(f"{option} names nothing")
     try:
-        return plan_of(scenes, args.methods, peers, args.size or "quick", args.patience)
+        return plan_of(scenes, args.methods, peers, args.size, args.patience)
     except ValueError as error:
         raise InputError(f"{error} (halfshell report --list names them)") from None
 

@@ -6,8 +6,10 @@ from __future__ import annotations
 import math
 import sys
 from argparse import Namespace
+from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,8 @@ from halfshell._terminal import printable
 __all__ = [
     "choose_cutoff",
     "describe_box",
+    "describe_points",
+    "describe_source",
     "load_scene",
     "plot_distribution",
     "radial_distribution",
@@ -42,20 +46,24 @@ def load_scene(args: Namespace) -> tuple[Scene, float, str]:
     return scene, *choose_cutoff(scene)
 
 
-def load_frames(args: Namespace) -> tuple[list[Scene], float, str]:
-    """Return the frames that --index names, and the cutoff as `load_scene` does, of the first."""
+def load_frames(args: Namespace) -> tuple[Scene, Iterator[Scene], float, str]:
+    """Return the first frame that --index names, and all, which are read when they are wanted.
+
+    Then the cutoff as `load_scene` does, of the first.
+    """
     if not isinstance(args.index, slice):
         scene, cutoff, reason = load_scene(args)
-        return [scene], cutoff, reason
+        return scene, iter([scene]), cutoff, reason
     if args.file is None:
         raise InputError("--index names frames: give a file that has some")
-    scenes = read_frames(
-        args.file, args.index, file_format=args.format, box=args.box, periodic=args.periodic
-    )
-    _tell_remarks(scenes[0])
-    if args.cutoff is not None:
-        return scenes, args.cutoff, ""
-    return scenes, *choose_cutoff(scenes[0])
+    frames = read_frames(
+        args.file, args.index, file_format=args.format, columns=args.columns,
+        trajectory=args.trajectory, box=args.box, periodic=args.periodic,
+    )  # fmt: skip
+    first = next(frames)
+    _tell_remarks(first)
+    cutoff, reason = (args.cutoff, "") if args.cutoff is not None else choose_cutoff(first)
+    return first, chain([first], frames), cutoff, reason
 
 
 def read_points(args: Namespace) -> Scene:
@@ -64,6 +72,8 @@ def read_points(args: Namespace) -> Scene:
         args.file,
         file_format=args.format,
         index=args.index,
+        columns=args.columns,
+        trajectory=args.trajectory,
         box=args.box,
         periodic=args.periodic,
     )
@@ -141,11 +151,27 @@ def unit_suffix(scene: Scene) -> str:
     return " Å"
 
 
+def describe_source(scene: Scene) -> dict[str, Any]:
+    """Return what a summary says of every scene, for machines."""
+    n, ndim = scene.points.shape
+    return {"file": scene.source, "reader": scene.reader, "points": n, "dimensions": ndim}
+
+
+def describe_points(scene: Scene) -> list[tuple[str, str]]:
+    """Return the same for people, below the name of the file: lines of a summary."""
+    n, ndim = scene.points.shape
+    names, counts = np.unique([] if scene.species is None else scene.species, return_counts=True)
+    species = "  ".join(f"{name} {k:,}" for name, k in zip(names, counts, strict=True))
+    points = ("points", f"{n:,} in {ndim}-D" + (f"   {species}" if species else ""))
+    return [("read by", scene.reader), points] if scene.reader else [points]
+
+
 def describe_box(scene: Scene) -> str:
     """Return the edge lengths, the angles unless they are right, and what repeats."""
     rows = scene.box_rows
     if rows is None or not any(scene.periodic):
-        return "none (open in every direction)"
+        left_out = f"; that of the file is left out: {scene.no_box}" if scene.no_box else ""
+        return f"none (open in every direction{left_out})"
     lengths = np.sqrt((rows * rows).sum(axis=1))
     sizes = [
         f"{length:.6g}" if flag else "open"

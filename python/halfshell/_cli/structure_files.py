@@ -1,129 +1,460 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Structures and trajectories, in the formats of ASE, or else of MDAnalysis."""
+"""Structures and trajectories, as ASE and MDAnalysis read them, and what each needs help with."""
 
 from __future__ import annotations
 
+import io
+import itertools
+import re
 import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from halfshell._cli.errors import InputError, missing_extra, one_line
+from halfshell._cli.errors import InputError, missing_extra
+from halfshell._cli.text_files import open_bytes
+from halfshell._convert.foreign_box import placeholder
+from halfshell._convert.species import SYMBOLS
 
-__all__ = ["Structure", "read_structures"]
+__all__ = ["Structure", "UnknownFormat", "by_ase", "by_mdanalysis", "kind_of_file"]
+
+Frames = int | slice | None
+
+_PACKED = {".gz", ".bz2", ".xz"}
+_OF_CELL = ((0, 9), (9, 9), (18, 9), (27, 7), (34, 7), (41, 7))  # numbers of a line CRYST1
+_CELL_OF_MMCIF = (
+    "length_a", "length_b", "length_c", "angle_alpha", "angle_beta", "angle_gamma"
+)  # fmt: skip
+_CIF_WORD = re.compile(r"""'(.*?)'(?=\s)|"(.*?)"(?=\s)|(\S+)""")
+_LAMMPS_STYLES = (None, "molecular", "charge", "full", "atomic")  # None: what the file says
+
+
+class UnknownFormat(Exception):
+    """A reader does not know the format of a file."""
 
 
 class Structure(NamedTuple):
-    """A frame of a file: coordinates in angstrom, edge vectors or None, periodic axes, elements."""
+    """What a reader made of a frame.
+
+    Points with edge vectors (or None), periodic axes and elements as far as they are known; what it
+    warned of, its name with that of the format, and why a box that the file has is none.
+    """
 
     points: NDArray[Any]
-    box: NDArray[np.float64] | None
-    periodic: tuple[bool, ...]
-    species: NDArray[np.str_] | None
-    remarks: tuple[str, ...]
+    box: NDArray[Any] | None = None
+    periodic: tuple[bool, ...] = (False,) * 3
+    species: NDArray[np.str_] | None = None
+    remarks: tuple[str, ...] = ()
+    reader: str = ""
+    unit: str = ""
+    no_box: str = ""
+    frame: str = ""
 
 
-def read_structures(
-    file: str, file_format: str | None, index: int | slice | None
-) -> list[Structure]:
-    """The frames that are meant: one, by default the last, unless `index` is a range.
+def kind_of_file(file: str) -> str:
+    """The last suffix of a name without that of a compression, in small letters: ``.pdb``."""
+    path = Path(file)
+    return (path.with_suffix("") if path.suffix.lower() in _PACKED else path).suffix.lower()
+
+
+# ---- ASE ---------------------------------------------------------------------------------------
+
+
+def by_ase(file: str, file_format: str | None, frames: Frames) -> Iterator[Structure]:
+    """Frames as ASE reads them: one, by default the last, unless `frames` is a range.
+
+    Those of a range are read one by one, where the reader of the format does so.
+
+    LAMMPS data, mmCIF and VASP 4 are told from what the file holds, because ASE does not.
 
     Raises
     ------
-    InputError
-        With the reason in one line.
+    UnknownFormat, InputError, Exception
+        ASE may raise anything for a broken file.
     """
     try:
+        import ase
         import ase.io
-        from ase.io.formats import UnknownFileTypeError
+        from ase.io.formats import UnknownFileTypeError, filetype
     except ImportError:
-        found = None if file_format else _by_mdanalysis(file, index)
-        if found is None:
-            raise missing_extra(f"{file}: reading this file", "ase") from None
-        return found
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+        raise missing_extra("reading this file", "ase") from None
+    own = None if file_format else _ase_needs_help(file)
+    with _warnings() as remarks:
         try:
-            atoms: Any = ase.io.read(
-                file,
-                index=-1 if index is None else index,
-                format=file_format,
-                do_not_split_by_at_sign=True,
-            )
-        except UnknownFileTypeError as error:
-            found = None if file_format else _by_mdanalysis(file, index)
-            if found is not None:
-                return found
-            name = file_format or one_line(error)
-            raise InputError(
-                f"{file}: unknown format{f' {name!r}' if name else ''} "
-                "(see `ase info --formats`; force one with --format)"
-            ) from None
-        except OSError as error:
-            raise InputError(f"{file}: cannot be read: {one_line(error)}") from None
+            name = file_format or (own[0] if own else filetype(file))
+            read = partial(ase.io.read, file, format=name, do_not_split_by_at_sign=True)
+            read = partial(_all_of, own[1]) if own else read
+            found: Any
+            if isinstance(frames, slice) and not own:
+                found = ase.io.iread(file, frames, format=name, do_not_split_by_at_sign=True)
+            elif isinstance(frames, slice):
+                found = read(index=frames)
+            else:
+                number = -1 if frames is None else frames
+                found = [read(index=number)]
+                if not len(found[0]):  # such as that between ENDMDL and END of a PDB file
+                    found = [[atoms for atoms in read(index=slice(None)) if len(atoms)][number]]
+        except UnknownFileTypeError:
+            raise UnknownFormat from None
         except (IndexError, StopIteration) as error:
-            what = f"has no frame {index}" if isinstance(index, int) else "holds no atoms"
-            detail = f" ({one_line(error)})" if str(error) else ""
-            raise InputError(f"{file}: {what}{detail}") from None
+            what = f"has no frame {frames}" if isinstance(frames, int) else "holds no atoms"
+            detail = f" ({' '.join(str(error).split())})" if str(error) else ""
+            raise InputError(what + detail) from None
+    reader = f"ASE {ase.__version__}, {name}"
+    for frame, atoms in _each(found, frames, remarks):
+        if len(atoms):
+            one = _of_atoms(atoms, tuple(remarks), reader, "lammps" in name)
+            yield one._replace(frame=frame)
+        elif isinstance(frames, slice) and min(frames.start or 0, frames.stop or 0) < 0:
+            raise InputError(f"{frame} holds no atoms: count frames from the first on")
+
+
+def _all_of(read: Callable[[], list[Any]], index: int | slice) -> Any:
+    return read()[index]
+
+
+def _of_atoms(atoms: Any, remarks: tuple[str, ...], reader: str, is_lammps: bool) -> Structure:
+    names, residues = (atoms.arrays.get(part) for part in ("atomtypes", "residuenames"))
+    species: NDArray[np.str_] | None = np.array(atoms.get_chemical_symbols())
+    if is_lammps and np.array_equal(atoms.arrays.get("type", ()), atoms.numbers):
+        species, reader = None, f"{reader}: types, not elements"
+    elif names is not None and residues is not None and not _plausible(species, residues):
+        species = _elements(names, residues)
+        reader = f"{reader}: elements by names of atoms"
+    box = atoms.cell.array if atoms.cell.rank > 0 else None
+    no_box = placeholder(atoms.cell.array, residues is not None) if atoms.pbc.any() else ""
+    periodic = tuple(bool(flag) for flag in atoms.pbc)
+    if no_box:
+        box, periodic = None, (False,) * 3
+    unit = "" if is_lammps else "angstrom"
+    species = None if species is None else _known(species)
+    return Structure(atoms.positions, box, periodic, species, remarks, reader, unit, no_box)
+
+
+def _ase_needs_help(file: str) -> tuple[str, Callable[[], list[Any]]] | None:
+    """A format that ASE does not recognise, but may read, and how."""
+    with open_bytes(file) as stream:
+        head = stream.read(1 << 14)
+    if b"_atom_site.Cartn_x" in head or re.match(rb"data_\w+\s+#\s+_entry\.id", head):
+        return "mmcif", partial(_of_mmcif, file)
+    if re.search(rb"^\s*\d+\s+atoms\b", head[:4000], re.M) and b"atom types" in head:
+        return "lammps-data", partial(_of_lammps, file)
+    cell = re.search(rb"^CRYST1(.{48})", head, re.M)
+    if cell and any(not float(cell[1][k : k + width].strip() or 0) for k, width in _OF_CELL):
+        return "proteindatabank", partial(_of_pdb_without_cell, file)
+    lines = head.splitlines()[:8]
+    counts = lines[5].split() if len(lines) == 8 else ()
+    vectors = [_numbers_of(line) for line in lines[1:5]]
+    if counts and all(map(bytes.isdigit, counts)) and vectors == [1, 3, 3, 3]:
+        return "vasp 4", partial(_of_vasp4, file)
+    return None
+
+
+def _numbers_of(line: bytes) -> int:
+    """How many numbers a line holds; -1 if it holds anything else."""
+    try:
+        return len([float(word) for word in line.split()])
+    except ValueError:
+        return -1
+
+
+def _of_lammps(file: str) -> list[Any]:
+    """LAMMPS data, by the style that it names or else by each that fits; no image is unwrapped."""
+    import ase.io
+
+    said = []
+    for style in _LAMMPS_STYLES:
+        try:
+            return [ase.io.read(file, format="lammps-data", atom_style=style,
+                                read_image_flags=False, do_not_split_by_at_sign=True)]  # fmt: skip
         except MemoryError:
             raise
-        except Exception as error:  # a reader may fail in any way on a broken file
-            raise _unreadable(file, error) from None
-    remarks = _remarks(caught)
-    return [
-        Structure(
-            one.positions,
-            one.cell.array if one.cell.rank > 0 else None,
-            tuple(bool(flag) for flag in one.pbc),
-            np.array(one.get_chemical_symbols()),
-            remarks,
-        )
-        for one in (atoms if isinstance(index, slice) else [atoms])
-    ]
+        except Exception as error:
+            said.append(f"{style or 'the style of the file'}: {' '.join(str(error).split())}")
+    raise InputError("no style of atoms fits: " + "; ".join(said))
 
 
-def _by_mdanalysis(file: str, index: int | slice | None) -> list[Structure] | None:
-    """Frames as MDAnalysis reads them; None where it is missing or does not know the format."""
+def _of_mmcif(file: str) -> list[Any]:
+    """The models of an mmCIF file, whose coordinates are Cartesian; ASE's parser takes minutes."""
+    from ase import Atoms
+
+    cell, sites = _mmcif_tables(file)
+    keys = ["type_symbol", "cartn_x", "cartn_y", "cartn_z"]
+    if not all(sites.get(key) for key in keys):
+        raise InputError("holds no atoms")
+    symbols, *axes = (np.array(sites[key]) for key in keys)
+    points = np.stack(axes, axis=1).astype(np.float64)
+    species = ["H" if s == "D" else s.capitalize() for s in symbols.tolist()]
+    species = [s if s in SYMBOLS else "X" for s in species]
+    known = [cell.get(part, "?") for part in _CELL_OF_MMCIF]
+    has_cell = all(re.fullmatch(r"[\d.]+", value) for value in known)
+    models = np.array(sites.get("pdbx_pdb_model_num") or [""] * len(points))
+    frames = []
+    for model in dict.fromkeys(models.tolist()):
+        part = models == model
+        atoms = Atoms(np.array(species)[part], points[part], pbc=has_cell)
+        if has_cell and all(map(float, known)):
+            atoms.cell = [float(value) for value in known]
+        atoms.arrays["residuenames"] = np.full(len(atoms), "?")  # as of a PDB file
+        frames.append(atoms)
+    return frames
+
+
+def _mmcif_tables(file: str) -> tuple[dict[str, str], dict[str, list[str]]]:
+    """Values of ``_cell`` and columns of ``_atom_site``, by names in small letters."""
+    cell: dict[str, str] = {}
+    sites: dict[str, list[str]] = {}
+    in_rows = False
+    with open_bytes(file) as stream:
+        for line in io.TextIOWrapper(stream, "utf-8"):
+            if line.startswith("_atom_site."):
+                sites[line.split()[0][len("_atom_site.") :].lower()] = []
+                in_rows = True
+            elif in_rows and line[:1] not in "#_\n" and line[:5] not in ("loop_", "data_"):
+                words = line.split()
+                if "'" in line or '"' in line:
+                    words = [quoted or double or word for quoted, double, word
+                             in _CIF_WORD.findall(line)]  # fmt: skip
+                if len(words) != len(sites):
+                    raise InputError(f"an atom has {len(words)} values, not {len(sites)}")
+                for column, word in zip(sites.values(), words):
+                    column.append(word)
+            else:
+                in_rows = False
+                if line.startswith("_cell."):
+                    name, _, value = line[len("_cell.") :].strip().partition(" ")
+                    cell[name.lower()] = value.strip()
+    return cell, sites
+
+
+def _of_pdb_without_cell(file: str) -> list[Any]:
+    """The models of a PDB file whose lengths or angles are zero, which ASE does not take."""
+    import ase.io
+
+    with open_bytes(file) as stream:
+        lines = [line for line in stream.read().decode("utf-8").splitlines(keepends=True)
+                 if not line.startswith("CRYST1")]  # fmt: skip
+    found = ase.io.read(io.StringIO("".join(lines)), index=slice(None), format="proteindatabank")
+    for atoms in found:
+        atoms.pbc = True  # with a cell of zeros: a box is said, and none
+    return list(found)
+
+
+def _of_vasp4(file: str) -> list[Any]:
+    """A POSCAR without names of species, which are read where the first line has them."""
+    from ase.io.vasp import read_vasp
+
+    with open_bytes(file) as stream:
+        lines = io.TextIOWrapper(stream, "utf-8").read().splitlines()
+    words, n = lines[0].split(), len(lines[5].split())
+    named = len(words) == n and set(words) <= set(SYMBOLS)
+    lines.insert(5, " ".join(words if named else ["X"] * n))
+    return [read_vasp(io.StringIO("\n".join(lines) + "\n"))]
+
+
+# ---- MDAnalysis --------------------------------------------------------------------------------
+
+
+# What it does not know by these names.
+_NAMES_OF_MDANALYSIS = {
+    "RST7": "INPCRD", "RST": "INPCRD", "LAMMPSTRJ": "LAMMPSDUMP", "DUMP": "LAMMPSDUMP",
+    "LMP": "DATA", "PDBX": "MMCIF",
+}  # fmt: skip
+
+
+_NOT_OF_POINTS = re.compile(r"[Mm]ass|atom types|guess types|dt information|[Ee]lement")
+
+
+def by_mdanalysis(
+    file: str, file_format: str | None, frames: Frames, trajectory: str | None = None
+) -> Iterator[Structure]:
+    """Frames as MDAnalysis reads them, where it is installed; see `by_ase`.
+
+    With `trajectory` they are in that file, and `file` is its topology.
+    """
     try:
         import MDAnalysis
     except ImportError:
-        return None
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+        if trajectory is not None:
+            raise missing_extra("--trajectory", "MDAnalysis") from None
+        raise UnknownFormat from None
+    kind = (file_format or kind_of_file(file)[1:] or Path(file).name.split("_")[0]).upper()
+    kind = _NAMES_OF_MDANALYSIS.get(kind, kind)
+    parsers, readers = (getattr(MDAnalysis, part, {}) for part in ("_PARSERS", "_READERS"))
+    if kind not in parsers and kind not in readers:
+        raise UnknownFormat
+    with _warnings() as remarks:
+        if kind in parsers or trajectory is not None:
+            universe = _of_topology(file, kind, trajectory)
+        else:
+            universe = _of_coordinates(file, kind)
         try:
-            universe = MDAnalysis.Universe(file, to_guess=("elements",))
-            trajectory = universe.trajectory
-        except MemoryError:
-            raise
-        except (ValueError, TypeError, NotImplementedError):
-            return None  # what it does not know
-        except Exception as error:
-            raise _unreadable(file, error) from None
+            steps = universe.trajectory
+        except AttributeError:
+            raise InputError(
+                "holds a topology without coordinates: give these with --trajectory"
+            ) from None
+        numbers = range(len(steps))
+        one = -1 if frames is None else frames
         try:
-            numbers = range(len(trajectory))
-            one = -1 if index is None else index
             chosen = numbers[one] if isinstance(one, slice) else [numbers[one]]
         except IndexError:
-            raise InputError(f"{file}: has no frame {index}") from None
-        elements = getattr(universe.atoms, "elements", None)
-        remarks = _remarks(caught)
-        return [_frame(trajectory[number], elements, remarks) for number in chosen]
+            raise InputError(f"has no frame {frames}") from None
+        species, how = _elements_of(universe.atoms)
+        reader = f"MDAnalysis {MDAnalysis.__version__}, {kind}{how}"
+    found = (_of_frame(steps[k], species, reader) for k in chosen)
+    for frame, one in _each(found, frames, remarks, chosen):
+        told = tuple(remark for remark in remarks if not _NOT_OF_POINTS.search(remark))
+        yield one._replace(remarks=told, frame=frame)
 
 
-def _frame(frame: Any, elements: Any, remarks: tuple[str, ...]) -> Structure:
+def _of_topology(file: str, kind: str, trajectory: str | None) -> Any:
+    """The universe of a file that says which atoms there are, with frames of its own or another."""
+    import MDAnalysis
+
+    formats = {"topology_format": kind} if kind in MDAnalysis._PARSERS else {}
+    parts = [file] if trajectory is None else [file, trajectory]
+    if trajectory is None and kind in MDAnalysis._READERS:
+        formats["format"] = kind
+    try:
+        return MDAnalysis.Universe(*parts, to_guess=("elements",), **formats)
+    except (ValueError, TypeError, NotImplementedError):  # there may be no names to guess by
+        return MDAnalysis.Universe(*parts, to_guess=(), **formats)
+
+
+def _of_coordinates(file: str, kind: str) -> Any:
+    """The universe of a file that has nothing but coordinates."""
+    import MDAnalysis
+
+    try:
+        n_atoms = MDAnalysis._READERS[kind].parse_n_atoms(file)
+    except NotImplementedError:
+        raise InputError(
+            "holds coordinates alone, which are read with a topology: give that as FILE, and this "
+            "with --trajectory"
+        ) from None
+    universe = MDAnalysis.Universe.empty(n_atoms)
+    universe.load_new(file, format=kind)
+    return universe
+
+
+def _elements_of(atoms: Any) -> tuple[NDArray[np.str_] | None, str]:
+    found = getattr(atoms, "elements", None)
+    if found is None:
+        return None, ""
+    species = np.array([str(symbol).capitalize() or "X" for symbol in found])
+    names, residues = getattr(atoms, "names", None), getattr(atoms, "resnames", None)
+    if names is not None and residues is not None and not _plausible(species, residues):
+        species = _elements(names, residues)
+        return _known(species), ": elements by names of atoms"
+    return _known(species), ""
+
+
+def _of_frame(frame: Any, species: NDArray[np.str_] | None, reader: str) -> Structure:
     box = None if frame.dimensions is None else frame.triclinic_dimensions.astype(np.float64)
-    return Structure(
-        frame.positions.copy(), box, (box is not None,) * 3,
-        None if elements is None else np.array([str(name) for name in elements]), remarks,
-    )  # fmt: skip
+    no_box = "" if box is None else placeholder(box, False)
+    box = None if no_box else box
+    points, periodic = frame.positions.copy(), (box is not None,) * 3
+    return Structure(points, box, periodic, species, (), reader, "angstrom", no_box)
 
 
-def _remarks(caught: Any) -> tuple[str, ...]:
-    texts = (" ".join(str(w.message).split()) for w in caught
-             if issubclass(w.category, UserWarning))  # fmt: skip
-    return tuple(dict.fromkeys(texts))
+@contextmanager
+def _warnings() -> Iterator[list[str]]:
+    """What a reader warns of, each once, once the block is left."""
+    texts: list[str] = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield texts
+        told = (" ".join(str(w.message).split()) for w in caught
+                if issubclass(w.category, UserWarning))  # fmt: skip
+        texts += dict.fromkeys(told)
 
 
-def _unreadable(file: str, error: Exception) -> InputError:
-    return InputError(f"{file}: cannot be read: {type(error).__name__}: {one_line(error)}")
+def _each(
+    found: Iterable[Any], frames: Frames, remarks: list[str], numbers: Sequence[int] = ()
+) -> Iterator[tuple[str, Any]]:
+    """Frames one by one, with words for which it is of several, read when they are wanted.
+
+    What is warned of is put to the remarks. InputError names the frame at which reading fails.
+    """
+    iterator = iter(found)
+    for count in itertools.count():
+        frame = _words_for(count, frames, numbers)
+        with _warnings() as more:
+            try:
+                one = next(iterator, None)
+            except MemoryError:
+                raise
+            except Exception as error:
+                if not count:
+                    raise
+                reason = " ".join(str(error).split())
+                raise InputError(f"{frame}: {type(error).__name__}: {reason}") from None
+        remarks += [text for text in more if text not in remarks]
+        if one is None:
+            return
+        yield frame, one
+
+
+def _words_for(count: int, frames: Frames, numbers: Sequence[int]) -> str:
+    if not isinstance(frames, slice):
+        return ""
+    if count < len(numbers):
+        return f"frame {numbers[count]}"
+    start, step = frames.start or 0, frames.step or 1
+    if start < 0 or step < 0:
+        return f"frame {count}, counted from the first that --index names"
+    return f"frame {start + count * step}"
+
+
+# ---- elements ----------------------------------------------------------------------------------
+
+# Residues of proteins, nucleic acids and water, in which only these elements are.
+_RESIDUES = frozenset("""
+ALA ARG ASN ASP CYS GLN GLU GLY HIS ILE LEU LYS MET PHE PRO SER THR TRP TYR VAL ACE NME NMA NH2 MSE
+HSD HSE HSP HID HIE HIP CYX CYM CYSH ASH GLH LYN LYSH HISA HISB HISH HIS1 HIS2 A C G T U DA DC DG
+DT DU RA RC RG RU ADE CYT GUA THY URA HOH WAT SOL TIP TIP3 TIP4 TIP5 T3P SPC SPCE H2O DOD
+""".split())
+_LIGHT = frozenset(("H", "D", "C", "N", "O", "S", "P", "Se", "X", ""))
+_IONS = {"SOD": "Na", "POT": "K", "CLA": "Cl", "CAL": "Ca", "CES": "Cs", "LIT": "Li"}  # of CHARMM
+_HEAVY = frozenset("FE ZN MG MN CL BR NA CU CO NI SE SI AL LI".split())  # that ligands may have
+
+
+def _known(species: NDArray[np.str_]) -> NDArray[np.str_] | None:
+    return None if (species == "X").all() else species
+
+
+def _plausible(species: Any, residues: Any) -> bool:
+    """Whether no amino acid, nucleotide or water has an element that it cannot have."""
+    kinds = set(zip(species.tolist(), map(str, residues)))
+    return all(s in _LIGHT for s, residue in kinds if residue.strip().upper() in _RESIDUES)
+
+
+def _elements(names: Sequence[Any], residues: Sequence[Any]) -> NDArray[np.str_]:
+    """Elements by the names of atoms, as they are usual in residues; ``X`` where none is meant."""
+    known: dict[tuple[str, str], str] = {}
+    pairs = [(str(name), str(residue)) for name, residue in zip(names, residues, strict=True)]
+    for pair in pairs:
+        if pair not in known:
+            known[pair] = _element(*pair)
+    return np.array([known[pair] for pair in pairs])
+
+
+def _element(name: str, residue: str) -> str:
+    letters = re.sub(r"[^A-Z]", "", name.upper())
+    residue = residue.strip().upper()
+    if residue not in _RESIDUES:
+        if letters == re.sub(r"[^A-Z]", "", residue):  # an ion
+            ion = _IONS.get(letters, letters.capitalize())
+            return ion if ion in SYMBOLS else "X"
+        if letters[:2] in _HEAVY:
+            return letters[:2].capitalize()
+    elif residue == "MSE" and letters == "SE":
+        return "Se"
+    first = "H" if letters[:1] == "D" and residue in _RESIDUES else letters[:1]
+    return first if first in SYMBOLS and (first in _LIGHT or residue not in _RESIDUES) else "X"

@@ -34,6 +34,13 @@ def box(text: str) -> NDArray[np.float64]:
     return np.array([number(part) for part in text.replace(",", " ").split()])
 
 
+def columns(text: str) -> tuple[str, ...]:
+    names = tuple(part.strip() for part in text.split(","))
+    if not all(names):
+        raise argparse.ArgumentTypeError(f"{text!r} is not made of names or numbers of columns")
+    return names
+
+
 def periodic(text: str) -> tuple[bool, ...]:
     if not text or set(text.upper()) - set("TF"):
         raise argparse.ArgumentTypeError(f"{text!r} is not made of the letters T and F")

@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 from argparse import Namespace
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal, localcontext
 from fractions import Fraction
 from typing import Any
@@ -19,9 +19,16 @@ from halfshell._check.reference import exact_square, reference_pairs
 from halfshell._check.verify import LIST, compare
 from halfshell._cli.errors import InputError, one_line
 from halfshell._cli.files import Scene
+from halfshell._cli.pair_files import read_list
 from halfshell._cli.peers import PairList, ask_peer, find_peer
 from halfshell._cli.progress import progress_bar
-from halfshell._cli.scene import load_scene, unit_suffix
+from halfshell._cli.scene import (
+    describe_points,
+    describe_source,
+    load_scene,
+    read_points,
+    unit_suffix,
+)
 from halfshell._terminal import printable
 
 __all__ = ["Check", "check_by_integers", "check_by_search", "run", "sample_points"]
@@ -56,8 +63,11 @@ class Check:
         return not any(map(len, self.faults.values()))
 
 
-def check_by_search(pairs: PairList, scene: Scene, cutoff: float) -> Check:
-    """Compare with the exact search; what differs is confirmed in rational arithmetic."""
+def check_by_search(pairs: PairList, scene: Scene, cutoff: float) -> tuple[Check, bool]:
+    """Compare with the exact search; what differs is confirmed in rational arithmetic.
+
+    Also returns whether the list is full, as `verify` finds.
+    """
     n = len(scene.points)
     rows = sample_points(scene, max(1, n * SEARCH_ROWS // max(SEARCH_ROWS, len(pairs.i))))
     part = pairs.among(rows, n)
@@ -71,9 +81,9 @@ def check_by_search(pairs: PairList, scene: Scene, cutoff: float) -> Check:
         box=scene.box,
         periodic=scene.periodic if scene.box is not None else None,
         inclusive=pairs.inclusive,
-        full=pairs.full,
+        full=bool(pairs.full),
     )
-    return _check("search", verdict, rows, len(points))
+    return _check("search", verdict, rows, len(points)), verdict.is_full
 
 
 def check_by_integers(
@@ -100,10 +110,12 @@ def check_by_integers(
         points, cutoff, scene.box, periodic, pairs.inclusive, progress=progress
     )
     rows_of_truth = [(i, j, *shift) for i, j, shift in truth]
+    columns = (part.i, part.j) if part.S is None else (part.i, part.j, part.S)
+    given = np.column_stack(columns)
     verdict = compare(
-        np.array(rows_of_truth, dtype=np.int64).reshape(-1, 2 + ndim),
-        np.column_stack((part.i, part.j, part.S)),
-        LIST[pairs.full],
+        np.array(rows_of_truth, dtype=np.int64).reshape(-1, 2 + ndim)[:, : given.shape[1]],
+        given,
+        LIST[bool(pairs.full)],
     )
     return _check("integers", verdict, rows, len(points))
 
@@ -154,17 +166,25 @@ def run(args: Namespace) -> int:
     """Carry out ``halfshell verify``: 0 when the list is right, 1 when it is not."""
     if args.against and (args.strict or args.kernel):
         raise InputError("--strict and --kernel are for our own list, not with --against")
+    if args.list and (args.against or args.kernel):
+        raise InputError("--against and --kernel make a list: leave them out, or the file of one")
     peer = find_peer(args.against) if args.against else None
-    scene, cutoff, _ = load_scene(args)
+    saved = _saved_list(args) if args.list else None
+    scene, cutoff = saved[2:] if saved else load_scene(args)[:2]
     checks = []
     try:
-        if peer is None:
+        if saved:
+            author, pairs = saved[:2]
+        elif peer is None:
             author = f"halfshell {hs.__version__}"
             pairs = _own_list(scene, cutoff, args)
         else:
             author = peer.name_and_version()
             pairs = ask_peer(peer, scene, cutoff)
-            checks.append(check_by_search(pairs, scene, cutoff))
+        if saved or peer:
+            check, full = check_by_search(pairs, scene, cutoff)
+            pairs = replace(pairs, full=full)
+            checks.append(check)
         with progress_bar(args.progress and not args.json, "checking by integers") as advance:
             checks.append(check_by_integers(pairs, scene, cutoff, args.sample, advance))
     except (ValueError, TypeError, OverflowError, MemoryError) as error:
@@ -189,14 +209,36 @@ def _own_list(scene: Scene, cutoff: float, args: Namespace) -> PairList:
     return PairList(i, j, S.astype(np.int64), inclusive=not args.strict, full=False)
 
 
+def _saved_list(args: Namespace) -> tuple[str, PairList, Scene, float]:
+    """A list in a file: what it is, its pairs, the points that it is for, and the cutoff."""
+    scene = read_points(args)
+    found = read_list(args.list, *scene.points.shape)
+    cutoff = found.cutoff if args.cutoff is None else args.cutoff
+    if cutoff is None:
+        raise InputError(f"{args.list}: does not tell its cutoff: give --cutoff")
+    if found.cutoff not in (None, cutoff):
+        raise InputError(f"{args.list}: is a list for a cutoff of {found.cutoff}, not {cutoff}")
+    inclusive = not args.strict
+    if found.inclusive is False:
+        inclusive = False
+    elif found.inclusive and args.strict:
+        raise InputError(f"{args.list}: is a list for d <= cutoff: leave out --strict")
+    S = found.S
+    if S is None and not any(scene.periodic):
+        S = np.zeros((len(found.i), scene.points.shape[1]), dtype=np.int64)
+    told = f"{args.list}, columns {', '.join(found.columns)}"
+    if found.counts_from:
+        told += f", which counts points from {found.counts_from}"
+    return told, PairList(found.i, found.j, S, inclusive, None), scene, cutoff
+
+
 # The report --------------------------------------------------------------------------------
 
 
 def _json(author: str, pairs: PairList, scene: Scene, cutoff: float, checks: list[Check]) -> str:
     report: dict[str, Any] = {
-        "file": scene.source,
+        **describe_source(scene),
         "list": author,
-        "points": len(scene.points),
         "cutoff": cutoff,
         "inclusive": pairs.inclusive,
         "full": pairs.full,
@@ -222,6 +264,7 @@ def _text(author: str, pairs: PairList, scene: Scene, cutoff: float, checks: lis
     kind = "both directions of each pair" if pairs.full else "each pair once"
     n = len(scene.points)
     lines = [
+        *describe_points(scene),
         ("list of", author),
         ("cutoff", f"{cutoff:.6g}{unit_suffix(scene)}   ({rule})"),
         ("rows", f"{len(pairs.i):,}   ({kind})"),
@@ -235,8 +278,11 @@ def _text(author: str, pairs: PairList, scene: Scene, cutoff: float, checks: lis
     wrong = next((check.faults for check in checks if not check.ok), {})
     for name, found in wrong.items():
         for i, j, *shift in found[:EXAMPLES].tolist():
-            excess = _excess(scene, cutoff, i, j, shift)
-            text.append(f"  {name}: i={i} j={j} S={shift}   distance - cutoff = {excess:+.3e}")
+            line = f"  {name}: i={i} j={j}"
+            if pairs.S is not None:
+                excess = _excess(scene, cutoff, i, j, shift)
+                line += f" S={shift}   distance - cutoff = {excess:+.3e}"
+            text.append(line)
         if len(found) > EXAMPLES:
             text.append(f"  {name}: and {len(found) - EXAMPLES:,} more")
     return "\n".join(map(printable, text))

@@ -123,9 +123,10 @@ def in_order(array: npt.NDArray[Any], dtype: type[Any]) -> npt.NDArray[Any]:
 
 def _unmasked(values: Any, name: str) -> npt.NDArray[Any]:
     """The data of a masked array that masks nothing."""
-    mask = np.asarray(np.ma.getmaskarray(values))
-    if mask.dtype.kind == "b" and mask.any():  # structured ones are refused for their type
-        raise ValueError(f"{_element(name, np.argwhere(mask)[0])} must not be masked")
+    mask = np.array(np.ma.getmaskarray(values))
+    if mask.dtype.kind == "b":  # structured ones are refused for their type
+        for where in np.argwhere(mask):
+            raise ValueError(f"{_element(name, where)} must not be masked")
     return np.asarray(values)
 
 

@@ -7,6 +7,8 @@ the rows of each frame, a ``Timestep`` of MDAnalysis its own.
 
 from __future__ import annotations
 
+import sys
+import warnings
 from typing import Any
 
 import numpy as np
@@ -58,6 +60,35 @@ def foreign_periodic(box: Any, ndim: int) -> Any:
         return None
     flags = flags & [True, True, not is_flat(box)]
     return flags[:2] if ndim == 2 else flags
+
+
+def placeholder(rows: Any, is_pdb: bool) -> str:
+    """Why a box is none, which a file or an object has only because a box must stand there.
+
+    Vectors that are all zero, as lengths or angles of zero make them; in what PDB or mmCIF files
+    say, where lengths are in angstrom, also a cube of 1 x 1 x 1. Else nothing.
+    """
+    rows = np.asarray(rows, dtype=np.float64)
+    if not rows.any():
+        return "its lengths or angles are zero"
+    if is_pdb and np.array_equal(rows, np.eye(len(rows))):
+        return "1 x 1 x 1 is a placeholder in such files"
+    return ""
+
+
+def without_placeholder(vectors: Any, name: str, is_pdb: bool = False) -> Any:
+    """The vectors that an object brings, or None with a warning if they are a placeholder."""
+    if vectors is None:
+        return None
+    rows = as_array(vectors, "box")
+    reason = placeholder(rows, is_pdb) if rows.dtype.kind in "fiu" else ""
+    if not reason:
+        return vectors
+    level, frame = 1, sys._getframe()
+    while frame.f_back is not None and frame.f_globals["__name__"].startswith("halfshell."):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(f"the box of {name} is left out: {reason}", UserWarning, stacklevel=level)
+    return None
 
 
 def _matrix_of(box: Any, name: str) -> Any:

@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+from halfshell._convert.arrays import as_array
 from halfshell._convert.foreign import attribute, is_a, kind_of
+from halfshell._convert.foreign_box import without_placeholder
 from halfshell._convert.scene import brings_its_box
 
 _MISSING = object()
@@ -32,7 +34,7 @@ def frames_of(frames: Any) -> tuple[Iterator[Any], int | None]:
     if whole is not None:
         return iter(zip(*whole)), len(whole[0])
     try:
-        iterator = iter(frames)
+        iterator = iter(as_array(frames, "frames") if is_a(frames, memoryview) else frames)
     except MemoryError:
         raise
     except Exception as error:
@@ -61,11 +63,13 @@ def as_frame(frame: Any, box: Any, periodic: Any) -> Frame:
     if one is not None:
         if len(one[0]) != 1:
             raise ValueError(f"a {kind_of(frame)} in frames must be one frame, got {len(one[0])}")
-        return _with(one[0][0], one[1][0], box, periodic, kind_of(frame))
+        own = without_placeholder(one[1][0], "frames")
+        return _with(one[0][0], own, box, periodic, kind_of(frame))
     vectors = attribute(frame, "triclinic_dimensions", "frames", _MISSING)
     if vectors is not _MISSING:
         points = attribute(frame, "positions", "frames")
-        return _with(points, vectors, box, periodic, kind_of(frame))
+        own = without_placeholder(vectors, "frames")
+        return _with(points, own, box, periodic, kind_of(frame))
     return Frame(frame, box, periodic)
 
 

@@ -28,7 +28,12 @@ def as_number(value: Any, name: str, single: str = "be a number") -> float:
 
     def check(shape: tuple[int, ...]) -> None:
         if shape != ():
-            hint = ": pass a length for each point as radii" if name == "cutoff" else ""
+            hint = ""
+            if name == "cutoff":
+                hint = (
+                    ": several cutoffs are for count_pairs and the letter k of pairs, a length for "
+                    "each point is one of radii"
+                )
             raise TypeError(f"{name} must {single}, got shape {shape}{hint}")
 
     return float(as_real_array(value, name, single, check))

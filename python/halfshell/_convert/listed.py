@@ -23,13 +23,13 @@ def as_point_numbers(values: Any, name: str, n: int, numbered: str) -> IntArray:
         raise ValueError(f"{name} must have shape (m,), got {column.shape}")
     if column.size and n == 0:
         raise ValueError(f"{name} must be empty: there are no {numbered}")
-    if column.size and (int(column.min()) < 0 or int(column.max()) >= n):
-        k = int(np.flatnonzero((column < 0) | (column >= n))[0])
+    numbers = np.array(column, np.int64)  # one's own, as another thread may change the caller's
+    for k in np.flatnonzero((numbers < 0) | (numbers >= n)):
         raise ValueError(
             f"{name} must be numbers of {numbered}, from 0 to {n - 1}, got {name}[{k}] = "
             f"{column[k]}"
         )
-    return np.ascontiguousarray(column, np.int64)
+    return numbers
 
 
 def as_listed(

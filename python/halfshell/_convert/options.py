@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from halfshell import _core
+from halfshell._convert.arrays import as_array
 from halfshell._convert.foreign import exact_number, is_a, kind_of, shown
 from halfshell._unknown import nearest_word
 
@@ -25,6 +26,7 @@ RAISE = "raise"
 
 # Blocks are counted by int64, and two of them must be.
 _MOST_PAIRS = 2**62
+_MOST_BRICKS = 2**20
 
 
 def kernels() -> list[str]:
@@ -40,12 +42,11 @@ def kernels() -> list[str]:
 
 
 def as_flag(value: Any, name: str) -> bool:
-    """A bool; also one of NumPy's, and the integers 0 and 1."""
+    """A bool, also one of NumPy's; no number."""
     if value is True or value is False:
         return value
-    number = exact_number(value)
-    if is_a(number, int) and number in (0, 1):
-        return bool(number)
+    if is_a(value, np.bool_):
+        return bool(np.generic.item(value))
     raise TypeError(f"{name} must be True or False, got {shown(value)}")
 
 
@@ -62,6 +63,14 @@ def as_count(value: Any, name: str) -> int:
     number = as_whole(value, name)
     if number < 1:
         raise ValueError(f"{name} must be 1 or more, got {shown(number)}")
+    return number
+
+
+def as_brick_count(n: Any) -> int:
+    """A number of bricks; each costs time and memory, even if it owns no points."""
+    number = as_count(n, "n")
+    if number > _MOST_BRICKS:
+        raise ValueError(f"n must be at most {_MOST_BRICKS:,} bricks, got {shown(number)}")
     return number
 
 
@@ -87,7 +96,7 @@ def as_list(value: Any, name: str, of_what: str) -> list[Any]:
     """What a sequence has."""
     if not hasattr(type(value), "__iter__"):
         raise TypeError(f"{name} must be a sequence of {of_what}, got {kind_of(value)}")
-    return list(value)
+    return list(as_array(value, name) if is_a(value, memoryview) else value)
 
 
 def as_choice(value: Any, name: str, choices: tuple[str, ...]) -> str:

@@ -39,6 +39,9 @@ def as_points(values: Any, name: str = "points", ndim: int = 3) -> PointArray:
         if shape[0] > MAX_POINTS:
             raise OverflowError(f"fewer than 2**31 {name} can be searched, got {shape[0]}")
 
+    if type(values) not in (np.ndarray, list, tuple):  # a Molecule of pymatgen has no box
+        places = attribute(values, "cart_coords", name, _MISSING)
+        values = values if places is _MISSING or brings_its_box(values, name) else places
     array = as_real_array(values, name, check_shape=check)
     return np.empty((0, ndim)) if array.shape == (0,) else array
 
@@ -47,6 +50,8 @@ def _hint_of_shape(values: Any, shape: tuple[int, ...], name: str) -> str:
     """What may be meant by points of this shape, if it is clear."""
     if type(values) in (list, tuple) and values and brings_its_box(values[0], name):
         return ": several systems are one array of points, with batch"
+    if brings_its_box(values, name):
+        return f": a {kind_of(values)} brings a box, for which there is no place here: give arrays"
     if len(shape) == 2 and 1 <= shape[0] <= MAX_DIM < shape[1]:
         return f": one row for each point, as in {name}.T"
     if len(shape) == 1:
@@ -173,13 +178,13 @@ def as_box_alone(box: Any, periodic: Any) -> tuple[int, FloatArray | None, int]:
 def brings_its_box(points: Any, name: str = "points") -> bool:
     """Whether points are an object with ``positions``, ``cell`` and ``pbc``, like ASE's Atoms.
 
-    Or a universe or a group of atoms of MDAnalysis.
+    Or a Structure of pymatgen, or a universe or a group of atoms of MDAnalysis.
     """
     if type(points) in (np.ndarray, list, tuple):
         return False
-    if all(
-        attribute(points, part, name, _MISSING) is not _MISSING
-        for part in ("positions", "cell", "pbc")
+    if any(
+        all(attribute(points, part, name, _MISSING) is not _MISSING for part in parts)
+        for parts in (("positions", "cell", "pbc"), ("cart_coords", "lattice"))
     ):
         return True
     from halfshell._convert.atom_groups import is_group  # which few calls need
@@ -190,21 +195,36 @@ def brings_its_box(points: Any, name: str = "points") -> bool:
 def _group(points: Any, name: str) -> tuple[Any, Any] | None:
     """Positions and box vectors of a group of MDAnalysis; None for what is like ASE's Atoms."""
     from halfshell._convert.atom_groups import is_group, of_group
+    from halfshell._convert.foreign_box import without_placeholder
 
-    return of_group(points, name) if is_group(points, name) else None
+    if not is_group(points, name):
+        return None
+    positions, vectors = of_group(points, name)
+    return positions, without_placeholder(vectors, name)
 
 
 def _own_scene(
     atoms: Any, name: str = "points", ndim: int = 3
 ) -> tuple[PointArray, FloatArray | None, int]:
     """`as_scene` of an object that brings its box."""
-    array = as_points(attribute(atoms, "positions", name), name, ndim)
+    places = attribute(atoms, "positions", name, _MISSING)
+    owner, cell = atoms, "cell"
+    if places is _MISSING:  # a Structure of pymatgen
+        places = attribute(atoms, "cart_coords", name)
+        owner, cell = attribute(atoms, "lattice", "box"), "matrix"
+    array = as_points(places, name, ndim)
     ndim = array.shape[1]
     try:
-        bits = as_periodic_bits(attribute(atoms, "pbc", "periodic"), ndim, default=False)
+        bits = as_periodic_bits(attribute(owner, "pbc", "periodic"), ndim, default=False)
         if not bits:
             return array, None, 0
-        return array, as_box(as_array(attribute(atoms, "cell", "box"), "box"), ndim), bits
+        from halfshell._convert.foreign_box import without_placeholder
+
+        arrays = attribute(atoms, "arrays", name)
+        is_pdb = is_a(arrays, dict) and "residuenames" in arrays
+        given = as_array(attribute(owner, cell, "box"), "box")
+        vectors = without_placeholder(given, name, is_pdb)
+        return (array, None, 0) if vectors is None else (array, as_box(vectors, ndim), bits)
     except (TypeError, ValueError, OverflowError) as error:
         kinds = (TypeError, OverflowError, ValueError)
         kind = next(one for one in kinds if isinstance(error, one))

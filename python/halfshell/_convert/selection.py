@@ -125,7 +125,7 @@ def _as_pairs(exclude: Any, n: int, q: int | None) -> npt.NDArray[np.int64] | No
         )
     if array.ndim < 2 and not (array.size == 0 and n > 0):
         return None
-    if array.size == 0:
+    if array.ndim < 2:
         array = np.empty((0, 2), np.int64)
     if array.ndim != 2 or array.shape[1] != 2:
         raise ValueError(

@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from halfshell._convert.types import FloatArray
 
 # By atomic number; 0 stands for what is no element.
-_SYMBOLS = """
+SYMBOLS = """
 X H He Li Be B C N O F Ne Na Mg Al Si P S Cl Ar K Ca Sc Ti V Cr Mn Fe Co Ni Cu Zn Ga Ge As Se Br Kr
 Rb Sr Y Zr Nb Mo Tc Ru Rh Pd Ag Cd In Sn Sb Te I Xe Cs Ba La Ce Pr Nd Pm Sm Eu Gd Tb Dy Ho Er Tm Yb
 Lu Hf Ta W Re Os Ir Pt Au Hg Tl Pb Bi Po At Rn Fr Ra Ac Th Pa U Np Pu Am Cm Bk Cf Es Fm Md No Lr Rf
 Db Sg Bh Hs Mt Ds Rg Cn Nh Fl Mc Lv Ts Og
 """.split()
-_ATOMIC_NUMBERS = {symbol: number for number, symbol in enumerate(_SYMBOLS)}
+_ATOMIC_NUMBERS = {symbol: number for number, symbol in enumerate(SYMBOLS)}
 
 
 class _Kinds(NamedTuple):
@@ -99,13 +99,15 @@ def _elements_of(owner: Any, owners: str) -> _Kinds | None:
     if not brings_its_box(owner, owners):
         return None
     numbers = attribute(owner, "numbers", owners)
+    if numbers is None:
+        numbers = attribute(owner, "atomic_numbers", owners)  # of pymatgen
     if numbers is not None:
         array = as_array(numbers, f"{owners}.numbers", "hold integers")
         if array.dtype.kind not in "iu":
             raise TypeError(f"{owners}.numbers must hold integers, got dtype {array.dtype}")
-        for k in np.flatnonzero((array < 0) | (array >= len(_SYMBOLS))):
+        for k in np.flatnonzero((array < 0) | (array >= len(SYMBOLS))):
             raise ValueError(
-                f"{owners}.numbers must be below {len(_SYMBOLS)}, got numbers[{k}] = {array[k]}"
+                f"{owners}.numbers must be below {len(SYMBOLS)}, got numbers[{k}] = {array[k]}"
             )
         return _Kinds(array.astype(np.int32), are_elements=True)
     symbols = attribute(owner, "get_chemical_symbols", owners)
@@ -129,7 +131,7 @@ def _alike(own: _Kinds, asking: _Kinds) -> list[_Kinds]:
     both = [own, asking]
     if own.are_names != asking.are_names:
         both = [
-            _Kinds(np.array(_SYMBOLS)[kinds.values]) if kinds.are_elements else kinds
+            _Kinds(np.array(SYMBOLS)[kinds.values]) if kinds.are_elements else kinds
             for kinds in both
         ]
     if both[0].are_names != both[1].are_names or both[0].are_elements != both[1].are_elements:
@@ -190,7 +192,7 @@ def _name(part: Any, where: str, kinds: list[_Kinds]) -> Any:
         raise TypeError(f"{where} must have types or names as its key, got {shown(part)}")
     if kinds[0].are_names:
         raise ValueError(f"{where} has numbers, and types are names")
-    most = len(_SYMBOLS) - 1 if kinds[0].are_elements else 2**31 - 2
+    most = len(SYMBOLS) - 1 if kinds[0].are_elements else 2**31 - 2
     if not 0 <= number <= most:
         raise ValueError(f"{where} must have types from 0 to {most}, got {shown(part)}")
     return number

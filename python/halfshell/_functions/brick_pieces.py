@@ -112,7 +112,7 @@ def _leaves(
         yield numbers, is_inside
         return
     own = places[cut.axis].take(numbers)
-    reach, repeats = float(axes.reach[cut.axis]), axes.flags[cut.axis]
+    reach, repeats = axes.reach[cut.axis], axes.repeats[cut.axis]
     is_below = own < cut.at
     for part, low, high, is_mine in (
         (cut.below, cut.low, cut.at, is_below), (cut.above, cut.at, cut.high, ~is_below),

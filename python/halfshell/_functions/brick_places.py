@@ -9,52 +9,30 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from halfshell import _core
 from halfshell._convert.types import FloatArray
-
-# Places are products of some terms with matrices that were inverted in float64: relative to their
-# terms they are known to this, which is far more than they lose.
-_ROUNDING = 2.0**-30
 
 
 class Axes(NamedTuple):
-    """Along axes that repeat, places are from 0 to 1; others have the length of the coordinates."""
+    """What the core says of the axes of a box, which are not those of the box vectors."""
 
-    dual: FloatArray  # a row for each axis
-    flags: tuple[bool, ...]  # which repeat
-    reach: FloatArray  # how far places of a pair can be apart
-    widths: FloatArray  # what one unit of an axis is in the unit of points
+    scene: tuple[FloatArray | None, int, float, float]  # box, periodic bits, cutoff, largest
+    repeats: tuple[bool, ...]  # places are from 0 to 1
+    reach: tuple[float, ...]  # how far places of a pair can be apart: infinite where unknown
+    widths: FloatArray  # what one unit of an axis is in a common unit
 
     def places(self, points: npt.NDArray[Any]) -> FloatArray:
-        """Places of shape (d, n), 0 along axes where numbers are too large for them."""
-        with np.errstate(all="ignore"):
-            places: FloatArray = self.dual @ points.T.astype(np.float64, copy=False)
-            for axis, repeats in enumerate(self.flags):
-                if math.isinf(self.reach[axis]):
-                    places[axis] = 0.0
-                elif repeats:
-                    places[axis] -= np.floor(places[axis])
-        return places
+        """Places of shape (d, n), 0 along axes where the reach is infinite."""
+        return _core.box_places(points, *self.scene)[0]
 
 
-def axes_of(vectors: Any, flags: tuple[bool, ...], cutoff: float, largest: float) -> Axes:
-    """Axes of a box, for coordinates up to `largest`; the reach is infinite where it is unknown."""
-    ndim = len(flags)
-    rows = np.eye(ndim)
-    repeating = [k for k in range(ndim) if flags[k]]
-    if vectors is not None and repeating:
-        given = np.asarray(vectors, np.float64)[repeating]
-        scale = np.abs(given).max(axis=1, keepdims=True)
-        others = np.linalg.svd(given / scale)[2][len(repeating) :]  # at right angles to all of them
-        rows[repeating] = given
-        rows[[k for k in range(ndim) if not flags[k]]] = others
-    with np.errstate(all="ignore"):
-        dual: Any = np.linalg.inv(rows).T
-        lengths = np.linalg.norm(dual, axis=1)
-        terms = largest * np.abs(dual).sum(axis=1)
-        reach: Any = cutoff * lengths * (1.0 + _ROUNDING) + (terms + 1.0) * _ROUNDING
-    reach[~np.isfinite(reach) | ~np.isfinite(terms)] = np.inf
-    widths: FloatArray = 1.0 / np.where(lengths > 0.0, lengths, 1.0)
-    return Axes(dual, flags, reach, widths)
+def axes_of(
+    vectors: FloatArray | None, flags: tuple[bool, ...], cutoff: float, largest: float
+) -> Axes:
+    """Axes of a box, for coordinates up to `largest`."""
+    scene = (vectors, sum(flag << k for k, flag in enumerate(flags)), cutoff, largest)
+    _, repeats, reach, widths = _core.box_places(np.empty((0, len(flags))), *scene)
+    return Axes(scene, repeats, reach, np.array(widths))
 
 
 def within(places: FloatArray, low: float, high: float, repeats: bool) -> npt.NDArray[np.bool_]:

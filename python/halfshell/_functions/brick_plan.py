@@ -62,7 +62,8 @@ def summary(points: Array, n_pieces: int) -> Summary:
     largest = float(max(points.max(initial=0.0), -points.min(initial=0.0)))
     error = None
     if not np.isfinite(largest):
-        row, column = np.argwhere(~np.isfinite(points))[0].tolist()
+        wrong = np.argwhere(~np.isfinite(points)).tolist()
+        row, column = wrong[0] if wrong else (0, 0)  # if another thread changes them
         value = points[row, column]
         error = ValueError(f"points must be finite, got points[{row}, {column}] = {value}")
     sample = points[::step].astype(np.float64)
@@ -81,8 +82,8 @@ def divide(
     samples = [one.sample for one in summaries if len(one.sample)]
     places = axes.places(np.concatenate(samples)) if samples else np.empty((len(flags), 0))
     weights = np.repeat([one.weight for one in summaries], [len(one.sample) for one in summaries])
-    low = np.where(flags, 0.0, -np.inf)
-    high = np.where(flags, 1.0, np.inf)
+    low = np.where(axes.repeats, 0.0, -np.inf)
+    high = np.where(axes.repeats, 1.0, np.inf)
     bricks = iter(range(n_bricks))
     cuts = _cut(places, weights, n_bricks, (low, high), axes.widths, bricks)
     return Division(cuts, n_bricks, axes, tuple(ends[:-1]), ends[-1], cutoff, (vectors, flags))

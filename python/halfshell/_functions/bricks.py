@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from typing import Never
 
@@ -12,7 +11,7 @@ import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.lengths import as_cutoff
-from halfshell._convert.options import as_count
+from halfshell._convert.options import as_brick_count
 from halfshell._convert.scene import as_scene
 from halfshell._convert.types import BoxLike, FloatArray, Number, PeriodicLike, PointsLike
 from halfshell._functions.brick_places import Axes, axes_of, within
@@ -42,7 +41,7 @@ def bricks(
         than a brick, and than the box: bricks then need many other points, as `Bricks.overhead`
         tells beforehand.
     n : int
-        Number of bricks, 1 or more. The numbers of points that they own differ by at most 1; with
+        Number of bricks, 1 to 2**20. The numbers of points that they own differ by at most 1; with
         more bricks than points some own none.
     box, periodic
         As in `pairs`.
@@ -56,7 +55,7 @@ def bricks(
     Raises
     ------
     TypeError, ValueError, OverflowError
-        As `pairs`; ValueError also if `n` is less than 1.
+        As `pairs`; ValueError also if `n` is not from 1 to 2**20.
 
     See Also
     --------
@@ -66,7 +65,8 @@ def bricks(
     -----
     Points are halved again and again across their longest side [1]_, so that bricks follow the
     points, even in clusters, and not the volume. The points that a brick needs are found from the
-    range of its points along each box vector, widened by the cutoff and a bound on rounding. Each
+    range of its points along each vector of a short basis of the box, or open axis, widened by the
+    cutoff and a bound on rounding, however long, short or skewed the box is. Each
     brick is searched with the whole box and the points as given: its decisions and shifts are
     those of a single search of all points.
 
@@ -91,10 +91,12 @@ def bricks(
     if unknown:
         refuse_unknown(bricks, unknown)
     array, vectors, bits = as_scene(points, box, periodic)
-    largest, n_bricks = as_cutoff(cutoff), as_count(n, "n")
-    # Refuses what a search would refuse, at the price of a search with the cutoff 0.
-    _core.count_pairs(array, 0.0 if math.isfinite(largest) and largest >= 0.0 else largest,
-                      vectors, bits, False, "exact", None, None, None, 1, None, "auto")  # fmt: skip
+    largest, n_bricks = as_cutoff(cutoff), as_brick_count(n)
+    rest = (vectors, bits, False, "exact", None, None, None, 1, None, "auto")
+    try:  # refuses what a search would refuse, at the price of a search with the cutoff 0
+        _core.count_pairs(array, 0.0, *rest)
+    except ValueError:  # which needs more of a box than a larger cutoff
+        _core.count_pairs(array, largest, *rest)
     n_points, ndim = array.shape
     flags = tuple(bool(bits >> k & 1) for k in range(ndim))
     largest_of_all = max(array.max(initial=0.0), -array.min(initial=0.0))
@@ -132,8 +134,8 @@ def _near(
     if len(owned) == 0:
         return owned
     for axis in along:
-        own, reach = places[axis][owned], float(axes.reach[axis])
+        own, reach = places[axis][owned], axes.reach[axis]
         low, high = float(own.min()) - reach, float(own.max()) + reach
-        near = within(places[axis].take(numbers), low, high, axes.flags[axis])
+        near = within(places[axis].take(numbers), low, high, axes.repeats[axis])
         numbers = numbers.take(np.flatnonzero(near))  # quicker than numbers[near]
     return numbers

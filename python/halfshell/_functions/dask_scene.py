@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from halfshell._convert.foreign import kind_of
-from halfshell._convert.options import as_count
+from halfshell._convert.options import as_brick_count
 from halfshell._convert.scene import MAX_DIM, as_own_box
 from halfshell._extras import needs
 from halfshell._functions import brick_tasks
@@ -63,7 +63,7 @@ def divided(
 ) -> Scene:
     """Parts of points, and all that can be refused before anything is read."""
     chunks, n_points, ndim, dtype = _chunks(points)
-    n_bricks = max(1, len(chunks)) if n is None else as_count(n, "n")
+    n_bricks = max(1, len(chunks)) if n is None else as_brick_count(n)
     vectors, bits = as_own_box(box, periodic, ndim)
     scene: dict[str, Any] = {"box": vectors, "periodic": None}
     if vectors is not None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from halfshell._convert.options import as_flag
 from halfshell._errors import CapacityError
 from halfshell._functions.between import pairs_between
 from halfshell._functions.neighbors import neighbors
@@ -29,7 +30,7 @@ def entries_of(
     inclusive: bool,
 ) -> Entries:
     """Return i, j and S of a list, ascending by (i, j, S)."""
-    if half:
+    if as_flag(half, "half"):
         i, j, S = pairs(
             points, cutoff, box=box, periodic=periodic, quantities="ijS", sort=True,
             inclusive=inclusive, batch=batch,

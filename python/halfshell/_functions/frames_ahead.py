@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -17,6 +18,7 @@ from halfshell._convert.types import Arrays
 # Below them handing a frame to another thread takes longer than the search.
 _WORTH_A_THREAD = 1000
 
+_Scene = tuple[Any, Any, Any]  # points, box vectors and which of them repeat
 Search = Callable[[Any, Any, Any], Arrays]
 
 
@@ -29,32 +31,54 @@ def search_ahead(
     object each time. Where the frames are small all is done by the caller's thread.
     """
     number = 0
-    waiting: deque[Future[Arrays]] = deque()
-    with ThreadPoolExecutor(n_threads) as pool:
-        try:
-            for frame in frames:
-                try:
-                    scene = _own(as_frame(frame, box, periodic))
-                except Exception as error:
-                    for future in waiting:  # the frames before it come first
-                        number = yield from _hand_out(future, number)
-                    of_frame(error, number)
-                    raise
-                if len(scene[0]) >= _WORTH_A_THREAD:
-                    waiting.append(pool.submit(search, *scene))
-                    if len(waiting) > n_threads:
-                        number = yield from _hand_out(waiting.popleft(), number)
-                    continue
-                while waiting:
-                    number = yield from _hand_out(waiting.popleft(), number)
-                number = yield from _hand_out(_done(search, scene), number)
-            while waiting:
-                number = yield from _hand_out(waiting.popleft(), number)
-        finally:
+    waiting: deque[tuple[_Scene, Future[Arrays]]] = deque()
+    process, pool = os.getpid(), ThreadPoolExecutor(n_threads)
+
+    def ask_again() -> None:
+        """In a child: threads are gone, and frames that they searched are searched anew."""
+        nonlocal process, pool, waiting
+        if process != os.getpid():
+            process, pool = os.getpid(), ThreadPoolExecutor(n_threads)
+            waiting = deque((scene, pool.submit(search, *scene)) for scene, _ in waiting)
+
+    def hand_out(most: int) -> Generator[Arrays, None, None]:
+        """The results of the frames that came first, until at most so many wait."""
+        nonlocal number
+        while len(waiting) > most:
+            ask_again()
+            future = waiting.popleft()[1]
+            try:
+                found = future.result()
+            except Exception as error:
+                of_frame(error, number)
+                raise
+            del future  # its memory is the caller's
+            number += 1
+            yield found
+
+    try:
+        for frame in frames:
+            try:
+                scene = _own(as_frame(frame, box, periodic))
+            except Exception as error:
+                yield from hand_out(0)  # the frames before it come first
+                of_frame(error, number)
+                raise
+            ask_again()
+            if len(scene[0]) >= _WORTH_A_THREAD:
+                waiting.append((scene, pool.submit(search, *scene)))
+                yield from hand_out(n_threads)
+            else:
+                yield from hand_out(0)
+                waiting.append((scene, _done(search, scene)))
+                yield from hand_out(0)
+        yield from hand_out(0)
+    finally:
+        if process == os.getpid():
             pool.shutdown(cancel_futures=True)
 
 
-def _own(frame: Any) -> tuple[Any, Any, Any]:
+def _own(frame: Any) -> _Scene:
     """Copies of the points, and of the box if there is one, and which of its vectors repeat."""
     points, vectors, bits = as_scene(*frame)
     if vectors is None:
@@ -62,7 +86,7 @@ def _own(frame: Any) -> tuple[Any, Any, Any]:
     return points.copy(), np.array(vectors), [bool(bits >> k & 1) for k in range(len(vectors))]
 
 
-def _done(search: Search, scene: tuple[Any, Any, Any]) -> Future[Arrays]:
+def _done(search: Search, scene: _Scene) -> Future[Arrays]:
     """The search of a frame by this thread."""
     future: Future[Arrays] = Future()
     try:
@@ -70,15 +94,3 @@ def _done(search: Search, scene: tuple[Any, Any, Any]) -> Future[Arrays]:
     except Exception as error:
         future.set_exception(error)
     return future
-
-
-def _hand_out(future: Future[Arrays], number: int) -> Generator[Arrays, None, int]:
-    """The result of frame `number`; the number of the next."""
-    try:
-        found = future.result()
-    except Exception as error:
-        of_frame(error, number)
-        raise
-    del future  # its memory is the caller's
-    yield found
-    return number + 1

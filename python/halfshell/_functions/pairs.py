@@ -117,8 +117,9 @@ def pairs(
         Coordinates, any length unit, 1 <= d <= 8. float32 and float64 values are used as they
         are; integers, booleans and float16 are converted exactly or refused. Points may lie
         anywhere, even outside the box. ``[]`` counts as shape (0, 3). An object with
-        ``positions``, ``cell`` and ``pbc``, such as ``ase.Atoms``, brings its own box and
-        periodicity; an MDAnalysis ``AtomGroup`` or ``Universe`` brings the current frame's box.
+        ``positions``, ``cell`` and ``pbc``, such as ``ase.Atoms``, or a ``Structure`` of pymatgen
+        brings its own box and periodicity; an MDAnalysis ``AtomGroup`` or ``Universe`` brings the
+        current frame's box.
     cutoff : float, array_like of float, shape (k,) or (t, t), dict or None
         Largest distance of a pair, in the unit of `points`; finite, not negative. It may be
         larger than the box. With `radii` or `supports`, a further limit, or None; with `types`,

@@ -168,7 +168,7 @@ def trajectory_pairs(
         )  # fmt: skip
 
     def follow(points: Any, own: Any, repeats: Any) -> Arrays:
-        kept._box, kept._periodic = own, repeats  # update() would take None as those before
+        kept._given = own, repeats  # update() would take None as those before
         kept.update(points)
         return kept.pairs(quantities=quantities, sort=sort, index_dtype=index_dtype)
 

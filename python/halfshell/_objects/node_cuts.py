@@ -39,7 +39,7 @@ def as_mask(which: Any, pairs: PairTable) -> npt.NDArray[np.bool_]:
     if mask.shape != (len(pairs),):
         shape = f"({len(pairs)},), one for each pair"
         raise ValueError(f"which must have shape {shape}, got {mask.shape}")
-    return np.ascontiguousarray(mask)
+    return np.array(mask)  # another thread may change the caller's
 
 
 def cut_of_keys(keys: npt.NDArray[np.int64], nodes: Nodes) -> Cut:

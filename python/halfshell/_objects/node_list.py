@@ -188,8 +188,7 @@ def _locked(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 
 def _refuse_infinite(points: FloatArray) -> None:
-    if not np.isfinite(points).all():
-        i, k = np.argwhere(~np.isfinite(points))[0]
+    for i, k in np.argwhere(~np.isfinite(points)):
         raise ValueError(f"positions must be finite, got positions[{i}, {k}] = {points[i, k]}")
 
 

@@ -68,10 +68,12 @@ class Nodes:
         """Ranks of nodes by their numbers."""
         if self.number is None:
             return number
-        if self._rank is None:
-            self._rank = np.empty(self.n, np.int32)
-            self._rank[self.number] = np.arange(self.n, dtype=np.int32)
-        found: npt.NDArray[Any] = self._rank[number]
+        ranks = self._rank
+        if ranks is None:
+            ranks = np.empty(self.n, np.int32)
+            ranks[self.number] = np.arange(self.n, dtype=np.int32)
+            self._rank = ranks  # once it is complete: other threads look
+        found: npt.NDArray[Any] = ranks[number]
         return found
 
     def numbers(self, rank: npt.NDArray[Any]) -> npt.NDArray[Any]:

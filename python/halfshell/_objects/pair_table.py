@@ -300,9 +300,9 @@ class PairTable:
 def as_pair_rows(values: Any, name: str, single: bool = False) -> npt.NDArray[np.int64]:
     """Rows (i_node, i_list, j_node, j_list); single: one such row is as good."""
     array = as_array(values, name)
-    if array.size == 0 and not single:
+    if array.shape == (0,) and not single:
         return np.empty((0, 4), np.int64)
-    if array.dtype.kind not in "iu":
+    if array.size and array.dtype.kind not in "iu":
         raise TypeError(f"{name} must hold whole numbers, got dtype {array.dtype}")
     if array.ndim not in ((1, 2) if single else (2,)) or array.shape[-1] != 4:
         shapes = "(4,) or (k, 4)" if single else "(k, 4)"

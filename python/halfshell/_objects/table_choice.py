@@ -23,7 +23,7 @@ _SUMMED_IN = {"b": np.int64, "i": np.int64, "u": np.uint64, "f": np.float64}
 
 def as_rows(chosen: Any, n_rows: int) -> Positions:
     """Numbers of rows from 0 on, of an array of whole numbers or a mask."""
-    if not (is_a(chosen, (list, np.ndarray)) or hasattr(type(chosen), "__array__")):
+    if not (is_a(chosen, (list, np.ndarray, memoryview)) or hasattr(type(chosen), "__array__")):
         raise _refused(type(chosen).__name__)
     array = as_array(chosen, "rows", "hold whole numbers or bools")
     if array.ndim == 0:
@@ -36,14 +36,13 @@ def as_rows(chosen: Any, n_rows: int) -> Positions:
                 f"a mask of rows must have shape ({n_rows},), one bool for each row, got "
                 f"{array.shape}"
             )
-        return np.flatnonzero(array)
+        return np.flatnonzero(array.copy())  # another thread may change the caller's
     if len(array) == 0 and is_a(chosen, list):
         return np.empty(0, np.int64)
     if array.dtype.kind not in "iu":
         raise _refused(f"an array of {array.dtype}")
-    outside = (array >= n_rows) | (array < -n_rows)
-    if outside.any():
-        k = int(outside.argmax())
+    array = array.copy()
+    for k in np.flatnonzero((array >= n_rows) | (array < -n_rows)):
         raise IndexError(f"row {array[k]} (at [{k}]) of a table of {n_rows} rows")
     rows: Positions = array.astype(np.int64)
     rows[rows < 0] += n_rows

@@ -37,7 +37,7 @@ def as_mask(mask: npt.ArrayLike, n_entries: int) -> npt.NDArray[np.bool_]:
         )
     if array.dtype != np.bool_ and n_entries > 0:
         raise TypeError(f"mask must hold bools, got dtype {array.dtype}")
-    return array.astype(np.bool_, copy=False)
+    return array.astype(np.bool_)  # a copy, as another thread may change the caller's
 
 
 def first_halves(rows: Array, indices: Array, shifts: Callable[[], Array]) -> Array:

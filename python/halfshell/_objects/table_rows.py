@@ -46,16 +46,18 @@ class TableRows:
 
     def __init__(
         self,
-        arrays: tuple[Array, ...],
-        quantities: str,
-        n_points: int,
-        is_of_one_set: bool,
+        arrays: tuple[Array, ...] = (),
+        quantities: str = "",
+        n_points: int = 0,
+        is_of_one_set: bool = False,
         is_complete: bool = True,
         is_in_order: bool = True,
         origin: Origin | None = None,
         first_row: int | Array = 0,
         entries: slice | Array = slice(None),
     ) -> None:
+        if type(arrays) is not tuple or type(quantities) is not str or not arrays:
+            raise TypeError("a NeighborTable is what neighbors() returns: none is made of arrays")
         self._arrays = arrays
         self._quantities = quantities
         self._n_points = n_points

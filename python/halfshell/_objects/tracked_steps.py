@@ -35,8 +35,6 @@ class TrackedSteps:
         search: Callable[[Step, str, bool, int, None], Arrays],
     ) -> PairChanges:
         """Formed and broken pairs. `find` those of the last step, `search` for those of another."""
-        if not self._steps:
-            raise RuntimeError("there are no points yet: call update first")
         now = self._steps[-1]
         nothing = Step(now.points[:0], now.vectors, now.bits)
         before = self._steps[0] if len(self._steps) == 2 else nothing

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import threading
 from contextlib import suppress
 from typing import Any, Literal, Never, NoReturn, TypedDict, Unpack, overload
 
@@ -74,7 +73,9 @@ class VerletList(VerletRows):
     (other points, another number or dtype of them, too large a deformation of the box).
 
     A list pays only if it lasts for several steps: ``docs/verlet.md`` has measurements.
-    Several threads may use one list; calls run one at a time. It cannot be copied or pickled.
+    Several threads may use one list; calls run one at a time. It cannot be copied or pickled. A
+    forked process may continue with its copy; if another thread was in `update` at the time, that
+    copy has no points until the next `update`.
 
     Examples
     --------
@@ -109,26 +110,40 @@ class VerletList(VerletRows):
         if unknown:
             refuse_unknown(VerletList, unknown)
         self._cutoff = as_length(as_cutoff(cutoff), "cutoff")
-        self._auto = AutoSkin(self._cutoff) if isinstance(skin, str) and skin == "auto" else None
-        self._skin = self._auto.skin if self._auto is not None else as_skin(skin)
-        self._box = box
-        self._periodic = periodic
+        self._given_skin = None if isinstance(skin, str) and skin == "auto" else as_skin(skin)
+        self._given = box, periodic  # last
         self._inclusive = as_flag(inclusive, "inclusive")
-        self._tracked = TrackedSteps() if as_flag(track_changes, "track_changes") else None
+        self._tracks = as_flag(track_changes, "track_changes")
         self._threads = threads
         self._kernel = kernel
         self._memory_limit = memory_limit
         self._check()
-        self._list = _core.verlet_new()
-        self._lock = threading.RLock()
-        self._is_busy = False
-        self._searched: Step | None = None  # the last step's scene, if it has no list
         self._n_builds = 0
         self._n_updates = 0
+        self._start("there are no points yet: call update first")
+        self._make_lock()
+
+    def _start(self, without_points: str) -> None:
+        """Begin without points, and with what an error says of that."""
+        self._without_points = without_points
+        self._list = _core.verlet_new()
+        self._searched: Step | None = None  # the last step's scene, if it has no list
+        self._tracked = TrackedSteps() if self._tracks else None
+        auto, given = AutoSkin(self._cutoff), self._given_skin
+        self._auto = auto if given is None else None
+        self._skin = auto.skin if given is None else given
+        self._updates = False  # in the middle of one
+
+    def _interrupted(self) -> None:
+        if self._updates:
+            # The list of before is never freed: the frames of a thread that is gone keep theirs.
+            self._start(
+                "this process was forked off while another thread was in update: call it first"
+            )
 
     def _check(self) -> None:
         """Refuse what no step could be taken with, by a search among no points."""
-        ndim, vectors, bits = as_box_alone(self._box, self._periodic)
+        ndim, vectors, bits = as_box_alone(*self._given)
         with suppress(MemoryError):  # each step says whether it fits
             _core.count_pairs(
                 np.empty((0, ndim)), 0.0, vectors, 0 if vectors is None else bits,
@@ -175,18 +190,23 @@ class VerletList(VerletRows):
         [0.95]
         """
         with Alone(self):
-            return self._update(points, box, periodic)
+            before = self._given
+            given = (before[0] if box is None else box, before[1] if periodic is None else periodic)
+            scene = as_scene(points, *given)
+            self._updates = True
+            try:
+                rebuilt = self._update(*scene)
+                self._given = given
+            finally:
+                self._updates = False
+            return rebuilt
 
-    def _update(self, points: Any, box: Any, periodic: Any) -> bool:
-        box = self._box if box is None else box
-        periodic = self._periodic if periodic is None else periodic
-        array, vectors, bits = as_scene(points, box, periodic)
+    def _update(self, array: Any, vectors: Any, bits: int) -> bool:
         if self._tracked is not None:
             array = array.copy()
         auto = self._auto
         if auto is not None and auto.searches:
             self._take(array, vectors, bits)
-            self._box, self._periodic = box, periodic
             self._taken(array, vectors, bits)
             auto.searched()
             return True
@@ -198,7 +218,6 @@ class VerletList(VerletRows):
                 self._kernel, self._memory_limit, None, self._threads, skin, change,
             )
         self._searched = None
-        self._box, self._periodic = box, periodic
         self._taken(array, vectors, bits)
         self._n_builds += rebuilt
         if rebuilt:
@@ -344,6 +363,8 @@ class VerletList(VerletRows):
         with Alone(self):
             if self._tracked is None:
                 raise RuntimeError("changes are not tracked: make it with track_changes=True")
+            if self._searched is None:
+                self._state()
             index_bytes = as_index_bytes(index_dtype)
             return self._tracked.changes(quantities, index_bytes, self._find, self._search)
 
@@ -387,7 +408,7 @@ class VerletList(VerletRows):
     def _state(self) -> dict[str, Any]:
         state = _core.verlet_look(self._list)
         if not state["has_list"]:
-            raise RuntimeError("there are no points yet: call update first")
+            raise RuntimeError(self._without_points)
         return state
 
     def __reduce__(self) -> NoReturn:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import threading
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy.typing as npt
 
 from halfshell._convert.options import as_index_bytes, check_letters
 from halfshell._convert.starts import starts_of
-from halfshell._objects.alone import Alone
+from halfshell._objects.alone import Alone, Owner
 from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._objects.table_rows import read_only
 
@@ -21,11 +20,8 @@ _Array = npt.NDArray[Any]
 _LEAST_SHIFT = -(2**31)  # which has no opposite in int32
 
 
-class VerletRows:
+class VerletRows(Owner):
     """The method of `VerletList` that returns rows."""
-
-    _lock: threading.RLock
-    _is_busy: bool
 
     @property
     def n_points(self) -> int:

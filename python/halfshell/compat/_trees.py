@@ -20,6 +20,9 @@ Points = npt.NDArray[np.float64]
 #: all points are sorted into cells; these decide among them.
 _FEW = 1.0 / 256.0
 
+#: What is beyond this wraps in SciPy, which then reads what lies before its results.
+_LAST = np.iinfo(np.intp).max
+
 
 class TreeSearches:
     """To stand before one of SciPy's trees: which arguments are ours, and the searches."""
@@ -176,7 +179,11 @@ def as_ranks(k: Any) -> tuple[npt.NDArray[np.intp], bool] | None:
     except TypeError:
         pass
     ranks = np.asarray(k)
-    if ranks.ndim != 1 or not ranks.size or ranks.dtype.kind not in "iu" or ranks.min() < 1:
+    if ranks.ndim != 1 or not ranks.size or ranks.dtype.kind not in "biuf":
+        return None
+    if not ((ranks >= 1) & (ranks <= _LAST)).all():
+        raise ValueError(f"k must be 1 or more, as 1 is the nearest neighbour, got {k!r}")
+    if ranks.dtype.kind not in "iu":
         return None
     return ranks.astype(np.intp), False
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Neighbour lists in place of those of ``matscipy.neighbours``.
 
-The functions have matscipy's arguments, quantities, dtypes and shapes, and its rule: a pair counts
-if it is closer than the cutoff, or than the sum of the radii of its two atoms (``<``). Here that is
-decided for the exact values of the floats.
+The functions have matscipy's arguments, quantities, dtypes, shapes and types of errors, and its
+rule: a pair counts if it is closer than the cutoff, or than the sum of the radii of its two atoms
+(``<``). Here that is decided for the exact values of the floats. `neighbour_matrix` is in the
+package matscipy-neighbours alone, whose other functions are as those of matscipy.
 
 The order is ascending (i, j, S), always; matscipy promises ascending i alone. Points in a plane or
 on a line need no cell here: matscipy shrinks one around them, which has no volume, and fails.
@@ -11,15 +12,28 @@ on a line need no cell here: matscipy shrinks one around them, which has no volu
 
 from __future__ import annotations
 
+import operator
 from collections import defaultdict
+from collections.abc import Mapping
+from itertools import product
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from ase.data import atomic_numbers
 
-from halfshell.compat.ase import primitive_neighbor_list
+import halfshell as hs
+from halfshell.compat.ase import _reach, primitive_neighbor_list
 
-__all__ = ["first_neighbours", "neighbour_list", "triplet_list"]
+__all__ = [
+    "coordination",
+    "first_neighbours",
+    "get_jump_indicies",
+    "mic",
+    "neighbour_list",
+    "neighbour_matrix",
+    "triplet_list",
+]
 
 _TYPES = {"i": np.int32, "j": np.int32, "S": np.int32}
 
@@ -42,9 +56,10 @@ def neighbour_list(
         Letters of what is returned, in their order: i, j, d, D, S, as in `halfshell.compat.ase`.
     atoms : ase.Atoms, optional
         The atoms; or else what they consist of, one by one:
-    cutoff : float, dict or array_like of float, shape (n,)
-        One length for all; one for each pair of elements, by symbol or number; or a radius for each
-        atom, whose sums are the cutoffs.
+    cutoff : float, dict or array_like of float, shape (n,) or (z, z)
+        One length for all; one for each pair of elements, by symbol or number, in a dict or a
+        symmetric matrix with a row for each atomic number; or a radius for each atom, whose sums
+        are the cutoffs.
     positions : array_like of float, shape (n, 3), optional
         In place of `atoms`, like the following.
     cell : array_like of float, shape (3, 3), optional
@@ -64,6 +79,8 @@ def neighbour_list(
 
     Raises
     ------
+    TypeError
+        If there is not one radius, or number, for each atom, or `quantities` is not a string.
     TypeError, ValueError, OverflowError, MemoryError
         As `halfshell.neighbors`; ValueError also for letters that are none of these, without a
         cutoff, and for `atoms` beside what they consist of.
@@ -76,37 +93,231 @@ def neighbour_list(
     >>> i.tolist(), j.tolist()
     ([0, 0, 1, 2], [1, 2, 0, 0])
     """
-    if cutoff is None:
-        raise ValueError("Please provide a value for the cutoff radius.")
-    if atoms is not None:
-        beside = {"positions": positions, "cell_origin": cell_origin, "cell": cell, "pbc": pbc}
-        for name, value in {**beside, "numbers": numbers}.items():
-            if value is not None:
-                raise ValueError(f"You cannot provide an ASE Atoms object and {name} as well.")
-        positions, cell, pbc, numbers = atoms.positions, atoms.cell, atoms.pbc, atoms.numbers
-    if positions is None:
-        raise ValueError("Please provide atoms or positions.")
-    if pbc is None:
-        pbc = False
-    if cell is None:
-        cell = np.zeros((3, 3))
-    if numbers is None:
-        numbers = np.ones(len(positions), dtype=int)
-    if isinstance(cutoff, defaultdict):
-        cutoff = cutoff.default_factory()  # type: ignore[misc]
+    if not isinstance(quantities, str):
+        raise TypeError(f"quantities must be a string, got {type(quantities).__name__}")
+    parts = {"positions": positions, "cell": cell, "pbc": pbc, "numbers": numbers}
+    scene, cutoff = _scene(atoms, cutoff, **parts, cell_origin=cell_origin)
     if not set(quantities) <= set("ijdDS"):
         raise ValueError("Unsupported quantity specified.")
-    cell = np.asarray(cell, dtype=float)
-    found = primitive_neighbor_list(
-        quantities, np.broadcast_to(np.asarray(pbc, bool), 3), cell, positions, cutoff,
-        numbers=numbers,
-    )  # fmt: skip
+    found = primitive_neighbor_list(quantities, cutoff=cutoff, **scene)
     arrays = found if isinstance(found, tuple) else (found,)
     typed = tuple(
         array.astype(_TYPES.get(letter, array.dtype), copy=False)
         for letter, array in zip(quantities, arrays, strict=True)
     )
-    return typed if len(typed) > 1 else typed[0]
+    return typed[0] if len(typed) == 1 else typed
+
+
+def _scene(atoms: Any, cutoff: Any, **parts: Any) -> tuple[dict[str, Any], Any]:
+    """What ASE's function takes: atoms or what they consist of, and a cutoff."""
+    if cutoff is None:
+        raise ValueError("Please provide a value for the cutoff radius.")
+    if atoms is not None:
+        for name, value in parts.items():
+            if value is not None:
+                raise ValueError(f"You cannot provide an ASE Atoms object and {name} as well.")
+        parts = {name: getattr(atoms, name) for name in ("positions", "cell", "pbc", "numbers")}
+    positions, cell, pbc, numbers = (
+        parts[name] for name in ("positions", "cell", "pbc", "numbers")
+    )
+    if positions is None:
+        raise ValueError("Please provide atoms or positions.")
+    n = len(positions)
+    pbc = np.broadcast_to(np.asarray(False if pbc is None else pbc, bool), 3)
+    if cell is None and pbc.any():
+        raise ValueError("Please provide a cell: pbc says that it repeats.")
+    cell = np.zeros((3, 3)) if cell is None else np.asarray(cell, dtype=float)
+    numbers = np.ones(n, dtype=int) if numbers is None else np.asarray(numbers)
+    if len(numbers) != n:
+        raise TypeError(f"There must be a number for each of {n} atoms, got {len(numbers)}.")
+    scene = {"positions": positions if n else np.empty((0, 3)), "cell": cell, "pbc": pbc}
+    return scene | {"numbers": numbers}, _cutoff(cutoff, numbers)
+
+
+def _cutoff(cutoff: Any, numbers: npt.NDArray[Any]) -> Any:
+    if isinstance(cutoff, defaultdict):
+        cutoff = cutoff.default_factory()  # type: ignore[misc]
+    if isinstance(cutoff, Mapping):
+        for key in {key for pair in cutoff for key in pair if isinstance(key, str)}:
+            if key not in atomic_numbers:
+                raise ValueError(f"There is no element {key!r}, as in the dict of cutoffs.")
+        return {(one, other): float(length) for (one, other), length in cutoff.items()}
+    if np.ndim(cutoff) == 0:
+        return float(cutoff)
+    lengths = np.asarray(cutoff, dtype=float)
+    if lengths.ndim == 1 and len(lengths) != len(numbers):
+        raise TypeError(
+            f"There must be a radius for each of {len(numbers)} atoms, got {len(lengths)}."
+        )
+    if lengths.ndim != 2:
+        return lengths
+    kinds = np.unique(numbers).tolist()
+    if not np.array_equal(lengths, lengths.T) or any(not 0 <= k < len(lengths) for k in kinds):
+        raise ValueError(
+            "A matrix of cutoffs must be symmetric, and have a row for each atomic number up to "
+            f"the largest one, got shape {lengths.shape} for the numbers {kinds}."
+        )
+    return {pair: lengths[pair] for pair in product(kinds, repeat=2)}
+
+
+def _rows(atoms: Any, cutoff: Any, **parts: Any) -> tuple[tuple[Any, Any], dict[str, Any]]:
+    """What `halfshell.neighbors` takes, and `halfshell.coordination`."""
+    scene, cutoff = _scene(atoms, cutoff, **parts)
+    cutoff, each = _reach(cutoff, scene["numbers"])
+    box = {"box": scene["cell"], "periodic": scene["pbc"], "inclusive": False}
+    return (scene["positions"], cutoff), each | box
+
+
+def coordination(
+    structure: Any = None,
+    cutoff: Any = None,
+    *,
+    positions: Any = None,
+    cell: Any = None,
+    pbc: Any = None,
+    numbers: Any = None,
+    cell_origin: Any = None,
+) -> npt.NDArray[np.int64]:
+    """Count the neighbours of each atom, as ``matscipy.neighbours.coordination`` does.
+
+    Parameters
+    ----------
+    structure : ase.Atoms, optional
+        The atoms, or else what they consist of, as in `neighbour_list`.
+    cutoff, positions, cell, pbc, numbers, cell_origin
+        As in `neighbour_list`.
+
+    Returns
+    -------
+    ndarray of int64, shape (n,)
+        A number for each atom. matscipy's array ends with the last atom that has neighbours.
+
+    Raises
+    ------
+    TypeError, ValueError, OverflowError, MemoryError
+        As `neighbour_list`.
+
+    Examples
+    --------
+    >>> from ase.build import molecule
+    >>> from halfshell.compat.matscipy import coordination
+    >>> coordination(molecule("H2O"), 1.2).tolist()
+    [2, 1, 1]
+    """
+    parts = {"positions": positions, "cell": cell, "pbc": pbc, "numbers": numbers}
+    search, options = _rows(structure, cutoff, **parts, cell_origin=cell_origin)
+    return hs.coordination(*search, **options)
+
+
+def neighbour_matrix(
+    atoms: Any = None,
+    cutoff: Any = None,
+    max_neighbours: int | None = None,
+    *,
+    positions: Any = None,
+    cell: Any = None,
+    pbc: Any = None,
+    numbers: Any = None,
+    cell_origin: Any = None,
+    device: Any = None,
+    array_namespace: Any = None,
+) -> tuple[Any, Any, Any]:
+    """List neighbours in rows of one length, as ``matscipy_neighbours.neighbour_matrix`` does.
+
+    Parameters
+    ----------
+    atoms, cutoff, positions, cell, pbc, numbers, cell_origin
+        As in `neighbour_list`.
+    max_neighbours : int
+        The length of the rows.
+    device : {"cpu"}, optional
+        Where to search.
+    array_namespace : module or "dlpack", optional
+        The result is made by its ``from_dlpack``. Default, and with "dlpack": arrays of NumPy.
+
+    Returns
+    -------
+    idx : ndarray of int64, shape (n, max_neighbours)
+        Numbers of the neighbours, ascending, then zeros.
+    dist : ndarray of float64, shape (n, max_neighbours, 3)
+        Their vectors, then zeros.
+    count : ndarray of int64, shape (n,)
+        How many they are.
+
+    Raises
+    ------
+    CapacityError
+        A ValueError: if an atom has more than `max_neighbours`; ``needed`` tells how many.
+    TypeError, ValueError, OverflowError, MemoryError
+        As `neighbour_list`; ValueError also for another device.
+
+    Examples
+    --------
+    >>> from ase.build import molecule
+    >>> from halfshell.compat.matscipy import neighbour_matrix
+    >>> idx, dist, count = neighbour_matrix(molecule("H2O"), 1.2, 3)
+    >>> idx.tolist(), count.tolist()
+    ([[1, 2, 0], [0, 0, 0], [0, 0, 0]], [2, 1, 1])
+    """
+    if max_neighbours is None:
+        raise ValueError("Please provide max_neighbours (the row capacity).")
+    if device not in (None, "cpu"):
+        raise ValueError(f"device must be None or 'cpu', got {device!r}")
+    parts = {"positions": positions, "cell": cell, "pbc": pbc, "numbers": numbers}
+    search, options = _rows(atoms, cutoff, **parts, cell_origin=cell_origin)
+    table = hs.neighbors(*search, quantities="jD", **options)
+    idx, dist = (table.to_padded(max_neighbours, 0, quantity=letter) for letter in "jD")
+    made = idx, dist, table.counts
+    if array_namespace in (None, "dlpack"):
+        return made
+    idx, dist, count = (array_namespace.from_dlpack(array) for array in made)
+    return idx, dist, count
+
+
+def mic(dr: npt.ArrayLike, cell: Any, pbc: Any = None) -> npt.NDArray[np.float64]:
+    """Replace vectors by their shortest images.
+
+    ``matscipy.neighbours.mic`` rounds multiples of the cell vectors, which may give a longer image
+    in a skewed cell; as in matscipy-neighbours, the shortest one is found in any cell. Which one it
+    is, is decided exactly.
+
+    Parameters
+    ----------
+    dr : array_like of float, shape (..., 3)
+        The vectors.
+    cell : array_like of float, shape (3, 3)
+        Cell vectors as rows. Those that do not repeat may be zero.
+    pbc : bool or sequence of bool, shape (3,), optional
+        Which of them repeat. Default: all.
+
+    Returns
+    -------
+    ndarray of float64, shape (..., 3)
+        ``dr + S @ cell`` with the integers S that make it shortest, the least S of several.
+
+    Raises
+    ------
+    TypeError, ValueError, OverflowError, MemoryError
+        As `halfshell.nearest`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from halfshell.compat.matscipy import mic
+    >>> mic([[0.75, 0.0, 0.0], [0.75, 0.0, 1.25]], np.eye(3), [True, True, False]).tolist()
+    [[-0.25, 0.0, 0.0], [-0.25, 0.0, 1.25]]
+    """
+    vectors = np.asarray(dr, dtype=float)
+    box = np.asarray(cell, dtype=float)
+    dim = vectors.shape[-1] if vectors.ndim else 0
+    if box.shape != (dim, dim):
+        raise ValueError(f"cell must have shape ({dim}, {dim}) as dr demands, got {box.shape}")
+    periodic = np.broadcast_to(np.asarray(True if pbc is None else pbc, bool), dim)
+    found = hs.nearest(
+        np.zeros((1, dim)), 1, queries=-vectors.reshape(-1, dim), box=box, periodic=periodic,
+        quantities="D",
+    )  # fmt: skip
+    return found.reshape(vectors.shape)
 
 
 def first_neighbours(nat: int, i: npt.ArrayLike) -> npt.NDArray[np.int32]:
@@ -122,15 +333,64 @@ def first_neighbours(nat: int, i: npt.ArrayLike) -> npt.NDArray[np.int32]:
     Returns
     -------
     ndarray of int32, shape (nat + 1,)
-        Those of atom k are from ``first[k]`` to ``first[k + 1]``.
+        Those of atom k are from ``first[k]`` to ``first[k + 1]``. As in matscipy, it is -1, not 0,
+        for atoms before the first one that has neighbours.
+
+    Raises
+    ------
+    TypeError
+        If `nat` is not an integer.
+    ValueError
+        If `i` does not ascend from 0 or more, where matscipy returns something.
 
     Examples
     --------
     >>> from halfshell.compat.matscipy import first_neighbours
     >>> first_neighbours(4, [0, 0, 2]).tolist()
     [0, 2, 2, 3, 3]
+    >>> first_neighbours(3, [1, 1, 2]).tolist()
+    [-1, 0, 2, 3]
     """
-    return np.searchsorted(np.asarray(i), np.arange(nat + 1)).astype(np.int32)
+    nat, rows = operator.index(nat), np.asarray(i).astype(np.int64)
+    if rows.ndim != 1 or (np.diff(rows, prepend=0) < 0).any():
+        raise ValueError("i must be one row of numbers that ascend, from 0 or more")
+    first = np.searchsorted(rows, np.arange(nat + 1)).astype(np.int32)
+    if len(rows):
+        first[: min(int(rows[0]), max(nat, 0))] = -1
+    return first
+
+
+def get_jump_indicies(sorted: npt.ArrayLike) -> npt.NDArray[np.int32]:
+    """Where each number begins in a list that ascends from 0 in steps of at most 1.
+
+    The name is spelt as in ``matscipy.neighbours``.
+
+    Parameters
+    ----------
+    sorted : array_like of int, shape (m,)
+        The list.
+
+    Returns
+    -------
+    ndarray of int32
+        Number k is from place k to place k + 1 of it; 0, 0 for an empty list.
+
+    Raises
+    ------
+    ValueError
+        If the list is not like that; matscipy then returns what was in memory.
+
+    Examples
+    --------
+    >>> from halfshell.compat.matscipy import get_jump_indicies
+    >>> get_jump_indicies([0, 0, 1, 1, 1]).tolist()
+    [0, 2, 5]
+    """
+    rows = np.asarray(sorted).astype(np.int64)
+    steps = np.diff(rows)
+    if rows.ndim != 1 or rows[:1].any() or ((steps < 0) | (steps > 1)).any():
+        raise ValueError("the numbers must be one row that ascends from 0 in steps of at most 1")
+    return first_neighbours(int(rows[-1]) + 1 if len(rows) else 1, rows)
 
 
 def triplet_list(
@@ -145,7 +405,7 @@ def triplet_list(
     Parameters
     ----------
     first_neighbours : array_like of int, shape (n + 1,)
-        Where the pairs of each atom begin.
+        Where the pairs of each atom begin, as `first_neighbours` tells.
     abs_dr_p : array_like of float, shape (m,), optional
         Distance of each pair; with `cutoff` only pairs that are closer than that count.
     cutoff : float, optional
@@ -170,7 +430,7 @@ def triplet_list(
     from halfshell._convert.starts import starts_of
     from halfshell._objects.table_triplets import triplets
 
-    starts = np.asarray(first_neighbours).astype(np.int64)
+    starts = np.maximum(np.asarray(first_neighbours).astype(np.int64), 0)
     if abs_dr_p is None or cutoff is None:
         ij, ik = triplets(starts, True)
     else:

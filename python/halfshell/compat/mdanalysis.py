@@ -14,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 
 try:
-    from MDAnalysis.lib.mdamath import triclinic_vectors
     from MDAnalysis.lib.util import check_box, check_coords
 except ImportError as error:  # pragma: no cover
     message = "halfshell.compat.mdanalysis needs MDAnalysis: pip install MDAnalysis"
@@ -27,32 +26,63 @@ from halfshell._objects.box import Box
 __all__ = ["capped_distance", "self_capped_distance"]
 
 _METHODS = {"bruteforce", "nsgrid", "pkdtree"}
+_BACKENDS = ("serial", "openmp", "distopia")
 Entries = tuple[npt.NDArray[Any], npt.NDArray[Any]]
 _KEPT = {"enforce_copy": False, "reduce_result_if_single": False, "allow_atomgroup": True}
 
 
-def _box(box: Any) -> npt.NDArray[np.float64] | None:
-    """Box vectors in rows, or None for open space, which zeros mean too."""
+#: Axes that are not longer are open in MDAnalysis.
+_SHORTEST = np.finfo(np.float32).eps
+
+
+def _box(box: Any) -> dict[str, Any]:
+    """Box and periodicity; open axes where MDAnalysis has them."""
     if box is None:
-        return None
-    check_box(box)
-    lengths_and_angles = np.asarray(box, np.float32)
-    if not lengths_and_angles.any():
-        return None
-    return np.asarray(triclinic_vectors(lengths_and_angles), np.float64)
+        return {"box": None}
+    kind, form = check_box(box)
+    if np.isnan(np.asarray(box, np.float32)).any():
+        raise ValueError(f"box must be lengths and angles, which NaN is not, got {box!r}")
+    lengths = form if kind == "ortho" else form.diagonal()  # zeros, if no triclinic box is like it
+    periodic = lengths > _SHORTEST
+    if not periodic.any():
+        return {"box": None}
+    vectors = np.diag(np.where(periodic, form, 0.0)) if kind == "ortho" else form
+    return {"box": vectors.astype(np.float64), "periodic": periodic}
 
 
-def _check(method: str | None) -> None:
+def _check(method: str | None, backend: str) -> None:
     if method is not None and method.lower() not in _METHODS:
         raise KeyError(method.lower())
+    if backend.lower() not in _BACKENDS:
+        raise ValueError(f"backend must be one of {_BACKENDS}, got {backend!r}")
 
 
-def _nearest_images(
-    entries: Entries, vectors: npt.NDArray[Any] | None, cutoff: float, selves: bool
-) -> Entries:
+def _within(max_cutoff: Any, box: dict[str, Any], *sets: Any) -> Any:
+    """The cutoff, or if it is less a length that no nearest image exceeds.
+
+    The vectors of the box are rows of a lower triangle, so some image of each point is as near as
+    half of the diagonal is long; on open axes points are as far apart as their coordinates.
+    """
+    halves = np.zeros(3) if box["box"] is None else box["box"].diagonal() / 2.0
+    if np.isfinite(max_cutoff) and (box["box"] is None or max_cutoff <= halves.max()):
+        return max_cutoff
+    low = np.min([points.min(axis=0) for points in sets], axis=0).astype(np.float64)
+    spans = np.max([points.max(axis=0) for points in sets], axis=0) - low
+    spans = np.where(box.get("periodic", False), halves, spans)
+    most = float(np.sqrt((spans * spans).sum())) * (1.0 + 1e-9)
+    if not np.isfinite(most):
+        return 0.0  # enough to find out which of the points is not finite
+    return most if max_cutoff > most else max_cutoff
+
+
+def _nearest_images(entries: Entries, box: dict[str, Any], cutoff: float, selves: bool) -> Entries:
     """Each pair once, with its least distance, where some have several images."""
     both, d = entries
-    if vectors is None or 2.0 * cutoff < Box.from_matrix(vectors).perpendicular_heights.min():
+    if box["box"] is None or not len(d):
+        return both, d
+    heights = Box.from_matrix(np.where(box["periodic"], box["box"], np.eye(3)))
+    nearest = heights.perpendicular_heights[box["periodic"]].min()
+    if 2.0 * cutoff < nearest * (1.0 - 1e-9):  # which is rounded
         return both, d
     order = np.lexsort((d, both[:, 1], both[:, 0]))
     both, d = both[order], d[order]
@@ -63,11 +93,26 @@ def _nearest_images(
     return both[first], d[first]
 
 
-def _answer(entries: Entries, min_cutoff: float | None, distances: bool) -> Any:
+def _answer(
+    search: Any, max_cutoff: Any, min_cutoff: Any, box: dict[str, Any], sets: Any, distances: bool
+) -> Any:
+    """Pairs that `search` finds in these sets, in the nearest image, beyond the lesser cutoff."""
+    if not all(len(points) for points in sets) or max_cutoff < 0.0:
+        entries = np.empty((0, 2), np.intp), np.empty(0)
+    else:
+        cutoff = _within(max_cutoff, box, *sets)
+        found = search(*sets, cutoff, quantities="Pd", **box)
+        entries = _nearest_images(cast("Entries", found), box, cutoff, len(sets) == 1)
     both, d = entries
     if min_cutoff is not None:
-        beyond = d > min_cutoff
-        both, d = both[beyond], d[beyond]
+        kept = d > min_cutoff
+        unsure = (abs(d - min_cutoff) <= 4.0 * np.spacing(d)) & (min_cutoff >= 0.0)  # d is rounded
+        if unsure.any():
+            near = search(*sets, min_cutoff, quantities="P", **box).astype(np.intp)
+            width = len(sets[-1])
+            number = both[unsure].astype(np.intp) @ (width, 1)
+            kept[unsure] = ~np.isin(number, near @ (width, 1))
+        both, d = both[kept], d[kept]
     both = both.astype(np.intp, copy=False)
     return (both, d) if distances else both
 
@@ -90,13 +135,14 @@ def capped_distance(
     reference, configuration : (n, 3) or (3,) array_like, or AtomGroup
         Read as float32.
     max_cutoff : float
-        Pairs at this distance count.
+        Pairs at this distance count; infinity, for all.
     min_cutoff : float, optional
         Pairs at this distance, or nearer, do not.
     box : (6,) array_like, optional
-        Lengths and angles in degrees. None, or zeros: open space.
+        Lengths and angles in degrees. None: open space. With right angles an axis is open if its
+        length is zero or negative; if there is no such triclinic box, all are.
     method, backend : str, optional
-        Checked, where they are names of methods, and not used.
+        Checked, and not used.
     return_distances : bool, default True
 
     Returns
@@ -109,7 +155,8 @@ def capped_distance(
     Raises
     ------
     ValueError, TypeError, KeyError
-        As the original, for a box, coordinates or a method that are none; ValueError for NaN.
+        As the original, for a box, coordinates, a backend or a method that are none; ValueError
+        for NaN.
 
     Examples
     --------
@@ -121,13 +168,9 @@ def capped_distance(
     >>> pairs.tolist(), d.tolist()
     ([[0, 0]], [1.0])
     """
-    _check(method)
-    vectors = _box(box)
-    if not len(reference) or not len(configuration) or max_cutoff < 0.0:
-        return _answer((np.empty((0, 2), np.intp), np.empty(0)), None, return_distances)
-    found = pairs_between(reference, configuration, max_cutoff, box=vectors, quantities="Pd")
-    nearest = _nearest_images(cast("Entries", found), vectors, max_cutoff, False)
-    return _answer(nearest, min_cutoff, return_distances)
+    _check(method, backend)
+    sets = reference, configuration
+    return _answer(pairs_between, max_cutoff, min_cutoff, _box(box), sets, return_distances)
 
 
 @check_coords("reference", **_KEPT)
@@ -170,10 +213,5 @@ def self_capped_distance(
     >>> pairs.tolist(), d.tolist()
     ([[0, 1]], [5.0])
     """
-    _check(method)
-    vectors = _box(box)
-    if not len(reference) or max_cutoff < 0.0:
-        return _answer((np.empty((0, 2), np.intp), np.empty(0)), None, return_distances)
-    found = pairs(reference, max_cutoff, box=vectors, quantities="Pd")
-    nearest = _nearest_images(cast("Entries", found), vectors, max_cutoff, True)
-    return _answer(nearest, min_cutoff, return_distances)
+    _check(method, backend)
+    return _answer(pairs, max_cutoff, min_cutoff, _box(box), (reference,), return_distances)

@@ -84,6 +84,12 @@ class _Searches(TreeSearches):
             is 1, as an int.
         i : int or ndarray of intp, shape (..., k)
             Numbers of the neighbours; n where there is none.
+
+        Raises
+        ------
+        ValueError
+            If any of `k` is less than 1; there SciPy crashes, or returns what was in memory. Other
+            errors are SciPy's.
         """
         asked, threads, ranks = self._asked(x, p, eps), as_threads(workers), as_ranks(k)
         bound = as_bound(distance_upper_bound)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeVar
 
+from halfshell._convert.options import as_flag
 from halfshell.scenes._scene import SIZES, Scene, Size
 
 __all__ = ["add", "load", "names"]
@@ -68,7 +69,8 @@ def names(*, radii: bool = False, supports: bool = False, updates: bool = False)
     >>> scenes.names(supports=True)
     ('needles', 'needles-strict')
     """
-    asked = ("radii",) * radii + ("supports",) * supports + ("updates",) * updates or ("cutoff",)
+    given = {"radii": radii, "supports": supports, "updates": updates}
+    asked = [kind for kind, wanted in given.items() if as_flag(wanted, kind)] or ["cutoff"]
     return tuple(name for name, entry in _ENTRIES.items() if entry.kind in asked)
 
 

@@ -656,6 +656,85 @@ it_can_be_stopped(void)
     free(zeros);
 }
 
+/* Whether places of axis k are near enough for a pair. */
+static bool
+are_near(const hs_box_axes *axes, int k, double a, double b)
+{
+    const double apart = fabs(a - b);
+    return apart <= axes->reach[k] || (axes->repeats[k] && 1.0 - apart <= axes->reach[k]);
+}
+
+/* In boxes and units of all kinds; and most points that are no pair are told apart. */
+static void
+places_of_pairs_are_within_reach(void)
+{
+    harness_random random = {271828};
+    int64_t        n_pairs = 0, n_told = 0, n_all = 0;
+    for (int trial = 0; trial < 600; trial++) {
+        enum { N = 24 };
+        double      places[HS_MAX_DIM * N], part[HS_MAX_DIM];
+        const int   exponent = trial % 3 == 0 ? random_below(&random, 1800) - 900 : 0;
+        hs_options  options = hs_options_default();
+        hs_pairs   *pairs = NULL;
+        hs_box_axes axes, again;
+        make_scene(&random, trial % SCENE_KINDS, 1 + trial % 5, N, 8.0, exponent, &shared);
+        const hs_points points = points_of(&shared.scene);
+        options.cutoff = ldexp(0.75, exponent);
+        options.want = HS_WANT_I | HS_WANT_J;
+        if (hs_pairs_find(AMONG(&points, shared.scene.box), &options, &pairs, NULL) != HS_OK)
+            continue;
+        const int    d = points.ndim;
+        const double largest = ldexp(1024.0, exponent);
+        CHECK(hs_box_places(shared.scene.box, &points, options.cutoff, largest, places, N, &axes,
+                            NULL) == HS_OK);
+        const int64_t *i_of = hs_pairs_array(pairs, HS_WANT_I);
+        const int64_t *j_of = hs_pairs_array(pairs, HS_WANT_J);
+        for (int64_t p = 0; p < hs_pairs_length(pairs); p++) {
+            for (int k = 0; k < d; k++)
+                CHECK(are_near(&axes, k, places[k * N + i_of[p]], places[k * N + j_of[p]]));
+        }
+        n_pairs += hs_pairs_length(pairs);
+        hs_pairs_free(pairs);
+        for (int i = 0; i < N; i++) { /* those of each point are the same alone */
+            hs_points one = points;
+            one.data = (const char *)points.data + i * points.row_stride;
+            one.n = 1;
+            CHECK(hs_box_places(shared.scene.box, &one, options.cutoff, largest, part, 1, &again,
+                                NULL) == HS_OK);
+            for (int k = 0; k < d; k++)
+                CHECK(part[k] == places[k * N + i] && again.reach[k] == axes.reach[k]);
+            for (int j = 0; j < i; j++) {
+                bool near = true;
+                for (int k = 0; k < d; k++)
+                    near = near && are_near(&axes, k, places[k * N + i], places[k * N + j]);
+                n_told += !near;
+                n_all++;
+            }
+        }
+    }
+    CHECK(n_pairs > 1000 && n_told > n_all / 4);
+}
+
+static void
+places_need_a_largest_coordinate(void)
+{
+    const double    x[2] = {3.0, -5.0};
+    const hs_points points = {x, 2, 1, HS_FLOAT64, 8, 8};
+    hs_box_axes     axes;
+    double          places[2];
+    CHECK(hs_box_places(NULL, &points, 1.0, 5.0, NULL, 0, &axes, NULL) == HS_OK);
+    CHECK(!axes.repeats[0] && axes.reach[0] > 0.0);
+    CHECK(hs_box_places(NULL, &points, 1.0, 4.0, NULL, 0, &axes, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_box_places(NULL, &points, 1.0, NAN, NULL, 0, &axes, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_box_places(NULL, &points, 1.0, 5.0, places, 2, NULL, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_box_places(NULL, &points, -1.0, 5.0, places, 2, &axes, NULL) == HS_ERR_CUTOFF);
+    /* entries of one box that are not scaled together without loss: nothing is known */
+    const hs_box    box = {.ndim = 2, .periodic = {true, true}, .rows = {{1, 0x1p-1070}, {0, 1}}};
+    const hs_points none = {x, 0, 2, HS_FLOAT64, 16, 8};
+    CHECK(hs_box_places(&box, &none, 1.0, 5.0, NULL, 0, &axes, NULL) == HS_OK);
+    CHECK(isinf(axes.reach[0]) && isinf(axes.reach[1]));
+}
+
 void
 test_api_verlet(void)
 {
@@ -674,4 +753,6 @@ test_api_verlet(void)
     RUN(the_first_of_many_that_fails_is_named);
     RUN(arguments_are_checked);
     RUN(it_can_be_stopped);
+    RUN(places_of_pairs_are_within_reach);
+    RUN(places_need_a_largest_coordinate);
 }

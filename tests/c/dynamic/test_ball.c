@@ -3,6 +3,7 @@
 #include "../../../csrc/core/base/fpenv.h"
 #include "../../../csrc/core/dynamic/ball.h"
 #include "../../../csrc/core/dynamic/new_list.h"
+#include "../../../csrc/core/dynamic/update.h"
 #include "../support/dynamic_brute.h"
 #include "../support/harness.h"
 
@@ -42,6 +43,73 @@ nothing_is_surely_within_less_than_the_error(void)
         }
         hs_list_free(list);
     }
+}
+
+/* A ball that ends before a cell by less than coordinates may be wrong by reaches that cell. */
+static void
+balls_reach_as_far_as_errors_may(void)
+{
+    static const hs_box box = {
+        .ndim = 2, .periodic = {true, true}, .rows = {{40.0, 3.0}, {7.0, 40.0}}};
+    hs_dynamic_options options = hs_dynamic_options_default();
+    harness_random     random = {77};
+    hs_dynamic        *list = NULL;
+    hs_failure         failure;
+    int                n_tried = 0;
+    options.ndim = 2;
+    options.box = &box;
+    options.max_radius = 9.0;
+    options.cell_size = 2.0;
+    CHECK(hs_list_new(&options, &list, &failure) == HS_OK);
+    for (int trial = 0; trial < 400; trial++) {
+        const hs_axis *axis = &list->axes.axis[trial % 2];
+        double         centre[2];
+        hs_ball        ball;
+        for (int k = 0; k < 2; k++)
+            centre[k] = 30.0 * (random_unit(&random) - 0.5);
+        CHECK(hs_ball_init(&ball, list, centre, 3.0, &failure) == HS_OK);
+        const double  t = ball.centre.t[trial % 2];
+        const double  terms = hs_axis_terms(&list->lattice, ball.centre.x, trial % 2);
+        const double  error = hs_axis_rounding(2) * (2.0 * terms + 24.0) + axis->leak;
+        const int64_t next = hs_axis_cell(axis, t + 3.0) + 1;
+        const double  edge = (double)next * axis->width - axis->half;
+        if (!(next < axis->n - 1 && t - 7.0 > -axis->half))
+            continue;
+        CHECK(error > 0x1p-44 && error < 0x1p-30);
+        for (int more = 0; more < 2; more++) {
+            const double radius = edge - t - (more ? 0.5 : 2.0) * error;
+            CHECK(hs_ball_init(&ball, list, centre, radius, &failure) == HS_OK);
+            CHECK(ball.span[trial % 2].last == next - !more);
+        }
+        n_tried++;
+    }
+    CHECK(n_tried > 100);
+    hs_list_free(list);
+}
+
+/* A far point hardly matters to others; a list that was emptied is as exact as a new one. */
+static void
+emptied_lists_are_as_exact_as_new_ones(void)
+{
+    const hs_box       box = {.ndim = 2, .periodic = {true}, .rows = {{3.0, 1.0}}};
+    const double       centre[2] = {0.5, 0.5}, far[2] = {-1e12, 1e12};
+    hs_dynamic_options options = hs_dynamic_options_default();
+    hs_dynamic        *list = NULL;
+    hs_failure         failure;
+    hs_placed          placed;
+    hs_ball            at_first, with_far, emptied;
+    options.ndim = 2;
+    options.box = &box;
+    CHECK(hs_list_new(&options, &list, &failure) == HS_OK);
+    CHECK(hs_ball_init(&at_first, list, centre, 1.0, &failure) == HS_OK);
+    CHECK(hs_dynamic_place(list, far, &placed, &failure) == HS_OK);
+    CHECK(hs_update_insert(list, (hs_key){0, 0}, &placed, &failure) == HS_OK);
+    CHECK(hs_ball_init(&with_far, list, centre, 1.0, &failure) == HS_OK);
+    CHECK(with_far.error < 1.5 * at_first.error && list->magnitude > 0.0);
+    hs_list_clear(list);
+    CHECK(hs_ball_init(&emptied, list, centre, 1.0, &failure) == HS_OK);
+    CHECK(emptied.error == at_first.error && list->magnitude == 0.0);
+    hs_list_free(list);
 }
 
 /* Ball walk: a list does only what its scene needs, as its counters show. */
@@ -195,6 +263,8 @@ test_ball(void)
 {
     const hs_fpenv env = hs_fpenv_enter();
     RUN(nothing_is_surely_within_less_than_the_error);
+    RUN(balls_reach_as_far_as_errors_may);
+    RUN(emptied_lists_are_as_exact_as_new_ones);
     hs_fpenv_leave(env);
     RUN(what_a_scene_does_not_need_is_left_out);
     RUN(ties_are_decided_exactly);

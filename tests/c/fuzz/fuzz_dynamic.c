@@ -27,6 +27,7 @@ typedef struct state {
     hs_dynamic *list;
     brute_list  brute;
     hs_storage  storage;
+    bool        is_far[HS_MAX_DIM]; /* coordinates that may be: the box does not move them */
     int         queries;
 } state;
 
@@ -46,7 +47,7 @@ must(bool holds, const char *what)
     }
 }
 
-/* Eighths from -4 to 4, some moved by the last bits. */
+/* Eighths from -4 to 4, some moved by the last bits, some very large. */
 static void
 take_position(state *of, double *x)
 {
@@ -55,6 +56,8 @@ take_position(state *of, double *x)
         x[k] = (byte % 65 - 32) / 8.0;
         if (byte > 200)
             x[k] = nextafter(x[k], byte % 2 == 0 ? 9.0 : -9.0);
+        if (byte == 199 && of->is_far[k])
+            x[k] = ldexp(x[k], 4 * take(&of->in));
     }
 }
 
@@ -92,6 +95,11 @@ begin(state *of)
     if (second & 8) {
         box = take_box(&of->in, options.ndim, &reach);
         options.box = &box;
+    }
+    for (int k = 0; k < options.ndim; k++) { /* dense cells would have to reach there */
+        of->is_far[k] = of->storage != HS_STORE_DENSE;
+        for (int l = 0; options.box != NULL && l < options.ndim; l++)
+            of->is_far[k] = of->is_far[k] && !(box.periodic[l] && box.rows[l][k] != 0.0);
     }
     must(hs_dynamic_new(&options, &of->list, NULL) == HS_OK, "no list");
     brute_init(&of->brute, &options, reach);

@@ -4,6 +4,7 @@
 #if !defined(_WIN32)
 #define _GNU_SOURCE /* mmap, fork, setrlimit */
 #endif
+#include "../../../csrc/core/base/os_thread.h"
 #include "../../../csrc/core/collect/columns.h"
 #include "../../../csrc/core/memory/account.h"
 #include "../../../csrc/core/memory/chunk.h"
@@ -158,8 +159,8 @@ many_threads(void)
 
 #endif
 
-/* Pool lock: where the lock of the pool is taken, for a while or for ever, as in a child that is
- * forked off meanwhile, memory comes from the system. */
+/* Pool lock: where the lock of the pool is taken, memory comes from the system; a child that is
+ * forked off meanwhile begins with an empty pool. */
 
 #if !HS_WATCHED_MALLOC
 static void
@@ -176,6 +177,11 @@ without_the_lock(void)
     hs_pool_clear();
     hs_test_pool_hold(false);
     CHECK(hs_pool_held() == 4 * MB && hs_pool_limit() == HS_POOL_LIMIT);
+    void *left = hs_pool_take(4 * MB); /* what is in the pool is lost below */
+    hs_test_pool_hold(true);
+    hs_test_fork();
+    CHECK(hs_pool_held() == 0 && hs_pool_limit() == HS_POOL_LIMIT);
+    CHECK(left != NULL && hs_pool_give(left) && hs_pool_held() == 4 * MB);
     reset_pool();
 }
 
@@ -184,8 +190,10 @@ without_the_lock(void)
 #if !defined(_WIN32)
 /* What a child does with the pool it inherits, and with a region that was being written. */
 static int
-work_in_child(hs_region *region)
+work_in_child(hs_region *region, bool held)
 {
+    if (hs_pool_limit() != HS_POOL_LIMIT || (held && hs_pool_held() != 0))
+        return 5;
     if (!is_all(region->data, 6 * MB, 9))
         return 1;
     if (!hs_region_grow(region, region->capacity + 9 * MB) || !is_all(region->data, 6 * MB, 9))
@@ -218,12 +226,12 @@ fork_in_the_middle(void)
         int status = -1;
         fflush(NULL);
 #if !HS_WATCHED_MALLOC
-        hs_test_pool_hold(held); /* the second child never gets the lock */
+        hs_test_pool_hold(held);
 #endif
         const pid_t child = fork();
         if (child == 0) {
             harness_failures = 0;
-            _exit(work_in_child(&region));
+            _exit(work_in_child(&region, held));
         }
 #if !HS_WATCHED_MALLOC
         hs_test_pool_hold(false);

@@ -1,6 +1,10 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_nearest.c: searches of nearest points: what they prepare and keep, their radii, and where
  * they stop. */
+#if !defined(_WIN32)
+#define _POSIX_C_SOURCE 200809L
+#endif
+#include "../../../csrc/core/base/os_thread.h"
 #include "../../../csrc/core/collect/columns.h"
 #include "../../../csrc/core/memory/account.h"
 #include "../../../csrc/core/nearest/nearest_kept.h"
@@ -67,6 +71,9 @@ whoever_comes_while_it_is_built_does_without(void)
     CHECK(!borrows(kept, INFINITY));
     hs_nearest_kept_end(kept, false); /* it could not be built: the next one tries */
     CHECK(hs_nearest_kept_get(kept, &room) == NULL && room != NULL);
+    hs_test_fork(); /* a thread of the parent built it */
+    CHECK(hs_nearest_kept_get(kept, &room) == NULL && room != NULL);
+    CHECK(hs_nearest_kept_get(kept, &other) == NULL && other == NULL);
     hs_nearest_kept_end(kept, false);
     CHECK(borrows(kept, INFINITY));
     CHECK(borrows(kept, 1.0));

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_rank.c: the order of nearest points is exact, and so is what is written of it. */
+#include "../../../csrc/core/nearest/nearest_keys.h"
 #include "../../../csrc/core/nearest/nearest_rank.h"
 #include "../support/among.h"
 #include "../support/harness.h"
@@ -268,6 +269,41 @@ eight_thousand_points_may_be_one(void)
     hs_pairs_free(rows);
 }
 
+enum { KEYS = 40 };
+
+static hs_nearest_key keys[KEYS], spare[KEYS], given[KEYS];
+
+static bool
+are_sorted(const hs_nearest_key *sorted, int64_t n)
+{
+    bool right = true;
+    for (int64_t e = 0; e < n; e++) {
+        const hs_nearest_key *key = &sorted[e];
+        right = right && key->place >= 0 && key->place < n;
+        right = right && key->square == given[key->place].square;
+        if (e > 0)
+            right = right && (key->square > key[-1].square ||
+                              (key->square == key[-1].square && key->place > key[-1].place));
+    }
+    return right;
+}
+
+/* A step of such a bound would be infinite. */
+static void
+bounds_may_be_zero_or_tiny(void)
+{
+    static const double bounds[] = {0.0, 0x1p-1074, 0x1p-1000, 0x1p-999};
+    const hs_options    options = hs_options_default();
+    for (int b = 0; b < 4; b++) {
+        hs_nearest_pace pace = {.options = &options};
+        hs_nearest_key *sorted = keys, *other = spare;
+        for (int32_t e = 0; e < 20; e++)
+            given[e] = keys[e] = (hs_nearest_key){e % 3 == 0 ? bounds[b] : 0.0, e};
+        hs_nearest_sort(&pace, &sorted, &other, 20, bounds[b]);
+        CHECK(are_sorted(sorted, 20));
+    }
+}
+
 void
 test_rank(void)
 {
@@ -276,4 +312,5 @@ test_rank(void)
     RUN(ranking_can_be_stopped_anywhere);
     RUN(all_candidates_may_lie_in_one_image);
     RUN(eight_thousand_points_may_be_one);
+    RUN(bounds_may_be_zero_or_tiny);
 }

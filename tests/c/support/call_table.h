@@ -73,6 +73,7 @@ static const call_kind call_kinds[] = {
     {"measure", call_measure, OF_SCENE | USES_OPTIONS | USES_KERNEL | USES_COUNTERS | USES_RESULT},
     {"box_measure", call_box_measure, USES_BOX | NEEDS_BOX},
     {"box_wrap", call_box_wrap, OF_SCENE | NEEDS_BOX},
+    {"box_places", call_box_places, OF_SCENE | USES_CUTOFF | NEEDS_FINITE},
 };
 
 enum { CALL_KINDS = sizeof call_kinds / sizeof call_kinds[0] };

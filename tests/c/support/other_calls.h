@@ -6,6 +6,8 @@
 
 #include "calls.h"
 
+#include <float.h>
+
 /* Every third point is none that clusters are made of. */
 static inline hs_status
 call_clusters(call *c, hs_failure *failure)
@@ -45,6 +47,19 @@ call_box_measure(call *c, hs_failure *failure)
     const hs_status status = hs_box_measure(c->box, heights, &volume, failure);
     CHECK((status == HS_OK) == (volume >= 0.0));
     c->answer = status == HS_OK ? call_hash(2, &volume, sizeof volume) : c->answer;
+    return status;
+}
+
+static inline hs_status
+call_box_places(call *c, hs_failure *failure)
+{
+    double          places[CALL_ROOM] = {0.0};
+    hs_box_axes     axes = {.reach = {-7.0}};
+    const double    cutoff = c->options != NULL ? c->options->cutoff : 1.0;
+    const hs_status status = hs_box_places(c->box, c->points, cutoff, DBL_MAX, places,
+                                           CALL_ROOM / HS_MAX_DIM, &axes, failure);
+    CHECK((status == HS_OK) == (axes.reach[0] >= 0.0));
+    c->answer = status == HS_OK ? call_hash(4, places, sizeof places) : c->answer;
     return status;
 }
 

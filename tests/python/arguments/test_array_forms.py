@@ -112,3 +112,85 @@ def test_sets_may_share_memory():
         (rows[:200], rows[199::-1]),
     ):
         assert answers(points, queries) == answers(points.copy(), queries.copy())
+
+
+# ---- memoryviews, wherever an array is taken -----------------------------------------------
+
+NUMBERS = np.arange(200)
+RADII = np.full(200, 0.05)
+MATRICES = np.repeat(np.eye(3)[None] * 10.0, 200, axis=0)
+
+
+def connectivity(*arrays, **how):
+    points, h, ids = arrays
+    return hs.Connectivity([hs.NodeList("a", points, h, ids=ids)], **how)
+
+
+def dynamic(keys, points):
+    made = hs.DynamicCellList(3, 0.5)
+    made.insert_many(keys, points)
+    made.insert(-1, memoryview(POINTS[0]))
+    return sorted(made.remove_many(keys[:3])), made.within_many(points, 0.1)[0]
+
+
+def patched(keep, old2new):
+    made = connectivity(POINTS, RADII, NUMBERS)
+    made.patch(keep, old2new)
+    return made.pairs.view()
+
+
+TAKEN = {
+    "points, box": (lambda x, b: hs.pairs(x, 0.1, box=b), (POINTS, np.eye(3))),
+    "periodic": (
+        lambda x, p: hs.pairs(x, 0.1, box=BOX, periodic=p), (POINTS, np.array([True, False, True]))
+    ),
+    "cutoffs": (lambda c: hs.pairs(POINTS, c, quantities="ijk"), (np.array([0.05, 0.1]),)),
+    "radii": (lambda r: hs.neighbors(POINTS, None, radii=r).indices, (RADII,)),
+    "supports": (
+        lambda H: hs.neighbors(POINTS, None, supports=H, extent=1.0).indices, (MATRICES,)
+    ),
+    "types": (lambda t: hs.rdf(POINTS, 0.1, types=t, box=BOX).counts, (TYPES,)),
+    "batch": (lambda k: hs.pairs(POINTS, 0.1, batch=k), (NUMBERS // 50,)),
+    "pairs": (lambda k: hs.pairs(POINTS, 0.2, exclude=k), (np.array([[0, 1], [2, 3]]),)),
+    "labels": (lambda k: hs.pairs(POINTS, 0.2, exclude=k), (NUMBERS // 3,)),
+    "groups": (lambda k: hs.pairs(POINTS, 0.2, groups=k), (NUMBERS // 3,)),
+    "touching": (lambda k: hs.pairs(POINTS, 0.2, touching=k), (NUMBERS[5:9],)),
+    "indices": (lambda k: hs.neighbors(POINTS, 0.2, indices=k).indices, (NUMBERS[5:9],)),
+    "edges, weights": (
+        lambda e, w: hs.pair_histogram(POINTS, e, weights=w), (EDGES, WEIGHTS)
+    ),
+    "lists": (lambda i, j: hs.measure(POINTS, i, j), (NUMBERS[:9], NUMBERS[1:10])),
+    "checked": (lambda i, j: str(hs.verify(POINTS, 0.2, i, j)), hs.pairs(POINTS, 0.2)),
+    "rows": (lambda k: hs.neighbors(POINTS, 0.2)[k].indices, (NUMBERS[5:9],)),
+    "mask of rows": (lambda k: hs.neighbors(POINTS, 0.2)[k].indices, (NUMBERS % 2 == 0,)),
+    "frames": (lambda x: list(hs.trajectory_pairs(x, 0.2))[1], (POINTS.reshape(2, 100, 3),)),
+    "step": (lambda x, b: hs.VerletList(0.2, box=BOX).update(x, b), (POINTS, np.eye(3) * 1.1)),
+    "keys": (dynamic, (NUMBERS, POINTS)),
+    "nodes": (lambda *a: connectivity(*a).pairs.view(), (POINTS, RADII, NUMBERS)),
+    "nodes of ellipsoids": (lambda *a: connectivity(*a).pairs.view(), (POINTS, MATRICES, NUMBERS)),
+    "pairs of nodes": (
+        lambda k: connectivity(POINTS, RADII, NUMBERS, exclude=k).pairs.view(),
+        (np.array([[0, 0, 1, 0]]),),
+    ),
+    "corners": (
+        lambda k: connectivity(POINTS, RADII, NUMBERS, order="morton", morton_box=k).pairs.view(),
+        (np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]),),
+    ),
+    "kept nodes": (patched, ((NUMBERS % 2 == 0)[None], (NUMBERS // 2)[None])),
+    "bricks": (lambda x: hs.bricks(x, 0.2, 2)[0].pairs(x), (POINTS,)),
+    "vectors": (lambda b, x: hs.Box(b).wrap(x), (np.eye(3) * 0.3, POINTS)),
+}
+
+
+@pytest.mark.parametrize("name", TAKEN)
+def test_memoryviews(name):
+    call, arrays = TAKEN[name]
+    expected, found = call(*arrays), call(*map(memoryview, arrays))
+    pairs = zip(found, expected, strict=True) if isinstance(found, tuple) else [(found, expected)]
+    for one, other in pairs:
+        assert np.array_equal(one, other)
+
+
+def test_a_memoryview_of_numbers_is_no_list_of_nodes():
+    with pytest.raises(TypeError, match="lists must be of NodeList, got ndarray"):
+        hs.Connectivity(memoryview(POINTS))

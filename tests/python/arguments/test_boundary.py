@@ -8,6 +8,7 @@ HALFSHELL_FUZZ_SEED (1 without it), the next number, and so on; a failure says w
 
 import faulthandler
 import functools
+import inspect
 import itertools
 import os
 import time
@@ -19,7 +20,7 @@ from hypothesis import strategies as st
 
 import boundary
 import halfshell as hs
-from boundary import POINTS, anything, calls, dressed, laid_out, outcome
+from boundary import CUBE, POINTS, anything, calls, dressed, laid_out, outcome
 from halfshell._check.reference import reference_pairs
 
 FUZZ_ROUNDS = int(os.environ.get("HALFSHELL_FUZZ_ROUNDS", "0"))
@@ -139,6 +140,117 @@ def test_any_objects_as_several_arguments():
             assert mentioned, result.message
 
     fuzz(several_wild(), check, 300)
+
+
+# ---- flags ---------------------------------------------------------------------------------
+
+TABLE = hs.neighbors(POINTS, 0.5, quantities="jdDS")
+NODES = [hs.NodeList("a", POINTS, [0.3] * len(POINTS))]
+ONE_EACH = hs.bricks(POINTS, 0.5, 1)
+DYNAMIC = hs.DynamicCellList(3, 1.0)
+#: Every public function and method with arguments that are bools, but for the flag.
+FLAGS = {
+    "Brick.count_pairs": lambda **how: ONE_EACH[0].count_pairs(POINTS, **how),
+    "Brick.neighbors": lambda **how: ONE_EACH[0].neighbors(POINTS, **how),
+    "Brick.pairs": lambda **how: ONE_EACH[0].pairs(POINTS, **how),
+    "CellList.coordination": lambda **how: hs.CellList(POINTS, 0.5).coordination(**how),
+    "CellList.count_pairs": lambda **how: hs.CellList(POINTS, 0.5).count_pairs(**how),
+    "CellList.for_each_pair": lambda **how: hs.CellList(POINTS, 0.5).for_each_pair(print, **how),
+    "CellList.iter_pairs": lambda **how: list(hs.CellList(POINTS, 0.5).iter_pairs(**how)),
+    "CellList.neighbors": lambda **how: hs.CellList(POINTS, 0.5).neighbors(**how),
+    "CellList.pairs": lambda **how: hs.CellList(POINTS, 0.5).pairs(**how),
+    "CellList.query": lambda **how: hs.CellList(POINTS, 0.5).query(POINTS, **how),
+    "Connectivity": lambda **how: hs.Connectivity(NODES, **how),
+    "DynamicCellList": lambda **how: hs.DynamicCellList(3, 1.0, **how),
+    "DynamicCellList.within": lambda **how: DYNAMIC.within(POINTS[0], 1.0, **how),
+    "DynamicCellList.within_many": lambda **how: DYNAMIC.within_many(POINTS, 1.0, **how),
+    "NeighborTable.to_pairs": TABLE.to_pairs,
+    "NeighborTable.triplets": TABLE.triplets,
+    "VerletList": lambda **how: hs.VerletList(0.5, **how),
+    "VerletList.pairs": lambda **how: kept().pairs(**how),
+    "clusters": lambda **how: hs.clusters(POINTS, 0.5, box=CUBE, **how),
+    "coordination": lambda **how: hs.coordination(
+        POINTS, np.full((2, 2), 0.5), types=[0, 1, 0, 1], **how
+    ),
+    "count_pairs": lambda **how: hs.count_pairs(POINTS, 0.5, **how),
+    "explain": lambda **how: hs.explain(POINTS, 0.5, **how),
+    "for_each_pair": lambda **how: hs.for_each_pair(POINTS, 0.5, print, **how),
+    "iter_pairs": lambda **how: list(hs.iter_pairs(POINTS, 0.5, **how)),
+    "neighbors": lambda **how: hs.neighbors(POINTS, 0.5, **how),
+    "pairs": lambda **how: hs.pairs(POINTS, 0.5, **how),
+    "pairs_between": lambda **how: hs.pairs_between(POINTS, POINTS, 0.5, **how),
+    "trajectory_pairs": lambda **how: list(hs.trajectory_pairs([POINTS], 0.5, **how)),
+    "verify": lambda **how: hs.verify(POINTS, 0.5, [0], [1], **how),
+}
+MADE_BY_OTHERS = {
+    "NeighborTable",
+    "RadialDistribution",
+    "Verdict",
+}  # users call no constructor of theirs
+
+
+def kept():
+    made = hs.VerletList(0.5)
+    made.update(POINTS)
+    return made
+
+
+def flags_of(function):
+    """Names of the arguments that are bools."""
+    parameters = inspect.signature(function).parameters.values()
+    return [one.name for one in parameters if one.annotation in ("bool", "bool | None")]
+
+
+def public_flags():
+    """(name, flag) of everything public."""
+    for name in hs.__all__:
+        thing = getattr(hs, name)
+        members = [(name, thing)] if callable(thing) and name not in MADE_BY_OTHERS else []
+        if inspect.isclass(thing):
+            own = inspect.getmembers(thing, inspect.isfunction)
+            members += [(f"{name}.{k}", member) for k, member in own if k[0] != "_"]
+        for full_name, member in members:
+            yield from ((full_name, flag) for flag in flags_of(member))
+
+
+@pytest.mark.parametrize(("name", "flag"), sorted(set(public_flags())))
+def test_flags_are_bools(name, flag):
+    call = FLAGS[name]
+    for value in (True, False, np.True_, np.False_):
+        if "for_each_pair" not in name:  # whose callback has to be of C
+            call(**{flag: value})
+    for value in (
+        0,
+        1,
+        2,
+        0.0,
+        "True",
+        b"",
+        [],
+        [True],
+        np.int64(1),
+        np.array(True),
+        np.array([1]),
+    ):
+        with pytest.raises(TypeError, match=flag):
+            call(**{flag: value})
+
+
+@pytest.mark.parametrize("shape", [(4, 0), (1, 0), (0, 0), (0, 3), (0, 1), (0, 2, 0)])
+def test_excluded_pairs_have_two_columns(shape):
+    with pytest.raises(ValueError, match=r"exclude must have shape"):
+        hs.pairs(POINTS, 0.5, exclude=np.empty(shape))
+    with pytest.raises(ValueError, match=r"exclude must have shape"):
+        hs.Connectivity(NODES, exclude=np.empty(shape))
+
+
+def test_no_excluded_pairs():
+    count = hs.count_pairs(POINTS, 0.5)
+    for nothing in ([], np.empty((0, 2)), np.empty((0, 2), int)):
+        assert hs.count_pairs(POINTS, 0.5, exclude=nothing) == count
+    pairs = len(hs.Connectivity(NODES).pairs)
+    for nothing in ([], np.empty((0, 4)), np.empty((0, 4), int)):
+        assert len(hs.Connectivity(NODES, exclude=nothing).pairs) == pairs
 
 
 # ---- good scenes in odd clothes ------------------------------------------------------------

@@ -260,3 +260,61 @@ def test_boxes_of_mdanalysis():
     universe.load_new(POINTS[None].astype(np.float32), dimensions=[[4, 5, 6, 80, 90, 70]])
     box = universe.trajectory.ts
     check_box(box, mda.lib.mdamath.triclinic_vectors(box.dimensions))
+
+
+# ---- structures of pymatgen ----------------------------------------------------------------
+
+
+class Structure:
+    """What we read of it."""
+
+    def __init__(self, points, rows, pbc, numbers):
+        self.cart_coords, self.atomic_numbers = points, numbers
+        self.lattice = SimpleNamespace(matrix=rows, pbc=pbc)
+
+    def __len__(self):
+        return len(self.cart_coords)
+
+
+def like_pymatgen(pbc):
+    return Structure(POINTS, ROWS, pbc, (11, 17) * 30)
+
+
+def of_pymatgen(pbc):
+    core = pytest.importorskip("pymatgen.core")
+    lattice = core.Lattice(ROWS, pbc=pbc)
+    return core.Structure(lattice, ["Na", "Cl"] * 30, POINTS, coords_are_cartesian=True)
+
+
+@pytest.mark.parametrize("made", [like_pymatgen, of_pymatgen])
+@pytest.mark.parametrize("pbc", [(True, True, True), (True, False, True), (False, False, False)])
+def test_structures_of_pymatgen(made, pbc):
+    structure = made(pbc)
+    points, rows = np.asarray(structure.cart_coords), np.asarray(structure.lattice.matrix)
+    how = {"box": rows, "periodic": list(pbc)} if any(pbc) else {}
+    expected = hs.pairs(points, 1.5, quantities="ijS", **how)
+    cells = hs.CellList(structure, 1.5).pairs(quantities="ijS", sort=True)
+    for one, other in zip(hs.pairs(structure, 1.5, quantities="ijS"), expected, strict=True):
+        assert np.array_equal(one, other)
+    for one, other in zip(
+        cells, hs.pairs(points, 1.5, quantities="ijS", sort=True, **how), strict=True
+    ):
+        assert np.array_equal(one, other)
+    cutoffs = {("Na", "Cl"): 1.5}
+    of_types = hs.neighbors(points, cutoffs, types=["Na", "Cl"] * 30, **how)
+    assert np.array_equal(hs.neighbors(structure, cutoffs).indices, of_types.indices)
+    with pytest.raises(ValueError, match=r"points of type \w*Structure bring their own box"):
+        hs.pairs(structure, 1.0, box=ROWS)
+
+
+def test_structures_where_there_is_no_place_for_a_box():
+    structure = of_pymatgen((True, True, True))
+    with pytest.raises(ValueError, match="a Structure brings a box, for which there is no place"):
+        hs.NodeList("a", structure, [1.0] * 60)
+
+
+def test_molecules_of_pymatgen():
+    core = pytest.importorskip("pymatgen.core")
+    molecule = core.Molecule(["H"] * 60, POINTS)
+    assert hs.count_pairs(molecule, 1.5) == hs.count_pairs(POINTS, 1.5)
+    assert hs.count_pairs(molecule, 1.5, box=ROWS) == hs.count_pairs(POINTS, 1.5, box=ROWS)

@@ -168,7 +168,9 @@ HINTS = {
     ),
     r"got indices\[1\] = 10$": lambda: hs.neighbors(POINTS, 1.0, indices=[0, 10]),
     r"one pair is \[\[i, j\]\]$": lambda: hs.pairs(POINTS, 1.0, exclude=[0, 1]),
-    r"pass a length for each point as radii$": lambda: hs.neighbors(POINTS, np.ones(10)),
+    r"letter k of pairs, a length for each point is one of radii$": lambda: hs.neighbors(
+        POINTS, np.ones(10)
+    ),
     r"\(i is the row itself\), got 'ijd'$": lambda: hs.neighbors(POINTS, 1.0, quantities="ijd"),
     r"pair_histogram takes edges$": lambda: hs.rdf(POINTS, 1.0, bins=[0.0, 1.0], box=5.0),
     r"did you mean neighbors\?$": lambda: hs.neighbours,
@@ -176,6 +178,12 @@ HINTS = {
         POINTS, 1.0, include_self=True
     ),
     r"got Universe: pass its trajectory$": lambda: hs.trajectory_pairs(Universe(), 1.0),
+    r"^a NeighborTable is what neighbors\(\) returns": lambda: hs.NeighborTable([0], [1]),
+    r"'sort': it is an argument of pairs and trajectory_pairs$": lambda: hs.neighbors(
+        POINTS, 1.0, sort=True
+    ),
+    r"'indices': did you mean touching=\?$": lambda: hs.pairs(POINTS, 1.0, indices=[1]),
+    r"argument 'zzz'$": lambda: hs.pairs(POINTS, 1.0, zzz=1),
     r"several systems are one array of points, with batch$": lambda: hs.pairs([Atoms()] * 2, 1.0),
 }
 

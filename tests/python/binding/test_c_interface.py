@@ -18,7 +18,7 @@ from halfshell import _core
 DOCS = (ROOT / "docs/c-interface.md").read_text()
 EXAMPLES = ROOT / "examples" / "c"
 PLAIN = "-std=c11 -O0 -g1"
-SANITIZE = f"{PLAIN} -fsanitize=address,undefined -fno-sanitize-recover=all"
+SANITIZE = f"{PLAIN} -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all"
 
 pytestmark = [pytest.mark.slow, needs_c]
 

@@ -93,6 +93,24 @@ def test_wrapping_takes_three_arguments(arguments):
         _core.box_wrap(POINTS, None, 0)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "kind", "words"),
+    [
+        ((), TypeError, "box_places takes points, a box, periodic bits, a cutoff and the largest"),
+        ((POINTS, None, 0, "1", 9.0), TypeError, "must be real number"),
+        ((POINTS, None, 0, 1.0, None), TypeError, "must be real number"),
+        ((POINTS.tolist(), None, 0, 1.0, 9.0), TypeError, "points must be an array"),
+        ((POINTS, np.eye(2), 7, 1.0, 9.0), ValueError, "box must be a float64 array"),
+        ((POINTS, None, 0, -1.0, 9.0), ValueError, "cutoff must be"),
+        ((POINTS, None, 0, 1.0, np.inf), ValueError, "argument"),
+        ((POINTS + 10.0, None, 0, 1.0, 9.0), ValueError, "argument"),
+    ],
+)
+def test_what_places_are_told_by(arguments, kind, words):
+    with pytest.raises(kind, match=words):
+        _core.box_places(*arguments)
+
+
 @pytest.mark.parametrize("periodic", [-1, 1 << 64])
 def test_periodic_is_bits(periodic):
     with pytest.raises(OverflowError):

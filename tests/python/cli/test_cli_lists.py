@@ -152,11 +152,11 @@ def test_forms_of_text(told, tmp_path, content, rows):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ("0 0 0\n1 x 3\n", "line 2: 'x' is not a number"),
-        ("0 0 0\n\n1 2\n", "line 3: has 2 numbers, lines before 3"),
-        ("x y\nz w\n1 2\n", "line 2: 'z' is not a number"),
-        ("0 y z\n", "line 1: 'y' is not a number"),
-        ("0 nan 1\n", "line 1: nan is not a finite number"),
+        ("0 0 0\n1 x 3\n", "line 2, field 2: 'x' is not a number"),
+        ("0 0 0\n\n1 2\n", "line 3: has 2 fields, the first line has 3"),
+        ("x y\nz w\n1 2\n", "line 2, field 1: 'z' is not a number"),
+        ("0 y z\n", "line 1, field 2: 'y' is not a number"),
+        ("0 nan 1\n", "line 1, field 2: nan is not a finite number"),
         ("# nothing\n", "holds no points"),
     ],
 )
@@ -172,7 +172,8 @@ def test_text_that_is_none(run, tmp_path):
     path.write_bytes(b"\xff\xfe\x00\x01")
     status, _, err = run("pairs", path, "--cutoff", "1")
     assert status == 2 and err.count("\n") == 1
-    status, _, err = run("pairs", path, "--index", "0")
+    (tmp_path / "points.csv").write_text("1,2,3\n")
+    status, _, err = run("pairs", tmp_path / "points.csv", "--index", "0")
     assert status == 2 and "--index is for formats with several frames" in err
 
 
@@ -275,7 +276,7 @@ def test_numbers_that_are_not_finite_are_named_by_their_line(run, tmp_path, word
     text = tmp_path / "points.txt"
     text.write_text(f"# three points\n0 0 0\n1 {word} 0\n0 0 1\n")
     status, _, err = run("pairs", text, "--cutoff", "1")
-    assert status != 0 and "line 3: " in err and "is not a finite number" in err
+    assert status != 0 and "line 3, field 2: " in err and "is not a finite number" in err
 
 
 # ---- queries, frames, Parquet ----------------------------------------------------------------

@@ -32,11 +32,11 @@ def test_what_ase_does_not_know_mdanalysis_may(universe_file):
     scene = read_scene(str(universe_file))
     assert scene.points.tolist() == np.arange(12.0).reshape(4, 3).tolist()
     assert scene.box is None and not any(scene.periodic)
-    assert len(read_frames(str(universe_file), slice(None))) == 1
+    assert len(list(read_frames(str(universe_file), slice(None)))) == 1
     with pytest.raises(InputError, match="has no frame 3"):
         read_scene(str(universe_file), index=3)
     with pytest.raises(InputError, match="has none of these frames"):
-        read_frames(str(universe_file), slice(5, None))
+        list(read_frames(str(universe_file), slice(5, None)))
 
 
 def test_a_box_of_mdanalysis_is_that_of_its_frame(tmp_path):
@@ -44,7 +44,7 @@ def test_a_box_of_mdanalysis_is_that_of_its_frame(tmp_path):
     universe = MDAnalysis.Universe.empty(3, trajectory=True)
     universe.atoms.positions = np.arange(9.0).reshape(3, 3)
     universe.dimensions = [8.0, 9.0, 10.0, 90.0, 90.0, 60.0]
-    found = structure_files._frame(universe.trajectory[0], None, ())
+    found = structure_files._of_frame(universe.trajectory[0], None, "")
     assert found.box.tolist() == universe.trajectory.ts.triclinic_dimensions.tolist()
     assert found.periodic == (True, True, True) and found.points.dtype == np.float32
 

@@ -82,6 +82,88 @@ def test_cutoffs_beyond_half_the_box_give_the_nearest_image_alone(name, rng):
         assert_same(found, wanted, [cutoff])
 
 
+OPEN_AXES = [
+    [10, 0, 0, 90, 90, 90], [10, 12, 0, 90, 90, 90], [0, 0, 9, 90, 90, 90], [0, 0, 0, 90, 90, 90],
+    [-10, 12, 9, 90, 90, 90], [1e-8, 12, 9, 90, 90, 90], [10, 12, 0, 80, 75, 100],
+    [10, 12, 9, 0, 0, 0], [10, 12, 9, 30, 30, 90], [10, 12, 9, 90, 90, 180], [0] * 6,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("box", OPEN_AXES, ids=str)
+def test_axes_without_a_length_are_open(box, rng):
+    """With right angles these alone, and all where there is no such triclinic box."""
+    points = scatter(rng, 60)
+    for cutoff, least in ((3.0, None), (3.0, 2.0), (7.0, None), (np.inf, 4.0)):
+        cutoffs = [min(cutoff, 1e3), least or cutoff]
+        found = ours.self_capped_distance(points, cutoff, least, box)
+        wanted = distances.self_capped_distance(
+            points, min(cutoff, 1e3), least, box, method="bruteforce"
+        )
+        assert_same(found, wanted, cutoffs)
+        found = ours.capped_distance(points[:9], points, cutoff, least, box)
+        wanted = distances.capped_distance(
+            points[:9], points, cutoff, least, box, method="bruteforce"
+        )
+        assert_same(found, wanted, cutoffs)
+
+
+@pytest.mark.parametrize("name", BOXES)
+def test_an_infinite_cutoff_finds_all_pairs(name, rng):
+    points = scatter(rng, 30)
+    for cutoff in (np.inf, 1e30, 1e6, 40.0):
+        i, j = ours.self_capped_distance(points, cutoff, box=BOXES[name])[0].T
+        found = set(zip(i.tolist(), j.tolist(), strict=True))
+        assert found == {(a, b) for b in range(30) for a in range(b)} and len(i) == 435
+        theirs = None if name == "zeros" else BOXES[name]
+        found = ours.capped_distance(points[:9], points, cutoff, box=BOXES[name])
+        assert len(found[0]) == 270
+        wanted = distances.capped_distance(points[:9], points, cutoff, box=theirs)
+        assert_same(found, wanted, [0.0])
+    for same in (np.zeros((3, 3), np.float32), points[:1]):
+        assert (
+            len(ours.self_capped_distance(same, np.inf, box=BOXES[name])[0]) == (len(same) == 3) * 3
+        )
+    with pytest.raises(ValueError, match="points must be finite"):
+        ours.self_capped_distance(points * np.float32(np.nan), np.inf, box=BOXES[name])
+    for wrong in (np.nan, -np.inf):
+        if wrong < 0:
+            assert len(ours.self_capped_distance(points, wrong, box=BOXES[name])[0]) == 0
+            continue
+        with pytest.raises(ValueError, match="cutoff must be finite"):
+            ours.self_capped_distance(points, wrong, box=BOXES[name])
+
+
+@pytest.mark.parametrize("name", BOXES)
+def test_pairs_at_the_lesser_cutoff_are_those_of_the_real_numbers(name):
+    """Distances that are rounded up to the cutoff, and down to it, each decided by fractions."""
+    rng = np.random.default_rng(3)
+    decided = set()
+    for _ in range(40):
+        points = (rng.integers(1, 100, (2, 3)) / 30.0).astype(np.float32)
+        a, b = ([Fraction(x) for x in point] for point in points.tolist())
+        square = sum((y - x) ** 2 for x, y in zip(a, b, strict=True))
+        least = float(np.sqrt(float(square)))
+        for cutoff in (np.nextafter(least, 0.0), least, np.nextafter(least, 9.0)):
+            beyond = Fraction(float(cutoff)) ** 2 < square
+            decided.add(beyond)
+            found = ours.self_capped_distance(points, 9.0, cutoff, BOXES[name])
+            assert len(found[0]) == beyond
+            found = ours.capped_distance(points[:1], points[1:], 9.0, cutoff, BOXES[name])
+            assert len(found[0]) == beyond
+    assert decided == {False, True}
+    two = np.zeros((2, 3), np.float32)
+    for least, kept in ((0.0, 0), (-1.0, 1), (-5e-324, 1), (np.nan, 0), (np.inf, 0)):
+        assert len(ours.self_capped_distance(two, 1.0, least, BOXES[name])[0]) == kept
+
+
+def test_a_cutoff_of_half_a_height_counts_each_pair_once():
+    """The height is rounded, and both images are at the same distance."""
+    for length in np.linspace(3.0, 11.0, 50, dtype=np.float32):
+        x = np.array([[0.0, 0.0, 0.0], [length / 2, 0.0, 0.0]], np.float32)
+        box = [length, 20.0, 20.0, 90.0, 90.0, 90.0]
+        assert len(ours.self_capped_distance(x, float(length) / 2, box=box)[0]) == 1
+
+
 def test_nothing_to_find():
     none = np.empty((0, 3), np.float32)
     for cutoff in (1.0, -1.0):
@@ -132,3 +214,12 @@ def test_what_the_original_refuses():
             module.self_capped_distance(np.zeros((3, 2), np.float32), 1.0)
         with pytest.raises(TypeError):
             module.capped_distance("points", points, 1.0)
+        for backend in ("nonsense", ""):
+            with pytest.raises(ValueError, match="backend"):
+                module.self_capped_distance(points, 1.0, backend=backend)
+            with pytest.raises(ValueError, match="backend"):
+                module.capped_distance(points, points, 1.0, backend=backend)
+        for backend in ("serial", "Serial", "OpenMP"):
+            assert len(module.self_capped_distance(points, 1.0, backend=backend)[0]) == 3
+    with pytest.raises(ValueError, match="NaN"):
+        ours.self_capped_distance(points, 1.0, box=[np.nan, 1.0, 1.0, 90.0, 90.0, 90.0])

@@ -254,6 +254,23 @@ def test_errors_are_those_of_scipy(call):
     assert outcomes[0] == outcomes[1]
 
 
+@pytest.mark.parametrize(
+    "k",
+    [[0], [1, 0], (0, 3), [-1], [1, -2], np.array([0]), np.array([0.5]), np.array([np.nan]),
+     np.array([2**63], np.uint64), [False]],
+    ids=str,
+)  # fmt: skip
+@pytest.mark.parametrize("name", TREES)
+@pytest.mark.parametrize("n", [0, 2, 3000])
+def test_ranks_below_1_are_refused(name, n, k):
+    """SciPy crashes, or returns what was in memory: it reads the entry before its results."""
+    tree = getattr(ours, name)(np.zeros((n, 2)))
+    for x in ([0.0, 0.0], [[0.0, 0.0]], np.empty((0, 2))):
+        for options in ({}, {"p": 1}, {"eps": 0.1}, {"distance_upper_bound": -1.0}):
+            with pytest.raises(ValueError, match="k must be 1 or more"):
+                tree.query(x, k, **options)
+
+
 # ---- exact decisions -----------------------------------------------------------------------
 
 #: Apart by 0.2, 0.2 and 0.1 or so: as floats just closer than 0.3, which rounding makes a tie.

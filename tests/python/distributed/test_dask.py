@@ -299,6 +299,7 @@ def test_bad_coordinates_are_named_among_all_points():
         ((4, 3), {"box": [1.0, 1.0]}, ValueError, "box"),
         ((4, 3), {"periodic": True}, ValueError, "periodic needs a box"),
         ((4, 3), {"n": 0}, ValueError, "n must be 1"),
+        ((4, 3), {"n": 10**30}, ValueError, "n must be at most 1,048,576 bricks"),
         ((4, 3), {"kernel": "none"}, ValueError, "kernel"),
         ((4, 3), {"threads": 0}, ValueError, "threads"),
         ((4, 3), {"quantities": "x"}, ValueError, "quantities"),

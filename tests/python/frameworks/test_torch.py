@@ -52,6 +52,41 @@ def test_the_boundary_is_decided_exactly():
     assert len(ht.neighbor_list(x.float(), 0.1, quantities="i")) == 0  # float32(0.1) > 0.1
 
 
+@pytest.mark.parametrize("dtype", [torch.float16, torch.bfloat16])
+def test_halves_are_searched_as_the_numbers_that_they_are(dtype, rng):
+    x = torch.from_numpy(4.0 * rng.random((60, 3))).to(dtype)
+    box = torch.diag(tensor([4.0, 4.25, 4.5])).to(dtype)
+    batch = torch.arange(60) // 20
+    for options in ({}, {"box": box}, {"box": box, "half": True}, {"batch": batch}):
+        exact = {k: v.double() if k == "box" else v for k, v in options.items()}
+        found = ht.neighbor_list(x, 1.25, quantities="ijSdD", **options)
+        wanted = ht.neighbor_list(x.double(), 1.25, quantities="ijSdD", **exact)
+        for one, other in zip(found[:3], wanted):
+            assert torch.equal(one, other) and len(one)
+        for one, other in zip(found[3:], wanted[3:]):
+            assert one.dtype == dtype and torch.equal(one, other.to(dtype))
+    assert torch.equal(ht.radius_graph(x, 1.25, batch), ht.radius_graph(x.double(), 1.25, batch))
+    assert torch.equal(ht.radius(x, x[:9], 1.25), ht.radius(x.double(), x[:9].double(), 1.25))
+    two = torch.tensor([[0.0], [0.1]], dtype=dtype)
+    exactly = float(two[1])  # above 0.1 or below it, as it was rounded
+    for cutoff in (0.1, exactly, np.nextafter(exactly, 0.0)):
+        assert len(ht.neighbor_list(two, cutoff, quantities="i")) == 2 * (exactly <= cutoff)
+
+
+@pytest.mark.parametrize("dtype", [torch.float16, torch.bfloat16])
+def test_derivatives_by_halves_have_their_type(dtype, rng):
+    values, lengths = torch.from_numpy(4.0 * rng.random((20, 3))), tensor([4.0, 4.25, 4.5])
+    gradients = []
+    for kind in (dtype, torch.float64):
+        x = values.to(dtype).to(kind).requires_grad_()
+        box = lengths.to(kind).requires_grad_()
+        d = ht.neighbor_list(x, 1.25, box=box, quantities="d")
+        gradients.append(torch.autograd.grad(d.sum(), (x, box)))
+        assert [one.dtype for one in gradients[-1]] == [kind, kind]
+    for one, other in zip(*gradients):
+        torch.testing.assert_close(one.double(), other, rtol=0.02, atol=0.1)
+
+
 def test_systems_of_a_batch_are_apart(rng):
     sizes = [5, 0, 9]
     boxes = tensor(np.stack([np.diag([2.0, 3.0]), np.eye(2), [[2.0, 1.0], [0.0, 2.0]]]))
@@ -202,7 +237,7 @@ def test_too_many_neighbors_are_an_error_and_not_left_out():
         (lambda x: ht.neighbor_list(x.to_sparse(), 1.0), TypeError, "dense"),
         (lambda x: ht.neighbor_list(x.to(torch.complex128), 1.0), TypeError, "complex128"),
         (lambda x: ht.neighbor_list(x.long(), 1.0), TypeError, "int64"),
-        (lambda x: ht.neighbor_list(x.half(), 1.0), TypeError, "float16"),
+        (lambda x: ht.neighbor_list(x.bool(), 1.0), TypeError, "bool"),
         (lambda x: ht.neighbor_list(x[0], 1.0), ValueError, r"shape \(n, d\), got \(3,\)"),
         (lambda x: ht.neighbor_list(x / 0.0, 1.0), ValueError, "finite|nan|inf"),
         (lambda x: ht.neighbor_list(x, -1.0), ValueError, "cutoff"),

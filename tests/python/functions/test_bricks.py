@@ -6,6 +6,7 @@ import pickle
 import numpy as np
 import pytest
 
+import brick_scenes
 import halfshell as hs
 
 
@@ -39,7 +40,7 @@ def scenes():
     yield "far from the box", points[:, :2] + [1e14, 0.0], 0.2, {"box": [1.0, 1.0]}
 
 
-SCENES = {name: rest for name, *rest in scenes()}
+SCENES = {**{name: rest for name, *rest in scenes()}, **brick_scenes.scenes()}
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 7, 40])
@@ -69,6 +70,26 @@ def test_together_they_are_one_search(name, n):
         for k, number in enumerate(part.owned):
             for one, other in zip(rows[k], table[number], strict=True):
                 assert one.tobytes() == other.tobytes()
+
+
+def test_images_whose_shifts_no_column_holds():
+    box = brick_scenes.NO_INVERSE
+    points = np.random.default_rng(6).random((200, 2)) @ box
+    parts = hs.bricks(points, 100.0, 4, box=box)
+    assert sum(part.count_pairs(points) for part in parts) == hs.count_pairs(points, 100.0, box=box)
+    assert parts.overhead < 2.0
+
+
+def test_a_box_that_no_cutoff_of_0_can_be_searched_in():
+    rng = np.random.default_rng(2)
+    box = np.array([[900.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.1, -0.1, 0.6]])
+    points = (rng.random((17, 3)) * 2.0 - 1.0) @ box * 2.0 ** rng.integers(36, 47)
+    scene = {"box": box, "periodic": [False, False, True]}
+    with pytest.raises(ValueError, match="too skewed"):
+        hs.bricks(points, 0.0, 3, **scene)
+    parts = hs.bricks(points, 4.0, 3, **scene)
+    assert sum(part.count_pairs(points) for part in parts) == 102
+    assert hs.count_pairs(points, 4.0, **scene) == 102
 
 
 @pytest.mark.parametrize("inclusive", [False, True])
@@ -121,6 +142,7 @@ def test_they_show_themselves():
         (([[np.nan]], 1.0, 2), ValueError, r"points\[0, 0\]"),
         (([[0.0]], -1.0, 2), ValueError, "cutoff"), (([[0.0]], np.inf, 2), ValueError, "cutoff"),
         (([[0.0]], "1", 2), TypeError, "cutoff"), (([[0.0]], 1.0, 0), ValueError, "n must be 1"),
+        (([[0.0]], 1.0, 10**30), ValueError, "n must be at most 1,048,576 bricks, got 10"),
         (([[0.0]], 1.0, 1.5), TypeError, "n must be"), (([["a"]], 1.0, 2), TypeError, "points"),
     ],
 )

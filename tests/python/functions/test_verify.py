@@ -114,8 +114,9 @@ def test_full_lists(scene):
     i, j, S = listed(scene)
     assert hs.verify(points, cutoff, *doubled(i, j, S), box=box, full=True).ok
     assert len(hs.verify(points, cutoff, i, j, S, box=box, full=True).missed) == len(i)
-    half = hs.verify(points, cutoff, *doubled(i, j, S), box=box)
-    assert len(half.duplicate) == len(i)
+    found = hs.verify(points, cutoff, *doubled(i, j, S), box=box)
+    assert found.ok and found.is_full and found.n_expected == 2 * len(i)
+    assert str(found) == f"correct: {2 * len(i)} pairs of a full list"
 
 
 def test_a_point_as_its_own_neighbour_is_spurious():

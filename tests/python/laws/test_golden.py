@@ -20,7 +20,7 @@ def test_every_scene_has_its_entry():
     assert list(KEPT) == list(SCENES)
 
 
-@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("threads", [1, 2, 4])
 @pytest.mark.parametrize("name", SCENES)
 def test_results_are_what_they_were(name, kernel, threads):
     found = golden.hashes(SCENES[name], kernel=kernel, threads=threads)

@@ -211,3 +211,71 @@ for thread in threads:
 print(json.dumps(True))
 """
     )
+
+
+def changing(array, bad, call, seconds=0.3):
+    """What `call` raises while another thread writes to the array, but what it may raise."""
+    done, good, raised = threading.Event(), array.copy(), set()
+
+    def write():
+        while not done.is_set():
+            array[...] = bad
+            array[...] = good
+
+    thread = threading.Thread(target=write)
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    thread.start()
+    try:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            try:
+                call()
+            except (ValueError, TypeError, OverflowError, KeyError):
+                pass
+            except IndexError as error:
+                if "of a table of" not in str(error):
+                    raised.add(str(error))
+    finally:
+        done.set()
+        thread.join()
+        sys.setswitchinterval(interval)
+    return raised
+
+
+_PLACES = np.random.default_rng(0).random((1500, 3)) * 8.0
+_NUMBERS = np.arange(1500)
+_RADII = np.full(1500, 0.3)
+_TABLE = hs.neighbors(_PLACES, 0.8)
+_FEW = hs.NodeList("a", _PLACES[:200], _RADII[:200] * 4)
+_PAIRS = hs.Connectivity([_FEW]).pairs
+_ROWS = np.array([tuple(pair) for pair in _PAIRS])
+CHANGING = {
+    "touching": (_NUMBERS, 10**6, lambda x: hs.pairs(_PLACES, 0.5, touching=x)),
+    "indices": (_NUMBERS, -7, lambda x: hs.neighbors(_PLACES, 0.5, indices=x)),
+    "nodes": (_PLACES, np.nan, lambda x: hs.NodeList("a", x, _RADII)),
+    "h": (_RADII, np.nan, lambda x: hs.NodeList("a", _PLACES, x)),
+    "bricks": (_PLACES, np.inf, lambda x: hs.bricks(x, 0.5, 2)),
+    "lists": (_NUMBERS, 10**6, lambda x: hs.measure(_PLACES, x, _NUMBERS)),
+    "checked": (_NUMBERS, 10**6, lambda x: hs.verify(_PLACES, 0.1, x, _NUMBERS)),
+    "rows": (_NUMBERS, 10**6, lambda x: _TABLE[x]),
+    "mask of rows": (np.zeros(1500, bool), True, lambda x: _TABLE[x]),
+    "mask of entries": (np.zeros(len(_TABLE.indices), bool), True, _TABLE.filter),
+    "kept nodes": (np.ones(200, bool), False, lambda x: hs.Connectivity([_FEW]).patch([x])),
+    "which pairs": (np.zeros(len(_PAIRS), bool), True, lambda x: hs.Connectivity([_FEW]).remove(x)),
+    "pairs of nodes": (_ROWS, -1, _PAIRS.index),
+    "excluded nodes": (_ROWS, 10**6, lambda x: hs.Connectivity([_FEW], exclude=x)),
+    "masked": (
+        np.zeros(1500, bool),
+        True,
+        lambda x: hs.NodeList("a", _PLACES, np.ma.MaskedArray(_RADII, x, keep_mask=False)),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CHANGING)
+def test_arrays_that_change_meanwhile_give_clear_errors(name):
+    """Never an IndexError of ours, nor a broken heap: what is checked is a copy."""
+    array, bad, call = CHANGING[name]
+    array = array.copy()
+    assert not changing(array, bad, lambda: call(array))

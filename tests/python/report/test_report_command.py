@@ -8,7 +8,6 @@ import pytest
 
 import halfshell as hs
 from halfshell import cli
-from halfshell._cli import report
 from halfshell._peers import LIBRARIES
 from halfshell._report.measure import run
 from halfshell._report.measure.peers import PeerProcess
@@ -34,7 +33,7 @@ def command(capsys, tmp_path, monkeypatch):
 
 def test_the_command_writes_the_report(command, tmp_path):
     status, out, err = command(
-        "--quick", "--size", "small", "--scenes", "near-ties,head-on", "--peers", "cKDTree",
+        "--size", "small", "--scenes", "near-ties,head-on", "--peers", "cKDTree",
         "-o", "there/it is",
     )  # fmt: skip
     assert (status, err) == (0, "")
@@ -100,6 +99,7 @@ def test_names_are_listed(command):
         ["--methods", "exact,guess"],
         ["--peers", "nobody"],
         ["--size", "huge"],
+        ["--size", "small", "--quick"],
         ["--patience", "0"],
         ["--patience", "soon"],
         ["--quik"],
@@ -132,7 +132,15 @@ def test_all_missing_extras_are_named_at_once(command, monkeypatch):
     assert "report needs scipy and rich: pip install scipy rich\n" in err
 
 
-def test_quick_is_a_choice_of_scenes_that_there_are():
-    assert set(report.QUICK) <= set(SCENES)
-    assert any(name.startswith("balls-") for name in report.QUICK)
-    assert {"head-on", "stiff-chain"} <= set(report.QUICK)
+def test_quick_is_a_choice_of_scenes_and_one_thing(command, monkeypatch):
+    plans = []
+    monkeypatch.setattr(run, "run", lambda plan, progress: plans.append(plan) or [row("exact")])
+    for options in ([], ["--quick"], ["--size", "quick"]):
+        command(*options, "--peers", "none")
+    assert plans[0] == plans[1] == plans[2]
+    assert plans[0].scenes == run.QUICK and set(run.QUICK) < set(SCENES)
+    assert any(name.startswith("balls-") for name in run.QUICK)
+    assert "head-on" in run.QUICK
+    command("--scenes", "all"), command("--size", "small")
+    assert [plan.scenes for plan in plans[3:]] == [SCENES, SCENES]
+    assert run.plan_of(None, None, "none", "quick") == plans[0]

@@ -7,6 +7,11 @@ import halfshell as hs
 
 LETTERS = "ijdDSP"
 
+# A box for which LAPACK has no inverse.
+NO_INVERSE = np.array(
+    [[6687355403199.516, 2068641513505.0], [668735540.3192828, 206864151.35029313]]
+)
+
 
 def scenes():
     """Name -> points, cutoff, box and periodicity."""
@@ -28,7 +33,42 @@ def scenes():
         "one axis": (points[:, :1], 0.05, {"box": 5.0}),
         "one point": (np.ones((1, 3)), 1.5, {"box": 1.0}),
         "none": (np.empty((0, 3)), 1.0, {"box": 1.0}),
+        **dict(_of_any_size()),
+        **dict(_in_skewed_boxes()),
     }
+
+
+def _of_any_size():
+    """The same scenes in units from among the smallest numbers to among the largest."""
+    points = np.random.default_rng(4).integers(-30, 90, (120, 3)) / 8.0
+    left_handed = np.array([[0.0, 8.0, 0.0], [6.0, 1.5, 0.0], [0.0, -2.0, 7.0]])
+    for exponent in (-1060, -800, -540, 535, 541, 1016):
+        unit = 2.0**exponent
+        for kind, box, periodic in (
+            ("upright", np.diag([8.0, -7.0, 9.0]), [True, True, True]),
+            ("oblique", left_handed, [True, exponent % 2 == 0, True]),
+        ):
+            scene = {"box": box * unit, "periodic": periodic}
+            yield f"{kind}, 2**{exponent}", (points * unit, 1.25 * unit, scene)
+    yield "open, 2**1016", (points * 2.0**1016, 1.25 * 2.0**1016, {})
+    thin = {"box": np.diag([2.0**400, 2.0**-400]), "periodic": [False, True]}
+    yield "lengths far apart", (points[:, :2] * [2.0**397, 2.0**-397], 2.0**-400, thin)
+
+
+def _in_skewed_boxes():
+    """Boxes whose vectors are long sums of short ones, or nearly depend on each other."""
+    rng = np.random.default_rng(5)
+    for number, ndim in enumerate((1, 2, 3, 3, 5)):
+        box = rng.normal(size=(ndim, ndim)) + 3.0 * np.eye(ndim)
+        points, cutoff = rng.random((120, ndim)) @ box, 0.3 * ndim
+        for k in range(1, ndim):
+            box[k] += int(rng.integers(-3000, 3000)) * box[k - 1]
+        periodic = [True] * ndim if ndim < 5 else [k != 2 for k in range(ndim)]
+        scene = {"box": box, "periodic": periodic}
+        yield f"sheared {number}", (points, cutoff, scene)
+    flat = np.array([[3.0, 1.0], [3.0 / 7.0, 1.0 / 7.0 + 2.0**-30]])
+    yield "nearly flat", (rng.random((120, 2)) @ flat, 1e-7, {"box": flat})
+    yield "flat for LAPACK", (rng.random((120, 2)) * 60.0, 4.0, {"box": NO_INVERSE})
 
 
 def same(found, expected):

@@ -32,10 +32,18 @@ from halfshell._report.truth.pairs import Truth, true_pairs
 from halfshell._report.truth.reach import reach_of
 from halfshell._terminal import printable
 
-__all__ = ["PEERS", "SCENES", "Plan", "Progress", "plan_of", "run"]
+__all__ = ["PEERS", "QUICK", "SCENES", "Plan", "Progress", "plan_of", "run"]
 
 #: Scenes by name, those with a radius or a support for each point after those with one cutoff.
 SCENES = (*catalogue.names(), *catalogue.names(radii=True, supports=True))
+
+#: What "quick" runs unless scenes are named: one of each demand, about 20 s with other libraries.
+QUICK = (
+    "uniform", "silicon-shell", "fcc-rotated", "near-ties", "hair-ties", "float32-ulp",
+    "half-box", "offset-1e6", "many-boxes", "needle", "sheared-1000", "slab", "lognormal",
+    "coincident", "subnormal", "plane-2d", "head-on", "balls-decades",
+    "balls-ties", "balls-rounded", "balls-giant", "needles",
+)  # fmt: skip
 
 #: Other libraries by name.
 PEERS = tuple(LIBRARIES)
@@ -63,7 +71,7 @@ class Effort:
 
 _EFFORTS = {
     "small": Effort(Patience(3, 0.02), Patience(3, 0.02), 60.0, 300.0, 100_000, "small"),
-    "quick": Effort(Patience(5, 0.04), Patience(3, 0.02), 3.0, 4.0, 100_000, "small"),
+    "quick": Effort(Patience(5, 0.04), Patience(3, 0.02), 1.0, 2.0, 100_000, "small"),
     "full": Effort(Patience(7, 2.0), Patience(5, 3.0), 60.0, 1800.0, 400_000, "quick"),
 }
 
@@ -88,17 +96,19 @@ class Plan:
 
 
 def plan_of(
-    scenes: Sequence[str] | None,
+    scenes: Sequence[str] | str | None,
     chosen: Sequence[str] | None,
     peers: Sequence[str] | str | None,
     size: str,
     patience: float | None = None,
 ) -> Plan:
-    """Check names; None means all, and so does "all" of libraries; "none" means none.
+    """Check names; "all" means all, and so does None, except for scenes of size "quick".
 
-    Raises ValueError with the nearest names.
+    "none" of libraries means none. Raises ValueError with the nearest names.
     """
     libraries = peers
+    if scenes is None or isinstance(scenes, str):
+        scenes = QUICK if scenes is None and size == "quick" else SCENES
     if isinstance(peers, str):
         libraries = {"all": None, "none": ()}[peers]
     if patience is not None and not 0.0 < patience < math.inf:

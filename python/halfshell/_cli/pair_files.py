@@ -1,0 +1,313 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Files with a list of pairs, ours or another library's: told from files of points, and read.
+
+Whatever the format, a file is columns with names: i and j, and one for each component of the shift.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.util import find_spec
+from itertools import chain
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from halfshell._cli.errors import InputError, missing_extra, one_line
+from halfshell._cli.numpy_files import Unreadable, read_arrays
+
+__all__ = ["ListFile", "read_list", "refuse_list"]
+
+# Names of the two points, in lower case and without anything but letters and digits.
+_WORDS = (
+    ("source", "target"), ("src", "dst"), ("first", "second"), ("from", "to"),
+    ("sender", "receiver"), ("senders", "receivers"), ("center", "neighbor"),
+)  # fmt: skip
+_STEMS = ("", "idx", "index", "indices", "atom", "atomindex", "atomid", "id", "node", "point",
+          "particle", "p", "pair", "pairs", "edge", "edges", "edgeindex", "bonds",
+          "neighborlist")  # fmt: skip
+_ENDS = (("i", "j"), ("0", "1"), ("1", "2"))
+_ENDPOINTS = (
+    *_WORDS, *((stem + a, stem + b) for a, b in _ENDS for stem in _STEMS if stem or a == "i")
+)  # fmt: skip
+_SHIFTS = ("s", "shift", "shifts", "cellshift", "cellshifts", "unitshift", "unitshifts", "offset",
+           "offsets", "edgeshift", "edgeshifts", "image")  # fmt: skip
+_AXES = ("01234567", "xyz", "abc")
+_OTHERS = ("cutoff", "inclusive", "n")  # what an archive of ours tells besides
+
+_TEXT, _NUMPY = (".csv", ".txt", ".dat", ".tsv"), (".npy", ".npz")
+MOST_SHOWN = 12  # names of columns in a message
+
+
+class ListFile(NamedTuple):
+    """What a file tells of pairs; S, cutoff and inclusive are None where it does not."""
+
+    i: NDArray[np.int64]
+    j: NDArray[np.int64]
+    S: NDArray[np.int64] | None
+    cutoff: float | None
+    inclusive: bool | None
+    columns: tuple[str, ...]  # those that were read
+    counts_from: int
+
+
+def refuse_list(file: str, source: str) -> None:
+    """InputError that names `source` if a file has the columns of a list of pairs, not of points.
+
+    A file that cannot be read is left to the reader of points, which says why.
+    """
+    suffix = Path(file).suffix.lower()
+    if not os.path.isfile(file):
+        return
+    try:
+        if suffix in _TEXT:
+            names = _header(file)[0] or []
+        elif suffix == ".npz":
+            names = read_arrays(file, ())[1]
+        elif suffix == ".parquet":
+            names = _parquet(file)[0]
+        else:
+            return
+    except Exception:
+        return
+    plain = [_plain(name) for name in names]
+    if {"points", "x", "k"} & set(plain):  # coordinates may be beside i and j, or be i, j and k
+        return
+    if suffix == ".npz":  # a name may stand for both columns
+        plain += [name + end for name in plain for end in "01"]
+    if _endpoints(plain) is not None:
+        raise InputError(
+            f"{source}: is a list of pairs ({_shown(names)}), not points; "
+            "halfshell verify STRUCTURE LIST checks one"
+        )
+
+
+def read_list(file: str, n: int, ndim: int) -> ListFile:
+    """Read a list of pairs of `n` points with `ndim` coordinates.
+
+    Parameters
+    ----------
+    file : str
+        ``.csv``, ``.txt``, ``.dat`` or ``.tsv`` with a line of names, ``.npz``, or ``.parquet``.
+        Without names, the columns of text and of a ``.npy`` file are i, j, and perhaps the shift.
+
+    Raises
+    ------
+    InputError
+        With the reason in one line.
+    """
+    suffix = Path(file).suffix.lower()
+    others: dict[str, Any] = {}
+    try:
+        if suffix in _TEXT:
+            names, columns = _read_text(file, ndim)
+        elif suffix in _NUMPY:
+            names, columns, others = _read_numpy(file, ndim)
+        elif suffix == ".parquet":
+            held, read = _parquet(file)
+            names = _wanted(held, ndim, file)
+            columns = read(names)
+        else:
+            known = ", ".join((*_TEXT, *_NUMPY, ".parquet"))
+            raise InputError(f"{file}: lists of pairs are read from {known}")
+    except (Unreadable, UnicodeDecodeError) as error:
+        raise InputError(f"{file}: {one_line(error)}") from None
+    except (InputError, MemoryError):
+        raise
+    except Exception as error:  # a broken file may fail in any part of its library
+        raise InputError(f"{file}: cannot be read: {one_line(error)}") from None
+    whole = [_whole(file, name, columns[name]) for name in names]
+    i, j = whole[:2]
+    if len({len(column) for column in whole}) > 1:
+        raise InputError(f"{file}: its columns differ in length")
+    counts_from = _first_index(file, i, j, n)
+    shift = np.column_stack(whole[2:]) if whole[2:] else None
+    if others.get("n", n) != n:
+        raise InputError(f"{file}: is a list for {others['n']} points; there are {n}")
+    return ListFile(
+        i - counts_from, j - counts_from, shift, others.get("cutoff"), others.get("inclusive"),
+        tuple(names), counts_from,
+    )  # fmt: skip
+
+
+# ---- which columns ---------------------------------------------------------------------------
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def _endpoints(plain: Sequence[str]) -> tuple[int, int] | None:
+    """Places of the names of both points, if they are there."""
+    for first, second in _ENDPOINTS:
+        if first in plain and second in plain:
+            return plain.index(first), plain.index(second)
+    return None
+
+
+def _wanted(names: Sequence[str], ndim: int, file: str) -> list[str]:
+    """The names of i, j and, as far as there are some, the components of the shift."""
+    plain = [_plain(name) for name in names]
+    ends = _endpoints(plain)
+    if ends is None:
+        raise InputError(
+            f"{file}: has no columns i and j, source and target, first and second, or the like "
+            f"(it has {_shown(names)})"
+        )
+    for stem in _SHIFTS:
+        for axes in _AXES:
+            found = [stem + axis for axis in axes if stem + axis in plain]
+            if found:
+                if len(found) != ndim:
+                    held = ", ".join(names[plain.index(one)] for one in found)
+                    raise InputError(
+                        f"{file}: has shifts of {len(found)} axes ({held}); points have {ndim} "
+                        "coordinates"
+                    )
+                return [names[k] for k in (*ends, *map(plain.index, found))]
+    return [names[k] for k in ends]
+
+
+def _unnamed(n_columns: int, ndim: int, file: str) -> list[str]:
+    names = ["i", "j", *(f"S{axis}" for axis in range(ndim))]
+    if n_columns not in (2, len(names)):
+        raise InputError(
+            f"{file}: has {n_columns} columns without names; those of a list are 2 (i, j) or "
+            f"{len(names)} (with shifts): name them in the first line"
+        )
+    return names[:n_columns]
+
+
+def _shown(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:MOST_SHOWN]) or "nothing"
+    return shown + (", ..." if len(names) > MOST_SHOWN else "")
+
+
+# ---- formats ---------------------------------------------------------------------------------
+
+
+def _header(file: str) -> tuple[list[str] | None, str | None, int]:
+    """Names of the columns of a text, what is between them, and lines before the first of numbers.
+
+    A line of names may be a remark, as NumPy writes it. Without one the names are None.
+    """
+    with open(file, encoding="utf-8-sig") as lines:
+        for number, line in enumerate(lines):
+            text = line.strip()
+            is_remark = text.startswith("#")
+            text = text.lstrip("# ")
+            if not text:
+                continue
+            between = next((one for one in ",;\t" if one in text), None)
+            words = [word.strip().strip("\"'") for word in text.split(between)]
+            if not any(re.match(r"[-+.]?\d", word) for word in words):
+                if not is_remark or _endpoints([_plain(word) for word in words]) is not None:
+                    return words, between, number + 1
+            elif not is_remark:
+                return None, between, number
+    return None, None, 0
+
+
+def _read_text(file: str, ndim: int) -> tuple[list[str], dict[str, NDArray[Any]]]:
+    names, between, n_lines = _header(file)
+    if names is None:
+        with open(file, encoding="utf-8-sig") as lines:
+            row = next((line for k, line in enumerate(lines) if k >= n_lines), "")
+        found = _unnamed(len(row.partition("#")[0].split(between)), ndim, file)
+        places = list(range(len(found)))
+    else:
+        found = _wanted(names, ndim, file)
+        places = [names.index(name) for name in found]
+    with open(file, encoding="utf-8-sig") as lines:
+        for _ in range(n_lines):
+            next(lines)
+        first = next((line for line in lines if line.partition("#")[0].strip()), None)
+        rows = np.empty((0, len(places)))
+        if first is not None:
+            rows = np.loadtxt(
+                chain([first], lines), delimiter=between, usecols=places, ndmin=2, quotechar='"'
+            )
+    return found, {name: rows[:, k] for k, name in enumerate(found)}
+
+
+def _read_numpy(
+    file: str, ndim: int
+) -> tuple[list[str], dict[str, NDArray[Any]], dict[str, Any]]:
+    names = read_arrays(file, ())[1]
+    known = {"alone", *chain(*_ENDPOINTS), *_STEMS, *_SHIFTS}
+    known |= {stem + axis for stem in _SHIFTS for axis in chain(*_AXES)}
+    arrays, _ = read_arrays(file, [one for one in names if _plain(one) in known or one in _OTHERS])
+    others = {name: array.item() for name, array in arrays.items()
+              if name in _OTHERS and array.size == 1}  # fmt: skip
+    columns: dict[str, NDArray[Any]] = {}
+    for name, array in arrays.items():
+        if array.ndim == 1:
+            columns[name] = array
+        elif array.ndim == 2:  # (m, 2), (m, d), or the edges of a graph (2, m)
+            is_across = array.shape[0] == 2 < array.shape[1] and _plain(name) not in _SHIFTS
+            rows = array if is_across else array.T
+            columns |= {f"{name}{k}": column for k, column in enumerate(rows)}
+    if names == ["alone"]:
+        found = _unnamed(len(columns), ndim, file)
+        return found, dict(zip(found, columns.values(), strict=True)), others
+    if _endpoints([_plain(name) for name in columns]) is None:
+        _wanted(names, ndim, file)  # which says what the file holds
+    return _wanted(list(columns), ndim, file), columns, others
+
+
+def _parquet(file: str) -> tuple[list[str], Any]:
+    """Names of the columns, and a function that reads some of them."""
+    if find_spec("pyarrow") is not None:
+        parquet: Any = import_module("pyarrow.parquet")
+
+        def read(names: list[str]) -> dict[str, NDArray[Any]]:
+            table = parquet.read_table(file, columns=names)
+            return {name: table[name].to_numpy() for name in names}
+
+        return list(parquet.read_schema(file).names), read
+    if find_spec("polars") is not None:
+        polars: Any = import_module("polars")
+
+        def read_polars(names: list[str]) -> dict[str, NDArray[Any]]:
+            table = polars.read_parquet(file, columns=names)
+            return {name: table[name].to_numpy() for name in names}
+
+        return list(polars.read_parquet_schema(file)), read_polars
+    if find_spec("fastparquet") is not None and find_spec("pandas") is not None:
+        pandas: Any = import_module("pandas")
+        frame = pandas.read_parquet(file)
+        return list(frame.columns), lambda names: {name: frame[name].to_numpy() for name in names}
+    raise missing_extra(f"{file}: reading Parquet", "pyarrow")
+
+
+# ---- values ----------------------------------------------------------------------------------
+
+
+def _whole(file: str, name: str, column: NDArray[Any]) -> NDArray[np.int64]:
+    """A column as integers; InputError if there is one that is none."""
+    if column.dtype.kind not in "iuf":
+        raise InputError(f"{file}: column {name} has type {column.dtype}, not whole numbers")
+    with np.errstate(invalid="ignore"):
+        whole = column.astype(np.int64)
+        wrong = np.flatnonzero(whole != column)
+    if len(wrong):
+        row = int(wrong[0])
+        raise InputError(f"{file}: {name} of row {row} is {column[row]}, not a whole number")
+    return whole
+
+
+def _first_index(file: str, i: NDArray[np.int64], j: NDArray[np.int64], n: int) -> int:
+    """0, or 1 where the points must be counted from 1, because some index is `n` and none is 0."""
+    if not len(i):
+        return 0
+    least, most = int(min(i.min(), j.min())), int(max(i.max(), j.max()))
+    if least >= 0 and most < n:
+        return 0
+    if least >= 1 and most == n:
+        return 1
+    raise InputError(f"{file}: has points {least} to {most}; there are {n}, 0 to {n - 1}")
