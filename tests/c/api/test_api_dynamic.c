@@ -406,10 +406,10 @@ what_is_not_held_need_not_be_released(void)
     hs_dynamic_release(list);
     CHECK(hs_dynamic_length(list) == 3);
     hs_dynamic_hold(list);
-    CHECK(hs_dynamic_length(list) == 3 && list->gate.state == -1);
+    CHECK(hs_dynamic_length(list) == 3 && hs_gate_is_mine(&list->gate));
     hs_dynamic_release(list);
     hs_dynamic_release(list);
-    CHECK(list->gate.state == 0);
+    CHECK(!hs_gate_is_mine(&list->gate));
     hs_dynamic_free(list);
 }
 
