@@ -22,9 +22,7 @@ CORE = HERE.parent.parent / "csrc" / "core" / "exact"
 COMPILER = os.environ.get("CC", "cc").split()
 FLAGS = ["-std=c11", "-O2", "-ffp-contract=off", "-UNDEBUG", "-DHS_TESTING=1", f"-I{HERE}"]
 
-MODULES = ["doubleword", "metric_decide", "metric_integer", "metric_compare", "metric_measure"]
-MODULES += ["metric_sum", "filter", "limit_form", "expanded", "reach"]
-MODULES += ["dyadic", "support", "support_form", "metric_support"]
+MODULES = ["arithmetic", "metric", "filter", "ellipsoid", "reach"]
 SOURCES = sorted(CORE.glob("*.c"))
 SOURCES += [HERE / "exact" / f"test_{name}.c" for name in MODULES]
 

@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * test_api_cells.c: cells that are kept give the answers of searches of their own, for any cutoff
- * and any queries, and stay as they are.
- */
+/* test_api_cells.c: cells that are kept give what a search gives, and candidates hold all of it. */
+#include "../../../csrc/halfshell.h"
+#include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
-#include "../support/random_scenes.h"
-#include "../support/range_checks.h"
-#include "../support/among.h"
 #include "../support/poll_checks.h"
+#include "../support/random_scenes.h"
 
-#include "../../../csrc/core/memory/account.h"
+#include <math.h>
 
 void test_api_cells(void);
+
+/* Api cells: cells that are kept give the answers of searches of their own, for any cutoff and any
+ * queries, and stay as they are. */
 
 static bool
 same_pairs(const hs_pairs *a, const hs_pairs *b, int ndim)
@@ -103,282 +103,241 @@ any_cutoff_and_any_queries(void)
     }
 }
 
-/* Clusters a long way apart, where only occupied cells are stored. */
+/* Api candidates: what cells say of themselves, dense and of occupied cells only: indices, the
+ * cell of any point, ranges of candidates, and what is refused. */
+
+/* A few dense clusters far apart, whose cells are only the occupied ones. */
+enum { CLUSTERS = 4, EACH = 1000, SPARSE_POINTS = CLUSTERS * EACH };
+#define APART 1e7
+
 static void
-cells_that_are_few_and_far_between(void)
+make_sparse(harness_random *random, int ndim, double *x)
 {
-    enum { N = 3000 };
-    static double  x[3 * N], y[3 * N];
-    harness_random random = {8};
-    brute_scene    scene = {.ndim = 3, .n = N, .x = x, .inclusive = true, .cutoff = 0.1};
-    brute_scene    asking = {.ndim = 3, .n = N, .x = y};
-    hs_cells      *cells = NULL;
-    for (int e = 0; e < 3 * N; e++) {
-        const double away = e / 3 % 2 ? 1e9 : 0.0;
-        x[e] = random_unit(&random) + away;
-        y[e] = 1.2 * random_unit(&random) + (e / 3 % 3 ? away : -2e9);
+    for (int i = 0; i < SPARSE_POINTS; i++) {
+        for (int k = 0; k < ndim; k++)
+            x[i * ndim + k] = 3.0 * random_unit(random) + APART * (i / EACH % (k + 3));
     }
-    const hs_points points = points_of(&scene), queries = points_of(&asking);
-    hs_options      options = options_of(&scene);
-    CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
-    options.want = WANT_ALL;
-    for (int c = 0; c < 3; c++) {
-        options.cutoff = c == 0 ? 0.1 : c == 1 ? 0.05 : 0.11;
-        compare_lists(cells, &scene, &options);
-        compare_rows(cells, &scene, NULL, &options);
-        compare_rows(cells, &scene, &queries, &options);
-    }
-    hs_cells_free(cells);
 }
 
-/* The layout is what it says: a permutation, in ascending cells, each point in its own. */
-static void
-check_layout(const hs_cells *cells, const hs_points *points, const hs_layout *layout)
+static hs_cells *
+build(const brute_scene *scene, hs_layout *layout)
 {
-    int64_t *cell = array_of(points->n, sizeof(int64_t));
-    bool    *met = array_of(points->n, sizeof(bool));
-    memset(met, 0, (size_t)points->n);
-    CHECK(layout->n_points == points->n && layout->start[0] == 0);
-    CHECK(layout->start[layout->n_cells] == points->n);
-    CHECK(hs_cells_find(cells, points, cell, NULL) == HS_OK);
+    const hs_points  points = points_of(scene);
+    const hs_options options = options_of(scene);
+    hs_cells        *cells = NULL;
+    CHECK(hs_cells_build(&points, scene->box, &options, &cells, NULL) == HS_OK);
+    hs_cells_layout(cells, layout);
+    return cells;
+}
+
+/* Indices are within the shape, ascend with the ids, last axis first, and are those of the points:
+ * two of these are as many cells apart along an open axis as their distance says, or one beside. */
+static void
+check_indices(const hs_cells *cells, const brute_scene *scene, const hs_layout *layout)
+{
+    const int       d = scene->ndim;
+    int64_t        *indices = array_of(layout->n_cells * d, sizeof *indices);
+    int64_t        *cell = array_of(scene->n, sizeof *cell), wrong = 0;
+    const hs_points points = points_of(scene);
+    hs_cells_indices(cells, indices);
+    CHECK(hs_cells_find(cells, &points, cell, NULL) == HS_OK);
     for (int64_t c = 0; c < layout->n_cells; c++) {
-        for (int64_t si = layout->start[c]; si < layout->start[c + 1]; si++) {
-            const int32_t i = layout->order[si];
-            CHECK(i >= 0 && i < points->n && !met[i]);
-            CHECK(si == layout->start[c] || layout->order[si - 1] < i);
-            CHECK(cell[i] == c);
-            met[i] = true;
+        int64_t id = 0;
+        int     order = c == 0 ? 1 : 0;
+        for (int k = d - 1; k >= 0; k--) {
+            const int64_t at = indices[c * d + k];
+            wrong += at < 0 || at >= layout->shape[k];
+            id = layout->occupied_only ? 0 : id * layout->shape[k] + at;
+            if (order == 0)
+                order = (at > indices[(c - 1) * d + k]) - (at < indices[(c - 1) * d + k]);
+        }
+        wrong += order != 1 || (!layout->occupied_only && id != c);
+        wrong += layout->occupied_only && layout->start[c] == layout->start[c + 1];
+    }
+    for (int64_t i = 1; i < scene->n; i++) {
+        wrong += cell[i] < 0 || cell[i] >= layout->n_cells;
+        for (int k = 0; k < d; k++) {
+            const double apart = (scene->x[i * d + k] - scene->x[k]) / layout->cell_size[k];
+            const double steps = (double)(indices[cell[i] * d + k] - indices[cell[0] * d + k]);
+            wrong += scene->box == NULL && !(fabs(apart - steps) < 1.0 + 1e-9);
         }
     }
-    free(met);
+    CHECK(wrong == 0);
+    free(indices);
     free(cell);
 }
 
 static void
-the_layout_is_visible_and_holds_all_neighbours(void)
+indices_are_where_points_are(void)
 {
-    harness_random      random = {314};
-    static random_scene s, other;
-    for (int trial = 0; trial < 120; trial++) {
-        const int ndim = 1 + trial / SCENE_KINDS % 4, n = 1 + random_below(&random, 120);
-        hs_cells *cells = NULL;
-        hs_pairs *ranges = NULL, *rows = NULL;
-        hs_layout layout;
-        make_scene(&random, trial % SCENE_KINDS, ndim, n, 4.0, 0, &s);
-        make_scene(&random, SCENE_OPEN, ndim, 20, 4.0, 0, &other);
-        const hs_points  points = points_of(&s.scene), queries = points_of(&other.scene);
-        const hs_points *asking = trial % 2 ? &queries : NULL;
-        hs_options       options = options_of(&s.scene);
-        options.cutoff *= 0.5;
-        options.cell_size = wanted_width(trial, options.cutoff);
-        CHECK(hs_cells_build(&points, s.scene.box, &options, &cells, NULL) == HS_OK);
-        options.cell_size = 0.0;
-        hs_cells_layout(cells, &layout);
-        check_layout(cells, &points, &layout);
-        options.want = HS_WANT_J;
-        CHECK(hs_neighbors_find(QUERIED_CELLS(cells, asking), &options, &rows, NULL) == HS_OK);
-        CHECK(hs_cells_candidates(cells, asking, &options, &ranges, NULL) == HS_OK);
-        CHECK(ranges_hold_rows(&layout, ranges, rows));
-        hs_pairs_free(rows);
+    harness_random      random = {6};
+    static random_scene s;
+    static double       x[3 * SPARSE_POINTS];
+    for (int trial = 0; trial < 12; trial++) {
+        const int   ndim = 2 + trial % 2;
+        hs_layout   layout;
+        brute_scene scene = {.ndim = ndim, .n = SPARSE_POINTS, .x = x, .cutoff = 0.4};
+        make_sparse(&random, ndim, x);
+        hs_cells *cells = build(&scene, &layout);
+        CHECK(layout.occupied_only);
+        check_indices(cells, &scene, &layout);
+        hs_cells_free(cells);
+        make_scene(&random, trial % SCENE_KINDS, 1 + trial % 4, 200, 4.0, 0, &s);
+        s.scene.cutoff *= 0.3;
+        cells = build(&s.scene, &layout);
+        check_indices(cells, &s.scene, &layout);
+        hs_cells_free(cells);
+    }
+}
+
+/* Points where no other is: no cell of these has an id. */
+static void
+empty_cells_have_no_id(void)
+{
+    enum { N = 500 };
+    static double  x[2 * SPARSE_POINTS], other[2 * N];
+    static int64_t cell[N];
+    harness_random random = {7};
+    hs_layout      layout;
+    int            inside = 0, wrong = 0;
+    brute_scene    scene = {.ndim = 2, .n = SPARSE_POINTS, .x = x, .cutoff = 0.4};
+    brute_scene    others = {.ndim = 2, .n = N, .x = other};
+    hs_failure     failure;
+    make_sparse(&random, 2, x);
+    for (int e = 0; e < 2 * N; e++) {
+        other[e] = e < N ? 3.0 * random_unit(&random) : APART * random_unit(&random);
+    }
+    hs_cells       *cells = build(&scene, &layout);
+    const hs_points points = points_of(&others);
+    CHECK(layout.occupied_only);
+    CHECK(hs_cells_find(cells, &points, cell, &failure) == HS_OK);
+    for (int i = 0; i < N; i++) {
+        inside += cell[i] >= 0;
+        if (cell[i] >= 0) {
+            /* Who is there is less than a cell away. */
+            const double *there = x + 2 * layout.order[layout.start[cell[i]]];
+            wrong += fabs(there[0] - other[2 * i]) > 1.001 * layout.cell_size[0] ||
+                     fabs(there[1] - other[2 * i + 1]) > 1.001 * layout.cell_size[1];
+        }
+    }
+    CHECK(wrong == 0 && inside > N / 8 && inside < 7 * N / 8);
+    other[33] = NAN;
+    CHECK(hs_cells_find(cells, &points, cell, &failure) == HS_ERR_NOT_FINITE);
+    CHECK(failure.row == 16 && failure.column == 1);
+    CHECK(hs_cells_find(cells, &points, cell, NULL) == HS_ERR_NOT_FINITE);
+    hs_cells_free(cells);
+}
+
+static void
+ranges_that_are_refused(void)
+{
+    harness_random      random = {9};
+    static random_scene s;
+    hs_layout           layout;
+    hs_failure          failure;
+    hs_pairs           *ranges = NULL;
+    make_scene(&random, SCENE_ALIGNED, 3, 100, 4.0, 0, &s);
+    s.scene.cutoff = 0.5;
+    hs_cells       *cells = build(&s.scene, &layout);
+    const double    far[6] = {1e9, 0.0, 0.0, 0.0, -1e300, 0.0};
+    const hs_points points = points_of(&s.scene), query = {far, 2, 3, HS_FLOAT64, 24, 8};
+    hs_options      options = options_of(&s.scene);
+    int64_t         polls = INT32_MAX;
+    CHECK(hs_cells_candidates(cells, &query, &options, &ranges, &failure) == HS_ERR_FAR);
+    CHECK(failure.row == 1 && failure.column == 1 && failure.value == -1e300);
+    CHECK(failure.in_queries && failure.system == -1 && ranges == NULL);
+    options.cutoff = 0.75;
+    CHECK(hs_cells_candidates(cells, &points, &options, &ranges, NULL) == HS_ERR_CUTOFF);
+    options.cutoff = NAN;
+    CHECK(hs_cells_candidates(cells, NULL, &options, &ranges, NULL) == HS_ERR_CUTOFF);
+    options.cutoff = 0.5;
+    options.poll = stop_after;
+    options.poll_context = &polls;
+    CHECK(hs_cells_candidates(cells, NULL, &options, &ranges, NULL) == HS_OK);
+    hs_pairs_free(ranges);
+    const int64_t most = INT32_MAX - polls;
+    CHECK(most >= 2);
+    for (int64_t n = 0; n < most; n++) {
+        polls = n;
+        CHECK(hs_cells_candidates(cells, NULL, &options, &ranges, NULL) == HS_ERR_INTERRUPTED);
+        CHECK(ranges == NULL);
+    }
+    hs_cells_free(cells);
+}
+
+/* Candidates far: candidates of queries that lie far from the points, and of points that no cells
+ * hold. */
+
+/* Along open axes, around points at either end of the numbers. */
+static void
+queries_at_any_distance(void)
+{
+    const double places[] = {0.0, 1.0, -0x1p30, 0x1p200};
+    for (int p = 0; p < 4; p++) {
+        const double    unit = p == 3 ? 0x1p190 : 1.0;
+        const double    x[2] = {places[p], places[p] + 0.125 * unit};
+        const double    q[5] = {x[1], x[1] + 0.25 * unit, 0x1p800, -0x1p800, 0x1p-1074};
+        const int       near = p == 0 ? 2 : 1; /* the last one is the first point, nearly */
+        const hs_points points = {x, 2, 1, HS_FLOAT64, 8, 8};
+        const hs_points asking = {q, 5, 1, HS_FLOAT64, 8, 8};
+        hs_options      options = hs_options_default();
+        hs_cells       *cells = NULL;
+        hs_pairs       *ranges = NULL;
+        options.cutoff = 0.125 * unit;
+        CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
+        CHECK(hs_cells_candidates(cells, &asking, &options, &ranges, NULL) == HS_OK);
+        CHECK(hs_pairs_length(ranges) >= near);
+        const int64_t *offsets = hs_pairs_offsets(ranges);
+        CHECK(offsets[1] > 0 && offsets[4] == offsets[1]);
+        CHECK((offsets[5] > offsets[4]) == (near == 2));
         hs_pairs_free(ranges);
         hs_cells_free(cells);
     }
 }
 
-/* No narrower than wanted, unless there is one only; as many as fit, but not more than memory of
- * the order of the points holds. */
+/* An open axis on which points lie far beyond what a skewed box beside it can be scaled with: all
+ * are in one cell, with which no ranges can be told, wherever queries are. Searches in it are
+ * right. */
 static void
-cells_are_as_wide_as_wanted(void)
+cells_with_everything_have_no_ranges(void)
 {
-    enum { N = 500 };
-    static double  x[8 * N];
-    harness_random random = {5};
-    for (int e = 0; e < 8 * N; e++) {
-        x[e] = random_unit(&random);
-    }
-    for (int ndim = 1; ndim <= HS_MAX_DIM; ndim++) {
-        brute_scene     scene = {.ndim = ndim, .n = N, .x = x, .inclusive = true, .cutoff = 0.1};
-        const hs_points points = points_of(&scene);
-        hs_options      options = options_of(&scene);
-        for (double width = 0x1p-40; width < 4.0; width *= 1.5) {
-            hs_cells *cells = NULL;
-            hs_layout layout;
-            double    as_wanted = 1.0;
-            options.cell_size = width;
-            CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
-            hs_cells_layout(cells, &layout);
-            CHECK(layout.n_cells <= 2 * N + 64 && !layout.occupied_only);
-            for (int k = 0; k < ndim; k++) {
-                CHECK(layout.shape[k] == 1 || layout.cell_size[k] >= width);
-                as_wanted *= floor(fmax(0.99 / width, 1.0));
-            }
-            if (ndim <= 3 && width >= 0.02 && as_wanted <= 2 * N) {
-                CHECK(layout.n_cells >= as_wanted);
-            }
-            hs_cells_free(cells);
-        }
-    }
-}
-
-/* Counted by the core: a plane costs two columns, and no rows of cells above or below it. */
-static void
-a_plane_has_no_third_coordinate(void)
-{
-    enum { N = 4000 };
-    static double  x[3 * N];
-    harness_random random = {77};
-    hs_counters    counters[2];
-    for (int solid = 0; solid < 2; solid++) {
-        const int   ndim = 2 + solid;
-        brute_scene scene = {.ndim = ndim, .n = N, .x = x, .inclusive = true, .cutoff = 0.5};
-        hs_cells   *cells = NULL;
-        for (int e = 0; e < ndim * N; e++) {
-            x[e] = 10.0 * random_unit(&random);
-        }
-        const hs_points points = points_of(&scene);
-        hs_options      options = options_of(&scene);
-        options.counters = &counters[solid];
-        CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
-        hs_cells_free(cells);
-    }
-    const int64_t  column = N * (int64_t)sizeof(double);
-    const int64_t *flat = counters[0].bytes, *deep = counters[1].bytes;
-    CHECK(flat[HS_FOR_POINTS] >= 2 * column && flat[HS_FOR_POINTS] < 2 * column + 4096);
-    CHECK(deep[HS_FOR_POINTS] - flat[HS_FOR_POINTS] == column);
-    CHECK(flat[HS_FOR_ORIGINALS] == 2 * column && deep[HS_FOR_ORIGINALS] == 3 * column);
-    CHECK(flat[HS_FOR_STENCIL] < deep[HS_FOR_STENCIL]);
-}
-
-/* However many pairs calls may find later, cells take memory of their own size. */
-static void
-cells_of_a_crowd_need_no_room_for_its_pairs(void)
-{
-    static double   x[4000];
-    const hs_points points = {x, 4000, 1, HS_FLOAT64, 8, 8};
+    const double    x[6] = {0.0, 0.0, 1e300, 0.3, 0.0, 1e300}, q[3] = {0.0, 0.0, 0.0};
+    const hs_points points = {x, 2, 3, HS_FLOAT64, 24, 8}, asking = {q, 1, 3, HS_FLOAT64, 24, 8};
+    const hs_box    box = {3, {true, true, false}, {{1.0}, {0.5, 1.0}, {0.0, 0.0, 1.0}}};
     hs_options      options = hs_options_default();
-    hs_cells       *cells;
-    int64_t         count;
-    for (int i = 0; i < 4000; i++)
-        x[i] = i;
-    options.cutoff = 4000.0;
-    options.memory_limit = 1e6; /* 8 million pairs take 128 MB */
-    CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
-    CHECK(hs_pairs_count(IN_CELLS(cells), &options, &count, NULL) == HS_OK);
-    CHECK(count == 4000 * 3999 / 2);
-    hs_cells_free(cells);
-}
-
-static void
-points_may_change_once_they_are_in_cells(void)
-{
-    double      x[4] = {0.0, 0.25, 0.5, 0.75};
-    brute_scene scene = {.ndim = 1, .n = 4, .x = x, .inclusive = true, .cutoff = 0.25};
-    hs_points   points = points_of(&scene);
-    hs_options  options = options_of(&scene);
-    hs_cells   *cells = NULL;
-    int64_t     count = -1;
-    CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
-    x[0] = x[1] = NAN;
-    CHECK(hs_pairs_count(IN_CELLS(cells), &options, &count, NULL) == HS_OK && count == 3);
-    options.cutoff = 1.0; /* by cells that are made for this call */
-    CHECK(hs_pairs_count(IN_CELLS(cells), &options, &count, NULL) == HS_OK && count == 6);
-    hs_cells_free(cells);
-}
-
-static void
-failures_leave_nothing_behind(void)
-{
-    static random_scene s;
-    harness_random      random = {99};
-    hs_cells           *cells = NULL;
-    make_scene(&random, SCENE_TRICLINIC, 3, 40, 4.0, 0, &s);
-    const hs_points points = points_of(&s.scene);
-    hs_options      options = options_of(&s.scene);
-    const int64_t   before = hs_test_live_blocks();
-    hs_status       status = HS_ERR_MEMORY;
-    for (int64_t nth = 1; status == HS_ERR_MEMORY && nth < 1000; nth++) {
-        hs_pairs *rows = NULL;
-        hs_test_fail_allocation(nth);
-        status = hs_cells_build(&points, s.scene.box, &options, &cells, NULL);
-        if (status == HS_OK) {
-            status = hs_neighbors_find(QUERIED_CELLS(cells, &points), &options, &rows, NULL);
-        }
-        hs_test_fail_allocation(0);
-        hs_pairs_free(rows);
-        hs_cells_free(cells);
-        CHECK(hs_test_live_blocks() == before);
-    }
-    CHECK(status == HS_OK);
-}
-
-/* Whichever allocation is refused: cells that were made have all that a search in them needs. */
-static hs_status
-build_and_use(void *context)
-{
-    const hs_points *points = context;
-    hs_options       options = hs_options_default();
-    hs_cells        *cells = NULL;
-    hs_pairs        *rows = NULL;
-    options.cutoff = INFINITY;
-    options.threads = 1;
-    hs_options of_cells = options;
-    of_cells.cutoff = 0.5;
-    const hs_status built = hs_cells_build(points, NULL, &of_cells, &cells, NULL);
-    CHECK((built == HS_OK) == (cells != NULL));
-    CHECK(built == HS_OK || built == HS_ERR_MEMORY);
-    if (built == HS_OK && hs_test_failure_is_due()) { /* nothing was refused, nor is from now on */
-        hs_test_fail_allocation(0);
-        CHECK(hs_nearest_find(IN_CELLS(cells), 2, &options, &rows, NULL) == HS_OK);
-        hs_test_fail_allocation(INT64_MAX);
-    } else {
-        CHECK(built == HS_ERR_MEMORY);
-    }
-    hs_pairs_free(rows);
-    hs_cells_free(cells);
-    return built;
-}
-
-static void
-cells_are_whole_or_refused(void)
-{
-    const double x[4] = {0.0, 0.25, 0.5, 0.75};
-    hs_points    points = {x, 4, 1, HS_FLOAT64, 8, 8};
-    CHECK(fail_each_allocation(build_and_use, &points, 100) > 3);
-}
-
-/* Cells keep no pairs: as many as there are need not fit the limit. */
-static void
-cells_are_built_where_their_pairs_would_not_fit(void)
-{
-    enum { MANY = 2000 };
-    static double  many[3 * MANY];
-    harness_random random = {606};
-    const hs_box   box = {
-          .ndim = 3, .periodic = {true, true, true}, .rows = {{1.0}, {0.0, 1.0}, {0.0, 0.0, 1.0}}};
-    hs_options options = hs_options_default();
-    hs_cells  *cells = NULL;
-    hs_pairs  *pairs = NULL;
-    for (int e = 0; e < 3 * MANY; e++)
-        many[e] = random_unit(&random);
-    const hs_points points = {many, MANY, 3, HS_FLOAT64, 24, 8};
-    options.cutoff = 0.9;
-    options.memory_limit = 4e6; /* of six million pairs */
-    CHECK(hs_pairs_find(AMONG(&points, &box), &options, &pairs, NULL) == HS_ERR_MEMORY);
+    hs_cells       *cells = NULL;
+    hs_pairs       *ranges = (hs_pairs *)&options;
+    hs_layout       layout;
+    hs_failure      failure;
+    int64_t         count = 0, cell[2] = {-7, -7};
+    options.cutoff = 0.4;
     CHECK(hs_cells_build(&points, &box, &options, &cells, NULL) == HS_OK);
+    for (int with = 0; with < 2; with++) {
+        const hs_points *queries = with ? &asking : NULL;
+        memset(&failure, 0x5a, sizeof failure);
+        CHECK(hs_cells_candidates(cells, queries, &options, &ranges, &failure) == HS_ERR_FAR);
+        CHECK(ranges == NULL && failure.row == -1 && failure.column == -1);
+        CHECK(!failure.in_queries && failure.limit_bytes == 0.0);
+    }
+    hs_cells_layout(cells, &layout);
+    CHECK(layout.n_cells == 1 && !layout.occupied_only && layout.n_points == 2);
+    for (int k = 0; k < 3; k++)
+        CHECK(layout.shape[k] == 1 && layout.cell_size[k] == INFINITY);
+    CHECK(hs_cells_find(cells, &points, cell, NULL) == HS_OK && cell[0] == 0 && cell[1] == 0);
+    CHECK(hs_pairs_count(IN_CELLS(cells), &options, &count, NULL) == HS_OK && count == 1);
+    options.cutoff = 0.2;
+    CHECK(hs_cells_candidates(cells, NULL, &options, &ranges, &failure) == HS_ERR_CUTOFF);
+    CHECK(failure.value == 0.2 && ranges == NULL);
     hs_cells_free(cells);
 }
 
 void
 test_api_cells(void)
 {
-    RUN(cells_are_built_where_their_pairs_would_not_fit);
     RUN(any_cutoff_and_any_queries);
-    RUN(cells_are_whole_or_refused);
-    RUN(cells_that_are_few_and_far_between);
-    RUN(the_layout_is_visible_and_holds_all_neighbours);
-    RUN(cells_are_as_wide_as_wanted);
-    RUN(a_plane_has_no_third_coordinate);
-    RUN(cells_of_a_crowd_need_no_room_for_its_pairs);
-    RUN(points_may_change_once_they_are_in_cells);
-    RUN(failures_leave_nothing_behind);
+    RUN(indices_are_where_points_are);
+    RUN(empty_cells_have_no_id);
+    RUN(ranges_that_are_refused);
+    RUN(cells_with_everything_have_no_ranges);
+    RUN(queries_at_any_distance);
 }

@@ -1,11 +1,15 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_api_dynamic.c: after any history, in any box and storage, a list answers as brute force. */
-#include "../../../csrc/core/memory/account.h"
+/* test_api_dynamic.c: dynamic lists, through the public interface, against plain arrays. */
+#include "../../../csrc/core/dynamic/dynamic.h"
+#include "../../../csrc/halfshell_dynamic.h"
 #include "../support/dynamic_brute.h"
+#include "../support/harness.h"
 
 #include <math.h>
 
 void test_api_dynamic(void);
+
+/* Api dynamic: after any history, in any box and storage, a list answers as brute force. */
 
 typedef enum box_kind { OPEN, CUBE, SLAB, SKEWED, SMALL, SKEWED_WIRE, BOX_KINDS } box_kind;
 
@@ -138,24 +142,6 @@ answers_are_those_of_brute_force(void)
                                 seed++);
 }
 
-/* x = 1 - 2^-54 and x + 1 = 2: two cells apart, and at distance 1 as computed in float64. */
-static void
-a_pair_across_two_cells_is_not_lost(void)
-{
-    const double       first = 0x1.fffffffffffffp-1, second = 0x1.fffffffffffffp0;
-    hs_dynamic_options options = hs_dynamic_options_default();
-    hs_dynamic        *list;
-    bool               any;
-    options.ndim = 1;
-    CHECK(hs_dynamic_new(&options, &list, NULL) == HS_OK);
-    CHECK(hs_dynamic_insert(list, (hs_key){1, 0}, &second, NULL) == HS_OK);
-    CHECK(hs_dynamic_any_within(list, &first, 1.0, NULL, &any, NULL) == HS_OK && any);
-    const double two = 2.0;
-    CHECK(hs_dynamic_move(list, (hs_key){1, 0}, &two, NULL) == HS_OK);
-    CHECK(hs_dynamic_any_within(list, &first, 1.0, NULL, &any, NULL) == HS_OK && !any);
-    hs_dynamic_free(list);
-}
-
 /* Cells 2^32 apart share what the table knows of them, and those beyond 2^52 are one. */
 static void
 far_points_are_found(void)
@@ -243,12 +229,334 @@ bad_points_change_nothing(void)
     hs_dynamic_free(list);
 }
 
+/* Api dynamic calls: calls that change a list, or ask for one point, refuse what they cannot take,
+ * and then have done nothing. */
+
+static hs_dynamic *
+list_with_two(void)
+{
+    const hs_dynamic_options options = hs_dynamic_options_default();
+    const double             x[2][3] = {{0.5, 1.5, -2.5}, {4.0, 0.0, 0.0}};
+    hs_dynamic              *list = NULL;
+    CHECK(hs_dynamic_new(&options, &list, NULL) == HS_OK);
+    CHECK(hs_dynamic_insert(list, (hs_key){1, 0}, x[0], NULL) == HS_OK);
+    CHECK(hs_dynamic_insert(list, (hs_key){2, 0}, x[1], NULL) == HS_OK);
+    return list;
+}
+
+static void
+no_list_is_an_argument_error(void)
+{
+    const double    x[3] = {0.0, 0.0, 0.0};
+    const int64_t   id = 1;
+    const hs_key    key = {1, 0};
+    const hs_points points = {.data = x,
+                              .n = 1,
+                              .ndim = 3,
+                              .real = HS_FLOAT64,
+                              .row_stride = sizeof x,
+                              .column_stride = sizeof *x};
+    double          back[3];
+    int64_t         cell[3];
+    hs_dynamic     *copy;
+    CHECK(hs_dynamic_copy(NULL, &copy) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_insert(NULL, key, x, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_move(NULL, key, x, NULL) == HS_ERR_ARGUMENT);
+    CHECK(!hs_dynamic_remove(NULL, key) && !hs_dynamic_has(NULL, key));
+    CHECK(hs_dynamic_insert_many(NULL, &id, NULL, &points, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_remove_many(NULL, &id, NULL, 1, NULL, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_shrink_to_fit(NULL) == HS_ERR_ARGUMENT && hs_dynamic_length(NULL) == 0);
+    CHECK(hs_dynamic_position(NULL, key, back) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_cell(NULL, key, cell) == HS_ERR_ARGUMENT);
+    hs_dynamic_clear(NULL);
+}
+
+static void
+missing_arguments_change_nothing(void)
+{
+    double          x[3] = {0.0, 0.0, 0.0};
+    const int64_t   id = 1;
+    const hs_key    key = {1, 0};
+    const hs_points good = {.data = x,
+                            .n = 1,
+                            .ndim = 3,
+                            .real = HS_FLOAT64,
+                            .row_stride = sizeof x,
+                            .column_stride = sizeof *x};
+    hs_points       flat = good, bad = good;
+    hs_failure      failure;
+    hs_dynamic     *list = list_with_two();
+    const int64_t   changes = hs_dynamic_look(list).changes;
+    flat.ndim = 2;
+    bad.n = -1;
+    CHECK(hs_dynamic_copy(list, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_insert_many(list, &id, NULL, NULL, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_insert_many(list, &id, NULL, &flat, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_insert_many(list, NULL, NULL, &good, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_insert_many(list, &id, NULL, &bad, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_remove_many(list, &id, NULL, -1, NULL, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_remove_many(list, NULL, NULL, 1, NULL, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_position(list, key, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_cell(list, key, NULL) == HS_ERR_ARGUMENT);
+    x[2] = NAN;
+    CHECK(hs_dynamic_insert_many(list, &id, NULL, &good, &failure) == HS_ERR_NOT_FINITE);
+    CHECK(failure.row == 0 && failure.column == 2);
+    CHECK(hs_dynamic_length(list) == 2 && hs_dynamic_look(list).changes == changes);
+    hs_dynamic_free(list);
+}
+
+static void
+cells_are_those_of_the_coordinates(void)
+{
+    const hs_box       box = {.ndim = 2, .periodic = {true, false}, .rows = {{6.0, 0}, {0, 1}}};
+    hs_dynamic_options options = hs_dynamic_options_default();
+    hs_dynamic        *list = list_with_two();
+    int64_t            cell[3] = {9, 9, 9};
+    CHECK(hs_dynamic_cell(list, (hs_key){1, 0}, cell) == HS_OK);
+    CHECK(cell[0] == 0 && cell[1] == 1 && cell[2] == -3);
+    CHECK(hs_dynamic_cell(list, (hs_key){3, 0}, cell) == HS_ERR_KEY);
+    hs_dynamic_free(list);
+    options.ndim = 2;
+    options.box = &box;
+    CHECK(hs_dynamic_new(&options, &list, NULL) == HS_OK);
+    for (int64_t id = 0; id < 12; id++) {
+        const double x[2] = {(double)id - 20.0 + 0.25, (double)id - 6.0};
+        CHECK(hs_dynamic_insert(list, (hs_key){id, 0}, x, NULL) == HS_OK);
+        CHECK(hs_dynamic_cell(list, (hs_key){id, 0}, cell) == HS_OK);
+        CHECK(cell[0] == (id + 1) % 6 && cell[1] == id - 6);
+    }
+    hs_dynamic_free(list);
+    options.box = NULL;
+    options.storage = HS_STORE_ALL_PAIRS;
+    CHECK(hs_dynamic_new(&options, &list, NULL) == HS_OK);
+    CHECK(hs_dynamic_insert(list, (hs_key){1, 0}, NULL, NULL) == HS_OK);
+    CHECK(hs_dynamic_cell(list, (hs_key){1, 0}, cell) == HS_ERR_ARGUMENT); /* it has no position */
+    hs_dynamic_free(list);
+}
+
+/* Api dynamic ball: queries, keys in turn and calls in a row refuse what they cannot take. */
+
+static int
+count_keys_ball(hs_key key, const double *position, const int64_t *shift, void *user)
+{
+    (void)key, (void)position, (void)shift;
+    ++*(int *)user;
+    return 0;
+}
+
+static hs_dynamic *
+line_of(int64_t n)
+{
+    hs_dynamic_options options = hs_dynamic_options_default();
+    hs_dynamic        *list = NULL;
+    options.ndim = 1;
+    CHECK(hs_dynamic_new(&options, &list, NULL) == HS_OK);
+    for (int64_t id = 0; id < n; id++) {
+        const double x = 0.3 * (double)id;
+        CHECK(hs_dynamic_insert(list, (hs_key){id, 0}, &x, NULL) == HS_OK);
+    }
+    return list;
+}
+
+static void
+missing_arguments_are_refused(void)
+{
+    const double x = 0.0;
+    hs_dynamic  *list = line_of(3);
+    int          n = 0;
+    bool         any = true;
+    CHECK(hs_dynamic_near(NULL, &x, 1.0, count_keys_ball, &n, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_near(list, NULL, 1.0, count_keys_ball, &n, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_near(list, &x, 1.0, NULL, &n, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_within(NULL, &x, 1.0, false, count_keys_ball, &n, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_within(list, NULL, 1.0, false, count_keys_ball, &n, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_within(list, &x, 1.0, false, NULL, &n, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_any_within(NULL, &x, 1.0, NULL, &any, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_any_within(list, NULL, 1.0, NULL, &any, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_any_within(list, &x, 1.0, NULL, NULL, NULL) == HS_ERR_ARGUMENT);
+    CHECK(n == 0 && any);
+    hs_dynamic_free(list);
+}
+
+static void
+bad_balls_visit_nothing(void)
+{
+    const double x = 0.0, bad = NAN;
+    const double radii[] = {-1.0, NAN, INFINITY, 1.0000001};
+    hs_dynamic  *list = line_of(3);
+    int          n = 0;
+    bool         any = true;
+    for (int r = 0; r < 4; r++) {
+        hs_failure failure;
+        CHECK(hs_dynamic_near(list, &x, radii[r], count_keys_ball, &n, &failure) == HS_ERR_CUTOFF);
+        CHECK(failure.value == radii[r] || isnan(radii[r]));
+        CHECK(hs_dynamic_within(list, &x, radii[r], true, count_keys_ball, &n, NULL) ==
+              HS_ERR_CUTOFF);
+        CHECK(hs_dynamic_any_within(list, &x, radii[r], NULL, &any, NULL) == HS_ERR_CUTOFF);
+    }
+    CHECK(hs_dynamic_near(list, &bad, 0.5, count_keys_ball, &n, NULL) == HS_ERR_NOT_FINITE);
+    CHECK(n == 0 && any);
+    hs_dynamic_free(list);
+}
+
+static void
+what_is_not_held_need_not_be_released(void)
+{
+    hs_dynamic *list = line_of(3);
+    hs_dynamic_release(list);
+    CHECK(hs_dynamic_length(list) == 3);
+    hs_dynamic_hold(list);
+    CHECK(hs_dynamic_length(list) == 3 && hs_gate_is_mine(&list->gate));
+    hs_dynamic_release(list);
+    hs_dynamic_release(list);
+    CHECK(!hs_gate_is_mine(&list->gate));
+    hs_dynamic_free(list);
+}
+
+static void
+counters_begin_at_zero(void)
+{
+    const double        x = 0.1;
+    hs_dynamic         *list = line_of(9);
+    hs_dynamic_counters counters = {.wraps = 7, .cells = 7, .candidates = 7, .exact = 7};
+    int                 n = 0;
+    hs_dynamic_count(NULL, &counters);
+    CHECK(counters.cells == 7);
+    hs_dynamic_count(list, &counters);
+    CHECK(counters.cells == 0 && counters.wraps == 0);
+    CHECK(hs_dynamic_within(list, &x, 1.0, false, count_keys_ball, &n, NULL) == HS_OK);
+    CHECK(counters.candidates >= n && n == 4);
+    hs_dynamic_count(list, NULL);
+    const int64_t before = counters.cells;
+    CHECK(hs_dynamic_within(list, &x, 1.0, false, count_keys_ball, &n, NULL) == HS_OK);
+    CHECK(counters.cells == before);
+    hs_dynamic_free(list);
+}
+
+/* Api dynamic list: lists as a whole: options, copies, keys in turn, and no list at all. */
+
+static void
+bad_options_are_refused(void)
+{
+    hs_dynamic_options options = hs_dynamic_options_default();
+    hs_dynamic        *list = NULL;
+    hs_failure         failure;
+    const double       bad[] = {0.0, -1.0, NAN, INFINITY, 1e-100, 1e100};
+    CHECK(hs_dynamic_new(NULL, &list, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_new(&options, NULL, NULL) == HS_ERR_ARGUMENT);
+    for (int b = 0; b < 6; b++) {
+        options.cell_size = bad[b];
+        CHECK(hs_dynamic_new(&options, &list, &failure) == HS_ERR_CUTOFF && list == NULL);
+        CHECK(failure.column == HS_LENGTH_CELL_SIZE);
+        options.cell_size = 1.0;
+        options.max_radius = bad[b];
+        CHECK((hs_dynamic_new(&options, &list, &failure) == HS_OK) == (b == 0));
+        CHECK(b == 0 || failure.column == HS_LENGTH_MAX_RADIUS);
+        hs_dynamic_free(list);
+        list = NULL;
+        options.max_radius = 0.0;
+    }
+    options.ndim = 9;
+    CHECK(hs_dynamic_new(&options, &list, &failure) == HS_ERR_ARGUMENT);
+    hs_box box = {.ndim = 3};
+    for (int l = 0; l < 3; l++) {
+        box.periodic[l] = true;
+        box.rows[l][l] = 4.0;
+    }
+    options.ndim = 3;
+    options.box = &box;
+    box.rows[0][0] = 1e-100;
+    CHECK(hs_dynamic_new(&options, &list, &failure) == HS_ERR_CUTOFF &&
+          failure.column == HS_LENGTH_BOX);
+    box.rows[0][0] = 1e-5;
+    options.max_radius = 1e3;
+    CHECK(hs_dynamic_new(&options, &list, &failure) == HS_ERR_CUTOFF &&
+          failure.column == HS_LENGTH_MAX_RADIUS);
+    memset(box.rows[0], 0, sizeof box.rows[0]);
+    CHECK(hs_dynamic_new(&options, &list, &failure) == HS_ERR_BOX_DEPENDENT);
+}
+
+static void
+no_list_is_an_argument_to_refuse(void)
+{
+    hs_dynamic_counters counters;
+    hs_dynamic         *list = NULL;
+    hs_key              key = {0, 0};
+    int64_t             cursor = 0;
+    hs_dynamic_free(NULL);
+    hs_dynamic_clear(NULL);
+    hs_dynamic_hold(NULL);
+    hs_dynamic_release(NULL);
+    hs_dynamic_count(NULL, &counters);
+    CHECK(hs_dynamic_copy(NULL, &list) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_shrink_to_fit(NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_keys(NULL, &cursor, &key, 1) == 0 && hs_dynamic_length(NULL) == 0);
+    CHECK(hs_dynamic_look(NULL).n_points == 0 && !hs_dynamic_has(NULL, key));
+}
+
+/* Which ids 0, 1, ... of n come when keys are taken so many at a time; each must come once. */
+static bool
+keys_come_once(const hs_dynamic *list, int64_t n, int64_t at_a_time)
+{
+    hs_key  keys[8];
+    int64_t cursor = 0, found = 0, sum = 0;
+    for (int64_t got; (got = hs_dynamic_keys(list, &cursor, keys, at_a_time)) > 0; found += got) {
+        for (int64_t k = 0; k < got; k++) {
+            sum += keys[k].id;
+        }
+    }
+    return found == n && sum == n * (n - 1) / 2;
+}
+
+static void
+keys_come_in_turn_and_copies_hold_them(void)
+{
+    hs_dynamic_options options = hs_dynamic_options_default();
+    hs_dynamic        *list, *copy;
+    hs_key             key = {0, 0};
+    int64_t            cursor = -1;
+    CHECK(hs_dynamic_new(&options, &list, NULL) == HS_OK);
+    CHECK(hs_dynamic_keys(list, &cursor, &key, 1) == 0);
+    CHECK(hs_dynamic_keys(list, NULL, &key, 1) == 0);
+    cursor = 0;
+    CHECK(hs_dynamic_keys(list, &cursor, NULL, 1) == 0);
+    hs_dynamic_release(list); /* was not held */
+    hs_dynamic_hold(list);
+    for (key.id = 0; key.id < 20; key.id++) { /* five in each of four cells */
+        CHECK(hs_dynamic_insert(list, key, (double[]){(double)(key.id % 4), 0.5, 0.5}, NULL) ==
+              HS_OK);
+    }
+    hs_dynamic_release(list);
+    CHECK(hs_dynamic_copy(list, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_copy(list, &copy) == HS_OK);
+    for (int64_t n = 1; n <= 8; n++) {
+        CHECK(keys_come_once(list, 20, n) && keys_come_once(copy, 20, n));
+    }
+    hs_dynamic_clear(list);
+    CHECK(hs_dynamic_shrink_to_fit(list) == HS_OK && hs_dynamic_length(list) == 0);
+    CHECK(hs_dynamic_length(copy) == 20 && hs_dynamic_look(copy).n_cells == 4);
+    for (int k = 0; k < 3; k++) {
+        CHECK(hs_dynamic_look(list).cell_size[k] == options.cell_size);
+    }
+    hs_dynamic_free(list);
+    hs_dynamic_free(copy);
+}
+
 void
 test_api_dynamic(void)
 {
     RUN(answers_are_those_of_brute_force);
-    RUN(a_pair_across_two_cells_is_not_lost);
     RUN(far_points_are_found);
     RUN(keys_need_no_position_in_all_pairs);
     RUN(bad_points_change_nothing);
+    RUN(no_list_is_an_argument_error);
+    RUN(missing_arguments_change_nothing);
+    RUN(cells_are_those_of_the_coordinates);
+    RUN(missing_arguments_are_refused);
+    RUN(bad_balls_visit_nothing);
+    RUN(what_is_not_held_need_not_be_released);
+    RUN(counters_begin_at_zero);
+    RUN(bad_options_are_refused);
+    RUN(no_list_is_an_argument_to_refuse);
+    RUN(keys_come_in_turn_and_copies_hold_them);
 }

@@ -1,41 +1,19 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * test_api_nearest.c: rows of the nearest, against all neighbours within a cutoff, put in order by
- * integers that share no code with the library.
- */
+/* test_api_nearest.c: the nearest points are those of big integers, in rows and in cells. */
 #include "../../../csrc/core/memory/account.h"
+#include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/nearest_checks.h"
+#include "../support/pair_checks.h"
 #include "../support/poll_checks.h"
 #include "../support/random_scenes.h"
-#include "../support/among.h"
+
+#include <pthread.h>
 
 void test_api_nearest(void);
 
-static void
-rows_are_the_neighbours_in_order(void)
-{
-    harness_random      random = {31415};
-    static random_scene s;
-    const char         *names[16];
-    const int           n_names = hs_kernel_names(names, 16);
-    int64_t             found = 0;
-    for (int trial = 0; trial < TRIALS(700); trial++) {
-        const int ndim = 1 + trial / SCENE_KINDS % HS_MAX_DIM;
-        const int n = random_below(&random, ndim <= 3 ? 50 : ndim <= 5 ? 10 : 5);
-        kernel_to_check = names[random_below(&random, n_names)];
-        make_scene(&random, trial % SCENE_KINDS, ndim, n, trial % 7 ? 4.0 : 400.0,
-                   trial % 11  ? 0
-                   : trial % 2 ? -400
-                               : 300,
-                   &s);
-        s.scene.cutoff *= ndim > 5 ? 0.5 : 1.0;
-        found += compare_rows(&s.scene, trial % 3 ? -1 : random_below(&random, n + 1),
-                              1 + random_below(&random, 40), 1 + trial % 2);
-    }
-    kernel_to_check = NULL;
-    CHECK(found > TRIALS(30000));
-}
+/* Api nearest: rows of the nearest, against all neighbours within a cutoff, put in order by
+ * integers that share no code with the library. */
 
 static void
 whichever_allocation_fails_nothing_is_left(void)
@@ -64,106 +42,119 @@ whichever_allocation_fails_nothing_is_left(void)
     CHECK(ended && nth > 10);
 }
 
-static bool
-stop_at_once(void *context, double fraction)
-{
-    (void)context;
-    (void)fraction;
-    return false;
-}
-
-static void
-it_can_be_stopped(void)
-{
-    harness_random      random = {3};
-    static random_scene s;
-    hs_pairs           *rows = NULL;
-    make_scene(&random, SCENE_OPEN, 3, 60, 4.0, 0, &s);
-    const hs_points points = points_of(&s.scene);
-    hs_options      options = options_of(&s.scene);
-    options.cutoff = INFINITY;
-    options.want = HS_WANT_J;
-    options.poll = stop_at_once;
-    CHECK(hs_nearest_find(AMONG(&points, NULL), 3, &options, &rows, NULL) == HS_ERR_INTERRUPTED);
-    CHECK(rows == NULL);
-    options.cutoff = -1.0;
-    CHECK(hs_nearest_find(AMONG(&points, NULL), 3, &options, &rows, NULL) == HS_ERR_CUTOFF);
-}
-
 /* ---- as many as you like, all equally far ---- */
 
-#define ORDERS 5040 /* of 7 numbers */
+/* Nearest cells: nearest points by a tree that cells keep are those of a search of its own, to the
+ * last bit, whoever asks first and however far away queries are. */
 
-/* All orders of the numbers from 1 to 7: each is as far from the origin as any other. */
-static void
-list_orders(double (*to)[7])
+/* NaN and all: what is missing has the same bits too. */
+static bool
+same_rows(const hs_pairs *a, const hs_pairs *b, int ndim)
 {
-    for (int n = 0; n < ORDERS; n++) {
-        int left[7] = {1, 2, 3, 4, 5, 6, 7}, rest = n;
-        for (int k = 0; k < 7; k++) {
-            const int at = rest % (7 - k);
-            rest /= 7 - k;
-            to[n][k] = left[at];
-            memmove(left + at, left + at + 1, (size_t)(6 - k - at) * sizeof *left);
-        }
-    }
+    const size_t d = (size_t)ndim;
+    return same_array(a, b, HS_WANT_J, 8) && same_array(a, b, HS_WANT_DISTANCE, 8) &&
+           same_array(a, b, HS_WANT_VECTOR, 8 * d) && same_array(a, b, HS_WANT_SHIFT, 4 * d);
 }
 
-static hs_status
-find_ties(int64_t k, int64_t polls, hs_counters *counters, int64_t *wrong)
+static bool
+compare(const hs_cells *cells, const brute_scene *scene, const hs_points *queries, int64_t k,
+        double limit)
 {
-    static double   orders[ORDERS][7];
-    const double    origin_of_all[7] = {0.0};
-    const hs_points points = {&orders[0][0], ORDERS, 7, HS_FLOAT64, sizeof orders[0], 8};
-    const hs_points query = {origin_of_all, 1, 7, HS_FLOAT64, sizeof origin_of_all, 8};
-    hs_options      options = hs_options_default();
-    hs_pairs       *rows = NULL;
-    list_orders(orders);
-    options.cutoff = INFINITY;
-    options.want = HS_WANT_J;
-    options.poll = stop_after;
-    options.poll_context = &polls;
-    options.counters = counters;
+    const hs_points points = points_of(scene);
+    hs_options      options = options_of(scene);
+    hs_pairs       *kept = NULL, *fresh = NULL;
+    options.cutoff = limit;
+    options.want = WANT_ALL & ~HS_WANT_I;
     const hs_status status =
-        hs_nearest_find(QUERIED(&points, &query, NULL), k, &options, &rows, NULL);
-    *wrong = status != HS_OK && rows != NULL;
-    for (int64_t e = 0; status == HS_OK && e < k; e++)
-        *wrong += ((const int64_t *)hs_pairs_array(rows, HS_WANT_J))[e] != e;
-    hs_pairs_free(rows);
-    return status;
+        hs_nearest_find(QUERIED(&points, queries, scene->box), k, &options, &fresh, NULL);
+    bool right = hs_nearest_find(QUERIED_CELLS(cells, queries), k, &options, &kept, NULL) == status;
+    right = right && (status != HS_OK || same_rows(kept, fresh, scene->ndim));
+    hs_pairs_free(kept);
+    hs_pairs_free(fresh);
+    return right;
 }
 
+/* Queries near and far; limits that the kept tree serves, and one that it does not. */
 static void
-ties_take_no_more_than_sorting(void)
+a_kept_tree_gives_the_same_rows(void)
 {
-    hs_counters   counters;
-    int64_t       wrong;
-    const int64_t numbers[] = {1, 64, 65, 1000, ORDERS / 4 - 1, ORDERS};
-    for (int t = 0; t < 6; t++) {
-        CHECK(find_ties(numbers[t], INT32_MAX, &counters, &wrong) == HS_OK && wrong == 0);
-        CHECK(counters.ambiguous < 65 * (int64_t)ORDERS);
-        CHECK(numbers[t] <= 64 || counters.ambiguous < 14 * (int64_t)ORDERS);
+    harness_random      random = {2718};
+    static random_scene s, other;
+    for (int trial = 0; trial < 300; trial++) {
+        const int ndim = 1 + trial / SCENE_KINDS % 6;
+        const int n = random_below(&random, ndim <= 3 ? 60 : 12);
+        hs_cells *cells = NULL;
+        make_scene(&random, trial % SCENE_KINDS, ndim, n, 4.0,
+                   trial % 11  ? 0
+                   : trial % 2 ? -400
+                               : 300,
+                   &s);
+        make_scene(&random, SCENE_OPEN, ndim, random_below(&random, 20), 4.0, trial % 5 ? 0 : 30,
+                   &other);
+        const hs_points  points = points_of(&s.scene), queries = points_of(&other.scene);
+        const hs_options options = options_of(&s.scene);
+        CHECK(hs_cells_build(&points, s.scene.box, &options, &cells, NULL) == HS_OK);
+        for (int call = 0; call < 4; call++) {
+            const double     limit = call == 0                  ? s.scene.cutoff
+                                     : call == 3                ? 0x1p-900
+                                     : random_below(&random, 2) ? 0.0
+                                                                : 3.0;
+            const hs_points *asking = (call + trial) % 2 ? &queries : NULL;
+            const bool       right =
+                compare(cells, &s.scene, asking, 1 + random_below(&random, 40), limit);
+            CHECK(right);
+            if (!right)
+                fprintf(stderr, "  trial %d, call %d\n", trial, call);
+        }
+        hs_cells_free(cells);
     }
 }
 
-static void
-one_row_can_be_stopped_anywhere(void)
+typedef struct together {
+    const hs_cells    *cells;
+    const brute_scene *scene;
+    int                n_right;
+} together;
+
+static void *
+ask(void *context)
 {
-    hs_counters counters;
-    int64_t     wrong;
-    CHECK(find_ties(ORDERS, INT32_MAX, &counters, &wrong) == HS_OK);
-    const int64_t polls = counters.polls;
-    CHECK(polls > 1); /* more than there are groups */
-    for (int n = 0; n < polls; n++)
-        CHECK(find_ties(ORDERS, n, &counters, &wrong) == HS_ERR_INTERRUPTED && wrong == 0);
+    together *own = context;
+    for (int call = 0; call < 5; call++)
+        own->n_right += compare(own->cells, own->scene, NULL, 1 + call, INFINITY);
+    return NULL;
+}
+
+static void
+several_may_come_first(void)
+{
+    enum { ASKING = 4 };
+    static random_scene s;
+    harness_random      random = {8};
+    make_scene(&random, SCENE_TRICLINIC, 3, 60, 4.0, 0, &s);
+    const hs_points  points = points_of(&s.scene);
+    const hs_options options = options_of(&s.scene);
+    for (int round = 0; round < 20; round++) {
+        hs_cells *cells = NULL;
+        together  own[ASKING];
+        pthread_t threads[ASKING];
+        CHECK(hs_cells_build(&points, s.scene.box, &options, &cells, NULL) == HS_OK);
+        for (int t = 0; t < ASKING; t++) {
+            own[t] = (together){cells, &s.scene, 0};
+            CHECK(pthread_create(&threads[t], NULL, ask, &own[t]) == 0);
+        }
+        for (int t = 0; t < ASKING; t++) {
+            (void)pthread_join(threads[t], NULL);
+            CHECK(own[t].n_right == 5);
+        }
+        hs_cells_free(cells);
+    }
 }
 
 void
 test_api_nearest(void)
 {
-    RUN(ties_take_no_more_than_sorting);
-    RUN(one_row_can_be_stopped_anywhere);
-    RUN(rows_are_the_neighbours_in_order);
     RUN(whichever_allocation_fails_nothing_is_left);
-    RUN(it_can_be_stopped);
+    RUN(a_kept_tree_gives_the_same_rows);
+    RUN(several_may_come_first);
 }

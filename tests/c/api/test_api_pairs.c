@@ -1,11 +1,18 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_api_pairs.c: the set of pairs, and what is returned with them, against the brute force. */
+/* test_api_pairs.c: pairs, rows, clusters and plans are those of the brute force. */
+#include "../../../csrc/core/collect/components.h"
+#include "../../../csrc/core/levels/level_join.h"
+#include "../support/among.h"
+#include "../support/block_checks.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
-#include "../support/among.h"
+
+#include <math.h>
 
 void test_api_pairs(void);
+
+/* Api pairs: the set of pairs, and what is returned with them, against the brute force. */
 
 /* Compares by any kernel of this CPU, and names the scene if it differs. Returns the number of
  * pairs, -1 if not compared. */
@@ -31,46 +38,6 @@ compare_scene(const brute_scene *scene, double budget, int64_t stride)
     kernel_to_check = NULL;
     algorithm_to_check = HS_AUTO;
     return n;
-}
-
-static void
-big_integers_confirm_the_plain_numbers(void)
-{
-    harness_random      random = {77};
-    static random_scene s;
-    for (int trial = 0; trial < 60; trial++) {
-        brute_rows r;
-        int64_t    shift[HS_MAX_DIM] = {0};
-        make_scene(&random, trial % SCENE_KINDS, 1 + trial % 3, 6, 8.0, trial % 5 ? 0 : -530, &s);
-        if (!brute_prepare(&s.scene, &r))
-            continue;
-        for (int i = 0; i < 6; i++) {
-            for (int l = 0; l < r.m; l++)
-                shift[l] = random_below(&random, 5) - 2;
-            const double *p = s.x, *q = s.x + i * s.scene.ndim;
-            CHECK(brute_sign(&s.scene, &r, p, q, shift) ==
-                  brute_sign_exact(&s.scene, &r, p, q, shift));
-        }
-    }
-}
-
-static void
-every_kind_of_box_in_every_dimension(void)
-{
-    harness_random      random = {20240601};
-    static random_scene s;
-    int                 compared = 0;
-    int64_t             pairs = 0;
-    for (int trial = 0; trial < TRIALS(1440); trial++) {
-        const int kind = trial % SCENE_KINDS, ndim = 1 + trial / SCENE_KINDS % HS_MAX_DIM;
-        const int n = random_below(&random, ndim <= 3 ? 30 : ndim <= 5 ? 10 : 6);
-        make_scene(&random, kind, ndim, n, 4.0, 0, &s);
-        const int64_t found = compare_scene(&s.scene, 30000.0, 1);
-        compared += found >= 0;
-        pairs += found > 0 ? found : 0;
-    }
-    CHECK(compared > TRIALS(1000));
-    CHECK(pairs > TRIALS(20000));
 }
 
 static void
@@ -113,239 +80,388 @@ clusters_far_from_the_origin(void)
     CHECK(pairs > TRIALS(20000));
 }
 
-static void
-every_scale_has_the_same_answer(void)
-{
-    static const int    exponents[] = {-1060, -1000, -500, -60, -21, 21, 60, 500, 1000, 1018};
-    harness_random      random = {4242};
-    static random_scene s;
-    int                 compared = 0;
-    for (int trial = 0; trial < TRIALS(600); trial++) {
-        const int exponent = exponents[trial / 2 % 10];
-        make_scene(&random, random_below(&random, SCENE_KINDS), 1 + trial % 4, 7, 4.0, exponent,
-                   &s);
-        compared += compare_scene(&s.scene, 4000.0, 1) >= 0;
-    }
-    CHECK(compared > TRIALS(400));
-}
+/* Api neighbors: rows of all neighbours, of points and of queries. */
 
-/* One scene holds numbers of very different size: the cutoff, the points or the box. */
-static void
-scenes_of_several_scales(void)
-{
-    harness_random      random = {909};
-    static random_scene s;
-    int                 compared = 0;
-    for (int trial = 0; trial < TRIALS(600); trial++) {
-        make_scene(&random, random_below(&random, SCENE_KINDS), 1 + trial % 3, 7, 4.0, 0, &s);
-        const int exponent = random_below(&random, 2000) - 1000;
-        if (trial % 3 == 0) {
-            s.scene.cutoff = ldexp(s.scene.cutoff, -abs(exponent));
-        } else {
-            for (int k = 0; k < s.scene.ndim; k++)
-                s.x[(trial % 7) * s.scene.ndim + k] = ldexp(s.x[k], -abs(exponent));
-        }
-        if (trial % 2) {
-            const int scale = random_below(&random, 60) + 960;
-            for (int e = 0; e < 7 * s.scene.ndim; e++)
-                s.x[e] = ldexp(s.x[e], scale);
-            for (int e = 0; e < 8 * s.scene.ndim; e++)
-                s.box.rows[e / 8][e % 8] = ldexp(s.box.rows[e / 8][e % 8], scale);
-            s.scene.cutoff = ldexp(s.scene.cutoff, scale);
-        }
-        compared += compare_scene(&s.scene, 4000.0, 1) >= 0;
-    }
-    CHECK(compared > TRIALS(400));
-}
+/* So many that one walk finds them all, in memory of i, and two walks with a second thread. */
+enum { MANY = 24000, ASKING = 9000 };
 
-/* A distant coordinate leaves no exponents for the square of a tiny cutoff; images still count. */
-static void
-tiny_cutoffs_beside_distant_points(void)
+static hs_status
+find_many(int index_bytes, int threads, bool asks, double limit, hs_pairs **rows)
 {
-    static const double periods[] = {0x1p-560, 0x1p-600, 1e-200};
-    for (int trial = 0; trial < 6; trial++) {
-        const double period = periods[trial % 3], x[2] = {0.0, trial < 3 ? 1e300 : 0.5};
-        hs_box       box = {.ndim = 2, .periodic = {true}};
-        brute_scene  s = {.ndim = 2, .n = 1, .x = x, .box = &box, .inclusive = true};
-        box.rows[0][0] = period;
-        s.cutoff = 2.5 * period;
-        CHECK(compare_scene(&s, 1000.0, 1) == 2);
-    }
-}
-
-static void
-no_one_and_two_points(void)
-{
-    static const double cutoffs[] = {0.0, 0x1p-1074, 0.5, 1.0, 1.5, 3.25};
-    hs_box              box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
-    double              x[4] = {0.25, 0.5, 0.25, 0.5};
-    for (int trial = 0; trial < 72; trial++) {
-        brute_scene s = {.ndim = 2, .n = trial % 3, .x = x, .inclusive = trial / 3 % 2};
-        s.cutoff = cutoffs[trial / 6 % 6];
-        s.box = trial < 36 ? NULL : &box;
-        CHECK(compare_scene(&s, 1000.0, 1) >= 0);
-    }
-}
-
-static void
-coincident_points_are_pairs_at_cutoff_zero(void)
-{
-    static double x[3 * 100];
-    hs_box        box = {.ndim = 3, .periodic = {true, true, true}};
-    for (int k = 0; k < 3; k++)
-        box.rows[k][k] = 2.0;
-    for (int i = 0; i < 100; i++) { /* images of one another, too */
-        x[3 * i] = 0.1 + (i % 2 ? 2.0 : 0.0);
-        x[3 * i + 1] = i % 5;
-        x[3 * i + 2] = -7.0;
-    }
-    x[0] = 0.1 + 0x1p-50;
-    for (int trial = 0; trial < 4; trial++) {
-        brute_scene s = {.ndim = 3, .n = 100, .x = x, .inclusive = trial % 2};
-        s.box = trial < 2 ? NULL : &box;
-        const int64_t found = compare_scene(&s, 1e6, 1);
-        CHECK(s.inclusive ? found > 100 : found == 0);
-    }
-}
-
-/* More candidates than one block holds, and more points in a cell than one group holds. */
-static void
-crowded_cells_and_several_blocks(void)
-{
-    harness_random      random = {555};
-    static random_scene s;
-    static double       x[3 * 3000];
-    for (int trial = 0; trial < 5; trial++) {
-        make_scene(&random, trial < 3 ? SCENE_ALIGNED : SCENE_TRICLINIC, trial < 4 ? 2 : 3,
-                   trial < 4 ? 300 : 100, 4.0, 0, &s);
-        s.scene.cutoff = trial < 4 ? 6.0 : 4.5;
-        CHECK(compare_scene(&s.scene, 1e7, 97) > 10000);
-    }
-    for (int e = 0; e < 3 * 3000; e++) {
+    static double   x[3 * MANY];
+    harness_random  random = {88};
+    hs_box          box = {.ndim = 3, .periodic = {true, false, true}};
+    const hs_points points = {
+        .data = x, .n = MANY, .ndim = 3, .real = HS_FLOAT64, .row_stride = 24, .column_stride = 8};
+    hs_points  queries = points;
+    hs_options options = hs_options_default();
+    for (int e = 0; e < 3 * MANY; e++)
         x[e] = random_unit(&random);
-        x[e] *= random_below(&random, 20) ? 1.0 : 40.0;
-    }
-    for (int e = 3 * 2500; e < 3 * 3000; e++)
-        x[e] = 0.5 + 0x1p-40 * random_unit(&random); /* one cell full of them */
-    brute_scene open = {.ndim = 3, .n = 3000, .x = x, .cutoff = 0.06, .inclusive = true};
-    CHECK(compare_scene(&open, 1e7, 997) > 100000);
-    open.n = 4300;
-    open.cutoff = 200.0; /* everything: one cell, two blocks */
-    open.ndim = 1;
-    hs_options      options = options_of(&open);
-    const hs_points points = points_of(&open);
-    int64_t         count = 0;
-    CHECK(hs_pairs_count(AMONG(&points, NULL), &options, &count, NULL) == HS_OK);
-    CHECK(count == (int64_t)4300 * 4299 / 2);
+    for (int k = 0; k < 3; k++)
+        box.rows[k][k] = 1.0;
+    queries.n = ASKING;
+    options.cutoff = asks ? 0.12 : 0.09;
+    options.index_bytes = index_bytes;
+    options.threads = threads;
+    options.memory_limit = limit;
+    return hs_neighbors_find(QUERIED(&points, asks ? &queries : NULL, &box), &options, rows, NULL);
 }
 
-/* Each image of a single point is a run of its own: more of them than a block has room for. */
-static void
-cutoffs_much_larger_than_the_box(void)
-{
-    double x[3] = {0.3, -0.2, 0.9};
-    hs_box box = {.ndim = 3, .periodic = {true, true, false}, .rows = {{1.0}, {0.5, 1.0}}};
-    for (int trial = 0; trial < 6; trial++) {
-        brute_scene s = {.ndim = 3, .n = 1, .x = x, .box = &box, .inclusive = trial % 2};
-        box.rows[1][0] = trial < 4 ? 0.5 : 0.0;
-        s.cutoff = trial < 2 ? 30.0 : 5.0 * (trial + 1);
-        CHECK(compare_scene(&s, 1e5, 1) > 100);
-    }
-}
-
-/* Whole shells of a lattice lie on the cutoff; every pair of them must go the same way. */
-static void
-lattice_shells_at_the_cutoff(void)
-{
-    static const double steps[] = {1.0, 0.1, 1.0 / 3.0, 0x1.8p-30};
-    static double       x[3 * 125];
-    for (int trial = 0; trial < 32; trial++) {
-        const double step = steps[trial % 4];
-        hs_box       box = {.ndim = 3, .periodic = {true, true, trial % 8 < 4}};
-        for (int k = 0; k < 3; k++)
-            box.rows[k][k] = 5.0 * step;
-        box.rows[2][0] = trial % 16 < 8 ? 0.0 : step;
-        for (int i = 0; i < 125; i++) {
-            x[3 * i] = step * (i % 5);
-            x[3 * i + 1] = step * (i / 5 % 5);
-            x[3 * i + 2] = step * (i / 25);
-        }
-        brute_scene s = {.ndim = 3, .n = 125, .x = x, .box = &box, .inclusive = trial % 3 != 0};
-        s.cutoff = trial < 16 ? step : 2.0 * step;
-        CHECK(compare_scene(&s, 1e6, 7) >= 0);
-    }
-}
-
-/* precision="double" is one formula, in plain float64, on the points and shifts as given. */
 static bool
-formula_says_within(const brute_scene *scene, const brute_pair *pair)
+same_numbers(const hs_pairs *one, const hs_pairs *two, int index_bytes)
 {
-    volatile double sum = 0.0; /* volatile: every operation is rounded by itself */
-    for (int k = 0; k < scene->ndim; k++) {
-        volatile double along = scene->x[pair->j * scene->ndim + k];
-        volatile double moved = 0.0;
-        bool            first = true;
-        along = along - scene->x[pair->i * scene->ndim + k];
-        for (int l = 0; scene->box != NULL && l < scene->ndim; l++) {
-            if (scene->box->periodic[l]) {
-                volatile double product = (double)pair->shift[l] * scene->box->rows[l][k];
-                moved = first ? product : moved + product;
-                first = false;
-            }
-        }
-        if (!first)
-            along = along + moved;
-        const volatile double square = along * along;
-        sum = k == 0 ? square : sum + square;
-    }
-    const volatile double limit = scene->cutoff * scene->cutoff;
-    return scene->inclusive ? sum <= limit : sum < limit;
+    const size_t bytes = (size_t)hs_pairs_length(one) * (size_t)index_bytes;
+    return hs_pairs_length(one) == hs_pairs_length(two) &&
+           memcmp(hs_pairs_array(one, HS_WANT_I), hs_pairs_array(two, HS_WANT_I), bytes) == 0 &&
+           memcmp(hs_pairs_array(one, HS_WANT_J), hs_pairs_array(two, HS_WANT_J), bytes) == 0 &&
+           memcmp(hs_pairs_offsets(one), hs_pairs_offsets(two),
+                  (size_t)(hs_pairs_rows(one) + 1) * sizeof(int64_t)) == 0;
 }
 
 static void
-double_precision_is_the_plain_formula(void)
+one_walk_finds_what_two_find(void)
 {
-    harness_random      random = {8088};
-    static random_scene s;
-    int                 unlike_exact = 0;
-    for (int trial = 0; trial < 900; trial++) {
-        make_scene(&random, trial % SCENE_KINDS, 1 + trial % 4, 12, trial % 5 ? 4.0 : 3e4, 0, &s);
-        brute_scene wider = s.scene;
-        brute_list  candidates;
-        int64_t     formula = 0, exact = 0, count = -1;
-        if (s.scene.cutoff < 1e-100)
-            continue; /* the formula's squares would underflow; the search scales them */
-        wider.cutoff = wider.cutoff * (1.0 + 1e-8) + 1e-8;
-        if (!brute_find(&wider, 20000.0, &candidates))
-            continue;
-        for (int64_t e = 0; e < candidates.n; e++)
-            formula += formula_says_within(&s.scene, &candidates.pairs[e]);
-        brute_free(&candidates);
-        hs_options      options = options_of(&s.scene);
-        const hs_points points = points_of(&s.scene);
-        CHECK(hs_pairs_count(AMONG(&points, s.scene.box), &options, &exact, NULL) == HS_OK);
-        options.precision = HS_DOUBLE;
-        CHECK(hs_pairs_count(AMONG(&points, s.scene.box), &options, &count, NULL) == HS_OK);
-        CHECK(count == formula);
-        unlike_exact += count != exact;
+    for (int form = 0; form < 4; form++) {
+        const int  index_bytes = form % 2 ? 4 : 8;
+        const bool asks = form / 2;
+        hs_pairs  *one = NULL, *two = NULL;
+        CHECK(find_many(index_bytes, 1, asks, INFINITY, &one) == HS_OK);
+        CHECK(find_many(index_bytes, 2, asks, INFINITY, &two) == HS_OK);
+        CHECK(hs_pairs_length(one) > 1 << 20);
+        CHECK(same_numbers(one, two, index_bytes));
+        hs_pairs_free(one);
+        hs_pairs_free(two);
     }
-    CHECK(unlike_exact > 5);
+}
+
+static void
+one_walk_gives_way_where_memory_is_short(void)
+{
+    hs_pairs *all = NULL;
+    int       n_found = 0, n_refused = 0;
+    CHECK(find_many(8, 1, true, INFINITY, &all) == HS_OK);
+    const double bytes = 16.0 * (double)hs_pairs_length(all);
+    for (double beyond = 16.0; beyond > -1.0; beyond -= 1.0) { /* hundredths of the result */
+        hs_pairs       *rows = NULL;
+        const hs_status status = find_many(8, 1, true, bytes * (1.0 + 0.01 * beyond), &rows);
+        CHECK(status == HS_OK || status == HS_ERR_MEMORY);
+        CHECK((status == HS_OK) == (rows != NULL));
+        CHECK(rows == NULL || same_numbers(all, rows, 8));
+        n_found += status == HS_OK;
+        n_refused += status != HS_OK;
+        hs_pairs_free(rows);
+    }
+    CHECK(n_found > 0 && n_refused > 0);
+    hs_pairs_free(all);
+}
+
+static void
+a_capacity_that_is_too_small_is_named(void)
+{
+    double         x[4] = {0.0, 0.25, 0.5, 0.75};
+    int64_t        j[12] = {0};
+    hs_pair_arrays arrays = {.capacity = 11, .index_bytes = 8, .j = j};
+    brute_scene    scene = {.ndim = 1, .n = 4, .x = x, .inclusive = true, .cutoff = 1.0};
+    hs_points      points = points_of(&scene);
+    hs_options     options = options_of(&scene);
+    hs_failure     failure;
+    hs_pairs      *rows = NULL;
+    options.want = HS_WANT_J;
+    options.out = &arrays;
+    CHECK(hs_neighbors_find(AMONG(&points, NULL), &options, &rows, &failure) == HS_ERR_CAPACITY);
+    CHECK(failure.expected_pairs == 12.0 && rows == NULL);
+    arrays.capacity = 12;
+    CHECK(hs_neighbors_find(AMONG(&points, NULL), &options, &rows, &failure) == HS_OK);
+    CHECK(hs_pairs_length(rows) == 12 && j[0] == 1 && j[3] == 0 && j[11] == 2);
+    hs_pairs_free(rows);
+}
+
+/* Api clusters: clusters are what the pairs of hs_pairs_find say, core points or not, for any
+ * number of threads. */
+
+enum { MOST = SCENE_POINTS };
+
+typedef struct found_clusters {
+    int64_t labels[MOST], n;
+    uint8_t winding[MOST];
+} found_clusters;
+
+/* From a whole list of pairs. */
+static void
+from_pairs(const hs_pairs *pairs, const brute_scene *scene, const uint8_t *core, found_clusters *f)
+{
+    const int64_t *i = hs_pairs_array(pairs, HS_WANT_I), *j = hs_pairs_array(pairs, HS_WANT_J);
+    const int32_t *S = hs_pairs_array(pairs, HS_WANT_SHIFT);
+    hs_components  c;
+    CHECK(hs_components_open(NULL, scene->n, scene->ndim, &c) == HS_OK);
+    for (int64_t e = 0; e < hs_pairs_length(pairs); e++) {
+        if (core == NULL || (core[i[e]] && core[j[e]])) {
+            hs_components_join(&c, (int32_t)i[e], (int32_t)j[e], S + e * scene->ndim);
+        }
+    }
+    f->n = hs_components_label(&c, core, f->labels, f->winding);
+    hs_components_close(NULL, &c);
+    for (int64_t e = 0; core != NULL && e < hs_pairs_length(pairs); e++) {
+        const int64_t in = core[i[e]] ? i[e] : j[e], out = core[i[e]] ? j[e] : i[e];
+        if (core[in] && !core[out] && (f->labels[out] < 0 || f->labels[in] < f->labels[out])) {
+            f->labels[out] = f->labels[in];
+        }
+    }
+}
+
+static void
+compare(const brute_scene *scene, const uint8_t *core, int threads)
+{
+    static found_clusters wanted, got;
+    const hs_points       points = points_of(scene);
+    hs_options            options = options_of(scene);
+    hs_pairs             *pairs = NULL;
+    hs_counters           counters;
+    options.want = WANT_ALL;
+    options.threads = threads;
+    CHECK(hs_pairs_find(AMONG(&points, scene->box), &options, &pairs, NULL) == HS_OK);
+    from_pairs(pairs, scene, core, &wanted);
+    options.want = ~0u; /* ignored, as the next two */
+    options.index_bytes = 3;
+    options.sorted = true;
+    options.counters = &counters;
+    CHECK(hs_clusters_find(AMONG(&points, scene->box), &options, core, got.labels, got.winding,
+                           &got.n, NULL) == HS_OK);
+    CHECK(got.n == wanted.n && counters.pairs == hs_pairs_length(pairs));
+    CHECK(memcmp(got.labels, wanted.labels, (size_t)scene->n * 8) == 0);
+    CHECK(memcmp(got.winding, wanted.winding, (size_t)got.n) == 0);
+    CHECK(hs_clusters_find(AMONG(&points, scene->box), &options, core, got.labels, NULL, &got.n,
+                           NULL) == HS_OK);
+    CHECK(got.n == wanted.n && memcmp(got.labels, wanted.labels, (size_t)scene->n * 8) == 0);
+    hs_pairs_free(pairs);
+}
+
+static void
+clusters_are_those_of_the_pairs(void)
+{
+    harness_random      random = {20261125};
+    static random_scene s;
+    for (int trial = 0; trial < 240; trial++) {
+        const int ndim = 1 + trial / SCENE_KINDS % 4;
+        const int n = random_below(&random, ndim <= 3 ? 50 : 10);
+        uint8_t   core[64];
+        make_scene(&random, trial % SCENE_KINDS, ndim, n, 4.0, 0, &s);
+        for (int p = 0; p < n; p++) {
+            core[p] = (uint8_t)(random_below(&random, 3) * 100);
+        }
+        compare(&s.scene, trial % 2 ? core : NULL, 1 + trial % 3);
+    }
+}
+
+/* Api plan: a plan tells what a search of a scene would do. */
+
+/* Lengths are the caller's, whatever the search scales by; occupied cells and threads are told. */
+static void
+plans_are_in_the_callers_unit(void)
+{
+    enum { N = 8000 };
+    static double   x[2 * N];
+    harness_random  random = {21};
+    hs_options      options = hs_options_default();
+    hs_plan         plan;
+    const hs_points points = {x, N, 2, HS_FLOAT64, 16, 8};
+    for (int e = 0; e < 2 * N; e++)
+        x[e] = 0x1p40 * random_unit(&random);
+    options.cutoff = 0x1p36;
+    options.threads = 1;
+    CHECK(hs_plan_make(AMONG(&points, NULL), &options, &plan, NULL) == HS_OK);
+    CHECK(!plan.sparse && plan.threads == 1 && plan.ndim == 2 && plan.expected_pairs > 1000.0);
+    CHECK(plan.cell_size[1] * (double)plan.shape[1] > 0.95 * 0x1p40);
+    CHECK(plan.cell_size[1] * (double)plan.shape[1] < 1.05 * 0x1p40);
+    for (int i = 0; i < N; i++) {
+        x[2 * i] = random_unit(&random) + (i % 2 ? 1e6 : 0.0);
+        x[2 * i + 1] = random_unit(&random);
+    }
+    options.cutoff = 0.01;
+    CHECK(hs_plan_make(AMONG(&points, NULL), &options, &plan, NULL) == HS_OK && plan.sparse);
+}
+
+/* Several searches, or none: of points without a pair there is nothing to say but what they are. */
+static void
+plans_know_a_reach(void)
+{
+    static double   x[1000], radii[1000];
+    const double    none[1] = {-1.0}, x_none[1] = {0.0};
+    const int32_t   type[1000] = {0};
+    harness_random  random = {23};
+    hs_options      options = hs_options_default();
+    hs_plan         plan;
+    int64_t         count = 0;
+    const hs_points points = {x, 1000, 1, HS_FLOAT64, 8, 8}, empty = {x_none, 0, 1, 1, 8, 8};
+    hs_reach        reach = {.rule = HS_RULE_MAX, .radii = radii};
+    for (int i = 0; i < 1000; i++) {
+        x[i] = 1000.0 * random_unit(&random);
+        radii[i] = i % 20 == 0 ? 1.5 : ldexp(1.5, -4 * (1 + i % 2));
+    }
+    hs_among among = {.points = &points, .reach = &reach};
+    options.cutoff = INFINITY;
+    CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK);
+    CHECK(hs_pairs_count(&among, &options, &count, NULL) == HS_OK);
+    CHECK(plan.algorithm == HS_HIERARCHY && plan.n_searches == 5);
+    CHECK(fabs(plan.expected_pairs / (double)count - 1.0) < 1e-9); /* all are counted */
+    CHECK(plan.all_pairs || plan.cell_size[0] * (double)plan.reach[0] >= 1.5);
+    options.algorithm = HS_GRID;
+    CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK);
+    CHECK(plan.algorithm == HS_GRID && plan.n_searches == 1);
+    CHECK(plan.expected_pairs == (double)count);
+    reach = (hs_reach){.n_types = 1, .types = type, .cutoffs = none};
+    options.cutoff = 1.0;
+    CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK);
+    CHECK(plan.n_searches == 0 && plan.expected_pairs == 0.0 && plan.ndim == 1);
+    among.points = &empty;
+    CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches == 0);
+}
+
+/* What a plan has of the cells where nothing is searched is that of a cutoff of 0, whatever the bound
+ * is, even none. */
+static void
+plans_of_nothing_have_the_cells_of_no_cutoff(void)
+{
+    static double   x[1000];
+    const double    none[1] = {-1.0};
+    const int32_t   type[1000] = {0};
+    hs_options      options = hs_options_default();
+    hs_plan         plan, of_none, of_bound;
+    const hs_points points = {x, 1000, 1, HS_FLOAT64, 8, 8}, empty = {x, 0, 1, HS_FLOAT64, 8, 8};
+    const hs_reach  by_type = {.n_types = 1, .types = type, .cutoffs = none};
+    const hs_reach  by_radii = {.rule = HS_RULE_SUM};
+    for (int i = 0; i < 1000; i++)
+        x[i] = 0.125 * i;
+    CHECK(hs_plan_make(AMONG(&points, NULL), &options, &of_none, NULL) == HS_OK);
+    options.cutoff = 30.0;
+    CHECK(hs_plan_make(AMONG(&points, NULL), &options, &of_bound, NULL) == HS_OK);
+    hs_among among = {.points = &points, .reach = &by_type};
+    CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches == 0);
+    CHECK(plan.n_cells == of_none.n_cells && plan.cell_size[0] == of_none.cell_size[0]);
+    CHECK(plan.n_cells != of_bound.n_cells);
+    options.cutoff = INFINITY;
+    among = (hs_among){.points = &empty, .reach = &by_radii};
+    CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK);
+    CHECK(plan.n_searches == 0 && plan.expected_pairs == 0.0);
+}
+
+/* Where levels of radii are so alike that one search with limits takes less time than several. */
+static void
+plans_join_levels_unless_told_otherwise(void)
+{
+    static double   x[300], radii[300];
+    harness_random  random = {24};
+    hs_options      options = hs_options_default();
+    hs_plan         plan;
+    const hs_points points = {x, 100, 3, HS_FLOAT64, 24, 8};
+    const hs_reach  reach = {.rule = HS_RULE_SUM, .radii = radii};
+    const hs_among  among = {.points = &points, .reach = &reach};
+    for (int e = 0; e < 300; e++) {
+        x[e] = 4.0 * random_unit(&random);
+        radii[e] = e % 2 ? 0.5 : 0.2;
+    }
+    options.cutoff = INFINITY;
+    const bool joins = hs_test_join_levels(true);
+    CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches == 1);
+    const double expected = plan.expected_pairs;
+    options.algorithm = HS_HIERARCHY;
+    CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches > 1);
+    CHECK(plan.expected_pairs == expected);
+    (void)hs_test_join_levels(joins);
+}
+
+/* Precision: precision "single" and "double" on numbers that they hold exactly, where their
+ * answers are those of the real numbers. */
+
+/* All pairs, with S, against the brute force. */
+static bool
+is_like_brute_force(const brute_scene *scene, hs_precision precision, const char *kernel)
+{
+    const hs_points points = points_of(scene);
+    hs_options      options = options_of(scene);
+    found_pairs     found;
+    brute_list      expected;
+    int64_t         count = -1;
+    CHECK(brute_find(scene, 1e7, &expected));
+    options.want = HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT;
+    options.sorted = true;
+    options.precision = precision;
+    options.kernel = kernel;
+    bool right = search_pairs(&points, scene->box, &options, &found, NULL) == HS_OK &&
+                 found.n == expected.n;
+    for (int64_t e = 0; right && e < found.n; e++)
+        right = pair_matches(scene, &expected.pairs[e], &found, e);
+    right = right && hs_pairs_count(AMONG(&points, scene->box), &options, &count, NULL) == HS_OK &&
+            count == expected.n;
+    found_free(&found);
+    brute_free(&expected);
+    return right;
+}
+
+/* Differences whose squares are subnormal float32, again and again: flushed to zero they would be
+ * beyond no cutoff, and here each of them decides. */
+static void
+single_does_not_flush(void)
+{
+    enum { CLUSTERS = 60, EACH = 12, N = CLUSTERS * EACH };
+    static double  x[2 * N];
+    harness_random random = {3};
+    for (int fine = 0; fine < 2; fine++) {
+        brute_scene scene = {.ndim = 2, .n = N, .x = x, .inclusive = true};
+        scene.cutoff = 1.0;
+        for (int i = 0; i < N; i++) {
+            for (int k = 0; k < 2; k++)
+                x[2 * i + k] = 0x1p-66 * random_below(&random, 8);
+            x[2 * i] += fine ? 0.0 : 16.0 * (i / EACH);
+        }
+        CHECK(is_like_brute_force(&scene, HS_SINGLE, NULL));
+        CHECK(is_like_brute_force(&scene, HS_EXACT, NULL));
+    }
+}
+
+/* Points so far away that float64 cannot tell one image from the next: the farthest is named. */
+static void
+double_names_the_farthest(void)
+{
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0, 0.0}, {0.0, 1.0}}};
+    double       x[8] = {0.5, 0.5, 0.25, 0x1p60, 0x1p60, 0.0, 0.0, 0.0};
+    double       q[4] = {0.0, 0.0, -0x1p61, 0.0};
+    hs_points    points = {x, 4, 2, HS_FLOAT64, 16, 8}, queries = {q, 2, 2, HS_FLOAT64, 16, 8};
+    hs_options   options = hs_options_default();
+    hs_failure   failure;
+    int64_t      count = -1;
+    options.cutoff = 0.25;
+    options.precision = HS_DOUBLE;
+    CHECK(hs_pairs_count(AMONG(&points, &box), &options, &count, &failure) == HS_ERR_ROUNDING);
+    CHECK(failure.row == 1 && !failure.in_queries && count == -1);
+    CHECK(hs_pairs_count(QUERIED(&points, &queries, &box), &options, &count, &failure) ==
+          HS_ERR_ROUNDING);
+    CHECK(failure.row == 1 && failure.in_queries);
+    q[2] = 1.0;
+    CHECK(hs_pairs_count(QUERIED(&points, &queries, &box), &options, &count, &failure) ==
+          HS_ERR_ROUNDING);
+    CHECK(failure.row == 1 && !failure.in_queries);
+    x[0] = 0x1p60; /* as far as the next two: the first is named */
+    CHECK(hs_pairs_count(AMONG(&points, &box), &options, &count, &failure) == HS_ERR_ROUNDING);
+    CHECK(failure.row == 0);
+    x[0] = 0.5;
+    options.precision = HS_EXACT;
+    CHECK(hs_pairs_count(AMONG(&points, &box), &options, &count, &failure) == HS_OK && count == 3);
 }
 
 void
 test_api_pairs(void)
 {
-    RUN(big_integers_confirm_the_plain_numbers);
-    RUN(every_kind_of_box_in_every_dimension);
     RUN(points_far_outside_the_box);
     RUN(clusters_far_from_the_origin);
-    RUN(every_scale_has_the_same_answer);
-    RUN(scenes_of_several_scales);
-    RUN(tiny_cutoffs_beside_distant_points);
-    RUN(no_one_and_two_points);
-    RUN(coincident_points_are_pairs_at_cutoff_zero);
-    RUN(crowded_cells_and_several_blocks);
-    RUN(cutoffs_much_larger_than_the_box);
-    RUN(lattice_shells_at_the_cutoff);
-    RUN(double_precision_is_the_plain_formula);
+    RUN(one_walk_finds_what_two_find);
+    RUN(one_walk_gives_way_where_memory_is_short);
+    RUN(a_capacity_that_is_too_small_is_named);
+    RUN(clusters_are_those_of_the_pairs);
+    RUN(plans_are_in_the_callers_unit);
+    RUN(plans_know_a_reach);
+    RUN(plans_of_nothing_have_the_cells_of_no_cutoff);
+    RUN(plans_join_levels_unless_told_otherwise);
+    RUN(single_does_not_flush);
+    RUN(double_names_the_farthest);
 }

@@ -1,14 +1,17 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_api_systems.c: many systems in one call against one call for each. */
-#include "../support/harness.h"
-#include "../support/among.h"
-
+/* test_api_systems.c: many systems in one call have the pairs that each has alone. */
+#include "../../../csrc/core/api/system_part.h"
 #include "../../../csrc/core/memory/account.h"
 #include "../../../csrc/halfshell.h"
+#include "../support/among.h"
+#include "../support/harness.h"
+#include "../support/poll_checks.h"
 
 #include <math.h>
 
 void test_api_systems(void);
+
+/* Api systems: many systems in one call against one call for each. */
 
 enum { N_SYSTEMS = 40, MOST_POINTS = 90 };
 
@@ -121,123 +124,6 @@ the_same_as_single_calls(void)
     }
 }
 
-static void
-failures_name_system_and_point(void)
-{
-    static batch made;
-    hs_options   options = hs_options_default();
-    hs_failure   failure;
-    int64_t      counts[N_SYSTEMS];
-    make_batch(5, &made);
-    const hs_points  points = points_of(&made, 0, made.first[N_SYSTEMS]);
-    const hs_systems systems = {N_SYSTEMS, made.first, &made.box, made.rows, made.cutoffs,
-                                NULL,      NULL,       NULL,      NULL};
-    const double     saved = made.rows[9 * 17 + 4];
-    made.rows[9 * 17 + 4] = INFINITY;
-    CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_ERR_BOX_FINITE);
-    CHECK(failure.system == 17 && failure.row == 1 && failure.column == 1);
-    made.rows[9 * 17 + 4] = saved;
-    const int64_t row = made.first[20] + 1;
-    made.x[3 * row + 2] = NAN;
-    CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_ERR_NOT_FINITE);
-    CHECK(failure.row == row && failure.column == 2);
-}
-
-/* Also where each system has one point, which no search would miss. */
-static void
-single_points_are_read(void)
-{
-    enum { SYSTEMS = 5 };
-    double           x[SYSTEMS] = {0.0, 1.0, 2.0, 3.0, 4.0};
-    const int64_t    first[SYSTEMS + 1] = {0, 1, 2, 3, 4, 5};
-    const hs_points  points = {x, SYSTEMS, 1, HS_FLOAT64, 8, 8};
-    const hs_systems systems = {.n = SYSTEMS, .first = first};
-    const hs_options options = hs_options_default();
-    hs_failure       failure;
-    int64_t          counts[SYSTEMS];
-    CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_OK);
-    x[3] = NAN;
-    CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_ERR_NOT_FINITE);
-    CHECK(failure.row == 3 && failure.system == 3);
-}
-
-static bool
-count_poll(void *context, double fraction)
-{
-    int64_t *calls = context;
-    CHECK(fraction >= 0.0 && fraction <= 1.0);
-    ++*calls;
-    return true;
-}
-
-/* Also those that a thread makes while it waits for its turn, and no others. */
-static void
-polls_are_counted(void)
-{
-    enum { N = 6, POINTS = 1500 };
-    static double  x[N * POINTS];
-    harness_random random = {11};
-    int64_t        first[N + 1], most = 0;
-    for (int e = 0; e < N * POINTS; e++)
-        x[e] = random_unit(&random);
-    for (int s = 0; s <= N; s++)
-        first[s] = s * POINTS;
-    const hs_points  points = {x, N * POINTS, 1, HS_FLOAT64, sizeof(double), sizeof(double)};
-    const hs_systems systems = {N, first, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
-    for (int threads = 1; threads <= 4; threads++) {
-        for (int trial = 0; trial < 4; trial++) {
-            hs_counters counters;
-            int64_t     calls = 0, counts[N];
-            hs_options  options = hs_options_default();
-            hs_pairs   *pairs = NULL;
-            options.cutoff = 2.0;
-            options.threads = threads;
-            options.poll = count_poll;
-            options.poll_context = &calls;
-            options.counters = &counters;
-            if (trial % 2) {
-                CHECK(hs_systems_find(&points, &systems, &options, &pairs, NULL) == HS_OK);
-            } else {
-                CHECK(hs_systems_count(&points, &systems, &options, counts, NULL) == HS_OK);
-            }
-            CHECK(counters.polls == calls);
-            CHECK(counters.pairs == (int64_t)N * POINTS * (POINTS - 1) / 2);
-            most = calls > most ? calls : most;
-            hs_pairs_free(pairs);
-        }
-    }
-    CHECK(most > 0);
-}
-
-/* The message of a refusal names what was expected, also before anything was read. */
-static void
-a_shortage_is_told_in_pairs_and_bytes(void)
-{
-    static batch made;
-    hs_failure   failure;
-    make_batch(3, &made);
-    const hs_points  points = points_of(&made, 0, made.first[N_SYSTEMS]);
-    const hs_systems systems = {N_SYSTEMS, made.first, &made.box, made.rows, made.cutoffs,
-                                NULL,      NULL,       NULL,      NULL};
-    for (int kind = 0; kind < 4; kind++) {
-        hs_options options = hs_options_default();
-        hs_pairs  *pairs = NULL;
-        int64_t    counts[N_SYSTEMS];
-        options.memory_limit = 100.0;
-        options.cutoff = 1.0;
-        options.threads = 1 + kind / 2;
-        const hs_status status =
-            kind % 2 ? hs_systems_find(&points, &systems, &options, &pairs, &failure)
-                     : hs_systems_count(&points, &systems, &options, counts, &failure);
-        CHECK(status == HS_ERR_MEMORY && pairs == NULL);
-        CHECK(failure.expected_pairs > 100.0 && failure.expected_pairs < 1e6);
-        CHECK(failure.expected_bytes == (kind % 2 ? 16.0 : 0.0) * failure.expected_pairs);
-        CHECK(failure.search_bytes > 100.0 && failure.limit_bytes <= 100.0);
-        CHECK(hs_pairs_find(AMONG(&points, NULL), &options, &pairs, &failure) == HS_ERR_MEMORY);
-        CHECK(failure.expected_bytes > 0.0 && failure.limit_bytes == 100.0);
-    }
-}
-
 /* Every allocation fails once: an error, or what there would be otherwise; nothing is left
  * behind. */
 static void
@@ -272,49 +158,6 @@ nothing_is_lost_when_memory_is_short(void)
     }
     hs_pool_clear();
     CHECK(hs_test_live_blocks() == before);
-}
-
-/* What all systems share is checked before any is read. */
-static void
-bad_arguments_are_refused(void)
-{
-    static batch made;
-    hs_options   options = hs_options_default();
-    hs_failure   failure;
-    hs_pairs    *pairs = NULL;
-    int64_t      counts[N_SYSTEMS];
-    make_batch(4, &made);
-    hs_points           points = points_of(&made, 0, made.first[N_SYSTEMS]);
-    hs_systems          systems = {N_SYSTEMS, made.first, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
-    static const double bad[] = {NAN, INFINITY, -1.0};
-    for (int b = 0; b < 3; b++) {
-        options.cutoff = bad[b];
-        CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_ERR_CUTOFF);
-        CHECK(memcmp(&failure.value, &bad[b], sizeof failure.value) == 0);
-    }
-    options.cutoff = 1.0;
-    options.kernel = "none of that name";
-    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_KERNEL);
-    options.kernel = NULL;
-    points.n = INT64_C(1) << 31;
-    points.row_stride = 0; /* one point so many times takes no memory */
-    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_TOO_MANY);
-    CHECK(failure.value == 0x1p31 && pairs == NULL);
-    points = points_of(&made, 0, made.first[N_SYSTEMS]);
-    options.memory_limit = 100.0; /* of one cutoff for all */
-    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_MEMORY);
-    CHECK(failure.expected_pairs > 0.0 && pairs == NULL);
-    options.memory_limit = INFINITY;
-    options.want = 1u << 20;
-    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
-    options.want = HS_WANT_I;
-    points.n = 5;
-    systems.n = -1;
-    CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_ERR_ARGUMENT);
-    systems.n = 0;
-    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_OK);
-    CHECK(hs_pairs_length(pairs) == 0);
-    hs_pairs_free(pairs);
 }
 
 static double
@@ -369,19 +212,6 @@ results_go_to_the_callers_arrays(void)
         }
     }
     CHECK(n_asked > 0 && points.n > 0);
-}
-
-/* Many systems without points before those that have some. */
-static void
-empty_systems_cost_nothing(void)
-{
-    static batch made;
-    make_batch(8, &made);
-    for (int s = 1; s <= 25; s++) {
-        made.first[s] = 0;
-    }
-    CHECK(compare(&made, hs_options_default(), true, 1) > 100);
-    CHECK(compare(&made, hs_options_default(), false, 3) > 100);
 }
 
 /* Points too far away for the shifts or the precision of one system are named among all. */
@@ -455,51 +285,948 @@ progress_goes_on_over_all_systems(void)
     }
 }
 
-/* A crowd far from a few others takes cells that are stored sparsely, the next system does not. */
+/* Systems reach: many systems whose pairs have a reach of their own, against one call for each. */
+
+enum { N_SYSTEMS_REACH = 30, MOST_POINTS_REACH = 60, N_TYPES = 3 };
+
+typedef struct batch_reach {
+    int64_t first[N_SYSTEMS_REACH + 1];
+    double  x[N_SYSTEMS_REACH * MOST_POINTS_REACH * 3];
+    double  rows[N_SYSTEMS_REACH * 9];
+    double  cutoffs[N_SYSTEMS_REACH];
+    double  radii[N_SYSTEMS_REACH * MOST_POINTS_REACH];
+    int32_t types[N_SYSTEMS_REACH * MOST_POINTS_REACH];
+    double  supports[N_SYSTEMS_REACH * MOST_POINTS_REACH * 9];
+    double  table[N_TYPES * N_TYPES];
+    hs_box  box;
+} batch_reach;
+
+/* decades: over how many the radii of a system spread. */
 static void
-cells_of_one_system_are_not_those_of_the_next(void)
+make_batch_reach(uint64_t seed, double decades, batch_reach *made_reach)
 {
-    enum { CROWD = 1200, FEW = 300 };
-    static double    x[(CROWD + FEW) * 3];
-    const int64_t    first[] = {0, CROWD, CROWD + FEW};
-    const hs_points  points = {x, CROWD + FEW, 3, HS_FLOAT64, 24, 8};
-    const hs_systems systems = {2, first, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
-    harness_random   random = {23};
-    hs_options       options = hs_options_default();
-    hs_pairs        *pairs, *alone;
-    for (int e = 0; e < 3 * (CROWD + FEW); e++)
-        x[e] = random_unit(&random) * (e < 3 * CROWD ? 4.0 : 8.0) + (e < 30 ? 1e5 : 0.0);
-    options.cutoff = 1.0;
-    options.cell_size = 1.0;
-    CHECK(hs_systems_find(&points, &systems, &options, &pairs, NULL) == HS_OK);
-    const int64_t *i = hs_pairs_array(pairs, HS_WANT_I), *j = hs_pairs_array(pairs, HS_WANT_J);
-    int64_t        at = 0, wrong = 0;
-    for (int s = 0; s < 2; s++) {
-        const hs_points own = {x + 3 * first[s], first[s + 1] - first[s], 3, HS_FLOAT64, 24, 8};
-        CHECK(hs_pairs_find(AMONG(&own, NULL), &options, &alone, NULL) == HS_OK);
-        const int64_t *own_i = hs_pairs_array(alone, HS_WANT_I);
-        const int64_t *own_j = hs_pairs_array(alone, HS_WANT_J);
-        for (int64_t e = 0; e < hs_pairs_length(alone) && at < hs_pairs_length(pairs); e++, at++)
-            wrong += i[at] != own_i[e] + first[s] || j[at] != own_j[e] + first[s];
-        hs_pairs_free(alone);
+    harness_random random = {seed};
+    memset(made_reach, 0, sizeof *made_reach);
+    made_reach->box.ndim = 3;
+    for (int s = 0; s < N_SYSTEMS_REACH; s++) {
+        const int n = s % 7 == 3 ? 0 : 1 + (int)(random_unit(&random) * (MOST_POINTS_REACH - 1));
+        made_reach->first[s + 1] = made_reach->first[s] + n;
+        made_reach->cutoffs[s] = 0.3 + 1.2 * random_unit(&random);
+        for (int k = 0; k < 9; k++)
+            made_reach->rows[9 * s + k] = (k % 4 == 0 ? 3.0 : 0.0) + random_unit(&random);
     }
-    CHECK(wrong == 0 && at == hs_pairs_length(pairs));
+    for (int64_t e = 0; e < 3 * made_reach->first[N_SYSTEMS_REACH]; e++)
+        made_reach->x[e] = 4.0 * random_unit(&random);
+    for (int64_t i = 0; i < made_reach->first[N_SYSTEMS_REACH]; i++) {
+        made_reach->radii[i] = 0.8 * pow(10.0, -decades * random_unit(&random));
+        made_reach->types[i] = (int32_t)(N_TYPES * random_unit(&random));
+        for (int e = 0; e < 9; e++) /* reaches 2 at most */
+            made_reach->supports[9 * i + e] = e % 4 == 0 ? 1.0 / made_reach->radii[i] : 0.25;
+    }
+    for (int a = 0; a < N_TYPES; a++) {
+        for (int b = 0; b <= a; b++) {
+            const double cutoff = a + b == 0 ? -1.0 : decades > 1.0 ? 0.2 * (a + b) : 1.0;
+            made_reach->table[a * N_TYPES + b] = made_reach->table[b * N_TYPES + a] = cutoff;
+        }
+    }
+    for (int k = 0; k < 3; k++)
+        made_reach->box.periodic[k] = true;
+}
+
+static hs_points
+points_of_reach(const batch_reach *made_reach, int64_t first, int64_t end)
+{
+    return (hs_points){made_reach->x + 3 * first, end - first,   3, HS_FLOAT64,
+                       3 * sizeof(double),        sizeof(double)};
+}
+
+typedef enum marks { RADII, TYPES, SUPPORTS } marks;
+
+static hs_reach
+reach_of(const batch_reach *made_reach, hs_rule rule, marks by, int64_t first)
+{
+    if (by == TYPES) {
+        return (hs_reach){
+            .n_types = N_TYPES, .types = made_reach->types + first, .cutoffs = made_reach->table};
+    }
+    if (by == SUPPORTS) {
+        return (hs_reach){.rule = rule,
+                          .has_supports = true,
+                          .extent = 0.9,
+                          .supports = made_reach->supports + 9 * first};
+    }
+    return (hs_reach){.rule = rule, .radii = made_reach->radii + first};
+}
+
+/* Compares with single calls; returns the number of pairs, -1 when something differs. */
+static int64_t
+compare_reach(const batch_reach *made_reach, const hs_reach *reach, bool has_box, bool has_cutoffs,
+              hs_options options, int threads)
+{
+    const hs_points  points = points_of_reach(made_reach, 0, made_reach->first[N_SYSTEMS_REACH]);
+    const hs_systems systems = {.n = N_SYSTEMS_REACH,
+                                .first = made_reach->first,
+                                .box = has_box ? &made_reach->box : NULL,
+                                .rows = has_box ? made_reach->rows : NULL,
+                                .cutoffs = has_cutoffs ? made_reach->cutoffs : NULL,
+                                .reach = reach};
+    hs_pairs        *pairs = NULL;
+    int64_t          counts[N_SYSTEMS_REACH], at = 0;
+    bool             same = true;
+    options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_SHIFT;
+    options.threads = threads;
+    if (hs_systems_find(&points, &systems, &options, &pairs, NULL) != HS_OK ||
+        hs_systems_count(&points, &systems, &options, counts, NULL) != HS_OK) {
+        hs_pairs_free(pairs);
+        return -1;
+    }
+    const int64_t *i = hs_pairs_array(pairs, HS_WANT_I), *j = hs_pairs_array(pairs, HS_WANT_J);
+    const double  *d = hs_pairs_array(pairs, HS_WANT_DISTANCE);
+    const int32_t *shift = hs_pairs_array(pairs, HS_WANT_SHIFT);
+    options.threads = 1;
+    for (int s = 0; s < N_SYSTEMS_REACH; s++) {
+        const int64_t   first = made_reach->first[s];
+        const hs_points own = points_of_reach(made_reach, first, made_reach->first[s + 1]);
+        const marks     by = reach->has_supports ? SUPPORTS : reach->n_types > 0 ? TYPES : RADII;
+        const hs_reach  of_own = reach_of(made_reach, reach->rule, by, first);
+        hs_box          box = made_reach->box;
+        hs_pairs       *expected = NULL;
+        for (int k = 0; k < 9; k++)
+            box.rows[k / 3][k % 3] = made_reach->rows[9 * s + k];
+        options.cutoff = has_cutoffs ? made_reach->cutoffs[s] : options.cutoff;
+        const hs_among among = {.points = &own, .box = has_box ? &box : NULL, .reach = &of_own};
+        same = same && hs_pairs_find(&among, &options, &expected, NULL) == HS_OK;
+        const int64_t  n = hs_pairs_length(expected);
+        const int64_t *a = hs_pairs_array(expected, HS_WANT_I);
+        const int64_t *b = hs_pairs_array(expected, HS_WANT_J);
+        const double  *c = hs_pairs_array(expected, HS_WANT_DISTANCE);
+        const int32_t *t = hs_pairs_array(expected, HS_WANT_SHIFT);
+        same = same && counts[s] == n && at + n <= hs_pairs_length(pairs);
+        for (int64_t p = 0; p < n && same; p++, at++) {
+            same = i[at] == a[p] + first && j[at] == b[p] + first && d[at] == c[p] &&
+                   memcmp(shift + 3 * at, t + 3 * p, 12) == 0;
+        }
+        hs_pairs_free(expected);
+    }
+    same = same && at == hs_pairs_length(pairs);
     hs_pairs_free(pairs);
+    return same ? at : -1;
+}
+
+static batch_reach made_reach;
+
+/* In the order of these calls, too. */
+static void
+the_same_as_single_calls_reach(void)
+{
+    for (uint64_t seed = 1; seed <= TRIALS(8); seed++) {
+        make_batch_reach(seed, seed % 2 == 1 ? 0.5 : 3.0, &made_reach);
+        for (int kind = 0; kind < 16; kind++) {
+            hs_options options = hs_options_default();
+            options.cutoff = INFINITY;
+            options.sorted = kind % 2 == 1;
+            for (hs_rule rule = HS_RULE_SUM; rule <= HS_RULE_MIN; rule++) {
+                const hs_reach reach = reach_of(&made_reach, rule, RADII, 0);
+                CHECK(compare_reach(&made_reach, &reach, kind & 2, kind & 8, options,
+                                    kind & 4 ? 3 : 1) >= 0);
+            }
+            for (hs_rule rule = HS_RULE_MAX; rule <= HS_RULE_MIN; rule++) {
+                const hs_reach reach = reach_of(&made_reach, rule, SUPPORTS, 0);
+                CHECK(compare_reach(&made_reach, &reach, kind & 2, kind & 8, options,
+                                    kind & 4 ? 3 : 1) >= 0);
+            }
+            const hs_reach by_types = reach_of(&made_reach, HS_RULE_SUM, TYPES, 0);
+            options.cutoff = 0.7;
+            CHECK(compare_reach(&made_reach, &by_types, kind & 2, kind & 8, options,
+                                kind & 4 ? 3 : 1) > 30);
+        }
+    }
+}
+
+static void
+every_algorithm_is_the_same_as_single_calls(void)
+{
+    make_batch_reach(31, 2.0, &made_reach);
+    const hs_reach reach = reach_of(&made_reach, HS_RULE_SUM, RADII, 0);
+    const hs_reach of_supports = reach_of(&made_reach, HS_RULE_MAX, SUPPORTS, 0);
+    for (hs_algorithm a = HS_AUTO; a < HS_ALGORITHM_END; a++) {
+        hs_options options = hs_options_default();
+        options.cutoff = INFINITY;
+        options.algorithm = a;
+        CHECK(compare_reach(&made_reach, &reach, true, false, options, 1) > 100);
+        CHECK(compare_reach(&made_reach, &of_supports, true, false, options, 1) > 10);
+    }
+}
+
+/* Rows are counted through all systems. */
+static void
+failures_name_system_and_point(void)
+{
+    hs_failure failure;
+    hs_pairs  *pairs = NULL;
+    hs_options options = hs_options_default();
+    make_batch_reach(32, 1.0, &made_reach);
+    const int64_t   n = made_reach.first[N_SYSTEMS_REACH], row = made_reach.first[20] + 1;
+    const hs_points points = points_of_reach(&made_reach, 0, n);
+    const hs_reach  reach = reach_of(&made_reach, HS_RULE_SUM, RADII, 0);
+    const hs_reach  by_types = reach_of(&made_reach, HS_RULE_SUM, TYPES, 0);
+    const hs_reach  of_supports = reach_of(&made_reach, HS_RULE_MIN, SUPPORTS, 0);
+    const hs_reach  sums = reach_of(&made_reach, HS_RULE_SUM, SUPPORTS, 0);
+    const hs_reach  directed = {.rule = HS_RULE_GATHER, .radii = made_reach.radii};
+    const hs_reach  without = {.rule = HS_RULE_SUM};
+    hs_systems      systems = {.n = N_SYSTEMS_REACH, .first = made_reach.first, .reach = &reach};
+    const double    radius = made_reach.radii[row], x = made_reach.x[3 * row];
+    const int32_t   type = made_reach.types[row];
+    options.cutoff = INFINITY;
+    made_reach.radii[row] = -1.0;
+    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_RADII);
+    CHECK(failure.row == row && failure.value == -1.0 && failure.system == 20 && pairs == NULL);
+    made_reach.radii[row] = radius;
+    made_reach.x[3 * row] = NAN;
+    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_NOT_FINITE);
+    CHECK(failure.row == row && failure.column == 0 && failure.system == 20);
+    made_reach.x[3 * row] = x;
+    systems.cutoffs = made_reach.cutoffs;
+    made_reach.cutoffs[20] = -2.0;
+    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_CUTOFF);
+    CHECK(failure.value == -2.0 && failure.system == 20);
+    systems.cutoffs = NULL;
+    systems.reach = &by_types;
+    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_CUTOFF);
+    options.cutoff = 1.0;
+    made_reach.types[row] = N_TYPES;
+    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_TYPES);
+    CHECK(failure.row == row && failure.value == N_TYPES);
+    made_reach.types[row] = type;
+    made_reach.types[row] = type;
+    systems.reach = &of_supports;
+    options.cutoff = INFINITY;
+    made_reach.supports[9 * row + 1] = INFINITY;
+    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_SUPPORTS);
+    CHECK(failure.row == row && failure.system == 20);
+    made_reach.supports[9 * row + 1] = 0.25;
+    systems.reach = &sums;
+    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
+    systems.reach = &directed;
+    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
+    systems.reach = &without;
+    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
+    systems.reach = &reach;
+    systems.box = &made_reach.box;
+    systems.rows = made_reach.rows;
+    memset(made_reach.rows + 9 * 3, 0, 9 * sizeof(double)); /* of a system without points */
+    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_BOX_DEPENDENT);
+    CHECK(failure.system == 3);
+}
+
+/* Neither supports of which there are none, nor a table without a bound for it. */
+static void
+reaches_that_systems_cannot_have_are_refused(void)
+{
+    static const int bad[] = {7, 0, N_SYSTEMS_REACH - 1};
+    int64_t          counts[N_SYSTEMS_REACH];
+    hs_options       options = hs_options_default();
+    hs_failure       failure;
+    make_batch_reach(35, 1.0, &made_reach);
+    const hs_points points = points_of_reach(&made_reach, 0, made_reach.first[N_SYSTEMS_REACH]);
+    const hs_reach  by_types = reach_of(&made_reach, HS_RULE_SUM, true, 0);
+    const hs_reach  by_supports = {.rule = HS_RULE_MAX, .has_supports = true, .extent = 1.0};
+    hs_systems systems = {.n = N_SYSTEMS_REACH, .first = made_reach.first, .reach = &by_supports};
+    options.cutoff = INFINITY;
+    memset(&failure, 0x5a, sizeof failure);
+    CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_ERR_ARGUMENT);
+    CHECK(failure.row == -1 && failure.system == -1);
+    systems.reach = &by_types;
+    systems.cutoffs = made_reach.cutoffs;
+    for (int b = 0; b < 3; b++) { /* the first of them is named */
+        hs_pairs *pairs = (hs_pairs *)&points;
+        made_reach.cutoffs[bad[b]] = INFINITY;
+        const int first = b == 0 ? bad[0] : 0;
+        CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_CUTOFF);
+        CHECK(pairs == NULL && failure.value == INFINITY && failure.system == first);
+        CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_ERR_CUTOFF);
+        CHECK(failure.value == INFINITY && failure.system == first);
+    }
+    for (int b = 0; b < 3; b++)
+        made_reach.cutoffs[bad[b]] = 1.0;
+    CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_OK);
+}
+
+static hs_status
+find_all(void *context)
+{
+    const hs_systems *systems = context;
+    const hs_points   points = points_of_reach(&made_reach, 0, made_reach.first[systems->n]);
+    hs_options        options = hs_options_default();
+    hs_pairs         *pairs = NULL;
+    options.cutoff = INFINITY;
+    options.sorted = systems->box == NULL;
+    const hs_status status = hs_systems_find(&points, systems, &options, &pairs, NULL);
+    hs_pairs_free(pairs);
+    return status;
+}
+
+static void
+nothing_leaks_when_memory_is_short(void)
+{
+    make_batch_reach(33, 2.0, &made_reach);
+    const hs_reach reach = reach_of(&made_reach, HS_RULE_SUM, RADII, 0);
+    hs_systems     systems = {.n = 5, .first = made_reach.first, .reach = &reach};
+    CHECK(fail_each_allocation(find_all, &systems, 20000) > 5);
+    check_arena(find_all, &systems);
+    systems.box = &made_reach.box;
+    systems.rows = made_reach.rows;
+    CHECK(fail_each_allocation(find_all, &systems, 20000) > 5);
+    check_arena(find_all, &systems);
+    const hs_reach of_supports = reach_of(&made_reach, HS_RULE_MAX, SUPPORTS, 0);
+    systems.reach = &of_supports;
+    CHECK(fail_each_allocation(find_all, &systems, 20000) > 5);
+    check_arena(find_all, &systems);
+}
+
+/* System part: what one of many systems has of the arrays of all. */
+
+/* One box for all, or rows for each, of which it says what repeats. */
+static void
+each_system_has_its_box(void)
+{
+    const int64_t first[] = {0, 1, 2};
+    const double  rows[] = {1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0};
+    const hs_box  box = {.ndim = 2, .periodic = {true, false}, .rows = {{9.0}, {0.0, 9.0}}};
+    hs_systems    systems = {.n = 2, .first = first, .box = &box};
+    hs_box        own_box;
+    CHECK(hs_box_of_system(&systems, 2, 1, &own_box) == &box);
+    systems.rows = rows;
+    for (int s = 0; s < 2; s++) {
+        CHECK(hs_box_of_system(&systems, 2, s, &own_box) == &own_box && own_box.ndim == 2);
+        CHECK(own_box.periodic[0] && !own_box.periodic[1]);
+        CHECK(own_box.rows[0][0] == 1.0 + 4 * s && own_box.rows[0][1] == 2.0 + 4 * s);
+        CHECK(own_box.rows[1][0] == 3.0 + 4 * s && own_box.rows[1][1] == 4.0 + 4 * s);
+    }
+    const uint8_t bits[] = {2, 1}; /* which axes repeat may be of each as well, or that alone */
+    systems.periodic = bits;
+    CHECK(hs_box_of_system(&systems, 2, 0, &own_box) == &own_box);
+    CHECK(!own_box.periodic[0] && own_box.periodic[1] && own_box.rows[1][1] == 4.0);
+    systems.rows = NULL;
+    CHECK(hs_box_of_system(&systems, 2, 1, &own_box) == &own_box && own_box.ndim == 2);
+    CHECK(own_box.periodic[0] && !own_box.periodic[1]);
+    CHECK(own_box.rows[0][0] == 9.0 && own_box.rows[1][1] == 9.0);
+    systems.box = NULL;
+    CHECK(hs_box_of_system(&systems, 2, 1, &own_box) == NULL);
+    CHECK(hs_cutoff_of_system(&systems, 1, 0.5) == 0.5);
+    systems.cutoffs = rows;
+    CHECK(hs_cutoff_of_system(&systems, 1, 0.5) == 2.0);
+}
+
+enum { N_SYSTEM_PART = 6, Q = 4, D = 2 };
+
+/* The excluded pairs of a system, with numbers of its own; pairs of two systems are none. */
+static void
+excluded_pairs_are_sorted_by_system(void)
+{
+    const int64_t        first[] = {0, 0, 3, 3, 5, 6}, excluded[] = {4, 3, 0, 2, 5, 0, 1, 1, 3, 5};
+    const double         numbers[N_SYSTEM_PART] = {0.0};
+    const hs_points      points = {numbers, N_SYSTEM_PART, 1, HS_FLOAT64, 8, 8};
+    const hs_selection   selection = {.n_excluded = 5, .excluded = excluded};
+    const hs_systems     systems = {.n = 5, .first = first, .selection = &selection};
+    const hs_system_sets sets = {&points, NULL, &systems};
+    const int64_t        expected[] = {0, 2, 1, 1, 1, 0}, ends[] = {0, 0, 2, 2, 3, 3};
+    const hs_options     options = hs_options_default();
+    hs_excluded_parts    parts;
+    hs_system_part       part;
+    hs_account           account;
+    hs_account_init(&account, &options);
+    CHECK(hs_excluded_parts_open(&sets, &account, &parts) == HS_OK);
+    CHECK(memcmp(parts.first, ends, sizeof ends) == 0);
+    CHECK(memcmp(parts.pairs, expected, sizeof expected) == 0);
+    hs_system_part_cut(&sets, &parts, 3, &part);
+    CHECK(part.selection.n_excluded == 1 && part.selection.excluded == parts.pairs + 4);
+    hs_system_part_cut(&sets, &parts, 2, &part);
+    CHECK(part.selection.n_excluded == 0);
+    hs_excluded_parts_free(&account, &parts);
+    hs_excluded_parts_free(&account, &parts);
+    for (int nth = 1; nth <= 2; nth++) {
+        hs_test_fail_allocation(nth);
+        CHECK(hs_excluded_parts_open(&sets, &account, &parts) == HS_ERR_MEMORY);
+        hs_excluded_parts_free(&account, &parts);
+    }
+    hs_test_fail_allocation(0);
+    CHECK(account.held == 0);
+    hs_account_close(&account);
+}
+
+/* With queries the first number is that of a query. */
+static void
+excluded_pairs_of_queries_have_numbers_of_both(void)
+{
+    const int64_t   first[] = {0, 2, 5}, first_query[] = {0, 1, 3};
+    const int64_t   excluded[] = {2, 4, 0, 4, 1, 2}, expected[] = {1, 2, 0, 0};
+    const double    numbers[N_SYSTEM_PART] = {0.0};
+    const hs_points points = {numbers, 5, 1, HS_FLOAT64, 8, 8},
+                    queries = {numbers, 3, 1, HS_FLOAT64, 8, 8};
+    const hs_selection selection = {.n_excluded = 3, .excluded = excluded};
+    const hs_systems   systems = {
+          .n = 2, .first = first, .first_query = first_query, .selection = &selection};
+    const hs_system_sets sets = {&points, &queries, &systems};
+    const hs_options     options = hs_options_default();
+    hs_excluded_parts    parts;
+    hs_account           account;
+    hs_account_init(&account, &options);
+    CHECK(hs_excluded_parts_open(&sets, &account, &parts) == HS_OK);
+    CHECK(parts.first[1] == 0 && parts.first[2] == 2);
+    CHECK(memcmp(parts.pairs, expected, sizeof expected) == 0);
+    hs_excluded_parts_free(&account, &parts);
+    hs_account_close(&account);
+}
+
+/* Systems each: one call for each of many systems: polls, threads, and what failures say. */
+
+enum {
+    N_SYSTEMS_EACH = 50,
+    POINTS_EACH = 60,
+    N_EACH = N_SYSTEMS_EACH * POINTS_EACH,
+    N_QUERIES = 2 * N_SYSTEMS_EACH
+};
+
+static struct {
+    double     x[N_EACH * 3], q[N_QUERIES * 3];
+    int64_t    first[N_SYSTEMS_EACH + 1], first_query[N_SYSTEMS_EACH + 1], counts[N_EACH];
+    hs_points  points, queries;
+    hs_systems systems;
+    hs_options options;
+} s_each;
+
+static void
+make_scene(void)
+{
+    harness_random random = {77};
+    for (int e = 0; e < N_EACH * 3; e++)
+        s_each.x[e] = random_unit(&random);
+    for (int e = 0; e < N_QUERIES * 3; e++)
+        s_each.q[e] = random_unit(&random);
+    for (int n = 0; n <= N_SYSTEMS_EACH; n++) {
+        s_each.first[n] = n * POINTS_EACH;
+        s_each.first_query[n] = 2 * n;
+    }
+    s_each.points = (hs_points){s_each.x, N_EACH, 3, HS_FLOAT64, 24, 8};
+    s_each.queries = (hs_points){s_each.q, N_QUERIES, 3, HS_FLOAT64, 24, 8};
+    s_each.systems =
+        (hs_systems){.n = N_SYSTEMS_EACH, .first = s_each.first, .first_query = s_each.first_query};
+    s_each.options = hs_options_default();
+    s_each.options.cutoff = 0.4;
+    s_each.options.want = HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT;
+}
+
+static hs_status
+find_rows(void *context)
+{
+    hs_pairs       *rows;
+    hs_failure      failure;
+    const hs_status status = hs_systems_neighbors(&s_each.points, context, &s_each.systems,
+                                                  &s_each.options, &rows, &failure);
+    hs_pairs_free(rows);
+    return status;
+}
+
+static void
+memory_may_be_short(void)
+{
+    static const int64_t pair[] = {0, 1};
+    const hs_selection   one_excluded = {.n_excluded = 1, .excluded = pair};
+    make_scene();
+    s_each.systems.n = 6;
+    s_each.points.n = s_each.first[6];
+    s_each.queries.n = s_each.first_query[6];
+    for (s_each.options.threads = 1; s_each.options.threads <= 2; s_each.options.threads++) {
+        CHECK(fail_each_allocation(find_rows, NULL, 2000) > 10);
+        check_arena(find_rows, NULL);
+        CHECK(fail_each_allocation(find_rows, &s_each.queries, 2000) > 10);
+        check_arena(find_rows, &s_each.queries);
+        CHECK(raise_memory_limit(find_rows, NULL, &s_each.options.memory_limit) > 3);
+        s_each.systems.selection = &one_excluded;
+        CHECK(fail_each_allocation(find_rows, NULL, 2000) > 10);
+        check_arena(find_rows, NULL);
+        s_each.systems.selection = NULL;
+    }
+}
+
+/* The row of a box is not that of a point. */
+static void
+rows_of_boxes_stay(void)
+{
+    static double boxes[N_SYSTEMS_EACH * 9];
+    const hs_box  box = {.ndim = 3, .periodic = {true, true, true}};
+    hs_failure    failure;
+    make_scene();
+    for (int n = 0; n < N_SYSTEMS_EACH; n++) {
+        for (int k = 0; k < 3; k++)
+            boxes[9 * n + 4 * k] = 3.0;
+    }
+    s_each.systems.box = &box;
+    s_each.systems.rows = boxes;
+    boxes[9 * 7 + 8] = 0.0;
+    CHECK(hs_systems_coordination(&s_each.points, NULL, &s_each.systems, &s_each.options,
+                                  s_each.counts, &failure) == HS_ERR_BOX_DEPENDENT);
+    CHECK(failure.row == 2 && failure.system == 7);
+    boxes[9 * 7 + 8] = INFINITY;
+    CHECK(hs_systems_coordination(&s_each.points, NULL, &s_each.systems, &s_each.options,
+                                  s_each.counts, &failure) == HS_ERR_BOX_FINITE);
+    CHECK(failure.row == 2 && failure.column == 2 && failure.system == 7);
+}
+
+/* What all systems share is looked at where there are none. */
+static void
+without_systems_all_else_is_checked(void)
+{
+    const hs_selection numbered = {.n_excluded = 1, .excluded = (const int64_t[]){0, 0}};
+    const hs_reach     reach = {.rule = HS_RULE_END};
+    hs_counters        counters = {.pairs = 7};
+    make_scene();
+    s_each.systems.n = s_each.points.n = 0;
+    s_each.options.counters = &counters;
+    CHECK(find_rows(NULL) == HS_OK && counters.pairs == 0);
+    s_each.options.cutoff = -1.0;
+    CHECK(find_rows(NULL) == HS_ERR_CUTOFF);
+    s_each.options.cutoff = 1.0;
+    s_each.systems.selection = &numbered;
+    CHECK(find_rows(NULL) == HS_ERR_ARGUMENT);
+    s_each.systems.selection = NULL;
+    s_each.systems.reach = &reach;
+    CHECK(find_rows(NULL) == HS_ERR_ARGUMENT);
+    s_each.systems.reach = NULL;
+    s_each.options.kernel = "none";
+    CHECK(find_rows(NULL) == HS_ERR_KERNEL);
+}
+
+/* Numbers of a call that are sums of those of others. */
+static void
+add_work(const hs_counters *more, hs_counters *sum)
+{
+    sum->pairs += more->pairs;
+    sum->groups += more->groups;
+    sum->candidates += more->candidates;
+    sum->ambiguous += more->ambiguous;
+    sum->by_float64 += more->by_float64;
+    sum->by_double_word += more->by_double_word;
+    sum->by_integers += more->by_integers;
+}
+
+static bool
+is_same_work(const hs_counters *one, const hs_counters *other)
+{
+    return one->pairs == other->pairs && one->groups == other->groups &&
+           one->candidates == other->candidates && one->ambiguous == other->ambiguous &&
+           one->by_float64 == other->by_float64 && one->by_double_word == other->by_double_word &&
+           one->by_integers == other->by_integers;
+}
+
+/* What is done is what calls for each of the systems do, by however many threads: of lattice points
+ * many are at the cutoff, some but for 2^-30, for a rounding, or for the square of 2^-60. */
+static void
+work_of_all_systems_is_added_up(void)
+{
+    harness_random random = {78};
+    hs_counters    single = {.pairs = 0}, sum = {.pairs = 0}, all;
+    int64_t        most_bytes = 0;
+    make_scene();
+    for (int e = 0; e < N_EACH * 3; e++) {
+        const double at = (double)(random_bits(&random) % 6) / (e < N_EACH ? 3.0 : 2.0);
+        s_each.x[e] = at > 0.0 ? at + (double)(e % 7 == 0) * 0x1p-30 : (double)(e % 2) * 0x1p-60;
+    }
+    s_each.options.cutoff = 1.0;
+    s_each.options.counters = &single;
+    for (int n = 0; n < N_SYSTEMS_EACH; n++) {
+        hs_pairs       *rows;
+        const hs_points own = {s_each.x + s_each.first[n] * 3, POINTS_EACH, 3, HS_FLOAT64, 24, 8};
+        const hs_among  among = {.points = &own};
+        CHECK(hs_neighbors_find(&among, &s_each.options, &rows, NULL) == HS_OK);
+        hs_pairs_free(rows);
+        add_work(&single, &sum);
+        most_bytes = single.bytes_peak > most_bytes ? single.bytes_peak : most_bytes;
+    }
+    CHECK(sum.ambiguous > 0 && sum.by_float64 > 0 && sum.by_double_word > 0 && sum.by_integers > 0);
+    s_each.options.counters = &all;
+    for (s_each.options.threads = 1; s_each.options.threads <= 2; s_each.options.threads++) {
+        CHECK(find_rows(NULL) == HS_OK);
+        CHECK(is_same_work(&all, &sum));
+        CHECK(all.bytes[HS_FOR_POINTS] > 0 && all.bytes_peak >= most_bytes);
+    }
+}
+
+/* More threads than systems, and systems that are a range of their own. */
+static void
+few_large_systems(void)
+{
+    const int64_t ends[] = {0, N_EACH / 2, N_EACH}, of_queries[] = {0, 1, 2};
+    hs_pairs     *one, *many;
+    make_scene();
+    s_each.options.cutoff = 0.1;
+    s_each.queries.n = 2;
+    s_each.systems = (hs_systems){.n = 2, .first = ends, .first_query = of_queries};
+    CHECK(hs_systems_neighbors(&s_each.points, NULL, &s_each.systems, &s_each.options, &one,
+                               NULL) == HS_OK);
+    s_each.options.threads = 4;
+    CHECK(hs_systems_neighbors(&s_each.points, NULL, &s_each.systems, &s_each.options, &many,
+                               NULL) == HS_OK);
+    CHECK(hs_pairs_length(one) > N_EACH && hs_pairs_length(one) == hs_pairs_length(many));
+    CHECK(memcmp(hs_pairs_array(one, HS_WANT_J), hs_pairs_array(many, HS_WANT_J),
+                 (size_t)hs_pairs_length(one) * 8) == 0);
+    hs_pairs_free(one);
+    hs_pairs_free(many);
+    CHECK(find_rows(&s_each.queries) == HS_OK);
+}
+
+/* Api systems rows: rows, nearest points and histograms of many systems, against one call for
+ * each. */
+
+enum {
+    N_SYSTEMS_ROWS = 20,
+    MOST = 40,
+    N_EDGES = 4,
+    N_TYPES_ROWS = 2,
+    CELLS = N_TYPES_ROWS * N_TYPES_ROWS * N_EDGES
+};
+
+static struct {
+    double       x[N_SYSTEMS_ROWS * MOST * 3], q[N_SYSTEMS_ROWS * MOST * 3];
+    double       rows[N_SYSTEMS_ROWS * 9], cutoffs[N_SYSTEMS_ROWS], edges[N_EDGES];
+    int64_t      first[N_SYSTEMS_ROWS + 1], first_query[N_SYSTEMS_ROWS + 1];
+    int64_t      groups[N_SYSTEMS_ROWS * MOST], query_groups[N_SYSTEMS_ROWS * MOST];
+    double       radii[N_SYSTEMS_ROWS * MOST];
+    int32_t      types[N_SYSTEMS_ROWS * MOST];
+    double       weights[N_SYSTEMS_ROWS * MOST];
+    hs_box       box;
+    hs_points    points, queries;
+    hs_selection selection;
+    hs_reach     reach;
+    hs_systems   systems;
+    hs_options   options;
+} s_rows;
+
+static hs_points
+points_at(const double *x, const int64_t *first, int64_t n)
+{
+    return (hs_points){x + 3 * first[n], first[n + 1] - first[n], 3, HS_FLOAT64, 24, 8};
+}
+
+static void
+make_scene_rows(uint64_t seed)
+{
+    harness_random random = {seed};
+    memset(&s_rows, 0, sizeof s_rows);
+    for (int n = 0; n < N_SYSTEMS_ROWS; n++) {
+        const int64_t more = n % 7 == 3 ? 0 : (int64_t)(random_unit(&random) * MOST);
+        s_rows.first[n + 1] = s_rows.first[n] + more;
+        s_rows.first_query[n + 1] = s_rows.first_query[n] + (int64_t)(random_unit(&random) * 6);
+        s_rows.cutoffs[n] = 0.5 + random_unit(&random);
+        for (int k = 0; k < 9; k++)
+            s_rows.rows[9 * n + k] = (k % 4 == 0 ? 3.0 : 0.0) + 0.5 * random_unit(&random);
+    }
+    for (int e = 0; e < N_SYSTEMS_ROWS * MOST * 3; e++) {
+        s_rows.x[e] = 2.5 * random_unit(&random);
+        s_rows.q[e] = 2.5 * random_unit(&random);
+    }
+    for (int e = 0; e < N_SYSTEMS_ROWS * MOST; e++) {
+        s_rows.groups[e] = (int64_t)(3.0 * random_unit(&random));
+        s_rows.query_groups[e] = (int64_t)(3.0 * random_unit(&random));
+        s_rows.radii[e] = random_unit(&random);
+        s_rows.types[e] = e % N_TYPES_ROWS;
+        s_rows.weights[e] = random_unit(&random) - 0.25;
+    }
+    for (int k = 0; k < N_EDGES; k++)
+        s_rows.edges[k] = 0.4 * (k + 1);
+    s_rows.box = (hs_box){.ndim = 3, .periodic = {true, true, false}};
+    s_rows.points = (hs_points){s_rows.x, s_rows.first[N_SYSTEMS_ROWS], 3, HS_FLOAT64, 24, 8};
+    s_rows.queries =
+        (hs_points){s_rows.q, s_rows.first_query[N_SYSTEMS_ROWS], 3, HS_FLOAT64, 24, 8};
+    s_rows.selection = (hs_selection){.groups = s_rows.groups, .query_groups = s_rows.query_groups};
+    s_rows.reach = (hs_reach){.radii = s_rows.radii, .query_radii = s_rows.radii};
+    s_rows.systems = (hs_systems){.n = N_SYSTEMS_ROWS,
+                                  .first = s_rows.first,
+                                  .box = &s_rows.box,
+                                  .rows = s_rows.rows,
+                                  .first_query = s_rows.first_query};
+    s_rows.options = hs_options_default();
+    s_rows.options.cutoff = 1.0;
+    s_rows.options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_SHIFT | HS_WANT_BOTH;
+}
+
+/* One system by itself. */
+typedef struct single_rows {
+    hs_points    points, queries;
+    hs_box       box;
+    hs_selection selection;
+    hs_reach     reach;
+    hs_options   options;
+    hs_among     among;
+} single_rows;
+
+static void
+take_single(int n, bool has_queries, single_rows *one)
+{
+    *one = (single_rows){.points = points_at(s_rows.x, s_rows.first, n),
+                         .queries = points_at(s_rows.q, s_rows.first_query, n),
+                         .box = s_rows.box,
+                         .selection = {.groups = s_rows.groups + s_rows.first[n],
+                                       .query_groups = s_rows.query_groups + s_rows.first_query[n]},
+                         .reach = {.radii = s_rows.radii + s_rows.first[n],
+                                   .query_radii = s_rows.radii + s_rows.first_query[n]},
+                         .options = s_rows.options};
+    for (int k = 0; k < 9; k++)
+        one->box.rows[k / 3][k % 3] = s_rows.rows[9 * n + k];
+    one->options.threads = 1;
+    one->options.cutoff = s_rows.systems.cutoffs != NULL ? s_rows.cutoffs[n]
+                                                         : s_rows.options.cutoff;
+    one->among =
+        (hs_among){.points = &one->points, .box = s_rows.systems.box != NULL ? &one->box : NULL};
+    one->among.queries = has_queries ? &one->queries : NULL;
+    one->among.reach = s_rows.systems.reach != NULL ? &one->reach : NULL;
+    one->among.selection = s_rows.systems.selection != NULL ? &one->selection : NULL;
+}
+
+/* Compares pairs [at, at + n) of all with those of one system; k: of the nearest, or 0. */
+static void
+compare_pairs(const hs_pairs *all, int64_t at, const hs_pairs *own, int n, bool has_queries)
+{
+    const int64_t  n_pairs = hs_pairs_length(own);
+    const int64_t *i = hs_pairs_array(all, HS_WANT_I), *j = hs_pairs_array(all, HS_WANT_J);
+    const int64_t *both = hs_pairs_array(all, HS_WANT_BOTH);
+    const int64_t *a = hs_pairs_array(own, HS_WANT_I), *b = hs_pairs_array(own, HS_WANT_J);
+    const double  *d = hs_pairs_array(all, HS_WANT_DISTANCE);
+    const double  *c = hs_pairs_array(own, HS_WANT_DISTANCE);
+    const int64_t  first = s_rows.first[n], asking = has_queries ? s_rows.first_query[n] : first;
+    CHECK(at + n_pairs <= hs_pairs_length(all));
+    for (int64_t p = 0; p < n_pairs; p++) {
+        CHECK(j[at + p] == (b[p] < 0 ? -1 : b[p] + first) && d[at + p] == c[p]);
+        CHECK(i == NULL || i[at + p] == a[p] + asking);
+        CHECK(both == NULL ||
+              (both[2 * (at + p)] == a[p] + asking && both[2 * (at + p) + 1] == b[p] + first));
+    }
+}
+
+static void
+check_rows(bool has_queries)
+{
+    const hs_points *queries = has_queries ? &s_rows.queries : NULL;
+    static int64_t   counts[N_SYSTEMS_ROWS * MOST];
+    hs_pairs        *all, *near;
+    int64_t          at = 0, row = 0;
+    CHECK(hs_systems_neighbors(&s_rows.points, queries, &s_rows.systems, &s_rows.options, &all,
+                               NULL) == HS_OK);
+    CHECK(hs_systems_coordination(&s_rows.points, queries, &s_rows.systems, &s_rows.options, counts,
+                                  NULL) == HS_OK);
+    const int64_t *offsets = hs_pairs_offsets(all);
+    for (int n = 0; n < N_SYSTEMS_ROWS; n++) {
+        single_rows one;
+        hs_pairs   *own;
+        take_single(n, has_queries, &one);
+        CHECK(hs_neighbors_find(&one.among, &one.options, &own, NULL) == HS_OK);
+        compare_pairs(all, at, own, n, has_queries);
+        at += hs_pairs_length(own);
+        const int64_t *ends = hs_pairs_offsets(own), n_rows = hs_pairs_rows(own);
+        for (int64_t i = 0; i < n_rows; i++, row++) {
+            CHECK(counts[row] == ends[i + 1] - ends[i]);
+            CHECK(offsets[row + 1] - offsets[row] == counts[row]);
+        }
+        hs_pairs_free(own);
+    }
+    CHECK(at > 10 && at == hs_pairs_length(all) && row == hs_pairs_rows(all) && offsets[0] == 0);
+    hs_pairs_free(all);
+    if (s_rows.systems.reach != NULL || s_rows.systems.selection != NULL) {
+        CHECK(hs_systems_nearest(&s_rows.points, queries, &s_rows.systems, 3, &s_rows.options,
+                                 &near, NULL) == HS_ERR_ARGUMENT);
+        return;
+    }
+    CHECK(hs_systems_nearest(&s_rows.points, queries, &s_rows.systems, 3, &s_rows.options, &near,
+                             NULL) == HS_OK);
+    at = 0;
+    for (int n = 0; n < N_SYSTEMS_ROWS; n++) {
+        single_rows one;
+        hs_pairs   *own;
+        take_single(n, has_queries, &one);
+        CHECK(hs_nearest_find(&one.among, 3, &one.options, &own, NULL) == HS_OK);
+        compare_pairs(near, at, own, n, has_queries);
+        at += hs_pairs_length(own);
+        hs_pairs_free(own);
+    }
+    CHECK(at == hs_pairs_length(near) && hs_pairs_offsets(near) == NULL);
+    hs_pairs_free(near);
+}
+
+static void
+rows_are_those_of_single_calls(void)
+{
+    for (uint64_t seed = 1; seed <= TRIALS(10); seed++) {
+        for (int kind = 0; kind < 64; kind++) {
+            make_scene_rows(seed);
+            s_rows.systems.box = kind & 1 ? &s_rows.box : NULL;
+            s_rows.systems.rows = kind & 1 ? s_rows.rows : NULL;
+            s_rows.systems.cutoffs = kind & 2 ? s_rows.cutoffs : NULL;
+            s_rows.systems.selection = kind & 4 ? &s_rows.selection : NULL;
+            s_rows.systems.reach = kind & 8 ? &s_rows.reach : NULL;
+            s_rows.options.threads = kind & 16 ? 3 : 1;
+            check_rows(kind & 32);
+        }
+    }
+}
+
+/* Numbers of 4 bytes, of which -1 stays. */
+static void
+numbers_may_be_short(void)
+{
+    hs_pairs *wide, *narrow;
+    make_scene_rows(3);
+    s_rows.options.want = HS_WANT_J | HS_WANT_DISTANCE;
+    CHECK(hs_systems_nearest(&s_rows.points, NULL, &s_rows.systems, 50, &s_rows.options, &wide,
+                             NULL) == HS_OK);
+    s_rows.options.index_bytes = 4;
+    CHECK(hs_systems_nearest(&s_rows.points, NULL, &s_rows.systems, 50, &s_rows.options, &narrow,
+                             NULL) == HS_OK);
+    const int64_t *j = hs_pairs_array(wide, HS_WANT_J);
+    const int32_t *k = hs_pairs_array(narrow, HS_WANT_J);
+    for (int64_t e = 0; e < hs_pairs_length(wide); e++)
+        CHECK(j[e] == k[e]);
+    hs_pairs_free(wide);
+    hs_pairs_free(narrow);
+}
+
+static void
+histograms_are_those_of_single_calls(void)
+{
+    static int64_t counts[N_SYSTEMS_ROWS * CELLS], own_counts[CELLS];
+    static double  sums[N_SYSTEMS_ROWS * CELLS], own_sums[CELLS];
+    for (int kind = 0; kind < 8; kind++) {
+        make_scene_rows(11 + (uint64_t)kind);
+        s_rows.options.threads = kind & 1 ? 3 : 1;
+        s_rows.systems.selection = kind & 4 ? &s_rows.selection : NULL;
+        const hs_points *queries = kind & 2 ? &s_rows.queries : NULL;
+        hs_histogram     wanted = {.n_edges = N_EDGES,
+                                   .edges = s_rows.edges,
+                                   .n_types = N_TYPES_ROWS,
+                                   .of_points = {s_rows.types, s_rows.weights},
+                                   .of_queries = {s_rows.types, s_rows.weights},
+                                   .counts = counts,
+                                   .sums = sums};
+        hs_counters      counters;
+        int64_t          n_pairs = 0;
+        s_rows.options.counters = &counters;
+        CHECK(hs_systems_histogram(&s_rows.points, queries, &s_rows.systems, &s_rows.options,
+                                   &wanted, NULL) == HS_OK);
+        const int64_t of_all = counters.pairs;
+        for (int n = 0; n < N_SYSTEMS_ROWS; n++) {
+            single_rows one;
+            take_single(n, queries != NULL, &one);
+            wanted.of_points =
+                (hs_marks){s_rows.types + s_rows.first[n], s_rows.weights + s_rows.first[n]};
+            wanted.of_queries = (hs_marks){s_rows.types + s_rows.first_query[n],
+                                           s_rows.weights + s_rows.first_query[n]};
+            wanted.counts = own_counts;
+            wanted.sums = own_sums;
+            CHECK(hs_pairs_histogram(&one.among, &one.options, &wanted, NULL) == HS_OK);
+            CHECK(memcmp(counts + n * CELLS, own_counts, sizeof own_counts) == 0);
+            CHECK(memcmp(sums + n * CELLS, own_sums, sizeof own_sums) == 0);
+            n_pairs += counters.pairs;
+        }
+        CHECK(n_pairs == of_all && n_pairs > 50);
+    }
+}
+
+static void
+a_histogram_may_have_no_marks(void)
+{
+    static int64_t counts[N_SYSTEMS_ROWS * N_EDGES];
+    int64_t        n_pairs = 0, n_counted = 0, each[N_SYSTEMS_ROWS];
+    hs_histogram   wanted = {.n_edges = N_EDGES,
+                             .edges = s_rows.edges,
+                             .inclusive = true,
+                             .n_types = 1,
+                             .counts = counts};
+    make_scene_rows(5);
+    CHECK(hs_systems_histogram(&s_rows.points, NULL, &s_rows.systems, &s_rows.options, &wanted,
+                               NULL) == HS_OK);
+    s_rows.options.cutoff = s_rows.edges[N_EDGES - 1];
+    CHECK(hs_systems_count(&s_rows.points, &s_rows.systems, &s_rows.options, each, NULL) == HS_OK);
+    for (int n = 0; n < N_SYSTEMS_ROWS; n++)
+        n_pairs += each[n];
+    for (int e = 0; e < N_SYSTEMS_ROWS * N_EDGES; e++)
+        n_counted += counts[e];
+    CHECK(n_pairs == n_counted && n_pairs > 0);
+    static double sums[N_SYSTEMS_ROWS * N_EDGES]; /* without weights they are the counts */
+    wanted.counts = NULL;
+    wanted.sums = sums;
+    CHECK(hs_systems_histogram(&s_rows.points, NULL, &s_rows.systems, &s_rows.options, &wanted,
+                               NULL) == HS_OK);
+    for (int e = 0; e < N_SYSTEMS_ROWS * N_EDGES; e++)
+        CHECK(sums[e] == (double)counts[e]);
+}
+
+static void
+what_has_no_meaning_is_refused(void)
+{
+    static int64_t counts[N_SYSTEMS_ROWS * N_EDGES];
+    hs_histogram   wanted = {
+          .n_edges = N_EDGES, .edges = s_rows.edges, .n_types = 1, .counts = counts};
+    hs_failure failure;
+    hs_pairs  *rows;
+    make_scene_rows(6);
+    CHECK(hs_systems_nearest(&s_rows.points, NULL, &s_rows.systems, 0, &s_rows.options, &rows,
+                             NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_systems_nearest(&s_rows.points, NULL, &s_rows.systems, 1, &s_rows.options, &rows,
+                             NULL) == HS_OK);
+    CHECK(hs_pairs_length(rows) == s_rows.points.n);
+    hs_pairs_free(rows);
+    s_rows.options.cutoff = -1.0;
+    CHECK(hs_systems_nearest(&s_rows.points, NULL, &s_rows.systems, 2, &s_rows.options, &rows,
+                             &failure) == HS_ERR_CUTOFF);
+    CHECK(failure.value == -1.0);
+    s_rows.options.cutoff = INFINITY;
+    CHECK(hs_systems_nearest(&s_rows.points, NULL, &s_rows.systems, 2, &s_rows.options, &rows,
+                             NULL) == HS_OK);
+    hs_pairs_free(rows);
+    s_rows.systems.cutoffs = s_rows.cutoffs;
+    s_rows.options.cutoff = -1.0; /* is not looked at, and neither by histograms */
+    CHECK(hs_systems_nearest(&s_rows.points, NULL, &s_rows.systems, 2, &s_rows.options, &rows,
+                             NULL) == HS_OK);
+    hs_pairs_free(rows);
+    CHECK(hs_systems_histogram(&s_rows.points, NULL, &s_rows.systems, &s_rows.options, &wanted,
+                               NULL) == HS_OK);
+    s_rows.systems.cutoffs = NULL;
+    s_rows.systems.reach = &s_rows.reach;
+    CHECK(hs_systems_histogram(&s_rows.points, NULL, &s_rows.systems, &s_rows.options, &wanted,
+                               NULL) == HS_ERR_ARGUMENT);
+    s_rows.systems.reach = NULL;
+    wanted.n_types = INT32_MAX;
+    CHECK(hs_systems_histogram(&s_rows.points, NULL, &s_rows.systems, &s_rows.options, &wanted,
+                               NULL) == HS_ERR_MEMORY);
+    wanted.n_types = 0;
+    CHECK(hs_systems_histogram(&s_rows.points, NULL, &s_rows.systems, &s_rows.options, &wanted,
+                               NULL) == HS_ERR_ARGUMENT);
 }
 
 void
 test_api_systems(void)
 {
     RUN(progress_goes_on_over_all_systems);
-    RUN(cells_of_one_system_are_not_those_of_the_next);
     RUN(the_same_as_single_calls);
-    RUN(single_points_are_read);
-    RUN(failures_name_system_and_point);
-    RUN(polls_are_counted);
-    RUN(a_shortage_is_told_in_pairs_and_bytes);
     RUN(nothing_is_lost_when_memory_is_short);
-    RUN(bad_arguments_are_refused);
     RUN(results_go_to_the_callers_arrays);
-    RUN(empty_systems_cost_nothing);
     RUN(far_points_are_named_among_all);
+    RUN(the_same_as_single_calls_reach);
+    RUN(every_algorithm_is_the_same_as_single_calls);
+    RUN(failures_name_system_and_point);
+    RUN(reaches_that_systems_cannot_have_are_refused);
+    RUN(nothing_leaks_when_memory_is_short);
+    RUN(each_system_has_its_box);
+    RUN(excluded_pairs_are_sorted_by_system);
+    RUN(excluded_pairs_of_queries_have_numbers_of_both);
+    RUN(memory_may_be_short);
+    RUN(rows_of_boxes_stay);
+    RUN(without_systems_all_else_is_checked);
+    RUN(work_of_all_systems_is_added_up);
+    RUN(few_large_systems);
+    RUN(rows_are_those_of_single_calls);
+    RUN(numbers_may_be_short);
+    RUN(histograms_are_those_of_single_calls);
+    RUN(a_histogram_may_have_no_marks);
+    RUN(what_has_no_meaning_is_refused);
 }

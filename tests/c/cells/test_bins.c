@@ -1,12 +1,17 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_bins.c: points in cell order: each once, in its own cell, in the caller's order within
- * it. */
+/* test_bins.c: every point is once in its own cell, in dense grids and in sparse ones. */
+#include "../../../csrc/core/base/poll.h"
 #include "../../../csrc/core/cells/bins.h"
+#include "../../../csrc/core/cells/sparse_grid.h"
+#include "../../../csrc/core/memory/account.h"
+#include "../../../csrc/core/threads/passes.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
 
 void test_bins(void);
+
+/* Bins: points in cell order: each once, in its own cell, in the caller's order within it. */
 
 static random_scene shared;
 
@@ -25,67 +30,6 @@ sort_scene(hs_account *account, const hs_options *options, hs_scene *scene, hs_g
         return false;
     }
     return hs_bins_build(account, NULL, options, scene, grid, bins) == HS_OK;
-}
-
-static int64_t
-cell_of(const hs_scene *scene, const hs_grid *grid, const hs_bins *bins, int64_t si)
-{
-    double  x[HS_MAX_DIM];
-    int64_t cell = 0;
-    for (int k = 0; k < bins->ndim; k++)
-        x[k] = bins->x[k][si];
-    for (int k = 0; k < bins->ndim; k++) {
-        const double t = hs_lattice_coordinate(&scene->lattice, x, k);
-        cell += hs_grid_index(grid, k, t) * grid->stride[k];
-    }
-    return cell;
-}
-
-static void
-check_order(const hs_scene *scene, const hs_grid *grid, const hs_bins *bins)
-{
-    bool seen[SCENE_POINTS] = {false}, right = true;
-    CHECK(bins->start[0] == 0);
-    CHECK(bins->start[grid->n_cells] == bins->n);
-    for (int64_t c = 0; c < grid->n_cells; c++) {
-        right = right && bins->start[c] <= bins->start[c + 1];
-        for (int32_t si = bins->start[c]; si < bins->start[c + 1]; si++) {
-            const int32_t i = bins->order[si];
-            right = right && i >= 0 && i < bins->n && !seen[i];
-            seen[i] = true;
-            right = right && (si == bins->start[c] || bins->order[si - 1] < i);
-            right = right && cell_of(scene, grid, bins, si) == c;
-        }
-    }
-    CHECK(right);
-}
-
-static void
-every_point_is_once_in_its_own_cell(void)
-{
-    harness_random random = {16180};
-    int            sorted = 0, many_cells = 0;
-    for (int trial = 0; trial < 400; trial++) {
-        hs_account account;
-        hs_scene   scene;
-        hs_grid    grid;
-        hs_bins    bins;
-        make_scene(&random, trial % SCENE_KINDS, 1 + trial / SCENE_KINDS % HS_MAX_DIM,
-                   random_below(&random, SCENE_POINTS + 1), trial % 7 ? 4.0 : 1e6, 0, &shared);
-        shared.scene.cutoff = random_unit(&random);
-        const hs_options options = options_of(&shared.scene);
-        if (!sort_scene(&account, &options, &scene, &grid, &bins))
-            continue;
-        CHECK(bins.n == shared.scene.n);
-        CHECK(account.total.bytes[HS_FOR_CELLS] >= 4 * (grid.n_cells + 1));
-        check_order(&scene, &grid, &bins);
-        many_cells += grid.n_cells > 1;
-        sorted++;
-        hs_bins_free(&account, &bins);
-        CHECK(account.held == 0);
-    }
-    CHECK(sorted > 300);
-    CHECK(many_cells > 50);
 }
 
 /* X = r - w B is the point, moved by whole box vectors: exactly so in aligned boxes. */
@@ -122,92 +66,172 @@ coordinates_and_turns_travel_with_their_point(void)
     }
 }
 
-/* Boxes and open ranges that are whole multiples of the cutoff or its parts, with points on the
- * faces between cells and a last place beside them. */
+/* Bins threads: points are sorted into the same order by any number of threads, with as much
+ * memory as there is, until a poll says no. */
+
+enum { MANY = 2 * HS_POLL_POINTS + 40000, FEW = 70000 }; /* FEW: of four strips */
+
+typedef struct sorted {
+    hs_account account;
+    hs_options options;
+    hs_scene   scene;
+    hs_grid    grid;
+    double    *x;
+} sorted;
+
+/* Points in [-1, 1)^ndim: some of them are outside the box, if there is one. */
 static void
-cells_are_cut_by_faces(void)
+open_scene(int ndim, int64_t n, double cutoff, const hs_box *box, sorted *s)
 {
-    harness_random   random = {10};
-    const hs_options defaults = hs_options_default();
-    const double     units[] = {1.0, 0.1, 0.3, 1.0 / 3.0, 0x1p-30};
-    int              cut = 0;
-    for (int trial = 0; trial < 300; trial++) {
-        const int    ndim = 1 + trial % 3;
-        const double unit = units[trial % 5];
-        hs_account   account;
-        hs_options   options = defaults;
-        hs_scene     scene;
-        hs_grid      grid;
-        hs_bins      bins;
-        memset(&shared.box, 0, sizeof shared.box);
-        shared.box.ndim = ndim;
-        shared.scene = (brute_scene){.ndim = ndim, .n = SCENE_POINTS, .x = shared.x};
-        shared.scene.box = trial % 4 ? &shared.box : NULL;
-        options.cutoff = unit * (1 + trial / 5 % 2);
-        for (int k = 0; k < ndim; k++) {
-            shared.box.periodic[k] = trial % 4 != 2 || k == 0;
-            shared.box.rows[k][k] = unit * (4 + random_below(&random, 9));
-        }
-        for (int e = 0; e < ndim * SCENE_POINTS; e++) {
-            const double x = unit * random_below(&random, 12) * (trial % 7 ? 1.0 : 0.5);
-            const int    step = random_below(&random, 4);
-            shared.x[e] = step == 0 ? nextafter(x, -1.0) : step == 1 ? nextafter(x, 99.0) : x;
-            if (trial % 2)
-                shared.x[e] += trial % 3 ? -5.0 * unit : 0.25 * unit * random_unit(&random);
-        }
-        if (!sort_scene(&account, &options, &scene, &grid, &bins))
-            continue;
-        for (int k = 0; k < ndim; k++)
-            cut += grid.by_faces[k];
-        check_order(&scene, &grid, &bins);
-        hs_bins_free(&account, &bins);
-        hs_scene_free(&account, &scene);
-        hs_account_close(&account);
-    }
-    CHECK(cut > 20);
+    harness_random random = {4711};
+    hs_failure     failure;
+    s->x = malloc((size_t)(n * ndim) * sizeof *s->x);
+    for (int64_t e = 0; e < n * ndim; e++)
+        s->x[e] = 2.0 * random_unit(&random) - 1.0;
+    const hs_points points = {.data = s->x,
+                              .n = n,
+                              .ndim = ndim,
+                              .real = HS_FLOAT64,
+                              .row_stride = ndim * (ptrdiff_t)sizeof(double),
+                              .column_stride = sizeof(double)};
+    s->options = hs_options_default();
+    s->options.cutoff = cutoff;
+    s->options.want = HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT;
+    hs_account_init(&s->account, &s->options);
+    CHECK(hs_scene_init(&s->account, NULL, &points, box, &s->options, &s->scene, &failure) ==
+          HS_OK);
+    CHECK(hs_grid_init(&s->scene, &s->grid, &failure) == HS_OK);
 }
 
-/* A lattice with a point on each face, whose zeros are negative: they lie on a face, not before
- * it. */
 static void
-a_zero_has_no_sign(void)
+close_scene(sorted *s)
 {
-    for (int ndim = 1; ndim <= 2; ndim++) {
-        hs_account account;
-        hs_scene   scene;
-        hs_grid    grid;
-        hs_bins    bins;
-        const int  n = 64, length = ndim == 1 ? 64 : 8;
-        shared.scene = (brute_scene){.ndim = ndim,
-                                     .n = n,
-                                     .x = shared.x,
-                                     .box = &shared.box,
-                                     .cutoff = 1.0,
-                                     .inclusive = true};
-        shared.box = (hs_box){.ndim = ndim};
-        for (int k = 0; k < ndim; k++) {
-            shared.box.periodic[k] = true;
-            shared.box.rows[k][k] = (double)length;
+    hs_scene_free(&s->account, &s->scene);
+    CHECK(s->account.held == 0);
+    hs_account_close(&s->account);
+    free(s->x);
+}
+
+/* Sorts points of a scene of the same kind, in one go, by so many threads, while allocation nth
+ * fails. Whether it was asked for. */
+static bool
+compare_order(double cutoff, int threads, int nth, const int32_t *expected, int *n_refused)
+{
+    sorted   s;
+    hs_bins  bins;
+    hs_team *team = hs_team_create(threads);
+    open_scene(2, FEW, cutoff, NULL, &s);
+    hs_test_fail_allocation(nth);
+    const hs_status status = hs_bins_build(&s.account, team, &s.options, &s.scene, &s.grid, &bins);
+    const bool      disturbed = nth > 0 && !hs_test_failure_is_due();
+    hs_test_fail_allocation(0);
+    CHECK(status == HS_OK || (disturbed && status == HS_ERR_MEMORY));
+    *n_refused += status != HS_OK;
+    if (status == HS_OK) {
+        CHECK(memcmp(bins.order, expected, FEW * sizeof *expected) == 0);
+        hs_bins_free(&s.account, &bins);
+    }
+    close_scene(&s);
+    hs_team_free(team);
+    return disturbed;
+}
+
+/* Few cells, and about as many as points: then threads do not count for themselves. */
+static void
+any_team_finds_the_same_order(void)
+{
+    static const double cutoffs[] = {0.02, 0.0001};
+    for (int c = 0; c < 2; c++) {
+        sorted  s;
+        hs_bins bins;
+        int     nth = 0, n_refused = 0;
+        open_scene(2, FEW, cutoffs[c], NULL, &s);
+        CHECK((s.grid.n_cells > FEW / 3) == (c == 1));
+        CHECK(hs_bins_build(&s.account, NULL, &s.options, &s.scene, &s.grid, &bins) == HS_OK);
+        for (int threads = 2; threads <= HS_SLABS + 1; threads += threads == 2 ? 2 : 29)
+            (void)compare_order(cutoffs[c], threads, 0, bins.order, &n_refused);
+        CHECK(n_refused == 0);
+        while (compare_order(cutoffs[c], 2, ++nth, bins.order, &n_refused) && nth < 50) {
         }
-        for (int e = 0; e < n * ndim; e++) {
-            const int place = (e % ndim == 0 ? e / ndim % length : e / ndim / length) - length / 2;
-            shared.x[e] = place == 0 ? -0.0 : (double)place;
+        /* The second one, of a thread that counts for itself, is no need. */
+        CHECK(nth == (c == 0 ? 3 : 2) && n_refused == 1);
+        hs_bins_free(&s.account, &bins);
+        close_scene(&s);
+    }
+}
+
+/* Sparse scenes: scenes whose points are few and far between, crowded, or both. */
+
+enum { SPARSE_MANY = 20000, SPARSE_MANY_KINDS = 8 };
+
+/* Normal, from two uniform numbers. */
+static double
+random_normal(harness_random *random)
+{
+    const double angle = 6.283185307179586 * random_unit(random);
+    return sqrt(-2.0 * log(1.0 - random_unit(random))) * cos(angle);
+}
+
+/* SPARSE_MANY points in three dimensions, for cutoff 1. */
+static void
+many_points(harness_random *random, int kind, double *many)
+{
+    const double side = 11.0; /* 15 points per unit of volume, 63 neighbours */
+    for (int i = 0; i < SPARSE_MANY; i++) {
+        double *x = many + 3 * i, radius = 1.0;
+        if (kind == 3) /* lognormal sizes */
+            radius = exp(3.0 * random_normal(random));
+        else if (kind == 4) /* Plummer */
+            radius = 3.0 / sqrt(pow(1.0 - random_unit(random), -2.0 / 3.0) - 1.0 + 1e-12);
+        for (int k = 0; k < 3; k++) {
+            x[k] = kind < 3 ? side * random_unit(random) : radius * random_normal(random);
+            x[k] += kind == 1 && i % 2 ? 1e9 : kind == 2 && i % 2 ? 1e14 : 0.0;
+            if (kind == 5)
+                x[k] = pow(10.0, -3.0 + 303.0 * random_unit(random));
         }
-        const hs_options options = options_of(&shared.scene);
-        CHECK(sort_scene(&account, &options, &scene, &grid, &bins));
-        CHECK(grid.by_faces[0] && grid.n_cells > 1);
-        check_order(&scene, &grid, &bins);
-        hs_bins_free(&account, &bins);
-        hs_scene_free(&account, &scene);
-        hs_account_close(&account);
+        if (kind == 6)
+            x[1] = x[2] = x[0] * 1e3; /* a line across */
+        if (kind == 7 && i % 1000 == 0)
+            x[0] = i % 2000 ? 1e300 : -1e300;
+        if (kind == 7)
+            x[2] = 1e-6 * x[2]; /* a plane */
+    }
+}
+
+/* Sparse grid: sparse cells are as far apart as their reach says, at any magnitude of the
+ * coordinates. */
+
+static double many_sparse_grid[3 * SPARSE_MANY];
+
+/* Scenes that a dense grid serves well are left to it; those it fails are not. */
+static void
+sparse_pays_where_points_crowd(void)
+{
+    /* What reaches to 1e300 has been condensed before. */
+    static const bool pays[SPARSE_MANY_KINDS] = {false, true, true, true, true, false, true, false};
+    harness_random    random = {141};
+    for (int kind = 0; kind < SPARSE_MANY_KINDS; kind++) {
+        const brute_scene scene = {
+            .ndim = 3, .n = SPARSE_MANY, .x = many_sparse_grid, .cutoff = 1.0, .inclusive = true};
+        const hs_options options = options_of(&scene);
+        const hs_points  points = points_of(&scene);
+        hs_account       account;
+        hs_scene         read;
+        hs_grid          dense;
+        hs_failure       failure;
+        many_points(&random, kind, many_sparse_grid);
+        hs_account_init(&account, &options);
+        CHECK(hs_scene_init(&account, NULL, &points, NULL, &options, &read, &failure) == HS_OK);
+        CHECK(hs_grid_init(&read, &dense, &failure) == HS_OK);
+        CHECK((hs_sparse_choose(&read, &dense) > 0.0) == pays[kind]);
+        hs_scene_free(&account, &read);
     }
 }
 
 void
 test_bins(void)
 {
-    RUN(a_zero_has_no_sign);
-    RUN(every_point_is_once_in_its_own_cell);
     RUN(coordinates_and_turns_travel_with_their_point);
-    RUN(cells_are_cut_by_faces);
+    RUN(any_team_finds_the_same_order);
+    RUN(sparse_pays_where_points_crowd);
 }

@@ -1,264 +1,249 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * test_grid.c: wherever two points within the radius of each other lie, the offset of their cells
- * is met exactly once: forwards from one of them, and not also from the other.
- */
-#include <float.h>
-
+/* test_grid.c: cells are as wide as the search needs, and their stencils miss no neighbour. */
+#include "../../../csrc/core/base/outcome.h"
+#include "../../../csrc/core/box/lattice.h"
+#include "../../../csrc/core/cells/grid.h"
 #include "../../../csrc/core/cells/stencil.h"
+#include "../../../csrc/core/memory/account.h"
+#include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
-#include "../support/random_scenes.h"
+#include "../support/poll_checks.h"
+
+#include <math.h>
 
 void test_grid(void);
 
-static random_scene shared;
+/* Grid width: how wide cells are, and where their faces lie, changes no answer. */
 
-typedef struct searched {
-    hs_account account;
-    hs_scene   scene;
-    hs_grid    grid;
-    hs_stencil stencil;
-} searched;
+/* Boxes so short that a cutoff passes more images than are counted are refused with any cells. */
+static void
+endless_images_are_refused_with_any_cells(void)
+{
+    static const double lengths[] = {1e-9, 1e-11, 1e-30, 0x1p-1000};
+    double              x[4] = {0.0, 0.0, 0.1, 0.1};
+    for (int l = 0; l < 4; l++) {
+        hs_box      box = {.ndim = 2, .periodic = {true, false}, .rows = {{lengths[l], 0.0}}};
+        brute_scene scene = {.ndim = 2, .n = 2, .x = x, .box = &box, .cutoff = 10.0};
+        for (double size = 1.0; size > 1e-40; size *= 1e-8) {
+            const hs_points points = points_of(&scene);
+            hs_options      options = options_of(&scene);
+            hs_plan         plan;
+            options.cell_size = 0.0;
+            const hs_status without = hs_plan_make(AMONG(&points, &box), &options, &plan, NULL);
+            options.cell_size = size;
+            CHECK(hs_plan_make(AMONG(&points, &box), &options, &plan, NULL) == without);
+            CHECK(without == HS_OK || without == HS_ERR_MEMORY);
+            CHECK(l == 0 || without == HS_ERR_MEMORY);
+        }
+    }
+}
+
+/* Grid unit: a scene in the plane and its grid, so that a test can take the steps of choosing
+ * cells one by one. */
+
+enum { N = 3000 };
+
+static double     x_grid_unit[2 * N];
+static hs_account account;
+static hs_scene   scene_grid_unit;
+static hs_grid    grid;
+
+static void
+open_scene(int64_t n, const hs_box *box, double cutoff)
+{
+    const hs_points points = {x_grid_unit, n, 2, HS_FLOAT64, 16, 8};
+    hs_options      options = hs_options_default();
+    hs_failure      failure;
+    options.cutoff = cutoff;
+    hs_account_init(&account, &options);
+    CHECK(hs_scene_init(&account, NULL, &points, box, &options, &scene_grid_unit, &failure) ==
+          HS_OK);
+    CHECK(hs_grid_init(&scene_grid_unit, &grid, &failure) == HS_OK);
+}
+
+static void
+close_scene(void)
+{
+    hs_scene_free(&account, &scene_grid_unit);
+    CHECK(account.held == 0);
+}
+
+static void
+fill_square(double side)
+{
+    harness_random random = {88};
+    for (int e = 0; e < 2 * N; e++)
+        x_grid_unit[e] = side * random_unit(&random);
+}
+
+/* Grid faces: axes are cut at the numbers that cells begin at where these are as wide as the
+ * cutoff, or a part of it, and no rounding can move a point over them. */
+
+/* Boxes that are whole multiples of the cutoff get as many cells, unless the cutoff is 0. */
+static void
+faces_need_a_cutoff(void)
+{
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{8.0}, {0.0, 8.0}}};
+    const double counts[2] = {7.0, 7.0}, parts[2] = {1.0, 1.0};
+    fill_square(8.0);
+    open_scene(N, &box, 1.0);
+    for (int with = 0; with < 2; with++) {
+        scene_grid_unit.radius = with ? 1.0 : 0.0;
+        CHECK(hs_grid_set_shape(&scene_grid_unit, counts, &grid) == HS_OK);
+        hs_grid_cut_by_faces(&scene_grid_unit, parts, 1000.0, &grid);
+        CHECK(grid.by_faces[0] == with && grid.by_faces[1] == with);
+        CHECK(grid.shape[0] == 7 + with && grid.n_cells == (7 + with) * (7 + with));
+    }
+    CHECK(hs_grid_set_shape(&scene_grid_unit, counts, &grid) == HS_OK);
+    const hs_grid seven = grid;
+    scene_grid_unit.upper[0] =
+        -(scene_grid_unit.lower[0] = -0x1p31); /* more cells than can be told apart */
+    grid.shape[0] = INT64_C(1) << 31;
+    hs_grid_cut_by_faces(&scene_grid_unit, parts, 0x1p60, &grid);
+    CHECK(!grid.by_faces[0] && grid.shape[0] == INT64_C(1) << 31);
+    scene_grid_unit.upper[0] = -(scene_grid_unit.lower[0] = -4.0);
+    grid = seven;
+    hs_grid_cut_by_faces(&scene_grid_unit, parts, 56.0,
+                         &grid); /* room for a row more, not for two */
+    CHECK(grid.by_faces[0] && !grid.by_faces[1] && grid.n_cells == 56);
+    close_scene();
+}
+
+/* Grid ranges: how far apart the cells of a pair can be, in lattices that are worse than any box
+ * gives. */
+
+/* Normals that miss the periods by 0.3 of one: ranges grow with the number of images, which grows
+ * with the ranges. */
+static void
+endless_ranges_are_refused(void)
+{
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 1.0}}};
+    double       density;
+    hs_failure   failure = HS_NO_FAILURE;
+    bool         is_wider;
+    fill_square(1.0);
+    open_scene(4, &box, 1.0);
+    scene_grid_unit.lattice.aligned = false;
+    scene_grid_unit.lattice.normal[0][0] = 0.7;
+    scene_grid_unit.lattice.normal[0][1] = scene_grid_unit.lattice.normal[1][0] = 0.0;
+    scene_grid_unit.lattice.normal[1][1] = 1.0;
+    scene_grid_unit.radius = 100.0;
+    CHECK(hs_grid_begin(&scene_grid_unit, &density, &grid, &failure) == HS_ERR_MEMORY);
+    CHECK(failure.expected_pairs == INFINITY && failure.expected_bytes == INFINITY);
+    failure = HS_NO_FAILURE;
+    CHECK(hs_grid_init(&scene_grid_unit, &grid, &failure) == HS_ERR_MEMORY);
+    CHECK(failure.expected_pairs == INFINITY);
+    CHECK(hs_grid_init_wide(&scene_grid_unit, 1.0, &grid, &is_wider, &failure) == HS_ERR_MEMORY);
+    const hs_grid before = grid;
+    CHECK(hs_grid_narrow(&scene_grid_unit, false, 2.0, &grid) == HS_ERR_MEMORY);
+    CHECK(grid.reach[0] == before.reach[0] && grid.expected_pairs == before.expected_pairs);
+    scene_grid_unit.lattice.U[1][0] = INT64_C(1) << 32; /* a row that no S counts */
+    CHECK(hs_grid_begin(&scene_grid_unit, &density, &grid, &failure) == HS_ERR_BOX_SKEWED);
+    CHECK(hs_grid_init_wide(&scene_grid_unit, 1.0, &grid, &is_wider, &failure) ==
+          HS_ERR_BOX_SKEWED);
+    scene_grid_unit.lattice.U[1][0] = 0;
+    scene_grid_unit.radius = 0.25; /* then it is rounding alone that moves points across the box */
+    scene_grid_unit.t_error[0] = 0.3;
+    CHECK(hs_grid_begin(&scene_grid_unit, &density, &grid, &failure) == HS_ERR_BOX_SKEWED);
+    scene_grid_unit.t_error[0] = 0.0;
+    scene_grid_unit.lattice.normal[0][0] = 1.0;
+    CHECK(hs_grid_begin(&scene_grid_unit, &density, &grid, &failure) == HS_OK);
+    CHECK(grid.range[0] >= 0.25 && grid.range[0] < 0.2500001);
+    close_scene();
+}
+
+/* Directions within 1e-4 of each other say nothing about which rows are out of reach. */
+static void
+flat_frames_prune_nothing(void)
+{
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0, 0.25}, {0.0, 1.0}}};
+    hs_stencil   pruned, whole;
+    fill_square(1.0);
+    open_scene(4, &box, 6.0);
+    const hs_options options = hs_options_default();
+    CHECK(!scene_grid_unit.lattice.aligned && grid.n_cells == 1);
+    CHECK(hs_stencil_build(&account, &options, &scene_grid_unit, &grid, true, &pruned) == HS_OK);
+    hs_lattice  *lattice = &scene_grid_unit.lattice;
+    const double normal[2][2] = {{1.0, -1e4}, {0.0, 1e4}}, direction[2][2] = {{1.0}, {1.0, 1e-4}};
+    for (int k = 0; k < 2; k++) {
+        memcpy(lattice->normal[k], normal[k], sizeof normal[k]);
+        memcpy(lattice->direction[k], direction[k], sizeof direction[k]);
+    }
+    CHECK(hs_stencil_build(&account, &options, &scene_grid_unit, &grid, true, &whole) == HS_OK);
+    CHECK(whole.n_rows == 2 * grid.reach[1] + 1);
+    const int64_t n_rows = whole.n_rows;
+    hs_stencil_free(&account, &whole);
+    lattice->direction[1][1] = 1.0; /* nor do directions that are not those of the normals */
+    CHECK(hs_stencil_build(&account, &options, &scene_grid_unit, &grid, true, &whole) == HS_OK);
+    CHECK(whole.n_rows == n_rows);
+    int64_t narrower = 0;
+    for (int64_t r = 0; r < whole.n_rows; r++) {
+        CHECK(whole.rows[r].offset[1] == r - grid.reach[1]);
+        CHECK(whole.rows[r].first == -grid.reach[0] && whole.rows[r].last == grid.reach[0]);
+    }
+    for (int64_t r = 0; r < pruned.n_rows; r++)
+        narrower += pruned.rows[r].last - pruned.rows[r].first < 2 * grid.reach[0];
+    CHECK(pruned.n_rows == whole.n_rows ? narrower > 0 : pruned.n_rows < whole.n_rows);
+    hs_stencil_free(&account, &pruned);
+    hs_stencil_free(&account, &whole);
+    close_scene();
+}
+
+/* Stencil: neighbourhoods of very many rows of cells: counted right, stopped, refused. */
+
+static const double one_point[3] = {0.125, 0.25, 0.5};
 
 static hs_status
-prepare(searched *s)
+count_images(double tilt, double cutoff, hs_options *options, int64_t *count)
 {
-    const hs_points  points = points_of(&shared.scene);
-    const hs_options options = options_of(&shared.scene);
-    hs_failure       failure;
-    hs_account_init(&s->account, &options);
-    hs_status status =
-        hs_scene_init(&s->account, NULL, &points, shared.scene.box, &options, &s->scene, &failure);
-    if (status != HS_OK)
-        return status;
-    status = hs_grid_init(&s->scene, &s->grid, &failure);
-    if (status == HS_OK)
-        status = hs_stencil_build(&s->account, &options, &s->scene, &s->grid, false, &s->stencil);
-    if (status != HS_OK)
-        hs_scene_free(&s->account, &s->scene);
-    return status;
+    const hs_box    box = {.ndim = 3,
+                           .periodic = {true, true, true},
+                           .rows = {{1.0, 0.0, 0.0}, {tilt, 1.0, 0.0}, {0.0, tilt, 1.0}}};
+    const hs_points points = {one_point, 1, 3, HS_FLOAT64, 24, 8};
+    *count = -1;
+    options->cutoff = cutoff;
+    return hs_pairs_count(AMONG(&points, &box), options, count, NULL);
 }
 
 static void
-release(searched *s)
+long_lists_of_rows_can_be_stopped(void)
 {
-    hs_stencil_free(&s->account, &s->stencil);
-    hs_scene_free(&s->account, &s->scene);
-    CHECK(s->account.held == 0);
-}
-
-/* How many times the stencil goes forward by this offset of cells. */
-static int
-times_visited(const searched *s, const int64_t *offset, int64_t sign)
-{
-    int times = 0;
-    for (int64_t e = 0; e < s->stencil.n_rows; e++) {
-        const hs_stencil_row *row = &s->stencil.rows[e];
-        bool                  same = true;
-        for (int k = 1; k < s->grid.ndim; k++)
-            same = same && row->offset[k] == sign * offset[k];
-        times += same && row->first <= sign * offset[0] && sign * offset[0] <= row->last;
-    }
-    return times;
-}
-
-/* The cell of x, images counted on: wraps a copy into the box first, as the search does. False
- * when x is not where points can be. */
-static bool
-cell_indices(const searched *s, const double *x, int64_t *index)
-{
-    const hs_lattice *lattice = &s->scene.lattice;
-    double            inside[HS_MAX_DIM];
-    int64_t           turns[HS_MAX_DIM] = {0};
-    memcpy(inside, x, sizeof inside);
-    for (int pass = 0; pass < 2; pass++) {
-        for (int k = 0; k < s->grid.ndim; k++) {
-            const int r = lattice->row_of_axis[k];
-            if (r < 0)
-                continue;
-            const double t = hs_lattice_coordinate(lattice, inside, k);
-            const double turn = rint(t / lattice->period[k]);
-            for (int c = 0; c < s->grid.ndim; c++)
-                inside[c] -= turn * lattice->rows[r][c];
-            turns[k] += (int64_t)turn;
-        }
-    }
-    for (int k = 0; k < s->grid.ndim; k++) {
-        const double t = hs_lattice_coordinate(&s->scene.lattice, inside, k);
-        if (lattice->row_of_axis[k] < 0 && !(t >= s->scene.lower[k] && t <= s->scene.upper[k]))
-            return false;
-        index[k] = hs_grid_index(&s->grid, k, t) + turns[k] * s->grid.shape[k];
-    }
-    return true;
-}
-
-/* A place in the region, on a cell's face along about half of the axes. */
-static void
-random_place(harness_random *random, const searched *s, double *x)
-{
-    double t[HS_MAX_DIM];
-    for (int k = 0; k < s->grid.ndim; k++) {
-        const double cells = (double)s->grid.shape[k];
-        double       place = cells * random_unit(random);
-        if (random_below(random, 2))
-            place = floor(place) + (random_below(random, 2) ? 0.0 : 1.0 - 1e-12);
-        t[k] = s->grid.lower[k] + place * s->grid.cell_size[k];
-    }
-    for (int c = 0; c < s->grid.ndim; c++) {
-        x[c] = 0.0;
-        for (int k = 0; k < s->grid.ndim; k++)
-            x[c] += t[k] * s->scene.lattice.direction[k][c];
-    }
-}
-
-/* y = x + a vector no longer than the radius, most of them exactly as long, some along an axis. */
-static void
-random_neighbour(harness_random *random, const searched *s, const double *x, double *y)
-{
-    double    vector[HS_MAX_DIM], square = 0.0;
-    const int along = random_below(random, 2 * s->grid.ndim);
-    for (int k = 0; k < s->grid.ndim; k++) {
-        vector[k] = along < s->grid.ndim ? (double)(k == along) : 2.0 * random_unit(random) - 1.0;
-        if (random_below(random, 2))
-            vector[k] = -vector[k];
-        square += vector[k] * vector[k];
-    }
-    const double length = random_below(random, 4) ? 1.0 - 1e-15 : random_unit(random);
-    for (int k = 0; k < s->grid.ndim; k++)
-        y[k] = x[k] + (square > 0.0 ? vector[k] / sqrt(square) : 0.0) * length * s->scene.cutoff;
-}
-
-/* Returns how many neighbours lay where points can be. */
-static int
-check_places(harness_random *random, const searched *s, int n_places)
-{
-    int checked = 0;
-    for (int p = 0; p < n_places; p++) {
-        double  x[HS_MAX_DIM] = {0}, y[HS_MAX_DIM] = {0};
-        int64_t from[HS_MAX_DIM] = {0}, to[HS_MAX_DIM] = {0}, offset[HS_MAX_DIM] = {0};
-        bool    own = true;
-        random_place(random, s, x);
-        random_neighbour(random, s, x, y);
-        if (!cell_indices(s, x, from) || !cell_indices(s, y, to))
-            continue;
-        for (int k = 0; k < s->grid.ndim; k++) {
-            offset[k] = to[k] - from[k];
-            own = own && offset[k] == 0;
-        }
-        const int forwards = times_visited(s, offset, 1);
-        CHECK(own ? forwards == 1 : forwards + times_visited(s, offset, -1) == 1);
-        checked++;
-    }
-    return checked;
-}
-
-static void
-neighbouring_cells_are_met_exactly_once(void)
-{
-    harness_random random = {299792458};
-    int            checked = 0, several = 0, few = 0;
-    for (int trial = 0; trial < 900; trial++) {
-        searched s;
-        make_scene(&random, trial % SCENE_KINDS, 1 + trial / SCENE_KINDS % 5,
-                   40 + random_below(&random, 361), trial % 9 ? 4.0 : 100.0, 0, &shared);
-        shared.scene.cutoff = (trial % 4 ? 0.7 : 3.0) * random_unit(&random);
-        if (prepare(&s) != HS_OK)
-            continue;
-        several += s.grid.n_cells > 1;
-        for (int k = 0; k < s.grid.ndim; k++)
-            few += s.scene.lattice.row_of_axis[k] >= 0 && s.grid.shape[k] < 3;
-        if (s.stencil.n_rows < 3000)
-            checked += check_places(&random, &s, 150);
-        release(&s);
-    }
-    CHECK(checked > 60000);
-    CHECK(several > 300);
-    CHECK(few > 50);
-}
-
-static void
-offsets_are_listed_once(void)
-{
-    harness_random random = {6626};
-    for (int trial = 0; trial < 200; trial++) {
-        searched s;
-        make_scene(&random, trial % SCENE_KINDS, 1 + trial / SCENE_KINDS % 4, 300, 4.0, 0, &shared);
-        shared.scene.cutoff = 1.5 * random_unit(&random);
-        if (prepare(&s) != HS_OK)
-            continue;
-        const hs_stencil_row *rows = s.stencil.rows;
-        bool                  once = s.stencil.n_rows >= 1 && rows[0].first == 0;
-        for (int k = 1; k < s.grid.ndim; k++)
-            once = once && rows[0].offset[k] == 0;
-        for (int64_t a = 0; a < s.stencil.n_rows && a < 300; a++) {
-            int64_t offset[HS_MAX_DIM] = {0};
-            for (int k = 1; k < s.grid.ndim; k++)
-                offset[k] = rows[a].offset[k];
-            offset[0] = rows[a].last;
-            once = once && times_visited(&s, offset, 1) == 1;
-            once = once && (a == 0 || times_visited(&s, offset, -1) == 0);
-        }
-        CHECK(once);
-        release(&s);
+    hs_options options = hs_options_default();
+    int64_t    count, polls;
+    options.poll = stop_after;
+    options.poll_context = &polls;
+    for (int n = 0; n < 3; n++) {
+        polls = n;
+        CHECK(count_images(0.0, 200.0, &options, &count) == HS_ERR_INTERRUPTED && count == -1);
     }
 }
 
 static void
-cells_are_bounded_by_the_points(void)
+too_many_rows_are_refused(void)
 {
-    harness_random random = {137};
-    for (int trial = 0; trial < 400; trial++) {
-        searched s;
-        make_scene(&random, trial % SCENE_KINDS, 1 + trial / 7 % HS_MAX_DIM,
-                   random_below(&random, 60), 4.0, trial % 3 ? 0 : 300, &shared);
-        const int exponent = random_below(&random, 700);
-        for (int e = 0; e < shared.scene.n * shared.scene.ndim; e++)
-            shared.x[e] = ldexp(shared.x[e], trial % 2 ? exponent : 0);
-        for (int e = 0; e < 64; e++)
-            shared.box.rows[e / 8][e % 8] = ldexp(shared.box.rows[e / 8][e % 8], exponent);
-        shared.scene.cutoff = ldexp(1.0, -random_below(&random, 1000));
-        if (prepare(&s) != HS_OK)
-            continue;
-        int64_t product = 1;
-        for (int k = 0; k < s.grid.ndim; k++) {
-            CHECK(s.grid.shape[k] >= 1 && s.grid.stride[k] == product);
-            product *= s.grid.shape[k];
-        }
-        CHECK(product == s.grid.n_cells);
-        CHECK(s.grid.n_cells <= 2 * shared.scene.n + HS_GRID_SPARE_CELLS);
-        release(&s);
+    hs_options options = hs_options_default();
+    int64_t    count;
+    CHECK(count_images(0.0, 1e5, &options, &count) == HS_ERR_MEMORY);
+    CHECK(count_images(0.375, 1e5, &options, &count) == HS_ERR_MEMORY);
+    CHECK(count_images(0.0, 1e300, &options, &count) == HS_ERR_MEMORY);
+    for (int exponent = 25; exponent < 900; exponent += 25) {
+        const hs_status expected = exponent == 25 ? HS_ERR_TOO_MANY : HS_ERR_MEMORY;
+        CHECK(count_images(0.0, ldexp(1.0, exponent), &options, &count) == expected);
+        CHECK(count_images(0.375, ldexp(1.0, exponent), &options, &count) == expected);
     }
-}
-
-/* A reach of 2^31 cells or more must be refused, not rounded into a narrower integer. */
-static void
-reach_never_passes_its_integers(void)
-{
-    static const double cutoffs[] = {0x1p30,         0x1.fffffffp+30, 0x1.fffffffep+30,
-                                     0x1p31 - 0.5,   0x1p31,          0x1p32,
-                                     0x1p31 - 0.001, 0x1p31 - 1.5,    0x1p31 - 2.5};
-    hs_box              box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
-    for (int trial = 0; trial < 9; trial++) {
-        searched s;
-        shared.x[0] = 0.25;
-        shared.scene = (brute_scene){.ndim = 1, .n = 1, .x = shared.x, .box = &box};
-        shared.scene.cutoff = cutoffs[trial];
-        const hs_status status = prepare(&s);
-        CHECK(status == HS_OK || status == HS_ERR_MEMORY);
-        if (status == HS_OK) {
-            const double cells = (double)s.stencil.rows[0].last;
-            CHECK((cells + 1.0) * s.grid.cell_size[0] >= s.scene.cutoff);
-            release(&s);
-        }
-    }
+    options.memory_limit = 2e5;
+    CHECK(count_images(0.0, 200.0, &options, &count) == HS_ERR_MEMORY);
+    CHECK(count_images(0.375, 200.0, &options, &count) == HS_ERR_MEMORY);
 }
 
 void
 test_grid(void)
 {
-    RUN(neighbouring_cells_are_met_exactly_once);
-    RUN(offsets_are_listed_once);
-    RUN(cells_are_bounded_by_the_points);
-    RUN(reach_never_passes_its_integers);
+    RUN(endless_images_are_refused_with_any_cells);
+    RUN(faces_need_a_cutoff);
+    RUN(endless_ranges_are_refused);
+    RUN(flat_frames_prune_nothing);
+    RUN(long_lists_of_rows_can_be_stopped);
+    RUN(too_many_rows_are_refused);
 }

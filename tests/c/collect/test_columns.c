@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_columns.c: options.out, pairs written into arrays of the caller, and nothing beyond them. */
-#include "../../../csrc/core/base/want.h"
+/* test_columns.c: columns of results are joined, filled and returned, or written to the caller's
+ * arrays. */
 #include "../../../csrc/core/collect/columns.h"
-#include "../../../csrc/core/memory/account.h"
-#include "../../../csrc/core/memory/pool.h"
+#include "../support/among.h"
+#include "../support/harness.h"
 #include "../support/output_checks.h"
 #include "../support/random_scenes.h"
-#include "../support/among.h"
 
 void test_columns(void);
+
+/* Columns: options.out, pairs written into arrays of the caller, and nothing beyond them. */
 
 static random_scene shared;
 
@@ -52,112 +53,6 @@ find_anew(const brute_scene *scene, const hs_options *options)
     return pairs;
 }
 
-/* Exactly enough room, some to spare, and too little in several ways. */
-static void
-check_capacities(const brute_scene *scene, const hs_options *options)
-{
-    hs_pairs     *pairs = find_anew(scene, options);
-    const int64_t n = hs_pairs_length(pairs);
-    const int64_t enough[] = {n, n + 1, n + 100}, short_of[] = {0, 1, n / 2, n - 1};
-    caller_arrays c;
-    hs_failure    failure;
-    int64_t       found;
-    for (int e = 0; e < 3; e++) {
-        CHECK(find_into(scene, *options, enough[e], n + 100, &c, &failure, &found) == HS_OK);
-        CHECK(found == n);
-        CHECK(same_as_result(&c, pairs, n));
-        CHECK(untouched_from(&c, n));
-        free_arrays(&c);
-    }
-    for (int e = 0; e < 4 && n > 2; e++) {
-        CHECK(find_into(scene, *options, short_of[e], n, &c, &failure, &found) == HS_ERR_CAPACITY);
-        CHECK(failure.expected_pairs == (double)n);
-        CHECK(untouched_from(&c, short_of[e]));
-        free_arrays(&c);
-    }
-    hs_pairs_free(pairs);
-}
-
-static void
-every_quantity_goes_to_the_callers_arrays(void)
-{
-    for (int sorted = 0; sorted < 2; sorted++) {
-        for (unsigned want = 1; want <= HS_WANT_ALL; want++) {
-            const brute_scene *scene = scene_of((int)want % SCENE_KINDS, false);
-            hs_options         options = options_of(scene);
-            options.want = want;
-            options.sorted = sorted;
-            options.index_bytes = want / 7 % 2 ? 4 : 8;
-            check_capacities(scene, &options);
-        }
-    }
-}
-
-static void
-many_pairs_go_to_the_callers_arrays(void)
-{
-    static const unsigned wants[] = {HS_WANT_I | HS_WANT_J, HS_WANT_BOTH, WANT_ALL | HS_WANT_BOTH};
-    int64_t               most = 0;
-    for (int kind = 0; kind < SCENE_KINDS; kind++) {
-        for (int variant = 0; variant < 6; variant += IS_SLOW ? 5 : 1) {
-            const brute_scene *scene = scene_of(kind, true);
-            hs_options         options = options_of(scene);
-            options.want = wants[variant / 2];
-            options.sorted = variant & 1;
-            check_capacities(scene, &options);
-            hs_pairs *pairs = find_anew(scene, &options);
-            most = hs_pairs_length(pairs) > most ? hs_pairs_length(pairs) : most;
-            hs_pairs_free(pairs);
-        }
-    }
-    CHECK(most > 32768); /* a stage holds 16384 of 16 bytes */
-}
-
-/* Room for none and no arrays at all: says how many there are. */
-static void
-no_room_asks_for_the_number(void)
-{
-    const brute_scene   *scene = scene_of(SCENE_TRICLINIC, true);
-    const hs_points      points = points_of(scene);
-    const hs_pair_arrays nothing = {.index_bytes = 8};
-    hs_options           options = options_of(scene);
-    int64_t              count = -1;
-    CHECK(hs_pairs_count(AMONG(&points, scene->box), &options, &count, NULL) == HS_OK);
-    for (int sorted = 0; sorted < 2; sorted++) {
-        hs_pairs  *pairs = (hs_pairs *)&options;
-        hs_failure failure;
-        options.sorted = sorted;
-        options.want = WANT_ALL | HS_WANT_BOTH;
-        options.out = &nothing;
-        CHECK(hs_pairs_find(AMONG(&points, scene->box), &options, &pairs, &failure) ==
-              HS_ERR_CAPACITY);
-        CHECK(pairs == NULL);
-        CHECK(failure.expected_pairs == (double)count);
-        CHECK(hs_pairs_find(AMONG(&points, scene->box), &options, &pairs, NULL) == HS_ERR_CAPACITY);
-    }
-}
-
-static void
-no_pairs_need_no_room(void)
-{
-    const hs_pair_arrays nothing = {.index_bytes = 4};
-    brute_scene         *scene = scene_of(SCENE_OPEN, false);
-    for (int trial = 0; trial < 4; trial++) {
-        hs_points  points = points_of(scene);
-        hs_options options = options_of(scene);
-        hs_pairs  *pairs = NULL;
-        options.cutoff = 0.0;
-        options.inclusive = false;
-        options.sorted = trial & 1;
-        options.want = WANT_ALL | HS_WANT_BOTH;
-        options.out = &nothing;
-        points.n = trial & 2 ? 0 : points.n;
-        CHECK(hs_pairs_find(AMONG(&points, NULL), &options, &pairs, NULL) == HS_OK);
-        CHECK(pairs != NULL && hs_pairs_length(pairs) == 0);
-        hs_pairs_free(pairs);
-    }
-}
-
 /* The caller's arrays take none of our memory: they are not counted, and no limit refuses them. */
 static void
 the_callers_memory_is_not_counted(void)
@@ -185,38 +80,6 @@ the_callers_memory_is_not_counted(void)
     CHECK(with_own.bytes[HS_FOR_SHIFTS] >= n * 12 && counters.bytes[HS_FOR_SHIFTS] == 0);
 }
 
-/* Pairs of j and D that grow as they come, to the last that the limit allows. */
-static void
-outputs_grow_to_their_limit(void)
-{
-    hs_account account;
-    hs_options options = hs_options_default();
-    hs_output  output;
-    int64_t    n = 0;
-    options.memory_limit = 1e6;
-    hs_account_init(&account, &options);
-    hs_output_init(&account, 3, HS_WANT_J | HS_WANT_VECTOR, 8, &output);
-    CHECK(hs_output_bytes_per_pair(&output) == 32 && !hs_output_has_room(&output, 0));
-    while (hs_output_reserve(&output, 10, 0.0) == HS_OK) {
-        double *to = hs_output_next(&output, HS_WANT_VECTOR);
-        CHECK(hs_output_has_room(&output, 10));
-        for (int e = 0; e < 30; e++) {
-            to[e] = (double)(3 * n + e);
-        }
-        n += 10;
-        output.n_pairs = n;
-    }
-    const double *vector = hs_output_column(&output, HS_WANT_VECTOR);
-    bool          kept = true;
-    for (int64_t e = 0; e < 3 * n; e++) {
-        kept = kept && vector[e] == (double)e;
-    }
-    CHECK(kept && n <= 31250 && n + 10 > 31250 && account.held == 32 * n);
-    CHECK(!hs_output_has_room(&output, 10));
-    hs_output_free(&output);
-    CHECK(account.held == 0);
-}
-
 /* What no memory holds is refused at once; guesses of it are forgotten. */
 static void
 endless_outputs_are_refused(void)
@@ -235,102 +98,102 @@ endless_outputs_are_refused(void)
     hs_output_free(&output);
 }
 
-/* Memory of a result that was not taken is kept for the next one, and counts as what it is. */
-static void
-a_result_that_is_freed_is_held_with_all_it_wrote(void)
+/* Columns touch: every page of a large column is written to, by parts, and small ones are left
+ * alone. */
+
+enum { PAGE = 4096, PART = 4 * PAGE, PAIRS = 6000 };
+
+typedef struct asked {
+    int polls, most; /* times that it goes on */
+} asked;
+
+static bool
+go_on(void *context, double fraction)
 {
-    const brute_scene *scene = scene_of(SCENE_ALIGNED, true);
-    hs_options         options = options_of(scene);
-    options.cutoff = 12.0;
-    const unsigned wants[] = {HS_WANT_DISTANCE, HS_WANT_VECTOR, HS_WANT_SHIFT, HS_WANT_BOTH};
-    const size_t   widths[] = {8, 24, 12, 16};
-    const size_t   before = hs_pool_limit();
-    hs_pool_set_limit((size_t)1 << 30);
-    for (int w = 0; w < 4; w++) {
-        hs_pool_clear();
-        CHECK(hs_pool_held() == 0);
-        options.want = wants[w];
-        hs_pairs     *pairs = find_anew(scene, &options);
-        const int64_t n = hs_pairs_length(pairs);
-        CHECK(n > 400000);
-        hs_pairs_free(pairs);
-        /* Sanitizers watch malloc: nothing is kept from them. */
-        CHECK(HS_WATCHED_MALLOC || hs_pool_held() >= (size_t)n * widths[w]);
-    }
-    hs_pool_clear();
-    hs_pool_set_limit(before);
+    asked *counts = context;
+    CHECK(fraction >= 0.0 && fraction <= 1.0);
+    return ++counts->polls <= counts->most;
 }
 
-/* Where one column cannot grow, the others give back what they got, and have what they had. */
-static void
-columns_grow_together_or_not_at_all(void)
+/* Bytes of a column that are other than 0x5a, if all of these are the first of their page and among
+ * the first `end`, else -1. */
+static int64_t
+touched_pages(const hs_output *output, unsigned bit, int64_t end)
 {
-    for (int had = 0; had < 2; had++) {
-        enum { MANY = 4000000, LITTLE = 1 << 20 }; /* more than what is there at first, in bytes */
-        hs_output output;
-        hs_pool_clear();
-        hs_output_init(NULL, 2, HS_WANT_I | HS_WANT_J | HS_WANT_VECTOR, 8, &output);
-        CHECK(!had || hs_output_reserve(&output, 3000, 0.0) == HS_OK);
-        const int64_t capacity = output.capacity;
-        for (int64_t e = 0; e < 100 * had; e++) {
-            ((int64_t *)hs_output_column(&output, HS_WANT_I))[e] = e;
+    const unsigned char *bytes = hs_output_column(output, bit);
+    const int64_t        n = PAIRS * (int64_t)hs_output_width(output, bit);
+    int64_t              touched = 0;
+    for (int64_t b = 0; b < n; b++) {
+        if (bytes[b] != 0x5a) {
+            touched = touched < 0 || b % PAGE != 0 || b >= end ? -1 : touched + 1;
         }
-        output.n_pairs = 100 * had;
-        hs_test_fail_allocation(-3); /* the third and all behind it */
-        CHECK(hs_output_reserve(&output, MANY, 0.0) == HS_ERR_MEMORY);
-        hs_test_fail_allocation(0);
-        CHECK(output.capacity == capacity && output.n_pairs == 100 * had);
-        for (int k = 0; k < HS_QUANTITIES; k++) {
-            const hs_region *column = &output.column[k];
-            CHECK((column->data != NULL) == (had && (output.columns >> k & 1u)));
-            CHECK(column->capacity <= LITTLE);
-        }
-        for (int64_t e = 0; e < 100 * had; e++) {
-            CHECK(((int64_t *)hs_output_column(&output, HS_WANT_I))[e] == e);
-        }
-        CHECK(hs_output_reserve(&output, MANY, 0.0) == HS_OK);
-        output.n_pairs = 0;
-        hs_output_free(&output);
     }
+    return touched;
+}
+
+/* Touches an output of j (8 bytes a pair) and D (24) whose first n pairs count. */
+static hs_status
+touch(int threads, int64_t n, asked *counts, int64_t *of_j, int64_t *of_vector)
+{
+    hs_options options = hs_options_default();
+    hs_output  output;
+    hs_team   *team = hs_team_create(threads);
+    options.poll = go_on;
+    options.poll_context = counts;
+    counts->polls = 0;
+    hs_output_init(NULL, 3, HS_WANT_J | HS_WANT_VECTOR, 8, &output);
+    CHECK(hs_output_reserve(&output, PAIRS, 0.0) == HS_OK);
+    memset(hs_output_column(&output, HS_WANT_J), 0x5a, PAIRS * 8);
+    memset(hs_output_column(&output, HS_WANT_VECTOR), 0x5a, PAIRS * 24);
+    output.n_pairs = n;
+    const hs_status status = hs_touch_output(team, &options, &output);
+    *of_j = touched_pages(&output, HS_WANT_J, n * 8);
+    *of_vector = touched_pages(&output, HS_WANT_VECTOR, n * 24);
+    hs_output_free(&output);
+    hs_team_free(team);
+    return status;
+}
+
+static int64_t
+pages_of(int64_t bytes)
+{
+    return bytes >= 8 * PART ? (bytes + PAGE - 1) / PAGE : 0;
 }
 
 static void
-opposites_of_shifts_are_numbers(void)
+each_page_is_written_to_once(void)
 {
-    hs_failure failure = {.row = -1};
-    for (int with = 0; with <= 1; with++) {
-        hs_output output;
-        hs_output_init(NULL, 2, HS_WANT_I | HS_WANT_J | (with ? HS_WANT_SHIFT : 0u), 4, &output);
-        CHECK(hs_output_reserve(&output, 3, 0.0) == HS_OK);
-        output.n_pairs = 3;
-        int32_t *shift = hs_output_column(&output, HS_WANT_SHIFT);
-        for (int32_t e = 0; e < 3; e++) {
-            ((int32_t *)hs_output_column(&output, HS_WANT_J))[e] = 10 + e;
-            for (int k = 0; with && k < 2; k++) {
-                shift[2 * e + k] = e == 1 ? -INT32_MAX : INT32_MAX;
-            }
+    static const int64_t sizes[] = {0, 100, 5461, 5462, 5500, PAIRS};
+    const size_t         before = hs_test_touch_parts(PART);
+    for (int threads = 1; threads <= 6; threads++) {
+        for (int s = 0; s < 6; s++) {
+            asked         counts = {.most = 1000};
+            int64_t       of_j, of_vector;
+            const int64_t parts = (sizes[s] * 24 + PART - 1) / PART;
+            CHECK(touch(threads, sizes[s], &counts, &of_j, &of_vector) == HS_OK);
+            CHECK(of_j == pages_of(sizes[s] * 8) && of_vector == pages_of(sizes[s] * 24));
+            CHECK(counts.polls == (of_vector == 0 ? 0 : (parts + threads - 1) / threads));
         }
-        CHECK(hs_output_check_opposites(&output, &failure) == HS_OK && failure.row == -1);
-        if (with) {
-            shift[5] = INT32_MIN;
-            CHECK(hs_output_check_opposites(&output, &failure) == HS_ERR_SHIFT_RANGE);
-            CHECK(failure.row == 12);
-        }
-        hs_output_free(&output);
     }
+    CHECK(hs_test_touch_parts(before) == PART);
+}
+
+static void
+the_caller_may_stop_it(void)
+{
+    const size_t before = hs_test_touch_parts(PART);
+    asked        counts = {.most = 2};
+    int64_t      of_j, of_vector;
+    CHECK(touch(1, PAIRS, &counts, &of_j, &of_vector) == HS_ERR_INTERRUPTED);
+    CHECK(counts.polls == 3 && of_vector == 3 * PART / PAGE && of_j == 0);
+    (void)hs_test_touch_parts(before);
 }
 
 void
 test_columns(void)
 {
-    RUN(every_quantity_goes_to_the_callers_arrays);
-    RUN(many_pairs_go_to_the_callers_arrays);
-    RUN(no_room_asks_for_the_number);
-    RUN(no_pairs_need_no_room);
     RUN(the_callers_memory_is_not_counted);
-    RUN(outputs_grow_to_their_limit);
     RUN(endless_outputs_are_refused);
-    RUN(a_result_that_is_freed_is_held_with_all_it_wrote);
-    RUN(columns_grow_together_or_not_at_all);
-    RUN(opposites_of_shifts_are_numbers);
+    RUN(each_page_is_written_to_once);
+    RUN(the_caller_may_stop_it);
 }

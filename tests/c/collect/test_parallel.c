@@ -1,17 +1,53 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * test_parallel.c: the same answer by any number of threads, to the last bit and in the same order;
- * and whatever goes wrong meanwhile, the call comes to an end and leaves nothing behind.
- */
-#include "../../../csrc/core/base/want.h"
+/* test_parallel.c: the same answer by any number of threads, to the last bit and in the same
+ * order; whatever goes wrong, a call comes to an end and leaves nothing. */
+#include "../../../csrc/core/collect/parallel.h"
 #include "../../../csrc/core/memory/account.h"
 #include "../../../csrc/core/threads/team.h"
-#include "../support/output_checks.h"
-#include "../support/random_scenes.h"
-#include "../support/thread_limit.h"
 #include "../support/among.h"
+#include "../support/output_checks.h"
+#include "../support/search_unit.h"
+
+#include <math.h>
 
 void test_parallel(void);
+
+/* Thread limit: a system that starts only so many threads. */
+
+#if defined(__linux__)
+#define HAS_THREAD_LIMIT 1
+
+#include <errno.h>
+#include <pthread.h>
+
+int __real_pthread_create(pthread_t *, const pthread_attr_t *, void *(*)(void *), void *);
+int __wrap_pthread_create(pthread_t *, const pthread_attr_t *, void *(*)(void *), void *);
+
+static int threads_left = -1;
+
+/* So many more can be started; -1: as many as the system likes. */
+static inline void
+limit_threads(int n)
+{
+    threads_left = n;
+}
+
+int
+__wrap_pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*run)(void *),
+                      void *context)
+{
+    if (threads_left == 0) {
+        return EAGAIN;
+    }
+    threads_left -= threads_left > 0;
+    return __real_pthread_create(thread, attributes, run, context);
+}
+
+#else
+#define HAS_THREAD_LIMIT 0
+#endif
+
+/* Parallel: the same answer by any number of threads, to the last bit and in the same order. */
 
 enum {
     MOST_THREADS = IS_SLOW ? 3 : 5,
@@ -105,143 +141,7 @@ same_pairs(const hs_options *options, const hs_pairs *a, const hs_pairs *b)
     return same;
 }
 
-/* Into arrays of the caller: the room that is needed, or less. */
-static void
-check_out(hs_options options, const hs_pairs *expected, int64_t room)
-{
-    const hs_points points = points_of(&scene);
-    const int64_t   n = hs_pairs_length(expected);
-    hs_pairs       *pairs = NULL;
-    hs_failure      failure;
-    caller_arrays   c;
-    make_arrays(options.want, scene.ndim, options.index_bytes, room, &c);
-    options.out = &c.arrays;
-    const hs_status status = hs_pairs_find(AMONG(&points, scene.box), &options, &pairs, &failure);
-    if (room < n) {
-        CHECK(status == HS_ERR_CAPACITY && failure.expected_pairs == (double)n);
-        CHECK(untouched_from(&c, room));
-    } else {
-        CHECK(status == HS_OK && hs_pairs_length(pairs) == n);
-        CHECK(same_as_result(&c, expected, n) && untouched_from(&c, n));
-    }
-    hs_pairs_free(pairs);
-    free_arrays(&c);
-}
-
-static void
-check_crowd(hs_options options)
-{
-    const hs_points points = points_of(&scene);
-    options.threads = 1;
-    hs_pairs     *alone = find(&options);
-    const int64_t n = hs_pairs_length(alone);
-    for (int threads = 2; threads <= MOST_THREADS; threads++) {
-        int64_t count = -1;
-        options.threads = threads;
-        hs_pairs *together = find(&options);
-        CHECK(same_pairs(&options, alone, together));
-        hs_pairs_free(together);
-        check_out(options, alone, n);
-        if (n > 0) {
-            check_out(options, alone, threads % 2 ? n - 1 : n / 3);
-        }
-        CHECK(hs_pairs_count(AMONG(&points, scene.box), &options, &count, NULL) == HS_OK &&
-              count == n);
-    }
-    hs_pairs_free(alone);
-}
-
-static void
-any_number_of_threads_finds_the_same(void)
-{
-    for (int kind = 0; kind < CROWDS; kind++) {
-        hs_options options = options_of(make_crowd(kind));
-        for (int variant = 0; variant < 4; variant += IS_SLOW ? 3 : 1) {
-            options.sorted = variant & 1;
-            options.want = variant & 2 ? WANT_EVERYTHING : HS_WANT_I | HS_WANT_J;
-            options.index_bytes = variant == 3 ? 4 : 8;
-            check_crowd(options);
-        }
-    }
-}
-
-static void
-every_quantity_is_the_same(void)
-{
-    hs_options options = options_of(make_crowd(CROWD_TRICLINIC));
-    for (unsigned want = 0; want <= HS_WANT_ALL; want += IS_SLOW ? 9 : 1) {
-        options.want = want;
-        options.sorted = want / 5 % 2;
-        options.threads = 1;
-        hs_pairs *alone = find(&options);
-        options.threads = 2 + (int)want % 4;
-        hs_pairs *together = find(&options);
-        CHECK(same_pairs(&options, alone, together));
-        hs_pairs_free(together);
-        hs_pairs_free(alone);
-    }
-}
-
-/* What was done is counted in full, whoever did it. */
-static void
-counters_do_not_depend_on_threads(void)
-{
-    for (int kind = 0; kind < CROWDS; kind++) {
-        hs_options  options = options_of(make_crowd(kind));
-        hs_counters alone, together;
-        options.counters = &alone;
-        hs_pairs_free(find(&options));
-        options.counters = &together;
-        options.threads = 4;
-        hs_pairs_free(find(&options));
-        CHECK(alone.groups == together.groups && alone.candidates == together.candidates);
-        CHECK(alone.pairs == together.pairs && alone.ambiguous == together.ambiguous);
-        CHECK(alone.by_float64 == together.by_float64);
-        CHECK(alone.by_double_word == together.by_double_word);
-        CHECK(alone.by_integers == together.by_integers);
-    }
-}
-
 /* ---- interrupts ---- */
-
-static bool
-poll_until(void *context, double fraction)
-{
-    int64_t *left = context;
-    CHECK(fraction >= 0.0 && fraction <= 1.0);
-    return --*left > 0;
-}
-
-/* Points and candidates enough that the caller is asked a few times, however fast the others. */
-static void
-an_interrupt_ends_all_threads(void)
-{
-    const hs_points points = (make_crowd(CROWD_OPEN), points_of(&scene));
-    hs_options      options = options_of(&scene);
-    int             interrupted = 0;
-    options.cutoff = IS_SLOW ? 0.8 : 0.35;
-    options.want = HS_WANT_BOTH;
-    options.index_bytes = 4;
-    options.poll = poll_until;
-    for (int trial = 0; trial < 24; trial++) {
-        const int64_t before = hs_test_live_blocks();
-        int64_t       left = 1 + trial / 3, count = -1;
-        hs_pairs     *pairs = NULL;
-        options.threads = 1 + trial % MOST_THREADS;
-        options.sorted = trial % 3 == 1;
-        options.poll_context = &left;
-        const hs_status status = trial % 3 == 2
-                                     ? hs_pairs_count(AMONG(&points, NULL), &options, &count, NULL)
-                                     : hs_pairs_find(AMONG(&points, NULL), &options, &pairs, NULL);
-        CHECK(status == (left <= 0 ? HS_ERR_INTERRUPTED : HS_OK) && left >= 0);
-        CHECK((pairs != NULL) == (status == HS_OK && trial % 3 != 2));
-        CHECK((count == -1) == (status != HS_OK || trial % 3 != 2));
-        interrupted += status == HS_ERR_INTERRUPTED;
-        hs_pairs_free(pairs);
-        CHECK(hs_test_live_blocks() == before);
-    }
-    CHECK(interrupted >= (IS_SLOW ? 3 : 6));
-}
 
 /* ---- failures ---- */
 
@@ -294,29 +194,6 @@ a_failing_allocation_ends_all_threads(void)
     }
 }
 
-/* A limit that the result passes, when some threads wait for their turn and others write. */
-static void
-a_memory_limit_ends_all_threads(void)
-{
-    const hs_points points = (make_crowd(CROWD_UNEVEN), points_of(&scene));
-    hs_options      options = options_of(&scene);
-    int             refused = 0;
-    options.cutoff = 0.2;
-    options.want = WANT_EVERYTHING;
-    for (int trial = 0; trial < 40; trial += IS_SLOW ? 3 : 1) {
-        const int64_t before = hs_test_live_blocks();
-        hs_pairs     *pairs = NULL;
-        options.threads = 2 + trial % 4;
-        options.memory_limit = ldexp(1.0, 14 + trial / 2);
-        const hs_status status = hs_pairs_find(AMONG(&points, NULL), &options, &pairs, NULL);
-        CHECK(status == HS_OK || status == HS_ERR_MEMORY);
-        refused += status == HS_ERR_MEMORY;
-        hs_pairs_free(pairs);
-        CHECK(hs_test_live_blocks() == before);
-    }
-    CHECK(refused > (IS_SLOW ? 3 : 10) && refused < (IS_SLOW ? 14 : 40));
-}
-
 #if HAS_THREAD_LIMIT
 /* Where the system refuses threads the others do their work. */
 static void
@@ -341,18 +218,65 @@ fewer_threads_find_the_same(void)
     }
     hs_pairs_free(alone);
 }
+
 #endif
+
+/* Parallel memory: a search that is left half way needs room to the last pair that it leaves with:
+ * with one byte less it fails, and takes nothing with it. */
+
+enum { N = 2000, ENOUGH = 200000 };
+
+static search_unit unit;
+
+/* Records some pairs, with so much memory beyond what is held, and returns how many. */
+static hs_status
+record(double room, int64_t *n_pairs)
+{
+    hs_search    *search = &unit.search;
+    hs_bookmark   bookmark = {.point = 0};
+    hs_failure    failure = HS_NO_FAILURE;
+    hs_output     pairs;
+    const int64_t held = search->call->account.held;
+    search->call->account.limit = (double)held + room;
+    hs_output_init(&search->call->account, 2, HS_WANT_I | HS_WANT_J, 8, &pairs);
+    const hs_status status = hs_parallel_record_on(search, &pairs, ENOUGH, &bookmark, &failure);
+    CHECK((bookmark.point > 0 || bookmark.blocks > 0) == (status == HS_OK));
+    CHECK(bookmark.point < N);
+    *n_pairs = pairs.n_pairs;
+    hs_output_free(&pairs);
+    CHECK(search->call->account.held == held);
+    return status;
+}
+
+static void
+the_last_pairs_need_their_room(void)
+{
+    int64_t n_pairs, n_all;
+    double  low = 0.0, high = 0x1p30;
+    search_unit_points(3, N, 2, 1.0, &unit);
+    search_unit_open(NULL, 2.0, false, HS_WANT_I | HS_WANT_J, &unit);
+    CHECK(record(high, &n_all) == HS_OK && n_all >= ENOUGH && n_all < N * (N - 1) / 2);
+    while (high - low > 1.0) {
+        const double    middle = floor(0.5 * (low + high));
+        const hs_status status = record(middle, &n_pairs);
+        CHECK(status == HS_OK || status == HS_ERR_MEMORY);
+        CHECK(status != HS_OK || n_pairs == n_all);
+        if (status == HS_OK)
+            high = middle;
+        else
+            low = middle;
+    }
+    CHECK(high >= 16.0 * (double)n_all);
+    CHECK(record(low, &n_pairs) == HS_ERR_MEMORY && n_pairs < n_all && n_pairs > 0);
+    search_unit_close(&unit);
+}
 
 void
 test_parallel(void)
 {
-    RUN(any_number_of_threads_finds_the_same);
-    RUN(every_quantity_is_the_same);
-    RUN(counters_do_not_depend_on_threads);
-    RUN(an_interrupt_ends_all_threads);
     RUN(a_failing_allocation_ends_all_threads);
-    RUN(a_memory_limit_ends_all_threads);
 #if HAS_THREAD_LIMIT
     RUN(fewer_threads_find_the_same);
 #endif
+    RUN(the_last_pairs_need_their_room);
 }

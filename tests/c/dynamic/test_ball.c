@@ -1,116 +1,18 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_ball.c: what the thresholds call sure is what the exact metric says of the positions as given,
- * for points about as far away as the radius, in any image. */
+/* test_ball.c: points within a ball of a dynamic list. */
 #include "../../../csrc/core/base/fpenv.h"
 #include "../../../csrc/core/dynamic/ball.h"
 #include "../../../csrc/core/dynamic/new_list.h"
 #include "../../../csrc/core/dynamic/update.h"
+#include "../support/dynamic_brute.h"
 #include "../support/harness.h"
+
+#include <math.h>
 
 void test_ball(void);
 
-/* The image in which the entry has this S. */
-static void
-turn_to(hs_ball *ball, uint32_t place, const int64_t *S, hs_ball_image *turned)
-{
-    int64_t image[2], shift[2] = {INT64_MIN, 0};
-    for (image[0] = -6; image[0] <= 6; image[0]++) {
-        for (image[1] = -6; image[1] <= 6; image[1]++) {
-            hs_ball_turn(ball, image, turned);
-            hs_ball_shift(ball, turned, place, shift);
-            if (shift[0] == S[0] && shift[1] == S[1])
-                return;
-        }
-    }
-}
-
-static void
-check_box(const hs_box *box, double far, uint64_t seed)
-{
-    hs_dynamic_options options = hs_dynamic_options_default();
-    harness_random     random = {seed};
-    hs_dynamic        *list = NULL;
-    hs_failure         failure;
-    int                unsure = 0;
-    options.ndim = 2;
-    options.box = box;
-    options.max_radius = 3.0;
-    CHECK(hs_list_new(&options, &list, &failure) == HS_OK);
-    for (int trial = 0; trial < TRIALS(20000); trial++) {
-        const double  angle = 6.3 * random_unit(&random);
-        const double  radius = 0.5 + 2.0 * random_unit(&random);
-        const double  off = trial % 3 == 0 ? 0.0 : ldexp(random_unit(&random) - 0.5, -40);
-        const int64_t S[2] = {(int64_t)(random_bits(&random) % 5) - 2,
-                              (int64_t)(random_bits(&random) % 5) - 2};
-        double        centre[2], point[2];
-        hs_ball       ball;
-        hs_ball_image turned;
-        hs_placed     placed;
-        int64_t       shift[2] = {0, 0};
-        for (int k = 0; k < 2; k++) {
-            centre[k] = far * (random_unit(&random) - 0.5);
-            point[k] = centre[k] + (radius + off) * (k == 0 ? cos(angle) : sin(angle));
-            for (int l = 0; box != NULL && l < 2; l++)
-                point[k] -= (double)S[l] * box->rows[l][k];
-        }
-        CHECK(hs_ball_init(&ball, list, centre, radius, &failure) == HS_OK);
-        CHECK(hs_dynamic_place(list, point, &placed, &failure) == HS_OK);
-        CHECK(hs_update_insert(list, (hs_key){0, 0}, &placed, &failure) == HS_OK);
-        const uint32_t place = hs_key_map_find(&list->map, &list->entries, (hs_key){0, 0});
-        double         x = 0.0;
-        turned = ball.home;
-        if (box != NULL)
-            turn_to(&ball, place, S, &turned);
-        hs_ball_shift(&ball, &turned, place, shift);
-        CHECK(box == NULL || (shift[0] == S[0] && shift[1] == S[1]));
-        for (int k = 0; k < 2; k++) {
-            const double difference = hs_entry_at(&list->entries, place)[k] - turned.centre[k];
-            x += difference * difference;
-        }
-        hs_metric metric;
-        hs_stages stages = {0};
-        if (box != NULL) {
-            hs_metric_init(&metric, 2, 2, box->rows, radius, true);
-        } else {
-            hs_metric_init(&metric, 2, 0, NULL, radius, true);
-        }
-        const bool within = hs_metric_within(&metric, centre, point, S, &stages);
-        CHECK(!(x < turned.in) || within);
-        CHECK(!(x > turned.out) || !within);
-        CHECK(hs_ball_settle(&ball, &turned, place) == within);
-        unsure += !(x < turned.in) && !(x > turned.out);
-    }
-    CHECK(unsure > 0);
-    hs_list_free(list);
-}
-
-static void
-thresholds_are_never_wrong(void)
-{
-    const hs_box aligned = {.ndim = 2, .periodic = {true, true}, .rows = {{3.1, 0}, {0, 4.3}}};
-    const hs_box skewed = {.ndim = 2, .periodic = {true, true}, .rows = {{3.1, 0.2}, {1.3, 4.3}}};
-    check_box(NULL, 10.0, 1);
-    check_box(&aligned, 10.0, 2);
-    check_box(&aligned, 1e6, 3);
-    check_box(&skewed, 10.0, 4);
-    check_box(&skewed, 1e6, 5);
-}
-
-/* Without ordinary numbers nothing is sure, and all is decided by the stages behind. */
-static void
-extreme_radii_are_left_to_the_exact_stages(void)
-{
-    const double       centre[3] = {0.0, 0.0, 0.0};
-    hs_dynamic_options options = hs_dynamic_options_default();
-    hs_dynamic        *list = NULL;
-    hs_failure         failure;
-    hs_ball            ball;
-    CHECK(hs_list_new(&options, &list, &failure) == HS_OK);
-    CHECK(hs_ball_init(&ball, list, centre, 1e-200, &failure) == HS_OK);
-    CHECK(ball.home.in < 0.0 && ball.home.out == INFINITY);
-    CHECK(hs_ball_init(&ball, list, centre, 0.0, &failure) == HS_OK && ball.home.in < 0.0);
-    hs_list_free(list);
-}
+/* Ball: what the thresholds call sure is what the exact metric says of the positions as given, for
+ * points about as far away as the radius, in any image. */
 
 /* In skewed boxes rounded coordinates may be wrong by more than the radius, and radius and error
  * together be more than has an ordinary square. */
@@ -185,38 +87,6 @@ balls_reach_as_far_as_errors_may(void)
     hs_list_free(list);
 }
 
-/* Lengths times a power of two, and squares times its square. */
-static void
-thresholds_are_scaled_with_the_lengths(void)
-{
-    double errors[2], ends[2][4];
-    for (int s = 0; s < 2; s++) {
-        const double       unit = s == 0 ? 1.0 : 0x1p-100;
-        const double       centre[2] = {0.5 * unit, -unit};
-        const hs_box       box = {.ndim = 2,
-                                  .periodic = {true, true},
-                                  .rows = {{3.0 * unit, 0.25 * unit}, {unit, 4.0 * unit}}};
-        hs_dynamic_options options = hs_dynamic_options_default();
-        hs_dynamic        *list = NULL;
-        hs_failure         failure;
-        hs_ball            ball;
-        hs_ball_image      turned;
-        options.ndim = 2;
-        options.box = &box;
-        options.cell_size = options.max_radius = 2.0 * unit;
-        CHECK(hs_list_new(&options, &list, &failure) == HS_OK);
-        CHECK(hs_ball_init(&ball, list, centre, 1.5 * unit, &failure) == HS_OK);
-        hs_ball_turn(&ball, (const int64_t[]){1, -2}, &turned);
-        errors[s] = ball.error / unit;
-        const double found[4] = {ball.home.in, ball.home.out, turned.in, turned.out};
-        for (int e = 0; e < 4; e++)
-            ends[s][e] = found[e] / unit / unit;
-        hs_list_free(list);
-    }
-    CHECK(errors[0] > 0.0 && errors[0] == errors[1] && ends[0][0] > 2.0);
-    CHECK(memcmp(ends[0], ends[1], sizeof ends[0]) == 0);
-}
-
 /* A far point hardly matters to others; a list that was emptied is as exact as a new one. */
 static void
 emptied_lists_are_as_exact_as_new_ones(void)
@@ -242,15 +112,163 @@ emptied_lists_are_as_exact_as_new_ones(void)
     hs_list_free(list);
 }
 
+/* Ball walk: a list does only what its scene needs, as its counters show. */
+
+static hs_dynamic *
+filled(hs_storage storage, const hs_box *box, int ndim)
+{
+    hs_dynamic_options options = hs_dynamic_options_default();
+    hs_dynamic        *list = NULL;
+    harness_random     random = {11};
+    options.ndim = ndim;
+    options.box = box;
+    options.storage = storage;
+    CHECK(hs_dynamic_new(&options, &list, NULL) == HS_OK);
+    for (int64_t id = 0; id < 500; id++) {
+        double x[3];
+        for (int k = 0; k < 3; k++)
+            x[k] = 10.0 * random_unit(&random);
+        CHECK(hs_dynamic_insert(list, (hs_key){id, 0}, x, NULL) == HS_OK);
+    }
+    return list;
+}
+
+static void
+what_a_scene_does_not_need_is_left_out(void)
+{
+    const hs_box        box = {.ndim = 2, .periodic = {true, true}, .rows = {{10, 0}, {0, 10}}};
+    const double        centre[3] = {5.25, 5.25, 5.25};
+    hs_dynamic_counters counters;
+    bool                any;
+    for (int storage = 0; storage < 3; storage++) {
+        hs_dynamic *open = filled((hs_storage)storage, NULL, 2);
+        hs_dynamic *periodic = filled((hs_storage)storage, &box, 2);
+        hs_dynamic_count(open, &counters);
+        for (int64_t id = 0; id < 500; id += 9)
+            CHECK(hs_dynamic_move(open, (hs_key){id, 0}, centre, NULL) == HS_OK);
+        CHECK(hs_dynamic_any_within(open, centre, 0.0, NULL, &any, NULL) == HS_OK && any);
+        CHECK(counters.wraps == 0);
+        CHECK((counters.lookups > 0) == (storage == HS_STORE_HASH));
+        CHECK(counters.cells == 1);
+        hs_dynamic_count(open, NULL);
+        hs_dynamic_count(periodic, &counters);
+        CHECK(hs_dynamic_any_within(periodic, centre, 0.0, NULL, &any, NULL) == HS_OK);
+        CHECK(counters.wraps == 1);
+        hs_dynamic_free(open);
+        hs_dynamic_free(periodic);
+    }
+}
+
+/* Points at the radius but for less than float64 resolves, and exactly at it. */
+static void
+ties_are_decided_exactly(void)
+{
+    for (int inclusive = 0; inclusive <= 1; inclusive++) {
+        hs_dynamic_options  options = hs_dynamic_options_default();
+        hs_dynamic_counters counters;
+        hs_dynamic         *list;
+        bool                any;
+        options.ndim = 2;
+        options.inclusive = inclusive == 1;
+        options.max_radius = 5.0;
+        CHECK(hs_dynamic_new(&options, &list, NULL) == HS_OK);
+        hs_dynamic_count(list, &counters);
+        const double tie[2] = {3.0, 4.0}, origin[2] = {0.0, 0.0}, above[2] = {5.0, 0x1p-60};
+        CHECK(hs_dynamic_insert(list, (hs_key){0, 0}, tie, NULL) == HS_OK);
+        CHECK(hs_dynamic_any_within(list, origin, 5.0, NULL, &any, NULL) == HS_OK);
+        CHECK(any == (inclusive == 1) && counters.exact == 1);
+        CHECK(hs_dynamic_move(list, (hs_key){0, 0}, above, NULL) == HS_OK);
+        CHECK(hs_dynamic_any_within(list, origin, 5.0, NULL, &any, NULL) == HS_OK);
+        CHECK(!any && counters.exact == 2);
+        hs_dynamic_free(list);
+    }
+}
+
+/* Held, a list gives the same answers. */
+static void
+held_lists_answer_the_same(void)
+{
+    const hs_box box = {
+        .ndim = 3, .periodic = {true, true, true}, .rows = {{10, 0, 0}, {3, 9, 0}, {-2, 1, 8}}};
+    hs_dynamic    *list = filled(HS_STORE_HASH, &box, 3);
+    harness_random random = {13};
+    bool           plain[100], held[100];
+    for (int h = 0; h < 2; h++) {
+        random.state = 13;
+        if (h == 1)
+            hs_dynamic_hold(list);
+        for (int trial = 0; trial < 100; trial++) {
+            double x[3];
+            for (int k = 0; k < 3; k++)
+                x[k] = 10.0 * random_unit(&random);
+            CHECK(hs_dynamic_any_within(list, x, 0.7, NULL, h == 1 ? &held[trial] : &plain[trial],
+                                        NULL) == HS_OK);
+        }
+        if (h == 1)
+            hs_dynamic_release(list);
+    }
+    CHECK(memcmp(plain, held, sizeof plain) == 0);
+    hs_dynamic_free(list);
+}
+
+static int
+stop_at(hs_key key, const double *position, const int64_t *shift, void *user)
+{
+    (void)key, (void)position, (void)shift;
+    return --*(int *)user == 0;
+}
+
+/* A visitor ends any way through the cells, near or within, with images or without. */
+static void
+visitors_may_stop(void)
+{
+    const hs_box box = {.ndim = 3, .periodic = {true, true, true}};
+    for (int kind = 0; kind < 6; kind++) {
+        hs_box small = box;
+        for (int l = 0; l < 3; l++)
+            small.rows[l][l] = 10.0;
+        hs_dynamic  *list = filled((hs_storage)(kind % 3), kind >= 3 ? &small : NULL, 3);
+        const double corner[3] = {0.1, 0.1, 0.1};
+        for (int after = 1; after <= 3; after++) {
+            int near = after, within = after;
+            CHECK(hs_dynamic_near(list, corner, 1.0, stop_at, &near, NULL) == HS_OK && near <= 0);
+            CHECK(hs_dynamic_insert(list, (hs_key){after, 1}, corner, NULL) == HS_OK);
+            CHECK(hs_dynamic_insert(list, (hs_key){after, 2}, corner, NULL) == HS_OK);
+            CHECK(hs_dynamic_within(list, corner, 0.5, true, stop_at, &within, NULL) == HS_OK);
+            CHECK(within == 0);
+        }
+        hs_dynamic_free(list);
+    }
+}
+
+/* A near query compares no distances. */
+static void
+near_counts_cells_and_no_candidates(void)
+{
+    const double        middle[3] = {5.5, 5.5, 5.5};
+    hs_dynamic_counters counters;
+    for (int storage = 0; storage < 2; storage++) {
+        hs_dynamic *list = filled((hs_storage)storage, NULL, 2);
+        brute_found found = {.n = 0};
+        hs_dynamic_count(list, &counters);
+        CHECK(hs_dynamic_near(list, middle, 1.0, take_found, &found, NULL) == HS_OK);
+        CHECK(counters.cells == 9 && counters.candidates == 0 && counters.exact == 0);
+        CHECK(found.n > 9);
+        hs_dynamic_free(list);
+    }
+}
+
 void
 test_ball(void)
 {
     const hs_fpenv env = hs_fpenv_enter();
-    RUN(thresholds_are_never_wrong);
-    RUN(extreme_radii_are_left_to_the_exact_stages);
     RUN(nothing_is_surely_within_less_than_the_error);
-    RUN(thresholds_are_scaled_with_the_lengths);
-    RUN(emptied_lists_are_as_exact_as_new_ones);
     RUN(balls_reach_as_far_as_errors_may);
+    RUN(emptied_lists_are_as_exact_as_new_ones);
     hs_fpenv_leave(env);
+    RUN(what_a_scene_does_not_need_is_left_out);
+    RUN(ties_are_decided_exactly);
+    RUN(held_lists_answer_the_same);
+    RUN(visitors_may_stop);
+    RUN(near_counts_cells_and_no_candidates);
 }

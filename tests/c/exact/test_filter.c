@@ -1,14 +1,18 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * test_filter.c: the thresholds of the float32 filter's direct form, in float32 and in
- * floating-point systems so small that every number can be tried.
- */
+/* test_filter.c: what thresholds leave unsure is little, and what they call sure is so. */
+#include "../../../csrc/core/exact/doubleword.h"
 #include "../../../csrc/core/exact/filter.h"
-
+#include "../../../csrc/kernels/kernel.h"
 #include "../support/harness.h"
 #include "../support/tiny_floats.h"
 
+#include <float.h>
+#include <math.h>
+
 void test_filter(void);
+
+/* Filter: the thresholds of the float32 filter's direct form, in float32 and in floating-point
+ * systems so small that every number can be tried. */
 
 /* ---- tiny floating-point systems ---- */
 
@@ -290,6 +294,797 @@ extreme_cutoffs_round_outwards(void)
     CHECK(t.in == -1.0f && t.out > 1.0f);
 }
 
+/*
+ * Limit form: the thresholds that kernels compute of two radii, fleft or not, against those of
+ * filter.h for the real sum, the larger or the smaller: they must hold it between them, and not by
+ * much.
+ */
+
+static const double tiny = 0x1p-126;
+
+/* One limit of a pair, all that it is made of. */
+typedef struct limit_case {
+    int     ndim;
+    hs_rule rule;
+    double  a, b, bound, extent, error;
+} limit_case;
+
+/* As a kernel that fuses: one rounding for product and sum, by way of float64, which holds the
+ * product. */
+static hs_thresholds
+fleft_thresholds(const hs_limit_scan *limits, float limit)
+{
+    const hs_limit_form form = limits->form;
+    const float         in = fmaf(limit, form.in_factor, -form.in_less);
+    const float         out = fmaf(limit, form.out_factor, form.out_more);
+    return (hs_thresholds){in > 0.0f ? in * in : 0.0f, out * out};
+}
+
+static float
+float_limit(const hs_limit_scan *limits, float a, float b)
+{
+    const float made = limits->rule == HS_RULE_MAX   ? fmaxf(a, b)
+                       : limits->rule == HS_RULE_MIN ? fminf(a, b)
+                                                     : a + b;
+    return fminf(made, limits->bound);
+}
+
+/* The real limit, to its float64 neighbours: below it and above it. */
+static void
+real_limit(const limit_case *c, double *low, double *high)
+{
+    const bool  is_one = c->rule == HS_RULE_MAX || c->rule == HS_RULE_MIN;
+    const hs_dw sum = hs_two_sum(c->a, c->b);
+    *low = c->rule == HS_RULE_MAX   ? fmax(c->a, c->b)
+           : c->rule == HS_RULE_MIN ? fmin(c->a, c->b)
+                                    : sum.hi;
+    *high = *low;
+    if (!is_one) {
+        *low = sum.lo < 0.0 ? nextafter(sum.hi, 0.0) : sum.hi;
+        *high = sum.lo > 0.0 ? nextafter(sum.hi, HUGE_VAL) : sum.hi;
+    }
+    *low = fmin(*low, c->bound);
+    *high = fmin(*high, c->bound);
+}
+
+/* Whether both thresholds are on the safe side of the exact ones; left: how far off these they are,
+ * in units of u, `in` and `out`. */
+static bool
+holds(const limit_case *c, double left[2])
+{
+    const hs_limit_scan limits = {.rule = c->rule,
+                                  .bound = (float)c->bound,
+                                  .form = hs_limit_form_of(c->ndim, c->extent, c->error)};
+    const float         a = (float)c->a, b = (float)c->b;
+    const hs_thresholds plain = hs_limit_thresholds(&limits, a, b);
+    const hs_thresholds fleft = fleft_thresholds(&limits, float_limit(&limits, a, b));
+    double              low, high, in, out, unused;
+    real_limit(c, &low, &high);
+    hs_threshold_bounds(c->ndim, low, c->extent, c->error, u, tiny, &in, &unused);
+    hs_threshold_bounds(c->ndim, high, c->extent, c->error, u, tiny, &unused, &out);
+    const double largest = fmax(plain.in, fleft.in), least = fmin(plain.out, fleft.out);
+    left[0] = (in - largest) / (in * u);
+    left[1] = (least - out) / (out * u);
+    return least >= out && (largest == 0.0 || largest <= in);
+}
+
+/* A radius whose rounding goes to this side, by nearly all that it can: it is a little off the middle
+ * between two floats, and near a power of two more often than not. */
+static double
+beside_a_middle(harness_random *random, int side)
+{
+    const int64_t first = INT64_C(1) << 23, more = INT64_C(1) << (12 + random_bits(random) % 11);
+    const int64_t m = first + (int64_t)(random_bits(random) % (uint64_t)more);
+    const int     exponent = (int)(random_bits(random) % 3) - 24;
+    return ldexp((double)m + 0.5 + side * 0x1p-12, exponent);
+}
+
+static void
+limits_of_any_radii_hold(void)
+{
+    static const hs_rule rules[] = {HS_RULE_SUM, HS_RULE_MAX, HS_RULE_MIN, HS_RULE_MEAN};
+    harness_random       random = {1213};
+    int                  wrong = 0;
+    for (int trial = 0; trial < TRIALS(400000); trial++) {
+        const int  side = trial / 4 % 3 - 1;
+        limit_case c = {.ndim = 1 + trial % 8,
+                        .rule = rules[random_bits(&random) % 4],
+                        .a = ldexp(random_unit(&random), (int)(random_bits(&random) % 12) - 6),
+                        .b = ldexp(random_unit(&random), (int)(random_bits(&random) % 12) - 6),
+                        .bound = HUGE_VAL,
+                        .extent = ldexp(random_unit(&random), (int)(random_bits(&random) % 9)),
+                        .error = trial % 3 == 0 ? 0x1p-20 * random_unit(&random) : 0.0};
+        double     left[2];
+        if (side != 0) {
+            c.a = beside_a_middle(&random, side);
+            c.b = beside_a_middle(&random, side);
+        }
+        if (trial % 5 == 0)
+            c.extent = 0.0;
+        if (trial % 7 == 0)
+            c.bound = beside_a_middle(&random, trial % 2 ? 1 : -1);
+        wrong += !holds(&c, left);
+    }
+    CHECK(wrong == 0);
+}
+
+/* Without an extent, all that there is between both thresholds are roundings. For some of these radii
+ * most of them go one way, and little more is left than the roundings of the factors to float32,
+ * which take up to 2 u and 4 u of the squares: with half of the bound, thresholds would be wrong. */
+static void
+bounds_are_nearly_reached(void)
+{
+    for (int ndim = 1; ndim <= 8; ndim++) {
+        harness_random random = {1000 + (uint64_t)ndim};
+        double         least[2] = {HUGE_VAL, HUGE_VAL};
+        int            wrong = 0;
+        for (int trial = 0; trial < TRIALS(400000); trial++) {
+            const int        side = trial % 2 ? 1 : -1;
+            const limit_case c = {.ndim = ndim,
+                                  .rule = HS_RULE_SUM,
+                                  .a = beside_a_middle(&random, side),
+                                  .b = beside_a_middle(&random, side),
+                                  .bound = HUGE_VAL};
+            double           left[2];
+            wrong += !holds(&c, left);
+            least[0] = fmin(least[0], left[0]);
+            least[1] = fmin(least[1], left[1]);
+        }
+        CHECK(wrong == 0);
+        CHECK(least[0] >= 0.0 && least[0] < 6.0);
+        CHECK(least[1] >= 0.0 && least[1] < 8.0);
+    }
+}
+
+/* Radii so small that their floats are subnormal, or zero, are not taken for more than they may be. */
+static void
+what_is_lost_of_small_radii_is_not_sure(void)
+{
+    harness_random random = {1415};
+    int            wrong = 0;
+    for (int trial = 0; trial < TRIALS(100000); trial++) {
+        const limit_case c = {.ndim = 1 + trial % 8,
+                              .rule = HS_RULE_SUM,
+                              .a = ldexp(random_unit(&random), -(int)(random_bits(&random) % 200)),
+                              .b = ldexp(random_unit(&random), -(int)(random_bits(&random) % 200)),
+                              .bound = HUGE_VAL,
+                              .extent = trial % 2 ? 0x1p-120 : 0.0};
+        double           left[2];
+        wrong += !holds(&c, left);
+    }
+    CHECK(wrong == 0);
+}
+
+/* Nothing but equal points, and what may be lost, is within 0; that is not sure either. */
+static void
+zero_radii_make_nothing_sure(void)
+{
+    for (int ndim = 1; ndim <= 8; ndim++) {
+        for (int rule = 0; rule < HS_RULE_END; rule++) {
+            const hs_limit_scan limits = {
+                .rule = (hs_rule)rule, .bound = INFINITY, .form = hs_limit_form_of(ndim, 2.0, 0.0)};
+            const hs_thresholds none = hs_limit_thresholds(&limits, 0.0f, 0.0f);
+            CHECK(none.in == 0.0f && none.out > 0.0f && none.out < 1e-12f);
+            const hs_limit_scan bounded = {
+                .rule = (hs_rule)rule, .bound = 0.0f, .form = limits.form};
+            const hs_thresholds at_most = hs_limit_thresholds(&bounded, 5.0f, 7.0f);
+            CHECK(at_most.in == none.in && at_most.out == none.out);
+        }
+    }
+}
+
+/* A radius that no float32 holds is beyond all squares; within a bound, nothing of it is left. */
+static void
+huge_radii_are_beyond_all(void)
+{
+    const hs_limit_form form = hs_limit_form_of(3, 64.0, 0x1p-40);
+    hs_limit_scan       limits = {.rule = HS_RULE_SUM, .bound = INFINITY, .form = form};
+    hs_thresholds       t = hs_limit_thresholds(&limits, INFINITY, 1.0f);
+    CHECK(t.in == INFINITY && t.out == INFINITY);
+    t = hs_limit_thresholds(&limits, FLT_MAX, FLT_MAX);
+    CHECK(t.in == INFINITY && t.out == INFINITY);
+    limits.rule = HS_RULE_MIN;
+    t = hs_limit_thresholds(&limits, INFINITY, 1.0f);
+    CHECK(t.in > 0.99f && t.in < 1.0f && t.out > 1.0f && t.out < 1.01f);
+    limits.rule = HS_RULE_MAX;
+    limits.bound = 2.0f;
+    t = hs_limit_thresholds(&limits, INFINITY, 1.0f);
+    CHECK(t.in > 3.99f && t.in < 4.0f && t.out > 4.0f && t.out < 4.01f);
+}
+
+/* A negative limit is that of no pair: nothing is sure, and nothing beyond what may be lost is a
+ * hit. */
+static void
+negative_limits_are_of_no_pair(void)
+{
+    hs_limit_scan limits = {
+        .rule = HS_RULE_SCATTER, .bound = INFINITY, .form = hs_limit_form_of(3, 2.0, 0.0)};
+    hs_thresholds t = hs_limit_thresholds(&limits, 0.0f, -1.0f);
+    CHECK(t.in == 0.0f && t.out == 0.0f);
+    limits.form = hs_limit_form_of(3, 0x1p25, 0.0);
+    t = hs_limit_thresholds(&limits, 0.0f, -1.0f);
+    CHECK(t.in == 0.0f && t.out > 1.0f);
+    limits.form = (hs_limit_form){1.0f, 0.0f, 1.0f, 0.0f};
+    t = hs_limit_thresholds(&limits, 0.0f, -1.0f);
+    CHECK(t.in == 0.0f && t.out == 0.0f);
+}
+
+/* Each rule takes the radii that it names, whichever of the two points has them. */
+static void
+rules_take_their_radii(void)
+{
+    static const struct {
+        hs_rule rule;
+        float   a, b, limit;
+    } cases[] = {{HS_RULE_SUM, 1.0f, 3.0f, 4.0f},    {HS_RULE_MEAN, 1.0f, 3.0f, 4.0f},
+                 {HS_RULE_MAX, 1.0f, 3.0f, 3.0f},    {HS_RULE_MAX, 3.0f, 1.0f, 3.0f},
+                 {HS_RULE_MIN, 1.0f, 3.0f, 1.0f},    {HS_RULE_MIN, 3.0f, 1.0f, 1.0f},
+                 {HS_RULE_GATHER, 2.0f, 0.0f, 2.0f}, {HS_RULE_SCATTER, 0.0f, 2.0f, 2.0f}};
+    for (size_t e = 0; e < sizeof cases / sizeof cases[0]; e++) {
+        const hs_limit_scan limits = {
+            .rule = cases[e].rule, .bound = INFINITY, .form = {1.0f, 0.0f, 1.0f, 0.0f}};
+        const hs_thresholds t = hs_limit_thresholds(&limits, cases[e].a, cases[e].b);
+        CHECK(t.in == cases[e].limit * cases[e].limit && t.out == t.in);
+    }
+}
+
+static void
+nothing_is_sure_without_finite_inputs_limit_form(void)
+{
+    const double bad[] = {NAN, INFINITY};
+    for (int e = 0; e < 4; e++) {
+        const hs_limit_scan limits = {
+            .rule = HS_RULE_SUM,
+            .bound = INFINITY,
+            .form = hs_limit_form_of(3, e < 2 ? bad[e] : 1.0, e < 2 ? 0.0 : bad[e - 2])};
+        for (int size = 0; size < 3; size++) {
+            const float         radius = size == 0 ? 0.0f : size == 1 ? 1.0f : INFINITY;
+            const hs_thresholds t = hs_limit_thresholds(&limits, radius, radius);
+            CHECK(!(t.in > 0.0f) && t.out == INFINITY);
+        }
+    }
+}
+
+/* A thousandth off the limit everything is sure, or the filter would be of no use. */
+static void
+thresholds_are_narrow_limit_form(void)
+{
+    for (int ndim = 1; ndim <= 8; ndim++) {
+        const hs_limit_scan limits = {
+            .rule = HS_RULE_SUM, .bound = INFINITY, .form = hs_limit_form_of(ndim, 2.0, 0.0)};
+        const hs_thresholds t = hs_limit_thresholds(&limits, 0.25f, 0.75f);
+        const double        width = ((double)t.out - (double)t.in) / u;
+        CHECK(t.in < 1.0f && t.out > 1.0f);
+        CHECK(width < 8.0 * sqrt((double)ndim) + 2.0 * ndim + 40.0);
+    }
+}
+
+/*
+ * Support form: the thresholds of supports in float32, against |N D| in float64, which is exact
+ * enough: they hold it between them however entries, coordinates and sums are rounded, and the
+ * roundings of one term come near their bound.
+ */
+
+/* A number of float64, and mostly near a power of two, where roundings are largest. */
+static double
+any_number(harness_random *random)
+{
+    const int64_t many = INT64_C(1) << (10 + random_bits(random) % 42);
+    const double  x = 1.0 + ldexp((double)(random_bits(random) % (uint64_t)many), -52);
+    const double  size = ldexp(x, (int)(random_bits(random) % 3) - 1);
+    return random_bits(random) % 2 ? size : -size;
+}
+
+typedef struct term_case {
+    int    ndim;
+    double n[HS_SUPPORT_ENTRIES], y[3], q[3]; /* y and q relative to a centre, in float64 */
+} term_case;
+
+/* |N D|^2 in float64, and as a kernel computes it, fused or not. */
+static double
+true_square(const term_case *c)
+{
+    double square = 0.0;
+    for (int k = 0; k < c->ndim; k++) {
+        double z = 0.0;
+        for (int l = 0; l < c->ndim; l++)
+            z += c->n[hs_support_at(k, l)] * (c->y[l] - c->q[l]);
+        square += z * z;
+    }
+    return square;
+}
+
+static float
+float_square(const term_case *c, bool fused)
+{
+    volatile float square = 0.0f;
+    for (int k = 0; k < c->ndim; k++) {
+        volatile float z = 0.0f;
+        for (int l = 0; l < c->ndim; l++) {
+            const float          n = (float)c->n[hs_support_at(k, l)];
+            const volatile float d = (float)c->y[l] - (float)c->q[l];
+            const volatile float product = n * d;
+            z = fused ? fmaf(n, d, z) : z + product;
+        }
+        const volatile float one = z * z;
+        square = fused ? fmaf(z, z, square) : square + one;
+    }
+    return square;
+}
+
+static double
+size_of(const term_case *c)
+{
+    double sum = 0.0;
+    for (int k = 0; k < c->ndim; k++)
+        for (int l = 0; l < c->ndim; l++)
+            sum += c->n[hs_support_at(k, l)] * c->n[hs_support_at(k, l)];
+    return sqrt(sum);
+}
+
+/* Needles and round ones, scaled so that |N D| is near 1: s must not be beyond a threshold that says
+ * otherwise. Where N D cancels, the bound is that of what cancels. */
+static void
+thresholds_hold(void)
+{
+    harness_random random = {801};
+    int            wrong = 0, sure_in = 0, sure_out = 0;
+    for (int trial = 0; trial < TRIALS(400000); trial++) {
+        term_case c = {.ndim = 1 + trial % 3};
+        double    largest = 0.0;
+        for (int k = 0; k < c.ndim; k++) {
+            c.y[k] = any_number(&random);
+            c.q[k] = any_number(&random);
+            largest = fmax(largest, fabs((double)(float)c.y[k]) + fabs((double)(float)c.q[k]));
+            for (int l = 0; l <= k; l++)
+                c.n[hs_support_at(k, l)] = any_number(&random) * (trial / 3 % 2 && k ? 30.0 : 1.0);
+        }
+        const double square = true_square(&c);
+        const double beside = 1.0 + (random_unit(&random) - 0.5) * (trial % 2 ? 1e-5 : 1e-6);
+        if (!(square > 1e-6))
+            continue;
+        for (int e = 0; e < HS_SUPPORT_ENTRIES; e++)
+            c.n[e] *= beside / sqrt(square);
+        const double        value = true_square(&c);
+        const hs_limit_form form = hs_support_form_of(c.ndim, largest, 0.0);
+        const hs_thresholds near =
+            hs_support_thresholds(form, (float)(size_of(&c) * (1.0 + 0x1p-22)));
+        for (int fused = 0; fused < 2; fused++) {
+            const float s = float_square(&c, fused);
+            wrong += s < near.in && value > 1.0 - 1e-12;
+            wrong += s > near.out && value < 1.0 + 1e-12;
+            sure_in += s < near.in;
+            sure_out += s > near.out;
+        }
+    }
+    CHECK(wrong == 0);
+    CHECK(sure_in > TRIALS(400000) / 20 && sure_out > TRIALS(400000) / 20);
+}
+
+/* One term: an entry, a difference and their product are rounded, all of them the same way and by
+ * nearly as much as can be. */
+static void
+roundings_of_a_term_come_near_their_bound(void)
+{
+    harness_random random = {802};
+    const double   bound = hs_support_roundings(1, u);
+    double         most = 0.0;
+    for (int trial = 0; trial < 2000000; trial++) {
+        /* N and y - q a little below the middle above a float; and a product that is so, too. */
+        const int64_t j = 1024 + (int64_t)(random_bits(&random) % 8192);
+        const double  middle = ((double)(random_bits(&random) % 8) + 0.5) * 0x1p23;
+        const double  i = floor(middle / (double)j) - (double)(trial % 2);
+        const double  n = 1.0 + ldexp(i + 0.49999, -23);
+        const double  y = 1.0 + ldexp((double)j, -23), q = -0.49999 * 0x1p-23;
+        const float   d = (float)y - (float)q;
+        const float   z = (float)n * d;
+        const double  real = n * ((double)(float)y - (double)(float)q);
+        most = fmax(most, fabs(real - (double)z) / real);
+    }
+    CHECK(most <= bound && most > 0.9 * bound);
+}
+
+/* With more axes the bound grows by one rounding each. */
+static void
+roundings_grow_with_the_axes(void)
+{
+    for (int ndim = 1; ndim <= 3; ndim++) {
+        const double roundings = hs_support_roundings(ndim, u) / u;
+        CHECK(roundings >= ndim + 2.0 && roundings < ndim + 2.1);
+    }
+}
+
+/* Where extents are beyond float32, nothing is sure. */
+static void
+nothing_is_sure_of_what_float32_does_not_hold(void)
+{
+    const double extents[] = {HUGE_VAL, NAN, 0x1p200, 0x1p130, 0x1p123}; /* or flushes */
+    for (int e = 0; e < 5; e++) {
+        const hs_thresholds near =
+            hs_support_thresholds(hs_support_form_of(3, extents[e], 0.0), 1.0f);
+        CHECK(!(near.in > 0.0f) && near.out == INFINITY);
+    }
+    const hs_limit_form form = hs_support_form_of(3, 1.0, 0.0);
+    const hs_thresholds none = hs_support_thresholds(form, INFINITY);
+    CHECK(!(none.in > 0.0f) && none.out == INFINITY);
+    const hs_thresholds some = hs_support_thresholds(form, 1.0f);
+    CHECK(some.in > 0.9999f && some.in < 1.0f && some.out > 1.0f && some.out < 1.0001f);
+    const hs_thresholds doubtful = hs_support_thresholds(hs_support_form_of(3, 1.0, 0.125), 4.0f);
+    CHECK(doubtful.in == 0.0f && doubtful.out > 4.0f);
+}
+
+/* Expanded: the thresholds of the float32 filter's expanded form, in float32 and in floating-point
+ * systems so small that every number can be tried. */
+
+/* ---- tiny floating-point systems ---- */
+
+/* How a kernel goes about it. */
+typedef struct manner {
+    bool fused_norm, fused_chain;
+    bool threshold_flushes; /* where the system does */
+} manner;
+
+static double
+rounded_threshold(const tiny_system *system, const manner *way, double x)
+{
+    tiny_system own = *system;
+    own.flush = system->flush && way->threshold_flushes;
+    return isinf(x) ? x : round_to(&own, x);
+}
+
+/* sum + a b, fused or not. */
+static double
+add_product(const tiny_system *system, bool fused, double sum, double a, double b)
+{
+    return round_to(system, sum + (fused ? a * b : round_to(system, a * b)));
+}
+
+static double
+tiny_chain(const tiny_system *system, const manner *way, int ndim, const double *y, const double *q)
+{
+    double s = 0.0;
+    for (int k = 0; k < ndim; k++) {
+        s = add_product(system, way->fused_norm, s, y[k], y[k]);
+    }
+    for (int k = 0; k < ndim; k++) {
+        s = add_product(system, way->fused_chain, s, -2.0 * q[k], y[k]);
+    }
+    return s;
+}
+
+/* A pair within the smallest possible distance must not be out, one beyond the largest not in. */
+static bool
+claims_hold_expanded(const tiny_system *system, const manner *way, int ndim, const double *y,
+                     const double *q, double error)
+{
+    double largest = 0.0, low = 0.0, high = 0.0, norm = 0.0, in, out, unused;
+    for (int k = 0; k < ndim; k++) {
+        double component_low, component_high;
+        largest = fmax(largest, fmax(fabs(y[k]), fabs(q[k])));
+        distance_interval(system, y[k], q[k], error, &component_low, &component_high);
+        low += component_low * component_low;
+        high += component_high * component_high;
+        norm += q[k] * q[k];
+    }
+    low = ndim == 1 ? sqrt(low) : sqrt(low) * (1.0 + 0x1p-48);
+    high = ndim == 1 ? sqrt(high) : sqrt(high) * (1.0 - 0x1p-48);
+    const double s = tiny_chain(system, way, ndim, y, q), extent = 2.0 * largest;
+    hs_expanded_bounds(ndim, low, extent, error, system->unit, system->tiny, &unused, &out);
+    hs_expanded_bounds(ndim, high, extent, error, system->unit, system->tiny, &in, &unused);
+    return s <= rounded_threshold(system, way, out - norm) &&
+           s >= rounded_threshold(system, way, in - norm);
+}
+
+static void
+every_pair_of_a_tiny_system_is_judged_right_expanded(void)
+{
+    static const int lowest[] = {-12, -3, 0, 3}; /* 3: the flushes dwarf everything else */
+    double           numbers[512];
+    int              wrong = 0;
+    for (int digits = 3; digits <= 5; digits++) {
+        for (int variant = 0; variant < 32; variant++) {
+            const tiny_system system = make_system(digits, lowest[variant / 8], variant & 1, false);
+            const manner      way = {false, variant & 2, variant & 4};
+            const int         n = list_numbers(&system, 6, numbers);
+            for (int i = 0; i < n; i++) {
+                for (int j = 0; j < n; j++) {
+                    const double y = numbers[i], q = numbers[j], minus = -q;
+                    wrong += !claims_hold_expanded(&system, &way, 1, &y, &q, 0.0);
+                    wrong += !claims_hold_expanded(&system, &way, 1, &y, &minus, 0.0);
+                    wrong += !claims_hold_expanded(&system, &way, 1, &y, &q, 0.3 * numbers[i / 2]);
+                }
+            }
+        }
+    }
+    CHECK(wrong == 0);
+}
+
+static void
+samples_of_tiny_systems_are_judged_right_expanded(void)
+{
+    harness_random random = {41};
+    double         numbers[512];
+    int            wrong = 0;
+    for (int trial = 0; trial < 96; trial++) {
+        const int         ndim = 2 + trial % 3;
+        const tiny_system system =
+            make_system(3 + trial / 3 % 6, trial % 4 * 4 - 10, trial & 1, false);
+        const manner way = {trial & 4, trial & 8, trial & 16};
+        const int    n = list_numbers(&system, system.digits < 6 ? 5 : 2, numbers);
+        const bool   near = trial & 32; /* close together */
+        for (int i = 0; i < 4000; i++) {
+            double y[4], q[4];
+            for (int k = 0; k < ndim; k++) {
+                const int at = (int)(random_bits(&random) % (unsigned)n);
+                const int by = near ? (int)(random_bits(&random) % 3) : at + 1;
+                y[k] = numbers[at];
+                q[k] = near ? numbers[at >= by ? at - by : at]
+                            : numbers[random_bits(&random) % (unsigned)n];
+                q[k] = near || random_bits(&random) & 1 ? q[k] : -q[k];
+            }
+            wrong += !claims_hold_expanded(&system, &way, ndim, y, q, 0.0);
+        }
+    }
+    CHECK(wrong == 0);
+}
+
+/* Small points: every square, product and sum is a little below the smallest normal number and
+ * flushed. Scaled so that it is the flushes that count. */
+static void
+flushed_terms_are_not_sure(void)
+{
+    const tiny_system system = make_system(24, -126, true, false);
+    for (int ndim = 1; ndim <= 8; ndim++) {
+        for (int variant = 0; variant < 8; variant++) {
+            const manner way = {variant & 1, variant & 2, variant & 4};
+            const double last = 1.0 - 0x1p-23;
+            double       y[8], q[8], opposite[8];
+            for (int k = 0; k < ndim; k++) {
+                y[k] = last * 0x1p-63; /* y^2 is flushed, and so is 2 q y */
+                q[k] = last * 0x1p-64;
+                opposite[k] = -q[k];
+            }
+            CHECK(tiny_chain(&system, &way, ndim, y, q) == 0.0);
+            CHECK(claims_hold_expanded(&system, &way, ndim, y, q, 0.0));
+            CHECK(claims_hold_expanded(&system, &way, ndim, y, opposite, 0.0));
+        }
+    }
+}
+
+/* ---- float32 ---- */
+
+/* A pair for a kernel: true points, the floats, and what the two kinds of kernel make of them. */
+typedef struct pair {
+    int    ndim;
+    double Y[HS_MAX_DIM], Q[HS_MAX_DIM];
+    float  y[HS_MAX_DIM], q[HS_MAX_DIM];
+    double square; /* |Y - Q|^2 */
+    double norm;   /* |q|^2 */
+    double extent;
+    float  s[2];     /* unfused, fused */
+    double exact[2]; /* before the last rounding */
+} pair;
+
+static void
+compute_pair(pair *p)
+{
+    p->square = p->norm = p->extent = 0.0;
+    for (int k = 0; k < p->ndim; k++) {
+        p->square += (p->Y[k] - p->Q[k]) * (p->Y[k] - p->Q[k]);
+        p->y[k] = (float)p->Y[k];
+        p->q[k] = (float)p->Q[k];
+        p->norm += (double)p->q[k] * (double)p->q[k];
+        p->extent = fmax(p->extent, 2.0 * fmax(fabs((double)p->y[k]), fabs((double)p->q[k])));
+    }
+    for (int fused = 0; fused < 2; fused++) {
+        float s = 0.0f;
+        for (int k = 0; k < p->ndim; k++) {
+            s = fused ? fmaf(p->y[k], p->y[k], s) : s + p->y[k] * p->y[k];
+        }
+        for (int k = 0; k < p->ndim; k++) {
+            const float c = -2.0f * p->q[k], product = c * p->y[k];
+            p->exact[fused] = (double)s + (fused ? (double)c * (double)p->y[k] : (double)product);
+            s = fused ? fmaf(c, p->y[k], s) : s + product;
+        }
+        p->s[fused] = s;
+    }
+}
+
+/* Neither surely in nor surely out, by a cutoff a little to this side of the distance. */
+static bool
+is_unsure(const pair *p, int fused, int side, bool *is_wrong)
+{
+    const double        cutoff = sqrt(p->square) * (1.0 + side * 0x1p-46);
+    const hs_expanded   bounds = hs_expanded_of(p->ndim, cutoff, p->extent, 0.0);
+    const hs_thresholds t = hs_expanded_thresholds(bounds, p->q, p->ndim);
+    const bool is_in = p->s[fused]<t.in, is_out = p->s[fused]> t.out;
+    *is_wrong = side > 0 ? is_out : is_in;
+    return !is_in && !is_out;
+}
+
+static void
+float32_thresholds_hold_near_the_cutoff_expanded(void)
+{
+    harness_random random = {43};
+    int            wrong = 0, sure = 0;
+    for (int trial = 0; trial < 100000; trial++) {
+        const double reach = trial % 2 ? 2.0 : 64.0;
+        pair         p = {.ndim = 1 + trial % 4};
+        for (int k = 0; k < p.ndim; k++) {
+            p.Y[k] = reach * (random_unit(&random) - 0.5);
+            p.Q[k] = p.Y[k] + (random_unit(&random) - 0.5) * 2.0;
+        }
+        compute_pair(&p);
+        for (int variant = 0; variant < 4; variant++) {
+            bool is_wrong;
+            sure += !is_unsure(&p, variant & 1, variant & 2 ? 1 : -1, &is_wrong);
+            wrong += is_wrong;
+        }
+    }
+    CHECK(wrong == 0);
+    CHECK(sure == 0); /* nothing this close to the cutoff is sure */
+}
+
+/* Where |q|^2 nearly equals the threshold, their difference has few digits, or is subnormal. */
+static void
+thresholds_near_zero_hold(void)
+{
+    harness_random random = {47};
+    int            wrong = 0;
+    for (int trial = 0; trial < 60000; trial++) {
+        const double size = ldexp(1.0, -(trial % 75)); /* squares down to 2^-148 */
+        pair         p = {.ndim = 1 + trial % 3};
+        for (int k = 0; k < p.ndim; k++) {
+            p.Q[k] = size * (random_unit(&random) + 0.5);
+            p.Y[k] = trial % 2 ? 0.0 : p.Q[k] * ldexp(random_unit(&random), -20);
+        }
+        compute_pair(&p);
+        for (int variant = 0; variant < 4; variant++) {
+            bool is_wrong;
+            (void)is_unsure(&p, variant & 1, variant & 2 ? 1 : -1, &is_wrong);
+            wrong += is_wrong;
+        }
+    }
+    CHECK(wrong == 0);
+}
+
+/* Share of the band on that side that the errors of a pair take, the last rounding left out. */
+static double
+band_used_expanded(pair *p, int fused)
+{
+    double in, out;
+    compute_pair(p);
+    hs_expanded_bounds(p->ndim, sqrt(p->square), p->extent, 0.0, u, 0x1p-126, &in, &out);
+    const double moved = p->exact[fused] + p->norm - p->square;
+    return moved > 0.0 ? moved / (out - p->square) : isinf(in) ? 0.0 : moved / (in - p->square);
+}
+
+static double
+climb(harness_random *random, int ndim, int fused, double distance)
+{
+    pair   p = {.ndim = ndim};
+    double best = 0.0;
+    for (int k = 0; k < ndim; k++) {
+        p.Y[k] = 2.0 * random_unit(random) - 1.0;
+        p.Q[k] = p.Y[k] + distance * (2.0 * random_unit(random) - 1.0);
+    }
+    for (int step = 0; step < 4000; step++) {
+        double      *x = random_bits(random) & 1 ? p.Y : p.Q;
+        const int    k = (int)(random_bits(random) % (unsigned)ndim);
+        const double before = x[k];
+        const double step_size = ldexp(1.0, -(int)(random_bits(random) % 30));
+        x[k] += step_size * (2.0 * random_unit(random) - 1.0);
+        const double used = band_used_expanded(&p, fused);
+        if (used < best) {
+            x[k] = before;
+        } else {
+            best = used;
+        }
+    }
+    return best;
+}
+
+/* Hill climbing comes close to the bounds where it can, and never past them. */
+static void
+climbing_stays_within_the_bounds_expanded(void)
+{
+    static const double least[2][3] = {{0.95, 0.75, 0.5}, {0.75, 0.65, 0.5}};
+    harness_random      random = {7};
+    for (int ndim = 1; ndim <= 3; ndim++) {
+        for (int fused = 0; fused < 2; fused++) {
+            double most = 0.0;
+            for (int start = 0; start < 60; start++) {
+                const double distance = ldexp(1.0, -(start % 10));
+                most = fmax(most, climb(&random, ndim, fused, distance));
+            }
+            CHECK(most <= 1.0);
+            CHECK(most > least[fused][ndim - 1]);
+        }
+    }
+}
+
+/* What the caller states of errors is paid for twice. */
+static void
+errors_of_the_caller_are_paid_for(void)
+{
+    const double error = 0x1p-12;
+    double       in, out;
+    hs_expanded_bounds(1, 2.0 * error, 0.0, error, u, 0x1p-126, &in, &out);
+    CHECK(16.0 * error * error <= out && isinf(in)); /* y - q is 4 e, or 0 */
+    hs_expanded_bounds(1, 6.0 * error, 0.0, error, u, 0x1p-126, &in, &out);
+    CHECK(16.0 * error * error >= in && in > 15.9 * error * error);
+}
+
+/* In the worst case that the walk uses the form for, one pair in a thousand is unsure. */
+static void
+thresholds_are_narrow_expanded(void)
+{
+    for (int ndim = 1; ndim <= 8; ndim++) {
+        for (double extent = 1.0; hs_expanded_pays(1.0, extent); extent += 1.0) {
+            const hs_expanded t = hs_expanded_of(ndim, 1.0, extent, 0.0);
+            const double      d = ndim, half = 0.5 * extent;
+            const double      band = 4.0 * sqrt(d) * extent + 6.0 * d * d * half * half;
+            CHECK(t.in < 1.0 && t.out > 1.0);
+            CHECK((t.out - t.in) / u < band * 1.001);
+            CHECK(t.out - t.in < 2e-3);
+        }
+    }
+    CHECK(!hs_expanded_pays(1.0, 17.0) && !hs_expanded_pays(0.0, 1.0));
+    CHECK(!hs_expanded_pays(1.0, NAN) && !hs_expanded_pays(1.0, INFINITY));
+}
+
+static bool
+nothing_is_sure(hs_expanded bounds)
+{
+    return bounds.in == -INFINITY && bounds.out == INFINITY;
+}
+
+static void
+nothing_is_sure_beyond_the_range_of_float32(void)
+{
+    const double bad[] = {NAN, INFINITY, 1e200};
+    for (int i = 0; i < 3; i++) {
+        CHECK(nothing_is_sure(hs_expanded_of(3, 1.0, bad[i], 0.0)));
+        CHECK(nothing_is_sure(hs_expanded_of(3, 1.0, 1.0, bad[i])));
+    }
+    CHECK(nothing_is_sure(hs_expanded_of(3, DBL_MAX, 1.0, 0.0)));
+    CHECK(nothing_is_sure(hs_expanded_of(3, 1e20, 1.0, 0.0)));
+    CHECK(nothing_is_sure(hs_expanded_of(1, 1.0, 1e20, 0.0)));
+    /* A point and itself, and its opposite, as far out as float32 goes: not lost, not taken. */
+    for (int exponent = 0; exponent < 128; exponent++) {
+        for (int ndim = 1; ndim <= 8; ndim++) {
+            pair p = {.ndim = ndim}, other = {.ndim = ndim};
+            for (int k = 0; k < ndim; k++) {
+                p.Y[k] = p.Q[k] = other.Y[k] = ldexp(1.0 - 0x1p-20, exponent);
+                other.Q[k] = -p.Q[k];
+            }
+            compute_pair(&p);
+            compute_pair(&other);
+            const hs_expanded   bounds = hs_expanded_of(ndim, 1.0, p.extent, 0.0);
+            const hs_thresholds t = hs_expanded_thresholds(bounds, p.q, ndim);
+            CHECK(!(p.s[0] > t.out) && !(p.s[1] > t.out));
+            CHECK(!(other.s[0] < t.in) && !(other.s[1] < t.in));
+        }
+    }
+}
+
+static void
+extreme_cutoffs_are_safe(void)
+{
+    hs_expanded t = hs_expanded_of(3, 0.0, 1.0, 0.0);
+    CHECK(t.in == -INFINITY && t.out > 0.0 && t.out < 1e-5);
+    t = hs_expanded_of(3, 0.0, 0.0, 0.0);
+    CHECK(t.in == -INFINITY && t.out >= 6.0 * 0x1p-126);
+    t = hs_expanded_of(3, 0x1p-1074, 1.0, 0.0);
+    CHECK(t.in == -INFINITY && t.out > 0.0);
+    t = hs_expanded_of(3, 1.0, 1e9, 0.0);
+    CHECK(t.in == -INFINITY && t.out > 1e9);
+    t = hs_expanded_of(3, 1.0, 1e4, 0.0);
+    CHECK(t.in < 0.0 && t.out > 1.0); /* below zero is no mistake: s may be */
+    t = hs_expanded_of(3, 1e18, 1.0, 0.0);
+    CHECK(t.in > 0.99e36 && t.out < 1.01e36);
+}
+
 void
 test_filter(void)
 {
@@ -303,4 +1098,27 @@ test_filter(void)
     RUN(thresholds_are_narrow);
     RUN(nothing_is_sure_without_finite_inputs);
     RUN(extreme_cutoffs_round_outwards);
+    RUN(limits_of_any_radii_hold);
+    RUN(bounds_are_nearly_reached);
+    RUN(what_is_lost_of_small_radii_is_not_sure);
+    RUN(zero_radii_make_nothing_sure);
+    RUN(huge_radii_are_beyond_all);
+    RUN(negative_limits_are_of_no_pair);
+    RUN(rules_take_their_radii);
+    RUN(nothing_is_sure_without_finite_inputs_limit_form);
+    RUN(thresholds_are_narrow_limit_form);
+    RUN(thresholds_hold);
+    RUN(roundings_of_a_term_come_near_their_bound);
+    RUN(roundings_grow_with_the_axes);
+    RUN(nothing_is_sure_of_what_float32_does_not_hold);
+    RUN(every_pair_of_a_tiny_system_is_judged_right_expanded);
+    RUN(samples_of_tiny_systems_are_judged_right_expanded);
+    RUN(flushed_terms_are_not_sure);
+    RUN(float32_thresholds_hold_near_the_cutoff_expanded);
+    RUN(thresholds_near_zero_hold);
+    RUN(climbing_stays_within_the_bounds_expanded);
+    RUN(errors_of_the_caller_are_paid_for);
+    RUN(thresholds_are_narrow_expanded);
+    RUN(nothing_is_sure_beyond_the_range_of_float32);
+    RUN(extreme_cutoffs_are_safe);
 }

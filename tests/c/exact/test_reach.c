@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * test_reach.c: candidates left out because they are far from the box of a group are beyond
- * the cutoff of all its points, in floating-point systems so small that every number can be tried.
+ * test_reach.c: candidates left out because they are far from the box of a group are beyond the
+ * cutoff of all its points, in floating-point systems so small that every number can be tried.
  */
 #include "../../../csrc/core/exact/filter.h"
-
 #include "../support/harness.h"
 #include "../support/tiny_floats.h"
 

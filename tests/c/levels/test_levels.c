@@ -1,15 +1,26 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_levels.c: each point is in one level, in the caller's order there, and levels ascend; what is
- * no radius, type or table is refused with its first row, and nothing is left. */
+/* test_levels.c: points with radii of many sizes are divided into levels, whose searches find each
+ * pair once. */
 #include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/base/poll.h"
+#include "../../../csrc/core/levels/level_join.h"
+#include "../../../csrc/core/levels/level_plan.h"
+#include "../../../csrc/core/levels/level_search.h"
 #include "../../../csrc/core/levels/levels.h"
+#include "../../../csrc/core/levels/support_set.h"
+#include "../../../csrc/core/search/limits.h"
 #include "../support/poll_checks.h"
 #include "../support/reach_sets.h"
 
+#include <math.h>
+
 void test_levels(void);
 
-static reach_set points, queries;
+/* Support set: supports as they are read: the lower triangle, a size, how far each reaches. */
+
+enum { N = 5 };
+
+static double matrices[N * 9], reaches_support_set[N];
 
 static hs_account
 new_account(void)
@@ -20,343 +31,62 @@ new_account(void)
     return account;
 }
 
+/* Diagonal 1, 2, 4 and beside it 0.25, for each point a power of two of that. */
+static void
+fill(int ndim)
+{
+    for (int i = 0; i < N; i++)
+        for (int k = 0; k < ndim; k++)
+            for (int l = 0; l < ndim; l++)
+                matrices[(i * ndim + k) * ndim + l] = ldexp(k == l ? ldexp(1.0, k) : 0.25, i);
+}
+
+static void
+is_refused(hs_status status, int64_t row, double value)
+{
+    const hs_options options = hs_options_default();
+    hs_account       account = new_account();
+    hs_failure       failure = {.row = -1};
+    hs_support_set   set;
+    CHECK(hs_support_set_read(&account, &options, matrices, N, 3, 1.0, &set, reaches_support_set,
+                              &failure) == status);
+    CHECK(failure.row == row && set.numbers == NULL && account.held == 0);
+    CHECK(failure.value == value || (isnan(failure.value) && isnan(value)));
+    hs_account_close(&account);
+}
+
+static void
+the_first_that_is_wrong_is_named(void)
+{
+    static const double wrong[] = {NAN, INFINITY, -INFINITY};
+    for (int e = 0; e < 9; e++) {
+        for (int w = 0; w < 3; w++) {
+            fill(3);
+            matrices[2 * 9 + e] = matrices[4 * 9] = wrong[w];
+            is_refused(HS_ERR_SUPPORTS, 2, wrong[w]);
+        }
+        fill(3);
+        matrices[3 * 9 + e] += 1.0; /* not symmetric, unless on the diagonal */
+        if (e % 4 != 0) {           /* by its upper entry */
+            is_refused(HS_ERR_SUPPORTS, 3, e % 3 > e / 3 ? 3.0 : 2.0);
+        }
+    }
+    fill(3);
+    matrices[9 + 4] = 0.0625;                    /* singular, or less */
+    is_refused(HS_ERR_SUPPORTS, 1, matrices[9]); /* named by its first entry */
+    fill(3);
+    for (int e = 0; e < 9; e++)
+        matrices[4 * 9 + e] *= 0x1p-1050;
+    is_refused(HS_ERR_SUPPORT_REACH, 4, 1.0); /* the extent */
+}
+
+/* Levels: each point is in one level, in the caller's order there, and levels ascend. */
+
 static void
 close_account(hs_account *account)
 {
     CHECK(account->held == 0);
     hs_account_close(account);
-}
-
-/* Each point of `of` once, with its coordinates; ascending numbers in each level. */
-static bool
-has_each_point(const hs_level_set *set, int32_t n_levels, const reach_set *of)
-{
-    bool seen[REACH_POINTS] = {false};
-    bool right = set->n == of->n && set->ndim == of->ndim && set->first[0] == 0 &&
-                 set->first[n_levels] == of->n;
-    for (int32_t l = 0; right && l < n_levels; l++) {
-        right = set->first[l] <= set->first[l + 1];
-        for (int64_t at = set->first[l]; right && at < set->first[l + 1]; at++) {
-            const int32_t i = set->number[at];
-            right = i >= 0 && i < of->n && !seen[i] &&
-                    (at == set->first[l] || set->number[at - 1] < i) &&
-                    memcmp(set->rows + at * of->ndim, of->x + (int64_t)i * of->ndim,
-                           (size_t)of->ndim * sizeof(double)) == 0;
-            seen[right ? i : 0] = true;
-        }
-    }
-    return right;
-}
-
-/* Radii as given, or halved; those of a level are larger than all of the one before. */
-static bool
-radii_ascend(const hs_level_set *set, int32_t n_levels, const reach_set *of, bool halved)
-{
-    bool   right = set->radii != NULL;
-    double before = -1.0;
-    for (int32_t l = 0; right && l < n_levels; l++) {
-        double largest = before;
-        for (int64_t at = set->first[l]; right && at < set->first[l + 1]; at++) {
-            const double radius = of->radii[set->number[at]];
-            right = set->radii[at] == (halved ? 0.5 * radius : radius) && set->radii[at] > before &&
-                    !signbit(set->radii[at]);
-            largest = fmax(largest, set->radii[at]);
-        }
-        before = largest;
-    }
-    return right;
-}
-
-static hs_status
-divide(const hs_reach *reach, bool has_queries, hs_account *account, hs_levels *levels,
-       hs_failure *failure)
-{
-    const hs_points  p = reach_points(&points), q = reach_points(&queries);
-    const hs_options options = hs_options_default();
-    *failure = HS_NO_FAILURE;
-    return hs_levels_divide(account, &options, &p, has_queries ? &q : NULL, reach, levels, failure);
-}
-
-static void
-points_are_divided_by_their_radii(void)
-{
-    harness_random random = {31};
-    int            most = 0;
-    for (int trial = 0; trial < 200; trial++) {
-        const bool has_queries = trial & 1, halves = trial % 3 == 0;
-        reach_fill(&random, trial % 4 ? 1 + trial : 0, 1 + trial % 8, 3.0, trial % 5, 0.7, &points);
-        reach_fill(&random, trial % 7 ? 200 - trial : 0, 1 + trial % 8, 3.0, 2, 0.7, &queries);
-        if (points.n > 1)
-            points.radii[0] = -0.0;
-        const hs_reach reach = {.rule = halves ? HS_RULE_MEAN : HS_RULE_MAX,
-                                .radii = points.radii,
-                                .query_radii = queries.radii};
-        hs_account     account = new_account();
-        hs_levels      levels;
-        hs_failure     failure;
-        CHECK(divide(&reach, has_queries, &account, &levels, &failure) == HS_OK);
-        CHECK(levels.has_queries == has_queries && levels.cutoffs == NULL);
-        CHECK(has_each_point(&levels.points, levels.n, &points));
-        CHECK(radii_ascend(&levels.points, levels.n, &points, halves));
-        CHECK(hs_levels_asking(&levels) == (has_queries ? &levels.queries : &levels.points));
-        if (has_queries) {
-            CHECK(has_each_point(&levels.queries, levels.n, &queries));
-            CHECK(radii_ascend(&levels.queries, levels.n, &queries, halves));
-        }
-        for (int32_t l = 0; l < levels.n; l++) { /* none is empty */
-            const bool some = has_queries && levels.queries.first[l] < levels.queries.first[l + 1];
-            CHECK(some || levels.points.first[l] < levels.points.first[l + 1]);
-        }
-        most = levels.n > most ? levels.n : most;
-        hs_levels_free(&account, &levels);
-        hs_levels_free(&account, &levels);
-        close_account(&account);
-    }
-    CHECK(most > 8);
-}
-
-/* Of which the rule needs no radii, all are of the smallest size. */
-static void
-sets_without_radii_are_of_one_level(void)
-{
-    const hs_reach reach = {.rule = HS_RULE_GATHER, .query_radii = queries.radii};
-    hs_account     account = new_account();
-    hs_levels      levels;
-    hs_failure     failure;
-    harness_random random = {39};
-    reach_fill(&random, 70, 2, 3.0, 0, 0.7, &points);
-    reach_fill(&random, 50, 2, 3.0, 2, 0.7, &queries);
-    CHECK(divide(&reach, true, &account, &levels, &failure) == HS_OK && levels.n > 3);
-    CHECK(levels.points.radii == NULL && levels.points.first[1] == 70);
-    CHECK(has_each_point(&levels.points, levels.n, &points));
-    CHECK(radii_ascend(&levels.queries, levels.n, &queries, false));
-    hs_levels_renumber(1000, &levels);
-    for (int i = 0; i < 70; i++)
-        CHECK(levels.points.number[i] == 1000 + i);
-    CHECK(levels.queries.number[0] < 50);
-    hs_levels_free(&account, &levels);
-    close_account(&account);
-}
-
-/* All of one order are in two levels at most; the largest and the smallest numbers are in order. */
-static void
-levels_are_binary_orders(void)
-{
-    static const double ladder[] = {0.0, 5e-324, 0x1p-1030, 0x1p-1021, 1e-300,  0x1p-3,
-                                    0.2, 0.9,    1.0,       0x1.8p900, 0x1p1022};
-    const hs_reach      reach = {.rule = HS_RULE_SUM, .radii = points.radii};
-    hs_account          account = new_account();
-    hs_levels           levels;
-    hs_failure          failure;
-    harness_random      random = {32};
-    reach_fill(&random, 11, 2, 1.0, 0, 1.0, &points);
-    for (int i = 0; i < 11; i++)
-        points.radii[(i * 4) % 11] = ladder[i];
-    CHECK(divide(&reach, false, &account, &levels, &failure) == HS_OK);
-    CHECK(radii_ascend(&levels.points, levels.n, &points, false) && levels.n >= 6);
-    hs_levels_free(&account, &levels);
-    for (int i = 0; i < 11; i++)
-        points.radii[i] = 0x1p-1040 * (16 + i);
-    CHECK(divide(&reach, false, &account, &levels, &failure) == HS_OK);
-    CHECK(levels.n <= 2 && radii_ascend(&levels.points, levels.n, &points, false));
-    hs_levels_free(&account, &levels);
-    close_account(&account);
-}
-
-/* Types 1 and 4 of six have no point: there are levels, and cutoffs, of the others. */
-static void
-points_are_divided_by_their_types(void)
-{
-    double               table[REACH_TYPES * REACH_TYPES];
-    hs_account           account = new_account();
-    hs_levels            levels;
-    hs_failure           failure;
-    harness_random       random = {33};
-    static const int32_t present[] = {0, 2, 3, 5};
-    reach_fill(&random, 300, 3, 1.0, 1, 1.0, &points);
-    reach_fill(&random, 20, 3, 1.0, 1, 1.0, &queries);
-    for (int a = 0; a < REACH_TYPES; a++) {
-        for (int b = 0; b < REACH_TYPES; b++)
-            table[a * REACH_TYPES + b] = a == b && a == 3 ? -7.5 : 0.1 * (a + b);
-    }
-    for (int i = 0; i < 300; i++)
-        points.types[i] = i % 2 ? 0 : i % 3 ? 5 : 3;
-    for (int i = 0; i < 20; i++)
-        queries.types[i] = i % 2 ? 2 : 5;
-    const hs_reach reach = {.rule = HS_RULE_GATHER, /* plays no part, nor do radii */
-                            .radii = points.radii,
-                            .query_radii = queries.radii,
-                            .n_types = REACH_TYPES,
-                            .types = points.types,
-                            .query_types = queries.types,
-                            .cutoffs = table};
-    CHECK(divide(&reach, true, &account, &levels, &failure) == HS_OK);
-    CHECK(levels.n == 4 && levels.points.radii == NULL && levels.queries.radii == NULL);
-    CHECK(has_each_point(&levels.points, 4, &points));
-    CHECK(has_each_point(&levels.queries, 4, &queries));
-    for (int32_t a = 0; a < 4; a++) {
-        for (int64_t at = levels.points.first[a]; at < levels.points.first[a + 1]; at++)
-            CHECK(points.types[levels.points.number[at]] == present[a]);
-        for (int32_t b = 0; b < 4; b++) {
-            const double cutoff = table[present[a] * REACH_TYPES + present[b]];
-            CHECK(levels.cutoffs[a * 4 + b] == (cutoff < 0.0 ? -1.0 : cutoff));
-        }
-    }
-    hs_levels_free(&account, &levels);
-    close_account(&account);
-}
-
-/* What a refusal must say: nothing is held, and the first bad row is named. */
-static void
-is_refused(const hs_reach *reach, hs_status status, int64_t row, bool in_queries)
-{
-    hs_account account = new_account();
-    hs_levels  levels;
-    hs_failure failure;
-    CHECK(divide(reach, true, &account, &levels, &failure) == status);
-    CHECK(failure.row == row && failure.in_queries == in_queries);
-    CHECK(levels.points.rows == NULL && levels.queries.rows == NULL && levels.cutoffs == NULL);
-    hs_levels_free(&account, &levels);
-    close_account(&account);
-}
-
-static void
-bad_numbers_are_refused(void)
-{
-    static const double bad[] = {-1.0, NAN, INFINITY, -INFINITY, 0x1.0000000000001p1022, -5e-324};
-    harness_random      random = {34};
-    reach_fill(&random, 50, 2, 1.0, 1, 1.0, &points);
-    reach_fill(&random, 30, 2, 1.0, 1, 1.0, &queries);
-    hs_reach reach = {.rule = HS_RULE_SUM, .radii = points.radii, .query_radii = queries.radii};
-    for (int e = 0; e < 6; e++) {
-        queries.radii[7] = queries.radii[9] = bad[e];
-        is_refused(&reach, HS_ERR_RADII, 7, true);
-        points.radii[31] = points.radii[49] = bad[e];
-        is_refused(&reach, HS_ERR_RADII, 31, false);
-        points.radii[31] = points.radii[49] = queries.radii[7] = queries.radii[9] = 1.0;
-    }
-    reach.rule = HS_RULE_MEAN; /* half of it would lose a digit */
-    points.radii[3] = 0x1p-1022;
-    is_refused(&reach, HS_ERR_RADII, 3, false);
-    points.radii[3] = 0x1p-1021;
-    queries.x[2 * 11 + 1] = INFINITY;
-    is_refused(&reach, HS_ERR_NOT_FINITE, 11, true);
-    points.x[0] = NAN;
-    is_refused(&reach, HS_ERR_NOT_FINITE, 0, false);
-}
-
-/* With an extent, which is the factor then, the bounds of radii are narrower; 0 is none. */
-static void
-radii_that_have_an_extent_are_moderate(void)
-{
-    static const double fits[] = {0.0, 0x1p-500, 0x1p500}, bad[] = {0x1p-501, 0x1.8p500, 5e-324};
-    harness_random      random = {38};
-    hs_account          account = new_account();
-    hs_levels           levels;
-    hs_failure          failure;
-    reach_fill(&random, 50, 2, 1.0, 1, 1.0, &points);
-    reach_fill(&random, 30, 2, 1.0, 1, 1.0, &queries);
-    hs_reach reach = {
-        .rule = HS_RULE_MAX, .radii = points.radii, .query_radii = queries.radii, .extent = 0.625};
-    for (int e = 0; e < 3; e++) {
-        points.radii[9] = fits[e];
-        CHECK(divide(&reach, true, &account, &levels, &failure) == HS_OK);
-        CHECK(levels.factor == 0.625 && radii_ascend(&levels.points, levels.n, &points, false));
-        hs_levels_free(&account, &levels);
-    }
-    for (int e = 0; e < 3; e++) {
-        points.radii[9] = bad[e];
-        reach.extent = 0.625;
-        is_refused(&reach, HS_ERR_RADII, 9, false);
-        reach.extent = e; /* 0 is as 1, which bounds nothing; 2 does */
-        if (e == 2) {
-            is_refused(&reach, HS_ERR_RADII, 9, false);
-        } else {
-            CHECK(divide(&reach, true, &account, &levels, &failure) == HS_OK);
-            CHECK(levels.factor == 1.0);
-            hs_levels_free(&account, &levels);
-        }
-    }
-    close_account(&account);
-}
-
-static void
-bad_types_and_tables_are_refused(void)
-{
-    double         table[4] = {1.0, 2.0, 2.0, 3.0};
-    harness_random random = {35};
-    reach_fill(&random, 50, 2, 1.0, 1, 1.0, &points);
-    reach_fill(&random, 30, 2, 1.0, 1, 1.0, &queries);
-    const hs_reach reach = {
-        .n_types = 2, .types = points.types, .query_types = queries.types, .cutoffs = table};
-    for (int i = 0; i < 50; i++)
-        points.types[i] = queries.types[i] = i % 2;
-    queries.types[29] = 2;
-    is_refused(&reach, HS_ERR_TYPES, 29, true);
-    points.types[1] = INT32_MIN;
-    is_refused(&reach, HS_ERR_TYPES, 1, false);
-    points.types[1] = queries.types[29] = 1;
-    for (int e = 0; e < 4; e++) {
-        static const double wrong[] = {NAN, INFINITY, -INFINITY, 2.5};
-        table[2] = wrong[e];
-        is_refused(&reach, HS_ERR_CUTOFF, -1, false);
-    }
-    table[2] = 2.0;
-    table[3] = NAN; /* no point need be of such types */
-    is_refused(&reach, HS_ERR_CUTOFF, -1, false);
-}
-
-static hs_status
-divide_once(void *context)
-{
-    hs_account      account = new_account();
-    hs_levels       levels;
-    hs_failure      failure;
-    const hs_status status = divide(context, true, &account, &levels, &failure);
-    CHECK(status == HS_OK || levels.points.rows == NULL);
-    hs_levels_free(&account, &levels);
-    close_account(&account);
-    return status;
-}
-
-static void
-nothing_leaks_when_memory_is_short(void)
-{
-    double         table[REACH_TYPES * REACH_TYPES] = {0.0};
-    harness_random random = {36};
-    reach_fill(&random, 50, 2, 1.0, 2, 1.0, &points);
-    reach_fill(&random, 30, 2, 1.0, 2, 1.0, &queries);
-    hs_reach reach = {.rule = HS_RULE_SUM, .radii = points.radii, .query_radii = queries.radii};
-    CHECK(fail_each_allocation(divide_once, &reach, 100) > 12);
-    reach = (hs_reach){.n_types = REACH_TYPES,
-                       .types = points.types,
-                       .query_types = queries.types,
-                       .cutoffs = table};
-    CHECK(fail_each_allocation(divide_once, &reach, 100) > 12);
-}
-
-/* Points of a slice are those of its levels, where they are. */
-static void
-slices_are_points_in_place(void)
-{
-    const hs_reach reach = {.rule = HS_RULE_MIN, .radii = points.radii};
-    hs_account     account = new_account();
-    hs_levels      levels;
-    hs_failure     failure;
-    harness_random random = {37};
-    reach_fill(&random, 200, 3, 1.0, 2, 1.0, &points);
-    CHECK(divide(&reach, false, &account, &levels, &failure) == HS_OK);
-    for (int64_t first = 0; first < levels.n; first++) {
-        for (int64_t end = first; end <= levels.n; end++) {
-            const hs_points slice = hs_level_points(&levels.points, (hs_slice){first, end});
-            CHECK(slice.n == levels.points.first[end] - levels.points.first[first]);
-            CHECK(slice.data == levels.points.rows + 3 * levels.points.first[first]);
-            CHECK(slice.ndim == 3 && slice.real == HS_FLOAT64);
-            CHECK(slice.row_stride == 24 && slice.column_stride == 8);
-        }
-    }
-    hs_levels_free(&account, &levels);
-    close_account(&account);
 }
 
 /* Every poll of a division of many points: the one that says no ends it, and nothing is left. */
@@ -407,17 +137,525 @@ a_division_can_be_stopped(void)
     }
 }
 
+/* Plan checks: plans of levels, and whether every pair of points is in one step of theirs. */
+
+static reach_set points, queries;
+static double    table[12 * 12]; /* of up to 12 types */
+
+/* A division and a plan of it. */
+typedef struct planned {
+    hs_account    account;
+    hs_levels     levels;
+    hs_level_plan plan;
+} planned;
+
+static void
+make_plan_as(const hs_reach *reach, bool has_queries, double bound, hs_algorithm algorithm,
+             planned *made)
+{
+    const hs_options options = hs_options_default();
+    const hs_points  p = reach_points(&points), q = reach_points(&queries);
+    hs_failure       failure = HS_NO_FAILURE;
+    hs_account_init(&made->account, &options);
+    CHECK(hs_levels_divide(&made->account, &options, &p, has_queries ? &q : NULL, reach,
+                           &made->levels, &failure) == HS_OK);
+    CHECK(hs_level_plan_make(&made->account, &made->levels, bound, algorithm, &made->plan) ==
+          HS_OK);
+}
+
+static void
+make_plan(const hs_reach *reach, bool has_queries, double bound, planned *made)
+{
+    make_plan_as(reach, has_queries, bound, HS_AUTO, made);
+}
+
+static void
+free_plan(planned *made)
+{
+    hs_level_plan_free(&made->account, &made->plan);
+    hs_level_plan_free(&made->account, &made->plan);
+    CHECK(made->plan.steps == NULL && made->plan.n == 0);
+    hs_levels_free(&made->account, &made->levels);
+    CHECK(made->account.held == 0);
+    hs_account_close(&made->account);
+}
+
+/* Sign of what a pair is compared with, less the cutoff. */
+static int
+compare_limit(hs_dw limit, double cutoff)
+{
+    return limit.hi != cutoff ? (limit.hi > cutoff) - (limit.hi < cutoff)
+                              : (limit.lo > 0.0) - (limit.lo < 0.0);
+}
+
+static double
+radius_at(const hs_level_set *set, int64_t at)
+{
+    return set->radii != NULL ? set->radii[at] : 0.0;
+}
+
+/* The limit of the asking point and the point at these places. */
+static hs_dw
+limit_at(const planned *made, int64_t a, int64_t b)
+{
+    const hs_levels *levels = &made->levels;
+    return hs_limit_by(levels->rule, levels->factor, radius_at(hs_levels_asking(levels), a),
+                       radius_at(&levels->points, b), made->plan.bound);
+}
+
+/* The smallest positive radius in a slice; infinity where there is none. */
+static double
+least_of(const hs_level_set *set, hs_slice slice)
+{
+    double least = HUGE_VAL;
+    for (int64_t at = set->first[slice.first]; at < set->first[slice.end]; at++) {
+        if (radius_at(set, at) > 0.0)
+            least = fmin(least, radius_at(set, at));
+    }
+    return least;
+}
+
+/* The cutoff of two types by the table of the levels; negative: none. */
+static double
+cutoff_at(const planned *made, int64_t a, int64_t b)
+{
+    const hs_levels    *levels = &made->levels;
+    const hs_level_set *asking = hs_levels_asking(levels);
+    int32_t             row = 0, column = 0;
+    while (asking->first[row + 1] <= a)
+        row++;
+    while (levels->points.first[column + 1] <= b)
+        column++;
+    return levels->cutoffs[row * levels->n + column];
+}
+
+/* Of one pair: sign of its limit less the cutoff of the step. With a table, pairs of types that have
+ * none are not counted. */
+static int
+count_pair(const planned *made, const hs_level_step *step, int64_t a, int64_t b, int *covered)
+{
+    const bool has_types = made->levels.cutoffs != NULL;
+    double     cutoff = has_types ? cutoff_at(made, a, b) : 0.0;
+    if (cutoff < 0.0 && step->by_table) {
+        return -1;
+    }
+    ++*covered;
+    cutoff = fmin(cutoff, made->plan.bound);
+    return compare_limit(has_types ? (hs_dw){cutoff, 0.0} : limit_at(made, a, b), step->cutoff);
+}
+
+/* Counts the pairs of a step, and checks what it says of them: no limit passes the cutoff, one or
+ * more are it, and all of them are where there are no limits. */
+static bool
+cover(const planned *made, const hs_level_step *step, int *covered, int64_t n_points)
+{
+    const hs_level_set *asking = hs_levels_asking(&made->levels), *among = &made->levels.points;
+    const hs_slice      askers = step->is_own ? step->points : step->asking;
+    const double        least = fmin(least_of(asking, askers), least_of(among, step->points));
+    bool                right = true, reaches = false, all_equal = true;
+    if (made->levels.cutoffs == NULL) {
+        const double factor = made->levels.factor, part = factor != 1.0 ? factor * 0x1p-110 : 1.0;
+        right = step->least == (least < HUGE_VAL ? least * part : 0.0) && !step->by_table;
+    }
+    right = right && asking->first[askers.first] < asking->first[askers.end];
+    right = right && among->first[step->points.first] < among->first[step->points.end];
+    right = right && (!step->is_own || made->plan.is_half);
+    for (int64_t a = asking->first[askers.first]; a < asking->first[askers.end]; a++) {
+        const int64_t from = step->is_own ? a : among->first[step->points.first];
+        for (int64_t b = from; b < among->first[step->points.end]; b++) {
+            const int64_t pair = asking->number[a] * n_points + among->number[b];
+            const int     sign = count_pair(made, step, a, b, &covered[pair]);
+            right = right && sign <= 0;
+            all_equal = all_equal && sign == 0;
+            reaches = reaches || sign == 0 || made->levels.cutoffs != NULL ||
+                      compare_limit(limit_at(made, a, b), hs_next_down(step->cutoff)) > 0;
+        }
+    }
+    return right && reaches && (step->has_limits || all_equal);
+}
+
+/* Every pair as often as it must be. */
+static bool
+covers_each_once(const planned *made)
+{
+    static int          covered[REACH_POINTS * REACH_POINTS];
+    const hs_levels    *levels = &made->levels;
+    const hs_level_set *asking = hs_levels_asking(levels);
+    const int64_t       n = levels->points.n, n_asking = asking->n;
+    const int32_t      *of_asking = levels->has_queries ? queries.types : points.types;
+    bool                right = true;
+    memset(covered, 0, sizeof covered);
+    for (int64_t s = 0; s < made->plan.n; s++) {
+        right = cover(made, &made->plan.steps[s], covered, n) && right;
+    }
+    for (int64_t i = 0; i < n_asking; i++) {
+        for (int64_t j = made->plan.is_half ? i : 0; j < n; j++) {
+            const bool none = levels->cutoffs != NULL &&
+                              table[of_asking[i] * REACH_TYPES + points.types[j]] < 0.0;
+            int times = covered[i * n + j];
+            times += made->plan.is_half && i != j ? covered[j * n + i] : 0;
+            right = right && times == !none;
+        }
+    }
+    return right;
+}
+
+/* Level plan: whatever the rule and the radii, each pair of points is in exactly one step, whose
+ * cutoff is no less than its limit. */
+
+/* So do sums of which the largest alone is no float64. */
+static void
+sums_above_an_exact_one_are_not_it(void)
+{
+    const hs_reach reach = {
+        .rule = HS_RULE_SUM, .radii = points.radii, .query_radii = queries.radii};
+    planned        made;
+    int            joined = 0;
+    harness_random random = {77};
+    reach_fill(&random, 2, 1, 1.0, 0, 1.0, &points);
+    reach_fill(&random, 5, 1, 1.0, 0, 0.0, &queries);
+    queries.radii[1] = 0x1p-60;
+    queries.radii[3] = 0.375;
+    queries.radii[4] = 0.1875;
+    make_plan_as(&reach, true, HUGE_VAL, HS_HIERARCHY, &made);
+    CHECK(covers_each_once(&made));
+    for (int64_t s = 0; s < made.plan.n; s++) {
+        const hs_level_step *step = &made.plan.steps[s];
+        if (step->asking.end - step->asking.first == 2) {
+            CHECK(step->has_limits && step->cutoff == nextafter(1.0, 2.0));
+            joined++;
+        }
+    }
+    CHECK(joined == 1);
+    free_plan(&made);
+}
+
+/* More types than a table of limits is laid out for are searched two by two. A plan is single where
+ * one step has all points. */
+static void
+many_types_are_searched_in_pairs(void)
+{
+    enum { N_TYPES = 9 };
+    double         all[N_TYPES * N_TYPES];
+    harness_random random = {78};
+    planned        made;
+    reach_fill(&random, 90, 1, 1.0, 0, 1.0, &points);
+    for (int n_types = 1; n_types <= N_TYPES; n_types++) {
+        const hs_reach reach = {.n_types = n_types, .types = points.types, .cutoffs = all};
+        for (int e = 0; e < N_TYPES * N_TYPES; e++)
+            all[e] = 1.0;
+        for (int i = 0; i < 90; i++)
+            points.types[i] = i % n_types;
+        make_plan(&reach, false, HUGE_VAL, &made);
+        CHECK(made.plan.n == (n_types <= 8 ? 1 : N_TYPES * (N_TYPES + 1) / 2));
+        CHECK(hs_level_plan_is_single(&made.levels, &made.plan) == (n_types <= 8));
+        free_plan(&made);
+    }
+    static const double alone[3][4] = {/* type 0 with itself, with type 1, or that with itself */
+                                       {0.1, -1.0, -1.0, -1.0},
+                                       {-1.0, 0.1, 0.1, -1.0},
+                                       {-1.0, -1.0, -1.0, 0.1}};
+    for (int lone = 0; lone < 3; lone++) {
+        const hs_reach reach = {.n_types = 2, .types = points.types, .cutoffs = alone[lone]};
+        for (int i = 0; i < 90; i++)
+            points.types[i] = lone == 0 ? i % 9 != 0 : lone == 1 ? i % 2 : i % 9 == 0;
+        make_plan(&reach, false, HUGE_VAL, &made);
+        const bool by_table = made.plan.steps[0].by_table;
+        CHECK(made.plan.n == 1);
+        CHECK(hs_level_plan_is_single(&made.levels, &made.plan) == by_table);
+        free_plan(&made);
+    }
+}
+
+/* Queries of one level that look among all points ask for less than all levels. */
+static void
+a_level_of_two_is_not_all(void)
+{
+    const hs_reach reach = {
+        .rule = HS_RULE_GATHER, .radii = points.radii, .query_radii = queries.radii};
+    harness_random random = {79};
+    planned        made;
+    reach_fill(&random, 10, 1, 1.0, 0, 0.1, &points);
+    reach_fill(&random, 10, 1, 1.0, 0, 0.1, &queries);
+    points.radii[4] = 0.9;
+    for (int upper = 0; upper < 2; upper++) {
+        for (int i = 0; i < 10; i++)
+            queries.radii[i] = upper ? 0.9 : 0.1;
+        make_plan_as(&reach, true, HUGE_VAL, HS_HIERARCHY, &made);
+        CHECK(made.levels.n == 2 && made.plan.n == 1 && made.plan.steps[0].asking.first == upper);
+        CHECK(!hs_level_plan_is_single(&made.levels, &made.plan));
+        free_plan(&made);
+    }
+}
+
+/* Level join: few common sizes are searched at once, rare large points and dense neighbourhoods of
+ * small ones are not. */
+
+static void
+choose_plan(const hs_box *box, planned *made)
+{
+    const hs_options   options = hs_options_default();
+    const hs_algorithm algorithm = made->plan.algorithm;
+    hs_level_plan_free(&made->account, &made->plan);
+    CHECK(hs_level_plan_choose(&made->account, &options, &made->levels, box, HUGE_VAL, algorithm,
+                               &made->plan) == HS_OK);
+}
+
+/* As it is, where levels may be joined; and frees it. */
+static void
+stays(planned *made)
+{
+    const int64_t n = made->plan.n;
+    CHECK(!hs_test_join_levels(true));
+    choose_plan(NULL, made);
+    CHECK(hs_test_join_levels(false));
+    CHECK(made->plan.n == n && covers_each_once(made));
+    free_plan(made);
+}
+
+/* Half of the points have a radius of 0.5, the others one of `large`; n points in a cube. */
+static void
+two_sizes(int64_t n, double side, double large, int64_t every)
+{
+    harness_random random = {4711};
+    reach_fill(&random, n, 3, side, 0, 1.0, &points);
+    for (int64_t i = 0; i < n; i++)
+        points.radii[i] = i % every == 0 ? large : 0.5;
+}
+
+/* A plan that the caller chose, of one step, of types, of too many levels or of no points stays. */
+static void
+some_plans_are_never_joined(void)
+{
+    hs_reach       reach = {.rule = HS_RULE_SUM, .radii = points.radii};
+    harness_random random = {73};
+    planned        made;
+    two_sizes(REACH_POINTS, 20.0, 1.2, 2);
+    make_plan_as(&reach, false, HUGE_VAL, HS_HIERARCHY, &made);
+    stays(&made);
+    two_sizes(REACH_POINTS, 20.0, 0.5, 2);
+    make_plan(&reach, false, HUGE_VAL, &made);
+    CHECK(made.plan.n == 1);
+    stays(&made);
+    for (int n_levels = 16; n_levels <= 17; n_levels++) { /* few points, far apart */
+        reach_fill(&random, 2 * n_levels, 3, 1e6, 0, 1.0, &points);
+        for (int i = 0; i < 2 * n_levels; i++)
+            points.radii[i] = ldexp(0.75, -(i % n_levels));
+        points.radii[0] =
+            1.0; /* the largest one has a level of its own size, or of all above half */
+        make_plan(&reach, false, HUGE_VAL, &made);
+        CHECK(made.levels.n == n_levels);
+        if (n_levels == 17) {
+            stays(&made);
+        } else {
+            CHECK(made.plan.n > 1);
+            CHECK(!hs_test_join_levels(true));
+            choose_plan(NULL, &made);
+            CHECK(hs_test_join_levels(false));
+            CHECK(made.plan.n == 1 && covers_each_once(&made));
+            free_plan(&made);
+        }
+    }
+    reach_fill(&random, 90, 1, 1.0, 0, 1.0, &points);
+    for (int e = 0; e < REACH_TYPES * REACH_TYPES; e++)
+        table[e] = e % (REACH_TYPES + 1) == 0 ? 0.001 : -1.0;
+    reach = (hs_reach){.n_types = REACH_TYPES, .types = points.types, .cutoffs = table};
+    make_plan(&reach, false, HUGE_VAL, &made);
+    CHECK(made.plan.n == REACH_TYPES);
+    stays(&made);
+}
+
+static void
+choose_plan_by(const hs_options *options, planned *made, hs_status expected)
+{
+    const hs_status status = hs_level_plan_choose(&made->account, options, &made->levels, NULL,
+                                                  HUGE_VAL, HS_AUTO, &made->plan);
+    CHECK(status == expected && (made->plan.n > 0) == (expected == HS_OK));
+    hs_level_plan_free(&made->account, &made->plan);
+}
+
+/* A pass over the points polls, and ends where the caller says so. */
+static void
+it_can_be_stopped(void)
+{
+    enum { MANY = 2 * HS_POLL_POINTS + 9 };
+    static double   x[2 * MANY], radii[2 * MANY];
+    const hs_points p = {x, 2 * MANY, 1, HS_FLOAT64, sizeof *x, sizeof *x},
+                    q = {x, MANY, 1, HS_FLOAT64, sizeof *x, sizeof *x};
+    const hs_reach   reach = {.rule = HS_RULE_SUM, .radii = radii, .query_radii = radii};
+    const hs_options quiet = hs_options_default();
+    for (int64_t i = 0; i < 2 * MANY; i++) {
+        x[i] = (double)i;
+        radii[i] = i % 2 ? 1.0 : 4.0;
+    }
+    for (int has_queries = 0; has_queries < 2; has_queries++) {
+        refusal    once = {.nth = 0};
+        hs_options options = quiet;
+        planned    made;
+        hs_failure failure;
+        options.poll = refuse_once;
+        options.poll_context = &once;
+        hs_account_init(&made.account, &quiet);
+        CHECK(hs_levels_divide(&made.account, &quiet, &p, has_queries ? &q : NULL, &reach,
+                               &made.levels, &failure) == HS_OK);
+        CHECK(!hs_test_join_levels(true));
+        choose_plan_by(&options, &made, HS_OK);
+        const int64_t n = once.n;
+        CHECK(n == (has_queries ? 6 : 4));
+        for (int64_t nth = 1; nth <= n; nth++) {
+            once = (refusal){.nth = nth};
+            choose_plan_by(&options, &made, HS_ERR_INTERRUPTED);
+            CHECK(once.n == nth);
+        }
+        CHECK(hs_test_join_levels(false));
+        free_plan(&made);
+    }
+}
+
+/* Level search: one step of a plan as an open search: its points have the caller's numbers, and
+ * radii lie in the order of the cells. */
+
+/* A plan and the call that its steps are opened for. */
+typedef struct planned_level_search {
+    hs_call       call;
+    hs_levels     levels;
+    hs_level_plan plan;
+    const hs_box *box;
+} planned_level_search;
+
+static void
+make_plan_level_search(const hs_reach *reach, bool has_queries, double bound, const hs_box *box,
+                       planned_level_search *made)
+{
+    hs_options      options = hs_options_default();
+    const hs_points p = reach_points(&points), q = reach_points(&queries);
+    hs_failure      failure = HS_NO_FAILURE;
+    options.cutoff = bound;
+    options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE;
+    made->box = box;
+    hs_call_begin(&options, &made->call);
+    hs_account *account = &made->call.account;
+    CHECK(hs_levels_divide(account, &options, &p, has_queries ? &q : NULL, reach, &made->levels,
+                           &failure) == HS_OK);
+    CHECK(hs_level_plan_make(account, &made->levels, bound, HS_AUTO, &made->plan) == HS_OK);
+}
+
+static void
+free_plan_level_search(planned_level_search *made)
+{
+    hs_level_plan_free(&made->call.account, &made->plan);
+    hs_levels_free(&made->call.account, &made->levels);
+    hs_call_dismiss(&made->call);
+    CHECK(made->call.account.held == 0);
+    hs_account_close(&made->call.account);
+}
+
+static hs_status
+open_step(planned_level_search *made, int64_t step, hs_level_search *open, hs_failure *failure)
+{
+    *failure = HS_NO_FAILURE;
+    return hs_level_open(&made->levels, &made->plan, step, made->box, false, &made->call, open,
+                         failure);
+}
+
+/* A point too far for its box: the row is the caller's, of the set that it belongs to. */
+static void
+failures_name_the_callers_row(void)
+{
+    const hs_box   box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
+    harness_random random = {93};
+    for (int in_queries = 0; in_queries < 2; in_queries++) {
+        for (int has_queries = in_queries; has_queries < 2; has_queries++) {
+            const hs_reach reach = {
+                .rule = HS_RULE_GATHER, .radii = points.radii, .query_radii = queries.radii};
+            planned_level_search made;
+            int                  n_failed = 0;
+            reach_fill(&random, 60, 1, 1.0, 2, 0.25, &points);
+            reach_fill(&random, 50, 1, 1.0, 2, 0.25, &queries);
+            *(in_queries ? &queries.x[31] : &points.x[31]) = 1e300;
+            make_plan_level_search(&reach, has_queries, HUGE_VAL, &box, &made);
+            made.call.options.precision = HS_DOUBLE;
+            for (int64_t s = 0; s < made.plan.n; s++) {
+                hs_level_search open;
+                hs_failure      failure;
+                const hs_status status = open_step(&made, s, &open, &failure);
+                if (status == HS_OK) {
+                    hs_level_close(&open);
+                    continue;
+                }
+                CHECK(status == HS_ERR_ROUNDING && failure.row == 31);
+                CHECK(failure.in_queries == in_queries);
+                n_failed++;
+            }
+            CHECK(n_failed > 0);
+            free_plan_level_search(&made);
+        }
+    }
+}
+
+/* Supports are looked at for the width of cells, and laid out for kernels: both poll. */
+static void
+opening_a_step_of_many_supports_can_be_stopped(void)
+{
+    enum { MANY = 2 * HS_POLL_SUPPORTS + 9 };
+    static double   x[MANY], numbers[MANY];
+    const hs_points p = {x, MANY, 1, HS_FLOAT64, sizeof *x, sizeof *x};
+    for (int64_t i = 0; i < MANY; i++) {
+        x[i] = (double)i;
+        numbers[i] = i == MANY - 1 ? 1.0 : 1.5; /* the last is as wide as the ball */
+    }
+    for (int rule = HS_RULE_MAX; rule < HS_RULE_END; rule++) {
+        for (int has_queries = 0; has_queries < 2; has_queries++) {
+            const bool      asks = rule != HS_RULE_SCATTER, meets = rule != HS_RULE_GATHER;
+            const hs_reach  reach = {.rule = (hs_rule)rule,
+                                     .has_supports = true,
+                                     .extent = 1.0,
+                                     .supports = meets || !has_queries ? numbers : NULL,
+                                     .query_supports = asks && has_queries ? numbers : NULL};
+            refusal         once = {.nth = 0};
+            hs_options      options = hs_options_default();
+            hs_failure      failure = HS_NO_FAILURE;
+            hs_levels       levels;
+            hs_level_plan   plan;
+            hs_level_search open;
+            hs_call         call;
+            options.cutoff = HUGE_VAL;
+            options.poll = refuse_once;
+            options.poll_context = &once;
+            hs_call_begin(&options, &call);
+            CHECK(hs_levels_divide(&call.account, &options, &p, has_queries ? &p : NULL, &reach,
+                                   &levels, &failure) == HS_OK);
+            CHECK(hs_level_plan_make(&call.account, &levels, HUGE_VAL, HS_AUTO, &plan) == HS_OK);
+            const int64_t held = call.account.held;
+            once = (refusal){.nth = 0};
+            CHECK(hs_level_open(&levels, &plan, 0, NULL, false, &call, &open, &failure) == HS_OK);
+            hs_level_close(&open);
+            const int64_t n = once.n;
+            CHECK(n >= 4); /* the width of one side at least, and what is laid out */
+            for (int64_t nth = 1; nth <= n; nth++) {
+                once = (refusal){.nth = nth};
+                CHECK(hs_level_open(&levels, &plan, 0, NULL, false, &call, &open, &failure) ==
+                      HS_ERR_INTERRUPTED);
+                CHECK(once.n == nth && call.account.held == held);
+            }
+            hs_level_plan_free(&call.account, &plan);
+            hs_levels_free(&call.account, &levels);
+            hs_call_dismiss(&call);
+            hs_account_close(&call.account);
+        }
+    }
+}
+
 void
 test_levels(void)
 {
+    RUN(the_first_that_is_wrong_is_named);
     RUN(a_division_can_be_stopped);
-    RUN(points_are_divided_by_their_radii);
-    RUN(sets_without_radii_are_of_one_level);
-    RUN(levels_are_binary_orders);
-    RUN(points_are_divided_by_their_types);
-    RUN(bad_numbers_are_refused);
-    RUN(radii_that_have_an_extent_are_moderate);
-    RUN(bad_types_and_tables_are_refused);
-    RUN(nothing_leaks_when_memory_is_short);
-    RUN(slices_are_points_in_place);
+    RUN(sums_above_an_exact_one_are_not_it);
+    RUN(many_types_are_searched_in_pairs);
+    RUN(a_level_of_two_is_not_all);
+    RUN(it_can_be_stopped);
+    RUN(some_plans_are_never_joined);
+    RUN(opening_a_step_of_many_supports_can_be_stopped);
+    RUN(failures_name_the_callers_row);
 }

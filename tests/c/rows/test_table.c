@@ -1,111 +1,131 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_table.c: rows have the lengths that a count gives, whether one walk or two make them. */
-#include "../../../csrc/core/rows/table.h"
-#include "../support/search_unit.h"
-
-#include <math.h>
+/* test_table.c: rows of neighbours, both ways, from one list. */
+#include "../support/among.h"
+#include "../support/harness.h"
+#include "../support/output_checks.h"
+#include "../support/random_scenes.h"
 
 void test_table(void);
 
-enum { N = 200 };
-
-static search_unit unit;
-static int64_t     offsets[N + 1], counts[N];
+static random_scene shared;
 
 static int64_t
-neighbours_of(int i, double cutoff)
+number_at(const void *numbers, int index_bytes, int64_t e)
 {
-    int64_t n = 0;
-    for (int j = 0; j < N; j++)
-        n += j != i &&
-             hypot(unit.x[2 * i] - unit.x[2 * j], unit.x[2 * i + 1] - unit.x[2 * j + 1]) <= cutoff;
-    return n;
+    return index_bytes == 8 ? ((const int64_t *)numbers)[e] : ((const int32_t *)numbers)[e];
 }
 
-/* Not counting the point itself; with a cutoff of 0 only what coincides. */
-static void
-points_do_not_count_themselves(void)
+/* Whether i, j and both say the same, and i is the row. */
+static bool
+rows_are_consistent(const hs_pairs *rows, int index_bytes)
 {
-    hs_failure failure;
-    search_unit_points(131, N, 2, 4.0, &unit);
-    unit.x[2] = unit.x[0];
-    unit.x[3] = unit.x[1];
-    for (int c = 0; c < 3; c++) {
-        const double cutoff = 0.5 * c;
-        search_unit_open(NULL, cutoff, true, HS_WANT_J, &unit);
-        memset(counts, 0x5a, sizeof counts);
-        CHECK(hs_table_count(&unit.search, counts, &failure) == HS_OK);
-        int64_t wrong = 0;
-        for (int i = 0; i < N; i++)
-            wrong += counts[i] != neighbours_of(i, cutoff);
-        CHECK(wrong == 0 && counts[0] >= 1);
-        search_unit_close(&unit);
-    }
-}
-
-static void
-sums_are_where_rows_begin(void)
-{
-    hs_table table = {.search = &unit.search, .offsets = offsets};
-    search_unit_points(132, N, 2, 4.0, &unit);
-    search_unit_open(NULL, 0.5, true, HS_WANT_J, &unit);
-    for (int i = 0; i < N; i++)
-        offsets[i] = i % 5;
-    offsets[N] = -1;
-    hs_table_sum(&table);
-    CHECK(offsets[0] == 0 && offsets[1] == 0 && offsets[2] == 1 && offsets[5] == 10);
-    CHECK(offsets[N] == 2 * N);
-    search_unit_close(&unit);
-}
-
-/* Small tables are kept by the walk that finds them, unless the account has no room for that. */
-static void
-tables_are_the_same_by_one_walk_and_two(void)
-{
-    static int64_t first[N * N];
-    int64_t        n_first = 0;
-    for (int two = 0; two < 2; two++) {
-        hs_output  entries;
-        hs_failure failure;
-        hs_table   table = {.search = &unit.search, .offsets = offsets, .entries = &entries};
-        search_unit_points(133, N, 2, 4.0, &unit);
-        search_unit_open(NULL, 0.75, true, HS_WANT_J | HS_WANT_DISTANCE, &unit);
-        hs_output_init(&unit.call.account, 2, HS_WANT_J | HS_WANT_DISTANCE, 8, &entries);
-        CHECK(hs_table_prepare(&table, &failure) == HS_OK && table.most.candidates > 0);
-        if (two)
-            unit.call.account.limit = 2.0 * HS_MOST_KEPT;
-        CHECK(hs_table_measure(&table, &failure) == HS_OK);
-        CHECK((table.kept.columns == 0) == two);
-        for (int i = 0; i < N; i++)
-            CHECK(offsets[i + 1] - offsets[i] == neighbours_of(i, 0.75));
-        CHECK(hs_output_reserve(&entries, offsets[N], 0.0) == HS_OK);
-        CHECK(hs_table_fill(&table, &failure) == HS_OK);
-        const int64_t *j = hs_output_column(&entries, HS_WANT_J);
-        const double  *d = hs_output_column(&entries, HS_WANT_DISTANCE);
-        int64_t        wrong = 0;
-        for (int i = 0; i < N; i++) {
-            for (int64_t e = offsets[i]; e < offsets[i + 1]; e++) {
-                wrong += e > offsets[i] && j[e] <= j[e - 1];
-                wrong += fabs(hypot(unit.x[2 * i] - unit.x[2 * j[e]],
-                                    unit.x[2 * i + 1] - unit.x[2 * j[e] + 1]) -
-                              d[e]) > 1e-14;
-                wrong += two && first[e] != j[e];
-                first[e] = j[e];
-            }
+    const int64_t *offsets = hs_pairs_offsets(rows);
+    const void    *i = hs_pairs_array(rows, HS_WANT_I), *j = hs_pairs_array(rows, HS_WANT_J);
+    const void    *both = hs_pairs_array(rows, HS_WANT_BOTH);
+    bool           right = offsets[hs_pairs_rows(rows)] == hs_pairs_length(rows);
+    for (int64_t row = 0; row < hs_pairs_rows(rows); row++) {
+        for (int64_t e = offsets[row]; e < offsets[row + 1]; e++) {
+            right = right && number_at(i, index_bytes, e) == row;
+            right = right && number_at(both, index_bytes, 2 * e) == row;
+            right = right &&
+                    number_at(both, index_bytes, 2 * e + 1) == number_at(j, index_bytes, e);
         }
-        CHECK(wrong == 0 && (!two || n_first == offsets[N]));
-        n_first = offsets[N];
-        hs_table_free(&table);
-        hs_table_free(&table);
-        hs_output_free(&entries);
-        search_unit_close(&unit);
     }
+    return right;
+}
+
+/* i and j of 4 and 8 bytes, alone and side by side, with and without measures: the same rows. */
+static void
+every_shape_of_columns_has_the_same_rows(void)
+{
+    static const unsigned wants[] = {HS_WANT_I | HS_WANT_J | HS_WANT_BOTH, WANT_ALL | HS_WANT_BOTH};
+    harness_random        random = {606};
+    int64_t               n_entries = 0;
+    for (int trial = 0; trial < THIRD_OF_TRIALS(200); trial++) {
+        make_scene(&random, trial % SCENE_KINDS, 1 + trial % 4, random_below(&random, 80), 4.0, 0,
+                   &shared);
+        const hs_points points = points_of(&shared.scene);
+        const hs_points queries = {points.data, points.n / 2,      points.ndim,
+                                   HS_FLOAT64,  points.row_stride, points.column_stride};
+        hs_options      options = options_of(&shared.scene);
+        for (int shape = 0; shape < 8; shape++) {
+            const hs_points *asking = shape & 4 ? &queries : NULL;
+            hs_pairs        *rows = NULL, *full = NULL;
+            caller_arrays    c;
+            options.want = wants[shape & 1];
+            options.index_bytes = shape & 2 ? 4 : 8;
+            options.threads = 1 + trial % 2;
+            options.out = NULL;
+            CHECK(hs_neighbors_find(QUERIED(&points, asking, shared.scene.box), &options, &rows,
+                                    NULL) == HS_OK);
+            const int64_t n = hs_pairs_length(rows);
+            CHECK(hs_pairs_rows(rows) == (asking != NULL ? queries.n : points.n));
+            CHECK(rows_are_consistent(rows, options.index_bytes));
+            make_arrays(options.want, points.ndim, options.index_bytes, n, &c);
+            options.out = &c.arrays;
+            CHECK(hs_neighbors_find(QUERIED(&points, asking, shared.scene.box), &options, &full,
+                                    NULL) == HS_OK);
+            CHECK(same_as_result(&c, rows, n) && untouched_from(&c, n));
+            hs_array_free(hs_pairs_take_offsets(rows));
+            CHECK(hs_pairs_rows(rows) == 0 && hs_pairs_offsets(rows) == NULL);
+            free_arrays(&c);
+            hs_pairs_free(full);
+            hs_pairs_free(rows);
+            n_entries += n;
+        }
+    }
+    CHECK(n_entries > THIRD_OF_TRIALS(100000));
+}
+
+static bool
+go_on_until(void *context, double fraction)
+{
+    int *left = context;
+    (void)fraction;
+    return (*left)-- > 0;
+}
+
+/* Over a million entries in long rows: kept by one walk, or written to the caller's arrays at once;
+ * the caller may stop either at any time. */
+static void
+long_rows_are_the_same_by_one_walk(void)
+{
+    enum { N = 2500 };
+    static double  x[3 * N];
+    harness_random random = {15};
+    for (int e = 0; e < 3 * N; e++) {
+        x[e] = random_unit(&random);
+    }
+    const hs_points points = {x, N, 3, HS_FLOAT64, 24, 8};
+    hs_options      options = hs_options_default();
+    hs_pairs       *rows = NULL, *into = NULL;
+    hs_status       status = HS_ERR_INTERRUPTED;
+    caller_arrays   c;
+    int             n_stopped = 0;
+    options.cutoff = 0.45;
+    options.want = HS_WANT_I | HS_WANT_J;
+    options.poll = go_on_until;
+    for (int polls = 0; status != HS_OK && polls < 1000; polls += 1 + polls / 4) {
+        int left = polls;
+        options.poll_context = &left;
+        status = hs_neighbors_find(AMONG(&points, NULL), &options, &rows, NULL);
+        CHECK(status == HS_OK || (status == HS_ERR_INTERRUPTED && rows == NULL));
+        n_stopped += status != HS_OK;
+    }
+    CHECK(status == HS_OK && n_stopped > 0 && hs_pairs_length(rows) > 1 << 20);
+    options.poll = NULL;
+    make_arrays(options.want, 3, 8, hs_pairs_length(rows), &c);
+    options.out = &c.arrays;
+    CHECK(hs_neighbors_find(AMONG(&points, NULL), &options, &into, NULL) == HS_OK);
+    CHECK(same_as_result(&c, rows, hs_pairs_length(rows)));
+    free_arrays(&c);
+    hs_pairs_free(into);
+    hs_pairs_free(rows);
 }
 
 void
 test_table(void)
 {
-    RUN(points_do_not_count_themselves);
-    RUN(sums_are_where_rows_begin);
-    RUN(tables_are_the_same_by_one_walk_and_two);
+    RUN(every_shape_of_columns_has_the_same_rows);
+    RUN(long_rows_are_the_same_by_one_walk);
 }

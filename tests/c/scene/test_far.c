@@ -1,15 +1,14 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * test_far.c: coordinates, boxes and cutoffs from the smallest to the largest numbers in one scene:
- * every search gives the number of pairs that the half list has, or refuses. (Python's tests
- * compare with rational arithmetic; the sanitizers watch here.)
- */
+/* test_far.c: points and boxes far from the origin, or of many sizes. */
+#include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
-#include "../support/among.h"
 
 void test_far(void);
+
+/* Far: coordinates, boxes and cutoffs from the smallest to the largest numbers in one scene: every
+ * search gives the number of pairs that the half list has, or refuses. */
 
 enum { N_FAR = 7 };
 
@@ -205,9 +204,76 @@ subnormal_numbers_in_a_long_box(void)
     CHECK(hs_pairs_count(AMONG(&two, &box), &options, &half, NULL) == HS_OK && half == 4);
 }
 
+/* Far open: points that are so far away, in the unit of the box, that its vectors are less than
+ * their last digits: along open axes, and along those that repeat. */
+
+/* Queries of kept cells find what those of a new search find. */
+static void
+check_queries(const hs_points *points, const hs_box *box, const hs_options *options,
+              hs_cells *cells)
+{
+    int64_t   count = -1, kept = -2;
+    hs_pairs *rows = NULL, *of_cells = NULL;
+    CHECK(hs_pairs_count(QUERIED(points, points, box), options, &count, NULL) == HS_OK);
+    CHECK(hs_pairs_count(QUERIED_CELLS(cells, points), options, &kept, NULL) == HS_OK &&
+          kept == count);
+    CHECK(hs_nearest_find(AMONG(points, box), 2, options, &rows, NULL) == HS_OK);
+    CHECK(hs_nearest_find(IN_CELLS(cells), 2, options, &of_cells, NULL) == HS_OK);
+    CHECK(rows != NULL && of_cells != NULL && hs_pairs_length(rows) == hs_pairs_length(of_cells) &&
+          memcmp(hs_pairs_array(rows, HS_WANT_DISTANCE), hs_pairs_array(of_cells, HS_WANT_DISTANCE),
+                 (size_t)hs_pairs_length(rows) * sizeof(double)) == 0);
+    hs_pairs_free(rows);
+    hs_pairs_free(of_cells);
+}
+
+/* Distances of all pairs of `points` in the box, which must be the n given ones, sorted by i and j;
+ * by a search, and from cells where they can be kept. */
+static void
+check_pairs(const hs_points *points, const hs_box *box, double cutoff, int64_t n, const double *d,
+            bool keeps)
+{
+    hs_cells  *cells = NULL;
+    hs_options options = hs_options_default();
+    hs_pairs  *pairs = NULL;
+    options.cutoff = cutoff;
+    options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE;
+    options.sorted = true;
+    /* Cells know the shifts, which can be too many. */
+    CHECK(hs_cells_build(points, box, &options, &cells, NULL) ==
+          (keeps ? HS_OK : HS_ERR_SHIFT_RANGE));
+    for (int kept = 0; kept < 1 + keeps; kept++) {
+        CHECK((kept ? hs_pairs_find(IN_CELLS(cells), &options, &pairs, NULL)
+                    : hs_pairs_find(AMONG(points, box), &options, &pairs, NULL)) == HS_OK);
+        CHECK(hs_pairs_length(pairs) == n);
+        for (int64_t e = 0; e < n && hs_pairs_length(pairs) == n; e++)
+            CHECK(((const double *)hs_pairs_array(pairs, HS_WANT_DISTANCE))[e] == d[e]);
+        hs_pairs_free(pairs);
+    }
+    if (keeps)
+        check_queries(points, box, &options, cells);
+    hs_cells_free(cells);
+}
+
+/* A slab whose vectors are not along the axes, and points far above it. */
+static void
+points_far_above_a_slab_keep_their_neighbours(void)
+{
+    static const double heights[] = {0x1p60, 0x1p90, 0x1p100, 0x1p300, 0x1p900};
+    static const double distances[] = {0.25};
+    const hs_box        box = {
+               .ndim = 3, .periodic = {true, true}, .rows = {{1.0, 0.0, 0.0}, {0.25, 1.0, 0.0}}};
+    for (int h = 0; h < 5; h++) {
+        const double    z = heights[h];
+        const double    x[] = {0.125, 0.5, z, 1.375, 0.5, z, 0.125, 0.5, 0.0, 0.625, 0.5, -z};
+        const hs_points points = {x, 4, 3, HS_FLOAT64, 24, 8};
+        check_pairs(&points, &box, 0.3, 1, distances, true);
+    }
+}
+
 void
 test_far(void)
 {
     RUN(every_search_counts_the_same);
     RUN(subnormal_numbers_in_a_long_box);
+    RUN(points_far_above_a_slab_keep_their_neighbours);
 }

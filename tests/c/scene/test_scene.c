@@ -1,22 +1,30 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_scene.c: what a scene keeps of its points, what it refuses, and that nothing is left
- * then. */
+/* test_scene.c: points and boxes become a scene: scaled, wrapped, bounded, or refused with the
+ * point that is to blame. */
 #include "../../../csrc/core/base/outcome.h"
+#include "../../../csrc/core/base/poll.h"
+#include "../../../csrc/core/memory/account.h"
+#include "../../../csrc/core/scene/close_gaps.h"
 #include "../../../csrc/core/scene/scene.h"
+#include "../../../csrc/core/scene/snapshot.h"
+#include "../../../csrc/core/scene/unit.h"
+#include "../../../csrc/core/threads/passes.h"
+#include "../../../csrc/halfshell.h"
+#include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/poll_checks.h"
 
+#include <float.h>
 #include <math.h>
 
 void test_scene(void);
 
-enum { N = 5 };
+/* Scene: what a scene keeps of its points, what it refuses, and that nothing is left then. */
 
-static hs_account   account;
-static hs_scene     scene, asking;
-static const hs_box upright = {.ndim = 2, .periodic = {true, false}, .rows = {{4.0}, {0.0, 1.0}}};
-static const hs_box tilted = {.ndim = 2, .periodic = {true, true}, .rows = {{4.0}, {1.0, 4.0}}};
-static const double x[2 * N] = {0.5, 1.0, 5.0, 2.0, -3.0, 0.25, 1.0, 1.0, 9.5, -1.5};
+enum { N_POINTS = 5 };
+
+static hs_account account;
+static hs_scene   one_scene;
 
 static hs_points
 points_in(const double *data, int64_t n)
@@ -34,222 +42,667 @@ options_for(double cutoff, unsigned want, hs_precision precision)
     return options;
 }
 
-static hs_status
-start(const double *data, const hs_box *box, const hs_options *options, hs_failure *failure)
-{
-    const hs_points points = points_in(data, N);
-    *failure = HS_NO_FAILURE;
-    hs_account_init(&account, options);
-    return hs_scene_init(&account, NULL, &points, box, options, &scene, failure);
-}
-
 static void
 finish(void)
 {
-    hs_scene_free(&account, &scene);
+    hs_scene_free(&account, &one_scene);
     CHECK(account.held == 0);
-}
-
-/* A cutoff that is no length; a number that is none, of points and of queries. */
-static void
-what_is_no_number_is_refused(void)
-{
-    const double cutoffs[] = {-1.0, -0x1p-1074, INFINITY, NAN};
-    hs_failure   failure;
-    hs_options   options = options_for(0.0, HS_WANT_J, HS_EXACT);
-    double       bad[2 * N];
-    for (int c = 0; c < 4; c++) {
-        options.cutoff = cutoffs[c];
-        CHECK(start(x, NULL, &options, &failure) == HS_ERR_CUTOFF);
-        CHECK(memcmp(&failure.value, &cutoffs[c], sizeof(double)) == 0 && account.held == 0);
-    }
-    options.cutoff = 0.0;
-    CHECK(start(x, NULL, &options, &failure) == HS_OK);
-    finish();
-    memcpy(bad, x, sizeof bad);
-    bad[5] = INFINITY;
-    CHECK(start(bad, NULL, &options, &failure) == HS_ERR_NOT_FINITE);
-    CHECK(failure.row == 2 && failure.column == 1 && !failure.in_queries && account.held == 0);
-    const hs_points points = points_in(x, N), queries = points_in(bad, N);
-    const hs_sets   sets = {.points = &points, .queries = &queries, .is_full = true};
-    CHECK(hs_scene_init_sets(&account, NULL, &sets, NULL, &options, &scene, &asking, &failure) ==
-          HS_ERR_NOT_FINITE);
-    CHECK(failure.row == 2 && failure.in_queries && account.held == 0);
-    const hs_box flat = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {2.0}}};
-    CHECK(start(x, &flat, &options, &failure) == HS_ERR_BOX_DEPENDENT && account.held == 0);
-}
-
-/* Points and queries have one scale and bounds for both, and arrays of their own. */
-static void
-points_and_queries_share_a_scale(void)
-{
-    const double     q[4] = {-20.0, 3.0, 7.0, 0x1p52};
-    const hs_points  points = points_in(x, N), queries = points_in(q, 2);
-    const hs_sets    sets = {.points = &points, .queries = &queries, .is_full = true};
-    const hs_options options = options_for(0x1p30, HS_WANT_SHIFT, HS_EXACT);
-    hs_failure       failure = HS_NO_FAILURE;
-    hs_account_init(&account, &options);
-    CHECK(hs_scene_init_sets(&account, NULL, &sets, &upright, &options, &scene, &asking,
-                             &failure) == HS_OK);
-    CHECK(scene.scale.exponent == 30 && asking.scale.exponent == 30 && scene.is_asked);
-    CHECK(scene.n == N && asking.n == 2 && asking.cloud.x[0] != scene.cloud.x[0]);
-    CHECK(scene.upper[1] >= 0x1p22 && scene.x_largest[1] >= 0x1p22);
-    CHECK(asking.cloud.x[1][1] == 0x1p22 && asking.cloud.x[0][0] == 0.0);
-    CHECK(hs_turns_get(&asking.turns, 0, 0) == -5 && hs_turns_get(&asking.turns, 0, 1) == 2);
-    CHECK(hs_turns_get(&scene.turns, 0, 1) == 1 && hs_turns_get(&scene.turns, 0, 0) == 0);
-    hs_scene_free(&account, &asking);
-    finish();
-}
-
-/* Originals are kept where X is rounded or precision="double" computes with what was given; turns
- * where originals or shifts need them. */
-static void
-only_what_is_needed_is_kept(void)
-{
-    const struct {
-        const hs_box *box;
-        unsigned      want;
-        hs_precision  precision;
-        bool          originals, turns, beside;
-    } cases[] = {{NULL, HS_WANT_SHIFT, HS_EXACT, false, false, false},
-                 {NULL, HS_WANT_SHIFT, HS_DOUBLE, false, false, false},
-                 {&upright, HS_WANT_J, HS_EXACT, false, false, false},
-                 {&upright, HS_WANT_SHIFT, HS_EXACT, false, true, false},
-                 {&upright, HS_WANT_J, HS_DOUBLE, true, true, false},
-                 {&tilted, HS_WANT_J, HS_EXACT, true, true, true},
-                 {&tilted, HS_WANT_J, HS_DOUBLE, true, true, true}};
-    for (int c = 0; c < 7; c++) {
-        for (int scaled = 0; scaled < 2; scaled++) {
-            const hs_options options =
-                options_for(scaled ? 0x1p-30 : 1.0, cases[c].want, cases[c].precision);
-            hs_failure failure;
-            CHECK(start(x, cases[c].box, &options, &failure) == HS_OK);
-            CHECK(scene.keeps_originals == cases[c].originals);
-            CHECK(scene.turns.known == cases[c].turns && scene.x_is_beside == cases[c].beside);
-            CHECK((scene.beside != NULL) == (cases[c].originals || cases[c].turns));
-            for (int i = 0; scene.keeps_originals && i < N; i++) {
-                CHECK(scene.originals[0][i] == ldexp(x[2 * i], 30 * scaled));
-                CHECK(scene.originals[1][i] == ldexp(x[2 * i + 1], 30 * scaled));
-            }
-            for (int i = 0; i < N; i++) {
-                double X = ldexp(x[2 * i], 30 * scaled), Y = ldexp(x[2 * i + 1], 30 * scaled);
-                for (int r = 0; r < scene.lattice.n_periodic && scene.turns.known; r++) {
-                    X -= (double)hs_turns_get(&scene.turns, r, i) * scene.lattice.rows[r][0];
-                    Y -= (double)hs_turns_get(&scene.turns, r, i) * scene.lattice.rows[r][1];
-                }
-                if (scene.turns.known || cases[c].box == NULL)
-                    CHECK(scene.cloud.x[0][i] == X && scene.cloud.x[1][i] == Y);
-            }
-            finish();
-        }
-    }
 }
 
 /* Where scaling loses digits the originals are those that were given. */
 static void
 lost_digits_are_kept(void)
 {
-    const double     tiny[2 * N] = {0x1.8p-1070, 1.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0};
+    const double tiny[2 * N_POINTS] = {0x1.8p-1070, 1.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0};
     const hs_options options = options_for(0x1p40, HS_WANT_J, HS_EXACT);
     hs_failure       failure;
-    const hs_points  points = points_in(tiny, N);
+    const hs_points  points = points_in(tiny, N_POINTS);
     const hs_sets    sets = {.points = &points, .is_plain = true};
     hs_account_init(&account, &options);
-    CHECK(hs_scene_init_sets(&account, NULL, &sets, NULL, &options, &scene, NULL, &failure) ==
+    CHECK(hs_scene_init_sets(&account, NULL, &sets, NULL, &options, &one_scene, NULL, &failure) ==
           HS_OK);
-    CHECK(scene.extreme && scene.keeps_originals && scene.originals[0][0] == 0x1.8p-1070);
-    CHECK(scene.cloud.x[0][4] == 3.0 * 0x1p-40 && scene.originals[0][4] == 3.0);
-    CHECK(scene.metric.cutoff == 0x1p40 && !scene.turns.known);
+    CHECK(one_scene.extreme && one_scene.keeps_originals &&
+          one_scene.originals[0][0] == 0x1.8p-1070);
+    CHECK(one_scene.cloud.x[0][4] == 3.0 * 0x1p-40 && one_scene.originals[0][4] == 3.0);
+    CHECK(one_scene.metric.cutoff == 0x1p40 && !one_scene.turns.known);
     finish();
 }
 
-/* Turns are 32 bits wide as long as all fit. */
-static void
-turns_are_as_wide_as_need_be(void)
+/* Scene queries: points and queries get one scale and bounds that hold for both, also where
+ * queries come later: which of these a scene that was kept takes, step by step. */
+
+static hs_scene kept;
+
+static hs_points
+points_in_queries(const double *x, int64_t n, int ndim)
 {
-    const hs_options options = options_for(1.0, HS_WANT_SHIFT, HS_EXACT);
-    hs_failure       failure;
-    double           far[2 * N];
-    memcpy(far, x, sizeof far);
-    CHECK(start(x, &upright, &options, &failure) == HS_OK);
-    CHECK(scene.turns.narrow[0] != NULL && scene.turns.wide[0] == NULL);
-    finish();
-    far[4] = 0x1p34; /* 2^32 turns */
-    CHECK(start(far, &upright, &options, &failure) == HS_OK);
-    CHECK(hs_turns_get(&scene.turns, 0, 1) == 1 && scene.cloud.x[0][1] == 1.0);
-    finish();
-    const hs_points points = points_in(far, N);
-    const hs_sets   sets = {.points = &points, .is_plain = true};
-    CHECK(hs_scene_init_sets(&account, NULL, &sets, &upright, &options, &scene, NULL, &failure) ==
-          HS_OK);
-    CHECK(scene.turns.narrow[0] == NULL && hs_turns_get(&scene.turns, 0, 2) == INT64_C(1) << 32);
-    finish();
-    far[4] = 0x1p60;
-    CHECK(hs_scene_init_sets(&account, NULL, &sets, &upright, &options, &scene, NULL, &failure) ==
-          HS_ERR_SHIFT_RANGE);
-    CHECK(failure.row == 2 && account.held == 0);
+    return (hs_points){x, n, ndim, HS_FLOAT64, ndim * 8, 8};
 }
 
-/* The same wrapping, for points that are of the scene themselves. */
+/* A scene for queries to come, which knows the turns. */
 static void
-points_are_wrapped_like_a_kept_scene(void)
+keep(const double *x, int64_t n, const hs_box *box)
 {
-    const hs_options options = options_for(1.0, HS_WANT_SHIFT, HS_EXACT);
-    const hs_points  points = points_in(x, N);
-    double           bad[2 * N];
-    hs_failure       failure;
-    CHECK(start(x, &tilted, &options, &failure) == HS_OK);
-    CHECK(hs_scene_wrapped_like(&account, &scene, &points, &options, &asking, &failure) == HS_OK);
-    for (int k = 0; k < 2; k++) {
-        CHECK(memcmp(asking.cloud.x[k], scene.cloud.x[k], N * sizeof(double)) == 0);
-        for (int i = 0; i < N; i++)
-            CHECK(hs_turns_get(&asking.turns, k, i) == hs_turns_get(&scene.turns, k, i));
-    }
-    hs_scene_free(&account, &asking);
-    const int64_t held = account.held;
-    memcpy(bad, x, sizeof bad);
-    bad[3] = NAN;
-    const hs_points spoilt = points_in(bad, N);
-    CHECK(hs_scene_wrapped_like(&account, &scene, &spoilt, &options, &asking, &failure) ==
-          HS_ERR_NOT_FINITE);
-    CHECK(failure.row == 1 && failure.column == 1 && account.held == held);
-    finish();
+    const hs_points points = points_in_queries(x, n, box->ndim);
+    const hs_sets   sets = {
+          .points = &points, .is_kept = true, .is_full = true, .is_plain = true, .is_wide = true};
+    hs_options options = hs_options_default();
+    hs_failure failure;
+    options.cutoff = 1.0;
+    options.want = HS_WANT_SHIFT;
+    hs_account_init(&account, &options);
+    CHECK(hs_scene_init_sets(&account, NULL, &sets, box, &options, &kept, NULL, &failure) == HS_OK);
 }
 
 static hs_status
-make_and_free(void *context)
+ask(const double *q, int64_t n, unsigned want, hs_failure *failure)
 {
-    const hs_options options = options_for(1.0, HS_WANT_SHIFT, HS_EXACT);
-    const hs_points  points = points_in(x, N), queries = points_in(x, N);
-    const hs_sets    sets = {.points = &points, .queries = &queries, .is_full = true};
-    hs_failure       failure;
-    (void)context;
-    hs_account_init(&account, &options);
+    const hs_points queries = points_in_queries(q, n, kept.ndim);
+    hs_options      options = hs_options_default();
+    hs_scene        asking;
+    options.cutoff = 1.0;
+    options.want = want;
+    *failure = HS_NO_FAILURE;
     const hs_status status =
-        hs_scene_init_sets(&account, NULL, &sets, &tilted, &options, &scene, &asking, &failure);
-    if (status == HS_OK) {
+        hs_scene_like(&account, NULL, &kept, &queries, &options, &asking, failure);
+    if (status == HS_OK)
         hs_scene_free(&account, &asking);
-        hs_scene_free(&account, &scene);
-    }
-    CHECK(account.held == 0);
-    hs_account_close(&account);
     return status;
 }
 
+/* Queries may be four times as far away as the points. Where these are 2^50 box vectors away their
+ * turns cannot be counted then: an error if they are wanted, else the queries need a scene of their
+ * own that does without. */
 static void
-any_allocation_may_be_refused(void)
+queries_too_far_to_count_get_another_scene(void)
 {
-    CHECK(fail_each_allocation(make_and_free, NULL, 40) > 4);
+    const hs_box box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
+    const double x[4] = {0.25, 0.5, 0x1p50, 0.5}, near[2] = {-0x1p50, 0.25};
+    const double far[4] = {0.5, 0.5, 0x1.8p51, 0.25}, farther[2] = {0x1.8p52, 0.0};
+    hs_failure   failure;
+    keep(x, 2, &box);
+    const int64_t held = account.held;
+    CHECK(kept.turns.known);
+    CHECK(ask(near, 1, HS_WANT_J, &failure) == HS_OK && !failure.in_queries);
+    CHECK(ask(near, 1, HS_WANT_SHIFT, &failure) == HS_OK);
+    CHECK(ask(far, 2, HS_WANT_J, &failure) == HS_UNSERVED);
+    CHECK(ask(far, 2, HS_WANT_SHIFT, &failure) == HS_ERR_SHIFT_RANGE);
+    CHECK(failure.in_queries && failure.row == 1);
+    CHECK(ask(farther, 1, HS_WANT_SHIFT, &failure) == HS_UNSERVED); /* not even tried */
+    CHECK(account.held == held);
+    hs_scene_free(&account, &kept);
+    CHECK(account.held == 0);
+}
+
+/* Scenes that no scale holds, and scenes whose scale has lost digits, take no query. */
+static void
+scenes_that_hold_nothing_take_nothing(void)
+{
+    const hs_box box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
+    const double x[2] = {0.25, 0.5};
+    hs_failure   failure;
+    keep(x, 2, &box);
+    CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_OK);
+    kept.extreme = true;
+    CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_UNSERVED);
+    kept.extreme = false;
+    kept.in_one_cell = true;
+    CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_UNSERVED);
+    kept.in_one_cell = false;
+    kept.x_error = kept.t_error[0] = 0.0; /* of an aligned box: these hold for all */
+    CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_OK);
+    kept.x_largest[0] = 0.25; /* queries lie beyond */
+    CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_UNSERVED);
+    hs_scene_free(&account, &kept);
+}
+
+/* Of queries for cells the farthest number, or the first that no kept scene takes. */
+static void
+what_is_refused_is_named(void)
+{
+    const hs_box    box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
+    const double    x[4] = {0.25, 0.5, 0.75, 0.5}, q[6] = {1.0, -2.0, 3.0, -4.0, 2.0, 0.0};
+    const double    far[6] = {1.0, 0x1p1000, 0x1p1020, 0.0, 0.0, 0.0};
+    const hs_points queries = points_in_queries(q, 3, 2), too_far = points_in_queries(far, 3, 2);
+    hs_failure      failure = HS_NO_FAILURE;
+    keep(x, 2, &box);
+    hs_scene_name_refused(&kept, &queries, &failure);
+    CHECK(failure.in_queries && failure.row == 1 && failure.column == 1 && failure.value == -4.0);
+    hs_scene_name_refused(&kept, &too_far, &failure);
+    CHECK(failure.in_queries && failure.row == 0 && failure.column == 1);
+    CHECK(failure.value == 0x1p1000);
+    failure = HS_NO_FAILURE;
+    hs_test_fail_allocation(1);
+    hs_scene_name_refused(&kept, &queries, &failure);
+    hs_test_fail_allocation(0);
+    CHECK(!failure.in_queries && failure.row == -1);
+    kept.in_one_cell = true;
+    hs_scene_name_refused(&kept, &queries, &failure);
+    CHECK(!failure.in_queries && failure.row == -1);
+    hs_scene_free(&account, &kept);
+}
+
+/* Two points on the ends of a range along each axis. */
+static void
+put_range(double low, double high, hs_scene *scene)
+{
+    memset(scene, 0, sizeof *scene);
+    scene->ndim = scene->cloud.ndim = 2;
+    scene->n = scene->cloud.n = 2;
+    for (int k = 0; k < 2; k++) {
+        scene->cloud.lower[k] = scene->lower[k] = low - k;
+        scene->cloud.upper[k] = scene->upper[k] = high + k;
+        scene->x_largest[k] = fmax(-low, high) + k;
+    }
+    scene->cloud.largest = fmax(-low, high) + 1.0;
+}
+
+/* What is larger, or what scaling would round, is not taken; for cells alone it is. */
+static void
+queries_that_fit_are_taken(void)
+{
+    double   x[2] = {0x1p-1000, 2.0};
+    hs_scene scene;
+    hs_cloud cloud = {.ndim = 1, .n = 2, .x = {x}, .largest = 2.0, .lower = {0.0}, .upper = {2.0}};
+    put_range(-1.0, 1.0, &scene); /* the largest is 2 */
+    scene.scale = hs_scale_of(0);
+    CHECK(hs_scene_takes(&scene, &cloud));
+    cloud.largest = nextafter(2.0, 3.0);
+    CHECK(!hs_scene_takes(&scene, &cloud));
+    cloud.largest = 2.0;
+    scene.scale = hs_scale_of(22); /* smallest normal number */
+    CHECK(hs_scene_takes(&scene, &cloud));
+    scene.scale = hs_scale_of(23);
+    CHECK(!hs_scene_takes(&scene, &cloud));
+    scene.is_untested = true;
+    CHECK(hs_scene_takes(&scene, &cloud));
+    scene.is_untested = false;
+    cloud.largest = x[1] = cloud.upper[0] = 0.0;
+    x[0] = 0.0;
+    CHECK(hs_scene_takes(&scene, &cloud)); /* nothing to lose */
+    scene.scale = hs_scale_of(0);
+    scene.is_untested = scene.lattice.aligned = true;
+    cloud.largest = 0x1p900;
+    CHECK(hs_scene_takes(&scene, &cloud));
+    cloud.largest = 0x1.1p900;
+    CHECK(!hs_scene_takes(&scene, &cloud));
+    scene.lattice.aligned = false;
+    cloud.largest = 3.0;
+    CHECK(!hs_scene_takes(&scene, &cloud));
+    scene.n = 0;
+    CHECK(hs_scene_takes(&scene, &cloud));
+    scene.scale = hs_scale_of(-2000);
+    cloud.largest = 0x1p1000;
+    CHECK(!hs_scene_takes(&scene, &cloud));
+}
+
+/* Scene scale: whether gaps are closed, which cutoff and scale a scene goes by, and why some boxes
+ * have none. */
+
+/* Boxes that vanish beside the cutoff have no scale, but where that has images without end. */
+static void
+endless_images_are_refused_for_their_number(void)
+{
+    const hs_box tiny = {.ndim = 1, .periodic = {true}, .rows = {{0x1p-1000}}};
+    hs_condensed condensed = {.box = &tiny, .given_box = &tiny};
+    hs_scene     scene;
+    hs_failure   failure = HS_NO_FAILURE;
+    memset(&scene, 0, sizeof scene);
+    scene.ndim = scene.cloud.ndim = scene.lattice.ndim = scene.lattice.n_periodic = 1;
+    scene.lattice.period[0] = 0x1p-1000;
+    scene.sought = 0x1p-960; /* scaled by 2^0 or by more */
+    scene.cutoff = 0x1p-900;
+    CHECK(hs_scene_box_vanishes(&scene));
+    CHECK(hs_scene_has_no_scale(&scene, &condensed));
+    CHECK(hs_scene_refuse_vanishing(&scene, &condensed, &failure) == HS_ERR_BOX_SKEWED);
+    CHECK(failure.expected_pairs == 0.0);
+    condensed.is_scaled = true;
+    CHECK(!hs_scene_has_no_scale(&scene, &condensed));
+    CHECK(hs_scene_refuse_vanishing(&scene, &condensed, &failure) == HS_ERR_MEMORY);
+    CHECK(failure.expected_pairs == INFINITY && failure.expected_bytes == INFINITY);
+    condensed.is_scaled = false;
+    scene.sought = 0x1p-900;
+    CHECK(!hs_scene_has_no_scale(&scene, &condensed));
+    scene.lattice.aligned = true;
+    scene.sought = 0x1p-960;
+    CHECK(hs_scene_refuse_vanishing(&scene, &condensed, &failure) == HS_ERR_MEMORY);
+    scene.lattice.period[0] = 0x1p-899;
+    CHECK(!hs_scene_box_vanishes(&scene));
+}
+
+/* Scene bounds: how far what is computed with may be from the numbers that were given. */
+
+/* Two dimensions, the first of them periodic with a period of 4. */
+static void
+put_scene(hs_scene *scene)
+{
+    const hs_box box = {.ndim = 2, .periodic = {true, false}, .rows = {{4.0}, {0.0, 1.0}}};
+    memset(scene, 0, sizeof *scene);
+    scene->ndim = 2;
+    scene->scale = scene->unscale = hs_scale_of(0);
+    hs_lattice_init(&box, 2, hs_scale_of(0), &scene->lattice);
+}
+
+/* The grid covers the whole period. What rounding left outside is put on the face. */
+static void
+ranges_become_periods(void)
+{
+    hs_scene scene;
+    put_scene(&scene);
+    scene.lower[0] = -1.0;
+    scene.upper[0] = 2.0 + 0x1p-50;
+    scene.lower[1] = -7.0;
+    scene.upper[1] = 9.0;
+    scene.t_error[0] = 0x1p-52;
+    scene.t_error[1] = 0x1p-51;
+    hs_scene_settle_ranges(&scene);
+    CHECK(scene.lower[0] == -2.0 && scene.upper[0] == 2.0);
+    CHECK(scene.lower[1] == -7.0 && scene.upper[1] == 9.0);
+    CHECK(scene.t_error[0] == 0x1p-52 + 0x1p-50 && scene.t_error[1] == 0x1p-51);
+    scene.lower[0] = -2.0 - 0x1p-49;
+    scene.upper[0] = 2.0 + 0x1p-50;
+    scene.t_error[0] = 0.0;
+    hs_scene_settle_ranges(&scene);
+    CHECK(scene.t_error[0] == 0x1p-49 && scene.lower[0] == -2.0);
+    scene.t_error[0] = 0.0;
+    hs_scene_settle_ranges(&scene);
+    CHECK(scene.t_error[0] == 0.0);
+}
+
+static double widths[2], asked_enough;
+
+static hs_status
+width_along(const void *context, const double *normal, double enough, double *width)
+{
+    CHECK(context == widths && normal[0] + normal[1] == 1.0);
+    asked_enough = enough;
+    *width = widths[normal[1] > 0.5];
+    return *width == HUGE_VAL ? HS_ERR_INTERRUPTED : HS_OK;
+}
+
+/* Where pairs are surely narrower, by a fifth at least: in the scene's unit, which is half of the
+ * caller's, and less of what the formula may err by. */
+static void
+scenes_are_narrowed_by_what_is_sure(void)
+{
+    static const struct {
+        double formula_error, width[2], less[2];
+    } cases[] = {{0.0, {0.1, 0.45}, {0.8, 0.0}},
+                 {0.5, {0.3, 0.1}, {0.0, 0.3}},
+                 {0.0, {0.39, 0.4}, {0.22, 0.0}},
+                 {0.0, {0.0, 1.0}, {1.0, 0.0}}};
+    const hs_narrowing narrowing = {width_along, widths};
+    hs_scene           scene;
+    put_scene(&scene);
+    scene.radius = 1.0;
+    scene.scale = hs_scale_of(-1);
+    scene.unscale = hs_scale_of(1);
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        scene.formula_error = cases[c].formula_error;
+        memcpy(widths, cases[c].width, sizeof widths);
+        CHECK(hs_scene_narrow(&scene, &narrowing) == HS_OK);
+        CHECK(asked_enough == 0.8 * 0.5);
+        for (int k = 0; k < 2; k++) {
+            const double less = cases[c].less[k];
+            CHECK(less == 0.0 ? scene.less[k] == 0.0
+                              : scene.less[k] < less && scene.less[k] > less - 1e-9);
+            CHECK(hs_scene_radius_along(&scene, k) == 1.0 - scene.less[k]);
+        }
+        const double volume = hs_scene_volume(&scene, 3.0);
+        CHECK(volume == 3.0 * (1.0 - scene.less[0]) * (1.0 - scene.less[1]));
+    }
+    CHECK(hs_scene_narrow(&scene, NULL) == HS_OK);
+    CHECK(scene.less[0] > 0.9);
+    widths[1] = HUGE_VAL;
+    CHECK(hs_scene_narrow(&scene, &narrowing) == HS_ERR_INTERRUPTED);
+}
+
+/* Scene wrap: points are wrapped axis by axis where that will do, their turns counted, and those
+ * that are too far away wrapped before they are scaled. */
+
+/* Numbers that overflow when they are scaled, on columns of which the lattice knows the period
+ * though rows have several entries there; and on one that nothing repeats. */
+static void
+columns_are_wrapped_where_their_period_is_known(void)
+{
+    enum { N = 3 };
+    double   x[3][N] = {{0x1p1000, 0.25, -0x1p1000}, {0x1p1000, 2.5, 0.5}, {0x1p1000, 0.5, 0.0}};
+    hs_scene scene;
+    memset(&scene, 0, sizeof scene);
+    scene.ndim = scene.cloud.ndim = scene.lattice.ndim = 3;
+    scene.n = scene.cloud.n = N;
+    scene.pending = scene.scale = hs_scale_of(-100);
+    scene.unscale = hs_scale_of(100);
+    scene.lattice.n_periodic = 2;
+    scene.lattice.aligned = true;
+    scene.lattice.given[0][0] = 1.0; /* the second column has two entries */
+    scene.lattice.given[1][0] = scene.lattice.given[1][1] = 1.0;
+    for (int k = 0; k < 3; k++) {
+        scene.cloud.x[k] = x[k];
+        scene.cloud.lower[k] = k == 0 ? -0x1p1000 : 0.0;
+        scene.cloud.upper[k] = 0x1p1000;
+        scene.lattice.row_of_axis[k] = k < 2 ? k : -1;
+        scene.lattice.period[k] = k < 2 ? 0x1p100 : 0.0;
+    }
+    hs_scene_fold_far(&scene);
+    for (int k = 0; k < 2; k++) {
+        CHECK(scene.cloud.lower[k] == -0.5 && scene.cloud.upper[k] == 0.5);
+        CHECK(x[k][0] == 0.0 && x[k][1] == (k == 0 ? 0.25 : 0.5));
+        CHECK(x[k][2] == (k == 0 ? 0.0 : 0.5));
+    }
+    CHECK(x[2][0] == 0x1p1000 && scene.cloud.upper[2] == 0x1p1000);
+    /* Where scaling loses digits only what is given counts: nothing tells. */
+    x[0][0] = scene.cloud.upper[0] = 0x1p1000;
+    scene.extreme = true;
+    hs_scene_fold_far(&scene);
+    CHECK(x[0][0] == 0x1p1000 && scene.cloud.upper[0] == 0x1p1000);
+}
+
+/* Originals are wrapped from where their turns cannot be counted, and no sooner. */
+static void
+originals_too_far_to_count_are_wrapped(void)
+{
+    double   x[1] = {0x1p50 + 0.25};
+    hs_scene scene;
+    memset(&scene, 0, sizeof scene);
+    scene.ndim = scene.cloud.ndim = scene.lattice.ndim = scene.lattice.n_periodic = 1;
+    scene.n = scene.cloud.n = 1;
+    scene.pending = scene.scale = scene.unscale = hs_scale_of(0);
+    scene.lattice.given[0][0] = scene.lattice.period[0] = 1.0;
+    scene.cloud.x[0] = x;
+    scene.cloud.lower[0] = scene.cloud.upper[0] = x[0];
+    scene.keeps_originals = true;
+    hs_scene_fold_far(&scene);
+    CHECK(x[0] == 0x1p50 + 0.25);
+    scene.cloud.lower[0] = scene.cloud.upper[0] = x[0] = 0x1p51 + 0.5;
+    scene.keeps_originals = false;
+    hs_scene_fold_far(&scene);
+    CHECK(x[0] == 0x1p51 + 0.5);
+    scene.keeps_originals = true;
+    hs_scene_fold_far(&scene);
+    CHECK(fabs(x[0]) == 0.5 && scene.cloud.lower[0] == -0.5 && scene.cloud.upper[0] == 0.5);
+    x[0] = scene.cloud.lower[0] = -0x1p53; /* the far end may be the lower one */
+    scene.cloud.upper[0] = 0.0;
+    hs_scene_fold_far(&scene);
+    CHECK(x[0] == 0.0);
+}
+
+/* Unit: the power of two that a scene is scaled by, and how far far is. */
+
+/* Points from low to high along each axis; `x` is theirs. */
+static hs_cloud
+cloud_of(int ndim, double low, double high, double *x)
+{
+    hs_cloud cloud = {.n = 2, .ndim = ndim, .largest = fmax(-low, high)};
+    x[0] = low;
+    x[1] = high;
+    for (int k = 0; k < ndim; k++) {
+        cloud.x[k] = x;
+        cloud.lower[k] = low;
+        cloud.upper[k] = high;
+    }
+    return cloud;
+}
+
+/* A cutoff far beyond all distances is as good as one that is 2^8 times the largest coordinate. */
+static void
+cutoffs_beyond_everything_become_smaller(void)
+{
+    const hs_box      box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
+    const hs_box_size none = hs_box_size_of(NULL), some = hs_box_size_of(&box);
+    double            x[2];
+    hs_cloud          cloud = cloud_of(1, -3.0, 1.0, x);
+    CHECK(hs_enough_cutoff(&cloud, &none, 192.0) == 192.0); /* 64 times as much is not enough */
+    CHECK(hs_enough_cutoff(&cloud, &none, 256.0) == 256.0);
+    CHECK(hs_enough_cutoff(&cloud, &none, 512.0) == 512.0);
+    CHECK(hs_enough_cutoff(&cloud, &none, 513.0) == 512.0);
+    CHECK(hs_enough_cutoff(&cloud, &none, DBL_MAX) == 512.0);
+    CHECK(hs_enough_cutoff(&cloud, &some, 513.0) == 513.0); /* images are at any distance */
+    cloud = cloud_of(1, 0.0, 0.0, x);
+    CHECK(hs_enough_cutoff(&cloud, &none, 513.0) == 513.0);
+    cloud = cloud_of(1, 0.0, 0x1p1015, x);
+    CHECK(hs_enough_cutoff(&cloud, &none, DBL_MAX) == 0x1p1023);
+    cloud = cloud_of(1, 0.0, 0x1p1016, x);
+    CHECK(hs_enough_cutoff(&cloud, &none, DBL_MAX) == DBL_MAX);
+}
+
+/* Snapshot: the copy of one step's points: every type and layout, the first number that is not
+ * finite, and which frames a list can go from to which. */
+
+static hs_status
+take(const hs_points *points, hs_frame *frame, hs_failure *failure)
+{
+    const hs_options options = hs_options_default();
+    *failure = HS_NO_FAILURE;
+    return hs_frame_take(points, NULL, &options, frame, failure);
+}
+
+/* Row-major with gaps, column-major, reversed, one row for all: the copy has no gaps. */
+static void
+any_layout_is_copied(void)
+{
+    enum { N = 37, D = 3 };
+    static float  f[2 * N * D + 8];
+    static double x[2 * N * D + 8];
+    for (int e = 0; e < 2 * N * D + 8; e++) {
+        f[e] = (float)(e * 0.5 - 20.0);
+        x[e] = -e * 0.1;
+    }
+    const struct {
+        ptrdiff_t row, column; /* in entries */
+        int64_t   first;
+        int       ndim;
+    } layouts[] = {{D, 1, 0, D},     {2 * D, 1, 0, D}, {1, N, 0, D}, {-D, 1, (N - 1) * D, D},
+                   {0, 1, 5, D},     {2 * D, 2, 0, D}, {1, 7, 0, 1}, {2, 7, 0, 1},
+                   {D, -1, D - 1, D}};
+    hs_frame frame = {0};
+    for (int l = 0; l < 18; l++) {
+        const bool    narrow = l >= 9;
+        const int     d = layouts[l % 9].ndim;
+        const int64_t size = narrow ? sizeof(float) : sizeof(double), first = layouts[l % 9].first;
+        double        largest = 0.0;
+        hs_failure    failure;
+        hs_points     points = {.n = N, .ndim = d, .real = narrow ? HS_FLOAT32 : HS_FLOAT64};
+        points.data = narrow ? (const void *)(f + first) : (const void *)(x + first);
+        points.row_stride = layouts[l % 9].row * size;
+        points.column_stride = layouts[l % 9].column * size;
+        CHECK(take(&points, &frame, &failure) == HS_OK);
+        CHECK(frame.points.row_stride == d * size && frame.points.column_stride == size);
+        for (int64_t i = 0; i < N; i++) {
+            for (int k = 0; k < d; k++) {
+                const int64_t from = first + i * layouts[l % 9].row + k * layouts[l % 9].column;
+                const double  expected = narrow ? f[from] : x[from];
+                CHECK(hs_frame_entry(frame.rows, points.real, i * d + k) == expected);
+                largest = fmax(largest, fabs(expected));
+            }
+        }
+        CHECK(frame.largest == largest);
+    }
+    hs_frame_free(&frame);
+    hs_frame_free(&frame);
+}
+
+static void
+the_first_that_is_not_finite_is_named(void)
+{
+    enum { N = 50 };
+    float        f[2 * N];
+    double       x[2 * N];
+    const double bad[] = {NAN, INFINITY, -INFINITY};
+    hs_frame     frame = {0};
+    hs_failure   failure;
+    for (int trial = 0; trial < 4 * N; trial++) {
+        const int at = trial / 2;
+        for (int e = 0; e < 2 * N; e++) {
+            f[e] = (float)e;
+            x[e] = e % 2 ? DBL_MAX : -DBL_MAX; /* sums of these would not be finite */
+        }
+        f[at] = (float)bad[at % 3];
+        x[at] = bad[at % 3];
+        if (trial % 2) /* alone, or not the only one */
+            f[2 * N - 1] = (float)(x[2 * N - 1] = NAN);
+        const hs_points narrow = {f, N, 2, HS_FLOAT32, 8, 4}, wide = {x, N, 2, HS_FLOAT64, 16, 8};
+        for (int w = 0; w < 2; w++) {
+            CHECK(take(w ? &wide : &narrow, &frame, &failure) == HS_ERR_NOT_FINITE);
+            CHECK(failure.row == at / 2 && failure.column == at % 2);
+            CHECK(!isfinite(failure.value));
+        }
+    }
+    for (int e = 0; e < 2 * N; e++)
+        x[e] = e % 2 ? DBL_MAX : -DBL_MAX;
+    const hs_points all = {x, N, 2, HS_FLOAT64, 16, 8};
+    CHECK(take(&all, &frame, &failure) == HS_OK && frame.largest == DBL_MAX);
+    hs_frame_free(&frame);
+}
+
+/* One number for all points takes no memory to give, and some to copy. */
+static void
+large_frames_can_be_stopped(void)
+{
+    const int64_t   n = 2 * HS_POLL_POINTS + 5;
+    const float     x = -2.5f;
+    const hs_points points = {&x, n, 1, HS_FLOAT32, 0, 0};
+    hs_options      options = hs_options_default();
+    hs_frame        frame = {0};
+    hs_failure      failure = HS_NO_FAILURE;
+    int64_t         polls = 0;
+    options.poll = stop_after;
+    options.poll_context = &polls;
+    CHECK(hs_frame_take(&points, NULL, &options, &frame, &failure) == HS_ERR_INTERRUPTED);
+    polls = 1;
+    CHECK(hs_frame_take(&points, NULL, &options, &frame, &failure) == HS_ERR_INTERRUPTED);
+    polls = 2;
+    CHECK(hs_frame_take(&points, NULL, &options, &frame, &failure) == HS_OK && polls == 0);
+    CHECK(frame.largest == 2.5 && hs_frame_entry(frame.rows, HS_FLOAT32, n - 1) == -2.5);
+    hs_frame_free(&frame);
+}
+
+/* As many, of one type and dimension, in boxes that repeat along the same axes. */
+static void
+frames_match_or_do_not(void)
+{
+    const double     x[12] = {0.0};
+    const hs_options options = hs_options_default();
+    hs_box           box = {.ndim = 2, .periodic = {true, false}, .rows = {{1, 0}, {0, 1}}};
+    const hs_box     longer = {.ndim = 2, .periodic = {true, false}, .rows = {{1, 0.5}, {0, 7}}};
+    const hs_box     wide = {.ndim = 2, .periodic = {true, false}, .rows = {{1, 0}, {9, 9}}};
+    const hs_box     other = {.ndim = 2, .periodic = {false, true}, .rows = {{1, 0}, {0, 1}}};
+    const hs_box     both = {.ndim = 2, .periodic = {true, true}, .rows = {{1, 0}, {0, 1}}};
+    const hs_points  one = {x, 5, 2, HS_FLOAT64, 16, 8}, fewer = {x, 4, 2, HS_FLOAT64, 16, 8};
+    const hs_points  narrow = {x, 5, 2, HS_FLOAT32, 8, 4}, flat = {x, 5, 1, HS_FLOAT64, 8, 8};
+    const struct {
+        const hs_points *points;
+        const hs_box    *box;
+        bool             matches;
+    } cases[] = {{&one, &box, true},    {&one, &longer, true}, {&one, &wide, true},
+                 {&fewer, &box, false}, {&flat, NULL, false},  {&narrow, &box, false},
+                 {&one, &both, false},  {&one, &other, false}, {&one, NULL, false}};
+    hs_frame   base = {0}, frame = {0};
+    hs_failure failure = HS_NO_FAILURE;
+    CHECK(hs_frame_take(&one, &box, &options, &base, &failure) == HS_OK);
+    for (int c = 0; c < 9; c++) {
+        CHECK(hs_frame_take(cases[c].points, cases[c].box, &options, &frame, &failure) == HS_OK);
+        CHECK(hs_frames_match(&base, &frame) == cases[c].matches);
+        CHECK(hs_frames_match(&frame, &base) == cases[c].matches);
+        if (cases[c].matches)
+            CHECK(hs_frames_share_box(&base, &frame) == (c != 1));
+    }
+    hs_frame_free(&base);
+    hs_frame_free(&frame);
+}
+
+/* Gaps failures: while far points are drawn together, allocations may fail and polls may say no. */
+
+enum { FAR = HS_POLL_POINTS + 1000 };
+
+/* Many cutoffs lie between any two points, but for images of the same. */
+static void
+check_each_allocation(double scale)
+{
+    double          x[] = {0.25, 0.0, 4096.25, 0.0, 0.0, 1e200, -1e9, 1e200};
+    const hs_points points = {x, 4, 2, HS_FLOAT64, 16, 8};
+    const hs_box    box = {.ndim = 2, .periodic = {true, false}, .rows = {{scale, 0.0}}};
+    hs_options      options = hs_options_default();
+    hs_status       status = HS_ERR_MEMORY;
+    bool            ended = false;
+    int             nth = 0, n_failed = 0;
+    for (int e = 0; e < 8; e++)
+        x[e] *= scale;
+    options.cutoff = 1e-60 * scale;
+    options.want = HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT;
+    options.sorted = true;
+    while (!ended && nth < 200) {
+        const int64_t before = hs_test_live_blocks();
+        hs_pairs     *pairs = NULL;
+        hs_test_fail_allocation(++nth);
+        status = hs_pairs_find(AMONG(&points, &box), &options, &pairs, NULL);
+        ended = hs_test_failure_is_due();
+        hs_test_fail_allocation(0);
+        CHECK(status == HS_OK || (status == HS_ERR_MEMORY && pairs == NULL));
+        n_failed += status != HS_OK;
+        if (status == HS_OK) {
+            const int32_t *shift = hs_pairs_array(pairs, HS_WANT_SHIFT);
+            CHECK(hs_pairs_length(pairs) == 2);
+            CHECK(hs_pairs_length(pairs) == 2 && shift[0] == -4096 && shift[2] == 1000000000);
+        }
+        hs_pairs_free(pairs);
+        CHECK(hs_test_live_blocks() == before);
+    }
+    CHECK(ended && status == HS_OK && n_failed > 8);
+}
+
+/* Where the cutoff is scaled up, and where it is scaled down, so that digits may be lost. */
+static void
+any_allocation_may_fail(void)
+{
+    check_each_allocation(1.0);
+    check_each_allocation(0x1p300);
+}
+
+/* So many far points that putting them in order takes a while. */
+static void
+any_poll_may_end_it(void)
+{
+    const int64_t   before = hs_test_live_blocks();
+    double         *x = malloc(FAR * sizeof *x);
+    const hs_points points = {x, FAR, 1, HS_FLOAT64, 8, 8};
+    hs_options      options = hs_options_default();
+    hs_status       status = HS_ERR_INTERRUPTED;
+    int64_t         nth = 0, count = -1;
+    for (int64_t p = 0; p < FAR; p++) /* but for 0, 1 and 2 each is alone */
+        x[p] = p < 3 ? (double)p : 1e200 * (double)((p * 7919) % FAR + 1);
+    options.cutoff = 1.0;
+    options.poll_context = NULL;
+    while (status != HS_OK && nth < 50) {
+        refusal once = {.nth = ++nth};
+        options.poll = refuse_once;
+        options.poll_context = &once;
+        status = hs_pairs_count(AMONG(&points, NULL), &options, &count, NULL);
+        CHECK(status == (once.n >= nth ? HS_ERR_INTERRUPTED : HS_OK));
+    }
+    CHECK(nth > 2 && nth < 50 && count == 2);
+    free(x);
+    CHECK(hs_test_live_blocks() == before);
 }
 
 void
 test_scene(void)
 {
-    RUN(what_is_no_number_is_refused);
-    RUN(points_and_queries_share_a_scale);
-    RUN(only_what_is_needed_is_kept);
     RUN(lost_digits_are_kept);
-    RUN(turns_are_as_wide_as_need_be);
-    RUN(points_are_wrapped_like_a_kept_scene);
-    RUN(any_allocation_may_be_refused);
+    RUN(queries_that_fit_are_taken);
+    RUN(what_is_refused_is_named);
+    RUN(queries_too_far_to_count_get_another_scene);
+    RUN(scenes_that_hold_nothing_take_nothing);
+    RUN(endless_images_are_refused_for_their_number);
+    RUN(ranges_become_periods);
+    RUN(scenes_are_narrowed_by_what_is_sure);
+    RUN(columns_are_wrapped_where_their_period_is_known);
+    RUN(originals_too_far_to_count_are_wrapped);
+    RUN(cutoffs_beyond_everything_become_smaller);
+    RUN(any_layout_is_copied);
+    RUN(the_first_that_is_not_finite_is_named);
+    RUN(large_frames_can_be_stopped);
+    RUN(frames_match_or_do_not);
+    RUN(any_allocation_may_fail);
+    RUN(any_poll_may_end_it);
 }

@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_scan.c: each point of a group meets each candidate once, however many blocks that takes; what
- * was done is counted and polled for, and a scan ends where it is told to. */
-#include "../../../csrc/core/base/fpenv.h"
-#include "../../../csrc/core/search/open_scanner.h"
-#include "../../../csrc/core/search/scan.h"
+/* test_scan.c: neighbourhoods of a group, what is scanned of them, and what is decided of the
+ * hits. */
+#include "../../../csrc/core/collect/parallel.h"
+#include "../../../csrc/core/search/form.h"
+#include "../../../csrc/core/search/neighbourhood.h"
+#include "../../../csrc/core/verlet/pair_list_search.h"
+#include "../support/among.h"
+#include "../support/harness.h"
 #include "../support/poll_checks.h"
 #include "../support/search_unit.h"
 
@@ -11,334 +14,324 @@
 
 void test_scan(void);
 
-enum { N = 400, FIRST = 100, LAST = 140, OF_GROUP = LAST - FIRST };
+/* Neighbourhood: a block has room for what its header promises. */
+
+enum { N = 300, D = 3 };
+
+static double  x_neighbourhood[D][N + HS_PADDING];
+static int32_t order[N + HS_PADDING];
+
+static hs_bins
+some_bins(uint64_t seed, int ndim)
+{
+    harness_random random = {seed};
+    hs_bins        bins = {.n = N, .ndim = ndim, .order = order};
+    for (int i = 0; i < N + HS_PADDING; i++) {
+        order[i] = 7 * i;
+        for (int k = 0; k < ndim; k++)
+            x_neighbourhood[k][i] = i < N ? 8.0 * random_unit(&random) - 3.0 : NAN;
+    }
+    for (int k = 0; k < ndim; k++)
+        bins.x[k] = x_neighbourhood[k];
+    return bins;
+}
+
+static void
+hits_are_twice_the_candidates_where_int32_holds_that(void)
+{
+    const int32_t half = INT32_MAX / 2;
+    CHECK(hs_block_most_hits(1) == 1 + HS_BURST);
+    CHECK(hs_block_most_hits(HS_BURST) == 2 * HS_BURST &&
+          hs_block_most_hits(half - 1) == 2 * (half - 1));
+    CHECK(hs_block_most_hits(half) == half && hs_block_most_hits(INT32_MAX) == INT32_MAX);
+}
+
+/* The middle point is the centre; the largest number is that of any axis and sign. */
+static void
+groups_know_their_extent(void)
+{
+    static hs_group group;
+    for (int trial = 0; trial < 60; trial++) {
+        const int     ndim = 1 + trial % D;
+        const int32_t first = trial, last = first + 1 + trial * 7 % HS_GROUP_POINTS;
+        hs_bins       bins = some_bins(40 + (uint64_t)trial, ndim);
+        float         largest = 0.0f;
+        group.near.out = 1.0f;
+        hs_group_start(&bins, first, last, &group);
+        CHECK(group.first == first && group.last == last && group.largest == 0);
+        CHECK(group.near.out == INFINITY);
+        CHECK(hs_group_bound(&bins, &group) >= 0.0f);
+        for (int k = 0; k < ndim; k++) {
+            float low = INFINITY, high = -INFINITY;
+            CHECK(group.centre[k] == x_neighbourhood[k][(first + last) / 2]);
+            for (int32_t t = 0; t < last - first; t++) {
+                const float q = (float)(x_neighbourhood[k][first + t] - group.centre[k]);
+                CHECK(group.q[k][t] == q);
+                low = fminf(low, q);
+                high = fmaxf(high, q);
+            }
+            CHECK(group.near.low[k] == low && group.near.high[k] == high);
+            largest = fmaxf(largest, fmaxf(-low, high));
+        }
+        CHECK(hs_group_bound(&bins, &group) == largest);
+        CHECK(group.largest == hs_bits_of_float(largest + 0.0f)); /* 0 has no sign then */
+    }
+}
+
+/* Form: thresholds that were kept are those of the extent that asks. */
 
 static search_unit unit;
-static uint8_t     met[N][N];
 
-typedef struct visits {
-    int64_t   n, n_hits, largest; /* visits, hits of all, of one */
-    int64_t   leave_at;           /* visit that leaves; 0: none */
-    int64_t   fail_at;            /* that fails */
-    hs_status status;             /* with this */
-} visits;
-
-static hs_status
-note_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
-{
-    visits       *to = context;
-    const int32_t n = hits->end[hits->n - 1];
-    int64_t       wrong = n < 1;
-    for (int32_t t = 0, h = 0; t < hits->n; t++) {
-        wrong += hits->point[t] != unit.search.bins.order[first + t];
-        for (; h < hits->end[t]; h++) {
-            const int32_t label = hits->label[h];
-            met[hits->point[t]]
-               [scanner->use == HS_BLOCK_LISTS_IDS ? label : scanner->block.id[label]]++;
-        }
-    }
-    CHECK(wrong == 0);
-    to->n_hits += n;
-    to->largest = n > to->largest ? n : to->largest;
-    to->n++;
-    scanner->leaves = scanner->leaves || to->n == to->leave_at;
-    return to->n == to->fail_at ? to->status : HS_OK;
-}
-
-/* `extent`: of the points, in cutoffs; below 0.5 all are neighbours. */
 static void
-open_search(bool is_full, double extent)
+open_walker(double side, double cutoff, hs_walker *walker)
 {
-    search_unit_points(91, N, 2, extent, &unit);
-    search_unit_open(NULL, 1.0, is_full, HS_WANT_I, &unit);
+    search_unit_points(271828, 1500, 3, side, &unit);
+    search_unit_open(NULL, cutoff, false, HS_WANT_I, &unit);
+    CHECK(hs_walker_init(&unit.search, HS_BLOCK_COUNTS, NULL, NULL, walker) == HS_OK);
 }
 
 static void
-open_scanner(hs_block_use use, int32_t capacity, visits *to, hs_scanner *scanner)
+close_walker(hs_walker *walker)
 {
-    CHECK(hs_scanner_init(&unit.search, use, capacity, 8, false, scanner) == HS_OK);
-    *to = (visits){0};
-    if (use > HS_BLOCK_COUNTS) {
-        scanner->visit = note_hits;
-        scanner->visit_context = to;
-    }
-}
-
-/* The group against all points up to this one, or all of them behind its first. */
-static hs_status
-scan_up_to(int32_t end, hs_scanner *scanner)
-{
-    static const double  none[HS_MAX_DIM];
-    static const int32_t home[HS_MAX_DIM];
-    hs_scanner_start(scanner, FIRST, LAST);
-    const hs_status status =
-        hs_scanner_append(scanner, unit.search.is_full ? 0 : FIRST, end, none, home);
-    return status == HS_OK ? hs_scanner_finish(scanner) : status;
-}
-
-static hs_status
-scan_group(hs_scanner *scanner)
-{
-    return scan_up_to(N, scanner);
-}
-
-/* Pairs that are not met as often as they should be: once or not at all. */
-static int64_t
-wrong_pairs(void)
-{
-    const int32_t *order = unit.search.bins.order;
-    int64_t        wrong = 0;
-    for (int32_t si = FIRST; si < LAST; si++) {
-        for (int32_t sj = 0; sj < N; sj++) {
-            const double *a = unit.x + 2 * order[si], *b = unit.x + 2 * order[sj];
-            const bool    within = hypot(a[0] - b[0], a[1] - b[1]) <= 1.0;
-            wrong += met[order[si]][order[sj]] != (within && (unit.search.is_full || sj > si));
-        }
-    }
-    return wrong;
-}
-
-static void
-each_pair_is_met_once(void)
-{
-    static const int32_t capacities[] = {OF_GROUP, OF_GROUP + 1, 150, N - 1, N, 1000};
-    for (int trial = 0; trial < 2 * 4 * 6; trial++) {
-        const hs_block_use use = (hs_block_use)(HS_BLOCK_COUNTS + trial / 2 % 4);
-        const bool         is_full = trial % 2;
-        hs_scanner         scanner;
-        visits             to;
-        open_search(is_full, 4.0);
-        const int64_t held = unit.call.account.held;
-        open_scanner(use, capacities[trial / 8], &to, &scanner);
-        memset(met, 0, sizeof met);
-        CHECK(scan_group(&scanner) == HS_OK);
-        if (use == HS_BLOCK_LISTS_IDS || use == HS_BLOCK_LISTS_PLACES)
-            CHECK(wrong_pairs() == 0);
-        CHECK(use == HS_BLOCK_COUNTS ? to.n == 0 : to.n > 0 && to.n_hits == scanner.n_found);
-        CHECK(scanner.n_found > 500 && scanner.n_groups == 1 && scanner.block.n == 0);
-        CHECK(scanner.n_candidates < (int64_t)OF_GROUP * N); /* some are not near */
-        hs_scanner_close(&unit.search, &scanner);
-        hs_scanner_close(&unit.search, &scanner);
-        CHECK(unit.call.account.held == held && unit.call.done.groups == 1);
-        search_unit_close(&unit);
-    }
-}
-
-/* Where all are near: tests are counted to the last one, and so is the work between polls. */
-static void
-what_is_done_is_counted(void)
-{
-    for (int trial = 0; trial < 2 * 3; trial++) {
-        const bool    is_full = trial % 2;
-        const int32_t n = is_full ? N : N - FIRST, capacity = trial < 2 ? 50 : trial < 4 ? 75 : N;
-        const int64_t own = is_full ? 0 : OF_GROUP * (OF_GROUP + 1) / 2;
-        const int     n_blocks = (n + capacity - 1) / capacity;
-        hs_scanner    scanner;
-        visits        to;
-        open_search(is_full, 0.25);
-        open_scanner(HS_BLOCK_LISTS_IDS, capacity, &to, &scanner);
-        for (int round = 1; round <= 2; round++) {
-            CHECK(scan_group(&scanner) == HS_OK);
-            CHECK(scanner.n_groups == round && scanner.n_blocks == round * n_blocks);
-            CHECK(scanner.blocks == n_blocks && scanner.n_ambiguous == 0);
-            CHECK(scanner.n_candidates == round * (OF_GROUP * (int64_t)n - own));
-            CHECK(scanner.n_found == scanner.n_candidates && to.n_hits == scanner.n_found);
-            CHECK(scanner.work_since_poll ==
-                  round * (64 * (int64_t)n_blocks + (1 + OF_GROUP) * (int64_t)n));
-        }
-        CHECK(to.largest <= capacity + 256); /* short bursts */
-        hs_scanner_close(&unit.search, &scanner);
-        CHECK(unit.call.done.groups == 2 && scanner.n_groups == 0);
-        CHECK(unit.call.done.candidates == 2 * (OF_GROUP * (int64_t)n - own));
-        search_unit_close(&unit);
-    }
-}
-
-/* Hits that are looked up again come as many at a time as the block holds. */
-static void
-places_come_in_large_visits(void)
-{
-    hs_scanner scanner;
-    visits     to;
-    open_search(true, 0.25);
-    open_scanner(HS_BLOCK_LISTS_PLACES, N, &to, &scanner);
-    CHECK(scan_group(&scanner) == HS_OK);
-    CHECK(to.largest == hs_block_most_hits(N) && to.n == OF_GROUP / 2);
-    hs_scanner_close(&unit.search, &scanner);
+    hs_walker_close(&unit.search, walker);
     search_unit_close(&unit);
 }
 
-/* Nothing is tested: candidates and runs of a group are counted, and the most of any group. */
+/* What a walker has found out serves the next search, of the same cutoff and errors only. */
 static void
-sizes_are_those_of_the_largest_group(void)
+thresholds_are_kept_for_the_next_search(void)
 {
-    static const double  none[HS_MAX_DIM];
-    static const int32_t home[HS_MAX_DIM], counts[] = {10, 300, 20}, runs[] = {1, 3, 20};
-    hs_scanner           scanner;
-    visits               to;
-    int64_t              work = 0;
-    open_search(true, 4.0);
-    open_scanner(HS_BLOCK_SIZES, 100, &to, &scanner);
-    for (int g = 0; g < 3; g++) {
-        const int32_t of_run = counts[g] / runs[g];
-        hs_scanner_start(&scanner, FIRST, LAST);
-        for (int32_t r = 0; r < runs[g]; r++)
-            CHECK(hs_scanner_append(&scanner, r, r + of_run, none, home) == HS_OK);
-        CHECK(hs_scanner_finish(&scanner) == HS_OK);
-        CHECK(scanner.of_group.candidates == counts[g] && scanner.of_group.runs == runs[g]);
-        CHECK(scanner.most.candidates == (g > 0 ? 300 : 10));
-        CHECK(scanner.most.runs == (g < 2 ? runs[g] : 20));
-        work += 32 * runs[g];
-        CHECK(scanner.work_since_poll == work);
+    hs_walker walker;
+    open_walker(8.0, 1.0, &walker);
+    hs_scene *scene = &unit.search.scene;
+    walker.scanner.group.largest = hs_bits_of_float(1.5f);
+    hs_form_set(&walker.scanner);
+    hs_form *form = &walker.scanner.forms[walker.scanner.form - walker.scanner.forms];
+    for (int turn = 0; turn < 5; turn++) {
+        form->direct.in = 0.5f; /* it is left like that */
+        scene->cutoff = turn == 1 ? 1.25 : scene->cutoff;
+        unit.search.filter_error += turn == 2 ? 1e-9 : 0.0;
+        scene->extreme = turn >= 3;
+        scene->cutoff_low = turn == 4 ? 1.0 : scene->cutoff; /* the same cutoff, known less well */
+        hs_form_set(&walker.scanner);
+        const double        cutoff = scene->cutoff, error = unit.search.filter_error;
+        const hs_thresholds direct = hs_thresholds_of(3, cutoff, form->extent, error);
+        const hs_thresholds low = hs_thresholds_of(3, scene->cutoff_low, form->extent, error);
+        CHECK(walker.scanner.form == form && form->direct.out == direct.out);
+        CHECK(form->direct.in == (turn == 0 ? 0.5f : low.in));
+        CHECK(hs_expanded_pays(cutoff, form->extent));
+        CHECK(form->expanded.out == hs_expanded_of(3, cutoff, form->extent, error).out);
+        CHECK(form->expanded.in == hs_expanded_of(3, scene->cutoff_low, form->extent, error).in);
     }
-    CHECK(scanner.n_found == 0 && scanner.n_groups == 0 && scanner.n_candidates == 0);
-    hs_scanner_close(&unit.search, &scanner);
+    scene->extreme = false;
+    close_walker(&walker);
+}
+
+/*
+ * Decide: what the filter lets through is decided, however little the filter can tell: with any
+ * error beyond its own the same pairs are found and counted, at any size of the numbers.
+ */
+
+static bool
+count_polls(void *context, double fraction)
+{
+    CHECK(fraction >= 0.0 && fraction <= 1.0);
+    ++*(int *)context;
+    return true;
+}
+
+/* One cell with everything: each pair is tested once, and there is a poll for each two millions. */
+static void
+every_pair_is_tested_once(void)
+{
+    enum { GROUPS = 31, MANY = 64 * GROUPS, CANDIDATES = MANY * (GROUPS + 1) / 2 };
+    static double  x[MANY];
+    hs_walker      walker;
+    int            polls = 0;
+    const hs_sets  sets = {.points = &unit.points};
+    hs_options     options = hs_options_default();
+    hs_failure     failure;
+    harness_random random = {9};
+    for (int i = 0; i < MANY; i++)
+        x[i] = random_unit(&random);
+    unit.points = (hs_points){x, MANY, 1, HS_FLOAT64, 8, 8};
+    options.cutoff = 2.0;
+    options.threads = 1;
+    hs_call_begin(&options, &unit.call);
+    CHECK(hs_search_open(&sets, NULL, &unit.call, &unit.search, &failure) == HS_OK);
+    CHECK(unit.search.grid.n_cells == 1);
+    for (int times = 1; times <= 4; times *= 2) {
+        polls = 0;
+        CHECK(hs_walker_init(&unit.search, HS_BLOCK_COUNTS, NULL, NULL, &walker) == HS_OK);
+        walker.scanner.options.poll = count_polls;
+        walker.scanner.options.poll_context = &polls;
+        for (int t = 0; t < times; t++)
+            CHECK(hs_walk(&walker, 0, MANY) == HS_OK);
+        CHECK(walker.scanner.n_found == (int64_t)times * MANY * (MANY - 1) / 2);
+        CHECK(walker.scanner.n_candidates == walker.scanner.n_found);
+        CHECK(walker.scanner.n_ambiguous == 0);
+        /* Gathering counts as well, and each block. */
+        CHECK(polls == times * (65 * CANDIDATES + 64 * GROUPS) / (1 << 21));
+        hs_walker_close(&unit.search, &walker);
+    }
     search_unit_close(&unit);
 }
 
-/* Blocks that were scanned before are skipped once; a visitor or a limit ends the scan, after the
- * block. */
-static void
-scans_go_on_and_end_where_they_are_told(void)
+/* Pair batch: shifts are kept as short as they are known to be, and those that pass the integers
+ * are told, whoever looks them up. */
+
+static bool
+is_narrow(void)
 {
-    for (int is_full = 0; is_full < 2; is_full++) {
-        const int32_t n = is_full ? N : N - FIRST, capacity = 75;
-        const int64_t own = is_full ? 0 : OF_GROUP * (OF_GROUP + 1) / 2;
-        const int64_t of_first = OF_GROUP * capacity - own;
-        hs_scanner    scanner;
-        visits        to;
-        open_search(is_full, 0.25);
-        open_scanner(HS_BLOCK_LISTS_IDS, capacity, &to, &scanner);
-        scanner.blocks_to_skip = 2;
-        CHECK(scan_group(&scanner) == HS_OK && scanner.blocks_to_skip == 0);
-        CHECK(scanner.n_found == OF_GROUP * (int64_t)(n - 2 * capacity));
-        CHECK(scanner.blocks == (n + capacity - 1) / capacity);
-        scanner.n_found = scanner.n_candidates = 0;
-        CHECK(scan_group(&scanner) == HS_OK);
-        CHECK(scanner.n_found == OF_GROUP * (int64_t)n - own);
-        scanner.n_found = scanner.n_candidates = 0;
-        scanner.candidate_limit = of_first;
-        CHECK(scan_group(&scanner) == HS_STOPPED && scanner.blocks == 2);
-        scanner.n_found = scanner.n_candidates = 0;
-        scanner.candidate_limit = of_first - 1;
-        CHECK(scan_group(&scanner) == HS_STOPPED && scanner.blocks == 1);
-        CHECK(scanner.n_found == of_first && scanner.block.n == 0);
-        scanner.candidate_limit = INT64_MAX;
-        scanner.n_found = 0;
-        to = (visits){.leave_at = 1};
-        CHECK(scan_group(&scanner) == HS_STOPPED && scanner.blocks == 1);
-        CHECK(scanner.n_found == of_first && to.n > 1 && to.n_hits == of_first);
-        scanner.leaves = false;
-        to = (visits){.fail_at = 2, .status = HS_ERR_SHIFT_RANGE};
-        CHECK(scan_group(&scanner) == HS_ERR_SHIFT_RANGE && to.n == 2);
-        hs_scanner_close(&unit.search, &scanner);
+    hs_walker walker;
+    hs_trace  trace;
+    CHECK(hs_walker_init(&unit.search, HS_BLOCK_COUNTS, NULL, NULL, &walker) == HS_OK);
+    CHECK(hs_trace_init(&unit.search, &walker.scanner.block, &walker.scanner.options, true,
+                        &trace) == HS_OK);
+    const bool narrow = trace.of.is_narrow;
+    hs_trace_free(&unit.call.account, &trace);
+    hs_walker_close(&unit.search, &walker);
+    return narrow;
+}
+
+/* Sums of an image and two turns are int32 where none of them passes 2^28. */
+static void
+shifts_are_int32_where_they_are_known_to_be_few(void)
+{
+    hs_box box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
+    search_unit_points(17, 20, 2, 1.0, &unit);
+    search_unit_open(&box, 0.5, false, HS_WANT_SHIFT, &unit);
+    hs_search    *search = &unit.search;
+    const hs_grid grid = search->grid;
+    CHECK(is_narrow());
+    search->grid.reach[0] = (INT64_C(1) << 28) * grid.shape[0];
+    CHECK(!is_narrow());
+    search->grid.reach[0] -= 1;
+    CHECK(is_narrow());
+    search->grid = grid;
+    search->grid.reach[1] = (INT64_C(1) << 28) * grid.shape[1]; /* no image is there */
+    CHECK(is_narrow());
+    search->grid = grid;
+    search->scene.cloud.largest = 0x1p27; /* 2 of it, and some */
+    CHECK(!is_narrow());
+    search->scene.cloud.largest = 0x1p27 - 3.0;
+    CHECK(is_narrow());
+    search->scene.lattice.U[0][0] = 2;
+    CHECK(!is_narrow());
+    search->scene.lattice.U[0][0] = -1;
+    CHECK(!is_narrow());
+    search_unit_close(&unit);
+    box.rows[1][0] = 0.25; /* open: of no meaning */
+    search_unit_open(&box, 0.5, false, HS_WANT_SHIFT, &unit);
+    CHECK(is_narrow());
+    search_unit_close(&unit);
+    box.rows[0][1] = 0.25; /* then the points as given are kept */
+    search_unit_open(&box, 0.5, false, HS_WANT_SHIFT, &unit);
+    CHECK(is_narrow());
+    search_unit_close(&unit);
+}
+
+/* A basis in which every image passes 2^62: neither the keys that pairs are sorted by nor the
+ * shifts of a list hold it. */
+static void
+shifts_beyond_the_integers_are_told(void)
+{
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.5, 1.0}}};
+    for (int beyond = 0; beyond < 2; beyond++) {
+        hs_output  pairs;
+        hs_pieces  pieces;
+        hs_failure failure = HS_NO_FAILURE;
+        search_unit_points(18, 40, 2, 1.0, &unit);
+        search_unit_open(&box, 0.3, false, HS_WANT_I | HS_WANT_J, &unit);
+        hs_search *search = &unit.search;
+        for (int r = 0; r < 2 && beyond; r++)
+            search->scene.lattice.U[r][r] = INT64_MAX;
+        hs_output_init(&search->call->account, 2, HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT, 4, &pairs);
+        CHECK(hs_parallel_record(search, &pairs, &failure) ==
+              (beyond ? HS_ERR_SHIFT_RANGE : HS_OK));
+        CHECK(beyond ? failure.row >= 0 && failure.row < 40 : pairs.n_pairs > 100);
+        hs_output_free(&pairs);
+        for (int32_t si = 0; si < 40; si++)
+            search->bins.order[si] = si;
+        failure.row = -1;
+        CHECK(hs_pieces_find(search, &pieces, &failure) == (beyond ? HS_ERR_SHIFT_RANGE : HS_OK));
+        CHECK(beyond ? failure.row >= 0 && failure.row < 40
+                     : pieces.n == 1 && pieces.of[0].shifted.pairs.n_pairs > 10);
+        if (!beyond)
+            hs_pieces_free(&search->call->account, &pieces);
         search_unit_close(&unit);
     }
 }
 
-/* A point alone in a half list has nothing to be tested against. */
+/* Two points as given that are neighbours with no shift, while the nearest image of what is wrapped
+ * is another: only the key that sorts it is beyond the integers. */
 static void
-lone_points_are_passed_over(void)
+keys_beyond_the_integers_are_told(void)
 {
-    static const double  none[HS_MAX_DIM];
-    static const int32_t home[HS_MAX_DIM];
-    for (int is_full = 0; is_full < 2; is_full++) {
-        hs_scanner scanner;
-        visits     to;
-        open_search(is_full, 0.25);
-        open_scanner(HS_BLOCK_LISTS_IDS, 10, &to, &scanner);
-        hs_scanner_start(&scanner, 5, 6);
-        CHECK(is_full || hs_scanner_append(&scanner, 5, 6, none, home) == HS_OK);
-        CHECK(hs_scanner_finish(&scanner) == HS_OK);
-        CHECK(scanner.n_blocks == 0 && scanner.blocks == 1 && to.n == 0);
-        CHECK(scanner.block.n == 0 && scanner.block.n_runs == 0);
-        CHECK(scanner.work_since_poll == 64 && scanner.n_candidates == 0);
-        hs_scanner_start(&scanner, 5, 6);
-        CHECK(hs_scanner_append(&scanner, 5, is_full ? 6 : 7, none, home) == HS_OK);
-        CHECK(hs_scanner_finish(&scanner) == HS_OK);
-        CHECK(scanner.n_blocks == 1 && to.n == 1 && to.n_hits == 1);
-        hs_scanner_close(&unit.search, &scanner);
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.25, 1.0}}};
+    for (int beyond = 0; beyond < 2; beyond++) {
+        hs_output  pairs;
+        hs_failure failure = HS_NO_FAILURE;
+        unit.x[0] = 0.45;
+        unit.x[2] = 0.55;
+        unit.x[1] = unit.x[3] = 0.0;
+        unit.points = (hs_points){unit.x, 2, 2, HS_FLOAT64, 16, 8};
+        search_unit_open(&box, 0.2, false, HS_WANT_I | HS_WANT_J, &unit);
+        hs_search *search = &unit.search;
+        for (int r = 0; r < 2 && beyond; r++)
+            search->scene.lattice.U[r][r] = INT64_MAX;
+        hs_output_init(&unit.call.account, 2, HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT, 4, &pairs);
+        CHECK(hs_parallel_record(search, &pairs, &failure) ==
+              (beyond ? HS_ERR_SHIFT_RANGE : HS_OK));
+        CHECK(beyond ? failure.row == 0 || failure.row == 1 : pairs.n_pairs == 1);
+        hs_output_free(&pairs);
         search_unit_close(&unit);
     }
 }
 
-/* Once there is more work than that since the last poll, not before. */
-static void
-work_is_polled_for(void)
+static bool
+refuse_at(void *context, double fraction)
 {
-    enum { POLL_WORK = 1 << 21 };
-    for (int trial = 0; trial < 3 * 2; trial++) {
-        const hs_block_use use = trial % 3 == 0   ? HS_BLOCK_SIZES
-                                 : trial % 3 == 1 ? HS_BLOCK_COUNTS
-                                                  : HS_BLOCK_LISTS_IDS;
-        const int64_t      work = use == HS_BLOCK_SIZES ? 32 : 64 + (1 + OF_GROUP) * (int64_t)N;
-        const int          stop = trial / 3;
-        hs_scanner         scanner;
-        refusal            once = {.nth = stop};
-        visits             to;
-        open_search(true, 0.25);
-        open_scanner(use, N, &to, &scanner);
-        scanner.options.poll = refuse_once;
-        scanner.options.poll_context = &once;
-        scanner.work_since_poll = POLL_WORK - work;
-        CHECK(scan_group(&scanner) == HS_OK && once.n == 0);
-        CHECK(scanner.work_since_poll == POLL_WORK);
-        scanner.work_since_poll = POLL_WORK - work + 1;
-        CHECK(scan_group(&scanner) == (stop ? HS_ERR_INTERRUPTED : HS_OK) && once.n == 1);
-        CHECK(scanner.work_since_poll == 0);
-        hs_scanner_close(&unit.search, &scanner);
-        search_unit_close(&unit);
-    }
+    (void)fraction;
+    return --*(int64_t *)context != 0;
 }
 
-static volatile float tiny = 0x1p-140f;
-
-/* Subnormal numbers count, and nothing is flushed when a scan has ended. Where the CPU says that
- * they were met, the filter flushes from the seventeenth block on, but never where it decides. */
+/* A hundred thousand images of one point, in the block that its ordered neighbours come from: any
+ * poll may end it. */
 static void
-subnormal_blocks_are_flushed_once_they_are_many(void)
+many_runs_can_be_stopped(void)
 {
-    enum { END = N - HS_PADDING }; /* what lies behind the last point is not looked at */
-    for (int trial = 0; trial < 2; trial++) {
-        const hs_fpenv saved = hs_fpenv_enter();
-        hs_scanner     scanner;
-        visits         to;
-        int            begun = 0; /* blocks before it flushed */
-        open_search(true, 0.25);
-        for (int64_t si = 0; si < N; si++) {
-            for (int k = 0; k < 2; k++)
-                unit.search.bins.x[k][si] *= 0x1p-140;
-        }
-        open_scanner(HS_BLOCK_LISTS_IDS, N, &to, &scanner);
-        scanner.options.precision = trial == 1 ? HS_SINGLE : HS_EXACT;
-        tiny = tiny * 0.5f;
-        tiny = tiny * 2.0f;
-        const bool is_told = hs_fpenv_met_subnormal();
-        hs_fpenv_flush(false);
-        CHECK(!hs_fpenv_met_subnormal());
-        for (int round = 1; round <= 20; round++) {
-            CHECK(scan_up_to(END, &scanner) == HS_OK && tiny * 0.5f == 0x1p-141f);
-            hs_fpenv_flush(false);
-            CHECK(scanner.n_found == round * (int64_t)OF_GROUP * END);
-            begun += !scanner.flushes;
-        }
-        CHECK(begun == (is_told && trial == 0 ? 16 : 20));
-        CHECK(scanner.n_subnormal == (is_told && trial == 0 ? 17 : 0));
-        hs_scanner_close(&unit.search, &scanner);
-        search_unit_close(&unit);
-        hs_fpenv_leave(saved);
+    const hs_box box = {
+        .ndim = 3, .periodic = {true, true, true}, .rows = {{1.0}, {0.0, 1.0}, {0.0, 0.0, 1.0}}};
+    const double    x[3] = {0.5, 0.5, 0.5};
+    const hs_points points = {x, 1, 3, HS_FLOAT64, 24, 8};
+    hs_options      options = hs_options_default();
+    hs_pairs       *rows = NULL;
+    hs_status       status = HS_ERR_INTERRUPTED;
+    int64_t         nth = 0;
+    options.cutoff = 30.0;
+    options.want = HS_WANT_J;
+    options.threads = 1;
+    options.poll = refuse_at;
+    while (status == HS_ERR_INTERRUPTED && nth < 40) {
+        int64_t left = ++nth;
+        options.poll_context = &left;
+        status = hs_neighbors_find(AMONG(&points, &box), &options, &rows, NULL);
+        CHECK((status == HS_OK) == (rows != NULL));
     }
+    CHECK(status == HS_OK && nth > 3 && hs_pairs_length(rows) == 113080);
+    hs_pairs_free(rows);
 }
 
 void
 test_scan(void)
 {
-    RUN(each_pair_is_met_once);
-    RUN(what_is_done_is_counted);
-    RUN(places_come_in_large_visits);
-    RUN(sizes_are_those_of_the_largest_group);
-    RUN(scans_go_on_and_end_where_they_are_told);
-    RUN(lone_points_are_passed_over);
-    RUN(work_is_polled_for);
-    RUN(subnormal_blocks_are_flushed_once_they_are_many);
+    RUN(hits_are_twice_the_candidates_where_int32_holds_that);
+    RUN(groups_know_their_extent);
+    RUN(thresholds_are_kept_for_the_next_search);
+    RUN(every_pair_is_tested_once);
+    RUN(shifts_are_int32_where_they_are_known_to_be_few);
+    RUN(shifts_beyond_the_integers_are_told);
+    RUN(keys_beyond_the_integers_are_told);
+    RUN(many_runs_can_be_stopped);
 }

@@ -1,38 +1,18 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_call.c: what a call takes it gives back, and what it has done it says. */
+/* test_call.c: what a call takes it gives back; teams do each task once, and passes meet every point
+ * once. */
+#if !defined(_WIN32)
+#define _POSIX_C_SOURCE 200809L
+#include <pthread.h>
+#include <signal.h>
+#endif
 #include "../../../csrc/core/threads/call.h"
+#include "../../../csrc/core/threads/passes.h"
 #include "../support/harness.h"
 
 #include <fenv.h>
 
 void test_call(void);
-
-/* An hs_poll_fn. */
-static bool
-note_poll(void *context, double fraction)
-{
-    *(double *)context = fraction;
-    return fraction < 0.75;
-}
-
-static void
-polls_are_counted_and_passed_on(void)
-{
-    double      seen = -1.0;
-    hs_counters counters;
-    hs_options  options = hs_options_default();
-    hs_call     call;
-    options.counters = &counters;
-    options.poll = note_poll;
-    options.poll_context = &seen;
-    hs_call_begin(&options, &call);
-    CHECK(call.options.poll(call.options.poll_context, 0.5) && seen == 0.5);
-    CHECK(!call.options.poll(call.options.poll_context, 0.75) && seen == 0.75);
-    hs_call_report(&call, 7);
-    CHECK(counters.polls == 2 && counters.pairs == 7);
-    hs_call_set_poll(NULL, NULL, &call);
-    CHECK(call.options.poll == NULL);
-}
 
 static void
 what_was_done_adds_up(void)
@@ -97,26 +77,6 @@ the_callers_environment_comes_back(void)
 #endif
 }
 
-static void
-threads_come_and_go(void)
-{
-    hs_options options = hs_options_default();
-    hs_call    call;
-    options.threads = -2; /* from so many points on */
-    hs_call_begin(&options, &call);
-    hs_call_gather(&call, HS_POINTS_FOR_THREADS - 1);
-    CHECK(call.team == NULL);
-    hs_call_gather(&call, HS_POINTS_FOR_THREADS);
-    const hs_team *team = call.team;
-    hs_call_gather(&call, HS_POINTS_FOR_THREADS); /* they run already */
-    CHECK(call.team == team && hs_team_size(team) <= 2);
-    hs_call_dismiss(&call);
-    hs_call_dismiss(&call);
-    CHECK(call.team == NULL);
-    options.threads = HS_MOST_THREADS + 1;
-    CHECK(hs_call_threads(0.0, &options) == HS_MOST_THREADS);
-}
-
 /* A number of threads is the most that are started: little work has one. */
 static void
 threads_are_started_where_they_are_worth_it(void)
@@ -142,54 +102,124 @@ threads_are_started_where_they_are_worth_it(void)
     CHECK(hs_test_worth_threads(0.0) == 1000.0);
 }
 
+/* Teams: the caller's own thread sees its mask of signals, the others see every signal blocked. */
+
+enum { TASKS = 5000 };
+
+typedef struct tally {
+    int  done[TASKS];
+    bool right[TASKS];
+#if !defined(_WIN32)
+    pthread_t caller;
+#endif
+} tally;
+
 static void
-a_call_that_is_kept_lets_go_of_the_callers_memory(void)
+do_task(void *context, int64_t task)
 {
-    double         seen;
-    hs_counters    counters;
-    hs_pair_arrays out = {.capacity = 0};
-    hs_options     options = hs_options_default();
-    hs_call        call;
-    options.kernel = "scalar";
-    options.counters = &counters;
-    options.out = &out;
-    options.poll = note_poll;
-    options.poll_context = &seen;
-    hs_call_begin(&options, &call);
-    const hs_kernel *kernel = call.kernel;
-    CHECK(kernel != NULL && strcmp(kernel->name, "scalar") == 0);
-    hs_call_detach(&call);
-    CHECK(call.options.kernel == NULL && call.options.counters == NULL && call.options.out == NULL);
-    CHECK(call.options.poll == NULL && call.kernel == kernel);
-    options.kernel = "none of that name";
-    hs_call_begin(&options, &call);
-    CHECK(call.kernel == NULL);
+    tally *counts = context;
+    counts->done[task]++;
+    counts->right[task] = !rounds_up();
+#if !defined(_WIN32)
+    sigset_t blocked;
+    (void)pthread_sigmask(SIG_BLOCK, NULL, &blocked);
+    const bool is_caller = pthread_equal(pthread_self(), counts->caller) != 0;
+    counts->right[task] &= (sigismember(&blocked, SIGINT) == 1) != is_caller;
+#endif
 }
 
 static void
-a_limit_is_told_where_memory_was_short(void)
+every_task_is_done_once(void)
 {
-    hs_failure failure = {.limit_bytes = -1.0};
+    static tally counts;
+    for (int n_threads = 0; n_threads <= 9; n_threads++) {
+        hs_team *team = hs_team_create(n_threads);
+        CHECK(hs_team_size(team) == (n_threads > 1 ? n_threads : 1));
+        CHECK((team == NULL) == (n_threads <= 1));
+        for (int job = 0; job < 20; job++) {
+            const int64_t n_tasks = job % 7 == 0 ? TASKS : job % 5;
+            bool          right = true;
+            memset(&counts, 0, sizeof counts);
+#if !defined(_WIN32)
+            counts.caller = pthread_self();
+#endif
+            hs_team_run(team, n_tasks, do_task, &counts);
+            for (int64_t task = 0; task < TASKS; task++)
+                right = right && counts.done[task] == (task < n_tasks) &&
+                        counts.right[task] == (task < n_tasks);
+            CHECK(right);
+        }
+        hs_team_free(team);
+    }
+}
+
+/* Passes: strips and slabs, in rounds between which there is a poll. */
+
+enum { MOST = 3 * HS_POLL_POINTS };
+
+typedef struct walked {
+    int64_t met, calls, failing; /* the call that fails; -1: none */
+    int64_t polls, stops_at;
+} walked;
+
+static hs_status
+note_range(void *context, int slab, int64_t first, int64_t last)
+{
+    walked *of = context;
+    CHECK(slab >= 0 && slab < HS_SLABS && first <= last && first >= 0);
+    of->met += last - first;
+    return of->calls++ == of->failing ? HS_ERR_MEMORY : HS_OK;
+}
+
+static bool
+note_poll(void *context, double fraction)
+{
+    walked *of = context;
+    (void)fraction;
+    return ++of->polls != of->stops_at;
+}
+
+/* n_strips: 0 for slabs. */
+static hs_status
+walk_points(int64_t n, int n_strips, int64_t failing, int64_t stops_at, walked *of)
+{
     hs_options options = hs_options_default();
-    hs_call    call;
-    options.memory_limit = 5e6;
-    hs_call_begin(&options, &call);
-    hs_call_tell_limit(&call, HS_OK, &failure);
-    hs_call_tell_limit(&call, HS_ERR_CUTOFF, &failure);
-    CHECK(failure.limit_bytes == -1.0);
-    hs_call_tell_limit(&call, HS_ERR_MEMORY, &failure);
-    CHECK(failure.limit_bytes == 5e6);
-    hs_account_close(&call.account);
+    *of = (walked){.failing = failing, .stops_at = stops_at};
+    options.poll = note_poll;
+    options.poll_context = of;
+    return n_strips == 0 ? hs_walk_slabs(NULL, &options, n, note_range, of)
+                         : hs_walk_strips(NULL, &options, n, n_strips, note_range, of);
+}
+
+static void
+passes_end_behind_all_points_or_early(void)
+{
+    static const int64_t numbers[] = {
+        0, 1, HS_SLAB_POINTS, HS_POLL_POINTS - 1, HS_POLL_POINTS, HS_POLL_POINTS + 1, MOST};
+    walked of;
+    for (int c = 0; c < 7; c++) {
+        const int64_t n = numbers[c];
+        for (int strips = 0; strips <= 3; strips++) {
+            const int64_t rounds = (n + HS_POLL_POINTS - 1) / HS_POLL_POINTS;
+            const int64_t slabs = (n + HS_SLAB_POINTS - 1) / HS_SLAB_POINTS;
+            CHECK(walk_points(n, strips, -1, 0, &of) == HS_OK && of.met == n);
+            CHECK(of.calls == (strips > 0 ? strips * rounds : slabs));
+            CHECK(of.polls == n / HS_POLL_POINTS);
+        }
+    }
+    CHECK(walk_points(MOST, 0, HS_SLABS + 1, 0, &of) == HS_ERR_MEMORY);
+    CHECK(of.calls == 2 * HS_SLABS && of.polls == 1);
+    CHECK(walk_points(MOST, 3, 2, 0, &of) == HS_ERR_MEMORY && of.calls == 3);
+    CHECK(walk_points(MOST, 0, -1, 1, &of) == HS_ERR_INTERRUPTED && of.calls == HS_SLABS);
+    CHECK(walk_points(MOST, 7, -1, 3, &of) == HS_ERR_INTERRUPTED && of.calls == 21);
 }
 
 void
 test_call(void)
 {
-    RUN(polls_are_counted_and_passed_on);
     RUN(what_was_done_adds_up);
     RUN(the_callers_environment_comes_back);
-    RUN(threads_come_and_go);
     RUN(threads_are_started_where_they_are_worth_it);
-    RUN(a_call_that_is_kept_lets_go_of_the_callers_memory);
-    RUN(a_limit_is_told_where_memory_was_short);
+    RUN(every_task_is_done_once);
+    RUN(passes_end_behind_all_points_or_early);
 }

@@ -1,12 +1,19 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_recheck.c: listed pairs are decided, measured and written as a search does it: in every
- * type, number of dimensions and range of numbers. */
+/* test_recheck.c: pairs of a list are checked again at new positions. */
+#include "../../../csrc/core/verlet/recheck.h"
+#include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/list_checks.h"
+#include "../support/poll_checks.h"
 #include "../support/random_scenes.h"
-#include "../support/among.h"
+
+#include <math.h>
+#include <string.h>
 
 void test_recheck(void);
+
+/* Recheck: listed pairs are decided, measured and written as a search does it: in every type,
+ * number of dimensions and range of numbers. */
 
 enum { STEPS = 4, FLOATS = SCENE_POINTS * HS_MAX_DIM };
 
@@ -79,30 +86,6 @@ every_type_and_dimension_gives_the_pairs_of_a_search(void)
     CHECK(n_pairs > THIRD_OF_TRIALS(50000) && n_kept > THIRD_OF_TRIALS(250));
 }
 
-/* Coordinates at both ends of the numbers: no scale keeps the digits of all. */
-static void
-digits_that_scaling_would_lose_are_kept(void)
-{
-    harness_random random = {1010};
-    int64_t        n_pairs = 0;
-    for (int kind = 0; kind < 2 * SCENE_KINDS; kind++) {
-        make_scene(&random, kind % SCENE_KINDS, 3, 60, 4.0, 1010, &shared);
-        shared.scene.cutoff = kind < SCENE_KINDS ? 0x1p1010 : 0x1.8p-1060;
-        for (int e = 0; e < 30; e++) {
-            shared.x[e] = ldexp(random_below(&random, 4), -1061);
-        }
-        const hs_points  points = points_of(&shared.scene);
-        const hs_options options = options_of(&shared.scene);
-        hs_verlet       *list = hs_verlet_new();
-        bool             rebuilt;
-        CHECK(hs_verlet_update(list, &points, shared.scene.box, &options, 0.0, false, &rebuilt,
-                               NULL) == HS_OK);
-        CHECK(list_difference(list, &points, shared.scene.box, options, &n_pairs) == NULL);
-        hs_verlet_free(list);
-    }
-    CHECK(n_pairs > 1000);
-}
-
 /* A pair at the cutoff, and a point of it that jumps by so many heights of a box that an upright
  * one is equivalent to. */
 static void
@@ -169,76 +152,6 @@ shifts_may_be_as_large_as_jumps_are(void)
     }
 }
 
-/* Of several pairs of a point, the one whose shift does not fit is named by its lower number:
- * -2^31 fits, 2^31 does not. */
-static void
-the_pair_that_does_not_fit_is_named(void)
-{
-    enum { N = 5 };
-    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{2.0}, {0.0, 2.0}}};
-    for (int trial = 0; trial < N * 2 * 2 * 2; trial++) {
-        const int  jumper = trial % N, axis = trial / N % 2;
-        const bool backwards = trial / N / 2 % 2, is_down = trial / N / 4;
-        /* S of pairs with higher numbers is the jump, of those with lower ones its negative. */
-        const int  beyond = is_down ? 0 : jumper;
-        const bool is_told = is_down ? jumper > 0 : jumper < N - 1;
-        double     x[2 * N];
-        hs_points  points = {x, N, 2, HS_FLOAT64, 16, 8};
-        hs_options options = hs_options_default();
-        hs_verlet *list = hs_verlet_new();
-        hs_pairs  *pairs = NULL;
-        hs_failure failure;
-        bool       rebuilt;
-        options.cutoff = 0.5;
-        options.threads = 1;
-        for (int i = 0; i < N; i++) {
-            x[2 * i] = 0.5 + 0.0625 * (backwards ? N - i : i);
-            x[2 * i + 1] = 0.5;
-        }
-        CHECK(hs_verlet_update(list, &points, &box, &options, 0.25, false, &rebuilt, NULL) ==
-              HS_OK);
-        x[2 * jumper + axis] += is_down ? -0x1p32 : 0x1p32;
-        CHECK(hs_verlet_update(list, &points, &box, &options, 0.25, false, &rebuilt, NULL) ==
-              HS_OK);
-        CHECK(!rebuilt);
-        options.want = HS_WANT_SHIFT;
-        CHECK(hs_verlet_find(list, &options, &pairs, &failure) ==
-              (is_told ? HS_ERR_SHIFT_RANGE : HS_OK));
-        CHECK(is_told ? failure.row >= beyond && failure.row <= (is_down ? jumper - 1 : jumper)
-                      : hs_pairs_length(pairs) == N * (N - 1) / 2);
-        CHECK((pairs == NULL) == is_told);
-        hs_pairs_free(pairs);
-        hs_verlet_free(list);
-    }
-}
-
-/* A strict limit of 0 has no pairs; any other has those that are nearer. */
-static void
-strict_limits_have_what_is_nearer(void)
-{
-    static const double cutoffs[] = {0.0, 0.5, 1.0, 2.0};
-    double              x[6] = {0.0, 0.25, 0.25, 1.25, 2.0, 2.0};
-    const hs_points     points = {x, 6, 1, HS_FLOAT64, 8, 8};
-    for (int c = 0; c < 4; c++) {
-        hs_options options = hs_options_default();
-        hs_verlet *list = hs_verlet_new();
-        hs_pairs  *pairs = NULL;
-        int64_t    n = 0;
-        bool       rebuilt;
-        options.cutoff = cutoffs[c];
-        options.inclusive = false;
-        options.want = HS_WANT_I | HS_WANT_J;
-        for (int i = 0; i < 6; i++)
-            for (int j = 0; j < i; j++)
-                n += x[i] - x[j] < cutoffs[c];
-        CHECK(hs_verlet_update(list, &points, NULL, &options, 0.5, false, &rebuilt, NULL) == HS_OK);
-        CHECK(hs_verlet_find(list, &options, &pairs, NULL) == HS_OK);
-        CHECK(hs_pairs_length(pairs) == n && (n > 0) == (c > 0));
-        hs_pairs_free(pairs);
-        hs_verlet_free(list);
-    }
-}
-
 /* Box vectors along the axes but for so many times the one before: shifts over the upright box are
  * found modulo 2^64. */
 static void
@@ -285,75 +198,324 @@ box_vectors_may_be_any_sum_of_shorter_ones(void)
     CHECK(n_pairs > 10000);
 }
 
-/* Each pair of the list is a candidate once for each find, and each that float32 cannot tell is
- * decided by one stage. */
+/* Recheck unit: a list of a few points, put together by hand, whose pairs are decided anew, so
+ * that a test can take the steps of that one by one. */
+
+enum { RECHECK_POINTS = 6, RECHECK_IMAGES = 4 };
+
+typedef struct recheck_unit {
+    hs_call    call;
+    hs_verlet  list;
+    hs_recheck recheck;
+    hs_output  output; /* fixed, so that batches are measured */
+    int32_t    order[RECHECK_POINTS];
+    int64_t    counts[RECHECK_POINTS * 3], jumps[RECHECK_POINTS * 3];
+    int32_t    images[RECHECK_IMAGES * 3];
+} recheck_unit;
+
+/* All points in reverse, no jumps, counts and images of 0. */
 static void
-what_is_counted_adds_up(void)
+recheck_unit_open(const hs_points *points, const hs_box *box, double cutoff, unsigned want,
+                  recheck_unit *unit)
 {
-    harness_random random = {77};
-    int64_t        ambiguous = 0;
-    for (int trial = 0; trial < 8; trial++) {
-        make_scene(&random, trial % 2 ? SCENE_TRICLINIC : SCENE_ALIGNED, 3, 300, 4.0, 0, &shared);
-        for (int e = 0; e < 900; e++) /* a lattice: many distances are the cutoff */
-            shared.x[e] = floor(shared.x[e] * 4.0) * 0.25;
-        shared.scene.cutoff = 1.25;
-        const hs_points points = points_of(&shared.scene);
-        hs_options      options = options_of(&shared.scene);
-        hs_counters     counters;
-        hs_verlet      *list = hs_verlet_new();
-        hs_pairs       *pairs = NULL;
-        bool            rebuilt;
-        CHECK(hs_verlet_update(list, &points, shared.scene.box, &options, 0.25, false, &rebuilt,
-                               NULL) == HS_OK);
-        options.counters = &counters;
-        CHECK(hs_verlet_find(list, &options, &pairs, NULL) == HS_OK);
-        CHECK(counters.pairs == hs_pairs_length(pairs) && counters.candidates >= counters.pairs);
-        CHECK(counters.ambiguous ==
-              counters.by_float64 + counters.by_double_word + counters.by_integers);
-        ambiguous += counters.ambiguous;
-        hs_pairs_free(pairs);
-        hs_verlet_free(list);
-    }
-    CHECK(ambiguous > 1000);
+    hs_options  options = hs_options_default();
+    hs_failure  failure;
+    double      rows[HS_MAX_DIM][HS_MAX_DIM];
+    hs_recheck *recheck = &unit->recheck;
+    memset(unit, 0, sizeof *unit);
+    options.cutoff = cutoff;
+    options.want = want;
+    options.threads = 1;
+    hs_call_begin(&options, &unit->call);
+    unit->call.kernel = hs_kernel_select(NULL);
+    CHECK(hs_frame_take(points, box, &options, &unit->list.frames[0], &failure) == HS_OK);
+    for (int a = 0; a < points->n; a++)
+        unit->order[a] = (int32_t)points->n - 1 - a;
+    unit->list.cutoff = cutoff;
+    unit->list.jumps_now = -1;
+    recheck->list = &unit->list;
+    recheck->now = &unit->list.frames[0];
+    recheck->call = &unit->call;
+    unit->output.fixed = true;
+    recheck->output = &unit->output;
+    recheck->d = points->ndim;
+    recheck->m = hs_frame_periodic(recheck->now, recheck->vector_of_row);
+    for (int r = 0; r < recheck->m; r++)
+        memcpy(rows[r], box->rows[recheck->vector_of_row[r]], sizeof rows[r]);
+    hs_metric_init(&recheck->given, recheck->d, recheck->m, (const double(*)[HS_MAX_DIM])rows,
+                   cutoff, true);
+    unit->list.listing.order = unit->order;
+    unit->list.listing.images =
+        (hs_images){.width = recheck->m, .of = unit->images, .n = RECHECK_IMAGES};
 }
 
-/* x^2 + y^2 is beside (x + 1)^2 by less than the last place of any low word. */
 static void
-what_integers_decide_is_counted(void)
+recheck_unit_close(recheck_unit *unit)
 {
-    harness_random random = {31};
-    int64_t        by_integers = 0;
-    for (int trial = 0; trial < 300; trial++) {
-        const double    x = floor(ldexp(1.0 + random_unit(&random), 52)) - 1.0;
-        const double    at[4] = {0.0, 0.0, x, sqrt(2.0 * x + 1.0)};
-        const hs_points points = {at, 2, 2, HS_FLOAT64, 16, 8};
-        hs_options      options = hs_options_default();
-        hs_counters     counters;
-        hs_verlet      *list = hs_verlet_new();
-        hs_pairs       *pairs = NULL;
-        bool            rebuilt;
-        options.cutoff = x + 1.0;
-        CHECK(hs_verlet_update(list, &points, NULL, &options, 0.25 * x, false, &rebuilt, NULL) ==
-              HS_OK);
-        options.counters = &counters;
-        CHECK(hs_verlet_find(list, &options, &pairs, NULL) == HS_OK);
-        CHECK(counters.ambiguous == 1 && counters.by_integers >= 0);
-        by_integers += counters.by_integers;
+    hs_account *account = &unit->call.account;
+    hs_recheck *recheck = &unit->recheck;
+    hs_scene_free(account, &recheck->scene);
+    hs_free(account, recheck->counts);
+    hs_free(account, recheck->y);
+    hs_free(account, recheck->offset);
+    hs_free(account, recheck->x);
+    hs_free(account, recheck->image);
+    hs_free(account, recheck->lag);
+    hs_free(account, recheck->lagging);
+    hs_free(account, recheck->few);
+    hs_free(account, recheck->of_a);
+    hs_frame_free(&unit->list.frames[0]);
+    CHECK(account->held == 0);
+    hs_account_close(account);
+}
+
+/* Recheck measure: listed pairs are measured between points as the scene has them: with their
+ * shift over its rows, whatever they were wrapped by and have jumped since. */
+
+enum { N_MEASURE = RECHECK_POINTS, IMAGES = RECHECK_IMAGES };
+
+static recheck_unit unit_measure;
+
+/* Along one axis, and along two, where points that lag are laid out for the writer as well. */
+static void
+any_allocation_may_be_refused(void)
+{
+    const double x[2 * N_MEASURE] = {0.0, 5.0, 2.0, 3.0, 4.0, 1.0, 9.0, 8.0, 6.0, 1.0, 7.0, 0.0};
+    for (int d = 1; d <= 2; d++) {
+        const hs_box    box = {.ndim = d, .periodic = {true, d > 1}, .rows = {{4.0}, {0.0, 4.0}}};
+        const hs_points points = {x, N_MEASURE, d, HS_FLOAT64, 16, 8};
+        hs_status       status = HS_ERR_MEMORY;
+        hs_failure      failure;
+        int             nth;
+        for (nth = 1; status != HS_OK && nth < 20; nth++) {
+            recheck_unit_open(&points, &box, 1.0, HS_WANT_DISTANCE, &unit_measure);
+            const bool writes = d > 1 && unit_measure.call.kernel->write != NULL;
+            unit_measure.output.fixed = false;
+            hs_test_fail_allocation(nth);
+            status = hs_recheck_open_scene(&unit_measure.recheck, &failure);
+            CHECK(status == (hs_test_failure_is_due() ? HS_OK : HS_ERR_MEMORY));
+            hs_test_fail_allocation(0);
+            CHECK(status != HS_OK || (unit_measure.recheck.few != NULL) == writes);
+            recheck_unit_close(&unit_measure);
+        }
+        CHECK(nth > 6 && nth < 20);
+    }
+}
+
+/* Recheck write: when hits of a list are measured while they are written, and what is laid out for
+ * that. */
+
+enum { N_WRITE = 3, WANT = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR };
+
+static void *
+zeros(int64_t n, size_t size)
+{
+    void *to = hs_alloc(&unit_measure.call.account, HS_FOR_WRAPS, n, size);
+    CHECK(to != NULL);
+    memset(to, 0, (size_t)n * size);
+    return to;
+}
+
+/* Three points in a box whose vectors repeat, none of which lags. */
+static void
+open_unit(int d)
+{
+    static const double x[N_WRITE * 3] = {0.5, 0.5, 0.5, 1.0, 1.0, 1.0, 3.0, 3.0, 3.0};
+    const hs_points     points = {x, N_WRITE, d, HS_FLOAT64, 24, 8};
+    const hs_box        box = {
+               .ndim = d, .periodic = {true, true, true}, .rows = {{4.0}, {0.0, 4.0}, {0.0, 0.0, 4.0}}};
+    hs_recheck *recheck = &unit_measure.recheck;
+    recheck_unit_open(&points, &box, 1.0, WANT, &unit_measure);
+    unit_measure.output.fixed = false;
+    unit_measure.output.columns = WANT;
+    recheck->scene.ndim = d;
+    hs_metric_init(&recheck->scene.metric, d, d, box.rows, 1.0, true);
+    recheck->lag = zeros((int64_t)N_WRITE * d, sizeof *recheck->lag);
+    recheck->lagging = zeros(N_WRITE, sizeof *recheck->lagging);
+    recheck->image = zeros((int64_t)RECHECK_IMAGES * d, sizeof *recheck->image);
+}
+
+static bool
+has_writer(void)
+{
+    return unit_measure.call.kernel->write != NULL;
+}
+
+/* Whether hits can be written. Without lags there are no records of them. */
+static bool
+can_write(void)
+{
+    const hs_recheck *recheck = &unit_measure.recheck;
+    CHECK(hs_recheck_plan_write(&unit_measure.recheck) == HS_OK);
+    CHECK(recheck->few == NULL);
+    return recheck->writes;
+}
+
+enum { ORDINARY, SHARED, EXTREME, ORIGINALS, NO_FLOATS, FIXED, BOTH, OWN_IMAGES, SHORT, ODDITIES };
+
+static void
+only_what_is_ordinary_is_written(void)
+{
+    static const double short_rows[3][HS_MAX_DIM] = {{0.5}, {0.0, 0.5}, {0.0, 0.0, 0.5}};
+    for (int d = 1; d <= 3; d++) {
+        for (int oddity = 0; oddity < ODDITIES; oddity++) {
+            open_unit(d);
+            hs_scene *scene = &unit_measure.recheck.scene;
+            scene->extreme = oddity == EXTREME;
+            scene->keeps_originals = oddity == ORIGINALS;
+            scene->metric.floats_usable = oddity != NO_FLOATS;
+            unit_measure.output.fixed = oddity == FIXED || oddity == SHARED;
+            unit_measure.recheck.shared = oddity == SHARED;
+            unit_measure.output.columns |= oddity == BOTH ? HS_WANT_BOTH : 0;
+            if (oddity == OWN_IMAGES)
+                scene->metric.cutoff = 4.0;
+            if (oddity == SHORT)
+                hs_metric_init(&scene->metric, d, d, short_rows, 0.75, true);
+            CHECK(can_write() == (has_writer() && oddity <= SHARED && d > 1));
+            recheck_unit_close(&unit_measure);
+        }
+    }
+}
+
+/* Sums of these must fit into int32, whichever of them are added. */
+static void
+large_lags_and_images_are_not_written(void)
+{
+    const int64_t most = INT64_C(1) << 29;
+    const int64_t values[] = {most - 1, -most, most, -most - 1, INT64_MAX, INT64_MIN};
+    const size_t  n_values = sizeof values / sizeof *values;
+    for (size_t v = 0; v < n_values; v++) {
+        for (int of_image = 0; of_image < 2; of_image++) {
+            for (int last = 0; last < 2; last++) {
+                open_unit(2);
+                hs_recheck *recheck = &unit_measure.recheck;
+                int64_t    *to = of_image ? recheck->image : recheck->lag;
+                const int   n = 2 * (of_image ? RECHECK_IMAGES : N_WRITE);
+                to[last ? n - 1 : 0] = values[v];
+                CHECK(can_write() == (has_writer() && v < 2));
+                recheck_unit_close(&unit_measure);
+            }
+        }
+    }
+}
+
+/* Recheck find: what a list has found becomes a result, in its order or sorted. */
+
+static double
+small_limit(void *context)
+{
+    return *(double *)context;
+}
+
+/* Arrays of the caller that are too small say how many pairs there are; refusals name the limit. */
+static void
+what_does_not_fit_is_told(void)
+{
+    harness_random random = {7};
+    make_scene(&random, SCENE_TRICLINIC, 3, 300, 4.0, 0, &shared);
+    shared.scene.cutoff = 1.5;
+    const hs_points points = points_of(&shared.scene);
+    hs_options      options = options_of(&shared.scene);
+    hs_verlet      *list = hs_verlet_new();
+    hs_pairs       *pairs = NULL;
+    hs_failure      failure;
+    bool            rebuilt;
+    caller_arrays   c;
+    int64_t         count;
+    hs_status       status = HS_ERR_MEMORY;
+    int             n_told = 0;
+    double          limit;
+    CHECK(hs_verlet_update(list, &points, shared.scene.box, &options, 0.2, false, &rebuilt, NULL) ==
+          HS_OK);
+    CHECK(hs_pairs_count(AMONG(&points, shared.scene.box), &options, &count, NULL) == HS_OK);
+    CHECK(count > 5000);
+    make_arrays(options.want, 3, 8, 100, &c);
+    options.out = &c.arrays;
+    CHECK(hs_verlet_find(list, &options, &pairs, &failure) == HS_ERR_CAPACITY && pairs == NULL);
+    CHECK(failure.expected_pairs == (double)count && untouched_from(&c, 100));
+    free_arrays(&c);
+    options.out = NULL;
+    for (limit = 10000.0; status != HS_OK && limit < 1e9; limit *= 1.25) {
+        options.memory_limit = limit;
+        status = hs_verlet_find(list, &options, &pairs, &failure);
+        CHECK((status == HS_OK) == (pairs != NULL));
+        CHECK(pairs == NULL || hs_pairs_length(pairs) == count);
+        CHECK(status == HS_OK || (status == HS_ERR_MEMORY && failure.limit_bytes == limit));
+        n_told += status != HS_OK && failure.expected_pairs > 0.0;
         hs_pairs_free(pairs);
+    }
+    CHECK(status == HS_OK && n_told > 0);
+    options.memory_limit = INFINITY;
+    options.find_limit = small_limit; /* not heard below HS_LIMIT_FREE */
+    options.find_context = &limit;
+    limit = 10000.0;
+    CHECK(hs_verlet_find(list, &options, &pairs, &failure) == HS_OK);
+    CHECK(hs_pairs_length(pairs) == count);
+    hs_pairs_free(pairs);
+    options.kernel = "none of that name";
+    CHECK(hs_verlet_find(list, &options, &pairs, &failure) == HS_ERR_KERNEL && pairs == NULL);
+    options.kernel = NULL;
+    options.index_bytes = 5;
+    CHECK(hs_verlet_find(list, &options, &pairs, &failure) == HS_ERR_ARGUMENT && pairs == NULL);
+    hs_verlet_free(list);
+}
+
+/* Lists of many slabs: a thread that meets a pair whose S passes int32 names its lower number, and
+ * all threads stop. */
+static void
+threads_stop_at_shifts_that_do_not_fit(void)
+{
+    enum { POINTS = 3000 };
+    static double   x[3 * POINTS];
+    const hs_points points = points_in_space(x, POINTS);
+    hs_box          box = {.ndim = 3};
+    harness_random  random = {12};
+    for (int k = 0; k < 3; k++) {
+        box.rows[k][k] = 10.0;
+        box.periodic[k] = true;
+    }
+    for (int trial = 0; trial < 8; trial++) {
+        const int  jumper = (int)(random_bits(&random) % POINTS);
+        hs_options options = hs_options_default();
+        hs_verlet *list = hs_verlet_new();
+        hs_pairs  *pairs = NULL;
+        hs_failure failure;
+        bool       rebuilt, lower[POINTS] = {false};
+        for (int e = 0; e < 3 * POINTS; e++)
+            x[e] = (double)(random_bits(&random) % 640) / 64.0; /* exact, after a jump too */
+        for (int i = 0; i < POINTS; i++) {
+            double square = 0.0;
+            for (int k = 0; k < 3; k++) {
+                const double along = fabs(x[3 * i + k] - x[3 * jumper + k]);
+                square += fmin(along, 10.0 - along) * fmin(along, 10.0 - along);
+            }
+            lower[i < jumper ? i : jumper] |= i != jumper && square <= 1.0;
+        }
+        options.cutoff = 1.0;
+        for (int step = 0; step < 2; step++) {
+            CHECK(hs_verlet_update(list, &points, &box, &options, 0.2, false, &rebuilt, NULL) ==
+                  HS_OK);
+            CHECK(rebuilt == (step == 0));
+            x[3 * jumper] += 10.0 * 0x1p33;
+        }
+        options.want = HS_WANT_SHIFT;
+        for (options.threads = 1; options.threads <= 3; options.threads++) {
+            CHECK(hs_verlet_find(list, &options, &pairs, &failure) == HS_ERR_SHIFT_RANGE);
+            CHECK(pairs == NULL && failure.row >= 0 && failure.row < POINTS && lower[failure.row]);
+        }
         hs_verlet_free(list);
     }
-    CHECK(by_integers > 0);
 }
 
 void
 test_recheck(void)
 {
-    RUN(what_integers_decide_is_counted);
-    RUN(what_is_counted_adds_up);
     RUN(every_type_and_dimension_gives_the_pairs_of_a_search);
-    RUN(digits_that_scaling_would_lose_are_kept);
     RUN(shifts_may_be_as_large_as_jumps_are);
-    RUN(the_pair_that_does_not_fit_is_named);
-    RUN(strict_limits_have_what_is_nearer);
     RUN(box_vectors_may_be_any_sum_of_shorter_ones);
+    RUN(any_allocation_may_be_refused);
+    RUN(only_what_is_ordinary_is_written);
+    RUN(large_lags_and_images_are_not_written);
+    RUN(what_does_not_fit_is_told);
+    RUN(threads_stop_at_shifts_that_do_not_fit);
 }

@@ -1,0 +1,127 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_api_seeds.c: every kind of search against the brute force: of the scenes that fuzzing keeps, of
+ * random inputs like them, and of random scenes with as many points as have many cells. */
+#define FUZZ_ALL_ANSWERS       1
+#define LLVMFuzzerTestOneInput test_pairs_input
+#include "../fuzz/fuzz_pairs.c"
+#include "../support/harness.h"
+#include "../support/random_scenes.h"
+#include "../support/seeds.h"
+
+void test_api_seeds(void);
+
+static const char *const seeds[] = {
+#include "../fuzz/pairs.txt"
+};
+
+enum { PARTS = 4, SEEDS = sizeof seeds / sizeof seeds[0] };
+
+static void
+seeds_of_part(int part)
+{
+    for (int s = part; s < SEEDS; s += PARTS * (IS_SLOW ? 4 : 1))
+        run_seed(test_pairs_input, seeds[s]);
+    run_random_inputs(test_pairs_input, 400 + (uint64_t)part, TRIALS(100));
+}
+
+static void
+seeds_of_the_first_part(void)
+{
+    seeds_of_part(0);
+}
+
+static void
+seeds_of_the_second_part(void)
+{
+    seeds_of_part(1);
+}
+
+static void
+seeds_of_the_third_part(void)
+{
+    seeds_of_part(2);
+}
+
+static void
+seeds_of_the_fourth_part(void)
+{
+    seeds_of_part(3);
+}
+
+/* Scenes of every kind of box, with kernels, algorithms and threads in turn. */
+static void
+check_scenes(int first, int end)
+{
+    static random_scene s;
+    const char         *kernels[16];
+    const int           n_kernels = hs_kernel_names(kernels, 16);
+    harness_random      random = {20261127 + (uint64_t)first};
+    for (int trial = 0; trial < THIRD_OF_TRIALS(72); trial++) {
+        const int  ndim = 1 + trial / SCENE_KINDS % 4;
+        const int  n = random_below(&random, ndim > 3 ? 30 : trial % 5 == 0 ? 300 : 80);
+        brute_list expected;
+        make_scene(&random, trial % SCENE_KINDS, ndim, n, trial % 4 == 3 ? 40.0 : 4.0,
+                   trial % 16 == 7 ? 300 : 0, &s);
+        if (trial % 5 == 0) /* many cells */
+            s.scene.cutoff *= 0.25;
+        kernel_to_check = kernels[trial % n_kernels];
+        algorithm_to_check = (hs_algorithm)(trial % HS_ALGORITHM_END);
+        if (!brute_find(&s.scene, 2e5, &expected))
+            continue;
+        for (int number = first; number < end; number++) {
+            const char *difference = answer_difference(
+                number, &s.scene, &expected, (uint64_t)(trial + number), 1 + expected.n / 50);
+            CHECK(difference == NULL);
+            if (difference != NULL)
+                fprintf(stderr, "  %s, scene %d: %s\n", answer_checks[number].name, trial,
+                        difference);
+        }
+        brute_free(&expected);
+    }
+    kernel_to_check = NULL;
+    algorithm_to_check = HS_AUTO;
+}
+
+static void
+rows_and_the_nearest(void)
+{
+    check_scenes(0, 2);
+}
+
+static void
+histograms_shells_and_clusters(void)
+{
+    check_scenes(2, 5);
+}
+
+static void
+streams_and_systems(void)
+{
+    check_scenes(5, 7);
+}
+
+static void
+reaches(void)
+{
+    check_scenes(7, 10);
+}
+
+static void
+selections_cells_and_lists(void)
+{
+    check_scenes(10, ANSWER_CHECKS);
+}
+
+void
+test_api_seeds(void)
+{
+    RUN(seeds_of_the_first_part);
+    RUN(seeds_of_the_second_part);
+    RUN(seeds_of_the_third_part);
+    RUN(seeds_of_the_fourth_part);
+    RUN(rows_and_the_nearest);
+    RUN(histograms_shells_and_clusters);
+    RUN(streams_and_systems);
+    RUN(reaches);
+    RUN(selections_cells_and_lists);
+}

@@ -1,0 +1,398 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_candidates.c: candidates of a group: images, leaves and runs of them. */
+#include "../support/nearest_unit.h"
+
+#include <math.h>
+
+void test_candidates(void);
+
+/* Nearest images: each image that can be near a group is met once, and whatever is within the
+ * radius lies in one of them. */
+
+static nearest_unit unit;
+
+static hs_points
+points_in(const double *x, int64_t n, int ndim)
+{
+    return (hs_points){x, n, ndim, HS_FLOAT64, ndim * 8, 8};
+}
+
+/* Points on one line across the box, and a group between its images that looks less far. */
+static void
+there_may_be_no_image_in_reach(void)
+{
+    const double      x[2] = {0.0, 0.0};
+    const hs_box      box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
+    const hs_points   points = points_in(x, 1, 2);
+    hs_nearest_images images;
+    nearest_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
+    hs_nearest_group group = nearest_unit_group(&unit, 0.25);
+    unit.search.scene.lower[0] = unit.search.scene.upper[0] = 0.0;
+    group.t_lower[0] = group.t_upper[0] = 0.375;
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK);
+    CHECK(images.count == 0.0 && !hs_nearest_images_next(&images));
+    group.radius = 0.375;
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK);
+    CHECK(images.count == 1.0 && hs_nearest_images_next(&images) && images.shift[0] == 0);
+    group.radius = 0.625;
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK && images.count == 2.0);
+    nearest_unit_close(&unit);
+}
+
+static void
+more_images_than_can_be_counted_are_refused(void)
+{
+    const double      x[2] = {0.0, 0.0};
+    const hs_box      box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
+    const hs_points   points = points_in(x, 1, 2);
+    hs_nearest_images images;
+    nearest_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
+    hs_nearest_group group = nearest_unit_group(&unit, 1.0);
+    group.t_upper[0] = 0x1p30; /* the first image can be counted to, the last one not */
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_ERR_MEMORY);
+    group.t_upper[0] = 0.0;
+    group.t_lower[0] = -0x1p30;
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_ERR_MEMORY);
+    group.t_lower[0] = group.t_upper[0] = 0x1p30 - 4.0;
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK && images.count <= 4.0);
+    group = nearest_unit_group(&unit, 0x1p23 - 2.0); /* 2^24 are too many */
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK);
+    group.radius = 0x1p23;
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_ERR_MEMORY);
+    unit.near.k = 1 << 15; /* but for so many neighbours */
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK);
+    group.radius = 0x1p24;
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_ERR_MEMORY);
+    nearest_unit_close(&unit);
+}
+
+/* Only where the open axes are at right angles to what repeats does the way to the points along
+ * them leave less for the rest. */
+static void
+layers_are_upright(void)
+{
+    const double    x[6] = {0.25, -1.0, 0.5, 2.0, 0.75, 0.5};
+    const hs_box    box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
+    const hs_points points = points_in(x, 3, 2);
+    nearest_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
+    hs_lattice *lattice = &unit.search.scene.lattice;
+    CHECK(unit.near.has_layer);
+    CHECK(unit.near.layer_lower[1] == -1.0 && unit.near.layer_upper[1] == 2.0);
+    const double normals[2][2] = {{1.0, 0.0}, {0.0, 1.0}};
+    lattice->aligned = false;
+    memcpy(lattice->normal[0], normals[0], sizeof normals[0]);
+    memcpy(lattice->normal[1], normals[1], sizeof normals[1]);
+    hs_nearest_measure_layer(&unit.near);
+    CHECK(unit.near.has_layer);
+    CHECK(unit.near.layer_lower[1] == -1.0 && unit.near.layer_upper[1] == 2.0);
+    lattice->normal[1][0] = 0x1p-39;
+    hs_nearest_measure_layer(&unit.near);
+    CHECK(!unit.near.has_layer);
+    lattice->normal[1][0] = 0x1p-41;
+    hs_nearest_measure_layer(&unit.near);
+    CHECK(unit.near.has_layer);
+    nearest_unit_close(&unit);
+}
+
+/* Nearest leaves: leaves that groups share are all that any of them may need, each group is given
+ * those within its radius, and where a list would save nothing there is none. */
+
+enum { MOST = 24000, GROUP = 16 };
+static hs_nearest_leaves leaves;
+static double            x_leaves[3 * MOST];
+
+static void
+open_points(int64_t n, int d, double side, const hs_box *box, int64_t k)
+{
+    harness_random random = {515};
+    for (int64_t e = 0; e < n * d; e++)
+        x_leaves[e] = side * random_unit(&random);
+    const hs_points points = {x_leaves, n, d, HS_FLOAT64, d * 8, 8};
+    nearest_unit_open(&points, NULL, box, k, HS_WANT_J, INFINITY, &unit);
+    CHECK(hs_nearest_leaves_init(&unit.near, &leaves) == HS_OK);
+}
+
+static void
+close_points(void)
+{
+    hs_nearest_leaves_free(&unit.near, &leaves);
+    nearest_unit_close(&unit);
+}
+
+static hs_nearest_group
+group_from(int32_t first, int32_t n, double radius)
+{
+    hs_nearest_group group;
+    hs_nearest_group_set(&unit.near, first, first + n, &group);
+    group.radius = radius;
+    return group;
+}
+
+/* One group, one leaf, groups that are far wider than their radius, too many leaves or images. */
+static void
+where_nothing_is_saved_there_is_no_list(void)
+{
+    const hs_box     box = {.ndim = 2, .periodic = {true, true}, .rows = {{4.0}, {0.0, 4.0}}};
+    hs_nearest_group groups[2];
+    open_points(100, 2, 4.0, NULL, 4);
+    groups[0] = group_from(0, GROUP, 1.0);
+    groups[1] = group_from(GROUP, GROUP, 1.0);
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
+    CHECK(leaves.radius == 1.0);
+    hs_nearest_leaves_find(&unit.near, groups, 1, &leaves);
+    CHECK(leaves.radius == 0.0);
+    groups[0].radius = groups[1].radius = 1.0;
+    groups[1].upper[0] = groups[0].lower[0] + 255.0;
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
+    CHECK(leaves.radius == 1.0);
+    groups[1].upper[0] = groups[0].lower[0] + 256.0;
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
+    CHECK(leaves.radius == 0.0);
+    close_points();
+    open_points(8, 2, 4.0, NULL, 4); /* all in one leaf */
+    groups[0] = group_from(0, 4, 1.0);
+    groups[1] = group_from(4, 4, 1.0);
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
+    CHECK(leaves.radius == 0.0);
+    close_points();
+    open_points(MOST, 2, 4.0, NULL, 4);
+    groups[0] = group_from(0, GROUP, 8.0);
+    groups[1] = group_from(GROUP, GROUP, 8.0);
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
+    CHECK(leaves.radius == 0.0);
+    close_points();
+    open_points(10, 2, 4.0, &box, 4);
+    groups[0] = group_from(0, 1, 14.0);
+    groups[1] = group_from(1, 1, 14.0);
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
+    CHECK(leaves.radius == 0.0);
+    groups[0].radius = groups[1].radius = 6.0;
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
+    CHECK(leaves.radius == 6.0);
+    close_points();
+}
+
+/* Nearest block: what a group may be near to is gathered whole, whether it comes from leaves that
+ * groups share or from a walk down the tree, and what cannot be gathered is told. */
+
+enum { N = 400, GROUP_BLOCK = 16 };
+static hs_nearest_block block;
+static double           x_block[3 * N];
+
+static void
+open_scene(harness_random *random, int d, const hs_box *box)
+{
+    for (int e = 0; e < d * N; e++)
+        x_block[e] = 4.0 * random_unit(random);
+    const hs_points points = {x_block, N, d, HS_FLOAT64, d * 8, 8};
+    nearest_unit_open(&points, NULL, box, 4, HS_WANT_J, INFINITY, &unit);
+    CHECK(hs_nearest_leaves_init(&unit.near, &leaves) == HS_OK);
+    CHECK(hs_nearest_block_init(&unit.near, &block) == HS_OK);
+}
+
+static void
+close_scene(void)
+{
+    hs_nearest_block_free(&unit.near, &block);
+    hs_nearest_leaves_free(&unit.near, &leaves);
+    nearest_unit_close(&unit);
+}
+
+static hs_nearest_group
+group_from_block(int32_t first, double radius)
+{
+    hs_nearest_group group;
+    hs_nearest_group_set(&unit.near, first, first + GROUP_BLOCK, &group);
+    group.radius = radius;
+    return group;
+}
+
+static hs_status
+fill(hs_nearest_group *group, double most, hs_nearest_leaves *from)
+{
+    return hs_nearest_block_fill(&unit.near, &unit.call.options, group, most, from, &block);
+}
+
+/* Whether the block has point j in the image with this displacement. */
+static bool
+block_has(int32_t sj, const double *moved)
+{
+    const int d = unit.near.tree.ndim;
+    for (int32_t c = 0; c < block.n; c++) {
+        bool same = block.number[c] == sj;
+        for (int k = 0; k < d; k++)
+            same = same && hs_nearest_image_of(&block, c)->moved[k] == moved[k];
+        if (same)
+            return true;
+    }
+    return false;
+}
+
+/* Candidates are where they say, in units from the centre. */
+static bool
+places_are_right(const hs_nearest_group *group)
+{
+    const hs_bins *bins = &unit.search.bins;
+    bool           right = true;
+    for (int32_t c = 0; c < block.n; c++) {
+        double norm = 0.0;
+        for (int k = 0; k < bins->ndim; k++) {
+            const double centre = group->lower[k] + 0.5 * (group->upper[k] - group->lower[k]);
+            const double y =
+                (bins->x[k][block.number[c]] + hs_nearest_image_of(&block, c)->moved[k] - centre) *
+                block.unit;
+            right = right && fabs(fmax(fmin(y, block.extent), -block.extent) -
+                                  (double)block.y[k][c]) <= 1e-5;
+            norm += (double)block.y[k][c] * (double)block.y[k][c];
+        }
+        right = right && fabs(norm - (double)block.norm[c]) <= 1e-5 * (1.0 + norm);
+    }
+    return right;
+}
+
+/* All within the radius of a point of the group, in the nearest images along each axis. */
+static int64_t
+check_block(const hs_nearest_group *group)
+{
+    const hs_lattice *lattice = &unit.search.scene.lattice;
+    const hs_bins    *bins = &unit.search.bins;
+    const int         d = bins->ndim, m = lattice->n_periodic;
+    int               images = 1;
+    int64_t           n_near = 0, missing = 0;
+    for (int r = 0; r < m; r++)
+        images *= 5;
+    for (int image = 0; image < images; image++) {
+        double moved[3] = {0.0};
+        for (int r = 0, rest = image; r < m; r++, rest /= 5)
+            for (int k = 0; k < d; k++)
+                moved[k] += (rest % 5 - 2) * lattice->rows[r][k];
+        for (int32_t sj = 0; sj < N; sj++) {
+            bool is_near = false;
+            for (int32_t si = group->first; si < group->last && !is_near; si++) {
+                double square = 0.0;
+                for (int k = 0; k < d; k++) {
+                    const double along = bins->x[k][sj] + moved[k] - bins->x[k][si];
+                    square += along * along;
+                }
+                is_near = square <= group->radius * group->radius;
+            }
+            n_near += is_near;
+            missing += is_near && !block_has(sj, moved);
+        }
+    }
+    CHECK(missing == 0 && places_are_right(group));
+    return n_near;
+}
+
+static void
+leaves_that_are_shared_hold_all_that_is_near(void)
+{
+    harness_random random = {577};
+    int64_t        n_near = 0, n_shared = 0, n_candidates = 0;
+    for (int trial = 0; trial < 24; trial++) {
+        const int        d = 1 + trial % 3;
+        hs_nearest_group groups[3];
+        hs_box           box = {.ndim = d};
+        for (int l = 0; l < d; l++) {
+            box.periodic[l] = trial % 4 == 0 || l == trial % d;
+            for (int k = 0; k < d; k++)
+                box.rows[l][k] = k == l ? 4.0 : trial % 2 ? random_unit(&random) - 0.5 : 0.0;
+        }
+        open_scene(&random, d, trial % 5 ? &box : NULL);
+        const int32_t first = (int32_t)(random_unit(&random) * (N - 3 * GROUP_BLOCK));
+        const double  radius = d == 1 ? 0.05 : d == 2 ? 0.3 : 0.8;
+        for (int g = 0; g < 3; g++)
+            groups[g] = group_from_block(first + g * GROUP_BLOCK, radius * (1.0 + 0.6 * g));
+        hs_nearest_leaves_find(&unit.near, groups, 3, &leaves);
+        CHECK(leaves.radius == 0.0 || leaves.radius == groups[1].radius);
+        for (int g = 0; g < 3; g++) {
+            n_shared += groups[g].radius <= leaves.radius;
+            CHECK(fill(&groups[g], 1e9, &leaves) == HS_OK);
+            n_near += check_block(&groups[g]);
+            n_candidates += block.n;
+            const int32_t n = block.n;
+            CHECK(fill(&groups[g], n, &leaves) == HS_OK && block.n == n);
+            CHECK(fill(&groups[g], n - 1, &leaves) == HS_TOO_MUCH);
+            CHECK(fill(&groups[g], 1e9, NULL) == HS_OK);
+            check_block(&groups[g]);
+        }
+        close_scene();
+    }
+    CHECK(n_shared > 30 && n_near > 500 && n_candidates < 12 * n_near);
+}
+
+/* Leaves in coordinates that are far less certain than the radius of a group are of no use to
+ * it. */
+static void
+uncertain_leaves_are_not_taken(void)
+{
+    harness_random random = {31};
+    open_scene(&random, 2, NULL);
+    hs_nearest_group groups[2] = {group_from_block(0, 0.5), group_from_block(GROUP_BLOCK, 0.5)};
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
+    CHECK(leaves.radius == 0.5 && leaves.n > 0);
+    const int32_t n_leaves = leaves.n, n_images = leaves.n_images;
+    leaves.n = leaves.n_images = 0; /* whoever takes them finds nothing */
+    CHECK(fill(&groups[0], 1e9, &leaves) == HS_OK && block.n == 0 && block.n_images == 0);
+    leaves.error = 0.5 / 1024.0;
+    CHECK(fill(&groups[0], 1e9, &leaves) == HS_OK && block.n == 0);
+    leaves.error = nextafter(0.5 / 1024.0, 1.0);
+    CHECK(fill(&groups[0], 1e9, &leaves) == HS_OK && block.n >= GROUP_BLOCK);
+    check_block(&groups[0]);
+    leaves.n = n_leaves;
+    leaves.n_images = n_images;
+    unit.search.scene.x_error = 0x1p-20; /* 2^-19 of a difference, 2^-18 in units of 1/2 */
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
+    CHECK(leaves.radius == 0.5 && leaves.error == 0x1p-19);
+    unit.search.scene.x_error = 0x1.001p-20;
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
+    CHECK(leaves.radius == 0.0);
+    close_scene();
+}
+
+/* Floats would not tell distances apart. */
+static void
+groups_far_wider_than_their_radius_are_refused(void)
+{
+    harness_random random = {32};
+    open_scene(&random, 2, NULL);
+    hs_nearest_group group = group_from_block(0, 0x1p-8);
+    group.upper[0] = group.lower[0] + 2.0; /* 512 radii */
+    group.upper[1] = group.lower[1];
+    CHECK(fill(&group, 1e9, NULL) == HS_OK);
+    group.upper[0] = group.lower[0] + 2.25;
+    CHECK(fill(&group, 1e9, NULL) == HS_TOO_MUCH);
+    leaves.radius = 1.0;
+    leaves.error = 0.0;
+    CHECK(fill(&group, 1e9, &leaves) == HS_TOO_MUCH);
+    close_scene();
+}
+
+/* Where nothing else can be tried that is an error. */
+static void
+too_many_images_are_refused(void)
+{
+    const hs_box   box = {.ndim = 2, .periodic = {true, true}, .rows = {{4.0}, {0.0, 4.0}}};
+    harness_random random = {33};
+    open_scene(&random, 2, &box);
+    hs_nearest_group group = group_from_block(0, 0x1p40);
+    CHECK(fill(&group, 1e9, NULL) == HS_TOO_MUCH);
+    CHECK(fill(&group, INFINITY, NULL) == HS_ERR_MEMORY);
+    group = group_from_block(0, 40.0);
+    CHECK(fill(&group, 100.0, NULL) == HS_TOO_MUCH); /* before they are walked through */
+    CHECK(fill(&group, INFINITY, NULL) == HS_OK);
+    close_scene();
+}
+
+void
+test_candidates(void)
+{
+    RUN(there_may_be_no_image_in_reach);
+    RUN(more_images_than_can_be_counted_are_refused);
+    RUN(layers_are_upright);
+    RUN(where_nothing_is_saved_there_is_no_list);
+    RUN(leaves_that_are_shared_hold_all_that_is_near);
+    RUN(uncertain_leaves_are_not_taken);
+    RUN(groups_far_wider_than_their_radius_are_refused);
+    RUN(too_many_images_are_refused);
+}

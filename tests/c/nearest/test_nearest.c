@@ -1,0 +1,531 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_nearest.c: searches of nearest points: what they prepare and keep, their radii, and where
+ * they stop. */
+#if !defined(_WIN32)
+#define _POSIX_C_SOURCE 200809L
+#endif
+#include "../../../csrc/core/base/os_thread.h"
+#include "../../../csrc/core/collect/columns.h"
+#include "../../../csrc/core/memory/account.h"
+#include "../../../csrc/core/nearest/nearest_kept.h"
+#include "../../../csrc/core/nearest/nearest_write.h"
+#include "../support/among.h"
+#include "../support/harness.h"
+#include "../support/nearest_checks.h"
+#include "../support/nearest_unit.h"
+#include "../support/pair_checks.h"
+#include "../support/poll_checks.h"
+#include "../support/random_scenes.h"
+
+#include <math.h>
+
+void test_nearest(void);
+
+/* Nearest kept: one of those that come at once builds the tree that is kept, the others do with
+ * one of their own. */
+
+static nearest_unit unit;
+
+/* The four numbers 0, 0.5, 1 and 1.2, or so many others. */
+static const double line[4] = {0.0, 0.5, 1.0, 1.2};
+
+static hs_points
+points_on_line(const double *x, int64_t n)
+{
+    return (hs_points){x, n, 1, HS_FLOAT64, 8, 8};
+}
+
+/* Prepares a search that may use what is kept; whether it does. */
+static bool
+borrows(hs_nearest_kept *kept, double limit)
+{
+    const hs_points points = points_on_line(line, 4);
+    const hs_sets   sets = {
+          .points = &points, .is_full = true, .is_plain = true, .is_wide = true, .trees = kept};
+    hs_options options = hs_options_default();
+    hs_failure failure;
+    options.cutoff = limit;
+    options.want = HS_WANT_J;
+    hs_call_begin(&options, &unit.call);
+    hs_search_begin(&unit.call, &unit.search);
+    unit.call.team = hs_team_create(2);
+    unit.near = (hs_nearest){.search = &unit.search, .k = 1, .of_spot = 2, .omits_self = true};
+    CHECK(hs_nearest_prepare(&unit.near, &sets, NULL, limit, &failure) == HS_OK);
+    CHECK(unit.near.tree.n_nodes == 1 && unit.near.limit > 0.0);
+    const bool borrowed = unit.search.is_borrowed;
+    hs_nearest_release(&unit.near);
+    hs_search_close(&unit.search);
+    hs_call_dismiss(&unit.call);
+    hs_account_close(&unit.call.account);
+    return borrowed;
+}
+
+static void
+whoever_comes_while_it_is_built_does_without(void)
+{
+    const int64_t    blocks = hs_test_live_blocks();
+    hs_nearest_kept *kept = hs_nearest_kept_new();
+    hs_nearest      *room = NULL, *other = NULL;
+    CHECK(hs_nearest_kept_get(kept, &room) == NULL && room != NULL);
+    CHECK(hs_nearest_kept_get(kept, &other) == NULL && other == NULL);
+    CHECK(!borrows(kept, INFINITY));
+    hs_nearest_kept_end(kept, false); /* it could not be built: the next one tries */
+    CHECK(hs_nearest_kept_get(kept, &room) == NULL && room != NULL);
+    hs_test_fork(); /* a thread of the parent built it */
+    CHECK(hs_nearest_kept_get(kept, &room) == NULL && room != NULL);
+    CHECK(hs_nearest_kept_get(kept, &other) == NULL && other == NULL);
+    hs_nearest_kept_end(kept, false);
+    CHECK(borrows(kept, INFINITY));
+    CHECK(borrows(kept, 1.0));
+    CHECK(!borrows(kept, 0x1p-900)); /* has a scale of its own */
+    const hs_nearest *built = hs_nearest_kept_get(kept, &room);
+    CHECK(built != NULL && room == NULL && built->tree.n_nodes == 1);
+    CHECK(built->search->call->team == NULL); /* it was the call's that built it */
+    CHECK(hs_nearest_kept_get(kept, &other) == built && other == NULL);
+    hs_nearest_kept_free(kept);
+    hs_nearest_kept_free(NULL);
+    CHECK(hs_test_live_blocks() == blocks);
+}
+
+/* Points that a radius beyond the largest distance has let in. */
+static void
+rows_end_at_the_largest_distance(void)
+{
+    const hs_points          points = points_on_line(line, 4);
+    static hs_nearest_block  block;
+    static hs_nearest_writer writer;
+    static const double      limits[] = {0.25, 0.5, 0.75, 1.0, 1.125, 1.25};
+    static const int         within[] = {0, 1, 1, 2, 2, 3};
+    hs_options               options = hs_options_default();
+    for (int l = 0; l < 6; l++) {
+        nearest_unit_open(&points, NULL, NULL, 3, HS_WANT_J | HS_WANT_DISTANCE, limits[l], &unit);
+        hs_nearest_ranker ranker = {
+            .near = &unit.near, .block = &block, .pace = {.options = &options}};
+        hs_nearest_group group = nearest_unit_group(&unit, 1.5);
+        int32_t          hits[4] = {0, 1, 2, 3}, si = 0;
+        int64_t          count;
+        CHECK(hs_output_reserve(&unit.rows, 12, 0.0) == HS_OK);
+        unit.rows.n_pairs = 12;
+        CHECK(hs_nearest_block_init(&unit.near, &block) == HS_OK);
+        CHECK(hs_nearest_block_fill(&unit.near, &unit.call.options, &group, 1e9, NULL, &block) ==
+              HS_OK);
+        while (unit.search.bins.order[si] != 0)
+            si++;
+        CHECK(hs_nearest_rank(&ranker, &group, si, hits, 4, &count) == HS_OK && count == 3);
+        hs_nearest_writer_init(&unit.near, &writer);
+        CHECK(hs_nearest_write(&writer, &ranker, count) == HS_OK);
+        hs_nearest_flush(&writer);
+        const int64_t *j = hs_output_column(&unit.rows, HS_WANT_J);
+        const double  *d = hs_output_column(&unit.rows, HS_WANT_DISTANCE);
+        for (int e = 0; e < 3; e++) {
+            CHECK(j[e] == (e < within[l] ? e + 1 : -1));
+            CHECK(d[e] == (e < within[l] ? line[e + 1] : INFINITY));
+        }
+        hs_nearest_ranker_free(&ranker);
+        hs_nearest_block_free(&unit.near, &block);
+        nearest_unit_close(&unit);
+    }
+}
+
+/* Squares of what is far beyond the first guess would overflow, those of what is far below it would
+ * vanish: the unit changes, up and down to the last that there is. */
+static void
+check_radii(const double *x)
+{
+    const hs_points  points = points_on_line(x, 2);
+    const hs_options options = hs_options_default();
+    static const int exponents[] = {-1000, -300, 0, 300, 600, 601, 602, 900};
+    for (int e = 0; e < 8; e++) {
+        hs_nearest_bounder bounder;
+        nearest_unit_open(&points, NULL, NULL, 1, HS_WANT_J, INFINITY, &unit);
+        const double apart = fabs(unit.search.bins.x[0][0] - unit.search.bins.x[0][1]);
+        CHECK(apart > 0.0 && apart < INFINITY);
+        CHECK(hs_nearest_bounder_init(&unit.near, &bounder) == HS_OK);
+        hs_nearest_group group;
+        hs_nearest_group_set(&unit.near, 0, 1, &group);
+        group.radius = ldexp(1.0, exponents[e]);
+        CHECK(hs_nearest_bound(&unit.near, &options, &bounder, &group) == HS_OK);
+        CHECK(group.radius >= apart && group.radius <= 1.001 * apart);
+        hs_nearest_bounder_free(&unit.near, &bounder);
+        nearest_unit_close(&unit);
+    }
+}
+
+static void
+radii_are_found_far_from_a_guess(void)
+{
+    check_radii((const double[2]){-0x1.fp900, 0x1.fp900});
+    check_radii((const double[2]){0.0, 0x1.fp-900});
+    check_radii((const double[2]){-0x1p-500, 0x1.fp-470});
+    check_radii((const double[2]){0x1p500, 0x1.fp470});
+}
+
+/* Nearest search: rows of nearest points are right where groups, ranges of them, images and ties
+ * are at their limits, and refused beyond these. */
+
+/* Points that one box vector apart are the same in X, and are not as given. */
+static void
+points_that_wrapping_makes_equal(void)
+{
+    static double x[2 * 60];
+    hs_box        box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0, 0.0}, {0.5, 1.0}}};
+    brute_scene   scene = {.ndim = 2, .n = 60, .x = x, .box = &box, .cutoff = 1.0};
+    for (int i = 0; i < 60; i++) {
+        x[2 * i] = i % 20 + 0.25;
+        x[2 * i + 1] = 0.25 * (i / 20);
+    }
+    for (int64_t k = 1; k < 100; k += 14) {
+        CHECK(compare_rows(&scene, -1, k, 1) > 0);
+        CHECK(compare_rows(&scene, 20, k, 1) > 0);
+    }
+}
+
+/* Scales in one search that are far apart: clusters that are nothing beside their distances. */
+static void
+clusters_of_all_sizes(void)
+{
+    enum { N = 120 };
+    static double  x[2 * N];
+    harness_random random = {12};
+    for (int trial = 0; trial < 30; trial++) {
+        hs_box      box = {.ndim = 2, .periodic = {true, true}, .rows = {{8.0, 0.0}, {3.0, 7.0}}};
+        brute_scene scene = {.ndim = 2, .n = N, .x = x, .cutoff = 0.5};
+        scene.box = trial % 3 ? &box : NULL;
+        for (int i = 0; i < N; i++) {
+            const int spread = -random_below(&random, trial % 2 ? 60 : 20);
+            for (int k = 0; k < 2; k++)
+                x[2 * i + k] = ldexp(random_unit(&random) - 0.5, spread) + i % 3;
+        }
+        CHECK(compare_rows(&scene, trial % 5 ? -1 : 40, 1 + random_below(&random, 20), 1) > 0);
+    }
+}
+
+/* Where all that are wanted are within the cutoff, rows are the same without one. */
+static void
+check_unlimited(const brute_scene *scene, int64_t k)
+{
+    const hs_points points = points_of(scene);
+    hs_options      options = options_of(scene);
+    hs_pairs       *limited = NULL, *unlimited = NULL;
+    options.want = HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_SHIFT;
+    CHECK(hs_nearest_find(AMONG(&points, scene->box), k, &options, &limited, NULL) == HS_OK);
+    options.cutoff = INFINITY;
+    CHECK(hs_nearest_find(AMONG(&points, scene->box), k, &options, &unlimited, NULL) == HS_OK);
+    const int64_t *j = hs_pairs_array(limited, HS_WANT_J);
+    const int64_t *of = hs_pairs_array(unlimited, HS_WANT_J);
+    const double  *d = hs_pairs_array(limited, HS_WANT_DISTANCE);
+    const double  *without = hs_pairs_array(unlimited, HS_WANT_DISTANCE);
+    int64_t        wrong = 0;
+    for (int64_t e = 0; e < hs_pairs_length(limited); e++)
+        wrong += j[e] >= 0 ? j[e] != of[e] || d[e] != without[e]
+                           : of[e] >= 0 && without[e] <= scene->cutoff;
+    CHECK(wrong == 0);
+    hs_pairs_free(limited);
+    hs_pairs_free(unlimited);
+}
+
+/* A hundred thousand points of the lattice of whole numbers, whose nearest are known. */
+static void
+many_points_on_a_lattice(void)
+{
+    enum { SIDE = 45, N = SIDE * SIDE * SIDE, K = 6 };
+    double    *x = array_of(3 * N, sizeof *x);
+    int64_t    wrong = 0;
+    hs_options options = hs_options_default();
+    hs_pairs  *rows = NULL;
+    for (int i = 0; i < N; i++) {
+        x[3 * i] = i % SIDE;
+        x[3 * i + 1] = i / SIDE % SIDE;
+        x[3 * i + 2] = i / SIDE / SIDE;
+    }
+    const hs_points points = {x, N, 3, HS_FLOAT64, 24, 8};
+    options.cutoff = INFINITY;
+    options.want = HS_WANT_J | HS_WANT_DISTANCE;
+    options.threads = 2;
+    CHECK(hs_nearest_find(AMONG(&points, NULL), K, &options, &rows, NULL) == HS_OK);
+    const int64_t *j = hs_pairs_array(rows, HS_WANT_J);
+    const double  *d = hs_pairs_array(rows, HS_WANT_DISTANCE);
+    for (int64_t i = 0; i < N; i++) {
+        const int steps[] = {-SIDE * SIDE, -SIDE, -1, 1, SIDE, SIDE * SIDE};
+        int       n = 0;
+        for (int s = 0; s < 6; s++) {
+            const int    k = s < 3 ? 2 - s : s - 3;
+            const double to = x[3 * i + k] + (s < 3 ? -1.0 : 1.0);
+            if (to >= 0.0 && to < SIDE) {
+                wrong += j[K * i + n] != i + steps[s] || d[K * i + n] != 1.0;
+                n++;
+            }
+        }
+        for (; n < K; n++)
+            wrong += d[K * i + n] != sqrt(2.0) ||
+                     (d[K * i + n - 1] > 1.0 && j[K * i + n] <= j[K * i + n - 1]);
+    }
+    CHECK(wrong == 0);
+    hs_pairs_free(rows);
+    free(x);
+}
+
+/* Many dimensions, where each group needs nearly all leaves; and one leaf alone. */
+static void
+many_leaves_and_few(void)
+{
+    enum { N = 24000, D = 6 };
+    double        *x = array_of(D * N, sizeof *x);
+    harness_random random = {14};
+    int64_t        wrong = 0;
+    hs_options     options = hs_options_default();
+    hs_pairs      *rows = NULL;
+    for (int e = 0; e < D * N; e++)
+        x[e] = random_unit(&random);
+    for (int few = 0; few < 2; few++) {
+        const hs_points points = {x, few ? 5 : N, D, HS_FLOAT64, 8 * D, 8};
+        const hs_points queries = {x, few ? 3000 : 700, D, HS_FLOAT64, 8 * D, 8};
+        options.cutoff = INFINITY;
+        options.want = HS_WANT_J | HS_WANT_DISTANCE;
+        CHECK(hs_nearest_find(QUERIED(&points, &queries, NULL), 2, &options, &rows, NULL) == HS_OK);
+        const int64_t *j = hs_pairs_array(rows, HS_WANT_J);
+        for (int64_t i = 0; i < queries.n; i += few ? 37 : 23) {
+            double  least = INFINITY; /* of all but the point itself */
+            int64_t nearest = -1;
+            for (int64_t q = 0; q < points.n; q++) {
+                double square = 0.0;
+                for (int k = 0; k < D; k++)
+                    square += (x[D * q + k] - x[D * i + k]) * (x[D * q + k] - x[D * i + k]);
+                if (q != i && square < least) {
+                    least = square;
+                    nearest = q;
+                }
+            }
+            wrong += i < points.n ? j[2 * i] != i || j[2 * i + 1] != nearest : j[2 * i] != nearest;
+        }
+        hs_pairs_free(rows);
+    }
+    CHECK(wrong == 0);
+    free(x);
+}
+
+/* Boxes so long that a ball as large as the density says holds thousands of images of few
+ * points. */
+static void
+long_boxes_have_many_images(void)
+{
+    static double  x[3 * 120];
+    harness_random random = {15};
+    for (int e = 0; e < 3 * 120; e++)
+        x[e] = random_unit(&random);
+    for (int trial = 0; trial < 12; trial++) {
+        hs_box      box = {.ndim = 3, .periodic = {true, true, true}};
+        brute_scene scene = {.ndim = 3, .n = trial % 2 ? 2 : 120, .x = x, .box = &box};
+        scene.cutoff = trial % 2 ? 3.0 : 0.75;
+        box.rows[0][0] = box.rows[1][1] = 1.0;
+        box.rows[2][2] = trial % 4 < 2 ? 1e6 : 1e15;
+        box.rows[1][0] = trial % 3 ? 0.25 : 0.0;
+        CHECK(compare_rows(&scene, -1, 10, 1) > 0);
+        CHECK(compare_rows(&scene, scene.n / 2, 10, 1) > 0);
+        check_unlimited(&scene, 10);
+    }
+}
+
+/* Nearest stops: long searches for nearest points can be stopped wherever they ask whether to go
+ * on, and fail wherever memory ends, with nothing left. */
+
+/* Rows of a search that may be asked so often whether it goes on. */
+static hs_status
+find_until(const brute_scene *scene, const hs_points *queries, int64_t k, int64_t polls,
+           hs_counters *counters, hs_pairs **rows)
+{
+    const hs_points points = points_of(scene);
+    hs_options      options = options_of(scene);
+    options.cutoff = scene->cutoff;
+    options.want = HS_WANT_J | HS_WANT_DISTANCE;
+    options.poll = stop_after;
+    options.poll_context = &polls;
+    options.counters = counters;
+    return hs_nearest_find(QUERIED(&points, queries, scene->box), k, &options, rows, NULL);
+}
+
+/* Stops at `tries` of its polls, evenly picked, and at the last one. Returns how many there are. */
+static int64_t
+stop_everywhere(const brute_scene *scene, const hs_points *queries, int64_t k, int tries)
+{
+    hs_counters   counters;
+    hs_pairs     *rows = NULL;
+    const int64_t blocks = hs_test_live_blocks();
+    CHECK(find_until(scene, queries, k, INT64_MAX, &counters, &rows) == HS_OK);
+    hs_pairs_free(rows);
+    const int64_t polls = counters.polls;
+    for (int t = 0; t <= tries; t++) {
+        rows = NULL;
+        CHECK(find_until(scene, queries, k, (polls - 1) * t / tries, NULL, &rows) ==
+              HS_ERR_INTERRUPTED);
+        CHECK(rows == NULL && hs_test_live_blocks() == blocks);
+    }
+    return polls;
+}
+
+/* More points than are sorted into a tree, gathered or ranked between two polls. */
+static void
+many_points_can_be_stopped(void)
+{
+    enum { N = 150000, K = 140000 };
+    double         *x = array_of(N, sizeof *x);
+    harness_random  random = {21};
+    hs_pairs       *rows = NULL;
+    const double    at = 0.5;
+    const hs_points query = {&at, 1, 1, HS_FLOAT64, 8, 8};
+    brute_scene     scene = {.ndim = 1, .n = N, .x = x, .cutoff = INFINITY};
+    for (int i = 0; i < N; i++)
+        x[i] = random_unit(&random);
+    CHECK(find_until(&scene, &query, K, INT64_MAX, NULL, &rows) == HS_OK);
+    const int64_t *j = hs_pairs_array(rows, HS_WANT_J);
+    const double  *d = hs_pairs_array(rows, HS_WANT_DISTANCE);
+    int64_t        wrong = 0, nearer = 0;
+    for (int64_t e = 0; e < K; e++) {
+        wrong += d[e] != fabs(x[j[e]] - at) || (e > 0 && d[e] < d[e - 1]);
+    }
+    for (int i = 0; i < N; i++)
+        nearer += fabs(x[i] - at) <= d[K - 1];
+    CHECK(wrong == 0 && nearer == K);
+    hs_pairs_free(rows);
+    CHECK(stop_everywhere(&scene, &query, K, 12) > 12);
+    free(x);
+}
+
+/* A hundred thousand images of one point are asked for, or lie nearer than what is. */
+static void
+many_images_can_be_stopped(void)
+{
+    double x[6] = {0.125, 0.25, 0.375, 0.0, 0.0, 0.0};
+    hs_box box = {
+        .ndim = 3, .periodic = {true, true, true}, .rows = {{1.0}, {0.0, 1.0}, {0.0, 0.0, 1.0}}};
+    brute_scene     scene = {.ndim = 3, .n = 1, .x = x, .box = &box, .cutoff = INFINITY};
+    const hs_points query = {x + 3, 1, 3, HS_FLOAT64, 24, 8};
+    hs_pairs       *rows = NULL;
+    int64_t         wrong = 0;
+    CHECK(find_until(&scene, &query, 30000, INT64_MAX, NULL, &rows) == HS_OK);
+    const double *d = hs_pairs_array(rows, HS_WANT_DISTANCE);
+    int64_t       nearer = 0;
+    for (int64_t e = 1; e < 30000; e++)
+        wrong += d[e] < d[e - 1];
+    for (int a = -24; a <= 24; a++) {
+        for (int b = -24; b <= 24; b++) {
+            for (int c = -24; c <= 24; c++) {
+                const double u = a + x[0], v = b + x[1], w = c + x[2];
+                nearer += sqrt(u * u + v * v + w * w) < d[29999];
+            }
+        }
+    }
+    CHECK(wrong == 0 && nearer <= 29999 && nearer > 29900);
+    hs_pairs_free(rows);
+    CHECK(stop_everywhere(&scene, &query, 30000, 8) > 8);
+    x[3] = 400.0;
+    box.periodic[0] = false;
+    CHECK(stop_everywhere(&scene, &query, 3, 3) >= 1);
+    x[3] = 6000.0; /* far along the open axis of the box: many images are about as near */
+    CHECK(stop_everywhere(&scene, &query, 3, 3) >= 1);
+    box.rows[1][0] = 0.5; /* which is not upright any more */
+    CHECK(stop_everywhere(&scene, &query, 3, 3) >= 1);
+}
+
+/* Nearest radius: a first radius holds about as many points as are wanted, by the density of what
+ * is around a group, of its line or plane, or of the box. */
+
+enum { MOST = 4000 };
+static double x_radius[3 * MOST];
+
+static hs_points
+points_in(int64_t n, int ndim)
+{
+    return (hs_points){x_radius, n, ndim, HS_FLOAT64, ndim * 8, 8};
+}
+
+/* A layer: its open axis has the points' own width. */
+static void
+layers_are_as_thick_as_their_points(void)
+{
+    const hs_box   box = {.ndim = 2, .periodic = {true, false}, .rows = {{100.0}, {0.0, 1.0}}};
+    harness_random random = {342};
+    for (int i = 0; i < 30; i++) {
+        x_radius[2 * i] = 0.001 * random_unit(&random);
+        x_radius[2 * i + 1] = 500.0 * random_unit(&random);
+    }
+    x_radius[1] = 0.0;
+    x_radius[3] = 500.0;
+    const hs_points points = points_in(30, 2);
+    nearest_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
+    for (int32_t si = 0; si < 30; si++) {
+        hs_nearest_group group;
+        hs_nearest_group_set(&unit.near, si, si + 1, &group);
+        hs_nearest_guess(&unit.near, &group);
+        const double wanted = 2.0 + 3.5 * sqrt(2.0) + 1.0;
+        const double radius = sqrt(wanted / 30.0 * 100.0 * 500.0 / 3.1416);
+        CHECK(group.radius > 0.999 * radius && group.radius < 1.42 * radius);
+    }
+    nearest_unit_close(&unit);
+}
+
+/* Nearest bound: the search for a radius that surely suffices ends when it is told to. */
+
+enum { N_BOUND = 6000, QUERIES = 400, K_BOUND = 10 };
+
+/* Points on a sphere, and queries about its centre: no density says how far the nearest are, and to
+ * find out takes a walk over nearly all of them for each. */
+static hs_status
+find_hollow(refusal *once, hs_pairs **rows)
+{
+    static double   x[3 * N_BOUND], q[3 * QUERIES];
+    harness_random  random = {61};
+    const hs_points points = {x, N_BOUND, 3, HS_FLOAT64, 24, 8};
+    const hs_points queries = {q, QUERIES, 3, HS_FLOAT64, 24, 8};
+    hs_options      options = hs_options_default();
+    for (int i = 0; i < N_BOUND; i++) {
+        double square = 0.0;
+        for (int k = 0; k < 3; k++) {
+            x[3 * i + k] = random_unit(&random) - 0.5;
+            square += x[3 * i + k] * x[3 * i + k];
+        }
+        for (int k = 0; k < 3; k++)
+            x[3 * i + k] /= sqrt(square);
+    }
+    for (int e = 0; e < 3 * QUERIES; e++)
+        q[e] = 0.01 * random_unit(&random);
+    options.cutoff = INFINITY;
+    options.want = HS_WANT_J;
+    options.poll = refuse_once;
+    options.poll_context = once;
+    return hs_nearest_find(QUERIED(&points, &queries, NULL), K_BOUND, &options, rows, NULL);
+}
+
+static void
+one_refusal_ends_the_search(void)
+{
+    refusal   once = {.nth = 0};
+    hs_pairs *rows = NULL;
+    CHECK(find_hollow(&once, &rows) == HS_OK);
+    CHECK(hs_pairs_length(rows) == QUERIES * K_BOUND);
+    hs_pairs_free(rows);
+    const int64_t polls = once.n;
+    CHECK(polls > 2);
+    for (int64_t nth = 1; nth <= polls; nth++) {
+        once = (refusal){.nth = nth};
+        CHECK(find_hollow(&once, &rows) == HS_ERR_INTERRUPTED);
+        CHECK(rows == NULL && once.n == nth); /* there is no further question */
+    }
+}
+
+void
+test_nearest(void)
+{
+    RUN(whoever_comes_while_it_is_built_does_without);
+    RUN(rows_end_at_the_largest_distance);
+    RUN(radii_are_found_far_from_a_guess);
+    RUN(points_that_wrapping_makes_equal);
+    RUN(clusters_of_all_sizes);
+    RUN(many_points_on_a_lattice);
+    RUN(many_leaves_and_few);
+    RUN(long_boxes_have_many_images);
+    RUN(many_points_can_be_stopped);
+    RUN(many_images_can_be_stopped);
+    RUN(layers_are_as_thick_as_their_points);
+    RUN(one_refusal_ends_the_search);
+}
