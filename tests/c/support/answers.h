@@ -72,6 +72,29 @@ is_within(big square, big limit, bool inclusive)
     return sign < 0 || (inclusive && sign == 0);
 }
 
+/* Whether `times` |D| is less than r + s, or as much; in plain numbers where these can tell. */
+TRUTH bool
+is_within_sum(const asked *a, const brute_pair *pair, int times, double r, double s, bool inclusive)
+{
+    const double     *p = at_point(a, pair->i), *q = at_point(a, pair->j);
+    const long double limit = ((long double)r + s) * ((long double)r + s);
+    long double       square = 0.0L, sizes = limit;
+    for (int k = 0; k < a->d; k++) {
+        long double along = (long double)q[k] - p[k], size = fabsl((long double)q[k]) + fabs(p[k]);
+        for (int l = 0; l < a->rows.m; l++) {
+            along += (long double)pair->shift[a->rows.axis[l]] * a->rows.rows[l][k];
+            size += fabsl((long double)pair->shift[a->rows.axis[l]] * a->rows.rows[l][k]);
+        }
+        square += times * times * along * along;
+        sizes += times * times * size * size;
+    }
+    const long double slack = 0x1p-40L * sizes;
+    if (slack > LDBL_MIN * 0x1p100L && slack < LDBL_MAX && fabsl(square - limit) > slack)
+        return square < limit;
+    return is_within(big_product(big_from_int(times * times), square_of(a, pair)),
+                     big_sum(big_from_double(r), big_from_double(s)), inclusive);
+}
+
 TRUTH void
 keep(brute_list *to, const brute_pair *pair)
 {
@@ -134,26 +157,25 @@ TRUTH bool
 is_within_radii(const asked *a, const brute_pair *pair)
 {
     const double r = a->radii[pair->i], s = a->radii[pair->j];
-    const big    quarters = big_from_int(a->quarters), square = square_of(a, pair);
-    const big    sum = big_sum(big_from_double(r), big_from_double(s));
     const double one = a->reach.rule == HS_RULE_MAX      ? fmax(r, s)
                        : a->reach.rule == HS_RULE_MIN    ? fmin(r, s)
                        : a->reach.rule == HS_RULE_GATHER ? r
                                                          : s;
-    if (a->reach.rule == HS_RULE_SUM)
-        return is_within(square, sum, a->scene->inclusive);
-    if (a->reach.rule == HS_RULE_MEAN)
-        return is_within(big_product(big_from_int(4), square), sum, a->scene->inclusive);
-    return is_within(big_product(big_from_int(16), square),
-                     big_product(quarters, big_from_double(one)), a->scene->inclusive);
+    if (a->reach.rule == HS_RULE_SUM || a->reach.rule == HS_RULE_MEAN)
+        return is_within_sum(a, pair, a->reach.rule == HS_RULE_MEAN ? 2 : 1, r, s,
+                             a->scene->inclusive);
+    if (a->quarters == 4)
+        return is_within_sum(a, pair, 1, one, 0.0, a->scene->inclusive);
+    return is_within(big_product(big_from_int(16), square_of(a, pair)),
+                     big_product(big_from_int(a->quarters), big_from_double(one)),
+                     a->scene->inclusive);
 }
 
 TRUTH bool
 is_within_table(const asked *a, const brute_pair *pair)
 {
     const double cutoff = a->table[a->types[pair->i] * ANSWER_TYPES + a->types[pair->j]];
-    return cutoff >= 0.0 &&
-           is_within(square_of(a, pair), big_from_double(cutoff), a->scene->inclusive);
+    return cutoff >= 0.0 && is_within_sum(a, pair, 1, cutoff, 0.0, a->scene->inclusive);
 }
 
 /* H is whole numbers times a power of two, which the extent has too. */
@@ -211,7 +233,7 @@ is_selected(const asked *a, const brute_pair *pair)
     const double        least = of->min_distance;
     if (of->groups != NULL && a->groups[pair->i] != a->groups[pair->j])
         return false;
-    if (least > 0.0 && is_within(square_of(a, pair), big_from_double(least), false))
+    if (least > 0.0 && is_within_sum(a, pair, 1, least, 0.0, false))
         return false;
     const bool excluded = of->labels != NULL && pair->i != pair->j &&
                           llabs(a->labels[pair->i] - a->labels[pair->j]) <= of->within;
@@ -382,9 +404,8 @@ check_nearest(asked *a)
 TRUTH int
 bin_of(const asked *a, const brute_pair *pair, bool inclusive)
 {
-    const big square = square_of(a, pair);
-    int       k = 0;
-    while (k < ANSWER_EDGES - 1 && !is_within(square, big_from_double(a->edges[k]), inclusive))
+    int k = 0;
+    while (k < ANSWER_EDGES - 1 && !is_within_sum(a, pair, 1, a->edges[k], 0.0, inclusive))
         k++;
     return k;
 }
