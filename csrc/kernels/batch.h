@@ -32,7 +32,7 @@ typedef struct hs_batch {
 } hs_batch;
 
 /*
- * verdict[e] is an hs_verdict (core/exact/metric_float.h). HS_UNDECIDED leaves pair e to
+ * verdict[e] is an hs_verdict (core/exact/metric.h). HS_UNDECIDED leaves pair e to
  * hs_metric_settle. Adds the pairs that it decides to *stages.
  */
 typedef void (*hs_judge_fn)(const hs_metric *metric, const hs_batch *batch, uint8_t *verdict,

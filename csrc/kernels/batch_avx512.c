@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* batch_avx512.c: the batch kernels for x86-64 CPUs with AVX-512, from batch_template.h. */
-#include "../core/exact/metric_float.h"
+#include "../core/exact/metric.h"
 #include "batch.h"
 #include "target.h"
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* batch_baseline.c: the batch kernels for any CPU, from batch_template.h: SSE2, NEON or plain C,
  * whichever is the baseline. */
-#include "../core/exact/metric_float.h"
+#include "../core/exact/metric.h"
 #include "batch.h"
 #include "target.h"
 

@@ -7,8 +7,8 @@
  *   MEASURE   name of the hs_measure_fn
  *
  * Each is one loop over groups of LANES pairs, made for 1, 2, 3 and any number of axes, with and
- * without shifts, by inlining with constants. Line by line they follow core/exact/metric_float.h
- * and core/exact/metric_measure.c, which explain the steps for one pair. Undefines both parameters
+ * without shifts, by inlining with constants. Line by line they follow core/exact/metric.h
+ * and core/exact/metric.c, which explain the steps for one pair. Undefines both parameters
  * at its end.
  */
 #if !defined(JUDGE) || !defined(MEASURE)

@@ -27,9 +27,9 @@
 #define HS_KERNEL_H
 
 #include "../core/base/base.h"
-#include "../core/base/rule.h"
+#include "../core/base/status.h"
 #include "../core/exact/filter.h"
-#include "../core/exact/support.h"
+#include "../core/exact/ellipsoid.h"
 #include "../halfshell.h"
 #include "batch.h"
 #include "sift.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * wide_doubleword.h: core/exact/doubleword.h in lanes: its operations in its order, so that every
+ * wide_doubleword.h: core/exact/arithmetic.h in lanes: its operations in its order, so that every
  * lane has its bits. Include it after a vocabulary (wide_<isa>.h), inside that instruction set's
  * target region.
  */

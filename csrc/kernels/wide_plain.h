@@ -5,7 +5,7 @@
 
 #include <math.h>
 
-#include "../core/exact/doubleword.h"
+#include "../core/exact/arithmetic.h"
 
 /* One operation a line. */
 /* clang-format off */

@@ -25,7 +25,7 @@ HS_ALWAYS_INLINE reals magnitude(reals a) { return _mm_andnot_pd(_mm_set1_pd(-0.
 /* a > b ? a : b, and a < b ? a : b. */
 HS_ALWAYS_INLINE reals larger(reals a, reals b) { return _mm_max_pd(a, b); }
 HS_ALWAYS_INLINE reals smaller(reals a, reals b) { return _mm_min_pd(a, b); }
-/* a without its lower half: hs_split of core/exact/doubleword.h. */
+/* a without its lower half: hs_split of core/exact/arithmetic.h. */
 HS_ALWAYS_INLINE reals
 upper_half(reals a)
 {

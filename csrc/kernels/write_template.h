@@ -6,7 +6,7 @@
  *   WRITE   name of the hs_write_fn (write.h)
  *
  * One loop over the hits of a point, LANES at a time. D is found by the steps of
- * core/exact/metric_float.h, so it has their bits; |D| from D in halves (write_distance.h), for a
+ * core/exact/metric.h, so it has their bits; |D| from D in halves (write_distance.h), for a
  * tile of hits at a time: what one of them waits for, others do meanwhile. A pair that this is not
  * sure of is measured by itself. Undefines WRITE at its end.
  */

@@ -1,15 +1,14 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_API_BY_REACH_H
+#define HS_API_BY_REACH_H
+
+#include "../levels/levels.h"
+#include "pairs.h"
+
 /*
  * by_reach.h: searches in which pairs have a reach of their own: several searches of levels, one
  * after the other, in place of one.
  */
-#ifndef HS_BY_REACH_H
-#define HS_BY_REACH_H
-
-#include "../levels/level_join.h"
-#include "../levels/level_search.h"
-
-#include "request.h"
 
 /* What the searches of a request are. */
 typedef struct hs_by_reach {
@@ -41,5 +40,16 @@ hs_status hs_by_reach_single(hs_by_reach *by, hs_call *call, hs_use_fn use, void
 /* hs_request_use for requests with a reach and without. */
 hs_status hs_by_reach_use(const hs_request *request, hs_use_fn use, void *context,
                           hs_failure *failure);
+
+/*
+ * What hs_pairs_find, hs_neighbors_find and hs_neighbors_count do for a request that
+ * has a reach. fill, count: what does it for one search, which is taken where there is but one.
+ */
+
+hs_status hs_by_reach_pairs(const hs_request *request, hs_pairs **result, hs_failure *failure);
+hs_status hs_by_reach_rows(const hs_request *request, hs_fill_fn fill, hs_pairs **result,
+                           hs_failure *failure);
+hs_status hs_by_reach_count_rows(const hs_request *request, hs_use_fn count, int64_t *counts,
+                                 hs_failure *failure);
 
 #endif

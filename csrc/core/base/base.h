@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* base.h: compiler macros, and small arithmetic that must not become a library call. Every file of
- * the core includes it. */
-#ifndef HS_BASE_H
-#define HS_BASE_H
+#ifndef HS_BASE_BASE_H
+#define HS_BASE_BASE_H
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
+
+/* base.h: compiler macros, and small arithmetic that must not become a library call. Every file of
+ * the core includes it. */
 
 /*
  * Results must not depend on the compiler: sums keep their order, and no multiply-add is fused

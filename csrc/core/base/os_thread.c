@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* os_thread.c: what all threads of a process share, and what is new in a child. */
 #if !defined(_WIN32)
 #define _POSIX_C_SOURCE 200809L
 #endif
 #include "os_thread.h"
+
+/* os_thread.c: what all threads of a process share, and what is new in a child. */
 
 volatile int64_t hs_n_forks;
 volatile int64_t hs_n_waiting;

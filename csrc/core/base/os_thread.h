@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* os_thread.h: the few functions of threads, and of numbers that several of them change, that the
- * core needs, on POSIX and on Windows. */
-#ifndef HS_OS_THREAD_H
-#define HS_OS_THREAD_H
+#ifndef HS_BASE_OS_THREAD_H
+#define HS_BASE_OS_THREAD_H
 
 #include "base.h"
+
+/* os_thread.h: the few functions of threads, and of numbers that several of them change, that the
+ * core needs, on POSIX and on Windows. */
 
 #define HS_BRIEFLY_MS 50 /* a wait that ends on its own */
 #define HS_NAP_MS     1  /* or more: 16 on some Windows */

@@ -1,4 +1,676 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#include "lattice.h"
+#include "../exact/arithmetic.h"
+
+#include <math.h>
+#include <string.h>
+
+/*
+ * Reduction that decides in floating point and computes in exact integers.
+ *
+ * Every step subtracts an integer multiple of one row from another, so U stays unimodular
+ * whatever rounding does to the decision to take it. The changed row of B is then formed anew
+ * from an exact sum U A: no error is passed on, and shears of 1e9 widths cancel without loss.
+ *
+ * The decisions are those of Lenstra, Lenstra and Lovasz (1982), row by row as in Nguyen and
+ * Stehle (2009): rows before the current one are already nearly orthogonal, so the coefficients
+ * are accurate where it matters. In two and three dimensions a descent follows, which subtracts
+ * sums of the shorter rows as long as that shortens a row (Lagrange; Semaev 2001); it ends in a
+ * basis reduced in the sense of Minkowski.
+ *
+ * Rows are never exchanged: the algorithm permutes an index instead. A box that is already
+ * reduced, in whatever order its rows come, is therefore left as it is.
+ */
+
+#define MAX_COEFFICIENT  (INT64_C(1) << 61)
+#define COEFFICIENT_TAIL (INT64_C(1) << 26) /* splits them into 35 and 26 bits, exact as doubles */
+
+#define LOVASZ 0.99 /* the factor that each exchange of rows must gain, so that they end */
+/* What a step must gain to count: far above rounding, so that ties are left alone. */
+#define NOTABLY_LESS (1.0 - 0x1p-40)
+
+/* Bounds on work: several times what boxes needed where the reduction ended by itself. */
+enum { MAX_STEPS = 2000, MAX_SWEEPS = 16, MAX_REFUSED = 100, MAX_PASSES = 8 };
+
+/* x * 2^exponent, where the largest |x[k]| is in [0.5, 1): squares neither overflow nor vanish. */
+typedef struct scaled_row {
+    double x[HS_MAX_DIM];
+    double norm2; /* x . x */
+    int    exponent;
+} scaled_row;
+
+typedef struct short_basis {
+    int        ndim, n_rows;
+    int        n_refused; /* steps that were not taken for their size */
+    bool       changed;
+    int        order[HS_MAX_DIM]; /* row order[k] is the k-th to the algorithm */
+    scaled_row row[HS_MAX_DIM];   /* B = U A, rounded */
+    scaled_row star[HS_MAX_DIM];  /* row order[k], less its projection on those before */
+    int64_t    U[HS_MAX_DIM][HS_MAX_DIM];
+    const double (*given)[HS_MAX_DIM]; /* A; borrowed */
+} short_basis;
+
+static double
+dot_of_rows(int ndim, const double a[], const double b[])
+{
+    double sum = 0.0;
+    for (int c = 0; c < ndim; c++) {
+        sum += a[c] * b[c];
+    }
+    return sum;
+}
+
+/* False when the row is zero or not finite; it gets norm 0. */
+static bool
+set_row(int ndim, const double x[], int exponent, scaled_row *row)
+{
+    double largest = 0.0, nothing = 0.0;
+    int    shift;
+    for (int c = 0; c < ndim; c++) {
+        largest = fabs(x[c]) > largest ? fabs(x[c]) : largest;
+        nothing += x[c] - x[c]; /* NaN from infinity or NaN */
+    }
+    row->norm2 = 0.0;
+    row->exponent = exponent;
+    if (largest == 0.0 || nothing != 0.0) {
+        memset(row->x, 0, sizeof row->x);
+        return false;
+    }
+    (void)frexp(largest, &shift);
+    double first = hs_power_of_two(-(shift / 2)), second = hs_power_of_two(shift / 2 - shift);
+    for (int c = 0; c < ndim; c++) {
+        row->x[c] = x[c] * first * second; /* 2^1073 is not a double */
+    }
+    row->norm2 = dot_of_rows(ndim, row->x, row->x);
+    row->exponent += shift;
+    return true;
+}
+
+/* |a|^2 / |b|^2; may overflow to infinity, or underflow to 0. */
+static double
+norm_ratio(const scaled_row *a, const scaled_row *b)
+{
+    double ratio = a->norm2 / b->norm2;
+    return a->exponent == b->exponent ? ratio : ldexp(ratio, 2 * (a->exponent - b->exponent));
+}
+
+/* Add b to the sum that the m numbers are, without error (Shewchuk 1997). Returns the new m. */
+static int
+add_exactly(double sum[], int m, double b)
+{
+    int kept = 0;
+    for (int i = 0; i < m; i++) {
+        hs_dw s = hs_two_sum(b, sum[i]);
+        b = s.hi;
+        if (s.lo != 0.0) {
+            sum[kept++] = s.lo;
+        }
+    }
+    if (b != 0.0) {
+        sum[kept++] = b;
+    }
+    return kept;
+}
+
+/* Entry c of the row with these coefficients; when error is not NULL, a bound on its error. */
+static double
+combine(const short_basis *b, const int64_t coefficients[], int c, double *error)
+{
+    double sum[4 * HS_MAX_DIM + 1], size = 0.0, value = 0.0, lost = 0.0;
+    int    m = 0;
+    for (int l = 0; l < b->n_rows; l++) {
+        size += fabs((double)coefficients[l]) * fabs(b->given[l][c]);
+    }
+    double scale = size < 0x1p990 ? 1.0 : 0x1p-120;
+    for (int l = 0; l < b->n_rows; l++) {
+        double given = coefficients[l] != 0 ? b->given[l][c] : 0.0, entry = given * scale;
+        if (entry / scale != given) {
+            lost = 0x1p-890; /* 8 rows, 2^61 times half of 2^-1074, times 2^120 */
+        }
+        if (entry != 0.0) {
+            /* Exact for subnormal entries too: multiples of the entry's last bit. */
+            const int64_t tail = coefficients[l] % COEFFICIENT_TAIL;
+            const hs_dw   high = hs_two_product((double)(coefficients[l] - tail), entry);
+            const hs_dw   low = hs_two_product((double)tail, entry);
+            m = add_exactly(sum, add_exactly(sum, m, low.lo), low.hi);
+            m = add_exactly(sum, add_exactly(sum, m, high.lo), high.hi);
+        }
+    }
+    for (int i = 0; i < m; i++) {
+        value += sum[i];
+    }
+    if (error != NULL) {
+        double rest = 0.0;
+        m = add_exactly(sum, m, -value);
+        for (int i = 0; i < m; i++) {
+            rest += fabs(sum[i]);
+        }
+        *error = lost + rest / scale * (1.0 + 0x1p-40);
+    }
+    return value / scale;
+}
+
+/* out = row - multiple * other; false when an entry passes 2^61. */
+static bool
+subtract_integers(int n, const int64_t row[], int64_t multiple, const int64_t other[],
+                  int64_t out[])
+{
+    for (int i = 0; i < n; i++) {
+        double rough = (double)row[i] - (double)multiple * (double)other[i];
+        if (fabs(rough) > 2.0 * (double)MAX_COEFFICIENT) {
+            return false; /* else the integers below do not overflow */
+        }
+        out[i] = row[i] - multiple * other[i];
+        if (out[i] > MAX_COEFFICIENT || out[i] < -MAX_COEFFICIENT) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Row k less a multiple of row l. False, and nothing done, where numbers would get too large. */
+static bool
+subtract(short_basis *b, int k, int l, int64_t multiple)
+{
+    int64_t    coefficients[HS_MAX_DIM];
+    double     entries[HS_MAX_DIM];
+    scaled_row row;
+    bool       fits = subtract_integers(b->n_rows, b->U[k], multiple, b->U[l], coefficients);
+    for (int c = 0; fits && c < b->ndim; c++) {
+        entries[c] = combine(b, coefficients, c, NULL);
+    }
+    if (!fits || !set_row(b->ndim, entries, 0, &row)) {
+        b->n_refused++;
+        return false;
+    }
+    memcpy(b->U[k], coefficients, (size_t)b->n_rows * sizeof coefficients[0]);
+    b->row[k] = row;
+    b->changed = true;
+    return true;
+}
+
+/* Shortest first; equal ones stay in the order given. */
+static void
+sort_rows(short_basis *b)
+{
+    for (int k = 0; k < b->n_rows; k++) {
+        int at = k;
+        while (at > 0 && norm_ratio(&b->row[k], &b->row[b->order[at - 1]]) < 1.0) {
+            b->order[at] = b->order[at - 1];
+            at--;
+        }
+        b->order[at] = k;
+    }
+}
+
+static void
+project(short_basis *b, int k)
+{
+    const scaled_row *row = &b->row[b->order[k]];
+    double            x[HS_MAX_DIM];
+    memcpy(x, row->x, sizeof x);
+    for (int j = 0; j < k; j++) {
+        const scaled_row *star = &b->star[j];
+        double along = star->norm2 > 0.0 ? dot_of_rows(b->ndim, x, star->x) / star->norm2 : 0.0;
+        for (int c = 0; c < b->ndim; c++) {
+            x[c] -= along * star->x[c];
+        }
+    }
+    (void)set_row(b->ndim, x, row->exponent, &b->star[k]);
+}
+
+/* How often star j is contained in the k-th row. */
+static double
+coefficient(const short_basis *b, int k, int j)
+{
+    const scaled_row *row = &b->row[b->order[k]], *star = &b->star[j];
+    double mu = star->norm2 > 0.0 ? dot_of_rows(b->ndim, row->x, star->x) / star->norm2 : 0.0;
+    return ldexp(mu, row->exponent - star->exponent);
+}
+
+/*
+ * Bring the coefficients of the k-th row to one half or less. One sweep does unless the row is
+ * very long: then each takes off what double precision can see, and the next sees more. A
+ * coefficient beyond 2^61 is left, and so is one that drowns in the rounding of a long row.
+ */
+static void
+size_reduce(short_basis *b, int k)
+{
+    bool again = true;
+    for (int sweep = 0; again && sweep < MAX_SWEEPS; sweep++) {
+        again = false;
+        for (int j = k - 1; j >= 0; j--) {
+            int    from = b->order[k], what = b->order[j];
+            double mu = coefficient(b, k, j);
+            double noise = ldexp(0x1p-45, b->row[from].exponent - b->star[j].exponent);
+            if (fabs(mu) > 0.5 + 0x1p-20 + noise && fabs(mu) <= (double)MAX_COEFFICIENT) {
+                again = subtract(b, from, what, (int64_t)rint(mu)) || again;
+            }
+        }
+    }
+}
+
+static void
+reduce_lll(short_basis *b)
+{
+    int k = 1;
+    project(b, 0);
+    for (int step = 0; step < MAX_STEPS && k < b->n_rows && b->n_refused < MAX_REFUSED; step++) {
+        size_reduce(b, k);
+        project(b, k);
+        double mu = coefficient(b, k, k - 1);
+        if (!(norm_ratio(&b->star[k], &b->star[k - 1]) < LOVASZ - mu * mu)) {
+            k++;
+            continue;
+        }
+        int other = b->order[k];
+        b->order[k] = b->order[k - 1];
+        b->order[k - 1] = other;
+        project(b, 0);
+        k = k > 1 ? k - 1 : 1;
+    }
+}
+
+/*
+ * Try to shorten the k-th row by the rows before it, at most two: three rows in order of length
+ * none of which this shortens are Minkowski reduced.
+ */
+static bool
+shorten(short_basis *b, int k)
+{
+    const scaled_row *row = &b->row[b->order[k]];
+    double            added[2][HS_MAX_DIM] = {{0.0}}, best = row->norm2 * NOTABLY_LESS;
+    int               choice[2] = {0, 0};
+    for (int j = 0; j < k; j++) {
+        const scaled_row *shorter = &b->row[b->order[j]];
+        double            scale = ldexp(1.0, shorter->exponent - row->exponent);
+        for (int c = 0; c < b->ndim; c++) {
+            added[j][c] = shorter->x[c] * scale;
+        }
+    }
+    for (int p = -1; p <= 1; p++) {
+        for (int q = k > 1 ? -1 : 0; q <= (k > 1); q++) {
+            double norm2 = 0.0;
+            for (int c = 0; c < b->ndim; c++) {
+                double x = row->x[c] - p * added[0][c] - q * added[1][c];
+                norm2 += x * x;
+            }
+            if (norm2 < best) {
+                best = norm2;
+                choice[0] = p;
+                choice[1] = q;
+            }
+        }
+    }
+    bool first = choice[0] != 0 && subtract(b, b->order[k], b->order[0], choice[0]);
+    bool second = choice[1] != 0 && subtract(b, b->order[k], b->order[1], choice[1]);
+    return first || second;
+}
+
+static void
+descend(short_basis *b)
+{
+    int k = 1;
+    sort_rows(b);
+    for (int step = 0; step < MAX_STEPS && k < b->n_rows; step++) {
+        if (shorten(b, k)) {
+            sort_rows(b);
+            k = 1;
+        } else {
+            k++;
+        }
+    }
+}
+
+/* Compares the products of the lengths, which bound how flat a basis is. */
+static bool
+is_shorter(const short_basis *a, const short_basis *b)
+{
+    double ratio = 1.0;
+    int    exponent = 0;
+    for (int k = 0; k < a->n_rows; k++) {
+        ratio *= a->row[k].norm2 / b->row[k].norm2;
+        exponent += a->row[k].exponent - b->row[k].exponent;
+    }
+    return ldexp(ratio, 2 * exponent) < NOTABLY_LESS;
+}
+
+/* False when there is nothing to reduce. */
+static bool
+begin(short_basis *b, int ndim, int n_rows, const double rows[][HS_MAX_DIM])
+{
+    b->ndim = ndim;
+    b->n_rows = n_rows;
+    b->given = rows;
+    bool orthogonal = true, usable = true;
+    for (int k = 0; k < n_rows; k++) {
+        for (int l = 0; l < n_rows; l++) {
+            b->U[k][l] = k == l;
+        }
+        usable = set_row(ndim, rows[k], 0, &b->row[k]) && usable;
+        for (int j = 0; j < k; j++) {
+            orthogonal = dot_of_rows(ndim, b->row[k].x, b->row[j].x) == 0.0 && orthogonal;
+        }
+    }
+    return usable && !orthogonal;
+}
+
+static void
+report(const short_basis *b, hs_reduction *reduction)
+{
+    reduction->n_rows = b->n_rows;
+    reduction->changed = false;
+    for (int k = 0; k < b->n_rows; k++) {
+        bool same = true;
+        for (int l = 0; l < b->n_rows; l++) {
+            reduction->U[k][l] = b->U[k][l];
+            same = same && b->U[k][l] == (k == l);
+        }
+        reduction->changed = reduction->changed || !same;
+        reduction->error[k] = 0.0;
+        for (int c = 0; c < b->ndim; c++) {
+            double error = 0.0;
+            reduction->rows[k][c] = same ? b->given[k][c] : combine(b, b->U[k], c, &error);
+            reduction->error[k] = hs_larger(error, reduction->error[k]);
+        }
+    }
+}
+
+void
+hs_reduce(int ndim, int n_rows, const double rows[][HS_MAX_DIM], hs_reduction *reduction)
+{
+    short_basis best, trial;
+    bool        promising = begin(&best, ndim, n_rows, rows);
+    /* A pass that gains nothing is undone, which leaves reduced boxes alone. Beyond three
+     * dimensions what it reaches depends on the order of the rows, and a second may gain more. */
+    for (int pass = 0; promising && pass < (n_rows <= 3 ? 1 : MAX_PASSES); pass++) {
+        trial = best;
+        trial.changed = false;
+        trial.n_refused = 0;
+        sort_rows(&trial);
+        reduce_lll(&trial);
+        if (n_rows <= 3) {
+            descend(&trial);
+        }
+        promising = trial.changed && is_shorter(&trial, &best);
+        if (promising) {
+            best = trial;
+        }
+    }
+    report(&best, reduction);
+}
+
+/*
+ * Exact linear independence, by elimination modulo primes just below 2^62.
+ *
+ * Multiplying a row by a power of two keeps the rank, so the rows may be taken as integers. If
+ * they are independent, some n x n minor is a nonzero integer, at most B by Hadamard's
+ * inequality. A prime modulo which the rank is deficient divides every minor. Therefore
+ *   - full rank modulo one prime proves independence: some minor is nonzero modulo it;
+ *   - deficient rank modulo primes whose product exceeds B proves dependence: their product
+ *     divides every minor, and zero is the only multiple of it that small.
+ * The first prime settles practically every independent box; only dependent rows and rows made
+ * for the purpose go further. Numbers are kept as in Montgomery (1985), scaled by R = 2^64.
+ */
+
+/* The largest prime below 2^62, so that the usual call need not look for one. */
+#define FIRST_PRIME ((UINT64_C(1) << 62) - 57)
+
+/* Every prime that can be reached exceeds 2^61: there are about 2^61 / 43 between. */
+#define PRIME_BITS 61
+
+typedef struct modulus {
+    uint64_t p;
+    uint64_t negated_inverse; /* -1/p modulo R */
+    uint64_t one;             /* R modulo p */
+} modulus;
+
+/* A row as integers, mantissa * 2^exponent. */
+typedef struct integer_row {
+    int64_t mantissa[HS_MAX_DIM];
+    int     exponent[HS_MAX_DIM]; /* not negative, least 0 */
+} integer_row;
+
+/* 0 <= a, b < p < 2^62: a b / R modulo p. */
+HS_ALWAYS_INLINE uint64_t
+multiply_exactly(const modulus *m, uint64_t a, uint64_t b)
+{
+#if HS_HAVE_INT128
+    hs_uint128 product = (hs_uint128)a * b;
+    uint64_t   factor = (uint64_t)product * m->negated_inverse;
+    uint64_t   result = (uint64_t)((product + (hs_uint128)factor * m->p) >> 64);
+#else
+    uint64_t operands[2][2] = {{a, b}, {0, m->p}};
+    uint64_t high[2], low = 0;
+    for (int k = 0; k < 2; k++) {
+        uint64_t x = operands[k][0], y = operands[k][1];
+        uint64_t x0 = x & UINT32_MAX, x1 = x >> 32, y0 = y & UINT32_MAX, y1 = y >> 32;
+        uint64_t middle = x1 * y0 + ((x0 * y0) >> 32); /* at most 2^64 - 2^32 */
+        uint64_t other = x0 * y1 + (middle & UINT32_MAX);
+        high[k] = x1 * y1 + (middle >> 32) + (other >> 32);
+        if (k == 0) {
+            low = x * y;
+            operands[1][0] = low * m->negated_inverse;
+        }
+    }
+    /* The low halves cancel: they add up to R, or to nothing where both are zero. */
+    uint64_t result = high[0] + high[1] + (low != 0);
+#endif
+    return result >= m->p ? result - m->p : result;
+}
+
+static modulus
+make_modulus(uint64_t p)
+{
+    modulus  m;
+    uint64_t inverse = p; /* of p modulo 2^3, as of any odd number; each step doubles the bits */
+    for (int bits = 3; bits < 64; bits *= 2) {
+        inverse *= 2 - p * inverse;
+    }
+    m.p = p;
+    m.negated_inverse = 0 - inverse;
+    m.one = (0 - p) % p;
+    return m;
+}
+
+/* base: x R modulo p. Returns x^exponent R modulo p. */
+static uint64_t
+power(const modulus *m, uint64_t base, uint64_t exponent)
+{
+    uint64_t result = m->one;
+    for (; exponent != 0; exponent >>= 1) {
+        if (exponent & 1) {
+            result = multiply_exactly(m, result, base);
+        }
+        base = multiply_exactly(m, base, base);
+    }
+    return result;
+}
+
+HS_ALWAYS_INLINE uint64_t
+add(const modulus *m, uint64_t a, uint64_t b)
+{
+    return a + b >= m->p ? a + b - m->p : a + b;
+}
+
+/* Whether odd p passes the strong test of Miller and Rabin to a base: no prime fails. */
+static bool
+passes(const modulus *m, uint64_t base)
+{
+    uint64_t minus_one = m->p - m->one;
+    uint64_t odd = m->p - 1, x = 0;
+    int      halvings = 0;
+    while (odd % 2 == 0) {
+        odd /= 2;
+        halvings++;
+    }
+    for (int bit = 31; bit >= 0; bit--) { /* x = base R modulo p */
+        x = add(m, x, x);
+        x = (base >> bit) & 1 ? add(m, x, m->one) : x;
+    }
+    x = power(m, x, odd);
+    if (x == m->one || x == minus_one) {
+        return true;
+    }
+    for (int k = 1; k < halvings; k++) {
+        x = multiply_exactly(m, x, x);
+        if (x == minus_one) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* 2^61 < p < 2^62, odd. */
+static bool
+is_prime(uint64_t p)
+{
+    /* The first twelve primes as bases decide every number below 3.3e24 (Sorenson and Webster
+     * 2015); dividing by them first costs less than a test and drops most numbers. */
+    static const uint64_t small[12] = {2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37};
+    for (int k = 1; k < 12; k++) {
+        if (p % small[k] == 0) {
+            return false;
+        }
+    }
+    modulus m = make_modulus(p);
+    for (int k = 0; k < 12; k++) {
+        if (!passes(&m, small[k])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+uint64_t
+hs_prime_below(uint64_t p)
+{
+    do {
+        p -= 2;
+    } while (!is_prime(p));
+    return p;
+}
+
+/* Returns bits enough for every integer of the row, or -1 if all are zero. */
+static int
+load_row(int ndim, const double row[], integer_row *integers)
+{
+    int least = INT32_MAX, bits = -1;
+    for (int k = 0; k < ndim; k++) {
+        uint64_t word;
+        memcpy(&word, &row[k], sizeof word);
+        int      biased = (int)((word >> 52) & 2047);
+        uint64_t mantissa = word & ((UINT64_C(1) << 52) - 1);
+        mantissa |= biased != 0 ? UINT64_C(1) << 52 : 0;
+        integers->mantissa[k] = word >> 63 ? -(int64_t)mantissa : (int64_t)mantissa;
+        integers->exponent[k] = biased != 0 ? biased - 1 : 0; /* of the least subnormal: 0 */
+        if (mantissa != 0 && integers->exponent[k] < least) {
+            least = integers->exponent[k];
+        }
+    }
+    for (int k = 0; k < ndim; k++) {
+        integers->exponent[k] -= least;
+        if (integers->mantissa[k] != 0 && integers->exponent[k] + 53 > bits) {
+            bits = integers->exponent[k] + 53;
+        }
+    }
+    return bits;
+}
+
+/* out: the row modulo p, times 1/R. */
+static void
+take_residues(const modulus *m, int ndim, const integer_row *row, uint64_t out[])
+{
+    for (int k = 0; k < ndim; k++) {
+        int64_t  mantissa = row->mantissa[k];
+        int      exponent = row->exponent[k];
+        uint64_t residue = 0;
+        if (mantissa != 0) {
+            residue = mantissa > 0 ? (uint64_t)mantissa : m->p - (uint64_t)-mantissa;
+            residue = multiply_exactly(m, residue, UINT64_C(1) << (exponent % 61));
+        }
+        if (residue != 0 && exponent >= 61) {
+            uint64_t two = add(m, m->one, m->one);
+            residue =
+                multiply_exactly(m, residue, power(m, two, (uint64_t)(exponent - exponent % 61)));
+        }
+        out[k] = residue;
+    }
+}
+
+/*
+ * Elimination without division: what is left of a row is multiplied by the pivot instead. For
+ * the rank a row's factor is of no account, nor is the 1/R that every product brings.
+ */
+static bool
+full_rank(uint64_t p, int ndim, int n_rows, const integer_row rows[])
+{
+    modulus  m = make_modulus(p);
+    uint64_t a[HS_MAX_DIM][HS_MAX_DIM];
+    for (int k = 0; k < n_rows; k++) {
+        take_residues(&m, ndim, &rows[k], a[k]);
+    }
+    for (int k = 0; k < n_rows; k++) {
+        int column = 0;
+        while (column < ndim && a[k][column] == 0) {
+            column++;
+        }
+        if (column == ndim) {
+            return false;
+        }
+        uint64_t pivot = a[k][column];
+        for (int i = k + 1; i < n_rows; i++) {
+            uint64_t factor = a[i][column];
+            if (factor == 0) {
+                continue;
+            }
+            factor = p - factor;
+            for (int c = 0; c < ndim; c++) {
+                a[i][c] = add(&m, multiply_exactly(&m, pivot, a[i][c]),
+                              multiply_exactly(&m, factor, a[k][c]));
+            }
+        }
+    }
+    return true;
+}
+
+bool
+hs_rows_independent(int ndim, int n_rows, const double rows[][HS_MAX_DIM])
+{
+    integer_row integers[HS_MAX_DIM];
+    int         bound_bits = 0;
+    HS_ASSERT(0 <= n_rows && n_rows <= ndim && ndim <= HS_MAX_DIM);
+    for (int k = 0; k < n_rows; k++) {
+        int bits = load_row(ndim, rows[k], &integers[k]);
+        if (bits < 0) {
+            return false;
+        }
+        bound_bits += bits + 2; /* a minor's row is no longer than sqrt(8) 2^bits */
+    }
+    /* At most 8 * 2100 bits: some 280 primes. */
+    uint64_t p = FIRST_PRIME;
+    for (int proven_bits = 0; proven_bits <= bound_bits; proven_bits += PRIME_BITS) {
+        if (proven_bits != 0) {
+            p = hs_prime_below(p);
+        }
+        if (full_rank(p, ndim, n_rows, integers)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+int
+hs_zero_row(int ndim, int n_rows, const double rows[][HS_MAX_DIM])
+{
+    integer_row ignored;
+    int         k = 0;
+    while (k < n_rows && load_row(ndim, rows[k], &ignored) >= 0) {
+        k++;
+    }
+    return k;
+}
+
 /*
  * lattice.c: a short basis of the box vectors, and a unit normal for each grid axis.
  *
@@ -6,13 +678,6 @@
  * is, |normal[k] . D| <= |D| holds, and grid.c measures how far a lattice vector moves a grid
  * coordinate that it should not move. A bad normal makes cells wider, never an answer wrong.
  */
-#include "lattice.h"
-
-#include "box_check.h"
-#include "lattice_reduce.h"
-
-#include <math.h>
-#include <string.h>
 
 hs_scale
 hs_scale_of(int exponent)
@@ -396,4 +1061,248 @@ hs_lattice_shift(const hs_lattice *lattice, const int64_t *reduced, int64_t *giv
         given[l] = sum <= INT64_MAX ? (int64_t)sum : -(int64_t)(UINT64_MAX - sum) - 1;
     }
     return true;
+}
+
+/* Tests of the reduced basis: how flat it is, and how large its coefficients are. */
+
+/* Least height of a reduced basis in its row, with much room: 8 rows may have 2^-4. */
+#define LEAST_HEIGHT 0x1p-20
+/* More than an int32 component of S holds. */
+#define MOST_OF_A_ROW 0x1p32
+
+bool
+hs_skew_is_left(const hs_lattice *lattice)
+{
+    for (int k = 0; k < lattice->ndim && !lattice->aligned; k++) {
+        const int r = lattice->row_of_axis[k];
+        double    largest = 0.0;
+        for (int c = 0; r >= 0 && c < lattice->ndim; c++) {
+            largest = hs_larger(fabs(lattice->rows[r][c]), largest);
+        }
+        for (int l = 0; r >= 0 && l < lattice->n_periodic; l++) {
+            if (fabs((double)lattice->U[r][l]) >= MOST_OF_A_ROW) {
+                return true;
+            }
+        }
+        if (r >= 0 && !(lattice->period[k] >= LEAST_HEIGHT * largest)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+hs_status
+hs_skew_or_memory(const hs_lattice *lattice)
+{
+    return hs_skew_is_left(lattice) ? HS_ERR_BOX_SKEWED : HS_ERR_MEMORY;
+}
+
+/*
+ * A first guess of F, then bounds on how wrong it is. Sums of non-negative numbers are
+ * rounded up by a factor GROW at the end: no sum here has more than 200 operations, each of a
+ * relative error of at most 2^-53.
+ */
+
+#define UNIT 0x1p-53
+#define GROW (1.0 + 0x1p-40)
+/* More than all underflows of a sum of products lose. */
+#define LOST 0x1p-1060
+/* Sweeps of rotations: they converge quadratically, and whatever is left is measured. */
+#define SWEEPS 12
+
+/* c = a b; returns how far, at most, an entry may be from that of the exact product. */
+static double
+multiply_matrices(int rows, int inner, int columns, const double a[][HS_MAX_DIM],
+                  const double b[][HS_MAX_DIM], double c[][HS_MAX_DIM])
+{
+    double worst = 0.0;
+    for (int r = 0; r < rows; r++) {
+        for (int k = 0; k < columns; k++) {
+            double sum = 0.0, size = 0.0;
+            for (int l = 0; l < inner; l++) {
+                sum += a[r][l] * b[l][k];
+                size += fabs(a[r][l]) * fabs(b[l][k]);
+            }
+            c[r][k] = sum;
+            worst = hs_larger((inner + 1) * UNIT * size, worst);
+        }
+    }
+    return worst * GROW + LOST;
+}
+
+/* At most the smallest (sign = -1), or at least the largest (sign = 1), eigenvalue of M M^T, by
+ * Gershgorin's circles. */
+static double
+bound_eigenvalue(int d, const double M[][HS_MAX_DIM], double sign)
+{
+    double bound = sign * -INFINITY;
+    for (int a = 0; a < d; a++) {
+        double radius = 0.0, centre = 0.0;
+        for (int b = 0; b < d; b++) {
+            double dot = 0.0, size = 0.0;
+            for (int k = 0; k < d; k++) {
+                dot += M[a][k] * M[b][k];
+                size += fabs(M[a][k]) * fabs(M[b][k]);
+            }
+            radius += (b == a ? 0.0 : fabs(dot)) + (d + 1) * UNIT * size + LOST;
+            centre = b == a ? dot : centre;
+        }
+        /* The sum and its rounding, to the safe side. */
+        const double reach = radius * GROW + fabs(centre) * 0x1p-50;
+        const double end = centre + sign * reach;
+        bound = sign > 0.0 ? hs_larger(end, bound) : hs_smaller(end, bound);
+        if (!(end == end)) {
+            return NAN;
+        }
+    }
+    return bound;
+}
+
+/* Rotates rows a and b of M, and of V, so that those of M become orthogonal. */
+static void
+rotate_rows(int d, double M[][HS_MAX_DIM], double V[][HS_MAX_DIM], int a, int b)
+{
+    double aa = 0.0, bb = 0.0, ab = 0.0;
+    for (int k = 0; k < d; k++) {
+        aa += M[a][k] * M[a][k];
+        bb += M[b][k] * M[b][k];
+        ab += M[a][k] * M[b][k];
+    }
+    if (ab == 0.0) {
+        return;
+    }
+    const double zeta = (bb - aa) / (2.0 * ab);
+    const double t = (zeta >= 0.0 ? 1.0 : -1.0) / (fabs(zeta) + sqrt(1.0 + zeta * zeta));
+    const double c = 1.0 / sqrt(1.0 + t * t), s = c * t;
+    for (int k = 0; k < d; k++) {
+        const double m = M[a][k], v = V[a][k];
+        M[a][k] = c * m - s * M[b][k];
+        M[b][k] = s * m + c * M[b][k];
+        V[a][k] = c * v - s * V[b][k];
+        V[b][k] = s * v + c * V[b][k];
+    }
+}
+
+double
+hs_smallest_stretch(int d, const double F[][HS_MAX_DIM])
+{
+    double M[HS_MAX_DIM][HS_MAX_DIM], V[HS_MAX_DIM][HS_MAX_DIM];
+    for (int a = 0; a < d; a++) {
+        for (int k = 0; k < d; k++) {
+            M[a][k] = F[a][k];
+            V[a][k] = a == k;
+        }
+    }
+    for (int sweep = 0; sweep < SWEEPS; sweep++) {
+        for (int a = 0; a < d; a++) {
+            for (int b = a + 1; b < d; b++) {
+                rotate_rows(d, M, V, a, b);
+            }
+        }
+    }
+    /* V is nearly orthogonal and V F has nearly orthogonal rows. Neither is trusted: both are
+     * measured. With x = y V: |x F|^2 = |y (V F)|^2 and |x|^2 = |y V|^2. */
+    const double off = multiply_matrices(d, d, d, (const double(*)[HS_MAX_DIM])V, F, M);
+    const double least = bound_eigenvalue(d, (const double(*)[HS_MAX_DIM])M, -1.0);
+    const double most = bound_eigenvalue(d, (const double(*)[HS_MAX_DIM])V, 1.0);
+    if (!(least > 0x1p-900) || !(least < 0x1p900) || !(most < 2.0) || !(most > 0.5)) {
+        return 0.0;
+    }
+    /* 2^-48 is more than the six roundings; `off` moves a singular value by its norm at most. */
+    return (sqrt(least) - d * off * GROW) / sqrt(most) * (1.0 - 0x1p-48);
+}
+
+/* F = 1 + sum_r g_r^T (h_r - h0_r), g_r being the vectors dual to h0: a first guess. */
+static bool
+guess_strain(const hs_lattice *lattice, const double now[][HS_MAX_DIM], hs_strain *strain)
+{
+    const int d = lattice->ndim;
+    for (int c = 0; c < d; c++) {
+        for (int k = 0; k < d; k++) {
+            strain->F[c][k] = c == k;
+        }
+    }
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        const int axis = lattice->vector_of_row[r];
+        if (!(lattice->period[axis] > 0.0)) {
+            return false;
+        }
+        for (int c = 0; c < d; c++) {
+            const double dual = lattice->normal[axis][c] / lattice->period[axis];
+            for (int k = 0; k < d; k++) {
+                strain->F[c][k] += dual * (now[r][k] - lattice->given[r][k]);
+            }
+        }
+    }
+    return true;
+}
+
+/* |g| (Frobenius) of a right inverse of h0, from a rounded one that is within `error` of one. */
+static double
+bound_inverse(const hs_lattice *lattice)
+{
+    const int d = lattice->ndim, m = lattice->n_periodic;
+    double    g[HS_MAX_DIM][HS_MAX_DIM], product[HS_MAX_DIM][HS_MAX_DIM];
+    double    norm = 0.0, error = 0.0;
+    for (int r = 0; r < m; r++) {
+        const int axis = lattice->vector_of_row[r];
+        for (int c = 0; c < d; c++) {
+            g[c][r] = lattice->normal[axis][c] / lattice->period[axis];
+            norm += fabs(g[c][r]);
+        }
+    }
+    const double off =
+        multiply_matrices(m, d, m, lattice->given, (const double(*)[HS_MAX_DIM])g, product);
+    for (int r = 0; r < m; r++) {
+        for (int s = 0; s < m; s++) {
+            error += fabs(product[r][s] - (r == s)) * (1.0 + 0x1p-52) + off;
+        }
+    }
+    error *= GROW;
+    return error < 0.5 ? norm / (1.0 - error) * GROW : INFINITY;
+}
+
+/* |h0 F - h|, the sum over all entries. */
+static double
+bound_residual(const hs_lattice *lattice, const double now[][HS_MAX_DIM], const hs_strain *strain)
+{
+    const int    d = lattice->ndim, m = lattice->n_periodic;
+    double       product[HS_MAX_DIM][HS_MAX_DIM], sum = 0.0;
+    const double off = multiply_matrices(m, d, d, lattice->given, strain->F, product);
+    for (int r = 0; r < m; r++) {
+        for (int k = 0; k < d; k++) {
+            sum += fabs(product[r][k] - now[r][k]) * (1.0 + 0x1p-52) + off;
+        }
+    }
+    return sum * GROW;
+}
+
+bool
+hs_strain_find(const hs_box *before, const hs_box *now, hs_strain *strain)
+{
+    hs_lattice lattice;
+    double     rows[HS_MAX_DIM][HS_MAX_DIM];
+    hs_lattice_init_given(before, hs_scale_of(0), &lattice);
+    for (int r = 0; r < lattice.n_periodic; r++) {
+        memcpy(rows[r], now->rows[lattice.vector_of_row[r]], sizeof rows[r]);
+    }
+    if (!guess_strain(&lattice, (const double(*)[HS_MAX_DIM])rows, strain)) {
+        return false;
+    }
+    strain->column_sum = 0.0;
+    for (int k = 0; k < before->ndim; k++) {
+        double sum = 0.0;
+        for (int c = 0; c < before->ndim; c++) {
+            sum += fabs(strain->F[c][k]);
+        }
+        strain->column_sum = hs_larger(sum * GROW, strain->column_sum);
+    }
+    strain->residual = bound_inverse(&lattice) *
+                       bound_residual(&lattice, (const double(*)[HS_MAX_DIM])rows, strain) * GROW;
+    strain->shrink = hs_smallest_stretch(before->ndim, (const double(*)[HS_MAX_DIM])strain->F) -
+                     strain->residual;
+    /* The difference is rounded by at most 2^-53 of the larger. */
+    strain->shrink -= 0x1p-52 * fabs(strain->shrink) + 0x1p-53 * strain->residual + 0x1p-1060;
+    strain->shrink = hs_smaller(strain->shrink, 1.0);
+    return strain->shrink > 0.0 && strain->residual < INFINITY;
 }

@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_BOX_LATTICE_H
+#define HS_BOX_LATTICE_H
+
+#include "../../halfshell.h"
+#include "../base/base.h"
+
 /*
  * lattice.h: the box as the search uses it. The periodic box vectors are replaced by a short
  * basis B of the same lattice, and each grid axis gets a unit normal along which points are
  * binned. Axis-aligned boxes keep their own coordinate axes and cost no arithmetic.
  */
-#ifndef HS_LATTICE_H
-#define HS_LATTICE_H
-
-#include "../../halfshell.h"
-#include "../base/base.h"
 
 /* Multiplying by 2^-exponent, in two steps because 2^1074 is not a double. */
 typedef struct hs_scale {
@@ -82,11 +83,69 @@ double hs_lattice_volume(const hs_lattice *lattice, int exponent);
 bool hs_lattice_shift(const hs_lattice *lattice, const int64_t *reduced, int64_t *given);
 
 /* Whether reduction has failed: rows of B nearly depend on each other, or have coefficients over
- * the given box vectors that no shift may have. In box_skew.c, as the next one. */
+ * the given box vectors that no shift may have. In lattice.c, as the next one. */
 bool hs_skew_is_left(const hs_lattice *lattice);
 
 /* Why a search would meet more images or rows of cells than any memory holds: HS_ERR_BOX_SKEWED or
  * HS_ERR_MEMORY, because the cutoff spans them. */
 hs_status hs_skew_or_memory(const hs_lattice *lattice);
+
+/*
+ * A short, nearly orthogonal basis of the lattice that the periodic box vectors
+ * span. The search enumerates images in the reduced basis, where their number is small however
+ * skewed the box is; shifts are mapped back to the box as given, exactly, through integers.
+ */
+
+/* B = U A: row k of the reduced basis is sum_l U[k][l] * (row l of A), in real arithmetic. U has
+ * determinant +1 or -1, so both bases span the same lattice. */
+typedef struct hs_reduction {
+    int     n_rows;
+    bool    changed;                      /* U is not the identity */
+    int64_t U[HS_MAX_DIM][HS_MAX_DIM];    /* |U[k][l]| <= 2^61 */
+    double  rows[HS_MAX_DIM][HS_MAX_DIM]; /* B rounded to float64 ... */
+    double  error[HS_MAX_DIM];            /* ... each entry of row k within this */
+} hs_reduction;
+
+/*
+ * rows: n_rows linearly independent rows of ndim finite doubles. Any scale,
+ * 1e-300 to 1e300, rows of very different length too. Where a row would need a coefficient beyond
+ * 2^61, the reduction stops early: the result is always a valid basis, at worst the given one.
+ */
+void hs_reduce(int ndim, int n_rows, const double rows[][HS_MAX_DIM], hs_reduction *reduction);
+
+/*
+ * Are the periodic box vectors linearly independent? Decided exactly for the given
+ * floats, by elimination modulo 62-bit primes: one prime of full rank proves independence, enough
+ * primes to pass the Hadamard bound prove dependence. A rounded determinant can do neither.
+ */
+
+/* rows: n_rows (0 ... ndim) rows of ndim finite doubles, of any magnitude. Allocates nothing. */
+bool hs_rows_independent(int ndim, int n_rows, const double rows[][HS_MAX_DIM]);
+
+/* The first of these rows that is zero, or n_rows. */
+int hs_zero_row(int ndim, int n_rows, const double rows[][HS_MAX_DIM]);
+
+/* The largest prime below p; p: odd, at most 2^62 and far above 2^61. A step of the above. */
+uint64_t hs_prime_below(uint64_t p);
+
+/*
+ * What a change of the box does to distances, with certified bounds. docs/verlet.md
+ * derives them.
+ */
+
+/* F, any matrix near the one that takes the old box vectors h0 to the new ones h. `residual` pays
+ * for the difference between the two; no bound depends on how well F was found. */
+typedef struct hs_strain {
+    double F[HS_MAX_DIM][HS_MAX_DIM]; /* a row vector x goes to x F */
+    double column_sum;                /* at least the largest sum over |F| of a column */
+    double shrink;   /* |x F| >= shrink |x|, at most 1, rounded down; 0 or less: nothing known */
+    double residual; /* |S (h0 F - h)| <= residual |S h0| for every S; taken off `shrink` too */
+} hs_strain;
+
+/* False where a bound cannot be had: too large a change, or numbers near the ends of the range. */
+bool hs_strain_find(const hs_box *before, const hs_box *now, hs_strain *strain);
+
+/* At most the smallest singular value of F (d rows of d); 0 or less where it may vanish. */
+double hs_smallest_stretch(int d, const double F[][HS_MAX_DIM]);
 
 #endif

@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* wrap.c: one point in any box, and columns of points along coordinate axes. Remainders are exact
- * or computed by compensated sums. */
 #include "wrap.h"
+#include "../exact/arithmetic.h"
 
 #include <math.h>
+#include <string.h>
 
-#include "../exact/doubleword.h"
+/* wrap.c: one point in any box, and columns of points along coordinate axes. Remainders are exact
+ * or computed by compensated sums. */
 
 #define TURNS_TAIL  (INT64_C(1) << 26) /* splits 62 bits into 36 and 26, both exact as doubles */
 #define WRAP_PASSES 4 /* each pass gains 50 bits; from 2^51 turns two are enough, two are spare */
 
 /* Numbers beyond this are taken smaller, exactly, before they are split into halves: splitting
- * multiplies by 2^27 + 1 (doubleword.h), and sums of a few products must be finite too. */
+ * multiplies by 2^27 + 1 (arithmetic.h), and sums of a few products must be finite too. */
 #define LARGE 0x1p900
 /* Coordinates by so much: those that are large stay above 2^800, so that no digit of the length,
  * which is at least 2^-52 of them, is lost. */
@@ -303,4 +304,631 @@ hs_fold_coordinates(const hs_lattice *lattice, int k, const double *const *x, in
             t[i] += factor * from[i];
         }
     }
+}
+
+/*
+ * Columns of points into a box of any shape, hs_fold_points. A tile of points at a
+ * time, without branches.
+ *
+ * Why the bits are those of hs_wrap_point: the steps are those of its first pass. With so few turns
+ * the products by the leading part of the turns vanish, and the splitting of the turns is trivial;
+ * a vanishing product changes nothing but the sign of a zero, which adding `low`, never -0, takes
+ * away again. A tile with a point that may need a second pass goes through hs_wrap_point.
+ */
+
+#define SKEWED_TILE  256 /* points at a time: all work arrays together fit the nearest cache */
+#define SKEWED_LANES 8 /* extremes kept side by side, so that the loops over them can be vectors */
+/* Adding and subtracting this rounds any |x| < 2^51 to an integer, ties to even, as rint() does. */
+#define ROUNDER 0x1.8p52
+
+/* Work arrays of one tile. */
+typedef struct tile {
+    int    n;
+    double inside[HS_MAX_DIM][SKEWED_TILE];
+    double given[HS_MAX_DIM][SKEWED_TILE];  /* turns over the given box vectors, as doubles */
+    double turned[HS_MAX_DIM][SKEWED_TILE]; /* turns over B */
+    double moved[SKEWED_TILE];              /* 0 where no turn is needed */
+    double t[SKEWED_TILE], sum[SKEWED_TILE], low[SKEWED_TILE], absolute[SKEWED_TILE];
+} tile;
+
+static void
+count_turns(const hs_lattice *lattice, const double *const *x, tile *work)
+{
+    double *HS_RESTRICT moved = work->moved;
+    for (int i = 0; i < work->n; i++) {
+        moved[i] = 0.0;
+    }
+    for (int k = 0; k < lattice->ndim; k++) {
+        const int row = lattice->row_of_axis[k];
+        if (row < 0) {
+            continue;
+        }
+        double *HS_RESTRICT turned = work->turned[row];
+        const double        period = lattice->period[k];
+        hs_fold_coordinates(lattice, k, x, work->n, work->t);
+        for (int i = 0; i < work->n; i++) {
+            turned[i] = (work->t[i] / period + ROUNDER) - ROUNDER;
+            moved[i] += fabs(turned[i]);
+        }
+    }
+    for (int l = 0; l < lattice->n_periodic; l++) {
+        double *HS_RESTRICT given = work->given[l];
+        for (int i = 0; i < work->n; i++) {
+            given[i] = 0.0;
+        }
+        for (int r = 0; r < lattice->n_periodic; r++) {
+            const double factor = (double)lattice->U[r][l];
+            for (int i = 0; factor != 0.0 && i < work->n; i++) {
+                given[i] += factor * work->turned[r][i];
+            }
+        }
+    }
+}
+
+/* A given box vector with a component along the present axis, and the turns over it. */
+typedef struct term {
+    const double *turns;
+    double        entry;
+    double        high_part, low_part; /* of the entry: Veltkamp's halves. Their products with less
+                                        * than 2^26 turns are exact */
+} term;
+
+/* At most this many terms at a time; more need a second loop. */
+#define TERMS 3
+
+static int
+list_terms(const hs_lattice *lattice, int k, const tile *work, term *terms)
+{
+    int n_terms = 0;
+    for (int l = 0; l < lattice->n_periodic; l++) {
+        const double entry = lattice->scaled[l][k];
+        if (entry != 0.0) {
+            const double scaled = 0x1.0000002p27 * entry;
+            const double high_part = scaled - (scaled - entry);
+            terms[n_terms++] = (term){work->given[l], entry, high_part, entry - high_part};
+        }
+    }
+    return n_terms;
+}
+
+/* sum + low -= turns * entry for each of n_terms terms, by the steps of subtract_product.
+ * Inlined with constant n_terms. */
+HS_ALWAYS_INLINE void
+subtract_terms(const term *terms, int n_terms, tile *work)
+{
+    const term a = terms[0], b = n_terms > 1 ? terms[1] : a, c = n_terms > 2 ? terms[2] : a;
+    const term each[TERMS] = {a, b, c};
+    for (int i = 0; i < work->n; i++) {
+        double sum = work->sum[i], low = work->low[i], absolute = work->absolute[i];
+        for (int e = 0; e < n_terms; e++) {
+            const double factor = -each[e].turns[i];
+            const double product = factor * each[e].entry;
+            const double error = (factor * each[e].high_part - product) + factor * each[e].low_part;
+            const hs_dw  partial = hs_two_sum(sum, product);
+            sum = partial.hi;
+            low += partial.lo + error;
+            absolute += fabs(product);
+        }
+        work->sum[i] = sum;
+        work->low[i] = low;
+        work->absolute[i] = absolute;
+    }
+}
+
+static void
+move_inside(const hs_lattice *lattice, int k, const double *HS_RESTRICT x, tile *work,
+            hs_folded *folded)
+{
+    double *HS_RESTRICT inside = work->inside[k];
+    term                terms[HS_MAX_DIM];
+    const int           n_terms = list_terms(lattice, k, work, terms);
+    for (int i = 0; i < work->n; i++) {
+        work->sum[i] = x[i];
+        work->low[i] = 0.0;
+        work->absolute[i] = fabs(x[i]);
+    }
+    for (int e = 0; e < n_terms; e += TERMS) {
+        if (n_terms - e >= 3) {
+            subtract_terms(terms + e, 3, work);
+        } else if (n_terms - e == 2) {
+            subtract_terms(terms + e, 2, work);
+        } else {
+            subtract_terms(terms + e, 1, work);
+        }
+    }
+    for (int i = 0; i < work->n; i++) {
+        inside[i] = work->sum[i] + work->low[i];
+    }
+    for (int i = 0; i < work->n; i++) { /* a point that stays keeps its -0; no branch this way */
+        const double given = x[i], moved = inside[i];
+        inside[i] = work->moved[i] != 0.0 ? moved : given;
+    }
+    folded->magnitude = hs_fold_largest(work->absolute, work->n, folded->magnitude);
+}
+
+/* Ranges of the coordinates t_k of the points inside, joined to *folded. Returns whether along any
+ * periodic axis one of them is beyond its faces. */
+static bool
+find_ranges(const hs_lattice *lattice, tile *work, hs_folded *folded)
+{
+    const double *inside[HS_MAX_DIM];
+    bool          beyond = false;
+    for (int k = 0; k < lattice->ndim; k++) {
+        inside[k] = work->inside[k];
+    }
+    for (int k = 0; k < lattice->ndim; k++) {
+        double lower[SKEWED_LANES], upper[SKEWED_LANES], low = INFINITY, high = -INFINITY;
+        int    i = 0;
+        hs_fold_coordinates(lattice, k, inside, work->n, work->t);
+        for (int l = 0; l < SKEWED_LANES; l++) {
+            lower[l] = INFINITY;
+            upper[l] = -INFINITY;
+        }
+        for (; i + SKEWED_LANES <= work->n; i += SKEWED_LANES) {
+            for (int l = 0; l < SKEWED_LANES; l++) {
+                const double t = work->t[i + l];
+                lower[l] = t < lower[l] ? t : lower[l];
+                upper[l] = t > upper[l] ? t : upper[l];
+            }
+        }
+        for (; i < work->n; i++) {
+            lower[0] = fmin(lower[0], work->t[i]);
+            upper[0] = fmax(upper[0], work->t[i]);
+        }
+        for (int l = 0; l < SKEWED_LANES; l++) {
+            low = fmin(low, lower[l]);
+            high = fmax(high, upper[l]);
+        }
+        folded->lower[k] = fmin(folded->lower[k], low);
+        folded->upper[k] = fmax(folded->upper[k], high);
+        folded->x_largest[k] = hs_fold_largest(inside[k], work->n, folded->x_largest[k]);
+        const double half = 0.5 * lattice->period[k];
+        beyond = beyond || (lattice->row_of_axis[k] >= 0 && !(low >= -half && high <= half));
+    }
+    return beyond;
+}
+
+/* Wraps every point by hs_wrap_point. Returns the first point that fails, or -1. */
+static int
+fold_one_by_one(const hs_lattice *lattice, const double *const *x, const hs_turns *turns,
+                int64_t begin, tile *work, hs_folded *folded)
+{
+    for (int i = 0; i < work->n; i++) {
+        double  r[HS_MAX_DIM], inside[HS_MAX_DIM];
+        int64_t turned[HS_MAX_DIM];
+        for (int k = 0; k < lattice->ndim; k++) {
+            r[k] = x[k][i];
+        }
+        if (!hs_wrap_point(lattice, r, inside, turned, &folded->magnitude)) {
+            return i;
+        }
+        for (int k = 0; k < lattice->ndim; k++) {
+            work->inside[k][i] = inside[k];
+        }
+        for (int row = 0; row < lattice->n_periodic; row++) {
+            hs_turns_set(turns, row, begin + i, turned[row]);
+        }
+    }
+    return -1;
+}
+
+static void
+put_turns(const hs_turns *turns, int row, int64_t begin, const tile *work)
+{
+    const double *HS_RESTRICT turned = work->turned[row];
+    const int                 n = work->n;
+    if (turns->narrow[row] != NULL) {
+        int32_t *HS_RESTRICT to = turns->narrow[row] + begin;
+        for (int i = 0; i < n; i++) {
+            to[i] = (int32_t)turned[i];
+        }
+    } else {
+        for (int i = 0; i < n; i++) {
+            turns->wide[row][begin + i] = (int64_t)turned[i];
+        }
+    }
+}
+
+/* Whether no point of the tile has more than so many turns, over all rows of B together. */
+static bool
+turns_are_few(const tile *work, double most)
+{
+    int many = 0;
+    for (int i = 0; i < work->n; i++) {
+        many |= !(work->moved[i] <= most); /* also where overflow has left no number */
+    }
+    return many == 0;
+}
+
+/* Turns over B that make at most HS_FOLD_TURNS over any given box vector. */
+static double
+most_turns(const hs_lattice *lattice)
+{
+    double largest = 1.0;
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        for (int l = 0; l < lattice->n_periodic; l++) {
+            largest = fmax(largest, fabs((double)lattice->U[r][l]));
+        }
+    }
+    return HS_FOLD_TURNS / largest;
+}
+
+/* The quick way. Returns false where some points have too many turns or may need a second pass. */
+static bool
+fold_tile(const hs_lattice *lattice, double most, const double *const *x, const hs_turns *turns,
+          int64_t begin, tile *work, hs_folded *folded)
+{
+    hs_folded found = *folded;
+    count_turns(lattice, x, work);
+    if (!turns_are_few(work, most)) {
+        return false;
+    }
+    for (int k = 0; k < lattice->ndim; k++) {
+        move_inside(lattice, k, x[k], work, &found);
+    }
+    if (find_ranges(lattice, work, &found)) {
+        return false;
+    }
+    *folded = found;
+    for (int row = 0; row < lattice->n_periodic; row++) {
+        put_turns(turns, row, begin, work);
+    }
+    return true;
+}
+
+void
+hs_fold_points(const hs_lattice *lattice, bool few_turns, double *const *r, int64_t first,
+               int64_t last, double *const *x, const hs_turns *turns, hs_folded *folded)
+{
+    tile         work;
+    const double most = few_turns ? INFINITY : most_turns(lattice);
+    for (int64_t begin = first; begin < last; begin += SKEWED_TILE) {
+        const double *from[HS_MAX_DIM];
+        work.n = (int)(last - begin < SKEWED_TILE ? last - begin : SKEWED_TILE);
+        for (int k = 0; k < lattice->ndim; k++) {
+            from[k] = r[k] + begin;
+        }
+        if (!fold_tile(lattice, most, from, turns, begin, &work, folded)) {
+            const int failed = fold_one_by_one(lattice, from, turns, begin, &work, folded);
+            if (failed >= 0) {
+                folded->failed = begin + failed;
+                return;
+            }
+            (void)find_ranges(lattice, &work, folded);
+        }
+        for (int k = 0; k < lattice->ndim; k++) {
+            memcpy(x[k] + begin, work.inside[k], (size_t)work.n * sizeof(double));
+        }
+    }
+}
+
+/* Along coordinate axes each axis by itself; else all images within the distance of
+ * one that is near, coordinate by coordinate (Fincke and Pohst, Math. Comp. 44 (1985) 463). */
+
+#define UNIT 0x1p-53
+/* Fractions of a period this close to a half are compared exactly; they are known to 2^-50. */
+#define HALF_SLACK 0x1p-40
+/* 2^8 images are equally near in 8 dimensions; others are within rounding of these. */
+#define MOST_IMAGES 1024
+/* Milliseconds; a pair takes one or two microseconds in three dimensions, some twenty at worst in
+ * eight, which is why none is polled for. */
+#define MOST_STEPS 0x100000
+/* Coordinates beyond this are too many periods away in any box that is not refused. */
+#define MOST_SCALED 0x1p500
+/* Squares of shorter rows, the longest being 1, would be lost. */
+#define LEAST_ROW 0x1p-400
+/* Of wrapping, relative to its terms: hs_wrap_point. */
+#define WRAP_ERROR 0x1p-94
+/* More than the rows that make an image of a wrapped point, in number of times of each. */
+#define MOST_TIMES 0x1p10
+
+/* Images that may be the nearest, as shifts over B between the wrapped points. */
+typedef struct image_list {
+    const hs_image_box *box;
+    double              y[HS_MAX_DIM]; /* from p to q, wrapped, along the unit vectors */
+    double              slack;         /* twice the error of a length */
+    double              limit;         /* lengths beyond this are not the least */
+    int64_t             steps;
+    int                 n;
+    bool                is_kept; /* images are listed: the limit is known */
+    bool                is_full;
+    int8_t              shift[MOST_IMAGES][HS_MAX_DIM];
+} image_list;
+
+static double
+length_of(const double *x, int n)
+{
+    double square = 0.0;
+    for (int k = 0; k < n; k++) {
+        square += x[k] * x[k];
+    }
+    return sqrt(square);
+}
+
+/* Images are listed along long rows first: along short ones few are then left. */
+static void
+sort_rows(hs_image_box *to)
+{
+    const hs_lattice *lattice = &to->lattice;
+    for (int r = 1; r < lattice->n_periodic; r++) {
+        const int    row = to->order[r];
+        const double length = length_of(lattice->rows[row], lattice->ndim);
+        int          at = r;
+        while (at > 0 && length_of(lattice->rows[to->order[at - 1]], lattice->ndim) > length) {
+            to->order[at] = to->order[at - 1];
+            at--;
+        }
+        to->order[at] = row;
+    }
+}
+
+/* Gram and Schmidt, twice, so that the unit vectors are at right angles to rounding. */
+static hs_status
+set_unit_vectors(hs_image_box *to)
+{
+    const hs_lattice *lattice = &to->lattice;
+    const int         d = lattice->ndim, m = lattice->n_periodic;
+    double            least = 1.0;
+    sort_rows(to);
+    for (int r = 0; r < m; r++) {
+        double       *unit = to->along[r];
+        const double *row = lattice->rows[to->order[r]];
+        const double  whole = length_of(row, d);
+        memcpy(unit, row, (size_t)d * sizeof *row);
+        for (int pass = 0; pass < 2; pass++) {
+            for (int k = 0; k < r; k++) {
+                double part = 0.0;
+                for (int c = 0; c < d; c++) {
+                    part += unit[c] * to->along[k][c];
+                }
+                to->R[r][k] += part;
+                for (int c = 0; c < d; c++) {
+                    unit[c] -= part * to->along[k][c];
+                }
+            }
+        }
+        const double height = length_of(unit, d);
+        to->R[r][r] = height;
+        if (!(whole >= LEAST_ROW)) {
+            return HS_ERR_BOX_SKEWED;
+        }
+        least = hs_smaller(height / whole, least);
+        for (int c = 0; c < d; c++) {
+            unit[c] /= height;
+            to->is_spanned[c] = to->is_spanned[c] || row[c] != 0.0;
+        }
+        to->row_error += MOST_TIMES * d * lattice->row_error[r];
+    }
+    to->rounding = 16.0 * UNIT * d * m / least;
+    return HS_OK;
+}
+
+/* Whether scaling has lost nothing. */
+static bool
+keeps_digits(const hs_lattice *lattice, hs_scale scale)
+{
+    const hs_scale back = hs_scale_of(-scale.exponent);
+    bool           same = true;
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        for (int k = 0; k < lattice->ndim; k++) {
+            same = same && hs_scale_apply(back, lattice->scaled[r][k]) == lattice->given[r][k];
+        }
+    }
+    return same;
+}
+
+hs_status
+hs_image_box_init(const hs_box *box, int ndim, hs_image_box *to)
+{
+    double largest = 0.0;
+    memset(to, 0, sizeof *to);
+    for (int r = 0; r < HS_MAX_DIM; r++) {
+        to->order[r] = r;
+    }
+    for (int l = 0; box != NULL && l < ndim; l++) {
+        for (int k = 0; box->periodic[l] && k < ndim; k++) {
+            largest = hs_larger(fabs(box->rows[l][k]), largest);
+        }
+    }
+    /* Along coordinate axes as they are given nothing overflows, and no digit may be lost. */
+    to->scale = hs_scale_of(0);
+    hs_lattice_init(box, ndim, to->scale, &to->lattice);
+    if (!to->lattice.aligned || to->lattice.reduced) {
+        to->scale = hs_scale_of(ilogb(largest));
+        hs_lattice_init(box, ndim, to->scale, &to->lattice);
+    }
+    hs_metric_init(&to->metric, ndim, to->lattice.n_periodic,
+                   (const double(*)[HS_MAX_DIM])to->lattice.given, 1.0, true);
+    if (to->lattice.aligned) {
+        return keeps_digits(&to->lattice, to->scale) ? HS_OK : HS_ERR_BOX_SKEWED;
+    }
+    return hs_skew_is_left(&to->lattice) ? HS_ERR_BOX_SKEWED : set_unit_vectors(to);
+}
+
+static void
+add_image(image_list *list, const int8_t *shift, double length)
+{
+    if (!list->is_kept) {
+        list->limit = hs_smaller(length + list->slack, list->limit);
+    } else if (list->n < MOST_IMAGES) {
+        memcpy(list->shift[list->n++], shift, sizeof list->shift[0]);
+    } else {
+        list->is_full = true;
+    }
+}
+
+/* Shifts along rows r, r - 1, ..., 0, for those along the others; `square` is that of the parts
+ * along unit vectors beyond r. */
+static void
+list_images(image_list *list, int r, int8_t *shift, double square)
+{
+    const hs_image_box *box = list->box;
+    const int           m = box->lattice.n_periodic;
+    double              part = list->y[r];
+    for (int l = r + 1; l < m; l++) {
+        part += shift[l] * box->R[l][r];
+    }
+    const double height = box->R[r][r];
+    const double centre = -part / height, middle = rint(centre);
+    const double side = centre < middle ? -1.0 : 1.0;
+    /* The nearest first, then on alternating sides: distances ascend. */
+    for (int step = 0;; step++) {
+        const double turn = step % 2 ? side * ((step + 1) / 2) : -side * (step / 2);
+        const double times = middle + turn;
+        const double z = part + times * height;
+        const double length = sqrt(square + z * z);
+        if (!(length <= list->limit) || list->is_full) {
+            return;
+        }
+        if (!(fabs(times) <= INT8_MAX) || ++list->steps > MOST_STEPS) {
+            list->is_full = true;
+            return;
+        }
+        shift[r] = (int8_t)times;
+        if (r > 0) {
+            list_images(list, r - 1, shift, square + z * z);
+        } else {
+            add_image(list, shift, length);
+        }
+    }
+}
+
+/* Images of wrapped points that may be the nearest. magnitude: of wrapping both. */
+static hs_status
+find_images(image_list *list, const double *p, const double *q, double magnitude)
+{
+    const hs_image_box *box = list->box;
+    const int           d = box->lattice.ndim, m = box->lattice.n_periodic;
+    int8_t              shift[HS_MAX_DIM] = {0};
+    double              terms = 0.0;
+    memset(list->y, 0, sizeof list->y);
+    for (int c = 0; c < d; c++) {
+        if (box->is_spanned[c]) { /* others are at right angles to all rows */
+            terms += fabs(p[c]) + fabs(q[c]);
+            for (int k = 0; k < m; k++) {
+                list->y[k] += box->along[k][c] * (q[c] - p[c]);
+            }
+        }
+    }
+    const double longest = HS_MAX_DIM * 2.0 * MOST_TIMES * UNIT; /* what is added to y */
+    /* INT8_MAX: of a row, as R has it, as many times as an image may have it */
+    list->slack = 2.0 * HS_MAX_DIM *
+                  (box->rounding * (terms + INT8_MAX) + longest + box->row_error +
+                   2.0 * WRAP_ERROR * magnitude);
+    list->limit = INFINITY;
+    list->n = 0;
+    list->steps = 0;
+    list->is_full = false;
+    for (int pass = 0; pass < 2; pass++) { /* how near is the nearest? which are as near? */
+        list->is_kept = pass == 1;
+        list_images(list, m - 1, shift, 0.0);
+    }
+    return list->is_full ? HS_ERR_BOX_SKEWED : HS_OK;
+}
+
+/* In an aligned lattice: each axis has one image, or two. */
+static void
+find_along_axes(image_list *list, const double *p, const double *q)
+{
+    const hs_lattice *lattice = &list->box->lattice;
+    memset(list->shift[0], 0, sizeof list->shift[0]);
+    list->n = 1;
+    for (int k = 0; k < lattice->ndim; k++) {
+        const int r = lattice->row_of_axis[k];
+        if (r < 0) {
+            continue;
+        }
+        const double t = (p[k] - q[k]) / lattice->period[k];
+        const double whole = rint(t), rest = t - whole;
+        const int    n = list->n;
+        for (int e = 0; e < n; e++) {
+            list->shift[e][r] = (int8_t)whole;
+            if (fabs(rest) > 0.5 - HALF_SLACK) {
+                memcpy(list->shift[list->n], list->shift[e], sizeof list->shift[e]);
+                list->shift[list->n++][r] = (int8_t)(whole + (rest < 0.0 ? -1.0 : 1.0));
+            }
+        }
+    }
+}
+
+/* Wraps a point as given; turns over B. Coordinates at right angles to all rows are left out. */
+static bool
+wrap(const hs_image_box *box, const double *x, double *inside, int64_t *turns, double *magnitude)
+{
+    const hs_lattice *lattice = &box->lattice;
+    double            scaled[HS_MAX_DIM];
+    for (int k = 0; k < lattice->ndim; k++) {
+        const int r = lattice->row_of_axis[k];
+        scaled[k] = hs_scale_apply(box->scale, x[k]);
+        if (lattice->aligned && r >= 0) {
+            inside[k] = hs_wrap_axis(scaled[k], lattice->period[k], &turns[r]);
+            if (turns[r] == HS_WRAP_UNKNOWN) {
+                return false;
+            }
+        }
+        scaled[k] = box->is_spanned[k] ? scaled[k] : 0.0;
+        if (!(fabs(scaled[k]) <= MOST_SCALED)) {
+            return false;
+        }
+    }
+    return lattice->aligned || hs_wrap_point(lattice, scaled, inside, turns, magnitude);
+}
+
+static bool
+is_less(const int64_t *one, const int64_t *other, int n)
+{
+    int l = 0;
+    while (l < n - 1 && one[l] == other[l]) {
+        l++;
+    }
+    return one[l] < other[l];
+}
+
+/* S of image e; false when it passes 2^62. */
+static bool
+shift_of(const image_list *list, int e, const int64_t *from, int64_t *shift)
+{
+    const hs_lattice *lattice = &list->box->lattice;
+    int64_t           over[HS_MAX_DIM];
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        const int row = list->box->order[r];
+        over[row] = from[row] + list->shift[e][r];
+    }
+    return hs_lattice_shift(lattice, over, shift);
+}
+
+hs_status
+hs_near_image(const hs_image_box *box, const double *p, const double *q, int64_t *shift)
+{
+    const int  m = box->lattice.n_periodic;
+    image_list list;
+    double     inside[2][HS_MAX_DIM], magnitude = 0.0;
+    int64_t    turns[2][HS_MAX_DIM];
+    list.box = box;
+    if (!wrap(box, p, inside[0], turns[0], &magnitude) ||
+        !wrap(box, q, inside[1], turns[1], &magnitude)) {
+        return HS_ERR_SHIFT_RANGE;
+    }
+    hs_status status = HS_OK;
+    if (box->lattice.aligned) {
+        find_along_axes(&list, inside[0], inside[1]);
+    } else {
+        status = find_images(&list, inside[0], inside[1], magnitude);
+    }
+    for (int r = 0; r < m; r++) {
+        turns[0][r] -= turns[1][r];
+    }
+    for (int e = 0; status == HS_OK && e < list.n; e++) {
+        int64_t   other[HS_MAX_DIM];
+        hs_stages stages = {0};
+        if (!shift_of(&list, e, turns[0], other)) {
+            return HS_ERR_SHIFT_RANGE;
+        }
+        const hs_span spans[2] = {{p, q, shift}, {p, q, other}};
+        const int sign = e > 0 ? hs_metric_compare(&box->metric, &spans[0], &spans[1], &stages) : 1;
+        if (sign > 0 || (sign == 0 && is_less(other, shift, m))) {
+            memcpy(shift, other, (size_t)m * sizeof *shift);
+        }
+    }
+    return status;
 }

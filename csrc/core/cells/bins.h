@@ -1,13 +1,16 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_CELLS_BINS_H
+#define HS_CELLS_BINS_H
+
+#include "../threads/call.h"
+#include "grid.h"
+
+#include <string.h>
+
 /*
  * bins.h: the points in cell order. Point number si here is order[si] in the caller's array; cell c
  * holds si in [start[c], start[c + 1]), in ascending order of the caller's numbers.
  */
-#ifndef HS_BINS_H
-#define HS_BINS_H
-
-#include "../threads/team.h"
-#include "grid.h"
 
 typedef struct hs_bins {
     int64_t  n;
@@ -49,5 +52,132 @@ void hs_bins_free(hs_account *account, hs_bins *bins);
  *
  * so that this takes room for one column and no more.
  */
+
+/*
+ * Cells as wide as the search wants them, however far the points reach. Such a grid
+ * has no array over its cells: only the occupied ones are stored.
+ */
+
+/* Cells per row's width along the first axis: short cells make tight windows and cost no rows. */
+#define HS_SPARSE_SPLIT 4
+/* Places nearer to 0 than this are numbered one by one; beyond it their 49 leading bits are. */
+#define HS_SPARSE_LINEAR 0x1p49
+
+/*
+ * The grid of a scene with rows of cells `width` ranges wide (a power of two from 1 on) and cells
+ * of width / HS_SPARSE_SPLIT along the first axis, however many these are; range, shift_error and
+ * expected_pairs are those of `dense`. stride is 0, and n_cells is 0 until hs_sparse_build has
+ * counted the occupied cells.
+ */
+void hs_sparse_grid(const hs_scene *scene, const hs_grid *dense, double width, hs_grid *grid);
+
+/* Number of the cell that a place is in: of places (multiples of the cell's width) below
+ * HS_SPARSE_LINEAR their floor; beyond it cells widen as the numbers themselves do. */
+HS_ALWAYS_INLINE int64_t
+hs_sparse_number(double place)
+{
+    if (place < HS_SPARSE_LINEAR && place > -HS_SPARSE_LINEAR) {
+        const int64_t whole = (int64_t)place;
+        return whole - (place < (double)whole);
+    }
+    const double  first = HS_SPARSE_LINEAR, size = place < 0.0 ? -place : place;
+    const int64_t beyond = (int64_t)(hs_bits_of_double(size) - hs_bits_of_double(first));
+    const int64_t number = (int64_t)first + (beyond >> 4); /* 48 of 52 fraction bits are left */
+    return place < 0.0 ? -1 - number : number;
+}
+
+/* Cell index along axis k, in 0 ... shape - 1; points beyond the grid count as on its faces. */
+HS_ALWAYS_INLINE int64_t
+hs_sparse_index(const hs_grid *grid, int k, double t)
+{
+    const double  place = (t - grid->lower[k]) * grid->cells_per_length[k];
+    const int64_t index = hs_sparse_number(place) - grid->skipped[k];
+    const int64_t last = grid->shape[k] - 1;
+    return index < 0 ? 0 : index < last ? index : last;
+}
+
+/*
+ * Whether storing occupied cells only is quicker than the grid `dense`: 0 if not, else the `width`
+ * for hs_sparse_grid. A judgement from the scene alone; costs nothing where the dense grid has the
+ * cells it wants, some microseconds where it has not, and more only where points crowd.
+ */
+double hs_sparse_choose(const hs_scene *scene, const hs_grid *dense);
+
+/* The `width` for hs_sparse_grid that is expected to be quickest, for a scene of any number of
+ * points. dense: any grid of it. */
+double hs_sparse_width(const hs_scene *scene, const hs_grid *dense);
+
+/*
+ * The occupied cells of a sparse grid, in rows. A row is a line of cells along the
+ * first axis; rows are sorted by their indices (the last axis slowest), the cells of a row by
+ * theirs, so that cost and memory follow the points and nothing follows the volume. Nothing is
+ * hashed: targets of neighbouring rows come in nearly ascending order, so that a hint finds them in
+ * O(1), and no input makes a search slower than O(log n).
+ *
+ * How to walk (hs_sparse_grid, hs_stencil_build and hs_sparse_build first):
+ *
+ *     for each row
+ *         for each row of the stencil, with a hint of its own that starts at 0
+ *             target = index of the row + offset; along periodic axes wrapped into 0 ... shape - 1,
+ *             which gives image and shift as in a dense grid
+ *             hs_sparse_find_row(target, &hint); if there is one: a link, with a cursor of its own
+ *         for each group of the row (hs_sparse_next_group)
+ *             for each link
+ *                 window of cells: group.x_first + link.first ... group.x_last + link.last; along a
+ *                 periodic first axis cut into turns of `shape` cells, a cursor for each turn
+ *                 or a fresh one
+ *                 hs_sparse_window: points [first, end); in the own row and image 0 from
+ *                 group.first on, where each point meets only those that follow it
+ *
+ * Each pair is met once: a group may see cells that are too far from some of its points, but always
+ * along the row offset by which they see each other, and only forward (grid.h).
+ */
+
+typedef struct hs_sparse {
+    int            ndim;
+    int64_t        n_rows;
+    int64_t        n_cells;    /* occupied ones */
+    int64_t       *row_index;  /* owned; (ndim - 1) per row: its index along axes 1, 2 ... */
+    int32_t       *row_cell;   /* owned; n_rows + 1: its first cell */
+    int64_t       *cell_x;     /* owned; index of each cell along the first axis */
+    const int32_t *cell_start; /* bins->start: n_cells + 1, each cell's first point */
+} hs_sparse;
+
+/* Cells where the last window of a link began and ended. Any will do at first, as {0, 0}. */
+typedef struct hs_sparse_cursor {
+    int32_t low, high;
+} hs_sparse_cursor;
+
+/* Consecutive points of a row, at most one range long. */
+typedef struct hs_sparse_group {
+    int32_t first, last;     /* points [first, last) */
+    int64_t x_first, x_last; /* indices of the cells that the first and the last are in */
+    int32_t cell;            /* where the last one is */
+} hs_sparse_group;
+
+/*
+ * Sorts the points by row, cell and the caller's number, polling now and then; takes the scene's
+ * arrays over or frees them, as hs_bins_build does. bins->start counts the occupied cells and
+ * grid->n_cells is their number. On failure neither holds anything. grid: from hs_sparse_grid.
+ */
+hs_status hs_sparse_build(hs_account *account, hs_team *team, const hs_options *options,
+                          hs_scene *scene, hs_grid *grid, hs_sparse *sparse, hs_bins *bins);
+
+/* The row with these indices (index[0] is not read), or -1. *hint: a row to start from, any in
+ * 0 ... n_rows; receives where the row is or would be. */
+int64_t hs_sparse_find_row(const hs_sparse *sparse, const int64_t *index, int64_t *hint);
+
+/* Points [*first, *end) of the row whose index along the first axis is in [x_first, x_last]. */
+void hs_sparse_window(const hs_sparse *sparse, int64_t row, int64_t x_first, int64_t x_last,
+                      hs_sparse_cursor *cursor, int32_t *first, int32_t *end);
+
+/* Before the first group of a row. */
+void hs_sparse_first_group(const hs_sparse *sparse, int64_t row, hs_sparse_group *group);
+
+/* The next group, of at most `most` points; false after the row's last. */
+bool hs_sparse_next_group(const hs_sparse *sparse, int64_t row, int32_t most,
+                          hs_sparse_group *group);
+
+void hs_sparse_free(hs_account *account, hs_sparse *sparse);
 
 #endif

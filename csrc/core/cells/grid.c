@@ -1,16 +1,221 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#include "grid.h"
+#include "../exact/arithmetic.h"
+#include "../base/os.h"
+#include "../base/status.h"
+
+#include <math.h>
+#include <string.h>
+
+/*
+ * Boxes are often whole multiples of the cutoff. There is no room for rounding then,
+ * so points are told apart by the faces between cells, which are numbers: two points with `part`
+ * whole cells between their cells are more than the radius apart, also across a periodic face
+ * unless one lies on it.
+ */
+
+/* Is every cell along axis k at least `least` wide, in the real numbers that its faces are? */
+static bool
+faces_hold(const hs_scene *scene, const hs_grid *grid, int k, double least)
+{
+    double from = scene->lower[k]; /* where cell 0 begins */
+    for (int64_t cell = 0; cell < grid->shape[k]; cell++) {
+        const double to = cell + 1 < grid->shape[k] ? hs_grid_face(grid, k, (double)(cell + 1))
+                                                    : scene->upper[k];
+        const hs_dw  width = hs_two_difference(to, from);
+        if (!(width.hi > least || (width.hi == least && width.lo >= 0.0))) {
+            return false;
+        }
+        from = to;
+    }
+    return true;
+}
+
+/* Does a point lie on the far face? There the last cell is closed, not half open. */
+static bool
+touches_end(const hs_scene *scene, int k)
+{
+    const double *x = scene->cloud.x[k], end = scene->upper[k];
+    int           any = 0;
+    for (int64_t i = 0; i < scene->n; i++) {
+        any |= x[i] >= end;
+    }
+    return any != 0;
+}
+
+void
+hs_grid_cut_by_faces(const hs_scene *scene, const double *parts, double cap, hs_grid *grid)
+{
+    double cells = (double)grid->n_cells;
+    for (int k = 0; k < scene->ndim; k++) {
+        const double extent = scene->upper[k] - scene->lower[k];
+        const double along = hs_scene_radius_along(scene, k);
+        const double part = along / parts[k]; /* exact but for thirds */
+        const double least = parts[k] == 3.0 ? hs_next_up(part) : part;
+        const double count = (double)grid->shape[k] + 1.0;
+        const double reach = hs_larger(fabs(scene->lower[k]), fabs(scene->upper[k]));
+        if (scene->t_error[k] != 0.0 || reach > 16.0 * extent || count < 4.0 || !(least > 0.0) ||
+            !(least * count <= extent * (1.0 + HS_GRID_SLACK)) || count > HS_GRID_CELLS_PER_AXIS) {
+            continue;
+        }
+        const double  more = cells / (count - 1.0) * count;
+        const hs_grid before = *grid;
+        grid->shape[k] = (int64_t)count;
+        grid->cell_size[k] = extent / count;
+        grid->cells_per_length[k] = count / extent;
+        grid->reach[k] = (int64_t)parts[k];
+        grid->by_faces[k] = more <= cap && faces_hold(scene, grid, k, least) &&
+                            (scene->lattice.row_of_axis[k] < 0 || !touches_end(scene, k));
+        if (grid->by_faces[k]) {
+            cells = more;
+        } else {
+            *grid = before;
+        }
+    }
+    grid->n_cells = 1;
+    for (int k = 0; k < scene->ndim; k++) {
+        grid->stride[k] = grid->n_cells;
+        grid->n_cells *= grid->shape[k];
+    }
+}
+
+/* How many cells there are along each axis, unless the caller sets their width
+ *. Any cells find all pairs: what is chosen here is speed alone. */
+
+/* Cells of a grid: their ids are uint32. */
+#define MOST_CELLS 4294967295.0
+/* Points that a cell along the first axis should hold, if that makes it a quarter of the range or
+ * more; walks put cells together where these are fewer. */
+#define POINTS_PER_CELL 12.0
+/* Where cells are wider than need be, rows of few cells hold so many points at least: there is
+ * nothing to put together along them. */
+#define FEW_CELLS      4.0
+#define POINTS_PER_ROW 8.0
+/* Where many cells are wider than need be: how many times shorter they are made along the first
+ * axis at most, and along how many rows they then lie at least, on each other axis. Clusters of
+ * 300 points gain a quarter with 4 to 30; uniform scenes lose with more than 16. */
+#define SHORTER     16.0
+#define ROWS_ACROSS 10.0
+
+/* The least width of cells along axis k of which `parts` shall reach as far as the range. */
+static double
+pitch_of(const hs_grid *grid, int k, double parts)
+{
+    return grid->range[k] * (1.0 + 0x1p-20) / parts;
+}
+
+void
+hs_grid_choose_counts(const hs_scene *scene, const hs_grid *grid, int finer, double density,
+                      double *counts, double *parts)
+{
+    double area = 1.0; /* of one row's cross-section */
+    for (int k = scene->ndim - 1; k >= 0; k--) {
+        const double extent = scene->upper[k] - scene->lower[k];
+        parts[k] = finer;
+        if (k == 0 && scene->ndim > 1) {
+            /* A whole fraction of the range: otherwise windows are longer than need be. */
+            const double points = density * area * grid->range[0];
+            parts[k] = fmin(fmax(nearbyint(points / POINTS_PER_CELL), 1.0), 4.0);
+        }
+        const double pitch = pitch_of(grid, k, parts[k]);
+        counts[k] = 1.0;
+        if (extent > pitch) { /* never for a zero extent, also with cutoff 0 */
+            counts[k] = floor(fmin(extent / pitch, HS_GRID_CELLS_PER_AXIS));
+        }
+        area *= fmax(extent, grid->range[k]) / counts[k]; /* flat scenes count as this thick */
+    }
+}
+
+double
+hs_grid_most_cells(const hs_scene *scene)
+{
+    return fmin(2.0 * (double)scene->n + HS_GRID_SPARE_CELLS, MOST_CELLS);
+}
+
+/* Fewer cells, evenly over the axes, until there are no more than `cap`. Returns whether it had
+ * to. */
+static bool
+cap_counts(int ndim, double cap, double *counts)
+{
+    for (bool capped = false;;) {
+        double product = 1.0;
+        int    divided = 0;
+        for (int k = 0; k < ndim; k++) {
+            product *= counts[k];
+            divided += counts[k] > 1.0;
+        }
+        if (product <= cap) {
+            return capped;
+        }
+        capped = true;
+        const double factor = pow(cap / product, 1.0 / divided);
+        for (int k = 0; k < ndim; k++) {
+            /* Always at least one less, so that this ends. */
+            counts[k] = fmax(1.0, floor(fmin(counts[k] * factor, counts[k] - 1.0)));
+        }
+    }
+}
+
+bool
+hs_grid_cap_counts(const hs_scene *scene, double *counts)
+{
+    return cap_counts(scene->ndim, hs_grid_most_cells(scene), counts);
+}
+
+/*
+ * For counts that were capped, so that cells are wider than the range: cells become shorter along
+ * the first axis, where a walk passes over them one after the other, and wider along the others, in
+ * about the same number. Points of a group are then closer together, and meet fewer candidates,
+ * where points are in clusters. Not where an axis has hardly more than ROWS_ACROSS.
+ */
+static void
+shorten_cells(const hs_scene *scene, const hs_grid *grid, double *counts)
+{
+    const double extent = scene->upper[0] - scene->lower[0]; /* not 0: there are several cells */
+    const double most = fmin(SHORTER * counts[0], floor(extent / pitch_of(grid, 0, 1.0)));
+    double       across = INFINITY, product = counts[0];
+    int          n_others = 0;
+    for (int k = 1; k < scene->ndim; k++) {
+        across = counts[k] > 1.0 ? fmin(across, counts[k]) : across;
+        product *= counts[k];
+        n_others += counts[k] > 1.0;
+    }
+    /* Infinite with one axis, or with cutoff 0: then the other bound counts, or there is no
+     * other. */
+    const double times = fmin(most / counts[0], pow(across / ROWS_ACROSS, (double)n_others));
+    if (n_others == 0 || !(times > 1.0)) {
+        return;
+    }
+    for (int k = 1; k < scene->ndim; k++) {
+        if (counts[k] > 1.0) {
+            counts[k] = fmax(ROWS_ACROSS, floor(counts[k] * pow(times, -1.0 / n_others)));
+            product /= counts[k];
+        }
+    }
+    counts[0] = fmin(floor(product), most);
+}
+
+bool
+hs_grid_fit_counts(const hs_scene *scene, const hs_grid *grid, double *counts)
+{
+    const bool capped = hs_grid_cap_counts(scene, counts);
+    if (capped && counts[0] < FEW_CELLS) {
+        const double rows = fmax((double)scene->n / POINTS_PER_ROW, 1.0);
+        (void)cap_counts(scene->ndim, counts[0] * rows, counts);
+    } else if (capped) {
+        shorten_cells(scene, grid, counts);
+    }
+    return capped;
+}
+
 /*
  * grid.c: how far apart the coordinates of a pair can be, then one cell or several, whichever makes
- * a search cheaper; grid_counts.c says how many.
+ * a search cheaper; grid.c says how many.
  *
  * Why no pair is lost: rounding is monotone, so cell indices are a monotone function of t; `range`
  * bounds how far apart the computed coordinates of a pair can be, every rounding and the whole
  * effect of inexact normals included; and `reach` is that range in cells, rounded up.
  */
-#include "grid.h"
-
-#include <math.h>
-#include <string.h>
 
 #define UNIT                0x1p-53
 #define SLACK               HS_GRID_SLACK
@@ -196,7 +401,7 @@ choose_shape(const hs_scene *scene, hs_grid_kind kind, double density, double ne
     }
     const hs_grid single = *grid;
     /* Narrower rows cost more rows to visit, and leave out candidates that else are gathered first
-     * (form.h). */
+     * (scan.h). */
     const int finer = neighbours < 600.0 ? 1 : neighbours < 3000.0 ? 2 : 3;
     hs_grid_choose_counts(scene, grid, finer, density, counts, parts);
     const bool capped = hs_grid_fit_counts(scene, grid, counts);
@@ -323,4 +528,371 @@ hs_grid_narrow(const hs_scene *scene, bool is_sparse, double cutoff_before, hs_g
         grid->expected_pairs *= ratio;
     }
     return status;
+}
+
+/*
+ * Counts through the offsets of rows and drops those that are out of reach.
+ *
+ * How far a neighbour can be along the first axis depends on the row: in a frame in which the
+ * directions of the grid axes are lower triangular, the offsets along the later axes bound some
+ * components of D from below, and what is left of the radius bounds the first. In aligned boxes
+ * this is the circle of cells around a point.
+ */
+
+#define DUALITY_DEFECT 1e-9   /* normals and directions further from dual than this are not used */
+#define FIRST_CAPACITY 1024   /* rows; doubled as needed: of many, most are out of reach */
+#define MOST_UNPRUNED  0x1p22 /* rows, in a box too flat to tell which of them are out of reach */
+#define POLL_ROWS      (1 << 16)
+#define FRAME_SLACK    1e-6 /* relative; covers the defect in 8 dimensions many times */
+
+typedef struct frame {
+    bool   usable;
+    bool   diagonal;                      /* no entry but lower[k][k] differs from zero */
+    double lower[HS_MAX_DIM][HS_MAX_DIM]; /* direction k = sum_{c <= k} lower[k][c] q_c */
+} frame;
+
+/* What add_rows needs beside the stencil. */
+typedef struct scope {
+    const hs_scene *scene;
+    const hs_grid  *grid;
+    frame           axes;
+} scope;
+
+/* Is v = sum_k (normal_k . v) direction_k, for every v? */
+static bool
+axes_are_dual(const hs_lattice *lattice)
+{
+    for (int a = 0; a < lattice->ndim; a++) {
+        for (int b = 0; b < lattice->ndim; b++) {
+            double sum = a == b ? -1.0 : 0.0;
+            for (int k = 0; k < lattice->ndim; k++) {
+                sum += lattice->normal[k][a] * lattice->direction[k][b];
+            }
+            if (!(fabs(sum) <= DUALITY_DEFECT)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* The frame of an aligned lattice: its directions are the coordinate axes. */
+static void
+set_unit_frame(int ndim, frame *axes)
+{
+    axes->usable = axes->diagonal = true;
+    for (int k = 0; k < ndim; k++) {
+        for (int c = 0; c <= k; c++) {
+            axes->lower[k][c] = k == c ? 1.0 : 0.0;
+        }
+    }
+}
+
+/* Gram-Schmidt on the directions, first axis first; checked, not trusted. */
+static void
+set_triangular_frame(const hs_lattice *lattice, frame *axes)
+{
+    double    q[HS_MAX_DIM][HS_MAX_DIM];
+    const int d = lattice->ndim;
+    axes->usable = axes_are_dual(lattice);
+    axes->diagonal = false;
+    for (int k = 0; k < d; k++) {
+        memcpy(q[k], lattice->direction[k], sizeof q[k]);
+        memset(axes->lower[k], 0, (size_t)d * sizeof(double));
+        for (int pass = 0; pass < 2; pass++) {
+            for (int c = 0; c < k; c++) {
+                double along = 0.0;
+                for (int a = 0; a < d; a++) {
+                    along += q[k][a] * q[c][a];
+                }
+                for (int a = 0; a < d; a++) {
+                    q[k][a] -= along * q[c][a];
+                }
+                axes->lower[k][c] += along;
+            }
+        }
+        double square = 0.0;
+        for (int a = 0; a < d; a++) {
+            square += q[k][a] * q[k][a];
+        }
+        axes->lower[k][k] = sqrt(square);
+        if (!(axes->lower[k][k] > 1e-3)) {
+            axes->usable = false; /* nearly flat: the frame would be all rounding */
+            return;
+        }
+        for (int a = 0; a < d; a++) {
+            q[k][a] /= axes->lower[k][k];
+        }
+    }
+}
+
+/* How far the difference of two cell indices, as a length, can be from that of the true t. */
+static double
+slack_along(const hs_scene *scene, const hs_grid *grid, int k)
+{
+    const double extent = grid->cell_size[k] * (double)grid->shape[k];
+    return (grid->range[k] - hs_scene_radius_along(scene, k)) + FRAME_SLACK * scene->radius +
+           0x1p-50 * extent;
+}
+
+/* Differences of t_k along the later axes, as far as the radius lets them go. */
+typedef struct spans {
+    double low[HS_MAX_DIM], high[HS_MAX_DIM];
+} spans;
+
+/* Sets the differences that points of the cells at `offset` can have, rounding included. */
+static void
+set_spans(const hs_scene *scene, const hs_grid *grid, const int32_t *offset, spans *t)
+{
+    for (int k = 1; k < grid->ndim; k++) {
+        const double slack = slack_along(scene, grid, k);
+        const double radius = hs_scene_radius_along(scene, k) * (1.0 + FRAME_SLACK);
+        t->low[k] = hs_larger((offset[k] - 1) * grid->cell_size[k] - slack, -radius - slack);
+        t->high[k] = hs_smaller((offset[k] + 1) * grid->cell_size[k] + slack, radius + slack);
+    }
+}
+
+/* Finds the range of component c of D; of the first one, what the later axes add to it. */
+static void
+range_of_component(const frame *axes, const spans *t, int ndim, int c, double *least, double *most)
+{
+    const int last = axes->diagonal ? c : ndim - 1;
+    *least = *most = 0.0;
+    for (int k = c > 0 ? c : 1; k <= last; k++) {
+        const double a = axes->lower[k][c] * t->low[k], b = axes->lower[k][c] * t->high[k];
+        *least += hs_smaller(a, b);
+        *most += hs_larger(a, b);
+    }
+}
+
+/* Narrows the range of t_0 in which points of the row at `offset` can be within the radius. Returns
+ * false when none can. */
+static bool
+narrow_by_frame(const hs_scene *scene, const hs_grid *grid, const frame *axes,
+                const int32_t *offset, double *low, double *high)
+{
+    const double radius = scene->radius * (1.0 + FRAME_SLACK);
+    const double unit = radius > 0.0 ? radius : 1.0; /* squares of tiny lengths would vanish */
+    double       left = radius > 0.0 ? 1.0 : 0.0; /* of the square, for the components still open */
+    double       least, most;
+    spans        t;
+    set_spans(scene, grid, offset, &t);
+    for (int c = grid->ndim - 1; c >= 1; c--) {
+        range_of_component(axes, &t, grid->ndim, c, &least, &most);
+        const double gap = hs_larger(hs_larger(least, -most), 0.0) / unit;
+        left -= gap * gap;
+        if (left < 0.0) {
+            return false;
+        }
+    }
+    range_of_component(axes, &t, grid->ndim, 0, &least, &most);
+    const double rest = sqrt(left) * unit;
+    const double slack = slack_along(scene, grid, 0);
+    *low = hs_larger((-rest - most) / axes->lower[0][0] - slack, *low);
+    *high = hs_smaller((rest - least) / axes->lower[0][0] + slack, *high);
+    return true;
+}
+
+/*
+ * Cells of the row at `offset` that a pair within the radius can reach. Returns false when there
+ * are none.
+ */
+static bool
+reach_along_row(const hs_scene *scene, const hs_grid *grid, const frame *axes, hs_stencil_row *row)
+{
+    double low = -grid->range[0], high = grid->range[0];
+    if (axes->usable && grid->ndim > 1 &&
+        !narrow_by_frame(scene, grid, axes, row->offset, &low, &high)) {
+        return false;
+    }
+    const double cells = grid->cells_per_length[0];
+    const double reach = (double)grid->reach[0];
+    const double first = hs_larger(ceil(low * cells - 1.0 - 1e-5), -reach);
+    const double last = hs_smaller(floor(high * cells + 1.0 + 1e-5), reach);
+    if (!(first <= last)) { /* they may be beyond any integer */
+        return false;
+    }
+    row->first = (int32_t)first;
+    row->last = (int32_t)last;
+    return true;
+}
+
+/* The next offset in the order of the axes, the last axis slowest; false after the last one. */
+static bool
+advance(const hs_grid *grid, int32_t *offset)
+{
+    for (int k = 1; k < grid->ndim; k++) {
+        if (offset[k] < grid->reach[k]) {
+            offset[k]++;
+            return true;
+        }
+        offset[k] = (int32_t)-grid->reach[k];
+    }
+    return false;
+}
+
+double
+hs_stencil_bound(const hs_grid *grid)
+{
+    double rows = 1.0;
+    for (int k = 1; k < grid->ndim; k++) {
+        rows *= 2.0 * (double)grid->reach[k] + 1.0;
+    }
+    return 0.5 * (rows + 1.0);
+}
+
+double
+hs_stencil_bytes(const hs_grid *grid, bool is_full)
+{
+    /* Along axes on which only the next cells are in reach these always are; in the space of the
+     * others rows in reach fill a ball, or an ellipsoid, of which this is the share of the box. */
+    static const double share[HS_MAX_DIM] = {1.0, 1.0, 0.785, 0.523, 0.308, 0.164, 0.080, 0.036};
+    double              rows = is_full ? 1.0 : 0.5;
+    int                 m = 0;
+    for (int k = 1; k < grid->ndim; k++) {
+        const double reach = (double)grid->reach[k];
+        rows *= reach > 1.0 ? 2.0 * reach : 2.0 * reach + 1.0;
+        m += reach > 1.0;
+    }
+    return 0.9 * share[m] * rows * (double)sizeof(hs_stencil_row); /* balls of cells are uneven */
+}
+
+/* Twice the room; on failure the stencil is freed. */
+static bool
+grow(hs_account *account, int64_t *capacity, hs_stencil *stencil)
+{
+    hs_stencil_row *more = hs_grow(account, HS_FOR_STENCIL, stencil->rows, stencil->n_rows,
+                                   2 * *capacity, sizeof(hs_stencil_row));
+    if (more == NULL) {
+        hs_stencil_free(account, stencil);
+        return false;
+    }
+    stencil->rows = more;
+    *capacity *= 2;
+    return true;
+}
+
+/* Adds the rows from this one to the last in the order of the axes, as far as they are in reach. */
+static hs_status
+add_rows(hs_account *account, const hs_options *options, const scope *of, hs_stencil_row *row,
+         hs_stencil *stencil, int64_t capacity)
+{
+    int64_t tried = 0;
+    do {
+        if (++tried % POLL_ROWS == 0 && hs_poll(options, 0.0) != HS_OK) {
+            hs_stencil_free(account, stencil);
+            return HS_ERR_INTERRUPTED;
+        }
+        if (stencil->n_rows == capacity && !grow(account, &capacity, stencil)) {
+            return HS_ERR_MEMORY;
+        }
+        if (reach_along_row(of->scene, of->grid, &of->axes, row)) {
+            stencil->rows[stencil->n_rows++] = *row;
+        }
+    } while (advance(of->grid, row->offset));
+    return HS_OK;
+}
+
+hs_status
+hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene *scene,
+                 const hs_grid *grid, bool is_full, hs_stencil *stencil)
+{
+    const double bound = hs_stencil_bound(grid) * (is_full ? 2.0 : 1.0);
+    scope        of;
+    of.scene = scene;
+    of.grid = grid;
+    of.axes.usable = false; /* the own row alone needs none */
+    *stencil = (hs_stencil){0};
+    if (bound > 1.0 && scene->lattice.aligned) {
+        set_unit_frame(grid->ndim, &of.axes);
+    } else if (bound > 1.0) {
+        set_triangular_frame(&scene->lattice, &of.axes);
+    }
+    if (bound > (of.axes.usable ? (double)INT32_MAX : MOST_UNPRUNED)) {
+        return hs_skew_or_memory(&scene->lattice);
+    }
+    if (scene->lattice.aligned && bound > FIRST_CAPACITY &&
+        !hs_account_allows(account, hs_stencil_bytes(grid, is_full))) {
+        return HS_ERR_MEMORY; /* refused now, not after as much has been written */
+    }
+    const int64_t capacity = (int64_t)hs_smaller(bound, FIRST_CAPACITY);
+    stencil->rows = hs_alloc(account, HS_FOR_STENCIL, capacity, sizeof(hs_stencil_row));
+    if (stencil->rows == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    hs_stencil_row row = {{0}, 0, 0};
+    if (is_full) {
+        for (int k = 1; k < grid->ndim; k++) {
+            row.offset[k] = (int32_t)-grid->reach[k];
+        }
+        return add_rows(account, options, &of, &row, stencil, capacity);
+    }
+    (void)reach_along_row(scene, grid, &of.axes, &row);
+    row.first = 0; /* in the own row only what lies ahead */
+    row.last = row.last > 0 ? row.last : 0;
+    stencil->rows[stencil->n_rows++] = row;
+    /* From the zero offset on, counting up visits exactly the forward half. */
+    return advance(grid, row.offset) ? add_rows(account, options, &of, &row, stencil, capacity)
+                                     : HS_OK;
+}
+
+void
+hs_stencil_free(hs_account *account, hs_stencil *stencil)
+{
+    hs_free(account, stencil->rows);
+    stencil->rows = NULL;
+}
+
+/* Cells of a width that the caller chooses. Any cells find all pairs, for their reach
+ * follows from their width: only layout and speed are the caller's. */
+
+/* Rows around a cell, the forward half of them, at most: each takes room, and a look for each group
+ * of points. In eight dimensions the nearest ones alone are half of 3^7 = 2187. */
+#define MOST_ROWS 2048.0
+
+/* Where the range is a whole number of cells it would reach one cell further, for it is a little
+ * more than the cutoff: such cells are as much wider. */
+static double
+wide_enough(double range, double width)
+{
+    const double parts = fmax(nearbyint(range / width), 1.0);
+    const double part = range * (1.0 + 0x1p-20) / parts;
+    return part > width && part <= width * (1.0 + 0x1p-18) ? part : width;
+}
+
+/* Returns whether any axis had more than one. */
+static bool
+halve_counts(int ndim, double *counts)
+{
+    bool any = false;
+    for (int k = 0; k < ndim; k++) {
+        any = any || counts[k] > 1.0;
+        counts[k] = fmax(floor(0.5 * counts[k]), 1.0);
+    }
+    return any;
+}
+
+hs_status
+hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_wider,
+                  hs_failure *failure)
+{
+    double          counts[HS_MAX_DIM], density;
+    const hs_status status = hs_grid_begin(scene, &density, grid, failure);
+    if (status != HS_OK) {
+        return status;
+    }
+    for (int k = 0; k < scene->ndim; k++) {
+        const double extent = scene->upper[k] - scene->lower[k];
+        const double pitch = wide_enough(grid->range[k], width);
+        /* Not for a zero extent, also with a width that scaling brought to zero. */
+        counts[k] = extent > pitch ? floor(fmin(extent / pitch, HS_GRID_CELLS_PER_AXIS)) : 1.0;
+    }
+    *is_wider = hs_grid_cap_counts(scene, counts);
+    while (hs_grid_set_shape(scene, counts, grid) != HS_OK || hs_stencil_bound(grid) > MOST_ROWS) {
+        *is_wider = true;
+        if (!halve_counts(scene->ndim, counts)) {
+            return HS_TOO_MUCH;
+        }
+    }
+    return HS_OK;
 }

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_CELLS_GRID_H
+#define HS_CELLS_GRID_H
+
+#include "../scene/scene.h"
+
 /*
  * grid.h: cells. How many along each grid axis, which one a point is in, and how many cells away a
  * neighbour can be. The number of cells follows the number of points, never the volume.
  */
-#ifndef HS_GRID_H
-#define HS_GRID_H
-
-#include "../scene/scene.h"
 
 typedef struct hs_grid {
     int     ndim;
@@ -41,7 +42,7 @@ hs_status hs_grid_init_kind(const hs_scene *scene, hs_grid_kind kind, hs_grid *g
 /*
  * Cells that are at least `width` wide, whatever that costs; wider ones, with *is_wider set, where
  * there would be too many of them, or too many around each. HS_TOO_MUCH where no grid will do. In
- * grid_width.c.
+ * grid.c.
  */
 hs_status hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_wider,
                             hs_failure *failure);
@@ -51,7 +52,7 @@ hs_status hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, 
 hs_status hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure *failure);
 
 /*
- * How many cells along each axis, in grid_counts.c. hs_grid_choose_counts: those that make a search
+ * How many cells along each axis. hs_grid_choose_counts: those that make a search
  * quickest, `finer` of them to a range; along the first axis so many that a cell holds some twelve
  * points of this density. Fills parts[k], the cells to a range along axis k. hs_grid_cap_counts:
  * fewer, evenly over the axes, until there are no more than hs_grid_most_cells, which is in
@@ -72,7 +73,7 @@ hs_status hs_grid_set_shape(const hs_scene *scene, const double *counts, hs_grid
 hs_status hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *grid);
 
 /* Tries one cell more along each axis, each a whole part of the radius wide (one of parts[k]) and
- * no wider. Not for scenes with queries: only the points are looked at. In grid_faces.c. */
+ * no wider. Not for scenes with queries: only the points are looked at. */
 void hs_grid_cut_by_faces(const hs_scene *scene, const double *parts, double cap, hs_grid *grid);
 
 /* The cells of `grid`, not cut by faces, for a scene whose cutoff was `cutoff_before` and is
@@ -110,5 +111,38 @@ hs_grid_index(const hs_grid *grid, int k, double t)
     cell -= by_faces && cell > 0 && t < hs_grid_face(grid, k, (double)cell);
     return cell;
 }
+
+/*
+ * The forward half of the neighbouring rows of cells. A row is a line of cells along the
+ * first grid axis. With the offset of j's cell from i's counted over images, each pair of cells
+ * occurs once as a forward offset and once as its opposite, so following the forward ones only
+ * visits each pair of points once, in boxes of any size, without comparing indices.
+ */
+
+/* Neighbouring row; offset[k] for axes k >= 1 (offset[0] unused). Cells from x + first to x + last
+ * of that row can hold neighbours of points in cell x. */
+typedef struct hs_stencil_row {
+    int32_t offset[HS_MAX_DIM];
+    int32_t first, last;
+} hs_stencil_row;
+
+typedef struct hs_stencil {
+    hs_stencil_row *rows; /* owned; rows[0] is the own row, with first = 0 unless full */
+    int64_t         n_rows;
+} hs_stencil;
+
+/* Polls now and then. HS_ERR_MEMORY or HS_ERR_BOX_SKEWED when the rows do not fit. is_full: the
+ * backward half as well, for points that meet all their neighbours. */
+hs_status hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene *scene,
+                           const hs_grid *grid, bool is_full, hs_stencil *stencil);
+
+/* Number of rows that hs_stencil_build would look at, before it drops those out of reach. */
+double hs_stencil_bound(const hs_grid *grid);
+
+/* Bytes that the rows take at least, in boxes along the coordinate axes; elsewhere about so
+ * many. */
+double hs_stencil_bytes(const hs_grid *grid, bool is_full);
+
+void hs_stencil_free(hs_account *account, hs_stencil *stencil);
 
 #endif

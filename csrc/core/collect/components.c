@@ -1,10 +1,15 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#include "components.h"
+#include "record.h"
+
+#include <math.h>
+#include <string.h>
+
 /*
  * components.c: the forest. Ways to the root are halved as they are gone, and a root hangs itself
  * under a lower one. Shifts are added modulo 2^32: a ring that is missed would have to wind 2^32
  * times around the box.
  */
-#include "components.h"
 
 hs_status
 hs_components_open(hs_account *account, int64_t n, int n_axes, hs_components *components)
@@ -111,4 +116,203 @@ hs_components_label(hs_components *components, const uint8_t *counts, int64_t *l
         }
     }
     return n_found;
+}
+
+/* A batch at a time, between the points as given, by the kernels that measure pairs
+ * of searches. Far from the box, where their error could reach the last place, by integers. */
+
+#define MOST_SHIFT (INT64_C(1) << 62)
+/* Distances below this part of the terms that they are made of: double-words leave an error of
+ * 2^-26 units in the last place otherwise, which rounding nearly never shows. */
+#define CANCELLED 0x1p-24
+
+/* What is done, and what went wrong in each slab of a round. */
+typedef struct measuring {
+    const hs_given_pairs *given;
+    const hs_kernel      *kernel;
+    hs_metric             slow; /* by integers alone */
+    double                longest;
+    int64_t               failed[HS_SLABS];
+} measuring;
+
+/* S of a pair over the periodic box vectors. */
+static hs_status
+find_shift(const hs_given_pairs *given, int64_t at, const double *p, const double *q,
+           int64_t *shift)
+{
+    const hs_pair_numbers *pairs = given->pairs;
+    const hs_lattice      *lattice = &given->box->lattice;
+    const int              d = lattice->ndim;
+    if (pairs->shift == NULL) {
+        return lattice->n_periodic > 0 ? hs_near_image(given->box, p, q, shift) : HS_OK;
+    }
+    int64_t all[HS_MAX_DIM];
+    memcpy(all, pairs->shift + at * d, (size_t)d * sizeof *all);
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        const int l = lattice->vector_of_row[r];
+        shift[r] = all[l];
+        all[l] = 0;
+        if (shift[r] >= MOST_SHIFT || shift[r] <= -MOST_SHIFT) {
+            return HS_ERR_ARGUMENT;
+        }
+    }
+    for (int l = 0; l < d; l++) {
+        if (all[l] != 0) {
+            return HS_ERR_ARGUMENT;
+        }
+    }
+    return HS_OK;
+}
+
+/* S over all box vectors; false when it does not fit. */
+static bool
+put_shift(const hs_lattice *lattice, const int64_t *shift, int32_t *to)
+{
+    memset(to, 0, (size_t)lattice->ndim * sizeof *to);
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        if (shift[r] < INT32_MIN || shift[r] > INT32_MAX) {
+            return false;
+        }
+        to[lattice->vector_of_row[r]] = (int32_t)shift[r];
+    }
+    return true;
+}
+
+/* Takes pair `at` into the batch as number e. */
+static hs_status
+take_pair(const hs_given_pairs *given, int64_t at, int32_t e, int32_t *S, hs_measured *batch)
+{
+    const hs_cloud *cloud = given->cloud;
+    const int       d = cloud->ndim;
+    const int64_t   i = given->pairs->i[at], j = given->pairs->j[at];
+    double          p[HS_MAX_DIM], q[HS_MAX_DIM];
+    int64_t         shift[HS_MAX_DIM];
+    if (i < 0 || i >= cloud->n || j < 0 || j >= cloud->n) {
+        return HS_ERR_ARGUMENT;
+    }
+    for (int k = 0; k < d; k++) {
+        batch->p[k][e] = p[k] = cloud->x[k][i];
+        batch->q[k][e] = q[k] = cloud->x[k][j];
+    }
+    const hs_status status = find_shift(given, at, p, q, shift);
+    if (status != HS_OK) {
+        return status;
+    }
+    for (int r = 0; r < given->box->lattice.n_periodic; r++) {
+        hs_measured_shift(batch, e, r, shift[r]);
+    }
+    return S == NULL || put_shift(&given->box->lattice, shift, S + at * d) ? HS_OK
+                                                                           : HS_ERR_SHIFT_RANGE;
+}
+
+/* Measures anew what nearly cancels. */
+static void
+measure_cancelled(const measuring *doing, int32_t e, double largest, hs_measured *batch)
+{
+    const int d = doing->slow.ndim, m = doing->slow.n_rows;
+    double    p[HS_MAX_DIM], q[HS_MAX_DIM], vector[HS_MAX_DIM], terms = largest;
+    int64_t   shift[HS_MAX_DIM];
+    for (int r = 0; r < m; r++) {
+        shift[r] = batch->shift[r][e];
+        terms += fabs((double)shift[r]) * doing->longest;
+    }
+    if (batch->distance[e] >= CANCELLED * terms) {
+        return;
+    }
+    for (int k = 0; k < d; k++) {
+        p[k] = batch->p[k][e];
+        q[k] = batch->q[k][e];
+    }
+    batch->distance[e] = hs_metric_measure(&doing->slow, p, q, shift, vector);
+    for (int k = 0; k < d; k++) {
+        batch->vector[k][e] = vector[k];
+    }
+}
+
+/* Measures the batch, and writes it to the place of its first pair. *failed: the first whose vector
+ * is not finite, else -1. */
+static void
+put_batch(const measuring *doing, int64_t first, hs_measured *batch, int32_t *failed)
+{
+    const hs_output *output = doing->given->output;
+    const hs_scale   same = {.exponent = 0, .first = 1.0, .second = 1.0};
+    const double     largest = 2.0 * doing->given->cloud->largest;
+    const int        d = output->ndim;
+    double          *distance = hs_output_column(output, HS_WANT_DISTANCE);
+    double          *vectors = hs_output_column(output, HS_WANT_VECTOR);
+    double          *vector[HS_MAX_DIM], sign[HS_BATCH];
+    hs_measured_find(doing->kernel, &doing->given->box->metric, vectors != NULL, batch);
+    *failed = -1;
+    for (int32_t e = 0; e < batch->n; e++) {
+        sign[e] = 1.0;
+        if (batch->is_shifted) {
+            measure_cancelled(doing, e, largest, batch);
+        }
+        if (*failed < 0 && !(batch->distance[e] < INFINITY)) {
+            *failed = e;
+        }
+    }
+    if (distance != NULL) {
+        memcpy(distance + first, batch->distance, (size_t)batch->n * sizeof *distance);
+    }
+    if (vectors != NULL) {
+        for (int k = 0; k < d; k++) {
+            vector[k] = batch->vector[k];
+        }
+        hs_restore_vectors(vectors + first * d, vector, sign, batch->n, d, same);
+    }
+}
+
+/* A hs_slab_fn. */
+static hs_status
+measure_slab(void *context, int slab, int64_t first, int64_t last)
+{
+    measuring            *doing = context;
+    const hs_given_pairs *given = doing->given;
+    int32_t              *S = hs_output_column(given->output, HS_WANT_SHIFT);
+    const bool            measures = given->output->columns & (HS_WANT_DISTANCE | HS_WANT_VECTOR);
+    hs_measured           batch;
+    memset(&batch, 0, sizeof batch); /* kernels read a little beyond the last pair */
+    while (first < last) {
+        int32_t failed = -1;
+        batch.n = (int32_t)(last - first < HS_BATCH ? last - first : HS_BATCH);
+        batch.is_shifted = batch.is_wide = false;
+        for (int32_t e = 0; e < batch.n; e++) {
+            const hs_status status = take_pair(given, first + e, e, S, &batch);
+            if (status != HS_OK) {
+                doing->failed[slab] = first + e;
+                return status;
+            }
+        }
+        if (measures) {
+            put_batch(doing, first, &batch, &failed);
+        }
+        if (failed >= 0) {
+            doing->failed[slab] = first + failed;
+            return HS_ERR_FAR;
+        }
+        first += batch.n;
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_given_pairs_measure(const hs_given_pairs *given, hs_call *call, hs_failure *failure)
+{
+    measuring doing = {.given = given, .kernel = call->kernel, .slow = given->box->metric};
+    doing.slow.floats_usable = false;
+    for (int r = 0; r < doing.slow.n_rows; r++) {
+        for (int k = 0; k < doing.slow.ndim; k++) {
+            doing.longest = hs_larger(fabs(doing.slow.rows[r][k]), doing.longest);
+        }
+    }
+    for (int slab = 0; slab < HS_SLABS; slab++) {
+        doing.failed[slab] = -1;
+    }
+    const hs_status status =
+        hs_walk_slabs(call->team, &call->options, given->pairs->n, measure_slab, &doing);
+    for (int slab = 0; status != HS_OK && slab < HS_SLABS && failure->row < 0; slab++) {
+        failure->row = doing.failed[slab];
+    }
+    return status;
 }

@@ -1,12 +1,646 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#include "record.h"
+#include "../search/search.h"
+#include "../search/limits.h"
+#include "../search/choice.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Takes only the arrays that the columns of the output need. */
+
+hs_block_use
+hs_record_use(unsigned columns)
+{
+    return columns & (HS_MEASURED | HS_WANT_SHIFT) ? HS_BLOCK_LISTS_PLACES : HS_BLOCK_LISTS_IDS;
+}
+
+hs_status
+hs_recorder_init(hs_account *account, hs_output *output, int32_t most_hits, hs_recorder *recorder)
+{
+    const int64_t  n = most_hits + HS_PADDING, in_batch = HS_BATCH + HS_PADDING;
+    const unsigned columns = output->columns;
+    bool           complete = true;
+    *recorder = (hs_recorder){.output = output, .columns = columns, .most_hits = most_hits};
+    if (hs_record_use(columns) == HS_BLOCK_LISTS_PLACES) {
+        recorder->ids = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(int32_t));
+        complete = recorder->ids != NULL;
+    }
+    if (columns & HS_WANT_BOTH) {
+        recorder->ends[0] = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(int32_t));
+        recorder->ends[1] = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(int32_t));
+        complete = complete && recorder->ends[0] != NULL && recorder->ends[1] != NULL;
+    }
+    if (columns & HS_MEASURED) {
+        recorder->distance = hs_alloc(account, HS_FOR_CANDIDATES, in_batch, sizeof(double));
+        complete = complete && recorder->distance != NULL;
+    }
+    for (int k = 0; (columns & HS_WANT_VECTOR) && k < output->ndim; k++) {
+        recorder->vector[k] = hs_alloc(account, HS_FOR_CANDIDATES, in_batch, sizeof(double));
+        complete = complete && recorder->vector[k] != NULL;
+    }
+    if ((columns & HS_WANT_SHELL) && !(columns & HS_WANT_DISTANCE)) {
+        recorder->all_distances = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(double));
+        complete = complete && recorder->all_distances != NULL;
+    }
+    if (!complete) {
+        hs_recorder_free(account, recorder);
+        return HS_ERR_MEMORY;
+    }
+    return HS_OK;
+}
+
+void
+hs_recorder_free(hs_account *account, hs_recorder *recorder)
+{
+    hs_free(account, recorder->ids);
+    hs_free(account, recorder->ends[0]);
+    hs_free(account, recorder->ends[1]);
+    hs_free(account, recorder->distance);
+    hs_free(account, recorder->all_distances);
+    for (int k = 0; k < HS_MAX_DIM; k++) {
+        hs_free(account, recorder->vector[k]);
+    }
+    *recorder = (hs_recorder){0};
+}
+
+/* By the rounded distance where that is far enough from all edges, which are
+ * nearly all pairs; the others are decided exactly, those at one edge together. */
+
+/* A pair that is beyond `low` edges, at most `high`. */
+typedef struct open_pair {
+    int32_t hit, si;
+    int32_t low, high;
+} open_pair;
+
+/* Pairs that are to be decided, and where their shells go. */
+typedef struct open_pairs {
+    hs_scanner    *scanner;
+    const int32_t *places;
+    double        *distance;
+    int32_t       *shell;
+    int32_t        n;
+    open_pair      pair[HS_BATCH];
+} open_pairs;
+
+/* Traces the open pairs whose next edge is this one; of[e]: which of them is pair e. */
+static hs_status
+trace_at(const open_pairs *open, int32_t edge, int32_t *of)
+{
+    hs_trace *trace = &open->scanner->trace;
+    hs_trace_clear(trace);
+    for (int32_t u = 0; u < open->n; u++) {
+        const open_pair *pair = &open->pair[u];
+        if (pair->low == edge) {
+            of[trace->n] = u;
+            hs_trace_put(trace, pair->si, open->places[pair->hit]);
+        }
+    }
+    return hs_trace_look_up(trace, true, &open->scanner->failed_point);
+}
+
+/* Decides the pairs that are traced at this edge. */
+static void
+decide_at(open_pairs *open, int32_t edge, const int32_t *of)
+{
+    const hs_metric *given = &open->scanner->search->scene.metric;
+    const hs_shells *shells = &open->scanner->search->shells;
+    hs_metric        metric;
+    uint8_t          within[HS_BATCH];
+    hs_metric_init(&metric, given->ndim, given->n_rows, (const double(*)[HS_MAX_DIM])given->rows,
+                   shells->at[edge], shells->inclusive);
+    hs_decide_traced(open->scanner, &metric, within);
+    for (int32_t e = 0; e < open->scanner->trace.n; e++) {
+        open_pair *pair = &open->pair[of[e]];
+        if (within[e]) {
+            pair->high = edge;
+        } else {
+            pair->low = edge + 1;
+        }
+    }
+}
+
+/* Writes those that are decided, and keeps the others. */
+static void
+put_decided(open_pairs *open)
+{
+    const hs_shells *shells = &open->scanner->search->shells;
+    int32_t          n = 0;
+    for (int32_t u = 0; u < open->n; u++) {
+        const open_pair pair = open->pair[u];
+        if (pair.low < pair.high) {
+            open->pair[n++] = pair;
+        } else {
+            double *distance = &open->distance[pair.hit];
+            *distance = hs_shells_keep(shells, pair.low, *distance);
+            open->shell[pair.hit] = pair.low;
+        }
+    }
+    open->n = n;
+}
+
+static hs_status
+decide_open(open_pairs *open)
+{
+    int32_t of[HS_BATCH];
+    open->scanner->n_ambiguous += open->n;
+    while (open->n > 0) {
+        const int32_t   edge = open->pair[0].low;
+        const hs_status status = trace_at(open, edge, of);
+        if (status != HS_OK) {
+            return status;
+        }
+        decide_at(open, edge, of);
+        put_decided(open);
+    }
+    return HS_OK;
+}
+
+/* Looks again at the distances that are too near to an edge. */
+static hs_status
+look_again(open_pairs *open, int32_t first, const hs_hits *hits)
+{
+    const hs_shells *shells = &open->scanner->search->shells;
+    for (int32_t t = 0, h = 0; t < hits->n; t++) {
+        for (; h < hits->end[t]; h++) {
+            int32_t low = open->shell[h], high;
+            hs_shells_range(shells, open->distance[h], &low, &high);
+            open->shell[h] = low;
+            if (low < high) {
+                open->pair[open->n++] = (open_pair){h, first + t, low, high};
+            }
+            if (open->n == HS_BATCH) {
+                const hs_status status = decide_open(open);
+                if (status != HS_OK) {
+                    return status;
+                }
+            }
+        }
+    }
+    return decide_open(open);
+}
+
+hs_status
+hs_put_shells(const hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+{
+    const hs_shells *shells = &scanner->search->shells;
+    const int32_t    n = hits->end[hits->n - 1];
+    open_pairs       open; /* large, and seldom used: not cleared */
+    if (!(recorder->columns & HS_WANT_SHELL)) {
+        return HS_OK;
+    }
+    open.scanner = scanner;
+    open.places = hits->label;
+    open.distance = hs_recorder_distances(recorder);
+    open.shell = hs_output_next(recorder->output, HS_WANT_SHELL);
+    open.n = 0;
+    const bool is_open = hs_shells_find(shells, open.distance, n, open.shell);
+    return is_open ? look_again(&open, first, hits) : HS_OK;
+}
+
+/* Kernels first, one pair at a time where they decline; then to the caller's unit, in
+ * loops without branches, which compilers turn into vectors. */
+
+/* Pair e of the batch, by itself. */
+static void
+measure_one(const hs_metric *metric, const hs_batch *batch, int64_t *const *shift, int32_t e,
+            double *distance, double *const *vector)
+{
+    double  p[HS_MAX_DIM], q[HS_MAX_DIM], along[HS_MAX_DIM];
+    int64_t of_pair[HS_MAX_DIM];
+    for (int k = 0; k < metric->ndim; k++) {
+        p[k] = batch->p[k][e];
+        q[k] = batch->q[k][e];
+    }
+    for (int r = 0; shift != NULL && r < metric->n_rows; r++) {
+        of_pair[r] = shift[r][e];
+    }
+    distance[e] = hs_metric_measure(metric, p, q, shift != NULL ? of_pair : NULL, along);
+    for (int k = 0; vector != NULL && k < metric->ndim; k++) {
+        vector[k][e] = along[k];
+    }
+}
+
+void
+hs_measure_pairs(const hs_kernel *kernel, const hs_metric *metric, const hs_batch *batch,
+                 int64_t *const *shift, bool is_wide, double *distance, double *const *vector)
+{
+    uint8_t done[HS_IN_BATCH] = {0};
+    if (!is_wide) {
+        kernel->measure(metric, batch, distance, vector, done);
+    }
+    for (int32_t e = 0; e < batch->n; e++) {
+        if (HS_UNLIKELY(!done[e])) {
+            measure_one(metric, batch, shift, e, distance, vector);
+        }
+    }
+}
+
+void
+hs_measured_find(const hs_kernel *kernel, const hs_metric *metric, bool vectors, hs_measured *pairs)
+{
+    hs_batch batch = {.n = pairs->n};
+    double  *vector[HS_MAX_DIM];
+    int64_t *shift[HS_MAX_DIM];
+    for (int k = 0; k < metric->ndim; k++) {
+        batch.p[k] = pairs->p[k];
+        batch.q[k] = pairs->q[k];
+        vector[k] = pairs->vector[k];
+    }
+    for (int r = 0; pairs->is_shifted && r < metric->n_rows; r++) {
+        batch.shift[r] = pairs->times[r];
+        shift[r] = pairs->shift[r];
+    }
+    hs_measure_pairs(kernel, metric, &batch, pairs->is_shifted ? shift : NULL, pairs->is_wide,
+                     pairs->distance, vectors ? vector : NULL);
+}
+
+hs_scale
+hs_measures_unscale(const hs_scene *scene)
+{
+    const hs_scale same = {.exponent = 0, .first = 1.0, .second = 1.0};
+    return scene->extreme ? same : scene->unscale; /* then the metric has the caller's unit */
+}
+
+/* The largest distance that is within the cutoff. */
+static double
+largest_within(double cutoff, bool inclusive)
+{
+    return inclusive ? cutoff : nextafter(cutoff, 0.0);
+}
+
+void
+hs_measures_tell(const hs_scene *scene, const hs_options *options, hs_write *write)
+{
+    const hs_scale unscale = hs_measures_unscale(scene);
+    const bool     is_exact = options->precision == HS_EXACT;
+    write->first = unscale.first;
+    write->second = unscale.second;
+    write->cutoff = is_exact ? options->cutoff : INFINITY;
+    write->largest = is_exact ? largest_within(options->cutoff, options->inclusive) : INFINITY;
+}
+
+void
+hs_restore_distances(double *distance, int32_t n, hs_scale unscale)
+{
+    for (int32_t e = 0; unscale.exponent != 0 && e < n; e++) {
+        distance[e] = hs_scale_apply(unscale, distance[e]);
+    }
+}
+
+void
+hs_keep_all_within(double *distance, int32_t n, double cutoff, bool inclusive)
+{
+    const double largest = largest_within(cutoff, inclusive);
+    for (int32_t e = 0; e < n; e++) {
+        distance[e] = distance[e] < cutoff ? distance[e] : largest;
+    }
+}
+
+HS_ALWAYS_INLINE void
+restore_vectors(double *HS_RESTRICT to, double *const *vector, const double *sign, int32_t n,
+                const int ndim, hs_scale unscale)
+{
+    for (int32_t e = 0; e < n; e++) {
+        for (int k = 0; k < ndim; k++) {
+            /* Plus zero: a zero has no sign, which would tell where the search met the pair. */
+            to[(int64_t)e * ndim + k] = hs_scale_apply(unscale, vector[k][e]) * sign[e] + 0.0;
+        }
+    }
+}
+
+void
+hs_restore_vectors(double *HS_RESTRICT to, double *const *vector, const double *sign, int32_t n,
+                   int ndim, hs_scale unscale)
+{
+    switch (ndim) {
+    case 1: restore_vectors(to, vector, sign, n, 1, unscale); break;
+    case 2: restore_vectors(to, vector, sign, n, 2, unscale); break;
+    case 3: restore_vectors(to, vector, sign, n, 3, unscale); break;
+    default: restore_vectors(to, vector, sign, n, ndim, unscale);
+    }
+}
+
+/* Most scenes have few turns and ordinary numbers, in 2-D or 3-D. Their pairs are
+ * shifted and measured while they are written, without the arrays of a batch in between: the time
+ * goes into passes over these, not into arithmetic. */
+
+/* Whether hits of this search can be written so, to these columns. */
+static bool
+can_write(const hs_recorder *recorder, const hs_scanner *scanner)
+{
+    const hs_search *search = scanner->search;
+    const int        d = search->scene.ndim;
+    return search->call->kernel->write != NULL &&
+           (search->is_half || !(recorder->columns & (HS_WANT_I | HS_WANT_J))) && d >= 2 &&
+           d <= HS_WRITE_MOST_DIM && !(recorder->columns & HS_WANT_BOTH) &&
+           scanner->trace.of.is_narrow &&
+           (!(recorder->columns & HS_MEASURED) ||
+            (search->limits == NULL && !search->scene.extreme &&
+             search->scene.metric.floats_usable));
+}
+
+/* What candidates and points are, of the hits of points from `first` on. */
+static void
+describe(const hs_scanner *scanner, bool is_measured, int32_t first, hs_write *write)
+{
+    const hs_search  *search = scanner->search;
+    const hs_trace   *trace = &scanner->trace;
+    const hs_bins    *asking = hs_search_asking(search);
+    const hs_lattice *lattice = &search->scene.lattice;
+    const bool        turned = asking->turns.known;
+    write->by_S = search->bins.keeps_originals;
+    write->is_shifted = trace->of.has_images || write->by_S;
+    write->q = is_measured ? trace->of.q : NULL;
+    write->number = scanner->block.id;
+    write->image = trace->of.has_images ? trace->of.image : NULL;
+    write->few = search->bins.turns.known ? trace->of.few : NULL;
+    for (int k = 0; k < search->scene.ndim; k++) {
+        write->p[k] = (write->by_S ? asking->originals[k] : asking->x[k]) + first;
+    }
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        write->column[r] = lattice->vector_of_row[r];
+        write->turns[r] = turned ? asking->turns.narrow[r] + first : NULL;
+    }
+}
+
+/* Where the pairs go. */
+static void
+direct(const hs_recorder *recorder, hs_write *write)
+{
+    const hs_output *output = recorder->output;
+    write->index_bytes = output->index_bytes;
+    write->i = hs_output_next(output, HS_WANT_I);
+    write->j = hs_output_next(output, HS_WANT_J);
+    write->distance = hs_recorder_distances(recorder);
+    write->vector = hs_output_next(output, HS_WANT_VECTOR);
+    write->shift = hs_output_next(output, HS_WANT_SHIFT);
+}
+
+hs_status
+hs_write_hits(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits,
+              bool *written)
+{
+    const hs_search *search = scanner->search;
+    *written = false;
+    if (!can_write(recorder, scanner)) {
+        return HS_OK;
+    }
+    const bool is_measured = recorder->columns & HS_MEASURED;
+    if (hs_records_load(&scanner->trace.of, is_measured) != HS_OK) {
+        return HS_ERR_INTERRUPTED;
+    }
+    hs_write write = {
+        .ndim = search->scene.ndim, .is_half = search->is_half, .metric = &search->scene.metric};
+    hs_measures_tell(&search->scene, &search->call->options, &write);
+    describe(scanner, is_measured, first, &write);
+    memset(scanner->block.hits + hits->end[hits->n - 1], 0, HS_PADDING * sizeof(int32_t));
+    direct(recorder, &write);
+    *written = search->call->kernel->write(&write, hits);
+    return HS_OK;
+}
+
+/* A batch of hits at a time, looked up, measured by the batch kernel, brought to
+ * the caller's unit. */
+
+/* Hits of the batch that is being written. */
+typedef struct batch_part {
+    int32_t first;           /* its first hit */
+    int32_t point[HS_BATCH]; /* number of the point whose hit each one is */
+} batch_part;
+
+/* The first nonzero component of S is negative. */
+static bool
+is_backward(const hs_trace *trace, int32_t e)
+{
+    const int m = trace->search->scene.lattice.n_periodic;
+    for (int l = 0; l < m; l++) {
+        const int64_t shift = trace->of.is_narrow ? trace->shift[l][e] : trace->given[l][e];
+        if (shift != 0) {
+            return shift < 0;
+        }
+    }
+    return false;
+}
+
+/* 1, or -1 for pairs of a half list that are listed the other way round. */
+static void
+find_signs(const hs_trace *trace, const int32_t *point, const int32_t *id, double *sign)
+{
+    int32_t any_own = 0;
+    for (int32_t e = 0; e < trace->n; e++) {
+        sign[e] = id[e] < point[e] ? -1.0 : 1.0;
+        any_own |= id[e] == point[e];
+    }
+    for (int32_t e = 0; any_own && e < trace->n; e++) {
+        if (id[e] == point[e] && is_backward(trace, e)) {
+            sign[e] = -1.0;
+        }
+    }
+}
+
+/* d and D of the batch to the recorder's arrays, in the unit of the metric. */
+static void
+measure(hs_recorder *recorder, hs_trace *trace)
+{
+    const hs_search *search = trace->search;
+    const hs_batch   batch = hs_trace_batch(trace);
+    int64_t *const  *shift = search->bins.keeps_originals ? trace->given : trace->image;
+    double *const   *vector = recorder->columns & HS_WANT_VECTOR ? recorder->vector : NULL;
+    hs_measure_pairs(search->call->kernel, &search->scene.metric, &batch,
+                     trace->is_shifted ? shift : NULL, trace->is_wide, recorder->distance, vector);
+}
+
+/* Distances of the batch, none beyond the limit of its pair, or what that is rounded to. */
+static void
+keep_within_limits(const hs_scanner *scanner, double *distance, hs_scale unscale)
+{
+    for (int32_t e = 0; e < scanner->trace.n; e++) {
+        const hs_dw limit = hs_limit_of_pair(scanner, e);
+        distance[e] = hs_keep_within(distance[e], hs_scale_apply(unscale, limit.hi),
+                                     scanner->options.inclusive || limit.lo > 0.0);
+    }
+}
+
+static void
+put_distances(hs_recorder *recorder, const hs_scanner *scanner, int32_t first)
+{
+    const hs_search  *search = scanner->search;
+    const hs_options *options = &search->call->options;
+    const int32_t     n = scanner->trace.n;
+    const hs_scale    unscale = hs_measures_unscale(&search->scene);
+    double           *to = hs_recorder_distances(recorder);
+    hs_restore_distances(recorder->distance, n, unscale);
+    if (options->precision == HS_EXACT && search->limits != NULL &&
+        search->limits->supports == NULL) {
+        keep_within_limits(scanner, recorder->distance, unscale);
+    } else if (options->precision == HS_EXACT) {
+        hs_keep_all_within(recorder->distance, n, options->cutoff, options->inclusive);
+    }
+    memcpy(to + first, recorder->distance, (size_t)n * sizeof *to);
+}
+
+static void
+put_vectors(const hs_recorder *recorder, const hs_search *search, const double *sign, int32_t first,
+            int32_t n)
+{
+    const int d = recorder->output->ndim;
+    double   *to = hs_output_next(recorder->output, HS_WANT_VECTOR);
+    hs_restore_vectors(to + (int64_t)first * d, recorder->vector, sign, n, d,
+                       hs_measures_unscale(&search->scene));
+}
+
+/* Shifts that only sort the images of one pair may leave out what these images share: the turns by
+ * which i and j were wrapped, which can be too many for int32. Returns the first pair whose shift
+ * does not fit, or their number. */
+static int32_t
+find_keys(const hs_trace *trace, int64_t keys[][HS_BATCH])
+{
+    const int m = trace->search->scene.lattice.n_periodic;
+    for (int32_t e = 0; e < trace->n; e++) {
+        int64_t image[HS_MAX_DIM], key[HS_MAX_DIM];
+        for (int r = 0; r < m; r++) {
+            image[r] = trace->image[r][e];
+        }
+        if (!hs_lattice_shift(&trace->search->scene.lattice, image, key)) {
+            return e;
+        }
+        for (int l = 0; l < m; l++) {
+            keys[l][e] = key[l];
+        }
+    }
+    return trace->n;
+}
+
+/* S over all box vectors, zero on open ones, when all are few. */
+static void
+put_narrow(const hs_trace *trace, const double *sign, int32_t *to)
+{
+    const hs_lattice *lattice = &trace->search->scene.lattice;
+    const int         d = lattice->ndim;
+    int32_t           flip[HS_BATCH]; /* 0, or -1 to negate: (x ^ -1) - -1 */
+    for (int32_t e = 0; e < trace->n; e++) {
+        flip[e] = -(sign[e] < 0.0);
+    }
+    if (d == 3 && lattice->n_periodic == 3) { /* most scenes: one pair after the other */
+        const int32_t *x = trace->shift[0], *y = trace->shift[1], *z = trace->shift[2];
+        for (int32_t e = 0; e < trace->n; e++, to += 3) {
+            to[lattice->vector_of_row[0]] = (x[e] ^ flip[e]) - flip[e];
+            to[lattice->vector_of_row[1]] = (y[e] ^ flip[e]) - flip[e];
+            to[lattice->vector_of_row[2]] = (z[e] ^ flip[e]) - flip[e];
+        }
+        return;
+    }
+    for (int l = 0; l < lattice->n_periodic; l++) {
+        const int32_t *shift = trace->shift[l];
+        int32_t       *column = to + lattice->vector_of_row[l];
+        for (int32_t e = 0; e < trace->n; e++) {
+            column[(int64_t)e * d] = (shift[e] ^ flip[e]) - flip[e];
+        }
+    }
+}
+
+/* S over all box vectors, zero on open ones. Returns the first pair whose S does not fit int32, or
+ * their number. */
+static int32_t
+put_shifts(const hs_recorder *recorder, const hs_trace *trace, const double *sign, int32_t first)
+{
+    const hs_lattice *lattice = &trace->search->scene.lattice;
+    const int         d = lattice->ndim, m = lattice->n_periodic;
+    const bool        keys_only = !(trace->search->call->options.want & HS_WANT_SHIFT);
+    int64_t           keys[HS_MAX_DIM][HS_BATCH];
+    int32_t *to = (int32_t *)hs_output_next(recorder->output, HS_WANT_SHIFT) + (int64_t)first * d;
+    int32_t  fitting = trace->n;
+    if (m < d) {
+        memset(to, 0, (size_t)trace->n * (size_t)d * sizeof *to);
+    }
+    if (trace->of.is_narrow) { /* what is left out is zero, or common to all images */
+        put_narrow(trace, sign, to);
+        return fitting;
+    }
+    if (keys_only) {
+        fitting = find_keys(trace, keys);
+    }
+    for (int l = 0; l < m; l++) {
+        const int64_t *shifts = keys_only ? keys[l] : trace->given[l];
+        int32_t       *column = to + lattice->vector_of_row[l];
+        for (int32_t e = 0; e < fitting; e++) {
+            const int64_t value = sign[e] < 0.0 ? -shifts[e] : shifts[e];
+            column[(int64_t)e * d] = (int32_t)value;
+            if (value < INT32_MIN || value > INT32_MAX) {
+                fitting = e;
+            }
+        }
+    }
+    return fitting;
+}
+
+/* Writes the batch. */
+static hs_status
+put_batch(hs_recorder *recorder, hs_scanner *scanner, const batch_part *part)
+{
+    hs_trace        *trace = &scanner->trace;
+    const hs_search *search = scanner->search;
+    const bool       measured = recorder->columns & HS_MEASURED;
+    double           sign[HS_BATCH];
+    const hs_status  status = hs_trace_look_up(&scanner->trace, measured, &scanner->failed_point);
+    if (status != HS_OK) {
+        return status;
+    }
+    if (!search->is_half) {
+        for (int32_t e = 0; e < trace->n; e++) {
+            sign[e] = 1.0;
+        }
+    } else if (recorder->columns & (HS_WANT_VECTOR | HS_WANT_SHIFT)) {
+        find_signs(trace, part->point, recorder->ids + part->first, sign);
+    }
+    if (measured) {
+        measure(recorder, trace);
+    }
+    if (recorder->columns & (HS_WANT_DISTANCE | HS_WANT_SHELL)) {
+        put_distances(recorder, scanner, part->first);
+    }
+    if (recorder->columns & HS_WANT_VECTOR) {
+        put_vectors(recorder, search, sign, part->first, trace->n);
+    }
+    if (recorder->columns & HS_WANT_SHIFT) {
+        const int32_t fitting = put_shifts(recorder, trace, sign, part->first);
+        if (fitting < trace->n) {
+            scanner->failed_point = part->point[fitting];
+            return HS_ERR_SHIFT_RANGE;
+        }
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_put_measures(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+{
+    hs_trace  *trace = &scanner->trace;
+    batch_part part = {.first = 0};
+    hs_trace_clear(trace);
+    for (int32_t t = 0, h = 0; t < hits->n; t++) {
+        while (h < hits->end[t]) {
+            const int32_t taken = hs_trace_add(trace, first + t, hits->label + h, hits->end[t] - h);
+            for (int32_t e = trace->n - taken; e < trace->n; e++) {
+                part.point[e] = hits->point[t];
+            }
+            h += taken;
+            if (trace->n == HS_BATCH) {
+                const hs_status status = put_batch(recorder, scanner, &part);
+                if (status != HS_OK) {
+                    return status;
+                }
+                part.first = h;
+                hs_trace_clear(trace);
+            }
+        }
+    }
+    return trace->n > 0 ? put_batch(recorder, scanner, &part) : HS_OK;
+}
+
 /* record.c: all columns at once if the writer can; else i and j by the kernel, then what is
  * measured in batches. */
-#include "record.h"
-
-#include "record_measures.h"
-#include "record_write.h"
-#include "record_shells.h"
-#include "../search/choice.h"
 
 #define INDICES (HS_WANT_I | HS_WANT_J | HS_WANT_BOTH)
 

@@ -1,16 +1,290 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#include "sort_pairs.h"
+#include "../base/sort.h"
+#include "../base/os.h"
+#include "parallel.h"
+
+#include <string.h>
+
+/* By numbers where entries have their j; of these, images of one pair by S, which
+ * is one number too as a rule. */
+
+/* Pairs of two points that insertion sorts in less time than a heap. */
+#define FEW 48
+
+static bool
+is_before(const hs_sorting *all, uint64_t a, uint64_t b)
+{
+    const int32_t ja = hs_second_of(all, a), jb = hs_second_of(all, b);
+    if (ja != jb) {
+        return ja < jb;
+    }
+    for (int k = 0; all->shift != NULL && k < all->found->ndim; k++) {
+        const int32_t sa = hs_shift_of(all, a, k), sb = hs_shift_of(all, b, k);
+        if (sa != sb) {
+            return sa < sb;
+        }
+    }
+    return false;
+}
+
+static void
+sift_down(const hs_sorting *all, uint64_t *heap, int64_t root, int64_t n)
+{
+    const uint64_t moving = heap[root];
+    for (int64_t child; (child = 2 * root + 1) < n; root = child) {
+        if (child + 1 < n && is_before(all, heap[child], heap[child + 1])) {
+            child++;
+        }
+        if (!is_before(all, moving, heap[child])) {
+            break;
+        }
+        heap[root] = heap[child];
+    }
+    heap[root] = moving;
+}
+
+/* Sorts by (j, S), whatever these are: insertion sort for a few, heap sort for a crowd. */
+static void
+sort_any(const hs_sorting *all, uint64_t *row, int64_t n)
+{
+    if (n <= FEW) {
+        for (int64_t e = 1; e < n; e++) {
+            const uint64_t moving = row[e];
+            int64_t        at = e;
+            for (; at > 0 && is_before(all, moving, row[at - 1]); at--) {
+                row[at] = row[at - 1];
+            }
+            row[at] = moving;
+        }
+        return;
+    }
+    for (int64_t root = n / 2; root-- > 0;) {
+        sift_down(all, row, root, n);
+    }
+    for (int64_t end = n - 1; end > 0; end--) {
+        const uint64_t largest = row[0];
+        row[0] = row[end];
+        row[end] = largest;
+        sift_down(all, row, 0, end);
+    }
+}
+
+/* S as one number that orders images; false where it does not fit. */
+static bool
+image_key(const hs_sorting *all, uint64_t entry, uint64_t *key)
+{
+    const int     d = all->found->ndim, width = d > 1 ? 64 / d : 32;
+    const int64_t middle = INT64_C(1) << (width - 1);
+    *key = 0;
+    for (int k = 0; k < d; k++) {
+        const int64_t shift = hs_shift_of(all, entry, k) + middle;
+        if (shift < 0 || shift >> width != 0) {
+            return false;
+        }
+        *key = *key << width | (uint64_t)shift;
+    }
+    return true;
+}
+
+/* Sorts pairs of two points by S. */
+static void
+sort_images(const hs_sorting *all, uint64_t *row, int64_t n, uint64_t *keys)
+{
+    bool fit = n <= FEW;
+    for (int64_t e = 0; e < n && fit; e++) {
+        fit = image_key(all, row[e], &keys[e]);
+    }
+    for (int64_t e = 1; e < n && fit; e++) {
+        const uint64_t moving = row[e], key = keys[e];
+        int64_t        at = e;
+        for (; at > 0 && keys[at - 1] > key; at--) {
+            row[at] = row[at - 1];
+            keys[at] = keys[at - 1];
+        }
+        row[at] = moving;
+        keys[at] = key;
+    }
+    if (!fit) {
+        sort_any(all, row, n);
+    }
+}
+
+void
+hs_sort_row(const hs_sorting *all, uint64_t *row, int64_t n, uint64_t *spare)
+{
+    if (!all->has_j) {
+        sort_any(all, row, n);
+        return;
+    }
+    hs_sort_numbers(row, n, spare);
+    for (int64_t first = 0, end; all->shift != NULL && first < n; first = end) {
+        const uint64_t j = row[first] >> all->place_bits;
+        for (end = first + 1; end < n && row[end] >> all->place_bits == j;) {
+            end++;
+        }
+        if (end - first > 1) {
+            sort_images(all, row + first, end - first, spare);
+        }
+    }
+}
+
+int64_t
+hs_row_from(const hs_sorting *all, int64_t entry)
+{
+    int64_t first = 0, end = all->n_points;
+    while (first < end) {
+        const int64_t middle = first + (end - first) / 2;
+        if (hs_row_begin(all, middle) < entry) {
+            first = middle + 1;
+        } else {
+            end = middle;
+        }
+    }
+    return first;
+}
+
+/* Two passes over the pairs. Threads count strips of them, each strip the pairs of
+ * every row; the sums say where those of each strip go, and then they are dealt out at once. */
+
+#define STRIP_PAIRS (INT64_C(1) << 15) /* of a strip, at least: fewer are no work for a thread */
+
+#ifdef HS_TESTING
+static int most_place_bits = 63;
+
+int
+hs_test_sort_place_bits(int bits)
+{
+    const int before = most_place_bits;
+    most_place_bits = bits;
+    return before;
+}
+#else
+enum { most_place_bits = 63 };
+#endif
+
+/* Two passes over the pairs, by strips that each have numbers of their own for each row. */
+typedef struct strips {
+    hs_sorting *all;
+    int         n;
+    int64_t    *next[HS_SLABS]; /* how many, then the place of the next; the last are all->end */
+    int32_t     any[HS_SLABS];  /* the bits of all numbers j */
+} strips;
+
+/* A hs_slab_fn. */
+static hs_status
+count_strip(void *context, int strip, int64_t first, int64_t last)
+{
+    strips           *doing = context;
+    const hs_sorting *all = doing->all;
+    int64_t          *counts = doing->next[strip];
+    int32_t           any = 0;
+    for (int64_t p = first; p < last; p++) {
+        counts[all->i[p] - all->first_point]++;
+        any |= all->j[p];
+        if (all->both_ways) {
+            counts[all->j[p] - all->first_point]++;
+            any |= all->i[p];
+        }
+    }
+    doing->any[strip] |= any;
+    return HS_OK;
+}
+
+/* From numbers of pairs to places: row by row, and in each row strip by strip. */
+static void
+accumulate(const strips *doing)
+{
+    hs_sorting *all = doing->all;
+    int64_t     place = 0;
+    int32_t     any = 0;
+    for (int64_t row = 0; row < all->n_points; row++) {
+        const int64_t begin = place;
+        for (int strip = 0; strip < doing->n; strip++) {
+            const int64_t count = doing->next[strip][row];
+            doing->next[strip][row] = place;
+            place += count;
+        }
+        all->longest = place - begin > all->longest ? place - begin : all->longest;
+    }
+    for (int strip = 0; strip < doing->n; strip++) {
+        any |= doing->any[strip];
+    }
+    HS_ASSERT(place == all->n);
+    all->place_bits = 64 - hs_count_bits((uint64_t)any | 1);
+    all->has_j =
+        all->n >> (all->place_bits < most_place_bits ? all->place_bits : most_place_bits) == 0;
+}
+
+/* A hs_slab_fn: puts the entries in rows. */
+static hs_status
+deal_strip(void *context, int strip, int64_t first, int64_t last)
+{
+    const strips     *doing = context;
+    const hs_sorting *all = doing->all;
+    int64_t          *next = doing->next[strip];
+    for (int64_t p = first; p < last; p++) {
+        const int32_t i = all->i[p], j = all->j[p];
+        if (all->both_ways) {
+            all->entries[next[i - all->first_point]++] = hs_entry_of(all, j, 2 * p);
+            all->entries[next[j - all->first_point]++] = hs_entry_of(all, i, 2 * p + 1);
+        } else {
+            all->entries[next[i - all->first_point]++] = hs_entry_of(all, j, p);
+        }
+    }
+    return HS_OK;
+}
+
+/* Strips for this team: each with pairs enough, and no more further numbers than pairs. */
+static int
+choose_strips(const hs_sorting *all)
+{
+    const int64_t n_pairs = all->found->n_pairs;
+    const int     size = hs_team_size(all->call->team);
+    int           n = size < HS_SLABS ? size : HS_SLABS;
+    while (n > 1 && (n_pairs < n * STRIP_PAIRS || (n - 1) * all->n_points > n_pairs)) {
+        n--;
+    }
+    return n;
+}
+
+hs_status
+hs_deal_out(hs_sorting *all)
+{
+    hs_call      *call = all->call;
+    const int64_t n_pairs = all->found->n_pairs;
+    const size_t  size = (size_t)all->n_points * sizeof *all->end;
+    strips        doing = {.all = all, .n = choose_strips(all)};
+    int64_t      *others = NULL;
+    all->n = all->both_ways ? 2 * n_pairs : n_pairs;
+    all->entries = hs_alloc(&call->account, HS_FOR_SORTING, all->n, sizeof *all->entries);
+    if (all->entries == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    if (doing.n > 1) { /* last: without memory for these there is one strip */
+        others =
+            hs_alloc(&call->account, HS_FOR_SORTING, (doing.n - 1) * all->n_points, sizeof *others);
+        doing.n = others == NULL ? 1 : doing.n;
+    }
+    for (int strip = 0; strip < doing.n; strip++) {
+        doing.next[strip] = strip == doing.n - 1 ? all->end : others + strip * all->n_points;
+        memset(doing.next[strip], 0, size);
+    }
+    hs_status status =
+        hs_walk_strips(call->team, &call->options, n_pairs, doing.n, count_strip, &doing);
+    if (status == HS_OK) {
+        accumulate(&doing);
+        status = hs_walk_strips(call->team, &call->options, n_pairs, doing.n, deal_strip, &doing);
+    }
+    hs_free(&call->account, others);
+    return status;
+}
+
 /*
  * sort_pairs.c: a counting sort by i, then each point's few pairs by (j, S). A pair is one number
  * while it is sorted, j before its place, so that nothing is looked up but the S of images of one
- * pair. sort_deal.h has the counting sort; here threads put rows in order and write them.
+ * pair. sort_pairs.h has the counting sort; here threads put rows in order and write them.
  */
-#include "sort_pairs.h"
-
-#include "../base/poll.h"
-#include "crew.h"
-#include "sort_deal.h"
-
-#include <string.h>
 
 #define POLL_ENTRIES  (INT64_C(1) << 17) /* sorted and written between two calls of poll() */
 #define RANGE_ENTRIES 8192 /* of a range, about: with what is written of them they fit a cache */

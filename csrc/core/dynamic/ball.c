@@ -1,4 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#include "ball.h"
+#include "../box/wrap.h"
+#include "../exact/bounds.h"
+
 /*
  * ball.c: thresholds on the float64 square of the distance, and what decides between them.
  *
@@ -8,10 +12,6 @@
  * are wrong by at most `error` a component, D by a = sqrt(d) error, and the thresholds are those of
  * (R - a)^2 and (R + a)^2.
  */
-#include "ball.h"
-
-#include "../box/wrap.h"
-#include "../exact/bounds.h"
 
 #define SAFE 0x1p300 /* squares of such radii, and of 1 / SAFE, are ordinary numbers */
 
@@ -212,4 +212,309 @@ hs_ball_settle(hs_ball *ball, const hs_ball_image *image, uint32_t place)
                    list->inclusive);
     return hs_metric_within(&metric, ball->centre.given, hs_entry_given(&list->entries, place),
                             shift, &stages);
+}
+
+/*
+ * Three ways through the cells of a ball. A ball of a few cells takes them nearest
+ * first, from the lists of storage.h; what is needed of each cell is made up of a part for each
+ * axis. A larger one takes them by index, and one that meets more cells than there are takes all
+ * entries there are, in each image.
+ */
+
+#define CROWD         4   /* entries of a cell that are gathered without a branch */
+#define MOST_GATHERED 125 /* cells */
+
+/* The parts of all cells up to `reach` to a side; those that the ball does not meet are out of
+ * reach, and add nothing to a number. */
+HS_ALWAYS_INLINE void
+set_parts(const ball_walk *walk, int reach, part parts[][HS_SLOTS], const int ndim)
+{
+    int k = 0;
+    do {
+        const hs_span_of_cells *span = &walk->ball->span[k];
+        for (int o = -reach; o <= reach; o++) {
+            const int64_t u = span->centre + o;
+            if (u < span->first || u > span->last) {
+                parts[k][o + HS_MOST_REACH] = (part){.gap = INFINITY};
+            } else {
+                parts[k][o + HS_MOST_REACH] = part_of(walk, k, u);
+            }
+        }
+    } while (++k < ndim);
+}
+
+/* Cells nearest first. */
+HS_ALWAYS_INLINE bool
+walk_listed(ball_walk *walk, int reach, part parts[][HS_SLOTS], const int ndim)
+{
+    int64_t               index[HS_MAX_DIM] = {0}, along[HS_MAX_DIM] = {0};
+    const bool            needs_index = !walk->ball->list->cells.dense || walk->meets_images;
+    const hs_offset_list *offsets = &walk->ball->list->offsets.list[reach];
+    const uint8_t        *end = offsets->slot + offsets->n * ndim;
+    for (const uint8_t *slot = offsets->slot; slot < end; slot += ndim) {
+        double   gap = 0.0;
+        uint64_t number = 0;
+        int      k = 0;
+        do
+            gap += parts[k][slot[k]].gap;
+        while (++k < ndim);
+        if (gap > walk->limit) {
+            continue;
+        }
+        k = 0;
+        do {
+            const part *of = &parts[k][slot[k]];
+            number += of->number;
+            if (needs_index) {
+                index[k] = of->index;
+                along[k] = of->image;
+            }
+        } while (++k < ndim);
+        if (scan_number(walk, number, index, along, ndim)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/*
+ * The same for few dense cells of few entries in one image: first the places of all entries,
+ * without a branch that depends on how many a cell has, then their distances. Mispredicted branches
+ * would take most of the time. False: a cell is too full, or there are too many; nothing was done.
+ */
+HS_ALWAYS_INLINE bool
+walk_gathered(ball_walk *walk, int reach, part parts[][HS_SLOTS], bool *stopped, const int ndim)
+{
+    uint32_t              places[MOST_GATHERED * CROWD];
+    const hs_dynamic     *list = walk->ball->list;
+    const hs_offset_list *offsets = &list->offsets.list[reach];
+    const uint8_t        *slot = offsets->slot;
+    uint32_t              fullest = 0;
+    int                   n = 0;
+    if (!list->cells.dense || walk->meets_images || walk->is_near || offsets->n > MOST_GATHERED ||
+        list->counters != NULL) {
+        return false;
+    }
+    for (int64_t o = 0; o < offsets->n; o++, slot += ndim) {
+        double   gap = parts[0][slot[0]].gap;
+        uint64_t number = parts[0][slot[0]].number;
+        for (int k = 1; k < ndim; k++) {
+            gap += parts[k][slot[k]].gap;
+            number += parts[k][slot[k]].number;
+        }
+        const hs_cell  cell = list->cells.cell[number];
+        const uint32_t count = gap <= walk->limit ? cell.count : 0;
+        fullest = count > fullest ? count : fullest;
+        for (uint32_t e = 0; e < CROWD; e++) {
+            places[n + (int)e] = cell.start + e;
+        }
+        n += (int)(count < CROWD ? count : CROWD);
+    }
+    if (fullest > CROWD) {
+        return false;
+    }
+    *stopped = false;
+    for (int e = 0; e < n && !*stopped; e++) {
+        *stopped = scan_entry(walk, &walk->ball->home, places[e], ndim);
+    }
+    return true;
+}
+
+HS_ALWAYS_INLINE bool
+walk_few(ball_walk *walk, int reach, const int ndim)
+{
+    part parts[HS_MAX_DIM][HS_SLOTS];
+    bool stopped;
+    set_parts(walk, reach, parts, ndim);
+    return walk_gathered(walk, reach, parts, &stopped, ndim)
+               ? stopped
+               : walk_listed(walk, reach, parts, ndim);
+}
+
+/* Cells by index, the last axis fastest. */
+static bool
+walk_by_index(ball_walk *walk)
+{
+    const hs_span_of_cells *span = walk->ball->span;
+    const int               d = walk->ball->list->lattice.ndim;
+    int64_t                 u[HS_MAX_DIM], index[HS_MAX_DIM] = {0}, along[HS_MAX_DIM] = {0};
+    part                    parts[HS_MAX_DIM];
+    for (int k = 0; k < d; k++) {
+        u[k] = span[k].first;
+        parts[k] = part_of(walk, k, u[k]);
+    }
+    for (;;) {
+        double   gap = 0.0;
+        uint64_t number = 0;
+        for (int k = 0; k < d; k++) {
+            gap += parts[k].gap;
+            number += parts[k].number;
+            index[k] = parts[k].index;
+            along[k] = parts[k].image;
+        }
+        if ((gap <= walk->limit && scan_number(walk, number, index, along, d)) ||
+            !goes_on(walk, 1)) {
+            return true;
+        }
+        int k = d - 1;
+        while (k >= 0 && u[k] == span[k].last) {
+            u[k] = span[k].first;
+            parts[k] = part_of(walk, k, u[k]);
+            k--;
+        }
+        if (k < 0) {
+            return false;
+        }
+        u[k]++;
+        parts[k] = part_of(walk, k, u[k]);
+    }
+}
+
+/* All cells there are, in one image. */
+static bool
+scan_all(ball_walk *walk, const hs_ball_image *image)
+{
+    const hs_dynamic *list = walk->ball->list;
+    for (int64_t c = 0; c < list->cells.n; c++) {
+        if (scan_cell(walk, image, list->cells.cell[c], list->lattice.ndim)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* All cells there are, in each image; entries of a near walk once. */
+static bool
+walk_all(ball_walk *walk)
+{
+    const hs_span_of_cells *span = walk->ball->span;
+    const hs_dynamic       *list = walk->ball->list;
+    const int               d = list->lattice.ndim;
+    int64_t                 along[HS_MAX_DIM];
+    if (walk->is_near) {
+        walk->filters = list->storage != HS_STORE_ALL_PAIRS;
+        return scan_all(walk, &walk->ball->home);
+    }
+    for (int k = 0; k < d; k++) {
+        along[k] = span[k].least;
+    }
+    for (;;) {
+        uint64_t turns = 0;
+        for (int k = 0; k < d; k++) {
+            turns |= (uint64_t)along[k];
+        }
+        if (scan_all(walk, turns != 0 ? image_of(walk, along) : &walk->ball->home)) {
+            return true;
+        }
+        int k = d - 1;
+        while (k >= 0 && along[k] == span[k].most) {
+            along[k] = span[k].least;
+            k--;
+        }
+        if (k < 0) {
+            return false;
+        }
+        along[k]++;
+    }
+}
+
+/* Along open axes a dense table ends where its cells do. False: no cell is left. */
+static bool
+cut_spans(const hs_dynamic *list, hs_span_of_cells *span)
+{
+    bool some = list->cells.n > 0;
+    for (int k = 0; k < list->lattice.ndim; k++) {
+        if (list->cells.dense && list->axes.axis[k].n == 0 && some) {
+            const int64_t last = list->cells.lowest[k] + list->cells.shape[k] - 1;
+            span[k].first = span[k].first < list->cells.lowest[k] ? list->cells.lowest[k]
+                                                                  : span[k].first;
+            span[k].last = span[k].last > last ? last : span[k].last;
+        }
+        some = some && span[k].first <= span[k].last;
+    }
+    return some;
+}
+
+/* A ball whose cells are fewer than those of the list, times images. */
+static bool
+take_cells(ball_walk *walk)
+{
+    const hs_dynamic       *list = walk->ball->list;
+    const hs_span_of_cells *span = walk->ball->span;
+    double                  wanted = 1.0, stored = (double)list->cells.n;
+    int64_t                 reach = 0;
+    for (int k = 0; k < list->lattice.ndim; k++) {
+        const int64_t below = span[k].centre - span[k].first, above = span[k].last - span[k].centre;
+        wanted *= (double)(span[k].last - span[k].first) + 1.0;
+        stored *= walk->is_near ? 1.0 : (double)(span[k].most - span[k].least) + 1.0;
+        walk->meets_images = walk->meets_images || span[k].least != 0 || span[k].most != 0;
+        reach = below > reach ? below : reach;
+        reach = above > reach ? above : reach;
+    }
+    if (reach > 1 && wanted > stored) {
+        return walk_all(walk);
+    }
+    if (reach > list->offsets.reach || walk->cut != 0) {
+        return walk_by_index(walk);
+    }
+    switch (list->lattice.ndim) {
+    case 2: return walk_few(walk, (int)reach, 2);
+    case 3: return walk_few(walk, (int)reach, 3);
+    default: return walk_few(walk, (int)reach, list->lattice.ndim);
+    }
+}
+
+/* Above the square of the radius, by more than all rounding: no cell with a larger gap matters. */
+static double
+limit_of(const hs_ball *ball)
+{
+    const double least = hs_larger(ball->radius, HS_LEAST_BALL);
+    return least * least * (1.0 + 0x1p-30);
+}
+
+bool
+hs_ball_within(hs_ball *ball, const hs_ball_visit *visit)
+{
+    ball_walk walk = {.ball = ball, .visit = visit, .limit = limit_of(ball), .has_turned = false};
+    return cut_spans(ball->list, ball->span) && take_cells(&walk);
+}
+
+/* Each cell once: those of one period around the centre's cell. */
+static void
+cut_to_a_period(ball_walk *walk)
+{
+    for (int k = 0; k < walk->ball->list->lattice.ndim; k++) {
+        const int64_t     n = walk->ball->list->axes.axis[k].n;
+        hs_span_of_cells *span = &walk->ball->span[k];
+        if (n > 0 && span->last - span->first >= n) {
+            span->first = span->centre - n / 2;
+            span->last = span->first + n - 1;
+            walk->cut |= 1u << k;
+        }
+    }
+}
+
+static bool
+passes_int32(const hs_span_of_cells *span, int ndim)
+{
+    bool passes = false;
+    for (int k = 0; k < ndim; k++) {
+        passes = passes || span[k].first < INT32_MIN || span[k].last > INT32_MAX;
+    }
+    return passes;
+}
+
+void
+hs_ball_near(hs_ball *ball, const hs_ball_visit *visit)
+{
+    const hs_dynamic *list = ball->list;
+    ball_walk walk = {.ball = ball, .visit = visit, .limit = limit_of(ball), .is_near = true};
+    cut_to_a_period(&walk);
+    walk.filters = !list->cells.dense &&
+                   (list->cells.is_wide || passes_int32(ball->span, list->lattice.ndim));
+    if (list->storage == HS_STORE_ALL_PAIRS) {
+        (void)walk_all(&walk);
+    } else if (cut_spans(list, ball->span)) {
+        (void)take_cells(&walk);
+    }
 }

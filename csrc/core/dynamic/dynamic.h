@@ -1,4 +1,42 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_DYNAMIC_DYNAMIC_H
+#define HS_DYNAMIC_DYNAMIC_H
+
+#include "../base/base.h"
+#include "../../halfshell_dynamic.h"
+#include "../base/os.h"
+#include "../box/lattice.h"
+#include "storage.h"
+#include "../box/wrap.h"
+
+/*
+ * A lock that many readers may hold at once, or one writer. Free, it costs two atomic
+ * instructions a call, which is what a list of a hundred nanoseconds a call can afford; only a
+ * thread that has to wait calls the system.
+ */
+
+/* How many readers are inside, or that a writer is, and after how many forks (os_thread.h). */
+typedef struct hs_gate {
+    volatile int64_t state;
+    volatile int64_t holder;  /* number of the thread that is the writer for many calls; 0: none */
+    int64_t          held_at; /* how many forks there had been when it became that */
+    void *(*pause)(void);     /* around each wait of a writer; NULL: nothing is done */
+    void (*resume)(void *paused);
+} hs_gate;
+
+void hs_gate_init(hs_gate *gate);
+
+/* Go in, which `end` ends. False: this thread holds the gate, and is inside. */
+bool hs_gate_read(hs_gate *gate);
+void hs_gate_read_end(hs_gate *gate);
+bool hs_gate_write(hs_gate *gate);
+void hs_gate_write_end(hs_gate *gate);
+
+/* A writer for many calls. False: this thread holds the gate already. */
+bool hs_gate_hold(hs_gate *gate);
+bool hs_gate_is_mine(hs_gate *gate); /* whether this thread holds it */
+void hs_gate_release(hs_gate *gate); /* which this thread holds */
+
 /*
  * dynamic.h: a list of points that come, go and move, each under a key.
  *
@@ -7,18 +45,6 @@
  * by one of twice the size. A map leads from keys to entries. Removal moves the last entry of the
  * cell into the gap and tells the map: it takes the same time however crowded the cell is.
  */
-#ifndef HS_DYNAMIC_H
-#define HS_DYNAMIC_H
-
-#include "../../halfshell_dynamic.h"
-#include "../base/fpenv.h"
-#include "../box/lattice.h"
-#include "cell_axes.h"
-#include "cell_table.h"
-#include "entries.h"
-#include "gate.h"
-#include "key_map.h"
-#include "offsets.h"
 
 struct hs_dynamic {
     hs_storage storage;
@@ -46,7 +72,236 @@ struct hs_dynamic {
     hs_dynamic_counters *counters; /* borrowed, or NULL */
 };
 
-/* A position, made ready: place_point.h. */
+/* A position, made ready: dynamic.h. */
 typedef struct hs_placed hs_placed;
+
+/* Room for the entries of a cell. */
+
+/* The size of the smallest block for so many entries: it has 2^size. */
+int hs_block_size(int64_t count);
+
+/* Makes room for `count` entries in a cell; those that are there move to a larger block. False when
+ * memory is refused: then nothing has changed. */
+bool hs_cell_reserve(hs_dynamic *list, uint32_t number, int64_t count);
+
+/* A position as a list stores it: brought into the middle period, and its cell. */
+
+/* A position, made ready. */
+struct hs_placed {
+    const double *given;             /* borrowed; ndim finite numbers */
+    double        x[HS_MAX_DIM];     /* X, in the middle period; not rounded in aligned boxes */
+    double        t[HS_MAX_DIM];     /* coordinates along the grid axes */
+    double        terms[HS_MAX_DIM]; /* sums of absolute products in them; not in aligned boxes */
+    int64_t       turns[HS_MAX_DIM]; /* over the rows of B */
+    int64_t       index[HS_MAX_DIM]; /* of the cell */
+    double        magnitude; /* as hs_wrap_point raises it, of the coordinates that the box moves;
+                              * not in aligned boxes */
+};
+
+/*
+ * X and turns of finite numbers; false beyond HS_WRAP_LIMIT. *magnitude as in hs_wrap_point.
+ * Aligned boxes wrap each coordinate exactly, others by compensated sums. Most points are inside
+ * or one period away, where the difference is exact, as wrap.c says of its columns.
+ */
+HS_ALWAYS_INLINE bool
+hs_dynamic_wrap(const hs_dynamic *list, const double *given, double *wrapped, int64_t *turns,
+                double *magnitude, const int ndim)
+{
+    bool fits = true;
+    if (!list->lattice.aligned) {
+        return hs_wrap_point(&list->lattice, given, wrapped, turns, magnitude);
+    }
+    for (int k = 0; k < ndim; k++) {
+        const hs_axis *axis = &list->axes.axis[k];
+        const double   x = given[k], size = fabs(x);
+        wrapped[k] = x;
+        if (axis->row < 0) {
+            continue;
+        }
+        if (size <= 1.25 * axis->period) {
+            /* No branch: which half of the box a point is in cannot be predicted. */
+            const double turn = (double)((x > axis->half) - (x < -axis->half));
+            wrapped[k] = x - turn * axis->period;
+            turns[axis->row] = (int64_t)turn;
+        } else {
+            wrapped[k] = hs_wrap_axis(x, axis->period, &turns[axis->row]);
+            fits = fits && turns[axis->row] != HS_WRAP_UNKNOWN;
+        }
+    }
+    return fits;
+}
+
+/* In general boxes: whether X and its coordinates are known to within a few periods, so that a ball
+ * meets few images. Sets the magnitude and the terms. */
+bool hs_dynamic_is_known(const hs_dynamic *list, hs_placed *placed);
+
+/* HS_OK, HS_ERR_NOT_FINITE with column and value, HS_ERR_SHIFT_RANGE. ndim: that of the list, for
+ * callers that let the compiler unroll loops. */
+HS_ALWAYS_INLINE hs_status
+hs_dynamic_place_in(const hs_dynamic *list, const double *given, hs_placed *placed,
+                    hs_failure *failure, const int ndim)
+{
+    placed->given = given;
+    placed->magnitude = 0.0;
+    for (int k = 0; k < ndim; k++) {
+        if (!isfinite(given[k])) {
+            failure->column = k;
+            failure->value = given[k];
+            return HS_ERR_NOT_FINITE;
+        }
+    }
+    if (HS_UNLIKELY(list->counters != NULL) && list->lattice.n_periodic > 0) {
+        list->counters->wraps++;
+    }
+    if (!hs_dynamic_wrap(list, given, placed->x, placed->turns, &placed->magnitude, ndim)) {
+        return HS_ERR_SHIFT_RANGE;
+    }
+    if (!list->lattice.aligned && !hs_dynamic_is_known(list, placed)) {
+        return HS_ERR_SHIFT_RANGE;
+    }
+    for (int k = 0; k < ndim; k++) {
+        placed->t[k] = hs_lattice_coordinate(&list->lattice, placed->x, k);
+        placed->index[k] = hs_axis_cell(&list->axes.axis[k], placed->t[k]);
+    }
+    return HS_OK;
+}
+
+hs_status hs_dynamic_place(const hs_dynamic *list, const double *given, hs_placed *placed,
+                           hs_failure *failure);
+
+/* The position of an entry. placed: NULL for a key without one. */
+void hs_dynamic_write(hs_dynamic *list, uint32_t place, const hs_placed *placed);
+
+/* Many positions, as columns x[k][i] of finite numbers. */
+
+/* Whether to go on before row i, as long as the list is as it was. */
+HS_ALWAYS_INLINE bool
+hs_rows_go_on(const hs_dynamic *list, int64_t i)
+{
+    return (i + 1) % HS_POLL_POINTS != 0 || list->hooks.poll == NULL || list->hooks.poll(NULL, 0.0);
+}
+
+/* Row i made ready. given: receives its numbers, which `placed` borrows. Statuses of
+ * hs_dynamic_place, with failure->row. */
+hs_status hs_rows_place(const hs_dynamic *list, double *const *x, int64_t i, double *given,
+                        hs_placed *placed, hs_failure *failure);
+
+/* Whether all positions can be had; dense cells are made to reach them. HS_ERR_SHIFT_RANGE;
+ * HS_ERR_CAPACITY with the bytes, HS_ERR_MEMORY, HS_ERR_INTERRUPTED. n > 0. */
+hs_status hs_rows_reach(hs_dynamic *list, int64_t n, double *const *x, hs_failure *failure);
+
+/* Lists as a whole: made from options, copied, emptied. */
+
+/* HS_OK, or what is wrong with the options; failure->column as halfshell_dynamic.h says. */
+hs_status hs_list_check(const hs_dynamic_options *options, hs_failure *failure);
+
+/* options: checked. HS_ERR_MEMORY, HS_ERR_BOX_SKEWED, or HS_ERR_CUTOFF when a ball would meet too
+ * many images. */
+hs_status hs_list_new(const hs_dynamic_options *options, hs_dynamic **list, hs_failure *failure);
+
+void      hs_list_free(hs_dynamic *list);
+hs_status hs_list_copy(const hs_dynamic *list, hs_dynamic **copy);
+void      hs_list_clear(hs_dynamic *list);
+
+/* On failure the list is as it was. */
+hs_status hs_list_shrink(hs_dynamic *list);
+
+/* The points of a list in another one, which takes no more memory than they need. */
+
+/* copy: a new list of the same kind. HS_ERR_MEMORY: it holds no points. */
+hs_status hs_copy_points(const hs_dynamic *list, hs_dynamic *copy);
+
+/* Many points into a list that holds none: no key has to be looked up, and each cell has
+ * its block from the beginning. */
+
+/* list: empty. ids: n that differ from each other, n > 0; positions are columns x[k][i], finite.
+ * Statuses of hs_update_insert_many; on failure the list holds no points. */
+hs_status hs_fill(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n,
+                  double *const *x, hs_failure *failure);
+
+/*
+ * A point comes into a cell, goes out of it or moves on, once there is room: nothing
+ * here can fail. A point that stays in its cell is written over; else it is appended to its new
+ * cell and taken out of the old one.
+ */
+
+/* A new entry behind those of a cell that has room for it; returns its place. */
+HS_ALWAYS_INLINE uint32_t
+hs_append_entry(hs_dynamic *list, uint32_t number, hs_key key, const hs_placed *placed)
+{
+    hs_cell *const       cell = &list->cells.cell[number];
+    const uint32_t       place = cell->start + cell->count;
+    hs_entry_tail *const tail = hs_entry_tail_at(&list->entries, place);
+    list->cells.n_empty -= cell->count == 0;
+    cell->count++;
+    tail->id = key.id;
+    tail->tag = key.tag;
+    tail->cell = number;
+    hs_dynamic_write(list, place, placed);
+    return place;
+}
+
+/* Takes an entry out of its cell: the last one takes its place. A cell that is left empty gives its
+ * block back. */
+HS_ALWAYS_INLINE void
+hs_take_out(hs_dynamic *list, uint32_t place)
+{
+    const uint32_t number = hs_entry_tail_at(&list->entries, place)->cell;
+    hs_cell *const cell = &list->cells.cell[number];
+    const uint32_t last = cell->start + cell->count - 1;
+    if (last != place) {
+        const hs_entry_tail *tail = hs_entry_tail_at(&list->entries, last);
+        hs_key_map_moved(&list->map, (hs_key){tail->id, tail->tag}, last, place);
+        hs_entries_copy(&list->entries, last, &list->entries, place, 1);
+    }
+    cell->count--;
+    list->cells.n_empty += cell->count == 0;
+    if (cell->count == 0 && !list->keeps_blocks) {
+        hs_entries_give(&list->entries, list->cells.size[number], cell->start);
+        list->cells.size[number] = HS_NO_BLOCK;
+    }
+}
+
+HS_ALWAYS_INLINE bool
+hs_has_position(const hs_dynamic *list, uint32_t place)
+{
+    return !isnan(hs_entry_at(&list->entries, place)[0]);
+}
+
+/* The point of a key that is there, for which its new cell has room if that is another one. */
+HS_ALWAYS_INLINE void
+hs_put_again(hs_dynamic *list, hs_key key, uint32_t place, uint32_t number, const hs_placed *placed)
+{
+    list->n_without += (placed == NULL) - !hs_has_position(list, place);
+    if (hs_entry_tail_at(&list->entries, place)->cell == number) {
+        hs_dynamic_write(list, place, placed);
+        return;
+    }
+    const uint32_t to = hs_append_entry(list, number, key, placed);
+    hs_key_map_moved(&list->map, key, place, to);
+    hs_take_out(list, place);
+}
+
+HS_ALWAYS_INLINE void
+hs_put_new(hs_dynamic *list, hs_key key, uint32_t number, const hs_placed *placed)
+{
+    list->n_without += placed == NULL;
+    hs_key_map_add(&list->map, key, hs_append_entry(list, number, key, placed));
+}
+
+/*
+ * Points come, go and move. Each function either does all that it is for, or returns a
+ * status and leaves the list as it was, but for memory that waits for the next point.
+ */
+
+/* Adds the point or moves it. placed: NULL for a key without a position. */
+hs_status hs_update_insert(hs_dynamic *list, hs_key key, const hs_placed *placed,
+                           hs_failure *failure);
+
+/* The same for n keys that differ from each other; positions are columns x[k][i], finite. */
+hs_status hs_update_insert_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags,
+                                int64_t n, double *const *x, hs_failure *failure);
+
+bool hs_update_remove(hs_dynamic *list, hs_key key);
 
 #endif

@@ -1,4 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_EXACT_BOUNDS_H
+#define HS_EXACT_BOUNDS_H
+
 /*
  * bounds.h: every error constant of the float stages, in one place, each with its reason.
  *
@@ -9,8 +12,6 @@
  * u is the unit roundoff of float32, v that of float64: rounding to nearest changes a number by
  * at most that factor of itself.
  */
-#ifndef HS_BOUNDS_H
-#define HS_BOUNDS_H
 
 /* v. */
 #ifndef HS_FLOAT64_UNIT
@@ -95,7 +96,7 @@
 #define HS_EXPANDED_FLUSHES 2.0
 #endif
 
-/* ---- float64 stage (metric_float.h) ---- */
+/* ---- float64 stage (metric.h) ---- */
 
 /* Roundings of |D|^2 in float64: the difference, twice as it is squared, and per axis one (the
  * square of the first axis, the sum of the others). The .001 pays for the products of roundings
@@ -107,7 +108,7 @@
 #define HS_FLOAT64_ROUNDINGS_PER_AXIS 1.0
 #endif
 
-/* Supports in float64 (metric_support.h): roundings of a term of H D, in units of the term. D once;
+/* Supports in float64 (ellipsoid.h): roundings of a term of H D, in units of the term. D once;
  * and for each axis, the product, and the sums that it goes to, which are one less. The .001 pays
  * for the products of roundings and for working out the bound. */
 #ifndef HS_SUPPORT_ROUNDINGS
@@ -117,7 +118,7 @@
 #define HS_SUPPORT_ROUNDINGS_PER_AXIS 1.0
 #endif
 
-/* ---- double-word stage (metric_float.h) ---- */
+/* ---- double-word stage (metric.h) ---- */
 
 /* v^2 per sum of two double-words, relative to the sum of their magnitudes. The .01 pays for the
  * terms in v^3 and for working out the bound in float64. */

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* filter.c: the float32 thresholds, every step of their computation rounded to the safe side. */
 #include "filter.h"
+#include "bounds.h"
+#include "arithmetic.h"
 
 #include <float.h>
 #include <math.h>
 
-#include "bounds.h"
-#include "doubleword.h"
+/* filter.c: the float32 thresholds, every step of their computation rounded to the safe side. */
 
 /* Sums and products of numbers >= 0, rounded up and down. */
 static double

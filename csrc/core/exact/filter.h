@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_EXACT_FILTER_H
+#define HS_EXACT_FILTER_H
+
+#include "../base/base.h"
+
 /*
  * filter.h: the two thresholds of a gathered neighbourhood. A kernel computes, in float32, an s of
  * candidates y and points q given relative to a common centre: the direct form
@@ -6,10 +11,6 @@
  * s > out the pair is surely beyond the cutoff, with s < in surely within it; what lies between is
  * settled by metric.h. docs/exactness.md derives the bounds.
  */
-#ifndef HS_FILTER_H
-#define HS_FILTER_H
-
-#include "../base/base.h"
 
 typedef struct hs_thresholds {
     float in;  /* rounded down; -1 when nothing is sure */
@@ -53,7 +54,7 @@ typedef struct hs_limit_form {
 hs_limit_form hs_limit_form_of(int ndim, double extent, double error);
 
 /*
- * For supports (support.h) over their extent: N = H / extent, rounded to float32, with which
+ * For supports (ellipsoid.h) over their extent: N = H / extent, rounded to float32, with which
  * kernels compute s = sum_k (sum_l N_kl (y_l - q_l))^2. Thresholds for |N D| against 1 are those of
  * a limit, r being not below the size of N (hs_support_size), nor below HS_LEAST_NEAR_SIZE.
  */

@@ -1,6 +1,137 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* levels.c: a level as others see it: a set of points by itself. */
 #include "levels.h"
+#include "../base/status.h"
+#include "../scene/points.h"
+#include "../base/sort.h"
+#include "../cells/grid.h"
+#include "../search/choice.h"
+#include "../search/search.h"
+
+#include <math.h>
+#include <string.h>
+
+/* The lower triangle of each matrix, once the upper one is seen to be the same. */
+
+/* The lower triangle, each number of the matrix read once. False if one is not finite or differs
+ * from its mirror image, which is *wrong then; NaN differs. */
+static bool
+read_entries(const double *matrix, int ndim, double *entries, double *wrong)
+{
+    bool right = true;
+    for (int k = 0; k < ndim; k++) {
+        for (int l = 0; l <= k; l++) {
+            const double lower = matrix[k * ndim + l] + 0.0; /* and no -0 */
+            const double upper = l < k ? matrix[l * ndim + k] : lower;
+            entries[hs_support_at(k, l)] = lower;
+            if (right && (!isfinite(lower) || lower != upper)) {
+                *wrong = isfinite(lower) ? upper : lower;
+                right = false;
+            }
+        }
+    }
+    return right;
+}
+
+static hs_status
+refuse_support(hs_status status, int64_t row, double value, hs_failure *failure)
+{
+    failure->row = row;
+    failure->value = value;
+    return status;
+}
+
+static hs_status
+read_one(const double *matrix, int64_t row, int ndim, double extent, double *numbers, double *reach,
+         hs_failure *failure)
+{
+    double wrong = 0.0;
+    if (!read_entries(matrix, ndim, numbers, &wrong)) {
+        return refuse_support(HS_ERR_SUPPORTS, row, wrong, failure);
+    }
+    numbers[hs_support_entries(ndim)] = hs_support_size(ndim, numbers);
+    switch (hs_support_reach(ndim, numbers, extent, reach)) {
+    case HS_SUPPORT_FITS: return HS_OK;
+    case HS_SUPPORT_NOT_DEFINITE: return refuse_support(HS_ERR_SUPPORTS, row, numbers[0], failure);
+    default: return refuse_support(HS_ERR_SUPPORT_REACH, row, extent, failure);
+    }
+}
+
+hs_status
+hs_support_set_read(hs_account *account, const hs_options *options, const double *supports,
+                    int64_t n, int ndim, double extent, hs_support_set *set, double *reaches,
+                    hs_failure *failure)
+{
+    const int64_t each = hs_support_numbers(ndim);
+    hs_status     status = HS_OK;
+    set->first = 0;
+    set->numbers = hs_alloc(account, HS_FOR_SUPPORTS, n * each, sizeof *set->numbers);
+    if (set->numbers == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    for (int64_t i = 0; status == HS_OK && i < n; i++) {
+        status = read_one(supports + i * ndim * ndim, i, ndim, extent, set->numbers + i * each,
+                          &reaches[i], failure);
+        if (status == HS_OK && (i + 1) % HS_POLL_SUPPORTS == 0) {
+            status = hs_poll(options, 0.0);
+        }
+    }
+    if (status != HS_OK) {
+        hs_support_set_free(account, set);
+    }
+    return status;
+}
+
+void
+hs_support_set_free(hs_account *account, hs_support_set *set)
+{
+    hs_free(account, set->numbers);
+    set->numbers = NULL;
+}
+
+/* The largest width of all points, which a few tell where they are round or turned
+ * in all ways. */
+
+/* Of the points of some levels, which have supports. Ends where it is enough. */
+static hs_status
+width_of(const hs_support_step *of, const hs_level_set *set, hs_slice levels, const double *normal,
+         double enough, double *width)
+{
+    const int     size_at = hs_support_entries(set->ndim);
+    const int64_t first = set->first[levels.first], end = set->first[levels.end];
+    *width = 0.0;
+    for (int64_t at = first; at < end && *width < enough; at++) {
+        const double *numbers = hs_support_set_at(&set->supports, set->ndim, set->number[at]);
+        const double  own = hs_support_width(set->ndim, numbers, numbers[size_at],
+                                             of->levels->extent, set->radii[at], normal);
+        *width = hs_larger(*width, own);
+        if ((at + 1 - first) % HS_POLL_SUPPORTS == 0 && hs_poll(of->options, 0.0) != HS_OK) {
+            return HS_ERR_INTERRUPTED;
+        }
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_support_step_width(const void *context, const double *normal, double enough, double *width)
+{
+    const hs_support_step *of = context;
+    const hs_level_step   *step = of->step;
+    const hs_level_set    *set = hs_levels_asking(of->levels);
+    const hs_rule          rule = of->levels->rule;
+    hs_status              status = HS_OK;
+    double                 asking = 0.0, points = 0.0;
+    if (hs_rule_needs_asking(rule)) {
+        status = width_of(of, set, step->asking, normal, enough, &asking);
+    }
+    if (status == HS_OK && hs_rule_needs_other(rule) &&
+        !(rule == HS_RULE_MAX && asking >= enough)) {
+        status = width_of(of, &of->levels->points, step->points, normal, enough, &points);
+    }
+    *width = rule == HS_RULE_MIN ? hs_smaller(asking, points) : hs_larger(asking, points);
+    return status;
+}
+
+/* levels.c: a level as others see it: a set of points by itself. */
 
 static void
 free_level_set(hs_account *account, hs_level_set *set)
@@ -40,4 +171,1077 @@ hs_level_points(const hs_level_set *set, hs_slice levels)
                        .real = HS_FLOAT64,
                        .row_stride = set->ndim * (ptrdiff_t)sizeof(double),
                        .column_stride = sizeof(double)};
+}
+
+/* Each number of the caller is read once, into a copy that is then worked on. */
+
+/* Radii that no sum or half of the rules takes out of float64's range. */
+#define LARGEST_RADIUS  0x1p1022
+#define SMALLEST_HALVED 0x1p-1021
+
+/* Radii that have an extent, where they are not 0: the two words of the product are float64s, and
+ * no two radii are so different that they could not be told apart by their size. */
+#define SMALLEST_EXTENDED 0x1p-500
+#define LARGEST_EXTENDED  0x1p500
+
+static hs_status
+refuse_input(hs_status status, const hs_level_input *set, int64_t row, double value,
+             hs_failure *failure)
+{
+    failure->row = row;
+    failure->value = value;
+    failure->in_queries = set->are_queries;
+    return status;
+}
+
+bool
+hs_division_go_on(const hs_division *by, int64_t n, hs_slice *next, hs_status *status)
+{
+    if (*status == HS_OK && next->end > 0 && next->end < n) {
+        *status = hs_poll(by->options, 0.0);
+    }
+    next->first = next->end;
+    next->end = n - next->first < HS_POLL_POINTS ? n : next->first + HS_POLL_POINTS;
+    return *status == HS_OK && next->first < n;
+}
+
+static hs_status
+read_radii(hs_division *by, hs_level_input *set, hs_failure *failure)
+{
+    const bool    halves = by->reach->rule == HS_RULE_MEAN, extends = by->factor != 1.0;
+    const double  largest = extends ? LARGEST_EXTENDED : LARGEST_RADIUS;
+    const double  smallest = extends ? SMALLEST_EXTENDED : halves ? SMALLEST_HALVED : 0.0;
+    const int64_t n = set->radii != NULL ? set->points->n : 0;
+    hs_slice      next = {0, 0};
+    hs_status     status = HS_OK;
+    while (hs_division_go_on(by, n, &next, &status)) {
+        for (int64_t i = next.first; i < next.end; i++) {
+            const double radius = set->radii[i] + 0.0; /* and no -0 */
+            if (!(radius >= 0.0 && radius <= largest) || (radius > 0.0 && radius < smallest)) {
+                return refuse_input(HS_ERR_RADII, set, i, radius, failure);
+            }
+            set->copy[i] = halves ? 0.5 * radius : radius;
+            by->largest = hs_larger(by->largest, set->copy[i]);
+        }
+    }
+    return status;
+}
+
+static hs_status
+read_supports(hs_division *by, hs_level_input *set, hs_failure *failure)
+{
+    const int64_t n = set->points->n;
+    hs_status     status = HS_OK;
+    if (set->supports != NULL) {
+        status = hs_support_set_read(by->account, by->options, set->supports, n, set->points->ndim,
+                                     by->reach->extent, &set->read, set->copy, failure);
+        failure->in_queries = set->are_queries;
+    }
+    for (int64_t i = 0; status == HS_OK && set->supports != NULL && i < n; i++) {
+        by->largest = hs_larger(by->largest, set->copy[i]);
+    }
+    return status;
+}
+
+static hs_status
+read_types(const hs_division *by, hs_level_input *set, hs_failure *failure)
+{
+    hs_slice  next = {0, 0};
+    hs_status status = HS_OK;
+    while (hs_division_go_on(by, set->points->n, &next, &status)) {
+        for (int64_t i = next.first; i < next.end; i++) {
+            const int32_t type = set->types[i];
+            if (type < 0 || type >= by->reach->n_types) {
+                return refuse_input(HS_ERR_TYPES, set, i, type, failure);
+            }
+            set->size[i] = type;
+            by->count[type]++;
+        }
+    }
+    return status;
+}
+
+static hs_status
+read_rows(const hs_division *by, hs_level_input *set, hs_failure *failure)
+{
+    hs_slice  next = {0, 0};
+    hs_status status = HS_OK;
+    while (hs_division_go_on(by, set->points->n, &next, &status)) {
+        hs_points part = *set->points;
+        part.data = (const char *)part.data + next.first * part.row_stride;
+        part.n = next.end - next.first;
+        status = hs_points_copy_finite(&part, set->rows + next.first * part.ndim, failure);
+        if (status != HS_OK) {
+            failure->row += next.first;
+            failure->in_queries = set->are_queries;
+        }
+    }
+    return status;
+}
+
+hs_status
+hs_level_input_read(hs_division *by, hs_level_input *set, hs_failure *failure)
+{
+    const int64_t n = set->points->n;
+    set->rows = hs_alloc(by->account, HS_FOR_POINTS, n * set->points->ndim, sizeof *set->rows);
+    set->copy = hs_alloc(by->account, HS_FOR_POINTS, n, sizeof *set->copy);
+    set->size = hs_alloc(by->account, HS_FOR_ORDER, n, sizeof *set->size);
+    if (set->rows == NULL || set->copy == NULL || set->size == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    const hs_status status = by->reach->has_supports  ? read_supports(by, set, failure)
+                             : by->reach->n_types > 0 ? read_types(by, set, failure)
+                                                      : read_radii(by, set, failure);
+    return status == HS_OK ? read_rows(by, set, failure) : status;
+}
+
+void
+hs_level_input_free(hs_account *account, hs_level_input *set)
+{
+    hs_free(account, set->rows);
+    hs_free(account, set->copy);
+    hs_free(account, set->size);
+    hs_support_set_free(account, &set->read);
+}
+
+/* One pass finds the level of each point, a counting sort puts the levels in
+ * order. */
+
+/* Sizes count the binary orders of a radius below the largest one, and zero as the smallest. */
+#define LEAST_EXPONENT (-1074)
+#define N_SIZES        (1 - LEAST_EXPONENT)
+
+/* Ascends with the radius: the largest size are radii above half of the largest one, and so on, so
+ * that radii which differ little are of one or two sizes. */
+static int32_t
+size_of(double radius, double largest)
+{
+    const double part = radius > 0.0 ? radius / largest : 0.0;
+    return part == 0.0 ? 0 : part == 1.0 ? N_SIZES - 1 : ilogb(part) - LEAST_EXPONENT + 1;
+}
+
+/* Once the largest radius is known. Sets without any are of one size. */
+static hs_status
+find_sizes(const hs_division *by, hs_level_input *set)
+{
+    hs_slice  next = {0, 0};
+    hs_status status = HS_OK;
+    while (hs_division_go_on(by, set->points->n, &next, &status)) {
+        for (int64_t i = next.first; i < next.end; i++) {
+            set->size[i] = hs_level_input_has_radii(set) ? size_of(set->copy[i], by->largest) : 0;
+            by->count[set->size[i]]++;
+        }
+    }
+    return status;
+}
+
+/* Gives each size that occurs a level, in count; returns how many there are. */
+static int32_t
+number_levels(const hs_division *by)
+{
+    int32_t n = 0;
+    for (int32_t s = 0; s < by->n_sizes; s++) {
+        by->count[s] = by->count[s] > 0 ? n++ : -1;
+    }
+    return n;
+}
+
+static bool
+allocate_set(const hs_division *by, const hs_level_input *from, int32_t n_levels, hs_level_set *to)
+{
+    const int64_t n = from->points->n;
+    to->n = n;
+    to->ndim = from->points->ndim;
+    to->rows = hs_alloc(by->account, HS_FOR_POINTS, n * to->ndim, sizeof *to->rows);
+    to->number = hs_alloc(by->account, HS_FOR_ORDER, n, sizeof *to->number);
+    to->first = hs_alloc(by->account, HS_FOR_CELLS, (int64_t)n_levels + 1, sizeof *to->first);
+    to->radii = NULL;
+    if (hs_level_input_has_radii(from)) {
+        to->radii = hs_alloc(by->account, HS_FOR_POINTS, n, sizeof *to->radii);
+    }
+    return to->rows != NULL && to->number != NULL && to->first != NULL &&
+           (to->radii != NULL || !hs_level_input_has_radii(from));
+}
+
+/* Puts the points in the order of their levels. */
+static hs_status
+arrange(const hs_division *by, hs_level_input *from, int32_t n_levels, hs_level_set *to)
+{
+    if (!allocate_set(by, from, n_levels, to)) {
+        return HS_ERR_MEMORY;
+    }
+    const size_t bytes = (size_t)to->ndim * sizeof(double);
+    hs_slice     part = {0, 0};
+    hs_status    status = HS_OK;
+    int64_t *next = to->first; /* where each level goes on; then, where the one before it ends */
+    memset(next, 0, ((size_t)n_levels + 1) * sizeof *next);
+    for (int64_t i = 0; i < to->n; i++) {
+        next[by->count[from->size[i]] + 1]++;
+    }
+    hs_starts_of_lengths(next, (int64_t)n_levels + 1);
+    while (hs_division_go_on(by, to->n, &part, &status)) {
+        for (int64_t i = part.first; i < part.end; i++) {
+            const int64_t at = next[by->count[from->size[i]]]++;
+            memcpy(to->rows + at * to->ndim, from->rows + i * to->ndim, bytes);
+            to->number[at] = (int32_t)i;
+            if (to->radii != NULL) {
+                to->radii[at] = from->copy[i];
+            }
+        }
+    }
+    hs_starts_of_ends(next, (int64_t)n_levels + 1);
+    to->supports = from->read;
+    from->read.numbers = NULL;
+    return status;
+}
+
+/* The cutoffs of those types that occur, in the order of their levels. */
+static hs_status
+read_cutoffs(const hs_division *by, hs_levels *levels, hs_failure *failure)
+{
+    const int32_t n_types = by->reach->n_types, n = levels->n;
+    levels->cutoffs = hs_alloc(by->account, HS_FOR_CELLS, (int64_t)n * n, sizeof *levels->cutoffs);
+    if (levels->cutoffs == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    for (int32_t a = 0; a < n_types; a++) {
+        for (int32_t b = 0; b < n_types; b++) {
+            const double cutoff = by->reach->cutoffs[(int64_t)a * n_types + b];
+            if (!isfinite(cutoff) || cutoff != by->reach->cutoffs[(int64_t)b * n_types + a]) {
+                failure->value = cutoff;
+                return HS_ERR_CUTOFF;
+            }
+            if (by->count[a] >= 0 && by->count[b] >= 0) {
+                levels->cutoffs[by->count[a] * n + by->count[b]] = cutoff < 0.0 ? -1.0 : cutoff;
+            }
+        }
+    }
+    return HS_OK;
+}
+
+static hs_status
+divide(hs_division *by, hs_level_input *points, hs_level_input *queries, hs_levels *levels,
+       hs_failure *failure)
+{
+    const bool has_types = by->reach->n_types > 0;
+    by->n_sizes = has_types ? by->reach->n_types : N_SIZES;
+    by->count = hs_alloc(by->account, HS_FOR_CELLS, by->n_sizes, sizeof *by->count);
+    if (by->count == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    memset(by->count, 0, (size_t)by->n_sizes * sizeof *by->count);
+    hs_status status = hs_level_input_read(by, points, failure);
+    if (status == HS_OK && queries->points != NULL) {
+        status = hs_level_input_read(by, queries, failure);
+    }
+    if (status != HS_OK) {
+        return status;
+    }
+    if (!has_types) {
+        status = find_sizes(by, points);
+    }
+    if (status == HS_OK && !has_types && queries->points != NULL) {
+        status = find_sizes(by, queries);
+    }
+    levels->n = number_levels(by);
+    if (status == HS_OK && has_types) {
+        status = read_cutoffs(by, levels, failure);
+    }
+    if (status == HS_OK) {
+        status = arrange(by, points, levels->n, &levels->points);
+    }
+    if (status == HS_OK && queries->points != NULL) {
+        status = arrange(by, queries, levels->n, &levels->queries);
+    }
+    return status;
+}
+
+hs_status
+hs_levels_divide(hs_account *account, const hs_options *options, const hs_points *points,
+                 const hs_points *queries, const hs_reach *reach, hs_levels *levels,
+                 hs_failure *failure)
+{
+    const bool     has_supports = reach->has_supports, has_types = reach->n_types > 0;
+    const bool     has_own = !has_types && !has_supports; /* radii */
+    const double   factor = has_own && reach->extent != 0.0 ? reach->extent : 1.0;
+    hs_division    by = {.account = account, .options = options, .reach = reach, .factor = factor};
+    hs_level_input of_points = {.points = points,
+                                .radii = has_own ? reach->radii : NULL,
+                                .types = reach->types,
+                                .supports = has_supports ? reach->supports : NULL};
+    hs_level_input of_queries = {.points = queries,
+                                 .radii = has_own ? reach->query_radii : NULL,
+                                 .types = reach->query_types,
+                                 .supports = has_supports ? reach->query_supports : NULL,
+                                 .are_queries = true};
+    *levels = (hs_levels){.rule = reach->rule,
+                          .factor = factor,
+                          .has_queries = queries != NULL,
+                          .has_supports = has_supports,
+                          .extent = reach->extent};
+    const hs_status status = divide(&by, &of_points, &of_queries, levels, failure);
+    hs_level_input_free(account, &of_points);
+    hs_level_input_free(account, &of_queries);
+    hs_free(account, by.count);
+    if (status != HS_OK) {
+        hs_levels_free(account, levels);
+    }
+    return status;
+}
+
+/*
+ * The steps by rule. With a sum, the larger of two points decides nearly alone once
+ * the other one is an eighth of it: only the two levels below a level are searched by themselves.
+ */
+
+/* Levels below another that are searched one by one for a sum of radii. */
+#define APART 2
+
+/* Steps that a level begins, at most: with itself, with those below it, and these with it. */
+#define MOST_STEPS (1 + 2 * (APART + 1))
+
+/* Times a product of two float64s, less than what its low word is a multiple of. */
+#define LOW_WORD 0x1p-110
+
+/* Radii of points in some levels; nothing where there are none. */
+typedef struct radii_range {
+    double smallest, largest, least; /* least: that is not 0 */
+} radii_range;
+
+/* Extremes are found in so many parts, which do not wait for each other. */
+#define PARTS 4
+
+/* The smallest of radii, and of those that are not 0; infinity where there are none. */
+static void
+find_smallest(const double *radii, int64_t n, radii_range *range)
+{
+    double smallest[PARTS], least[PARTS];
+    for (int p = 0; p < PARTS; p++) {
+        smallest[p] = least[p] = HUGE_VAL;
+    }
+    for (int64_t first = 0; first < n; first += PARTS) {
+        for (int p = 0; p < PARTS; p++) {
+            const double radius = radii[first + p < n ? first + p : n - 1];
+            const double positive = radius > 0.0 ? radius : HUGE_VAL;
+            smallest[p] = hs_smaller(smallest[p], radius);
+            least[p] = hs_smaller(least[p], positive);
+        }
+    }
+    for (int p = 0; p < PARTS; p++) {
+        range->smallest = hs_smaller(range->smallest, smallest[p]);
+        range->least = hs_smaller(range->least, least[p]);
+    }
+}
+
+static double
+largest_of(const double *radii, int64_t n)
+{
+    double largest[PARTS] = {0.0};
+    for (int64_t first = 0; first < n; first += PARTS) {
+        for (int p = 0; p < PARTS; p++) {
+            largest[p] = hs_larger(largest[p], radii[first + p < n ? first + p : n - 1]);
+        }
+    }
+    return hs_larger(hs_larger(largest[0], largest[1]), hs_larger(largest[2], largest[3]));
+}
+
+/* Of a slice that has a point. Levels ascend, so that the first ones and the last tell all. */
+static radii_range
+range_of(const hs_level_set *set, hs_slice levels)
+{
+    const int64_t end = set->first[levels.end];
+    int64_t       last = levels.end - 1;
+    if (set->radii == NULL) {
+        return (radii_range){0.0, 0.0, 0.0};
+    }
+    radii_range range = {.smallest = HUGE_VAL, .least = HUGE_VAL};
+    for (int64_t l = levels.first; l < levels.end && range.least == HUGE_VAL; l++) {
+        const int64_t first = set->first[l];
+        find_smallest(set->radii + first, set->first[l + 1] - first, &range);
+    }
+    while (set->first[last] == end) {
+        last--;
+    }
+    range.largest = largest_of(set->radii + set->first[last], end - set->first[last]);
+    range.least = range.least == HUGE_VAL ? 0.0 : range.least;
+    return range;
+}
+
+/* What steps are added to, and from. */
+typedef struct planning {
+    const hs_levels *levels;
+    hs_level_plan   *plan;
+} planning;
+
+static bool
+is_empty(const hs_level_set *set, hs_slice levels)
+{
+    return levels.first >= levels.end || set->first[levels.first] == set->first[levels.end];
+}
+
+static hs_dw
+limit_by(const planning *now, double asking, double other)
+{
+    return hs_limit_by(now->levels->rule, now->levels->factor, asking, other, now->plan->bound);
+}
+
+static void
+add_step(planning *now, hs_slice asking, hs_slice points, bool is_own)
+{
+    const hs_levels    *levels = now->levels;
+    hs_level_plan      *plan = now->plan;
+    const hs_level_set *askers = hs_levels_asking(levels);
+    if (is_empty(askers, asking) || is_empty(&levels->points, points)) {
+        return;
+    }
+    hs_level_step step = {.asking = asking, .points = points, .is_own = is_own};
+    if (levels->cutoffs != NULL) {
+        step.cutoff = levels->cutoffs[asking.first * levels->n + points.first];
+        if (step.cutoff < 0.0) {
+            return;
+        }
+        step.cutoff = hs_smaller(step.cutoff, plan->bound);
+        plan->steps[plan->n++] = step;
+        return;
+    }
+    const radii_range a = range_of(askers, asking), b = range_of(&levels->points, points);
+    const hs_dw       low = limit_by(now, a.smallest, b.smallest);
+    const hs_dw       high = limit_by(now, a.largest, b.largest);
+    step.cutoff = high.lo > 0.0 ? hs_next_up(high.hi) : high.hi;
+    step.least = a.least > 0.0 && !(b.least > 0.0 && b.least < a.least) ? a.least : b.least;
+    if (levels->factor != 1.0) { /* where lengths are scaled, the low words of products count */
+        step.least *= levels->factor * LOW_WORD;
+    }
+    step.has_limits = levels->has_supports || low.hi != high.hi || low.lo != 0.0 || high.lo != 0.0;
+    plan->steps[plan->n++] = step;
+}
+
+/* Level l with itself and with all below it, those far below together; with queries, both ways. */
+static void
+add_below(planning *now, int32_t l, int32_t apart)
+{
+    const hs_slice own = {l, l + 1};
+    const bool     is_half = now->plan->is_half;
+    add_step(now, own, own, is_half);
+    for (int32_t below = l - 1; below >= 0 && below >= l - apart; below--) {
+        const hs_slice other = {below, below + 1};
+        add_step(now, own, other, false);
+        if (!is_half) {
+            add_step(now, other, own, false);
+        }
+    }
+    const hs_slice rest = {0, l - apart};
+    add_step(now, own, rest, false);
+    if (!is_half) {
+        add_step(now, rest, own, false);
+    }
+}
+
+/* Level l with itself and with all above it, which look among its points. */
+static void
+add_above(planning *now, int32_t l)
+{
+    const hs_slice own = {l, l + 1}, rest = {l + 1, now->levels->n};
+    add_step(now, own, own, now->plan->is_half);
+    add_step(now, rest, own, false);
+    if (!now->plan->is_half) {
+        add_step(now, own, rest, false);
+    }
+}
+
+/*
+ * Whether all types are searched at once, with the largest cutoff, and not in pairs. These test
+ * fewer candidates, in proportion to the volumes of their cutoffs, but sort every type into cells
+ * for every other: with three types that costs two or three times as much.
+ */
+#define SHARE_OF_PAIRED 0.3
+
+/* By how much the candidates of all pairs of types are fewer than those of all at once. */
+static double
+share_of_paired(const hs_levels *levels)
+{
+    const hs_level_set *asking = hs_levels_asking(levels), *points = &levels->points;
+    const int32_t       n = levels->n;
+    double              largest = 0.0, share = 0.0;
+    for (int32_t e = 0; e < n * n; e++) {
+        largest = hs_larger(largest, levels->cutoffs[e]);
+    }
+    const double all = (double)asking->n * (double)points->n;
+    for (int32_t e = 0; e < n * n && largest > 0.0 && all > 0.0; e++) {
+        const double   volume = pow(hs_larger(levels->cutoffs[e], 0.0) / largest, points->ndim);
+        const hs_slice a = {e / n, e / n + 1}, b = {e % n, e % n + 1};
+        share += hs_level_count(asking, a) * hs_level_count(points, b) / all * volume;
+    }
+    return share;
+}
+
+/* Whether there is one search, as far as that does not depend on where the points are. */
+static bool
+takes_all(const hs_levels *levels, hs_algorithm algorithm)
+{
+    const bool has_types = levels->cutoffs != NULL;
+    if (levels->n < 2 || algorithm == HS_HIERARCHY || (has_types && levels->n > HS_TABLE_TYPES)) {
+        return false;
+    }
+    return algorithm != HS_AUTO || (has_types && share_of_paired(levels) > SHARE_OF_PAIRED);
+}
+
+static void
+add_all(planning *now)
+{
+    const hs_levels *levels = now->levels;
+    const hs_slice   all = {0, levels->n};
+    if (levels->cutoffs == NULL) {
+        add_step(now, all, all, now->plan->is_half);
+        return;
+    }
+    hs_level_step step = {.asking = all,
+                          .points = all,
+                          .is_own = now->plan->is_half,
+                          .by_table = true,
+                          .has_limits = true};
+    for (int32_t e = 0; e < levels->n * levels->n; e++) {
+        const double cutoff = levels->cutoffs[e];
+        step.cutoff = hs_larger(step.cutoff, cutoff);
+        if (cutoff > 0.0 && !(step.least > 0.0 && step.least <= cutoff)) {
+            step.least = cutoff;
+        }
+    }
+    step.cutoff = hs_smaller(step.cutoff, now->plan->bound);
+    now->plan->steps[now->plan->n++] = step;
+}
+
+static void
+add_level(planning *now, int32_t l)
+{
+    const hs_slice own = {l, l + 1}, all = {0, now->levels->n};
+    if (now->levels->cutoffs != NULL) {
+        add_below(now, l, l);
+        return;
+    }
+    switch (now->levels->rule) {
+    case HS_RULE_MAX: add_below(now, l, 0); break;
+    case HS_RULE_MIN: add_above(now, l); break;
+    case HS_RULE_GATHER: add_step(now, own, all, false); break;
+    case HS_RULE_SCATTER: add_step(now, all, own, false); break;
+    default: add_below(now, l, APART);
+    }
+}
+
+hs_status
+hs_level_plan_make(hs_account *account, const hs_levels *levels, double bound,
+                   hs_algorithm algorithm, hs_level_plan *plan)
+{
+    const int64_t n = levels->n, most = levels->cutoffs != NULL ? 2 * n : MOST_STEPS;
+    const bool    is_directed = levels->cutoffs == NULL && hs_rule_is_directed(levels->rule);
+    *plan = (hs_level_plan){
+        .is_half = !levels->has_queries && !is_directed, .bound = bound, .algorithm = algorithm};
+    plan->steps = hs_alloc(account, HS_FOR_CELLS, n * most, sizeof *plan->steps);
+    if (plan->steps == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    planning now = {.levels = levels, .plan = plan};
+    if (takes_all(levels, algorithm)) {
+        add_all(&now);
+        return HS_OK;
+    }
+    for (int32_t l = 0; l < n; l++) {
+        add_level(&now, l);
+    }
+    HS_ASSERT(plan->n <= n * most);
+    return HS_OK;
+}
+
+hs_level_step
+hs_level_plan_all(const hs_levels *levels, const hs_level_plan *plan)
+{
+    hs_level_step  all = {.is_own = plan->is_half};
+    hs_level_plan  one = {.steps = &all, .is_half = plan->is_half, .bound = plan->bound};
+    planning       now = {.levels = levels, .plan = &one};
+    const hs_slice each = {0, levels->n};
+    add_step(&now, each, each, plan->is_half);
+    HS_ASSERT(one.n == 1);
+    return all;
+}
+
+bool
+hs_level_plan_is_single(const hs_levels *levels, const hs_level_plan *plan)
+{
+    const hs_level_step *step = plan->steps;
+    return plan->n == 1 && step->points.first == 0 && step->points.end == levels->n &&
+           step->asking.first == 0 && step->asking.end == levels->n;
+}
+
+void
+hs_level_plan_free(hs_account *account, hs_level_plan *plan)
+{
+    hs_free(account, plan->steps);
+    *plan = (hs_level_plan){.n = 0};
+}
+
+/* Points are taken to be spread evenly over the box of their level. Where they are
+ * not, both plans test more than that, and the one with fewer tests is favoured too little. */
+
+#ifdef HS_TESTING
+static bool joins = false;
+
+bool
+hs_test_join_levels(bool on)
+{
+    const bool before = joins;
+    joins = on;
+    return before;
+}
+#else
+enum { joins = true };
+#endif
+
+/* More levels than this are hardly ever better searched at once. */
+#define MOST_JOINED 16
+
+/* A point of a search costs as much as so many tests, in cells and in the walk. Measured: 60 ns
+ * with next to no neighbours, 0.25 ns a test. */
+#define TESTS_PER_POINT 240.0
+/* Candidates for each point within the cutoff: cells are cubes, and three of them wide. */
+#define TESTS_PER_PAIR 7.7
+/* A test with a limit of its own, over one with the cutoff. */
+#define TEST_OF_LIMITS 1.3
+
+/* How long the box of each level's points is along the coordinate axes. */
+typedef struct spread {
+    double asking[MOST_JOINED][HS_MAX_DIM], points[MOST_JOINED][HS_MAX_DIM];
+} spread;
+
+static hs_status
+find_extents(const hs_options *options, const hs_level_set *set, int32_t level,
+             const double *longest, double *extent)
+{
+    const int d = set->ndim;
+    double    low[HS_MAX_DIM], high[HS_MAX_DIM];
+    for (int k = 0; k < d; k++) {
+        low[k] = HUGE_VAL;
+        high[k] = -HUGE_VAL;
+    }
+    for (int64_t i = set->first[level]; i < set->first[level + 1]; i++) {
+        for (int k = 0; k < d; k++) {
+            low[k] = hs_smaller(set->rows[i * d + k], low[k]);
+            high[k] = hs_larger(set->rows[i * d + k], high[k]);
+        }
+        if ((i + 1) % HS_POLL_POINTS == 0 && hs_poll(options, 0.0) != HS_OK) {
+            return HS_ERR_INTERRUPTED;
+        }
+    }
+    for (int k = 0; k < d; k++) {
+        extent[k] = hs_smaller(high[k] - low[k], longest[k]);
+    }
+    return HS_OK;
+}
+
+/* Points of a box that repeats along all its vectors are wrapped into it. */
+static hs_status
+find_spread(const hs_options *options, const hs_levels *levels, const hs_box *box, spread *of)
+{
+    hs_status status = HS_OK;
+    double    longest[HS_MAX_DIM];
+    for (int k = 0; k < levels->points.ndim; k++) {
+        longest[k] = box != NULL ? 0.0 : HUGE_VAL;
+        for (int l = 0; box != NULL && l < box->ndim; l++) {
+            longest[k] += box->periodic[l] ? fabs(box->rows[l][k]) : HUGE_VAL;
+        }
+    }
+    for (int32_t l = 0; status == HS_OK && l < levels->n; l++) {
+        status = find_extents(options, &levels->points, l, longest, of->points[l]);
+        if (status == HS_OK && levels->has_queries) {
+            status = find_extents(options, &levels->queries, l, longest, of->asking[l]);
+        } else {
+            memcpy(of->asking[l], of->points[l], sizeof of->asking[l]);
+        }
+    }
+    return status;
+}
+
+/* The part of all pairs of two levels' points that is within the side of a cube, for boxes one of
+ * which lies in the other. */
+static double
+part_within(const double *extent, const double *other, int ndim, double side)
+{
+    double part = 1.0;
+    for (int k = 0; k < ndim; k++) {
+        const double longer = hs_larger(extent[k], other[k]);
+        part *= side < longer ? side / longer : 1.0;
+    }
+    return part;
+}
+
+/* In tests of one candidate. Levels with themselves are half lists. */
+static double
+cost_of_step(const hs_levels *levels, const spread *of, const hs_level_step *step)
+{
+    const hs_level_set *points = &levels->points;
+    const hs_level_set *asking = step->is_own ? points : hs_levels_asking(levels);
+    const hs_slice      asked = step->is_own ? step->points : step->asking;
+    const int           d = points->ndim;
+    /* of a cube as large as the ball of the cutoff */
+    const double side = step->cutoff * pow(hs_ball_volume(d, 1.0), 1.0 / d);
+    double       pairs = 0.0;
+    for (int64_t a = asked.first; a < asked.end; a++) {
+        for (int64_t b = step->points.first; b < step->points.end; b++) {
+            const double *extent = step->is_own ? of->points[a] : of->asking[a];
+            pairs += hs_level_count(asking, (hs_slice){a, a + 1}) *
+                     hs_level_count(points, (hs_slice){b, b + 1}) *
+                     part_within(extent, of->points[b], d, side);
+        }
+    }
+    return TESTS_PER_POINT * (hs_level_count(asking, asked) +
+                              (step->is_own ? 0.0 : hs_level_count(points, step->points))) +
+           TESTS_PER_PAIR * (step->has_limits ? TEST_OF_LIMITS : 1.0) * (step->is_own ? 0.5 : 1.0) *
+               pairs;
+}
+
+static hs_status
+join(const hs_options *options, const hs_levels *levels, const hs_box *box, hs_level_plan *plan)
+{
+    spread of;
+    double cost = 0.0;
+    if (!joins || plan->algorithm != HS_AUTO || levels->cutoffs != NULL || plan->n < 2 ||
+        levels->n > MOST_JOINED) {
+        return HS_OK;
+    }
+    const hs_level_step all = hs_level_plan_all(levels, plan);
+    const hs_status     status = find_spread(options, levels, box, &of);
+    if (status != HS_OK) {
+        return status;
+    }
+    for (int64_t s = 0; s < plan->n; s++) {
+        cost += cost_of_step(levels, &of, &plan->steps[s]);
+    }
+    if (cost_of_step(levels, &of, &all) < cost) {
+        plan->steps[0] = all;
+        plan->n = 1;
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_level_plan_choose(hs_account *account, const hs_options *options, const hs_levels *levels,
+                     const hs_box *box, double bound, hs_algorithm algorithm, hs_level_plan *plan)
+{
+    hs_status status = hs_level_plan_make(account, levels, bound, algorithm, plan);
+    if (status == HS_OK) {
+        status = join(options, levels, box, plan);
+    }
+    if (status != HS_OK) {
+        hs_level_plan_free(account, plan);
+    }
+    return status;
+}
+
+/* Radii, types and supports come in the order of levels, and are laid out in the
+ * order of the cells. */
+
+/* Scaled radii that are larger are beyond all distances: the scale goes by a cutoff that is no
+ * larger than these. */
+#define BEYOND_ALL 0x1p600
+
+/* The radii of a set's points in the order of the cells, in one block, which is returned; NULL
+ * where there are none, or when memory is short. */
+static void *
+arrange_radii(const hs_search *search, const hs_bins *bins, const double *radii, hs_radii *to)
+{
+    const double  factor = search->limits->factor;
+    const bool    in_caller_unit = search->scene.extreme; /* as the metric's then */
+    const int64_t size = sizeof(double) + sizeof(float);
+    double       *exact = NULL;
+    *to = (hs_radii){.exact = NULL};
+    if (radii != NULL) {
+        exact = hs_alloc(&search->call->account, HS_FOR_POINTS, bins->n + HS_PADDING, size);
+    }
+    if (exact == NULL) {
+        return NULL;
+    }
+    float *near = (float *)(exact + bins->n + HS_PADDING), most = 0.0f;
+    for (int64_t si = 0; si < bins->n; si++) {
+        const double radius = radii[bins->order[si]];
+        const double scaled = hs_smaller(hs_scale_apply(search->scene.scale, radius), BEYOND_ALL);
+        exact[si] = in_caller_unit ? radius : scaled;
+        near[si] = (float)hs_smaller(factor * scaled, BEYOND_ALL);
+        most = near[si] > most ? near[si] : most;
+    }
+    memset(near + bins->n, 0, HS_PADDING * sizeof *near);
+    *to = (hs_radii){exact, near, most};
+    return exact;
+}
+
+/* The types of a set's points, which are their levels, in the order of the cells; NULL when memory
+ * is short. */
+static int32_t *
+arrange_types(hs_account *account, const hs_bins *bins, const hs_level_set *set, int32_t n_levels)
+{
+    int32_t *to = hs_alloc(account, HS_FOR_POINTS, bins->n, sizeof *to);
+    for (int64_t si = 0; to != NULL && si < bins->n; si++) {
+        int32_t level = 0;
+        while (level < n_levels - 1 && set->first[level + 1] <= bins->order[si]) {
+            level++;
+        }
+        to[si] = level;
+    }
+    return to;
+}
+
+/* The cutoffs of all types, exactly and as they are scanned with. */
+static void
+scale_table(const hs_levels *levels, const hs_scene *scene, double *exact, float *near)
+{
+    for (int32_t e = 0; e < levels->n * levels->n; e++) {
+        const double cutoff = levels->cutoffs[e];
+        const double scaled = hs_smaller(hs_scale_apply(scene->scale, cutoff), BEYOND_ALL);
+        exact[e] = cutoff < 0.0 ? -1.0 : scene->extreme ? cutoff : scaled;
+        near[e] = cutoff < 0.0 ? -1.0f : (float)scaled;
+    }
+}
+
+/* Limits by the types of both points, for a search of all of them. */
+static hs_status
+set_table(const hs_levels *levels, hs_search *search, hs_level_limits *own)
+{
+    hs_account   *account = &search->call->account;
+    const int32_t n = levels->n, size = n * n;
+    double       *exact = hs_alloc(account, HS_FOR_CELLS, size, sizeof(double) + sizeof(float));
+    own->table = exact;
+    own->of_points = arrange_types(account, &search->bins, &levels->points, n);
+    if (search->has_queries) {
+        own->of_asking = arrange_types(account, &search->query_bins, &levels->queries, n);
+    }
+    if (exact == NULL || own->of_points == NULL ||
+        (search->has_queries && own->of_asking == NULL)) {
+        return HS_ERR_MEMORY;
+    }
+    float *near = (float *)(exact + size);
+    scale_table(levels, &search->scene, exact, near);
+    own->limits.rule = HS_RULE_SCATTER;
+    own->limits.table = (hs_limit_table){
+        .n_types = n,
+        .of_points = own->of_points,
+        .of_asking = search->has_queries ? own->of_asking : own->of_points,
+        .exact = exact,
+        .near = near,
+    };
+    return HS_OK;
+}
+
+/* Where the radii of a slice begin. */
+static const double *
+radii_of(const hs_level_set *set, hs_slice levels)
+{
+    return set->radii != NULL ? set->radii + set->first[levels.first] : NULL;
+}
+
+/* As kernels read them, once the points have the caller's numbers; set: NULL where the rule needs
+ * none. *owned: what is to be freed, or NULL. */
+static hs_status
+arrange_supports(const hs_search *search, const hs_bins *bins, const hs_support_set *set,
+                 double cutoff, hs_support_side *to, void **owned)
+{
+    const int    ndim = search->scene.ndim;
+    const double unscale = hs_scale_apply(search->scene.unscale, 1.0);
+    hs_status    status = HS_OK;
+    *to = (hs_support_side){.numbers = NULL};
+    if (set == NULL) {
+        return HS_OK;
+    }
+    float *near = hs_alloc(&search->call->account, HS_FOR_SUPPORTS,
+                           bins->n * hs_support_numbers(ndim), sizeof *near);
+    *owned = near;
+    *to = (hs_support_side){
+        .numbers = set->numbers, .first = set->first, .order = bins->order, .near = near};
+    if (near == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    for (int64_t first = 0; status == HS_OK && first < bins->n; first += HS_POLL_SUPPORTS) {
+        const int64_t end = first + HS_POLL_SUPPORTS < bins->n ? first + HS_POLL_SUPPORTS : bins->n;
+        hs_supports_lay_out(to, first, end, ndim, cutoff, unscale, near);
+        status = end < bins->n ? hs_poll(&search->call->options, 0.0) : HS_OK;
+    }
+    return status;
+}
+
+static hs_status
+set_supports(const hs_levels *levels, const hs_level_step *step, double bound, hs_search *search,
+             hs_level_limits *own)
+{
+    const hs_scene       *scene = &search->scene;
+    hs_supports          *supports = &own->supports;
+    const double         *cutoff = &supports->metric.limit.cutoff;
+    const hs_support_set *of_points = hs_rule_needs_other(levels->rule) ? &levels->points.supports
+                                                                        : NULL;
+    const hs_support_set *of_asking =
+        hs_rule_needs_asking(levels->rule) ? &hs_levels_asking(levels)->supports : NULL;
+    const int exponent = scene->extreme ? 0 : -scene->scale.exponent;
+    *supports = (hs_supports){.rule = levels->rule, .is_bounded = bound <= step->cutoff};
+    hs_support_metric_init(scene->ndim, levels->extent, scene->metric.inclusive, exponent,
+                           &supports->metric);
+    own->limits = (hs_limits){.rule = levels->rule, .supports = supports};
+    HS_ASSERT(search->has_queries || of_points != NULL); /* directed rules ask as queries do */
+    hs_status status = arrange_supports(search, &search->bins, of_points, *cutoff,
+                                        &supports->of_points, &own->of_points);
+    supports->of_asking = supports->of_points;
+    if (status == HS_OK && search->has_queries) {
+        status = arrange_supports(search, &search->query_bins, of_asking, *cutoff,
+                                  &supports->of_asking, &own->of_asking);
+    }
+    return status;
+}
+
+hs_status
+hs_level_limits_set(const hs_levels *levels, const hs_level_step *step, double bound,
+                    hs_search *search, hs_level_limits *own)
+{
+    const hs_scene     *scene = &search->scene;
+    const hs_level_set *asking = hs_levels_asking(levels);
+    const double       *of_points =
+        hs_rule_needs_other(levels->rule) ? radii_of(&levels->points, step->points) : NULL;
+    const double *of_asking = hs_rule_needs_asking(levels->rule) ? radii_of(asking, step->asking)
+                                                                 : NULL;
+    const double  near_bound = hs_scale_apply(scene->scale, bound);
+    if (levels->has_supports) {
+        return set_supports(levels, step, bound, search, own);
+    }
+    own->limits = (hs_limits){.rule = levels->rule,
+                              .factor = levels->factor,
+                              .bound = scene->extreme ? bound : near_bound,
+                              .near_bound = (float)near_bound};
+    if (step->by_table) {
+        return set_table(levels, search, own);
+    }
+    own->of_points = arrange_radii(search, &search->bins, of_points, &own->limits.of_points);
+    own->limits.of_asking = own->limits.of_points;
+    if (search->has_queries) {
+        own->of_asking =
+            arrange_radii(search, &search->query_bins, of_asking, &own->limits.of_asking);
+    }
+    const bool lacks = (of_points != NULL && own->of_points == NULL) ||
+                       (search->has_queries && of_asking != NULL && own->of_asking == NULL);
+    return lacks ? HS_ERR_MEMORY : HS_OK;
+}
+
+void
+hs_level_limits_free(hs_account *account, hs_level_limits *own)
+{
+    hs_free(account, own->of_asking);
+    hs_free(account, own->of_points);
+    hs_free(account, own->table);
+    own->of_asking = own->of_points = own->table = NULL;
+}
+
+/* Opens the search of two slices, has its limits set, and gives its points the
+ * caller's numbers. */
+
+static void
+renumber(const int32_t *number, hs_bins *bins)
+{
+    for (int64_t si = 0; si < bins->n; si++) {
+        bins->order[si] = number[bins->order[si]];
+    }
+}
+
+/* Where the numbers of a slice begin. */
+static const int32_t *
+numbers_of(const hs_level_set *set, hs_slice levels)
+{
+    return set->number + set->first[levels.first];
+}
+
+/* Fractions done are those of all asking points of all steps, as far as these are equal. */
+static void
+set_progress(const hs_level_plan *plan, int64_t step, hs_search *search)
+{
+    const int64_t n = hs_search_asking(search)->n;
+    search->first_point = step * n;
+    search->n_in_all = plan->n * n;
+}
+
+static void
+name_row(const hs_levels *levels, const hs_level_step *step, hs_failure *failure)
+{
+    const hs_level_set *set = &levels->points;
+    hs_slice            slice = step->points;
+    if (failure->row < 0) {
+        return;
+    }
+    if (failure->in_queries) {
+        set = hs_levels_asking(levels);
+        slice = step->asking;
+        failure->in_queries = levels->has_queries;
+    }
+    failure->row = numbers_of(set, slice)[failure->row];
+}
+
+/* Asking points that meet all points of a step sooner than these are sorted into cells. */
+#ifdef HS_TESTING
+#define FEW_ASKING 4 /* so that small scenes have both */
+#else
+#define FEW_ASKING 32
+#endif
+
+/* What a step is searched by: without cells for few asking points, where the caller leaves that
+ * open. */
+static hs_algorithm
+algorithm_of(const hs_level_plan *plan, const hs_level_step *step, int64_t n_asking)
+{
+    const bool is_open = plan->algorithm == HS_AUTO || plan->algorithm == HS_HIERARCHY;
+    return is_open && !step->is_own && n_asking <= FEW_ASKING ? HS_ALL_PAIRS : plan->algorithm;
+}
+
+hs_status
+hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int64_t number, const hs_box *box,
+              bool keeps_none, hs_call *call, hs_level_search *open, hs_failure *failure)
+{
+    const hs_level_step  *step = &plan->steps[number];
+    const hs_level_set   *asking = hs_levels_asking(levels);
+    const hs_points       points = hs_level_points(&levels->points, step->points);
+    const hs_points       queries = hs_level_points(asking, step->asking);
+    hs_search            *search = &open->search;
+    const hs_support_step of_supports = {levels, step, &call->options};
+    const hs_narrowing    narrowing = {hs_support_step_width, &of_supports};
+    const hs_sets         sets = {.points = &points,
+                                  .queries = step->is_own ? NULL : &queries,
+                                  .is_full = !step->is_own || !plan->is_half,
+                                  .keeps_none = keeps_none,
+                                  .least_cutoff = hs_choice_least_length(call->choice, step->least),
+                                  .narrowing = levels->has_supports ? &narrowing : NULL};
+    hs_level_limits_init(levels, step, &open->own);
+    call->options.cutoff = step->cutoff;
+    call->options.algorithm = algorithm_of(plan, step, queries.n);
+    hs_search_begin(call, search);
+    search->limits = step->has_limits ? &open->own.limits : NULL;
+    hs_status status = hs_search_build(&sets, box, search, failure);
+    if (status != HS_OK) {
+        name_row(levels, step, failure);
+    }
+    if (status == HS_OK && step->has_limits && !levels->has_supports) {
+        status = hs_level_limits_set(levels, step, plan->bound, search, &open->own);
+    }
+    if (status == HS_OK) {
+        search->is_half = plan->is_half;
+        renumber(numbers_of(&levels->points, step->points), &search->bins);
+    }
+    if (status == HS_OK && search->has_queries) {
+        renumber(numbers_of(asking, step->asking), &search->query_bins);
+    }
+    if (status == HS_OK && levels->has_supports) {
+        status = hs_level_limits_set(levels, step, plan->bound, search, &open->own);
+    }
+    if (status != HS_OK) {
+        hs_level_close(open);
+        return status;
+    }
+    set_progress(plan, number, search);
+    return HS_OK;
+}
+
+void
+hs_level_close(hs_level_search *open)
+{
+    hs_level_limits_free(&open->search.call->account, &open->own);
+    hs_search_close(&open->search);
 }

@@ -1,14 +1,50 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_LEVELS_LEVELS_H
+#define HS_LEVELS_LEVELS_H
+
+#include "../base/os.h"
+#include "../exact/ellipsoid.h"
+#include "../memory/memory.h"
+#include "../scene/scene.h"
+#include "../search/limits.h"
+
+/*
+ * The supports of a set of points, read once and checked: what is decided with, and
+ * how far each reaches.
+ */
+
+/* Supports that are read, or looked at, between two polls: some milliseconds. */
+#define HS_POLL_SUPPORTS (HS_POLL_POINTS / 16)
+
+/* hs_support_numbers for each point. */
+typedef struct hs_support_set {
+    double *numbers; /* owned; one support after the other, in the caller's order; NULL: none */
+    int64_t first;   /* the number of the first */
+} hs_support_set;
+
+/* supports: n * ndim * ndim, numbered from 0. reaches: receives n. HS_OK; HS_ERR_MEMORY;
+ * HS_ERR_INTERRUPTED; HS_ERR_SUPPORTS or HS_ERR_SUPPORT_REACH with the row of the failure. On
+ * failure holds nothing. */
+hs_status hs_support_set_read(hs_account *account, const hs_options *options,
+                              const double *supports, int64_t n, int ndim, double extent,
+                              hs_support_set *set, double *reaches, hs_failure *failure);
+
+/* The numbers of the support of this number. */
+HS_ALWAYS_INLINE const double *
+hs_support_set_at(const hs_support_set *set, int ndim, int64_t number)
+{
+    return set->numbers + (number - set->first) * (hs_support_entries(ndim) + 1);
+}
+
+/* Harmless twice. */
+void hs_support_set_free(hs_account *account, hs_support_set *set);
+
 /*
  * levels.h: points divided by the size of their reach, so that small ones are searched in small
  * cells however large others are: a level is all points whose radii are of one binary order,
  * counted from the largest one, or all points of one type. Each level lies in one piece, which is a
  * set of points by itself.
  */
-#ifndef HS_LEVELS_H
-#define HS_LEVELS_H
-
-#include "support_set.h"
 
 /* Consecutive levels, or a part of what lies in them. */
 typedef struct hs_slice {
@@ -70,5 +106,183 @@ hs_levels_asking(const hs_levels *levels)
 {
     return levels->has_queries ? &levels->queries : &levels->points;
 }
+
+/*
+ * Which levels are searched together. A search between two levels costs what its
+ * largest reach costs. Where one level is much larger than others, its own size decides the reach,
+ * and these others may be searched against it all at once: so there are a few searches for each
+ * level, and not one for every two levels.
+ */
+
+/* One search: these levels of the asking set among these of the points. */
+typedef struct hs_level_step {
+    hs_slice asking, points; /* levels */
+    double   cutoff;         /* the largest length that one of the pairs is compared with */
+    double   least;          /* the smallest positive radius that is involved, or 0 */
+    bool     is_own;         /* one level with itself, each pair once; asking is not looked at */
+    bool     by_table;       /* of all types: limits are those of the table */
+    bool     has_limits;     /* pairs have lengths of their own, up to the cutoff */
+} hs_level_step;
+
+typedef struct hs_level_plan {
+    hs_level_step *steps; /* owned */
+    int64_t        n;
+    bool           is_half;   /* each pair of points once, the lower number first. If not, a level
+                             * with itself gives each point all its neighbours */
+    double         bound;     /* no pair is further apart than this; may be infinite */
+    hs_algorithm   algorithm; /* the caller's choice, which levels.c narrows for each step */
+} hs_level_plan;
+
+/* Without queries, rules that are the same both ways give the half list; else every asking point
+ * meets all that it can. HS_OK or HS_ERR_MEMORY. algorithm: HS_HIERARCHY is levels in any case,
+ * HS_AUTO what is expected to be quickest, and any other one search of all, with the largest reach;
+ * but types are searched in pairs where there are more of them than a table of limits holds. */
+hs_status hs_level_plan_make(hs_account *account, const hs_levels *levels, double bound,
+                             hs_algorithm algorithm, hs_level_plan *plan);
+
+/* One step that is all of a search by radii, in place of those of the plan, which has some. */
+hs_level_step hs_level_plan_all(const hs_levels *levels, const hs_level_plan *plan);
+
+/* Whether one step is all of the search. */
+bool hs_level_plan_is_single(const hs_levels *levels, const hs_level_plan *plan);
+
+/* Harmless twice. */
+void hs_level_plan_free(hs_account *account, hs_level_plan *plan);
+
+/*
+ * How far pairs of a step can be apart along an axis of the grid, by their
+ * supports: cells go by that, so that needles along an axis have few candidates across it.
+ */
+
+/* A step whose pairs are decided by supports; borrowed. */
+typedef struct hs_support_step {
+    const hs_levels     *levels;
+    const hs_level_step *step;
+    const hs_options    *options; /* to poll by */
+} hs_support_step;
+
+/* The `find` of a hs_narrowing, whose context is a hs_support_step. */
+hs_status hs_support_step_width(const void *context, const double *normal, double enough,
+                                double *width);
+
+/*
+ * What is to be divided into levels, read once and checked: the coordinates of a set
+ * of points, and its radii, types or supports.
+ */
+
+/* What is divided, and by what. */
+typedef struct hs_division {
+    hs_account       *account;
+    const hs_options *options; /* to poll by */
+    const hs_reach   *reach;
+    int64_t          *count; /* owned; points of each size or type, in both sets */
+    int32_t           n_sizes;
+    double            factor;
+    double            largest; /* of all radii */
+} hs_division;
+
+/* A set of points while it is divided. */
+typedef struct hs_level_input {
+    const hs_points *points;
+    const double    *radii;
+    const int32_t   *types;
+    const double    *supports;
+    bool             are_queries;
+    double          *rows; /* owned, in the caller's order, as are all of these */
+    double          *copy; /* of the radii, or how far supports reach */
+    int32_t         *size; /* of each point; read where there are types, else to be found */
+    hs_support_set   read; /* of the supports */
+} hs_level_input;
+
+HS_ALWAYS_INLINE bool
+hs_level_input_has_radii(const hs_level_input *set)
+{
+    return set->radii != NULL || set->supports != NULL;
+}
+
+/* Reads a set, and counts its types or finds the largest of its radii. On failure as well, it is to
+ * be freed. */
+hs_status hs_level_input_read(hs_division *by, hs_level_input *set, hs_failure *failure);
+void      hs_level_input_free(hs_account *account, hs_level_input *set);
+
+/* Passes go over HS_POLL_POINTS at a time and poll in between. The next ones of n; false where
+ * there are none, after a failure, or where the caller wants to stop, which *status says. */
+bool hs_division_go_on(const hs_division *by, int64_t n, hs_slice *next, hs_status *status);
+
+/*
+ * One search of all levels in place of several, where that is quicker. Searches of
+ * a few levels each sort their points and walk over them again; one search tests more candidates,
+ * each with a limit of its own. Points of few sizes, all of them common, are better searched at
+ * once.
+ */
+
+/* As hs_level_plan_make, but of radii and supports it is a single step, if that is expected to cost
+ * less and the caller has not chosen an algorithm. box: of the points, borrowed, or NULL. options:
+ * to poll by. HS_ERR_INTERRUPTED too, without a plan. */
+hs_status hs_level_plan_choose(hs_account *account, const hs_options *options,
+                               const hs_levels *levels, const hs_box *box, double bound,
+                               hs_algorithm algorithm, hs_level_plan *plan);
+
+#ifdef HS_TESTING
+/* Whether plans are replaced; off at first, so that few points have several searches. Returns what
+ * it was before. */
+bool hs_test_join_levels(bool on);
+#endif
+
+/*
+ * The lengths that the pairs of one step are compared with: by radii, by the types
+ * of both points, or by supports, in the order of the cells of an open search.
+ */
+
+/* It must not move: the search has a pointer to its limits. */
+typedef struct hs_level_limits {
+    hs_limits   limits;
+    hs_supports supports;              /* those of limits, if it has any */
+    void       *of_asking, *of_points; /* owned: the radii of limits, the types, or the supports */
+    void       *table;                 /* owned: that of limits */
+} hs_level_limits;
+
+/* What an open search needs to know beforehand; the rest is set once it has cells. */
+HS_ALWAYS_INLINE void
+hs_level_limits_init(const hs_levels *levels, const hs_level_step *step, hs_level_limits *own)
+{
+    own->of_asking = own->of_points = own->table = NULL;
+    own->limits.table.n_types = step->by_table ? levels->n : 0;
+    own->limits.supports = levels->has_supports ? &own->supports : NULL;
+}
+
+/*
+ * For the cells of this search. With radii and types, the points are numbered by their places in
+ * the slices of the step; with supports, as the caller numbers them. HS_ERR_MEMORY, or
+ * HS_ERR_INTERRUPTED where the poll says so; in any case to be freed.
+ */
+hs_status hs_level_limits_set(const hs_levels *levels, const hs_level_step *step, double bound,
+                              hs_search *search, hs_level_limits *own);
+
+/* Harmless twice. */
+void hs_level_limits_free(hs_account *account, hs_level_limits *own);
+
+/*
+ * One step of a plan as a search like any other: of two sets of points, or of one,
+ * with the caller's numbers, and with limits where pairs have lengths of their own.
+ */
+
+/* An open step; it must not move. */
+typedef struct hs_level_search {
+    hs_search       search;
+    hs_level_limits own; /* where the step has any */
+} hs_level_search;
+
+/*
+ * Opens step number `step`, for the options of the call but for the cutoff, which is set to that of
+ * the step. keeps_none: pairs are not kept. On failure it is closed, and the failure names rows as
+ * the caller does.
+ */
+hs_status hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int64_t step,
+                        const hs_box *box, bool keeps_none, hs_call *call, hs_level_search *open,
+                        hs_failure *failure);
+
+/* Harmless twice. */
+void hs_level_close(hs_level_search *open);
 
 #endif

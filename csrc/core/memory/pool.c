@@ -1,16 +1,505 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* pool.c: an array of chunks, oldest first. Chunks are freed after the lock is released, because
- * freeing is a system call. */
+#if defined(__linux__)
+#define _GNU_SOURCE /* madvise, mremap, MAP_ANONYMOUS */
+#endif
 #if !defined(_WIN32)
 #define _POSIX_C_SOURCE 200809L /* for os_thread.h */
 #endif
 #include "pool.h"
-
 #include "../../halfshell.h"
 #include "../base/os_thread.h"
-#include "chunk.h"
 
+#include <stdlib.h>
 #include <string.h>
+
+/* Mmap, mremap and madvise of Linux. Elsewhere, and under AddressSanitizer, which watches
+ * malloc, every request is refused. */
+
+#if defined(__linux__) && !HS_WATCHED_MALLOC
+
+#include <sys/mman.h>
+
+static size_t
+round_up_pages(size_t bytes)
+{
+    return (bytes + HS_PAGES_STEP - 1) / HS_PAGES_STEP * HS_PAGES_STEP;
+}
+
+/* A mapping of HS_PAGES_STEP bytes and then the block, which starts at a huge-page boundary. */
+static void *
+map_aligned(size_t bytes, int flags, void **mapping, size_t *length)
+{
+    if (bytes > PTRDIFF_MAX - HS_PAGES_FROM - 2 * HS_PAGES_STEP) {
+        return NULL;
+    }
+    const size_t rounded = round_up_pages(bytes);
+    const size_t reserved = rounded + HS_PAGES_FROM + HS_PAGES_STEP;
+    char        *start =
+        mmap(NULL, reserved, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | flags, -1, 0);
+    if (start == MAP_FAILED) {
+        return NULL;
+    }
+    /* The first huge-page boundary that leaves a step for the headroom; the rest goes back. */
+    const uintptr_t boundary =
+        ((uintptr_t)start + HS_PAGES_STEP + HS_PAGES_FROM - 1) / HS_PAGES_FROM * HS_PAGES_FROM;
+    char        *block = (char *)boundary;
+    char        *first = block - HS_PAGES_STEP;
+    const size_t before = (size_t)(first - start); /* less than a huge page: the rest lies behind */
+    if (before > 0) {
+        munmap(start, before);
+    }
+    munmap(block + rounded, HS_PAGES_FROM - before);
+    *mapping = first;
+    *length = HS_PAGES_STEP + rounded;
+    return block;
+}
+
+void *
+hs_pages_alloc(size_t bytes, void **mapping, size_t *length)
+{
+    /* A tail of a quarter and more becomes a whole huge page: quicker to fill than small ones. */
+    const size_t tail = bytes % HS_PAGES_FROM;
+    if (tail >= HS_PAGES_FROM / 4 && bytes <= PTRDIFF_MAX / 2) {
+        bytes += HS_PAGES_FROM - tail;
+    }
+    char *block = map_aligned(bytes, 0, mapping, length);
+    if (block != NULL) {
+        hs_pages_advise(block, block + round_up_pages(bytes), true);
+    }
+    return block;
+}
+
+void
+hs_pages_free(void *mapping, size_t length)
+{
+    munmap(mapping, length);
+}
+
+void *
+hs_pages_reserve(size_t bytes, void **mapping, size_t *length)
+{
+    char *block = map_aligned(bytes, MAP_NORESERVE, mapping, length);
+    if (block != NULL) {
+        /* The first touch comes before the first advice, which splits the mapping in two:
+         * the parts then share what Linux knows about their pages, and hs_pages_grow can
+         * make them one again. */
+        *(volatile char *)(block - 1) = 0;
+        hs_pages_advise(*mapping, block + round_up_pages(bytes), false);
+    }
+    return block;
+}
+
+void
+hs_pages_advise(void *from, void *to, bool huge)
+{
+#if defined(MADV_HUGEPAGE) && defined(MADV_NOHUGEPAGE)
+    if (from < to) {
+        (void)madvise(from, (size_t)((char *)to - (char *)from),
+                      huge ? MADV_HUGEPAGE : MADV_NOHUGEPAGE);
+    }
+#else
+    (void)from;
+    (void)to;
+    (void)huge;
+#endif
+}
+
+void *
+hs_pages_grow(size_t bytes, void **mapping, size_t *length)
+{
+    if (bytes > PTRDIFF_MAX - HS_PAGES_FROM - 2 * HS_PAGES_STEP) {
+        return NULL;
+    }
+    const size_t wanted = HS_PAGES_STEP + round_up_pages(bytes);
+    hs_pages_advise(*mapping, (char *)*mapping + *length, false); /* mremap takes one part only */
+    char *moved = mremap(*mapping, *length, wanted, 0);
+    if (moved == MAP_FAILED && HS_MAPPINGS_MOVE) {
+        void  *target;
+        size_t target_length;
+        if (map_aligned(bytes, MAP_NORESERVE, &target, &target_length) != NULL) {
+            /* Aligned like the old place, so that page tables move 2 MB at a time. If this fails
+             * the target may be gone and its addresses taken by others: it is left alone. */
+            moved = mremap(*mapping, *length, wanted, MREMAP_MAYMOVE | MREMAP_FIXED, target);
+        } else {
+            moved = mremap(*mapping, *length, wanted, MREMAP_MAYMOVE);
+        }
+    }
+    if (moved == MAP_FAILED) {
+        return NULL;
+    }
+    *mapping = moved;
+    *length = wanted;
+    return moved + HS_PAGES_STEP;
+}
+
+void
+hs_pages_tear(void *from, void *to)
+{
+#if defined(MADV_FREE)
+    /* Freeing lazily makes Linux split a huge page at once; the cut frees it. */
+    (void)madvise(from, (size_t)((char *)to - (char *)from), MADV_FREE);
+#else
+    (void)from;
+    (void)to;
+#endif
+}
+
+bool
+hs_pages_cut(void *from, void *to)
+{
+    const size_t bytes = (size_t)((char *)to - (char *)from);
+    if (bytes == 0 || munmap(from, bytes) == 0) {
+        return true;
+    }
+    (void)madvise(from, bytes, MADV_DONTNEED); /* too many mappings in this process */
+    return false;
+}
+
+size_t
+hs_pages_trim(void *mapping, size_t length, void *block, size_t bytes)
+{
+    const size_t before = (size_t)((char *)block - (char *)mapping);
+    const size_t kept = before + round_up_pages(bytes);
+    if (kept >= length || munmap((char *)mapping + kept, length - kept) != 0) {
+        return length;
+    }
+    return kept;
+}
+
+#else
+
+void *
+hs_pages_alloc(size_t bytes, void **mapping, size_t *length)
+{
+    (void)bytes;
+    (void)mapping;
+    (void)length;
+    return NULL;
+}
+
+void
+hs_pages_free(void *mapping, size_t length)
+{
+    (void)mapping;
+    (void)length;
+}
+
+void *
+hs_pages_reserve(size_t bytes, void **mapping, size_t *length)
+{
+    return hs_pages_alloc(bytes, mapping, length);
+}
+
+void
+hs_pages_advise(void *from, void *to, bool huge)
+{
+    (void)from;
+    (void)to;
+    (void)huge;
+}
+
+void *
+hs_pages_grow(size_t bytes, void **mapping, size_t *length)
+{
+    return hs_pages_alloc(bytes, mapping, length);
+}
+
+void
+hs_pages_tear(void *from, void *to)
+{
+    (void)from;
+    (void)to;
+}
+
+bool
+hs_pages_cut(void *from, void *to)
+{
+    (void)from;
+    (void)to;
+    return false;
+}
+
+size_t
+hs_pages_trim(void *mapping, size_t length, void *block, size_t bytes)
+{
+    (void)mapping;
+    (void)block;
+    (void)bytes;
+    return length;
+}
+
+#endif
+
+/* Small chunks come from malloc, large ones are pages. A small one that grows large is
+ * copied from the first to the second. */
+
+_Static_assert(sizeof(hs_chunk) <= HS_PAGES_HEADROOM, "the header lies in the headroom");
+_Static_assert(sizeof(hs_chunk) <= HS_ALIGNMENT, "and in front of an aligned chunk");
+
+/* malloc's memory: the header, up to one alignment of padding, the data. */
+#define OVERHEAD (sizeof(hs_chunk) + HS_ALIGNMENT)
+
+hs_chunk *
+hs_chunk_of(void *data)
+{
+    return (hs_chunk *)data - 1;
+}
+
+/* What malloc gave is not shrunk by less than this part of it: lists are a little shorter than was
+ * foreseen, and a chunk that was cut has no room for the next such list. */
+#define WORTH_CUTTING 8
+
+static uintptr_t
+round_up_chunk(uintptr_t address, size_t multiple)
+{
+    return (address + multiple - 1) / multiple * multiple;
+}
+
+/* How far behind the start of what malloc returned the data lie. */
+static size_t
+lead_of(const void *raw)
+{
+    const uintptr_t address = (uintptr_t)raw;
+    return (size_t)(round_up_chunk(address + sizeof(hs_chunk), HS_ALIGNMENT) - address);
+}
+
+/* A chunk of `bytes` bytes in what malloc returned: its data. No part of it can be given back, so
+ * all of it counts as touched. */
+static void *
+place(void *raw, size_t bytes)
+{
+    const size_t lead = lead_of(raw);
+    void        *data = (char *)raw + lead;
+    *hs_chunk_of(data) = (hs_chunk){.raw = raw, .lead = lead, .capacity = bytes, .touched = bytes};
+    return data;
+}
+
+static void *
+new_in_pages(size_t bytes)
+{
+    void  *raw;
+    size_t length;
+    char  *data = hs_pages_reserve(bytes, &raw, &length);
+    if (data != NULL) {
+        const size_t capacity = length - (size_t)(data - (char *)raw);
+        *hs_chunk_of(data) = (hs_chunk){.raw = raw, .length = length, .capacity = capacity};
+    }
+    return data;
+}
+
+void *
+hs_chunk_new(size_t bytes)
+{
+    if (bytes > PTRDIFF_MAX / 2) {
+        return NULL;
+    }
+    void *data = bytes >= HS_PAGES_FROM ? new_in_pages(bytes) : NULL;
+    if (data != NULL) {
+        return data;
+    }
+    void *raw = malloc(bytes + OVERHEAD);
+    return raw != NULL ? place(raw, bytes) : NULL;
+}
+
+void
+hs_chunk_free(void *data)
+{
+    const hs_chunk chunk = *hs_chunk_of(data);
+    if (chunk.length > 0) {
+        hs_pages_free(chunk.raw, chunk.length);
+    } else {
+        free(chunk.raw);
+    }
+}
+
+static void *
+grow_in_pages(void *data, size_t bytes)
+{
+    hs_chunk     chunk = *hs_chunk_of(data);
+    const size_t huge = chunk.huge;
+    char        *grown = hs_pages_grow(bytes, &chunk.raw, &chunk.length);
+    if (grown == NULL) {
+        hs_chunk_of(data)->huge = 0;
+        hs_chunk_expect(data, huge);
+        return NULL;
+    }
+    chunk.capacity = chunk.length - (size_t)(grown - (char *)chunk.raw);
+    chunk.huge = 0;
+    *hs_chunk_of(grown) = chunk;
+    hs_chunk_expect(grown, huge);
+    return grown;
+}
+
+/* A chunk from malloc with another size, the first `kept` bytes of it as they were. */
+static void *
+resize_in_malloc(void *data, size_t bytes, size_t kept)
+{
+    const size_t before = hs_chunk_of(data)->lead;
+    char        *raw = realloc(hs_chunk_of(data)->raw, bytes + OVERHEAD);
+    if (raw == NULL) {
+        return NULL;
+    }
+    /* The data first: the header may come to lie where they are now. */
+    if (lead_of(raw) != before) {
+        memmove(raw + lead_of(raw), raw + before, kept);
+    }
+    return place(raw, bytes);
+}
+
+void *
+hs_chunk_grow(void *data, size_t bytes, size_t used)
+{
+    const bool in_pages = hs_chunk_of(data)->length > 0;
+    if (bytes > PTRDIFF_MAX / 2) {
+        return NULL;
+    }
+    if (in_pages) {
+        void *grown = grow_in_pages(data, bytes);
+        if (grown != NULL) {
+            return grown;
+        }
+    }
+    if (in_pages || bytes >= HS_PAGES_FROM) {
+        /* From malloc to pages; or Linux cannot move a mapping in one piece, as in a process forked
+         * from the one that made it. */
+        void *copy = new_in_pages(bytes);
+        if (copy != NULL) {
+            memcpy(copy, data, used);
+            hs_chunk_touch(copy, used);
+            hs_chunk_free(data);
+            return copy;
+        }
+    }
+    return in_pages ? NULL : resize_in_malloc(data, bytes, used);
+}
+
+void
+hs_chunk_expect(void *data, size_t bytes)
+{
+    hs_chunk *chunk = hs_chunk_of(data);
+    if (chunk->length == 0) {
+        return;
+    }
+    if (bytes > chunk->capacity) {
+        bytes = chunk->capacity;
+    }
+    char           *start = data;
+    const uintptr_t first = round_up_chunk((uintptr_t)data, HS_PAGES_FROM);
+    const uintptr_t end = ((uintptr_t)data + bytes) / HS_PAGES_FROM * HS_PAGES_FROM;
+    const size_t    huge = end > first ? (size_t)(end - (uintptr_t)data) : 0;
+    if (huge <= chunk->touched && chunk->huge <= chunk->touched) {
+        return; /* all of that has its pages already */
+    }
+    if (huge > chunk->huge) {
+        /* From the mapping on, so that Linux keeps two mappings and not three; what lies in front
+         * of the first whole huge page stays small anyway. */
+        hs_pages_advise(chunk->huge > 0 ? start + chunk->huge : chunk->raw, start + huge, true);
+    } else if (huge < chunk->huge) {
+        hs_pages_advise(huge > 0 ? start + huge : chunk->raw, start + chunk->huge, false);
+    }
+    chunk->huge = huge;
+}
+
+void
+hs_chunk_touch(void *data, size_t used)
+{
+    hs_chunk *chunk = hs_chunk_of(data);
+    size_t    touched = used;
+    if (used > 0 && used < chunk->huge) { /* the last page is a huge one */
+        touched = (size_t)(round_up_chunk((uintptr_t)data + used, HS_PAGES_FROM) - (uintptr_t)data);
+    }
+    if (touched > chunk->capacity) {
+        touched = chunk->capacity;
+    }
+    if (touched > chunk->touched) {
+        chunk->touched = touched;
+    }
+}
+
+/* The part of a chunk from `from` on, a multiple of HS_PAGES_STEP from the mapping, becomes a
+ * chunk of its own if what was touched of it deserves that. The rest of it is unmapped. */
+static void *
+split(void *data, char *from)
+{
+    hs_chunk *chunk = hs_chunk_of(data);
+    char     *end = (char *)chunk->raw + chunk->length;
+    char     *rest = (char *)round_up_chunk((uintptr_t)from + HS_PAGES_STEP, HS_PAGES_FROM);
+    char     *raw = rest - HS_PAGES_STEP;
+    if (rest >= end || (size_t)(rest - (char *)data) + HS_PAGES_FROM > chunk->touched ||
+        !hs_pages_cut(from, raw)) {
+        return NULL;
+    }
+    const size_t before = (size_t)(rest - (char *)data);
+    *hs_chunk_of(rest) = (hs_chunk){
+        .raw = raw,
+        .length = (size_t)(end - raw),
+        .capacity = (size_t)(end - rest),
+        .touched = chunk->touched - before,
+        .huge = chunk->huge > before ? chunk->huge - before : 0,
+    };
+    chunk->length = (size_t)(from - (char *)chunk->raw);
+    return rest;
+}
+
+/* A cut through a huge page pins what is cut off until memory is short. That is left so where it
+ * is little, against what is kept. */
+static void
+tear_at(char *data, char *from)
+{
+    const hs_chunk *chunk = hs_chunk_of(data);
+    const size_t    kept = (size_t)(from - data);
+    char           *end = (char *)round_up_chunk((uintptr_t)from, HS_PAGES_FROM);
+    if (kept < chunk->huge && kept < chunk->touched && (size_t)(end - from) > kept / 8) {
+        hs_pages_tear(from, end);
+    }
+}
+
+static void
+cut_in_pages(void *data, size_t bytes, void **rest)
+{
+    hs_chunk    *chunk = hs_chunk_of(data);
+    const size_t head = (size_t)((char *)data - (char *)chunk->raw);
+    char        *end = (char *)chunk->raw + chunk->length;
+    char        *from = (char *)chunk->raw + round_up_chunk(head + bytes, HS_PAGES_STEP);
+    if (from >= end) {
+        return;
+    }
+    tear_at(data, from);
+    if (rest != NULL) {
+        *rest = split(data, from);
+    }
+    if ((rest == NULL || *rest == NULL) && hs_pages_cut(from, end)) {
+        chunk->length = (size_t)(from - (char *)chunk->raw);
+    }
+    chunk->capacity = chunk->length - head;
+    const size_t kept = (size_t)(from - (char *)data);
+    chunk->touched = chunk->touched < kept ? chunk->touched : kept;
+    chunk->huge = chunk->huge < chunk->capacity ? chunk->huge : chunk->capacity;
+}
+
+void *
+hs_chunk_cut(void *data, size_t bytes, void **rest)
+{
+    hs_chunk *chunk = hs_chunk_of(data);
+    if (rest != NULL) {
+        *rest = NULL;
+    }
+    if (bytes >= chunk->capacity) {
+        return data;
+    }
+    if (chunk->length > 0) {
+        cut_in_pages(data, bytes, rest);
+        return data;
+    }
+    if (chunk->capacity - bytes <= chunk->capacity / WORTH_CUTTING) {
+        return data;
+    }
+    void *shrunk = resize_in_malloc(data, bytes, bytes);
+    return shrunk != NULL ? shrunk : data;
+}
+
+/* pool.c: an array of chunks, oldest first. Chunks are freed after the lock is released, because
+ * freeing is a system call. */
 
 static struct {
     size_t limit, held;

@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_NEAREST_NEAREST_H
+#define HS_NEAREST_NEAREST_H
+
+#include "../collect/columns.h"
+#include "../search/search.h"
+#include "../memory/memory.h"
+#include "tree.h"
+
 /*
  * nearest.h: what a search for the nearest points knows, and the parts that its steps are made of:
  * images that can be near, a first radius, a radius that surely suffices.
  */
-#ifndef HS_NEAREST_H
-#define HS_NEAREST_H
-
-#include "../collect/columns.h"
-#include "../search/search.h"
-#include "../memory/account_shared.h"
-#include "tree.h"
 
 typedef struct hs_nearest {
     hs_search     *search;      /* borrowed: scene, bins, call */
@@ -127,14 +128,36 @@ int hs_nearest_exponent(double radius);
  * A scene and trees, made anew or borrowed from cells that keep them: everything of `near` but k,
  * of_spot, omits_self and rows, which are set already, as is its search but for scene, bins, kernel
  * and threads. sets->trees: NULL, or what keeps a tree of the points. `limit`: the largest
- * distance. hs_nearest_release in any case. In nearest_prepare.c.
+ * distance. hs_nearest_release in any case.
  */
 hs_status hs_nearest_prepare(hs_nearest *near, const hs_sets *sets, const hs_box *box, double limit,
                              hs_failure *failure);
 void      hs_nearest_release(hs_nearest *near);
 
 /* Writes all rows, by all threads of the team. HS_ERR_MEMORY, HS_ERR_INTERRUPTED;
- * HS_ERR_SHIFT_RANGE sets failure->row. In nearest_search.c. */
+ * HS_ERR_SHIFT_RANGE sets failure->row. */
 hs_status hs_nearest_search(hs_nearest *near, hs_failure *failure);
+
+/*
+ * A tree that is kept with cells. The first search for the nearest points there
+ * builds it; others borrow it, any number of them at once. No call waits: one that comes while it
+ * is being built makes a tree for itself alone.
+ */
+
+typedef struct hs_nearest_kept hs_nearest_kept;
+
+/* One without a tree as yet. NULL when memory is short. */
+hs_nearest_kept *hs_nearest_kept_new(void);
+void             hs_nearest_kept_free(hs_nearest_kept *kept); /* NULL-safe */
+
+/*
+ * What has been built, or NULL. *room is then NULL too, or where the caller is to build it: a
+ * hs_nearest of zeros but for its search, which is not begun. hs_nearest_kept_end says how that
+ * went.
+ */
+const hs_nearest *hs_nearest_kept_get(hs_nearest_kept *kept, hs_nearest **room);
+
+/* After a failure the room must hold nothing again. */
+void hs_nearest_kept_end(hs_nearest_kept *kept, bool done);
 
 #endif

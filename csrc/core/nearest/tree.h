@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_NEAREST_TREE_H
+#define HS_NEAREST_TREE_H
+
+#include "../cells/bins.h"
+
+#include <math.h>
+
 /*
  * tree.h: cells that follow the points: each node halves its points along the axis where they are
  * spread widest, about evenly, so that cells are small where points crowd and few where they are
  * rare, on any scale and in any box. The search for the nearest walks it.
  */
-#ifndef HS_TREE_H
-#define HS_TREE_H
-
-#include "../cells/bins.h"
-
-#include <math.h>
 
 typedef struct hs_tree_node {
     int32_t first, end; /* its points, in tree order */
@@ -104,5 +105,48 @@ hs_tree_step(int32_t left, const double gap[2], double limit, int32_t *waiting, 
     }
     return true;
 }
+
+/* Makes a tree of the points of a scene. */
+
+/*
+ * Sorts the points of the scene, whose arrays the bins take over, into leaves of at most
+ * leaf_points; spots may be larger. In each node points are in the caller's order. The tree is the
+ * same for any team. bins->start stays NULL. HS_ERR_MEMORY, HS_ERR_INTERRUPTED; on failure bins and
+ * tree are to be freed as well.
+ */
+hs_status hs_tree_build(hs_account *account, hs_team *team, const hs_options *options,
+                        hs_scene *scene, int32_t leaf_points, hs_bins *bins, hs_tree *tree);
+
+/* Harmless twice, and on a tree of zeros. */
+void hs_tree_free(hs_account *account, hs_tree *tree);
+
+/* One step in building a tree: the points of a node are divided between two
+ * children. */
+
+/* What nodes of one tree are split with; all borrowed. */
+typedef struct hs_splitter {
+    const hs_bins *bins;
+    int32_t       *order; /* numbers of points, of each node those from `first` to `end` */
+    int32_t       *aside; /* room for as many */
+    int32_t        leaf_points;
+} hs_splitter;
+
+/*
+ * Divides the points of a node, which keep their order on both sides; returns where those of the
+ * right child begin. 0: the node stays a leaf, and is_spot says whether that is because its points
+ * are equal. Nodes that share no points can be split at the same time.
+ */
+int32_t hs_tree_split(const hs_splitter *splitter, hs_tree_node *node);
+
+/* The last step in building a tree: how far its nodes reach. */
+
+/*
+ * Fills depth, lower, upper and bounds, for which there is room, of a tree with nodes, whose points
+ * are in tree order by now. begins, n_subtrees + 1 numbers: nodes begins[s] to begins[s + 1] - 1
+ * are those below the root of subtree s, which is one thread's task; roots and what is above them
+ * come before.
+ */
+void hs_tree_bound(hs_team *team, const hs_bins *bins, const int32_t *begins, int32_t n_subtrees,
+                   hs_tree *tree);
 
 #endif

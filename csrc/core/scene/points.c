@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* points.c: slabs of points are copied to columns, and the range of each column is kept. */
 #include "points.h"
-
-#include "../threads/passes.h"
 
 #include <math.h>
 #include <string.h>
+
+/* points.c: slabs of points are copied to columns, and the range of each column is kept. */
+
 #if defined(__SSE2__) || defined(_M_X64)
 #include <emmintrin.h>
 #define HAS_SSE2 1

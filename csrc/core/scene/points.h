@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_SCENE_POINTS_H
+#define HS_SCENE_POINTS_H
+
+#include "../memory/memory.h"
+#include "../threads/call.h"
+#include "../../kernels/kernel.h"
+
 /*
  * points.h: the only reader of the caller's coordinates. Each number is read once, so that a
  * concurrent write can change the answer but not corrupt memory: all later steps see this copy.
  */
-#ifndef HS_POINTS_H
-#define HS_POINTS_H
-
-#include "../memory/account.h"
-#include "../threads/team.h"
-
-#include "../../kernels/kernel.h"
 
 /*
  * Coordinates as given, float32 widened exactly to float64, in one memory block together with the

@@ -1,14 +1,1203 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* scene.c: reads the points, closes gaps, scales, wraps, and settles bounds, in this order. */
 #include "scene.h"
-
-#include "close_gaps.h"
-#include "unit.h"
-#include "../base/outcome.h"
-#include "../threads/passes.h"
+#include "../exact/arithmetic.h"
+#include "../threads/call.h"
+#include "../base/sort.h"
+#include "../base/status.h"
+#include "../base/os.h"
 
 #include <math.h>
 #include <string.h>
+#include <stdlib.h>
+
+/* How far what the search computes with can be from the numbers that were given,
+ * and what decides then. */
+
+/* Part of the radius above which the width of pairs along an axis counts as that of a ball. */
+#define WORTH_NARROWING 0.8
+/* Far more than the roundings of the difference of radius and width. */
+#define NARROWING_SLACK 0x1p-40
+#define UNIT            0x1p-53 /* unit roundoff of float64 */
+/* Error of precision="double", in heights of the box, up to which candidates are few. */
+#define NOISE 0x1p-6
+
+void
+hs_scene_settle_ranges(hs_scene *scene)
+{
+    for (int k = 0; k < scene->ndim; k++) {
+        if (scene->lattice.row_of_axis[k] >= 0) {
+            const double half = 0.5 * scene->lattice.period[k];
+            /* Points that rounding left outside are binned on the face: an error of t. */
+            scene->t_error[k] +=
+                hs_larger(hs_larger(scene->upper[k] - half, -half - scene->lower[k]), 0.0);
+            scene->lower[k] = -half;
+            scene->upper[k] = half;
+        }
+    }
+}
+
+/* Component by component, because those of a long box vector may be known far less well than those
+ * of a short one. */
+void
+hs_scene_bound_errors(hs_scene *scene, double magnitude)
+{
+    const hs_lattice *lattice = &scene->lattice;
+    const double      lost = scene->extreme ? HS_SCALING_LOSS : 0.0;
+    const double      terms = 2 * lattice->n_periodic + 2;
+    double            error[HS_MAX_DIM];
+    scene->x_error = lost;
+    for (int c = 0; c < scene->ndim; c++) {
+        error[c] = lattice->aligned ? lost
+                                    : lost + 2.0 * UNIT * scene->x_largest[c] +
+                                          terms * terms * 0x1p-104 * magnitude;
+        scene->x_error = hs_larger(error[c], scene->x_error);
+    }
+    for (int k = 0; k < scene->ndim; k++) {
+        double along = 0.0; /* what the dot product carries on, and its own rounding */
+        for (int c = 0; c < scene->ndim && !lattice->aligned; c++) {
+            along += fabs(lattice->normal[k][c]) *
+                     (error[c] + (scene->ndim + 2) * UNIT * scene->x_largest[c]);
+        }
+        scene->t_error[k] = lattice->aligned ? lost : along * (1.0 + 0x1p-40);
+    }
+}
+
+/*
+ * precision="double" computes D in float64 from the points as given: each of its m + 2 terms is
+ * rounded to within 2^-53 of the largest partial sum. Candidates must be sought that much further
+ * out.
+ */
+static double
+bound_formula(const hs_scene *scene, double farthest)
+{
+    const hs_lattice *lattice = &scene->lattice;
+    double            total = 2.0 * farthest;
+    if (lattice->n_periodic == 0) {
+        /* Differences of floats have a relative error only. */
+        return 4.0 * UNIT * scene->cutoff * scene->ndim;
+    }
+    double turns[HS_MAX_DIM]; /* bound on |shift| over row b of B of any pair in reach */
+    for (int k = 0; k < scene->ndim; k++) {
+        const int b = lattice->row_of_axis[k];
+        if (b >= 0) {
+            turns[b] = (2.0 * scene->ndim * total + scene->cutoff) / lattice->period[k] + 4.0;
+        }
+    }
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        double given_turns = 0.0, largest = 0.0;
+        for (int b = 0; b < lattice->n_periodic; b++) {
+            given_turns += turns[b] * fabs((double)lattice->U[b][r]);
+        }
+        for (int c = 0; c < scene->ndim; c++) {
+            largest = fmax(largest, fabs(lattice->scaled[r][c]));
+        }
+        total += given_turns * largest;
+    }
+    return (lattice->n_periodic + 4) * scene->ndim * UNIT * (total + scene->cutoff);
+}
+
+void
+hs_scene_set_radius(hs_scene *scene, const hs_options *options, double largest)
+{
+    scene->formula_error = options->precision == HS_DOUBLE ? bound_formula(scene, largest) : 0.0;
+    scene->radius = scene->cutoff + scene->formula_error;
+    memset(scene->less, 0, sizeof scene->less);
+}
+
+hs_status
+hs_scene_narrow(hs_scene *scene, const hs_narrowing *narrowing)
+{
+    /* Less than this is not worth it. */
+    const double enough = WORTH_NARROWING * hs_scale_apply(scene->unscale, scene->radius);
+    for (int k = 0; narrowing != NULL && k < scene->ndim; k++) {
+        double          width;
+        const hs_status status =
+            narrowing->find(narrowing->context, scene->lattice.normal[k], enough, &width);
+        if (status != HS_OK) {
+            return status;
+        }
+        const double near = hs_next_up(hs_scale_apply(scene->scale, width)) + scene->formula_error;
+        const double less = (scene->radius - near) * (1.0 - NARROWING_SLACK);
+        scene->less[k] = width < enough && less > 0.0 ? less : 0.0;
+    }
+    return HS_OK;
+}
+
+double
+hs_scene_volume(const hs_scene *scene, double ball)
+{
+    for (int k = 0; k < scene->ndim; k++) {
+        ball *= scene->less[k] > 0.0 ? hs_scene_radius_along(scene, k) / scene->radius : 1.0;
+    }
+    return ball;
+}
+
+void
+hs_scene_init_metric(hs_scene *scene, const hs_options *options)
+{
+    const hs_lattice *lattice = &scene->lattice;
+    const double(*rows)[HS_MAX_DIM] = (const double(*)[HS_MAX_DIM])lattice->rows;
+    double cutoff = hs_scale_apply(scene->scale, scene->sought);
+    if (scene->extreme) {
+        rows = (const double(*)[HS_MAX_DIM])lattice->given;
+        cutoff = scene->sought;
+    } else if (scene->keeps_originals) {
+        rows = (const double(*)[HS_MAX_DIM])lattice->scaled;
+    }
+    hs_metric_init(&scene->metric, scene->ndim, lattice->n_periodic, rows, cutoff,
+                   options->inclusive);
+}
+
+void
+hs_scene_set_cutoff(hs_scene *scene, const hs_options *options)
+{
+    HS_ASSERT(!scene->extreme);
+    scene->sought = options->cutoff;
+    scene->cutoff = scene->cutoff_low = hs_scale_apply(scene->scale, options->cutoff);
+    hs_scene_set_radius(scene, options, scene->cloud.largest);
+    hs_scene_init_metric(scene, options);
+}
+
+/* The first of the points that are farthest from zero along some axis; *far: how far. */
+static int64_t
+farthest_point(const hs_cloud *cloud, double *far)
+{
+    int64_t farthest = 0;
+    double  largest = -1.0;
+    for (int k = 0; k < cloud->ndim; k++) {
+        for (int64_t i = 0; i < cloud->n; i++) {
+            const double size = fabs(cloud->x[k][i]);
+            if (size > largest || (size == largest && i < farthest)) {
+                largest = size;
+                farthest = i;
+            }
+        }
+    }
+    *far = largest;
+    return farthest;
+}
+
+void
+hs_scene_name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure *failure)
+{
+    double of_points, of_queries;
+    failure->row = farthest_point(&scene->cloud, &of_points);
+    if (asking != NULL) {
+        const int64_t query = farthest_point(&asking->cloud, &of_queries);
+        failure->in_queries = of_queries > of_points;
+        failure->row = failure->in_queries ? query : failure->row;
+    }
+}
+
+bool
+hs_scene_is_drowned(const hs_scene *scene)
+{
+    double shortest = INFINITY;
+    for (int k = 0; k < scene->ndim; k++) {
+        if (scene->lattice.row_of_axis[k] >= 0) {
+            shortest = hs_smaller(scene->lattice.period[k], shortest);
+        }
+    }
+    return scene->formula_error > scene->cutoff && !(scene->formula_error <= NOISE * shortest);
+}
+
+/* Points and queries in one scene, at once or one after the other: bounds must
+ * hold for both. */
+
+/* How much further from the box than the points queries may be that come later, and how many box
+ * vectors at least, before they need bounds of their own. Bounds that are so much wider cost next
+ * to nothing: they are some units in the last place. */
+#define FURTHER     4.0
+#define BOX_VECTORS 1024.0
+/* Along coordinate axes cells are found for any number, as long as sums of a few are finite. */
+#define MOST_FOR_CELLS 0x1p900
+
+void
+hs_scene_join_clouds(hs_scene *scene, hs_scene *asking)
+{
+    hs_cloud *a = &scene->cloud, *b = &asking->cloud;
+    /* The range of no points is empty: infinity to -infinity. */
+    for (int k = 0; k < scene->ndim; k++) {
+        a->lower[k] = b->lower[k] = hs_smaller(a->lower[k], b->lower[k]);
+        a->upper[k] = b->upper[k] = hs_larger(a->upper[k], b->upper[k]);
+    }
+    a->largest = b->largest = hs_larger(a->largest, b->largest);
+}
+
+void
+hs_scene_share(const hs_scene *scene, hs_scene *asking)
+{
+    asking->scale = scene->scale;
+    asking->unscale = scene->unscale;
+    asking->pending = scene->pending;
+    asking->sought = scene->sought;
+    asking->lattice = scene->lattice;
+    asking->cutoff = scene->cutoff;
+    asking->cutoff_low = scene->cutoff_low;
+    asking->radius = scene->radius;
+    memcpy(asking->less, scene->less, sizeof asking->less);
+    asking->extreme = scene->extreme;
+    asking->formula_error = scene->formula_error;
+}
+
+void
+hs_scene_join_wrapped(hs_scene *scene, const hs_scene *asking)
+{
+    const bool points = scene->n > 0, queries = asking->n > 0;
+    scene->is_asked = true;
+    for (int k = 0; k < scene->ndim; k++) {
+        scene->x_largest[k] = hs_larger(scene->x_largest[k], asking->x_largest[k]);
+        if (queries) { /* otherwise its range is that of nothing */
+            scene->lower[k] = points ? hs_smaller(scene->lower[k], asking->lower[k])
+                                     : asking->lower[k];
+            scene->upper[k] = points ? hs_larger(scene->upper[k], asking->upper[k])
+                                     : asking->upper[k];
+        }
+    }
+}
+
+void
+hs_scene_put_in_one_cell(hs_scene *scene)
+{
+    hs_cloud *cloud = &scene->cloud;
+    for (int k = 0; k < scene->ndim; k++) {
+        memset(cloud->x[k], 0, (size_t)cloud->n * sizeof(double));
+        cloud->lower[k] = cloud->upper[k] = 0.0;
+    }
+    cloud->largest = 0.0;
+    scene->scale = scene->unscale = scene->pending = hs_scale_of(0);
+    scene->cutoff = scene->cutoff_low = scene->radius = 1.0;
+    scene->formula_error = 0.0;
+    memset(scene->less, 0, sizeof scene->less);
+    scene->extreme = false;
+    scene->in_one_cell = true;
+    hs_lattice_init(NULL, scene->ndim, scene->pending, &scene->lattice);
+}
+
+static double
+largest_entry(const hs_lattice *lattice)
+{
+    double largest = 0.0;
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        for (int k = 0; k < lattice->ndim; k++) {
+            largest = hs_larger(largest, fabs(lattice->rows[r][k]));
+        }
+    }
+    return largest;
+}
+
+void
+hs_scene_make_room(hs_scene *scene, double *magnitude)
+{
+    const hs_lattice *lattice = &scene->lattice;
+    const double      away = BOX_VECTORS * largest_entry(lattice);
+    scene->cloud.largest = hs_larger(FURTHER * scene->cloud.largest, away);
+    *magnitude = hs_larger(FURTHER * *magnitude, away);
+    for (int k = 0; k < scene->ndim; k++) {
+        double across = 0.0; /* what is wrapped lies within half of each row of B */
+        for (int r = 0; r < lattice->n_periodic; r++) {
+            across += 0.5 * fabs(lattice->rows[r][k]);
+        }
+        scene->x_largest[k] = 2.0 * hs_larger(scene->x_largest[k], across);
+        if (across == 0.0) { /* queries stay wherever they are along this axis */
+            scene->x_largest[k] = hs_larger(2.0 * scene->x_largest[k], away);
+        }
+    }
+}
+
+void
+hs_scene_widen_errors(hs_scene *scene)
+{
+    for (int k = 0; k < scene->ndim; k++) {
+        scene->t_error[k] *= 2.0; /* queries may be rounded to beyond another face */
+    }
+}
+
+/* The largest scaled coordinate of queries that come later. */
+static double
+most_taken(const hs_scene *kept, bool is_untested)
+{
+    return is_untested && kept->lattice.aligned ? MOST_FOR_CELLS : kept->cloud.largest;
+}
+
+bool
+hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud)
+{
+    const hs_scale scale = kept->scale;
+    if (kept->n == 0) { /* no point is found, wherever queries are, but they need a place */
+        return hs_scale_apply(scale, cloud->largest) < INFINITY;
+    }
+    const double most = most_taken(kept, kept->is_untested);
+    if (kept->in_one_cell || !(hs_scale_apply(scale, cloud->largest) <= most)) {
+        return false;
+    }
+    if (kept->is_untested) { /* digits that are lost are less than the room between cells */
+        return true;
+    }
+    if (kept->extreme) {
+        return false;
+    }
+    /* Scaling down must not reach the subnormal numbers. */
+    return scale.exponent == 0 || cloud->largest == 0.0 ||
+           hs_scale_apply(scale, hs_cloud_smallest(cloud)) >= 0x1p-1022;
+}
+
+bool
+hs_scene_covers(const hs_scene *kept, const hs_scene *asking)
+{
+    const bool is_tested = kept->n > 0 && !kept->is_untested;
+    bool       covers = !is_tested || asking->x_error <= kept->x_error;
+    for (int k = 0; kept->n > 0 && k < kept->ndim; k++) {
+        covers = covers && asking->t_error[k] <= kept->t_error[k] &&
+                 (!is_tested || asking->x_largest[k] <= kept->x_largest[k]);
+    }
+    return covers;
+}
+
+void
+hs_scene_name_refused(const hs_scene *kept, const hs_points *queries, hs_failure *failure)
+{
+    const hs_options options = hs_options_default();
+    const double     most = most_taken(kept, true);
+    double           largest = -1.0;
+    hs_cloud         cloud;
+    if (kept->in_one_cell ||
+        hs_cloud_load(NULL, NULL, queries, &options, &cloud, failure) != HS_OK) {
+        return;
+    }
+    for (int64_t i = 0; i < cloud.n; i++) {
+        for (int k = 0; k < cloud.ndim; k++) {
+            const double size = hs_scale_apply(kept->scale, fabs(cloud.x[k][i]));
+            if (largest <= most && size > largest) {
+                largest = size;
+                failure->row = i;
+                failure->column = k;
+                failure->value = cloud.x[k][i];
+                failure->in_queries = true;
+            }
+        }
+    }
+    hs_cloud_free(NULL, &cloud);
+}
+
+/* Compares exponents, which are integers: no ratio of lengths can overflow. */
+
+/* Cutoffs between 2^-20 and 2^20 are left alone: the float32 filter has room for their squares. */
+#define ORDINARY_EXPONENT 20
+/* A cutoff that is 2^8 times the largest coordinate: two points are less than 2 sqrt(8) times that
+ * and a binary order apart. */
+#define WHOLE_EXPONENT 8
+/* Cutoffs up to so many times the largest coordinate are never shortened. */
+#define ENOUGH_CUTOFF 64.0
+/* Exponent of zero; that of infinity is its opposite. Sums with other exponents do not overflow. */
+#define NO_EXPONENT (INT32_MIN / 2)
+
+int
+hs_exponent_of(double x)
+{
+    return x == 0.0 ? NO_EXPONENT : isinf(x) ? -NO_EXPONENT : ilogb(x);
+}
+
+bool
+hs_is_far(double size, int unit, int powers)
+{
+    return size > ldexp(1.0, unit + powers); /* infinity, or 0, where that passes the range */
+}
+
+static int
+entries_of_row(const double *row, int ndim)
+{
+    int entries = 0;
+    for (int k = 0; k < ndim; k++) {
+        entries += row[k] != 0.0;
+    }
+    return entries;
+}
+
+int
+hs_mover_among(const double rows[][HS_MAX_DIM], const bool *periodic, int n_rows, int ndim,
+               int column)
+{
+    int mover = HS_OPEN;
+    for (int l = 0; l < n_rows; l++) {
+        if ((periodic == NULL || periodic[l]) && rows[l][column] != 0.0) {
+            mover = mover == HS_OPEN && entries_of_row(rows[l], ndim) == 1 ? l : HS_COUPLED;
+        }
+    }
+    return mover;
+}
+
+int
+hs_mover_of(const hs_box *box, int column)
+{
+    return box == NULL ? HS_OPEN
+                       : hs_mover_among((const double(*)[HS_MAX_DIM])box->rows, box->periodic,
+                                        box->ndim, box->ndim, column);
+}
+
+hs_box_size
+hs_box_size_of(const hs_box *box)
+{
+    hs_box_size found = {0.0, INFINITY, INFINITY, 0, false};
+    for (int l = 0; box != NULL && l < box->ndim; l++) {
+        double row_largest = 0.0;
+        for (int k = 0; box->periodic[l] && k < box->ndim; k++) {
+            const double size = fabs(box->rows[l][k]);
+            row_largest = hs_larger(size, row_largest);
+            found.smallest = size > 0.0 ? hs_smaller(size, found.smallest) : found.smallest;
+        }
+        found.largest = hs_larger(row_largest, found.largest);
+        if (box->periodic[l]) {
+            found.short_row = hs_smaller(row_largest, found.short_row);
+        }
+    }
+    for (int k = 0; box != NULL && k < box->ndim; k++) {
+        const int mover = hs_mover_of(box, k);
+        found.moved |= (unsigned)(mover != HS_OPEN) << k;
+        found.is_coupled = found.is_coupled || mover == HS_COUPLED;
+    }
+    return found;
+}
+
+double
+hs_enough_cutoff(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
+{
+    if (!(cutoff > ENOUGH_CUTOFF * cloud->largest) || cloud->largest == 0.0 || box->largest > 0.0) {
+        return cutoff;
+    }
+    const int exponent = hs_exponent_of(cloud->largest) + WHOLE_EXPONENT;
+    return exponent > 1023 ? cutoff : hs_smaller(ldexp(1.0, exponent), cutoff);
+}
+
+bool
+hs_is_ordinary(const hs_cloud *cloud, double cutoff)
+{
+    const double far = ldexp(1.0, HS_FAR_EXPONENT - 1 - ORDINARY_EXPONENT);
+    return cutoff >= ldexp(1.0, -ORDINARY_EXPONENT) && cutoff <= ldexp(1.0, ORDINARY_EXPONENT) &&
+           cutoff <= ENOUGH_CUTOFF * cloud->largest && cloud->largest <= far;
+}
+
+int
+hs_unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
+{
+    return hs_exponent_of(cutoff > 0.0                 ? cutoff
+                          : box->short_row != INFINITY ? box->short_row
+                                                       : cloud->largest);
+}
+
+bool
+hs_fits_one_scale(const hs_cloud *cloud, const hs_box_size *box, int unit, int powers)
+{
+    const double largest = hs_larger(box->largest, cloud->largest);
+    return !hs_is_far(largest, unit, powers);
+}
+
+/* The largest coordinate that wrapping leaves as it is. */
+static double
+open_reach(const hs_cloud *cloud, const hs_box_size *box)
+{
+    double reach = 0.0;
+    for (int k = 0; k < cloud->ndim; k++) {
+        if (!(box->moved >> k & 1u)) {
+            reach = hs_larger(hs_larger(-cloud->lower[k], cloud->upper[k]), reach);
+        }
+    }
+    return reach;
+}
+
+bool
+hs_open_drowns_box(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
+{
+    return box->is_coupled &&
+           hs_is_far(open_reach(cloud, box), hs_exponent_of(hs_larger(box->largest, cutoff)),
+                     HS_FAR_DROWNING_EXPONENT);
+}
+
+int
+hs_choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff, int unit,
+                   int largest, bool *extreme)
+{
+    int          exponent = unit == NO_EXPONENT || abs(unit) <= ORDINARY_EXPONENT ? 0 : unit;
+    const double turned = ldexp(box->largest, HS_FAR_TURNS_EXPONENT);
+    const double reach = turned > 0.0 ? hs_smaller(turned, cloud->largest) : cloud->largest;
+    const int    found = hs_exponent_of(hs_larger(box->largest, reach));
+    if (found - exponent > largest) {
+        exponent = found - largest;
+    }
+    const int wide = hs_exponent_of(open_reach(cloud, box)) - HS_LARGEST_WIDE_EXPONENT;
+    exponent = exponent < wide ? wide : exponent;
+    *extreme = false;
+    if (exponent > 0) {
+        double smallest = fmin(box->smallest, hs_cloud_smallest(cloud));
+        smallest = cutoff > 0.0 ? fmin(smallest, cutoff) : smallest;
+        *extreme = smallest != INFINITY && hs_exponent_of(smallest) - exponent < -1022;
+    }
+    return exponent;
+}
+
+/* Which power of two a scene is scaled by, and whether gaps between its
+ * points are closed before that. */
+
+bool
+hs_scene_may_condense(const hs_scene *scene, const hs_scene *asking, const hs_box_size *size,
+                      int unit)
+{
+    const bool is_bounded = scene->within > 0.0 && scene->sought == scene->within;
+    if (scene->is_kept || (scene->is_wide && !is_bounded)) {
+        return false;
+    }
+    return scene->is_wide || (asking == NULL && !scene->is_plain) ||
+           hs_open_drowns_box(&scene->cloud, size, scene->sought) ||
+           !hs_fits_one_scale(&scene->cloud, size, unit, HS_LARGEST_WIDE_EXPONENT);
+}
+
+double
+hs_scene_settle_cutoff(const hs_scene *scene, const hs_box_size *size, double cutoff)
+{
+    const hs_cloud *cloud = &scene->cloud;
+    if (scene->within > 0.0 &&
+        !hs_fits_one_scale(cloud, size, hs_unit_exponent(cloud, size, scene->within),
+                           HS_FAR_BOUNDED_EXPONENT)) {
+        return scene->within;
+    }
+    return scene->is_kept || scene->is_plain ? cutoff : hs_enough_cutoff(cloud, size, cutoff);
+}
+
+void
+hs_scene_set_scale(const hs_box *box, bool is_scaled, int unit, hs_scene *scene,
+                   const hs_scene *asking)
+{
+    const hs_box_size size = hs_box_size_of(box);
+    int               exponent = unit;
+    bool              also_extreme = false;
+    /* The smallest length that pairs are compared with. */
+    const double least = scene->least_cutoff > 0.0 ? hs_smaller(scene->least_cutoff, scene->sought)
+                                                   : scene->sought;
+    scene->extreme = false;
+    if (!is_scaled) {
+        const int largest = scene->is_wide ? HS_LARGEST_WIDE_EXPONENT : HS_LARGEST_EXPONENT;
+        exponent = hs_choose_exponent(&scene->cloud, &size, least, unit, largest, &scene->extreme);
+        if (asking != NULL) { /* the same exponent: the clouds' ranges are joined */
+            (void)hs_choose_exponent(&asking->cloud, &size, least, unit, largest, &also_extreme);
+        }
+    }
+    scene->extreme = scene->extreme || also_extreme;
+    scene->scale = hs_scale_of(exponent);
+    scene->unscale = hs_scale_of(-exponent);
+    scene->pending = is_scaled ? hs_scale_of(0) : scene->scale;
+    scene->cutoff = scene->cutoff_low = hs_scale_apply(scene->scale, scene->sought);
+    if (scene->extreme && scene->sought > 0.0) {
+        /* The scaled cutoff may have been rounded or flushed: take bounds. */
+        scene->cutoff_low -= HS_SCALING_LOSS;
+        scene->cutoff += HS_SCALING_LOSS;
+    }
+}
+
+bool
+hs_scene_box_vanishes(const hs_scene *scene)
+{
+    const hs_lattice *lattice = &scene->lattice;
+    for (int k = 0; k < lattice->ndim; k++) {
+        if (lattice->row_of_axis[k] >= 0 && !(lattice->period[k] > 0x1p-900)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Whether a cutoff has more images than any memory holds. */
+static bool
+has_endless_images(const hs_scene *scene, const hs_condensed *condensed)
+{
+    const hs_box_size size = hs_box_size_of(condensed->box);
+    const double      cutoff = condensed->is_scaled ? scene->cutoff : scene->sought;
+    return hs_is_far(cutoff, hs_exponent_of(size.short_row), HS_FAR_IMAGES_EXPONENT);
+}
+
+bool
+hs_scene_has_no_scale(const hs_scene *scene, const hs_condensed *condensed)
+{
+    const hs_box_size size = hs_box_size_of(condensed->box);
+    return (hs_scene_box_vanishes(scene) ||
+            hs_open_drowns_box(&scene->cloud, &size, scene->sought)) &&
+           !has_endless_images(scene, condensed);
+}
+
+hs_status
+hs_scene_refuse_vanishing(const hs_scene *scene, const hs_condensed *condensed, hs_failure *failure)
+{
+    if (!scene->lattice.aligned && !has_endless_images(scene, condensed)) {
+        return HS_ERR_BOX_SKEWED;
+    }
+    failure->expected_pairs = failure->expected_bytes = INFINITY; /* of images */
+    return HS_ERR_MEMORY;
+}
+
+/* The pass over all points that wraps them into the box, axis by axis where
+ * it can. */
+
+typedef struct wrapping {
+    hs_scene *scene;
+    bool      few_turns;
+    int       n_slabs; /* that so many points have; the others are not set */
+    hs_folded folded[HS_SLABS];
+} wrapping;
+
+/* Whether the points lie in the middle period along axis k, all of them: then none is touched. */
+static bool
+is_inside(const hs_scene *scene, int k)
+{
+    const double half = 0.5 * scene->lattice.period[k];
+    return scene->cloud.lower[k] >= -half && scene->cloud.upper[k] <= half;
+}
+
+/* The length that the given numbers of column k repeat after; 0 where that is not known. */
+static double
+given_length(const hs_scene *scene, int k)
+{
+    const hs_lattice *lattice = &scene->lattice;
+    const int         own = hs_mover_among((const double(*)[HS_MAX_DIM])lattice->given, NULL,
+                                           lattice->n_periodic, lattice->ndim, k);
+    if (own >= 0) {
+        return fabs(lattice->given[own][k]);
+    }
+    return lattice->aligned && !scene->extreme && lattice->row_of_axis[k] >= 0
+               ? hs_scale_apply(scene->unscale, lattice->period[k])
+               : 0.0;
+}
+
+void
+hs_scene_fold_far(hs_scene *scene)
+{
+    hs_cloud *cloud = &scene->cloud;
+    for (int k = 0; k < scene->ndim; k++) {
+        const double reach = hs_larger(-cloud->lower[k], cloud->upper[k]);
+        const bool   overflows = !(hs_scale_apply(scene->pending, reach) < INFINITY);
+        if (!overflows && !scene->keeps_originals) {
+            continue;
+        }
+        const double length = given_length(scene, k);
+        if (!(length > 0.0) || !(overflows || reach / length >= HS_WRAP_LIMIT)) {
+            continue;
+        }
+        for (int64_t i = 0; i < cloud->n; i++) {
+            int64_t turned;
+            cloud->x[k][i] = hs_wrap_axis(cloud->x[k][i], length, &turned);
+        }
+        cloud->lower[k] = -0.5 * length;
+        cloud->upper[k] = 0.5 * length;
+    }
+}
+
+static void
+clear_turns(const hs_turns *turns, int row, int64_t first, int64_t last)
+{
+    if (turns->narrow[row] != NULL) {
+        memset(turns->narrow[row] + first, 0, (size_t)(last - first) * sizeof(int32_t));
+    } else {
+        memset(turns->wide[row] + first, 0, (size_t)(last - first) * sizeof(int64_t));
+    }
+}
+
+static hs_status
+wrap_slab(void *context, int slab, int64_t first, int64_t last)
+{
+    wrapping         *wrap = context;
+    hs_scene         *scene = wrap->scene;
+    const hs_lattice *lattice = &scene->lattice;
+    const hs_turns   *turns = scene->turns.known ? &scene->turns : NULL;
+    hs_folded        *folded = &wrap->folded[slab];
+    if (!lattice->aligned) {
+        double *const *r = scene->x_is_beside ? scene->originals : scene->cloud.x;
+        hs_fold_points(lattice, wrap->few_turns, r, first, last, scene->cloud.x, turns, folded);
+    }
+    for (int k = 0; lattice->aligned && k < scene->ndim; k++) {
+        const int row = lattice->row_of_axis[k];
+        if (row >= 0 && !is_inside(scene, k)) {
+            const double largest = fmax(-scene->cloud.lower[k], scene->cloud.upper[k]);
+            hs_fold_axis(lattice, k, scene->cloud.x[k], first, last, largest, turns, folded);
+        } else if (row >= 0 && turns != NULL) {
+            clear_turns(turns, row, first, last);
+        }
+    }
+    return folded->failed < 0 ? HS_OK : HS_ERR_SHIFT_RANGE;
+}
+
+/* What wrapping found in all slabs together, and on the axes that were left alone. */
+static hs_folded
+join_slabs(const wrapping *wrap)
+{
+    const hs_scene *scene = wrap->scene;
+    hs_folded       folded = hs_folded_none();
+    for (int slab = 0; slab < wrap->n_slabs; slab++) {
+        hs_folded_join(&folded, &wrap->folded[slab]);
+    }
+    for (int k = 0; scene->lattice.aligned && k < scene->ndim; k++) {
+        const bool open = scene->lattice.row_of_axis[k] < 0;
+        if (scene->n > 0 && (open || is_inside(scene, k))) {
+            folded.x_largest[k] = fmax(-scene->cloud.lower[k], scene->cloud.upper[k]);
+        }
+        folded.lower[k] = open ? scene->cloud.lower[k] : 0.0;
+        folded.upper[k] = open ? scene->cloud.upper[k] : 0.0;
+    }
+    return folded;
+}
+
+/* No point moves, and coordinates are those along the axes. */
+static void
+stay(hs_scene *scene)
+{
+    const hs_cloud *cloud = &scene->cloud;
+    for (int k = 0; k < scene->ndim; k++) {
+        scene->x_largest[k] = scene->n > 0 ? hs_larger(-cloud->lower[k], cloud->upper[k]) : 0.0;
+        scene->lower[k] = scene->n > 0 ? cloud->lower[k] : 0.0;
+        scene->upper[k] = scene->n > 0 ? cloud->upper[k] : 0.0;
+    }
+}
+
+hs_status
+hs_scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options, double *magnitude,
+              hs_failure *failure)
+{
+    wrapping wrap;
+    *magnitude = 0.0;
+    if (scene->lattice.n_periodic == 0) {
+        stay(scene);
+        return HS_OK;
+    }
+    wrap.scene = scene;
+    wrap.few_turns = hs_fold_turns(&scene->lattice, scene->cloud.largest) <= HS_FOLD_TURNS;
+    wrap.n_slabs = scene->n < HS_SLABS * HS_SLAB_POINTS
+                       ? (int)((scene->n + HS_SLAB_POINTS - 1) / HS_SLAB_POINTS)
+                       : HS_SLABS;
+    for (int slab = 0; slab < wrap.n_slabs; slab++) {
+        wrap.folded[slab] = hs_folded_none();
+    }
+    hs_status       status = hs_walk_slabs(team, options, scene->n, wrap_slab, &wrap);
+    const hs_folded folded = join_slabs(&wrap);
+    if (status == HS_ERR_SHIFT_RANGE) {
+        failure->row = folded.failed;
+        status = hs_skew_is_left(&scene->lattice) ? HS_ERR_BOX_SKEWED : status;
+    }
+    *magnitude = folded.magnitude;
+    for (int k = 0; k < scene->ndim; k++) {
+        scene->x_largest[k] = folded.x_largest[k];
+        scene->lower[k] = scene->n > 0 ? folded.lower[k] : 0.0;
+        scene->upper[k] = scene->n > 0 ? folded.upper[k] : 0.0;
+    }
+    return status;
+}
+
+/* Scenes without a box whose numbers need no scale are filled in one go. */
+
+bool
+hs_scene_stays(const hs_sets *sets, const hs_box *box, const hs_options *options,
+               const hs_scene *scene)
+{
+    return box == NULL && sets->queries == NULL && !sets->is_kept && !sets->is_wide &&
+           options->precision != HS_DOUBLE && hs_is_ordinary(&scene->cloud, options->cutoff);
+}
+
+hs_status
+hs_scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene,
+                       hs_failure *failure)
+{
+    double magnitude;
+    if (!follows) {
+        scene->scale = scene->unscale = scene->pending = hs_scale_of(0);
+        scene->sought = scene->cutoff = scene->cutoff_low = options->cutoff;
+        scene->extreme = false;
+        hs_lattice_init(NULL, scene->ndim, scene->scale, &scene->lattice);
+        hs_scene_bound_errors(scene, 0.0);
+        hs_scene_init_metric(scene, options);
+    }
+    hs_scene_set_radius(scene, options, scene->cloud.largest);
+    return hs_scene_wrap(scene, NULL, options, &magnitude, failure);
+}
+
+/*
+ * Sorts the far magnitudes of each column and moves them closer to zero.
+ *
+ * Why pairs stay what they are. Let u be the unit, so that the cutoff is below 2 u. The magnitudes
+ * of a column are taken in ascending order. One that is more than 8 u beyond the one before it
+ * moves to some 4 u to 12 u from it, and all that follow move with it. Numbers up to 2^54 u move by
+ * multiples of 4 u: they are multiples of a unit in their last place, which is at most 2 u, and
+ * become smaller, so that nothing is rounded. Larger numbers are multiples of 4 u, so each is 4 u
+ * or more from all others: only which are equal matters, and each follows at the next multiple. So
+ * every difference of two coordinates stays what it is to the last bit, or was more than 2 u and is
+ * so still. None becomes larger, so all are float64 numbers, wherever closing begins.
+ *
+ * Along a periodic axis of length L, all x lie in [-L/2, L/2] first, and L/2 takes part as one more
+ * number. Across the face, the difference of two points is the sum of L/2 - |x| and L/2 - |y|, and
+ * each of these stays as it is, or stays more than the cutoff. Queries take part as if they were
+ * points: the differences that count are between both.
+ *
+ * Where scaling loses digits, pairs are decided on coordinates and box vectors that are not scaled.
+ * Those with closed gaps will do: differences are what they were. But S also counts the turns that
+ * were made here, so a column with such turns is decided on as it was given, and so is its box
+ * vector.
+ */
+
+/* Extent of one axis after closing, per point, where all points are apart. */
+#define UNITS_PER_POINT 8.0
+
+/* Stands for half a box vector among the keys. Points are numbers from 0 on, queries from -2 on
+ * downwards. */
+#define HALF (-1)
+
+/* From here on half a box entry is exact: its last place is at least twice the smallest number. */
+#define LEAST_HALF 0x1p-1022
+
+/* What one call of hs_condense works with. */
+typedef struct condensing {
+    hs_account       *account;
+    const hs_options *options;
+    hs_cloud         *of[HS_CONDENSED_SETS]; /* points, and queries if there are any */
+    int               n_sets;
+    int64_t           n; /* of both together */
+    hs_condensed     *condensed;
+    bool              changes_rows; /* gaps of box vectors may be closed, too */
+    bool              keeps_given;  /* columns that are wrapped, as they were before */
+    hs_scale          to_units, from_units;
+    double            far;    /* gaps are closed from here on, in the caller's unit */
+    double            coarse; /* 2^54 u, in the caller's unit */
+    hs_keys           keys;   /* room for n + 1 */
+} condensing;
+
+/* The number that stands for entry i of a set among the keys. */
+static int32_t
+id_of(int set, int64_t i)
+{
+    return set == 0 ? (int32_t)i : (int32_t)(HALF - 1 - i);
+}
+
+/* The coordinate that a number stands for. */
+static double *
+coordinate_of(const condensing *doing, int k, int32_t id)
+{
+    return id >= 0 ? &doing->of[0]->x[k][id] : &doing->of[1]->x[k][HALF - 1 - (int64_t)id];
+}
+
+/* Box vectors are left alone where closing would change a decision on the points as given: in
+ * coupled boxes, and for precision="double". */
+static bool
+rows_may_change(const condensing *doing, const hs_box *box)
+{
+    for (int k = 0; box != NULL && k < box->ndim; k++) {
+        if (hs_mover_of(box, k) == HS_COUPLED) {
+            return false;
+        }
+    }
+    return box == NULL || doing->options->precision != HS_DOUBLE;
+}
+
+static bool
+anything_is_far(const hs_cloud *cloud, const hs_box *box, int unit, int powers)
+{
+    bool found = hs_is_far(cloud->largest, unit, powers);
+    for (int l = 0; box != NULL && l < box->ndim; l++) {
+        for (int k = 0; box->periodic[l] && k < box->ndim; k++) {
+            found = found || hs_is_far(0.5 * fabs(box->rows[l][k]), unit, powers);
+        }
+    }
+    return found;
+}
+
+/* Copies the column of both sets before any number in it is wrapped. */
+static hs_status
+keep_given(const condensing *doing, int k)
+{
+    for (int set = 0; set < doing->n_sets; set++) {
+        const hs_cloud *cloud = doing->of[set];
+        double        **given = &doing->condensed->given[set][k];
+        *given = hs_alloc(doing->account, HS_FOR_ORIGINALS, cloud->n, sizeof **given);
+        if (*given == NULL) {
+            return HS_ERR_MEMORY;
+        }
+        memcpy(*given, cloud->x[k], (size_t)cloud->n * sizeof **given);
+    }
+    return HS_OK;
+}
+
+/* Makes room for the turns of a column, all zero. */
+static hs_status
+begin_turns(const condensing *doing, int set, int k)
+{
+    hs_condensed *condensed = doing->condensed;
+    const int64_t n = doing->of[set]->n;
+    int64_t      *turns = hs_alloc(doing->account, HS_FOR_WRAPS, n, sizeof *turns);
+    condensed->turns[set][k] = turns;
+    if (turns == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    memset(turns, 0, (size_t)n * sizeof *turns);
+    condensed->has_turns = true;
+    return doing->keeps_given && condensed->given[0][k] == NULL ? keep_given(doing, k) : HS_OK;
+}
+
+/* Wraps what is far into the box; turns are counted where S is wanted. */
+static hs_status
+wrap_far(const condensing *doing, int set, int k, double length, hs_failure *failure)
+{
+    double *x = doing->of[set]->x[k];
+    for (int64_t i = 0; i < doing->of[set]->n; i++) {
+        int64_t turned = 0;
+        if (!(fabs(x[i]) > doing->far)) {
+            continue;
+        }
+        const double wrapped = hs_wrap_axis(x[i], length, &turned);
+        if ((doing->options->want & HS_WANT_SHIFT) && turned != 0) {
+            if (turned == HS_WRAP_UNKNOWN) {
+                failure->row = i;
+                failure->in_queries = set > 0;
+                return HS_ERR_SHIFT_RANGE;
+            }
+            int64_t *const *turns = &doing->condensed->turns[set][k];
+            if (*turns == NULL && begin_turns(doing, set, k) != HS_OK) {
+                return HS_ERR_MEMORY;
+            }
+            (*turns)[i] = turned;
+        }
+        x[i] = wrapped;
+    }
+    return HS_OK;
+}
+
+/* Of the magnitude, which orders like the number. */
+static int64_t
+bits_of(double x)
+{
+    return (int64_t)hs_bits_of_double(fabs(x));
+}
+
+/* The magnitudes of a column, ascending, in units. */
+typedef struct places {
+    double last;  /* the last one, */
+    double place; /* where it went, */
+    double moved; /* and, unless it is beyond 2^54 u, by what */
+} places;
+
+/* Where the next magnitude goes, and all that are equal to it. */
+static double
+next_place(places *at, double x, bool is_coarse)
+{
+    const double after = 4.0 * (ceil(0.25 * at->place) + 1.0);
+    if (is_coarse) {
+        at->place = after;
+    } else {
+        if (x - at->last > 8.0) {
+            at->moved = 4.0 * floor(0.25 * (x - after));
+        }
+        at->place = x - at->moved;
+    }
+    at->last = x;
+    return at->place;
+}
+
+/* A place as a coordinate of the scene. */
+static double
+placed(const condensing *doing, double place)
+{
+    return doing->condensed->is_scaled ? place : hs_scale_apply(doing->from_units, place);
+}
+
+/* Lists the magnitudes beyond `from`, `half` among them if it is one; returns how many. The
+ * largest of the others is where places begin. */
+static int64_t
+collect(condensing *doing, int k, double from, double half, places *at)
+{
+    hs_keys *keys = &doing->keys;
+    int64_t  found = 0;
+    double   largest = 0.0;
+    for (int set = 0; set < doing->n_sets; set++) {
+        double *x = doing->of[set]->x[k];
+        for (int64_t i = 0; i < doing->of[set]->n; i++) {
+            if (fabs(x[i]) > from) {
+                keys->keys[found] = bits_of(x[i]);
+                keys->ids[found++] = id_of(set, i);
+                continue;
+            }
+            largest = hs_larger(fabs(x[i]), largest);
+            if (doing->condensed->is_scaled) {
+                x[i] = hs_scale_apply(doing->to_units, x[i]);
+            }
+        }
+    }
+    if (half > from) {
+        keys->keys[found] = bits_of(half);
+        keys->ids[found++] = HALF;
+    }
+    at->last = at->place = hs_scale_apply(doing->to_units, largest);
+    at->moved = 0.0;
+    return found;
+}
+
+/* Closes the gaps of a column from `from` on, and *half, which is 0 along an open axis. */
+static hs_status
+condense_numbers(condensing *doing, int k, double from, double *half)
+{
+    const hs_keys  *keys = &doing->keys;
+    places          at;
+    const int64_t   found = collect(doing, k, from, *half, &at);
+    const hs_status status = hs_keys_sort(&doing->keys, 0, found);
+    double          place = 0.0;
+    *half = placed(doing, hs_scale_apply(doing->to_units, *half)); /* unless it is far */
+    for (int64_t e = 0; e < found && status == HS_OK; e++) {
+        if (e == 0 || keys->keys[e] != keys->keys[e - 1]) {
+            const double size = hs_double_of_bits((uint64_t)keys->keys[e]);
+            const bool   is_coarse = size > doing->coarse;
+            const double x_units = is_coarse ? at.last : hs_scale_apply(doing->to_units, size);
+            place = placed(doing, next_place(&at, x_units, is_coarse));
+        }
+        if (keys->ids[e] == HALF) {
+            *half = place;
+        } else {
+            double *x = coordinate_of(doing, k, keys->ids[e]);
+            *x = copysign(place, *x);
+        }
+    }
+    return status;
+}
+
+/* Sets the range of a column: each cloud gets that of both. */
+static void
+measure_column(const condensing *doing, int k)
+{
+    double lower = INFINITY, upper = -INFINITY;
+    for (int set = 0; set < doing->n_sets; set++) {
+        const hs_cloud *cloud = doing->of[set];
+        for (int64_t i = 0; i < cloud->n; i++) {
+            lower = hs_smaller(cloud->x[k][i], lower);
+            upper = hs_larger(cloud->x[k][i], upper);
+        }
+    }
+    for (int set = 0; set < doing->n_sets; set++) {
+        doing->of[set]->lower[k] = lower;
+        doing->of[set]->upper[k] = upper;
+    }
+}
+
+static hs_status
+condense_column(condensing *doing, int k, hs_failure *failure)
+{
+    const hs_cloud *cloud = doing->of[0]; /* its range is that of both */
+    hs_condensed   *condensed = doing->condensed;
+    const double    far = doing->far;
+    const int       row = hs_mover_of(condensed->box, k);
+    double         *entry = row >= 0 ? &condensed->rows.rows[row][k] : NULL;
+    double          half = row >= 0 ? 0.5 * fabs(*entry) : 0.0;
+    const bool      is_far = hs_larger(-cloud->lower[k], cloud->upper[k]) > far || half > far;
+    if (!is_far && !condensed->is_scaled) {
+        return HS_OK;
+    }
+    for (int set = 0; is_far && row >= 0 && set < doing->n_sets; set++) {
+        const hs_status status = wrap_far(doing, set, k, fabs(*entry), failure);
+        if (status != HS_OK) {
+            return status;
+        }
+    }
+    const bool condenses = is_far && (row < 0 || half > hs_larger(far, LEAST_HALF));
+    /* What is dense enough already is left alone, so that one outlier costs no sorting. */
+    const double    dense = hs_scale_apply(doing->from_units, UNITS_PER_POINT * (double)doing->n);
+    const double    from = condenses ? hs_smaller(dense, far) : INFINITY;
+    const hs_status status = condense_numbers(doing, k, from, &half);
+    if (row >= 0 && condenses) {
+        *entry = copysign(2.0 * half, *entry);
+    } else if (row >= 0 && condensed->is_scaled) {
+        *entry = hs_scale_apply(doing->to_units, *entry);
+    }
+    measure_column(doing, k);
+    return status;
+}
+
+/* All four arrays are one memory block, which begins with the keys. */
+static bool
+allocate_keys(hs_account *account, const hs_options *options, int64_t n, hs_keys *keys)
+{
+    keys->options = options;
+    keys->keys = hs_alloc(account, HS_FOR_ORDER, n, 2 * (sizeof(int64_t) + sizeof(int32_t)));
+    if (keys->keys != NULL) {
+        keys->spare_keys = keys->keys + n;
+        keys->ids = (int32_t *)(void *)(keys->spare_keys + n);
+        keys->spare_ids = keys->ids + n;
+    }
+    return keys->keys != NULL;
+}
+
+/* Closes the gaps of all columns that have any, one after the other. */
+static hs_status
+condense_columns(condensing *doing, hs_failure *failure)
+{
+    const hs_cloud *cloud = doing->of[0];
+    double          largest = 0.0;
+    for (int k = 0; k < cloud->ndim; k++) {
+        const int mover = hs_mover_of(doing->condensed->box, k);
+        if (mover == HS_OPEN || (mover >= 0 && doing->changes_rows)) {
+            const hs_status status = condense_column(doing, k, failure);
+            if (status != HS_OK) {
+                return status;
+            }
+        }
+        largest = hs_larger(hs_larger(-cloud->lower[k], cloud->upper[k]), largest);
+    }
+    for (int set = 0; set < doing->n_sets; set++) {
+        doing->of[set]->largest = largest;
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_condense(hs_account *account, const hs_options *options, const hs_box *box, int unit, int powers,
+            hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed, hs_failure *failure)
+{
+    condensed->box = condensed->given_box = box;
+    condensed->is_scaled = condensed->has_turns = false;
+    if (cloud->n == 0 || (asking != NULL && asking->n == 0) ||
+        !anything_is_far(cloud, box, unit, powers)) {
+        return HS_OK;
+    }
+    memset(condensed->turns, 0, sizeof condensed->turns);
+    memset(condensed->given, 0, sizeof condensed->given);
+    condensing doing = {.account = account,
+                        .options = options,
+                        .of = {cloud, asking},
+                        .n_sets = asking != NULL ? 2 : 1,
+                        .keeps_given = unit > 0, /* scaling down may lose digits */
+                        .n = cloud->n + (asking != NULL ? asking->n : 0),
+                        .condensed = condensed,
+                        .to_units = hs_scale_of(unit),
+                        .from_units = hs_scale_of(-unit),
+                        .far = ldexp(1.0, unit + powers),
+                        .coarse = ldexp(1.0, unit + HS_FAR_EXPONENT)};
+    doing.changes_rows = rows_may_change(&doing, box);
+    if (doing.changes_rows) {
+        condensed->is_scaled = unit < 0;
+        if (box != NULL) {
+            condensed->rows = *box;
+            condensed->box = &condensed->rows;
+        }
+    }
+    const hs_status status = allocate_keys(account, options, doing.n + 1, &doing.keys)
+                                 ? condense_columns(&doing, failure)
+                                 : HS_ERR_MEMORY;
+    hs_free(account, doing.keys.keys);
+    return status;
+}
+
+void
+hs_condensed_free(hs_account *account, hs_condensed *condensed)
+{
+    for (int set = 0; condensed->has_turns && set < HS_CONDENSED_SETS; set++) {
+        for (int k = 0; k < HS_MAX_DIM; k++) {
+            hs_free(account, condensed->turns[set][k]);
+            hs_free(account, condensed->given[set][k]);
+            condensed->turns[set][k] = NULL;
+            condensed->given[set][k] = NULL;
+        }
+    }
+}
+
+/* scene.c: reads the points, closes gaps, scales, wraps, and settles bounds, in this order. */
 
 /* Allocates columns for the originals and the turns, as far as these are kept, in this order. */
 static bool
@@ -375,4 +1564,147 @@ hs_scene_free(hs_account *account, hs_scene *scene)
     hs_cloud_free(account, &scene->cloud);
     hs_free(account, scene->beside);
     scene->beside = NULL;
+}
+
+/* One pass that copies each point, then finds the largest coordinate in the copy. */
+
+/* Independent chains of the loop over all entries: one would wait for itself. */
+#define CHAINS 4
+
+/* Points [first, last), one behind another. */
+static void
+copy_rows(const hs_points *points, int64_t first, int64_t last, char *to)
+{
+    const size_t size = points->real == HS_FLOAT32 ? sizeof(float) : sizeof(double);
+    const size_t row_size = size * (size_t)points->ndim;
+    const bool   packed = points->column_stride == (ptrdiff_t)size || points->ndim == 1;
+    to += (size_t)first * row_size;
+    if (packed && points->row_stride == (ptrdiff_t)row_size) {
+        memcpy(to, (const char *)points->data + first * points->row_stride,
+               (size_t)(last - first) * row_size);
+        return;
+    }
+    for (int64_t i = first; i < last; i++) { /* no address behind the last point: it may overflow */
+        const char *row = (const char *)points->data + i * points->row_stride;
+        for (int k = 0; k < points->ndim; k++, to += size) {
+            memcpy(to, row + k * points->column_stride, size);
+        }
+    }
+}
+
+/* Largest |x| of entries [first, last), or NaN if one is not finite. */
+HS_ALWAYS_INLINE double
+find_largest(const void *rows, const hs_real real, int64_t first, int64_t last)
+{
+    double  largest[CHAINS] = {0.0}, poison[CHAINS] = {0.0};
+    int64_t e = first;
+    for (; e + CHAINS <= last; e += CHAINS) {
+        for (int c = 0; c < CHAINS; c++) {
+            const double x = hs_frame_entry(rows, real, e + c);
+            largest[c] = hs_larger(fabs(x), largest[c]);
+            poison[c] += x - x;
+        }
+    }
+    for (; e < last; e++) {
+        const double x = hs_frame_entry(rows, real, e);
+        largest[0] = hs_larger(fabs(x), largest[0]);
+        poison[0] += x - x;
+    }
+    return hs_larger(hs_larger(largest[0], largest[1]), hs_larger(largest[2], largest[3])) +
+           (poison[0] + poison[1] + poison[2] + poison[3]);
+}
+
+static hs_status
+name_first_bad(const hs_frame *frame, int64_t first, int64_t last, hs_failure *failure)
+{
+    for (int64_t e = first; e < last; e++) {
+        const double x = hs_frame_entry(frame->rows, frame->points.real, e);
+        if (!isfinite(x)) {
+            failure->row = e / frame->points.ndim;
+            failure->column = e % frame->points.ndim;
+            failure->value = x;
+            break;
+        }
+    }
+    return HS_ERR_NOT_FINITE;
+}
+
+static hs_status
+take_points(const hs_points *points, const hs_options *options, hs_frame *frame,
+            hs_failure *failure)
+{
+    const int64_t d = points->ndim;
+    frame->largest = 0.0;
+    for (int64_t first = 0; first < points->n; first += HS_POLL_POINTS) {
+        const int64_t left = points->n - first;
+        const int64_t last = first + (left < HS_POLL_POINTS ? left : HS_POLL_POINTS);
+        copy_rows(points, first, last, frame->rows);
+        const double largest = points->real == HS_FLOAT32
+                                   ? find_largest(frame->rows, HS_FLOAT32, first * d, last * d)
+                                   : find_largest(frame->rows, HS_FLOAT64, first * d, last * d);
+        if (!isfinite(largest)) {
+            return name_first_bad(frame, first * d, last * d, failure);
+        }
+        frame->largest = hs_larger(largest, frame->largest);
+        if (left > HS_POLL_POINTS && hs_poll(options, 0.0) != HS_OK) {
+            return HS_ERR_INTERRUPTED;
+        }
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_frame_take(const hs_points *points, const hs_box *box, const hs_options *options,
+              hs_frame *frame, hs_failure *failure)
+{
+    const size_t size = points->real == HS_FLOAT32 ? sizeof(float) : sizeof(double);
+    const size_t row_size = size * (size_t)points->ndim;
+    frame->rows = hs_store_reserve(&frame->store, HS_FOR_POINTS, points->n, row_size);
+    if (frame->rows == NULL) {
+        frame->points.n = 0;
+        return HS_ERR_MEMORY;
+    }
+    frame->points = (hs_points){.data = frame->rows,
+                                .n = points->n,
+                                .ndim = points->ndim,
+                                .real = points->real,
+                                .row_stride = (ptrdiff_t)row_size,
+                                .column_stride = (ptrdiff_t)size};
+    frame->has_box = box != NULL;
+    if (box != NULL) {
+        frame->box = *box;
+    }
+    return take_points(points, options, frame, failure);
+}
+
+bool
+hs_frames_match(const hs_frame *one, const hs_frame *other)
+{
+    int       rows[HS_MAX_DIM], others[HS_MAX_DIM];
+    const int m = hs_frame_periodic(one, rows);
+    return one->points.n == other->points.n && one->points.ndim == other->points.ndim &&
+           one->points.real == other->points.real && m == hs_frame_periodic(other, others) &&
+           memcmp(rows, others, (size_t)m * sizeof *rows) == 0;
+}
+
+bool
+hs_frames_share_box(const hs_frame *one, const hs_frame *other)
+{
+    int       rows[HS_MAX_DIM];
+    const int m = hs_frame_periodic(one, rows);
+    for (int r = 0; r < m; r++) {
+        for (int k = 0; k < one->points.ndim; k++) {
+            if (one->box.rows[rows[r]][k] != other->box.rows[rows[r]][k]) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+void
+hs_frame_free(hs_frame *frame)
+{
+    hs_store_free(&frame->store);
+    frame->rows = NULL;
 }

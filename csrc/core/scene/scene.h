@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_SCENE_SCENE_H
+#define HS_SCENE_SCENE_H
+
+#include "../exact/metric.h"
+#include "../box/wrap.h"
+#include "../memory/memory.h"
+#include "points.h"
+
 /*
  * scene.h: points, box and cutoff in the form that the search works on: scaled by a power of two so
  * that the cutoff has an ordinary size, wrapped into the box, with a bound on every rounding.
  */
-#ifndef HS_SCENE_H
-#define HS_SCENE_H
-
-#include "../exact/metric.h"
-#include "../box/wrap.h"
-#include "../memory/account.h"
-#include "points.h"
 
 struct hs_box_size;
 
@@ -63,12 +64,12 @@ typedef struct hs_sets {
     const hs_points *queries;  /* NULL: the points themselves; else of the same dimension */
     bool             is_kept;  /* queries come later: bounds with room for them */
     bool             is_plain; /* the cutoff is taken as it is, however far beyond all distances,
-                                * and gaps (close_gaps.h) are closed only if need be */
+                                * and gaps are closed only if need be */
     bool             is_wide;  /* X is not made float32: it may be larger than that holds */
     bool             follows;  /* the scene was filled before, with the same options but for the
                                 * cutoff: lattice, scale and metric are kept if they are the same */
     const struct hs_search *built; /* NULL, or a search that has the points in cells already */
-    struct hs_nearest_kept *trees; /* NULL, or what keeps a tree of the points (nearest_kept.h) */
+    struct hs_nearest_kept *trees; /* NULL, or what keeps a tree of the points (nearest.h) */
     bool                    is_untested; /* cells are all that is wanted, no distance is computed */
     bool                    keeps_none;  /* pairs are handed on and not kept: any number will fit */
     bool   is_full;      /* each asking point meets all its neighbours, not the half list that
@@ -98,7 +99,7 @@ hs_scene_radius_along(const hs_scene *scene, int k)
 double hs_scene_volume(const hs_scene *scene, double ball);
 
 /* Sets scene->less, for a scene whose radius is known; the status is that of narrowing. In
- * scene_bounds.c. */
+ * scene.c. */
 hs_status hs_scene_narrow(hs_scene *scene, const hs_narrowing *narrowing);
 
 /*
@@ -118,7 +119,7 @@ hs_status hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *
                              const hs_box *box, const hs_options *options, hs_scene *scene,
                              hs_scene *asking, hs_failure *failure);
 
-/* Steps of hs_scene_init_sets, in scene_scale.c. The cutoff that scale and gaps go by. */
+/* Steps of hs_scene_init_sets. The cutoff that scale and gaps go by. */
 double hs_scene_settle_cutoff(const hs_scene *scene, const struct hs_box_size *size, double cutoff);
 
 /* Whether gaps between far points and queries are closed. Queries that come later may lie in such a
@@ -134,13 +135,13 @@ void hs_scene_set_scale(const hs_box *box, bool is_scaled, int unit, hs_scene *s
 
 /* Whether a scene, once its points have been read, stays as it was given: there is no box, and
  * nothing is scaled. Then hs_scene_fill_ordinary fills it. follows: it has filled it before, with
- * this cutoff and as many axes. In scene_ordinary.c. */
+ * this cutoff and as many axes. */
 bool      hs_scene_stays(const hs_sets *sets, const hs_box *box, const hs_options *options,
                          const hs_scene *scene);
 hs_status hs_scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene,
                                  hs_failure *failure);
 
-/* Steps in scene_queries.c. Both clouds get the range of both. */
+/* Steps in scene.c. Both clouds get the range of both. */
 void hs_scene_join_clouds(hs_scene *scene, hs_scene *asking);
 
 /* What has been settled for the points is settled for the queries. */
@@ -193,15 +194,15 @@ void hs_scene_set_cutoff(hs_scene *scene, const hs_options *options);
 
 /* Wraps columns that scaling would make infinite, or that lie more box vectors away than turns can
  * tell, in the caller's unit. For scenes whose S is not wanted, before they are scaled. In
- * scene_wrap.c. */
+ * scene.c. */
 void hs_scene_fold_far(hs_scene *scene);
 
-/* Wraps the points into the box, in scene_wrap.c. Sets x_largest, the range of t_k of the points in
+/* Wraps the points into the box. Sets x_largest, the range of t_k of the points in
  * lower and upper, and *magnitude, the largest sum of absolute terms. */
 hs_status hs_scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options,
                         double *magnitude, hs_failure *failure);
 
-/* Steps in scene_bounds.c. Sets x_error and t_error, from x_largest and *magnitude of wrapping. */
+/* Steps in scene.c. Sets x_error and t_error, from x_largest and *magnitude of wrapping. */
 void hs_scene_bound_errors(hs_scene *scene, double magnitude);
 
 /* Sets the range of the grid coordinates: the points' own where open, one period where periodic. */
@@ -234,7 +235,7 @@ hs_scene_coordinate(const hs_scene *scene, int64_t i, int k)
     return t;
 }
 
-/* Steps of scene_scale.c once the box is scaled. Whether one of its periods has become zero. */
+/* Steps of scene.c once the box is scaled. Whether one of its periods has become zero. */
 struct hs_condensed;
 bool hs_scene_box_vanishes(const hs_scene *scene);
 
@@ -246,5 +247,185 @@ hs_status hs_scene_refuse_vanishing(const hs_scene *scene, const struct hs_conde
                                     hs_failure *failure);
 
 void hs_scene_free(hs_account *account, hs_scene *scene);
+
+/* The power of two that a scene is scaled by, so that the search has ordinary numbers. */
+
+/*
+ * How far is far? So many powers of two beyond a length, each for a reason of its own. hs_is_far
+ * tells.
+ */
+/* Beyond so many cutoffs gaps between the points are closed: float64 numbers are
+ * multiples of four cutoffs there. */
+#define HS_FAR_EXPONENT 54
+/*
+ * Beyond so many largest distances they are in a bounded search for the nearest. Wrapped into a
+ * coupled box, coordinates err by 2^-52 of the largest one. The radius that is looked at is 2^10
+ * times the error of two at least (candidates.c), so it passes the largest distance from here
+ * on, and soon spans many images.
+ */
+#define HS_FAR_BOUNDED_EXPONENT 40
+/* Points may be 2^51 box vectors away, where turns are integers that float64 holds; there is one
+ * order to spare. What is further away is refused or wrapped before it is scaled. */
+#define HS_FAR_TURNS_EXPONENT 52
+/*
+ * Scaled coordinates and box entries stay below 2^57, so that squares of sums of a few are finite
+ * in float32. Closing gaps keeps to that along open and aligned axes; what remains, coupled by a
+ * skewed box, is known to within 2^-53 of the largest only, so that a cutoff may well be smaller
+ * than 1 then.
+ */
+#define HS_LARGEST_EXPONENT 56
+/* So many vectors of the box in a cutoff have more images than any memory holds. */
+#define HS_FAR_IMAGES_EXPONENT 64
+/* Open axes that are so many times as long leave less than 2^-10 of a coupled box certain: wrapping
+ * errs by some 2^-99 of the largest coordinate (wrap.h). */
+#define HS_FAR_DROWNING_EXPONENT 88
+/* Where no float32 is made of scaled numbers they stay below 2^901, so that sums of a few are
+ * finite. */
+#define HS_LARGEST_WIDE_EXPONENT 900
+
+/* x = m 2^e with 1 <= m < 2: e. Of zero a very small number, of infinity a very large one. */
+int hs_exponent_of(double x);
+
+/* Whether a size is more than 2^powers times a length of the exponent `unit`, 2^unit. */
+bool hs_is_far(double size, int unit, int powers);
+
+/* Sizes of the periodic box entries. */
+typedef struct hs_box_size {
+    double   largest;    /* 0 without box vectors */
+    double   smallest;   /* not counting zeros; infinity without box vectors */
+    double   short_row;  /* the least of the vectors' largest entries; infinity without */
+    unsigned moved;      /* bit k: some vector has an entry in column k */
+    bool     is_coupled; /* a vector has several entries, or a column has */
+} hs_box_size;
+
+/* box: NULL for none. */
+hs_box_size hs_box_size_of(const hs_box *box);
+
+/* What moves a column of coordinates besides the points' own values. */
+#define HS_OPEN    (-1) /* nothing */
+#define HS_COUPLED (-2) /* box vectors that have entries in other columns as well */
+
+/* HS_OPEN, HS_COUPLED, or the number of the row (a box vector) that alone has an entry in this
+ * column, and no other entry. periodic: the rows that count; NULL: all. */
+int hs_mover_among(const double rows[][HS_MAX_DIM], const bool *periodic, int n_rows, int ndim,
+                   int column);
+
+/* hs_mover_among for the periodic rows of a box. box: NULL for none. */
+int hs_mover_of(const hs_box *box, int column);
+
+/* The cutoff, or a smaller one if that is beyond all distances as well. */
+double hs_enough_cutoff(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
+
+/* The exponent of the length that a scene goes by: its cutoff, or with cutoff 0 its box, or where
+ * its points are. A very small number if all is 0. */
+int hs_unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
+
+/* Whether points of open space with this cutoff are searched as they are: no gap is closed, nothing
+ * is scaled, and the cutoff is not shortened. */
+bool hs_is_ordinary(const hs_cloud *cloud, double cutoff);
+
+/* Whether all numbers are at most so many powers of two above a length of this exponent. */
+bool hs_fits_one_scale(const hs_cloud *cloud, const hs_box_size *box, int unit, int powers);
+
+/* Whether coordinates along open axes are so large that a coupled box is lost in the rounding of
+ * what is wrapped into it. */
+bool hs_open_drowns_box(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
+
+/* The exponent to scale by, so that no exponent is above `largest`; *extreme: whether that loses
+ * digits. unit: from hs_unit_exponent. */
+int hs_choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff, int unit,
+                       int largest, bool *extreme);
+
+/*
+ * Closes the gaps between coordinates that are far from zero. Where two different
+ * float64 numbers are more than a cutoff apart, all that matters is which are equal, so smaller
+ * numbers can take their place. No scale holds both a cutoff of 1e-300 and an outlier at 1e300;
+ * once gaps are closed, one does. No pair changes, nor a bit of d and D, and S by the turns alone.
+ */
+
+/* Points, queries. */
+#define HS_CONDENSED_SETS 2
+
+typedef struct hs_condensed {
+    const hs_box *box;       /* in place of the caller's: borrowed, or `rows` */
+    const hs_box *given_box; /* the caller's */
+    hs_box        rows;
+    bool          is_scaled; /* points and box vectors are in units of 2^unit now */
+    bool          has_turns; /* something was wrapped into the box, and S is wanted: */
+    /* Both set where has_turns says so. Owned, of points and of queries; n each for a column where
+     * some were, else NULL. */
+    int64_t *turns[HS_CONDENSED_SETS][HS_MAX_DIM];
+    /* Owned; where scaling may lose digits: the columns that have turns, of both sets, as they were
+     * given. S with all its turns belongs to these numbers and to the box as given. */
+    double *given[HS_CONDENSED_SETS][HS_MAX_DIM];
+} hs_condensed;
+
+/*
+ * unit: the exponent of the cutoff, 2^unit <= cutoff < 2^(unit + 1); with cutoff 0 any other.
+ * powers: what is far is so beyond 2^powers units, HS_FAR_EXPONENT at most. Does nothing
+ * but look at ranges where nothing is far. box: checked. asking: NULL, or queries, whose
+ * range and that of the points have been joined. HS_ERR_SHIFT_RANGE only where S is wanted.
+ * hs_condensed_free in any case.
+ */
+hs_status hs_condense(hs_account *account, const hs_options *options, const hs_box *box, int unit,
+                      int powers, hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed,
+                      hs_failure *failure);
+
+void hs_condensed_free(hs_account *account, hs_condensed *condensed);
+
+/* A copy of the caller's points and box at one step, as given: what a list that
+ * outlives the call (pair_list.h) compares and decides with. */
+
+typedef struct hs_frame {
+    hs_points points; /* one point behind another, of the caller's type */
+    hs_store  store;
+    void     *rows;    /* in it; what points.data is */
+    double    largest; /* largest |x| of all coordinates, 0 without points */
+    bool      has_box;
+    hs_box    box;
+} hs_frame;
+
+/*
+ * Copies both, each number read once. HS_ERR_NOT_FINITE names the first bad row and column. Storage
+ * is used again where it is large enough. On failure the frame holds nothing of use.
+ */
+hs_status hs_frame_take(const hs_points *points, const hs_box *box, const hs_options *options,
+                        hs_frame *frame, hs_failure *failure);
+
+/* Whether points of one are those of the other as far as a list goes: as many, of the same type, in
+ * boxes that repeat along the same axes. */
+bool hs_frames_match(const hs_frame *one, const hs_frame *other);
+
+/* Whether all box vectors that repeat are the same numbers. */
+bool hs_frames_share_box(const hs_frame *one, const hs_frame *other);
+
+void hs_frame_free(hs_frame *frame);
+
+/* The box, or NULL for open space. */
+HS_ALWAYS_INLINE const hs_box *
+hs_frame_box(const hs_frame *frame)
+{
+    return frame->has_box ? &frame->box : NULL;
+}
+
+/* Coordinate e, counted point after point. */
+HS_ALWAYS_INLINE double
+hs_frame_entry(const void *rows, hs_real real, int64_t e)
+{
+    return real == HS_FLOAT32 ? (double)((const float *)rows)[e] : ((const double *)rows)[e];
+}
+
+/* How many box vectors repeat. */
+HS_ALWAYS_INLINE int
+hs_frame_periodic(const hs_frame *frame, int *vector_of_row)
+{
+    int m = 0;
+    for (int l = 0; frame->has_box && l < frame->box.ndim; l++) {
+        if (frame->box.periodic[l]) {
+            vector_of_row[m++] = l;
+        }
+    }
+    return m;
+}
 
 #endif

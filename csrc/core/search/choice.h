@@ -1,19 +1,45 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_SEARCH_CHOICE_H
+#define HS_SEARCH_CHOICE_H
+
+#include "../../halfshell.h"
+#include "../memory/memory.h"
+#include "../box/wrap.h"
+#include "../scene/scene.h"
+#include "../threads/call.h"
+#include "scan.h"
+
+#include <math.h>
+
+/* Excluded pairs of the caller as rows: the partners of each asking point. */
+
+/* Those of row r are number[first[r]] to number[first[r + 1]], ascending. Arrays are owned. */
+typedef struct hs_partners {
+    int64_t *first; /* NULL: no pairs are excluded */
+    int32_t *number;
+} hs_partners;
+
+/* HS_OK, or HS_ERR_ARGUMENT for numbers that are no point's (failure->row). */
+hs_status hs_partners_check(const hs_selection *selection, int64_t n_asking, int64_t n_points,
+                            hs_failure *failure);
+
+/*
+ * Each way round, or from queries to points alone. Any status of hs_partners_check, or
+ * HS_ERR_MEMORY. To be freed on failure as well.
+ */
+hs_status hs_partners_open(const hs_selection *selection, int64_t n_asking, int64_t n_points,
+                           bool has_queries, hs_account *account, hs_partners *partners,
+                           hs_failure *failure);
+
+/* Harmless twice. */
+void hs_partners_free(hs_account *account, hs_partners *partners);
+
 /*
  * choice.h: which pairs count, of those within reach: the caller's selection made ready for one
  * call. Labels stay in the caller's order and arrays; excluded pairs become rows of partners. Where
  * twice the cutoff may reach from one image of a point to another, points and box are kept as given
- * besides, so that it can be decided which image is the nearest. choose.h applies it to hits.
+ * besides, so that it can be decided which image is the nearest. choice.h applies it to hits.
  */
-#ifndef HS_CHOICE_H
-#define HS_CHOICE_H
-
-#include "../box/near_image.h"
-#include "../scene/scene.h"
-#include "../threads/call.h"
-#include "partners.h"
-
-#include <math.h>
 
 typedef struct hs_choice {
     /* Borrowed. Labels of asking points and of points; NULL where they do not matter. */
@@ -101,5 +127,68 @@ hs_choice_least(const hs_choice *choice, const hs_scene *scene)
     return scene->extreme ? choice->min_distance
                           : hs_scale_apply(scene->scale, choice->min_distance);
 }
+
+/* Takes pairs that do not count from the hits of a scan, before anything is done with
+ * them. */
+
+/*
+ * Takes hits of points [first, next) of the group out that the call's choice leaves out; the order
+ * of the others stays. Hits are places, and become point numbers where the scanner lists these. The
+ * pair of a point with itself stays where lists are full: table rows count on it. HS_OK, or any
+ * status of hs_trace_look_up and hs_near_image; scanner->failed_point is the asking point then.
+ */
+hs_status hs_choose(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next);
+
+/*
+ * Which hits of a point their labels leave out: those of another group; those whose label
+ * is equal or near, or that are among the point's partners, for excluded pairs.
+ */
+
+/* By what hits of a point are left out. */
+typedef enum hs_label_test {
+    HS_OF_OTHER_GROUP,
+    HS_OF_EQUAL_LABEL,
+    HS_OF_NEAR_LABEL,
+    HS_OF_PARTNER
+} hs_label_test;
+
+typedef struct hs_asking {
+    int32_t        itself; /* its number, where it may be among its hits; else -1 */
+    const int64_t *label;  /* of all points: groups, or what excludes */
+    int64_t        own;
+    uint64_t       within;
+    const int32_t *partner; /* ascending */
+    int64_t        n_partners;
+    uint64_t       bits; /* one for the last six bits of each partner */
+} hs_asking;
+
+/* The candidate that a hit is: its place in the block as it was gathered. */
+HS_ALWAYS_INLINE int32_t
+hs_hit_place(const hs_scanner *scanner, int32_t hit)
+{
+    return scanner->is_ordered ? scanner->block.origin[hit] : hit;
+}
+
+/* Its number in the caller's order. */
+HS_ALWAYS_INLINE int32_t
+hs_hit_number(const hs_scanner *scanner, int32_t hit)
+{
+    return scanner->search->bins.order[scanner->block.number[hs_hit_place(scanner, hit)]];
+}
+
+/* The test by which pairs of this point are excluded; false where none are. */
+bool hs_labels_find(const hs_choice *choice, int32_t point, hs_asking *asking, hs_label_test *test);
+
+/* Whether a test that excludes leaves out the pair of the asking point with another one. */
+bool hs_labels_leave_out(const hs_asking *asking, int32_t number, hs_label_test test);
+
+/* Moves hits [from, end) that the test does not leave out to `to`, which is not behind them;
+ * returns where they end. Hits are numbers where these are scanned for, else as scans list them. */
+int32_t hs_labels_sift(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking,
+                       int32_t from, int32_t end, int32_t to, hs_label_test test);
+
+/* The same by the groups of the call's choice; without groups all are moved. */
+int32_t hs_labels_sift_groups(const hs_scanner *scanner, hs_scan *scan, int32_t point, int32_t from,
+                              int32_t end, int32_t to);
 
 #endif

@@ -1,7 +1,11 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#include "limits.h"
+#include "../base/status.h"
+
+#include <math.h>
+
 /* limits.c: what a scan compares with is laid out beside the candidates, so that kernels read it as
  * they read coordinates. */
-#include "limits.h"
 
 int32_t
 hs_limits_rows(const hs_search *search)
@@ -67,5 +71,212 @@ hs_limits_set(const hs_scanner *scanner, const hs_limit_form *form, hs_limit_sca
         lay_out_table(table, scanner);
     } else if (of_points != NULL) {
         lay_out_radii(of_points, scanner);
+    }
+}
+
+/* One support of a pair often tells without the other, so that integers are the last
+ * resort of the pair, not of each. */
+
+/* Supports of other sizes, over their extent, leave no room for float32: nothing is sure of them.
+ * Those of common scenes are about 1, or as much larger as they are smaller than the largest. */
+#define LARGEST_NEAR 0x1p100
+
+/* Factors below this may have lost digits. */
+#define LEAST_FACTOR 0x1p-1000
+
+/* More than float64 and float32 round down. */
+#define UPWARDS (1.0 + 0x1p-23)
+
+/* One support. Those that float32 does not hold are zeros of infinite size, of which thresholds
+ * make nothing sure. */
+static void
+lay_out_one(const double *numbers, int n_entries, double times, float *near)
+{
+    const double size = numbers[n_entries] * times;
+    const bool   fits = times >= LEAST_FACTOR && size >= (double)HS_LEAST_NEAR_SIZE &&
+                      size <= LARGEST_NEAR; /* not NaN either */
+    for (int e = 0; e < n_entries; e++) {
+        near[e] = fits ? (float)(numbers[e] * times) : 0.0f;
+    }
+    near[n_entries] = fits ? (float)(size * UPWARDS) : INFINITY;
+}
+
+/* Of the point in this place of the cells, of a side that the rule looks at. */
+static const double *
+support_of(const hs_support_side *side, int64_t si, int n_entries)
+{
+    return side->numbers + (side->order[si] - side->first) * (n_entries + 1);
+}
+
+void
+hs_supports_lay_out(const hs_support_side *side, int64_t first, int64_t end, int ndim,
+                    double extent, double unscale, float *near)
+{
+    const int    n_numbers = hs_support_numbers(ndim);
+    const double times = unscale / extent;
+    for (int64_t si = first; si < end; si++) {
+        lay_out_one(support_of(side, si, n_numbers - 1), n_numbers - 1, times,
+                    near + si * n_numbers);
+    }
+}
+
+/* The numbers of the candidates, a row for each. */
+static void
+lay_out_block(const float *near, const hs_scanner *scanner)
+{
+    const hs_block *block = &scanner->block;
+    const int       n_numbers = hs_support_numbers(scanner->search->scene.ndim);
+    for (int32_t c = 0; c < block->n; c++) {
+        const int32_t sj = block->number[scanner->is_ordered ? block->origin[c] : c];
+        const float  *numbers = near + (int64_t)sj * n_numbers;
+        for (int e = 0; e < n_numbers; e++) {
+            block->radius[e * block->pitch + c] = numbers[e];
+        }
+    }
+    for (int e = 0; e < n_numbers; e++) {
+        hs_pad_lanes(block->radius + e * block->pitch, block->n);
+    }
+}
+
+void
+hs_supports_set(const hs_scanner *scanner, hs_scan *scan)
+{
+    const hs_supports *supports = scanner->search->limits->supports;
+    const int64_t      first = scanner->group.first;
+    const int          n_numbers = hs_support_numbers(scan->ndim);
+    const float       *asking = supports->of_asking.near;
+    scan->supports = (hs_support_scan){
+        .rule = supports->rule,
+        .form = scanner->form->limits,
+        .of_point = asking != NULL ? asking + first * n_numbers : NULL,
+        .of_block = scanner->block.radius,
+        .pitch = scanner->block.pitch,
+    };
+    if (!supports->is_bounded) {
+        scan->direct.in = INFINITY; /* no support reaches that far */
+    }
+    if (supports->of_points.near != NULL) {
+        lay_out_block(supports->of_points.near, scanner);
+    }
+}
+
+/* The supports of pair e of the batch; NULL where the rule does not look at one. */
+typedef struct two_supports {
+    const double *asking, *point;
+    int           n_entries;
+} two_supports;
+
+static two_supports
+supports_of(const hs_scanner *scanner, int32_t e)
+{
+    const hs_supports *supports = scanner->search->limits->supports;
+    const hs_trace    *trace = &scanner->trace;
+    const int          n_entries = hs_support_entries(scanner->search->scene.ndim);
+    const int32_t      sj = scanner->block.number[trace->place[e]];
+    two_supports       of = {NULL, NULL, n_entries};
+    if (hs_rule_needs_asking(supports->rule)) {
+        of.asking = support_of(&supports->of_asking, trace->si[e], n_entries);
+    }
+    if (hs_rule_needs_other(supports->rule)) {
+        of.point = support_of(&supports->of_points, sj, n_entries);
+    }
+    return of;
+}
+
+/* What two verdicts come to by the rule; a support that it does not look at is neither way. */
+static hs_verdict
+combine(hs_rule rule, hs_verdict one, hs_verdict other)
+{
+    const hs_verdict strong = rule == HS_RULE_MIN ? HS_BEYOND : HS_WITHIN;
+    if (one == strong || other == strong) {
+        return strong;
+    }
+    return one == HS_UNDECIDED || other == HS_UNDECIDED ? HS_UNDECIDED
+           : strong == HS_WITHIN                        ? HS_BEYOND
+                                                        : HS_WITHIN;
+}
+
+/* The verdict of a support that the rule does not look at: it changes nothing. */
+static hs_verdict
+neutral(hs_rule rule)
+{
+    return rule == HS_RULE_MIN ? HS_WITHIN : HS_BEYOND;
+}
+
+static hs_verdict
+settle(const hs_supports *supports, const double *numbers, const hs_metric *measure,
+       const hs_span *span)
+{
+    const int sign = hs_support_compare(&supports->metric, numbers, measure, span);
+    return sign < 0 || (sign == 0 && supports->metric.limit.inclusive) ? HS_WITHIN : HS_BEYOND;
+}
+
+/* One pair exactly; it counts once, by the stage that it took. */
+static bool
+decide_exactly(hs_scanner *scanner, const two_supports *of, const hs_span *span)
+{
+    const hs_supports *supports = scanner->search->limits->supports;
+    const hs_metric   *measure = &scanner->search->scene.metric;
+    const hs_rule      rule = supports->rule;
+    const double      *numbers[2] = {of->asking, of->point};
+    hs_verdict         verdict[2] = {neutral(rule), neutral(rule)};
+    hs_stages          stages = {0, 0, 0};
+    hs_support_span    measured;
+    hs_support_span_of(measure, span, &measured);
+    for (int n = 0; n < 2; n++) {
+        if (numbers[n] != NULL) {
+            verdict[n] = hs_support_judge(&supports->metric, numbers[n], numbers[n][of->n_entries],
+                                          &measured, &stages);
+        }
+    }
+    hs_verdict all = combine(rule, verdict[0], verdict[1]);
+    scanner->stages.by_integers += all == HS_UNDECIDED;
+    scanner->stages.by_double_word += all != HS_UNDECIDED && stages.by_double_word > 0;
+    scanner->stages.by_float64 += all != HS_UNDECIDED && stages.by_double_word == 0;
+    for (int n = 0; n < 2 && all == HS_UNDECIDED; n++) {
+        if (verdict[n] == HS_UNDECIDED) {
+            verdict[n] = settle(supports, numbers[n], measure, span);
+            all = combine(rule, verdict[0], verdict[1]);
+        }
+    }
+    return all == HS_WITHIN;
+}
+
+/* precision="double" and "single": one comparison of rounded numbers for each support. */
+static bool
+decide_rounded(hs_scanner *scanner, const two_supports *of, const hs_span *span)
+{
+    const hs_supports *supports = scanner->search->limits->supports;
+    const hs_metric   *measure = &scanner->search->scene.metric;
+    const double      *numbers[2] = {of->asking, of->point};
+    const bool         is_single = scanner->options.precision == HS_SINGLE;
+    hs_verdict         verdict[2] = {neutral(supports->rule), neutral(supports->rule)};
+    for (int n = 0; n < 2; n++) {
+        if (numbers[n] != NULL) {
+            verdict[n] =
+                hs_support_within_rounded(&supports->metric, numbers[n], measure, span, is_single)
+                    ? HS_WITHIN
+                    : HS_BEYOND;
+        }
+    }
+    return combine(supports->rule, verdict[0], verdict[1]) == HS_WITHIN;
+}
+
+static bool
+decide_pair(hs_scanner *scanner, int32_t e)
+{
+    double             p[HS_MAX_DIM], q[HS_MAX_DIM];
+    int64_t            shift[HS_MAX_DIM];
+    const two_supports of = supports_of(scanner, e);
+    const hs_span      span = {p, q, hs_trace_pair(&scanner->trace, e, p, q, shift)};
+    return scanner->options.precision == HS_EXACT ? decide_exactly(scanner, &of, &span)
+                                                  : decide_rounded(scanner, &of, &span);
+}
+
+void
+hs_supports_decide(hs_scanner *scanner, uint8_t *within)
+{
+    for (int32_t e = 0; e < scanner->trace.n; e++) {
+        within[e] = decide_pair(scanner, e);
     }
 }

@@ -1,16 +1,17 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_SEARCH_LIMITS_H
+#define HS_SEARCH_LIMITS_H
+
+#include "../exact/metric.h"
+#include "scan.h"
+#include "../exact/ellipsoid.h"
+
 /*
  * limits.h: pairs that are compared with a length of their own, the sum of two radii for example,
  * and not with the cutoff of the search, which is the largest of these lengths. Scans compare
  * float32 squares with thresholds for each pair; what they cannot tell is decided for the real
  * numbers. A search without limits pays for none of it.
  */
-#ifndef HS_LIMITS_H
-#define HS_LIMITS_H
-
-#include "../exact/metric_sum.h"
-
-#include "scanner.h"
 
 /* The radii of a set in the order of its cells; borrowed. */
 typedef struct hs_radii {
@@ -91,5 +92,40 @@ hs_limit_of_pair(const hs_scanner *scanner, int32_t e)
     return hs_limit_of(scanner->search->limits, trace->si[e],
                        scanner->block.number[trace->place[e]]);
 }
+
+/*
+ * Pairs that are decided by the supports of their points (ellipsoid.h), and not by a
+ * length. The search is one for the longest distance that supports reach, and scans compare in
+ * float32 with a bound for each pair; hits that these cannot tell are decided for the real numbers.
+ */
+
+/* The supports of a set; borrowed. */
+typedef struct hs_support_side {
+    const double  *numbers; /* of all points, in the caller's order (hs_support_numbers); NULL where
+                             * the rule needs none */
+    int64_t        first;   /* the caller's number of the first of them */
+    const int32_t *order;   /* the caller's numbers, in the order of the cells */
+    const float   *near;    /* over the extent, for the unit that is scanned in: as kernels read
+                             * them, in the order of the cells */
+} hs_support_side;
+
+typedef struct hs_supports {
+    hs_rule           rule;
+    bool              is_bounded; /* pairs must be within the cutoff as well, and may not be */
+    hs_support_metric metric;
+    hs_support_side   of_asking, of_points;
+} hs_supports;
+
+/* The numbers that kernels read of the supports first ... end - 1 of a side, in the order of the
+ * cells; its own `near` is not looked at. near: end * hs_support_numbers(ndim). */
+void hs_supports_lay_out(const hs_support_side *side, int64_t first, int64_t end, int ndim,
+                         double extent, double unscale, float *near);
+
+/* The supports of the group and the block, for a scan. */
+void hs_supports_set(const hs_scanner *scanner, hs_scan *scan);
+
+/* Whether each pair of scanner->trace is within the supports, by the rule, however far apart it is;
+ * not for an extent of 0. within: HS_BATCH of them. */
+void hs_supports_decide(hs_scanner *scanner, uint8_t *within);
 
 #endif

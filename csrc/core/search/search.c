@@ -1,9 +1,502 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* search.c: begins a search, settles what follows from its parts, and frees them. */
 #include "search.h"
+#include "../base/status.h"
+#include "walk.h"
+#include "choice.h"
 
-#include <stddef.h>
+#include <math.h>
 #include <string.h>
+#include <stddef.h>
+
+/* First by the density of the points, then by counting the neighbours of a sample. */
+
+/* What a search takes, about: order, cells and keys; a column and the copy that sorting makes; one
+ * neighbourhood. */
+#define BYTES_PER_POINT      24.0
+#define BYTES_PER_COORDINATE 8.0
+#define BYTES_OF_WALK        4e5
+#define SAMPLES              64    /* points that are counted: an error of some per cent */
+#define SAMPLE_WORK          4.0e6 /* candidates and rows that sampling may cost: milliseconds */
+#define MANY_SAMPLES         1024  /* a power of two; more of them, for a number that is told */
+#define SAMPLE_STEP          633   /* odd: they are taken here and there, for work may end early */
+#define WORK_OF_ROW          8.0
+#define MOST_PAIRS           0x1p62 /* close to the most that int64 counts */
+#define ROUNDING             1e-9   /* relative; far more than coordinates along axes are rounded */
+#define SURE_ERRORS          3.0    /* standard errors below the mean: sure enough to refuse */
+
+static double
+sum_of_squares(const hs_bins *bins, int64_t n_cells)
+{
+    double squares = 0.0;
+    for (int64_t c = 0; c < n_cells; c++) {
+        const double n = bins->start[c + 1] - bins->start[c];
+        squares += n * n;
+    }
+    return squares;
+}
+
+/*
+ * A bound on the number of pairs. Each stencil offset pairs every cell with at most one other, so
+ * by the Cauchy-Schwarz inequality it contributes at most the sum of squared occupancies; for two
+ * sets, the root of the product of both sums.
+ */
+static double
+bound_pairs(const hs_search *search)
+{
+    double squares = sum_of_squares(&search->bins, search->grid.n_cells), offsets = 0.0;
+    if (search->has_queries) {
+        const int64_t n_cells = search->is_sparse ? search->query_sparse.n_cells
+                                                  : search->grid.n_cells;
+        squares = sqrt(squares * sum_of_squares(&search->query_bins, n_cells));
+    }
+    for (int64_t s = 0; s < search->stencil.n_rows; s++) {
+        offsets += (double)search->stencil.rows[s].last - search->stencil.rows[s].first + 1.0;
+    }
+    return squares * offsets;
+}
+
+/* Bytes that one pair of the result takes at the worst moment: the caller's arrays, and what the
+ * search still holds beside them. 0 when nothing is wanted but the count. */
+static double
+bytes_per_pair_of(const hs_options *options, int ndim)
+{
+    int64_t bytes = 0;
+    if (options->out == NULL) {
+        bytes += hs_want_bytes(options->want, ndim, options->index_bytes);
+    }
+    if (options->sorted) { /* it holds the pairs as found, and their order, while it writes */
+        bytes += hs_want_bytes(options->want & ~(unsigned)HS_WANT_BOTH, ndim, sizeof(int32_t)) +
+                 (int64_t)sizeof(int64_t);
+    }
+    return (double)bytes;
+}
+
+/* Bytes that one pair of this search's result takes, or 0 when none is kept. */
+static double
+find_bytes_per_pair(const hs_search *search)
+{
+    return search->keeps_none ? 0.0 : bytes_per_pair_of(&search->call->options, search->scene.ndim);
+}
+
+/* Volume of the space that a search covers: of the periodic part, times the extents along the
+ * coordinate axes that have none. */
+static double
+occupied_volume(const hs_points *points, const hs_box *box, double cutoff)
+{
+    hs_lattice lattice;
+    double     lower[HS_MAX_DIM], upper[HS_MAX_DIM];
+    hs_lattice_init(box, points->ndim, hs_scale_of(0), &lattice);
+    hs_points_range(points, lower, upper);
+    double volume = hs_lattice_volume(&lattice, 0);
+    for (int k = 0; k < points->ndim; k++) {
+        volume *= lattice.row_of_axis[k] >= 0 ? 1.0 : hs_larger(upper[k] - lower[k], cutoff);
+    }
+    return volume;
+}
+
+void
+hs_shortage_add(const hs_points *points, const hs_box *box, double cutoff, hs_shortage *shortage)
+{
+    const double n = (double)points->n, all = 0.5 * n * (n - 1.0);
+    hs_failure   ignored;
+    if (points->n == 0 || !(cutoff >= 0.0) || hs_box_check(box, &ignored) != HS_OK) {
+        return;
+    }
+    const double volume = occupied_volume(points, box, cutoff);
+    const double pairs = 0.5 * n * n * hs_ball_volume(points->ndim, cutoff) / volume;
+    /* Numbers near the ends of the range leave no volume: all pairs then. */
+    shortage->pairs += box == NULL && !(pairs < all) ? all : isfinite(pairs) ? pairs : all;
+    shortage->bytes += n * (BYTES_PER_POINT + BYTES_PER_COORDINATE * points->ndim);
+}
+
+void
+hs_shortage_tell(const hs_shortage *shortage, const hs_options *options, int ndim, double limit,
+                 hs_failure *failure)
+{
+    failure->limit_bytes = limit;
+    if (failure->expected_bytes == 0.0) {
+        failure->expected_pairs = hs_larger(shortage->pairs, failure->expected_pairs);
+        failure->expected_bytes = failure->expected_pairs * bytes_per_pair_of(options, ndim);
+        failure->search_bytes = hs_larger(shortage->bytes + BYTES_OF_WALK, failure->search_bytes);
+    }
+}
+
+void
+hs_shortage_of_search(const hs_points *points, const hs_box *box, const hs_search *search,
+                      hs_failure *failure)
+{
+    hs_shortage shortage = {0.0, 0.0};
+    hs_shortage_add(points, box, search->call->options.cutoff, &shortage);
+    if (search->is_full) {
+        shortage.pairs *= search->pairs_per_half;
+    }
+    hs_shortage_tell(&shortage, &search->call->options, points->ndim, search->call->account.limit,
+                     failure);
+}
+
+static hs_status
+refuse(const hs_search *search, double pairs, double bytes_per_pair, hs_failure *failure)
+{
+    failure->expected_pairs = pairs;
+    failure->expected_bytes = pairs * bytes_per_pair;
+    failure->limit_bytes = search->call->account.limit;
+    return HS_ERR_MEMORY;
+}
+
+/*
+ * Pairs that a periodic box must have. Along the open axes no two points are further apart than the
+ * diagonal of what the points span there; what is left of the radius spans a ball in the space of
+ * the periodic axes. One of radius R holds at least as many lattice points as copies of the cell
+ * cover a ball of radius R less the cell's diameter.
+ */
+static double
+least_pairs(const hs_search *search)
+{
+    const hs_scene   *scene = &search->scene;
+    const hs_lattice *lattice = &scene->lattice;
+    const double      n = (double)scene->n;
+    double            diameter = 0.0, across = 0.0;
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        double square = 0.0;
+        for (int k = 0; k < scene->ndim; k++) {
+            square += lattice->rows[r][k] * lattice->rows[r][k];
+        }
+        diameter += sqrt(square);
+    }
+    for (int k = 0; k < scene->ndim; k++) {
+        if (lattice->row_of_axis[k] < 0) {
+            const double extent = (scene->upper[k] - scene->lower[k]) / scene->cutoff;
+            across += extent * extent * (1.0 + ROUNDING);
+        }
+    }
+    const double radius = sqrt(hs_larger(1.0 - across, 0.0)) * scene->cutoff - diameter;
+    if (!(radius > 0.0)) {
+        return 0.0;
+    }
+    const double ball = hs_ball_volume(lattice->n_periodic, radius);
+    const double around = n * ball / hs_lattice_volume(lattice, 0); /* points in that ball */
+    /* Half a pair of each point would be the one with itself. */
+    return 0.5 * n * (around - (search->has_queries ? 0.0 : 1.0)) * search->pairs_per_half;
+}
+
+hs_status
+hs_estimate_by_density(hs_search *search, hs_failure *failure)
+{
+    const double bytes_per_pair = find_bytes_per_pair(search);
+    if (search->limits != NULL ||                /* the cutoff is that of few pairs */
+        search->scene.lattice.n_periodic == 0) { /* nothing tells the density; a scene without
+                                                  * points has no box either */
+        return HS_OK;
+    }
+    const double least = least_pairs(search);
+    if (bytes_per_pair == 0.0 && least > MOST_PAIRS) {
+        failure->value = least;
+        return HS_ERR_TOO_MANY;
+    }
+    if (!(least > 0.0) || hs_account_allows(&search->call->account, least * bytes_per_pair)) {
+        return HS_OK;
+    }
+    const bool   has_density = search->scene.lattice.n_periodic == search->scene.ndim;
+    const double dense = search->grid.expected_pairs * search->pairs_per_half;
+    return refuse(search, has_density ? dense : least, bytes_per_pair, failure);
+}
+
+/* What a few points have found: the sum of their counts, of the squares, and how many. */
+typedef struct sample {
+    double  sum, squares;
+    int64_t taken;
+} sample;
+
+/*
+ * Points are sampled evenly over the cells; each counts its forward half, so the mean over points
+ * times n estimates the pairs without bias. Stopping early leaves a count too small: an estimate
+ * from below, which is the safe side here.
+ */
+static hs_status
+take_sample(hs_walker *walker, int64_t n, sample *taken)
+{
+    const int64_t samples = n < SAMPLES ? n : SAMPLES;
+    const double  row_work = WORK_OF_ROW * (double)walker->search->stencil.n_rows;
+    double        work = 0.0;
+    *taken = (sample){0.0, 0.0, 0};
+    for (; taken->taken < samples && work < SAMPLE_WORK; taken->taken++) {
+        const int64_t si = (2 * taken->taken + 1) * n / (2 * samples);
+        const int64_t before = walker->scanner.n_candidates;
+        walker->scanner.n_found = 0;
+        walker->scanner.candidate_limit = before + (int64_t)SAMPLE_WORK;
+        const hs_status status = hs_walk_point(walker, (int32_t)si);
+        if (status != HS_OK && status != HS_STOPPED) {
+            return status;
+        }
+        taken->sum += (double)walker->scanner.n_found;
+        taken->squares += (double)walker->scanner.n_found * (double)walker->scanner.n_found;
+        work += (double)(walker->scanner.n_candidates - before) + row_work;
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_estimate_pairs(hs_search *search, double *pairs)
+{
+    const int64_t n = hs_search_asking(search)->n;
+    const int64_t samples = n < MANY_SAMPLES ? n : MANY_SAMPLES;
+    const double  by_density = search->grid.expected_pairs * search->pairs_per_half;
+    double        work = 0.0, sum = 0.0;
+    int64_t       taken = 0;
+    hs_walker     walker;
+    *pairs = 0.0;
+    hs_status status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
+    if (status != HS_OK) {
+        return status;
+    }
+    for (; status == HS_OK && taken < samples && work < SAMPLE_WORK; taken++) {
+        const int64_t s = samples == n ? taken : taken * SAMPLE_STEP % samples;
+        const int64_t before = walker.scanner.n_candidates;
+        walker.scanner.n_found = 0;
+        walker.scanner.candidate_limit = before + (int64_t)SAMPLE_WORK;
+        status = hs_walk_point(&walker, (int32_t)((2 * s + 1) * n / (2 * samples)));
+        sum += (double)walker.scanner.n_found;
+        work += (double)(walker.scanner.n_candidates - before) +
+                WORK_OF_ROW * (double)search->stencil.n_rows;
+    }
+    hs_walker_close(search, &walker);
+    if (taken > 0) {
+        *pairs = sum / (double)taken * (double)n;
+    }
+    if (status == HS_STOPPED || taken < samples) {
+        *pairs = hs_larger(*pairs, by_density);
+    }
+    return status == HS_STOPPED ? HS_OK : status;
+}
+
+/* The part of what is free that a result may seem to need: its density may be off by a third. */
+#define SEEMS_SMALL 0.75
+
+/* Whether to take a sample before the limit is looked up, which takes longer: the result may be too
+ * large to do without, and does not seem to be. */
+static bool
+samples_first(const hs_search *search, double bytes_per_pair, double bound)
+{
+    const double by_density = search->grid.expected_pairs * search->pairs_per_half;
+    return search->call->account.find_limit != NULL && bound > HS_LIMIT_FREE &&
+           by_density * bytes_per_pair < SEEMS_SMALL * HS_LIMIT_FREE;
+}
+
+hs_status
+hs_estimate_by_sample(hs_search *search, hs_failure *failure)
+{
+    hs_account   *account = &search->call->account;
+    const double  bytes_per_pair = find_bytes_per_pair(search);
+    const int64_t n = hs_search_asking(search)->n;
+    const double  bound = n > 0 ? bound_pairs(search) * bytes_per_pair : 0.0;
+    hs_walker     walker;
+    sample        taken;
+    if (n == 0 ||
+        (!samples_first(search, bytes_per_pair, bound) && hs_account_allows(account, bound))) {
+        return HS_OK;
+    }
+    hs_status status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
+    if (status == HS_OK) {
+        status = take_sample(&walker, n, &taken);
+        HS_ASSERT(status != HS_ERR_SHIFT_RANGE); /* counting needs no S */
+        hs_walker_close(search, &walker);
+    }
+    if (status != HS_OK) {
+        return status;
+    }
+    const double many = (double)taken.taken;
+    const double mean = taken.sum / many;
+    const double variance = fmax(0.0, taken.squares / many - mean * mean);
+    const double error = taken.taken < n ? sqrt(variance / many) : 0.0;
+    const double least = (mean - SURE_ERRORS * error) * (double)n;
+    /* a sample may say more than is possible */
+    if (hs_account_allows(account, hs_smaller(least * bytes_per_pair, bound))) {
+        return HS_OK;
+    }
+    return refuse(search, mean * (double)n, bytes_per_pair, failure);
+}
+
+/* Distances have an error of 1 ulp, or less than 2^-1073 below the normal numbers; the
+ * band around an edge is some times as wide, which costs nothing. */
+
+/* Times a number: 4 ulp of it or more. */
+#define BAND 0x1p-50
+
+/* Eight of the smallest numbers there are. */
+#define LEAST_BAND 0x1p-1071
+
+/* Bits of a distance that choose its cell, of the 52 within a power of two: so that few edges share
+ * a cell. The first is tried first. */
+static const int cell_bits[] = {3, 6, 9};
+#define MOST_CELLS 4096 /* some 100 kB; distances below these share cell 0 */
+
+/* The bits of a number that is not negative. */
+HS_ALWAYS_INLINE int64_t
+bits_of(double x)
+{
+    int64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits;
+}
+
+/* The least number with these leading bits. */
+static double
+least_of(int64_t leading, int shift)
+{
+    const uint64_t bits = (uint64_t)leading << shift;
+    double         x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+/* Cells from the one before the first edge above zero to that of the cutoff. Returns how many
+ * edges share a cell with the one before, though their bands are apart. */
+static int64_t
+set_cells(double cutoff, int bits, hs_shells *shells)
+{
+    const int64_t n = shells->n;
+    int64_t       k = 0, shared = 0;
+    while (k < n - 1 && !(shells->low[k] > 0.0)) {
+        k++;
+    }
+    shells->shift = 52 - bits;
+    shells->first = (bits_of(hs_larger(shells->low[k], 0.0)) >> shells->shift) - 1;
+    shells->last = (bits_of(cutoff) >> shells->shift) - shells->first;
+    if (shells->last >= MOST_CELLS) {
+        shells->first += shells->last - (MOST_CELLS - 1);
+        shells->last = MOST_CELLS - 1;
+    }
+    for (k++; k < n; k++) {
+        const int64_t at = bits_of(shells->low[k]) >> shells->shift;
+        const int64_t before = bits_of(shells->high[k - 1]) >> shells->shift;
+        shared += shells->low[k] > shells->high[k - 1] && (at <= before || at <= shells->first);
+    }
+    return shared;
+}
+
+static void
+fill_cells(const hs_shells *shells)
+{
+    int64_t below = 0, reached = 0; /* bands that end before the cell, or begin before its end */
+    for (int64_t c = 0; c <= shells->last; c++) {
+        const double least = c == 0 ? 0.0 : least_of(shells->first + c, shells->shift);
+        const double end = least_of(shells->first + c + 1, shells->shift);
+        while (below < shells->n && shells->high[below] < least) {
+            below++;
+        }
+        while (reached < shells->n && (c == shells->last || shells->low[reached] < end)) {
+            reached++;
+        }
+        hs_shell_cell *cell = &shells->cells[c];
+        *cell = (hs_shell_cell){.low = INT64_MAX, .high = INT64_MAX, .below = (int32_t)below};
+        if (reached - below == 1) {
+            cell->low = bits_of(hs_larger(shells->low[below], 0.0));
+            cell->high = bits_of(shells->high[below]);
+        } else if (reached > below) {
+            cell->low = 0; /* all of them are looked at again */
+        }
+    }
+}
+
+/* The edges of the options, in both units, and their bands. */
+static void
+set_edges(const hs_scene *scene, const hs_options *options, hs_shells *shells)
+{
+    for (int64_t k = 0; k < shells->n; k++) {
+        const double edge = options->shells[k], width = edge * BAND + LEAST_BAND;
+        shells->edge[k] = edge;
+        shells->at[k] = scene->extreme ? edge : hs_scale_apply(scene->scale, edge);
+        shells->low[k] = edge - width;
+        shells->high[k] = edge + width;
+    }
+}
+
+hs_status
+hs_shells_open(hs_account *account, const hs_scene *scene, const hs_options *options,
+               hs_shells *shells)
+{
+    const int64_t n = options->want & HS_WANT_SHELL ? options->n_shells - 1 : 0;
+    *shells = (hs_shells){.inclusive = options->inclusive};
+    if (n == 0) {
+        return HS_OK;
+    }
+    shells->edge = hs_alloc(account, HS_FOR_CANDIDATES, 4 * n, sizeof(double));
+    if (shells->edge == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    shells->n = n;
+    shells->at = shells->edge + n;
+    shells->low = shells->at + n;
+    shells->high = shells->low + n;
+    set_edges(scene, options, shells);
+    for (size_t b = 0; b < sizeof cell_bits / sizeof *cell_bits; b++) {
+        if (set_cells(options->cutoff, cell_bits[b], shells) == 0) {
+            break;
+        }
+    }
+    shells->cells = hs_alloc(account, HS_FOR_CANDIDATES, shells->last + 1, sizeof(hs_shell_cell));
+    if (shells->cells == NULL) {
+        hs_shells_free(account, shells);
+        return HS_ERR_MEMORY;
+    }
+    fill_cells(shells);
+    return HS_OK;
+}
+
+void
+hs_shells_free(hs_account *account, hs_shells *shells)
+{
+    hs_free(account, shells->cells);
+    hs_free(account, shells->edge);
+    *shells = (hs_shells){.n = 0};
+}
+
+bool
+hs_shells_find(const hs_shells *shells, const double *distance, int32_t n, int32_t *shell)
+{
+    const hs_shell_cell *cells = shells->cells;
+    const int64_t        first = shells->first;
+    const int            shift = shells->shift;
+    int64_t              sure = -1;
+    if (shells->n == 0) {
+        memset(shell, 0, (size_t)n * sizeof *shell);
+        return false;
+    }
+    for (int32_t h = 0; h < n; h++) {
+        const int64_t        bits = bits_of(distance[h]), at = (bits >> shift) - first;
+        const hs_shell_cell *cell = &cells[at < 0 ? 0 : at];
+        /* Differences of these do not overflow; their sign bits count. */
+        const int64_t above = cell->high - bits;
+        shell[h] = cell->below + (int32_t)((uint64_t)above >> 63);
+        sure &= above | (bits - cell->low);
+    }
+    return sure >= 0;
+}
+
+void
+hs_shells_range(const hs_shells *shells, double distance, int32_t *low, int32_t *high)
+{
+    const int32_t n = (int32_t)shells->n;
+    while (*low < n && shells->high[*low] < distance) {
+        ++*low;
+    }
+    *high = *low;
+    while (*high < n && shells->low[*high] <= distance) {
+        ++*high;
+    }
+}
+
+double
+hs_shells_keep(const hs_shells *shells, int64_t k, double distance)
+{
+    if (k > 0) {
+        const double below = shells->edge[k - 1];
+        distance = hs_larger(distance, shells->inclusive ? nextafter(below, INFINITY) : below);
+    }
+    return k < shells->n ? hs_keep_within(distance, shells->edge[k], shells->inclusive) : distance;
+}
+
+/* search.c: begins a search, settles what follows from its parts, and frees them. */
 
 void
 hs_search_set_asking(const hs_sets *sets, hs_search *search)
@@ -61,4 +554,284 @@ hs_search_close(hs_search *search)
         hs_bins_free(account, &search->query_bins);
         hs_sparse_free(account, &search->query_sparse);
     }
+}
+
+/* The scene first, then the grid, its stencil, and the points sorted into its
+ * cells. */
+
+/* Stores occupied cells only, in place of the grid that was chosen; nothing for a width of 0. */
+static void
+make_sparse(hs_search *search, double width)
+{
+    search->is_sparse = width > 0.0;
+    if (search->is_sparse) {
+        const hs_grid dense = search->grid;
+        hs_sparse_grid(&search->scene, &dense, width, &search->grid);
+    }
+}
+
+/* The grid of an algorithm of the caller's choice. */
+static hs_status
+choose_single_or_sparse(hs_search *search, bool is_sparse, hs_failure *failure)
+{
+    const hs_status status =
+        hs_grid_init_kind(&search->scene, HS_GRID_SINGLE, &search->grid, failure);
+    if (status == HS_OK && is_sparse) {
+        make_sparse(search, hs_sparse_width(&search->scene, &search->grid));
+    }
+    return status;
+}
+
+/* Chooses the dense grid, with cells as wide as the caller wants them or as is quickest. Where
+ * points crowd in few of its cells, one that stores occupied cells only, unless the dense one has
+ * the caller's width, or the caller wants all cells. */
+static hs_status
+choose_grid(hs_search *search, hs_failure *failure)
+{
+    const hs_options  *options = &search->call->options;
+    const hs_algorithm algorithm = options->algorithm;
+    const bool         is_dense = algorithm == HS_GRID;
+    hs_status          status = HS_TOO_MUCH;
+    bool               may_be_sparse = true;
+    search->is_sparse = false; /* another system may have been searched before */
+    if (algorithm == HS_ALL_PAIRS || algorithm == HS_HASH) {
+        return choose_single_or_sparse(search, algorithm == HS_HASH, failure);
+    }
+    if (options->cell_size > 0.0) {
+        const double width = hs_scale_apply(search->scene.scale, options->cell_size);
+        status = hs_grid_init_wide(&search->scene, width, &search->grid, &may_be_sparse, failure);
+    }
+    if (status == HS_TOO_MUCH) {
+        status = hs_grid_init_kind(&search->scene, is_dense ? HS_GRID_CELLS : HS_GRID_ANY,
+                                   &search->grid, failure);
+    }
+    if (status == HS_OK && may_be_sparse && !is_dense) {
+        make_sparse(search, hs_sparse_choose(&search->scene, &search->grid));
+    }
+    return status;
+}
+
+/* Sorts the points into the cells of the grid. */
+static hs_status
+build_bins(hs_search *search, hs_scene *scene, hs_grid *grid, hs_sparse *sparse, hs_bins *bins)
+{
+    hs_account *account = &search->call->account;
+    return search->is_sparse ? hs_sparse_build(account, search->call->team, &search->call->options,
+                                               scene, grid, sparse, bins)
+                             : hs_bins_build(account, search->call->team, &search->call->options,
+                                             scene, grid, bins);
+}
+
+hs_status
+hs_search_bin_queries(hs_search *search, hs_scene *asking)
+{
+    hs_grid grid = search->grid; /* of which occupied cells are counted anew */
+    return build_bins(search, asking, &grid, &search->query_sparse, &search->query_bins);
+}
+
+/* Grid, stencil and bins. */
+static hs_status
+build_cells(hs_search *search, hs_scene *asking, hs_failure *failure)
+{
+    hs_scene *scene = &search->scene;
+    hs_status status = choose_grid(search, failure);
+    if (status == HS_OK) {
+        status = hs_estimate_by_density(search, failure);
+    }
+    if (status == HS_OK) {
+        status = hs_stencil_build(&search->call->account, &search->call->options, scene,
+                                  &search->grid, search->is_full, &search->stencil);
+        if (status == HS_ERR_MEMORY) {
+            failure->search_bytes = hs_stencil_bytes(&search->grid, search->is_full);
+        }
+    }
+    if (status == HS_OK) {
+        status = build_bins(search, scene, &search->grid, &search->sparse, &search->bins);
+    }
+    if (status == HS_OK && asking != NULL) {
+        status = hs_search_bin_queries(search, asking);
+    }
+    return status;
+}
+
+/* The call's options for its scene; `others`: room for some. Where images are compared, S is needed
+ * of all pairs. */
+static const hs_options *
+options_of_scene(const hs_call *call, hs_options *others)
+{
+    if (call->choice == NULL || !hs_choice_compares(call->choice, call->options.cutoff)) {
+        return &call->options;
+    }
+    *others = call->options;
+    others->want |= HS_WANT_SHIFT;
+    return others;
+}
+
+hs_status
+hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_failure *failure)
+{
+    hs_options others;
+    hs_scene   queries, *asking = sets->queries != NULL ? &queries : NULL;
+    if (search->call->kernel == NULL) {
+        return HS_ERR_KERNEL;
+    }
+    hs_search_set_asking(sets, search);
+    hs_status status = hs_scene_init_sets(&search->call->account, search->call->team, sets, box,
+                                          options_of_scene(search->call, &others), &search->scene,
+                                          asking, failure);
+    if (status == HS_OK) {
+        status = hs_scene_narrow(&search->scene, sets->narrowing);
+        status = status == HS_OK ? build_cells(search, asking, failure) : status;
+        if (asking != NULL) {
+            hs_scene_free(&search->call->account, asking);
+        }
+    }
+    if (status == HS_OK) {
+        hs_search_settle(search);
+    }
+    return status;
+}
+
+/* A copy of the other search that borrows its arrays, with a reach and queries of
+ * its own. */
+
+/* Scaled cutoffs as small as this keep all their digits. */
+#define SMALLEST_CUTOFF 0x1p-500
+
+/* Takes what is shared as the new search's own, and marks as borrowed what it must not free. */
+static void
+borrow(const hs_search *built, bool is_untested, hs_search *search)
+{
+    search->scene = built->scene;
+    search->scene.is_untested = is_untested;
+    search->grid = built->grid;
+    search->bins = built->bins;
+    search->sparse = built->sparse;
+    search->is_sparse = built->is_sparse;
+    search->is_borrowed = true;
+}
+
+/* Whether the scale of the cells keeps all digits of a length up to theirs. */
+static bool
+keeps_digits(const hs_search *built, double length)
+{
+    return length == 0.0 || hs_scale_apply(built->scene.scale, length) >= SMALLEST_CUTOFF;
+}
+
+/* Whether cells for one cutoff serve another, and a least one where there are several. What is kept
+ * of the points depends on the precision that they were meant for. */
+static bool
+serves(const hs_search *built, const hs_options *options, double least_cutoff)
+{
+    const double before = built->call->options.cutoff, cutoff = options->cutoff;
+    if (options->precision != built->call->options.precision || built->scene.in_one_cell) {
+        return false;
+    }
+    if (built->scene.extreme) { /* digits are lost, and kept beside */
+        return cutoff == before;
+    }
+    return keeps_digits(built, least_cutoff) &&
+           (cutoff == before || (cutoff >= 0.0 && cutoff < before && keeps_digits(built, cutoff)));
+}
+
+/* Makes cells serve the cutoff of the options, and sorts the queries into them. */
+static hs_status
+adapt(const hs_sets *sets, hs_search *search, hs_failure *failure)
+{
+    const hs_options *options = &search->call->options;
+    const double      before = search->scene.cutoff;
+    hs_status         status = HS_OK;
+    if (options->cutoff != sets->built->call->options.cutoff) {
+        hs_scene_set_cutoff(&search->scene, options);
+        status = hs_grid_narrow(&search->scene, search->is_sparse, before, &search->grid);
+    }
+    hs_scene_init_metric(&search->scene, options);
+    hs_search_set_asking(sets, search);
+    hs_search_settle(search);
+    if (status == HS_OK) {
+        status = hs_estimate_by_density(search, failure);
+    }
+    if (status == HS_OK) {
+        status = hs_stencil_build(&search->call->account, options, &search->scene, &search->grid,
+                                  search->is_full, &search->stencil);
+    }
+    return status;
+}
+
+static hs_status
+take_queries(const hs_points *queries, hs_search *search, hs_failure *failure)
+{
+    hs_scene  asking;
+    hs_status status = hs_scene_like(&search->call->account, search->call->team, &search->scene,
+                                     queries, &search->call->options, &asking, failure);
+    if (status == HS_OK) {
+        status = hs_search_bin_queries(search, &asking);
+        hs_scene_free(&search->call->account, &asking);
+    }
+    return status;
+}
+
+hs_status
+hs_search_reuse(const hs_sets *sets, hs_call *call, hs_search *search, hs_failure *failure)
+{
+    const hs_search *built = sets->built;
+    const int64_t    n_queries = sets->queries != NULL ? sets->queries->n : 0;
+    if (!serves(built, &call->options, sets->least_cutoff)) {
+        return HS_UNSERVED;
+    }
+    hs_search_begin(call, search);
+    borrow(built, sets->is_untested, search);
+    hs_call_gather(call, sets->points->n + n_queries);
+    hs_status status = call->kernel == NULL ? HS_ERR_KERNEL : adapt(sets, search, failure);
+    if (status == HS_OK && sets->queries != NULL) {
+        status = take_queries(sets->queries, search, failure);
+    }
+    if (status != HS_OK) {
+        hs_search_close(search);
+        if (status == HS_UNSERVED) {
+            hs_call_restart(call);
+            failure->in_queries = false;
+        }
+    }
+    return status;
+}
+
+/* Takes cells that were kept where they serve, and else makes new ones. */
+
+/* Shells, and threads for the walk where points alone were not worth them. */
+static hs_status
+finish(hs_search *search)
+{
+    hs_call *call = search->call;
+    if (hs_shells_open(&call->account, &search->scene, &call->options, &search->shells) != HS_OK) {
+        hs_search_close(search);
+        return HS_ERR_MEMORY;
+    }
+    hs_call_gather_for(call, hs_search_asking(search)->n,
+                       search->grid.expected_pairs * search->pairs_per_half);
+    return HS_OK;
+}
+
+hs_status
+hs_search_open(const hs_sets *sets, const hs_box *box, hs_call *call, hs_search *search,
+               hs_failure *failure)
+{
+    hs_status status = HS_UNSERVED;
+    if (sets->built != NULL) {
+        status = hs_search_reuse(sets, call, search, failure);
+    }
+    if (status == HS_UNSERVED) {
+        const int64_t n_queries = sets->queries != NULL ? sets->queries->n : 0;
+        hs_search_begin(call, search);
+        hs_call_gather(call, sets->points->n + n_queries);
+        status = hs_search_build(sets, box, search, failure);
+        if (status != HS_OK) {
+            hs_search_close(search);
+        }
+    }
+    if (status == HS_OK) {
+        status = finish(search);
+    }
+    hs_call_tell_limit(call, status, failure);
+    return status;
 }

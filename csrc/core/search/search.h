@@ -1,15 +1,62 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_SEARCH_SEARCH_H
+#define HS_SEARCH_SEARCH_H
+
+#include "../scene/scene.h"
+#include "../cells/bins.h"
+#include "../cells/grid.h"
+#include "../threads/call.h"
+
+/*
+ * Several cutoffs of one search, and for each but the last the float64 distances that do
+ * not tell on which side of it a pair is. The last one is that of the search itself. A table,
+ * indexed by the leading bits of a distance, knows for each of its cells which edges are in it.
+ */
+
+/* Distances of one cell of the table: `below` edges are below them; above `high`, one more. From
+ * `low` to `high` they do not tell. These two are the bits of doubles, which order like them. */
+typedef struct hs_shell_cell {
+    int64_t low, high;
+    int32_t below;
+} hs_shell_cell;
+
+/* Shared by all threads. Arrays have n entries and do not descend. */
+typedef struct hs_shells {
+    int64_t        n;         /* edges: cutoffs but the last; 0 also where shells are not wanted */
+    bool           inclusive; /* an edge belongs to the shell below it */
+    double        *edge;      /* owned; in the caller's unit */
+    double        *at; /* in the memory of `edge`, like those below; as the scene's metric has it */
+    double        *low;   /* a distance below this, as it is returned, is below the edge, ... */
+    double        *high;  /* ... and one above this is above it */
+    hs_shell_cell *cells; /* owned; last + 1 */
+    int            shift; /* bits of a distance that do not choose the cell */
+    int64_t        first; /* leading bits of the distances of cell 0; lower ones are there too */
+    int64_t        last;  /* number of the last cell; that of the largest cutoff */
+} hs_shells;
+
+/* Those of the options, if they are wanted; HS_OK or HS_ERR_MEMORY. */
+hs_status hs_shells_open(hs_account *account, const hs_scene *scene, const hs_options *options,
+                         hs_shells *shells);
+
+/* Harmless twice. */
+void hs_shells_free(hs_account *account, hs_shells *shells);
+
+/* How many edges each of n distances, which are not negative, is surely above; for one that its
+ * cell does not tell at least so many are. Returns whether there is such a one. */
+bool hs_shells_find(const hs_shells *shells, const double *distance, int32_t n, int32_t *shell);
+
+/* For a distance that is above *low edges or more: *low that it is surely above, and *high that it
+ * may be. */
+void hs_shells_range(const hs_shells *shells, double distance, int32_t *low, int32_t *high);
+
+/* A distance as it is returned, of a pair that was decided to be in shell k: on the right side of
+ * both edges, and still within 1 ulp, because the true distance is there too. */
+double hs_shells_keep(const hs_shells *shells, int64_t k, double distance);
+
 /*
  * search.h: one scene made ready for a call: points in cell order and the neighbouring rows of
  * cells. Walkers (walk.h) read it and leave it as it is.
  */
-#ifndef HS_SEARCH_H
-#define HS_SEARCH_H
-
-#include "../cells/sparse_rows.h"
-#include "../cells/stencil.h"
-#include "../threads/call.h"
-#include "shells.h"
 
 typedef struct hs_search {
     /* Large, and filled before they are read: not cleared at first. */
@@ -73,5 +120,73 @@ void hs_search_settle(hs_search *search);
 
 /* Frees what it has; harmless twice. The call goes on. */
 void hs_search_close(hs_search *search);
+
+/*
+ * From points, queries, box and options to a search that can be walked: with cells
+ * of its own, or with those of another one.
+ */
+
+/*
+ * Everything up to the first group: threads and cells, or what can be reused of sets->built. On
+ * failure the search is closed. The points are not needed any more.
+ */
+hs_status hs_search_open(const hs_sets *sets, const hs_box *box, hs_call *call, hs_search *search,
+                         hs_failure *failure);
+
+/* The scene of these points and its cells, in place of those that hs_search_close has freed;
+ * options.cutoff may have changed. */
+hs_status hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search,
+                          hs_failure *failure);
+
+/* The queries into the cells that are there; their scene gives up its arrays. */
+hs_status hs_search_bin_queries(hs_search *search, hs_scene *asking);
+
+/*
+ * A search among the points of another one, which was made to be kept, stays as it is and must
+ * outlive this one. The queries of the sets ask, or the points. Cells, points and their scale are
+ * those of the first search; cutoff, reach, stencil and queries are its own; account and threads
+ * are those of its call. HS_UNSERVED when it cannot serve them: the cutoff is larger than its own,
+ * or its bounds do not hold for the queries. Else any status of hs_search_open.
+ */
+hs_status hs_search_reuse(const hs_sets *sets, hs_call *call, hs_search *search,
+                          hs_failure *failure);
+
+/* Will the result fit? Estimated before the search from a sample of points. */
+
+/* What a search that was refused memory would have taken. For HS_ERR_MEMORY only; changes nothing
+ * where the failure says it already. */
+typedef struct hs_shortage {
+    double pairs; /* by the density of the points in the space that they occupy */
+    double bytes; /* of the search itself */
+} hs_shortage;
+
+/* Adds one system, from the caller's numbers: nothing else need have been read yet. */
+void hs_shortage_add(const hs_points *points, const hs_box *box, double cutoff,
+                     hs_shortage *shortage);
+void hs_shortage_tell(const hs_shortage *shortage, const hs_options *options, int ndim,
+                      double limit, hs_failure *failure);
+
+/* Pairs and bytes of one search. */
+void hs_shortage_of_search(const hs_points *points, const hs_box *box, const hs_search *search,
+                           hs_failure *failure);
+
+/*
+ * Before any work: a box has at least so many pairs as its density along the periodic axes says,
+ * less what a cell's diameter and the extent along the open axes can hide. HS_ERR_MEMORY when even
+ * these pass the limit, HS_ERR_TOO_MANY when int64 cannot count them.
+ */
+hs_status hs_estimate_by_density(hs_search *search, hs_failure *failure);
+
+/*
+ * After sorting into cells: HS_OK when a result is expected to fit the account's limit, and always
+ * when a cheap bound shows it to be small. HS_ERR_MEMORY fills failure->expected_*. The margin is
+ * on the side of searching: a result that turns out too large is refused when it is stored.
+ */
+hs_status hs_estimate_by_sample(hs_search *search, hs_failure *failure);
+
+/* How many pairs there are, about, from a larger sample: all of them for some hundred points. Where
+ * they cannot be counted in some milliseconds, no less than the density of the points says. HS_OK
+ * or HS_ERR_MEMORY. */
+hs_status hs_estimate_pairs(hs_search *search, double *pairs);
 
 #endif

@@ -1,12 +1,160 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* call.c: options, memory, threads and counters of a call are in one struct, to which every step
- * adds. */
+#if !defined(_WIN32)
+#define _POSIX_C_SOURCE 200809L /* pthread_sigmask */
+#endif
 #include "call.h"
-
-#include "../base/outcome.h"
-#include "../base/want.h"
+#include "../base/os_thread.h"
+#include "../base/status.h"
 
 #include <string.h>
+
+/* A job is open while its tasks are handed out. Threads that wake up too late for it go
+ * back to sleep, so the caller never waits for them. */
+
+typedef struct job {
+    hs_task_fn run;
+    void      *context;
+    int64_t    n_tasks;
+} job;
+
+struct hs_team {
+    hs_mutex         mutex;  /* guards all but `next` */
+    hs_condition     opened; /* a job is there, or the team ends */
+    hs_condition     left;   /* no thread works on the job any more */
+    job              job;
+    int64_t          job_number;
+    bool             is_open;
+    bool             ends;
+    int              n_working; /* threads on the job, the caller not among them */
+    int              n_others;
+    volatile int64_t next; /* task to be handed out; atomic */
+    hs_thread        others[];
+};
+
+static void
+do_tasks(hs_team *team, const job *doing)
+{
+    for (;;) {
+        const int64_t task = hs_fetch_increment(&team->next);
+        if (task >= doing->n_tasks) {
+            return;
+        }
+        doing->run(doing->context, task);
+    }
+}
+
+/* What each thread but the caller's runs. */
+static hs_thread_result HS_THREAD_CALL
+work(void *context)
+{
+    hs_team *team = context;
+    int64_t  seen = 0; /* number of the last job that this thread worked on */
+    (void)hs_fpenv_enter();
+    hs_mutex_lock(&team->mutex);
+    for (;;) {
+        while (!team->ends && !(team->is_open && team->job_number != seen)) {
+            hs_condition_wait(&team->opened, &team->mutex);
+        }
+        if (team->ends) {
+            break;
+        }
+        const job doing = team->job;
+        seen = team->job_number;
+        team->n_working++;
+        hs_mutex_unlock(&team->mutex);
+        do_tasks(team, &doing);
+        hs_mutex_lock(&team->mutex);
+        if (--team->n_working == 0) {
+            hs_condition_wake(&team->left);
+        }
+    }
+    hs_mutex_unlock(&team->mutex);
+    return 0;
+}
+
+hs_team *
+hs_team_create(int n_threads)
+{
+    if (n_threads <= 1) {
+        return NULL;
+    }
+    const int64_t n_others = n_threads - 1;
+    const size_t  size = sizeof(hs_team) + (size_t)n_others * sizeof(hs_thread);
+    hs_team      *team = hs_alloc(NULL, HS_FOR_STENCIL, 1, size);
+    if (team == NULL) {
+        return NULL;
+    }
+    *team = (hs_team){.n_others = 0};
+    hs_mutex_init(&team->mutex);
+    hs_condition_init(&team->opened);
+    hs_condition_init(&team->left);
+    hs_signals saved;
+    hs_signals_block(&saved);
+    while (team->n_others < n_others &&
+           hs_thread_start(&team->others[team->n_others], work, team)) {
+        team->n_others++;
+    }
+    hs_signals_restore(&saved);
+    if (team->n_others == 0) {
+        hs_team_free(team);
+        return NULL;
+    }
+    return team;
+}
+
+int
+hs_team_size(const hs_team *team)
+{
+    return team == NULL ? 1 : team->n_others + 1;
+}
+
+void
+hs_team_run(hs_team *team, int64_t n_tasks, hs_task_fn run, void *context)
+{
+    if (team == NULL || n_tasks <= 1) {
+        for (int64_t task = 0; task < n_tasks; task++) {
+            run(context, task);
+        }
+        return;
+    }
+    const job doing = {run, context, n_tasks};
+    hs_mutex_lock(&team->mutex);
+    team->job = doing;
+    team->job_number++;
+    team->next = 0; /* no thread takes tasks now: the last job is closed and left */
+    team->is_open = true;
+    hs_condition_wake(&team->opened);
+    hs_mutex_unlock(&team->mutex);
+    do_tasks(team, &doing);
+    hs_mutex_lock(&team->mutex);
+    team->is_open = false;
+    while (team->n_working > 0) {
+        hs_condition_wait(&team->left, &team->mutex);
+    }
+    hs_mutex_unlock(&team->mutex);
+}
+
+void
+hs_team_free(hs_team *team)
+{
+    if (team == NULL) {
+        return;
+    }
+    hs_mutex_lock(&team->mutex);
+    team->ends = true;
+    hs_condition_wake(&team->opened);
+    hs_mutex_unlock(&team->mutex);
+    for (int t = 0; t < team->n_others; t++) {
+        hs_thread_join(team->others[t]);
+    }
+    hs_condition_destroy(&team->left);
+    hs_condition_destroy(&team->opened);
+    hs_mutex_destroy(&team->mutex);
+    hs_free(NULL, team);
+}
+
+/* call.c: options, memory, threads and counters of a call are in one struct, to which every step
+ * adds. */
 
 /* An hs_poll_fn: the caller's, counted. */
 static bool
@@ -177,4 +325,80 @@ hs_call_detach(hs_call *call)
     call->options.kernel = NULL;
     call->options.out = NULL;
     call->options.shells = NULL;
+}
+
+/* Each round is one job of the team. */
+
+typedef struct pass {
+    hs_slab_fn run;
+    void      *context;
+    int64_t    n;
+    int64_t    round, n_rounds;
+    int        n_strips; /* 0: slabs */
+    hs_status  status[HS_SLABS];
+} pass;
+
+static void
+do_slab(void *context, int64_t slab)
+{
+    pass         *doing = context;
+    const int64_t first = doing->round * HS_POLL_POINTS + slab * HS_SLAB_POINTS;
+    const int64_t left = doing->n - first;
+    const int64_t n = left < HS_SLAB_POINTS ? left : HS_SLAB_POINTS;
+    doing->status[slab] = doing->run(doing->context, (int)slab, first, first + n);
+}
+
+/* Part `round` of n_rounds nearly equal parts of strip `slab`. The products fit: n * n / 2^17 is
+ * below 2^63 up to 2^40 pairs, whose i and j take 9 TB. */
+static void
+do_strip(void *context, int64_t slab)
+{
+    pass         *doing = context;
+    const int64_t begin = doing->n * slab / doing->n_strips;
+    const int64_t length = doing->n * (slab + 1) / doing->n_strips - begin;
+    const int64_t first = begin + length * doing->round / doing->n_rounds;
+    const int64_t last = begin + length * (doing->round + 1) / doing->n_rounds;
+    doing->status[slab] = doing->run(doing->context, (int)slab, first, last);
+}
+
+static hs_status
+walk(hs_team *team, const hs_options *options, pass *doing)
+{
+    doing->n_rounds = (doing->n + HS_POLL_POINTS - 1) / HS_POLL_POINTS;
+    for (doing->round = 0; doing->round < doing->n_rounds; doing->round++) {
+        const int64_t left = doing->n - doing->round * HS_POLL_POINTS;
+        const int64_t now = left < HS_POLL_POINTS ? left : HS_POLL_POINTS;
+        const int64_t n_tasks = doing->n_strips > 0 ? doing->n_strips
+                                                    : (now + HS_SLAB_POINTS - 1) / HS_SLAB_POINTS;
+        hs_team_run(team, n_tasks, doing->n_strips > 0 ? do_strip : do_slab, doing);
+        for (int64_t task = 0; task < n_tasks; task++) {
+            if (doing->status[task] != HS_OK) {
+                return doing->status[task];
+            }
+        }
+        const hs_status status = now == HS_POLL_POINTS ? hs_poll(options, 0.0) : HS_OK;
+        if (status != HS_OK) {
+            return status;
+        }
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_walk_slabs(hs_team *team, const hs_options *options, int64_t n, hs_slab_fn run, void *context)
+{
+    if (n > 0 && n <= HS_SLAB_POINTS) {
+        return run(context, 0, 0, n);
+    }
+    pass doing = {.run = run, .context = context, .n = n};
+    return walk(team, options, &doing);
+}
+
+hs_status
+hs_walk_strips(hs_team *team, const hs_options *options, int64_t n, int n_strips, hs_slab_fn run,
+               void *context)
+{
+    HS_ASSERT(n_strips >= 1 && n_strips <= HS_SLABS);
+    pass doing = {.run = run, .context = context, .n = n, .n_strips = n_strips};
+    return walk(team, options, &doing);
 }

@@ -1,17 +1,46 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_THREADS_CALL_H
+#define HS_THREADS_CALL_H
+
+#include "../base/base.h"
+#include "../base/os.h"
+#include "../memory/memory.h"
+#include "../../kernels/kernel.h"
+
+/*
+ * Threads for one call. A team is made when a call begins that may use several threads, and
+ * ends before the call returns: no thread is left behind, none is shared between calls. NULL is the
+ * team of the caller alone, who then does every task itself.
+ */
+
+typedef struct hs_team hs_team;
+
+/* One of the tasks 0 ... n_tasks - 1. Several run at once, so each writes to places of its own. */
+typedef void (*hs_task_fn)(void *context, int64_t task);
+
+/*
+ * A team of the caller and up to n_threads - 1 others, to be ended by hs_team_free. With fewer
+ * threads than that where the system refuses them; NULL where there are none, or n_threads is 1 or
+ * less. The others block all signals, and compute in the floating-point environment of os.h.
+ */
+hs_team *hs_team_create(int n_threads);
+
+/* Threads that work for the team, the caller among them: at least 1, also of NULL. */
+int hs_team_size(const hs_team *team);
+
+/* Runs every task and returns when all are done. Tasks are handed out in ascending order;
+ * which thread gets which is left to chance. Called by the thread that made the team, never
+ * from a task. */
+void hs_team_run(hs_team *team, int64_t n_tasks, hs_task_fn run, void *context);
+
+/* Ends the threads and waits for them. NULL-safe. */
+void hs_team_free(hs_team *team);
+
 /*
  * call.h: one call of the library, from its first line to its last: what the caller wants, the
  * memory and the threads that it may use, and what it has done so far. Every function that works
  * for a call gets a pointer to it; only the result outlives it.
  */
-#ifndef HS_CALL_H
-#define HS_CALL_H
-
-#include "../base/fpenv.h"
-#include "../memory/account.h"
-#include "team.h"
-
-#include "../../kernels/kernel.h"
 
 /* The way into a public function and out of it. */
 typedef struct hs_entry {
@@ -88,5 +117,26 @@ void hs_call_restart(hs_call *call);
 /* Gives up what points to the caller's memory, for a call that is kept inside an object; only the
  * context of find_limit stays. */
 void hs_call_detach(hs_call *call);
+
+/* A pass over all points, cut into ranges that a team works on at once. Between its
+ * rounds the caller is polled: once in HS_POLL_POINTS points, however many threads there are. */
+
+/* Slabs of a round. Results of a slab can be kept in an array of that many. */
+#define HS_SLABS       32
+#define HS_SLAB_POINTS (HS_POLL_POINTS / HS_SLABS)
+
+/* Work on points [first, last). `slab` numbers the ranges of one round in ascending order; no two
+ * calls with the same number run at once. */
+typedef hs_status (*hs_slab_fn)(void *context, int slab, int64_t first, int64_t last);
+
+/* Points 0 ... n - 1 in ascending rounds. Ends after a round in which a slab fails, with the status
+ * of the lowest that does; HS_ERR_INTERRUPTED when the caller says so. */
+hs_status hs_walk_slabs(hs_team *team, const hs_options *options, int64_t n, hs_slab_fn run,
+                        void *context);
+
+/* Points 0 ... n - 1 in n_strips long ranges, at most HS_SLABS, each in ascending order of its
+ * points: `slab` is the strip. Ends as hs_walk_slabs does. */
+hs_status hs_walk_strips(hs_team *team, const hs_options *options, int64_t n, int n_strips,
+                         hs_slab_fn run, void *context);
 
 #endif

@@ -1,11 +1,38 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* pair_list.h: a list of pairs that is used for many steps: what it holds. */
-#ifndef HS_PAIR_LIST_H
-#define HS_PAIR_LIST_H
+#ifndef HS_VERLET_PAIR_LIST_H
+#define HS_VERLET_PAIR_LIST_H
 
-#include "../scene/snapshot.h"
+#include "../base/base.h"
+#include "../scene/scene.h"
 #include "../../kernels/sift.h"
-#include "shift_table.h"
+#include "../collect/columns.h"
+#include "../search/search.h"
+#include "../box/lattice.h"
+#include "../box/wrap.h"
+
+#include <math.h>
+
+/* The distinct shifts among many, numbered in the order in which they first come. */
+
+typedef struct hs_images {
+    int      width; /* numbers of a shift */
+    int32_t *of;    /* owned; n shifts of `width` numbers */
+    int64_t  n;
+    int64_t  capacity; /* shifts */
+    int32_t *slots;    /* owned; -1, or the number of a shift; twice the capacity, a power of two */
+    int32_t  last;     /* number of the last shift: most often the next has it, too */
+} hs_images;
+
+/* An empty table. */
+void hs_images_init(int width, hs_images *images);
+
+/* The number of this shift, a new one if it was not there. -1: out of memory. */
+int32_t hs_images_number(hs_images *images, const int32_t *shift);
+
+/* Harmless twice. */
+void hs_images_free(hs_images *images);
+
+/* pair_list.h: a list of pairs that is used for many steps: what it holds. */
 
 /*
  * The pairs within `radius` of one step, in bundles: those of one point a with all that are in the
@@ -50,5 +77,118 @@ hs_status hs_listing_build(const hs_frame *frame, const hs_options *options, dou
                            hs_listing *listing, hs_failure *failure);
 
 void hs_listing_free(hs_listing *listing);
+
+/*
+ * The pairs of a search in pieces, one for each range of its points, by several
+ * threads. Which pieces there are depends on the number of threads, what follows from one to the
+ * next does not. Points are told by their places in cell order. Few pairs have a shift, those that
+ * are in different images once the points are wrapped, and each piece keeps them apart.
+ */
+
+/* Some pairs of a piece, as in a hs_listing. */
+typedef struct hs_part {
+    hs_output  pairs;   /* b of each, in its column j; counted by no account */
+    hs_bundle *bundles; /* owned; ends are places in this part */
+    int32_t   *shift;   /* owned; m for each bundle, over the box vectors that repeat, as given */
+    int64_t    n_bundles, capacity;
+} hs_part;
+
+typedef struct hs_piece {
+    hs_part plain, shifted;
+} hs_piece;
+
+typedef struct hs_pieces {
+    int64_t   n;
+    hs_piece *of; /* owned */
+} hs_pieces;
+
+/* All pairs. search->bins.order must be 0, 1, 2, ... On failure nothing is held; HS_ERR_SHIFT_RANGE
+ * sets failure->row, a place. */
+hs_status hs_pieces_find(hs_search *search, hs_pieces *pieces, hs_failure *failure);
+
+void hs_pieces_free(hs_account *account, hs_pieces *pieces);
+
+/*
+ * How far points have moved, a tile at a time: u_i = r_i - r0_i F - k_i h - c, what
+ * is left when the deformation of the box, whole box vectors and what all points share are taken
+ * away.
+ */
+
+#define HS_TILE 64 /* points whose displacements are held at a time; whole chains of a maximum */
+
+/* What is compared; all borrowed. */
+typedef struct hs_motion {
+    const hs_frame *built;  /* the step that the list was built for */
+    const hs_frame *now;    /* hs_frames_match */
+    double          radius; /* the list has every pair up to here */
+    double          cutoff;
+} hs_motion;
+
+typedef struct hs_tracking {
+    const hs_motion *motion;
+    bool             deformed;
+    hs_strain        strain;
+    hs_lattice       lattice; /* of the box now */
+    int              m;
+    double           jump; /* longer displacements are looked at; infinity: none */
+    bool             has_base;
+    double           base[HS_MAX_DIM];
+    bool             has_drift;
+    double           drift[HS_MAX_DIM];
+    hs_store        *jumps;
+    int64_t         *jump_of;   /* in it, m a point; NULL: there is none yet */
+    double           square;    /* largest |u|^2 ... */
+    double           component; /* ... and |u_k| */
+    double           magnitude; /* of the terms of wrapping */
+} hs_tracking;
+
+/* u of the points of one tile, one array for each axis, without drift. */
+typedef struct hs_tile {
+    int64_t first, step; /* points first, first + step, ... */
+    int     n;
+    double  u[HS_MAX_DIM][HS_TILE];
+} hs_tile;
+
+/* Displacements of up to HS_TILE points from `first` on; their longest to *square and *component.
+ * Returns whether some point may have jumped. */
+bool hs_look_at_tile(const hs_tracking *track, int64_t first, int64_t step, hs_tile *t,
+                     double *square, double *component);
+
+/* Whether a displacement is so long that it may be a jump. */
+HS_ALWAYS_INLINE bool
+hs_may_be_jump(const hs_tracking *track, const hs_tile *t, int p)
+{
+    double longest = 0.0;
+    for (int k = 0; k < track->lattice.ndim; k++) {
+        longest = hs_larger(fabs(t->u[k][p]), longest);
+    }
+    return !(longest < track->jump);
+}
+
+/* Takes whole box vectors from u of point p. Returns whether that is known to have worked; sets
+ * `given`, over the box vectors as given. */
+bool hs_take_jump(hs_tracking *track, hs_tile *t, int p, int64_t *given);
+
+/* Takes and keeps the jumps of the points of a tile. HS_UNSERVED: some point went too far to
+ * tell. */
+hs_status hs_take_jumps(hs_tracking *track, hs_tile *t);
+
+/* The longest of the tile, less drift, to *square and *component, which are not lowered. */
+void hs_measure_tile(hs_tile *t, int d, const double *drift, double *square, double *component);
+
+/*
+ * How far points have moved since a list was built, and what that leaves of its skin.
+ * docs/verlet.md derives the inequality.
+ */
+
+/*
+ * *margin: by how much pairs may still come closer, in the unit of points, rounded down. At least
+ * 0: every pair within the cutoff now is in the list. Below 0: it may not be; -infinity where
+ * nothing is known. *jumped: some point has jumped by whole box vectors, and `jumps` says by how
+ * many of each that repeats, int64 (n, m); else `jumps` has no meaning. HS_ERR_MEMORY,
+ * HS_ERR_INTERRUPTED.
+ */
+hs_status hs_motion_margin(const hs_motion *motion, const hs_options *options, double *margin,
+                           bool *jumped, hs_store *jumps);
 
 #endif

@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_VERLET_RECHECK_H
+#define HS_VERLET_RECHECK_H
+
+#include "../collect/columns.h"
+#include "../scene/scene.h"
+#include "../threads/call.h"
+#include "pair_list.h"
+
 /*
  * recheck.h: the pairs of a list that are within the cutoff now, decided as a search decides them:
  * in float32 (kernels/sift.h), and by the exact metric where float32 cannot tell. A slab of the
  * list at a time; threads work on one each, and what they find is written in the order of the list.
  */
-#ifndef HS_RECHECK_H
-#define HS_RECHECK_H
-
-#include "../collect/columns.h"
-#include "../collect/result.h"
-#include "../scene/scene.h"
-#include "../threads/call.h"
-#include "pair_list.h"
 
 /* The points a of the bundles of a slab, as kernels/write.h wants them. */
 typedef struct hs_bundle_points {
@@ -47,7 +47,7 @@ typedef struct hs_recheck {
     int64_t          *image;   /* owned; m for each image: its shift is image + lag_j - lag_i */
     int64_t          *lag;     /* owned; m a point */
     uint8_t          *lagging; /* owned; whether those are not all zero */
-    bool              writes;  /* recheck_write.c measures. Then: */
+    bool              writes;  /* recheck.c measures. Then: */
     int32_t          *few;     /* owned; records of lags; NULL: all are zero */
     hs_bundle_points *of_a;    /* each thread has its own */
 } hs_recheck;
@@ -67,25 +67,25 @@ typedef struct hs_sifted {
      * each bundle; and where the hits of each bundle end. */
     int32_t      hits[HS_SIFT + HS_PADDING], point[HS_SIFT], hits_end[HS_SIFT];
     hs_open_pair open[HS_SIFT + 1];
-    int32_t      number[HS_SIFT + HS_PADDING];                     /* recheck_put.c: of b */
+    int32_t      number[HS_SIFT + HS_PADDING];                     /* recheck.c: of b */
     int32_t      i[HS_SIFT + HS_PADDING], j[HS_SIFT + HS_PADDING]; /* ... and what is copied */
 } hs_sifted;
 
 /* Writes all pairs within the cutoff to the output. */
 hs_status hs_recheck_run(hs_recheck *recheck, hs_failure *failure);
 
-/* The points as floats, their counts and thresholds. In recheck_points.c. */
+/* The points as floats, their counts and thresholds. */
 hs_status hs_recheck_prepare(hs_recheck *recheck);
 
 /* Decides the hits of a slab that float32 cannot tell, of which there are some, and takes those
- * that are beyond the cutoff from the hits. In recheck_settle.c. */
+ * that are beyond the cutoff from the hits. */
 void hs_recheck_settle(const hs_recheck *recheck, hs_sifted *slab);
 
-/* Writes the hits. In recheck_put.c. */
+/* Writes the hits. */
 void hs_recheck_put(const hs_recheck *recheck, hs_sifted *slab);
 
 /* Makes the scene ready that d and D are measured in, so that they have the bits that a search
- * finds, and writes them. In recheck_measure.c. */
+ * finds, and writes them. */
 hs_status hs_recheck_open_scene(hs_recheck *recheck, hs_failure *failure);
 void      hs_recheck_measure(const hs_recheck *recheck, const hs_sifted *slab);
 
@@ -93,7 +93,7 @@ void      hs_recheck_measure(const hs_recheck *recheck, const hs_sifted *slab);
 hs_status hs_recheck_plan_write(hs_recheck *recheck);
 
 /* Writes i, j, d and D; false: it cannot, and what it has written does not count. In
- * recheck_write.c. */
+ * recheck.c. */
 bool hs_recheck_write(const hs_recheck *recheck, hs_sifted *slab);
 
 /* Room in the column of this HS_WANT_ bit for pair `at` of the output; NULL where not kept. */
@@ -138,7 +138,7 @@ hs_recheck_shift(const hs_recheck *recheck, int64_t a, int64_t b, const int32_t 
 }
 
 /* The pairs of the last step, into a result whose call has begun. Its options are checked and have
- * the cutoff of the list. Any status of hs_verlet_find. In recheck_find.c. */
+ * the cutoff of the list. Any status of hs_verlet_find. */
 hs_status hs_recheck_find(const hs_verlet *list, hs_pairs *pairs, hs_failure *failure);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_api_memory.c: memory that is refused, allocation by allocation, in every call of the table. */
-#include "../../../csrc/core/memory/account.h"
+#include "../../../csrc/core/memory/memory.h"
 #include "../support/among.h"
 #include "../support/call_table.h"
 #include "../support/random_scenes.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_api_nearest.c: the nearest points are those of big integers, in rows and in cells. */
-#include "../../../csrc/core/memory/account.h"
+#include "../../../csrc/core/memory/memory.h"
 #include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/nearest_checks.h"

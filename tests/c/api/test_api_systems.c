@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_api_systems.c: many systems in one call have the pairs that each has alone. */
-#include "../../../csrc/core/api/system_part.h"
-#include "../../../csrc/core/memory/account.h"
+#include "../../../csrc/core/api/systems.h"
+#include "../../../csrc/core/memory/memory.h"
 #include "../../../csrc/halfshell.h"
 #include "../support/among.h"
 #include "../support/harness.h"

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_api_verlet.c: Verlet lists step by step, boxes that are measured, and points that are
  * wrapped. */
-#include "../../../csrc/core/base/poll.h"
+#include "../../../csrc/core/base/os.h"
 #include "../../../csrc/core/exact/metric.h"
-#include "../../../csrc/core/memory/account.h"
+#include "../../../csrc/core/memory/memory.h"
 #include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/list_checks.h"

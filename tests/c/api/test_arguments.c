@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_arguments.c: arguments that are wrong are refused, in every call of the table, and nothing
  * is changed. */
-#include "../../../csrc/core/base/want.h"
+#include "../../../csrc/core/base/status.h"
 #include "../../../csrc/core/search/search.h"
 #include "../support/among.h"
 #include "../support/call_table.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_os.c: the environment of floats is the core's in a call and the caller's after it. */
-#include "../../../csrc/core/base/fpenv.h"
+#include "../../../csrc/core/base/os.h"
 #include "../../../csrc/core/exact/metric.h"
 #include "../support/among.h"
 #include "../support/harness.h"

@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_sort_numbers.c: numbers, keys and rows come out in order, those that are equal in the order
  * of before. */
-#include "../../../csrc/core/base/radix_sort.h"
-#include "../../../csrc/core/base/sort_numbers.h"
-#include "../../../csrc/core/base/starts.h"
+#include "../../../csrc/core/base/sort.h"
 #include "../support/harness.h"
 
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_status.c: every status and every quantity has a name and a meaning. */
-#include "../../../csrc/core/base/want.h"
+#include "../../../csrc/core/base/status.h"
 #include "../../../csrc/halfshell.h"
 #include "../support/harness.h"
 

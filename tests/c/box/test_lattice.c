@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_lattice.c: boxes are reduced, checked and measured, however skewed they are. */
-#include "../../../csrc/core/box/box_check.h"
-#include "../../../csrc/core/box/lattice_reduce.h"
-#include "../../../csrc/core/box/strain.h"
+#include "../../../csrc/core/box/lattice.h"
 #include "../support/among.h"
 #include "../support/bigint.h"
 #include "../support/harness.h"

@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_bins.c: every point is once in its own cell, in dense grids and in sparse ones. */
-#include "../../../csrc/core/base/poll.h"
+#include "../../../csrc/core/base/os.h"
 #include "../../../csrc/core/cells/bins.h"
-#include "../../../csrc/core/cells/sparse_grid.h"
-#include "../../../csrc/core/memory/account.h"
-#include "../../../csrc/core/threads/passes.h"
+#include "../../../csrc/core/memory/memory.h"
+#include "../../../csrc/core/threads/call.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"

@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_grid.c: cells are as wide as the search needs, and their stencils miss no neighbour. */
-#include "../../../csrc/core/base/outcome.h"
+#include "../../../csrc/core/base/status.h"
 #include "../../../csrc/core/box/lattice.h"
 #include "../../../csrc/core/cells/grid.h"
-#include "../../../csrc/core/cells/stencil.h"
-#include "../../../csrc/core/memory/account.h"
+#include "../../../csrc/core/memory/memory.h"
 #include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"

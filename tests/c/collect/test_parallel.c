@@ -2,8 +2,8 @@
 /* test_parallel.c: the same answer by any number of threads, to the last bit and in the same
  * order; whatever goes wrong, a call comes to an end and leaves nothing. */
 #include "../../../csrc/core/collect/parallel.h"
-#include "../../../csrc/core/memory/account.h"
-#include "../../../csrc/core/threads/team.h"
+#include "../../../csrc/core/memory/memory.h"
+#include "../../../csrc/core/threads/call.h"
 #include "../support/among.h"
 #include "../support/output_checks.h"
 #include "../support/search_unit.h"

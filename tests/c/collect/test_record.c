@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_record.c: pairs are recorded in blocks, and measured as they are written. */
-#include "../../../csrc/core/base/poll.h"
-#include "../../../csrc/core/collect/measures.h"
+#include "../../../csrc/core/base/os.h"
 #include "../../../csrc/core/collect/record.h"
 #include "../support/among.h"
 #include "../support/harness.h"

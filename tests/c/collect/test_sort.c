@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_sort.c: pairs and rows in order. */
-#include "../../../csrc/core/collect/sort_deal.h"
 #include "../../../csrc/core/collect/sort_pairs.h"
 #include "../support/search_unit.h"
 

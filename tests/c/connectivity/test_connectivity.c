@@ -2,8 +2,6 @@
 /* test_connectivity.c: lists of nodes and the pairs between them: half lists, rows, and what is
  * kept of them. */
 #include "../../../csrc/core/connectivity/connectivity.h"
-#include "../../../csrc/core/connectivity/half_list.h"
-#include "../../../csrc/core/connectivity/row_split.h"
 #include "../support/node_scenes.h"
 #include "../support/poll_checks.h"
 

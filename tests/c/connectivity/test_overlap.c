@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_overlap.c: overlaps and intersections of neighbourhoods. */
-#include "../../../csrc/core/connectivity/morton.h"
-#include "../../../csrc/core/connectivity/point_rows.h"
+#include "../../../csrc/core/connectivity/overlap.h"
 #include "../support/harness.h"
 #include "../support/node_scenes.h"
 #include "../support/poll_checks.h"

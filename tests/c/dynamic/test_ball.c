@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_ball.c: points within a ball of a dynamic list. */
-#include "../../../csrc/core/base/fpenv.h"
+#include "../../../csrc/core/base/os.h"
 #include "../../../csrc/core/dynamic/ball.h"
-#include "../../../csrc/core/dynamic/new_list.h"
-#include "../../../csrc/core/dynamic/update.h"
+#include "../../../csrc/core/dynamic/dynamic.h"
 #include "../support/dynamic_brute.h"
 #include "../support/harness.h"
 

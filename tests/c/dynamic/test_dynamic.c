@@ -1,14 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_dynamic.c: dynamic lists: room of cells, places of points, filling, rows and changes. */
-#include "../../../csrc/core/base/fpenv.h"
-#include "../../../csrc/core/base/outcome.h"
-#include "../../../csrc/core/dynamic/cell_room.h"
-#include "../../../csrc/core/dynamic/fill.h"
-#include "../../../csrc/core/dynamic/new_list.h"
-#include "../../../csrc/core/dynamic/place_point.h"
-#include "../../../csrc/core/dynamic/rows.h"
-#include "../../../csrc/core/dynamic/update.h"
-#include "../../../csrc/core/memory/account.h"
+#include "../../../csrc/core/base/os.h"
+#include "../../../csrc/core/base/status.h"
+#include "../../../csrc/core/dynamic/dynamic.h"
+#include "../../../csrc/core/memory/memory.h"
 #include "../../../csrc/halfshell_dynamic.h"
 #include "../support/dynamic_brute.h"
 #include "../support/harness.h"

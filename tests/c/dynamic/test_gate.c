@@ -6,7 +6,6 @@
 #endif
 #include "../../../csrc/core/base/os_thread.h"
 #include "../../../csrc/core/dynamic/dynamic.h"
-#include "../../../csrc/core/dynamic/gate.h"
 #include "../support/harness.h"
 
 #if !defined(_WIN32)

@@ -1,12 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_storage.c: entries, keys and cells of a dynamic list. */
-#include "../../../csrc/core/base/fpenv.h"
-#include "../../../csrc/core/dynamic/cell_axes.h"
-#include "../../../csrc/core/dynamic/cell_table.h"
-#include "../../../csrc/core/dynamic/entries.h"
-#include "../../../csrc/core/dynamic/key_map.h"
-#include "../../../csrc/core/dynamic/repeated_key.h"
-#include "../../../csrc/core/memory/account.h"
+#include "../../../csrc/core/base/os.h"
+#include "../../../csrc/core/dynamic/storage.h"
+#include "../../../csrc/core/memory/memory.h"
 #include "../support/harness.h"
 
 #include <math.h>

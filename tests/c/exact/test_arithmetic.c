@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_arithmetic.c: sums of two doubles and dyadic numbers err by no more than they say. */
-#include "../../../csrc/core/exact/doubleword.h"
-#include "../../../csrc/core/exact/dyadic.h"
-#include "../../../csrc/core/exact/metric_float.h"
+#include "../../../csrc/core/exact/arithmetic.h"
+#include "../../../csrc/core/exact/metric.h"
 #include "../support/bigint.h"
 #include "../support/harness.h"
 

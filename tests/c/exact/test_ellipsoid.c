@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_ellipsoid.c: supports of points: ellipsoids that contain one another or not, decided
  * exactly. */
-#include "../../../csrc/core/exact/metric_support.h"
-#include "../../../csrc/core/exact/support.h"
-#include "../../../csrc/core/exact/support_along.h"
+#include "../../../csrc/core/exact/ellipsoid.h"
 #include "../support/bigint.h"
 #include "../support/harness.h"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_filter.c: what thresholds leave unsure is little, and what they call sure is so. */
-#include "../../../csrc/core/exact/doubleword.h"
+#include "../../../csrc/core/exact/arithmetic.h"
 #include "../../../csrc/core/exact/filter.h"
 #include "../../../csrc/kernels/kernel.h"
 #include "../support/harness.h"

@@ -2,9 +2,6 @@
 /* test_metric.c: distances in any box: what the filter says of them, what integers decide, and
  * what is measured. */
 #include "../../../csrc/core/exact/metric.h"
-#include "../../../csrc/core/exact/metric_foot.h"
-#include "../../../csrc/core/exact/metric_integer.h"
-#include "../../../csrc/core/exact/metric_sum.h"
 #include "../support/bigint.h"
 #include "../support/harness.h"
 #include "../support/random_scenes.h"

@@ -4,7 +4,7 @@
  * answer must be that of plain arrays and brute force, also after memory was refused. Coordinates are
  * steps of a grid, so that distances tie with radii, or a hair from there. Aborts on any difference.
  */
-#include "../../../csrc/core/memory/account.h"
+#include "../../../csrc/core/memory/memory.h"
 #include "../support/dynamic_brute.h"
 
 #include <math.h>

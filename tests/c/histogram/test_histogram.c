@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_histogram.c: pairs are counted in the right bin, with their weights. */
 #include "../../../csrc/core/exact/filter.h"
-#include "../../../csrc/core/histogram/edges.h"
-#include "../../../csrc/core/histogram/weights.h"
-#include "../../../csrc/core/memory/account.h"
+#include "../../../csrc/core/histogram/histogram.h"
+#include "../../../csrc/core/memory/memory.h"
 #include "../support/among.h"
 #include "../support/bigint.h"
 #include "../support/harness.h"

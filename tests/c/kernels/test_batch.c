@@ -3,7 +3,7 @@
 #include <float.h>
 #include <math.h>
 
-#include "../../../csrc/core/exact/metric_float.h"
+#include "../../../csrc/core/exact/metric.h"
 #include "../../../csrc/kernels/kernel.h"
 #include "../support/harness.h"
 

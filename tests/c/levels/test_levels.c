@@ -1,13 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_levels.c: points with radii of many sizes are divided into levels, whose searches find each
  * pair once. */
-#include "../../../csrc/core/base/outcome.h"
-#include "../../../csrc/core/base/poll.h"
-#include "../../../csrc/core/levels/level_join.h"
-#include "../../../csrc/core/levels/level_plan.h"
-#include "../../../csrc/core/levels/level_search.h"
+#include "../../../csrc/core/base/status.h"
+#include "../../../csrc/core/base/os.h"
 #include "../../../csrc/core/levels/levels.h"
-#include "../../../csrc/core/levels/support_set.h"
 #include "../../../csrc/core/search/limits.h"
 #include "../support/poll_checks.h"
 #include "../support/reach_sets.h"

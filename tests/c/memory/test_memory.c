@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_memory.c: what a call takes is charged, limited and given back. */
-#include "../../../csrc/core/memory/account.h"
-#include "../../../csrc/core/memory/chunk.h"
+#include "../../../csrc/core/memory/memory.h"
 #include "../../../csrc/core/memory/pool.h"
 #include "../support/address_space.h"
 #include "../support/harness.h"

@@ -6,11 +6,9 @@
 #endif
 #include "../../../csrc/core/base/os_thread.h"
 #include "../../../csrc/core/collect/columns.h"
-#include "../../../csrc/core/memory/account.h"
-#include "../../../csrc/core/memory/chunk.h"
-#include "../../../csrc/core/memory/pages.h"
+#include "../../../csrc/core/memory/memory.h"
 #include "../../../csrc/core/memory/pool.h"
-#include "../../../csrc/core/memory/region.h"
+#include "../../../csrc/core/memory/results.h"
 #include "../support/address_space.h"
 #include "../support/harness.h"
 

@@ -6,9 +6,9 @@
 #endif
 #include "../../../csrc/core/base/os_thread.h"
 #include "../../../csrc/core/collect/columns.h"
-#include "../../../csrc/core/memory/account.h"
-#include "../../../csrc/core/nearest/nearest_kept.h"
-#include "../../../csrc/core/nearest/nearest_write.h"
+#include "../../../csrc/core/memory/memory.h"
+#include "../../../csrc/core/nearest/nearest.h"
+#include "../../../csrc/core/nearest/rank.h"
 #include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/nearest_checks.h"

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_rank.c: the order of nearest points is exact, and so is what is written of it. */
-#include "../../../csrc/core/nearest/nearest_keys.h"
-#include "../../../csrc/core/nearest/nearest_rank.h"
+#include "../../../csrc/core/nearest/rank.h"
 #include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/nearest_checks.h"

@@ -1,14 +1,11 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_scene.c: points and boxes become a scene: scaled, wrapped, bounded, or refused with the
  * point that is to blame. */
-#include "../../../csrc/core/base/outcome.h"
-#include "../../../csrc/core/base/poll.h"
-#include "../../../csrc/core/memory/account.h"
-#include "../../../csrc/core/scene/close_gaps.h"
+#include "../../../csrc/core/base/status.h"
+#include "../../../csrc/core/base/os.h"
+#include "../../../csrc/core/memory/memory.h"
 #include "../../../csrc/core/scene/scene.h"
-#include "../../../csrc/core/scene/snapshot.h"
-#include "../../../csrc/core/scene/unit.h"
-#include "../../../csrc/core/threads/passes.h"
+#include "../../../csrc/core/threads/call.h"
 #include "../../../csrc/halfshell.h"
 #include "../support/among.h"
 #include "../support/harness.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_limits.c: limits of each pair by radii, types or supports. */
-#include "../../../csrc/core/levels/level_search.h"
-#include "../../../csrc/core/search/supports.h"
+#include "../../../csrc/core/levels/levels.h"
+#include "../../../csrc/core/search/limits.h"
 #include "../../../csrc/core/search/walk.h"
 #include "../support/harness.h"
 

@@ -2,9 +2,8 @@
 /* test_scan.c: neighbourhoods of a group, what is scanned of them, and what is decided of the
  * hits. */
 #include "../../../csrc/core/collect/parallel.h"
-#include "../../../csrc/core/search/form.h"
-#include "../../../csrc/core/search/neighbourhood.h"
-#include "../../../csrc/core/verlet/pair_list_search.h"
+#include "../../../csrc/core/search/scan.h"
+#include "../../../csrc/core/verlet/pair_list.h"
 #include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/poll_checks.h"

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_search.c: searches are opened, built, kept for more of the same kind, and estimated. */
-#include "../../../csrc/core/search/estimate.h"
-#include "../../../csrc/core/search/search_open.h"
-#include "../../../csrc/core/search/shells.h"
+#include "../../../csrc/core/search/search.h"
 #include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"

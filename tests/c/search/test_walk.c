@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_walk.c: rows and groups of cells are walked, each pair of points once. */
-#include "../../../csrc/core/memory/account.h"
-#include "../../../csrc/core/search/cell_rows.h"
+#include "../../../csrc/core/memory/memory.h"
+#include "../../../csrc/core/search/walk.h"
 #include "../../../csrc/halfshell.h"
 #include "../support/harness.h"
 #include "../support/search_unit.h"

@@ -4,7 +4,7 @@
 #ifndef HS_DYNAMIC_BRUTE_H
 #define HS_DYNAMIC_BRUTE_H
 
-#include "../../../csrc/core/base/fpenv.h"
+#include "../../../csrc/core/base/os.h"
 #include "../../../csrc/core/exact/metric.h"
 #include "../../../csrc/halfshell_dynamic.h"
 #include "harness.h"

@@ -4,8 +4,8 @@
 #ifndef HS_NEAREST_UNIT_H
 #define HS_NEAREST_UNIT_H
 
-#include "../../../csrc/core/base/outcome.h"
-#include "../../../csrc/core/nearest/nearest_block.h"
+#include "../../../csrc/core/base/status.h"
+#include "../../../csrc/core/nearest/candidates.h"
 #include "../../../csrc/core/nearest/nearest.h"
 #include "harness.h"
 

@@ -4,7 +4,7 @@
 #ifndef HS_NODE_SCENES_H
 #define HS_NODE_SCENES_H
 
-#include "../../../csrc/core/connectivity/node_map.h"
+#include "../../../csrc/core/connectivity/connectivity.h"
 #include "../../../csrc/core/threads/call.h"
 #include "harness.h"
 

@@ -4,7 +4,7 @@
 #ifndef HS_POLL_CHECKS_H
 #define HS_POLL_CHECKS_H
 
-#include "../../../csrc/core/memory/account.h"
+#include "../../../csrc/core/memory/memory.h"
 #include "harness.h"
 
 #include <math.h>

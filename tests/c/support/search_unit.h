@@ -4,8 +4,8 @@
 #ifndef HS_SEARCH_UNIT_H
 #define HS_SEARCH_UNIT_H
 
-#include "../../../csrc/core/base/outcome.h"
-#include "../../../csrc/core/search/search_open.h"
+#include "../../../csrc/core/base/status.h"
+#include "../../../csrc/core/search/search.h"
 #include "../../../csrc/core/search/walk.h"
 #include "harness.h"
 

@@ -7,7 +7,6 @@
 #include <signal.h>
 #endif
 #include "../../../csrc/core/threads/call.h"
-#include "../../../csrc/core/threads/passes.h"
 #include "../support/harness.h"
 
 #include <fenv.h>

@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_pair_list.c: lists with a skin: how far points may move, and what is built anew. */
-#include "../../../csrc/core/base/poll.h"
-#include "../../../csrc/core/memory/account.h"
-#include "../../../csrc/core/verlet/motion.h"
+#include "../../../csrc/core/base/os.h"
+#include "../../../csrc/core/memory/memory.h"
 #include "../../../csrc/core/verlet/pair_list.h"
-#include "../../../csrc/core/verlet/shift_table.h"
 #include "../support/harness.h"
 #include "../support/list_checks.h"
 #include "../support/pair_checks.h"

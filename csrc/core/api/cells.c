@@ -1,0 +1,477 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+#include "cells.h"
+#include "pairs.h"
+#include "../scene/points.h"
+#include "../cells/bins.h"
+#include "../base/status.h"
+#include "../base/os.h"
+#include "../search/walk.h"
+
+#include <math.h>
+#include <string.h>
+
+/* The public functions of cells: points that are copied, sorted once and searched many
+ * times. */
+
+/* The points in memory of the cells: the caller cannot change them between searches. */
+static hs_status
+keep_points(const hs_points *points, hs_cells *cells)
+{
+    const int64_t width = points->ndim * (int64_t)sizeof(double);
+    cells->copy = hs_alloc(&cells->call.account, HS_FOR_ORIGINALS, points->n, (size_t)width);
+    if (cells->copy == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    hs_points_copy(points, cells->copy);
+    cells->points = (hs_points){.data = cells->copy,
+                                .n = points->n,
+                                .ndim = points->ndim,
+                                .real = HS_FLOAT64,
+                                .row_stride = (ptrdiff_t)width,
+                                .column_stride = sizeof(double)};
+    return HS_OK;
+}
+
+/* The options that cells are built with: they keep all that a later search may want. */
+static hs_options
+options_of_cells(const hs_options *options)
+{
+    hs_options of_cells = *options;
+    of_cells.want = HS_WANT_SHIFT;
+    of_cells.out = NULL;
+    return of_cells;
+}
+
+static hs_status
+build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
+            hs_failure *failure)
+{
+    const hs_options of_cells = options_of_cells(options);
+    hs_call         *call = &cells->call;
+    failure = hs_call_enter(&of_cells, failure, call);
+    call->account.is_kept = true;
+    hs_search_begin(call, &cells->search);
+    hs_status status =
+        hs_check_arguments(points, NULL, cells->has_box ? &cells->box : NULL, &of_cells, failure);
+    if (status == HS_OK) {
+        status = keep_points(points, cells);
+    }
+    if (status == HS_OK) {
+        /* keeps_none: no pairs are kept by this call */
+        const hs_sets sets = {.points = &cells->points, .is_kept = true, .keeps_none = true};
+        hs_call_gather(call, points->n / HS_POINTS_MADE_READY);
+        status =
+            hs_search_build(&sets, cells->has_box ? &cells->box : NULL, &cells->search, failure);
+    }
+    if (status == HS_OK && cells->trees == NULL) {
+        status = HS_ERR_MEMORY;
+    }
+    hs_call_tell_limit(call, status, failure);
+    hs_call_leave(call, 0);
+    hs_call_detach(call);
+    return status;
+}
+
+hs_status
+hs_cells_build(const hs_points *points, const hs_box *box, const hs_options *options,
+               hs_cells **result, hs_failure *failure)
+{
+    if (result != NULL) {
+        *result = NULL;
+    }
+    if (!hs_can_begin(result, options)) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
+    hs_cells *cells = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *cells);
+    if (cells == NULL) {
+        return hs_end_early(HS_ERR_MEMORY, options, failure);
+    }
+    cells->copy = NULL;
+    cells->trees = hs_nearest_kept_new();
+    cells->has_box = box != NULL;
+    if (box != NULL) {
+        cells->box = *box;
+    }
+    const hs_status status = build_cells(points, options, cells, failure);
+    if (status != HS_OK) {
+        hs_cells_free(cells);
+        return status;
+    }
+    *result = cells;
+    return HS_OK;
+}
+
+void
+hs_cells_free(hs_cells *cells)
+{
+    if (cells == NULL) {
+        return;
+    }
+    hs_search_close(&cells->search);
+    hs_free(&cells->call.account, cells->copy);
+    hs_account_close(&cells->call.account);
+    hs_nearest_kept_free(cells->trees);
+    hs_free(NULL, cells);
+}
+
+void
+hs_cells_points(const hs_cells *cells, hs_points *points)
+{
+    if (points != NULL) {
+        *points = cells != NULL ? cells->points : (hs_points){.data = NULL};
+    }
+}
+
+const hs_box *
+hs_cells_box(const hs_cells *cells)
+{
+    return cells != NULL && cells->has_box ? &cells->box : NULL;
+}
+
+/* The public functions that tell which cells there are, and which of them a point is
+ * in. */
+
+void
+hs_cells_layout(const hs_cells *cells, hs_layout *layout)
+{
+    if (layout == NULL) {
+        return;
+    }
+    if (cells == NULL) {
+        *layout = (hs_layout){.ndim = 0};
+        return;
+    }
+    const hs_search *search = &cells->search;
+    const hs_grid   *grid = &search->grid;
+    *layout = (hs_layout){.ndim = grid->ndim,
+                          .n_points = search->bins.n,
+                          .n_cells = grid->n_cells,
+                          .occupied_only = search->is_sparse,
+                          .start = search->bins.start,
+                          .order = search->bins.order};
+    const hs_fpenv saved = hs_fpenv_enter();
+    for (int k = 0; k < grid->ndim; k++) {
+        layout->shape[k] = grid->shape[k];
+        layout->cell_size[k] = search->scene.in_one_cell
+                                   ? INFINITY
+                                   : hs_scale_apply(search->scene.unscale, grid->cell_size[k]);
+    }
+    hs_fpenv_leave(saved);
+}
+
+/* Index along axis k of a point with coordinate t. */
+static int64_t
+index_along(const hs_search *search, int k, double t)
+{
+    return search->is_sparse ? hs_sparse_index(&search->grid, k, t)
+                             : hs_grid_index(&search->grid, k, t);
+}
+
+/* The occupied cell with these indices, or -1. */
+static int64_t
+find_occupied(const hs_sparse *sparse, const int64_t *index, int64_t *hint)
+{
+    const int64_t    row = hs_sparse_find_row(sparse, index, hint);
+    hs_sparse_cursor cursor = {0, 0};
+    int32_t          first, end;
+    if (row < 0) {
+        return -1;
+    }
+    cursor.low = cursor.high = sparse->row_cell[row];
+    hs_sparse_window(sparse, row, index[0], index[0], &cursor, &first, &end);
+    return end > first ? cursor.low : -1;
+}
+
+static int64_t
+cell_of_point(const hs_search *search, const hs_scene *scene, int64_t i, int64_t *hint)
+{
+    int64_t index[HS_MAX_DIM], cell = 0;
+    for (int k = 0; k < scene->ndim; k++) {
+        index[k] = index_along(search, k, hs_scene_coordinate(scene, i, k));
+        cell += index[k] * search->grid.stride[k];
+    }
+    return search->is_sparse ? find_occupied(&search->sparse, index, hint) : cell;
+}
+
+hs_status
+hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t *cell, hs_failure *failure)
+{
+    const hs_options options = hs_options_default();
+    hs_call          call;
+    hs_scene         scene;
+    if (cells == NULL || points == NULL || !hs_has_entries(cell, points)) {
+        return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
+    }
+    failure = hs_call_enter(&options, failure, &call);
+    hs_status status = hs_check_arguments(&cells->points, points, NULL, &options, failure);
+    if (status == HS_OK) {
+        status = hs_scene_wrapped_like(&call.account, &cells->search.scene, points, &options,
+                                       &scene, failure);
+    }
+    if (status == HS_OK) {
+        int64_t hint = 0;
+        for (int64_t i = 0; i < points->n; i++) {
+            cell[i] = cell_of_point(&cells->search, &scene, i, &hint);
+        }
+        hs_scene_free(&call.account, &scene);
+    }
+    hs_call_leave(&call, 0);
+    hs_account_close(&call.account);
+    return status;
+}
+
+void
+hs_cells_indices(const hs_cells *cells, int64_t *indices)
+{
+    if (cells == NULL || indices == NULL) {
+        return;
+    }
+    const hs_search *search = &cells->search;
+    const hs_sparse *sparse = &search->sparse;
+    const int        d = search->grid.ndim;
+    if (search->is_sparse) {
+        for (int64_t row = 0; row < sparse->n_rows; row++) {
+            for (int64_t c = sparse->row_cell[row]; c < sparse->row_cell[row + 1]; c++) {
+                indices[c * d] = sparse->cell_x[c];
+                memcpy(indices + c * d + 1, sparse->row_index + row * (d - 1),
+                       (size_t)(d - 1) * sizeof *indices);
+            }
+        }
+        return;
+    }
+    for (int64_t c = 0; c < search->grid.n_cells; c++) {
+        for (int k = 0; k < d; k++) {
+            indices[c * d + k] = c / search->grid.stride[k] % search->grid.shape[k];
+        }
+    }
+}
+
+/* Which points the cells around a query hold, without a distance test. */
+
+/* Ranges of points in cell order, of one query after the other. */
+typedef struct range_list {
+    const hs_search *search;
+    hs_link         *links;
+    int64_t         *hints;
+    const int64_t   *offsets; /* where the ranges of each query begin; NULL: they are counted */
+    int64_t         *counts;
+    int64_t         *first, *end;
+    int64_t          si, unpolled; /* the query, in cell order; work since the last poll */
+} range_list;
+
+static void
+add_range(range_list *list, int64_t query, int32_t first, int32_t end)
+{
+    if (first < end) {
+        const int64_t at = list->counts[query]++;
+        if (list->offsets != NULL) {
+            list->first[list->offsets[query] + at] = first;
+            list->end[list->offsets[query] + at] = end;
+        }
+    }
+}
+
+/* Polls after so much more work: rows of cells, of which there may be thousands for one query, and
+ * images of them, of which there may be millions. */
+static hs_status
+poll_sometimes(range_list *list, int64_t work)
+{
+    const hs_search *search = list->search;
+    list->unpolled += work;
+    if (list->unpolled < HS_POLL_POINTS) {
+        return HS_OK;
+    }
+    list->unpolled = 0;
+    return hs_poll(&search->call->options, (double)list->si / (double)hs_search_asking(search)->n);
+}
+
+/* Cells low to high of the link's row; along a periodic first axis they may run over images: as
+ * many as the reach has, below 2^32. */
+static hs_status
+add_window(range_list *list, int64_t query, hs_link *link, int64_t low, int64_t high)
+{
+    const hs_search *search = list->search;
+    const int64_t    n_x = search->grid.shape[0];
+    const bool       repeats = search->scene.lattice.row_of_axis[0] >= 0;
+    int64_t          turn = repeats ? hs_floor_divide(low, n_x) : 0;
+    hs_status        status;
+    do {
+        int32_t first, end;
+        hs_link_window(search, link, low - turn * n_x, high - turn * n_x, &first, &end);
+        add_range(list, query, first, end);
+        status = poll_sometimes(list, 1);
+        turn++;
+    } while (status == HS_OK && repeats && turn * n_x <= high);
+    return status;
+}
+
+/* Whether a query lies further beyond an open face than any point can be within the cutoff. */
+static bool
+is_far_outside(const hs_search *search, int64_t si)
+{
+    const hs_scene *scene = &search->scene;
+    double          x[HS_MAX_DIM];
+    for (int c = 0; c < scene->ndim; c++) {
+        x[c] = hs_search_asking(search)->x[c][si];
+    }
+    for (int k = 0; k < scene->ndim; k++) {
+        const double t = hs_lattice_coordinate(&scene->lattice, x, k);
+        const double reach = scene->radius * (1.0 + HS_GRID_SLACK) + 2.0 * scene->t_error[k];
+        if (scene->lattice.row_of_axis[k] < 0 &&
+            (t - scene->upper[k] > reach || scene->lower[k] - t > reach)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static hs_status
+add_queries(range_list *list)
+{
+    const hs_search *search = list->search;
+    const hs_bins   *asking = hs_search_asking(search);
+    hs_status        status = HS_OK;
+    list->unpolled = HS_POLL_POINTS;
+    for (int64_t si = 0; status == HS_OK && si < asking->n; si++) {
+        hs_row       row;
+        hs_row_group group;
+        int64_t      n_links = 0;
+        list->si = si;
+        status = poll_sometimes(list, 1);
+        if (status != HS_OK || is_far_outside(search, si)) {
+            continue;
+        }
+        hs_row_open_at(search, (int32_t)si, &row, &group);
+        status =
+            hs_row_links(search, &search->call->options, &row, list->links, list->hints, &n_links);
+        list->unpolled += search->stencil.n_rows;
+        for (int64_t l = 0; status == HS_OK && l < n_links; l++) {
+            hs_link *link = &list->links[l];
+            status = add_window(list, asking->order[si], link, group.x_first + link->first,
+                                group.x_last + link->last);
+        }
+    }
+    return status;
+}
+
+/* Offsets from counts, which are zero again. */
+static int64_t
+sum_counts(int64_t n, int64_t *counts, int64_t *offsets)
+{
+    int64_t sum = 0;
+    for (int64_t q = 0; q < n; q++) {
+        offsets[q] = sum;
+        sum += counts[q];
+        counts[q] = 0;
+    }
+    offsets[n] = sum;
+    return sum;
+}
+
+static hs_status
+find_ranges(hs_pairs *rows, range_list *list, hs_failure *failure)
+{
+    const int64_t n = hs_search_asking(list->search)->n;
+    int64_t      *offsets = NULL;
+    hs_status     status = hs_output_reserve(&rows->offsets, n + 1, 0.0);
+    if (status == HS_OK) {
+        rows->offsets.n_pairs = n + 1;
+        offsets = hs_output_column(&rows->offsets, HS_WANT_I);
+        memset(list->counts, 0, (size_t)n * sizeof *list->counts);
+        status = add_queries(list);
+    }
+    if (status == HS_OK) {
+        const int64_t n_ranges = sum_counts(n, list->counts, offsets);
+        failure->search_bytes = (double)n_ranges * 2.0 * sizeof(int64_t);
+        status = hs_output_reserve(&rows->output, n_ranges, 0.0);
+        rows->output.n_pairs = status == HS_OK ? n_ranges : 0;
+    }
+    if (status == HS_OK) {
+        list->offsets = offsets;
+        list->first = hs_output_column(&rows->output, HS_WANT_I);
+        list->end = hs_output_column(&rows->output, HS_WANT_J);
+        status = add_queries(list);
+    }
+    return status;
+}
+
+/* With an open search: allocates links and ranges, and fills the ranges. */
+static hs_status
+list_ranges(hs_search *search, hs_pairs *rows, hs_failure *failure)
+{
+    hs_account   *account = &search->call->account;
+    const int64_t n = hs_search_asking(search)->n, n_links = search->stencil.n_rows;
+    range_list    list = {.search = search};
+    list.links = hs_alloc(account, HS_FOR_STENCIL, n_links, sizeof *list.links);
+    list.hints = hs_alloc(account, HS_FOR_STENCIL, n_links, sizeof *list.hints);
+    list.counts = hs_alloc(account, HS_FOR_INDICES, n, sizeof *list.counts);
+    hs_status status = HS_ERR_MEMORY;
+    if (list.links != NULL && list.hints != NULL && list.counts != NULL) {
+        memset(list.hints, 0, (size_t)n_links * sizeof *list.hints);
+        status = find_ranges(rows, &list, failure);
+    }
+    hs_free(account, list.counts);
+    hs_free(account, list.hints);
+    hs_free(account, list.links);
+    return status;
+}
+
+/* Why the cells do not serve these queries at this cutoff. */
+static hs_status
+tell_unserved(const hs_cells *cells, const hs_points *queries, double cutoff, hs_failure *failure)
+{
+    *failure = HS_NO_FAILURE;
+    if (cutoff != cells->call.options.cutoff) {
+        failure->value = cutoff;
+        return HS_ERR_CUTOFF;
+    }
+    if (queries != NULL) {
+        hs_scene_name_refused(&cells->search.scene, queries, failure);
+    }
+    return HS_ERR_FAR;
+}
+
+static hs_status
+find_candidates(const hs_cells *cells, const hs_points *queries, hs_pairs *rows,
+                hs_failure *failure)
+{
+    hs_search search;
+    hs_call  *call = &rows->call;
+    hs_sets   sets = {
+          .points = &cells->points, .queries = queries, .built = &cells->search, .is_full = true};
+    sets.is_untested = true;
+    sets.keeps_none = true; /* no pairs; the ranges are allocated when their number is known */
+    hs_status status = hs_check_arguments(&cells->points, queries, NULL, &call->options, failure);
+    if (status == HS_OK) {
+        call->options.precision = cells->call.options.precision; /* no pair is decided on */
+        status = hs_search_reuse(&sets, call, &search, failure);
+    }
+    if (status == HS_OK) {
+        const int d = cells->points.ndim;
+        hs_output_init(&call->account, d, HS_WANT_I | HS_WANT_J, 8, &rows->output);
+        hs_output_init(&call->account, d, HS_WANT_I, 8, &rows->offsets);
+        status = list_ranges(&search, rows, failure);
+        hs_search_close(&search);
+    } else if (status == HS_UNSERVED) {
+        status = tell_unserved(cells, queries, call->options.cutoff, failure);
+    }
+    if (status != HS_OK) {
+        failure->limit_bytes = status == HS_ERR_MEMORY ? call->account.limit : 0.0;
+    }
+    return status;
+}
+
+hs_status
+hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_options *options,
+                    hs_pairs **result, hs_failure *failure)
+{
+    if (!hs_can_return(result, options) || cells == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
+    hs_pairs *rows = hs_pairs_begin(options, &failure);
+    if (rows == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    const hs_status status = find_candidates(cells, queries, rows, failure);
+    return hs_pairs_finish(rows, status, 0, result);
+}

@@ -1,0 +1,954 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+#if !defined(_WIN32) && !defined(_POSIX_C_SOURCE)
+#define _POSIX_C_SOURCE 200809L
+#endif
+#include "dynamic.h"
+#include "../base/os_thread.h"
+#include "../memory/memory.h"
+
+#include <stdlib.h>
+
+/* A block that is too small is replaced by a larger one; the map learns where its
+ * entries are now. */
+
+int
+hs_block_size(int64_t count)
+{
+    int size = 0;
+    while (INT64_C(1) << size < count) {
+        size++;
+    }
+    return size;
+}
+
+bool
+hs_cell_reserve(hs_dynamic *list, uint32_t number, int64_t count)
+{
+    hs_cell *const cell = &list->cells.cell[number];
+    uint8_t *const size = &list->cells.size[number];
+    const int      larger = hs_block_size(count);
+    if (*size != HS_NO_BLOCK && larger <= *size) {
+        return true;
+    }
+    const uint32_t place = larger < HS_ENTRY_SIZES ? hs_entries_take(&list->entries, larger)
+                                                   : HS_NO_PLACE;
+    if (place == HS_NO_PLACE) {
+        return false;
+    }
+    for (uint32_t e = 0; e < cell->count; e++) {
+        const hs_entry_tail *tail = hs_entry_tail_at(&list->entries, cell->start + e);
+        hs_entries_copy(&list->entries, cell->start + e, &list->entries, place + e, 1);
+        hs_key_map_moved(&list->map, (hs_key){tail->id, tail->tag}, cell->start + e, place + e);
+    }
+    if (*size != HS_NO_BLOCK) {
+        hs_entries_give(&list->entries, *size, cell->start);
+    }
+    cell->start = place;
+    *size = (uint8_t)larger;
+    return true;
+}
+
+/* The way in is one compare-and-swap; threads that do not get in sleep until one leaves. */
+
+#define WRITER      (INT64_C(1) << 31)
+#define PER_PROCESS (INT64_C(1) << 32)
+
+/* The state where no thread of this process is inside. */
+static int64_t
+empty(void)
+{
+    return hs_atomic_load(&hs_n_forks) * PER_PROCESS;
+}
+
+/* Adds to what is inside, unless that is too much; threads of a parent are not. */
+static bool
+try_enter(hs_gate *gate, int64_t most, int64_t more)
+{
+    const int64_t state = hs_atomic_load(&gate->state), none = empty();
+    const int64_t inside = state < none ? 0 : state - none;
+    return inside <= most && hs_atomic_swap_if(&gate->state, state, none + inside + more);
+}
+
+static bool
+try_read(void *gate)
+{
+    return try_enter(gate, WRITER - 2, 1);
+}
+
+static bool
+try_write(void *gate)
+{
+    return try_enter(gate, 0, WRITER);
+}
+
+static bool
+is_free(void *context)
+{
+    hs_gate *gate = context;
+    return hs_atomic_load(&gate->state) <= empty();
+}
+
+static void
+wake(void)
+{
+    if (hs_atomic_load(&hs_n_waiting) > 0) {
+        hs_wake_waiting();
+    }
+}
+
+void
+hs_gate_init(hs_gate *gate)
+{
+    *gate = (hs_gate){.state = empty()};
+}
+
+bool
+hs_gate_is_mine(hs_gate *gate)
+{
+    const int64_t holder = hs_atomic_load(&gate->holder);
+    return holder != 0 && holder == HS_THREAD_NUMBER() &&
+           gate->held_at == hs_atomic_load(&hs_n_forks);
+}
+
+bool
+hs_gate_read(hs_gate *gate)
+{
+    if (hs_gate_is_mine(gate)) {
+        return false;
+    }
+    if (!try_read(gate) && !try_read(gate)) {
+        hs_wait_for(try_read, gate);
+    }
+    return true;
+}
+
+void
+hs_gate_read_end(hs_gate *gate)
+{
+    if (hs_atomic_add(&gate->state, -1) % WRITER == 1) {
+        wake();
+    }
+}
+
+/* A writer that waits gives up what readers may need to get out, and takes it back before it goes
+ * in: never the other way round. */
+static HS_NO_INLINE void
+wait_to_write(hs_gate *gate)
+{
+    if (gate->pause == NULL) {
+        hs_wait_for(try_write, gate);
+        return;
+    }
+    do {
+        void *const paused = gate->pause();
+        hs_wait_for(is_free, gate);
+        gate->resume(paused);
+    } while (!try_write(gate));
+}
+
+bool
+hs_gate_write(hs_gate *gate)
+{
+    if (hs_gate_is_mine(gate)) {
+        return false;
+    }
+    if (!try_write(gate) && !try_write(gate)) {
+        wait_to_write(gate);
+    }
+    return true;
+}
+
+void
+hs_gate_write_end(hs_gate *gate)
+{
+    hs_atomic_store(&gate->state, empty());
+    wake();
+}
+
+bool
+hs_gate_hold(hs_gate *gate)
+{
+    const bool went_in = hs_gate_write(gate);
+    if (went_in) {
+        gate->held_at = hs_atomic_load(&hs_n_forks);
+        hs_atomic_store(&gate->holder, HS_THREAD_NUMBER());
+    }
+    return went_in;
+}
+
+void
+hs_gate_release(hs_gate *gate)
+{
+    hs_atomic_store(&gate->holder, 0);
+    hs_gate_write_end(gate);
+}
+
+/* Positions made ready, for the number of dimensions that a list has. */
+
+hs_status
+hs_dynamic_place(const hs_dynamic *list, const double *given, hs_placed *placed,
+                 hs_failure *failure)
+{
+    switch (list->lattice.ndim) {
+    case 2: return hs_dynamic_place_in(list, given, placed, failure, 2);
+    case 3: return hs_dynamic_place_in(list, given, placed, failure, 3);
+    default: return hs_dynamic_place_in(list, given, placed, failure, list->lattice.ndim);
+    }
+}
+
+/* The largest sum of absolute terms that a coordinate is wrapped by, of those that the box moves:
+ * others are what was given. */
+static double
+terms_of_wrapping(const hs_dynamic *list, const hs_placed *placed)
+{
+    const hs_lattice *lattice = &list->lattice;
+    int64_t           given_turns[HS_MAX_DIM];
+    double            largest = 0.0;
+    (void)hs_lattice_shift(lattice, placed->turns, given_turns); /* as when it was wrapped */
+    for (int c = 0; c < lattice->ndim; c++) {
+        double terms = list->moves[c] ? fabs(placed->given[c]) : 0.0;
+        for (int l = 0; l < lattice->n_periodic; l++) {
+            terms += fabs((double)given_turns[l] * lattice->given[l][c]);
+        }
+        largest = hs_larger(terms, largest);
+    }
+    return largest;
+}
+
+bool
+hs_dynamic_is_known(const hs_dynamic *list, hs_placed *placed)
+{
+    const hs_lattice *lattice = &list->lattice;
+    bool              known = true;
+    if (placed->magnitude > 0x1p-50 * list->most_terms) {
+        placed->magnitude = terms_of_wrapping(list, placed);
+        known = placed->magnitude <= list->most_terms;
+    }
+    for (int k = 0; k < lattice->ndim; k++) {
+        placed->terms[k] = hs_axis_terms(lattice, placed->x, k);
+        known = known && placed->terms[k] < list->axes.axis[k].farthest;
+    }
+    return known;
+}
+
+/* In line: a call of memcpy for two or three numbers takes longer than they do. */
+HS_ALWAYS_INLINE void
+copy_numbers(double *to, const double *from, int n)
+{
+    for (int k = 0; k < n; k++) {
+        to[k] = from[k];
+    }
+}
+
+void
+hs_dynamic_write(hs_dynamic *list, uint32_t place, const hs_placed *placed)
+{
+    const int     d = list->lattice.ndim;
+    double *const x = hs_entry_at(&list->entries, place);
+    if (placed == NULL) {
+        for (int k = 0; k < d; k++) {
+            x[k] = NAN;
+        }
+        return;
+    }
+    copy_numbers(x, placed->x, d);
+    if (list->entries.keeps_given) {
+        copy_numbers(hs_entry_given(&list->entries, place), placed->given, d);
+    }
+    if (!list->lattice.aligned) {
+        list->magnitude = hs_larger(placed->magnitude, list->magnitude);
+    }
+}
+
+/* Rows are placed one at a time: to store what comes of it would cost more than to do it
+ * again. */
+
+hs_status
+hs_rows_place(const hs_dynamic *list, double *const *x, int64_t i, double *given, hs_placed *placed,
+              hs_failure *failure)
+{
+    for (int k = 0; k < list->lattice.ndim; k++) {
+        given[k] = x[k][i];
+    }
+    const hs_status status = hs_dynamic_place(list, given, placed, failure);
+    failure->row = status == HS_OK ? failure->row : i;
+    return status;
+}
+
+hs_status
+hs_rows_reach(hs_dynamic *list, int64_t n, double *const *x, hs_failure *failure)
+{
+    int64_t   first[HS_MAX_DIM], last[HS_MAX_DIM];
+    double    given[HS_MAX_DIM], bytes = 0.0;
+    hs_placed placed;
+    for (int64_t i = 0; i < n; i++) {
+        if (!hs_rows_go_on(list, i)) {
+            return HS_ERR_INTERRUPTED;
+        }
+        const hs_status status = hs_rows_place(list, x, i, given, &placed, failure);
+        if (status != HS_OK) {
+            return status;
+        }
+        for (int k = 0; k < list->lattice.ndim; k++) {
+            const int64_t u = placed.index[k];
+            first[k] = i == 0 || u < first[k] ? u : first[k];
+            last[k] = i == 0 || u > last[k] ? u : last[k];
+        }
+    }
+    if (!list->cells.dense) {
+        return HS_OK;
+    }
+    const hs_status status =
+        hs_cell_table_extend(&list->cells, &list->entries, first, last, list->grid_bytes, &bytes);
+    failure->expected_bytes = bytes;
+    failure->limit_bytes = list->grid_bytes;
+    return status;
+}
+
+/* All memory first, then cell after cell, in order. */
+
+/* Memory for all that a copy will hold, and no more. */
+static bool
+reserve_copy(const hs_dynamic *list, hs_dynamic *copy)
+{
+    int64_t first[HS_MAX_DIM], last[HS_MAX_DIM], index[HS_MAX_DIM];
+    int64_t n_entries = 0, n_cells = 0;
+    double  bytes;
+    for (int64_t c = 0; c < list->cells.n; c++) {
+        if (list->cells.cell[c].count == 0) {
+            continue;
+        }
+        hs_cell_table_index(&list->cells, (uint32_t)c, index);
+        for (int k = 0; k < list->lattice.ndim; k++) {
+            first[k] = n_cells == 0 || index[k] < first[k] ? index[k] : first[k];
+            last[k] = n_cells == 0 || index[k] > last[k] ? index[k] : last[k];
+        }
+        n_entries += INT64_C(1) << hs_block_size(list->cells.cell[c].count);
+        n_cells++;
+    }
+    return n_cells == 0 ||
+           (hs_key_map_reserve(&copy->map, list->map.n) &&
+            hs_entries_reserve(&copy->entries, n_entries) &&
+            (list->cells.dense ? hs_cell_table_extend(&copy->cells, &copy->entries, first, last,
+                                                      list->grid_bytes, &bytes) == HS_OK
+                               : hs_cell_table_reserve(&copy->cells, &copy->entries, n_cells)));
+}
+
+hs_status
+hs_copy_points(const hs_dynamic *list, hs_dynamic *copy)
+{
+    int64_t index[HS_MAX_DIM];
+    if (!reserve_copy(list, copy)) {
+        return HS_ERR_MEMORY;
+    }
+    for (int64_t c = 0; c < list->cells.n; c++) {
+        const hs_cell cell = list->cells.cell[c];
+        if (cell.count == 0) {
+            continue;
+        }
+        hs_cell_table_index(&list->cells, (uint32_t)c, index);
+        const uint32_t number = hs_cell_table_add(&copy->cells, &copy->entries, index);
+        (void)hs_cell_reserve(copy, number, cell.count); /* reserve_copy has the memory */
+        const uint32_t start = copy->cells.cell[number].start;
+        hs_entries_copy(&list->entries, cell.start, &copy->entries, start, cell.count);
+        copy->cells.cell[number].count = cell.count;
+        copy->cells.n_empty--;
+        for (uint32_t e = 0; e < cell.count; e++) {
+            hs_entry_tail *tail = hs_entry_tail_at(&copy->entries, start + e);
+            tail->cell = number;
+            hs_key_map_add(&copy->map, (hs_key){tail->id, tail->tag}, start + e);
+        }
+    }
+    copy->n_without = list->n_without;
+    copy->cells.is_wide = list->cells.is_wide;
+    copy->magnitude = list->magnitude;
+    return HS_OK;
+}
+
+/* The checks of options, and lists that are made, copied and emptied. A copy is a new
+ * list into which the points of the old one are put, cell after cell; shrinking makes one and keeps
+ * it. */
+
+#define LEAST_LENGTH 0x1p-300 /* squares of these and of their quotients are ordinary numbers */
+#define MOST_LENGTH  0x1p300
+#define MOST_IMAGES  0x1p20
+
+static bool
+is_length(double x)
+{
+    return x >= LEAST_LENGTH && x <= MOST_LENGTH;
+}
+
+static hs_status
+refuse_length(hs_failure *failure, hs_length_column column, double value)
+{
+    failure->column = column;
+    failure->value = value;
+    return HS_ERR_CUTOFF;
+}
+
+static hs_status
+check_box(const hs_box *box, int ndim, hs_failure *failure)
+{
+    if (box == NULL) {
+        return HS_OK;
+    }
+    if (box->ndim != ndim) {
+        return HS_ERR_ARGUMENT;
+    }
+    const hs_status status = hs_box_check(box, failure);
+    for (int l = 0; status == HS_OK && l < ndim; l++) {
+        for (int k = 0; box->periodic[l] && k < ndim; k++) {
+            if (box->rows[l][k] != 0.0 && !is_length(fabs(box->rows[l][k]))) {
+                return refuse_length(failure, HS_LENGTH_BOX, box->rows[l][k]);
+            }
+        }
+    }
+    return status;
+}
+
+hs_status
+hs_list_check(const hs_dynamic_options *options, hs_failure *failure)
+{
+    const double radius = options->max_radius;
+    if (options->ndim < 1 || options->ndim > HS_MAX_DIM || (int)options->storage < 0 ||
+        options->storage > HS_STORE_ALL_PAIRS || !(options->grid_bytes >= 0.0)) {
+        return HS_ERR_ARGUMENT;
+    }
+    if (!is_length(options->cell_size)) {
+        return refuse_length(failure, HS_LENGTH_CELL_SIZE, options->cell_size);
+    }
+    if (radius != 0.0 && !is_length(radius)) {
+        return refuse_length(failure, HS_LENGTH_MAX_RADIUS, radius);
+    }
+    return check_box(options->box, options->ndim, failure);
+}
+
+/* Images of a ball that a query may have to look at, as far as its centre does not add to them. */
+static double
+count_images(const hs_axes *axes, double max_radius)
+{
+    double n = 1.0;
+    for (int k = 0; k < axes->ndim; k++) {
+        const hs_axis *axis = &axes->axis[k];
+        if (axis->row >= 0) {
+            n *= 2.0 * ceil((max_radius + axis->leak) / axis->period) + 1.0;
+        }
+    }
+    return n;
+}
+
+/* Sums over the box that bounds of rounding are made of. */
+static void
+measure_box(hs_dynamic *list)
+{
+    double least = INFINITY;
+    for (int r = 0; r < list->lattice.n_periodic; r++) {
+        list->row_error += list->lattice.row_error[r];
+        for (int k = 0; k < list->lattice.ndim; k++) {
+            list->spread += fabs(list->lattice.rows[r][k]);
+        }
+    }
+    for (int k = 0; k < list->lattice.ndim; k++) {
+        list->moves[k] = hs_moves_column(&list->lattice, k);
+        least = list->axes.axis[k].row >= 0 ? hs_smaller(list->axes.axis[k].period, least) : least;
+    }
+    list->most_terms = 0x1p90 * least;
+}
+
+hs_status
+hs_list_new(const hs_dynamic_options *options, hs_dynamic **list, hs_failure *failure)
+{
+    const bool  one_cell = options->storage == HS_STORE_ALL_PAIRS;
+    hs_dynamic *made = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *made);
+    if (made == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    memset(made, 0, sizeof *made);
+    made->storage = options->storage;
+    made->inclusive = options->inclusive;
+    made->cell_size = options->cell_size;
+    made->max_radius = options->max_radius != 0.0 ? options->max_radius : options->cell_size;
+    made->grid_bytes = options->grid_bytes;
+    made->has_box = options->box != NULL;
+    if (made->has_box) {
+        made->box = *options->box;
+    }
+    hs_lattice_init(options->box, options->ndim, hs_scale_of(0), &made->lattice);
+    hs_status status = hs_skew_is_left(&made->lattice) ? HS_ERR_BOX_SKEWED : HS_OK;
+    if (status == HS_OK) {
+        hs_axes_init(&made->axes, &made->lattice, made->cell_size, one_cell, made->max_radius);
+        measure_box(made);
+        hs_gate_init(&made->gate);
+        if (!(count_images(&made->axes, made->max_radius) <= MOST_IMAGES)) {
+            status = refuse_length(failure, HS_LENGTH_MAX_RADIUS, made->max_radius);
+        } else if (!hs_offsets_init(&made->offsets, &made->axes, &made->lattice,
+                                    made->max_radius)) {
+            status = HS_ERR_MEMORY;
+        }
+    }
+    if (status != HS_OK) {
+        hs_free(NULL, made);
+        return status;
+    }
+    hs_entries_init(&made->entries, options->ndim, made->lattice.n_periodic > 0);
+    hs_cell_table_init(&made->cells, &made->axes, options->storage != HS_STORE_HASH);
+    *list = made;
+    return HS_OK;
+}
+
+static void
+free_points(hs_dynamic *list)
+{
+    hs_entries_free(&list->entries);
+    hs_key_map_free(&list->map);
+    hs_cell_table_free(&list->cells);
+}
+
+void
+hs_list_free(hs_dynamic *list)
+{
+    free_points(list);
+    hs_offsets_free(&list->offsets);
+    hs_free(NULL, list);
+}
+
+hs_status
+hs_list_copy(const hs_dynamic *list, hs_dynamic **copy)
+{
+    const hs_dynamic_options options = {.ndim = list->lattice.ndim,
+                                        .box = list->has_box ? &list->box : NULL,
+                                        .storage = list->storage,
+                                        .cell_size = list->cell_size,
+                                        .max_radius = list->max_radius,
+                                        .inclusive = list->inclusive,
+                                        .grid_bytes = list->grid_bytes};
+    hs_failure               ignored;
+    hs_dynamic              *made;
+    hs_status                status = hs_list_new(&options, &made, &ignored);
+    *copy = NULL;
+    if (status == HS_OK) {
+        status = hs_copy_points(list, made);
+        if (status == HS_OK) {
+            *copy = made;
+        } else {
+            hs_list_free(made);
+        }
+    }
+    return status;
+}
+
+void
+hs_list_clear(hs_dynamic *list)
+{
+    free_points(list);
+    hs_cell_table_init(&list->cells, &list->axes, list->cells.dense);
+    list->n_without = 0;
+    list->magnitude = 0.0;
+}
+
+hs_status
+hs_list_shrink(hs_dynamic *list)
+{
+    hs_dynamic     *copy;
+    const hs_status status = hs_list_copy(list, &copy);
+    if (status != HS_OK) {
+        return status;
+    }
+    const hs_entries    entries = list->entries;
+    const hs_key_map    map = list->map;
+    const hs_cell_table cells = list->cells;
+    list->entries = copy->entries;
+    list->map = copy->map;
+    list->cells = copy->cells;
+    list->magnitude = copy->magnitude;
+    list->changes++;
+    copy->entries = entries;
+    copy->map = map;
+    copy->cells = cells;
+    hs_list_free(copy);
+    return HS_OK;
+}
+
+/*
+ * A counting sort. A first pass numbers the cells and counts what goes into each, a second
+ * one gives them blocks, one behind another, and a third one writes the points there.
+ */
+
+#define POINTS_A_CELL 4  /* or more: else a hash table grows meanwhile */
+#define AT_ONCE       32 /* rows whose memory is fetched before they are written */
+
+static hs_key
+key_of(const int64_t *ids, const int32_t *tags, int64_t i)
+{
+    return (hs_key){ids[i], tags != NULL ? tags[i] : 0};
+}
+
+/* hs_rows_place, for a number of dimensions that the compiler may know. */
+HS_ALWAYS_INLINE hs_status
+place_row(const hs_dynamic *list, double *const *x, int64_t i, double *given, hs_placed *placed,
+          hs_failure *failure, const int ndim)
+{
+    for (int k = 0; k < ndim; k++) {
+        given[k] = x[k][i];
+    }
+    return hs_dynamic_place_in(list, given, placed, failure, ndim);
+}
+
+/* The cell of each row, and how many go to each. */
+HS_ALWAYS_INLINE hs_status
+count_in(hs_dynamic *list, int64_t n, double *const *x, uint32_t *numbers, hs_failure *failure,
+         const int ndim)
+{
+    double    given[HS_MAX_DIM];
+    hs_placed placed;
+    for (int64_t i = 0; i < n; i++) {
+        if (!hs_rows_go_on(list, i)) {
+            return HS_ERR_INTERRUPTED;
+        }
+        const hs_status status = place_row(list, x, i, given, &placed, failure, ndim);
+        if (status != HS_OK) {
+            failure->row = i;
+            return status;
+        }
+        numbers[i] = hs_cell_table_add(&list->cells, &list->entries, placed.index);
+        if (numbers[i] == HS_NO_CELL) {
+            return HS_ERR_MEMORY;
+        }
+        list->cells.n_empty -= list->cells.cell[numbers[i]].count++ == 0;
+    }
+    return HS_OK;
+}
+
+static hs_status
+count_rows(hs_dynamic *list, int64_t n, double *const *x, uint32_t *numbers, hs_failure *failure)
+{
+    switch (list->lattice.ndim) {
+    case 2: return count_in(list, n, x, numbers, failure, 2);
+    case 3: return count_in(list, n, x, numbers, failure, 3);
+    default: return count_in(list, n, x, numbers, failure, list->lattice.ndim);
+    }
+}
+
+/* Dense cells as far as there are points. Along the axes of aligned boxes the cell is a monotone
+ * function of the coordinate, so that the outermost coordinates are enough; count_rows will see
+ * whether each position can be had. */
+static hs_status
+reach(hs_dynamic *list, int64_t n, double *const *x, hs_failure *failure)
+{
+    int64_t first[HS_MAX_DIM], last[HS_MAX_DIM];
+    double  bytes = 0.0;
+    if (!list->lattice.aligned) {
+        return hs_rows_reach(list, n, x, failure);
+    }
+    for (int k = 0; k < list->lattice.ndim; k++) {
+        const hs_axis *axis = &list->axes.axis[k];
+        double         low = x[k][0], high = low;
+        for (int64_t i = 1; axis->n == 0 && i < n; i++) {
+            low = hs_smaller(x[k][i], low);
+            high = hs_larger(x[k][i], high);
+        }
+        first[k] = axis->n == 0 ? hs_axis_cell(axis, low) : 0;
+        last[k] = axis->n == 0 ? hs_axis_cell(axis, high) : axis->n - 1;
+    }
+    const hs_status status =
+        hs_cell_table_extend(&list->cells, &list->entries, first, last, list->grid_bytes, &bytes);
+    failure->expected_bytes = bytes;
+    failure->limit_bytes = list->grid_bytes;
+    return status;
+}
+
+/* A block for each cell that is not empty, in the order of the cells, so that those of neighbours
+ * lie side by side. Counts begin again. */
+static bool
+cut_blocks(hs_dynamic *list)
+{
+    hs_cell_table *cells = &list->cells;
+    int64_t        total = 0;
+    for (int64_t c = 0; c < cells->n; c++) {
+        total += cells->cell[c].count > 0 ? INT64_C(1) << hs_block_size(cells->cell[c].count) : 0;
+    }
+    if (!hs_entries_reserve(&list->entries, total)) {
+        return false;
+    }
+    for (int64_t c = 0; c < cells->n; c++) {
+        if (cells->cell[c].count > 0) {
+            const int size = hs_block_size(cells->cell[c].count);
+            cells->size[c] = (uint8_t)size;
+            cells->cell[c] = (hs_cell){hs_entries_take(&list->entries, size), 0};
+        }
+    }
+    return true;
+}
+
+/* Rows i to i + n - 1. First where each of them goes, so that the memory is there when it is
+ * written to: the points of a cell come from anywhere among the rows. */
+HS_ALWAYS_INLINE void
+write_in(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t i, int n,
+         double *const *x, const uint32_t *numbers, hs_failure *failure, const int ndim)
+{
+    uint32_t  places[AT_ONCE];
+    double    given[HS_MAX_DIM];
+    hs_placed placed;
+    for (int r = 0; r < n; r++) {
+        hs_cell *const cell = &list->cells.cell[numbers[i + r]];
+        places[r] = cell->start + cell->count++;
+        HS_PREFETCH_WRITE(hs_entry_at(&list->entries, places[r]));
+        HS_PREFETCH_WRITE(hs_entry_given(&list->entries, places[r]));
+        hs_key_map_expect(&list->map, key_of(ids, tags, i + r));
+    }
+    for (int r = 0; r < n; r++) {
+        const hs_key   key = key_of(ids, tags, i + r);
+        hs_entry_tail *tail = hs_entry_tail_at(&list->entries, places[r]);
+        (void)place_row(list, x, i + r, given, &placed, failure, ndim); /* as in count_rows */
+        *tail = (hs_entry_tail){key.id, key.tag, numbers[i + r]};
+        hs_dynamic_write(list, places[r], &placed);
+        hs_key_map_add(&list->map, key, places[r]);
+    }
+}
+
+static void
+write_some(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t i, int n,
+           double *const *x, const uint32_t *numbers, hs_failure *failure)
+{
+    switch (list->lattice.ndim) {
+    case 2: write_in(list, ids, tags, i, n, x, numbers, failure, 2); break;
+    case 3: write_in(list, ids, tags, i, n, x, numbers, failure, 3); break;
+    default: write_in(list, ids, tags, i, n, x, numbers, failure, list->lattice.ndim);
+    }
+}
+
+hs_status
+hs_fill(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n, double *const *x,
+        hs_failure *failure)
+{
+    hs_list_clear(list);
+    uint32_t *numbers = hs_alloc(NULL, HS_FOR_CELLS, n, sizeof *numbers);
+    hs_status status = numbers != NULL ? HS_OK : HS_ERR_MEMORY;
+    if (status == HS_OK && list->cells.dense) {
+        status = reach(list, n, x, failure);
+    } else if (status == HS_OK &&
+               !hs_cell_table_reserve(&list->cells, &list->entries, n / POINTS_A_CELL)) {
+        status = HS_ERR_MEMORY;
+    }
+    if (status == HS_OK) {
+        status = count_rows(list, n, x, numbers, failure);
+    }
+    if (status == HS_OK && !(cut_blocks(list) && hs_key_map_reserve(&list->map, n))) {
+        status = HS_ERR_MEMORY;
+    }
+    if (status == HS_OK) {
+        for (int64_t i = 0; i < n; i += AT_ONCE) {
+            const int some = (int)(n - i < AT_ONCE ? n - i : AT_ONCE);
+            write_some(list, ids, tags, i, some, x, numbers, failure);
+        }
+    } else {
+        hs_list_clear(list);
+    }
+    hs_free(NULL, numbers);
+    return status;
+}
+
+/* One point. Memory first, then changes that cannot fail. */
+
+/* The cell of a position, which is added where there is none. */
+static hs_status
+cell_for(hs_dynamic *list, const hs_placed *placed, uint32_t *number, hs_failure *failure)
+{
+    static const int64_t nowhere[HS_MAX_DIM] = {0};
+    const int64_t       *index = placed != NULL ? placed->index : nowhere;
+    if (list->cells.dense) {
+        double          bytes = 0.0;
+        const hs_status status = hs_cell_table_extend(&list->cells, &list->entries, index, index,
+                                                      list->grid_bytes, &bytes);
+        if (status != HS_OK) {
+            failure->expected_bytes = bytes;
+            failure->limit_bytes = list->grid_bytes;
+            return status;
+        }
+    }
+    *number = hs_cell_table_add(&list->cells, &list->entries, index);
+    return *number != HS_NO_CELL ? HS_OK : HS_ERR_MEMORY;
+}
+
+hs_status
+hs_update_insert(hs_dynamic *list, hs_key key, const hs_placed *placed, hs_failure *failure)
+{
+    uint32_t  number;
+    hs_status status = cell_for(list, placed, &number, failure);
+    if (status != HS_OK) {
+        return status;
+    }
+    uint32_t place = hs_key_map_find(&list->map, &list->entries, key);
+    if (place == HS_NO_PLACE && !hs_key_map_reserve(&list->map, list->map.n + 1)) {
+        return HS_ERR_MEMORY;
+    }
+    if (place == HS_NO_PLACE || hs_entry_tail_at(&list->entries, place)->cell != number) {
+        if (!hs_cell_reserve(list, number, (int64_t)list->cells.cell[number].count + 1)) {
+            return HS_ERR_MEMORY;
+        }
+    }
+    if (place == HS_NO_PLACE) {
+        hs_put_new(list, key, number, placed);
+    } else {
+        hs_put_again(list, key, place, number, placed);
+    }
+    list->changes++;
+    return HS_OK;
+}
+
+bool
+hs_update_remove(hs_dynamic *list, hs_key key)
+{
+    const uint32_t place = hs_key_map_find(&list->map, &list->entries, key);
+    if (place == HS_NO_PLACE) {
+        return false;
+    }
+    list->n_without -= !hs_has_position(list, place);
+    hs_key_map_remove(&list->map, key, place);
+    hs_take_out(list, place);
+    list->changes++;
+    return true;
+}
+
+/* Many points at once. First each cell gets room for all that comes into it, as if
+ * all were new; then each point is put where it belongs. */
+
+/* Rows are few where there are more than so many cells for each: these are not all looked at. */
+#define FEW_ROWS 16
+
+/* Room for `coming` more entries in each cell, in the order of the cells, so that the blocks of
+ * neighbours lie side by side. */
+static bool
+reserve_in_cells(hs_dynamic *list, const uint32_t *coming)
+{
+    for (int64_t c = 0; c < list->cells.n; c++) {
+        const int64_t count = (int64_t)list->cells.cell[c].count + coming[c];
+        if (coming[c] > 0 && !hs_cell_reserve(list, (uint32_t)c, count)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static int
+compare_cells(const void *one, const void *other)
+{
+    const uint32_t a = *(const uint32_t *)one, b = *(const uint32_t *)other;
+    return (a > b) - (a < b);
+}
+
+/* The same for few rows among many cells: the numbers of their cells, which are sorted. */
+static bool
+reserve_in_some(hs_dynamic *list, uint32_t *numbers, int64_t n)
+{
+    qsort(numbers, (size_t)n, sizeof *numbers, compare_cells);
+    for (int64_t i = 0; i < n;) {
+        const int64_t begin = i;
+        while (i < n && numbers[i] == numbers[begin]) {
+            i++;
+        }
+        const int64_t count = (int64_t)list->cells.cell[numbers[begin]].count + (i - begin);
+        if (!hs_cell_reserve(list, numbers[begin], count)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Room in each cell for all rows that go there, as if they were all new. numbers: n, scratch. */
+static hs_status
+reserve_rows(hs_dynamic *list, int64_t n, double *const *x, uint32_t *numbers, hs_failure *failure)
+{
+    double    given[HS_MAX_DIM];
+    hs_placed placed;
+    uint32_t *coming = NULL;
+    bool      fits;
+    for (int64_t i = 0; i < n; i++) {
+        (void)hs_rows_place(list, x, i, given, &placed, failure); /* it can be had: hs_rows_reach */
+        numbers[i] = hs_cell_table_add(&list->cells, &list->entries, placed.index);
+    }
+    if (n < list->cells.n / FEW_ROWS) {
+        return reserve_in_some(list, numbers, n) ? HS_OK : HS_ERR_MEMORY;
+    }
+    coming = hs_alloc(NULL, HS_FOR_CELLS, list->cells.n, sizeof *coming);
+    fits = coming != NULL;
+    if (fits) {
+        memset(coming, 0, (size_t)list->cells.n * sizeof *coming);
+        for (int64_t i = 0; i < n; i++) {
+            coming[numbers[i]]++;
+        }
+        fits = reserve_in_cells(list, coming);
+    }
+    hs_free(NULL, coming);
+    return fits ? HS_OK : HS_ERR_MEMORY;
+}
+
+/* Gives back the blocks of those of these cells that are empty. */
+static void
+release_empty(hs_dynamic *list, const uint32_t *numbers, int64_t n)
+{
+    for (int64_t i = 0; i < n; i++) {
+        const uint32_t c = numbers[i];
+        if (list->cells.cell[c].count == 0 && list->cells.size[c] != HS_NO_BLOCK) {
+            hs_entries_give(&list->entries, list->cells.size[c], list->cells.cell[c].start);
+            list->cells.size[c] = HS_NO_BLOCK;
+        }
+    }
+}
+
+/* numbers: receives the cells that the points were in, or are in if they are new. */
+static void
+put_rows(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n, double *const *x,
+         uint32_t *numbers, hs_failure *failure)
+{
+    double    given[HS_MAX_DIM];
+    hs_placed placed;
+    list->keeps_blocks = true;
+    for (int64_t i = 0; i < n; i++) {
+        const hs_key   key = {ids[i], tags != NULL ? tags[i] : 0};
+        const uint32_t place = hs_key_map_find(&list->map, &list->entries, key);
+        (void)hs_rows_place(list, x, i, given, &placed, failure);
+        numbers[i] = hs_cell_table_find(&list->cells, placed.index);
+        if (place == HS_NO_PLACE) {
+            hs_put_new(list, key, numbers[i], &placed);
+        } else {
+            const uint32_t number = numbers[i];
+            numbers[i] = hs_entry_tail_at(&list->entries, place)->cell;
+            hs_put_again(list, key, place, number, &placed);
+        }
+    }
+    list->keeps_blocks = false;
+}
+
+hs_status
+hs_update_insert_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n,
+                      double *const *x, hs_failure *failure)
+{
+    if (n == 0) {
+        return HS_OK;
+    }
+    if (list->map.n == 0) {
+        const hs_status status = hs_fill(list, ids, tags, n, x, failure);
+        list->changes += status == HS_OK;
+        return status;
+    }
+    hs_status status = hs_rows_reach(list, n, x, failure);
+    if (status != HS_OK) {
+        return status;
+    }
+    uint32_t *numbers = hs_alloc(NULL, HS_FOR_CELLS, n, sizeof *numbers);
+    if (numbers == NULL || !hs_key_map_reserve(&list->map, list->map.n + n) ||
+        !(list->cells.dense || hs_cell_table_reserve(&list->cells, &list->entries, n))) {
+        hs_free(NULL, numbers);
+        return HS_ERR_MEMORY;
+    }
+    status = reserve_rows(list, n, x, numbers, failure);
+    if (status == HS_OK) {
+        put_rows(list, ids, tags, n, x, numbers, failure);
+        list->changes++;
+    }
+    release_empty(list, numbers, n);
+    hs_free(NULL, numbers);
+    return status;
+}

@@ -1,0 +1,783 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+#include "metric.h"
+
+#include <string.h>
+#include <math.h>
+
+/* Comparing |D| with the cutoff in integers of a fixed, sufficient size. */
+
+/*
+ * Limbs of 64 bits that hold any component of D. In units of the smallest subnormal, 2^-1074, a
+ * float64 has at most 2098 bits and a multiple of one by an int64 at most 2161; eight of those and
+ * the two points sum to less than 2^2165. Two bits are for the sign and for the sum of 8 squares.
+ */
+#define MAX_LIMBS 34
+
+/* One axis has two points and up to eight rows. */
+#define MAX_TERMS (2 + HS_MAX_DIM)
+
+/* The cutoff, or a sum that it is in place of. */
+#define CUTOFF_TERMS 2
+
+/* A float64 times an integer: +-(high * 2^64 + low) * 2^exponent. */
+typedef struct exact_term {
+    uint64_t low, high;
+    int      exponent;
+    bool     negative;
+} exact_term;
+
+/* What is added up along each axis, zeros left out, and what unit and width hold all of it. */
+typedef struct exact_sums {
+    exact_term terms[HS_MAX_DIM][MAX_TERMS];
+    int        n_terms[HS_MAX_DIM];
+    int        most_terms;           /* of any axis */
+    exact_term cutoff[CUTOFF_TERMS]; /* zeros where there is less */
+    int        lowest;               /* everything is a multiple of 2^lowest */
+    int        highest;              /* and every term is below 2^highest */
+} exact_sums;
+
+/* A nonzero finite double as an odd significand with sign and exponent. */
+HS_ALWAYS_INLINE exact_term
+decompose(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    const int      field = (int)(bits >> 52) & 0x7ff;
+    const uint64_t fraction = bits & ((UINT64_C(1) << 52) - 1);
+    const uint64_t significand = fraction | (uint64_t)(field != 0) << 52;
+    const int      zeros = hs_trailing_zeros(significand);
+    return (exact_term){.low = significand >> zeros,
+                        .high = 0,
+                        .exponent = field + (field == 0) - 1075 + zeros,
+                        .negative = bits >> 63};
+}
+
+/* Widen the range to hold this term. */
+HS_ALWAYS_INLINE void
+include_term(exact_sums *sums, const exact_term *term)
+{
+    const int bits = term->high != 0 ? 64 + hs_bit_length(term->high) : hs_bit_length(term->low);
+    const int top = term->exponent + bits;
+    sums->lowest = term->exponent < sums->lowest ? term->exponent : sums->lowest;
+    sums->highest = top > sums->highest ? top : sums->highest;
+}
+
+HS_ALWAYS_INLINE void
+set_sums(exact_sums *sums, const hs_metric *metric, hs_dw cutoff, const hs_span *span)
+{
+    const double  *p = span->p, *q = span->q, parts[CUTOFF_TERMS] = {cutoff.hi, cutoff.lo};
+    const int64_t *shift = span->shift;
+    sums->lowest = INT32_MAX;
+    sums->highest = INT32_MIN;
+    sums->most_terms = cutoff.lo != 0.0 ? CUTOFF_TERMS : 1;
+    for (int t = 0; t < CUTOFF_TERMS; t++) {
+        sums->cutoff[t].low = sums->cutoff[t].high = 0;
+        if (parts[t] != 0.0) {
+            sums->cutoff[t] = decompose(parts[t]);
+            include_term(sums, &sums->cutoff[t]);
+        }
+    }
+    for (int k = 0; k < metric->ndim; k++) {
+        exact_term *next = sums->terms[k];
+        if (q[k] != 0.0) {
+            *next = decompose(q[k]);
+            include_term(sums, next++);
+        }
+        if (p[k] != 0.0) {
+            *next = decompose(p[k]);
+            next->negative = !next->negative;
+            include_term(sums, next++);
+        }
+        for (int l = 0; shift != NULL && l < metric->n_rows; l++) {
+            const double entry = metric->rows[l][k];
+            if (shift[l] == 0 || entry == 0.0) {
+                continue;
+            }
+            const uint64_t times = shift[l] < 0 ? ~(uint64_t)shift[l] + 1 : (uint64_t)shift[l];
+            *next = decompose(entry);
+            next->low = hs_multiply_add(next->low, times, 0, &next->high);
+            next->negative = next->negative != (shift[l] < 0);
+            include_term(sums, next++);
+        }
+        const int n_terms = (int)(next - sums->terms[k]);
+        sums->n_terms[k] = n_terms;
+        sums->most_terms = n_terms > sums->most_terms ? n_terms : sums->most_terms;
+    }
+}
+
+/* Limbs for a component of D, and twice as many for |D|^2; 0 when every input is zero. */
+static int
+count_limbs(const exact_sums *sums)
+{
+    if (sums->lowest > sums->highest) {
+        return 0;
+    }
+    const int bits = sums->highest - sums->lowest + hs_bit_length((uint64_t)sums->most_terms - 1);
+    const int n = (bits + 2 + 63) / 64;
+    HS_ASSERT(n >= 1 && n <= MAX_LIMBS);
+    return n;
+}
+
+/* difference += term, n limbs in two's complement. */
+HS_ALWAYS_INLINE void
+add_term(uint64_t *difference, const exact_term *term, int lowest, int n)
+{
+    const int      distance = term->exponent - lowest;
+    const int      first = distance / 64, bits = distance % 64;
+    const uint64_t sign = term->negative ? UINT64_MAX : 0;
+    uint64_t       carry = term->negative; /* -x is ~x + 1 */
+    const uint64_t limb[3] = {
+        term->low << bits,
+        term->high << bits | (bits ? term->low >> (64 - bits) : 0),
+        bits ? term->high >> (64 - bits) : 0,
+    };
+    for (int i = 0; i < n; i++) {
+        const int      place = i - first;
+        const uint64_t value = place >= 0 && place < 3 ? limb[place] : 0;
+        difference[i] = hs_add_carry(difference[i], value ^ sign, &carry);
+    }
+}
+
+/* |component k of D| in n limbs; returns whether it was negative. */
+HS_ALWAYS_INLINE bool
+sum_terms(uint64_t *difference, const exact_sums *sums, int k, int n)
+{
+    for (int i = 0; i < n; i++) {
+        difference[i] = 0;
+    }
+    for (int t = 0; t < sums->n_terms[k]; t++) {
+        add_term(difference, &sums->terms[k][t], sums->lowest, n);
+    }
+
+    const bool     negative = difference[n - 1] >> 63;
+    const uint64_t sign = negative ? UINT64_MAX : 0;
+    uint64_t       carry = negative;
+    for (int i = 0; i < n; i++) {
+        difference[i] = hs_add_carry(difference[i] ^ sign, 0, &carry);
+    }
+    return negative;
+}
+
+/* total += value^2; n and 2 n limbs. */
+HS_ALWAYS_INLINE void
+add_square(uint64_t *total, const uint64_t *value, int n)
+{
+    for (int i = 0; i < n; i++) {
+        uint64_t carry = 0;
+        if (value[i] == 0) {
+            continue;
+        }
+        for (int j = 0; j < n; j++) {
+            total[i + j] = hs_multiply_add(value[i], value[j], total[i + j], &carry);
+        }
+        for (int j = i + n; j < 2 * n && carry != 0; j++) {
+            total[j] += carry;
+            carry = total[j] < carry;
+        }
+    }
+}
+
+/* Sign of a - b. */
+HS_ALWAYS_INLINE int
+compare_limbs(const uint64_t *a, const uint64_t *b, int n)
+{
+    for (int i = n - 1; i >= 0; i--) {
+        if (a[i] != b[i]) {
+            return a[i] < b[i] ? -1 : 1;
+        }
+    }
+    return 0;
+}
+
+/* The comparison; total and limit have 2 n limbs, value n. */
+HS_ALWAYS_INLINE int
+compare_squares(const exact_sums *sums, int ndim, int n, uint64_t *total, uint64_t *limit,
+                uint64_t *value)
+{
+    for (int i = 0; i < 2 * n; i++) {
+        total[i] = limit[i] = 0;
+    }
+    for (int k = 0; k < ndim; k++) {
+        sum_terms(value, sums, k, n);
+        add_square(total, value, n);
+    }
+    for (int i = 0; i < n; i++) {
+        value[i] = 0;
+    }
+    for (int t = 0; t < CUTOFF_TERMS && sums->cutoff[t].low != 0; t++) {
+        add_term(value, &sums->cutoff[t], sums->lowest, n);
+    }
+    add_square(limit, value, n);
+    return compare_limbs(total, limit, 2 * n);
+}
+
+/* The comparison where everything fits 62 bits: single words instead of limbs. */
+static int
+compare_small(const exact_sums *sums, int ndim)
+{
+    uint64_t total[2] = {0, 0}, limit[2] = {0, 0};
+    for (int k = 0; k < ndim; k++) {
+        int64_t value = 0;
+        for (int t = 0; t < sums->n_terms[k]; t++) {
+            const exact_term *term = &sums->terms[k][t];
+            const int64_t     size = (int64_t)(term->low << (term->exponent - sums->lowest));
+            value += term->negative ? -size : size;
+        }
+        const uint64_t size = (uint64_t)(value < 0 ? -value : value);
+        uint64_t       high = 0, carry = 0;
+        const uint64_t low = hs_multiply_add(size, size, 0, &high);
+        total[0] = hs_add_carry(total[0], low, &carry);
+        total[1] += high + carry;
+    }
+    uint64_t cutoff = 0;
+    for (int t = 0; t < CUTOFF_TERMS && sums->cutoff[t].low != 0; t++) {
+        const exact_term *term = &sums->cutoff[t];
+        const uint64_t    size = term->low << (term->exponent - sums->lowest);
+        cutoff += term->negative ? ~size + 1 : size;
+    }
+    limit[0] = hs_multiply_add(cutoff, cutoff, 0, &limit[1]);
+    return compare_limbs(total, limit, 2);
+}
+
+/* Up to 126 bits, where the compiler can unroll every loop over limbs. */
+static int
+compare_medium(const exact_sums *sums, int ndim)
+{
+    uint64_t total[4], limit[4], value[2];
+    return compare_squares(sums, ndim, 2, total, limit, value);
+}
+
+static HS_NO_INLINE int
+compare_large(const exact_sums *sums, int ndim, int n)
+{
+    uint64_t total[2 * MAX_LIMBS], limit[2 * MAX_LIMBS], value[MAX_LIMBS];
+    return compare_squares(sums, ndim, n, total, limit, value);
+}
+
+HS_ALWAYS_INLINE int
+compare(const hs_metric *metric, hs_dw cutoff, const hs_span *span)
+{
+    exact_sums sums;
+    set_sums(&sums, metric, cutoff, span);
+    const int n = count_limbs(&sums);
+    switch (n) {
+    case 0: return 0;
+    case 1: return compare_small(&sums, metric->ndim);
+    case 2: return compare_medium(&sums, metric->ndim);
+    default: return compare_large(&sums, metric->ndim, n);
+    }
+}
+
+int
+hs_integer_compare(const hs_metric *metric, const double *p, const double *q, const int64_t *shift)
+{
+    return compare(metric, (hs_dw){metric->cutoff, 0.0}, &(hs_span){p, q, shift});
+}
+
+int
+hs_integer_compare_sum(const hs_metric *metric, hs_dw limit, const double *p, const double *q,
+                       const int64_t *shift)
+{
+    return compare(metric, limit, &(hs_span){p, q, shift});
+}
+
+/* Compares both squares, in 2 n limbs and one unit. */
+HS_ALWAYS_INLINE int
+compare_two_sums(const exact_sums *one, const exact_sums *other, int ndim, int n, uint64_t *first,
+                 uint64_t *second, uint64_t *value)
+{
+    for (int i = 0; i < 2 * n; i++) {
+        first[i] = second[i] = 0;
+    }
+    for (int k = 0; k < ndim; k++) {
+        sum_terms(value, one, k, n);
+        add_square(first, value, n);
+        sum_terms(value, other, k, n);
+        add_square(second, value, n);
+    }
+    return compare_limbs(first, second, 2 * n);
+}
+
+static int
+compare_two_medium(const exact_sums *one, const exact_sums *other, int ndim)
+{
+    uint64_t first[4], second[4], value[2];
+    return compare_two_sums(one, other, ndim, 2, first, second, value);
+}
+
+static HS_NO_INLINE int
+compare_two_large(const exact_sums *one, const exact_sums *other, int ndim, int n)
+{
+    uint64_t first[2 * MAX_LIMBS], second[2 * MAX_LIMBS], value[MAX_LIMBS];
+    return compare_two_sums(one, other, ndim, n, first, second, value);
+}
+
+/* Gives both sums one unit and one width. */
+static void
+join_units(exact_sums *one, exact_sums *other)
+{
+    const int lowest = one->lowest < other->lowest ? one->lowest : other->lowest;
+    const int highest = one->highest > other->highest ? one->highest : other->highest;
+    const int terms = one->most_terms > other->most_terms ? one->most_terms : other->most_terms;
+    one->lowest = other->lowest = lowest;
+    one->highest = other->highest = highest;
+    one->most_terms = other->most_terms = terms;
+}
+
+int
+hs_integer_compare_two(const hs_metric *metric, const hs_span *one, const hs_span *other)
+{
+    exact_sums a, b;
+    set_sums(&a, metric, (hs_dw){0.0, 0.0}, one);
+    set_sums(&b, metric, (hs_dw){0.0, 0.0}, other);
+    join_units(&a, &b);
+    const int n = count_limbs(&a);
+    return n == 0   ? 0
+           : n <= 2 ? compare_two_medium(&a, &b, metric->ndim)
+                    : compare_two_large(&a, &b, metric->ndim, n);
+}
+
+/* The limbs top, top - 1 and top - 2 as a double-word, in units of the lowest of them. */
+static hs_dw
+gather_limbs(const uint64_t *value, int top)
+{
+    hs_dw  sum = {0.0, 0.0};
+    double unit = 0x1p160; /* of the upper half of the highest limb */
+    for (int i = top; i > top - 3; i--) {
+        const uint64_t limb = i >= 0 ? value[i] : 0;
+        sum = hs_dw_add(sum, (hs_dw){(double)(limb >> 32) * unit, 0.0});
+        sum = hs_dw_add(sum, (hs_dw){(double)(limb & UINT32_MAX) * (unit * 0x1p-32), 0.0});
+        unit *= 0x1p-64;
+    }
+    return sum;
+}
+
+void
+hs_integer_difference(const hs_metric *metric, const double *p, const double *q,
+                      const int64_t *shift, hs_dw *value, int *exponent)
+{
+    exact_sums sums;
+    uint64_t   component[HS_MAX_DIM][MAX_LIMBS];
+    bool       negative[HS_MAX_DIM];
+    int        top = -1; /* highest limb in use */
+    set_sums(&sums, metric, (hs_dw){metric->cutoff, 0.0}, &(hs_span){p, q, shift});
+    const int n = count_limbs(&sums);
+    for (int k = 0; k < metric->ndim; k++) {
+        value[k] = (hs_dw){0.0, 0.0};
+        negative[k] = n > 0 && sum_terms(component[k], &sums, k, n);
+        for (int i = top + 1; i < n; i++) {
+            if (component[k][i] != 0) {
+                top = i;
+            }
+        }
+    }
+    *exponent = 0;
+    if (top < 0) {
+        return;
+    }
+    *exponent = sums.lowest + 64 * (top - 2);
+    for (int k = 0; k < metric->ndim; k++) {
+        value[k] = gather_limbs(component[k], top);
+        if (negative[k]) {
+            value[k] = (hs_dw){-value[k].hi, -value[k].lo};
+        }
+    }
+}
+
+/* Whether a pair is within the cutoff, by the cheapest stage that can tell. */
+
+/* Whether the float stages may use this number: squares of it neither overflow nor underflow. */
+static bool
+is_safe(double x)
+{
+    return fabs(x) >= ldexp(1.0, -HS_SAFE_EXPONENT) && fabs(x) <= ldexp(1.0, HS_SAFE_EXPONENT);
+}
+
+/* The double next to x.hi + x.lo on the given side, or itself. */
+static double
+round_down(hs_dw x)
+{
+    return x.lo < 0.0 ? hs_next_down(x.hi) : x.hi;
+}
+
+static double
+round_up(hs_dw x)
+{
+    return x.lo > 0.0 ? hs_next_up(x.hi) : x.hi;
+}
+
+void
+hs_metric_init(hs_metric *metric, int ndim, int n_rows, const double rows[][HS_MAX_DIM],
+               double cutoff, bool inclusive)
+{
+    HS_ASSERT(ndim >= 1 && ndim <= HS_MAX_DIM && n_rows >= 0 && n_rows <= HS_MAX_DIM);
+    HS_ASSERT(cutoff >= 0.0);
+    metric->ndim = ndim;
+    metric->n_rows = n_rows;
+    metric->inclusive = inclusive;
+    metric->cutoff = cutoff;
+    metric->floats_usable = is_safe(cutoff);
+    for (int l = 0; l < n_rows; l++) {
+        for (int k = 0; k < ndim; k++) {
+            metric->rows[l][k] = rows[l][k];
+            if (rows[l][k] != 0.0 && !is_safe(rows[l][k])) {
+                metric->floats_usable = false;
+            }
+        }
+    }
+    metric->square_hi = metric->square_lo = metric->sure_in = metric->sure_out = 0.0;
+    if (!metric->floats_usable) {
+        return;
+    }
+
+    const hs_dw  square = hs_two_square(cutoff);
+    const double roundings = HS_FLOAT64_ROUNDINGS + HS_FLOAT64_ROUNDINGS_PER_AXIS * ndim;
+    const hs_dw  width = hs_two_product(roundings * HS_FLOAT64_UNIT, square.hi);
+    metric->square_hi = square.hi;
+    metric->square_lo = square.lo;
+    metric->sure_in = round_down(hs_dw_add(square, (hs_dw){-width.hi, -width.lo}));
+    metric->sure_out = round_up(hs_dw_add(square, width));
+}
+
+/* The float stages, for a constant ndim where the compiler can be given one. */
+HS_ALWAYS_INLINE hs_verdict
+judge_in_floats(const hs_metric *metric, const double *p, const double *q, const int64_t *shift,
+                int ndim, hs_stages *stages)
+{
+    hs_difference difference;
+    hs_verdict    verdict;
+    if (shift == NULL) {
+        hs_difference_plain(&difference, p, q, ndim);
+    } else if (!hs_difference_shifted(&difference, metric, p, q, shift, ndim, false)) {
+        return HS_UNDECIDED;
+    }
+
+    const double square = hs_float64_square(&difference, ndim);
+    verdict = hs_float64_verdict(metric, square, difference.error);
+    if (verdict != HS_UNDECIDED) {
+        stages->by_float64++;
+        return verdict;
+    }
+    if (shift != NULL) {
+        (void)hs_difference_shifted(&difference, metric, p, q, shift, ndim, true);
+    }
+    verdict = hs_double_word_verdict(metric, &difference, ndim);
+    stages->by_double_word += verdict != HS_UNDECIDED;
+    return verdict;
+}
+
+bool
+hs_metric_within(const hs_metric *metric, const double *p, const double *q, const int64_t *shift,
+                 hs_stages *stages)
+{
+    if (!hs_is_shifted(metric, shift)) {
+        shift = NULL;
+    }
+    if (metric->floats_usable) {
+        hs_verdict verdict;
+        switch (metric->ndim) {
+        case 2: verdict = judge_in_floats(metric, p, q, shift, 2, stages); break;
+        case 3: verdict = judge_in_floats(metric, p, q, shift, 3, stages); break;
+        default: verdict = judge_in_floats(metric, p, q, shift, metric->ndim, stages);
+        }
+        if (verdict != HS_UNDECIDED) {
+            return verdict == HS_WITHIN;
+        }
+    }
+    return hs_metric_settle(metric, p, q, shift, stages);
+}
+
+/* Long integers take ten times as long. */
+static hs_verdict
+judge_by_a_hair(const hs_metric *metric, const double *p, const double *q, const int64_t *shift)
+{
+    hs_difference difference;
+    return hs_difference_watched(&difference, metric, p, q, shift)
+               ? hs_hair_verdict(metric, &difference, metric->ndim)
+               : HS_UNDECIDED;
+}
+
+bool
+hs_metric_settle(const hs_metric *metric, const double *p, const double *q, const int64_t *shift,
+                 hs_stages *stages)
+{
+    if (metric->floats_usable) {
+        const hs_verdict verdict = judge_by_a_hair(metric, p, q, shift);
+        if (verdict != HS_UNDECIDED) {
+            stages->by_double_word++;
+            return verdict == HS_WITHIN;
+        }
+    }
+    stages->by_integers++;
+    const int sign = hs_integer_compare(metric, p, q, shift);
+    return sign < 0 || (sign == 0 && metric->inclusive);
+}
+
+bool
+hs_metric_within_double(const hs_metric *metric, const double *p, const double *q,
+                        const int64_t *shift)
+{
+    const double limit = metric->cutoff * metric->cutoff;
+    double       square = 0.0;
+    for (int k = 0; k < metric->ndim; k++) {
+        double difference = q[k] - p[k];
+        if (shift != NULL && metric->n_rows > 0) {
+            double offset = (double)shift[0] * metric->rows[0][k];
+            for (int l = 1; l < metric->n_rows; l++) {
+                offset += (double)shift[l] * metric->rows[l][k];
+            }
+            difference += offset;
+        }
+        square += difference * difference;
+    }
+    return metric->inclusive ? square <= limit : square < limit;
+}
+
+/* Double-words first, then integers. docs/exactness.md derives the bounds. */
+
+/* Squares in this range are far from overflow, and what their terms lose to underflow, 2^-1074
+ * each, is nothing beside 2^-106 of them. */
+#define LEAST_SQUARE 0x1p-800
+#define MOST_SQUARE  0x1p800
+
+/* D in double-words, with what was lost. False where floats cannot hold it. */
+static bool
+subtract(const hs_metric *metric, const hs_span *span, hs_difference *difference)
+{
+    return (metric->floats_usable || !hs_is_shifted(metric, span->shift)) &&
+           hs_difference_watched(difference, metric, span->p, span->q, span->shift);
+}
+
+/* How far hs_float64_square may be from |D|^2. */
+static double
+float64_error(double square, double error, int ndim)
+{
+    const double roundings = HS_FLOAT64_ROUNDINGS + HS_FLOAT64_ROUNDINGS_PER_AXIS * ndim;
+    const double rounding = roundings * HS_FLOAT64_UNIT * square;
+    return error > 0.0 ? rounding + 2.001 * error * (sqrt(square) + error) : rounding;
+}
+
+static int
+sign_of(double x)
+{
+    return (x > 0.0) - (x < 0.0);
+}
+
+/* Compares both differences by their double-word squares; false when these cannot tell. */
+static bool
+compare_double_words(const hs_difference *one, const hs_difference *other, int ndim, int *sign)
+{
+    bool         one_exact, other_exact;
+    const hs_dw  a = hs_double_word_square_watched(one, ndim, &one_exact);
+    const hs_dw  b = hs_double_word_square_watched(other, ndim, &other_exact);
+    const hs_dw  excess = hs_dw_add(a, (hs_dw){-b.hi, -b.lo});
+    const double bound = hs_double_word_error(a.hi, one->error, ndim) +
+                         hs_double_word_error(b.hi, other->error, ndim);
+    *sign = sign_of(excess.hi);
+    return fabs(excess.hi) > bound || (one_exact && other_exact);
+}
+
+int
+hs_metric_compare(const hs_metric *metric, const hs_span *one, const hs_span *other,
+                  hs_stages *stages)
+{
+    const int     ndim = metric->ndim;
+    hs_difference a, b;
+    int           sign;
+    if (subtract(metric, one, &a) && subtract(metric, other, &b)) {
+        const double first = hs_float64_square(&a, ndim), second = hs_float64_square(&b, ndim);
+        if (hs_smaller(first, second) >= LEAST_SQUARE && hs_larger(first, second) <= MOST_SQUARE) {
+            if (fabs(first - second) >
+                float64_error(first, a.error, ndim) + float64_error(second, b.error, ndim)) {
+                stages->by_float64++;
+                return sign_of(first - second);
+            }
+            if (compare_double_words(&a, &b, ndim, &sign)) {
+                stages->by_double_word++;
+                return sign;
+            }
+        }
+    }
+    stages->by_integers++;
+    return hs_integer_compare_two(metric, one, other);
+}
+
+/* The distance and the vector of a pair, to the last place. */
+
+/* |D| of a D that is exact as a double-word up to difference->error. */
+HS_ALWAYS_INLINE double
+distance_of(const hs_difference *difference, int ndim)
+{
+    return hs_dw_sqrt(hs_double_word_square(difference, ndim));
+}
+
+/*
+ * In double-words, or false where their error might reach the last place. The final rounding takes
+ * half a unit in the last place, of a component or of |D|, which leaves half a unit for the error
+ * of D and for the double-word roundings. The former is held to a quarter; the latter are below
+ * 1e-14 of a unit.
+ */
+HS_ALWAYS_INLINE bool
+measure_in_floats(const hs_metric *metric, const double *p, const double *q, const int64_t *shift,
+                  int ndim, double *vector, double *distance)
+{
+    hs_difference difference;
+    if (shift == NULL || metric->n_rows == 0) {
+        hs_difference_plain(&difference, p, q, ndim);
+    } else if (!metric->floats_usable ||
+               !hs_difference_shifted(&difference, metric, p, q, shift, ndim, false)) {
+        return false;
+    }
+
+    double largest = 0.0;
+    for (int k = 0; k < ndim; k++) {
+        const double size = fabs(difference.component[k].hi);
+        largest = size > largest ? size : largest;
+    }
+    if (largest == 0.0 && difference.error == 0.0) {
+        *distance = 0.0;
+    } else if (!(largest >= 0x1p-400 && largest <= 0x1p400)) {
+        return false;
+    } else {
+        *distance = distance_of(&difference, ndim);
+    }
+    /* The lower neighbour is the closer one, so this is the stricter side. */
+    if (*distance - 2.0 * difference.error != *distance) {
+        return false;
+    }
+    for (int k = 0; vector != NULL && k < ndim; k++) {
+        vector[k] = difference.component[k].hi;
+    }
+    return true;
+}
+
+/* By integers: D scaled to where nothing overflows, and scaled back. */
+static HS_NO_INLINE double
+measure_in_integers(const hs_metric *metric, const double *p, const double *q, const int64_t *shift,
+                    double *vector)
+{
+    hs_difference difference;
+    int           exponent;
+    double        largest = 0.0;
+    hs_integer_difference(metric, p, q, shift, difference.component, &exponent);
+    difference.error = 0.0;
+    for (int k = 0; k < metric->ndim; k++) {
+        const double component = difference.component[k].hi;
+        largest = fabs(component) > largest ? fabs(component) : largest;
+        if (vector != NULL) {
+            vector[k] = ldexp(component, exponent);
+        }
+    }
+    return largest == 0.0 ? 0.0 : ldexp(distance_of(&difference, metric->ndim), exponent);
+}
+
+double
+hs_metric_measure(const hs_metric *metric, const double *p, const double *q, const int64_t *shift,
+                  double *vector)
+{
+    double distance;
+    bool   done;
+    switch (metric->ndim) {
+    case 2: done = measure_in_floats(metric, p, q, shift, 2, vector, &distance); break;
+    case 3: done = measure_in_floats(metric, p, q, shift, 3, vector, &distance); break;
+    default: done = measure_in_floats(metric, p, q, shift, metric->ndim, vector, &distance);
+    }
+    return done ? distance : measure_in_integers(metric, p, q, shift, vector);
+}
+
+double
+hs_keep_within(double distance, double cutoff, bool inclusive)
+{
+    if (distance < cutoff) {
+        return distance;
+    }
+    return inclusive ? cutoff : nextafter(cutoff, 0.0);
+}
+
+/* A sum that is no float64 lies between two neighbouring ones, and so does nearly
+ * no distance. */
+
+void
+hs_metric_set_cutoff(double cutoff, hs_metric *metric)
+{
+    hs_metric_init(metric, metric->ndim, metric->n_rows, (const double(*)[HS_MAX_DIM])metric->rows,
+                   cutoff, metric->inclusive);
+}
+
+bool
+hs_metric_within_sum(const hs_metric *metric, hs_dw limit, const double *p, const double *q,
+                     const int64_t *shift, hs_stages *stages)
+{
+    hs_metric side = *metric;
+    HS_ASSERT(limit.hi >= 0.0 && limit.hi + limit.lo == limit.hi);
+    if (limit.lo == 0.0) {
+        hs_metric_set_cutoff(limit.hi, &side);
+        return hs_metric_within(&side, p, q, shift, stages);
+    }
+    hs_stages unused = {0, 0, 0}, first = *stages; /* a pair counts once */
+    side.inclusive = true;
+    hs_metric_set_cutoff(limit.lo < 0.0 ? hs_next_down(limit.hi) : limit.hi, &side);
+    if (hs_metric_within(&side, p, q, shift, &first)) {
+        *stages = first;
+        return true;
+    }
+    side.inclusive = false;
+    hs_metric_set_cutoff(limit.lo < 0.0 ? limit.hi : hs_next_up(limit.hi), &side);
+    if (!hs_metric_within(&side, p, q, shift, &unused)) {
+        *stages = first;
+        return false;
+    }
+    stages->by_integers++;
+    const int sign = hs_integer_compare_sum(metric, limit, p, q, shift);
+    return sign < 0 || (sign == 0 && metric->inclusive);
+}
+
+/*
+ * The signs of (x - p).(q - p) and (x - q).(p - q), neither of which is negative if
+ * the foot lies between p and q: by float64 with an error bound, and else by integers.
+ */
+
+/*
+ * d terms, each a product of two differences, are rounded three times each, and their sum d - 1
+ * times: with v = 2^-53 and m the sum of their sizes as it is computed, the error is less than
+ * (d + 2) v m (1 + 2 (d + 2) v), for d <= 8 below 11 v m. Numbers that underflow change it by less
+ * than 2^-1071, which is below v m where m is at least 2^-1000.
+ */
+#define FOOT_ERROR   (12.0 * 0x1p-53)
+#define LEAST_SIZE   0x1p-1000
+#define LARGEST_SIZE 0x1p1020
+
+/* Sign of (x - p).(q - p) by integers: four times that product is |x + q - 2 p|^2 - |x - q|^2. The
+ * first vector is x - p + q - p: q and p are taken for box vectors, with the shift (1, -1). */
+static HS_NO_INLINE int
+sign_by_integers(const double *x, const double *p, const double *q, int ndim)
+{
+    const int64_t shift[2] = {1, -1};
+    hs_metric     metric = {.ndim = ndim, .n_rows = 2};
+    for (int k = 0; k < ndim; k++) {
+        metric.rows[0][k] = q[k];
+        metric.rows[1][k] = p[k];
+    }
+    return hs_integer_compare_two(&metric, &(hs_span){p, x, shift}, &(hs_span){q, x, NULL});
+}
+
+HS_ALWAYS_INLINE bool
+is_forward(const double *x, const double *p, const double *q, int ndim)
+{
+    double product = 0.0, size = 0.0;
+    for (int k = 0; k < ndim; k++) {
+        const double term = (x[k] - p[k]) * (q[k] - p[k]);
+        product += term;
+        size += fabs(term);
+    }
+    if (size >= LEAST_SIZE && size <= LARGEST_SIZE && fabs(product) > FOOT_ERROR * size) {
+        return product > 0.0;
+    }
+    return sign_by_integers(x, p, q, ndim) >= 0;
+}
+
+bool
+hs_foot_is_between(const double *x, const double *p, const double *q, int ndim)
+{
+    return is_forward(x, p, q, ndim) && is_forward(x, q, p, ndim);
+}

@@ -1,0 +1,923 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+#include "histogram.h"
+#include "../exact/filter.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+/* Bands are the filter's thresholds at each edge; the table is made as fine as keeps most
+ * bands apart. */
+
+/* Bits of a float32 that do not choose its cell, in the order in which they are tried. For each
+ * power of two there are 128 cells, which tell a hundred bins apart, or 2048 for a thousand, or
+ * 32768. Constants make the loop quicker. */
+#define FEW_CELLS  16
+#define MANY_CELLS 12
+#define ALL_CELLS  8
+#define MOST_CELLS (1 << 16) /* a megabyte; squares below these share cell 0 */
+
+hs_status
+hs_edges_init(hs_account *account, const hs_scene *scene, double filter_error,
+              const hs_histogram *histogram, hs_edges *edges)
+{
+    const int64_t n = histogram->n_edges;
+    *edges = (hs_edges){.n = n,
+                        .inclusive = histogram->inclusive,
+                        .last_inclusive = histogram->last_inclusive,
+                        .ndim = scene->ndim,
+                        .filter_error = filter_error};
+    edges->at = hs_alloc(account, HS_FOR_CANDIDATES, scene->extreme ? 3 * n : n, sizeof(double));
+    if (edges->at == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    edges->lower = edges->upper = edges->at;
+    if (scene->extreme) {
+        edges->lower = edges->at + n;
+        edges->upper = edges->lower + n;
+    }
+    for (int64_t k = 0; k < n; k++) {
+        const double given = histogram->edges[k], scaled = hs_scale_apply(scene->scale, given);
+        edges->at[k] = scene->extreme ? given : scaled;
+        if (scene->extreme) { /* scaling may have rounded or flushed it */
+            edges->lower[k] = given > 0.0 ? scaled - HS_SCALING_LOSS : 0.0;
+            edges->upper[k] = given > 0.0 ? scaled + HS_SCALING_LOSS : 0.0;
+        }
+    }
+    return HS_OK;
+}
+
+void
+hs_edges_free(hs_account *account, hs_edges *edges)
+{
+    hs_free(account, edges->at);
+    edges->at = NULL;
+}
+
+/* Sets the band of every edge. */
+static void
+set_bands(const hs_edges *edges, double extent, hs_edge_table *table)
+{
+    for (int64_t k = 0; k < edges->n; k++) {
+        const double lower = edges->lower[k], upper = edges->upper[k];
+        if (edges->at[k] == 0.0 && !hs_edge_is_inclusive(edges, k)) {
+            table->in[k] = table->out[k] = -1.0f; /* no distance is below zero */
+            continue;
+        }
+        const hs_thresholds near =
+            hs_thresholds_of(edges->ndim, upper, extent, edges->filter_error);
+        table->out[k] = near.out;
+        table->in[k] = near.in;
+        if (lower != upper) {
+            table->in[k] =
+                lower > 0.0 ? hs_thresholds_of(edges->ndim, lower, extent, edges->filter_error).in
+                            : -1.0f;
+        }
+    }
+}
+
+/* The cell of a square that is not negative, and no larger than the end of the last band. */
+static int32_t
+cell_of(const hs_edge_table *table, float square)
+{
+    const int32_t cell = (int32_t)(hs_bits_of_float(square) >> table->shift) - table->first;
+    HS_ASSERT(square >= 0.0f && cell <= table->last);
+    return cell < 0 ? 0 : cell;
+}
+
+/* Makes cells of 2^shift neighbouring floats each, from the first band that ends above zero to the
+ * last. Returns how many pairs of bands share a cell although they do not overlap. */
+static int64_t
+set_cells(const hs_edges *edges, int shift, hs_edge_table *table)
+{
+    int64_t k = 0, shared = 0;
+    while (k < edges->n - 1 && table->out[k] < 0.0f) {
+        k++;
+    }
+    const float lowest = table->out[k] < 0.0f ? 0.0f : table->out[k];
+    const float highest = table->out[edges->n - 1] < 0.0f ? 0.0f : table->out[edges->n - 1];
+    table->shift = shift;
+    table->first = (int32_t)(hs_bits_of_float(lowest) >> shift);
+    table->last = (int32_t)(hs_bits_of_float(highest) >> shift) - table->first;
+    if (table->last >= MOST_CELLS) {
+        table->first += table->last - (MOST_CELLS - 1);
+        table->last = MOST_CELLS - 1;
+    }
+    for (; k + 1 < edges->n; k++) {
+        const float in = table->in[k + 1], out = table->out[k];
+        shared += in > out && cell_of(table, in) == cell_of(table, out);
+    }
+    return shared;
+}
+
+/* Chooses as few cells as keep most bands apart. */
+static void
+choose_cells(const hs_edges *edges, hs_edge_table *table)
+{
+    const int64_t few = edges->n / 64; /* the last bins share first, and have the most pairs */
+    if (set_cells(edges, FEW_CELLS, table) > few && set_cells(edges, MANY_CELLS, table) > few) {
+        (void)set_cells(edges, ALL_CELLS, table);
+    }
+}
+
+static void
+fill_cells(const hs_edges *edges, hs_edge_table *table)
+{
+    int64_t below = 0, reached = 0; /* bands that end before the cell, or begin before its end */
+    for (int32_t c = 0; c <= table->last; c++) {
+        const uint32_t at = (uint32_t)(table->first + c);
+        const float    least = c == 0 ? 0.0f : hs_float_of_bits(at << table->shift);
+        const float    most = hs_float_of_bits(((at + 1) << table->shift) - 1);
+        while (below < edges->n && table->out[below] < least) {
+            below++;
+        }
+        while (reached < edges->n && (c == table->last || table->in[reached] <= most)) {
+            reached++;
+        }
+        hs_edge_cell *cell = &table->cells[c];
+        cell->slot = (int32_t)(2 * below);
+        cell->n_bands = (int32_t)(reached - below);
+        cell->in = cell->n_bands == 0 ? INT32_MAX : 0;
+        cell->out = INT32_MAX;
+        if (cell->n_bands == 1) {
+            cell->in = table->in[below] < 0.0f ? 0 : (int32_t)hs_bits_of_float(table->in[below]);
+            cell->out = (int32_t)hs_bits_of_float(table->out[below]); /* not below `least` */
+        }
+    }
+}
+
+hs_status
+hs_edge_table_build(const hs_edges *edges, double extent, hs_edge_table *table)
+{
+    hs_edge_table_free(table);
+    table->in = hs_alloc(NULL, HS_FOR_CANDIDATES, 2 * edges->n, sizeof(float));
+    if (table->in == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    table->out = table->in + edges->n;
+    set_bands(edges, extent, table);
+    table->extent = extent;
+    if (!(4.0 * edges->ndim * extent * extent <= FLT_MAX)) { /* four times the largest square */
+        return HS_OK;
+    }
+    choose_cells(edges, table);
+    table->cells =
+        hs_alloc(NULL, HS_FOR_CANDIDATES, (int64_t)table->last + 1, sizeof(hs_edge_cell));
+    if (table->cells == NULL) {
+        hs_edge_table_free(table);
+        return HS_ERR_MEMORY;
+    }
+    fill_cells(edges, table);
+    return HS_OK;
+}
+
+void
+hs_edge_table_free(hs_edge_table *table)
+{
+    hs_free(NULL, table->cells);
+    hs_free(NULL, table->in);
+    *table = (hs_edge_table){0};
+}
+
+HS_ALWAYS_INLINE bool
+find_slots(const hs_edge_table *table, const float *squares, int32_t n, int32_t *slots,
+           const int shift)
+{
+    const hs_edge_cell *cells = table->cells;
+    const int32_t       first = table->first;
+    int32_t             odd = 0;
+    for (int32_t h = 0; h < n; h++) {
+        const int32_t       bits = (int32_t)hs_bits_of_float(squares[h]);
+        const int32_t       at = (bits >> shift) - first;
+        const hs_edge_cell *cell = &cells[at < 0 ? 0 : at];
+        /* Differences of these do not overflow; their sign bits count. */
+        const uint32_t below = (uint32_t)(bits - cell->in) >> 31;
+        const uint32_t above = (uint32_t)(cell->out - bits) >> 31;
+        slots[h] = cell->slot + 1 - (int32_t)below + (int32_t)above;
+        odd |= slots[h];
+    }
+    return (odd & 1) != 0;
+}
+
+bool
+hs_edge_slots(const hs_edge_table *table, const float *squares, int32_t n, int32_t *slots)
+{
+    if (table->cells == NULL) {
+        for (int32_t h = 0; h < n; h++) {
+            slots[h] = 1;
+        }
+        return true;
+    }
+    switch (table->shift) {
+    case FEW_CELLS: return find_slots(table, squares, n, slots, FEW_CELLS);
+    case MANY_CELLS: return find_slots(table, squares, n, slots, MANY_CELLS);
+    default: return find_slots(table, squares, n, slots, ALL_CELLS);
+    }
+}
+
+/* The first edge of [low, high) whose limit is not below the square. */
+static int32_t
+first_not_below(const float *limits, int32_t low, int32_t high, float square)
+{
+    while (low < high) {
+        const int32_t middle = low + (high - low) / 2;
+        if (limits[middle] < square) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    return low;
+}
+
+void
+hs_edge_range(const hs_edge_table *table, const hs_edges *edges, float square, int32_t *low,
+              int32_t *high)
+{
+    if (table->cells == NULL) {
+        *low = 0;
+        *high = (int32_t)edges->n;
+        return;
+    }
+    const hs_edge_cell *cell = &table->cells[cell_of(table, square)];
+    const int32_t       first = cell->slot / 2, end = first + cell->n_bands;
+    *low = first_not_below(table->out, first, end, square);
+    /* Edges with in <= s: up to the first with in > s. */
+    *high = first_not_below(table->in, *low, end, nextafterf(square, INFINITY));
+}
+
+/* Weights to integers, carries between limbs, and the one rounding at the end. */
+
+#define VALUE_BITS 62    /* of a weight, at most */
+#define SUM_BITS   64    /* that 2^62 terms and a sign add to those of a term */
+#define LOWEST     -1074 /* exponent of the smallest float64 */
+
+/* A float64 that is not zero as an odd integer times a power of two. */
+static int64_t
+odd_part(double x, int *exponent)
+{
+    const double  mantissa = frexp(x, exponent);
+    const int64_t whole = (int64_t)ldexp(mantissa, 53);
+    const int     zeros = hs_trailing_zeros((uint64_t)(whole < 0 ? -whole : whole));
+    *exponent += zeros - 53;
+    return whole / (INT64_C(1) << zeros);
+}
+
+/* Exponents of the lowest and of the highest bit of any; 0 where all are zero. */
+static hs_status
+find_range(const double *weights, int64_t n, int *lowest, int *highest, hs_failure *failure)
+{
+    bool any = false;
+    *lowest = *highest = 0;
+    for (int64_t i = 0; i < n; i++) {
+        int exponent, above;
+        if (!isfinite(weights[i])) {
+            failure->row = i;
+            failure->value = weights[i];
+            return HS_ERR_WEIGHTS;
+        }
+        if (weights[i] != 0.0) {
+            (void)odd_part(weights[i], &exponent);
+            (void)frexp(weights[i], &above);
+            *lowest = any && *lowest < exponent ? *lowest : exponent;
+            *highest = any && *highest > above ? *highest : above;
+            any = true;
+        }
+    }
+    return HS_OK;
+}
+
+/* Takes weights as integers of one exponent where 62 bits hold them, else each with a place of its
+ * own. Another thread may write to the weights meanwhile: places are kept in range. */
+static void
+take_weights(const double *weights, const int32_t *order, int64_t n, hs_weights *taken)
+{
+    for (int64_t i = 0; i < n; i++) {
+        const double weight = weights[order[i]];
+        int          exponent = taken->exponent;
+        int64_t      value = 0;
+        if (weight != 0.0 && isfinite(weight)) {
+            value = odd_part(weight, &exponent);
+        }
+        int place = exponent - taken->exponent;
+        place = place < 0 ? 0 : place > taken->most_place ? taken->most_place : place;
+        if (taken->place != NULL) {
+            taken->value[i] = value;
+            taken->place[i] = place;
+        } else {
+            taken->value[i] = (int64_t)((uint64_t)value << place);
+        }
+    }
+}
+
+hs_status
+hs_weights_init(hs_account *account, const double *weights, const int32_t *order, int64_t n,
+                hs_weights *taken, hs_failure *failure)
+{
+    int lowest, highest;
+    *taken = (hs_weights){.bits = 1};
+    if (weights == NULL) {
+        return HS_OK;
+    }
+    const hs_status status = find_range(weights, n, &lowest, &highest, failure);
+    if (status != HS_OK) {
+        return status;
+    }
+    const bool one_place = highest - lowest <= VALUE_BITS;
+    taken->exponent = lowest;
+    taken->bits = one_place ? highest - lowest : 53;
+    taken->most_place = highest - lowest;
+    taken->value = hs_alloc(account, HS_FOR_POINTS, n, sizeof(int64_t));
+    taken->place = one_place ? NULL : hs_alloc(account, HS_FOR_POINTS, n, sizeof(int32_t));
+    if (taken->value == NULL || (!one_place && taken->place == NULL)) {
+        hs_weights_free(account, taken);
+        return HS_ERR_MEMORY;
+    }
+    take_weights(weights, order, n, taken);
+    if (one_place) {
+        taken->most_place = 0;
+    }
+    return HS_OK;
+}
+
+void
+hs_weights_free(hs_account *account, hs_weights *weights)
+{
+    hs_free(account, weights->value);
+    hs_free(account, weights->place);
+    weights->value = NULL;
+    weights->place = NULL;
+}
+
+hs_status
+hs_sums_init(hs_account *account, int64_t n, const hs_weights *a, const hs_weights *b,
+             hs_sums *sums)
+{
+    const int most_place = a->most_place + b->most_place;
+    const int for_bits = (a->bits + b->bits + most_place + SUM_BITS) / 32 + 1;
+    const int for_place = most_place / 32 + 5; /* what hs_sums_add writes to */
+    *sums = (hs_sums){.n = n,
+                      .n_limbs = for_bits > for_place ? for_bits : for_place,
+                      .exponent = a->exponent + b->exponent};
+    if (n > INT64_MAX / sums->n_limbs) {
+        return HS_ERR_MEMORY;
+    }
+    sums->limbs = hs_alloc(account, HS_FOR_CANDIDATES, n * sums->n_limbs, sizeof(int64_t));
+    if (sums->limbs == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    memset(sums->limbs, 0, (size_t)(n * sums->n_limbs) * sizeof(int64_t));
+    return HS_OK;
+}
+
+void
+hs_sums_free(hs_account *account, hs_sums *sums)
+{
+    hs_free(account, sums->limbs);
+    sums->limbs = NULL;
+}
+
+/* Limbs of 32 bits but for the highest one, which has the sign. */
+static void
+carry_one(int64_t *limbs, int32_t n)
+{
+    for (int32_t e = 0; e + 1 < n; e++) {
+        const int64_t low = limbs[e] & INT64_C(0xffffffff);
+        limbs[e + 1] += (limbs[e] - low) / (INT64_C(1) << 32);
+        limbs[e] = low;
+    }
+}
+
+void
+hs_sums_carry(hs_sums *sums)
+{
+    for (int64_t k = 0; k < sums->n; k++) {
+        carry_one(sums->limbs + k * sums->n_limbs, sums->n_limbs);
+    }
+    sums->n_added = 0;
+}
+
+void
+hs_sums_join(hs_sums *sums, hs_sums *more)
+{
+    hs_sums_carry(sums);
+    hs_sums_carry(more);
+    for (int64_t e = 0; e < sums->n * sums->n_limbs; e++) {
+        sums->limbs[e] += more->limbs[e];
+    }
+    hs_sums_carry(sums);
+}
+
+/* top * 2^exponent, 2^63 <= top, and if `more` a little more, as a float64. */
+static double
+round_top(uint64_t top, bool more, int exponent)
+{
+    const int lowest = exponent + 11 > LOWEST ? exponent + 11 : LOWEST; /* 53 bits, or fewer */
+    const int shift = lowest - exponent;
+    if (shift > 64) {
+        return 0.0; /* below half of the smallest number */
+    }
+    const uint64_t half = UINT64_C(1) << (shift - 1);
+    const uint64_t rest = shift < 64 ? top & (2 * half - 1) : top;
+    uint64_t       kept = shift < 64 ? top >> shift : 0;
+    kept += rest > half || (rest == half && (more || (kept & 1)));
+    return ldexp((double)kept, lowest);
+}
+
+/* Bits [32 e, 32 e + 32) of |sum|: of two's complement, negated by `flip` and what is carried. */
+static uint32_t
+next_digit(int64_t limb, bool flip, uint64_t *carry)
+{
+    const uint64_t digit = (flip ? ~(uint32_t)limb : (uint32_t)limb) + *carry;
+    *carry = digit >> 32;
+    return (uint32_t)digit;
+}
+
+double
+hs_sums_round(const hs_sums *sums, int64_t k)
+{
+    const int64_t *limbs = sums->limbs + k * sums->n_limbs;
+    const bool     negative = limbs[sums->n_limbs - 1] < 0;
+    uint64_t       carry = negative, high = 0, low = 0; /* the last three digits so far */
+    uint64_t       top_high = 0, top_low = 0;           /* the highest one that is not zero, and the
+                                                           two below it */
+    bool           any = false, any_below_top = false;  /* digits below these */
+    int32_t        top = 0;
+    for (int32_t e = 0; e < sums->n_limbs; e++) {
+        const uint32_t digit = next_digit(limbs[e], negative, &carry);
+        any = any || (low & UINT32_MAX) != 0;
+        low = low >> 32 | high << 32;
+        high = digit;
+        if (digit != 0) {
+            top = e;
+            top_high = high;
+            top_low = low;
+            any_below_top = any;
+        }
+    }
+    if (top_high == 0) {
+        return 0.0;
+    }
+    const int      dropped = hs_bit_length(top_high); /* of the 96 bits, to have 64 */
+    const uint64_t leading = top_high << (64 - dropped) | top_low >> dropped;
+    const bool     more = any_below_top || (top_low & ((UINT64_C(1) << dropped) - 1)) != 0;
+    const double   size = round_top(leading, more, sums->exponent + 32 * (top - 2) + dropped);
+    return negative ? -size : size;
+}
+
+hs_status
+hs_marked_init(hs_account *account, const hs_marks *marks, const int32_t *order, int64_t n,
+               int32_t n_types, hs_marked *marked, hs_failure *failure)
+{
+    *marked = (hs_marked){.type = NULL};
+    hs_status status =
+        hs_weights_init(account, marks->weights, order, n, &marked->weights, failure);
+    if (status != HS_OK || marks->types == NULL) {
+        return status;
+    }
+    marked->type = hs_alloc(account, HS_FOR_POINTS, n, sizeof(int32_t));
+    if (marked->type == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    for (int64_t i = 0; i < n; i++) {
+        marked->type[i] = marks->types[order[i]];
+        if (marked->type[i] < 0 || marked->type[i] >= n_types) {
+            failure->row = order[i];
+            failure->value = marked->type[i];
+            return HS_ERR_TYPES;
+        }
+    }
+    return HS_OK;
+}
+
+void
+hs_marked_free(hs_account *account, hs_marked *marked)
+{
+    hs_free(account, marked->type);
+    marked->type = NULL;
+    hs_weights_free(account, &marked->weights);
+}
+
+/* Slots of all hits by table; hits that stay unsure wait for the edge that halves their
+ * range, and a batch decides them. */
+
+/* Slots up to which a histogram has copies: together they stay in the first-level cache. */
+#define FEW_SLOTS 1024
+
+static bool
+allocate(hs_tally *tally, int32_t block_capacity, int32_t most_hits)
+{
+    const hs_tally_plan *plan = tally->plan;
+    hs_account          *account = plan->account;
+    const int64_t        n_counts = tally->n_copies * plan->n_groups * tally->n_slots;
+    tally->counts = hs_alloc(account, HS_FOR_CANDIDATES, n_counts, sizeof(int64_t));
+    tally->slots = hs_alloc(account, HS_FOR_CANDIDATES, most_hits, sizeof(int32_t));
+    tally->open = hs_alloc(account, HS_FOR_CANDIDATES, HS_TALLY_OPEN, sizeof(hs_tally_open));
+    tally->asked = hs_alloc(account, HS_FOR_CANDIDATES, HS_TALLY_OPEN, sizeof(int32_t));
+    tally->waiting = hs_alloc(account, HS_FOR_CANDIDATES, plan->edges.n, sizeof(int32_t));
+    bool complete = tally->counts != NULL && tally->slots != NULL && tally->open != NULL &&
+                    tally->asked != NULL && tally->waiting != NULL;
+    if (complete && plan->has_types) {
+        tally->type = hs_alloc(account, HS_FOR_CANDIDATES, block_capacity, sizeof(int32_t));
+        complete = tally->type != NULL;
+    }
+    if (complete && plan->sums) {
+        tally->value = hs_alloc(account, HS_FOR_CANDIDATES, block_capacity, sizeof(int64_t));
+        tally->place = hs_alloc(account, HS_FOR_CANDIDATES, block_capacity, sizeof(int32_t));
+        complete = tally->value != NULL && tally->place != NULL &&
+                   hs_sums_init(account, plan->n_groups * (plan->edges.n + 1),
+                                &plan->asking->weights, &plan->points.weights,
+                                &tally->sums) == HS_OK;
+    }
+    return complete;
+}
+
+hs_status
+hs_tally_init(const hs_tally_plan *plan, int32_t block_capacity, int32_t most_hits, hs_tally *tally)
+{
+    *tally = (hs_tally){.plan = plan, .n_slots = 2 * plan->edges.n + 1, .block = -1};
+    tally->n_copies = !plan->has_types && tally->n_slots <= FEW_SLOTS ? HS_TALLY_COPIES : 1;
+    if (!allocate(tally, block_capacity, most_hits)) {
+        hs_tally_free(tally);
+        return HS_ERR_MEMORY;
+    }
+    memset(tally->counts, 0,
+           (size_t)(tally->n_copies * plan->n_groups * tally->n_slots) * sizeof(int64_t));
+    for (int64_t k = 0; k < plan->edges.n; k++) {
+        tally->waiting[k] = -1;
+    }
+    return HS_OK;
+}
+
+void
+hs_tally_free(hs_tally *tally)
+{
+    if (tally->plan == NULL) {
+        return;
+    }
+    hs_account *account = tally->plan->account;
+    for (int e = 0; e < HS_TALLY_TABLES; e++) {
+        hs_edge_table_free(&tally->tables[e]);
+    }
+    hs_free(account, tally->counts);
+    hs_free(account, tally->slots);
+    hs_free(account, tally->open);
+    hs_free(account, tally->asked);
+    hs_free(account, tally->waiting);
+    hs_free(account, tally->type);
+    hs_free(account, tally->value);
+    hs_free(account, tally->place);
+    hs_sums_free(account, &tally->sums);
+    *tally = (hs_tally){.plan = NULL};
+}
+
+int64_t
+hs_tally_count(const hs_tally *tally, int64_t group, int64_t n_reached)
+{
+    int64_t sum = 0;
+    for (int copy = 0; copy < tally->n_copies; copy++) {
+        const int64_t *counts =
+            tally->counts + (copy * tally->plan->n_groups + group) * tally->n_slots;
+        sum += counts[2 * n_reached];
+    }
+    return sum;
+}
+
+/* The table for groups up to this extent, rounded up to a power of two so that there are few. */
+static const hs_edge_table *
+table_for(hs_tally *tally, double extent)
+{
+    int exponent = 0;
+    if (!(extent > 0.0) || !isfinite(extent)) { /* NaN, with which nothing is sure, or one point */
+        extent = extent == 0.0 ? 0x1p-1000 : INFINITY;
+    } else if (frexp(extent, &exponent) > 0.5) {
+        extent = ldexp(1.0, exponent);
+    }
+    hs_edge_table *table = &tally->tables[(unsigned)exponent % HS_TALLY_TABLES];
+    if (table->extent != extent &&
+        hs_edge_table_build(&tally->plan->edges, extent, table) != HS_OK) {
+        return NULL;
+    }
+    return table;
+}
+
+/* Types and weights of the candidates, once for each block. */
+static void
+load_block(hs_tally *tally, const hs_scanner *scanner)
+{
+    const hs_block   *block = &scanner->block;
+    const hs_weights *weights = &tally->plan->points.weights;
+    if (tally->block == scanner->n_blocks || (tally->type == NULL && tally->value == NULL)) {
+        return;
+    }
+    tally->block = scanner->n_blocks;
+    for (int32_t c = 0; tally->value != NULL && c < block->n; c++) {
+        const int32_t si = block->number[c];
+        tally->value[c] = weights->value != NULL ? weights->value[si] : 1;
+        tally->place[c] = weights->place != NULL ? weights->place[si] : 0;
+    }
+    for (int32_t c = 0; tally->type != NULL && c < block->n; c++) {
+        tally->type[c] = tally->plan->points.type[block->number[c]];
+    }
+}
+
+/* The groups of pairs of point si, by the type of the other point. */
+static const int32_t *
+groups_of(const hs_tally *tally, int32_t si)
+{
+    const hs_tally_plan *plan = tally->plan;
+    return plan->group + (int64_t)plan->asking->type[si] * plan->n_types;
+}
+
+static int64_t
+group_of(const hs_tally *tally, int32_t si, int32_t place)
+{
+    return tally->plan->has_types ? groups_of(tally, si)[tally->type[place]] : 0;
+}
+
+/* The weight of point si. */
+static int64_t
+weight_of(const hs_tally *tally, int32_t si, int32_t *place)
+{
+    const hs_weights *weights = &tally->plan->asking->weights;
+    *place = weights->place != NULL ? weights->place[si] : 0;
+    return weights->value != NULL ? weights->value[si] : 1;
+}
+
+/* The sum of a group for pairs that reach so many edges. */
+static int64_t *
+limbs_of(const hs_tally *tally, int64_t group, int32_t n_reached)
+{
+    const int64_t n_bins = tally->plan->edges.n + 1;
+    return tally->sums.limbs + (group * n_bins + n_reached) * tally->sums.n_limbs;
+}
+
+static void
+sum_pair(hs_tally *tally, int64_t group, int32_t si, int32_t candidate, int32_t n_reached)
+{
+    int32_t       place;
+    const int64_t value = weight_of(tally, si, &place);
+    hs_sums_expect(&tally->sums, 1);
+    hs_sums_add(limbs_of(tally, group, n_reached), value, tally->value[candidate],
+                place + tally->place[candidate]);
+}
+
+static void
+count_plain(hs_tally *tally, int32_t n)
+{
+    const int32_t *slots = tally->slots;
+    const int64_t  n_slots = tally->n_slots;
+    int64_t       *counts = tally->counts;
+    int32_t        h = 0;
+    for (; tally->n_copies == HS_TALLY_COPIES && h + HS_TALLY_COPIES <= n; h += HS_TALLY_COPIES) {
+        counts[slots[h]]++;
+        counts[n_slots + slots[h + 1]]++;
+        counts[2 * n_slots + slots[h + 2]]++;
+        counts[3 * n_slots + slots[h + 3]]++;
+    }
+    for (; h < n; h++) {
+        counts[slots[h]]++;
+    }
+}
+
+/* Counts hits [begin, end) of point si. */
+static void
+count_typed(hs_tally *tally, int32_t si, const int32_t *places, int32_t begin, int32_t end)
+{
+    const int32_t *groups = groups_of(tally, si), *type = tally->type;
+    for (int32_t h = begin; h < end; h++) {
+        tally->counts[groups[type[places[h]]] * tally->n_slots + tally->slots[h]]++;
+    }
+}
+
+/* Sums weights of the hits of point si whose slots are even; those beyond the last edge add to a
+ * sum that is never read. has_places: otherwise all places of weights are 0. */
+HS_ALWAYS_INLINE void
+sum_hits(hs_tally *tally, int32_t si, const int32_t *places, int32_t begin, int32_t end,
+         const bool has_places)
+{
+    int32_t        own_place;
+    const int64_t  own = weight_of(tally, si, &own_place), *value = tally->value;
+    const int64_t  n_limbs = tally->sums.n_limbs;
+    const int32_t *slots = tally->slots;
+    int64_t       *first = tally->sums.limbs;
+    hs_sums_expect(&tally->sums, end - begin);
+    for (int32_t h = begin; h < end; h++) {
+        const int32_t place = has_places ? own_place + tally->place[places[h]] : 0;
+        if (!(slots[h] & 1)) {
+            int64_t *limbs = tally->plan->has_types
+                                 ? limbs_of(tally, group_of(tally, si, places[h]), slots[h] / 2)
+                                 : first + slots[h] / 2 * n_limbs;
+            hs_sums_add(limbs, own, value[places[h]], place);
+        }
+    }
+}
+
+/* An open pair whose range is empty is decided; others wait for the edge in the middle. */
+static void
+settle_or_wait(hs_tally *tally, int32_t u)
+{
+    hs_tally_open *pair = &tally->open[u];
+    if (pair->low < pair->high) {
+        const int32_t edge = pair->low + (pair->high - pair->low) / 2;
+        if (tally->waiting[edge] < 0) {
+            tally->asked[tally->n_asked++] = edge;
+        }
+        pair->next = tally->waiting[edge];
+        tally->waiting[edge] = u;
+        return;
+    }
+    const int64_t group = group_of(tally, pair->si, pair->place);
+    if (tally->plan->sums) {
+        sum_pair(tally, group, pair->si, pair->place, pair->low);
+    }
+    tally->counts[group * tally->n_slots + 2 * pair->low]++;
+}
+
+/* Traces pairs that wait for an edge, from u on; *next: the first that did not fit the batch. */
+static hs_status
+trace_waiting(hs_tally *tally, hs_scanner *scanner, int32_t u, int32_t *next)
+{
+    hs_trace *trace = &scanner->trace;
+    hs_trace_clear(trace);
+    while (u >= 0 && trace->n < HS_BATCH) {
+        hs_trace_put(trace, tally->open[u].si, tally->open[u].place);
+        u = tally->open[u].next;
+    }
+    *next = u;
+    return hs_trace_look_up(trace, true, &scanner->failed_point);
+}
+
+/* Decides all pairs that wait for one edge. */
+static hs_status
+decide_edge(hs_tally *tally, hs_scanner *scanner, int32_t edge)
+{
+    const hs_metric *given = &scanner->search->scene.metric;
+    const hs_edges  *edges = &tally->plan->edges;
+    hs_metric        metric;
+    uint8_t          within[HS_BATCH];
+    int32_t          u = tally->waiting[edge], end;
+    tally->waiting[edge] = -1;
+    hs_metric_init(&metric, given->ndim, given->n_rows, (const double(*)[HS_MAX_DIM])given->rows,
+                   edges->at[edge], hs_edge_is_inclusive(edges, edge));
+    while (u >= 0) {
+        const hs_status status = trace_waiting(tally, scanner, u, &end);
+        if (status != HS_OK) {
+            return status;
+        }
+        hs_decide_traced(scanner, &metric, within);
+        for (int32_t e = 0; u != end; e++) {
+            hs_tally_open *pair = &tally->open[u];
+            const int32_t  next = pair->next;
+            if (within[e]) {
+                pair->high = edge;
+            } else {
+                pair->low = edge + 1;
+            }
+            settle_or_wait(tally, u);
+            u = next;
+        }
+    }
+    return HS_OK;
+}
+
+/* Decides all open pairs. */
+static hs_status
+decide_open(hs_tally *tally, hs_scanner *scanner)
+{
+    hs_status status = HS_OK;
+    scanner->n_ambiguous += tally->n_open;
+    for (int32_t u = 0; u < tally->n_open; u++) {
+        settle_or_wait(tally, u);
+    }
+    while (status == HS_OK && tally->n_asked > 0) {
+        status = decide_edge(tally, scanner, tally->asked[--tally->n_asked]);
+    }
+    tally->n_open = 0;
+    return status;
+}
+
+/* Looks again at hits with odd slots. */
+static hs_status
+look_again(hs_tally *tally, hs_scanner *scanner, const hs_edge_table *table, int32_t first,
+           const hs_hits *hits)
+{
+    hs_status status = HS_OK;
+    for (int32_t t = 0, h = 0; t < hits->n; t++) {
+        for (; h < hits->end[t]; h++) {
+            if (!(tally->slots[h] & 1)) {
+                continue;
+            }
+            hs_tally_open *pair = &tally->open[tally->n_open];
+            *pair = (hs_tally_open){.si = first + t, .place = hits->label[h]};
+            hs_edge_range(table, &tally->plan->edges, scanner->block.squares[h], &pair->low,
+                          &pair->high);
+            if (pair->low == pair->high) { /* of a cell with several bands, but in none of these */
+                settle_or_wait(tally, tally->n_open);
+            } else if (++tally->n_open == HS_TALLY_OPEN) {
+                status = decide_open(tally, scanner);
+            }
+            if (status != HS_OK) {
+                return status;
+            }
+        }
+    }
+    return decide_open(tally, scanner);
+}
+
+hs_status
+hs_tally_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+{
+    hs_tally            *tally = context;
+    const hs_edge_table *table = table_for(tally, scanner->form->extent);
+    const int32_t        n = hits->end[hits->n - 1];
+    if (table == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    load_block(tally, scanner);
+    const bool has_places = tally->plan->points.weights.place != NULL ||
+                            tally->plan->asking->weights.place != NULL;
+    const bool is_open = hs_edge_slots(table, scanner->block.squares, n, tally->slots);
+    if (!tally->plan->has_types) {
+        count_plain(tally, n);
+    }
+    for (int32_t t = 0, begin = 0; t < hits->n; t++) {
+        const int32_t end = hits->end[t];
+        if (tally->plan->has_types) {
+            count_typed(tally, first + t, hits->label, begin, end);
+        }
+        if (tally->plan->sums && has_places) {
+            sum_hits(tally, first + t, hits->label, begin, end, true);
+        } else if (tally->plan->sums) {
+            sum_hits(tally, first + t, hits->label, begin, end, false);
+        }
+        begin = end;
+    }
+    return is_open ? look_again(tally, scanner, table, first, hits) : HS_OK;
+}
+
+/* Edges, types and weights in the order of the cells, before any thread counts. */
+
+/* Which pairs of types are told apart: all, but in the half list (a, b) and (b, a) are one. */
+static hs_status
+plan_groups(bool has_queries, hs_tally_plan *plan)
+{
+    const int64_t n = plan->n_types;
+    plan->n_groups = has_queries ? n * n : n * (n + 1) / 2;
+    if (!plan->has_types) {
+        plan->n_groups = 1;
+        return HS_OK;
+    }
+    plan->group = plan->n_groups <= INT32_MAX
+                      ? hs_alloc(plan->account, HS_FOR_CANDIDATES, n * n, sizeof(int32_t))
+                      : NULL;
+    if (plan->group == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    int32_t next = 0;
+    for (int64_t a = 0; a < n; a++) {
+        for (int64_t b = 0; b < n; b++) {
+            const bool again = !has_queries && b < a;
+            plan->group[a * n + b] = again ? plan->group[b * n + a] : next;
+            next += !again;
+        }
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_tally_plan_open(hs_search *search, const hs_histogram *histogram, hs_tally_plan *plan,
+                   hs_failure *failure)
+{
+    hs_account *account = &search->call->account;
+    plan->account = account;
+    plan->has_types = histogram->n_types > 1;
+    plan->n_types = histogram->n_types;
+    plan->sums = histogram->sums != NULL;
+    plan->asking = search->has_queries ? &plan->queries : &plan->points;
+    hs_status status =
+        hs_edges_init(account, &search->scene, search->filter_error, histogram, &plan->edges);
+    if (status == HS_OK) {
+        status = hs_marked_init(account, &histogram->of_points, search->bins.order, search->bins.n,
+                                plan->n_types, &plan->points, failure);
+    }
+    if (status == HS_OK && search->has_queries) {
+        status = hs_marked_init(account, &histogram->of_queries, search->query_bins.order,
+                                search->query_bins.n, plan->n_types, &plan->queries, failure);
+        failure->in_queries = status == HS_ERR_TYPES || status == HS_ERR_WEIGHTS;
+    }
+    if (status == HS_OK && plan->has_types &&
+        (plan->points.type == NULL || plan->asking->type == NULL)) {
+        status = HS_ERR_TYPES;
+    }
+    return status == HS_OK ? plan_groups(search->has_queries, plan) : status;
+}
+
+void
+hs_tally_plan_close(hs_tally_plan *plan)
+{
+    hs_edges_free(plan->account, &plan->edges);
+    hs_marked_free(plan->account, &plan->points);
+    hs_marked_free(plan->account, &plan->queries);
+    hs_free(plan->account, plan->group);
+}
