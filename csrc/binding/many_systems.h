@@ -34,7 +34,7 @@ bool hs_batch_take(PyObject *const *given, const hs_py_call *call, hs_batch *bat
 /* The same for functions that have a batch as one of their arguments, letter m. */
 bool hs_batch_take_optional(const hs_py_call *call, hs_batch *batch);
 
-/* Harmless twice. */
+/* Idempotent. */
 void hs_batch_free(hs_batch *batch);
 
 /* Systems are named where each has something of its own. */

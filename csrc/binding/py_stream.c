@@ -11,7 +11,7 @@
 /* Owns the stream, and references to the cells that it borrows from and to the progress hook. */
 typedef struct pair_stream {
     PyObject_HEAD
-    hs_stream *stream;     /* NULL: over */
+    hs_stream *stream;     /* NULL after the last block */
     PyObject  *cells;      /* or NULL; as long as there is a stream */
     hs_py_call call;       /* points: their number only */
     PyObject  *progress;   /* or NULL */

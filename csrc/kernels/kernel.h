@@ -9,7 +9,7 @@
  *   squares  lists them too, with the float32 square of each, and notes none as unsure
  *   emit     writes listed hits as pairs, i < j, int32 or int64
  *   write    does so with all that is measured of them
- *   relate   gathers candidates of a search for the nearest
+ *   gather_relative   gathers candidates of a search for the nearest
  *   order    puts the squares of a few hits in order
  *   near_boxes  lists boxes within a distance of another one
  *
@@ -262,7 +262,8 @@ typedef struct hs_relate {
 /* Copies n runs, each of at least one point: y_k = (float)(((x_k + moved_k) - centre_k) * unit),
  * but no further from 0 than extent, each operation rounded once; norm = sum of y_k^2, fused or
  * not; number = that in tree order. Entries past the last may be overwritten. */
-typedef void (*hs_relate_fn)(const hs_relate *relate, const hs_nearest_run *runs, int32_t n);
+typedef void (*hs_relate_fn)(const hs_relate *gather_relative, const hs_nearest_run *runs,
+                             int32_t n);
 
 /* Boxes, and the one that they are near to; all arrays borrowed. */
 typedef struct hs_boxes {
@@ -317,7 +318,7 @@ typedef struct hs_kernel {
     hs_scan_fn    squares;
     hs_emit_fn    emit_int32;
     hs_emit_fn    emit_int64;
-    hs_relate_fn  relate;
+    hs_relate_fn  gather_relative;
     hs_order_fn   order;
     hs_boxes_fn   near_boxes;
     hs_sift_fn    sift;  /* sift.h */
@@ -334,8 +335,8 @@ typedef struct hs_kernel {
     .gather = gather, .list = list, .count = count, .list_direct = list_direct,             \
     .count_direct = count_direct, .list_limits = list_limits, .count_limits = count_limits, \
     .list_supports = list_supports, .count_supports = count_supports, .squares = squares,   \
-    .emit_int32 = emit_int32, .emit_int64 = emit_int64, .relate = relate, .order = order,   \
-    .near_boxes = near_boxes
+    .emit_int32 = emit_int32, .emit_int64 = emit_int64, .gather_relative = gather_relative, \
+    .order = order, .near_boxes = near_boxes
 
 extern const hs_kernel hs_kernel_scalar; /* plain C, any CPU; the specification of the others */
 extern const hs_kernel hs_kernel_avx2;   /* x86-64 only */

@@ -326,18 +326,19 @@ emit_int64(const hs_hits *hits, void *i, void *j)
 }
 
 static void
-relate(const hs_relate *relate, const hs_nearest_run *runs, int32_t n_runs)
+gather_relative(const hs_relate *gather_relative, const hs_nearest_run *runs, int32_t n_runs)
 {
-    const float extent = (float)relate->extent;
+    const float extent = (float)gather_relative->extent;
     for (const hs_nearest_run *run = runs; run < runs + n_runs; run++) {
-        float *HS_RESTRICT   norm = relate->norm + run->at;
-        int32_t *HS_RESTRICT number = relate->number + run->at;
-        for (int k = 0; k < relate->ndim; k++) {
-            const double *HS_RESTRICT x = relate->x[k] + run->si;
-            float *HS_RESTRICT        y = relate->y[k] + run->at;
-            const double              moved = relate->images[run->image].moved[k];
+        float *HS_RESTRICT   norm = gather_relative->norm + run->at;
+        int32_t *HS_RESTRICT number = gather_relative->number + run->at;
+        for (int k = 0; k < gather_relative->ndim; k++) {
+            const double *HS_RESTRICT x = gather_relative->x[k] + run->si;
+            float *HS_RESTRICT        y = gather_relative->y[k] + run->at;
+            const double              moved = gather_relative->images[run->image].moved[k];
             for (int32_t c = 0; c < run->n; c++) {
-                const float place = (float)((x[c] + moved - relate->centre[k]) * relate->unit);
+                const float place =
+                    (float)((x[c] + moved - gather_relative->centre[k]) * gather_relative->unit);
                 y[c] = place > extent ? extent : place < -extent ? -extent : place;
                 norm[c] = (k > 0 ? norm[c] : 0.0f) + y[c] * y[c];
             }

@@ -2,41 +2,43 @@
 /*
  * nearest_template.h: the vector loops of a search for the nearest, once for each instruction set.
  * Include it after a vocabulary (simd_<isa>.h), inside that instruction set's target region.
- * Defines relate (hs_relate_fn), order (hs_order_fn) and near_boxes (hs_boxes_fn).
+ * Defines gather_relative (hs_relate_fn), order (hs_order_fn) and near_boxes (hs_boxes_fn).
  */
 
 HS_ALWAYS_INLINE void
-relate_runs(const hs_relate *relate, const hs_nearest_run *runs, int32_t n_runs, const int ndim)
+gather_relative_runs(const hs_relate *gather_relative, const hs_nearest_run *runs, int32_t n_runs,
+                     const int ndim)
 {
-    const float    extent = (float)relate->extent;
+    const float    extent = (float)gather_relative->extent;
     const integers lanes = lane_numbers();
-    const double   unit = relate->unit;
+    const double   unit = gather_relative->unit;
     for (int32_t r = 0; r < n_runs; r++) {
         const hs_nearest_run *run = &runs[r];
-        const double         *moved = relate->images[run->image].moved;
+        const double         *moved = gather_relative->images[run->image].moved;
         for (int32_t c = 0; c < run->n; c += LANES) {
             const int32_t to = run->at + c, si = run->si + c;
             floats        sum = broadcast(0.0f);
             for (int k = 0; k < ndim; k++) {
-                const double *x = relate->x[k] + si;
-                const floats  y = load_relative(x, moved[k], relate->centre[k], unit);
+                const double *x = gather_relative->x[k] + si;
+                const floats  y = load_relative(x, moved[k], gather_relative->centre[k], unit);
                 const floats  place = within(y, extent);
-                store(relate->y[k] + to, place);
+                store(gather_relative->y[k] + to, place);
                 sum = multiply_add(place, place, sum);
             }
-            store(relate->norm + to, sum);
-            store_integers(relate->number + to, add_integers(lanes, broadcast_integer(si)));
+            store(gather_relative->norm + to, sum);
+            store_integers(gather_relative->number + to,
+                           add_integers(lanes, broadcast_integer(si)));
         }
     }
 }
 
 static void
-relate(const hs_relate *relate, const hs_nearest_run *runs, int32_t n)
+gather_relative(const hs_relate *gather_relative, const hs_nearest_run *runs, int32_t n)
 {
-    switch (relate->ndim) {
-    case 2: relate_runs(relate, runs, n, 2); break;
-    case 3: relate_runs(relate, runs, n, 3); break;
-    default: relate_runs(relate, runs, n, relate->ndim); break;
+    switch (gather_relative->ndim) {
+    case 2: gather_relative_runs(gather_relative, runs, n, 2); break;
+    case 3: gather_relative_runs(gather_relative, runs, n, 3); break;
+    default: gather_relative_runs(gather_relative, runs, n, gather_relative->ndim); break;
     }
 }
 

@@ -33,7 +33,7 @@ typedef struct lanes {
     places image[HS_WRITE_MOST_DIM];
     places S[HS_WRITE_MOST_DIM];
     reals  D[HS_WRITE_MOST_DIM];    /* rounded */
-    halves of_D[HS_WRITE_MOST_DIM]; /* large is exact */
+    halves of_D[HS_WRITE_MOST_DIM]; /* the high part alone is exact */
     marks  flips;                   /* pairs that are listed the other way round */
 } lanes;
 

@@ -174,7 +174,7 @@ hs_by_reach_single(hs_by_reach *by, hs_call *call, hs_use_fn use, void *context,
 }
 
 hs_status
-hs_by_reach_use(const hs_request *request, hs_use_fn use, void *context, hs_failure *failure)
+hs_by_reach_each_step(const hs_request *request, hs_use_fn use, void *context, hs_failure *failure)
 {
     hs_call call;
     int64_t n_pairs = 0;

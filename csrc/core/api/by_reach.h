@@ -25,7 +25,7 @@ hs_status hs_by_reach_check(const hs_request *request, hs_failure *failure);
 hs_status hs_by_reach_open(const hs_request *request, hs_call *call, hs_by_reach *by,
                            hs_failure *failure);
 
-/* Harmless twice. */
+/* Idempotent. */
 void hs_by_reach_close(hs_call *call, hs_by_reach *by);
 
 /* Uses each search in turn, as long as that gives HS_OK; *n_pairs, zero before, is how many all of
@@ -38,8 +38,8 @@ hs_status hs_by_reach_single(hs_by_reach *by, hs_call *call, hs_use_fn use, void
                              int64_t *n_pairs, hs_failure *failure);
 
 /* hs_request_use for requests with a reach and without. */
-hs_status hs_by_reach_use(const hs_request *request, hs_use_fn use, void *context,
-                          hs_failure *failure);
+hs_status hs_by_reach_each_step(const hs_request *request, hs_use_fn use, void *context,
+                                hs_failure *failure);
 
 /*
  * What hs_pairs_find, hs_neighbors_find and hs_neighbors_count do for a request that

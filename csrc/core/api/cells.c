@@ -452,7 +452,7 @@ find_candidates(const hs_cells *cells, const hs_points *queries, hs_pairs *rows,
         hs_output_init(&call->account, d, HS_WANT_I, 8, &rows->offsets);
         status = list_ranges(&search, rows, failure);
         hs_search_close(&search);
-    } else if (status == HS_UNSERVED) {
+    } else if (status == HS_REBUILD) {
         status = tell_unserved(cells, queries, call->options.cutoff, failure);
     }
     if (status != HS_OK) {

@@ -506,7 +506,7 @@ hs_pairs_count(const hs_among *among, const hs_options *options, int64_t *count,
     const hs_options counting = hs_options_of_count(options);
     const hs_request request = hs_request_among(among, HS_HALF_OR_QUERIES, &counting);
     int64_t          n_pairs = 0;
-    const hs_status  status = hs_by_reach_use(&request, count_pairs, &n_pairs, failure);
+    const hs_status  status = hs_by_reach_each_step(&request, count_pairs, &n_pairs, failure);
     *count = status == HS_OK ? n_pairs : *count;
     return status;
 }
@@ -546,8 +546,8 @@ static hs_status
 find_entries(hs_pairs *rows, hs_table *table, hs_failure *failure)
 {
     hs_search *search = table->search;
-    hs_status  status = hs_once_applies(table) ? hs_once_find(table, failure) : HS_TOO_MUCH;
-    if (status != HS_TOO_MUCH) {
+    hs_status  status = hs_once_applies(table) ? hs_once_find(table, failure) : HS_TRY_OTHER;
+    if (status != HS_TRY_OTHER) {
         return status;
     }
     status = hs_table_measure(table, failure);
@@ -1099,7 +1099,7 @@ hs_plan_make(const hs_among *among, const hs_options *options, hs_plan *plan, hs
     }
     hs_plan   made = {.ndim = 0};
     planning  now = {.plan = &made, .wanted = options->algorithm};
-    hs_status status = hs_by_reach_use(&request, use_search, &now, failure);
+    hs_status status = hs_by_reach_each_step(&request, use_search, &now, failure);
     if (status == HS_OK && made.n_searches == 0) {
         status = plan_nothing(&request, &now, failure);
     }

@@ -89,7 +89,7 @@ move_waiting(hs_stream *stream, int64_t first, hs_output *moved)
 {
     const double expected = fmin((double)fill_of(stream), stream->search->grid.expected_pairs);
     open_output(stream, &stream->call.account, moved);
-    hs_output_expect(moved, fmin(expected, MOST_EXPECTED));
+    hs_output_reserve_hint(moved, fmin(expected, MOST_EXPECTED));
     const hs_status status = copy_waiting(stream, first, stream->held.n_pairs - first, moved);
     if (status != HS_OK) {
         hs_output_free(moved);
@@ -476,7 +476,7 @@ hs_visit_columns(const hs_among *among, const hs_options *options, const hs_visi
     }
     request.sets.keeps_none = true;
     *n_visited = 0;
-    const hs_status status = hs_by_reach_use(&request, visit_pairs, &shared, failure);
+    const hs_status status = hs_by_reach_each_step(&request, visit_pairs, &shared, failure);
     return status == HS_ENOUGH ? HS_OK : status;
 }
 

@@ -261,7 +261,7 @@ count_pairs(worker *me, hs_search *search, int64_t s)
         status = hs_walk_or_tell(walker, 0, (int32_t)n, &me->committer.failure);
         me->job->counts[s] += walker->scanner.n_found;
     }
-    hs_walker_rest(search, walker);
+    hs_walker_flush_counters(search, walker);
     return status;
 }
 
@@ -471,7 +471,7 @@ search_range(void *context, int64_t range)
     const double done = (double)job->systems->first[end] / (double)job->points->n;
     if (job->is_direct && first == 0 && done > 0.0) {
         /* most batches have systems of similar size */
-        hs_output_expect(job->output, (double)job->output->n_pairs / done);
+        hs_output_reserve_hint(job->output, (double)job->output->n_pairs / done);
     }
     /* Of nothing, where pairs are written directly: then it only says how far this has come. */
     return hs_commit(&me->committer, done, true);

@@ -20,10 +20,10 @@
 #define HS_NO_FAILURE ((hs_failure){.row = -1, .column = -1, .system = -1})
 
 /* What was kept (cells, a tree, a list) does not serve: it is to be made anew. */
-#define HS_UNSERVED ((hs_status)(HS_STATUS_END + 1))
+#define HS_REBUILD ((hs_status)(HS_STATUS_END + 1))
 
 /* There is more than this method is made for: the caller takes another one. */
-#define HS_TOO_MUCH ((hs_status)(HS_STATUS_END + 2))
+#define HS_TRY_OTHER ((hs_status)(HS_STATUS_END + 2))
 
 /* The work ended here because something else did: a visitor left, or another thread has failed. */
 #define HS_STOPPED ((hs_status)(HS_STATUS_END + 3))

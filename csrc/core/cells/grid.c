@@ -891,7 +891,7 @@ hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_w
     while (hs_grid_set_shape(scene, counts, grid) != HS_OK || hs_stencil_bound(grid) > MOST_ROWS) {
         *is_wider = true;
         if (!halve_counts(scene->ndim, counts)) {
-            return HS_TOO_MUCH;
+            return HS_TRY_OTHER;
         }
     }
     return HS_OK;

@@ -115,7 +115,7 @@ resize(hs_output *output, double pairs)
             undo_resize(output);
             return false;
         }
-        hs_region_expect(column, bytes);
+        hs_region_advise(column, bytes);
     }
     output->capacity = (int64_t)pairs;
     return true;
@@ -160,7 +160,7 @@ charge(hs_output *output, int64_t n)
 }
 
 void
-hs_output_expect(hs_output *output, double n)
+hs_output_reserve_hint(hs_output *output, double n)
 {
     const double guess = n * GUESS_MARGIN + FIRST_CAPACITY;
     if (!(guess < 0x1p40) || !resize(output, guess)) {

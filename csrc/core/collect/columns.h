@@ -66,7 +66,7 @@ void hs_output_copy(hs_output *output, int64_t at, const hs_output *part, int64_
                     int64_t end);
 
 /* Virtual room for about n pairs, before the first: saves growing. Never fails. */
-void hs_output_expect(hs_output *output, double n);
+void hs_output_reserve_hint(hs_output *output, double n);
 
 /* Bytes that the account has been charged for. */
 int64_t hs_output_charged(const hs_output *output);
@@ -75,7 +75,7 @@ int64_t hs_output_charged(const hs_output *output);
  * kept. */
 void *hs_output_take(hs_output *output, unsigned bit);
 
-/* Harmless twice. A fixed output is let go of. */
+/* Idempotent. A fixed output is let go of. */
 void hs_output_free(hs_output *output);
 
 /*

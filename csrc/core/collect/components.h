@@ -27,7 +27,7 @@ typedef struct hs_components {
 /* n points, each alone. HS_OK or HS_ERR_MEMORY: then it holds nothing. 0 <= n < 2^31. */
 hs_status hs_components_open(hs_account *account, int64_t n, int n_axes, hs_components *components);
 
-/* Harmless twice. */
+/* Idempotent. */
 void hs_components_close(hs_account *account, hs_components *components);
 
 /* Points i and j, in image S of j, belong together. S: n_axes entries. */

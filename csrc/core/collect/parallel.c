@@ -665,7 +665,7 @@ record_by(hs_search *search, hs_output *output, hs_walker *walker, hs_recorder *
     if (status == HS_OK) {
         status = walk_all(search, walker, failure);
     }
-    hs_walker_rest(search, walker);
+    hs_walker_flush_counters(search, walker);
     return status;
 }
 
@@ -708,7 +708,7 @@ hs_record_all(hs_search *search, hs_output *output, hs_failure *failure)
     if (output->fixed) { /* a backlog keeps what is written ahead out of the caller's arrays */
         return hs_parallel_record(search, output, failure);
     }
-    hs_output_expect(output, (double)output->n_pairs + search->grid.expected_pairs);
+    hs_output_reserve_hint(output, (double)output->n_pairs + search->grid.expected_pairs);
     return search->call->team != NULL ? hs_parallel_record(search, output, failure)
                                       : hs_record_alone(search, output, failure);
 }

@@ -174,7 +174,7 @@ hs_status hs_parallel_count(hs_search *search, int64_t *count, hs_failure *failu
  */
 
 typedef struct hs_backlog {
-    hs_output     pairs; /* owned; on no account: it is small and does not stay */
+    hs_output     pairs; /* owned; not charged to the account (short-lived) */
     hs_recorder   recorder;
     hs_committer *committer; /* borrowed; takes the pairs when they are many */
 } hs_backlog;

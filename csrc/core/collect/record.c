@@ -87,16 +87,16 @@ typedef struct open_pairs {
 static hs_status
 trace_at(const open_pairs *open, int32_t edge, int32_t *of)
 {
-    hs_trace *trace = &open->scanner->trace;
-    hs_trace_clear(trace);
+    hs_pair_batch *trace = &open->scanner->trace;
+    hs_pair_batch_clear(trace);
     for (int32_t u = 0; u < open->n; u++) {
         const open_pair *pair = &open->pair[u];
         if (pair->low == edge) {
             of[trace->n] = u;
-            hs_trace_put(trace, pair->si, open->places[pair->hit]);
+            hs_pair_batch_put(trace, pair->si, open->places[pair->hit]);
         }
     }
-    return hs_trace_look_up(trace, true, &open->scanner->failed_point);
+    return hs_pair_batch_look_up(trace, true, &open->scanner->failed_point);
 }
 
 /* Decides the pairs that are traced at this edge. */
@@ -344,11 +344,11 @@ can_write(const hs_recorder *recorder, const hs_scanner *scanner)
 static void
 describe(const hs_scanner *scanner, bool is_measured, int32_t first, hs_write *write)
 {
-    const hs_search  *search = scanner->search;
-    const hs_trace   *trace = &scanner->trace;
-    const hs_bins    *asking = hs_search_asking(search);
-    const hs_lattice *lattice = &search->scene.lattice;
-    const bool        turned = asking->turns.known;
+    const hs_search     *search = scanner->search;
+    const hs_pair_batch *trace = &scanner->trace;
+    const hs_bins       *asking = hs_search_asking(search);
+    const hs_lattice    *lattice = &search->scene.lattice;
+    const bool           turned = asking->turns.known;
     write->by_S = search->bins.keeps_originals;
     write->is_shifted = trace->of.has_images || write->by_S;
     write->q = is_measured ? trace->of.q : NULL;
@@ -411,7 +411,7 @@ typedef struct batch_part {
 
 /* The first nonzero component of S is negative. */
 static bool
-is_backward(const hs_trace *trace, int32_t e)
+is_backward(const hs_pair_batch *trace, int32_t e)
 {
     const int m = trace->search->scene.lattice.n_periodic;
     for (int l = 0; l < m; l++) {
@@ -425,7 +425,7 @@ is_backward(const hs_trace *trace, int32_t e)
 
 /* 1, or -1 for pairs of a half list that are listed the other way round. */
 static void
-find_signs(const hs_trace *trace, const int32_t *point, const int32_t *id, double *sign)
+find_signs(const hs_pair_batch *trace, const int32_t *point, const int32_t *id, double *sign)
 {
     int32_t any_own = 0;
     for (int32_t e = 0; e < trace->n; e++) {
@@ -441,10 +441,10 @@ find_signs(const hs_trace *trace, const int32_t *point, const int32_t *id, doubl
 
 /* d and D of the batch to the recorder's arrays, in the unit of the metric. */
 static void
-measure(hs_recorder *recorder, hs_trace *trace)
+measure(hs_recorder *recorder, hs_pair_batch *trace)
 {
     const hs_search *search = trace->search;
-    const hs_batch   batch = hs_trace_batch(trace);
+    const hs_batch   batch = hs_pair_batch_view(trace);
     int64_t *const  *shift = search->bins.keeps_originals ? trace->given : trace->image;
     double *const   *vector = recorder->columns & HS_WANT_VECTOR ? recorder->vector : NULL;
     hs_measure_pairs(search->call->kernel, &search->scene.metric, &batch,
@@ -494,7 +494,7 @@ put_vectors(const hs_recorder *recorder, const hs_search *search, const double *
  * which i and j were wrapped, which can be too many for int32. Returns the first pair whose shift
  * does not fit, or their number. */
 static int32_t
-find_keys(const hs_trace *trace, int64_t keys[][HS_BATCH])
+find_keys(const hs_pair_batch *trace, int64_t keys[][HS_BATCH])
 {
     const int m = trace->search->scene.lattice.n_periodic;
     for (int32_t e = 0; e < trace->n; e++) {
@@ -514,7 +514,7 @@ find_keys(const hs_trace *trace, int64_t keys[][HS_BATCH])
 
 /* S over all box vectors, zero on open ones, when all are few. */
 static void
-put_narrow(const hs_trace *trace, const double *sign, int32_t *to)
+put_narrow(const hs_pair_batch *trace, const double *sign, int32_t *to)
 {
     const hs_lattice *lattice = &trace->search->scene.lattice;
     const int         d = lattice->ndim;
@@ -543,7 +543,8 @@ put_narrow(const hs_trace *trace, const double *sign, int32_t *to)
 /* S over all box vectors, zero on open ones. Returns the first pair whose S does not fit int32, or
  * their number. */
 static int32_t
-put_shifts(const hs_recorder *recorder, const hs_trace *trace, const double *sign, int32_t first)
+put_shifts(const hs_recorder *recorder, const hs_pair_batch *trace, const double *sign,
+           int32_t first)
 {
     const hs_lattice *lattice = &trace->search->scene.lattice;
     const int         d = lattice->ndim, m = lattice->n_periodic;
@@ -579,11 +580,12 @@ put_shifts(const hs_recorder *recorder, const hs_trace *trace, const double *sig
 static hs_status
 put_batch(hs_recorder *recorder, hs_scanner *scanner, const batch_part *part)
 {
-    hs_trace        *trace = &scanner->trace;
+    hs_pair_batch   *trace = &scanner->trace;
     const hs_search *search = scanner->search;
     const bool       measured = recorder->columns & HS_MEASURED;
     double           sign[HS_BATCH];
-    const hs_status  status = hs_trace_look_up(&scanner->trace, measured, &scanner->failed_point);
+    const hs_status  status =
+        hs_pair_batch_look_up(&scanner->trace, measured, &scanner->failed_point);
     if (status != HS_OK) {
         return status;
     }
@@ -616,12 +618,13 @@ put_batch(hs_recorder *recorder, hs_scanner *scanner, const batch_part *part)
 hs_status
 hs_put_measures(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    hs_trace  *trace = &scanner->trace;
-    batch_part part = {.first = 0};
-    hs_trace_clear(trace);
+    hs_pair_batch *trace = &scanner->trace;
+    batch_part     part = {.first = 0};
+    hs_pair_batch_clear(trace);
     for (int32_t t = 0, h = 0; t < hits->n; t++) {
         while (h < hits->end[t]) {
-            const int32_t taken = hs_trace_add(trace, first + t, hits->label + h, hits->end[t] - h);
+            const int32_t taken =
+                hs_pair_batch_add(trace, first + t, hits->label + h, hits->end[t] - h);
             for (int32_t e = trace->n - taken; e < trace->n; e++) {
                 part.point[e] = hits->point[t];
             }
@@ -632,7 +635,7 @@ hs_put_measures(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const
                     return status;
                 }
                 part.first = h;
-                hs_trace_clear(trace);
+                hs_pair_batch_clear(trace);
             }
         }
     }

@@ -34,7 +34,7 @@ typedef struct hs_node_map {
 hs_status hs_node_map_make(hs_account *account, const hs_node_lists *lists, int64_t n,
                            hs_node_map *map);
 
-/* Harmless twice. */
+/* Idempotent. */
 void hs_node_map_free(hs_account *account, hs_node_map *map);
 
 /* Pairs that a caller gives, each once and in ascending order, copied so that nothing

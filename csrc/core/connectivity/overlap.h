@@ -35,7 +35,7 @@ hs_status hs_point_rows_turn(hs_account *account, const hs_point_rows *from, con
 hs_status hs_point_rows_of(hs_account *account, const hs_output *half, int64_t n,
                            hs_point_rows *rows);
 
-/* Harmless twice. */
+/* Idempotent. */
 void hs_point_rows_free(hs_account *account, hs_point_rows *rows);
 
 /* Rows of numbers as bits, 64 numbers to a word. Where the numbers of a row are close
@@ -52,7 +52,7 @@ typedef struct hs_word_rows {
 /* Of rows that ascend. On failure holds nothing. */
 hs_status hs_word_rows_make(hs_account *account, const hs_point_rows *from, hs_word_rows *rows);
 
-/* Harmless twice. */
+/* Idempotent. */
 void hs_word_rows_free(hs_account *account, hs_word_rows *rows);
 
 /*
@@ -157,7 +157,7 @@ typedef struct hs_space_order {
 hs_status hs_space_order_make(hs_call *call, const double *points, int64_t n, int ndim,
                               hs_space_order *order);
 
-/* Harmless twice. */
+/* Idempotent. */
 void hs_space_order_free(hs_account *account, hs_space_order *order);
 
 /*

@@ -738,14 +738,14 @@ settle_or_wait(hs_tally *tally, int32_t u)
 static hs_status
 trace_waiting(hs_tally *tally, hs_scanner *scanner, int32_t u, int32_t *next)
 {
-    hs_trace *trace = &scanner->trace;
-    hs_trace_clear(trace);
+    hs_pair_batch *trace = &scanner->trace;
+    hs_pair_batch_clear(trace);
     while (u >= 0 && trace->n < HS_BATCH) {
-        hs_trace_put(trace, tally->open[u].si, tally->open[u].place);
+        hs_pair_batch_put(trace, tally->open[u].si, tally->open[u].place);
         u = tally->open[u].next;
     }
     *next = u;
-    return hs_trace_look_up(trace, true, &scanner->failed_point);
+    return hs_pair_batch_look_up(trace, true, &scanner->failed_point);
 }
 
 /* Decides all pairs that wait for one edge. */

@@ -36,7 +36,7 @@ hs_support_set_at(const hs_support_set *set, int ndim, int64_t number)
     return set->numbers + (number - set->first) * (hs_support_entries(ndim) + 1);
 }
 
-/* Harmless twice. */
+/* Idempotent. */
 void hs_support_set_free(hs_account *account, hs_support_set *set);
 
 /*
@@ -87,7 +87,7 @@ hs_status hs_levels_divide(hs_account *account, const hs_options *options, const
 /* Counts the points from `first` on: they are part of more. */
 void hs_levels_renumber(int32_t first, hs_levels *levels);
 
-/* Harmless twice. */
+/* Idempotent. */
 void hs_levels_free(hs_account *account, hs_levels *levels);
 
 /* The points of these levels, borrowed. */
@@ -146,7 +146,7 @@ hs_level_step hs_level_plan_all(const hs_levels *levels, const hs_level_plan *pl
 /* Whether one step is all of the search. */
 bool hs_level_plan_is_single(const hs_levels *levels, const hs_level_plan *plan);
 
-/* Harmless twice. */
+/* Idempotent. */
 void hs_level_plan_free(hs_account *account, hs_level_plan *plan);
 
 /*
@@ -259,7 +259,7 @@ hs_level_limits_init(const hs_levels *levels, const hs_level_step *step, hs_leve
 hs_status hs_level_limits_set(const hs_levels *levels, const hs_level_step *step, double bound,
                               hs_search *search, hs_level_limits *own);
 
-/* Harmless twice. */
+/* Idempotent. */
 void hs_level_limits_free(hs_account *account, hs_level_limits *own);
 
 /*
@@ -282,7 +282,7 @@ hs_status hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int6
                         const hs_box *box, bool keeps_none, hs_call *call, hs_level_search *open,
                         hs_failure *failure);
 
-/* Harmless twice. */
+/* Idempotent. */
 void hs_level_close(hs_level_search *open);
 
 #endif

@@ -195,7 +195,7 @@ hs_store_reserve(hs_store *store, hs_purpose purpose, int64_t count, size_t size
     return data;
 }
 
-/* Harmless twice. */
+/* Idempotent. */
 HS_ALWAYS_INLINE void
 hs_store_free(hs_store *store)
 {

@@ -91,7 +91,7 @@ hs_region_reserve(hs_region *region, size_t expected)
     }
     count_block(1);
     *region = (hs_region){.data = data, .capacity = hs_chunk_of(data)->capacity};
-    hs_region_expect(region, expected);
+    hs_region_advise(region, expected);
     return true;
 }
 
@@ -120,7 +120,7 @@ hs_region_grow(hs_region *region, size_t bytes)
 }
 
 void
-hs_region_expect(hs_region *region, size_t bytes)
+hs_region_advise(hs_region *region, size_t bytes)
 {
     if (region->data != NULL) {
         hs_chunk_touch(region->data, region->used);

@@ -34,18 +34,18 @@ typedef struct hs_region {
 } hs_region;
 
 /* An empty region gets at least `expected` writable bytes. False when refused: it is still empty,
- * and a smaller request may succeed. Implies hs_region_expect. */
+ * and a smaller request may succeed. Implies hs_region_advise. */
 bool hs_region_reserve(hs_region *region, size_t expected);
 
 /* At least `bytes` writable bytes; the first `used` ones are kept but may move. False when
- * refused: the region is as before. Call hs_region_expect when all of it will be needed. */
+ * refused: the region is as before. Call hs_region_advise when all of it will be needed. */
 bool hs_region_grow(hs_region *region, size_t bytes);
 
 /* Advice: about this many bytes will have been written in the end. Huge pages for the whole 2 MB
  * parts of them and small pages beyond, so that no result pins up to 2 MB that it does not use:
  * rather a little too few than too many. Calling this with more later costs next to nothing.
  * It holds for pages that have not been written yet. */
-void hs_region_expect(hs_region *region, size_t bytes);
+void hs_region_advise(hs_region *region, size_t bytes);
 
 /* Bytes from the front that are taken to be resident: what was recycled, or is known to be used. */
 size_t hs_region_resident(const hs_region *region);

@@ -512,7 +512,7 @@ find_runs(const hs_nearest *near, const double *low, const double *high, double 
         } else if (!add_leaf_runs(near, node, block) || block->n >= INT32_MAX / 8) {
             return HS_ERR_MEMORY;
         } else if (block->n > most) {
-            return HS_TOO_MUCH;
+            return HS_TRY_OTHER;
         }
         if (!hs_tree_step(left, gap, limit, block->stack, &n_waiting, &number)) {
             return HS_OK;
@@ -590,7 +590,7 @@ hs_nearest_runs_take(const hs_nearest *near, const hs_nearest_group *group, doub
     for (int32_t r = 0; is_one && r < block->n_runs; r++) {
         block->runs[r].image = 0;
     }
-    return block->n > most ? HS_TOO_MUCH : HS_OK;
+    return block->n > most ? HS_TRY_OTHER : HS_OK;
 }
 
 /* Runs and images first; then a unit for which the radius is between 1 and 2; then
@@ -703,20 +703,20 @@ settle_unit(const hs_nearest *near, const hs_nearest_group *group, double error,
 }
 
 static void
-relate(const hs_nearest *near, const double *centre, hs_nearest_block *block)
+gather_relative(const hs_nearest *near, const double *centre, hs_nearest_block *block)
 {
-    hs_relate relate = {.ndim = near->tree.ndim,
-                        .images = block->images,
-                        .unit = block->unit,
-                        .extent = block->extent,
-                        .norm = block->norm,
-                        .number = block->number};
+    hs_relate gather_relative = {.ndim = near->tree.ndim,
+                                 .images = block->images,
+                                 .unit = block->unit,
+                                 .extent = block->extent,
+                                 .norm = block->norm,
+                                 .number = block->number};
     for (int k = 0; k < near->tree.ndim; k++) {
-        relate.x[k] = near->search->bins.x[k];
-        relate.y[k] = block->y[k];
-        relate.centre[k] = centre[k];
+        gather_relative.x[k] = near->search->bins.x[k];
+        gather_relative.y[k] = block->y[k];
+        gather_relative.centre[k] = centre[k];
     }
-    near->search->call->kernel->relate(&relate, block->runs, block->n_runs);
+    near->search->call->kernel->gather_relative(&gather_relative, block->runs, block->n_runs);
     for (int k = 0; k < near->tree.ndim; k++) {
         hs_pad_lanes(block->y[k], block->n);
     }
@@ -742,7 +742,7 @@ gather(const hs_nearest *near, const hs_options *options, const hs_nearest_group
                                                  block->unit, block->extent);
         }
     }
-    relate(near, centre, block);
+    gather_relative(near, centre, block);
     return poll_if_large(options, block);
 }
 
@@ -773,7 +773,7 @@ choose_squares(const hs_nearest *near, const hs_nearest_group *group, hs_nearest
     block->square_error = hs_larger(square - in, out - square) * (1.0 + BLOCK_ROOM);
 }
 
-/* Unit, errors and extent; HS_TOO_MUCH: the group is too wide. */
+/* Unit, errors and extent; HS_TRY_OTHER: the group is too wide. */
 static hs_status
 settle_frame(const hs_nearest *near, const hs_nearest_group *group, double error,
              hs_nearest_block *block)
@@ -785,7 +785,7 @@ settle_frame(const hs_nearest *near, const hs_nearest_group *group, double error
     }
     /* Beyond the group and the radius, by more than roundings take. */
     block->extent = 0.5 * widest + 4.0;
-    return widest > WIDEST_BLOCK ? HS_TOO_MUCH : HS_OK;
+    return widest > WIDEST_BLOCK ? HS_TRY_OTHER : HS_OK;
 }
 
 /* Runs and images. */
@@ -800,7 +800,7 @@ find(const hs_nearest *near, const hs_options *options, hs_nearest_group *group,
         return status == HS_OK ? hs_nearest_runs_take(near, group, most, leaves, block) : status;
     }
     if (start_images(near, group, &images) != HS_OK || images.count > most) {
-        return most < INFINITY ? HS_TOO_MUCH : HS_ERR_MEMORY;
+        return most < INFINITY ? HS_TRY_OTHER : HS_ERR_MEMORY;
     }
     const hs_status status = settle_frame(near, group, images.error, block);
     return status == HS_OK ? hs_nearest_runs_find(near, options, group, most, &images, block)

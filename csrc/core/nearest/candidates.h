@@ -75,7 +75,7 @@ typedef struct hs_nearest_block {
 } hs_nearest_block;
 
 /* Sets runs and images, by walking down the tree: what is within the radius of the group and a
- * little more. HS_TOO_MUCH: more than `most` candidates. */
+ * little more. HS_TRY_OTHER: more than `most` candidates. */
 hs_status hs_nearest_runs_find(const hs_nearest *near, const hs_options *options,
                                const hs_nearest_group *group, double most,
                                hs_nearest_images *images, hs_nearest_block *block);
@@ -88,7 +88,7 @@ hs_status hs_nearest_block_init(const hs_nearest *near, hs_nearest_block *block)
 void      hs_nearest_block_free(const hs_nearest *near, hs_nearest_block *block);
 
 /* Fills the block for a group with its radius, which may be raised a little. leaves: for some
- * groups, this among them, or NULL. HS_TOO_MUCH: there are more than `most` candidates or images,
+ * groups, this among them, or NULL. HS_TRY_OTHER: there are more than `most` candidates or images,
  * or the group is far wider than its radius. */
 hs_status hs_nearest_block_fill(const hs_nearest *near, const hs_options *options,
                                 hs_nearest_group *group, double most, hs_nearest_leaves *leaves,

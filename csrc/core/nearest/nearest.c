@@ -232,7 +232,7 @@ borrow(const hs_nearest *kept, hs_nearest *near)
     memcpy(near->layer_upper, kept->layer_upper, sizeof near->layer_upper);
 }
 
-/* HS_UNSERVED when what is kept does not serve: bounds that do not hold for the queries, a scale
+/* HS_REBUILD when what is kept does not serve: bounds that do not hold for the queries, a scale
  * that would lose digits of the largest distance; or another thread is building it. */
 static hs_status
 prepare_from_kept(hs_nearest *near, const hs_sets *sets, const hs_box *box, double limit,
@@ -243,7 +243,7 @@ prepare_from_kept(hs_nearest *near, const hs_sets *sets, const hs_box *box, doub
     hs_scene    asking;
     hs_status   status = HS_OK;
     if (limit_is_small(limit)) {
-        return HS_UNSERVED;
+        return HS_REBUILD;
     }
     const hs_nearest *kept = hs_nearest_kept_get(sets->trees, &room);
     if (room != NULL) {
@@ -252,19 +252,20 @@ prepare_from_kept(hs_nearest *near, const hs_sets *sets, const hs_box *box, doub
         kept = room;
     }
     if (kept == NULL || status != HS_OK) {
-        return kept == NULL ? HS_UNSERVED : status;
+        return kept == NULL ? HS_REBUILD : status;
     }
     const hs_scene *scene = &kept->search->scene;
     const int       unit = hs_exponent_of(hs_scale_apply(scene->scale, limit));
     /* Far points need closed gaps, which a tree that is kept does not have. */
     if (scene->in_one_cell || hs_is_far(scene->cloud.largest, unit, HS_FAR_BOUNDED_EXPONENT)) {
-        return HS_UNSERVED;
+        return HS_REBUILD;
     }
     if (sets->queries != NULL) {
-        status = hs_scene_like(&search->call->account, search->call->team, &kept->search->scene,
-                               sets->queries, &search->call->options, &asking, failure);
+        status = hs_scene_from_kept(&search->call->account, search->call->team,
+                                    &kept->search->scene, sets->queries, &search->call->options,
+                                    &asking, failure);
         if (status != HS_OK) {
-            failure->in_queries = status != HS_UNSERVED;
+            failure->in_queries = status != HS_REBUILD;
             return status;
         }
     }
@@ -286,11 +287,11 @@ hs_nearest_prepare(hs_nearest *near, const hs_sets *sets, const hs_box *box, dou
     hs_call_gather(search->call, sets->points->n + n_queries);
     hs_call_gather_for(search->call, n_asking, PAIRS_PER_POINT * (double)n_asking);
     search->is_full = true;
-    hs_status status = HS_UNSERVED;
+    hs_status status = HS_REBUILD;
     if (sets->trees != NULL) {
         status = prepare_from_kept(near, sets, box, limit, failure);
     }
-    return status == HS_UNSERVED ? prepare_anew(near, sets, box, limit, failure) : status;
+    return status == HS_REBUILD ? prepare_anew(near, sets, box, limit, failure) : status;
 }
 
 void
@@ -861,7 +862,7 @@ finish_block(nearest_worker *worker, const hs_nearest_group *group, uint64_t *le
         for (int32_t t = first; t < next && status == HS_OK; t++) {
             const int32_t begin = t > first ? end[t - 1] : 0;
             if (t + AHEAD < n_points) {
-                hs_nearest_expect(&worker->writer, group->first + t + AHEAD);
+                hs_nearest_prefetch(&worker->writer, group->first + t + AHEAD);
             }
             bool done = false;
             status = finish_point(worker, group, group->first + t, begin, end[t], &done);
@@ -906,7 +907,7 @@ search_group(nearest_worker *worker, hs_nearest_group *group)
                                                      &worker->leaves, &worker->block);
     if (status == HS_OK) {
         status = finish_block(worker, group, &left);
-    } else if (status == HS_TOO_MUCH) {
+    } else if (status == HS_TRY_OTHER) {
         status = HS_OK;
     }
     for (int32_t t = 0; t < n_points && status == HS_OK && left != 0; t++) {

@@ -446,7 +446,7 @@ hs_nearest_writer_init(const hs_nearest *near, hs_nearest_writer *writer)
 }
 
 void
-hs_nearest_expect(const hs_nearest_writer *writer, int32_t si)
+hs_nearest_prefetch(const hs_nearest_writer *writer, int32_t si)
 {
     const hs_nearest *near = writer->near;
     const int64_t     row = hs_search_asking(near->search)->order[si];

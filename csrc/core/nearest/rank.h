@@ -159,7 +159,7 @@ void hs_nearest_writer_init(const hs_nearest *near, hs_nearest_writer *writer);
 hs_status hs_nearest_write(hs_nearest_writer *writer, hs_nearest_ranker *ranker, int64_t count);
 
 /* Prefetches the row of point si, which will be written soon: rows lie far apart in memory. */
-void hs_nearest_expect(const hs_nearest_writer *writer, int32_t si);
+void hs_nearest_prefetch(const hs_nearest_writer *writer, int32_t si);
 
 /* Writes what is left of the batch: needed once, at the end. Entries do not refer to the block. */
 void hs_nearest_flush(hs_nearest_writer *writer);

@@ -262,7 +262,7 @@ hs_keep_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *h
     }
     keep_visit(fill, scanner, hits, own, NULL);
     const bool is_much = kept->n_pairs * hs_output_bytes_per_pair(kept) > HS_MOST_KEPT;
-    return is_much ? HS_TOO_MUCH : HS_OK;
+    return is_much ? HS_TRY_OTHER : HS_OK;
 }
 
 hs_status
@@ -377,7 +377,7 @@ will_keep(hs_table *table)
            hs_account_allows(&search->call->account, 2.0 * HS_MOST_KEPT);
 }
 
-/* HS_TOO_MUCH: there were too many entries, and none is kept. */
+/* HS_TRY_OTHER: there were too many entries, and none is kept. */
 static hs_status
 keep_all(hs_table *table, hs_failure *failure)
 {
@@ -402,8 +402,8 @@ keep_all(hs_table *table, hs_failure *failure)
 hs_status
 hs_table_measure(hs_table *table, hs_failure *failure)
 {
-    hs_status status = will_keep(table) ? keep_all(table, failure) : HS_TOO_MUCH;
-    if (status == HS_TOO_MUCH) {
+    hs_status status = will_keep(table) ? keep_all(table, failure) : HS_TRY_OTHER;
+    if (status == HS_TRY_OTHER) {
         hs_table_free(table);
         status = hs_table_count(table->search, table->offsets, failure);
     }
@@ -595,7 +595,7 @@ walk_once(once *doing, hs_failure *failure)
     const int64_t n = hs_search_asking(search)->n;
     hs_walker     walker;
     memset(table->offsets, 0, (size_t)n * sizeof *table->offsets);
-    hs_output_expect(table->entries, search->grid.expected_pairs * search->pairs_per_half);
+    hs_output_reserve_hint(table->entries, search->grid.expected_pairs * search->pairs_per_half);
     hs_status status =
         hs_walker_init_ordered(search, HS_BLOCK_LISTS_IDS, &table->most, keep_hits, doing, &walker);
     if (status == HS_OK) {
@@ -682,7 +682,7 @@ hs_once_find(hs_table *table, hs_failure *failure)
     hs_free(&search->call->account, doing.where);
     if (status == HS_ERR_MEMORY) {
         give_up(table->entries);
-        return HS_TOO_MUCH;
+        return HS_TRY_OTHER;
     }
     return status;
 }

@@ -40,7 +40,7 @@ void      hs_filler_close(hs_filler *fill);
 hs_status hs_fill_rows(void *filler, hs_scanner *scanner, int32_t first, const hs_hits *hits);
 
 /* A hs_visit_fn of ordered walkers: whole rows, one behind another, and their lengths as offsets.
- * HS_TOO_MUCH when they are more than HS_MOST_KEPT. */
+ * HS_TRY_OTHER when they are more than HS_MOST_KEPT. */
 hs_status hs_keep_rows(void *filler, hs_scanner *scanner, int32_t first, const hs_hits *hits);
 
 /* The rows of a visit with HS_BLOCK_LISTS_IDS, one behind another, in fill->to, which has room for
@@ -74,7 +74,7 @@ void hs_table_sum(hs_table *table);
 /* Call last: fills the entries, which have room for offsets[rows]. */
 hs_status hs_table_fill(hs_table *table, hs_failure *failure);
 
-/* Harmless twice. */
+/* Idempotent. */
 void hs_table_free(hs_table *table);
 
 /*
@@ -86,7 +86,7 @@ void hs_table_free(hs_table *table);
 /* Whether to try: i and j, nothing else, in columns of the search's own, by one thread. */
 bool hs_once_applies(const hs_table *table);
 
-/* After hs_table_prepare: finds offsets and entries. HS_TOO_MUCH when memory is short: nothing is
+/* After hs_table_prepare: finds offsets and entries. HS_TRY_OTHER when memory is short: nothing is
  * kept then, and two walks, the first of which only counts, can do with less or tell how much it
  * takes. */
 hs_status hs_once_find(hs_table *table, hs_failure *failure);

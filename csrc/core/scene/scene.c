@@ -552,7 +552,7 @@ hs_scene_may_condense(const hs_scene *scene, const hs_scene *asking, const hs_bo
 }
 
 double
-hs_scene_settle_cutoff(const hs_scene *scene, const hs_box_size *size, double cutoff)
+hs_scene_scale_cutoff(const hs_scene *scene, const hs_box_size *size, double cutoff)
 {
     const hs_cloud *cloud = &scene->cloud;
     if (scene->within > 0.0 &&
@@ -791,8 +791,8 @@ hs_scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options, double 
 /* Scenes without a box whose numbers need no scale are filled in one go. */
 
 bool
-hs_scene_stays(const hs_sets *sets, const hs_box *box, const hs_options *options,
-               const hs_scene *scene)
+hs_scene_needs_no_scaling(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                          const hs_scene *scene)
 {
     return box == NULL && sets->queries == NULL && !sets->is_kept && !sets->is_wide &&
            options->precision != HS_DOUBLE && hs_is_ordinary(&scene->cloud, options->cutoff);
@@ -1346,8 +1346,9 @@ start_scene(const hs_points *points, hs_scene *scene)
 }
 
 hs_status
-hs_scene_like(hs_account *account, hs_team *team, const hs_scene *kept, const hs_points *queries,
-              const hs_options *options, hs_scene *asking, hs_failure *failure)
+hs_scene_from_kept(hs_account *account, hs_team *team, const hs_scene *kept,
+                   const hs_points *queries, const hs_options *options, hs_scene *asking,
+                   hs_failure *failure)
 {
     double     magnitude = 0.0;
     hs_options as_kept = *options;
@@ -1359,20 +1360,20 @@ hs_scene_like(hs_account *account, hs_team *team, const hs_scene *kept, const hs
     }
     hs_status status = hs_cloud_load(account, team, queries, options, &asking->cloud, failure);
     if (status == HS_OK && !hs_scene_takes(kept, &asking->cloud)) {
-        status = HS_UNSERVED;
+        status = HS_REBUILD;
     }
     if (status == HS_OK) {
         hs_scene_share(kept, asking);
         status = wrap_points(account, team, &as_kept, asking, &magnitude, failure);
     }
     if (status == HS_ERR_SHIFT_RANGE && !(options->want & HS_WANT_SHIFT)) {
-        status = HS_UNSERVED; /* a scene without turns will do */
+        status = HS_REBUILD; /* a scene without turns will do */
     }
     failure->in_queries = status != HS_OK;
     if (status == HS_OK) {
         hs_scene_bound_errors(asking, magnitude);
         hs_scene_settle_ranges(asking);
-        status = hs_scene_covers(kept, asking) ? HS_OK : HS_UNSERVED;
+        status = hs_scene_covers(kept, asking) ? HS_OK : HS_REBUILD;
     }
     if (status != HS_OK) {
         hs_scene_free(account, asking);
@@ -1489,7 +1490,7 @@ scale_scene(hs_account *account, hs_team *team, const hs_options *options, const
     hs_status         status = HS_OK;
     condensed.box = condensed.given_box = box;
     condensed.is_scaled = condensed.has_turns = false;
-    scene->sought = hs_scene_settle_cutoff(scene, &size, options->cutoff);
+    scene->sought = hs_scene_scale_cutoff(scene, &size, options->cutoff);
     const int unit = hs_unit_exponent(cloud, &size, scene->sought);
     if (hs_scene_may_condense(scene, asking, &size, unit)) {
         const int powers = scene->is_wide ? HS_FAR_BOUNDED_EXPONENT : HS_FAR_EXPONENT;
@@ -1535,7 +1536,7 @@ hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, cons
     if (status == HS_OK) {
         status = load_clouds(account, team, sets, options, scene, asking, failure);
     }
-    scene->is_ordinary = status == HS_OK && hs_scene_stays(sets, box, options, scene);
+    scene->is_ordinary = status == HS_OK && hs_scene_needs_no_scaling(sets, box, options, scene);
     if (scene->is_ordinary) {
         status = hs_scene_fill_ordinary(options, follows, scene, failure);
     } else if (status == HS_OK) {

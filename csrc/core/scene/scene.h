@@ -120,7 +120,7 @@ hs_status hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *
                              hs_scene *asking, hs_failure *failure);
 
 /* Steps of hs_scene_init_sets. The cutoff that scale and gaps go by. */
-double hs_scene_settle_cutoff(const hs_scene *scene, const struct hs_box_size *size, double cutoff);
+double hs_scene_scale_cutoff(const hs_scene *scene, const struct hs_box_size *size, double cutoff);
 
 /* Whether gaps between far points and queries are closed. Queries that come later may lie in such a
  * gap, and the k nearest may be at any distance. Where one scale holds everything, cells of queries
@@ -136,8 +136,8 @@ void hs_scene_set_scale(const hs_box *box, bool is_scaled, int unit, hs_scene *s
 /* Whether a scene, once its points have been read, stays as it was given: there is no box, and
  * nothing is scaled. Then hs_scene_fill_ordinary fills it. follows: it has filled it before, with
  * this cutoff and as many axes. */
-bool      hs_scene_stays(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                         const hs_scene *scene);
+bool hs_scene_needs_no_scaling(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                               const hs_scene *scene);
 hs_status hs_scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene,
                                  hs_failure *failure);
 
@@ -177,12 +177,12 @@ void hs_scene_widen_errors(hs_scene *scene);
 
 /*
  * Queries that meet the points of a scene that was made to be kept, as a scene of their own.
- * HS_UNSERVED when its bounds do not hold for them: they need another one. On failure it holds
+ * HS_REBUILD when its bounds do not hold for them: they need another one. On failure it holds
  * nothing.
  */
-hs_status hs_scene_like(hs_account *account, hs_team *team, const hs_scene *kept,
-                        const hs_points *queries, const hs_options *options, hs_scene *asking,
-                        hs_failure *failure);
+hs_status hs_scene_from_kept(hs_account *account, hs_team *team, const hs_scene *kept,
+                             const hs_points *queries, const hs_options *options, hs_scene *asking,
+                             hs_failure *failure);
 
 /* Points wrapped into the box of a scene that was kept, however far away they are: for their cells
  * alone. On failure it holds nothing. */

@@ -455,14 +455,15 @@ static hs_status
 trace_batch(hit_batch *batch, bool metric)
 {
     hs_scanner *scanner = batch->scanner;
-    hs_trace_clear(&scanner->trace);
-    (void)hs_trace_add(&scanner->trace, scanner->group.first + batch->t, batch->place, batch->n);
-    return hs_trace_look_up(&scanner->trace, metric, &scanner->failed_point);
+    hs_pair_batch_clear(&scanner->trace);
+    (void)hs_pair_batch_add(&scanner->trace, scanner->group.first + batch->t, batch->place,
+                            batch->n);
+    return hs_pair_batch_look_up(&scanner->trace, metric, &scanner->failed_point);
 }
 
 /* Shift e of the trace over the periodic box vectors, from a point to a candidate. */
 static void
-given_shift(const hs_trace *trace, int32_t e, int64_t *shift)
+given_shift(const hs_pair_batch *trace, int32_t e, int64_t *shift)
 {
     for (int r = 0; r < trace->search->scene.lattice.n_periodic; r++) {
         shift[r] = trace->of.is_narrow ? trace->shift[r][e] : trace->given[r][e];
@@ -520,7 +521,7 @@ drop_nearest(const hs_choice *choice, hit_batch *batch)
 
 /* Whether pair e of the trace, of a point with itself, is in the image S = 0. */
 static bool
-is_itself(const hs_trace *trace, int32_t e)
+is_itself(const hs_pair_batch *trace, int32_t e)
 {
     int moved = 0;
     for (int r = 0; r < trace->search->scene.lattice.n_periodic && trace->is_shifted; r++) {

@@ -31,7 +31,7 @@ hs_status hs_partners_open(const hs_selection *selection, int64_t n_asking, int6
                            bool has_queries, hs_account *account, hs_partners *partners,
                            hs_failure *failure);
 
-/* Harmless twice. */
+/* Idempotent. */
 void hs_partners_free(hs_account *account, hs_partners *partners);
 
 /*
@@ -135,7 +135,7 @@ hs_choice_least(const hs_choice *choice, const hs_scene *scene)
  * Takes hits of points [first, next) of the group out that the call's choice leaves out; the order
  * of the others stays. Hits are places, and become point numbers where the scanner lists these. The
  * pair of a point with itself stays where lists are full: table rows count on it. HS_OK, or any
- * status of hs_trace_look_up and hs_near_image; scanner->failed_point is the asking point then.
+ * status of hs_pair_batch_look_up and hs_near_image; scanner->failed_point is the asking point then.
  */
 hs_status hs_choose(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next);
 

@@ -169,11 +169,11 @@ typedef struct two_supports {
 static two_supports
 supports_of(const hs_scanner *scanner, int32_t e)
 {
-    const hs_supports *supports = scanner->search->limits->supports;
-    const hs_trace    *trace = &scanner->trace;
-    const int          n_entries = hs_support_entries(scanner->search->scene.ndim);
-    const int32_t      sj = scanner->block.number[trace->place[e]];
-    two_supports       of = {NULL, NULL, n_entries};
+    const hs_supports   *supports = scanner->search->limits->supports;
+    const hs_pair_batch *trace = &scanner->trace;
+    const int            n_entries = hs_support_entries(scanner->search->scene.ndim);
+    const int32_t        sj = scanner->block.number[trace->place[e]];
+    two_supports         of = {NULL, NULL, n_entries};
     if (hs_rule_needs_asking(supports->rule)) {
         of.asking = support_of(&supports->of_asking, trace->si[e], n_entries);
     }
@@ -268,7 +268,7 @@ decide_pair(hs_scanner *scanner, int32_t e)
     double             p[HS_MAX_DIM], q[HS_MAX_DIM];
     int64_t            shift[HS_MAX_DIM];
     const two_supports of = supports_of(scanner, e);
-    const hs_span      span = {p, q, hs_trace_pair(&scanner->trace, e, p, q, shift)};
+    const hs_span      span = {p, q, hs_pair_batch_pair(&scanner->trace, e, p, q, shift)};
     return scanner->options.precision == HS_EXACT ? decide_exactly(scanner, &of, &span)
                                                   : decide_rounded(scanner, &of, &span);
 }

@@ -88,7 +88,7 @@ hs_limit_of(const hs_limits *limits, int32_t si, int32_t sj)
 HS_ALWAYS_INLINE hs_dw
 hs_limit_of_pair(const hs_scanner *scanner, int32_t e)
 {
-    const hs_trace *trace = &scanner->trace;
+    const hs_pair_batch *trace = &scanner->trace;
     return hs_limit_of(scanner->search->limits, trace->si[e],
                        scanner->block.number[trace->place[e]]);
 }

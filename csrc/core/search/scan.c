@@ -785,7 +785,7 @@ add_arrays(hs_parts *parts, int n, int64_t length, size_t size, void **arrays)
 }
 
 static bool
-allocate(hs_account *account, hs_trace *trace)
+allocate(hs_account *account, hs_pair_batch *trace)
 {
     const int     d = trace->search->scene.ndim, m = trace->search->scene.lattice.n_periodic;
     const bool    as_given = trace->search->bins.keeps_originals, narrow = trace->of.is_narrow;
@@ -807,8 +807,8 @@ allocate(hs_account *account, hs_trace *trace)
 }
 
 hs_status
-hs_trace_init(const hs_search *search, const hs_block *block, const hs_options *polls,
-              bool needs_given, hs_trace *trace)
+hs_pair_batch_init(const hs_search *search, const hs_block *block, const hs_options *polls,
+                   bool needs_given, hs_pair_batch *trace)
 {
     hs_account *account = &search->call->account;
     trace->search = search;
@@ -817,19 +817,19 @@ hs_trace_init(const hs_search *search, const hs_block *block, const hs_options *
     trace->as_given = search->bins.keeps_originals;
     trace->is_plain = hs_has_plain_shifts(&search->scene.lattice);
     trace->has_zeros = false;
-    hs_trace_clear(trace);
+    hs_pair_batch_clear(trace);
     hs_status status = hs_records_init(search, block, polls, needs_given, &trace->of);
     if (status == HS_OK && !allocate(account, trace)) {
         status = HS_ERR_MEMORY;
     }
     if (status != HS_OK) {
-        hs_trace_free(account, trace);
+        hs_pair_batch_free(account, trace);
     }
     return status;
 }
 
 bool
-hs_trace_renew(bool needs_given, hs_trace *trace)
+hs_pair_batch_renew(bool needs_given, hs_pair_batch *trace)
 {
     const hs_search *search = trace->search;
     if (trace->n_rows != search->scene.lattice.n_periodic ||
@@ -839,12 +839,12 @@ hs_trace_renew(bool needs_given, hs_trace *trace)
         return false;
     }
     trace->is_plain = hs_has_plain_shifts(&search->scene.lattice);
-    hs_trace_clear(trace);
+    hs_pair_batch_clear(trace);
     return true;
 }
 
 void
-hs_trace_free(hs_account *account, hs_trace *trace)
+hs_pair_batch_free(hs_account *account, hs_pair_batch *trace)
 {
     hs_free(account, trace->memory);
     trace->memory = NULL;
@@ -859,7 +859,7 @@ turns_of(const hs_bins *bins, int r, int64_t si)
 }
 
 int32_t
-hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t n)
+hs_pair_batch_add(hs_pair_batch *trace, int32_t si, const int32_t *places, int32_t n)
 {
     const int32_t room = HS_BATCH - trace->n;
     int32_t      *place = trace->place + trace->n, *of = trace->si + trace->n;
@@ -889,7 +889,7 @@ run_of(const hs_block *block, int32_t place)
 /* What the metric measures between, and its shifts, without records: they are of X, over B. Where
  * the block has no image, `image` and `times` are left alone, and not read later. */
 static void
-look_up_few(hs_trace *trace)
+look_up_few(hs_pair_batch *trace)
 {
     const hs_block *block = trace->of.block;
     const hs_bins  *bins = &trace->search->bins, *asking = hs_search_asking(trace->search);
@@ -914,7 +914,7 @@ look_up_few(hs_trace *trace)
 }
 
 static void
-look_up_points(hs_trace *trace)
+look_up_points(hs_pair_batch *trace)
 {
     const hs_bins *bins = hs_search_asking(trace->search);
     const int32_t *place = trace->place, *si = trace->si;
@@ -933,7 +933,7 @@ look_up_points(hs_trace *trace)
 
 /* S = image + turns_i - turns_j; of points as given also the metric's shift. */
 static void
-look_up_narrow(hs_trace *trace)
+look_up_narrow(hs_pair_batch *trace)
 {
     const bool      as_given = trace->search->bins.keeps_originals;
     const hs_turns *turns = &hs_search_asking(trace->search)->turns;
@@ -964,7 +964,7 @@ look_up_narrow(hs_trace *trace)
  * all known to cancel or not to be needed. Returns the first pair whose S passes its range, or
  * their number. */
 static int32_t
-look_up_given(hs_trace *trace)
+look_up_given(hs_pair_batch *trace)
 {
     const hs_bins *asking = hs_search_asking(trace->search);
     const int      m = trace->search->bins.n_periodic;
@@ -994,7 +994,7 @@ look_up_given(hs_trace *trace)
 /* Shifts over B, the metric's where it measures between X. Where the block has none, they are
  * zeroed once and left alone; how many times the metric shifts is not read then. */
 static void
-look_up_images(hs_trace *trace)
+look_up_images(hs_pair_batch *trace)
 {
     const bool zero = !trace->of.has_images;
     int32_t    any = 0;
@@ -1019,7 +1019,7 @@ look_up_images(hs_trace *trace)
 
 /* The metric's shift of points as given, over the box vectors as given. */
 static void
-look_up_times(hs_trace *trace)
+look_up_times(hs_pair_batch *trace)
 {
     int64_t any = 0, wide = 0;
     for (int r = 0; r < trace->search->bins.n_periodic; r++) {
@@ -1035,7 +1035,7 @@ look_up_times(hs_trace *trace)
 }
 
 hs_status
-hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point)
+hs_pair_batch_look_up(hs_pair_batch *trace, bool metric, int64_t *failed_point)
 {
     const hs_bins *bins = hs_search_asking(trace->search);
     metric = metric ||
@@ -1076,7 +1076,7 @@ end_with_zeros(double *entries, int32_t n)
 }
 
 hs_batch
-hs_trace_batch(hs_trace *trace)
+hs_pair_batch_view(hs_pair_batch *trace)
 {
     hs_batch batch = {.n = trace->n};
     for (int k = 0; k < trace->search->scene.ndim; k++) {
@@ -1090,7 +1090,7 @@ hs_trace_batch(hs_trace *trace)
 }
 
 const int64_t *
-hs_trace_pair(const hs_trace *trace, int32_t e, double *p, double *q, int64_t *shift)
+hs_pair_batch_pair(const hs_pair_batch *trace, int32_t e, double *p, double *q, int64_t *shift)
 {
     const bool as_given = trace->search->bins.keeps_originals;
     for (int k = 0; k < trace->search->scene.ndim; k++) {
@@ -1320,8 +1320,8 @@ looks_up_late(const hs_scanner *scanner)
 static hs_status
 open_trace(bool needs_given, hs_scanner *scanner)
 {
-    return hs_trace_init(scanner->search, &scanner->block, &scanner->options, needs_given,
-                         &scanner->trace);
+    return hs_pair_batch_init(scanner->search, &scanner->block, &scanner->options, needs_given,
+                              &scanner->trace);
 }
 
 /* Sets all but what has memory. */
@@ -1384,7 +1384,7 @@ hs_scanner_renew(hs_search *search, hs_block_use use, int32_t capacity, int32_t 
     }
     begin(search, use, false, scanner);
     return scanner->scans == scans && (scanner->trace.memory == NULL ||
-                                       hs_trace_renew(needs_shifts(scanner), &scanner->trace));
+                                       hs_pair_batch_renew(needs_shifts(scanner), &scanner->trace));
 }
 
 void
@@ -1406,7 +1406,7 @@ hs_scanner_close(hs_search *search, hs_scanner *scanner)
 {
     hs_scanner_note(search, scanner);
     hs_order_free(&search->call->account, &scanner->block, &scanner->order);
-    hs_trace_free(&search->call->account, &scanner->trace);
+    hs_pair_batch_free(&search->call->account, &scanner->trace);
     hs_block_free(&search->call->account, &scanner->block);
 }
 
@@ -1454,7 +1454,7 @@ decide_pair(hs_scanner *scanner, const hs_metric *metric, int32_t e, bool others
 {
     double         p[HS_MAX_DIM], q[HS_MAX_DIM];
     int64_t        of_pair[HS_MAX_DIM];
-    const int64_t *shift = hs_trace_pair(&scanner->trace, e, p, q, of_pair);
+    const int64_t *shift = hs_pair_batch_pair(&scanner->trace, e, p, q, of_pair);
     if (scanner->options.precision == HS_DOUBLE) {
         return hs_metric_within_double(metric, p, q, shift);
     }
@@ -1468,7 +1468,8 @@ decide_pair(hs_scanner *scanner, const hs_metric *metric, int32_t e, bool others
  * r^2, by at most (d + 4) 2^-53 of it. Pairs without a shift only.
  */
 static void
-judge_scaled(const hs_metric *metric, const hs_trace *trace, uint8_t *verdict, hs_stages *stages)
+judge_scaled(const hs_metric *metric, const hs_pair_batch *trace, uint8_t *verdict,
+             hs_stages *stages)
 {
     const hs_scale scale = hs_scale_of(metric->cutoff > 0.0 ? ilogb(metric->cutoff) : 0);
     const double   r = hs_scale_apply(scale, metric->cutoff);
@@ -1495,13 +1496,13 @@ judge_scaled(const hs_metric *metric, const hs_trace *trace, uint8_t *verdict, h
 void
 hs_decide_traced(hs_scanner *scanner, const hs_metric *metric, uint8_t *within)
 {
-    hs_trace  *trace = &scanner->trace;
-    const bool by_batch = scanner->options.precision != HS_DOUBLE && !trace->is_wide;
-    uint8_t    verdict[HS_BATCH + HS_BATCH_PADDING];
+    hs_pair_batch *trace = &scanner->trace;
+    const bool     by_batch = scanner->options.precision != HS_DOUBLE && !trace->is_wide;
+    uint8_t        verdict[HS_BATCH + HS_BATCH_PADDING];
     if (by_batch && !metric->floats_usable && !trace->is_shifted) {
         judge_scaled(metric, trace, verdict, &scanner->stages);
     } else if (by_batch) {
-        const hs_batch batch = hs_trace_batch(trace);
+        const hs_batch batch = hs_pair_batch_view(trace);
         scanner->search->call->kernel->judge(metric, &batch, verdict, &scanner->stages);
     }
     for (int32_t e = 0; e < trace->n; e++) {
@@ -1518,7 +1519,7 @@ decide_by_limit(hs_scanner *scanner, int32_t e, hs_dw limit)
     double         p[HS_MAX_DIM], q[HS_MAX_DIM];
     int64_t        of_pair[HS_MAX_DIM];
     hs_metric      metric = scanner->search->scene.metric;
-    const int64_t *shift = hs_trace_pair(&scanner->trace, e, p, q, of_pair);
+    const int64_t *shift = hs_pair_batch_pair(&scanner->trace, e, p, q, of_pair);
     if (limit.hi < 0.0) {
         return false;
     }
@@ -1584,15 +1585,15 @@ decide_by_supports(hs_scanner *scanner, uint8_t *within)
 static hs_status
 trace_unsure(hs_scanner *scanner, const hs_scan *scan, int32_t u, int32_t *next)
 {
-    hs_trace *trace = &scanner->trace;
-    hs_trace_clear(trace);
+    hs_pair_batch *trace = &scanner->trace;
+    hs_pair_batch_clear(trace);
     for (; u < scan->n_unsure && trace->n < HS_BATCH; u++) {
         const hs_unsure unsure = scan->unsure[u];
-        hs_trace_put(trace, scanner->group.first + unsure.t,
-                     scanner->is_ordered ? scanner->block.origin[unsure.place] : unsure.place);
+        hs_pair_batch_put(trace, scanner->group.first + unsure.t,
+                          scanner->is_ordered ? scanner->block.origin[unsure.place] : unsure.place);
     }
     *next = u;
-    return hs_trace_look_up(trace, true, &scanner->failed_point);
+    return hs_pair_batch_look_up(trace, true, &scanner->failed_point);
 }
 
 hs_status

@@ -208,7 +208,7 @@ bool hs_has_plain_shifts(const hs_lattice *lattice);
 
 /* A batch of pairs. Arrays have one entry for each pair, HS_BATCH and some more of doubles; those
  * of shifts are one for each row of B. */
-typedef struct hs_trace {
+typedef struct hs_pair_batch {
     const hs_search *search;   /* borrowed */
     void            *memory;   /* owned: of the arrays */
     hs_records       of;       /* the candidates */
@@ -225,20 +225,20 @@ typedef struct hs_trace {
     bool     has_zeros;         /* image holds nothing but zeros */
     bool     is_shifted;        /* some entry of times is not zero */
     bool     is_wide;           /* some entry is too large for the batch kernels */
-} hs_trace;
+} hs_pair_batch;
 
 /* needs_given: whether S is wanted, or else only what the metric needs. */
-hs_status hs_trace_init(const hs_search *search, const hs_block *block, const hs_options *polls,
-                        bool needs_given, hs_trace *trace);
-void      hs_trace_free(hs_account *account, hs_trace *trace);
+hs_status hs_pair_batch_init(const hs_search *search, const hs_block *block,
+                             const hs_options *polls, bool needs_given, hs_pair_batch *trace);
+void      hs_pair_batch_free(hs_account *account, hs_pair_batch *trace);
 
 /* Makes it ready for what its search has become, with as many axes. False if it has other arrays
  * than that needs. */
-bool hs_trace_renew(bool needs_given, hs_trace *trace);
+bool hs_pair_batch_renew(bool needs_given, hs_pair_batch *trace);
 
 /* Empties the batch. */
 HS_ALWAYS_INLINE void
-hs_trace_clear(hs_trace *trace)
+hs_pair_batch_clear(hs_pair_batch *trace)
 {
     trace->n = 0;
     trace->is_shifted = trace->is_wide = false;
@@ -246,7 +246,7 @@ hs_trace_clear(hs_trace *trace)
 
 /* Adds the pair of point si with the candidate at a place; there must be room. */
 HS_ALWAYS_INLINE void
-hs_trace_put(hs_trace *trace, int32_t si, int32_t place)
+hs_pair_batch_put(hs_pair_batch *trace, int32_t si, int32_t place)
 {
     trace->si[trace->n] = si;
     trace->place[trace->n] = place;
@@ -255,21 +255,21 @@ hs_trace_put(hs_trace *trace, int32_t si, int32_t place)
 
 /* Adds the pairs of point si with the candidates at n places, as far as there is room; returns how
  * many. They are looked up together, because one point has few hits. */
-int32_t hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t n);
+int32_t hs_pair_batch_add(hs_pair_batch *trace, int32_t si, const int32_t *places, int32_t n);
 
 /*
  * Fills the arrays of the batch: S, when needs_given, and unless `metric` is false and S needs
  * nothing else, what the metric measures between. HS_OK; HS_ERR_SHIFT_RANGE when a shift passes its
  * range, with the number of the point; HS_ERR_INTERRUPTED.
  */
-hs_status hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point);
+hs_status hs_pair_batch_look_up(hs_pair_batch *trace, bool metric, int64_t *failed_point);
 
 /* The batch as the batch kernels take it. */
-hs_batch hs_trace_batch(hs_trace *trace);
+hs_batch hs_pair_batch_view(hs_pair_batch *trace);
 
 /* Pair e as the functions of metric.h take it; returns shift, filled, or NULL for none. */
-const int64_t *hs_trace_pair(const hs_trace *trace, int32_t e, double *p, double *q,
-                             int64_t *shift);
+const int64_t *hs_pair_batch_pair(const hs_pair_batch *trace, int32_t e, double *p, double *q,
+                                  int64_t *shift);
 
 /*
  * What tests one group of points after the other against its neighbourhood: the block of
@@ -310,10 +310,10 @@ typedef struct hs_form {
 /* Belongs to one thread. */
 struct hs_scanner {
     /* Large, and filled before they are read: not cleared at first. */
-    hs_form  forms[HS_FORMS]; /* by the last bits of the extent */
-    hs_group group;
-    hs_block block;
-    hs_trace trace;
+    hs_form       forms[HS_FORMS]; /* by the last bits of the extent */
+    hs_group      group;
+    hs_block      block;
+    hs_pair_batch trace;
     /* From here on all begins as zero. */
     const hs_search *search;     /* borrowed, read only */
     hs_options       options;    /* the call's, with a poll only for the caller's own thread */

@@ -514,7 +514,7 @@ hs_search_set_asking(const hs_sets *sets, hs_search *search)
 }
 
 void
-hs_search_settle(hs_search *search)
+hs_search_finish_setup(hs_search *search)
 {
     search->filter_error =
         search->scene.x_error + search->grid.shift_error + search->scene.formula_error;
@@ -591,7 +591,7 @@ choose_grid(hs_search *search, hs_failure *failure)
     const hs_options  *options = &search->call->options;
     const hs_algorithm algorithm = options->algorithm;
     const bool         is_dense = algorithm == HS_GRID;
-    hs_status          status = HS_TOO_MUCH;
+    hs_status          status = HS_TRY_OTHER;
     bool               may_be_sparse = true;
     search->is_sparse = false; /* another system may have been searched before */
     if (algorithm == HS_ALL_PAIRS || algorithm == HS_HASH) {
@@ -601,7 +601,7 @@ choose_grid(hs_search *search, hs_failure *failure)
         const double width = hs_scale_apply(search->scene.scale, options->cell_size);
         status = hs_grid_init_wide(&search->scene, width, &search->grid, &may_be_sparse, failure);
     }
-    if (status == HS_TOO_MUCH) {
+    if (status == HS_TRY_OTHER) {
         status = hs_grid_init_kind(&search->scene, is_dense ? HS_GRID_CELLS : HS_GRID_ANY,
                                    &search->grid, failure);
     }
@@ -687,7 +687,7 @@ hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_fa
         }
     }
     if (status == HS_OK) {
-        hs_search_settle(search);
+        hs_search_finish_setup(search);
     }
     return status;
 }
@@ -747,7 +747,7 @@ adapt(const hs_sets *sets, hs_search *search, hs_failure *failure)
     }
     hs_scene_init_metric(&search->scene, options);
     hs_search_set_asking(sets, search);
-    hs_search_settle(search);
+    hs_search_finish_setup(search);
     if (status == HS_OK) {
         status = hs_estimate_by_density(search, failure);
     }
@@ -762,8 +762,9 @@ static hs_status
 take_queries(const hs_points *queries, hs_search *search, hs_failure *failure)
 {
     hs_scene  asking;
-    hs_status status = hs_scene_like(&search->call->account, search->call->team, &search->scene,
-                                     queries, &search->call->options, &asking, failure);
+    hs_status status = hs_scene_from_kept(&search->call->account, search->call->team,
+                                          &search->scene, queries, &search->call->options, &asking,
+                                          failure);
     if (status == HS_OK) {
         status = hs_search_bin_queries(search, &asking);
         hs_scene_free(&search->call->account, &asking);
@@ -777,7 +778,7 @@ hs_search_reuse(const hs_sets *sets, hs_call *call, hs_search *search, hs_failur
     const hs_search *built = sets->built;
     const int64_t    n_queries = sets->queries != NULL ? sets->queries->n : 0;
     if (!serves(built, &call->options, sets->least_cutoff)) {
-        return HS_UNSERVED;
+        return HS_REBUILD;
     }
     hs_search_begin(call, search);
     borrow(built, sets->is_untested, search);
@@ -788,7 +789,7 @@ hs_search_reuse(const hs_sets *sets, hs_call *call, hs_search *search, hs_failur
     }
     if (status != HS_OK) {
         hs_search_close(search);
-        if (status == HS_UNSERVED) {
+        if (status == HS_REBUILD) {
             hs_call_restart(call);
             failure->in_queries = false;
         }
@@ -816,11 +817,11 @@ hs_status
 hs_search_open(const hs_sets *sets, const hs_box *box, hs_call *call, hs_search *search,
                hs_failure *failure)
 {
-    hs_status status = HS_UNSERVED;
+    hs_status status = HS_REBUILD;
     if (sets->built != NULL) {
         status = hs_search_reuse(sets, call, search, failure);
     }
-    if (status == HS_UNSERVED) {
+    if (status == HS_REBUILD) {
         const int64_t n_queries = sets->queries != NULL ? sets->queries->n : 0;
         hs_search_begin(call, search);
         hs_call_gather(call, sets->points->n + n_queries);

@@ -38,7 +38,7 @@ typedef struct hs_shells {
 hs_status hs_shells_open(hs_account *account, const hs_scene *scene, const hs_options *options,
                          hs_shells *shells);
 
-/* Harmless twice. */
+/* Idempotent. */
 void hs_shells_free(hs_account *account, hs_shells *shells);
 
 /* How many edges each of n distances, which are not negative, is surely above; for one that its
@@ -116,7 +116,7 @@ hs_search_asking(const hs_search *search)
 void hs_search_set_asking(const hs_sets *sets, hs_search *search);
 
 /* Sets what follows from scene and grid. */
-void hs_search_settle(hs_search *search);
+void hs_search_finish_setup(hs_search *search);
 
 /* Frees what it has; harmless twice. The call goes on. */
 void hs_search_close(hs_search *search);
@@ -145,7 +145,7 @@ hs_status hs_search_bin_queries(hs_search *search, hs_scene *asking);
  * A search among the points of another one, which was made to be kept, stays as it is and must
  * outlive this one. The queries of the sets ask, or the points. Cells, points and their scale are
  * those of the first search; cutoff, reach, stencil and queries are its own; account and threads
- * are those of its call. HS_UNSERVED when it cannot serve them: the cutoff is larger than its own,
+ * are those of its call. HS_REBUILD when it cannot serve them: the cutoff is larger than its own,
  * or its bounds do not hold for the queries. Else any status of hs_search_open.
  */
 hs_status hs_search_reuse(const hs_sets *sets, hs_call *call, hs_search *search,

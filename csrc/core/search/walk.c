@@ -516,7 +516,7 @@ hs_walker_renew(hs_search *search, hs_block_use use, hs_visit_fn visit, void *co
 }
 
 void
-hs_walker_rest(hs_search *search, hs_walker *walker)
+hs_walker_flush_counters(hs_search *search, hs_walker *walker)
 {
     hs_scanner_note(search, &walker->scanner);
     if (!hs_search_keeps_walker(search)) {

@@ -129,12 +129,12 @@ hs_status hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit,
  * hs_walker_init for what the search of this walker has become, or for the first one: then the
  * walker is all zeros. It is the same object, of the same call, with as many axes, and with the
  * same kernel and options but for the cutoff. Memory that will do is kept, in the account's arena
- * too (hs_account_keep). Between two searches hs_walker_rest tells the call what was done; a walker
+ * too (hs_account_keep). Between two searches hs_walker_flush_counters tells the call what was done; a walker
  * that is not for others (hs_search_keeps_walker) ends there.
  */
 hs_status hs_walker_renew(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
                           hs_walker *walker);
-void      hs_walker_rest(hs_search *search, hs_walker *walker);
+void      hs_walker_flush_counters(hs_search *search, hs_walker *walker);
 
 /*
  * hs_walker_init for a full search that lists: each point's hits come in one visit, ascending by

@@ -98,7 +98,7 @@ void hs_call_gather_for(hs_call *call, int64_t n_points, double n_pairs);
 double hs_test_worth_threads(double n_points);
 #endif
 
-/* Ends them. Harmless twice. */
+/* Ends them. Idempotent. */
 void hs_call_dismiss(hs_call *call);
 
 /* Adds what a walker, or another call, has done. */

@@ -255,7 +255,7 @@ search_piece(void *context, int64_t piece)
     const hs_search *search = me->search;
     const int64_t    n = search->bins.n, n_pieces = me->pieces->n;
     me->piece = &me->pieces->of[piece];
-    hs_output_expect(&me->piece->plain.pairs, search->grid.expected_pairs / (double)n_pieces);
+    hs_output_reserve_hint(&me->piece->plain.pairs, search->grid.expected_pairs / (double)n_pieces);
     return hs_walk_or_tell(&me->walker, (int32_t)(n * piece / n_pieces),
                            (int32_t)(n * (piece + 1) / n_pieces), &me->committer.failure);
 }
@@ -887,7 +887,7 @@ hs_take_jumps(hs_tracking *track, hs_tile *t)
             continue;
         }
         if (!hs_take_jump(track, t, p, given)) {
-            return HS_UNSERVED;
+            return HS_REBUILD;
         }
         for (int r = 0; r < m; r++) {
             any |= (uint64_t)given[r];
@@ -1068,7 +1068,7 @@ start(const hs_motion *motion, hs_store *jumps, hs_tracking *track)
     track->deformed = !hs_frames_share_box(motion->built, motion->now);
     if (track->deformed &&
         !hs_strain_find(&motion->built->box, &motion->now->box, &track->strain)) {
-        return HS_UNSERVED;
+        return HS_REBUILD;
     }
     hs_lattice_init(&motion->now->box, motion->now->points.ndim, hs_scale_of(0), &track->lattice);
     for (int k = 0; k < track->lattice.ndim; k++) {
@@ -1076,7 +1076,7 @@ start(const hs_motion *motion, hs_store *jumps, hs_tracking *track)
             track->jump = hs_smaller(JUMP * track->lattice.period[k], track->jump);
         }
     }
-    return track->jump > 0.0 ? HS_OK : HS_UNSERVED;
+    return track->jump > 0.0 ? HS_OK : HS_REBUILD;
 }
 
 static hs_status
@@ -1123,5 +1123,5 @@ hs_motion_margin(const hs_motion *motion, const hs_options *options, double *mar
         *margin = found == found ? found : -INFINITY;
         *jumped = track.jump_of != NULL;
     }
-    return status == HS_UNSERVED ? HS_OK : status;
+    return status == HS_REBUILD ? HS_OK : status;
 }

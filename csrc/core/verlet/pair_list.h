@@ -29,7 +29,7 @@ void hs_images_init(int width, hs_images *images);
 /* The number of this shift, a new one if it was not there. -1: out of memory. */
 int32_t hs_images_number(hs_images *images, const int32_t *shift);
 
-/* Harmless twice. */
+/* Idempotent. */
 void hs_images_free(hs_images *images);
 
 /* pair_list.h: a list of pairs that is used for many steps: what it holds. */
@@ -169,7 +169,7 @@ hs_may_be_jump(const hs_tracking *track, const hs_tile *t, int p)
  * `given`, over the box vectors as given. */
 bool hs_take_jump(hs_tracking *track, hs_tile *t, int p, int64_t *given);
 
-/* Takes and keeps the jumps of the points of a tile. HS_UNSERVED: some point went too far to
+/* Takes and keeps the jumps of the points of a tile. HS_REBUILD: some point went too far to
  * tell. */
 hs_status hs_take_jumps(hs_tracking *track, hs_tile *t);
 

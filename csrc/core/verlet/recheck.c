@@ -324,7 +324,7 @@ drop_hits(hs_sifted *slab, const int32_t *gone, int32_t n)
 }
 
 void
-hs_recheck_settle(const hs_recheck *recheck, hs_sifted *slab)
+hs_recheck_decide_unsure(const hs_recheck *recheck, hs_sifted *slab)
 {
     int32_t    gone[HS_SIFT], n_gone = 0;
     open_batch open;
@@ -983,7 +983,7 @@ sift_slab(const hs_recheck *recheck, hs_sifted *slab)
     slab->n_hits = sift.n_hits;
     slab->n_open = sift.n_open;
     if (slab->n_open > 0) {
-        hs_recheck_settle(recheck, slab);
+        hs_recheck_decide_unsure(recheck, slab);
     }
 }
 

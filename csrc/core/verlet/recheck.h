@@ -79,7 +79,7 @@ hs_status hs_recheck_prepare(hs_recheck *recheck);
 
 /* Decides the hits of a slab that float32 cannot tell, of which there are some, and takes those
  * that are beyond the cutoff from the hits. */
-void hs_recheck_settle(const hs_recheck *recheck, hs_sifted *slab);
+void hs_recheck_decide_unsure(const hs_recheck *recheck, hs_sifted *slab);
 
 /* Writes the hits. */
 void hs_recheck_put(const hs_recheck *recheck, hs_sifted *slab);

@@ -87,9 +87,9 @@ endless_outputs_are_refused(void)
     hs_output output;
     hs_output_init(NULL, 8, HS_WANT_VECTOR | HS_WANT_SHIFT, 8, &output);
     CHECK(!hs_output_has_room(&output, 0));
-    hs_output_expect(&output, 1e18);
+    hs_output_reserve_hint(&output, 1e18);
     CHECK(output.capacity == 1024 && hs_output_has_room(&output, 1024));
-    hs_output_expect(&output, INFINITY);
+    hs_output_reserve_hint(&output, INFINITY);
     CHECK(output.capacity == 1024 && !hs_output_has_room(&output, 1025));
     CHECK(hs_output_reserve(&output, INT64_C(1) << 57, 0.0) == HS_ERR_MEMORY);
     CHECK(hs_output_reserve(&output, INT64_C(1) << 60, 0.5) == HS_ERR_MEMORY);

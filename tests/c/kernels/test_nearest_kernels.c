@@ -33,7 +33,7 @@ below(harness_random *random, int32_t n)
     return (int32_t)(random_bits(random) % (unsigned)n);
 }
 
-/* ---- relate ---- */
+/* ---- gather_relative ---- */
 
 /* Runs of one of two images; returns how many, *n: candidates. */
 static int32_t
@@ -106,7 +106,7 @@ relating_rounds_each_step(void)
             }
             g.norm = guarded_place(norm_pages, n + HS_PADDING, sizeof(float), trial & 1);
             g.number = guarded_place(integer_pages[0], n + HS_PADDING, sizeof(int32_t), trial & 1);
-            kernel->relate(&g, runs, n_runs);
+            kernel->gather_relative(&g, runs, n_runs);
             for (int32_t r = 0; r < n_runs; r++) {
                 check_run(&g, &runs[r]);
             }

@@ -447,7 +447,7 @@ static void
 reserve_gives_room(void)
 {
     hs_region none = {0};
-    hs_region_expect(&none, GB); /* advice for what is not there */
+    hs_region_advise(&none, GB); /* advice for what is not there */
     CHECK(none.data == NULL && none.capacity == 0);
     static const size_t sizes[] = {0, 1, 64, 4096, 100000, 1 * MB, 2 * MB - 1, 2 * MB, 5 * MB + 3};
     hs_pool_clear();
@@ -505,7 +505,7 @@ what_was_written_is_resident(void)
     CHECK(HS_WATCHED_MALLOC || hs_region_resident(&region) == 0); /* malloc may have used it */
     memset(region.data, 1, BYTES);
     region.used = BYTES;
-    hs_region_expect(&region, BYTES);
+    hs_region_advise(&region, BYTES);
     CHECK(hs_region_resident(&region) >= BYTES);
     hs_region_release(&region);
     CHECK(hs_region_reserve(&region, BYTES));

@@ -312,7 +312,7 @@ leaves_that_are_shared_hold_all_that_is_near(void)
             n_candidates += block.n;
             const int32_t n = block.n;
             CHECK(fill(&groups[g], n, &leaves) == HS_OK && block.n == n);
-            CHECK(fill(&groups[g], n - 1, &leaves) == HS_TOO_MUCH);
+            CHECK(fill(&groups[g], n - 1, &leaves) == HS_TRY_OTHER);
             CHECK(fill(&groups[g], 1e9, NULL) == HS_OK);
             check_block(&groups[g]);
         }
@@ -361,10 +361,10 @@ groups_far_wider_than_their_radius_are_refused(void)
     group.upper[1] = group.lower[1];
     CHECK(fill(&group, 1e9, NULL) == HS_OK);
     group.upper[0] = group.lower[0] + 2.25;
-    CHECK(fill(&group, 1e9, NULL) == HS_TOO_MUCH);
+    CHECK(fill(&group, 1e9, NULL) == HS_TRY_OTHER);
     leaves.radius = 1.0;
     leaves.error = 0.0;
-    CHECK(fill(&group, 1e9, &leaves) == HS_TOO_MUCH);
+    CHECK(fill(&group, 1e9, &leaves) == HS_TRY_OTHER);
     close_scene();
 }
 
@@ -376,10 +376,10 @@ too_many_images_are_refused(void)
     harness_random random = {33};
     open_scene(&random, 2, &box);
     hs_nearest_group group = group_from_block(0, 0x1p40);
-    CHECK(fill(&group, 1e9, NULL) == HS_TOO_MUCH);
+    CHECK(fill(&group, 1e9, NULL) == HS_TRY_OTHER);
     CHECK(fill(&group, INFINITY, NULL) == HS_ERR_MEMORY);
     group = group_from_block(0, 40.0);
-    CHECK(fill(&group, 100.0, NULL) == HS_TOO_MUCH); /* before they are walked through */
+    CHECK(fill(&group, 100.0, NULL) == HS_TRY_OTHER); /* before they are walked through */
     CHECK(fill(&group, INFINITY, NULL) == HS_OK);
     close_scene();
 }

@@ -101,7 +101,7 @@ ask(const double *q, int64_t n, unsigned want, hs_failure *failure)
     options.want = want;
     *failure = HS_NO_FAILURE;
     const hs_status status =
-        hs_scene_like(&account, NULL, &kept, &queries, &options, &asking, failure);
+        hs_scene_from_kept(&account, NULL, &kept, &queries, &options, &asking, failure);
     if (status == HS_OK)
         hs_scene_free(&account, &asking);
     return status;
@@ -122,10 +122,10 @@ queries_too_far_to_count_get_another_scene(void)
     CHECK(kept.turns.known);
     CHECK(ask(near, 1, HS_WANT_J, &failure) == HS_OK && !failure.in_queries);
     CHECK(ask(near, 1, HS_WANT_SHIFT, &failure) == HS_OK);
-    CHECK(ask(far, 2, HS_WANT_J, &failure) == HS_UNSERVED);
+    CHECK(ask(far, 2, HS_WANT_J, &failure) == HS_REBUILD);
     CHECK(ask(far, 2, HS_WANT_SHIFT, &failure) == HS_ERR_SHIFT_RANGE);
     CHECK(failure.in_queries && failure.row == 1);
-    CHECK(ask(farther, 1, HS_WANT_SHIFT, &failure) == HS_UNSERVED); /* not even tried */
+    CHECK(ask(farther, 1, HS_WANT_SHIFT, &failure) == HS_REBUILD); /* not even tried */
     CHECK(account.held == held);
     hs_scene_free(&account, &kept);
     CHECK(account.held == 0);
@@ -141,15 +141,15 @@ scenes_that_hold_nothing_take_nothing(void)
     keep(x, 2, &box);
     CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_OK);
     kept.extreme = true;
-    CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_UNSERVED);
+    CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_REBUILD);
     kept.extreme = false;
     kept.in_one_cell = true;
-    CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_UNSERVED);
+    CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_REBUILD);
     kept.in_one_cell = false;
     kept.x_error = kept.t_error[0] = 0.0; /* of an aligned box: these hold for all */
     CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_OK);
     kept.x_largest[0] = 0.25; /* queries lie beyond */
-    CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_UNSERVED);
+    CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_REBUILD);
     hs_scene_free(&account, &kept);
 }
 

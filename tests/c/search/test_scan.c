@@ -182,13 +182,13 @@ every_pair_is_tested_once(void)
 static bool
 is_narrow(void)
 {
-    hs_walker walker;
-    hs_trace  trace;
+    hs_walker     walker;
+    hs_pair_batch trace;
     CHECK(hs_walker_init(&unit.search, HS_BLOCK_COUNTS, NULL, NULL, &walker) == HS_OK);
-    CHECK(hs_trace_init(&unit.search, &walker.scanner.block, &walker.scanner.options, true,
-                        &trace) == HS_OK);
+    CHECK(hs_pair_batch_init(&unit.search, &walker.scanner.block, &walker.scanner.options, true,
+                             &trace) == HS_OK);
     const bool narrow = trace.of.is_narrow;
-    hs_trace_free(&unit.call.account, &trace);
+    hs_pair_batch_free(&unit.call.account, &trace);
     hs_walker_close(&unit.search, &walker);
     return narrow;
 }
