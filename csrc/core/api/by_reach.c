@@ -153,9 +153,11 @@ use_step(const hs_by_reach *by, int64_t step, bool keeps_none, hs_call *call, hs
     return status;
 }
 
-hs_status
-hs_by_reach_each(const hs_by_reach *by, bool keeps_none, hs_call *call, hs_use_fn use,
-                 void *context, int64_t *n_pairs, hs_failure *failure)
+/* Uses each search in turn, as long as that gives HS_OK; *n_pairs, zero before, is how many all of
+ * them found. keeps_none: pairs are not kept. */
+static hs_status
+by_reach_each(const hs_by_reach *by, bool keeps_none, hs_call *call, hs_use_fn use, void *context,
+              int64_t *n_pairs, hs_failure *failure)
 {
     hs_status status = HS_OK;
     for (int64_t s = 0; status == HS_OK && s < by->plan.n; s++) {
@@ -164,9 +166,10 @@ hs_by_reach_each(const hs_by_reach *by, bool keeps_none, hs_call *call, hs_use_f
     return status;
 }
 
-hs_status
-hs_by_reach_single(hs_by_reach *by, hs_call *call, hs_use_fn use, void *context, int64_t *n_pairs,
-                   hs_failure *failure)
+/* Uses the one search that there is, of all neighbours of each asking point. */
+static hs_status
+by_reach_single(hs_by_reach *by, hs_call *call, hs_use_fn use, void *context, int64_t *n_pairs,
+                hs_failure *failure)
 {
     HS_ASSERT(hs_level_plan_is_single(&by->levels, &by->plan));
     by->plan.is_half = false;
@@ -186,7 +189,7 @@ hs_by_reach_each_step(const hs_request *request, hs_use_fn use, void *context, h
     hs_status   status = hs_by_reach_open(request, &call, &by, failure);
     if (status == HS_OK) {
         status =
-            hs_by_reach_each(&by, request->sets.keeps_none, &call, use, context, &n_pairs, failure);
+            by_reach_each(&by, request->sets.keeps_none, &call, use, context, &n_pairs, failure);
         hs_by_reach_close(&call, &by);
     }
     hs_call_tell_limit(&call, status, failure);
@@ -217,8 +220,7 @@ static hs_status
 record(const hs_by_reach *by, hs_call *call, hs_output *output, hs_failure *failure)
 {
     int64_t         n_pairs = 0;
-    const hs_status status =
-        hs_by_reach_each(by, false, call, record_step, output, &n_pairs, failure);
+    const hs_status status = by_reach_each(by, false, call, record_step, output, &n_pairs, failure);
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = fmax(failure->expected_pairs, (double)output->n_pairs);
     }
@@ -449,7 +451,7 @@ hs_by_reach_rows(const hs_request *request, hs_fill_fn fill, hs_pairs **result, 
     }
     if (status == HS_OK && is_single(request, &by)) {
         filling doing = {fill, rows};
-        status = hs_by_reach_single(&by, &rows->call, fill_rows, &doing, &n_pairs, failure);
+        status = by_reach_single(&by, &rows->call, fill_rows, &doing, &n_pairs, failure);
     } else if (status == HS_OK) {
         status = find_rows(request, &by, rows, failure);
     }
@@ -493,7 +495,7 @@ hs_by_reach_count_rows(const hs_request *request, hs_use_fn count, int64_t *coun
     failure = hs_call_enter(request->options, failure, &call);
     hs_status status = hs_by_reach_open(request, &call, &by, failure);
     if (status == HS_OK && is_single(request, &by)) {
-        status = hs_by_reach_single(&by, &call, count, counts, &n_entries, failure);
+        status = by_reach_single(&by, &call, count, counts, &n_entries, failure);
     } else if (status == HS_OK) {
         status = count_rows(request, &by, &call, counts, &n_entries, failure);
     }

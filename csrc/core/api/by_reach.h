@@ -28,15 +28,6 @@ hs_status hs_by_reach_open(const hs_request *request, hs_call *call, hs_by_reach
 /* Idempotent. */
 void hs_by_reach_close(hs_call *call, hs_by_reach *by);
 
-/* Uses each search in turn, as long as that gives HS_OK; *n_pairs, zero before, is how many all of
- * them found. keeps_none: pairs are not kept. */
-hs_status hs_by_reach_each(const hs_by_reach *by, bool keeps_none, hs_call *call, hs_use_fn use,
-                           void *context, int64_t *n_pairs, hs_failure *failure);
-
-/* Uses the one search that there is, of all neighbours of each asking point. */
-hs_status hs_by_reach_single(hs_by_reach *by, hs_call *call, hs_use_fn use, void *context,
-                             int64_t *n_pairs, hs_failure *failure);
-
 /* hs_request_use for requests with a reach and without. */
 hs_status hs_by_reach_each_step(const hs_request *request, hs_use_fn use, void *context,
                                 hs_failure *failure);

@@ -10,8 +10,9 @@
 
 /* Results of one kind and of the other, made alike. */
 
-hs_status
-hs_count_nodes(const hs_node_lists *lists, int64_t *n)
+/* How many nodes there are; HS_ERR_TOO_MANY from 2^31 on. */
+static hs_status
+count_nodes(const hs_node_lists *lists, int64_t *n)
 {
     *n = 0;
     if (lists == NULL || lists->n_lists < 0 || (lists->n_lists > 0 && lists->n_nodes == NULL)) {
@@ -30,8 +31,9 @@ hs_count_nodes(const hs_node_lists *lists, int64_t *n)
     return HS_OK;
 }
 
-bool
-hs_can_connect(hs_connectivity **result, const hs_options *options)
+/* Whether a call that returns a connectivity can begin; *result, unless NULL, is NULL then. */
+static bool
+can_connect(hs_connectivity **result, const hs_options *options)
 {
     if (result != NULL) {
         *result = NULL;
@@ -39,22 +41,10 @@ hs_can_connect(hs_connectivity **result, const hs_options *options)
     return hs_can_begin(result, options);
 }
 
-hs_connectivity *
-hs_connectivity_begin(const hs_options *options, hs_failure **failure, hs_status *status)
-{
-    hs_connectivity *made = hs_connectivity_new();
-    if (made == NULL) {
-        *status = hs_end_early(HS_ERR_MEMORY, options, *failure);
-        return NULL;
-    }
-    *failure = hs_call_enter(options, *failure, &made->call);
-    *status = hs_check_resources(options);
-    return made;
-}
-
-hs_status
-hs_connectivity_finish(hs_connectivity *made, hs_status status, hs_connectivity **result,
-                       hs_failure *failure)
+/* Leaves the call. *result becomes the object, or that is freed. Returns the status. */
+static hs_status
+connectivity_finish(hs_connectivity *made, hs_status status, hs_connectivity **result,
+                    hs_failure *failure)
 {
     hs_call_tell_limit(&made->call, status, failure);
     hs_call_leave(&made->call, hs_pairs_length(made->nodes));
@@ -67,9 +57,25 @@ hs_connectivity_finish(hs_connectivity *made, hs_status status, hs_connectivity 
     return status;
 }
 
-hs_pairs *
-hs_rows_begin(const hs_options *options, const hs_points *points, hs_failure **failure,
-              hs_status *status)
+/* An empty connectivity whose call, with these options, has been entered; *failure becomes where
+ * the failure goes, *status that of the resources. connectivity_finish must follow. NULL when
+ * memory is short: then the call has ended. */
+static hs_connectivity *
+connectivity_begin(const hs_options *options, hs_failure **failure, hs_status *status)
+{
+    hs_connectivity *made = hs_connectivity_new();
+    if (made == NULL) {
+        *status = hs_end_early(HS_ERR_MEMORY, options, *failure);
+        return NULL;
+    }
+    *failure = hs_call_enter(options, *failure, &made->call);
+    *status = hs_check_resources(options);
+    return made;
+}
+
+static hs_pairs *
+rows_begin(const hs_options *options, const hs_points *points, hs_failure **failure,
+           hs_status *status)
 {
     hs_pairs *made = hs_pairs_begin(options, failure);
     if (made == NULL) {
@@ -83,8 +89,9 @@ hs_rows_begin(const hs_options *options, const hs_points *points, hs_failure **f
     return made;
 }
 
-hs_status
-hs_rows_finish(hs_pairs *made, hs_status status, hs_pairs **result, hs_failure *failure)
+/* The same for rows, by hs_pairs_begin and hs_pairs_finish. points: NULL, or checked as well. */
+static hs_status
+rows_finish(hs_pairs *made, hs_status status, hs_pairs **result, hs_failure *failure)
 {
     hs_call_tell_limit(&made->call, status, failure);
     return hs_pairs_finish(made, status, made->output.n_pairs, result);
@@ -99,11 +106,11 @@ hs_connectivity_link(const hs_half_list *pairs, const hs_node_lists *lists,
 {
     int64_t   n = 0;
     hs_output half;
-    hs_status status = hs_count_nodes(lists, &n);
-    if (!hs_can_connect(result, options) || pairs == NULL || status != HS_OK) {
+    hs_status status = count_nodes(lists, &n);
+    if (!can_connect(result, options) || pairs == NULL || status != HS_OK) {
         return hs_end_early(status != HS_OK ? status : HS_ERR_ARGUMENT, options, failure);
     }
-    hs_connectivity *made = hs_connectivity_begin(options, &failure, &status);
+    hs_connectivity *made = connectivity_begin(options, &failure, &status);
     if (made == NULL) {
         return status;
     }
@@ -114,7 +121,7 @@ hs_connectivity_link(const hs_half_list *pairs, const hs_node_lists *lists,
         }
         hs_output_free(&half);
     }
-    return hs_connectivity_finish(made, status, result, failure);
+    return connectivity_finish(made, status, result, failure);
 }
 
 /* Options of the search for all neighbours. */
@@ -138,8 +145,8 @@ hs_connectivity_build(const hs_among *among, const hs_node_lists *lists, const h
 {
     int64_t   n = 0;
     hs_pairs *found = NULL;
-    hs_status status = hs_count_nodes(lists, &n);
-    if (!hs_can_connect(result, options) || among == NULL || status != HS_OK) {
+    hs_status status = count_nodes(lists, &n);
+    if (!can_connect(result, options) || among == NULL || status != HS_OK) {
         return hs_end_early(status != HS_OK ? status : HS_ERR_ARGUMENT, options, failure);
     }
     const hs_options search = options_of_rows(among, options);
@@ -153,14 +160,14 @@ hs_connectivity_build(const hs_among *among, const hs_node_lists *lists, const h
     }
     hs_options linking = *options; /* its counters are those of the search */
     linking.counters = NULL;
-    hs_connectivity *made = hs_connectivity_begin(&linking, &failure, &status);
+    hs_connectivity *made = connectivity_begin(&linking, &failure, &status);
     if (made == NULL) {
         hs_pairs_free(found);
         return status;
     }
     status = hs_connectivity_fill_rows(made, lists, &found);
     hs_pairs_free(found);
-    return hs_connectivity_finish(made, status, result, failure);
+    return connectivity_finish(made, status, result, failure);
 }
 
 /* Points of an overlap, which need not be finite. */
@@ -196,14 +203,14 @@ hs_connectivity_overlap(const hs_points *points, const hs_index_rows *gather,
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     hs_status status;
-    hs_pairs *made = hs_rows_begin(options, points, &failure, &status);
+    hs_pairs *made = rows_begin(options, points, &failure, &status);
     if (made == NULL) {
         return status;
     }
     if (status == HS_OK) {
         status = find_overlap(made, points, gather, lists, failure);
     }
-    return hs_rows_finish(made, status, rows, failure);
+    return rows_finish(made, status, rows, failure);
 }
 
 /* Of a half list that is copied, and a map. */
@@ -239,7 +246,7 @@ hs_connectivity_intersect(const hs_points *points, const hs_half_list *pairs,
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     hs_status status;
-    hs_pairs *made = hs_rows_begin(options, points, &failure, &status);
+    hs_pairs *made = rows_begin(options, points, &failure, &status);
     if (made == NULL) {
         return status;
     }
@@ -250,7 +257,7 @@ hs_connectivity_intersect(const hs_points *points, const hs_half_list *pairs,
         }
         hs_output_free(&half);
     }
-    return hs_rows_finish(made, status, result, failure);
+    return rows_finish(made, status, result, failure);
 }
 
 /* The public functions that make rows and pairs out of others: pairs of rows,
@@ -261,18 +268,18 @@ hs_connectivity_pair(const hs_list_rows *rows, const hs_node_lists *lists,
                      const hs_options *options, hs_connectivity **result, hs_failure *failure)
 {
     int64_t   n = 0;
-    hs_status status = hs_count_nodes(lists, &n);
-    if (!hs_can_connect(result, options) || rows == NULL || status != HS_OK) {
+    hs_status status = count_nodes(lists, &n);
+    if (!can_connect(result, options) || rows == NULL || status != HS_OK) {
         return hs_end_early(status != HS_OK ? status : HS_ERR_ARGUMENT, options, failure);
     }
-    hs_connectivity *made = hs_connectivity_begin(options, &failure, &status);
+    hs_connectivity *made = connectivity_begin(options, &failure, &status);
     if (made == NULL) {
         return status;
     }
     if (status == HS_OK) {
         status = hs_connectivity_fill_pairs(made, lists, n, rows);
     }
-    return hs_connectivity_finish(made, status, result, failure);
+    return connectivity_finish(made, status, result, failure);
 }
 
 hs_status
@@ -280,17 +287,17 @@ hs_node_pairs_keep(const hs_node_pairs *pairs, const hs_node_change *change, con
                    const hs_options *options, hs_connectivity **result, hs_failure *failure)
 {
     hs_status status = HS_ERR_ARGUMENT;
-    if (!hs_can_connect(result, options) || pairs == NULL) {
+    if (!can_connect(result, options) || pairs == NULL) {
         return hs_end_early(status, options, failure);
     }
-    hs_connectivity *made = hs_connectivity_begin(options, &failure, &status);
+    hs_connectivity *made = connectivity_begin(options, &failure, &status);
     if (made == NULL) {
         return status;
     }
     if (status == HS_OK) {
         status = hs_kept_pairs_fill(&made->call, pairs, change, keep, made->nodes, made->lists);
     }
-    return hs_connectivity_finish(made, status, result, failure);
+    return connectivity_finish(made, status, result, failure);
 }
 
 hs_status
@@ -301,14 +308,14 @@ hs_rows_keep(const hs_list_rows *rows, const hs_node_change *change, const int64
     if (!hs_can_return(result, options) || rows == NULL || change == NULL) {
         return hs_end_early(status, options, failure);
     }
-    hs_pairs *made = hs_rows_begin(options, NULL, &failure, &status);
+    hs_pairs *made = rows_begin(options, NULL, &failure, &status);
     if (made == NULL) {
         return status;
     }
     if (status == HS_OK) {
         status = hs_kept_rows_fill(&made->call, rows, change, source, n, made);
     }
-    return hs_rows_finish(made, status, result, failure);
+    return rows_finish(made, status, result, failure);
 }
 
 hs_status
@@ -319,14 +326,14 @@ hs_rows_without(const hs_list_rows *rows, const hs_list_rows *without, bool asce
     if (!hs_can_return(result, options) || rows == NULL || without == NULL) {
         return hs_end_early(status, options, failure);
     }
-    hs_pairs *made = hs_rows_begin(options, NULL, &failure, &status);
+    hs_pairs *made = rows_begin(options, NULL, &failure, &status);
     if (made == NULL) {
         return status;
     }
     if (status == HS_OK) {
         status = hs_rows_without_fill(&made->call, rows, without, ascend, made);
     }
-    return hs_rows_finish(made, status, result, failure);
+    return rows_finish(made, status, result, failure);
 }
 
 /* The public functions about single nodes: feet on a segment, and places on

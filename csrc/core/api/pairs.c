@@ -29,8 +29,9 @@ status_of(bool sound)
     return sound ? HS_OK : HS_ERR_ARGUMENT;
 }
 
-void
-hs_clear_counters(const hs_options *options)
+/* The counters, if any, of a call that ends before its search begins. */
+static void
+clear_counters(const hs_options *options)
 {
     if (options != NULL && options->counters != NULL) {
         *options->counters = (hs_counters){.pairs = 0};
@@ -43,7 +44,7 @@ hs_end_early(hs_status status, const hs_options *options, hs_failure *failure)
     if (failure != NULL) {
         *failure = HS_NO_FAILURE;
     }
-    hs_clear_counters(options);
+    clear_counters(options);
     return status;
 }
 
@@ -176,8 +177,9 @@ hs_check_options(const hs_options *options)
     return check_options(options, HS_WANT_ALL);
 }
 
-hs_status
-hs_check_lengths(const double *lengths, int64_t n, hs_failure *failure)
+/* HS_OK, or HS_ERR_EDGES unless there are some, finite, not negative and not descending. */
+static hs_status
+check_lengths(const double *lengths, int64_t n, hs_failure *failure)
 {
     if (n < 1 || n >= HS_MOST_LENGTHS) {
         return HS_ERR_EDGES;
@@ -198,11 +200,12 @@ hs_check_histogram(const hs_histogram *histogram, hs_failure *failure)
     if (histogram == NULL || histogram->edges == NULL || histogram->n_types < 1) {
         return HS_ERR_ARGUMENT;
     }
-    return hs_check_lengths(histogram->edges, histogram->n_edges, failure);
+    return check_lengths(histogram->edges, histogram->n_edges, failure);
 }
 
-double
-hs_least_length(const double *lengths, int64_t n)
+/* The first of such lengths that is above 0, or 0. */
+static double
+least_length(const double *lengths, int64_t n)
 {
     for (int64_t k = 0; k < n; k++) {
         if (lengths[k] > 0.0) {
@@ -219,7 +222,7 @@ check_shells(const hs_options *options, hs_failure *failure)
     if (options->shells == NULL || options->precision != HS_EXACT) {
         return HS_ERR_ARGUMENT;
     }
-    const hs_status status = hs_check_lengths(options->shells, options->n_shells, failure);
+    const hs_status status = check_lengths(options->shells, options->n_shells, failure);
     return status == HS_OK ? status_of(options->shells[options->n_shells - 1] == options->cutoff)
                            : status;
 }
@@ -249,9 +252,10 @@ hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_b
     return status == HS_OK ? hs_check_options(options) : status;
 }
 
-hs_status
-hs_check_half_list(const hs_points *points, const hs_box *box, const hs_options *options,
-                   hs_failure *failure)
+/* The same for half lists, which may have shells. */
+static hs_status
+check_half_list(const hs_points *points, const hs_box *box, const hs_options *options,
+                hs_failure *failure)
 {
     hs_status status = check_sets(points, NULL, box, failure);
     if (status == HS_OK) {
@@ -306,13 +310,13 @@ hs_request_open(const hs_request *request, hs_call *call, hs_search *search, hs_
     hs_sets           sets = request->sets;
     hs_status         sound =
         sets.is_full ? hs_check_arguments(sets.points, sets.queries, request->box, options, failure)
-                             : hs_check_half_list(sets.points, request->box, options, failure);
+                             : check_half_list(sets.points, request->box, options, failure);
     if (request->reach != NULL) { /* which this search does not know */
         sound = HS_ERR_ARGUMENT;
     }
     if (sound == HS_OK && (options->want & HS_WANT_SHELL)) {
         sets.is_plain = true;
-        sets.least_cutoff = hs_least_length(options->shells, options->n_shells);
+        sets.least_cutoff = least_length(options->shells, options->n_shells);
     }
     if (sound == HS_OK) {
         sound = hs_choice_of_request(request, options->cutoff, call, failure);
@@ -343,8 +347,9 @@ hs_choice_of_request(const hs_request *request, double cutoff, hs_call *call, hs
     return status;
 }
 
-void
-hs_request_close(hs_call *call, hs_search *search)
+/* Closes it, and what was opened with it. */
+static void
+request_close(hs_call *call, hs_search *search)
 {
     hs_search_close(search);
     hs_choice_close(call);
@@ -360,7 +365,7 @@ hs_request_use(const hs_request *request, hs_use_fn use, void *context, hs_failu
     hs_status status = hs_request_open(request, &call, &search, failure);
     if (status == HS_OK) {
         status = use(context, &search, &n_pairs, failure);
-        hs_request_close(&call, &search);
+        request_close(&call, &search);
     }
     if (status == HS_ERR_MEMORY) {
         tell_shortage(request, &search, failure);
@@ -403,8 +408,9 @@ hs_options_of_count(const hs_options *options)
     return counting;
 }
 
-hs_status
-hs_request_fill(const hs_request *request, hs_fill_fn fill, hs_pairs **result, hs_failure *failure)
+/* A search whose pairs the caller gets, to be freed by hs_pairs_free; NULL on failure. */
+static hs_status
+request_fill(const hs_request *request, hs_fill_fn fill, hs_pairs **result, hs_failure *failure)
 {
     hs_search search;
     hs_pairs *pairs = hs_pairs_begin(request->options, &failure);
@@ -415,7 +421,7 @@ hs_request_fill(const hs_request *request, hs_fill_fn fill, hs_pairs **result, h
     if (status == HS_OK) {
         hs_pairs_open(pairs, search.scene.ndim);
         status = fill(&search, pairs, failure);
-        hs_request_close(&pairs->call, &search);
+        request_close(&pairs->call, &search);
     }
     if (status == HS_ERR_MEMORY) {
         tell_shortage(request, &search, failure);
@@ -482,7 +488,7 @@ hs_pairs_find(const hs_among *among, const hs_options *options, hs_pairs **resul
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     return request.reach != NULL ? hs_by_reach_pairs(&request, result, failure)
-                                 : hs_request_fill(&request, fill_pairs, result, failure);
+                                 : request_fill(&request, fill_pairs, result, failure);
 }
 
 /* A hs_use_fn: adds the number of pairs, each once; with queries, of all neighbours of each. */
@@ -596,7 +602,7 @@ hs_neighbors_find(const hs_among *among, const hs_options *options, hs_pairs **r
     const hs_options of_rows = options_of_rows(options);
     const hs_request request = hs_request_among(among, HS_FULL_LIST, &of_rows);
     return request.reach != NULL ? hs_by_reach_rows(&request, find_rows, result, failure)
-                                 : hs_request_fill(&request, find_rows, result, failure);
+                                 : request_fill(&request, find_rows, result, failure);
 }
 
 /* A hs_use_fn. */
@@ -844,7 +850,7 @@ find_histogram(const hs_among *among, const hs_options *options, const hs_histog
     const hs_status status = options != NULL ? hs_check_histogram(histogram, failure)
                                              : HS_ERR_ARGUMENT;
     if (status != HS_OK) {
-        hs_clear_counters(options);
+        clear_counters(options);
         return status;
     }
     hs_histogram     filled = *histogram;
@@ -852,7 +858,7 @@ find_histogram(const hs_among *among, const hs_options *options, const hs_histog
     hs_request       request = hs_request_among(among, HS_HALF_OR_QUERIES, &of_search);
     request.sets.is_plain = true;
     request.sets.keeps_none = true;
-    request.sets.least_cutoff = hs_least_length(histogram->edges, histogram->n_edges);
+    request.sets.least_cutoff = least_length(histogram->edges, histogram->n_edges);
     return hs_request_use(&request, fill_histogram, &filled, failure);
 }
 
@@ -966,7 +972,7 @@ find_clusters(const hs_among *among, const hs_options *options, const uint8_t *c
     const hs_points *points = request.sets.points;
     gathering        doing = {.core = core, .labels = labels};
     hs_account       account;
-    hs_clear_counters(options);
+    clear_counters(options);
     hs_status status = hs_check_arguments(points, NULL, request.box, options, failure);
     if (status != HS_OK) {
         return status;

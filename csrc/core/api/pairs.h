@@ -19,9 +19,6 @@
  * NULL, except the options and the failure that are given to a function hs_check_*.
  */
 
-/* The counters, if any, of a call that ends before its search begins. */
-void hs_clear_counters(const hs_options *options);
-
 /* Ends such a call: returns the status. *failure, unless NULL, has no details. */
 hs_status hs_end_early(hs_status status, const hs_options *options, hs_failure *failure);
 
@@ -52,22 +49,12 @@ hs_status hs_check_options(const hs_options *options);
 /* Most lengths that distances are sorted by: twice as many are int32. */
 #define HS_MOST_LENGTHS (INT64_C(1) << 30)
 
-/* HS_OK, or HS_ERR_EDGES unless there are some, finite, not negative and not descending. */
-hs_status hs_check_lengths(const double *lengths, int64_t n, hs_failure *failure);
-
 /* HS_OK, HS_ERR_ARGUMENT, or HS_ERR_EDGES. */
 hs_status hs_check_histogram(const hs_histogram *histogram, hs_failure *failure);
-
-/* The first of such lengths that is above 0, or 0. */
-double hs_least_length(const double *lengths, int64_t n);
 
 /* Checks all of the above but systems; failure->in_queries tells queries from points. */
 hs_status hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_box *box,
                              const hs_options *options, hs_failure *failure);
-
-/* The same for half lists, which may have shells. */
-hs_status hs_check_half_list(const hs_points *points, const hs_box *box, const hs_options *options,
-                             hs_failure *failure);
 
 /*
  * What the public searches of one scene share: from their arguments to an open search,
@@ -95,9 +82,6 @@ hs_request hs_request_among(const hs_among *among, hs_list_kind kind, const hs_o
 hs_status hs_request_open(const hs_request *request, hs_call *call, hs_search *search,
                           hs_failure *failure);
 
-/* Closes it, and what was opened with it. */
-void hs_request_close(hs_call *call, hs_search *search);
-
 /* Which pairs count: the request's selection, made ready for the call, of which no pair is further
  * apart than the cutoff. To be freed by hs_choice_close; on failure there is none. */
 hs_status hs_choice_of_request(const hs_request *request, double cutoff, hs_call *call,
@@ -124,9 +108,5 @@ hs_options hs_options_of_count(const hs_options *options);
 
 /* These options for a search of nearest points, as far as they count there. */
 hs_options hs_options_of_nearest(const hs_options *options);
-
-/* A search whose pairs the caller gets, to be freed by hs_pairs_free; NULL on failure. */
-hs_status hs_request_fill(const hs_request *request, hs_fill_fn fill, hs_pairs **result,
-                          hs_failure *failure);
 
 #endif

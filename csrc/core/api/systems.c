@@ -16,8 +16,9 @@
 
 /* Arrays of a system begin where those of the systems before it end. */
 
-hs_points
-hs_points_of_system(const hs_points *all, const int64_t *first, int64_t s)
+/* Points first[s] to first[s + 1] of all. */
+static hs_points
+points_of_system(const hs_points *all, const int64_t *first, int64_t s)
 {
     hs_points points = *all;
     points.n = first[s + 1] - first[s];
@@ -64,8 +65,9 @@ labels_from(const int64_t *labels, int64_t first)
     return labels != NULL ? labels + first : NULL;
 }
 
-hs_reach
-hs_reach_of_system(const hs_systems *systems, int ndim, int64_t s)
+/* What pairs of system s have as their reach, where systems->reach is there. */
+static hs_reach
+reach_of_system(const hs_systems *systems, int ndim, int64_t s)
 {
     const int64_t first = systems->first[s];
     const int64_t query = systems->first_query != NULL ? systems->first_query[s] : 0;
@@ -181,17 +183,17 @@ hs_system_part_cut(const hs_system_sets *sets, const hs_excluded_parts *excluded
     part->system = s;
     part->first_point = systems->first[s];
     part->first_asking = first_asking(sets, s);
-    part->points = hs_points_of_system(sets->points, systems->first, s);
+    part->points = points_of_system(sets->points, systems->first, s);
     part->n_asking = part->points.n;
     part->among = (hs_among){.points = &part->points};
     part->among.box = hs_box_of_system(systems, ndim, s, &part->own_box);
     if (sets->queries != NULL) {
-        part->queries = hs_points_of_system(sets->queries, systems->first_query, s);
+        part->queries = points_of_system(sets->queries, systems->first_query, s);
         part->n_asking = part->queries.n;
         part->among.queries = &part->queries;
     }
     if (systems->reach != NULL) {
-        part->reach = hs_reach_of_system(systems, ndim, s);
+        part->reach = reach_of_system(systems, ndim, s);
         part->among.reach = &part->reach;
     }
     if (systems->selection != NULL) {
@@ -326,7 +328,7 @@ static hs_status
 reach_of(const worker *me, int64_t s, hs_reach *reach, double *bound, hs_failure *failure)
 {
     const hs_systems *systems = me->job->systems;
-    *reach = hs_reach_of_system(systems, me->job->points->ndim, s);
+    *reach = reach_of_system(systems, me->job->points->ndim, s);
     *bound = hs_cutoff_of_system(systems, s, me->job->total->options.cutoff);
     if (!(*bound >= 0.0) || (reach->n_types > 0 && !isfinite(*bound))) {
         failure->value = *bound;
@@ -431,7 +433,7 @@ search_system(worker *me, int64_t s)
     const hs_systems_job *job = me->job;
     const int64_t         before = me->call.done.candidates;
     const hs_systems     *systems = job->systems;
-    const hs_points       points = hs_points_of_system(job->points, systems->first, s);
+    const hs_points       points = points_of_system(job->points, systems->first, s);
     const hs_box         *box = hs_box_of_system(systems, points.ndim, s, &me->box);
     me->found.n_pairs = 0;
     if (job->output == NULL) {
@@ -553,8 +555,10 @@ check_queries(const hs_system_sets *sets, hs_failure *failure)
     return status;
 }
 
-hs_status
-hs_systems_check(const hs_system_sets *sets, const hs_call *total, hs_failure *failure)
+/* The arguments of a call that has been entered, and its kernel. What a system has of its own is
+ * looked at with it. */
+static hs_status
+systems_check(const hs_system_sets *sets, const hs_call *total, hs_failure *failure)
 {
     const hs_systems *systems = sets->systems;
     const hs_box     *box = systems != NULL ? systems->box : NULL;
@@ -574,9 +578,11 @@ hs_systems_check(const hs_system_sets *sets, const hs_call *total, hs_failure *f
                                             : hs_box_check(box, failure);
 }
 
-hs_status
-hs_systems_check_limit(const hs_system_sets *sets, bool is_full, const hs_options *options,
-                       hs_failure *failure)
+/* After that, where pairs have the cutoff or a reach as their limit, and what all systems share of
+ * it; is_full: rules may have a direction. */
+static hs_status
+systems_check_limit(const hs_system_sets *sets, bool is_full, const hs_options *options,
+                    hs_failure *failure)
 {
     const hs_systems *systems = sets->systems;
     if (systems->reach != NULL) { /* limits of each system are looked at with it */
@@ -595,8 +601,9 @@ hs_systems_check_limit(const hs_system_sets *sets, bool is_full, const hs_option
     return HS_OK;
 }
 
-void
-hs_share_limit(hs_options *options, int n_threads)
+/* Each thread has an account of its own: together they must not pass the limit of the call. */
+static void
+share_limit(hs_options *options, int n_threads)
 {
     if (n_threads > 1 && options->find_limit != NULL) {
         options->memory_limit =
@@ -617,7 +624,7 @@ tell_shortage(const hs_systems_job *job, hs_failure *failure)
     hs_shortage    shortage = {0.0, 0.0};
     for (int64_t s = 0; s < job->systems->n; s++) {
         hs_box          own_box;
-        const hs_points points = hs_points_of_system(job->points, job->systems->first, s);
+        const hs_points points = points_of_system(job->points, job->systems->first, s);
         const hs_box   *box = hs_box_of_system(job->systems, points.ndim, s, &own_box);
         const double    cutoff = hs_cutoff_of_system(job->systems, s, total->options.cutoff);
         hs_shortage_add(&points, box, cutoff, &shortage);
@@ -629,8 +636,8 @@ static hs_status
 check_arguments(const hs_systems_job *job, hs_failure *failure)
 {
     const hs_system_sets sets = {.points = job->points, .systems = job->systems};
-    const hs_status      status = hs_systems_check(&sets, job->total, failure);
-    return status == HS_OK ? hs_systems_check_limit(&sets, false, &job->total->options, failure)
+    const hs_status      status = systems_check(&sets, job->total, failure);
+    return status == HS_OK ? systems_check_limit(&sets, false, &job->total->options, failure)
                            : status;
 }
 
@@ -658,7 +665,7 @@ search_systems(hs_systems_job *job, hs_failure *failure)
         const int n_threads = hs_call_threads((double)job->points->n, options);
         const int most = job->systems->n < n_threads ? (int)job->systems->n : n_threads;
         total->team = hs_team_create(most);
-        hs_share_limit(&total->options, hs_team_size(total->team));
+        share_limit(&total->options, hs_team_size(total->team));
         status = hs_systems_search(job, failure);
     }
     hs_choice_close(total);
@@ -918,7 +925,7 @@ search_all(calls_job *shared, hs_failure *failure)
     const int              n_threads =
         hs_call_threads((double)(each->sets.points->n + shared->n_points), &total->options);
     total->team = hs_team_create(n_systems < n_threads ? (int)n_systems : n_threads);
-    hs_share_limit(&total->options, hs_team_size(total->team));
+    share_limit(&total->options, hs_team_size(total->team));
     total->options.threads = 1;
     total->options.out = NULL;
     shared->is_direct = hs_team_size(total->team) == 1 && each->output != NULL &&
@@ -936,14 +943,16 @@ search_all(calls_job *shared, hs_failure *failure)
     return hs_crew_run(&crew, failure);
 }
 
-hs_status
-hs_systems_do_each(const hs_systems_each *each, hs_call *total, hs_failure *failure)
+/* Checks what the systems share, also where there are none, and does it, for a call that has been
+ * entered. total->done.pairs becomes their number, failure->system the one that fails. */
+static hs_status
+systems_do_each(const hs_systems_each *each, hs_call *total, hs_failure *failure)
 {
     const hs_system_sets *sets = &each->sets;
     calls_job             shared = {.each = each, .total = total};
-    hs_status             status = hs_systems_check(sets, total, failure);
+    hs_status             status = systems_check(sets, total, failure);
     if (status == HS_OK && each->has_limit) {
-        status = hs_systems_check_limit(sets, true, &total->options, failure);
+        status = systems_check_limit(sets, true, &total->options, failure);
     }
     if (status == HS_OK && sets->systems->selection != NULL) {
         const hs_sets all = {.points = sets->points, .queries = sets->queries};
@@ -1066,7 +1075,7 @@ find_rows(const hs_system_sets *sets, hs_system_fn search, int64_t k, const hs_o
                             .context = &job,
                             .has_limit = k == 0,
                             .output = &rows->output};
-    hs_status       status = hs_systems_check(sets, &rows->call, failure);
+    hs_status       status = systems_check(sets, &rows->call, failure);
     if (status == HS_OK) {
         hs_pairs_open(rows, sets->points->ndim);
         status = k > 0 ? check_radius(sets, options, failure)
@@ -1074,7 +1083,7 @@ find_rows(const hs_system_sets *sets, hs_system_fn search, int64_t k, const hs_o
                                                &job.offsets);
     }
     if (status == HS_OK) {
-        status = hs_systems_do_each(&each, &rows->call, failure);
+        status = systems_do_each(&each, &rows->call, failure);
     }
     if (status == HS_OK && k == 0) {
         job.offsets[0] = 0;
@@ -1141,7 +1150,7 @@ count_rows(const hs_systems_each *each, const hs_options *options, hs_failure *f
         status = check_histogram(job->histogram, failure);
     }
     if (status == HS_OK) {
-        status = hs_systems_do_each(each, &call, failure);
+        status = systems_do_each(each, &call, failure);
     }
     hs_call_leave(&call, call.done.pairs);
     hs_account_close(&call.account);

@@ -62,9 +62,6 @@ typedef struct hs_system_part {
     hs_among     among; /* of what is above, as far as all systems have it */
 } hs_system_part;
 
-/* Points first[s] to first[s + 1] of all. */
-hs_points hs_points_of_system(const hs_points *all, const int64_t *first, int64_t s);
-
 /* Whether each system has something of a box of its own. */
 HS_ALWAYS_INLINE bool
 hs_systems_have_boxes(const hs_systems *systems)
@@ -74,9 +71,6 @@ hs_systems_have_boxes(const hs_systems *systems)
 
 /* The box of system s of points in so many dimensions: that of all, or own_box, which is set. */
 const hs_box *hs_box_of_system(const hs_systems *systems, int ndim, int64_t s, hs_box *own_box);
-
-/* What pairs of system s have as their reach, where systems->reach is there. */
-hs_reach hs_reach_of_system(const hs_systems *systems, int ndim, int64_t s);
 
 /* How far pairs of system s may be apart: its own cutoff, or else that of all. */
 HS_ALWAYS_INLINE double
@@ -115,22 +109,6 @@ typedef struct hs_systems_each {
     hs_output     *output;    /* where pairs go, with the columns that the options want; or NULL */
 } hs_systems_each;
 
-/* Checks what the systems share, also where there are none, and does it, for a call that has been
- * entered. total->done.pairs becomes their number, failure->system the one that fails. */
-hs_status hs_systems_do_each(const hs_systems_each *each, hs_call *total, hs_failure *failure);
-
 /* What is checked, and shared out, before many systems are searched. */
-
-/* The arguments of a call that has been entered, and its kernel. What a system has of its own is
- * looked at with it. */
-hs_status hs_systems_check(const hs_system_sets *sets, const hs_call *total, hs_failure *failure);
-
-/* After that, where pairs have the cutoff or a reach as their limit, and what all systems share of
- * it; is_full: rules may have a direction. */
-hs_status hs_systems_check_limit(const hs_system_sets *sets, bool is_full,
-                                 const hs_options *options, hs_failure *failure);
-
-/* Each thread has an account of its own: together they must not pass the limit of the call. */
-void hs_share_limit(hs_options *options, int n_threads);
 
 #endif

@@ -542,8 +542,9 @@ is_prime(uint64_t p)
     return true;
 }
 
-uint64_t
-hs_prime_below(uint64_t p)
+/* The largest prime below p; p: odd, at most 2^62 and far above 2^61. A step of the above. */
+static uint64_t
+prime_below(uint64_t p)
 {
     do {
         p -= 2;
@@ -651,7 +652,7 @@ hs_rows_independent(int ndim, int n_rows, const double rows[][HS_MAX_DIM])
     uint64_t p = FIRST_PRIME;
     for (int proven_bits = 0; proven_bits <= bound_bits; proven_bits += PRIME_BITS) {
         if (proven_bits != 0) {
-            p = hs_prime_below(p);
+            p = prime_below(p);
         }
         if (full_rank(p, ndim, n_rows, integers)) {
             return true;
@@ -660,8 +661,9 @@ hs_rows_independent(int ndim, int n_rows, const double rows[][HS_MAX_DIM])
     return false;
 }
 
-int
-hs_zero_row(int ndim, int n_rows, const double rows[][HS_MAX_DIM])
+/* The first of these rows that is zero, or n_rows. */
+static int
+zero_row(int ndim, int n_rows, const double rows[][HS_MAX_DIM])
 {
     integer_row ignored;
     int         k = 0;
@@ -748,7 +750,7 @@ hs_box_check(const hs_box *box, hs_failure *failure)
         hs_rows_independent(box->ndim, n_periodic, rows)) {
         return HS_OK;
     }
-    const int zero = hs_zero_row(box->ndim, n_periodic, rows);
+    const int zero = zero_row(box->ndim, n_periodic, rows);
     failure->row = zero < n_periodic ? vector_of_row[zero] : -1;
     return HS_ERR_BOX_DEPENDENT;
 }
@@ -1183,8 +1185,9 @@ rotate_rows(int d, double M[][HS_MAX_DIM], double V[][HS_MAX_DIM], int a, int b)
     }
 }
 
-double
-hs_smallest_stretch(int d, const double F[][HS_MAX_DIM])
+/* At most the smallest singular value of F (d rows of d); 0 or less where it may vanish. */
+static double
+smallest_stretch(int d, const double F[][HS_MAX_DIM])
 {
     double M[HS_MAX_DIM][HS_MAX_DIM], V[HS_MAX_DIM][HS_MAX_DIM];
     for (int a = 0; a < d; a++) {
@@ -1299,8 +1302,8 @@ hs_strain_find(const hs_box *before, const hs_box *now, hs_strain *strain)
     }
     strain->residual = bound_inverse(&lattice) *
                        bound_residual(&lattice, (const double(*)[HS_MAX_DIM])rows, strain) * GROW;
-    strain->shrink = hs_smallest_stretch(before->ndim, (const double(*)[HS_MAX_DIM])strain->F) -
-                     strain->residual;
+    strain->shrink =
+        smallest_stretch(before->ndim, (const double(*)[HS_MAX_DIM])strain->F) - strain->residual;
     /* The difference is rounded by at most 2^-53 of the larger. */
     strain->shrink -= 0x1p-52 * fabs(strain->shrink) + 0x1p-53 * strain->residual + 0x1p-1060;
     strain->shrink = hs_smaller(strain->shrink, 1.0);

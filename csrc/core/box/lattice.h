@@ -122,12 +122,6 @@ void hs_reduce(int ndim, int n_rows, const double rows[][HS_MAX_DIM], hs_reducti
 /* rows: n_rows (0 ... ndim) rows of ndim finite doubles, of any magnitude. Allocates nothing. */
 bool hs_rows_independent(int ndim, int n_rows, const double rows[][HS_MAX_DIM]);
 
-/* The first of these rows that is zero, or n_rows. */
-int hs_zero_row(int ndim, int n_rows, const double rows[][HS_MAX_DIM]);
-
-/* The largest prime below p; p: odd, at most 2^62 and far above 2^61. A step of the above. */
-uint64_t hs_prime_below(uint64_t p);
-
 /*
  * What a change of the box does to distances, with certified bounds. docs/verlet.md
  * derives them.
@@ -144,8 +138,5 @@ typedef struct hs_strain {
 
 /* False where a bound cannot be had: too large a change, or numbers near the ends of the range. */
 bool hs_strain_find(const hs_box *before, const hs_box *now, hs_strain *strain);
-
-/* At most the smallest singular value of F (d rows of d); 0 or less where it may vanish. */
-double hs_smallest_stretch(int d, const double F[][HS_MAX_DIM]);
 
 #endif

@@ -185,8 +185,9 @@ hs_folded_join(hs_folded *folded, const hs_folded *more)
     }
 }
 
-double
-hs_fold_largest(const double *x, int64_t n, double largest)
+/* Largest |x|, or `largest` if that is larger. */
+static double
+fold_largest(const double *x, int64_t n, double largest)
 {
     double  lane[LANES] = {0.0};
     int64_t i = 0;
@@ -443,7 +444,7 @@ move_inside(const hs_lattice *lattice, int k, const double *HS_RESTRICT x, tile 
         const double given = x[i], moved = inside[i];
         inside[i] = work->moved[i] != 0.0 ? moved : given;
     }
-    folded->magnitude = hs_fold_largest(work->absolute, work->n, folded->magnitude);
+    folded->magnitude = fold_largest(work->absolute, work->n, folded->magnitude);
 }
 
 /* Ranges of the coordinates t_k of the points inside, joined to *folded. Returns whether along any
@@ -481,7 +482,7 @@ find_ranges(const hs_lattice *lattice, tile *work, hs_folded *folded)
         }
         folded->lower[k] = fmin(folded->lower[k], low);
         folded->upper[k] = fmax(folded->upper[k], high);
-        folded->x_largest[k] = hs_fold_largest(inside[k], work->n, folded->x_largest[k]);
+        folded->x_largest[k] = fold_largest(inside[k], work->n, folded->x_largest[k]);
         const double half = 0.5 * lattice->period[k];
         beyond = beyond || (lattice->row_of_axis[k] >= 0 && !(low >= -half && high <= half));
     }

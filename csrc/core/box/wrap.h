@@ -93,9 +93,6 @@ void hs_fold_axis(const hs_lattice *lattice, int k, double *x, int64_t first, in
 void hs_fold_points(const hs_lattice *lattice, bool few_turns, double *const *r, int64_t first,
                     int64_t last, double *const *x, const hs_turns *turns, hs_folded *folded);
 
-/* Largest |x|, or `largest` if that is larger. */
-double hs_fold_largest(const double *x, int64_t n, double largest);
-
 /* t_k of n points, with the bits of hs_lattice_coordinate: summed in its order. */
 void hs_fold_coordinates(const hs_lattice *lattice, int k, const double *const *x, int64_t n,
                          double *t);

@@ -731,8 +731,9 @@ advance(const hs_grid *grid, int32_t *offset)
     return false;
 }
 
-double
-hs_stencil_bound(const hs_grid *grid)
+/* Number of rows that hs_stencil_build would look at, before it drops those out of reach. */
+static double
+stencil_bound(const hs_grid *grid)
 {
     double rows = 1.0;
     for (int k = 1; k < grid->ndim; k++) {
@@ -797,7 +798,7 @@ hs_status
 hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene *scene,
                  const hs_grid *grid, bool is_full, hs_stencil *stencil)
 {
-    const double bound = hs_stencil_bound(grid) * (is_full ? 2.0 : 1.0);
+    const double bound = stencil_bound(grid) * (is_full ? 2.0 : 1.0);
     scope        of;
     of.scene = scene;
     of.grid = grid;
@@ -888,7 +889,7 @@ hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_w
         counts[k] = extent > pitch ? floor(fmin(extent / pitch, HS_GRID_CELLS_PER_AXIS)) : 1.0;
     }
     *is_wider = hs_grid_cap_counts(scene, counts);
-    while (hs_grid_set_shape(scene, counts, grid) != HS_OK || hs_stencil_bound(grid) > MOST_ROWS) {
+    while (hs_grid_set_shape(scene, counts, grid) != HS_OK || stencil_bound(grid) > MOST_ROWS) {
         *is_wider = true;
         if (!halve_counts(scene->ndim, counts)) {
             return HS_TRY_OTHER;

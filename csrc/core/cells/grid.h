@@ -136,9 +136,6 @@ typedef struct hs_stencil {
 hs_status hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene *scene,
                            const hs_grid *grid, bool is_full, hs_stencil *stencil);
 
-/* Number of rows that hs_stencil_build would look at, before it drops those out of reach. */
-double hs_stencil_bound(const hs_grid *grid);
-
 /* Bytes that the rows take at least, in boxes along the coordinate axes; elsewhere about so
  * many. */
 double hs_stencil_bytes(const hs_grid *grid, bool is_full);

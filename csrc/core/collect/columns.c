@@ -37,8 +37,9 @@ hs_output_width(const hs_output *output, unsigned bit)
     return hs_want_width(bit, output->ndim, output->index_bytes);
 }
 
-void
-hs_output_fix(hs_output *output, const hs_pair_arrays *arrays)
+/* Write to the caller's arrays. */
+static void
+output_fix(hs_output *output, const hs_pair_arrays *arrays)
 {
     void *const data[HS_QUANTITIES] = {arrays->i,      arrays->j,     arrays->distance,
                                        arrays->vector, arrays->shift, arrays->both,
@@ -254,8 +255,10 @@ hs_output_copy(hs_output *output, int64_t at, const hs_output *part, int64_t fir
     }
 }
 
-void *
-hs_output_take(hs_output *output, unsigned bit)
+/* Ownership of one column, cut to n_pairs, goes to the caller: hs_buffer_free. NULL where it is not
+ * kept. */
+static void *
+output_take(hs_output *output, unsigned bit)
 {
     if (!(output->columns & bit)) {
         return NULL;
@@ -267,8 +270,9 @@ hs_output_take(hs_output *output, unsigned bit)
     return hs_region_detach(column, column->used);
 }
 
-int64_t
-hs_output_charged(const hs_output *output)
+/* Bytes that the account has been charged for. */
+static int64_t
+output_charged(const hs_output *output)
 {
     return output->charged > 0 ? output->charged * hs_output_bytes_per_pair(output) : 0;
 }
@@ -278,7 +282,7 @@ hs_output_free(hs_output *output)
 {
     const unsigned owned = output->fixed ? 0 : output->columns;
     if (output->account != NULL) {
-        hs_account_give(output->account, hs_output_charged(output));
+        hs_account_give(output->account, output_charged(output));
     }
     for (int k = 0; k < HS_QUANTITIES; k++) {
         hs_region *column = &output->column[k];
@@ -382,7 +386,7 @@ hs_pairs_open(hs_pairs *pairs, int ndim)
     const hs_options *options = &pairs->call.options;
     hs_output_init(&pairs->call.account, ndim, options->want, options->index_bytes, &pairs->output);
     if (options->out != NULL) {
-        hs_output_fix(&pairs->output, options->out);
+        output_fix(&pairs->output, options->out);
     }
 }
 
@@ -406,7 +410,7 @@ hs_pairs_finish(hs_pairs *pairs, hs_status status, int64_t n_pairs, hs_pairs **r
     hs_call_detach(&pairs->call);
     if (status == HS_OK) { /* no block is left: the next call may have the arena */
         HS_ASSERT(account->held ==
-                  hs_output_charged(&pairs->output) + hs_output_charged(&pairs->offsets));
+                  output_charged(&pairs->output) + output_charged(&pairs->offsets));
         hs_account_close(account);
         *result = pairs;
     } else {
@@ -457,7 +461,7 @@ hs_pairs_take(hs_pairs *pairs, unsigned which)
 {
     return pairs == NULL || pairs->output.fixed || !is_quantity(which)
                ? NULL
-               : hs_output_take(&pairs->output, which);
+               : output_take(&pairs->output, which);
 }
 
 int64_t
@@ -475,7 +479,7 @@ hs_pairs_offsets(const hs_pairs *pairs)
 int64_t *
 hs_pairs_take_offsets(hs_pairs *pairs)
 {
-    return pairs != NULL ? hs_output_take(&pairs->offsets, HS_WANT_I) : NULL;
+    return pairs != NULL ? output_take(&pairs->offsets, HS_WANT_I) : NULL;
 }
 
 void

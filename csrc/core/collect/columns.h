@@ -33,9 +33,6 @@ size_t hs_output_width(const hs_output *output, unsigned bit);
 /* Bytes of one pair in all columns. */
 int64_t hs_output_bytes_per_pair(const hs_output *output);
 
-/* Write to the caller's arrays. */
-void hs_output_fix(hs_output *output, const hs_pair_arrays *arrays);
-
 /* The column of this HS_WANT_ bit; NULL where it is not kept. */
 void *hs_output_column(const hs_output *output, unsigned bit);
 
@@ -67,13 +64,6 @@ void hs_output_copy(hs_output *output, int64_t at, const hs_output *part, int64_
 
 /* Virtual room for about n pairs, before the first: saves growing. Never fails. */
 void hs_output_reserve_hint(hs_output *output, double n);
-
-/* Bytes that the account has been charged for. */
-int64_t hs_output_charged(const hs_output *output);
-
-/* Ownership of one column, cut to n_pairs, goes to the caller: hs_buffer_free. NULL where it is not
- * kept. */
-void *hs_output_take(hs_output *output, unsigned bit);
 
 /* Idempotent. A fixed output is let go of. */
 void hs_output_free(hs_output *output);

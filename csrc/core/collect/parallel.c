@@ -30,8 +30,10 @@ struct hs_commits {
     int64_t          full_range; /* the last one that is written, n_ranges at first */
 };
 
-hs_commits *
-hs_commits_new(hs_account *account, hs_output *output, int64_t n_ranges)
+/* output: borrowed; NULL when nothing is written. The thread that calls this is the only one that
+ * may poll. NULL when memory is short. */
+static hs_commits *
+commits_new(hs_account *account, hs_output *output, int64_t n_ranges)
 {
     hs_commits *commits = hs_alloc(account, HS_FOR_CANDIDATES, 1, sizeof *commits);
     if (commits != NULL) {
@@ -54,14 +56,16 @@ hs_commits_limit(hs_commits *commits, int64_t enough, int64_t most)
     commits->most = most;
 }
 
-int64_t
-hs_commits_written(const hs_commits *commits)
+/* After all threads are done: how many ranges have been written to their end, the first ones. */
+static int64_t
+commits_written(const hs_commits *commits)
 {
     return commits->due;
 }
 
-hs_status
-hs_commits_end(hs_account *account, hs_commits *commits, hs_failure *failure)
+/* After all threads are done: HS_OK, or the failure of the earliest range that had one. Frees. */
+static hs_status
+commits_end(hs_account *account, hs_commits *commits, hs_failure *failure)
 {
     const hs_status status = commits->status;
     if (status != HS_OK) {
@@ -369,7 +373,7 @@ static hs_status
 search_ranges(hs_crew *crew, hs_failure *failure)
 {
     hs_account *account = &crew->call->account;
-    sharing     shared = {crew, hs_commits_new(account, crew->output, crew->n_ranges)};
+    sharing     shared = {crew, commits_new(account, crew->output, crew->n_ranges)};
     if (shared.commits == NULL) {
         return HS_ERR_MEMORY;
     }
@@ -377,8 +381,8 @@ search_ranges(hs_crew *crew, hs_failure *failure)
         hs_commits_limit(shared.commits, crew->enough, crew->most);
     }
     hs_team_run(crew->call->team, crew->n_open, work, &shared);
-    crew->n_written = hs_commits_written(shared.commits);
-    return hs_commits_end(account, shared.commits, failure);
+    crew->n_written = commits_written(shared.commits);
+    return commits_end(account, shared.commits, failure);
 }
 
 hs_status
@@ -676,8 +680,9 @@ hs_record_next(hs_search *search, hs_output *output, hs_walker *walker, hs_recor
     return record_by(search, output, walker, recorder, hs_record_hits, recorder, failure);
 }
 
-hs_status
-hs_record_alone(hs_search *search, hs_output *output, hs_failure *failure)
+/* Records all pairs by this thread, straight into an output that grows. */
+static hs_status
+record_alone(hs_search *search, hs_output *output, hs_failure *failure)
 {
     hs_account *account = &search->call->account;
     hs_walker   walker;
@@ -710,5 +715,5 @@ hs_record_all(hs_search *search, hs_output *output, hs_failure *failure)
     }
     hs_output_reserve_hint(output, (double)output->n_pairs + search->grid.expected_pairs);
     return search->call->team != NULL ? hs_parallel_record(search, output, failure)
-                                      : hs_record_alone(search, output, failure);
+                                      : record_alone(search, output, failure);
 }

@@ -57,19 +57,9 @@ typedef struct hs_committer {
 /* Does the work of one range. */
 typedef hs_status (*hs_range_fn)(void *worker, int64_t range);
 
-/* output: borrowed; NULL when nothing is written. The thread that calls this is the only one that
- * may poll. NULL when memory is short. */
-hs_commits *hs_commits_new(hs_account *account, hs_output *output, int64_t n_ranges);
-
 /* Before any thread joins: from `enough` pairs in the output on no range is begun, and from `most`
  * on none is ended but the one that is due, which is to be left (hs_committer.is_full). */
 void hs_commits_limit(hs_commits *commits, int64_t enough, int64_t most);
-
-/* After all threads are done: how many ranges have been written to their end, the first ones. */
-int64_t hs_commits_written(const hs_commits *commits);
-
-/* After all threads are done: HS_OK, or the failure of the earliest range that had one. Frees. */
-hs_status hs_commits_end(hs_account *account, hs_commits *commits, hs_failure *failure);
 
 /* Called by the thread itself, whose committer has options and pairs, and nothing else. The options
  * are changed: threads that may not poll look whether another has failed, and the caller's thread
@@ -137,9 +127,6 @@ typedef struct hs_visitors {
     void                   *contexts; /* borrowed; of each thread, as hs_crew.workers */
     size_t                  context_size;
 } hs_visitors;
-
-/* Records all pairs by this thread, straight into an output that grows. */
-hs_status hs_record_alone(hs_search *search, hs_output *output, hs_failure *failure);
 
 /* The same with a walker and a recorder that are kept from one search to the next; all zeros before
  * the first, and closed by the caller. */

@@ -180,8 +180,12 @@ look_again(open_pairs *open, int32_t first, const hs_hits *hits)
     return decide_open(open);
 }
 
-hs_status
-hs_put_shells(const hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+/* The shells of the hits of points from `first` on, places in the walker's block whose distances
+ * have been written, as the next of the column; nothing where they are not wanted. Distances that
+ * rounding has moved across an edge are put right. HS_OK, HS_ERR_SHIFT_RANGE, which sets
+ * scanner->failed_point, or HS_ERR_INTERRUPTED. */
+static hs_status
+put_shells(const hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     const hs_shells *shells = &scanner->search->shells;
     const int32_t    n = hits->end[hits->n - 1];
@@ -221,9 +225,12 @@ measure_one(const hs_metric *metric, const hs_batch *batch, int64_t *const *shif
     }
 }
 
-void
-hs_measure_pairs(const hs_kernel *kernel, const hs_metric *metric, const hs_batch *batch,
-                 int64_t *const *shift, bool is_wide, double *distance, double *const *vector)
+/* Measures pairs in the arrays of `batch`. shift: one array for each row of the metric, or NULL if
+ * no pair is shifted. is_wide: batch->shift does not hold these numbers. vector: NULL, or one array
+ * for each axis. */
+static void
+measure_pairs(const hs_kernel *kernel, const hs_metric *metric, const hs_batch *batch,
+              int64_t *const *shift, bool is_wide, double *distance, double *const *vector)
 {
     uint8_t done[HS_IN_BATCH] = {0};
     if (!is_wide) {
@@ -251,8 +258,8 @@ hs_measured_find(const hs_kernel *kernel, const hs_metric *metric, bool vectors,
         batch.shift[r] = pairs->times[r];
         shift[r] = pairs->shift[r];
     }
-    hs_measure_pairs(kernel, metric, &batch, pairs->is_shifted ? shift : NULL, pairs->is_wide,
-                     pairs->distance, vectors ? vector : NULL);
+    measure_pairs(kernel, metric, &batch, pairs->is_shifted ? shift : NULL, pairs->is_wide,
+                  pairs->distance, vectors ? vector : NULL);
 }
 
 hs_scale
@@ -377,9 +384,12 @@ direct(const hs_recorder *recorder, hs_write *write)
     write->shift = hs_output_next(output, HS_WANT_SHIFT);
 }
 
-hs_status
-hs_write_hits(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits,
-              bool *written)
+/* The hits of points from `first` on, which are places in the walker's block, as the next pairs of
+ * the output, but for HS_WANT_BOTH. *written: whether that was possible; if not, nothing is there
+ * yet. HS_OK or HS_ERR_INTERRUPTED. */
+static hs_status
+write_hits(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits,
+           bool *written)
 {
     const hs_search *search = scanner->search;
     *written = false;
@@ -447,8 +457,8 @@ measure(hs_recorder *recorder, hs_pair_batch *trace)
     const hs_batch   batch = hs_pair_batch_view(trace);
     int64_t *const  *shift = search->bins.keeps_originals ? trace->given : trace->image;
     double *const   *vector = recorder->columns & HS_WANT_VECTOR ? recorder->vector : NULL;
-    hs_measure_pairs(search->call->kernel, &search->scene.metric, &batch,
-                     trace->is_shifted ? shift : NULL, trace->is_wide, recorder->distance, vector);
+    measure_pairs(search->call->kernel, &search->scene.metric, &batch,
+                  trace->is_shifted ? shift : NULL, trace->is_wide, recorder->distance, vector);
 }
 
 /* Distances of the batch, none beyond the limit of its pair, or what that is rounded to. */
@@ -615,8 +625,10 @@ put_batch(hs_recorder *recorder, hs_scanner *scanner, const batch_part *part)
     return HS_OK;
 }
 
-hs_status
-hs_put_measures(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+/* The hits of points from `first` on, which are places in the walker's block, as the next pairs of
+ * the output; recorder->ids holds their numbers. HS_ERR_SHIFT_RANGE sets scanner->failed_point. */
+static hs_status
+put_measures(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     hs_pair_batch *trace = &scanner->trace;
     batch_part     part = {.first = 0};
@@ -721,12 +733,12 @@ put_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_h
     const int32_t *id = scanner->block.id;
     hs_hits        by_id = *hits;
     bool           written;
-    hs_status      status = hs_write_hits(recorder, scanner, first, hits, &written);
+    hs_status      status = write_hits(recorder, scanner, first, hits, &written);
     if (status != HS_OK) {
         return status;
     }
     if (written) {
-        return hs_put_shells(recorder, scanner, first, hits);
+        return put_shells(recorder, scanner, first, hits);
     }
     if (scanner->search->is_half || (recorder->columns & INDICES)) {
         for (int32_t h = 0; h < n; h++) {
@@ -735,8 +747,8 @@ put_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_h
         by_id.label = recorder->ids;
         put_indices(recorder, scanner->search, &by_id);
     }
-    status = hs_put_measures(recorder, scanner, first, hits);
-    return status == HS_OK ? hs_put_shells(recorder, scanner, first, hits) : status;
+    status = put_measures(recorder, scanner, first, hits);
+    return status == HS_OK ? put_shells(recorder, scanner, first, hits) : status;
 }
 
 /* Distances of pairs that are this far apart or further are not below that. */

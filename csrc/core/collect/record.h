@@ -58,27 +58,9 @@ hs_status hs_record_hits(void *recorder, hs_scanner *scanner, int32_t first, con
 
 /* All columns of a visit's hits in one pass, by the kernel's writer (write.h). */
 
-/* The hits of points from `first` on, which are places in the walker's block, as the next pairs of
- * the output, but for HS_WANT_BOTH. *written: whether that was possible; if not, nothing is there
- * yet. HS_OK or HS_ERR_INTERRUPTED. */
-hs_status hs_write_hits(hs_recorder *recorder, hs_scanner *scanner, int32_t first,
-                        const hs_hits *hits, bool *written);
-
 /* D, D and S of hits, written beside their indices. */
 
-/* The hits of points from `first` on, which are places in the walker's block, as the next pairs of
- * the output; recorder->ids holds their numbers. HS_ERR_SHIFT_RANGE sets scanner->failed_point. */
-hs_status hs_put_measures(hs_recorder *recorder, hs_scanner *scanner, int32_t first,
-                          const hs_hits *hits);
-
 /* Which shell each pair is in (search.h). */
-
-/* The shells of the hits of points from `first` on, places in the walker's block whose distances
- * have been written, as the next of the column; nothing where they are not wanted. Distances that
- * rounding has moved across an edge are put right. HS_OK, HS_ERR_SHIFT_RANGE, which sets
- * scanner->failed_point, or HS_ERR_INTERRUPTED. */
-hs_status hs_put_shells(const hs_recorder *recorder, hs_scanner *scanner, int32_t first,
-                        const hs_hits *hits);
 
 /*
  * D and D of a batch of pairs, with the same bits wherever pairs come from: a walk, the
@@ -113,12 +95,6 @@ hs_measured_shift(hs_measured *pairs, int32_t e, int r, int64_t shift)
 /* Sets distance and, if `vectors`, vector, in the unit of the metric. */
 void hs_measured_find(const hs_kernel *kernel, const hs_metric *metric, bool vectors,
                       hs_measured *pairs);
-
-/* Measures pairs in the arrays of `batch`. shift: one array for each row of the metric, or NULL if
- * no pair is shifted. is_wide: batch->shift does not hold these numbers. vector: NULL, or one array
- * for each axis. */
-void hs_measure_pairs(const hs_kernel *kernel, const hs_metric *metric, const hs_batch *batch,
-                      int64_t *const *shift, bool is_wide, double *distance, double *const *vector);
 
 /* From the unit of the scene's metric to the caller's. */
 hs_scale hs_measures_unscale(const hs_scene *scene);

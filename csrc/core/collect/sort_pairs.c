@@ -110,7 +110,8 @@ sort_images(const hs_sorting *all, uint64_t *row, int64_t n, uint64_t *keys)
     }
 }
 
-void
+/* Puts n entries of one row in the order of (j, S). spare: room for as many. */
+static void
 hs_sort_row(const hs_sorting *all, uint64_t *row, int64_t n, uint64_t *spare)
 {
     if (!all->has_j) {
@@ -129,8 +130,9 @@ hs_sort_row(const hs_sorting *all, uint64_t *row, int64_t n, uint64_t *spare)
     }
 }
 
-int64_t
-hs_row_from(const hs_sorting *all, int64_t entry)
+/* The first row that begins at this entry or behind it. */
+static int64_t
+row_from(const hs_sorting *all, int64_t entry)
 {
     int64_t first = 0, end = all->n_points;
     while (first < end) {
@@ -248,8 +250,11 @@ choose_strips(const hs_sorting *all)
     return n;
 }
 
-hs_status
-hs_deal_out(hs_sorting *all)
+/* Sets end, n, longest, has_j, place_bits and entries, which the caller frees, also on failure: the
+ * entries of each row together, in no order yet. i, j and what describes the pairs are there
+ * already. */
+static hs_status
+deal_out(hs_sorting *all)
 {
     hs_call      *call = all->call;
     const int64_t n_pairs = all->found->n_pairs;
@@ -413,8 +418,8 @@ do_range(void *context, int64_t range)
 {
     worker           *me = context;
     const hs_sorting *all = me->job->all;
-    const int64_t     first_row = hs_row_from(all, range * RANGE_ENTRIES);
-    const int64_t     end_row = hs_row_from(all, (range + 1) * RANGE_ENTRIES);
+    const int64_t     first_row = row_from(all, range * RANGE_ENTRIES);
+    const int64_t     end_row = row_from(all, (range + 1) * RANGE_ENTRIES);
     const int64_t     begin = hs_row_begin(all, first_row);
     const int64_t     end = hs_row_begin(all, end_row);
     hs_status         status = HS_OK;
@@ -522,7 +527,7 @@ sort(hs_sorting *all, hs_output *sorted)
     all->i = hs_output_column(all->found, HS_WANT_I);
     all->j = hs_output_column(all->found, HS_WANT_J);
     all->shift = hs_output_column(all->found, HS_WANT_SHIFT);
-    hs_status status = hs_deal_out(all);
+    hs_status status = deal_out(all);
     if (status == HS_OK) {
         status = put_all(all, sorted);
     }

@@ -80,18 +80,7 @@ hs_row_begin(const hs_sorting *all, int64_t row)
     return row > 0 ? all->end[row - 1] : 0;
 }
 
-/* The first row that begins at this entry or behind it. */
-int64_t hs_row_from(const hs_sorting *all, int64_t entry);
-
-/* Puts n entries of one row in the order of (j, S). spare: room for as many. */
-void hs_sort_row(const hs_sorting *all, uint64_t *row, int64_t n, uint64_t *spare);
-
 /* The counting sort of pairs into rows. */
-
-/* Sets end, n, longest, has_j, place_bits and entries, which the caller frees, also on failure: the
- * entries of each row together, in no order yet. i, j and what describes the pairs are there
- * already. */
-hs_status hs_deal_out(hs_sorting *all);
 
 #ifdef HS_TESTING
 /* How many bits a place may have at most. Returns what it was before. */

@@ -535,9 +535,11 @@ hs_node_pairs_count(const hs_node_map *map, bool ghost_pairs, const hs_output *h
     return n;
 }
 
-hs_status
-hs_node_columns_open(hs_call *call, bool has_shift, int ndim, int64_t room, hs_pairs *nodes,
-                     hs_pairs *lists, hs_node_columns *to)
+/* Room for so many pairs: numbers, and shifts of ndim components where there are any, in `nodes`,
+ * and lists in `lists`, both empty, whose n_pairs stay 0. HS_OK or HS_ERR_MEMORY. */
+static hs_status
+node_columns_open(hs_call *call, bool has_shift, int ndim, int64_t room, hs_pairs *nodes,
+                  hs_pairs *lists, hs_node_columns *to)
 {
     const unsigned shift = has_shift ? (unsigned)HS_WANT_SHIFT : 0u;
     const int      d = has_shift ? ndim : 1;
@@ -582,8 +584,8 @@ hs_node_pairs_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs, cons
     const hs_half_columns pairs = hs_half_list_columns(half);
     const int64_t         n = hs_node_pairs_count(map, ghost_pairs, half);
     hs_node_columns       to;
-    const hs_status       status = hs_node_columns_open(call, (half->columns & HS_WANT_SHIFT) != 0,
-                                                        half->ndim, n, nodes, lists, &to);
+    const hs_status       status = node_columns_open(call, (half->columns & HS_WANT_SHIFT) != 0,
+                                                     half->ndim, n, nodes, lists, &to);
     if (status != HS_OK) {
         return status;
     }
@@ -697,15 +699,18 @@ put_row(pairs_filling *doing, int64_t p, int64_t *looked)
     return HS_OK;
 }
 
-hs_status
-hs_row_pairs_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs, const hs_list_rows *rows,
-                  hs_pairs *nodes, hs_pairs *lists)
+/* Fills columns I, J and S of `nodes`, and I and J of `lists`, as hs_node_pairs_fill does. The map
+ * is plain, and all of its nodes have rows. HS_ERR_ARGUMENT where offsets are none, or there are
+ * more pairs than rows can have that mirror each other. */
+static hs_status
+row_pairs_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs, const hs_list_rows *rows,
+               hs_pairs *nodes, hs_pairs *lists)
 {
     pairs_filling doing = {
         .map = map, .rows = rows, .ghost_pairs = ghost_pairs, .room = rows->n_indices / 2};
     int64_t   looked = 0;
-    hs_status status = hs_node_columns_open(call, rows->shift != NULL, rows->ndim, doing.room,
-                                            nodes, lists, &doing.to);
+    hs_status status = node_columns_open(call, rows->shift != NULL, rows->ndim, doing.room, nodes,
+                                         lists, &doing.to);
     HS_ASSERT(map->is_plain && map->n_rows == map->n);
     for (int64_t p = 0; status == HS_OK && p < map->n; p++) {
         status = put_row(&doing, p, &looked);
@@ -820,8 +825,8 @@ fill_rows(hs_connectivity *made, const hs_node_map *map, const hs_node_lists *li
     }
     if (status == HS_OK && !lists->rows_only && has_all) {
         const hs_list_rows rows = rows_of(made->rows, map->n_lists);
-        status = hs_row_pairs_fill(&made->call, map, lists->ghost_pairs, &rows, made->nodes,
-                                   made->lists);
+        status =
+            row_pairs_fill(&made->call, map, lists->ghost_pairs, &rows, made->nodes, made->lists);
     }
     return status;
 }
@@ -848,8 +853,8 @@ hs_connectivity_fill_pairs(hs_connectivity *made, const hs_node_lists *lists, in
     hs_status   status = hs_node_map_make(account, lists, n, &map);
     if (status == HS_OK) {
         status = map.is_plain && map.n_rows == n && rows->n == n && rows->n_lists == map.n_lists
-                     ? hs_row_pairs_fill(&made->call, &map, lists->ghost_pairs, rows, made->nodes,
-                                         made->lists)
+                     ? row_pairs_fill(&made->call, &map, lists->ghost_pairs, rows, made->nodes,
+                                      made->lists)
                      : HS_ERR_ARGUMENT;
         hs_node_map_free(account, &map);
     }
@@ -1313,8 +1318,8 @@ hs_kept_pairs_fill(hs_call *call, const hs_node_pairs *pairs, const hs_node_chan
         status = find_targets(&call->account, change, &doing);
     }
     if (status == HS_OK) {
-        status = hs_node_columns_open(call, pairs->shift != NULL, pairs->ndim, pairs->n, nodes,
-                                      lists, &doing.to);
+        status = node_columns_open(call, pairs->shift != NULL, pairs->ndim, pairs->n, nodes, lists,
+                                   &doing.to);
     }
     for (int64_t e = 0; status == HS_OK && e < pairs->n; e++) {
         status = put_kept_pair(&doing, e, keep == NULL || keep[e]) ? HS_OK : HS_ERR_ARGUMENT;

@@ -127,11 +127,6 @@ typedef struct hs_node_columns {
     int32_t *shift;
 } hs_node_columns;
 
-/* Room for so many pairs: numbers, and shifts of ndim components where there are any, in `nodes`,
- * and lists in `lists`, both empty, whose n_pairs stay 0. HS_OK or HS_ERR_MEMORY. */
-hs_status hs_node_columns_open(hs_call *call, bool has_shift, int ndim, int64_t room,
-                               hs_pairs *nodes, hs_pairs *lists, hs_node_columns *to);
-
 /* How many pairs the table has. */
 int64_t hs_node_pairs_count(const hs_node_map *map, bool ghost_pairs, const hs_output *half);
 
@@ -142,12 +137,6 @@ hs_status hs_node_pairs_fill(hs_call *call, const hs_node_map *map, bool ghost_p
 
 /* The table of pairs of nodes from rows of all of them, whose points are in the order
  * of lists and nodes: each row has the pairs that its node begins as it is, list by list. */
-
-/* Fills columns I, J and S of `nodes`, and I and J of `lists`, as hs_node_pairs_fill does. The map
- * is plain, and all of its nodes have rows. HS_ERR_ARGUMENT where offsets are none, or there are
- * more pairs than rows can have that mirror each other. */
-hs_status hs_row_pairs_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs,
-                            const hs_list_rows *rows, hs_pairs *nodes, hs_pairs *lists);
 
 /* connectivity.h: rows and pairs of node lists, which the functions of api/ make and give out. */
 

@@ -95,9 +95,11 @@ hs_point_rows_copy(hs_account *account, const hs_index_rows *given, hs_point_row
     return status;
 }
 
-hs_status
-hs_point_rows_turn(hs_account *account, const hs_point_rows *from, const int32_t *order,
-                   const int32_t *place, hs_point_rows *rows)
+/* The opposite direction, with all points under other numbers: row place[j] has the places of all i
+ * in whose rows j is; order[place[i]] is i. */
+static hs_status
+point_rows_turn(hs_account *account, const hs_point_rows *from, const int32_t *order,
+                const int32_t *place, hs_point_rows *rows)
 {
     const int64_t n_entries = from->first[from->n];
     hs_status     status = allocate(account, from->n, rows);
@@ -122,8 +124,9 @@ hs_point_rows_turn(hs_account *account, const hs_point_rows *from, const int32_t
     return HS_OK;
 }
 
-hs_status
-hs_point_rows_of(hs_account *account, const hs_output *half, int64_t n, hs_point_rows *rows)
+/* All neighbours of each of n points. */
+static hs_status
+point_rows_of(hs_account *account, const hs_output *half, int64_t n, hs_point_rows *rows)
 {
     const hs_half_columns pairs = hs_half_list_columns(half);
     hs_status             status = allocate(account, n, rows);
@@ -192,8 +195,19 @@ fill_words(const hs_point_rows *from, hs_word_rows *rows)
     }
 }
 
-hs_status
-hs_word_rows_make(hs_account *account, const hs_point_rows *from, hs_word_rows *rows)
+/* Idempotent. */
+static void
+word_rows_free(hs_account *account, hs_word_rows *rows)
+{
+    hs_free(account, rows->first);
+    hs_free(account, rows->word);
+    hs_free(account, rows->bits);
+    *rows = (hs_word_rows){.first = NULL};
+}
+
+/* Of rows that ascend. On failure holds nothing. */
+static hs_status
+word_rows_make(hs_account *account, const hs_point_rows *from, hs_word_rows *rows)
 {
     *rows = (hs_word_rows){.first = NULL};
     rows->first = hs_alloc(account, HS_FOR_SORTING, from->n + 1, sizeof *rows->first);
@@ -204,20 +218,11 @@ hs_word_rows_make(hs_account *account, const hs_point_rows *from, hs_word_rows *
     rows->word = hs_alloc(account, HS_FOR_SORTING, n, sizeof *rows->word);
     rows->bits = hs_alloc(account, HS_FOR_SORTING, n, sizeof *rows->bits);
     if (rows->word == NULL || rows->bits == NULL) {
-        hs_word_rows_free(account, rows);
+        word_rows_free(account, rows);
         return HS_ERR_MEMORY;
     }
     fill_words(from, rows);
     return HS_OK;
-}
-
-void
-hs_word_rows_free(hs_account *account, hs_word_rows *rows)
-{
-    hs_free(account, rows->first);
-    hs_free(account, rows->word);
-    hs_free(account, rows->bits);
-    *rows = (hs_word_rows){.first = NULL};
 }
 
 /*
@@ -446,7 +451,7 @@ merge_all(merging *doing, const hs_output *half, hs_output *output, hs_failure *
                           .n_ranges = n_ranges,
                           .search = merge_range,
                           .output = output};
-    hs_status status = hs_point_rows_of(&doing->call->account, half, doing->map->n, &doing->rows);
+    hs_status     status = point_rows_of(&doing->call->account, half, doing->map->n, &doing->rows);
     if (status == HS_OK && !count_before(doing, n_ranges)) {
         status = HS_ERR_MEMORY;
     }
@@ -558,8 +563,17 @@ find_keys(const double *points, int64_t n, int ndim, hs_keys *sort)
     }
 }
 
-hs_status
-hs_space_order_make(hs_call *call, const double *points, int64_t n, int ndim, hs_space_order *order)
+/* Idempotent. */
+static void
+space_order_free(hs_account *account, hs_space_order *order)
+{
+    hs_free(account, order->order);
+    *order = (hs_space_order){NULL, NULL};
+}
+
+/* points: row after row; those that are not finite come anywhere. On failure holds nothing. */
+static hs_status
+space_order_make(hs_call *call, const double *points, int64_t n, int ndim, hs_space_order *order)
 {
     hs_account *account = &call->account;
     int64_t    *keys = hs_alloc(account, HS_FOR_SORTING, n, 2 * sizeof *keys);
@@ -578,7 +592,7 @@ hs_space_order_make(hs_call *call, const double *points, int64_t n, int ndim, hs
     hs_free(account, keys);
     hs_free(account, spare);
     if (status != HS_OK) {
-        hs_space_order_free(account, order);
+        space_order_free(account, order);
         return status;
     }
     order->place = order->order + n;
@@ -586,13 +600,6 @@ hs_space_order_make(hs_call *call, const double *points, int64_t n, int ndim, hs
         order->place[order->order[p]] = (int32_t)p;
     }
     return HS_OK;
-}
-
-void
-hs_space_order_free(hs_account *account, hs_space_order *order)
-{
-    hs_free(account, order->order);
-    *order = (hs_space_order){NULL, NULL};
 }
 
 /*
@@ -717,8 +724,8 @@ static void
 free_product(hs_account *account, product *doing)
 {
     hs_point_rows_free(account, &doing->gather);
-    hs_space_order_free(account, &doing->order);
-    hs_word_rows_free(account, &doing->turned);
+    space_order_free(account, &doing->order);
+    word_rows_free(account, &doing->turned);
     hs_free(account, doing->first);
     hs_output_free(&doing->all);
 }
@@ -730,14 +737,14 @@ prepare(hs_call *call, const hs_index_rows *gather, const double *points, int nd
     hs_point_rows turned;
     hs_status     status = hs_point_rows_copy(account, gather, &doing->gather);
     if (status == HS_OK) {
-        status = hs_space_order_make(call, points, gather->n, ndim, &doing->order);
+        status = space_order_make(call, points, gather->n, ndim, &doing->order);
     }
     if (status == HS_OK) {
-        status = hs_point_rows_turn(account, &doing->gather, doing->order.order, doing->order.place,
-                                    &turned);
+        status = point_rows_turn(account, &doing->gather, doing->order.order, doing->order.place,
+                                 &turned);
     }
     if (status == HS_OK) {
-        status = hs_word_rows_make(account, &turned, &doing->turned);
+        status = word_rows_make(account, &turned, &doing->turned);
         hs_point_rows_free(account, &turned);
     }
     if (status == HS_OK) {

@@ -26,15 +26,6 @@ typedef struct hs_point_rows {
  */
 hs_status hs_point_rows_copy(hs_account *account, const hs_index_rows *given, hs_point_rows *rows);
 
-/* The opposite direction, with all points under other numbers: row place[j] has the places of all i
- * in whose rows j is; order[place[i]] is i. */
-hs_status hs_point_rows_turn(hs_account *account, const hs_point_rows *from, const int32_t *order,
-                             const int32_t *place, hs_point_rows *rows);
-
-/* All neighbours of each of n points. */
-hs_status hs_point_rows_of(hs_account *account, const hs_output *half, int64_t n,
-                           hs_point_rows *rows);
-
 /* Idempotent. */
 void hs_point_rows_free(hs_account *account, hs_point_rows *rows);
 
@@ -48,12 +39,6 @@ typedef struct hs_word_rows {
     int32_t  *word; /* ascending in each row */
     uint64_t *bits;
 } hs_word_rows;
-
-/* Of rows that ascend. On failure holds nothing. */
-hs_status hs_word_rows_make(hs_account *account, const hs_point_rows *from, hs_word_rows *rows);
-
-/* Idempotent. */
-void hs_word_rows_free(hs_account *account, hs_word_rows *rows);
 
 /*
  * A set of numbers that is filled in any order and emptied in ascending order, again and
@@ -152,13 +137,6 @@ typedef struct hs_space_order {
     int32_t *order; /* n: the points, in this order */
     int32_t *place; /* n: where each of them is in it */
 } hs_space_order;
-
-/* points: row after row; those that are not finite come anywhere. On failure holds nothing. */
-hs_status hs_space_order_make(hs_call *call, const double *points, int64_t n, int ndim,
-                              hs_space_order *order);
-
-/* Idempotent. */
-void hs_space_order_free(hs_account *account, hs_space_order *order);
 
 /*
  * overlap.h: points that gather a common point, from the rows of what each point gathers. With G

@@ -11,8 +11,9 @@
 /* A block that is too small is replaced by a larger one; the map learns where its
  * entries are now. */
 
-int
-hs_block_size(int64_t count)
+/* The size of the smallest block for so many entries: it has 2^size. */
+static int
+block_size(int64_t count)
 {
     int size = 0;
     while (INT64_C(1) << size < count) {
@@ -26,7 +27,7 @@ hs_cell_reserve(hs_dynamic *list, uint32_t number, int64_t count)
 {
     hs_cell *const cell = &list->cells.cell[number];
     uint8_t *const size = &list->cells.size[number];
-    const int      larger = hs_block_size(count);
+    const int      larger = block_size(count);
     if (*size != HS_NO_BLOCK && larger <= *size) {
         return true;
     }
@@ -275,8 +276,10 @@ hs_rows_place(const hs_dynamic *list, double *const *x, int64_t i, double *given
     return status;
 }
 
-hs_status
-hs_rows_reach(hs_dynamic *list, int64_t n, double *const *x, hs_failure *failure)
+/* Whether all positions can be had; dense cells are made to reach them. HS_ERR_SHIFT_RANGE;
+ * HS_ERR_CAPACITY with the bytes, HS_ERR_MEMORY, HS_ERR_INTERRUPTED. n > 0. */
+static hs_status
+rows_reach(hs_dynamic *list, int64_t n, double *const *x, hs_failure *failure)
 {
     int64_t   first[HS_MAX_DIM], last[HS_MAX_DIM];
     double    given[HS_MAX_DIM], bytes = 0.0;
@@ -323,7 +326,7 @@ reserve_copy(const hs_dynamic *list, hs_dynamic *copy)
             first[k] = n_cells == 0 || index[k] < first[k] ? index[k] : first[k];
             last[k] = n_cells == 0 || index[k] > last[k] ? index[k] : last[k];
         }
-        n_entries += INT64_C(1) << hs_block_size(list->cells.cell[c].count);
+        n_entries += INT64_C(1) << block_size(list->cells.cell[c].count);
         n_cells++;
     }
     return n_cells == 0 ||
@@ -334,8 +337,9 @@ reserve_copy(const hs_dynamic *list, hs_dynamic *copy)
                                : hs_cell_table_reserve(&copy->cells, &copy->entries, n_cells)));
 }
 
-hs_status
-hs_copy_points(const hs_dynamic *list, hs_dynamic *copy)
+/* copy: a new list of the same kind. HS_ERR_MEMORY: it holds no points. */
+static hs_status
+copy_points(const hs_dynamic *list, hs_dynamic *copy)
 {
     int64_t index[HS_MAX_DIM];
     if (!reserve_copy(list, copy)) {
@@ -528,7 +532,7 @@ hs_list_copy(const hs_dynamic *list, hs_dynamic **copy)
     hs_status                status = hs_list_new(&options, &made, &ignored);
     *copy = NULL;
     if (status == HS_OK) {
-        status = hs_copy_points(list, made);
+        status = copy_points(list, made);
         if (status == HS_OK) {
             *copy = made;
         } else {
@@ -639,7 +643,7 @@ reach(hs_dynamic *list, int64_t n, double *const *x, hs_failure *failure)
     int64_t first[HS_MAX_DIM], last[HS_MAX_DIM];
     double  bytes = 0.0;
     if (!list->lattice.aligned) {
-        return hs_rows_reach(list, n, x, failure);
+        return rows_reach(list, n, x, failure);
     }
     for (int k = 0; k < list->lattice.ndim; k++) {
         const hs_axis *axis = &list->axes.axis[k];
@@ -666,14 +670,14 @@ cut_blocks(hs_dynamic *list)
     hs_cell_table *cells = &list->cells;
     int64_t        total = 0;
     for (int64_t c = 0; c < cells->n; c++) {
-        total += cells->cell[c].count > 0 ? INT64_C(1) << hs_block_size(cells->cell[c].count) : 0;
+        total += cells->cell[c].count > 0 ? INT64_C(1) << block_size(cells->cell[c].count) : 0;
     }
     if (!hs_entries_reserve(&list->entries, total)) {
         return false;
     }
     for (int64_t c = 0; c < cells->n; c++) {
         if (cells->cell[c].count > 0) {
-            const int size = hs_block_size(cells->cell[c].count);
+            const int size = block_size(cells->cell[c].count);
             cells->size[c] = (uint8_t)size;
             cells->cell[c] = (hs_cell){hs_entries_take(&list->entries, size), 0};
         }
@@ -865,7 +869,7 @@ reserve_rows(hs_dynamic *list, int64_t n, double *const *x, uint32_t *numbers, h
     uint32_t *coming = NULL;
     bool      fits;
     for (int64_t i = 0; i < n; i++) {
-        (void)hs_rows_place(list, x, i, given, &placed, failure); /* it can be had: hs_rows_reach */
+        (void)hs_rows_place(list, x, i, given, &placed, failure); /* it can be had: rows_reach */
         numbers[i] = hs_cell_table_add(&list->cells, &list->entries, placed.index);
     }
     if (n < list->cells.n / FEW_ROWS) {
@@ -933,7 +937,7 @@ hs_update_insert_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags,
         list->changes += status == HS_OK;
         return status;
     }
-    hs_status status = hs_rows_reach(list, n, x, failure);
+    hs_status status = rows_reach(list, n, x, failure);
     if (status != HS_OK) {
         return status;
     }

@@ -77,9 +77,6 @@ typedef struct hs_placed hs_placed;
 
 /* Room for the entries of a cell. */
 
-/* The size of the smallest block for so many entries: it has 2^size. */
-int hs_block_size(int64_t count);
-
 /* Makes room for `count` entries in a cell; those that are there move to a larger block. False when
  * memory is refused: then nothing has changed. */
 bool hs_cell_reserve(hs_dynamic *list, uint32_t number, int64_t count);
@@ -186,10 +183,6 @@ hs_rows_go_on(const hs_dynamic *list, int64_t i)
 hs_status hs_rows_place(const hs_dynamic *list, double *const *x, int64_t i, double *given,
                         hs_placed *placed, hs_failure *failure);
 
-/* Whether all positions can be had; dense cells are made to reach them. HS_ERR_SHIFT_RANGE;
- * HS_ERR_CAPACITY with the bytes, HS_ERR_MEMORY, HS_ERR_INTERRUPTED. n > 0. */
-hs_status hs_rows_reach(hs_dynamic *list, int64_t n, double *const *x, hs_failure *failure);
-
 /* Lists as a whole: made from options, copied, emptied. */
 
 /* HS_OK, or what is wrong with the options; failure->column as halfshell_dynamic.h says. */
@@ -207,9 +200,6 @@ void      hs_list_clear(hs_dynamic *list);
 hs_status hs_list_shrink(hs_dynamic *list);
 
 /* The points of a list in another one, which takes no more memory than they need. */
-
-/* copy: a new list of the same kind. HS_ERR_MEMORY: it holds no points. */
-hs_status hs_copy_points(const hs_dynamic *list, hs_dynamic *copy);
 
 /* Many points into a list that holds none: no key has to be looked up, and each cell has
  * its block from the beginning. */

@@ -511,8 +511,9 @@ hs_cell_table_reserve(hs_cell_table *table, hs_entries *entries, int64_t more)
     return table->n + more <= table->capacity;
 }
 
-uint32_t
-hs_cell_table_append(hs_cell_table *table, const int64_t *index)
+/* Sparse: adds a cell that is not there, for which there is room. */
+static uint32_t
+cell_table_append(hs_cell_table *table, const int64_t *index)
 {
     const uint32_t cell = (uint32_t)table->n++;
     table->n_empty++;
@@ -589,8 +590,7 @@ hs_cell_table_add(hs_cell_table *table, hs_entries *entries, const int64_t *inde
     if (found != HS_NO_CELL || table->dense) {
         return found;
     }
-    return hs_cell_table_reserve(table, entries, 1) ? hs_cell_table_append(table, index)
-                                                    : HS_NO_CELL;
+    return hs_cell_table_reserve(table, entries, 1) ? cell_table_append(table, index) : HS_NO_CELL;
 }
 
 void

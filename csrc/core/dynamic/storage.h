@@ -336,9 +336,6 @@ uint32_t hs_cell_table_add(hs_cell_table *table, hs_entries *entries, const int6
 /* Sparse: makes room for so many cells more, whose numbers will then stay. */
 bool hs_cell_table_reserve(hs_cell_table *table, hs_entries *entries, int64_t more);
 
-/* Sparse: adds a cell that is not there, for which there is room. */
-uint32_t hs_cell_table_append(hs_cell_table *table, const int64_t *index);
-
 /* The indices of a cell, in sparse tables modulo 2^32. */
 void hs_cell_table_index(const hs_cell_table *table, uint32_t cell, int64_t *index);
 

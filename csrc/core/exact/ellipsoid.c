@@ -138,8 +138,9 @@ is_surely_definite(const scaled_support *h, double x)
                         : is_triple_definite(h->entries, diagonal);
 }
 
-double
-hs_support_cofactors(const double *h, double *c)
+/* About the entries of the cofactors of three rows, in float64; returns about the determinant. */
+static double
+support_cofactors(const double *h, double *c)
 {
     c[hs_support_at(0, 0)] = h[2] * h[5] - h[4] * h[4];
     c[hs_support_at(1, 0)] = h[3] * h[4] - h[1] * h[5];
@@ -168,7 +169,7 @@ static double
 estimate_three(const double *h)
 {
     double       c[HS_SUPPORT_ENTRIES];
-    const double determinant = hs_support_cofactors(h, c);
+    const double determinant = support_cofactors(h, c);
     const double xx = c[0], yx = c[1], yy = c[2], zx = c[3], zy = c[4], zz = c[5];
     const double mean = (xx + yy + zz) / 3.0;
     const double x = xx - mean, y = yy - mean, z = zz - mean;
@@ -358,7 +359,7 @@ solve(int ndim, const double *h, const double *normal, double *y)
         return;
     }
     double       c[HS_SUPPORT_ENTRIES];
-    const double determinant = hs_support_cofactors(h, c);
+    const double determinant = support_cofactors(h, c);
     y[0] = (c[0] * normal[0] + c[1] * normal[1] + c[3] * normal[2]) / determinant;
     y[1] = (c[1] * normal[0] + c[2] * normal[1] + c[4] * normal[2]) / determinant;
     y[2] = (c[3] * normal[0] + c[4] * normal[1] + c[5] * normal[2]) / determinant;

@@ -60,9 +60,6 @@ typedef enum hs_support_state {
  * as well, and it is not negative. */
 hs_support_state hs_support_reach(int ndim, const double *entries, double extent, double *reach);
 
-/* About the entries of the cofactors of three rows, in float64; returns about the determinant. */
-double hs_support_cofactors(const double *entries, double *cofactors);
-
 /* Not below the root of the sum of all squares of the matrix, and so |H D| <= size |D|; may be
  * infinite. */
 double hs_support_size(int ndim, const double *entries);

@@ -17,9 +17,9 @@
 #define ALL_CELLS  8
 #define MOST_CELLS (1 << 16) /* a megabyte; squares below these share cell 0 */
 
-hs_status
-hs_edges_init(hs_account *account, const hs_scene *scene, double filter_error,
-              const hs_histogram *histogram, hs_edges *edges)
+static hs_status
+edges_init(hs_account *account, const hs_scene *scene, double filter_error,
+           const hs_histogram *histogram, hs_edges *edges)
 {
     const int64_t n = histogram->n_edges;
     *edges = (hs_edges){.n = n,
@@ -47,8 +47,9 @@ hs_edges_init(hs_account *account, const hs_scene *scene, double filter_error,
     return HS_OK;
 }
 
-void
-hs_edges_free(hs_account *account, hs_edges *edges)
+/* Edges of the histogram in the unit of the scene. */
+static void
+edges_free(hs_account *account, hs_edges *edges)
 {
     hs_free(account, edges->at);
     edges->at = NULL;
@@ -465,9 +466,9 @@ hs_sums_round(const hs_sums *sums, int64_t k)
     return negative ? -size : size;
 }
 
-hs_status
-hs_marked_init(hs_account *account, const hs_marks *marks, const int32_t *order, int64_t n,
-               int32_t n_types, hs_marked *marked, hs_failure *failure)
+static hs_status
+marked_init(hs_account *account, const hs_marks *marks, const int32_t *order, int64_t n,
+            int32_t n_types, hs_marked *marked, hs_failure *failure)
 {
     *marked = (hs_marked){.type = NULL};
     hs_status status =
@@ -490,8 +491,10 @@ hs_marked_init(hs_account *account, const hs_marks *marks, const int32_t *order,
     return HS_OK;
 }
 
-void
-hs_marked_free(hs_account *account, hs_marked *marked)
+/* Point i of the set has the caller's number order[i]. HS_ERR_TYPES or HS_ERR_WEIGHTS set
+ * failure->row. */
+static void
+marked_free(hs_account *account, hs_marked *marked)
 {
     hs_free(account, marked->type);
     marked->type = NULL;
@@ -896,14 +899,14 @@ hs_tally_plan_open(hs_search *search, const hs_histogram *histogram, hs_tally_pl
     plan->sums = histogram->sums != NULL;
     plan->asking = search->has_queries ? &plan->queries : &plan->points;
     hs_status status =
-        hs_edges_init(account, &search->scene, search->filter_error, histogram, &plan->edges);
+        edges_init(account, &search->scene, search->filter_error, histogram, &plan->edges);
     if (status == HS_OK) {
-        status = hs_marked_init(account, &histogram->of_points, search->bins.order, search->bins.n,
-                                plan->n_types, &plan->points, failure);
+        status = marked_init(account, &histogram->of_points, search->bins.order, search->bins.n,
+                             plan->n_types, &plan->points, failure);
     }
     if (status == HS_OK && search->has_queries) {
-        status = hs_marked_init(account, &histogram->of_queries, search->query_bins.order,
-                                search->query_bins.n, plan->n_types, &plan->queries, failure);
+        status = marked_init(account, &histogram->of_queries, search->query_bins.order,
+                             search->query_bins.n, plan->n_types, &plan->queries, failure);
         failure->in_queries = status == HS_ERR_TYPES || status == HS_ERR_WEIGHTS;
     }
     if (status == HS_OK && plan->has_types &&
@@ -916,8 +919,8 @@ hs_tally_plan_open(hs_search *search, const hs_histogram *histogram, hs_tally_pl
 void
 hs_tally_plan_close(hs_tally_plan *plan)
 {
-    hs_edges_free(plan->account, &plan->edges);
-    hs_marked_free(plan->account, &plan->points);
-    hs_marked_free(plan->account, &plan->queries);
+    edges_free(plan->account, &plan->edges);
+    marked_free(plan->account, &plan->points);
+    marked_free(plan->account, &plan->queries);
     hs_free(plan->account, plan->group);
 }

@@ -49,11 +49,6 @@ typedef struct hs_edge_table {
     int32_t       last;   /* number of the last cell */
 } hs_edge_table;
 
-/* Edges of the histogram in the unit of the scene. */
-hs_status hs_edges_init(hs_account *account, const hs_scene *scene, double filter_error,
-                        const hs_histogram *histogram, hs_edges *edges);
-void      hs_edges_free(hs_account *account, hs_edges *edges);
-
 /* Whether a pair at exactly edge k is below it. */
 HS_ALWAYS_INLINE bool
 hs_edge_is_inclusive(const hs_edges *edges, int64_t k)
@@ -161,12 +156,6 @@ typedef struct hs_marked {
     int32_t   *type; /* owned; NULL: all 0 */
     hs_weights weights;
 } hs_marked;
-
-/* Point i of the set has the caller's number order[i]. HS_ERR_TYPES or HS_ERR_WEIGHTS set
- * failure->row. */
-hs_status hs_marked_init(hs_account *account, const hs_marks *marks, const int32_t *order,
-                         int64_t n, int32_t n_types, hs_marked *marked, hs_failure *failure);
-void      hs_marked_free(hs_account *account, hs_marked *marked);
 
 /*
  * What one thread counts for a histogram. Hits come with their float32 squares; a table

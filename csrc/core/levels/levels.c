@@ -56,6 +56,14 @@ read_one(const double *matrix, int64_t row, int ndim, double extent, double *num
     }
 }
 
+/* Idempotent. */
+static void
+support_set_free(hs_account *account, hs_support_set *set)
+{
+    hs_free(account, set->numbers);
+    set->numbers = NULL;
+}
+
 hs_status
 hs_support_set_read(hs_account *account, const hs_options *options, const double *supports,
                     int64_t n, int ndim, double extent, hs_support_set *set, double *reaches,
@@ -76,16 +84,9 @@ hs_support_set_read(hs_account *account, const hs_options *options, const double
         }
     }
     if (status != HS_OK) {
-        hs_support_set_free(account, set);
+        support_set_free(account, set);
     }
     return status;
-}
-
-void
-hs_support_set_free(hs_account *account, hs_support_set *set)
-{
-    hs_free(account, set->numbers);
-    set->numbers = NULL;
 }
 
 /* The largest width of all points, which a few tell where they are round or turned
@@ -111,8 +112,9 @@ width_of(const hs_support_step *of, const hs_level_set *set, hs_slice levels, co
     return HS_OK;
 }
 
-hs_status
-hs_support_step_width(const void *context, const double *normal, double enough, double *width)
+/* The `find` of a hs_narrowing, whose context is a hs_support_step. */
+static hs_status
+support_step_width(const void *context, const double *normal, double enough, double *width)
 {
     const hs_support_step *of = context;
     const hs_level_step   *step = of->step;
@@ -140,7 +142,7 @@ free_level_set(hs_account *account, hs_level_set *set)
     hs_free(account, set->number);
     hs_free(account, set->radii);
     hs_free(account, set->first);
-    hs_support_set_free(account, &set->supports);
+    support_set_free(account, &set->supports);
 }
 
 void
@@ -161,8 +163,9 @@ hs_levels_free(hs_account *account, hs_levels *levels)
     *levels = (hs_levels){.n = 0};
 }
 
-hs_points
-hs_level_points(const hs_level_set *set, hs_slice levels)
+/* The points of these levels, borrowed. */
+static hs_points
+level_points(const hs_level_set *set, hs_slice levels)
 {
     const int64_t first = set->first[levels.first];
     return (hs_points){.data = set->rows + first * set->ndim,
@@ -194,8 +197,10 @@ refuse_input(hs_status status, const hs_level_input *set, int64_t row, double va
     return status;
 }
 
-bool
-hs_division_go_on(const hs_division *by, int64_t n, hs_slice *next, hs_status *status)
+/* Passes go over HS_POLL_POINTS at a time and poll in between. The next ones of n; false where
+ * there are none, after a failure, or where the caller wants to stop, which *status says. */
+static bool
+division_go_on(const hs_division *by, int64_t n, hs_slice *next, hs_status *status)
 {
     if (*status == HS_OK && next->end > 0 && next->end < n) {
         *status = hs_poll(by->options, 0.0);
@@ -214,7 +219,7 @@ read_radii(hs_division *by, hs_level_input *set, hs_failure *failure)
     const int64_t n = set->radii != NULL ? set->points->n : 0;
     hs_slice      next = {0, 0};
     hs_status     status = HS_OK;
-    while (hs_division_go_on(by, n, &next, &status)) {
+    while (division_go_on(by, n, &next, &status)) {
         for (int64_t i = next.first; i < next.end; i++) {
             const double radius = set->radii[i] + 0.0; /* and no -0 */
             if (!(radius >= 0.0 && radius <= largest) || (radius > 0.0 && radius < smallest)) {
@@ -248,7 +253,7 @@ read_types(const hs_division *by, hs_level_input *set, hs_failure *failure)
 {
     hs_slice  next = {0, 0};
     hs_status status = HS_OK;
-    while (hs_division_go_on(by, set->points->n, &next, &status)) {
+    while (division_go_on(by, set->points->n, &next, &status)) {
         for (int64_t i = next.first; i < next.end; i++) {
             const int32_t type = set->types[i];
             if (type < 0 || type >= by->reach->n_types) {
@@ -266,7 +271,7 @@ read_rows(const hs_division *by, hs_level_input *set, hs_failure *failure)
 {
     hs_slice  next = {0, 0};
     hs_status status = HS_OK;
-    while (hs_division_go_on(by, set->points->n, &next, &status)) {
+    while (division_go_on(by, set->points->n, &next, &status)) {
         hs_points part = *set->points;
         part.data = (const char *)part.data + next.first * part.row_stride;
         part.n = next.end - next.first;
@@ -279,8 +284,8 @@ read_rows(const hs_division *by, hs_level_input *set, hs_failure *failure)
     return status;
 }
 
-hs_status
-hs_level_input_read(hs_division *by, hs_level_input *set, hs_failure *failure)
+static hs_status
+level_input_read(hs_division *by, hs_level_input *set, hs_failure *failure)
 {
     const int64_t n = set->points->n;
     set->rows = hs_alloc(by->account, HS_FOR_POINTS, n * set->points->ndim, sizeof *set->rows);
@@ -295,13 +300,15 @@ hs_level_input_read(hs_division *by, hs_level_input *set, hs_failure *failure)
     return status == HS_OK ? read_rows(by, set, failure) : status;
 }
 
-void
-hs_level_input_free(hs_account *account, hs_level_input *set)
+/* Reads a set, and counts its types or finds the largest of its radii. On failure as well, it is to
+ * be freed. */
+static void
+level_input_free(hs_account *account, hs_level_input *set)
 {
     hs_free(account, set->rows);
     hs_free(account, set->copy);
     hs_free(account, set->size);
-    hs_support_set_free(account, &set->read);
+    support_set_free(account, &set->read);
 }
 
 /* One pass finds the level of each point, a counting sort puts the levels in
@@ -326,7 +333,7 @@ find_sizes(const hs_division *by, hs_level_input *set)
 {
     hs_slice  next = {0, 0};
     hs_status status = HS_OK;
-    while (hs_division_go_on(by, set->points->n, &next, &status)) {
+    while (division_go_on(by, set->points->n, &next, &status)) {
         for (int64_t i = next.first; i < next.end; i++) {
             set->size[i] = hs_level_input_has_radii(set) ? size_of(set->copy[i], by->largest) : 0;
             by->count[set->size[i]]++;
@@ -379,7 +386,7 @@ arrange(const hs_division *by, hs_level_input *from, int32_t n_levels, hs_level_
         next[by->count[from->size[i]] + 1]++;
     }
     hs_starts_of_lengths(next, (int64_t)n_levels + 1);
-    while (hs_division_go_on(by, to->n, &part, &status)) {
+    while (division_go_on(by, to->n, &part, &status)) {
         for (int64_t i = part.first; i < part.end; i++) {
             const int64_t at = next[by->count[from->size[i]]]++;
             memcpy(to->rows + at * to->ndim, from->rows + i * to->ndim, bytes);
@@ -430,9 +437,9 @@ divide(hs_division *by, hs_level_input *points, hs_level_input *queries, hs_leve
         return HS_ERR_MEMORY;
     }
     memset(by->count, 0, (size_t)by->n_sizes * sizeof *by->count);
-    hs_status status = hs_level_input_read(by, points, failure);
+    hs_status status = level_input_read(by, points, failure);
     if (status == HS_OK && queries->points != NULL) {
-        status = hs_level_input_read(by, queries, failure);
+        status = level_input_read(by, queries, failure);
     }
     if (status != HS_OK) {
         return status;
@@ -480,8 +487,8 @@ hs_levels_divide(hs_account *account, const hs_options *options, const hs_points
                           .has_supports = has_supports,
                           .extent = reach->extent};
     const hs_status status = divide(&by, &of_points, &of_queries, levels, failure);
-    hs_level_input_free(account, &of_points);
-    hs_level_input_free(account, &of_queries);
+    level_input_free(account, &of_points);
+    level_input_free(account, &of_queries);
     hs_free(account, by.count);
     if (status != HS_OK) {
         hs_levels_free(account, levels);
@@ -752,8 +759,9 @@ hs_level_plan_make(hs_account *account, const hs_levels *levels, double bound,
     return HS_OK;
 }
 
-hs_level_step
-hs_level_plan_all(const hs_levels *levels, const hs_level_plan *plan)
+/* One step that is all of a search by radii, in place of those of the plan, which has some. */
+static hs_level_step
+level_plan_all(const hs_levels *levels, const hs_level_plan *plan)
 {
     hs_level_step  all = {.is_own = plan->is_half};
     hs_level_plan  one = {.steps = &all, .is_half = plan->is_half, .bound = plan->bound};
@@ -907,7 +915,7 @@ join(const hs_options *options, const hs_levels *levels, const hs_box *box, hs_l
         levels->n > MOST_JOINED) {
         return HS_OK;
     }
-    const hs_level_step all = hs_level_plan_all(levels, plan);
+    const hs_level_step all = level_plan_all(levels, plan);
     const hs_status     status = find_spread(options, levels, box, &of);
     if (status != HS_OK) {
         return status;
@@ -1092,9 +1100,14 @@ set_supports(const hs_levels *levels, const hs_level_step *step, double bound, h
     return status;
 }
 
-hs_status
-hs_level_limits_set(const hs_levels *levels, const hs_level_step *step, double bound,
-                    hs_search *search, hs_level_limits *own)
+/*
+ * For the cells of this search. With radii and types, the points are numbered by their places in
+ * the slices of the step; with supports, as the caller numbers them. HS_ERR_MEMORY, or
+ * HS_ERR_INTERRUPTED where the poll says so; in any case to be freed.
+ */
+static hs_status
+level_limits_set(const hs_levels *levels, const hs_level_step *step, double bound,
+                 hs_search *search, hs_level_limits *own)
 {
     const hs_scene     *scene = &search->scene;
     const hs_level_set *asking = hs_levels_asking(levels);
@@ -1124,8 +1137,9 @@ hs_level_limits_set(const hs_levels *levels, const hs_level_step *step, double b
     return lacks ? HS_ERR_MEMORY : HS_OK;
 }
 
-void
-hs_level_limits_free(hs_account *account, hs_level_limits *own)
+/* Idempotent. */
+static void
+level_limits_free(hs_account *account, hs_level_limits *own)
 {
     hs_free(account, own->of_asking);
     hs_free(account, own->of_points);
@@ -1198,11 +1212,11 @@ hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int64_t number
 {
     const hs_level_step  *step = &plan->steps[number];
     const hs_level_set   *asking = hs_levels_asking(levels);
-    const hs_points       points = hs_level_points(&levels->points, step->points);
-    const hs_points       queries = hs_level_points(asking, step->asking);
+    const hs_points       points = level_points(&levels->points, step->points);
+    const hs_points       queries = level_points(asking, step->asking);
     hs_search            *search = &open->search;
     const hs_support_step of_supports = {levels, step, &call->options};
-    const hs_narrowing    narrowing = {hs_support_step_width, &of_supports};
+    const hs_narrowing    narrowing = {support_step_width, &of_supports};
     const hs_sets         sets = {.points = &points,
                                   .queries = step->is_own ? NULL : &queries,
                                   .is_full = !step->is_own || !plan->is_half,
@@ -1219,7 +1233,7 @@ hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int64_t number
         name_row(levels, step, failure);
     }
     if (status == HS_OK && step->has_limits && !levels->has_supports) {
-        status = hs_level_limits_set(levels, step, plan->bound, search, &open->own);
+        status = level_limits_set(levels, step, plan->bound, search, &open->own);
     }
     if (status == HS_OK) {
         search->is_half = plan->is_half;
@@ -1229,7 +1243,7 @@ hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int64_t number
         renumber(numbers_of(asking, step->asking), &search->query_bins);
     }
     if (status == HS_OK && levels->has_supports) {
-        status = hs_level_limits_set(levels, step, plan->bound, search, &open->own);
+        status = level_limits_set(levels, step, plan->bound, search, &open->own);
     }
     if (status != HS_OK) {
         hs_level_close(open);
@@ -1242,6 +1256,6 @@ hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int64_t number
 void
 hs_level_close(hs_level_search *open)
 {
-    hs_level_limits_free(&open->search.call->account, &open->own);
+    level_limits_free(&open->search.call->account, &open->own);
     hs_search_close(&open->search);
 }

@@ -36,9 +36,6 @@ hs_support_set_at(const hs_support_set *set, int ndim, int64_t number)
     return set->numbers + (number - set->first) * (hs_support_entries(ndim) + 1);
 }
 
-/* Idempotent. */
-void hs_support_set_free(hs_account *account, hs_support_set *set);
-
 /*
  * levels.h: points divided by the size of their reach, so that small ones are searched in small
  * cells however large others are: a level is all points whose radii are of one binary order,
@@ -90,9 +87,6 @@ void hs_levels_renumber(int32_t first, hs_levels *levels);
 /* Idempotent. */
 void hs_levels_free(hs_account *account, hs_levels *levels);
 
-/* The points of these levels, borrowed. */
-hs_points hs_level_points(const hs_level_set *set, hs_slice levels);
-
 /* How many these are. */
 HS_ALWAYS_INLINE double
 hs_level_count(const hs_level_set *set, hs_slice levels)
@@ -140,9 +134,6 @@ typedef struct hs_level_plan {
 hs_status hs_level_plan_make(hs_account *account, const hs_levels *levels, double bound,
                              hs_algorithm algorithm, hs_level_plan *plan);
 
-/* One step that is all of a search by radii, in place of those of the plan, which has some. */
-hs_level_step hs_level_plan_all(const hs_levels *levels, const hs_level_plan *plan);
-
 /* Whether one step is all of the search. */
 bool hs_level_plan_is_single(const hs_levels *levels, const hs_level_plan *plan);
 
@@ -160,10 +151,6 @@ typedef struct hs_support_step {
     const hs_level_step *step;
     const hs_options    *options; /* to poll by */
 } hs_support_step;
-
-/* The `find` of a hs_narrowing, whose context is a hs_support_step. */
-hs_status hs_support_step_width(const void *context, const double *normal, double enough,
-                                double *width);
 
 /*
  * What is to be divided into levels, read once and checked: the coordinates of a set
@@ -199,15 +186,6 @@ hs_level_input_has_radii(const hs_level_input *set)
 {
     return set->radii != NULL || set->supports != NULL;
 }
-
-/* Reads a set, and counts its types or finds the largest of its radii. On failure as well, it is to
- * be freed. */
-hs_status hs_level_input_read(hs_division *by, hs_level_input *set, hs_failure *failure);
-void      hs_level_input_free(hs_account *account, hs_level_input *set);
-
-/* Passes go over HS_POLL_POINTS at a time and poll in between. The next ones of n; false where
- * there are none, after a failure, or where the caller wants to stop, which *status says. */
-bool hs_division_go_on(const hs_division *by, int64_t n, hs_slice *next, hs_status *status);
 
 /*
  * One search of all levels in place of several, where that is quicker. Searches of
@@ -250,17 +228,6 @@ hs_level_limits_init(const hs_levels *levels, const hs_level_step *step, hs_leve
     own->limits.table.n_types = step->by_table ? levels->n : 0;
     own->limits.supports = levels->has_supports ? &own->supports : NULL;
 }
-
-/*
- * For the cells of this search. With radii and types, the points are numbered by their places in
- * the slices of the step; with supports, as the caller numbers them. HS_ERR_MEMORY, or
- * HS_ERR_INTERRUPTED where the poll says so; in any case to be freed.
- */
-hs_status hs_level_limits_set(const hs_levels *levels, const hs_level_step *step, double bound,
-                              hs_search *search, hs_level_limits *own);
-
-/* Idempotent. */
-void hs_level_limits_free(hs_account *account, hs_level_limits *own);
 
 /*
  * One step of a plan as a search like any other: of two sets of points, or of one,

@@ -415,9 +415,11 @@ hs_nearest_leaves_find(const hs_nearest *near, const hs_nearest_group *groups, i
     }
 }
 
-int32_t
-hs_nearest_leaves_list(const hs_nearest *near, const hs_nearest_group *group, double radius,
-                       hs_nearest_leaves *leaves)
+/* Lists the leaves within `radius` of one of these groups in leaves->hits, ascending; returns how
+ * many. radius: at most leaves->radius. */
+static int32_t
+nearest_leaves_list(const hs_nearest *near, const hs_nearest_group *group, double radius,
+                    hs_nearest_leaves *leaves)
 {
     const int    d = near->tree.ndim;
     const double reach =
@@ -563,11 +565,12 @@ hs_nearest_runs_find(const hs_nearest *near, const hs_options *options,
     return status;
 }
 
-hs_status
-hs_nearest_runs_take(const hs_nearest *near, const hs_nearest_group *group, double most,
-                     hs_nearest_leaves *leaves, hs_nearest_block *block)
+/* hs_nearest_runs_find from leaves that were found for this group and others. */
+static hs_status
+nearest_runs_take(const hs_nearest *near, const hs_nearest_group *group, double most,
+                  hs_nearest_leaves *leaves, hs_nearest_block *block)
 {
-    const int32_t n = hs_nearest_leaves_list(near, group, group->radius, leaves);
+    const int32_t n = nearest_leaves_list(near, group, group->radius, leaves);
     int32_t       first = 0;
     bool          is_one = true;
     block->n = block->n_runs = block->n_images = 0;
@@ -797,7 +800,7 @@ find(const hs_nearest *near, const hs_options *options, hs_nearest_group *group,
     if (leaves != NULL && group->radius <= leaves->radius &&
         group->radius >= LEAST_IN_ERRORS * leaves->error) {
         const hs_status status = settle_frame(near, group, leaves->error, block);
-        return status == HS_OK ? hs_nearest_runs_take(near, group, most, leaves, block) : status;
+        return status == HS_OK ? nearest_runs_take(near, group, most, leaves, block) : status;
     }
     if (start_images(near, group, &images) != HS_OK || images.count > most) {
         return most < INFINITY ? HS_TRY_OTHER : HS_ERR_MEMORY;

@@ -38,11 +38,6 @@ void      hs_nearest_leaves_free(const hs_nearest *near, hs_nearest_leaves *leav
 void hs_nearest_leaves_find(const hs_nearest *near, const hs_nearest_group *groups, int32_t n,
                             hs_nearest_leaves *leaves);
 
-/* Lists the leaves within `radius` of one of these groups in leaves->hits, ascending; returns how
- * many. radius: at most leaves->radius. */
-int32_t hs_nearest_leaves_list(const hs_nearest *near, const hs_nearest_group *group, double radius,
-                               hs_nearest_leaves *leaves);
-
 /*
  * What a group may be near to, gathered from all images as float32 relative to the
  * group.
@@ -79,10 +74,6 @@ typedef struct hs_nearest_block {
 hs_status hs_nearest_runs_find(const hs_nearest *near, const hs_options *options,
                                const hs_nearest_group *group, double most,
                                hs_nearest_images *images, hs_nearest_block *block);
-
-/* hs_nearest_runs_find from leaves that were found for this group and others. */
-hs_status hs_nearest_runs_take(const hs_nearest *near, const hs_nearest_group *group, double most,
-                               hs_nearest_leaves *leaves, hs_nearest_block *block);
 
 hs_status hs_nearest_block_init(const hs_nearest *near, hs_nearest_block *block);
 void      hs_nearest_block_free(const hs_nearest *near, hs_nearest_block *block);

@@ -361,8 +361,10 @@ hs_nearest_group_set(const hs_nearest *near, int32_t first, int32_t last, hs_nea
     }
 }
 
-double
-hs_nearest_farthest(const hs_nearest *near, const hs_nearest_group *group)
+/* A distance beyond which nothing is of use: that of all points, or the largest distance. In
+ * periodic boxes infinity, unless there is a largest distance. */
+static double
+nearest_farthest(const hs_nearest *near, const hs_nearest_group *group)
 {
     const hs_scene *scene = &near->search->scene;
     const double    limit = near->limit * (1.0 + RADIUS_ROOM);
@@ -516,7 +518,7 @@ hs_nearest_guess(const hs_nearest *near, hs_nearest_group *group)
     if (lattice->n_periodic > 0 && number == 0) {
         take_box(lattice, &region);
     }
-    const double farthest = hs_nearest_farthest(near, group);
+    const double farthest = nearest_farthest(near, group);
     const double inside = exp2(radius_of(&region, wanted));
     group->radius = hs_larger(widen_at_edges(near, group, inside) + away, HS_NEAREST_LEAST_RADIUS);
     group->is_complete = group->radius >= farthest ||
@@ -735,7 +737,7 @@ hs_nearest_bound(const hs_nearest *near, const hs_options *options, hs_nearest_b
                  hs_nearest_group *group)
 {
     const bool   is_open = near->search->scene.lattice.n_periodic == 0;
-    const double farthest = hs_nearest_farthest(near, group);
+    const double farthest = nearest_farthest(near, group);
     near_probe   probe = {.near = near, .bounder = bounder};
     double       error, along = hs_smaller(group->radius, near->smallest_period);
     /* Each time twice as far: some times, until hs_nearest_images_start refuses so many images. */

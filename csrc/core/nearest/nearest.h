@@ -92,10 +92,6 @@ void hs_nearest_group_set(const hs_nearest *near, int32_t first, int32_t last,
  * more; in any case not more than can be of use. */
 void hs_nearest_guess(const hs_nearest *near, hs_nearest_group *group);
 
-/* A distance beyond which nothing is of use: that of all points, or the largest distance. In
- * periodic boxes infinity, unless there is a largest distance. */
-double hs_nearest_farthest(const hs_nearest *near, const hs_nearest_group *group);
-
 /* The present image, as a group keeps it. */
 void hs_nearest_image_set(const hs_nearest *near, const hs_nearest_images *images,
                           hs_nearest_image *image);

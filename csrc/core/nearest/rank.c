@@ -58,8 +58,9 @@ hs_nearest_sort(hs_nearest_pace *pace, hs_nearest_key **keys, hs_nearest_key **s
     }
 }
 
-void
-hs_nearest_select(hs_nearest_key *keys, int64_t n, int64_t wanted)
+/* Brings the `wanted` keys of least squares to the front, in no order. */
+static void
+nearest_select(hs_nearest_key *keys, int64_t n, int64_t wanted)
 {
     for (int64_t low = 0, high = n - 1; low < high;) {
         const double pivot = keys[low + (high - low) / 2].square;
@@ -131,9 +132,11 @@ closeness(const hs_nearest_ranker *ranker, double square)
     return 2.0 * hs_nearest_error(ranker->block, ranker->near->tree.ndim, square);
 }
 
-bool
-hs_nearest_pair(const hs_nearest *near, const hs_nearest_block *block, int32_t si, int32_t place,
-                double *q, int64_t *shift, int64_t *given)
+/* What the metric measures to, and its shift; also S over the periodic box vectors as given when
+ * `given` is not NULL. False when a shift passes its range. */
+static bool
+nearest_pair(const hs_nearest *near, const hs_nearest_block *block, int32_t si, int32_t place,
+             double *q, int64_t *shift, int64_t *given)
 {
     const hs_bins          *bins = &near->search->bins, *asking = hs_search_asking(near->search);
     const hs_nearest_image *image = hs_nearest_image_of(block, place);
@@ -186,8 +189,8 @@ compare(hs_nearest_ranker *ranker, const hs_nearest_key *one, const hs_nearest_k
     take_origin(near, ranker->si, p);
     ranker->n_compared++;
     /* Shifts that pass their range are found when the pair is written; here any order will do. */
-    if (!hs_nearest_pair(near, ranker->block, ranker->si, one->place, q[0], shift[0], NULL) ||
-        !hs_nearest_pair(near, ranker->block, ranker->si, other->place, q[1], shift[1], NULL)) {
+    if (!nearest_pair(near, ranker->block, ranker->si, one->place, q[0], shift[0], NULL) ||
+        !nearest_pair(near, ranker->block, ranker->si, other->place, q[1], shift[1], NULL)) {
         return 0;
     }
     return hs_metric_compare(&near->order, &(hs_span){p, q[0], shift[0]},
@@ -326,7 +329,7 @@ keep_nearest(hs_nearest_ranker *ranker, int64_t n, int64_t wanted)
     hs_nearest_key *keys = ranker->keys;
     double          last = 0.0;
     int64_t         kept = wanted;
-    hs_nearest_select(keys, n, wanted);
+    nearest_select(keys, n, wanted);
     for (int64_t e = 0; e < wanted; e++) {
         last = hs_larger(keys[e].square, last);
     }
@@ -579,7 +582,7 @@ put_given(hs_nearest_writer *writer, const hs_nearest_ranker *ranker, const hs_n
     for (int32_t e = 0; e < n; e++) {
         double  q[HS_MAX_DIM];
         int64_t shift[HS_MAX_DIM], given[HS_MAX_DIM];
-        if (!hs_nearest_pair(near, ranker->block, ranker->si, keys[e].place, q, shift, given) ||
+        if (!nearest_pair(near, ranker->block, ranker->si, keys[e].place, q, shift, given) ||
             (writer->S != NULL && !put_shift(near, given, writer->S + (at + e) * asking->ndim))) {
             writer->failed = asking->order[ranker->si];
             return HS_ERR_SHIFT_RANGE;
@@ -671,7 +674,7 @@ count_within(hs_nearest_ranker *ranker, int64_t count)
                                            : asking->x[k][ranker->si];
         }
         if (key->square <= square + error &&
-            (!hs_nearest_pair(near, ranker->block, ranker->si, key->place, q, shift, NULL) ||
+            (!nearest_pair(near, ranker->block, ranker->si, key->place, q, shift, NULL) ||
              hs_metric_within(&near->within, p, q, shift, &ranker->stages))) {
             break; /* shifts that pass their range are found when they are written */
         }

@@ -54,9 +54,6 @@ hs_nearest_goes_on(hs_nearest_pace *pace, int64_t steps)
 void hs_nearest_sort(hs_nearest_pace *pace, hs_nearest_key **keys, hs_nearest_key **spare,
                      int64_t n, double largest);
 
-/* Brings the `wanted` keys of least squares to the front, in no order. */
-void hs_nearest_select(hs_nearest_key *keys, int64_t n, int64_t wanted);
-
 /* Stable, by insertion. */
 HS_ALWAYS_INLINE void
 hs_nearest_insert(void *context, hs_nearest_key *keys, int64_t n, hs_nearest_before_fn before)
@@ -131,11 +128,6 @@ bool hs_nearest_rank_fast(hs_nearest_ranker *ranker, int32_t si, const int32_t *
  */
 hs_status hs_nearest_rank(hs_nearest_ranker *ranker, const hs_nearest_group *group, int32_t si,
                           const int32_t *hits, int64_t n, int64_t *count);
-
-/* What the metric measures to, and its shift; also S over the periodic box vectors as given when
- * `given` is not NULL. False when a shift passes its range. */
-bool hs_nearest_pair(const hs_nearest *near, const hs_nearest_block *block, int32_t si,
-                     int32_t place, double *q, int64_t *shift, int64_t *given);
 
 /* Rows of the nearest, to their places in the output: k entries for each asking
  * point, in the caller's order; what a row lacks is j = -1, d = infinity, D = NaN and S = 0. */

@@ -135,8 +135,13 @@ partition(const hs_splitter *splitter, const hs_tree_node *node, const tree_cut 
     return left;
 }
 
-int32_t
-hs_tree_split(const hs_splitter *splitter, hs_tree_node *node)
+/*
+ * Divides the points of a node, which keep their order on both sides; returns where those of the
+ * right child begin. 0: the node stays a leaf, and is_spot says whether that is because its points
+ * are equal. Nodes that share no points can be split at the same time.
+ */
+static int32_t
+tree_split(const hs_splitter *splitter, hs_tree_node *node)
 {
     tree_cut cut;
     if (hs_tree_points(node) <= splitter->leaf_points) {
@@ -221,9 +226,15 @@ bound_subtree(void *context, int64_t task)
     bound_nodes(bounder->bins, bounder->tree, bounder->begins[task], bounder->begins[task + 1]);
 }
 
-void
-hs_tree_bound(hs_team *team, const hs_bins *bins, const int32_t *begins, int32_t n_subtrees,
-              hs_tree *tree)
+/*
+ * Fills depth, lower, upper and bounds, for which there is room, of a tree with nodes, whose points
+ * are in tree order by now. begins, n_subtrees + 1 numbers: nodes begins[s] to begins[s + 1] - 1
+ * are those below the root of subtree s, which is one thread's task; roots and what is above them
+ * come before.
+ */
+static void
+tree_bound(hs_team *team, const hs_bins *bins, const int32_t *begins, int32_t n_subtrees,
+           hs_tree *tree)
 {
     tree_bounder bounder = {bins, begins, tree};
     double       range[2];
@@ -294,7 +305,7 @@ split_large(void *context, int64_t task)
     const tree_builder *builder = context;
     hs_tree_node       *node = &builder->tree->nodes[builder->first_node + task];
     if (hs_tree_points(node) > SUBTREE_POINTS) {
-        node->left = hs_tree_split(&builder->splitter, node);
+        node->left = tree_split(&builder->splitter, node);
     }
 }
 
@@ -425,7 +436,7 @@ split_nodes(const tree_builder *builder, subtree *sub)
             left + 2 > sub->capacity && !grow(builder, sub)) {
             return HS_ERR_MEMORY;
         }
-        const int32_t middle = hs_tree_split(&builder->splitter, &sub->nodes[number]);
+        const int32_t middle = tree_split(&builder->splitter, &sub->nodes[number]);
         if (middle != 0) {
             append_children(sub->nodes, &sub->n_nodes, number, middle);
             const bool left_is_larger = hs_tree_points(&sub->nodes[left]) >
@@ -553,7 +564,7 @@ build_tree(tree_builder *builder, hs_scene *scene, hs_bins *bins)
         status = tree->bounds == NULL ? HS_ERR_MEMORY : HS_OK;
     }
     if (status == HS_OK && tree->n_nodes > 0) {
-        hs_tree_bound(builder->team, bins, builder->begins, builder->n_subtrees, tree);
+        tree_bound(builder->team, bins, builder->begins, builder->n_subtrees, tree);
     }
     return status;
 }

@@ -131,22 +131,6 @@ typedef struct hs_splitter {
     int32_t        leaf_points;
 } hs_splitter;
 
-/*
- * Divides the points of a node, which keep their order on both sides; returns where those of the
- * right child begin. 0: the node stays a leaf, and is_spot says whether that is because its points
- * are equal. Nodes that share no points can be split at the same time.
- */
-int32_t hs_tree_split(const hs_splitter *splitter, hs_tree_node *node);
-
 /* The last step in building a tree: how far its nodes reach. */
-
-/*
- * Fills depth, lower, upper and bounds, for which there is room, of a tree with nodes, whose points
- * are in tree order by now. begins, n_subtrees + 1 numbers: nodes begins[s] to begins[s + 1] - 1
- * are those below the root of subtree s, which is one thread's task; roots and what is above them
- * come before.
- */
-void hs_tree_bound(hs_team *team, const hs_bins *bins, const int32_t *begins, int32_t n_subtrees,
-                   hs_tree *tree);
 
 #endif

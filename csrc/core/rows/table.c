@@ -204,8 +204,9 @@ put_row(const hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits, i
     }
 }
 
-hs_status
-hs_fill_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+/* A hs_visit_fn of ordered walkers: whole rows, to their places by table->offsets. */
+static hs_status
+fill_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     hs_filler      *fill = context;
     const hs_bins  *asking = hs_search_asking(scanner->search);
@@ -239,15 +240,20 @@ keep_visit(hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int3
     }
 }
 
-void
-hs_keep_numbers(hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int64_t *where)
+/* The rows of a visit with HS_BLOCK_LISTS_IDS, one behind another, in fill->to, which has room for
+ * them: to table->offsets the lengths, and to `where` the entry that each begins with. Of `fill`
+ * only table and to are looked at. */
+static void
+keep_numbers(hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int64_t *where)
 {
     HS_ASSERT(scanner->use == HS_BLOCK_LISTS_IDS);
     keep_visit(fill, scanner, hits, 0, where);
 }
 
-hs_status
-hs_keep_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+/* A hs_visit_fn of ordered walkers: whole rows, one behind another, and their lengths as offsets.
+ * HS_TRY_OTHER when they are more than HS_MOST_KEPT. */
+static hs_status
+keep_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     hs_filler    *fill = context;
     hs_output    *kept = fill->to;
@@ -265,8 +271,8 @@ hs_keep_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *h
     return is_much ? HS_TRY_OTHER : HS_OK;
 }
 
-hs_status
-hs_filler_open(hs_table *table, hs_output *to, hs_filler *fill)
+static hs_status
+filler_open(hs_table *table, hs_output *to, hs_filler *fill)
 {
     hs_account *account = &table->search->call->account;
     *fill = (hs_filler){.table = table, .to = to};
@@ -286,8 +292,9 @@ hs_filler_close(hs_filler *fill)
     hs_output_free(&fill->part);
 }
 
-void
-hs_move_rows(hs_table *table)
+/* The rows that were kept, to their places. */
+static void
+move_rows(hs_table *table)
 {
     const hs_bins  *asking = hs_search_asking(table->search);
     const int32_t  *numbers = hs_output_column(&table->kept, HS_WANT_J);
@@ -350,8 +357,9 @@ hs_table_prepare(hs_table *table, hs_failure *failure)
                : hs_parallel_visit(table->search, &sizes, &table->most, failure);
 }
 
-void
-hs_table_sum(hs_table *table)
+/* Offsets that hold the number of each row's entries: where it begins. */
+static void
+table_sum(hs_table *table)
 {
     const int64_t n = hs_search_asking(table->search)->n;
     int64_t      *offsets = table->offsets, sum = 0;
@@ -386,10 +394,10 @@ keep_all(hs_table *table, hs_failure *failure)
     hs_walker     walker;
     hs_filler     fill;
     memset(table->offsets, 0, (size_t)n * sizeof *table->offsets);
-    hs_status status = hs_filler_open(table, &table->kept, &fill);
+    hs_status status = filler_open(table, &table->kept, &fill);
     if (status == HS_OK) {
         status = hs_walker_init_ordered(search, hs_record_use(table->kept.columns), &table->most,
-                                        hs_keep_rows, &fill, &walker);
+                                        keep_rows, &fill, &walker);
     }
     if (status == HS_OK) {
         status = hs_walk_or_tell(&walker, 0, (int32_t)n, failure);
@@ -407,14 +415,14 @@ hs_table_measure(hs_table *table, hs_failure *failure)
         hs_table_free(table);
         status = hs_table_count(table->search, table->offsets, failure);
     }
-    hs_table_sum(table);
+    table_sum(table);
     return status;
 }
 
 static hs_status
 open_filler(void *table, void *filler)
 {
-    return hs_filler_open(table, ((hs_table *)table)->entries, filler);
+    return filler_open(table, ((hs_table *)table)->entries, filler);
 }
 
 static void
@@ -436,7 +444,7 @@ fill_all(hs_table *table, hs_failure *failure)
     if (status == HS_OK) {
         const hs_visitors visitors = {.use = hs_record_use(table->entries->columns),
                                       .most = &table->most,
-                                      .visit = hs_fill_rows,
+                                      .visit = fill_rows,
                                       .contexts = crew.workers,
                                       .context_size = crew.worker_size};
         status = hs_parallel_visit(table->search, &visitors, NULL, failure);
@@ -451,7 +459,7 @@ hs_table_fill(hs_table *table, hs_failure *failure)
     if (table->kept.columns == 0) {
         return fill_all(table, failure);
     }
-    hs_move_rows(table);
+    move_rows(table);
     return HS_OK;
 }
 
@@ -554,7 +562,7 @@ hs_put_close(hs_put_column *out)
 /* The walk and what it leaves. */
 typedef struct once {
     hs_table *table;
-    hs_filler fill;  /* not opened: hs_keep_numbers needs no more than table and to */
+    hs_filler fill;  /* not opened: keep_numbers needs no more than table and to */
     hs_output kept;  /* its numbers j lie in the entries' column i */
     int64_t  *where; /* owned; for each asking point: where in `kept` its row begins */
 } once;
@@ -582,7 +590,7 @@ keep_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits
         return status;
     }
     doing->kept.column[1].data = hs_output_column(entries, HS_WANT_I); /* it may have moved */
-    hs_keep_numbers(&doing->fill, scanner, hits, doing->where);
+    keep_numbers(&doing->fill, scanner, hits, doing->where);
     entries->n_pairs = doing->kept.n_pairs;
     return HS_OK;
 }
@@ -673,7 +681,7 @@ hs_once_find(hs_table *table, hs_failure *failure)
         status = walk_once(&doing, failure);
     }
     if (status == HS_OK) {
-        hs_table_sum(table);
+        table_sum(table);
         status = write_column(&doing, HS_WANT_J, &search->call->options);
     }
     if (status == HS_OK) {

@@ -33,24 +33,7 @@ typedef struct hs_filler {
 } hs_filler;
 
 /* After hs_table_prepare. On failure hs_filler_close. */
-hs_status hs_filler_open(hs_table *table, hs_output *to, hs_filler *fill);
-void      hs_filler_close(hs_filler *fill);
-
-/* A hs_visit_fn of ordered walkers: whole rows, to their places by table->offsets. */
-hs_status hs_fill_rows(void *filler, hs_scanner *scanner, int32_t first, const hs_hits *hits);
-
-/* A hs_visit_fn of ordered walkers: whole rows, one behind another, and their lengths as offsets.
- * HS_TRY_OTHER when they are more than HS_MOST_KEPT. */
-hs_status hs_keep_rows(void *filler, hs_scanner *scanner, int32_t first, const hs_hits *hits);
-
-/* The rows of a visit with HS_BLOCK_LISTS_IDS, one behind another, in fill->to, which has room for
- * them: to table->offsets the lengths, and to `where` the entry that each begins with. Of `fill`
- * only table and to are looked at. */
-void hs_keep_numbers(hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits,
-                     int64_t *where);
-
-/* The rows that were kept, to their places. */
-void hs_move_rows(hs_table *table);
+void hs_filler_close(hs_filler *fill);
 
 /*
  * table.h: all neighbours of each asking point, one row a point, in the order of the caller's
@@ -67,9 +50,6 @@ hs_status hs_table_prepare(hs_table *table, hs_failure *failure);
 
 /* Fills offsets. Where few entries are expected, one walk finds them, and keeps them. */
 hs_status hs_table_measure(hs_table *table, hs_failure *failure);
-
-/* Offsets that hold the number of each row's entries: where it begins. */
-void hs_table_sum(hs_table *table);
 
 /* Call last: fills the entries, which have room for offsets[rows]. */
 hs_status hs_table_fill(hs_table *table, hs_failure *failure);

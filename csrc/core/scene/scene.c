@@ -36,10 +36,11 @@ hs_scene_settle_ranges(hs_scene *scene)
     }
 }
 
+/* Steps in scene.c. Sets x_error and t_error, from x_largest and *magnitude of wrapping. */
 /* Component by component, because those of a long box vector may be known far less well than those
  * of a short one. */
-void
-hs_scene_bound_errors(hs_scene *scene, double magnitude)
+static void
+scene_bound_errors(hs_scene *scene, double magnitude)
 {
     const hs_lattice *lattice = &scene->lattice;
     const double      lost = scene->extreme ? HS_SCALING_LOSS : 0.0;
@@ -96,8 +97,9 @@ bound_formula(const hs_scene *scene, double farthest)
     return (lattice->n_periodic + 4) * scene->ndim * UNIT * (total + scene->cutoff);
 }
 
-void
-hs_scene_set_radius(hs_scene *scene, const hs_options *options, double largest)
+/* Sets formula_error and radius, from the cutoff, the lattice and the largest |x|, scaled. */
+static void
+scene_set_radius(hs_scene *scene, const hs_options *options, double largest)
 {
     scene->formula_error = options->precision == HS_DOUBLE ? bound_formula(scene, largest) : 0.0;
     scene->radius = scene->cutoff + scene->formula_error;
@@ -154,7 +156,7 @@ hs_scene_set_cutoff(hs_scene *scene, const hs_options *options)
     HS_ASSERT(!scene->extreme);
     scene->sought = options->cutoff;
     scene->cutoff = scene->cutoff_low = hs_scale_apply(scene->scale, options->cutoff);
-    hs_scene_set_radius(scene, options, scene->cloud.largest);
+    scene_set_radius(scene, options, scene->cloud.largest);
     hs_scene_init_metric(scene, options);
 }
 
@@ -189,8 +191,8 @@ hs_scene_name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure
     }
 }
 
-bool
-hs_scene_is_drowned(const hs_scene *scene)
+static bool
+scene_is_drowned(const hs_scene *scene)
 {
     double shortest = INFINITY;
     for (int k = 0; k < scene->ndim; k++) {
@@ -212,8 +214,9 @@ hs_scene_is_drowned(const hs_scene *scene)
 /* Along coordinate axes cells are found for any number, as long as sums of a few are finite. */
 #define MOST_FOR_CELLS 0x1p900
 
-void
-hs_scene_join_clouds(hs_scene *scene, hs_scene *asking)
+/* Steps in scene.c. Both clouds get the range of both. */
+static void
+scene_join_clouds(hs_scene *scene, hs_scene *asking)
 {
     hs_cloud *a = &scene->cloud, *b = &asking->cloud;
     /* The range of no points is empty: infinity to -infinity. */
@@ -224,8 +227,9 @@ hs_scene_join_clouds(hs_scene *scene, hs_scene *asking)
     a->largest = b->largest = hs_larger(a->largest, b->largest);
 }
 
-void
-hs_scene_share(const hs_scene *scene, hs_scene *asking)
+/* What has been settled for the points is settled for the queries. */
+static void
+scene_share(const hs_scene *scene, hs_scene *asking)
 {
     asking->scale = scene->scale;
     asking->unscale = scene->unscale;
@@ -240,8 +244,9 @@ hs_scene_share(const hs_scene *scene, hs_scene *asking)
     asking->formula_error = scene->formula_error;
 }
 
-void
-hs_scene_join_wrapped(hs_scene *scene, const hs_scene *asking)
+/* The scene's x_largest, lower and upper cover what wrapping found in both. */
+static void
+scene_join_wrapped(hs_scene *scene, const hs_scene *asking)
 {
     const bool points = scene->n > 0, queries = asking->n > 0;
     scene->is_asked = true;
@@ -286,8 +291,8 @@ largest_entry(const hs_lattice *lattice)
     return largest;
 }
 
-void
-hs_scene_make_room(hs_scene *scene, double *magnitude)
+static void
+scene_make_room(hs_scene *scene, double *magnitude)
 {
     const hs_lattice *lattice = &scene->lattice;
     const double      away = BOX_VECTORS * largest_entry(lattice);
@@ -305,8 +310,10 @@ hs_scene_make_room(hs_scene *scene, double *magnitude)
     }
 }
 
-void
-hs_scene_widen_errors(hs_scene *scene)
+/* Widen the bounds on what was wrapped, for queries that come later: before and after they are
+ * settled. */
+static void
+scene_widen_errors(hs_scene *scene)
 {
     for (int k = 0; k < scene->ndim; k++) {
         scene->t_error[k] *= 2.0; /* queries may be rounded to beyond another face */
@@ -342,8 +349,9 @@ hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud)
            hs_scale_apply(scale, hs_cloud_smallest(cloud)) >= 0x1p-1022;
 }
 
-bool
-hs_scene_covers(const hs_scene *kept, const hs_scene *asking)
+/* Whether the bounds of a scene that was kept hold for queries that have been wrapped. */
+static bool
+scene_covers(const hs_scene *kept, const hs_scene *asking)
 {
     const bool is_tested = kept->n > 0 && !kept->is_untested;
     bool       covers = !is_tested || asking->x_error <= kept->x_error;
@@ -427,8 +435,9 @@ hs_mover_among(const double rows[][HS_MAX_DIM], const bool *periodic, int n_rows
     return mover;
 }
 
-int
-hs_mover_of(const hs_box *box, int column)
+/* hs_mover_among for the periodic rows of a box. box: NULL for none. */
+static int
+mover_of(const hs_box *box, int column)
 {
     return box == NULL ? HS_OPEN
                        : hs_mover_among((const double(*)[HS_MAX_DIM])box->rows, box->periodic,
@@ -452,7 +461,7 @@ hs_box_size_of(const hs_box *box)
         }
     }
     for (int k = 0; box != NULL && k < box->ndim; k++) {
-        const int mover = hs_mover_of(box, k);
+        const int mover = mover_of(box, k);
         found.moved |= (unsigned)(mover != HS_OPEN) << k;
         found.is_coupled = found.is_coupled || mover == HS_COUPLED;
     }
@@ -469,7 +478,9 @@ hs_enough_cutoff(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
     return exponent > 1023 ? cutoff : hs_smaller(ldexp(1.0, exponent), cutoff);
 }
 
-bool
+/* Whether points of open space with this cutoff are searched as they are: no gap is closed, nothing
+ * is scaled, and the cutoff is not shortened. */
+static bool
 hs_is_ordinary(const hs_cloud *cloud, double cutoff)
 {
     const double far = ldexp(1.0, HS_FAR_EXPONENT - 1 - ORDINARY_EXPONENT);
@@ -485,8 +496,9 @@ hs_unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
                                                        : cloud->largest);
 }
 
-bool
-hs_fits_one_scale(const hs_cloud *cloud, const hs_box_size *box, int unit, int powers)
+/* Whether all numbers are at most so many powers of two above a length of this exponent. */
+static bool
+fits_one_scale(const hs_cloud *cloud, const hs_box_size *box, int unit, int powers)
 {
     const double largest = hs_larger(box->largest, cloud->largest);
     return !hs_is_far(largest, unit, powers);
@@ -505,17 +517,21 @@ open_reach(const hs_cloud *cloud, const hs_box_size *box)
     return reach;
 }
 
-bool
-hs_open_drowns_box(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
+/* Whether coordinates along open axes are so large that a coupled box is lost in the rounding of
+ * what is wrapped into it. */
+static bool
+open_drowns_box(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
 {
     return box->is_coupled &&
            hs_is_far(open_reach(cloud, box), hs_exponent_of(hs_larger(box->largest, cutoff)),
                      HS_FAR_DROWNING_EXPONENT);
 }
 
-int
-hs_choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff, int unit,
-                   int largest, bool *extreme)
+/* The exponent to scale by, so that no exponent is above `largest`; *extreme: whether that loses
+ * digits. unit: from hs_unit_exponent. */
+static int
+choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff, int unit, int largest,
+                bool *extreme)
 {
     int          exponent = unit == NO_EXPONENT || abs(unit) <= ORDINARY_EXPONENT ? 0 : unit;
     const double turned = ldexp(box->largest, HS_FAR_TURNS_EXPONENT);
@@ -538,34 +554,39 @@ hs_choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff,
 /* Which power of two a scene is scaled by, and whether gaps between its
  * points are closed before that. */
 
-bool
-hs_scene_may_condense(const hs_scene *scene, const hs_scene *asking, const hs_box_size *size,
-                      int unit)
+/* Whether gaps between far points and queries are closed. Queries that come later may lie in such a
+ * gap, and the k nearest may be at any distance. Where one scale holds everything, cells of queries
+ * and of lists that last are those of the points as given. */
+static bool
+scene_may_condense(const hs_scene *scene, const hs_scene *asking, const hs_box_size *size, int unit)
 {
     const bool is_bounded = scene->within > 0.0 && scene->sought == scene->within;
     if (scene->is_kept || (scene->is_wide && !is_bounded)) {
         return false;
     }
     return scene->is_wide || (asking == NULL && !scene->is_plain) ||
-           hs_open_drowns_box(&scene->cloud, size, scene->sought) ||
-           !hs_fits_one_scale(&scene->cloud, size, unit, HS_LARGEST_WIDE_EXPONENT);
+           open_drowns_box(&scene->cloud, size, scene->sought) ||
+           !fits_one_scale(&scene->cloud, size, unit, HS_LARGEST_WIDE_EXPONENT);
 }
 
-double
-hs_scene_scale_cutoff(const hs_scene *scene, const hs_box_size *size, double cutoff)
+/* Steps of hs_scene_init_sets. The cutoff that scale and gaps go by. */
+static double
+scene_scale_cutoff(const hs_scene *scene, const hs_box_size *size, double cutoff)
 {
     const hs_cloud *cloud = &scene->cloud;
     if (scene->within > 0.0 &&
-        !hs_fits_one_scale(cloud, size, hs_unit_exponent(cloud, size, scene->within),
-                           HS_FAR_BOUNDED_EXPONENT)) {
+        !fits_one_scale(cloud, size, hs_unit_exponent(cloud, size, scene->within),
+                        HS_FAR_BOUNDED_EXPONENT)) {
         return scene->within;
     }
     return scene->is_kept || scene->is_plain ? cutoff : hs_enough_cutoff(cloud, size, cutoff);
 }
 
-void
-hs_scene_set_scale(const hs_box *box, bool is_scaled, int unit, hs_scene *scene,
-                   const hs_scene *asking)
+/* The scale of points, lengths and the cutoff. asking: NULL, or the queries' scene. is_scaled:
+ * closing gaps has brought the points and this box to units. */
+static void
+scene_set_scale(const hs_box *box, bool is_scaled, int unit, hs_scene *scene,
+                const hs_scene *asking)
 {
     const hs_box_size size = hs_box_size_of(box);
     int               exponent = unit;
@@ -576,9 +597,9 @@ hs_scene_set_scale(const hs_box *box, bool is_scaled, int unit, hs_scene *scene,
     scene->extreme = false;
     if (!is_scaled) {
         const int largest = scene->is_wide ? HS_LARGEST_WIDE_EXPONENT : HS_LARGEST_EXPONENT;
-        exponent = hs_choose_exponent(&scene->cloud, &size, least, unit, largest, &scene->extreme);
+        exponent = choose_exponent(&scene->cloud, &size, least, unit, largest, &scene->extreme);
         if (asking != NULL) { /* the same exponent: the clouds' ranges are joined */
-            (void)hs_choose_exponent(&asking->cloud, &size, least, unit, largest, &also_extreme);
+            (void)choose_exponent(&asking->cloud, &size, least, unit, largest, &also_extreme);
         }
     }
     scene->extreme = scene->extreme || also_extreme;
@@ -618,8 +639,7 @@ bool
 hs_scene_has_no_scale(const hs_scene *scene, const hs_condensed *condensed)
 {
     const hs_box_size size = hs_box_size_of(condensed->box);
-    return (hs_scene_box_vanishes(scene) ||
-            hs_open_drowns_box(&scene->cloud, &size, scene->sought)) &&
+    return (hs_scene_box_vanishes(scene) || open_drowns_box(&scene->cloud, &size, scene->sought)) &&
            !has_endless_images(scene, condensed);
 }
 
@@ -755,9 +775,11 @@ stay(hs_scene *scene)
     }
 }
 
-hs_status
-hs_scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options, double *magnitude,
-              hs_failure *failure)
+/* Wraps the points into the box. Sets x_largest, the range of t_k of the points in
+ * lower and upper, and *magnitude, the largest sum of absolute terms. */
+static hs_status
+scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options, double *magnitude,
+           hs_failure *failure)
 {
     wrapping wrap;
     *magnitude = 0.0;
@@ -790,9 +812,9 @@ hs_scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options, double 
 
 /* Scenes without a box whose numbers need no scale are filled in one go. */
 
-bool
-hs_scene_needs_no_scaling(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                          const hs_scene *scene)
+static bool
+scene_needs_no_scaling(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                       const hs_scene *scene)
 {
     return box == NULL && sets->queries == NULL && !sets->is_kept && !sets->is_wide &&
            options->precision != HS_DOUBLE && hs_is_ordinary(&scene->cloud, options->cutoff);
@@ -808,11 +830,11 @@ hs_scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene,
         scene->sought = scene->cutoff = scene->cutoff_low = options->cutoff;
         scene->extreme = false;
         hs_lattice_init(NULL, scene->ndim, scene->scale, &scene->lattice);
-        hs_scene_bound_errors(scene, 0.0);
+        scene_bound_errors(scene, 0.0);
         hs_scene_init_metric(scene, options);
     }
-    hs_scene_set_radius(scene, options, scene->cloud.largest);
-    return hs_scene_wrap(scene, NULL, options, &magnitude, failure);
+    scene_set_radius(scene, options, scene->cloud.largest);
+    return scene_wrap(scene, NULL, options, &magnitude, failure);
 }
 
 /*
@@ -884,7 +906,7 @@ static bool
 rows_may_change(const condensing *doing, const hs_box *box)
 {
     for (int k = 0; box != NULL && k < box->ndim; k++) {
-        if (hs_mover_of(box, k) == HS_COUPLED) {
+        if (mover_of(box, k) == HS_COUPLED) {
             return false;
         }
     }
@@ -1083,7 +1105,7 @@ condense_column(condensing *doing, int k, hs_failure *failure)
     const hs_cloud *cloud = doing->of[0]; /* its range is that of both */
     hs_condensed   *condensed = doing->condensed;
     const double    far = doing->far;
-    const int       row = hs_mover_of(condensed->box, k);
+    const int       row = mover_of(condensed->box, k);
     double         *entry = row >= 0 ? &condensed->rows.rows[row][k] : NULL;
     double          half = row >= 0 ? 0.5 * fabs(*entry) : 0.0;
     const bool      is_far = hs_larger(-cloud->lower[k], cloud->upper[k]) > far || half > far;
@@ -1131,7 +1153,7 @@ condense_columns(condensing *doing, hs_failure *failure)
     const hs_cloud *cloud = doing->of[0];
     double          largest = 0.0;
     for (int k = 0; k < cloud->ndim; k++) {
-        const int mover = hs_mover_of(doing->condensed->box, k);
+        const int mover = mover_of(doing->condensed->box, k);
         if (mover == HS_OPEN || (mover >= 0 && doing->changes_rows)) {
             const hs_status status = condense_column(doing, k, failure);
             if (status != HS_OK) {
@@ -1299,7 +1321,7 @@ wrap_points(hs_account *account, hs_team *team, const hs_options *options, hs_sc
             double *magnitude, hs_failure *failure)
 {
     const hs_status status = prepare_points(account, team, options, scene);
-    return status == HS_OK ? hs_scene_wrap(scene, team, options, magnitude, failure) : status;
+    return status == HS_OK ? scene_wrap(scene, team, options, magnitude, failure) : status;
 }
 
 /* asking: NULL, or the queries' scene, which is wrapped too and gets the bounds of `scene`. */
@@ -1318,15 +1340,15 @@ fill_scene(hs_account *account, hs_team *team, const hs_options *options, hs_sce
     }
     magnitude = hs_larger(magnitude, of_asking);
     if (asking != NULL) {
-        hs_scene_join_wrapped(scene, asking);
+        scene_join_wrapped(scene, asking);
     }
     if (scene->is_kept) {
-        hs_scene_make_room(scene, &magnitude);
+        scene_make_room(scene, &magnitude);
     }
-    hs_scene_bound_errors(scene, magnitude);
+    scene_bound_errors(scene, magnitude);
     hs_scene_settle_ranges(scene);
     if (scene->is_kept) {
-        hs_scene_widen_errors(scene);
+        scene_widen_errors(scene);
     }
     hs_scene_init_metric(scene, options);
     return HS_OK;
@@ -1363,7 +1385,7 @@ hs_scene_from_kept(hs_account *account, hs_team *team, const hs_scene *kept,
         status = HS_REBUILD;
     }
     if (status == HS_OK) {
-        hs_scene_share(kept, asking);
+        scene_share(kept, asking);
         status = wrap_points(account, team, &as_kept, asking, &magnitude, failure);
     }
     if (status == HS_ERR_SHIFT_RANGE && !(options->want & HS_WANT_SHIFT)) {
@@ -1371,9 +1393,9 @@ hs_scene_from_kept(hs_account *account, hs_team *team, const hs_scene *kept,
     }
     failure->in_queries = status != HS_OK;
     if (status == HS_OK) {
-        hs_scene_bound_errors(asking, magnitude);
+        scene_bound_errors(asking, magnitude);
         hs_scene_settle_ranges(asking);
-        status = hs_scene_covers(kept, asking) ? HS_OK : HS_REBUILD;
+        status = scene_covers(kept, asking) ? HS_OK : HS_REBUILD;
     }
     if (status != HS_OK) {
         hs_scene_free(account, asking);
@@ -1389,7 +1411,7 @@ hs_scene_wrapped_like(hs_account *account, const hs_scene *kept, const hs_points
     start_scene(points, scene);
     hs_status status = hs_cloud_load(account, NULL, points, options, &scene->cloud, failure);
     if (status == HS_OK) {
-        hs_scene_share(kept, scene);
+        scene_share(kept, scene);
         status = wrap_points(account, NULL, options, scene, &magnitude, failure);
     }
     if (status != HS_OK) {
@@ -1409,7 +1431,7 @@ load_clouds(hs_account *account, hs_team *team, const hs_sets *sets, const hs_op
         failure->in_queries = status != HS_OK;
     }
     if (status == HS_OK && asking != NULL) {
-        hs_scene_join_clouds(scene, asking);
+        scene_join_clouds(scene, asking);
     }
     return status;
 }
@@ -1466,13 +1488,13 @@ fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
     if (scene->is_kept && !empty && hs_scene_has_no_scale(scene, condensed)) {
         hs_scene_put_in_one_cell(scene);
     }
-    hs_scene_set_radius(scene, options, hs_scale_apply(scene->pending, scene->cloud.largest));
-    if (hs_scene_is_drowned(scene)) {
+    scene_set_radius(scene, options, hs_scale_apply(scene->pending, scene->cloud.largest));
+    if (scene_is_drowned(scene)) {
         hs_scene_name_farthest(scene, asking, failure);
         return HS_ERR_ROUNDING;
     }
     if (asking != NULL) {
-        hs_scene_share(scene, asking);
+        scene_share(scene, asking);
     }
     return hs_scene_box_vanishes(scene)
                ? hs_scene_refuse_vanishing(scene, condensed, failure)
@@ -1490,15 +1512,15 @@ scale_scene(hs_account *account, hs_team *team, const hs_options *options, const
     hs_status         status = HS_OK;
     condensed.box = condensed.given_box = box;
     condensed.is_scaled = condensed.has_turns = false;
-    scene->sought = hs_scene_scale_cutoff(scene, &size, options->cutoff);
+    scene->sought = scene_scale_cutoff(scene, &size, options->cutoff);
     const int unit = hs_unit_exponent(cloud, &size, scene->sought);
-    if (hs_scene_may_condense(scene, asking, &size, unit)) {
+    if (scene_may_condense(scene, asking, &size, unit)) {
         const int powers = scene->is_wide ? HS_FAR_BOUNDED_EXPONENT : HS_FAR_EXPONENT;
         status = hs_condense(account, options, box, unit, powers, cloud,
                              asking != NULL ? &asking->cloud : NULL, &condensed, failure);
     }
     if (status == HS_OK) {
-        hs_scene_set_scale(condensed.box, condensed.is_scaled, unit, scene, asking);
+        scene_set_scale(condensed.box, condensed.is_scaled, unit, scene, asking);
         status = fill_scaled(account, team, options, &condensed, scene, asking, failure);
     }
     if (status == HS_OK) {
@@ -1536,7 +1558,7 @@ hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, cons
     if (status == HS_OK) {
         status = load_clouds(account, team, sets, options, scene, asking, failure);
     }
-    scene->is_ordinary = status == HS_OK && hs_scene_needs_no_scaling(sets, box, options, scene);
+    scene->is_ordinary = status == HS_OK && scene_needs_no_scaling(sets, box, options, scene);
     if (scene->is_ordinary) {
         status = hs_scene_fill_ordinary(options, follows, scene, failure);
     } else if (status == HS_OK) {

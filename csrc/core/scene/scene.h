@@ -119,36 +119,11 @@ hs_status hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *
                              const hs_box *box, const hs_options *options, hs_scene *scene,
                              hs_scene *asking, hs_failure *failure);
 
-/* Steps of hs_scene_init_sets. The cutoff that scale and gaps go by. */
-double hs_scene_scale_cutoff(const hs_scene *scene, const struct hs_box_size *size, double cutoff);
-
-/* Whether gaps between far points and queries are closed. Queries that come later may lie in such a
- * gap, and the k nearest may be at any distance. Where one scale holds everything, cells of queries
- * and of lists that last are those of the points as given. */
-bool hs_scene_may_condense(const hs_scene *scene, const hs_scene *asking,
-                           const struct hs_box_size *size, int unit);
-
-/* The scale of points, lengths and the cutoff. asking: NULL, or the queries' scene. is_scaled:
- * closing gaps has brought the points and this box to units. */
-void hs_scene_set_scale(const hs_box *box, bool is_scaled, int unit, hs_scene *scene,
-                        const hs_scene *asking);
-
 /* Whether a scene, once its points have been read, stays as it was given: there is no box, and
  * nothing is scaled. Then hs_scene_fill_ordinary fills it. follows: it has filled it before, with
  * this cutoff and as many axes. */
-bool hs_scene_needs_no_scaling(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                               const hs_scene *scene);
 hs_status hs_scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene,
                                  hs_failure *failure);
-
-/* Steps in scene.c. Both clouds get the range of both. */
-void hs_scene_join_clouds(hs_scene *scene, hs_scene *asking);
-
-/* What has been settled for the points is settled for the queries. */
-void hs_scene_share(const hs_scene *scene, hs_scene *asking);
-
-/* The scene's x_largest, lower and upper cover what wrapping found in both. */
-void hs_scene_join_wrapped(hs_scene *scene, const hs_scene *asking);
 
 /*
  * A scene that is kept for numbers that no scale holds: all points on one spot of open space, which
@@ -162,18 +137,10 @@ void hs_scene_put_in_one_cell(hs_scene *scene);
  * its scale would round unless only cells are wanted. */
 bool hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud);
 
-/* Whether the bounds of a scene that was kept hold for queries that have been wrapped. */
-bool hs_scene_covers(const hs_scene *kept, const hs_scene *asking);
-
 /* Names, of queries whose cells are wanted, row, column and value of the first coordinate that a
  * kept scene does not take; if each alone would do, the largest. Names none where no query would
  * do. */
 void hs_scene_name_refused(const hs_scene *kept, const hs_points *queries, hs_failure *failure);
-
-/* Widen the bounds on what was wrapped, for queries that come later: before and after they are
- * settled. */
-void hs_scene_make_room(hs_scene *scene, double *magnitude);
-void hs_scene_widen_errors(hs_scene *scene);
 
 /*
  * Queries that meet the points of a scene that was made to be kept, as a scene of their own.
@@ -197,24 +164,12 @@ void hs_scene_set_cutoff(hs_scene *scene, const hs_options *options);
  * scene.c. */
 void hs_scene_fold_far(hs_scene *scene);
 
-/* Wraps the points into the box. Sets x_largest, the range of t_k of the points in
- * lower and upper, and *magnitude, the largest sum of absolute terms. */
-hs_status hs_scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options,
-                        double *magnitude, hs_failure *failure);
-
-/* Steps in scene.c. Sets x_error and t_error, from x_largest and *magnitude of wrapping. */
-void hs_scene_bound_errors(hs_scene *scene, double magnitude);
-
 /* Sets the range of the grid coordinates: the points' own where open, one period where periodic. */
 void hs_scene_settle_ranges(hs_scene *scene);
-
-/* Sets formula_error and radius, from the cutoff, the lattice and the largest |x|, scaled. */
-void hs_scene_set_radius(hs_scene *scene, const hs_options *options, double largest);
 
 /* Whether the error of the formula of precision="double" passes both the cutoff and a small part of
  * the box: then it might call too many images near, and its answer is noise. hs_scene_name_farthest
  * says which point or query is to blame; asking: NULL without queries. */
-bool hs_scene_is_drowned(const hs_scene *scene);
 void hs_scene_name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure *failure);
 
 /* Sets what decides: X and B where they hold every digit, else points and box vectors as given. */
@@ -310,31 +265,12 @@ hs_box_size hs_box_size_of(const hs_box *box);
 int hs_mover_among(const double rows[][HS_MAX_DIM], const bool *periodic, int n_rows, int ndim,
                    int column);
 
-/* hs_mover_among for the periodic rows of a box. box: NULL for none. */
-int hs_mover_of(const hs_box *box, int column);
-
 /* The cutoff, or a smaller one if that is beyond all distances as well. */
 double hs_enough_cutoff(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
 
 /* The exponent of the length that a scene goes by: its cutoff, or with cutoff 0 its box, or where
  * its points are. A very small number if all is 0. */
 int hs_unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
-
-/* Whether points of open space with this cutoff are searched as they are: no gap is closed, nothing
- * is scaled, and the cutoff is not shortened. */
-bool hs_is_ordinary(const hs_cloud *cloud, double cutoff);
-
-/* Whether all numbers are at most so many powers of two above a length of this exponent. */
-bool hs_fits_one_scale(const hs_cloud *cloud, const hs_box_size *box, int unit, int powers);
-
-/* Whether coordinates along open axes are so large that a coupled box is lost in the rounding of
- * what is wrapped into it. */
-bool hs_open_drowns_box(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
-
-/* The exponent to scale by, so that no exponent is above `largest`; *extreme: whether that loses
- * digits. unit: from hs_unit_exponent. */
-int hs_choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff, int unit,
-                       int largest, bool *extreme);
 
 /*
  * Closes the gaps between coordinates that are far from zero. Where two different

@@ -21,8 +21,9 @@ open_rows(hs_account *account, int64_t n_rows, int64_t n_numbers, hs_partners *r
     return true;
 }
 
-void
-hs_partners_free(hs_account *account, hs_partners *rows)
+/* Idempotent. */
+static void
+partners_free(hs_account *account, hs_partners *rows)
 {
     hs_free(account, rows->first);
     hs_free(account, rows->number);
@@ -82,9 +83,13 @@ hs_partners_check(const hs_selection *selection, int64_t n_asking, int64_t n_poi
     return HS_OK;
 }
 
-hs_status
-hs_partners_open(const hs_selection *selection, int64_t n_asking, int64_t n_points,
-                 bool has_queries, hs_account *account, hs_partners *partners, hs_failure *failure)
+/*
+ * Each way round, or from queries to points alone. Any status of hs_partners_check, or
+ * HS_ERR_MEMORY. To be freed on failure as well.
+ */
+static hs_status
+partners_open(const hs_selection *selection, int64_t n_asking, int64_t n_points, bool has_queries,
+              hs_account *account, hs_partners *partners, hs_failure *failure)
 {
     const int       n_ways = has_queries ? 1 : 2;
     const int64_t   n_numbers = selection->n_excluded * n_ways;
@@ -99,7 +104,7 @@ hs_partners_open(const hs_selection *selection, int64_t n_asking, int64_t n_poin
         fill_by_second(selection, n_ways, n_points, &by_second);
         transpose(&by_second, n_points, n_asking, partners);
     }
-    hs_partners_free(account, &by_second);
+    partners_free(account, &by_second);
     return is_open ? HS_OK : HS_ERR_MEMORY;
 }
 
@@ -267,9 +272,9 @@ hs_choice_open(const hs_selection *selection, const hs_sets *sets, hs_call *call
     call->choice = choice;
     hs_status status = HS_OK;
     if (selection->n_excluded > 0) {
-        status = hs_partners_open(selection, has_queries ? sets->queries->n : sets->points->n,
-                                  sets->points->n, has_queries, &call->account, &choice->partners,
-                                  failure);
+        status = partners_open(selection, has_queries ? sets->queries->n : sets->points->n,
+                               sets->points->n, has_queries, &call->account, &choice->partners,
+                               failure);
     }
     if (status != HS_OK) {
         hs_choice_close(call);
@@ -288,7 +293,7 @@ hs_choice_close(hs_call *call)
     hs_cloud_free(account, &choice->asking_cloud);
     hs_cloud_free(account, &choice->cloud);
     hs_free(account, choice->copies);
-    hs_partners_free(account, &choice->partners);
+    partners_free(account, &choice->partners);
     hs_free(account, choice);
     call->choice = NULL;
 }
@@ -331,8 +336,9 @@ is_left_out(const hs_asking *asking, int32_t id, const hs_label_test test)
     }
 }
 
-bool
-hs_labels_find(const hs_choice *choice, int32_t point, hs_asking *asking, hs_label_test *test)
+/* The test by which pairs of this point are excluded; false where none are. */
+static bool
+labels_find(const hs_choice *choice, int32_t point, hs_asking *asking, hs_label_test *test)
 {
     *asking = (hs_asking){.itself = choice->has_queries ? -1 : point};
     *test = HS_OF_PARTNER;
@@ -373,8 +379,9 @@ sift(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, int32_t 
     return to;
 }
 
-bool
-hs_labels_leave_out(const hs_asking *asking, int32_t number, hs_label_test test)
+/* Whether a test that excludes leaves out the pair of the asking point with another one. */
+static bool
+labels_leave_out(const hs_asking *asking, int32_t number, hs_label_test test)
 {
     switch (test) {
     case HS_OF_EQUAL_LABEL: return is_left_out(asking, number, HS_OF_EQUAL_LABEL);
@@ -383,9 +390,11 @@ hs_labels_leave_out(const hs_asking *asking, int32_t number, hs_label_test test)
     }
 }
 
-int32_t
-hs_labels_sift(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, int32_t from,
-               int32_t end, int32_t to, hs_label_test test)
+/* Moves hits [from, end) that the test does not leave out to `to`, which is not behind them;
+ * returns where they end. Hits are numbers where these are scanned for, else as scans list them. */
+static int32_t
+labels_sift(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, int32_t from,
+            int32_t end, int32_t to, hs_label_test test)
 {
     const bool by_id = scanner->scans == HS_BLOCK_LISTS_IDS;
     switch (test) {
@@ -404,15 +413,16 @@ hs_labels_sift(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking
     }
 }
 
-int32_t
-hs_labels_sift_groups(const hs_scanner *scanner, hs_scan *scan, int32_t point, int32_t from,
-                      int32_t end, int32_t to)
+/* The same by the groups of the call's choice; without groups all are moved. */
+static int32_t
+labels_sift_groups(const hs_scanner *scanner, hs_scan *scan, int32_t point, int32_t from,
+                   int32_t end, int32_t to)
 {
     const hs_choice *choice = scanner->search->call->choice;
     const size_t     n = (size_t)(end - from);
     if (choice->group != NULL) {
         const hs_asking asking = {.label = choice->group, .own = choice->asking_group[point]};
-        return hs_labels_sift(scanner, scan, &asking, from, end, to, HS_OF_OTHER_GROUP);
+        return labels_sift(scanner, scan, &asking, from, end, to, HS_OF_OTHER_GROUP);
     }
     if (to < from) {
         memmove(scan->hits + to, scan->hits + from, n * sizeof *scan->hits);
@@ -595,7 +605,7 @@ drop_images(const hs_asking *asking, hs_label_test test, int32_t from, int32_t e
     hs_status        status = HS_OK;
     for (int32_t h = from; status == HS_OK && h < end; h++) {
         const int32_t id = hs_hit_number(batch->scanner, scan->hits[h]);
-        if (hs_labels_leave_out(asking, id, test)) {
+        if (labels_leave_out(asking, id, test)) {
             add_hit(scan, h, batch);
         }
         if (batch->n == HS_BATCH) {
@@ -657,11 +667,11 @@ choose_of_point(hit_batch *batch, hs_scan *scan, float out, int32_t from, int32_
     hs_asking         asking;
     hs_label_test     test;
     hs_status         status = HS_OK;
-    *end = hs_labels_sift_groups(scanner, scan, point, from, scan->end[batch->t], to);
-    const bool excludes = hs_labels_find(choice, point, &asking, &test);
+    *end = labels_sift_groups(scanner, scan, point, from, scan->end[batch->t], to);
+    const bool excludes = labels_find(choice, point, &asking, &test);
     const bool compares = hs_choice_compares(choice, scanner->options.cutoff);
     if (excludes && !compares) {
-        *end = hs_labels_sift(scanner, scan, &asking, to, *end, to, test);
+        *end = labels_sift(scanner, scan, &asking, to, *end, to, test);
     } else if (excludes) {
         status = drop_images(&asking, test, to, *end, batch, scan);
         *end = close_up(scan, to, *end);

@@ -24,17 +24,6 @@ hs_status hs_partners_check(const hs_selection *selection, int64_t n_asking, int
                             hs_failure *failure);
 
 /*
- * Each way round, or from queries to points alone. Any status of hs_partners_check, or
- * HS_ERR_MEMORY. To be freed on failure as well.
- */
-hs_status hs_partners_open(const hs_selection *selection, int64_t n_asking, int64_t n_points,
-                           bool has_queries, hs_account *account, hs_partners *partners,
-                           hs_failure *failure);
-
-/* Idempotent. */
-void hs_partners_free(hs_account *account, hs_partners *partners);
-
-/*
  * choice.h: which pairs count, of those within reach: the caller's selection made ready for one
  * call. Labels stay in the caller's order and arrays; excluded pairs become rows of partners. Where
  * twice the cutoff may reach from one image of a point to another, points and box are kept as given
@@ -135,7 +124,8 @@ hs_choice_least(const hs_choice *choice, const hs_scene *scene)
  * Takes hits of points [first, next) of the group out that the call's choice leaves out; the order
  * of the others stays. Hits are places, and become point numbers where the scanner lists these. The
  * pair of a point with itself stays where lists are full: table rows count on it. HS_OK, or any
- * status of hs_pair_batch_look_up and hs_near_image; scanner->failed_point is the asking point then.
+ * status of hs_pair_batch_look_up and hs_near_image, with the asking point in
+ * scanner->failed_point.
  */
 hs_status hs_choose(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next);
 
@@ -175,20 +165,5 @@ hs_hit_number(const hs_scanner *scanner, int32_t hit)
 {
     return scanner->search->bins.order[scanner->block.number[hs_hit_place(scanner, hit)]];
 }
-
-/* The test by which pairs of this point are excluded; false where none are. */
-bool hs_labels_find(const hs_choice *choice, int32_t point, hs_asking *asking, hs_label_test *test);
-
-/* Whether a test that excludes leaves out the pair of the asking point with another one. */
-bool hs_labels_leave_out(const hs_asking *asking, int32_t number, hs_label_test test);
-
-/* Moves hits [from, end) that the test does not leave out to `to`, which is not behind them;
- * returns where they end. Hits are numbers where these are scanned for, else as scans list them. */
-int32_t hs_labels_sift(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking,
-                       int32_t from, int32_t end, int32_t to, hs_label_test test);
-
-/* The same by the groups of the call's choice; without groups all are moved. */
-int32_t hs_labels_sift_groups(const hs_scanner *scanner, hs_scan *scan, int32_t point, int32_t from,
-                              int32_t end, int32_t to);
 
 #endif

@@ -24,9 +24,10 @@ hs_block_most_hits(int32_t capacity)
                                                         : capacity;
 }
 
-hs_status
-hs_block_init(hs_account *account, int ndim, hs_block_use use, int32_t most, int32_t most_runs,
-              hs_block *block)
+/* Room for so many candidates and runs at a time. */
+static hs_status
+block_init(hs_account *account, int ndim, hs_block_use use, int32_t most, int32_t most_runs,
+           hs_block *block)
 {
     const int64_t capacity = (int64_t)most + HS_PADDING;
     const int64_t hits = (int64_t)hs_block_most_hits(most) + HS_PADDING;
@@ -64,8 +65,8 @@ hs_block_add_radii(hs_account *account, int32_t n_rows, hs_block *block)
     return block->radius != NULL ? HS_OK : HS_ERR_MEMORY;
 }
 
-void
-hs_block_free(hs_account *account, hs_block *block)
+static void
+block_free(hs_account *account, hs_block *block)
 {
     hs_free(account, block->radius);
     block->radius = NULL;
@@ -87,8 +88,10 @@ hs_group_start(const hs_bins *bins, int32_t first, int32_t last, hs_group *group
     }
 }
 
-void
-hs_group_load(const hs_bins *bins, hs_group *group)
+/* Its points, copied from where they are: for groups whose neighbourhood does not begin with them,
+ * after hs_group_start. Rounded as candidates are. */
+static void
+group_load(const hs_bins *bins, hs_group *group)
 {
     for (int k = 0; k < bins->ndim; k++) {
         const double *x = bins->x[k] + group->first;
@@ -105,7 +108,7 @@ float
 hs_group_bound(const hs_bins *bins, hs_group *group)
 {
     float largest = 0.0f;
-    hs_group_load(bins, group);
+    group_load(bins, group);
     for (int k = 0; k < bins->ndim; k++) {
         float low = group->q[k][0], high = low;
         for (int32_t t = 1; t < group->last - group->first; t++) {
@@ -119,9 +122,13 @@ hs_group_bound(const hs_bins *bins, hs_group *group)
     return largest;
 }
 
-int32_t
-hs_block_append(hs_block *block, int32_t si, int32_t end, int ndim, const double *shift,
-                const int32_t *image, const hs_group *group)
+/*
+ * Appends points [si, end) of one image to the block, as many as there is room for; returns how
+ * many. shift: the image's displacement, ndim doubles; image: that displacement over the rows of B.
+ */
+static int32_t
+block_append(hs_block *block, int32_t si, int32_t end, int ndim, const double *shift,
+             const int32_t *image, const hs_group *group)
 {
     const int32_t room = block->capacity - block->n;
     const int32_t n = end - si < room ? end - si : room;
@@ -167,9 +174,14 @@ set_places(hs_block *block)
     block->n_places = end > block->n_places ? end : block->n_places;
 }
 
-hs_status
-hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, const hs_options *options,
-                bool is_first, hs_block *block, hs_group *group)
+/*
+ * Copies what was appended, but for candidates that are not near the group. The first block of a
+ * group must begin with the group's own points, in the image 0: they are kept as its q. Fails when
+ * poll() stops the search; it is called now and then for a large block.
+ */
+static hs_status
+block_gather(const hs_bins *bins, const hs_kernel *kernel, const hs_options *options, bool is_first,
+             hs_block *block, hs_group *group)
 {
     hs_gather gather;
     gather.ndim = bins->ndim;
@@ -217,8 +229,8 @@ hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, const hs_options *
 #define MANY       160 /* from here on two digits are quicker than one and insertion */
 #define CROWD      12 /* entries with the same leading digit, beyond which insertion does not pay */
 
-hs_status
-hs_order_init(hs_account *account, hs_block *block, hs_order *order)
+static hs_status
+order_init(hs_account *account, hs_block *block, hs_order *order)
 {
     const int64_t n = (int64_t)block->capacity + HS_PADDING;
     order->entries = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(uint64_t));
@@ -485,9 +497,15 @@ is_ascending(const int32_t *numbers, int32_t n)
     return descents == 0;
 }
 
-hs_status
-hs_order_block(const hs_lattice *lattice, const hs_options *options, hs_block_use use,
-               hs_block *block, hs_order *order)
+/*
+ * Sorts a block that has been gathered: ascending by the caller's number, then, where hits are
+ * listed as places, by S over the box vectors as given. block->origin says where each candidate
+ * was; ids follow the new order only where these are listed. HS_ERR_SHIFT_RANGE when an image
+ * passes 2^62; HS_ERR_INTERRUPTED, as options say, while a large block is sorted.
+ */
+static hs_status
+order_block(const hs_lattice *lattice, const hs_options *options, hs_block_use use, hs_block *block,
+            hs_order *order)
 {
     if (poll_large(options, block) != HS_OK) { /* it was gathered */
         return HS_ERR_INTERRUPTED;
@@ -522,8 +540,9 @@ hs_order_block(const hs_lattice *lattice, const hs_options *options, hs_block_us
 /* Turns and images up to here are few: sums of four of them are int32. */
 #define MOST_FEW 0x1p28
 
-bool
-hs_has_plain_shifts(const hs_lattice *lattice)
+/* Whether shifts over B are those over the box vectors as given. */
+static bool
+has_plain_shifts(const hs_lattice *lattice)
 {
     for (int r = 0; r < lattice->n_periodic; r++) {
         for (int l = 0; l < lattice->n_periodic; l++) {
@@ -535,8 +554,9 @@ hs_has_plain_shifts(const hs_lattice *lattice)
     return true;
 }
 
-bool
-hs_has_narrow_shifts(const hs_search *search)
+/* Whether every S of the scene is the sum of an image and of turns that are known to be few. */
+static bool
+has_narrow_shifts(const hs_search *search)
 {
     const hs_scene *scene = &search->scene;
     for (int k = 0; k < scene->ndim; k++) {
@@ -545,14 +565,14 @@ hs_has_narrow_shifts(const hs_search *search)
             return false;
         }
     }
-    return hs_has_plain_shifts(&scene->lattice) &&
+    return has_plain_shifts(&scene->lattice) &&
            (!search->bins.turns.known ||
             hs_fold_turns(&scene->lattice, scene->cloud.largest) < MOST_FEW);
 }
 
-hs_status
-hs_records_init(const hs_search *search, const hs_block *block, const hs_options *polls,
-                bool needs_given, hs_records *records)
+static hs_status
+records_init(const hs_search *search, const hs_block *block, const hs_options *polls,
+             bool needs_given, hs_records *records)
 {
     hs_account   *account = &search->call->account;
     const bool    has_rows = search->scene.lattice.n_periodic > 0;
@@ -561,7 +581,7 @@ hs_records_init(const hs_search *search, const hs_block *block, const hs_options
     hs_parts      parts;
     *records = (hs_records){.search = search, .block = block, .polls = polls, .width = width};
     records->needs_given = needs_given || search->bins.keeps_originals;
-    records->is_narrow = hs_has_narrow_shifts(search);
+    records->is_narrow = has_narrow_shifts(search);
     hs_parts_begin(&parts);
     hs_parts_add(&parts, (void **)&records->q, n, sizeof(double));
     if (has_rows) {
@@ -576,8 +596,9 @@ hs_records_init(const hs_search *search, const hs_block *block, const hs_options
     return records->memory != NULL ? HS_OK : HS_ERR_MEMORY;
 }
 
-void
-hs_records_free(hs_account *account, hs_records *records)
+/* needs_given: whether S is wanted, or else only what the metric needs. */
+static void
+records_free(hs_account *account, hs_records *records)
 {
     hs_free(account, records->memory);
     records->memory = NULL;
@@ -710,8 +731,9 @@ load_images(hs_records *records, const hs_run *run, int32_t n)
     }
 }
 
-bool
-hs_records_has_images(hs_records *records)
+/* Whether some candidate of the block is in another image; looks at its runs once. */
+static bool
+records_has_images(hs_records *records)
 {
     if (records->knows_images) {
         return records->has_images;
@@ -737,7 +759,7 @@ hs_records_load(hs_records *records, bool metric)
     if (!given && !metric) {
         return HS_OK;
     }
-    const bool images = hs_records_has_images(records);
+    const bool images = records_has_images(records);
     given = given && (records->search->bins.turns.known || !records->is_narrow);
     for (const hs_run *run = records->block->runs; run->at < records->block->n; run++) {
         const int32_t n = run[1].at - run->at;
@@ -815,10 +837,10 @@ hs_pair_batch_init(const hs_search *search, const hs_block *block, const hs_opti
     trace->memory = NULL;
     trace->n_rows = search->scene.lattice.n_periodic;
     trace->as_given = search->bins.keeps_originals;
-    trace->is_plain = hs_has_plain_shifts(&search->scene.lattice);
+    trace->is_plain = has_plain_shifts(&search->scene.lattice);
     trace->has_zeros = false;
     hs_pair_batch_clear(trace);
-    hs_status status = hs_records_init(search, block, polls, needs_given, &trace->of);
+    hs_status status = records_init(search, block, polls, needs_given, &trace->of);
     if (status == HS_OK && !allocate(account, trace)) {
         status = HS_ERR_MEMORY;
     }
@@ -828,17 +850,19 @@ hs_pair_batch_init(const hs_search *search, const hs_block *block, const hs_opti
     return status;
 }
 
-bool
-hs_pair_batch_renew(bool needs_given, hs_pair_batch *trace)
+/* Makes it ready for what its search has become, with as many axes. False if it has other arrays
+ * than that needs. */
+static bool
+pair_batch_renew(bool needs_given, hs_pair_batch *trace)
 {
     const hs_search *search = trace->search;
     if (trace->n_rows != search->scene.lattice.n_periodic ||
         trace->as_given != search->bins.keeps_originals ||
         trace->of.needs_given != (needs_given || trace->as_given) ||
-        trace->of.is_narrow != hs_has_narrow_shifts(search)) {
+        trace->of.is_narrow != has_narrow_shifts(search)) {
         return false;
     }
-    trace->is_plain = hs_has_plain_shifts(&search->scene.lattice);
+    trace->is_plain = has_plain_shifts(&search->scene.lattice);
     hs_pair_batch_clear(trace);
     return true;
 }
@@ -848,7 +872,7 @@ hs_pair_batch_free(hs_account *account, hs_pair_batch *trace)
 {
     hs_free(account, trace->memory);
     trace->memory = NULL;
-    hs_records_free(account, &trace->of);
+    records_free(account, &trace->of);
 }
 
 /* Rows of B that point si was wrapped by; 0 where that is known to cancel or not needed. */
@@ -900,7 +924,7 @@ look_up_few(hs_pair_batch *trace)
         }
     }
     int32_t    any = 0;
-    const bool images = hs_records_has_images(&trace->of);
+    const bool images = records_has_images(&trace->of);
     for (int32_t e = 0; images && e < trace->n; e++) {
         const hs_run *run = run_of(block, trace->place[e]);
         for (int r = 0; r < bins->n_periodic; r++) {
@@ -1226,8 +1250,9 @@ form_of(hs_scanner *scanner, uint32_t bits)
     return form;
 }
 
-void
-hs_forms_init(hs_scanner *scanner)
+/* None is known yet. */
+static void
+forms_init(hs_scanner *scanner)
 {
     for (int f = 0; f < HS_FORMS; f++) {
         scanner->forms[f].extent = -1.0;
@@ -1261,8 +1286,10 @@ group_cutoff(const hs_scanner *scanner)
     return hs_smaller((limit.hi + 0x1p-20 * cutoff) * (1.0 + 0x1p-20), cutoff);
 }
 
-void
-hs_form_prune(hs_scanner *scanner)
+/* Lets candidates of the present group be left out that are beyond the cutoff of all its points, or
+ * their limits, where the block has so many that this is worth it. */
+static void
+form_prune(hs_scanner *scanner)
 {
     const hs_search *search = scanner->search;
     hs_group        *group = &scanner->group;
@@ -1345,10 +1372,10 @@ hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t m
 {
     hs_account *account = &search->call->account;
     begin(search, use, is_ordered, scanner);
-    hs_forms_init(scanner);
+    forms_init(scanner);
     scanner->trace.memory = scanner->trace.of.memory = NULL; /* freed also when never set */
-    hs_status status = hs_block_init(account, search->scene.ndim, scanner->scans, capacity,
-                                     most_runs, &scanner->block);
+    hs_status status = block_init(account, search->scene.ndim, scanner->scans, capacity, most_runs,
+                                  &scanner->block);
     if (status == HS_OK && search->limits != NULL) {
         status = hs_block_add_radii(account, hs_limits_rows(search), &scanner->block);
     }
@@ -1356,13 +1383,15 @@ hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t m
         status = open_trace(needs_shifts(scanner), scanner);
     }
     if (status == HS_OK && is_ordered) {
-        status = hs_order_init(account, &scanner->block, &scanner->order);
+        status = order_init(account, &scanner->block, &scanner->order);
     }
     return status;
 }
 
-hs_status
-hs_scanner_open_trace(hs_scanner *scanner)
+/* The arrays for pairs to decide, where hs_scanner_init has left them for later: trace.memory is
+ * NULL. They are kept (hs_account_keep) where the walker is. */
+static hs_status
+scanner_open_trace(hs_scanner *scanner)
 {
     const hs_status status = open_trace(false, scanner);
     if (hs_search_keeps_walker(scanner->search)) {
@@ -1384,7 +1413,7 @@ hs_scanner_renew(hs_search *search, hs_block_use use, int32_t capacity, int32_t 
     }
     begin(search, use, false, scanner);
     return scanner->scans == scans && (scanner->trace.memory == NULL ||
-                                       hs_pair_batch_renew(needs_shifts(scanner), &scanner->trace));
+                                       pair_batch_renew(needs_shifts(scanner), &scanner->trace));
 }
 
 void
@@ -1407,7 +1436,7 @@ hs_scanner_close(hs_search *search, hs_scanner *scanner)
     hs_scanner_note(search, scanner);
     hs_order_free(&search->call->account, &scanner->block, &scanner->order);
     hs_pair_batch_free(&search->call->account, &scanner->trace);
-    hs_block_free(&search->call->account, &scanner->block);
+    block_free(&search->call->account, &scanner->block);
 }
 
 /* A batch of pairs at a time by the batch kernel; pairs that it leaves, one by one. */
@@ -1596,7 +1625,9 @@ trace_unsure(hs_scanner *scanner, const hs_scan *scan, int32_t u, int32_t *next)
     return hs_pair_batch_look_up(trace, true, &scanner->failed_point);
 }
 
-hs_status
+/* Decides scan->unsure, of the points [first, next) of the group, and takes those that are beyond
+ * the cutoff from the hits; the order stays. */
+static hs_status
 hs_decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
 {
     int32_t n_beyond = 0;
@@ -1726,12 +1757,12 @@ fill_block(hs_scanner *scanner)
     scanner->n_blocks++;
     scanner->work_since_poll += WORK_OF_BLOCK + block->n;
     if (!(scanner->group.near.out < INFINITY)) {
-        hs_form_prune(scanner);
+        form_prune(scanner);
     }
     set_flushing(scanner, true);
-    hs_status status = hs_block_gather(&scanner->search->bins, scanner->search->call->kernel,
-                                       &scanner->options, scanner->block_is_first, block,
-                                       &scanner->group);
+    hs_status status = block_gather(&scanner->search->bins, scanner->search->call->kernel,
+                                    &scanner->options, scanner->block_is_first, block,
+                                    &scanner->group);
     set_flushing(scanner, false);
     if (status != HS_OK) {
         return status;
@@ -1741,8 +1772,8 @@ fill_block(hs_scanner *scanner)
     if (!scanner->is_ordered) {
         return HS_OK;
     }
-    status = hs_order_block(&scanner->search->scene.lattice, &scanner->options, scanner->scans,
-                            block, &scanner->order);
+    status = order_block(&scanner->search->scene.lattice, &scanner->options, scanner->scans, block,
+                         &scanner->order);
     if (status == HS_ERR_SHIFT_RANGE) {
         scanner->failed_point = hs_search_asking(scanner->search)->order[scanner->group.first];
     }
@@ -1815,7 +1846,7 @@ decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
 {
     hs_status status = HS_OK;
     if (scanner->trace.memory == NULL) {
-        status = hs_scanner_open_trace(scanner);
+        status = scanner_open_trace(scanner);
     }
     return status == HS_OK ? hs_decide(scanner, scan, first, next) : status;
 }
@@ -1872,7 +1903,7 @@ hs_scanner_start(hs_scanner *scanner, int32_t first, int32_t last)
     scanner->of_group = (hs_neighbourhood){0, 0};
     hs_group_start(hs_search_asking(search), first, last, &scanner->group);
     if ((search->is_full || scanner->blocks_to_skip > 0) && scanner->use != HS_BLOCK_SIZES) {
-        hs_group_load(hs_search_asking(search), &scanner->group);
+        group_load(hs_search_asking(search), &scanner->group);
     }
 }
 
@@ -1887,8 +1918,8 @@ hs_scanner_append(hs_scanner *scanner, int32_t si, int32_t end, const double *sh
                 return status;
             }
         }
-        si += hs_block_append(&scanner->block, si, end, scanner->search->scene.ndim, shift, image,
-                              &scanner->group);
+        si += block_append(&scanner->block, si, end, scanner->search->scene.ndim, shift, image,
+                           &scanner->group);
         if (scanner->block.n_runs % HS_RUNS_PER_POLL == 0 &&
             hs_poll(&scanner->options, hs_scanner_fraction(scanner)) != HS_OK) {
             return HS_ERR_INTERRUPTED;

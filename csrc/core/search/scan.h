@@ -66,13 +66,8 @@ typedef struct hs_group {
     uint32_t       largest; /* bits of the largest |q| or |y| gathered for it so far */
 } hs_group;
 
-/* Room for so many candidates and runs at a time. */
-hs_status hs_block_init(hs_account *account, int ndim, hs_block_use use, int32_t capacity,
-                        int32_t most_runs, hs_block *block);
-
 /* Room for so many rows of radii of the candidates besides. On failure the block may be freed. */
 hs_status hs_block_add_radii(hs_account *account, int32_t n_rows, hs_block *block);
-void      hs_block_free(hs_account *account, hs_block *block);
 
 /* most_hits of a block of this capacity. */
 int32_t hs_block_most_hits(int32_t capacity);
@@ -85,27 +80,8 @@ int32_t hs_block_most_hits(int32_t capacity);
 /* Chooses the centre. */
 void hs_group_start(const hs_bins *bins, int32_t first, int32_t last, hs_group *group);
 
-/* Its points, copied from where they are: for groups whose neighbourhood does not begin with them,
- * after hs_group_start. Rounded as candidates are. */
-void hs_group_load(const hs_bins *bins, hs_group *group);
-
 /* Its box, from its points, which it loads; returns the largest |q_k|. */
 float hs_group_bound(const hs_bins *bins, hs_group *group);
-
-/*
- * Appends points [si, end) of one image to the block, as many as there is room for; returns how
- * many. shift: the image's displacement, ndim doubles; image: that displacement over the rows of B.
- */
-int32_t hs_block_append(hs_block *block, int32_t si, int32_t end, int ndim, const double *shift,
-                        const int32_t *image, const hs_group *group);
-
-/*
- * Copies what was appended, but for candidates that are not near the group. The first block of a
- * group must begin with the group's own points, in the image 0: they are kept as its q. Fails when
- * poll() stops the search; it is called now and then for a large block.
- */
-hs_status hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, const hs_options *options,
-                          bool is_first, hs_block *block, hs_group *group);
 
 /* The bits of a float >= 0, rounded up to the top five bits of the mantissa, which adds 1/32 at
  * most: so that few different thresholds are needed. NaN and infinity remain. */
@@ -140,17 +116,7 @@ typedef struct hs_order {
 } hs_order;
 
 /* Room for this block, and its `origin`. On failure hs_order_free. */
-hs_status hs_order_init(hs_account *account, hs_block *block, hs_order *order);
-void      hs_order_free(hs_account *account, hs_block *block, hs_order *order);
-
-/*
- * Sorts a block that has been gathered: ascending by the caller's number, then, where hits are
- * listed as places, by S over the box vectors as given. block->origin says where each candidate
- * was; ids follow the new order only where these are listed. HS_ERR_SHIFT_RANGE when an image
- * passes 2^62; HS_ERR_INTERRUPTED, as options say, while a large block is sorted.
- */
-hs_status hs_order_block(const hs_lattice *lattice, const hs_options *options, hs_block_use use,
-                         hs_block *block, hs_order *order);
+void hs_order_free(hs_account *account, hs_block *block, hs_order *order);
 
 /*
  * What was given of the candidates of a block: float64 coordinates, images and turns, as
@@ -176,11 +142,6 @@ typedef struct hs_records {
     bool has_images, knows_images; /* some candidate is in another image; valid if knows_images */
 } hs_records;
 
-/* needs_given: whether S is wanted, or else only what the metric needs. */
-hs_status hs_records_init(const hs_search *search, const hs_block *block, const hs_options *polls,
-                          bool needs_given, hs_records *records);
-void      hs_records_free(hs_account *account, hs_records *records);
-
 /* Call when the block has new candidates: they will be looked up again. */
 HS_ALWAYS_INLINE void
 hs_records_reset(hs_records *records)
@@ -191,15 +152,6 @@ hs_records_reset(hs_records *records)
 /* Fills what is needed for all candidates of the block, as far as that is not done yet; `metric`:
  * also q. HS_OK or HS_ERR_INTERRUPTED. */
 hs_status hs_records_load(hs_records *records, bool metric);
-
-/* Whether some candidate of the block is in another image; looks at its runs once. */
-bool hs_records_has_images(hs_records *records);
-
-/* Whether every S of the scene is the sum of an image and of turns that are known to be few. */
-bool hs_has_narrow_shifts(const hs_search *search);
-
-/* Whether shifts over B are those over the box vectors as given. */
-bool hs_has_plain_shifts(const hs_lattice *lattice);
 
 /*
  * From places in the gathered block back to the numbers that were given, a batch of
@@ -231,10 +183,6 @@ typedef struct hs_pair_batch {
 hs_status hs_pair_batch_init(const hs_search *search, const hs_block *block,
                              const hs_options *polls, bool needs_given, hs_pair_batch *trace);
 void      hs_pair_batch_free(hs_account *account, hs_pair_batch *trace);
-
-/* Makes it ready for what its search has become, with as many axes. False if it has other arrays
- * than that needs. */
-bool hs_pair_batch_renew(bool needs_given, hs_pair_batch *trace);
 
 /* Empties the batch. */
 HS_ALWAYS_INLINE void
@@ -368,10 +316,6 @@ void hs_scanner_note(hs_search *search, hs_scanner *scanner);
 /* hs_scanner_note, and frees; harmless twice. */
 void hs_scanner_close(hs_search *search, hs_scanner *scanner);
 
-/* The arrays for pairs to decide, where hs_scanner_init has left them for later: trace.memory is
- * NULL. They are kept (hs_account_keep) where the walker is. */
-hs_status hs_scanner_open_trace(hs_scanner *scanner);
-
 /*
  * scan.h: a scanner's block against its group: candidates appended, copied, put in order where that
  * is wanted, tested by the kernel, decided, and the hits handed to the visitor.
@@ -403,21 +347,10 @@ hs_status hs_scanner_finish(hs_scanner *scanner);
  * of a search have few extents, and what follows from each is kept.
  */
 
-/* None is known yet. */
-void hs_forms_init(hs_scanner *scanner);
-
 /* Sets scanner->form by the size of the present group and block. */
 void hs_form_set(hs_scanner *scanner);
 
-/* Lets candidates of the present group be left out that are beyond the cutoff of all its points, or
- * their limits, where the block has so many that this is worth it. */
-void hs_form_prune(hs_scanner *scanner);
-
 /* The exact decision of the hits that float32 could not tell. */
-
-/* Decides scan->unsure, of the points [first, next) of the group, and takes those that are beyond
- * the cutoff from the hits; the order stays. */
-hs_status hs_decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next);
 
 /* Whether each pair of scanner->trace is within the metric's cutoff, which need not be the scene's.
  * within: HS_BATCH of them. */

@@ -179,8 +179,13 @@ least_pairs(const hs_search *search)
     return 0.5 * n * (around - (search->has_queries ? 0.0 : 1.0)) * search->pairs_per_half;
 }
 
-hs_status
-hs_estimate_by_density(hs_search *search, hs_failure *failure)
+/*
+ * Before any work: a box has at least so many pairs as its density along the periodic axes says,
+ * less what a cell's diameter and the extent along the open axes can hide. HS_ERR_MEMORY when even
+ * these pass the limit, HS_ERR_TOO_MANY when int64 cannot count them.
+ */
+static hs_status
+estimate_by_density(hs_search *search, hs_failure *failure)
 {
     const double bytes_per_pair = find_bytes_per_pair(search);
     if (search->limits != NULL ||                /* the cutoff is that of few pairs */
@@ -498,8 +503,9 @@ hs_shells_keep(const hs_shells *shells, int64_t k, double distance)
 
 /* search.c: begins a search, settles what follows from its parts, and frees them. */
 
-void
-hs_search_set_asking(const hs_sets *sets, hs_search *search)
+/* Sets, from the sets, which points ask and whether lists are full. */
+static void
+search_set_asking(const hs_sets *sets, hs_search *search)
 {
     const int64_t n = sets->points->n;
     search->has_queries = sets->queries != NULL;
@@ -513,8 +519,9 @@ hs_search_set_asking(const hs_sets *sets, hs_search *search)
                                               : 2.0 * (double)search->n_in_all / (double)n;
 }
 
-void
-hs_search_finish_setup(hs_search *search)
+/* Sets what follows from scene and grid. */
+static void
+search_finish_setup(hs_search *search)
 {
     search->filter_error =
         search->scene.x_error + search->grid.shift_error + search->scene.formula_error;
@@ -622,8 +629,9 @@ build_bins(hs_search *search, hs_scene *scene, hs_grid *grid, hs_sparse *sparse,
                                              scene, grid, bins);
 }
 
-hs_status
-hs_search_bin_queries(hs_search *search, hs_scene *asking)
+/* The queries into the cells that are there; their scene gives up its arrays. */
+static hs_status
+search_bin_queries(hs_search *search, hs_scene *asking)
 {
     hs_grid grid = search->grid; /* of which occupied cells are counted anew */
     return build_bins(search, asking, &grid, &search->query_sparse, &search->query_bins);
@@ -636,7 +644,7 @@ build_cells(hs_search *search, hs_scene *asking, hs_failure *failure)
     hs_scene *scene = &search->scene;
     hs_status status = choose_grid(search, failure);
     if (status == HS_OK) {
-        status = hs_estimate_by_density(search, failure);
+        status = estimate_by_density(search, failure);
     }
     if (status == HS_OK) {
         status = hs_stencil_build(&search->call->account, &search->call->options, scene,
@@ -649,7 +657,7 @@ build_cells(hs_search *search, hs_scene *asking, hs_failure *failure)
         status = build_bins(search, scene, &search->grid, &search->sparse, &search->bins);
     }
     if (status == HS_OK && asking != NULL) {
-        status = hs_search_bin_queries(search, asking);
+        status = search_bin_queries(search, asking);
     }
     return status;
 }
@@ -675,7 +683,7 @@ hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_fa
     if (search->call->kernel == NULL) {
         return HS_ERR_KERNEL;
     }
-    hs_search_set_asking(sets, search);
+    search_set_asking(sets, search);
     hs_status status = hs_scene_init_sets(&search->call->account, search->call->team, sets, box,
                                           options_of_scene(search->call, &others), &search->scene,
                                           asking, failure);
@@ -687,7 +695,7 @@ hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_fa
         }
     }
     if (status == HS_OK) {
-        hs_search_finish_setup(search);
+        search_finish_setup(search);
     }
     return status;
 }
@@ -746,10 +754,10 @@ adapt(const hs_sets *sets, hs_search *search, hs_failure *failure)
         status = hs_grid_narrow(&search->scene, search->is_sparse, before, &search->grid);
     }
     hs_scene_init_metric(&search->scene, options);
-    hs_search_set_asking(sets, search);
-    hs_search_finish_setup(search);
+    search_set_asking(sets, search);
+    search_finish_setup(search);
     if (status == HS_OK) {
-        status = hs_estimate_by_density(search, failure);
+        status = estimate_by_density(search, failure);
     }
     if (status == HS_OK) {
         status = hs_stencil_build(&search->call->account, options, &search->scene, &search->grid,
@@ -766,7 +774,7 @@ take_queries(const hs_points *queries, hs_search *search, hs_failure *failure)
                                           &search->scene, queries, &search->call->options, &asking,
                                           failure);
     if (status == HS_OK) {
-        status = hs_search_bin_queries(search, &asking);
+        status = search_bin_queries(search, &asking);
         hs_scene_free(&search->call->account, &asking);
     }
     return status;

@@ -112,12 +112,6 @@ hs_search_asking(const hs_search *search)
     return search->has_queries ? &search->query_bins : &search->bins;
 }
 
-/* Sets, from the sets, which points ask and whether lists are full. */
-void hs_search_set_asking(const hs_sets *sets, hs_search *search);
-
-/* Sets what follows from scene and grid. */
-void hs_search_finish_setup(hs_search *search);
-
 /* Frees what it has; harmless twice. The call goes on. */
 void hs_search_close(hs_search *search);
 
@@ -137,9 +131,6 @@ hs_status hs_search_open(const hs_sets *sets, const hs_box *box, hs_call *call, 
  * options.cutoff may have changed. */
 hs_status hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search,
                           hs_failure *failure);
-
-/* The queries into the cells that are there; their scene gives up its arrays. */
-hs_status hs_search_bin_queries(hs_search *search, hs_scene *asking);
 
 /*
  * A search among the points of another one, which was made to be kept, stays as it is and must
@@ -169,13 +160,6 @@ void hs_shortage_tell(const hs_shortage *shortage, const hs_options *options, in
 /* Pairs and bytes of one search. */
 void hs_shortage_of_search(const hs_points *points, const hs_box *box, const hs_search *search,
                            hs_failure *failure);
-
-/*
- * Before any work: a box has at least so many pairs as its density along the periodic axes says,
- * less what a cell's diameter and the extent along the open axes can hide. HS_ERR_MEMORY when even
- * these pass the limit, HS_ERR_TOO_MANY when int64 cannot count them.
- */
-hs_status hs_estimate_by_density(hs_search *search, hs_failure *failure);
 
 /*
  * After sorting into cells: HS_OK when a result is expected to fit the account's limit, and always

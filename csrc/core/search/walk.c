@@ -33,8 +33,8 @@ asking_sparse(const hs_search *search)
     return search->has_queries ? &search->query_sparse : &search->sparse;
 }
 
-int64_t
-hs_row_count(const hs_search *search)
+static int64_t
+row_count(const hs_search *search)
 {
     return search->is_sparse ? asking_sparse(search)->n_rows
                              : search->grid.n_cells / search->grid.shape[0];
@@ -49,10 +49,11 @@ first_point(const hs_search *search, int64_t number)
     return hs_search_asking(search)->start[cell];
 }
 
-int64_t
+/* The last row that begins at or before point si. */
+static int64_t
 hs_row_of(const hs_search *search, int32_t si)
 {
-    int64_t low = 0, high = hs_row_count(search);
+    int64_t low = 0, high = row_count(search);
     while (high - low > 1) {
         const int64_t middle = low + (high - low) / 2;
         if (first_point(search, middle) <= si) {
@@ -64,8 +65,8 @@ hs_row_of(const hs_search *search, int32_t si)
     return low;
 }
 
-void
-hs_row_open(const hs_search *search, int64_t number, hs_row *row)
+static void
+row_open(const hs_search *search, int64_t number, hs_row *row)
 {
     const hs_grid *grid = &search->grid;
     row->first = row->next = first_point(search, number);
@@ -93,15 +94,17 @@ hs_row_open_at(const hs_search *search, int32_t si, hs_row *row, hs_row_group *g
         x[k] = hs_search_asking(search)->x[k][si];
     }
     const double t = hs_lattice_coordinate(&search->scene.lattice, x, 0);
-    hs_row_open(search, hs_row_of(search, si), row);
+    row_open(search, hs_row_of(search, si), row);
     group->first = si;
     group->last = si + 1;
     group->x_first = group->x_last = search->is_sparse ? hs_sparse_index(&search->grid, 0, t)
                                                        : hs_grid_index(&search->grid, 0, t);
 }
 
-int32_t
-hs_row_target(const hs_search *search, bool is_ordered)
+/* Points that consecutive cells of a dense row are put together for, by walkers that put their
+ * candidates in order (scan.h) or others. */
+static int32_t
+row_target(const hs_search *search, bool is_ordered)
 {
     const hs_grid *grid = &search->grid;
     if (!is_ordered || search->is_sparse) {
@@ -295,7 +298,7 @@ static hs_status
 open_row(hs_walker *walker, int64_t number)
 {
     hs_cursor *cursor = &walker->cursor;
-    hs_row_open(walker->search, number, &cursor->row);
+    row_open(walker->search, number, &cursor->row);
     cursor->row_number = -1; /* until it has its links */
     cursor->last_first = -1;
     cursor->has_next = cursor->row.first < cursor->row.end;
@@ -338,7 +341,7 @@ hs_walk(hs_walker *walker, int32_t first, int32_t end)
 {
     const hs_search  *search = walker->search;
     const hs_options *options = &walker->scanner.options;
-    const int64_t     n_rows = hs_row_count(search);
+    const int64_t     n_rows = row_count(search);
     if (first >= end || (!options->inclusive && options->cutoff == 0.0)) {
         return HS_OK; /* no distance is below zero */
     }
@@ -450,7 +453,7 @@ init_links(hs_search *search, hs_cursor *cursor)
 static void
 set_out(const hs_search *search, bool is_ordered, hs_cursor *cursor)
 {
-    cursor->target = hs_row_target(search, is_ordered);
+    cursor->target = row_target(search, is_ordered);
     cursor->row_number = -1;
 }
 

@@ -36,19 +36,8 @@ typedef struct hs_link {
     double           shift[HS_MAX_DIM]; /* image * B */
 } hs_link;
 
-int64_t hs_row_count(const hs_search *search);
-
-/* The last row that begins at or before point si. */
-int64_t hs_row_of(const hs_search *search, int32_t si);
-
-void hs_row_open(const hs_search *search, int64_t number, hs_row *row);
-
 /* The row and the cell along it of point si, taken as a group of its own. */
 void hs_row_open_at(const hs_search *search, int32_t si, hs_row *row, hs_row_group *group);
-
-/* Points that consecutive cells of a dense row are put together for, by walkers that put their
- * candidates in order (scan.h) or others. */
-int32_t hs_row_target(const hs_search *search, bool is_ordered);
 
 /* The next group, with this target; false after the last. Groups depend on the scene and the target
  * alone. */
@@ -129,7 +118,8 @@ hs_status hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit,
  * hs_walker_init for what the search of this walker has become, or for the first one: then the
  * walker is all zeros. It is the same object, of the same call, with as many axes, and with the
  * same kernel and options but for the cutoff. Memory that will do is kept, in the account's arena
- * too (hs_account_keep). Between two searches hs_walker_flush_counters tells the call what was done; a walker
+ * too (hs_account_keep). Between two searches hs_walker_flush_counters tells the call what was
+ * done; a walker
  * that is not for others (hs_search_keeps_walker) ends there.
  */
 hs_status hs_walker_renew(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,

@@ -352,18 +352,20 @@ hs_pieces_find(hs_search *search, hs_pieces *pieces, hs_failure *failure)
 
 #define FIRST_CAPACITY 64 /* the 26 images next to a box, and some room */
 
-void
-hs_images_init(int width, hs_images *images)
+/* An empty table. */
+static void
+images_init(int width, hs_images *images)
 {
     *images = (hs_images){.width = width};
 }
 
-void
-hs_images_free(hs_images *images)
+/* Idempotent. */
+static void
+images_free(hs_images *images)
 {
     hs_free(NULL, images->of);
     hs_free(NULL, images->slots);
-    hs_images_init(images->width, images);
+    images_init(images->width, images);
 }
 
 /* Where the shift is, or the empty slot where it belongs. */
@@ -396,7 +398,7 @@ grow(hs_images *images)
     larger.of = hs_alloc(NULL, HS_FOR_SHIFTS, larger.capacity * larger.width, sizeof(int32_t));
     larger.slots = hs_alloc(NULL, HS_FOR_SHIFTS, 2 * larger.capacity, sizeof(int32_t));
     if (larger.of == NULL || larger.slots == NULL) {
-        hs_images_free(&larger);
+        images_free(&larger);
         return false;
     }
     memset(larger.slots, -1, 2 * (size_t)larger.capacity * sizeof(int32_t));
@@ -405,7 +407,7 @@ grow(hs_images *images)
         memcpy(larger.of + number * larger.width, shift, (size_t)images->width * sizeof(int32_t));
         larger.slots[find_slot(&larger, shift)] = (int32_t)number;
     }
-    hs_images_free(images);
+    images_free(images);
     *images = larger;
     return true;
 }
@@ -453,7 +455,7 @@ hs_listing_free(hs_listing *listing)
         hs_store_free(&listing->for_order[turn]);
         hs_store_free(&listing->for_counts[turn]);
     }
-    hs_images_free(&listing->images);
+    images_free(&listing->images);
     *listing = (hs_listing){0};
 }
 
@@ -676,7 +678,7 @@ settle_pairs(building *built)
 {
     hs_search *search = &built->search;
     placing    place = {.built = built};
-    hs_images_init(search->scene.lattice.n_periodic, &built->listing->images);
+    images_init(search->scene.lattice.n_periodic, &built->listing->images);
     bool complete = count_pairs(built, &place);
     for (int64_t p = 0; p < built->pieces.n && complete; p++) {
         complete = number_images(&built->pieces.of[p].shifted, built->listing);
@@ -727,7 +729,7 @@ hs_listing_build(const hs_frame *frame, const hs_options *options, double radius
     next.n_pairs = 0; /* not known */
     next.radius = radius;
     next.counts = NULL;
-    hs_images_init(0, &next.images);
+    images_init(0, &next.images);
     next.turn = 1 - listing->turn;
     built->listing = &next;
     built->pieces = (hs_pieces){0};
@@ -737,10 +739,10 @@ hs_listing_build(const hs_frame *frame, const hs_options *options, double radius
     hs_account_close(&built->call.account);
     hs_free(NULL, built);
     if (status == HS_OK) {
-        hs_images_free(&listing->images);
+        images_free(&listing->images);
         *listing = next;
     } else { /* stores that are not in use may have grown */
-        hs_images_free(&next.images);
+        images_free(&next.images);
         listing->for_order[next.turn] = next.for_order[next.turn];
         listing->for_counts[next.turn] = next.for_counts[next.turn];
     }
@@ -792,8 +794,10 @@ find_displacements(const hs_tracking *track, hs_tile *t)
     }
 }
 
-bool
-hs_take_jump(hs_tracking *track, hs_tile *t, int p, int64_t *given)
+/* Takes whole box vectors from u of point p. Returns whether that is known to have worked; sets
+ * `given`, over the box vectors as given. */
+static bool
+take_jump(hs_tracking *track, hs_tile *t, int p, int64_t *given)
 {
     double  u[HS_MAX_DIM], inside[HS_MAX_DIM];
     int64_t turns[HS_MAX_DIM];
@@ -851,8 +855,9 @@ find_longest(hs_tile *t, const int d, const double *drift, double *square, doubl
     }
 }
 
-void
-hs_measure_tile(hs_tile *t, int d, const double *drift, double *square, double *component)
+/* The longest of the tile, less drift, to *square and *component, which are not lowered. */
+static void
+measure_tile(hs_tile *t, int d, const double *drift, double *square, double *component)
 {
     switch (d) {
     case 2: find_longest(t, 2, drift, square, component); break;
@@ -861,9 +866,11 @@ hs_measure_tile(hs_tile *t, int d, const double *drift, double *square, double *
     }
 }
 
-bool
-hs_look_at_tile(const hs_tracking *track, int64_t first, int64_t step, hs_tile *t, double *square,
-                double *component)
+/* Displacements of up to HS_TILE points from `first` on; their longest to *square and *component.
+ * Returns whether some point may have jumped. */
+static bool
+look_at_tile(const hs_tracking *track, int64_t first, int64_t step, hs_tile *t, double *square,
+             double *component)
 {
     const double  none[HS_MAX_DIM] = {0.0};
     const int64_t left = (track->motion->now->points.n - first + step - 1) / step;
@@ -872,12 +879,14 @@ hs_look_at_tile(const hs_tracking *track, int64_t first, int64_t step, hs_tile *
     t->n = left < HS_TILE ? (int)left : HS_TILE;
     *square = *component = 0.0;
     find_displacements(track, t);
-    hs_measure_tile(t, track->motion->now->points.ndim, none, square, component);
+    measure_tile(t, track->motion->now->points.ndim, none, square, component);
     return track->m > 0 && !(*component < track->jump);
 }
 
-hs_status
-hs_take_jumps(hs_tracking *track, hs_tile *t)
+/* Takes and keeps the jumps of the points of a tile. HS_REBUILD: some point went too far to
+ * tell. */
+static hs_status
+take_jumps(hs_tracking *track, hs_tile *t)
 {
     const int m = track->m;
     for (int p = 0; p < t->n; p++) {
@@ -886,7 +895,7 @@ hs_take_jumps(hs_tracking *track, hs_tile *t)
         if (!hs_may_be_jump(track, t, p)) {
             continue;
         }
-        if (!hs_take_jump(track, t, p, given)) {
+        if (!take_jump(track, t, p, given)) {
             return HS_REBUILD;
         }
         for (int r = 0; r < m; r++) {
@@ -925,7 +934,7 @@ find_base(hs_tracking *track)
     double        base[HS_MAX_DIM] = {0.0}, square, component;
     hs_tile       t;
     for (int64_t i = 0; track->m > 0 && i < n; i += HS_TILE * step, count += t.n) {
-        const bool any = hs_look_at_tile(track, i, step, &t, &square, &component);
+        const bool any = look_at_tile(track, i, step, &t, &square, &component);
         for (int p = 0; any && p < t.n; p++) {
             if (hs_may_be_jump(track, &t, p)) {
                 for (int k = 0; far == 0 && k < track->lattice.ndim; k++) {
@@ -957,12 +966,11 @@ take_sample(hs_tracking *track, const double *drift, sample *found)
     hs_tile       t;
     *found = (sample){.count = 0.0};
     for (int64_t i = 0; i < n; i += HS_TILE * step) {
-        const bool any = hs_look_at_tile(track, i, step, &t, &square, &component);
+        const bool any = look_at_tile(track, i, step, &t, &square, &component);
         for (int p = 0; p < t.n; p++) {
             if (any && hs_may_be_jump(track, &t, p)) {
                 int64_t given[HS_MAX_DIM];
-                (void)hs_take_jump(track, &t, p,
-                                   given); /* a failure shows again in the full pass */
+                (void)take_jump(track, &t, p, given); /* a failure shows again in the full pass */
             }
             for (int k = 0; k < d; k++) {
                 const double u = t.u[k][p];
@@ -972,7 +980,7 @@ take_sample(hs_tracking *track, const double *drift, sample *found)
             }
         }
         found->count += t.n;
-        hs_measure_tile(&t, d, drift, &found->square, &found->component);
+        measure_tile(&t, d, drift, &found->square, &found->component);
     }
 }
 
@@ -1086,11 +1094,11 @@ measure_all(hs_tracking *track, const hs_options *options)
     hs_tile       t;
     for (int64_t first = 0; first < n; first += HS_TILE) {
         double     square, component;
-        const bool any = hs_look_at_tile(track, first, 1, &t, &square, &component);
-        hs_status  status = any ? hs_take_jumps(track, &t) : HS_OK;
+        const bool any = look_at_tile(track, first, 1, &t, &square, &component);
+        hs_status  status = any ? take_jumps(track, &t) : HS_OK;
         if (status == HS_OK && (any || track->has_drift)) {
-            hs_measure_tile(&t, track->motion->now->points.ndim, track->drift, &track->square,
-                            &track->component);
+            measure_tile(&t, track->motion->now->points.ndim, track->drift, &track->square,
+                         &track->component);
         } else {
             track->square = hs_larger(square, track->square);
             track->component = hs_larger(component, track->component);

@@ -23,14 +23,8 @@ typedef struct hs_images {
     int32_t  last;     /* number of the last shift: most often the next has it, too */
 } hs_images;
 
-/* An empty table. */
-void hs_images_init(int width, hs_images *images);
-
 /* The number of this shift, a new one if it was not there. -1: out of memory. */
 int32_t hs_images_number(hs_images *images, const int32_t *shift);
-
-/* Idempotent. */
-void hs_images_free(hs_images *images);
 
 /* pair_list.h: a list of pairs that is used for many steps: what it holds. */
 
@@ -149,11 +143,6 @@ typedef struct hs_tile {
     double  u[HS_MAX_DIM][HS_TILE];
 } hs_tile;
 
-/* Displacements of up to HS_TILE points from `first` on; their longest to *square and *component.
- * Returns whether some point may have jumped. */
-bool hs_look_at_tile(const hs_tracking *track, int64_t first, int64_t step, hs_tile *t,
-                     double *square, double *component);
-
 /* Whether a displacement is so long that it may be a jump. */
 HS_ALWAYS_INLINE bool
 hs_may_be_jump(const hs_tracking *track, const hs_tile *t, int p)
@@ -164,17 +153,6 @@ hs_may_be_jump(const hs_tracking *track, const hs_tile *t, int p)
     }
     return !(longest < track->jump);
 }
-
-/* Takes whole box vectors from u of point p. Returns whether that is known to have worked; sets
- * `given`, over the box vectors as given. */
-bool hs_take_jump(hs_tracking *track, hs_tile *t, int p, int64_t *given);
-
-/* Takes and keeps the jumps of the points of a tile. HS_REBUILD: some point went too far to
- * tell. */
-hs_status hs_take_jumps(hs_tracking *track, hs_tile *t);
-
-/* The longest of the tile, less drift, to *square and *component, which are not lowered. */
-void hs_measure_tile(hs_tile *t, int d, const double *drift, double *square, double *component);
 
 /*
  * How far points have moved since a list was built, and what that leaves of its skin.

@@ -210,8 +210,9 @@ set_thresholds(hs_recheck *recheck, hs_scale scale, double largest, double error
     recheck->shifted = hs_thresholds_of(recheck->d, cutoff, extent, error + tiny + more);
 }
 
-hs_status
-hs_recheck_prepare(hs_recheck *recheck)
+/* The points as floats, their counts and thresholds. */
+static hs_status
+recheck_prepare(hs_recheck *recheck)
 {
     hs_account    *account = &recheck->call->account;
     const int      stride = hs_sift_stride(recheck->d);
@@ -323,8 +324,10 @@ drop_hits(hs_sifted *slab, const int32_t *gone, int32_t n)
     slab->n_hits -= n;
 }
 
-void
-hs_recheck_decide_unsure(const hs_recheck *recheck, hs_sifted *slab)
+/* Decides the hits of a slab that float32 cannot tell, of which there are some, and takes those
+ * that are beyond the cutoff from the hits. */
+static void
+recheck_decide_unsure(const hs_recheck *recheck, hs_sifted *slab)
 {
     int32_t    gone[HS_SIFT], n_gone = 0;
     open_batch open;
@@ -449,8 +452,10 @@ describe_points(const hs_recheck *recheck, const hs_sifted *slab, bool shifted, 
     }
 }
 
-bool
-hs_recheck_write(const hs_recheck *recheck, hs_sifted *slab)
+/* Writes i, j, d and D; false: it cannot, and what it has written does not count. In
+ * recheck.c. */
+static bool
+recheck_write(const hs_recheck *recheck, hs_sifted *slab)
 {
     const bool shifted = hs_sifted_has_images(recheck, slab) || recheck->few != NULL;
     hs_write   write = {
@@ -730,8 +735,8 @@ fill(const hs_recheck *recheck, const hs_sifted *slab, hit_batch *batch)
     }
 }
 
-void
-hs_recheck_measure(const hs_recheck *recheck, const hs_sifted *slab)
+static void
+recheck_measure(const hs_recheck *recheck, const hs_sifted *slab)
 {
     const hs_scene   *scene = &recheck->scene;
     const hs_options *options = &recheck->call->options;
@@ -913,16 +918,17 @@ put_shifts(const hs_recheck *recheck, hs_sifted *slab)
     }
 }
 
-void
-hs_recheck_put(const hs_recheck *recheck, hs_sifted *slab)
+/* Writes the hits. */
+static void
+recheck_put(const hs_recheck *recheck, hs_sifted *slab)
 {
     if (slab->n_hits == 0) {
         return;
     }
-    if (!(recheck->writes && hs_recheck_write(recheck, slab))) {
+    if (!(recheck->writes && recheck_write(recheck, slab))) {
         put_indices(recheck, slab);
         if (recheck->measures) {
-            hs_recheck_measure(recheck, slab);
+            recheck_measure(recheck, slab);
         }
     }
     if (recheck->output->columns & HS_WANT_SHIFT) {
@@ -983,7 +989,7 @@ sift_slab(const hs_recheck *recheck, hs_sifted *slab)
     slab->n_hits = sift.n_hits;
     slab->n_open = sift.n_open;
     if (slab->n_open > 0) {
-        hs_recheck_decide_unsure(recheck, slab);
+        recheck_decide_unsure(recheck, slab);
     }
 }
 
@@ -1053,7 +1059,7 @@ do_slab(worker *me, int64_t s)
         status = hs_output_reserve(output, slab->n_hits, output == &me->found ? 0.0 : done);
     }
     if (status == HS_OK && (!output->fixed || slab->at + slab->n_hits <= output->capacity)) {
-        hs_recheck_put(&me->recheck, slab);
+        recheck_put(&me->recheck, slab);
         status = slab->status;
     }
     if (status == HS_OK) {
@@ -1178,8 +1184,9 @@ free_recheck(hs_recheck *recheck)
     hs_free(account, recheck->y);
 }
 
-hs_status
-hs_recheck_run(hs_recheck *recheck, hs_failure *failure)
+/* Writes all pairs within the cutoff to the output. */
+static hs_status
+recheck_run(hs_recheck *recheck, hs_failure *failure)
 {
     const hs_listing *listing = &recheck->list->listing;
     const bool        more = recheck->measures || (recheck->output->columns & HS_WANT_SHIFT);
@@ -1188,7 +1195,7 @@ hs_recheck_run(hs_recheck *recheck, hs_failure *failure)
     job.in_range = 1 + HS_RANGE_BYTES / (1 + HS_SIFT * hs_output_bytes_per_pair(recheck->output));
     recheck->shared = recheck->call->team != NULL && job.n_slabs > job.in_range;
     recheck->numbers = !more && hs_sift_has_numbers(recheck->d);
-    hs_status status = hs_recheck_prepare(recheck);
+    hs_status status = recheck_prepare(recheck);
     if (status == HS_OK && recheck->measures) {
         status = hs_recheck_open_scene(recheck, failure);
     }
@@ -1218,7 +1225,7 @@ find_sorted(hs_recheck *recheck, hs_output *output, hs_failure *failure)
     hs_output found;
     hs_output_init(&call->account, recheck->d, columns_to_sort(recheck), 4, &found);
     recheck->output = &found;
-    hs_status status = hs_recheck_run(recheck, failure);
+    hs_status status = recheck_run(recheck, failure);
     if (status == HS_OK) {
         status = hs_sort_pairs(call, 0, recheck->now->points.n, &found, output);
     }
@@ -1238,7 +1245,7 @@ find_pairs(hs_recheck *recheck, hs_output *output, hs_failure *failure)
         status = find_sorted(recheck, output, failure);
     } else {
         recheck->output = output;
-        status = hs_recheck_run(recheck, failure);
+        status = recheck_run(recheck, failure);
     }
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = fmax(failure->expected_pairs, (double)output->n_pairs);

@@ -71,30 +71,12 @@ typedef struct hs_sifted {
     int32_t      i[HS_SIFT + HS_PADDING], j[HS_SIFT + HS_PADDING]; /* ... and what is copied */
 } hs_sifted;
 
-/* Writes all pairs within the cutoff to the output. */
-hs_status hs_recheck_run(hs_recheck *recheck, hs_failure *failure);
-
-/* The points as floats, their counts and thresholds. */
-hs_status hs_recheck_prepare(hs_recheck *recheck);
-
-/* Decides the hits of a slab that float32 cannot tell, of which there are some, and takes those
- * that are beyond the cutoff from the hits. */
-void hs_recheck_decide_unsure(const hs_recheck *recheck, hs_sifted *slab);
-
-/* Writes the hits. */
-void hs_recheck_put(const hs_recheck *recheck, hs_sifted *slab);
-
 /* Makes the scene ready that d and D are measured in, so that they have the bits that a search
  * finds, and writes them. */
 hs_status hs_recheck_open_scene(hs_recheck *recheck, hs_failure *failure);
-void      hs_recheck_measure(const hs_recheck *recheck, const hs_sifted *slab);
 
 /* Whether hits can be measured while they are written, and what that needs. */
 hs_status hs_recheck_plan_write(hs_recheck *recheck);
-
-/* Writes i, j, d and D; false: it cannot, and what it has written does not count. In
- * recheck.c. */
-bool hs_recheck_write(const hs_recheck *recheck, hs_sifted *slab);
 
 /* Room in the column of this HS_WANT_ bit for pair `at` of the output; NULL where not kept. */
 HS_ALWAYS_INLINE void *
