@@ -2,6 +2,7 @@
 /* test_wrap.c: points come into the box by the turns that are told, to the nearest image if that
  * is wanted. */
 #include "../../../csrc/core/box/wrap.h"
+#include "../../../csrc/core/box/near_image.h"
 #include "../support/harness.h"
 #include "../support/random_scenes.h"
 
@@ -96,10 +97,51 @@ coordinates_are_summed_in_one_order(void)
     }
 }
 
+/* The magnitude is that of all numbers that went in, also of a point that stays where it is. */
+static void
+points_that_stay_have_a_magnitude(void)
+{
+    const hs_box box = {.ndim = 2, .rows = {{4.0, 1.0}}, .periodic = {true, false}};
+    const double r[2] = {0.5, -300.0};
+    double       inside[2], magnitude = 0.0;
+    int64_t      turns;
+    hs_lattice   lattice;
+    hs_lattice_init(&box, 2, hs_scale_of(0), &lattice);
+    const double along = r[0] * 4.0 + r[1];
+    CHECK(fabs(along) > 8.5); /* so that this one moves */
+    CHECK(hs_wrap_point(&lattice, r, inside, &turns, &magnitude) && magnitude >= 300.0);
+    const double near_zero[2] = {0.5, 0.25};
+    magnitude = 0.0;
+    CHECK(hs_wrap_point(&lattice, near_zero, inside, &turns, &magnitude));
+    CHECK(turns == 0 && magnitude == 0.5);
+}
+
+/* The unit is that of the longest component: squares of others do not tell whether these fit. */
+static void
+rows_may_be_long_along_any_axis(void)
+{
+    const double p[2] = {0.0, 0.0};
+    for (int k = 0; k < 2; k++) {
+        hs_box       box = {.ndim = 2, .periodic = {true, false}};
+        double       q[2];
+        hs_image_box images;
+        int64_t      shift = 99;
+        box.rows[0][k] = 0x1p1000;
+        box.rows[0][1 - k] = 1.0;
+        q[k] = 0.75 * 0x1p1000;
+        q[1 - k] = 0.75;
+        CHECK(hs_image_box_init(&box, 2, &images) == HS_OK);
+        CHECK(hs_near_image(&images, p, q, &shift) == HS_OK && shift == -1);
+        CHECK(hs_near_image(&images, q, p, &shift) == HS_OK && shift == 1);
+    }
+}
+
 void
 test_wrap(void)
 {
     RUN(the_lowest_failure_is_told);
     RUN(what_does_not_settle_is_as_many_rows_away);
     RUN(coordinates_are_summed_in_one_order);
+    RUN(points_that_stay_have_a_magnitude);
+    RUN(rows_may_be_long_along_any_axis);
 }

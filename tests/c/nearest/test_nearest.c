@@ -513,6 +513,48 @@ one_refusal_ends_the_search(void)
     }
 }
 
+/* One point and one query so many boxes apart: S, or the status that says that it is too large. */
+static hs_status
+find_far(double away, unsigned want, double *distance, int32_t *shift, hs_failure *failure)
+{
+    const double    x[2] = {0.25, 0.5}, far[2] = {away, 0.5};
+    const hs_box    box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0, 0.0}, {0.5, 1.0}}};
+    const hs_points point = {x, 1, 2, HS_FLOAT64, 16, 8}, query = {far, 1, 2, HS_FLOAT64, 16, 8};
+    hs_options      options = hs_options_default();
+    hs_pairs       *rows = NULL;
+    options.cutoff = INFINITY;
+    options.want = want | HS_WANT_DISTANCE;
+    const hs_status status =
+        hs_nearest_find(QUERIED(&point, &query, &box), 1, &options, &rows, failure);
+    if (status == HS_OK) {
+        *distance = ((const double *)hs_pairs_array(rows, HS_WANT_DISTANCE))[0];
+        *shift = want != 0 ? ((const int32_t *)hs_pairs_array(rows, HS_WANT_SHIFT))[0] : 0;
+    }
+    hs_pairs_free(rows);
+    return status;
+}
+
+static void
+shifts_may_be_too_large(void)
+{
+    double     distance = -1.0;
+    int32_t    shift = -1;
+    hs_failure failure;
+    CHECK(find_far(0x1p30, HS_WANT_SHIFT, &distance, &shift, &failure) == HS_OK);
+    CHECK(distance == 0.25 && shift == 1 << 30);
+    CHECK(find_far(-0x1p31, HS_WANT_SHIFT, &distance, &shift, &failure) == HS_OK);
+    CHECK(distance == 0.25 && shift == INT32_MIN);
+    for (int sign = -1; sign <= 1; sign += 2) {
+        CHECK(find_far(sign * 0x1p32, HS_WANT_SHIFT, &distance, &shift, &failure) ==
+              HS_ERR_SHIFT_RANGE);
+        CHECK(failure.row == 0);
+        for (int exponent = 33; exponent <= 50; exponent += 17) {
+            CHECK(find_far(sign * ldexp(1.0, exponent), 0, &distance, &shift, &failure) == HS_OK);
+            CHECK(distance == 0.25);
+        }
+    }
+}
+
 void
 test_nearest(void)
 {
@@ -528,4 +570,5 @@ test_nearest(void)
     RUN(many_images_can_be_stopped);
     RUN(layers_are_as_thick_as_their_points);
     RUN(one_refusal_ends_the_search);
+    RUN(shifts_may_be_too_large);
 }

@@ -475,6 +475,20 @@ shifts_that_do_not_fit_name_a_point(void)
     }
 }
 
+/* Points that stay have all of the skin left, but for its rounding. */
+static void
+what_does_not_move_uses_nothing(void)
+{
+    double      x[6] = {0.0, 0.1, 0.2, 3.0, 4.0, 5.0};
+    brute_scene scene = {.ndim = 3, .n = 2, .x = x};
+    for (int n = 0; n <= 2; n++) {
+        scene.n = n;
+        CHECK(margin_between(&scene, &scene, 1.5, 1.0) == nextafter(0.5, 0.0));
+        CHECK(margin_between(&scene, &scene, 1.5, 0.0) == 1.5);
+        CHECK(margin_between(&scene, &scene, 1.0, 1.0) == 0.0);
+    }
+}
+
 void
 test_pair_list(void)
 {
@@ -487,4 +501,5 @@ test_pair_list(void)
     RUN(other_scenes_get_lists_of_their_own);
     RUN(limits_leave_the_list_as_it_was);
     RUN(shifts_that_do_not_fit_name_a_point);
+    RUN(what_does_not_move_uses_nothing);
 }
