@@ -2,7 +2,6 @@
 /* test_wrap.c: points come into the box by the turns that are told, to the nearest image if that
  * is wanted. */
 #include "../../../csrc/core/box/wrap.h"
-#include "../../../csrc/core/box/near_image.h"
 #include "../support/harness.h"
 #include "../support/random_scenes.h"
 

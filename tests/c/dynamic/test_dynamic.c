@@ -584,6 +584,41 @@ no_rows_are_no_change(void)
     hs_dynamic_free(list);
 }
 
+/* A coordinate inside, on a face, one period away or many, or next to one of these. */
+static double
+some_coordinate(harness_random *random, double length)
+{
+    double x = (random_unit(random) - 0.5) * 4.0 * length;
+    switch (random_bits(random) % 4) {
+    case 0: x = ldexp(x, (int)(random_bits(random) % 40)); break;
+    case 1: x = (double)(int64_t)(random_bits(random) % 9) * 0.5 * length - 2.0 * length; break;
+    default: break;
+    }
+    return random_bits(random) % 3 == 0 ? nextafter(x, 0.0) : x;
+}
+
+static void
+skewed_positions_are_those_of_wrap_point(void)
+{
+    const hs_box   box = {.ndim = 2, .periodic = {true, true}, .rows = {{3.0, 0.0}, {1.1, 2.5}}};
+    hs_dynamic    *list = list_of(&box);
+    harness_random random = {6};
+    for (int trial = 0; trial < TRIALS(20000); trial++) {
+        const double given[2] = {some_coordinate(&random, 3.0), some_coordinate(&random, 3.0)};
+        double       inside[2], magnitude = 0.0;
+        int64_t      turns[2];
+        hs_placed    placed;
+        hs_failure   failure;
+        CHECK(hs_wrap_point(&list->lattice, given, inside, turns, &magnitude));
+        CHECK(hs_dynamic_place(list, given, &placed, &failure) == HS_OK);
+        CHECK(memcmp(placed.x, inside, sizeof inside) == 0);
+        CHECK(memcmp(placed.turns, turns, sizeof turns) == 0);
+        CHECK(hs_update_insert(list, (hs_key){0, 0}, &placed, &failure) == HS_OK);
+        CHECK(list->magnitude >= magnitude);
+    }
+    hs_list_free(list);
+}
+
 void
 test_dynamic(void)
 {
@@ -601,5 +636,6 @@ test_dynamic(void)
     RUN(few_rows_among_many_cells);
     RUN(rows_have_tags);
     RUN(no_rows_are_no_change);
+    RUN(skewed_positions_are_those_of_wrap_point);
     hs_fpenv_leave(env);
 }
