@@ -175,14 +175,17 @@ CHARMM_PDB = "".join([
     pdb_atom(3, " HG", "SER", (3, 0, 0)), pdb_atom(4, "HE21", "GLN", (0, 3, 0)),
     pdb_atom(5, " OG1", "THR", (0, 5, 0)), pdb_atom(6, "CA", "CA", (0, 7, 0), record="HETATM"),
     pdb_atom(7, "ZN", "ZN2", (0, 9, 0), record="HETATM"), pdb_atom(8, " SG", "CYS", (0, 11, 0)),
-    pdb_atom(9, "SOD", "SOD", (0, 13, 0)), pdb_atom(10, " MW", "SOL", (0, 15, 0)),
+    pdb_atom(9, "SOD", "SOD", (0, 13, 0)),
 ])  # fmt: skip
+VIRTUAL_SITE = pdb_atom(10, " MW", "SOL", (0, 15, 0))  # which ASE takes for no atom
 
 
-def test_elements_of_a_protein_without_a_column_for_them(scene):
-    need("ase")
-    found = scene("charmm.pdb", CHARMM_PDB)
-    assert found.species.tolist() == ["N", "C", "H", "H", "O", "Ca", "Zn", "S", "Na", "X"]
+@pytest.mark.parametrize("library, more", [("ase", ""), ("MDAnalysis", VIRTUAL_SITE)])
+def test_elements_of_a_protein_without_a_column_for_them(scene, library, more):
+    need("ase", library)
+    found = scene("charmm.pdb", CHARMM_PDB + more)
+    wanted = ["N", "C", "H", "H", "O", "Ca", "Zn", "S", "Na", *(["X"] if more else [])]
+    assert found.species.tolist() == wanted
     assert "elements by names of atoms" in found.reader
 
 
