@@ -227,7 +227,7 @@ def test_the_header_stands_alone(header):
 )
 def test_flags_that_break_the_arithmetic_are_refused(flags):
     with pytest.raises(AssertionError, match="-ffast-math and the like break them"):
-        compile(*flags.split(), "-fsyntax-only", CSRC / "core" / "search" / "decide.c")
+        compile(*flags.split(), "-fsyntax-only", CSRC / "core" / "search" / "scan.c")
 
 
 FUSED = """
