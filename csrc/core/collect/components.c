@@ -55,12 +55,11 @@ root_of(hs_components *components, int32_t p, uint32_t *image)
         image[l] = 0;
     }
     while (parent[p] != p) {
-        const int32_t   above = parent[p];
-        uint32_t       *from_parent = components->image + (int64_t)p * n_axes;
-        const uint32_t *of_point = components->image + (int64_t)above * n_axes;
+        const int32_t above = parent[p];
         for (int l = 0; l < n_axes; l++) { /* zero where the parent is the root */
-            from_parent[l] += of_point[l];
-            image[l] += from_parent[l];
+            uint32_t *from_parent = &components->image[(int64_t)p * n_axes + l];
+            *from_parent += components->image[(int64_t)above * n_axes + l];
+            image[l] += *from_parent;
         }
         parent[p] = parent[above];
         p = parent[p];

@@ -305,7 +305,7 @@ move_rows(hs_table *table)
         table_row      of = {.at = place[0], .n = (int32_t)(place[1] - place[0])};
         of.point = asking->order[si];
         of.itself = NO_POINT;
-        of.numbers = numbers + from;
+        of.numbers = numbers != NULL ? numbers + from : NULL; /* none: an empty table */
         expect_rows(&fill, asking, si);
         put_ends(fill.to, &of);
         put_measures(&fill, of.at, from, of.n);
