@@ -14,7 +14,10 @@ from halfshell._convert.types import FloatArray
 
 
 class Axes(NamedTuple):
-    """What the core says of the axes of a box, which are not those of the box vectors."""
+    """What the core says of the axes of a box, which are not those of the box vectors.
+
+    Between processes arrays may arrive at any address: the core is given them aligned.
+    """
 
     scene: tuple[FloatArray | None, int, float, float]  # box, periodic bits, cutoff, largest
     repeats: tuple[bool, ...]  # places are from 0 to 1
@@ -23,7 +26,7 @@ class Axes(NamedTuple):
 
     def places(self, points: npt.NDArray[Any]) -> FloatArray:
         """Places of shape (d, n), 0 along axes where the reach is infinite."""
-        return _core.box_places(points, *self.scene)[0]
+        return _places(points, self.scene)[0]
 
 
 def axes_of(
@@ -31,8 +34,14 @@ def axes_of(
 ) -> Axes:
     """Axes of a box, for coordinates up to `largest`."""
     scene = (vectors, sum(flag << k for k, flag in enumerate(flags)), cutoff, largest)
-    _, repeats, reach, widths = _core.box_places(np.empty((0, len(flags))), *scene)
+    _, repeats, reach, widths = _places(np.empty((0, len(flags))), scene)
     return Axes(scene, repeats, reach, np.array(widths))
+
+
+def _places(points: npt.NDArray[Any], scene: tuple[FloatArray | None, int, float, float]) -> Any:
+    box, *others = scene
+    given = None if box is None else np.require(box, requirements="CA")
+    return _core.box_places(np.require(points, requirements="CA"), given, *others)
 
 
 def within(places: FloatArray, low: float, high: float, repeats: bool) -> npt.NDArray[np.bool_]:

@@ -3,7 +3,9 @@
 
 import contextlib
 import doctest
+import functools
 import os
+import pickle
 import re
 import signal
 import subprocess
@@ -17,6 +19,7 @@ from brick_scenes import LETTERS, in_order, same, scenes, serial
 from checkout import ROOT
 
 dask = pytest.importorskip("dask", reason="dask is not installed")
+pytest.importorskip("dask.local", reason="dask is not installed")
 da = pytest.importorskip("dask.array", reason="dask.array is not installed")
 distributed = pytest.importorskip("distributed", reason="distributed is not installed")
 hd = pytest.importorskip("halfshell.dask", reason="dask is not installed")
@@ -92,6 +95,28 @@ def cluster(workers, **options):
 
 
 @pytest.mark.slow
+def packed(task):
+    buffers = []
+    frame = pickle.dumps(task, protocol=5, buffer_callback=buffers.append)
+    return frame, [bytes(1) + one.raw().tobytes() for one in buffers]
+
+
+def unpacked(given):
+    """What was packed; its arrays are read-only and at odd addresses."""
+    frame, buffers = given
+    return pickle.loads(frame, buffers=[memoryview(one)[1:] for one in buffers])
+
+
+@pytest.mark.parametrize("name", scenes())
+def test_what_a_task_receives_may_be_at_any_address(name):
+    get = functools.partial(
+        dask.local.get_async, dask.local.SynchronousExecutor().submit, 1, dumps=packed,
+        loads=unpacked,
+    )  # fmt: skip
+    with dask.config.set(scheduler=get):
+        check_all(*scenes()[name], 50)
+
+
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("workers", [1, 2, 4])
 def test_a_cluster(workers):
