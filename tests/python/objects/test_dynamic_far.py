@@ -256,8 +256,8 @@ def handle(*_):
     if len(heard) == 2:
         raise RuntimeError("enough")
 
-if sys.argv[2] == "handled":
-    signal.signal(signal.SIGINT, handle)
+# A shell ignores Ctrl-C in what it runs in the background.
+signal.signal(signal.SIGINT, handle if sys.argv[2] == "handled" else signal.default_int_handler)
 print("ready", flush=True)
 try:
     queries[sys.argv[1]]()
