@@ -265,7 +265,8 @@ typedef enum hs_rule {
  */
 typedef struct hs_reach {
     hs_rule        rule;
-    const double  *radii;         /* n, from 0 to 2^1022; NULL where the rule needs none */
+    const double  *radii;         /* n, from 0 to 2^1022, with HS_RULE_MEAN 0 or 2^-1021 at least,
+                                   * as halves are exact; NULL where the rule needs none */
     const double  *query_radii;   /* of queries, if there are any; NULL where the rule needs none */
     int32_t        n_types;       /* in place of radii, if not 0: */
     const int32_t *types;         /* n, from 0 to n_types - 1 */
@@ -589,7 +590,8 @@ hs_status hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t 
  * queries that they cannot. Open space and boxes along the coordinate axes take queries up to some
  * 2^850 cutoffs away, skewed boxes those within four times the distance of the points or 1024 box
  * vectors. failure.row, column and value tell which one; row is -1 for cells that are one cell with
- * everything. Of the options out, precision, sorted and want are ignored; counters.pairs is 0.
+ * everything. Of the options out, precision, sorted, want and index_bytes are ignored: ranges are of
+ * int64; counters.pairs is 0.
  */
 hs_status hs_cells_candidates(const hs_cells *cells, const hs_points *queries,
                               const hs_options *options, hs_pairs **ranges, hs_failure *failure);
