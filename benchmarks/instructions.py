@@ -34,6 +34,7 @@ DEFAULT = (
     "nearest-1e5-periodic", "nearest-1e5-one", "balls-1to10-1e5", "types-3-1e5",
 )  # fmt: skip
 MOST = 1.03  # of the other file's count
+ENOUGH = 10**9  # of all calls: starting Python takes some millions more or less
 
 
 def _call(name: str, times: int) -> None:
@@ -45,22 +46,28 @@ def _call(name: str, times: int) -> None:
         call()
 
 
+def _total(name: str, times: int) -> int:
+    """Return the instructions of a process that makes so many calls and one more."""
+    command = ["setarch", "-R", "valgrind", "--tool=cachegrind", "--cache-sim=no"]
+    command += ["--cachegrind-out-file=/dev/null", sys.executable, "-B", __file__]
+    command += ["--call", name, str(times)]
+    done = subprocess.run(
+        command, capture_output=True, text=True, env={**os.environ, "PYTHONHASHSEED": "0"}
+    )
+    found = re.search(r"I\s+refs:\s+([\d,]+)", done.stderr)
+    if done.returncode or found is None:
+        sys.exit(f"{name}: {done.stderr[-2000:]}")
+    return int(found[1].replace(",", ""))
+
+
 def count(name: str) -> int:
     """Return the instructions of one call."""
-    more = 1000 if load(name).n <= 1000 else 4  # starting Python varies by a million or so
-    totals = []
-    for times in (1, 1 + more):
-        command = ["setarch", "-R", "valgrind", "--tool=cachegrind", "--cache-sim=no"]
-        command += ["--cachegrind-out-file=/dev/null", sys.executable, "-B", __file__]
-        command += ["--call", name, str(times)]
-        done = subprocess.run(
-            command, capture_output=True, text=True, env={**os.environ, "PYTHONHASHSEED": "0"}
-        )
-        found = re.search(r"I\s+refs:\s+([\d,]+)", done.stderr)
-        if done.returncode or found is None:
-            sys.exit(f"{name}: {done.stderr[-2000:]}")
-        totals.append(int(found[1].replace(",", "")))
-    return (totals[1] - totals[0]) // more
+    without, more = _total(name, 1), 4
+    added = _total(name, 1 + more) - without
+    if added < ENOUGH:
+        more = min(1000, more * ENOUGH // max(added, 1))
+        added = _total(name, 1 + more) - without
+    return added // more
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
