@@ -33,7 +33,7 @@ const hs_kernel hs_kernel_avx2 = {
     .supported = supported,
     HS_KERNEL_LOOPS,
     .sift = sift,
-    .judge = hs_judge_avx2,
+    .decide_batch = hs_decide_batch_avx2,
     .measure = hs_measure_avx2,
     .write = hs_write_avx2,
     .point_records = hs_point_records_avx2,

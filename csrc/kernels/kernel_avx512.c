@@ -33,7 +33,7 @@ const hs_kernel hs_kernel_avx512 = {
     .supported = supported,
     HS_KERNEL_LOOPS,
     .sift = sift,
-    .judge = hs_judge_avx512,
+    .decide_batch = hs_decide_batch_avx512,
     .measure = hs_measure_avx512,
     .write = hs_write_avx512,
     .point_records = hs_point_records_avx2,

@@ -24,7 +24,7 @@ const hs_kernel hs_kernel_neon = {
     .supported = supported,
     HS_KERNEL_LOOPS,
     .sift = sift,
-    .judge = hs_judge_baseline, /* NEON is the baseline */
+    .decide_batch = hs_decide_batch_baseline, /* NEON is the baseline */
     .measure = hs_measure_baseline,
 };
 #else

@@ -225,8 +225,8 @@ decide_exactly(hs_scanner *scanner, const two_supports *of, const hs_span *span)
     hs_support_span_of(measure, span, &measured);
     for (int n = 0; n < 2; n++) {
         if (numbers[n] != NULL) {
-            verdict[n] = hs_support_judge(&supports->metric, numbers[n], numbers[n][of->n_entries],
-                                          &measured, &stages);
+            verdict[n] = hs_support_decide_double(&supports->metric, numbers[n],
+                                                  numbers[n][of->n_entries], &measured, &stages);
         }
     }
     hs_verdict all = combine(rule, verdict[0], verdict[1]);

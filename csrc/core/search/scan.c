@@ -1487,7 +1487,7 @@ decide_pair(hs_scanner *scanner, const hs_metric *metric, int32_t e, bool others
     if (scanner->options.precision == HS_DOUBLE) {
         return hs_metric_within_double(metric, p, q, shift);
     }
-    return others_failed ? hs_metric_settle(metric, p, q, shift, &scanner->stages)
+    return others_failed ? hs_metric_decide_by_integers(metric, p, q, shift, &scanner->stages)
                          : hs_metric_within(metric, p, q, shift, &scanner->stages);
 }
 
@@ -1532,7 +1532,7 @@ hs_decide_traced(hs_scanner *scanner, const hs_metric *metric, uint8_t *within)
         judge_scaled(metric, trace, verdict, &scanner->stages);
     } else if (by_batch) {
         const hs_batch batch = hs_pair_batch_view(trace);
-        scanner->search->call->kernel->judge(metric, &batch, verdict, &scanner->stages);
+        scanner->search->call->kernel->decide_batch(metric, &batch, verdict, &scanner->stages);
     }
     for (int32_t e = 0; e < trace->n; e++) {
         within[e] = by_batch && verdict[e] != HS_UNDECIDED

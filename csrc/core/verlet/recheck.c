@@ -288,7 +288,7 @@ decide_open(const hs_recheck *recheck, const open_batch *open, int32_t n, hs_sta
         batch.shift[r] = open->times[r];
     }
     if (!open->is_wide) {
-        recheck->call->kernel->judge(metric, &batch, verdict, stages);
+        recheck->call->kernel->decide_batch(metric, &batch, verdict, stages);
     }
     for (int32_t b = 0; b < n; b++) {
         double p[HS_MAX_DIM], q[HS_MAX_DIM];
@@ -300,8 +300,9 @@ decide_open(const hs_recheck *recheck, const open_batch *open, int32_t n, hs_sta
             p[k] = open->p[k][b];
             q[k] = open->q[k][b];
         }
-        within[b] = open->is_wide ? hs_metric_within(metric, p, q, open->shift[b], stages)
-                                  : hs_metric_settle(metric, p, q, open->shift[b], stages);
+        within[b] = open->is_wide
+                        ? hs_metric_within(metric, p, q, open->shift[b], stages)
+                        : hs_metric_decide_by_integers(metric, p, q, open->shift[b], stages);
     }
 }
 
