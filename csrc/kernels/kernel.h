@@ -32,7 +32,7 @@
 #include "../core/exact/ellipsoid.h"
 #include "../halfshell.h"
 #include "batch.h"
-#include "sift.h"
+#include "slab.h"
 #include "write.h"
 
 #include <math.h>
@@ -321,7 +321,7 @@ typedef struct hs_kernel {
     hs_gather_relative_fn gather_relative;
     hs_order_fn           order;
     hs_boxes_fn           near_boxes;
-    hs_sift_fn            sift;         /* sift.h */
+    hs_recheck_fn         recheck;      /* slab.h */
     hs_decide_batch_fn    decide_batch; /* batch.h */
     hs_measure_fn         measure;
     /* write.h; or all NULL: */

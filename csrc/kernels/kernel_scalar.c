@@ -394,7 +394,7 @@ const hs_kernel hs_kernel_scalar = {
     .name = "scalar",
     .supported = supported,
     HS_KERNEL_LOOPS,
-    .sift = hs_sift_baseline,
+    .recheck = hs_recheck_baseline,
     .decide_batch = hs_decide_batch_baseline,
     .measure = hs_measure_baseline,
 };

@@ -362,8 +362,8 @@ labels_find(const hs_choice *choice, int32_t point, hs_asking *asking, hs_label_
 }
 
 HS_ALWAYS_INLINE int32_t
-sift(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, int32_t from, int32_t end,
-     int32_t to, const hs_label_test test, const bool by_id)
+keep_chosen(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, int32_t from,
+            int32_t end, int32_t to, const hs_label_test test, const bool by_id)
 {
     int32_t *hits = scan->hits;
     float   *squares = scan->squares;
@@ -399,17 +399,17 @@ labels_sift(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, i
     const bool by_id = scanner->scans == HS_BLOCK_LISTS_IDS;
     switch (test) {
     case HS_OF_OTHER_GROUP:
-        return by_id ? sift(scanner, scan, asking, from, end, to, HS_OF_OTHER_GROUP, true)
-                     : sift(scanner, scan, asking, from, end, to, HS_OF_OTHER_GROUP, false);
+        return by_id ? keep_chosen(scanner, scan, asking, from, end, to, HS_OF_OTHER_GROUP, true)
+                     : keep_chosen(scanner, scan, asking, from, end, to, HS_OF_OTHER_GROUP, false);
     case HS_OF_EQUAL_LABEL:
-        return by_id ? sift(scanner, scan, asking, from, end, to, HS_OF_EQUAL_LABEL, true)
-                     : sift(scanner, scan, asking, from, end, to, HS_OF_EQUAL_LABEL, false);
+        return by_id ? keep_chosen(scanner, scan, asking, from, end, to, HS_OF_EQUAL_LABEL, true)
+                     : keep_chosen(scanner, scan, asking, from, end, to, HS_OF_EQUAL_LABEL, false);
     case HS_OF_NEAR_LABEL:
-        return by_id ? sift(scanner, scan, asking, from, end, to, HS_OF_NEAR_LABEL, true)
-                     : sift(scanner, scan, asking, from, end, to, HS_OF_NEAR_LABEL, false);
+        return by_id ? keep_chosen(scanner, scan, asking, from, end, to, HS_OF_NEAR_LABEL, true)
+                     : keep_chosen(scanner, scan, asking, from, end, to, HS_OF_NEAR_LABEL, false);
     default:
-        return by_id ? sift(scanner, scan, asking, from, end, to, HS_OF_PARTNER, true)
-                     : sift(scanner, scan, asking, from, end, to, HS_OF_PARTNER, false);
+        return by_id ? keep_chosen(scanner, scan, asking, from, end, to, HS_OF_PARTNER, true)
+                     : keep_chosen(scanner, scan, asking, from, end, to, HS_OF_PARTNER, false);
     }
 }
 
