@@ -63,7 +63,7 @@ bool hs_ball_shift(hs_ball *ball, const hs_ball_image *image, uint32_t place, in
 /* One cell of a ball: whether it is in reach, which image of it is meant, and its
  * entries. For ball.c, which knows the dimension where that is 2 or 3. */
 
-/* What is known of one index along one axis. */
+/* One cell index along one axis: its least distance from the centre of the ball. */
 typedef struct part {
     double   gap;    /* square of the distance to it; infinity: out of reach */
     uint64_t number; /* dense: what it adds to the number of a cell; sparse: to its hash */

@@ -565,7 +565,7 @@ hs_support_within(const hs_support_metric *metric, const double *entries, double
     return sign < 0 || (sign == 0 && metric->limit.inclusive);
 }
 
-/* As in hs_metric_within_double. */
+/* Unfused float64, terms added in the order of the axes, as in hs_metric_within_double. */
 static double
 rounded_component(const hs_metric *measure, const hs_span *span, int k)
 {

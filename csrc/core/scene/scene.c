@@ -1221,7 +1221,7 @@ hs_condensed_free(hs_account *account, hs_condensed *condensed)
 
 /* scene.c: reads the points, closes gaps, scales, wraps, and settles bounds, in this order. */
 
-/* Allocates columns for the originals and the turns, as far as these are kept, in this order. */
+/* Allocates columns for the originals and the turns, in this order, where they are kept. */
 static bool
 allocate_beside(hs_account *account, hs_scene *scene)
 {

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-/* Pairs are transposed twice, which leaves the rows ascending. */
+/* Builds the excluded partners of each point, in CSR form: a counting sort by j, then by i. */
 
 /* Room for rows of so many numbers, all of them empty. The length of row r is then counted at
  * first[r + 2]; once they are summed, row r is filled from first[r + 1] on, which becomes where the

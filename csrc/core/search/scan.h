@@ -313,7 +313,7 @@ bool hs_scanner_renew(hs_search *search, hs_block_use use, int32_t capacity, int
 /* Adds what was done to that of the call. */
 void hs_scanner_note(hs_search *search, hs_scanner *scanner);
 
-/* hs_scanner_note, and frees; harmless twice. */
+/* hs_scanner_note, and frees; idempotent. */
 void hs_scanner_close(hs_search *search, hs_scanner *scanner);
 
 /*
