@@ -33,10 +33,10 @@ typedef struct hs_batch {
 
 /*
  * verdict[e] is an hs_verdict (core/exact/metric.h). HS_UNDECIDED leaves pair e to
- * hs_metric_settle. Adds the pairs that it decides to *stages.
+ * hs_metric_decide_by_integers. Adds the pairs that it decides to *stages.
  */
-typedef void (*hs_judge_fn)(const hs_metric *metric, const hs_batch *batch, uint8_t *verdict,
-                            hs_stages *stages);
+typedef void (*hs_decide_batch_fn)(const hs_metric *metric, const hs_batch *batch, uint8_t *verdict,
+                                   hs_stages *stages);
 
 /*
  * distance[e] and vector[k][e] as hs_metric_measure; vector is NULL or has an array for every axis.
@@ -46,18 +46,18 @@ typedef void (*hs_measure_fn)(const hs_metric *metric, const hs_batch *batch, do
                               double *const *vector, uint8_t *done);
 
 /* batch_baseline.c: what every CPU of this kind can do. */
-void hs_judge_baseline(const hs_metric *metric, const hs_batch *batch, uint8_t *verdict,
-                       hs_stages *stages);
+void hs_decide_batch_baseline(const hs_metric *metric, const hs_batch *batch, uint8_t *verdict,
+                              hs_stages *stages);
 void hs_measure_baseline(const hs_metric *metric, const hs_batch *batch, double *distance,
                          double *const *vector, uint8_t *done);
 
 /* batch_avx2.c, batch_avx512.c: x86-64 only. */
-void hs_judge_avx2(const hs_metric *metric, const hs_batch *batch, uint8_t *verdict,
-                   hs_stages *stages);
+void hs_decide_batch_avx2(const hs_metric *metric, const hs_batch *batch, uint8_t *verdict,
+                          hs_stages *stages);
 void hs_measure_avx2(const hs_metric *metric, const hs_batch *batch, double *distance,
                      double *const *vector, uint8_t *done);
-void hs_judge_avx512(const hs_metric *metric, const hs_batch *batch, uint8_t *verdict,
-                     hs_stages *stages);
+void hs_decide_batch_avx512(const hs_metric *metric, const hs_batch *batch, uint8_t *verdict,
+                            hs_stages *stages);
 void hs_measure_avx512(const hs_metric *metric, const hs_batch *batch, double *distance,
                        double *const *vector, uint8_t *done);
 

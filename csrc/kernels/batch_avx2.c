@@ -9,8 +9,8 @@
 #include <string.h>
 HS_TARGET_BEGIN("avx2,fma,popcnt")
 #include "wide_avx2.h"
-#define JUDGE   hs_judge_avx2
-#define MEASURE hs_measure_avx2
+#define DECIDE_BATCH hs_decide_batch_avx2
+#define MEASURE      hs_measure_avx2
 #include "batch_template.h"
 HS_TARGET_END
 #else

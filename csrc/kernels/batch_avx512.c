@@ -9,8 +9,8 @@
 #include <string.h>
 HS_TARGET_BEGIN("avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,popcnt")
 #include "wide_avx512.h"
-#define JUDGE   hs_judge_avx512
-#define MEASURE hs_measure_avx512
+#define DECIDE_BATCH hs_decide_batch_avx512
+#define MEASURE      hs_measure_avx512
 #include "batch_template.h"
 HS_TARGET_END
 #else

@@ -16,6 +16,6 @@
 #else
 #include "wide_plain.h"
 #endif
-#define JUDGE   hs_judge_baseline
-#define MEASURE hs_measure_baseline
+#define DECIDE_BATCH hs_decide_batch_baseline
+#define MEASURE      hs_measure_baseline
 #include "batch_template.h"

@@ -3,7 +3,7 @@
  * batch_template.h: the batch kernels, once for each instruction set. Include it after a vocabulary
  * (wide_<isa>.h), inside that instruction set's target region.
  *
- *   JUDGE     name of the hs_judge_fn (batch.h)
+ *   DECIDE_BATCH     name of the hs_decide_batch_fn (batch.h)
  *   MEASURE   name of the hs_measure_fn
  *
  * Each is one loop over groups of LANES pairs, made for 1, 2, 3 and any number of axes, with and
@@ -11,8 +11,8 @@
  * and core/exact/metric.c, which explain the steps for one pair. Undefines both parameters
  * at its end.
  */
-#if !defined(JUDGE) || !defined(MEASURE)
-#error "define JUDGE and MEASURE before including batch_template.h"
+#if !defined(DECIDE_BATCH) || !defined(MEASURE)
+#error "define DECIDE_BATCH and MEASURE before including batch_template.h"
 #endif
 
 #include "wide_doubleword.h"
@@ -251,7 +251,7 @@ measure_loop(const hs_metric *metric, const hs_batch *batch, const int ndim, con
     } while (0)
 
 void
-JUDGE(const hs_metric *metric, const hs_batch *batch, uint8_t *verdict, hs_stages *stages)
+DECIDE_BATCH(const hs_metric *metric, const hs_batch *batch, uint8_t *verdict, hs_stages *stages)
 {
     if (!metric->floats_usable) {
         memset(verdict, HS_UNDECIDED, (size_t)batch->n);
@@ -275,5 +275,5 @@ MEASURE(const hs_metric *metric, const hs_batch *batch, double *distance, double
 #undef EVERY_LANE
 #undef SAFE_LARGE
 #undef SAFE_SMALL
-#undef JUDGE
+#undef DECIDE_BATCH
 #undef MEASURE

@@ -32,7 +32,7 @@
 #include "../core/exact/ellipsoid.h"
 #include "../halfshell.h"
 #include "batch.h"
-#include "sift.h"
+#include "slab.h"
 #include "write.h"
 
 #include <math.h>
@@ -247,7 +247,7 @@ typedef struct hs_nearest_image {
 } hs_nearest_image;
 
 /* Where candidates for the nearest come from and go to; all arrays borrowed. */
-typedef struct hs_relate {
+typedef struct hs_relative_keys {
     int                     ndim;
     const double           *x[HS_MAX_DIM]; /* points in tree order; HS_PADDING more may be read */
     const hs_nearest_image *images;
@@ -257,13 +257,13 @@ typedef struct hs_relate {
     float                  *y[HS_MAX_DIM]; /* room for all candidates and HS_PADDING more */
     float                  *norm;          /* room for all candidates and HS_PADDING more */
     int32_t                *number;        /* room for all candidates and HS_PADDING more */
-} hs_relate;
+} hs_relative_keys;
 
 /* Copies n runs, each of at least one point: y_k = (float)(((x_k + moved_k) - centre_k) * unit),
  * but no further from 0 than extent, each operation rounded once; norm = sum of y_k^2, fused or
  * not; number = that in tree order. Entries past the last may be overwritten. */
-typedef void (*hs_relate_fn)(const hs_relate *gather_relative, const hs_nearest_run *runs,
-                             int32_t n);
+typedef void (*hs_gather_relative_fn)(const hs_relative_keys *keys, const hs_nearest_run *runs,
+                                      int32_t n);
 
 /* Boxes, and the one that they are near to; all arrays borrowed. */
 typedef struct hs_boxes {
@@ -306,24 +306,24 @@ typedef void (*hs_emit_fn)(const hs_hits *hits, void *i, void *j);
 typedef struct hs_kernel {
     const char *name;
     bool (*supported)(void); /* by this CPU, and compiled as it must be */
-    hs_gather_fn  gather;
-    hs_scan_fn    list; /* expanded */
-    hs_scan_fn    count;
-    hs_scan_fn    list_direct;
-    hs_scan_fn    count_direct;
-    hs_scan_fn    list_limits;
-    hs_scan_fn    count_limits;
-    hs_scan_fn    list_supports;
-    hs_scan_fn    count_supports;
-    hs_scan_fn    squares;
-    hs_emit_fn    emit_int32;
-    hs_emit_fn    emit_int64;
-    hs_relate_fn  gather_relative;
-    hs_order_fn   order;
-    hs_boxes_fn   near_boxes;
-    hs_sift_fn    sift;  /* sift.h */
-    hs_judge_fn   judge; /* batch.h */
-    hs_measure_fn measure;
+    hs_gather_fn          gather;
+    hs_scan_fn            list; /* expanded */
+    hs_scan_fn            count;
+    hs_scan_fn            list_direct;
+    hs_scan_fn            count_direct;
+    hs_scan_fn            list_limits;
+    hs_scan_fn            count_limits;
+    hs_scan_fn            list_supports;
+    hs_scan_fn            count_supports;
+    hs_scan_fn            squares;
+    hs_emit_fn            emit_int32;
+    hs_emit_fn            emit_int64;
+    hs_gather_relative_fn gather_relative;
+    hs_order_fn           order;
+    hs_boxes_fn           near_boxes;
+    hs_recheck_fn         recheck;      /* slab.h */
+    hs_decide_batch_fn    decide_batch; /* batch.h */
+    hs_measure_fn         measure;
     /* write.h; or all NULL: */
     hs_write_fn         write;
     hs_point_records_fn point_records;

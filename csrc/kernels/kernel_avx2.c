@@ -13,7 +13,7 @@ HS_TARGET_BEGIN("avx2,fma,popcnt")
 #include "copy_template.h"
 #include "nearest_template.h"
 #include "scan_template.h"
-#include "sift_template.h"
+#include "slab_template.h"
 
 static HS_NO_INLINE bool
 sound(void)
@@ -32,8 +32,8 @@ const hs_kernel hs_kernel_avx2 = {
     .name = "avx2",
     .supported = supported,
     HS_KERNEL_LOOPS,
-    .sift = sift,
-    .judge = hs_judge_avx2,
+    .recheck = recheck_slab,
+    .decide_batch = hs_decide_batch_avx2,
     .measure = hs_measure_avx2,
     .write = hs_write_avx2,
     .point_records = hs_point_records_avx2,

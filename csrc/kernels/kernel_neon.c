@@ -11,7 +11,7 @@
 #include "copy_template.h"
 #include "nearest_template.h"
 #include "scan_template.h"
-#include "sift_template.h"
+#include "slab_template.h"
 
 static bool
 supported(void)
@@ -23,8 +23,8 @@ const hs_kernel hs_kernel_neon = {
     .name = "neon",
     .supported = supported,
     HS_KERNEL_LOOPS,
-    .sift = sift,
-    .judge = hs_judge_baseline, /* NEON is the baseline */
+    .recheck = recheck_slab,
+    .decide_batch = hs_decide_batch_baseline, /* NEON is the baseline */
     .measure = hs_measure_baseline,
 };
 #else

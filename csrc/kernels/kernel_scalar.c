@@ -326,19 +326,18 @@ emit_int64(const hs_hits *hits, void *i, void *j)
 }
 
 static void
-gather_relative(const hs_relate *gather_relative, const hs_nearest_run *runs, int32_t n_runs)
+gather_relative(const hs_relative_keys *keys, const hs_nearest_run *runs, int32_t n_runs)
 {
-    const float extent = (float)gather_relative->extent;
+    const float extent = (float)keys->extent;
     for (const hs_nearest_run *run = runs; run < runs + n_runs; run++) {
-        float *HS_RESTRICT   norm = gather_relative->norm + run->at;
-        int32_t *HS_RESTRICT number = gather_relative->number + run->at;
-        for (int k = 0; k < gather_relative->ndim; k++) {
-            const double *HS_RESTRICT x = gather_relative->x[k] + run->si;
-            float *HS_RESTRICT        y = gather_relative->y[k] + run->at;
-            const double              moved = gather_relative->images[run->image].moved[k];
+        float *HS_RESTRICT   norm = keys->norm + run->at;
+        int32_t *HS_RESTRICT number = keys->number + run->at;
+        for (int k = 0; k < keys->ndim; k++) {
+            const double *HS_RESTRICT x = keys->x[k] + run->si;
+            float *HS_RESTRICT        y = keys->y[k] + run->at;
+            const double              moved = keys->images[run->image].moved[k];
             for (int32_t c = 0; c < run->n; c++) {
-                const float place =
-                    (float)((x[c] + moved - gather_relative->centre[k]) * gather_relative->unit);
+                const float place = (float)((x[c] + moved - keys->centre[k]) * keys->unit);
                 y[c] = place > extent ? extent : place < -extent ? -extent : place;
                 norm[c] = (k > 0 ? norm[c] : 0.0f) + y[c] * y[c];
             }
@@ -395,7 +394,7 @@ const hs_kernel hs_kernel_scalar = {
     .name = "scalar",
     .supported = supported,
     HS_KERNEL_LOOPS,
-    .sift = hs_sift_baseline,
-    .judge = hs_judge_baseline,
+    .recheck = hs_recheck_baseline,
+    .decide_batch = hs_decide_batch_baseline,
     .measure = hs_measure_baseline,
 };

@@ -2,43 +2,42 @@
 /*
  * nearest_template.h: the vector loops of a search for the nearest, once for each instruction set.
  * Include it after a vocabulary (simd_<isa>.h), inside that instruction set's target region.
- * Defines gather_relative (hs_relate_fn), order (hs_order_fn) and near_boxes (hs_boxes_fn).
+ * Defines gather_relative (hs_gather_relative_fn), order (hs_order_fn) and near_boxes (hs_boxes_fn).
  */
 
 HS_ALWAYS_INLINE void
-gather_relative_runs(const hs_relate *gather_relative, const hs_nearest_run *runs, int32_t n_runs,
+gather_relative_runs(const hs_relative_keys *keys, const hs_nearest_run *runs, int32_t n_runs,
                      const int ndim)
 {
-    const float    extent = (float)gather_relative->extent;
+    const float    extent = (float)keys->extent;
     const integers lanes = lane_numbers();
-    const double   unit = gather_relative->unit;
+    const double   unit = keys->unit;
     for (int32_t r = 0; r < n_runs; r++) {
         const hs_nearest_run *run = &runs[r];
-        const double         *moved = gather_relative->images[run->image].moved;
+        const double         *moved = keys->images[run->image].moved;
         for (int32_t c = 0; c < run->n; c += LANES) {
             const int32_t to = run->at + c, si = run->si + c;
             floats        sum = broadcast(0.0f);
             for (int k = 0; k < ndim; k++) {
-                const double *x = gather_relative->x[k] + si;
-                const floats  y = load_relative(x, moved[k], gather_relative->centre[k], unit);
+                const double *x = keys->x[k] + si;
+                const floats  y = load_relative(x, moved[k], keys->centre[k], unit);
                 const floats  place = within(y, extent);
-                store(gather_relative->y[k] + to, place);
+                store(keys->y[k] + to, place);
                 sum = multiply_add(place, place, sum);
             }
-            store(gather_relative->norm + to, sum);
-            store_integers(gather_relative->number + to,
-                           add_integers(lanes, broadcast_integer(si)));
+            store(keys->norm + to, sum);
+            store_integers(keys->number + to, add_integers(lanes, broadcast_integer(si)));
         }
     }
 }
 
 static void
-gather_relative(const hs_relate *gather_relative, const hs_nearest_run *runs, int32_t n)
+gather_relative(const hs_relative_keys *keys, const hs_nearest_run *runs, int32_t n)
 {
-    switch (gather_relative->ndim) {
-    case 2: gather_relative_runs(gather_relative, runs, n, 2); break;
-    case 3: gather_relative_runs(gather_relative, runs, n, 3); break;
-    default: gather_relative_runs(gather_relative, runs, n, gather_relative->ndim); break;
+    switch (keys->ndim) {
+    case 2: gather_relative_runs(keys, runs, n, 2); break;
+    case 3: gather_relative_runs(keys, runs, n, 3); break;
+    default: gather_relative_runs(keys, runs, n, keys->ndim); break;
     }
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* simd_sse2.h: what sift_template.h needs of a vocabulary, for SSE2, which every x86-64 CPU has: 4
+/* simd_sse2.h: what slab_template.h needs of a vocabulary, for SSE2, which every x86-64 CPU has: 4
  * lanes. */
 #ifndef HS_SIMD_SSE2_H
 #define HS_SIMD_SSE2_H

@@ -749,7 +749,7 @@ typedef struct caller {
     const calls_job *job;
     hs_options       options; /* with this thread's poll */
     hs_counters      done;
-    hs_output        backlog; /* pairs that wait for their turn; on no account: they do not stay */
+    hs_output        backlog; /* pairs that wait for their turn; not charged to the account */
     hs_output       *target;  /* this one, or that of all */
     hs_system_part   part;
     double           first, share; /* of the present system, of all points */

@@ -169,7 +169,7 @@ typedef struct hs_backlog {
 /* Columns as those of `target`; no recorder yet. */
 void hs_backlog_init(const hs_output *target, hs_committer *committer, hs_backlog *backlog);
 
-/* Its pairs and recorder; harmless twice. */
+/* Its pairs and recorder; idempotent. */
 void hs_backlog_free(hs_account *account, hs_backlog *backlog);
 
 /* hs_record_next for a backlog. */

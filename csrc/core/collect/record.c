@@ -87,16 +87,16 @@ typedef struct open_pairs {
 static hs_status
 trace_at(const open_pairs *open, int32_t edge, int32_t *of)
 {
-    hs_pair_batch *trace = &open->scanner->trace;
-    hs_pair_batch_clear(trace);
+    hs_pair_batch *pair_batch = &open->scanner->pair_batch;
+    hs_pair_batch_clear(pair_batch);
     for (int32_t u = 0; u < open->n; u++) {
         const open_pair *pair = &open->pair[u];
         if (pair->low == edge) {
-            of[trace->n] = u;
-            hs_pair_batch_put(trace, pair->si, open->places[pair->hit]);
+            of[pair_batch->n] = u;
+            hs_pair_batch_put(pair_batch, pair->si, open->places[pair->hit]);
         }
     }
-    return hs_pair_batch_look_up(trace, true, &open->scanner->failed_point);
+    return hs_pair_batch_look_up(pair_batch, true, &open->scanner->failed_point);
 }
 
 /* Decides the pairs that are traced at this edge. */
@@ -109,8 +109,8 @@ decide_at(open_pairs *open, int32_t edge, const int32_t *of)
     uint8_t          within[HS_BATCH];
     hs_metric_init(&metric, given->ndim, given->n_rows, (const double(*)[HS_MAX_DIM])given->rows,
                    shells->at[edge], shells->inclusive);
-    hs_decide_traced(open->scanner, &metric, within);
-    for (int32_t e = 0; e < open->scanner->trace.n; e++) {
+    hs_decide_pair_batch(open->scanner, &metric, within);
+    for (int32_t e = 0; e < open->scanner->pair_batch.n; e++) {
         open_pair *pair = &open->pair[of[e]];
         if (within[e]) {
             pair->high = edge;
@@ -341,7 +341,7 @@ can_write(const hs_recorder *recorder, const hs_scanner *scanner)
     return search->call->kernel->write != NULL &&
            (search->is_half || !(recorder->columns & (HS_WANT_I | HS_WANT_J))) && d >= 2 &&
            d <= HS_WRITE_MOST_DIM && !(recorder->columns & HS_WANT_BOTH) &&
-           scanner->trace.of.is_narrow &&
+           scanner->pair_batch.of.is_narrow &&
            (!(recorder->columns & HS_MEASURED) ||
             (search->limits == NULL && !search->scene.extreme &&
              search->scene.metric.floats_usable));
@@ -352,16 +352,16 @@ static void
 describe(const hs_scanner *scanner, bool is_measured, int32_t first, hs_write *write)
 {
     const hs_search     *search = scanner->search;
-    const hs_pair_batch *trace = &scanner->trace;
+    const hs_pair_batch *pair_batch = &scanner->pair_batch;
     const hs_bins       *asking = hs_search_asking(search);
     const hs_lattice    *lattice = &search->scene.lattice;
     const bool           turned = asking->turns.known;
     write->by_S = search->bins.keeps_originals;
-    write->is_shifted = trace->of.has_images || write->by_S;
-    write->q = is_measured ? trace->of.q : NULL;
+    write->is_shifted = pair_batch->of.has_images || write->by_S;
+    write->q = is_measured ? pair_batch->of.q : NULL;
     write->number = scanner->block.id;
-    write->image = trace->of.has_images ? trace->of.image : NULL;
-    write->few = search->bins.turns.known ? trace->of.few : NULL;
+    write->image = pair_batch->of.has_images ? pair_batch->of.image : NULL;
+    write->few = search->bins.turns.known ? pair_batch->of.few : NULL;
     for (int k = 0; k < search->scene.ndim; k++) {
         write->p[k] = (write->by_S ? asking->originals[k] : asking->x[k]) + first;
     }
@@ -397,7 +397,7 @@ write_hits(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_h
         return HS_OK;
     }
     const bool is_measured = recorder->columns & HS_MEASURED;
-    if (hs_records_load(&scanner->trace.of, is_measured) != HS_OK) {
+    if (hs_records_load(&scanner->pair_batch.of, is_measured) != HS_OK) {
         return HS_ERR_INTERRUPTED;
     }
     hs_write write = {
@@ -421,11 +421,12 @@ typedef struct batch_part {
 
 /* The first nonzero component of S is negative. */
 static bool
-is_backward(const hs_pair_batch *trace, int32_t e)
+is_backward(const hs_pair_batch *pair_batch, int32_t e)
 {
-    const int m = trace->search->scene.lattice.n_periodic;
+    const int m = pair_batch->search->scene.lattice.n_periodic;
     for (int l = 0; l < m; l++) {
-        const int64_t shift = trace->of.is_narrow ? trace->shift[l][e] : trace->given[l][e];
+        const int64_t shift = pair_batch->of.is_narrow ? pair_batch->shift[l][e]
+                                                       : pair_batch->given[l][e];
         if (shift != 0) {
             return shift < 0;
         }
@@ -435,15 +436,15 @@ is_backward(const hs_pair_batch *trace, int32_t e)
 
 /* 1, or -1 for pairs of a half list that are listed the other way round. */
 static void
-find_signs(const hs_pair_batch *trace, const int32_t *point, const int32_t *id, double *sign)
+find_signs(const hs_pair_batch *pair_batch, const int32_t *point, const int32_t *id, double *sign)
 {
     int32_t any_own = 0;
-    for (int32_t e = 0; e < trace->n; e++) {
+    for (int32_t e = 0; e < pair_batch->n; e++) {
         sign[e] = id[e] < point[e] ? -1.0 : 1.0;
         any_own |= id[e] == point[e];
     }
-    for (int32_t e = 0; any_own && e < trace->n; e++) {
-        if (id[e] == point[e] && is_backward(trace, e)) {
+    for (int32_t e = 0; any_own && e < pair_batch->n; e++) {
+        if (id[e] == point[e] && is_backward(pair_batch, e)) {
             sign[e] = -1.0;
         }
     }
@@ -451,21 +452,22 @@ find_signs(const hs_pair_batch *trace, const int32_t *point, const int32_t *id, 
 
 /* d and D of the batch to the recorder's arrays, in the unit of the metric. */
 static void
-measure(hs_recorder *recorder, hs_pair_batch *trace)
+measure(hs_recorder *recorder, hs_pair_batch *pair_batch)
 {
-    const hs_search *search = trace->search;
-    const hs_batch   batch = hs_pair_batch_view(trace);
-    int64_t *const  *shift = search->bins.keeps_originals ? trace->given : trace->image;
+    const hs_search *search = pair_batch->search;
+    const hs_batch   batch = hs_pair_batch_view(pair_batch);
+    int64_t *const  *shift = search->bins.keeps_originals ? pair_batch->given : pair_batch->image;
     double *const   *vector = recorder->columns & HS_WANT_VECTOR ? recorder->vector : NULL;
     measure_pairs(search->call->kernel, &search->scene.metric, &batch,
-                  trace->is_shifted ? shift : NULL, trace->is_wide, recorder->distance, vector);
+                  pair_batch->is_shifted ? shift : NULL, pair_batch->is_wide, recorder->distance,
+                  vector);
 }
 
 /* Distances of the batch, none beyond the limit of its pair, or what that is rounded to. */
 static void
 keep_within_limits(const hs_scanner *scanner, double *distance, hs_scale unscale)
 {
-    for (int32_t e = 0; e < scanner->trace.n; e++) {
+    for (int32_t e = 0; e < scanner->pair_batch.n; e++) {
         const hs_dw limit = hs_limit_of_pair(scanner, e);
         distance[e] = hs_keep_within(distance[e], hs_scale_apply(unscale, limit.hi),
                                      scanner->options.inclusive || limit.lo > 0.0);
@@ -477,7 +479,7 @@ put_distances(hs_recorder *recorder, const hs_scanner *scanner, int32_t first)
 {
     const hs_search  *search = scanner->search;
     const hs_options *options = &search->call->options;
-    const int32_t     n = scanner->trace.n;
+    const int32_t     n = scanner->pair_batch.n;
     const hs_scale    unscale = hs_measures_unscale(&search->scene);
     double           *to = hs_recorder_distances(recorder);
     hs_restore_distances(recorder->distance, n, unscale);
@@ -504,37 +506,38 @@ put_vectors(const hs_recorder *recorder, const hs_search *search, const double *
  * which i and j were wrapped, which can be too many for int32. Returns the first pair whose shift
  * does not fit, or their number. */
 static int32_t
-find_keys(const hs_pair_batch *trace, int64_t keys[][HS_BATCH])
+find_keys(const hs_pair_batch *pair_batch, int64_t keys[][HS_BATCH])
 {
-    const int m = trace->search->scene.lattice.n_periodic;
-    for (int32_t e = 0; e < trace->n; e++) {
+    const int m = pair_batch->search->scene.lattice.n_periodic;
+    for (int32_t e = 0; e < pair_batch->n; e++) {
         int64_t image[HS_MAX_DIM], key[HS_MAX_DIM];
         for (int r = 0; r < m; r++) {
-            image[r] = trace->image[r][e];
+            image[r] = pair_batch->image[r][e];
         }
-        if (!hs_lattice_shift(&trace->search->scene.lattice, image, key)) {
+        if (!hs_lattice_shift(&pair_batch->search->scene.lattice, image, key)) {
             return e;
         }
         for (int l = 0; l < m; l++) {
             keys[l][e] = key[l];
         }
     }
-    return trace->n;
+    return pair_batch->n;
 }
 
 /* S over all box vectors, zero on open ones, when all are few. */
 static void
-put_narrow(const hs_pair_batch *trace, const double *sign, int32_t *to)
+put_narrow(const hs_pair_batch *pair_batch, const double *sign, int32_t *to)
 {
-    const hs_lattice *lattice = &trace->search->scene.lattice;
+    const hs_lattice *lattice = &pair_batch->search->scene.lattice;
     const int         d = lattice->ndim;
     int32_t           flip[HS_BATCH]; /* 0, or -1 to negate: (x ^ -1) - -1 */
-    for (int32_t e = 0; e < trace->n; e++) {
+    for (int32_t e = 0; e < pair_batch->n; e++) {
         flip[e] = -(sign[e] < 0.0);
     }
     if (d == 3 && lattice->n_periodic == 3) { /* most scenes: one pair after the other */
-        const int32_t *x = trace->shift[0], *y = trace->shift[1], *z = trace->shift[2];
-        for (int32_t e = 0; e < trace->n; e++, to += 3) {
+        const int32_t *x = pair_batch->shift[0], *y = pair_batch->shift[1],
+                      *z = pair_batch->shift[2];
+        for (int32_t e = 0; e < pair_batch->n; e++, to += 3) {
             to[lattice->vector_of_row[0]] = (x[e] ^ flip[e]) - flip[e];
             to[lattice->vector_of_row[1]] = (y[e] ^ flip[e]) - flip[e];
             to[lattice->vector_of_row[2]] = (z[e] ^ flip[e]) - flip[e];
@@ -542,9 +545,9 @@ put_narrow(const hs_pair_batch *trace, const double *sign, int32_t *to)
         return;
     }
     for (int l = 0; l < lattice->n_periodic; l++) {
-        const int32_t *shift = trace->shift[l];
+        const int32_t *shift = pair_batch->shift[l];
         int32_t       *column = to + lattice->vector_of_row[l];
-        for (int32_t e = 0; e < trace->n; e++) {
+        for (int32_t e = 0; e < pair_batch->n; e++) {
             column[(int64_t)e * d] = (shift[e] ^ flip[e]) - flip[e];
         }
     }
@@ -553,27 +556,27 @@ put_narrow(const hs_pair_batch *trace, const double *sign, int32_t *to)
 /* S over all box vectors, zero on open ones. Returns the first pair whose S does not fit int32, or
  * their number. */
 static int32_t
-put_shifts(const hs_recorder *recorder, const hs_pair_batch *trace, const double *sign,
+put_shifts(const hs_recorder *recorder, const hs_pair_batch *pair_batch, const double *sign,
            int32_t first)
 {
-    const hs_lattice *lattice = &trace->search->scene.lattice;
+    const hs_lattice *lattice = &pair_batch->search->scene.lattice;
     const int         d = lattice->ndim, m = lattice->n_periodic;
-    const bool        keys_only = !(trace->search->call->options.want & HS_WANT_SHIFT);
+    const bool        keys_only = !(pair_batch->search->call->options.want & HS_WANT_SHIFT);
     int64_t           keys[HS_MAX_DIM][HS_BATCH];
     int32_t *to = (int32_t *)hs_output_next(recorder->output, HS_WANT_SHIFT) + (int64_t)first * d;
-    int32_t  fitting = trace->n;
+    int32_t  fitting = pair_batch->n;
     if (m < d) {
-        memset(to, 0, (size_t)trace->n * (size_t)d * sizeof *to);
+        memset(to, 0, (size_t)pair_batch->n * (size_t)d * sizeof *to);
     }
-    if (trace->of.is_narrow) { /* what is left out is zero, or common to all images */
-        put_narrow(trace, sign, to);
+    if (pair_batch->of.is_narrow) { /* what is left out is zero, or common to all images */
+        put_narrow(pair_batch, sign, to);
         return fitting;
     }
     if (keys_only) {
-        fitting = find_keys(trace, keys);
+        fitting = find_keys(pair_batch, keys);
     }
     for (int l = 0; l < m; l++) {
-        const int64_t *shifts = keys_only ? keys[l] : trace->given[l];
+        const int64_t *shifts = keys_only ? keys[l] : pair_batch->given[l];
         int32_t       *column = to + lattice->vector_of_row[l];
         for (int32_t e = 0; e < fitting; e++) {
             const int64_t value = sign[e] < 0.0 ? -shifts[e] : shifts[e];
@@ -590,34 +593,34 @@ put_shifts(const hs_recorder *recorder, const hs_pair_batch *trace, const double
 static hs_status
 put_batch(hs_recorder *recorder, hs_scanner *scanner, const batch_part *part)
 {
-    hs_pair_batch   *trace = &scanner->trace;
+    hs_pair_batch   *pair_batch = &scanner->pair_batch;
     const hs_search *search = scanner->search;
     const bool       measured = recorder->columns & HS_MEASURED;
     double           sign[HS_BATCH];
     const hs_status  status =
-        hs_pair_batch_look_up(&scanner->trace, measured, &scanner->failed_point);
+        hs_pair_batch_look_up(&scanner->pair_batch, measured, &scanner->failed_point);
     if (status != HS_OK) {
         return status;
     }
     if (!search->is_half) {
-        for (int32_t e = 0; e < trace->n; e++) {
+        for (int32_t e = 0; e < pair_batch->n; e++) {
             sign[e] = 1.0;
         }
     } else if (recorder->columns & (HS_WANT_VECTOR | HS_WANT_SHIFT)) {
-        find_signs(trace, part->point, recorder->ids + part->first, sign);
+        find_signs(pair_batch, part->point, recorder->ids + part->first, sign);
     }
     if (measured) {
-        measure(recorder, trace);
+        measure(recorder, pair_batch);
     }
     if (recorder->columns & (HS_WANT_DISTANCE | HS_WANT_SHELL)) {
         put_distances(recorder, scanner, part->first);
     }
     if (recorder->columns & HS_WANT_VECTOR) {
-        put_vectors(recorder, search, sign, part->first, trace->n);
+        put_vectors(recorder, search, sign, part->first, pair_batch->n);
     }
     if (recorder->columns & HS_WANT_SHIFT) {
-        const int32_t fitting = put_shifts(recorder, trace, sign, part->first);
-        if (fitting < trace->n) {
+        const int32_t fitting = put_shifts(recorder, pair_batch, sign, part->first);
+        if (fitting < pair_batch->n) {
             scanner->failed_point = part->point[fitting];
             return HS_ERR_SHIFT_RANGE;
         }
@@ -630,28 +633,28 @@ put_batch(hs_recorder *recorder, hs_scanner *scanner, const batch_part *part)
 static hs_status
 put_measures(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    hs_pair_batch *trace = &scanner->trace;
+    hs_pair_batch *pair_batch = &scanner->pair_batch;
     batch_part     part = {.first = 0};
-    hs_pair_batch_clear(trace);
+    hs_pair_batch_clear(pair_batch);
     for (int32_t t = 0, h = 0; t < hits->n; t++) {
         while (h < hits->end[t]) {
             const int32_t taken =
-                hs_pair_batch_add(trace, first + t, hits->label + h, hits->end[t] - h);
-            for (int32_t e = trace->n - taken; e < trace->n; e++) {
+                hs_pair_batch_add(pair_batch, first + t, hits->label + h, hits->end[t] - h);
+            for (int32_t e = pair_batch->n - taken; e < pair_batch->n; e++) {
                 part.point[e] = hits->point[t];
             }
             h += taken;
-            if (trace->n == HS_BATCH) {
+            if (pair_batch->n == HS_BATCH) {
                 const hs_status status = put_batch(recorder, scanner, &part);
                 if (status != HS_OK) {
                     return status;
                 }
                 part.first = h;
-                hs_pair_batch_clear(trace);
+                hs_pair_batch_clear(pair_batch);
             }
         }
     }
-    return trace->n > 0 ? put_batch(recorder, scanner, &part) : HS_OK;
+    return pair_batch->n > 0 ? put_batch(recorder, scanner, &part) : HS_OK;
 }
 
 /* record.c: all columns at once if the writer can; else i and j by the kernel, then what is

@@ -186,7 +186,7 @@ hs_ball_shift(hs_ball *ball, const hs_ball_image *image, uint32_t place, int64_t
 }
 
 bool
-hs_ball_settle(hs_ball *ball, const hs_ball_image *image, uint32_t place)
+hs_ball_decide_unsure(hs_ball *ball, const hs_ball_image *image, uint32_t place)
 {
     const hs_dynamic *list = ball->list;
     const hs_lattice *lattice = &list->lattice;

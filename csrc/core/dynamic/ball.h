@@ -54,7 +54,7 @@ bool hs_ball_skips(const hs_ball *ball, const hs_ball_image *image);
 void hs_ball_turn(const hs_ball *ball, const int64_t *image, hs_ball_image *turned);
 
 /* Decides for an entry that the thresholds left open. */
-bool hs_ball_settle(hs_ball *ball, const hs_ball_image *image, uint32_t place);
+bool hs_ball_decide_unsure(hs_ball *ball, const hs_ball_image *image, uint32_t place);
 
 /* S of an entry over the box vectors: ndim integers, 0 where the box does not repeat. False where
  * it passes 2^62: ball->status says so then. */
@@ -63,7 +63,7 @@ bool hs_ball_shift(hs_ball *ball, const hs_ball_image *image, uint32_t place, in
 /* One cell of a ball: whether it is in reach, which image of it is meant, and its
  * entries. For ball.c, which knows the dimension where that is 2 or 3. */
 
-/* What is known of one index along one axis. */
+/* One cell index along one axis: its least distance from the centre of the ball. */
 typedef struct part {
     double   gap;    /* square of the distance to it; infinity: out of reach */
     uint64_t number; /* dense: what it adds to the number of a cell; sparse: to its hash */
@@ -187,7 +187,7 @@ scan_entry(const ball_walk *walk, const hs_ball_image *image, uint32_t place, co
     if (place == ball->skip && hs_ball_skips(ball, image)) {
         return false;
     }
-    if (!(square < image->in) && !hs_ball_settle(ball, image, place)) {
+    if (!(square < image->in) && !hs_ball_decide_unsure(ball, image, place)) {
         return ball->status != HS_OK;
     }
     return walk->visit->fn == NULL || tell(walk, image, place);

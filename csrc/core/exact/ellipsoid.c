@@ -461,8 +461,8 @@ scale_entries(const hs_support_metric *metric, const double *entries, double *to
 }
 
 HS_ALWAYS_INLINE hs_verdict
-judge(const hs_support_metric *metric, const double *h, double size, const hs_support_span *of,
-      const int ndim, hs_stages *stages)
+decide_span(const hs_support_metric *metric, const double *h, double size,
+            const hs_support_span *of, const int ndim, hs_stages *stages)
 {
     double       z[HS_SUPPORT_DIM];
     const double error = hs_support_product(h, size, of, ndim, z);
@@ -483,8 +483,8 @@ judge(const hs_support_metric *metric, const double *h, double size, const hs_su
 }
 
 hs_verdict
-hs_support_judge(const hs_support_metric *metric, const double *entries, double size,
-                 const hs_support_span *of, hs_stages *stages)
+hs_support_decide_double(const hs_support_metric *metric, const double *entries, double size,
+                         const hs_support_span *of, hs_stages *stages)
 {
     const int    ndim = metric->limit.ndim;
     const double scaled = size * metric->unscale;
@@ -494,9 +494,9 @@ hs_support_judge(const hs_support_metric *metric, const double *entries, double 
         return HS_UNDECIDED;
     }
     switch (ndim) {
-    case 1: return judge(metric, h, scaled, of, 1, stages);
-    case 2: return judge(metric, h, scaled, of, 2, stages);
-    default: return judge(metric, h, scaled, of, 3, stages);
+    case 1: return decide_span(metric, h, scaled, of, 1, stages);
+    case 2: return decide_span(metric, h, scaled, of, 2, stages);
+    default: return decide_span(metric, h, scaled, of, 3, stages);
     }
 }
 
@@ -556,7 +556,7 @@ hs_support_within(const hs_support_metric *metric, const double *entries, double
 {
     hs_support_span of;
     hs_support_span_of(measure, span, &of);
-    const hs_verdict verdict = hs_support_judge(metric, entries, size, &of, stages);
+    const hs_verdict verdict = hs_support_decide_double(metric, entries, size, &of, stages);
     if (verdict != HS_UNDECIDED) {
         return verdict == HS_WITHIN;
     }
@@ -565,7 +565,7 @@ hs_support_within(const hs_support_metric *metric, const double *entries, double
     return sign < 0 || (sign == 0 && metric->limit.inclusive);
 }
 
-/* As in hs_metric_within_double. */
+/* Unfused float64, terms added in the order of the axes, as in hs_metric_within_double. */
 static double
 rounded_component(const hs_metric *measure, const hs_span *span, int k)
 {

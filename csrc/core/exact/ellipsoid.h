@@ -102,10 +102,10 @@ void hs_support_metric_init(int ndim, double extent, bool inclusive, int exponen
 void hs_support_span_of(const hs_metric *metric, const hs_span *span, hs_support_span *of);
 
 /* In float64 and double-words. size: of hs_support_size. Adds to *stages where it decides. */
-hs_verdict hs_support_judge(const hs_support_metric *metric, const double *entries, double size,
-                            const hs_support_span *of, hs_stages *stages);
+hs_verdict hs_support_decide_double(const hs_support_metric *metric, const double *entries,
+                                    double size, const hs_support_span *of, hs_stages *stages);
 
-/* For spans that hs_support_judge has left undecided: sign of |H D| - extent. */
+/* For spans that hs_support_decide_double has left undecided: sign of |H D| - extent. */
 int hs_support_compare(const hs_support_metric *metric, const double *entries,
                        const hs_metric *measure, const hs_span *span);
 

@@ -484,7 +484,7 @@ hs_metric_within(const hs_metric *metric, const double *p, const double *q, cons
             return verdict == HS_WITHIN;
         }
     }
-    return hs_metric_settle(metric, p, q, shift, stages);
+    return hs_metric_decide_by_integers(metric, p, q, shift, stages);
 }
 
 /* Long integers take ten times as long. */
@@ -498,8 +498,8 @@ judge_by_a_hair(const hs_metric *metric, const double *p, const double *q, const
 }
 
 bool
-hs_metric_settle(const hs_metric *metric, const double *p, const double *q, const int64_t *shift,
-                 hs_stages *stages)
+hs_metric_decide_by_integers(const hs_metric *metric, const double *p, const double *q,
+                             const int64_t *shift, hs_stages *stages)
 {
     if (metric->floats_usable) {
         const hs_verdict verdict = judge_by_a_hair(metric, p, q, shift);

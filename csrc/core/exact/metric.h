@@ -55,8 +55,8 @@ bool hs_metric_within(const hs_metric *metric, const double *p, const double *q,
                       const int64_t *shift, hs_stages *stages);
 
 /* hs_metric_within for pairs that the float64 and double-word stages have left undecided. */
-bool hs_metric_settle(const hs_metric *metric, const double *p, const double *q,
-                      const int64_t *shift, hs_stages *stages);
+bool hs_metric_decide_by_integers(const hs_metric *metric, const double *p, const double *q,
+                                  const int64_t *shift, hs_stages *stages);
 
 /*
  * D = q - p + shift * rows and |D|. vector: ndim doubles, each within 1 ulp of |D|, or NULL.

@@ -741,14 +741,14 @@ settle_or_wait(hs_tally *tally, int32_t u)
 static hs_status
 trace_waiting(hs_tally *tally, hs_scanner *scanner, int32_t u, int32_t *next)
 {
-    hs_pair_batch *trace = &scanner->trace;
-    hs_pair_batch_clear(trace);
-    while (u >= 0 && trace->n < HS_BATCH) {
-        hs_pair_batch_put(trace, tally->open[u].si, tally->open[u].place);
+    hs_pair_batch *pair_batch = &scanner->pair_batch;
+    hs_pair_batch_clear(pair_batch);
+    while (u >= 0 && pair_batch->n < HS_BATCH) {
+        hs_pair_batch_put(pair_batch, tally->open[u].si, tally->open[u].place);
         u = tally->open[u].next;
     }
     *next = u;
-    return hs_pair_batch_look_up(trace, true, &scanner->failed_point);
+    return hs_pair_batch_look_up(pair_batch, true, &scanner->failed_point);
 }
 
 /* Decides all pairs that wait for one edge. */
@@ -768,7 +768,7 @@ decide_edge(hs_tally *tally, hs_scanner *scanner, int32_t edge)
         if (status != HS_OK) {
             return status;
         }
-        hs_decide_traced(scanner, &metric, within);
+        hs_decide_pair_batch(scanner, &metric, within);
         for (int32_t e = 0; u != end; e++) {
             hs_tally_open *pair = &tally->open[u];
             const int32_t  next = pair->next;

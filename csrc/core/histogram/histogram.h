@@ -57,7 +57,8 @@ hs_edge_is_inclusive(const hs_edges *edges, int64_t k)
 }
 
 /* Replaces the table by one for this extent (the sum of the largest |y_k| and |q_k|). Called by
- * threads as they go, so its memory, at most 8 bytes an edge and a megabyte, is on no account. */
+ * threads as they go, so no account is charged for its memory: at most 8 bytes an edge, and a
+ * megabyte. */
 hs_status hs_edge_table_build(const hs_edges *edges, double extent, hs_edge_table *table);
 void      hs_edge_table_free(hs_edge_table *table);
 

@@ -59,7 +59,7 @@ typedef struct hs_account {
 
 void hs_account_init(hs_account *account, const hs_options *options);
 
-/* Gives the arena back, after the last block. Harmless twice, and on an account of zeros. */
+/* Gives the arena back, after the last block. Idempotent; does nothing to an account of zeros. */
 void hs_account_close(hs_account *account);
 
 /* The arena hands out anew what it has handed out since hs_account_keep: none of that may be in use

@@ -708,18 +708,18 @@ settle_unit(const hs_nearest *near, const hs_nearest_group *group, double error,
 static void
 gather_relative(const hs_nearest *near, const double *centre, hs_nearest_block *block)
 {
-    hs_relate gather_relative = {.ndim = near->tree.ndim,
-                                 .images = block->images,
-                                 .unit = block->unit,
-                                 .extent = block->extent,
-                                 .norm = block->norm,
-                                 .number = block->number};
+    hs_relative_keys keys = {.ndim = near->tree.ndim,
+                             .images = block->images,
+                             .unit = block->unit,
+                             .extent = block->extent,
+                             .norm = block->norm,
+                             .number = block->number};
     for (int k = 0; k < near->tree.ndim; k++) {
-        gather_relative.x[k] = near->search->bins.x[k];
-        gather_relative.y[k] = block->y[k];
-        gather_relative.centre[k] = centre[k];
+        keys.x[k] = near->search->bins.x[k];
+        keys.y[k] = block->y[k];
+        keys.centre[k] = centre[k];
     }
-    near->search->call->kernel->gather_relative(&gather_relative, block->runs, block->n_runs);
+    near->search->call->kernel->gather_relative(&keys, block->runs, block->n_runs);
     for (int k = 0; k < near->tree.ndim; k++) {
         hs_pad_lanes(block->y[k], block->n);
     }

@@ -306,7 +306,7 @@ fill_keys(hs_nearest_ranker *ranker, const int32_t *hits, int64_t n, double limi
     return n_keys;
 }
 
-/* The point itself, in its own image, which is among the keys of distance about 0. */
+/* Key of the point itself (S = 0): one of the keys whose distance is about 0. */
 static int64_t
 drop_self(hs_nearest_ranker *ranker, int64_t n)
 {

@@ -117,7 +117,7 @@ hs_tree_step(int32_t left, const double gap[2], double limit, int32_t *waiting, 
 hs_status hs_tree_build(hs_account *account, hs_team *team, const hs_options *options,
                         hs_scene *scene, int32_t leaf_points, hs_bins *bins, hs_tree *tree);
 
-/* Harmless twice, and on a tree of zeros. */
+/* Idempotent; does nothing to a tree of zeros. */
 void hs_tree_free(hs_account *account, hs_tree *tree);
 
 /* One step in building a tree: the points of a node are divided between two

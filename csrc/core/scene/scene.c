@@ -22,7 +22,7 @@
 #define NOISE 0x1p-6
 
 void
-hs_scene_settle_ranges(hs_scene *scene)
+hs_scene_scale_ranges(hs_scene *scene)
 {
     for (int k = 0; k < scene->ndim; k++) {
         if (scene->lattice.row_of_axis[k] >= 0) {
@@ -1221,7 +1221,7 @@ hs_condensed_free(hs_account *account, hs_condensed *condensed)
 
 /* scene.c: reads the points, closes gaps, scales, wraps, and settles bounds, in this order. */
 
-/* Allocates columns for the originals and the turns, as far as these are kept, in this order. */
+/* Allocates columns for the originals and the turns, in this order, where they are kept. */
 static bool
 allocate_beside(hs_account *account, hs_scene *scene)
 {
@@ -1346,7 +1346,7 @@ fill_scene(hs_account *account, hs_team *team, const hs_options *options, hs_sce
         scene_make_room(scene, &magnitude);
     }
     scene_bound_errors(scene, magnitude);
-    hs_scene_settle_ranges(scene);
+    hs_scene_scale_ranges(scene);
     if (scene->is_kept) {
         scene_widen_errors(scene);
     }
@@ -1394,7 +1394,7 @@ hs_scene_from_kept(hs_account *account, hs_team *team, const hs_scene *kept,
     failure->in_queries = status != HS_OK;
     if (status == HS_OK) {
         scene_bound_errors(asking, magnitude);
-        hs_scene_settle_ranges(asking);
+        hs_scene_scale_ranges(asking);
         status = scene_covers(kept, asking) ? HS_OK : HS_REBUILD;
     }
     if (status != HS_OK) {

@@ -165,7 +165,7 @@ void hs_scene_set_cutoff(hs_scene *scene, const hs_options *options);
 void hs_scene_fold_far(hs_scene *scene);
 
 /* Sets the range of the grid coordinates: the points' own where open, one period where periodic. */
-void hs_scene_settle_ranges(hs_scene *scene);
+void hs_scene_scale_ranges(hs_scene *scene);
 
 /* Whether the error of the formula of precision="double" passes both the cutoff and a small part of
  * the box: then it might call too many images near, and its answer is noise. hs_scene_name_farthest

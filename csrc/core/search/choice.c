@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-/* Pairs are transposed twice, which leaves the rows ascending. */
+/* Builds the excluded partners of each point, in CSR form: a counting sort by j, then by i. */
 
 /* Room for rows of so many numbers, all of them empty. The length of row r is then counted at
  * first[r + 2]; once they are summed, row r is filled from first[r + 1] on, which becomes where the
@@ -362,8 +362,8 @@ labels_find(const hs_choice *choice, int32_t point, hs_asking *asking, hs_label_
 }
 
 HS_ALWAYS_INLINE int32_t
-sift(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, int32_t from, int32_t end,
-     int32_t to, const hs_label_test test, const bool by_id)
+keep_chosen(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, int32_t from,
+            int32_t end, int32_t to, const hs_label_test test, const bool by_id)
 {
     int32_t *hits = scan->hits;
     float   *squares = scan->squares;
@@ -399,17 +399,17 @@ labels_sift(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, i
     const bool by_id = scanner->scans == HS_BLOCK_LISTS_IDS;
     switch (test) {
     case HS_OF_OTHER_GROUP:
-        return by_id ? sift(scanner, scan, asking, from, end, to, HS_OF_OTHER_GROUP, true)
-                     : sift(scanner, scan, asking, from, end, to, HS_OF_OTHER_GROUP, false);
+        return by_id ? keep_chosen(scanner, scan, asking, from, end, to, HS_OF_OTHER_GROUP, true)
+                     : keep_chosen(scanner, scan, asking, from, end, to, HS_OF_OTHER_GROUP, false);
     case HS_OF_EQUAL_LABEL:
-        return by_id ? sift(scanner, scan, asking, from, end, to, HS_OF_EQUAL_LABEL, true)
-                     : sift(scanner, scan, asking, from, end, to, HS_OF_EQUAL_LABEL, false);
+        return by_id ? keep_chosen(scanner, scan, asking, from, end, to, HS_OF_EQUAL_LABEL, true)
+                     : keep_chosen(scanner, scan, asking, from, end, to, HS_OF_EQUAL_LABEL, false);
     case HS_OF_NEAR_LABEL:
-        return by_id ? sift(scanner, scan, asking, from, end, to, HS_OF_NEAR_LABEL, true)
-                     : sift(scanner, scan, asking, from, end, to, HS_OF_NEAR_LABEL, false);
+        return by_id ? keep_chosen(scanner, scan, asking, from, end, to, HS_OF_NEAR_LABEL, true)
+                     : keep_chosen(scanner, scan, asking, from, end, to, HS_OF_NEAR_LABEL, false);
     default:
-        return by_id ? sift(scanner, scan, asking, from, end, to, HS_OF_PARTNER, true)
-                     : sift(scanner, scan, asking, from, end, to, HS_OF_PARTNER, false);
+        return by_id ? keep_chosen(scanner, scan, asking, from, end, to, HS_OF_PARTNER, true)
+                     : keep_chosen(scanner, scan, asking, from, end, to, HS_OF_PARTNER, false);
     }
 }
 
@@ -465,18 +465,18 @@ static hs_status
 trace_batch(hit_batch *batch, bool metric)
 {
     hs_scanner *scanner = batch->scanner;
-    hs_pair_batch_clear(&scanner->trace);
-    (void)hs_pair_batch_add(&scanner->trace, scanner->group.first + batch->t, batch->place,
+    hs_pair_batch_clear(&scanner->pair_batch);
+    (void)hs_pair_batch_add(&scanner->pair_batch, scanner->group.first + batch->t, batch->place,
                             batch->n);
-    return hs_pair_batch_look_up(&scanner->trace, metric, &scanner->failed_point);
+    return hs_pair_batch_look_up(&scanner->pair_batch, metric, &scanner->failed_point);
 }
 
-/* Shift e of the trace over the periodic box vectors, from a point to a candidate. */
+/* Shift e of the pair batch over the periodic box vectors, from a point to a candidate. */
 static void
-given_shift(const hs_pair_batch *trace, int32_t e, int64_t *shift)
+given_shift(const hs_pair_batch *pair_batch, int32_t e, int64_t *shift)
 {
-    for (int r = 0; r < trace->search->scene.lattice.n_periodic; r++) {
-        shift[r] = trace->of.is_narrow ? trace->shift[r][e] : trace->given[r][e];
+    for (int r = 0; r < pair_batch->search->scene.lattice.n_periodic; r++) {
+        shift[r] = pair_batch->of.is_narrow ? pair_batch->shift[r][e] : pair_batch->given[r][e];
     }
 }
 
@@ -519,7 +519,7 @@ drop_nearest(const hs_choice *choice, hit_batch *batch)
     scanner->work_since_poll += WORK_OF_IMAGE * (int64_t)batch->n;
     for (int32_t e = 0; status == HS_OK && e < batch->n; e++) {
         bool nearest;
-        given_shift(&scanner->trace, e, shift);
+        given_shift(&scanner->pair_batch, e, shift);
         status = is_nearest(choice, batch, e, shift, &nearest);
         if (status != HS_OK) {
             scanner->failed_point = batch->point;
@@ -529,13 +529,14 @@ drop_nearest(const hs_choice *choice, hit_batch *batch)
     return status;
 }
 
-/* Whether pair e of the trace, of a point with itself, is in the image S = 0. */
+/* Whether pair e of the pair batch, of a point with itself, is in the image S = 0. */
 static bool
-is_itself(const hs_pair_batch *trace, int32_t e)
+is_itself(const hs_pair_batch *pair_batch, int32_t e)
 {
     int moved = 0;
-    for (int r = 0; r < trace->search->scene.lattice.n_periodic && trace->is_shifted; r++) {
-        moved += trace->times[r][e] != 0.0;
+    for (int r = 0; r < pair_batch->search->scene.lattice.n_periodic && pair_batch->is_shifted;
+         r++) {
+        moved += pair_batch->times[r][e] != 0.0;
     }
     return moved == 0;
 }
@@ -554,10 +555,10 @@ drop_near(const hs_choice *choice, hit_batch *batch)
     hs_metric_init(&nearer, scene->metric.ndim, scene->metric.n_rows,
                    (const double(*)[HS_MAX_DIM])scene->metric.rows, hs_choice_least(choice, scene),
                    false);
-    hs_decide_traced(scanner, &nearer, batch->drop);
+    hs_decide_pair_batch(scanner, &nearer, batch->drop);
     for (int32_t e = 0; e < batch->n; e++) {
         const bool own = !choice->has_queries && batch->id[e] == batch->point;
-        batch->drop[e] = batch->drop[e] && !(own && is_itself(&scanner->trace, e));
+        batch->drop[e] = batch->drop[e] && !(own && is_itself(&scanner->pair_batch, e));
     }
     return HS_OK;
 }

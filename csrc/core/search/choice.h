@@ -60,7 +60,7 @@ hs_status hs_selection_check(const hs_selection *selection, const hs_sets *sets,
 hs_status hs_choice_open(const hs_selection *selection, const hs_sets *sets, hs_call *call,
                          hs_failure *failure);
 
-/* Frees the choice of a call, if it has one; harmless twice. */
+/* Frees the choice of a call, if it has one; idempotent. */
 void hs_choice_close(hs_call *call);
 
 /* Whether pairs are excluded, in their nearest image. */

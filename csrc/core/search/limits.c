@@ -170,12 +170,12 @@ static two_supports
 supports_of(const hs_scanner *scanner, int32_t e)
 {
     const hs_supports   *supports = scanner->search->limits->supports;
-    const hs_pair_batch *trace = &scanner->trace;
+    const hs_pair_batch *pair_batch = &scanner->pair_batch;
     const int            n_entries = hs_support_entries(scanner->search->scene.ndim);
-    const int32_t        sj = scanner->block.number[trace->place[e]];
+    const int32_t        sj = scanner->block.number[pair_batch->place[e]];
     two_supports         of = {NULL, NULL, n_entries};
     if (hs_rule_needs_asking(supports->rule)) {
-        of.asking = support_of(&supports->of_asking, trace->si[e], n_entries);
+        of.asking = support_of(&supports->of_asking, pair_batch->si[e], n_entries);
     }
     if (hs_rule_needs_other(supports->rule)) {
         of.point = support_of(&supports->of_points, sj, n_entries);
@@ -225,8 +225,8 @@ decide_exactly(hs_scanner *scanner, const two_supports *of, const hs_span *span)
     hs_support_span_of(measure, span, &measured);
     for (int n = 0; n < 2; n++) {
         if (numbers[n] != NULL) {
-            verdict[n] = hs_support_judge(&supports->metric, numbers[n], numbers[n][of->n_entries],
-                                          &measured, &stages);
+            verdict[n] = hs_support_decide_double(&supports->metric, numbers[n],
+                                                  numbers[n][of->n_entries], &measured, &stages);
         }
     }
     hs_verdict all = combine(rule, verdict[0], verdict[1]);
@@ -268,7 +268,7 @@ decide_pair(hs_scanner *scanner, int32_t e)
     double             p[HS_MAX_DIM], q[HS_MAX_DIM];
     int64_t            shift[HS_MAX_DIM];
     const two_supports of = supports_of(scanner, e);
-    const hs_span      span = {p, q, hs_pair_batch_pair(&scanner->trace, e, p, q, shift)};
+    const hs_span      span = {p, q, hs_pair_batch_pair(&scanner->pair_batch, e, p, q, shift)};
     return scanner->options.precision == HS_EXACT ? decide_exactly(scanner, &of, &span)
                                                   : decide_rounded(scanner, &of, &span);
 }
@@ -276,7 +276,7 @@ decide_pair(hs_scanner *scanner, int32_t e)
 void
 hs_supports_decide(hs_scanner *scanner, uint8_t *within)
 {
-    for (int32_t e = 0; e < scanner->trace.n; e++) {
+    for (int32_t e = 0; e < scanner->pair_batch.n; e++) {
         within[e] = decide_pair(scanner, e);
     }
 }

@@ -88,9 +88,9 @@ hs_limit_of(const hs_limits *limits, int32_t si, int32_t sj)
 HS_ALWAYS_INLINE hs_dw
 hs_limit_of_pair(const hs_scanner *scanner, int32_t e)
 {
-    const hs_pair_batch *trace = &scanner->trace;
-    return hs_limit_of(scanner->search->limits, trace->si[e],
-                       scanner->block.number[trace->place[e]]);
+    const hs_pair_batch *pair_batch = &scanner->pair_batch;
+    return hs_limit_of(scanner->search->limits, pair_batch->si[e],
+                       scanner->block.number[pair_batch->place[e]]);
 }
 
 /*
@@ -124,7 +124,7 @@ void hs_supports_lay_out(const hs_support_side *side, int64_t first, int64_t end
 /* The supports of the group and the block, for a scan. */
 void hs_supports_set(const hs_scanner *scanner, hs_scan *scan);
 
-/* Whether each pair of scanner->trace is within the supports, by the rule, however far apart it is;
+/* Whether each pair of scanner->pair_batch is within the supports, by the rule, however far apart it is;
  * not for an extent of 0. within: HS_BATCH of them. */
 void hs_supports_decide(hs_scanner *scanner, uint8_t *within);
 

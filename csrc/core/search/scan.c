@@ -807,45 +807,46 @@ add_arrays(hs_parts *parts, int n, int64_t length, size_t size, void **arrays)
 }
 
 static bool
-allocate(hs_account *account, hs_pair_batch *trace)
+allocate(hs_account *account, hs_pair_batch *pair_batch)
 {
-    const int     d = trace->search->scene.ndim, m = trace->search->scene.lattice.n_periodic;
-    const bool    as_given = trace->search->bins.keeps_originals, narrow = trace->of.is_narrow;
-    const int     m_given = trace->of.needs_given && (as_given || !narrow) ? m : 0;
-    const int     m_narrow = trace->of.needs_given && narrow ? m : 0;
+    const int  d = pair_batch->search->scene.ndim, m = pair_batch->search->scene.lattice.n_periodic;
+    const bool as_given = pair_batch->search->bins.keeps_originals,
+               narrow = pair_batch->of.is_narrow;
+    const int     m_given = pair_batch->of.needs_given && (as_given || !narrow) ? m : 0;
+    const int     m_narrow = pair_batch->of.needs_given && narrow ? m : 0;
     const int64_t batch = HS_BATCH + HS_BATCH_PADDING;
     hs_parts      parts;
     hs_parts_begin(&parts);
-    add_arrays(&parts, 1, HS_BATCH, sizeof(int32_t), (void **)&trace->place);
-    add_arrays(&parts, 1, HS_BATCH, sizeof(int32_t), (void **)&trace->si);
-    add_arrays(&parts, d, batch, sizeof(double), (void **)trace->p);
-    add_arrays(&parts, d, batch, sizeof(double), (void **)trace->q);
-    add_arrays(&parts, m, batch, sizeof(double), (void **)trace->times);
-    add_arrays(&parts, m, HS_BATCH, sizeof(int64_t), (void **)trace->image);
-    add_arrays(&parts, m_given, HS_BATCH, sizeof(int64_t), (void **)trace->given);
-    add_arrays(&parts, m_narrow, HS_BATCH, sizeof(int32_t), (void **)trace->shift);
-    trace->memory = hs_parts_alloc(account, HS_FOR_CANDIDATES, &parts);
-    return trace->memory != NULL;
+    add_arrays(&parts, 1, HS_BATCH, sizeof(int32_t), (void **)&pair_batch->place);
+    add_arrays(&parts, 1, HS_BATCH, sizeof(int32_t), (void **)&pair_batch->si);
+    add_arrays(&parts, d, batch, sizeof(double), (void **)pair_batch->p);
+    add_arrays(&parts, d, batch, sizeof(double), (void **)pair_batch->q);
+    add_arrays(&parts, m, batch, sizeof(double), (void **)pair_batch->times);
+    add_arrays(&parts, m, HS_BATCH, sizeof(int64_t), (void **)pair_batch->image);
+    add_arrays(&parts, m_given, HS_BATCH, sizeof(int64_t), (void **)pair_batch->given);
+    add_arrays(&parts, m_narrow, HS_BATCH, sizeof(int32_t), (void **)pair_batch->shift);
+    pair_batch->memory = hs_parts_alloc(account, HS_FOR_CANDIDATES, &parts);
+    return pair_batch->memory != NULL;
 }
 
 hs_status
 hs_pair_batch_init(const hs_search *search, const hs_block *block, const hs_options *polls,
-                   bool needs_given, hs_pair_batch *trace)
+                   bool needs_given, hs_pair_batch *pair_batch)
 {
     hs_account *account = &search->call->account;
-    trace->search = search;
-    trace->memory = NULL;
-    trace->n_rows = search->scene.lattice.n_periodic;
-    trace->as_given = search->bins.keeps_originals;
-    trace->is_plain = has_plain_shifts(&search->scene.lattice);
-    trace->has_zeros = false;
-    hs_pair_batch_clear(trace);
-    hs_status status = records_init(search, block, polls, needs_given, &trace->of);
-    if (status == HS_OK && !allocate(account, trace)) {
+    pair_batch->search = search;
+    pair_batch->memory = NULL;
+    pair_batch->n_rows = search->scene.lattice.n_periodic;
+    pair_batch->as_given = search->bins.keeps_originals;
+    pair_batch->is_plain = has_plain_shifts(&search->scene.lattice);
+    pair_batch->has_zeros = false;
+    hs_pair_batch_clear(pair_batch);
+    hs_status status = records_init(search, block, polls, needs_given, &pair_batch->of);
+    if (status == HS_OK && !allocate(account, pair_batch)) {
         status = HS_ERR_MEMORY;
     }
     if (status != HS_OK) {
-        hs_pair_batch_free(account, trace);
+        hs_pair_batch_free(account, pair_batch);
     }
     return status;
 }
@@ -853,26 +854,26 @@ hs_pair_batch_init(const hs_search *search, const hs_block *block, const hs_opti
 /* Makes it ready for what its search has become, with as many axes. False if it has other arrays
  * than that needs. */
 static bool
-pair_batch_renew(bool needs_given, hs_pair_batch *trace)
+pair_batch_renew(bool needs_given, hs_pair_batch *pair_batch)
 {
-    const hs_search *search = trace->search;
-    if (trace->n_rows != search->scene.lattice.n_periodic ||
-        trace->as_given != search->bins.keeps_originals ||
-        trace->of.needs_given != (needs_given || trace->as_given) ||
-        trace->of.is_narrow != has_narrow_shifts(search)) {
+    const hs_search *search = pair_batch->search;
+    if (pair_batch->n_rows != search->scene.lattice.n_periodic ||
+        pair_batch->as_given != search->bins.keeps_originals ||
+        pair_batch->of.needs_given != (needs_given || pair_batch->as_given) ||
+        pair_batch->of.is_narrow != has_narrow_shifts(search)) {
         return false;
     }
-    trace->is_plain = has_plain_shifts(&search->scene.lattice);
-    hs_pair_batch_clear(trace);
+    pair_batch->is_plain = has_plain_shifts(&search->scene.lattice);
+    hs_pair_batch_clear(pair_batch);
     return true;
 }
 
 void
-hs_pair_batch_free(hs_account *account, hs_pair_batch *trace)
+hs_pair_batch_free(hs_account *account, hs_pair_batch *pair_batch)
 {
-    hs_free(account, trace->memory);
-    trace->memory = NULL;
-    records_free(account, &trace->of);
+    hs_free(account, pair_batch->memory);
+    pair_batch->memory = NULL;
+    records_free(account, &pair_batch->of);
 }
 
 /* Rows of B that point si was wrapped by; 0 where that is known to cancel or not needed. */
@@ -883,16 +884,16 @@ turns_of(const hs_bins *bins, int r, int64_t si)
 }
 
 int32_t
-hs_pair_batch_add(hs_pair_batch *trace, int32_t si, const int32_t *places, int32_t n)
+hs_pair_batch_add(hs_pair_batch *pair_batch, int32_t si, const int32_t *places, int32_t n)
 {
-    const int32_t room = HS_BATCH - trace->n;
-    int32_t      *place = trace->place + trace->n, *of = trace->si + trace->n;
+    const int32_t room = HS_BATCH - pair_batch->n;
+    int32_t      *place = pair_batch->place + pair_batch->n, *of = pair_batch->si + pair_batch->n;
     n = n < room ? n : room;
     for (int32_t e = 0; e < n; e++) {
         place[e] = places[e];
         of[e] = si;
     }
-    trace->n += n;
+    pair_batch->n += n;
     return n;
 }
 
@@ -913,41 +914,41 @@ run_of(const hs_block *block, int32_t place)
 /* What the metric measures between, and its shifts, without records: they are of X, over B. Where
  * the block has no image, `image` and `times` are left alone, and not read later. */
 static void
-look_up_few(hs_pair_batch *trace)
+look_up_few(hs_pair_batch *pair_batch)
 {
-    const hs_block *block = trace->of.block;
-    const hs_bins  *bins = &trace->search->bins, *asking = hs_search_asking(trace->search);
+    const hs_block *block = pair_batch->of.block;
+    const hs_bins *bins = &pair_batch->search->bins, *asking = hs_search_asking(pair_batch->search);
     for (int k = 0; k < bins->ndim; k++) {
-        for (int32_t e = 0; e < trace->n; e++) {
-            trace->p[k][e] = asking->x[k][trace->si[e]];
-            trace->q[k][e] = bins->x[k][block->number[trace->place[e]]];
+        for (int32_t e = 0; e < pair_batch->n; e++) {
+            pair_batch->p[k][e] = asking->x[k][pair_batch->si[e]];
+            pair_batch->q[k][e] = bins->x[k][block->number[pair_batch->place[e]]];
         }
     }
     int32_t    any = 0;
-    const bool images = records_has_images(&trace->of);
-    for (int32_t e = 0; images && e < trace->n; e++) {
-        const hs_run *run = run_of(block, trace->place[e]);
+    const bool images = records_has_images(&pair_batch->of);
+    for (int32_t e = 0; images && e < pair_batch->n; e++) {
+        const hs_run *run = run_of(block, pair_batch->place[e]);
         for (int r = 0; r < bins->n_periodic; r++) {
-            trace->image[r][e] = run->image[r];
-            trace->times[r][e] = (double)run->image[r];
+            pair_batch->image[r][e] = run->image[r];
+            pair_batch->times[r][e] = (double)run->image[r];
             any |= run->image[r];
         }
     }
-    trace->is_shifted = any != 0;
-    trace->has_zeros = false;
+    pair_batch->is_shifted = any != 0;
+    pair_batch->has_zeros = false;
 }
 
 static void
-look_up_points(hs_pair_batch *trace)
+look_up_points(hs_pair_batch *pair_batch)
 {
-    const hs_bins *bins = hs_search_asking(trace->search);
-    const int32_t *place = trace->place, *si = trace->si;
-    const int      width = trace->of.width;
-    const int32_t  n = trace->n;
+    const hs_bins *bins = hs_search_asking(pair_batch->search);
+    const int32_t *place = pair_batch->place, *si = pair_batch->si;
+    const int      width = pair_batch->of.width;
+    const int32_t  n = pair_batch->n;
     for (int k = 0; k < bins->ndim; k++) {
         const double *of_p = bins->keeps_originals ? bins->originals[k] : bins->x[k];
-        const double *of_q = trace->of.q + k;
-        double       *p = trace->p[k], *q = trace->q[k];
+        const double *of_q = pair_batch->of.q + k;
+        double       *p = pair_batch->p[k], *q = pair_batch->q[k];
         for (int32_t e = 0; e < n; e++) {
             p[e] = of_p[si[e]];
             q[e] = of_q[(int64_t)place[e] * width];
@@ -957,18 +958,18 @@ look_up_points(hs_pair_batch *trace)
 
 /* S = image + turns_i - turns_j; of points as given also the metric's shift. */
 static void
-look_up_narrow(hs_pair_batch *trace)
+look_up_narrow(hs_pair_batch *pair_batch)
 {
-    const bool      as_given = trace->search->bins.keeps_originals;
-    const hs_turns *turns = &hs_search_asking(trace->search)->turns;
-    const int32_t  *place = trace->place, *si = trace->si;
-    const int32_t  *few = trace->search->bins.turns.known ? trace->of.few
-                          : trace->of.has_images          ? trace->of.image
-                                                          : NULL;
-    const int32_t   n = trace->n, width = trace->of.width;
+    const bool      as_given = pair_batch->search->bins.keeps_originals;
+    const hs_turns *turns = &hs_search_asking(pair_batch->search)->turns;
+    const int32_t  *place = pair_batch->place, *si = pair_batch->si;
+    const int32_t  *few = pair_batch->search->bins.turns.known ? pair_batch->of.few
+                          : pair_batch->of.has_images          ? pair_batch->of.image
+                                                               : NULL;
+    const int32_t   n = pair_batch->n, width = pair_batch->of.width;
     int32_t         any = 0;
-    for (int r = 0; r < trace->search->bins.n_periodic; r++) {
-        int32_t *to = trace->shift[r];
+    for (int r = 0; r < pair_batch->search->bins.n_periodic; r++) {
+        int32_t *to = pair_batch->shift[r];
         for (int32_t e = 0; e < n; e++) {
             to[e] = few != NULL ? few[(int64_t)place[e] * width + r] : 0;
         }
@@ -976,117 +977,117 @@ look_up_narrow(hs_pair_batch *trace)
             to[e] += (int32_t)hs_turns_get(turns, r, si[e]);
         }
         for (int32_t e = 0; as_given && e < n; e++) {
-            trace->given[r][e] = to[e];
-            trace->times[r][e] = (double)to[e];
+            pair_batch->given[r][e] = to[e];
+            pair_batch->times[r][e] = (double)to[e];
             any |= to[e];
         }
     }
-    trace->is_shifted = trace->is_shifted || any != 0;
+    pair_batch->is_shifted = pair_batch->is_shifted || any != 0;
 }
 
 /* S = image + turns_i - turns_j over B, then over the box vectors as given. Without turns they are
  * all known to cancel or not to be needed. Returns the first pair whose S passes its range, or
  * their number. */
 static int32_t
-look_up_given(hs_pair_batch *trace)
+look_up_given(hs_pair_batch *pair_batch)
 {
-    const hs_bins *asking = hs_search_asking(trace->search);
-    const int      m = trace->search->bins.n_periodic;
+    const hs_bins *asking = hs_search_asking(pair_batch->search);
+    const int      m = pair_batch->search->bins.n_periodic;
     for (int r = 0; r < m; r++) {
-        const int64_t *turned = trace->of.turned + r;
-        int64_t       *to = trace->given[r];
-        for (int32_t e = 0; e < trace->n; e++) {
-            to[e] = turned[(int64_t)trace->place[e] * trace->of.width] +
-                    turns_of(asking, r, trace->si[e]);
+        const int64_t *turned = pair_batch->of.turned + r;
+        int64_t       *to = pair_batch->given[r];
+        for (int32_t e = 0; e < pair_batch->n; e++) {
+            to[e] = turned[(int64_t)pair_batch->place[e] * pair_batch->of.width] +
+                    turns_of(asking, r, pair_batch->si[e]);
         }
     }
-    for (int32_t e = 0; !trace->is_plain && e < trace->n; e++) {
+    for (int32_t e = 0; !pair_batch->is_plain && e < pair_batch->n; e++) {
         int64_t reduced[HS_MAX_DIM], given[HS_MAX_DIM];
         for (int r = 0; r < m; r++) {
-            reduced[r] = trace->given[r][e];
+            reduced[r] = pair_batch->given[r][e];
         }
-        if (!hs_lattice_shift(&trace->search->scene.lattice, reduced, given)) {
+        if (!hs_lattice_shift(&pair_batch->search->scene.lattice, reduced, given)) {
             return e;
         }
         for (int r = 0; r < m; r++) {
-            trace->given[r][e] = given[r];
+            pair_batch->given[r][e] = given[r];
         }
     }
-    return trace->n;
+    return pair_batch->n;
 }
 
 /* Shifts over B, the metric's where it measures between X. Where the block has none, they are
  * zeroed once and left alone; how many times the metric shifts is not read then. */
 static void
-look_up_images(hs_pair_batch *trace)
+look_up_images(hs_pair_batch *pair_batch)
 {
-    const bool zero = !trace->of.has_images;
+    const bool zero = !pair_batch->of.has_images;
     int32_t    any = 0;
-    if (zero && trace->has_zeros) {
+    if (zero && pair_batch->has_zeros) {
         return;
     }
-    for (int r = 0; r < trace->search->bins.n_periodic; r++) {
-        const int32_t *from = trace->of.image + r;
+    for (int r = 0; r < pair_batch->search->bins.n_periodic; r++) {
+        const int32_t *from = pair_batch->of.image + r;
         if (zero) {
-            memset(trace->image[r], 0, HS_BATCH * sizeof(int64_t));
+            memset(pair_batch->image[r], 0, HS_BATCH * sizeof(int64_t));
         }
-        for (int32_t e = 0; e < trace->n && !zero; e++) {
-            const int32_t image = from[(int64_t)trace->place[e] * trace->of.width];
-            trace->image[r][e] = image;
-            trace->times[r][e] = (double)image;
+        for (int32_t e = 0; e < pair_batch->n && !zero; e++) {
+            const int32_t image = from[(int64_t)pair_batch->place[e] * pair_batch->of.width];
+            pair_batch->image[r][e] = image;
+            pair_batch->times[r][e] = (double)image;
             any |= image;
         }
     }
-    trace->has_zeros = zero;
-    trace->is_shifted = any != 0 && !trace->search->bins.keeps_originals;
+    pair_batch->has_zeros = zero;
+    pair_batch->is_shifted = any != 0 && !pair_batch->search->bins.keeps_originals;
 }
 
 /* The metric's shift of points as given, over the box vectors as given. */
 static void
-look_up_times(hs_pair_batch *trace)
+look_up_times(hs_pair_batch *pair_batch)
 {
     int64_t any = 0, wide = 0;
-    for (int r = 0; r < trace->search->bins.n_periodic; r++) {
-        const int64_t *from = trace->given[r];
-        for (int32_t e = 0; e < trace->n; e++) {
-            trace->times[r][e] = (double)from[e];
+    for (int r = 0; r < pair_batch->search->bins.n_periodic; r++) {
+        const int64_t *from = pair_batch->given[r];
+        for (int32_t e = 0; e < pair_batch->n; e++) {
+            pair_batch->times[r][e] = (double)from[e];
             any |= from[e];
             wide |= from[e] > WIDEST_SHIFT || from[e] < -WIDEST_SHIFT;
         }
     }
-    trace->is_shifted = any != 0;
-    trace->is_wide = wide != 0;
+    pair_batch->is_shifted = any != 0;
+    pair_batch->is_wide = wide != 0;
 }
 
 hs_status
-hs_pair_batch_look_up(hs_pair_batch *trace, bool metric, int64_t *failed_point)
+hs_pair_batch_look_up(hs_pair_batch *pair_batch, bool metric, int64_t *failed_point)
 {
-    const hs_bins *bins = hs_search_asking(trace->search);
+    const hs_bins *bins = hs_search_asking(pair_batch->search);
     metric = metric ||
-             !trace->of.is_narrow; /* shifts of the points as given are the metric's too */
-    if (!trace->of.needs_given && !trace->of.has_metric &&
-        trace->n <= trace->of.block->n / FEW_OF_BLOCK) {
-        look_up_few(trace);
+             !pair_batch->of.is_narrow; /* shifts of the points as given are the metric's too */
+    if (!pair_batch->of.needs_given && !pair_batch->of.has_metric &&
+        pair_batch->n <= pair_batch->of.block->n / FEW_OF_BLOCK) {
+        look_up_few(pair_batch);
         return HS_OK;
     }
-    if (hs_records_load(&trace->of, metric) != HS_OK) {
+    if (hs_records_load(&pair_batch->of, metric) != HS_OK) {
         return HS_ERR_INTERRUPTED;
     }
     if (metric) {
-        look_up_points(trace);
-        look_up_images(trace);
+        look_up_points(pair_batch);
+        look_up_images(pair_batch);
     }
-    if (trace->of.needs_given && trace->of.is_narrow) {
-        look_up_narrow(trace);
-    } else if (trace->of.needs_given) {
-        const int32_t fitting = look_up_given(trace);
-        if (fitting < trace->n) {
-            *failed_point = bins->order[trace->si[fitting]];
+    if (pair_batch->of.needs_given && pair_batch->of.is_narrow) {
+        look_up_narrow(pair_batch);
+    } else if (pair_batch->of.needs_given) {
+        const int32_t fitting = look_up_given(pair_batch);
+        if (fitting < pair_batch->n) {
+            *failed_point = bins->order[pair_batch->si[fitting]];
             return HS_ERR_SHIFT_RANGE;
         }
     }
-    if (bins->keeps_originals && !trace->of.is_narrow) {
-        look_up_times(trace);
+    if (bins->keeps_originals && !pair_batch->of.is_narrow) {
+        look_up_times(pair_batch);
     }
     return HS_OK;
 }
@@ -1100,32 +1101,33 @@ end_with_zeros(double *entries, int32_t n)
 }
 
 hs_batch
-hs_pair_batch_view(hs_pair_batch *trace)
+hs_pair_batch_view(hs_pair_batch *pair_batch)
 {
-    hs_batch batch = {.n = trace->n};
-    for (int k = 0; k < trace->search->scene.ndim; k++) {
-        batch.p[k] = end_with_zeros(trace->p[k], trace->n);
-        batch.q[k] = end_with_zeros(trace->q[k], trace->n);
+    hs_batch batch = {.n = pair_batch->n};
+    for (int k = 0; k < pair_batch->search->scene.ndim; k++) {
+        batch.p[k] = end_with_zeros(pair_batch->p[k], pair_batch->n);
+        batch.q[k] = end_with_zeros(pair_batch->q[k], pair_batch->n);
     }
-    for (int r = 0; trace->is_shifted && r < trace->search->scene.lattice.n_periodic; r++) {
-        batch.shift[r] = end_with_zeros(trace->times[r], trace->n);
+    for (int r = 0; pair_batch->is_shifted && r < pair_batch->search->scene.lattice.n_periodic;
+         r++) {
+        batch.shift[r] = end_with_zeros(pair_batch->times[r], pair_batch->n);
     }
     return batch;
 }
 
 const int64_t *
-hs_pair_batch_pair(const hs_pair_batch *trace, int32_t e, double *p, double *q, int64_t *shift)
+hs_pair_batch_pair(const hs_pair_batch *pair_batch, int32_t e, double *p, double *q, int64_t *shift)
 {
-    const bool as_given = trace->search->bins.keeps_originals;
-    for (int k = 0; k < trace->search->scene.ndim; k++) {
-        p[k] = trace->p[k][e];
-        q[k] = trace->q[k][e];
+    const bool as_given = pair_batch->search->bins.keeps_originals;
+    for (int k = 0; k < pair_batch->search->scene.ndim; k++) {
+        p[k] = pair_batch->p[k][e];
+        q[k] = pair_batch->q[k][e];
     }
-    if (!trace->is_shifted) {
+    if (!pair_batch->is_shifted) {
         return NULL;
     }
-    for (int r = 0; r < trace->search->scene.lattice.n_periodic; r++) {
-        shift[r] = as_given ? trace->given[r][e] : trace->image[r][e];
+    for (int r = 0; r < pair_batch->search->scene.lattice.n_periodic; r++) {
+        shift[r] = as_given ? pair_batch->given[r][e] : pair_batch->image[r][e];
     }
     return shift;
 }
@@ -1348,7 +1350,7 @@ static hs_status
 open_trace(bool needs_given, hs_scanner *scanner)
 {
     return hs_pair_batch_init(scanner->search, &scanner->block, &scanner->options, needs_given,
-                              &scanner->trace);
+                              &scanner->pair_batch);
 }
 
 /* Sets all but what has memory. */
@@ -1373,7 +1375,8 @@ hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t m
     hs_account *account = &search->call->account;
     begin(search, use, is_ordered, scanner);
     forms_init(scanner);
-    scanner->trace.memory = scanner->trace.of.memory = NULL; /* freed also when never set */
+    scanner->pair_batch.memory = scanner->pair_batch.of.memory =
+        NULL; /* freed also when never set */
     hs_status status = block_init(account, search->scene.ndim, scanner->scans, capacity, most_runs,
                                   &scanner->block);
     if (status == HS_OK && search->limits != NULL) {
@@ -1388,7 +1391,7 @@ hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t m
     return status;
 }
 
-/* The arrays for pairs to decide, where hs_scanner_init has left them for later: trace.memory is
+/* The arrays for pairs to decide, where hs_scanner_init has left them for later: pair_batch.memory is
  * NULL. They are kept (hs_account_keep) where the walker is. */
 static hs_status
 scanner_open_trace(hs_scanner *scanner)
@@ -1412,8 +1415,9 @@ hs_scanner_renew(hs_search *search, hs_block_use use, int32_t capacity, int32_t 
         return false;
     }
     begin(search, use, false, scanner);
-    return scanner->scans == scans && (scanner->trace.memory == NULL ||
-                                       pair_batch_renew(needs_shifts(scanner), &scanner->trace));
+    return scanner->scans == scans &&
+           (scanner->pair_batch.memory == NULL ||
+            pair_batch_renew(needs_shifts(scanner), &scanner->pair_batch));
 }
 
 void
@@ -1435,7 +1439,7 @@ hs_scanner_close(hs_search *search, hs_scanner *scanner)
 {
     hs_scanner_note(search, scanner);
     hs_order_free(&search->call->account, &scanner->block, &scanner->order);
-    hs_pair_batch_free(&search->call->account, &scanner->trace);
+    hs_pair_batch_free(&search->call->account, &scanner->pair_batch);
     block_free(&search->call->account, &scanner->block);
 }
 
@@ -1483,11 +1487,11 @@ decide_pair(hs_scanner *scanner, const hs_metric *metric, int32_t e, bool others
 {
     double         p[HS_MAX_DIM], q[HS_MAX_DIM];
     int64_t        of_pair[HS_MAX_DIM];
-    const int64_t *shift = hs_pair_batch_pair(&scanner->trace, e, p, q, of_pair);
+    const int64_t *shift = hs_pair_batch_pair(&scanner->pair_batch, e, p, q, of_pair);
     if (scanner->options.precision == HS_DOUBLE) {
         return hs_metric_within_double(metric, p, q, shift);
     }
-    return others_failed ? hs_metric_settle(metric, p, q, shift, &scanner->stages)
+    return others_failed ? hs_metric_decide_by_integers(metric, p, q, shift, &scanner->stages)
                          : hs_metric_within(metric, p, q, shift, &scanner->stages);
 }
 
@@ -1497,7 +1501,7 @@ decide_pair(hs_scanner *scanner, const hs_metric *metric, int32_t e, bool others
  * r^2, by at most (d + 4) 2^-53 of it. Pairs without a shift only.
  */
 static void
-judge_scaled(const hs_metric *metric, const hs_pair_batch *trace, uint8_t *verdict,
+judge_scaled(const hs_metric *metric, const hs_pair_batch *pair_batch, uint8_t *verdict,
              hs_stages *stages)
 {
     const hs_scale scale = hs_scale_of(metric->cutoff > 0.0 ? ilogb(metric->cutoff) : 0);
@@ -1505,14 +1509,14 @@ judge_scaled(const hs_metric *metric, const hs_pair_batch *trace, uint8_t *verdi
     const double   in = r * r * (1.0 - SCALED_MARGIN), out = r * r * (1.0 + SCALED_MARGIN);
     double         square[HS_BATCH] = {0.0}, size[HS_BATCH] = {0.0};
     for (int k = 0; k < metric->ndim; k++) {
-        for (int32_t e = 0; e < trace->n; e++) {
-            const double component = trace->q[k][e] - trace->p[k][e];
+        for (int32_t e = 0; e < pair_batch->n; e++) {
+            const double component = pair_batch->q[k][e] - pair_batch->p[k][e];
             const double scaled = hs_scale_apply(scale, component);
             square[e] += scaled * scaled;
             size[e] += fabs(component); /* for cutoff 0: 0 only if all are */
         }
     }
-    for (int32_t e = 0; e < trace->n; e++) {
+    for (int32_t e = 0; e < pair_batch->n; e++) {
         const bool within = r > 0.0 ? square[e] < in : size[e] == 0.0 && metric->inclusive;
         const bool beyond = r > 0.0 ? square[e] > out : !within;
         verdict[e] = within   ? (uint8_t)HS_WITHIN
@@ -1523,18 +1527,18 @@ judge_scaled(const hs_metric *metric, const hs_pair_batch *trace, uint8_t *verdi
 }
 
 void
-hs_decide_traced(hs_scanner *scanner, const hs_metric *metric, uint8_t *within)
+hs_decide_pair_batch(hs_scanner *scanner, const hs_metric *metric, uint8_t *within)
 {
-    hs_pair_batch *trace = &scanner->trace;
-    const bool     by_batch = scanner->options.precision != HS_DOUBLE && !trace->is_wide;
+    hs_pair_batch *pair_batch = &scanner->pair_batch;
+    const bool     by_batch = scanner->options.precision != HS_DOUBLE && !pair_batch->is_wide;
     uint8_t        verdict[HS_BATCH + HS_BATCH_PADDING];
-    if (by_batch && !metric->floats_usable && !trace->is_shifted) {
-        judge_scaled(metric, trace, verdict, &scanner->stages);
+    if (by_batch && !metric->floats_usable && !pair_batch->is_shifted) {
+        judge_scaled(metric, pair_batch, verdict, &scanner->stages);
     } else if (by_batch) {
-        const hs_batch batch = hs_pair_batch_view(trace);
-        scanner->search->call->kernel->judge(metric, &batch, verdict, &scanner->stages);
+        const hs_batch batch = hs_pair_batch_view(pair_batch);
+        scanner->search->call->kernel->decide_batch(metric, &batch, verdict, &scanner->stages);
     }
-    for (int32_t e = 0; e < trace->n; e++) {
+    for (int32_t e = 0; e < pair_batch->n; e++) {
         within[e] = by_batch && verdict[e] != HS_UNDECIDED
                         ? verdict[e] == HS_WITHIN
                         : decide_pair(scanner, metric, e, by_batch);
@@ -1548,7 +1552,7 @@ decide_by_limit(hs_scanner *scanner, int32_t e, hs_dw limit)
     double         p[HS_MAX_DIM], q[HS_MAX_DIM];
     int64_t        of_pair[HS_MAX_DIM];
     hs_metric      metric = scanner->search->scene.metric;
-    const int64_t *shift = hs_pair_batch_pair(&scanner->trace, e, p, q, of_pair);
+    const int64_t *shift = hs_pair_batch_pair(&scanner->pair_batch, e, p, q, of_pair);
     if (limit.hi < 0.0) {
         return false;
     }
@@ -1567,7 +1571,7 @@ decide_by_limit(hs_scanner *scanner, int32_t e, hs_dw limit)
 static void
 decide_by_limits(hs_scanner *scanner, uint8_t *within)
 {
-    const int32_t n = scanner->trace.n;
+    const int32_t n = scanner->pair_batch.n;
     hs_dw         limits[HS_BATCH];
     bool          is_one = scanner->options.precision != HS_SINGLE;
     for (int32_t e = 0; e < n; e++) {
@@ -1578,7 +1582,7 @@ decide_by_limits(hs_scanner *scanner, uint8_t *within)
     if (is_one) {
         hs_metric metric = scanner->search->scene.metric;
         hs_metric_set_cutoff(limits[0].hi, &metric);
-        hs_decide_traced(scanner, &metric, within);
+        hs_decide_pair_batch(scanner, &metric, within);
         return;
     }
     for (int32_t e = 0; e < n; e++) {
@@ -1596,15 +1600,15 @@ decide_by_supports(hs_scanner *scanner, uint8_t *within)
     uint8_t            in_ball[HS_BATCH];
     if (supports->metric.limit.cutoff == 0.0) {
         hs_metric_set_cutoff(0.0, &ball);
-        hs_decide_traced(scanner, &ball, within);
+        hs_decide_pair_batch(scanner, &ball, within);
         return;
     }
     hs_supports_decide(scanner, within);
     if (supports->is_bounded) {
         const hs_stages counted = scanner->stages;
-        hs_decide_traced(scanner, &ball, in_ball);
+        hs_decide_pair_batch(scanner, &ball, in_ball);
         scanner->stages = counted; /* a pair counts once */
-        for (int32_t e = 0; e < scanner->trace.n; e++) {
+        for (int32_t e = 0; e < scanner->pair_batch.n; e++) {
             within[e] = within[e] && in_ball[e];
         }
     }
@@ -1614,15 +1618,15 @@ decide_by_supports(hs_scanner *scanner, uint8_t *within)
 static hs_status
 trace_unsure(hs_scanner *scanner, const hs_scan *scan, int32_t u, int32_t *next)
 {
-    hs_pair_batch *trace = &scanner->trace;
-    hs_pair_batch_clear(trace);
-    for (; u < scan->n_unsure && trace->n < HS_BATCH; u++) {
+    hs_pair_batch *pair_batch = &scanner->pair_batch;
+    hs_pair_batch_clear(pair_batch);
+    for (; u < scan->n_unsure && pair_batch->n < HS_BATCH; u++) {
         const hs_unsure unsure = scan->unsure[u];
-        hs_pair_batch_put(trace, scanner->group.first + unsure.t,
+        hs_pair_batch_put(pair_batch, scanner->group.first + unsure.t,
                           scanner->is_ordered ? scanner->block.origin[unsure.place] : unsure.place);
     }
     *next = u;
-    return hs_pair_batch_look_up(trace, true, &scanner->failed_point);
+    return hs_pair_batch_look_up(pair_batch, true, &scanner->failed_point);
 }
 
 /* Decides scan->unsure, of the points [first, next) of the group, and takes those that are beyond
@@ -1642,7 +1646,7 @@ hs_decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
         } else if (scanner->search->limits != NULL) {
             decide_by_limits(scanner, within);
         } else {
-            hs_decide_traced(scanner, &scanner->search->scene.metric, within);
+            hs_decide_pair_batch(scanner, &scanner->search->scene.metric, within);
         }
         for (int32_t e = 0; e < end - u; e++) {
             scan->unsure[n_beyond] = scan->unsure[u + e]; /* those beyond gather in front */
@@ -1767,7 +1771,7 @@ fill_block(hs_scanner *scanner)
     if (status != HS_OK) {
         return status;
     }
-    hs_records_reset(&scanner->trace.of);
+    hs_records_reset(&scanner->pair_batch.of);
     hs_form_set(scanner);
     if (!scanner->is_ordered) {
         return HS_OK;
@@ -1845,7 +1849,7 @@ static hs_status
 decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
 {
     hs_status status = HS_OK;
-    if (scanner->trace.memory == NULL) {
+    if (scanner->pair_batch.memory == NULL) {
         status = scanner_open_trace(scanner);
     }
     return status == HS_OK ? hs_decide(scanner, scan, first, next) : status;

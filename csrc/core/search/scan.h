@@ -181,42 +181,42 @@ typedef struct hs_pair_batch {
 
 /* needs_given: whether S is wanted, or else only what the metric needs. */
 hs_status hs_pair_batch_init(const hs_search *search, const hs_block *block,
-                             const hs_options *polls, bool needs_given, hs_pair_batch *trace);
-void      hs_pair_batch_free(hs_account *account, hs_pair_batch *trace);
+                             const hs_options *polls, bool needs_given, hs_pair_batch *pair_batch);
+void      hs_pair_batch_free(hs_account *account, hs_pair_batch *pair_batch);
 
 /* Empties the batch. */
 HS_ALWAYS_INLINE void
-hs_pair_batch_clear(hs_pair_batch *trace)
+hs_pair_batch_clear(hs_pair_batch *pair_batch)
 {
-    trace->n = 0;
-    trace->is_shifted = trace->is_wide = false;
+    pair_batch->n = 0;
+    pair_batch->is_shifted = pair_batch->is_wide = false;
 }
 
 /* Adds the pair of point si with the candidate at a place; there must be room. */
 HS_ALWAYS_INLINE void
-hs_pair_batch_put(hs_pair_batch *trace, int32_t si, int32_t place)
+hs_pair_batch_put(hs_pair_batch *pair_batch, int32_t si, int32_t place)
 {
-    trace->si[trace->n] = si;
-    trace->place[trace->n] = place;
-    trace->n++;
+    pair_batch->si[pair_batch->n] = si;
+    pair_batch->place[pair_batch->n] = place;
+    pair_batch->n++;
 }
 
 /* Adds the pairs of point si with the candidates at n places, as far as there is room; returns how
  * many. They are looked up together, because one point has few hits. */
-int32_t hs_pair_batch_add(hs_pair_batch *trace, int32_t si, const int32_t *places, int32_t n);
+int32_t hs_pair_batch_add(hs_pair_batch *pair_batch, int32_t si, const int32_t *places, int32_t n);
 
 /*
  * Fills the arrays of the batch: S, when needs_given, and unless `metric` is false and S needs
  * nothing else, what the metric measures between. HS_OK; HS_ERR_SHIFT_RANGE when a shift passes its
  * range, with the number of the point; HS_ERR_INTERRUPTED.
  */
-hs_status hs_pair_batch_look_up(hs_pair_batch *trace, bool metric, int64_t *failed_point);
+hs_status hs_pair_batch_look_up(hs_pair_batch *pair_batch, bool metric, int64_t *failed_point);
 
 /* The batch as the batch kernels take it. */
-hs_batch hs_pair_batch_view(hs_pair_batch *trace);
+hs_batch hs_pair_batch_view(hs_pair_batch *pair_batch);
 
 /* Pair e as the functions of metric.h take it; returns shift, filled, or NULL for none. */
-const int64_t *hs_pair_batch_pair(const hs_pair_batch *trace, int32_t e, double *p, double *q,
+const int64_t *hs_pair_batch_pair(const hs_pair_batch *pair_batch, int32_t e, double *p, double *q,
                                   int64_t *shift);
 
 /*
@@ -261,7 +261,7 @@ struct hs_scanner {
     hs_form       forms[HS_FORMS]; /* by the last bits of the extent */
     hs_group      group;
     hs_block      block;
-    hs_pair_batch trace;
+    hs_pair_batch pair_batch;
     /* From here on all begins as zero. */
     const hs_search *search;     /* borrowed, read only */
     hs_options       options;    /* the call's, with a poll only for the caller's own thread */
@@ -313,7 +313,7 @@ bool hs_scanner_renew(hs_search *search, hs_block_use use, int32_t capacity, int
 /* Adds what was done to that of the call. */
 void hs_scanner_note(hs_search *search, hs_scanner *scanner);
 
-/* hs_scanner_note, and frees; harmless twice. */
+/* hs_scanner_note, and frees; idempotent. */
 void hs_scanner_close(hs_search *search, hs_scanner *scanner);
 
 /*
@@ -352,8 +352,8 @@ void hs_form_set(hs_scanner *scanner);
 
 /* The exact decision of the hits that float32 could not tell. */
 
-/* Whether each pair of scanner->trace is within the metric's cutoff, which need not be the scene's.
+/* Whether each pair of scanner->pair_batch is within the metric's cutoff, which need not be the scene's.
  * within: HS_BATCH of them. */
-void hs_decide_traced(hs_scanner *scanner, const hs_metric *metric, uint8_t *within);
+void hs_decide_pair_batch(hs_scanner *scanner, const hs_metric *metric, uint8_t *within);
 
 #endif

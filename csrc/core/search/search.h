@@ -112,7 +112,7 @@ hs_search_asking(const hs_search *search)
     return search->has_queries ? &search->query_bins : &search->bins;
 }
 
-/* Frees what it has; harmless twice. The call goes on. */
+/* Frees what it has; idempotent. The call goes on. */
 void hs_search_close(hs_search *search);
 
 /*

@@ -143,7 +143,7 @@ hs_status hs_walk_or_tell(hs_walker *walker, int32_t first, int32_t end, hs_fail
 /* Visit one point, as a group of its own. */
 hs_status hs_walk_point(hs_walker *walker, int32_t si);
 
-/* Adds what was done to that of the call and frees; harmless twice. */
+/* Adds what was done to that of the call and frees; idempotent. */
 void hs_walker_close(hs_search *search, hs_walker *walker);
 
 #endif

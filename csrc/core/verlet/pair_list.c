@@ -646,7 +646,7 @@ count_pairs(building *built, placing *place)
     listing->n_pairs = sum.plain_pair + sum.shifted_pair;
     listing->n_plain_bundles = sum.plain_bundle;
     listing->n_bundles = sum.plain_bundle + sum.shifted_bundle;
-    /* The pieces, which are on no account, and the listing. */
+    /* The pieces, which the account is not charged for, and the listing. */
     return hs_account_allows(account, (double)(2 * sizeof *listing->j) * (double)listing->n_pairs +
                                           (double)(3 * sizeof *listing->bundles) *
                                               (double)listing->n_bundles);

@@ -4,7 +4,7 @@
 
 #include "../base/base.h"
 #include "../scene/scene.h"
-#include "../../kernels/sift.h"
+#include "../../kernels/slab.h"
 #include "../collect/columns.h"
 #include "../search/search.h"
 #include "../box/lattice.h"

@@ -97,7 +97,7 @@ HS_ALWAYS_INLINE double
 put_floats(const hs_recheck *recheck, hs_scale scale, const double *centre, const hs_real real,
            const int d, const int m)
 {
-    const int      stride = hs_sift_stride(d);
+    const int      stride = hs_slab_stride(d);
     double         largest[HS_MAX_DIM] = {0.0}, poison[HS_MAX_DIM] = {0.0}, most = 0.0;
     const int32_t *order = recheck->list->listing.order;
     const int64_t  n = recheck->now->points.n;
@@ -112,7 +112,7 @@ put_floats(const hs_recheck *recheck, hs_scale scale, const double *centre, cons
         for (int k = d; k < stride; k++) {
             y[k] = 0.0f;
         }
-        if (hs_sift_has_numbers(d)) {
+        if (hs_slab_has_numbers(d)) {
             memcpy(y + stride - 1, order + a, sizeof *order);
         }
         for (int k = 0; k < d; k++) {
@@ -152,7 +152,7 @@ static void
 put_offsets(const hs_recheck *recheck, hs_scale scale, double *largest, double *size)
 {
     const hs_images *images = &recheck->list->listing.images;
-    const int        stride = hs_sift_stride(recheck->d);
+    const int        stride = hs_slab_stride(recheck->d);
     *largest = *size = 0.0;
     for (int64_t image = 0; image < images->n; image++) {
         for (int k = 0; k < stride; k++) {
@@ -215,7 +215,7 @@ static hs_status
 recheck_prepare(hs_recheck *recheck)
 {
     hs_account    *account = &recheck->call->account;
-    const int      stride = hs_sift_stride(recheck->d);
+    const int      stride = hs_slab_stride(recheck->d);
     const double   cutoff = recheck->given.cutoff;
     const int      exponent = cutoff > 0.0 ? ilogb(cutoff) : 0;
     const bool     ordinary = exponent >= -ORDINARY_EXPONENT && exponent <= ORDINARY_EXPONENT;
@@ -246,7 +246,7 @@ typedef struct open_batch {
 } open_batch;
 
 static void
-fill_open(const hs_recheck *recheck, const hs_sifted *slab, const hs_open_pair *pairs, int32_t n,
+fill_open(const hs_recheck *recheck, const hs_slab_hits *slab, const hs_open_pair *pairs, int32_t n,
           open_batch *open)
 {
     const hs_listing *listing = &recheck->list->listing;
@@ -288,7 +288,7 @@ decide_open(const hs_recheck *recheck, const open_batch *open, int32_t n, hs_sta
         batch.shift[r] = open->times[r];
     }
     if (!open->is_wide) {
-        recheck->call->kernel->judge(metric, &batch, verdict, stages);
+        recheck->call->kernel->decide_batch(metric, &batch, verdict, stages);
     }
     for (int32_t b = 0; b < n; b++) {
         double p[HS_MAX_DIM], q[HS_MAX_DIM];
@@ -300,14 +300,15 @@ decide_open(const hs_recheck *recheck, const open_batch *open, int32_t n, hs_sta
             p[k] = open->p[k][b];
             q[k] = open->q[k][b];
         }
-        within[b] = open->is_wide ? hs_metric_within(metric, p, q, open->shift[b], stages)
-                                  : hs_metric_settle(metric, p, q, open->shift[b], stages);
+        within[b] = open->is_wide
+                        ? hs_metric_within(metric, p, q, open->shift[b], stages)
+                        : hs_metric_decide_by_integers(metric, p, q, open->shift[b], stages);
     }
 }
 
 /* Takes the hits whose numbers are in `gone`, ascending, from a slab. */
 static void
-drop_hits(hs_sifted *slab, const int32_t *gone, int32_t n)
+drop_hits(hs_slab_hits *slab, const int32_t *gone, int32_t n)
 {
     int32_t to = gone[0], before = 0;
     for (int32_t g = 0; g < n; g++) {
@@ -327,9 +328,9 @@ drop_hits(hs_sifted *slab, const int32_t *gone, int32_t n)
 /* Decides the hits of a slab that float32 cannot tell, of which there are some, and takes those
  * that are beyond the cutoff from the hits. */
 static void
-recheck_decide_unsure(const hs_recheck *recheck, hs_sifted *slab)
+recheck_decide_unsure(const hs_recheck *recheck, hs_slab_hits *slab)
 {
-    int32_t    gone[HS_SIFT], n_gone = 0;
+    int32_t    gone[HS_SLAB], n_gone = 0;
     open_batch open;
     memset(&open, 0, sizeof open); /* kernels read a little beyond the last pair */
     for (int32_t u = 0; u < slab->n_open; u += HS_BATCH) {
@@ -427,10 +428,10 @@ hs_recheck_plan_write(hs_recheck *recheck)
 
 /* What the writer is told of the point a of each bundle. */
 static void
-describe_points(const hs_recheck *recheck, const hs_sifted *slab, bool shifted, hs_write *write)
+describe_points(const hs_recheck *recheck, const hs_slab_hits *slab, bool shifted, hs_write *write)
 {
     hs_bundle_points *of = recheck->of_a;
-    const bool        has_images = hs_sifted_has_images(recheck, slab);
+    const bool        has_images = hs_slab_has_images(recheck, slab);
     for (int32_t t = 0; t < slab->n_bundles; t++) {
         const hs_bundle *bundle = &slab->bundles[t];
         const int64_t    a = bundle->point;
@@ -455,9 +456,9 @@ describe_points(const hs_recheck *recheck, const hs_sifted *slab, bool shifted, 
 /* Writes i, j, d and D; false: it cannot, and what it has written does not count. In
  * recheck.c. */
 static bool
-recheck_write(const hs_recheck *recheck, hs_sifted *slab)
+recheck_write(const hs_recheck *recheck, hs_slab_hits *slab)
 {
-    const bool shifted = hs_sifted_has_images(recheck, slab) || recheck->few != NULL;
+    const bool shifted = hs_slab_has_images(recheck, slab) || recheck->few != NULL;
     hs_write   write = {
           .ndim = recheck->d,
           .is_half = true,
@@ -655,7 +656,7 @@ typedef struct hit_batch {
 
 /* Takes hits [begin, end) of the batch, which are of the present bundle. */
 HS_ALWAYS_INLINE void
-take_of_bundle(const hs_recheck *recheck, const hs_sifted *slab, int32_t begin, int32_t end,
+take_of_bundle(const hs_recheck *recheck, const hs_slab_hits *slab, int32_t begin, int32_t end,
                const int d, hit_batch *HS_RESTRICT batch)
 {
     const int32_t *hits = slab->hits + batch->next;
@@ -684,7 +685,7 @@ take_of_bundle(const hs_recheck *recheck, const hs_sifted *slab, int32_t begin, 
 
 /* Takes the next hits of the slab into the batch. */
 HS_ALWAYS_INLINE void
-take_hits(const hs_recheck *recheck, const hs_sifted *slab, const int d, hit_batch *batch)
+take_hits(const hs_recheck *recheck, const hs_slab_hits *slab, const int d, hit_batch *batch)
 {
     const int32_t left = slab->n_hits - batch->next;
     const int32_t n = left < HS_BATCH ? left : HS_BATCH;
@@ -704,9 +705,9 @@ take_hits(const hs_recheck *recheck, const hs_sifted *slab, const int d, hit_bat
 
 /* The shifts of the batch, for the scene's metric. */
 static void
-fill_shifts(const hs_recheck *recheck, const hs_sifted *slab, hit_batch *batch)
+fill_shifts(const hs_recheck *recheck, const hs_slab_hits *slab, hit_batch *batch)
 {
-    const bool has_images = hs_sifted_has_images(recheck, slab);
+    const bool has_images = hs_slab_has_images(recheck, slab);
     const int  m = recheck->m;
     for (int32_t e = 0; e < batch->measured.n; e++) {
         const hs_bundle *bundle = &slab->bundles[batch->of[e]];
@@ -722,7 +723,7 @@ fill_shifts(const hs_recheck *recheck, const hs_sifted *slab, hit_batch *batch)
 }
 
 static void
-fill(const hs_recheck *recheck, const hs_sifted *slab, hit_batch *batch)
+fill(const hs_recheck *recheck, const hs_slab_hits *slab, hit_batch *batch)
 {
     switch (recheck->d) {
     case 2: take_hits(recheck, slab, 2, batch); break;
@@ -730,13 +731,13 @@ fill(const hs_recheck *recheck, const hs_sifted *slab, hit_batch *batch)
     default: take_hits(recheck, slab, recheck->d, batch);
     }
     batch->measured.is_shifted = batch->measured.is_wide = false;
-    if (recheck->m > 0 && (batch->lagging != 0 || hs_sifted_has_images(recheck, slab))) {
+    if (recheck->m > 0 && (batch->lagging != 0 || hs_slab_has_images(recheck, slab))) {
         fill_shifts(recheck, slab, batch);
     }
 }
 
 static void
-recheck_measure(const hs_recheck *recheck, const hs_sifted *slab)
+recheck_measure(const hs_recheck *recheck, const hs_slab_hits *slab)
 {
     const hs_scene   *scene = &recheck->scene;
     const hs_options *options = &recheck->call->options;
@@ -776,7 +777,7 @@ recheck_measure(const hs_recheck *recheck, const hs_sifted *slab)
 
 /* The hits as point numbers. */
 static hs_hits
-hits_by_number(const hs_recheck *recheck, hs_sifted *slab)
+hits_by_number(const hs_recheck *recheck, hs_slab_hits *slab)
 {
     const hs_listing *listing = &recheck->list->listing;
     const hs_hits     hits = {.n = slab->n_bundles,
@@ -813,7 +814,7 @@ copy_numbers(const int32_t *numbers, int32_t n, int index_bytes, const int step,
 }
 
 static void
-put_indices(const hs_recheck *recheck, hs_sifted *slab)
+put_indices(const hs_recheck *recheck, hs_slab_hits *slab)
 {
     const hs_kernel *kernel = recheck->call->kernel;
     const hs_output *output = recheck->output;
@@ -838,7 +839,7 @@ put_indices(const hs_recheck *recheck, hs_sifted *slab)
 
 /* Where the hits of a bundle begin. */
 HS_ALWAYS_INLINE int32_t
-begin_of(const hs_sifted *slab, int32_t t)
+begin_of(const hs_slab_hits *slab, int32_t t)
 {
     return t > 0 ? slab->hits_end[t - 1] : 0;
 }
@@ -846,7 +847,7 @@ begin_of(const hs_sifted *slab, int32_t t)
 /* S of the hits of one bundle; returns whether a number does not fit. counts: NULL: as if no point
  * had any. */
 HS_ALWAYS_INLINE bool
-put_of_bundle(const hs_recheck *recheck, const hs_sifted *slab, int32_t t, const int64_t *counts,
+put_of_bundle(const hs_recheck *recheck, const hs_slab_hits *slab, int32_t t, const int64_t *counts,
               const int d, const int m, int32_t *to)
 {
     const hs_listing *listing = &recheck->list->listing;
@@ -875,7 +876,7 @@ put_of_bundle(const hs_recheck *recheck, const hs_sifted *slab, int32_t t, const
 
 /* The first point of the first pair of the bundle whose S does not fit; there is one. */
 static int64_t
-first_beyond(const hs_recheck *recheck, const hs_sifted *slab, int32_t t)
+first_beyond(const hs_recheck *recheck, const hs_slab_hits *slab, int32_t t)
 {
     const hs_listing *listing = &recheck->list->listing;
     const int64_t     a = slab->bundles[t].point;
@@ -897,11 +898,11 @@ first_beyond(const hs_recheck *recheck, const hs_sifted *slab, int32_t t)
 /* S, zero over open box vectors; where only sorting needs it, the images alone, which sort as S
  * does and always fit. */
 static void
-put_shifts(const hs_recheck *recheck, hs_sifted *slab)
+put_shifts(const hs_recheck *recheck, hs_slab_hits *slab)
 {
     const bool     images_only = !(recheck->call->options.want & HS_WANT_SHIFT);
     const int64_t *counts = images_only ? NULL : recheck->counts;
-    const bool     any = hs_sifted_has_images(recheck, slab) || counts != NULL;
+    const bool     any = hs_slab_has_images(recheck, slab) || counts != NULL;
     const int      d = recheck->d, m = recheck->m;
     int32_t       *to = hs_recheck_column(recheck, HS_WANT_SHIFT, slab->at);
     if (m < d || !any) {
@@ -920,7 +921,7 @@ put_shifts(const hs_recheck *recheck, hs_sifted *slab)
 
 /* Writes the hits. */
 static void
-recheck_put(const hs_recheck *recheck, hs_sifted *slab)
+recheck_put(const hs_recheck *recheck, hs_slab_hits *slab)
 {
     if (slab->n_hits == 0) {
         return;
@@ -954,22 +955,22 @@ typedef struct recheck_job {
 
 /* What one thread works with. */
 typedef struct worker {
-    hs_committer committer;
-    recheck_job *job;
-    hs_options   options; /* with this thread's poll */
-    hs_recheck   recheck; /* the job's, with this thread's output */
-    hs_sifted   *slab;    /* owned */
-    hs_output    found;   /* owned; pairs that wait for their turn */
-    int64_t      work;    /* since the last poll */
-    hs_counters  done;
+    hs_committer  committer;
+    recheck_job  *job;
+    hs_options    options; /* with this thread's poll */
+    hs_recheck    recheck; /* the job's, with this thread's output */
+    hs_slab_hits *slab;    /* owned */
+    hs_output     found;   /* owned; pairs that wait for their turn */
+    int64_t       work;    /* since the last poll */
+    hs_counters   done;
 } worker;
 
 /* Finds the hits of a slab. */
 static void
-sift_slab(const hs_recheck *recheck, hs_sifted *slab)
+recheck_slab(const hs_recheck *recheck, hs_slab_hits *slab)
 {
-    const bool shifted = hs_sifted_has_images(recheck, slab);
-    hs_sift    sift = {
+    const bool shifted = hs_slab_has_images(recheck, slab);
+    hs_slab    listed = {
            .ndim = recheck->d,
            .y = recheck->y,
            .offset = shifted ? recheck->offset : NULL,
@@ -984,10 +985,10 @@ sift_slab(const hs_recheck *recheck, hs_sifted *slab)
            .hits_end = slab->hits_end,
            .open = slab->open,
     };
-    recheck->call->kernel->sift(&sift);
-    slab->n_bundles = sift.n_bundles;
-    slab->n_hits = sift.n_hits;
-    slab->n_open = sift.n_open;
+    recheck->call->kernel->recheck(&listed);
+    slab->n_bundles = listed.n_bundles;
+    slab->n_hits = listed.n_hits;
+    slab->n_open = listed.n_open;
     if (slab->n_open > 0) {
         recheck_decide_unsure(recheck, slab);
     }
@@ -1012,18 +1013,18 @@ bundle_of(const hs_listing *listing, int64_t pair)
 static int64_t
 slabs_of(int64_t n_pairs)
 {
-    return (n_pairs + HS_SIFT - 1) / HS_SIFT;
+    return (n_pairs + HS_SLAB - 1) / HS_SLAB;
 }
 
 /* Pairs of slab s. */
 static void
-cut_slab(const recheck_job *job, int64_t s, hs_sifted *slab)
+cut_slab(const recheck_job *job, int64_t s, hs_slab_hits *slab)
 {
     const hs_listing *listing = &job->recheck->list->listing;
     const bool        plain = s < job->n_plain;
     const int64_t     end = plain ? listing->n_plain : listing->n_pairs;
-    slab->first = plain ? s * HS_SIFT : listing->n_plain + (s - job->n_plain) * HS_SIFT;
-    slab->n = (int32_t)(end - slab->first < HS_SIFT ? end - slab->first : HS_SIFT);
+    slab->first = plain ? s * HS_SLAB : listing->n_plain + (s - job->n_plain) * HS_SLAB;
+    slab->n = (int32_t)(end - slab->first < HS_SLAB ? end - slab->first : HS_SLAB);
     slab->bundles = listing->bundles + bundle_of(listing, slab->first);
     slab->status = HS_OK;
     slab->stages = (hs_stages){0};
@@ -1032,7 +1033,7 @@ cut_slab(const recheck_job *job, int64_t s, hs_sifted *slab)
 static void
 note_slab(worker *me)
 {
-    const hs_sifted *slab = me->slab;
+    const hs_slab_hits *slab = me->slab;
     me->done.candidates += slab->n;
     me->done.ambiguous += slab->n_open;
     me->done.by_float64 += slab->stages.by_float64;
@@ -1048,9 +1049,9 @@ do_slab(worker *me, int64_t s)
 {
     const hs_listing *listing = &me->job->recheck->list->listing;
     hs_output        *output = me->recheck.output;
-    hs_sifted        *slab = me->slab;
+    hs_slab_hits     *slab = me->slab;
     cut_slab(me->job, s, slab);
-    sift_slab(&me->recheck, slab);
+    recheck_slab(&me->recheck, slab);
     note_slab(me);
     const double done = (double)(slab->first + slab->n) / (double)listing->n_pairs;
     hs_status    status = HS_OK;
@@ -1192,9 +1193,9 @@ recheck_run(hs_recheck *recheck, hs_failure *failure)
     const bool        more = recheck->measures || (recheck->output->columns & HS_WANT_SHIFT);
     recheck_job       job = {.recheck = recheck, .n_plain = slabs_of(listing->n_plain)};
     job.n_slabs = job.n_plain + slabs_of(listing->n_pairs - listing->n_plain);
-    job.in_range = 1 + HS_RANGE_BYTES / (1 + HS_SIFT * hs_output_bytes_per_pair(recheck->output));
+    job.in_range = 1 + HS_RANGE_BYTES / (1 + HS_SLAB * hs_output_bytes_per_pair(recheck->output));
     recheck->shared = recheck->call->team != NULL && job.n_slabs > job.in_range;
-    recheck->numbers = !more && hs_sift_has_numbers(recheck->d);
+    recheck->numbers = !more && hs_slab_has_numbers(recheck->d);
     hs_status status = recheck_prepare(recheck);
     if (status == HS_OK && recheck->measures) {
         status = hs_recheck_open_scene(recheck, failure);

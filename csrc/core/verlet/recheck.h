@@ -9,15 +9,15 @@
 
 /*
  * recheck.h: the pairs of a list that are within the cutoff now, decided as a search decides them:
- * in float32 (kernels/sift.h), and by the exact metric where float32 cannot tell. A slab of the
+ * in float32 (kernels/slab.h), and by the exact metric where float32 cannot tell. A slab of the
  * list at a time; threads work on one each, and what they find is written in the order of the list.
  */
 
 /* The points a of the bundles of a slab, as kernels/write.h wants them. */
 typedef struct hs_bundle_points {
-    int32_t number[HS_SIFT];
-    double  p[HS_WRITE_MOST_DIM][HS_SIFT];
-    int32_t turns[HS_WRITE_MOST_DIM][HS_SIFT];
+    int32_t number[HS_SLAB];
+    double  p[HS_WRITE_MOST_DIM][HS_SLAB];
+    int32_t turns[HS_WRITE_MOST_DIM][HS_SLAB];
 } hs_bundle_points;
 
 /*
@@ -36,7 +36,7 @@ typedef struct hs_recheck {
     hs_metric         given;  /* decides, on points and box vectors as given */
     int64_t          *counts; /* owned; m a point, as those of the list, jumps included; or NULL */
     double            most_counts;    /* the largest of them, of either sign */
-    float            *y;              /* owned; kernels/sift.h */
+    float            *y;              /* owned; kernels/slab.h */
     float            *offset;         /* owned; of each image */
     hs_thresholds     plain, shifted; /* for pairs without and with an image */
     bool              numbers;        /* point numbers are all that is wanted of a hit */
@@ -53,7 +53,7 @@ typedef struct hs_recheck {
 } hs_recheck;
 
 /* The hits of one slab: consecutive pairs, all with or all without an image. */
-typedef struct hs_sifted {
+typedef struct hs_slab_hits {
     int64_t          first; /* pair of the list */
     int32_t          n;
     const hs_bundle *bundles; /* the first is that of pair `first` */
@@ -65,11 +65,11 @@ typedef struct hs_sifted {
     hs_stages        stages;
     /* Places b, or where recheck->numbers says so the caller's numbers of them, and those of a for
      * each bundle; and where the hits of each bundle end. */
-    int32_t      hits[HS_SIFT + HS_PADDING], point[HS_SIFT], hits_end[HS_SIFT];
-    hs_open_pair open[HS_SIFT + 1];
-    int32_t      number[HS_SIFT + HS_PADDING];                     /* recheck.c: of b */
-    int32_t      i[HS_SIFT + HS_PADDING], j[HS_SIFT + HS_PADDING]; /* ... and what is copied */
-} hs_sifted;
+    int32_t      hits[HS_SLAB + HS_PADDING], point[HS_SLAB], hits_end[HS_SLAB];
+    hs_open_pair open[HS_SLAB + 1];
+    int32_t      number[HS_SLAB + HS_PADDING];                     /* recheck.c: of b */
+    int32_t      i[HS_SLAB + HS_PADDING], j[HS_SLAB + HS_PADDING]; /* ... and what is copied */
+} hs_slab_hits;
 
 /* Makes the scene ready that d and D are measured in, so that they have the bits that a search
  * finds, and writes them. */
@@ -88,19 +88,18 @@ hs_recheck_column(const hs_recheck *recheck, unsigned bit, int64_t at)
 
 /* Whether the bundles of a slab have images. */
 HS_ALWAYS_INLINE bool
-hs_sifted_has_images(const hs_recheck *recheck, const hs_sifted *slab)
+hs_slab_has_images(const hs_recheck *recheck, const hs_slab_hits *slab)
 {
     return slab->first >= recheck->list->listing.n_plain;
 }
 
 /* The image of a bundle, over the box vectors that repeat; NULL: none. */
 HS_ALWAYS_INLINE const int32_t *
-hs_recheck_image(const hs_recheck *recheck, const hs_sifted *slab, int32_t bundle)
+hs_recheck_image(const hs_recheck *recheck, const hs_slab_hits *slab, int32_t bundle)
 {
-    return hs_sifted_has_images(recheck, slab)
-               ? recheck->list->listing.images.of +
-                     (int64_t)slab->bundles[bundle].image * recheck->m
-               : NULL;
+    return hs_slab_has_images(recheck, slab) ? recheck->list->listing.images.of +
+                                                   (int64_t)slab->bundles[bundle].image * recheck->m
+                                             : NULL;
 }
 
 /* S from a to b over the box vectors that repeat. image: NULL if they have none. */

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Objects of strangers: asked for their type, their attributes and their text without surprises.
+"""Duck-typed access to objects of other libraries (ASE, MDAnalysis, ...).
 
-Any of these may run code that is not ours. What it raises is put down as the cause of a TypeError
-that names the argument; only what is not the fault of the input passes: MemoryError, Ctrl-C.
+Reading a type, an attribute or a text may run code of theirs. What it raises becomes the cause of a
+TypeError that names the argument; MemoryError and Ctrl-C, which are no fault of the input, pass.
 """
 
 from __future__ import annotations

@@ -135,17 +135,17 @@ static hs_status
 record_unwanted(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     hs_recorder      *recorder = context;
-    const hs_options *polls = scanner->trace.of.polls;
+    const hs_options *polls = scanner->pair_batch.of.polls;
     refusal           once = {.nth = 1};
     hs_options        refusing = *polls;
     refusing.poll = refuse_once;
     refusing.poll_context = &once;
     CHECK(scanner->block.n > HS_POLL_CANDIDATES);
     CHECK(hs_output_reserve(recorder->output, hits->end[hits->n - 1], 0.0) == HS_OK);
-    scanner->trace.of.polls = &refusing;
-    hs_records_reset(&scanner->trace.of); /* as if float32 had told all pairs */
+    scanner->pair_batch.of.polls = &refusing;
+    hs_records_reset(&scanner->pair_batch.of); /* as if float32 had told all pairs */
     const hs_status status = hs_record_places(recorder, scanner, first, hits);
-    scanner->trace.of.polls = polls;
+    scanner->pair_batch.of.polls = polls;
     CHECK(status == HS_ERR_INTERRUPTED && once.n == 1 && recorder->output->n_pairs == 0);
     n_visits++;
     return HS_ERR_INTERRUPTED;

@@ -69,14 +69,15 @@ check_judged(const hs_kernel *kernel, const hs_metric *metric, const scene *s, i
     const hs_batch batch = batch_of(s);
     bool           same = true;
     memset(verdict, 99, sizeof verdict);
-    kernel->judge(metric, &batch, verdict, &stages);
+    kernel->decide_batch(metric, &batch, verdict, &stages);
     CHECK(stages.by_integers == 0);
     for (int32_t e = 0; e < s->n; e++) {
         const one_pair pair = pair_of(s, e);
         const int64_t *shift = s->shifted ? pair.turns : NULL;
         const bool     within = hs_metric_within(metric, pair.p, pair.q, shift, &expected);
         const bool     is_open = verdict[e] == HS_UNDECIDED;
-        same = same && within == (is_open ? hs_metric_settle(metric, pair.p, pair.q, shift, &stages)
+        same = same && within == (is_open ? hs_metric_decide_by_integers(metric, pair.p, pair.q,
+                                                                         shift, &stages)
                                           : verdict[e] == HS_WITHIN);
         *n_open += is_open;
     }

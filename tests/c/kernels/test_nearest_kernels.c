@@ -55,7 +55,7 @@ make_runs(harness_random *random, int32_t n_points, hs_nearest_run *runs, int32_
 }
 
 static void
-check_run(const hs_relate *g, const hs_nearest_run *run)
+check_run(const hs_relative_keys *g, const hs_nearest_run *run)
 {
     bool same = true;
     for (int32_t c = 0; c < run->n; c++) {
@@ -88,7 +88,7 @@ relating_rounds_each_step(void)
             int32_t          n;
             const int32_t    n_runs = make_runs(&random, n_points, runs, &n);
             hs_nearest_image images[2] = {{.is_home = true}, {.is_home = false}};
-            hs_relate        g = {.ndim = 1 + trial % HS_MAX_DIM,
+            hs_relative_keys g = {.ndim = 1 + trial % HS_MAX_DIM,
                                   .images = images,
                                   .unit = ldexp(1.0, below(&random, 40) - 20),
                                   .extent = 1.0 + random_unit(&random)};

@@ -292,17 +292,17 @@ ranges_become_periods(void)
     scene.upper[1] = 9.0;
     scene.t_error[0] = 0x1p-52;
     scene.t_error[1] = 0x1p-51;
-    hs_scene_settle_ranges(&scene);
+    hs_scene_scale_ranges(&scene);
     CHECK(scene.lower[0] == -2.0 && scene.upper[0] == 2.0);
     CHECK(scene.lower[1] == -7.0 && scene.upper[1] == 9.0);
     CHECK(scene.t_error[0] == 0x1p-52 + 0x1p-50 && scene.t_error[1] == 0x1p-51);
     scene.lower[0] = -2.0 - 0x1p-49;
     scene.upper[0] = 2.0 + 0x1p-50;
     scene.t_error[0] = 0.0;
-    hs_scene_settle_ranges(&scene);
+    hs_scene_scale_ranges(&scene);
     CHECK(scene.t_error[0] == 0x1p-49 && scene.lower[0] == -2.0);
     scene.t_error[0] = 0.0;
-    hs_scene_settle_ranges(&scene);
+    hs_scene_scale_ranges(&scene);
     CHECK(scene.t_error[0] == 0.0);
 }
 

@@ -183,12 +183,12 @@ static bool
 is_narrow(void)
 {
     hs_walker     walker;
-    hs_pair_batch trace;
+    hs_pair_batch pair_batch;
     CHECK(hs_walker_init(&unit.search, HS_BLOCK_COUNTS, NULL, NULL, &walker) == HS_OK);
     CHECK(hs_pair_batch_init(&unit.search, &walker.scanner.block, &walker.scanner.options, true,
-                             &trace) == HS_OK);
-    const bool narrow = trace.of.is_narrow;
-    hs_pair_batch_free(&unit.call.account, &trace);
+                             &pair_batch) == HS_OK);
+    const bool narrow = pair_batch.of.is_narrow;
+    hs_pair_batch_free(&unit.call.account, &pair_batch);
     hs_walker_close(&unit.search, &walker);
     return narrow;
 }

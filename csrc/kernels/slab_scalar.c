@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * sift_scalar.c: the test of listed pairs in plain C; the specification of sift_template.h. Two
+ * slab_scalar.c: the test of listed pairs in plain C; the specification of slab_template.h. Two
  * short loops for each tile of a bundle, as in kernel_scalar.c: one tests, one packs, neither
  * branches.
  */
-#include "sift.h"
+#include "slab.h"
 
 #include "../halfshell.h"
 
@@ -34,12 +34,12 @@ square_of_pair(const float *y, const float *centre, const int ndim)
 
 /* q of a bundle. */
 HS_ALWAYS_INLINE void
-set_centre(const hs_sift *sift, const hs_bundle *bundle, const int ndim, float *centre)
+set_centre(const hs_slab *slab, const hs_bundle *bundle, const int ndim, float *centre)
 {
-    const int64_t stride = hs_sift_stride(ndim);
+    const int64_t stride = hs_slab_stride(ndim);
     for (int k = 0; k < ndim; k++) {
-        const float y = sift->y[bundle->point * stride + k];
-        centre[k] = sift->offset != NULL ? y - sift->offset[bundle->image * stride + k] : y;
+        const float y = slab->y[bundle->point * stride + k];
+        centre[k] = slab->offset != NULL ? y - slab->offset[bundle->image * stride + k] : y;
     }
 }
 
@@ -56,7 +56,7 @@ HS_ALWAYS_INLINE bool
 test_tile(const listed *of, int32_t n, const int ndim, float *HS_RESTRICT s,
           int32_t *HS_RESTRICT near)
 {
-    const int64_t  stride = hs_sift_stride(ndim);
+    const int64_t  stride = hs_slab_stride(ndim);
     const float   *y = of->y;
     const int32_t *j = of->j;
     float          centre[HS_MAX_DIM];
@@ -88,51 +88,51 @@ pack_tile(const listed *of, int32_t n, const int stride, const bool numbers,
 }
 
 HS_ALWAYS_INLINE void
-sift_bundles(hs_sift *sift, const int ndim, const bool numbers)
+recheck_bundles(hs_slab *slab, const int ndim, const bool numbers)
 {
-    const int stride = hs_sift_stride(ndim);
-    listed    of = {.y = sift->y, .limit = sift->limit};
+    const int stride = hs_slab_stride(ndim);
+    listed    of = {.y = slab->y, .limit = slab->limit};
     int32_t   at = 0, t = 0;
-    sift->n_open = 0;
-    for (int64_t e = sift->first; e < sift->end; t++) {
-        const hs_bundle *bundle = &sift->bundles[t];
-        const int64_t    end = bundle->end < sift->end ? bundle->end : sift->end;
-        set_centre(sift, bundle, ndim, of.centre);
+    slab->n_open = 0;
+    for (int64_t e = slab->first; e < slab->end; t++) {
+        const hs_bundle *bundle = &slab->bundles[t];
+        const int64_t    end = bundle->end < slab->end ? bundle->end : slab->end;
+        set_centre(slab, bundle, ndim, of.centre);
         while (e < end) {
             const int32_t n = (int32_t)(end - e < TILE ? end - e : TILE);
-            const int32_t pair = (int32_t)(e - sift->first);
+            const int32_t pair = (int32_t)(e - slab->first);
             float         s[TILE];
             int32_t       near[TILE];
-            of.j = sift->j + e;
+            of.j = slab->j + e;
             if (test_tile(&of, n, ndim, s, near)) {
                 for (int32_t o = 0, before = at; o < n; before += near[o], o++) {
-                    if (near[o] && !(s[o] < sift->limit.in)) {
-                        sift->open[sift->n_open++] = (hs_open_pair){t, pair + o, before};
+                    if (near[o] && !(s[o] < slab->limit.in)) {
+                        slab->open[slab->n_open++] = (hs_open_pair){t, pair + o, before};
                     }
                 }
             }
-            at += pack_tile(&of, n, stride, numbers, near, sift->hits + at);
+            at += pack_tile(&of, n, stride, numbers, near, slab->hits + at);
             e += n;
         }
-        sift->hits_end[t] = at;
+        slab->hits_end[t] = at;
         if (numbers) {
-            sift->point[t] = number_of(sift->y + (int64_t)bundle->point * stride, stride);
+            slab->point[t] = number_of(slab->y + (int64_t)bundle->point * stride, stride);
         }
     }
-    sift->n_bundles = t;
-    sift->n_hits = at;
+    slab->n_bundles = t;
+    slab->n_hits = at;
 }
 
 void
-hs_sift_scalar(hs_sift *sift)
+hs_recheck_scalar(hs_slab *slab)
 {
-    const int  d = sift->ndim;
-    const bool numbers = sift->numbers && hs_sift_has_numbers(d);
+    const int  d = slab->ndim;
+    const bool numbers = slab->numbers && hs_slab_has_numbers(d);
     if (d == 2) {
-        numbers ? sift_bundles(sift, 2, true) : sift_bundles(sift, 2, false);
+        numbers ? recheck_bundles(slab, 2, true) : recheck_bundles(slab, 2, false);
     } else if (d == 3) {
-        numbers ? sift_bundles(sift, 3, true) : sift_bundles(sift, 3, false);
+        numbers ? recheck_bundles(slab, 3, true) : recheck_bundles(slab, 3, false);
     } else {
-        sift_bundles(sift, d, numbers);
+        recheck_bundles(slab, d, numbers);
     }
 }
