@@ -13,17 +13,17 @@ from node_oracle import check, gather_rows, random_lists
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])
-@pytest.mark.parametrize("seed", range(12))
-def test_random_lists_are_what_the_definitions_say(seed, d):
-    rng = np.random.default_rng([seed, d])
-    counts = rng.integers(0, 25, rng.integers(0, 5))
-    lists = random_lists(rng, counts, d, lattice=seed % 2 == 0)
-    ghosts, overlap, intersection = (bool(rng.integers(2)) for _ in range(3))
-    extent = float(rng.choice([2.0, 1.1, 0.1 * 7]))
-    c = hs.Connectivity(
-        lists, extent, ghosts=ghosts, overlap=overlap, intersection=intersection
-    )
-    check(c, lists, extent, ghosts)
+def test_random_lists_are_what_the_definitions_say(d):
+    for seed in range(12):
+        rng = np.random.default_rng([seed, d])
+        counts = rng.integers(0, 25, rng.integers(0, 5))
+        lists = random_lists(rng, counts, d, lattice=seed % 2 == 0)
+        ghosts, overlap, intersection = (bool(rng.integers(2)) for _ in range(3))
+        extent = float(rng.choice([2.0, 1.1, 0.1 * 7]))
+        c = hs.Connectivity(
+            lists, extent, ghosts=ghosts, overlap=overlap, intersection=intersection
+        )
+        check(c, lists, extent, ghosts)
 
 
 @settings(max_examples=40, deadline=None)
@@ -149,25 +149,25 @@ def _check_as_a_whole(c, lists, extent):
     c.validate()
 
 
-@pytest.mark.parametrize("extent", [2.0, 0.1, 1.1, 1 / 3])
-def test_a_support_ends_where_the_real_product_does(extent):
+def test_a_support_ends_where_the_real_product_does():
     """extent * h need not be a float64: neighbours of what it is rounded to are on either side."""
-    rng = np.random.default_rng(3)
-    h = rng.uniform(0.5, 1.0, 400)
-    product = extent * h
-    at = np.concatenate((product, np.nextafter(product, 0), np.nextafter(product, 9)))
-    x = np.concatenate((np.zeros(1200), at))[:, None]
-    x = np.column_stack((x, np.tile(np.arange(1200) * 100.0, 2)))  # each pair by itself
-    lists = [
-        hs.NodeList("from", x[:1200], np.tile(h, 3)), hs.NodeList("to", x[1200:], np.zeros(1200))
-    ]  # fmt: skip
-    c = hs.Connectivity(lists, extent)
-    want = [
-        k for k in range(1200)
-        if Fraction(float(at[k])) <= Fraction(extent) * Fraction(float(h[k % 400]))
-    ]  # fmt: skip
-    assert c.pairs.i_node.tolist() == want
-    assert 400 <= len(want) <= 800
+    for extent in (2.0, 0.1, 1.1, 1 / 3):
+        rng = np.random.default_rng(3)
+        h = rng.uniform(0.5, 1.0, 400)
+        product = extent * h
+        at = np.concatenate((product, np.nextafter(product, 0), np.nextafter(product, 9)))
+        x = np.concatenate((np.zeros(1200), at))[:, None]
+        x = np.column_stack((x, np.tile(np.arange(1200) * 100.0, 2)))  # each pair by itself
+        lists = [
+            hs.NodeList("from", x[:1200], np.tile(h, 3)), hs.NodeList("to", x[1200:], np.zeros(1200))
+        ]  # fmt: skip
+        c = hs.Connectivity(lists, extent)
+        want = [
+            k for k in range(1200)
+            if Fraction(float(at[k])) <= Fraction(extent) * Fraction(float(h[k % 400]))
+        ]  # fmt: skip
+        assert c.pairs.i_node.tolist() == want
+        assert 400 <= len(want) <= 800
 
 
 @pytest.mark.slow
@@ -188,18 +188,18 @@ def random_matrices(rng, n, d, aspect=4.0):
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])
-@pytest.mark.parametrize("seed", range(6))
-def test_supports_that_are_ellipsoids(seed, d):
-    rng = np.random.default_rng([seed, d, 7])
-    lists = []
-    for k, n in enumerate((14, 0, 11)):
-        x = rng.integers(0, 5, (n, d)) * 0.5 if seed % 2 else rng.random((n, d)) * 2.5
-        H = random_matrices(rng, n, d) * 1.2
-        if seed % 2:  # many ties: axes along the lattice
-            H = np.einsum("i,ab->iab", rng.choice([1.0, 2.0], n), np.eye(d))
-        lists.append(hs.NodeList(f"{k}", x if n else [], H if n else [], n // 4))
-    options = {name: bool(rng.integers(2)) for name in ("ghosts", "overlap", "intersection")}
-    check(hs.Connectivity(lists, **options), lists, 2.0, options["ghosts"])
+def test_supports_that_are_ellipsoids(d):
+    for seed in range(6):
+        rng = np.random.default_rng([seed, d, 7])
+        lists = []
+        for k, n in enumerate((14, 0, 11)):
+            x = rng.integers(0, 5, (n, d)) * 0.5 if seed % 2 else rng.random((n, d)) * 2.5
+            H = random_matrices(rng, n, d) * 1.2
+            if seed % 2:  # many ties: axes along the lattice
+                H = np.einsum("i,ab->iab", rng.choice([1.0, 2.0], n), np.eye(d))
+            lists.append(hs.NodeList(f"{k}", x if n else [], H if n else [], n // 4))
+        options = {name: bool(rng.integers(2)) for name in ("ghosts", "overlap", "intersection")}
+        check(hs.Connectivity(lists, **options), lists, 2.0, options["ghosts"])
 
 
 def test_needles_of_a_ratio_of_a_million():

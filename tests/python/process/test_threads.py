@@ -198,7 +198,7 @@ import pytest
 import halfshell as hs
 
 def work():
-    for k in range(20):
+    for k in range(8):
         count = hs.count_pairs(np.random.default_rng(k).random((3000, 3)).astype(">f8")[::2], 0.1)
         assert count > 0
         gc.collect()
@@ -213,7 +213,7 @@ print(json.dumps(True))
     )
 
 
-def changing(array, bad, call, seconds=0.3):
+def changing(array, bad, call, seconds=0.1):
     """What `call` raises while another thread writes to the array, but what it may raise."""
     done, good, raised = threading.Event(), array.copy(), set()
 
