@@ -34,7 +34,7 @@ def parts_of(points, cutoff, options, n):
 
 @pytest.mark.parametrize("number, name", [*enumerate(scenes())])
 def test_parts_are_one_search(number, name, monkeypatch):
-    """Points of a piece are divided some at a time; seven parts of tiles, another number at once."""
+    """Points of a piece are divided some at a time, or all of them at once."""
     scene = scenes()[name]
     for tile, n in ((7, 7), (1 << 16, (1, 2, 50)[number % 3])):
         monkeypatch.setattr(brick_pieces, "_TILE", tile)

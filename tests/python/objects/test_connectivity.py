@@ -159,8 +159,9 @@ def test_a_support_ends_where_the_real_product_does():
         x = np.concatenate((np.zeros(1200), at))[:, None]
         x = np.column_stack((x, np.tile(np.arange(1200) * 100.0, 2)))  # each pair by itself
         lists = [
-            hs.NodeList("from", x[:1200], np.tile(h, 3)), hs.NodeList("to", x[1200:], np.zeros(1200))
-        ]  # fmt: skip
+            hs.NodeList("from", x[:1200], np.tile(h, 3)),
+            hs.NodeList("to", x[1200:], np.zeros(1200)),
+        ]
         c = hs.Connectivity(lists, extent)
         want = [
             k for k in range(1200)

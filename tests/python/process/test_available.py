@@ -52,10 +52,6 @@ def machine(megabytes):
     return {"/proc/meminfo": f"MemTotal: 99999999 kB\nMemAvailable: {megabytes * 1024} kB\n"}
 
 
-def test_the_machine_sets_the_limit_where_there_is_no_group(available):
-    assert available(machine(700)) == 700
-
-
 def test_where_the_machine_says_nothing_all_its_memory_counts(available):
     pages = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGESIZE") / MEGA
     assert available({}) == pages
