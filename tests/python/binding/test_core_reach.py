@@ -30,6 +30,7 @@ SELECTION = {
 }  # fmt: skip
 ARRAYS = arrays_among(REACHES)
 REFUSED = r"^(radii and types|the table of cutoffs|supports) must be"
+ENTRIES = "labels must be int64 arrays of one entry for each"
 LABELS = ["groups", "query_groups", "labels", "query_labels", "query_numbers"]
 
 
@@ -92,7 +93,7 @@ def test_a_reach_is_nine_values():
 def test_arrays_of_a_selection_have_an_entry_for_each():
     for name in LABELS:
         for wrong in other_arrays(SELECTION[name]):
-            with pytest.raises(TypeError, match="labels must be int64 arrays of one entry for"):
+            with pytest.raises(TypeError, match=ENTRIES):
                 with_selection(**{name: wrong})
 
 

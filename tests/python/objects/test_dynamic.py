@@ -14,7 +14,6 @@ import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
-from scipy.spatial import cKDTree
 
 import halfshell as hs
 from dynamic_model import Model, check, check_points, keys_of
@@ -181,26 +180,6 @@ def test_65536_operations_on_16384_keys():
             assert mine == set(names[table[row]].tolist()) | {key}
 
 
-@pytest.mark.parametrize("dim, width", [(1, 1.0), (2, 0.25), (3, 0.5)])
-def test_2048_points_in_a_ball(rng, dim, width):
-    """Every true neighbour is near; all storages find the same within."""
-    where = rng.normal(size=(2048, dim))
-    where *= 12.0 * rng.random((2048, 1)) ** (1 / dim) / np.linalg.norm(where, axis=1)[:, None]
-    found = []
-    tree = cKDTree(where)
-    for storage in STORAGES:
-        cells = hs.DynamicCellList(dim, width, storage=storage, max_radius=1.0)
-        cells.insert_many(np.arange(2048), where)
-        offsets, keys = cells.within_many(where, 1.0)
-        found.append([sorted(keys[a:b].tolist()) for a, b in itertools.pairwise(offsets)])
-        for row in range(0, 2048, 16):
-            near = keys_of(cells.near(where[row], 1.0))
-            assert len(set(near)) == len(near)
-            assert set(tree.query_ball_point(where[row], 1.0)) <= set(near)
-    assert found[0] == found[1] == found[2]
-    assert sum(map(len, found[0])) >= 4096
-
-
 # ---- radii and cells -----------------------------------------------------------------------
 
 
@@ -252,23 +231,6 @@ def test_far_points(rng):
 
 
 # ---- bulk, memory, threads -----------------------------------------------------------------
-
-
-@pytest.mark.parametrize("storage", STORAGES)
-def test_bulk_is_one_by_one(rng, storage):
-    box = [[9.0, 0.0, 0.0], [2.0, 8.0, 0.0], [-1.0, 1.0, 7.0]]
-    one, many = (hs.DynamicCellList(3, 1.0, box=box, storage=storage) for _ in range(2))
-    for _ in range(3):
-        keys = rng.permutation(500)[:300]
-        where = rng.normal(scale=9.0, size=(300, 3))
-        many.insert_many(keys, where)
-        for key, x in zip(keys.tolist(), where):
-            one.insert(key, x)
-        assert many.remove_many(keys[:50]).all()
-        assert all(one.remove(key) for key in keys[:50].tolist())
-        assert sorted(one) == sorted(many)
-        for x in where[:50]:
-            assert sorted(one.within(x, 1.0)) == sorted(many.within(x, 1.0))
 
 
 def test_equal_histories_give_equal_orders(rng):

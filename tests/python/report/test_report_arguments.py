@@ -8,6 +8,8 @@ import halfshell as hs
 from halfshell import cli
 from halfshell_report import report, run
 
+PATIENCE = "^patience must be a positive number of seconds, got"
+
 
 class Gone:
     """A sequence that raises an error of its own."""
@@ -38,13 +40,13 @@ def test_unknown_names_are_plain_strings():
 
 def test_patience_that_is_no_number():
     for value in ("x", [1], np.zeros((2, 2)), 1j, object()):
-        with pytest.raises(TypeError, match=r"^patience must be a positive number of seconds"):
+        with pytest.raises(TypeError, match=PATIENCE):
             report([], patience=value)
 
 
 def test_patience_that_is_not_positive():
     for value in (0.0, -1, float("nan"), float("inf")):
-        with pytest.raises(ValueError, match=r"^patience must be a positive number of seconds"):
+        with pytest.raises(ValueError, match=PATIENCE):
             report([], patience=value)
 
 
