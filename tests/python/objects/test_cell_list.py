@@ -206,13 +206,11 @@ def test_many_threads_may_ask_at_once(what, rng):
 
 
 # All at once, or one search of the cells for each radius.
-both_ways = pytest.mark.parametrize("sorted_meanwhile", [1 << 40, 1])
+MEANWHILE = [1 << 40, 1]
 
 
-@both_ways
 @pytest.mark.parametrize("name", SCENES)
-def test_each_query_may_have_a_radius_of_its_own(name, sorted_meanwhile, monkeypatch):
-    monkeypatch.setattr(radii_module, "_SORTED_MEANWHILE", sorted_meanwhile)
+def test_each_query_may_have_a_radius_of_its_own(name, monkeypatch):
     points, cutoff, scene = scene_of(name)
     cells, queries = hs.CellList(points, cutoff, **scene), queries_of(name, 25)
     parts = np.array([0.0, 0.01, 0.3, 0.3, 0.77, 1.0, 1.0, 1.2])
@@ -223,18 +221,20 @@ def test_each_query_may_have_a_radius_of_its_own(name, sorted_meanwhile, monkeyp
         if len(near[i]):
             radii[i] = near[i][0] if i % 2 else np.nextafter(near[i][0], 0.0)
     for inclusive in (True, False):
-        table = cells.query(queries, radii, quantities="jdDS", inclusive=inclusive)
         rows = [
             cells.query(queries[i : i + 1], radius, quantities="jdDS", inclusive=inclusive)[0]
             for i, radius in enumerate(radii.tolist())
         ]
-        assert table.n_rows == len(rows) and all(map(same_arrays, table, rows))
-        narrow = cells.query(queries, radii, inclusive=inclusive, index_dtype=np.int32)
-        assert narrow.indices.dtype == np.int32
-        assert_array_equal(narrow.indices, table.indices)
+        for sorted_meanwhile in MEANWHILE:
+            monkeypatch.setattr(radii_module, "_SORTED_MEANWHILE", sorted_meanwhile)
+            table = cells.query(queries, radii, quantities="jdDS", inclusive=inclusive)
+            assert table.n_rows == len(rows) and all(map(same_arrays, table, rows))
+            narrow = cells.query(queries, radii, inclusive=inclusive, index_dtype=np.int32)
+            assert narrow.indices.dtype == np.int32
+            assert_array_equal(narrow.indices, table.indices)
 
 
-@both_ways
+@pytest.mark.parametrize("sorted_meanwhile", MEANWHILE)
 @pytest.mark.parametrize("precision", ["exact", "double"])
 def test_a_table_of_radii_is_a_table_of_queries(sorted_meanwhile, precision, monkeypatch, rng):
     monkeypatch.setattr(radii_module, "_SORTED_MEANWHILE", sorted_meanwhile)

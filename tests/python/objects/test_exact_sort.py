@@ -150,19 +150,19 @@ def test_what_happens_to_the_arguments_changes_nothing():
 
 
 @pytest.mark.parametrize("maker", makers())
-@pytest.mark.parametrize("letters", ["jd", "jdS"])
-def test_pickles_hold_what_their_rows_need(maker, letters):
-    table = makers()[maker](letters)
-    inner = table[1:8][2:5]
-    filtered = inner.filter(np.arange(inner.n_entries) % 3 == 1)
-    for part in (table, table[3:5], table[4:4], filtered, table[2:6].sort()[1:]):
-        again = part
-        for _ in range(2):
-            again = pickle.loads(pickle.dumps(again))
-        first = copy.deepcopy(again[:1])
-        for one, other in ((part, again), (part[1:], again[1:]), (part[:1], first)):
-            assert same_arrays(one.sort().indices, other.sort().indices)
-    assert copy.copy(table) is table
+def test_pickles_hold_what_their_rows_need(maker):
+    for letters in ("jd", "jdS"):
+        table = makers()[maker](letters)
+        inner = table[1:8][2:5]
+        filtered = inner.filter(np.arange(inner.n_entries) % 3 == 1)
+        for part in (table, table[3:5], table[4:4], filtered, table[2:6].sort()[1:]):
+            again = part
+            for _ in range(2):
+                again = pickle.loads(pickle.dumps(again))
+            first = copy.deepcopy(again[:1])
+            for one, other in ((part, again), (part[1:], again[1:]), (part[:1], first)):
+                assert same_arrays(one.sort().indices, other.sort().indices)
+        assert copy.copy(table) is table
 
 
 def test_pickles_of_few_rows_are_small(rng):
@@ -290,16 +290,16 @@ def test_what_sorting_needs_is_named():
         hs.neighbors(SCENE, 0.25, quantities="d").sort()
 
 
-@pytest.mark.parametrize("at_a_time", [1, 7, 100])
-def test_rows_are_sorted_a_few_at_a_time(at_a_time, monkeypatch):
+def test_rows_are_sorted_a_few_at_a_time(monkeypatch):
     points = crystal(0.1, 4, 3)
     points = np.concatenate([points, [[90.0, 0.0, 0.0]], points + 0.01])  # one row is empty
     table = hs.neighbors(points, 0.2, quantities="jdS")
     whole = table.sort()
-    monkeypatch.setattr(table_rows, "_SORTED_AT_A_TIME", at_a_time)
-    parts = table.sort()
-    assert same_arrays(parts.to_pairs(quantities="ijdS"), whole.to_pairs(quantities="ijdS"))
-    assert_in_exact_order(parts[5:9], points, None, first=5)
-    rows = table[3:90].sort()
-    assert same_arrays(rows.to_pairs(quantities="ijdS"), whole[3:90].to_pairs(quantities="ijdS"))
-    assert hs.neighbors(points[:0], 0.2, quantities="jd").sort().n_entries == 0
+    for at_a_time in (1, 7, 100):
+        monkeypatch.setattr(table_rows, "_SORTED_AT_A_TIME", at_a_time)
+        parts, rows = table.sort(), table[3:90].sort()
+        for one, other in ((parts, whole), (rows, whole[3:90])):
+            pairs = (some.to_pairs(quantities="ijdS") for some in (one, other))
+            assert same_arrays(*pairs)
+        assert_in_exact_order(parts[5:9], points, None, first=5)
+        assert hs.neighbors(points[:0], 0.2, quantities="jd").sort().n_entries == 0
