@@ -14,6 +14,7 @@ import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+from scipy.spatial import cKDTree
 
 import halfshell as hs
 from dynamic_model import Model, check, check_points, keys_of
@@ -178,6 +179,25 @@ def test_65536_operations_on_16384_keys():
         for row, key in enumerate(names.tolist()):
             mine = set(found[offsets[row] : offsets[row + 1]].tolist())
             assert mine == set(names[table[row]].tolist()) | {key}
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_2048_points_in_a_ball(rng, dim):
+    """Every true neighbour is near; all storages find the same within."""
+    where = rng.normal(size=(2048, dim))
+    where *= 12.0 * rng.random((2048, 1)) ** (1 / dim) / np.linalg.norm(where, axis=1)[:, None]
+    tree, found = cKDTree(where), []
+    for width, storage in itertools.product((1.0, 0.5, 0.25), STORAGES):
+        cells = hs.DynamicCellList(dim, width, storage=storage, max_radius=1.0)
+        cells.insert_many(np.arange(2048), where)
+        offsets, keys = cells.within_many(where, 1.0)
+        found.append([sorted(keys[a:b].tolist()) for a, b in itertools.pairwise(offsets)])
+        for row in range(0, 2048, 64):
+            near = keys_of(cells.near(where[row], 1.0))
+            assert len(set(near)) == len(near)
+            assert set(tree.query_ball_point(where[row], 1.0)) <= set(near)
+    assert all(one == found[0] for one in found)
+    assert sum(map(len, found[0])) >= 4096
 
 
 # ---- radii and cells -----------------------------------------------------------------------
