@@ -249,6 +249,11 @@ def wide_ties(n_rows, n_points):
     )  # fmt: skip
 
 
+def test_ties_of_every_scale_are_in_the_order_of_their_numbers():
+    table = wide_ties(3, 20)
+    assert same_arrays(table.sort().indices, table.indices)
+
+
 def peak_of(call):
     tracemalloc.start()
     try:
