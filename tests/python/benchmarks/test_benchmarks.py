@@ -73,34 +73,6 @@ def test_adapters_refuse_what_they_cannot_do(bench: SimpleNamespace) -> None:
     assert peers["vesin"].refuses(load("plane-1e5-k20")) is None
 
 
-def test_turns_are_all_taken_and_results_held(bench: SimpleNamespace) -> None:
-    made: list[str] = []
-
-    def call(name: str) -> Any:
-        made.append(name)
-        return np.zeros(1000)
-
-    turns = {
-        "a": bench.turns.Turn(lambda: call("a"), calls=2, repeats=5),
-        "b": bench.turns.Turn(lambda: call("b"), calls=1, repeats=3),
-    }
-    held = bench.turns.take_turns(turns, keep=True)
-    assert (made.count("a"), made.count("b")) == (10, 3)
-    assert [len(held[name].seconds) for name in "ab"] == [5, 3]
-    assert all(timing.all_held and timing.minimum > 0.0 for timing in held.values())
-    some = bench.turns.take_turns(turns, keep=True, budget=90_000, yields=("a",))
-    assert (some["a"].all_held, some["b"].all_held) == (True, False)
-    dropped = bench.turns.take_turns(turns, keep=False)
-    assert dropped["a"].median >= dropped["a"].minimum
-
-
-def test_short_calls_are_repeated_and_long_ones_are_not(bench: SimpleNamespace) -> None:
-    assert bench.turns.plan_turn(lambda: None, 7, 60.0).calls > 10
-    slow = bench.turns.plan_turn(lambda: bench.turns.time.sleep(0.02), 7, 0.1)
-    assert slow.calls == 1
-    assert 1 <= slow.repeats < 7
-
-
 def test_ratios_are_peer_over_ours_for_the_fastest_complete_peer(bench: SimpleNamespace) -> None:
     rows = bench.report.ratio_rows(
         [
@@ -150,17 +122,6 @@ def test_limits_compare_as_a_whole_by_pair_or_by_point(bench: SimpleNamespace) -
     assert [value for _, _, value, _, _ in rows] == pytest.approx([2.0, 4.0, 1.0, 0.004, 4.0])
 
 
-def test_tables_print_without_the_rich_package(
-    bench: SimpleNamespace, capsys: pytest.CaptureFixture[str]
-) -> None:
-    rows = [measurement(bench, "halfshell", 0.004), measurement(bench, "fast", 0.05)]
-    bench.report.render(bench.report.table_of_contestants(rows), rich=False)
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[2].split()[:2] == ["scene", "contestant"]
-    assert "50 ms" in lines[4]
-    assert "12.50" in lines[4]
-
-
 def test_result_files_name_machine_kernel_commit_and_versions(
     bench: SimpleNamespace, tmp_path: Path
 ) -> None:
@@ -188,22 +149,6 @@ def test_runner_starts_with_nothing_installed(
     monkeypatch.setattr(bench.machine, "touch_memory", lambda n_bytes: None)
     assert bench.run.main(["--quick", "--without-halfshell", "--peers", "--no-pin"]) == 0
     assert "silicon-8: a unit cell" in capsys.readouterr().out
-
-
-def test_stage_shares_are_of_the_pairs(bench: SimpleNamespace) -> None:
-    counted = {
-        "pairs": 200, "candidates": 1000, "ambiguous": 20, "by_float64": 10,
-        "by_double_word": 6, "by_integers": 4, "groups": 3, "bytes_peak": 4096, "bytes": {},
-    }  # fmt: skip
-    row = bench.stages.shares("fcc-tie", counted)
-    assert tuple(sorted(row)) == tuple(sorted(bench.stages.COLUMNS))
-    assert (row["candidates_per_pair"], row["ambiguous"]) == (5.0, 0.1)
-    assert (row["by_float64"], row["by_integers"]) == (0.05, 0.02)
-
-
-def test_memory_allowance_depends_on_the_box(bench: SimpleNamespace) -> None:
-    assert bench.footprint.allowance(bench.scenes.load("open-1e4")) == 8_480_000
-    assert bench.footprint.allowance(bench.scenes.load("triclinic-1e4-k52")) == 8_720_000
 
 
 def test_result_files_of_other_columns_are_left_alone(
@@ -261,15 +206,6 @@ def test_a_library_without_memory_is_left_out(
     )
     assert correct and "cKDTree" not in {row.contestant for row in rows}
     assert "without cKDTree: it asked for more memory" in capsys.readouterr().out
-
-
-def test_single_calls_give_median_and_percentile(bench: SimpleNamespace) -> None:
-    made: list[int] = []
-    single = bench.turns.single_calls({"a": lambda: made.append(1), "b": list}, samples=50)
-    assert len(made) == 50
-    assert all(high >= middle > 0.0 for middle, high in single.values())
-    bench.turns.single_calls({"a": lambda: made.append(1)}, samples=50, patience=0.0)
-    assert len(made) == 51
 
 
 def test_memory_of_dropped_results_is_not_used_again(bench: SimpleNamespace) -> None:
@@ -363,14 +299,6 @@ def test_groups_choose_scenes(bench: SimpleNamespace, capsys: pytest.CaptureFixt
     assert "S13: input order" in capsys.readouterr().out
     with pytest.raises(SystemExit):
         parse(["--group", "S99"])
-
-
-def test_memory_cases_name_a_scene_and_quantities(bench: SimpleNamespace) -> None:
-    parse = bench.footprint.parse_case
-    assert parse("open-1e4") == ("open-1e4", "")
-    assert parse("growth-1e5:ijdDS") == ("growth-1e5", "ijdDS")
-    with pytest.raises(Exception, match="no scene 'nothing'"):
-        parse("nothing:ij")
 
 
 def test_nearest_points_are_compared_by_their_distances(bench: SimpleNamespace) -> None:

@@ -30,6 +30,7 @@ SELECTION = {
 }  # fmt: skip
 ARRAYS = arrays_among(REACHES)
 REFUSED = r"^(radii and types|the table of cutoffs|supports) must be"
+ENTRIES = "labels must be int64 arrays of one entry for each"
 LABELS = ["groups", "query_groups", "labels", "query_labels", "query_numbers"]
 
 
@@ -56,16 +57,16 @@ def other_arrays(array):
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", REACHES)
-def test_a_reach_that_fits_is_taken(kind):
-    assert len(with_reach(REACHES[kind])) == 4
+def test_a_reach_that_fits_is_taken():
+    for kind in REACHES:
+        assert len(with_reach(REACHES[kind])) == 4
 
 
-@pytest.mark.parametrize(("kind", "name"), ARRAYS)
-def test_arrays_of_a_reach_have_an_entry_for_each(kind, name):
-    for wrong in other_arrays(REACHES[kind][name]):
-        with pytest.raises(TypeError, match=REFUSED):
-            with_reach(REACHES[kind] | {name: wrong})
+def test_arrays_of_a_reach_have_an_entry_for_each():
+    for kind, name in ARRAYS:
+        for wrong in other_arrays(REACHES[kind][name]):
+            with pytest.raises(TypeError, match=REFUSED):
+                with_reach(REACHES[kind] | {name: wrong})
 
 
 @pytest.mark.parametrize("name", ["supports", "query_supports"])
@@ -89,11 +90,11 @@ def test_a_reach_is_nine_values():
             with_reach(REACHES["supports"] | {"extent": extent})
 
 
-@pytest.mark.parametrize("name", LABELS)
-def test_arrays_of_a_selection_have_an_entry_for_each(name):
-    for wrong in other_arrays(SELECTION[name]):
-        with pytest.raises(TypeError, match="labels must be int64 arrays of one entry for each"):
-            with_selection(**{name: wrong})
+def test_arrays_of_a_selection_have_an_entry_for_each():
+    for name in LABELS:
+        for wrong in other_arrays(SELECTION[name]):
+            with pytest.raises(TypeError, match=ENTRIES):
+                with_selection(**{name: wrong})
 
 
 def test_excluded_pairs_are_two_columns():

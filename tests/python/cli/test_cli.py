@@ -104,31 +104,6 @@ def test_without_a_file_the_quartz_and_a_cutoff_that_is_named(command):
     assert all(line.startswith("  ") and line[19] == " " != line[20] for line in lines)  # aligned
 
 
-@pytest.mark.parametrize("extension", ["cif", "xyz", "extxyz", "vasp", "pdb", "traj", "gen"])
-def test_reads_what_ase_reads(summary, tmp_path, extension):
-    ase = pytest.importorskip("ase")
-    from ase.build import bulk
-    from ase.io import read, write
-
-    atoms = bulk("NaCl", "rocksalt", a=5.64, cubic=True) * (2, 2, 2)
-    atoms.rattle(0.05, seed=3)
-    path = tmp_path / ("POSCAR" if extension == "vasp" else f"scene.{extension}")
-    write(path, atoms, format=extension if extension != "pdb" else "proteindatabank")
-    seen = read(path)
-    told = summary(path, "--cutoff", "6")
-    assert told["points"] == len(atoms)
-    assert told["unit"] == "angstrom"
-    assert told["periodic"] == seen.pbc.tolist()
-    assert told["species"] == {"Cl": 32, "Na": 32}
-    assert told["pairs"] == hs.count_pairs(
-        seen.positions,
-        6.0,
-        box=seen.cell.array if seen.pbc.any() else None,
-        periodic=seen.pbc if seen.pbc.any() else None,
-    )
-    assert isinstance(seen, ase.Atoms)
-
-
 def test_reads_poscar_by_name(summary, tmp_path):
     pytest.importorskip("ase")
     from ase.build import bulk
@@ -147,7 +122,8 @@ def test_mixed_periodic_axes_come_from_the_file(summary, tmp_path):
     slab.info.clear()
     write(tmp_path / "slab.extxyz", slab)
     told = summary(tmp_path / "slab.extxyz", "--cutoff", "3")
-    assert told["periodic"] == [True, True, False]
+    assert told["periodic"] == [True, True, False] and told["unit"] == "angstrom"
+    assert told["species"] == {"Al": 27} and told["points"] == 27
     assert told["mean_coordination"] == (12 * 9 + 9 * 18) / 27
 
 
@@ -324,13 +300,13 @@ def test_empty_result_is_a_header_or_empty_arrays(summary, npy, tmp_path):
 def test_plot_makes_a_picture(command, npz, npy, tmp_path, name):
     pytest.importorskip("matplotlib")
     starts = {"png": b"\x89PNG\r\n\x1a\n", "pdf": b"%PDF-", "svg": b"<?xml"}
-    for scene in (npz, npy):
-        status, out, err = command("pairs", scene, "--cutoff", "3", "--plot", tmp_path / name)
-        assert (status, err) == (0, "")
-        assert f"plot written to   {tmp_path / name}" in out
-        content = (tmp_path / name).read_bytes()
-        assert content.startswith(starts[name[2:]])
-        assert len(content) > 2000
+    scene = npy if name == "g.pdf" else npz
+    status, out, err = command("pairs", scene, "--cutoff", "3", "--plot", tmp_path / name)
+    assert (status, err) == (0, "")
+    assert f"plot written to   {tmp_path / name}" in out
+    content = (tmp_path / name).read_bytes()
+    assert content.startswith(starts[name[2:]])
+    assert len(content) > 2000
 
 
 def test_radial_distribution_of_an_ideal_gas_is_one():
@@ -478,15 +454,8 @@ def test_wrong_content_is_refused_with_its_place(refusal, tmp_path):
     assert "--index" in line("--index", "0", points=POINTS)
 
 
-def test_nan_in_a_structure_file_is_refused(refusal, tmp_path):
-    pytest.importorskip("ase")
-    (tmp_path / "nan.xyz").write_text("2\n\nH 0 0 0\nH 0 nan 1\n")
-    assert "point 1, coordinate 1 is nan" in refusal("pairs", tmp_path / "nan.xyz")
-
-
-@pytest.mark.parametrize(
-    "args",
-    [
+def test_wrong_options_are_refused(refusal):
+    for args in (
         ["unheard-of"],
         ["pairs", "--unheard-of"],
         ["pairs", "--cutoff"],
@@ -508,10 +477,8 @@ def test_nan_in_a_structure_file_is_refused(refusal, tmp_path):
         ["verify", "--against", "ase", "--strict"],
         ["verify", "--against", "ase", "--kernel", "scalar"],
         ["info", "file"],
-    ],
-)
-def test_wrong_options_are_refused(refusal, args):
-    refusal(*args)
+    ):
+        refusal(*args)
 
 
 def test_what_is_not_installed_is_named(monkeypatch, refusal, npz, tmp_path):
@@ -563,20 +530,20 @@ def test_own_list_is_right(command, npz, kernel):
     assert out.endswith("verdict           right\n")
 
 
-@pytest.mark.parametrize("options", [[], ["--periodic", "F"], ["--periodic", "TFT"]])
 @pytest.mark.parametrize("peer", ["ase", "matscipy", "matscipy-neighbours", "vesin"])
-def test_lists_of_peers_are_checked_by_their_rule(command, npz, peer, options):
-    for module in {"matscipy-neighbours": ["matscipy_neighbours"]}.get(peer, [peer, "ase"]):
-        pytest.importorskip(module)
-    status, out, err = command(
-        "verify", npz, "--cutoff", "3", "--against", peer, "--json", *options
-    )
-    assert (status, err) == (0, "")
-    told = json.loads(out)
-    assert told["ok"]
-    assert (told["inclusive"], told["full"]) == (False, peer != "vesin")
-    assert [check["by"] for check in told["checks"]] == ["search", "integers"]
-    assert told["list"].startswith(peer)
+def test_lists_of_peers_are_checked_by_their_rule(command, npz, peer):
+    for options in ([], ["--periodic", "F"], ["--periodic", "TFT"]):
+        for module in {"matscipy-neighbours": ["matscipy_neighbours"]}.get(peer, [peer, "ase"]):
+            pytest.importorskip(module)
+        status, out, err = command(
+            "verify", npz, "--cutoff", "3", "--against", peer, "--json", *options
+        )
+        assert (status, err) == (0, "")
+        told = json.loads(out)
+        assert told["ok"]
+        assert (told["inclusive"], told["full"]) == (False, peer != "vesin")
+        assert [check["by"] for check in told["checks"]] == ["search", "integers"]
+        assert told["list"].startswith(peer)
 
 
 def test_scipy_is_checked_by_its_rule_and_refuses_what_it_cannot(command, refusal, npz, npy):
@@ -734,16 +701,14 @@ def python(script, **options):
 def test_imports_nothing_that_is_not_needed(npz):
     script = (
         "import sys; from halfshell.cli import main;"
-        "status = main(sys.argv[1:]);"
-        "print({'ase', 'scipy', 'matplotlib', 'rich', 'pandas'} & set(sys.modules));"
-        "sys.exit(status)"
+        "statuses = [main(command.split()) for command in sys.argv[1:]];"
+        "print(statuses, {'ase', 'scipy', 'matplotlib', 'rich', 'pandas'} & set(sys.modules))"
     )
-    for args in (["pairs"], ["pairs", str(npz), "--json"], ["info"], ["verify", str(npz)]):
-        done = subprocess.run(
-            [sys.executable, "-c", script, *args], capture_output=True, text=True, timeout=120
-        )
-        assert done.returncode == 0, done.stderr
-        assert done.stdout.splitlines()[-1] == "set()"
+    commands = ["pairs", f"pairs {npz} --json", "info", f"verify {npz}"]
+    done = subprocess.run(
+        [sys.executable, "-c", script, *commands], capture_output=True, text=True, timeout=120
+    )
+    assert done.stdout.splitlines()[-1] == "[0, 0, 0, 0] set()", done.stderr
 
 
 def test_module_runs_and_exits_with_the_status(tmp_path):

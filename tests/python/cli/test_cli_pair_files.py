@@ -65,28 +65,27 @@ def text(names, *columns, between=","):
 
 @pytest.mark.parametrize("suffix", ["csv", "npz", "parquet"])
 @pytest.mark.parametrize("command", ["pairs", "neighbors"])
-@pytest.mark.parametrize("letters", ["ijdS", "ij", "jDSi", "P"])
-def test_lists_of_ours(run, judged, scene, tmp_path, command, suffix, letters):
-    if suffix == "parquet":
-        pytest.importorskip("pyarrow", reason="pyarrow is not installed")
-    if letters == "P" and command == "neighbors":
-        letters = "ijS"
-    name = f"list.{suffix}"
-    assert run(command, scene, "--cutoff", CUTOFF, "-o", tmp_path / name,
-               "--quantities", letters)[0] == 0  # fmt: skip
-    told = judged(None, name=name)
-    assert told["ok"] and told["full"] == (command == "neighbors")
-    assert [check["by"] for check in told["checks"]] == ["search", "integers"]
-    assert told["rows"] == hs.count_pairs(POINTS, CUTOFF, box=BOX) * (1 + told["full"])
-    status, out, err = run("pairs", tmp_path / name)
-    assert (status, out) == (2, "") and "is a list of pairs (" in err and err.count("\n") == 1
-    if suffix == "npz" and command == "pairs":  # which tells its cutoff
-        assert run("verify", scene, tmp_path / name)[0] == 0
-    else:
-        assert "does not tell its cutoff" in run("verify", scene, tmp_path / name)[2]
+def test_lists_of_ours(run, judged, scene, tmp_path, command, suffix):
+    for letters in ("ijdS", "ij", "jDSi", "P"):
+        if suffix == "parquet":
+            pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+        if letters == "P" and command == "neighbors":
+            letters = "ijS"
+        name = f"list.{suffix}"
+        assert run(command, scene, "--cutoff", CUTOFF, "-o", tmp_path / name,
+                   "--quantities", letters)[0] == 0  # fmt: skip
+        told = judged(None, name=name)
+        assert told["ok"] and told["full"] == (command == "neighbors")
+        assert [check["by"] for check in told["checks"]] == ["search", "integers"]
+        assert told["rows"] == hs.count_pairs(POINTS, CUTOFF, box=BOX) * (1 + told["full"])
+        status, out, err = run("pairs", tmp_path / name)
+        assert (status, out) == (2, "") and "is a list of pairs (" in err and err.count("\n") == 1
+        if suffix == "npz" and command == "pairs":  # which tells its cutoff
+            assert run("verify", scene, tmp_path / name)[0] == 0
+        else:
+            assert "does not tell its cutoff" in run("verify", scene, tmp_path / name)[2]
 
 
-@pytest.mark.parametrize("full", [False, True])
 @pytest.mark.parametrize(
     ("names", "between"),
     [
@@ -96,13 +95,14 @@ def test_lists_of_ours(run, judged, scene, tmp_path, command, suffix, letters):
         ("Atom 1,Atom 2,Shift X,Shift Y,Shift Z", ","),
     ],
 )  # fmt: skip
-def test_columns_are_found_by_their_names(judged, full, names, between):
-    i, j, S = listed(full)
-    told = judged(text(names, i, j, *S.T, between=between))
-    assert told["ok"] and told["full"] == full
-    wrong = judged(text(names, i[1:], j[1:], *S[1:].T, between=between))
-    assert not wrong["ok"] and wrong["full"] == full
-    assert wrong["checks"][0]["examples"]["missed"] == [[i[0], j[0], *S[0]]]
+def test_columns_are_found_by_their_names(judged, names, between):
+    for full in (False, True):
+        i, j, S = listed(full)
+        told = judged(text(names, i, j, *S.T, between=between))
+        assert told["ok"] and told["full"] == full
+        wrong = judged(text(names, i[1:], j[1:], *S[1:].T, between=between))
+        assert not wrong["ok"] and wrong["full"] == full
+        assert wrong["checks"][0]["examples"]["missed"] == [[i[0], j[0], *S[0]]]
 
 
 def test_columns_in_any_order_beside_others(judged):

@@ -70,22 +70,24 @@ CELL = "CRYST1{:9.3f}{:9.3f}{:9.3f}{:7.2f}{:7.2f}{:7.2f} P 1           1\n"
 # ---- placeholders ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("cell", "words"),
-    [((1, 1, 1, 90, 90, 90), "1 x 1 x 1 is a placeholder"), ((0,) * 6, "are zero"),
-     ((10, 10, 10, 0, 0, 0), "are zero")],
-)  # fmt: skip
-def test_a_placeholder_is_no_box(scene, tmp_path, capsys, cell, words):
-    need("ase")
-    found = scene("em.pdb", CELL.format(*cell) + TWO + "END\n")
-    assert found.box is None and not any(found.periodic) and words in found.no_box
-    assert hs.count_pairs(found.points, 2.0) == 1
-    assert cli.main(["pairs", str(tmp_path / "em.pdb"), "--cutoff", "2"]) == 0
-    assert words in capsys.readouterr().out
-    assert cli.main(["pairs", str(tmp_path / "em.pdb"), "--cutoff", "2", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert words in told["no_box"] and told["pairs"] == 1 and told["box"] is None
-    assert told["reader"].startswith("ASE ") and told["dimensions"] == 3
+PLACEHOLDERS = [
+    ((1, 1, 1, 90, 90, 90), "1 x 1 x 1 is a placeholder"), ((0,) * 6, "are zero"),
+    ((10, 10, 10, 0, 0, 0), "are zero"),
+]  # fmt: skip
+
+
+def test_a_placeholder_is_no_box(scene, tmp_path, capsys):
+    for cell, words in PLACEHOLDERS:
+        need("ase")
+        found = scene("em.pdb", CELL.format(*cell) + TWO + "END\n")
+        assert found.box is None and not any(found.periodic) and words in found.no_box
+        assert hs.count_pairs(found.points, 2.0) == 1
+        assert cli.main(["pairs", str(tmp_path / "em.pdb"), "--cutoff", "2"]) == 0
+        assert words in capsys.readouterr().out
+        assert cli.main(["pairs", str(tmp_path / "em.pdb"), "--cutoff", "2", "--json"]) == 0
+        told = json.loads(capsys.readouterr().out)
+        assert words in told["no_box"] and told["pairs"] == 1 and told["box"] is None
+        assert told["reader"].startswith("ASE ") and told["dimensions"] == 3
 
 
 def test_a_box_that_is_meant_stays(scene):
@@ -149,19 +151,19 @@ def lammps(style, rows, masses=""):
     [(" # atomic", "{t}"), ("", "{t}"), (" # full", "1 {t} 0.5"), ("", "1 {t} -0.5"),
      (" # molecular", "7 {t}"), ("", "7 {t}"), (" # charge", "{t} 0.5"), ("", "{t} -0.5")],
 )  # fmt: skip
-@pytest.mark.parametrize("name", ["tiny.data", "data.lmp", "data.unheard-of"])
-def test_lammps_data(scene, style, columns, name):
-    need("ase")
-    rows = [
-        f"{k + 1} {columns.format(t=k % 2 + 1)} {' '.join(map(str, point))} 0 0 1"
-        for k, point in enumerate(POINTS)
-    ]
-    found = scene(name, lammps(style, rows))
-    assert found.points.tolist() == POINTS.tolist()  # not unwrapped by images, which rounds
-    assert found.box.tolist() == np.diag([10.0] * 3).tolist() and all(found.periodic)
-    assert found.species is None and found.unit == "" and "types, not elements" in found.reader
-    masses = "\nMasses\n\n1 15.999\n2 1.008\n"
-    assert scene(name, lammps(style, rows, masses)).species.tolist() == ["O", "H"] * 2
+def test_lammps_data(scene, style, columns):
+    for name in ("tiny.data", "data.lmp", "data.unheard-of"):
+        need("ase")
+        rows = [
+            f"{k + 1} {columns.format(t=k % 2 + 1)} {' '.join(map(str, point))} 0 0 1"
+            for k, point in enumerate(POINTS)
+        ]
+        found = scene(name, lammps(style, rows))
+        assert found.points.tolist() == POINTS.tolist()  # not unwrapped by images, which rounds
+        assert found.box.tolist() == np.diag([10.0] * 3).tolist() and all(found.periodic)
+        assert found.species is None and found.unit == "" and "types, not elements" in found.reader
+        masses = "\nMasses\n\n1 15.999\n2 1.008\n"
+        assert scene(name, lammps(style, rows, masses)).species.tolist() == ["O", "H"] * 2
 
 
 def test_lammps_data_that_fit_no_style(refused):
@@ -335,9 +337,7 @@ def test_what_ase_writes_is_read(tmp_path, form):
         assert hs.count_pairs(found.points, 2.9, box=box) == 24
 
 
-@pytest.mark.parametrize("form", ["gro", "pdb", "crd", "xyz", "dcd", "xtc", "trr", "ncdf", "pqr"])
-def test_what_mdanalysis_writes_is_read(tmp_path, form):
-    need("MDAnalysis", "ase", "scipy")
+def mdanalysis_file(folder, form):
     import MDAnalysis
 
     with warnings.catch_warnings():
@@ -348,8 +348,14 @@ def test_what_mdanalysis_writes_is_read(tmp_path, form):
             universe.add_TopologyAttr(name, values)
         universe.atoms.positions = POINTS
         universe.dimensions = [10, 11, 12, 90, 90, 90]
-        universe.atoms.write(str(tmp_path / f"a.{form}"))
-    found = read_scene(str(tmp_path / f"a.{form}"))
+        universe.atoms.write(str(folder / f"a.{form}"))
+    return folder / f"a.{form}"
+
+
+@pytest.mark.parametrize("form", ["gro", "pdb", "crd", "xyz", "dcd", "xtc", "trr", "ncdf", "pqr"])
+def test_what_mdanalysis_writes_is_read(tmp_path, form):
+    need("MDAnalysis", "ase", "scipy")
+    found = read_scene(str(mdanalysis_file(tmp_path, form)))
     np.testing.assert_allclose(found.points, POINTS, atol=0.011)
     if form in ("gro", "pdb", "dcd", "xtc", "trr", "ncdf"):
         np.testing.assert_allclose(found.box, np.diag([10, 11, 12]), atol=1e-4)
@@ -403,21 +409,21 @@ def test_pts(scene, refused):
 HUGE = 10**14
 
 
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        ("a.xyz", f"{HUGE}\n\nH 0 0 0\n"), ("a.gro", f"title\n{HUGE}\n    1SOL     OW    1\n"),
-        ("a.crd", f"* title\n*\n{HUGE} EXT\n"), ("a.vtk", VTK.format(HUGE)),
-        ("a.data", f"LAMMPS\n\n{HUGE} atoms\n\nAtoms\n\n1 1"),
-        ("a.lammpstrj", f"ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n{HUGE}\nITEM: BOX BOUNDS\n"),
-        ("a.ply", PLY.format(HUGE, OF_PLY)), ("a.pcd", PCD.format(HUGE)),
-        ("a.pts", f"{HUGE}\n0 0 0\n"), ("a.dcd", dcd("NAMD", n_atoms=2**31 - 1)),
-        ("a.dcd", dcd("NAMD", ">", n_atoms=10**9)), ("a.xyz", "1000000\n\nH 0 0 0\n"),
-    ],
-)  # fmt: skip
-def test_headers_that_promise_more_than_the_file_can_hold(refused, name, content):
-    line = refused(name, content)
-    assert "points, more than its" in line and "bytes can" in line
+PROMISES = [
+    ("a.xyz", f"{HUGE}\n\nH 0 0 0\n"), ("a.gro", f"title\n{HUGE}\n    1SOL     OW    1\n"),
+    ("a.crd", f"* title\n*\n{HUGE} EXT\n"), ("a.vtk", VTK.format(HUGE)),
+    ("a.data", f"LAMMPS\n\n{HUGE} atoms\n\nAtoms\n\n1 1"),
+    ("a.lammpstrj", f"ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n{HUGE}\nITEM: BOX BOUNDS\n"),
+    ("a.ply", PLY.format(HUGE, OF_PLY)), ("a.pcd", PCD.format(HUGE)),
+    ("a.pts", f"{HUGE}\n0 0 0\n"), ("a.dcd", dcd("NAMD", n_atoms=2**31 - 1)),
+    ("a.dcd", dcd("NAMD", ">", n_atoms=10**9)), ("a.xyz", "1000000\n\nH 0 0 0\n"),
+]  # fmt: skip
+
+
+def test_headers_that_promise_more_than_the_file_can_hold(refused):
+    for name, content in PROMISES:
+        line = refused(name, content)
+        assert "points, more than its" in line and "bytes can" in line, name
 
 
 def test_numbers_that_are_no_promise(scene):
@@ -456,62 +462,71 @@ def test_fewer_points_than_the_header_says_are_remarked(scene):
         ("xpos,ypos,zpos\n1,2,3\n4,5,6\n", "columns xpos, ypos, zpos"),
     ],
 )  # fmt: skip
-@pytest.mark.parametrize("suffix", ["csv", "txt", ""])
-def test_coordinates_are_found_by_their_names(scene, content, reader, suffix):
-    found = scene(f"points.{suffix}" if suffix else "points", content)
-    assert found.points.tolist() == [[1, 2, 3], [4, 5, 6]]
-    assert found.reader == f"text, {reader}"
+def test_coordinates_are_found_by_their_names(scene, content, reader):
+    for suffix in ("csv", "txt", ""):
+        found = scene(f"points.{suffix}" if suffix else "points", content)
+        assert found.points.tolist() == [[1, 2, 3], [4, 5, 6]]
+        assert found.reader == f"text, {reader}"
 
 
-@pytest.mark.parametrize(
-    ("content", "columns", "points"),
-    [
-        ("a,b,c,d\n0,1,x,3\n", "b,d", [[1, 3]]), ("0 1 2 3\n", "2,4", [[1, 3]]),
-        ("a,b,c\n1,2,3\n", "C,1", [[3, 1]]), ("H 1 2 3\n", "2,3,4", [[1, 2, 3]]),
-        ("1 2 3 4 5 6\n", "1,2,3,4,5,6", [[1, 2, 3, 4, 5, 6]]), ("2 1\n7 8\n", "1", [[2], [7]]),
-    ],
-)  # fmt: skip
-def test_columns_that_are_named(scene, content, columns, points):
-    found = scene("points.csv", content, columns=columns.split(","))
-    assert found.points.tolist() == points
+COLUMNS = [
+    ("a,b,c,d\n0,1,x,3\n", "b,d", [[1, 3]]), ("0 1 2 3\n", "2,4", [[1, 3]]),
+    ("a,b,c\n1,2,3\n", "C,1", [[3, 1]]), ("H 1 2 3\n", "2,3,4", [[1, 2, 3]]),
+    ("1 2 3 4 5 6\n", "1,2,3,4,5,6", [[1, 2, 3, 4, 5, 6]]), ("2 1\n7 8\n", "1", [[2], [7]]),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        ("x,y,z\n1,,3\n4,5,\n", "line 2, field 2: is empty"),
-        ("x,y,z\n1,2,3\n4,5,\n", "line 3, field 3: is empty"),
-        ("0,1.5,2,3\n", "line 1: has 4 numbers without names; --columns"),
-        ("x,y\n1,2,3\n", "line 2: has 3 fields, the first line has 2"),
-        ("x,y,z\n1,2,3\n4,5\n", "line 3: has 2 fields"),
-        ("x,y,z\n1_0,2,3\n", "line 2, field 1: '1_0' is not a number"),
-        ("x,y,z\n0,5,0,0,0,0\n", "with decimal commas, separate the columns by ;"),
-        ("0,5,0,0,0,0\n", "with decimal commas, separate the columns by ;"),
-        ("0,5 0,0 0,0\n", "line 1: '0,5' has a decimal comma"),
-        ("x;y\n0,5;1\n0.5;1\n", "line 3, field 1: '0.5': the file has decimal commas and"),
-        ("i,j,d\n0,1,0.5\n", "is a list of pairs (i, j, d), not points"),
-        ("a,b,c\n1,2,3\n", "columns 'a', 'b', 'c': none are known as coordinates"),
-        ("ra,dec,z\n1,2,3\n", "none are known as coordinates"),
-        ("pos_x,pos_y,com_x,com_y\n1,2,3,4\n", "several may be coordinates"),
-        ("x0,y0,z0,x1,y1,z1\n1,2,3,4,5,6\n", "none are known"),  # two points to a line, not axes
-        ("x_1,y_1,x_2,y_2\n1,2,3,4\n", "none are known"),
-        ("x1,x2,x3,x4,x5,x6,x7,x8,x9\n1" + ",1" * 8, "has 9 columns of coordinates; at most 8"),
-        ("x,x,y\n1,2,3\n", "none are known"), ("3\n1 2 3\n", "line 1: says 3 points, there are 1"),
-        ("x y z\n1e999 0 0\n", "field 1: 1e999 is not a finite number"),
-        ("x y z\n\uff11 0 0\n", "is not a number"), ("x,y,z\n", "holds no points"),
-    ],
-)  # fmt: skip
-def test_text_that_is_refused_says_where(refused, content, words):
-    assert words in refused("points.csv", content)
+def test_columns_that_are_named(scene):
+    for content, columns, points in COLUMNS:
+        found = scene("points.csv", content, columns=columns.split(","))
+        assert found.points.tolist() == points
 
 
-@pytest.mark.parametrize(
-    ("columns", "words"),
-    [("q", "--columns q: names none of the columns 'x', 'y'"), ("3", "names none of the"),
-     ("x,1", "names a column twice")],
-)  # fmt: skip
-def test_columns_that_are_not_there(refused, columns, words):
-    assert words in refused("points.csv", "x,y\n1,2\n", columns=columns.split(","))
+BAD_TEXT = [
+    ("0 0 0\n1 x 3\n", "line 2, field 2: 'x' is not a number"),
+    ("0 0 0\n\n1 2\n", "line 3: has 2 fields, the first line has 3"),
+    ("x y\nz w\n1 2\n", "line 2, field 1: 'z' is not a number"),
+    ("0 y z\n", "line 1, field 2: 'y' is not a number"),
+    ("# nothing\n", "holds no points"),
+    *((f"# three points\n0 0 0\n1 {word} 0\n", f"line 3, field 2: {word} is not a finite number")
+      for word in ("nan", "inf", "-Infinity")),
+    ("x,y,z\n1,,3\n4,5,\n", "line 2, field 2: is empty"),
+    ("x,y,z\n1,2,3\n4,5,\n", "line 3, field 3: is empty"),
+    ("0,1.5,2,3\n", "line 1: has 4 numbers without names; --columns"),
+    ("x,y\n1,2,3\n", "line 2: has 3 fields, the first line has 2"),
+    ("x,y,z\n1,2,3\n4,5\n", "line 3: has 2 fields"),
+    ("x,y,z\n1_0,2,3\n", "line 2, field 1: '1_0' is not a number"),
+    ("x,y,z\n0,5,0,0,0,0\n", "with decimal commas, separate the columns by ;"),
+    ("0,5,0,0,0,0\n", "with decimal commas, separate the columns by ;"),
+    ("0,5 0,0 0,0\n", "line 1: '0,5' has a decimal comma"),
+    ("x;y\n0,5;1\n0.5;1\n", "line 3, field 1: '0.5': the file has decimal commas and"),
+    ("i,j,d\n0,1,0.5\n", "is a list of pairs (i, j, d), not points"),
+    ("a,b,c\n1,2,3\n", "columns 'a', 'b', 'c': none are known as coordinates"),
+    ("ra,dec,z\n1,2,3\n", "none are known as coordinates"),
+    ("pos_x,pos_y,com_x,com_y\n1,2,3,4\n", "several may be coordinates"),
+    ("x0,y0,z0,x1,y1,z1\n1,2,3,4,5,6\n", "none are known"),  # two points to a line, not axes
+    ("x_1,y_1,x_2,y_2\n1,2,3,4\n", "none are known"),
+    ("x1,x2,x3,x4,x5,x6,x7,x8,x9\n1" + ",1" * 8, "has 9 columns of coordinates; at most 8"),
+    ("x,x,y\n1,2,3\n", "none are known"), ("3\n1 2 3\n", "line 1: says 3 points, there are 1"),
+    ("x y z\n1e999 0 0\n", "field 1: 1e999 is not a finite number"),
+    ("x y z\n\uff11 0 0\n", "is not a number"), ("x,y,z\n", "holds no points"),
+]  # fmt: skip
+
+
+def test_text_that_is_refused_says_where(refused):
+    for content, words in BAD_TEXT:
+        assert words in refused("points.csv", content), content
+
+
+NO_COLUMNS = [
+    ("q", "--columns q: names none of the columns 'x', 'y'"), ("3", "names none of the"),
+    ("x,1", "names a column twice")
+]  # fmt: skip
+
+
+def test_columns_that_are_not_there(refused):
+    for columns, words in NO_COLUMNS:
+        assert words in refused("points.csv", "x,y\n1,2\n", columns=columns.split(","))
 
 
 def test_the_summary_says_the_dimension_and_the_columns(tmp_path, capsys):
@@ -561,6 +576,24 @@ def test_clouds_that_have_the_suffix_of_another_format(scene):
     need("ase")
     assert scene("cloud.xyz", ROWS).points.tolist() == POINTS.tolist()
     assert scene("cloud.unheard-of", ROWS).points.tolist() == POINTS.tolist()
+
+
+def test_frames_of_what_ase_does_not_know(tmp_path):
+    """A CHARMM coordinate file."""
+    need("MDAnalysis", "ase")
+    path = str(mdanalysis_file(tmp_path, "crd"))
+    assert len(list(read_frames(path, slice(None)))) == 1
+    with pytest.raises(InputError, match="has no frame 3"):
+        read_scene(path, index=3)
+    with pytest.raises(InputError, match="has none of these frames"):
+        list(read_frames(path, slice(5, None)))
+
+
+def test_without_mdanalysis_its_formats_are_unknown(refused, monkeypatch):
+    need("ase")
+    monkeypatch.setitem(sys.modules, "MDAnalysis", None)
+    assert "unknown format" in refused("points.crd", "* title\n*\n    0\n")
+    assert "unknown format" in refused("points.nothing", "?\n")
 
 
 def test_every_reader_says_why(refused):

@@ -50,9 +50,11 @@ def test_json_has_the_name_as_it_is(command, evil):
         assert json.loads(command(name, evil, "--cutoff", "0.2", "--json")[1])["file"] == evil
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
+def test_messages_escape_names(command, evil):
+    with open("broken" + EVIL, "wb") as stream:
+        stream.write(b"nothing")
+    np.savez("variable.npz", **{"what\x1b]0;title\x07": POINTS})
+    for arguments in (
         ["pairs", "missing" + EVIL],
         ["pairs", "broken" + EVIL],
         ["pairs", EVIL, "--cutoff", "x\x1b"],
@@ -66,16 +68,11 @@ def test_json_has_the_name_as_it_is(command, evil):
         ["report", "-o", EVIL],
         ["report", "--scenes", "\x1b"],
         ["\x1b"],
-    ],
-)
-def test_messages_escape_names(command, evil, arguments):
-    with open("broken" + EVIL, "wb") as stream:
-        stream.write(b"nothing")
-    np.savez("variable.npz", **{"what\x1b]0;title\x07": POINTS})
-    status, out, err = command(*arguments)
-    assert (status, out, err.count("\n")) == (2, "", 1)
-    if arguments[-1] == "variable.npz":
-        assert r"(it holds what\x1b]0;title\x07)" in err
+    ):
+        status, out, err = command(*arguments)
+        assert (status, out, err.count("\n")) == (2, "", 1)
+        if arguments[-1] == "variable.npz":
+            assert r"(it holds what\x1b]0;title\x07)" in err
 
 
 def test_warnings_and_titles_escape_names(command, tmp_path, monkeypatch):

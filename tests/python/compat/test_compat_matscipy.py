@@ -39,19 +39,19 @@ def as_set(i, j, d, S):
 
 
 @pytest.mark.parametrize("name", STRUCTURES)
-@pytest.mark.parametrize("cutoff", [2.0, 3.3, 6.1])
-def test_lists_of_atoms(name, cutoff):
-    atoms = STRUCTURES[name]
-    found = ours.neighbour_list("ijdDS", atoms, cutoff)
-    wanted = theirs.neighbour_list("ijdDS", atoms, cutoff)
-    for one, other in zip(found, wanted, strict=True):
-        assert one.dtype == other.dtype and one.shape == other.shape
-    i, j, d, D, S = found
-    mine, other = as_set(i, j, d, S), as_set(wanted[0], wanted[1], wanted[2], wanted[4])
-    assert mine.keys() == other.keys()
-    assert all(abs(mine[key] - other[key]) < 1e-9 for key in mine)
-    assert np.allclose(D, atoms.positions[j] - atoms.positions[i] + S @ atoms.cell.array)
-    assert np.array_equal(np.lexsort((S[:, 2], S[:, 1], S[:, 0], j, i)), np.arange(len(i)))
+def test_lists_of_atoms(name):
+    for cutoff in (2.0, 3.3, 6.1):
+        atoms = STRUCTURES[name]
+        found = ours.neighbour_list("ijdDS", atoms, cutoff)
+        wanted = theirs.neighbour_list("ijdDS", atoms, cutoff)
+        for one, other in zip(found, wanted, strict=True):
+            assert one.dtype == other.dtype and one.shape == other.shape
+        i, j, d, D, S = found
+        mine, other = as_set(i, j, d, S), as_set(wanted[0], wanted[1], wanted[2], wanted[4])
+        assert mine.keys() == other.keys()
+        assert all(abs(mine[key] - other[key]) < 1e-9 for key in mine)
+        assert np.allclose(D, atoms.positions[j] - atoms.positions[i] + S @ atoms.cell.array)
+        assert np.array_equal(np.lexsort((S[:, 2], S[:, 1], S[:, 0], j, i)), np.arange(len(i)))
 
 
 @pytest.mark.parametrize(
@@ -105,18 +105,18 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("case", WRONG)
-def test_errors_have_the_types_of_the_original(case):
-    arguments = {"quantities": "ij", "atoms": STRUCTURES["molecule"], "cutoff": 2.0, **WRONG[case]}
-    if case == "few numbers":
-        arguments["pbc"] = [True] * 3
-    outcomes = []
-    for module in (theirs, ours):
-        try:
-            outcomes.append(module.neighbour_list(**arguments))
-        except Exception as error:
-            outcomes.append(type(error))
-    assert outcomes[0] == outcomes[1]
+def test_errors_have_the_types_of_the_original():
+    for case, wrong in WRONG.items():
+        arguments = {"quantities": "ij", "atoms": STRUCTURES["molecule"], "cutoff": 2.0, **wrong}
+        if case == "few numbers":
+            arguments["pbc"] = [True] * 3
+        outcomes = []
+        for module in (theirs, ours):
+            try:
+                outcomes.append(module.neighbour_list(**arguments))
+            except Exception as error:
+                outcomes.append(type(error))
+        assert outcomes[0] == outcomes[1], case
 
 
 def test_unknown_elements_and_periods_without_a_cell_are_refused():
@@ -150,15 +150,15 @@ BEYOND = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("nat, i", FIRST)
-def test_first_neighbours(nat, i):
-    if isinstance(nat, float):
-        for module in (ours, theirs):
-            with pytest.raises(TypeError):
-                module.first_neighbours(nat, i)
-        return
-    found, wanted = (module.first_neighbours(nat, i) for module in (ours, theirs))
-    assert found.dtype == wanted.dtype and found.tolist() == wanted.tolist()
+def test_first_neighbours():
+    for nat, i in FIRST:
+        if isinstance(nat, float):
+            for module in (ours, theirs):
+                with pytest.raises(TypeError):
+                    module.first_neighbours(nat, i)
+            continue
+        found, wanted = (module.first_neighbours(nat, i) for module in (ours, theirs))
+        assert found.dtype == wanted.dtype and found.tolist() == wanted.tolist()
 
 
 def test_first_neighbours_of_what_the_original_does_not_take():
@@ -189,21 +189,21 @@ def test_triplets_of_atoms_behind_some_without_neighbours():
 
 
 @pytest.mark.parametrize("name", STRUCTURES)
-@pytest.mark.parametrize("cutoff", [2.0, 3.3])
-def test_counts_and_matrices_are_those_of_lists(name, cutoff):
-    atoms = STRUCTURES[name]
-    i, j, D = ours.neighbour_list("ijD", atoms, cutoff)
-    counts = np.bincount(i, minlength=len(atoms))
-    assert np.array_equal(ours.coordination(atoms, cutoff), counts)
-    parts = {"positions": atoms.positions, "cell": atoms.cell.array, "pbc": atoms.pbc}
-    assert np.array_equal(ours.coordination(cutoff=cutoff, **parts), counts)
-    idx, dist, count = ours.neighbour_matrix(atoms, cutoff, int(counts.max()) + 2)
-    there = np.arange(idx.shape[1]) < count[:, None]
-    assert np.array_equal(count, counts) and np.array_equal(idx[there], j)
-    assert np.array_equal(dist[there], D) and not idx[~there].any() and not dist[~there].any()
-    assert (idx.dtype, dist.dtype, count.dtype) == (np.int64, np.float64, np.int64)
-    if counts[-1]:  # or the array of matscipy is shorter
-        assert np.array_equal(theirs.coordination(atoms, cutoff), counts)
+def test_counts_and_matrices_are_those_of_lists(name):
+    for cutoff in (2.0, 3.3):
+        atoms = STRUCTURES[name]
+        i, j, D = ours.neighbour_list("ijD", atoms, cutoff)
+        counts = np.bincount(i, minlength=len(atoms))
+        assert np.array_equal(ours.coordination(atoms, cutoff), counts)
+        parts = {"positions": atoms.positions, "cell": atoms.cell.array, "pbc": atoms.pbc}
+        assert np.array_equal(ours.coordination(cutoff=cutoff, **parts), counts)
+        idx, dist, count = ours.neighbour_matrix(atoms, cutoff, int(counts.max()) + 2)
+        there = np.arange(idx.shape[1]) < count[:, None]
+        assert np.array_equal(count, counts) and np.array_equal(idx[there], j)
+        assert np.array_equal(dist[there], D) and not idx[~there].any() and not dist[~there].any()
+        assert (idx.dtype, dist.dtype, count.dtype) == (np.int64, np.float64, np.int64)
+        if counts[-1]:  # or the array of matscipy is shorter
+            assert np.array_equal(theirs.coordination(atoms, cutoff), counts)
 
 
 @pytest.mark.parametrize("cutoff", [{("C", "H"): 1.3}, "radii"], ids=str)
@@ -258,7 +258,7 @@ def test_shortest_images(rng):
 
 def test_shortest_images_in_a_skewed_cell(rng):
     """Rounded multiples of the vectors of the cell, as in matscipy, leave longer ones."""
-    vectors = rng.normal(size=(200, 3)) * 8.0
+    vectors = rng.normal(size=(40, 3)) * 8.0
     shifts = np.stack(np.meshgrid(*[np.arange(-30, 31)] * 3, indexing="ij"), -1).reshape(-1, 3)
     found = ours.mic(vectors, SKEWED)
     squares = (found**2).sum(axis=1)
@@ -316,20 +316,20 @@ def test_triplets_of_nothing():
 
 
 @pytest.mark.parametrize("periodic", [(1, 1, 1), (1, 0, 1), (0, 0, 0)])
-@pytest.mark.parametrize("r", [0.4, 0.9, 1.0, 2.5, 4.0])
-def test_points_in_spheres(periodic, r, rng):
-    owner = pytest.importorskip("pymatgen.optimization.neighbors", reason="pymatgen is missing")
-    lattice = np.array([[4.0, 0.0, 0.0], [1.0, 3.5, 0.0], [0.5, -0.5, 3.0]])
-    points = rng.random((30, 3)) @ lattice
-    centres = rng.random((9, 3)) @ lattice
-    pbc = np.array(periodic, np.int64)
-    found = find_points_in_spheres(points, centres, r, pbc, lattice)
-    wanted = owner.find_points_in_spheres(points, centres, r, pbc, lattice)
-    for one, other in zip(found, wanted, strict=True):
-        assert one.dtype == other.dtype and one.shape == other.shape
-    sets = [as_set(i, j, d, S) for i, j, S, d in (found, wanted)]
-    assert sets[0].keys() == sets[1].keys()
-    assert all(abs(sets[0][key] - sets[1][key]) < 1e-9 for key in sets[0])
+def test_points_in_spheres(periodic, rng):
+    for r in (0.4, 0.9, 1.0, 2.5, 4.0):
+        owner = pytest.importorskip("pymatgen.optimization.neighbors", reason="pymatgen is missing")
+        lattice = np.array([[4.0, 0.0, 0.0], [1.0, 3.5, 0.0], [0.5, -0.5, 3.0]])
+        points = rng.random((30, 3)) @ lattice
+        centres = rng.random((9, 3)) @ lattice
+        pbc = np.array(periodic, np.int64)
+        found = find_points_in_spheres(points, centres, r, pbc, lattice)
+        wanted = owner.find_points_in_spheres(points, centres, r, pbc, lattice)
+        for one, other in zip(found, wanted, strict=True):
+            assert one.dtype == other.dtype and one.shape == other.shape
+        sets = [as_set(i, j, d, S) for i, j, S, d in (found, wanted)]
+        assert sets[0].keys() == sets[1].keys()
+        assert all(abs(sets[0][key] - sets[1][key]) < 1e-9 for key in sets[0])
 
 
 def test_spheres_have_a_tolerance():

@@ -20,6 +20,7 @@ SETS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @parametrize_with_checks(
     [ours.RadiusNeighborsTransformer(radius=2.0), ours.KNeighborsTransformer()]
 )

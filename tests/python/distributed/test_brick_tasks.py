@@ -18,12 +18,6 @@ from halfshell._functions.brick_plan import divide, summary
 OPTIONS = {"inclusive": True, "kernel": None, "threads": 1, "memory_limit": None}
 
 
-@pytest.fixture(autouse=True, params=[7, 1 << 16], ids=["tiles", "one tile"])
-def _tiles(request, monkeypatch):
-    """Points of a piece are divided some at a time."""
-    monkeypatch.setattr(brick_pieces, "_TILE", request.param)
-
-
 def parts_of(points, cutoff, options, n):
     array = np.asarray(points)
     chunks = np.array_split(array, 3)
@@ -38,10 +32,16 @@ def parts_of(points, cutoff, options, n):
     return pickle.loads(pickle.dumps(parts)), division
 
 
-@pytest.mark.parametrize("n", [1, 2, 7, 50])
-@pytest.mark.parametrize("name", scenes())
-def test_parts_are_one_search(name, n):
-    points, cutoff, scene = scenes()[name]
+@pytest.mark.parametrize("number, name", [*enumerate(scenes())])
+def test_parts_are_one_search(number, name, monkeypatch):
+    """Points of a piece are divided some at a time, or all of them at once."""
+    scene = scenes()[name]
+    for tile, n in ((7, 7), (1 << 16, (1, 2, 50)[number % 3])):
+        monkeypatch.setattr(brick_pieces, "_TILE", tile)
+        check_parts(*scene, n)
+
+
+def check_parts(points, cutoff, scene, n):
     parts, division = parts_of(points, cutoff, scene, n)
     found = [tasks.pairs_of(part, LETTERS, OPTIONS) for part in parts]
     columns = [np.concatenate(column) for column in zip(*(one[0][1:] for one in found))]

@@ -1,315 +1,351 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`CellList` answers as the functions do, for any cutoff and any queries, and shows its layout."""
+"""`CellList` answers as the functions do, for any cutoff, any queries and any width of cells."""
 
 import copy
 import gc
+import itertools
+import math
 import pickle
 import threading
+import tracemalloc
 import weakref
+from functools import partial
 
 import numpy as np
 import pytest
+from ase import Atoms
+from ase.build import bulk
 from numpy.testing import assert_array_equal
 
 import halfshell as hs
+from cell_scenes import SCENES, WIDTHS, queries_of, scene_of
+from full_lists import same_tables
+from halfshell._objects import radii as radii_module
+from oracles import same_arrays
+from refused_calls import check_refusals
+from subprocesses import RESIDENT, run
 
-QUANTITIES = "ijdDS"
-BOXES = {
-    "open": (None, None),
-    "box": ([9.0, 8.0, 7.0], None),
-    "slab": ([[9.0, 0, 0], [2.0, 8.0, 0], [1.0, -2.0, 7.0]], [True, False, True]),
-    "triclinic": ([[9.0, 0, 0], [4.0, 8.0, 0], [-3.0, 2.0, 7.0]], None),
-    "sheared": ([[9.0, 0, 0], [9000.0, 8.0, 0], [1.0, 8000.0, 7.0]], None),
-    "tiny": ([1.5, 1.25, 1.0], None),
+
+class Alone:
+    """What a list of cells answers, each by a search of its own."""
+
+    def __init__(self, points, **scene):
+        self.points, self.scene = points, scene
+
+    def __getattr__(self, name):
+        return partial(getattr(hs, name), self.points, **self.scene)
+
+    def query(self, queries, radius, **how):
+        return hs.neighbors(self.points, radius, queries=queries, **how, **self.scene)
+
+
+def same(found, expected):
+    if isinstance(expected, hs.NeighborTable):
+        return same_tables(found, expected) and found.shape == expected.shape
+    if isinstance(expected, (int, list)):
+        return type(found) is type(expected) and found == expected
+    return same_arrays(found, expected)
+
+
+# Of cells, a radius, queries, and options.
+ASKS = {
+    "pairs": lambda c, r, q, how: c.pairs(r, quantities="ijdDS", sort=True, **how),
+    "count_pairs": lambda c, r, q, how: c.count_pairs(r, **how),
+    "count, queries": lambda c, r, q, how: c.count_pairs(r, queries=q, **how),
+    "counts": lambda c, r, q, how: c.count_pairs(r * np.array([0.0, 0.5, 0.5, 0.9, 1.0]), **how),
+    "counts, queries": lambda c, r, q, how: c.count_pairs([0.4 * r, r], queries=q, **how),
+    "neighbors": lambda c, r, q, how: c.neighbors(r, quantities="jdDS", **how),
+    "query": lambda c, r, q, how: c.query(q, r, quantities="jdDS", **how),
+    "int32": lambda c, r, q, how: c.query(q, r, index_dtype=np.int32, **how),
+    "coordination": lambda c, r, q, how: c.coordination(r, **how),
+    "coordination, queries": lambda c, r, q, how: c.coordination(r, queries=q, **how),
 }
 
 
-def random_points(n, seed, ndim=3, spread=9.0):
-    return np.random.default_rng(seed).random((n, ndim)) * spread
+@pytest.mark.parametrize("name", SCENES)
+def test_answers_are_those_of_a_search_of_its_own(name):
+    points, cutoff, scene = scene_of(name)
+    alone, queries = Alone(points, **scene), queries_of(name)
+    sizes = [(cutoff or 1.0) * factor for factor in WIDTHS]
+    sized = itertools.cycle([hs.CellList(points, cutoff, cell_size=one, **scene) for one in sizes])
+    plain = hs.CellList(points, cutoff, **scene)
+    for factor in (1.0, 0.3, 0.0, 1.5):
+        for inclusive in (True, False):
+            lists = [plain, next(sized), next(sized)]
+            for what, ask in ASKS.items():
+                asked = (factor * cutoff, queries, {"inclusive": inclusive})
+                expected = ask(alone, *asked)
+                for cells in lists:
+                    assert same(ask(cells, *asked), expected), (what, factor, inclusive)
+    assert plain.count_pairs(cutoff) == plain.count_pairs() == alone.count_pairs(cutoff)
 
 
-def scene_of(name, ndim=3):
-    box, periodic = BOXES[name]
-    return {"box": box, "periodic": periodic}
+def edges_of(points, cutoff, scene, factor):
+    """Edges up to a part of the cutoff or more, some of them exactly at distances."""
+    last = cutoff * factor
+    d = hs.pairs(points, last, quantities="d", **scene)[:3]
+    return np.sort(np.concatenate([[0.0, 0.3 * last, 0.3 * last, last], np.minimum(d, last)]))
 
 
-def assert_same(found, expected):
-    assert len(found) == len(expected)
-    for a, b in zip(found, expected, strict=True):
-        assert_array_equal(a, b)
-        assert a.dtype == b.dtype
+@pytest.mark.parametrize("name", SCENES)
+def test_histograms_are_those_of_a_search_of_its_own(name, rng):
+    points, cutoff, scene = scene_of(name)
+    queries = queries_of(name)
+    lists = [hs.CellList(points, cutoff, cell_size=s, **scene) for s in (None, cutoff / 2 or 1.0)]
+    types, weights = rng.integers(0, 3, len(points)), rng.normal(size=len(points))
+    asked = {"queries": queries}
+    for factor in (1.0, 0.5, 0.001, 1.25):
+        edges = edges_of(points, cutoff, scene, factor)
+        for marks in (
+            {},
+            {"types": types},
+            {"types": types, "weights": weights},
+            asked,
+            {**asked, "types": types, "query_types": rng.integers(0, 2, len(queries))},
+            {**asked, "weights": weights, "query_weights": rng.normal(size=len(queries))},
+        ):
+            expected = hs.pair_histogram(points, edges, **marks, **scene)
+            for cells in lists:
+                assert same_arrays(cells.pair_histogram(edges, **marks), expected)
 
 
-@pytest.mark.parametrize("name", BOXES)
-@pytest.mark.parametrize("factor", [1.0, 0.5, 0.0, 1.5])
-def test_pairs_are_those_of_a_search_of_its_own(name, factor):
-    points, scene = random_points(60 if name == "tiny" else 300, 1), scene_of(name)
-    cells = hs.CellList(points, 2.0, **scene)
-    for inclusive in (True, False):
-        expected = hs.pairs(
-            points, 2.0 * factor, quantities=QUANTITIES, sort=True, inclusive=inclusive, **scene
-        )
-        found = cells.pairs(2.0 * factor, quantities=QUANTITIES, sort=True, inclusive=inclusive)
-        assert_same(found, expected)
-        assert cells.count_pairs(2.0 * factor, inclusive=inclusive) == len(expected[0])
-
-
-@pytest.mark.parametrize("name", BOXES)
-@pytest.mark.parametrize("factor", [1.0, 0.5, 0.0, 1.5])
-def test_queries_get_the_rows_of_neighbors(name, factor):
-    points, scene = random_points(60 if name == "tiny" else 300, 2), scene_of(name)
-    queries = random_points(50, 3, spread=30.0) - 10.0
-    cells = hs.CellList(points, 2.0, **scene)
-    expected = hs.neighbors(points, 2.0 * factor, queries=queries, quantities="jdDS", **scene)
-    found = cells.query(queries, 2.0 * factor, quantities="jdDS")
-    assert_array_equal(found.offsets, expected.offsets)
-    for name_of in ("indices", "distances", "vectors", "shifts"):
-        assert_array_equal(getattr(found, name_of), getattr(expected, name_of))
-    assert cells.count_pairs(2.0 * factor, queries=queries) == expected.n_entries
-    assert_array_equal(cells.coordination(2.0 * factor, queries=queries), expected.counts)
-
-
-@pytest.mark.parametrize("name", ["open", "slab", "tiny"])
-def test_rows_of_the_points_leave_each_point_out(name):
-    points, scene = random_points(80, 4), scene_of(name)
-    cells = hs.CellList(points, 1.5, **scene)
-    expected = hs.neighbors(points, 1.5, quantities="jS", **scene)
-    found = cells.neighbors(quantities="jS")
-    assert_array_equal(found.offsets, expected.offsets)
-    assert_array_equal(found.indices, expected.indices)
-    assert_array_equal(found.shifts, expected.shifts)
-    assert_array_equal(cells.coordination(), expected.counts)
-
-
-@pytest.mark.parametrize("inclusive", [True, False])
-def test_each_query_may_have_a_radius_of_its_own(inclusive):
-    # On a lattice, where many distances are exactly a radius or a step beside it.
-    points = np.stack(np.meshgrid(*[np.arange(5.0)] * 3), -1).reshape(-1, 3)
-    queries = points[::3]
-    rng = np.random.default_rng(5)
-    radii = np.sqrt(rng.integers(0, 9, len(queries)).astype(float))
-    radii = rng.choice([radii, np.nextafter(radii, 9.0), np.nextafter(radii, 0.0)])
-    cells = hs.CellList(points, 2.0, box=[5.0, 5.0, 6.0], periodic=[True, False, True])
-    table = cells.query(queries, radii, quantities="dSj", inclusive=inclusive)
-    for i, radius in enumerate(radii):
-        expected = cells.query(queries[i : i + 1], radius, quantities="dSj", inclusive=inclusive)
-        assert_same(table[i], expected[0])
-
-
-def test_radii_of_no_queries():
-    table = hs.CellList([[0.0]], 1.0).query(np.empty((0, 1)), np.empty(0), quantities="jD")
-    assert table.n_rows == 0 and table.vectors.shape == (0, 1)
-
-
-@pytest.mark.parametrize("kernel", hs.kernels())
-@pytest.mark.parametrize("threads", [1, 2])
-def test_the_answer_depends_on_neither_kernel_nor_threads(kernel, threads):
-    points, queries = random_points(2000, 6), random_points(900, 7)
-    cells = hs.CellList(points, 1.0, box=[9.0, 9.0, 9.0], threads=threads)
-    first = cells.query(queries, quantities="jd", kernel="scalar", threads=1)
-    other = cells.query(queries, quantities="jd", kernel=kernel, threads=threads)
-    assert first.indices.tobytes() == other.indices.tobytes()
-    assert first.distances.tobytes() == other.distances.tobytes()
-
-
-@pytest.mark.parametrize("ndim", [1, 2, 3, 4, 5])
-@pytest.mark.parametrize("periodic", [False, True])
-def test_the_layout_is_a_sort_of_the_points(ndim, periodic):
-    points = random_points(200, ndim, ndim)
-    cells = hs.CellList(points, 2.0, box=[9.0] * ndim if periodic else None)
-    assert cells.cell_ids is None and len(cells.shape) == len(cells.cell_sizes) == ndim
-    assert cells.cell_start[0] == 0 and cells.cell_start[-1] == len(points) == len(cells)
-    assert (np.diff(cells.cell_start) >= 0).all()
-    assert len(cells.cell_start) == np.prod(cells.shape) + 1
-    assert_array_equal(np.sort(cells.order), np.arange(len(points)))
-    home = cells.cell_of(points)
-    for c in range(len(cells.cell_start) - 1):
-        inside = cells.order[cells.cell_start[c] : cells.cell_start[c + 1]]
-        assert (np.diff(inside) > 0).all()
-        assert (home[inside] == c).all()
-
-
-def test_clusters_far_apart_have_occupied_cells_only():
-    points = np.concatenate([random_points(2000, 1, spread=1.0), random_points(2000, 2) + 1e9])
-    cells = hs.CellList(points, 0.1)
-    assert cells.cell_ids.shape == (len(cells.cell_start) - 1, 3)
-    assert len(np.unique(cells.cell_ids, axis=0)) == len(cells.cell_ids)
-    home = cells.cell_of(points)
-    for c in range(0, len(cells.cell_start) - 1, 17):
-        assert (home[cells.order[cells.cell_start[c] : cells.cell_start[c + 1]]] == c).all()
-    assert cells.cell_of([[5e8, 0.0, 0.0]]).tolist() == [-1]
-
-
-@pytest.mark.parametrize("name", BOXES)
-def test_candidates_hold_every_neighbour(name):
-    points, scene = random_points(60 if name == "tiny" else 300, 8), scene_of(name)
-    queries = random_points(40, 9)
-    cells = hs.CellList(points, 1.0, **scene)
-    block = cells.candidates(queries)
-    for i, row in enumerate(cells.query(queries)):
-        ranges = slice(block.offsets[i], block.offsets[i + 1])
-        held = [
-            cells.order[a:b] for a, b in zip(block.start[ranges], block.stop[ranges], strict=True)
-        ]
-        assert set(row.tolist()) <= set(np.concatenate([np.empty(0, int), *held]).tolist())
-
-
-def test_candidates_of_the_points_hold_each_pair_both_ways():
-    points = random_points(200, 10, 2)
-    cells = hs.CellList(points, 1.0)
-    block = cells.candidates()
-    held = [
-        np.concatenate([cells.order[block.start[r] : block.stop[r]] for r in range(a, b)])
-        for a, b in zip(block.offsets[:-1], block.offsets[1:], strict=True)
-    ]
-    for i, j in zip(*cells.pairs(), strict=True):
-        assert j in held[i] and i in held[j]
-    assert all(i in row for i, row in enumerate(held))
-
-
-def test_arrays_are_read_only_and_outlive_the_list():
-    cells = hs.CellList(random_points(100, 11), 1.0)
-    order, start = cells.order, cells.cell_start
-    copies = order.copy(), start.copy()
-    for array in (order, start):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 1
-    del cells
-    gc.collect()
-    np.random.default_rng(0).random(100000)
-    assert_array_equal(order, copies[0])
-    assert_array_equal(start, copies[1])
-
-
-def test_points_are_copied():
-    points = random_points(100, 12)
-    cells = hs.CellList(points, 1.0)
-    expected = cells.count_pairs(), cells.count_pairs(3.0)
-    points[:] = 0.0
-    assert (cells.count_pairs(), cells.count_pairs(3.0)) == expected
-
-
-def test_many_threads_may_ask_at_once():
-    cells = hs.CellList(random_points(3000, 13), 1.0, box=[9.0, 9.0, 9.0])
-    queries = random_points(500, 14)
-    expected = cells.query(queries).indices.tobytes(), cells.count_pairs(0.7)
-    found = []
-
-    def ask():
-        for _ in range(5):
-            found.append((cells.query(queries).indices.tobytes(), cells.count_pairs(0.7)))
-
-    asking = [threading.Thread(target=ask) for _ in range(4)]
-    for thread in asking:
-        thread.start()
-    for thread in asking:
-        thread.join()
-    assert found == [expected] * 20
-
-
-@pytest.mark.parametrize("name", BOXES)
+@pytest.mark.parametrize("name", SCENES)
 def test_nearest_are_those_of_a_search_of_its_own(name):
-    points, scene = random_points(60 if name == "tiny" else 300, 16), scene_of(name)
-    queries = random_points(50, 17, spread=30.0) - 10.0
-    cells = hs.CellList(points, 2.0, **scene)
-    for k in (1, 7, 40):
-        for limit in (np.inf, 1.5):
-            for asking in (None, queries, queries * 100.0, queries[:0]):
-                expected = hs.nearest(
-                    points, k, queries=asking, max_distance=limit, quantities="jdDS", **scene
-                )
-                found = cells.nearest(k, queries=asking, max_distance=limit, quantities="jdDS")
-                assert_same(found, expected)
+    points, cutoff, scene = scene_of(name)
+    cells, alone = hs.CellList(points, cutoff, **scene), Alone(points, **scene)
+    queries = queries_of(name)
+    for k, limit in ((1, np.inf), (7, 0.75 * cutoff), (40, np.inf)):
+        for asking in (None, queries, queries[:0]):
+            how = {"queries": asking, "max_distance": limit, "quantities": "jdDS"}
+            assert same_arrays(cells.nearest(k, **how), alone.nearest(k, **how))
 
 
 def test_nearest_do_not_depend_on_what_the_cells_are_for():
     points = np.stack(np.meshgrid(*[np.arange(4.0)] * 3), -1).reshape(-1, 3) * 0.1
     for cutoff, precision in ((0.0, "exact"), (0.1, "single"), (1e200, "double")):
         cells = hs.CellList(points, cutoff, precision=precision)
-        assert_same(cells.nearest(14), hs.nearest(points, 14))
+        assert same_arrays(cells.nearest(14), hs.nearest(points, 14))
+        far = points[:5] * 100.0
+        assert same_arrays(cells.nearest(3, queries=far), hs.nearest(points, 3, queries=far))
     scene = np.array([[1e300, 0.0], [1e-300, 0.0], [0.0, 3e-300], [0.0, 0.0]])
     cells = hs.CellList(scene, 1.0)
-    assert_same(cells.nearest(2), hs.nearest(scene, 2))
-    assert_same(cells.nearest(2, queries=scene), hs.nearest(scene, 2, queries=scene))
-    assert_same(
-        cells.nearest(2, max_distance=2e-300), hs.nearest(scene, 2, max_distance=2e-300)
-    )
+    for how in ({}, {"queries": scene}, {"max_distance": 2e-300}):
+        assert same_arrays(cells.nearest(2, **how), hs.nearest(scene, 2, **how))
 
 
-def test_nearest_of_many_threads_at_once():
-    points, queries = random_points(3000, 18), random_points(500, 19)
-    expected = hs.nearest(points, 5, queries=queries, quantities="j").tobytes()
-    for _ in range(5):
-        cells, found = hs.CellList(points, 1.0), []
-
-        def ask(cells=cells, found=found):
-            for _ in range(3):
-                found.append(cells.nearest(5, queries=queries, quantities="j").tobytes())
-
-        asking = [threading.Thread(target=ask) for _ in range(4)]
-        for thread in asking:
-            thread.start()
-        for thread in asking:
-            thread.join()
-        assert found == [expected] * 12
-
-
-def test_nearest_of_nothing():
-    cells = hs.CellList(np.empty((0, 2)), 1.0, box=[3.0, 3.0])
-    assert cells.nearest(3)[0].shape == (0, 3)
-    j, d = cells.nearest(3, queries=[[0.0, 0.0]])
-    assert j.tolist() == [[-1] * 3] and np.isinf(d).all()
-    assert hs.CellList([[1.0]], 1.0).nearest(2, queries=np.empty((0, 1)))[0].shape == (0, 2)
+def test_shells_of_a_lattice_by_whole_numbers():
+    shape = (4, 5)
+    points = np.array(list(itertools.product(*map(range, shape))), dtype=np.float64)
+    squares = [
+        (a - c) ** 2 + (b - d) ** 2
+        for (a, b), (c, d) in itertools.combinations(itertools.product(*map(range, shape)), 2)
+    ]
+    cells = hs.CellList(points, 3.0)
+    # Each bin begins at a shell, which counts in it; the last one ends at a shell.
+    limits = [1, 4, 5, 9]
+    edges = [0.0, 1.0, 2.0, math.nextafter(math.sqrt(5.0), 0.0), 3.0]
+    expected = [
+        sum(a <= s < b or (b == 9 and s == 9) for s in squares)
+        for a, b in itertools.pairwise([0, *limits])
+    ]
+    assert cells.pair_histogram(edges).tolist() == expected
+    within = [sum(s <= limit for s in squares) for limit in (1, 4, 9)]
+    assert cells.count_pairs([1.0, 2.0, 3.0]).tolist() == within
 
 
-def test_float32_and_ase_atoms():
-    ase = pytest.importorskip("ase.build")
-    atoms = ase.bulk("NaCl", "rocksalt", a=5.64, cubic=True)
-    cells = hs.CellList(atoms, 4.0)
-    assert_same(
-        cells.pairs(quantities="ijS", sort=True), hs.pairs(atoms, 4.0, quantities="ijS", sort=True)
-    )
-    points = random_points(100, 15).astype(np.float32)
-    assert hs.CellList(points, 2.0).count_pairs() == hs.count_pairs(points, 2.0)
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_histograms_are_exact_for_any_precision(precision):
+    points = np.stack(np.meshgrid(*[np.arange(6.0) * 0.1] * 3), -1).reshape(-1, 3)
+    box, edges = [0.6] * 3, np.array([0.0, 0.1, 0.2, 0.3])
+    cells = hs.CellList(points, 0.3, box=box, precision=precision)
+    assert_array_equal(cells.pair_histogram(edges), hs.pair_histogram(points, edges, box=box))
+    # Counts are by the precision of the list, for one cutoff and for several.
+    assert cells.count_pairs(edges).tolist() == [cells.count_pairs(one) for one in edges]
+    if precision == "double":  # single depends on the cells
+        expected = hs.count_pairs(points, edges, box=box, precision="double")
+        assert_array_equal(cells.count_pairs(edges), expected)
 
 
-def test_empty_lists():
-    cells = hs.CellList(np.empty((0, 2)), 1.0, box=[3.0, 3.0])
-    assert len(cells) == 0 and cells.count_pairs() == 0 and len(cells.order) == 0
-    assert cells.query([[0.0, 0.0]]).counts.tolist() == [0]
-    assert hs.CellList([[1.0]], 1.0).query(np.empty((0, 1))).n_rows == 0
+def test_neither_kernel_nor_threads_matter(rng):
+    points, queries = rng.random((25_000, 3)), rng.random((900, 3))
+    weights, edges = rng.normal(size=len(points)), np.linspace(0.0, 0.05, 12)
+    asks = [
+        lambda cells, how: cells.pair_histogram(edges, weights=weights, **how),
+        lambda cells, how: cells.query(queries, quantities="jd", **how),
+        lambda cells, how: cells.pairs(quantities="P", **how),
+    ]
+    lists = [hs.CellList(points, 0.05, box=1.0, threads=threads) for threads in (1, 2)]
+    for ask in asks:
+        expected = ask(lists[0], {"kernel": "scalar", "threads": 1})
+        for cells, kernel, more in itertools.product(lists, hs.kernels(), ({}, {"threads": 2})):
+            assert same(ask(cells, {"kernel": kernel, **more}), expected)
 
 
-def test_a_list_can_be_collected():
-    class Owner:
-        pass
+@pytest.mark.parametrize("what", ["query", "nearest"])
+def test_many_threads_may_ask_at_once(what, rng):
+    points, queries, found = rng.random((3000, 3)) * 9.0, rng.random((500, 3)) * 9.0, []
+    cells = hs.CellList(points, 1.0, box=9.0)
 
-    owner = Owner()
-    owner.cells = hs.CellList(random_points(10, 1), 1.0)
-    gone = weakref.ref(owner)
-    del owner
-    gc.collect()
-    assert gone() is None
+    def ask(one):
+        if what == "query":
+            return one.query(queries, 1.0).indices.tobytes(), one.count_pairs(0.7)
+        return one.nearest(5, queries=queries, quantities="j").tobytes()
 
-
-@pytest.mark.parametrize("built_for", [0.5, 1.0, 1.01, 2.0])
-@pytest.mark.parametrize("tilt", [None, 0.0, 0.3])
-def test_blocks_and_visits_have_the_order_of_the_pairs(built_for, tilt):
-    for n, cutoff in ((20, 0.45), (1000, 0.3), (20000, 0.1)):
-        points = np.random.default_rng(n).random((n, 3))
-        box = None if tilt is None else np.eye(3) + tilt * np.eye(3, k=-1)
-        cells = hs.CellList(points, built_for * cutoff, box=box)
-        expected = cells.pairs(cutoff, quantities="P")
-        blocks = list(cells.iter_pairs(cutoff, quantities="P", max_pairs=1000))
-        assert_array_equal(np.concatenate(blocks), expected)
-        if n < 20000:
-            seen = []
-            cells.for_each_pair(lambda i, j, *_: seen.append((i, j)), cutoff)  # noqa: B023
-            assert_array_equal(seen, expected)
+    asking = [
+        threading.Thread(target=lambda: found.extend(ask(cells) for _ in range(3)))
+        for _ in range(4)
+    ]
+    for thread in asking:
+        thread.start()
+    for thread in asking:
+        thread.join()
+    assert found == [ask(Alone(points, box=9.0))] * 12
 
 
-def test_more_pairs_than_memory_holds_are_counted_and_streamed():
-    points = np.random.default_rng(18).random((2000, 3))
+# ---- a radius for each query ---------------------------------------------------------------------
+
+
+# All at once, or one search of the cells for each radius.
+MEANWHILE = [1 << 40, 1]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_each_query_may_have_a_radius_of_its_own(name, monkeypatch):
+    points, cutoff, scene = scene_of(name)
+    cells, queries = hs.CellList(points, cutoff, **scene), queries_of(name, 25)
+    parts = np.array([0.0, 0.01, 0.3, 0.3, 0.77, 1.0, 1.0, 1.2])
+    radii = cutoff * np.resize(parts, len(queries))
+    # Some are exactly the distance of a neighbour, or a step less.
+    near = cells.query(queries, cutoff, quantities="d")
+    for i in range(0, len(queries), 3):
+        if len(near[i]):
+            radii[i] = near[i][0] if i % 2 else np.nextafter(near[i][0], 0.0)
+    for inclusive in (True, False):
+        rows = [
+            cells.query(queries[i : i + 1], radius, quantities="jdDS", inclusive=inclusive)[0]
+            for i, radius in enumerate(radii.tolist())
+        ]
+        for sorted_meanwhile in MEANWHILE:
+            monkeypatch.setattr(radii_module, "_SORTED_MEANWHILE", sorted_meanwhile)
+            table = cells.query(queries, radii, quantities="jdDS", inclusive=inclusive)
+            assert table.n_rows == len(rows) and all(map(same_arrays, table, rows))
+            narrow = cells.query(queries, radii, inclusive=inclusive, index_dtype=np.int32)
+            assert narrow.indices.dtype == np.int32
+            assert_array_equal(narrow.indices, table.indices)
+
+
+@pytest.mark.parametrize("sorted_meanwhile", MEANWHILE)
+@pytest.mark.parametrize("precision", ["exact", "double"])
+def test_a_table_of_radii_is_a_table_of_queries(sorted_meanwhile, precision, monkeypatch, rng):
+    monkeypatch.setattr(radii_module, "_SORTED_MEANWHILE", sorted_meanwhile)
+    cells = hs.CellList(rng.random((300, 3)), 0.5, box=1.0, precision=precision)
+    queries, radii = rng.random((40, 3)), rng.choice([0.1, 0.2, 0.3, 0.4], 40)
+    table = cells.query(queries, radii, quantities="jd", index_dtype=np.int32)
+    assert table.quantities == "jd" and table.n_points == 300
+    assert not any(array.flags.writeable for array in table._arrays)
+    queries[:], kept = 0.0, queries.copy()
+    for k, (j, d) in enumerate(table.sort()):
+        alone = cells.query(kept[k : k + 1], radii[k], quantities="jd").sort()
+        assert np.array_equal(j, alone[0][0]) and np.array_equal(d, alone[0][1])
+    with pytest.raises(ValueError, match="one set"):
+        table.reverse()
+
+
+def test_special_radii():
+    cells = hs.CellList([[-1.5e308], [0.0], [1.5e308]], 1.0)
+    table = cells.query([[0.0], [0.0], [0.0]], [1.6e308, 1.4e308, 0.0])
+    assert [row.tolist() for row in table] == [[0, 1, 2], [1], [1]]
+    table = hs.CellList([[0.0]], 1.0).query(np.empty((0, 1)), np.empty(0), quantities="jD")
+    assert table.n_rows == 0 and table.vectors.shape == (0, 1)
+    points, cutoff, scene = scene_of("plane")
+    cells = hs.CellList(points, cutoff, **scene)
+    for radius in (np.array(0.5), np.float32(0.5), np.full(len(points), 0.5)):
+        assert_array_equal(cells.query(points, radius).indices, cells.query(points, 0.5).indices)
+
+
+def test_radii_are_decided_by_the_precision_of_the_list():
+    # Far outside the box rounded and exact distances differ by many last places.
+    points, box = np.random.default_rng(4).random((300, 2)) * 1e6, [3.9, 3.7]
+    cells = hs.CellList(points, 0.5, precision="double", box=box)
+    queries = points[:100]
+    near = hs.neighbors(points, 0.5, queries=queries, quantities="d", box=box)
+    radii = np.array([d[-1] for d in near]) * (1.0 + 1e-12)
+    table = cells.query(queries, radii, quantities="jS")
+    differ = 0
+    for i, radius in enumerate(radii.tolist()):
+        alone = cells.query(queries[i : i + 1], radius, quantities="jS")[0]
+        assert same_arrays(table[i], alone)
+        exact = hs.neighbors(points, radius, queries=queries[i : i + 1], box=box)
+        differ += len(exact[0]) != len(alone[0])
+    assert differ > 0
+
+
+def shell(rng, n=3000):
+    """Points between two spheres about the origin: none within 1.09, all within 1.99."""
+    v = rng.normal(size=(n, 3))
+    v /= np.linalg.norm(v, axis=1)[:, None]
+    return hs.CellList(v * rng.uniform(1.1, 1.8, (n, 1)), 2.0)
+
+
+def test_small_results_of_radii_take_little_memory(rng):
+    # With the largest radius of all, each query at the origin would find every point.
+    cells, origin = shell(rng), np.zeros((3000, 3))
+    for near in (np.full(3000, 1.0), rng.uniform(1.0, 1.09, 3000)):
+        queries, radii = np.vstack([origin, [[50.0, 0.0, 0.0]]]), np.append(near, 1.99)
+        for letters in ("j", "jdDS"):
+            table = cells.query(queries, radii, quantities=letters, memory_limit=20e6)
+            assert table.n_entries == 0 and len(table) == 3001
+    near = np.append(rng.uniform(1.0, 1.09, 2999), 1.18)  # one band, and 1.18 finds some points
+    tracemalloc.start()
+    try:
+        table = cells.query(origin, near)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert table.counts[:-1].sum() == 0 and table.counts[-1] > 0
+    assert peak < 40e6
+    radii = np.append(np.full(200, 1.95), np.full(200, 1.99))  # 3000 neighbours each, 8 bytes
+    assert cells.query(origin[:400], radii, memory_limit=40e6).n_entries == 1_200_000
+    for limit in (3e6, 8e6):
+        with pytest.raises(MemoryError, match="would not fit"):
+            cells.query(origin[:400], radii, memory_limit=limit)
+
+
+# ---- blocks and visits ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_blocks_and_visits_have_the_order_of_the_pairs(name):
+    points, cutoff, scene = scene_of(name)
+    for factor in (1.0, 1.5, 0.5):
+        cells = hs.CellList(points, cutoff * factor, **scene)
+        expected = cells.pairs(cutoff, quantities="ijdDS")
+        m = len(expected[0])
+        for most in {1, 7, max(m, 1), m + 1} if m < 300 else {m // 3, m + 1}:
+            blocks = list(cells.iter_pairs(cutoff, quantities="ijdDS", max_pairs=most))
+            assert len(blocks) == -(-m // most)
+            for k, whole in enumerate(expected):
+                joined = [block[k] for block in blocks]
+                assert_array_equal(np.concatenate([whole[:0], *joined]), whole)
+    seen = []
+    n = cells.for_each_pair(lambda i, j, S, D, d2: seen.append((i, j, S, D)))
+    i, j, S, D = cells.pairs(quantities="ijSD")
+    assert n == len(i) == len(seen)
+    rows = zip(i.tolist(), j.tolist(), map(tuple, S.tolist()), map(tuple, D.tolist()), strict=True)
+    assert seen == list(rows)
+
+
+@pytest.mark.parametrize("built_for, tilt", [(0.5, None), (1.0, 0.3), (1.01, 0.0), (2.0, 0.3)])
+def test_large_lists_are_streamed_in_the_order_of_the_pairs(built_for, tilt):
+    points = np.random.default_rng(9).random((20_000, 3))
+    box = None if tilt is None else np.eye(3) + tilt * np.eye(3, k=-1)
+    cells = hs.CellList(points, built_for * 0.1, box=box)
+    blocks = list(cells.iter_pairs(0.1, quantities="P", max_pairs=1000))
+    assert_array_equal(np.concatenate(blocks), cells.pairs(0.1, quantities="P"))
+
+
+def test_more_pairs_than_memory_holds_are_counted_and_streamed(rng):
+    points = rng.random((2000, 3))
     cells = hs.CellList(points, 1.5, box=[1.0] * 3, memory_limit=5e6)
     assert next(cells.iter_pairs(max_pairs=10))[0].shape == (10,)
     assert cells.count_pairs(0.1) == hs.count_pairs(points, 0.1, box=[1.0] * 3)
@@ -317,31 +353,113 @@ def test_more_pairs_than_memory_holds_are_counted_and_streamed():
         cells.pairs(memory_limit=5e6)
 
 
-def test_candidates_take_the_memory_of_their_ranges_only():
-    # 2e11 pairs would take terabytes.
-    cells = hs.CellList(np.random.default_rng(19).random((1_000_000, 1)), 1000.0, box=[1.0])
-    block = cells.candidates(np.zeros((100, 1)))
-    assert (block.stop - block.start).sum() >= 100 * 1_999 * 1_000_000
-    assert block.offsets[-1] == len(block.start)
-
-
-def test_an_iterator_keeps_its_cells():
-    points = random_points(2000, 16)
+def test_an_iterator_keeps_its_cells(rng):
+    points = rng.random((2000, 3)) * 9.0
     cells = hs.CellList(points, 1.0)
     expected = cells.pairs(quantities="P")
     blocks = cells.iter_pairs(quantities="P", max_pairs=100)
-    abandoned = cells.iter_pairs(max_pairs=100)
+    first, abandoned = next(blocks), cells.iter_pairs(max_pairs=100)
     next(abandoned)
     del cells, abandoned
     gc.collect()
-    others = [hs.CellList(random_points(2000, seed), 1.0) for seed in range(30, 34)]
-    assert_array_equal(np.concatenate(list(blocks)), expected)
+    others = [hs.CellList(rng.random((2000, 3)) * 9.0, 1.0) for _ in range(4)]
+    assert_array_equal(np.concatenate([first, *blocks]), expected)
     assert len(others[0].pairs(quantities="P")) != len(expected)
-    blocks.close()
 
 
-def test_a_list_does_not_change():
-    cells = hs.CellList(random_points(10, 17), 1.0)
+def test_lists_and_iterators_give_their_memory_back():
+    grown = run(RESIDENT + """
+import json
+import numpy as np, halfshell as hs
+points = np.random.default_rng(1).random((200_000, 3))
+held = []
+for turn in range(30):
+    cells = hs.CellList(points, 0.02, box=[1.0] * 3)
+    blocks = cells.iter_pairs(max_pairs=100_000)
+    next(blocks)
+    if turn % 3 == 0:
+        blocks.close()
+        assert list(blocks) == []
+    elif turn % 3 == 1:
+        del cells
+    del blocks
+    held.append(resident())
+print(json.dumps(held[-1] - held[9]))
+""")
+    assert grown < 30e6  # a list has 10 MB
+
+
+def test_progress_is_told_and_may_stop_a_block():
+    points = np.random.default_rng(2).random((60_000, 3))
+    cells = hs.CellList(points, 0.03, box=[1.0] * 3, threads=1)
+    told = []
+    n = sum(len(i) for i, _ in cells.iter_pairs(max_pairs=200_000, progress=told.append))
+    assert n == cells.count_pairs()
+    assert told == sorted(told) and told[-1] == 1.0 and len(told) >= 2
+
+    fails = [False]
+
+    def stop(fraction):
+        if fails[0]:
+            raise KeyError(fraction)
+
+    blocks = cells.iter_pairs(max_pairs=200_000, progress=stop)
+    m = len(next(blocks)[0])
+    fails[0] = True
+    with pytest.raises(KeyError):
+        next(blocks)
+    fails[0] = False
+    assert m + sum(len(i) for i, _ in blocks) == n  # it goes on where it was
+
+
+# ---- what is given, and what stays as it is ------------------------------------------------------
+
+
+def test_queries_may_bring_the_box_of_the_list():
+    crystal = bulk("Cu", cubic=True) * (2, 2, 2)
+    probe = Atoms("H2", positions=[[0.9, 0.9, 0.9], [30.0, -8.0, 1.0]], cell=crystal.cell, pbc=True)
+    cells = hs.CellList(crystal, 3.0)
+    found, whole = cells.pairs(quantities="ijS", sort=True), {"quantities": "ijS", "sort": True}
+    assert same_arrays(found, hs.pairs(crystal, 3.0, **whole))
+    calls = [
+        lambda asking: cells.neighbors(queries=asking).indices,
+        lambda asking: cells.query(asking, [3.0, 2.0]).indices,
+        lambda asking: cells.nearest(4, queries=asking, quantities="j"),
+        lambda asking: cells.pair_histogram([0.0, 1.0, 3.0], queries=asking),
+        lambda asking: cells.coordination(queries=asking),
+        lambda asking: cells.count_pairs(queries=asking),
+        lambda asking: cells.candidates(asking).start,
+        lambda asking: cells.cell_of(asking),
+    ]
+    other = Atoms("H2", positions=probe.positions)
+    for call in calls:
+        assert_array_equal(call(probe), call(probe.positions))
+        with pytest.raises(ValueError, match="bring a box that is not that of points"):
+            call(other)
+    in_open_space = hs.CellList(crystal.positions, 3.0)
+    assert_array_equal(
+        in_open_space.neighbors(queries=other).indices,
+        hs.neighbors(crystal.positions, 3.0, queries=other).indices,
+    )
+    with pytest.raises(ValueError, match="bring a box that is not that of points"):
+        in_open_space.neighbors(queries=probe)
+    with pytest.raises(ValueError, match="queries must have 2 columns"):
+        hs.CellList([[0.0, 0.0]], 1.0).neighbors(queries=probe)
+
+
+def test_a_list_does_not_change(rng):
+    points = rng.random((100, 3)) * 9.0
+    cells = hs.CellList(points, 1.0)
+    expected = cells.count_pairs(), cells.count_pairs(3.0)
+    points[:] = 0.0
+    assert (cells.count_pairs(), cells.count_pairs(3.0)) == expected
+    edges, types = np.array([0.0, 0.5, 1.0]), np.zeros(100, dtype=np.int64)
+    for array in (edges, types):
+        array.flags.writeable = False
+    first = cells.pair_histogram(edges, types=types)
+    assert first.flags.writeable and first.shape == (1, 1, 2)
+    first[:] = -1
+    assert (cells.pair_histogram(edges, types=types) >= 0).all()
     with pytest.raises(AttributeError):
         cells.cutoff = 2.0
     assert copy.copy(cells) is cells and copy.deepcopy([cells])[0] is cells
@@ -349,41 +467,93 @@ def test_a_list_does_not_change():
         pickle.dumps(cells)
 
 
-CELLS = hs.CellList([[0.0, 0.0], [1.0, 1.0]], 1.0)
+def test_a_list_can_be_collected(rng):
+    class Owner:
+        pass
+
+    owner = Owner()
+    owner.cells = hs.CellList(rng.random((10, 3)), 1.0)
+    gone = weakref.ref(owner)
+    del owner
+    gc.collect()
+    assert gone() is None
 
 
-@pytest.mark.parametrize(
-    ("call", "error", "message"),
-    [
-        (lambda: hs.CellList([[0.0, np.nan]], 1.0), ValueError, r"points\[0, 1\]"),
-        (lambda: hs.CellList([[0.0]], -1.0), ValueError, "cutoff"),
-        (lambda: hs.CellList([[0.0]], 1.0, periodic=True), ValueError, "periodic needs a box"),
-        (lambda: hs.CellList("ab", 1.0), TypeError, "points"),
-        (lambda: CELLS.query([[0.0]]), ValueError, "queries must have 2 columns"),
-        (lambda: CELLS.query([[0.0, np.inf]]), ValueError, r"queries\[0, 1\]"),
-        (lambda: CELLS.query([[0.0, 0.0]], -1.0), ValueError, "radius .* got -1.0"),
-        (lambda: CELLS.query([[0.0, 0.0]], np.nan), ValueError, "radius .* got nan"),
-        (lambda: CELLS.query([[0.0, 0.0]], 10**400), OverflowError, "radius"),
-        (lambda: CELLS.query([[0.0, 0.0]], [1.0, 2.0]), ValueError, r"shape \(1,\)"),
-        (lambda: CELLS.query([[0.0, 0.0]], [-1.0]), ValueError, r"radius\[0\]"),
-        (lambda: CELLS.query([[0.0, 0.0]], "a"), TypeError, "radius"),
+def test_empty_lists():
+    cells = hs.CellList(np.empty((0, 2)), 1.0, box=[3.0, 3.0])
+    assert len(cells) == 0 and cells.count_pairs() == 0 and len(cells.order) == 0
+    assert cells.query([[0.0, 0.0]]).counts.tolist() == [0]
+    assert cells.nearest(3)[0].shape == (0, 3)
+    j, d = cells.nearest(3, queries=[[0.0, 0.0]])
+    assert j.tolist() == [[-1] * 3] and np.isinf(d).all()
+    one = hs.CellList([[1.0]], 1.0)
+    assert one.query(np.empty((0, 1))).n_rows == 0
+    assert one.nearest(2, queries=np.empty((0, 1)))[0].shape == (0, 2)
+
+
+CELLS = hs.CellList([[0.0, 0.0], [1.0, 1.0]], 2.0)
+PERIODIC = hs.CellList([[0.1, 0.1, 0.1], [0.7, 0.2, 0.4]], 0.5, box=[1.0] * 3)
+EDGES = [0.0, 1.0]
+
+
+def test_bad_input_is_named():
+    build, query, counts = hs.CellList, CELLS.query, CELLS.count_pairs
+    nearest, histogram = CELLS.nearest, CELLS.pair_histogram
+    check_refusals([
+        (lambda: build([[0.0, np.nan]], 1.0), ValueError, r"points\[0, 1\]"),
+        (lambda: build([[0.0]], -1.0), ValueError, "cutoff"),
+        (lambda: build([[0.0]], 1.0, periodic=True), ValueError, "periodic needs a box"),
+        (lambda: build("ab", 1.0), TypeError, "points"),
+        (lambda: query([[0.0]]), ValueError, "queries must have 2 columns"),
+        (lambda: query([[0.0, np.inf]]), ValueError, r"queries\[0, 1\]"),
+        (lambda: query([[0.0, 0.0]], -1.0), ValueError, "radius .* got -1.0"),
+        (lambda: query([[0.0, 0.0]], np.nan), ValueError, "radius .* got nan"),
+        (lambda: query([[0.0, 0.0]], 10**400), OverflowError, "radius"),
+        (lambda: query([[0.0, 0.0]], [1.0, 2.0]), ValueError, r"shape \(1,\)"),
+        (lambda: query([[0.0, 0.0]], [-1.0]), ValueError, r"radius\[0\]"),
+        (lambda: query([[0.0, 0.0]], "a"), TypeError, "radius"),
+        *((
+            lambda radius=radius: PERIODIC.query(np.zeros((2, 3)), radius), MemoryError,
+            "radius spans more images.*smaller radius",
+        ) for radius in (1e300, [1e300] * 2, [1e300, 1.0], [1e300, 1.1e300])),
         (lambda: CELLS.pairs(quantities="x"), ValueError, "quantities"),
         (lambda: CELLS.pairs(np.nan), ValueError, "cutoff"),
         (lambda: CELLS.pairs(wrong=1), TypeError, "wrong"),
         (lambda: CELLS.candidates([[0, 0], [0, -1e300]]), ValueError, r"queries\[1, 1\] = -1e"),
         (lambda: CELLS.cell_of([[1.0, 2.0, 3.0]]), ValueError, "2 columns"),
-        (lambda: CELLS.count_pairs(kernel="none"), ValueError, "kernel"),
-        (lambda: CELLS.nearest(0), ValueError, "k must be 1 or more"),
-        (lambda: CELLS.nearest(1.0), TypeError, "k must be a whole number"),
-        (lambda: CELLS.nearest(1, queries=[[0.0]]), ValueError, "queries must have 2 columns"),
-        (lambda: CELLS.nearest(1, queries=[[np.nan, 0.0]]), ValueError, r"queries\[0, 0\]"),
-        (lambda: CELLS.nearest(1, max_distance=-1.0), ValueError, "max_distance"),
-        (lambda: CELLS.nearest(1, quantities="ij"), ValueError, "quantities"),
-        (lambda: CELLS.nearest(1, inclusive=False), TypeError, "inclusive"),
-        (lambda: CELLS.nearest(1, wrong=False), TypeError, "wrong"),
-        (lambda: CELLS.nearest(1, memory_limit=10.0), MemoryError, "would not fit"),
-    ],
-)
-def test_bad_input_is_named(call, error, message):
-    with pytest.raises(error, match=message):
-        call()
+        (lambda: CELLS.iter_pairs(progress=3), TypeError, "progress must be callable or a bool, g"),
+        (lambda: CELLS.iter_pairs(max_pairs=0), ValueError, "max_pairs must be 1 or more"),
+        (lambda: CELLS.for_each_pair(3), TypeError, "callback must be"),
+        (lambda: CELLS.iter_pairs(sort=True), TypeError, "sort"),
+        (lambda: counts(kernel="none"), ValueError, "kernel"),
+        (lambda: counts([1.0, 0.5]), ValueError, r"cutoff\[0\] = 1.0 before"),
+        (lambda: counts([0.5, np.nan]), ValueError, r"cutoff\[1\] = nan"),
+        (lambda: counts([[1.0]]), ValueError, "cutoff"),
+        (lambda: counts([0.5, 1.0], queries=[[1.0]]), ValueError, "2 columns"),
+        (lambda: nearest(0), ValueError, "k must be 1 or more"),
+        (lambda: nearest(1.0), TypeError, "k must be a whole number"),
+        (lambda: nearest(1, queries=[[0.0]]), ValueError, "queries must have 2 columns"),
+        (lambda: nearest(1, queries=[[np.nan, 0.0]]), ValueError, r"queries\[0, 0\]"),
+        (lambda: nearest(1, max_distance=-1.0), ValueError, "max_distance"),
+        (lambda: nearest(1, quantities="ij"), ValueError, "quantities"),
+        (lambda: nearest(1, inclusive=False), TypeError, "inclusive"),
+        (lambda: nearest(1, wrong=False), TypeError, "wrong"),
+        (lambda: nearest(1, memory_limit=10.0), MemoryError, "would not fit"),
+        (lambda: histogram([0.0, 2.0, 1.0]), ValueError, r"edges\[1\]"),
+        (lambda: histogram([1.0]), ValueError, "edges must have shape"),
+        (lambda: histogram([-1.0, 1.0]), ValueError, r"edges\[0\] = -1.0"),
+        (lambda: histogram([0.0, np.nan]), ValueError, r"edges\[1\]"),
+        (lambda: histogram(["a", "b"]), TypeError, "edges"),
+        (lambda: histogram(), TypeError, "edges"),
+        (lambda: histogram(EDGES, queries=[[1.0]]), ValueError, "2 columns"),
+        (lambda: histogram(EDGES, types=[0]), ValueError, r"types must have shape \(2,\)"),
+        (lambda: histogram(EDGES, types=[0, 1], queries=[[0.0, 0.0]]), ValueError, "together"),
+        (lambda: histogram(EDGES, query_weights=[1.0]), ValueError, "needs queries"),
+        (lambda: histogram(EDGES, weights=[1.0, np.nan]), ValueError, r"weights\[1\]"),
+        (lambda: histogram(EDGES, inclusive=True), TypeError, "inclusive"),
+        (lambda: histogram(EDGES, kernel="none"), ValueError, "kernel"),
+        (
+            lambda: histogram(np.linspace(0.0, 1.0, 100_000), memory_limit=1e4), MemoryError,
+            "counts: 10 kB are allowed",
+        ),
+    ])  # fmt: skip

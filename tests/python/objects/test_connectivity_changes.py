@@ -132,27 +132,27 @@ def test_a_patch_in_a_box_keeps_shifts():
 
 
 @pytest.mark.parametrize("ghosts", [False, True])
-@pytest.mark.parametrize("seed", range(6))
-def test_a_mask_takes_single_images(seed, ghosts):
+def test_a_mask_takes_single_images(ghosts):
     """In a box, where two nodes are a pair in several images: rows lose these as well."""
-    rng = np.random.default_rng([seed, 9])
-    lists = random_lists(rng, (12, 0, 9), 2, size=5.0, h=(0.1, 0.8))
-    c = hs.Connectivity(lists, box=[[1.6, 0.0], [0.3, 1.8]], ghosts=ghosts)
-    rows = _rows_with_shifts(c)
-    mask = rng.random(len(c.pairs)) < 0.4
-    c.pairs.coupling = np.arange(len(mask))
-    table = np.column_stack([*(getattr(c.pairs, name) for name in COLUMNS), c.pairs.shifts])
-    several = np.unique(table[:, :4], axis=0, return_counts=True)[1]
-    assert (several > 1).any()
-    for i, a, j, b, *s in table[mask].tolist():
-        rows.discard((a, i, b, j, *s))
-        rows.discard((b, j, a, i, *(-k for k in s)))
-    c.remove(mask)
-    assert _rows_with_shifts(c) == rows
-    left = np.column_stack([*(getattr(c.pairs, name) for name in COLUMNS), c.pairs.shifts])
-    assert (left == table[~mask]).all()
-    assert c.pairs.coupling.tolist() == np.flatnonzero(~mask).tolist()
-    c.validate()
+    for seed in range(6):
+        rng = np.random.default_rng([seed, 9])
+        lists = random_lists(rng, (12, 0, 9), 2, size=5.0, h=(0.1, 0.8))
+        c = hs.Connectivity(lists, box=[[1.6, 0.0], [0.3, 1.8]], ghosts=ghosts)
+        rows = _rows_with_shifts(c)
+        mask = rng.random(len(c.pairs)) < 0.4
+        c.pairs.coupling = np.arange(len(mask))
+        table = np.column_stack([*(getattr(c.pairs, name) for name in COLUMNS), c.pairs.shifts])
+        several = np.unique(table[:, :4], axis=0, return_counts=True)[1]
+        assert (several > 1).any()
+        for i, a, j, b, *s in table[mask].tolist():
+            rows.discard((a, i, b, j, *s))
+            rows.discard((b, j, a, i, *(-k for k in s)))
+        c.remove(mask)
+        assert _rows_with_shifts(c) == rows
+        left = np.column_stack([*(getattr(c.pairs, name) for name in COLUMNS), c.pairs.shifts])
+        assert (left == table[~mask]).all()
+        assert c.pairs.coupling.tolist() == np.flatnonzero(~mask).tolist()
+        c.validate()
 
 
 def _rows_with_shifts(c):
@@ -168,43 +168,43 @@ def _rows_with_shifts(c):
     return found
 
 
-@pytest.mark.parametrize("seed", range(16))
-def test_remove_equals_exclude(seed):
-    rng = np.random.default_rng([seed, 2])
-    lists = random_lists(rng, rng.integers(1, 16, 3), 2)
-    options = random_options(rng)
+def test_remove_equals_exclude():
+    for seed in range(16):
+        rng = np.random.default_rng([seed, 2])
+        lists = random_lists(rng, rng.integers(1, 16, 3), 2)
+        options = random_options(rng)
 
-    def gone(i_node, i_list, j_node, j_list):
-        """Symmetric, and of pairs that merely overlap as well."""
-        return (i_node * 7 + j_node * 7 + i_list + j_list) % 5 == seed % 5
+        def gone(i_node, i_list, j_node, j_list, seed=seed):
+            """Symmetric, and of pairs that merely overlap as well."""
+            return (i_node * 7 + j_node * 7 + i_list + j_list) % 5 == seed % 5
 
-    c = hs.Connectivity(lists, **options)
-    c.pairs.coupling = np.arange(len(c.pairs))
-    stays = ~gone(*(getattr(c.pairs, name) for name in COLUMNS))
-    c.remove(gone)
-    assert_equal(c, hs.Connectivity(lists, exclude=gone, **options))
-    assert c.pairs.coupling.tolist() == np.flatnonzero(stays).tolist()
+        c = hs.Connectivity(lists, **options)
+        c.pairs.coupling = np.arange(len(c.pairs))
+        stays = ~gone(*(getattr(c.pairs, name) for name in COLUMNS))
+        c.remove(gone)
+        assert_equal(c, hs.Connectivity(lists, exclude=gone, **options))
+        assert c.pairs.coupling.tolist() == np.flatnonzero(stays).tolist()
 
 
-@pytest.mark.parametrize("seed", range(8))
-def test_pairs_that_are_excluded_by_number_count_nowhere(seed):
-    rng = np.random.default_rng([seed, 3])
-    lists = random_lists(rng, (9, 0, 7), 2, lattice=True)
-    n = 16
-    gone = {tuple(sorted(rng.choice(n, 2, replace=False).tolist())) for _ in range(20)}
-    label = [(i, 0) for i in range(9)] + [(i, 2) for i in range(7)]
-    rows = [(*label[b], *label[a]) if (a + b) % 2 else (*label[a], *label[b]) for a, b in gone]
-    c = hs.Connectivity(lists, overlap=True, intersection=True, exclude=rows)
-    check(c, lists, gone=gone)
-    masked = hs.Connectivity(lists, ghosts=True)
-    mask = np.zeros(len(masked.pairs), bool)
-    for row in rows:
-        try:
-            mask[masked.pairs.index(row)] = True
-        except KeyError:
-            continue
-    masked.remove(mask)
-    check(masked, lists, ghosts=True, gone=gone)
+def test_pairs_that_are_excluded_by_number_count_nowhere():
+    for seed in range(8):
+        rng = np.random.default_rng([seed, 3])
+        lists = random_lists(rng, (9, 0, 7), 2, lattice=True)
+        n = 16
+        gone = {tuple(sorted(rng.choice(n, 2, replace=False).tolist())) for _ in range(20)}
+        label = [(i, 0) for i in range(9)] + [(i, 2) for i in range(7)]
+        rows = [(*label[b], *label[a]) if (a + b) % 2 else (*label[a], *label[b]) for a, b in gone]
+        c = hs.Connectivity(lists, overlap=True, intersection=True, exclude=rows)
+        check(c, lists, gone=gone)
+        masked = hs.Connectivity(lists, ghosts=True)
+        mask = np.zeros(len(masked.pairs), bool)
+        for row in rows:
+            try:
+                mask[masked.pairs.index(row)] = True
+            except KeyError:
+                continue
+        masked.remove(mask)
+        check(masked, lists, ghosts=True, gone=gone)
 
 
 def test_removing_twice_does_not_bring_back_what_was_removed():

@@ -29,17 +29,20 @@ def slab(dim, storage):
     return hs.DynamicCellList(dim, 1.0, box=box, periodic=periodic, storage=storage)
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize("exponent", EXPONENTS)
 @pytest.mark.parametrize("storage", ["hash", "dense", "all-pairs"])
-@pytest.mark.parametrize("dim", [1, 3, 5])
-def test_a_far_point_hides_no_other(dim, storage, exponent, sign):
+def test_a_far_point_hides_no_other(storage):
+    for number, exponent in enumerate(EXPONENTS):
+        for dim, sign in ((1, 1.0), (3, -1.0), (5, (-1.0) ** number)):
+            far_point(dim, storage, sign * math.ldexp(1.0, exponent))
+
+
+def far_point(dim, storage, place):
     """Dense cells do not reach that far, which the error says; the others find the point."""
     cells = slab(dim, storage)
     one, other, far = np.zeros((3, dim))
     one[:2] = other[:2] = far[:2] = 1.0
     other[0] += 0.5
-    far[-1] = sign * math.ldexp(1.0, exponent)
+    far[-1] = place
     cells.insert_many([1, 2], [one, other])
     ways = [
         lambda: cells.insert(3, far),
@@ -68,8 +71,12 @@ def test_a_far_point_hides_no_other(dim, storage, exponent, sign):
             cells.remove(3)
 
 
-@pytest.mark.parametrize("exponent", EXPONENTS)
-def test_far_along_an_oblique_axis_is_found_or_refused(exponent):
+def test_far_along_an_oblique_axis_is_found_or_refused():
+    for exponent in EXPONENTS:
+        far_along_an_oblique_axis(exponent)
+
+
+def far_along_an_oblique_axis(exponent):
     """Where the open direction is no coordinate axis, float64 loses the place in the box."""
     box, periodic = [[3.0, 1.0], [0.0, 1.0]], [True, False]
     x = math.ldexp(1.0, exponent)
@@ -183,7 +190,7 @@ def test_near_returns_the_points_of_the_cells_that_the_ball_meets(dim, periods):
         points = points % 8.0 - 4.0 if periods else points
         for cells in lists:
             cells.insert_many(np.arange(n), points)
-        for _ in range(30):
+        for _ in range(12):
             at = rng.integers(-64, 64, dim) / 16.0
             radius = float(rng.choice([0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.5, 9.0]))
             at_least, at_most = set(), set()
@@ -198,7 +205,7 @@ def test_near_returns_the_points_of_the_cells_that_the_ball_meets(dim, periods):
             assert near[0] == near[1]
             assert at_least <= set(near[0]) <= at_most
             n_left_out += n - len(at_most)
-    assert n_left_out > 300
+    assert n_left_out > 100
 
 
 def test_near_tells_cells_apart_whose_numbers_are_the_same():
@@ -269,8 +276,9 @@ except RuntimeError as error:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
-@pytest.mark.parametrize("query", ["any_within", "within", "within_many"])
-@pytest.mark.parametrize("handler", ["default", "handled"])
+@pytest.mark.parametrize(
+    "query, handler", [("any_within", "default"), ("within", "handled"), ("within_many", "default")]
+)
 def test_ctrl_c_ends_one_long_query(query, handler):
     """A handler that returns does not end it: it is made again."""
     with subprocess.Popen(

@@ -76,29 +76,26 @@ def test_iteration_goes_over_rows(table):
     assert len(list(table)) == 30
 
 
-@pytest.mark.parametrize("key", [30, -31, 10**30])
-def test_rows_that_are_not_there(table, key):
-    assert_refused(lambda: table[key], IndexError, "of a table of 30 rows")
+def test_rows_that_are_not_there(table):
+    for key in (30, -31, 10**30):
+        assert_refused(partial(table.__getitem__, key), IndexError, "of a table of 30 rows")
+    for key in (1.0, "1", None, (1, 2), np.float64(1.0), np.array(1.0)):
+        assert_refused(partial(table.__getitem__, key), TypeError, "whole number")
 
 
-@pytest.mark.parametrize("key", [1.0, "1", None, (1, 2), np.float64(1.0), np.array(1.0)])
-def test_rows_are_chosen_by_numbers(table, key):
-    assert_refused(lambda: table[key], TypeError, "whole number")
-
-
-@pytest.mark.parametrize("ends", [*itertools.product((None, 0, 7, -3, 30, 99), repeat=2)])
-def test_slices_are_tables(table, ends):
-    part = table[slice(*ends)]
-    numbers = range(30)[slice(*ends)]
-    assert len(part) == len(numbers) and part.n_points == 30
-    assert part.offsets[0] == 0 and part.n_entries == part.offsets[-1] == len(part.indices)
-    for k, number in enumerate(numbers):
-        assert same_arrays(part[k], table[number])
-    if part.n_entries:
-        assert np.shares_memory(part.distances, table.distances)
-    assert not part.offsets.flags.writeable and not part.indices.flags.writeable
-    again = part[1:]
-    assert len(again) == max(len(part) - 1, 0)
+def test_slices_are_tables(table):
+    for ends in itertools.product((None, 0, 7, -3, 30, 99), repeat=2):
+        part = table[slice(*ends)]
+        numbers = range(30)[slice(*ends)]
+        assert len(part) == len(numbers) and part.n_points == 30
+        assert part.offsets[0] == 0 and part.n_entries == part.offsets[-1] == len(part.indices)
+        for k, number in enumerate(numbers):
+            assert same_arrays(part[k], table[number])
+        if part.n_entries:
+            assert np.shares_memory(part.distances, table.distances)
+        assert not part.offsets.flags.writeable and not part.indices.flags.writeable
+        again = part[1:]
+        assert len(again) == max(len(part) - 1, 0)
 
 
 def test_slices_follow_rows(table):
@@ -106,18 +103,18 @@ def test_slices_follow_rows(table):
     assert_refused(lambda: table[::-1], ValueError, "step of -1")
 
 
-@pytest.mark.parametrize("letters", ["j", "d", "D", "S", "dS"])
-def test_what_was_not_asked_for_is_named(letters):
-    table = hs.neighbors(POINTS, 1.0, quantities=letters)
-    for letter, name in NAMES.items():
-        if letter in letters:
-            assert len(getattr(table, name)) == table.n_entries
-        else:
-            assert not hasattr(table, name)
-            assert_refused(
-                lambda name=name: getattr(table, name),
-                AttributeError, name, f"'{letter}' in quantities, got '{letters}'",
-            )  # fmt: skip
+def test_what_was_not_asked_for_is_named():
+    for letters in ("j", "d", "D", "S", "dS"):
+        table = hs.neighbors(POINTS, 1.0, quantities=letters)
+        for letter, name in NAMES.items():
+            if letter in letters:
+                assert len(getattr(table, name)) == table.n_entries
+            else:
+                assert not hasattr(table, name)
+                assert_refused(
+                    partial(getattr, table, name),
+                    AttributeError, name, f"'{letter}' in quantities, got '{letters}'",
+                )  # fmt: skip
 
 
 def test_tables_do_not_change(table):

@@ -28,18 +28,19 @@ def numbers_of(choice):
     return np.arange(30)[np.asarray(choice, None if len(choice) else np.int64)]
 
 
-@pytest.mark.parametrize("letters", ["j", "jd", "DjSd", "d"])
-@pytest.mark.parametrize("box", [None, [6.0, 6.0]])
-@pytest.mark.parametrize("choice", CHOICES)
-def test_chosen_rows_are_those_of_the_table(choice, box, letters):
+@pytest.mark.parametrize(
+    "letters, box", [("j", None), ("jd", [6.0, 6.0]), ("DjSd", [6.0, 6.0]), ("d", None)]
+)
+def test_chosen_rows_are_those_of_the_table(box, letters):
     table = hs.neighbors(POINTS, 1.5, box=box, quantities=letters)
-    part, numbers = table[choice], numbers_of(choice)
-    assert part.shape == (len(numbers), 30) and part.quantities == letters
-    assert part.offsets.dtype == np.int64 and part.offsets[-1] == part.n_entries
-    for row, k in zip(part, numbers, strict=True):
-        assert same_arrays(row, table[k])
-    assert not any(column.flags.writeable for column in part._arrays)
-    assert_refused(part.reverse, (ValueError, AttributeError))
+    for choice in CHOICES:
+        part, numbers = table[choice], numbers_of(choice)
+        assert part.shape == (len(numbers), 30) and part.quantities == letters
+        assert part.offsets.dtype == np.int64 and part.offsets[-1] == part.n_entries
+        for row, k in zip(part, numbers, strict=True):
+            assert same_arrays(row, table[k])
+        assert not any(column.flags.writeable for column in part._arrays)
+        assert_refused(part.reverse, (ValueError, AttributeError))
 
 
 @pytest.mark.parametrize("letters", ["jd", "jdS"])
@@ -61,9 +62,9 @@ def test_rows_of_rows_sort_and_are_pickled_as_those_of_the_whole(queries, letter
         assert np.array_equal(row[0], whole[k][0][whole[k][1] > 1.0])
 
 
-@pytest.mark.parametrize(
-    ("choice", "kind", "words"),
-    [
+def test_what_chooses_no_rows():
+    table = hs.neighbors(POINTS, 1.0)
+    for choice, kind, words in (
         ([30], IndexError, "row 30 (at [0]) of a table of 30 rows"),
         ([0, -31], IndexError, "row -31 (at [1])"),
         (np.array([0, 2**64 - 1], np.uint64), IndexError, "at [1]"),
@@ -75,11 +76,8 @@ def test_rows_of_rows_sort_and_are_pickled_as_those_of_the_whole(queries, letter
         ([[0], [0, 1]], ValueError, "rows must be a rectangular array"),
         (np.ma.array([0, 1], mask=[0, 1]), ValueError, "masked"),
         ((0, 1), TypeError, "an array of whole numbers or a mask, got tuple"),
-    ],
-)  # fmt: skip
-def test_what_chooses_no_rows(choice, kind, words):
-    table = hs.neighbors(POINTS, 1.0)
-    assert_refused(lambda: table[choice], kind, re.escape(words))
+    ):  # fmt: skip
+        assert_refused(partial(table.__getitem__, choice), kind, re.escape(words))
 
 
 def test_sums_are_those_of_the_rows():
@@ -99,18 +97,16 @@ def test_sums_are_those_of_the_rows():
     assert np.array_equal(ends.sum(ends.distances), table.sum(table.distances)[[29, 4, 4]])
 
 
-@pytest.mark.parametrize(
-    ("given", "summed"),
-    [
+def test_types_of_sums():
+    types = [
         (bool, np.int64), (np.int8, np.int64), (np.int64, np.int64), (np.uint8, np.uint64),
         (np.float16, np.float64), (np.float32, np.float64), (">f8", np.float64),
-    ],
-)  # fmt: skip
-@pytest.mark.parametrize("n", [0, 2])
-def test_types_of_sums(given, summed, n):
-    table = hs.neighbors(np.zeros((n, 1)), 1.0)
-    sums = table.sum(np.ones(table.n_entries, given))
-    assert sums.dtype == summed and sums.tolist() == [1] * n
+    ]  # fmt: skip
+    for n in (0, 2):
+        table = hs.neighbors(np.zeros((n, 1)), 1.0)
+        for given, summed in types:
+            sums = table.sum(np.ones(table.n_entries, given))
+            assert sums.dtype == summed and sums.tolist() == [1] * n
 
 
 def test_values_that_cannot_be_summed():

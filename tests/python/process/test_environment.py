@@ -49,7 +49,7 @@ def test_empty_is_as_good_as_not_set():
     assert told("") == {"default": best, "unnamed": best, "named": "scalar"}
 
 
-@pytest.mark.parametrize("name", ["abacus", "SCALAR", "scalar ", "x" * 1000])
+@pytest.mark.parametrize("name", ["SCALAR", "scalar ", "x" * 1000])
 def test_an_unknown_name_is_refused_by_such_searches_only(name):
     answer = told(name)
     assert "kernel must be one of" in answer["unnamed"]

@@ -138,61 +138,55 @@ def test_the_test_can_change_the_environment():
     assert flushed and not subnormals_are_flushed()
 
 
-@pytest.mark.parametrize("mode, flush", SETTINGS)
 @pytest.mark.parametrize("name", SCENES)
-def test_same_bytes_in_every_environment(name, mode, flush, kernel):
+def test_same_bytes_in_every_environment(name):
     points, cutoff, box = SCENES[name]
-    how = {"box": box, "quantities": "ijSdD", "kernel": kernel}
-    expected = hs.pairs(points, cutoff, **how)
-    strict = hs.count_pairs(points, cutoff, box=box, inclusive=False, kernel=kernel)
-    with environment(mode, flush):
-        found = hs.pairs(points, cutoff, **how)
-        found_strict = hs.count_pairs(points, cutoff, box=box, inclusive=False, kernel=kernel)
-    assert same_arrays(found, expected)
-    assert found_strict == strict
-    assert len(expected[0])
+    for kernel in hs.kernels():
+        how = {"box": box, "kernel": kernel}
+        searches = [
+            lambda how=how: hs.pairs(points, cutoff, quantities="ijSdD", **how),
+            lambda how=how: np.array(hs.count_pairs(points, cutoff, inclusive=False, **how)),
+            lambda how=how: hs.pairs(points, cutoff, precision="double", **how),
+            lambda how=how: hs.pairs(points, cutoff, precision="single", **how),
+        ]
+        for number, search in enumerate(searches):
+            expected = search()
+            for mode, flush in SETTINGS:
+                with environment(mode, flush):
+                    found = search()
+                assert same_arrays(found, expected), (kernel, number, mode, flush)
+        assert len(searches[0]()[0])
 
 
-@pytest.mark.parametrize("mode, flush", SETTINGS)
-@pytest.mark.parametrize("precision", ["double", "single"])
-def test_rounded_rules_are_the_same_in_every_environment(mode, flush, precision):
-    for points, cutoff, box in SCENES.values():
-        how = {"box": box, "precision": precision}
-        expected = hs.pairs(points, cutoff, **how)
+def test_the_environment_survives_a_refused_call():
+    for mode, flush in SETTINGS:
+        points = np.full((3, 3), np.nan)
         with environment(mode, flush):
-            found = hs.pairs(points, cutoff, **how)
-        assert same_arrays(found, expected)
+            try:
+                hs.pairs(points, 1.0)
+            except ValueError:
+                refused = True
+            try:
+                hs.pairs(np.zeros((100_000, 3)), 1.0, memory_limit=10**6)
+            except MemoryError:
+                refused_later = True
+        assert refused and refused_later
 
 
-@pytest.mark.parametrize("mode, flush", SETTINGS)
-def test_the_environment_survives_a_refused_call(mode, flush):
-    points = np.full((3, 3), np.nan)
-    with environment(mode, flush):
-        try:
-            hs.pairs(points, 1.0)
-        except ValueError:
-            refused = True
-        try:
-            hs.pairs(np.zeros((100_000, 3)), 1.0, memory_limit=10**6)
-        except MemoryError:
-            refused_later = True
-    assert refused and refused_later
-
-
-@pytest.mark.parametrize("mode, flush", SETTINGS)
-def test_dependence_is_decided_alike_in_every_environment(mode, flush):
-    sheared = np.array([[0.1, 0.2, 0.3], [0.7, 0.1, 0.9], [0.2, 0.4, 0.6]])
-    tiny = np.diag([5e-324, 1e-323, 5e-324])
-    points = np.zeros((1, 3))
-    with environment(mode, flush):
-        try:
-            hs.pairs(points, 1.0, box=sheared)
-            refused = False
-        except ValueError:
-            refused = True
-        count = hs.count_pairs(points, 1e-323, box=tiny)
-    assert refused
-    assert count == hs.count_pairs(points, 1e-323, box=tiny) == 7
+def test_dependence_is_decided_alike_in_every_environment():
+    for mode, flush in SETTINGS:
+        sheared = np.array([[0.1, 0.2, 0.3], [0.7, 0.1, 0.9], [0.2, 0.4, 0.6]])
+        tiny = np.diag([5e-324, 1e-323, 5e-324])
+        points = np.zeros((1, 3))
+        with environment(mode, flush):
+            try:
+                hs.pairs(points, 1.0, box=sheared)
+                refused = False
+            except ValueError:
+                refused = True
+            count = hs.count_pairs(points, 1e-323, box=tiny)
+        assert refused
+        assert count == hs.count_pairs(points, 1e-323, box=tiny) == 7
 
 
 def test_searching_raises_no_floating_point_warnings(rng):

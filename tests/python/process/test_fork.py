@@ -74,8 +74,7 @@ def in_children(inside, check, forks=FORKS):
 # ---- VerletList ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("skin", [0.3, 0.0, "auto"])
-@pytest.mark.parametrize("tracks", [False, True])
+@pytest.mark.parametrize("skin, tracks", [(0.3, True), (0.0, False), ("auto", True)])
 def test_update_of_a_verlet_list(skin, tracks):
     """It has the pairs of one of the steps, or says why it has none; then it goes on."""
     taken = steps(4000, 3)
@@ -272,13 +271,13 @@ def test_dynamic_cell_lists(work):
 @pytest.mark.parametrize("order", ["index", "morton"])
 def test_connectivities(order):
     """What is computed when it is first looked at may be half done."""
-    (points,) = steps(3000, 1)
+    (points,) = steps(2000, 1)
 
     def made():
-        return hs.Connectivity([hs.NodeList("a", points, [0.3] * 3000)], order=order, box=BOX)
+        return hs.Connectivity([hs.NodeList("a", points, [0.3] * 2000)], order=order, box=BOX)
 
     answer = [tuple(pair) for pair in made().pairs]
-    many = [made() for _ in range(30)]
+    many = [made() for _ in range(12)]
     used = iter(many)
 
     def inside():
@@ -287,7 +286,7 @@ def test_connectivities(order):
         _ = one.pairs.index(answer[0])
 
     def check():
-        for one in (*many[:3], *many[-3:], next(used, many[0])):
+        for one in (*many[:2], *many[-2:], next(used, many[0])):
             assert [tuple(pair) for pair in one.pairs] == answer
             assert one.pairs.index(answer[5]) == 5
             field = hs.PairField(one.pairs)

@@ -8,11 +8,14 @@ import sys
 import textwrap
 import threading
 import time
+from functools import partial
 
 import numpy as np
 import pytest
 
 import halfshell as hs
+from oracles import same_arrays
+from refused_calls import check_refusals
 
 RNG = np.random.RandomState(7)
 CLOUD = RNG.rand(10500, 3) * 30.0
@@ -35,27 +38,21 @@ def run(code):
     subprocess.run([sys.executable, "-c", textwrap.dedent(code)], check=True, timeout=120)
 
 
-@pytest.mark.parametrize("name", [name for name in SCENES if name != "nobody"])
-def test_the_scenes_are_searched_by_several_threads(name):
-    points, cutoff, box = SCENES[name]
-    assert hs.explain(points, cutoff, box=box, threads=2).threads == 2
-
-
 @pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("quantities", ["ij", "ijdDS", "P"])
-@pytest.mark.parametrize("sort", [False, True])
-def test_arrays_do_not_depend_on_the_number_of_threads(name, quantities, sort, kernel):
+def test_arrays_do_not_depend_on_the_number_of_threads(name):
+    """Each kernel and scene with some of the quantities, each kernel with all of them."""
     points, cutoff, box = SCENES[name]
-    options = {"box": box, "quantities": quantities, "sort": sort, "kernel": kernel}
-    alone = hs.pairs(points, cutoff, threads=1, **options)
-    alone = alone if isinstance(alone, tuple) else (alone,)
-    for threads in (2, 3, 8):
-        together = hs.pairs(points, cutoff, threads=threads, **options)
-        together = together if isinstance(together, tuple) else (together,)
-        for a, b in zip(alone, together, strict=True):
-            assert a.dtype == b.dtype
-            assert a.tobytes() == b.tobytes()
-    assert hs.count_pairs(points, cutoff, box=box, threads=4) == len(alone[0])
+    assert hs.explain(points, cutoff, box=box, threads=2).threads == 1 + (name != "nobody")
+    ways = [(quantities, sort) for quantities in ("ij", "ijdDS", "P") for sort in (False, True)]
+    for number, kernel in enumerate(hs.kernels()):
+        for quantities, sort in ways[(number + list(SCENES).index(name)) % 3 :: 3]:
+            options = {"box": box, "quantities": quantities, "sort": sort, "kernel": kernel}
+            alone = hs.pairs(points, cutoff, threads=1, **options)
+            for threads in (2, 3, 8):
+                together = hs.pairs(points, cutoff, threads=threads, **options)
+                assert same_arrays(together, alone), (kernel, quantities, sort, threads)
+            n = len(alone[0] if len(quantities) > 1 else alone)
+            assert hs.count_pairs(points, cutoff, box=box, kernel=kernel, threads=4) == n
 
 
 @pytest.mark.parametrize("threads", [2, 5])
@@ -86,13 +83,13 @@ def test_small_scenes_use_one_thread_and_large_ones_what_is_allowed(monkeypatch)
     assert hs.explain(large, 1.0).threads >= 1
 
 
-@pytest.mark.parametrize(
-    ("threads", "error"), [(0, ValueError), (-1, ValueError), (10**9, ValueError),
-                           (1.5, TypeError), ("2", TypeError), (True, TypeError)]
-)  # fmt: skip
-def test_bad_numbers_of_threads(threads, error):
-    with pytest.raises(error, match="threads must be a whole number"):
-        hs.pairs(CLOUD, 1.0, threads=threads)
+def test_bad_numbers_of_threads():
+    cases = [(0, ValueError), (-1, ValueError), (10**9, ValueError), (1.5, TypeError),
+             ("2", TypeError), (True, TypeError)]  # fmt: skip
+    check_refusals([
+        (partial(hs.pairs, CLOUD, 1.0, threads=n), kind, "threads must be a whole number")
+        for n, kind in cases
+    ])  # fmt: skip
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/task"), reason="needs /proc")
@@ -146,7 +143,7 @@ def test_after_fork_and_in_process_pools():
 
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs POSIX timers")
-@pytest.mark.parametrize("threads", [1, 2, 4])
+@pytest.mark.parametrize("threads", [1, 4])
 def test_interrupting_stops_all_threads_soon(threads):
     points = RNG.rand(250000, 3)
     started = []

@@ -35,17 +35,6 @@ def in_threads(count, work):
     return results
 
 
-def test_the_same_search_in_many_threads(rng):
-    points, cutoff, box, _ = random_scene(rng, 2000, neighbours=20)
-    expected = hs.pairs(points, cutoff, box=box, quantities="ijSdD")
-
-    def work(_):
-        return [hs.pairs(points, cutoff, box=box, quantities="ijSdD") for _ in range(4)]
-
-    for results in in_threads(16, work):
-        assert all(same_arrays(found, expected) for found in results)
-
-
 def test_different_searches_in_many_threads(rng):
     scenes = [random_scene(rng, 20 + 60 * k, 1 + k % 4, neighbours=12) for k in range(12)]
     names = hs.kernels()
@@ -198,7 +187,7 @@ import pytest
 import halfshell as hs
 
 def work():
-    for k in range(20):
+    for k in range(8):
         count = hs.count_pairs(np.random.default_rng(k).random((3000, 3)).astype(">f8")[::2], 0.1)
         assert count > 0
         gc.collect()
@@ -213,7 +202,7 @@ print(json.dumps(True))
     )
 
 
-def changing(array, bad, call, seconds=0.3):
+def changing(array, bad, call, seconds=0.1):
     """What `call` raises while another thread writes to the array, but what it may raise."""
     done, good, raised = threading.Event(), array.copy(), set()
 

@@ -58,29 +58,29 @@ def test_what_is_public_was_found():
             "Box.wrap", "VerletList.__init__", "Case.find"} <= set(METHODS)  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CALLABLES)
-def test_every_keyword_is_spelled_out(name):
-    known = parameters(CALLABLES[name])
-    if "unknown" in known:  # is refused, with a hint
-        assert known["unknown"].annotation == "Never"
-    kinds = {one.kind for key, one in known.items() if key != "unknown"}
-    assert inspect.Parameter.VAR_KEYWORD not in kinds
-    assert inspect.Parameter.VAR_POSITIONAL not in kinds or name == "Box.orthorhombic"
+def test_every_keyword_is_spelled_out():
+    for name, function in CALLABLES.items():
+        known = parameters(function)
+        if "unknown" in known:  # is refused, with a hint
+            assert known["unknown"].annotation == "Never", name
+        kinds = {one.kind for key, one in known.items() if key != "unknown"}
+        assert inspect.Parameter.VAR_KEYWORD not in kinds, name
+        assert inspect.Parameter.VAR_POSITIONAL not in kinds or name == "Box.orthorhombic"
 
 
-@pytest.mark.parametrize("name", FUNCTIONS | METHODS)
-def test_keywords_come_in_one_order(name):
-    known = [keyword for keyword in keywords(CALLABLES[name]) if keyword in ORDER]
-    assert known == sorted(known, key=ORDER.index)
+def test_keywords_come_in_one_order():
+    for name, function in (FUNCTIONS | METHODS).items():
+        known = [keyword for keyword in keywords(function) if keyword in ORDER]
+        assert known == sorted(known, key=ORDER.index), name
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        name for name in METHODS
-        if name.split(".")[1] in FUNCTIONS and name.split(".")[0] not in ("Verdict", "Connectivity")
-    ],
-)
+SHARED = [
+    name for name in METHODS
+    if name.split(".")[1] in FUNCTIONS and name.split(".")[0] not in ("Verdict", "Connectivity")
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SHARED)
 def test_methods_have_the_keywords_of_the_functions(name):
     method, function = METHODS[name], FUNCTIONS[name.split(".")[1]]
     common = set(keywords(method)) & set(keywords(function))
@@ -99,23 +99,25 @@ def test_methods_have_the_keywords_of_the_functions(name):
         assert set(keywords(function)) - set(keywords(method)) <= of_the_list | of_pairs
 
 
-@pytest.mark.parametrize("name", FUNCTIONS | METHODS)
-def test_quantities_and_queries_are_keywords(name):
-    for one in ("quantities", "queries"):
-        if one in parameters(CALLABLES[name]) and (one, name) not in {
-            ("queries", "pairs_between"), ("queries", "CellList.query"),
-            ("queries", "CellList.candidates"), ("quantities", "NeighborTable.__init__"),
-            ("quantities", "Case.find"),
-        }:  # fmt: skip
-            assert one in keywords(CALLABLES[name])
+def test_quantities_and_queries_are_keywords():
+    positional = {
+        (one, name) for name, function in (FUNCTIONS | METHODS).items()
+        for one in ("quantities", "queries")
+        if one in parameters(function) and one not in keywords(function)
+    }  # fmt: skip
+    assert positional == {
+        ("queries", "pairs_between"), ("queries", "CellList.query"),
+        ("queries", "CellList.candidates"), ("quantities", "NeighborTable.__init__"),
+        ("quantities", "Case.find"),
+    }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", FUNCTIONS | METHODS)
-def test_public_arguments_have_types(name):
-    for one in parameters(CALLABLES[name]).values():
-        if one.name not in UNTYPED | {"self"}:
-            assert one.annotation is not one.empty, one
-            assert not re.search(r"^Any\b", str(one.annotation)), one
+def test_public_arguments_have_types():
+    for name, function in (FUNCTIONS | METHODS).items():
+        for one in parameters(function).values():
+            if one.name not in UNTYPED | {"self"}:
+                assert one.annotation is not one.empty, (name, one)
+                assert not re.search(r"^Any\b", str(one.annotation)), (name, one)
 
 
 def test_functions_without_precision_say_that_they_are_exact():

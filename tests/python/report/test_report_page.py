@@ -49,13 +49,12 @@ def test_words_on_a_scene_tell_right_from_wrong():
     )
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(None, ""), (0, "0"), (7, "7"), (12345, "12,345"), (0.5, "0.5"), (1e10, "1.0e+10"),
-     (math.inf, "inf"), (3e-17, "3e-17"), (99.9, "100"), (9.96, "10"), (580.4, "580")],
-)  # fmt: skip
-def test_numbers_are_short(value, text):
-    assert findings.number(value) == text
+def test_numbers_are_short():
+    texts = {
+        None: "", 0: "0", 7: "7", 12345: "12,345", 0.5: "0.5", 1e10: "1.0e+10", math.inf: "inf",
+        3e-17: "3e-17", 99.9: "100", 9.96: "10", 580.4: "580",
+    }  # fmt: skip
+    assert {value: findings.number(value) for value in texts} == texts
 
 
 def test_durations_have_units():

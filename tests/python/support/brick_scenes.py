@@ -29,7 +29,7 @@ def scenes():
         "whole numbers": (lattice.astype(np.int32), 1.0, {"box": [6.0, 6.0]}),
         "clusters": (points + far, 0.8, {}),
         "on the cuts": (lattice, 1.0, {"box": [6.0, 6.0]}),
-        "eight axes": (rng.random((40, 8)), 0.9, {"box": 1.0}),
+        "eight axes": (rng.random((14, 8)), 0.9, {"box": 1.0}),
         "one axis": (points[:, :1], 0.05, {"box": 5.0}),
         "one point": (np.ones((1, 3)), 1.5, {"box": 1.0}),
         "none": (np.empty((0, 3)), 1.0, {"box": 1.0}),

@@ -16,6 +16,7 @@ def _clusters(distance):
     return np.concatenate([_random(900, 3, k, 1.0) + k * distance for k in range(2)])
 
 
+SHEARED = [[9.0, 0.0, 0.0], [9000.0, 8.0, 0.0], [1.0, 8000.0, 7.0]]
 TRICLINIC = [[9.0, 0.0, 0.0], [4.0, 8.0, 0.0], [-3.0, 2.0, 7.0]]
 
 # points, cutoff, box, periodic
@@ -26,6 +27,7 @@ SCENES = {
     "lattice": (_lattice(6, 3), 1.0, [6.0, 6.0, 6.0], None),
     "triclinic": (_random(300, 3, 4, 9.0), 1.5, TRICLINIC, None),
     "slab": (_random(300, 3, 5, 9.0), 1.5, TRICLINIC, [True, False, True]),
+    "sheared": (_random(300, 3, 5, 9.0), 2.0, SHEARED, None),
     "images": (_random(20, 3, 6, 1.0), 2.0, [1.5, 1.25, 1.0], None),
     "images of one point": ([[0.25, 0.5]], 2.5, [1.0, 0.75], None),
     "one point": ([[1.0, 2.0, 3.0]], 1.0, None, None),
@@ -44,6 +46,9 @@ SCENES = {
     "coincident": (np.zeros((40, 2)), 0.0, None, None),
 }  # fmt: skip
 
+# Widths of cells in cutoffs; the smallest and the largest are no size that any cell can have.
+WIDTHS = [1e-15, 0.07, 0.5, 1.0, 2.5, 1e6]
+
 
 def scene_of(name):
     """Points, cutoff, and box and periodic as keywords."""
@@ -54,6 +59,7 @@ def scene_of(name):
 def queries_of(name, n=30):
     """Some of the points, others between them and around them."""
     points, cutoff, _ = scene_of(name)
+    n = min(n, 4) if name == "a periodic box of eight" else n  # each has thousands of images
     rng = np.random.default_rng(99)
     if len(points) == 0:
         return rng.random((n, points.shape[1]))

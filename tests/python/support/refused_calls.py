@@ -32,6 +32,19 @@ def assert_refused(call, exceptions, *fragments):
     assert elapsed < LIMIT, f"refused after {elapsed:.2f} s"
 
 
+def check_refusals(cases):
+    """Each call of {name: (call, error, pattern)}, or of a list of these, is refused so."""
+    wrong = {}
+    cases = cases if isinstance(cases, dict) else dict(enumerate(cases))
+    for name, (call, kind, pattern) in cases.items():
+        try:
+            wrong[name] = f"gives {call()!r}"
+        except kind as error:
+            if not re.search(pattern, str(error)):
+                wrong[name] = f"says: {error}"
+    assert wrong == {}
+
+
 def arrays_among(arguments):
     """(call, name) of each array of {call: {name: argument}}."""
     return [

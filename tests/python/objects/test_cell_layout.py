@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The layout of a `CellList`: a sort of the points, `cell_size`, and `candidates`."""
+
+import gc
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+import halfshell as hs
+from cell_scenes import SCENES, WIDTHS, queries_of, scene_of
+from refused_calls import check_refusals
+
+
+def held_by(cells, block):
+    """The points that each query's candidates are."""
+    ends = zip(block.offsets[:-1], block.offsets[1:], strict=True)
+    ranges = ([cells.order[block.start[r] : block.stop[r]] for r in range(a, b)] for a, b in ends)
+    return [np.concatenate([np.empty(0, int), *one]).tolist() for one in ranges]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_layout_is_a_sort_of_the_points(name):
+    points, cutoff, scene = scene_of(name)
+    for wanted in (None, *((cutoff or 1.0) * factor for factor in WIDTHS)):
+        cells = hs.CellList(points, cutoff, cell_size=wanted, **scene)
+        n_cells = len(cells.cell_start) - 1
+        assert n_cells <= 2 * len(points) + 64
+        assert cells.cell_start[0] == 0 and cells.cell_start[-1] == len(points) == len(cells)
+        assert_array_equal(np.sort(cells.order), np.arange(len(points)))
+        inside = np.repeat(np.arange(n_cells), np.diff(cells.cell_start))
+        assert_array_equal(cells.cell_of(points)[cells.order], inside)
+        assert (np.diff(cells.order)[np.diff(inside) == 0] > 0).all()
+        if name != "digits that scaling loses":
+            queries = queries_of(name)
+            held = held_by(cells, cells.candidates(queries))
+            for row, some in zip(cells.query(queries), held, strict=True):
+                assert set(row.tolist()) <= set(some)
+        assert len(cells.shape) == len(cells.cell_sizes) == points.shape[1]
+        if cells.cell_ids is None:
+            assert math.prod(cells.shape) == n_cells
+            for count, width in zip(cells.shape, cells.cell_sizes, strict=True):
+                assert count == 1 or wanted is None or width >= wanted
+        else:
+            assert cells.cell_ids.shape == (n_cells, points.shape[1])
+            assert len(np.unique(cells.cell_ids, axis=0)) == n_cells
+
+
+def test_clusters_far_apart_have_occupied_cells_only():
+    points, cutoff, _ = scene_of("clusters far apart")
+    for size in (None, 0.05):
+        cells = hs.CellList(points, cutoff, cell_size=size)
+        assert cells.cell_ids is not None and cells.cell_of([[5e8, 0.0, 0.0]]).tolist() == [-1]
+    one = hs.CellList(points, cutoff, cell_size=1e12)  # as wanted: all of them in one cell
+    assert one.shape == (1, 1, 1) and one.count_pairs() == hs.count_pairs(points, cutoff)
+
+
+def test_arrays_are_read_only_and_outlive_the_list(rng):
+    cells = hs.CellList(rng.random((100, 3)) * 9.0, 1.0)
+    order, start = cells.order, cells.cell_start
+    copies = order.copy(), start.copy()
+    for array in (order, start):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
+    del cells
+    gc.collect()
+    rng.random(100_000)
+    assert_array_equal(order, copies[0])
+    assert_array_equal(start, copies[1])
+
+
+def test_axes_are_cut_into_as_many_cells_as_are_wide_enough():
+    points = np.random.default_rng(1).random((800, 2)) * [12.0, 5.0]
+    points[:2] = [[0.0, 0.0], [12.0, 5.0]]
+    for width in (0.25, 0.5, 0.75, 1.0, 1.5, 3.0, 20.0):
+        for box in (None, [12.0, 5.0]):
+            cells = hs.CellList(points, 0.7, box=box, cell_size=width)
+            expected = [max(int(length / width), 1) for length in (12.0, 5.0)]
+            assert list(cells.shape) == expected
+            sizes = [length / count for length, count in zip((12.0, 5.0), expected, strict=True)]
+            assert np.allclose(cells.cell_sizes, sizes)
+
+
+@pytest.mark.parametrize("ndim", [1, 2, 3])
+def test_a_block_of_cells_as_wide_as_the_cutoff(ndim):
+    """With cells of a cutoff: 3 along each axis. With a half of it, 5; a third, 7."""
+    points = np.random.default_rng(2).random((3000, ndim)) * 7.37
+    for parts in (1, 2, 3):
+        cells = hs.CellList(points, 0.5, cell_size=0.5 / parts)
+        at = np.stack(np.unravel_index(cells.cell_of(points), cells.shape, order="F"), 1)
+        for i, held in enumerate(held_by(cells, cells.candidates(points[:50]))):
+            assert len(held) == len(set(held))
+            assert (np.abs(at[held] - at[i]) <= parts).all()
+
+
+def test_any_number_that_pairs_takes_is_a_size():
+    points = np.random.default_rng(3).random((100, 2))
+    for size in (1, np.float32(0.25), np.int64(2), np.array(0.5), 5e-324, 1.7e308):
+        assert hs.CellList(points, 0.2, cell_size=size).count_pairs() == hs.count_pairs(points, 0.2)
+
+
+def test_what_is_no_size_is_refused():
+    cases = [
+        (0.0, ValueError, "cell_size must be finite and greater than 0, got 0.0"),
+        (-1.0, ValueError, "greater than 0, got -1.0"),
+        (np.nan, ValueError, "greater than 0, got nan"),
+        (np.inf, ValueError, "greater than 0, got inf"),
+        ([1.0, 1.0], TypeError, "cell_size must be a number"),
+        ("1", TypeError, "cell_size must be a number"),
+        (1j, TypeError, "cell_size must be a number"),
+        (10**400, OverflowError, "cell_size"),
+    ]
+    check_refusals([
+        (lambda size=size: hs.CellList([[0.0, 0.0]], 1.0, cell_size=size), *how)
+        for size, *how in cases
+    ])  # fmt: skip
+
+
+def test_one_cell_with_everything_says_so():
+    points = [[0.0, 2.0**1000], [0.0, -(2.0**1000)]]
+    box = [[2.0**-900, 0.0], [0.0, 1.0]]
+    cells = hs.CellList(points, 2.0**-899, box=box, periodic=[True, False])
+    assert cells.cell_sizes == (np.inf, np.inf) and cells.shape == (1, 1)
+    assert cells.cell_of(points).tolist() == [0, 0] and cells.count_pairs() == 4
+    for queries in (None, [[0.0, 0.0]]):
+        with pytest.raises(ValueError, match="one cell holds everything"):
+            cells.candidates(queries)
+
+
+# ---- candidates ----------------------------------------------------------------------------------
+
+
+def test_candidates_of_the_points_hold_each_pair_both_ways(rng):
+    cells = hs.CellList(rng.random((200, 2)) * 9.0, 1.0)
+    held = held_by(cells, cells.candidates())
+    for i, j in zip(*cells.pairs(), strict=True):
+        assert j in held[i] and i in held[j]
+    assert all(i in row for i, row in enumerate(held))
+
+
+def test_candidates_take_the_memory_of_their_ranges_only(rng):
+    # 2e11 pairs would take terabytes.
+    cells = hs.CellList(rng.random((1_000_000, 1)), 1000.0, box=[1.0])
+    block = cells.candidates(np.zeros((100, 1)))
+    assert (block.stop - block.start).sum() >= 100 * 1_999 * 1_000_000
+    assert block.offsets[-1] == len(block.start)
+
+
+@pytest.mark.parametrize("box", [None, [1.0, 1.0], [[1.0, 0.0], [0.3, 1.0]]], ids=str)
+def test_candidates_of_queries_far_outside(box, rng):
+    for where in (0.0, 1.0, -100.0, 1e6):
+        points = rng.random((50, 2)) + where
+        for periodic in (None,) if box is None else ([True, True], [True, False]):
+            cells = hs.CellList(points, 0.1, box=box, periodic=periodic)
+            for away in (0.0, 0.3, 1.5, -3.0, 50.0, -900.0):
+                queries = points[:20] + np.array([0.0, away])
+                block = cells.candidates(queries)
+                for row, held in zip(cells.query(queries), held_by(cells, block), strict=True):
+                    assert set(row.tolist()) <= set(held)
+                if abs(away) > 1.2 and (box is None or not periodic[1]):
+                    assert len(block.start) == 0
+
+
+def test_candidates_take_queries_at_any_distance_along_the_axes():
+    for shift in (0.0, 1.0, -1e9):
+        cells = hs.CellList([[shift], [shift + 0.125]], 0.125)
+        block = cells.candidates([[shift + 0.375], [shift + 0.125], [1e200], [-1e200]])
+        none, some, *beyond = np.diff(block.offsets).tolist()
+        assert none == 0 and some > 0 and beyond == [0, 0]
+    periodic = hs.CellList([[0.25, 0.0]], 0.5, box=[4.0, 4.0])
+    for query in ([4e200, 0.0], [-(2.0**60), 2.0**100], [5e-324, -5e-324]):
+        assert 0 in held_by(periodic, periodic.candidates([query]))[0]
+    assert len(hs.CellList([[1e30]], 1e25).candidates([[5e-324]]).start) == 0
+
+
+def test_candidates_that_are_refused_name_the_query():
+    skewed = hs.CellList([[0.1, 0.1]], 0.3, box=[[1.0, 0.0], [0.3, 1.0]])
+    with pytest.raises(ValueError, match=r"queries\[2, 1\] = 9000000.0 lies too far"):
+        skewed.candidates([[0.0, 0.0], [1000.0, 0.0], [0.0, 9e6], [9e9, 0.0]])
+    box = [[1.0, 0.0, 0.0], [0.3, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    far = hs.CellList([[0.1, 0.1, 1e200]], 0.3, box=box, periodic=[True, True, False])
+    with pytest.raises(ValueError, match="one cell holds everything"):
+        far.candidates([[0.1, 0.1, 0.0]])
+    assert len(far.query([[0.1, 0.1, 1e200]]).indices) == 1
