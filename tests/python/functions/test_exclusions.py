@@ -91,9 +91,7 @@ class Rule:
                 yield (i, j, S)
 
     def entries(self):
-        found = (
-            self.row(i, j) for i in range(len(self.asking)) for j in range(len(self.points))
-        )
+        found = (self.row(i, j) for i in range(len(self.asking)) for j in range(len(self.points)))
         return set(itertools.chain.from_iterable(found))
 
 
@@ -161,17 +159,26 @@ def of_table(table, numbers=None):
     return entries_of(np.repeat(numbers, table.counts), table.indices, table.shifts)
 
 
-SEEDS = range(250)
+def in_parts(n, parts=4):
+    """Run a test for the seeds below n, in some parts."""
+    return pytest.mark.parametrize("seeds", [range(k, n, parts) for k in range(parts)], ids=str)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_one_set(seed):
-    draw = random.Random(seed)
-    points, cutoff, options = scene_of(draw)
-    n = len(points)
-    chosen, _ = chosen_of(draw, n, n, cutoff)
-    full = Rule((points, cutoff, options), chosen).entries()
-    half = {(i, j, S) for i, j, S in full if i < j or (i == j and any(S) and S > (0,) * len(S))}
+@in_parts(200)
+def test_one_set(seeds):
+    for seed in seeds:
+        draw = random.Random(seed)
+        points, cutoff, options = scene_of(draw)
+        chosen, _ = chosen_of(draw, len(points), len(points), cutoff)
+        full = Rule((points, cutoff, options), chosen).entries()
+        zero = (0,) * points.shape[1]
+        half = {(i, j, S) for i, j, S in full if i < j or (i == j and S > zero)}
+        check_half_lists(points, cutoff, half, chosen, options)
+        check_rows(points, cutoff, full, {**chosen, **options})
+        check_some_points(draw, points, cutoff, full, half, chosen, options)
+
+
+def check_half_lists(points, cutoff, half, chosen, options):
     every = {**chosen, **options}
     assert entries_of(*hs.pairs(points, cutoff, quantities="ijS", **every)) == half
     i, j, d, _, S = hs.pairs(points, cutoff, quantities="ijdDS", **every)
@@ -180,29 +187,27 @@ def test_one_set(seed):
     found = hs.pairs(points, cutoff, quantities="P", **every).tolist()
     assert sorted(map(tuple, found)) == sorted(entry[:2] for entry in half)
     assert hs.count_pairs(points, cutoff, **every) == len(half)
-    counts = hs.count_pairs(points, [cutoff / 2, cutoff], **every)
-    assert counts[1] == len(half)
+    assert hs.count_pairs(points, [cutoff / 2, cutoff], **every)[1] == len(half)
+    blocks = list(hs.iter_pairs(points, cutoff, quantities="ijS", max_pairs=3, **every))
+    assert set().union(*(entries_of(*block) for block in blocks)) == half
+    reach = {"radii": np.full(len(points), cutoff), "rule": "max"}
+    assert entries_of(*hs.pairs(points, None, quantities="ijS", **reach, **every)) == half
+    if options["inclusive"] and not chosen["min_distance"]:
+        scene = {key: options[key] for key in options if key != "inclusive"}
+        scene |= {key: chosen[key] for key in chosen if key != "min_distance"}
+        bins = hs.pair_histogram(points, [0.0, cutoff / 2, cutoff], **scene)
+        assert bins.sum() == len(half)
+
+
+def check_rows(points, cutoff, full, every):
     table = hs.neighbors(points, cutoff, quantities="jS", **every)
     assert of_table(table) == full
     assert hs.neighbors(points, cutoff, **every).indices.tolist() == table.indices.tolist()
     assert hs.coordination(points, cutoff, **every).tolist() == table.counts.tolist()
-    blocks = list(hs.iter_pairs(points, cutoff, quantities="ijS", max_pairs=3, **every))
-    assert set().union(*(entries_of(*block) for block in blocks)) == half
-    radii = hs.pairs(
-        points, None, radii=np.full(n, cutoff), rule="max", quantities="ijS", **every
-    )
-    assert entries_of(*radii) == half
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_some_points_of_one_set(seed):
-    draw = random.Random(seed)
-    points, cutoff, options = scene_of(draw)
-    n = len(points)
-    chosen, _ = chosen_of(draw, n, n, cutoff)
-    full = Rule((points, cutoff, options), chosen).entries()
-    half = {(i, j, S) for i, j, S in full if i < j or (i == j and S > (0,) * len(S))}
-    every = {**chosen, **options}
+def check_some_points(draw, points, cutoff, full, half, chosen, options):
+    n, every = len(points), {**chosen, **options}
     some = np.array(sorted(draw.sample(range(n), draw.randint(0, n))), np.int64)
     table = hs.neighbors(points, cutoff, quantities="jS", indices=some, **every)
     assert of_table(table, some) == {entry for entry in full if entry[0] in some}
@@ -213,29 +218,25 @@ def test_some_points_of_one_set(seed):
     found = hs.pairs(points, cutoff, quantities="ijS", batch=batch, **every)
     assert entries_of(*found) == {e for e in half if batch[e[0]] == batch[e[1]]}
     assert hs.count_pairs(points, cutoff, batch=batch, **every).sum() == len(found[0])
-    if options["inclusive"] and not chosen["min_distance"]:
-        del chosen["min_distance"]
-        scene = {key: options[key] for key in options if key != "inclusive"}
-        bins = hs.pair_histogram(points, [0.0, cutoff / 2, cutoff], **chosen, **scene)
-        assert bins.sum() == len(half)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_two_sets(seed):
-    draw = random.Random(seed)
-    points, cutoff, options = scene_of(draw)
-    queries = points_of(draw, draw.randint(0, 6), points.shape[1], 3.0)
-    chosen, of_queries = chosen_of(draw, len(points), len(queries), cutoff)
-    rule = Rule((points, cutoff, options), chosen, {"queries": queries, **of_queries})
-    expected = rule.entries()
-    every = {**chosen, **of_queries, **options}
-    found = hs.pairs_between(queries, points, cutoff, quantities="ijS", **every)
-    assert entries_of(*found) == expected
-    assert hs.count_pairs(points, cutoff, queries=queries, **every) == len(expected)
-    table = hs.neighbors(points, cutoff, queries=queries, quantities="jS", **every)
-    assert of_table(table) == expected
-    counts = hs.coordination(points, cutoff, queries=queries, **every)
-    assert counts.tolist() == table.counts.tolist()
+@in_parts(200)
+def test_two_sets(seeds):
+    for seed in seeds:
+        draw = random.Random(seed)
+        points, cutoff, options = scene_of(draw)
+        queries = points_of(draw, draw.randint(0, 6), points.shape[1], 3.0)
+        chosen, of_queries = chosen_of(draw, len(points), len(queries), cutoff)
+        rule = Rule((points, cutoff, options), chosen, {"queries": queries, **of_queries})
+        expected = rule.entries()
+        every = {**chosen, **of_queries, **options}
+        found = hs.pairs_between(queries, points, cutoff, quantities="ijS", **every)
+        assert entries_of(*found) == expected
+        assert hs.count_pairs(points, cutoff, queries=queries, **every) == len(expected)
+        table = hs.neighbors(points, cutoff, queries=queries, quantities="jS", **every)
+        assert of_table(table) == expected
+        counts = hs.coordination(points, cutoff, queries=queries, **every)
+        assert counts.tolist() == table.counts.tolist()
 
 
 def test_large_scenes_are_those_of_a_filter():
@@ -278,16 +279,25 @@ def test_the_largest_labels():
     assert hs.count_pairs(points, 1.0, exclude=[0, labels[1]], exclude_within=2**63 - 1) == 0
 
 
-@pytest.mark.parametrize("scale", [2.0**-1030, 2.0**-500, 1.0, 2.0**500, 2.0**1000])
-def test_extreme_units(scale):
-    points = np.array([[0.0], [1.0], [2.0], [3.0]]) * scale
-    found = hs.pairs(points, 2.0 * scale, box=[4.0 * scale], exclude=[[0, 1], [0, 2]],
-                     min_distance=scale, quantities="ijS", sort=True)
-    assert [column.tolist() for column in found] == [
-        [0, 0, 1, 1, 1, 2], [2, 3, 2, 3, 3, 3], [[0], [-1], [0], [-1], [0], [0]]
-    ]
-    nearer = hs.count_pairs(points, 2.0 * scale, min_distance=np.nextafter(scale, np.inf))
-    assert nearer == 2
+def test_extreme_units():
+    for scale in (2.0**-1030, 2.0**-500, 1.0, 2.0**500, 2.0**1000):
+        points = np.array([[0.0], [1.0], [2.0], [3.0]]) * scale
+        found = hs.pairs(
+            points,
+            2.0 * scale,
+            box=[4.0 * scale],
+            exclude=[[0, 1], [0, 2]],
+            min_distance=scale,
+            quantities="ijS",
+            sort=True,
+        )
+        assert [column.tolist() for column in found] == [
+            [0, 0, 1, 1, 1, 2],
+            [2, 3, 2, 3, 3, 3],
+            [[0], [-1], [0], [-1], [0], [0]],
+        ]
+        nearer = hs.count_pairs(points, 2.0 * scale, min_distance=np.nextafter(scale, np.inf))
+        assert nearer == 2
 
 
 BAD = [
@@ -317,20 +327,20 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("chosen", "kind", "words"), BAD, ids=lambda value: str(value)[:40])
-def test_bad_choices(chosen, kind, words):
-    points = [[0.0], [1.0], [2.0]]
-    alone = {name: value for name, value in chosen.items() if not name.startswith("query_")}
-    if alone == chosen:
-        with pytest.raises(kind, match=words):
-            hs.pairs(points, 1.0, **chosen)
-        with pytest.raises(kind, match=words):
-            hs.pairs(points, 1.0, batch=[0, 0, 0], **chosen)
-        with pytest.raises(kind, match=words):
-            hs.iter_pairs(points, 1.0, **chosen)
-    for search in (hs.neighbors, hs.count_pairs, hs.coordination):
-        with pytest.raises(kind, match=words):
-            search(points, 1.0, **chosen)
+def test_bad_choices():
+    for chosen, kind, words in BAD:
+        points = [[0.0], [1.0], [2.0]]
+        alone = {name: value for name, value in chosen.items() if not name.startswith("query_")}
+        if alone == chosen:
+            with pytest.raises(kind, match=words):
+                hs.pairs(points, 1.0, **chosen)
+            with pytest.raises(kind, match=words):
+                hs.pairs(points, 1.0, batch=[0, 0, 0], **chosen)
+            with pytest.raises(kind, match=words):
+                hs.iter_pairs(points, 1.0, **chosen)
+        for search in (hs.neighbors, hs.count_pairs, hs.coordination):
+            with pytest.raises(kind, match=words):
+                search(points, 1.0, **chosen)
 
 
 def test_labels_of_both_sets():
@@ -357,28 +367,28 @@ def test_inputs_stay_and_empty_ones_are_nothing():
     assert hs.count_pairs(empty, 1.0, groups=[], exclude=[], min_distance=0.5) == 0
 
 
-@pytest.mark.parametrize("seed", range(60))
-def test_counts_by_type(seed):
-    draw = random.Random(seed)
-    points, cutoff, options = scene_of(draw)
-    n = len(points)
-    chosen, of_queries = chosen_of(draw, n, n, cutoff)
-    types = labels_of(draw, n, 0)
-    every = {**chosen, **options}
-    table = hs.neighbors(points, cutoff, **every)
-    wanted = np.zeros((n, 1 + types.max(initial=0)), int)
-    np.add.at(wanted, (np.repeat(np.arange(n), table.counts), types[table.indices]), 1)
-    assert hs.coordination(points, cutoff, types=types, **every).tolist() == wanted.tolist()
-    some = [k for k in range(n) if draw.random() < 0.5]
-    found = hs.coordination(points, cutoff, types=types, indices=some, **every)
-    assert found.tolist() == wanted[some].tolist()
-    queried = {**every, **of_queries}
-    if chosen["exclude"] is None or chosen["exclude"].ndim == 1:
-        table = hs.neighbors(points, cutoff, queries=points, **queried)
-        wanted = np.zeros_like(wanted)
+def test_counts_by_type():
+    for seed in range(40):
+        draw = random.Random(seed)
+        points, cutoff, options = scene_of(draw)
+        n = len(points)
+        chosen, of_queries = chosen_of(draw, n, n, cutoff)
+        types = labels_of(draw, n, 0)
+        every = {**chosen, **options}
+        table = hs.neighbors(points, cutoff, **every)
+        wanted = np.zeros((n, 1 + types.max(initial=0)), int)
         np.add.at(wanted, (np.repeat(np.arange(n), table.counts), types[table.indices]), 1)
-        found = hs.coordination(points, cutoff, queries=points, types=types, **queried)
-        assert found.tolist() == wanted.tolist()
+        assert hs.coordination(points, cutoff, types=types, **every).tolist() == wanted.tolist()
+        some = [k for k in range(n) if draw.random() < 0.5]
+        found = hs.coordination(points, cutoff, types=types, indices=some, **every)
+        assert found.tolist() == wanted[some].tolist()
+        queried = {**every, **of_queries}
+        if chosen["exclude"] is None or chosen["exclude"].ndim == 1:
+            table = hs.neighbors(points, cutoff, queries=points, **queried)
+            wanted = np.zeros_like(wanted)
+            np.add.at(wanted, (np.repeat(np.arange(n), table.counts), types[table.indices]), 1)
+            found = hs.coordination(points, cutoff, queries=points, types=types, **queried)
+            assert found.tolist() == wanted.tolist()
 
 
 def test_g_of_r_between_molecules():

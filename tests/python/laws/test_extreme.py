@@ -37,58 +37,58 @@ def near_points(rng, points, cutoff):
 
 
 @pytest.mark.parametrize("cutoff", [SMALLEST, 1e-310, 1e-200, 1e-9, 0.5, 1e9, 1e200, 1e307, 0.0])
-@pytest.mark.parametrize("ndim", [1, 2, 3])
-def test_open_scenes_of_all_scales(rng, kernel, cutoff, ndim):
-    for lowest, highest in [(-320, 308), (-3, 300), (-323, -300), (0, 0.1)]:
-        points = scales(rng, 25, ndim, lowest, highest)
-        check(near_points(rng, points, cutoff), cutoff, kernel=kernel)
+def test_open_scenes_of_all_scales(rng, cutoff):
+    for ndim in (1, 2, 3):
+        for lowest, highest in [(-320, 308), (-3, 300), (-323, -300), (0, 0.1)]:
+            points = scales(rng, 25, ndim, lowest, highest)
+            check(near_points(rng, points, cutoff), cutoff)
 
 
 @pytest.mark.parametrize("cutoff", [SMALLEST, 1e-300, 1e-17, 0.4, 1e200, 0.0])
 @pytest.mark.parametrize("length", [1.0, 1e-300, 1e300, 3 * SMALLEST])
-def test_periodic_scenes_of_all_scales(rng, kernel, cutoff, length):
+def test_periodic_scenes_of_all_scales(rng, cutoff, length):
     if cutoff > 3 * length:
         return  # more images than there is room for
     for outside in (0, 3):
         points = rng.uniform(-outside, outside + 1, (20, 2)) * length
         points[:4, 0] = [length / 2, -length / 2, 0, np.nextafter(length / 2, 0)]
         near_points(rng, points, cutoff)
-        check(points, cutoff, [length, 2 * length], kernel=kernel)
-        check(points, cutoff, [[0, -length], [length, 0]], [True, False], kernel=kernel)
+        check(points, cutoff, [length, 2 * length])
+        check(points, cutoff, [[0, -length], [length, 0]], [True, False])
 
 
-def test_boxes_of_very_different_lengths(rng, kernel):
+def test_boxes_of_very_different_lengths(rng):
     box = [1e-300, 1.0, 1e300]
     points = rng.random((20, 3)) * box
     points[:, 0] = points[rng.integers(20, size=20), 0]
     near_points(rng, points, 1e-300)
-    check(points, 1e-300, box, kernel=kernel)
-    check(points, 0.0, box, kernel=kernel)
+    check(points, 1e-300, box)
+    check(points, 0.0, box)
     for open_axis in range(3):
-        check(points, 1e-300, box, [k != open_axis for k in range(3)], kernel=kernel)
+        check(points, 1e-300, box, [k != open_axis for k in range(3)])
 
 
-def test_tilted_boxes_with_tiny_cutoffs(rng, kernel):
+def test_tilted_boxes_with_tiny_cutoffs(rng):
     box = np.array([[1.0, 0, 0], [0.3, 1, 0], [0, 0, 1]])
     points = rng.random((30, 3)) @ box
     points[15:] = points[:15]
     points[20:25, 2] = [1e300, -1e300, 0, LARGEST, -LARGEST]
     for cutoff in (0.0, SMALLEST, 1e-200):
-        found = check(points, cutoff, box, [True, True, False], kernel=kernel)
+        found = check(points, cutoff, box, [True, True, False])
         assert len(found) >= 10
         points[:, 2] %= 1.0
-        assert len(check(points, cutoff, box, kernel=kernel)) >= 10
+        assert len(check(points, cutoff, box)) >= 10
 
 
-@pytest.mark.parametrize("box", [None, [1.0, 1.0, 1.0]])
-def test_distances_and_vectors_beside_outliers(rng, box):
-    points = rng.random((40, 3))
-    points[7, 0], points[8, 1], points[9, 2] = 1e300, -LARGEST, SMALLEST
-    shifts = "" if box else "S"
-    i, j, d, D, *_ = hs.pairs(points, 0.5, box=box, quantities="ijdD" + shifts, periodic=None)
-    vectors = np.where(box is None, points[j] - points[i], D)
-    assert np.all(np.abs(np.linalg.norm(vectors, axis=1) - d) <= 2 * np.spacing(d))
-    assert len(i) == len(reference_pairs(points, 0.5, box))
+def test_distances_and_vectors_beside_outliers(rng):
+    for box in (None, [1.0, 1.0, 1.0]):
+        points = rng.random((40, 3))
+        points[7, 0], points[8, 1], points[9, 2] = 1e300, -LARGEST, SMALLEST
+        shifts = "" if box else "S"
+        i, j, d, D, *_ = hs.pairs(points, 0.5, box=box, quantities="ijdD" + shifts, periodic=None)
+        vectors = np.where(box is None, points[j] - points[i], D)
+        assert np.all(np.abs(np.linalg.norm(vectors, axis=1) - d) <= 2 * np.spacing(d))
+        assert len(i) == len(reference_pairs(points, 0.5, box))
 
 
 def test_distances_of_subnormal_coordinates(rng):
@@ -102,45 +102,47 @@ def test_distances_of_subnormal_coordinates(rng):
     assert len(check(points, 9 * SMALLEST)) == len(i)
 
 
-def test_points_wrapped_from_far_away_count_their_turns(kernel):
+def test_points_wrapped_from_far_away_count_their_turns():
     # The box is far wider than the cutoff can tell, and points lie outside of it.
     box = [1.0, 1.0]
     points = np.array([[0.25, 0.5], [3.25, 0.5], [-2.75, 0.5], [0.25, 8.5], [0.5, 0.5]])
     expected = {(0, 1, (-3, 0)), (0, 2, (3, 0)), (1, 2, (6, 0)), (0, 3, (0, -8))}
     expected |= {(1, 3, (3, -8)), (2, 3, (-3, -8))}
     for cutoff in (0.0, 1e-300, SMALLEST):
-        assert check(points, cutoff, box, kernel=kernel) == expected
+        assert check(points, cutoff, box) == expected
     points[4, 0] = 2.0**51
-    assert hs.count_pairs(points, 1e-300, box=box, kernel=kernel) == 6
+    for kernel in hs.kernels():
+        assert hs.count_pairs(points, 1e-300, box=box, kernel=kernel) == 6
     with pytest.raises(OverflowError, match=r"points\[4\] lies too many box vectors away"):
-        hs.pairs(points * 4, 1e-300, box=box, quantities="S", kernel=kernel)
+        hs.pairs(points * 4, 1e-300, box=box, quantities="S")
 
 
-def test_faces_of_a_condensed_box_meet(kernel):
+def test_faces_of_a_condensed_box_meet():
     half = 0.5
     points = np.array([[half], [-half], [np.nextafter(half, 0)], [0.0]])
     expected = {(0, 1, (1,))}
-    assert check(points, 1e-200, [1.0], kernel=kernel) == expected
-    assert check(points, 2.0**-54, [1.0], kernel=kernel) == expected | {(0, 2, (0,)), (1, 2, (-1,))}
+    assert check(points, 1e-200, [1.0]) == expected
+    assert check(points, 2.0**-54, [1.0]) == expected | {(0, 2, (0,)), (1, 2, (-1,))}
 
 
-def test_a_cutoff_far_beyond_the_cloud(rng, kernel):
-    points = rng.random((50, 3)) * 1e-300
-    for cutoff in (1e-299, 1e-290, 1.0, 1e19, 1e300, LARGEST):
-        assert hs.count_pairs(points, cutoff, kernel=kernel) == 50 * 49 // 2
-        d = hs.pairs(points, cutoff, quantities="d", kernel=kernel)
-        expected = hs.pairs(points, 1e-299, quantities="d")
-        assert np.allclose(np.sort(d), np.sort(expected), rtol=1e-15)
-    assert hs.count_pairs(points * 0, 1.0, kernel=kernel) == 50 * 49 // 2
+def test_a_cutoff_far_beyond_the_cloud(rng):
+    for kernel in hs.kernels():
+        points = rng.random((50, 3)) * 1e-300
+        for cutoff in (1e-299, 1e-290, 1.0, 1e19, 1e300, LARGEST):
+            assert hs.count_pairs(points, cutoff, kernel=kernel) == 50 * 49 // 2
+            d = hs.pairs(points, cutoff, quantities="d", kernel=kernel)
+            expected = hs.pairs(points, 1e-299, quantities="d")
+            assert np.allclose(np.sort(d), np.sort(expected), rtol=1e-15)
+        assert hs.count_pairs(points * 0, 1.0, kernel=kernel) == 50 * 49 // 2
 
 
-def test_crowds_far_smaller_than_the_cutoff(rng, kernel):
+def test_crowds_far_smaller_than_the_cutoff(rng):
     # Differences underflow in float32 where the crowds are 1e-30 wide.
     centres = rng.integers(0, 9, (300, 3)).astype(float)
     centres[:100] = 0.0
     points = centres + rng.uniform(-1, 1, (300, 3)) * 10.0 ** rng.uniform(-40, -12, (300, 1))
     for cutoff in (1e-35, 1e-25, 1e-13, 1.0):
-        check_large(points, cutoff, kernel=kernel)
+        check_large(points, cutoff)
 
 
 def long_boxes(aspect):
@@ -151,12 +153,12 @@ def long_boxes(aspect):
 
 
 @pytest.mark.parametrize("aspect", [1e6, 1e12, 1e16, 1e19, 1e25])
-def test_long_skewed_boxes(rng, kernel, aspect):
+def test_long_skewed_boxes(rng, aspect):
     for box in long_boxes(aspect):
         points = rng.uniform(-1, 2, (25, 3)) @ box
         points[15:] = points[:10] + rng.uniform(-0.6, 0.6, (10, 3))
         for cutoff in (0.3, 0.9):
-            check(points, cutoff, box, kernel=kernel)
+            check(points, cutoff, box)
     report = hs.explain(rng.random((2000, 3)) @ box, 0.3, box=box, measure=True)
     assert report.measured["candidates"] < 300 * 2000
 
@@ -197,14 +199,14 @@ WIDE = {
 }
 
 
-@pytest.mark.parametrize("ndim", [1, 2, 3])
 @pytest.mark.parametrize("scene", WIDE.values(), ids=WIDE)
-def test_work_follows_points_and_pairs(rng, scene, ndim):
-    points, cutoff, box = scene(rng.random((3000, ndim)))
-    candidates, ambiguous, by_integers = work(points, cutoff, box)
-    assert candidates < 100
-    assert ambiguous < 0.1
-    assert by_integers < 0.01
+def test_work_follows_points_and_pairs(rng, scene):
+    for ndim in (1, 2, 3):
+        points, cutoff, box = scene(rng.random((3000, ndim)))
+        candidates, ambiguous, by_integers = work(points, cutoff, box)
+        assert candidates < 100
+        assert ambiguous < 0.1
+        assert by_integers < 0.01
 
 
 def test_coincident_points_with_cutoff_zero_are_no_work_for_integers():
@@ -241,8 +243,10 @@ def test_double_refuses_what_rounding_drowns(rng):
                 hs.count_pairs(points, 0.2, box=box, precision="double")
 
 
-@pytest.mark.parametrize("limit", [0, 1000, 3e5])
-@pytest.mark.parametrize("options", [{}, {"box": [1.0] * 3}, {"sort": True}, {"threads": 2}])
+@pytest.mark.parametrize(
+    ("limit", "options"),
+    [(0, {}), (1000, {"box": [1.0] * 3}), (3e5, {"sort": True}), (3e5, {"threads": 2})],
+)
 def test_a_refusal_says_what_was_expected(rng, limit, options):
     points = rng.random((20_000, 3))
     count = hs.count_pairs(points, 0.05)

@@ -33,19 +33,20 @@ def scene_in(rng, box, n=20):
 
 
 @pytest.mark.parametrize("aspect", [1e6, 1e12, 1e19])
-def test_full_lists_in_long_skewed_boxes(rng, kernel, aspect):
-    for box in long_boxes(aspect):
-        points = scene_in(rng, box)
-        queries = np.concatenate([scene_in(rng, box, 4), points[:4] + 0.1])
-        for cutoff in (0.3, 0.9):
-            found = hs.neighbors(points, cutoff, box=box, quantities="jS", kernel=kernel)
-            assert entries(found) == full_list(points, cutoff, box)
-            expected = list_between(queries, points, cutoff, box)
-            found = hs.neighbors(
-                points, cutoff, queries=queries, box=box, quantities="jS", kernel=kernel
-            )
-            assert entries(found) == expected
-            assert hs.count_pairs(points, cutoff, queries=queries, box=box) == len(expected)
+def test_full_lists_in_long_skewed_boxes(rng, aspect):
+    for kernel in hs.kernels():
+        for box in long_boxes(aspect):
+            points = scene_in(rng, box)
+            queries = np.concatenate([scene_in(rng, box, 4), points[:4] + 0.1])
+            for cutoff in (0.3, 0.9):
+                found = hs.neighbors(points, cutoff, box=box, quantities="jS", kernel=kernel)
+                assert entries(found) == full_list(points, cutoff, box)
+                expected = list_between(queries, points, cutoff, box)
+                found = hs.neighbors(
+                    points, cutoff, queries=queries, box=box, quantities="jS", kernel=kernel
+                )
+                assert entries(found) == expected
+                assert hs.count_pairs(points, cutoff, queries=queries, box=box) == len(expected)
 
 
 @pytest.mark.parametrize("aspect", [1e6, 1e12, 1e19])
@@ -119,22 +120,23 @@ def test_cells_for_a_large_cutoff_refuse_what_is_smaller_than_rounding(rng):
 
 
 @pytest.mark.parametrize("far", [1e5, 1e8])
-def test_some_points_and_queries_many_boxes_away(rng, kernel, far):
-    box = np.array([[3.0, 0, 0], [1.0, 2.5, 0], [-1.0, 0.7, 3.0]])
-    points, queries = rng.random((300, 3)) @ box, rng.random((300, 3)) @ box
-    for some in (points[7:290:71], queries[130:140]):
-        some += np.round(rng.uniform(-far, far, some.shape)) @ box
-    everyone = np.concatenate([queries, points])
-    half = exact_pairs(everyone, 0.4, box)
-    between = half[(half[:, 0] < 300) & (half[:, 1] >= 300)]
-    found = hs.neighbors(points, 0.4, queries=queries, box=box, quantities="jS", kernel=kernel)
-    assert entries(found) == [(i, j - 300, tuple(S)) for i, j, *S in between.tolist()]
-    kept = hs.CellList(points, 0.4, box=box).query(queries, quantities="jS")
-    assert entries(kept) == entries(found)
-    full = hs.neighbors(points, 0.4, box=box, quantities="jS", kernel=kernel)
-    assert entries(full) == [
-        (i, j, tuple(S)) for i, j, *S in large_full_rows(points, 0.4, box).tolist()
-    ]
+def test_some_points_and_queries_many_boxes_away(rng, far):
+    for kernel in hs.kernels():
+        box = np.array([[3.0, 0, 0], [1.0, 2.5, 0], [-1.0, 0.7, 3.0]])
+        points, queries = rng.random((300, 3)) @ box, rng.random((300, 3)) @ box
+        for some in (points[7:290:71], queries[130:140]):
+            some += np.round(rng.uniform(-far, far, some.shape)) @ box
+        everyone = np.concatenate([queries, points])
+        half = exact_pairs(everyone, 0.4, box)
+        between = half[(half[:, 0] < 300) & (half[:, 1] >= 300)]
+        found = hs.neighbors(points, 0.4, queries=queries, box=box, quantities="jS", kernel=kernel)
+        assert entries(found) == [(i, j - 300, tuple(S)) for i, j, *S in between.tolist()]
+        kept = hs.CellList(points, 0.4, box=box).query(queries, quantities="jS")
+        assert entries(kept) == entries(found)
+        full = hs.neighbors(points, 0.4, box=box, quantities="jS", kernel=kernel)
+        assert entries(full) == [
+            (i, j, tuple(S)) for i, j, *S in large_full_rows(points, 0.4, box).tolist()
+        ]
 
 
 # ---- groups that meet nobody ---------------------------------------------------------------
@@ -156,33 +158,32 @@ def test_queries_that_meet_nobody(rng):
     assert nobody.n_entries == 0 and len(nobody.offsets) == 3001
 
 
-@pytest.mark.parametrize("size", [1, 3, 50])
-def test_blocks_of_pairs_among_lonely_points(rng, size):
-    points = rng.random((2000, 3)) * 60.0
-    expected = hs.pairs(points, 2.0, quantities="ijS", box=[60.0] * 3)
-    assert 50 < len(expected[0]) < 2000
-    blocks = list(
-        hs.iter_pairs(points, 2.0, quantities="ijS", box=[60.0] * 3, max_pairs=size)
-    )
-    for column, whole in enumerate(expected):
-        assert np.array_equal(np.concatenate([block[column] for block in blocks]), whole)
+def test_blocks_of_pairs_among_lonely_points(rng):
+    for size in (1, 3, 50):
+        points = rng.random((2000, 3)) * 60.0
+        expected = hs.pairs(points, 2.0, quantities="ijS", box=[60.0] * 3)
+        assert 50 < len(expected[0]) < 2000
+        blocks = list(hs.iter_pairs(points, 2.0, quantities="ijS", box=[60.0] * 3, max_pairs=size))
+        for column, whole in enumerate(expected):
+            assert np.array_equal(np.concatenate([block[column] for block in blocks]), whole)
 
 
 # ---- plates --------------------------------------------------------------------------------
 
 
-def test_full_lists_in_plates(rng, kernel):
-    box = [2000.0, 2000.0, 0.05]
-    points, queries = rng.random((1500, 3)) * box, rng.random((200, 3)) * box
-    queries[:100] = points[:100] + 0.01
-    for cutoff in (1.0, 0.3):
-        table = hs.neighbors(points, cutoff, box=box, quantities="jS", kernel=kernel)
-        assert entries(table) == [
-            (i, j, tuple(S)) for i, j, *S in large_full_rows(points, cutoff, box).tolist()
-        ]
-        half = exact_pairs(np.concatenate([queries, points]), cutoff, box)
-        between = half[(half[:, 0] < 200) & (half[:, 1] >= 200)]
-        found = hs.neighbors(
-            points, cutoff, queries=queries, box=box, quantities="jS", kernel=kernel
-        )
-        assert entries(found) == [(i, j - 200, tuple(S)) for i, j, *S in between.tolist()]
+def test_full_lists_in_plates(rng):
+    for kernel in hs.kernels():
+        box = [2000.0, 2000.0, 0.05]
+        points, queries = rng.random((1500, 3)) * box, rng.random((200, 3)) * box
+        queries[:100] = points[:100] + 0.01
+        for cutoff in (1.0, 0.3):
+            table = hs.neighbors(points, cutoff, box=box, quantities="jS", kernel=kernel)
+            assert entries(table) == [
+                (i, j, tuple(S)) for i, j, *S in large_full_rows(points, cutoff, box).tolist()
+            ]
+            half = exact_pairs(np.concatenate([queries, points]), cutoff, box)
+            between = half[(half[:, 0] < 200) & (half[:, 1] >= 200)]
+            found = hs.neighbors(
+                points, cutoff, queries=queries, box=box, quantities="jS", kernel=kernel
+            )
+            assert entries(found) == [(i, j - 200, tuple(S)) for i, j, *S in between.tolist()]
