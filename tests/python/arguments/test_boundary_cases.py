@@ -130,20 +130,10 @@ def test_memory_limits_are_plain_numbers():
         assert len(hs.pairs(POINTS, 1.0, memory_limit=limit)) == 2
 
 
-def test_a_limit_below_the_search_itself_is_named():
-    message = refusal(MemoryError, hs.count_pairs, POINTS, 1.0, memory_limit=10)
-    assert "10 bytes are allowed" in message
-
-
 def test_too_many_threads_is_a_value():
     for threads in (0, -1, 1025, 2**63, 10**400, -(10**5000)):
         message = refusal(ValueError, hs.pairs, POINTS, 1.0, threads=threads)
         assert "threads must be a whole number from 1 to 1024" in message
-
-
-def test_as_many_threads_as_are_allowed():
-    for threads in (1, 1024, np.int16(1024)):
-        assert len(hs.pairs(POINTS, 1.0, threads=threads)) == 2
 
 
 @pytest.mark.parametrize("name", ["quantities", "kernel", "precision"])

@@ -287,6 +287,7 @@ def test_many_systems_do_not_depend_on_threads(rng):
         assert (one[1][own] - first).tolist() == j.tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("search", "threads"), [("hs.pairs", 2), ("hs.count_pairs", 1)])
 def test_an_interrupt_stops_the_search(search, threads):
     outcome, delay, grown = run(

@@ -162,10 +162,3 @@ def test_bad_input_is_refused_as_by_pairs():
     ):
         with pytest.raises(exception, match=word):
             hs.explain(**arguments)
-
-
-def test_small_and_empty_scenes():
-    for n in (0, 1, 2):
-        plan = hs.explain(np.zeros((n, 3)), 1.0, measure=True)
-        assert plan.n == n and plan.measured["pairs"] == n * (n - 1) // 2
-        assert str(plan)

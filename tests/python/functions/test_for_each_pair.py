@@ -359,6 +359,7 @@ def test_results_of_any_size_are_visited():
     assert total == 300 * 299 // 2
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_compiled_functions_and_callables():
     outcomes = run(
         """

@@ -361,6 +361,7 @@ print(json.dumps([peak - before, n]))
     assert peak < 60_000_000
 
 
+@pytest.mark.slow
 def test_ctrl_c_within_a_block_and_between_blocks():
     outcome, delay, total, expected = run(
         """

@@ -227,12 +227,6 @@ def test_kernels_agree_to_the_bit(rng):
     assert all(same_tables(first, other) for other in others)
 
 
-@pytest.mark.parametrize("precision", ["double", "single"])
-def test_rounded_decisions_on_generic_points(precision):
-    exact = hs.neighbors(POINTS, 1.5, box=LENGTHS)
-    assert same_tables(hs.neighbors(POINTS, 1.5, box=LENGTHS, precision=precision), exact)
-
-
 def test_rows_of_queries(rng):
     queries = rng.random((15, 3)) * 6.0 - 1.0
     table = hs.neighbors(POINTS, 1.5, queries=queries, box=LENGTHS, quantities="jdDS")

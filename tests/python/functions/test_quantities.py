@@ -44,13 +44,6 @@ def test_several_letters_return_a_tuple_in_their_order(scene):
     assert len(hs.pairs(points, cutoff, box=box, quantities="PSDdji")) == 6
 
 
-def test_default_is_i_and_j(scene):
-    points, cutoff, box = scene
-    assert same_arrays(
-        hs.pairs(points, cutoff, box=box), hs.pairs(points, cutoff, box=box, quantities="ij")
-    )
-
-
 def test_index_dtype(scene):
     for dtype in (np.int64, np.int32, "int64", "int32", np.dtype("int32")):
         points, cutoff, box = scene
@@ -81,11 +74,6 @@ def test_arrays_are_contiguous_writable_and_native(scene):
     for array in hs.pairs(points, cutoff, box=box, quantities="ijdDSP"):
         assert array.flags.c_contiguous and array.flags.writeable and array.flags.aligned
         assert array.dtype.isnative
-
-
-def test_shifts_are_zero_in_open_space(rng):
-    S = hs.pairs(rng.random((20, 2)), 0.5, quantities="S")
-    assert len(S) and not S.any()
 
 
 def test_half_list_convention(scene):
@@ -169,13 +157,6 @@ def test_last_place_in_eight_dimensions(rng):
             points = rng.normal(size=(12, ndim))
             found = hs.pairs(points, 3.0, quantities="ijSdD", kernel=kernel)
             assert_last_place(points, 3.0, None, [x.tolist() for x in found])
-
-
-def test_coincident_points_have_distance_zero():
-    for kernel in hs.kernels():
-        d, D = hs.pairs(np.full((3, 3), 0.1), 1.0, quantities="dD", kernel=kernel)
-        assert d.tolist() == [0.0] * 3 and not D.any()
-        assert not np.signbit(d).any()
 
 
 # ---- the rounded rules, which exist to be compared with ------------------------------------

@@ -62,13 +62,6 @@ def test_kept_cells_in_long_skewed_boxes(rng, aspect):
             assert entries(found) == full_list(points, radius, box)
 
 
-def test_work_in_long_skewed_boxes_follows_the_points(rng):
-    for box in long_boxes(1e12):
-        points = rng.random((2000, 3)) @ box
-        report = hs.explain(points, 0.3, box=box, measure=True)
-        assert report.measured["candidates"] < 300 * len(points)
-
-
 # ---- boxes that are refused ----------------------------------------------------------------
 
 
@@ -156,16 +149,6 @@ def test_queries_that_meet_nobody(rng):
         assert np.array_equal(np.column_stack([i, j - 0, S]), between - [0, 3000, 0, 0, 0])
     nobody = hs.neighbors(points, 1.5, queries=queries + 1e4)
     assert nobody.n_entries == 0 and len(nobody.offsets) == 3001
-
-
-def test_blocks_of_pairs_among_lonely_points(rng):
-    for size in (1, 3, 50):
-        points = rng.random((2000, 3)) * 60.0
-        expected = hs.pairs(points, 2.0, quantities="ijS", box=[60.0] * 3)
-        assert 50 < len(expected[0]) < 2000
-        blocks = list(hs.iter_pairs(points, 2.0, quantities="ijS", box=[60.0] * 3, max_pairs=size))
-        for column, whole in enumerate(expected):
-            assert np.array_equal(np.concatenate([block[column] for block in blocks]), whole)
 
 
 # ---- plates --------------------------------------------------------------------------------

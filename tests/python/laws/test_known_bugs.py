@@ -65,21 +65,6 @@ def test_tiny_cutoff_in_a_big_box(rng):
             assert found.tolist() == [[3, 7]]
 
 
-def test_enormous_cutoff(rng):
-    for kernel in hs.kernels():
-        # matscipy: an empty list at 1e10
-        points = rng.random((60, 3))
-        for cutoff in (1e8, 1e10, 1e300, 1.7e308):
-            assert hs.count_pairs(points, cutoff, kernel=kernel) == 60 * 59 // 2
-
-
-def test_small_units(rng):
-    # ASE: bin_size = max(cutoff, 3) assumes Angstrom
-    points = rng.random((216, 3)) * 0.6
-    check_large(points, 0.03, [0.6] * 3)
-    check_large(points * 1e-10, 0.03e-10, [0.6e-10] * 3)
-
-
 def test_many_equal_coordinates():
     for kernel in hs.kernels():
         # SciPy #14799, #6108, #11595: recursion and quadratic trees on duplicates
@@ -101,50 +86,12 @@ def test_one_crowded_cell_among_empty_ones(rng):
 # ---- faces and wrapping --------------------------------------------------------------------
 
 
-def test_moving_the_whole_scene_by_box_vectors(rng):
-    # OpenMM #5382: 962 of 4084 pairs lost after a translation by 2 b, 2090 after 2 c
-    box = np.array([[8.0, 0, 0], [2.5, 7.0, 0], [-1.5, 3.0, 6.5]])
-    points = np.round(rng.random((150, 3)) @ box * 1024) / 1024
-    expected = check_large(points, 2.0, box)
-    for steps in ([0, 2, 0], [0, 0, 2], [5, -3, 1]):
-        assert np.array_equal(check_large(points + np.array(steps) @ box, 2.0, box), expected)
-
-
-def test_more_than_two_billion_cells_away():
-    # vesin: shifts are truncated to int32 and 720 of 1152 pairs are left
-    points, box = lattice("sc", (4, 4, 4))
-    points, box = points * 3, box * 3
-    moved = points + np.array([12.0 * 2**31, 0, 0])
-    assert hs.count_pairs(moved, 4.25, box=box) == hs.count_pairs(points, 4.25, box=box) == 576
-
-
-def test_open_axes_have_no_shift(rng):
-    # matscipy #315, nvalchemi #104, MACE #1726
-    points = rng.uniform(-30, 30, (80, 3))
-    for flags in ([True, True, False], [False, False, True], [False, True, False]):
-        rows = check_large(points, 6.0, random_box(rng, "triclinic", length=9.0), flags)
-        assert not rows[:, 2:][:, ~np.array(flags)].any()
-
-
-def test_all_negative_coordinates_on_open_axes(rng):
-    # vesin 0.5.8: pairs were skipped
-    points = -100 - rng.random((100, 3)) * 10
-    check_large(points, 2.0)
-    check_large(points, 2.0, [10.0, 10.0, 10.0], [True, False, False])
-
-
 def test_tilted_slab(rng):
     # MACE #1727, vesin 0.5.8: the open direction is not a Cartesian axis
     box = random_box(rng, "rotated", length=5.0)
     points = rng.uniform(-4, 4, (60, 3)) @ box
     for flags in itertools.product([False, True], repeat=3):
         check_large(points, 2.5, box, flags)
-
-
-def test_coordinates_an_instant_below_zero():
-    # NeighbourLists.jl #38, Atomistica #30, SciPy boxsize recipes
-    points = [[-4.4e-52, 0.5], [0.5, -1e-17], [9.999, 0.5], [0.5, 9.999]]
-    assert check(points, 0.01, [10.0, 10.0]) == {(0, 2, (-1, 0)), (1, 3, (0, -1))}
 
 
 def test_coordinates_on_cell_borders():
@@ -164,20 +111,7 @@ def test_few_cells_per_axis(cells, rng):
         check(points, 1.0, lengths)
 
 
-def test_a_length_just_below_a_multiple_of_the_cutoff(rng):
-    # GPUMD #190
-    for length in (math.nextafter(3.0, 0), 2.999999, 3.0, math.nextafter(3.0, 4)):
-        points = np.concatenate([rng.random((60, 3)) * length, [[0, 0, 0], [length] * 3]])
-        check_large(points, 1.0, [length] * 3)
-
-
 # ---- skewed boxes --------------------------------------------------------------------------
-
-
-def test_reduced_triclinic_box(rng):
-    # mdtraj 1.11.1: 2506 of 2671 pairs
-    box = np.array([[7, 0, 0], [1.3, 6.1, 0], [2.2, 1.7, 5.5]])
-    check_large(rng.random((300, 3)) @ box, 1.5, box)
 
 
 def test_sharp_angles(rng):
@@ -197,29 +131,6 @@ def test_sheared_by_a_thousand_cells_in_no_time(rng):
     assert time.process_time() - start < 1.0
 
 
-def test_a_length_below_the_cutoff(rng):
-    # sisl #1016: 140 of 224 pairs
-    for lengths in itertools.permutations([0.7, 3.0, 5.0]):
-        check_large(rng.random((60, 3)) * lengths, 1.0, lengths)
-
-
-def test_left_handed_boxes(rng):
-    # fairchem #2134
-    box = random_box(rng, "left-handed")
-    assert np.linalg.det(box) < 0
-    check_large(rng.random((100, 3)) @ box, 0.4, box)
-
-
-def test_perfect_triclinic_lattice_in_a_half_list():
-    # LAMMPS #2759, #3846: both copies of a pair rejected, or both taken
-    box = np.array([[1.0, 0, 0], [0.25, 0.9, 0], [0.1, -0.3, 1.2]])
-    steps = np.array(list(itertools.product(range(5), repeat=3)))
-    for offset in (0.0, 0.2, -1e-17):
-        points = steps @ box + offset
-        count = len(check_large(points, 1.05, 5 * box))
-        assert count % 125 == 0 and count > 0
-
-
 # ---- ties ----------------------------------------------------------------------------------
 
 
@@ -231,14 +142,6 @@ def test_diagonal_neighbours_of_a_square_grid():
         check(grid, math.sqrt(2.0 * spacing**2))
     grid = np.array(list(itertools.product(range(4), repeat=2)))
     assert len(check(grid, math.sqrt(2.0))) == 24 + 18
-
-
-def test_ties_are_the_same_in_a_cloud_and_in_a_box():
-    for kernel in hs.kernels():
-        # freud, mdtraj: ties kept in free clouds and lost in periodic ones
-        points, box = lattice("sc", (6, 6, 6))
-        assert hs.count_pairs(points, 1.0, kernel=kernel) == 540
-        assert hs.count_pairs(points, 1.0, box=box, kernel=kernel) == 648
 
 
 def test_hcp_has_twelve_neighbours_everywhere():
@@ -261,13 +164,6 @@ def test_fcc_slab():
         neighbours = np.bincount(np.concatenate([i, j]), minlength=len(points))
         assert sorted(set(neighbours.tolist())) == [8, 12]
         assert np.array_equal(neighbours == 8, (points[:, 2] == 0) | (points[:, 2] == 3))
-
-
-def test_pairs_at_distance_zero_are_kept():
-    for kernel in hs.kernels():
-        # SciPy #2353, #5563: they vanish in sparse matrices
-        points = [[1.0, 1.0], [1.0, 1.0], [1.0, 1.5]]
-        assert as_set(*hs.pairs(points, 0.5, kernel=kernel)) == {(0, 1, ()), (0, 2, ()), (1, 2, ())}
 
 
 def test_no_site_is_its_own_neighbour():
@@ -295,15 +191,6 @@ def test_no_points_in_any_box():
     for ndim in range(1, 9):
         for box in (None, np.ones(ndim), np.ones(ndim) * 1e-3):
             assert hs.count_pairs(np.empty((0, ndim)), 1.0, box=box) == 0
-
-
-def test_nan_is_never_just_an_empty_list():
-    # SciPy #14793, neighborlist-rs
-    for box in (None, [1.0, 1.0, 1.0]):
-        points = np.zeros((3, 3))
-        points[2, 0] = math.nan
-        with pytest.raises(ValueError, match="points"):
-            hs.pairs(points, 0.1, box=box)
 
 
 def test_signed_arithmetic_on_indices():
