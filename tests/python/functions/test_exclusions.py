@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which pairs count: groups, excluded pairs, a least distance, against integers in every box."""
+"""Which pairs count: groups, excluded pairs, a least distance, against fractions in every box."""
 
-import itertools
 import random
 from fractions import Fraction
 
@@ -9,54 +8,29 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from full_lists import full_list, list_between
+from halfshell._check.reference import exact_square
+from rational_images import Images, between, exact
 
-# ---- the rule, in integers -------------------------------------------------------------------
-
-
-def unit_of(*arrays):
-    """A power of two that makes all of these floats integers."""
-    each = itertools.chain.from_iterable(np.ravel(array).tolist() for array in arrays)
-    return max((x.as_integer_ratio()[1] for x in each), default=1)
-
-
-def integers_of(array, unit):
-    return [[int(Fraction(x) * unit) for x in row] for row in array.tolist()]
-
-
-def square(p, q, step):
-    total = 0
-    for a, b, c in zip(p, q, step, strict=True):
-        total += (b - a + c) ** 2
-    return total
+# ---- the rule, in fractions ------------------------------------------------------------------
 
 
 class Rule:
     """What counts in a scene; entries are (i, j, S) of rows of points or of queries."""
 
     def __init__(self, scene, chosen, of_queries=None):
-        points, cutoff, options = scene
+        self.points, self.cutoff, self.options = scene
         self.own = of_queries is None
         self.chosen = chosen
         self.of_asking = chosen if self.own else of_queries
-        ndim = points.shape[1]
-        periodic = options.get("periodic", [False] * ndim)
-        asking = points if self.own else of_queries["queries"]
-        box = options.get("box", np.zeros((ndim, ndim)))
-        limits = np.array([[cutoff, chosen["min_distance"] or 0.0]])
-        unit = unit_of(points, asking, box, limits)
-        self.points, self.asking = integers_of(points, unit), integers_of(asking, unit)
-        self.images = {  # each with its displacement
-            S: [sum(s * x for s, x in zip(S, column, strict=True)) for column in columns]
-            for columns in [integers_of(box.T, unit)]
-            for S in itertools.product(*[range(-5, 6) if axis else (0,) for axis in periodic])
-        }
-        ((largest, least),) = integers_of(limits, unit)
-        self.largest, self.least = largest**2, least**2
-        self.inclusive = options["inclusive"]
+        self.asking = self.points if self.own else of_queries["queries"]
+        geometry = self.options.get("box"), self.options.get("periodic")
+        self.images = Images(self.points.shape[1], *geometry)
+        self.scene = (self.cutoff, *geometry, self.options["inclusive"])
 
     def is_excluded(self, i, j):
         exclude = self.chosen["exclude"]
-        if exclude is None:
+        if exclude is None or (self.own and i == j):
             return False
         if exclude.ndim == 2:
             pairs = {tuple(pair) for pair in exclude.tolist()}
@@ -65,34 +39,29 @@ class Rule:
         return abs(int(label) - int(exclude[j])) <= (self.chosen["exclude_within"] or 0)
 
     def nearest(self, i, j):
-        p, q = self.asking[i], self.points[j]
+        """Of images that are equally near the first one of the lower number: they ascend."""
         if self.own and j < i:
-            return tuple(-s for s in self.least_image(q, p))
-        return self.least_image(p, q)
+            return tuple(-s for s in self.nearest(j, i))
+        apart = between(exact(self.asking[i]), exact(self.points[j]))
+        found = self.images.within(apart, Fraction(self.cutoff) ** 2)
+        return min(((square, S) for S, _, square in found), default=(None, None))[1]
 
-    def least_image(self, p, q):
-        """Of images that are equally near the first one: they ascend."""
-        return min(self.images, key=lambda S: square(p, q, self.images[S]))
-
-    def row(self, i, j):
-        groups = self.chosen["groups"]
+    def is_left_out(self, i, j, S):
+        groups, least = self.chosen["groups"], Fraction(self.chosen["min_distance"] or 0.0)
         if groups is not None:
             label = (groups if self.own else self.of_asking["query_groups"])[i]
             if label != groups[j]:
-                return
-        is_excluded = self.is_excluded(i, j) and not (self.own and i == j)
-        excluded = self.nearest(i, j) if is_excluded else None
-        for S, step in self.images.items():
-            if self.own and i == j and not any(S):
-                continue
-            size = square(self.asking[i], self.points[j], step)
-            near = size < self.largest or (self.inclusive and size == self.largest)
-            if near and size >= self.least and S != excluded:
-                yield (i, j, S)
+                return True
+        both = (self.asking[i], self.points[j])
+        square = exact_square(both, 0, 1, S, self.options.get("box"))
+        return square < least**2 or (self.is_excluded(i, j) and S == self.nearest(i, j))
 
     def entries(self):
-        found = (self.row(i, j) for i in range(len(self.asking)) for j in range(len(self.points)))
-        return set(itertools.chain.from_iterable(found))
+        if self.own:
+            found = full_list(self.points, *self.scene)
+        else:
+            found = list_between(self.asking, self.points, *self.scene)
+        return {entry for entry in found if not self.is_left_out(*entry)}
 
 
 # ---- scenes ----------------------------------------------------------------------------------
