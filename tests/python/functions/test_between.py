@@ -12,7 +12,7 @@ from hypothesis import given
 
 import halfshell as hs
 from full_lists import assert_last_place, both_ways, joined, list_between
-from oracles import BOX_KINDS, lattice, random_scene, same_arrays
+from oracles import BOX_KINDS, lattice, random_scene, same_arrays, triples
 from refused_calls import INF, NAN, assert_refused, with_value
 from scene_strategies import scenes
 
@@ -22,18 +22,13 @@ QUERIES = RNG.random((15, 3)) * 5.0 - 0.5
 LENGTHS = np.array([4.0, 4.5, 5.0])
 
 
-def as_list(i, j, S):
-    """Pairs as a list of (i, j, S) in the order that they came in."""
-    return list(zip(i.tolist(), j.tolist(), map(tuple, S.tolist()), strict=True))
-
-
 def check(queries, points, cutoff, box=None, periodic=None, inclusive=True):
     """Assert that pairs and their number are those of the reference, by every kernel."""
     expected = list_between(queries, points, cutoff, box, periodic, inclusive)
     for kernel in hs.kernels():
         how = {"box": box, "periodic": periodic, "inclusive": inclusive, "kernel": kernel}
         found = hs.pairs_between(queries, points, cutoff, quantities="ijS", **how)
-        assert as_list(*found) == expected
+        assert triples(*found) == expected
         assert hs.count_pairs(points, cutoff, queries=queries, **how) == len(expected)
     return expected
 
@@ -119,7 +114,7 @@ def test_a_set_with_itself_is_its_full_list_and_each_point(scene):
     found = hs.pairs_between(scene.points, scene.points, scene.cutoff, quantities="ijS", **how)
     n, ndim = scene.points.shape
     own = [(i, i, (0,) * ndim) for i in range(n)] if scene.inclusive or scene.cutoff > 0 else []
-    assert as_list(*found) == sorted(both_ways(scene.found()) + own)
+    assert triples(*found) == sorted(both_ways(scene.found()) + own)
     assert hs.count_pairs(scene.points, scene.cutoff, queries=scene.points, **how) == len(found[0])
 
 

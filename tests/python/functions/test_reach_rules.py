@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import halfshell as hs
-from full_lists import same_tables
+from full_lists import entries, same_tables
 from oracles import same_arrays
 from reach_scenes import (
     BOXES,
@@ -16,7 +16,6 @@ from reach_scenes import (
     Reaching,
     boxed,
     check,
-    entries,
     spread_radii,
 )
 from scene_strategies import scenes

@@ -17,7 +17,8 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from oracles import same_arrays
+from full_lists import entries
+from oracles import same_arrays, triples
 from rational_images import Images, between, exact
 
 # ---- brute force, in fractions -------------------------------------------------------------
@@ -62,15 +63,6 @@ def keys(pairs):
 
 def by_distance(pairs):
     return keys(sorted(pairs, key=lambda p: (p[0], p[3], p[1], p[2])))
-
-
-def rows_of(table):
-    i = np.repeat(np.arange(len(table)), table.counts).tolist()
-    return list(zip(i, table.indices.tolist(), map(tuple, table.shifts.tolist()), strict=True))
-
-
-def rows_of_arrays(i, j, S):
-    return list(zip(i.tolist(), j.tolist(), map(tuple, S.tolist()), strict=True))
 
 
 # ---- scenes --------------------------------------------------------------------------------
@@ -136,16 +128,16 @@ def histogram(brute, pairs, edges):
 
 def check_table(scene, table, brute, pairs, largest):
     """A table with jSdD: its rows, each number, what sort, filter and graph make of them."""
-    assert rows_of(table) == keys(pairs)
+    assert entries(table) == keys(pairs)
     for pair, d, D in zip(pairs, table.distances.tolist(), table.vectors, strict=True):
         brute.check_numbers(pair, d, D, largest[pair[0]])
-    assert rows_of(table.sort()) == by_distance(pairs)
+    assert entries(table.sort()) == by_distance(pairs)
     mask = np.array([scene.random.random() < 0.6 for _ in pairs], bool)
     kept = [pair for pair, keep in zip(pairs, mask, strict=True) if keep]
     filtered = table.filter(mask)
-    assert rows_of(filtered) == keys(kept)
-    assert rows_of(filtered.sort()) == by_distance(kept)
-    assert rows_of(table.sort().filter(np.ones(len(mask), bool)).sort()) == by_distance(pairs)
+    assert entries(filtered) == keys(kept)
+    assert entries(filtered.sort()) == by_distance(kept)
+    assert entries(table.sort().filter(np.ones(len(mask), bool)).sort()) == by_distance(pairs)
     graph = table.sort().graph()
     ordered = table.sort()
     assert np.array_equal(graph.edge_index[0], ordered.indices)
@@ -171,7 +163,7 @@ def test_half_lists_and_reductions(seeds):
             i, j, S, d, D = hs.pairs(
                 points, cutoff, quantities="ijSdD", sort=True, inclusive=inclusive, **how
             )
-            assert rows_of_arrays(i, j, S) == keys(expected)
+            assert triples(i, j, S) == keys(expected)
             largest = cutoff if inclusive else math.nextafter(cutoff, 0.0)
             for pair, length, vector in zip(expected, d.tolist(), D, strict=True):
                 brute.check_numbers(pair, length, vector, largest)
@@ -243,7 +235,7 @@ def test_lists_of_many_steps(seeds):
             kept.update(points)
             brute = scene.brute(points=points, cutoff=cutoff)
             i, j, S, d, D = kept.pairs(quantities="ijSdD", sort=True)
-            assert rows_of_arrays(i, j, S) == keys(brute.half())
+            assert triples(i, j, S) == keys(brute.half())
             for pair, length, vector in zip(brute.half(), d.tolist(), D, strict=True):
                 brute.check_numbers(pair, length, vector, cutoff)
             step = [scene.random.choice([0.0, 0.25, -0.125]) * cutoff for _ in range(points.size)]

@@ -34,6 +34,11 @@ def as_set(i, j, S=None):
     return found
 
 
+def triples(i, j, S):
+    """A list of (i, j, S), in its order."""
+    return list(zip(i.tolist(), j.tolist(), map(tuple, S.tolist()), strict=True))
+
+
 def as_rows(i, j, S=None):
     """The pairs as int64 rows (i, j, *S) in ascending order: `as_set` for large lists."""
     columns = [np.reshape(i, (-1, 1)), np.reshape(j, (-1, 1))]

@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 
 import halfshell as hs
-from full_lists import both_ways
+from full_lists import both_ways, entries
 from halfshell._check.reference import (
     exact_square,
     reach_by_radii,
@@ -14,7 +14,7 @@ from halfshell._check.reference import (
     reference_pairs,
     ulp_error,
 )
-from oracles import by_kernels, random_box
+from oracles import by_kernels, random_box, triples
 
 SYMMETRIC = ("sum", "mean", "max", "min")
 RULES = (*SYMMETRIC, "gather", "scatter")
@@ -106,17 +106,6 @@ class Reaching:
         if way == "back":
             reach = [list(column) for column in zip(*reach)]
         return reference_pairs(self.points, reach, **self.scene)
-
-
-def triples(i, j, S):
-    """A list of (i, j, S), in its order."""
-    return list(zip(i.tolist(), j.tolist(), map(tuple, S.tolist()), strict=True))
-
-
-def entries(table):
-    """The same of a table with shifts."""
-    rows = np.repeat(np.arange(len(table)), table.counts)
-    return triples(rows, table.indices, table.shifts)
 
 
 def check(scene, **how):
