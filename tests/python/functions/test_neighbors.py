@@ -155,10 +155,12 @@ def test_coincident_points_and_no_cutoff():
 
 
 def test_own_images_and_all_shells():
+    box = hs.Box([1.0, 1.0])
     for kernel in hs.kernels():
-        table = hs.neighbors([[0.3, 0.4]], 1.0, box=[1.0, 1.0], quantities="jS", kernel=kernel)
+        table = hs.neighbors([[0.3, 0.4]], 1.0, box=box, quantities="jS", kernel=kernel)
         assert table.shifts.tolist() == [[-1, 0], [0, -1], [0, 1], [1, 0]]
         assert table.indices.tolist() == [0] * 4
+        assert hs.coordination([[0.3, 0.4]], 1.0, box=box, kernel=kernel).tolist() == [4]
 
 
 def test_rows_far_longer_than_the_others(rng):
