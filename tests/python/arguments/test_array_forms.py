@@ -17,7 +17,7 @@ class Subclass(np.ndarray):
 
 
 def strided(array):
-    wide = np.zeros((2 * len(array), 7))
+    wide = np.zeros((2 * len(array), 7), array.dtype)
     wide[::2, 1::2] = array
     return wide[::2, 1::2]
 
@@ -29,13 +29,13 @@ def read_only(array):
 
 
 def unaligned(array):
-    result = np.ndarray(array.shape, np.float64, bytearray(array.nbytes + 1), 1)
+    result = np.ndarray(array.shape, array.dtype, bytearray(array.nbytes + 1), 1)
     result[...] = array
     return result
 
 
 def field(array):
-    records = np.zeros(len(array), [("mark", "i1"), ("place", "f8", 3)])
+    records = np.zeros(len(array), [("mark", "i1"), ("place", array.dtype, 3)])
     records["place"] = array
     return records["place"]
 
@@ -68,6 +68,7 @@ def answers(points, queries):
     ]
     arrays = [
         *hs.pairs_between(queries, points, 0.3, box=BOX, quantities="ijdDS"),
+        *hs.nearest(points, 5, queries=queries, box=BOX, quantities="jdDS"),
         *(a for t in tables for a in (t.offsets, t.indices, t.distances, t.vectors, t.shifts)),
         hs.coordination(points, 0.3, queries=queries, box=BOX),
         hs.pair_histogram(points, EDGES, queries=queries, box=BOX),
@@ -92,6 +93,10 @@ def test_the_form_of_an_array_changes_nothing(form):
     before = bytes(np.asarray(points, float)), bytes(np.asarray(queries, float))
     assert answers(points, queries) == EXPECTED
     assert answers(POINTS, queries) == EXPECTED
+    single = POINTS.astype(np.float32)
+    found = hs.pairs(form(single), 0.3, box=BOX, quantities="ijSdD")
+    expected = hs.pairs(single, 0.3, box=BOX, quantities="ijSdD")
+    assert [a.tobytes() for a in found] == [a.tobytes() for a in expected]
     assert before == (bytes(np.asarray(points, float)), bytes(np.asarray(queries, float)))
 
 
@@ -142,13 +147,12 @@ def patched(keep, old2new):
 TAKEN = {
     "points, box": (lambda x, b: hs.pairs(x, 0.1, box=b), (POINTS, np.eye(3))),
     "periodic": (
-        lambda x, p: hs.pairs(x, 0.1, box=BOX, periodic=p), (POINTS, np.array([True, False, True]))
+        lambda x, p: hs.pairs(x, 0.1, box=BOX, periodic=p),
+        (POINTS, np.array([True, False, True])),
     ),
     "cutoffs": (lambda c: hs.pairs(POINTS, c, quantities="ijk"), (np.array([0.05, 0.1]),)),
     "radii": (lambda r: hs.neighbors(POINTS, None, radii=r).indices, (RADII,)),
-    "supports": (
-        lambda H: hs.neighbors(POINTS, None, supports=H, extent=1.0).indices, (MATRICES,)
-    ),
+    "supports": (lambda H: hs.neighbors(POINTS, None, supports=H, extent=1.0).indices, (MATRICES,)),
     "types": (lambda t: hs.rdf(POINTS, 0.1, types=t, box=BOX).counts, (TYPES,)),
     "batch": (lambda k: hs.pairs(POINTS, 0.1, batch=k), (NUMBERS // 50,)),
     "pairs": (lambda k: hs.pairs(POINTS, 0.2, exclude=k), (np.array([[0, 1], [2, 3]]),)),
@@ -156,9 +160,7 @@ TAKEN = {
     "groups": (lambda k: hs.pairs(POINTS, 0.2, groups=k), (NUMBERS // 3,)),
     "touching": (lambda k: hs.pairs(POINTS, 0.2, touching=k), (NUMBERS[5:9],)),
     "indices": (lambda k: hs.neighbors(POINTS, 0.2, indices=k).indices, (NUMBERS[5:9],)),
-    "edges, weights": (
-        lambda e, w: hs.pair_histogram(POINTS, e, weights=w), (EDGES, WEIGHTS)
-    ),
+    "edges, weights": (lambda e, w: hs.pair_histogram(POINTS, e, weights=w), (EDGES, WEIGHTS)),
     "lists": (lambda i, j: hs.measure(POINTS, i, j), (NUMBERS[:9], NUMBERS[1:10])),
     "checked": (lambda i, j: str(hs.verify(POINTS, 0.2, i, j)), hs.pairs(POINTS, 0.2)),
     "rows": (lambda k: hs.neighbors(POINTS, 0.2)[k].indices, (NUMBERS[5:9],)),

@@ -213,35 +213,35 @@ def public_flags():
             yield from ((full_name, flag) for flag in flags_of(member))
 
 
-@pytest.mark.parametrize(("name", "flag"), sorted(set(public_flags())))
-def test_flags_are_bools(name, flag):
-    call = FLAGS[name]
-    for value in (True, False, np.True_, np.False_):
-        if "for_each_pair" not in name:  # whose callback has to be of C
-            call(**{flag: value})
-    for value in (
-        0,
-        1,
-        2,
-        0.0,
-        "True",
-        b"",
-        [],
-        [True],
-        np.int64(1),
-        np.array(True),
-        np.array([1]),
-    ):
-        with pytest.raises(TypeError, match=flag):
-            call(**{flag: value})
+def test_flags_are_bools():
+    for name, flag in sorted(set(public_flags())):
+        call = FLAGS[name]
+        for value in (True, False, np.True_, np.False_):
+            if "for_each_pair" not in name:  # whose callback has to be of C
+                call(**{flag: value})
+        for value in (
+            0,
+            1,
+            2,
+            0.0,
+            "True",
+            b"",
+            [],
+            [True],
+            np.int64(1),
+            np.array(True),
+            np.array([1]),
+        ):
+            with pytest.raises(TypeError, match=flag):
+                call(**{flag: value})
 
 
-@pytest.mark.parametrize("shape", [(4, 0), (1, 0), (0, 0), (0, 3), (0, 1), (0, 2, 0)])
-def test_excluded_pairs_have_two_columns(shape):
-    with pytest.raises(ValueError, match=r"exclude must have shape"):
-        hs.pairs(POINTS, 0.5, exclude=np.empty(shape))
-    with pytest.raises(ValueError, match=r"exclude must have shape"):
-        hs.Connectivity(NODES, exclude=np.empty(shape))
+def test_excluded_pairs_have_two_columns():
+    for shape in ((4, 0), (1, 0), (0, 0), (0, 3), (0, 1), (0, 2, 0)):
+        with pytest.raises(ValueError, match=r"exclude must have shape"):
+            hs.pairs(POINTS, 0.5, exclude=np.empty(shape))
+        with pytest.raises(ValueError, match=r"exclude must have shape"):
+            hs.Connectivity(NODES, exclude=np.empty(shape))
 
 
 def test_no_excluded_pairs():

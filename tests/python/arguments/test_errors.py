@@ -4,7 +4,7 @@
 import datetime
 import decimal
 import fractions
-import re
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,218 +14,159 @@ from refused_calls import INF, NAN, assert_refused, with_value
 
 POINTS = np.arange(12.0).reshape(4, 3) / 8
 CUBE = np.eye(3) * 2
+EITHER = (TypeError, ValueError)
 
-WRONG_KIND_OF_POINTS = {
-    "string": "points",
-    "strings": [["a", "b", "c"]],
-    "bytes": b"123456789",
-    "string array": np.array([["1", "2", "3"]]),
-    "complex": np.zeros((4, 3), complex),
-    "complex list": [[1j, 0, 0]],
-    "None": None,
-    "list of None": [[None, 0.0, 0.0]],
-    "Fractions": [[fractions.Fraction(1, 3), 0, 0]],
-    "Decimals": [[decimal.Decimal("0.1"), 0, 0]],
-    "datetimes": np.zeros((4, 3), "datetime64[s]"),
-    "time spans": np.zeros((4, 3), "timedelta64[s]"),
-    "date objects": [[datetime.date(2020, 1, 1)] * 3],
-    "structured": np.zeros(4, [("x", float), ("y", float), ("z", float)]),
-    "void": np.zeros((4, 3), "V8"),
-    "dict": {"x": [1.0]},
-    "set": {1.0, 2.0},
-    "generator": ((x, x) for x in (1.0, 2.0)),
-    "function": len,
-}
+#: Argument -> (exception, what the message also says, values).
+REFUSED = {
+    "points": [
+        (TypeError, "", [
+            "points", [["a", "b", "c"]], b"123456789", np.array([["1", "2", "3"]]),
+            np.zeros((4, 3), complex), [[1j, 0, 0]], None, [[None, 0.0, 0.0]],
+            [[fractions.Fraction(1, 3), 0, 0]], [[decimal.Decimal("0.1"), 0, 0]],
+            np.zeros((4, 3), "datetime64[s]"), np.zeros((4, 3), "timedelta64[s]"),
+            [[datetime.date(2020, 1, 1)] * 3], np.zeros((4, 3), "V8"), {"x": [1.0]}, {1.0, 2.0},
+            np.zeros(4, [("x", float), ("y", float), ("z", float)]), len,
+        ]),
+        (TypeError, "", [(x for x in (1.0, 2.0))]),
+        (ValueError, r"\(\)", [1.0]), (ValueError, r"\(3,\)", [[1.0, 2.0, 3.0]]),
+        (ValueError, r"\(2, 3, 4\)", [np.zeros((2, 3, 4))]),
+        (ValueError, r"\(4, 0\)", [np.zeros((4, 0))]),
+        (ValueError, r"\(4, 9\)", [np.zeros((4, 9))]),
+        (ValueError, r"\(0, 0\)", [np.zeros((0, 0))]),
+        (EITHER, "", [[[0.0, 0.0], [1.0]]]),
+        (ValueError, "mask", [np.ma.array(POINTS, mask=POINTS == POINTS[2, 1])]),
+        (OverflowError, "", [[[10**400, 0, 0]], [[-(10**400), 0.5, 0]]]),
+        (OverflowError, r"2147483648|2\^31|2\*\*31", [np.broadcast_to(0.0, (2**31, 1))]),
+        (OverflowError, "", [np.broadcast_to(np.float32(0.0), (2**40, 3))]),
+    ],
+    "cutoff": [
+        (ValueError, "nan", [NAN, np.float32(NAN)]), (ValueError, "inf", [INF]),
+        (ValueError, "-inf", [-INF]), (ValueError, "-1", [-1.0, -1]),
+        (ValueError, "-5e-324|negative", [-5e-324]), (ValueError, "", [2**53 + 1]),
+        (TypeError, "str", ["1"]), (TypeError, "bytes", [b"1"]), (TypeError, "None", [None]),
+        (TypeError, "complex", [1j, np.complex128(1)]), (TypeError, "dict", [{"H": 1.0}]),
+        (TypeError, "Fraction", [fractions.Fraction(1, 3)]),
+        (TypeError, "Decimal", [decimal.Decimal("0.1")]),
+        (TypeError, "datetime", [np.datetime64("2020-01-01")]), (EITHER, "", [[[1.0, 2.0]]]),
+        (OverflowError, "", [10**400]),
+        (TypeError, "^cutoff must be a number, got NoneType: None needs radii or", [None]),
+        (TypeError, "^cutoff must be a number, got object$", [object()]),
+        (TypeError, "^cutoff must be a number, got dtype complex128$", [1j]),
+        (OverflowError, "^cutoff = ", [-(10**5000)]),
+        (ValueError, f"^cutoff = {2**64 + 1} ", [2**64 + 1]),
+        (ValueError, "^cutoff must not be masked", [np.ma.array(1.0, mask=True)]),
+    ],
+    "box": [
+        (ValueError, r"\(2,\)", [[1.0, 2.0]]), (ValueError, r"\(4,\)", [[1.0] * 4]),
+        (ValueError, r"\(2, 3\)", [np.ones((2, 3))]), (ValueError, r"\(3, 2\)", [np.ones((3, 2))]),
+        (ValueError, r"\(1, 3, 3\)", [np.ones((1, 3, 3))]), (ValueError, r"\(0,\)", [[]]),
+        (TypeError, "", [
+            "cubic", True, np.False_, 1j, [["a"] * 3] * 3, np.eye(3) * 1j, [[None] * 3] * 3,
+            np.zeros((3, 3), "M8[s]"),
+        ]),
+        (ValueError, "mask", [np.ma.array(CUBE, mask=CUBE > 0)]),
+        (ValueError, "", [np.diag([5, 5, 2**53 + 1])]),
+        (ValueError, "dependent|zero|0", [
+            np.zeros((3, 3)), [1.0, 0.0, 1.0], [[1, 0, 0], [0, 0, 0], [0, 0, 1]],
+            [[0.1, 0.2, 0.3], [0.1, 0.2, 0.3], [0, 0, 1]],  # equal rows, a double, a sum
+            [[0.1, 0.2, 0.3], [1, 0, 0], [0.2, 0.4, 0.6]],
+            [[0.375, 0.75, 0.125], [0.25, 1.5, 3.5], [0.625, 2.25, 3.625]],
+            [[1, 2, 0], [3, 4, 0], [5, 7, 0]],  # flat, tiny, huge, subnormal
+            [[1e-300, 2e-300, 0], [2e-300, 4e-300, 0], [0, 0, 1]],
+            [[1e300, 2e300, 0], [2e300, 4e300, 0], [0, 0, 1]],
+            [[5e-324, 0, 0], [1e-323, 0, 0], [0, 0, 1]],
+        ]),
+    ],
+    "periodic": [
+        (TypeError, "", ["xyz", "TFT", "True", ["T", "F", "T"], b"TFT"]),
+        (EITHER, "", [[True, True], [True] * 4, [[True] * 3], []]),
+        (EITHER, "", [[0.5, 1.0, 1.0], [1, 0, 2], [None, True, True], [1j, 0, 0]]),
+    ],
+    "quantities": [
+        (ValueError, "", ["", "x", "ijk", "iJ", "i j", "ij,d", "ijé"]),
+        (TypeError, "", [None, 3, b"ij", object()]),
+    ],
+    "index_dtype": [
+        (EITHER, "", [
+            np.uint64, np.uint32, np.int16, np.float64, ">i8", "banana", object, [1], complex,
+        ]),
+    ],
+    "precision": [(EITHER, "", ["half", "", "EXACT", None, 64, float])],
+    "kernel": [(EITHER, "", ["sse9", "", "SCALAR", 3, b"scalar", "scalar\0", "x" * 10**6])],
+    "memory_limit": [(EITHER, "", [-1, NAN, "10GB", 1j, [1]])],
+}  # fmt: skip
+OF_PAIRS = ("quantities", "index_dtype")
 
 
-@pytest.mark.parametrize("points", WRONG_KIND_OF_POINTS.values(), ids=WRONG_KIND_OF_POINTS)
-def test_points_of_a_wrong_kind(points):
-    assert_refused(lambda: hs.pairs(points, 1.0), TypeError, "points")
-    assert_refused(lambda: hs.count_pairs(points, 1.0), TypeError, "points")
+@pytest.mark.parametrize("name", REFUSED)
+def test_bad_arguments(name):
+    scene = {"points": POINTS, "cutoff": 1.0}
+    boxes = [{}, {"box": CUBE}] if name in ("points", "cutoff") else [{}]
+    boxes = [{"box": CUBE}] if name == "periodic" else boxes
+    for exception, fragment, values in REFUSED[name]:
+        for value in values:
+            for box in boxes:
+                for call in (hs.pairs,) if name in OF_PAIRS else (hs.pairs, hs.count_pairs):
+                    given = {**scene, **box, name: value}
+                    assert_refused(partial(call, **given), exception, name, fragment)
 
 
 def test_long_double_is_refused_because_it_would_be_rounded():
     if np.dtype(np.longdouble).itemsize == 8:
         return  # a plain double here
     for points in (POINTS.astype(np.longdouble), [[np.longdouble(1) / 3] * 3]):
-        assert_refused(lambda points=points: hs.pairs(points, 1.0), TypeError, "points")
+        assert_refused(partial(hs.pairs, points, 1.0), TypeError, "points")
     assert_refused(lambda: hs.pairs(POINTS, np.longdouble(1)), TypeError, "cutoff")
     box = CUBE.astype(np.longdouble)
     assert_refused(lambda: hs.pairs(POINTS, 1.0, box=box), TypeError, "box")
 
 
-@pytest.mark.parametrize(
-    "points, fragment",
-    [
-        (1.0, r"\(\)"),
-        ([1.0, 2.0, 3.0], r"\(3,\)"),
-        (np.zeros((2, 3, 4)), r"\(2, 3, 4\)"),
-        (np.zeros((4, 0)), r"\(4, 0\)"),
-        (np.zeros((4, 9)), r"\(4, 9\)"),
-        (np.zeros((0, 0)), r"\(0, 0\)"),
-    ],
-)
-def test_points_of_a_wrong_shape(points, fragment):
-    assert_refused(lambda: hs.pairs(points, 1.0), ValueError, "points", fragment)
-
-
-def test_ragged_points():
-    assert_refused(lambda: hs.pairs([[0.0, 0.0], [1.0]], 1.0), (ValueError, TypeError), "points")
-
-
-@pytest.mark.parametrize("value, word", [(NAN, "nan"), (INF, "inf"), (-INF, "-inf")])
 @pytest.mark.parametrize("dtype", [np.float64, np.float32, np.float16, ">f8"])
-def test_coordinates_that_are_not_finite(value, word, dtype):
-    for row, column in ((0, 0), (3, 1), (4, 2)):
-        points = with_value(row, column, value, dtype=dtype)
-        for box in (None, CUBE):
-            assert_refused(
-                lambda points=points, box=box: hs.pairs(points, 1.0, box=box),
-                ValueError,
-                "points",
-                word,
-                rf"row {row}|\[{row}, {column}\]",
-                rf"column {column}|\[{row}, {column}\]",
-            )
+def test_coordinates_that_are_not_finite(dtype):
+    for value, word in ((NAN, "nan"), (INF, "inf"), (-INF, "-inf")):
+        for row, column in ((0, 0), (3, 1), (4, 2)):
+            points = with_value(row, column, value, dtype=dtype)
+            place = rf"points\[{row}, {column}\]"
+            for box in (None, CUBE):
+                call = partial(hs.pairs, points, 1.0, box=box)
+                assert_refused(call, ValueError, place, word)
 
 
 def test_a_nan_among_many_points_is_found():
     for row in (0, 77_777, 99_999):
         points = with_value(row, 1, NAN, shape=(100_000, 3))
         points[:, 0] = np.arange(100_000)
-        assert_refused(lambda points=points: hs.pairs(points, 1e-3), ValueError, str(row), "nan")
+        assert_refused(partial(hs.pairs, points, 1e-3), ValueError, str(row), "nan")
 
 
 @pytest.mark.parametrize("dtype", [np.int64, np.uint64])
 def test_integers_that_float64_cannot_hold(dtype):
     for value in (2**53 + 1, 2**62 + 1, 2**63 - 1):
         points = with_value(2, 1, value, dtype=dtype)
-        assert_refused(
-            lambda points=points: hs.pairs(points, 1.0), ValueError, "points", str(value)
-        )
-    assert_refused(lambda: hs.pairs(POINTS, 2**53 + 1), ValueError, "cutoff")
-    box = np.diag([5, 5, 2**53 + 1])
-    assert_refused(lambda: hs.pairs(POINTS, 1, box=box), ValueError, "box")
-
-
-def test_numbers_too_large_for_float64():
-    assert_refused(lambda: hs.pairs(POINTS, 10**400), OverflowError, "cutoff")
-    for points in ([[10**400, 0, 0]], [[-(10**400), 0.5, 0]]):
-        assert_refused(lambda points=points: hs.pairs(points, 1.0), OverflowError, "points")
-
-
-def test_masked_elements():
-    points = np.ma.array(POINTS, mask=POINTS == POINTS[2, 1])
-    assert_refused(lambda: hs.pairs(points, 1.0), ValueError, "points", "mask")
-    box = np.ma.array(CUBE, mask=CUBE > 0)
-    assert_refused(lambda: hs.pairs(POINTS, 1.0, box=box), ValueError, "box", "mask")
-
-
-def test_two_billion_points():
-    points = np.broadcast_to(np.float64(0.0), (2**31, 1))  # takes no memory
-    assert_refused(
-        lambda: hs.pairs(points, 1.0), OverflowError, "points", "2147483648|2\\^31|2\\*\\*31"
-    )
-    points = np.broadcast_to(np.float32(0.0), (2**40, 3))
-    assert_refused(lambda: hs.count_pairs(points, 1.0), OverflowError, "points")
-
-
-@pytest.mark.parametrize(
-    "cutoff, exception, fragment",
-    [
-        (NAN, ValueError, "nan"),
-        (INF, ValueError, "inf"),
-        (-INF, ValueError, "-inf"),
-        (-1.0, ValueError, "-1"),
-        (-5e-324, ValueError, "-5e-324|negative"),
-        (-1, ValueError, "-1"),
-        (np.float32(NAN), ValueError, "nan"),
-        ("1", TypeError, "str"),
-        (b"1", TypeError, "bytes"),
-        (None, TypeError, "None"),
-        (1j, TypeError, "complex"),
-        (np.complex128(1), TypeError, "complex"),
-        (fractions.Fraction(1, 3), TypeError, "Fraction"),
-        (decimal.Decimal("0.1"), TypeError, "Decimal"),
-        (np.datetime64("2020-01-01"), TypeError, "datetime"),
-        ({"H": 1.0}, TypeError, "dict"),
-        ([[1.0, 2.0]], (TypeError, ValueError), ""),
-    ],
-)
-def test_bad_cutoffs(cutoff, exception, fragment):
-    for box in (None, CUBE):
-        for call in (hs.pairs, hs.count_pairs):
-            assert_refused(
-                lambda call=call, box=box: call(POINTS, cutoff, box=box),
-                exception,
-                "cutoff",
-                fragment,
-            )
+        assert_refused(partial(hs.pairs, points, 1.0), ValueError, "points", str(value))
 
 
 def test_a_list_of_cutoffs_is_for_counting_only():
-    assert_refused(lambda: hs.pairs(POINTS, [1.0, 2.0]), (TypeError, ValueError), "cutoff")
-    for cutoffs in ([2.0, 1.0], [0.5, 1.0, 0.75]):
-        assert_refused(
-            lambda cutoffs=cutoffs: hs.count_pairs(POINTS, cutoffs),
-            ValueError,
-            "cutoff",
-            "ascending",
-        )
-    for cutoffs in ([-1.0, 2.0], [1.0, NAN], [1.0, INF]):
-        assert_refused(
-            lambda cutoffs=cutoffs: hs.count_pairs(POINTS, cutoffs), ValueError, "cutoff"
-        )
+    assert_refused(lambda: hs.pairs(POINTS, [1.0, 2.0]), EITHER, "cutoff")
+    for cutoffs, message in (
+        ([0.5, 1.0, 0.75], r"ascending.*cutoff\[1\] = 1.0 before cutoff\[2\] = 0.75"),
+        ([-1.0, 2.0], r"not negative.*cutoff\[0\] = -1"),
+        ([1.0, NAN, 2.0], r"finite.*cutoff\[1\] = nan"),
+        ([1.0, INF], r"finite.*cutoff\[1\] = inf"),
+        ([1.0, 2.0, -INF], r"finite.*cutoff\[2\] = -inf"),
+    ):
+        assert_refused(partial(hs.count_pairs, POINTS, cutoffs), ValueError, message)
     assert_refused(lambda: hs.count_pairs(POINTS, ["1", "2"]), TypeError, "cutoff")
-
-
-@pytest.mark.parametrize(
-    "box", [[1.0, 2.0], [1.0] * 4, np.ones((2, 3)), np.ones((3, 2)), np.ones((1, 3, 3)), []]
-)
-def test_boxes_of_a_wrong_shape(box):
-    shape = re.escape(str(np.shape(box)))
-    assert_refused(lambda: hs.pairs(POINTS, 1.0, box=box), ValueError, "box", shape)
-
-
-@pytest.mark.parametrize(
-    "box",
-    ["cubic", True, np.False_, 1j, [["a"] * 3] * 3, np.eye(3) * 1j, [[None] * 3] * 3,
-     np.zeros((3, 3), "M8[s]")],
-)
-def test_boxes_of_a_wrong_kind(box):
-    assert_refused(lambda: hs.pairs(POINTS, 1.0, box=box), TypeError, "box")
 
 
 @pytest.mark.parametrize("value, word", [(NAN, "nan"), (INF, "inf"), (-INF, "-inf")])
 def test_box_entries_that_are_not_finite(value, word):
     box = CUBE.copy()
     box[2, 1] = value
-    row_and_column = r"row 2.*column 1|\[2, 1\]"
-    assert_refused(lambda: hs.pairs(POINTS, 1.0, box=box), ValueError, "box", word, row_and_column)
-    lengths = [1.0, value, 1.0]
-    assert_refused(lambda: hs.pairs(POINTS, 1.0, box=lengths), ValueError, "box", word)
-    for periodic in (False, [True, False, True]):  # also where the axis does not repeat
-        given = {"box": lengths, "periodic": periodic}
-        assert_refused(lambda given=given: hs.pairs(POINTS, 1.0, **given), ValueError, "box", word)
-
-
-DEPENDENT = {
-    "zero box": np.zeros((3, 3)),
-    "zero length": [1.0, 0.0, 1.0],
-    "zero row": [[1, 0, 0], [0, 0, 0], [0, 0, 1]],
-    "equal rows": [[0.1, 0.2, 0.3], [0.1, 0.2, 0.3], [0, 0, 1]],
-    "a double": [[0.1, 0.2, 0.3], [1, 0, 0], [0.2, 0.4, 0.6]],
-    "a sum": [[0.375, 0.75, 0.125], [0.25, 1.5, 3.5], [0.625, 2.25, 3.625]],
-    "flat": [[1, 2, 0], [3, 4, 0], [5, 7, 0]],
-    "tiny": [[1e-300, 2e-300, 0], [2e-300, 4e-300, 0], [0, 0, 1]],
-    "huge": [[1e300, 2e300, 0], [2e300, 4e300, 0], [0, 0, 1]],
-    "subnormal": [[5e-324, 0, 0], [1e-323, 0, 0], [0, 0, 1]],
-}
-
-
-@pytest.mark.parametrize("box", DEPENDENT.values(), ids=DEPENDENT)
-def test_dependent_box_vectors(box):
-    assert_refused(lambda: hs.pairs(POINTS, 1.0, box=box), ValueError, "box", "dependent|zero|0")
+    assert_refused(lambda: hs.pairs(POINTS, 1.0, box=box), ValueError, word, r"box\[2, 1\]")
+    for periodic in (None, False, [True, False, True]):  # also where the axis does not repeat
+        call = partial(hs.pairs, POINTS, 1.0, box=[1.0, value, 1.0], periodic=periodic)
+        assert_refused(call, ValueError, "box", word)
 
 
 def test_dependence_is_decided_exactly(rng):
@@ -236,11 +177,10 @@ def test_dependence_is_decided_exactly(rng):
         s, t = rng.integers(-50, 50, 2)
         box = np.array([a, b, s * a + t * b])
         hidden += np.linalg.det(box) != 0
-        assert_refused(lambda box=box: hs.pairs(POINTS, 1.0, box=box), ValueError, "box")
+        assert_refused(partial(hs.pairs, POINTS, 1.0, box=box), ValueError, "box")
     assert hidden > 0
     for scale in (2.0**-1000, 2.0**900):
-        small = box * scale
-        assert_refused(lambda small=small: hs.pairs(POINTS, 1.0, box=small), ValueError, "box")
+        assert_refused(partial(hs.pairs, POINTS, 1.0, box=box * scale), ValueError, "box")
 
 
 def test_nearly_dependent_box_vectors_are_independent():
@@ -259,102 +199,23 @@ def test_rows_of_open_axes_may_be_anything_finite_and_dependent():
     assert hs.count_pairs([[0.0, 0.0, 0.0]], 1.0, box=box, periodic=periodic) == 2
 
 
-@pytest.mark.parametrize("periodic", [True, [True, False, False], np.array([False, False, True])])
-def test_periodic_without_a_box(periodic):
-    assert_refused(lambda: hs.pairs(POINTS, 1.0, periodic=periodic), ValueError, "periodic", "box")
-
-
-@pytest.mark.parametrize("periodic", ["xyz", "TFT", "True", ["T", "F", "T"], b"TFT"])
-def test_a_string_is_not_periodic(periodic):
-    assert_refused(
-        lambda: hs.pairs(POINTS, 1.0, box=CUBE, periodic=periodic), TypeError, "periodic"
-    )
-
-
-@pytest.mark.parametrize("periodic", [[True, True], [True] * 4, [[True] * 3], []])
-def test_periodic_of_a_wrong_shape(periodic):
-    assert_refused(
-        lambda: hs.pairs(POINTS, 1.0, box=CUBE, periodic=periodic),
-        (ValueError, TypeError),
-        "periodic",
-    )
-
-
-@pytest.mark.parametrize("periodic", [[0.5, 1.0, 1.0], [1, 0, 2], [None, True, True], [1j, 0, 0]])
-def test_periodic_of_values_that_are_not_flags(periodic):
-    assert_refused(
-        lambda: hs.pairs(POINTS, 1.0, box=CUBE, periodic=periodic),
-        (TypeError, ValueError),
-        "periodic",
-    )
-
-
-@pytest.mark.parametrize("quantities", ["", "x", "ijk", "iJ", "i j", "ij,d", "ijé"])
-def test_unknown_quantities(quantities):
-    assert_refused(lambda: hs.pairs(POINTS, 1.0, quantities=quantities), ValueError, "quantities")
-
-
-@pytest.mark.parametrize("quantities", [None, 3, b"ij", object()])
-def test_quantities_of_a_wrong_kind(quantities):
-    assert_refused(lambda: hs.pairs(POINTS, 1.0, quantities=quantities), TypeError, "quantities")
-
-
-@pytest.mark.parametrize(
-    "dtype", [np.uint64, np.uint32, np.int16, np.float64, ">i8", "banana", object, [1], complex]
-)
-def test_index_dtypes_that_are_not_offered(dtype):
-    assert_refused(
-        lambda: hs.pairs(POINTS, 1.0, index_dtype=dtype), (TypeError, ValueError), "index_dtype"
-    )
-
-
-@pytest.mark.parametrize("precision", ["half", "", "EXACT", None, 64, float])
-def test_unknown_precision(precision):
-    for call in (hs.pairs, hs.count_pairs):
-        assert_refused(
-            lambda call=call: call(POINTS, 1.0, precision=precision),
-            (TypeError, ValueError),
-            "precision",
-        )
-
-
-@pytest.mark.parametrize("kernel", ["sse9", "", "SCALAR", 3, b"scalar", "scalar\0", "x" * 10**6])
-def test_unknown_kernels(kernel):
-    for call in (hs.pairs, hs.count_pairs):
-        assert_refused(
-            lambda call=call: call(POINTS, 1.0, kernel=kernel), (TypeError, ValueError), "kernel"
-        )
-
-
-@pytest.mark.parametrize("limit", [-1, NAN, "10GB", 1j, [1]])
-def test_bad_memory_limits(limit):
-    for call in (hs.pairs, hs.count_pairs):
-        assert_refused(
-            lambda call=call: call(POINTS, 1.0, memory_limit=limit),
-            (TypeError, ValueError),
-            "memory_limit",
-        )
-
-
-def test_unknown_and_missing_arguments():
+def test_unknown_and_missing_arguments_and_periodic_without_a_box():
     assert_refused(lambda: hs.pairs(POINTS), TypeError, "cutoff")
     assert_refused(lambda: hs.pairs(POINTS, 1.0, CUBE), TypeError)
     assert_refused(lambda: hs.pairs(POINTS, 1.0, boks=CUBE), TypeError, "boks")
+    for periodic in (True, [True, False, False], np.array([False, False, True])):
+        call = partial(hs.pairs, POINTS, 1.0, periodic=periodic)
+        assert_refused(call, ValueError, "periodic", "box")
 
 
 def test_atoms_bring_their_own_box():
     class Atoms:
         positions, cell, pbc = POINTS, CUBE, np.array([True, True, False])
 
-    assert hs.count_pairs(Atoms(), 1.0) == hs.count_pairs(
-        POINTS, 1.0, box=CUBE, periodic=[True, True, False]
-    )
+    expected = hs.count_pairs(POINTS, 1.0, box=CUBE, periodic=[True, True, False])
+    assert hs.count_pairs(Atoms(), 1.0) == expected
     for extra in ({"box": CUBE}, {"periodic": True}, {"box": CUBE, "periodic": [True] * 3}):
-        assert_refused(
-            lambda extra=extra: hs.pairs(Atoms(), 1.0, **extra),
-            (TypeError, ValueError),
-            "box|periodic",
-        )
+        assert_refused(partial(hs.pairs, Atoms(), 1.0, **extra), EITHER, "box|periodic")
 
 
 # ---- results that cannot be --------------------------------------------------------------
@@ -449,7 +310,7 @@ class Hostile:
         raise self.error
 
 
-# ---- conversions that fail, single numbers, flags ----------------------------------------
+# ---- conversions that fail, flags ----------------------------------------
 
 
 @pytest.mark.parametrize("error", [RuntimeError("needs grad"), AttributeError("mine")])
@@ -485,57 +346,6 @@ def test_a_tensor_that_only_speaks_dlpack_may_fail_too():
             return (1, 0)
 
     assert_refused(lambda: hs.pairs(Elsewhere(), 1.0), TypeError, "points", "on a device")
-
-
-def test_a_single_number_has_no_place():
-    refused = [
-        (None, TypeError, "^cutoff must be a number, got NoneType: None needs radii or"),
-        ("1", TypeError, "^cutoff must be a number, got str$"),
-        (object(), TypeError, "^cutoff must be a number, got object$"),
-        (1j, TypeError, "^cutoff must be a number, got dtype complex128$"),
-        (10**400, OverflowError, "^cutoff = "),
-        (-(10**5000), OverflowError, "^cutoff = "),
-        (2**53 + 1, ValueError, f"^cutoff = {2**53 + 1} "),
-        (2**64 + 1, ValueError, f"^cutoff = {2**64 + 1} "),
-        (np.ma.array(1.0, mask=True), ValueError, "^cutoff must not be masked"),
-    ]
-    for cutoff, exception, message in refused:
-        for call in (hs.pairs, hs.count_pairs, hs.explain):
-            assert_refused(
-                lambda call=call, cutoff=cutoff: call(POINTS, cutoff), exception, message
-            )
-
-
-@pytest.mark.parametrize(
-    "cutoffs, message",
-    [
-        ([1.0, NAN, 2.0], r"finite.*cutoff\[1\] = nan"),
-        ([NAN, 1.0], r"finite.*cutoff\[0\] = nan"),
-        ([1.0, 2.0, -INF], r"finite.*cutoff\[2\] = -inf"),
-        ([1.0, -1.0], r"not negative.*cutoff\[1\] = -1"),
-        ([1.0, 3.0, 2.0], r"ascending.*cutoff\[1\] = 3.0 before cutoff\[2\] = 2.0"),
-    ],
-)
-def test_the_bad_one_of_several_cutoffs_is_named(cutoffs, message):
-    assert_refused(lambda: hs.count_pairs(POINTS, cutoffs), ValueError, message)
-
-
-@pytest.mark.parametrize("flag", ["no", "True", b"", None, 2, -1, 1.0, [True], np.array([True])])
-def test_flags_are_bools(flag):
-    calls = [
-        ("inclusive", hs.pairs),
-        ("inclusive", hs.count_pairs),
-        ("inclusive", hs.explain),
-        ("sort", hs.pairs),
-        ("sort", hs.explain),
-        ("measure", hs.explain),
-        ("full", lambda *scene, **how: hs.verify(*scene, [0], [1], **how)),
-        ("inclusive", lambda *scene, **how: hs.verify(*scene, [0], [1], **how)),
-    ]
-    for name, call in calls:
-        assert_refused(
-            lambda call=call, name=name: call(POINTS, 1.0, **{name: flag}), TypeError, name
-        )
 
 
 @pytest.mark.parametrize("no", [False, np.False_])

@@ -37,11 +37,11 @@ SHAPED = {
 }
 
 
-@pytest.mark.parametrize("dtype", [np.float64, np.float32, np.int64, ">f8"])
 @pytest.mark.parametrize("name", SHAPED)
-def test_shapes_are_refused_before_anything_is_copied(name, dtype):
-    with pytest.raises(ValueError, match=rf"^{name.strip()} must .*\(1073741824, 3\)"):
-        SHAPED[name](huge(dtype))
+def test_shapes_are_refused_before_anything_is_copied(name):
+    for dtype in (np.float64, np.float32, np.int64, ">f8"):
+        with pytest.raises(ValueError, match=rf"^{name.strip()} must .*\(1073741824, 3\)"):
+            SHAPED[name](huge(dtype))
 
 
 @pytest.mark.parametrize("name", ["points", "queries"])

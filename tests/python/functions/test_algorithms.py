@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from oracles import as_rows, check, lattice, random_box
-from reach_scenes import RULES, SYMMETRIC
+from oracles import as_rows, lattice, random_box
+from reach_scenes import SYMMETRIC
 
 ALGORITHMS = ("auto", "all-pairs", "grid", "hash", "hierarchy")
 FORCED = ALGORITHMS[1:]
@@ -33,9 +33,12 @@ def scenes():
     yield "outside the box", cube * 50.0 - 100.0, 1.0, {"box": [6.0] * 3}
     for ndim, size, cutoff in ((1, 300.0, 1.5), (2, 18.0, 1.0), (5, 2.5, 1.0), (8, 2.0, 1.2)):
         yield f"{ndim}-D", rng.uniform(0.0, size, (300, ndim)), cutoff, {}
-        yield f"{ndim}-D periodic", rng.uniform(0.0, size, (100, ndim)), cutoff, {
-            "box": [size] * ndim
-        }
+        yield (
+            f"{ndim}-D periodic",
+            rng.uniform(0.0, size, (100, ndim)),
+            cutoff,
+            {"box": [size] * ndim},
+        )
     yield "crystal", crystal, 1.0, {"box": box}
     yield "strict", crystal, 1.0, {"box": box, "inclusive": False}
     yield "empty", np.zeros((0, 3)), 1.0, {}
@@ -58,22 +61,14 @@ SCENES = {name: scene for name, *scene in scenes()}
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_every_algorithm_finds_the_same_pairs(name):
+def test_every_algorithm_finds_the_same_pairs_and_says_that_it_ran(name):
     points, cutoff, how = SCENES[name]
     expected = rows(points, cutoff, "auto", **how)
     for algorithm in FORCED:
-        found = rows(points, cutoff, algorithm, **how)
-        assert np.array_equal(found, expected), algorithm
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_the_algorithm_that_was_asked_for_runs(name):
-    points, cutoff, how = SCENES[name]
-    n_pairs = hs.count_pairs(points, cutoff, **how)
-    for algorithm in FORCED:
+        assert np.array_equal(rows(points, cutoff, algorithm, **how), expected), algorithm
         plan = hs.explain(points, cutoff, algorithm=algorithm, measure=True, **how)
         assert plan.algorithm == algorithm and algorithm in str(plan)
-        assert plan.measured["pairs"] == n_pairs
+        assert plan.measured["pairs"] == len(expected)
         if algorithm == "all-pairs":
             assert plan.shape == (1,) * plan.ndim and plan.n_cells == 1
         elif algorithm == "hash":
@@ -81,14 +76,6 @@ def test_the_algorithm_that_was_asked_for_runs(name):
         elif algorithm == "grid":
             assert plan.n_cells == np.prod(plan.shape) <= 2 * plan.n + 64
     assert hs.explain(points, cutoff, **how).algorithm in FORCED[:3]
-
-
-@pytest.mark.parametrize("algorithm", FORCED)
-def test_a_small_scene_is_right_by_rational_arithmetic(algorithm):
-    rng = np.random.default_rng(4)
-    for kind, cutoff in itertools.product((None, "orthorhombic", "triclinic"), (0.3, 1.7)):
-        box = None if kind is None else random_box(rng, kind)
-        check(rng.uniform(-1.0, 2.0, (25, 3)), cutoff, box, algorithm=algorithm)
 
 
 def test_counters_tell_the_algorithms_apart():
@@ -150,70 +137,25 @@ def test_every_function_takes_it(algorithm):
     assert seen == list(zip(i.tolist(), j.tolist()))
 
 
-@pytest.mark.parametrize("rule", SYMMETRIC)
 @pytest.mark.parametrize("box", [None, [9.0, 8.0, 10.0]], ids=["open", "periodic"])
-def test_radii_are_compared_alike_by_every_algorithm(rule, box):
-    rng = np.random.default_rng(7)
-    points = rng.uniform(0.0, 9.0, (300, 3))
-    points[200:] = np.round(points[200:])
-    for radii in (
-        np.full(300, 0.5),
-        10.0 ** rng.uniform(-4.0, 0.3, 300),
-        rng.choice([0.0, 0.25, 0.5, 1.0], 300),
-        np.concatenate([[5.0], np.full(299, 0.01)]),
-        np.zeros(300),
-    ):
-        how = {"radii": radii, "rule": rule, "box": box}
-        expected = rows(points, None, "auto", **how)
-        for algorithm in FORCED:
-            assert np.array_equal(rows(points, None, algorithm, **how), expected), algorithm
-            bound = rows(points, 0.6, algorithm, **how)
-            assert np.array_equal(bound, rows(points, 0.6, "auto", **how))
-
-
-@pytest.mark.parametrize("rule", RULES)
-def test_rows_by_radii_are_alike(rule):
-    rng = np.random.default_rng(8)
-    points, queries = rng.uniform(0.0, 6.0, (150, 3)), rng.uniform(0.0, 6.0, (60, 3))
-    points[:20] = queries[:20]
-    radii, asking = 10.0 ** rng.uniform(-3, 0.2, 150), 10.0 ** rng.uniform(-3, 0.2, 60)
-    marks = {"radii": radii, "query_radii": asking, "queries": queries}
-    if rule in ("gather", "scatter"):
-        del marks["radii" if rule == "gather" else "query_radii"]
-    for how in ({"radii": radii}, marks):
-        tables = [
-            hs.neighbors(points, None, rule=rule, box=[6.0] * 3, algorithm=algorithm,
-                         quantities="jdS", **how)
-            for algorithm in ALGORITHMS
-        ]  # fmt: skip
-        counts = [
-            hs.coordination(points, None, rule=rule, box=[6.0] * 3, algorithm=algorithm, **how)
-            for algorithm in ALGORITHMS
-        ]
-        for table, count in zip(tables, counts):
-            assert np.array_equal(table.offsets, tables[0].offsets)
-            assert np.array_equal(table.indices, tables[0].indices)
-            assert np.array_equal(table.distances, tables[0].distances)
-            assert np.array_equal(table.shifts, tables[0].shifts)
-            assert np.array_equal(count, table.counts)
-
-
-@pytest.mark.parametrize("n_types", [1, 3, 8, 12])
-def test_types_are_compared_alike_by_every_algorithm(n_types):
-    rng = np.random.default_rng(n_types)
-    points = rng.uniform(0.0, 8.0, (300, 3))
-    types = rng.integers(0, n_types, 300)
-    table = rng.uniform(0.0, 1.5, (n_types, n_types))
-    table = np.maximum(table, table.T)
-    table[0, 0] = 0.0
-    expected = rows(points, table, "auto", types=types, box=[8.0] * 3)
-    for algorithm in FORCED:
-        found = rows(points, table, algorithm, types=types, box=[8.0] * 3)
-        assert np.array_equal(found, expected), algorithm
-    none = {(0, 0): 0.5} if n_types > 1 else {(0, 1): 0.5}
-    expected = rows(points, none, "auto", types=types)
-    for algorithm in FORCED:
-        assert np.array_equal(rows(points, none, algorithm, types=types), expected)
+def test_radii_are_compared_alike_by_every_algorithm(box):
+    for rule in SYMMETRIC:
+        rng = np.random.default_rng(7)
+        points = rng.uniform(0.0, 9.0, (300, 3))
+        points[200:] = np.round(points[200:])
+        for radii in (
+            np.full(300, 0.5),
+            10.0 ** rng.uniform(-4.0, 0.3, 300),
+            rng.choice([0.0, 0.25, 0.5, 1.0], 300),
+            np.concatenate([[5.0], np.full(299, 0.01)]),
+            np.zeros(300),
+        ):
+            how = {"radii": radii, "rule": rule, "box": box}
+            expected = rows(points, None, "auto", **how)
+            for algorithm in FORCED:
+                assert np.array_equal(rows(points, None, algorithm, **how), expected), algorithm
+                bound = rows(points, 0.6, algorithm, **how)
+                assert np.array_equal(bound, rows(points, 0.6, "auto", **how))
 
 
 def test_radii_are_explained():
@@ -268,23 +210,19 @@ def test_a_grid_of_far_points_takes_no_more_memory():
     assert plan.measured["bytes_peak"] < 1_000_000
 
 
-@pytest.mark.parametrize("algorithm", ["", "Grid", "sparse", "cells", "auto\0"])
-def test_unknown_names_are_refused_with_those_that_there_are(algorithm):
-    points = np.zeros((2, 3))
-    must = r"algorithm must be 'auto', 'all-pairs', 'grid', 'hash' or 'hierarchy', got "
-    for call in (
-        lambda: hs.pairs(points, 1.0, algorithm=algorithm),
-        lambda: hs.neighbors(points, 1.0, algorithm=algorithm),
-        lambda: hs.count_pairs(points, [1.0, 2.0], algorithm=algorithm),
-        lambda: hs.explain(points, 1.0, algorithm=algorithm),
-        lambda: hs.pair_histogram(points, [0.0, 1.0], algorithm=algorithm),
-        lambda: hs.pairs(points, None, radii=[1.0, 1.0], algorithm=algorithm),
-    ):
+@pytest.mark.parametrize("call", [
+    lambda **how: hs.pairs(np.zeros((2, 3)), 1.0, **how),
+    lambda **how: hs.neighbors(np.zeros((2, 3)), 1.0, **how),
+    lambda **how: hs.count_pairs(np.zeros((2, 3)), [1.0, 2.0], **how),
+    lambda **how: hs.explain(np.zeros((2, 3)), 1.0, **how),
+    lambda **how: hs.pair_histogram(np.zeros((2, 3)), [0.0, 1.0], **how),
+    lambda **how: hs.pairs(np.zeros((2, 3)), None, radii=[1.0, 1.0], **how),
+])  # fmt: skip
+def test_unknown_names_are_refused_with_those_that_there_are(call):
+    must = "algorithm must be 'auto', 'all-pairs', 'grid', 'hash' or 'hierarchy', got "
+    for unknown in ("", "Grid", "sparse", "cells", "auto\0"):
         with pytest.raises(ValueError, match=must):
-            call()
-
-
-@pytest.mark.parametrize("algorithm", [None, 3, b"grid", ["grid"], np.array(["grid"])])
-def test_what_is_no_name_is_refused(algorithm):
-    with pytest.raises(TypeError, match="algorithm must be 'auto'"):
-        hs.pairs(np.zeros((2, 3)), 1.0, algorithm=algorithm)
+            call(algorithm=unknown)
+    for unknown in (None, 3, b"grid", ["grid"], np.array(["grid"])):
+        with pytest.raises(TypeError, match="algorithm must be 'auto'"):
+            call(algorithm=unknown)

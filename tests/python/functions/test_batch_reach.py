@@ -12,8 +12,8 @@ from halfshell_report import scenes
 from oracles import same_arrays
 from reach_scenes import SYMMETRIC
 
+COVER = [(False, 1, True), (True, 3, False)]  # periodic, threads, sort
 SIZES = [30, 0, 1, 2, 7, 64, 65, 0, 0, 200, 30, 3, 0]
-COVALENT = {"H": 0.31, "C": 0.76, "N": 0.71, "O": 0.66, "S": 1.05, "Zn": 1.22}
 
 
 def one_by_one(points, cutoff, batch, n_systems, marks, box=None, **options):
@@ -44,9 +44,7 @@ def systems():
     return points, batch, boxes, 10.0 ** rng.uniform(-1.0, 0.0, len(batch))
 
 
-@pytest.mark.parametrize("sort", [False, True])
-@pytest.mark.parametrize("threads", [1, 3])
-@pytest.mark.parametrize("periodic", [False, True])
+@pytest.mark.parametrize("periodic, threads, sort", COVER)
 @pytest.mark.parametrize("rule", SYMMETRIC)
 def test_radii_are_those_of_single_calls(systems, rule, periodic, threads, sort):
     points, batch, boxes, radii = systems
@@ -64,23 +62,23 @@ def test_radii_are_those_of_single_calls(systems, rule, periodic, threads, sort)
         assert not any(counts[len(by_system) :])
 
 
-@pytest.mark.parametrize("threads", [1, 3])
-def test_types_are_those_of_single_calls(systems, threads):
-    points, batch, boxes, _ = systems
-    types = np.random.default_rng(1).integers(0, 3, len(points))
-    table = np.array([[0.2, 0.9, 0.5], [0.9, 1.1, 0.0], [0.5, 0.0, 0.7]])
-    for cutoff in (table, {(0, 1): 1.0, (2, 2): 0.5}):
-        for box in (None, boxes):
-            expected, counts = one_by_one(
-                points, cutoff, batch, len(SIZES), {"types": types}, box, sort=True
-            )
-            found = hs.pairs(
-                points, cutoff, types=types, batch=batch, box=box, quantities="ijdS", sort=True,
-                threads=threads,
-            )  # fmt: skip
-            assert same_arrays(found, expected)
-            by_system = hs.count_pairs(points, cutoff, types=types, batch=batch, box=box)
-            assert by_system.tolist() == counts[: len(by_system)]
+def test_types_are_those_of_single_calls(systems):
+    for threads in (1, 3):
+        points, batch, boxes, _ = systems
+        types = np.random.default_rng(1).integers(0, 3, len(points))
+        table = np.array([[0.2, 0.9, 0.5], [0.9, 1.1, 0.0], [0.5, 0.0, 0.7]])
+        for cutoff in (table, {(0, 1): 1.0, (2, 2): 0.5}):
+            for box in (None, boxes):
+                expected, counts = one_by_one(
+                    points, cutoff, batch, len(SIZES), {"types": types}, box, sort=True
+                )
+                found = hs.pairs(
+                    points, cutoff, types=types, batch=batch, box=box, quantities="ijdS", sort=True,
+                    threads=threads,
+                )  # fmt: skip
+                assert same_arrays(found, expected)
+                by_system = hs.count_pairs(points, cutoff, types=types, batch=batch, box=box)
+                assert by_system.tolist() == counts[: len(by_system)]
 
 
 def needles(rng, n, d, aspect):
@@ -91,9 +89,7 @@ def needles(rng, n, d, aspect):
     return (H + H.transpose(0, 2, 1)) / 2.0
 
 
-@pytest.mark.parametrize("sort", [False, True])
-@pytest.mark.parametrize("threads", [1, 3])
-@pytest.mark.parametrize("periodic", [False, True])
+@pytest.mark.parametrize("periodic, threads, sort", COVER)
 @pytest.mark.parametrize("rule", ["max", "min"])
 def test_supports_are_those_of_single_calls(systems, rule, periodic, threads, sort):
     points, batch, boxes, _ = systems
@@ -116,23 +112,20 @@ def test_supports_are_those_of_single_calls(systems, rule, periodic, threads, so
             assert not any(counts[len(by_system) :])
 
 
-@pytest.mark.parametrize("d", [1, 2, 3])
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_supports_of_a_batch_in_each_dimension_and_kernel(d, dtype, kernel):
+@pytest.mark.parametrize(("d", "dtype"), [(1, np.float64), (2, np.float32), (3, np.float64)])
+def test_supports_of_a_batch_in_each_dimension_and_kernel(d, dtype):
     rng = np.random.default_rng(d)
     batch = np.sort(rng.integers(0, 40, 600)) + 3
     points = (rng.random((600, d)) * 3.0).astype(dtype)
+    points[5] = points[4]
     for rule, extent in (("max", 0.7), ("min", 1.4), ("max", 0.0)):
         marks = {"supports": needles(rng, 600, d, 10.0), "extent": extent, "rule": rule}
-        points[5] = points[4]
-        expected, counts = one_by_one(
-            points, None, batch, 43, marks, np.eye(d) * 3.0, kernel=kernel
-        )
-        found = hs.pairs(
-            points, None, batch=batch, box=[3.0] * d, quantities="ijdS", kernel=kernel, **marks
-        )
-        assert same_arrays(found, expected)
-        assert hs.count_pairs(points, None, batch=batch, box=[3.0] * d, **marks).tolist() == counts
+        expected, counts = one_by_one(points, None, batch, 43, marks, np.eye(d) * 3.0)
+        how = {"batch": batch, "box": [3.0] * d, **marks}
+        for kernel in hs.kernels():
+            found = hs.pairs(points, None, quantities="ijdS", kernel=kernel, **how)
+            assert same_arrays(found, expected)
+        assert hs.count_pairs(points, None, **how).tolist() == counts
 
 
 def test_the_needles_of_a_batch_are_decided_exactly():
@@ -149,19 +142,25 @@ def test_the_needles_of_a_batch_are_decided_exactly():
         assert np.array_equal(column, np.concatenate([one, one + n, one + 2 * n]))
 
 
-@pytest.mark.parametrize("algorithm", ["auto", "all-pairs", "grid", "hash", "hierarchy"])
-def test_every_algorithm_finds_them(systems, algorithm):
-    points, batch, boxes, radii = systems
-    H = needles(np.random.default_rng(2), len(points), 3, 5.0)
-    for marks in ({"radii": radii}, {}, {"supports": H, "extent": 1.0}):
-        cutoff = None if marks else 1.1
-        expected, _ = one_by_one(
-            points, cutoff, batch, len(SIZES), marks, boxes, algorithm=algorithm
-        )
-        found = hs.pairs(
-            points, cutoff, batch=batch, box=boxes, quantities="ijdS", algorithm=algorithm, **marks
-        )
-        assert same_arrays(found, expected)
+def test_every_algorithm_finds_them(systems):
+    for algorithm in ("all-pairs", "grid", "hash", "hierarchy"):
+        points, batch, boxes, radii = systems
+        H = needles(np.random.default_rng(2), len(points), 3, 5.0)
+        for marks in ({"radii": radii}, {}, {"supports": H, "extent": 1.0}):
+            cutoff = None if marks else 1.1
+            expected, _ = one_by_one(
+                points, cutoff, batch, len(SIZES), marks, boxes, algorithm=algorithm
+            )
+            found = hs.pairs(
+                points,
+                cutoff,
+                batch=batch,
+                box=boxes,
+                quantities="ijdS",
+                algorithm=algorithm,
+                **marks,
+            )
+            assert same_arrays(found, expected)
 
 
 def test_balls_of_a_batch_touch_by_rational_arithmetic():
@@ -178,22 +177,6 @@ def test_balls_of_a_batch_touch_by_rational_arithmetic():
                 expected.add((i, j))
     i, j = hs.pairs(points, None, radii=radii, batch=batch)
     assert len(expected) > 50 and set(zip(i.tolist(), j.tolist())) == expected
-
-
-def test_molecules_with_covalent_radii():
-    rng = np.random.default_rng(4)
-    batch = np.repeat(np.arange(200), rng.integers(10, 31, 200))
-    names = rng.choice(list(COVALENT), len(batch))
-    radii = 1.15 * np.array([COVALENT[name] for name in names])
-    points = rng.uniform(0.0, 6.0, (len(batch), 3))
-    expected, counts = one_by_one(points, None, batch, 200, {"radii": radii})
-    found = hs.pairs(points, None, radii=radii, batch=batch, quantities="ijdS")
-    assert same_arrays(found, expected)
-    assert hs.count_pairs(points, None, radii=radii, batch=batch).tolist() == counts
-    # The same bonds by elements, as far as rounding of sums goes.
-    table = {(a, b): 1.15 * (ra + rb) for a, ra in COVALENT.items() for b, rb in COVALENT.items()}
-    found = hs.pairs(points, table, types=names, batch=batch, sort=True)
-    assert len(found[0]) == sum(counts)
 
 
 def test_memory_and_bytes_are_the_callers(systems):

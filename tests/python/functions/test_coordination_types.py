@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Neighbours counted by type, against the rows of the full list."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -38,18 +40,16 @@ def test_counts_are_those_of_rows(scene, data):
     assert np.array_equal(counts.sum(axis=1), plain)
 
 
-@pytest.mark.parametrize("kernel", hs.kernels())
-@pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("ndim", [1, 2, 3, 5])
-def test_many_images_ties_and_equal_points(kernel, threads, ndim, rng):
+def test_many_images_ties_and_equal_points(ndim, rng):
     points = np.repeat(rng.integers(0, 8, (30, ndim)) / 8, 2, axis=0).astype(np.float32)
     types = rng.integers(0, 4, 60) + 1  # 0 has no points
-    how = {"box": np.ones(ndim), "kernel": kernel, "threads": threads}
-    for cutoff in (0.0, 0.25, 1.0):
-        for inclusive in (True, False):
-            table = hs.neighbors(points, cutoff, inclusive=inclusive, **how)
-            counts = hs.coordination(points, cutoff, types=types, inclusive=inclusive, **how)
-            assert counts.tolist() == of_rows(table, types, 5)
+    for cutoff, inclusive in itertools.product((0.0, 0.25, 1.0), (True, False)):
+        scene = {"box": np.ones(ndim), "inclusive": inclusive}
+        expected = of_rows(hs.neighbors(points, cutoff, **scene), types, 5)
+        for kernel, threads in itertools.product(hs.kernels(), (1, 3)):
+            how = {"kernel": kernel, "threads": threads, **scene}
+            assert hs.coordination(points, cutoff, types=types, **how).tolist() == expected
 
 
 def test_queries_need_no_types(rng):
@@ -65,21 +65,21 @@ def test_queries_need_no_types(rng):
 CUTOFFS = {("Si", "O"): 0.5, ("O", "O"): 0.3, ("Na", "Na"): 0.0}
 
 
-@pytest.mark.parametrize("indices", [None, [3, 0, 3]])
-def test_a_cutoff_for_each_pair_of_types(indices, rng):
-    points, kinds = rng.random((80, 2)), rng.integers(0, 3, 80)
-    how = {"types": NAMES[kinds], "box": [1.0, 1.0], "indices": indices}
-    order, places = np.unique(NAMES[kinds], return_inverse=True)
-    table = hs.neighbors(points, CUTOFFS, **how)
-    counts = hs.coordination(points, CUTOFFS, by_type=True, **how)
-    assert counts.tolist() == of_rows(table, places, len(order))
-    assert hs.coordination(points, CUTOFFS, **how).tolist() == counts.sum(axis=1).tolist()
-    cutoffs = np.array([[0.1, 0.2, 0.5], [0.2, 0.0, 0.3], [0.5, 0.3, 0.4]])
-    how["types"] = kinds
-    table = hs.neighbors(points, cutoffs, **how)
-    counts = hs.coordination(points, cutoffs, by_type=True, **how)
-    assert counts.tolist() == of_rows(table, kinds, 3)
-    assert np.array_equal(hs.coordination(points, cutoffs, **how), counts.sum(axis=1))
+def test_a_cutoff_for_each_pair_of_types(rng):
+    for indices in (None, [3, 0, 3]):
+        points, kinds = rng.random((80, 2)), rng.integers(0, 3, 80)
+        how = {"types": NAMES[kinds], "box": [1.0, 1.0], "indices": indices}
+        order, places = np.unique(NAMES[kinds], return_inverse=True)
+        table = hs.neighbors(points, CUTOFFS, **how)
+        counts = hs.coordination(points, CUTOFFS, by_type=True, **how)
+        assert counts.tolist() == of_rows(table, places, len(order))
+        assert hs.coordination(points, CUTOFFS, **how).tolist() == counts.sum(axis=1).tolist()
+        cutoffs = np.array([[0.1, 0.2, 0.5], [0.2, 0.0, 0.3], [0.5, 0.3, 0.4]])
+        how["types"] = kinds
+        table = hs.neighbors(points, cutoffs, **how)
+        counts = hs.coordination(points, cutoffs, by_type=True, **how)
+        assert counts.tolist() == of_rows(table, kinds, 3)
+        assert np.array_equal(hs.coordination(points, cutoffs, **how), counts.sum(axis=1))
 
 
 def test_a_cutoff_for_each_pair_of_types_and_queries(rng):

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which pairs count: groups, excluded pairs, a least distance, against integers in every box."""
+"""Which pairs count: groups, excluded pairs, a least distance, against fractions in every box."""
 
-import itertools
 import random
 from fractions import Fraction
 
@@ -9,54 +8,29 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from full_lists import full_list, list_between
+from halfshell._check.reference import exact_square
+from rational_images import Images, between, exact
 
-# ---- the rule, in integers -------------------------------------------------------------------
-
-
-def unit_of(*arrays):
-    """A power of two that makes all of these floats integers."""
-    each = itertools.chain.from_iterable(np.ravel(array).tolist() for array in arrays)
-    return max((x.as_integer_ratio()[1] for x in each), default=1)
-
-
-def integers_of(array, unit):
-    return [[int(Fraction(x) * unit) for x in row] for row in array.tolist()]
-
-
-def square(p, q, step):
-    total = 0
-    for a, b, c in zip(p, q, step, strict=True):
-        total += (b - a + c) ** 2
-    return total
+# ---- the rule, in fractions ------------------------------------------------------------------
 
 
 class Rule:
     """What counts in a scene; entries are (i, j, S) of rows of points or of queries."""
 
     def __init__(self, scene, chosen, of_queries=None):
-        points, cutoff, options = scene
+        self.points, self.cutoff, self.options = scene
         self.own = of_queries is None
         self.chosen = chosen
         self.of_asking = chosen if self.own else of_queries
-        ndim = points.shape[1]
-        periodic = options.get("periodic", [False] * ndim)
-        asking = points if self.own else of_queries["queries"]
-        box = options.get("box", np.zeros((ndim, ndim)))
-        limits = np.array([[cutoff, chosen["min_distance"] or 0.0]])
-        unit = unit_of(points, asking, box, limits)
-        self.points, self.asking = integers_of(points, unit), integers_of(asking, unit)
-        self.images = {  # each with its displacement
-            S: [sum(s * x for s, x in zip(S, column, strict=True)) for column in columns]
-            for columns in [integers_of(box.T, unit)]
-            for S in itertools.product(*[range(-5, 6) if axis else (0,) for axis in periodic])
-        }
-        ((largest, least),) = integers_of(limits, unit)
-        self.largest, self.least = largest**2, least**2
-        self.inclusive = options["inclusive"]
+        self.asking = self.points if self.own else of_queries["queries"]
+        geometry = self.options.get("box"), self.options.get("periodic")
+        self.images = Images(self.points.shape[1], *geometry)
+        self.scene = (self.cutoff, *geometry, self.options["inclusive"])
 
     def is_excluded(self, i, j):
         exclude = self.chosen["exclude"]
-        if exclude is None:
+        if exclude is None or (self.own and i == j):
             return False
         if exclude.ndim == 2:
             pairs = {tuple(pair) for pair in exclude.tolist()}
@@ -65,36 +39,29 @@ class Rule:
         return abs(int(label) - int(exclude[j])) <= (self.chosen["exclude_within"] or 0)
 
     def nearest(self, i, j):
-        p, q = self.asking[i], self.points[j]
+        """Of images that are equally near the first one of the lower number: they ascend."""
         if self.own and j < i:
-            return tuple(-s for s in self.least_image(q, p))
-        return self.least_image(p, q)
+            return tuple(-s for s in self.nearest(j, i))
+        apart = between(exact(self.asking[i]), exact(self.points[j]))
+        found = self.images.within(apart, Fraction(self.cutoff) ** 2)
+        return min(((square, S) for S, _, square in found), default=(None, None))[1]
 
-    def least_image(self, p, q):
-        """Of images that are equally near the first one: they ascend."""
-        return min(self.images, key=lambda S: square(p, q, self.images[S]))
-
-    def row(self, i, j):
-        groups = self.chosen["groups"]
+    def is_left_out(self, i, j, S):
+        groups, least = self.chosen["groups"], Fraction(self.chosen["min_distance"] or 0.0)
         if groups is not None:
             label = (groups if self.own else self.of_asking["query_groups"])[i]
             if label != groups[j]:
-                return
-        is_excluded = self.is_excluded(i, j) and not (self.own and i == j)
-        excluded = self.nearest(i, j) if is_excluded else None
-        for S, step in self.images.items():
-            if self.own and i == j and not any(S):
-                continue
-            size = square(self.asking[i], self.points[j], step)
-            near = size < self.largest or (self.inclusive and size == self.largest)
-            if near and size >= self.least and S != excluded:
-                yield (i, j, S)
+                return True
+        both = (self.asking[i], self.points[j])
+        square = exact_square(both, 0, 1, S, self.options.get("box"))
+        return square < least**2 or (self.is_excluded(i, j) and S == self.nearest(i, j))
 
     def entries(self):
-        found = (
-            self.row(i, j) for i in range(len(self.asking)) for j in range(len(self.points))
-        )
-        return set(itertools.chain.from_iterable(found))
+        if self.own:
+            found = full_list(self.points, *self.scene)
+        else:
+            found = list_between(self.asking, self.points, *self.scene)
+        return {entry for entry in found if not self.is_left_out(*entry)}
 
 
 # ---- scenes ----------------------------------------------------------------------------------
@@ -161,17 +128,26 @@ def of_table(table, numbers=None):
     return entries_of(np.repeat(numbers, table.counts), table.indices, table.shifts)
 
 
-SEEDS = range(250)
+def in_parts(n, parts=4):
+    """Run a test for the seeds below n, in some parts."""
+    return pytest.mark.parametrize("seeds", [range(k, n, parts) for k in range(parts)], ids=str)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_one_set(seed):
-    draw = random.Random(seed)
-    points, cutoff, options = scene_of(draw)
-    n = len(points)
-    chosen, _ = chosen_of(draw, n, n, cutoff)
-    full = Rule((points, cutoff, options), chosen).entries()
-    half = {(i, j, S) for i, j, S in full if i < j or (i == j and any(S) and S > (0,) * len(S))}
+@in_parts(200)
+def test_one_set(seeds):
+    for seed in seeds:
+        draw = random.Random(seed)
+        points, cutoff, options = scene_of(draw)
+        chosen, _ = chosen_of(draw, len(points), len(points), cutoff)
+        full = Rule((points, cutoff, options), chosen).entries()
+        zero = (0,) * points.shape[1]
+        half = {(i, j, S) for i, j, S in full if i < j or (i == j and S > zero)}
+        check_half_lists(points, cutoff, half, chosen, options)
+        check_rows(points, cutoff, full, {**chosen, **options})
+        check_some_points(draw, points, cutoff, full, half, chosen, options)
+
+
+def check_half_lists(points, cutoff, half, chosen, options):
     every = {**chosen, **options}
     assert entries_of(*hs.pairs(points, cutoff, quantities="ijS", **every)) == half
     i, j, d, _, S = hs.pairs(points, cutoff, quantities="ijdDS", **every)
@@ -180,29 +156,27 @@ def test_one_set(seed):
     found = hs.pairs(points, cutoff, quantities="P", **every).tolist()
     assert sorted(map(tuple, found)) == sorted(entry[:2] for entry in half)
     assert hs.count_pairs(points, cutoff, **every) == len(half)
-    counts = hs.count_pairs(points, [cutoff / 2, cutoff], **every)
-    assert counts[1] == len(half)
+    assert hs.count_pairs(points, [cutoff / 2, cutoff], **every)[1] == len(half)
+    blocks = list(hs.iter_pairs(points, cutoff, quantities="ijS", max_pairs=3, **every))
+    assert set().union(*(entries_of(*block) for block in blocks)) == half
+    reach = {"radii": np.full(len(points), cutoff), "rule": "max"}
+    assert entries_of(*hs.pairs(points, None, quantities="ijS", **reach, **every)) == half
+    if options["inclusive"] and not chosen["min_distance"]:
+        scene = {key: options[key] for key in options if key != "inclusive"}
+        scene |= {key: chosen[key] for key in chosen if key != "min_distance"}
+        bins = hs.pair_histogram(points, [0.0, cutoff / 2, cutoff], **scene)
+        assert bins.sum() == len(half)
+
+
+def check_rows(points, cutoff, full, every):
     table = hs.neighbors(points, cutoff, quantities="jS", **every)
     assert of_table(table) == full
     assert hs.neighbors(points, cutoff, **every).indices.tolist() == table.indices.tolist()
     assert hs.coordination(points, cutoff, **every).tolist() == table.counts.tolist()
-    blocks = list(hs.iter_pairs(points, cutoff, quantities="ijS", max_pairs=3, **every))
-    assert set().union(*(entries_of(*block) for block in blocks)) == half
-    radii = hs.pairs(
-        points, None, radii=np.full(n, cutoff), rule="max", quantities="ijS", **every
-    )
-    assert entries_of(*radii) == half
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_some_points_of_one_set(seed):
-    draw = random.Random(seed)
-    points, cutoff, options = scene_of(draw)
-    n = len(points)
-    chosen, _ = chosen_of(draw, n, n, cutoff)
-    full = Rule((points, cutoff, options), chosen).entries()
-    half = {(i, j, S) for i, j, S in full if i < j or (i == j and S > (0,) * len(S))}
-    every = {**chosen, **options}
+def check_some_points(draw, points, cutoff, full, half, chosen, options):
+    n, every = len(points), {**chosen, **options}
     some = np.array(sorted(draw.sample(range(n), draw.randint(0, n))), np.int64)
     table = hs.neighbors(points, cutoff, quantities="jS", indices=some, **every)
     assert of_table(table, some) == {entry for entry in full if entry[0] in some}
@@ -213,29 +187,25 @@ def test_some_points_of_one_set(seed):
     found = hs.pairs(points, cutoff, quantities="ijS", batch=batch, **every)
     assert entries_of(*found) == {e for e in half if batch[e[0]] == batch[e[1]]}
     assert hs.count_pairs(points, cutoff, batch=batch, **every).sum() == len(found[0])
-    if options["inclusive"] and not chosen["min_distance"]:
-        del chosen["min_distance"]
-        scene = {key: options[key] for key in options if key != "inclusive"}
-        bins = hs.pair_histogram(points, [0.0, cutoff / 2, cutoff], **chosen, **scene)
-        assert bins.sum() == len(half)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_two_sets(seed):
-    draw = random.Random(seed)
-    points, cutoff, options = scene_of(draw)
-    queries = points_of(draw, draw.randint(0, 6), points.shape[1], 3.0)
-    chosen, of_queries = chosen_of(draw, len(points), len(queries), cutoff)
-    rule = Rule((points, cutoff, options), chosen, {"queries": queries, **of_queries})
-    expected = rule.entries()
-    every = {**chosen, **of_queries, **options}
-    found = hs.pairs_between(queries, points, cutoff, quantities="ijS", **every)
-    assert entries_of(*found) == expected
-    assert hs.count_pairs(points, cutoff, queries=queries, **every) == len(expected)
-    table = hs.neighbors(points, cutoff, queries=queries, quantities="jS", **every)
-    assert of_table(table) == expected
-    counts = hs.coordination(points, cutoff, queries=queries, **every)
-    assert counts.tolist() == table.counts.tolist()
+@in_parts(200)
+def test_two_sets(seeds):
+    for seed in seeds:
+        draw = random.Random(seed)
+        points, cutoff, options = scene_of(draw)
+        queries = points_of(draw, draw.randint(0, 6), points.shape[1], 3.0)
+        chosen, of_queries = chosen_of(draw, len(points), len(queries), cutoff)
+        rule = Rule((points, cutoff, options), chosen, {"queries": queries, **of_queries})
+        expected = rule.entries()
+        every = {**chosen, **of_queries, **options}
+        found = hs.pairs_between(queries, points, cutoff, quantities="ijS", **every)
+        assert entries_of(*found) == expected
+        assert hs.count_pairs(points, cutoff, queries=queries, **every) == len(expected)
+        table = hs.neighbors(points, cutoff, queries=queries, quantities="jS", **every)
+        assert of_table(table) == expected
+        counts = hs.coordination(points, cutoff, queries=queries, **every)
+        assert counts.tolist() == table.counts.tolist()
 
 
 def test_large_scenes_are_those_of_a_filter():
@@ -278,16 +248,25 @@ def test_the_largest_labels():
     assert hs.count_pairs(points, 1.0, exclude=[0, labels[1]], exclude_within=2**63 - 1) == 0
 
 
-@pytest.mark.parametrize("scale", [2.0**-1030, 2.0**-500, 1.0, 2.0**500, 2.0**1000])
-def test_extreme_units(scale):
-    points = np.array([[0.0], [1.0], [2.0], [3.0]]) * scale
-    found = hs.pairs(points, 2.0 * scale, box=[4.0 * scale], exclude=[[0, 1], [0, 2]],
-                     min_distance=scale, quantities="ijS", sort=True)
-    assert [column.tolist() for column in found] == [
-        [0, 0, 1, 1, 1, 2], [2, 3, 2, 3, 3, 3], [[0], [-1], [0], [-1], [0], [0]]
-    ]
-    nearer = hs.count_pairs(points, 2.0 * scale, min_distance=np.nextafter(scale, np.inf))
-    assert nearer == 2
+def test_extreme_units():
+    for scale in (2.0**-1030, 2.0**-500, 1.0, 2.0**500, 2.0**1000):
+        points = np.array([[0.0], [1.0], [2.0], [3.0]]) * scale
+        found = hs.pairs(
+            points,
+            2.0 * scale,
+            box=[4.0 * scale],
+            exclude=[[0, 1], [0, 2]],
+            min_distance=scale,
+            quantities="ijS",
+            sort=True,
+        )
+        assert [column.tolist() for column in found] == [
+            [0, 0, 1, 1, 1, 2],
+            [2, 3, 2, 3, 3, 3],
+            [[0], [-1], [0], [-1], [0], [0]],
+        ]
+        nearer = hs.count_pairs(points, 2.0 * scale, min_distance=np.nextafter(scale, np.inf))
+        assert nearer == 2
 
 
 BAD = [
@@ -317,20 +296,20 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("chosen", "kind", "words"), BAD, ids=lambda value: str(value)[:40])
-def test_bad_choices(chosen, kind, words):
-    points = [[0.0], [1.0], [2.0]]
-    alone = {name: value for name, value in chosen.items() if not name.startswith("query_")}
-    if alone == chosen:
-        with pytest.raises(kind, match=words):
-            hs.pairs(points, 1.0, **chosen)
-        with pytest.raises(kind, match=words):
-            hs.pairs(points, 1.0, batch=[0, 0, 0], **chosen)
-        with pytest.raises(kind, match=words):
-            hs.iter_pairs(points, 1.0, **chosen)
-    for search in (hs.neighbors, hs.count_pairs, hs.coordination):
-        with pytest.raises(kind, match=words):
-            search(points, 1.0, **chosen)
+def test_bad_choices():
+    for chosen, kind, words in BAD:
+        points = [[0.0], [1.0], [2.0]]
+        alone = {name: value for name, value in chosen.items() if not name.startswith("query_")}
+        if alone == chosen:
+            with pytest.raises(kind, match=words):
+                hs.pairs(points, 1.0, **chosen)
+            with pytest.raises(kind, match=words):
+                hs.pairs(points, 1.0, batch=[0, 0, 0], **chosen)
+            with pytest.raises(kind, match=words):
+                hs.iter_pairs(points, 1.0, **chosen)
+        for search in (hs.neighbors, hs.count_pairs, hs.coordination):
+            with pytest.raises(kind, match=words):
+                search(points, 1.0, **chosen)
 
 
 def test_labels_of_both_sets():
@@ -357,28 +336,28 @@ def test_inputs_stay_and_empty_ones_are_nothing():
     assert hs.count_pairs(empty, 1.0, groups=[], exclude=[], min_distance=0.5) == 0
 
 
-@pytest.mark.parametrize("seed", range(60))
-def test_counts_by_type(seed):
-    draw = random.Random(seed)
-    points, cutoff, options = scene_of(draw)
-    n = len(points)
-    chosen, of_queries = chosen_of(draw, n, n, cutoff)
-    types = labels_of(draw, n, 0)
-    every = {**chosen, **options}
-    table = hs.neighbors(points, cutoff, **every)
-    wanted = np.zeros((n, 1 + types.max(initial=0)), int)
-    np.add.at(wanted, (np.repeat(np.arange(n), table.counts), types[table.indices]), 1)
-    assert hs.coordination(points, cutoff, types=types, **every).tolist() == wanted.tolist()
-    some = [k for k in range(n) if draw.random() < 0.5]
-    found = hs.coordination(points, cutoff, types=types, indices=some, **every)
-    assert found.tolist() == wanted[some].tolist()
-    queried = {**every, **of_queries}
-    if chosen["exclude"] is None or chosen["exclude"].ndim == 1:
-        table = hs.neighbors(points, cutoff, queries=points, **queried)
-        wanted = np.zeros_like(wanted)
+def test_counts_by_type():
+    for seed in range(40):
+        draw = random.Random(seed)
+        points, cutoff, options = scene_of(draw)
+        n = len(points)
+        chosen, of_queries = chosen_of(draw, n, n, cutoff)
+        types = labels_of(draw, n, 0)
+        every = {**chosen, **options}
+        table = hs.neighbors(points, cutoff, **every)
+        wanted = np.zeros((n, 1 + types.max(initial=0)), int)
         np.add.at(wanted, (np.repeat(np.arange(n), table.counts), types[table.indices]), 1)
-        found = hs.coordination(points, cutoff, queries=points, types=types, **queried)
-        assert found.tolist() == wanted.tolist()
+        assert hs.coordination(points, cutoff, types=types, **every).tolist() == wanted.tolist()
+        some = [k for k in range(n) if draw.random() < 0.5]
+        found = hs.coordination(points, cutoff, types=types, indices=some, **every)
+        assert found.tolist() == wanted[some].tolist()
+        queried = {**every, **of_queries}
+        if chosen["exclude"] is None or chosen["exclude"].ndim == 1:
+            table = hs.neighbors(points, cutoff, queries=points, **queried)
+            wanted = np.zeros_like(wanted)
+            np.add.at(wanted, (np.repeat(np.arange(n), table.counts), types[table.indices]), 1)
+            found = hs.coordination(points, cutoff, queries=points, types=types, **queried)
+            assert found.tolist() == wanted.tolist()
 
 
 def test_g_of_r_between_molecules():

@@ -37,30 +37,33 @@ def test_rows_are_those_of_the_whole_table(scene, data):
     assert counts.dtype == np.int64 and counts.tolist() == whole.counts[numbers].tolist()
 
 
-@pytest.mark.parametrize("kernel", hs.kernels())
-@pytest.mark.parametrize("threads", [1, 3])
-def test_many_images_and_equal_points(kernel, threads, rng):
+def test_many_images_and_equal_points(rng):
     points = np.repeat(rng.random((40, 3)), 3, axis=0).astype(np.float32)
-    how = {"box": [0.9, 1.1, 0.7], "kernel": kernel, "threads": threads}
-    whole = hs.neighbors(points, 1.3, quantities="jDSd", **how)
-    numbers = rng.integers(0, 120, 50)
-    same(hs.neighbors(points, 1.3, quantities="jDSd", indices=numbers, **how), whole, numbers)
-    bare = hs.neighbors(points, 1.3, quantities="S", indices=numbers, index_dtype=np.int32, **how)
-    assert np.array_equal(bare.shifts, np.concatenate([whole[k][2] for k in numbers]))
-    lacking = hs.neighbors(points, 1.3, quantities="jd", indices=numbers, **how)
-    same(lacking.sort(), hs.neighbors(points, 1.3, quantities="jd", **how).sort(), numbers)
+    numbers, box = rng.integers(0, 120, 50), [0.9, 1.1, 0.7]
+    for kernel, threads in zip(hs.kernels(), (1, 3, 1, 3)):
+        how = {"box": box, "kernel": kernel, "threads": threads}
+        whole = hs.neighbors(points, 1.3, quantities="jDSd", **how)
+        how["indices"] = numbers
+        same(hs.neighbors(points, 1.3, quantities="jDSd", **how), whole, numbers)
+        bare = hs.neighbors(points, 1.3, quantities="S", index_dtype=np.int32, **how)
+        assert np.array_equal(bare.shifts, np.concatenate([whole[k][2] for k in numbers]))
+        lacking = hs.neighbors(points, 1.3, quantities="jd", **how)
+        del how["indices"]
+        same(lacking.sort(), hs.neighbors(points, 1.3, quantities="jd", **how).sort(), numbers)
 
 
-@pytest.mark.parametrize("rule", ["sum", "mean", "max", "min", "gather", "scatter"])
-@pytest.mark.parametrize("inclusive", [True, False])
-def test_radii_of_their_own(rule, inclusive, rng):
-    points, radii = rng.random((60, 2)), np.where(rng.random(60) < 0.3, 0.0, 0.4)
-    how = {"radii": radii, "rule": rule, "box": [1.0, 1.0], "inclusive": inclusive}
-    whole = hs.neighbors(points, None, quantities="jd", **how)
-    numbers = rng.permutation(60)[:30]
-    same(hs.neighbors(points, None, quantities="jd", indices=numbers, **how), whole, numbers)
-    counts = hs.coordination(points, None, indices=numbers, **how)
-    assert np.array_equal(counts, whole.counts[numbers])
+def test_radii_of_their_own(rng):
+    for rule in ("sum", "mean", "max", "min", "gather", "scatter"):
+        for inclusive in (True, False):
+            points, radii = rng.random((60, 2)), np.where(rng.random(60) < 0.3, 0.0, 0.4)
+            how = {"radii": radii, "rule": rule, "box": [1.0, 1.0], "inclusive": inclusive}
+            whole = hs.neighbors(points, None, quantities="jd", **how)
+            numbers = rng.permutation(60)[:30]
+            same(
+                hs.neighbors(points, None, quantities="jd", indices=numbers, **how), whole, numbers
+            )
+            counts = hs.coordination(points, None, indices=numbers, **how)
+            assert np.array_equal(counts, whole.counts[numbers])
 
 
 def test_types_that_do_not_see_themselves(rng):

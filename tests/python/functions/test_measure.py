@@ -69,24 +69,24 @@ def some_pairs(rng, n, m):
 
 
 @pytest.mark.parametrize("dim", range(1, 9))
-@pytest.mark.parametrize("kind", ["open", "upright", "mixed", "skewed", "slanted"])
-def test_nearest_images_are_those_of_rational_arithmetic(dim, kind):
-    rng = np.random.default_rng(dim)
-    points = rng.uniform(-3.0, 4.0, (12, dim))
-    box = np.diag(rng.uniform(0.5, 2.0, dim))
-    periodic = None
-    if kind == "open":
-        box = None
-    elif kind == "mixed":
-        periodic = rng.integers(0, 2, dim).astype(bool)
-    elif kind == "skewed":
-        for row in range(1, dim):
-            box[row] += rng.integers(-3, 4) * box[row - 1] * 1.01
-    elif kind == "slanted":
-        box = box + rng.uniform(-0.3, 0.3, (dim, dim))
-        periodic = np.arange(dim) != dim // 2
-    i, j = some_pairs(rng, 12, 40 if dim < 5 else 6)
-    check(points, i, j, box, periodic)
+def test_nearest_images_are_those_of_rational_arithmetic(dim):
+    for kind in ("open", "upright", "mixed", "skewed", "slanted"):
+        rng = np.random.default_rng(dim)
+        points = rng.uniform(-3.0, 4.0, (12, dim))
+        box = np.diag(rng.uniform(0.5, 2.0, dim))
+        periodic = None
+        if kind == "open":
+            box = None
+        elif kind == "mixed":
+            periodic = rng.integers(0, 2, dim).astype(bool)
+        elif kind == "skewed":
+            for row in range(1, dim):
+                box[row] += rng.integers(-3, 4) * box[row - 1] * 1.01
+        elif kind == "slanted":
+            box = box + rng.uniform(-0.3, 0.3, (dim, dim))
+            periodic = np.arange(dim) != dim // 2
+        i, j = some_pairs(rng, 12, 20 if dim < 5 else 4)
+        check(points, i, j, box, periodic)
 
 
 BCC = np.array([[-1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, -1.0]])
@@ -154,20 +154,19 @@ def test_far_points_and_huge_coordinates():
 
 @pytest.mark.parametrize("kind", ["open", "upright", "mixed", "skewed"])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("kernel", hs.kernels())
-def test_pairs_that_are_found_have_the_same_bits(kind, dtype, kernel):
+def test_pairs_that_are_found_have_the_same_bits(kind, dtype):
     rng = np.random.default_rng(7)
     points = rng.uniform(-2.0, 5.0, (400, 3)).astype(dtype)
     box = np.diag([2.0, 3.1, 2.7]) + (np.tri(3, k=-1) * 1.3 if kind == "skewed" else 0.0)
     options = {} if kind == "open" else {"box": box, "periodic": [True, kind != "mixed", True]}
     i, j, d, D, S = hs.pairs(points, 1.9, quantities="ijdDS", **options)
     assert len(i) > 1000
-    found = hs.measure(points, i, j, S, kernel=kernel, **options)
-    for one, other in zip(found, (d, D, S), strict=True):
-        assert one.tobytes() == other.tobytes()
-    turned = hs.measure(points, j, i, -S, kernel=kernel, quantities="SDd", **options)
-    for one, other in zip(turned, (-S, -D + 0.0, d), strict=True):
-        assert one.tobytes() == other.tobytes()
+    for kernel in hs.kernels():
+        options["kernel"] = kernel
+        found = hs.measure(points, i, j, S, **options)
+        turned = hs.measure(points, j, i, -S, quantities="SDd", **options)
+        for one, other in zip((*found, *turned), (d, D, S, -S, -D + 0.0, d), strict=True):
+            assert one.tobytes() == other.tobytes()
 
 
 def test_long_and_thin_boxes():

@@ -17,7 +17,6 @@ from oracles import (
     full_box,
     lattice,
     random_box,
-    remembered,
     same_arrays,
     whole,
 )
@@ -45,9 +44,7 @@ def within(point, owner, points, rows, axes, radius):
         apart = [a - b for a, b in zip(target, query)]
         along = dual @ np.array([a / (1 << 1074) for a in apart])
         reach = radius * lengths * (1 + 1e-6) + 1e-6
-        ranges = [
-            range(math.ceil(-a - r), math.floor(-a + r) + 1) for a, r in zip(along, reach)
-        ]
+        ranges = [range(math.ceil(-a - r), math.floor(-a + r) + 1) for a, r in zip(along, reach)]
         for s in itertools.product(*ranges):
             S = [0] * ndim
             for axis, value in zip(axes, s):
@@ -83,14 +80,15 @@ def expected_rows(points, k, queries=None, box=None, periodic=None, max_distance
     return result
 
 
-ORACLE = ("queries", "box", "periodic", "max_distance")
-
-
 def check(points, k, **how):
-    """Assert that all four quantities are those of the definition; return them."""
-    oracle = {"max_distance": math.inf, **how}
-    expected = remembered(expected_rows, points, k, *(oracle.get(key) for key in ORACLE))
-    arrays = hs.nearest(points, k, quantities="jdDS", **how)
+    """Assert that all four quantities are those of the definition; and the same by each kernel."""
+    limit = how.get("max_distance", math.inf)
+    scene = {key: value for key, value in how.items() if key != "max_distance"}
+    expected = expected_rows(points, k, max_distance=limit, **scene)
+    arrays, *others = (
+        hs.nearest(points, k, quantities="jdDS", kernel=kernel, **how) for kernel in hs.kernels()
+    )
+    assert all(same_arrays(arrays, other) for other in others)
     j, d, D, S = arrays
     ndim = np.asarray(points).shape[1]
     assert j.shape == d.shape == (len(expected), k)
@@ -102,11 +100,10 @@ def check(points, k, **how):
         for e, (square, *_) in enumerate(row):
             ulp, length = whole(np.spacing(d[i, e])), whole(d[i, e])
             assert max(length - ulp, 0) ** 2 <= square <= (length + ulp) ** 2
-        assert (np.diff(d[i, :m]) >= 0).all() and (d[i, :m] <= oracle["max_distance"]).all()
+        assert (np.diff(d[i, :m]) >= 0).all() and (d[i, :m] <= limit).all()
         assert (j[i, m:] == -1).all() and (d[i, m:] == np.inf).all()
         assert np.isnan(D[i, m:]).all() and (S[i, m:] == 0).all()
         check_vectors(points, i, j[i, :m], D[i, :m], S[i, :m], d[i, :m], how)
-    return arrays
 
 
 def check_vectors(points, i, j, D, S, d, how):
@@ -124,50 +121,50 @@ def check_vectors(points, i, j, D, S, d, how):
 # ---- against rational arithmetic -----------------------------------------------------------
 
 
-@pytest.mark.parametrize("ndim", [1, 2, 3, 4, 5])
-def test_random_points_in_open_space(ndim, rng, kernel):
-    for n, k in ((1, 1), (2, 3), (50, 12)):
-        points = rng.normal(size=(n, ndim))
-        check(points, k, kernel=kernel)
-        check(points, k, queries=rng.normal(size=(7, ndim)), kernel=kernel)
+def test_random_points_in_open_space(rng):
+    for ndim in (1, 2, 3, 4, 5):
+        for n, k in ((1, 1), (2, 3), (50, 12)):
+            points = rng.normal(size=(n, ndim))
+            check(points, k)
+            check(points, k, queries=rng.normal(size=(7, ndim)))
 
 
 @pytest.mark.parametrize("kind", BOX_KINDS)
 @pytest.mark.parametrize("ndim", [1, 2, 3])
-def test_random_points_in_boxes(kind, ndim, rng, kernel):
+def test_random_points_in_boxes(kind, ndim, rng):
     box = random_box(rng, kind, ndim, 3.0)
-    for n, k in ((1, 4), (3, 11), (25, 6)):
+    for n, k in ((1, 4), (3, 11), (15, 6)):
         points = rng.uniform(-9, 9, (n, ndim))
-        check(points, k, box=box, kernel=kernel)
-        check(points, k, box=box, queries=rng.uniform(-20, 20, (5, ndim)), kernel=kernel)
+        check(points, k, box=box)
+        check(points, k, box=box, queries=rng.uniform(-20, 20, (5, ndim)))
         if ndim > 1:
             flags = [True] + [False] * (ndim - 1)
-            check(points, k, box=box, periodic=flags, kernel=kernel)
+            check(points, k, box=box, periodic=flags)
 
 
 @pytest.mark.parametrize("name", ["sc", "bcc", "fcc", "diamond", "hcp"])
-def test_ties_on_crystals_are_in_order_of_number_and_shift(name, kernel):
+def test_ties_on_crystals_are_in_order_of_number_and_shift(name):
     points, box = lattice(name, (2, 2, 2))
     for factor in (1.0, 0.1, 1e-200):
-        check(points * factor, 14, kernel=kernel)
-        check(points[:4] * factor, 20, box=box * factor, kernel=kernel)
+        check(points * factor, 14)
+        check(points[:4] * factor, 20, box=box * factor)
 
 
-def test_ties_on_rotated_and_sheared_lattices(kernel):
+def test_ties_on_rotated_and_sheared_lattices():
     points, box = lattice("fcc", (2, 1, 1))
     points, box = points @ EXACT_ROTATION, box @ EXACT_ROTATION
-    check(points, 13, box=box, kernel=kernel)
+    check(points, 13, box=box)
     box[1] += 3 * box[0]
     box[2] -= 2 * box[1]
-    check(points + 40 * box[0], 13, box=box, kernel=kernel)
+    check(points + 40 * box[0], 13, box=box)
 
 
-@pytest.mark.parametrize("n", [1, 2, 3])
-def test_more_are_wanted_than_there_are_points(n, rng, kernel):
-    points = rng.random((n, 2))
-    check(points, 40, box=[0.5, 0.75], kernel=kernel)
-    check(points, 9, kernel=kernel)
-    check(points, 30, box=[0.5, 0.75], periodic=[False, True], kernel=kernel)
+def test_more_are_wanted_than_there_are_points(rng):
+    for n in (1, 2, 3):
+        points = rng.random((n, 2))
+        check(points, 40, box=[0.5, 0.75])
+        check(points, 9)
+        check(points, 30, box=[0.5, 0.75], periodic=[False, True])
 
 
 def test_many_images_of_a_tiny_anisotropic_box():
@@ -177,55 +174,55 @@ def test_many_images_of_a_tiny_anisotropic_box():
     assert not j.any() and not S[..., 1:].any()
 
 
-def test_duplicates_come_by_number(kernel):
+def test_duplicates_come_by_number():
     points = np.repeat([[0.1, 0.2], [0.3, 0.1], [0.1, 0.2]], 30, axis=0)
-    check(points, 35, kernel=kernel)
-    check(points, 65, queries=points[:1], box=[1.0, 1.0], kernel=kernel)
+    check(points, 35)
+    check(points, 65, queries=points[:1], box=[1.0, 1.0])
 
 
-def test_max_distance_on_a_shell(kernel):
+def test_max_distance_on_a_shell():
     points = np.array(list(itertools.product(range(3), repeat=3)), float)
     for limit in (0.0, 1.0, math.sqrt(2.0), np.nextafter(math.sqrt(2.0), 0.0), math.sqrt(3.0), 2.0):
-        check(points, 19, max_distance=limit, kernel=kernel)
-        check(points, 30, max_distance=limit, box=[3.0, 3.0, 3.0], kernel=kernel)
+        check(points, 19, max_distance=limit)
+        check(points, 30, max_distance=limit, box=[3.0, 3.0, 3.0])
     tenths = points * 0.1
-    check(tenths, 10, max_distance=0.1, kernel=kernel)
-    check(tenths, 10, max_distance=5e-324, queries=tenths, kernel=kernel)
+    check(tenths, 10, max_distance=0.1)
+    check(tenths, 10, max_distance=5e-324, queries=tenths)
 
 
-def test_queries_far_outside(rng, kernel):
+def test_queries_far_outside(rng):
     points = rng.random((60, 3))
     far = np.array([[1e3, 0.0, 0.0], [1e8, 1e8, -1e8], [1e200, 0.0, 1.0], [-1e300, 1e300, 0.0]])
-    check(points, 5, queries=far, kernel=kernel)
-    check(points, 5, queries=far[:2], box=[1.0, 1.0, 1.0], kernel=kernel)
+    check(points, 5, queries=far)
+    check(points, 5, queries=far[:2], box=[1.0, 1.0, 1.0])
     slab = {"box": [1.0, 1.0, 1.0], "periodic": [True, True, False]}
-    check(points[:3], 5, queries=[[0.3, 0.2, 6.0], [5.1, 0.2, -9.0]], **slab, kernel=kernel)
+    check(points[:3], 5, queries=[[0.3, 0.2, 6.0], [5.1, 0.2, -9.0]], **slab)
     # The nearest is the one with the least distance in the plane among those of the top layer.
     points[:, 2] = 0.0
-    j = hs.nearest(points, 1, queries=[[0.5, 0.5, 1e4]], quantities="j", **slab, kernel=kernel)
+    j = hs.nearest(points, 1, queries=[[0.5, 0.5, 1e4]], quantities="j", **slab)
     lateral = np.hypot(*(points[:, :2] - 0.5).T)
     assert j[0, 0] == np.argmin(lateral)
 
 
 @pytest.mark.parametrize("scale", [5e-324, 1e-320, 1e-300, 1e-160, 1e160, 1e300])
-def test_any_scale(scale, rng, kernel):
+def test_any_scale(scale, rng):
     points = rng.integers(-8, 9, (40, 2)).astype(float) * scale
-    check(points, 6, kernel=kernel)
+    check(points, 6)
     if scale > 1e-310:
-        check(points, 6, box=[5 * scale, 7 * scale], kernel=kernel)
+        check(points, 6, box=[5 * scale, 7 * scale])
 
 
-def test_a_cluster_and_an_outlier_on_different_scales(rng, kernel):
+def test_a_cluster_and_an_outlier_on_different_scales(rng):
     points = rng.random((80, 3)) * 1e-150
     points[7] = 1e300
     points[30:50] += 1e9
-    check(points, 4, kernel=kernel)
+    check(points, 4)
 
 
-def test_float32_and_strided_points(rng, kernel):
+def test_float32_and_strided_points(rng):
     points = rng.random((50, 6)).astype(np.float32)[::2, ::2]
-    check(points, 5, kernel=kernel)
-    check(points, 5, queries=rng.random((4, 3)), box=[1.0, 1.5, 1.0], kernel=kernel)
+    check(points, 5)
+    check(points, 5, queries=rng.random((4, 3)), box=[1.0, 1.5, 1.0])
 
 
 def test_the_largest_dimension(rng):
@@ -268,46 +265,27 @@ def scenes_of_all_densities(rng, n):
     }
 
 
-def test_distances_are_those_of_a_tree(rng, kernel):
-    for name, points in scenes_of_all_densities(rng, 4000).items():
-        j, d = hs.nearest(points, 9, kernel=kernel)
-        rest = np.abs(points).max(axis=1) < 1e200
-        near = points[rest]
-        unit = 2.0**-500 if name.startswith("tiny") else 1.0  # the tree squares
-        expected = cKDTree(near / unit).query(near / unit, 10)[0][:, 1:] * unit
-        # Each coordinate is exact; the tree's distances have a few roundings.
-        np.testing.assert_allclose(d[rest], expected, rtol=1e-14, err_msg=name)
-        assert (j >= 0).all() and (j != np.arange(len(points))[:, None]).all()
+def test_distances_are_those_of_a_tree(rng):
+    for kernel in hs.kernels():
+        for name, points in scenes_of_all_densities(rng, 4000).items():
+            j, d = hs.nearest(points, 9, kernel=kernel)
+            rest = np.abs(points).max(axis=1) < 1e200
+            near = points[rest]
+            unit = 2.0**-500 if name.startswith("tiny") else 1.0  # the tree squares
+            expected = cKDTree(near / unit).query(near / unit, 10)[0][:, 1:] * unit
+            # Each coordinate is exact; the tree's distances have a few roundings.
+            np.testing.assert_allclose(d[rest], expected, rtol=1e-14, err_msg=name)
+            assert (j >= 0).all() and (j != np.arange(len(points))[:, None]).all()
 
 
-def test_distances_are_those_of_a_periodic_tree(rng, kernel):
-    points = rng.random((4000, 3))
-    d = hs.nearest(points, 9, box=np.ones(3), quantities="d", kernel=kernel)
-    expected = cKDTree(points, boxsize=1.0).query(points, 10)[0][:, 1:]
-    np.testing.assert_allclose(d, expected, rtol=1e-12)
-
-
-def test_many_neighbours(rng, kernel):
-    points = rng.random((3000, 3))
-    for k in (100, 700, 2999, 3100):
-        j, d = hs.nearest(points[:], k, queries=points[:20], kernel=kernel)
-        expected, numbers = cKDTree(points).query(points[:20], min(k, 3000))
-        np.testing.assert_allclose(d[:, :3000], expected, rtol=1e-14)
-        assert np.array_equal(j[:, :3000], numbers) and (j[:, 3000:] == -1).all()
-
-
-def test_rows_agree_with_the_pairs_within_their_distance(rng):
-    points, box = rng.random((500, 3)), random_box(rng, "triclinic")
-    j, d, S = hs.nearest(points, 10, box=box, quantities="jdS", max_distance=0.15)
-    i, other, distance, shift = hs.pairs(points, 0.15, box=box, quantities="ijdS")
-    found = {(a, b, *s): x for a, b, s, x in zip(i, other, map(tuple, shift), distance)}
-    for a, row in enumerate(j):
-        for b, s, x in zip(row, S[a], d[a]):
-            if b >= 0:
-                key = (a, b, *s) if (a, b, *s) in found else (b, a, *-s)
-                assert found[key] == x
-    counts = np.bincount(np.concatenate([i, other]), minlength=500)
-    assert np.array_equal((j >= 0).sum(axis=1), np.minimum(counts, 10))
+def test_many_neighbours(rng):
+    for kernel in hs.kernels():
+        points = rng.random((3000, 3))
+        for k in (100, 700, 2999, 3100):
+            j, d = hs.nearest(points[:], k, queries=points[:20], kernel=kernel)
+            expected, numbers = cKDTree(points).query(points[:20], min(k, 3000))
+            np.testing.assert_allclose(d[:, :3000], expected, rtol=1e-14)
+            assert np.array_equal(j[:, :3000], numbers) and (j[:, 3000:] == -1).all()
 
 
 def test_the_same_bits_for_any_kernel_and_number_of_threads(rng):
@@ -316,9 +294,7 @@ def test_the_same_bits_for_any_kernel_and_number_of_threads(rng):
     one = hs.nearest(points, 12, box=box, quantities="jdDS", kernel="scalar", threads=1)
     for name in hs.kernels():
         for threads in (1, 2, 3):
-            other = hs.nearest(
-                points, 12, box=box, quantities="jdDS", kernel=name, threads=threads
-            )
+            other = hs.nearest(points, 12, box=box, quantities="jdDS", kernel=name, threads=threads)
             assert same_arrays(one, other)
 
 
@@ -336,18 +312,18 @@ def test_cost_follows_the_points_not_their_distances(rng):
 # ---- forms and errors ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("ndim", [1, 3, 8])
-def test_empty_inputs(ndim):
-    none, some = np.empty((0, ndim)), np.ones((4, ndim))
-    for box in (None, np.ones(ndim)):
-        j, d, D, S = hs.nearest(none, 3, box=box, quantities="jdDS")
-        assert j.shape == d.shape == (0, 3) and D.shape == S.shape == (0, 3, ndim)
-        j, d, D, S = hs.nearest(none, 3, queries=some, box=box, quantities="jdDS")
-        assert (j == -1).all() and (d == np.inf).all() and np.isnan(D).all() and not S.any()
-        assert hs.nearest(some, 3, queries=none, box=box, quantities="S").shape == (0, 3, ndim)
-    assert hs.nearest(none, 2**56, quantities="D").shape == (0, 2**56, ndim)
-    assert hs.nearest([], 2)[0].shape == (0, 2)
-    assert hs.nearest(some, 2, queries=[])[0].shape == (0, 2)
+def test_empty_inputs():
+    for ndim in (1, 3, 8):
+        none, some = np.empty((0, ndim)), np.ones((4, ndim))
+        for box in (None, np.ones(ndim)):
+            j, d, D, S = hs.nearest(none, 3, box=box, quantities="jdDS")
+            assert j.shape == d.shape == (0, 3) and D.shape == S.shape == (0, 3, ndim)
+            j, d, D, S = hs.nearest(none, 3, queries=some, box=box, quantities="jdDS")
+            assert (j == -1).all() and (d == np.inf).all() and np.isnan(D).all() and not S.any()
+            assert hs.nearest(some, 3, queries=none, box=box, quantities="S").shape == (0, 3, ndim)
+        assert hs.nearest(none, 2**56, quantities="D").shape == (0, 2**56, ndim)
+        assert hs.nearest([], 2)[0].shape == (0, 2)
+        assert hs.nearest(some, 2, queries=[])[0].shape == (0, 2)
 
 
 def test_quantities_and_types(rng):
@@ -428,17 +404,3 @@ def test_more_images_than_memory_are_refused():
             np.zeros((2, 3)), 1, queries=[[0.0, 0.0, 1e10]], box=np.ones(3),
             periodic=[True, True, False],
         )  # fmt: skip
-
-
-def test_inputs_are_left_alone(rng):
-    points = rng.random((40, 3)) * 3.0 - 1.0  # to be wrapped
-    queries, box = points[::2] + 5.0, np.ones(3)
-    before = [a.copy() for a in (points, queries, box)]
-    results = hs.nearest(points, 3, queries=queries, box=box, quantities="jdDS")
-    for array, copy in zip((points, queries, box), before):
-        assert array.tobytes() == copy.tobytes()
-        array.flags.writeable = False
-    again = hs.nearest(points, 3, queries=queries, box=box, quantities="jdDS")
-    for first, found in zip(results, again):
-        assert first.tobytes() == found.tobytes()
-        assert not any(np.shares_memory(found, array) for array in (points, queries, box))

@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Full lists: every neighbour of every point, and how many there are."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
-from ase.build import bulk, molecule
-from ase.neighborlist import neighbor_list
 from hypothesis import given
-from scipy.spatial import cKDTree
 
 import halfshell as hs
 from full_lists import (
@@ -19,7 +17,7 @@ from full_lists import (
     large_full_rows,
     same_tables,
 )
-from oracles import BOX_KINDS, as_set, lattice, random_scene
+from oracles import BOX_KINDS, lattice, random_scene
 from refused_calls import INF, NAN, assert_refused, with_value
 from scene_strategies import scenes
 
@@ -27,77 +25,83 @@ POINTS = np.random.default_rng(41).random((40, 3)) * 4.0
 LENGTHS = np.array([4.0, 4.5, 5.0])
 
 
-def check(points, cutoff, box=None, periodic=None, inclusive=True, **how):
-    """Assert that the table, the counts and the rest are those of the reference."""
-    scene = {"box": box, "periodic": periodic, "inclusive": inclusive}
-    table = hs.neighbors(points, cutoff, quantities="jS", **scene, **how)
+def check(points, cutoff, box=None, periodic=None, inclusive=True):
+    """Assert that the table and the counts are those of the reference, by every kernel."""
     expected = full_list(points, cutoff, box, periodic, inclusive)
-    assert entries(table) == expected
-    counts = np.bincount([i for i, _, _ in expected], minlength=len(points))
-    assert table.counts.tolist() == counts.tolist()
-    assert hs.coordination(points, cutoff, **scene, **how).tolist() == counts.tolist()
+    counts = np.bincount([i for i, _, _ in expected], minlength=len(points)).tolist()
+    for kernel in hs.kernels():
+        how = {"box": box, "periodic": periodic, "inclusive": inclusive, "kernel": kernel}
+        table = hs.neighbors(points, cutoff, quantities="jS", **how)
+        assert entries(table) == expected
+        assert table.counts.tolist() == counts
+        assert hs.coordination(points, cutoff, **how).tolist() == counts
     return table
 
 
 # ---- against rational arithmetic -----------------------------------------------------------
 
 
-@pytest.mark.parametrize("ndim", [1, 2, 3, 4, 5])
 @pytest.mark.parametrize("kind", [None, *BOX_KINDS])
-def test_equals_the_definition(ndim, kind, rng, kernel):
-    for n, neighbours in ((1, 3), (2, 3), (25, 6)):
-        points, cutoff, box, flags = random_scene(rng, n, ndim, kind or "rotated", neighbours, 2)
-        box = box if kind else None
-        for inclusive in (True, False):
-            check(points, cutoff, box, flags if kind else None, inclusive, kernel=kernel)
+def test_equals_the_definition(kind, rng):
+    for ndim in (1, 2, 3, 4, 5):
+        for n, neighbours in ((1, 3), (2, 3), (25, 6)):
+            points, cutoff, box, flags = random_scene(
+                rng, n, ndim, kind or "rotated", neighbours, 2
+            )
+            box, flags = (box, flags) if kind else (None, None)
+            for inclusive in (True, False):
+                check(points, cutoff, box, flags, inclusive)
 
 
 @pytest.mark.parametrize("periodic", [(True, True, False), (False, False, True), (False,) * 3])
-def test_slabs_and_wires(periodic, rng, kernel):
+def test_slabs_and_wires(periodic, rng):
     points, cutoff, box, _ = random_scene(rng, 30, neighbours=8, spread=3)
-    check(points, cutoff, box, periodic, kernel=kernel)
+    check(points, cutoff, box, periodic)
 
 
 @pytest.mark.parametrize("kind", BOX_KINDS)
-def test_tiny_boxes_with_images(kind, rng, kernel):
+def test_tiny_boxes_with_images(kind, rng):
     for n in (1, 2, 4):
         points, _, box, _ = random_scene(rng, n, kind=kind, spread=2)
-        table = check(points, 1.7, box, kernel=kernel)
+        table = check(points, 1.7, box)
         assert (table.indices == np.repeat(np.arange(n), table.counts)).any()
 
 
 @pytest.mark.parametrize("real", [np.float32, np.float64])
-def test_ties_on_lattices(real, kernel):
+def test_ties_on_lattices(real):
     for name in ("sc", "fcc", "diamond"):
         points, box = lattice(name, (2, 2, 2))
         for cutoff in (math.sqrt(2), 2.0, 3.0):
             for inclusive in (True, False):
-                check(points.astype(real), cutoff, box, None, inclusive, kernel=kernel)
+                check(points.astype(real), cutoff, box, None, inclusive)
 
 
 @pytest.mark.parametrize("real", [np.float32, np.float64])
-@pytest.mark.parametrize("ndim", [1, 2, 3])
-def test_distances_and_vectors_to_the_last_place(real, ndim, rng, kernel):
-    points, cutoff, box, _ = random_scene(rng, 30, ndim, "sheared", 8, 2)
-    points = points.astype(real)
-    for frame in (box, None):
-        table = hs.neighbors(points, cutoff, box=frame, quantities="DSdj", kernel=kernel)
-        assert table.distances.dtype == table.vectors.dtype == np.float64
-        assert table.vectors.shape == table.shifts.shape == (table.n_entries, ndim)
-        assert table.shifts.dtype == np.int32
-        i, j, S = zip(*entries(table))
-        found = (i, j, S, table.distances.tolist(), table.vectors.tolist())
-        assert_last_place(points, cutoff, frame, found)
+def test_distances_and_vectors_to_the_last_place(real, rng):
+    for ndim, kernel in itertools.product((1, 2, 3), hs.kernels()):
+        points, cutoff, box, _ = random_scene(rng, 30, ndim, "sheared", 8, 2)
+        points = points.astype(real)
+        for frame in (box, None):
+            table = hs.neighbors(points, cutoff, box=frame, quantities="DSdj", kernel=kernel)
+            assert table.distances.dtype == table.vectors.dtype == np.float64
+            assert table.vectors.shape == table.shifts.shape == (table.n_entries, ndim)
+            assert table.shifts.dtype == np.int32
+            i, j, S = zip(*entries(table))
+            found = (i, j, S, table.distances.tolist(), table.vectors.tolist())
+            assert_last_place(points, cutoff, frame, found)
 
 
 @pytest.mark.parametrize("kind", BOX_KINDS)
-def test_larger_scenes(kind, rng, kernel):
+def test_larger_scenes(kind, rng):
     points, cutoff, box, flags = random_scene(rng, 3000, kind=kind, neighbours=30, spread=2)
-    table = hs.neighbors(points, cutoff, box=box, quantities="jS", kernel=kernel)
-    rows = np.repeat(np.arange(3000), table.counts)
-    found = np.concatenate([np.stack([rows, table.indices], axis=1), table.shifts], axis=1)
-    assert np.array_equal(found, large_full_rows(points, cutoff, box, flags, True))
-    assert np.array_equal(hs.coordination(points, cutoff, box=box, kernel=kernel), table.counts)
+    expected = large_full_rows(points, cutoff, box, flags, True)
+    for kernel in hs.kernels():
+        table = hs.neighbors(points, cutoff, box=box, quantities="jS", kernel=kernel)
+        rows = np.repeat(np.arange(3000), table.counts)
+        found = np.concatenate([np.stack([rows, table.indices], axis=1), table.shifts], axis=1)
+        assert np.array_equal(found, expected)
+        counts = hs.coordination(points, cutoff, box=box, kernel=kernel)
+        assert np.array_equal(counts, table.counts)
 
 
 # ---- against the half list and other libraries ---------------------------------------------
@@ -119,135 +123,78 @@ def test_neighbors_are_pairs_both_ways(scene):
     assert np.array_equal(table.shifts[other], -table.shifts)
 
 
-def test_half_of_the_full_list_is_the_half_list(rng):
-    points, cutoff, box, _ = random_scene(rng, 500, neighbours=25, kind="triclinic")
-    table = hs.neighbors(points, cutoff, box=box, quantities="jS")
-    found = as_set(*table.to_pairs(quantities="ijS", half=True))
-    assert found == as_set(*hs.pairs(points, cutoff, box=box, quantities="ijS"))
-    assert table.n_entries == 2 * hs.count_pairs(points, cutoff, box=box)
-
-
-def test_equals_ckdtree(rng):
-    points = rng.normal(size=(800, 3))
-    tree = cKDTree(points)
-    for cutoff in (0.1, 0.5):
-        rows = [sorted(set(row) - {i}) for i, row in enumerate(tree.query_ball_tree(tree, cutoff))]
-        table = hs.neighbors(points, cutoff, quantities="jd")
-        assert [row.tolist() for row, _ in table] == rows
-        theirs = tree.sparse_distance_matrix(tree, cutoff, output_type="coo_matrix").tocsr()
-        difference = abs(table.to_scipy() - theirs)
-        assert difference.max() <= 1e-15
-
-
-@pytest.mark.parametrize(
-    "atoms",
-    [
-        bulk("Cu", cubic=True) * (3, 3, 3),
-        bulk("Si"),
-        bulk("Ti"),
-        bulk("NaCl", "rocksalt", a=5.64),
-        molecule("C60"),
-    ],
-    ids=["copper", "silicon", "titanium", "salt", "C60"],
-)
-def test_equals_ase(atoms, kernel):
-    atoms.rattle(0.05, seed=3)
-    i, j, d, D, S = neighbor_list("ijdDS", atoms, 5.2)
-    order = np.lexsort((*S.T[::-1], j, i))
-    table = hs.neighbors(atoms, 5.2, quantities="jdDS", inclusive=False, kernel=kernel)
-    assert np.array_equal(np.repeat(np.arange(len(atoms)), table.counts), i[order])
-    assert np.array_equal(table.indices, j[order])
-    assert np.array_equal(table.shifts, S[order])
-    np.testing.assert_allclose(table.distances, d[order], rtol=1e-13)
-    np.testing.assert_allclose(table.vectors, D[order], atol=1e-12)
-    counts = hs.coordination(atoms, 5.2, inclusive=False, kernel=kernel)
-    assert np.array_equal(counts, np.bincount(i, minlength=len(atoms)))
-
-
 # ---- special scenes ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("ndim", [1, 2, 3, 8])
-def test_no_points(ndim, kernel):
-    for box in (None, np.ones(ndim)):
-        table = hs.neighbors(np.empty((0, ndim)), 1.0, box=box, quantities="jdDS", kernel=kernel)
-        assert table.offsets.tolist() == [0] and len(table) == 0 and list(table) == []
-        assert table.indices.shape == table.distances.shape == (0,)
-        assert table.vectors.shape == table.shifts.shape == (0, ndim)
-        assert hs.coordination(np.empty((0, ndim)), 1.0, box=box, kernel=kernel).shape == (0,)
-    assert len(hs.neighbors([], 1.0)) == 0
+def test_no_points():
+    for ndim in (1, 2, 3, 8):
+        for kernel in hs.kernels():
+            for box in (None, np.ones(ndim)):
+                table = hs.neighbors(
+                    np.empty((0, ndim)), 1.0, box=box, quantities="jdDS", kernel=kernel
+                )
+                assert table.offsets.tolist() == [0] and len(table) == 0 and list(table) == []
+                assert table.indices.shape == table.distances.shape == (0,)
+                assert table.vectors.shape == table.shifts.shape == (0, ndim)
+                assert hs.coordination(np.empty((0, ndim)), 1.0, box=box, kernel=kernel).shape == (
+                    0,
+                )
+            assert len(hs.neighbors([], 1.0)) == 0
 
 
-def test_coincident_points_and_no_cutoff(kernel):
-    points = np.repeat([[0.1, 0.2], [0.7, 0.7]], 3, axis=0)
-    table = hs.neighbors(points, 0.0, quantities="jd", kernel=kernel)
-    assert [j.tolist() for j, _ in table] == [[1, 2], [0, 2], [0, 1], [4, 5], [3, 5], [3, 4]]
-    assert not table.distances.any()
-    strict = hs.neighbors(points, 0.0, inclusive=False, kernel=kernel)
-    assert strict.counts.tolist() == [0] * 6
-    assert hs.coordination(points, 0.0, kernel=kernel).tolist() == [2] * 6
-    assert hs.coordination(points, 0.0, inclusive=False, kernel=kernel).tolist() == [0] * 6
+def test_coincident_points_and_no_cutoff():
+    for kernel in hs.kernels():
+        points = np.repeat([[0.1, 0.2], [0.7, 0.7]], 3, axis=0)
+        table = hs.neighbors(points, 0.0, quantities="jd", kernel=kernel)
+        assert [j.tolist() for j, _ in table] == [[1, 2], [0, 2], [0, 1], [4, 5], [3, 5], [3, 4]]
+        assert not table.distances.any()
+        strict = hs.neighbors(points, 0.0, inclusive=False, kernel=kernel)
+        assert strict.counts.tolist() == [0] * 6
+        assert hs.coordination(points, 0.0, kernel=kernel).tolist() == [2] * 6
+        assert hs.coordination(points, 0.0, inclusive=False, kernel=kernel).tolist() == [0] * 6
 
 
-def test_own_images_and_all_shells(kernel):
-    table = hs.neighbors([[0.3, 0.4]], 1.0, box=[1.0, 1.0], quantities="jS", kernel=kernel)
-    assert table.shifts.tolist() == [[-1, 0], [0, -1], [0, 1], [1, 0]]
-    assert table.indices.tolist() == [0] * 4
+def test_own_images_and_all_shells():
+    box = hs.Box([1.0, 1.0])
+    for kernel in hs.kernels():
+        table = hs.neighbors([[0.3, 0.4]], 1.0, box=box, quantities="jS", kernel=kernel)
+        assert table.shifts.tolist() == [[-1, 0], [0, -1], [0, 1], [1, 0]]
+        assert table.indices.tolist() == [0] * 4
+        assert hs.coordination([[0.3, 0.4]], 1.0, box=box, kernel=kernel).tolist() == [4]
 
 
-def test_rows_far_longer_than_the_others(rng, kernel):
-    points = np.concatenate([np.zeros((700, 3)), rng.random((500, 3)) * 100.0 + 1.0])
-    table = hs.neighbors(points, 0.5, kernel=kernel)
-    assert (table.counts[:700] == 699).all()
-    assert np.array_equal(table[5], np.delete(np.arange(700), 5))
+def test_rows_far_longer_than_the_others(rng):
+    for kernel in hs.kernels():
+        points = np.concatenate([np.zeros((700, 3)), rng.random((500, 3)) * 100.0 + 1.0])
+        table = hs.neighbors(points, 0.5, kernel=kernel)
+        assert (table.counts[:700] == 699).all()
+        assert np.array_equal(table[5], np.delete(np.arange(700), 5))
 
 
 # ---- forms of input and output -------------------------------------------------------------
 
 
-@pytest.mark.parametrize("letters", ["j", "d", "D", "S", "jd", "dj", "SDdj"])
-def test_quantities_in_their_order(letters):
-    whole = hs.neighbors(POINTS, 1.5, box=LENGTHS, quantities="jdDS")
-    table = hs.neighbors(POINTS, 1.5, box=LENGTHS, quantities=letters)
-    columns = {"j": "indices", "d": "distances", "D": "vectors", "S": "shifts"}
-    assert table.quantities == letters
-    assert np.array_equal(table.offsets, whole.offsets)
-    row = table[3] if len(letters) > 1 else (table[3],)
-    for letter, part in zip(letters, row, strict=True):
-        column = getattr(table, columns[letter])
-        assert np.array_equal(column, getattr(whole, columns[letter]))
-        assert np.shares_memory(part, column)
-        assert np.array_equal(part, column[table.offsets[3] : table.offsets[4]])
+def test_quantities_in_their_order():
+    for letters in ("j", "d", "D", "S", "jd", "dj", "SDdj"):
+        whole = hs.neighbors(POINTS, 1.5, box=LENGTHS, quantities="jdDS")
+        table = hs.neighbors(POINTS, 1.5, box=LENGTHS, quantities=letters)
+        columns = {"j": "indices", "d": "distances", "D": "vectors", "S": "shifts"}
+        assert table.quantities == letters
+        assert np.array_equal(table.offsets, whole.offsets)
+        row = table[3] if len(letters) > 1 else (table[3],)
+        for letter, part in zip(letters, row, strict=True):
+            column = getattr(table, columns[letter])
+            assert np.array_equal(column, getattr(whole, columns[letter]))
+            assert np.shares_memory(part, column)
+            assert np.array_equal(part, column[table.offsets[3] : table.offsets[4]])
 
 
-@pytest.mark.parametrize("dtype", [np.int32, np.int64, "int32", np.dtype(np.int64)])
-def test_index_dtype(dtype):
-    table = hs.neighbors(POINTS, 1.5, index_dtype=dtype)
-    assert table.indices.dtype == np.dtype(dtype)
-    assert table.offsets.dtype == np.int64
-    assert np.array_equal(table.indices, hs.neighbors(POINTS, 1.5).indices)
-
-
-def test_any_form_of_input_gives_the_same(rng):
-    points = rng.random((60, 3)).astype(np.float32)
-    expected = hs.neighbors(points, 0.3, quantities="jdS", box=[1.0] * 3)
-    wide = np.zeros((60, 7), np.float64)
-    wide[:, 5::-2] = points
-    frozen = points.copy()
-    frozen.flags.writeable = False
-    forms = [points.tolist(), wide[:, 5::-2], points[::-1][::-1], np.asfortranarray(points), frozen,
-             points.astype(">f8"), memoryview(points)]  # fmt: skip
-    for form in forms:
-        assert same_tables(hs.neighbors(form, 0.3, quantities="jdS", box=np.ones(3)), expected)
-        how = {"box": hs.Box([1.0] * 3), "periodic": [1, 1, 1]}
-        assert np.array_equal(hs.coordination(form, 0.3, **how), expected.counts)
-
-
-def test_inputs_stay_as_they_are():
-    points, box = POINTS.copy(), LENGTHS.copy()
-    hs.neighbors(points, 1.5, box=box, quantities="jdDS")
-    hs.coordination(points, 1.5, box=box)
-    assert np.array_equal(points, POINTS) and np.array_equal(box, LENGTHS)
+def test_index_dtype():
+    for dtype in (np.int32, np.int64, "int32", np.dtype(np.int64)):
+        table = hs.neighbors(POINTS, 1.5, index_dtype=dtype)
+        assert table.indices.dtype == np.dtype(dtype)
+        assert table.offsets.dtype == np.int64
+        assert np.array_equal(table.indices, hs.neighbors(POINTS, 1.5).indices)
 
 
 def test_large_and_small_results_are_read_only(rng):
@@ -280,12 +227,6 @@ def test_kernels_agree_to_the_bit(rng):
         for kernel in hs.kernels()
     )
     assert all(same_tables(first, other) for other in others)
-
-
-@pytest.mark.parametrize("precision", ["double", "single"])
-def test_rounded_decisions_on_generic_points(precision):
-    exact = hs.neighbors(POINTS, 1.5, box=LENGTHS)
-    assert same_tables(hs.neighbors(POINTS, 1.5, box=LENGTHS, precision=precision), exact)
 
 
 def test_rows_of_queries(rng):

@@ -11,20 +11,20 @@ from halfshell._check.reference import reference_pairs
 from oracles import BOX_KINDS, as_set, check, random_box, random_scene
 
 
-@pytest.mark.parametrize("n", [0, 1, 2])
-@pytest.mark.parametrize("ndim", [1, 2, 3, 5])
-def test_fewest_points_in_open_space(n, ndim):
-    points = np.arange(n * ndim, dtype=float).reshape(n, ndim)
-    found = check(points, 100.0)
-    assert len(found) == n * (n - 1) // 2
-    assert check(points, 0.0) == set()
+def test_fewest_points_in_open_space():
+    for n in (0, 1, 2):
+        for ndim in (1, 2, 3, 5):
+            points = np.arange(n * ndim, dtype=float).reshape(n, ndim)
+            found = check(points, 100.0)
+            assert len(found) == n * (n - 1) // 2
+            assert check(points, 0.0) == set()
 
 
-@pytest.mark.parametrize("n", [0, 1, 2])
-def test_fewest_points_in_a_box(n, kernel):
-    points = np.array([[0.25, 0.5, 0.75], [0.5, 0.5, 0.5]])[:n]
-    for cutoff in (0.0, 0.3, 1.0, 1.5):
-        check(points, cutoff, box=[1.0, 1.0, 1.25], kernel=kernel)
+def test_fewest_points_in_a_box():
+    for n in (0, 1, 2):
+        points = np.array([[0.25, 0.5, 0.75], [0.5, 0.5, 0.5]])[:n]
+        for cutoff in (0.0, 0.3, 1.0, 1.5):
+            check(points, cutoff, box=[1.0, 1.0, 1.25])
 
 
 def test_a_point_alone_pairs_with_its_own_images_once():
@@ -38,13 +38,13 @@ def test_a_point_is_never_its_own_neighbour_without_a_shift():
         assert all(i < j or any(S) for i, j, S in check(points, 1.5, box=box))
 
 
-def test_coincident_points_are_pairs_at_any_cutoff(kernel):
+def test_coincident_points_are_pairs_at_any_cutoff():
     points = np.repeat([[0.1, 0.2, 0.3], [5.0, 5.0, 5.0]], [3, 2], axis=0)
     everyone = {(0, 1), (0, 2), (1, 2), (3, 4)}
     for cutoff in (0.0, 5e-324, 1e-300, 0.1):
-        assert {p[:2] for p in check(points, cutoff, kernel=kernel)} == everyone
-    assert check(points, 0.0, inclusive=False, kernel=kernel) == set()
-    assert len(check(points, 0.0, box=[0.7, 0.7, 0.7], kernel=kernel)) == 4
+        assert {p[:2] for p in check(points, cutoff)} == everyone
+    assert check(points, 0.0, inclusive=False) == set()
+    assert len(check(points, 0.0, box=[0.7, 0.7, 0.7])) == 4
 
 
 def test_points_that_coincide_only_by_a_box_vector_are_pairs_at_zero():
@@ -60,35 +60,35 @@ def test_all_points_coincide():
 
 
 @pytest.mark.parametrize("kind", BOX_KINDS)
-@pytest.mark.parametrize("flags", list(itertools.product([False, True], repeat=3)))
-def test_every_box_and_every_mixture_of_axes(kind, flags, rng):
-    for neighbours in (0.3, 3.0, 25.0):
-        n = int(rng.integers(2, 9))
-        points, cutoff, box, flags = random_scene(
-            rng, n, 3, kind, neighbours, spread=2, periodic=flags
-        )
-        check(points, cutoff, box, flags)
-        check(points, cutoff, box, flags, inclusive=False)
+def test_every_box_and_every_mixture_of_axes(kind, rng):
+    for flags in itertools.product([False, True], repeat=3):
+        for neighbours in (0.3, 3.0, 25.0):
+            n = int(rng.integers(2, 9))
+            points, cutoff, box, axes = random_scene(
+                rng, n, 3, kind, neighbours, spread=2, periodic=flags
+            )
+            check(points, cutoff, box, axes)
+            check(points, cutoff, box, axes, inclusive=False)
 
 
 @pytest.mark.parametrize("ndim", [1, 2, 3])
-def test_every_kernel_on_random_scenes(kernel, ndim, rng):
-    for _ in range(12):
+def test_every_kernel_on_random_scenes(ndim, rng):
+    for _ in range(20):
         kind = str(rng.choice(BOX_KINDS))
         flags = rng.random(ndim) < 0.7
         points, cutoff, box, flags = random_scene(
             rng, int(rng.integers(1, 24)), ndim, kind, 4, spread=2, periodic=flags
         )
-        check(points, cutoff, box, flags, kernel=kernel)
-        check(points, cutoff, kernel=kernel)
+        check(points, cutoff, box, flags)
+        check(points, cutoff)
 
 
-def test_cutoff_of_many_boxes(kernel, rng):
+def test_cutoff_of_many_boxes(rng):
     for kind in BOX_KINDS:
         box = random_box(rng, kind)
         points = rng.random((2, 3)) @ box
-        check(points, 3.2, box, kernel=kernel)
-        check(points, 6.0, box, [False, True, False], kernel=kernel)
+        check(points, 3.2, box)
+        check(points, 6.0, box, [False, True, False])
 
 
 def test_one_short_edge_among_long_ones(rng):
@@ -133,57 +133,35 @@ def test_open_axes_of_a_box_are_open(rng):
     assert found == check(points, 2.0)
 
 
-def test_points_many_boxes_away(rng, kernel):
-    for kind in BOX_KINDS:
-        box = random_box(rng, kind)
-        for spread in (10, 1e4, 1e8):
-            points = np.round(rng.uniform(-spread, spread, (6, 3))) @ box + rng.random((6, 3))
-            check(points, 0.9, box, kernel=kernel)
+def test_sizes_around_vector_lengths(rng):
+    for kernel in hs.kernels():
+        # Tails of vector loops: every n up to 40, and around 64 and 128.
+        for n in [*range(41), 63, 64, 65, 127, 128, 129]:
+            points = rng.random((n, 3))
+            i, j = hs.pairs(points, 0.4, kernel=kernel)
+            D = points[:, None] - points[None]
+            near = np.triu((D * D).sum(-1) <= 0.16, 1)
+            assert as_set(i, j) == {(a, b, ()) for a, b in np.argwhere(near).tolist()}
 
 
-def test_sizes_around_vector_lengths(kernel, rng):
-    # Tails of vector loops: every n up to 40, and around 64 and 128.
-    for n in [*range(41), 63, 64, 65, 127, 128, 129]:
-        points = rng.random((n, 3))
-        i, j = hs.pairs(points, 0.4, kernel=kernel)
-        D = points[:, None] - points[None]
-        near = np.triu((D * D).sum(-1) <= 0.16, 1)
-        assert as_set(i, j) == {(a, b, ()) for a, b in np.argwhere(near).tolist()}
-
-
-def test_extreme_scales(kernel, rng):
-    points = rng.random((8, 3))
-    box = random_box(rng, "triclinic")
-    for exponent in (-1060, -1022, -600, -300, -150, 150, 300, 600, 1000):
-        scale = 2.0**exponent
-        check(points * scale, 0.5 * scale, kernel=kernel)
-        check(points * scale, 0.5 * scale, box * scale, kernel=kernel)
-
-
-def test_coordinates_whose_difference_overflows(kernel):
+def test_coordinates_whose_difference_overflows():
     huge = 1.7e308
     points = np.array([[huge, 0.0], [-huge, 0.0], [-huge, 1.0], [0.0, huge]])
-    check(points, 1.0, kernel=kernel)
-    check(points, 1.7976931348623157e308, kernel=kernel)
+    check(points, 1.0)
+    check(points, 1.7976931348623157e308)
 
 
-def test_subnormal_distances(kernel):
+def test_subnormal_distances():
     tiny = 5e-324
     points = np.array([[0.0, 0.0], [tiny, 0.0], [0.0, 3 * tiny], [4 * tiny, 3 * tiny]])
     for cutoff in (0.0, tiny, 2 * tiny, 3 * tiny, 4 * tiny, 5 * tiny):
-        check(points, cutoff, kernel=kernel)
-        check(points, cutoff, inclusive=False, kernel=kernel)
-        check(points + 0.0, cutoff, [8 * tiny, 8 * tiny], kernel=kernel)
+        check(points, cutoff)
+        check(points, cutoff, inclusive=False)
+        check(points + 0.0, cutoff, [8 * tiny, 8 * tiny])
 
 
-def test_mixed_magnitudes_on_the_axes(kernel, rng):
+def test_mixed_magnitudes_on_the_axes(rng):
     points = rng.normal(size=(12, 3)) * [1e-12, 1.0, 1e12]
     for cutoff in (1e-12, 1.0, 1e12):
-        check(points, cutoff, kernel=kernel)
-        check(points, cutoff, [3e-12, 4.0, 5e12], [False, False, True], kernel=kernel)
-
-
-def test_negative_zero_is_zero(kernel):
-    points = np.array([[0.0, -0.0], [-0.0, 0.0], [1.0, -0.0]])
-    check(points, -0.0, kernel=kernel)
-    check(points, 0.0, [1.0, 1.0], kernel=kernel)
+        check(points, cutoff)
+        check(points, cutoff, [3e-12, 4.0, 5e12], [False, False, True])

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Radii and rules as they may be given, and all that is refused, before anything is searched."""
 
+import threading
+
 import numpy as np
 import pytest
 
@@ -301,7 +303,36 @@ def test_results_that_do_not_fit_are_refused(rule):
         )  # fmt: skip
 
 
-@pytest.mark.parametrize("cutoff", [INF, NAN, -1.0])
-def test_a_further_cutoff_is_a_length(cutoff):
-    with pytest.raises(ValueError, match="cutoff must be finite and not negative"):
-        hs.count_pairs([[0.0], [1.0]], cutoff, radii=[1.0, 1.0])
+def test_a_further_cutoff_is_a_length():
+    for cutoff in (INF, NAN, -1.0):
+        with pytest.raises(ValueError, match="cutoff must be finite and not negative"):
+            hs.count_pairs([[0.0], [1.0]], cutoff, radii=[1.0, 1.0])
+
+
+def test_radii_that_change_meanwhile_do_no_harm():
+    points, radii = LARGE[:1500], 0.04 * 2.0 ** -RNG.integers(0, 6, 1500)
+    radii[:3] = 0.4
+    stop = threading.Event()
+
+    def write():
+        k = 0
+        values = (np.nan, -1.0, 0.3, 1e308, 0.0, np.inf, 0.01)
+        while not stop.is_set():
+            radii[k % len(radii)] = values[k % len(values)]
+            radii[:] = 0.03
+            k += 1
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    try:
+        for _ in range(15):
+            for search in (hs.pairs, hs.coordination, hs.count_pairs):
+                try:
+                    search(points, 0.1, radii=radii, threads=2)
+                except ValueError as refused:
+                    assert "radii" in str(refused)
+    finally:
+        stop.set()
+        writer.join()
+    i, j = hs.pairs(points, None, radii=radii)
+    assert (i < j).all()

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A cutoff for each pair of types, as a table or a dict, against rational arithmetic."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -17,61 +19,82 @@ TYPES = np.arange(20) % 3
 
 
 @pytest.mark.parametrize("kind", BOXES)
-@pytest.mark.parametrize("ndim", [1, 2, 3, 4])
-@pytest.mark.parametrize("cutoff", [TABLE, PAIRS], ids=["table", "dict"])
-def test_equals_the_definition(kind, ndim, cutoff, rng, kernel):
-    points, scene = boxed(rng, kind, ndim, 18)
-    types = rng.integers(0, 4, 18)
-    for inclusive in (True, False):
-        scene |= {"inclusive": inclusive}
-        one = Reaching(points, cutoff, types=types, **scene)
-        check(one, kernel=kernel)
-        check(one.but(n_queries=7), kernel=kernel)
-        check(one.but(points=points.astype(np.float32)), kernel=kernel)
+def test_equals_the_definition(kind, rng):
+    for ndim in (1, 2, 3, 4):
+        for cutoff in (TABLE, PAIRS):
+            points, scene = boxed(rng, kind, ndim, 18)
+            types = rng.integers(0, 4, 18)
+            for inclusive in (True, False):
+                scene |= {"inclusive": inclusive}
+                one = Reaching(points, cutoff, types=types, **scene)
+                check(one)
+                check(one.but(n_queries=7))
+                check(one.but(points=points.astype(np.float32)))
 
 
-def test_types_that_nobody_has_and_types_that_pair_with_nobody(rng, kernel):
+def test_types_that_nobody_has_and_types_that_pair_with_nobody(rng):
     points = rng.random((20, 2))
     for types in (np.full(20, 2), rng.choice([1, 3], 20), rng.integers(0, 9, 20)):
         for cutoff in ({(1, 3): 0.4}, {(2, 2): 0.3}, {(5, 6): 0.5, (6, 8): 0.3}, {}):
-            check(Reaching(points, cutoff, types=types), kernel=kernel)
-            check(Reaching(points, cutoff, 8, types=types), kernel=kernel)
+            check(Reaching(points, cutoff, types=types))
+            check(Reaching(points, cutoff, 8, types=types))
     for types in (np.full(20, 2), rng.choice([1, 3], 20)):
-        check(Reaching(points, TABLE, types=types), kernel=kernel)
-    assert hs.count_pairs(points, np.zeros((1, 1)), types=[0] * 20, kernel=kernel) == 0
+        check(Reaching(points, TABLE, types=types))
+    assert hs.count_pairs(points, np.zeros((1, 1)), types=[0] * 20) == 0
 
 
-def test_ties_at_each_cutoff(rng, kernel):
+def test_ties_at_each_cutoff(rng):
     points = rng.integers(-6, 7, (30, 2)) / 4.0
     table = rng.integers(0, 7, (3, 3)) / 4.0
     table = np.maximum(table, table.T)
     for inclusive in (True, False):
         one = Reaching(points, table, types=rng.integers(0, 3, 30), inclusive=inclusive)
-        check(one, kernel=kernel)
-        check(one.but(box=[3.0, 3.0]), kernel=kernel)
-        check(one.but(n_queries=11), kernel=kernel)
+        check(one)
+        check(one.but(box=[3.0, 3.0]))
+        check(one.but(n_queries=11))
 
 
-def test_cutoffs_of_every_size(rng, kernel):
+def test_cutoffs_of_every_size(rng):
     points = np.concatenate([rng.random((12, 2)), 1e-5 * rng.random((12, 2))])
     table = [[0.5, 1e-3, 1e-9], [1e-3, 3e-6, 0.0], [1e-9, 0.0, 4e-6]]
-    assert check(Reaching(points, np.array(table), types=rng.integers(0, 3, 24)), kernel=kernel)
+    assert check(Reaching(points, np.array(table), types=rng.integers(0, 3, 24)))
 
 
-@pytest.mark.parametrize("kind", ["periodic", "triclinic"])
-def test_cutoffs_larger_than_the_box(kind, rng, kernel):
-    points, scene = boxed(rng, kind, 2, 5)
-    cutoffs = {(0, 0): 2.5, (0, 1): 0.3, (1, 1): 1.1}
-    found = check(Reaching(points, cutoffs, types=[0, 1, 1, 0, 2], **scene), kernel=kernel)
-    assert any(i == j for i, j, _ in found)
+def test_cutoffs_larger_than_the_box(rng):
+    for kind in ("periodic", "triclinic"):
+        points, scene = boxed(rng, kind, 2, 5)
+        cutoffs = {(0, 0): 2.5, (0, 1): 0.3, (1, 1): 1.1}
+        found = check(Reaching(points, cutoffs, types=[0, 1, 1, 0, 2], **scene))
+        assert any(i == j for i, j, _ in found)
 
 
-def test_one_cutoff_for_all_types_is_one_cutoff(rng, kernel):
-    points = rng.random((500, 3))
-    how = {"quantities": "ijSdD", "sort": True, "box": 1.0, "kernel": kernel}
-    table = np.full((5, 5), 0.2)
-    found = hs.pairs(points, table, types=rng.integers(0, 5, 500), **how)
-    assert same_arrays(found, hs.pairs(points, 0.2, **how))
+def test_one_cutoff_for_all_types_is_one_cutoff(rng):
+    for kernel in hs.kernels():
+        points = rng.random((500, 3))
+        how = {"quantities": "ijSdD", "sort": True, "box": 1.0, "kernel": kernel}
+        table = np.full((5, 5), 0.2)
+        found = hs.pairs(points, table, types=rng.integers(0, 5, 500), **how)
+        assert same_arrays(found, hs.pairs(points, 0.2, **how))
+
+
+@pytest.mark.parametrize("t", [1, 8, 9, 40])
+def test_tables_of_many_types_with_pairs_left_out(t):
+    rng = np.random.default_rng(t)
+    points, types = rng.integers(0, 8, (300, 3)) / 8.0, rng.integers(0, t, 300)
+    table = rng.choice([0.0, 0.125, 0.25, 0.375, math.nextafter(0.25, 0)], (t, t))
+    table = np.maximum(table, table.T)
+    left_out = rng.random((t, t)) < 0.3
+    left_out[0, 0] = False
+    left_out |= left_out.T
+    cutoffs = {(a, b): table[a, b] for a in range(t) for b in range(a, t) if not left_out[a, b]}
+    # whole eighths: squares are exact, and roots of those that are no squares are far from them
+    distance = np.sqrt(((points[None] - points[:, None]) ** 2).sum(-1))
+    reach = table[np.ix_(types, types)]
+    kept = ~left_out[np.ix_(types, types)] & np.triu(np.ones((300, 300), bool), 1)
+    for inclusive in (True, False):
+        near = distance <= reach if inclusive else distance < reach
+        i, j = hs.pairs(points, cutoffs, types=types, inclusive=inclusive, sort=True)
+        assert np.array_equal(np.argwhere(near & kept), np.column_stack([i, j]))
 
 
 # ---- forms ---------------------------------------------------------------------------------
@@ -169,9 +192,7 @@ def test_tables_that_are_none(table, fragments):
 )
 def test_types_and_dicts_that_do_not_fit(cutoff, types, exception, fragments):
     for call in (hs.pairs, hs.coordination, hs.iter_pairs):
-        assert_refused(
-            lambda call=call: call(POINTS, cutoff, types=types), exception, *fragments
-        )
+        assert_refused(lambda call=call: call(POINTS, cutoff, types=types), exception, *fragments)
 
 
 def test_types_of_two_sets_go_together():

@@ -66,8 +66,7 @@ def test_types_and_queries():
     assert wrong.spurious.tolist() == [[0, 0, 0]] and wrong.missed.tolist() == [[1, 2, 0]]
 
 
-@pytest.mark.parametrize("rule", RULES)
-@pytest.mark.parametrize("kind", ["open", "periodic", "sheared"])
+@pytest.mark.parametrize(("rule", "kind"), [*zip(RULES, ["open", "periodic", "sheared"] * 2)])
 def test_the_right_list_is_that_of_rational_arithmetic(rule, kind, rng):
     points, scene = boxed(rng, kind, 3, 25)
     for decades in (1.0, 300.0):

@@ -133,43 +133,45 @@ BOXES = {
 }
 
 
-@pytest.mark.parametrize("d", [1, 2, 3])
-@pytest.mark.parametrize("rule", RULES)
 @pytest.mark.parametrize("kind", BOXES)
-def test_the_brute_force_agrees(kind, rule, d):
-    rng = np.random.default_rng([d, RULES.index(rule), len(kind)])
-    for trial in range(4):
-        n = 14 if d < 3 else 10
-        box, periodic = BOXES[kind][0](d), BOXES[kind][1](d)
-        x = rng.random((n, d)).astype(np.float32 if trial % 2 else np.float64)
-        H = tensors(rng, n, d, 0.3 + 0.2 * (d == 3), (1.0, 3.0, 20.0, 1e3)[trial])
-        how = {} if box is None else {"box": box, "periodic": periodic}
-        expected = brute(x, H, 1.0, rule, box, periodic)
-        assert found(x, rule, supports=H, extent=1.0, **how) == expected
-        if rule in ("max", "min"):
-            table = hs.neighbors(x, None, supports=H, extent=1.0, rule=rule, quantities="jS", **how)
-            both = [(j, i, *(-s for s in S)) for i, j, *S in expected]
-            assert rows_of(table.to_pairs(quantities="ijS")) == sorted(expected + both)
-            count = hs.count_pairs(x, None, supports=H, extent=1.0, rule=rule, **how)
-            assert count == len(expected)
-
-
-@pytest.mark.parametrize("d", [1, 2, 3])
 @pytest.mark.parametrize("rule", RULES)
-def test_two_sets_agree(rule, d):
-    rng = np.random.default_rng([d, RULES.index(rule)])
-    x, q = rng.random((12, d)), rng.random((9, d)).astype(np.float32)
-    H, Hq = tensors(rng, 12, d, 0.5, 10.0), tensors(rng, 9, d, 0.3, 4.0)
-    own = None if rule == "gather" else H
-    asking = None if rule == "scatter" else Hq
-    for box, periodic in ((None, None), (np.eye(d), [True] * d)):
-        how = {} if box is None else {"box": box}
-        expected = brute(x, own, 2.0, rule, box, periodic, q=q, Hq=asking)
-        given = {"supports": own, "query_supports": asking, "extent": 2.0, **how}
-        assert found(x, rule, queries=q, **given) == expected
-        counts = hs.coordination(x, None, queries=q, rule=rule, **given)
-        assert counts.tolist() == [sum(row[0] == i for row in expected) for i in range(len(q))]
-        assert hs.count_pairs(x, None, queries=q, rule=rule, **given) == len(expected)
+def test_the_brute_force_agrees(kind, rule):
+    for d in (1, 2, 3):
+        rng = np.random.default_rng([d, RULES.index(rule), len(kind)])
+        for trial in range(4):
+            n = 14 if d < 3 else 10
+            box, periodic = BOXES[kind][0](d), BOXES[kind][1](d)
+            x = rng.random((n, d)).astype(np.float32 if trial % 2 else np.float64)
+            H = tensors(rng, n, d, 0.3 + 0.2 * (d == 3), (1.0, 3.0, 20.0, 1e3)[trial])
+            how = {} if box is None else {"box": box, "periodic": periodic}
+            expected = brute(x, H, 1.0, rule, box, periodic)
+            assert found(x, rule, supports=H, extent=1.0, **how) == expected
+            if rule in ("max", "min"):
+                table = hs.neighbors(
+                    x, None, supports=H, extent=1.0, rule=rule, quantities="jS", **how
+                )
+                both = [(j, i, *(-s for s in S)) for i, j, *S in expected]
+                assert rows_of(table.to_pairs(quantities="ijS")) == sorted(expected + both)
+                count = hs.count_pairs(x, None, supports=H, extent=1.0, rule=rule, **how)
+                assert count == len(expected)
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_two_sets_agree(rule):
+    for d in (1, 2, 3):
+        rng = np.random.default_rng([d, RULES.index(rule)])
+        x, q = rng.random((12, d)), rng.random((9, d)).astype(np.float32)
+        H, Hq = tensors(rng, 12, d, 0.5, 10.0), tensors(rng, 9, d, 0.3, 4.0)
+        own = None if rule == "gather" else H
+        asking = None if rule == "scatter" else Hq
+        for box, periodic in ((None, None), (np.eye(d), [True] * d)):
+            how = {} if box is None else {"box": box}
+            expected = brute(x, own, 2.0, rule, box, periodic, q=q, Hq=asking)
+            given = {"supports": own, "query_supports": asking, "extent": 2.0, **how}
+            assert found(x, rule, queries=q, **given) == expected
+            counts = hs.coordination(x, None, queries=q, rule=rule, **given)
+            assert counts.tolist() == [sum(row[0] == i for row in expected) for i in range(len(q))]
+            assert hs.count_pairs(x, None, queries=q, rule=rule, **given) == len(expected)
 
 
 @pytest.mark.parametrize("d", [2, 3])
@@ -233,39 +235,39 @@ def test_ties_are_decided_exactly():
     assert kept > 8
 
 
-@pytest.mark.parametrize("inclusive", [True, False])
-def test_lattices_of_ties(inclusive):
+def test_lattices_of_ties():
     """Every neighbour along an axis is on the surface: powers of two, and thirds, which are not."""
-    g = np.stack(np.meshgrid(*[np.arange(5.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
-    for unit, factor in ((1.0, 0.5), (0.25, 2.0), (1.0 / 3.0, 3.0), (0.1, 10.0)):
-        x = g * unit
-        H = np.tile(factor * np.diag([2.0, 1.0, 0.5]) / 2.0, (len(x), 1, 1))
-        args = {"supports": H, "extent": 0.5, "inclusive": inclusive}
-        got = hs.pairs(x, None, quantities="ijS", **args)
-        assert hs.verify(x, None, *got, **args)
-        few = slice(0, 30)
-        part = {**args, "supports": H[few]}
-        expected = brute(x[few], H[few], 0.5, "max", inclusive=inclusive)
-        assert found(x[few], "max", **part) == expected
+    for inclusive in (True, False):
+        g = np.stack(np.meshgrid(*[np.arange(5.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
+        for unit, factor in ((1.0, 0.5), (0.25, 2.0), (1.0 / 3.0, 3.0), (0.1, 10.0)):
+            x = g * unit
+            H = np.tile(factor * np.diag([2.0, 1.0, 0.5]) / 2.0, (len(x), 1, 1))
+            args = {"supports": H, "extent": 0.5, "inclusive": inclusive}
+            got = hs.pairs(x, None, quantities="ijS", **args)
+            assert hs.verify(x, None, *got, **args)
+            few = slice(0, 30)
+            part = {**args, "supports": H[few]}
+            expected = brute(x[few], H[few], 0.5, "max", inclusive=inclusive)
+            assert found(x[few], "max", **part) == expected
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])
-@pytest.mark.parametrize("rule", RULES)
-@pytest.mark.parametrize("inclusive", [True, False])
-def test_round_supports_are_radii(rule, d, inclusive):
+def test_round_supports_are_radii(d):
     """Radii whose inverses are exact: H = I / r, extent 1."""
-    rng = np.random.default_rng([d, inclusive])
-    n = 300
-    x = np.round(rng.random((n, d)) * 64) / 64
-    radii = 2.0 ** rng.integers(-5, -1, n)
-    H = np.eye(d) / radii[:, None, None]
-    for box in (None, [1.0] * d):
-        same = {"box": box, "inclusive": inclusive, "rule": rule}
-        by_radii = hs.neighbors(x, None, radii=radii, quantities="jS", **same)
-        by_supports = hs.neighbors(x, None, supports=H, extent=1.0, quantities="jS", **same)
-        assert np.array_equal(by_radii.offsets, by_supports.offsets)
-        assert np.array_equal(by_radii.indices, by_supports.indices)
-        assert np.array_equal(by_radii.shifts, by_supports.shifts)
+    for rule in RULES:
+        for inclusive in (True, False):
+            rng = np.random.default_rng([d, inclusive])
+            n = 300
+            x = np.round(rng.random((n, d)) * 64) / 64
+            radii = 2.0 ** rng.integers(-5, -1, n)
+            H = np.eye(d) / radii[:, None, None]
+            for box in (None, [1.0] * d):
+                same = {"box": box, "inclusive": inclusive, "rule": rule}
+                by_radii = hs.neighbors(x, None, radii=radii, quantities="jS", **same)
+                by_supports = hs.neighbors(x, None, supports=H, extent=1.0, quantities="jS", **same)
+                assert np.array_equal(by_radii.offsets, by_supports.offsets)
+                assert np.array_equal(by_radii.indices, by_supports.indices)
+                assert np.array_equal(by_radii.shifts, by_supports.shifts)
 
 
 @pytest.mark.parametrize("rule", ["max", "min"])
@@ -292,56 +294,56 @@ def test_every_function_gives_the_same_pairs(rule):
     assert hs.verify(x, None, hs.neighbors(x, None, quantities="jS", **args), **args)
 
 
-@pytest.mark.parametrize("inclusive", [True, False])
-def test_a_cutoff_is_a_further_limit(inclusive):
-    rng = np.random.default_rng(11)
-    x = np.round(rng.random((14, 2)) * 16) / 16
-    H = tensors(rng, 14, 2, 0.6, 3.0)
-    for cutoff in (0.0, 0.125, 0.3125, 0.5, 5.0):
-        for box in (None, np.eye(2)):
-            how = {} if box is None else {"box": box}
-            expected = brute(x, H, 1.0, "max", box, [True] * 2, inclusive, cutoff=cutoff)
-            args = {"supports": H, "extent": 1.0, "inclusive": inclusive, **how}
-            assert found(x, "max", cutoff=cutoff, **args) == expected
-            i, j, S = hs.pairs(x, cutoff, quantities="ijS", **args)
-            assert hs.verify(x, cutoff, i, j, S, **args)
+def test_a_cutoff_is_a_further_limit():
+    for inclusive in (True, False):
+        rng = np.random.default_rng(11)
+        x = np.round(rng.random((14, 2)) * 16) / 16
+        H = tensors(rng, 14, 2, 0.6, 3.0)
+        for cutoff in (0.0, 0.125, 0.3125, 0.5, 5.0):
+            for box in (None, np.eye(2)):
+                how = {} if box is None else {"box": box}
+                expected = brute(x, H, 1.0, "max", box, [True] * 2, inclusive, cutoff=cutoff)
+                args = {"supports": H, "extent": 1.0, "inclusive": inclusive, **how}
+                assert found(x, "max", cutoff=cutoff, **args) == expected
+                i, j, S = hs.pairs(x, cutoff, quantities="ijS", **args)
+                assert hs.verify(x, cutoff, i, j, S, **args)
 
 
-@pytest.mark.parametrize("inclusive", [True, False])
-def test_an_extent_of_zero_holds_coincident_points(inclusive):
-    x = np.array([[0.0, 0.0], [0.0, 0.0], [1e-300, 0.0], [1.0, 1.0], [1.0, 1.0]])
-    H = np.tile(np.diag([1.0, 2.0]), (5, 1, 1))
-    expected = [(0, 1, 0, 0), (3, 4, 0, 0)] if inclusive else []
-    assert found(x, "max", supports=H, extent=0.0, inclusive=inclusive) == expected
+def test_an_extent_of_zero_holds_coincident_points():
+    for inclusive in (True, False):
+        x = np.array([[0.0, 0.0], [0.0, 0.0], [1e-300, 0.0], [1.0, 1.0], [1.0, 1.0]])
+        H = np.tile(np.diag([1.0, 2.0]), (5, 1, 1))
+        expected = [(0, 1, 0, 0), (3, 4, 0, 0)] if inclusive else []
+        assert found(x, "max", supports=H, extent=0.0, inclusive=inclusive) == expected
 
 
-@pytest.mark.parametrize("exponent", [-940, -400, -60, 60, 400, 900])
 @pytest.mark.parametrize("aspect", [1.5, 1e7])
-def test_any_unit_of_length(exponent, aspect):
-    rng = np.random.default_rng(5)
-    x = rng.random((16, 2))
-    H = tensors(rng, 16, 2, 0.5, aspect)
-    x[8:] = x[:8] + np.linalg.solve(H[:8], rng.standard_normal((8, 2, 1)) * 0.6)[..., 0]
-    expected = brute(x, H, 1.0, "max")
-    assert expected
-    scaled = np.ldexp(x, exponent)
-    inverse = np.ldexp(H, -exponent)
-    assert np.array_equal(np.ldexp(scaled, -exponent), x)
-    assert np.array_equal(np.ldexp(inverse, exponent), H)
-    assert found(scaled, "max", supports=inverse, extent=1.0) == expected
-    box = np.ldexp(np.eye(2) * 64.0, exponent)
-    assert found(scaled, "max", supports=inverse, extent=1.0, box=box) == expected
+def test_any_unit_of_length(aspect):
+    for exponent in (-940, -400, -60, 60, 400, 900):
+        rng = np.random.default_rng(5)
+        x = rng.random((16, 2))
+        H = tensors(rng, 16, 2, 0.5, aspect)
+        x[8:] = x[:8] + np.linalg.solve(H[:8], rng.standard_normal((8, 2, 1)) * 0.6)[..., 0]
+        expected = brute(x, H, 1.0, "max")
+        assert expected
+        scaled = np.ldexp(x, exponent)
+        inverse = np.ldexp(H, -exponent)
+        assert np.array_equal(np.ldexp(scaled, -exponent), x)
+        assert np.array_equal(np.ldexp(inverse, exponent), H)
+        assert found(scaled, "max", supports=inverse, extent=1.0) == expected
+        box = np.ldexp(np.eye(2) * 64.0, exponent)
+        assert found(scaled, "max", supports=inverse, extent=1.0, box=box) == expected
 
 
-@pytest.mark.parametrize("extent_exponent", [-1000, 0, 1000])
-def test_any_unit_of_the_extent(extent_exponent):
-    rng = np.random.default_rng(6)
-    x = rng.random((16, 3))
-    H = tensors(rng, 16, 3, 0.5, 8.0)
-    extent = math.ldexp(1.0, extent_exponent)
-    assert found(x, "max", supports=np.ldexp(H, extent_exponent), extent=extent) == brute(
-        x, H, 1.0, "max"
-    )
+def test_any_unit_of_the_extent():
+    for extent_exponent in (-1000, 0, 1000):
+        rng = np.random.default_rng(6)
+        x = rng.random((16, 3))
+        H = tensors(rng, 16, 3, 0.5, 8.0)
+        extent = math.ldexp(1.0, extent_exponent)
+        assert found(x, "max", supports=np.ldexp(H, extent_exponent), extent=extent) == brute(
+            x, H, 1.0, "max"
+        )
 
 
 def test_entries_of_extreme_sizes_in_one_support():
@@ -352,15 +354,15 @@ def test_entries_of_extreme_sizes_in_one_support():
     assert found(x, "min", supports=H, extent=1.0) == brute(x, H, 1.0, "min")
 
 
-@pytest.mark.parametrize("precision", ["double", "single"])
-def test_other_precisions_are_those_of_any_kernel(precision):
-    rng = np.random.default_rng(8)
-    x = rng.random((400, 3))
-    args = {"supports": tensors(rng, 400, 3, 0.3, 6.0), "extent": 1.0, "box": 1.0}
-    exact = set(found(x, "max", **args))
-    answers = [found(x, "max", precision=precision, kernel=k, **args) for k in hs.kernels()]
-    assert all(a == answers[0] for a in answers)
-    assert len(exact ^ set(answers[0])) <= 2
+def test_other_precisions_are_those_of_any_kernel():
+    for precision in ("double", "single"):
+        rng = np.random.default_rng(8)
+        x = rng.random((400, 3))
+        args = {"supports": tensors(rng, 400, 3, 0.3, 6.0), "extent": 1.0, "box": 1.0}
+        exact = set(found(x, "max", **args))
+        answers = [found(x, "max", precision=precision, kernel=k, **args) for k in hs.kernels()]
+        assert all(a == answers[0] for a in answers)
+        assert len(exact ^ set(answers[0])) <= 2
 
 
 def test_points_far_apart_and_outside_the_box():
@@ -380,30 +382,30 @@ def test_points_far_apart_and_outside_the_box():
 SKEWED = np.array([[1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.25, -0.375, 1.25]])
 
 
-@pytest.mark.parametrize("rule", RULES)
 @pytest.mark.parametrize("kind", ["open", "box", "slab", "skewed", "short"])
-@pytest.mark.parametrize("d", [2, 3])
-def test_needles_along_the_axes(d, kind, rule):
+def test_needles_along_the_axes(kind):
     """Cells and images go by the width of needles along each axis of the grid."""
-    rng = np.random.default_rng([d, RULES.index(rule), len(kind)])
-    n = 18
-    box = {
-        "open": None, "box": np.eye(d), "slab": np.eye(d), "skewed": SKEWED[:d, :d],
-        "short": np.diag([1.0, 0.5, 0.75][:d]),
-    }[kind]  # fmt: skip
-    periodic = [kind != "slab" or k == 0 for k in range(d)]
-    how = {} if box is None else {"box": box, "periodic": periodic}
-    n_pairs = 0
-    for axis in range(d):
-        values = np.full((n, d), 8.0) + rng.random((n, d))
-        values[:, axis] = 1.2 + 0.2 * rng.random(n)
-        H = np.stack([np.diag(v) for v in values])
-        H[:, 0, 1] = H[:, 1, 0] = 0.05 * rng.random(n)  # not quite along it
-        x = rng.random((n, d)) * (1.25 if box is None else 1.0)
-        expected = brute(x, H, 1.0, rule, box, periodic)
-        assert found(x, rule, supports=H, extent=1.0, **how) == expected
-        n_pairs += len(expected)
-    assert n_pairs > 0
+    for rule in RULES:
+        for d in (2, 3):
+            rng = np.random.default_rng([d, RULES.index(rule), len(kind)])
+            n = 18
+            box = {
+                "open": None, "box": np.eye(d), "slab": np.eye(d), "skewed": SKEWED[:d, :d],
+                "short": np.diag([1.0, 0.5, 0.75][:d]),
+            }[kind]  # fmt: skip
+            periodic = [kind != "slab" or k == 0 for k in range(d)]
+            how = {} if box is None else {"box": box, "periodic": periodic}
+            n_pairs = 0
+            for axis in range(d):
+                values = np.full((n, d), 8.0) + rng.random((n, d))
+                values[:, axis] = 1.2 + 0.2 * rng.random(n)
+                H = np.stack([np.diag(v) for v in values])
+                H[:, 0, 1] = H[:, 1, 0] = 0.05 * rng.random(n)  # not quite along it
+                x = rng.random((n, d)) * (1.25 if box is None else 1.0)
+                expected = brute(x, H, 1.0, rule, box, periodic)
+                assert found(x, rule, supports=H, extent=1.0, **how) == expected
+                n_pairs += len(expected)
+            assert n_pairs > 0
 
 
 def test_a_needle_at_its_very_ends():

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell import _core
 from halfshell._check.by_supports import spheres_of
 
-X = np.random.default_rng(0).random((6, 3))
+X, BATCH = np.random.default_rng(0).random((6, 3)), [0, 0, 1, 1, 1, 7]
 H = np.tile(np.diag([1.0, 2.0, 4.0]), (6, 1, 1))
 
 
@@ -35,6 +34,8 @@ CALLS = {
     "for_each_pair": lambda **how: hs.for_each_pair(X, None, lambda *pair: None, **how),
     "verify": lambda **how: hs.verify(X, None, [], [], **how),
     "explain": lambda **how: hs.explain(X, None, **how),
+    "pairs of a batch": lambda **how: hs.pairs(X, None, batch=BATCH, **how),
+    "count_pairs of a batch": lambda **how: hs.count_pairs(X, None, batch=BATCH, **how),
 }
 
 REFUSED = [
@@ -72,18 +73,18 @@ REFUSED = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CALLS)
 @pytest.mark.parametrize(("how", "error", "message"), REFUSED)
-def test_what_is_refused_says_why(name, how, error, message):
-    with pytest.raises(error, match=message):
-        CALLS[name](**how)
+def test_what_is_refused_says_why(how, error, message):
+    for call in CALLS.values():
+        with pytest.raises(error, match=message):
+            call(**how)
 
 
-@pytest.mark.parametrize("name", ["pairs", "iter_pairs", "for_each_pair", "explain"])
-@pytest.mark.parametrize("rule", ["gather", "scatter"])
-def test_rules_with_a_direction_are_for_rows(name, rule):
-    with pytest.raises(ValueError, match="has a direction"):
-        CALLS[name](supports=H, extent=1.0, rule=rule)
+def test_rules_with_a_direction_are_for_rows():
+    for name in ("pairs", "pairs of a batch", "iter_pairs", "for_each_pair", "explain"):
+        for rule in ("gather", "scatter"):
+            with pytest.raises(ValueError, match="has a direction"):
+                CALLS[name](supports=H, extent=1.0, rule=rule)
 
 
 def test_supports_of_two_sets_go_together():
@@ -102,37 +103,10 @@ def test_supports_of_two_sets_go_together():
         )
 
 
-@pytest.mark.parametrize("d", [4, 8])
-def test_more_than_three_dimensions_are_refused(d):
+def test_more_than_three_dimensions_are_refused():
+    d = 4
     with pytest.raises(ValueError, match=f"1 to 3 dimensions, got {d}"):
         hs.pairs(np.zeros((2, d)), None, supports=np.tile(np.eye(d), (2, 1, 1)), extent=1.0)
-
-
-def test_supports_of_a_batch_are_checked_as_all_are():
-    batch = [0, 0, 1, 1, 1, 7]
-    for call in (hs.pairs, hs.count_pairs):
-        for given, message in (
-            ({"supports": H}, "supports need an extent"),
-            ({"extent": 1.0}, "extent needs supports"),
-            ({"supports": H[:5], "extent": 1.0}, r"must have shape \(6, "),
-            ({"supports": H, "extent": -1.0}, "extent must be finite and not negative"),
-            ({"supports": H, "extent": 1.0, "rule": "sum"}, "rule"),
-            ({"supports": H, "extent": 1.0, "rule": "gather"}, "has a direction"),
-            ({"supports": H, "extent": 1.0, "radii": [1.0] * 6}, "cannot be given together"),
-            ({"supports": H, "extent": 1.0, "types": [0] * 6}, "cannot be given together"),
-            ({"supports": changed(3, 0, 0, -1.0), "extent": 1.0},
-             r"supports.3. .*positive definite|positive definite.*supports.3."),
-        ):  # fmt: skip
-            with pytest.raises(ValueError, match=message):
-                call(X, None, batch=batch, **given)
-        with pytest.raises((TypeError, ValueError), match="cutoff"):
-            call(X, {(0, 1): 1.0}, batch=batch, supports=H, extent=1.0)
-        with pytest.raises(ValueError, match="cutoff"):
-            call(X, np.ones((2, 2)), batch=batch, supports=H, extent=1.0)
-        with pytest.raises(ValueError, match="less than"):
-            call(X, [1.0, 2.0], batch=batch, supports=H, extent=1.0)
-    with pytest.raises(ValueError, match="queries"):
-        hs.count_pairs(X, None, batch=batch, supports=H, extent=1.0, queries=X)
 
 
 def test_a_large_scene_is_refused_before_it_is_searched():
@@ -215,16 +189,16 @@ def test_random_matrices_near_the_border_are_told_exactly():
     assert min(counts) > 40
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.int64, ">f8", np.float16])
-def test_other_types_are_converted_exactly(dtype):
-    expected = hs.pairs(X, None, supports=H, extent=1.5)
-    again = hs.pairs(X, None, supports=H.astype(dtype), extent=1.5)
-    assert all(np.array_equal(a, b) for a, b in zip(expected, again))
-    strided = np.empty((12, 3, 6))[::2, :, ::2]
-    strided[...] = H
-    strided.flags.writeable = False
-    again = hs.pairs(X, None, supports=strided, extent=1.5)
-    assert all(np.array_equal(a, b) for a, b in zip(expected, again))
+def test_other_types_are_converted_exactly():
+    for dtype in (np.float32, np.int64, ">f8", np.float16):
+        expected = hs.pairs(X, None, supports=H, extent=1.5)
+        again = hs.pairs(X, None, supports=H.astype(dtype), extent=1.5)
+        assert all(np.array_equal(a, b) for a, b in zip(expected, again))
+        strided = np.empty((12, 3, 6))[::2, :, ::2]
+        strided[...] = H
+        strided.flags.writeable = False
+        again = hs.pairs(X, None, supports=strided, extent=1.5)
+        assert all(np.array_equal(a, b) for a, b in zip(expected, again))
 
 
 def test_no_points_and_one_point():
@@ -254,20 +228,3 @@ def test_verify_finds_what_is_missed_and_what_is_spurious():
     assert verdict.missed.tolist() == [[0, 1]] and verdict.spurious.tolist() == [[0, 2]]
     wide = hs.verify(x, None, [0, 0], [1, 2], supports=narrow[:, ::-1, ::-1], extent=1.0)
     assert wide.spurious.tolist() == [[0, 1]]
-
-
-@pytest.mark.parametrize(
-    ("supports", "extent"),
-    [
-        (H[:5], 1.0), (H[:, :2], 1.0), (H.astype(np.float32), 1.0), (H[0], 1.0), ("H", 1.0),
-        (H[:, ::-1], 1.0), (H, 1), (H, "1"),
-    ],
-)  # fmt: skip
-def test_the_core_takes_no_other_arrays(supports, extent):
-    reach = (2, None, None, None, None, None, supports, None, extent)
-    search = (X, np.inf, None, 0, True, "exact", None, None, None, None)
-    with pytest.raises(TypeError):
-        _core.count_pairs(*search, reach)
-    assert _core.count_pairs(*search, (*reach[:6], H, None, 1.0)) >= 0
-    with pytest.raises(ValueError, match="extent must be finite"):
-        _core.count_pairs(*search, (*reach[:6], H, None, -1.0))

@@ -40,27 +40,27 @@ def follow(frames, cutoff=1.3, **options):
 
 
 @pytest.mark.parametrize("skin", SKINS)
-@pytest.mark.parametrize("inclusive", [True, False])
-@pytest.mark.parametrize("box", [None, 4.0, SKEWED], ids=["open", "cube", "skewed"])
-def test_frame_by_frame(skin, inclusive, box):
-    frames = walk()
-    options = {"box": box, "inclusive": inclusive}
-    expected = [fresh(points, **options) for points in frames]
-    assert min(len(one[0]) for one in expected) > 10
-    check(follow(frames, skin=skin, **options), expected)
-    check(follow(list(frames), skin=skin, **options), expected)
-    check(follow(iter(frames), skin=skin, **options), expected)
-    check(follow(frames.astype(np.float32), skin=skin, **options),
-          [fresh(points.astype(np.float32), **options) for points in frames])  # fmt: skip
+def test_frame_by_frame(skin):
+    for box in (None, 4.0, SKEWED):
+        for inclusive in (True, False):
+            frames = walk()
+            options = {"box": box, "inclusive": inclusive}
+            expected = [fresh(points, **options) for points in frames]
+            assert min(len(one[0]) for one in expected) > 10
+            check(follow(frames, skin=skin, **options), expected)
+            check(follow(list(frames), skin=skin, **options), expected)
+            check(follow(iter(frames), skin=skin, **options), expected)
+            check(follow(frames.astype(np.float32), skin=skin, **options),
+                  [fresh(points.astype(np.float32), **options) for points in frames])  # fmt: skip
 
 
 @pytest.mark.parametrize("skin", SKINS)
-@pytest.mark.parametrize("d", [1, 2, 5, 8])
-def test_dimensions_and_mixed_periodicity(skin, d):
-    frames = walk(6, 40, d)
-    options = {"box": np.full(d, 5.0), "periodic": [k % 2 == 0 for k in range(d)]}
-    expected = [fresh(points, 1.0 + 0.3 * d, **options) for points in frames]
-    check(follow(frames, 1.0 + 0.3 * d, skin=skin, **options), expected)
+def test_dimensions_and_mixed_periodicity(skin):
+    for d in (1, 2, 5, 8):
+        frames = walk(6, 40, d)
+        options = {"box": np.full(d, 5.0), "periodic": [k % 2 == 0 for k in range(d)]}
+        expected = [fresh(points, 1.0 + 0.3 * d, **options) for points in frames]
+        check(follow(frames, 1.0 + 0.3 * d, skin=skin, **options), expected)
 
 
 @pytest.mark.parametrize("step", [0.005, 3.0])
@@ -81,9 +81,7 @@ def test_without_a_skin_the_order_is_that_of_pairs():
             frames, 1.3, skin=None, quantities=letters, box=SKEWED, index_dtype=np.int32
         )
         for points, ours in zip(frames, found, strict=True):
-            theirs = hs.pairs(
-                points, 1.3, quantities=letters, box=SKEWED, index_dtype=np.int32
-            )
+            theirs = hs.pairs(points, 1.3, quantities=letters, box=SKEWED, index_dtype=np.int32)
             if letters == "P":
                 ours, theirs = (ours,), (theirs,)
             for a, b in zip(ours, theirs, strict=True):
@@ -224,7 +222,7 @@ def test_nothing_is_read_ahead():
 
 def test_arrays_are_of_the_caller():
     frames = np.repeat(walk(1), 3, axis=0)
-    one, two, three = (hs.trajectory_pairs(frames, 1.3, skin=0.4))
+    one, two, three = hs.trajectory_pairs(frames, 1.3, skin=0.4)
     for a, b in ((one, two), (two, three)):
         assert not any(np.shares_memory(x, y) for x in a for y in b)
         assert all(np.array_equal(x, y) for x, y in zip(a, b))
@@ -323,8 +321,9 @@ def large(n_frames=9, n=1500, seed=3):
     return [rng.uniform(0.0, 9.0, (size, 3)) for size in sizes]
 
 
-@pytest.mark.parametrize("threads", [2, 3, 8])
-@pytest.mark.parametrize("box", [None, 9.0, SKEWED + 6.0 * np.eye(3)], ids=["open", "cube", "skew"])
+@pytest.mark.parametrize(
+    ("threads", "box"), [(2, None), (3, 9.0), (8, SKEWED + 6.0 * np.eye(3))], ids=str
+)
 def test_frames_are_shared_out_among_threads(threads, box):
     frames = large()
     expected = [fresh(points, box=box) for points in frames]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Small scenes of every scale against a brute force of whole numbers of its own.
+"""Small scenes of every scale against a brute force in fractions.
 
 Where other tests look at one function or one scale, here everything that can go wrong meets: ties
 on the cutoff, units from subnormal numbers to 1e150, sheared boxes that repeat along some axes,
@@ -17,71 +17,31 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from oracles import same_arrays
+from full_lists import entries
+from oracles import same_arrays, triples
+from rational_images import Images, between, exact
 
-# ---- brute force: all coordinates times one power of two are whole numbers ------------------
-
-
-def dot(a, b):
-    return sum(x * y for x, y in zip(a, b, strict=True))
+# ---- brute force, in fractions -------------------------------------------------------------
 
 
 class Brute:
-    """All pairs (i, j, S, square, vector) of queries and points, ascending, in whole numbers."""
+    """All pairs (i, j, S, square, vector) of queries and points, ascending."""
 
     def __init__(self, points, cutoff, box, periodic, queries=None):
-        is_one_set = queries is None
-        arrays = [np.asarray(a, np.float64) for a in (points, points if is_one_set else queries)]
-        ndim = arrays[0].shape[1]
-        self.axes = [k for k in range(ndim) if box is not None and periodic[k]]
-        rows = [] if box is None else [np.asarray(box[k], np.float64).tolist() for k in self.axes]
-        points, queries = (a.tolist() for a in arrays)
-        numbers = [x for row in [*points, *queries, *rows, [cutoff]] for x in row]
-        self.unit = max(x.as_integer_ratio()[1] for x in numbers)
-        points, queries, self.rows = (
-            [[int(Fraction(x) * self.unit) for x in row] for row in part]
-            for part in (points, queries, rows)
-        )
-        self.cutoff = cutoff
+        images = Images(points.shape[1], box, periodic)
+        rows = [exact(row) for row in points.tolist()]
+        asking = rows if queries is None else [exact(row) for row in queries.tolist()]
         self.limit = self.squared(cutoff)
-        self.pairs = []
-        for i, p in enumerate(queries):
-            for j, q in enumerate(points):
-                apart = [b - a for a, b in zip(p, q, strict=True)]
-                for S, vector in self.images(apart):
-                    shift = [0] * ndim
-                    for k, s in zip(self.axes, S, strict=True):
-                        shift[k] = s
-                    if not is_one_set or i != j or any(S):
-                        self.pairs.append((i, j, tuple(shift), dot(vector, vector), vector))
-        self.pairs.sort(key=lambda pair: pair[:3])
+        self.pairs = sorted(
+            (i, j, S, square, D)
+            for i, p in enumerate(asking)
+            for j, q in enumerate(rows)
+            for S, D, square in images.within(between(p, q), self.limit)
+            if queries is not None or i != j or any(S)
+        )
 
     def squared(self, length):
-        return (Fraction(length) * self.unit) ** 2
-
-    def images(self, vector):
-        """(S, D) of all images within the cutoff: one axis after the other, by Gram and Schmidt."""
-        star = []
-        for row in self.rows:
-            v = [Fraction(x) for x in row]
-            for other in star:
-                share = dot(row, other) / dot(other, other)
-                v = [x - share * y for x, y in zip(v, other, strict=True)]
-            star.append(v)
-        found = [((), vector, Fraction(0))]
-        for row, v in reversed(list(zip(self.rows, star, strict=True))):
-            square = dot(v, v)
-            further = []
-            for S, D, used in found:
-                middle = -dot(D, v) / square
-                reach = math.isqrt(math.ceil((self.limit - used) / square)) + 1
-                for s in range(math.ceil(middle - reach), math.floor(middle + reach) + 1):
-                    along = used + (s - middle) ** 2 * square
-                    if along <= self.limit:
-                        moved = [x + s * y for x, y in zip(D, row, strict=True)]
-                        further.append(((s, *S), moved, along))
-            found = further
-        return [(S, D) for S, D, _ in found if dot(D, D) <= self.limit]
+        return Fraction(length) ** 2
 
     def half(self):
         return [p for p in self.pairs if p[0] < p[1] or (p[0] == p[1] and p[2] > (0,) * len(p[2]))]
@@ -93,8 +53,8 @@ class Brute:
         assert below < 0 or self.squared(below) <= square
         assert square <= self.squared(above)
         assert 0.0 <= d <= largest
-        for x, exact in zip(D.tolist(), vector, strict=True):
-            assert abs(Fraction(x) * self.unit - exact) <= Fraction(math.ulp(above)) * self.unit
+        for x, true in zip(D.tolist(), vector, strict=True):
+            assert abs(Fraction(x) - true) <= Fraction(math.ulp(above))
 
 
 def keys(pairs):
@@ -103,15 +63,6 @@ def keys(pairs):
 
 def by_distance(pairs):
     return keys(sorted(pairs, key=lambda p: (p[0], p[3], p[1], p[2])))
-
-
-def rows_of(table):
-    i = np.repeat(np.arange(len(table)), table.counts).tolist()
-    return list(zip(i, table.indices.tolist(), map(tuple, table.shifts.tolist()), strict=True))
-
-
-def rows_of_arrays(i, j, S):
-    return list(zip(i.tolist(), j.tolist(), map(tuple, S.tolist()), strict=True))
 
 
 # ---- scenes --------------------------------------------------------------------------------
@@ -177,16 +128,16 @@ def histogram(brute, pairs, edges):
 
 def check_table(scene, table, brute, pairs, largest):
     """A table with jSdD: its rows, each number, what sort, filter and graph make of them."""
-    assert rows_of(table) == keys(pairs)
+    assert entries(table) == keys(pairs)
     for pair, d, D in zip(pairs, table.distances.tolist(), table.vectors, strict=True):
         brute.check_numbers(pair, d, D, largest[pair[0]])
-    assert rows_of(table.sort()) == by_distance(pairs)
+    assert entries(table.sort()) == by_distance(pairs)
     mask = np.array([scene.random.random() < 0.6 for _ in pairs], bool)
     kept = [pair for pair, keep in zip(pairs, mask, strict=True) if keep]
     filtered = table.filter(mask)
-    assert rows_of(filtered) == keys(kept)
-    assert rows_of(filtered.sort()) == by_distance(kept)
-    assert rows_of(table.sort().filter(np.ones(len(mask), bool)).sort()) == by_distance(pairs)
+    assert entries(filtered) == keys(kept)
+    assert entries(filtered.sort()) == by_distance(kept)
+    assert entries(table.sort().filter(np.ones(len(mask), bool)).sort()) == by_distance(pairs)
     graph = table.sort().graph()
     ordered = table.sort()
     assert np.array_equal(graph.edge_index[0], ordered.indices)
@@ -194,94 +145,101 @@ def check_table(scene, table, brute, pairs, largest):
     assert np.array_equal(graph.vectors, -ordered.vectors)
 
 
+in_parts = pytest.mark.parametrize("seeds", [range(k, 48, 3) for k in range(3)], ids=str)
+
+
 # ---- one scene, one function after the other ------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(64))
-def test_half_lists_and_reductions(seed):
-    scene = Ties(seed)
-    points, cutoff, how = scene.points, scene.cutoff, scene.how | scene.some
-    brute = scene.brute()
-    half = brute.half()
-    strict = [pair for pair in half if pair[3] < brute.limit]
-    for inclusive, expected in ((True, half), (False, strict)):
-        i, j, S, d, D = hs.pairs(
-            points, cutoff, quantities="ijSdD", sort=True, inclusive=inclusive, **how
+@in_parts
+def test_half_lists_and_reductions(seeds):
+    for seed in seeds:
+        scene = Ties(seed)
+        points, cutoff, how = scene.points, scene.cutoff, scene.how | scene.some
+        brute = scene.brute()
+        half = brute.half()
+        strict = [pair for pair in half if pair[3] < brute.limit]
+        for inclusive, expected in ((True, half), (False, strict)):
+            i, j, S, d, D = hs.pairs(
+                points, cutoff, quantities="ijSdD", sort=True, inclusive=inclusive, **how
+            )
+            assert triples(i, j, S) == keys(expected)
+            largest = cutoff if inclusive else math.nextafter(cutoff, 0.0)
+            for pair, length, vector in zip(expected, d.tolist(), D, strict=True):
+                brute.check_numbers(pair, length, vector, largest)
+        assert hs.pair_histogram(points, scene.edges, **how).tolist() == histogram(
+            brute, half, scene.edges
         )
-        assert rows_of_arrays(i, j, S) == keys(expected)
-        largest = cutoff if inclusive else math.nextafter(cutoff, 0.0)
-        for pair, length, vector in zip(expected, d.tolist(), D, strict=True):
-            brute.check_numbers(pair, length, vector, largest)
-    assert hs.pair_histogram(points, scene.edges, **how).tolist() == histogram(
-        brute, half, scene.edges
-    )
-    by_type = hs.pair_histogram(points, scene.edges, types=scene.types, **how)
-    for a in range(3):
-        for b in range(a, 3):
-            mine = [p for p in half if sorted(scene.types[[p[0], p[1]]].tolist()) == [a, b]]
-            counts = histogram(brute, mine, scene.edges)
-            assert by_type[a, b].tolist() == by_type[b, a].tolist() == counts
-    within = [sum(p[3] < brute.squared(c) for p in half) for c in scene.edges]
-    assert hs.count_pairs(points, scene.edges, inclusive=False, **how).tolist() == within
-    parts = []
-    blocks = list(hs.iter_pairs(points, cutoff, max_pairs=2, progress=parts.append, **how))
-    assert sorted((a, b) for i, j in blocks for a, b in zip(i, j, strict=True)) == sorted(
-        pair[:2] for pair in half
-    )
-    assert parts == sorted(parts) and parts[-1] == 1.0
+        by_type = hs.pair_histogram(points, scene.edges, types=scene.types, **how)
+        for a in range(3):
+            for b in range(a, 3):
+                mine = [p for p in half if sorted(scene.types[[p[0], p[1]]].tolist()) == [a, b]]
+                counts = histogram(brute, mine, scene.edges)
+                assert by_type[a, b].tolist() == by_type[b, a].tolist() == counts
+        within = [sum(p[3] < brute.squared(c) for p in half) for c in scene.edges]
+        assert hs.count_pairs(points, scene.edges, inclusive=False, **how).tolist() == within
+        parts = []
+        blocks = list(hs.iter_pairs(points, cutoff, max_pairs=2, progress=parts.append, **how))
+        assert sorted((a, b) for i, j in blocks for a, b in zip(i, j, strict=True)) == sorted(
+            pair[:2] for pair in half
+        )
+        assert parts == sorted(parts) and parts[-1] == 1.0
 
 
-@pytest.mark.parametrize("seed", range(64))
-def test_tables_of_points_and_of_queries(seed):
-    scene = Ties(seed)
-    points, queries, cutoff = scene.points, scene.queries, scene.cutoff
-    for asking in (None, queries):
-        brute = scene.brute(asking)
-        options = {"queries": asking, **scene.how, **scene.some}
-        table = hs.neighbors(points, cutoff, quantities="jSdD", **options)
-        largest = [cutoff] * len(table)
-        check_table(scene, table, brute, brute.pairs, largest)
-        bare = hs.neighbors(points, cutoff, quantities="jd", **options).sort()
-        assert same_arrays(bare.indices, table.sort().indices)
-        j, S = hs.nearest(points, 3, max_distance=cutoff, quantities="jS", **options)
-        for i, (row, shifts) in enumerate(zip(j.tolist(), S.tolist(), strict=True)):
-            mine = [key[1:] for key in by_distance(p for p in brute.pairs if p[0] == i)][:3]
-            assert [(a, tuple(s)) for a, s in zip(row, shifts) if a >= 0] == mine
+@in_parts
+def test_tables_of_points_and_of_queries(seeds):
+    for seed in seeds:
+        scene = Ties(seed)
+        points, queries, cutoff = scene.points, scene.queries, scene.cutoff
+        for asking in (None, queries):
+            brute = scene.brute(asking)
+            options = {"queries": asking, **scene.how, **scene.some}
+            table = hs.neighbors(points, cutoff, quantities="jSdD", **options)
+            largest = [cutoff] * len(table)
+            check_table(scene, table, brute, brute.pairs, largest)
+            bare = hs.neighbors(points, cutoff, quantities="jd", **options).sort()
+            assert same_arrays(bare.indices, table.sort().indices)
+            j, S = hs.nearest(points, 3, max_distance=cutoff, quantities="jS", **options)
+            for i, (row, shifts) in enumerate(zip(j.tolist(), S.tolist(), strict=True)):
+                mine = [key[1:] for key in by_distance(p for p in brute.pairs if p[0] == i)][:3]
+                assert [(a, tuple(s)) for a, s in zip(row, shifts) if a >= 0] == mine
 
 
-@pytest.mark.parametrize("seed", range(64))
-def test_cells_are_asked_with_a_radius_for_each_query(seed):
-    scene = Ties(seed)
-    cells = hs.CellList(scene.points, scene.cutoff, threads=scene.some["threads"], **scene.how)
-    brute = scene.brute(scene.queries)
-    radii = [scene.random.choice([0.0, 0.5, 0.9, 1.0]) * scene.cutoff for _ in scene.queries]
-    pairs = [pair for pair in brute.pairs if pair[3] <= brute.squared(radii[pair[0]])]
-    table = cells.query(scene.queries, radii, quantities="jSdD", kernel=scene.some["kernel"])
-    check_table(scene, table, brute, pairs, radii)
-    block = cells.candidates()
-    everything = scene.brute()
-    for i in range(scene.n):
-        ranges = range(*block.offsets[i : i + 2])
-        found = Counter(j for r in ranges for j in cells.order[block.start[r] : block.stop[r]])
-        assert not Counter(p[1] for p in everything.pairs if p[0] == i) - found
+@in_parts
+def test_cells_are_asked_with_a_radius_for_each_query(seeds):
+    for seed in seeds:
+        scene = Ties(seed)
+        cells = hs.CellList(scene.points, scene.cutoff, threads=scene.some["threads"], **scene.how)
+        brute = scene.brute(scene.queries)
+        radii = [scene.random.choice([0.0, 0.5, 0.9, 1.0]) * scene.cutoff for _ in scene.queries]
+        pairs = [pair for pair in brute.pairs if pair[3] <= brute.squared(radii[pair[0]])]
+        table = cells.query(scene.queries, radii, quantities="jSdD", kernel=scene.some["kernel"])
+        check_table(scene, table, brute, pairs, radii)
+        block = cells.candidates()
+        everything = scene.brute()
+        for i in range(scene.n):
+            ranges = range(*block.offsets[i : i + 2])
+            found = Counter(j for r in ranges for j in cells.order[block.start[r] : block.stop[r]])
+            assert not Counter(p[1] for p in everything.pairs if p[0] == i) - found
 
 
-@pytest.mark.parametrize("seed", range(48))
-def test_lists_of_many_steps(seed):
-    scene = Ties(seed)
-    cutoff = scene.cutoff / 2
-    skin = [cutoff, 0.0, cutoff / 4, "auto"][seed % 4]
-    kept = hs.VerletList(cutoff, skin=skin, threads=scene.some["threads"], **scene.how)
-    points = scene.points
-    for _ in range(3):
-        kept.update(points)
-        brute = scene.brute(points=points, cutoff=cutoff)
-        i, j, S, d, D = kept.pairs(quantities="ijSdD", sort=True)
-        assert rows_of_arrays(i, j, S) == keys(brute.half())
-        for pair, length, vector in zip(brute.half(), d.tolist(), D, strict=True):
-            brute.check_numbers(pair, length, vector, cutoff)
-        step = [scene.random.choice([0.0, 0.25, -0.125]) * cutoff for _ in range(points.size)]
-        points = (points + np.reshape(step, points.shape)).astype(points.dtype)
+@in_parts
+def test_lists_of_many_steps(seeds):
+    for seed in seeds:
+        scene = Ties(seed)
+        cutoff = scene.cutoff / 2
+        skin = [cutoff, 0.0, cutoff / 4, "auto"][seed % 4]
+        kept = hs.VerletList(cutoff, skin=skin, threads=scene.some["threads"], **scene.how)
+        points = scene.points
+        for _ in range(3):
+            kept.update(points)
+            brute = scene.brute(points=points, cutoff=cutoff)
+            i, j, S, d, D = kept.pairs(quantities="ijSdD", sort=True)
+            assert triples(i, j, S) == keys(brute.half())
+            for pair, length, vector in zip(brute.half(), d.tolist(), D, strict=True):
+                brute.check_numbers(pair, length, vector, cutoff)
+            step = [scene.random.choice([0.0, 0.25, -0.125]) * cutoff for _ in range(points.size)]
+            points = (points + np.reshape(step, points.shape)).astype(points.dtype)
 
 
 # ---- kernels and threads -------------------------------------------------------------------

@@ -2,14 +2,14 @@
 """Scenes at the ends of float64: the same answers, in time that follows points and pairs."""
 
 import math
-from fractions import Fraction
 
 import numpy as np
 import pytest
 
 import halfshell as hs
+from full_lists import entries, full_list, large_full_rows, list_between
 from halfshell._check.reference import reference_pairs
-from oracles import check, check_large, same_arrays
+from oracles import check, check_large, exact_pairs, same_arrays
 
 LARGEST = 1.7e308
 SMALLEST = 5e-324
@@ -37,58 +37,58 @@ def near_points(rng, points, cutoff):
 
 
 @pytest.mark.parametrize("cutoff", [SMALLEST, 1e-310, 1e-200, 1e-9, 0.5, 1e9, 1e200, 1e307, 0.0])
-@pytest.mark.parametrize("ndim", [1, 2, 3])
-def test_open_scenes_of_all_scales(rng, kernel, cutoff, ndim):
-    for lowest, highest in [(-320, 308), (-3, 300), (-323, -300), (0, 0.1)]:
-        points = scales(rng, 25, ndim, lowest, highest)
-        check(near_points(rng, points, cutoff), cutoff, kernel=kernel)
+def test_open_scenes_of_all_scales(rng, cutoff):
+    for ndim in (1, 2, 3):
+        for lowest, highest in [(-320, 308), (-3, 300), (-323, -300), (0, 0.1)]:
+            points = scales(rng, 25, ndim, lowest, highest)
+            check(near_points(rng, points, cutoff), cutoff)
 
 
 @pytest.mark.parametrize("cutoff", [SMALLEST, 1e-300, 1e-17, 0.4, 1e200, 0.0])
 @pytest.mark.parametrize("length", [1.0, 1e-300, 1e300, 3 * SMALLEST])
-def test_periodic_scenes_of_all_scales(rng, kernel, cutoff, length):
+def test_periodic_scenes_of_all_scales(rng, cutoff, length):
     if cutoff > 3 * length:
         return  # more images than there is room for
     for outside in (0, 3):
         points = rng.uniform(-outside, outside + 1, (20, 2)) * length
         points[:4, 0] = [length / 2, -length / 2, 0, np.nextafter(length / 2, 0)]
         near_points(rng, points, cutoff)
-        check(points, cutoff, [length, 2 * length], kernel=kernel)
-        check(points, cutoff, [[0, -length], [length, 0]], [True, False], kernel=kernel)
+        check(points, cutoff, [length, 2 * length])
+        check(points, cutoff, [[0, -length], [length, 0]], [True, False])
 
 
-def test_boxes_of_very_different_lengths(rng, kernel):
+def test_boxes_of_very_different_lengths(rng):
     box = [1e-300, 1.0, 1e300]
     points = rng.random((20, 3)) * box
     points[:, 0] = points[rng.integers(20, size=20), 0]
     near_points(rng, points, 1e-300)
-    check(points, 1e-300, box, kernel=kernel)
-    check(points, 0.0, box, kernel=kernel)
+    check(points, 1e-300, box)
+    check(points, 0.0, box)
     for open_axis in range(3):
-        check(points, 1e-300, box, [k != open_axis for k in range(3)], kernel=kernel)
+        check(points, 1e-300, box, [k != open_axis for k in range(3)])
 
 
-def test_tilted_boxes_with_tiny_cutoffs(rng, kernel):
+def test_tilted_boxes_with_tiny_cutoffs(rng):
     box = np.array([[1.0, 0, 0], [0.3, 1, 0], [0, 0, 1]])
     points = rng.random((30, 3)) @ box
     points[15:] = points[:15]
     points[20:25, 2] = [1e300, -1e300, 0, LARGEST, -LARGEST]
     for cutoff in (0.0, SMALLEST, 1e-200):
-        found = check(points, cutoff, box, [True, True, False], kernel=kernel)
+        found = check(points, cutoff, box, [True, True, False])
         assert len(found) >= 10
         points[:, 2] %= 1.0
-        assert len(check(points, cutoff, box, kernel=kernel)) >= 10
+        assert len(check(points, cutoff, box)) >= 10
 
 
-@pytest.mark.parametrize("box", [None, [1.0, 1.0, 1.0]])
-def test_distances_and_vectors_beside_outliers(rng, box):
-    points = rng.random((40, 3))
-    points[7, 0], points[8, 1], points[9, 2] = 1e300, -LARGEST, SMALLEST
-    shifts = "" if box else "S"
-    i, j, d, D, *_ = hs.pairs(points, 0.5, box=box, quantities="ijdD" + shifts, periodic=None)
-    vectors = np.where(box is None, points[j] - points[i], D)
-    assert np.all(np.abs(np.linalg.norm(vectors, axis=1) - d) <= 2 * np.spacing(d))
-    assert len(i) == len(reference_pairs(points, 0.5, box))
+def test_distances_and_vectors_beside_outliers(rng):
+    for box in (None, [1.0, 1.0, 1.0]):
+        points = rng.random((40, 3))
+        points[7, 0], points[8, 1], points[9, 2] = 1e300, -LARGEST, SMALLEST
+        shifts = "" if box else "S"
+        i, j, d, D, *_ = hs.pairs(points, 0.5, box=box, quantities="ijdD" + shifts, periodic=None)
+        vectors = np.where(box is None, points[j] - points[i], D)
+        assert np.all(np.abs(np.linalg.norm(vectors, axis=1) - d) <= 2 * np.spacing(d))
+        assert len(i) == len(reference_pairs(points, 0.5, box))
 
 
 def test_distances_of_subnormal_coordinates(rng):
@@ -102,45 +102,47 @@ def test_distances_of_subnormal_coordinates(rng):
     assert len(check(points, 9 * SMALLEST)) == len(i)
 
 
-def test_points_wrapped_from_far_away_count_their_turns(kernel):
+def test_points_wrapped_from_far_away_count_their_turns():
     # The box is far wider than the cutoff can tell, and points lie outside of it.
     box = [1.0, 1.0]
     points = np.array([[0.25, 0.5], [3.25, 0.5], [-2.75, 0.5], [0.25, 8.5], [0.5, 0.5]])
     expected = {(0, 1, (-3, 0)), (0, 2, (3, 0)), (1, 2, (6, 0)), (0, 3, (0, -8))}
     expected |= {(1, 3, (3, -8)), (2, 3, (-3, -8))}
     for cutoff in (0.0, 1e-300, SMALLEST):
-        assert check(points, cutoff, box, kernel=kernel) == expected
+        assert check(points, cutoff, box) == expected
     points[4, 0] = 2.0**51
-    assert hs.count_pairs(points, 1e-300, box=box, kernel=kernel) == 6
+    for kernel in hs.kernels():
+        assert hs.count_pairs(points, 1e-300, box=box, kernel=kernel) == 6
     with pytest.raises(OverflowError, match=r"points\[4\] lies too many box vectors away"):
-        hs.pairs(points * 4, 1e-300, box=box, quantities="S", kernel=kernel)
+        hs.pairs(points * 4, 1e-300, box=box, quantities="S")
 
 
-def test_faces_of_a_condensed_box_meet(kernel):
+def test_faces_of_a_condensed_box_meet():
     half = 0.5
     points = np.array([[half], [-half], [np.nextafter(half, 0)], [0.0]])
     expected = {(0, 1, (1,))}
-    assert check(points, 1e-200, [1.0], kernel=kernel) == expected
-    assert check(points, 2.0**-54, [1.0], kernel=kernel) == expected | {(0, 2, (0,)), (1, 2, (-1,))}
+    assert check(points, 1e-200, [1.0]) == expected
+    assert check(points, 2.0**-54, [1.0]) == expected | {(0, 2, (0,)), (1, 2, (-1,))}
 
 
-def test_a_cutoff_far_beyond_the_cloud(rng, kernel):
-    points = rng.random((50, 3)) * 1e-300
-    for cutoff in (1e-299, 1e-290, 1.0, 1e19, 1e300, LARGEST):
-        assert hs.count_pairs(points, cutoff, kernel=kernel) == 50 * 49 // 2
-        d = hs.pairs(points, cutoff, quantities="d", kernel=kernel)
-        expected = hs.pairs(points, 1e-299, quantities="d")
-        assert np.allclose(np.sort(d), np.sort(expected), rtol=1e-15)
-    assert hs.count_pairs(points * 0, 1.0, kernel=kernel) == 50 * 49 // 2
+def test_a_cutoff_far_beyond_the_cloud(rng):
+    for kernel in hs.kernels():
+        points = rng.random((50, 3)) * 1e-300
+        for cutoff in (1e-299, 1e-290, 1.0, 1e19, 1e300, LARGEST):
+            assert hs.count_pairs(points, cutoff, kernel=kernel) == 50 * 49 // 2
+            d = hs.pairs(points, cutoff, quantities="d", kernel=kernel)
+            expected = hs.pairs(points, 1e-299, quantities="d")
+            assert np.allclose(np.sort(d), np.sort(expected), rtol=1e-15)
+        assert hs.count_pairs(points * 0, 1.0, kernel=kernel) == 50 * 49 // 2
 
 
-def test_crowds_far_smaller_than_the_cutoff(rng, kernel):
+def test_crowds_far_smaller_than_the_cutoff(rng):
     # Differences underflow in float32 where the crowds are 1e-30 wide.
     centres = rng.integers(0, 9, (300, 3)).astype(float)
     centres[:100] = 0.0
     points = centres + rng.uniform(-1, 1, (300, 3)) * 10.0 ** rng.uniform(-40, -12, (300, 1))
     for cutoff in (1e-35, 1e-25, 1e-13, 1.0):
-        check_large(points, cutoff, kernel=kernel)
+        check_large(points, cutoff)
 
 
 def long_boxes(aspect):
@@ -151,12 +153,12 @@ def long_boxes(aspect):
 
 
 @pytest.mark.parametrize("aspect", [1e6, 1e12, 1e16, 1e19, 1e25])
-def test_long_skewed_boxes(rng, kernel, aspect):
+def test_long_skewed_boxes(rng, aspect):
     for box in long_boxes(aspect):
         points = rng.uniform(-1, 2, (25, 3)) @ box
         points[15:] = points[:10] + rng.uniform(-0.6, 0.6, (10, 3))
         for cutoff in (0.3, 0.9):
-            check(points, cutoff, box, kernel=kernel)
+            check(points, cutoff, box)
     report = hs.explain(rng.random((2000, 3)) @ box, 0.3, box=box, measure=True)
     assert report.measured["candidates"] < 300 * 2000
 
@@ -197,14 +199,14 @@ WIDE = {
 }
 
 
-@pytest.mark.parametrize("ndim", [1, 2, 3])
 @pytest.mark.parametrize("scene", WIDE.values(), ids=WIDE)
-def test_work_follows_points_and_pairs(rng, scene, ndim):
-    points, cutoff, box = scene(rng.random((3000, ndim)))
-    candidates, ambiguous, by_integers = work(points, cutoff, box)
-    assert candidates < 100
-    assert ambiguous < 0.1
-    assert by_integers < 0.01
+def test_work_follows_points_and_pairs(rng, scene):
+    for ndim in (1, 2, 3):
+        points, cutoff, box = scene(rng.random((3000, ndim)))
+        candidates, ambiguous, by_integers = work(points, cutoff, box)
+        assert candidates < 100
+        assert ambiguous < 0.1
+        assert by_integers < 0.01
 
 
 def test_coincident_points_with_cutoff_zero_are_no_work_for_integers():
@@ -241,8 +243,10 @@ def test_double_refuses_what_rounding_drowns(rng):
                 hs.count_pairs(points, 0.2, box=box, precision="double")
 
 
-@pytest.mark.parametrize("limit", [0, 1000, 3e5])
-@pytest.mark.parametrize("options", [{}, {"box": [1.0] * 3}, {"sort": True}, {"threads": 2}])
+@pytest.mark.parametrize(
+    ("limit", "options"),
+    [(0, {}), (1000, {"box": [1.0] * 3}), (3e5, {"sort": True}), (3e5, {"threads": 2})],
+)
 def test_a_refusal_says_what_was_expected(rng, limit, options):
     points = rng.random((20_000, 3))
     count = hs.count_pairs(points, 0.05)
@@ -314,10 +318,159 @@ def test_out_may_lie_beside_the_inputs(rng):
     assert len(hs.pairs(none, 0.3, quantities="d", out=memory)) == 0
 
 
-def test_exactness_of_a_distance_in_a_condensed_scene():
-    points = np.array([[0.1, 0.0], [0.4, 1e-320], [1e300, 5.0], [1e300, 5.25]])
-    i, j, d = hs.pairs(points, 0.4, quantities="ijd", sort=True)
-    assert i.tolist() == [0, 2] and j.tolist() == [1, 3]
-    square = (Fraction(0.4) - Fraction(0.1)) ** 2 + Fraction(1e-320) ** 2
-    assert abs(Fraction(d[0]) ** 2 - square) <= 2 * Fraction(d[0]) * Fraction(math.ulp(d[0]))
-    assert d[1] == 0.25
+# ---- full lists, queries, and cells that are kept ---------------------------------------------
+
+SKEWED = "box is too skewed, or its vectors differ"
+
+
+def turned_box(rng, aspect):
+    """A box with one vector so many times as long as the others, along no coordinate axis."""
+    return np.diag([aspect, 1.0, 1.0]) @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+
+
+def scene_in(rng, box, n=20):
+    """Points about the box, half of them beside others."""
+    points = rng.uniform(-1, 2, (n, 3)) @ box
+    points[n // 2 :] = points[: n - n // 2] + rng.uniform(-0.6, 0.6, (n - n // 2, 3))
+    return points
+
+
+# ---- long skewed boxes ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("aspect", [1e6, 1e12, 1e19])
+def test_full_lists_in_long_skewed_boxes(rng, aspect):
+    for kernel in hs.kernels():
+        for box in long_boxes(aspect):
+            points = scene_in(rng, box)
+            queries = np.concatenate([scene_in(rng, box, 4), points[:4] + 0.1])
+            for cutoff in (0.3, 0.9):
+                found = hs.neighbors(points, cutoff, box=box, quantities="jS", kernel=kernel)
+                assert entries(found) == full_list(points, cutoff, box)
+                expected = list_between(queries, points, cutoff, box)
+                found = hs.neighbors(
+                    points, cutoff, queries=queries, box=box, quantities="jS", kernel=kernel
+                )
+                assert entries(found) == expected
+                assert hs.count_pairs(points, cutoff, queries=queries, box=box) == len(expected)
+
+
+@pytest.mark.parametrize("aspect", [1e6, 1e12, 1e19])
+def test_kept_cells_in_long_skewed_boxes(rng, aspect):
+    for box in long_boxes(aspect):
+        points = scene_in(rng, box)
+        queries = np.concatenate([scene_in(rng, box, 4), points[:4] + 0.1])
+        cells = hs.CellList(points, 0.9, box=box)
+        for radius in (0.9, 0.3, 1e-3):
+            found = cells.query(queries, radius, quantities="jS")
+            assert entries(found) == list_between(queries, points, radius, box)
+            found = cells.neighbors(radius, quantities="jS")
+            assert entries(found) == full_list(points, radius, box)
+
+
+# ---- boxes that are refused ----------------------------------------------------------------
+
+
+def searches(points, cutoff, box):
+    """Every function that takes a box, as (name, call)."""
+    edges = [0.0, cutoff]
+    yield "pairs", lambda: hs.pairs(points, cutoff, box=box)
+    yield "neighbors", lambda: hs.neighbors(points, cutoff, box=box)
+    yield "queries", lambda: hs.neighbors(points, cutoff, queries=points[:5], box=box)
+    yield "pairs_between", lambda: hs.pairs_between(points, points[:5], cutoff, box=box)
+    yield "coordination", lambda: hs.coordination(points, cutoff, box=box)
+    yield "pair_histogram", lambda: hs.pair_histogram(points, edges, box=box)
+    yield "iter_pairs", lambda: list(hs.iter_pairs(points, cutoff, box=box))
+    yield "CellList", lambda: hs.CellList(points, cutoff, box=box)
+    yield "VerletList", lambda: hs.VerletList(cutoff, skin=0.1 * cutoff, box=box).update(points)
+
+
+def test_every_search_refuses_boxes_that_float64_does_not_place_points_in(rng):
+    sheared = np.array([[1.0, 0, 0], [1e12, 1, 0], [-3e11, 7e11, 1]])
+    for box in (turned_box(rng, 1e17), sheared):
+        for name, search in searches(rng.random((50, 3)), 0.1, box):
+            with pytest.raises(ValueError, match=SKEWED):
+                search()
+                raise AssertionError(name)
+
+
+def test_a_refused_box_of_many_is_named(rng):
+    boxes = np.stack([np.eye(3), np.eye(3), turned_box(rng, 1e17)])
+    points = rng.random((60, 3))
+    with pytest.raises(ValueError, match=r"box\[2\] is too skewed"):
+        hs.pairs(points, 0.1, box=boxes, batch=np.arange(60) // 20)
+
+
+def test_cells_for_a_large_cutoff_refuse_what_is_smaller_than_rounding(rng):
+    # Along the short vectors points are known to some units: the cutoff has to be larger.
+    box = turned_box(rng, 2.0**50)
+    points = (rng.random((12, 3)) - 0.5) * 4.0
+    cells = hs.CellList(points, 10.0, box=box)
+    assert cells.count_pairs() == hs.count_pairs(points, 10.0, box=box)
+    for search in (cells.pairs, cells.neighbors, cells.coordination):
+        with pytest.raises(ValueError, match=SKEWED):
+            search(1e-3)
+    with pytest.raises(ValueError, match=SKEWED):
+        cells.query(points[:3], 1e-3)
+    assert cells.count_pairs() == hs.count_pairs(points, 10.0, box=box)
+
+
+# ---- few points far from the box, among many in it -----------------------------------------
+
+
+@pytest.mark.parametrize("far", [1e5, 1e8])
+def test_some_points_and_queries_many_boxes_away(rng, far):
+    for kernel in hs.kernels():
+        box = np.array([[3.0, 0, 0], [1.0, 2.5, 0], [-1.0, 0.7, 3.0]])
+        points, queries = rng.random((300, 3)) @ box, rng.random((300, 3)) @ box
+        for some in (points[7:290:71], queries[130:140]):
+            some += np.round(rng.uniform(-far, far, some.shape)) @ box
+        everyone = np.concatenate([queries, points])
+        half = exact_pairs(everyone, 0.4, box)
+        between = half[(half[:, 0] < 300) & (half[:, 1] >= 300)]
+        found = hs.neighbors(points, 0.4, queries=queries, box=box, quantities="jS", kernel=kernel)
+        assert entries(found) == [(i, j - 300, tuple(S)) for i, j, *S in between.tolist()]
+        kept = hs.CellList(points, 0.4, box=box).query(queries, quantities="jS")
+        assert entries(kept) == entries(found)
+        full = hs.neighbors(points, 0.4, box=box, quantities="jS", kernel=kernel)
+        assert entries(full) == [
+            (i, j, tuple(S)) for i, j, *S in large_full_rows(points, 0.4, box).tolist()
+        ]
+
+
+# ---- groups that meet nobody ---------------------------------------------------------------
+
+
+def test_queries_that_meet_nobody(rng):
+    points = rng.random((4000, 3)) * 200.0  # hardly a neighbour each
+    queries = rng.random((3000, 3)) * 200.0
+    for box in (None, [200.0] * 3):
+        full = large_full_rows(points, 1.5, box)
+        table = hs.neighbors(points, 1.5, box=box, quantities="jS")
+        assert entries(table) == [(i, j, tuple(S)) for i, j, *S in full.tolist()]
+        assert np.array_equal(hs.coordination(points, 1.5, box=box), table.counts)
+        half = exact_pairs(np.concatenate([queries, points]), 1.5, box)
+        between = half[(half[:, 0] < 3000) & (half[:, 1] >= 3000)]
+        i, j, S = hs.pairs_between(queries, points, 1.5, box=box, quantities="ijS")
+        assert np.array_equal(np.column_stack([i, j - 0, S]), between - [0, 3000, 0, 0, 0])
+    nobody = hs.neighbors(points, 1.5, queries=queries + 1e4)
+    assert nobody.n_entries == 0 and len(nobody.offsets) == 3001
+
+
+# ---- plates --------------------------------------------------------------------------------
+
+
+def test_full_lists_in_plates(rng):
+    box = [2000.0, 2000.0, 0.05]
+    points, queries = rng.random((1500, 3)) * box, rng.random((200, 3)) * box
+    queries[:100] = points[:100] + 0.01
+    for cutoff in (1.0, 0.3):
+        full = large_full_rows(points, cutoff, box).tolist()
+        half = exact_pairs(np.concatenate([queries, points]), cutoff, box)
+        between = half[(half[:, 0] < 200) & (half[:, 1] >= 200)].tolist()
+        for kernel in hs.kernels():
+            how = {"box": box, "quantities": "jS", "kernel": kernel}
+            table = hs.neighbors(points, cutoff, **how)
+            assert entries(table) == [(i, j, tuple(S)) for i, j, *S in full]
+            found = hs.neighbors(points, cutoff, queries=queries, **how)
+            assert entries(found) == [(i, j - 200, tuple(S)) for i, j, *S in between]

@@ -29,39 +29,39 @@ def beside(x, steps=(-2, -1, 0, 1, 2)):
     return values
 
 
-@pytest.mark.parametrize("length", LENGTHS)
 @pytest.mark.parametrize("boxes", [0, 1, -1, 2, 1000, -1000, 10**9, -(10**9)])
-def test_points_at_a_face_and_an_ulp_beside_it(length, boxes, kernel):
-    on_face = boxes * length
-    inside = [length / 2, length * 0.01, length * 0.99]
-    points = np.array(beside(on_face) + inside)[:, None]
-    spacing = abs(math.ulp(on_face)) if boxes else 5e-324
-    for cutoff in (0.0, spacing, 2 * spacing, length / 100, length / 3, length, 1.5 * length):
-        for inclusive in (True, False):
-            check(points, cutoff, [length], inclusive=inclusive, kernel=kernel)
+def test_points_at_a_face_and_an_ulp_beside_it(boxes):
+    for length in LENGTHS:
+        on_face = boxes * length
+        inside = [length / 2, length * 0.01, length * 0.99]
+        points = np.array(beside(on_face) + inside)[:, None]
+        spacing = abs(math.ulp(on_face)) if boxes else 5e-324
+        for cutoff in (0.0, spacing, 2 * spacing, length / 100, length / 3, length, 1.5 * length):
+            for inclusive in (True, False):
+                check(points, cutoff, [length], inclusive=inclusive)
 
 
 @pytest.mark.parametrize("length", LENGTHS)
-def test_tiny_negative_coordinates(length, kernel):
+def test_tiny_negative_coordinates(length):
     # x - floor(x / L) * L is exactly L for these in rounded arithmetic.
     tiny = [-5e-324, -4.4e-52, -1e-17, -1e-20, -(2.0**-54), -(2.0**-53), 5e-324, 0.0, -0.0]
     points = np.array([*tiny, length * 0.02, length * 0.98, length, -length])[:, None]
     for cutoff in (0.0, 1e-17, length * 0.02, length * 0.04, length * 0.5):
-        check(points, cutoff, [length], kernel=kernel)
-        check(np.repeat(points, 2, axis=1)[::2], cutoff, [length, length], kernel=kernel)
+        check(points, cutoff, [length])
+        check(np.repeat(points, 2, axis=1)[::2], cutoff, [length, length])
 
 
 @pytest.mark.parametrize("boxes", [0, 1, 10**9])
-def test_every_corner_edge_and_face_of_a_cube(boxes, kernel):
+def test_every_corner_edge_and_face_of_a_cube(boxes):
     length = 0.3
     values = [boxes * length, math.nextafter((boxes + 1) * length, 0), (boxes + 0.5) * length]
     points = np.array(list(itertools.product(values, repeat=3)))
     for cutoff in (0.0, 1e-16, 0.1, 0.15, 0.3):
-        check(points, cutoff, [length] * 3, kernel=kernel)
+        check(points, cutoff, [length] * 3)
 
 
 @pytest.mark.parametrize("boxes", [0, 1, -3, 10**6, 10**9])
-def test_faces_of_skewed_boxes(boxes, rng, kernel):
+def test_faces_of_skewed_boxes(boxes, rng):
     for kind in ("triclinic", "rotated", "left-handed", "sheared"):
         box = random_box(rng, kind)
         fractions = [0.0, 1.0, 0.5]
@@ -69,25 +69,25 @@ def test_faces_of_skewed_boxes(boxes, rng, kernel):
         points = points + boxes * box.sum(axis=0)
         points = np.concatenate([points, np.nextafter(points[:6], np.inf)])
         for cutoff in (0.0, 1e-15, 0.5, float(np.linalg.norm(box[0]))):
-            check(points, cutoff, box, kernel=kernel)
+            check(points, cutoff, box)
 
 
-def test_points_at_multiples_of_the_cutoff(kernel):
+def test_points_at_multiples_of_the_cutoff():
     # Faces of search cells: whatever the grid, some of these points lie on its walls.
     for cutoff in (1.0, 0.1, 1 / 3):
         values = [x for k in range(6) for x in beside(k * cutoff, (-1, 0, 1))]
         points = np.array(values)[:, None]
-        check(points, cutoff, kernel=kernel)
-        check(points, cutoff, [6 * cutoff], kernel=kernel)
-        check(points, cutoff, [math.nextafter(6 * cutoff, 9)], kernel=kernel)
-        check(points - 3 * cutoff, cutoff, kernel=kernel)
+        check(points, cutoff)
+        check(points, cutoff, [6 * cutoff])
+        check(points, cutoff, [math.nextafter(6 * cutoff, 9)])
+        check(points - 3 * cutoff, cutoff)
         plane = np.array(list(itertools.product(values[::2], repeat=2)))
-        check_large(plane, cutoff, kernel=kernel)
-        check_large(plane, cutoff, [6 * cutoff] * 2, kernel=kernel)
+        check_large(plane, cutoff)
+        check_large(plane, cutoff, [6 * cutoff] * 2)
 
 
 @pytest.mark.parametrize("away", [0.0, 1e3, 1e6, 1e9, 1e12])
-def test_walls_of_many_cells(away, kernel):
+def test_walls_of_many_cells(away):
     # As above, with enough points that the search does use a grid, far from home, too.
     for cutoff, count in ((1.0, 200), (0.1, 150), (1 / 3, 100)):
         walls = np.arange(count) * cutoff + away * cutoff
@@ -95,39 +95,40 @@ def test_walls_of_many_cells(away, kernel):
             np.concatenate([walls, np.nextafter(walls, -1e99), np.nextafter(walls, 1e99)])
         )
         for reach in (cutoff, 2 * cutoff, math.nextafter(3 * cutoff, 0)):
-            check_large(line[:, None], reach, kernel=kernel)
-            check_large(line[:, None], reach, [count * cutoff], kernel=kernel)
+            check_large(line[:, None], reach)
+            check_large(line[:, None], reach, [count * cutoff])
             plane = np.stack([line, line[::-1] * 0.7], axis=1)
-            check_large(plane, reach, [count * cutoff, count * cutoff * 0.7], kernel=kernel)
+            check_large(plane, reach, [count * cutoff, count * cutoff * 0.7])
             skewed = [[count * cutoff, 0.0], [0.3 * cutoff, count * cutoff * 0.7]]
-            check_large(plane, reach, skewed, kernel=kernel)
+            check_large(plane, reach, skewed)
 
 
-def test_a_point_in_the_exact_centre_of_the_box(rng, kernel):
+def test_a_point_in_the_exact_centre_of_the_box(rng):
     points = rng.random((120, 3)) * 60
     points[0] = 30.0
     for cutoff in (3.0, 10.0, 30.0):
-        check_large(points, cutoff, [60.0, 60.0, 60.0], kernel=kernel)
+        check_large(points, cutoff, [60.0, 60.0, 60.0])
 
 
-def test_coordinates_on_the_upper_face_are_welcome(kernel):
+def test_coordinates_on_the_upper_face_are_welcome():
     points = [[1.0, 1.0], [0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]
-    found = check(points, 0.0, [1.0, 1.0], kernel=kernel)
+    found = check(points, 0.0, [1.0, 1.0])
     assert {(i, j) for i, j, _ in found} == {(0, 1), (0, 2), (1, 2)}
 
 
 @pytest.mark.parametrize("boxes", [1, 10**3, 10**6, 10**9, 10**12])
-def test_far_points_meet_near_ones_across_faces(boxes, rng, kernel):
+def test_far_points_meet_near_ones_across_faces(boxes, rng):
     # One half of the points is moved by whole boxes, rounded: what counts is where they are.
     length = 0.7
     points = rng.random((12, 3)) * length
     points[:4, 0] = [0.0, math.nextafter(length, 0), length, length / 2]
     points[6:] += boxes * length * rng.integers(-1, 2, (6, 3))
-    found = np.stack(hs.pairs(points, 0.3, box=[length] * 3, kernel=kernel), axis=1)
     expected = [[i, j] for i, j, _ in reference_pairs(points, 0.3, [length] * 3)]
-    assert sorted(found.tolist()) == expected
+    for kernel in hs.kernels():
+        found = hs.pairs(points, 0.3, box=[length] * 3, quantities="P", kernel=kernel)
+        assert sorted(found.tolist()) == expected
     if boxes <= 10**9:  # the shifts fit into int32
-        check(points, 0.3, [length] * 3, kernel=kernel)
+        check(points, 0.3, [length] * 3)
 
 
 def test_moving_everything_by_box_vectors_loses_nothing(rng):
@@ -141,24 +142,25 @@ def test_moving_everything_by_box_vectors_loses_nothing(rng):
         assert hs.count_pairs(points + np.array(steps) @ box, 0.6, box=box) == expected
 
 
-def test_points_billions_of_boxes_away_keep_all_their_pairs(kernel):
-    # Beyond 2**31 boxes: a 64-point lattice, spacing exactly representable.
-    steps = np.array(list(itertools.product(range(4), repeat=3)), float) * 0.75
-    expected = hs.count_pairs(steps, 0.75, box=[3.0, 3.0, 3.0], kernel=kernel)
-    assert expected == 64 * 3
-    for away in (2.0**31, 2.0**33, -(2.0**40)):
-        moved = steps + 3.0 * away
-        d = hs.pairs(moved, 0.75, box=[3.0] * 3, quantities="d", kernel=kernel)
-        assert len(d) == expected
-        assert (d == 0.75).all()
+def test_points_billions_of_boxes_away_keep_all_their_pairs():
+    for kernel in hs.kernels():
+        # Beyond 2**31 boxes: a 64-point lattice, spacing exactly representable.
+        steps = np.array(list(itertools.product(range(4), repeat=3)), float) * 0.75
+        expected = hs.count_pairs(steps, 0.75, box=[3.0, 3.0, 3.0], kernel=kernel)
+        assert expected == 64 * 3
+        for away in (2.0**31, 2.0**33, -(2.0**40)):
+            moved = steps + 3.0 * away
+            d = hs.pairs(moved, 0.75, box=[3.0] * 3, quantities="d", kernel=kernel)
+            assert len(d) == expected
+            assert (d == 0.75).all()
 
 
-def test_an_ulp_decides_across_a_face(kernel):
+def test_an_ulp_decides_across_a_face():
     # The gap across the face is exactly the cutoff, then one ulp wider.
     for length in LENGTHS:
         gap = length / 8
         points = np.array([[0.0], [length - gap]])
         exact = length - (length - gap)  # Sterbenz: no rounding
-        assert len(check(points, exact, [length], kernel=kernel)) == 1
-        assert check(points, math.nextafter(exact, 0), [length], kernel=kernel) == set()
-        assert check(points, exact, [length], inclusive=False, kernel=kernel) == set()
+        assert len(check(points, exact, [length])) == 1
+        assert check(points, math.nextafter(exact, 0), [length]) == set()
+        assert check(points, exact, [length], inclusive=False) == set()

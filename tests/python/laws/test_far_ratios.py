@@ -50,8 +50,10 @@ class Scene:
         exponent = int(rng.integers(SMALLEST, LARGEST - 22))
         if single:  # so that float32 holds both ends
             exponent = int(rng.integers(-149, 100))
-        cutoff = float(math.ldexp(rng.uniform(1, 2), exponent)) if exponent > -1022 else (
-            math.ldexp(int(rng.integers(1, 9)), exponent)
+        cutoff = (
+            float(math.ldexp(rng.uniform(1, 2), exponent))
+            if exponent > -1022
+            else (math.ldexp(int(rng.integers(1, 9)), exponent))
         )
         flags = rng.random(ndim) < 0.6
         if skewed:
@@ -182,9 +184,15 @@ def check_half(scene):
     blocks = list(hs.iter_pairs(points, cutoff, max_pairs=3, **options))
     assert sorted((i, j) for a, b in blocks for i, j in zip(a, b)) == indices(expected)
     seen = []
-    if unless_too_far(scene, lambda: hs.for_each_pair(
-        points, cutoff, lambda *pair: seen.append(pair[:3]), **options
-    )) is not None:
+    if (
+        unless_too_far(
+            scene,
+            lambda: hs.for_each_pair(
+                points, cutoff, lambda *pair: seen.append(pair[:3]), **options
+            ),
+        )
+        is not None
+    ):
         assert sorted(seen) == expected
     assert hs.count_pairs(points, cutoff, **options) == len(expected)
     strict = sum(s < Fraction(cutoff) ** 2 for s in squares)
@@ -227,9 +235,9 @@ def check_between(scene):
     squares = distances_of(scene, [(i, j + 3, S) for i, j, S in expected], everything)
     i, j = hs.pairs_between(queries, points, cutoff, **options)
     assert sorted(zip(i.tolist(), j.tolist())) == indices(expected)
-    found = unless_too_far(scene, lambda: hs.pairs_between(
-        queries, points, cutoff, quantities="ijSdD", **options
-    ))
+    found = unless_too_far(
+        scene, lambda: hs.pairs_between(queries, points, cutoff, quantities="ijSdD", **options)
+    )
     if found is not None:
         assert as_set(*found[:3]) == set(expected)
         i, j, *rest = found
@@ -260,9 +268,7 @@ def number_visited(cells, radius):
 def check_cells(scene):
     """The same of cells that are kept, with the cutoff they are for and with a smaller one."""
     points, queries = scene.points, scene.queries
-    cells = unless_too_far(
-        scene, lambda: hs.CellList(points, scene.cutoff, **scene.options)
-    )
+    cells = unless_too_far(scene, lambda: hs.CellList(points, scene.cutoff, **scene.options))
     if cells is None:
         return
     assert sorted(cells.order.tolist()) == list(range(6))
@@ -312,9 +318,7 @@ def check_verlet(scene):
 
 
 def nearest_rows(j, S):
-    return [
-        [(a, tuple(s)) for a, s in zip(*row) if a >= 0] for row in zip(j.tolist(), S.tolist())
-    ]
+    return [[(a, tuple(s)) for a, s in zip(*row) if a >= 0] for row in zip(j.tolist(), S.tolist())]
 
 
 def expected_nearest(scene, queries, k):
@@ -353,26 +357,29 @@ CHECKS = [check_half, check_full, check_between, check_cells, check_verlet, chec
 # ---- sweeps --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("part", range(4))
-@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
-def test_every_search_of_any_ratio(check, part):
-    for seed in range(40 * part, 40 * part + 40):
-        check(Scene(np.random.default_rng(seed), 1 + seed % 3))
+def scene_of(family, seed):
+    rng = np.random.default_rng(seed)
+    if family == "subnormal":
+        return Scene.with_subnormals(rng, 2 + seed % 2)
+    ndim = 3 if family == "skewed" else 1 + seed % 3
+    return Scene(rng, ndim, single=family == "float32", skewed=family == "skewed")
 
 
-@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
-def test_points_of_float32(check):
-    for seed in range(60):
-        check(Scene(np.random.default_rng(seed), 1 + seed % 3, single=True))
-
-
-@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
-def test_beside_a_skewed_box(check):
-    for seed in range(60):
-        check(Scene(np.random.default_rng(seed), 3, skewed=True))
-
-
-@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
-def test_beside_subnormal_numbers(check):
-    for seed in range(40):
-        check(Scene.with_subnormals(np.random.default_rng(seed), 2 + seed % 2))
+@pytest.mark.parametrize(
+    ("family", "seeds"),
+    [
+        *(("any ratio", range(k, k + 40)) for k in range(0, 160, 40)),
+        *(
+            (family, range(20 * k, 20 * k + 20))
+            for k in range(3)
+            for family in ("float32", "skewed")
+        ),
+        ("subnormal", range(40)),
+    ],
+    ids=str,
+)
+def test_every_search(family, seeds):
+    for seed in seeds:
+        scene = scene_of(family, seed)
+        for check in CHECKS:
+            check(scene)

@@ -34,6 +34,11 @@ def as_set(i, j, S=None):
     return found
 
 
+def triples(i, j, S):
+    """A list of (i, j, S), in its order."""
+    return list(zip(i.tolist(), j.tolist(), map(tuple, S.tolist()), strict=True))
+
+
 def as_rows(i, j, S=None):
     """The pairs as int64 rows (i, j, *S) in ascending order: `as_set` for large lists."""
     columns = [np.reshape(i, (-1, 1)), np.reshape(j, (-1, 1))]
@@ -42,40 +47,39 @@ def as_rows(i, j, S=None):
 
 
 def check(points, cutoff, box=None, periodic=None, inclusive=True, **how):
-    """Assert that `hs.pairs` finds exactly the pairs of the reference; return their set."""
-    found = as_set(
-        *hs.pairs(
-            points,
-            cutoff,
-            box=box,
-            periodic=periodic,
-            inclusive=inclusive,
-            quantities="ijS",
-            **how,
-        )
-    )
-    expected = set(remembered(reference_pairs, points, cutoff, box, periodic, inclusive))
-    assert found == expected, describe(found, expected, points, cutoff, box)
-    return found
+    """Assert that `hs.pairs` finds exactly the pairs of the reference; return their set.
+
+    By every kernel, unless one is named.
+    """
+    scene = {"box": box, "periodic": periodic, "inclusive": inclusive}
+    expected = set(reference_pairs(points, cutoff, box, periodic, inclusive))
+    for by in by_kernels(how):
+        found = as_set(*hs.pairs(points, cutoff, quantities="ijS", **scene, **by))
+        assert found == expected, describe(found, expected, points, cutoff, box, by)
+    return expected
 
 
 def check_large(points, cutoff, box=None, periodic=None, inclusive=True, **how):
     """`check` against `exact_pairs`; return the sorted rows (i, j, *S)."""
-    i, j, S = hs.pairs(
-        points, cutoff, box=box, periodic=periodic, inclusive=inclusive, quantities="ijS", **how
-    )
-    found = as_rows(i, j, S)
-    expected = remembered(exact_pairs, points, cutoff, box, periodic, inclusive)
-    if not np.array_equal(found, expected):
-        one, other = ({tuple(row) for row in rows.tolist()} for rows in (found, expected))
-        assert len(one) == len(found), f"{len(found) - len(one)} pairs are listed twice"
-        one, other = ({(r[0], r[1], r[2:]) for r in rows} for rows in (one, other))
-        raise AssertionError(describe(one, other, points, cutoff, box))
-    return found
+    scene = {"box": box, "periodic": periodic, "inclusive": inclusive}
+    expected = exact_pairs(points, cutoff, box, periodic, inclusive)
+    for by in by_kernels(how):
+        found = as_rows(*hs.pairs(points, cutoff, quantities="ijS", **scene, **by))
+        if not np.array_equal(found, expected):
+            one, other = ({tuple(row) for row in rows.tolist()} for rows in (found, expected))
+            assert len(one) == len(found), f"{len(found) - len(one)} pairs are listed twice"
+            one, other = ({(r[0], r[1], r[2:]) for r in rows} for rows in (one, other))
+            raise AssertionError(describe(one, other, points, cutoff, box, by))
+    return expected
+
+
+def by_kernels(how):
+    """These keywords with each kernel, or as they are if one is named."""
+    return [how] if "kernel" in how else [{**how, "kernel": name} for name in hs.kernels()]
 
 
 def remembered(oracle, *scene):
-    """The oracle's answer, worked out once: tests put the same scene to each kernel."""
+    """The oracle's answer, worked out once: several checks put the same scene."""
     parts = [np.asarray(part) for part in scene]
     key = (oracle.__name__, *((part.dtype.str, part.shape, part.tobytes()) for part in parts))
     key = hashlib.sha256(repr(key).encode()).digest()
@@ -87,9 +91,9 @@ def remembered(oracle, *scene):
 _ANSWERS = {}
 
 
-def describe(found, expected, points, cutoff, box):
+def describe(found, expected, points, cutoff, box, by):
     """Say which pairs differ and how far from the cutoff they are, in exact arithmetic."""
-    lines = [f"{len(found)} pairs, expected {len(expected)}, cutoff {cutoff!r}"]
+    lines = [f"{len(found)} pairs, expected {len(expected)}, cutoff {cutoff!r}, by {by}"]
     for word, pairs in (("missed", expected - found), ("spurious", found - expected)):
         for i, j, S in sorted(pairs)[:5]:
             excess = exact_square(points, i, j, S or None, box) / max(float(cutoff), 1e-300) ** 2

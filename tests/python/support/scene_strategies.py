@@ -18,7 +18,6 @@ BESIDE = st.builds(
     lambda x, up: math.nextafter(x, math.inf if up else -math.inf), GRID, st.booleans()
 )
 COORDINATES = st.sampled_from([GRID, GRID, st.one_of(GRID, GRID, BESIDE), ANY])
-COORDINATE = st.one_of(GRID, BESIDE, ANY)
 # Distances that grid points have exactly: (3, 4, 5), (1, 2, 2, 3), (2, 3, 6, 7), (1, 1, 1, 1, 2)
 TIES = st.sampled_from([0.0, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0, 1.125, 1.25, 1.5])
 

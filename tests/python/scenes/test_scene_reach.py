@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The scenes of balls and of needles: exact answers, and hard for what they say."""
+
+import importlib.util
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from checkout import TESTS
+from halfshell_report import scenes
+from needle_scenes import needle_pairs
+from reach_scenes import Reaching, check
+
+SPEC = importlib.util.spec_from_file_location("scene_files", TESTS / "scene_files.py")
+scene_files = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(scene_files)
+
+KEPT = scene_files.read()
+BALLS, NEEDLES = scenes.names(radii=True), scenes.names(supports=True)
+
+
+@pytest.mark.parametrize("name", BALLS)
+def test_balls_are_paired_as_by_rational_arithmetic(name):
+    scene = Reaching(**scenes.load(name, "small").arguments)
+    for threads in (1, 2):
+        assert len(check(scene, threads=threads)) == KEPT[name]["small"]["pairs"]
+
+
+@pytest.mark.parametrize("name", NEEDLES)
+def test_needles_are_paired_as_by_rational_arithmetic(name):
+    scene = scenes.load(name, "small")
+    expected = needle_pairs(scene)
+    both = expected + [(j, i, *(-s for s in S)) for i, j, *S in expected]
+    for kernel, threads in zip(hs.kernels(), (1, 2, 1, 2)):
+        how = {**scene.arguments, "kernel": kernel, "threads": threads}
+        assert rows_of(*hs.pairs(**how, quantities="ijS", sort=True)) == expected
+        assert hs.count_pairs(**how) == len(expected) == KEPT[name]["small"]["pairs"]
+        table = hs.neighbors(**how, quantities="jS")
+        assert rows_of(*table.to_pairs(quantities="ijS")) == sorted(both)
+
+
+def rows_of(i, j, S):
+    return list(zip(i.tolist(), j.tolist(), *S.T.tolist(), strict=True))
+
+
+@pytest.mark.parametrize("name", BALLS + NEEDLES)
+def test_a_quick_scene_is_right(name):
+    scene = scenes.load(name, "quick")
+    i, j, S = hs.pairs(**scene.arguments, quantities="ijS")
+    assert hs.verify(**scene.arguments, i=i, j=j, S=S)
+    assert len(i) == KEPT[name]["quick"]["pairs"] == hs.count_pairs(**scene.arguments)
+
+
+def test_fields_have_the_promised_types():
+    for name in BALLS + NEEDLES:
+        scene = scenes.load(name, "small")
+        n, ndim = scene.points.shape
+        assert scene.cutoff is None and len(scene.periodic) == ndim
+        assert 10 <= len(scene.title) <= 80 and len(scene.stresses) > 40
+        reach = scene.radii if name in BALLS else scene.supports
+        assert reach.dtype == np.float64 and reach.flags.c_contiguous
+        if name in BALLS:
+            assert reach.shape == (n,) and (reach >= 0.0).all()
+            assert scene.rule in ("sum", "mean", "max", "min")
+        else:
+            assert scene.radii is None and scene.rule in ("max", "min")
+            assert np.array_equal(reach, reach.transpose(0, 2, 1)) and reach.shape[0] == n
+            assert set(scene.reach) == {"supports", "extent", "rule"}
+        sizes = [KEPT[name][size]["n"] for size in scenes.SIZES]
+        assert sizes[0] <= 300 < sizes[1] <= 10_000 < sizes[2] <= 1_000_000
+
+
+def test_the_kinds_are_apart():
+    assert len(BALLS) >= 6 and NEEDLES and not set(BALLS) & {*NEEDLES, *scenes.names()}
+    assert not set(NEEDLES) & set(scenes.names())
+    assert all(not scenes.load(name, "small").reach for name in scenes.names())
+    assert scenes.names(radii=True, supports=True) == BALLS + NEEDLES
+
+
+def test_rounded_sums_are_wrong_on_half_of_the_pairs():
+    scene = scenes.load("balls-rounded", "quick")
+    n = scene.n_points // 2
+    assert n / 3 < hs.count_pairs(**scene.arguments) < 3 * n / 4
+    assert hs.count_pairs(**scene.arguments, precision="double") == n
+
+
+def test_sizes_span_six_decades():
+    radii = scenes.load("balls-decades", "full").radii
+    assert 0.9e6 < radii.max() / radii.min() < 1.1e6
+
+
+@pytest.mark.parametrize("name", NEEDLES)
+def test_needles_are_long_and_turned_and_float64_decides_many_wrongly(name):
+    scene = scenes.load(name, "quick")
+    values, axes = np.linalg.eigh(scene.supports)
+    assert np.allclose(values[:, 1:] / values[:, :1], 1e6, rtol=1e-6)
+    along = np.abs(axes[:, :, 0])
+    assert along.max() < 0.9999  # along no axis of the box
+    assert len(np.unique(np.round(along, 9), axis=0)) > 30
+    exact, rounded = (
+        set(zip(*(x.tolist() for x in hs.pairs(**scene.arguments, precision=precision))))
+        for precision in ("exact", "double")
+    )
+    assert len(exact ^ rounded) > 50
+    assert exact - rounded and rounded - exact
+
+
+def test_ties_are_many():
+    one, other = (scenes.load(name, "quick") for name in ("balls-ties", "balls-ties-strict"))
+    assert hs.count_pairs(**one.arguments) - hs.count_pairs(**other.arguments) > 1000
+    needles = scenes.load("needles", "quick").arguments
+    strict = hs.count_pairs(**{**needles, "inclusive": False})
+    assert hs.count_pairs(**needles) - strict > 100
