@@ -38,10 +38,13 @@ def axes_of(
     return Axes(scene, repeats, reach, np.array(widths))
 
 
-def _places(points: npt.NDArray[Any], scene: tuple[FloatArray | None, int, float, float]) -> Any:
-    box, *others = scene
-    given = None if box is None else np.require(box, requirements="CA")
-    return _core.box_places(np.require(points, requirements="CA"), given, *others)
+def _places(
+    points: npt.NDArray[Any], scene: tuple[FloatArray | None, int, float, float]
+) -> tuple[FloatArray, tuple[bool, ...], tuple[float, ...], tuple[float, ...]]:
+    box, periodic, cutoff, largest = scene
+    given = None if box is None else np.require(box, requirements=["C", "A"])
+    aligned = np.require(points, requirements=["C", "A"])
+    return _core.box_places(aligned, given, periodic, cutoff, largest)
 
 
 def within(places: FloatArray, low: float, high: float, repeats: bool) -> npt.NDArray[np.bool_]:
