@@ -124,7 +124,7 @@ void hs_supports_lay_out(const hs_support_side *side, int64_t first, int64_t end
 /* The supports of the group and the block, for a scan. */
 void hs_supports_set(const hs_scanner *scanner, hs_scan *scan);
 
-/* Whether each pair of scanner->pair_batch is within the supports, by the rule, however far apart it is;
+/* Whether each pair of the pair batch is within the supports, by the rule, however far apart it is;
  * not for an extent of 0. within: HS_BATCH of them. */
 void hs_supports_decide(hs_scanner *scanner, uint8_t *within);
 

@@ -352,7 +352,7 @@ void hs_form_set(hs_scanner *scanner);
 
 /* The exact decision of the hits that float32 could not tell. */
 
-/* Whether each pair of scanner->pair_batch is within the metric's cutoff, which need not be the scene's.
+/* Whether each pair of the pair batch is within the metric's cutoff, which need not be the scene's.
  * within: HS_BATCH of them. */
 void hs_decide_pair_batch(hs_scanner *scanner, const hs_metric *metric, uint8_t *within);
 
