@@ -590,8 +590,8 @@ hs_status hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t 
  * queries that they cannot. Open space and boxes along the coordinate axes take queries up to some
  * 2^850 cutoffs away, skewed boxes those within four times the distance of the points or 1024 box
  * vectors. failure.row, column and value tell which one; row is -1 for cells that are one cell with
- * everything. Of the options out, precision, sorted, want and index_bytes are ignored: ranges are of
- * int64; counters.pairs is 0.
+ * everything. Of the options out, precision, sorted, want and index_bytes are ignored: ranges are
+ * of int64; counters.pairs is 0.
  */
 hs_status hs_cells_candidates(const hs_cells *cells, const hs_points *queries,
                               const hs_options *options, hs_pairs **ranges, hs_failure *failure);

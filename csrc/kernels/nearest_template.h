@@ -2,7 +2,7 @@
 /*
  * nearest_template.h: the vector loops of a search for the nearest, once for each instruction set.
  * Include it after a vocabulary (simd_<isa>.h), inside that instruction set's target region.
- * Defines gather_relative (hs_gather_relative_fn), order (hs_order_fn) and near_boxes (hs_boxes_fn).
+ * Defines gather_relative (hs_gather_relative_fn), order (hs_order_fn), near_boxes (hs_boxes_fn).
  */
 
 HS_ALWAYS_INLINE void

@@ -1391,8 +1391,8 @@ hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t m
     return status;
 }
 
-/* The arrays for pairs to decide, where hs_scanner_init has left them for later: pair_batch.memory is
- * NULL. They are kept (hs_account_keep) where the walker is. */
+/* The arrays for pairs to decide, where hs_scanner_init has left them for later: pair_batch.memory
+ * is NULL. They are kept (hs_account_keep) where the walker is. */
 static hs_status
 scanner_open_trace(hs_scanner *scanner)
 {
