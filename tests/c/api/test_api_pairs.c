@@ -273,12 +273,12 @@ plans_are_in_the_callers_unit(void)
     CHECK(!plan.sparse && plan.threads == 1 && plan.ndim == 2 && plan.expected_pairs > 1000.0);
     CHECK(plan.cell_size[1] * (double)plan.shape[1] > 0.95 * 0x1p40);
     CHECK(plan.cell_size[1] * (double)plan.shape[1] < 1.05 * 0x1p40);
-    for (int i = 0; i < N; i++) {
-        x[2 * i] = random_unit(&random) + (i % 2 ? 1e6 : 0.0);
-        x[2 * i + 1] = random_unit(&random);
-    }
     options.cutoff = 0.01;
-    CHECK(hs_plan_make(AMONG(&points, NULL), &options, &plan, NULL) == HS_OK && plan.sparse);
+    for (int along = 0; along < 2; along++) { /* two crowds, far apart */
+        for (int e = 0; e < 2 * N; e++)
+            x[e] = random_unit(&random) + (e / 2 % 2 && e % 2 == along ? 1e6 : 0.0);
+        CHECK(hs_plan_make(AMONG(&points, NULL), &options, &plan, NULL) == HS_OK && plan.sparse);
+    }
 }
 
 /* Several searches, or none: of points without a pair there is nothing to say but what they are. */

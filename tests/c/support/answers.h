@@ -720,23 +720,41 @@ check_supports(asked *a)
     return reach_difference(a, is_within_supports);
 }
 
-/* Pairs, rows and systems of those that are selected. */
+/* Pairs and rows of those that are selected; a stream keeps what it chooses by. */
 static inline const char *
 check_selection(asked *a)
 {
+    static int64_t groups[ANSWER_POINTS], labels[ANSWER_POINTS];
     const uint64_t which = 1 + chosen(a, 7);
-    a->selection = (hs_selection){.groups = which & 1 ? a->groups : NULL,
-                                  .labels = which & 2 ? a->labels : NULL,
+    a->selection = (hs_selection){.groups = which & 1 ? groups : NULL,
+                                  .labels = which & 2 ? labels : NULL,
                                   .within = which & 2 ? (int64_t)chosen(a, 3) : 0,
                                   .min_distance = which & 4 ? some_length(a) : 0.0};
+    memcpy(groups, a->groups, sizeof groups);
+    memcpy(labels, a->labels, sizeof labels);
     const hs_among among = {.points = &a->points, .box = a->scene->box, .selection = &a->selection};
-    hs_pairs      *pairs = NULL;
+    hs_stream     *stream = NULL;
+    hs_pairs      *pairs = NULL, *block = NULL;
     const char    *difference =
         rows_difference(a, &among, pairs_kept(a, a->half, is_selected, true, false), 0);
-    if (difference != NULL)
-        return difference;
-    const hs_status status = hs_pairs_find(&among, &a->options, &pairs, NULL);
-    return difference_of(a, status, pairs, pairs_kept(a, a->half, is_selected, false, false), 0);
+    brute_list expected = pairs_kept(a, a->half, is_selected, false, false);
+    hs_status  status = hs_stream_open(&among, &a->options, INT64_MAX, &stream, NULL);
+    if (status == HS_OK)
+        status = hs_pairs_find(&among, &a->options, &pairs, NULL);
+    memset(groups, 0, sizeof groups);
+    memset(labels, 0, sizeof labels);
+    if (status == HS_OK)
+        status = hs_stream_next(stream, NULL, NULL, &block, NULL);
+    if (difference == NULL && status == HS_OK &&
+        (block != NULL ? hs_pairs_length(block) : 0) != expected.n)
+        difference = "another stream of what is selected";
+    hs_pairs_free(block);
+    hs_stream_free(stream);
+    if (difference == NULL)
+        return difference_of(a, status, pairs, expected, 0);
+    hs_pairs_free(pairs);
+    brute_free(&expected);
+    return difference;
 }
 
 /* Cells give what a search gives; ranges of candidates hold all of it. */
