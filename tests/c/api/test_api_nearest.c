@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_api_nearest.c: the nearest points are those of big integers, in rows and in cells. */
+/* test_api_nearest.c: the nearest points in cells that are kept are those of a search of its own. */
 #include "../../../csrc/core/memory/memory.h"
 #include "../support/among.h"
 #include "../support/harness.h"
-#include "../support/nearest_checks.h"
 #include "../support/pair_checks.h"
 #include "../support/poll_checks.h"
 #include "../support/random_scenes.h"
@@ -11,9 +10,6 @@
 #include <pthread.h>
 
 void test_api_nearest(void);
-
-/* Api nearest: rows of the nearest, against all neighbours within a cutoff, put in order by
- * integers that share no code with the library. */
 
 static void
 whichever_allocation_fails_nothing_is_left(void)
@@ -41,8 +37,6 @@ whichever_allocation_fails_nothing_is_left(void)
     }
     CHECK(ended && nth > 10);
 }
-
-/* ---- as many as you like, all equally far ---- */
 
 /* Nearest cells: nearest points by a tree that cells keep are those of a search of its own, to the
  * last bit, whoever asks first and however far away queries are. */

@@ -9,7 +9,9 @@
 
 #include "pair_checks.h"
 
-enum { ANSWER_POINTS = 400, ANSWER_TYPES = 3, ANSWER_EDGES = 4 };
+#include <stdio.h>
+
+enum { ANSWER_POINTS = 400, ANSWER_TYPES = 3, ANSWER_EDGES = 12 };
 
 /* A scene, its pairs, and what is chosen for it by `salt`. */
 typedef struct asked {
@@ -26,6 +28,7 @@ typedef struct asked {
     hs_reach           reach;
     hs_selection       selection;
     int                quarters; /* radii count so many quarters */
+    int                n_edges;
     double             edges[ANSWER_EDGES];
     double             radii[ANSWER_POINTS], weights[ANSWER_POINTS], ellipsoids[ANSWER_POINTS * 9];
     double             table[ANSWER_TYPES * ANSWER_TYPES];
@@ -365,10 +368,11 @@ nearest_difference(const asked *a, const hs_pairs *rows, int64_t k, brute_list a
 static inline const char *
 check_nearest(asked *a)
 {
-    const int64_t first[] = {0, a->split, a->split, a->n}, k = 1 + (int64_t)chosen(a, 6);
-    hs_systems    systems = {.n = 3, .first = first, .box = a->scene->box};
-    hs_options    options = a->options;
-    const char   *difference = NULL;
+    const int64_t first[] = {0, a->split, a->split, a->n},
+                  k = 1 + (int64_t)chosen(a, chosen(a, 6) ? 6 : 150);
+    hs_systems  systems = {.n = 3, .first = first, .box = a->scene->box};
+    hs_options  options = a->options;
+    const char *difference = NULL;
     options.index_bytes = 8;
     for (int kind = 0; a->scene->inclusive && difference == NULL && kind < 4; kind++) {
         hs_pairs       *rows = NULL;
@@ -405,56 +409,69 @@ TRUTH int
 bin_of(const asked *a, const brute_pair *pair, bool inclusive)
 {
     int k = 0;
-    while (k < ANSWER_EDGES - 1 && !is_within_sum(a, pair, 1, a->edges[k], 0.0, inclusive))
+    while (k < a->n_edges - 1 && !is_within_sum(a, pair, 1, a->edges[k], 0.0, inclusive))
         k++;
     return k;
 }
 
-/* Of one set, between two, and of systems. */
+/* Of one set, between two, and of systems; of the first two in cells, too. */
 static inline const char *
 check_histogram(asked *a)
 {
     enum { SIZE = ANSWER_TYPES * ANSWER_TYPES * ANSWER_EDGES };
-    const int64_t first[] = {0, a->split, a->split, a->n};
-    for (int kind = 0; kind < 3; kind++) {
+    static const double factors[] = {1.0, 1.75, 0.5};
+    const int64_t       first[] = {0, a->split, a->split, a->n};
+    const int           types = 1 + (int)chosen(a, ANSWER_TYPES), size = types * types * a->n_edges;
+    for (int kind = 0; kind < 5; kind++) {
         static int64_t   counts[3 * SIZE], wanted[3 * SIZE];
         static double    sums[3 * SIZE], wanted_sums[3 * SIZE];
-        const bool       inclusive = a->scene->inclusive && chosen(a, 2), is_across = kind == 1;
+        const bool       inclusive = a->scene->inclusive && chosen(a, 2), is_across = kind % 2;
         const int64_t    from = is_across ? a->split : 0;
         const hs_systems systems = {.n = 3, .first = first, .box = a->scene->box};
-        const hs_among   among = {.points = is_across ? &a->rest : &a->points,
+        hs_among         among = {.points = is_across ? &a->rest : &a->points,
                                   .queries = is_across ? &a->first : NULL,
                                   .box = a->scene->box};
-        hs_histogram     histogram = {.n_edges = ANSWER_EDGES,
+        hs_histogram     histogram = {.n_edges = a->n_edges,
                                       .edges = a->edges,
                                       .inclusive = inclusive,
                                       .last_inclusive = a->scene->inclusive,
-                                      .n_types = ANSWER_TYPES,
+                                      .n_types = types,
                                       .of_points = {a->types + from, a->weights + from},
                                       .of_queries = {a->types, a->weights},
                                       .counts = counts,
                                       .sums = sums};
+        for (int64_t i = 0; i < a->n; i++)
+            a->types[i] %= types;
         memset(wanted, 0, sizeof wanted);
         memset(wanted_sums, 0, sizeof wanted_sums);
         for (int64_t e = 0; e < a->half->n; e++) {
             const brute_pair *pair = &a->half->pairs[e];
             const int         s = a->types[pair->i], t = a->types[pair->j];
-            if ((kind == 1 && !is_asked_across(a, pair)) ||
+            if ((is_across && !is_asked_across(a, pair)) ||
                 (kind == 2 && !is_of_one_system(a, pair)))
                 continue;
             for (int way = 0; way < 1 + (!is_across && s != t); way++) {
-                const int to = (kind == 2 && pair->i >= a->split ? 2 * SIZE : 0) +
-                               (way ? t * ANSWER_TYPES + s : s * ANSWER_TYPES + t) * ANSWER_EDGES +
+                const int to = (kind == 2 && pair->i >= a->split ? 2 * size : 0) +
+                               (way ? t * types + s : s * types + t) * a->n_edges +
                                bin_of(a, pair, inclusive);
                 wanted[to]++;
                 wanted_sums[to] += a->weights[pair->i] * a->weights[pair->j];
             }
         }
-        const hs_status status =
-            kind == 2
-                ? hs_systems_histogram(&a->points, NULL, &systems, &a->options, &histogram, NULL)
-                : hs_pairs_histogram(&among, &a->options, &histogram, NULL);
-        const size_t n = kind == 2 ? 3 * SIZE : SIZE;
+        hs_options building = a->options;
+        hs_cells  *cells = NULL;
+        hs_status  status = HS_OK;
+        building.cutoff *= factors[chosen(a, 3)];
+        if (kind > 2) {
+            status = hs_cells_build(among.points, among.box, &building, &cells, NULL);
+            among = (hs_among){.cells = cells, .queries = among.queries};
+        }
+        if (status == HS_OK)
+            status = kind == 2 ? hs_systems_histogram(&a->points, NULL, &systems, &a->options,
+                                                      &histogram, NULL)
+                               : hs_pairs_histogram(&among, &a->options, &histogram, NULL);
+        hs_cells_free(cells);
+        const size_t n = (size_t)(kind == 2 ? 3 * size : size);
         if (status != HS_OK)
             return hs_status_text(status);
         if (memcmp(counts, wanted, n * sizeof *counts) != 0)
@@ -473,7 +490,7 @@ check_shells(asked *a)
     hs_options options = a->options;
     hs_pairs  *pairs = NULL;
     options.want |= HS_WANT_SHELL;
-    options.n_shells = ANSWER_EDGES;
+    options.n_shells = a->n_edges;
     options.shells = a->edges;
     const hs_status status =
         hs_pairs_find(AMONG(&a->points, a->scene->box), &options, &pairs, NULL);
@@ -653,14 +670,16 @@ reach_difference(asked *a, kept_fn kept)
     return difference_of(a, status, pairs, expected, 0);
 }
 
-/* Radii and tables are parts of the cutoff, and distances that there are. */
+/* Radii, edges and tables are parts of the cutoff, and distances that there are or a step beside. */
 static inline double
 some_length(asked *a)
 {
     const double cutoff = a->scene->cutoff;
     if (a->half->n > 0 && chosen(a, 3) == 0) {
-        const big    square = square_of(a, &a->half->pairs[chosen(a, (uint64_t)a->half->n)]);
-        const double length = sqrt(big_to_double(&square, -2148));
+        const big square = square_of(a, &a->half->pairs[chosen(a, (uint64_t)a->half->n)]);
+        double    length = sqrt(big_to_double(&square, -2148));
+        if (chosen(a, 2))
+            length = nextafter(length, chosen(a, 2) ? INFINITY : 0.0);
         return length <= cutoff ? length : cutoff;
     }
     return cutoff * (double)chosen(a, 9) * 0.125;
@@ -949,12 +968,33 @@ answer_difference(int number, const brute_scene *scene, const brute_list *half, 
         a.labels[i] = (int64_t)chosen(&a, 8);
         a.weights[i] = (double)chosen(&a, 9) - 4.0;
     }
-    for (int k = 0; k < ANSWER_EDGES; k++)
-        a.edges[k] = k < ANSWER_EDGES - 1 ? some_length(&a) : scene->cutoff;
-    qsort(a.edges, ANSWER_EDGES, sizeof a.edges[0], compare_edges);
+    a.n_edges = 1 + (int)chosen(&a, ANSWER_EDGES);
+    a.edges[a.n_edges - 1] = scene->cutoff;
+    const bool are_close = chosen(&a, 6) == 0; /* so that what float32 cannot tell overlaps */
+    for (int k = a.n_edges - 2; k >= 0; k--)
+        a.edges[k] = are_close ? a.edges[k + 1] * (1.0 - 1e-8 * (double)chosen(&a, 9))
+                               : some_length(&a);
+    qsort(a.edges, (size_t)a.n_edges, sizeof a.edges[0], compare_edges);
     const char *difference = answer_checks[number].check(&a);
     brute_free(&a.both);
     return difference;
+}
+
+/* Whether the nearest within the cutoff are right, of as many and from where `salt` says. */
+static inline bool
+nearest_are_right(const brute_scene *scene, uint64_t salt)
+{
+    brute_scene inclusive = *scene;
+    brute_list  half;
+    inclusive.inclusive = true;
+    if (!brute_find(&inclusive, 1e7, &half))
+        return false;
+    const char *difference = answer_difference(1, &inclusive, &half, salt, 1);
+    if (difference != NULL)
+        fprintf(stderr, "  d = %d, n = %d, cutoff %a, salt %d: %s\n", scene->ndim, (int)scene->n,
+                scene->cutoff, (int)salt, difference);
+    brute_free(&half);
+    return difference == NULL;
 }
 
 #endif
