@@ -1538,8 +1538,7 @@ hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, cons
                    const hs_options *options, hs_scene *scene, hs_scene *asking,
                    hs_failure *failure)
 {
-    const bool follows = sets->follows && scene->is_ordinary && scene->sought == options->cutoff &&
-                         scene->ndim == sets->points->ndim;
+    const bool follows = sets->follows && scene->is_ordinary && scene->sought == options->cutoff;
     start_scene(sets->points, scene);
     scene->is_ordinary = false;
     scene->is_kept = scene->is_asked = sets->is_kept;

@@ -56,12 +56,13 @@ check_scenes(int first, int end)
     const char         *kernels[16];
     const int           n_kernels = hs_kernel_names(kernels, 16);
     harness_random      random = {20261127 + (uint64_t)first};
-    for (int trial = 0; trial < THIRD_OF_TRIALS(72); trial++) {
-        const int  ndim = 1 + trial / SCENE_KINDS % 4;
+    for (int trial = 0; trial < THIRD_OF_TRIALS(96); trial++) {
+        const int  ndim = 1 + trial / SCENE_KINDS % 8;
         const int  n = random_below(&random, ndim > 3 ? 30 : trial % 5 == 0 ? 300 : 80);
         brute_list expected;
-        make_scene(&random, trial % SCENE_KINDS, ndim, n, trial % 4 == 3 ? 40.0 : 4.0,
-                   trial % 8 == 7 ? (trial % 16 == 7 ? 300 : -400) : 0, &s);
+        make_scene(&random, ndim > 4 ? SCENE_OPEN : trial % SCENE_KINDS, ndim, n,
+                   trial % 4 == 3 ? 40.0 : 4.0, trial % 8 == 7 ? (trial % 16 == 7 ? 300 : -400) : 0,
+                   &s);
         if (trial % 5 == 0) /* many cells */
             s.scene.cutoff *= 0.25;
         kernel_to_check = kernels[trial % n_kernels];
@@ -112,9 +113,33 @@ selections_cells_and_lists(void)
     check_scenes(10, ANSWER_CHECKS);
 }
 
+/* Where cells are as wide as the cutoff their faces part the points that are beside them. */
+static void
+points_beside_faces_of_cells(void)
+{
+    enum { N = 150, SIDE = 12 };
+    static double  x[3 * N];
+    harness_random random = {12};
+    for (int trial = 0; trial < 18; trial++) {
+        const int   d = 1 + trial % 3;
+        hs_box      box = {.ndim = d, .periodic = {true, true, true}};
+        brute_list  expected;
+        brute_scene scene = {.ndim = d, .n = N, .x = x, .inclusive = trial % 2, .cutoff = 0.5};
+        for (int k = 0; k < d; k++)
+            box.rows[k][k] = SIDE;
+        scene.box = trial % 4 < 2 ? &box : NULL;
+        for (int e = 0; e < d * N; e++)
+            x[e] = steps_from(0.5 * random_below(&random, 2 * SIDE), random_below(&random, 3) - 1);
+        CHECK(brute_find(&scene, 1e6, &expected));
+        CHECK(pairs_difference(&scene, &expected, 1) == NULL);
+        brute_free(&expected);
+    }
+}
+
 void
 test_api_seeds(void)
 {
+    RUN(points_beside_faces_of_cells);
     RUN(seeds_of_the_first_part);
     RUN(seeds_of_the_second_part);
     RUN(seeds_of_the_third_part);

@@ -733,6 +733,19 @@ places_need_a_largest_coordinate(void)
     const hs_points none = {x, 0, 2, HS_FLOAT64, 16, 8};
     CHECK(hs_box_places(&box, &none, 1.0, 5.0, NULL, 0, &axes, NULL) == HS_OK);
     CHECK(isinf(axes.reach[0]) && isinf(axes.reach[1]));
+    /* nor where one box vector is lost in what another one's turns are rounded by */
+    const hs_box    flat = {.ndim = 3,
+                            .periodic = {true, true, true},
+                            .rows = {{0x1.8p-79, 0x1p-10}, {0, 0x1.8p-71, 1}, {0, 0, 0x1.8p-43}}};
+    const hs_points nowhere = {x, 0, 3, HS_FLOAT64, 24, 8};
+    CHECK(hs_box_places(&flat, &nowhere, 0x1p40, 0x1p42, NULL, 0, &axes, NULL) == HS_OK);
+    CHECK(isinf(axes.reach[0]) && isinf(axes.reach[1]));
+    /* of pairs that are surely in one image, and of points on one spot */
+    const hs_box even = {.ndim = 2, .periodic = {true, true}, .rows = {{1, 0}, {0.25, 1}}};
+    CHECK(hs_box_places(&even, &none, 0.1, 0.05, NULL, 0, &axes, NULL) == HS_OK);
+    CHECK(axes.reach[0] < 0.2 && axes.reach[1] < 0.2);
+    CHECK(hs_box_places(NULL, &none, 0.0, 0.0, NULL, 0, &axes, NULL) == HS_OK);
+    CHECK(axes.reach[0] >= 0.0 && axes.reach[0] < 1e-10);
 }
 
 void

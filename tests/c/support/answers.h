@@ -7,6 +7,7 @@
 #ifndef HS_ANSWERS_H
 #define HS_ANSWERS_H
 
+#include "../../../csrc/core/levels/levels.h"
 #include "pair_checks.h"
 
 #include <stdio.h>
@@ -374,21 +375,21 @@ check_nearest(asked *a)
     hs_options  options = a->options;
     const char *difference = NULL;
     options.index_bytes = 8;
-    for (int kind = 0; a->scene->inclusive && difference == NULL && kind < 4; kind++) {
+    for (int kind = 0; a->scene->inclusive && difference == NULL && kind < 5; kind++) {
         hs_pairs       *rows = NULL;
-        const bool      is_across = kind == 1, has_systems = kind == 2;
+        const bool      is_across = kind == 1 || kind == 4, has_systems = kind == 2;
         const hs_among  among = {.points = is_across ? &a->rest : &a->points,
                                  .queries = is_across ? &a->first : NULL,
                                  .box = a->scene->box};
         hs_cells       *cells = NULL;
         const hs_status built =
-            kind < 3 ? HS_OK : hs_cells_build(&a->points, a->scene->box, &options, &cells, NULL);
-        const hs_among  in_cells = {.cells = cells};
+            kind < 3 ? HS_OK : hs_cells_build(among.points, among.box, &options, &cells, NULL);
+        const hs_among  in_cells = {.cells = cells, .queries = among.queries};
         const hs_status status =
             built != HS_OK ? built
             : has_systems
                 ? hs_systems_nearest(&a->points, NULL, &systems, k, &options, &rows, NULL)
-                : hs_nearest_find(kind == 3 ? &in_cells : &among, k, &options, &rows, NULL);
+                : hs_nearest_find(kind > 2 ? &in_cells : &among, k, &options, &rows, NULL);
         if (status != HS_OK)
             difference = hs_status_text(status);
         else
@@ -541,11 +542,21 @@ check_clusters(asked *a)
                 turns[of] = (uint8_t)(turns[of] | 1 << l);
         }
     }
-    static int64_t  found[ANSWER_POINTS];
-    const hs_status status = hs_clusters_find(AMONG(&a->points, a->scene->box), &a->options,
-                                              all ? NULL : core, found, winding, &n_found, NULL);
-    if (status != HS_OK)
-        return hs_status_text(status);
+    static int64_t  found[ANSWER_POINTS], again[ANSWER_POINTS];
+    hs_counters     counters;
+    hs_options      options = a->options;
+    const hs_among  among = {.points = &a->points, .box = a->scene->box};
+    const uint8_t  *given = all ? NULL : core;
+    const hs_status without =
+        hs_clusters_find(&among, &options, given, again, NULL, &n_found, NULL);
+    options.index_bytes = 3; /* ignored */
+    options.counters = &counters;
+    const hs_status status =
+        hs_clusters_find(&among, &options, given, found, winding, &n_found, NULL);
+    if (status != HS_OK || without != HS_OK)
+        return hs_status_text(status != HS_OK ? status : without);
+    if (counters.pairs != a->half->n || memcmp(found, again, (size_t)a->n * sizeof *found) != 0)
+        return "another count of pairs in clusters, or labels without windings";
     return n != n_found || memcmp(found, label, (size_t)a->n * sizeof *found) != 0
                ? "another cluster"
            : memcmp(winding, turns, (size_t)n) != 0 ? "another winding"
@@ -652,22 +663,54 @@ check_systems(asked *a)
                          0);
 }
 
-/* Pairs, or rows, by `reach`, and their number. */
+/* Of the points before `split` among the others. */
+static inline const char *
+reach_across(asked *a, kept_fn kept)
+{
+    hs_reach       reach = a->reach;
+    const hs_among among = {
+        .points = &a->rest, .queries = &a->first, .box = a->scene->box, .reach = &reach};
+    brute_list    across = pairs_kept(a, a->half, is_asked_across, false, false);
+    const int64_t matrix = a->d * a->d;
+    int64_t       n = -1;
+    reach.query_radii = reach.radii;
+    reach.radii = reach.radii != NULL ? reach.radii + a->split : NULL;
+    reach.query_types = reach.types;
+    reach.types = reach.types != NULL ? reach.types + a->split : NULL;
+    reach.query_supports = reach.supports;
+    reach.supports = reach.has_supports ? a->ellipsoids + a->split * matrix : NULL;
+    const brute_list expected = pairs_kept(a, &across, kept, false, false);
+    brute_free(&across);
+    const hs_status counted = hs_pairs_count(&among, &a->options, &n, NULL);
+    if (counted == HS_OK && n != expected.n)
+        return "another count within reach between two sets";
+    return rows_difference(a, &among, expected, a->split);
+}
+
+/* Pairs, or rows, by `reach`, and their number; by one search or several. */
 static inline const char *
 reach_difference(asked *a, kept_fn kept)
 {
     const hs_among among = {.points = &a->points, .box = a->scene->box, .reach = &a->reach};
     const bool     by_rows = a->reach.rule >= HS_RULE_GATHER && a->reach.n_types == 0;
+    const bool     joins = hs_test_join_levels(chosen(a, 2) == 0);
+    const char    *difference = NULL;
     hs_pairs      *pairs = NULL;
     int64_t        n = -1;
-    if (by_rows || chosen(a, 4) == 0)
-        return rows_difference(a, &among, pairs_kept(a, &a->both, kept, false, false), 0);
-    brute_list      expected = pairs_kept(a, a->half, kept, false, false);
-    const hs_status counted = hs_pairs_count(&among, &a->options, &n, NULL);
-    if (counted == HS_OK && n != expected.n)
-        return "another count within reach";
-    const hs_status status = hs_pairs_find(&among, &a->options, &pairs, NULL);
-    return difference_of(a, status, pairs, expected, 0);
+    if (chosen(a, 3) == 0) {
+        difference = reach_across(a, kept);
+    } else if (by_rows || chosen(a, 3) == 0) {
+        difference = rows_difference(a, &among, pairs_kept(a, &a->both, kept, false, false), 0);
+    } else {
+        brute_list      expected = pairs_kept(a, a->half, kept, false, false);
+        const hs_status counted = hs_pairs_count(&among, &a->options, &n, NULL);
+        const hs_status status = hs_pairs_find(&among, &a->options, &pairs, NULL);
+        const bool      is_other = counted == HS_OK && n != expected.n;
+        difference = difference_of(a, status, pairs, expected, 0);
+        difference = is_other ? "another count within reach" : difference;
+    }
+    (void)hs_test_join_levels(joins);
+    return difference;
 }
 
 /* Radii, edges and tables are parts of the cutoff, and distances that there are or a step beside. */
@@ -780,10 +823,12 @@ check_selection(asked *a)
 static inline const char *
 check_cells(asked *a)
 {
-    hs_options building = a->options;
-    hs_cells  *cells = NULL;
-    hs_pairs  *pairs = NULL, *ranges = NULL;
-    building.cutoff = chosen(a, 3) == 0 ? 0.75 * a->scene->cutoff : a->scene->cutoff;
+    static const double widths[] = {0.0, 0.0, 1.0, 0.5, 0.07, 3.0, INFINITY};
+    hs_options          building = a->options;
+    hs_cells           *cells = NULL;
+    hs_pairs           *pairs = NULL, *ranges = NULL;
+    building.cutoff = (chosen(a, 2) ? 1.0 : 0.75 * (double)chosen(a, 3)) * a->scene->cutoff;
+    building.cell_size = widths[chosen(a, 7)] * (a->scene->cutoff > 0.0 ? a->scene->cutoff : 1.0);
     hs_status   status = hs_cells_build(&a->points, a->scene->box, &building, &cells, NULL);
     const char *difference = NULL;
     if (status == HS_OK)
