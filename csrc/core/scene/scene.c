@@ -1391,7 +1391,7 @@ hs_scene_from_kept(hs_account *account, hs_team *team, const hs_scene *kept,
     if (status == HS_ERR_SHIFT_RANGE && !(options->want & HS_WANT_SHIFT)) {
         status = HS_REBUILD; /* a scene without turns will do */
     }
-    failure->in_queries = status != HS_OK;
+    failure->in_queries = status != HS_OK && status != HS_REBUILD;
     if (status == HS_OK) {
         scene_bound_errors(asking, magnitude);
         hs_scene_settle_ranges(asking);

@@ -135,6 +135,35 @@ one_walk_finds_what_two_find(void)
     }
 }
 
+/* A hs_poll_fn: the largest fraction so far. */
+static bool
+keep_largest(void *context, double fraction)
+{
+    *(double *)context = fmax(*(double *)context, fraction);
+    return true;
+}
+
+/* The caller's thread tells how far the work is, if it has any share of it. */
+static void
+threads_tell_how_far_they_are(void)
+{
+    static double   x[60000];
+    harness_random  random = {34};
+    const hs_points points = {x, 20000, 3, HS_FLOAT64, 24, 8};
+    hs_options      options = hs_options_default();
+    double          largest = 0.0;
+    int64_t         n;
+    for (int e = 0; e < 60000; e++)
+        x[e] = random_unit(&random);
+    options.cutoff = 0.1;
+    options.threads = 2;
+    options.poll = keep_largest;
+    options.poll_context = &largest;
+    for (int trial = 0; trial < 50 && largest == 0.0; trial++)
+        CHECK(hs_pairs_count(AMONG(&points, NULL), &options, &n, NULL) == HS_OK);
+    CHECK(largest > 0.0 && largest <= 1.0);
+}
+
 /* More threads than pairs are dealt to, and more points than there are pairs. */
 static void
 any_number_of_threads_sorts_the_same(void)
@@ -425,6 +454,7 @@ test_api_pairs(void)
     RUN(points_far_outside_the_box);
     RUN(clusters_far_from_the_origin);
     RUN(one_walk_finds_what_two_find);
+    RUN(threads_tell_how_far_they_are);
     RUN(any_number_of_threads_sorts_the_same);
     RUN(one_walk_gives_way_where_memory_is_short);
     RUN(a_capacity_that_is_too_small_is_named);
