@@ -536,6 +536,32 @@ shifts_that_do_not_fit_name_the_callers_row(void)
     CHECK(found == NULL && failure.row == 0 && failure.in_queries);
 }
 
+/* Of many points and of many queries, which are read a hundred thousand at a time. */
+static void
+bad_rows_are_named_among_many(void)
+{
+    enum { ROWS_READ = (1 << 17) + 40, BAD = ROWS_READ - 7 };
+    double *x = array_of(ROWS_READ, sizeof *x), *radii = array_of(ROWS_READ, sizeof *radii);
+    for (int64_t i = 0; i < ROWS_READ; i++) {
+        x[i] = i == BAD ? NAN : (double)i;
+        radii[i] = 0.25;
+    }
+    for (int asks = 0; asks < 2; asks++) {
+        const hs_points few = {x, 9, 1, HS_FLOAT64, 8, 8}, many = {x, ROWS_READ, 1, 1, 8, 8};
+        const hs_reach  reach = {.rule = HS_RULE_SUM, .radii = radii, .query_radii = radii};
+        const hs_among  among = {
+             .points = asks ? &few : &many, .queries = asks ? &many : &few, .reach = &reach};
+        hs_options options = hs_options_default();
+        hs_failure failure;
+        int64_t    n;
+        options.cutoff = 1.0;
+        CHECK(hs_pairs_count(&among, &options, &n, &failure) == HS_ERR_NOT_FINITE);
+        CHECK(failure.row == BAD && failure.column == 0 && failure.in_queries == (asks == 1));
+    }
+    free(x);
+    free(radii);
+}
+
 /* Each set needs the radii that the rule looks at, and no more; sets without points need none. */
 static void
 both_sets_need_what_the_rule_looks_at(void)
@@ -659,6 +685,7 @@ test_api_reach(void)
     RUN(types_take_any_rule);
     RUN(tables_have_no_extent);
     RUN(shifts_that_do_not_fit_name_the_callers_row);
+    RUN(bad_rows_are_named_among_many);
     RUN(both_sets_need_what_the_rule_looks_at);
     RUN(kernel_and_box_are_checked_where_nothing_is_searched);
     RUN(other_functions_refuse_a_reach);

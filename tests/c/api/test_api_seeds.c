@@ -130,10 +130,12 @@ points_beside_faces_of_cells(void)
         scene.box = trial % 4 < 2 ? &box : NULL;
         for (int e = 0; e < d * N; e++)
             x[e] = steps_from(0.5 * random_below(&random, 2 * SIDE), random_below(&random, 3) - 1);
+        algorithm_to_check = HS_GRID;
         CHECK(brute_find(&scene, 1e6, &expected));
         CHECK(pairs_difference(&scene, &expected, 1) == NULL);
         brute_free(&expected);
     }
+    algorithm_to_check = HS_AUTO;
 }
 
 void

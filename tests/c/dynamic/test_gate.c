@@ -409,6 +409,8 @@ polls_end_long_queries(void)
         CHECK(hs_dynamic_near(list, centre, 200000.0, go_on, &polls, NULL) == HS_OK && polls == 1);
         CHECK(hs_dynamic_within(list, centre, 200000.0, false, go_on, &polls, NULL) == HS_OK);
         CHECK(polls > 1);
+        hs_dynamic_hook(list, NULL);
+        CHECK(hs_dynamic_within(list, centre, 200000.0, false, go_on, &polls, NULL) == HS_OK);
         hs_dynamic_free(list);
     }
     hs_dynamic_hook(NULL, &hooks);

@@ -384,7 +384,7 @@ many_points_can_be_stopped(void)
         nearer += fabs(x[i] - at) <= d[K - 1];
     CHECK(wrong == 0 && nearer == K);
     hs_pairs_free(rows);
-    CHECK(stop_everywhere(&scene, &query, K, 24) > 12);
+    CHECK(stop_everywhere(&scene, &query, K, 80) > 12);
     free(x);
 }
 

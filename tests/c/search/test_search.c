@@ -289,8 +289,8 @@ neighbourhoods_of_many_rows_can_be_stopped(void)
     int64_t         left, n, count = -1;
     const hs_points one = {x, 1, 4, HS_FLOAT64, 40, 8}, many = {x, 16, 5, HS_FLOAT64, 40, 8};
     for (int i = 1; i < 16; i += 2)
-        x[5 * i + 4] = 30.0; /* so far apart that density tells nothing */
-    options.cutoff = 26.0;
+        x[5 * i + 4] = 40.0; /* so far apart that density tells nothing */
+    options.cutoff = 34.0;
     options.poll = stop_after;
     options.poll_context = &left;
     options.threads = 1;
@@ -308,7 +308,7 @@ neighbourhoods_of_many_rows_can_be_stopped(void)
     box.ndim = 4;
     options.poll = NULL;
     options.memory_limit = INFINITY;
-    options.algorithm = HS_HASH; /* whose cells are made wider, where these have so many rows */
+    options.cell_size = 0.25; /* cells are made wider where neighbourhoods have so many rows */
     CHECK(hs_pairs_count(AMONG(&one, &box), &options, &n, NULL) == HS_OK && n == count);
 }
 
