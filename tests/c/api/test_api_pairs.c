@@ -260,6 +260,9 @@ plans_are_in_the_callers_unit(void)
             x[e] = random_unit(&random) + (e / 2 % 2 && e % 2 == along ? 1e6 : 0.0);
         CHECK(hs_plan_make(AMONG(&points, NULL), &options, &plan, NULL) == HS_OK && plan.sparse);
     }
+    const hs_points on_line = {x, 2 * N, 1, HS_FLOAT64, 8, 8};
+    options.cutoff = 0.001;
+    CHECK(hs_plan_make(AMONG(&on_line, NULL), &options, &plan, NULL) == HS_OK && plan.sparse);
 }
 
 /* Cells that cannot be as small as the cutoff are about two for each point, and long rows of them. */
