@@ -962,6 +962,25 @@ check_layout(asked *a)
     return difference_of(a, status, pairs, pairs_kept(a, a->half, NULL, false, false), 0);
 }
 
+/* Cells are about as many as points, and the plan is that of the search that is made. */
+static inline const char *
+check_plan(asked *a)
+{
+    const hs_among  among = {.points = &a->points, .box = a->scene->box};
+    hs_plan         plan;
+    const hs_status status = hs_plan_make(&among, &a->options, &plan, NULL);
+    int64_t         n_cells = 1;
+    if (status != HS_OK)
+        return hs_status_text(status);
+    for (int k = 0; !plan.sparse && k < a->d; k++)
+        n_cells *= plan.shape[k];
+    return n_cells != plan.n_cells && !plan.sparse    ? "another number of cells"
+           : n_cells > 2 * a->n + 64                  ? "more cells than points need"
+           : a->n > 0 && plan.n_periodic != a->rows.m ? "another plan"
+           : plan.all_pairs != (plan.n_cells == 1)    ? "a plan that contradicts itself"
+                                                      : NULL;
+}
+
 static const struct answer_check {
     const char *name;
     const char *(*check)(asked *a);
@@ -971,6 +990,7 @@ static const struct answer_check {
     {"systems", check_systems},   {"radii", check_radii},         {"table", check_table},
     {"supports", check_supports}, {"selection", check_selection}, {"cells", check_cells},
     {"list", check_list},         {"measures", check_measures},   {"layout", check_layout},
+    {"plan", check_plan},
 };
 
 enum { ANSWER_CHECKS = sizeof answer_checks / sizeof answer_checks[0] };
@@ -987,7 +1007,8 @@ static inline const char *
 answer_difference(int number, const brute_scene *scene, const brute_list *half, uint64_t salt,
                   int64_t stride)
 {
-    static asked a;
+    static const double widths[] = {0.3, 0.01, 1.0 + 1e-13, 2.0, 1e-90, 1e90};
+    static asked        a;
     memset(&a, 0, sizeof a);
     a.scene = scene;
     a.half = half;
@@ -1007,6 +1028,8 @@ answer_difference(int number, const brute_scene *scene, const brute_list *half, 
     a.options.sorted = true;
     a.options.threads = 1 + (int)chosen(&a, 2);
     a.options.index_bytes = number == 1 || chosen(&a, 2) ? 8 : 4;
+    if (chosen(&a, 3) == 0 && scene->cutoff > 0x1p-700 && scene->cutoff < 0x1p700)
+        a.options.cell_size = widths[chosen(&a, 6)] * scene->cutoff;
     for (int64_t i = 0; i < a.n; i++) {
         a.types[i] = (int32_t)chosen(&a, ANSWER_TYPES);
         a.groups[i] = (int64_t)chosen(&a, 2);
