@@ -168,7 +168,7 @@ give_away(hs_stream *stream, int64_t n, hs_output *given)
     return status;
 }
 
-/* Hands out a copy of the first n pairs that wait. Where there is no memory for it, it holds none. */
+/* Hands out a copy of the first n pairs that wait; without the memory for it, an empty one. */
 static hs_status
 copy_out(hs_stream *stream, int64_t n, hs_output *copy)
 {
