@@ -67,7 +67,8 @@ typedef struct hs_sets {
                                 * and gaps are closed only if need be */
     bool             is_wide;  /* X is not made float32: it may be larger than that holds */
     bool             follows;  /* the scene was filled before, with as many dimensions and the same
-                                * options but for the cutoff: lattice, scale and metric are kept if they are the same */
+                                * options but for the cutoff: lattice, scale and metric are
+                                * kept if they are the same */
     const struct hs_search *built; /* NULL, or a search that has the points in cells already */
     struct hs_nearest_kept *trees; /* NULL, or what keeps a tree of the points (nearest.h) */
     bool                    is_untested; /* cells are all that is wanted, no distance is computed */

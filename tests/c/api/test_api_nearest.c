@@ -2,6 +2,7 @@
 /* test_api_nearest.c: several threads may be the first to search kept cells for nearest points. */
 #include "../support/among.h"
 #include "../support/pair_checks.h"
+#include "../support/poll_checks.h"
 #include "../support/random_scenes.h"
 
 #include <pthread.h>
@@ -59,8 +60,34 @@ several_may_come_first(void)
     hs_pairs_free(wanted);
 }
 
+static hs_status
+find_far_more(void *context)
+{
+    const random_scene *s = context;
+    const hs_points     points = points_of(&s->scene);
+    hs_options          options = hs_options_default();
+    hs_pairs           *rows = NULL;
+    options.cutoff = INFINITY;
+    options.want = HS_WANT_J | HS_WANT_DISTANCE;
+    const hs_status status =
+        hs_nearest_find(AMONG(&points, s->scene.box), 100, &options, &rows, NULL);
+    hs_pairs_free(rows);
+    return status;
+}
+
+/* With more candidates than there was room for at first. */
+static void
+any_allocation_may_be_refused(void)
+{
+    harness_random      random = {2};
+    static random_scene s;
+    make_scene(&random, SCENE_TRICLINIC, 3, 60, 4.0, 0, &s);
+    CHECK(fail_each_allocation(find_far_more, &s, 300) > 10);
+}
+
 void
 test_api_nearest(void)
 {
+    RUN(any_allocation_may_be_refused);
     RUN(several_may_come_first);
 }

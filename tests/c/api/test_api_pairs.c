@@ -369,6 +369,10 @@ plans_join_levels_unless_told_otherwise(void)
     options.algorithm = HS_HIERARCHY;
     CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches > 1);
     CHECK(plan.expected_pairs == expected);
+    for (int e = 1; e < 300; e++) /* one that is far larger */
+        radii[e] = 0x1p-8;
+    options.algorithm = HS_AUTO;
+    CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches > 1);
     (void)hs_test_join_levels(joins);
 }
 

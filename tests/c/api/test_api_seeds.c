@@ -113,26 +113,33 @@ selections_cells_and_lists(void)
     check_scenes(10, ANSWER_CHECKS);
 }
 
-/* Where cells are as wide as the cutoff their faces part the points that are beside them. */
+/* Boxes of whole multiples of the cutoff, or one rounding beside: cells just as wide as it is, with
+ * many points on their faces. */
 static void
-points_beside_faces_of_cells(void)
+points_on_faces_of_cells(void)
 {
-    enum { N = 150, SIDE = 12 };
+    enum { N = 300 };
     static double  x[3 * N];
-    harness_random random = {12};
-    for (int trial = 0; trial < 18; trial++) {
-        const int   d = 1 + trial % 3;
-        hs_box      box = {.ndim = d, .periodic = {true, true, true}};
-        brute_list  expected;
-        brute_scene scene = {.ndim = d, .n = N, .x = x, .inclusive = trial % 2, .cutoff = 0.5};
+    harness_random random = {1234};
+    for (int trial = 0; trial < TRIALS(120); trial++) {
+        const int    d = 1 + trial % 3, parts = 2 + random_below(&random, d == 1 ? 60 : 9);
+        const double length = random_below(&random, 2) ? 1.0 : 0.5 + random_unit(&random);
+        const double lower = random_below(&random, 2) ? 0.0 : random_unit(&random) - 0.5;
+        hs_box       box = {.ndim = d, .periodic = {true, true, true}};
+        brute_list   expected;
+        brute_scene  scene = {.ndim = d, .n = N, .x = x, .inclusive = random_below(&random, 2)};
+        scene.cutoff = steps_from(length / parts, random_below(&random, 5) - 2);
         for (int k = 0; k < d; k++)
-            box.rows[k][k] = SIDE;
-        scene.box = trial % 4 < 2 ? &box : NULL;
+            box.rows[k][k] = length;
+        scene.box = trial % 2 ? &box : NULL;
         for (int e = 0; e < d * N; e++)
-            x[e] = steps_from(0.5 * random_below(&random, 2 * SIDE), random_below(&random, 3) - 1);
+            x[e] = lower + length * (random_below(&random, 3) ? random_below(&random, 64) / 64.0
+                                                              : random_unit(&random));
+        for (int k = 0; k < d; k++)
+            x[k] = lower, x[d + k] = lower + length;
         algorithm_to_check = HS_GRID;
-        CHECK(brute_find(&scene, 1e6, &expected));
-        CHECK(pairs_difference(&scene, &expected, 1) == NULL);
+        CHECK(brute_find(&scene, 1e7, &expected));
+        CHECK(pairs_difference(&scene, &expected, 50) == NULL);
         brute_free(&expected);
     }
     algorithm_to_check = HS_AUTO;
@@ -141,7 +148,7 @@ points_beside_faces_of_cells(void)
 void
 test_api_seeds(void)
 {
-    RUN(points_beside_faces_of_cells);
+    RUN(points_on_faces_of_cells);
     RUN(seeds_of_the_first_part);
     RUN(seeds_of_the_second_part);
     RUN(seeds_of_the_third_part);
