@@ -351,17 +351,18 @@ plans_of_nothing_have_the_cells_of_no_cutoff(void)
 static void
 plans_join_levels_unless_told_otherwise(void)
 {
-    static double   x[300], radii[300];
-    harness_random  random = {24};
-    hs_options      options = hs_options_default();
-    hs_plan         plan;
-    const hs_points points = {x, 100, 3, HS_FLOAT64, 24, 8};
-    const hs_reach  reach = {.rule = HS_RULE_SUM, .radii = radii};
-    const hs_among  among = {.points = &points, .reach = &reach};
-    for (int e = 0; e < 300; e++) {
+    enum { FEW = 100, N = 3000 };
+    static double  x[3 * N], radii[N];
+    harness_random random = {24};
+    hs_options     options = hs_options_default();
+    hs_plan        plan;
+    hs_points      points = {x, FEW, 3, HS_FLOAT64, 24, 8};
+    const hs_reach reach = {.rule = HS_RULE_SUM, .radii = radii};
+    const hs_among among = {.points = &points, .reach = &reach};
+    for (int e = 0; e < 3 * N; e++)
         x[e] = 4.0 * random_unit(&random);
-        radii[e] = e % 2 ? 0.5 : 0.2;
-    }
+    for (int i = 0; i < N; i++)
+        radii[i] = i % 2 ? 0.5 : 0.2;
     options.cutoff = INFINITY;
     const bool joins = hs_test_join_levels(true);
     CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches == 1);
@@ -369,8 +370,9 @@ plans_join_levels_unless_told_otherwise(void)
     options.algorithm = HS_HIERARCHY;
     CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches > 1);
     CHECK(plan.expected_pairs == expected);
-    for (int e = 1; e < 300; e++) /* one that is far larger */
-        radii[e] = 0x1p-8;
+    for (int i = 0; i < N; i++) /* one that is far larger than many */
+        radii[i] = i == 0 ? 2.0 : 0x1p-8;
+    points.n = N;
     options.algorithm = HS_AUTO;
     CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches > 1);
     (void)hs_test_join_levels(joins);
