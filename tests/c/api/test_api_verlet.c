@@ -306,7 +306,7 @@ static void
 the_largest_boxes_are_measured_and_wrapped_into(void)
 {
     hs_box  box = {.ndim = 2, .periodic = {true, true}};
-    double  x[4] = {0x1.8p1023, 0x1p1021, -0x1p1022, -0x1.cp1023}, heights[2], wrapped[4];
+    double  x[4] = {0x1.8p1023, 0x1p1021, -0x1p1022, -0x1.cp1023}, heights[2], wrapped[4], volume;
     int64_t shift[4];
     for (int exponent = 0; exponent > -80; exponent--) {
         double scaled[4];
@@ -318,6 +318,9 @@ the_largest_boxes_are_measured_and_wrapped_into(void)
         box.rows[0][0] = box.rows[1][1] = length;
         CHECK(hs_box_measure(&box, heights, NULL, NULL) == HS_OK);
         CHECK(heights[0] == length && heights[1] == length);
+        const hs_box flat = {
+            2, {true, true}, {{length}, {0.0, 0x1p-1000}, {NAN}}}; /* of two rows */
+        CHECK(hs_box_measure(&flat, NULL, &volume, NULL) == HS_OK && volume == length * 0x1p-1000);
         CHECK(hs_box_wrap(&box, &points, wrapped, shift, NULL) == HS_OK);
         CHECK(wrapped[0] == 0.5 * length && shift[0] == -1);
         CHECK(wrapped[1] == scaled[1] && shift[1] == 0);
@@ -598,6 +601,10 @@ arguments_are_checked(void)
     CHECK(measure_two(2, x, &box, bad[1], MEASURED, NULL) == HS_ERR_ARGUMENT);
     CHECK(measure_two(2, x, &mixed, bad[2], MEASURED, NULL) == HS_ERR_ARGUMENT);
     CHECK(measure_two(2, x, &mixed, bad[3], MEASURED, NULL) == HS_OK);
+    mixed.periodic[0] = false;
+    mixed.periodic[1] = true;
+    CHECK(measure_two(2, x, &mixed, bad[2], MEASURED, NULL) == HS_OK);
+    CHECK(measure_two(2, x, &mixed, bad[3], MEASURED, NULL) == HS_ERR_ARGUMENT);
     for (int k = 0; k < 4; k++) {
         first[0] = numbers[k][0];
         second[0] = numbers[k][1];
