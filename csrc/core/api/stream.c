@@ -168,7 +168,7 @@ give_away(hs_stream *stream, int64_t n, hs_output *given)
     return status;
 }
 
-/* Hands out a copy of the first n pairs that wait. */
+/* Hands out a copy of the first n pairs that wait; without the memory for it, an empty one. */
 static hs_status
 copy_out(hs_stream *stream, int64_t n, hs_output *copy)
 {
@@ -176,8 +176,6 @@ copy_out(hs_stream *stream, int64_t n, hs_output *copy)
     const hs_status status = copy_waiting(stream, stream->begin, n, copy);
     if (status == HS_OK) {
         stream->begin += n;
-    } else {
-        hs_output_free(copy);
     }
     return status;
 }

@@ -1304,8 +1304,8 @@ hs_strain_find(const hs_box *before, const hs_box *now, hs_strain *strain)
                        bound_residual(&lattice, (const double(*)[HS_MAX_DIM])rows, strain) * GROW;
     strain->shrink =
         smallest_stretch(before->ndim, (const double(*)[HS_MAX_DIM])strain->F) - strain->residual;
-    /* The difference is rounded by at most 2^-53 of the larger. */
-    strain->shrink -= 0x1p-52 * fabs(strain->shrink) + 0x1p-53 * strain->residual + 0x1p-1060;
+    /* The difference is rounded by at most 2^-53 of itself, and so is the next one. */
+    strain->shrink -= 0x1p-52 * fabs(strain->shrink);
     strain->shrink = hs_smaller(strain->shrink, 1.0);
     return strain->shrink > 0.0 && strain->residual < INFINITY;
 }

@@ -607,12 +607,13 @@ hs_sparse_find_row(const hs_sparse *sparse, const int64_t *index, int64_t *hint)
     return row;
 }
 
-/* The first of cells [low, high) at x or beyond, or high; by steps that double, then by halves. */
+/* The first of cells [low, high) at x or beyond, or high: from `hint` on, which is at most high, by
+ * steps that double, then by halves. */
 static int32_t
 seek_cell(const int64_t *cell_x, int32_t low, int32_t high, int32_t hint, int64_t x)
 {
     int64_t step = 1;
-    hint = hint < low ? low : hint > high ? high : hint;
+    hint = hint < low ? low : hint;
     if (hint < high && cell_x[hint] < x) {
         for (low = hint + 1; low + step <= high && cell_x[low + step - 1] < x; step *= 2) {
             low += (int32_t)step;

@@ -577,7 +577,9 @@ put_node_pair(const hs_node_columns *to, int64_t at, const hs_node_map *map,
     }
 }
 
-hs_status
+/* Fills columns I, J and, where the half list has shifts, S of `nodes`, and I and J of `lists`,
+ * both empty: numbers of nodes in their lists, and the lists. Pairs keep their order. */
+static hs_status
 hs_node_pairs_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs, const hs_output *half,
                    hs_pairs *nodes, hs_pairs *lists)
 {

@@ -130,11 +130,6 @@ typedef struct hs_node_columns {
 /* How many pairs the table has. */
 int64_t hs_node_pairs_count(const hs_node_map *map, bool ghost_pairs, const hs_output *half);
 
-/* Fills columns I, J and, where the half list has shifts, S of `nodes`, and I and J of `lists`,
- * both empty: numbers of nodes in their lists, and the lists. Pairs keep their order. */
-hs_status hs_node_pairs_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs,
-                             const hs_output *half, hs_pairs *nodes, hs_pairs *lists);
-
 /* The table of pairs of nodes from rows of all of them, whose points are in the order
  * of lists and nodes: each row has the pairs that its node begins as it is, list by list. */
 

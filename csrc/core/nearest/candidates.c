@@ -538,10 +538,11 @@ find_runs_in_image(const hs_nearest *near, const hs_nearest_group *group, const 
     }
 }
 
-hs_status
-hs_nearest_runs_find(const hs_nearest *near, const hs_options *options,
-                     const hs_nearest_group *group, double most, hs_nearest_images *images,
-                     hs_nearest_block *block)
+/* Sets runs and images, by walking down the tree: what is within the radius of the group and a
+ * little more. HS_TRY_OTHER: more than `most` candidates. */
+static hs_status
+nearest_runs_find(const hs_nearest *near, const hs_options *options, const hs_nearest_group *group,
+                  double most, hs_nearest_images *images, hs_nearest_block *block)
 {
     const double reach =
         block->reach * (1.0 + RUN_ROOM) + 4.0 * sqrt(near->tree.ndim) * block->error;
@@ -565,7 +566,7 @@ hs_nearest_runs_find(const hs_nearest *near, const hs_options *options,
     return status;
 }
 
-/* hs_nearest_runs_find from leaves that were found for this group and others. */
+/* nearest_runs_find from leaves that were found for this group and others. */
 static hs_status
 nearest_runs_take(const hs_nearest *near, const hs_nearest_group *group, double most,
                   hs_nearest_leaves *leaves, hs_nearest_block *block)
@@ -806,8 +807,7 @@ find(const hs_nearest *near, const hs_options *options, hs_nearest_group *group,
         return most < INFINITY ? HS_TRY_OTHER : HS_ERR_MEMORY;
     }
     const hs_status status = settle_frame(near, group, images.error, block);
-    return status == HS_OK ? hs_nearest_runs_find(near, options, group, most, &images, block)
-                           : status;
+    return status == HS_OK ? nearest_runs_find(near, options, group, most, &images, block) : status;
 }
 
 hs_status

@@ -69,12 +69,6 @@ typedef struct hs_nearest_block {
     double            square_error; /* of these, up to the radius */
 } hs_nearest_block;
 
-/* Sets runs and images, by walking down the tree: what is within the radius of the group and a
- * little more. HS_TRY_OTHER: more than `most` candidates. */
-hs_status hs_nearest_runs_find(const hs_nearest *near, const hs_options *options,
-                               const hs_nearest_group *group, double most,
-                               hs_nearest_images *images, hs_nearest_block *block);
-
 hs_status hs_nearest_block_init(const hs_nearest *near, hs_nearest_block *block);
 void      hs_nearest_block_free(const hs_nearest *near, hs_nearest_block *block);
 

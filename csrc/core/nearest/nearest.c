@@ -265,7 +265,6 @@ prepare_from_kept(hs_nearest *near, const hs_sets *sets, const hs_box *box, doub
                                     &kept->search->scene, sets->queries, &search->call->options,
                                     &asking, failure);
         if (status != HS_OK) {
-            failure->in_queries = status != HS_REBUILD;
             return status;
         }
     }

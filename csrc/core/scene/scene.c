@@ -422,9 +422,10 @@ entries_of_row(const double *row, int ndim)
     return entries;
 }
 
-int
-hs_mover_among(const double rows[][HS_MAX_DIM], const bool *periodic, int n_rows, int ndim,
-               int column)
+/* HS_OPEN, HS_COUPLED, or the number of the row (a box vector) that alone has an entry in this
+ * column, and no other entry. periodic: the rows that count; NULL: all. */
+static int
+mover_among(const double rows[][HS_MAX_DIM], const bool *periodic, int n_rows, int ndim, int column)
 {
     int mover = HS_OPEN;
     for (int l = 0; l < n_rows; l++) {
@@ -435,13 +436,13 @@ hs_mover_among(const double rows[][HS_MAX_DIM], const bool *periodic, int n_rows
     return mover;
 }
 
-/* hs_mover_among for the periodic rows of a box. box: NULL for none. */
+/* mover_among for the periodic rows of a box. box: NULL for none. */
 static int
 mover_of(const hs_box *box, int column)
 {
     return box == NULL ? HS_OPEN
-                       : hs_mover_among((const double(*)[HS_MAX_DIM])box->rows, box->periodic,
-                                        box->ndim, box->ndim, column);
+                       : mover_among((const double(*)[HS_MAX_DIM])box->rows, box->periodic,
+                                     box->ndim, box->ndim, column);
 }
 
 hs_box_size
@@ -488,8 +489,10 @@ hs_is_ordinary(const hs_cloud *cloud, double cutoff)
            cutoff <= ENOUGH_CUTOFF * cloud->largest && cloud->largest <= far;
 }
 
-int
-hs_unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
+/* The exponent of the length that a scene goes by: its cutoff, or with cutoff 0 its box, or where
+ * its points are. A very small number if all is 0. */
+static int
+unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
 {
     return hs_exponent_of(cutoff > 0.0                 ? cutoff
                           : box->short_row != INFINITY ? box->short_row
@@ -528,7 +531,7 @@ open_drowns_box(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
 }
 
 /* The exponent to scale by, so that no exponent is above `largest`; *extreme: whether that loses
- * digits. unit: from hs_unit_exponent. */
+ * digits. unit: from unit_exponent. */
 static int
 choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff, int unit, int largest,
                 bool *extreme)
@@ -575,7 +578,7 @@ scene_scale_cutoff(const hs_scene *scene, const hs_box_size *size, double cutoff
 {
     const hs_cloud *cloud = &scene->cloud;
     if (scene->within > 0.0 &&
-        !fits_one_scale(cloud, size, hs_unit_exponent(cloud, size, scene->within),
+        !fits_one_scale(cloud, size, unit_exponent(cloud, size, scene->within),
                         HS_FAR_BOUNDED_EXPONENT)) {
         return scene->within;
     }
@@ -676,8 +679,8 @@ static double
 given_length(const hs_scene *scene, int k)
 {
     const hs_lattice *lattice = &scene->lattice;
-    const int         own = hs_mover_among((const double(*)[HS_MAX_DIM])lattice->given, NULL,
-                                           lattice->n_periodic, lattice->ndim, k);
+    const int         own = mover_among((const double(*)[HS_MAX_DIM])lattice->given, NULL,
+                                        lattice->n_periodic, lattice->ndim, k);
     if (own >= 0) {
         return fabs(lattice->given[own][k]);
     }
@@ -1391,7 +1394,7 @@ hs_scene_from_kept(hs_account *account, hs_team *team, const hs_scene *kept,
     if (status == HS_ERR_SHIFT_RANGE && !(options->want & HS_WANT_SHIFT)) {
         status = HS_REBUILD; /* a scene without turns will do */
     }
-    failure->in_queries = status != HS_OK;
+    failure->in_queries = status != HS_OK && status != HS_REBUILD;
     if (status == HS_OK) {
         scene_bound_errors(asking, magnitude);
         hs_scene_scale_ranges(asking);
@@ -1513,7 +1516,7 @@ scale_scene(hs_account *account, hs_team *team, const hs_options *options, const
     condensed.box = condensed.given_box = box;
     condensed.is_scaled = condensed.has_turns = false;
     scene->sought = scene_scale_cutoff(scene, &size, options->cutoff);
-    const int unit = hs_unit_exponent(cloud, &size, scene->sought);
+    const int unit = unit_exponent(cloud, &size, scene->sought);
     if (scene_may_condense(scene, asking, &size, unit)) {
         const int powers = scene->is_wide ? HS_FAR_BOUNDED_EXPONENT : HS_FAR_EXPONENT;
         status = hs_condense(account, options, box, unit, powers, cloud,
@@ -1538,8 +1541,7 @@ hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, cons
                    const hs_options *options, hs_scene *scene, hs_scene *asking,
                    hs_failure *failure)
 {
-    const bool follows = sets->follows && scene->is_ordinary && scene->sought == options->cutoff &&
-                         scene->ndim == sets->points->ndim;
+    const bool follows = sets->follows && scene->is_ordinary && scene->sought == options->cutoff;
     start_scene(sets->points, scene);
     scene->is_ordinary = false;
     scene->is_kept = scene->is_asked = sets->is_kept;

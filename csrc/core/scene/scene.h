@@ -66,8 +66,9 @@ typedef struct hs_sets {
     bool             is_plain; /* the cutoff is taken as it is, however far beyond all distances,
                                 * and gaps are closed only if need be */
     bool             is_wide;  /* X is not made float32: it may be larger than that holds */
-    bool             follows;  /* the scene was filled before, with the same options but for the
-                                * cutoff: lattice, scale and metric are kept if they are the same */
+    bool             follows;  /* the scene was filled before, with as many dimensions and the same
+                                * options but for the cutoff: lattice, scale and metric are
+                                * kept if they are the same */
     const struct hs_search *built; /* NULL, or a search that has the points in cells already */
     struct hs_nearest_kept *trees; /* NULL, or what keeps a tree of the points (nearest.h) */
     bool                    is_untested; /* cells are all that is wanted, no distance is computed */
@@ -260,17 +261,8 @@ hs_box_size hs_box_size_of(const hs_box *box);
 #define HS_OPEN    (-1) /* nothing */
 #define HS_COUPLED (-2) /* box vectors that have entries in other columns as well */
 
-/* HS_OPEN, HS_COUPLED, or the number of the row (a box vector) that alone has an entry in this
- * column, and no other entry. periodic: the rows that count; NULL: all. */
-int hs_mover_among(const double rows[][HS_MAX_DIM], const bool *periodic, int n_rows, int ndim,
-                   int column);
-
 /* The cutoff, or a smaller one if that is beyond all distances as well. */
 double hs_enough_cutoff(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
-
-/* The exponent of the length that a scene goes by: its cutoff, or with cutoff 0 its box, or where
- * its points are. A very small number if all is 0. */
-int hs_unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
 
 /*
  * Closes the gaps between coordinates that are far from zero. Where two different

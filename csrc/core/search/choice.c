@@ -69,9 +69,10 @@ transpose(const hs_partners *from, int64_t n_from, int64_t n_to, hs_partners *to
     }
 }
 
-hs_status
-hs_partners_check(const hs_selection *selection, int64_t n_asking, int64_t n_points,
-                  hs_failure *failure)
+/* HS_OK, or HS_ERR_ARGUMENT for numbers that are no point's (failure->row). */
+static hs_status
+partners_check(const hs_selection *selection, int64_t n_asking, int64_t n_points,
+               hs_failure *failure)
 {
     for (int64_t e = 0; e < selection->n_excluded; e++) {
         const int64_t i = number_in(selection, e, 0), j = number_in(selection, e, 1);
@@ -84,7 +85,7 @@ hs_partners_check(const hs_selection *selection, int64_t n_asking, int64_t n_poi
 }
 
 /*
- * Each way round, or from queries to points alone. Any status of hs_partners_check, or
+ * Each way round, or from queries to points alone. Any status of partners_check, or
  * HS_ERR_MEMORY. To be freed on failure as well.
  */
 static hs_status
@@ -94,7 +95,7 @@ partners_open(const hs_selection *selection, int64_t n_asking, int64_t n_points,
     const int       n_ways = has_queries ? 1 : 2;
     const int64_t   n_numbers = selection->n_excluded * n_ways;
     hs_partners     by_second = {NULL, NULL};
-    const hs_status status = hs_partners_check(selection, n_asking, n_points, failure);
+    const hs_status status = partners_check(selection, n_asking, n_points, failure);
     if (status != HS_OK) {
         return status;
     }
@@ -238,8 +239,8 @@ hs_selection_check(const hs_selection *selection, const hs_sets *sets, const hs_
 {
     const bool has_queries = sets->queries != NULL && selection->query_numbers == NULL;
     return is_sound(selection, sets, options)
-               ? hs_partners_check(selection, has_queries ? sets->queries->n : sets->points->n,
-                                   sets->points->n, failure)
+               ? partners_check(selection, has_queries ? sets->queries->n : sets->points->n,
+                                sets->points->n, failure)
                : HS_ERR_ARGUMENT;
 }
 

@@ -19,10 +19,6 @@ typedef struct hs_partners {
     int32_t *number;
 } hs_partners;
 
-/* HS_OK, or HS_ERR_ARGUMENT for numbers that are no point's (failure->row). */
-hs_status hs_partners_check(const hs_selection *selection, int64_t n_asking, int64_t n_points,
-                            hs_failure *failure);
-
 /*
  * choice.h: which pairs count, of those within reach: the caller's selection made ready for one
  * call. Labels stay in the caller's order and arrays; excluded pairs become rows of partners. Where

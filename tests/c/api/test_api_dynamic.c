@@ -229,6 +229,100 @@ bad_points_change_nothing(void)
     hs_dynamic_free(list);
 }
 
+static int polls_left;
+
+/* What cannot be counted or told: places along oblique directions in
+ * which the box does not repeat, and shifts between points that are each near enough. */
+static void
+what_cannot_be_counted_is_refused(void)
+{
+    const hs_box steep = {
+        .ndim = 2, .periodic = {true, true}, .rows = {{1, 0.25}, {0x1p28, 0x1p26 + 1}}};
+    const hs_box       oblique = {.ndim = 3, .periodic = {true}, .rows = {{1.0, 0.5, 0.0}}};
+    const double       below[2] = {0.25, 0.5 - 0x1.8p33}, above[2] = {0.25, 0x1.8p33};
+    const double       along[][3] = {{-1e13, 2e13, 3.0}, {-1e17, 2e17, 0.0}, {-2e300, 4e300, 1.0}};
+    hs_dynamic_options options = hs_dynamic_options_default();
+    hs_dynamic        *list;
+    bool               any;
+    options.ndim = 2;
+    options.box = &steep;
+    CHECK(hs_dynamic_new(&options, &list, NULL) == HS_OK);
+    CHECK(hs_dynamic_insert(list, (hs_key){1, 0}, above, NULL) == HS_OK);
+    for (int with_shift = 0; with_shift < 2; with_shift++) {
+        brute_found     found = {.n = 0};
+        const hs_status status =
+            hs_dynamic_within(list, below, 0.75, with_shift, take_found, &found, NULL);
+        CHECK(status == (with_shift ? HS_ERR_SHIFT_RANGE : HS_OK));
+        CHECK((found.n > 0) == !with_shift);
+    }
+    CHECK(hs_dynamic_any_within(list, below, 0.5, NULL, &any, NULL) == HS_ERR_SHIFT_RANGE);
+    hs_dynamic_free(list);
+    options.ndim = 3;
+    options.box = &oblique;
+    CHECK(hs_dynamic_new(&options, &list, NULL) == HS_OK);
+    for (int f = 0; f < 3; f++)
+        CHECK(hs_dynamic_insert(list, (hs_key){1, 0}, along[f], NULL) ==
+              (f == 0 ? HS_OK : HS_ERR_SHIFT_RANGE));
+    hs_dynamic_free(list);
+}
+
+/* Cells of open space are told apart also where their indices are beyond 2^31. */
+static void
+cells_far_away_are_no_others(void)
+{
+    hs_dynamic_options options = hs_dynamic_options_default();
+    hs_dynamic        *list;
+    options.ndim = 2;
+    CHECK(hs_dynamic_new(&options, &list, NULL) == HS_OK);
+    const double origin[2] = {0.5, 0.5}, far[2] = {0x1p32 + 0.5, 0x1p32 + 0.5};
+    CHECK(hs_dynamic_insert(list, (hs_key){1, 0}, origin, NULL) == HS_OK);
+    brute_found found = {.n = 0};
+    CHECK(hs_dynamic_near(list, far, 1.0, take_found, &found, NULL) == HS_OK && found.n == 0);
+    CHECK(hs_dynamic_near(list, origin, 1.0, take_found, &found, NULL) == HS_OK && found.n == 1);
+    hs_dynamic_free(list);
+}
+
+static bool
+count_polls(void *user, double fraction)
+{
+    (void)user, (void)fraction;
+    return --polls_left >= 0;
+}
+
+/* As long as it has changed nothing. */
+static void
+filling_can_be_interrupted(void)
+{
+    enum { N = (1 << 17) + 1 };
+    static double          x[N];
+    static int64_t         ids[N];
+    const hs_points        points = {x, N, 1, HS_FLOAT64, 8, 8};
+    const hs_dynamic_hooks hooks = {.poll = count_polls};
+    for (int64_t i = 0; i < N; i++) {
+        ids[i] = i;
+        x[i] = (double)(i % 1000);
+    }
+    for (int trial = 0; trial < 4; trial++) {
+        hs_status status = HS_ERR_INTERRUPTED;
+        for (int polls = 0; status == HS_ERR_INTERRUPTED; polls++) {
+            hs_dynamic_options options = hs_dynamic_options_default();
+            hs_dynamic        *list;
+            options.ndim = 1;
+            options.storage = trial % 2 ? HS_STORE_DENSE : HS_STORE_HASH;
+            CHECK(hs_dynamic_new(&options, &list, NULL) == HS_OK);
+            if (trial % 2) /* rows that others are there before */
+                CHECK(hs_dynamic_insert(list, (hs_key){-1, 0}, x, NULL) == HS_OK);
+            hs_dynamic_hook(list, trial < 2 ? NULL : &hooks);
+            polls_left = polls;
+            status = hs_dynamic_insert_many(list, ids, NULL, &points, NULL);
+            CHECK(status == HS_OK || (status == HS_ERR_INTERRUPTED && trial >= 2));
+            CHECK(hs_dynamic_length(list) == trial % 2 + (status == HS_OK ? N : 0));
+            CHECK(status != HS_OK || (polls > 0) == (trial >= 2));
+            hs_dynamic_free(list);
+        }
+    }
+}
+
 /* Api dynamic calls: calls that change a list, or ask for one point, refuse what they cannot take,
  * and then have done nothing. */
 
@@ -549,6 +643,9 @@ test_api_dynamic(void)
     RUN(far_points_are_found);
     RUN(keys_need_no_position_in_all_pairs);
     RUN(bad_points_change_nothing);
+    RUN(what_cannot_be_counted_is_refused);
+    RUN(cells_far_away_are_no_others);
+    RUN(filling_can_be_interrupted);
     RUN(no_list_is_an_argument_error);
     RUN(missing_arguments_change_nothing);
     RUN(cells_are_those_of_the_coordinates);

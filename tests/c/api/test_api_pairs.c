@@ -114,8 +114,9 @@ same_numbers(const hs_pairs *one, const hs_pairs *two, int index_bytes)
     return hs_pairs_length(one) == hs_pairs_length(two) &&
            memcmp(hs_pairs_array(one, HS_WANT_I), hs_pairs_array(two, HS_WANT_I), bytes) == 0 &&
            memcmp(hs_pairs_array(one, HS_WANT_J), hs_pairs_array(two, HS_WANT_J), bytes) == 0 &&
-           memcmp(hs_pairs_offsets(one), hs_pairs_offsets(two),
-                  (size_t)(hs_pairs_rows(one) + 1) * sizeof(int64_t)) == 0;
+           (hs_pairs_rows(one) == 0 ||
+            memcmp(hs_pairs_offsets(one), hs_pairs_offsets(two),
+                   (size_t)(hs_pairs_rows(one) + 1) * sizeof(int64_t)) == 0);
 }
 
 static void
@@ -132,6 +133,63 @@ one_walk_finds_what_two_find(void)
         hs_pairs_free(one);
         hs_pairs_free(two);
     }
+}
+
+/* A hs_poll_fn: the largest fraction so far. */
+static bool
+keep_largest(void *context, double fraction)
+{
+    *(double *)context = fmax(*(double *)context, fraction);
+    return true;
+}
+
+/* The caller's thread tells how far the work is, if it has any share of it. */
+static void
+threads_tell_how_far_they_are(void)
+{
+    static double   x[60000];
+    harness_random  random = {34};
+    const hs_points points = {x, 20000, 3, HS_FLOAT64, 24, 8};
+    hs_options      options = hs_options_default();
+    double          largest = 0.0;
+    int64_t         n;
+    for (int e = 0; e < 60000; e++)
+        x[e] = random_unit(&random);
+    options.cutoff = 0.1;
+    options.threads = 2;
+    options.poll = keep_largest;
+    options.poll_context = &largest;
+    for (int trial = 0; trial < 50 && largest == 0.0; trial++)
+        CHECK(hs_pairs_count(AMONG(&points, NULL), &options, &n, NULL) == HS_OK);
+    CHECK(largest > 0.0 && largest <= 1.0);
+}
+
+/* More threads than pairs are dealt to, and more points than there are pairs. */
+static void
+any_number_of_threads_sorts_the_same(void)
+{
+    enum { N = 150000 };
+    double         *x = array_of(N, sizeof *x);
+    const hs_points points = {x, N, 1, HS_FLOAT64, 8, 8};
+    harness_random  random = {33};
+    for (int few = 0; few < 2; few++) {
+        hs_options options = hs_options_default();
+        hs_pairs  *pairs[2] = {NULL, NULL};
+        options.sorted = true;
+        options.cutoff = few ? 0.7 : 9.0;
+        for (int i = 0; i < N; i++)
+            x[i] = N * random_unit(&random);
+        for (int many = 0; many < 2; many++) {
+            options.threads = !many ? 1 : few ? 3 : 33;
+            CHECK(hs_pairs_find(AMONG(&points, NULL), &options, &pairs[many], NULL) == HS_OK);
+        }
+        CHECK(hs_pairs_length(pairs[0]) > (few ? 1 << 16 : 1 << 20));
+        CHECK(hs_pairs_length(pairs[0]) < (few ? N : 1 << 21));
+        CHECK(same_numbers(pairs[0], pairs[1], 8));
+        hs_pairs_free(pairs[0]);
+        hs_pairs_free(pairs[1]);
+    }
+    free(x);
 }
 
 static void
@@ -176,83 +234,6 @@ a_capacity_that_is_too_small_is_named(void)
     hs_pairs_free(rows);
 }
 
-/* Api clusters: clusters are what the pairs of hs_pairs_find say, core points or not, for any
- * number of threads. */
-
-enum { MOST = SCENE_POINTS };
-
-typedef struct found_clusters {
-    int64_t labels[MOST], n;
-    uint8_t winding[MOST];
-} found_clusters;
-
-/* From a whole list of pairs. */
-static void
-from_pairs(const hs_pairs *pairs, const brute_scene *scene, const uint8_t *core, found_clusters *f)
-{
-    const int64_t *i = hs_pairs_array(pairs, HS_WANT_I), *j = hs_pairs_array(pairs, HS_WANT_J);
-    const int32_t *S = hs_pairs_array(pairs, HS_WANT_SHIFT);
-    hs_components  c;
-    CHECK(hs_components_open(NULL, scene->n, scene->ndim, &c) == HS_OK);
-    for (int64_t e = 0; e < hs_pairs_length(pairs); e++) {
-        if (core == NULL || (core[i[e]] && core[j[e]])) {
-            hs_components_join(&c, (int32_t)i[e], (int32_t)j[e], S + e * scene->ndim);
-        }
-    }
-    f->n = hs_components_label(&c, core, f->labels, f->winding);
-    hs_components_close(NULL, &c);
-    for (int64_t e = 0; core != NULL && e < hs_pairs_length(pairs); e++) {
-        const int64_t in = core[i[e]] ? i[e] : j[e], out = core[i[e]] ? j[e] : i[e];
-        if (core[in] && !core[out] && (f->labels[out] < 0 || f->labels[in] < f->labels[out])) {
-            f->labels[out] = f->labels[in];
-        }
-    }
-}
-
-static void
-compare(const brute_scene *scene, const uint8_t *core, int threads)
-{
-    static found_clusters wanted, got;
-    const hs_points       points = points_of(scene);
-    hs_options            options = options_of(scene);
-    hs_pairs             *pairs = NULL;
-    hs_counters           counters;
-    options.want = WANT_ALL;
-    options.threads = threads;
-    CHECK(hs_pairs_find(AMONG(&points, scene->box), &options, &pairs, NULL) == HS_OK);
-    from_pairs(pairs, scene, core, &wanted);
-    options.want = ~0u; /* ignored, as the next two */
-    options.index_bytes = 3;
-    options.sorted = true;
-    options.counters = &counters;
-    CHECK(hs_clusters_find(AMONG(&points, scene->box), &options, core, got.labels, got.winding,
-                           &got.n, NULL) == HS_OK);
-    CHECK(got.n == wanted.n && counters.pairs == hs_pairs_length(pairs));
-    CHECK(memcmp(got.labels, wanted.labels, (size_t)scene->n * 8) == 0);
-    CHECK(memcmp(got.winding, wanted.winding, (size_t)got.n) == 0);
-    CHECK(hs_clusters_find(AMONG(&points, scene->box), &options, core, got.labels, NULL, &got.n,
-                           NULL) == HS_OK);
-    CHECK(got.n == wanted.n && memcmp(got.labels, wanted.labels, (size_t)scene->n * 8) == 0);
-    hs_pairs_free(pairs);
-}
-
-static void
-clusters_are_those_of_the_pairs(void)
-{
-    harness_random      random = {20261125};
-    static random_scene s;
-    for (int trial = 0; trial < 240; trial++) {
-        const int ndim = 1 + trial / SCENE_KINDS % 4;
-        const int n = random_below(&random, ndim <= 3 ? 50 : 10);
-        uint8_t   core[64];
-        make_scene(&random, trial % SCENE_KINDS, ndim, n, 4.0, 0, &s);
-        for (int p = 0; p < n; p++) {
-            core[p] = (uint8_t)(random_below(&random, 3) * 100);
-        }
-        compare(&s.scene, trial % 2 ? core : NULL, 1 + trial % 3);
-    }
-}
-
 /* Api plan: a plan tells what a search of a scene would do. */
 
 /* Lengths are the caller's, whatever the search scales by; occupied cells and threads are told. */
@@ -273,12 +254,33 @@ plans_are_in_the_callers_unit(void)
     CHECK(!plan.sparse && plan.threads == 1 && plan.ndim == 2 && plan.expected_pairs > 1000.0);
     CHECK(plan.cell_size[1] * (double)plan.shape[1] > 0.95 * 0x1p40);
     CHECK(plan.cell_size[1] * (double)plan.shape[1] < 1.05 * 0x1p40);
-    for (int i = 0; i < N; i++) {
-        x[2 * i] = random_unit(&random) + (i % 2 ? 1e6 : 0.0);
-        x[2 * i + 1] = random_unit(&random);
-    }
     options.cutoff = 0.01;
-    CHECK(hs_plan_make(AMONG(&points, NULL), &options, &plan, NULL) == HS_OK && plan.sparse);
+    for (int along = 0; along < 2; along++) { /* two crowds, far apart */
+        for (int e = 0; e < 2 * N; e++)
+            x[e] = random_unit(&random) + (e / 2 % 2 && e % 2 == along ? 1e6 : 0.0);
+        CHECK(hs_plan_make(AMONG(&points, NULL), &options, &plan, NULL) == HS_OK && plan.sparse);
+    }
+    const hs_points on_line = {x, 2 * N, 1, HS_FLOAT64, 8, 8};
+    options.cutoff = 0.001;
+    CHECK(hs_plan_make(AMONG(&on_line, NULL), &options, &plan, NULL) == HS_OK && plan.sparse);
+}
+
+/* Cells that cannot be as small as the cutoff are about two for each point, and long rows of them. */
+static void
+cells_of_clusters_are_no_more_than_points_need(void)
+{
+    enum { N = 8000 };
+    static double   x[3 * N];
+    harness_random  random = {22};
+    hs_options      options = hs_options_default();
+    hs_plan         plan;
+    const hs_points points = {x, N, 3, HS_FLOAT64, 24, 8};
+    for (int e = 0; e < 3 * N; e++)
+        x[e] = (e / 3 % 2 ? 1e6 : 1.0) * random_unit(&random);
+    options.cutoff = 0.01;
+    options.algorithm = HS_GRID;
+    CHECK(hs_plan_make(AMONG(&points, NULL), &options, &plan, NULL) == HS_OK);
+    CHECK(plan.n_cells > N && plan.n_cells < 2.1 * N && plan.shape[0] > 10 * plan.shape[1]);
 }
 
 /* Several searches, or none: of points without a pair there is nothing to say but what they are. */
@@ -349,17 +351,18 @@ plans_of_nothing_have_the_cells_of_no_cutoff(void)
 static void
 plans_join_levels_unless_told_otherwise(void)
 {
-    static double   x[300], radii[300];
-    harness_random  random = {24};
-    hs_options      options = hs_options_default();
-    hs_plan         plan;
-    const hs_points points = {x, 100, 3, HS_FLOAT64, 24, 8};
-    const hs_reach  reach = {.rule = HS_RULE_SUM, .radii = radii};
-    const hs_among  among = {.points = &points, .reach = &reach};
-    for (int e = 0; e < 300; e++) {
+    enum { FEW = 100, N = 3000 };
+    static double  x[3 * N], radii[N];
+    harness_random random = {24};
+    hs_options     options = hs_options_default();
+    hs_plan        plan;
+    hs_points      points = {x, FEW, 3, HS_FLOAT64, 24, 8};
+    const hs_reach reach = {.rule = HS_RULE_SUM, .radii = radii};
+    const hs_among among = {.points = &points, .reach = &reach};
+    for (int e = 0; e < 3 * N; e++)
         x[e] = 4.0 * random_unit(&random);
-        radii[e] = e % 2 ? 0.5 : 0.2;
-    }
+    for (int i = 0; i < N; i++)
+        radii[i] = i % 2 ? 0.5 : 0.2;
     options.cutoff = INFINITY;
     const bool joins = hs_test_join_levels(true);
     CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches == 1);
@@ -367,6 +370,11 @@ plans_join_levels_unless_told_otherwise(void)
     options.algorithm = HS_HIERARCHY;
     CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches > 1);
     CHECK(plan.expected_pairs == expected);
+    for (int i = 0; i < N; i++) /* one that is far larger than many */
+        radii[i] = i == 0 ? 2.0 : 0x1p-8;
+    points.n = N;
+    options.algorithm = HS_AUTO;
+    CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches > 1);
     (void)hs_test_join_levels(joins);
 }
 
@@ -455,10 +463,12 @@ test_api_pairs(void)
     RUN(points_far_outside_the_box);
     RUN(clusters_far_from_the_origin);
     RUN(one_walk_finds_what_two_find);
+    RUN(threads_tell_how_far_they_are);
+    RUN(any_number_of_threads_sorts_the_same);
     RUN(one_walk_gives_way_where_memory_is_short);
     RUN(a_capacity_that_is_too_small_is_named);
-    RUN(clusters_are_those_of_the_pairs);
     RUN(plans_are_in_the_callers_unit);
+    RUN(cells_of_clusters_are_no_more_than_points_need);
     RUN(plans_know_a_reach);
     RUN(plans_of_nothing_have_the_cells_of_no_cutoff);
     RUN(plans_join_levels_unless_told_otherwise);

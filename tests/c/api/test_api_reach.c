@@ -11,10 +11,7 @@
 
 void test_api_reach(void);
 
-/*
- * Reach brute: scenes in which each pair has a reach of its own, and all their pairs the plain
- * way: each image of each two points, against the real sum of their radii as an integer.
- */
+/* Scenes in which each pair has a reach of its own. */
 
 enum { REACH_TYPES = 4, REACH_STYLES = 5 };
 
@@ -30,9 +27,6 @@ typedef struct reach_scene {
     hs_points    points, queries;
     hs_among     among;
 } reach_scene;
-
-/* Which pairs are sought. */
-typedef enum reach_list { REACH_HALF, REACH_ROWS } reach_list;
 
 /* 0: quarters; 1: tenths, whose sums are no float64s; 2: of many orders; 3: all one; 4: what the
  * distance to another point leaves, so that the two just touch, or just do not. */
@@ -116,142 +110,6 @@ reach_options(const reach_scene *s)
     hs_options options = options_of(&s->of.scene);
     options.cutoff = s->bound;
     return options;
-}
-
-/* Two numbers whose real sum is what asking point i and point j are compared with; false: no pair. */
-TRUTH bool
-reach_limit(const reach_scene *s, int64_t i, int64_t j, double limit[2])
-{
-    const int64_t asking = s->has_queries ? s->n + i : i;
-    const double  a = s->radii[asking], b = s->radii[j];
-    limit[1] = 0.0;
-    if (s->reach.n_types > 0) {
-        limit[0] = s->table[s->types[asking] * REACH_TYPES + s->types[j]];
-        limit[0] = limit[0] > s->bound ? s->bound : limit[0];
-        return limit[0] >= 0.0;
-    }
-    switch (s->reach.rule) {
-    case HS_RULE_SUM: limit[0] = a, limit[1] = b; break;
-    case HS_RULE_MEAN: limit[0] = 0.5 * a, limit[1] = 0.5 * b; break;
-    case HS_RULE_MAX: limit[0] = a > b ? a : b; break;
-    case HS_RULE_MIN: limit[0] = a < b ? a : b; break;
-    case HS_RULE_GATHER: limit[0] = a; break;
-    default: limit[0] = b;
-    }
-    if (s->bound < HUGE_VAL &&
-        big_compare(big_sum(big_from_double(limit[0]), big_from_double(limit[1])),
-                    big_from_double(s->bound)) > 0) {
-        limit[0] = s->bound;
-        limit[1] = 0.0;
-    }
-    return true;
-}
-
-/* What brute_force.h and pair_checks.h need to know of one pair: hi, rounded to nearest, or just
- * above the limit. */
-TRUTH brute_scene
-reach_scene_of_pair(const reach_scene *s, const double limit[2], bool above)
-{
-    brute_scene  pair = s->of.scene;
-    const double sum = limit[0] + limit[1];
-    const big rest = big_difference(big_sum(big_from_double(limit[0]), big_from_double(limit[1])),
-                                    big_from_double(sum));
-    pair.n = s->n + s->n_queries;
-    pair.cutoff = above ? nextafter(sum, HUGE_VAL) : sum;
-    pair.inclusive = s->of.scene.inclusive || rest.sign > 0;
-    return pair;
-}
-
-TRUTH bool
-reach_is_within(const reach_scene *s, const brute_rows *r, const double limit[2], const double *p,
-                const double *q, const int64_t *shift)
-{
-    const brute_scene *scene = &s->of.scene;
-    const big          sum = big_sum(big_from_double(limit[0]), big_from_double(limit[1]));
-    const big square = big_square(scene->ndim, r->m, (const double(*)[8])r->rows, p, q, shift);
-    const int sign = big_compare(square, big_product(sum, sum));
-    return sign < 0 || (sign == 0 && scene->inclusive);
-}
-
-/* Whether the list has this pair, if it is within. */
-TRUTH bool
-reach_has(const reach_scene *s, reach_list kind, int64_t i, int64_t j, int m, const int64_t *shift)
-{
-    bool is_home = true;
-    for (int l = 0; l < m; l++)
-        is_home = is_home && shift[l] == 0;
-    if (kind == REACH_HALF && !s->has_queries)
-        return brute_is_forward((int32_t)i, (int32_t)j, m, shift);
-    return s->has_queries || i != j || !is_home;
-}
-
-TRUTH void
-reach_images(const reach_scene *s, reach_list kind, const brute_rows *r, int64_t i, int64_t j,
-             brute_list *list)
-{
-    const int     d = s->of.scene.ndim;
-    const double *p = s->of.x + ((s->has_queries ? s->n : 0) + i) * d, *q = s->of.x + j * d;
-    int64_t       low[HS_MAX_DIM] = {0}, high[HS_MAX_DIM] = {0}, shift[HS_MAX_DIM];
-    double        limit[2], images;
-    if (!reach_limit(s, i, j, limit))
-        return;
-    const brute_scene pair = reach_scene_of_pair(s, limit, true);
-    CHECK(brute_range(&pair, r, p, q, low, high, &images));
-    memcpy(shift, low, sizeof shift);
-    for (bool more = images > 0.0; more;) {
-        if (reach_has(s, kind, i, j, r->m, shift) && reach_is_within(s, r, limit, p, q, shift))
-            brute_add(list, r, (int32_t)i, (int32_t)j, shift);
-        int l = r->m - 1;
-        while (l >= 0 && shift[l] == high[l]) {
-            shift[l] = low[l];
-            l--;
-        }
-        more = l >= 0;
-        shift[more ? l : 0] += more;
-    }
-}
-
-/* All pairs, ascending. */
-TRUTH void
-reach_find(const reach_scene *s, reach_list kind, brute_list *list)
-{
-    brute_rows    r;
-    const int64_t n_asking = s->has_queries ? s->n_queries : s->n;
-    memset(list, 0, sizeof *list);
-    CHECK(brute_prepare(&s->of.scene, &r));
-    for (int64_t i = 0; i < n_asking; i++) {
-        for (int64_t j = 0; j < s->n; j++)
-            reach_images(s, kind, &r, i, j, list);
-    }
-    if (list->n > 1)
-        qsort(list->pairs, (size_t)list->n, sizeof *list->pairs, brute_order);
-}
-
-/* Whether found pairs are these, in this order, with distances and vectors that are right. */
-static bool
-reach_matches(const reach_scene *s, const hs_pairs *found, const brute_list *expected)
-{
-    const int64_t *i = hs_pairs_array(found, HS_WANT_I), *j = hs_pairs_array(found, HS_WANT_J);
-    const int32_t *shift = hs_pairs_array(found, HS_WANT_SHIFT);
-    const double  *distance = hs_pairs_array(found, HS_WANT_DISTANCE);
-    const double  *vector = hs_pairs_array(found, HS_WANT_VECTOR);
-    const int      d = s->of.scene.ndim;
-    brute_rows     r;
-    bool           right = hs_pairs_length(found) == expected->n;
-    (void)brute_prepare(&s->of.scene, &r);
-    for (int64_t e = 0; right && e < expected->n; e++) {
-        brute_pair pair = expected->pairs[e];
-        double     limit[2];
-        right = i[e] == pair.i && j[e] == pair.j && reach_limit(s, pair.i, pair.j, limit);
-        for (int k = 0; right && k < d; k++)
-            right = shift[e * d + k] == pair.shift[k];
-        if (right && (e < 20 || e % 5 == 0)) {
-            const brute_scene of_pair = reach_scene_of_pair(s, limit, false);
-            pair.i += s->has_queries ? (int32_t)s->n : 0;
-            right = measures_are_right(&of_pair, &r, &pair, distance[e], vector + e * d);
-        }
-    }
-    return right;
 }
 
 /* Reach entries: every function that knows a reach for each pair, behind one signature. */
@@ -417,207 +275,37 @@ one_refusal_ends_any_entry(void)
     }
 }
 
-/* Reach pairs: pairs, rows and counts of searches in which each pair has a reach of its own,
- * against a brute force: every rule, tables of types, all boxes, one set and two. */
-
-static reach_scene s_pairs;
-static int64_t     n_pairs; /* that were expected so far */
-
-/* What a rule is for: no half lists by the radius of one of the two. */
-static bool
-has_half_list(void)
-{
-    return !s_pairs.has_queries &&
-           (s_pairs.reach.n_types > 0 ||
-            (s_pairs.reach.rule != HS_RULE_GATHER && s_pairs.reach.rule != HS_RULE_SCATTER));
-}
-
-/* Number of pairs that the functions which count find. */
-static bool
-counts_are(hs_options options, const brute_list *expected, reach_list kind)
-{
-    static int64_t counts[SCENE_POINTS];
-    int64_t        n = -7;
-    if (kind == REACH_HALF) {
-        return hs_pairs_count(&s_pairs.among, &options, &n, NULL) == HS_OK && n == expected->n;
-    }
-    bool right = hs_neighbors_count(&s_pairs.among, &options, counts, NULL) == HS_OK;
-    for (int64_t e = 0; e < expected->n; e++)
-        counts[expected->pairs[e].i]--;
-    for (int64_t i = 0; i < (s_pairs.has_queries ? s_pairs.n_queries : s_pairs.n); i++)
-        right = right && counts[i] == 0;
-    if (right && s_pairs.has_queries) {
-        right = hs_pairs_count(&s_pairs.among, &options, &n, NULL) == HS_OK && n == expected->n;
-    }
-    return right;
-}
-
-/* Pairs that are found unsorted are the same, and their order is that of any kernel and any number
- * of threads. */
-static bool
-unsorted_are(hs_options options, const hs_pairs *sorted)
-{
-    hs_pairs *first = NULL;
-    bool      right = hs_pairs_find(&s_pairs.among, &options, &first, NULL) == HS_OK;
-    right = right && hs_pairs_length(first) == hs_pairs_length(sorted);
-    const char *names[16];
-    const int   n_kernels = hs_kernel_names(names, 16);
-    for (int k = 0; right && k < n_kernels; k++) {
-        hs_pairs *again = NULL;
-        options.kernel = names[k];
-        options.threads = 1 + k % 3;
-        right = hs_pairs_find(&s_pairs.among, &options, &again, NULL) == HS_OK &&
-                hs_pairs_length(again) == hs_pairs_length(first) &&
-                block_matches(first, again, 0, s_pairs.of.scene.ndim);
-        hs_pairs_free(again);
-    }
-    if (right) { /* sorted, they are the sorted ones */
-        const int64_t  n = hs_pairs_length(first);
-        uint64_t      *keys = array_of(n, sizeof *keys);
-        const int64_t *i = hs_pairs_array(first, HS_WANT_I), *j = hs_pairs_array(first, HS_WANT_J);
-        const int64_t *I = hs_pairs_array(sorted, HS_WANT_I);
-        const int64_t *J = hs_pairs_array(sorted, HS_WANT_J);
-        for (int64_t e = 0; e < n; e++)
-            keys[e] = (uint64_t)i[e] << 32 | (uint64_t)j[e];
-        qsort(keys, (size_t)n, sizeof *keys, compare_keys);
-        for (int64_t e = 0; right && e < n; e++)
-            right = keys[e] == ((uint64_t)I[e] << 32 | (uint64_t)J[e]);
-        free(keys);
-    }
-    hs_pairs_free(first);
-    return right;
-}
-
-static bool
-half_list_is_right(int threads)
-{
-    hs_options options = reach_options(&s_pairs);
-    brute_list expected;
-    hs_pairs  *found = NULL;
-    options.want = WANT_ALL;
-    options.threads = threads;
-    options.sorted = true;
-    reach_find(&s_pairs, REACH_HALF, &expected);
-    bool right = hs_pairs_find(&s_pairs.among, &options, &found, NULL) == HS_OK;
-    right = right && reach_matches(&s_pairs, found, &expected);
-    options.sorted = false;
-    right = right && unsorted_are(options, found) && counts_are(options, &expected, REACH_HALF);
-    hs_pairs_free(found);
-    brute_free(&expected);
-    return right;
-}
-
-static bool
-rows_are_right(int threads)
-{
-    hs_options options = reach_options(&s_pairs);
-    brute_list expected;
-    hs_pairs  *rows = NULL;
-    options.want = WANT_ALL;
-    options.threads = threads;
-    reach_find(&s_pairs, REACH_ROWS, &expected);
-    bool right = hs_neighbors_find(&s_pairs.among, &options, &rows, NULL) == HS_OK;
-    right = right && reach_matches(&s_pairs, rows, &expected);
-    right = right && hs_pairs_rows(rows) == (s_pairs.has_queries ? s_pairs.n_queries : s_pairs.n);
-    for (int64_t e = 0; right && e < expected.n; e++) {
-        const int64_t *offsets = hs_pairs_offsets(rows), i = expected.pairs[e].i;
-        right = offsets[i] <= e && e < offsets[i + 1];
-    }
-    right = right && hs_pairs_offsets(rows)[hs_pairs_rows(rows)] == expected.n;
-    right = right && counts_are(options, &expected, REACH_ROWS);
-    hs_pairs_free(rows);
-    n_pairs += expected.n;
-    brute_free(&expected);
-    return right;
-}
-
-/* By several searches or, in every other eleven trials, by one. */
-static void
-check_scene(int trial, const char *what)
-{
-    const int  threads = trial % 4 == 3 ? 3 : 1;
-    const int  before = harness_failures;
-    const bool joins = hs_test_join_levels(trial / 11 % 2);
-    if (has_half_list()) {
-        CHECK(half_list_is_right(threads));
-    }
-    CHECK(rows_are_right(threads));
-    (void)hs_test_join_levels(joins);
-    if (harness_failures != before) {
-        fprintf(stderr, "%s %d: rule %d, %d types\n", what, trial, (int)s_pairs.reach.rule,
-                (int)s_pairs.reach.n_types);
-    }
-}
-
-/* More queries than points, fewer, and none of either. */
-static void
-two_sets_find_what_the_brute_force_finds(void)
-{
-    static const int sizes[][2] = {{25, 6}, {6, 25}, {15, 15}, {0, 10}, {10, 0}, {1, 40}};
-    harness_random   random = {20261};
-    for (int trial = 0; trial < TRIALS(1000); trial++) {
-        const int *size = sizes[trial / 7 % 6];
-        reach_make(&random, (scene_kind)(trial % SCENE_KINDS), 1 + trial % 3, size[0], size[1],
-                   (hs_rule)(trial % (HS_RULE_END + 1)), 0, &s_pairs);
-        check_scene(trial, "two sets");
-    }
-}
-
-/* Up to the axes that there are, and numbers near the ends of what there is. */
-static void
-axes_and_exponents_make_no_difference(void)
-{
-    static const int exponents[] = {1010, -1000, -400, 500};
-    harness_random   random = {20262};
-    for (int trial = 0; trial < TRIALS(200); trial++) {
-        const bool is_far = trial % 2;
-        const int  ndim = is_far ? 1 + trial / 2 % 3 : 4 + trial / 2 % 5;
-        const int  n_queries = trial % 3 ? -1 : 7;
-        const int  kind = ndim > 4 ? SCENE_OPEN : trial / 2 % SCENE_KINDS;
-        const int  exponent = is_far ? exponents[trial / 2 % 4] : 0;
-        reach_make(&random, (scene_kind)kind, ndim, 12, n_queries,
-                   (hs_rule)(trial / 3 % (HS_RULE_END + 1)), exponent, &s_pairs);
-        if (s_pairs.reach.n_types > 0) {
-            s_pairs.bound = 0x1p1020;
-        }
-        if (exponent == 1010) {
-            s_pairs.of.x[0] = 0x1p-1070; /* a digit that scaling would lose: originals are kept */
-        }
-        check_scene(trial, "axes");
-    }
-}
-
 /* Where nothing is rounded, float32 and the formula of float64 find what exact arithmetic does. */
 static void
 precisions_agree_on_small_integers(void)
 {
-    harness_random random = {20263};
+    static reach_scene s;
+    harness_random     random = {20263};
     for (int trial = 0; trial < TRIALS(300); trial++) {
         const hs_rule rule = (hs_rule)(trial % (HS_RULE_END + 1));
-        reach_make(&random, SCENE_OPEN, 1 + trial % 3, 25, trial % 5 ? -1 : 9, rule, 0, &s_pairs);
-        for (int e = 0; e < 34 * s_pairs.of.scene.ndim; e++)
-            s_pairs.of.x[e] = (double)random_below(&random, 6);
+        hs_pairs     *exact = NULL;
+        reach_make(&random, SCENE_OPEN, 1 + trial % 3, 25, trial % 5 ? -1 : 9, rule, 0, &s);
+        for (int e = 0; e < 34 * s.of.scene.ndim; e++)
+            s.of.x[e] = (double)random_below(&random, 6);
         for (int i = 0; i < 34; i++)
-            s_pairs.radii[i] = 0.5 * random_below(&random, 5);
+            s.radii[i] = 0.5 * random_below(&random, 5);
         for (int e = 0; e < REACH_TYPES * REACH_TYPES; e++)
-            s_pairs.table[e] = (e % REACH_TYPES + e / REACH_TYPES) % 5 - (trial % 2);
-        brute_list expected;
-        reach_find(&s_pairs, REACH_ROWS, &expected);
+            s.table[e] = (e % REACH_TYPES + e / REACH_TYPES) % 5 - (trial % 2);
         for (int precision = HS_EXACT; precision <= HS_SINGLE; precision++) {
-            hs_options options = reach_options(&s_pairs);
+            hs_options options = reach_options(&s);
             hs_pairs  *rows = NULL;
-            options.want = HS_WANT_I | HS_WANT_J;
             options.precision = (hs_precision)precision;
-            CHECK(hs_neighbors_find(&s_pairs.among, &options, &rows, NULL) == HS_OK);
-            CHECK(hs_pairs_length(rows) == expected.n);
-            const int64_t *i = hs_pairs_array(rows, HS_WANT_I),
-                          *j = hs_pairs_array(rows, HS_WANT_J);
-            for (int64_t e = 0; e < expected.n && e < hs_pairs_length(rows); e++)
-                CHECK(i[e] == expected.pairs[e].i && j[e] == expected.pairs[e].j);
-            CHECK(counts_are(options, &expected, REACH_ROWS));
-            hs_pairs_free(rows);
+            CHECK(hs_neighbors_find(&s.among, &options, &rows, NULL) == HS_OK);
+            exact = precision == HS_EXACT ? rows : exact;
+            const size_t bytes = 8 * (size_t)hs_pairs_length(exact);
+            CHECK(hs_pairs_length(rows) == hs_pairs_length(exact));
+            for (unsigned which = HS_WANT_I; which <= HS_WANT_J; which *= 2)
+                CHECK(memcmp(hs_pairs_array(rows, which), hs_pairs_array(exact, which), bytes) ==
+                      0);
+            if (precision != HS_EXACT)
+                hs_pairs_free(rows);
         }
-        brute_free(&expected);
+        hs_pairs_free(exact);
     }
 }
 
@@ -848,6 +536,32 @@ shifts_that_do_not_fit_name_the_callers_row(void)
     CHECK(found == NULL && failure.row == 0 && failure.in_queries);
 }
 
+/* Of many points and of many queries, which are read a hundred thousand at a time. */
+static void
+bad_rows_are_named_among_many(void)
+{
+    enum { ROWS_READ = (1 << 17) + 40, BAD = ROWS_READ - 7 };
+    double *x = array_of(ROWS_READ, sizeof *x), *radii = array_of(ROWS_READ, sizeof *radii);
+    for (int64_t i = 0; i < ROWS_READ; i++) {
+        x[i] = i == BAD ? NAN : (double)i;
+        radii[i] = 0.25;
+    }
+    for (int asks = 0; asks < 2; asks++) {
+        const hs_points few = {x, 9, 1, HS_FLOAT64, 8, 8}, many = {x, ROWS_READ, 1, 1, 8, 8};
+        const hs_reach  reach = {.rule = HS_RULE_SUM, .radii = radii, .query_radii = radii};
+        const hs_among  among = {
+             .points = asks ? &few : &many, .queries = asks ? &many : &few, .reach = &reach};
+        hs_options options = hs_options_default();
+        hs_failure failure;
+        int64_t    n;
+        options.cutoff = 1.0;
+        CHECK(hs_pairs_count(&among, &options, &n, &failure) == HS_ERR_NOT_FINITE);
+        CHECK(failure.row == BAD && failure.column == 0 && failure.in_queries == (asks == 1));
+    }
+    free(x);
+    free(radii);
+}
+
 /* Each set needs the radii that the rule looks at, and no more; sets without points need none. */
 static void
 both_sets_need_what_the_rule_looks_at(void)
@@ -965,14 +679,13 @@ test_api_reach(void)
 {
     RUN(threads_make_no_difference);
     RUN(one_refusal_ends_any_entry);
-    RUN(two_sets_find_what_the_brute_force_finds);
-    RUN(axes_and_exponents_make_no_difference);
     RUN(precisions_agree_on_small_integers);
     RUN(bad_supports_are_refused);
     RUN(what_is_no_table_is_refused);
     RUN(types_take_any_rule);
     RUN(tables_have_no_extent);
     RUN(shifts_that_do_not_fit_name_the_callers_row);
+    RUN(bad_rows_are_named_among_many);
     RUN(both_sets_need_what_the_rule_looks_at);
     RUN(kernel_and_box_are_checked_where_nothing_is_searched);
     RUN(other_functions_refuse_a_reach);

@@ -56,12 +56,13 @@ check_scenes(int first, int end)
     const char         *kernels[16];
     const int           n_kernels = hs_kernel_names(kernels, 16);
     harness_random      random = {20261127 + (uint64_t)first};
-    for (int trial = 0; trial < THIRD_OF_TRIALS(72); trial++) {
-        const int  ndim = 1 + trial / SCENE_KINDS % 4;
+    for (int trial = 0; trial < THIRD_OF_TRIALS(96); trial++) {
+        const int  ndim = 1 + trial / SCENE_KINDS % 8;
         const int  n = random_below(&random, ndim > 3 ? 30 : trial % 5 == 0 ? 300 : 80);
         brute_list expected;
-        make_scene(&random, trial % SCENE_KINDS, ndim, n, trial % 4 == 3 ? 40.0 : 4.0,
-                   trial % 16 == 7 ? 300 : 0, &s);
+        make_scene(&random, ndim > 4 ? SCENE_OPEN : trial % SCENE_KINDS, ndim, n,
+                   trial % 4 == 3 ? 40.0 : 4.0, trial % 8 == 7 ? (trial % 16 == 7 ? 300 : -400) : 0,
+                   &s);
         if (trial % 5 == 0) /* many cells */
             s.scene.cutoff *= 0.25;
         kernel_to_check = kernels[trial % n_kernels];
@@ -112,9 +113,42 @@ selections_cells_and_lists(void)
     check_scenes(10, ANSWER_CHECKS);
 }
 
+/* Boxes of whole multiples of the cutoff, or one rounding beside: cells just as wide as it is, with
+ * many points on their faces. */
+static void
+points_on_faces_of_cells(void)
+{
+    enum { N = 300 };
+    static double  x[3 * N];
+    harness_random random = {1234};
+    for (int trial = 0; trial < TRIALS(120); trial++) {
+        const int    d = 1 + trial % 3, parts = 2 + random_below(&random, d == 1 ? 60 : 9);
+        const double length = random_below(&random, 2) ? 1.0 : 0.5 + random_unit(&random);
+        const double lower = random_below(&random, 2) ? 0.0 : random_unit(&random) - 0.5;
+        hs_box       box = {.ndim = d, .periodic = {true, true, true}};
+        brute_list   expected;
+        brute_scene  scene = {.ndim = d, .n = N, .x = x, .inclusive = random_below(&random, 2)};
+        scene.cutoff = steps_from(length / parts, random_below(&random, 5) - 2);
+        for (int k = 0; k < d; k++)
+            box.rows[k][k] = length;
+        scene.box = trial % 2 ? &box : NULL;
+        for (int e = 0; e < d * N; e++)
+            x[e] = lower + length * (random_below(&random, 3) ? random_below(&random, 64) / 64.0
+                                                              : random_unit(&random));
+        for (int k = 0; k < d; k++)
+            x[k] = lower, x[d + k] = lower + length;
+        algorithm_to_check = HS_GRID;
+        CHECK(brute_find(&scene, 1e7, &expected));
+        CHECK(pairs_difference(&scene, &expected, 50) == NULL);
+        brute_free(&expected);
+    }
+    algorithm_to_check = HS_AUTO;
+}
+
 void
 test_api_seeds(void)
 {
+    RUN(points_on_faces_of_cells);
     RUN(seeds_of_the_first_part);
     RUN(seeds_of_the_second_part);
     RUN(seeds_of_the_third_part);

@@ -306,7 +306,7 @@ static void
 the_largest_boxes_are_measured_and_wrapped_into(void)
 {
     hs_box  box = {.ndim = 2, .periodic = {true, true}};
-    double  x[4] = {0x1.8p1023, 0x1p1021, -0x1p1022, -0x1.cp1023}, heights[2], wrapped[4];
+    double  x[4] = {0x1.8p1023, 0x1p1021, -0x1p1022, -0x1.cp1023}, heights[2], wrapped[4], volume;
     int64_t shift[4];
     for (int exponent = 0; exponent > -80; exponent--) {
         double scaled[4];
@@ -318,6 +318,9 @@ the_largest_boxes_are_measured_and_wrapped_into(void)
         box.rows[0][0] = box.rows[1][1] = length;
         CHECK(hs_box_measure(&box, heights, NULL, NULL) == HS_OK);
         CHECK(heights[0] == length && heights[1] == length);
+        const hs_box flat = {
+            2, {true, true}, {{length}, {0.0, 0x1p-1000}, {NAN}}}; /* of two rows */
+        CHECK(hs_box_measure(&flat, NULL, &volume, NULL) == HS_OK && volume == length * 0x1p-1000);
         CHECK(hs_box_wrap(&box, &points, wrapped, shift, NULL) == HS_OK);
         CHECK(wrapped[0] == 0.5 * length && shift[0] == -1);
         CHECK(wrapped[1] == scaled[1] && shift[1] == 0);
@@ -598,6 +601,10 @@ arguments_are_checked(void)
     CHECK(measure_two(2, x, &box, bad[1], MEASURED, NULL) == HS_ERR_ARGUMENT);
     CHECK(measure_two(2, x, &mixed, bad[2], MEASURED, NULL) == HS_ERR_ARGUMENT);
     CHECK(measure_two(2, x, &mixed, bad[3], MEASURED, NULL) == HS_OK);
+    mixed.periodic[0] = false;
+    mixed.periodic[1] = true;
+    CHECK(measure_two(2, x, &mixed, bad[2], MEASURED, NULL) == HS_OK);
+    CHECK(measure_two(2, x, &mixed, bad[3], MEASURED, NULL) == HS_ERR_ARGUMENT);
     for (int k = 0; k < 4; k++) {
         first[0] = numbers[k][0];
         second[0] = numbers[k][1];
@@ -733,6 +740,19 @@ places_need_a_largest_coordinate(void)
     const hs_points none = {x, 0, 2, HS_FLOAT64, 16, 8};
     CHECK(hs_box_places(&box, &none, 1.0, 5.0, NULL, 0, &axes, NULL) == HS_OK);
     CHECK(isinf(axes.reach[0]) && isinf(axes.reach[1]));
+    /* nor where one box vector is lost in what another one's turns are rounded by */
+    const hs_box    flat = {.ndim = 3,
+                            .periodic = {true, true, true},
+                            .rows = {{0x1.8p-79, 0x1p-10}, {0, 0x1.8p-71, 1}, {0, 0, 0x1.8p-43}}};
+    const hs_points nowhere = {x, 0, 3, HS_FLOAT64, 24, 8};
+    CHECK(hs_box_places(&flat, &nowhere, 0x1p40, 0x1p42, NULL, 0, &axes, NULL) == HS_OK);
+    CHECK(isinf(axes.reach[0]) && isinf(axes.reach[1]));
+    /* of pairs that are surely in one image, and of points on one spot */
+    const hs_box even = {.ndim = 2, .periodic = {true, true}, .rows = {{1, 0}, {0.25, 1}}};
+    CHECK(hs_box_places(&even, &none, 0.1, 0.05, NULL, 0, &axes, NULL) == HS_OK);
+    CHECK(axes.reach[0] < 0.2 && axes.reach[1] < 0.2);
+    CHECK(hs_box_places(NULL, &none, 0.0, 0.0, NULL, 0, &axes, NULL) == HS_OK);
+    CHECK(axes.reach[0] >= 0.0 && axes.reach[0] < 1e-10);
 }
 
 void

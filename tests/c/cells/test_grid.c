@@ -149,6 +149,9 @@ endless_ranges_are_refused(void)
     scene_grid_unit.lattice.normal[0][0] = 1.0;
     CHECK(hs_grid_begin(&scene_grid_unit, &density, &grid, &failure) == HS_OK);
     CHECK(grid.range[0] >= 0.25 && grid.range[0] < 0.2500001);
+    scene_grid_unit.lattice.row_error[0] = 0x1p-20; /* of each image that a pair may be away */
+    CHECK(hs_grid_begin(&scene_grid_unit, &density, &grid, &failure) == HS_OK);
+    CHECK(grid.range[0] > 0.25 + 0x1p-20 && grid.range[0] < 0.2501);
     close_scene();
 }
 

@@ -421,6 +421,7 @@ single_calls_survive_refused_memory(void)
                 brute.has[key] = true;
                 memcpy(brute.position[key], x, sizeof x);
             }
+            copy = list;
             if (hs_dynamic_copy(list, &copy) != HS_OK)
                 CHECK(copy == NULL && hs_dynamic_copy(list, &copy) == HS_OK);
             if (hs_dynamic_shrink_to_fit(list) != HS_OK)

@@ -456,6 +456,35 @@ sums_are_rounded_once(void)
 }
 
 /* Weights with places of their own need two arrays; more sums than can be counted are refused. */
+/* As often as limbs bear without being carried, and again after that. */
+static void
+limbs_do_not_overflow(void)
+{
+    const double weight = ldexp(1.0, 53) - 1.0;
+    hs_weights   of = weights_of(&weight, 1);
+    hs_sums      sums;
+    CHECK(hs_sums_init(NULL, 1, &of, &of, &sums) == HS_OK);
+    for (int round = 0; round < 3; round++) {
+        sums.n_added = HS_SUMS_MOST_ADDED;
+        for (int e = 0; e < sums.n_limbs - 1; e++) {
+            sums.limbs[e] += UINT32_MAX * (HS_SUMS_MOST_ADDED - 1);
+        }
+        hs_sums_expect(&sums, 1);
+        CHECK(sums.n_added == 1);
+        for (int e = 0; e < sums.n_limbs - 1; e++) {
+            CHECK(sums.limbs[e] >= 0 && sums.limbs[e] <= UINT32_MAX);
+            sums.limbs[e] = 0;
+        }
+        sums.limbs[sums.n_limbs - 1] = 0;
+        hs_sums_add(sums.limbs, of.value[0], -of.value[0], 0);
+        hs_sums_carry(&sums);
+        CHECK(hs_sums_round(&sums, 0) == -(weight * weight));
+        memset(sums.limbs, 0, (size_t)sums.n_limbs * sizeof *sums.limbs);
+    }
+    hs_sums_free(NULL, &sums);
+    hs_weights_free(NULL, &of);
+}
+
 static void
 sums_need_memory(void)
 {
@@ -488,5 +517,6 @@ test_histogram(void)
     RUN(slots_are_those_of_the_bands);
     RUN(nothing_is_below_zero);
     RUN(sums_are_rounded_once);
+    RUN(limbs_do_not_overflow);
     RUN(sums_need_memory);
 }

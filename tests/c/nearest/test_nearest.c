@@ -10,8 +10,8 @@
 #include "../../../csrc/core/nearest/nearest.h"
 #include "../../../csrc/core/nearest/rank.h"
 #include "../support/among.h"
+#include "../support/answers.h"
 #include "../support/harness.h"
-#include "../support/nearest_checks.h"
 #include "../support/nearest_unit.h"
 #include "../support/pair_checks.h"
 #include "../support/poll_checks.h"
@@ -130,7 +130,7 @@ rows_end_at_the_largest_distance(void)
 /* Squares of what is far beyond the first guess would overflow, those of what is far below it would
  * vanish: the unit changes, up and down to the last that there is. */
 static void
-check_radii(const double *x)
+check_two_points(const double *x)
 {
     const hs_points  points = points_on_line(x, 2);
     const hs_options options = hs_options_default();
@@ -154,10 +154,10 @@ check_radii(const double *x)
 static void
 radii_are_found_far_from_a_guess(void)
 {
-    check_radii((const double[2]){-0x1.fp900, 0x1.fp900});
-    check_radii((const double[2]){0.0, 0x1.fp-900});
-    check_radii((const double[2]){-0x1p-500, 0x1.fp-470});
-    check_radii((const double[2]){0x1p500, 0x1.fp470});
+    check_two_points((const double[2]){-0x1.fp900, 0x1.fp900});
+    check_two_points((const double[2]){0.0, 0x1.fp-900});
+    check_two_points((const double[2]){-0x1p-500, 0x1.fp-470});
+    check_two_points((const double[2]){0x1p500, 0x1.fp470});
 }
 
 /* Nearest search: rows of nearest points are right where groups, ranges of them, images and ties
@@ -174,10 +174,8 @@ points_that_wrapping_makes_equal(void)
         x[2 * i] = i % 20 + 0.25;
         x[2 * i + 1] = 0.25 * (i / 20);
     }
-    for (int64_t k = 1; k < 100; k += 14) {
-        CHECK(compare_rows(&scene, -1, k, 1) > 0);
-        CHECK(compare_rows(&scene, 20, k, 1) > 0);
-    }
+    for (int salt = 0; salt < 14; salt++)
+        CHECK(nearest_are_right(&scene, (uint64_t)salt));
 }
 
 /* Scales in one search that are far apart: clusters that are nothing beside their distances. */
@@ -196,7 +194,7 @@ clusters_of_all_sizes(void)
             for (int k = 0; k < 2; k++)
                 x[2 * i + k] = ldexp(random_unit(&random) - 0.5, spread) + i % 3;
         }
-        CHECK(compare_rows(&scene, trial % 5 ? -1 : 40, 1 + random_below(&random, 20), 1) > 0);
+        CHECK(nearest_are_right(&scene, (uint64_t)trial));
     }
 }
 
@@ -320,8 +318,7 @@ long_boxes_have_many_images(void)
         box.rows[0][0] = box.rows[1][1] = 1.0;
         box.rows[2][2] = trial % 4 < 2 ? 1e6 : 1e15;
         box.rows[1][0] = trial % 3 ? 0.25 : 0.0;
-        CHECK(compare_rows(&scene, -1, 10, 1) > 0);
-        CHECK(compare_rows(&scene, scene.n / 2, 10, 1) > 0);
+        CHECK(nearest_are_right(&scene, (uint64_t)trial));
         check_unlimited(&scene, 10);
     }
 }
@@ -388,6 +385,12 @@ many_points_can_be_stopped(void)
     CHECK(wrong == 0 && nearer == K);
     hs_pairs_free(rows);
     CHECK(stop_everywhere(&scene, &query, K, 12) > 12);
+    for (int64_t polls = 0; polls < 40; polls++) { /* while the tree is made */
+        rows = NULL;
+        CHECK(find_until(&scene, &query, 1, polls, NULL, &rows) != HS_ERR_INTERRUPTED ||
+              rows == NULL);
+        hs_pairs_free(rows);
+    }
     free(x);
 }
 

@@ -3,7 +3,7 @@
 #include "../../../csrc/core/nearest/rank.h"
 #include "../support/among.h"
 #include "../support/harness.h"
-#include "../support/nearest_checks.h"
+#include "../support/pair_checks.h"
 #include "../support/nearest_unit.h"
 
 #include <math.h>

@@ -277,9 +277,45 @@ distances_are_kept_between_edges(void)
     hs_shells_free(NULL, &shells);
 }
 
+/* A cutoff of so many boxes that a neighbourhood has tens of thousands of rows: where these are
+ * gone through a caller can stop, and a few points are a sample. */
+static void
+neighbourhoods_of_many_rows_can_be_stopped(void)
+{
+    hs_box          box = {5, {true, true, true, true}, {{1}, {0, 1}, {0, 0, 1}, {0, 0, 0, 1}}};
+    static double   x[5 * 16];
+    hs_options      options = hs_options_default();
+    hs_pairs       *pairs = NULL;
+    int64_t         left, n, count = -1;
+    const hs_points one = {x, 1, 4, HS_FLOAT64, 40, 8}, many = {x, 16, 5, HS_FLOAT64, 40, 8};
+    for (int i = 1; i < 16; i += 2)
+        x[5 * i + 4] = 40.0; /* so far apart that density tells nothing */
+    options.cutoff = 34.0;
+    options.poll = stop_after;
+    options.poll_context = &left;
+    options.threads = 1;
+    for (int limited = 0; limited < 2; limited++) { /* found with an estimate, or counted */
+        hs_status status = HS_ERR_INTERRUPTED;
+        options.memory_limit = limited ? 1e9 : INFINITY;
+        box.ndim = limited ? 5 : 4;
+        for (n = 0; status == HS_ERR_INTERRUPTED; n++) {
+            left = n;
+            status = limited ? hs_pairs_find(AMONG(&many, &box), &options, &pairs, NULL)
+                             : hs_pairs_count(AMONG(&one, &box), &options, &count, NULL);
+        }
+        CHECK(n > 2 && status == (limited ? HS_ERR_MEMORY : HS_OK) && pairs == NULL);
+    }
+    box.ndim = 4;
+    options.poll = NULL;
+    options.memory_limit = INFINITY;
+    options.cell_size = 0.25; /* cells are made wider where neighbourhoods have so many rows */
+    CHECK(hs_pairs_count(AMONG(&one, &box), &options, &n, NULL) == HS_OK && n == count);
+}
+
 void
 test_search(void)
 {
+    RUN(neighbourhoods_of_many_rows_can_be_stopped);
     RUN(cells_that_cannot_be_narrowed_are_refused);
     RUN(small_scenes_are_known_exactly);
     RUN(what_is_left_is_asked_for_if_it_matters);

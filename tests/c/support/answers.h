@@ -7,9 +7,12 @@
 #ifndef HS_ANSWERS_H
 #define HS_ANSWERS_H
 
+#include "../../../csrc/core/levels/levels.h"
 #include "pair_checks.h"
 
-enum { ANSWER_POINTS = 400, ANSWER_TYPES = 3, ANSWER_EDGES = 4 };
+#include <stdio.h>
+
+enum { ANSWER_POINTS = 400, ANSWER_TYPES = 3, ANSWER_EDGES = 12 };
 
 /* A scene, its pairs, and what is chosen for it by `salt`. */
 typedef struct asked {
@@ -26,6 +29,7 @@ typedef struct asked {
     hs_reach           reach;
     hs_selection       selection;
     int                quarters; /* radii count so many quarters */
+    int                n_edges;
     double             edges[ANSWER_EDGES];
     double             radii[ANSWER_POINTS], weights[ANSWER_POINTS], ellipsoids[ANSWER_POINTS * 9];
     double             table[ANSWER_TYPES * ANSWER_TYPES];
@@ -365,26 +369,27 @@ nearest_difference(const asked *a, const hs_pairs *rows, int64_t k, brute_list a
 static inline const char *
 check_nearest(asked *a)
 {
-    const int64_t first[] = {0, a->split, a->split, a->n}, k = 1 + (int64_t)chosen(a, 6);
-    hs_systems    systems = {.n = 3, .first = first, .box = a->scene->box};
-    hs_options    options = a->options;
-    const char   *difference = NULL;
+    const int64_t first[] = {0, a->split, a->split, a->n},
+                  k = 1 + (int64_t)chosen(a, chosen(a, 6) ? 6 : 150);
+    hs_systems  systems = {.n = 3, .first = first, .box = a->scene->box};
+    hs_options  options = a->options;
+    const char *difference = NULL;
     options.index_bytes = 8;
-    for (int kind = 0; a->scene->inclusive && difference == NULL && kind < 4; kind++) {
+    for (int kind = 0; a->scene->inclusive && difference == NULL && kind < 5; kind++) {
         hs_pairs       *rows = NULL;
-        const bool      is_across = kind == 1, has_systems = kind == 2;
+        const bool      is_across = kind == 1 || kind == 4, has_systems = kind == 2;
         const hs_among  among = {.points = is_across ? &a->rest : &a->points,
                                  .queries = is_across ? &a->first : NULL,
                                  .box = a->scene->box};
         hs_cells       *cells = NULL;
         const hs_status built =
-            kind < 3 ? HS_OK : hs_cells_build(&a->points, a->scene->box, &options, &cells, NULL);
-        const hs_among  in_cells = {.cells = cells};
+            kind < 3 ? HS_OK : hs_cells_build(among.points, among.box, &options, &cells, NULL);
+        const hs_among  in_cells = {.cells = cells, .queries = among.queries};
         const hs_status status =
             built != HS_OK ? built
             : has_systems
                 ? hs_systems_nearest(&a->points, NULL, &systems, k, &options, &rows, NULL)
-                : hs_nearest_find(kind == 3 ? &in_cells : &among, k, &options, &rows, NULL);
+                : hs_nearest_find(kind > 2 ? &in_cells : &among, k, &options, &rows, NULL);
         if (status != HS_OK)
             difference = hs_status_text(status);
         else
@@ -405,56 +410,69 @@ TRUTH int
 bin_of(const asked *a, const brute_pair *pair, bool inclusive)
 {
     int k = 0;
-    while (k < ANSWER_EDGES - 1 && !is_within_sum(a, pair, 1, a->edges[k], 0.0, inclusive))
+    while (k < a->n_edges - 1 && !is_within_sum(a, pair, 1, a->edges[k], 0.0, inclusive))
         k++;
     return k;
 }
 
-/* Of one set, between two, and of systems. */
+/* Of one set, between two, and of systems; of the first two in cells, too. */
 static inline const char *
 check_histogram(asked *a)
 {
     enum { SIZE = ANSWER_TYPES * ANSWER_TYPES * ANSWER_EDGES };
-    const int64_t first[] = {0, a->split, a->split, a->n};
-    for (int kind = 0; kind < 3; kind++) {
+    static const double factors[] = {1.0, 1.75, 0.5};
+    const int64_t       first[] = {0, a->split, a->split, a->n};
+    const int           types = 1 + (int)chosen(a, ANSWER_TYPES), size = types * types * a->n_edges;
+    for (int kind = 0; kind < 5; kind++) {
         static int64_t   counts[3 * SIZE], wanted[3 * SIZE];
         static double    sums[3 * SIZE], wanted_sums[3 * SIZE];
-        const bool       inclusive = a->scene->inclusive && chosen(a, 2), is_across = kind == 1;
+        const bool       inclusive = a->scene->inclusive && chosen(a, 2), is_across = kind % 2;
         const int64_t    from = is_across ? a->split : 0;
         const hs_systems systems = {.n = 3, .first = first, .box = a->scene->box};
-        const hs_among   among = {.points = is_across ? &a->rest : &a->points,
+        hs_among         among = {.points = is_across ? &a->rest : &a->points,
                                   .queries = is_across ? &a->first : NULL,
                                   .box = a->scene->box};
-        hs_histogram     histogram = {.n_edges = ANSWER_EDGES,
+        hs_histogram     histogram = {.n_edges = a->n_edges,
                                       .edges = a->edges,
                                       .inclusive = inclusive,
                                       .last_inclusive = a->scene->inclusive,
-                                      .n_types = ANSWER_TYPES,
+                                      .n_types = types,
                                       .of_points = {a->types + from, a->weights + from},
                                       .of_queries = {a->types, a->weights},
                                       .counts = counts,
                                       .sums = sums};
+        for (int64_t i = 0; i < a->n; i++)
+            a->types[i] %= types;
         memset(wanted, 0, sizeof wanted);
         memset(wanted_sums, 0, sizeof wanted_sums);
         for (int64_t e = 0; e < a->half->n; e++) {
             const brute_pair *pair = &a->half->pairs[e];
             const int         s = a->types[pair->i], t = a->types[pair->j];
-            if ((kind == 1 && !is_asked_across(a, pair)) ||
+            if ((is_across && !is_asked_across(a, pair)) ||
                 (kind == 2 && !is_of_one_system(a, pair)))
                 continue;
             for (int way = 0; way < 1 + (!is_across && s != t); way++) {
-                const int to = (kind == 2 && pair->i >= a->split ? 2 * SIZE : 0) +
-                               (way ? t * ANSWER_TYPES + s : s * ANSWER_TYPES + t) * ANSWER_EDGES +
+                const int to = (kind == 2 && pair->i >= a->split ? 2 * size : 0) +
+                               (way ? t * types + s : s * types + t) * a->n_edges +
                                bin_of(a, pair, inclusive);
                 wanted[to]++;
                 wanted_sums[to] += a->weights[pair->i] * a->weights[pair->j];
             }
         }
-        const hs_status status =
-            kind == 2
-                ? hs_systems_histogram(&a->points, NULL, &systems, &a->options, &histogram, NULL)
-                : hs_pairs_histogram(&among, &a->options, &histogram, NULL);
-        const size_t n = kind == 2 ? 3 * SIZE : SIZE;
+        hs_options building = a->options;
+        hs_cells  *cells = NULL;
+        hs_status  status = HS_OK;
+        building.cutoff *= factors[chosen(a, 3)];
+        if (kind > 2) {
+            status = hs_cells_build(among.points, among.box, &building, &cells, NULL);
+            among = (hs_among){.cells = cells, .queries = among.queries};
+        }
+        if (status == HS_OK)
+            status = kind == 2 ? hs_systems_histogram(&a->points, NULL, &systems, &a->options,
+                                                      &histogram, NULL)
+                               : hs_pairs_histogram(&among, &a->options, &histogram, NULL);
+        hs_cells_free(cells);
+        const size_t n = (size_t)(kind == 2 ? 3 * size : size);
         if (status != HS_OK)
             return hs_status_text(status);
         if (memcmp(counts, wanted, n * sizeof *counts) != 0)
@@ -473,7 +491,7 @@ check_shells(asked *a)
     hs_options options = a->options;
     hs_pairs  *pairs = NULL;
     options.want |= HS_WANT_SHELL;
-    options.n_shells = ANSWER_EDGES;
+    options.n_shells = a->n_edges;
     options.shells = a->edges;
     const hs_status status =
         hs_pairs_find(AMONG(&a->points, a->scene->box), &options, &pairs, NULL);
@@ -524,11 +542,21 @@ check_clusters(asked *a)
                 turns[of] = (uint8_t)(turns[of] | 1 << l);
         }
     }
-    static int64_t  found[ANSWER_POINTS];
-    const hs_status status = hs_clusters_find(AMONG(&a->points, a->scene->box), &a->options,
-                                              all ? NULL : core, found, winding, &n_found, NULL);
-    if (status != HS_OK)
-        return hs_status_text(status);
+    static int64_t  found[ANSWER_POINTS], again[ANSWER_POINTS];
+    hs_counters     counters;
+    hs_options      options = a->options;
+    const hs_among  among = {.points = &a->points, .box = a->scene->box};
+    const uint8_t  *given = all ? NULL : core;
+    const hs_status without =
+        hs_clusters_find(&among, &options, given, again, NULL, &n_found, NULL);
+    options.index_bytes = 3; /* ignored */
+    options.counters = &counters;
+    const hs_status status =
+        hs_clusters_find(&among, &options, given, found, winding, &n_found, NULL);
+    if (status != HS_OK || without != HS_OK)
+        return hs_status_text(status != HS_OK ? status : without);
+    if (counters.pairs != a->half->n || memcmp(found, again, (size_t)a->n * sizeof *found) != 0)
+        return "another count of pairs in clusters, or labels without windings";
     return n != n_found || memcmp(found, label, (size_t)a->n * sizeof *found) != 0
                ? "another cluster"
            : memcmp(winding, turns, (size_t)n) != 0 ? "another winding"
@@ -635,32 +663,66 @@ check_systems(asked *a)
                          0);
 }
 
-/* Pairs, or rows, by `reach`, and their number. */
+/* Of the points before `split` among the others. */
+static inline const char *
+reach_across(asked *a, kept_fn kept)
+{
+    hs_reach       reach = a->reach;
+    const hs_among among = {
+        .points = &a->rest, .queries = &a->first, .box = a->scene->box, .reach = &reach};
+    brute_list    across = pairs_kept(a, a->half, is_asked_across, false, false);
+    const int64_t matrix = a->d * a->d;
+    int64_t       n = -1;
+    reach.query_radii = reach.radii;
+    reach.radii = reach.radii != NULL ? reach.radii + a->split : NULL;
+    reach.query_types = reach.types;
+    reach.types = reach.types != NULL ? reach.types + a->split : NULL;
+    reach.query_supports = reach.supports;
+    reach.supports = reach.has_supports ? a->ellipsoids + a->split * matrix : NULL;
+    const brute_list expected = pairs_kept(a, &across, kept, false, false);
+    brute_free(&across);
+    const hs_status counted = hs_pairs_count(&among, &a->options, &n, NULL);
+    if (counted == HS_OK && n != expected.n)
+        return "another count within reach between two sets";
+    return rows_difference(a, &among, expected, a->split);
+}
+
+/* Pairs, or rows, by `reach`, and their number; by one search or several. */
 static inline const char *
 reach_difference(asked *a, kept_fn kept)
 {
     const hs_among among = {.points = &a->points, .box = a->scene->box, .reach = &a->reach};
     const bool     by_rows = a->reach.rule >= HS_RULE_GATHER && a->reach.n_types == 0;
+    const bool     joins = hs_test_join_levels(chosen(a, 2) == 0);
+    const char    *difference = NULL;
     hs_pairs      *pairs = NULL;
     int64_t        n = -1;
-    if (by_rows || chosen(a, 4) == 0)
-        return rows_difference(a, &among, pairs_kept(a, &a->both, kept, false, false), 0);
-    brute_list      expected = pairs_kept(a, a->half, kept, false, false);
-    const hs_status counted = hs_pairs_count(&among, &a->options, &n, NULL);
-    if (counted == HS_OK && n != expected.n)
-        return "another count within reach";
-    const hs_status status = hs_pairs_find(&among, &a->options, &pairs, NULL);
-    return difference_of(a, status, pairs, expected, 0);
+    if (chosen(a, 3) == 0) {
+        difference = reach_across(a, kept);
+    } else if (by_rows || chosen(a, 3) == 0) {
+        difference = rows_difference(a, &among, pairs_kept(a, &a->both, kept, false, false), 0);
+    } else {
+        brute_list      expected = pairs_kept(a, a->half, kept, false, false);
+        const hs_status counted = hs_pairs_count(&among, &a->options, &n, NULL);
+        const hs_status status = hs_pairs_find(&among, &a->options, &pairs, NULL);
+        const bool      is_other = counted == HS_OK && n != expected.n;
+        difference = difference_of(a, status, pairs, expected, 0);
+        difference = is_other ? "another count within reach" : difference;
+    }
+    (void)hs_test_join_levels(joins);
+    return difference;
 }
 
-/* Radii and tables are parts of the cutoff, and distances that there are. */
+/* Radii, edges and tables are parts of the cutoff, and distances that there are or a step beside. */
 static inline double
 some_length(asked *a)
 {
     const double cutoff = a->scene->cutoff;
     if (a->half->n > 0 && chosen(a, 3) == 0) {
-        const big    square = square_of(a, &a->half->pairs[chosen(a, (uint64_t)a->half->n)]);
-        const double length = sqrt(big_to_double(&square, -2148));
+        const big square = square_of(a, &a->half->pairs[chosen(a, (uint64_t)a->half->n)]);
+        double    length = sqrt(big_to_double(&square, -2148));
+        if (chosen(a, 2))
+            length = nextafter(length, chosen(a, 2) ? INFINITY : 0.0);
         return length <= cutoff ? length : cutoff;
     }
     return cutoff * (double)chosen(a, 9) * 0.125;
@@ -720,33 +782,53 @@ check_supports(asked *a)
     return reach_difference(a, is_within_supports);
 }
 
-/* Pairs, rows and systems of those that are selected. */
+/* Pairs and rows of those that are selected; a stream keeps what it chooses by. */
 static inline const char *
 check_selection(asked *a)
 {
+    static int64_t groups[ANSWER_POINTS], labels[ANSWER_POINTS];
     const uint64_t which = 1 + chosen(a, 7);
-    a->selection = (hs_selection){.groups = which & 1 ? a->groups : NULL,
-                                  .labels = which & 2 ? a->labels : NULL,
+    a->selection = (hs_selection){.groups = which & 1 ? groups : NULL,
+                                  .labels = which & 2 ? labels : NULL,
                                   .within = which & 2 ? (int64_t)chosen(a, 3) : 0,
                                   .min_distance = which & 4 ? some_length(a) : 0.0};
+    memcpy(groups, a->groups, sizeof groups);
+    memcpy(labels, a->labels, sizeof labels);
     const hs_among among = {.points = &a->points, .box = a->scene->box, .selection = &a->selection};
-    hs_pairs      *pairs = NULL;
+    hs_stream     *stream = NULL;
+    hs_pairs      *pairs = NULL, *block = NULL;
     const char    *difference =
         rows_difference(a, &among, pairs_kept(a, a->half, is_selected, true, false), 0);
-    if (difference != NULL)
-        return difference;
-    const hs_status status = hs_pairs_find(&among, &a->options, &pairs, NULL);
-    return difference_of(a, status, pairs, pairs_kept(a, a->half, is_selected, false, false), 0);
+    brute_list expected = pairs_kept(a, a->half, is_selected, false, false);
+    hs_status  status = hs_stream_open(&among, &a->options, INT64_MAX, &stream, NULL);
+    if (status == HS_OK)
+        status = hs_pairs_find(&among, &a->options, &pairs, NULL);
+    memset(groups, 0, sizeof groups);
+    memset(labels, 0, sizeof labels);
+    if (status == HS_OK)
+        status = hs_stream_next(stream, NULL, NULL, &block, NULL);
+    if (difference == NULL && status == HS_OK &&
+        (block != NULL ? hs_pairs_length(block) : 0) != expected.n)
+        difference = "another stream of what is selected";
+    hs_pairs_free(block);
+    hs_stream_free(stream);
+    if (difference == NULL)
+        return difference_of(a, status, pairs, expected, 0);
+    hs_pairs_free(pairs);
+    brute_free(&expected);
+    return difference;
 }
 
 /* Cells give what a search gives; ranges of candidates hold all of it. */
 static inline const char *
 check_cells(asked *a)
 {
-    hs_options building = a->options;
-    hs_cells  *cells = NULL;
-    hs_pairs  *pairs = NULL, *ranges = NULL;
-    building.cutoff = chosen(a, 3) == 0 ? 0.75 * a->scene->cutoff : a->scene->cutoff;
+    static const double widths[] = {0.0, 0.0, 1.0, 0.5, 0.07, 3.0, INFINITY};
+    hs_options          building = a->options;
+    hs_cells           *cells = NULL;
+    hs_pairs           *pairs = NULL, *ranges = NULL;
+    building.cutoff = (chosen(a, 2) ? 1.0 : 0.75 * (double)chosen(a, 3)) * a->scene->cutoff;
+    building.cell_size = widths[chosen(a, 7)] * (a->scene->cutoff > 0.0 ? a->scene->cutoff : 1.0);
     hs_status   status = hs_cells_build(&a->points, a->scene->box, &building, &cells, NULL);
     const char *difference = NULL;
     if (status == HS_OK)
@@ -880,6 +962,25 @@ check_layout(asked *a)
     return difference_of(a, status, pairs, pairs_kept(a, a->half, NULL, false, false), 0);
 }
 
+/* Cells are about as many as points, and the plan is that of the search that is made. */
+static inline const char *
+check_plan(asked *a)
+{
+    const hs_among  among = {.points = &a->points, .box = a->scene->box};
+    hs_plan         plan;
+    const hs_status status = hs_plan_make(&among, &a->options, &plan, NULL);
+    int64_t         n_cells = 1;
+    if (status != HS_OK)
+        return hs_status_text(status);
+    for (int k = 0; !plan.sparse && k < a->d; k++)
+        n_cells *= plan.shape[k];
+    return n_cells != plan.n_cells && !plan.sparse    ? "another number of cells"
+           : n_cells > 2 * a->n + 64                  ? "more cells than points need"
+           : a->n > 0 && plan.n_periodic != a->rows.m ? "another plan"
+           : plan.all_pairs != (plan.n_cells == 1)    ? "a plan that contradicts itself"
+                                                      : NULL;
+}
+
 static const struct answer_check {
     const char *name;
     const char *(*check)(asked *a);
@@ -889,6 +990,7 @@ static const struct answer_check {
     {"systems", check_systems},   {"radii", check_radii},         {"table", check_table},
     {"supports", check_supports}, {"selection", check_selection}, {"cells", check_cells},
     {"list", check_list},         {"measures", check_measures},   {"layout", check_layout},
+    {"plan", check_plan},
 };
 
 enum { ANSWER_CHECKS = sizeof answer_checks / sizeof answer_checks[0] };
@@ -905,7 +1007,8 @@ static inline const char *
 answer_difference(int number, const brute_scene *scene, const brute_list *half, uint64_t salt,
                   int64_t stride)
 {
-    static asked a;
+    static const double widths[] = {0.3, 0.01, 1.0 + 1e-13, 2.0, 1e-90, 1e90};
+    static asked        a;
     memset(&a, 0, sizeof a);
     a.scene = scene;
     a.half = half;
@@ -925,18 +1028,41 @@ answer_difference(int number, const brute_scene *scene, const brute_list *half, 
     a.options.sorted = true;
     a.options.threads = 1 + (int)chosen(&a, 2);
     a.options.index_bytes = number == 1 || chosen(&a, 2) ? 8 : 4;
+    if (chosen(&a, 3) == 0 && scene->cutoff > 0x1p-700 && scene->cutoff < 0x1p700)
+        a.options.cell_size = widths[chosen(&a, 6)] * scene->cutoff;
     for (int64_t i = 0; i < a.n; i++) {
         a.types[i] = (int32_t)chosen(&a, ANSWER_TYPES);
         a.groups[i] = (int64_t)chosen(&a, 2);
         a.labels[i] = (int64_t)chosen(&a, 8);
         a.weights[i] = (double)chosen(&a, 9) - 4.0;
     }
-    for (int k = 0; k < ANSWER_EDGES; k++)
-        a.edges[k] = k < ANSWER_EDGES - 1 ? some_length(&a) : scene->cutoff;
-    qsort(a.edges, ANSWER_EDGES, sizeof a.edges[0], compare_edges);
+    a.n_edges = 1 + (int)chosen(&a, ANSWER_EDGES);
+    a.edges[a.n_edges - 1] = scene->cutoff;
+    const bool are_close = chosen(&a, 6) == 0; /* so that what float32 cannot tell overlaps */
+    for (int k = a.n_edges - 2; k >= 0; k--)
+        a.edges[k] = are_close ? a.edges[k + 1] * (1.0 - 1e-8 * (double)chosen(&a, 9))
+                               : some_length(&a);
+    qsort(a.edges, (size_t)a.n_edges, sizeof a.edges[0], compare_edges);
     const char *difference = answer_checks[number].check(&a);
     brute_free(&a.both);
     return difference;
+}
+
+/* Whether the nearest within the cutoff are right, of as many and from where `salt` says. */
+static inline bool
+nearest_are_right(const brute_scene *scene, uint64_t salt)
+{
+    brute_scene inclusive = *scene;
+    brute_list  half;
+    inclusive.inclusive = true;
+    if (!brute_find(&inclusive, 1e7, &half))
+        return false;
+    const char *difference = answer_difference(1, &inclusive, &half, salt, 1);
+    if (difference != NULL)
+        fprintf(stderr, "  d = %d, n = %d, cutoff %a, salt %d: %s\n", scene->ndim, (int)scene->n,
+                scene->cutoff, (int)salt, difference);
+    brute_free(&half);
+    return difference == NULL;
 }
 
 #endif
