@@ -66,12 +66,16 @@ find_far_more(void *context)
     const random_scene *s = context;
     const hs_points     points = points_of(&s->scene);
     hs_options          options = hs_options_default();
+    hs_cells           *cells = NULL;
     hs_pairs           *rows = NULL;
-    options.cutoff = INFINITY;
     options.want = HS_WANT_J | HS_WANT_DISTANCE;
-    const hs_status status =
-        hs_nearest_find(AMONG(&points, s->scene.box), 100, &options, &rows, NULL);
+    options.cutoff = 1.0;
+    hs_status status = hs_cells_build(&points, s->scene.box, &options, &cells, NULL);
+    options.cutoff = INFINITY;
+    if (status == HS_OK)
+        status = hs_nearest_find(IN_CELLS(cells), 100, &options, &rows, NULL);
     hs_pairs_free(rows);
+    hs_cells_free(cells);
     return status;
 }
 
@@ -83,6 +87,7 @@ any_allocation_may_be_refused(void)
     static random_scene s;
     make_scene(&random, SCENE_TRICLINIC, 3, 60, 4.0, 0, &s);
     CHECK(fail_each_allocation(find_far_more, &s, 300) > 10);
+    check_arena(find_far_more, &s);
 }
 
 void

@@ -385,12 +385,6 @@ many_points_can_be_stopped(void)
     CHECK(wrong == 0 && nearer == K);
     hs_pairs_free(rows);
     CHECK(stop_everywhere(&scene, &query, K, 12) > 12);
-    for (int64_t polls = 0; polls < 40; polls++) { /* while the tree is made */
-        rows = NULL;
-        CHECK(find_until(&scene, &query, 1, polls, NULL, &rows) != HS_ERR_INTERRUPTED ||
-              rows == NULL);
-        hs_pairs_free(rows);
-    }
     free(x);
 }
 

@@ -65,6 +65,13 @@ allocations_fail_in_a_subtree_that_grows(void)
 {
     tree_search search = {{lopsided, N, 1, HS_FLOAT64, 8, 8}, 1};
     CHECK(fail_each_allocation(search_once, &search, 200) > 10);
+    enum { MANY = 20000 }; /* of several subtrees */
+    static double  x[MANY];
+    harness_random random = {28};
+    for (int i = 0; i < MANY; i++)
+        x[i] = random_unit(&random);
+    search.points = (hs_points){x, MANY, 1, HS_FLOAT64, 8, 8};
+    CHECK(fail_each_allocation(search_once, &search, 200) > 10);
 }
 
 /* Two numbers that nothing lies between, a hundred times each: no middle is below one of them. */

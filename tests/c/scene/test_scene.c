@@ -80,6 +80,26 @@ digits_are_lost_from_the_subnormal_numbers_on(void)
     }
 }
 
+/* Coordinates of a skewed box are wrong by some units in the last place, and no more. */
+static void
+errors_are_bounded_and_small(void)
+{
+    const hs_box     box = {.ndim = 2, .periodic = {true, true}, .rows = {{4.0, 1.0}, {0.0, 4.0}}};
+    const double     x[4] = {1.9, 0.3, -1.7, 1.1};
+    const hs_options options = options_for(0.5, HS_WANT_J, HS_EXACT);
+    hs_failure       failure;
+    const hs_points  points = points_in(x, 2);
+    const hs_sets    sets = {.points = &points};
+    hs_account_init(&account, &options);
+    CHECK(hs_scene_init_sets(&account, NULL, &sets, &box, &options, &one_scene, NULL, &failure) ==
+          HS_OK);
+    for (int k = 0; k < 2; k++) {
+        CHECK(one_scene.t_error[k] >= 4.0 * 0x1p-53 * 1.7 && one_scene.t_error[k] < 0x1p-48);
+        CHECK(one_scene.x_error >= 2.0 * 0x1p-53 * 1.7 && one_scene.x_error < 0x1p-48);
+    }
+    finish();
+}
+
 /* Scene queries: points and queries get one scale and bounds that hold for both, also where
  * queries come later: which of these a scene that was kept takes, step by step. */
 
@@ -702,6 +722,7 @@ test_scene(void)
 {
     RUN(lost_digits_are_kept);
     RUN(digits_are_lost_from_the_subnormal_numbers_on);
+    RUN(errors_are_bounded_and_small);
     RUN(queries_that_fit_are_taken);
     RUN(what_is_refused_is_named);
     RUN(queries_too_far_to_count_get_another_scene);
