@@ -329,9 +329,10 @@ static void
 gather_relative(const hs_relative_keys *keys, const hs_nearest_run *runs, int32_t n_runs)
 {
     const float extent = (float)keys->extent;
-    for (const hs_nearest_run *run = runs; run < runs + n_runs; run++) {
-        float *HS_RESTRICT   norm = keys->norm + run->at;
-        int32_t *HS_RESTRICT number = keys->number + run->at;
+    for (int32_t r = 0; r < n_runs; r++) {
+        const hs_nearest_run *run = &runs[r];
+        float *HS_RESTRICT    norm = keys->norm + run->at;
+        int32_t *HS_RESTRICT  number = keys->number + run->at;
         for (int k = 0; k < keys->ndim; k++) {
             const double *HS_RESTRICT x = keys->x[k] + run->si;
             float *HS_RESTRICT        y = keys->y[k] + run->at;
