@@ -235,22 +235,27 @@ open_exact(const hs_dynamic *list, const double *position, double radius, double
     return status == HS_OK && list->n_without > 0 ? HS_ERR_KEY : status;
 }
 
-hs_status
-hs_dynamic_near(const hs_dynamic *list, const double *position, double radius, hs_dynamic_fn visit,
-                void *user, hs_failure *failure)
+/* Calls `each` for the points that a query finds: those near the ball, or exactly within it. */
+static hs_status
+visit_ball(const hs_dynamic *list, const double *position, double radius, bool exact,
+           const hs_ball_visit *each, hs_failure *failure)
 {
-    const hs_ball_visit each = {.fn = visit, .user = user};
-    hs_failure          ignored;
-    hs_ball             ball;
-    double              own[HS_MAX_DIM];
+    hs_failure ignored;
+    hs_ball    ball;
+    double     own[HS_MAX_DIM];
     failure = hs_failure_or(failure, &ignored);
-    if (list == NULL || position == NULL || visit == NULL) {
+    if (list == NULL || position == NULL || each->fn == NULL) {
         return HS_ERR_ARGUMENT;
     }
     const hs_dynamic_call call = hs_dynamic_enter(list, false);
-    hs_status             status = open_ball(list, position, radius, own, &ball, failure);
+    hs_status             status = exact ? open_exact(list, position, radius, own, &ball, failure)
+                                         : open_ball(list, position, radius, own, &ball, failure);
     if (status == HS_OK) {
-        hs_ball_near(&ball, &each);
+        if (exact) {
+            (void)hs_ball_within(&ball, each);
+        } else {
+            hs_ball_near(&ball, each);
+        }
         status = ball.status;
     }
     hs_dynamic_leave(list, call);
@@ -258,25 +263,19 @@ hs_dynamic_near(const hs_dynamic *list, const double *position, double radius, h
 }
 
 hs_status
+hs_dynamic_near(const hs_dynamic *list, const double *position, double radius, hs_dynamic_fn visit,
+                void *user, hs_failure *failure)
+{
+    const hs_ball_visit each = {.fn = visit, .user = user};
+    return visit_ball(list, position, radius, false, &each, failure);
+}
+
+hs_status
 hs_dynamic_within(const hs_dynamic *list, const double *position, double radius, bool with_shift,
                   hs_dynamic_fn visit, void *user, hs_failure *failure)
 {
     const hs_ball_visit each = {.fn = visit, .user = user, .with_shift = with_shift};
-    hs_failure          ignored;
-    hs_ball             ball;
-    double              own[HS_MAX_DIM];
-    failure = hs_failure_or(failure, &ignored);
-    if (list == NULL || position == NULL || visit == NULL) {
-        return HS_ERR_ARGUMENT;
-    }
-    const hs_dynamic_call call = hs_dynamic_enter(list, false);
-    hs_status             status = open_exact(list, position, radius, own, &ball, failure);
-    if (status == HS_OK) {
-        (void)hs_ball_within(&ball, &each);
-        status = ball.status;
-    }
-    hs_dynamic_leave(list, call);
-    return status;
+    return visit_ball(list, position, radius, true, &each, failure);
 }
 
 hs_status

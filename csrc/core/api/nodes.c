@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-#include "nodes.h"
+#include "../connectivity/connectivity.h"
+#include "pairs.h"
 #include "../../halfshell_nodes.h"
 #include "../connectivity/overlap.h"
 #include "../scene/points.h"

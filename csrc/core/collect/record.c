@@ -85,7 +85,7 @@ typedef struct open_pairs {
 
 /* Traces the open pairs whose next edge is this one; of[e]: which of them is pair e. */
 static hs_status
-trace_at(const open_pairs *open, int32_t edge, int32_t *of)
+batch_at(const open_pairs *open, int32_t edge, int32_t *of)
 {
     hs_pair_batch *pair_batch = &open->scanner->pair_batch;
     hs_pair_batch_clear(pair_batch);
@@ -99,7 +99,7 @@ trace_at(const open_pairs *open, int32_t edge, int32_t *of)
     return hs_pair_batch_look_up(pair_batch, true, &open->scanner->failed_point);
 }
 
-/* Decides the pairs that are traced at this edge. */
+/* Decides the pairs that are in the batch at this edge. */
 static void
 decide_at(open_pairs *open, int32_t edge, const int32_t *of)
 {
@@ -146,7 +146,7 @@ decide_open(open_pairs *open)
     open->scanner->n_ambiguous += open->n;
     while (open->n > 0) {
         const int32_t   edge = open->pair[0].low;
-        const hs_status status = trace_at(open, edge, of);
+        const hs_status status = batch_at(open, edge, of);
         if (status != HS_OK) {
             return status;
         }

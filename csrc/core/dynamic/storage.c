@@ -452,6 +452,15 @@ drop_empty(hs_cell_table *table, hs_entries *entries)
     put_all(table, table->rows, table->n_rows);
 }
 
+static void
+free_arrays(const hs_cell_table *table)
+{
+    hs_free(NULL, table->cell);
+    hs_free(NULL, table->size);
+    hs_free(NULL, table->index);
+    hs_free(NULL, table->rows);
+}
+
 /* Room for `capacity` cells and rows for them; on failure all is as it was. */
 static bool
 grow(hs_cell_table *table, int64_t capacity)
@@ -476,10 +485,7 @@ grow(hs_cell_table *table, int64_t capacity)
         memcpy(size, table->size, (size_t)table->n * sizeof *size);
         memcpy(index, table->index, (size_t)(table->n * table->ndim) * sizeof *index);
     }
-    hs_free(NULL, table->cell);
-    hs_free(NULL, table->size);
-    hs_free(NULL, table->index);
-    hs_free(NULL, table->rows);
+    free_arrays(table);
     table->cell = cell;
     table->size = size;
     table->index = index;
@@ -542,10 +548,7 @@ hs_cell_table_init(hs_cell_table *table, const hs_axes *axes, bool dense)
 void
 hs_cell_table_free(hs_cell_table *table)
 {
-    hs_free(NULL, table->cell);
-    hs_free(NULL, table->size);
-    hs_free(NULL, table->index);
-    hs_free(NULL, table->rows);
+    free_arrays(table);
     table->cell = NULL;
     table->size = NULL;
     table->index = NULL;

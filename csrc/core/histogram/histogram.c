@@ -739,7 +739,7 @@ settle_or_wait(hs_tally *tally, int32_t u)
 
 /* Traces pairs that wait for an edge, from u on; *next: the first that did not fit the batch. */
 static hs_status
-trace_waiting(hs_tally *tally, hs_scanner *scanner, int32_t u, int32_t *next)
+batch_waiting(hs_tally *tally, hs_scanner *scanner, int32_t u, int32_t *next)
 {
     hs_pair_batch *pair_batch = &scanner->pair_batch;
     hs_pair_batch_clear(pair_batch);
@@ -764,7 +764,7 @@ decide_edge(hs_tally *tally, hs_scanner *scanner, int32_t edge)
     hs_metric_init(&metric, given->ndim, given->n_rows, (const double(*)[HS_MAX_DIM])given->rows,
                    edges->at[edge], hs_edge_is_inclusive(edges, edge));
     while (u >= 0) {
-        const hs_status status = trace_waiting(tally, scanner, u, &end);
+        const hs_status status = batch_waiting(tally, scanner, u, &end);
         if (status != HS_OK) {
             return status;
         }

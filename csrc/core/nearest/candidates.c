@@ -77,18 +77,8 @@ hs_nearest_measure_layer(hs_nearest *near)
     const hs_bins    *bins = &near->search->bins;
     near->has_layer = bins->n > 0 && is_upright(lattice);
     for (int k = 0; near->has_layer && k < lattice->ndim; k++) {
-        double low = INFINITY, high = -INFINITY;
-        for (int64_t si = 0; lattice->row_of_axis[k] < 0 && si < bins->n; si++) {
-            double x[HS_MAX_DIM];
-            for (int c = 0; c < bins->ndim; c++) {
-                x[c] = bins->x[c][si];
-            }
-            const double t = hs_lattice_coordinate(lattice, x, k);
-            low = hs_smaller(t, low);
-            high = hs_larger(t, high);
-        }
-        near->layer_lower[k] = low;
-        near->layer_upper[k] = high;
+        const int64_t n = lattice->row_of_axis[k] < 0 ? bins->n : 0;
+        hs_nearest_range(lattice, bins, k, 0, n, &near->layer_lower[k], &near->layer_upper[k]);
     }
 }
 

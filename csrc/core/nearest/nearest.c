@@ -321,6 +321,24 @@ hs_nearest_exponent(double radius)
 }
 
 void
+hs_nearest_range(const hs_lattice *lattice, const hs_bins *bins, int k, int64_t first, int64_t last,
+                 double *lower, double *upper)
+{
+    double low = INFINITY, high = -INFINITY;
+    for (int64_t si = first; si < last; si++) {
+        double x[HS_MAX_DIM];
+        for (int c = 0; c < bins->ndim; c++) {
+            x[c] = bins->x[c][si];
+        }
+        const double t = hs_lattice_coordinate(lattice, x, k);
+        low = hs_smaller(t, low);
+        high = hs_larger(t, high);
+    }
+    *lower = low;
+    *upper = high;
+}
+
+void
 hs_nearest_group_set(const hs_nearest *near, int32_t first, int32_t last, hs_nearest_group *group)
 {
     const hs_bins    *bins = hs_search_asking(near->search);
@@ -337,18 +355,7 @@ hs_nearest_group_set(const hs_nearest *near, int32_t first, int32_t last, hs_nea
         group->upper[k] = group->t_upper[k] = high;
     }
     for (int k = 0; !lattice->aligned && k < bins->ndim; k++) {
-        double low = INFINITY, high = -INFINITY;
-        for (int32_t si = first; si < last; si++) {
-            double x[HS_MAX_DIM];
-            for (int c = 0; c < bins->ndim; c++) {
-                x[c] = bins->x[c][si];
-            }
-            const double t = hs_lattice_coordinate(lattice, x, k);
-            low = hs_smaller(t, low);
-            high = hs_larger(t, high);
-        }
-        group->t_lower[k] = low;
-        group->t_upper[k] = high;
+        hs_nearest_range(lattice, bins, k, first, last, &group->t_lower[k], &group->t_upper[k]);
     }
     for (int k = 0; near->has_layer && k < bins->ndim; k++) {
         if (lattice->row_of_axis[k] < 0) {

@@ -74,6 +74,10 @@ hs_nearest_of_leaf(const hs_nearest *near, const hs_tree_node *node)
 /* Measures `drift`, of the rows of B. */
 void hs_nearest_measure_drift(hs_nearest *near);
 
+/* Range of t_k of points [first, last), which are in order; none: from infinity to -infinity. */
+void hs_nearest_range(const hs_lattice *lattice, const hs_bins *bins, int k, int64_t first,
+                      int64_t last, double *lower, double *upper);
+
 /* Measures the range of points along open axes, once they are in tree order. */
 void hs_nearest_measure_layer(hs_nearest *near);
 

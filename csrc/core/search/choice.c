@@ -463,7 +463,7 @@ add_hit(const hs_scan *scan, int32_t h, hit_batch *batch)
 
 /* Looks up the pairs of the batch. */
 static hs_status
-trace_batch(hit_batch *batch, bool metric)
+look_up_batch(hit_batch *batch, bool metric)
 {
     hs_scanner *scanner = batch->scanner;
     hs_pair_batch_clear(&scanner->pair_batch);
@@ -516,7 +516,7 @@ drop_nearest(const hs_choice *choice, hit_batch *batch)
 {
     hs_scanner *scanner = batch->scanner;
     int64_t     shift[HS_MAX_DIM];
-    hs_status   status = trace_batch(batch, false);
+    hs_status   status = look_up_batch(batch, false);
     scanner->work_since_poll += WORK_OF_IMAGE * (int64_t)batch->n;
     for (int32_t e = 0; status == HS_OK && e < batch->n; e++) {
         bool nearest;
@@ -548,7 +548,7 @@ drop_near(const hs_choice *choice, hit_batch *batch)
 {
     hs_scanner     *scanner = batch->scanner;
     const hs_scene *scene = &scanner->search->scene;
-    const hs_status status = trace_batch(batch, true);
+    const hs_status status = look_up_batch(batch, true);
     hs_metric       nearer;
     if (status != HS_OK) {
         return status;

@@ -1347,7 +1347,7 @@ looks_up_late(const hs_scanner *scanner)
 }
 
 static hs_status
-open_trace(bool needs_given, hs_scanner *scanner)
+open_pair_batch(bool needs_given, hs_scanner *scanner)
 {
     return hs_pair_batch_init(scanner->search, &scanner->block, &scanner->options, needs_given,
                               &scanner->pair_batch);
@@ -1383,7 +1383,7 @@ hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t m
         status = hs_block_add_radii(account, hs_limits_rows(search), &scanner->block);
     }
     if (status == HS_OK && !looks_up_late(scanner)) {
-        status = open_trace(needs_shifts(scanner), scanner);
+        status = open_pair_batch(needs_shifts(scanner), scanner);
     }
     if (status == HS_OK && is_ordered) {
         status = order_init(account, &scanner->block, &scanner->order);
@@ -1394,9 +1394,9 @@ hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t m
 /* The arrays for pairs to decide, where hs_scanner_init has left them for later: pair_batch.memory
  * is NULL. They are kept (hs_account_keep) where the walker is. */
 static hs_status
-scanner_open_trace(hs_scanner *scanner)
+scanner_open_pair_batch(hs_scanner *scanner)
 {
-    const hs_status status = open_trace(false, scanner);
+    const hs_status status = open_pair_batch(false, scanner);
     if (hs_search_keeps_walker(scanner->search)) {
         hs_account_keep(&scanner->search->call->account);
     }
@@ -1616,7 +1616,7 @@ decide_by_supports(hs_scanner *scanner, uint8_t *within)
 
 /* Traces unsure hits from `u` on, as many as fit a batch; *next: the first that did not. */
 static hs_status
-trace_unsure(hs_scanner *scanner, const hs_scan *scan, int32_t u, int32_t *next)
+batch_unsure(hs_scanner *scanner, const hs_scan *scan, int32_t u, int32_t *next)
 {
     hs_pair_batch *pair_batch = &scanner->pair_batch;
     hs_pair_batch_clear(pair_batch);
@@ -1637,7 +1637,7 @@ hs_decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
     int32_t n_beyond = 0;
     uint8_t within[HS_BATCH];
     for (int32_t u = 0, end; u < scan->n_unsure; u = end) {
-        const hs_status status = trace_unsure(scanner, scan, u, &end);
+        const hs_status status = batch_unsure(scanner, scan, u, &end);
         if (status != HS_OK) {
             return status;
         }
@@ -1850,7 +1850,7 @@ decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
 {
     hs_status status = HS_OK;
     if (scanner->pair_batch.memory == NULL) {
-        status = scanner_open_trace(scanner);
+        status = scanner_open_pair_batch(scanner);
     }
     return status == HS_OK ? hs_decide(scanner, scan, first, next) : status;
 }

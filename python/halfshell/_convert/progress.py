@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The argument `progress` of long searches, and the bar that ``progress=True`` asks for."""
+"""The argument `progress` of long searches, and the bar that ``progress=True`` shows."""
 
 from __future__ import annotations
 

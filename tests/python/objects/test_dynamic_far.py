@@ -15,6 +15,7 @@ import pytest
 
 import halfshell as hs
 from rational_images import Images, between, exact
+from subprocesses import HEARS_INTERRUPTS
 
 EXPONENTS = [50, 54, 55, 60, 105, 106, 110, 200, 1000]
 SLAB = [[4.0, 0.0, 0.0], [-1.0, 5.0, 0.0], [0.0, 0.0, 1.0]]
@@ -263,8 +264,8 @@ def handle(*_):
     if len(heard) == 2:
         raise RuntimeError("enough")
 
-# A shell ignores Ctrl-C in what it runs in the background.
-signal.signal(signal.SIGINT, handle if sys.argv[2] == "handled" else signal.default_int_handler)
+if sys.argv[2] == "handled":
+    signal.signal(signal.SIGINT, handle)
 print("ready", flush=True)
 try:
     queries[sys.argv[1]]()
@@ -282,8 +283,9 @@ except RuntimeError as error:
 def test_ctrl_c_ends_one_long_query(query, handler):
     """A handler that returns does not end it: it is made again."""
     with subprocess.Popen(
-        [sys.executable, "-c", LONG_QUERY, query, handler], stdout=subprocess.PIPE, text=True
-    ) as child:
+        [sys.executable, "-c", HEARS_INTERRUPTS + LONG_QUERY, query, handler],
+        stdout=subprocess.PIPE, text=True,
+    ) as child:  # fmt: skip
         assert child.stdout is not None
         assert child.stdout.readline() == "ready\n"
         time.sleep(0.2)
