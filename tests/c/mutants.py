@@ -22,8 +22,9 @@ Prints a line for each mutant, and the rate at the end:
   same code   the compiler makes the same object of it: not counted
   no compile  not counted
 
-The exit code is 1 if a mutant lived, or with --least 90 if fewer than 90 % were killed. FOLDER (default: build/mutants) keeps what was built and
-which test reaches what, until a source changes.
+The exit code is 1 if a mutant lived, or with --least 90 if fewer than 90 of 100 were killed.
+FOLDER (default: build/mutants) keeps what was built and which test reaches what, until a source
+changes.
 """
 
 import argparse
