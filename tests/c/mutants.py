@@ -4,6 +4,7 @@
 Usage: python3 mutants.py [--jobs N] [--work FOLDER] SEED NUMBER [part of a file's name]
        python3 mutants.py [--jobs N] [--work FOLDER] --at FILE:LINE[-LINE] ...
        python3 mutants.py [...] --binding SEED NUMBER [part of a file's name]
+       python3 mutants.py --least PERCENT [...]
 
 The first form tries NUMBER changes chosen by SEED in csrc/core/*/*.c, the second all changes of
 some lines; mutations.py says what is changed. Each mutant is compiled, linked with what has not
@@ -21,8 +22,9 @@ Prints a line for each mutant, and the rate at the end:
   same code   the compiler makes the same object of it: not counted
   no compile  not counted
 
-The exit code is 1 if a mutant lived. FOLDER (default: build/mutants) keeps what was built and
-which test reaches what, until a source changes.
+The exit code is 1 if a mutant lived, or with --least 90 if fewer than 90 of 100 were killed.
+FOLDER (default: build/mutants) keeps what was built and which test reaches what, until a source
+changes.
 """
 
 import argparse
@@ -318,6 +320,7 @@ def arguments():
     parser.add_argument("--work", type=Path, default=HERE / "build" / "mutants")
     parser.add_argument("--binding", action="store_true")
     parser.add_argument("--at", nargs="+")
+    parser.add_argument("--least", type=float, default=100.0)
     parser.add_argument("seed", type=int, nargs="?")
     parser.add_argument("number", type=int, nargs="?")
     parser.add_argument("part", nargs="?", default="")
@@ -352,7 +355,7 @@ def main():
     judged = totals["killed"] + totals["lived"]
     print(", ".join(f"{number} {verdict}" for verdict, number in totals.items()))
     print(f"{totals['killed']} of {judged} killed: {100 * totals['killed'] / max(judged, 1):.1f} %")
-    return 1 if totals["lived"] else 0
+    return 0 if 100 * totals["killed"] >= options.least * judged else 1
 
 
 if __name__ == "__main__":

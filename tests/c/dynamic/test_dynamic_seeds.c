@@ -16,14 +16,14 @@ enum { SEEDS = sizeof seeds / sizeof seeds[0] };
 static void
 even_seeds(void)
 {
-    for (int s = 0; s < SEEDS; s += IS_SLOW ? 8 : 2)
+    for (int s = 0; s < SEEDS; s += IS_SLOW ? 4 : 2)
         run_seed(test_dynamic_input, seeds[s]);
 }
 
 static void
 odd_seeds(void)
 {
-    for (int s = 1; s < SEEDS; s += IS_SLOW ? 8 : 2)
+    for (int s = 1; s < SEEDS; s += IS_SLOW ? 4 : 2)
         run_seed(test_dynamic_input, seeds[s]);
 }
 

@@ -174,7 +174,7 @@ points_that_wrapping_makes_equal(void)
         x[2 * i] = i % 20 + 0.25;
         x[2 * i + 1] = 0.25 * (i / 20);
     }
-    for (int salt = 0; salt < 14; salt++)
+    for (int salt = 0; salt < (IS_SLOW ? 4 : 14); salt++)
         CHECK(nearest_are_right(&scene, (uint64_t)salt));
 }
 
@@ -185,7 +185,7 @@ clusters_of_all_sizes(void)
     enum { N = 120 };
     static double  x[2 * N];
     harness_random random = {12};
-    for (int trial = 0; trial < 30; trial++) {
+    for (int trial = 0; trial < 30; trial += IS_SLOW ? 5 : 1) {
         hs_box      box = {.ndim = 2, .periodic = {true, true}, .rows = {{8.0, 0.0}, {3.0, 7.0}}};
         brute_scene scene = {.ndim = 2, .n = N, .x = x, .cutoff = 0.5};
         scene.box = trial % 3 ? &box : NULL;
@@ -311,7 +311,7 @@ long_boxes_have_many_images(void)
     harness_random random = {15};
     for (int e = 0; e < 3 * 120; e++)
         x[e] = random_unit(&random);
-    for (int trial = 0; trial < 12; trial++) {
+    for (int trial = 0; trial < 12; trial += IS_SLOW ? 5 : 1) { /* 5: all kinds */
         hs_box      box = {.ndim = 3, .periodic = {true, true, true}};
         brute_scene scene = {.ndim = 3, .n = trial % 2 ? 2 : 120, .x = x, .box = &box};
         scene.cutoff = trial % 2 ? 3.0 : 0.75;

@@ -49,7 +49,7 @@ def test_a_quick_scene_is_counted_as_it_is_listed(name):
     assert measured["bytes_peak"] <= 2 * 16 * pairs + 500 * scene.n_points + (2 << 20)
 
 
-@pytest.mark.parametrize("size", scenes.SIZES)
+@pytest.mark.parametrize("size", ["small", "quick", pytest.param("full", marks=pytest.mark.slow)])
 def test_the_bits_are_those_that_are_written_down(size):
     for name in NAMES + OTHERS:
         scene = scenes.load(name, size)

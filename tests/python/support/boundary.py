@@ -41,6 +41,8 @@ def outcome(call, *arguments, slowdown=1.0, may_change=False, **options):
     before = None if may_change else snapshot((arguments, options))
     with warnings.catch_warnings(record=True) as caught, np.errstate(all="raise"):
         warnings.simplefilter("always")
+        # Of NumPy, about the name that was given: "a", an old one of bytes.
+        warnings.filterwarnings("ignore", "Data type alias", DeprecationWarning)
         start = time.process_time()
         try:
             result = Outcome(answer=call(*arguments, **options))
