@@ -165,6 +165,7 @@ hash_odd_scene(const uint8_t *data, size_t size)
     int64_t     shift[8 * 4] = {0};
     fuzz_scene  f;
     take_scene(&in, &f);
+    f.scene.cutoff = (float)f.scene.cutoff; /* hypot is not the same everywhere */
     const hs_points points = points_of(&f.scene);
     hs_options      options = options_of(&f.scene);
     options.memory_limit = PLAN_LIMIT;
