@@ -215,7 +215,8 @@ class CTests(Judge):
     def __init__(self, work, jobs):
         self.work, self.lock, self.passes = work, Lock(), {}
         self.free = Queue()
-        read = [*HERE.rglob("*.h"), *HERE.glob("fuzz/*"), *HERE.glob("golden/*.txt"), *(ROOT / "csrc").rglob("*.h")]
+        read = [*HERE.rglob("*.h"), *HERE.glob("*/*.txt"), *(ROOT / "csrc").rglob("*.h")]
+        read += HERE.glob("fuzz/*.c")
         stamp = digest([*sources(ROOT), *read])
         kept = work / "reached.json"
         old = json.loads(kept.read_text()) if kept.exists() else {}
