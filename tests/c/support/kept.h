@@ -10,6 +10,13 @@
 #include "../../../csrc/halfshell.h"
 #include "harness.h"
 
+/* Bytes, and what one kernel leaves to the next stage, are those of this system. */
+#if defined(__x86_64__) && defined(__linux__)
+#define WORK_IS_KEPT 1
+#else
+#define WORK_IS_KEPT 0
+#endif
+
 static const struct kept_hash {
     const char *name;
     uint64_t    answers, work;
@@ -25,7 +32,7 @@ hash_bytes(uint64_t hash, const void *bytes, size_t n)
     return hash;
 }
 
-/* What depends on no kernel, and on no number of threads. */
+/* What depends on no number of threads. */
 static inline uint64_t
 hash_counters(uint64_t hash, const hs_counters *counters)
 {
@@ -59,7 +66,7 @@ check_kept(const char *name, uint64_t answers, uint64_t work)
     while (k < n && strcmp(kept_hashes[k].name, name) != 0)
         k++;
     const bool answers_are = k < n && kept_hashes[k].answers == answers;
-    const bool work_is = k < n && kept_hashes[k].work == work;
+    const bool work_is = !WORK_IS_KEPT || (k < n && kept_hashes[k].work == work);
     CHECK(answers_are);
     CHECK(work_is);
     if (!answers_are || !work_is)
