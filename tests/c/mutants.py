@@ -116,7 +116,7 @@ def copy_tree(target):
     """The sources, in a place of their own: they may change while this runs."""
     shutil.rmtree(target, ignore_errors=True)
     for part in ("csrc", "tests/c"):
-        for path in [*(ROOT / part).rglob("*.[ch]"), *(ROOT / part).glob("fuzz/*.txt")]:
+        for path in [*(ROOT / part).rglob("*.[ch]"), *(ROOT / part).glob("*/*.txt")]:
             place = target / path.relative_to(ROOT)
             place.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(path, place)
@@ -217,7 +217,8 @@ class CTests(Judge):
     def __init__(self, work, jobs):
         self.work, self.lock, self.passes = work, Lock(), {}
         self.free = Queue()
-        read = [*HERE.rglob("*.h"), *HERE.glob("fuzz/*"), *(ROOT / "csrc").rglob("*.h")]
+        read = [*HERE.rglob("*.h"), *HERE.glob("*/*.txt"), *(ROOT / "csrc").rglob("*.h")]
+        read += HERE.glob("fuzz/*.c")
         stamp = digest([*sources(ROOT), *read])
         kept = work / "reached.json"
         old = json.loads(kept.read_text()) if kept.exists() else {}

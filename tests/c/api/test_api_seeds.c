@@ -5,6 +5,7 @@
 #define LLVMFuzzerTestOneInput test_pairs_input
 #include "../fuzz/fuzz_pairs.c"
 #include "../support/harness.h"
+#include "../support/kept.h"
 #include "../support/random_scenes.h"
 #include "../support/seeds.h"
 
@@ -56,6 +57,7 @@ check_scenes(int first, int end)
     const char         *kernels[16];
     const int           n_kernels = hs_kernel_names(kernels, 16);
     harness_random      random = {20261127 + (uint64_t)first};
+    uint64_t            work = 1;
     for (int trial = 0; trial < THIRD_OF_TRIALS(96); trial++) {
         const int  ndim = 1 + trial / SCENE_KINDS % 8;
         const int  n = random_below(&random, ndim > 3 ? 30 : trial % 5 == 0 ? 300 : 80);
@@ -70,9 +72,11 @@ check_scenes(int first, int end)
         if (!brute_find(&s.scene, 2e5, &expected))
             continue;
         for (int number = first; number < end; number++) {
+            memset(&answer_counters, 0, sizeof answer_counters);
             const char *difference = answer_difference(
                 number, &s.scene, &expected, (uint64_t)(trial + number), 1 + expected.n / 50);
             CHECK(difference == NULL);
+            work = hash_counters(work, &answer_counters);
             if (difference != NULL)
                 fprintf(stderr, "  %s, scene %d: %s\n", answer_checks[number].name, trial,
                         difference);
@@ -81,6 +85,8 @@ check_scenes(int first, int end)
     }
     kernel_to_check = NULL;
     algorithm_to_check = HS_AUTO;
+    if (!IS_SLOW) /* fewer scenes */
+        check_kept(answer_checks[first].name, 0, work);
 }
 
 static void
@@ -145,9 +151,70 @@ points_on_faces_of_cells(void)
     algorithm_to_check = HS_AUTO;
 }
 
+static uint64_t odd_boxes, odd_plans;
+
+/* An input's box, and how its scene would be searched. */
+static int
+hash_odd_scene(const uint8_t *data, size_t size)
+{
+    input       in = {data, data + size};
+    hs_failure  failure = {.row = -1};
+    hs_plan     plan;
+    hs_box_axes axes;
+    double      heights[8], volume, wrapped[8 * 4] = {0.0}, places[8 * 4] = {0.0};
+    int64_t     shift[8 * 4] = {0};
+    fuzz_scene  f;
+    take_scene(&in, &f);
+    f.scene.cutoff = (float)f.scene.cutoff; /* hypot is not the same everywhere */
+    const hs_points points = points_of(&f.scene);
+    hs_options      options = options_of(&f.scene);
+    options.memory_limit = PLAN_LIMIT;
+    options.algorithm = (hs_algorithm)(size / 8 % HS_ALGORITHM_END);
+    hs_status status = hs_plan_make(AMONG(&points, f.scene.box), &options, &plan, &failure);
+    odd_plans = hash_bytes(odd_plans, &status, sizeof status);
+    if (status == HS_OK)
+        odd_plans = hash_plan(odd_plans, &plan);
+    if (f.scene.box == NULL)
+        return 0;
+    status = hs_box_measure(f.scene.box, heights, &volume, &failure);
+    odd_boxes = hash_bytes(odd_boxes, &status, sizeof status);
+    for (int l = 0; status == HS_OK && l < f.box.ndim; l++)
+        if (f.box.periodic[l])
+            odd_boxes = hash_bytes(odd_boxes, &heights[l], sizeof heights[l]);
+    if (status == HS_OK)
+        odd_boxes = hash_bytes(odd_boxes, &volume, sizeof volume);
+    status = hs_box_wrap(f.scene.box, &points, wrapped, shift, &failure);
+    odd_boxes = hash_bytes(odd_boxes, &status, sizeof status);
+    if (status == HS_OK) {
+        odd_boxes = hash_bytes(odd_boxes, wrapped, sizeof wrapped);
+        odd_boxes = hash_bytes(odd_boxes, shift, sizeof shift);
+    }
+    status =
+        hs_box_places(f.scene.box, &points, f.scene.cutoff, 0x1p10, places, 8, &axes, &failure);
+    odd_boxes = hash_bytes(odd_boxes, &status, sizeof status);
+    if (status == HS_OK) {
+        odd_boxes = hash_bytes(odd_boxes, places, sizeof places);
+        odd_boxes = hash_bytes(odd_boxes, axes.reach, (size_t)f.box.ndim * sizeof *axes.reach);
+        odd_boxes = hash_bytes(odd_boxes, axes.width, (size_t)f.box.ndim * sizeof *axes.width);
+    }
+    return 0;
+}
+
+static void
+odd_scenes_are_planned_as_ever(void)
+{
+    odd_boxes = odd_plans = 1;
+    for (int s = 0; s < SEEDS; s++)
+        run_seed(hash_odd_scene, seeds[s]);
+    run_random_inputs(hash_odd_scene, 31, 4000);
+    check_kept("odd boxes", odd_boxes, 0);
+    check_kept("odd plans", 0, odd_plans);
+}
+
 void
 test_api_seeds(void)
 {
+    RUN(odd_scenes_are_planned_as_ever);
     RUN(points_on_faces_of_cells);
     RUN(seeds_of_the_first_part);
     RUN(seeds_of_the_second_part);

@@ -30,7 +30,10 @@ odd_seeds(void)
 static void
 random_histories(void)
 {
+    brute_seen = 1;
     run_random_inputs(test_dynamic_input, 77, TRIALS(1000));
+    if (!IS_SLOW) /* fewer histories */
+        check_kept("histories of dynamic lists", 0, brute_seen);
 }
 
 void

@@ -81,6 +81,8 @@ take_box(input *in, int ndim, int *reach)
     return box;
 }
 
+static hs_dynamic_counters counted; /* of the list that was made last */
+
 static void
 begin(state *of)
 {
@@ -104,6 +106,7 @@ begin(state *of)
             of->is_far[k] = of->is_far[k] && !(box.periodic[l] && box.rows[l][k] != 0.0);
     }
     must(hs_dynamic_new(&options, &of->list, NULL) == HS_OK, "no list");
+    hs_dynamic_count(of->list, &counted);
     brute_init(&of->brute, &options, reach);
 }
 
@@ -272,6 +275,10 @@ LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     check_points(&of);
     of.queries = 0;
     query(&of);
+    const hs_dynamic_state look = hs_dynamic_look(of.list);
+    const int64_t          numbers[] = {look.n_cells, look.n_empty, look.changes};
+    brute_seen = hash_bytes(brute_seen, numbers, sizeof numbers);
+    brute_seen = hash_bytes(brute_seen, &counted, sizeof counted);
     hs_dynamic_free(of.list);
     must(hs_test_live_blocks() == before, "memory is left");
     return 0;

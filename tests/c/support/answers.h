@@ -37,6 +37,8 @@ typedef struct asked {
     int64_t            labels[ANSWER_POINTS], groups[ANSWER_POINTS];
 } asked;
 
+static hs_counters answer_counters; /* of the last search of a check */
+
 typedef bool (*kept_fn)(const asked *a, const brute_pair *pair);
 
 static inline uint64_t
@@ -1027,6 +1029,7 @@ answer_difference(int number, const brute_scene *scene, const brute_list *half, 
     a.options.want = WANT_ALL;
     a.options.sorted = true;
     a.options.threads = 1 + (int)chosen(&a, 2);
+    a.options.counters = &answer_counters;
     a.options.index_bytes = number == 1 || chosen(&a, 2) ? 8 : 4;
     if (chosen(&a, 3) == 0 && scene->cutoff > 0x1p-700 && scene->cutoff < 0x1p700)
         a.options.cell_size = widths[chosen(&a, 6)] * scene->cutoff;

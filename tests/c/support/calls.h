@@ -12,6 +12,7 @@
 #include "../../../csrc/halfshell.h"
 #include "harness.h"
 #include "among.h"
+#include "kept.h"
 
 enum { CALL_ROOM = 1024 }; /* entries of counts, and of what histograms write */
 
@@ -83,24 +84,15 @@ typedef struct call_kind {
 
 static _Atomic uint64_t call_visited; /* the sum of what was visited, in whatever order */
 
-static inline uint64_t
-call_hash(uint64_t hash, const void *bytes, size_t n)
-{
-    for (size_t b = 0; b < n; b++) {
-        hash = (hash ^ ((const unsigned char *)bytes)[b]) * UINT64_C(1099511628211);
-    }
-    return hash;
-}
-
 /* A hs_pair_fn. */
 static inline int
 call_note_pair(int64_t i, int64_t j, const int32_t *S, const double *D, double d2, void *user)
 {
-    uint64_t hash = call_hash(1, &i, sizeof i);
-    hash = call_hash(hash, &j, sizeof j);
-    hash = call_hash(hash, S, sizeof *S);
-    hash = call_hash(hash, D, sizeof *D);
-    call_visited += call_hash(hash, &d2, sizeof d2);
+    uint64_t hash = hash_bytes(1, &i, sizeof i);
+    hash = hash_bytes(hash, &j, sizeof j);
+    hash = hash_bytes(hash, S, sizeof *S);
+    hash = hash_bytes(hash, D, sizeof *D);
+    call_visited += hash_bytes(hash, &d2, sizeof d2);
     (void)user;
     return 0;
 }
@@ -121,19 +113,19 @@ static inline uint64_t
 call_hash_pairs(const call *c, const hs_pairs *pairs)
 {
     const int64_t n = hs_pairs_length(pairs), rows = hs_pairs_rows(pairs);
-    uint64_t      hash = call_hash(call_hash(7, &n, sizeof n), &rows, sizeof rows);
+    uint64_t      hash = hash_bytes(hash_bytes(7, &n, sizeof n), &rows, sizeof rows);
     if (rows > 0) {
-        hash = call_hash(hash, hs_pairs_offsets(pairs), (size_t)(rows + 1) * sizeof(int64_t));
+        hash = hash_bytes(hash, hs_pairs_offsets(pairs), (size_t)(rows + 1) * sizeof(int64_t));
     }
     for (unsigned bit = 1; bit <= HS_WANT_BOTH; bit *= 2) {
         const void *array = hs_pairs_array(pairs, bit);
         if (array != NULL) {
-            hash = call_hash(hash, array, (size_t)n * call_width(c, bit));
+            hash = hash_bytes(hash, array, (size_t)n * call_width(c, bit));
         }
     }
     if (c->options != NULL && c->options->out != NULL && c->options->want & HS_WANT_I &&
         hs_pairs_array(pairs, HS_WANT_I) == NULL) {
-        hash = call_hash(hash, c->options->out->i, (size_t)n * call_width(c, HS_WANT_I));
+        hash = hash_bytes(hash, c->options->out->i, (size_t)n * call_width(c, HS_WANT_I));
     }
     return hash;
 }
@@ -172,7 +164,7 @@ static inline hs_status
 call_take_counts(call *c, hs_status status, const int64_t *counts, int64_t n)
 {
     if (status == HS_OK) {
-        c->answer = call_hash(3, counts, (size_t)n * sizeof *counts);
+        c->answer = hash_bytes(3, counts, (size_t)n * sizeof *counts);
     }
     return status;
 }
@@ -236,8 +228,8 @@ call_take_histogram(call *c, hs_status status)
     const hs_histogram *histogram = c->histogram;
     if (status == HS_OK) {
         const size_t n = (size_t)(histogram->n_edges * histogram->n_types * histogram->n_types);
-        c->answer = histogram->counts != NULL ? call_hash(5, histogram->counts, 8 * n) : 0;
-        c->answer = histogram->sums != NULL ? call_hash(c->answer, histogram->sums, 8 * n)
+        c->answer = histogram->counts != NULL ? hash_bytes(5, histogram->counts, 8 * n) : 0;
+        c->answer = histogram->sums != NULL ? hash_bytes(c->answer, histogram->sums, 8 * n)
                                             : c->answer;
     }
     return status;

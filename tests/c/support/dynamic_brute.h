@@ -8,6 +8,7 @@
 #include "../../../csrc/core/exact/metric.h"
 #include "../../../csrc/halfshell_dynamic.h"
 #include "harness.h"
+#include "kept.h"
 
 enum { BRUTE_KEYS = 64, BRUTE_FOUND = 20000 };
 
@@ -124,6 +125,8 @@ take_shifted(hs_key key, const double *position, const int64_t *shift, void *use
     return 0;
 }
 
+static uint64_t brute_seen = 1; /* a hash of what queries found, in their order */
+
 /* Whether every query of the list at this ball gives what brute force does. */
 static inline void
 brute_check(const brute_list *brute, const hs_dynamic *list, const double *centre, double radius)
@@ -141,6 +144,8 @@ brute_check(const brute_list *brute, const hs_dynamic *list, const double *centr
         CHECK(brute_holds(&found, expected.id[f], expected.shift[f]));
     CHECK(hs_dynamic_near(list, centre, radius, take_found, &near, NULL) == HS_OK);
     CHECK(near.n <= brute_length(brute));
+    brute_seen = hash_bytes(brute_seen, found.id, (size_t)found.n * sizeof *found.id);
+    brute_seen = hash_bytes(brute_seen, near.id, (size_t)near.n * sizeof *near.id);
     for (int f = 0; f < near.n; f++)
         for (int g = 0; g < f; g++)
             CHECK(near.id[f] != near.id[g]);

@@ -23,7 +23,7 @@ call_cells_build(call *c, hs_failure *failure)
         hs_cells_layout(cells, &layout);
         hs_cells_points(cells, &points);
         CHECK((hs_cells_box(cells) != NULL) == (c->box != NULL) && points.n == c->points->n);
-        c->answer = call_hash(6, layout.order, (size_t)layout.n_points * sizeof(int32_t));
+        c->answer = hash_bytes(6, layout.order, (size_t)layout.n_points * sizeof(int32_t));
         hs_cells_free(cells);
     }
     return status;
@@ -46,7 +46,7 @@ call_cells_candidates(call *c, hs_failure *failure)
     if (status == HS_OK) {
         const int64_t n = hs_pairs_length(ranges);
         CHECK(hs_pairs_rows(ranges) == (c->queries != NULL ? c->queries->n : c->n_points));
-        c->answer = call_hash((uint64_t)n, hs_pairs_array(ranges, HS_WANT_J), (size_t)n * 8);
+        c->answer = hash_bytes((uint64_t)n, hs_pairs_array(ranges, HS_WANT_J), (size_t)n * 8);
         hs_pairs_free(ranges);
     } else {
         CHECK(ranges == (c->has_result ? NULL : CALL_NOTHING));

@@ -22,7 +22,7 @@ call_clusters(call *c, hs_failure *failure)
         hs_clusters_find(&among, c->options, core, labels, winding, RESULT(n), failure);
     CHECK(status == HS_OK ? n >= 0 : n == -7);
     if (status == HS_OK) {
-        c->answer = call_hash(call_hash(2, labels, (size_t)c->n_points * 8), winding, (size_t)n);
+        c->answer = hash_bytes(hash_bytes(2, labels, (size_t)c->n_points * 8), winding, (size_t)n);
     }
     return status;
 }
@@ -36,7 +36,7 @@ call_plan(call *c, hs_failure *failure)
     memcpy(&untouched, &plan, sizeof plan);
     const hs_status status = hs_plan_make(&among, c->options, RESULT(plan), failure);
     CHECK(status == HS_OK || memcmp(&plan, &untouched, sizeof plan) == 0);
-    c->answer = status == HS_OK ? call_hash(9, plan.shape, sizeof plan.shape) : c->answer;
+    c->answer = status == HS_OK ? hash_plan(9, &plan) : c->answer;
     return status;
 }
 
@@ -46,7 +46,8 @@ call_box_measure(call *c, hs_failure *failure)
     double          heights[HS_MAX_DIM] = {-7.0}, volume = -7.0;
     const hs_status status = hs_box_measure(c->box, heights, &volume, failure);
     CHECK((status == HS_OK) == (volume >= 0.0));
-    c->answer = status == HS_OK ? call_hash(2, &volume, sizeof volume) : c->answer;
+    if (status == HS_OK)
+        c->answer = hash_bytes(hash_bytes(2, &volume, sizeof volume), heights, sizeof heights);
     return status;
 }
 
@@ -59,7 +60,8 @@ call_box_places(call *c, hs_failure *failure)
     const hs_status status = hs_box_places(c->box, c->points, cutoff, DBL_MAX, places,
                                            CALL_ROOM / HS_MAX_DIM, &axes, failure);
     CHECK((status == HS_OK) == (axes.reach[0] >= 0.0));
-    c->answer = status == HS_OK ? call_hash(4, places, sizeof places) : c->answer;
+    if (status == HS_OK)
+        c->answer = hash_bytes(hash_bytes(4, places, sizeof places), axes.reach, sizeof axes.reach);
     return status;
 }
 
@@ -71,7 +73,7 @@ call_box_wrap(call *c, hs_failure *failure)
     const hs_status status = hs_box_wrap(c->box, c->points, wrapped, shift, failure);
     if (status == HS_OK) {
         const size_t n = (size_t)(c->points->n * c->points->ndim);
-        c->answer = call_hash(call_hash(4, wrapped, n * 8), shift, n * 8);
+        c->answer = hash_bytes(hash_bytes(4, wrapped, n * 8), shift, n * 8);
     }
     return status;
 }
