@@ -204,7 +204,7 @@ hs_nearest_image_set(const hs_nearest *near, const hs_nearest_images *images,
     memcpy(image->moved, images->moved, sizeof image->moved);
     image->is_home = true;
     for (int r = 0; r < near->search->bins.n_periodic; r++) {
-        image->is_home = image->is_home && image->shift[r] == 0;
+        image->is_home = image->is_home && images->shift[r] == 0;
     }
 }
 
