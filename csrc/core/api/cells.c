@@ -10,7 +10,7 @@
 #include <math.h>
 #include <string.h>
 
-/* The public functions of cells: points that are copied, sorted once and searched many
+/* cells.c: the public functions of cells: points that are copied, sorted once and searched many
  * times. */
 
 /* The points in memory of the cells: the caller cannot change them between searches. */

@@ -6,7 +6,7 @@
 #include "../scene/points.h"
 #include "../dynamic/ball.h"
 
-/* The public functions of single points, and many, that come, go and move;
+/* dynamic_lists.c: the public functions of single points, and many, that come, go and move;
  * docs/dynamic.md. */
 
 /* hs_dynamic_insert and hs_dynamic_move. */

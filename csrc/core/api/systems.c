@@ -14,7 +14,8 @@
 #include <string.h>
 #include <math.h>
 
-/* Arrays of a system begin where those of the systems before it end. */
+/* systems.c: many systems in one call: arrays of a system begin where those of the systems before
+ * it end. */
 
 /* Points first[s] to first[s + 1] of all. */
 static hs_points

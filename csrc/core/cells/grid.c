@@ -8,10 +8,17 @@
 #include <string.h>
 
 /*
- * Boxes are often whole multiples of the cutoff. There is no room for rounding then,
- * so points are told apart by the faces between cells, which are numbers: two points with `part`
- * whole cells between their cells are more than the radius apart, also across a periodic face
- * unless one lies on it.
+ * grid.c: how far apart the coordinates of a pair can be, then one cell or several, whichever makes
+ * a search cheaper; hs_grid_choose_counts says how many.
+ *
+ * Why no pair is lost: rounding is monotone, so cell indices are a monotone function of t; `range`
+ * bounds how far apart the computed coordinates of a pair can be, every rounding and the whole
+ * effect of inexact normals included; and `reach` is that range in cells, rounded up.
+ *
+ * Boxes are often whole multiples of the cutoff. There is no room for rounding then, so points are
+ * told apart by the faces between cells, which are numbers: two points with `part` whole cells
+ * between their cells are more than the radius apart, also across a periodic face unless one lies
+ * on it.
  */
 
 /* Is every cell along axis k at least `least` wide, in the real numbers that its faces are? */
@@ -207,15 +214,6 @@ hs_grid_fit_counts(const hs_scene *scene, const hs_grid *grid, double *counts)
     }
     return capped;
 }
-
-/*
- * grid.c: how far apart the coordinates of a pair can be, then one cell or several, whichever makes
- * a search cheaper; grid.c says how many.
- *
- * Why no pair is lost: rounding is monotone, so cell indices are a monotone function of t; `range`
- * bounds how far apart the computed coordinates of a pair can be, every rounding and the whole
- * effect of inexact normals included; and `reach` is that range in cells, rounded up.
- */
 
 #define UNIT                0x1p-53
 #define SLACK               HS_GRID_SLACK

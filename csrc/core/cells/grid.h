@@ -41,8 +41,7 @@ hs_status hs_grid_init_kind(const hs_scene *scene, hs_grid_kind kind, hs_grid *g
 
 /*
  * Cells that are at least `width` wide, whatever that costs; wider ones, with *is_wider set, where
- * there would be too many of them, or too many around each. HS_TRY_OTHER where no grid will do. In
- * grid.c.
+ * there would be too many of them, or too many around each. HS_TRY_OTHER where no grid will do.
  */
 hs_status hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_wider,
                             hs_failure *failure);

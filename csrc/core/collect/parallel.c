@@ -9,7 +9,9 @@
 
 #include <string.h>
 
-/* A mutex guards the number of the range that is due; pairs are copied without it. */
+/* parallel.c: each worker has a walker and a backlog; ranges are committed in turn. A mutex guards
+ * the number of the range that is due; pairs are copied without it. A thread alone writes straight
+ * to the output, by a walker that it may keep for the next search. */
 
 struct hs_commits {
     hs_output       *output;
@@ -395,9 +397,6 @@ hs_crew_run(hs_crew *crew, hs_failure *failure)
     hs_crew_close(crew);
     return status;
 }
-
-/* parallel.c: each worker has a walker and a backlog; ranges are committed in turn. A thread alone
- * writes straight to the output, by a walker that it may keep for the next search. */
 
 /* Points of a range: a group at least, and so few that their pairs are a part of what a thread can
  * hold back: it seldom waits for others. */

@@ -8,6 +8,12 @@
 #include "record.h"
 
 /*
+ * parallel.h: the walk over all points by several threads. Points are handed out in ranges; what a
+ * thread finds in one waits in a backlog of its own until all earlier ranges have been written, so
+ * that the result does not depend on the number of threads.
+ */
+
+/*
  * Several threads that fill one output in a fixed order. The work is cut into numbered
  * ranges, which are handed out one at a time; what is found in one is written when all earlier
  * ranges have been, so that the result does not depend on the number of threads.
@@ -113,12 +119,6 @@ void      hs_crew_close(hs_crew *crew);
  * take ranges, and are closed. Returns the failure of the earliest range that had one. */
 hs_status hs_crew_run(hs_crew *crew, hs_failure *failure);
 
-/*
- * parallel.h: the walk over all points by several threads. Points are handed out in ranges; what a
- * thread finds in one waits in a backlog of its own until all earlier ranges have been written, so
- * that the result does not depend on the number of threads.
- */
-
 /* What each thread's walker shall do with its hits, in place of recording them. */
 typedef struct hs_visitors {
     hs_block_use            use;
@@ -128,8 +128,9 @@ typedef struct hs_visitors {
     size_t                  context_size;
 } hs_visitors;
 
-/* The same with a walker and a recorder that are kept from one search to the next; all zeros before
- * the first, and closed by the caller. */
+/* Records all pairs behind those that the output has, by the calling thread, with a walker and a
+ * recorder that are kept from one search to the next: all zeros before the first, and closed by the
+ * caller. */
 hs_status hs_record_next(hs_search *search, hs_output *output, hs_walker *walker,
                          hs_recorder *recorder, hs_failure *failure);
 

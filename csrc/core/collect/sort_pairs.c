@@ -6,8 +6,12 @@
 
 #include <string.h>
 
-/* By numbers where entries have their j; of these, images of one pair by S, which
- * is one number too as a rule. */
+/*
+ * sort_pairs.c: a counting sort by i, then each point's few pairs by (j, S). A pair is one number
+ * while it is sorted, j before its place, so that nothing is looked up but the S of images of one
+ * pair, which is one number too as a rule. deal_out is the counting sort; then threads put rows in
+ * order and write them.
+ */
 
 /* Pairs of two points that insertion sorts in less time than a heap. */
 #define FEW 48
@@ -284,12 +288,6 @@ deal_out(hs_sorting *all)
     hs_free(&call->account, others);
     return status;
 }
-
-/*
- * sort_pairs.c: a counting sort by i, then each point's few pairs by (j, S). A pair is one number
- * while it is sorted, j before its place, so that nothing is looked up but the S of images of one
- * pair. sort_pairs.h has the counting sort; here threads put rows in order and write them.
- */
 
 #define POLL_ENTRIES  (INT64_C(1) << 17) /* sorted and written between two calls of poll() */
 #define RANGE_ENTRIES 8192 /* of a range, about: with what is written of them they fit a cache */

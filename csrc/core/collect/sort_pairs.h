@@ -6,10 +6,7 @@
 #include "../threads/call.h"
 #include "../search/search.h"
 
-/*
- * Pairs as single numbers while they are sorted, and the order of those of one row.
- * sort_pairs.h has the pairs of all rows.
- */
+/* sort_pairs.h: the ascending order of pairs. */
 
 /*
  * What is put in order. An entry is the place of a pair among those found and, where both fit into
@@ -86,8 +83,6 @@ hs_row_begin(const hs_sorting *all, int64_t row)
 /* How many bits a place may have at most. Returns what it was before. */
 int hs_test_sort_place_bits(int bits);
 #endif
-
-/* sort_pairs.h: the ascending order of pairs. */
 
 /* The columns that must be found, so that pairs can be put in order and have all that is wanted. */
 unsigned hs_sort_columns(const hs_search *search);

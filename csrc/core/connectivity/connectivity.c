@@ -5,8 +5,8 @@
 
 #include <string.h>
 
-/* The lists one after the other give each node a number among all; points are these
- * nodes, in their order or in another. */
+/* connectivity.c: three results of one call. The lists one after the other give each node a number
+ * among all; points are these nodes, in their order or in another. */
 
 /* Where a list begins, among all nodes and among all rows; copied, so that it cannot change. */
 typedef struct list_range {
@@ -601,7 +601,8 @@ hs_node_pairs_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs, cons
     return HS_OK;
 }
 
-/* What is behind a node in its own list, and all of the lists that follow. */
+/* The table of pairs of nodes from rows of all of them, whose points are in the order of lists and
+ * nodes: of each row, what is behind its node in its own list, and all of the lists that follow. */
 
 /* Entries between two calls of poll(). */
 #define POLL_ROW_ENTRIES (INT64_C(1) << 21)
@@ -724,8 +725,6 @@ row_pairs_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs, const hs
     nodes->output.n_pairs = lists->output.n_pairs = status == HS_OK ? doing.n : 0;
     return status;
 }
-
-/* connectivity.c: three results of one call. */
 
 hs_connectivity *
 hs_connectivity_new(void)

@@ -8,6 +8,13 @@
 #include <string.h>
 #include <math.h>
 
+/*
+ * overlap.c: row i is the union, over all k that i gathers, of the points that gather k. Under the
+ * numbers of the order of space these are few words of bits, which the union takes 64 points at a
+ * time. Its points are then put in order under their own numbers. Threads take ranges of the order
+ * of space, whose rows are written in this order.
+ */
+
 /* Lengths are counted and added up; entries then come in ascending order. */
 
 static hs_status
@@ -601,13 +608,6 @@ space_order_make(hs_call *call, const double *points, int64_t n, int ndim, hs_sp
     }
     return HS_OK;
 }
-
-/*
- * overlap.c: row i is the union, over all k that i gathers, of the points that gather k. Under the
- * numbers of the order of space these are few words of bits, which the union takes 64 points at a
- * time. Its points are then put in order under their own numbers. Threads take ranges of the order
- * of space, whose rows are written in this order.
- */
 
 /* Words that are looked at between two calls of poll(). */
 #define POLL_WORDS (INT64_C(1) << 22)

@@ -9,6 +9,13 @@
 #include "../collect/columns.h"
 #include "../base/base.h"
 
+/*
+ * overlap.h: points that gather a common point, from the rows of what each point gathers. With G
+ * the matrix of these rows and of the diagonal, for each point is in its own support, row i of the
+ * pattern of G G^T has them: neighbours, where the common point is one of the two, and those
+ * further apart.
+ */
+
 /* Rows over the numbers of points, as scratch: of a caller's, of the opposite
  * direction, or of both ends of a half list. */
 
@@ -137,13 +144,6 @@ typedef struct hs_space_order {
     int32_t *order; /* n: the points, in this order */
     int32_t *place; /* n: where each of them is in it */
 } hs_space_order;
-
-/*
- * overlap.h: points that gather a common point, from the rows of what each point gathers. With G
- * the matrix of these rows and of the diagonal, for each point is in its own support, row i of the
- * pattern of G G^T has them: neighbours, where the common point is one of the two, and those
- * further apart.
- */
 
 /* Fills offsets and column J of `rows`, empty, as hs_node_rows_fill does; all points of the map
  * have rows. points: row after row; they only say what is near. */

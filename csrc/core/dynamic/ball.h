@@ -14,7 +14,8 @@
 /* Radius for cells in place of a smaller one: its square is not 0. */
 #define HS_LEAST_BALL 0x1p-400
 
-/* That one ball looks at: those of dynamic.c, and the images that a far centre adds. */
+/* Images that one ball looks at, at most: MOST_IMAGES of dynamic.c, and those that a far centre
+ * adds. */
 #define HS_MOST_BALL_IMAGES 0x1p24
 
 /* The centre as entries see it that have been moved by `image`: centre - image * B. */

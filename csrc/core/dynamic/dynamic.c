@@ -8,6 +8,9 @@
 
 #include <stdlib.h>
 
+/* dynamic.c: points come into cells, move and go; the gate that readers and writers pass; lists as
+ * a whole. */
+
 /* A block that is too small is replaced by a larger one; the map learns where its
  * entries are now. */
 

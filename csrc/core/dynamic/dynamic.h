@@ -10,6 +10,15 @@
 #include "../box/wrap.h"
 
 /*
+ * dynamic.h: a list of points that come, go and move, each under a key.
+ *
+ * Each point is an entry: wrapped position, key and cell side by side, so that a query reads cells
+ * only. The entries of a cell lie in one block of a power of two; a block that is full is replaced
+ * by one of twice the size. A map leads from keys to entries. Removal moves the last entry of the
+ * cell into the gap and tells the map: it takes the same time however crowded the cell is.
+ */
+
+/*
  * A lock that many readers may hold at once, or one writer. Free, it costs two atomic
  * instructions a call, which is what a list of a hundred nanoseconds a call can afford; only a
  * thread that has to wait calls the system.
@@ -37,15 +46,6 @@ bool hs_gate_hold(hs_gate *gate);
 bool hs_gate_is_mine(hs_gate *gate); /* whether this thread holds it */
 void hs_gate_release(hs_gate *gate); /* which this thread holds */
 
-/*
- * dynamic.h: a list of points that come, go and move, each under a key.
- *
- * Each point is an entry: wrapped position, key and cell side by side, so that a query reads cells
- * only. The entries of a cell lie in one block of a power of two; a block that is full is replaced
- * by one of twice the size. A map leads from keys to entries. Removal moves the last entry of the
- * cell into the gap and tells the map: it takes the same time however crowded the cell is.
- */
-
 struct hs_dynamic {
     hs_storage storage;
     bool       inclusive;
@@ -72,19 +72,8 @@ struct hs_dynamic {
     hs_dynamic_counters *counters; /* borrowed, or NULL */
 };
 
-/* A position, made ready: dynamic.h. */
-typedef struct hs_placed hs_placed;
-
-/* Room for the entries of a cell. */
-
-/* Makes room for `count` entries in a cell; those that are there move to a larger block. False when
- * memory is refused: then nothing has changed. */
-bool hs_cell_reserve(hs_dynamic *list, uint32_t number, int64_t count);
-
-/* A position as a list stores it: brought into the middle period, and its cell. */
-
 /* A position, made ready. */
-struct hs_placed {
+typedef struct hs_placed {
     const double *given;             /* borrowed; ndim finite numbers */
     double        x[HS_MAX_DIM];     /* X, in the middle period; not rounded in aligned boxes */
     double        t[HS_MAX_DIM];     /* coordinates along the grid axes */
@@ -93,7 +82,13 @@ struct hs_placed {
     int64_t       index[HS_MAX_DIM]; /* of the cell */
     double        magnitude; /* as hs_wrap_point raises it, of the coordinates that the box moves;
                               * not in aligned boxes */
-};
+} hs_placed;
+
+/* Makes room for `count` entries in a cell; those that are there move to a larger block. False when
+ * memory is refused: then nothing has changed. */
+bool hs_cell_reserve(hs_dynamic *list, uint32_t number, int64_t count);
+
+/* A position as a list stores it: brought into the middle period, and its cell. */
 
 /*
  * X and turns of finite numbers; false beyond HS_WRAP_LIMIT. *magnitude as in hs_wrap_point.
@@ -198,8 +193,6 @@ void      hs_list_clear(hs_dynamic *list);
 
 /* On failure the list is as it was. */
 hs_status hs_list_shrink(hs_dynamic *list);
-
-/* The points of a list in another one, which takes no more memory than they need. */
 
 /* Many points into a list that holds none: no key has to be looked up, and each cell has
  * its block from the beginning. */

@@ -4,7 +4,8 @@
 #include <string.h>
 #include <math.h>
 
-/* Comparing |D| with the cutoff in integers of a fixed, sufficient size. */
+/* metric.c: decides on pairs and measures them: in float64, in double words, and in integers of a
+ * fixed, sufficient size where these cannot tell. */
 
 /*
  * Limbs of 64 bits that hold any component of D. In units of the smallest subnormal, 2^-1074, a

@@ -6,6 +6,9 @@
 #include <math.h>
 #include <string.h>
 
+/* histogram.c: edges and their bands become a table, pairs are counted by it, weights are summed
+ * without rounding, and threads' counts are joined. */
+
 /* Bands are the filter's thresholds at each edge; the table is made as fine as keeps most
  * bands apart. */
 

@@ -7,6 +7,9 @@
 #include <math.h>
 #include <string.h>
 
+/* candidates.c: images that can be near a group, leaves of the tree in these, and the block of
+ * floats that they fill. */
+
 /* Which images of the points can be near a group, by the range of its t_k along
  * each periodic axis. */
 

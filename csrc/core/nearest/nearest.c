@@ -13,6 +13,9 @@
 #include <math.h>
 #include <string.h>
 
+/* nearest.c: trees that are built once for many calls, first radii, radii that surely suffice, and
+ * the search of groups by threads. */
+
 /* Who may build is decided by one compare-and-swap. */
 
 #define NOTHING 0

@@ -4,8 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-/* Few keys are placed by counting the smaller ones, many are merged; the nearest of
- * many come by partitioning. */
+/* rank.c: few keys are placed by counting the smaller ones, many are merged; the nearest of many
+ * come by partitioning. Squares too close to tell are compared exactly, then rows are written. */
 
 HS_ALWAYS_INLINE bool
 is_smaller(void *context, const hs_nearest_key *b, const hs_nearest_key *a)

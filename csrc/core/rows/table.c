@@ -8,8 +8,9 @@
 
 #include <string.h>
 
-/* Hits come in the order of the table; the point itself is left out, and each column
- * is copied. */
+/* table.c: lengths of table rows by a counting walk, or by the one walk that keeps them; their sums
+ * are the offsets. Hits come in the order of the table; the point itself is left out, and each
+ * column is copied. */
 
 #define ROWS_AHEAD         32        /* points from prefetch to writing; twice that for offsets */
 #define MOST_EXPECTED_ROWS 2048      /* bytes of a table row to prefetch */
@@ -312,9 +313,6 @@ move_rows(hs_table *table)
         from += of.n;
     }
 }
-
-/* table.c: lengths of table rows by a counting walk, or by the one walk that keeps them; their sums
- * are the offsets. */
 
 #define MOST_EXPECTED_KEPT (4 << 20) /* bytes; rows are kept when no more than these are expected */
 

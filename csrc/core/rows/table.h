@@ -5,6 +5,12 @@
 #include "../collect/record.h"
 #include "../memory/memory.h"
 
+/*
+ * table.h: all neighbours of each asking point, one row a point, in the order of the caller's
+ * numbers. One walk counts them, a second one writes each row to its place: no row moves, and
+ * nothing is held but the result. A small table is found by one walk, and its rows are moved.
+ */
+
 /* Table rows (the neighbours of one point each), written as walkers find them: to
  * their places when offsets are known, or one behind another in cell order, to be moved later. */
 
@@ -34,12 +40,6 @@ typedef struct hs_filler {
 
 /* After hs_table_prepare. On failure hs_filler_close. */
 void hs_filler_close(hs_filler *fill);
-
-/*
- * table.h: all neighbours of each asking point, one row a point, in the order of the caller's
- * numbers. One walk counts them, a second one writes each row to its place: no row moves, and
- * nothing is held but the result. A small table is found by one walk, and its rows are moved.
- */
 
 /* Neighbours of each asking point, not counting itself, to counts[0 ... n - 1]. HS_ERR_SHIFT_RANGE
  * sets failure->row. */

@@ -10,8 +10,8 @@
 #include <string.h>
 #include <stdlib.h>
 
-/* How far what the search computes with can be from the numbers that were given,
- * and what decides then. */
+/* scene.c: reads the points, closes gaps, scales, wraps, and sets bounds, in this order: how far
+ * what the search computes with can be from the numbers that were given, and what decides then. */
 
 /* Part of the radius above which the width of pairs along an axis counts as that of a ball. */
 #define WORTH_NARROWING 0.8
@@ -36,9 +36,8 @@ hs_scene_scale_ranges(hs_scene *scene)
     }
 }
 
-/* Steps in scene.c. Sets x_error and t_error, from x_largest and *magnitude of wrapping. */
-/* Component by component, because those of a long box vector may be known far less well than those
- * of a short one. */
+/* Sets x_error and t_error, from x_largest and the magnitude of wrapping: component by component,
+ * because those of a long box vector may be known far less well than those of a short one. */
 static void
 scene_bound_errors(hs_scene *scene, double magnitude)
 {
@@ -214,7 +213,7 @@ scene_is_drowned(const hs_scene *scene)
 /* Along coordinate axes cells are found for any number, as long as sums of a few are finite. */
 #define MOST_FOR_CELLS 0x1p900
 
-/* Steps in scene.c. Both clouds get the range of both. */
+/* Gives both clouds the range of both. */
 static void
 scene_join_clouds(hs_scene *scene, hs_scene *asking)
 {
@@ -227,7 +226,7 @@ scene_join_clouds(hs_scene *scene, hs_scene *asking)
     a->largest = b->largest = hs_larger(a->largest, b->largest);
 }
 
-/* What has been settled for the points is settled for the queries. */
+/* What was decided for the points holds for the queries. */
 static void
 scene_share(const hs_scene *scene, hs_scene *asking)
 {
@@ -1221,8 +1220,6 @@ hs_condensed_free(hs_account *account, hs_condensed *condensed)
         }
     }
 }
-
-/* scene.c: reads the points, closes gaps, scales, wraps, and settles bounds, in this order. */
 
 /* Allocates columns for the originals and the turns, in this order, where they are kept. */
 static bool

@@ -99,8 +99,7 @@ hs_scene_radius_along(const hs_scene *scene, int k)
 /* The volume that neighbours of a point lie in: of a ball, or less where they are narrower. */
 double hs_scene_volume(const hs_scene *scene, double ball);
 
-/* Sets scene->less, for a scene whose radius is known; the status is that of narrowing. In
- * scene.c. */
+/* Sets scene->less, for a scene whose radius is known; the status is that of narrowing. */
 hs_status hs_scene_narrow(hs_scene *scene, const hs_narrowing *narrowing);
 
 /*
@@ -161,8 +160,7 @@ hs_status hs_scene_wrapped_like(hs_account *account, const hs_scene *kept, const
 void hs_scene_set_cutoff(hs_scene *scene, const hs_options *options);
 
 /* Wraps columns that scaling would make infinite, or that lie more box vectors away than turns can
- * tell, in the caller's unit. For scenes whose S is not wanted, before they are scaled. In
- * scene.c. */
+ * tell, in the caller's unit. For scenes whose S is not wanted, before they are scaled. */
 void hs_scene_fold_far(hs_scene *scene);
 
 /* Sets the range of the grid coordinates: the points' own where open, one period where periodic. */
@@ -191,8 +189,9 @@ hs_scene_coordinate(const hs_scene *scene, int64_t i, int k)
     return t;
 }
 
-/* Steps of scene.c once the box is scaled. Whether one of its periods has become zero. */
 struct hs_condensed;
+
+/* Once the box is scaled: whether one of its periods has become zero. */
 bool hs_scene_box_vanishes(const hs_scene *scene);
 
 /* Whether open axes leave nothing of the box, so that the points cannot be in cells. */

@@ -4,7 +4,10 @@
 
 #include <string.h>
 
-/* Builds the excluded partners of each point, in CSR form: a counting sort by j, then by i. */
+/* choice.c: what the caller selects is checked; points, box and labels are kept where they are
+ * needed. */
+
+/* Excluded partners of each point, in CSR form: a counting sort by j, then by i. */
 
 /* Room for rows of so many numbers, all of them empty. The length of row r is then counted at
  * first[r + 2]; once they are summed, row r is filled from first[r + 1] on, which becomes where the
@@ -108,9 +111,6 @@ partners_open(const hs_selection *selection, int64_t n_asking, int64_t n_points,
     partners_free(account, &by_second);
     return is_open ? HS_OK : HS_ERR_MEMORY;
 }
-
-/* choice.c: what the caller selects is checked; points, box and labels are kept where they are
- * needed. */
 
 hs_status
 hs_choice_set_box(const hs_box *box, int ndim, hs_choice *choice)

@@ -11,8 +11,8 @@
 #include <string.h>
 #include <stddef.h>
 
-/* Candidates are appended as runs of point numbers; then the kernel copies all
- * runs at once. */
+/* scan.c: a block is gathered, scanned for some points at a time, and what they hit is decided.
+ * Candidates are appended as runs of point numbers; then the kernel copies all runs at once. */
 
 int32_t
 hs_block_most_hits(int32_t capacity)
@@ -1662,8 +1662,6 @@ hs_decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
     scan->n_hits -= n_beyond;
     return HS_OK;
 }
-
-/* scan.c: a block is gathered, scanned for some points at a time, and what they hit is decided. */
 
 /* Candidates between two calls of poll(): some milliseconds. */
 #define POLL_WORK   (INT64_C(1) << 21)

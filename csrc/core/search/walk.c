@@ -6,7 +6,8 @@
 #include <math.h>
 #include <string.h>
 
-/* Dense rows go by cell ids, sparse rows by a search for their indices. */
+/* walk.c: finds the links of each row once; then each group has a window of cells in each link.
+ * Dense rows go by cell ids, sparse rows by a search for their indices. */
 
 /*
  * More points pay better for finding and gathering a neighbourhood, fewer have a smaller one. The
@@ -219,8 +220,6 @@ hs_link_window(const hs_search *search, hs_link *link, int64_t low, int64_t high
     *first = start[low > 0 ? low < n_x ? low : n_x : 0];
     *end = start[high < n_x - 1 ? high >= 0 ? high + 1 : 0 : n_x];
 }
-
-/* walk.c: finds the links of each row once; then each group has a window of cells in each link. */
 
 /*
  * Gather cells low to high of the link's row, leaving out points before `from` of the image 0 (the

@@ -8,8 +8,9 @@
 
 #include <string.h>
 
-/* A job is open while its tasks are handed out. Threads that wake up too late for it go
- * back to sleep, so the caller never waits for them. */
+/* call.c: options, memory, threads and counters of a call are in one struct, to which every step
+ * adds. Its team works on a job, which is open while its tasks are handed out: threads that wake up
+ * too late for it go back to sleep, so the caller never waits for them. */
 
 typedef struct job {
     hs_task_fn run;
@@ -152,9 +153,6 @@ hs_team_free(hs_team *team)
     hs_mutex_destroy(&team->mutex);
     hs_free(NULL, team);
 }
-
-/* call.c: options, memory, threads and counters of a call are in one struct, to which every step
- * adds. */
 
 /* An hs_poll_fn: the caller's, counted. */
 static bool

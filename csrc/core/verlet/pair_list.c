@@ -9,6 +9,9 @@
 
 #include <string.h>
 
+/* pair_list.c: finds the pairs of a list, lists them in bundles, and follows the motion of the
+ * points: how much of the skin it leaves. */
+
 /* Each thread has a walker; shifts are looked up once for each run of a
  * block. */
 
@@ -912,7 +915,7 @@ take_jumps(hs_tracking *track, hs_tile *t)
 }
 
 /*
- * The F, k and c of pair_list.h, and what the longest displacement leaves of the skin.
+ * Chooses F, k and c (pair_list.h), and what the longest displacement leaves of the skin.
  * Any F, k and c are right; good ones make displacements small. c is `base`, taken away before box
  * vectors are looked for, and `drift`, taken away behind that.
  */

@@ -10,6 +10,9 @@
 #include <math.h>
 #include <string.h>
 
+/* recheck.c: slabs of the list, one after the other by one thread, or several at once by threads
+ * that write what they find in turn. */
+
 /* The points of a step in the order of the list, as floats, and the thresholds
  * that hold for them. */
 
@@ -453,8 +456,7 @@ describe_points(const hs_recheck *recheck, const hs_slab_hits *slab, bool shifte
     }
 }
 
-/* Writes i, j, d and D; false: it cannot, and what it has written does not count. In
- * recheck.c. */
+/* Writes i, j, d and D; false: it cannot, and what it has written does not count. */
 static bool
 recheck_write(const hs_recheck *recheck, hs_slab_hits *slab)
 {
@@ -484,7 +486,7 @@ recheck_write(const hs_recheck *recheck, hs_slab_hits *slab)
 }
 
 /*
- * D and D of hits. They are measured in the scene of a search of these points,
+ * d and D of hits. They are measured in the scene of a search of these points,
  * so that they have its bits: between the wrapped points with shifts over the reduced box, or
  * between the points as given.
  */
@@ -771,7 +773,7 @@ recheck_measure(const hs_recheck *recheck, const hs_slab_hits *slab)
 
 /*
  * The hits of a slab as pairs: i and j by the kernel that writes those of a search,
- * S, and what recheck.c measures. The kernel writes a little beyond the last pair. Where
+ * S, and the measures. The kernel writes a little beyond the last pair. Where
  * that is none of ours, in arrays of the caller, it writes to the slab, and the pairs are copied.
  */
 
@@ -936,9 +938,6 @@ recheck_put(const hs_recheck *recheck, hs_slab_hits *slab)
         put_shifts(recheck, slab);
     }
 }
-
-/* recheck.c: slabs of the list, one after the other by one thread, or several at once by threads
- * that write what they find in turn. */
 
 /* Work between two polls, in pairs: a few milliseconds. */
 #define POLL_WORK (INT64_C(1) << 20)

@@ -47,7 +47,7 @@ typedef struct hs_recheck {
     int64_t          *image;   /* owned; m for each image: its shift is image + lag_j - lag_i */
     int64_t          *lag;     /* owned; m a point */
     uint8_t          *lagging; /* owned; whether those are not all zero */
-    bool              writes;  /* recheck.c measures. Then: */
+    bool              writes;  /* d and D are written by the kernel's writer. Then: */
     int32_t          *few;     /* owned; records of lags; NULL: all are zero */
     hs_bundle_points *of_a;    /* each thread has its own */
 } hs_recheck;
@@ -67,7 +67,7 @@ typedef struct hs_slab_hits {
      * each bundle; and where the hits of each bundle end. */
     int32_t      hits[HS_SLAB + HS_PADDING], point[HS_SLAB], hits_end[HS_SLAB];
     hs_open_pair open[HS_SLAB + 1];
-    int32_t      number[HS_SLAB + HS_PADDING];                     /* recheck.c: of b */
+    int32_t      number[HS_SLAB + HS_PADDING];                     /* of b */
     int32_t      i[HS_SLAB + HS_PADDING], j[HS_SLAB + HS_PADDING]; /* ... and what is copied */
 } hs_slab_hits;
 
