@@ -127,7 +127,7 @@ hs_connectivity_link(const hs_half_list *pairs, const hs_node_lists *lists,
 
 /* Options of the search for all neighbours. */
 static hs_options
-options_of_rows(const hs_among *among, const hs_options *options)
+options_of_all_neighbours(const hs_among *among, const hs_options *options)
 {
     hs_options    search = *options;
     const hs_box *box = among->cells != NULL ? hs_cells_box(among->cells) : among->box;
@@ -150,7 +150,7 @@ hs_connectivity_build(const hs_among *among, const hs_node_lists *lists, const h
     if (!can_connect(result, options) || among == NULL || status != HS_OK) {
         return hs_end_early(status != HS_OK ? status : HS_ERR_ARGUMENT, options, failure);
     }
-    const hs_options search = options_of_rows(among, options);
+    const hs_options search = options_of_all_neighbours(among, options);
     /* Only to look at the points; a half list, so that queries are refused. */
     const hs_request request = hs_request_among(among, HS_HALF_LIST, &search);
     if (request.sets.points != NULL && request.sets.points->n != n) {

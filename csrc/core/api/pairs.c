@@ -448,7 +448,7 @@ sort_pairs(hs_search *search, hs_output *output, hs_failure *failure)
 {
     hs_output found;
     hs_output_init(&search->call->account, search->scene.ndim, hs_sort_columns(search), 4, &found);
-    hs_status status = hs_record_all(search, &found, failure);
+    hs_status status = hs_parallel_record_all(search, &found, failure);
     if (status == HS_OK) {
         status = hs_sort_pairs(search->call, search->first_point, search->scene.n, &found, output);
     }
@@ -471,7 +471,7 @@ fill_pairs(hs_search *search, hs_pairs *pairs, hs_failure *failure)
     if (search->call->options.sorted) {
         status = sort_pairs(search, output, failure);
     } else {
-        status = hs_record_all(search, output, failure);
+        status = hs_parallel_record_all(search, output, failure);
     }
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = fmax(failure->expected_pairs, (double)output->n_pairs);
@@ -552,7 +552,8 @@ static hs_status
 find_entries(hs_pairs *rows, hs_table *table, hs_failure *failure)
 {
     hs_search *search = table->search;
-    hs_status  status = hs_once_applies(table) ? hs_once_find(table, failure) : HS_TRY_OTHER;
+    hs_status  status = hs_table_takes_one_walk(table) ? hs_table_find_in_one_walk(table, failure)
+                                                       : HS_TRY_OTHER;
     if (status != HS_TRY_OTHER) {
         return status;
     }
@@ -755,7 +756,7 @@ write_group(const hs_tally *tallies, int n, int64_t group, int64_t to,
 
 /* Returns the number of pairs. */
 static int64_t
-write_result(const counting *shared, hs_tally *tallies, int n)
+write_histogram(const counting *shared, hs_tally *tallies, int n)
 {
     const hs_tally_plan *plan = &shared->plan;
     const hs_histogram  *histogram = shared->histogram;
@@ -813,7 +814,7 @@ tally_pairs(counting *shared, int64_t *n_pairs, hs_failure *failure)
         status = hs_parallel_visit(search, &visitors, NULL, failure);
     }
     if (status == HS_OK) {
-        *n_pairs = write_result(shared, crew.workers, crew.n_open);
+        *n_pairs = write_histogram(shared, crew.workers, crew.n_open);
     }
     hs_crew_close(&crew);
     return status;
@@ -821,7 +822,7 @@ tally_pairs(counting *shared, int64_t *n_pairs, hs_failure *failure)
 
 /* The search up to the largest edge. */
 static hs_options
-options_of(const hs_histogram *histogram, const hs_options *options)
+options_of_histogram(const hs_histogram *histogram, const hs_options *options)
 {
     hs_options of_search = hs_options_of_count(options);
     of_search.cutoff = histogram->edges[histogram->n_edges - 1];
@@ -854,7 +855,7 @@ find_histogram(const hs_among *among, const hs_options *options, const hs_histog
         return status;
     }
     hs_histogram     filled = *histogram;
-    const hs_options of_search = options_of(histogram, options);
+    const hs_options of_search = options_of_histogram(histogram, options);
     hs_request       request = hs_request_among(among, HS_HALF_OR_QUERIES, &of_search);
     request.sets.is_plain = true;
     request.sets.keeps_none = true;
@@ -878,17 +879,17 @@ hs_pairs_histogram(const hs_among *among, const hs_options *options, const hs_hi
 /* Clusters of points, joined pair by pair while these are found. */
 
 /* What the pairs are for. */
-typedef struct gathering {
+typedef struct clustering {
     hs_components  components; /* owned */
     const uint8_t *core;       /* borrowed, or NULL */
     int64_t       *labels;     /* borrowed */
-} gathering;
+} clustering;
 
 /* A hs_pairs_fn: core points that are a pair belong together. */
 static int
 join_pairs(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user)
 {
-    gathering     *doing = user;
+    clustering    *doing = user;
     const int32_t *i = pairs->i, *j = pairs->j;
     const int      n_axes = doing->components.n_axes;
     (void)n_taken;
@@ -905,9 +906,9 @@ join_pairs(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user)
 static int
 adopt_points(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user)
 {
-    const gathering *doing = user;
-    const uint8_t   *core = doing->core;
-    const int32_t   *i = pairs->i, *j = pairs->j;
+    const clustering *doing = user;
+    const uint8_t    *core = doing->core;
+    const int32_t    *i = pairs->i, *j = pairs->j;
     (void)n_taken;
     for (int64_t e = 0; e < n; e++) {
         if ((core[i[e]] != 0) != (core[j[e]] != 0)) {
@@ -938,8 +939,8 @@ is_periodic(const hs_box *box)
 
 /* The pairs, once or twice; the options' memory limit is what the search may take. */
 static hs_status
-gather(const hs_among *among, const hs_options *options, gathering *doing, uint8_t *winding,
-       int64_t *n_clusters, hs_failure *failure)
+join_all_pairs(const hs_among *among, const hs_options *options, clustering *doing,
+               uint8_t *winding, int64_t *n_clusters, hs_failure *failure)
 {
     hs_visit      visit = {.pairs = join_pairs, .user = doing};
     hs_options    of_visit = *options;
@@ -970,7 +971,7 @@ find_clusters(const hs_among *among, const hs_options *options, const uint8_t *c
 {
     const hs_request request = hs_request_among(among, HS_HALF_LIST, options);
     const hs_points *points = request.sets.points;
-    gathering        doing = {.core = core, .labels = labels};
+    clustering       doing = {.core = core, .labels = labels};
     hs_account       account;
     clear_counters(options);
     hs_status status = hs_check_arguments(points, NULL, request.box, options, failure);
@@ -983,7 +984,7 @@ find_clusters(const hs_among *among, const hs_options *options, const uint8_t *c
     if (status == HS_OK) {
         hs_options of_search = *options;
         of_search.memory_limit -= (double)account.held;
-        status = gather(among, &of_search, &doing, winding, n_clusters, failure);
+        status = join_all_pairs(among, &of_search, &doing, winding, n_clusters, failure);
         failure->limit_bytes += status == HS_ERR_MEMORY ? (double)account.held : 0.0;
     } else {
         failure->limit_bytes = account.limit;

@@ -673,8 +673,8 @@ record_by(hs_search *search, hs_output *output, hs_walker *walker, hs_recorder *
 }
 
 hs_status
-hs_record_next(hs_search *search, hs_output *output, hs_walker *walker, hs_recorder *recorder,
-               hs_failure *failure)
+hs_parallel_record_next(hs_search *search, hs_output *output, hs_walker *walker,
+                        hs_recorder *recorder, hs_failure *failure)
 {
     return record_by(search, output, walker, recorder, hs_record_hits, recorder, failure);
 }
@@ -707,7 +707,7 @@ hs_backlog_record(hs_search *search, hs_backlog *backlog, hs_walker *walker, hs_
 }
 
 hs_status
-hs_record_all(hs_search *search, hs_output *output, hs_failure *failure)
+hs_parallel_record_all(hs_search *search, hs_output *output, hs_failure *failure)
 {
     if (output->fixed) { /* a backlog keeps what is written ahead out of the caller's arrays */
         return hs_parallel_record(search, output, failure);

@@ -131,8 +131,8 @@ typedef struct hs_visitors {
 /* Records all pairs behind those that the output has, by the calling thread, with a walker and a
  * recorder that are kept from one search to the next: all zeros before the first, and closed by the
  * caller. */
-hs_status hs_record_next(hs_search *search, hs_output *output, hs_walker *walker,
-                         hs_recorder *recorder, hs_failure *failure);
+hs_status hs_parallel_record_next(hs_search *search, hs_output *output, hs_walker *walker,
+                                  hs_recorder *recorder, hs_failure *failure);
 
 /* Records all pairs in the output, by search->call->team. HS_ERR_SHIFT_RANGE sets failure->row. */
 hs_status hs_parallel_record(hs_search *search, hs_output *output, hs_failure *failure);
@@ -147,7 +147,7 @@ hs_status hs_parallel_record_on(hs_search *search, hs_output *output, int64_t en
                                 hs_bookmark *bookmark, hs_failure *failure);
 
 /* Records all pairs behind those that the output has, by the threads of the call or alone. */
-hs_status hs_record_all(hs_search *search, hs_output *output, hs_failure *failure);
+hs_status hs_parallel_record_all(hs_search *search, hs_output *output, hs_failure *failure);
 
 /* Visits all groups, in no order. *most, if not NULL: the largest neighbourhood. */
 hs_status hs_parallel_visit(hs_search *search, const hs_visitors *visitors, hs_neighbourhood *most,
@@ -173,7 +173,7 @@ void hs_backlog_init(const hs_output *target, hs_committer *committer, hs_backlo
 /* Its pairs and recorder; idempotent. */
 void hs_backlog_free(hs_account *account, hs_backlog *backlog);
 
-/* hs_record_next for a backlog. */
+/* hs_parallel_record_next for a backlog. */
 hs_status hs_backlog_record(hs_search *search, hs_backlog *backlog, hs_walker *walker,
                             hs_failure *failure);
 

@@ -788,8 +788,8 @@ rows_of(const hs_pairs *rows, int32_t n_lists)
 
 /* Pairs of points in any order, or of rows that are not those of all. */
 static hs_status
-fill_pairs(hs_connectivity *made, const hs_node_map *map, const hs_node_lists *lists,
-           const hs_rows_view *view)
+fill_pairs_by_half_list(hs_connectivity *made, const hs_node_map *map, const hs_node_lists *lists,
+                        const hs_rows_view *view)
 {
     hs_output half;
     hs_status status = hs_row_split_half(&made->call, map->n, view, &half);
@@ -815,7 +815,7 @@ fill_rows(hs_connectivity *made, const hs_node_map *map, const hs_node_lists *li
     const bool         has_all = map->is_plain && map->n_rows == map->n;
     hs_status          status = HS_OK;
     if (!lists->rows_only && !has_all) {
-        status = fill_pairs(made, map, lists, &view);
+        status = fill_pairs_by_half_list(made, map, lists, &view);
     }
     if (status == HS_OK && needs_no_split(map)) {
         hs_pairs_free(made->rows);

@@ -566,7 +566,7 @@ typedef struct once {
 } once;
 
 bool
-hs_once_applies(const hs_table *table)
+hs_table_takes_one_walk(const hs_table *table)
 {
     const hs_search *search = table->search;
     const hs_output *entries = table->entries;
@@ -666,7 +666,7 @@ give_up(hs_output *entries)
 }
 
 hs_status
-hs_once_find(hs_table *table, hs_failure *failure)
+hs_table_find_in_one_walk(hs_table *table, hs_failure *failure)
 {
     hs_search    *search = table->search;
     const int64_t n = hs_search_asking(search)->n;

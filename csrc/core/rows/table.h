@@ -64,12 +64,12 @@ void hs_table_free(hs_table *table);
  */
 
 /* Whether to try: i and j, nothing else, in columns of the search's own, by one thread. */
-bool hs_once_applies(const hs_table *table);
+bool hs_table_takes_one_walk(const hs_table *table);
 
 /* After hs_table_prepare: finds offsets and entries. HS_TRY_OTHER when memory is short: nothing is
  * kept then, and two walks, the first of which only counts, can do with less or tell how much it
  * takes. */
-hs_status hs_once_find(hs_table *table, hs_failure *failure);
+hs_status hs_table_find_in_one_walk(hs_table *table, hs_failure *failure);
 
 /*
  * A large column of point numbers that is written from its first entry to its last,

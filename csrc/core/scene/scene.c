@@ -659,10 +659,10 @@ hs_scene_refuse_vanishing(const hs_scene *scene, const hs_condensed *condensed, 
  * it can. */
 
 typedef struct wrapping {
-    hs_scene *scene;
-    bool      few_turns;
-    int       n_slabs; /* that so many points have; the others are not set */
-    hs_folded folded[HS_SLABS];
+    hs_scene     *scene;
+    bool          few_turns;
+    int           n_slabs; /* that so many points have; the others are not set */
+    hs_wrap_range folded[HS_SLABS];
 } wrapping;
 
 /* Whether the points lie in the middle period along axis k, all of them: then none is touched. */
@@ -728,7 +728,7 @@ wrap_slab(void *context, int slab, int64_t first, int64_t last)
     hs_scene         *scene = wrap->scene;
     const hs_lattice *lattice = &scene->lattice;
     const hs_turns   *turns = scene->turns.known ? &scene->turns : NULL;
-    hs_folded        *folded = &wrap->folded[slab];
+    hs_wrap_range    *folded = &wrap->folded[slab];
     if (!lattice->aligned) {
         double *const *r = scene->x_is_beside ? scene->originals : scene->cloud.x;
         hs_fold_points(lattice, wrap->few_turns, r, first, last, scene->cloud.x, turns, folded);
@@ -746,13 +746,13 @@ wrap_slab(void *context, int slab, int64_t first, int64_t last)
 }
 
 /* What wrapping found in all slabs together, and on the axes that were left alone. */
-static hs_folded
+static hs_wrap_range
 join_slabs(const wrapping *wrap)
 {
     const hs_scene *scene = wrap->scene;
-    hs_folded       folded = hs_folded_none();
+    hs_wrap_range   folded = hs_wrap_range_none();
     for (int slab = 0; slab < wrap->n_slabs; slab++) {
-        hs_folded_join(&folded, &wrap->folded[slab]);
+        hs_wrap_range_join(&folded, &wrap->folded[slab]);
     }
     for (int k = 0; scene->lattice.aligned && k < scene->ndim; k++) {
         const bool open = scene->lattice.row_of_axis[k] < 0;
@@ -795,10 +795,10 @@ scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options, double *ma
                        ? (int)((scene->n + HS_SLAB_POINTS - 1) / HS_SLAB_POINTS)
                        : HS_SLABS;
     for (int slab = 0; slab < wrap.n_slabs; slab++) {
-        wrap.folded[slab] = hs_folded_none();
+        wrap.folded[slab] = hs_wrap_range_none();
     }
-    hs_status       status = hs_walk_slabs(team, options, scene->n, wrap_slab, &wrap);
-    const hs_folded folded = join_slabs(&wrap);
+    hs_status           status = hs_walk_slabs(team, options, scene->n, wrap_slab, &wrap);
+    const hs_wrap_range folded = join_slabs(&wrap);
     if (status == HS_ERR_SHIFT_RANGE) {
         failure->row = folded.failed;
         status = hs_skew_is_left(&scene->lattice) ? HS_ERR_BOX_SKEWED : status;

@@ -316,9 +316,9 @@ bool hs_scanner_renew(hs_search *search, hs_block_use use, int32_t capacity, int
                       hs_scanner *scanner);
 
 /* Adds what was done to that of the call. */
-void hs_scanner_note(hs_search *search, hs_scanner *scanner);
+void hs_scanner_flush_counters(hs_search *search, hs_scanner *scanner);
 
-/* hs_scanner_note, and frees; idempotent. */
+/* hs_scanner_flush_counters, and frees; idempotent. */
 void hs_scanner_close(hs_search *search, hs_scanner *scanner);
 
 /* Points [first, last) in cell order are the group from here on, with an empty block. */

@@ -279,7 +279,7 @@ hs_call_dismiss(hs_call *call)
 }
 
 void
-hs_call_note(hs_call *call, const hs_counters *done)
+hs_call_add_counters(hs_call *call, const hs_counters *done)
 {
     hs_counters *sum = &call->done;
     sum->groups += done->groups;

@@ -102,7 +102,7 @@ double hs_test_worth_threads(double n_points);
 void hs_call_dismiss(hs_call *call);
 
 /* Adds what a walker, or another call, has done. */
-void hs_call_note(hs_call *call, const hs_counters *done);
+void hs_call_add_counters(hs_call *call, const hs_counters *done);
 
 /* Writes the counters, if the options want them. */
 void hs_call_report(const hs_call *call, int64_t n_pairs);

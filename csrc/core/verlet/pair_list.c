@@ -677,7 +677,7 @@ make_room(hs_listing *listing)
 
 /* Writes what was found to the listing. */
 static hs_status
-settle_pairs(building *built)
+write_listing(building *built)
 {
     hs_search *search = &built->search;
     placing    place = {.built = built};
@@ -705,7 +705,7 @@ build(const hs_frame *frame, building *built, hs_failure *failure)
         status = find(built, failure);
     }
     if (status == HS_OK) {
-        status = settle_pairs(built);
+        status = write_listing(built);
     }
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = fmax(failure->expected_pairs, (double)built->listing->n_pairs);

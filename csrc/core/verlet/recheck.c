@@ -1134,7 +1134,7 @@ close_worker(void *context, void *place)
 {
     worker  *me = place;
     hs_call *call = ((recheck_job *)context)->recheck->call;
-    hs_call_note(call, &me->done);
+    hs_call_add_counters(call, &me->done);
     hs_output_free(&me->found);
     free_scratch(me);
 }
@@ -1165,7 +1165,7 @@ run_alone(recheck_job *job, hs_failure *failure)
     if (status == HS_ERR_SHIFT_RANGE) {
         failure->row = me.committer.failure.row;
     }
-    hs_call_note(call, &me.done);
+    hs_call_add_counters(call, &me.done);
     free_scratch(&me);
     return status;
 }
