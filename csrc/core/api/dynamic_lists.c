@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "dynamic_lists.h"
 #include "../../halfshell_dynamic.h"
-#include "pairs.h"
+#include "request.h"
 #include "../dynamic/storage.h"
 #include "../scene/points.h"
 #include "../dynamic/ball.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "../connectivity/connectivity.h"
-#include "pairs.h"
+#include "request.h"
 #include "../../halfshell_nodes.h"
 #include "../connectivity/overlap.h"
 #include "../scene/points.h"

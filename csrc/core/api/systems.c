@@ -9,7 +9,7 @@
 #include "../collect/sort_pairs.h"
 #include "../levels/levels.h"
 #include "by_reach.h"
-#include "pairs.h"
+#include "request.h"
 
 #include <string.h>
 #include <math.h>
