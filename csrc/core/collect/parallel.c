@@ -27,7 +27,7 @@ struct hs_commits {
     hs_status        status;
     hs_failure       failure;
     int64_t          failed_range;
-    int64_t          enough, most; /* in pairs: limits set by hs_commits_limit */
+    int64_t          enough, most; /* in pairs: limits set by commits_limit */
     bool             has_enough;
     int64_t          full_range; /* the last one that is written, n_ranges at first */
 };
@@ -51,8 +51,10 @@ commits_new(hs_account *account, hs_output *output, int64_t n_ranges)
     return commits;
 }
 
-void
-hs_commits_limit(hs_commits *commits, int64_t enough, int64_t most)
+/* Before any thread joins: from `enough` pairs in the output on no range is begun, and from `most`
+ * on none is ended but the one that is due, which is to be left (hs_committer.is_full). */
+static void
+commits_limit(hs_commits *commits, int64_t enough, int64_t most)
 {
     commits->enough = enough;
     commits->most = most;
@@ -107,8 +109,11 @@ ask_caller(void *context, double fraction)
     return committer->poll(committer->poll_context, done);
 }
 
-void
-hs_commits_join(hs_commits *commits, hs_committer *committer)
+/* Called by the thread itself, whose committer has options and pairs, and nothing else. The options
+ * are changed: threads that may not poll look whether another has failed, and the caller's thread
+ * tells a fraction that never falls. committer must outlive them. */
+static void
+commits_join(hs_commits *commits, hs_committer *committer)
 {
     hs_options *options = committer->options;
     committer->failure = HS_NO_FAILURE;
@@ -302,8 +307,13 @@ leave(hs_committer *committer)
     return status;
 }
 
-void
-hs_commits_work(hs_committer *committer, hs_range_fn search_range, void *worker)
+/*
+ * Takes ranges as long as there are any and no thread has failed, and waits until all that was
+ * committed has been written. All threads stop when a range fails; the committer's failure tells
+ * why it did. The caller's thread then waits for the others, and polls meanwhile.
+ */
+static void
+commits_work(hs_committer *committer, hs_range_fn search_range, void *worker)
 {
     hs_status status = HS_OK;
     while (status == HS_OK && take_range(committer)) {
@@ -367,8 +377,8 @@ work(void *context, int64_t task)
 {
     const sharing *shared = context;
     hs_committer  *worker = worker_of(shared->crew, task);
-    hs_commits_join(shared->commits, worker);
-    hs_commits_work(worker, shared->crew->search, worker);
+    commits_join(shared->commits, worker);
+    commits_work(worker, shared->crew->search, worker);
 }
 
 static hs_status
@@ -380,7 +390,7 @@ search_ranges(hs_crew *crew, hs_failure *failure)
         return HS_ERR_MEMORY;
     }
     if (crew->enough > 0) {
-        hs_commits_limit(shared.commits, crew->enough, crew->most);
+        commits_limit(shared.commits, crew->enough, crew->most);
     }
     hs_team_run(crew->call->team, crew->n_open, work, &shared);
     crew->n_written = commits_written(shared.commits);

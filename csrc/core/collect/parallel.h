@@ -18,10 +18,8 @@
  * ranges, which are handed out one at a time; what is found in one is written when all earlier
  * ranges have been, so that the result does not depend on the number of threads.
  *
- * Usage, in each thread of a crew, with the committer's options and pairs set:
- *     hs_commits_join(commits, &committer);
- *     hs_commits_work(&committer, search_range, worker);
- * where search_range collects pairs and calls hs_commit, for the last time at its end.
+ * Usage: hs_crew_run, whose `search` collects pairs of a range and calls hs_commit, for the last
+ * time at its end.
  */
 
 typedef struct hs_commits hs_commits;
@@ -63,22 +61,6 @@ typedef struct hs_committer {
 /* Does the work of one range. */
 typedef hs_status (*hs_range_fn)(void *worker, int64_t range);
 
-/* Before any thread joins: from `enough` pairs in the output on no range is begun, and from `most`
- * on none is ended but the one that is due, which is to be left (hs_committer.is_full). */
-void hs_commits_limit(hs_commits *commits, int64_t enough, int64_t most);
-
-/* Called by the thread itself, whose committer has options and pairs, and nothing else. The options
- * are changed: threads that may not poll look whether another has failed, and the caller's thread
- * tells a fraction that never falls. committer must outlive them. */
-void hs_commits_join(hs_commits *commits, hs_committer *committer);
-
-/*
- * Takes ranges as long as there are any and no thread has failed, and waits until all that was
- * committed has been written. All threads stop when a range fails; the committer's failure tells
- * why it did. The caller's thread then waits for the others, and polls meanwhile.
- */
-void hs_commits_work(hs_committer *committer, hs_range_fn search_range, void *worker);
-
 /*
  * Commits what has been collected: with `ends` the whole range, else a part of it. Writes it if the
  * earlier ranges have been written, and waits for these only when the range goes on or much is held
@@ -107,7 +89,8 @@ typedef struct hs_crew {
     int64_t     n_ranges;
     hs_range_fn search;
     hs_output  *output;       /* borrowed; NULL when nothing is committed */
-    int64_t     enough, most; /* pairs in the output, for hs_commits_limit; 0: all */
+    int64_t     enough, most; /* pairs in the output: from `enough` on no range is begun, and
+                               * from `most` on none is ended but the one that is due; 0: all */
     int64_t     n_written;    /* set at the end: the first ranges, written to their end */
 } hs_crew;
 

@@ -178,8 +178,9 @@ farthest_point(const hs_cloud *cloud, double *far)
     return farthest;
 }
 
-void
-hs_scene_name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure *failure)
+/* Which point or query is to blame for noise; asking: NULL without queries. */
+static void
+scene_name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure *failure)
 {
     double of_points, of_queries;
     failure->row = farthest_point(&scene->cloud, &of_points);
@@ -190,6 +191,8 @@ hs_scene_name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure
     }
 }
 
+/* Whether the error of the formula of precision="double" passes both the cutoff and a small part of
+ * the box: then it might call too many images near, and its answer is noise. */
 static bool
 scene_is_drowned(const hs_scene *scene)
 {
@@ -260,8 +263,14 @@ scene_join_wrapped(hs_scene *scene, const hs_scene *asking)
     }
 }
 
-void
-hs_scene_put_in_one_cell(hs_scene *scene)
+/*
+ * A scene that is kept for numbers that no scale holds: all points on one spot of open space, which
+ * gives one cell with everything. No search can use it: each reads the points again and makes a
+ * scene of its own. It is there because what keeps cells owns the points, which those searches
+ * read, and its layout is public: it must be a sound one that holds each point once.
+ */
+static void
+scene_put_in_one_cell(hs_scene *scene)
 {
     hs_cloud *cloud = &scene->cloud;
     for (int k = 0; k < scene->ndim; k++) {
@@ -814,6 +823,8 @@ scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options, double *ma
 
 /* Scenes without a box whose numbers need no scale are filled in one go. */
 
+/* Whether a scene, once its points have been read, stays as it was given: there is no box, and
+ * nothing is scaled. Then scene_fill_ordinary fills it. */
 static bool
 scene_needs_no_scaling(const hs_sets *sets, const hs_box *box, const hs_options *options,
                        const hs_scene *scene)
@@ -822,9 +833,9 @@ scene_needs_no_scaling(const hs_sets *sets, const hs_box *box, const hs_options 
            options->precision != HS_DOUBLE && hs_is_ordinary(&scene->cloud, options->cutoff);
 }
 
-hs_status
-hs_scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene,
-                       hs_failure *failure)
+/* follows: it has filled the scene before, with this cutoff and as many axes. */
+static hs_status
+scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene, hs_failure *failure)
 {
     double magnitude;
     if (!follows) {
@@ -872,7 +883,7 @@ hs_scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene,
 /* From here on half a box entry is exact: its last place is at least twice the smallest number. */
 #define LEAST_HALF 0x1p-1022
 
-/* What one call of hs_condense works with. */
+/* What one call of condense works with. */
 typedef struct condensing {
     hs_account       *account;
     const hs_options *options;
@@ -1170,9 +1181,16 @@ condense_columns(condensing *doing, hs_failure *failure)
     return HS_OK;
 }
 
-hs_status
-hs_condense(hs_account *account, const hs_options *options, const hs_box *box, int unit, int powers,
-            hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed, hs_failure *failure)
+/*
+ * unit: the exponent of the cutoff, 2^unit <= cutoff < 2^(unit + 1); with cutoff 0 any other.
+ * powers: what is far is so beyond 2^powers units, HS_FAR_EXPONENT at most. Does nothing
+ * but look at ranges where nothing is far. box: checked. asking: NULL, or queries, whose
+ * range and that of the points have been joined. HS_ERR_SHIFT_RANGE only where S is wanted.
+ * condensed_free in any case.
+ */
+static hs_status
+condense(hs_account *account, const hs_options *options, const hs_box *box, int unit, int powers,
+         hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed, hs_failure *failure)
 {
     condensed->box = condensed->given_box = box;
     condensed->is_scaled = condensed->has_turns = false;
@@ -1208,8 +1226,8 @@ hs_condense(hs_account *account, const hs_options *options, const hs_box *box, i
     return status;
 }
 
-void
-hs_condensed_free(hs_account *account, hs_condensed *condensed)
+static void
+condensed_free(hs_account *account, hs_condensed *condensed)
 {
     for (int set = 0; condensed->has_turns && set < HS_CONDENSED_SETS; set++) {
         for (int k = 0; k < HS_MAX_DIM; k++) {
@@ -1486,11 +1504,11 @@ fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
         restore_rows(condensed, &scene->lattice);
     }
     if (scene->is_kept && !empty && hs_scene_has_no_scale(scene, condensed)) {
-        hs_scene_put_in_one_cell(scene);
+        scene_put_in_one_cell(scene);
     }
     scene_set_radius(scene, options, hs_scale_apply(scene->pending, scene->cloud.largest));
     if (scene_is_drowned(scene)) {
-        hs_scene_name_farthest(scene, asking, failure);
+        scene_name_farthest(scene, asking, failure);
         return HS_ERR_ROUNDING;
     }
     if (asking != NULL) {
@@ -1516,8 +1534,8 @@ scale_scene(hs_account *account, hs_team *team, const hs_options *options, const
     const int unit = unit_exponent(cloud, &size, scene->sought);
     if (scene_may_condense(scene, asking, &size, unit)) {
         const int powers = scene->is_wide ? HS_FAR_BOUNDED_EXPONENT : HS_FAR_EXPONENT;
-        status = hs_condense(account, options, box, unit, powers, cloud,
-                             asking != NULL ? &asking->cloud : NULL, &condensed, failure);
+        status = condense(account, options, box, unit, powers, cloud,
+                          asking != NULL ? &asking->cloud : NULL, &condensed, failure);
     }
     if (status == HS_OK) {
         scene_set_scale(condensed.box, condensed.is_scaled, unit, scene, asking);
@@ -1529,7 +1547,7 @@ scale_scene(hs_account *account, hs_team *team, const hs_options *options, const
             add_turns(&condensed, 1, asking);
         }
     }
-    hs_condensed_free(account, &condensed);
+    condensed_free(account, &condensed);
     return status;
 }
 
@@ -1559,7 +1577,7 @@ hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, cons
     }
     scene->is_ordinary = status == HS_OK && scene_needs_no_scaling(sets, box, options, scene);
     if (scene->is_ordinary) {
-        status = hs_scene_fill_ordinary(options, follows, scene, failure);
+        status = scene_fill_ordinary(options, follows, scene, failure);
     } else if (status == HS_OK) {
         status = scale_scene(account, team, options, box, scene, asking, failure);
     }
