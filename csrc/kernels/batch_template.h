@@ -122,8 +122,8 @@ put_bytes(uint8_t *bytes, unsigned ones, unsigned twos)
 
 /* Second stage: double-word verdicts as bits of *within and *beyond. hs_double_word_verdict. */
 HS_ALWAYS_INLINE void
-judge_in_double_words(const hs_metric *metric, const differences *d, const int ndim,
-                      const bool shifted, unsigned *within, unsigned *beyond)
+decide_in_double_words(const hs_metric *metric, const differences *d, const int ndim,
+                       const bool shifted, unsigned *within, unsigned *beyond)
 {
     const reals zero = broadcast(0.0);
     reals       lost = d->lost;
@@ -153,8 +153,8 @@ judge_in_double_words(const hs_metric *metric, const differences *d, const int n
 }
 
 HS_ALWAYS_INLINE void
-judge_loop(const hs_metric *metric, const hs_batch *batch, const int ndim, const bool shifted,
-           uint8_t *verdict, hs_stages *stages)
+decide_loop(const hs_metric *metric, const hs_batch *batch, const int ndim, const bool shifted,
+            uint8_t *verdict, hs_stages *stages)
 {
     const reals sure_in = broadcast(metric->sure_in), sure_out = broadcast(metric->sure_out);
     const reals cutoff = broadcast(metric->cutoff);
@@ -181,7 +181,7 @@ judge_loop(const hs_metric *metric, const hs_batch *batch, const int ndim, const
         stages->by_float64 += count(within | beyond);
         if (HS_UNLIKELY(open != 0)) {
             unsigned inside, outside;
-            judge_in_double_words(metric, &d, ndim, shifted, &inside, &outside);
+            decide_in_double_words(metric, &d, ndim, shifted, &inside, &outside);
             within |= inside & open;
             beyond |= outside & open;
             stages->by_double_word += count((inside | outside) & open);
@@ -257,7 +257,7 @@ DECIDE_BATCH(const hs_metric *metric, const hs_batch *batch, uint8_t *verdict, h
         memset(verdict, HS_UNDECIDED, (size_t)batch->n);
         return;
     }
-    DISPATCH(judge_loop, verdict, stages);
+    DISPATCH(decide_loop, verdict, stages);
 }
 
 void

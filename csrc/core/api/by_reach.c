@@ -210,7 +210,7 @@ record_step(void *context, hs_search *search, int64_t *n_pairs, hs_failure *fail
     const int64_t before = output->n_pairs;
     hs_status     status = hs_estimate_by_sample(search, failure);
     if (status == HS_OK) {
-        status = hs_record_all(search, output, failure);
+        status = hs_parallel_record_all(search, output, failure);
     }
     *n_pairs = output->n_pairs - before;
     return status;

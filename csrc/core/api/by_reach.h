@@ -3,7 +3,7 @@
 #define HS_API_BY_REACH_H
 
 #include "../levels/levels.h"
-#include "pairs.h"
+#include "request.h"
 
 /*
  * by_reach.h: searches in which pairs have a reach of their own: several searches of levels, one

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "cells.h"
-#include "pairs.h"
+#include "request.h"
 #include "../scene/points.h"
 #include "../cells/bins.h"
 #include "../base/status.h"
@@ -10,7 +10,7 @@
 #include <math.h>
 #include <string.h>
 
-/* The public functions of cells: points that are copied, sorted once and searched many
+/* cells.c: the public functions of cells: points that are copied, sorted once and searched many
  * times. */
 
 /* The points in memory of the cells: the caller cannot change them between searches. */

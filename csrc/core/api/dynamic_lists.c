@@ -1,13 +1,68 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-#include "dynamic_lists.h"
 #include "../../halfshell_dynamic.h"
-#include "pairs.h"
+#include "request.h"
+#include "../base/os.h"
+#include "../base/status.h"
 #include "../dynamic/storage.h"
 #include "../scene/points.h"
 #include "../dynamic/ball.h"
 
-/* The public functions of single points, and many, that come, go and move;
- * docs/dynamic.md. */
+/* dynamic_lists.c: the functions of halfshell_dynamic.h, for single points, and many, that come, go
+ * and move (docs/dynamic.md): arguments are checked and the list is held here, the work is done in
+ * dynamic/. */
+
+/* What each public function of a hs_dynamic does first and last. */
+
+typedef struct hs_dynamic_call {
+    hs_fpenv env;
+    bool     writes;
+    bool     went_in; /* false: this thread holds the list */
+} hs_dynamic_call;
+
+/* Waits until the list may be used, and sets the rounding mode. */
+HS_ALWAYS_INLINE hs_dynamic_call
+hs_dynamic_enter(const hs_dynamic *list, bool writes)
+{
+    hs_gate        *gate = &((hs_dynamic *)list)->gate; /* it changes, the list does not */
+    hs_dynamic_call call = {.writes = writes};
+    call.went_in = writes ? hs_gate_write(gate) : hs_gate_read(gate);
+    if (call.went_in) {
+        call.env = hs_fpenv_enter();
+    }
+    return call;
+}
+
+HS_ALWAYS_INLINE void
+hs_dynamic_leave(const hs_dynamic *list, hs_dynamic_call call)
+{
+    hs_gate *gate = &((hs_dynamic *)list)->gate;
+    if (call.went_in) {
+        hs_fpenv_leave(call.env);
+        if (call.writes) {
+            hs_gate_write_end(gate);
+        } else {
+            hs_gate_read_end(gate);
+        }
+    }
+}
+
+/* Where a failure goes. */
+HS_ALWAYS_INLINE hs_failure *
+hs_failure_or(hs_failure *failure, hs_failure *ignored)
+{
+    failure = failure != NULL ? failure : ignored;
+    *failure = HS_NO_FAILURE;
+    return failure;
+}
+
+/* The caller's numbers, each read once. */
+HS_ALWAYS_INLINE void
+hs_read_position(const hs_dynamic *list, const double *position, double *own)
+{
+    for (int k = 0; k < list->lattice.ndim; k++) {
+        own[k] = ((const volatile double *)position)[k];
+    }
+}
 
 /* hs_dynamic_insert and hs_dynamic_move. */
 static hs_status

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "../connectivity/connectivity.h"
-#include "pairs.h"
+#include "request.h"
 #include "../../halfshell_nodes.h"
 #include "../connectivity/overlap.h"
 #include "../scene/points.h"
@@ -9,7 +9,8 @@
 
 #include <math.h>
 
-/* Results of one kind and of the other, made alike. */
+/* nodes.c: the public functions of node lists: rows and pairs, of a search or of a half list, and
+ * what is made of them. */
 
 /* How many nodes there are; HS_ERR_TOO_MANY from 2^31 on. */
 static hs_status
@@ -74,6 +75,8 @@ connectivity_begin(const hs_options *options, hs_failure **failure, hs_status *s
     return made;
 }
 
+/* connectivity_begin for rows, by hs_pairs_begin; rows_finish must follow. points: NULL, or checked
+ * as well. */
 static hs_pairs *
 rows_begin(const hs_options *options, const hs_points *points, hs_failure **failure,
            hs_status *status)
@@ -90,16 +93,13 @@ rows_begin(const hs_options *options, const hs_points *points, hs_failure **fail
     return made;
 }
 
-/* The same for rows, by hs_pairs_begin and hs_pairs_finish. points: NULL, or checked as well. */
+/* Leaves the call. *result becomes the rows, or these are freed. Returns the status. */
 static hs_status
 rows_finish(hs_pairs *made, hs_status status, hs_pairs **result, hs_failure *failure)
 {
     hs_call_tell_limit(&made->call, status, failure);
     return hs_pairs_finish(made, status, made->output.n_pairs, result);
 }
-
-/* The public functions of node lists: rows and pairs, of a search or of a half
- * list, and what is made of them. */
 
 hs_status
 hs_connectivity_link(const hs_half_list *pairs, const hs_node_lists *lists,
@@ -127,7 +127,7 @@ hs_connectivity_link(const hs_half_list *pairs, const hs_node_lists *lists,
 
 /* Options of the search for all neighbours. */
 static hs_options
-options_of_rows(const hs_among *among, const hs_options *options)
+options_of_all_neighbours(const hs_among *among, const hs_options *options)
 {
     hs_options    search = *options;
     const hs_box *box = among->cells != NULL ? hs_cells_box(among->cells) : among->box;
@@ -150,7 +150,8 @@ hs_connectivity_build(const hs_among *among, const hs_node_lists *lists, const h
     if (!can_connect(result, options) || among == NULL || status != HS_OK) {
         return hs_end_early(status != HS_OK ? status : HS_ERR_ARGUMENT, options, failure);
     }
-    const hs_options search = options_of_rows(among, options);
+    const hs_options search = options_of_all_neighbours(among, options);
+    /* Only to look at the points; a half list, so that queries are refused. */
     const hs_request request = hs_request_among(among, HS_HALF_LIST, &search);
     if (request.sets.points != NULL && request.sets.points->n != n) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-#include "pairs.h"
+#include "request.h"
 #include "../base/status.h"
-#include "cells.h"
-#include "../search/choice.h"
 #include "by_reach.h"
 #include "../collect/parallel.h"
 #include "../collect/sort_pairs.h"
@@ -13,421 +11,10 @@
 #include "stream.h"
 #include "../collect/components.h"
 
-#include <limits.h>
 #include <math.h>
 
-/* Counts and pointers first, then what they lead to: nothing is read before it is
- * known to be there. */
-
-/* Most bytes from one end of an array to the other: a little less than addresses allow, because the
- * sum that is compared with it is rounded. */
-#define MOST_EXTENT (0.99 * (double)PTRDIFF_MAX)
-
-static hs_status
-status_of(bool sound)
-{
-    return sound ? HS_OK : HS_ERR_ARGUMENT;
-}
-
-/* The counters, if any, of a call that ends before its search begins. */
-static void
-clear_counters(const hs_options *options)
-{
-    if (options != NULL && options->counters != NULL) {
-        *options->counters = (hs_counters){.pairs = 0};
-    }
-}
-
-hs_status
-hs_end_early(hs_status status, const hs_options *options, hs_failure *failure)
-{
-    if (failure != NULL) {
-        *failure = HS_NO_FAILURE;
-    }
-    clear_counters(options);
-    return status;
-}
-
-bool
-hs_can_return(hs_pairs **result, const hs_options *options)
-{
-    if (result != NULL) {
-        *result = NULL;
-    }
-    return hs_can_begin(result, options);
-}
-
-bool
-hs_can_begin(const void *result, const hs_options *options)
-{
-    return result != NULL && options != NULL;
-}
-
-bool
-hs_has_entries(const void *array, const hs_points *points)
-{
-    return array != NULL || (points != NULL && points->n == 0);
-}
-
-static bool
-is_dimension(int ndim)
-{
-    return ndim >= 1 && ndim <= HS_MAX_DIM;
-}
-
-static bool
-is_index_size(int bytes)
-{
-    return bytes == 4 || bytes == 8;
-}
-
-/* Whether entries are there, if any, no further apart than addresses can be. */
-static bool
-has_coordinates(const hs_points *points)
-{
-    const double rows = (double)(points->n - 1) * (double)points->row_stride;
-    const double columns = (double)(points->ndim - 1) * (double)points->column_stride;
-    return points->n == 0 || (points->data != NULL && fabs(rows) + fabs(columns) <= MOST_EXTENT);
-}
-
-hs_status
-hs_check_points(const hs_points *points, hs_failure *failure)
-{
-    if (points == NULL || !is_dimension(points->ndim) || points->n < 0 ||
-        (points->real != HS_FLOAT32 && points->real != HS_FLOAT64)) {
-        return HS_ERR_ARGUMENT;
-    }
-    if (points->n > INT32_MAX) {
-        failure->value = (double)points->n;
-        return HS_ERR_TOO_MANY;
-    }
-    return status_of(has_coordinates(points));
-}
-
-hs_status
-hs_check_systems(const hs_systems *systems, int64_t n_points, hs_failure *failure)
-{
-    if (systems == NULL || systems->n < 0 || (systems->n > 0 && systems->first == NULL)) {
-        return HS_ERR_ARGUMENT;
-    }
-    if (systems->n > INT32_MAX) {
-        failure->value = (double)systems->n;
-        return HS_ERR_TOO_MANY;
-    }
-    for (int64_t s = 0; s < systems->n; s++) {
-        if (systems->first[s + 1] < systems->first[s]) {
-            failure->system = s;
-            return HS_ERR_ARGUMENT;
-        }
-    }
-    return status_of(systems->n == 0 ||
-                     (systems->first[0] == 0 && systems->first[systems->n] == n_points));
-}
-
-hs_status
-hs_check_box(const hs_box *box, int ndim)
-{
-    return status_of(box == NULL || (is_dimension(ndim) && box->ndim == ndim));
-}
-
-static bool
-has_all(const hs_pair_arrays *out, unsigned want)
-{
-    return (!(want & HS_WANT_I) || out->i != NULL) && (!(want & HS_WANT_J) || out->j != NULL) &&
-           (!(want & HS_WANT_BOTH) || out->both != NULL) &&
-           (!(want & HS_WANT_DISTANCE) || out->distance != NULL) &&
-           (!(want & HS_WANT_VECTOR) || out->vector != NULL) &&
-           (!(want & HS_WANT_SHIFT) || out->shift != NULL) &&
-           (!(want & HS_WANT_SHELL) || out->shell != NULL);
-}
-
-/* Each array that is wanted is there, if anything is to be written to it. */
-static bool
-can_hold(const hs_pair_arrays *out, unsigned want)
-{
-    return is_index_size(out->index_bytes) && out->capacity >= 0 &&
-           (out->capacity == 0 || has_all(out, want));
-}
-
-hs_status
-hs_check_resources(const hs_options *options)
-{
-    return status_of(options->threads > INT_MIN && options->memory_limit >= 0.0);
-}
-
-/* These options, of which `known` are bits that may be wanted. */
-static hs_status
-check_options(const hs_options *options, unsigned known)
-{
-    const unsigned        want = options->want;
-    const hs_pair_arrays *out = options->out;
-    if (hs_check_resources(options) != HS_OK) {
-        return HS_ERR_ARGUMENT;
-    }
-    return status_of((want & ~known) == 0 && (want == 0 || is_index_size(options->index_bytes)) &&
-                     (out == NULL || can_hold(out, want)) && options->cell_size >= 0.0 &&
-                     (unsigned)options->algorithm < HS_ALGORITHM_END &&
-                     (options->precision == HS_EXACT || options->precision == HS_DOUBLE ||
-                      options->precision == HS_SINGLE));
-}
-
-hs_status
-hs_check_options(const hs_options *options)
-{
-    return check_options(options, HS_WANT_ALL);
-}
-
-/* HS_OK, or HS_ERR_EDGES unless there are some, finite, not negative and not descending. */
-static hs_status
-check_lengths(const double *lengths, int64_t n, hs_failure *failure)
-{
-    if (n < 1 || n >= HS_MOST_LENGTHS) {
-        return HS_ERR_EDGES;
-    }
-    for (int64_t k = 0; k < n; k++) {
-        if (!isfinite(lengths[k]) || lengths[k] < 0.0 || (k > 0 && lengths[k] < lengths[k - 1])) {
-            failure->row = k;
-            failure->value = lengths[k];
-            return HS_ERR_EDGES;
-        }
-    }
-    return HS_OK;
-}
-
-hs_status
-hs_check_histogram(const hs_histogram *histogram, hs_failure *failure)
-{
-    if (histogram == NULL || histogram->edges == NULL || histogram->n_types < 1) {
-        return HS_ERR_ARGUMENT;
-    }
-    return check_lengths(histogram->edges, histogram->n_edges, failure);
-}
-
-/* The first of such lengths that is above 0, or 0. */
-static double
-least_length(const double *lengths, int64_t n)
-{
-    for (int64_t k = 0; k < n; k++) {
-        if (lengths[k] > 0.0) {
-            return lengths[k];
-        }
-    }
-    return 0.0;
-}
-
-/* Shells are those of an exact search, up to its cutoff. */
-static hs_status
-check_shells(const hs_options *options, hs_failure *failure)
-{
-    if (options->shells == NULL || options->precision != HS_EXACT) {
-        return HS_ERR_ARGUMENT;
-    }
-    const hs_status status = check_lengths(options->shells, options->n_shells, failure);
-    return status == HS_OK ? status_of(options->shells[options->n_shells - 1] == options->cutoff)
-                           : status;
-}
-
-/* Points, queries and box. */
-static hs_status
-check_sets(const hs_points *points, const hs_points *queries, const hs_box *box,
-           hs_failure *failure)
-{
-    hs_status status = hs_check_points(points, failure);
-    if (status == HS_OK) {
-        status = hs_check_box(box, points->ndim);
-    }
-    if (status == HS_OK && queries != NULL) {
-        status = hs_check_points(queries, failure);
-        failure->in_queries = status != HS_OK;
-        status = status == HS_OK ? status_of(queries->ndim == points->ndim) : status;
-    }
-    return status;
-}
-
-hs_status
-hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_box *box,
-                   const hs_options *options, hs_failure *failure)
-{
-    const hs_status status = check_sets(points, queries, box, failure);
-    return status == HS_OK ? hs_check_options(options) : status;
-}
-
-/* The same for half lists, which may have shells. */
-static hs_status
-check_half_list(const hs_points *points, const hs_box *box, const hs_options *options,
-                hs_failure *failure)
-{
-    hs_status status = check_sets(points, NULL, box, failure);
-    if (status == HS_OK) {
-        status = check_options(options, HS_WANT_ALL | HS_WANT_SHELL);
-    }
-    return status == HS_OK && (options->want & HS_WANT_SHELL) ? check_shells(options, failure)
-                                                              : status;
-}
-
-/* Checks, opens, uses and closes, in this order for every search. */
-
-/* Fills the failure when memory is short. Where no pairs are kept, their number is not the
- * reason. */
-static void
-tell_shortage(const hs_request *request, const hs_search *search, hs_failure *failure)
-{
-    if (request->sets.keeps_none) {
-        failure->limit_bytes = search->call->account.limit;
-    } else {
-        hs_shortage_of_search(request->sets.points, request->box, search, failure);
-    }
-}
-
-hs_request
-hs_request_among(const hs_among *among, hs_list_kind kind, const hs_options *options)
-{
-    hs_request request = {.options = options};
-    if (among == NULL || (kind == HS_HALF_LIST && among->queries != NULL)) {
-        return request;
-    }
-    request.reach = among->reach;
-    request.selection = among->selection;
-    request.sets.queries = among->queries;
-    request.sets.is_full = kind == HS_FULL_LIST || among->queries != NULL;
-    if (among->cells == NULL) {
-        request.sets.points = among->points;
-        request.box = among->box;
-    } else if (among->points == NULL && among->box == NULL) {
-        const hs_cells *cells = among->cells;
-        request.sets.points = &cells->points;
-        request.sets.built = &cells->search;
-        request.sets.trees = cells->trees;
-        request.box = hs_cells_box(cells);
-    }
-    return request;
-}
-
-hs_status
-hs_request_open(const hs_request *request, hs_call *call, hs_search *search, hs_failure *failure)
-{
-    const hs_options *options = request->options;
-    hs_sets           sets = request->sets;
-    hs_status         sound =
-        sets.is_full ? hs_check_arguments(sets.points, sets.queries, request->box, options, failure)
-                             : check_half_list(sets.points, request->box, options, failure);
-    if (request->reach != NULL) { /* which this search does not know */
-        sound = HS_ERR_ARGUMENT;
-    }
-    if (sound == HS_OK && (options->want & HS_WANT_SHELL)) {
-        sets.is_plain = true;
-        sets.least_cutoff = least_length(options->shells, options->n_shells);
-    }
-    if (sound == HS_OK) {
-        sound = hs_choice_of_request(request, options->cutoff, call, failure);
-    }
-    if (sound != HS_OK) {
-        hs_search_begin(call, search); /* an empty one */
-        return sound;
-    }
-    sets.least_cutoff = hs_choice_least_length(call->choice, sets.least_cutoff);
-    sound = hs_search_open(&sets, request->box, call, search, failure);
-    if (sound != HS_OK) {
-        hs_choice_close(call);
-    }
-    return sound;
-}
-
-hs_status
-hs_choice_of_request(const hs_request *request, double cutoff, hs_call *call, hs_failure *failure)
-{
-    const hs_sets *sets = &request->sets;
-    hs_status      status = hs_choice_open(request->selection, sets, call, failure);
-    if (status == HS_OK) {
-        status = hs_choice_set_scene(sets, request->box, cutoff, call, failure);
-    }
-    if (status != HS_OK) {
-        hs_choice_close(call);
-    }
-    return status;
-}
-
-/* Closes it, and what was opened with it. */
-static void
-request_close(hs_call *call, hs_search *search)
-{
-    hs_search_close(search);
-    hs_choice_close(call);
-}
-
-hs_status
-hs_request_use(const hs_request *request, hs_use_fn use, void *context, hs_failure *failure)
-{
-    hs_call   call;
-    hs_search search;
-    int64_t   n_pairs = 0;
-    failure = hs_call_enter(request->options, failure, &call);
-    hs_status status = hs_request_open(request, &call, &search, failure);
-    if (status == HS_OK) {
-        status = use(context, &search, &n_pairs, failure);
-        request_close(&call, &search);
-    }
-    if (status == HS_ERR_MEMORY) {
-        tell_shortage(request, &search, failure);
-    }
-    hs_call_leave(&call, n_pairs);
-    hs_account_close(&call.account);
-    return status;
-}
-
-hs_pairs *
-hs_pairs_begin(const hs_options *options, hs_failure **failure)
-{
-    hs_pairs *pairs = hs_pairs_new();
-    if (pairs == NULL) {
-        (void)hs_end_early(HS_ERR_MEMORY, options, *failure);
-        return NULL;
-    }
-    *failure = hs_call_enter(options, *failure, &pairs->call);
-    return pairs;
-}
-
-hs_options
-hs_options_of_nearest(const hs_options *options)
-{
-    hs_options of_rows = *options;
-    of_rows.sorted = false;
-    of_rows.out = NULL;
-    of_rows.precision = HS_EXACT;
-    of_rows.want &= HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
-    return of_rows;
-}
-
-hs_options
-hs_options_of_count(const hs_options *options)
-{
-    hs_options counting = *options;
-    counting.want = 0;
-    counting.sorted = false;
-    counting.out = NULL;
-    return counting;
-}
-
-/* A search whose pairs the caller gets, to be freed by hs_pairs_free; NULL on failure. */
-static hs_status
-request_fill(const hs_request *request, hs_fill_fn fill, hs_pairs **result, hs_failure *failure)
-{
-    hs_search search;
-    hs_pairs *pairs = hs_pairs_begin(request->options, &failure);
-    if (pairs == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    hs_status status = hs_request_open(request, &pairs->call, &search, failure);
-    if (status == HS_OK) {
-        hs_pairs_open(pairs, search.scene.ndim);
-        status = fill(&search, pairs, failure);
-        request_close(&pairs->call, &search);
-    }
-    if (status == HS_ERR_MEMORY) {
-        tell_shortage(request, &search, failure);
-    }
-    return hs_pairs_finish(pairs, status, pairs->output.n_pairs, result);
-}
+/* pairs.c: the public searches of one call: pairs, rows, nearest points, histograms, clusters and
+ * plans. */
 
 /* The public searches: find and count. */
 
@@ -448,7 +35,7 @@ sort_pairs(hs_search *search, hs_output *output, hs_failure *failure)
 {
     hs_output found;
     hs_output_init(&search->call->account, search->scene.ndim, hs_sort_columns(search), 4, &found);
-    hs_status status = hs_record_all(search, &found, failure);
+    hs_status status = hs_parallel_record_all(search, &found, failure);
     if (status == HS_OK) {
         status = hs_sort_pairs(search->call, search->first_point, search->scene.n, &found, output);
     }
@@ -471,7 +58,7 @@ fill_pairs(hs_search *search, hs_pairs *pairs, hs_failure *failure)
     if (search->call->options.sorted) {
         status = sort_pairs(search, output, failure);
     } else {
-        status = hs_record_all(search, output, failure);
+        status = hs_parallel_record_all(search, output, failure);
     }
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = fmax(failure->expected_pairs, (double)output->n_pairs);
@@ -488,7 +75,7 @@ hs_pairs_find(const hs_among *among, const hs_options *options, hs_pairs **resul
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     return request.reach != NULL ? hs_by_reach_pairs(&request, result, failure)
-                                 : request_fill(&request, fill_pairs, result, failure);
+                                 : hs_request_fill(&request, fill_pairs, result, failure);
 }
 
 /* A hs_use_fn: adds the number of pairs, each once; with queries, of all neighbours of each. */
@@ -552,7 +139,8 @@ static hs_status
 find_entries(hs_pairs *rows, hs_table *table, hs_failure *failure)
 {
     hs_search *search = table->search;
-    hs_status  status = hs_once_applies(table) ? hs_once_find(table, failure) : HS_TRY_OTHER;
+    hs_status  status = hs_table_takes_one_walk(table) ? hs_table_find_in_one_walk(table, failure)
+                                                       : HS_TRY_OTHER;
     if (status != HS_TRY_OTHER) {
         return status;
     }
@@ -602,7 +190,7 @@ hs_neighbors_find(const hs_among *among, const hs_options *options, hs_pairs **r
     const hs_options of_rows = options_of_rows(options);
     const hs_request request = hs_request_among(among, HS_FULL_LIST, &of_rows);
     return request.reach != NULL ? hs_by_reach_rows(&request, find_rows, result, failure)
-                                 : request_fill(&request, find_rows, result, failure);
+                                 : hs_request_fill(&request, find_rows, result, failure);
 }
 
 /* A hs_use_fn. */
@@ -755,7 +343,7 @@ write_group(const hs_tally *tallies, int n, int64_t group, int64_t to,
 
 /* Returns the number of pairs. */
 static int64_t
-write_result(const counting *shared, hs_tally *tallies, int n)
+write_histogram(const counting *shared, hs_tally *tallies, int n)
 {
     const hs_tally_plan *plan = &shared->plan;
     const hs_histogram  *histogram = shared->histogram;
@@ -813,7 +401,7 @@ tally_pairs(counting *shared, int64_t *n_pairs, hs_failure *failure)
         status = hs_parallel_visit(search, &visitors, NULL, failure);
     }
     if (status == HS_OK) {
-        *n_pairs = write_result(shared, crew.workers, crew.n_open);
+        *n_pairs = write_histogram(shared, crew.workers, crew.n_open);
     }
     hs_crew_close(&crew);
     return status;
@@ -821,7 +409,7 @@ tally_pairs(counting *shared, int64_t *n_pairs, hs_failure *failure)
 
 /* The search up to the largest edge. */
 static hs_options
-options_of(const hs_histogram *histogram, const hs_options *options)
+options_of_histogram(const hs_histogram *histogram, const hs_options *options)
 {
     hs_options of_search = hs_options_of_count(options);
     of_search.cutoff = histogram->edges[histogram->n_edges - 1];
@@ -850,15 +438,15 @@ find_histogram(const hs_among *among, const hs_options *options, const hs_histog
     const hs_status status = options != NULL ? hs_check_histogram(histogram, failure)
                                              : HS_ERR_ARGUMENT;
     if (status != HS_OK) {
-        clear_counters(options);
+        hs_clear_counters(options);
         return status;
     }
     hs_histogram     filled = *histogram;
-    const hs_options of_search = options_of(histogram, options);
+    const hs_options of_search = options_of_histogram(histogram, options);
     hs_request       request = hs_request_among(among, HS_HALF_OR_QUERIES, &of_search);
     request.sets.is_plain = true;
     request.sets.keeps_none = true;
-    request.sets.least_cutoff = least_length(histogram->edges, histogram->n_edges);
+    request.sets.least_cutoff = hs_least_length(histogram->edges, histogram->n_edges);
     return hs_request_use(&request, fill_histogram, &filled, failure);
 }
 
@@ -878,17 +466,17 @@ hs_pairs_histogram(const hs_among *among, const hs_options *options, const hs_hi
 /* Clusters of points, joined pair by pair while these are found. */
 
 /* What the pairs are for. */
-typedef struct gathering {
+typedef struct clustering {
     hs_components  components; /* owned */
     const uint8_t *core;       /* borrowed, or NULL */
     int64_t       *labels;     /* borrowed */
-} gathering;
+} clustering;
 
 /* A hs_pairs_fn: core points that are a pair belong together. */
 static int
 join_pairs(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user)
 {
-    gathering     *doing = user;
+    clustering    *doing = user;
     const int32_t *i = pairs->i, *j = pairs->j;
     const int      n_axes = doing->components.n_axes;
     (void)n_taken;
@@ -905,9 +493,9 @@ join_pairs(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user)
 static int
 adopt_points(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user)
 {
-    const gathering *doing = user;
-    const uint8_t   *core = doing->core;
-    const int32_t   *i = pairs->i, *j = pairs->j;
+    const clustering *doing = user;
+    const uint8_t    *core = doing->core;
+    const int32_t    *i = pairs->i, *j = pairs->j;
     (void)n_taken;
     for (int64_t e = 0; e < n; e++) {
         if ((core[i[e]] != 0) != (core[j[e]] != 0)) {
@@ -938,8 +526,8 @@ is_periodic(const hs_box *box)
 
 /* The pairs, once or twice; the options' memory limit is what the search may take. */
 static hs_status
-gather(const hs_among *among, const hs_options *options, gathering *doing, uint8_t *winding,
-       int64_t *n_clusters, hs_failure *failure)
+join_all_pairs(const hs_among *among, const hs_options *options, clustering *doing,
+               uint8_t *winding, int64_t *n_clusters, hs_failure *failure)
 {
     hs_visit      visit = {.pairs = join_pairs, .user = doing};
     hs_options    of_visit = *options;
@@ -970,9 +558,9 @@ find_clusters(const hs_among *among, const hs_options *options, const uint8_t *c
 {
     const hs_request request = hs_request_among(among, HS_HALF_LIST, options);
     const hs_points *points = request.sets.points;
-    gathering        doing = {.core = core, .labels = labels};
+    clustering       doing = {.core = core, .labels = labels};
     hs_account       account;
-    clear_counters(options);
+    hs_clear_counters(options);
     hs_status status = hs_check_arguments(points, NULL, request.box, options, failure);
     if (status != HS_OK) {
         return status;
@@ -983,7 +571,7 @@ find_clusters(const hs_among *among, const hs_options *options, const uint8_t *c
     if (status == HS_OK) {
         hs_options of_search = *options;
         of_search.memory_limit -= (double)account.held;
-        status = gather(among, &of_search, &doing, winding, n_clusters, failure);
+        status = join_all_pairs(among, &of_search, &doing, winding, n_clusters, failure);
         failure->limit_bytes += status == HS_ERR_MEMORY ? (double)account.held : 0.0;
     } else {
         failure->limit_bytes = account.limit;

@@ -11,8 +11,8 @@
 #include <math.h>
 #include <string.h>
 
-/* Pairs in blocks. A stream holds a search that is ready to be walked, a bookmark of
- * how far that has come, and the pairs that were found and not yet handed out. */
+/* stream.c: pairs in blocks. A stream holds a search that is ready to be walked, a bookmark of how
+ * far that has come, and the pairs that were found and not yet handed out. */
 
 /* Pairs that are looked for at a time, at least: less would not pay for walkers and threads. */
 #define LEAST_FILL (INT64_C(1) << 16)

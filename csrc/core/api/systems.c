@@ -9,12 +9,13 @@
 #include "../collect/sort_pairs.h"
 #include "../levels/levels.h"
 #include "by_reach.h"
-#include "pairs.h"
+#include "request.h"
 
 #include <string.h>
 #include <math.h>
 
-/* Arrays of a system begin where those of the systems before it end. */
+/* systems.c: many systems in one call: arrays of a system begin where those of the systems before
+ * it end. */
 
 /* Points first[s] to first[s + 1] of all. */
 static hs_points
@@ -278,7 +279,7 @@ record_unsorted(worker *me, hs_search *search)
         hs_output_init(&search->call->account, search->scene.ndim, columns, 4, found);
     }
     const hs_status status =
-        hs_record_next(search, found, &me->walker, &me->recorder, &me->committer.failure);
+        hs_parallel_record_next(search, found, &me->walker, &me->recorder, &me->committer.failure);
     if (status == HS_ERR_MEMORY) {
         me->committer.failure.expected_pairs = (double)found->n_pairs;
     }
@@ -297,7 +298,7 @@ find_pairs(worker *me, hs_search *search)
         return record_unsorted(me, search);
     }
     return me->job->is_direct
-               ? hs_record_next(search, me->target, &me->walker, &me->recorder, failure)
+               ? hs_parallel_record_next(search, me->target, &me->walker, &me->recorder, failure)
                : hs_backlog_record(search, &me->backlog, &me->walker, failure);
 }
 
@@ -514,7 +515,7 @@ close_worker(void *context, void *place)
     hs_walker_close(&me->search, &me->walker);
     hs_recorder_free(account, &me->recorder);
     hs_output_free(&me->found);
-    hs_call_note(total, &me->call.done);
+    hs_call_add_counters(total, &me->call.done);
     for (int p = 0; p < HS_PURPOSE_END; p++) {
         total->account.total.bytes[p] += account->total.bytes[p];
     }
@@ -907,7 +908,7 @@ close_caller(void *context, void *place)
     hs_call *total = ((calls_job *)context)->total;
     caller  *me = place;
     hs_output_free(&me->backlog);
-    hs_call_note(total, &me->done);
+    hs_call_add_counters(total, &me->done);
     total->done.pairs += me->done.pairs;
     for (int p = 0; p < HS_PURPOSE_END; p++) {
         total->account.total.bytes[p] += me->done.bytes[p];

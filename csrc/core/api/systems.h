@@ -109,6 +109,4 @@ typedef struct hs_systems_each {
     hs_output     *output;    /* where pairs go, with the columns that the options want; or NULL */
 } hs_systems_each;
 
-/* What is checked, and shared out, before many systems are searched. */
-
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "os.h"
 
-/* The floating-point control register on each kind of CPU. */
+/* os.c: the floating-point control register on each kind of CPU. */
 
 #if defined(__SSE2__) || defined(_M_X64)
 

@@ -2,11 +2,9 @@
 #include "sort.h"
 #include "os.h"
 
-/*
- * Sorts from the highest digit down. Each range looks for the highest bit in which
- * its keys differ and distributes by the eight bits from there, so that clusters far apart cost one
- * pass and not one for every digit of the distance.
- */
+/* sort.c: sorts from the highest digit down. Each range looks for the highest bit in which its keys
+ * differ and distributes by the eight bits from there, so that clusters far apart cost one pass and
+ * not one for every digit of the distance. */
 
 #define DIGIT_BITS 8 /* 256 places to write to stay in the first-level cache */
 #define BUCKETS    (1 << DIGIT_BITS)

@@ -6,6 +6,14 @@
 #include <string.h>
 
 /*
+ * lattice.c: a short basis of the box vectors, and a unit normal for each grid axis.
+ *
+ * Normals and heights need not be accurate, only consistent: whatever unit vector `normal[k]`
+ * is, |normal[k] . D| <= |D| holds, and grid.c measures how far a lattice vector moves a grid
+ * coordinate that it should not move. A bad normal makes cells wider, never an answer wrong.
+ */
+
+/*
  * Reduction that decides in floating point and computes in exact integers.
  *
  * Every step subtracts an integer multiple of one row from another, so U stays unimodular
@@ -672,14 +680,6 @@ zero_row(int ndim, int n_rows, const double rows[][HS_MAX_DIM])
     }
     return k;
 }
-
-/*
- * lattice.c: a short basis of the box vectors, and a unit normal for each grid axis.
- *
- * Normals and heights need not be accurate, only consistent: whatever unit vector `normal[k]`
- * is, |normal[k] . D| <= |D| holds, and grid.c measures how far a lattice vector moves a grid
- * coordinate that it should not move. A bad normal makes cells wider, never an answer wrong.
- */
 
 hs_scale
 hs_scale_of(int exponent)

@@ -83,7 +83,7 @@ double hs_lattice_volume(const hs_lattice *lattice, int exponent);
 bool hs_lattice_shift(const hs_lattice *lattice, const int64_t *reduced, int64_t *given);
 
 /* Whether reduction has failed: rows of B nearly depend on each other, or have coefficients over
- * the given box vectors that no shift may have. In lattice.c, as the next one. */
+ * the given box vectors that no shift may have. */
 bool hs_skew_is_left(const hs_lattice *lattice);
 
 /* Why a search would meet more images or rows of cells than any memory holds: HS_ERR_BOX_SKEWED or

@@ -160,10 +160,10 @@ hs_wrap_point(const hs_lattice *lattice, const double *r, double *inside, int64_
 /* Up to here, in periods, x is wrapped by one turn at most; below 1.5 with room for rounding. */
 #define ONE_TURN 1.25
 
-hs_folded
-hs_folded_none(void)
+hs_wrap_range
+hs_wrap_range_none(void)
 {
-    hs_folded none = {.failed = -1};
+    hs_wrap_range none = {.failed = -1};
     for (int k = 0; k < HS_MAX_DIM; k++) {
         none.lower[k] = INFINITY;
         none.upper[k] = -INFINITY;
@@ -172,7 +172,7 @@ hs_folded_none(void)
 }
 
 void
-hs_folded_join(hs_folded *folded, const hs_folded *more)
+hs_wrap_range_join(hs_wrap_range *folded, const hs_wrap_range *more)
 {
     for (int k = 0; k < HS_MAX_DIM; k++) {
         folded->x_largest[k] = fmax(folded->x_largest[k], more->x_largest[k]);
@@ -232,7 +232,7 @@ count_once(const double *HS_RESTRICT x, int64_t n, double length, int32_t *HS_RE
 
 void
 hs_fold_axis(const hs_lattice *lattice, int k, double *x, int64_t first, int64_t last,
-             double largest, const hs_turns *turns, hs_folded *folded)
+             double largest, const hs_turns *turns, hs_wrap_range *folded)
 {
     const double length = lattice->period[k];
     const int    row = lattice->row_of_axis[k];
@@ -418,7 +418,7 @@ subtract_terms(const term *terms, int n_terms, tile *work)
 
 static void
 move_inside(const hs_lattice *lattice, int k, const double *HS_RESTRICT x, tile *work,
-            hs_folded *folded)
+            hs_wrap_range *folded)
 {
     double *HS_RESTRICT inside = work->inside[k];
     term                terms[HS_MAX_DIM];
@@ -450,7 +450,7 @@ move_inside(const hs_lattice *lattice, int k, const double *HS_RESTRICT x, tile 
 /* Ranges of the coordinates t_k of the points inside, joined to *folded. Returns whether along any
  * periodic axis one of them is beyond its faces. */
 static bool
-find_ranges(const hs_lattice *lattice, tile *work, hs_folded *folded)
+find_ranges(const hs_lattice *lattice, tile *work, hs_wrap_range *folded)
 {
     const double *inside[HS_MAX_DIM];
     bool          beyond = false;
@@ -492,7 +492,7 @@ find_ranges(const hs_lattice *lattice, tile *work, hs_folded *folded)
 /* Wraps every point by hs_wrap_point. Returns the first point that fails, or -1. */
 static int
 fold_one_by_one(const hs_lattice *lattice, const double *const *x, const hs_turns *turns,
-                int64_t begin, tile *work, hs_folded *folded)
+                int64_t begin, tile *work, hs_wrap_range *folded)
 {
     for (int i = 0; i < work->n; i++) {
         double  r[HS_MAX_DIM], inside[HS_MAX_DIM];
@@ -557,9 +557,9 @@ most_turns(const hs_lattice *lattice)
 /* The quick way. Returns false where some points have too many turns or may need a second pass. */
 static bool
 fold_tile(const hs_lattice *lattice, double most, const double *const *x, const hs_turns *turns,
-          int64_t begin, tile *work, hs_folded *folded)
+          int64_t begin, tile *work, hs_wrap_range *folded)
 {
-    hs_folded found = *folded;
+    hs_wrap_range found = *folded;
     count_turns(lattice, x, work);
     if (!turns_are_few(work, most)) {
         return false;
@@ -579,7 +579,7 @@ fold_tile(const hs_lattice *lattice, double most, const double *const *x, const 
 
 void
 hs_fold_points(const hs_lattice *lattice, bool few_turns, double *const *r, int64_t first,
-               int64_t last, double *const *x, const hs_turns *turns, hs_folded *folded)
+               int64_t last, double *const *x, const hs_turns *turns, hs_wrap_range *folded)
 {
     tile         work;
     const double most = few_turns ? INFINITY : most_turns(lattice);

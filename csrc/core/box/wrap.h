@@ -63,19 +63,19 @@ hs_turns_set(const hs_turns *turns, int row, int64_t i, int64_t value)
 }
 
 /* What wrapping found out about the points. */
-typedef struct hs_folded {
+typedef struct hs_wrap_range {
     double  x_largest[HS_MAX_DIM]; /* at least the largest |X_k| */
     double  lower[HS_MAX_DIM];     /* range of t_k of X; not set in aligned lattices */
     double  upper[HS_MAX_DIM];
     double  magnitude; /* the largest sum of absolute terms of any point */
     int64_t failed;    /* lowest point that could not be wrapped, or -1 */
-} hs_folded;
+} hs_wrap_range;
 
 /* The result of wrapping no point. */
-hs_folded hs_folded_none(void);
+hs_wrap_range hs_wrap_range_none(void);
 
 /* Joins `more` to *folded. */
-void hs_folded_join(hs_folded *folded, const hs_folded *more);
+void hs_wrap_range_join(hs_wrap_range *folded, const hs_wrap_range *more);
 
 /*
  * Along coordinate axis k of an aligned lattice: x[first, last) are wrapped in place. `largest`: at
@@ -83,7 +83,7 @@ void hs_folded_join(hs_folded *folded, const hs_folded *more);
  * HS_WRAP_LIMIT fail only where turns are wanted.
  */
 void hs_fold_axis(const hs_lattice *lattice, int k, double *x, int64_t first, int64_t last,
-                  double largest, const hs_turns *turns, hs_folded *folded);
+                  double largest, const hs_turns *turns, hs_wrap_range *folded);
 
 /*
  * In any lattice: points [first, last) of the columns r go wrapped to the columns x, which may be
@@ -91,7 +91,7 @@ void hs_fold_axis(const hs_lattice *lattice, int k, double *x, int64_t first, in
  * point is tested.
  */
 void hs_fold_points(const hs_lattice *lattice, bool few_turns, double *const *r, int64_t first,
-                    int64_t last, double *const *x, const hs_turns *turns, hs_folded *folded);
+                    int64_t last, double *const *x, const hs_turns *turns, hs_wrap_range *folded);
 
 /* t_k of n points, with the bits of hs_lattice_coordinate: summed in its order. */
 void hs_fold_coordinates(const hs_lattice *lattice, int k, const double *const *x, int64_t n,

@@ -8,10 +8,17 @@
 #include <string.h>
 
 /*
- * Boxes are often whole multiples of the cutoff. There is no room for rounding then,
- * so points are told apart by the faces between cells, which are numbers: two points with `part`
- * whole cells between their cells are more than the radius apart, also across a periodic face
- * unless one lies on it.
+ * grid.c: how far apart the coordinates of a pair can be, then one cell or several, whichever makes
+ * a search cheaper; grid_choose_counts says how many.
+ *
+ * Why no pair is lost: rounding is monotone, so cell indices are a monotone function of t; `range`
+ * bounds how far apart the computed coordinates of a pair can be, every rounding and the whole
+ * effect of inexact normals included; and `reach` is that range in cells, rounded up.
+ *
+ * Boxes are often whole multiples of the cutoff. There is no room for rounding then, so points are
+ * told apart by the faces between cells, which are numbers: two points with `part` whole cells
+ * between their cells are more than the radius apart, also across a periodic face unless one lies
+ * on it.
  */
 
 /* Is every cell along axis k at least `least` wide, in the real numbers that its faces are? */
@@ -104,9 +111,14 @@ pitch_of(const hs_grid *grid, int k, double parts)
     return grid->range[k] * (1.0 + 0x1p-20) / parts;
 }
 
-void
-hs_grid_choose_counts(const hs_scene *scene, const hs_grid *grid, int finer, double density,
-                      double *counts, double *parts)
+/*
+ * How many cells along each axis: those that make a search quickest, `finer` of them to a range;
+ * along the first axis so many that a cell holds some twelve points of this density. Fills
+ * parts[k], the cells to a range along axis k.
+ */
+static void
+grid_choose_counts(const hs_scene *scene, const hs_grid *grid, int finer, double density,
+                   double *counts, double *parts)
 {
     double area = 1.0; /* of one row's cross-section */
     for (int k = scene->ndim - 1; k >= 0; k--) {
@@ -126,8 +138,9 @@ hs_grid_choose_counts(const hs_scene *scene, const hs_grid *grid, int finer, dou
     }
 }
 
-double
-hs_grid_most_cells(const hs_scene *scene)
+/* In proportion to the points. */
+static double
+grid_most_cells(const hs_scene *scene)
 {
     return fmin(2.0 * (double)scene->n + HS_GRID_SPARE_CELLS, MOST_CELLS);
 }
@@ -156,10 +169,12 @@ cap_counts(int ndim, double cap, double *counts)
     }
 }
 
-bool
-hs_grid_cap_counts(const hs_scene *scene, double *counts)
+/* Fewer cells, evenly over the axes, until there are no more than grid_most_cells. Returns
+ * whether it had to. */
+static bool
+grid_cap_counts(const hs_scene *scene, double *counts)
 {
-    return cap_counts(scene->ndim, hs_grid_most_cells(scene), counts);
+    return cap_counts(scene->ndim, grid_most_cells(scene), counts);
 }
 
 /*
@@ -195,10 +210,11 @@ shorten_cells(const hs_scene *scene, const hs_grid *grid, double *counts)
     counts[0] = fmin(floor(product), most);
 }
 
-bool
-hs_grid_fit_counts(const hs_scene *scene, const hs_grid *grid, double *counts)
+/* The same, then fewer rows of shorter cells, or of more points. */
+static bool
+grid_fit_counts(const hs_scene *scene, const hs_grid *grid, double *counts)
 {
-    const bool capped = hs_grid_cap_counts(scene, counts);
+    const bool capped = grid_cap_counts(scene, counts);
     if (capped && counts[0] < FEW_CELLS) {
         const double rows = fmax((double)scene->n / POINTS_PER_ROW, 1.0);
         (void)cap_counts(scene->ndim, counts[0] * rows, counts);
@@ -207,15 +223,6 @@ hs_grid_fit_counts(const hs_scene *scene, const hs_grid *grid, double *counts)
     }
     return capped;
 }
-
-/*
- * grid.c: how far apart the coordinates of a pair can be, then one cell or several, whichever makes
- * a search cheaper; grid.c says how many.
- *
- * Why no pair is lost: rounding is monotone, so cell indices are a monotone function of t; `range`
- * bounds how far apart the computed coordinates of a pair can be, every rounding and the whole
- * effect of inexact normals included; and `reach` is that range in cells, rounded up.
- */
 
 #define UNIT                0x1p-53
 #define SLACK               HS_GRID_SLACK
@@ -403,11 +410,11 @@ choose_shape(const hs_scene *scene, hs_grid_kind kind, double density, double ne
     /* Narrower rows cost more rows to visit, and leave out candidates that else are gathered first
      * (scan.h). */
     const int finer = neighbours < 600.0 ? 1 : neighbours < 3000.0 ? 2 : 3;
-    hs_grid_choose_counts(scene, grid, finer, density, counts, parts);
-    const bool capped = hs_grid_fit_counts(scene, grid, counts);
+    grid_choose_counts(scene, grid, finer, density, counts, parts);
+    const bool capped = grid_fit_counts(scene, grid, counts);
     hs_status  status = hs_grid_set_shape(scene, counts, grid);
     if (status == HS_OK && scene->lattice.aligned && !capped && !scene->is_asked) {
-        hs_grid_cut_by_faces(scene, parts, hs_grid_most_cells(scene), grid);
+        hs_grid_cut_by_faces(scene, parts, grid_most_cells(scene), grid);
     }
     /* Axes with several cells reach a few of them, the others as far as in the single one. */
     HS_ASSERT(status == HS_OK || single_cost == INFINITY);
@@ -888,7 +895,7 @@ hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_w
         /* Not for a zero extent, also with a width that scaling brought to zero. */
         counts[k] = extent > pitch ? floor(fmin(extent / pitch, HS_GRID_CELLS_PER_AXIS)) : 1.0;
     }
-    *is_wider = hs_grid_cap_counts(scene, counts);
+    *is_wider = grid_cap_counts(scene, counts);
     while (hs_grid_set_shape(scene, counts, grid) != HS_OK || stencil_bound(grid) > MOST_ROWS) {
         *is_wider = true;
         if (!halve_counts(scene->ndim, counts)) {

@@ -41,8 +41,7 @@ hs_status hs_grid_init_kind(const hs_scene *scene, hs_grid_kind kind, hs_grid *g
 
 /*
  * Cells that are at least `width` wide, whatever that costs; wider ones, with *is_wider set, where
- * there would be too many of them, or too many around each. HS_TRY_OTHER where no grid will do. In
- * grid.c.
+ * there would be too many of them, or too many around each. HS_TRY_OTHER where no grid will do.
  */
 hs_status hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_wider,
                             hs_failure *failure);
@@ -50,20 +49,6 @@ hs_status hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, 
 /* Steps of hs_grid_init and hs_grid_init_wide. Ranges, errors and expected pairs, no cells yet;
  * *density: points in a unit of the volume that they are in. */
 hs_status hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure *failure);
-
-/*
- * How many cells along each axis. hs_grid_choose_counts: those that make a search
- * quickest, `finer` of them to a range; along the first axis so many that a cell holds some twelve
- * points of this density. Fills parts[k], the cells to a range along axis k. hs_grid_cap_counts:
- * fewer, evenly over the axes, until there are no more than hs_grid_most_cells, which is in
- * proportion to the points. hs_grid_fit_counts: the same, then fewer rows of shorter cells, or of
- * more points. Both return whether they had to.
- */
-void   hs_grid_choose_counts(const hs_scene *scene, const hs_grid *grid, int finer, double density,
-                             double *counts, double *parts);
-double hs_grid_most_cells(const hs_scene *scene);
-bool   hs_grid_cap_counts(const hs_scene *scene, double *counts);
-bool   hs_grid_fit_counts(const hs_scene *scene, const hs_grid *grid, double *counts);
 
 /* So many cells along each axis. HS_ERR_MEMORY when a reach passes its integers. */
 hs_status hs_grid_set_shape(const hs_scene *scene, const double *counts, hs_grid *grid);

@@ -42,7 +42,7 @@ void hs_components_join(hs_components *components, int32_t i, int32_t j, const i
 int64_t hs_components_label(hs_components *components, const uint8_t *counts, int64_t *labels,
                             uint8_t *winding);
 
-/* D, D and S of pairs that the caller gives, in their order. */
+/* d, D and S of pairs that the caller gives, in their order. */
 
 /* What pairs are measured between; all borrowed. */
 typedef struct hs_given_pairs {

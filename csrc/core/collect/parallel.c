@@ -9,7 +9,9 @@
 
 #include <string.h>
 
-/* A mutex guards the number of the range that is due; pairs are copied without it. */
+/* parallel.c: each worker has a walker and a backlog; ranges are committed in turn. A mutex guards
+ * the number of the range that is due; pairs are copied without it. A thread alone writes straight
+ * to the output, by a walker that it may keep for the next search. */
 
 struct hs_commits {
     hs_output       *output;
@@ -25,7 +27,7 @@ struct hs_commits {
     hs_status        status;
     hs_failure       failure;
     int64_t          failed_range;
-    int64_t          enough, most; /* in pairs: limits set by hs_commits_limit */
+    int64_t          enough, most; /* in pairs: limits set by commits_limit */
     bool             has_enough;
     int64_t          full_range; /* the last one that is written, n_ranges at first */
 };
@@ -49,8 +51,10 @@ commits_new(hs_account *account, hs_output *output, int64_t n_ranges)
     return commits;
 }
 
-void
-hs_commits_limit(hs_commits *commits, int64_t enough, int64_t most)
+/* Before any thread joins: from `enough` pairs in the output on no range is begun, and from `most`
+ * on none is ended but the one that is due, which is to be left (hs_committer.is_full). */
+static void
+commits_limit(hs_commits *commits, int64_t enough, int64_t most)
 {
     commits->enough = enough;
     commits->most = most;
@@ -105,8 +109,11 @@ ask_caller(void *context, double fraction)
     return committer->poll(committer->poll_context, done);
 }
 
-void
-hs_commits_join(hs_commits *commits, hs_committer *committer)
+/* Called by the thread itself, whose committer has options and pairs, and nothing else. The options
+ * are changed: threads that may not poll look whether another has failed, and the caller's thread
+ * tells a fraction that never falls. committer must outlive them. */
+static void
+commits_join(hs_commits *commits, hs_committer *committer)
 {
     hs_options *options = committer->options;
     committer->failure = HS_NO_FAILURE;
@@ -300,8 +307,13 @@ leave(hs_committer *committer)
     return status;
 }
 
-void
-hs_commits_work(hs_committer *committer, hs_range_fn search_range, void *worker)
+/*
+ * Takes ranges as long as there are any and no thread has failed, and waits until all that was
+ * committed has been written. All threads stop when a range fails; the committer's failure tells
+ * why it did. The caller's thread then waits for the others, and polls meanwhile.
+ */
+static void
+commits_work(hs_committer *committer, hs_range_fn search_range, void *worker)
 {
     hs_status status = HS_OK;
     while (status == HS_OK && take_range(committer)) {
@@ -365,8 +377,8 @@ work(void *context, int64_t task)
 {
     const sharing *shared = context;
     hs_committer  *worker = worker_of(shared->crew, task);
-    hs_commits_join(shared->commits, worker);
-    hs_commits_work(worker, shared->crew->search, worker);
+    commits_join(shared->commits, worker);
+    commits_work(worker, shared->crew->search, worker);
 }
 
 static hs_status
@@ -378,7 +390,7 @@ search_ranges(hs_crew *crew, hs_failure *failure)
         return HS_ERR_MEMORY;
     }
     if (crew->enough > 0) {
-        hs_commits_limit(shared.commits, crew->enough, crew->most);
+        commits_limit(shared.commits, crew->enough, crew->most);
     }
     hs_team_run(crew->call->team, crew->n_open, work, &shared);
     crew->n_written = commits_written(shared.commits);
@@ -395,9 +407,6 @@ hs_crew_run(hs_crew *crew, hs_failure *failure)
     hs_crew_close(crew);
     return status;
 }
-
-/* parallel.c: each worker has a walker and a backlog; ranges are committed in turn. A thread alone
- * writes straight to the output, by a walker that it may keep for the next search. */
 
 /* Points of a range: a group at least, and so few that their pairs are a part of what a thread can
  * hold back: it seldom waits for others. */
@@ -674,8 +683,8 @@ record_by(hs_search *search, hs_output *output, hs_walker *walker, hs_recorder *
 }
 
 hs_status
-hs_record_next(hs_search *search, hs_output *output, hs_walker *walker, hs_recorder *recorder,
-               hs_failure *failure)
+hs_parallel_record_next(hs_search *search, hs_output *output, hs_walker *walker,
+                        hs_recorder *recorder, hs_failure *failure)
 {
     return record_by(search, output, walker, recorder, hs_record_hits, recorder, failure);
 }
@@ -708,7 +717,7 @@ hs_backlog_record(hs_search *search, hs_backlog *backlog, hs_walker *walker, hs_
 }
 
 hs_status
-hs_record_all(hs_search *search, hs_output *output, hs_failure *failure)
+hs_parallel_record_all(hs_search *search, hs_output *output, hs_failure *failure)
 {
     if (output->fixed) { /* a backlog keeps what is written ahead out of the caller's arrays */
         return hs_parallel_record(search, output, failure);

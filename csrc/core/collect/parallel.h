@@ -8,14 +8,18 @@
 #include "record.h"
 
 /*
+ * parallel.h: the walk over all points by several threads. Points are handed out in ranges; what a
+ * thread finds in one waits in a backlog of its own until all earlier ranges have been written, so
+ * that the result does not depend on the number of threads.
+ */
+
+/*
  * Several threads that fill one output in a fixed order. The work is cut into numbered
  * ranges, which are handed out one at a time; what is found in one is written when all earlier
  * ranges have been, so that the result does not depend on the number of threads.
  *
- * Usage, in each thread of a crew, with the committer's options and pairs set:
- *     hs_commits_join(commits, &committer);
- *     hs_commits_work(&committer, search_range, worker);
- * where search_range collects pairs and calls hs_commit, for the last time at its end.
+ * Usage: hs_crew_run, whose `search` collects pairs of a range and calls hs_commit, for the last
+ * time at its end.
  */
 
 typedef struct hs_commits hs_commits;
@@ -57,22 +61,6 @@ typedef struct hs_committer {
 /* Does the work of one range. */
 typedef hs_status (*hs_range_fn)(void *worker, int64_t range);
 
-/* Before any thread joins: from `enough` pairs in the output on no range is begun, and from `most`
- * on none is ended but the one that is due, which is to be left (hs_committer.is_full). */
-void hs_commits_limit(hs_commits *commits, int64_t enough, int64_t most);
-
-/* Called by the thread itself, whose committer has options and pairs, and nothing else. The options
- * are changed: threads that may not poll look whether another has failed, and the caller's thread
- * tells a fraction that never falls. committer must outlive them. */
-void hs_commits_join(hs_commits *commits, hs_committer *committer);
-
-/*
- * Takes ranges as long as there are any and no thread has failed, and waits until all that was
- * committed has been written. All threads stop when a range fails; the committer's failure tells
- * why it did. The caller's thread then waits for the others, and polls meanwhile.
- */
-void hs_commits_work(hs_committer *committer, hs_range_fn search_range, void *worker);
-
 /*
  * Commits what has been collected: with `ends` the whole range, else a part of it. Writes it if the
  * earlier ranges have been written, and waits for these only when the range goes on or much is held
@@ -101,7 +89,8 @@ typedef struct hs_crew {
     int64_t     n_ranges;
     hs_range_fn search;
     hs_output  *output;       /* borrowed; NULL when nothing is committed */
-    int64_t     enough, most; /* pairs in the output, for hs_commits_limit; 0: all */
+    int64_t     enough, most; /* pairs in the output: from `enough` on no range is begun, and
+                               * from `most` on none is ended but the one that is due; 0: all */
     int64_t     n_written;    /* set at the end: the first ranges, written to their end */
 } hs_crew;
 
@@ -113,12 +102,6 @@ void      hs_crew_close(hs_crew *crew);
  * take ranges, and are closed. Returns the failure of the earliest range that had one. */
 hs_status hs_crew_run(hs_crew *crew, hs_failure *failure);
 
-/*
- * parallel.h: the walk over all points by several threads. Points are handed out in ranges; what a
- * thread finds in one waits in a backlog of its own until all earlier ranges have been written, so
- * that the result does not depend on the number of threads.
- */
-
 /* What each thread's walker shall do with its hits, in place of recording them. */
 typedef struct hs_visitors {
     hs_block_use            use;
@@ -128,10 +111,11 @@ typedef struct hs_visitors {
     size_t                  context_size;
 } hs_visitors;
 
-/* The same with a walker and a recorder that are kept from one search to the next; all zeros before
- * the first, and closed by the caller. */
-hs_status hs_record_next(hs_search *search, hs_output *output, hs_walker *walker,
-                         hs_recorder *recorder, hs_failure *failure);
+/* Records all pairs behind those that the output has, by the calling thread, with a walker and a
+ * recorder that are kept from one search to the next: all zeros before the first, and closed by the
+ * caller. */
+hs_status hs_parallel_record_next(hs_search *search, hs_output *output, hs_walker *walker,
+                                  hs_recorder *recorder, hs_failure *failure);
 
 /* Records all pairs in the output, by search->call->team. HS_ERR_SHIFT_RANGE sets failure->row. */
 hs_status hs_parallel_record(hs_search *search, hs_output *output, hs_failure *failure);
@@ -146,7 +130,7 @@ hs_status hs_parallel_record_on(hs_search *search, hs_output *output, int64_t en
                                 hs_bookmark *bookmark, hs_failure *failure);
 
 /* Records all pairs behind those that the output has, by the threads of the call or alone. */
-hs_status hs_record_all(hs_search *search, hs_output *output, hs_failure *failure);
+hs_status hs_parallel_record_all(hs_search *search, hs_output *output, hs_failure *failure);
 
 /* Visits all groups, in no order. *most, if not NULL: the largest neighbourhood. */
 hs_status hs_parallel_visit(hs_search *search, const hs_visitors *visitors, hs_neighbourhood *most,
@@ -172,7 +156,7 @@ void hs_backlog_init(const hs_output *target, hs_committer *committer, hs_backlo
 /* Its pairs and recorder; idempotent. */
 void hs_backlog_free(hs_account *account, hs_backlog *backlog);
 
-/* hs_record_next for a backlog. */
+/* hs_parallel_record_next for a backlog. */
 hs_status hs_backlog_record(hs_search *search, hs_backlog *backlog, hs_walker *walker,
                             hs_failure *failure);
 

@@ -7,6 +7,9 @@
 #include <math.h>
 #include <string.h>
 
+/* record.c: all columns at once if the writer can; else i and j by the kernel, then what is
+ * measured in batches. */
+
 /* Takes only the arrays that the columns of the output need. */
 
 hs_block_use
@@ -656,9 +659,6 @@ put_measures(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs
     }
     return pair_batch->n > 0 ? put_batch(recorder, scanner, &part) : HS_OK;
 }
-
-/* record.c: all columns at once if the writer can; else i and j by the kernel, then what is
- * measured in batches. */
 
 #define INDICES (HS_WANT_I | HS_WANT_J | HS_WANT_BOTH)
 

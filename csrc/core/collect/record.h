@@ -8,7 +8,10 @@
 #include "../scene/scene.h"
 #include "../../kernels/kernel.h"
 
-/* Where the hits of one scanner go, and what they are prepared in. */
+/*
+ * record.h: turns hits into pairs of the half list: i < j, or for a point and its own image the
+ * first nonzero component of S positive, with D, d and S of that orientation.
+ */
 
 /* Where a walker's hits go, and room to prepare them in: owned arrays, NULL when not needed. */
 typedef struct hs_recorder {
@@ -42,11 +45,6 @@ hs_status hs_recorder_init(hs_account *account, hs_output *output, int32_t most_
                            hs_recorder *recorder);
 void      hs_recorder_free(hs_account *account, hs_recorder *recorder);
 
-/*
- * record.h: turns hits into pairs of the half list: i < j, or for a point and its own image the
- * first nonzero component of S positive, with D, d and S of that orientation.
- */
-
 /* The hits of points from `first` on, which are places in the walker's block, as the next pairs of
  * the output, which has room for them: at once where that is possible, else in batches.
  * HS_ERR_SHIFT_RANGE sets scanner->failed_point. */
@@ -56,21 +54,15 @@ hs_status hs_record_places(hs_recorder *recorder, hs_scanner *scanner, int32_t f
 /* A hs_visit_fn. */
 hs_status hs_record_hits(void *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits);
 
-/* All columns of a visit's hits in one pass, by the kernel's writer (write.h). */
-
-/* D, D and S of hits, written beside their indices. */
-
-/* Which shell each pair is in (search.h). */
-
 /*
- * D and D of a batch of pairs, with the same bits wherever pairs come from: a walk, the
+ * d and D of a batch of pairs, with the same bits wherever pairs come from: a walk, the
  * nearest points, a list that is decided anew. The batch kernels measure nearly all pairs, the
  * functions of metric.h what these leave.
  */
 
 enum { HS_IN_BATCH = HS_BATCH + HS_BATCH_PADDING };
 
-/* A batch of pairs with room of its own, for those that have no scan.h. */
+/* A batch of pairs with room of its own, for callers that have no hs_pair_batch. */
 typedef struct hs_measured {
     int32_t n;
     bool    is_shifted; /* some shift is not zero; or `times` and `shift` are not looked at */

@@ -6,8 +6,61 @@
 
 #include <string.h>
 
-/* By numbers where entries have their j; of these, images of one pair by S, which
- * is one number too as a rule. */
+/*
+ * sort_pairs.c: a counting sort by i, then each point's few pairs by (j, S). A pair is one number
+ * while it is sorted, j before its place, so that nothing is looked up but the S of images of one
+ * pair, which is one number too as a rule. deal_out is the counting sort; then threads put rows in
+ * order and write them.
+ */
+
+HS_ALWAYS_INLINE uint64_t
+place_of(const hs_sorting *all, uint64_t entry)
+{
+    return all->has_j ? entry & ((UINT64_C(1) << all->place_bits) - 1) : entry;
+}
+
+HS_ALWAYS_INLINE bool
+is_turned(const hs_sorting *all, uint64_t entry)
+{
+    return all->both_ways && entry % 2 != 0;
+}
+
+/* The pair of an entry, among those found. */
+HS_ALWAYS_INLINE int64_t
+pair_of(const hs_sorting *all, uint64_t entry)
+{
+    return (int64_t)(place_of(all, entry) >> all->both_ways);
+}
+
+HS_ALWAYS_INLINE int32_t
+second_of(const hs_sorting *all, uint64_t entry)
+{
+    if (all->has_j) {
+        return (int32_t)(entry >> all->place_bits);
+    }
+    return is_turned(all, entry) ? all->i[pair_of(all, entry)] : all->j[pair_of(all, entry)];
+}
+
+/* Component k of S; -S wraps around, which orders images no less. */
+HS_ALWAYS_INLINE int32_t
+shift_of(const hs_sorting *all, uint64_t entry, int k)
+{
+    const int32_t shift = all->shift[pair_of(all, entry) * all->found->ndim + k];
+    return is_turned(all, entry) ? (int32_t)(0u - (uint32_t)shift) : shift;
+}
+
+HS_ALWAYS_INLINE uint64_t
+entry_of(const hs_sorting *all, int32_t j, int64_t place)
+{
+    return all->has_j ? (uint64_t)j << all->place_bits | (uint64_t)place : (uint64_t)place;
+}
+
+/* The entry that a row begins at. */
+HS_ALWAYS_INLINE int64_t
+row_begin(const hs_sorting *all, int64_t row)
+{
+    return row > 0 ? all->end[row - 1] : 0;
+}
 
 /* Pairs of two points that insertion sorts in less time than a heap. */
 #define FEW 48
@@ -15,12 +68,12 @@
 static bool
 is_before(const hs_sorting *all, uint64_t a, uint64_t b)
 {
-    const int32_t ja = hs_second_of(all, a), jb = hs_second_of(all, b);
+    const int32_t ja = second_of(all, a), jb = second_of(all, b);
     if (ja != jb) {
         return ja < jb;
     }
     for (int k = 0; all->shift != NULL && k < all->found->ndim; k++) {
-        const int32_t sa = hs_shift_of(all, a, k), sb = hs_shift_of(all, b, k);
+        const int32_t sa = shift_of(all, a, k), sb = shift_of(all, b, k);
         if (sa != sb) {
             return sa < sb;
         }
@@ -78,7 +131,7 @@ image_key(const hs_sorting *all, uint64_t entry, uint64_t *key)
     const int64_t middle = INT64_C(1) << (width - 1);
     *key = 0;
     for (int k = 0; k < d; k++) {
-        const int64_t shift = hs_shift_of(all, entry, k) + middle;
+        const int64_t shift = shift_of(all, entry, k) + middle;
         if (shift < 0 || shift >> width != 0) {
             return false;
         }
@@ -137,7 +190,7 @@ row_from(const hs_sorting *all, int64_t entry)
     int64_t first = 0, end = all->n_points;
     while (first < end) {
         const int64_t middle = first + (end - first) / 2;
-        if (hs_row_begin(all, middle) < entry) {
+        if (row_begin(all, middle) < entry) {
             first = middle + 1;
         } else {
             end = middle;
@@ -228,10 +281,10 @@ deal_strip(void *context, int strip, int64_t first, int64_t last)
     for (int64_t p = first; p < last; p++) {
         const int32_t i = all->i[p], j = all->j[p];
         if (all->both_ways) {
-            all->entries[next[i - all->first_point]++] = hs_entry_of(all, j, 2 * p);
-            all->entries[next[j - all->first_point]++] = hs_entry_of(all, i, 2 * p + 1);
+            all->entries[next[i - all->first_point]++] = entry_of(all, j, 2 * p);
+            all->entries[next[j - all->first_point]++] = entry_of(all, i, 2 * p + 1);
         } else {
-            all->entries[next[i - all->first_point]++] = hs_entry_of(all, j, p);
+            all->entries[next[i - all->first_point]++] = entry_of(all, j, p);
         }
     }
     return HS_OK;
@@ -285,12 +338,6 @@ deal_out(hs_sorting *all)
     return status;
 }
 
-/*
- * sort_pairs.c: a counting sort by i, then each point's few pairs by (j, S). A pair is one number
- * while it is sorted, j before its place, so that nothing is looked up but the S of images of one
- * pair. sort_pairs.h has the counting sort; here threads put rows in order and write them.
- */
-
 #define POLL_ENTRIES  (INT64_C(1) << 17) /* sorted and written between two calls of poll() */
 #define RANGE_ENTRIES 8192 /* of a range, about: with what is written of them they fit a cache */
 #define PUT           256  /* entries that are written at a time */
@@ -341,21 +388,21 @@ put_measures(const hs_sorting *all, const uint64_t *entries, int64_t n, hs_outpu
     int32_t       *shell = hs_output_next(sorted, HS_WANT_SHELL);
     const int32_t *shells = hs_output_column(all->found, HS_WANT_SHELL);
     for (int64_t e = 0; e < n && distance != NULL; e++) {
-        distance[e] = distances[hs_pair_of(all, entries[e])];
+        distance[e] = distances[pair_of(all, entries[e])];
     }
     for (int64_t e = 0; e < n && shell != NULL; e++) {
-        shell[e] = shells[hs_pair_of(all, entries[e])];
+        shell[e] = shells[pair_of(all, entries[e])];
     }
     for (int64_t e = 0; e < n && vector != NULL; e++) {
-        const double *from = vectors + hs_pair_of(all, entries[e]) * d;
-        const bool    turned = hs_is_turned(all, entries[e]);
+        const double *from = vectors + pair_of(all, entries[e]) * d;
+        const bool    turned = is_turned(all, entries[e]);
         for (int k = 0; k < d; k++) {
             *vector++ = turned ? -from[k] + 0.0 : from[k]; /* a zero has no sign */
         }
     }
     for (int64_t e = 0; e < n && shift != NULL; e++) {
         for (int k = 0; k < d; k++) {
-            *shift++ = hs_shift_of(all, entries[e], k);
+            *shift++ = shift_of(all, entries[e], k);
         }
     }
 }
@@ -373,7 +420,7 @@ put_some(const hs_sorting *all, int64_t first, int64_t n, int64_t *row, hs_outpu
             ++*row;
         }
         i[e] = all->first_point + (int32_t)*row;
-        j[e] = hs_second_of(all, entries[e]);
+        j[e] = second_of(all, entries[e]);
     }
     put_indices(hs_output_next(sorted, HS_WANT_I), bytes, 1, i, n);
     put_indices(hs_output_next(sorted, HS_WANT_J), bytes, 1, j, n);
@@ -420,15 +467,15 @@ do_range(void *context, int64_t range)
     const hs_sorting *all = me->job->all;
     const int64_t     first_row = row_from(all, range * RANGE_ENTRIES);
     const int64_t     end_row = row_from(all, (range + 1) * RANGE_ENTRIES);
-    const int64_t     begin = hs_row_begin(all, first_row);
-    const int64_t     end = hs_row_begin(all, end_row);
+    const int64_t     begin = row_begin(all, first_row);
+    const int64_t     end = row_begin(all, end_row);
     hs_status         status = HS_OK;
     me->sorted.n_pairs = me->job->before + begin;
     if (all->call->team != NULL) { /* before the ranges behind this one write to its last pages */
         hs_output_touch(&me->sorted, me->sorted.n_pairs, end - begin);
     }
     for (int64_t row = first_row; row < end_row && status == HS_OK; row++) {
-        const int64_t first = hs_row_begin(all, row), n = all->end[row] - first;
+        const int64_t first = row_begin(all, row), n = all->end[row] - first;
         hs_sort_row(all, all->entries + first, n, me->spare);
         status = note_work(me, n);
     }

@@ -6,10 +6,7 @@
 #include "../threads/call.h"
 #include "../search/search.h"
 
-/*
- * Pairs as single numbers while they are sorted, and the order of those of one row.
- * sort_pairs.h has the pairs of all rows.
- */
+/* sort_pairs.h: the ascending order of pairs. */
 
 /*
  * What is put in order. An entry is the place of a pair among those found and, where both fit into
@@ -30,64 +27,10 @@ typedef struct hs_sorting {
     uint64_t        *entries;    /* ascending in the end */
 } hs_sorting;
 
-HS_ALWAYS_INLINE uint64_t
-hs_place_of(const hs_sorting *all, uint64_t entry)
-{
-    return all->has_j ? entry & ((UINT64_C(1) << all->place_bits) - 1) : entry;
-}
-
-HS_ALWAYS_INLINE bool
-hs_is_turned(const hs_sorting *all, uint64_t entry)
-{
-    return all->both_ways && entry % 2 != 0;
-}
-
-/* The pair of an entry, among those found. */
-HS_ALWAYS_INLINE int64_t
-hs_pair_of(const hs_sorting *all, uint64_t entry)
-{
-    return (int64_t)(hs_place_of(all, entry) >> all->both_ways);
-}
-
-HS_ALWAYS_INLINE int32_t
-hs_second_of(const hs_sorting *all, uint64_t entry)
-{
-    if (all->has_j) {
-        return (int32_t)(entry >> all->place_bits);
-    }
-    return hs_is_turned(all, entry) ? all->i[hs_pair_of(all, entry)]
-                                    : all->j[hs_pair_of(all, entry)];
-}
-
-/* Component k of S; -S wraps around, which orders images no less. */
-HS_ALWAYS_INLINE int32_t
-hs_shift_of(const hs_sorting *all, uint64_t entry, int k)
-{
-    const int32_t shift = all->shift[hs_pair_of(all, entry) * all->found->ndim + k];
-    return hs_is_turned(all, entry) ? (int32_t)(0u - (uint32_t)shift) : shift;
-}
-
-HS_ALWAYS_INLINE uint64_t
-hs_entry_of(const hs_sorting *all, int32_t j, int64_t place)
-{
-    return all->has_j ? (uint64_t)j << all->place_bits | (uint64_t)place : (uint64_t)place;
-}
-
-/* The entry that a row begins at. */
-HS_ALWAYS_INLINE int64_t
-hs_row_begin(const hs_sorting *all, int64_t row)
-{
-    return row > 0 ? all->end[row - 1] : 0;
-}
-
-/* The counting sort of pairs into rows. */
-
 #ifdef HS_TESTING
 /* How many bits a place may have at most. Returns what it was before. */
 int hs_test_sort_place_bits(int bits);
 #endif
-
-/* sort_pairs.h: the ascending order of pairs. */
 
 /* The columns that must be found, so that pairs can be put in order and have all that is wanted. */
 unsigned hs_sort_columns(const hs_search *search);

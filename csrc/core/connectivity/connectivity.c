@@ -5,8 +5,8 @@
 
 #include <string.h>
 
-/* The lists one after the other give each node a number among all; points are these
- * nodes, in their order or in another. */
+/* connectivity.c: three results of one call. The lists one after the other give each node a number
+ * among all; points are these nodes, in their order or in another. */
 
 /* Where a list begins, among all nodes and among all rows; copied, so that it cannot change. */
 typedef struct list_range {
@@ -601,7 +601,8 @@ hs_node_pairs_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs, cons
     return HS_OK;
 }
 
-/* What is behind a node in its own list, and all of the lists that follow. */
+/* The table of pairs of nodes from rows of all of them, whose points are in the order of lists and
+ * nodes: of each row, what is behind its node in its own list, and all of the lists that follow. */
 
 /* Entries between two calls of poll(). */
 #define POLL_ROW_ENTRIES (INT64_C(1) << 21)
@@ -725,8 +726,6 @@ row_pairs_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs, const hs
     return status;
 }
 
-/* connectivity.c: three results of one call. */
-
 hs_connectivity *
 hs_connectivity_new(void)
 {
@@ -789,8 +788,8 @@ rows_of(const hs_pairs *rows, int32_t n_lists)
 
 /* Pairs of points in any order, or of rows that are not those of all. */
 static hs_status
-fill_pairs(hs_connectivity *made, const hs_node_map *map, const hs_node_lists *lists,
-           const hs_rows_view *view)
+fill_pairs_by_half_list(hs_connectivity *made, const hs_node_map *map, const hs_node_lists *lists,
+                        const hs_rows_view *view)
 {
     hs_output half;
     hs_status status = hs_row_split_half(&made->call, map->n, view, &half);
@@ -816,7 +815,7 @@ fill_rows(hs_connectivity *made, const hs_node_map *map, const hs_node_lists *li
     const bool         has_all = map->is_plain && map->n_rows == map->n;
     hs_status          status = HS_OK;
     if (!lists->rows_only && !has_all) {
-        status = fill_pairs(made, map, lists, &view);
+        status = fill_pairs_by_half_list(made, map, lists, &view);
     }
     if (status == HS_OK && needs_no_split(map)) {
         hs_pairs_free(made->rows);

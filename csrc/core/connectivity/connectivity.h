@@ -6,6 +6,8 @@
 #include "../memory/memory.h"
 #include "../collect/columns.h"
 
+/* connectivity.h: rows and pairs of node lists, which the functions of api/ make and give out. */
+
 /*
  * Which list each point is of, which node of it, and which row it has. Searches and
  * pairs number points from 0 on, in whatever order they come; users of node lists know a node by
@@ -129,11 +131,6 @@ typedef struct hs_node_columns {
 
 /* How many pairs the table has. */
 int64_t hs_node_pairs_count(const hs_node_map *map, bool ghost_pairs, const hs_output *half);
-
-/* The table of pairs of nodes from rows of all of them, whose points are in the order
- * of lists and nodes: each row has the pairs that its node begins as it is, list by list. */
-
-/* connectivity.h: rows and pairs of node lists, which the functions of api/ make and give out. */
 
 /* All parts are charged to the call, which has ended when the caller gets the object. */
 struct hs_connectivity {

@@ -8,6 +8,9 @@
 
 #include <stdlib.h>
 
+/* dynamic.c: points come into cells, move and go; the gate that readers and writers pass; lists as
+ * a whole. */
+
 /* A block that is too small is replaced by a larger one; the map learns where its
  * entries are now. */
 
@@ -241,8 +244,9 @@ copy_numbers(double *to, const double *from, int n)
     }
 }
 
-void
-hs_dynamic_write(hs_dynamic *list, uint32_t place, const hs_placed *placed)
+/* The position of an entry. placed: NULL for a key without one. */
+static void
+dynamic_write(hs_dynamic *list, uint32_t place, const hs_placed *placed)
 {
     const int     d = list->lattice.ndim;
     double *const x = hs_entry_at(&list->entries, place);
@@ -276,6 +280,13 @@ hs_rows_place(const hs_dynamic *list, double *const *x, int64_t i, double *given
     return status;
 }
 
+/* Whether to go on before row i, as long as the list is as it was. */
+HS_ALWAYS_INLINE bool
+rows_go_on(const hs_dynamic *list, int64_t i)
+{
+    return (i + 1) % HS_POLL_POINTS != 0 || list->hooks.poll == NULL || list->hooks.poll(NULL, 0.0);
+}
+
 /* Whether all positions can be had; dense cells are made to reach them. HS_ERR_SHIFT_RANGE;
  * HS_ERR_CAPACITY with the bytes, HS_ERR_MEMORY, HS_ERR_INTERRUPTED. n > 0. */
 static hs_status
@@ -285,7 +296,7 @@ rows_reach(hs_dynamic *list, int64_t n, double *const *x, hs_failure *failure)
     double    given[HS_MAX_DIM], bytes = 0.0;
     hs_placed placed;
     for (int64_t i = 0; i < n; i++) {
-        if (!hs_rows_go_on(list, i)) {
+        if (!rows_go_on(list, i)) {
             return HS_ERR_INTERRUPTED;
         }
         const hs_status status = hs_rows_place(list, x, i, given, &placed, failure);
@@ -607,7 +618,7 @@ count_in(hs_dynamic *list, int64_t n, double *const *x, uint32_t *numbers, hs_fa
     double    given[HS_MAX_DIM];
     hs_placed placed;
     for (int64_t i = 0; i < n; i++) {
-        if (!hs_rows_go_on(list, i)) {
+        if (!rows_go_on(list, i)) {
             return HS_ERR_INTERRUPTED;
         }
         const hs_status status = place_row(list, x, i, given, &placed, failure, ndim);
@@ -706,7 +717,7 @@ write_in(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t i, i
         hs_entry_tail *tail = hs_entry_tail_at(&list->entries, places[r]);
         (void)place_row(list, x, i + r, given, &placed, failure, ndim); /* as in count_rows */
         *tail = (hs_entry_tail){key.id, key.tag, numbers[i + r]};
-        hs_dynamic_write(list, places[r], &placed);
+        dynamic_write(list, places[r], &placed);
         hs_key_map_add(&list->map, key, places[r]);
     }
 }
@@ -753,6 +764,76 @@ hs_fill(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n, do
     return status;
 }
 
+/*
+ * A point comes into a cell, goes out of it or moves on, once there is room: nothing
+ * here can fail. A point that stays in its cell is written over; else it is appended to its new
+ * cell and taken out of the old one.
+ */
+
+/* A new entry behind those of a cell that has room for it; returns its place. */
+HS_ALWAYS_INLINE uint32_t
+append_entry(hs_dynamic *list, uint32_t number, hs_key key, const hs_placed *placed)
+{
+    hs_cell *const       cell = &list->cells.cell[number];
+    const uint32_t       place = cell->start + cell->count;
+    hs_entry_tail *const tail = hs_entry_tail_at(&list->entries, place);
+    list->cells.n_empty -= cell->count == 0;
+    cell->count++;
+    tail->id = key.id;
+    tail->tag = key.tag;
+    tail->cell = number;
+    dynamic_write(list, place, placed);
+    return place;
+}
+
+/* Takes an entry out of its cell: the last one takes its place. A cell that is left empty gives its
+ * block back. */
+HS_ALWAYS_INLINE void
+take_out(hs_dynamic *list, uint32_t place)
+{
+    const uint32_t number = hs_entry_tail_at(&list->entries, place)->cell;
+    hs_cell *const cell = &list->cells.cell[number];
+    const uint32_t last = cell->start + cell->count - 1;
+    if (last != place) {
+        const hs_entry_tail *tail = hs_entry_tail_at(&list->entries, last);
+        hs_key_map_moved(&list->map, (hs_key){tail->id, tail->tag}, last, place);
+        hs_entries_copy(&list->entries, last, &list->entries, place, 1);
+    }
+    cell->count--;
+    list->cells.n_empty += cell->count == 0;
+    if (cell->count == 0 && !list->keeps_blocks) {
+        hs_entries_give(&list->entries, list->cells.size[number], cell->start);
+        list->cells.size[number] = HS_NO_BLOCK;
+    }
+}
+
+HS_ALWAYS_INLINE bool
+has_position(const hs_dynamic *list, uint32_t place)
+{
+    return !isnan(hs_entry_at(&list->entries, place)[0]);
+}
+
+/* The point of a key that is there, for which its new cell has room if that is another one. */
+HS_ALWAYS_INLINE void
+put_again(hs_dynamic *list, hs_key key, uint32_t place, uint32_t number, const hs_placed *placed)
+{
+    list->n_without += (placed == NULL) - !has_position(list, place);
+    if (hs_entry_tail_at(&list->entries, place)->cell == number) {
+        dynamic_write(list, place, placed);
+        return;
+    }
+    const uint32_t to = append_entry(list, number, key, placed);
+    hs_key_map_moved(&list->map, key, place, to);
+    take_out(list, place);
+}
+
+HS_ALWAYS_INLINE void
+put_new(hs_dynamic *list, hs_key key, uint32_t number, const hs_placed *placed)
+{
+    list->n_without += placed == NULL;
+    hs_key_map_add(&list->map, key, append_entry(list, number, key, placed));
+}
+
 /* One point. Memory first, then changes that cannot fail. */
 
 /* The cell of a position, which is added where there is none. */
@@ -793,9 +874,9 @@ hs_update_insert(hs_dynamic *list, hs_key key, const hs_placed *placed, hs_failu
         }
     }
     if (place == HS_NO_PLACE) {
-        hs_put_new(list, key, number, placed);
+        put_new(list, key, number, placed);
     } else {
-        hs_put_again(list, key, place, number, placed);
+        put_again(list, key, place, number, placed);
     }
     list->changes++;
     return HS_OK;
@@ -808,9 +889,9 @@ hs_update_remove(hs_dynamic *list, hs_key key)
     if (place == HS_NO_PLACE) {
         return false;
     }
-    list->n_without -= !hs_has_position(list, place);
+    list->n_without -= !has_position(list, place);
     hs_key_map_remove(&list->map, key, place);
-    hs_take_out(list, place);
+    take_out(list, place);
     list->changes++;
     return true;
 }
@@ -915,11 +996,11 @@ put_rows(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n, d
         (void)hs_rows_place(list, x, i, given, &placed, failure);
         numbers[i] = hs_cell_table_find(&list->cells, placed.index);
         if (place == HS_NO_PLACE) {
-            hs_put_new(list, key, numbers[i], &placed);
+            put_new(list, key, numbers[i], &placed);
         } else {
             const uint32_t number = numbers[i];
             numbers[i] = hs_entry_tail_at(&list->entries, place)->cell;
-            hs_put_again(list, key, place, number, &placed);
+            put_again(list, key, place, number, &placed);
         }
     }
     list->keeps_blocks = false;

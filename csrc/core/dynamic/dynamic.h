@@ -10,6 +10,15 @@
 #include "../box/wrap.h"
 
 /*
+ * dynamic.h: a list of points that come, go and move, each under a key.
+ *
+ * Each point is an entry: wrapped position, key and cell side by side, so that a query reads cells
+ * only. The entries of a cell lie in one block of a power of two; a block that is full is replaced
+ * by one of twice the size. A map leads from keys to entries. Removal moves the last entry of the
+ * cell into the gap and tells the map: it takes the same time however crowded the cell is.
+ */
+
+/*
  * A lock that many readers may hold at once, or one writer. Free, it costs two atomic
  * instructions a call, which is what a list of a hundred nanoseconds a call can afford; only a
  * thread that has to wait calls the system.
@@ -37,15 +46,6 @@ bool hs_gate_hold(hs_gate *gate);
 bool hs_gate_is_mine(hs_gate *gate); /* whether this thread holds it */
 void hs_gate_release(hs_gate *gate); /* which this thread holds */
 
-/*
- * dynamic.h: a list of points that come, go and move, each under a key.
- *
- * Each point is an entry: wrapped position, key and cell side by side, so that a query reads cells
- * only. The entries of a cell lie in one block of a power of two; a block that is full is replaced
- * by one of twice the size. A map leads from keys to entries. Removal moves the last entry of the
- * cell into the gap and tells the map: it takes the same time however crowded the cell is.
- */
-
 struct hs_dynamic {
     hs_storage storage;
     bool       inclusive;
@@ -72,19 +72,8 @@ struct hs_dynamic {
     hs_dynamic_counters *counters; /* borrowed, or NULL */
 };
 
-/* A position, made ready: dynamic.h. */
-typedef struct hs_placed hs_placed;
-
-/* Room for the entries of a cell. */
-
-/* Makes room for `count` entries in a cell; those that are there move to a larger block. False when
- * memory is refused: then nothing has changed. */
-bool hs_cell_reserve(hs_dynamic *list, uint32_t number, int64_t count);
-
-/* A position as a list stores it: brought into the middle period, and its cell. */
-
 /* A position, made ready. */
-struct hs_placed {
+typedef struct hs_placed {
     const double *given;             /* borrowed; ndim finite numbers */
     double        x[HS_MAX_DIM];     /* X, in the middle period; not rounded in aligned boxes */
     double        t[HS_MAX_DIM];     /* coordinates along the grid axes */
@@ -93,7 +82,13 @@ struct hs_placed {
     int64_t       index[HS_MAX_DIM]; /* of the cell */
     double        magnitude; /* as hs_wrap_point raises it, of the coordinates that the box moves;
                               * not in aligned boxes */
-};
+} hs_placed;
+
+/* Makes room for `count` entries in a cell; those that are there move to a larger block. False when
+ * memory is refused: then nothing has changed. */
+bool hs_cell_reserve(hs_dynamic *list, uint32_t number, int64_t count);
+
+/* A position as a list stores it: brought into the middle period, and its cell. */
 
 /*
  * X and turns of finite numbers; false beyond HS_WRAP_LIMIT. *magnitude as in hs_wrap_point.
@@ -166,17 +161,7 @@ hs_dynamic_place_in(const hs_dynamic *list, const double *given, hs_placed *plac
 hs_status hs_dynamic_place(const hs_dynamic *list, const double *given, hs_placed *placed,
                            hs_failure *failure);
 
-/* The position of an entry. placed: NULL for a key without one. */
-void hs_dynamic_write(hs_dynamic *list, uint32_t place, const hs_placed *placed);
-
 /* Many positions, as columns x[k][i] of finite numbers. */
-
-/* Whether to go on before row i, as long as the list is as it was. */
-HS_ALWAYS_INLINE bool
-hs_rows_go_on(const hs_dynamic *list, int64_t i)
-{
-    return (i + 1) % HS_POLL_POINTS != 0 || list->hooks.poll == NULL || list->hooks.poll(NULL, 0.0);
-}
 
 /* Row i made ready. given: receives its numbers, which `placed` borrows. Statuses of
  * hs_dynamic_place, with failure->row. */
@@ -199,8 +184,6 @@ void      hs_list_clear(hs_dynamic *list);
 /* On failure the list is as it was. */
 hs_status hs_list_shrink(hs_dynamic *list);
 
-/* The points of a list in another one, which takes no more memory than they need. */
-
 /* Many points into a list that holds none: no key has to be looked up, and each cell has
  * its block from the beginning. */
 
@@ -208,76 +191,6 @@ hs_status hs_list_shrink(hs_dynamic *list);
  * Statuses of hs_update_insert_many; on failure the list holds no points. */
 hs_status hs_fill(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n,
                   double *const *x, hs_failure *failure);
-
-/*
- * A point comes into a cell, goes out of it or moves on, once there is room: nothing
- * here can fail. A point that stays in its cell is written over; else it is appended to its new
- * cell and taken out of the old one.
- */
-
-/* A new entry behind those of a cell that has room for it; returns its place. */
-HS_ALWAYS_INLINE uint32_t
-hs_append_entry(hs_dynamic *list, uint32_t number, hs_key key, const hs_placed *placed)
-{
-    hs_cell *const       cell = &list->cells.cell[number];
-    const uint32_t       place = cell->start + cell->count;
-    hs_entry_tail *const tail = hs_entry_tail_at(&list->entries, place);
-    list->cells.n_empty -= cell->count == 0;
-    cell->count++;
-    tail->id = key.id;
-    tail->tag = key.tag;
-    tail->cell = number;
-    hs_dynamic_write(list, place, placed);
-    return place;
-}
-
-/* Takes an entry out of its cell: the last one takes its place. A cell that is left empty gives its
- * block back. */
-HS_ALWAYS_INLINE void
-hs_take_out(hs_dynamic *list, uint32_t place)
-{
-    const uint32_t number = hs_entry_tail_at(&list->entries, place)->cell;
-    hs_cell *const cell = &list->cells.cell[number];
-    const uint32_t last = cell->start + cell->count - 1;
-    if (last != place) {
-        const hs_entry_tail *tail = hs_entry_tail_at(&list->entries, last);
-        hs_key_map_moved(&list->map, (hs_key){tail->id, tail->tag}, last, place);
-        hs_entries_copy(&list->entries, last, &list->entries, place, 1);
-    }
-    cell->count--;
-    list->cells.n_empty += cell->count == 0;
-    if (cell->count == 0 && !list->keeps_blocks) {
-        hs_entries_give(&list->entries, list->cells.size[number], cell->start);
-        list->cells.size[number] = HS_NO_BLOCK;
-    }
-}
-
-HS_ALWAYS_INLINE bool
-hs_has_position(const hs_dynamic *list, uint32_t place)
-{
-    return !isnan(hs_entry_at(&list->entries, place)[0]);
-}
-
-/* The point of a key that is there, for which its new cell has room if that is another one. */
-HS_ALWAYS_INLINE void
-hs_put_again(hs_dynamic *list, hs_key key, uint32_t place, uint32_t number, const hs_placed *placed)
-{
-    list->n_without += (placed == NULL) - !hs_has_position(list, place);
-    if (hs_entry_tail_at(&list->entries, place)->cell == number) {
-        hs_dynamic_write(list, place, placed);
-        return;
-    }
-    const uint32_t to = hs_append_entry(list, number, key, placed);
-    hs_key_map_moved(&list->map, key, place, to);
-    hs_take_out(list, place);
-}
-
-HS_ALWAYS_INLINE void
-hs_put_new(hs_dynamic *list, hs_key key, uint32_t number, const hs_placed *placed)
-{
-    list->n_without += placed == NULL;
-    hs_key_map_add(&list->map, key, hs_append_entry(list, number, key, placed));
-}
 
 /*
  * Points come, go and move. Each function either does all that it is for, or returns a

@@ -5,6 +5,9 @@
 
 #include <stdlib.h>
 
+/* storage.c: what a list is stored in: blocks of entries, the map from keys to these, the cells
+ * along each axis, and the offsets around a cell. */
+
 /* Blocks by size. Those that are free form a list: the first bytes of each say where the
  * next one is. */
 
@@ -383,7 +386,7 @@ hs_axis_images(const hs_axis *axis, double low, double high, double error, hs_sp
     const double least = floor((low - error) / axis->period + 0.5 - 0x1p-40);
     const double most = floor((high + error) / axis->period + 0.5 + 0x1p-40);
     double       slack;
-    HS_ASSERT(least > -0x1p30 && most < 0x1p30); /* dynamic.c, dynamic.h */
+    HS_ASSERT(least > -0x1p30 && most < 0x1p30); /* hs_list_new and hs_dynamic_place see to that */
     span->least = (int64_t)least - (fabs(least) > 0x1p8);
     span->most = (int64_t)most + (fabs(most) > 0x1p8);
     const double first = hs_below(low, shift_of(axis, span->least, &slack));

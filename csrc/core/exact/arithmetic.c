@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "arithmetic.h"
 
-/* Places are multiples of a limb, so that sums need no shifts. */
+/* arithmetic.c: sums, products and comparisons of binary fractions of any size. Places are
+ * multiples of a limb, so that sums need no shifts. */
 
 /* Leaves out zero limbs at both ends. */
 static void

@@ -5,6 +5,9 @@
 #include <math.h>
 #include <stdlib.h>
 
+/* ellipsoid.c: how far a support reaches, and whether a pair lies in the sum of two: in float64
+ * with bounds, then exactly. */
+
 /*
  * H reaches extent / e, e its smallest eigenvalue, and e >= x if H - x I is positive
  * definite. An x just below e is estimated, and what is left of H is confirmed to be: by

@@ -9,7 +9,7 @@
  * candidates y and points q given relative to a common centre: the direct form
  * s = sum_k fl(y_k - q_k)^2, or the expanded form s = |y|^2 - 2 q y, which is |q|^2 less. With
  * s > out the pair is surely beyond the cutoff, with s < in surely within it; what lies between is
- * settled by metric.h. docs/exactness.md derives the bounds.
+ * decided by metric.h. docs/exactness.md derives the bounds.
  */
 
 typedef struct hs_thresholds {

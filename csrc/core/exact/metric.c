@@ -4,7 +4,8 @@
 #include <string.h>
 #include <math.h>
 
-/* Comparing |D| with the cutoff in integers of a fixed, sufficient size. */
+/* metric.c: decides on pairs and measures them: in float64, in double words, and in integers of a
+ * fixed, sufficient size where these cannot tell. */
 
 /*
  * Limbs of 64 bits that hold any component of D. In units of the smallest subnormal, 2^-1074, a
@@ -441,8 +442,8 @@ hs_metric_init(hs_metric *metric, int ndim, int n_rows, const double rows[][HS_M
 
 /* The float stages, for a constant ndim where the compiler can be given one. */
 HS_ALWAYS_INLINE hs_verdict
-judge_in_floats(const hs_metric *metric, const double *p, const double *q, const int64_t *shift,
-                int ndim, hs_stages *stages)
+decide_in_floats(const hs_metric *metric, const double *p, const double *q, const int64_t *shift,
+                 int ndim, hs_stages *stages)
 {
     hs_difference difference;
     hs_verdict    verdict;
@@ -476,9 +477,9 @@ hs_metric_within(const hs_metric *metric, const double *p, const double *q, cons
     if (metric->floats_usable) {
         hs_verdict verdict;
         switch (metric->ndim) {
-        case 2: verdict = judge_in_floats(metric, p, q, shift, 2, stages); break;
-        case 3: verdict = judge_in_floats(metric, p, q, shift, 3, stages); break;
-        default: verdict = judge_in_floats(metric, p, q, shift, metric->ndim, stages);
+        case 2: verdict = decide_in_floats(metric, p, q, shift, 2, stages); break;
+        case 3: verdict = decide_in_floats(metric, p, q, shift, 3, stages); break;
+        default: verdict = decide_in_floats(metric, p, q, shift, metric->ndim, stages);
         }
         if (verdict != HS_UNDECIDED) {
             return verdict == HS_WITHIN;
@@ -489,7 +490,7 @@ hs_metric_within(const hs_metric *metric, const double *p, const double *q, cons
 
 /* Long integers take ten times as long. */
 static hs_verdict
-judge_by_a_hair(const hs_metric *metric, const double *p, const double *q, const int64_t *shift)
+decide_by_a_hair(const hs_metric *metric, const double *p, const double *q, const int64_t *shift)
 {
     hs_difference difference;
     return hs_difference_watched(&difference, metric, p, q, shift)
@@ -502,7 +503,7 @@ hs_metric_decide_by_integers(const hs_metric *metric, const double *p, const dou
                              const int64_t *shift, hs_stages *stages)
 {
     if (metric->floats_usable) {
-        const hs_verdict verdict = judge_by_a_hair(metric, p, q, shift);
+        const hs_verdict verdict = decide_by_a_hair(metric, p, q, shift);
         if (verdict != HS_UNDECIDED) {
             stages->by_double_word++;
             return verdict == HS_WITHIN;

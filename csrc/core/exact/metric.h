@@ -85,7 +85,7 @@ int hs_metric_compare(const hs_metric *metric, const hs_span *one, const hs_span
 
 /*
  * The float stages of the decision, each a value with a proven bound on its error.
- * For metric.c, metric.c, metric.c, the batch kernels and tests only.
+ * For metric.c, the batch kernels and tests only.
  *
  * ndim is passed beside the metric because callers that know it let the compiler unroll loops.
  */
@@ -320,7 +320,7 @@ void hs_integer_difference(const hs_metric *metric, const double *p, const doubl
                            const int64_t *shift, hs_dw *value, int *exponent);
 
 /*
- * The decision of metric.h for a limit that is the sum of two numbers, such as two
+ * The decision for a limit that is the sum of two numbers, such as two
  * radii, and often no float64. What is compared is the real sum.
  */
 

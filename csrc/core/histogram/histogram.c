@@ -6,6 +6,9 @@
 #include <math.h>
 #include <string.h>
 
+/* histogram.c: edges and their bands become a table, pairs are counted by it, weights are summed
+ * without rounding, and threads' counts are joined. */
+
 /* Bands are the filter's thresholds at each edge; the table is made as fine as keeps most
  * bands apart. */
 
@@ -718,7 +721,7 @@ sum_hits(hs_tally *tally, int32_t si, const int32_t *places, int32_t begin, int3
 
 /* An open pair whose range is empty is decided; others wait for the edge in the middle. */
 static void
-settle_or_wait(hs_tally *tally, int32_t u)
+count_or_wait(hs_tally *tally, int32_t u)
 {
     hs_tally_open *pair = &tally->open[u];
     if (pair->low < pair->high) {
@@ -777,7 +780,7 @@ decide_edge(hs_tally *tally, hs_scanner *scanner, int32_t edge)
             } else {
                 pair->low = edge + 1;
             }
-            settle_or_wait(tally, u);
+            count_or_wait(tally, u);
             u = next;
         }
     }
@@ -791,7 +794,7 @@ decide_open(hs_tally *tally, hs_scanner *scanner)
     hs_status status = HS_OK;
     scanner->n_ambiguous += tally->n_open;
     for (int32_t u = 0; u < tally->n_open; u++) {
-        settle_or_wait(tally, u);
+        count_or_wait(tally, u);
     }
     while (status == HS_OK && tally->n_asked > 0) {
         status = decide_edge(tally, scanner, tally->asked[--tally->n_asked]);
@@ -816,7 +819,7 @@ look_again(hs_tally *tally, hs_scanner *scanner, const hs_edge_table *table, int
             hs_edge_range(table, &tally->plan->edges, scanner->block.squares[h], &pair->low,
                           &pair->high);
             if (pair->low == pair->high) { /* of a cell with several bands, but in none of these */
-                settle_or_wait(tally, tally->n_open);
+                count_or_wait(tally, tally->n_open);
             } else if (++tally->n_open == HS_TALLY_OPEN) {
                 status = decide_open(tally, scanner);
             }

@@ -10,6 +10,9 @@
 #include <math.h>
 #include <string.h>
 
+/* levels.c: supports are read and checked, points divided into levels, and steps planned between
+ * these; a level as others see it is a set of points by itself. */
+
 /* The lower triangle of each matrix, once the upper one is seen to be the same. */
 
 /* The lower triangle, each number of the matrix read once. False if one is not finite or differs
@@ -132,8 +135,6 @@ support_step_width(const void *context, const double *normal, double enough, dou
     *width = rule == HS_RULE_MIN ? hs_smaller(asking, points) : hs_larger(asking, points);
     return status;
 }
-
-/* levels.c: a level as others see it: a set of points by itself. */
 
 static void
 free_level_set(hs_account *account, hs_level_set *set)

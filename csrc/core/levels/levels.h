@@ -9,6 +9,13 @@
 #include "../search/limits.h"
 
 /*
+ * levels.h: points divided by the size of their reach, so that small ones are searched in small
+ * cells however large others are: a level is all points whose radii are of one binary order,
+ * counted from the largest one, or all points of one type. Each level lies in one piece, which is a
+ * set of points by itself.
+ */
+
+/*
  * The supports of a set of points, read once and checked: what is decided with, and
  * how far each reaches.
  */
@@ -35,13 +42,6 @@ hs_support_set_at(const hs_support_set *set, int ndim, int64_t number)
 {
     return set->numbers + (number - set->first) * (hs_support_entries(ndim) + 1);
 }
-
-/*
- * levels.h: points divided by the size of their reach, so that small ones are searched in small
- * cells however large others are: a level is all points whose radii are of one binary order,
- * counted from the largest one, or all points of one type. Each level lies in one piece, which is a
- * set of points by itself.
- */
 
 /* Consecutive levels, or a part of what lies in them. */
 typedef struct hs_slice {
@@ -124,7 +124,7 @@ typedef struct hs_level_plan {
     bool           is_half;   /* each pair of points once, the lower number first. If not, a level
                              * with itself gives each point all its neighbours */
     double         bound;     /* no pair is further apart than this; may be infinite */
-    hs_algorithm   algorithm; /* the caller's choice, which levels.c narrows for each step */
+    hs_algorithm   algorithm; /* the caller's choice, which is narrowed for each step */
 } hs_level_plan;
 
 /* Without queries, rules that are the same both ways give the half list; else every asking point

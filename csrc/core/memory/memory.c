@@ -10,7 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Each block has a header in front of it, which remembers its size. */
+/* memory.c: accounts, blocks and arenas. Each block has a header in front of it, which remembers
+ * its size. */
 
 #ifdef HS_TESTING
 #include <stdatomic.h>

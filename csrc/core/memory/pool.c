@@ -12,6 +12,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* pool.c: pages from Linux, chunks of these or of malloc, and the pool: an array of chunks, oldest
+ * first. Chunks are freed after the lock is released, because freeing is a system call. */
+
 /* Mmap, mremap and madvise of Linux. Elsewhere, and under AddressSanitizer, which watches
  * malloc, every request is refused. */
 
@@ -497,9 +500,6 @@ hs_chunk_cut(void *data, size_t bytes, void **rest)
     void *shrunk = resize_in_malloc(data, bytes, bytes);
     return shrunk != NULL ? shrunk : data;
 }
-
-/* pool.c: an array of chunks, oldest first. Chunks are freed after the lock is released, because
- * freeing is a system call. */
 
 static struct {
     size_t limit, held;

@@ -109,7 +109,7 @@ void hs_chunk_touch(void *data, size_t used);
 void *hs_chunk_cut(void *data, size_t bytes, void **rest);
 
 /*
- * pool.h: memory of results that are gone, kept for the next ones, and that in which calls have
+ * The pool: memory of results that are gone, kept for the next ones, and that in which calls have
  * worked (memory.h): writing to memory that the process already has is several times faster than
  * writing to new pages.
  *

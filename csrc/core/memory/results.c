@@ -2,7 +2,7 @@
 #include "results.h"
 #include "pool.h"
 
-/* Each region is one chunk, taken from the pool if it has one and given back to it. */
+/* results.c: each region is one chunk, taken from the pool if it has one and given back to it. */
 
 /* Address space without memory that a chunk takes along to the pool, so that the next request needs
  * no system call. More would only use up address space. */

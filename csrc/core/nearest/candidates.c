@@ -7,6 +7,9 @@
 #include <math.h>
 #include <string.h>
 
+/* candidates.c: images that can be near a group, leaves of the tree in these, and the block of
+ * floats that they fill. */
+
 /* Which images of the points can be near a group, by the range of its t_k along
  * each periodic axis. */
 
@@ -685,8 +688,8 @@ start_images(const hs_nearest *near, hs_nearest_group *group, hs_nearest_images 
 
 /* Unit and errors, for the group's radius. */
 static void
-settle_unit(const hs_nearest *near, const hs_nearest_group *group, double error,
-            hs_nearest_block *block)
+set_unit(const hs_nearest *near, const hs_nearest_group *group, double error,
+         hs_nearest_block *block)
 {
     block->unit = hs_power_of_two(-hs_nearest_exponent(group->radius));
     block->reach = group->radius * block->unit;
@@ -769,11 +772,11 @@ choose_squares(const hs_nearest *near, const hs_nearest_group *group, hs_nearest
 
 /* Unit, errors and extent; HS_TRY_OTHER: the group is too wide. */
 static hs_status
-settle_frame(const hs_nearest *near, const hs_nearest_group *group, double error,
-             hs_nearest_block *block)
+set_frame(const hs_nearest *near, const hs_nearest_group *group, double error,
+          hs_nearest_block *block)
 {
     double widest = 0.0;
-    settle_unit(near, group, error, block);
+    set_unit(near, group, error, block);
     for (int k = 0; k < near->tree.ndim; k++) {
         widest = hs_larger((group->upper[k] - group->lower[k]) * block->unit, widest);
     }
@@ -790,13 +793,13 @@ find(const hs_nearest *near, const hs_options *options, hs_nearest_group *group,
     hs_nearest_images images;
     if (leaves != NULL && group->radius <= leaves->radius &&
         group->radius >= LEAST_IN_ERRORS * leaves->error) {
-        const hs_status status = settle_frame(near, group, leaves->error, block);
+        const hs_status status = set_frame(near, group, leaves->error, block);
         return status == HS_OK ? nearest_runs_take(near, group, most, leaves, block) : status;
     }
     if (start_images(near, group, &images) != HS_OK || images.count > most) {
         return most < INFINITY ? HS_TRY_OTHER : HS_ERR_MEMORY;
     }
-    const hs_status status = settle_frame(near, group, images.error, block);
+    const hs_status status = set_frame(near, group, images.error, block);
     return status == HS_OK ? nearest_runs_find(near, options, group, most, &images, block) : status;
 }
 

@@ -13,6 +13,9 @@
 #include <math.h>
 #include <string.h>
 
+/* nearest.c: trees that are built once for many calls, first radii, radii that surely suffice, and
+ * the search of groups by threads. */
+
 /* Who may build is decided by one compare-and-swap. */
 
 #define NOTHING 0
@@ -982,7 +985,7 @@ close_worker(void *context, void *place)
                                  .by_double_word = stages->by_double_word,
                                  .by_integers = stages->by_integers};
     hs_nearest_flush(&worker->writer);
-    hs_call_note(job->near->search->call, &walked);
+    hs_call_add_counters(job->near->search->call, &walked);
     hs_nearest_ranker_free(&worker->ranker);
     hs_nearest_bounder_free(job->near, &worker->bounder);
     hs_nearest_leaves_free(job->near, &worker->leaves);

@@ -4,8 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-/* Few keys are placed by counting the smaller ones, many are merged; the nearest of
- * many come by partitioning. */
+/* rank.c: few keys are placed by counting the smaller ones, many are merged; the nearest of many
+ * come by partitioning. Squares too close to tell are compared exactly, then rows are written. */
 
 HS_ALWAYS_INLINE bool
 is_smaller(void *context, const hs_nearest_key *b, const hs_nearest_key *a)
@@ -235,7 +235,7 @@ is_listed_before(void *context, const hs_nearest_key *b, const hs_nearest_key *a
 /* Puts in exact order the first `wanted` of n keys that float64 cannot tell; the others come behind
  * them. */
 static void
-settle_keys(hs_nearest_ranker *ranker, hs_nearest_key *keys, int64_t n, int64_t wanted)
+sort_keys_exactly(hs_nearest_ranker *ranker, hs_nearest_key *keys, int64_t n, int64_t wanted)
 {
     hs_nearest_pace *pace = &ranker->pace;
     const int64_t    sorted = wanted <= MOST_INSERTED && n > 4 * wanted ? wanted : n;
@@ -259,10 +259,10 @@ settle_keys(hs_nearest_ranker *ranker, hs_nearest_key *keys, int64_t n, int64_t 
     }
 }
 
-/* Finds sorted keys whose squares are too close to tell, among the first `wanted`, and settles
- * them. */
+/* Finds sorted keys whose squares are too close to tell, among the first `wanted`, and puts
+ * them in exact order. */
 static void
-settle_order(hs_nearest_ranker *ranker, int64_t n, int64_t wanted)
+sort_close_keys_exactly(hs_nearest_ranker *ranker, int64_t n, int64_t wanted)
 {
     hs_nearest_key *const all = ranker->keys;
     for (int64_t begin = 0, end; begin < wanted; begin = end) {
@@ -272,7 +272,7 @@ settle_order(hs_nearest_ranker *ranker, int64_t n, int64_t wanted)
             end++;
         }
         if (end - begin > 1) {
-            settle_keys(ranker, all + begin, end - begin, wanted - begin);
+            sort_keys_exactly(ranker, all + begin, end - begin, wanted - begin);
         }
     }
 }
@@ -425,7 +425,7 @@ hs_nearest_rank(hs_nearest_ranker *ranker, const hs_nearest_group *group, int32_
             return HS_OK;
         }
     }
-    settle_order(ranker, n, wanted);
+    sort_close_keys_exactly(ranker, n, wanted);
     *count = wanted;
     return ranker->pace.status;
 }

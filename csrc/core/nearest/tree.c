@@ -5,8 +5,8 @@
 
 #include <string.h>
 
-/* A node is split at a sampled middle of its widest axis, or between the outermost
- * points where the sample is all in one place. */
+/* tree.c: a node is split at a sampled middle of its widest axis, or between the outermost points
+ * where the sample is all in one place. */
 
 /* Points that say where a node is split: enough for halves of 35 to 65 of 100. */
 #define SAMPLE       15

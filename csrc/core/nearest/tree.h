@@ -131,6 +131,4 @@ typedef struct hs_splitter {
     int32_t        leaf_points;
 } hs_splitter;
 
-/* The last step in building a tree: how far its nodes reach. */
-
 #endif

@@ -8,8 +8,24 @@
 
 #include <string.h>
 
-/* Hits come in the order of the table; the point itself is left out, and each column
- * is copied. */
+/* table.c: lengths of table rows by a counting walk, or by the one walk that keeps them; their sums
+ * are the offsets. Hits come in the order of the table; the point itself is left out, and each
+ * column is copied. */
+
+/* Columns of a table that are measured, not numbers. */
+#define MEASURES (HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)
+
+/* Bytes of rows that wait for their places. */
+#define MOST_KEPT (6 << 20)
+
+/* What one thread fills rows with; the context of the visits below. */
+typedef struct row_filler {
+    hs_table   *table;
+    hs_output  *to;       /* borrowed; where the rows go */
+    hs_output   part;     /* owned; measures of the hits of one visit */
+    hs_recorder recorder; /* owned; of the part */
+    int32_t    *numbers;  /* owned; of the hits of one point, where hits are places */
+} row_filler;
 
 #define ROWS_AHEAD         32        /* points from prefetch to writing; twice that for offsets */
 #define MOST_EXPECTED_ROWS 2048      /* bytes of a table row to prefetch */
@@ -68,7 +84,7 @@ put_ends(const hs_output *entries, const table_row *of)
 
 /* Measures of hits [hit, hit + n) of the visit, as entries from `at` on. */
 static void
-put_measures(const hs_filler *fill, int64_t at, int64_t hit, int32_t n)
+put_measures(const row_filler *fill, int64_t at, int64_t hit, int32_t n)
 {
     const hs_output *entries = fill->to;
     for (unsigned bit = HS_WANT_DISTANCE; bit <= HS_WANT_SHIFT && n > 0; bit <<= 1) {
@@ -104,7 +120,7 @@ own_place(const hs_scanner *scanner)
 
 /* Measures of all hits of a visit, as the part. */
 static hs_status
-fill_part(hs_filler *fill, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+fill_part(row_filler *fill, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     fill->part.n_pairs = 0;
     const hs_status status = hs_output_reserve(&fill->part, hits->end[hits->n - 1], 0.0);
@@ -125,7 +141,7 @@ count_below(const int32_t *numbers, int32_t n, int32_t number)
 
 /* Which of a point's hits is the point itself, or n. place: its own. */
 static int32_t
-find_self(const hs_filler *fill, const hs_scanner *scanner, const int32_t *hits, int32_t n,
+find_self(const row_filler *fill, const hs_scanner *scanner, const int32_t *hits, int32_t n,
           int32_t point, int32_t place)
 {
     int32_t self = scanner->search->has_queries ? n : count_below(fill->numbers, n, point);
@@ -137,7 +153,7 @@ find_self(const hs_filler *fill, const hs_scanner *scanner, const int32_t *hits,
 
 /* The row of a point whose n hits, from number `hit` of the visit on, are places. */
 static void
-put_places(const hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int32_t hit,
+put_places(const row_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int32_t hit,
            int32_t n, int32_t place, table_row *of)
 {
     const int32_t *places = hits->label + hit;
@@ -156,7 +172,7 @@ put_places(const hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits
 /* Table rows lie anywhere in the result: prefetches the memory of one that is soon to be written,
  * and the offset of a later one. */
 HS_ALWAYS_INLINE void
-expect_rows(const hs_filler *fill, const hs_bins *asking, int64_t si)
+expect_rows(const row_filler *fill, const hs_bins *asking, int64_t si)
 {
     const int64_t *offsets = fill->table->offsets;
     char          *j = hs_output_column(fill->table->entries, HS_WANT_J);
@@ -176,7 +192,7 @@ expect_rows(const hs_filler *fill, const hs_bins *asking, int64_t si)
 
 /* What is needed before the rows of a visit: measures, and the place of the group's first point. */
 static hs_status
-begin_visit(hs_filler *fill, hs_scanner *scanner, int32_t first, const hs_hits *hits, int32_t *own)
+begin_visit(row_filler *fill, hs_scanner *scanner, int32_t first, const hs_hits *hits, int32_t *own)
 {
     *own = 0;
     if (scanner->use != HS_BLOCK_LISTS_PLACES) {
@@ -189,7 +205,7 @@ begin_visit(hs_filler *fill, hs_scanner *scanner, int32_t first, const hs_hits *
 
 /* The row of point t of a visit, whose n hits begin at number `hit`. */
 HS_ALWAYS_INLINE void
-put_row(const hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int32_t hit,
+put_row(const row_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int32_t hit,
         int32_t n, int32_t place, table_row *of)
 {
     const bool has_self = !scanner->search->has_queries;
@@ -208,7 +224,7 @@ put_row(const hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits, i
 static hs_status
 fill_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    hs_filler      *fill = context;
+    row_filler     *fill = context;
     const hs_bins  *asking = hs_search_asking(scanner->search);
     int32_t         own;
     const hs_status status = begin_visit(fill, scanner, first, hits, &own);
@@ -224,7 +240,7 @@ fill_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits
 
 /* The rows of a visit, behind those that `fill->to` has already. */
 HS_ALWAYS_INLINE void
-keep_visit(hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int32_t own,
+keep_visit(row_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int32_t own,
            int64_t *where)
 {
     hs_output *kept = fill->to;
@@ -244,18 +260,18 @@ keep_visit(hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int3
  * them: to table->offsets the lengths, and to `where` the entry that each begins with. Of `fill`
  * only table and to are looked at. */
 static void
-keep_numbers(hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int64_t *where)
+keep_numbers(row_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int64_t *where)
 {
     HS_ASSERT(scanner->use == HS_BLOCK_LISTS_IDS);
     keep_visit(fill, scanner, hits, 0, where);
 }
 
 /* A hs_visit_fn of ordered walkers: whole rows, one behind another, and their lengths as offsets.
- * HS_TRY_OTHER when they are more than HS_MOST_KEPT. */
+ * HS_TRY_OTHER when they are more than MOST_KEPT. */
 static hs_status
 keep_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    hs_filler    *fill = context;
+    row_filler   *fill = context;
     hs_output    *kept = fill->to;
     const int32_t n = hits->end[hits->n - 1];
     int32_t       own;
@@ -267,16 +283,17 @@ keep_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits
         return status;
     }
     keep_visit(fill, scanner, hits, own, NULL);
-    const bool is_much = kept->n_pairs * hs_output_bytes_per_pair(kept) > HS_MOST_KEPT;
+    const bool is_much = kept->n_pairs * hs_output_bytes_per_pair(kept) > MOST_KEPT;
     return is_much ? HS_TRY_OTHER : HS_OK;
 }
 
+/* After hs_table_prepare. On failure filler_close. */
 static hs_status
-filler_open(hs_table *table, hs_output *to, hs_filler *fill)
+filler_open(hs_table *table, hs_output *to, row_filler *fill)
 {
     hs_account *account = &table->search->call->account;
-    *fill = (hs_filler){.table = table, .to = to};
-    hs_output_init(NULL, to->ndim, to->columns & HS_MEASURES, to->index_bytes, &fill->part);
+    *fill = (row_filler){.table = table, .to = to};
+    hs_output_init(NULL, to->ndim, to->columns & MEASURES, to->index_bytes, &fill->part);
     fill->numbers =
         hs_alloc(account, HS_FOR_CANDIDATES, table->most.candidates + 1, sizeof *fill->numbers);
     /* It keeps no numbers of hits: no pair must be turned round. */
@@ -284,8 +301,8 @@ filler_open(hs_table *table, hs_output *to, hs_filler *fill)
     return fill->numbers == NULL ? HS_ERR_MEMORY : status;
 }
 
-void
-hs_filler_close(hs_filler *fill)
+static void
+filler_close(row_filler *fill)
 {
     hs_recorder_free(&fill->table->search->call->account, &fill->recorder);
     hs_free(&fill->table->search->call->account, fill->numbers);
@@ -296,10 +313,10 @@ hs_filler_close(hs_filler *fill)
 static void
 move_rows(hs_table *table)
 {
-    const hs_bins  *asking = hs_search_asking(table->search);
-    const int32_t  *numbers = hs_output_column(&table->kept, HS_WANT_J);
-    const hs_filler fill = {.table = table, .to = table->entries, .part = table->kept};
-    int64_t         from = 0;
+    const hs_bins   *asking = hs_search_asking(table->search);
+    const int32_t   *numbers = hs_output_column(&table->kept, HS_WANT_J);
+    const row_filler fill = {.table = table, .to = table->entries, .part = table->kept};
+    int64_t          from = 0;
     for (int64_t si = 0; si < asking->n; si++) {
         const int64_t *place = table->offsets + asking->order[si];
         table_row      of = {.at = place[0], .n = (int32_t)(place[1] - place[0])};
@@ -312,9 +329,6 @@ move_rows(hs_table *table)
         from += of.n;
     }
 }
-
-/* table.c: lengths of table rows by a counting walk, or by the one walk that keeps them; their sums
- * are the offsets. */
 
 #define MOST_EXPECTED_KEPT (4 << 20) /* bytes; rows are kept when no more than these are expected */
 
@@ -378,11 +392,11 @@ will_keep(hs_table *table)
     hs_search       *search = table->search;
     const hs_output *entries = table->entries;
     const double     n = search->grid.expected_pairs * search->pairs_per_half;
-    hs_output_init(&search->call->account, entries->ndim,
-                   (entries->columns & HS_MEASURES) | HS_WANT_J, 4, &table->kept);
+    hs_output_init(&search->call->account, entries->ndim, (entries->columns & MEASURES) | HS_WANT_J,
+                   4, &table->kept);
     const double bytes = n * (double)hs_output_bytes_per_pair(&table->kept);
     return search->call->team == NULL && bytes < MOST_EXPECTED_KEPT &&
-           hs_account_allows(&search->call->account, 2.0 * HS_MOST_KEPT);
+           hs_account_allows(&search->call->account, 2.0 * MOST_KEPT);
 }
 
 /* HS_TRY_OTHER: there were too many entries, and none is kept. */
@@ -392,7 +406,7 @@ keep_all(hs_table *table, hs_failure *failure)
     hs_search    *search = table->search;
     const int64_t n = hs_search_asking(search)->n;
     hs_walker     walker;
-    hs_filler     fill;
+    row_filler    fill;
     memset(table->offsets, 0, (size_t)n * sizeof *table->offsets);
     hs_status status = filler_open(table, &table->kept, &fill);
     if (status == HS_OK) {
@@ -403,7 +417,7 @@ keep_all(hs_table *table, hs_failure *failure)
         status = hs_walk_or_tell(&walker, 0, (int32_t)n, failure);
         hs_walker_close(search, &walker);
     }
-    hs_filler_close(&fill);
+    filler_close(&fill);
     return status;
 }
 
@@ -429,7 +443,7 @@ static void
 close_filler(void *table, void *filler)
 {
     (void)table;
-    hs_filler_close(filler);
+    filler_close(filler);
 }
 
 static hs_status
@@ -437,7 +451,7 @@ fill_all(hs_table *table, hs_failure *failure)
 {
     hs_crew   crew = {.call = table->search->call,
                       .job = table,
-                      .worker_size = sizeof(hs_filler),
+                      .worker_size = sizeof(row_filler),
                       .open = open_filler,
                       .close = close_filler};
     hs_status status = hs_crew_open(&crew);
@@ -470,11 +484,33 @@ hs_table_free(hs_table *table)
     table->kept.columns = 0;
 }
 
-/* Collects numbers in a small buffer, then writes whole cache lines by streaming
- * stores. */
+/*
+ * A large column of point numbers that is written from its first entry to its last,
+ * past the caches: it does not fit them, and what a store misses there would first be read.
+ *
+ * Collected in a small buffer, whole cache lines are written by streaming stores.
+ *
+ * Usage: put_column_open(column, index_bytes, &out); put_column_numbers or put_column_repeat any
+ * number of times; put_column_close(&out), before which part of it is not there.
+ */
 
-void
-hs_put_open(void *column, int index_bytes, hs_put_column *out)
+#define PUT_BYTES 4096 /* collected before they are written: well inside the first-level cache */
+
+/* Numbers of 4 or 8 bytes on their way to memory. */
+typedef struct put_column {
+    char  *to; /* where the collected bytes will go */
+    size_t n;  /* of them */
+    int    index_bytes;
+    union {
+        char    bytes[PUT_BYTES + HS_ALIGNMENT];
+        int32_t narrow[(PUT_BYTES + HS_ALIGNMENT) / sizeof(int32_t)];
+        int64_t wide[(PUT_BYTES + HS_ALIGNMENT) / sizeof(int64_t)];
+    } part;
+} put_column;
+
+/* column: aligned to HS_ALIGNMENT; borrowed. */
+static void
+put_column_open(void *column, int index_bytes, put_column *out)
 {
     out->to = column;
     out->n = 0;
@@ -483,7 +519,7 @@ hs_put_open(void *column, int index_bytes, hs_put_column *out)
 
 /* The first collected bytes, as far as they fill whole lines. */
 static void
-write_lines(hs_put_column *out)
+write_lines(put_column *out)
 {
     const size_t n_bytes = out->n / HS_ALIGNMENT * HS_ALIGNMENT;
     hs_bypass_lines(out->to, out->part.bytes, n_bytes);
@@ -494,17 +530,18 @@ write_lines(hs_put_column *out)
 
 /* How many of n numbers there is room for. */
 static int64_t
-make_room(hs_put_column *out, int64_t n)
+make_room(put_column *out, int64_t n)
 {
-    if (out->n >= HS_PUT_BYTES) {
+    if (out->n >= PUT_BYTES) {
         write_lines(out);
     }
-    const int64_t room = (int64_t)(HS_PUT_BYTES - out->n) / out->index_bytes;
+    const int64_t room = (int64_t)(PUT_BYTES - out->n) / out->index_bytes;
     return n < room ? n : room;
 }
 
-void
-hs_put_numbers(hs_put_column *out, const int32_t *numbers, int64_t n)
+/* These n numbers, none of which is negative. */
+static void
+put_column_numbers(put_column *out, const int32_t *numbers, int64_t n)
 {
     while (n > 0) {
         const int64_t part = make_room(out, n);
@@ -522,8 +559,9 @@ hs_put_numbers(hs_put_column *out, const int32_t *numbers, int64_t n)
     }
 }
 
-void
-hs_put_repeat(hs_put_column *out, int32_t number, int64_t n)
+/* n times this number. */
+static void
+put_column_repeat(put_column *out, int32_t number, int64_t n)
 {
     while (n > 0) {
         const int64_t part = make_room(out, n);
@@ -543,8 +581,8 @@ hs_put_repeat(hs_put_column *out, int32_t number, int64_t n)
     }
 }
 
-void
-hs_put_close(hs_put_column *out)
+static void
+put_column_close(put_column *out)
 {
     write_lines(out);
     memcpy(out->to, out->part.bytes, out->n);
@@ -561,14 +599,14 @@ hs_put_close(hs_put_column *out)
 
 /* The walk and what it leaves. */
 typedef struct once {
-    hs_table *table;
-    hs_filler fill;  /* not opened: keep_numbers needs no more than table and to */
-    hs_output kept;  /* its numbers j lie in the entries' column i */
-    int64_t  *where; /* owned; for each asking point: where in `kept` its row begins */
+    hs_table  *table;
+    row_filler fill;  /* not opened: keep_numbers needs no more than table and to */
+    hs_output  kept;  /* its numbers j lie in the entries' column i */
+    int64_t   *where; /* owned; for each asking point: where in `kept` its row begins */
 } once;
 
 bool
-hs_once_applies(const hs_table *table)
+hs_table_takes_one_walk(const hs_table *table)
 {
     const hs_search *search = table->search;
     const hs_output *entries = table->entries;
@@ -634,25 +672,25 @@ write_column(const once *doing, unsigned bit, const hs_options *options)
     const int64_t   *offsets = doing->table->offsets;
     const int64_t    n = hs_search_asking(doing->table->search)->n;
     const int32_t   *kept = hs_output_column(&doing->kept, HS_WANT_J);
-    hs_put_column    out;
+    put_column       out;
     hs_status        status = HS_OK;
-    hs_put_open(hs_output_column(entries, bit), entries->index_bytes, &out);
+    put_column_open(hs_output_column(entries, bit), entries->index_bytes, &out);
     for (int64_t row = 0, next = POLL_ENTRIES; row < n && status == HS_OK; row++) {
         const int64_t length = offsets[row + 1] - offsets[row];
         if (bit == HS_WANT_I) {
-            hs_put_repeat(&out, (int32_t)row, length);
+            put_column_repeat(&out, (int32_t)row, length);
         } else {
             if (row + ONCE_AHEAD < n) {
                 ask_ahead(doing, kept, row + ONCE_AHEAD);
             }
-            hs_put_numbers(&out, kept + doing->where[row], length);
+            put_column_numbers(&out, kept + doing->where[row], length);
         }
         if (offsets[row] >= next) {
             status = hs_poll(options, 1.0);
             next = offsets[row] + POLL_ENTRIES;
         }
     }
-    hs_put_close(&out);
+    put_column_close(&out);
     return status;
 }
 
@@ -668,7 +706,7 @@ give_up(hs_output *entries)
 }
 
 hs_status
-hs_once_find(hs_table *table, hs_failure *failure)
+hs_table_find_in_one_walk(hs_table *table, hs_failure *failure)
 {
     hs_search    *search = table->search;
     const int64_t n = hs_search_asking(search)->n;

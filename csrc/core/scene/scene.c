@@ -10,8 +10,8 @@
 #include <string.h>
 #include <stdlib.h>
 
-/* How far what the search computes with can be from the numbers that were given,
- * and what decides then. */
+/* scene.c: reads the points, closes gaps, scales, wraps, and sets bounds, in this order: how far
+ * what the search computes with can be from the numbers that were given, and what decides then. */
 
 /* Part of the radius above which the width of pairs along an axis counts as that of a ball. */
 #define WORTH_NARROWING 0.8
@@ -36,9 +36,8 @@ hs_scene_scale_ranges(hs_scene *scene)
     }
 }
 
-/* Steps in scene.c. Sets x_error and t_error, from x_largest and *magnitude of wrapping. */
-/* Component by component, because those of a long box vector may be known far less well than those
- * of a short one. */
+/* Sets x_error and t_error, from x_largest and the magnitude of wrapping: component by component,
+ * because those of a long box vector may be known far less well than those of a short one. */
 static void
 scene_bound_errors(hs_scene *scene, double magnitude)
 {
@@ -179,8 +178,9 @@ farthest_point(const hs_cloud *cloud, double *far)
     return farthest;
 }
 
-void
-hs_scene_name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure *failure)
+/* Which point or query is to blame for noise; asking: NULL without queries. */
+static void
+scene_name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure *failure)
 {
     double of_points, of_queries;
     failure->row = farthest_point(&scene->cloud, &of_points);
@@ -191,6 +191,8 @@ hs_scene_name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure
     }
 }
 
+/* Whether the error of the formula of precision="double" passes both the cutoff and a small part of
+ * the box: then it might call too many images near, and its answer is noise. */
 static bool
 scene_is_drowned(const hs_scene *scene)
 {
@@ -214,7 +216,7 @@ scene_is_drowned(const hs_scene *scene)
 /* Along coordinate axes cells are found for any number, as long as sums of a few are finite. */
 #define MOST_FOR_CELLS 0x1p900
 
-/* Steps in scene.c. Both clouds get the range of both. */
+/* Gives both clouds the range of both. */
 static void
 scene_join_clouds(hs_scene *scene, hs_scene *asking)
 {
@@ -227,7 +229,7 @@ scene_join_clouds(hs_scene *scene, hs_scene *asking)
     a->largest = b->largest = hs_larger(a->largest, b->largest);
 }
 
-/* What has been settled for the points is settled for the queries. */
+/* What was decided for the points holds for the queries. */
 static void
 scene_share(const hs_scene *scene, hs_scene *asking)
 {
@@ -261,8 +263,14 @@ scene_join_wrapped(hs_scene *scene, const hs_scene *asking)
     }
 }
 
-void
-hs_scene_put_in_one_cell(hs_scene *scene)
+/*
+ * A scene that is kept for numbers that no scale holds: all points on one spot of open space, which
+ * gives one cell with everything. No search can use it: each reads the points again and makes a
+ * scene of its own. It is there because what keeps cells owns the points, which those searches
+ * read, and its layout is public: it must be a sound one that holds each point once.
+ */
+static void
+scene_put_in_one_cell(hs_scene *scene)
 {
     hs_cloud *cloud = &scene->cloud;
     for (int k = 0; k < scene->ndim; k++) {
@@ -660,10 +668,10 @@ hs_scene_refuse_vanishing(const hs_scene *scene, const hs_condensed *condensed, 
  * it can. */
 
 typedef struct wrapping {
-    hs_scene *scene;
-    bool      few_turns;
-    int       n_slabs; /* that so many points have; the others are not set */
-    hs_folded folded[HS_SLABS];
+    hs_scene     *scene;
+    bool          few_turns;
+    int           n_slabs; /* that so many points have; the others are not set */
+    hs_wrap_range folded[HS_SLABS];
 } wrapping;
 
 /* Whether the points lie in the middle period along axis k, all of them: then none is touched. */
@@ -729,7 +737,7 @@ wrap_slab(void *context, int slab, int64_t first, int64_t last)
     hs_scene         *scene = wrap->scene;
     const hs_lattice *lattice = &scene->lattice;
     const hs_turns   *turns = scene->turns.known ? &scene->turns : NULL;
-    hs_folded        *folded = &wrap->folded[slab];
+    hs_wrap_range    *folded = &wrap->folded[slab];
     if (!lattice->aligned) {
         double *const *r = scene->x_is_beside ? scene->originals : scene->cloud.x;
         hs_fold_points(lattice, wrap->few_turns, r, first, last, scene->cloud.x, turns, folded);
@@ -747,13 +755,13 @@ wrap_slab(void *context, int slab, int64_t first, int64_t last)
 }
 
 /* What wrapping found in all slabs together, and on the axes that were left alone. */
-static hs_folded
+static hs_wrap_range
 join_slabs(const wrapping *wrap)
 {
     const hs_scene *scene = wrap->scene;
-    hs_folded       folded = hs_folded_none();
+    hs_wrap_range   folded = hs_wrap_range_none();
     for (int slab = 0; slab < wrap->n_slabs; slab++) {
-        hs_folded_join(&folded, &wrap->folded[slab]);
+        hs_wrap_range_join(&folded, &wrap->folded[slab]);
     }
     for (int k = 0; scene->lattice.aligned && k < scene->ndim; k++) {
         const bool open = scene->lattice.row_of_axis[k] < 0;
@@ -796,10 +804,10 @@ scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options, double *ma
                        ? (int)((scene->n + HS_SLAB_POINTS - 1) / HS_SLAB_POINTS)
                        : HS_SLABS;
     for (int slab = 0; slab < wrap.n_slabs; slab++) {
-        wrap.folded[slab] = hs_folded_none();
+        wrap.folded[slab] = hs_wrap_range_none();
     }
-    hs_status       status = hs_walk_slabs(team, options, scene->n, wrap_slab, &wrap);
-    const hs_folded folded = join_slabs(&wrap);
+    hs_status           status = hs_walk_slabs(team, options, scene->n, wrap_slab, &wrap);
+    const hs_wrap_range folded = join_slabs(&wrap);
     if (status == HS_ERR_SHIFT_RANGE) {
         failure->row = folded.failed;
         status = hs_skew_is_left(&scene->lattice) ? HS_ERR_BOX_SKEWED : status;
@@ -815,6 +823,8 @@ scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options, double *ma
 
 /* Scenes without a box whose numbers need no scale are filled in one go. */
 
+/* Whether a scene, once its points have been read, stays as it was given: there is no box, and
+ * nothing is scaled. Then scene_fill_ordinary fills it. */
 static bool
 scene_needs_no_scaling(const hs_sets *sets, const hs_box *box, const hs_options *options,
                        const hs_scene *scene)
@@ -823,9 +833,9 @@ scene_needs_no_scaling(const hs_sets *sets, const hs_box *box, const hs_options 
            options->precision != HS_DOUBLE && hs_is_ordinary(&scene->cloud, options->cutoff);
 }
 
-hs_status
-hs_scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene,
-                       hs_failure *failure)
+/* follows: it has filled the scene before, with this cutoff and as many axes. */
+static hs_status
+scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene, hs_failure *failure)
 {
     double magnitude;
     if (!follows) {
@@ -873,7 +883,7 @@ hs_scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene,
 /* From here on half a box entry is exact: its last place is at least twice the smallest number. */
 #define LEAST_HALF 0x1p-1022
 
-/* What one call of hs_condense works with. */
+/* What one call of condense works with. */
 typedef struct condensing {
     hs_account       *account;
     const hs_options *options;
@@ -1171,9 +1181,16 @@ condense_columns(condensing *doing, hs_failure *failure)
     return HS_OK;
 }
 
-hs_status
-hs_condense(hs_account *account, const hs_options *options, const hs_box *box, int unit, int powers,
-            hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed, hs_failure *failure)
+/*
+ * unit: the exponent of the cutoff, 2^unit <= cutoff < 2^(unit + 1); with cutoff 0 any other.
+ * powers: what is far is so beyond 2^powers units, HS_FAR_EXPONENT at most. Does nothing
+ * but look at ranges where nothing is far. box: checked. asking: NULL, or queries, whose
+ * range and that of the points have been joined. HS_ERR_SHIFT_RANGE only where S is wanted.
+ * condensed_free in any case.
+ */
+static hs_status
+condense(hs_account *account, const hs_options *options, const hs_box *box, int unit, int powers,
+         hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed, hs_failure *failure)
 {
     condensed->box = condensed->given_box = box;
     condensed->is_scaled = condensed->has_turns = false;
@@ -1209,8 +1226,8 @@ hs_condense(hs_account *account, const hs_options *options, const hs_box *box, i
     return status;
 }
 
-void
-hs_condensed_free(hs_account *account, hs_condensed *condensed)
+static void
+condensed_free(hs_account *account, hs_condensed *condensed)
 {
     for (int set = 0; condensed->has_turns && set < HS_CONDENSED_SETS; set++) {
         for (int k = 0; k < HS_MAX_DIM; k++) {
@@ -1221,8 +1238,6 @@ hs_condensed_free(hs_account *account, hs_condensed *condensed)
         }
     }
 }
-
-/* scene.c: reads the points, closes gaps, scales, wraps, and settles bounds, in this order. */
 
 /* Allocates columns for the originals and the turns, in this order, where they are kept. */
 static bool
@@ -1489,11 +1504,11 @@ fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
         restore_rows(condensed, &scene->lattice);
     }
     if (scene->is_kept && !empty && hs_scene_has_no_scale(scene, condensed)) {
-        hs_scene_put_in_one_cell(scene);
+        scene_put_in_one_cell(scene);
     }
     scene_set_radius(scene, options, hs_scale_apply(scene->pending, scene->cloud.largest));
     if (scene_is_drowned(scene)) {
-        hs_scene_name_farthest(scene, asking, failure);
+        scene_name_farthest(scene, asking, failure);
         return HS_ERR_ROUNDING;
     }
     if (asking != NULL) {
@@ -1519,8 +1534,8 @@ scale_scene(hs_account *account, hs_team *team, const hs_options *options, const
     const int unit = unit_exponent(cloud, &size, scene->sought);
     if (scene_may_condense(scene, asking, &size, unit)) {
         const int powers = scene->is_wide ? HS_FAR_BOUNDED_EXPONENT : HS_FAR_EXPONENT;
-        status = hs_condense(account, options, box, unit, powers, cloud,
-                             asking != NULL ? &asking->cloud : NULL, &condensed, failure);
+        status = condense(account, options, box, unit, powers, cloud,
+                          asking != NULL ? &asking->cloud : NULL, &condensed, failure);
     }
     if (status == HS_OK) {
         scene_set_scale(condensed.box, condensed.is_scaled, unit, scene, asking);
@@ -1532,7 +1547,7 @@ scale_scene(hs_account *account, hs_team *team, const hs_options *options, const
             add_turns(&condensed, 1, asking);
         }
     }
-    hs_condensed_free(account, &condensed);
+    condensed_free(account, &condensed);
     return status;
 }
 
@@ -1562,7 +1577,7 @@ hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, cons
     }
     scene->is_ordinary = status == HS_OK && scene_needs_no_scaling(sets, box, options, scene);
     if (scene->is_ordinary) {
-        status = hs_scene_fill_ordinary(options, follows, scene, failure);
+        status = scene_fill_ordinary(options, follows, scene, failure);
     } else if (status == HS_OK) {
         status = scale_scene(account, team, options, box, scene, asking, failure);
     }

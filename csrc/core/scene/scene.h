@@ -47,7 +47,7 @@ typedef struct hs_scene {
     double    formula_error;         /* precision="double": its |D| against the true one */
     bool      is_asked;              /* there are queries: the bounds above hold for these too */
     bool      is_kept;               /* and for queries that come later */
-    bool      in_one_cell;           /* kept, but no scale holds it (hs_scene_put_in_one_cell) */
+    bool      in_one_cell;           /* kept, but no scale holds it (scene_put_in_one_cell) */
     bool      is_untested;           /* only cells are wanted: bounds for these alone will do */
     bool      is_plain;              /* the cutoff is taken as it is; gaps are closed only if
                                        * need be */
@@ -99,8 +99,7 @@ hs_scene_radius_along(const hs_scene *scene, int k)
 /* The volume that neighbours of a point lie in: of a ball, or less where they are narrower. */
 double hs_scene_volume(const hs_scene *scene, double ball);
 
-/* Sets scene->less, for a scene whose radius is known; the status is that of narrowing. In
- * scene.c. */
+/* Sets scene->less, for a scene whose radius is known; the status is that of narrowing. */
 hs_status hs_scene_narrow(hs_scene *scene, const hs_narrowing *narrowing);
 
 /*
@@ -119,20 +118,6 @@ hs_status hs_scene_init(hs_account *account, hs_team *team, const hs_points *poi
 hs_status hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets,
                              const hs_box *box, const hs_options *options, hs_scene *scene,
                              hs_scene *asking, hs_failure *failure);
-
-/* Whether a scene, once its points have been read, stays as it was given: there is no box, and
- * nothing is scaled. Then hs_scene_fill_ordinary fills it. follows: it has filled it before, with
- * this cutoff and as many axes. */
-hs_status hs_scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene,
-                                 hs_failure *failure);
-
-/*
- * A scene that is kept for numbers that no scale holds: all points on one spot of open space, which
- * gives one cell with everything. No search can use it: each reads the points again and makes a
- * scene of its own. It is there because what keeps cells owns the points, which those searches
- * read, and its layout is public: it must be a sound one that holds each point once.
- */
-void hs_scene_put_in_one_cell(hs_scene *scene);
 
 /* Whether a scene that was kept can take this cloud as it was loaded: no larger numbers, none that
  * its scale would round unless only cells are wanted. */
@@ -161,17 +146,11 @@ hs_status hs_scene_wrapped_like(hs_account *account, const hs_scene *kept, const
 void hs_scene_set_cutoff(hs_scene *scene, const hs_options *options);
 
 /* Wraps columns that scaling would make infinite, or that lie more box vectors away than turns can
- * tell, in the caller's unit. For scenes whose S is not wanted, before they are scaled. In
- * scene.c. */
+ * tell, in the caller's unit. For scenes whose S is not wanted, before they are scaled. */
 void hs_scene_fold_far(hs_scene *scene);
 
 /* Sets the range of the grid coordinates: the points' own where open, one period where periodic. */
 void hs_scene_scale_ranges(hs_scene *scene);
-
-/* Whether the error of the formula of precision="double" passes both the cutoff and a small part of
- * the box: then it might call too many images near, and its answer is noise. hs_scene_name_farthest
- * says which point or query is to blame; asking: NULL without queries. */
-void hs_scene_name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure *failure);
 
 /* Sets what decides: X and B where they hold every digit, else points and box vectors as given. */
 void hs_scene_init_metric(hs_scene *scene, const hs_options *options);
@@ -191,8 +170,9 @@ hs_scene_coordinate(const hs_scene *scene, int64_t i, int k)
     return t;
 }
 
-/* Steps of scene.c once the box is scaled. Whether one of its periods has become zero. */
 struct hs_condensed;
+
+/* Once the box is scaled: whether one of its periods has become zero. */
 bool hs_scene_box_vanishes(const hs_scene *scene);
 
 /* Whether open axes leave nothing of the box, so that the points cannot be in cells. */
@@ -287,19 +267,6 @@ typedef struct hs_condensed {
      * given. S with all its turns belongs to these numbers and to the box as given. */
     double *given[HS_CONDENSED_SETS][HS_MAX_DIM];
 } hs_condensed;
-
-/*
- * unit: the exponent of the cutoff, 2^unit <= cutoff < 2^(unit + 1); with cutoff 0 any other.
- * powers: what is far is so beyond 2^powers units, HS_FAR_EXPONENT at most. Does nothing
- * but look at ranges where nothing is far. box: checked. asking: NULL, or queries, whose
- * range and that of the points have been joined. HS_ERR_SHIFT_RANGE only where S is wanted.
- * hs_condensed_free in any case.
- */
-hs_status hs_condense(hs_account *account, const hs_options *options, const hs_box *box, int unit,
-                      int powers, hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed,
-                      hs_failure *failure);
-
-void hs_condensed_free(hs_account *account, hs_condensed *condensed);
 
 /* A copy of the caller's points and box at one step, as given: what a list that
  * outlives the call (pair_list.h) compares and decides with. */

@@ -4,7 +4,10 @@
 
 #include <string.h>
 
-/* Builds the excluded partners of each point, in CSR form: a counting sort by j, then by i. */
+/* choice.c: what the caller selects is checked; points, box and labels are kept where they are
+ * needed. */
+
+/* Excluded partners of each point, in CSR form: a counting sort by j, then by i. */
 
 /* Room for rows of so many numbers, all of them empty. The length of row r is then counted at
  * first[r + 2]; once they are summed, row r is filled from first[r + 1] on, which becomes where the
@@ -108,9 +111,6 @@ partners_open(const hs_selection *selection, int64_t n_asking, int64_t n_points,
     partners_free(account, &by_second);
     return is_open ? HS_OK : HS_ERR_MEMORY;
 }
-
-/* choice.c: what the caller selects is checked; points, box and labels are kept where they are
- * needed. */
 
 hs_status
 hs_choice_set_box(const hs_box *box, int ndim, hs_choice *choice)
@@ -394,8 +394,8 @@ labels_leave_out(const hs_asking *asking, int32_t number, hs_label_test test)
 /* Moves hits [from, end) that the test does not leave out to `to`, which is not behind them;
  * returns where they end. Hits are numbers where these are scanned for, else as scans list them. */
 static int32_t
-labels_sift(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, int32_t from,
-            int32_t end, int32_t to, hs_label_test test)
+keep_by_label(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, int32_t from,
+              int32_t end, int32_t to, hs_label_test test)
 {
     const bool by_id = scanner->scans == HS_BLOCK_LISTS_IDS;
     switch (test) {
@@ -416,14 +416,14 @@ labels_sift(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, i
 
 /* The same by the groups of the call's choice; without groups all are moved. */
 static int32_t
-labels_sift_groups(const hs_scanner *scanner, hs_scan *scan, int32_t point, int32_t from,
-                   int32_t end, int32_t to)
+keep_by_group(const hs_scanner *scanner, hs_scan *scan, int32_t point, int32_t from, int32_t end,
+              int32_t to)
 {
     const hs_choice *choice = scanner->search->call->choice;
     const size_t     n = (size_t)(end - from);
     if (choice->group != NULL) {
         const hs_asking asking = {.label = choice->group, .own = choice->asking_group[point]};
-        return labels_sift(scanner, scan, &asking, from, end, to, HS_OF_OTHER_GROUP);
+        return keep_by_label(scanner, scan, &asking, from, end, to, HS_OF_OTHER_GROUP);
     }
     if (to < from) {
         memmove(scan->hits + to, scan->hits + from, n * sizeof *scan->hits);
@@ -568,7 +568,7 @@ drop_near(const hs_choice *choice, hit_batch *batch)
 
 /* Decides the batch, by images or by the least distance, marks what is dropped, and empties it. */
 static hs_status
-settle(const hs_choice *choice, bool by_image, hit_batch *batch, hs_scan *scan)
+decide_batch_of_hits(const hs_choice *choice, bool by_image, hit_batch *batch, hs_scan *scan)
 {
     const hs_status status = batch->n == 0 ? HS_OK
                              : by_image    ? drop_nearest(choice, batch)
@@ -611,10 +611,10 @@ drop_images(const hs_asking *asking, hs_label_test test, int32_t from, int32_t e
             add_hit(scan, h, batch);
         }
         if (batch->n == HS_BATCH) {
-            status = settle(choice, true, batch, scan);
+            status = decide_batch_of_hits(choice, true, batch, scan);
         }
     }
-    return status == HS_OK ? settle(choice, true, batch, scan) : status;
+    return status == HS_OK ? decide_batch_of_hits(choice, true, batch, scan) : status;
 }
 
 /* Whether float32 cannot tell that a hit is as far as the least distance; out: beyond this square
@@ -641,10 +641,10 @@ drop_nearer(float out, int32_t from, int32_t end, hit_batch *batch, hs_scan *sca
             add_hit(scan, h, batch);
         }
         if (batch->n == HS_BATCH) {
-            status = settle(choice, false, batch, scan);
+            status = decide_batch_of_hits(choice, false, batch, scan);
         }
     }
-    return status == HS_OK ? settle(choice, false, batch, scan) : status;
+    return status == HS_OK ? decide_batch_of_hits(choice, false, batch, scan) : status;
 }
 
 /* Squares beyond this are those of pairs that are at least the least distance apart. */
@@ -669,11 +669,11 @@ choose_of_point(hit_batch *batch, hs_scan *scan, float out, int32_t from, int32_
     hs_asking         asking;
     hs_label_test     test;
     hs_status         status = HS_OK;
-    *end = labels_sift_groups(scanner, scan, point, from, scan->end[batch->t], to);
+    *end = keep_by_group(scanner, scan, point, from, scan->end[batch->t], to);
     const bool excludes = labels_find(choice, point, &asking, &test);
     const bool compares = hs_choice_compares(choice, scanner->options.cutoff);
     if (excludes && !compares) {
-        *end = labels_sift(scanner, scan, &asking, to, *end, to, test);
+        *end = keep_by_label(scanner, scan, &asking, to, *end, to, test);
     } else if (excludes) {
         status = drop_images(&asking, test, to, *end, batch, scan);
         *end = close_up(scan, to, *end);

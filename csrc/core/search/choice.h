@@ -11,6 +11,13 @@
 
 #include <math.h>
 
+/*
+ * choice.h: which pairs count, of those within reach: the caller's selection made ready for one
+ * call. Labels stay in the caller's order and arrays; excluded pairs become rows of partners. Where
+ * twice the cutoff may reach from one image of a point to another, points and box are kept as given
+ * besides, so that it can be decided which image is the nearest. hs_choose applies it to hits.
+ */
+
 /* Excluded pairs of the caller as rows: the partners of each asking point. */
 
 /* Those of row r are number[first[r]] to number[first[r + 1]], ascending. Arrays are owned. */
@@ -18,13 +25,6 @@ typedef struct hs_partners {
     int64_t *first; /* NULL: no pairs are excluded */
     int32_t *number;
 } hs_partners;
-
-/*
- * choice.h: which pairs count, of those within reach: the caller's selection made ready for one
- * call. Labels stay in the caller's order and arrays; excluded pairs become rows of partners. Where
- * twice the cutoff may reach from one image of a point to another, points and box are kept as given
- * besides, so that it can be decided which image is the nearest. choice.h applies it to hits.
- */
 
 typedef struct hs_choice {
     /* Borrowed. Labels of asking points and of points; NULL where they do not matter. */

@@ -204,8 +204,8 @@ neutral(hs_rule rule)
 }
 
 static hs_verdict
-settle(const hs_supports *supports, const double *numbers, const hs_metric *measure,
-       const hs_span *span)
+verdict_by_support(const hs_supports *supports, const double *numbers, const hs_metric *measure,
+                   const hs_span *span)
 {
     const int sign = hs_support_compare(&supports->metric, numbers, measure, span);
     return sign < 0 || (sign == 0 && supports->metric.limit.inclusive) ? HS_WITHIN : HS_BEYOND;
@@ -235,7 +235,7 @@ decide_exactly(hs_scanner *scanner, const two_supports *of, const hs_span *span)
     scanner->stages.by_float64 += all != HS_UNDECIDED && stages.by_double_word == 0;
     for (int n = 0; n < 2 && all == HS_UNDECIDED; n++) {
         if (verdict[n] == HS_UNDECIDED) {
-            verdict[n] = settle(supports, numbers[n], measure, span);
+            verdict[n] = verdict_by_support(supports, numbers[n], measure, span);
             all = combine(rule, verdict[0], verdict[1]);
         }
     }

@@ -11,8 +11,8 @@
 #include <string.h>
 #include <stddef.h>
 
-/* Candidates are appended as runs of point numbers; then the kernel copies all
- * runs at once. */
+/* scan.c: a block is gathered, scanned for some points at a time, and what they hit is decided.
+ * Candidates are appended as runs of point numbers; then the kernel copies all runs at once. */
 
 int32_t
 hs_block_most_hits(int32_t capacity)
@@ -1421,7 +1421,7 @@ hs_scanner_renew(hs_search *search, hs_block_use use, int32_t capacity, int32_t 
 }
 
 void
-hs_scanner_note(hs_search *search, hs_scanner *scanner)
+hs_scanner_flush_counters(hs_search *search, hs_scanner *scanner)
 {
     const hs_counters walked = {.groups = scanner->n_groups,
                                 .candidates = scanner->n_candidates,
@@ -1429,7 +1429,7 @@ hs_scanner_note(hs_search *search, hs_scanner *scanner)
                                 .by_float64 = scanner->stages.by_float64,
                                 .by_double_word = scanner->stages.by_double_word,
                                 .by_integers = scanner->stages.by_integers};
-    hs_call_note(search->call, &walked);
+    hs_call_add_counters(search->call, &walked);
     scanner->n_groups = scanner->n_candidates = scanner->n_ambiguous = 0;
     scanner->stages = (hs_stages){0};
 }
@@ -1437,7 +1437,7 @@ hs_scanner_note(hs_search *search, hs_scanner *scanner)
 void
 hs_scanner_close(hs_search *search, hs_scanner *scanner)
 {
-    hs_scanner_note(search, scanner);
+    hs_scanner_flush_counters(search, scanner);
     hs_order_free(&search->call->account, &scanner->block, &scanner->order);
     hs_pair_batch_free(&search->call->account, &scanner->pair_batch);
     block_free(&search->call->account, &scanner->block);
@@ -1496,13 +1496,13 @@ decide_pair(hs_scanner *scanner, const hs_metric *metric, int32_t e, bool others
 }
 
 /*
- * Where squares would leave float64's range: judges differences that are scaled so that the cutoff
- * is r in [1, 2). Rounding and what scaling loses change the sum of d squares, where it is near
- * r^2, by at most (d + 4) 2^-53 of it. Pairs without a shift only.
+ * Where squares would leave float64's range: decides by differences that are scaled so that the
+ * cutoff is r in [1, 2). Rounding and what scaling loses change the sum of d squares, where it is
+ * near r^2, by at most (d + 4) 2^-53 of it. Pairs without a shift only.
  */
 static void
-judge_scaled(const hs_metric *metric, const hs_pair_batch *pair_batch, uint8_t *verdict,
-             hs_stages *stages)
+decide_scaled(const hs_metric *metric, const hs_pair_batch *pair_batch, uint8_t *verdict,
+              hs_stages *stages)
 {
     const hs_scale scale = hs_scale_of(metric->cutoff > 0.0 ? ilogb(metric->cutoff) : 0);
     const double   r = hs_scale_apply(scale, metric->cutoff);
@@ -1533,7 +1533,7 @@ hs_decide_pair_batch(hs_scanner *scanner, const hs_metric *metric, uint8_t *with
     const bool     by_batch = scanner->options.precision != HS_DOUBLE && !pair_batch->is_wide;
     uint8_t        verdict[HS_BATCH + HS_BATCH_PADDING];
     if (by_batch && !metric->floats_usable && !pair_batch->is_shifted) {
-        judge_scaled(metric, pair_batch, verdict, &scanner->stages);
+        decide_scaled(metric, pair_batch, verdict, &scanner->stages);
     } else if (by_batch) {
         const hs_batch batch = hs_pair_batch_view(pair_batch);
         scanner->search->call->kernel->decide_batch(metric, &batch, verdict, &scanner->stages);
@@ -1662,8 +1662,6 @@ hs_decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
     scan->n_hits -= n_beyond;
     return HS_OK;
 }
-
-/* scan.c: a block is gathered, scanned for some points at a time, and what they hit is decided. */
 
 /* Candidates between two calls of poll(): some milliseconds. */
 #define POLL_WORK   (INT64_C(1) << 21)

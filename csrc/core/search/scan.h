@@ -7,6 +7,11 @@
 #include "search.h"
 
 /*
+ * scan.h: a scanner's block against its group: candidates appended, copied, put in order where that
+ * is wanted, tested by the kernel, decided, and the hits handed to the visitor.
+ */
+
+/*
  * The neighbourhood of one group of points, copied once into contiguous float32
  * arrays relative to a common centre, with the shift of its periodic image already added. All
  * points of the group are then tested against it in long, predictable loops: no ghosts, no minimum
@@ -34,8 +39,8 @@ typedef struct hs_block {
     int32_t   *id;      /* point numbers of the candidates */
     int32_t   *number;  /* their numbers in cell order, as they were gathered */
     int32_t   *place;   /* 0, 1, 2, ..., set as far as needed; NULL unless hits are places */
-    int32_t   *origin;  /* where candidates were before scan.h put them in order; NULL
-                        * when it did not */
+    int32_t   *origin;  /* where candidates were before they were put in order; NULL when they were
+                        * not */
     int32_t   *hits;    /* most_hits + HS_PADDING; NULL when only counting */
     float     *squares; /* of the hits, as many; NULL without HS_BLOCK_LISTS_SQUARES */
     float     *radius;  /* rows of the candidates' radii, owned; NULL until hs_block_add_radii */
@@ -222,7 +227,7 @@ const int64_t *hs_pair_batch_pair(const hs_pair_batch *pair_batch, int32_t e, do
 /*
  * What tests one group of points after the other against its neighbourhood: the block of
  * gathered candidates, the group, the batch of pairs to decide, thresholds, and counts of what was
- * done. The walk (walk.h) feeds it, scan.h and scan.h work on it, a visitor gets its hits.
+ * done. The walk (walk.h) feeds it, scan.c scans and decides, a visitor gets its hits.
  */
 
 typedef struct hs_scanner hs_scanner;
@@ -311,15 +316,10 @@ bool hs_scanner_renew(hs_search *search, hs_block_use use, int32_t capacity, int
                       hs_scanner *scanner);
 
 /* Adds what was done to that of the call. */
-void hs_scanner_note(hs_search *search, hs_scanner *scanner);
+void hs_scanner_flush_counters(hs_search *search, hs_scanner *scanner);
 
-/* hs_scanner_note, and frees; idempotent. */
+/* hs_scanner_flush_counters, and frees; idempotent. */
 void hs_scanner_close(hs_search *search, hs_scanner *scanner);
-
-/*
- * scan.h: a scanner's block against its group: candidates appended, copied, put in order where that
- * is wanted, tested by the kernel, decided, and the hits handed to the visitor.
- */
 
 /* Points [first, last) in cell order are the group from here on, with an empty block. */
 void hs_scanner_start(hs_scanner *scanner, int32_t first, int32_t last);

@@ -8,7 +8,8 @@
 #include <string.h>
 #include <stddef.h>
 
-/* First by the density of the points, then by counting the neighbours of a sample. */
+/* search.c: begins a search, sets what follows from its parts, and frees them; and says how many
+ * pairs to expect: by the density of the points, then by counting the neighbours of a sample. */
 
 /* What a search takes, about: order, cells and keys; a column and the copy that sorting makes; one
  * neighbourhood. */
@@ -500,8 +501,6 @@ hs_shells_keep(const hs_shells *shells, int64_t k, double distance)
     }
     return k < shells->n ? hs_keep_within(distance, shells->edge[k], shells->inclusive) : distance;
 }
-
-/* search.c: begins a search, settles what follows from its parts, and frees them. */
 
 /* Sets, from the sets, which points ask and whether lists are full. */
 static void

@@ -8,6 +8,11 @@
 #include "../threads/call.h"
 
 /*
+ * search.h: one scene made ready for a call: points in cell order and the neighbouring rows of
+ * cells. Walkers (walk.h) read it and leave it as it is.
+ */
+
+/*
  * Several cutoffs of one search, and for each but the last the float64 distances that do
  * not tell on which side of it a pair is. The last one is that of the search itself. A table,
  * indexed by the leading bits of a distance, knows for each of its cells which edges are in it.
@@ -52,11 +57,6 @@ void hs_shells_range(const hs_shells *shells, double distance, int32_t *low, int
 /* A distance as it is returned, of a pair that was decided to be in shell k: on the right side of
  * both edges, and still within 1 ulp, because the true distance is there too. */
 double hs_shells_keep(const hs_shells *shells, int64_t k, double distance);
-
-/*
- * search.h: one scene made ready for a call: points in cell order and the neighbouring rows of
- * cells. Walkers (walk.h) read it and leave it as it is.
- */
 
 typedef struct hs_search {
     /* Large, and filled before they are read: not cleared at first. */

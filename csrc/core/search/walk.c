@@ -6,7 +6,8 @@
 #include <math.h>
 #include <string.h>
 
-/* Dense rows go by cell ids, sparse rows by a search for their indices. */
+/* walk.c: finds the links of each row once; then each group has a window of cells in each link.
+ * Dense rows go by cell ids, sparse rows by a search for their indices. */
 
 /*
  * More points pay better for finding and gathering a neighbourhood, fewer have a smaller one. The
@@ -149,8 +150,8 @@ hs_row_next(const hs_search *search, int32_t target, hs_row *row, hs_row_group *
 
 /* The row at this offset from a row, wrapped into the box; false when there is none. */
 static bool
-settle_link(const hs_search *search, const hs_row *row, const hs_stencil_row *offset, hs_link *link,
-            int64_t *target)
+link_at_offset(const hs_search *search, const hs_row *row, const hs_stencil_row *offset,
+               hs_link *link, int64_t *target)
 {
     const hs_lattice *lattice = &search->scene.lattice;
     const hs_grid    *grid = &search->grid;
@@ -187,7 +188,7 @@ hs_row_links(const hs_search *search, const hs_options *options, const hs_row *r
         if (s % POLL_LINKS == POLL_LINKS - 1 && hs_poll(options, 0.0) != HS_OK) {
             return HS_ERR_INTERRUPTED;
         }
-        if (!settle_link(search, row, &stencil->rows[s], link, target)) {
+        if (!link_at_offset(search, row, &stencil->rows[s], link, target)) {
             continue;
         }
         if (search->is_sparse) {
@@ -219,8 +220,6 @@ hs_link_window(const hs_search *search, hs_link *link, int64_t low, int64_t high
     *first = start[low > 0 ? low < n_x ? low : n_x : 0];
     *end = start[high < n_x - 1 ? high >= 0 ? high + 1 : 0 : n_x];
 }
-
-/* walk.c: finds the links of each row once; then each group has a window of cells in each link. */
 
 /*
  * Gather cells low to high of the link's row, leaving out points before `from` of the image 0 (the
@@ -471,8 +470,8 @@ init_walker(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_
 
 /* Sets the visitor, or closes what could not be opened. */
 static hs_status
-settle_walker(hs_search *search, hs_status status, hs_visit_fn visit, void *context,
-              hs_walker *walker)
+set_visitor_or_close(hs_search *search, hs_status status, hs_visit_fn visit, void *context,
+                     hs_walker *walker)
 {
     walker->scanner.visit = visit;
     walker->scanner.visit_context = context;
@@ -497,7 +496,7 @@ hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *con
 {
     const hs_status status =
         init_walker(search, use, hs_walker_capacity(search), run_capacity(search), false, walker);
-    return settle_walker(search, status, visit, context, walker);
+    return set_visitor_or_close(search, status, visit, context, walker);
 }
 
 hs_status
@@ -508,7 +507,7 @@ hs_walker_renew(hs_search *search, hs_block_use use, hs_visit_fn visit, void *co
         hs_scanner_renew(search, use, hs_walker_capacity(search), run_capacity(search),
                          &walker->scanner)) {
         set_out(search, use == HS_BLOCK_SIZES, &walker->cursor);
-        return settle_walker(search, HS_OK, visit, context, walker);
+        return set_visitor_or_close(search, HS_OK, visit, context, walker);
     }
     hs_walker_close(search, walker);
     const hs_status status = hs_walker_init(search, use, visit, context, walker);
@@ -521,7 +520,7 @@ hs_walker_renew(hs_search *search, hs_block_use use, hs_visit_fn visit, void *co
 void
 hs_walker_flush_counters(hs_search *search, hs_walker *walker)
 {
-    hs_scanner_note(search, &walker->scanner);
+    hs_scanner_flush_counters(search, &walker->scanner);
     if (!hs_search_keeps_walker(search)) {
         hs_walker_close(search, walker);
     }
@@ -538,7 +537,7 @@ hs_walker_init_ordered(hs_search *search, hs_block_use use, const hs_neighbourho
     /* One more of each, because a full block is scanned before the next run. */
     const hs_status status = init_walker(search, use, (int32_t)most->candidates + 1,
                                          (int32_t)most->runs + 1, true, walker);
-    return settle_walker(search, status, visit, context, walker);
+    return set_visitor_or_close(search, status, visit, context, walker);
 }
 
 void

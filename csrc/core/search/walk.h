@@ -6,6 +6,13 @@
 #include "scan.h"
 
 /*
+ * walk.h: the walk over groups of points. Rows of cells in order, cells along each row, at most
+ * HS_GROUP_POINTS points at a time; each group's neighbourhood is gathered, scanned for every point
+ * of the group, decided, and the hits are handed to a visitor. Groups depend on the scene and on
+ * whether neighbourhoods are put in order, never on the thread that walks them.
+ */
+
+/*
  * Rows of cells, dense or sparse, as the walk sees them: which rows there are, which
  * groups of asking points each one has, which rows neighbour it, and which points of these lie in a
  * window of cells.
@@ -62,13 +69,6 @@ hs_floor_divide(int64_t a, int64_t b)
     const int64_t quotient = a / b;
     return quotient - (a % b != 0 && (a < 0) != (b < 0));
 }
-
-/*
- * walk.h: the walk over groups of points. Rows of cells in order, cells along each row, at most
- * HS_GROUP_POINTS points at a time; each group's neighbourhood is gathered, scanned for every point
- * of the group, decided, and the hits are handed to a visitor. Groups depend on the scene and on
- * whether neighbourhoods are put in order, never on the thread that walks them.
- */
 
 /* Where a walk was left and can be taken up: the group that begins at this point, or the first one
  * behind it, when so many blocks of its candidates have been scanned. */

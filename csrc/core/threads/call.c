@@ -8,8 +8,9 @@
 
 #include <string.h>
 
-/* A job is open while its tasks are handed out. Threads that wake up too late for it go
- * back to sleep, so the caller never waits for them. */
+/* call.c: options, memory, threads and counters of a call are in one struct, to which every step
+ * adds. Its team works on a job, which is open while its tasks are handed out: threads that wake up
+ * too late for it go back to sleep, so the caller never waits for them. */
 
 typedef struct job {
     hs_task_fn run;
@@ -153,9 +154,6 @@ hs_team_free(hs_team *team)
     hs_free(NULL, team);
 }
 
-/* call.c: options, memory, threads and counters of a call are in one struct, to which every step
- * adds. */
-
 /* An hs_poll_fn: the caller's, counted. */
 static bool
 counted_poll(void *context, double fraction)
@@ -281,7 +279,7 @@ hs_call_dismiss(hs_call *call)
 }
 
 void
-hs_call_note(hs_call *call, const hs_counters *done)
+hs_call_add_counters(hs_call *call, const hs_counters *done)
 {
     hs_counters *sum = &call->done;
     sum->groups += done->groups;

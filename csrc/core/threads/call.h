@@ -8,6 +8,12 @@
 #include "../../kernels/kernel.h"
 
 /*
+ * call.h: one call of the library, from its first line to its last: what the caller wants, the
+ * memory and the threads that it may use, and what it has done so far. Every function that works
+ * for a call gets a pointer to it; only the result outlives it.
+ */
+
+/*
  * Threads for one call. A team is made when a call begins that may use several threads, and
  * ends before the call returns: no thread is left behind, none is shared between calls. NULL is the
  * team of the caller alone, who then does every task itself.
@@ -35,12 +41,6 @@ void hs_team_run(hs_team *team, int64_t n_tasks, hs_task_fn run, void *context);
 
 /* Ends the threads and waits for them. NULL-safe. */
 void hs_team_free(hs_team *team);
-
-/*
- * call.h: one call of the library, from its first line to its last: what the caller wants, the
- * memory and the threads that it may use, and what it has done so far. Every function that works
- * for a call gets a pointer to it; only the result outlives it.
- */
 
 /* The way into a public function and out of it. */
 typedef struct hs_entry {
@@ -102,7 +102,7 @@ double hs_test_worth_threads(double n_points);
 void hs_call_dismiss(hs_call *call);
 
 /* Adds what a walker, or another call, has done. */
-void hs_call_note(hs_call *call, const hs_counters *done);
+void hs_call_add_counters(hs_call *call, const hs_counters *done);
 
 /* Writes the counters, if the options want them. */
 void hs_call_report(const hs_call *call, int64_t n_pairs);

@@ -9,6 +9,9 @@
 
 #include <string.h>
 
+/* pair_list.c: finds the pairs of a list, lists them in bundles, and follows the motion of the
+ * points: how much of the skin it leaves. */
+
 /* Each thread has a walker; shifts are looked up once for each run of a
  * block. */
 
@@ -674,7 +677,7 @@ make_room(hs_listing *listing)
 
 /* Writes what was found to the listing. */
 static hs_status
-settle_pairs(building *built)
+write_listing(building *built)
 {
     hs_search *search = &built->search;
     placing    place = {.built = built};
@@ -702,7 +705,7 @@ build(const hs_frame *frame, building *built, hs_failure *failure)
         status = find(built, failure);
     }
     if (status == HS_OK) {
-        status = settle_pairs(built);
+        status = write_listing(built);
     }
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = fmax(failure->expected_pairs, (double)built->listing->n_pairs);
@@ -912,7 +915,7 @@ take_jumps(hs_tracking *track, hs_tile *t)
 }
 
 /*
- * The F, k and c of pair_list.h, and what the longest displacement leaves of the skin.
+ * Chooses F, k and c (pair_list.h), and what the longest displacement leaves of the skin.
  * Any F, k and c are right; good ones make displacements small. c is `base`, taken away before box
  * vectors are looked for, and `drift`, taken away behind that.
  */

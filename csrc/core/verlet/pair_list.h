@@ -12,6 +12,8 @@
 
 #include <math.h>
 
+/* pair_list.h: a list of pairs that is used for many steps: what it holds. */
+
 /* The distinct shifts among many, numbered in the order in which they first come. */
 
 typedef struct hs_images {
@@ -25,8 +27,6 @@ typedef struct hs_images {
 
 /* The number of this shift, a new one if it was not there. -1: out of memory. */
 int32_t hs_images_number(hs_images *images, const int32_t *shift);
-
-/* pair_list.h: a list of pairs that is used for many steps: what it holds. */
 
 /*
  * The pairs within `radius` of one step, in bundles: those of one point a with all that are in the

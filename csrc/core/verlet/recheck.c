@@ -10,6 +10,48 @@
 #include <math.h>
 #include <string.h>
 
+/* recheck.c: slabs of the list, one after the other by one thread, or several at once by threads
+ * that write what they find in turn. */
+
+/* Room in the column of this HS_WANT_ bit for pair `at` of the output; NULL where not kept. */
+HS_ALWAYS_INLINE void *
+recheck_column(const hs_recheck *recheck, unsigned bit, int64_t at)
+{
+    char *column = hs_output_column(recheck->output, bit);
+    return column == NULL ? NULL : column + (size_t)at * hs_output_width(recheck->output, bit);
+}
+
+/* Whether the bundles of a slab have images. */
+HS_ALWAYS_INLINE bool
+slab_has_images(const hs_recheck *recheck, const hs_slab_hits *slab)
+{
+    return slab->first >= recheck->list->listing.n_plain;
+}
+
+/* The image of a bundle, over the box vectors that repeat; NULL: none. */
+HS_ALWAYS_INLINE const int32_t *
+recheck_image(const hs_recheck *recheck, const hs_slab_hits *slab, int32_t bundle)
+{
+    return slab_has_images(recheck, slab) ? recheck->list->listing.images.of +
+                                                (int64_t)slab->bundles[bundle].image * recheck->m
+                                          : NULL;
+}
+
+/* S from a to b over the box vectors that repeat. image: NULL if they have none. */
+HS_ALWAYS_INLINE void
+recheck_shift(const hs_recheck *recheck, int64_t a, int64_t b, const int32_t *image, int64_t *shift)
+{
+    const int m = recheck->m;
+    for (int r = 0; r < m; r++) {
+        shift[r] = image == NULL ? 0 : image[r];
+        if (recheck->counts != NULL) { /* modulo 2^64: exact, for the sum fits */
+            shift[r] =
+                (int64_t)((uint64_t)shift[r] + (uint64_t)recheck->counts[(int64_t)a * m + r] -
+                          (uint64_t)recheck->counts[(int64_t)b * m + r]);
+        }
+    }
+}
+
 /* The points of a step in the order of the list, as floats, and the thresholds
  * that hold for them. */
 
@@ -256,8 +298,7 @@ fill_open(const hs_recheck *recheck, const hs_slab_hits *slab, const hs_open_pai
         const int64_t a = slab->bundles[pairs[e].bundle].point;
         const int64_t b = listing->j[slab->first + pairs[e].pair];
         const int64_t i = listing->order[a], j = listing->order[b];
-        hs_recheck_shift(recheck, a, b, hs_recheck_image(recheck, slab, pairs[e].bundle),
-                         open->shift[e]);
+        recheck_shift(recheck, a, b, recheck_image(recheck, slab, pairs[e].bundle), open->shift[e]);
         for (int k = 0; k < recheck->d; k++) {
             open->p[k][e] = hs_frame_entry(now->rows, now->points.real, i * recheck->d + k);
             open->q[k][e] = hs_frame_entry(now->rows, now->points.real, j * recheck->d + k);
@@ -431,7 +472,7 @@ static void
 describe_points(const hs_recheck *recheck, const hs_slab_hits *slab, bool shifted, hs_write *write)
 {
     hs_bundle_points *of = recheck->of_a;
-    const bool        has_images = hs_slab_has_images(recheck, slab);
+    const bool        has_images = slab_has_images(recheck, slab);
     for (int32_t t = 0; t < slab->n_bundles; t++) {
         const hs_bundle *bundle = &slab->bundles[t];
         const int64_t    a = bundle->point;
@@ -453,12 +494,11 @@ describe_points(const hs_recheck *recheck, const hs_slab_hits *slab, bool shifte
     }
 }
 
-/* Writes i, j, d and D; false: it cannot, and what it has written does not count. In
- * recheck.c. */
+/* Writes i, j, d and D; false: it cannot, and what it has written does not count. */
 static bool
 recheck_write(const hs_recheck *recheck, hs_slab_hits *slab)
 {
-    const bool shifted = hs_slab_has_images(recheck, slab) || recheck->few != NULL;
+    const bool shifted = slab_has_images(recheck, slab) || recheck->few != NULL;
     hs_write   write = {
           .ndim = recheck->d,
           .is_half = true,
@@ -468,10 +508,10 @@ recheck_write(const hs_recheck *recheck, hs_slab_hits *slab)
           .q = recheck->x,
           .few = recheck->few,
           .index_bytes = recheck->output->index_bytes,
-          .i = hs_recheck_column(recheck, HS_WANT_I, slab->at),
-          .j = hs_recheck_column(recheck, HS_WANT_J, slab->at),
-          .distance = hs_recheck_column(recheck, HS_WANT_DISTANCE, slab->at),
-          .vector = hs_recheck_column(recheck, HS_WANT_VECTOR, slab->at),
+          .i = recheck_column(recheck, HS_WANT_I, slab->at),
+          .j = recheck_column(recheck, HS_WANT_J, slab->at),
+          .distance = recheck_column(recheck, HS_WANT_DISTANCE, slab->at),
+          .vector = recheck_column(recheck, HS_WANT_VECTOR, slab->at),
     };
     const hs_hits hits = {.n = slab->n_bundles,
                           .point = recheck->of_a->number,
@@ -484,7 +524,7 @@ recheck_write(const hs_recheck *recheck, hs_slab_hits *slab)
 }
 
 /*
- * D and D of hits. They are measured in the scene of a search of these points,
+ * d and D of hits. They are measured in the scene of a search of these points,
  * so that they have its bits: between the wrapped points with shifts over the reduced box, or
  * between the points as given.
  */
@@ -707,7 +747,7 @@ take_hits(const hs_recheck *recheck, const hs_slab_hits *slab, const int d, hit_
 static void
 fill_shifts(const hs_recheck *recheck, const hs_slab_hits *slab, hit_batch *batch)
 {
-    const bool has_images = hs_slab_has_images(recheck, slab);
+    const bool has_images = slab_has_images(recheck, slab);
     const int  m = recheck->m;
     for (int32_t e = 0; e < batch->measured.n; e++) {
         const hs_bundle *bundle = &slab->bundles[batch->of[e]];
@@ -731,7 +771,7 @@ fill(const hs_recheck *recheck, const hs_slab_hits *slab, hit_batch *batch)
     default: take_hits(recheck, slab, recheck->d, batch);
     }
     batch->measured.is_shifted = batch->measured.is_wide = false;
-    if (recheck->m > 0 && (batch->lagging != 0 || hs_slab_has_images(recheck, slab))) {
+    if (recheck->m > 0 && (batch->lagging != 0 || slab_has_images(recheck, slab))) {
         fill_shifts(recheck, slab, batch);
     }
 }
@@ -743,8 +783,8 @@ recheck_measure(const hs_recheck *recheck, const hs_slab_hits *slab)
     const hs_options *options = &recheck->call->options;
     const hs_scale    unscale = hs_measures_unscale(scene);
     const int         d = recheck->d;
-    double           *distance = hs_recheck_column(recheck, HS_WANT_DISTANCE, slab->at);
-    double           *vectors = hs_recheck_column(recheck, HS_WANT_VECTOR, slab->at);
+    double           *distance = recheck_column(recheck, HS_WANT_DISTANCE, slab->at);
+    double           *vectors = recheck_column(recheck, HS_WANT_VECTOR, slab->at);
     double           *vector[HS_MAX_DIM];
     hit_batch         batch;
     hs_measured      *measured = &batch.measured;
@@ -771,7 +811,7 @@ recheck_measure(const hs_recheck *recheck, const hs_slab_hits *slab)
 
 /*
  * The hits of a slab as pairs: i and j by the kernel that writes those of a search,
- * S, and what recheck.c measures. The kernel writes a little beyond the last pair. Where
+ * S, and the measures. The kernel writes a little beyond the last pair. Where
  * that is none of ours, in arrays of the caller, it writes to the slab, and the pairs are copied.
  */
 
@@ -820,9 +860,9 @@ put_indices(const hs_recheck *recheck, hs_slab_hits *slab)
     const hs_output *output = recheck->output;
     const hs_hits    hits = hits_by_number(recheck, slab);
     const int        bytes = output->index_bytes;
-    char            *both = hs_recheck_column(recheck, HS_WANT_BOTH, slab->at);
-    void            *i = hs_recheck_column(recheck, HS_WANT_I, slab->at);
-    void            *j = hs_recheck_column(recheck, HS_WANT_J, slab->at);
+    char            *both = recheck_column(recheck, HS_WANT_BOTH, slab->at);
+    void            *i = recheck_column(recheck, HS_WANT_I, slab->at);
+    void            *j = recheck_column(recheck, HS_WANT_J, slab->at);
     if (both == NULL && i == NULL && j == NULL) {
         return;
     }
@@ -852,7 +892,7 @@ put_of_bundle(const hs_recheck *recheck, const hs_slab_hits *slab, int32_t t, co
 {
     const hs_listing *listing = &recheck->list->listing;
     const int32_t    *order = listing->order;
-    const int32_t    *image = hs_recheck_image(recheck, slab, t);
+    const int32_t    *image = recheck_image(recheck, slab, t);
     const int64_t     a = slab->bundles[t].point;
     const int32_t     number = order[a];
     uint64_t          of_a[HS_MAX_DIM] = {0};
@@ -885,7 +925,7 @@ first_beyond(const hs_recheck *recheck, const hs_slab_hits *slab, int32_t t)
         const int64_t b = slab->hits[h];
         const bool    turned = listing->order[a] > listing->order[b];
         int64_t       shift[HS_MAX_DIM];
-        hs_recheck_shift(recheck, a, b, hs_recheck_image(recheck, slab, t), shift);
+        recheck_shift(recheck, a, b, recheck_image(recheck, slab, t), shift);
         for (int r = 0; r < recheck->m; r++) {
             const int64_t value = turned ? (int64_t)(0 - (uint64_t)shift[r]) : shift[r];
             if (value != (int32_t)value) {
@@ -902,9 +942,9 @@ put_shifts(const hs_recheck *recheck, hs_slab_hits *slab)
 {
     const bool     images_only = !(recheck->call->options.want & HS_WANT_SHIFT);
     const int64_t *counts = images_only ? NULL : recheck->counts;
-    const bool     any = hs_slab_has_images(recheck, slab) || counts != NULL;
+    const bool     any = slab_has_images(recheck, slab) || counts != NULL;
     const int      d = recheck->d, m = recheck->m;
-    int32_t       *to = hs_recheck_column(recheck, HS_WANT_SHIFT, slab->at);
+    int32_t       *to = recheck_column(recheck, HS_WANT_SHIFT, slab->at);
     if (m < d || !any) {
         memset(to, 0, (size_t)slab->n_hits * (size_t)d * sizeof *to);
     }
@@ -937,9 +977,6 @@ recheck_put(const hs_recheck *recheck, hs_slab_hits *slab)
     }
 }
 
-/* recheck.c: slabs of the list, one after the other by one thread, or several at once by threads
- * that write what they find in turn. */
-
 /* Work between two polls, in pairs: a few milliseconds. */
 #define POLL_WORK (INT64_C(1) << 20)
 /* A decision by integers takes as long as so many pairs, and d or D of a pair as so many. */
@@ -969,7 +1006,7 @@ typedef struct worker {
 static void
 recheck_slab(const hs_recheck *recheck, hs_slab_hits *slab)
 {
-    const bool shifted = hs_slab_has_images(recheck, slab);
+    const bool shifted = slab_has_images(recheck, slab);
     hs_slab    listed = {
            .ndim = recheck->d,
            .y = recheck->y,
@@ -1135,7 +1172,7 @@ close_worker(void *context, void *place)
 {
     worker  *me = place;
     hs_call *call = ((recheck_job *)context)->recheck->call;
-    hs_call_note(call, &me->done);
+    hs_call_add_counters(call, &me->done);
     hs_output_free(&me->found);
     free_scratch(me);
 }
@@ -1166,7 +1203,7 @@ run_alone(recheck_job *job, hs_failure *failure)
     if (status == HS_ERR_SHIFT_RANGE) {
         failure->row = me.committer.failure.row;
     }
-    hs_call_note(call, &me.done);
+    hs_call_add_counters(call, &me.done);
     free_scratch(&me);
     return status;
 }

@@ -47,7 +47,7 @@ typedef struct hs_recheck {
     int64_t          *image;   /* owned; m for each image: its shift is image + lag_j - lag_i */
     int64_t          *lag;     /* owned; m a point */
     uint8_t          *lagging; /* owned; whether those are not all zero */
-    bool              writes;  /* recheck.c measures. Then: */
+    bool              writes;  /* d and D are written by the kernel's writer. Then: */
     int32_t          *few;     /* owned; records of lags; NULL: all are zero */
     hs_bundle_points *of_a;    /* each thread has its own */
 } hs_recheck;
@@ -67,7 +67,7 @@ typedef struct hs_slab_hits {
      * each bundle; and where the hits of each bundle end. */
     int32_t      hits[HS_SLAB + HS_PADDING], point[HS_SLAB], hits_end[HS_SLAB];
     hs_open_pair open[HS_SLAB + 1];
-    int32_t      number[HS_SLAB + HS_PADDING];                     /* recheck.c: of b */
+    int32_t      number[HS_SLAB + HS_PADDING];                     /* of b */
     int32_t      i[HS_SLAB + HS_PADDING], j[HS_SLAB + HS_PADDING]; /* ... and what is copied */
 } hs_slab_hits;
 
@@ -77,46 +77,6 @@ hs_status hs_recheck_open_scene(hs_recheck *recheck, hs_failure *failure);
 
 /* Whether hits can be measured while they are written, and what that needs. */
 hs_status hs_recheck_plan_write(hs_recheck *recheck);
-
-/* Room in the column of this HS_WANT_ bit for pair `at` of the output; NULL where not kept. */
-HS_ALWAYS_INLINE void *
-hs_recheck_column(const hs_recheck *recheck, unsigned bit, int64_t at)
-{
-    char *column = hs_output_column(recheck->output, bit);
-    return column == NULL ? NULL : column + (size_t)at * hs_output_width(recheck->output, bit);
-}
-
-/* Whether the bundles of a slab have images. */
-HS_ALWAYS_INLINE bool
-hs_slab_has_images(const hs_recheck *recheck, const hs_slab_hits *slab)
-{
-    return slab->first >= recheck->list->listing.n_plain;
-}
-
-/* The image of a bundle, over the box vectors that repeat; NULL: none. */
-HS_ALWAYS_INLINE const int32_t *
-hs_recheck_image(const hs_recheck *recheck, const hs_slab_hits *slab, int32_t bundle)
-{
-    return hs_slab_has_images(recheck, slab) ? recheck->list->listing.images.of +
-                                                   (int64_t)slab->bundles[bundle].image * recheck->m
-                                             : NULL;
-}
-
-/* S from a to b over the box vectors that repeat. image: NULL if they have none. */
-HS_ALWAYS_INLINE void
-hs_recheck_shift(const hs_recheck *recheck, int64_t a, int64_t b, const int32_t *image,
-                 int64_t *shift)
-{
-    const int m = recheck->m;
-    for (int r = 0; r < m; r++) {
-        shift[r] = image == NULL ? 0 : image[r];
-        if (recheck->counts != NULL) { /* modulo 2^64: exact, for the sum fits */
-            shift[r] =
-                (int64_t)((uint64_t)shift[r] + (uint64_t)recheck->counts[(int64_t)a * m + r] -
-                          (uint64_t)recheck->counts[(int64_t)b * m + r]);
-        }
-    }
-}
 
 /* The pairs of the last step, into a result whose call has begun. Its options are checked and have
  * the cutoff of the list. Any status of hs_verlet_find. */

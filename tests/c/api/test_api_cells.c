@@ -11,8 +11,12 @@
 
 void test_api_cells(void);
 
-/* Api candidates: what cells say of themselves, dense and of occupied cells only: indices, the
- * cell of any point, ranges of candidates, and what is refused. */
+/*
+ * ---- api candidates ----
+ *
+ * What cells say of themselves, dense and of occupied cells only: indices, the cell of any point,
+ * ranges of candidates, and what is refused.
+ */
 
 /* A few dense clusters far apart, whose cells are only the occupied ones. */
 enum { CLUSTERS = 4, EACH = 1000, SPARSE_POINTS = CLUSTERS * EACH };
@@ -181,8 +185,7 @@ ranges_that_are_refused(void)
     hs_cells_free(cells);
 }
 
-/* Candidates far: candidates of queries that lie far from the points, and of points that no cells
- * hold. */
+/* ---- candidates of queries that lie far from the points, and of points that no cells hold ---- */
 
 /* Along open axes, around points at either end of the numbers. */
 static void

@@ -9,7 +9,7 @@
 
 void test_api_dynamic(void);
 
-/* Api dynamic: after any history, in any box and storage, a list answers as brute force. */
+/* ---- after any history, in any box and storage, a list answers as brute force ---- */
 
 typedef enum box_kind { OPEN, CUBE, SLAB, SKEWED, SMALL, SKEWED_WIRE, BOX_KINDS } box_kind;
 
@@ -323,8 +323,12 @@ filling_can_be_interrupted(void)
     }
 }
 
-/* Api dynamic calls: calls that change a list, or ask for one point, refuse what they cannot take,
- * and then have done nothing. */
+/*
+ * ---- api dynamic calls ----
+ *
+ * Calls that change a list, or ask for one point, refuse what they cannot take, and then have done
+ * nothing.
+ */
 
 static hs_dynamic *
 list_with_two(void)
@@ -428,7 +432,7 @@ cells_are_those_of_the_coordinates(void)
     hs_dynamic_free(list);
 }
 
-/* Api dynamic ball: queries, keys in turn and calls in a row refuse what they cannot take. */
+/* ---- queries, keys in turn and calls in a row refuse what they cannot take ---- */
 
 static int
 count_keys_ball(hs_key key, const double *position, const int64_t *shift, void *user)
@@ -527,7 +531,7 @@ counters_begin_at_zero(void)
     hs_dynamic_free(list);
 }
 
-/* Api dynamic list: lists as a whole: options, copies, keys in turn, and no list at all. */
+/* ---- lists as a whole: options, copies, keys in turn, and no list at all ---- */
 
 static void
 bad_options_are_refused(void)

@@ -6,7 +6,7 @@
 
 void test_api_memory(void);
 
-/* Scenes of several kinds: each takes another way through the search. */
+/* ---- scenes of several kinds, each of which takes another way through the search ---- */
 
 static const scene_of_calls kinds[] = {
     {.name = "dense", .box = SCENE_OPEN, .n = 150, .cutoff = 1.0, .want = HS_WANT_I | HS_WANT_J},
@@ -68,8 +68,11 @@ static const scene_of_calls kinds[] = {
 
 enum { KINDS = sizeof kinds / sizeof kinds[0] };
 
-/* Alloc calls: every function of halfshell.h, on scenes of several kinds, while allocation 1, 2,
- * 3, . */
+/*
+ * ---- alloc calls ----
+ *
+ * Every function of halfshell.h, on scenes of several kinds, while allocation 1, 2, 3, .
+ */
 
 enum { MOST_ALLOCATIONS = 1000 }; /* of one call here */
 
@@ -263,9 +266,11 @@ large_tables_fail_cleanly(void)
 }
 
 /*
- * Memory limits: every function of halfshell.h, on scenes of several kinds, under one limit of
- * memory after the other: whatever it forbids, the answer is HS_ERR_MEMORY or the right one, and
- * what the call was about stays usable.
+ * ---- memory limits ----
+ *
+ * Every function of halfshell.h, on scenes of several kinds, under one limit of memory after the
+ * other: whatever it forbids, the answer is HS_ERR_MEMORY or the right one, and what the call was
+ * about stays usable.
  */
 
 static const double LEAST = 300.0, MOST = 0x1p26; /* bytes */

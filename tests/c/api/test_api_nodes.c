@@ -9,7 +9,7 @@
 
 void test_api_nodes(void);
 
-/* Api connectivity: a build is the half list of a search, linked. */
+/* ---- a build is the half list of a search, linked ---- */
 
 static reach_set set;
 static double    limit = HUGE_VAL;
@@ -275,8 +275,7 @@ keys_and_feet_are_checked(void)
     CHECK(failure.row == 3);
 }
 
-/* Api node changes: what the functions that change rows and pairs refuse before they look at
- * these. */
+/* ---- what the functions that change rows and pairs refuse before they look at these ---- */
 
 static const int64_t        ends[2] = {0, 0}, count[1] = {1};
 static const int32_t        zero[1] = {0};

@@ -12,7 +12,7 @@
 
 void test_api_pairs(void);
 
-/* Api pairs: the set of pairs, and what is returned with them, against the brute force. */
+/* ---- the set of pairs, and what is returned with them, against the brute force ---- */
 
 /* Compares by any kernel of this CPU, and names the scene if it differs. Returns the number of
  * pairs, -1 if not compared. */
@@ -80,7 +80,7 @@ clusters_far_from_the_origin(void)
     CHECK(pairs > TRIALS(20000));
 }
 
-/* Api neighbors: rows of all neighbours, of points and of queries. */
+/* ---- rows of all neighbours, of points and of queries ---- */
 
 /* So many that one walk finds them all, in memory of i, and two walks with a second thread. */
 enum { MANY = 24000, ASKING = 9000 };
@@ -234,7 +234,7 @@ a_capacity_that_is_too_small_is_named(void)
     hs_pairs_free(rows);
 }
 
-/* Api plan: a plan tells what a search of a scene would do. */
+/* ---- a plan tells what a search of a scene would do ---- */
 
 /* Lengths are the caller's, whatever the search scales by; occupied cells and threads are told. */
 static void
@@ -378,8 +378,12 @@ plans_join_levels_unless_told_otherwise(void)
     (void)hs_test_join_levels(joins);
 }
 
-/* Precision: precision "single" and "double" on numbers that they hold exactly, where their
- * answers are those of the real numbers. */
+/*
+ * ---- precision ----
+ *
+ * Precision "single" and "double" on numbers that they hold exactly, where their answers are those
+ * of the real numbers.
+ */
 
 /* All pairs, with S, against the brute force. */
 static bool

@@ -112,7 +112,7 @@ reach_options(const reach_scene *s)
     return options;
 }
 
-/* Reach entries: every function that knows a reach for each pair, behind one signature. */
+/* ---- every function that knows a reach for each pair, behind one signature ---- */
 
 static reach_scene scene_entries; /* the present one */
 
@@ -192,10 +192,12 @@ takes_queries(entry which)
     return which == COUNT || which == ROWS || which == ROW_COUNTS;
 }
 
-/* By reach: streams, visits, cells and threads give the pairs of hs_pairs_find when each pair has
- * a reach of its own. */
-
-/* ---- many points ---- */
+/*
+ * ---- by reach ----
+ *
+ * Streams, visits, cells and threads give the pairs of hs_pairs_find when each pair has a reach of
+ * its own.
+ */
 
 enum { MANY = 40000 };
 
@@ -309,8 +311,12 @@ precisions_agree_on_small_integers(void)
     }
 }
 
-/* Reach supports: searches by supports through the public functions: all of them find what a plain
- * loop finds, whatever the kernel and the threads are. */
+/*
+ * ---- reach supports ----
+ *
+ * Searches by supports through the public functions: all of them find what a plain loop finds,
+ * whatever the kernel and the threads are.
+ */
 
 static double own[SCENE_POINTS * 9], of_queries[SCENE_POINTS * 9];
 
@@ -399,7 +405,7 @@ bad_supports_are_refused(void)
     all_refuse(HS_ERR_ARGUMENT, -1);
 }
 
-/* Reach refusals: what is no reach is refused by every function, whatever the failure held before. */
+/* ---- what is no reach is refused by every function, whatever the failure held before ---- */
 
 /* This entry refuses the present scene, or does not look at what is wrong. */
 static void

@@ -10,7 +10,7 @@
 
 void test_api_stream(void);
 
-/* Api stream: blocks are the pairs of one search, cut up, whoever looks for them. */
+/* ---- blocks are the pairs of one search, cut up, whoever looks for them ---- */
 
 static double *
 random_points(int64_t n, int ndim, double size)
@@ -69,7 +69,7 @@ interrupted_calls_can_be_made_again(void)
     free(x);
 }
 
-/* Api visit: a function sees the pairs of one search, each once, and may end it. */
+/* ---- a function sees the pairs of one search, each once, and may end it ---- */
 
 /* What a function compares the pairs with that it sees; by one thread. */
 typedef struct seen {

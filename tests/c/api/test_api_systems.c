@@ -11,7 +11,7 @@
 
 void test_api_systems(void);
 
-/* Api systems: many systems in one call against one call for each. */
+/* ---- many systems in one call against one call for each ---- */
 
 enum { N_SYSTEMS = 40, MOST_POINTS = 90 };
 
@@ -285,7 +285,7 @@ progress_goes_on_over_all_systems(void)
     }
 }
 
-/* Systems reach: many systems whose pairs have a reach of their own, against one call for each. */
+/* ---- many systems whose pairs have a reach of their own, against one call for each ---- */
 
 enum { N_SYSTEMS_REACH = 30, MOST_POINTS_REACH = 60, N_TYPES = 3 };
 
@@ -584,7 +584,7 @@ nothing_leaks_when_memory_is_short(void)
     check_arena(find_all, &systems);
 }
 
-/* System part: what one of many systems has of the arrays of all. */
+/* ---- what one of many systems has of the arrays of all ---- */
 
 /* One box for all, or rows for each, of which it says what repeats. */
 static void
@@ -679,7 +679,7 @@ excluded_pairs_of_queries_have_numbers_of_both(void)
     hs_account_close(&account);
 }
 
-/* Systems each: one call for each of many systems: polls, threads, and what failures say. */
+/* ---- one call for each of many systems: polls, threads, and what failures say ---- */
 
 enum {
     N_SYSTEMS_EACH = 50,
@@ -876,8 +876,7 @@ few_large_systems(void)
     CHECK(find_rows(&s_each.queries) == HS_OK);
 }
 
-/* Api systems rows: rows, nearest points and histograms of many systems, against one call for
- * each. */
+/* ---- rows, nearest points and histograms of many systems, against one call for each ---- */
 
 enum {
     N_SYSTEMS_ROWS = 20,

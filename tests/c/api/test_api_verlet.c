@@ -16,7 +16,7 @@
 
 void test_api_verlet(void);
 
-/* Api verlet: a list that is used for many steps gives what a search of each step gives. */
+/* ---- a list that is used for many steps gives what a search of each step gives ---- */
 
 static random_scene shared;
 
@@ -144,8 +144,11 @@ finding_can_be_interrupted(void)
     hs_verlet_free(list);
 }
 
-/* Verlet updates: a list is built again where the one there is cannot serve, even if no point has
- * moved. */
+/*
+ * ---- verlet updates ----
+ *
+ * A list is built again where the one there is cannot serve, even if no point has moved.
+ */
 
 enum { N_UPDATES = 80 };
 
@@ -254,7 +257,7 @@ radii_beyond_the_largest_number_are_refused(void)
     hs_verlet_free(list);
 }
 
-/* Api box: measuring and wrapping, plans, and what each failure says. */
+/* ---- measuring and wrapping, plans, and what each failure says ---- */
 
 /* |wrapped - (point + shift * box)| against 1 ulp of the largest of all these, in big integers. */
 static bool
@@ -346,7 +349,7 @@ turns_of_a_sheared_box_may_be_too_many(void)
     CHECK(failure.row == 1);
 }
 
-/* Api measure: given pairs against all images around them, and every refusal. */
+/* ---- given pairs against all images around them, and every refusal ---- */
 
 enum { N_PAIRS = 60, MEASURED = HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT };
 

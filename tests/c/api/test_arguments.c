@@ -14,8 +14,12 @@
 
 void test_arguments(void);
 
-/* Arguments: what would be read or written out of bounds is refused by every function that could,
- * before anything is read. */
+/*
+ * ---- arguments ----
+ *
+ * What would be read or written out of bounds is refused by every function that could, before
+ * anything is read.
+ */
 
 static const double numbers[16] = {0.0, 0.0, 0.0, 0.5, 0.5, 0.5};
 
@@ -259,8 +263,12 @@ nothing_at_all_is_refused(void)
     CHECK(hs_systems_count(&points, NULL, &options, NULL, NULL) == HS_ERR_ARGUMENT);
 }
 
-/* Call scene: one small scene with good arguments for every function of calls.h, each of them
- * where a test can spoil it. */
+/*
+ * ---- call scene ----
+ *
+ * One small scene with good arguments for every function of calls.h, each of them where a test can
+ * spoil it.
+ */
 
 enum { N_OF_CALL = 12, N_QUERIES_OF_CALL = 5, N_SYSTEMS_OF_CALL = 3, N_EDGES_OF_CALL = 3 };
 
@@ -361,8 +369,12 @@ call_fill_scene(call_scene *s)
                   .n_points = N_OF_CALL};
 }
 
-/* Bad arguments: one argument after the other is spoilt, for every function of halfshell.h: those
- * that look at it refuse it before anything happens, with a failure that is filled. */
+/*
+ * ---- bad arguments ----
+ *
+ * One argument after the other is spoilt, for every function of halfshell.h: those that look at it
+ * refuse it before anything happens, with a failure that is filled.
+ */
 
 typedef struct fault {
     const char *name;
@@ -748,7 +760,7 @@ only_one_bit_names_an_array(void)
     hs_pairs_free(pairs);
 }
 
-/* Refusals: a poll that says no once, and yes ever after, ends a search of any kind. */
+/* ---- a poll that says no once, and yes ever after, ends a search of any kind ---- */
 
 enum { N = 40000, CROWD = 2500 };
 

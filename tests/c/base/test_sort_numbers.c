@@ -9,7 +9,7 @@
 
 void test_sort_numbers(void);
 
-/* Radix sort: keys come out ascending, each with its own number, equal ones in their order. */
+/* ---- keys come out ascending, each with its own number, equal ones in their order ---- */
 
 enum { MOST = 5000 };
 
@@ -57,7 +57,7 @@ keys_ascend_and_equal_ones_keep_their_order(void)
     }
 }
 
-/* Sort numbers: few and many numbers, spread evenly, crowded or equal, are put in order. */
+/* ---- few and many numbers, spread evenly, crowded or equal, are put in order ---- */
 
 static int
 compare(const void *a, const void *b)
@@ -107,7 +107,7 @@ bits_are_counted(void)
     }
 }
 
-/* Starts: parts of any lengths, filled in any order, begin where the ones before end. */
+/* ---- parts of any lengths, filled in any order, begin where the ones before end ---- */
 
 static void
 parts_begin_where_others_end(void)

@@ -6,7 +6,7 @@
 
 void test_status(void);
 
-/* Status: each status has a sentence of its own, and the version is that of the header. */
+/* ---- each status has a sentence of its own, and the version is that of the header ---- */
 
 /* Each code has a sentence of its own; other numbers have one, too. */
 static void
@@ -29,7 +29,7 @@ the_version_is_that_of_the_header(void)
     CHECK(hs_version() == HS_VERSION);
 }
 
-/* Want: bytes and purpose of each quantity. */
+/* ---- bytes and purpose of each quantity ---- */
 
 static void
 quantities_have_the_widths_of_their_arrays(void)

@@ -13,7 +13,7 @@
 
 void test_lattice(void);
 
-/* Basis checks: exact comparisons, exact determinants and a measure of shape. */
+/* ---- exact comparisons, exact determinants and a measure of shape ---- */
 
 typedef double matrix[HS_MAX_DIM][HS_MAX_DIM];
 
@@ -149,7 +149,7 @@ defect_of(int ndim, int n, matrix rows)
     return defect;
 }
 
-/* Lattice reduce: reduced bases are bases of the same lattice, exactly, and they are short. */
+/* ---- reduced bases are bases of the same lattice, exactly, and they are short ---- */
 
 /* What is promised of every result, however odd the rows are. */
 static hs_reduction
@@ -263,7 +263,7 @@ coefficients_are_taken_off_from_half_to_the_largest(void)
     }
 }
 
-/* Box check: independence is decided for the numbers given, not for rounded determinants. */
+/* ---- independence is decided for the numbers given, not for rounded determinants ---- */
 
 static bool
 independent(int ndim, int n, matrix a)
@@ -285,8 +285,10 @@ sums_of_far_magnitudes_are_dependent(void)
 }
 
 /*
- * Box skew: boxes that are equivalent to an upright one, by so many of its vectors that shifts
- * over the vectors as given pass int32, 2^53 and int64: the same pairs, or a status that says so.
+ * ---- box skew ----
+ *
+ * Boxes that are equivalent to an upright one, by so many of its vectors that shifts over the
+ * vectors as given pass int32, 2^53 and int64: the same pairs, or a status that says so.
  */
 
 enum { N = 12 };
@@ -536,7 +538,7 @@ nearly_flat_boxes(void)
     }
 }
 
-/* Strain: what a change of the box does to lengths is bounded for every whole vector. */
+/* ---- what a change of the box does to lengths is bounded for every whole vector ---- */
 
 static bool
 has_bound(double a, double b, double c, double d, double scale)

@@ -10,7 +10,7 @@
 
 void test_wrap(void);
 
-/* Wrap: wrapped coordinates against big integers: nothing may get lost, however far away. */
+/* ---- wrapped coordinates against big integers: nothing may get lost, however far away ---- */
 
 /* A lattice whose period is not that of its row: every pass finds turns anew, and what is left
  * after the last one is the point less as many rows. */
@@ -43,29 +43,23 @@ the_lowest_failure_is_told(void)
     const int64_t failed[4] = {-1, 0, 3, 5};
     for (int a = 0; a < 4; a++) {
         for (int b = 0; b < 4; b++) {
-            hs_folded       joined = hs_folded_none();
-            const hs_folded none = hs_folded_none();
-            hs_folded       parts[2] = {none, none};
+            hs_wrap_range       joined = hs_wrap_range_none();
+            const hs_wrap_range none = hs_wrap_range_none();
+            hs_wrap_range       parts[2] = {none, none};
             parts[0].failed = failed[a];
             parts[1].failed = failed[b];
-            hs_folded_join(&joined, &parts[0]);
-            hs_folded_join(&joined, &parts[1]);
+            hs_wrap_range_join(&joined, &parts[0]);
+            hs_wrap_range_join(&joined, &parts[1]);
             CHECK(joined.failed == (a == 0 || b == 0 ? failed[a + b] : failed[a < b ? a : b]));
         }
     }
 }
 
-/* Wrap skewed: wrapping many points at once gives the bits of wrapping them one by one. */
+/* ---- wrapping many points at once gives the bits of wrapping them one by one ---- */
 
 enum { POINTS = 700 }; /* two whole tiles and a part of one */
 
 static double given[HS_MAX_DIM][POINTS], folded_x[HS_MAX_DIM][POINTS];
-
-static bool
-same_bits(double a, double b)
-{
-    return memcmp(&a, &b, sizeof a) == 0;
-}
 
 /* Coordinates of many points have the bits of those of one. */
 static void

@@ -10,7 +10,7 @@
 
 void test_bins(void);
 
-/* Bins: points in cell order: each once, in its own cell, in the caller's order within it. */
+/* ---- points in cell order: each once, in its own cell, in the caller's order within it ---- */
 
 static random_scene shared;
 
@@ -65,8 +65,12 @@ coordinates_and_turns_travel_with_their_point(void)
     }
 }
 
-/* Bins threads: points are sorted into the same order by any number of threads, with as much
- * memory as there is, until a poll says no. */
+/*
+ * ---- bins threads ----
+ *
+ * Points are sorted into the same order by any number of threads, with as much memory as there is,
+ * until a poll says no.
+ */
 
 enum { MANY = 2 * HS_POLL_POINTS + 40000, FEW = 70000 }; /* FEW: of four strips */
 
@@ -159,7 +163,7 @@ any_team_finds_the_same_order(void)
     }
 }
 
-/* Sparse scenes: scenes whose points are few and far between, crowded, or both. */
+/* ---- scenes whose points are few and far between, crowded, or both ---- */
 
 enum { SPARSE_MANY = 20000, SPARSE_MANY_KINDS = 8 };
 
@@ -197,8 +201,11 @@ many_points(harness_random *random, int kind, double *many)
     }
 }
 
-/* Sparse grid: sparse cells are as far apart as their reach says, at any magnitude of the
- * coordinates. */
+/*
+ * ---- sparse grid ----
+ *
+ * Sparse cells are as far apart as their reach says, at any magnitude of the coordinates.
+ */
 
 static double many_sparse_grid[3 * SPARSE_MANY];
 

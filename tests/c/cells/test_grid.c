@@ -13,7 +13,7 @@
 
 void test_grid(void);
 
-/* Grid width: how wide cells are, and where their faces lie, changes no answer. */
+/* ---- how wide cells are, and where their faces lie, changes no answer ---- */
 
 /* Boxes so short that a cutoff passes more images than are counted are refused with any cells. */
 static void
@@ -38,33 +38,36 @@ endless_images_are_refused_with_any_cells(void)
     }
 }
 
-/* Grid unit: a scene in the plane and its grid, so that a test can take the steps of choosing
- * cells one by one. */
+/*
+ * ---- grid unit ----
+ *
+ * A scene in the plane and its grid, so that a test can take the steps of choosing cells one by
+ * one.
+ */
 
 enum { N = 3000 };
 
-static double     x_grid_unit[2 * N];
+static double     grid_x[2 * N];
 static hs_account account;
-static hs_scene   scene_grid_unit;
+static hs_scene   grid_scene;
 static hs_grid    grid;
 
 static void
 open_scene(int64_t n, const hs_box *box, double cutoff)
 {
-    const hs_points points = {x_grid_unit, n, 2, HS_FLOAT64, 16, 8};
+    const hs_points points = {grid_x, n, 2, HS_FLOAT64, 16, 8};
     hs_options      options = hs_options_default();
     hs_failure      failure;
     options.cutoff = cutoff;
     hs_account_init(&account, &options);
-    CHECK(hs_scene_init(&account, NULL, &points, box, &options, &scene_grid_unit, &failure) ==
-          HS_OK);
-    CHECK(hs_grid_init(&scene_grid_unit, &grid, &failure) == HS_OK);
+    CHECK(hs_scene_init(&account, NULL, &points, box, &options, &grid_scene, &failure) == HS_OK);
+    CHECK(hs_grid_init(&grid_scene, &grid, &failure) == HS_OK);
 }
 
 static void
 close_scene(void)
 {
-    hs_scene_free(&account, &scene_grid_unit);
+    hs_scene_free(&account, &grid_scene);
     CHECK(account.held == 0);
 }
 
@@ -73,11 +76,15 @@ fill_square(double side)
 {
     harness_random random = {88};
     for (int e = 0; e < 2 * N; e++)
-        x_grid_unit[e] = side * random_unit(&random);
+        grid_x[e] = side * random_unit(&random);
 }
 
-/* Grid faces: axes are cut at the numbers that cells begin at where these are as wide as the
- * cutoff, or a part of it, and no rounding can move a point over them. */
+/*
+ * ---- grid faces ----
+ *
+ * Axes are cut at the numbers that cells begin at where these are as wide as the cutoff, or a part
+ * of it, and no rounding can move a point over them.
+ */
 
 /* Boxes that are whole multiples of the cutoff get as many cells, unless the cutoff is 0. */
 static void
@@ -88,29 +95,30 @@ faces_need_a_cutoff(void)
     fill_square(8.0);
     open_scene(N, &box, 1.0);
     for (int with = 0; with < 2; with++) {
-        scene_grid_unit.radius = with ? 1.0 : 0.0;
-        CHECK(hs_grid_set_shape(&scene_grid_unit, counts, &grid) == HS_OK);
-        hs_grid_cut_by_faces(&scene_grid_unit, parts, 1000.0, &grid);
+        grid_scene.radius = with ? 1.0 : 0.0;
+        CHECK(hs_grid_set_shape(&grid_scene, counts, &grid) == HS_OK);
+        hs_grid_cut_by_faces(&grid_scene, parts, 1000.0, &grid);
         CHECK(grid.by_faces[0] == with && grid.by_faces[1] == with);
         CHECK(grid.shape[0] == 7 + with && grid.n_cells == (7 + with) * (7 + with));
     }
-    CHECK(hs_grid_set_shape(&scene_grid_unit, counts, &grid) == HS_OK);
+    CHECK(hs_grid_set_shape(&grid_scene, counts, &grid) == HS_OK);
     const hs_grid seven = grid;
-    scene_grid_unit.upper[0] =
-        -(scene_grid_unit.lower[0] = -0x1p31); /* more cells than can be told apart */
+    grid_scene.upper[0] = -(grid_scene.lower[0] = -0x1p31); /* more cells than can be told apart */
     grid.shape[0] = INT64_C(1) << 31;
-    hs_grid_cut_by_faces(&scene_grid_unit, parts, 0x1p60, &grid);
+    hs_grid_cut_by_faces(&grid_scene, parts, 0x1p60, &grid);
     CHECK(!grid.by_faces[0] && grid.shape[0] == INT64_C(1) << 31);
-    scene_grid_unit.upper[0] = -(scene_grid_unit.lower[0] = -4.0);
+    grid_scene.upper[0] = -(grid_scene.lower[0] = -4.0);
     grid = seven;
-    hs_grid_cut_by_faces(&scene_grid_unit, parts, 56.0,
-                         &grid); /* room for a row more, not for two */
+    hs_grid_cut_by_faces(&grid_scene, parts, 56.0, &grid); /* room for a row more, not for two */
     CHECK(grid.by_faces[0] && !grid.by_faces[1] && grid.n_cells == 56);
     close_scene();
 }
 
-/* Grid ranges: how far apart the cells of a pair can be, in lattices that are worse than any box
- * gives. */
+/*
+ * ---- grid ranges ----
+ *
+ * How far apart the cells of a pair can be, in lattices that are worse than any box gives.
+ */
 
 /* Normals that miss the periods by 0.3 of one: ranges grow with the number of images, which grows
  * with the ranges. */
@@ -123,34 +131,33 @@ endless_ranges_are_refused(void)
     bool         is_wider;
     fill_square(1.0);
     open_scene(4, &box, 1.0);
-    scene_grid_unit.lattice.aligned = false;
-    scene_grid_unit.lattice.normal[0][0] = 0.7;
-    scene_grid_unit.lattice.normal[0][1] = scene_grid_unit.lattice.normal[1][0] = 0.0;
-    scene_grid_unit.lattice.normal[1][1] = 1.0;
-    scene_grid_unit.radius = 100.0;
-    CHECK(hs_grid_begin(&scene_grid_unit, &density, &grid, &failure) == HS_ERR_MEMORY);
+    grid_scene.lattice.aligned = false;
+    grid_scene.lattice.normal[0][0] = 0.7;
+    grid_scene.lattice.normal[0][1] = grid_scene.lattice.normal[1][0] = 0.0;
+    grid_scene.lattice.normal[1][1] = 1.0;
+    grid_scene.radius = 100.0;
+    CHECK(hs_grid_begin(&grid_scene, &density, &grid, &failure) == HS_ERR_MEMORY);
     CHECK(failure.expected_pairs == INFINITY && failure.expected_bytes == INFINITY);
     failure = HS_NO_FAILURE;
-    CHECK(hs_grid_init(&scene_grid_unit, &grid, &failure) == HS_ERR_MEMORY);
+    CHECK(hs_grid_init(&grid_scene, &grid, &failure) == HS_ERR_MEMORY);
     CHECK(failure.expected_pairs == INFINITY);
-    CHECK(hs_grid_init_wide(&scene_grid_unit, 1.0, &grid, &is_wider, &failure) == HS_ERR_MEMORY);
+    CHECK(hs_grid_init_wide(&grid_scene, 1.0, &grid, &is_wider, &failure) == HS_ERR_MEMORY);
     const hs_grid before = grid;
-    CHECK(hs_grid_narrow(&scene_grid_unit, false, 2.0, &grid) == HS_ERR_MEMORY);
+    CHECK(hs_grid_narrow(&grid_scene, false, 2.0, &grid) == HS_ERR_MEMORY);
     CHECK(grid.reach[0] == before.reach[0] && grid.expected_pairs == before.expected_pairs);
-    scene_grid_unit.lattice.U[1][0] = INT64_C(1) << 32; /* a row that no S counts */
-    CHECK(hs_grid_begin(&scene_grid_unit, &density, &grid, &failure) == HS_ERR_BOX_SKEWED);
-    CHECK(hs_grid_init_wide(&scene_grid_unit, 1.0, &grid, &is_wider, &failure) ==
-          HS_ERR_BOX_SKEWED);
-    scene_grid_unit.lattice.U[1][0] = 0;
-    scene_grid_unit.radius = 0.25; /* then it is rounding alone that moves points across the box */
-    scene_grid_unit.t_error[0] = 0.3;
-    CHECK(hs_grid_begin(&scene_grid_unit, &density, &grid, &failure) == HS_ERR_BOX_SKEWED);
-    scene_grid_unit.t_error[0] = 0.0;
-    scene_grid_unit.lattice.normal[0][0] = 1.0;
-    CHECK(hs_grid_begin(&scene_grid_unit, &density, &grid, &failure) == HS_OK);
+    grid_scene.lattice.U[1][0] = INT64_C(1) << 32; /* a row that no S counts */
+    CHECK(hs_grid_begin(&grid_scene, &density, &grid, &failure) == HS_ERR_BOX_SKEWED);
+    CHECK(hs_grid_init_wide(&grid_scene, 1.0, &grid, &is_wider, &failure) == HS_ERR_BOX_SKEWED);
+    grid_scene.lattice.U[1][0] = 0;
+    grid_scene.radius = 0.25; /* then it is rounding alone that moves points across the box */
+    grid_scene.t_error[0] = 0.3;
+    CHECK(hs_grid_begin(&grid_scene, &density, &grid, &failure) == HS_ERR_BOX_SKEWED);
+    grid_scene.t_error[0] = 0.0;
+    grid_scene.lattice.normal[0][0] = 1.0;
+    CHECK(hs_grid_begin(&grid_scene, &density, &grid, &failure) == HS_OK);
     CHECK(grid.range[0] >= 0.25 && grid.range[0] < 0.2500001);
-    scene_grid_unit.lattice.row_error[0] = 0x1p-20; /* of each image that a pair may be away */
-    CHECK(hs_grid_begin(&scene_grid_unit, &density, &grid, &failure) == HS_OK);
+    grid_scene.lattice.row_error[0] = 0x1p-20; /* of each image that a pair may be away */
+    CHECK(hs_grid_begin(&grid_scene, &density, &grid, &failure) == HS_OK);
     CHECK(grid.range[0] > 0.25 + 0x1p-20 && grid.range[0] < 0.2501);
     close_scene();
 }
@@ -164,20 +171,20 @@ flat_frames_prune_nothing(void)
     fill_square(1.0);
     open_scene(4, &box, 6.0);
     const hs_options options = hs_options_default();
-    CHECK(!scene_grid_unit.lattice.aligned && grid.n_cells == 1);
-    CHECK(hs_stencil_build(&account, &options, &scene_grid_unit, &grid, true, &pruned) == HS_OK);
-    hs_lattice  *lattice = &scene_grid_unit.lattice;
+    CHECK(!grid_scene.lattice.aligned && grid.n_cells == 1);
+    CHECK(hs_stencil_build(&account, &options, &grid_scene, &grid, true, &pruned) == HS_OK);
+    hs_lattice  *lattice = &grid_scene.lattice;
     const double normal[2][2] = {{1.0, -1e4}, {0.0, 1e4}}, direction[2][2] = {{1.0}, {1.0, 1e-4}};
     for (int k = 0; k < 2; k++) {
         memcpy(lattice->normal[k], normal[k], sizeof normal[k]);
         memcpy(lattice->direction[k], direction[k], sizeof direction[k]);
     }
-    CHECK(hs_stencil_build(&account, &options, &scene_grid_unit, &grid, true, &whole) == HS_OK);
+    CHECK(hs_stencil_build(&account, &options, &grid_scene, &grid, true, &whole) == HS_OK);
     CHECK(whole.n_rows == 2 * grid.reach[1] + 1);
     const int64_t n_rows = whole.n_rows;
     hs_stencil_free(&account, &whole);
     lattice->direction[1][1] = 1.0; /* nor do directions that are not those of the normals */
-    CHECK(hs_stencil_build(&account, &options, &scene_grid_unit, &grid, true, &whole) == HS_OK);
+    CHECK(hs_stencil_build(&account, &options, &grid_scene, &grid, true, &whole) == HS_OK);
     CHECK(whole.n_rows == n_rows);
     int64_t narrower = 0;
     for (int64_t r = 0; r < whole.n_rows; r++) {
@@ -192,7 +199,7 @@ flat_frames_prune_nothing(void)
     close_scene();
 }
 
-/* Stencil: neighbourhoods of very many rows of cells: counted right, stopped, refused. */
+/* ---- neighbourhoods of very many rows of cells: counted right, stopped, refused ---- */
 
 static const double one_point[3] = {0.125, 0.25, 0.5};
 

@@ -9,7 +9,7 @@
 
 void test_columns(void);
 
-/* Columns: options.out, pairs written into arrays of the caller, and nothing beyond them. */
+/* ---- options.out, pairs written into arrays of the caller, and nothing beyond them ---- */
 
 static random_scene shared;
 
@@ -98,8 +98,7 @@ endless_outputs_are_refused(void)
     hs_output_free(&output);
 }
 
-/* Columns touch: every page of a large column is written to, by parts, and small ones are left
- * alone. */
+/* ---- every page of a large column is written to, by parts, and small ones are left alone ---- */
 
 enum { PAGE = 4096, PART = 4 * PAGE, PAIRS = 6000 };
 

@@ -12,7 +12,7 @@
 
 void test_parallel(void);
 
-/* Thread limit: a system that starts only so many threads. */
+/* ---- a system that starts only so many threads ---- */
 
 #if defined(__linux__)
 #define HAS_THREAD_LIMIT 1
@@ -47,7 +47,7 @@ __wrap_pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void 
 #define HAS_THREAD_LIMIT 0
 #endif
 
-/* Parallel: the same answer by any number of threads, to the last bit and in the same order. */
+/* ---- the same answer by any number of threads, to the last bit and in the same order ---- */
 
 enum {
     MOST_THREADS = IS_SLOW ? 3 : 5,
@@ -141,9 +141,7 @@ same_pairs(const hs_options *options, const hs_pairs *a, const hs_pairs *b)
     return same;
 }
 
-/* ---- interrupts ---- */
-
-/* ---- failures ---- */
+/* ---- interrupts and failures ---- */
 
 /* Lets every third allocation fail, from `first` on, which differs from call to call. Which one
  * that is depends on which thread comes first; a search that gets on without it must give the same
@@ -221,8 +219,12 @@ fewer_threads_find_the_same(void)
 
 #endif
 
-/* Parallel memory: a search that is left half way needs room to the last pair that it leaves with:
- * with one byte less it fails, and takes nothing with it. */
+/*
+ * ---- parallel memory ----
+ *
+ * A search that is left half way needs room to the last pair that it leaves with: with one byte
+ * less it fails, and takes nothing with it.
+ */
 
 enum { N = 2000, ENOUGH = 200000 };
 

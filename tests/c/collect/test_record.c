@@ -12,8 +12,7 @@
 
 void test_record(void);
 
-/* Record unit: all pairs of an open search, recorded by one walk, and whether each is what it
- * says. */
+/* ---- all pairs of an open search, recorded by one walk, and whether each is what it says ---- */
 
 typedef struct record_unit {
     hs_recorder recorder;
@@ -56,7 +55,7 @@ recorded_index(const record_unit *recorded, unsigned bit, int64_t e)
                                              : ((const int32_t *)column)[e];
 }
 
-/* Record: each hit becomes a pair once, with i and j in columns of any shape. */
+/* ---- each hit becomes a pair once, with i and j in columns of any shape ---- */
 
 enum { N = 300 };
 
@@ -119,7 +118,7 @@ pairs_come_once_in_every_shape(void)
         check_shape(shape, shape & 4);
 }
 
-/* Record write: what is written at once is what is recorded in batches. */
+/* ---- what is written at once is what is recorded in batches ---- */
 
 enum {
     N_WRITE = 200,
@@ -177,7 +176,7 @@ large_blocks_can_be_stopped(void)
     search_unit_close(&unit_record);
 }
 
-/* Record shells: the shell of each pair, on edges and off them. */
+/* ---- the shell of each pair, on edges and off them ---- */
 
 enum { SIDE = 9, N_SHELLS = SIDE * SIDE * SIDE };
 
@@ -355,8 +354,12 @@ refused_memory_leaves_nothing(void)
     }
 }
 
-/* Measures: each pair of a batch is measured with the bits of hs_metric_measure, by every kernel,
- * whatever its shift. */
+/*
+ * ---- measures ----
+ *
+ * Each pair of a batch is measured with the bits of hs_metric_measure, by every kernel, whatever
+ * its shift.
+ */
 
 static hs_measured pairs_measures;
 

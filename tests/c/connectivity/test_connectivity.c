@@ -7,7 +7,7 @@
 
 void test_connectivity(void);
 
-/* Node map: each point is the node that its number says, and what is no map is refused. */
+/* ---- each point is the node that its number says, and what is no map is refused ---- */
 
 static node_scene scene;
 
@@ -61,7 +61,7 @@ what_is_no_map_is_refused(void)
     CHECK(hs_node_map_make(NULL, NULL, 0, &map) == HS_ERR_ARGUMENT);
 }
 
-/* Half list: pairs are copied as they are. */
+/* ---- pairs are copied as they are ---- */
 
 /* The row of the failure, -1 for none. */
 static int64_t
@@ -154,7 +154,7 @@ what_is_no_half_list_is_refused(void)
     }
 }
 
-/* Row split: rows of points become rows of nodes and half lists, with their shifts. */
+/* ---- rows of points become rows of nodes and half lists, with their shifts ---- */
 
 static void
 images_go_once_and_with_their_shifts(void)
@@ -178,7 +178,7 @@ images_go_once_and_with_their_shifts(void)
     hs_account_close(&call.account);
 }
 
-/* Node rows: rows and pairs of many pairs ask the caller, and leave nothing when they end early. */
+/* ---- rows and pairs of many pairs ask the caller, and leave nothing when they end early ---- */
 
 enum { MANY = 1500, MANY_PAIRS = MANY * (MANY - 1) / 2 };
 
@@ -248,7 +248,7 @@ no_limit_of_memory_leaves_anything(void)
     CHECK(raise_memory_limit(link_scene, NULL, &limit) > 10);
 }
 
-/* Row pairs: rows give the pairs that the half list gives, with their shifts. */
+/* ---- rows give the pairs that the half list gives, with their shifts ---- */
 
 /* Rows of a connectivity, as given to another one. */
 static hs_list_rows
@@ -419,7 +419,7 @@ failures_leave_nothing(void)
     hs_connectivity_free(made);
 }
 
-/* Connectivity: rows and pairs of a half list are those of its matrix. */
+/* ---- rows and pairs of a half list are those of its matrix ---- */
 
 static void
 shifts_are_opposite_in_the_other_row(void)
@@ -560,7 +560,7 @@ rows_that_are_found_may_be_too_many(void)
 }
 
 static hs_status
-link_scene_connectivity(void *context)
+link_small_scene(void *context)
 {
     const hs_half_list  half = node_half_of(&scene);
     const hs_node_lists lists = node_lists_of(&scene, true, true, true);
@@ -578,33 +578,32 @@ no_allocation_that_fails_leaves_anything(void)
 {
     harness_random random = {9};
     node_scene_fill(&random, true, &scene);
-    CHECK(fail_each_allocation(link_scene_connectivity, NULL, 200) > 5);
-    check_arena(link_scene_connectivity, NULL);
+    CHECK(fail_each_allocation(link_small_scene, NULL, 200) > 5);
+    check_arena(link_small_scene, NULL);
     hs_connectivity_free(NULL);
     CHECK(hs_connectivity_rows(NULL) == NULL && hs_connectivity_pairs(NULL) == NULL);
     CHECK(hs_connectivity_lists(NULL) == NULL);
 }
 
-/* Kept rows: rows without nodes, in their order or in another, and without entries. */
+/* ---- rows without nodes, in their order or in another, and without entries ---- */
 
 enum { ROWS = NODE_POINTS * NODE_LISTS + 1 };
-static int64_t offsets_kept_rows[ROWS], fewer_offsets[ROWS], source[NODE_POINTS];
+static int64_t row_offsets[ROWS], fewer_offsets[ROWS], source[NODE_POINTS];
 static int32_t indices[2 * NODE_PAIRS], fewer_indices[2 * NODE_PAIRS];
-static int32_t shift_kept_rows[4 * NODE_PAIRS], fewer_shift[4 * NODE_PAIRS];
+static int32_t row_shifts[4 * NODE_PAIRS], fewer_shift[4 * NODE_PAIRS];
 static int32_t target[NODE_POINTS], place[NODE_POINTS];
 static bool    gone[NODE_POINTS][NODE_POINTS];
 
 static hs_list_rows
 rows_given(bool has_shift)
 {
-    const int64_t n =
-        node_rows_fill(&scene, scene.near, offsets_kept_rows, indices, shift_kept_rows);
+    const int64_t n = node_rows_fill(&scene, scene.near, row_offsets, indices, row_shifts);
     return (hs_list_rows){.n = scene.n_lists > 0 ? scene.n : 0,
                           .n_lists = scene.n_lists,
-                          .offsets = offsets_kept_rows,
+                          .offsets = row_offsets,
                           .n_indices = n,
                           .indices = indices,
-                          .shift = has_shift ? shift_kept_rows : NULL,
+                          .shift = has_shift ? row_shifts : NULL,
                           .ndim = 2};
 }
 
@@ -708,8 +707,8 @@ rows_have_the_nodes_that_stay(void)
             int64_t base = 0;
             for (int32_t l = 0; l < scene.n_lists; l++) {
                 const int64_t e = k * scene.n_lists + l, old = source[k] * scene.n_lists + l;
-                CHECK(entry_is(kept, ends[e], ends[e + 1], offsets_kept_rows[old],
-                               offsets_kept_rows[old + 1], base, in_order));
+                CHECK(entry_is(kept, ends[e], ends[e + 1], row_offsets[old], row_offsets[old + 1],
+                               base, in_order));
                 base += scene.n_nodes[l];
             }
         }
@@ -718,7 +717,7 @@ rows_have_the_nodes_that_stay(void)
     }
 }
 
-/* ---- entries that go ----------------------------------------------------------------------- */
+/* ---- entries that go ---- */
 
 /* Some of the entries, or pairs that are none besides; with those of `rows`, whose shifts are the
  * numbers of their entries. */
@@ -740,11 +739,11 @@ fewer_given(harness_random *random, const hs_list_rows *rows, bool with_others)
     } else { /* every third entry, with its shift */
         for (int64_t k = 0; k < rows->n * rows->n_lists; k++) {
             fewer_offsets[k] = at;
-            for (int64_t e = offsets_kept_rows[k]; e < offsets_kept_rows[k + 1]; e++) {
+            for (int64_t e = row_offsets[k]; e < row_offsets[k + 1]; e++) {
                 if (e % 3 == 0) {
                     fewer_indices[at] = indices[e];
-                    fewer_shift[2 * at] = shift_kept_rows[2 * e];
-                    fewer_shift[2 * at++ + 1] = shift_kept_rows[2 * e + 1];
+                    fewer_shift[2 * at] = row_shifts[2 * e];
+                    fewer_shift[2 * at++ + 1] = row_shifts[2 * e + 1];
                 }
             }
         }
@@ -832,7 +831,7 @@ images_go_by_their_shifts(void)
     hs_pairs_free(kept);
 }
 
-/* ---- what is refused ----------------------------------------------------------------------- */
+/* ---- what is refused ---- */
 
 static void
 what_are_no_rows_is_refused(void)
@@ -937,7 +936,7 @@ keep_once(void *context)
 }
 
 static void
-failures_leave_nothing_kept_rows(void)
+failures_leave_no_kept_rows(void)
 {
     harness_random random = {81};
     do {
@@ -980,11 +979,11 @@ long_rows_ask_the_caller(void)
     hs_pairs_free(kept);
 }
 
-/* Kept pairs: a table has the pairs that stay, in its order and with their shifts. */
+/* ---- a table has the pairs that stay, in its order and with their shifts ---- */
 
 static int32_t i_node[NODE_PAIRS], i_list[NODE_PAIRS], j_node[NODE_PAIRS], j_list[NODE_PAIRS];
-static int32_t shift_kept_pairs[2 * NODE_PAIRS], target_kept_pairs[NODE_POINTS];
-static bool    keep_kept_pairs[NODE_PAIRS];
+static int32_t pair_shifts[2 * NODE_PAIRS], new_number[NODE_POINTS];
+static bool    stays[NODE_PAIRS];
 
 static hs_node_pairs
 pairs_given(bool has_shift)
@@ -994,23 +993,23 @@ pairs_given(bool has_shift)
         i_list[e] = scene.list[scene.i[e]];
         j_node[e] = scene.node[scene.j[e]];
         j_list[e] = scene.list[scene.j[e]];
-        shift_kept_pairs[2 * e] = (int32_t)e;
-        shift_kept_pairs[2 * e + 1] = INT32_MIN;
+        pair_shifts[2 * e] = (int32_t)e;
+        pair_shifts[2 * e + 1] = INT32_MIN;
     }
     return (hs_node_pairs){.n = scene.n_pairs,
                            .i_node = i_node,
                            .i_list = i_list,
                            .j_node = j_node,
                            .j_list = j_list,
-                           .shift = has_shift ? shift_kept_pairs : NULL,
+                           .shift = has_shift ? pair_shifts : NULL,
                            .ndim = 2};
 }
 
 static hs_node_change
-change_given_kept_pairs(void)
+change_given_pairs(void)
 {
     return (hs_node_change){
-        .n_lists = scene.n_lists, .n_nodes = scene.n_nodes, .target = target_kept_pairs};
+        .n_lists = scene.n_lists, .n_nodes = scene.n_nodes, .target = new_number};
 }
 
 static void
@@ -1018,16 +1017,15 @@ fill(harness_random *random)
 {
     node_scene_fill(random, true, &scene);
     for (int32_t p = 0; p < scene.n; p++)
-        target_kept_pairs[p] = random_bits(random) % 3 > 0 ? (int32_t)(random_bits(random) % 1000)
-                                                           : -1;
+        new_number[p] = random_bits(random) % 3 > 0 ? (int32_t)(random_bits(random) % 1000) : -1;
     for (int64_t e = 0; e < scene.n_pairs; e++)
-        keep_kept_pairs[e] = random_bits(random) % 2 > 0;
+        stays[e] = random_bits(random) % 2 > 0;
 }
 
 static int32_t
 target_of(int32_t point, bool has_change)
 {
-    return has_change ? target_kept_pairs[scene.number[point]] : scene.node[point];
+    return has_change ? new_number[scene.number[point]] : scene.node[point];
 }
 
 static void
@@ -1075,22 +1073,20 @@ count_kept(void)
 {
     int64_t n = 0;
     for (int64_t e = 0; e < scene.n_pairs; e++)
-        n += keep_kept_pairs[e] && target_of(scene.i[e], true) >= 0 &&
-             target_of(scene.j[e], true) >= 0;
+        n += stays[e] && target_of(scene.i[e], true) >= 0 && target_of(scene.j[e], true) >= 0;
     return n;
 }
 
 static hs_status
-keep_once_kept_pairs(void *context)
+keep_pairs_once(void *context)
 {
     const hs_node_pairs  pairs = pairs_given(true);
-    const hs_node_change change = change_given_kept_pairs();
+    const hs_node_change change = change_given_pairs();
     hs_options           options = hs_options_default();
     hs_connectivity     *made = NULL;
     (void)context;
     options.memory_limit = limit;
-    const hs_status status =
-        hs_node_pairs_keep(&pairs, &change, keep_kept_pairs, &options, &made, NULL);
+    const hs_status status = hs_node_pairs_keep(&pairs, &change, stays, &options, &made, NULL);
     CHECK((made != NULL) == (status == HS_OK));
     if (status == HS_OK) {
         const int64_t n = count_kept();
@@ -1102,7 +1098,7 @@ keep_once_kept_pairs(void *context)
 }
 
 static void
-failures_leave_nothing_kept_pairs(void)
+failures_leave_no_kept_pairs(void)
 {
     enum { LONG = 1 << 20 };
     static int32_t      many[LONG];
@@ -1114,9 +1110,9 @@ failures_leave_nothing_kept_pairs(void)
     do {
         fill(&random);
     } while (scene.n_pairs < 20);
-    CHECK(fail_each_allocation(keep_once_kept_pairs, NULL, 100) > 5);
-    check_arena(keep_once_kept_pairs, NULL);
-    CHECK(raise_memory_limit(keep_once_kept_pairs, NULL, &limit) > 5);
+    CHECK(fail_each_allocation(keep_pairs_once, NULL, 100) > 5);
+    check_arena(keep_pairs_once, NULL);
+    CHECK(raise_memory_limit(keep_pairs_once, NULL, &limit) > 5);
     options.poll = stop_after;
     options.poll_context = &left;
     CHECK(hs_node_pairs_keep(&pairs, NULL, NULL, &options, &made, NULL) == HS_ERR_INTERRUPTED);
@@ -1145,8 +1141,8 @@ test_connectivity(void)
     RUN(rows_lose_the_entries_that_go);
     RUN(images_go_by_their_shifts);
     RUN(what_are_no_rows_is_refused);
-    RUN(failures_leave_nothing_kept_rows);
+    RUN(failures_leave_no_kept_rows);
     RUN(long_rows_ask_the_caller);
     RUN(what_are_no_pairs_is_refused);
-    RUN(failures_leave_nothing_kept_pairs);
+    RUN(failures_leave_no_kept_pairs);
 }

@@ -9,8 +9,12 @@
 
 void test_overlap(void);
 
-/* Point rows: rows that are given are copied with their own numbers, turned under others, and made
- * of half lists. */
+/*
+ * ---- point rows ----
+ *
+ * Rows that are given are copied with their own numbers, turned under others, and made of half
+ * lists.
+ */
 
 static void
 what_are_no_rows_is_refused(void)
@@ -32,7 +36,7 @@ what_are_no_rows_is_refused(void)
     hs_point_rows_free(NULL, &rows);
 }
 
-/* Overlap: rows are the pattern of the product of matrices. */
+/* ---- rows are the pattern of the product of matrices ---- */
 
 static node_scene scene;
 static bool       gathers[NODE_POINTS][NODE_POINTS], common[NODE_POINTS][NODE_POINTS];
@@ -211,8 +215,12 @@ long_rows_ask_the_caller(void)
     }
 }
 
-/* Intersection: for each pair the common neighbours whose foot, by whole numbers, lies between the
- * ends, and the ends. */
+/*
+ * ---- intersection ----
+ *
+ * For each pair the common neighbours whose foot, by whole numbers, lies between the ends, and the
+ * ends.
+ */
 
 enum { DIM = 2 };
 
@@ -229,7 +237,8 @@ is_between(int32_t k, int32_t i, int32_t j)
     return along >= 0.0 && along <= square;
 }
 
-/* Whether entries from *entry on, one for each list, are those of the pair (i, j). */
+/* Whether offsets and indices from here on, one range for each list, are those of the pair
+ * (i, j). */
 static bool
 entry_is(int32_t i, int32_t j, const int64_t *offsets, const int32_t *indices)
 {
@@ -378,7 +387,7 @@ threads_change_nothing(void)
     hs_pairs_free(alone);
 }
 
-/* Morton: slices never descend, bits come in turns, and points are put in order by them. */
+/* ---- slices never descend, bits come in turns, and points are put in order by them ---- */
 
 static void
 slices_never_descend(void)

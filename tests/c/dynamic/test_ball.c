@@ -10,8 +10,12 @@
 
 void test_ball(void);
 
-/* Ball: what the thresholds call sure is what the exact metric says of the positions as given, for
- * points about as far away as the radius, in any image. */
+/*
+ * ---- ball ----
+ *
+ * What the thresholds call sure is what the exact metric says of the positions as given, for points
+ * about as far away as the radius, in any image.
+ */
 
 /* In skewed boxes rounded coordinates may be wrong by more than the radius, and radius and error
  * together be more than has an ordinary square. */
@@ -111,7 +115,7 @@ emptied_lists_are_as_exact_as_new_ones(void)
     hs_list_free(list);
 }
 
-/* Ball walk: a list does only what its scene needs, as its counters show. */
+/* ---- a list does only what its scene needs, as its counters show ---- */
 
 static hs_dynamic *
 filled(hs_storage storage, const hs_box *box, int ndim)

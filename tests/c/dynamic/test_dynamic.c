@@ -13,7 +13,7 @@
 
 void test_dynamic(void);
 
-/* Cell room: a cell that gets a larger block keeps its entries, and their keys lead there. */
+/* ---- a cell that gets a larger block keeps its entries, and their keys lead there ---- */
 
 /* Five points in one cell of a box, so that positions are kept as given, too. */
 static hs_dynamic *
@@ -67,7 +67,7 @@ refused_room_changes_nothing(void)
     hs_dynamic_free(list);
 }
 
-/* Place point: X and turns of a position are those of wrap.h, wherever it lies. */
+/* ---- X and turns of a position are those of wrap.h, wherever it lies ---- */
 
 static hs_dynamic *
 list_of(const hs_box *box)
@@ -111,7 +111,7 @@ both_axes_may_be_too_far(void)
     hs_list_free(list);
 }
 
-/* New list: copies are lists of their own. */
+/* ---- copies are lists of their own ---- */
 
 static void
 options_are_checked(void)
@@ -137,7 +137,7 @@ options_are_checked(void)
     CHECK(hs_dynamic_new(&bad[6], &list, NULL) == HS_ERR_BOX_SKEWED && list == NULL);
 }
 
-/* Fill: a list that is filled at once is the one that is filled point by point. */
+/* ---- a list that is filled at once is the one that is filled point by point ---- */
 
 enum { N = 211 };
 
@@ -297,7 +297,7 @@ refused_memory_leaves_an_empty_list(void)
     hs_list_free(wide);
 }
 
-/* Update: whatever memory is refused, a call does all or nothing, one point or many. */
+/* ---- whatever memory is refused, a call does all or nothing, one point or many ---- */
 
 enum { ROWS = 24 };
 

@@ -10,8 +10,11 @@
 
 void test_storage(void);
 
-/* Entries: blocks do not overlap, come back by size, and stay where they are while the array
- * grows. */
+/*
+ * ---- entries ----
+ *
+ * Blocks do not overlap, come back by size, and stay where they are while the array grows.
+ */
 
 static void
 more_than_there_are_numbers_for_is_refused(void)
@@ -24,7 +27,7 @@ more_than_there_are_numbers_for_is_refused(void)
     hs_entries_free(&entries);
 }
 
-/* Equal marks: different keys whose hashes have the same 32 bits. */
+/* ---- different keys whose hashes have the same 32 bits ---- */
 
 static int
 compare_marks(const void *one, const void *other)
@@ -59,7 +62,7 @@ each_pair_of_equal_marks(void (*check)(hs_key one, hs_key other))
     }
 }
 
-/* Key map: any history of keys, among them many with equal low bits, against an array. */
+/* ---- any history of keys, among them many with equal low bits, against an array ---- */
 
 static void
 check_apart(hs_key one, hs_key other)
@@ -89,7 +92,7 @@ keys_of_equal_marks_are_told_apart(void)
     each_pair_of_equal_marks(check_apart);
 }
 
-/* Repeated key: keys of any order, of equal hashes, with and without tags. */
+/* ---- keys of any order, of equal hashes, with and without tags ---- */
 
 static void
 ascending_keys_are_not_repeated(void)
@@ -120,8 +123,12 @@ keys_of_equal_marks_are_not_repeated(void)
     each_pair_of_equal_marks(check_not_repeated);
 }
 
-/* Cell axes: the cells of a ball hold every coordinate within it, and gaps are no larger than
- * distances, at any width, radius and distance from the origin. */
+/*
+ * ---- cell axes ----
+ *
+ * The cells of a ball hold every coordinate within it, and gaps are no larger than distances, at
+ * any width, radius and distance from the origin.
+ */
 
 static hs_axes
 axes_of(double length, double cell_size, double radius)
@@ -208,7 +215,7 @@ ends_in_far_images_are_held(void)
     }
 }
 
-/* Cell table: cells are found under their indices, in either kind of table, after any growth. */
+/* ---- cells are found under their indices, in either kind of table, after any growth ---- */
 
 static void
 start(hs_cell_table *table, hs_entries *entries, bool dense)

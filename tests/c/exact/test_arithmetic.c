@@ -7,7 +7,7 @@
 
 void test_arithmetic(void);
 
-/* Doubleword: double-word arithmetic and its error bounds, against exact arithmetic. */
+/* ---- double-word arithmetic and its error bounds, against exact arithmetic ---- */
 
 /* Not HS_FLOAT64_UNIT: what the tests demand must not move with the constants they test. */
 static const double v2 = 0x1p-106;
@@ -249,7 +249,7 @@ unsafe_terms_are_refused(void)
     CHECK(!hs_difference_shifted(&difference, &metric, &zero, &zero, &shift, 1, false));
 }
 
-/* Dyadic: sums, products and comparisons of exact numbers against those of bigint.h. */
+/* ---- sums, products and comparisons of exact numbers against those of bigint.h ---- */
 
 /* Of any float64, zeros and subnormal ones, few bits and many. */
 static double

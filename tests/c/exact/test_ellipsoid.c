@@ -9,8 +9,12 @@
 
 void test_ellipsoid(void);
 
-/* Support: which matrices are positive definite and how far their ellipsoids reach, against
- * leading minors as integers: certain for every float64, and nearly as short as can be. */
+/*
+ * ---- support ----
+ *
+ * Which matrices are positive definite and how far their ellipsoids reach, against leading minors
+ * as integers: certain for every float64, and nearly as short as can be.
+ */
 
 /* Scaled, so that three of them fit bigint.h, of whose unit 2^-1074 they are multiples. */
 static big
@@ -188,8 +192,12 @@ sizes_are_bounds(void)
     CHECK(hs_support_size(2, largest) == HUGE_VAL);
 }
 
-/* Metric support: |H D| against an extent, held against integers: ties, hairs beside them, H D
- * that cancels, any scale. */
+/*
+ * ---- metric support ----
+ *
+ * |H D| against an extent, held against integers: ties, hairs beside them, H D that cancels, any
+ * scale.
+ */
 
 typedef struct scene {
     int     ndim, n_rows;
@@ -316,14 +324,6 @@ ties_of_integers_are_ties(void)
     CHECK(stages.by_float64 > 0 && stages.by_double_word > 0 && stages.by_integers > 0);
 }
 
-static double
-any_size(harness_random *random, int spread)
-{
-    const int    exponent = (int)(random_bits(random) % (uint64_t)(2 * spread + 1)) - spread;
-    const double size = ldexp(1.0 + random_unit(random), exponent);
-    return random_bits(random) % 8 == 0 ? 0.0 : random_bits(random) & 1 ? size : -size;
-}
-
 /* The extent is what H D comes to, or some float64 beside that. */
 static void
 random_ones_are_decided_as_integers_say(void)
@@ -336,12 +336,12 @@ random_ones_are_decided_as_integers_say(void)
         scene     s = {.ndim = 1 + trial % 3, .n_rows = trial / 3 % 2};
         double    square = 0.0;
         for (int k = 0; k < s.ndim; k++) {
-            s.p[k] = any_size(&random, spread);
-            s.q[k] = any_size(&random, spread);
+            s.p[k] = random_size(&random, spread);
+            s.q[k] = random_size(&random, spread);
             s.shift[k] = (int64_t)(random_bits(&random) % 7) - 3;
-            s.rows[0][k] = any_size(&random, spread);
+            s.rows[0][k] = random_size(&random, spread);
             for (int l = 0; l <= k; l++)
-                s.h[hs_support_at(k, l)] = any_size(&random, spread);
+                s.h[hs_support_at(k, l)] = random_size(&random, spread);
         }
         for (int k = 0; k < s.ndim; k++) {
             const big    z = component(&s, k);
@@ -550,7 +550,7 @@ rounded_formulas_are_fixed(void)
     CHECK(wrong == 0 && within > 100);
 }
 
-/* Support along: how wide supports are along a normal, against cofactors as integers. */
+/* ---- how wide supports are along a normal, against cofactors as integers ---- */
 
 static big
 whole(double x)

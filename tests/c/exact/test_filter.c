@@ -11,10 +11,7 @@
 
 void test_filter(void);
 
-/* Filter: the thresholds of the float32 filter's direct form, in float32 and in floating-point
- * systems so small that every number can be tried. */
-
-/* ---- tiny floating-point systems ---- */
+/* ---- the direct form, in floating-point systems so small that every number can be tried ---- */
 
 /* What a kernel computes. */
 static double
@@ -102,7 +99,7 @@ samples_of_tiny_systems_are_judged_right(void)
     CHECK(wrong == 0);
 }
 
-/* ---- float32 ---- */
+/* ---- the direct form in float32 ---- */
 
 static const double u = 0x1p-24;
 
@@ -295,9 +292,10 @@ extreme_cutoffs_round_outwards(void)
 }
 
 /*
- * Limit form: the thresholds that kernels compute of two radii, fleft or not, against those of
- * filter.h for the real sum, the larger or the smaller: they must hold it between them, and not by
- * much.
+ * ---- limit form ----
+ *
+ * The thresholds that kernels compute of two radii, fleft or not, against those of filter.h for the
+ * real sum, the larger or the smaller: they must hold it between them, and not by much.
  */
 
 static const double tiny = 0x1p-126;
@@ -529,7 +527,7 @@ rules_take_their_radii(void)
 }
 
 static void
-nothing_is_sure_without_finite_inputs_limit_form(void)
+no_limit_is_sure_without_finite_inputs(void)
 {
     const double bad[] = {NAN, INFINITY};
     for (int e = 0; e < 4; e++) {
@@ -547,7 +545,7 @@ nothing_is_sure_without_finite_inputs_limit_form(void)
 
 /* A thousandth off the limit everything is sure, or the filter would be of no use. */
 static void
-thresholds_are_narrow_limit_form(void)
+limit_thresholds_are_narrow(void)
 {
     for (int ndim = 1; ndim <= 8; ndim++) {
         const hs_limit_scan limits = {
@@ -560,9 +558,11 @@ thresholds_are_narrow_limit_form(void)
 }
 
 /*
- * Support form: the thresholds of supports in float32, against |N D| in float64, which is exact
- * enough: they hold it between them however entries, coordinates and sums are rounded, and the
- * roundings of one term come near their bound.
+ * ---- support form ----
+ *
+ * The thresholds of supports in float32, against |N D| in float64, which is exact enough: they hold
+ * it between them however entries, coordinates and sums are rounded, and the roundings of one term
+ * come near their bound.
  */
 
 /* A number of float64, and mostly near a power of two, where roundings are largest. */
@@ -713,10 +713,7 @@ nothing_is_sure_of_what_float32_does_not_hold(void)
     CHECK(doubtful.in == 0.0f && doubtful.out > 4.0f);
 }
 
-/* Expanded: the thresholds of the float32 filter's expanded form, in float32 and in floating-point
- * systems so small that every number can be tried. */
-
-/* ---- tiny floating-point systems ---- */
+/* ---- the expanded form, in floating-point systems so small that every number can be tried ---- */
 
 /* How a kernel goes about it. */
 typedef struct manner {
@@ -851,7 +848,7 @@ flushed_terms_are_not_sure(void)
     }
 }
 
-/* ---- float32 ---- */
+/* ---- the expanded form in float32 ---- */
 
 /* A pair for a kernel: true points, the floats, and what the two kinds of kernel make of them. */
 typedef struct pair {
@@ -1105,8 +1102,8 @@ test_filter(void)
     RUN(huge_radii_are_beyond_all);
     RUN(negative_limits_are_of_no_pair);
     RUN(rules_take_their_radii);
-    RUN(nothing_is_sure_without_finite_inputs_limit_form);
-    RUN(thresholds_are_narrow_limit_form);
+    RUN(no_limit_is_sure_without_finite_inputs);
+    RUN(limit_thresholds_are_narrow);
     RUN(thresholds_hold);
     RUN(roundings_of_a_term_come_near_their_bound);
     RUN(roundings_grow_with_the_axes);

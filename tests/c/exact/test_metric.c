@@ -11,7 +11,7 @@
 
 void test_metric(void);
 
-/* Metric decide: the decision, against exact arithmetic that shares no code with it. */
+/* ---- the decision, against exact arithmetic that shares no code with it ---- */
 
 typedef struct scene {
     int     ndim, n_rows;
@@ -427,8 +427,12 @@ double_formula_is_the_fixed_one(void)
     }
 }
 
-/* Metric integer: the last stage alone: signs and differences for every finite number, against
- * integers that share no code with it. */
+/*
+ * ---- metric integer ----
+ *
+ * The last stage alone: signs and differences for every finite number, against integers that share
+ * no code with it.
+ */
 
 static hs_metric
 metric_of(int ndim, int n_rows, const double rows[][8], double cutoff)
@@ -521,26 +525,18 @@ typedef struct vector_case {
     int64_t shift[8];
 } vector_case;
 
-static double
-random_double(harness_random *random, int spread)
-{
-    const int    exponent = (int)(random_bits(random) % (uint64_t)(2 * spread + 1)) - spread;
-    const double size = ldexp(1.0 + random_unit(random), exponent);
-    return random_bits(random) % 8 == 0 ? 0.0 : random_bits(random) & 1 ? size : -size;
-}
-
 static void
 fill_case(harness_random *random, int spread, vector_case *c)
 {
     memset(c, 0, sizeof *c);
     c->ndim = 1 + (int)(random_bits(random) % 8);
     for (int k = 0; k < c->ndim; k++) {
-        c->p[k] = random_double(random, spread);
-        c->q[k] = random_bits(random) % 4 == 0 ? c->p[k] : random_double(random, spread);
+        c->p[k] = random_size(random, spread);
+        c->q[k] = random_bits(random) % 4 == 0 ? c->p[k] : random_size(random, spread);
         c->shift[k] = (int64_t)(random_bits(random) >> random_bits(random) % 64);
         c->shift[k] = random_bits(random) % 3 ? c->shift[k] / 2 : -(c->shift[k] / 2);
         for (int l = 0; l < c->ndim; l++)
-            c->rows[l][k] = random_double(random, spread);
+            c->rows[l][k] = random_size(random, spread);
     }
 }
 
@@ -632,7 +628,7 @@ two_are_compared_with_shifts(void)
     CHECK(wrong == 0 && ties > 100);
 }
 
-/* Metric compare: which of two is nearer, against integers that share no code with it. */
+/* ---- which of two is nearer, against integers that share no code with it ---- */
 
 typedef struct spans {
     int     ndim, n_rows;
@@ -762,8 +758,12 @@ the_first_stage_that_can_tell_which_is_nearer_does(void)
     }
 }
 
-/* Metric hair: differences with components so small that their squares underflow, beside one that
- * is the cutoff or a hair less or more: decided as big integers say. */
+/*
+ * ---- metric hair ----
+ *
+ * Differences with components so small that their squares underflow, beside one that is the cutoff
+ * or a hair less or more: decided as big integers say.
+ */
 
 static int
 true_sign_hair(const double *p, const double *q, double cutoff)
@@ -851,7 +851,7 @@ double_takes_one_comparison(void)
     }
 }
 
-/* Metric measure: distances and vectors to the last place, and never against the decision. */
+/* ---- distances and vectors to the last place, and never against the decision ---- */
 
 typedef struct scene_measure {
     int     ndim, n_rows;
@@ -1011,8 +1011,12 @@ strict_distances_stay_below_the_cutoff(void)
     CHECK(hs_keep_within(hs_metric_measure(&metric, s.p, s.q, NULL, NULL), 1.0, false) < 1.0);
 }
 
-/* Metric sum: limits that are sums of two numbers, held against the real sum as an integer: ties
- * that no float64 could tell, and what is a hair beside them. */
+/*
+ * ---- metric sum ----
+ *
+ * Limits that are sums of two numbers, held against the real sum as an integer: ties that no
+ * float64 could tell, and what is a hair beside them.
+ */
 
 /* Sign of |D|^2 - (a + b)^2. */
 static int
@@ -1166,10 +1170,10 @@ random_case(harness_random *random, int spread, int *signs, hs_stages *stages)
     scene_measure s = {.ndim = 1 + (int)(random_bits(random) % 8)};
     s.n_rows = (int)(random_bits(random) % (uint64_t)(s.ndim + 1));
     for (int k = 0; k < s.ndim; k++) {
-        s.p[k] = random_double(random, spread);
-        s.q[k] = random_double(random, spread);
+        s.p[k] = random_size(random, spread);
+        s.q[k] = random_size(random, spread);
         for (int l = 0; l < s.n_rows; l++)
-            s.rows[l][k] = random_double(random, spread);
+            s.rows[l][k] = random_size(random, spread);
         s.shift[k] = k < s.n_rows ? (int64_t)(random_bits(random) % 7) - 3 : 0;
     }
     const big square = big_square(s.ndim, s.n_rows, (const double(*)[8])s.rows, s.p, s.q, s.shift);
@@ -1228,8 +1232,12 @@ a_cutoff_is_set_and_no_more(void)
         CHECK(memcmp(metric.rows[l], rows[l], 2 * sizeof(double)) == 0);
 }
 
-/* Metric foot: held against whole numbers, at right angles and a hair beside them, and where
- * products leave the range of float64. */
+/*
+ * ---- metric foot ----
+ *
+ * Held against whole numbers, at right angles and a hair beside them, and where products leave the
+ * range of float64.
+ */
 
 /* Sign of (x - p).(q - p). */
 static int

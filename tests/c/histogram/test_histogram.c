@@ -13,8 +13,12 @@
 
 void test_histogram(void);
 
-/* Tally: counts and sums of scenes whose histogram is known: points on a line whose distances are
- * all different, and on a lattice, where every pair is at an edge. */
+/*
+ * ---- tally ----
+ *
+ * Counts and sums of scenes whose histogram is known: points on a line whose distances are all
+ * different, and on a lattice, where every pair is at an edge.
+ */
 
 enum { POINTS = 10, PAIRS = POINTS * (POINTS - 1) / 2, TYPES = 3 };
 
@@ -214,7 +218,7 @@ pairs_of_two_spots_are_all_at_the_edge(void)
     }
 }
 
-/* Edges: slots and ranges of squares are those that the band of each edge says. */
+/* ---- slots and ranges of squares are those that the band of each edge says ---- */
 
 enum { MOST = 3000 };
 
@@ -354,7 +358,7 @@ nothing_is_below_zero(void)
     hs_edge_table_free(&table);
 }
 
-/* Weights: sums of products are exact until they are rounded once, whoever adds them. */
+/* ---- sums of products are exact until they are rounded once, whoever adds them ---- */
 
 enum { N_WEIGHTS = 40 };
 

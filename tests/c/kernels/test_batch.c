@@ -53,12 +53,6 @@ batch_of(const scene *s)
     return batch;
 }
 
-static bool
-same_bits(double a, double b)
-{
-    return memcmp(&a, &b, sizeof a) == 0;
-}
-
 /* Verdicts and stages of one kernel, with what settles the rest. Adds the pairs that it left to
  * that to *n_open. */
 static void
@@ -269,7 +263,8 @@ nearest_ties_are_judged_alike(void)
     }
 }
 
-/* Pairs that only what a sum has lost tells from ties; test_exact.c says how they are made. */
+/* Pairs that only what a sum has lost tells from ties; exact/test_metric.c,
+ * ties_of_full_width_are_told_from_near_ties, says how they are made. */
 static void
 what_sums_lose_is_noticed_in_every_lane(void)
 {

@@ -12,20 +12,11 @@
 
 void test_levels(void);
 
-/* Support set: supports as they are read: the lower triangle, a size, how far each reaches. */
+/* ---- supports as they are read: the lower triangle, a size, how far each reaches ---- */
 
 enum { N = 5 };
 
-static double matrices[N * 9], reaches_support_set[N];
-
-static hs_account
-new_account(void)
-{
-    const hs_options options = hs_options_default();
-    hs_account       account;
-    hs_account_init(&account, &options);
-    return account;
-}
+static double matrices[N * 9], support_reaches[N];
 
 /* Diagonal 1, 2, 4 and beside it 0.25, for each point a power of two of that. */
 static void
@@ -44,7 +35,7 @@ is_refused(hs_status status, int64_t row, double value)
     hs_account       account = new_account();
     hs_failure       failure = {.row = -1};
     hs_support_set   set;
-    CHECK(hs_support_set_read(&account, &options, matrices, N, 3, 1.0, &set, reaches_support_set,
+    CHECK(hs_support_set_read(&account, &options, matrices, N, 3, 1.0, &set, support_reaches,
                               &failure) == status);
     CHECK(failure.row == row && set.numbers == NULL && account.held == 0);
     CHECK(failure.value == value || (isnan(failure.value) && isnan(value)));
@@ -76,7 +67,7 @@ the_first_that_is_wrong_is_named(void)
     is_refused(HS_ERR_SUPPORT_REACH, 4, 1.0); /* the extent */
 }
 
-/* Levels: each point is in one level, in the caller's order there, and levels ascend. */
+/* ---- each point is in one level, in the caller's order there, and levels ascend ---- */
 
 static void
 close_account(hs_account *account)
@@ -133,7 +124,7 @@ a_division_can_be_stopped(void)
     }
 }
 
-/* Plan checks: plans of levels, and whether every pair of points is in one step of theirs. */
+/* ---- plans of levels, and whether every pair of points is in one step of theirs ---- */
 
 static reach_set points, queries;
 static double    table[12 * 12]; /* of up to 12 types */
@@ -296,8 +287,12 @@ covers_each_once(const planned *made)
     return right;
 }
 
-/* Level plan: whatever the rule and the radii, each pair of points is in exactly one step, whose
- * cutoff is no less than its limit. */
+/*
+ * ---- level plan ----
+ *
+ * Whatever the rule and the radii, each pair of points is in exactly one step, whose cutoff is no
+ * less than its limit.
+ */
 
 /* So do sums of which the largest alone is no float64. */
 static void
@@ -384,8 +379,12 @@ a_level_of_two_is_not_all(void)
     }
 }
 
-/* Level join: few common sizes are searched at once, rare large points and dense neighbourhoods of
- * small ones are not. */
+/*
+ * ---- level join ----
+ *
+ * Few common sizes are searched at once, rare large points and dense neighbourhoods of small ones
+ * are not.
+ */
 
 static void
 choose_plan(const hs_box *box, planned *made)
@@ -508,20 +507,24 @@ it_can_be_stopped(void)
     }
 }
 
-/* Level search: one step of a plan as an open search: its points have the caller's numbers, and
- * radii lie in the order of the cells. */
+/*
+ * ---- level search ----
+ *
+ * One step of a plan as an open search: its points have the caller's numbers, and radii lie in the
+ * order of the cells.
+ */
 
 /* A plan and the call that its steps are opened for. */
-typedef struct planned_level_search {
+typedef struct opened_plan {
     hs_call       call;
     hs_levels     levels;
     hs_level_plan plan;
     const hs_box *box;
-} planned_level_search;
+} opened_plan;
 
 static void
-make_plan_level_search(const hs_reach *reach, bool has_queries, double bound, const hs_box *box,
-                       planned_level_search *made)
+open_plan(const hs_reach *reach, bool has_queries, double bound, const hs_box *box,
+          opened_plan *made)
 {
     hs_options      options = hs_options_default();
     const hs_points p = reach_points(&points), q = reach_points(&queries);
@@ -537,7 +540,7 @@ make_plan_level_search(const hs_reach *reach, bool has_queries, double bound, co
 }
 
 static void
-free_plan_level_search(planned_level_search *made)
+close_plan(opened_plan *made)
 {
     hs_level_plan_free(&made->call.account, &made->plan);
     hs_levels_free(&made->call.account, &made->levels);
@@ -547,7 +550,7 @@ free_plan_level_search(planned_level_search *made)
 }
 
 static hs_status
-open_step(planned_level_search *made, int64_t step, hs_level_search *open, hs_failure *failure)
+open_step(opened_plan *made, int64_t step, hs_level_search *open, hs_failure *failure)
 {
     *failure = HS_NO_FAILURE;
     return hs_level_open(&made->levels, &made->plan, step, made->box, false, &made->call, open,
@@ -564,12 +567,12 @@ failures_name_the_callers_row(void)
         for (int has_queries = in_queries; has_queries < 2; has_queries++) {
             const hs_reach reach = {
                 .rule = HS_RULE_GATHER, .radii = points.radii, .query_radii = queries.radii};
-            planned_level_search made;
-            int                  n_failed = 0;
+            opened_plan made;
+            int         n_failed = 0;
             reach_fill(&random, 60, 1, 1.0, 2, 0.25, &points);
             reach_fill(&random, 50, 1, 1.0, 2, 0.25, &queries);
             *(in_queries ? &queries.x[31] : &points.x[31]) = 1e300;
-            make_plan_level_search(&reach, has_queries, HUGE_VAL, &box, &made);
+            open_plan(&reach, has_queries, HUGE_VAL, &box, &made);
             made.call.options.precision = HS_DOUBLE;
             for (int64_t s = 0; s < made.plan.n; s++) {
                 hs_level_search open;
@@ -584,7 +587,7 @@ failures_name_the_callers_row(void)
                 n_failed++;
             }
             CHECK(n_failed > 0);
-            free_plan_level_search(&made);
+            close_plan(&made);
         }
     }
 }

@@ -5,17 +5,9 @@
 #include "../support/address_space.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
+#include "../support/poll_checks.h"
 
 void test_memory(void);
-
-static hs_account
-new_account(void)
-{
-    const hs_options options = hs_options_default();
-    hs_account       account;
-    hs_account_init(&account, &options);
-    return account;
-}
 
 static void
 impossible_sizes_are_refused(void)

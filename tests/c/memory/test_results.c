@@ -24,7 +24,7 @@
 
 void test_results(void);
 
-/* Pool checks: results that come from the pool and go back to it. */
+/* ---- results that come from the pool and go back to it ---- */
 
 #define MB ((size_t)1 << 20)
 
@@ -55,7 +55,7 @@ reset_pool(void)
     hs_pool_set_limit(HS_POOL_LIMIT);
 }
 
-/* Pool: memory comes back, within the limit, from many threads. */
+/* ---- memory comes back, within the limit, from many threads ---- */
 
 #if !HS_WATCHED_MALLOC
 static void
@@ -157,8 +157,12 @@ many_threads(void)
 
 #endif
 
-/* Pool lock: where the lock of the pool is taken, memory comes from the system; a child that is
- * forked off meanwhile begins with an empty pool. */
+/*
+ * ---- pool lock ----
+ *
+ * Where the lock of the pool is taken, memory comes from the system; a child that is forked off
+ * meanwhile begins with an empty pool.
+ */
 
 #if !HS_WATCHED_MALLOC
 static void
@@ -245,7 +249,7 @@ fork_in_the_middle(void)
 
 #endif
 
-/* Pages: blocks from the system, and what is left of them when the system refuses. */
+/* ---- blocks from the system, and what is left of them when the system refuses ---- */
 
 #if !defined(HS_EMULATED) && CAN_LIMIT_ADDRESSES
 #define TOO_MUCH ((size_t)1 << 61)
@@ -406,7 +410,7 @@ chunks_that_cannot_grow_stay(void)
 
 #endif
 
-/* Region: regions keep their contents, cost what is written to them, and give the rest back. */
+/* ---- regions keep their contents, cost what is written to them, and give the rest back ---- */
 
 #if !defined(HS_EMULATED)
 #define GB ((size_t)1 << 30)
@@ -544,7 +548,7 @@ failures_lose_nothing(void)
 
 #endif
 
-/* Chunk: memory from malloc in the pool, and columns that grow where little is left. */
+/* ---- memory from malloc in the pool, and columns that grow where little is left ---- */
 
 #if !defined(HS_EMULATED) && !HS_WATCHED_MALLOC
 /* A chunk as hs_chunk_new makes it where there are no pages. */

@@ -6,8 +6,12 @@
 
 void test_candidates(void);
 
-/* Nearest images: each image that can be near a group is met once, and whatever is within the
- * radius lies in one of them. */
+/*
+ * ---- nearest images ----
+ *
+ * Each image that can be near a group is met once, and whatever is within the radius lies in one of
+ * them.
+ */
 
 static nearest_unit unit;
 
@@ -94,8 +98,12 @@ layers_are_upright(void)
     nearest_unit_close(&unit);
 }
 
-/* Nearest leaves: leaves that groups share are all that any of them may need, each group is given
- * those within its radius, and where a list would save nothing there is none. */
+/*
+ * ---- nearest leaves ----
+ *
+ * Leaves that groups share are all that any of them may need, each group is given those within its
+ * radius, and where a list would save nothing there is none.
+ */
 
 enum { MOST = 24000, GROUP = 16 };
 static hs_nearest_leaves leaves;
@@ -172,8 +180,12 @@ where_nothing_is_saved_there_is_no_list(void)
     close_points();
 }
 
-/* Nearest block: what a group may be near to is gathered whole, whether it comes from leaves that
- * groups share or from a walk down the tree, and what cannot be gathered is told. */
+/*
+ * ---- nearest block ----
+ *
+ * What a group may be near to is gathered whole, whether it comes from leaves that groups share or
+ * from a walk down the tree, and what cannot be gathered is told.
+ */
 
 enum { N = 400, GROUP_BLOCK = 16 };
 static hs_nearest_block block;

@@ -21,8 +21,11 @@
 
 void test_nearest(void);
 
-/* Nearest kept: one of those that come at once builds the tree that is kept, the others do with
- * one of their own. */
+/*
+ * ---- nearest kept ----
+ *
+ * One of those that come at once builds the tree that is kept, the others do with one of their own.
+ */
 
 static nearest_unit unit;
 
@@ -160,8 +163,12 @@ radii_are_found_far_from_a_guess(void)
     check_two_points((const double[2]){0x1p500, 0x1.fp470});
 }
 
-/* Nearest search: rows of nearest points are right where groups, ranges of them, images and ties
- * are at their limits, and refused beyond these. */
+/*
+ * ---- nearest search ----
+ *
+ * Rows of nearest points are right where groups, ranges of them, images and ties are at their
+ * limits, and refused beyond these.
+ */
 
 /* Points that one box vector apart are the same in X, and are not as given. */
 static void
@@ -323,8 +330,12 @@ long_boxes_have_many_images(void)
     }
 }
 
-/* Nearest stops: long searches for nearest points can be stopped wherever they ask whether to go
- * on, and fail wherever memory ends, with nothing left. */
+/*
+ * ---- nearest stops ----
+ *
+ * Long searches for nearest points can be stopped wherever they ask whether to go on, and fail
+ * wherever memory ends, with nothing left.
+ */
 
 /* Rows of a search that may be asked so often whether it goes on. */
 static hs_status
@@ -424,8 +435,12 @@ many_images_can_be_stopped(void)
     CHECK(stop_everywhere(&scene, &query, 3, 3) >= 1);
 }
 
-/* Nearest radius: a first radius holds about as many points as are wanted, by the density of what
- * is around a group, of its line or plane, or of the box. */
+/*
+ * ---- nearest radius ----
+ *
+ * A first radius holds about as many points as are wanted, by the density of what is around a
+ * group, of its line or plane, or of the box.
+ */
 
 enum { MOST = 4000 };
 static double x_radius[3 * MOST];
@@ -461,7 +476,7 @@ layers_are_as_thick_as_their_points(void)
     nearest_unit_close(&unit);
 }
 
-/* Nearest bound: the search for a radius that surely suffices ends when it is told to. */
+/* ---- the search for a radius that surely suffices ends when it is told to ---- */
 
 enum { N_BOUND = 6000, QUERIES = 400, K_BOUND = 10 };
 

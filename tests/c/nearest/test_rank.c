@@ -10,8 +10,12 @@
 
 void test_rank(void);
 
-/* Nearest rank: hits are put in exact order however much their squares err, as long as the block
- * tells how much, and nothing is called the nearest that a radius may have left out. */
+/*
+ * ---- nearest rank ----
+ *
+ * Hits are put in exact order however much their squares err, as long as the block tells how much,
+ * and nothing is called the nearest that a radius may have left out.
+ */
 
 enum { N = 300 };
 
@@ -19,7 +23,7 @@ static nearest_unit      unit;
 static hs_nearest_block  block;
 static hs_nearest_ranker ranker;
 static hs_nearest_group  group;
-static hs_options        options_nearest_rank;
+static hs_options        rank_options;
 static int32_t           hits[2 * N];
 
 static void
@@ -31,9 +35,9 @@ open_scene(const double *x, int64_t n, int d, const hs_box *box, int64_t k, doub
     group = nearest_unit_group(&unit, radius);
     CHECK(hs_nearest_block_fill(&unit.near, &unit.call.options, &group, 1e9, NULL, &block) ==
           HS_OK);
-    options_nearest_rank = hs_options_default();
+    rank_options = hs_options_default();
     ranker = (hs_nearest_ranker){
-        .near = &unit.near, .block = &block, .pace = {.options = &options_nearest_rank}};
+        .near = &unit.near, .block = &block, .pace = {.options = &rank_options}};
     for (int32_t h = 0; h < block.n && h < 2 * N; h++)
         hits[h] = h;
 }
@@ -142,11 +146,11 @@ ranking_can_be_stopped_anywhere(void)
     CHECK(unit.search.bins.order[block.number[ranker.keys[0].place]] == 1);
     const int64_t n_steps = ranker.pace.steps;
     CHECK(n_steps > 3 * N && ranker.n_compared >= N - 2);
-    options_nearest_rank.poll = stop;
-    options_nearest_rank.poll_context = &asked;
+    rank_options.poll = stop;
+    rank_options.poll_context = &asked;
     for (int64_t ahead = 1; ahead <= n_steps + 20; ahead += 20) {
-        ranker.pace = (hs_nearest_pace){.options = &options_nearest_rank,
-                                        .steps = HS_NEAREST_POLL_STEPS - ahead};
+        ranker.pace =
+            (hs_nearest_pace){.options = &rank_options, .steps = HS_NEAREST_POLL_STEPS - ahead};
         const hs_status status = hs_nearest_rank(&ranker, &group, place_of(0), hits, N, &count);
         CHECK(status == (ahead <= n_steps ? HS_ERR_INTERRUPTED : HS_OK));
         n_stopped += status != HS_OK;
@@ -156,8 +160,10 @@ ranking_can_be_stopped_anywhere(void)
 }
 
 /*
- * Nearest write: the columns of nearest points: each alone has the bits that it has beside all
- * others, in either width of index, whether shifts are those of images or of points as given.
+ * ---- nearest write ----
+ *
+ * The columns of nearest points: each alone has the bits that it has beside all others, in either
+ * width of index, whether shifts are those of images or of points as given.
  */
 
 /* Whether an int32 column holds the numbers of an int64 one. */
@@ -172,7 +178,7 @@ same_numbers(const int32_t *narrow, const int64_t *wide, int64_t n)
 }
 
 static bool
-same_bits(const hs_pairs *one, const hs_pairs *all, unsigned which, size_t width)
+same_column(const hs_pairs *one, const hs_pairs *all, unsigned which, size_t width)
 {
     return hs_pairs_array(one, which) == NULL || same_array(one, all, which, width);
 }
@@ -202,9 +208,9 @@ check_columns(const brute_scene *scene, const hs_points *queries, int64_t k, dou
         CHECK(hs_nearest_find(QUERIED(&points, queries, scene->box), k, &options, &one, NULL) ==
               HS_OK);
         CHECK(hs_pairs_length(one) == hs_pairs_length(all));
-        CHECK(same_bits(one, all, HS_WANT_DISTANCE, 8));
-        CHECK(same_bits(one, all, HS_WANT_VECTOR, 8 * d));
-        CHECK(same_bits(one, all, HS_WANT_SHIFT, 4 * d));
+        CHECK(same_column(one, all, HS_WANT_DISTANCE, 8));
+        CHECK(same_column(one, all, HS_WANT_VECTOR, 8 * d));
+        CHECK(same_column(one, all, HS_WANT_SHIFT, 4 * d));
         if (options.want & HS_WANT_J) {
             const void *j = hs_pairs_array(one, HS_WANT_J);
             CHECK(c < 7 ? same_array(one, all, HS_WANT_J, 8)

@@ -12,8 +12,12 @@
 
 void test_tree(void);
 
-/* Tree build: the tree of nearest points, for points that samples do not show as they lie, so that
- * nodes are many. */
+/*
+ * ---- tree build ----
+ *
+ * The tree of nearest points, for points that samples do not show as they lie, so that nodes are
+ * many.
+ */
 
 /*
  * Points that samples see least of: many are 0, the others each twice as far as the last, in an
@@ -88,8 +92,11 @@ neighbouring_numbers_are_told_apart(void)
     }
 }
 
-/* Tree nodes: nodes of a tree part their points, within exact bounds, and it is not much deeper
- * than need be. */
+/*
+ * ---- tree nodes ----
+ *
+ * Nodes of a tree part their points, within exact bounds, and it is not much deeper than need be.
+ */
 
 static nearest_unit unit;
 

@@ -7,8 +7,12 @@
 
 void test_far(void);
 
-/* Far: coordinates, boxes and cutoffs from the smallest to the largest numbers in one scene: every
- * search gives the number of pairs that the half list has, or refuses. */
+/*
+ * ---- far ----
+ *
+ * Coordinates, boxes and cutoffs from the smallest to the largest numbers in one scene: every
+ * search gives the number of pairs that the half list has, or refuses.
+ */
 
 enum { N_FAR = 7 };
 
@@ -204,8 +208,12 @@ subnormal_numbers_in_a_long_box(void)
     CHECK(hs_pairs_count(AMONG(&two, &box), &options, &half, NULL) == HS_OK && half == 4);
 }
 
-/* Far open: points that are so far away, in the unit of the box, that its vectors are less than
- * their last digits: along open axes, and along those that repeat. */
+/*
+ * ---- far open ----
+ *
+ * Points that are so far away, in the unit of the box, that its vectors are less than their last
+ * digits: along open axes, and along those that repeat.
+ */
 
 /* Queries of kept cells find what those of a new search find. */
 static void

@@ -16,7 +16,7 @@
 
 void test_scene(void);
 
-/* Scene: what a scene keeps of its points, what it refuses, and that nothing is left then. */
+/* ---- what a scene keeps of its points, what it refuses, and that nothing is left then ---- */
 
 enum { N_POINTS = 5 };
 
@@ -100,8 +100,12 @@ errors_are_bounded_and_small(void)
     finish();
 }
 
-/* Scene queries: points and queries get one scale and bounds that hold for both, also where
- * queries come later: which of these a scene that was kept takes, step by step. */
+/*
+ * ---- scene queries ----
+ *
+ * Points and queries get one scale and bounds that hold for both, also where queries come later:
+ * which of these a scene that was kept takes, step by step.
+ */
 
 static hs_scene kept;
 
@@ -268,8 +272,11 @@ queries_that_fit_are_taken(void)
     CHECK(!hs_scene_takes(&scene, &cloud));
 }
 
-/* Scene scale: whether gaps are closed, which cutoff and scale a scene goes by, and why some boxes
- * have none. */
+/*
+ * ---- scene scale ----
+ *
+ * Whether gaps are closed, which cutoff and scale a scene goes by, and why some boxes have none.
+ */
 
 /* Boxes that vanish beside the cutoff have no scale, but where that has images without end. */
 static void
@@ -302,7 +309,7 @@ endless_images_are_refused_for_their_number(void)
     CHECK(!hs_scene_box_vanishes(&scene));
 }
 
-/* Scene bounds: how far what is computed with may be from the numbers that were given. */
+/* ---- how far what is computed with may be from the numbers that were given ---- */
 
 /* Two dimensions, the first of them periodic with a period of 4. */
 static void
@@ -389,8 +396,12 @@ scenes_are_narrowed_by_what_is_sure(void)
     CHECK(hs_scene_narrow(&scene, &narrowing) == HS_ERR_INTERRUPTED);
 }
 
-/* Scene wrap: points are wrapped axis by axis where that will do, their turns counted, and those
- * that are too far away wrapped before they are scaled. */
+/*
+ * ---- scene wrap ----
+ *
+ * Points are wrapped axis by axis where that will do, their turns counted, and those that are too
+ * far away wrapped before they are scaled.
+ */
 
 /* Numbers that overflow when they are scaled, on columns of which the lattice knows the period
  * though rows have several entries there; and on one that nothing repeats. */
@@ -459,7 +470,7 @@ originals_too_far_to_count_are_wrapped(void)
     CHECK(x[0] == 0.0);
 }
 
-/* Unit: the power of two that a scene is scaled by, and how far far is. */
+/* ---- the power of two that a scene is scaled by, and how far far is ---- */
 
 /* Points from low to high along each axis; `x` is theirs. */
 static hs_cloud
@@ -498,8 +509,12 @@ cutoffs_beyond_everything_become_smaller(void)
     CHECK(hs_enough_cutoff(&cloud, &none, DBL_MAX) == DBL_MAX);
 }
 
-/* Snapshot: the copy of one step's points: every type and layout, the first number that is not
- * finite, and which frames a list can go from to which. */
+/*
+ * ---- snapshot ----
+ *
+ * The copy of one step's points: every type and layout, the first number that is not finite, and
+ * which frames a list can go from to which.
+ */
 
 static hs_status
 take(const hs_points *points, hs_frame *frame, hs_failure *failure)
@@ -643,7 +658,7 @@ frames_match_or_do_not(void)
     hs_frame_free(&frame);
 }
 
-/* Gaps failures: while far points are drawn together, allocations may fail and polls may say no. */
+/* ---- while far points are drawn together, allocations may fail and polls may say no ---- */
 
 enum { FAR = HS_POLL_POINTS + 1000 };
 

@@ -8,17 +8,21 @@
 
 void test_choice(void);
 
-/* Choice: choices of many: crowds that are looked at in parts, points far from the box and in
- * extreme units, many partners of one point. */
+/*
+ * ---- choice ----
+ *
+ * Choices of many: crowds that are looked at in parts, points far from the box and in extreme
+ * units, many partners of one point.
+ */
 
 enum { CROWD = 300 };
 
-static double        x_choice[CROWD];
-static int64_t       labels_choice[CROWD], excluded_choice[2 * CROWD];
+static double        crowd_x[CROWD];
+static int64_t       crowd_labels[CROWD], excluded_choice[2 * CROWD];
 static const hs_box  line = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
-static hs_points     points_choice = {x_choice, CROWD, 1, HS_FLOAT64, 8, 8};
-static hs_selection  selection_choice;
-static hs_options    options_choice;
+static hs_points     crowd_points = {crowd_x, CROWD, 1, HS_FLOAT64, 8, 8};
+static hs_selection  crowd_selection;
+static hs_options    crowd_options;
 static const int64_t PAIRS = (int64_t)CROWD * (CROWD - 1) / 2;
 
 /* All points at one place, some box vectors away or not; pairs at 0 and at 1, 1 of the image. */
@@ -26,25 +30,25 @@ static void
 make_crowd(double away)
 {
     for (int i = 0; i < CROWD; i++) {
-        x_choice[i] = away * (i % 3);
-        labels_choice[i] = 7;
+        crowd_x[i] = away * (i % 3);
+        crowd_labels[i] = 7;
     }
-    selection_choice = (hs_selection){.min_distance = 0.0};
-    options_choice = hs_options_default();
-    options_choice.cutoff = 1.5;
+    crowd_selection = (hs_selection){.min_distance = 0.0};
+    crowd_options = hs_options_default();
+    crowd_options.cutoff = 1.5;
 }
 
 static int64_t
 count(const hs_box *box)
 {
-    const hs_among among = {.points = &points_choice, .box = box, .selection = &selection_choice};
+    const hs_among among = {.points = &crowd_points, .box = box, .selection = &crowd_selection};
     const unsigned wants[] = {HS_WANT_I, HS_WANT_DISTANCE | HS_WANT_J};
     int64_t        counted = -1;
-    CHECK(hs_pairs_count(&among, &options_choice, &counted, NULL) == HS_OK);
+    CHECK(hs_pairs_count(&among, &crowd_options, &counted, NULL) == HS_OK);
     for (int w = 0; w < 2; w++) {
         hs_pairs *pairs = NULL;
-        options_choice.want = wants[w];
-        CHECK(hs_pairs_find(&among, &options_choice, &pairs, NULL) == HS_OK);
+        crowd_options.want = wants[w];
+        CHECK(hs_pairs_find(&among, &crowd_options, &pairs, NULL) == HS_OK);
         CHECK(hs_pairs_length(pairs) == counted);
         hs_pairs_free(pairs);
     }
@@ -54,9 +58,9 @@ count(const hs_box *box)
 static int64_t
 count_rows(const hs_box *box)
 {
-    const hs_among among = {.points = &points_choice, .box = box, .selection = &selection_choice};
+    const hs_among among = {.points = &crowd_points, .box = box, .selection = &crowd_selection};
     int64_t        counted[CROWD], all = 0;
-    CHECK(hs_neighbors_count(&among, &options_choice, counted, NULL) == HS_OK);
+    CHECK(hs_neighbors_count(&among, &crowd_options, counted, NULL) == HS_OK);
     for (int i = 0; i < CROWD; i++)
         all += counted[i];
     return all;
@@ -67,13 +71,13 @@ one_point_may_have_many_partners(void)
 {
     for (int few = 0; few < 2; few++) {
         make_crowd(0.0);
-        selection_choice.excluded = excluded_choice;
+        crowd_selection.excluded = excluded_choice;
         for (int i = 1; i < CROWD; i++) {
             const int64_t at = few ? i / 64 * 64 : i; /* others have their last bits */
             excluded_choice[2 * i - 2] = i % 2 ? 0 : at;
             excluded_choice[2 * i - 1] = i % 2 ? at : 0;
         }
-        selection_choice.n_excluded = CROWD - 1;
+        crowd_selection.n_excluded = CROWD - 1;
         CHECK(count(NULL) == PAIRS - (few ? CROWD / 64 : CROWD - 1));
         CHECK(count(&line) == 3 * PAIRS + CROWD - (few ? CROWD / 64 : CROWD - 1));
     }
@@ -84,16 +88,16 @@ static void
 numbers_may_be_far_apart(void)
 {
     make_crowd(0.0);
-    const hs_points three = {x_choice, 3, 1, HS_FLOAT64, 8, 8}, all = points_choice;
-    points_choice = three;
-    x_choice[1] = 0x1p-1074;
-    x_choice[2] = 0x1p1000;
-    options_choice.cutoff = 0x1p1001;
-    selection_choice.min_distance = 0x1p-1074;
+    const hs_points three = {crowd_x, 3, 1, HS_FLOAT64, 8, 8}, all = crowd_points;
+    crowd_points = three;
+    crowd_x[1] = 0x1p-1074;
+    crowd_x[2] = 0x1p1000;
+    crowd_options.cutoff = 0x1p1001;
+    crowd_selection.min_distance = 0x1p-1074;
     CHECK(count(NULL) == 3);
-    selection_choice.min_distance = 0x1p-1073;
+    crowd_selection.min_distance = 0x1p-1073;
     CHECK(count(NULL) == 2);
-    points_choice = all;
+    crowd_points = all;
 }
 
 /* Numbers of queries say nothing where there are none. */
@@ -101,8 +105,8 @@ static void
 numbers_go_with_queries(void)
 {
     make_crowd(0.0);
-    selection_choice.query_numbers = labels_choice;
-    selection_choice.groups = labels_choice;
+    crowd_selection.query_numbers = crowd_labels;
+    crowd_selection.groups = crowd_labels;
     CHECK(count(&line) == 3 * PAIRS + CROWD);
 }
 
@@ -111,8 +115,8 @@ static void
 single_precision_chooses_as_well(void)
 {
     make_crowd(0.0);
-    selection_choice.labels = labels_choice;
-    options_choice.precision = HS_SINGLE;
+    crowd_selection.labels = crowd_labels;
+    crowd_options.precision = HS_SINGLE;
     CHECK(count(&line) == 2 * PAIRS + CROWD && count_rows(&line) == 2 * (2 * PAIRS + CROWD));
 }
 
@@ -123,19 +127,19 @@ systems_choose_as_well(void)
     static int64_t counted[CROWD];
     int64_t        first[] = {0, 100, CROWD}, counts[2];
     make_crowd(0.0);
-    hs_systems systems = {.n = 2, .first = first, .selection = &selection_choice};
-    selection_choice.labels = labels_choice;
-    CHECK(hs_systems_count(&points_choice, &systems, &options_choice, counts, NULL) == HS_OK);
+    hs_systems systems = {.n = 2, .first = first, .selection = &crowd_selection};
+    crowd_selection.labels = crowd_labels;
+    CHECK(hs_systems_count(&crowd_points, &systems, &crowd_options, counts, NULL) == HS_OK);
     CHECK(counts[0] == 0 && counts[1] == 0);
-    selection_choice.labels = NULL;
-    selection_choice.min_distance = 1.0;
-    CHECK(hs_systems_count(&points_choice, &systems, &options_choice, counts, NULL) == HS_OK);
+    crowd_selection.labels = NULL;
+    crowd_selection.min_distance = 1.0;
+    CHECK(hs_systems_count(&crowd_points, &systems, &crowd_options, counts, NULL) == HS_OK);
     CHECK(counts[0] == 0 && counts[1] == 0);
     systems.box = &line;
-    CHECK(hs_systems_count(&points_choice, &systems, &options_choice, counts, NULL) == HS_OK);
+    CHECK(hs_systems_count(&crowd_points, &systems, &crowd_options, counts, NULL) == HS_OK);
     CHECK(counts[0] == 99 * 100 + 100 && counts[1] == 199 * 200 + 200);
-    selection_choice.min_distance = -1.0;
-    CHECK(hs_systems_coordination(&points_choice, NULL, &systems, &options_choice, counted, NULL) ==
+    crowd_selection.min_distance = -1.0;
+    CHECK(hs_systems_coordination(&crowd_points, NULL, &systems, &crowd_options, counted, NULL) ==
           HS_ERR_ARGUMENT);
 }
 
@@ -146,22 +150,22 @@ numbers_of_queries_hold_in_systems(void)
     static int64_t numbers[CROWD], counted[CROWD];
     const int64_t  first[] = {0, 100, CROWD}, first_query[] = {0, 1, 2};
     make_crowd(0.0);
-    hs_points queries = points_choice;
+    hs_points queries = crowd_points;
     queries.n = 2;
     numbers[0] = 5;
     numbers[1] = 100;
-    selection_choice.query_numbers = numbers;
-    selection_choice.labels = labels_choice;
+    crowd_selection.query_numbers = numbers;
+    crowd_selection.labels = crowd_labels;
     const hs_systems systems = {.n = 2,
                                 .first = first,
                                 .box = &line,
-                                .selection = &selection_choice,
+                                .selection = &crowd_selection,
                                 .first_query = first_query};
-    CHECK(hs_systems_coordination(&points_choice, &queries, &systems, &options_choice, counted,
+    CHECK(hs_systems_coordination(&crowd_points, &queries, &systems, &crowd_options, counted,
                                   NULL) == HS_OK);
     CHECK(counted[0] == 2 * 99 + 3 && counted[1] == 2 * 199 + 3); /* itself at S = 0 too */
     numbers[1] = CROWD;
-    CHECK(hs_systems_coordination(&points_choice, &queries, &systems, &options_choice, counted,
+    CHECK(hs_systems_coordination(&crowd_points, &queries, &systems, &crowd_options, counted,
                                   NULL) == HS_ERR_ARGUMENT);
 }
 
@@ -174,16 +178,20 @@ a_bad_box_of_a_system_is_told(void)
     int64_t             counts[2];
     hs_failure          failure;
     make_crowd(0.0);
-    selection_choice.labels = labels_choice;
+    crowd_selection.labels = crowd_labels;
     const hs_systems systems = {
-        .n = 2, .first = first, .box = &line, .rows = rows, .selection = &selection_choice};
-    CHECK(hs_systems_count(&points_choice, &systems, &options_choice, counts, &failure) ==
+        .n = 2, .first = first, .box = &line, .rows = rows, .selection = &crowd_selection};
+    CHECK(hs_systems_count(&crowd_points, &systems, &crowd_options, counts, &failure) ==
           HS_ERR_BOX_DEPENDENT);
     CHECK(failure.system == 1 && failure.row == 0);
 }
 
-/* Choose: lattice points in boxes of whole numbers, where every distance is exact: what each
- * public search leaves out is what integers say. */
+/*
+ * ---- choose ----
+ *
+ * Lattice points in boxes of whole numbers, where every distance is exact: what each public search
+ * leaves out is what integers say.
+ */
 
 enum { MOST = 60, MOST_EXCLUDED = 150, WINDOW = 4 };
 
@@ -713,8 +721,10 @@ bad_selections_are_refused(void)
 }
 
 /*
- * Choose far: excluded pairs of points that are many periods apart, in a box so skewed that S over
- * its vectors is far larger still: what S says does not depend on that, until it does not fit.
+ * ---- choose far ----
+ *
+ * Excluded pairs of points that are many periods apart, in a box so skewed that S over its vectors
+ * is far larger still: what S says does not depend on that, until it does not fit.
  */
 
 enum { N = 300 }; /* more than are looked up together */
@@ -722,27 +732,27 @@ enum { N = 300 }; /* more than are looked up together */
 #define SIDE 8.0
 #define TILT 0x1p20 /* S is so many times the number of periods */
 
-static const hs_box box_choose_far = {
+static const hs_box far_box = {
     .ndim = 2, .periodic = {true, true}, .rows = {{SIDE}, {SIDE * TILT, SIDE}}};
 
-static double  x_choose_far[2 * N];
-static int64_t labels_choose_far[N];
+static double  far_x[2 * N];
+static int64_t far_labels[N];
 
 /* Points on a fine lattice, all with one label. */
 static void
-make_points_choose_far(void)
+make_far_points(void)
 {
     harness_random random = {86};
     for (int e = 0; e < 2 * N; e++)
-        x_choose_far[e] = (double)(random_bits(&random) % 128) / 16.0;
-    memset(labels_choose_far, 0, sizeof labels_choose_far);
+        far_x[e] = (double)(random_bits(&random) % 128) / 16.0;
+    memset(far_labels, 0, sizeof far_labels);
 }
 
 /* Moves a point by a vector of the lattice along the second axis: that is exact. */
 static void
 move(int point, double periods)
 {
-    x_choose_far[2 * point + 1] += SIDE * periods;
+    far_x[2 * point + 1] += SIDE * periods;
 }
 
 /* Pairs whose labels differ, and images other than the nearest of those whose do not; as many as
@@ -750,9 +760,9 @@ move(int point, double periods)
 static hs_status
 find(double min_distance, hs_pairs **pairs, hs_failure *failure)
 {
-    const hs_points    points = {x_choose_far, N, 2, HS_FLOAT64, 16, 8};
-    const hs_selection selection = {.labels = labels_choose_far, .min_distance = min_distance};
-    const hs_among     among = {.points = &points, .box = &box_choose_far, .selection = &selection};
+    const hs_points    points = {far_x, N, 2, HS_FLOAT64, 16, 8};
+    const hs_selection selection = {.labels = far_labels, .min_distance = min_distance};
+    const hs_among     among = {.points = &points, .box = &far_box, .selection = &selection};
     hs_options         options = hs_options_default();
     options.cutoff = 0.75 * SIDE + 0x1p-13; /* which no pair is so near that S decides */
     int64_t         n = 0;
@@ -779,13 +789,13 @@ shifts_that_are_not_known_are_told(void)
     for (int every = 1; every < N; every *= 7) {
         hs_pairs  *near, *far;
         hs_failure failure;
-        make_points_choose_far();
+        make_far_points();
         for (int i = every; i < N; i += 2 * every)
             move(i, 0x1p42);
         CHECK(find(0.0, &far, &failure) == HS_ERR_SHIFT_RANGE && far == NULL);
         CHECK(failure.row >= 0 && failure.row < N);
         for (int i = every; i < N; i += 2 * every)
-            labels_choose_far[i] = -i;
+            far_labels[i] = -i;
         CHECK(find(0.0, &far, NULL) == HS_OK);
         for (int i = every; i < N; i += 2 * every)
             move(i, -0x1p42);

@@ -186,7 +186,7 @@ count_with(const question *ask, hs_stages *stages)
 }
 
 static int64_t
-sum_of(const hs_stages *stages)
+decided(const hs_stages *stages)
 {
     return stages->by_float64 + stages->by_double_word + stages->by_integers;
 }
@@ -212,7 +212,7 @@ what_the_filter_leaves_is_decided(void)
             hs_stages stages = {0, 0, 0};
             ask.error = errors[e];
             CHECK(count_with(&ask, &stages) == expected);
-            const int64_t all = sum_of(&stages);
+            const int64_t all = decided(&stages);
             least = all < least ? all : least;
             most = all > most ? all : most;
         }
@@ -246,7 +246,7 @@ every_question_has_its_answer(void)
         fill(&random, ask.ndim, 4, ask.unit);
         const int64_t expected = expect(&ask);
         CHECK(count_with(&ask, &stages) == expected);
-        CHECK(ask.precision == HS_EXACT || sum_of(&stages) == 0);
+        CHECK(ask.precision == HS_EXACT || decided(&stages) == 0);
         question other = ask;
         other.is_strict = !ask.is_strict;
         differ += expect(&other) != expected;

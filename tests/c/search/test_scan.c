@@ -13,11 +13,11 @@
 
 void test_scan(void);
 
-/* Neighbourhood: a block has room for what its header promises. */
+/* ---- a block has room for what its header promises ---- */
 
 enum { N = 300, D = 3 };
 
-static double  x_neighbourhood[D][N + HS_PADDING];
+static double  group_x[D][N + HS_PADDING];
 static int32_t order[N + HS_PADDING];
 
 static hs_bins
@@ -28,10 +28,10 @@ some_bins(uint64_t seed, int ndim)
     for (int i = 0; i < N + HS_PADDING; i++) {
         order[i] = 7 * i;
         for (int k = 0; k < ndim; k++)
-            x_neighbourhood[k][i] = i < N ? 8.0 * random_unit(&random) - 3.0 : NAN;
+            group_x[k][i] = i < N ? 8.0 * random_unit(&random) - 3.0 : NAN;
     }
     for (int k = 0; k < ndim; k++)
-        bins.x[k] = x_neighbourhood[k];
+        bins.x[k] = group_x[k];
     return bins;
 }
 
@@ -62,9 +62,9 @@ groups_know_their_extent(void)
         CHECK(hs_group_bound(&bins, &group) >= 0.0f);
         for (int k = 0; k < ndim; k++) {
             float low = INFINITY, high = -INFINITY;
-            CHECK(group.centre[k] == x_neighbourhood[k][(first + last) / 2]);
+            CHECK(group.centre[k] == group_x[k][(first + last) / 2]);
             for (int32_t t = 0; t < last - first; t++) {
-                const float q = (float)(x_neighbourhood[k][first + t] - group.centre[k]);
+                const float q = (float)(group_x[k][first + t] - group.centre[k]);
                 CHECK(group.q[k][t] == q);
                 low = fminf(low, q);
                 high = fmaxf(high, q);
@@ -77,7 +77,7 @@ groups_know_their_extent(void)
     }
 }
 
-/* Form: thresholds that were kept are those of the extent that asks. */
+/* ---- thresholds that were kept are those of the extent that asks ---- */
 
 static search_unit unit;
 
@@ -127,8 +127,10 @@ thresholds_are_kept_for_the_next_search(void)
 }
 
 /*
- * Decide: what the filter lets through is decided, however little the filter can tell: with any
- * error beyond its own the same pairs are found and counted, at any size of the numbers.
+ * ---- decide ----
+ *
+ * What the filter lets through is decided, however little the filter can tell: with any error
+ * beyond its own the same pairs are found and counted, at any size of the numbers.
  */
 
 static bool
@@ -176,8 +178,12 @@ every_pair_is_tested_once(void)
     search_unit_close(&unit);
 }
 
-/* Pair batch: shifts are kept as short as they are known to be, and those that pass the integers
- * are told, whoever looks them up. */
+/*
+ * ---- pair batch ----
+ *
+ * Shifts are kept as short as they are known to be, and those that pass the integers are told,
+ * whoever looks them up.
+ */
 
 static bool
 is_narrow(void)

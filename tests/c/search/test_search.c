@@ -12,7 +12,7 @@
 
 void test_search(void);
 
-/* Search reuse: cells that are kept answer as cells of their own do, whatever they were built for. */
+/* ---- cells that are kept answer as cells of their own do, whatever they were built for ---- */
 
 /* Cells in a lattice whose normals miss the periods by nearly half: ranges have no end, and the
  * search is refused as one without cells is. */
@@ -48,7 +48,7 @@ cells_that_cannot_be_narrowed_are_refused(void)
     search_unit_close(&built);
 }
 
-/* Estimate: what cannot fit is refused before it is searched, with a number near the truth. */
+/* ---- what cannot fit is refused before it is searched, with a number near the truth ---- */
 
 /* Points in a box, or in a clump that is a tenth of it along each axis. */
 static void
@@ -143,7 +143,7 @@ small_scenes_are_known_exactly(void)
     search_unit_close(&unit);
 }
 
-/* Shells: the table tells which edges a distance is above, or that it is too near to one. */
+/* ---- the table tells which edges a distance is above, or that it is too near to one ---- */
 
 enum { MOST = 2000 };
 

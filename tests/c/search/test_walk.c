@@ -10,8 +10,12 @@
 
 void test_walk(void);
 
-/* Walk: a walk visits the groups of any range of points, in any order of ranges and as often as it
- * is told to. */
+/*
+ * ---- walk ----
+ *
+ * A walk visits the groups of any range of points, in any order of ranges and as often as it is
+ * told to.
+ */
 
 static search_unit unit;
 
@@ -56,7 +60,7 @@ neighbourhoods_without_end_are_refused(void)
     search_unit_close(&unit);
 }
 
-/* Cell rows: the points of a row that a window of cells holds, wherever the window lies. */
+/* ---- the points of a row that a window of cells holds, wherever the window lies ---- */
 
 enum { CELLS = 4 };
 
@@ -82,8 +86,12 @@ windows_are_cut_to_the_row(void)
     }
 }
 
-/* Large blocks: one point with so many candidates that a search asks between its passes over them
- * whether to go on: any of these polls ends it, and the last answer is right. */
+/*
+ * ---- large blocks ----
+ *
+ * One point with so many candidates that a search asks between its passes over them whether to go
+ * on: any of these polls ends it, and the last answer is right.
+ */
 
 enum { SPOTS = 1024, N = 180 * SPOTS }; /* more than 2^18 candidates within 1.5 box lengths */
 

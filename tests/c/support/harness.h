@@ -7,6 +7,7 @@
 #ifndef HS_HARNESS_H
 #define HS_HARNESS_H
 
+#include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -87,6 +88,21 @@ static inline double
 random_unit(harness_random *random)
 {
     return (double)(random_bits(random) >> 11) * 0x1p-53;
+}
+
+/* Zero, or of either sign and up to so many powers of two from 1. */
+static inline double
+random_size(harness_random *random, int spread)
+{
+    const int    exponent = (int)(random_bits(random) % (uint64_t)(2 * spread + 1)) - spread;
+    const double size = ldexp(1.0 + random_unit(random), exponent);
+    return random_bits(random) % 8 == 0 ? 0.0 : random_bits(random) & 1 ? size : -size;
+}
+
+static inline bool
+same_bits(double a, double b)
+{
+    return memcmp(&a, &b, sizeof a) == 0;
 }
 
 #endif

@@ -33,6 +33,16 @@ refuse_once(void *context, double fraction)
     return ++once->n != once->nth;
 }
 
+/* The account of a call without a limit. */
+static inline hs_account
+new_account(void)
+{
+    const hs_options options = hs_options_default();
+    hs_account       account;
+    hs_account_init(&account, &options);
+    return account;
+}
+
 /* Calls the function, which frees what it is given, while its first, second, ... allocation is
  * refused, until it has no more: each call succeeds or says that memory is short, and nothing is
  * left. Returns which allocation there was not; 0 if `most` were not enough. */

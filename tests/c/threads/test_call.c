@@ -28,8 +28,8 @@ what_was_done_adds_up(void)
     hs_call           call;
     options.counters = &counters;
     hs_call_begin(&options, &call);
-    hs_call_note(&call, &done);
-    hs_call_note(&call, &done);
+    hs_call_add_counters(&call, &done);
+    hs_call_add_counters(&call, &done);
     void *block = hs_alloc(&call.account, HS_FOR_CELLS, 100, 10);
     hs_free(&call.account, block);
     hs_call_report(&call, 0);
@@ -101,7 +101,11 @@ threads_are_started_where_they_are_worth_it(void)
     CHECK(hs_test_worth_threads(0.0) == 1000.0);
 }
 
-/* Teams: the caller's own thread sees its mask of signals, the others see every signal blocked. */
+/*
+ * ---- teams ----
+ *
+ * The caller's own thread sees its mask of signals, the others see every signal blocked.
+ */
 
 enum { TASKS = 5000 };
 
@@ -152,7 +156,7 @@ every_task_is_done_once(void)
     }
 }
 
-/* Passes: strips and slabs, in rounds between which there is a poll. */
+/* ---- strips and slabs, in rounds between which there is a poll ---- */
 
 enum { MOST = 3 * HS_POLL_POINTS };
 

@@ -12,7 +12,7 @@
 
 void test_pair_list(void);
 
-/* Motion: a margin is a promise about every pair. */
+/* ---- a margin is a promise about every pair ---- */
 
 enum { POINTS = 24 };
 
@@ -273,15 +273,19 @@ it_stops_when_told_to_or_without_memory(void)
     free_steps(&s);
 }
 
-/* Motion margin: every rounding on the way from coordinates to a margin is taken off it, with
- * room, and not much more than that. */
+/*
+ * ---- motion margin ----
+ *
+ * Every rounding on the way from coordinates to a margin is taken off it, with room, and not much
+ * more than that.
+ */
 
 #define UNIT 0x1p-53
 
 enum { N_MOTION_MARGIN = 6 };
 
-static hs_frame built_motion_margin, now_motion_margin;
-static hs_store jumps_motion_margin;
+static hs_frame frame_before, frame_now;
+static hs_store motion_jumps;
 
 static void
 take(const double *x, int64_t n, int d, const hs_box *box, hs_frame *frame)
@@ -296,18 +300,18 @@ static double
 margin_of(double radius, double cutoff, bool *jumped)
 {
     const hs_options options = hs_options_default();
-    const hs_motion  motion = {&built_motion_margin, &now_motion_margin, radius, cutoff};
+    const hs_motion  motion = {&frame_before, &frame_now, radius, cutoff};
     double           margin = NAN;
-    CHECK(hs_motion_margin(&motion, &options, &margin, jumped, &jumps_motion_margin) == HS_OK);
+    CHECK(hs_motion_margin(&motion, &options, &margin, jumped, &motion_jumps) == HS_OK);
     return margin;
 }
 
 static void
 free_all(void)
 {
-    hs_frame_free(&built_motion_margin);
-    hs_frame_free(&now_motion_margin);
-    hs_store_free(&jumps_motion_margin);
+    hs_frame_free(&frame_before);
+    hs_frame_free(&frame_now);
+    hs_store_free(&motion_jumps);
 }
 
 /* What is gone of a skin though nothing has moved but by what all share, between `least`, which the
@@ -329,16 +333,20 @@ a_jump_of_one_costs_a_difference_and_its_wrapping(void)
     for (int e = 0; e < 2 * N_MOTION_MARGIN; e++)
         x[e] = y[e] = 0x1p-8 * e;
     y[4] += 0x1p20;
-    take(x, N_MOTION_MARGIN, 2, &box, &built_motion_margin);
-    take(y, N_MOTION_MARGIN, 2, &box, &now_motion_margin);
+    take(x, N_MOTION_MARGIN, 2, &box, &frame_before);
+    take(y, N_MOTION_MARGIN, 2, &box, &frame_now);
     const double used = radius - cutoff - margin_of(radius, cutoff, &jumped);
-    CHECK(jumped && ((const int64_t *)jumps_motion_margin.data)[4] == INT64_C(1) << 20);
+    CHECK(jumped && ((const int64_t *)motion_jumps.data)[4] == INT64_C(1) << 20);
     check_used(used, 2.0 * sqrt(2.0) * UNIT * (0x1p20 + 0x1p21));
     free_all();
 }
 
-/* Shift table: shifts are numbered in the order in which they first come, however many there are,
- * and stay so when memory is refused. */
+/*
+ * ---- shift table ----
+ *
+ * Shifts are numbered in the order in which they first come, however many there are, and stay so
+ * when memory is refused.
+ */
 
 /* Numbers are int32. */
 static void
@@ -352,7 +360,7 @@ no_more_shifts_are_numbered_than_can_be(void)
     CHECK(images.n == INT32_MAX / 2 + 1 && images.of == of);
 }
 
-/* Pair list build: when a list is built again, and that it stays as it was when that fails. */
+/* ---- when a list is built again, and that it stays as it was when that fails ---- */
 
 static random_scene shared;
 

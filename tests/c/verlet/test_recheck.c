@@ -12,8 +12,12 @@
 
 void test_recheck(void);
 
-/* Recheck: listed pairs are decided, measured and written as a search does it: in every type,
- * number of dimensions and range of numbers. */
+/*
+ * ---- recheck ----
+ *
+ * Listed pairs are decided, measured and written as a search does it: in every type, number of
+ * dimensions and range of numbers.
+ */
 
 enum { STEPS = 4, FLOATS = SCENE_POINTS * HS_MAX_DIM };
 
@@ -198,8 +202,12 @@ box_vectors_may_be_any_sum_of_shorter_ones(void)
     CHECK(n_pairs > 10000);
 }
 
-/* Recheck unit: a list of a few points, put together by hand, whose pairs are decided anew, so
- * that a test can take the steps of that one by one. */
+/*
+ * ---- recheck unit ----
+ *
+ * A list of a few points, put together by hand, whose pairs are decided anew, so that a test can
+ * take the steps of that one by one.
+ */
 
 enum { RECHECK_POINTS = 6, RECHECK_IMAGES = 4 };
 
@@ -269,8 +277,12 @@ recheck_unit_close(recheck_unit *unit)
     hs_account_close(account);
 }
 
-/* Recheck measure: listed pairs are measured between points as the scene has them: with their
- * shift over its rows, whatever they were wrapped by and have jumped since. */
+/*
+ * ---- recheck measure ----
+ *
+ * Listed pairs are measured between points as the scene has them: with their shift over its rows,
+ * whatever they were wrapped by and have jumped since.
+ */
 
 enum { N_MEASURE = RECHECK_POINTS, IMAGES = RECHECK_IMAGES };
 
@@ -302,8 +314,11 @@ any_allocation_may_be_refused(void)
     }
 }
 
-/* Recheck write: when hits of a list are measured while they are written, and what is laid out for
- * that. */
+/*
+ * ---- recheck write ----
+ *
+ * When hits of a list are measured while they are written, and what is laid out for that.
+ */
 
 enum { N_WRITE = 3, WANT = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR };
 
@@ -399,7 +414,7 @@ large_lags_and_images_are_not_written(void)
     }
 }
 
-/* Recheck find: what a list has found becomes a result, in its order or sorted. */
+/* ---- what a list has found becomes a result, in its order or sorted ---- */
 
 static double
 small_limit(void *context)

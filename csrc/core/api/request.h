@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-#ifndef HS_API_PAIRS_H
-#define HS_API_PAIRS_H
+#ifndef HS_API_REQUEST_H
+#define HS_API_REQUEST_H
 
 #include "../../halfshell.h"
 #include "../base/base.h"
@@ -8,8 +8,8 @@
 #include "../search/search.h"
 
 /*
- * pairs.h: checks of the arguments that all searches share, and the searches of one call: pairs,
- * rows, nearest points, histograms, clusters and plans.
+ * request.h: checks of the arguments that all searches share, and requests: what to search for,
+ * from its arguments to an open search and to what the caller gets.
  */
 
 /*
@@ -21,6 +21,9 @@
 
 /* Ends such a call: returns the status. *failure, unless NULL, has no details. */
 hs_status hs_end_early(hs_status status, const hs_options *options, hs_failure *failure);
+
+/* The counters, if any, of a call that ends before its search begins. */
+void hs_clear_counters(const hs_options *options);
 
 /* Whether a call that returns an object has these two, without which it cannot begin. *result,
  * unless NULL, is NULL afterwards. */
@@ -48,6 +51,9 @@ hs_status hs_check_options(const hs_options *options);
 
 /* Most lengths that distances are sorted by: twice as many are int32. */
 #define HS_MOST_LENGTHS (INT64_C(1) << 30)
+
+/* The first of ascending lengths that is above 0, or 0. */
+double hs_least_length(const double *lengths, int64_t n);
 
 /* HS_OK, HS_ERR_ARGUMENT, or HS_ERR_EDGES. */
 hs_status hs_check_histogram(const hs_histogram *histogram, hs_failure *failure);
@@ -98,6 +104,10 @@ hs_status hs_request_use(const hs_request *request, hs_use_fn use, void *context
 
 /* Fills the output, which is empty and of the options' columns, from an open search. */
 typedef hs_status (*hs_fill_fn)(hs_search *search, hs_pairs *pairs, hs_failure *failure);
+
+/* A search whose pairs the caller gets, to be freed by hs_pairs_free; NULL on failure. */
+hs_status hs_request_fill(const hs_request *request, hs_fill_fn fill, hs_pairs **result,
+                          hs_failure *failure);
 
 /* A result whose call, with these options, has been entered; *failure becomes where the failure
  * goes. hs_pairs_finish must follow. NULL when memory is short: then the call has ended. */
