@@ -54,13 +54,12 @@ def shares(scene: str, measured: dict[str, Any]) -> dict[str, Any]:
 def _explain(scene: Scene, kernel: str | None) -> dict[str, Any]:
     import halfshell as hs
 
-    options: dict[str, Any] = {"kernel": kernel, "measure": True}
-    if scene.box is not None:
-        options.update(box=scene.box, periodic=scene.periodic)
-    found = hs.explain(
-        scene.points, scene.cutoff, quantities=scene.quantities,
-        index_dtype=np.dtype(scene.index_dtype), **options,
-    )  # fmt: skip
+    box = {} if scene.box is None else {"box": scene.box, "periodic": scene.periodic}
+    with hs.settings(kernel=kernel):
+        found = hs.explain(
+            scene.points, scene.cutoff, quantities=scene.quantities,
+            index_dtype=np.dtype(scene.index_dtype), measure=True, **box,
+        )  # fmt: skip
     return dict(found.measured)
 
 

@@ -61,9 +61,9 @@ def _timed(call: Callable[[], Any]) -> tuple[float, Any]:
 
 def _measure(gas: _Gas, skin: float | str, what: str, dtype: str, steps: int) -> dict[str, float]:
     """Seconds by name, for one list."""
-    given = {"quantities": what, "index_dtype": dtype}
+    given: Any = {"quantities": what, "index_dtype": dtype}
     box = np.full(3, gas.length)
-    size = skin if isinstance(skin, str) else skin * gas.cutoff
+    size: Any = skin if isinstance(skin, str) else skin * gas.cutoff
     listed = hs.VerletList(gas.cutoff, size, box=box, threads=1)
     times: dict[str, list[float]] = {"build": [], "update": [], "pairs": [], "search": []}
     in_all = [0.0]

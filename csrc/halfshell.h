@@ -233,6 +233,11 @@ typedef struct hs_options {
                               Shell k holds the pairs within number k and not within number k - 1,
                               decided exactly; d is on the right side of both. For HS_EXACT in
                               hs_pairs_find and hs_stream_open, without a reach */
+    const double *domain;   /* NULL, or borrowed, for hs_cells_build: a lowest and then a highest
+                              coordinate for each axis, finite; cells reach from one to the other
+                              or, where points lie beyond, further. Nothing is fixed along an axis
+                              with lowest > highest, as axes that repeat need, nor in boxes whose
+                              vectors do not lie along the coordinate axes */
 } hs_options;
 
 /* Defaults: cutoff 0, inclusive, unsorted, exact, i and j of 8 bytes, no limit, no poll. */

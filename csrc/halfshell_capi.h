@@ -134,17 +134,15 @@ typedef struct hs_capi {
     hs_status (*rows_keep)(const hs_list_rows *rows, const hs_node_change *change,
                            const int64_t *source, int64_t n, const hs_options *options,
                            hs_pairs **result, hs_failure *failure);
-    hs_status (*node_pairs_keep)(const hs_node_pairs *pairs, const hs_node_change *change,
-                                 const bool *keep, const hs_options *options,
-                                 hs_connectivity **result, hs_failure *failure);
     hs_status (*rows_without)(const hs_list_rows *rows, const hs_list_rows *without, bool ascend,
                               const hs_options *options, hs_pairs **result, hs_failure *failure);
     hs_status (*connectivity_overlap)(const hs_points *points, const hs_index_rows *gather,
                                       const hs_node_lists *lists, const hs_options *options,
                                       hs_pairs **rows, hs_failure *failure);
-    hs_status (*connectivity_intersect)(const hs_points *points, const hs_half_list *pairs,
-                                        const hs_node_lists *lists, const hs_options *options,
-                                        hs_pairs **result, hs_failure *failure);
+    hs_status (*connectivity_intersect)(const hs_points *points, const hs_box *box,
+                                        const hs_half_list *pairs, const hs_node_lists *lists,
+                                        const hs_options *options, hs_pairs **result,
+                                        hs_failure *failure);
     hs_status (*feet_between)(const hs_points *points, const double *p, const double *q,
                               bool *between, hs_failure *failure);
     hs_status (*morton_keys)(const hs_points *points, const double *low, const double *high,
@@ -192,6 +190,8 @@ typedef struct hs_capi {
     hs_status (*box_places)(const hs_box *box, const hs_points *points, double cutoff,
                             double largest, double *places, int64_t stride, hs_box_axes *axes,
                             hs_failure *failure);
+    hs_status (*dynamic_cell_of)(const hs_dynamic *list, const double *position, int64_t *cell,
+                                 hs_failure *failure);
 } hs_capi;
 
 /* The table, or NULL with an ImportError (also that of halfshell itself) when halfshell is not

@@ -111,6 +111,11 @@ hs_status hs_dynamic_position(const hs_dynamic *list, hs_key key, double *positi
  * but for rounding, from 0 along periodic ones; HS_STORE_ALL_PAIRS has one cell. */
 hs_status hs_dynamic_cell(const hs_dynamic *list, hs_key key, int64_t *cell);
 
+/* The cell that a position is in, whether or not it holds a point; errors as for
+ * hs_dynamic_insert. */
+hs_status hs_dynamic_cell_of(const hs_dynamic *list, const double *position, int64_t *cell,
+                             hs_failure *failure);
+
 /* Called for a key, with the position as it was given (NULL: none) and S over the box vectors where
  * that is wanted (else NULL); both are borrowed. Not 0: no more of them. It must not change the
  * list. */

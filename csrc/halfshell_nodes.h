@@ -26,10 +26,13 @@ typedef struct hs_node_lists {
     bool           ghost_rows;  /* ghosts have rows, too */
     bool           ghost_pairs; /* and pairs with each other */
     bool           rows_only;   /* no pairs at all */
+    bool           directed;    /* the rule is HS_RULE_GATHER or HS_RULE_SCATTER: i may have j as a
+                                 * neighbour and j not i. Each entry of a row is a pair */
 } hs_node_lists;
 
 /* Pairs that the caller has, each once, borrowed: ascending by (i, j, S), with i < j, or i == j and
- * the first nonzero component of S positive. */
+ * the first nonzero component of S positive. Of directed lists: any i and j, but not i == j with S
+ * zero. */
 typedef struct hs_half_list {
     int64_t        n;
     const int32_t *i, *j; /* numbers of points */
@@ -38,12 +41,15 @@ typedef struct hs_half_list {
 } hs_half_list;
 
 /* Rows that the caller has, one for each of n points, borrowed: that of point i begins at
- * indices[offsets[i]] and ends before indices[offsets[i + 1]], ascending, without i itself. */
+ * indices[offsets[i]] and ends before indices[offsets[i + 1]], ascending, without i itself; of one
+ * number ascending by S. */
 typedef struct hs_index_rows {
     int64_t        n;
     const int64_t *offsets; /* n + 1, from 0 to n_indices */
     int64_t        n_indices;
     const int32_t *indices;
+    const int32_t *shift; /* n_indices * ndim; NULL: none */
+    int            ndim;
 } hs_index_rows;
 
 /* Rows of nodes that the caller has, laid out as those of hs_connectivity_rows; borrowed. */
@@ -56,15 +62,6 @@ typedef struct hs_list_rows {
     const int32_t *shift; /* n_indices * ndim; NULL: none */
     int            ndim;
 } hs_list_rows;
-
-/* Pairs of nodes that the caller has, as those of hs_connectivity_pairs and hs_connectivity_lists;
- * borrowed. */
-typedef struct hs_node_pairs {
-    int64_t        n;
-    const int32_t *i_node, *i_list, *j_node, *j_list;
-    const int32_t *shift; /* n * ndim; NULL: none */
-    int            ndim;
-} hs_node_pairs;
 
 /* What becomes of the nodes of lists of which some go; borrowed. */
 typedef struct hs_node_change {
@@ -98,7 +95,8 @@ hs_status hs_connectivity_link(const hs_half_list *pairs, const hs_node_lists *l
  *
  * Pairs: HS_WANT_I and HS_WANT_J are node numbers, HS_WANT_SHIFT is S; those of
  * hs_connectivity_lists, of which list each of the two is. Ascending in the order of the points;
- * the lower one comes first, but an internal node before a ghost, unless `number` is given.
+ * the lower one comes first, but an internal node before a ghost, unless `number` is given. Of
+ * directed lists (i, j) for each entry j of the row of each i, of ghosts with ghost_pairs only.
  *
  * All borrow from the object and can be read by hs_pairs_array, hs_pairs_take and so on; not freed.
  */
@@ -108,26 +106,21 @@ hs_pairs *hs_connectivity_lists(hs_connectivity *connectivity);
 
 void hs_connectivity_free(hs_connectivity *connectivity);
 
-/* The pairs of hs_connectivity_build, from its rows, of all nodes and without `number`: for callers
- * who wanted rows_only at first. The object has no rows. */
+/* The pairs of hs_connectivity_build, from its rows: for callers who wanted rows_only at first. The
+ * object has no rows. */
 hs_status hs_connectivity_pair(const hs_list_rows *rows, const hs_node_lists *lists,
                                const hs_options *options, hs_connectivity **connectivity,
                                hs_failure *failure);
 
 /*
- * What is left of rows and pairs when nodes go, without a search: the same as of a new connectivity
- * of the nodes that stay. Row k is made of row source[k], each at most once; source: NULL for all
- * rows, n of them. Pairs keep their order, and with it the place of each pair that stays; keep, one
- * for each pair, says which others go as well, or is NULL; change: NULL where no node goes. Of the
- * options, those of resources count. Results are freed as those of hs_connectivity_overlap and
- * hs_connectivity_build; the latter has pairs alone.
+ * What is left of rows when nodes go, without a search: the same as of a new connectivity of the
+ * nodes that stay, of which hs_connectivity_pair makes the pairs. Row k is made of row source[k],
+ * each at most once; source: NULL for all rows, n of them. Of the options, those of resources
+ * count. To be freed with hs_pairs_free.
  */
 hs_status hs_rows_keep(const hs_list_rows *rows, const hs_node_change *change,
                        const int64_t *source, int64_t n, const hs_options *options,
                        hs_pairs **result, hs_failure *failure);
-hs_status hs_node_pairs_keep(const hs_node_pairs *pairs, const hs_node_change *change,
-                             const bool *keep, const hs_options *options, hs_connectivity **result,
-                             hs_failure *failure);
 
 /*
  * Rows without the entries of others, which have as many rows and lists. ascend: both ascend, and
@@ -140,23 +133,27 @@ hs_status hs_rows_without(const hs_list_rows *rows, const hs_list_rows *without,
 /*
  * Rows, as those of hs_connectivity_rows but of all nodes, of points that are in each other's rows
  * or have a common number in them; to be freed with hs_pairs_free. With rows of what each point's
- * own support reaches (HS_RULE_GATHER): of points whose supports have a common point. points: of
- * all nodes, in the order of `gather`. They make it quick, and change nothing else.
+ * own support reaches (HS_RULE_GATHER): of points whose supports have a common point. With shifts:
+ * of images, (j, S) in the row of i where i has (k, T) and j has (k, T - S), or HS_ERR_SHIFT_RANGE.
+ * points: of all nodes, in the order of `gather`. They make it quick, and change nothing else.
  */
 hs_status hs_connectivity_overlap(const hs_points *points, const hs_index_rows *gather,
                                   const hs_node_lists *lists, const hs_options *options,
                                   hs_pairs **rows, hs_failure *failure);
 
 /*
- * For each pair of hs_connectivity_pairs, of a half list without shifts: the points that are
- * neighbours of both ends and whose foot on the line through these lies on the closed segment
- * between them, in exact arithmetic; all common neighbours where the ends coincide; and the ends.
- * Entry l of pair p, as of a row, has in HS_WANT_J those of list l, the ends last. To be freed with
- * hs_pairs_free. points: of all nodes, in the order of the half list.
+ * For each pair of hs_connectivity_pairs, of a half list: the points that are neighbours of both
+ * ends and whose foot on the line through these lies on the closed segment between them, in exact
+ * arithmetic; all common neighbours where the ends coincide; and the ends. Entry l of pair p, as of
+ * a row, has in HS_WANT_J those of list l, the ends last; with shifts, HS_WANT_SHIFT has the S of
+ * each from the first end. To be freed with hs_pairs_free. points: of all nodes, in the order of
+ * the half list. box: what shifts multiply, of up to HS_MAX_DIM - 2 dimensions; NULL where there
+ * are none. HS_ERR_ARGUMENT for other boxes and for directed lists.
  */
-hs_status hs_connectivity_intersect(const hs_points *points, const hs_half_list *pairs,
-                                    const hs_node_lists *lists, const hs_options *options,
-                                    hs_pairs **result, hs_failure *failure);
+hs_status hs_connectivity_intersect(const hs_points *points, const hs_box *box,
+                                    const hs_half_list *pairs, const hs_node_lists *lists,
+                                    const hs_options *options, hs_pairs **result,
+                                    hs_failure *failure);
 
 /* Whether the foot of each point on the line through p and q lies on the closed segment between
  * them, in exact arithmetic; always where p and q coincide. between: one for each point. */

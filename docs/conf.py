@@ -66,7 +66,7 @@ def place_new_names(app, docname, source):
             if f":: {name}\n" not in placed:
                 kind = "class" if isinstance(getattr(halfshell, name), type) else "function"
                 source[0] = source[0].rstrip().removesuffix("```")
-                source[0] += f"\n.. auto{kind}:: {name}\n```\n"
+                source[0] += f"\n.. auto{kind}:: halfshell.{name}\n```\n"
 
 
 def setup(app):

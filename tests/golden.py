@@ -32,7 +32,7 @@ import halfshell as hs
 FILE = Path(__file__).with_name("golden.json")
 ABOUT = "SHA-256 of results; written by tests/golden.py, which says when it may be written again"
 
-# The arguments of hs.pairs that belong to the scene; "rows": hs.neighbors as well;
+# What is known of the points, and arguments of hs.pairs; "rows": hs.neighbors as well;
 # "blocks": hs.iter_pairs as well, for each of these numbers of pairs a block.
 Scene = dict[str, Any]
 
@@ -152,16 +152,19 @@ def digest(arrays: tuple[np.ndarray, ...]) -> str:
 
 
 def hashes(scene: Scene, **how: Any) -> dict[str, Any]:
-    """The entry of a scene in the file; `how` must not matter."""
-    given = {key: scene[key] for key in scene.keys() - {"rows", "blocks"}} | how
-    unsorted = hs.pairs(**given, quantities="ijdDSP")
-    ascending = hs.pairs(**given, quantities="ijdDSP", sort=True)
-    if "rows" in scene:
-        table = hs.neighbors(**given, quantities="jdDS")
-        ascending += (table.offsets, table.indices, table.distances, table.vectors, table.shifts)
-    for most in scene.get("blocks", ()):
-        for block in hs.iter_pairs(**given, quantities="ijdDSP", max_pairs=most):
-            unsorted += block
+    """The entry of a scene in the file; `how`, settings, must not matter."""
+    known = scene.keys() & {"box", "periodic", "radii", "types", "batch"}
+    points = hs.Points(scene["points"], **{name: scene[name] for name in known})
+    given = {name: scene[name] for name in scene.keys() - {"points", "rows", "blocks", *known}}
+    with hs.settings(**how):
+        unsorted = hs.pairs(points, **given, quantities="ijdDSP")
+        ascending = hs.pairs(points, **given, quantities="ijdDSP", sort=True)
+        if "rows" in scene:
+            table = hs.neighbors(points, **given, quantities="jdDS")
+            ascending += table.offsets, table.indices, table.distances, table.vectors, table.shifts
+        for most in scene.get("blocks", ()):
+            for block in hs.iter_pairs(points, **given, quantities="ijdDSP", max_pairs=most):
+                unsorted += block
     return {"pairs": len(unsorted[0]), "sorted": digest(ascending), "unsorted": digest(unsorted)}
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import importlib
 import os
 from collections.abc import Mapping
-from functools import cache, partial
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -121,20 +121,11 @@ class Looped(Contestant):
         return self.one.band(scene)
 
 
-@cache
-def _accepts(function: str, keyword: str, value: Any) -> bool:
-    """Whether the installed halfshell knows a keyword, found out by using it."""
-    hs = importlib.import_module("halfshell")
-    value = np.zeros(1, dtype=np.int64) if keyword == "batch" else value
-    try:
-        getattr(hs, function)(np.zeros((1, 3)), 1.0, **{keyword: value})
-    except TypeError:
-        return False
-    return True
+SETTINGS = ("kernel", "algorithm", "precision", "memory_limit")
 
 
 class Halfshell(Contestant):
-    """Our own search; `options` are passed on to the call."""
+    """Our own search; `options` are keywords of the call, or set around it."""
 
     name = "halfshell"
     distribution = module = "halfshell"
@@ -150,27 +141,31 @@ class Halfshell(Contestant):
         return self
 
     def refuses(self, scene: Scene) -> str | None:
-        """Refuse what the installed version does not have yet."""
-        function = "count_pairs" if scene.task == "count" else "pairs"
-        threads = self.options.get("threads", scene.threads)
-        if threads != 1 and not _accepts(function, "threads", threads):
-            return "no threads in this version"
-        if scene.batch is not None and not _accepts(function, "batch", None):
-            return "no batches in this version"
+        """Refuse nothing."""
         return None
 
     def prepare(self, scene: Scene) -> Call:
         """Return our call with the keywords of the scene."""
+        if scene.task == "count":
+            return self.call("count_pairs", scene, scene.points, scene.cutoff)
+        return self.call("pairs", scene, scene.points, scene.cutoff, **self.listed(scene))
+
+    def listed(self, scene: Scene) -> dict[str, Any]:
+        """Return the keywords that say what is listed."""
+        return {"quantities": scene.quantities, "index_dtype": np.dtype(scene.index_dtype)}
+
+    def call(self, function: str, scene: Scene, points: Any, *arguments: Any, **more: Any) -> Call:
+        """Return a call of a function of ours: what is known of points is told beforehand."""
         hs = importlib.import_module("halfshell")
-        function = "count_pairs" if scene.task == "count" else "pairs"
-        options: dict[str, Any] = {}
-        if _accepts(function, "threads", scene.threads):
-            options["threads"] = scene.threads
-        if scene.box is not None:
-            options.update(box=scene.box, periodic=scene.periodic)
-        if scene.batch is not None:
-            options["batch"] = scene.batch
-        if scene.task == "pairs":
-            options.update(quantities=scene.quantities, index_dtype=np.dtype(scene.index_dtype))
-        options.update(self.options)
-        return partial(getattr(hs, function), scene.points, scene.cutoff, **options)
+        under = importlib.import_module("halfshell_report.measure").under
+        box = {} if scene.box is None else {"box": scene.box, "periodic": scene.periodic}
+        fields = {"batch": scene.batch, "radii": scene.radii, "types": scene.types}
+        fields = {name: values for name, values in fields.items() if values is not None}
+        if fields:
+            points, box = hs.Points(points, **box, **fields), {}
+        options = {"threads": scene.threads, **box, **more, **self.options}
+        if function in ("nearest", "pair_histogram"):  # whose bins and ranks have no rule
+            options.pop("inclusive", None)
+        around = {name: options.pop(name) for name in SETTINGS if name in options}
+        found: Call = under(around, partial(getattr(hs, function), points, *arguments, **options))
+        return found

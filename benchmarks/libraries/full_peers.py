@@ -24,27 +24,14 @@ from scenes import Scene
 __all__ = ["for_scene", "ours_for"]
 
 
-def _options(scene: Scene, more: Any) -> dict[str, Any]:
-    box = {} if scene.box is None else {"box": scene.box, "periodic": scene.periodic}
-    return {"threads": scene.threads, "quantities": scene.quantities,
-            "index_dtype": np.dtype(scene.index_dtype), **box, **more}  # fmt: skip
-
-
 class OwnRows(Halfshell):
     """Our table of rows."""
 
     full = True
 
-    def refuses(self, scene: Scene) -> str | None:
-        """Refuse what the installed version does not have."""
-        hs = importlib.import_module("halfshell")
-        return None if hasattr(hs, "neighbors") else "no full lists in this version"
-
     def prepare(self, scene: Scene) -> Call:
         """Return our call with the keywords of the scene."""
-        hs = importlib.import_module("halfshell")
-        options = _options(scene, self.options)
-        return partial(hs.neighbors, scene.points, scene.cutoff, **options)
+        return self.call("neighbors", scene, scene.points, scene.cutoff, **self.listed(scene))
 
     def indices(self, result: Any) -> tuple[Any, Any]:
         """Return both indices of each entry."""
@@ -59,11 +46,10 @@ class OwnBetween(OwnRows):
 
     def prepare(self, scene: Scene) -> Call:
         """Return our call with the keywords of the scene."""
-        hs = importlib.import_module("halfshell")
-        options = _options(scene, self.options)
-        call = partial(hs.pairs_between, scene.asking, scene.found, scene.cutoff, **options)
         self.first = len(scene.asking)
-        return call
+        return self.call(
+            "pairs_between", scene, scene.asking, scene.found, scene.cutoff, **self.listed(scene)
+        )
 
     def indices(self, result: Any) -> tuple[Any, Any]:
         """Return both numbers among queries and points together."""

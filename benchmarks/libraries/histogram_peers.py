@@ -29,20 +29,9 @@ def _edges(scene: Scene) -> Floats:
 class OwnHistogram(Halfshell):
     """Our histogram; a pair at exactly the cutoff is in the last bin."""
 
-    def refuses(self, scene: Scene) -> str | None:
-        """Refuse what the installed version does not have."""
-        hs = importlib.import_module("halfshell")
-        return None if hasattr(hs, "pair_histogram") else "no histograms in this version"
-
     def prepare(self, scene: Scene) -> Call:
         """Return our call with the keywords of the scene."""
-        hs = importlib.import_module("halfshell")
-        options = {key: value for key, value in self.options.items() if key != "inclusive"}
-        if scene.box is not None:
-            options.update(box=scene.box, periodic=scene.periodic)
-        call = partial(
-            hs.pair_histogram, scene.points, _edges(scene), threads=scene.threads, **options
-        )
+        call = self.call("pair_histogram", scene, scene.points, _edges(scene))
         return lambda: int(call().sum())
 
 

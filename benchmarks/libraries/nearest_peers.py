@@ -9,7 +9,6 @@ inside the call.
 from __future__ import annotations
 
 import importlib
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -45,21 +44,9 @@ class Rows(Contestant):
 class OwnNearest(Halfshell):
     """Our rows."""
 
-    def refuses(self, scene: Scene) -> str | None:
-        """Refuse what the installed version does not have."""
-        hs = importlib.import_module("halfshell")
-        return None if hasattr(hs, "nearest") else "no nearest points in this version"
-
     def prepare(self, scene: Scene) -> Call:
         """Return our call with the keywords of the scene."""
-        hs = importlib.import_module("halfshell")
-        options = {key: value for key, value in self.options.items() if key != "inclusive"}
-        if scene.box is not None:
-            options.update(box=scene.box, periodic=scene.periodic)
-        return partial(
-            hs.nearest, scene.points, scene.nearest, quantities=scene.quantities,
-            index_dtype=np.dtype(scene.index_dtype), threads=scene.threads, **options,
-        )  # fmt: skip
+        return self.call("nearest", scene, scene.points, scene.nearest, **self.listed(scene))
 
     def nearest(self, scene: Scene, result: Any) -> tuple[Any, Any]:
         """Return distances and numbers."""

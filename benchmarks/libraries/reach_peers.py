@@ -27,16 +27,8 @@ class OwnReach(Halfshell):
 
     def prepare(self, scene: Scene) -> Call:
         """Return our call with the keywords of the scene."""
-        hs = importlib.import_module("halfshell")
-        options = {"threads": scene.threads, "quantities": scene.quantities,
-                   "index_dtype": np.dtype(scene.index_dtype), **self.options}  # fmt: skip
-        if scene.box is not None:
-            options.update(box=scene.box, periodic=scene.periodic)
-        if scene.types is not None:
-            return partial(hs.pairs, scene.points, scene.table, types=scene.types, **options)
-        return partial(
-            hs.pairs, scene.points, None, radii=scene.radii, rule=scene.rule, **options
-        )
+        how: dict[str, Any] = {} if scene.types is not None else {"rule": scene.rule}
+        return self.call("pairs", scene, scene.points, scene.table, **how, **self.listed(scene))
 
 
 def _reason(scene: Scene, types: bool) -> str | None:

@@ -65,7 +65,6 @@ static const hs_capi table = {
     .connectivity_free = hs_connectivity_free,
     .connectivity_pair = hs_connectivity_pair,
     .rows_keep = hs_rows_keep,
-    .node_pairs_keep = hs_node_pairs_keep,
     .rows_without = hs_rows_without,
     .connectivity_overlap = hs_connectivity_overlap,
     .connectivity_intersect = hs_connectivity_intersect,
@@ -99,6 +98,7 @@ static const hs_capi table = {
     .measure = hs_measure,
     .dynamic_hook = hs_dynamic_hook,
     .box_places = hs_box_places,
+    .dynamic_cell_of = hs_dynamic_cell_of,
 };
 
 int

@@ -3,30 +3,10 @@
  * allowed. */
 #include "errors.h"
 
-#include "environment.h"
-#include "tuples.h"
+#include "system.h"
 
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
-
-/* Raises the text of `format`, which the number follows: PyErr_Format knows no floating-point
- * numbers; repr does, and shortest. */
-static PyObject *
-raise_number(PyObject *type, double value, const char *format, ...)
-{
-    char      text[256];
-    PyObject *number = PyFloat_FromDouble(value);
-    va_list   arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
-    if (number != NULL) {
-        PyErr_Format(type, "%s%R", text, number);
-        Py_DECREF(number);
-    }
-    return NULL;
-}
 
 /* The argument that a failure's row is of. */
 static const char *
@@ -35,35 +15,47 @@ set_of(const hs_failure *failure)
     return failure->in_queries ? "queries" : "points";
 }
 
-static PyObject *
-raise_not_finite(const hs_failure *failure)
-{
-    const char *set = set_of(failure);
-    return raise_number(PyExc_ValueError, failure->value,
-                        "%s must be finite, got %s[%lld, %lld] = ", set, set,
-                        (long long)failure->row, (long long)failure->column);
-}
+/* What is said of a number that is wrong: "<name> <must>, got <name>[...] = <number>". */
+typedef struct number_words {
+    const char *name; /* NULL: that of the set */
+    const char *must;
+    enum { ALONE, AT_ROW, AT_ELEMENT, OF_SYSTEM } where;
+    bool has_queries; /* which then have query_ before the name */
+} number_words;
+
+/* By status. */
+static const number_words WORDS[] = {
+    [HS_ERR_CUTOFF] = {"cutoff", "must be finite and not negative", OF_SYSTEM, false},
+    [HS_ERR_NOT_FINITE] = {NULL, "must be finite", AT_ELEMENT, false},
+    [HS_ERR_BOX_FINITE] = {"box", "must be finite", AT_ELEMENT, false},
+    [HS_ERR_EDGES] = {"edges", "must be finite, not negative and ascending", AT_ROW, false},
+    [HS_ERR_WEIGHTS] = {"weights", "must be finite", AT_ROW, true},
+    [HS_ERR_RADII] = {"radii", "must be finite, not negative, and of ordinary size", AT_ROW, true},
+    [HS_ERR_EXTENT] = {"extent", "must be finite and not negative", ALONE, false},
+};
 
 static PyObject *
-raise_box(const hs_failure *failure)
+raise_words(const hs_failure *failure, const number_words *said)
 {
     const long long system = failure->system, row = failure->row, column = failure->column;
-    return system < 0 ? raise_number(PyExc_ValueError, failure->value,
-                                     "box must be finite, got box[%lld, %lld] = ", row, column)
-                      : raise_number(PyExc_ValueError, failure->value,
-                                     "box must be finite, got box[%lld, %lld, %lld] = ", system,
-                                     row, column);
-}
-
-static PyObject *
-raise_cutoff(const hs_failure *failure)
-{
-    return failure->system < 0
-               ? raise_number(PyExc_ValueError, failure->value,
-                              "cutoff must be finite and not negative, got ")
-               : raise_number(PyExc_ValueError, failure->value,
-                              "cutoff must be finite and not negative, got cutoff[%lld] = ",
-                              (long long)failure->system);
+    const char     *name = said->name != NULL ? said->name : set_of(failure);
+    const char     *query = said->has_queries && failure->in_queries ? "query_" : "";
+    char            place[80] = "";
+    PyObject       *number = PyFloat_FromDouble(failure->value);
+    if (said->where == AT_ROW) {
+        snprintf(place, sizeof place, "%s%s[%lld] = ", query, name, row);
+    } else if (said->where == AT_ELEMENT && (system < 0 || said->name == NULL)) {
+        snprintf(place, sizeof place, "%s[%lld, %lld] = ", name, row, column);
+    } else if (said->where == AT_ELEMENT) {
+        snprintf(place, sizeof place, "%s[%lld, %lld, %lld] = ", name, system, row, column);
+    } else if (said->where == OF_SYSTEM && system >= 0) {
+        snprintf(place, sizeof place, "%s[%lld] = ", name, system);
+    }
+    if (number != NULL) { /* repr is shortest; PyErr_Format knows no floating-point numbers */
+        PyErr_Format(PyExc_ValueError, "%s%s %s, got %s%R", query, name, said->must, place, number);
+        Py_DECREF(number);
+    }
+    return NULL;
 }
 
 /* "box", or which one of many. */
@@ -222,17 +214,14 @@ raise_capacity(const hs_failure *failure)
 static PyObject *
 raise_too_many(const hs_failure *failure)
 {
-    return raise_number(
-        PyExc_OverflowError, failure->value,
-        "fewer than 2**31 points and systems and 2**62 pairs can be searched, got ");
-}
-
-static PyObject *
-raise_edges(const hs_failure *failure)
-{
-    return raise_number(PyExc_ValueError, failure->value,
-                        "edges must be finite, not negative and ascending, got edges[%lld] = ",
-                        (long long)failure->row);
+    PyObject *number = PyFloat_FromDouble(failure->value);
+    if (number != NULL) {
+        PyErr_Format(PyExc_OverflowError,
+                     "fewer than 2**31 points and systems and 2**62 pairs can be searched, got %R",
+                     number);
+        Py_DECREF(number);
+    }
+    return NULL;
 }
 
 static PyObject *
@@ -243,23 +232,6 @@ raise_types(const hs_failure *failure)
                  "%s must be from 0 on and below the number of types, got %s[%lld] = %lld", name,
                  name, (long long)failure->row, (long long)failure->value);
     return NULL;
-}
-
-static PyObject *
-raise_radii(const hs_failure *failure)
-{
-    const char *name = failure->in_queries ? "query_radii" : "radii";
-    return raise_number(PyExc_ValueError, failure->value,
-                        "%s must be finite, not negative, and of ordinary size, got %s[%lld] = ",
-                        name, name, (long long)failure->row);
-}
-
-static PyObject *
-raise_weights(const hs_failure *failure)
-{
-    const char *name = failure->in_queries ? "query_weights" : "weights";
-    return raise_number(PyExc_ValueError, failure->value,
-                        "%s must be finite, got %s[%lld] = ", name, name, (long long)failure->row);
 }
 
 static PyObject *
@@ -282,13 +254,6 @@ raise_support_reach(const hs_failure *failure)
                  "as in another; %s[%lld] reaches further",
                  name, name, (long long)failure->row);
     return NULL;
-}
-
-static PyObject *
-raise_extent(const hs_failure *failure)
-{
-    return raise_number(PyExc_ValueError, failure->value,
-                        "extent must be finite and not negative, got ");
 }
 
 static PyObject *
@@ -341,59 +306,184 @@ raise_interrupted(const hs_failure *failure)
     return NULL;
 }
 
-static PyObject *
-raise_argument(const hs_failure *failure)
-{
-    (void)failure;
-    /* Python's arguments are checked before the call; the core refuses what that let through. */
-    PyErr_SetString(PyExc_ValueError, hs_status_text(HS_ERR_ARGUMENT));
-    return NULL;
-}
-
-/* The binding of dynamic lists names keys itself. */
-static PyObject *
-raise_key(const hs_failure *failure)
-{
-    (void)failure;
-    PyErr_SetString(PyExc_KeyError, hs_status_text(HS_ERR_KEY));
-    return NULL;
-}
-
-/* By status; NULL for those that are no failure, and for a kernel, whose name the options have. */
+/* Those that say more, by status. */
 static PyObject *(*const RAISE[])(const hs_failure *) = {
-    [HS_ERR_MEMORY] = raise_memory,
-    [HS_ERR_CUTOFF] = raise_cutoff,
-    [HS_ERR_NOT_FINITE] = raise_not_finite,
-    [HS_ERR_BOX_FINITE] = raise_box,
-    [HS_ERR_BOX_DEPENDENT] = raise_dependent,
-    [HS_ERR_BOX_SKEWED] = raise_skewed,
-    [HS_ERR_TOO_MANY] = raise_too_many,
-    [HS_ERR_SHIFT_RANGE] = raise_shift,
-    [HS_ERR_ROUNDING] = raise_rounding,
-    [HS_ERR_INTERRUPTED] = raise_interrupted,
-    [HS_ERR_FAR] = raise_far,
-    [HS_ERR_CAPACITY] = raise_capacity,
-    [HS_ERR_EDGES] = raise_edges,
-    [HS_ERR_TYPES] = raise_types,
-    [HS_ERR_WEIGHTS] = raise_weights,
-    [HS_ERR_RADII] = raise_radii,
-    [HS_ERR_SUPPORTS] = raise_supports,
-    [HS_ERR_SUPPORT_REACH] = raise_support_reach,
-    [HS_ERR_EXTENT] = raise_extent,
-    [HS_ERR_ARGUMENT] = raise_argument,
-    [HS_ERR_KEY] = raise_key,
+    [HS_ERR_MEMORY] = raise_memory,           [HS_ERR_BOX_DEPENDENT] = raise_dependent,
+    [HS_ERR_BOX_SKEWED] = raise_skewed,       [HS_ERR_TOO_MANY] = raise_too_many,
+    [HS_ERR_SHIFT_RANGE] = raise_shift,       [HS_ERR_ROUNDING] = raise_rounding,
+    [HS_ERR_INTERRUPTED] = raise_interrupted, [HS_ERR_FAR] = raise_far,
+    [HS_ERR_CAPACITY] = raise_capacity,       [HS_ERR_TYPES] = raise_types,
+    [HS_ERR_SUPPORTS] = raise_supports,       [HS_ERR_SUPPORT_REACH] = raise_support_reach,
 };
 
 PyObject *
 hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
 {
     const size_t number = (size_t)status;
-    if (status == HS_ERR_KERNEL) {
-        return raise_kernel(options);
+    if (number < sizeof WORDS / sizeof WORDS[0] && WORDS[number].must != NULL) {
+        return raise_words(failure, &WORDS[number]);
     }
     if (number < sizeof RAISE / sizeof RAISE[0] && RAISE[number] != NULL) {
         return RAISE[number](failure);
     }
+    switch (status) {
+    case HS_ERR_KERNEL: return raise_kernel(options);
+    /* Python's arguments are checked before the call; the core refuses what that let through. */
+    case HS_ERR_ARGUMENT: PyErr_SetString(PyExc_ValueError, hs_status_text(status)); return NULL;
+    /* The binding of dynamic lists names keys itself. */
+    case HS_ERR_KEY: PyErr_SetString(PyExc_KeyError, hs_status_text(status)); return NULL;
+    default: break;
+    }
     PyErr_Format(PyExc_SystemError, "unmapped status %d: %s", (int)status, hs_status_text(status));
     return NULL;
+}
+
+#define SHOWN 80 /* characters of a value in a message */
+
+/* The exception that is set, taken; NULL where it is not the fault of an argument. */
+static PyObject *
+take_fault(void)
+{
+    PyObject *type, *value, *trace;
+    if (!PyErr_ExceptionMatches(PyExc_Exception) || PyErr_ExceptionMatches(PyExc_MemoryError)) {
+        return NULL;
+    }
+    PyErr_Fetch(&type, &value, &trace);
+    PyErr_NormalizeException(&type, &value, &trace);
+    if (trace != NULL) {
+        PyException_SetTraceback(value, trace);
+    }
+    Py_XDECREF(type);
+    Py_XDECREF(trace);
+    return value;
+}
+
+/* Makes an exception the cause of the one that is set; takes ownership of it. */
+static void
+set_cause(PyObject *cause)
+{
+    PyObject *type, *value, *trace;
+    PyErr_Fetch(&type, &value, &trace);
+    PyErr_NormalizeException(&type, &value, &trace);
+    PyException_SetCause(value, cause);
+    PyErr_Restore(type, value, trace);
+}
+
+/* The text with one blank for each run of blanks and line breaks; takes ownership. NULL with an
+ * exception set, also for NULL. */
+static PyObject *
+on_one_line(PyObject *text)
+{
+    PyObject *words = text != NULL ? PyUnicode_Split(text, NULL, -1) : NULL;
+    PyObject *blank = words != NULL ? PyUnicode_FromString(" ") : NULL;
+    PyObject *joined = blank != NULL ? PyUnicode_Join(blank, words) : NULL;
+    Py_XDECREF(blank);
+    Py_XDECREF(words);
+    Py_XDECREF(text);
+    return joined;
+}
+
+void
+hs_refuse(PyObject *type, const char *must, PyObject *object)
+{
+    PyObject *text = on_one_line(PyObject_Repr(object));
+    if (text == NULL) {
+        PyObject *fault = take_fault();
+        if (fault == NULL) {
+            return;
+        }
+        Py_DECREF(fault);
+        PyErr_Format(type, "%s, got a value of type %.80s", must, Py_TYPE(object)->tp_name);
+        return;
+    }
+    if (PyUnicode_GetLength(text) > SHOWN) {
+        Py_SETREF(text, PyUnicode_Substring(text, 0, SHOWN - 3));
+        if (text != NULL) {
+            PyErr_Format(type, "%s, got %U...", must, text);
+        }
+    } else {
+        PyErr_Format(type, "%s, got %U", must, text);
+    }
+    Py_XDECREF(text);
+}
+
+bool
+hs_refuse_kind(const char *must, PyObject *object)
+{
+    PyObject *fault = take_fault();
+    if (fault != NULL) {
+        PyErr_Format(PyExc_TypeError, "%s, got %.80s", must, Py_TYPE(object)->tp_name);
+        set_cause(fault);
+    }
+    return false;
+}
+
+bool
+hs_whole_of(PyObject *object, const char *must, double *value)
+{
+    if (PyBool_Check(object)) {
+        hs_refuse(PyExc_TypeError, must, object);
+        return false;
+    }
+    PyObject *index = PyNumber_Index(object);
+    if (index == NULL) {
+        return hs_refuse_kind(must, object);
+    }
+    int             overflow;
+    const long long whole = PyLong_AsLongLongAndOverflow(index, &overflow);
+    *value = (double)whole;
+    if (overflow != 0) {
+        *value = PyLong_AsDouble(index);
+        if (PyErr_Occurred()) { /* an OverflowError: there is no other reason */
+            PyErr_Clear();
+            *value = overflow * (double)INFINITY;
+        }
+    }
+    Py_DECREF(index);
+    return true;
+}
+
+bool
+hs_real_of(PyObject *object, const char *must, double *value)
+{
+    if (PyFloat_Check(object)) {
+        *value = PyFloat_AS_DOUBLE(object);
+        return true;
+    }
+    if (sizeof(npy_longdouble) > sizeof(double) && PyArray_IsScalar(object, LongDouble)) {
+        hs_refuse(PyExc_TypeError, must, object); /* it would be rounded */
+        return false;
+    }
+    if (PyArray_IsScalar(object, Floating)) {
+        *value = PyFloat_AsDouble(object);
+        return PyErr_Occurred() ? hs_refuse_kind(must, object) : true;
+    }
+    if (!hs_whole_of(object, must, value)) {
+        return false;
+    }
+    if (isinf(*value)) {
+        PyErr_Format(PyExc_OverflowError, "%s, got one that is too large for float64", must);
+        return false;
+    }
+    return true;
+}
+
+void
+hs_tuple_put(PyObject **tuple, Py_ssize_t k, PyObject *entry)
+{
+    if (entry == NULL) {
+        Py_CLEAR(*tuple);
+    } else {
+        PyTuple_SET_ITEM(*tuple, k, entry);
+    }
+}
+
+PyObject *
+hs_tuple_of_names(const char *const *names, int n)
+{
+    PyObject *tuple = PyTuple_New(n);
+    for (int k = 0; tuple != NULL && k < n; k++) {
+        hs_tuple_put(&tuple, k, PyUnicode_FromString(names[k]));
+    }
+    return tuple;
 }

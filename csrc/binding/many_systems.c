@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* many_systems.c: finds where each system begins. Each number is read once: another thread may
  * write meanwhile. */
-#include "many_systems.h"
+#include "arguments.h"
 
-#include "convert.h"
+#include "outputs.h"
 
 #define FIRST_CAPACITY 1024               /* systems; doubled as needed */
 #define MOST_NUMBER    (INT64_C(1) << 62) /* so that counting on from it is safe */
@@ -263,27 +263,31 @@ take_own(PyObject *const *given, const hs_py_call *call, hs_systems *systems)
 }
 
 bool
-hs_batch_take(PyObject *const *given, const hs_py_call *call, hs_batch *batch)
+hs_batch_take(PyObject *given, const hs_py_call *call, hs_batch *batch)
 {
-    static const char *const names[HS_BATCH_PARTS] = {"batch", "cutoff", "box", "query_batch",
-                                                      "periodic"};
+    static const char *const names[] = {"batch", "cutoff", "box", "query_batch", "periodic"};
     hs_systems              *systems = &batch->systems;
     numbered                 points, queries = {.name = "query_batch"};
     *batch = (hs_batch){.is_given = true};
-    for (int k = 0; k < HS_BATCH_PARTS; k++) {
-        if (given[k] != Py_None && !hs_py_call_is_apart(call, given[k], names[k])) {
+    if (!PyTuple_CheckExact(given) || PyTuple_GET_SIZE(given) != 5 || call->among.cells != NULL) {
+        PyErr_SetString(PyExc_TypeError, "a batch of points must be a tuple of five");
+        return false;
+    }
+    PyObject *const *parts = &PyTuple_GET_ITEM(given, 0);
+    for (int k = 0; k < 5 && call->out != NULL; k++) {
+        if (parts[k] != Py_None && !hs_out_is_apart(call->out, call->letters, parts[k], names[k])) {
             return false;
         }
     }
-    if (!take_numbers(given[0], call->points.n, "batch", &points) ||
-        ((call->among.queries != NULL || given[3] != Py_None) &&
-         !take_numbers(given[3], call->queries.n, "query_batch", &queries))) {
+    if (!take_numbers(parts[0], call->points.n, "batch", &points) ||
+        ((call->among.queries != NULL || parts[3] != Py_None) &&
+         !take_numbers(parts[3], call->queries.n, "query_batch", &queries))) {
         return false;
     }
     systems->box = call->among.box;
     systems->reach = call->among.reach;
     systems->selection = call->among.selection;
-    const int64_t n_systems = take_own(given, call, systems);
+    const int64_t n_systems = take_own(parts, call, systems);
     if (n_systems < 0 || !find_systems(&points, &queries, n_systems, batch)) {
         hs_batch_free(batch);
         return false;
@@ -291,29 +295,6 @@ hs_batch_take(PyObject *const *given, const hs_py_call *call, hs_batch *batch)
     systems->first = batch->first;
     systems->first_query = batch->first_query;
     return true;
-}
-
-bool
-hs_batch_take_optional(const hs_py_call *call, hs_batch *batch)
-{
-    *batch = (hs_batch){.is_given = false};
-    if (call->batch == NULL) {
-        return true;
-    }
-    if (!PyTuple_CheckExact(call->batch) || PyTuple_GET_SIZE(call->batch) != HS_BATCH_PARTS ||
-        call->among.cells != NULL) {
-        PyErr_SetString(PyExc_TypeError, "a batch of points must be a tuple of five");
-        return false;
-    }
-    return hs_batch_take(&PyTuple_GET_ITEM(call->batch, 0), call, batch);
-}
-
-void
-hs_batch_forget_system(const hs_batch *batch, hs_failure *failure)
-{
-    if (batch->number != NULL) {
-        failure->system = -1;
-    }
 }
 
 PyObject *

@@ -1,74 +1,165 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* module.c: the extension module halfshell._core: method table, slots, init, and nothing else. */
+/* module.c: the extension module halfshell._core: its functions, what it says of itself, slots and
+ * init. */
 #define HS_IMPORTS_NUMPY
-#include "environment.h"
 #include "py_functions.h"
+
+#include "outputs.h"
+#include "errors.h"
 #include "quick.h"
+#include "system.h"
+
+static PyObject *
+kernels(PyObject *module, PyObject *ignored)
+{
+    const char *names[8];
+    (void)module;
+    (void)ignored;
+    return hs_tuple_of_names(names, hs_kernel_names(names, 8));
+}
+
+static PyObject *
+default_kernel(PyObject *module, PyObject *ignored)
+{
+    const char *best = "", *forced = hs_environment_kernel();
+    (void)module;
+    (void)ignored;
+    hs_kernel_names(&best, 1);
+    return PyUnicode_DecodeLocale(forced != NULL ? forced : best, "surrogateescape");
+}
+
+#if defined(__clang__)
+#define COMPILER "clang " __clang_version__
+#elif defined(__GNUC__)
+#define COMPILER "gcc " __VERSION__
+#elif defined(_MSC_VER)
+#define COMPILER "msvc"
+#else
+#define COMPILER "unknown"
+#endif
+
+/* Of the core as compiled, which may be older than the Python files beside it. */
+static PyObject *
+version(void)
+{
+    const int number = hs_version();
+    return PyUnicode_FromFormat("%d.%d.%d", number / 10000, number / 100 % 100, number % 100);
+}
+
+static PyObject *
+build_info(PyObject *module, PyObject *ignored)
+{
+    PyObject *dict = PyDict_New();
+    if (dict != NULL && hs_dict_put(dict, "core", version()) &&
+        hs_dict_put(dict, "compiler", PyUnicode_FromString(COMPILER)) &&
+#ifdef NDEBUG
+        hs_dict_put(dict, "assertions", PyBool_FromLong(0)) &&
+#else
+        hs_dict_put(dict, "assertions", PyBool_FromLong(1)) &&
+#endif
+        hs_dict_put(dict, "kernels", kernels(module, ignored))) {
+        return dict;
+    }
+    Py_XDECREF(dict);
+    return NULL;
+}
+
+static PyObject *
+available_memory(PyObject *module, PyObject *ignored)
+{
+    (void)module;
+    (void)ignored;
+    return PyFloat_FromDouble(hs_available_memory(NULL));
+}
+
+static PyObject *
+group_memory(PyObject *module, PyObject *root)
+{
+    const char *folder = PyUnicode_AsUTF8(root);
+    (void)module;
+    return folder != NULL ? PyFloat_FromDouble(hs_group_memory(folder)) : NULL;
+}
+
+static PyObject *
+clear_cache(PyObject *module, PyObject *ignored)
+{
+    (void)module;
+    (void)ignored;
+    hs_pool_clear();
+    Py_RETURN_NONE;
+}
+
+static PyObject *
+set_cache_limit(PyObject *module, PyObject *limit)
+{
+    const size_t before = hs_pool_limit();
+    const size_t bytes = PyLong_AsSize_t(limit);
+    (void)module;
+    if (bytes == (size_t)-1 && PyErr_Occurred()) {
+        return NULL;
+    }
+    hs_pool_set_limit(bytes);
+    return PyLong_FromSize_t(before);
+}
+
+static PyObject *
+cache_limit(PyObject *module, PyObject *ignored)
+{
+    (void)module;
+    (void)ignored;
+    return PyLong_FromSize_t(hs_pool_limit());
+}
+
+static PyObject *
+cache_held(PyObject *module, PyObject *ignored)
+{
+    (void)module;
+    (void)ignored;
+    return PyLong_FromSize_t(hs_pool_held());
+}
 
 #define FASTCALL(function) ((PyCFunction)(void (*)(void))(function))
 
-static PyMethodDef methods[] = {
-    {"pairs", FASTCALL(hs_py_pairs), METH_FASTCALL, "See halfshell.pairs."},
-    {"count_pairs", FASTCALL(hs_py_count_pairs), METH_FASTCALL, "See halfshell.count_pairs."},
-    {"iter_pairs", FASTCALL(hs_py_iter_pairs), METH_FASTCALL, "See halfshell.iter_pairs."},
-    {"for_each_pair", FASTCALL(hs_py_for_each_pair), METH_FASTCALL, "See halfshell.for_each_pair."},
-    {"histogram", FASTCALL(hs_py_histogram), METH_FASTCALL, "See halfshell.pair_histogram."},
-    {"plain", FASTCALL(hs_py_plain), METH_FASTCALL,
-     "One of these functions, of plain arguments, or NotImplemented."},
-    {"quick", FASTCALL(hs_py_quick), METH_FASTCALL, "The same, of arguments by name."},
-    {"pairs_between", FASTCALL(hs_py_pairs_between), METH_FASTCALL, "See halfshell.pairs_between."},
-    {"count_between", FASTCALL(hs_py_count_between), METH_FASTCALL,
-     "See halfshell.count_pairs: of two sets."},
-    {"neighbors", FASTCALL(hs_py_neighbors), METH_FASTCALL, "See halfshell.neighbors."},
-    {"coordination", FASTCALL(hs_py_coordination), METH_FASTCALL, "See halfshell.coordination."},
-    {"clusters", FASTCALL(hs_py_clusters), METH_FASTCALL, "See halfshell.clusters."},
-    {"cells_build", FASTCALL(hs_py_cells_build), METH_FASTCALL, "See halfshell.CellList."},
-    {"cells_layout", hs_py_cells_layout, METH_O, "The layout of cells."},
-    {"cells_find", FASTCALL(hs_py_cells_find), METH_FASTCALL, "See CellList.cell_of."},
-    {"cells_candidates", FASTCALL(hs_py_cells_candidates), METH_FASTCALL,
-     "See CellList.candidates."},
-    {"batch_pairs", FASTCALL(hs_py_batch_pairs), METH_FASTCALL, "pairs of many systems."},
-    {"batch_count", FASTCALL(hs_py_batch_count), METH_FASTCALL, "count_pairs of many systems."},
-    {"nearest", FASTCALL(hs_py_nearest), METH_FASTCALL, "See halfshell.nearest."},
-    {"measure", FASTCALL(hs_py_measure), METH_FASTCALL, "See halfshell.measure."},
-    {"connect", FASTCALL(hs_py_connect), METH_FASTCALL, "See halfshell.Connectivity."},
-    {"connect_search", FASTCALL(hs_py_connect_search), METH_FASTCALL,
-     "See halfshell.Connectivity."},
-    {"overlap", FASTCALL(hs_py_overlap), METH_FASTCALL, "See halfshell.Connectivity.overlap."},
-    {"intersect", FASTCALL(hs_py_intersect), METH_FASTCALL,
-     "See halfshell.Connectivity.intersection."},
-    {"pair_rows", FASTCALL(hs_py_pair_rows), METH_FASTCALL, "See halfshell.Connectivity.pairs."},
-    {"keep_rows", FASTCALL(hs_py_keep_rows), METH_FASTCALL, "See halfshell.Connectivity.patch."},
-    {"keep_pairs", FASTCALL(hs_py_keep_pairs), METH_FASTCALL, "See halfshell.Connectivity.patch."},
-    {"rows_without", FASTCALL(hs_py_rows_without), METH_FASTCALL,
-     "See halfshell.Connectivity.remove."},
-    {"feet_between", FASTCALL(hs_py_feet_between), METH_FASTCALL,
-     "See halfshell.Connectivity.intersection_of."},
-    {"morton_keys", FASTCALL(hs_py_morton_keys), METH_FASTCALL, "Places on the Z curve."},
-    {"explain", FASTCALL(hs_py_explain), METH_FASTCALL, "See halfshell.explain."},
-    {"kernels", hs_py_kernels, METH_NOARGS, "See halfshell.kernels."},
-    {"default_kernel", hs_py_default_kernel, METH_NOARGS, "The kernel where none is named."},
-    {"build_info", hs_py_build_info, METH_NOARGS, "How this extension was built."},
-    {"available_memory", hs_py_available_memory, METH_NOARGS,
-     "Bytes that this process may still take."},
-    {"group_memory", hs_py_group_memory, METH_O,
-     "What control groups leave of them; a folder stands in for the root of all files."},
-    {"clear_cache", hs_py_clear_cache, METH_NOARGS, "See halfshell.clear_cache."},
-    {"set_cache_limit", hs_py_set_cache_limit, METH_O, "See halfshell.set_cache_limit."},
-    {"cache_limit", hs_py_cache_limit, METH_NOARGS, "Bytes that the cache holds at most."},
-    {"cache_held", hs_py_cache_held, METH_NOARGS, "Bytes that the cache holds."},
-    {"box_measure", FASTCALL(hs_py_box_measure), METH_FASTCALL, "See halfshell.Box."},
-    {"box_wrap", FASTCALL(hs_py_box_wrap), METH_FASTCALL, "See halfshell.Box.wrap."},
-    {"box_places", FASTCALL(hs_py_box_places), METH_FASTCALL, "See halfshell.bricks."},
-    {"verlet_new", hs_py_verlet_new, METH_NOARGS, "See halfshell.VerletList."},
-    {"verlet_update", FASTCALL(hs_py_verlet_update), METH_FASTCALL,
-     "See halfshell.VerletList.update."},
-    {"verlet_pairs", FASTCALL(hs_py_verlet_pairs), METH_FASTCALL,
-     "See halfshell.VerletList.pairs."},
-    {"verlet_look", hs_py_verlet_look, METH_O, "What a list of halfshell.VerletList is like."},
-    {"dynamic_new", FASTCALL(hs_py_dynamic_new), METH_FASTCALL, "See halfshell.DynamicCellList."},
+/* Functions that are not in the table: they search for nothing. */
+static PyMethodDef others[] = {
+    {"quick", hs_py_quick, METH_O, NULL},
+    {"scene", FASTCALL(hs_py_scene), METH_FASTCALL, NULL},
+    {"know", FASTCALL(hs_py_know), METH_FASTCALL, NULL},
+    {"table", hs_py_table, METH_NOARGS, NULL},
+    {"cells_layout", hs_py_cells_layout, METH_O, NULL},
+    {"cells_find", FASTCALL(hs_py_cells_find), METH_FASTCALL, NULL},
+    {"feet_between", FASTCALL(hs_py_feet_between), METH_FASTCALL, NULL},
+    {"morton_keys", FASTCALL(hs_py_morton_keys), METH_FASTCALL, NULL},
+    {"kernels", kernels, METH_NOARGS, NULL},
+    {"default_kernel", default_kernel, METH_NOARGS, NULL},
+    {"build_info", build_info, METH_NOARGS, NULL},
+    {"available_memory", available_memory, METH_NOARGS, NULL},
+    {"group_memory", group_memory, METH_O, NULL},
+    {"clear_cache", clear_cache, METH_NOARGS, NULL},
+    {"set_cache_limit", set_cache_limit, METH_O, NULL},
+    {"cache_limit", cache_limit, METH_NOARGS, NULL},
+    {"cache_held", cache_held, METH_NOARGS, NULL},
+    {"box_measure", FASTCALL(hs_py_box_measure), METH_FASTCALL, NULL},
+    {"box_wrap", FASTCALL(hs_py_box_wrap), METH_FASTCALL, NULL},
+    {"box_places", FASTCALL(hs_py_box_places), METH_FASTCALL, NULL},
+    {"verlet_new", hs_py_verlet_new, METH_NOARGS, NULL},
+    {"verlet_look", hs_py_verlet_look, METH_O, NULL},
+    {"dynamic_new", FASTCALL(hs_py_dynamic_new), METH_FASTCALL, NULL},
     {NULL, NULL, 0, NULL},
 };
+
+/* Those of the table, filled when the module is first made. */
+static PyMethodDef searches[HS_FUNCTIONS + 1];
+
+static int
+add_functions(PyObject *module)
+{
+    for (int k = 0; k < HS_FUNCTIONS; k++) {
+        const hs_function *function = &hs_functions[k];
+        searches[k] = (PyMethodDef){function->name, FASTCALL(function->body), METH_FASTCALL, NULL};
+    }
+    return PyModule_AddFunctions(module, searches);
+}
 
 static int
 module_exec(PyObject *module)
@@ -77,7 +168,7 @@ module_exec(PyObject *module)
     hs_environment_read();
     types[HS_STREAM_TYPE] = hs_py_stream_type(module);
     types[HS_DYNAMIC_TYPE] = types[HS_STREAM_TYPE] != NULL ? hs_py_dynamic_type(module) : NULL;
-    if (types[HS_DYNAMIC_TYPE] == NULL || hs_py_add_capi(module) < 0) {
+    if (types[HS_DYNAMIC_TYPE] == NULL || hs_py_add_capi(module) < 0 || add_functions(module) < 0) {
         return -1;
     }
     return PyArray_ImportNumPyAPI();
@@ -87,8 +178,9 @@ static int
 module_traverse(PyObject *module, visitproc visit, void *arg)
 {
     PyObject **types = PyModule_GetState(module);
-    Py_VISIT(types[HS_STREAM_TYPE]);
-    Py_VISIT(types[HS_DYNAMIC_TYPE]);
+    for (int k = 0; k < HS_TYPES; k++) {
+        Py_VISIT(types[k]);
+    }
     return 0;
 }
 
@@ -96,8 +188,9 @@ static int
 module_clear(PyObject *module)
 {
     PyObject **types = PyModule_GetState(module);
-    Py_CLEAR(types[HS_STREAM_TYPE]);
-    Py_CLEAR(types[HS_DYNAMIC_TYPE]);
+    for (int k = 0; k < HS_TYPES; k++) {
+        Py_CLEAR(types[k]);
+    }
     return 0;
 }
 
@@ -117,7 +210,7 @@ static struct PyModuleDef definition = {
     .m_name = "halfshell._core",
     .m_doc = "The C core of halfshell. Private: use the functions of halfshell.",
     .m_size = HS_TYPES * sizeof(PyObject *),
-    .m_methods = methods,
+    .m_methods = others,
     .m_slots = slots,
     .m_traverse = module_traverse,
     .m_clear = module_clear,

@@ -2,7 +2,7 @@
 /* outputs.c: one table of letters, from which arrays are checked and made. */
 #include "outputs.h"
 
-#include "tuples.h"
+#include "errors.h"
 
 #include <math.h>
 #include <string.h>
@@ -268,8 +268,9 @@ front_of(PyArrayObject *array, npy_intp n_rows)
     return view;
 }
 
-PyObject *
-hs_out_filled(PyObject *out, const char *letters, int64_t n_pairs)
+/* The filled parts of these arrays, in the same form. */
+static PyObject *
+out_filled(PyObject *out, const char *letters, int64_t n_pairs)
 {
     const Py_ssize_t n = (Py_ssize_t)strlen(letters);
     if (n == 1) {
@@ -283,8 +284,8 @@ hs_out_filled(PyObject *out, const char *letters, int64_t n_pairs)
     return result;
 }
 
-double
-hs_out_bytes(const char *letters, int ndim, int index_bytes, int64_t capacity)
+static double
+out_bytes(const char *letters, int ndim, int index_bytes, int64_t capacity)
 {
     double bytes = 0.0;
     for (const char *letter = letters; *letter != '\0'; letter++) {
@@ -293,8 +294,9 @@ hs_out_bytes(const char *letters, int ndim, int index_bytes, int64_t capacity)
     return bytes * (double)capacity;
 }
 
-PyObject *
-hs_out_new(const char *letters, int ndim, int index_bytes, int64_t capacity)
+/* Uninitialized arrays for so many pairs, as hs_out_of takes them. */
+static PyObject *
+out_new(const char *letters, int ndim, int index_bytes, int64_t capacity)
 {
     const Py_ssize_t n = (Py_ssize_t)strlen(letters);
     PyObject        *result = n > 1 ? PyTuple_New(n) : NULL;
@@ -328,9 +330,11 @@ pad_integers(PyArrayObject *array, int64_t first, int64_t even, int64_t odd)
     }
 }
 
-void
-hs_out_pad(PyObject *out, const char *letters, int64_t first, int64_t no_i, int64_t no_j,
-           int64_t no_shell)
+/* Writes what is no pair into these arrays from row `first` on: `no_i` and `no_j` as i and j, an
+ * infinite distance, zeros as vector and shift, `no_shell` as shell. */
+static void
+out_pad(PyObject *out, const char *letters, int64_t first, int64_t no_i, int64_t no_j,
+        int64_t no_shell)
 {
     const Py_ssize_t n = (Py_ssize_t)strlen(letters);
     for (Py_ssize_t k = 0; k < n; k++) {
@@ -350,4 +354,142 @@ hs_out_pad(PyObject *out, const char *letters, int64_t first, int64_t no_i, int6
         default: memset(rest, 0, (size_t)((size - first * width) * PyArray_ITEMSIZE(array))); break;
         }
     }
+}
+
+/* Bytes of arrays for which the system is not asked what it has left. */
+#define SMALL_ROOM ((double)(64 << 20))
+
+bool
+hs_out_make_room(hs_py_call *call)
+{
+    const hs_options *options = &call->options;
+    const int         ndim = call->points.ndim, index_bytes = options->index_bytes;
+    const int64_t     capacity = call->capacity < 0 ? -call->capacity : call->capacity;
+    if (capacity == 0) {
+        return true;
+    }
+    const double bytes = out_bytes(call->letters, ndim, index_bytes, capacity);
+    double       limit = options->memory_limit;
+    if (bytes > SMALL_ROOM && options->find_limit != NULL) {
+        limit = fmin(limit, options->find_limit(options->find_context));
+    }
+    if (!(bytes <= limit && bytes <= (double)PY_SSIZE_T_MAX / 2)) {
+        char room[48], most[48];
+        PyErr_Format(PyExc_MemoryError, "arrays of capacity %lld would take %s; %s",
+                     (long long)capacity, hs_format_bytes(bytes, room, sizeof room),
+                     hs_format_limit(limit, most, sizeof most));
+        return false;
+    }
+    call->room = out_new(call->letters, ndim, index_bytes, capacity);
+    if (call->room != NULL &&
+        !hs_out_of(call->room, call->letters, ndim, index_bytes, &call->arrays)) {
+        Py_CLEAR(call->room);
+    }
+    call->out = call->room;
+    call->options.out = call->room != NULL ? &call->arrays : NULL;
+    return call->room != NULL;
+}
+
+/* Entries of the room, and behind them the number of pairs; a new reference or NULL. */
+static PyObject *
+with_need(PyObject *room, bool is_one, int64_t needed)
+{
+    const Py_ssize_t n = is_one ? 1 : PyTuple_GET_SIZE(room);
+    PyObject        *result = PyTuple_New(n + 1);
+    for (Py_ssize_t k = 0; result != NULL && k < n; k++) {
+        PyObject *array = is_one ? room : PyTuple_GET_ITEM(room, k);
+        Py_INCREF(array);
+        hs_tuple_put(&result, k, array);
+    }
+    if (result != NULL) {
+        hs_tuple_put(&result, n, PyLong_FromLongLong(needed));
+    }
+    return result;
+}
+
+/* The room, padded; gives it up. Where the pairs do not fit there is none of them in it. */
+static PyObject *
+padded(hs_py_call *call, hs_status status, int64_t n_pairs)
+{
+    const int64_t capacity = call->arrays.capacity;
+    const bool    fits = status == HS_OK, is_one = strlen(call->letters) == 1;
+    const int64_t needed = fits ? n_pairs : hs_pairs_needed(&call->failure);
+    PyObject     *result = NULL;
+    if (fits || (status == HS_ERR_CAPACITY && call->capacity < 0)) {
+        const hs_points *asking = call->among.queries != NULL ? &call->queries : &call->points;
+        out_pad(call->room, call->letters, fits ? needed : 0, asking->n, call->points.n,
+                call->options.n_shells);
+        Py_INCREF(call->room);
+        result = call->room;
+        if (call->capacity < 0) {
+            Py_SETREF(result, with_need(call->room, is_one, needed));
+        }
+    } else if (status == HS_ERR_CAPACITY) {
+        hs_raise_capacity(capacity, needed);
+    } else {
+        hs_raise(status, &call->failure, &call->options);
+    }
+    Py_CLEAR(call->room);
+    return result;
+}
+
+PyObject *
+hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs)
+{
+    hs_py_call_end(call);
+    if (call->room != NULL) {
+        const int64_t n_pairs = hs_pairs_length(pairs);
+        hs_pairs_free(pairs);
+        return padded(call, status, n_pairs);
+    }
+    if (status != HS_OK) {
+        return hs_raise(status, &call->failure, &call->options);
+    }
+    PyObject *arrays =
+        call->out != NULL
+            ? out_filled(call->out, call->letters, hs_pairs_length(pairs))
+            : hs_arrays_of(pairs, call->letters, call->points.ndim, call->options.index_bytes);
+    hs_pairs_free(pairs);
+    return arrays;
+}
+
+PyObject *
+hs_py_call_table(hs_py_call *call, hs_status status, hs_pairs *rows)
+{
+    hs_py_call_end(call);
+    if (status != HS_OK) {
+        return hs_raise(status, &call->failure, &call->options);
+    }
+    PyObject *table =
+        hs_table_of(rows, call->letters, call->points.ndim, call->options.index_bytes);
+    hs_pairs_free(rows);
+    return table;
+}
+
+PyObject *
+hs_tuple_of_integers(const int64_t *values, int n)
+{
+    PyObject *tuple = PyTuple_New(n);
+    for (int k = 0; tuple != NULL && k < n; k++) {
+        hs_tuple_put(&tuple, k, PyLong_FromLongLong(values[k]));
+    }
+    return tuple;
+}
+
+PyObject *
+hs_tuple_of_reals(const double *values, int n)
+{
+    PyObject *tuple = PyTuple_New(n);
+    for (int k = 0; tuple != NULL && k < n; k++) {
+        hs_tuple_put(&tuple, k, PyFloat_FromDouble(values[k]));
+    }
+    return tuple;
+}
+
+bool
+hs_dict_put(PyObject *dict, const char *key, PyObject *value)
+{
+    const bool done = value != NULL && PyDict_SetItemString(dict, key, value) == 0;
+    Py_XDECREF(value);
+    return done;
 }

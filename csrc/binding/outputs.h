@@ -1,11 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* outputs.h: the arrays that pairs and rows are returned in: new ones, or the caller's. */
 #ifndef HS_OUTPUTS_H
 #define HS_OUTPUTS_H
 
-#include "numpy_api.h"
-
-#include "../halfshell.h"
+#include "arguments.h"
 
 /*
  * The arrays of `out`, one for each letter, or for one letter the array itself, as the core takes
@@ -19,20 +16,6 @@ bool hs_out_of(PyObject *out, const char *letters, int ndim, int index_bytes,
  * array: else false with an exception set that names it. Compares where they begin and end. */
 bool hs_out_is_apart(PyObject *out, const char *letters, PyObject *input, const char *name);
 
-/* The filled parts of these arrays, in the same form; a new reference or NULL. */
-PyObject *hs_out_filled(PyObject *out, const char *letters, int64_t n_pairs);
-
-/* Uninitialized arrays for so many pairs, as hs_out_of takes them; a new reference or NULL. */
-PyObject *hs_out_new(const char *letters, int ndim, int index_bytes, int64_t capacity);
-
-/* Bytes of such arrays. */
-double hs_out_bytes(const char *letters, int ndim, int index_bytes, int64_t capacity);
-
-/* Writes what is no pair into these arrays from row `first` on: `no_i` and `no_j` as i and j, an
- * infinite distance, zeros as vector and shift, `no_shell` as shell. */
-void hs_out_pad(PyObject *out, const char *letters, int64_t first, int64_t no_i, int64_t no_j,
-                int64_t no_shell);
-
 /* New arrays in the order of the letters: a tuple, or for one letter the array itself. Takes
  * what it can from the pairs; a new reference or NULL. */
 PyObject *hs_arrays_of(hs_pairs *pairs, const char *letters, int ndim, int index_bytes);
@@ -40,5 +23,25 @@ PyObject *hs_arrays_of(hs_pairs *pairs, const char *letters, int ndim, int index
 /* Rows of a full search: a tuple of the offsets and these arrays, all of them read-only. Takes what
  * it can from the rows; a new reference or NULL. */
 PyObject *hs_table_of(hs_pairs *rows, const char *letters, int ndim, int index_bytes);
+
+/* Where there is a capacity: arrays of that length as `out` of the call. False with an exception
+ * set. */
+bool hs_out_make_room(hs_py_call *call);
+
+/* What a function returns, the GIL taken: arrays of the pairs, which are freed, or those of `out`,
+ * or with a capacity all of its room, padded; NULL with an exception set for a status other than
+ * HS_OK. The call has ended. */
+PyObject *hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs);
+
+/* The same, as a table of rows. */
+PyObject *hs_py_call_table(hs_py_call *call, hs_status status, hs_pairs *rows);
+
+/* n numbers; a new reference, or NULL with an exception set. */
+PyObject *hs_tuple_of_integers(const int64_t *values, int n);
+PyObject *hs_tuple_of_reals(const double *values, int n);
+
+/* Puts a new reference into a dictionary and gives it up; false with an exception set, also where
+ * `value` is NULL. */
+bool hs_dict_put(PyObject *dict, const char *key, PyObject *value);
 
 #endif

@@ -1,12 +1,15 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* py_cells.c: cells that are kept: building them, looking at them. Searches take them in place of
- * points. */
+/* py_cells.c: what is kept between searches, in capsules: cells, which searches take in place of
+ * points, and lists for many steps; and boxes. */
 #include "py_functions.h"
 
-#include "py_call.h"
-#include "convert.h"
 #include "errors.h"
-#include "tuples.h"
+#include "outputs.h"
+#include "system.h"
+
+#include <string.h>
+
+/* ---- cells -------------------------------------------------------------------------------- */
 
 static void
 free_cells(PyObject *capsule)
@@ -20,10 +23,19 @@ hs_py_cells_build(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     hs_py_call call;
     hs_cells  *cells = NULL;
     (void)module;
-    if (!hs_py_call_take(&call, "cells_build", "x", arguments, n_arguments)) {
+    if (!hs_py_call_take(&call, HS_FN_CELLS_BUILD, arguments, n_arguments)) {
         return NULL;
     }
     call.options.cell_size = call.real;
+    PyObject *domain = arguments[HS_CALL_ARGUMENTS + 1];
+    if (domain != Py_None) {
+        if (!hs_is_array(domain, NPY_DOUBLE, 2) || PyArray_DIM((PyArrayObject *)domain, 0) != 2 ||
+            PyArray_DIM((PyArrayObject *)domain, 1) != call.points.ndim) {
+            PyErr_SetString(PyExc_TypeError, "domain must be None or an array of two rows");
+            return NULL;
+        }
+        call.options.domain = PyArray_DATA((PyArrayObject *)domain);
+    }
     hs_py_call_release(&call);
     const hs_status status =
         hs_cells_build(&call.points, call.among.box, &call.options, &cells, &call.failure);
@@ -143,7 +155,7 @@ hs_py_cells_candidates(PyObject *module, PyObject *const *arguments, Py_ssize_t 
     hs_py_call call;
     hs_pairs  *ranges = NULL;
     (void)module;
-    if (!hs_py_call_take(&call, "cells_candidates", "Q", arguments, n_arguments) ||
+    if (!hs_py_call_take(&call, HS_FN_CELLS_CANDIDATES, arguments, n_arguments) ||
         !expect_cells(call.among.cells)) {
         return NULL;
     }
@@ -152,4 +164,286 @@ hs_py_cells_candidates(PyObject *module, PyObject *const *arguments, Py_ssize_t 
                                                  &call.options, &ranges, &call.failure);
     hs_py_call_acquire(&call);
     return hs_py_call_table(&call, status, ranges); /* "ij": where each begins and ends */
+}
+
+/* ---- lists for many steps ----------------------------------------------------------------- */
+
+#define CAPSULE "halfshell._core.verlet"
+
+static void
+free_list(PyObject *capsule)
+{
+    hs_verlet_free(PyCapsule_GetPointer(capsule, CAPSULE));
+}
+
+PyObject *
+hs_py_verlet_new(PyObject *module, PyObject *ignored)
+{
+    (void)module;
+    (void)ignored;
+    hs_verlet *list = hs_verlet_new();
+    if (list == NULL) {
+        return PyErr_NoMemory();
+    }
+    PyObject *capsule = PyCapsule_New(list, CAPSULE, free_list);
+    if (capsule == NULL) {
+        hs_verlet_free(list);
+    }
+    return capsule;
+}
+
+/* A list, and the arguments of a search; false with an exception set. */
+static bool
+take_call(hs_py_call *call, hs_verlet **list, hs_function_number number, PyObject *const *arguments,
+          Py_ssize_t n_arguments)
+{
+    *list = n_arguments > 0 ? PyCapsule_GetPointer(arguments[0], CAPSULE) : NULL;
+    if (n_arguments == 0) {
+        PyErr_Format(PyExc_TypeError, "%s takes a list", hs_functions[number].name);
+    }
+    return *list != NULL && hs_py_call_take(call, number, arguments + 1, n_arguments - 1);
+}
+
+PyObject *
+hs_py_verlet_update(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_py_call call;
+    hs_verlet *list;
+    bool       rebuilt = false;
+    (void)module;
+    if (!take_call(&call, &list, HS_FN_VERLET_UPDATE, arguments, n_arguments)) {
+        return NULL;
+    }
+    hs_py_call_release(&call);
+    const hs_status status = hs_verlet_update(list, &call.points, call.among.box, &call.options,
+                                              call.real, call.flag, &rebuilt, &call.failure);
+    hs_py_call_acquire(&call);
+    return status == HS_OK ? PyBool_FromLong(rebuilt)
+                           : hs_raise(status, &call.failure, &call.options);
+}
+
+PyObject *
+hs_py_verlet_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_py_call call;
+    hs_verlet *list;
+    hs_pairs  *pairs = NULL;
+    (void)module;
+    if (!take_call(&call, &list, HS_FN_VERLET_PAIRS, arguments, n_arguments)) {
+        return NULL;
+    }
+    const hs_verlet_state state = hs_verlet_look(list);
+    if (call.points.ndim != state.ndim) {
+        PyErr_Format(PyExc_ValueError, "points must have %d dimensions here", state.ndim);
+        return NULL;
+    }
+    call.points.n = state.n_points; /* those given are none: the list has its own */
+    if (arguments[HS_CALL_ARGUMENTS] == Py_None) {
+        call.options.threads = -hs_default_threads();
+    }
+    hs_py_call_release(&call);
+    const hs_status status = hs_verlet_find(list, &call.options, &pairs, &call.failure);
+    hs_py_call_acquire(&call);
+    return hs_py_call_pairs(&call, status, pairs);
+}
+
+PyObject *
+hs_py_verlet_look(PyObject *module, PyObject *capsule)
+{
+    (void)module;
+    hs_verlet *list = PyCapsule_GetPointer(capsule, CAPSULE);
+    if (list == NULL) {
+        return NULL;
+    }
+    const hs_verlet_state state = hs_verlet_look(list);
+    return Py_BuildValue("{s:O,s:i,s:L,s:L,s:d,s:d,s:d,s:d}", "has_list",
+                         state.has_list ? Py_True : Py_False, "ndim", state.ndim, "n_points",
+                         (long long)state.n_points, "n_listed", (long long)state.n_listed, "cutoff",
+                         state.cutoff, "radius", state.radius, "margin", state.margin, "tried",
+                         state.tried);
+}
+
+/* ---- boxes -------------------------------------------------------------------------------- */
+
+/* Points between two looks for Ctrl-C: some hundredths of a second in the most skewed box. */
+#define POINTS_PER_CALL 32768
+
+static PyObject *
+heights_and_volume(const double *heights, int ndim, double volume)
+{
+    npy_intp  shape[1] = {ndim};
+    PyObject *array = PyArray_SimpleNew(1, shape, NPY_DOUBLE);
+    if (array == NULL) {
+        return NULL;
+    }
+    memcpy(PyArray_DATA((PyArrayObject *)array), heights, (size_t)ndim * sizeof(double));
+    return Py_BuildValue("(Nd)", array, volume);
+}
+
+PyObject *
+hs_py_box_measure(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_box        box;
+    hs_failure    failure;
+    bool          given;
+    unsigned long repeats;
+    double        heights[HS_MAX_DIM] = {0}, volume;
+    (void)module;
+    if (n_arguments != 2 || !PyArray_Check(arguments[0]) ||
+        PyArray_NDIM((PyArrayObject *)arguments[0]) != 2) {
+        PyErr_SetString(PyExc_TypeError, "box_measure takes a box (d, d) and periodic bits");
+        return NULL;
+    }
+    const npy_intp ndim = PyArray_DIM((PyArrayObject *)arguments[0], 0);
+    if (ndim < 1 || ndim > HS_MAX_DIM) {
+        PyErr_Format(PyExc_ValueError, "box must have shape (d, d) with 1 <= d <= %d", HS_MAX_DIM);
+        return NULL;
+    }
+    if (!hs_repeats_of(arguments[1], &repeats) ||
+        !hs_box_of(arguments[0], repeats, (int)ndim, &box, &given)) {
+        return NULL;
+    }
+    const hs_status status = hs_box_measure(&box, heights, &volume, &failure);
+    if (status != HS_OK) {
+        return hs_raise(status, &failure, NULL);
+    }
+    return heights_and_volume(heights, (int)ndim, volume);
+}
+
+/* What is done with some rows of points, which begin at row `first`. */
+typedef struct box_work {
+    const hs_box *box;
+    int64_t       n; /* rows in all */
+    double       *wrapped;
+    int64_t      *shifts;
+    double        cutoff, largest, *places;
+    hs_box_axes   axes;
+} box_work;
+
+typedef hs_status work_fn(box_work *work, const hs_points *rows, int64_t first,
+                          hs_failure *failure);
+
+static hs_status
+wrap_rows(box_work *work, const hs_points *rows, int64_t first, hs_failure *failure)
+{
+    const int64_t at = first * rows->ndim;
+    return hs_box_wrap(work->box, rows, work->wrapped + at, work->shifts + at, failure);
+}
+
+static hs_status
+place_rows(box_work *work, const hs_points *rows, int64_t first, hs_failure *failure)
+{
+    return hs_box_places(work->box, rows, work->cutoff, work->largest, work->places + first,
+                         work->n, &work->axes, failure);
+}
+
+/* Some points after others, without the GIL; signals are handled in between. Without points once,
+ * for what is said of the box. Returns false with an exception set. */
+static bool
+in_parts(const hs_points *points, work_fn *work_on, box_work *work)
+{
+    hs_points  part = *points;
+    hs_failure failure;
+    int64_t    first = 0;
+    work->n = points->n;
+    do {
+        hs_status status;
+        part.n = points->n - first < POINTS_PER_CALL ? points->n - first : POINTS_PER_CALL;
+        part.data = (const char *)points->data + first * points->row_stride;
+        Py_BEGIN_ALLOW_THREADS
+        status = work_on(work, &part, first, &failure);
+        Py_END_ALLOW_THREADS
+        if (status != HS_OK) {
+            const bool is_of_point = status == HS_ERR_NOT_FINITE || status == HS_ERR_SHIFT_RANGE;
+            failure.row += failure.row >= 0 && is_of_point ? first : 0;
+            hs_raise(status, &failure, NULL);
+            return false;
+        }
+        if (PyErr_CheckSignals() != 0) {
+            return false;
+        }
+        first += part.n;
+    } while (first < points->n);
+    return true;
+}
+
+PyObject *
+hs_py_box_wrap(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_points     points;
+    hs_box        box;
+    bool          given;
+    unsigned long repeats;
+    (void)module;
+    if (n_arguments != 3) {
+        PyErr_SetString(PyExc_TypeError, "box_wrap takes points, a box and periodic bits");
+        return NULL;
+    }
+    if (!hs_repeats_of(arguments[2], &repeats) || !hs_points_of(arguments[0], "points", &points) ||
+        !hs_box_of(arguments[1], repeats, points.ndim, &box, &given)) {
+        return NULL;
+    }
+    if (!given) {
+        PyErr_SetString(PyExc_TypeError, "box_wrap needs a box");
+        return NULL;
+    }
+    npy_intp  shape[2] = {(npy_intp)points.n, points.ndim};
+    PyObject *wrapped = PyArray_SimpleNew(2, shape, NPY_DOUBLE);
+    PyObject *shifts = PyArray_SimpleNew(2, shape, NPY_INT64);
+    bool      made = wrapped != NULL && shifts != NULL;
+    if (made) {
+        box_work work = {.box = &box,
+                         .wrapped = PyArray_DATA((PyArrayObject *)wrapped),
+                         .shifts = PyArray_DATA((PyArrayObject *)shifts)};
+        made = in_parts(&points, wrap_rows, &work);
+    }
+    if (!made) {
+        Py_XDECREF(wrapped);
+        Py_XDECREF(shifts);
+        return NULL;
+    }
+    return Py_BuildValue("(NN)", wrapped, shifts);
+}
+
+PyObject *
+hs_py_box_places(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_points     points;
+    hs_box        box;
+    bool          given;
+    unsigned long repeats;
+    (void)module;
+    if (n_arguments != 5) {
+        PyErr_SetString(PyExc_TypeError,
+                        "box_places takes points, a box, periodic bits, a cutoff and the largest "
+                        "coordinate");
+        return NULL;
+    }
+    const double cutoff = PyFloat_AsDouble(arguments[3]);
+    const double largest = PyErr_Occurred() ? 0.0 : PyFloat_AsDouble(arguments[4]);
+    if (PyErr_Occurred() || !hs_repeats_of(arguments[2], &repeats) ||
+        !hs_points_of(arguments[0], "points", &points) ||
+        !hs_box_of(arguments[1], repeats, points.ndim, &box, &given)) {
+        return NULL;
+    }
+    npy_intp  shape[2] = {points.ndim, (npy_intp)points.n};
+    PyObject *places = PyArray_SimpleNew(2, shape, NPY_DOUBLE);
+    if (places == NULL) {
+        return NULL;
+    }
+    box_work work = {.box = given ? &box : NULL,
+                     .cutoff = cutoff,
+                     .largest = largest,
+                     .places = PyArray_DATA((PyArrayObject *)places)};
+    if (!in_parts(&points, place_rows, &work)) {
+        Py_DECREF(places);
+        return NULL;
+    }
+    PyObject *repeats_of_axes = PyTuple_New(points.ndim);
+    for (int k = 0; repeats_of_axes != NULL && k < points.ndim; k++) {
+        PyTuple_SET_ITEM(repeats_of_axes, k, PyBool_FromLong(work.axes.repeats[k]));
+    }
+    return Py_BuildValue("(NNNN)", places, repeats_of_axes,
+                         hs_tuple_of_reals(work.axes.reach, points.ndim),
+                         hs_tuple_of_reals(work.axes.width, points.ndim));
 }

@@ -1,14 +1,649 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* py_dynamic.c: _core.DynamicCells: the list of halfshell.DynamicCellList. Its methods hold the GIL
- * but for many queries at once; the list itself sees to its threads. */
-#include "py_dynamic.h"
-
-#include "foreign.h"
-#include "py_call.h"
+ * but for many queries at once; the list itself sees to its threads. Keys and positions are taken
+ * apart here, without a detour over arrays where they are plain numbers. */
 #include "py_functions.h"
-#include "tuples.h"
 
+#include "errors.h"
+#include "outputs.h"
+
+#include "../halfshell_dynamic.h"
+
+#include <math.h>
+#include <stdlib.h>
 #include <string.h>
+#include <time.h>
+
+typedef struct py_dynamic {
+    PyObject_HEAD
+    hs_dynamic *list;    /* owned */
+    PyObject   *convert; /* owned: makes an array of a position that is none */
+    int         ndim;
+    bool        tagged;
+    double      max_radius;
+} py_dynamic;
+
+static const hs_dynamic_hooks hooks;
+static bool                   is_to_be_made_again(hs_status status);
+
+static bool
+integer_of(PyObject *object, const char *must, long long *value)
+{
+    int overflow = 0;
+    if (!PyLong_CheckExact(object) &&
+        (PyBool_Check(object) || !PyIndex_Check(object) || PyArray_Check(object))) {
+        hs_refuse(PyExc_TypeError, must, object);
+        return false;
+    }
+    PyObject *index = PyNumber_Index(object);
+    if (index == NULL) {
+        return hs_refuse_kind(must, object);
+    }
+    *value = PyLong_AsLongLongAndOverflow(index, &overflow);
+    Py_DECREF(index);
+    if (overflow != 0) {
+        hs_refuse(PyExc_OverflowError, "key must fit int64", object);
+    }
+    return overflow == 0;
+}
+
+/* False with an exception set. */
+static bool
+key_of(const py_dynamic *self, PyObject *object, hs_key *key)
+{
+    long long id = 0, tag = 0;
+    if (!self->tagged) {
+        if (!integer_of(object, "key must be an integer", &id)) {
+            return false;
+        }
+    } else {
+        const char *must = "key must be a tuple (tag, integer) of integers";
+        if (!PyTuple_Check(object) || PyTuple_GET_SIZE(object) != 2) {
+            hs_refuse(PyExc_TypeError, must, object);
+            return false;
+        }
+        if (!integer_of(PyTuple_GET_ITEM(object, 0), must, &tag) ||
+            !integer_of(PyTuple_GET_ITEM(object, 1), must, &id)) {
+            return false;
+        }
+        if (tag < INT32_MIN || tag > INT32_MAX) {
+            hs_refuse(PyExc_OverflowError, "the tag of a key must fit int32", object);
+            return false;
+        }
+    }
+    *key = (hs_key){.id = id, .tag = (int32_t)tag};
+    return true;
+}
+
+/* Numbers of a float64 array, or the floats of a list or tuple; false for all else. */
+static bool
+plain_position(PyObject *object, int ndim, double *position)
+{
+    if (PyArray_Check(object)) {
+        PyArrayObject *array = (PyArrayObject *)object;
+        if (PyArray_TYPE(array) != NPY_DOUBLE || PyArray_NDIM(array) != 1 ||
+            PyArray_DIM(array, 0) != ndim || !PyArray_ISCARRAY_RO(array) ||
+            !PyArray_CheckExact(object)) {
+            return false;
+        }
+        memcpy(position, PyArray_DATA(array), (size_t)ndim * sizeof *position);
+        return true;
+    }
+    if ((!PyTuple_CheckExact(object) && !PyList_CheckExact(object)) ||
+        PySequence_Fast_GET_SIZE(object) != ndim) {
+        return false;
+    }
+    for (int k = 0; k < ndim; k++) {
+        PyObject *item = PySequence_Fast_GET_ITEM(object, k);
+        if (!PyFloat_CheckExact(item)) {
+            return false;
+        }
+        position[k] = PyFloat_AS_DOUBLE(item);
+    }
+    return true;
+}
+
+static bool
+position_of(const py_dynamic *self, PyObject *object, double *position)
+{
+    if (plain_position(object, self->ndim, position)) {
+        return true;
+    }
+    PyObject *array = PyObject_CallFunction(self->convert, "Oi", object, self->ndim);
+    if (array == NULL) {
+        return false;
+    }
+    const bool is_plain = plain_position(array, self->ndim, position);
+    Py_DECREF(array);
+    if (!is_plain) {
+        PyErr_SetString(PyExc_TypeError, "position must be real numbers");
+    }
+    return is_plain;
+}
+
+/* An array of a key for each row: (n,), or (n, 2) with tags. */
+static PyObject *
+keys_array(const py_dynamic *self, const hs_key *keys, int64_t n)
+{
+    npy_intp  shape[2] = {(npy_intp)n, 2};
+    PyObject *array = PyArray_SimpleNew(self->tagged ? 2 : 1, shape, NPY_INT64);
+    if (array == NULL) {
+        return NULL;
+    }
+    int64_t *data = PyArray_DATA((PyArrayObject *)array);
+    for (int64_t e = 0; e < n; e++) {
+        if (self->tagged) {
+            data[2 * e] = keys[e].tag;
+            data[2 * e + 1] = keys[e].id;
+        } else {
+            data[e] = keys[e].id;
+        }
+    }
+    return array;
+}
+
+static PyObject *
+raise_radius(const py_dynamic *self, const hs_failure *failure)
+{
+    PyObject *radius = PyFloat_FromDouble(failure->value);
+    PyObject *most = PyFloat_FromDouble(self->max_radius);
+    if (radius != NULL && most != NULL) {
+        PyErr_Format(PyExc_ValueError,
+                     "radius must be from 0 to max_radius, got radius = %R with max_radius = %R",
+                     radius, most);
+    }
+    Py_XDECREF(radius);
+    Py_XDECREF(most);
+    return NULL;
+}
+
+static PyObject *
+raise_coordinate(const hs_failure *failure)
+{
+    char name[64];
+    if (failure->row >= 0) {
+        PyOS_snprintf(name, sizeof name, "positions[%lld, %lld]", (long long)failure->row,
+                      (long long)failure->column);
+    } else {
+        PyOS_snprintf(name, sizeof name, "position[%lld]", (long long)failure->column);
+    }
+    PyObject *value = PyFloat_FromDouble(failure->value);
+    if (value != NULL) {
+        PyErr_Format(PyExc_ValueError, "%s must be finite, got %R", name, value);
+        Py_DECREF(value);
+    }
+    return NULL;
+}
+
+static PyObject *
+raise_far(const hs_failure *failure)
+{
+    char name[64] = "position";
+    if (failure->row >= 0) {
+        PyOS_snprintf(name, sizeof name, "positions[%lld]", (long long)failure->row);
+    }
+    PyErr_Format(PyExc_OverflowError,
+                 "%s lies 2**51 boxes away, or more, if only in a direction in which a box that "
+                 "is oblique to it does not repeat: wrap it into the box first",
+                 name);
+    return NULL;
+}
+
+static PyObject *
+raise_grid(const hs_failure *failure)
+{
+    char needed[32], limit[32];
+    PyErr_Format(
+        PyExc_ValueError,
+        "storage=\"dense\" would need %s for its cells, to reach this far; %s are allowed: "
+        "use storage=\"hash\"",
+        hs_format_bytes(failure->expected_bytes, needed, sizeof needed),
+        hs_format_bytes(failure->limit_bytes, limit, sizeof limit));
+    return NULL;
+}
+
+/* The exception for a status; `key`, or NULL, is named where one is at fault. Returns NULL. */
+static PyObject *
+raise_dynamic(const py_dynamic *self, hs_status status, const hs_failure *failure, PyObject *key)
+{
+    switch (status) {
+    case HS_ERR_KEY:
+        if (key != NULL) {
+            PyErr_SetObject(PyExc_KeyError, key);
+        } else {
+            PyErr_SetString(PyExc_ValueError,
+                            "distances need positions, which some of these keys do not have");
+        }
+        return NULL;
+    case HS_ERR_ARGUMENT:
+        PyErr_Format(PyExc_ValueError, "key %R has no position", key != NULL ? key : Py_None);
+        return NULL;
+    case HS_ERR_CUTOFF: return raise_radius(self, failure);
+    case HS_ERR_NOT_FINITE: return raise_coordinate(failure);
+    case HS_ERR_SHIFT_RANGE: return raise_far(failure);
+    case HS_ERR_CAPACITY: return raise_grid(failure);
+    case HS_ERR_MEMORY:
+        PyErr_SetString(PyExc_MemoryError, "out of memory; the list is as it was");
+        return NULL;
+    default: return hs_raise(status, failure, NULL);
+    }
+}
+
+/* Arrays of ids (int64), and of tags (int32) or None, of one length. */
+static bool
+take_keys(PyObject *const *arguments, const int64_t **ids, const int32_t **tags, int64_t *n)
+{
+    if (!hs_is_array(arguments[0], NPY_INT64, 1) ||
+        (arguments[1] != Py_None && !hs_is_array(arguments[1], NPY_INT32, 1))) {
+        PyErr_SetString(PyExc_TypeError, "keys must be arrays of int64 and int32");
+        return false;
+    }
+    *ids = PyArray_DATA((PyArrayObject *)arguments[0]);
+    *n = PyArray_DIM((PyArrayObject *)arguments[0], 0);
+    *tags = arguments[1] == Py_None ? NULL : PyArray_DATA((PyArrayObject *)arguments[1]);
+    return true;
+}
+
+/* KeyError of an absent key, ValueError of one that comes twice; or what else is wrong. */
+static PyObject *
+raise_many(const py_dynamic *self, hs_status status, const hs_failure *failure, const int64_t *ids,
+           const int32_t *tags)
+{
+    if (status != HS_ERR_KEY || failure->row < 0) {
+        return raise_dynamic(self, status, failure, NULL);
+    }
+    const long long id = ids[failure->row];
+    PyObject *key = self->tagged ? Py_BuildValue("(iL)", tags != NULL ? tags[failure->row] : 0, id)
+                                 : PyLong_FromLongLong(id);
+    if (key != NULL && failure->column == HS_KEY_ABSENT) {
+        PyErr_SetObject(PyExc_KeyError, key);
+    } else if (key != NULL) {
+        PyErr_Format(PyExc_ValueError, "keys must differ, but keys[%lld] = %R came before",
+                     (long long)failure->row, key);
+    }
+    Py_XDECREF(key);
+    return NULL;
+}
+
+typedef hs_status put_many_fn(hs_dynamic *, const int64_t *, const int32_t *, const hs_points *,
+                              hs_failure *);
+
+/* ids, tags or None, positions. */
+static PyObject *
+put_many(PyObject *object, PyObject *const *arguments, Py_ssize_t n_arguments, put_many_fn *put)
+{
+    const py_dynamic *self = (const py_dynamic *)object;
+    const int64_t    *ids;
+    const int32_t    *tags;
+    int64_t           n;
+    hs_points         positions;
+    hs_failure        failure = {.row = -1};
+    if (!hs_expect_arguments("insert_many or move_many", n_arguments, 3) ||
+        !take_keys(arguments, &ids, &tags, &n) ||
+        !hs_points_of(arguments[2], "positions", &positions)) {
+        return NULL;
+    }
+    if (positions.n != n || positions.ndim != self->ndim) {
+        PyErr_SetString(PyExc_ValueError, "keys and positions must be of one length");
+        return NULL;
+    }
+    hs_status status;
+    do {
+        status = put(self->list, ids, tags, &positions, &failure);
+    } while (is_to_be_made_again(status));
+    if (status != HS_OK) {
+        return raise_many(self, status, &failure, ids, tags);
+    }
+    Py_RETURN_NONE;
+}
+
+static PyObject *
+insert_many(PyObject *self, PyObject *const *arguments, Py_ssize_t n)
+{
+    return put_many(self, arguments, n, hs_dynamic_insert_many);
+}
+
+static PyObject *
+move_many(PyObject *self, PyObject *const *arguments, Py_ssize_t n)
+{
+    return put_many(self, arguments, n, hs_dynamic_move_many);
+}
+
+/* ids, tags or None -> which of them were there. */
+static PyObject *
+remove_many(PyObject *object, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    const py_dynamic *self = (const py_dynamic *)object;
+    const int64_t    *ids;
+    const int32_t    *tags;
+    int64_t           n;
+    hs_failure        failure = {.row = -1};
+    if (!hs_expect_arguments("remove_many", n_arguments, 2) ||
+        !take_keys(arguments, &ids, &tags, &n)) {
+        return NULL;
+    }
+    npy_intp  shape = (npy_intp)n;
+    PyObject *removed = PyArray_SimpleNew(1, &shape, NPY_BOOL);
+    if (removed == NULL) {
+        return NULL;
+    }
+    const hs_status status = hs_dynamic_remove_many(
+        self->list, ids, tags, n, PyArray_DATA((PyArrayObject *)removed), &failure);
+    if (status != HS_OK) {
+        Py_DECREF(removed);
+        return raise_many(self, status, &failure, ids, tags);
+    }
+    return removed;
+}
+
+/* cursor, most keys -> the next cursor, keys. */
+static PyObject *
+next_keys(PyObject *object, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    const py_dynamic *self = (const py_dynamic *)object;
+    int64_t           cursor = n_arguments == 2 ? PyLong_AsLongLong(arguments[0]) : -1;
+    const int64_t     most = n_arguments == 2 ? PyLong_AsLongLong(arguments[1]) : -1;
+    if (PyErr_Occurred() || cursor < 0 || most < 1) {
+        return PyErr_Occurred() ? NULL : PyErr_Format(PyExc_ValueError, "keys: bad arguments");
+    }
+    hs_key *keys = malloc((size_t)most * sizeof *keys);
+    if (keys == NULL) {
+        return PyErr_NoMemory();
+    }
+    const int64_t n = hs_dynamic_keys(self->list, &cursor, keys, most);
+    PyObject     *result = Py_BuildValue("(LN)", (long long)cursor, keys_array(self, keys, n));
+    free(keys);
+    return result;
+}
+
+/* Keys as an array of this list -> (n, ndim) positions, NaN for those that have none. */
+static PyObject *
+positions_of_keys(PyObject *object, PyObject *argument)
+{
+    const py_dynamic *self = (const py_dynamic *)object;
+    if (!hs_is_array(argument, NPY_INT64, self->tagged ? 2 : 1)) {
+        PyErr_SetString(PyExc_TypeError, "keys must be an array of int64");
+        return NULL;
+    }
+    const int64_t *data = PyArray_DATA((PyArrayObject *)argument);
+    npy_intp       shape[2] = {PyArray_DIM((PyArrayObject *)argument, 0), self->ndim};
+    PyObject      *array = PyArray_SimpleNew(2, shape, NPY_DOUBLE);
+    double        *rows = array != NULL ? PyArray_DATA((PyArrayObject *)array) : NULL;
+    for (npy_intp e = 0; array != NULL && e < shape[0]; e++) {
+        const hs_key    key = self->tagged ? (hs_key){data[2 * e + 1], (int32_t)data[2 * e]}
+                                           : (hs_key){data[e], 0};
+        const hs_status status = hs_dynamic_position(self->list, key, rows + e * self->ndim);
+        for (int k = 0; status == HS_ERR_ARGUMENT && k < self->ndim; k++) {
+            rows[e * self->ndim + k] = NAN;
+        }
+        if (status == HS_ERR_KEY) {
+            Py_CLEAR(array);
+            PyErr_SetString(PyExc_RuntimeError, "the list changed meanwhile");
+        }
+    }
+    return array;
+}
+
+/* The GIL is taken, to look for signals, so often; the clock is read after so many rows. */
+#define CLOCK_ROWS         32
+#define SIGNALS_PER_SECOND 20
+
+/* What visits have found, in memory that is not Python's: it grows without the GIL. */
+typedef struct gathered {
+    const py_dynamic *self;
+    hs_key           *keys;
+    int32_t          *shifts; /* ndim each; NULL where they are not wanted */
+    int64_t           n, capacity;
+    bool              with_shift;
+    hs_status         status; /* why the visit ended, if early */
+    PyThreadState    *thread; /* NULL: this thread has the GIL */
+    clock_t           looked; /* for signals, where it has not */
+} gathered;
+
+/* An hs_poll_fn: false on Ctrl-C. No handler is run, as that might use the list: it is left first.
+ * user: a gathered, or NULL. */
+static bool
+poll_signals(void *user, double fraction)
+{
+    gathered *found = user;
+    (void)fraction;
+    if (found != NULL && found->thread != NULL) {
+        if (clock() - found->looked < CLOCKS_PER_SEC / SIGNALS_PER_SECOND) {
+            return true;
+        }
+        found->looked = clock();
+        PyEval_RestoreThread(found->thread);
+    }
+    const bool is_interrupted = PyOS_InterruptOccurred() != 0;
+    if (is_interrupted) {
+        PyErr_SetInterrupt(); /* for the look at signals that follows */
+    }
+    if (found != NULL && found->thread != NULL) {
+        found->thread = PyEval_SaveThread();
+    }
+    return !is_interrupted;
+}
+
+static void *
+give_up_gil(void)
+{
+    return PyEval_SaveThread();
+}
+
+static void
+take_gil(void *thread)
+{
+    PyEval_RestoreThread(thread);
+}
+
+/* For queries that take long, and changes that wait for them: Ctrl-C, and the GIL. */
+static const hs_dynamic_hooks hooks = {poll_signals, give_up_gil, take_gil};
+
+/* Whether a query ended for a signal, whose handler has returned. Else the status stays, with an
+ * exception where that is HS_ERR_INTERRUPTED. */
+static bool
+is_to_be_made_again(hs_status status)
+{
+    return status == HS_ERR_INTERRUPTED && PyErr_CheckSignals() == 0;
+}
+
+static bool
+grow(gathered *found)
+{
+    const int64_t capacity = found->capacity * 2 + 64;
+    hs_key       *keys = realloc(found->keys, (size_t)capacity * sizeof *keys);
+    found->keys = keys != NULL ? keys : found->keys;
+    if (keys != NULL && found->with_shift) {
+        const size_t width = (size_t)found->self->ndim * sizeof *found->shifts;
+        int32_t     *shifts = realloc(found->shifts, (size_t)capacity * width);
+        found->shifts = shifts != NULL ? shifts : found->shifts;
+        if (shifts == NULL) {
+            return false;
+        }
+    }
+    found->capacity = keys != NULL ? capacity : found->capacity;
+    return keys != NULL;
+}
+
+static int
+take(hs_key key, const double *position, const int64_t *shift, void *user)
+{
+    gathered *found = user;
+    (void)position;
+    if (found->n == found->capacity && !grow(found)) {
+        found->status = HS_ERR_MEMORY;
+        return 1;
+    }
+    for (int k = 0; found->with_shift && k < found->self->ndim; k++) {
+        if (shift[k] < INT32_MIN || shift[k] > INT32_MAX) {
+            found->status = HS_ERR_SHIFT_RANGE;
+            return 1;
+        }
+        found->shifts[found->n * found->self->ndim + k] = (int32_t)shift[k];
+    }
+    found->keys[found->n++] = key;
+    return 0;
+}
+
+static void
+free_found(gathered *found)
+{
+    free(found->keys);
+    free(found->shifts);
+}
+
+static PyObject *
+shifts_array(const gathered *found)
+{
+    npy_intp  shape[2] = {(npy_intp)found->n, found->self->ndim};
+    PyObject *array = PyArray_SimpleNew(2, shape, NPY_INT32);
+    if (array != NULL && found->n > 0) {
+        memcpy(PyArray_DATA((PyArrayObject *)array), found->shifts,
+               (size_t)(found->n * found->self->ndim) * sizeof *found->shifts);
+    }
+    return array;
+}
+
+/* Keys, or keys and shifts. */
+static PyObject *
+arrays_of(const gathered *found)
+{
+    PyObject *keys = keys_array(found->self, found->keys, found->n);
+    if (!found->with_shift || keys == NULL) {
+        return keys;
+    }
+    PyObject *both = PyTuple_New(2);
+    hs_tuple_put(&both, 0, keys);
+    if (both != NULL) {
+        hs_tuple_put(&both, 1, shifts_array(found));
+    }
+    return both;
+}
+
+/* The arrays, or what ended the visits: a status, or that of `take`. */
+static PyObject *
+result_of(const gathered *found, hs_status status, const hs_failure *failure)
+{
+    if (status == HS_OK && found->status == HS_ERR_SHIFT_RANGE) {
+        PyErr_SetString(PyExc_OverflowError,
+                        "S holds 2**31 boxes, and a point in the ball lies further from the centre "
+                        "as it was given: wrap both into the box first");
+        return NULL;
+    }
+    status = status == HS_OK ? found->status : status;
+    return status == HS_OK ? arrays_of(found) : raise_dynamic(found->self, status, failure, NULL);
+}
+
+/* position, radius, and whether shifts are wanted. */
+static PyObject *
+ask(const py_dynamic *self, PyObject *const *arguments, bool is_near, bool with_shift)
+{
+    gathered   found = {.self = self, .with_shift = with_shift, .status = HS_OK};
+    double     position[HS_MAX_DIM], radius;
+    hs_failure failure;
+    if (!hs_real_of(arguments[1], "radius must be a number", &radius) ||
+        !position_of(self, arguments[0], position)) {
+        return NULL;
+    }
+    hs_status status;
+    do {
+        found.n = 0;
+        status = is_near ? hs_dynamic_near(self->list, position, radius, take, &found, &failure)
+                         : hs_dynamic_within(self->list, position, radius, with_shift, take, &found,
+                                             &failure);
+    } while (is_to_be_made_again(status));
+    PyObject *result = result_of(&found, status, &failure);
+    free_found(&found);
+    return result;
+}
+
+static PyObject *
+near(PyObject *self, PyObject *const *arguments, Py_ssize_t n)
+{
+    return hs_expect_arguments("near", n, 2) ? ask((py_dynamic *)self, arguments, true, false)
+                                             : NULL;
+}
+
+static PyObject *
+within(PyObject *self, PyObject *const *arguments, Py_ssize_t n)
+{
+    return hs_expect_arguments("within", n, 3)
+               ? ask((py_dynamic *)self, arguments, false, arguments[2] == Py_True)
+               : NULL;
+}
+
+/* The balls around rows of float64, one after another, without the GIL but for a look at signals.
+ * HS_ERR_INTERRUPTED has an exception set. */
+static hs_status
+ask_rows(const py_dynamic *self, const double *rows, int64_t n, double radius, int64_t *offsets,
+         gathered *found, hs_failure *failure)
+{
+    hs_status status = HS_OK;
+    found->looked = clock();
+    found->thread = PyEval_SaveThread();
+    offsets[0] = 0;
+    for (int64_t q = 0; q < n && status == HS_OK && found->status == HS_OK; q++) {
+        status = hs_dynamic_within(self->list, rows + q * self->ndim, radius, found->with_shift,
+                                   take, found, failure);
+        failure->row = status != HS_OK ? q : failure->row;
+        offsets[q + 1] = found->n;
+        const bool is_time = q % CLOCK_ROWS == CLOCK_ROWS - 1 &&
+                             clock() - found->looked > CLOCKS_PER_SEC / SIGNALS_PER_SECOND;
+        if (is_time || status == HS_ERR_INTERRUPTED) {
+            found->looked = clock();
+            PyEval_RestoreThread(found->thread);
+            if (PyErr_CheckSignals() != 0) {
+                status = HS_ERR_INTERRUPTED;
+            } else if (status == HS_ERR_INTERRUPTED) { /* this row once more */
+                status = HS_OK;
+                found->n = offsets[q--];
+            }
+            found->thread = PyEval_SaveThread();
+        }
+    }
+    PyEval_RestoreThread(found->thread);
+    return status;
+}
+
+/* positions (q, ndim) of float64, radius, whether shifts are wanted -> offsets, keys[, shifts]. */
+static PyObject *
+within_many(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
+{
+    const py_dynamic *self = (const py_dynamic *)object;
+    gathered          found = {.self = self, .with_shift = n == 3 && arguments[2] == Py_True};
+    hs_failure        failure = {.row = -1};
+    double            radius;
+    if (n != 3 || !hs_is_array(arguments[0], NPY_DOUBLE, 2) ||
+        PyArray_DIM((PyArrayObject *)arguments[0], 1) != self->ndim) {
+        PyErr_SetString(PyExc_TypeError, "within_many takes positions, a radius and a bool");
+        return NULL;
+    }
+    if (!hs_real_of(arguments[1], "radius must be a number", &radius)) {
+        return NULL;
+    }
+    PyArrayObject *positions = (PyArrayObject *)arguments[0];
+    npy_intp       rows = PyArray_DIM(positions, 0), ends = rows + 1;
+    PyObject      *offsets = PyArray_SimpleNew(1, &ends, NPY_INT64);
+    if (offsets == NULL) {
+        return NULL;
+    }
+    const hs_status status = ask_rows(self, PyArray_DATA(positions), rows, radius,
+                                      PyArray_DATA((PyArrayObject *)offsets), &found, &failure);
+    PyObject       *arrays = result_of(&found, status, &failure);
+    free_found(&found);
+    if (arrays == NULL) {
+        Py_DECREF(offsets);
+        return NULL;
+    }
+    PyObject *result = PyTuple_New(2);
+    hs_tuple_put(&result, 0, offsets);
+    if (result != NULL) {
+        hs_tuple_put(&result, 1, arrays);
+    } else {
+        Py_DECREF(arrays);
+    }
+    return result;
+}
 
 typedef hs_status put_fn(hs_dynamic *, hs_key, const double *, hs_failure *);
 
@@ -19,11 +654,11 @@ put(PyObject *object, PyObject *const *arguments, Py_ssize_t n, put_fn *put_in)
     double            position[HS_MAX_DIM];
     hs_key            key;
     hs_failure        failure;
-    if (!hs_expect_arguments("insert or move", n, 2) || !hs_key_of(self, arguments[0], &key)) {
+    if (!hs_expect_arguments("insert or move", n, 2) || !key_of(self, arguments[0], &key)) {
         return NULL;
     }
     const bool has_position = arguments[1] != Py_None;
-    if (has_position && !hs_position_of(self, arguments[1], position)) {
+    if (has_position && !position_of(self, arguments[1], position)) {
         return NULL;
     }
     const hs_status status = put_in(self->list, key, has_position ? position : NULL, &failure);
@@ -33,7 +668,7 @@ put(PyObject *object, PyObject *const *arguments, Py_ssize_t n, put_fn *put_in)
         return NULL;
     }
     if (status != HS_OK) {
-        return hs_raise_dynamic(self, status, &failure, arguments[0]);
+        return raise_dynamic(self, status, &failure, arguments[0]);
     }
     Py_RETURN_NONE;
 }
@@ -55,7 +690,7 @@ remove_key(PyObject *object, PyObject *argument)
 {
     const py_dynamic *self = (const py_dynamic *)object;
     hs_key            key;
-    if (!hs_key_of(self, argument, &key)) {
+    if (!key_of(self, argument, &key)) {
         return NULL;
     }
     return PyBool_FromLong(hs_dynamic_remove(self->list, key));
@@ -66,7 +701,7 @@ has(PyObject *object, PyObject *argument)
 {
     const py_dynamic *self = (const py_dynamic *)object;
     hs_key            key;
-    if (!hs_key_of(self, argument, &key)) {
+    if (!key_of(self, argument, &key)) {
         return NULL;
     }
     return PyBool_FromLong(hs_dynamic_has(self->list, key));
@@ -79,12 +714,12 @@ position_of_key(PyObject *object, PyObject *argument)
     double            position[HS_MAX_DIM];
     npy_intp          shape = self->ndim;
     hs_key            key;
-    if (!hs_key_of(self, argument, &key)) {
+    if (!key_of(self, argument, &key)) {
         return NULL;
     }
     const hs_status status = hs_dynamic_position(self->list, key, position);
     if (status != HS_OK) {
-        return hs_raise_dynamic(self, status, NULL, argument);
+        return raise_dynamic(self, status, NULL, argument);
     }
     PyObject *array = PyArray_SimpleNew(1, &shape, NPY_DOUBLE);
     if (array != NULL) {
@@ -100,12 +735,27 @@ cell_of_key(PyObject *object, PyObject *argument)
     const py_dynamic *self = (const py_dynamic *)object;
     int64_t           cell[HS_MAX_DIM];
     hs_key            key;
-    if (!hs_key_of(self, argument, &key)) {
+    if (!key_of(self, argument, &key)) {
         return NULL;
     }
     const hs_status status = hs_dynamic_cell(self->list, key, cell);
     return status == HS_OK ? hs_tuple_of_integers(cell, self->ndim)
-                           : hs_raise_dynamic(self, status, NULL, argument);
+                           : raise_dynamic(self, status, NULL, argument);
+}
+
+static PyObject *
+cell_of_position(PyObject *object, PyObject *argument)
+{
+    const py_dynamic *self = (const py_dynamic *)object;
+    double            position[HS_MAX_DIM];
+    int64_t           cell[HS_MAX_DIM];
+    hs_failure        failure;
+    if (!position_of(self, argument, position)) {
+        return NULL;
+    }
+    const hs_status status = hs_dynamic_cell_of(self->list, position, cell, &failure);
+    return status == HS_OK ? hs_tuple_of_integers(cell, self->ndim)
+                           : raise_dynamic(self, status, &failure, NULL);
 }
 
 /* position, radius, skip or None. */
@@ -119,8 +769,8 @@ any_within(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
     bool              any = false;
     if (!hs_expect_arguments("any_within", n, 3) ||
         !hs_real_of(arguments[1], "radius must be a number", &radius) ||
-        (arguments[2] != Py_None && !hs_key_of(self, arguments[2], &skip)) ||
-        !hs_position_of(self, arguments[0], position)) {
+        (arguments[2] != Py_None && !key_of(self, arguments[2], &skip)) ||
+        !position_of(self, arguments[0], position)) {
         return NULL;
     }
     const bool skips = arguments[2] != Py_None;
@@ -128,10 +778,10 @@ any_within(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
     do {
         status = hs_dynamic_any_within(self->list, position, radius, skips ? &skip : NULL, &any,
                                        &failure);
-    } while (hs_py_dynamic_again(status));
+    } while (is_to_be_made_again(status));
     if (status != HS_OK) {
         const bool absent = skips && !hs_dynamic_has(self->list, skip);
-        return hs_raise_dynamic(self, status, &failure, absent ? arguments[2] : NULL);
+        return raise_dynamic(self, status, &failure, absent ? arguments[2] : NULL);
     }
     return PyBool_FromLong(any);
 }
@@ -150,7 +800,7 @@ shrink(PyObject *object, PyObject *ignored)
     (void)ignored;
     const hs_status status = hs_dynamic_shrink_to_fit(((py_dynamic *)object)->list);
     if (status != HS_OK) {
-        return hs_raise_dynamic((py_dynamic *)object, status, NULL, NULL);
+        return raise_dynamic((py_dynamic *)object, status, NULL, NULL);
     }
     Py_RETURN_NONE;
 }
@@ -164,7 +814,7 @@ copy(PyObject *object, PyObject *ignored)
     (void)ignored;
     const hs_status status = hs_dynamic_copy(self->list, &list);
     if (status != HS_OK) {
-        return hs_raise_dynamic(self, status, NULL, NULL);
+        return raise_dynamic(self, status, NULL, NULL);
     }
     py_dynamic *made = (py_dynamic *)type->tp_alloc(type, 0);
     if (made == NULL) {
@@ -172,7 +822,7 @@ copy(PyObject *object, PyObject *ignored)
         return NULL;
     }
     made->list = list;
-    hs_dynamic_hook(list, &hs_py_dynamic_hooks);
+    hs_dynamic_hook(list, &hooks);
     made->convert = Py_NewRef(self->convert);
     made->ndim = self->ndim;
     made->tagged = self->tagged;
@@ -211,7 +861,7 @@ contains(PyObject *object, PyObject *argument)
 {
     const py_dynamic *self = (const py_dynamic *)object;
     hs_key            key;
-    return hs_key_of(self, argument, &key) ? hs_dynamic_has(self->list, key) : -1;
+    return key_of(self, argument, &key) ? hs_dynamic_has(self->list, key) : -1;
 }
 
 static int
@@ -243,15 +893,16 @@ static PyMethodDef methods[] = {
     {"has", has, METH_O, NULL},
     {"position", position_of_key, METH_O, NULL},
     {"cell", cell_of_key, METH_O, NULL},
+    {"cell_of", cell_of_position, METH_O, NULL},
     {"any_within", FASTCALL(any_within), METH_FASTCALL, NULL},
-    {"near", FASTCALL(hs_py_dynamic_near), METH_FASTCALL, NULL},
-    {"within", FASTCALL(hs_py_dynamic_within), METH_FASTCALL, NULL},
-    {"within_many", FASTCALL(hs_py_dynamic_within_many), METH_FASTCALL, NULL},
-    {"insert_many", FASTCALL(hs_py_dynamic_insert_many), METH_FASTCALL, NULL},
-    {"move_many", FASTCALL(hs_py_dynamic_move_many), METH_FASTCALL, NULL},
-    {"remove_many", FASTCALL(hs_py_dynamic_remove_many), METH_FASTCALL, NULL},
-    {"keys", FASTCALL(hs_py_dynamic_keys), METH_FASTCALL, NULL},
-    {"positions", hs_py_dynamic_positions, METH_O, NULL},
+    {"near", FASTCALL(near), METH_FASTCALL, NULL},
+    {"within", FASTCALL(within), METH_FASTCALL, NULL},
+    {"within_many", FASTCALL(within_many), METH_FASTCALL, NULL},
+    {"insert_many", FASTCALL(insert_many), METH_FASTCALL, NULL},
+    {"move_many", FASTCALL(move_many), METH_FASTCALL, NULL},
+    {"remove_many", FASTCALL(remove_many), METH_FASTCALL, NULL},
+    {"keys", FASTCALL(next_keys), METH_FASTCALL, NULL},
+    {"positions", positions_of_keys, METH_O, NULL},
     {"clear", clear, METH_NOARGS, NULL},
     {"shrink_to_fit", shrink, METH_NOARGS, NULL},
     {"copy", copy, METH_NOARGS, NULL},
@@ -282,4 +933,68 @@ PyObject *
 hs_py_dynamic_type(PyObject *module)
 {
     return PyType_FromModuleAndSpec(module, &spec, NULL);
+}
+
+static PyObject *
+raise_new(hs_status status, const hs_failure *failure)
+{
+    static const char *const must[] = {
+        [HS_LENGTH_CELL_SIZE] = "cell_size must be from 2**-300 to 2**300",
+        [HS_LENGTH_MAX_RADIUS] =
+            "max_radius must be from 2**-300 to 2**300, and span at most 2**20 images of the box",
+        [HS_LENGTH_BOX] =
+            "entries of periodic box vectors must be 0 or from 2**-300 to 2**300 in size"};
+    if (status == HS_ERR_CUTOFF && failure->column >= 0 && failure->column <= HS_LENGTH_BOX) {
+        PyObject *value = PyFloat_FromDouble(failure->value);
+        if (value != NULL) {
+            PyErr_Format(PyExc_ValueError, "%s, got %R", must[failure->column], value);
+            Py_DECREF(value);
+        }
+        return NULL;
+    }
+    return hs_raise(status, failure, NULL);
+}
+
+PyObject *
+hs_py_dynamic_new(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    PyObject         **types = PyModule_GetState(module);
+    PyTypeObject      *type = (PyTypeObject *)types[HS_DYNAMIC_TYPE];
+    hs_dynamic_options options = hs_dynamic_options_default();
+    hs_failure         failure;
+    hs_dynamic        *list;
+    hs_box             box;
+    unsigned long      repeats;
+    bool               given;
+    if (n_arguments != 9) {
+        PyErr_SetString(PyExc_TypeError, "dynamic_new takes 9 arguments");
+        return NULL;
+    }
+    options.ndim = (int)PyLong_AsLong(arguments[0]);
+    options.storage = (hs_storage)PyLong_AsLong(arguments[4]);
+    options.inclusive = PyObject_IsTrue(arguments[6]) == 1;
+    if (PyErr_Occurred() ||
+        !hs_real_of(arguments[1], "cell_size must be a number", &options.cell_size) ||
+        !hs_real_of(arguments[5], "max_radius must be a number", &options.max_radius) ||
+        !hs_repeats_of(arguments[3], &repeats) ||
+        !hs_box_of(arguments[2], repeats, options.ndim, &box, &given)) {
+        return NULL;
+    }
+    options.box = given ? &box : NULL;
+    const hs_status status = hs_dynamic_new(&options, &list, &failure);
+    if (status != HS_OK) {
+        return raise_new(status, &failure);
+    }
+    py_dynamic *self = (py_dynamic *)type->tp_alloc(type, 0);
+    if (self == NULL) {
+        hs_dynamic_free(list);
+        return NULL;
+    }
+    self->list = list;
+    hs_dynamic_hook(list, &hooks);
+    self->convert = Py_NewRef(arguments[8]);
+    self->ndim = options.ndim;
+    self->tagged = PyObject_IsTrue(arguments[7]) == 1;
+    self->max_radius = hs_dynamic_look(list).max_radius;
+    return (PyObject *)self;
 }

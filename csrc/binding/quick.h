@@ -1,22 +1,28 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* quick.h: calls whose arguments are the usual ones, as users give them (plain.h). */
 #ifndef HS_QUICK_H
 #define HS_QUICK_H
 
 #include "numpy_api.h"
 
 /*
- * plain(function, *arguments): what the function of this module returns for these, with periodic in
- * place of bits and index_dtype in place of index_bytes. NotImplemented, and no exception, where an
- * argument is not plain.
+ * quick(name) -> attempt, for a function of the table that users call. attempt(arguments, options)
+ * returns what that function returns for a tuple and a dict of arguments as users give them. They
+ * are converted here, without a line of Python; NotImplemented, and no exception, where an argument
+ * needs more than that, or is wrong in a way that _convert/ has words for.
  */
-PyObject *hs_py_plain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
+PyObject *hs_py_quick(PyObject *module, PyObject *name);
 
-/*
- * quick(function, usual, places, points, cutoff, options): plain() of the arguments in `usual`, a
- * tuple, with points and cutoff as its first two and the values of `options` at the places that the
- * dict `places` has for their names. NotImplemented also for a name that it does not have.
- */
-PyObject *hs_py_quick(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
+/* scene(points, queries, box, periodic) -> the same as (queries, points, rows of the box, bits), of
+ * which queries and box may be None; or NotImplemented. */
+PyObject *hs_py_scene(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
+
+/* know(name, object): what is told apart from other objects here: "Box" and "Points", which are
+ * types, and "settings", a context variable with its usual value. */
+PyObject *hs_py_know(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
+
+/* table() -> the arguments of each function that users call, by its name: of each argument its
+ * name, what it is where it is left out, as Python writes it, or None, and whether it is
+ * positional. */
+PyObject *hs_py_table(PyObject *module, PyObject *ignored);
 
 #endif

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The drawings of the README and of docs/explanation: `python docs/figures/draw.py` writes them."""
 
+import csv
+from functools import partial
 from pathlib import Path
 
 import matplotlib
@@ -35,11 +37,11 @@ def quartz():
     left.set_box_aspect(None, zoom=1.6)
 
     points, box, species = alpha_quartz()
-    kinds, types = np.unique(species, return_inverse=True)
     moved = points + np.random.default_rng(0).normal(0.0, 0.06, points.shape)
-    result = hs.rdf(moved, 6.0, bins=240, types=types, box=box)
-    for a, b in ((0, 1), (0, 0), (1, 1)):
-        right.plot(result.r, result.g[a, b], label=f"{kinds[b]}-{kinds[a]}", linewidth=1.2)
+    atoms = hs.Points(moved, types=species, box=box)
+    result = hs.rdf(atoms, 6.0, bins=240, by_type=True)
+    for a, b in (("Si", "O"), ("O", "O"), ("Si", "Si")):
+        right.plot(result.r, result[a, b].g, label=f"{a}-{b}", linewidth=1.2)
     right.set(xlabel="r / Å", ylabel="g(r)", xlim=(1.0, 6.0), ylim=(0.0, 16.0))
     right.spines[["top", "right"]].set_visible(False)
     right.legend(frameon=False)
@@ -152,9 +154,34 @@ def levels():
     return fig
 
 
+def times(ink):
+    """The same list of pairs by eight libraries, in ink that suits a light or a dark page."""
+    with open(FOLDER.parents[1] / "benchmarks/results" / TIMED, newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["scene"] == "pairs-1e5-k52"]
+    found = {row["contestant"]: 1e3 * float(row["fresh_median"]) for row in rows}
+    names = sorted((name for name in found if "[" not in name), key=found.get, reverse=True)
+    fig, ax = plt.subplots(figsize=(7.6, 3.0), layout="constrained")
+    ours = [name == "halfshell" for name in names]
+    bars = ax.barh(
+        names, [found[name] for name in names], color=[ORANGE if own else GREY for own in ours]
+    )
+    labels = [f"{found[name]:,.0f} ms" for name in names]
+    for text, own in zip(ax.bar_label(bars, labels, padding=4, color=ink), ours):
+        text.set_fontweight("bold" if own else "normal")
+    ax.tick_params(left=False, bottom=False, labelbottom=False, labelcolor=ink)
+    ax.spines[:].set_visible(False)
+    ax.set_title("2.6 million pairs of 100,000 points, one thread", color=ink, fontsize=10)
+    fig.patch.set_alpha(0.0)
+    ax.patch.set_alpha(0.0)
+    return fig
+
+
+#: The newest measurement with all libraries.
+TIMED = "amd-epyc/2026-11-25.csv"
+
 DRAWINGS = {
     "quartz": quartz, "half-shell": half_shell, "stages": stages, "images": images,
-    "levels": levels,
+    "levels": levels, "times": partial(times, "#1f2328"), "times-dark": partial(times, "#e6edf3"),
 }  # fmt: skip
 
 
@@ -163,7 +190,7 @@ def main(folder=FOLDER):
     for name, draw in DRAWINGS.items():
         with plt.rc_context(settings):
             fig = draw()
-            fig.savefig(folder / f"{name}.svg", metadata={"Date": None}, facecolor="white")
+            fig.savefig(folder / f"{name}.svg", metadata={"Date": None})
             plt.close(fig)
 
 

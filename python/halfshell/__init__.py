@@ -1,44 +1,65 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every pair of points within a cutoff, decided exactly."""
+"""Every pair of points within a cutoff, decided exactly.
+
+    pairs(points, cutoff, box=...)      each pair once, as arrays
+    neighbors(points, cutoff, ...)      both directions, as a table with a row for each point
+    pairs_between(queries, points, cutoff, ...)         pairs of two sets
+    nearest(points, k, ...)             the k nearest of each point
+    count_pairs, coordination, pair_histogram, rdf      numbers, of which no pair is stored
+    clusters(points, cutoff, ...)       connected components, DBSCAN, percolation
+    iter_pairs, for_each_pair, trajectory_pairs, bricks more than memory holds, and many frames
+    verify(points, cutoff, i, j, ...)   check a list of pairs of any library
+    explain, measure, bonded, plot_pairs
+
+    Points(positions, box=..., radii=..., types=...)    what is known of each point
+    Box, settings                       the periodic box; how searches are made
+    CellList, VerletList, DynamicCellList               points that are kept, or move
+    Connectivity, NodeList, PairTable, PairField        node lists, as in SPH codes
+
+``help(halfshell.pairs)`` has all shared arguments. `halfshell.compat` stands in for functions of
+ASE, SciPy, matscipy, MDAnalysis and scikit-learn; `halfshell.torch`, `halfshell.jax`,
+`halfshell.dask` and `halfshell.mpi` take their arrays.
+"""
 
 import importlib
 from typing import TYPE_CHECKING
 
 from halfshell._convert.memory import CacheInfo, cache_info, clear_cache, set_cache_limit
 from halfshell._convert.options import kernels
+from halfshell._convert.points import Points
 from halfshell._errors import CapacityError, StaleError
-from halfshell._functions.between import pairs_between
-from halfshell._functions.counts import count_pairs
-from halfshell._functions.pairs import pairs
+from halfshell._functions.counts import count_pairs, pair_histogram
+from halfshell._functions.pairs import for_each_pair, iter_pairs, pairs, pairs_between
 from halfshell._objects.box import Box
+from halfshell._settings import settings
 
 if TYPE_CHECKING:
+    from halfshell import compat as compat
+    from halfshell import dask as dask
+    from halfshell import jax as jax
+    from halfshell import mpi as mpi
+    from halfshell import structures as structures
+    from halfshell import torch as torch
     from halfshell._check.verify import Verdict, verify
+    from halfshell._functions.bonded import bonded
     from halfshell._functions.bricks import bricks
-    from halfshell._functions.clusters import clusters
-    from halfshell._functions.coordination import coordination
+    from halfshell._functions.clusters import Clusters, clusters
     from halfshell._functions.explain import Explanation, explain
-    from halfshell._functions.histogram import pair_histogram
     from halfshell._functions.measure import measure
-    from halfshell._functions.nearest import nearest
-    from halfshell._functions.neighbors import neighbors
+    from halfshell._functions.neighbors import coordination, nearest, neighbors
     from halfshell._functions.plot_pairs import plot_pairs
-    from halfshell._functions.rdf import rdf
-    from halfshell._functions.stream import for_each_pair, iter_pairs
+    from halfshell._functions.rdf import RadialDistribution, rdf
     from halfshell._functions.trajectory import trajectory_pairs
     from halfshell._include import get_include
     from halfshell._objects.brick import Brick, Bricks
     from halfshell._objects.cell_list import CellList
-    from halfshell._objects.clusters import Clusters
     from halfshell._objects.connectivity import Connectivity
     from halfshell._objects.dynamic_cell_list import DynamicCellList
-    from halfshell._objects.graph import Graph
-    from halfshell._objects.neighbor_table import NeighborTable
+    from halfshell._objects.neighbor_table import Graph, NeighborTable
     from halfshell._objects.node_list import NodeList
     from halfshell._objects.pair_changes import PairChanges
     from halfshell._objects.pair_field import PairField
     from halfshell._objects.pair_table import PairTable
-    from halfshell._objects.radial_distribution import RadialDistribution
     from halfshell._objects.verlet_list import VerletList
 
 __version__ = "0.1.0"
@@ -60,10 +81,12 @@ __all__ = [
     "PairChanges",
     "PairField",
     "PairTable",
+    "Points",
     "RadialDistribution",
     "StaleError",
     "Verdict",
     "VerletList",
+    "bonded",
     "bricks",
     "cache_info",
     "clear_cache",
@@ -84,6 +107,7 @@ __all__ = [
     "plot_pairs",
     "rdf",
     "set_cache_limit",
+    "settings",
     "trajectory_pairs",
     "verify",
 ]
@@ -93,39 +117,49 @@ _LATER = {
     "Brick": "_objects.brick",
     "Bricks": "_objects.brick",
     "CellList": "_objects.cell_list",
-    "Clusters": "_objects.clusters",
+    "Clusters": "_functions.clusters",
     "Connectivity": "_objects.connectivity",
     "DynamicCellList": "_objects.dynamic_cell_list",
     "Explanation": "_functions.explain",
-    "Graph": "_objects.graph",
+    "Graph": "_objects.neighbor_table",
     "NeighborTable": "_objects.neighbor_table",
     "NodeList": "_objects.node_list",
     "PairChanges": "_objects.pair_changes",
     "PairField": "_objects.pair_field",
     "PairTable": "_objects.pair_table",
-    "RadialDistribution": "_objects.radial_distribution",
+    "RadialDistribution": "_functions.rdf",
     "Verdict": "_check.verify",
     "VerletList": "_objects.verlet_list",
+    "bonded": "_functions.bonded",
     "bricks": "_functions.bricks",
     "clusters": "_functions.clusters",
-    "coordination": "_functions.coordination",
+    "coordination": "_functions.neighbors",
     "explain": "_functions.explain",
-    "for_each_pair": "_functions.stream",
     "get_include": "_include",
-    "iter_pairs": "_functions.stream",
     "measure": "_functions.measure",
-    "nearest": "_functions.nearest",
+    "nearest": "_functions.neighbors",
     "neighbors": "_functions.neighbors",
-    "pair_histogram": "_functions.histogram",
     "plot_pairs": "_functions.plot_pairs",
     "rdf": "_functions.rdf",
     "trajectory_pairs": "_functions.trajectory",
     "verify": "_check.verify",
 }
 
+#: Modules that are imported when they are first used, and the package that each needs.
+_MODULES = {
+    "compat": None,
+    "dask": "dask",
+    "jax": "jax",
+    "mpi": "mpi4py",
+    "structures": None,
+    "torch": "torch",
+}
+
 if not TYPE_CHECKING:  # for type checkers they are there
 
     def __getattr__(name: str) -> object:
+        if name in _MODULES:
+            return importlib.import_module(f"{__name__}.{name}")
         if name not in _LATER:
             from halfshell._unknown import nearest_word
 
@@ -137,4 +171,7 @@ if not TYPE_CHECKING:  # for type checkers they are there
         return value
 
     def __dir__() -> list[str]:
-        return sorted({*globals(), *_LATER})
+        from importlib.util import find_spec
+
+        there = [name for name, needs in _MODULES.items() if not needs or find_spec(needs)]
+        return sorted([*__all__, *there, "__doc__", "__file__", "__name__", "__version__"])

@@ -3,6 +3,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, TypeVar, cast
+
+#: What input is refused by; other errors keep their frames.
+REFUSALS = (TypeError, ValueError, OverflowError, MemoryError)
+
+Function = TypeVar("Function", bound="Callable[..., Any]")
+
 
 class CapacityError(ValueError):
     """The given arrays or capacity are too small for the result.
@@ -62,10 +71,25 @@ class StaleError(RuntimeError):
 def shorten(error: BaseException) -> None:
     """Drop the frames of an error in which input was looked at, before it is raised again.
 
-    Where it was raised by this package: what a user's own code raises keeps them.
+    Where all are of this package: what a user's own code raises keeps them.
     """
-    last = error.__traceback__
-    while last is not None and last.tb_next is not None:
-        last = last.tb_next
-    if last is None or str(last.tb_frame.f_globals.get("__name__")).startswith("halfshell."):
-        error.__traceback__ = None
+    frame = error.__traceback__
+    while frame is not None:
+        if not str(frame.tb_frame.f_globals.get("__name__")).startswith("halfshell."):
+            return
+        frame = frame.tb_next
+    error.__traceback__ = None
+
+
+def brief(function: Function) -> Function:
+    """Decorate what looks at input, so that its errors have one frame of it."""
+
+    @wraps(function)
+    def looked(*arguments: Any, **options: Any) -> Any:
+        try:
+            return function(*arguments, **options)
+        except REFUSALS as error:
+            shorten(error)
+            raise
+
+    return cast("Function", looked)

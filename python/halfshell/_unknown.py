@@ -15,11 +15,8 @@ _MEANT = {
     ],
     "cutoff": [
         "r", "rc", "r_c", "rcut", "r_cut", "rmax", "r_max", "radius", "max_cutoff", "max_distance",
-        "distance_upper_bound", "cut_off", "eps",
+        "distance_upper_bound", "cut_off", "eps", "range", "extent",
     ],
-    "touching": ["indices"],
-    "indices": ["touching"],
-    "r_max": ["range", "rmax", "cutoff"],
     "max_distance": ["cutoff", "r_max", "radius", "distance_upper_bound"],
     "min_distance": ["min_cutoff", "r_min", "rmin", "minimum_distance"],
     "bins": ["nbins", "n_bins", "num_bins"],
@@ -29,12 +26,26 @@ _MEANT = {
     "points": ["positions", "coordinates", "coords", "xyz", "atoms", "data"],
     "quantities": ["return_distance", "return_distances", "quantity", "output"],
     "sort": ["sorted", "sort_results", "sort_pairs"],
-    "types": ["species", "symbols", "elements", "numbers"],
     "index_dtype": ["dtype", "index_type", "output_type"],
     "min_points": ["min_samples"],
-    "batch": ["batch_index", "system_index"],
+    "exclude": ["exclusions", "exclude_within", "exclude_pairs"],
+    "indices": ["touching", "rows", "subset"],
 }  # fmt: skip
 
+
+#: What is known of the points, not of a search; with what others call it.
+_OF_POINTS = {
+    "radii": ["radius_of_each"],
+    "types": ["species", "symbols", "elements", "numbers"],
+    "supports": [],
+    "groups": [],
+    "labels": ["molecules", "residues"],
+    "weights": ["charges", "masses"],
+    "batch": ["batch_index", "system_index"],
+}
+
+#: What is set around calls.
+_SETTINGS = ("kernel", "algorithm", "precision", "memory_limit")
 
 #: Where a keyword that a function does not have is looked for.
 _SEARCHES = [
@@ -52,6 +63,11 @@ def refuse_unknown(function: Callable[..., Any], names: Iterable[str]) -> Never:
     import inspect  # here, as it takes some milliseconds
 
     name = next(iter(names))
+    moved = _moved(name)
+    if moved:
+        raise TypeError(
+            f"{function.__name__}() got an unexpected keyword argument {name!r}: {moved}"
+        )
     known = [
         parameter.name for parameter in inspect.signature(function).parameters.values()
         if parameter.kind is not inspect.Parameter.VAR_KEYWORD and parameter.name != "self"
@@ -66,6 +82,24 @@ def refuse_unknown(function: Callable[..., Any], names: Iterable[str]) -> Never:
     raise TypeError(
         f"{function.__name__}() got an unexpected keyword argument {name!r}{hint}"
     )
+
+
+def _moved(name: str) -> str | None:
+    """Where something is given that no search takes."""
+    if name in _SETTINGS:
+        return f"set it around the call, with hs.settings({name}=...)"
+    own = name.removeprefix("query_")
+    for field, others in _OF_POINTS.items():
+        if own == field or own in others:
+            whose = "queries" if own != name else "points"
+            return f"it is known of the points: hs.Points({whose}, {field}=...)"
+    if name == "query_exclude":
+        return "labels are those of hs.Points(queries, labels=...)"
+    if name in ("capacity", "on_overflow"):
+        return "out= takes arrays of a fixed length, and halfshell.jax has fixed shapes"
+    if name == "winding":
+        return "Clusters.spans is there in every case"
+    return None
 
 
 def _meant(name: str, known: list[str]) -> str | None:

@@ -3,27 +3,134 @@
 
 All is lazy: nothing is read or searched before ``compute``. Bricks are cut by a sample of each
 chunk; each chunk gives its points to the bricks that own or need them; each brick is then a task.
+`halfshell.settings` around a call hold for its tasks.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert.lengths import as_cutoff, as_cutoffs, as_edges
-from halfshell._convert.options import as_flag, check_letters
-from halfshell._convert.types import BoxLike, Number, PeriodicLike
+from halfshell._convert.foreign import is_a, kind_of, whole_number
+from halfshell._convert.lengths import as_edges
+from halfshell._convert.options import as_brick_count, as_flag, check_letters
+from halfshell._convert.points import MAX_DIM
+from halfshell._convert.points import Points as _Points
+from halfshell._extras import needs
 from halfshell._functions import brick_tasks
-from halfshell._functions.dask_scene import columns, da, dask, divided, joined, options_of
+from halfshell._functions.bricks import Terms, divide, part_of
+from halfshell._functions.counts import count_pairs as _count_pairs
+from halfshell._search import document
+from halfshell._settings import current
 
-__all__ = ["Neighbors", "bricks", "coordination", "count_pairs", "neighbors", "pair_histogram",
-           "pairs"]  # fmt: skip
+if TYPE_CHECKING:
+    from halfshell._convert.types import ArrayLike, BoxLike, CutoffLike, PeriodicLike, Rule
+
+try:
+    import dask
+    import dask.array as da
+    from dask.delayed import Delayed  # which has every attribute
+except ModuleNotFoundError as error:
+    if error.name not in ("dask", "dask.array"):
+        raise
+    raise ImportError(
+        f"{needs('halfshell.dask', 'dask[array]')} (the extra halfshell[distributed])"
+    ) from None
+
+__all__ = ["Neighbors", "Points", "bricks", "coordination", "count_pairs", "neighbors",
+           "pair_histogram", "pairs"]  # fmt: skip
 
 Collection = Any  # a dask Array, DataFrame or Delayed, also for type checkers without dask
+
+_TYPES = {"i": np.int64, "j": np.int64, "P": np.int64, "S": np.int32, "d": np.float64,
+          "D": np.float64}  # fmt: skip
+
+
+class Points:
+    """Points of dask and what is known of each, in place of points in all functions here.
+
+    Parameters
+    ----------
+    positions : dask Array or DataFrame of real numbers, shape (n, d)
+        Coordinates, in chunks of any length, which need not be known; 1 <= d <= 8. Points are
+        numbered across all chunks. The columns of a dataframe are the axes.
+    box, periodic
+        As in `halfshell.Points`.
+    radii, types, supports, groups, labels : dask Array or Series, or array_like, optional
+        As in `halfshell.Points`, in chunks of any length, or of those of `positions` where these
+        are not known; `radii` may be a dict by type. What is no dask collection needs known
+        chunks.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If something is not of the kind or the shape that its metadata should say.
+
+    Examples
+    --------
+    >>> import dask.array as da
+    >>> import halfshell.dask as hd
+    >>> positions = da.from_array([[0.0], [1.0], [3.0]], chunks=2)
+    >>> points = hd.Points(positions, radii=[0.25, 0.75, 1.0], box=4.0)
+    >>> hd.pairs(points, None, quantities="P").compute().tolist()
+    [[0, 1], [0, 2]]
+    """
+
+    def __init__(
+        self,
+        positions: Collection,
+        *,
+        box: BoxLike | None = None,
+        periodic: PeriodicLike | None = None,
+        radii: Collection | Mapping[Any, float] | None = None,
+        types: Collection | None = None,
+        supports: Collection | None = None,
+        groups: Collection | None = None,
+        labels: Collection | None = None,
+    ) -> None:
+        self.chunks, self.lengths, self.ndim, self.dtype = _chunks(positions)
+        self.box, self.periodic = box, periodic
+        self.known: list[dict[str, Any]] = [{} for _ in self.chunks]
+        given = {"radii": radii, "types": types, "supports": supports, "groups": groups,
+                 "labels": labels}  # fmt: skip
+        self.fields = tuple(name for name, values in given.items() if values is not None)
+        for name in self.fields:
+            values = given[name]
+            if is_a(values, Mapping):
+                columns = [values] * len(self.chunks)
+            else:
+                columns = self._aligned(values, name)
+            for known, column in zip(self.known, columns, strict=True):
+                known[name] = column
+
+    @property
+    def n_points(self) -> float:
+        """How many points there are, NaN if that is not known."""
+        return float(sum(self.lengths))
+
+    def _aligned(self, values: Any, name: str) -> list[Any]:
+        """The rows of each chunk of the positions."""
+        if hasattr(values, "to_delayed") and not isinstance(values, da.Array | Delayed):
+            values = values.to_dask_array()
+        if not isinstance(values, da.Array):
+            values = da.from_array(np.asanyarray(values))
+        n = self.n_points
+        if not (math.isnan(n) or math.isnan(values.shape[0])):
+            if values.shape[0] != n:
+                raise ValueError(f"{name} must have a row for each of {n:.0f} points, got "
+                                 f"{values.shape[0]}")  # fmt: skip
+            values = values.rechunk((self.lengths, *[-1] * (values.ndim - 1)))
+        if values.numblocks[0] != len(self.chunks):
+            raise ValueError(
+                f"{name} must have the chunks of points, whose lengths are not known: "
+                f"{len(self.chunks)}, got {values.numblocks[0]}"
+            )
+        return list(values.rechunk(dict.fromkeys(range(1, values.ndim), -1)).to_delayed().ravel())
 
 
 class Neighbors(NamedTuple):
@@ -48,12 +155,13 @@ class Neighbors(NamedTuple):
 
 
 def bricks(
-    points: Collection,
-    cutoff: Number,
+    points: Collection | Points,
+    cutoff: CutoffLike,
     *,
     n: int | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
+    rule: Rule | None = None,
 ) -> Collection:
     """Divide points as the other functions of this module do, to find out what that costs.
 
@@ -62,7 +170,7 @@ def bricks(
 
     Parameters
     ----------
-    points, cutoff, n, box, periodic
+    points, cutoff, n, box, periodic, rule
         As in `pairs`.
 
     Returns
@@ -82,49 +190,44 @@ def bricks(
     >>> hd.bricks(da.arange(8.0, chunks=4)[:, None], 1.0).compute()
     Bricks(2 of 8 points, overhead 1.25)
     """
-    scene = divided(points, as_cutoff(cutoff), n, box, periodic)
-    return dask.delayed(brick_tasks.bricks_of, pure=True)(
-        scene.division, *scene.each(brick_tasks.brick_of)
+    parts = _Parts(points, cutoff, n, box, periodic, rule, directed=True)
+    return _task(brick_tasks.bricks_of)(
+        parts.division, *[_task(brick_tasks.brick_of)(part) for part in parts.parts]
     )
 
 
 def pairs(
-    points: Collection,
-    cutoff: Number,
+    points: Collection | Points,
+    cutoff: CutoffLike,
     *,
     n: int | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
-    quantities: str = "ij",
+    rule: Rule | None = None,
+    exclude: ArrayLike | int | None = None,
+    min_distance: float | None = None,
     inclusive: bool = True,
+    quantities: str = "ij",
     sort: bool = False,
-    kernel: str | None = None,
     threads: int = 1,
-    memory_limit: float | None = None,
 ) -> Collection:
     """Find all pairs of points within a cutoff, always exactly, brick by brick.
 
     Parameters
     ----------
-    points : dask Array or DataFrame of real numbers, shape (n_points, d)
+    points : dask Array or DataFrame of real numbers, shape (n_points, d), or Points
         Coordinates, in chunks of any length, which need not be known; 1 <= d <= 8. Points are
-        numbered across all chunks.
-    cutoff : float
-        As in `halfshell.bricks`; in the unit of `points`.
+        numbered across all chunks. `Points` of this module say what else is known of each.
+    {cutoff}
     n : int, optional
         Number of bricks, 1 to 2**20. Default: the number of chunks of `points`.
-    box, periodic
-        As in `halfshell.pairs`.
+    {box, periodic, rule, exclude, min_distance, inclusive}
     quantities : str, default "ij"
         Any of the letters ``i j d D S P``, as in `halfshell.pairs`.
-    inclusive : bool, default True
-        Whether a pair at exactly `cutoff` counts.
     sort : bool, default False
         Sort all pairs by (i, j, S), ascending, byte for byte as `halfshell.pairs` with
         ``sort=True``. The pairs of every brick are then sent to as many tasks as there are bricks.
         Otherwise they have this order within each chunk, which is a brick.
-    kernel, memory_limit
-        As in `halfshell.pairs`, for each brick.
     threads : int, default 1
         Threads of each task; dask runs several tasks at once.
 
@@ -149,33 +252,34 @@ def pairs(
     [[0, 1], [0, 2]]
     """
     check_letters(quantities)
-    scene = divided(points, as_cutoff(cutoff), n, box, periodic, kernel=kernel)
-    options = options_of(inclusive, kernel, threads, memory_limit)
-    found = scene.each(brick_tasks.pairs_of, quantities, options)
+    parts = _Parts(points, cutoff, n, box, periodic, rule)
+    options = parts.options(exclude, min_distance, threads, inclusive=inclusive)
+    found = parts.each(brick_tasks.pairs_of, {**options, "quantities": quantities})
     if as_flag(sort, "sort"):
-        found = scene.in_ranges(found)
-    return columns(found, 0, quantities, scene.ndim)
+        found = parts.in_ranges(found)
+    return _columns(found, 0, quantities, parts.terms.ndim)
 
 
 def neighbors(
-    points: Collection,
-    cutoff: Number,
+    points: Collection | Points,
+    cutoff: CutoffLike,
     *,
     n: int | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
-    quantities: str = "j",
+    rule: Rule | None = None,
+    exclude: ArrayLike | int | None = None,
+    min_distance: float | None = None,
     inclusive: bool = True,
+    quantities: str = "j",
     sort: bool = False,
-    kernel: str | None = None,
     threads: int = 1,
-    memory_limit: float | None = None,
 ) -> Neighbors:
     """Find all neighbours of each point, always exactly, brick by brick.
 
     Parameters
     ----------
-    points, cutoff, n, box, periodic, inclusive, kernel, threads, memory_limit
+    points, cutoff, n, box, periodic, rule, exclude, min_distance, inclusive, threads
         As in `pairs`.
     quantities : str, default "j"
         Any of the letters ``j d D S``, as in `halfshell.neighbors`.
@@ -205,33 +309,35 @@ def neighbors(
     check_letters(quantities)
     if not set(quantities) <= set("jdDS"):
         raise ValueError(f"quantities of neighbors are some of j d D S, got {quantities!r}")
-    scene = divided(points, as_cutoff(cutoff), n, box, periodic, kernel=kernel)
-    options = options_of(inclusive, kernel, threads, memory_limit)
-    found = scene.each(brick_tasks.neighbors_of, quantities, options)
-    table = dask.delayed(brick_tasks.table_of, pure=True)(quantities, scene.division, *found)
+    parts = _Parts(points, cutoff, n, box, periodic, rule, directed=True)
+    options = parts.options(exclude, min_distance, threads, inclusive=inclusive)
+    found = parts.each(brick_tasks.neighbors_of, {**options, "quantities": quantities})
+    is_full = rule not in ("gather", "scatter")
+    table = _task(brick_tasks.table_of)(quantities, is_full, parts.division, *found)
     if as_flag(sort, "sort"):
-        found = scene.in_ranges(found)
-    rows, counts = (joined(found, 0, place, (math.nan,), np.int64) for place in (0, 1))
-    return Neighbors(rows, counts, columns(found, 1, quantities, scene.ndim), table)
+        found = parts.in_ranges(found)
+    rows, counts = (_joined(found, 0, place, (math.nan,), np.int64) for place in (0, 1))
+    return Neighbors(rows, counts, _columns(found, 1, quantities, parts.terms.ndim), table)
 
 
 def coordination(
-    points: Collection,
-    cutoff: Number,
+    points: Collection | Points,
+    cutoff: CutoffLike,
     *,
     n: int | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
+    rule: Rule | None = None,
+    exclude: ArrayLike | int | None = None,
+    min_distance: float | None = None,
     inclusive: bool = True,
-    kernel: str | None = None,
     threads: int = 1,
-    memory_limit: float | None = None,
 ) -> Collection:
     """Count the neighbours of each point, always exactly.
 
     Parameters
     ----------
-    points, cutoff, n, box, periodic, inclusive, kernel, threads, memory_limit
+    points, cutoff, n, box, periodic, rule, exclude, min_distance, inclusive, threads
         As in `pairs`.
 
     Returns
@@ -252,12 +358,12 @@ def coordination(
     >>> hd.coordination(points, 1.5, box=[4.0]).compute().tolist()
     [2, 1, 1]
     """
-    scene = divided(points, as_cutoff(cutoff), n, box, periodic, kernel=kernel)
-    options = options_of(inclusive, kernel, threads, memory_limit)
-    found = scene.in_ranges(scene.each(brick_tasks.coordination_of, scene.box, options))
+    parts = _Parts(points, cutoff, n, box, periodic, rule, directed=True)
+    options = parts.options(exclude, min_distance, threads, inclusive=inclusive)
+    found = parts.in_ranges(parts.each(brick_tasks.coordination_of, options))
     n_ranges, lengths = len(found), [math.nan] * len(found)
-    if not math.isnan(scene.n_points):
-        limits = [int(scene.n_points) * k // n_ranges for k in range(n_ranges + 1)]
+    if not math.isnan(parts.n_points):
+        limits = [int(parts.n_points) * k // n_ranges for k in range(n_ranges + 1)]
         lengths = [high - low for low, high in pairwise(limits)]
     return da.concatenate(
         [
@@ -269,25 +375,26 @@ def coordination(
 
 
 def count_pairs(
-    points: Collection,
-    cutoff: npt.ArrayLike,
+    points: Collection | Points,
+    cutoff: CutoffLike,
     *,
     n: int | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
+    rule: Rule | None = None,
+    exclude: ArrayLike | int | None = None,
+    min_distance: float | None = None,
     inclusive: bool = True,
-    kernel: str | None = None,
     threads: int = 1,
-    memory_limit: float | None = None,
 ) -> Collection:
     """Count all pairs within a cutoff, or several, always exactly.
 
     Parameters
     ----------
-    points, n, box, periodic, inclusive, kernel, threads, memory_limit
+    points, n, box, periodic, rule, exclude, min_distance, inclusive, threads
         As in `pairs`.
-    cutoff : float or array_like of float, shape (k,)
-        One cutoff, or several in ascending order.
+    cutoff : float, array_like of float, shape (k,) or (t, t), dict or None
+        As in `pairs`, or several in ascending order.
 
     Returns
     -------
@@ -307,31 +414,32 @@ def count_pairs(
     >>> int(hd.count_pairs(points, 1.5, box=[4.0]).compute())
     2
     """
-    cutoffs = as_cutoffs(cutoff)
-    largest = float(np.max(cutoffs, initial=0.0)) if np.ndim(cutoffs) else float(cutoffs)
-    scene = divided(points, largest, n, box, periodic, kernel=kernel)
-    options = options_of(inclusive, kernel, threads, memory_limit)
-    counts = scene.each(brick_tasks.counts_of, cutoffs, scene.box, options)
-    total = dask.delayed(brick_tasks.total, pure=True)(*counts)
-    return da.from_delayed(total, np.shape(cutoffs), np.int64)
+    several: Any = None if is_a(cutoff, Mapping) or np.ndim(cutoff) != 1 else np.array(cutoff)  # type: ignore[arg-type]
+    largest: Any = cutoff if several is None else several[-1] if len(several) else 0.0
+    parts = _Parts(points, largest, n, box, periodic, rule)
+    _count_pairs(parts.terms.of_none(), cutoff, rule=rule)
+    options = parts.options(exclude, min_distance, threads, inclusive=inclusive)
+    counts = parts.each(brick_tasks.counts_of, cutoff if several is None else several, options)
+    return da.from_delayed(_task(brick_tasks.total)(*counts), np.shape(several)
+                           if several is not None else (), np.int64)  # fmt: skip
 
 
 def pair_histogram(
-    points: Collection,
+    points: Collection | Points,
     edges: npt.ArrayLike,
     *,
     n: int | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
-    kernel: str | None = None,
+    exclude: ArrayLike | int | None = None,
+    min_distance: float | None = None,
     threads: int = 1,
-    memory_limit: float | None = None,
 ) -> Collection:
     """Count all pairs by distance, always exactly.
 
     Parameters
     ----------
-    points, n, box, periodic, kernel, threads, memory_limit
+    points, n, box, periodic, exclude, min_distance, threads
         As in `pairs`.
     edges : array_like of float, shape (bins + 1,)
         Limits of the bins, as in `halfshell.pair_histogram`.
@@ -355,9 +463,143 @@ def pair_histogram(
     [2, 2]
     """
     limits = as_edges(edges)
-    scene = divided(points, float(limits[-1]), n, box, periodic, kernel=kernel)
-    options = options_of(True, kernel, threads, memory_limit)
-    del options["inclusive"]
-    counts = scene.each(brick_tasks.histogram_of, limits, scene.box, options)
-    total = dask.delayed(brick_tasks.total, pure=True)(*counts)
-    return da.from_delayed(total, (len(limits) - 1,), np.int64)
+    parts = _Parts(points, float(limits[-1]), n, box, periodic, None, by_reach=False)
+    counts = parts.each(
+        brick_tasks.histogram_of, limits, parts.options(exclude, min_distance, threads)
+    )
+    return da.from_delayed(_task(brick_tasks.total)(*counts), (len(limits) - 1,), np.int64)
+
+
+document(pairs)
+
+
+# ---- parts of a division, and what is found in them ----------------------------------------
+
+
+def _task(function: Callable[..., Any]) -> Callable[..., Any]:
+    made: Callable[..., Any] = dask.delayed(function, pure=True)
+    return made
+
+
+class _Parts:
+    """Parts of a division that is to come, after all that can be refused before it."""
+
+    def __init__(
+        self, points: Any, cutoff: Any, n: Any, box: Any, periodic: Any, rule: Any,
+        by_reach: bool = True, directed: bool = False,
+    ) -> None:  # fmt: skip
+        given = points if isinstance(points, Points) else Points(points, box=box, periodic=periodic)
+        for name, value in (("box", box), ("periodic", periodic)):
+            if given is points and value is not None:
+                raise ValueError(f"Points bring their own {name}: leave {name} out")
+        if current().precision != "exact":
+            raise ValueError(f"bricks need precision 'exact', got {current().precision!r}")
+        n_bricks = max(1, len(given.chunks)) if n is None else as_brick_count(n)
+        scene = _Points(np.empty((0, given.ndim)), box=given.box, periodic=given.periodic)
+        # Radii and supports do not matter for a histogram.
+        fields = [name for name in given.fields if by_reach or name not in ("radii", "supports")]
+        flags = None if scene.periodic is None else tuple(scene.periodic.tolist())
+        self.terms = Terms(cutoff, rule, scene.box, flags, given.ndim, tuple(fields))
+        self.terms.call(directed)
+        self.n_points = given.n_points
+        each = [
+            (chunk, given.ndim, given.dtype, place, {name: known[name] for name in fields})
+            for place, (chunk, known) in enumerate(zip(given.chunks, given.known, strict=True))
+        ]
+        summaries = [_task(brick_tasks.summary_of)(*one, len(each)) for one in each]
+        self.division = _task(divide)(self.terms, n_bricks, *summaries)
+        pieces = [_task(brick_tasks.pieces_of)(*one, self.division) for one in each]
+        self.parts = [
+            _task(part_of)(self.division, *[piece[k] for piece in pieces]) for k in range(n_bricks)
+        ]
+
+    def options(
+        self, exclude: Any, min_distance: Any, threads: Any, **inclusive: Any
+    ) -> dict[str, Any]:
+        """Options of a search, after a search of no points with them."""
+        options = {"min_distance": min_distance, "threads": threads, **inclusive}
+        is_number = exclude is None or whole_number(exclude, "exclude") is not None
+        _count_pairs(
+            self.terms.of_none().replace(radii=None, supports=None), 0.0,
+            exclude=exclude if is_number else np.empty((0, 2), np.int64), **options,
+        )  # fmt: skip
+        return {**options, "exclude": exclude if is_number else np.array(exclude)}
+
+    def each(self, task: Callable[..., Any], *arguments: Any) -> list[Any]:
+        """What a task finds in each part."""
+        return [_task(task)(part, current()._asdict(), *arguments) for part in self.parts]
+
+    def in_ranges(self, found: list[Any]) -> list[Any]:
+        """What parts found, in as many ranges of ascending points."""
+        n = len(self.parts)
+        cuts = [_task(brick_tasks.cut)(groups, self.division, n) for groups in found]
+        return [_task(brick_tasks.merged)(*[one[k] for one in cuts]) for k in range(n)]
+
+
+def _joined(
+    found: Sequence[Any], group: int, place: int, shape: tuple[float, ...], dtype: Any
+) -> Any:
+    """One array of what parts found, with a chunk for each."""
+    blocks = [da.from_delayed(one[group][place], shape, dtype) for one in found]
+    return da.concatenate(blocks, allow_unknown_chunksizes=True)
+
+
+def _columns(found: Sequence[Any], group: int, quantities: str, ndim: int) -> Any:
+    """The array of each letter, which stand in a group before the last columns."""
+    arrays = []
+    for place, letter in enumerate(quantities, 1):
+        width = {"P": (2,), "S": (ndim,), "D": (ndim,)}.get(letter, ())
+        arrays.append(_joined(found, group, place, (math.nan, *width), _TYPES[letter]))
+    return tuple(arrays) if len(arrays) > 1 else arrays[0]
+
+
+# ---- chunks --------------------------------------------------------------------------------
+
+
+def _chunks(points: Any) -> tuple[list[Any], tuple[float, ...], int, np.dtype[Any]]:
+    """Delayed arrays of rows, how many rows (NaN if unknown) and columns they have, their type."""
+    if isinstance(points, da.Array):
+        return _of_array(points)
+    needed = ("to_delayed", "dtypes", "columns")
+    if not isinstance(points, Delayed) and all(hasattr(points, name) for name in needed):
+        return _of_frame(points)
+    raise TypeError(
+        f"points must be a dask array or dataframe, or Points of these, got {kind_of(points)}; "
+        "dask.array.from_array makes one of an array"
+    )
+
+
+def _of_array(points: Any) -> tuple[list[Any], tuple[float, ...], int, np.dtype[Any]]:
+    if points.ndim != 2:
+        raise ValueError(f"points must have shape (n, d), got {points.ndim} axes")
+    if math.isnan(points.shape[1]):
+        raise ValueError(
+            "points must have a known number of columns; points.compute_chunk_sizes() finds it"
+        )
+    ndim, dtype = int(points.shape[1]), np.dtype(points.dtype)
+    _check(ndim, dtype, "points")
+    if points.numblocks[1] > 1:
+        points = points.rechunk({1: -1})
+    return list(points.to_delayed()[:, 0]), points.chunks[0], ndim, dtype
+
+
+def _of_frame(points: Any) -> tuple[list[Any], tuple[float, ...], int, np.dtype[Any]]:
+    if getattr(points, "ndim", 2) != 2:
+        raise ValueError("points must be a dataframe with a column for each axis")
+    types = list(points.dtypes.items())
+    for name, dtype in types:
+        if not isinstance(dtype, np.dtype):
+            raise TypeError(f"column {name!r} of points must be of a type of NumPy, got {dtype}")
+        _check(1, dtype, f"column {name!r} of points")
+    narrow = types and all(dtype == np.float32 for _, dtype in types)
+    common = np.dtype(np.float32 if narrow else np.float64)
+    _check(len(types), common, "points")
+    chunks = [_task(brick_tasks.of_columns)(part, common) for part in points.to_delayed()]
+    return chunks, (math.nan,) * len(chunks), len(types), common
+
+
+def _check(ndim: int, dtype: np.dtype[Any], name: str) -> None:
+    if not 1 <= ndim <= MAX_DIM:
+        raise ValueError(f"points must have from 1 to {MAX_DIM} columns, got {ndim}")
+    if dtype.kind not in "biuf" or dtype.itemsize > 8:
+        raise TypeError(f"{name} must hold real numbers, got {dtype}")

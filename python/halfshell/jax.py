@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from halfshell import _show
+from halfshell._convert.foreign import shown
 from halfshell._extras import needs
 from halfshell._functions.directed import entries_of
 from halfshell._objects.box import Box
@@ -137,7 +138,7 @@ def neighbor_list(
         raise ValueError(f"positions must have shape (n, d), got {positions.shape}")
     capacity = operator.index(capacity)
     if not 0 <= capacity < 2**31:
-        raise ValueError(f"capacity must be from 0 to 2**31 - 1, got {capacity}")
+        raise ValueError(f"capacity must be from 0 to 2**31 - 1, got {shown(capacity)}")
     n, dim = positions.shape
     if isinstance(box, Box):
         box = box.vectors

@@ -3,19 +3,25 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from halfshell._convert.foreign import kind_of
-from halfshell._convert.lengths import as_cutoff
-from halfshell._convert.scene import as_own_box, as_points
-from halfshell._convert.types import BoxLike, Number, PeriodicLike, PointsLike
-from halfshell._functions.brick_pieces import Piece, part_of, split
-from halfshell._functions.brick_plan import Division, Summary, divide, summary
-from halfshell._functions.counts import count_pairs
+from halfshell._convert.foreign import is_a, kind_of
+from halfshell._convert.points import Points
+from halfshell._convert.types import BoxLike, CutoffLike, PeriodicLike, PointsLike, Rule
+from halfshell._functions.bricks import (
+    FIELDS,
+    Division,
+    Piece,
+    Summary,
+    Terms,
+    divide,
+    part_of,
+    split,
+    summary,
+)
 from halfshell._objects.brick import Brick
 
 __all__ = ["Exchanged", "exchange"]
@@ -28,33 +34,31 @@ class Exchanged(NamedTuple):
     ----------
     brick : Brick
         The points that this rank owns and those that it needs, by their numbers among all points.
-    points : ndarray of float, shape (m + k, d)
-        Coordinates of ``brick.members``, which the brick's methods take.
+    points : Points
+        ``brick.members``, with all that is known of them; the brick's methods take these.
     """
 
     brick: Brick
-    points: npt.NDArray[Any]
+    points: Points
 
 
 class _Given(NamedTuple):
     """What one rank says of its points, or why it has none."""
 
-    ndim: int
-    dtype: str
-    summary: Summary | None
-    cutoff: float
-    box: bytes | None
-    periodic: int
-    error: Exception | None
+    dtype: str = ""
+    summary: Summary | None = None
+    terms: Terms | None = None
+    error: Exception | None = None
 
 
 def exchange(
     comm: Any,
     points: PointsLike,
-    cutoff: Number,
+    cutoff: CutoffLike,
     *,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
+    rule: Rule | None = None,
 ) -> Exchanged:
     """Give each rank a brick of all ranks' points; called by all ranks at once.
 
@@ -62,17 +66,17 @@ def exchange(
     ----------
     comm : mpi4py.MPI.Comm
         The ranks, as many as there will be bricks.
-    points : array_like of float, shape (n_rank, d)
-        Coordinates of this rank, with the same dtype and d on all ranks; there may be none.
-        Points are numbered across all ranks: those of rank 0 come first.
-    cutoff, box, periodic
+    points : array_like of float, shape (n_rank, d), or Points
+        Those of this rank, with the same dtype and d on all ranks, of which the same is known;
+        there may be none. They are numbered across all ranks: those of rank 0 come first.
+    cutoff, box, periodic, rule
         As in `halfshell.bricks`; the same on all ranks.
 
     Returns
     -------
     Exchanged
-        This rank's brick, which owns about as many points as the others, and the coordinates of
-        its members. ``brick.pairs(points)`` of all ranks together is `halfshell.pairs` of all
+        This rank's brick, which owns about as many points as the others, and its members.
+        ``brick.pairs(points)`` of all ranks together is `halfshell.pairs` of all
         points, byte for byte.
 
     Raises
@@ -80,7 +84,7 @@ def exchange(
     TypeError, ValueError, OverflowError, MemoryError
         As for `halfshell.bricks`, with the same type and message on every rank, whichever rank has
         the error; coordinates are named by their position among all points. Also if ranks differ
-        in cutoff, box, periodicity, d or dtype.
+        in cutoff, rule, box, periodicity, d, dtype or what is known of each point.
 
     Notes
     -----
@@ -101,7 +105,7 @@ def exchange(
         raise TypeError(
             f"comm must be a communicator of mpi4py (the extra halfshell[mpi]), got {kind_of(comm)}"
         )
-    array, given = _given(points, cutoff, box, periodic, comm.Get_size())
+    own, given = _given(points, cutoff, box, periodic, rule, comm.Get_size())
     gathered = comm.gather(given)
     answer: Division | Exception | None = None
     if gathered is not None:
@@ -116,7 +120,7 @@ def exchange(
     pieces: list[Piece] = []
     error = None
     try:
-        pieces = split(array, division, comm.Get_rank())
+        pieces = split(own, division, comm.Get_rank())
     except Exception as found:  # the others must not wait for these pieces
         error = _plain(found, "")
     for rank, one in enumerate(comm.allgather(error)):
@@ -126,52 +130,57 @@ def exchange(
 
 
 def _given(
-    points: Any, cutoff: Any, box: Any, periodic: Any, n_ranks: int
-) -> tuple[npt.NDArray[Any], _Given]:
+    points: Any, cutoff: Any, box: Any, periodic: Any, rule: Any, n_ranks: int
+) -> tuple[Points, _Given]:
     """Arguments of this rank, with what is wrong with them, so that no other waits in vain."""
     try:
-        array = as_points(points)
-        ndim, dtype = array.shape[1], array.dtype.name
-        vectors, bits = as_own_box(box, periodic, ndim)
-        shown = None if vectors is None else np.ascontiguousarray(vectors, np.float64).tobytes()
-        short = summary(array, n_ranks)
-        return array, _Given(ndim, dtype, short, as_cutoff(cutoff), shown, bits, None)
+        own = Points._of(points, "points", box, periodic)
+        if own.batch is not None:
+            raise ValueError("exchange cannot be combined with a batch: its systems are apart")
+        fields = tuple(name for name in FIELDS if getattr(own, name) is not None)
+        flags = None if own.periodic is None else tuple(own.periodic.tolist())
+        kept = cutoff if is_a(cutoff, Mapping) or np.ndim(cutoff) == 0 else np.array(cutoff)
+        vectors = None if own.box is None else np.array(own.box)
+        terms = Terms(kept, rule, vectors, flags, own.positions.shape[1], fields)
+        terms.call()
+        return own, _Given(own.positions.dtype.name, summary(own, n_ranks), terms)
     except Exception as error:
-        return np.empty((0, 1)), _Given(0, "", None, 0.0, None, 0, _plain(error, ""))
+        return Points(np.empty((0, 1))), _Given(error=_plain(error, ""))
 
 
 def _divided(given: list[_Given]) -> Division:
     for rank, one in enumerate(given):
         if one.error is not None:
             raise _plain(one.error, f"rank {rank}: ")
-    first = given[0]
+    first: Any = given[0].terms
     for rank, one in enumerate(given):
-        if (one.ndim, one.dtype) != (first.ndim, first.dtype):
+        terms: Any = one.terms
+        if (terms.ndim, one.dtype) != (first.ndim, given[0].dtype):
             raise ValueError(
                 "points must be of one width and type on all ranks, got "
-                f"{first.ndim} columns of {first.dtype} on rank 0 and "
-                f"{one.ndim} of {one.dtype} on rank {rank}"
+                f"{first.ndim} columns of {given[0].dtype} on rank 0 and "
+                f"{terms.ndim} of {one.dtype} on rank {rank}"
             )
-        if one.cutoff != first.cutoff and not math.isnan(first.cutoff):
-            raise ValueError(
-                f"cutoff must be the same on all ranks, got {first.cutoff} on rank 0 and "
-                f"{one.cutoff} on rank {rank}"
-            )
-        for name, mine, other in (
-            ("box", one.box, first.box), ("periodic", one.periodic, first.periodic),
-        ):  # fmt: skip
-            if mine != other:
+        for name in ("cutoff", "rule", "box", "periodic", "fields"):
+            mine, other = getattr(terms, name), getattr(first, name)
+            if not _is_same(mine, other):
+                what = "what is known of points" if name == "fields" else name
                 raise ValueError(
-                    f"{name} must be the same on all ranks; rank {rank} has another than rank 0"
+                    f"{what} must be the same on all ranks, got {_shown(other)} on rank 0 and "
+                    f"{_shown(mine)} on rank {rank}"
                 )
-    ndim, vectors, flags = first.ndim, None, None
-    if first.box is not None:
-        vectors = np.frombuffer(first.box).reshape(ndim, ndim)
-        flags = [bool(first.periodic >> k & 1) for k in range(ndim)]
-    # Refuses what a search would refuse.
-    count_pairs(np.empty((0, ndim)), first.cutoff, box=vectors, periodic=flags)
     summaries = [one.summary for one in given if one.summary is not None]
-    return divide(first.cutoff, len(given), vectors, tuple(flags or [False] * ndim), *summaries)
+    return divide(first, len(given), *summaries)
+
+
+def _is_same(one: Any, other: Any) -> bool:
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        return np.array_equal(one, other)
+    return bool(one == other)
+
+
+def _shown(value: Any) -> str:
+    return " ".join(repr(value.tolist() if isinstance(value, np.ndarray) else value).split())
 
 
 def _plain(error: Exception, whose: str) -> Exception:

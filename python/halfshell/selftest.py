@@ -19,7 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import halfshell as hs
-from halfshell._check.reference import exact_square, reference_pairs, ulp_error
+from halfshell._check.reference import (
+    exact_square,
+    reach_by_radii,
+    reference_pairs,
+    ulp_error,
+)
 
 __all__ = ["Case", "cases", "main", "run"]
 
@@ -34,19 +39,23 @@ class Case:
     box: NDArray[np.float64] | None = None
     periodic: tuple[bool, ...] | None = None
     inclusive: bool = True
+    radii: NDArray[np.float64] | None = None  # of which sums are compared, within the cutoff
 
     def find(self, kernel: str | None, quantities: str, sort: bool = False) -> Any:
         """Run the search on this scene."""
-        return hs.pairs(
-            self.points,
-            self.cutoff,
-            box=self.box,
-            periodic=self.periodic,
-            quantities=quantities,
-            inclusive=self.inclusive,
-            sort=sort,
-            kernel=kernel,
-        )
+        points = hs.Points(self.points, box=self.box, periodic=self.periodic, radii=self.radii)
+        with hs.settings(kernel=kernel):
+            return hs.pairs(
+                points, self.cutoff, quantities=quantities, inclusive=self.inclusive, sort=sort
+            )
+
+    @property
+    def expected(self) -> list[Any]:
+        """The pairs by integers."""
+        reach: Any = self.cutoff
+        if self.radii is not None:
+            reach = reach_by_radii(self.radii.tolist(), cutoff=self.cutoff)
+        return reference_pairs(self.points, reach, self.box, self.periodic, self.inclusive)
 
 
 def cases() -> Iterator[Case]:
@@ -81,13 +90,17 @@ def cases() -> Iterator[Case]:
     yield Case("subnormal coordinates and cutoff", tiny, 2 * 5e-324)
     yield Case("huge coordinates: squares overflow", (cloud - 0.5) * 1e300, 3e299)
 
+    radii: Any = random.integers(0, 4, len(lattice)) * 0.125
+    yield Case("ties: balls on a lattice that touch", lattice * 0.25, 0.5, radii=radii)
+    sizes: Any = 0.4 * 10.0 ** -random.uniform(0, 6, len(cloud))
+    yield Case("random: balls of six decades", cloud, 0.5, np.ones(3), radii=sizes)
+
 
 def check_case(case: Case) -> str:
     """Compare all kernels with the integers; return how many pairs there are."""
-    expected = reference_pairs(case.points, case.cutoff, case.box, case.periodic, case.inclusive)
-    quantities = "ijSd"
+    expected = case.expected
     for kernel in hs.kernels():
-        i, j, S, d = case.find(kernel, quantities, sort=True)
+        i, j, S, d = case.find(kernel, "ijSd", sort=True)
         found = list(zip(i.tolist(), j.tolist(), map(tuple, S.tolist()), strict=True))
         if found != expected:
             missed, spurious = set(expected) - set(found), set(found) - set(expected)

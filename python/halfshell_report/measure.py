@@ -24,6 +24,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextvars import copy_context
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -42,7 +43,7 @@ from halfshell_report.peers import LIBRARIES, Question, wrapped
 
 __all__ = [
     "METHODS", "PRECISIONS", "REUSE", "Patience", "PeerProcess", "Timing", "answer_of",
-    "calls_of", "machine_facts", "options_of", "serve", "take_turns",
+    "calls_of", "machine_facts", "options_of", "serve", "take_turns", "under",
 ]  # fmt: skip
 
 
@@ -120,7 +121,7 @@ def _one_turn(call: Callable[[], Any]) -> list[float]:
             gc.enable()
 
 
-#: precision= of `halfshell.pairs`.
+#: Of `halfshell.settings`.
 PRECISIONS = ("exact", "double", "single")
 #: Ways to keep one list for several steps: rebuilt in time, or by the clock.
 REUSE = ("verlet", "stale")
@@ -145,31 +146,35 @@ def options_of(method: str, scene: Any) -> dict[str, Any]:
             points = points.astype(np.float32)
         if not np.isfinite(points).all():
             raise ValueError("coordinates beyond the range of float32")
-    reach: dict[str, Any] = scene.reach
-    return reach | {
-        "points": points,
-        "cutoff": scene.cutoff,
-        "box": scene.box,
-        "periodic": scene.periodic if scene.box is not None else None,
-        "inclusive": scene.inclusive,
-        "precision": method if method in PRECISIONS else "exact",
-        "threads": 1,
-        "memory_limit": _MOST_BYTES,
-    }
+    return {**scene.arguments_of(points), "threads": 1}
 
 
-def answer_of(options: dict[str, Any]) -> Answer:
+def answer_of(method: str, options: dict[str, Any]) -> Answer:
     """Ask for everything."""
-    i, j, d, D, S = hs.pairs(**options, quantities="ijdDS")
+    with hs.settings(memory_limit=_MOST_BYTES, **_settings_of(method)):
+        i, j, d, D, S = hs.pairs(**options, quantities="ijdDS")
     return Answer(i, j, S, d, D, inclusive=options["inclusive"])
 
 
-def calls_of(options: dict[str, Any]) -> dict[str, Callable[[], Any]]:
+def calls_of(method: str, options: dict[str, Any]) -> dict[str, Callable[[], Any]]:
     """Return the calls to be timed: i and j alone, and with d and D."""
     return {
-        "ij": partial(hs.pairs, **options),
-        "with_d": partial(hs.pairs, **options, quantities="ijdD"),
+        "ij": under(_settings_of(method), partial(hs.pairs, **options)),
+        "with_d": under(_settings_of(method), partial(hs.pairs, **options, quantities="ijdD")),
     }
+
+
+def _settings_of(method: str) -> dict[str, Any]:
+    return {"precision": method} if method in PRECISIONS[1:] else {}
+
+
+def under(settings: Mapping[str, Any], call: Callable[[], Any]) -> Callable[[], Any]:
+    """Return a call that is made within `halfshell.settings`: itself, if there are none."""
+    if not settings:
+        return call
+    context = copy_context()
+    context.run(hs.settings(**settings).__enter__)
+    return partial(context.run, call)
 
 
 LENGTH = struct.Struct("<Q")

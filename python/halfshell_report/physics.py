@@ -208,14 +208,16 @@ class Lists(Protocol):
 class EveryStep:
     """A new list for every step."""
 
-    def __init__(self, scene: Any, precision: str) -> None:
+    def __init__(self, scene: Any, precision: Any) -> None:
         self.builds: int = 0
-        self._options = _search(scene) | {"precision": precision}
+        self._options = _search(scene)
+        self._how = hs.settings(precision=precision)
 
     def pairs(self, points: Floats) -> Answer:
         """Search."""
         self.builds += 1
-        i, j, d, D, S = hs.pairs(points, quantities="ijdDS", **self._options)
+        with self._how:
+            i, j, d, D, S = hs.pairs(points, quantities="ijdDS", **self._options)
         return Answer(i, j, S, d, D, inclusive=self._options["inclusive"])
 
 

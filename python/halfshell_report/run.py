@@ -212,8 +212,8 @@ class _Stage:
             one = replace(blank, method=method)
             try:
                 options = measure.options_of(method, self.scene)
-                answered[method] = self._judged(one, measure.answer_of(options))
-                for what, call in measure.calls_of(options).items():
+                answered[method] = self._judged(one, measure.answer_of(method, options))
+                for what, call in measure.calls_of(method, options).items():
                     calls[f"{method} {what}"] = call
             except ValueError as error:
                 answered[method] = replace(one, status="not offered", note=str(error))

@@ -20,38 +20,24 @@ NAME = "_core" + sysconfig.get_config_var("EXT_SUFFIX")
 
 # Themes of each file of the binding, as names of tests say them, besides its own name.
 THEMES = {
-    "convert": "core_arguments boundary_cases dtypes array_forms",
-    "py_call": "core_arguments interrupt threads boundary_cases quantities",
-    "plain": "plain array_forms",
-    "outputs": "quantities table array_forms",
-    "foreign": "boundary",
-    "tuples": "for_each_pair explain cell_list",
-    "py_pairs": "quantities pairs_small count",
-    "py_neighbors": "neighbors between table",
-    "py_cells": "cell_",
-    "py_stream": "iter_pairs",
-    "py_visit": "for_each_pair",
-    "py_info": "environment cache available",
-    "py_batch": "batch core_arguments",
+    "arguments": "core_arguments interrupt threads boundary_cases quantities reach selection",
+    "quick": "quick dtypes array_forms",
+    "interface": "quick core_arguments",
+    "outputs": "quantities table array_forms capacity pairs_small",
+    "errors": "boundary statuses for_each_pair explain cell_list",
     "many_systems": "batch core_arguments",
-    "reach": "reach_arguments reach_types supports_arguments core_arguments",
-    "selection": "exclusions shells core_arguments",
-    "py_results": "capacity quantities pairs_small",
-    "py_connectivity": "connectivity",
-    "node_call": "connectivity",
-    "py_node_changes": "connectivity_changes",
+    "py_searches": "quantities pairs_small count neighbors between table nearest clusters",
+    "py_cells": "cell_ verlet box",
+    "py_streams": "iter_pairs for_each_pair",
+    "py_nodes": "connectivity",
     "py_dynamic": "dynamic",
-    "py_dynamic_arguments": "dynamic",
-    "py_dynamic_balls": "dynamic",
-    "py_dynamic_many": "dynamic",
-    "py_dynamic_new": "dynamic",
-    "groups": "available_memory",
+    "system": "environment available_memory threads",
     "capi": "capi",
-    "module": "capi iter_pairs",
+    "module": "capi iter_pairs cache environment",
 }
 # Tests of many files, which come next. Left out at the end are those of programs and pages, and
 # those that run other builds or other libraries.
-FIRST = ["core_arguments", "plain", "quantities", "errors", "no_memory"]
+FIRST = ["core_arguments", "quick", "quantities", "errors", "no_memory"]
 LEFT_OUT = ["adversarial", "benchmark", "report", "cli", "c_interface", "packaging", "docs"]
 LEFT_OUT += ["typing", "golden", "selftest", "scene", "peers", "notebooks", "site", "dask", "mpi"]
 LEFT_OUT += ["framework", "torch", "jax"]

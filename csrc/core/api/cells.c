@@ -39,7 +39,21 @@ options_of_cells(const hs_options *options)
     hs_options of_cells = *options;
     of_cells.want = HS_WANT_SHIFT;
     of_cells.out = NULL;
+    of_cells.domain = NULL; /* borrowed for this call */
     return of_cells;
+}
+
+/* Whether all ends are finite, where something is fixed, and those of axes that do not matter. */
+static bool
+is_domain(const double *domain, int ndim)
+{
+    for (int k = 0; domain != NULL && k < ndim; k++) {
+        const double low = domain[k], high = domain[ndim + k];
+        if (!(low > high) && !(low <= high && isfinite(low) && isfinite(high))) {
+            return false;
+        }
+    }
+    return true;
 }
 
 static hs_status
@@ -53,12 +67,18 @@ build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
     hs_search_begin(call, &cells->search);
     hs_status status =
         hs_check_arguments(points, NULL, cells->has_box ? &cells->box : NULL, &of_cells, failure);
+    if (status == HS_OK && !is_domain(options->domain, points->ndim)) {
+        status = HS_ERR_ARGUMENT;
+    }
     if (status == HS_OK) {
         status = keep_points(points, cells);
     }
     if (status == HS_OK) {
         /* keeps_none: no pairs are kept by this call */
-        const hs_sets sets = {.points = &cells->points, .is_kept = true, .keeps_none = true};
+        const hs_sets sets = {.points = &cells->points,
+                              .is_kept = true,
+                              .keeps_none = true,
+                              .domain = options->domain};
         hs_call_gather(call, points->n / HS_POINTS_MADE_READY);
         status =
             hs_search_build(&sets, cells->has_box ? &cells->box : NULL, &cells->search, failure);

@@ -270,6 +270,27 @@ hs_dynamic_cell(const hs_dynamic *list, hs_key key, int64_t *cell)
     return status;
 }
 
+hs_status
+hs_dynamic_cell_of(const hs_dynamic *list, const double *position, int64_t *cell,
+                   hs_failure *failure)
+{
+    hs_failure ignored;
+    hs_placed  placed;
+    double     own[HS_MAX_DIM];
+    failure = hs_failure_or(failure, &ignored);
+    if (list == NULL || position == NULL || cell == NULL) {
+        return HS_ERR_ARGUMENT;
+    }
+    const hs_dynamic_call call = hs_dynamic_enter(list, false);
+    hs_read_position(list, position, own);
+    const hs_status status = hs_dynamic_place(list, own, &placed, failure);
+    if (status == HS_OK) {
+        memcpy(cell, placed.index, (size_t)list->lattice.ndim * sizeof *cell);
+    }
+    hs_dynamic_leave(list, call);
+    return status;
+}
+
 /* The public functions that ask what lies in a ball. */
 
 /* A ball for a list that has been entered; `own` holds its centre. */

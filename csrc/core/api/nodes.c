@@ -116,7 +116,7 @@ hs_connectivity_link(const hs_half_list *pairs, const hs_node_lists *lists,
         return status;
     }
     if (status == HS_OK) {
-        status = hs_half_list_copy(&made->call.account, pairs, n, &half, failure);
+        status = hs_half_list_copy(&made->call.account, pairs, n, lists->directed, &half, failure);
         if (status == HS_OK) {
             status = hs_connectivity_fill(made, lists, n, &half, failure);
         }
@@ -215,10 +215,24 @@ hs_connectivity_overlap(const hs_points *points, const hs_index_rows *gather,
     return rows_finish(made, status, rows, failure);
 }
 
+/* What the shifts of a half list multiply; axes that do not repeat have rows of zeros. False for a
+ * box of too many dimensions. */
+static bool
+read_images(const hs_box *box, int ndim, hs_metric *images)
+{
+    *images = (hs_metric){.ndim = ndim, .n_rows = box != NULL ? ndim : 0};
+    for (int l = 0; l < images->n_rows; l++) {
+        for (int k = 0; k < ndim; k++) {
+            images->rows[l][k] = box->periodic[l] ? box->rows[l][k] : 0.0;
+        }
+    }
+    return images->n_rows <= HS_MAX_DIM - 2;
+}
+
 /* Of a half list that is copied, and a map. */
 static hs_status
-intersect(hs_pairs *made, const hs_points *points, const hs_node_lists *lists,
-          const hs_output *half, hs_failure *failure)
+intersect(hs_pairs *made, const hs_points *points, const hs_metric *images,
+          const hs_node_lists *lists, const hs_output *half, hs_failure *failure)
 {
     hs_account *account = &made->call.account;
     hs_node_map map;
@@ -229,8 +243,8 @@ intersect(hs_pairs *made, const hs_points *points, const hs_node_lists *lists,
     double *rows = hs_alloc(account, HS_FOR_POINTS, points->n * points->ndim, sizeof *rows);
     status = rows != NULL ? hs_points_copy_finite(points, rows, failure) : HS_ERR_MEMORY;
     if (status == HS_OK) {
-        status = hs_intersection_fill(&made->call, &map, lists->ghost_pairs, half, rows,
-                                      points->ndim, made, failure);
+        status = hs_intersection_fill(&made->call, &map, lists->ghost_pairs, half, rows, images,
+                                      made, failure);
     }
     hs_free(account, rows);
     hs_node_map_free(account, &map);
@@ -238,13 +252,14 @@ intersect(hs_pairs *made, const hs_points *points, const hs_node_lists *lists,
 }
 
 hs_status
-hs_connectivity_intersect(const hs_points *points, const hs_half_list *pairs,
+hs_connectivity_intersect(const hs_points *points, const hs_box *box, const hs_half_list *pairs,
                           const hs_node_lists *lists, const hs_options *options, hs_pairs **result,
                           hs_failure *failure)
 {
     hs_output half;
-    if (!hs_can_return(result, options) || points == NULL || pairs == NULL ||
-        pairs->shift != NULL || lists == NULL) {
+    hs_metric images;
+    if (!hs_can_return(result, options) || points == NULL || pairs == NULL || lists == NULL ||
+        lists->directed || (box == NULL) != (pairs->shift == NULL)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     hs_status status;
@@ -252,10 +267,20 @@ hs_connectivity_intersect(const hs_points *points, const hs_half_list *pairs,
     if (made == NULL) {
         return status;
     }
+    if (status == HS_OK && box != NULL &&
+        (hs_check_box(box, points->ndim) != HS_OK || pairs->ndim != points->ndim)) {
+        status = HS_ERR_ARGUMENT;
+    }
     if (status == HS_OK) {
-        status = hs_half_list_copy(&made->call.account, pairs, points->n, &half, failure);
+        status = box != NULL ? hs_box_check(box, failure) : HS_OK;
+    }
+    if (status == HS_OK && !read_images(box, points->ndim, &images)) {
+        status = HS_ERR_ARGUMENT;
+    }
+    if (status == HS_OK) {
+        status = hs_half_list_copy(&made->call.account, pairs, points->n, false, &half, failure);
         if (status == HS_OK) {
-            status = intersect(made, points, lists, &half, failure);
+            status = intersect(made, points, &images, lists, &half, failure);
         }
         hs_output_free(&half);
     }
@@ -263,7 +288,7 @@ hs_connectivity_intersect(const hs_points *points, const hs_half_list *pairs,
 }
 
 /* The public functions that make rows and pairs out of others: pairs of rows,
- * and what is left of both when nodes or pairs go. */
+ * and what is left of rows when nodes or pairs go. */
 
 hs_status
 hs_connectivity_pair(const hs_list_rows *rows, const hs_node_lists *lists,
@@ -280,24 +305,6 @@ hs_connectivity_pair(const hs_list_rows *rows, const hs_node_lists *lists,
     }
     if (status == HS_OK) {
         status = hs_connectivity_fill_pairs(made, lists, n, rows);
-    }
-    return connectivity_finish(made, status, result, failure);
-}
-
-hs_status
-hs_node_pairs_keep(const hs_node_pairs *pairs, const hs_node_change *change, const bool *keep,
-                   const hs_options *options, hs_connectivity **result, hs_failure *failure)
-{
-    hs_status status = HS_ERR_ARGUMENT;
-    if (!can_connect(result, options) || pairs == NULL) {
-        return hs_end_early(status, options, failure);
-    }
-    hs_connectivity *made = connectivity_begin(options, &failure, &status);
-    if (made == NULL) {
-        return status;
-    }
-    if (status == HS_OK) {
-        status = hs_kept_pairs_fill(&made->call, pairs, change, keep, made->nodes, made->lists);
     }
     return connectivity_finish(made, status, result, failure);
 }

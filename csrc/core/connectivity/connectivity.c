@@ -5,8 +5,8 @@
 
 #include <string.h>
 
-/* connectivity.c: three results of one call. The lists one after the other give each node a number
- * among all; points are these nodes, in their order or in another. */
+/* The lists one after the other give each node a number among all; points are these
+ * nodes, in their order or in another. */
 
 /* Where a list begins, among all nodes and among all rows; copied, so that it cannot change. */
 typedef struct list_range {
@@ -126,6 +126,7 @@ hs_node_map_make(hs_account *account, const hs_node_lists *lists, int64_t n, hs_
     }
     map->n_lists = lists->n_lists;
     map->is_plain = lists->number == NULL;
+    map->directed = lists->directed;
     list_range *ranges = hs_alloc(account, HS_FOR_CELLS, map->n_lists, sizeof *ranges);
     hs_status   status = HS_ERR_MEMORY;
     if (ranges != NULL && !read_ranges(lists, n, ranges, &map->n_rows)) {
@@ -175,13 +176,18 @@ compare_shifts(const int32_t *shift, const int32_t *other, int ndim)
 
 /* Whether pair e is one of n points and comes behind the one before. */
 static bool
-is_right(const hs_half_columns *half, int64_t e, int64_t n)
+is_right(const hs_half_columns *half, int64_t e, int64_t n, bool directed)
 {
     const int32_t  i = half->i[e], j = half->j[e];
     const int32_t *shift = half->shift != NULL ? half->shift + e * half->ndim : NULL;
-    if (i < 0 || j < i || j >= n ||
-        (i == j && (shift == NULL || compare_shifts(shift, NULL, half->ndim) <= 0))) {
+    if (i < 0 || j < 0 || i >= n || j >= n || (j < i && !directed)) {
         return false;
+    }
+    if (i == j) {
+        const int side = shift != NULL ? compare_shifts(shift, NULL, half->ndim) : 0;
+        if (side == 0 || (side < 0 && !directed)) {
+            return false;
+        }
     }
     if (e == 0 || half->i[e - 1] < i || (half->i[e - 1] == i && half->j[e - 1] < j)) {
         return true;
@@ -191,10 +197,10 @@ is_right(const hs_half_columns *half, int64_t e, int64_t n)
 }
 
 static hs_status
-check(const hs_half_columns *half, int64_t n, hs_failure *failure)
+check(const hs_half_columns *half, int64_t n, bool directed, hs_failure *failure)
 {
     for (int64_t e = 0; e < half->n; e++) {
-        if (!is_right(half, e, n)) {
+        if (!is_right(half, e, n, directed)) {
             failure->row = e;
             return HS_ERR_ARGUMENT;
         }
@@ -203,8 +209,8 @@ check(const hs_half_columns *half, int64_t n, hs_failure *failure)
 }
 
 hs_status
-hs_half_list_copy(hs_account *account, const hs_half_list *pairs, int64_t n, hs_output *copy,
-                  hs_failure *failure)
+hs_half_list_copy(hs_account *account, const hs_half_list *pairs, int64_t n, bool directed,
+                  hs_output *copy, hs_failure *failure)
 {
     const unsigned shift = pairs->shift != NULL ? HS_WANT_SHIFT : 0;
     const int      ndim = pairs->shift != NULL ? pairs->ndim : 1;
@@ -227,7 +233,7 @@ hs_half_list_copy(hs_account *account, const hs_half_list *pairs, int64_t n, hs_
         }
     }
     const hs_half_columns half = hs_half_list_columns(copy);
-    return check(&half, n, failure);
+    return check(&half, n, directed, failure);
 }
 
 /* Where the lists follow each other in a row, it is cut at their ends; else each entry
@@ -342,50 +348,6 @@ hs_row_split_fill(hs_call *call, const hs_node_map *map, const hs_rows_view *fro
     return status;
 }
 
-/* Whether entry e of the row of p begins a pair. */
-HS_ALWAYS_INLINE bool
-is_forward(const hs_rows_view *from, int64_t p, int64_t e)
-{
-    if (from->shift == NULL || from->index[e] != p) {
-        return from->index[e] > p;
-    }
-    return hs_shift_is_forward(from->shift + e * from->ndim, from->ndim);
-}
-
-hs_status
-hs_row_split_half(hs_call *call, int64_t n, const hs_rows_view *from, hs_output *half)
-{
-    const unsigned shift = from->shift != NULL ? HS_WANT_SHIFT : 0;
-    const int      d = from->ndim;
-    int64_t        n_pairs = 0;
-    hs_output_init(&call->account, d, HS_WANT_I | HS_WANT_J | shift, 4, half);
-    for (int64_t p = 0; p < n; p++) {
-        for (int64_t e = from->first[p]; e < from->end[p]; e++) {
-            n_pairs += is_forward(from, p, e);
-        }
-    }
-    const hs_status status = hs_output_reserve(half, n_pairs, 0.0);
-    if (status != HS_OK) {
-        return status;
-    }
-    half->n_pairs = n_pairs;
-    int32_t *i = hs_output_column(half, HS_WANT_I), *j = hs_output_column(half, HS_WANT_J);
-    int32_t *s = hs_output_column(half, HS_WANT_SHIFT);
-    for (int64_t p = 0, at = 0; p < n; p++) {
-        for (int64_t e = from->first[p]; e < from->end[p]; e++) {
-            if (is_forward(from, p, e)) {
-                i[at] = (int32_t)p;
-                j[at] = from->index[e];
-                if (s != NULL) {
-                    memcpy(s + at * d, from->shift + e * d, (size_t)d * sizeof *s);
-                }
-                at++;
-            }
-        }
-    }
-    return HS_OK;
-}
-
 /* One pass counts, one puts each point where the row goes on. Pairs of one i and j in
  * several images are a group, put from its end for the row in which shifts are negative. */
 
@@ -416,7 +378,8 @@ count(const hs_options *options, const rows_filling *doing)
     int64_t               *counts = doing->next + 1;
     for (int64_t e = 0; e < half->n; e++) {
         const int64_t of_i = entry_of(doing->map, half->i[e], half->j[e]);
-        const int64_t of_j = entry_of(doing->map, half->j[e], half->i[e]);
+        const int64_t of_j = doing->map->directed ? -1
+                                                  : entry_of(doing->map, half->j[e], half->i[e]);
         if (of_i >= 0) {
             counts[of_i]++;
         }
@@ -454,13 +417,14 @@ HS_ALWAYS_INLINE void
 put_group(const rows_filling *doing, int64_t first, int64_t end)
 {
     const int32_t i = doing->half.i[first], j = doing->half.j[first];
-    for (int64_t e = end; i == j && e-- > first;) {
+    const bool    mirrors = !doing->map->directed;
+    for (int64_t e = end; i == j && mirrors && e-- > first;) {
         put_node_entry(doing, i, i, e, true);
     }
     for (int64_t e = first; e < end; e++) {
         put_node_entry(doing, i, j, e, false);
     }
-    for (int64_t e = end; i != j && e-- > first;) {
+    for (int64_t e = end; i != j && mirrors && e-- > first;) {
         put_node_entry(doing, j, i, e, true);
     }
 }
@@ -601,8 +565,7 @@ hs_node_pairs_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs, cons
     return HS_OK;
 }
 
-/* The table of pairs of nodes from rows of all of them, whose points are in the order of lists and
- * nodes: of each row, what is behind its node in its own list, and all of the lists that follow. */
+/* What is behind a node in its own list, and all of the lists that follow. */
 
 /* Entries between two calls of poll(). */
 #define POLL_ROW_ENTRIES (INT64_C(1) << 21)
@@ -726,6 +689,190 @@ row_pairs_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs, const hs
     return status;
 }
 
+/* Pairs of rows in any order, or of which ghosts have none: entries that begin a pair are put in
+ * order by both of its points, the second one first. */
+
+typedef struct pair_sorting {
+    const hs_node_map  *map;
+    const hs_list_rows *rows;
+    int32_t            *point_of_node; /* owned */
+    int64_t            *start;         /* owned; of each point */
+    int64_t            *order, *spare; /* owned; pairs */
+    hs_output           found, half;   /* as entries come, and in order */
+} pair_sorting;
+
+/* Whether entry e of the row of p, which is q, begins a pair; *turned: with q. */
+HS_ALWAYS_INLINE bool
+begins(const pair_sorting *doing, int32_t p, int32_t q, int64_t e, bool *turned)
+{
+    const hs_list_rows *rows = doing->rows;
+    *turned = false;
+    if (doing->map->directed) {
+        return true;
+    }
+    if (q < p) {
+        *turned = doing->map->row[q] < 0;
+        return *turned;
+    }
+    return q > p ||
+           (rows->shift != NULL && hs_shift_is_forward(rows->shift + e * rows->ndim, rows->ndim));
+}
+
+/* Writes entry e of the row of p, with q, as a pair. */
+HS_ALWAYS_INLINE void
+put_found(pair_sorting *doing, int32_t p, int32_t q, int64_t e, bool turned)
+{
+    const hs_list_rows *rows = doing->rows;
+    hs_output          *found = &doing->found;
+    const int64_t       at = found->n_pairs++;
+    int32_t            *shift = hs_output_column(found, HS_WANT_SHIFT);
+    ((int32_t *)hs_output_column(found, HS_WANT_I))[at] = turned ? q : p;
+    ((int32_t *)hs_output_column(found, HS_WANT_J))[at] = turned ? p : q;
+    for (int k = 0; shift != NULL && k < rows->ndim; k++) {
+        const uint32_t component = (uint32_t)rows->shift[e * rows->ndim + k];
+        shift[at * rows->ndim + k] = (int32_t)(turned ? 0u - component : component);
+    }
+}
+
+/* The pairs of entries [first, last) of the row of p, of list l; of one q that comes first, by
+ * their opposite shifts. False where a node is none. */
+static bool
+put_entries(pair_sorting *doing, int32_t p, int32_t l, int64_t first, int64_t last)
+{
+    const int32_t *indices = doing->rows->indices;
+    const int64_t  before = l > 0 ? doing->map->end[l - 1] : 0;
+    for (int64_t e = first, end; e < last; e = end) {
+        const int32_t node = indices[e];
+        bool          turned;
+        if (node < 0 || node >= doing->map->end[l] - before) {
+            return false;
+        }
+        const int32_t q = doing->point_of_node[before + node];
+        for (end = e + 1; end < last && indices[end] == node;) {
+            end++;
+        }
+        for (int64_t k = e; k < end; k++) {
+            if (begins(doing, p, q, k, &turned)) {
+                put_found(doing, p, q, turned ? e + end - 1 - k : k, turned);
+            }
+        }
+    }
+    return true;
+}
+
+static hs_status
+find_pairs(hs_call *call, pair_sorting *doing)
+{
+    const hs_node_map  *map = doing->map;
+    const hs_list_rows *rows = doing->rows;
+    hs_status           status = hs_output_reserve(&doing->found, rows->n_indices, 0.0);
+    int64_t             room = rows->n_indices, looked = 0;
+    for (int64_t p = 0; status == HS_OK && p < map->n; p++) {
+        for (int32_t l = 0; status == HS_OK && map->row[p] >= 0 && l < map->n_lists; l++) {
+            const int64_t *at = rows->offsets + (int64_t)map->row[p] * map->n_lists + l;
+            if (at[0] < 0 || at[0] > at[1] || at[1] > rows->n_indices || at[1] - at[0] > room ||
+                !put_entries(doing, (int32_t)p, l, at[0], at[1])) {
+                status = HS_ERR_ARGUMENT;
+            } else {
+                room -= at[1] - at[0];
+                looked += at[1] - at[0];
+            }
+        }
+        if (status == HS_OK && looked >= POLL_ROW_ENTRIES) {
+            looked = 0;
+            status = hs_poll(&call->options, (double)p / (double)map->n);
+        }
+    }
+    return status;
+}
+
+/* The numbers of pairs in `from` (NULL: in their order), by the points of a column, in `to`. */
+static void
+sort_by(const pair_sorting *doing, const int32_t *points, const int64_t *from, int64_t *to)
+{
+    int64_t *start = doing->start;
+    memset(start, 0, (size_t)(doing->map->n + 1) * sizeof *start);
+    for (int64_t e = 0; e < doing->found.n_pairs; e++) {
+        start[points[e] + 1]++;
+    }
+    hs_starts_of_lengths(start, doing->map->n + 1);
+    for (int64_t e = 0; e < doing->found.n_pairs; e++) {
+        const int64_t k = from != NULL ? from[e] : e;
+        to[start[points[k]]++] = k;
+    }
+}
+
+static hs_status
+sort_pairs(hs_call *call, pair_sorting *doing)
+{
+    const hs_half_columns found = hs_half_list_columns(&doing->found);
+    hs_account           *account = &call->account;
+    hs_status             status = HS_ERR_MEMORY;
+    doing->start = hs_alloc(account, HS_FOR_SORTING, doing->map->n + 1, sizeof *doing->start);
+    doing->order = hs_alloc(account, HS_FOR_SORTING, found.n, sizeof *doing->order);
+    doing->spare = hs_alloc(account, HS_FOR_SORTING, found.n, sizeof *doing->spare);
+    if (doing->start != NULL && doing->order != NULL && doing->spare != NULL) {
+        status = hs_output_reserve(&doing->half, found.n, 0.0);
+    }
+    if (status != HS_OK) {
+        return status;
+    }
+    sort_by(doing, found.j, NULL, doing->spare);
+    sort_by(doing, found.i, doing->spare, doing->order);
+    int32_t *i = hs_output_column(&doing->half, HS_WANT_I);
+    int32_t *j = hs_output_column(&doing->half, HS_WANT_J);
+    int32_t *shift = hs_output_column(&doing->half, HS_WANT_SHIFT);
+    for (int64_t e = 0; e < found.n; e++) {
+        const int64_t k = doing->order[e];
+        i[e] = found.i[k];
+        j[e] = found.j[k];
+        if (shift != NULL) {
+            memcpy(shift + e * found.ndim, found.shift + k * found.ndim,
+                   (size_t)found.ndim * sizeof *shift);
+        }
+    }
+    doing->half.n_pairs = found.n;
+    return HS_OK;
+}
+
+/* As row_pairs_fill, of any map. */
+static hs_status
+sorted_pairs_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs, const hs_list_rows *rows,
+                  hs_pairs *nodes, hs_pairs *lists)
+{
+    hs_account    *account = &call->account;
+    pair_sorting   doing = {.map = map, .rows = rows};
+    const int      d = rows->shift != NULL ? rows->ndim : 1;
+    const unsigned columns = HS_WANT_I | HS_WANT_J |
+                             (rows->shift != NULL ? (unsigned)HS_WANT_SHIFT : 0u);
+    hs_status status = HS_ERR_MEMORY;
+    hs_output_init(account, d, columns, 4, &doing.found);
+    hs_output_init(account, d, columns, 4, &doing.half);
+    doing.point_of_node = hs_alloc(account, HS_FOR_ORDER, map->n, sizeof *doing.point_of_node);
+    if (doing.point_of_node != NULL) {
+        for (int64_t p = 0; p < map->n; p++) {
+            const int32_t l = map->list[p];
+            doing.point_of_node[(l > 0 ? map->end[l - 1] : 0) + map->node[p]] = (int32_t)p;
+        }
+        status = find_pairs(call, &doing);
+    }
+    if (status == HS_OK) {
+        status = sort_pairs(call, &doing);
+    }
+    if (status == HS_OK) {
+        status = hs_node_pairs_fill(call, map, ghost_pairs, &doing.half, nodes, lists);
+    }
+    hs_output_free(&doing.found);
+    hs_output_free(&doing.half);
+    hs_free(account, doing.point_of_node);
+    hs_free(account, doing.start);
+    hs_free(account, doing.order);
+    hs_free(account, doing.spare);
+    return status;
+}
+
+/* connectivity.c: three results of one call. */
+
 hs_connectivity *
 hs_connectivity_new(void)
 {
@@ -786,19 +933,13 @@ rows_of(const hs_pairs *rows, int32_t n_lists)
                           .ndim = rows->output.ndim};
 }
 
-/* Pairs of points in any order, or of rows that are not those of all. */
 static hs_status
-fill_pairs_by_half_list(hs_connectivity *made, const hs_node_map *map, const hs_node_lists *lists,
-                        const hs_rows_view *view)
+fill_pairs(hs_connectivity *made, const hs_node_map *map, bool ghost_pairs,
+           const hs_list_rows *rows)
 {
-    hs_output half;
-    hs_status status = hs_row_split_half(&made->call, map->n, view, &half);
-    if (status == HS_OK) {
-        status = hs_node_pairs_fill(&made->call, map, lists->ghost_pairs, &half, made->nodes,
-                                    made->lists);
-    }
-    hs_output_free(&half);
-    return status;
+    const bool begin_rows = map->is_plain && map->n_rows == map->n && !map->directed;
+    return (begin_rows ? row_pairs_fill : sorted_pairs_fill)(&made->call, map, ghost_pairs, rows,
+                                                             made->nodes, made->lists);
 }
 
 static hs_status
@@ -812,22 +953,17 @@ fill_rows(hs_connectivity *made, const hs_node_map *map, const hs_node_lists *li
                                .index = hs_output_column(output, HS_WANT_J),
                                .shift = hs_output_column(output, HS_WANT_SHIFT),
                                .ndim = output->ndim};
-    const bool         has_all = map->is_plain && map->n_rows == map->n;
     hs_status          status = HS_OK;
-    if (!lists->rows_only && !has_all) {
-        status = fill_pairs_by_half_list(made, map, lists, &view);
-    }
-    if (status == HS_OK && needs_no_split(map)) {
+    if (needs_no_split(map)) {
         hs_pairs_free(made->rows);
         made->rows = *found;
         *found = NULL;
-    } else if (status == HS_OK) {
+    } else {
         status = hs_row_split_fill(&made->call, map, &view, made->rows);
     }
-    if (status == HS_OK && !lists->rows_only && has_all) {
+    if (status == HS_OK && !lists->rows_only) {
         const hs_list_rows rows = rows_of(made->rows, map->n_lists);
-        status =
-            row_pairs_fill(&made->call, map, lists->ghost_pairs, &rows, made->nodes, made->lists);
+        status = fill_pairs(made, map, lists->ghost_pairs, &rows);
     }
     return status;
 }
@@ -853,9 +989,8 @@ hs_connectivity_fill_pairs(hs_connectivity *made, const hs_node_lists *lists, in
     hs_account *account = &made->call.account;
     hs_status   status = hs_node_map_make(account, lists, n, &map);
     if (status == HS_OK) {
-        status = map.is_plain && map.n_rows == n && rows->n == n && rows->n_lists == map.n_lists
-                     ? row_pairs_fill(&made->call, &map, lists->ghost_pairs, rows, made->nodes,
-                                      made->lists)
+        status = rows->n == map.n_rows && rows->n_lists == map.n_lists
+                     ? fill_pairs(made, &map, lists->ghost_pairs, rows)
                      : HS_ERR_ARGUMENT;
         hs_node_map_free(account, &map);
     }
@@ -1214,121 +1349,5 @@ hs_rows_without_fill(hs_call *call, const hs_list_rows *rows, const hs_list_rows
         }
     }
     result->output.n_pairs = status == HS_OK ? to.n : 0;
-    return status;
-}
-
-/* Each pair is read once, and written where the new table goes on. */
-
-/* Pairs between two calls of poll(). */
-#define POLL_KEPT_PAIRS (INT64_C(1) << 20)
-
-typedef struct kept_filling {
-    const hs_node_pairs *pairs;
-    const int32_t      **targets; /* owned; of the nodes of each list. NULL: numbers stay */
-    const int64_t       *n_nodes; /* of each list */
-    int32_t              n_lists;
-    int64_t              n;
-    hs_node_columns      to;
-} kept_filling;
-
-static hs_status
-find_targets(hs_account *account, const hs_node_change *change, kept_filling *doing)
-{
-    if (change == NULL) {
-        return HS_OK;
-    }
-    doing->targets = hs_alloc(account, HS_FOR_CELLS, change->n_lists, sizeof *doing->targets);
-    if (doing->targets == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    const int32_t *target = change->target;
-    for (int32_t l = 0; l < change->n_lists; l++) {
-        if (change->n_nodes[l] < 0) {
-            return HS_ERR_ARGUMENT;
-        }
-        doing->targets[l] = target;
-        target += change->n_nodes[l];
-    }
-    doing->n_lists = change->n_lists;
-    doing->n_nodes = change->n_nodes;
-    return HS_OK;
-}
-
-/* The new number of a node, or -1 where it goes. False where there is no such node. */
-HS_ALWAYS_INLINE bool
-look_up(const kept_filling *doing, int32_t list, int32_t node, int32_t *number)
-{
-    if (doing->targets == NULL) {
-        *number = node;
-        return true;
-    }
-    if (list < 0 || list >= doing->n_lists || node < 0 || node >= doing->n_nodes[list]) {
-        return false;
-    }
-    *number = doing->targets[list][node];
-    return true;
-}
-
-/* Writes pair e, which counts only if it stays: there is room for all. */
-HS_ALWAYS_INLINE bool
-put_kept_pair(kept_filling *doing, int64_t e, bool stays)
-{
-    const hs_node_pairs *pairs = doing->pairs;
-    const int64_t        at = doing->n;
-    const int32_t        i_list = pairs->i_list[e], j_list = pairs->j_list[e];
-    const int            d = pairs->ndim;
-    int32_t              i, j;
-    if (!look_up(doing, i_list, pairs->i_node[e], &i) ||
-        !look_up(doing, j_list, pairs->j_node[e], &j)) {
-        return false;
-    }
-    doing->to.i_node[at] = i;
-    doing->to.j_node[at] = j;
-    doing->to.i_list[at] = i_list;
-    doing->to.j_list[at] = j_list;
-    for (int k = 0; doing->to.shift != NULL && k < d; k++) {
-        doing->to.shift[at * d + k] = pairs->shift[e * d + k];
-    }
-    doing->n += stays & (i >= 0) & (j >= 0);
-    return true;
-}
-
-static bool
-are_pairs(const hs_node_pairs *pairs)
-{
-    return pairs->n >= 0 &&
-           (pairs->n == 0 || (pairs->i_node != NULL && pairs->i_list != NULL &&
-                              pairs->j_node != NULL && pairs->j_list != NULL)) &&
-           (pairs->shift == NULL || (pairs->ndim >= 1 && pairs->ndim <= HS_MAX_DIM));
-}
-
-static bool
-is_change(const hs_node_change *change)
-{
-    return change->n_lists >= 0 &&
-           (change->n_lists == 0 || (change->n_nodes != NULL && change->target != NULL));
-}
-
-hs_status
-hs_kept_pairs_fill(hs_call *call, const hs_node_pairs *pairs, const hs_node_change *change,
-                   const bool *keep, hs_pairs *nodes, hs_pairs *lists)
-{
-    kept_filling doing = {.pairs = pairs};
-    hs_status    status = HS_ERR_ARGUMENT;
-    if (are_pairs(pairs) && (change == NULL || is_change(change))) {
-        status = find_targets(&call->account, change, &doing);
-    }
-    if (status == HS_OK) {
-        status = node_columns_open(call, pairs->shift != NULL, pairs->ndim, pairs->n, nodes, lists,
-                                   &doing.to);
-    }
-    for (int64_t e = 0; status == HS_OK && e < pairs->n; e++) {
-        status = put_kept_pair(&doing, e, keep == NULL || keep[e]) ? HS_OK : HS_ERR_ARGUMENT;
-        if (status == HS_OK && e % POLL_KEPT_PAIRS == POLL_KEPT_PAIRS - 1) {
-            status = hs_poll(&call->options, (double)e / (double)pairs->n);
-        }
-    }
-    nodes->output.n_pairs = lists->output.n_pairs = status == HS_OK ? doing.n : 0;
-    hs_free(&call->account, doing.targets);
     return status;
 }

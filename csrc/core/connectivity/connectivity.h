@@ -6,8 +6,6 @@
 #include "../memory/memory.h"
 #include "../collect/columns.h"
 
-/* connectivity.h: rows and pairs of node lists, which the functions of api/ make and give out. */
-
 /*
  * Which list each point is of, which node of it, and which row it has. Searches and
  * pairs number points from 0 on, in whatever order they come; users of node lists know a node by
@@ -20,6 +18,7 @@ typedef struct hs_node_map {
     int32_t  n_lists;
     int64_t  n_rows;      /* nodes that have rows: of list 0, of list 1, ..., ascending in each */
     bool     is_plain;    /* points come in the order of lists and nodes */
+    bool     directed;    /* as that of the lists */
     int64_t *end;         /* n_lists: where each list ends, among all nodes */
     int64_t *first_ghost; /* n_lists, part of end: the number of its first ghost in each */
     int32_t *list;
@@ -45,10 +44,11 @@ void hs_node_map_free(hs_account *account, hs_node_map *map);
 /* A half list is an output of i, j and, in a box, S, of 4 bytes each: ascending by (i, j, S), with
  * i < j, or i == j and the first nonzero component of S positive. */
 
-/* A copy of these pairs of n points. HS_ERR_ARGUMENT where they are no half list: failure->row is
- * the first pair that is wrong. On failure *copy can still be freed. */
+/* A copy of these pairs of n points. HS_ERR_ARGUMENT where they are no half list, or none of
+ * directed lists: failure->row is the first pair that is wrong. On failure *copy can still be
+ * freed. */
 hs_status hs_half_list_copy(hs_account *account, const hs_half_list *pairs, int64_t n,
-                            hs_output *copy, hs_failure *failure);
+                            bool directed, hs_output *copy, hs_failure *failure);
 
 /* Its columns; shift is NULL where there is none. */
 typedef struct hs_half_columns {
@@ -89,10 +89,6 @@ typedef struct hs_rows_view {
 hs_status hs_row_split_fill(hs_call *call, const hs_node_map *map, const hs_rows_view *from,
                             hs_pairs *rows);
 
-/* The half list of these rows, in an empty output: of each row what is above its point, and of its
- * own images those that are forward. */
-hs_status hs_row_split_half(hs_call *call, int64_t n, const hs_rows_view *from, hs_output *half);
-
 /*
  * The neighbours of each node in each list, from a half list. Pair (i, j) puts j into
  * the row of i and i into that of j. As pairs come in ascending order, each row is filled in
@@ -114,13 +110,13 @@ hs_status hs_node_rows_fill(hs_call *call, const hs_node_map *map, const hs_outp
 /*
  * Whether a pair of points is one of the table: not if both are ghosts, unless these are wanted.
  * *turned: whether the second point comes first, as it does where it is internal and the other one
- * is a ghost; not where points have an order of their own.
+ * is a ghost; not where points have an order of their own. Of directed lists i decides.
  */
 HS_ALWAYS_INLINE bool
 hs_node_pair_counts(const hs_node_map *map, bool ghost_pairs, int32_t i, int32_t j, bool *turned)
 {
-    *turned = map->is_plain && map->is_ghost[i] && !map->is_ghost[j];
-    return ghost_pairs || !map->is_ghost[i] || !map->is_ghost[j];
+    *turned = map->is_plain && !map->directed && map->is_ghost[i] && !map->is_ghost[j];
+    return ghost_pairs || !map->is_ghost[i] || (!map->directed && !map->is_ghost[j]);
 }
 
 /* The columns of the table; shift: NULL where there are none. */
@@ -131,6 +127,8 @@ typedef struct hs_node_columns {
 
 /* How many pairs the table has. */
 int64_t hs_node_pairs_count(const hs_node_map *map, bool ghost_pairs, const hs_output *half);
+
+/* connectivity.h: rows and pairs of node lists, which the functions of api/ make and give out. */
 
 /* All parts are charged to the call, which has ended when the caller gets the object. */
 struct hs_connectivity {
@@ -150,8 +148,8 @@ hs_status hs_connectivity_fill(hs_connectivity *connectivity, const hs_node_list
 hs_status hs_connectivity_fill_rows(hs_connectivity *connectivity, const hs_node_lists *lists,
                                     hs_pairs **found);
 
-/* Fills the pairs alone, from rows of all n nodes, in the order of lists and nodes, which are
- * given. HS_ERR_ARGUMENT where that is not so. */
+/* Fills the pairs alone, from rows of the n nodes, which are given. HS_ERR_ARGUMENT where these are
+ * none of these lists. */
 hs_status hs_connectivity_fill_pairs(hs_connectivity *connectivity, const hs_node_lists *lists,
                                      int64_t n, const hs_list_rows *rows);
 
@@ -177,16 +175,5 @@ hs_status hs_kept_rows_fill(hs_call *call, const hs_list_rows *rows, const hs_no
  * them, in the same order: HS_ERR_ARGUMENT. */
 hs_status hs_rows_without_fill(hs_call *call, const hs_list_rows *rows, const hs_list_rows *without,
                                bool ascend, hs_pairs *result);
-
-/* A table of pairs of nodes without some of them, in the order that it has. */
-
-/*
- * Fills columns I, J and S of `nodes` and I and J of `lists`, both empty, with the pairs whose two
- * nodes stay, under their new numbers (change, or NULL: all stay), and that are kept (keep, one for
- * each pair, or NULL: all are). HS_ERR_ARGUMENT where a pair names a node that there is not.
- */
-hs_status hs_kept_pairs_fill(hs_call *call, const hs_node_pairs *pairs,
-                             const hs_node_change *change, const bool *keep, hs_pairs *nodes,
-                             hs_pairs *lists);
 
 #endif

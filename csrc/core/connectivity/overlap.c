@@ -8,100 +8,6 @@
 #include <string.h>
 #include <math.h>
 
-/*
- * overlap.c: row i is the union, over all k that i gathers, of the points that gather k. Under the
- * numbers of the order of space these are few words of bits, which the union takes 64 points at a
- * time. Its points are then put in order under their own numbers. Threads take ranges of the order
- * of space, whose rows are written in this order.
- */
-
-/*
- * A set of numbers that is filled in any order and emptied in ascending order, again and
- * again. A bit for each number, and two levels above that tell which words have any: emptying takes
- * time by the words that were touched, and a little by the size of the set.
- */
-
-#define HS_BIT_LEVELS 3
-
-typedef struct hs_bit_set {
-    uint64_t *word[HS_BIT_LEVELS]; /* parts of one block, owned by word[0] */
-    int64_t   n_words[HS_BIT_LEVELS];
-} hs_bit_set;
-
-/* An empty set of numbers below n. False when memory is short. */
-HS_ALWAYS_INLINE bool
-hs_bit_set_make(hs_account *account, int64_t n, hs_bit_set *set)
-{
-    int64_t all = 0, words = n;
-    for (int l = 0; l < HS_BIT_LEVELS; l++) {
-        words = (words + 63) / 64;
-        set->n_words[l] = words;
-        all += words;
-    }
-    set->word[0] = hs_alloc(account, HS_FOR_SORTING, all, sizeof(uint64_t));
-    if (set->word[0] == NULL) {
-        return false;
-    }
-    memset(set->word[0], 0, (size_t)all * sizeof(uint64_t));
-    for (int l = 1; l < HS_BIT_LEVELS; l++) {
-        set->word[l] = set->word[l - 1] + set->n_words[l - 1];
-    }
-    return true;
-}
-
-HS_ALWAYS_INLINE void
-hs_bit_set_free(hs_account *account, hs_bit_set *set)
-{
-    hs_free(account, set->word[0]);
-    set->word[0] = NULL;
-}
-
-/* Adds numbers from 64 * word on, one for each bit. */
-HS_ALWAYS_INLINE void
-hs_bit_set_add_word(hs_bit_set *set, int32_t word, uint64_t bits)
-{
-    const uint64_t before = set->word[0][word];
-    set->word[0][word] = before | bits;
-    if (before == 0) {
-        set->word[1][word >> 6] |= UINT64_C(1) << (word & 63);
-        set->word[2][word >> 12] |= UINT64_C(1) << (word >> 6 & 63);
-    }
-}
-
-HS_ALWAYS_INLINE void
-hs_bit_set_add(hs_bit_set *set, int32_t number)
-{
-    hs_bit_set_add_word(set, number >> 6, UINT64_C(1) << (number & 63));
-}
-
-HS_ALWAYS_INLINE bool
-hs_bit_set_has(const hs_bit_set *set, int32_t number)
-{
-    return set->word[0][number >> 6] >> (number & 63) & 1u;
-}
-
-/* Writes all numbers, ascending, and forgets them; returns how many there were. */
-HS_ALWAYS_INLINE int64_t
-hs_bit_set_drain(hs_bit_set *set, int32_t *to)
-{
-    const int32_t *const first = to;
-    for (int64_t high = 0; high < set->n_words[2]; high++) {
-        for (uint64_t top = set->word[2][high]; top != 0; top &= top - 1) {
-            const int64_t middle = high * 64 + hs_trailing_zeros(top);
-            for (uint64_t mid = set->word[1][middle]; mid != 0; mid &= mid - 1) {
-                const int64_t low = middle * 64 + hs_trailing_zeros(mid);
-                for (uint64_t bits = set->word[0][low]; bits != 0; bits &= bits - 1) {
-                    *to++ = (int32_t)(low * 64 + hs_trailing_zeros(bits));
-                }
-                set->word[0][low] = 0;
-            }
-            set->word[1][middle] = 0;
-        }
-        set->word[2][high] = 0;
-    }
-    return to - first;
-}
-
 /* Lengths are counted and added up; entries then come in ascending order. */
 
 static hs_status
@@ -121,6 +27,50 @@ allocate_index(hs_account *account, int64_t n, hs_point_rows *rows)
 {
     rows->index = hs_alloc(account, HS_FOR_SORTING, n, sizeof *rows->index);
     return rows->index != NULL ? HS_OK : HS_ERR_MEMORY;
+}
+
+static hs_status
+allocate_shifts(hs_account *account, int64_t n, int ndim, hs_point_rows *rows)
+{
+    rows->ndim = ndim;
+    rows->shift = hs_alloc(account, HS_FOR_SORTING, n * ndim, sizeof *rows->shift);
+    return rows->shift != NULL ? HS_OK : HS_ERR_MEMORY;
+}
+
+/* Sign of S - T. */
+static int
+compare_shifts(const int32_t *s, const int32_t *t, int ndim)
+{
+    for (int k = 0; k < ndim; k++) {
+        if (s[k] != t[k]) {
+            return s[k] < t[k] ? -1 : 1;
+        }
+    }
+    return 0;
+}
+
+/* The same of rows with shifts: the point itself, at S zero, comes first. */
+static bool
+copy_images(const hs_index_rows *given, int64_t from, int64_t length, int64_t i, int64_t at,
+            hs_point_rows *rows)
+{
+    const int      d = given->ndim;
+    int32_t *const own = rows->shift + at * d;
+    memset(own, 0, (size_t)d * sizeof *own);
+    rows->index[at] = (int32_t)i;
+    for (int64_t e = 0; e < length; e++) {
+        const int32_t  j = given->indices[from + e];
+        const int32_t *shift = given->shift + (from + e) * d;
+        const int32_t  before = e > 0 ? rows->index[at + e] : -1;
+        if (j < before || j < 0 || j >= given->n ||
+            (j == i && compare_shifts(shift, own, d) == 0) ||
+            (j == before && compare_shifts(shift, rows->shift + (at + e) * d, d) <= 0)) {
+            return false;
+        }
+        rows->index[at + e + 1] = j;
+        memcpy(rows->shift + (at + e + 1) * d, shift, (size_t)d * sizeof *shift);
+    }
+    return true;
 }
 
 /* Copies the row of point i, which has `length` entries, and adds i; false where it is no row. */
@@ -168,7 +118,8 @@ hs_point_rows_copy(hs_account *account, const hs_index_rows *given, hs_point_row
     hs_status status = HS_ERR_ARGUMENT;
     *rows = (hs_point_rows){.n = 0};
     if (given->n >= 0 && given->n <= INT32_MAX && given->offsets != NULL &&
-        (given->indices != NULL || given->n_indices == 0)) {
+        (given->indices != NULL || given->n_indices == 0) &&
+        (given->shift == NULL || (given->ndim >= 1 && given->ndim <= HS_MAX_DIM))) {
         status = allocate(account, given->n, rows);
     }
     if (status == HS_OK && !copy_offsets(given, rows)) {
@@ -177,9 +128,14 @@ hs_point_rows_copy(hs_account *account, const hs_index_rows *given, hs_point_row
     if (status == HS_OK) {
         status = allocate_index(account, rows->first[rows->n], rows);
     }
+    if (status == HS_OK && given->shift != NULL) {
+        status = allocate_shifts(account, rows->first[rows->n], given->ndim, rows);
+    }
     for (int64_t i = 0; status == HS_OK && i < rows->n; i++) {
         const int64_t at = rows->first[i], length = rows->first[i + 1] - at - 1;
-        if (!copy_row(given->indices + (at - i), length, i, rows->n, rows->index + at)) {
+        if (!(rows->shift != NULL
+                  ? copy_images(given, at - i, length, i, at, rows)
+                  : copy_row(given->indices + (at - i), length, i, rows->n, rows->index + at))) {
             status = HS_ERR_ARGUMENT;
         }
     }
@@ -189,8 +145,16 @@ hs_point_rows_copy(hs_account *account, const hs_index_rows *given, hs_point_row
     return status;
 }
 
+HS_ALWAYS_INLINE void
+copy_shift(const hs_point_rows *from, int64_t e, const hs_point_rows *to, int64_t at)
+{
+    for (int k = 0; from->shift != NULL && k < from->ndim; k++) {
+        to->shift[at * from->ndim + k] = from->shift[e * from->ndim + k];
+    }
+}
+
 /* The opposite direction, with all points under other numbers: row place[j] has the places of all i
- * in whose rows j is; order[place[i]] is i. */
+ * in whose rows j is, with the shifts that it has there; order[place[i]] is i. */
 static hs_status
 point_rows_turn(hs_account *account, const hs_point_rows *from, const int32_t *order,
                 const int32_t *place, hs_point_rows *rows)
@@ -199,6 +163,9 @@ point_rows_turn(hs_account *account, const hs_point_rows *from, const int32_t *o
     hs_status     status = allocate(account, from->n, rows);
     if (status == HS_OK) {
         status = allocate_index(account, n_entries, rows);
+    }
+    if (status == HS_OK && from->shift != NULL) {
+        status = allocate_shifts(account, n_entries, from->ndim, rows);
     }
     if (status != HS_OK) {
         hs_point_rows_free(account, rows);
@@ -211,11 +178,39 @@ point_rows_turn(hs_account *account, const hs_point_rows *from, const int32_t *o
     for (int64_t p = 0; p < from->n; p++) {
         const int32_t i = order[p];
         for (int64_t e = from->first[i]; e < from->first[i + 1]; e++) {
-            rows->index[rows->first[place[from->index[e]]]++] = (int32_t)p;
+            const int64_t at = rows->first[place[from->index[e]]]++;
+            rows->index[at] = (int32_t)p;
+            copy_shift(from, e, rows, at);
         }
     }
     hs_starts_of_ends(rows->first, rows->n + 1);
     return HS_OK;
+}
+
+/* Puts `other` into the row of a point, with the shift of pair e, or its opposite. */
+HS_ALWAYS_INLINE void
+put_neighbor(const hs_half_columns *pairs, int64_t e, int32_t point, int32_t other,
+             bool is_opposite, hs_point_rows *rows)
+{
+    const int     d = pairs->ndim;
+    const int64_t at = rows->first[point]++;
+    rows->index[at] = other;
+    for (int k = 0; rows->shift != NULL && k < d; k++) {
+        const uint32_t component = (uint32_t)pairs->shift[e * d + k];
+        rows->shift[at * d + k] = (int32_t)(is_opposite ? 0u - component : component);
+    }
+}
+
+/* The first pair behind those of the i and j of pair e. */
+static int64_t
+end_of_images(const hs_half_columns *pairs, int64_t e)
+{
+    int64_t end = e + 1;
+    while (pairs->shift != NULL && end < pairs->n && pairs->i[end] == pairs->i[e] &&
+           pairs->j[end] == pairs->j[e]) {
+        end++;
+    }
+    return end;
 }
 
 /* All neighbours of each of n points. */
@@ -227,6 +222,9 @@ point_rows_of(hs_account *account, const hs_output *half, int64_t n, hs_point_ro
     if (status == HS_OK) {
         status = allocate_index(account, 2 * pairs.n, rows);
     }
+    if (status == HS_OK && pairs.shift != NULL) {
+        status = allocate_shifts(account, 2 * pairs.n, pairs.ndim, rows);
+    }
     if (status != HS_OK) {
         hs_point_rows_free(account, rows);
         return status;
@@ -236,9 +234,15 @@ point_rows_of(hs_account *account, const hs_output *half, int64_t n, hs_point_ro
         rows->first[pairs.j[e] + 1]++;
     }
     hs_starts_of_lengths(rows->first, rows->n + 1);
-    for (int64_t e = 0; e < pairs.n; e++) {
-        rows->index[rows->first[pairs.i[e]]++] = pairs.j[e];
-        rows->index[rows->first[pairs.j[e]]++] = pairs.i[e];
+    for (int64_t first = 0, end; first < pairs.n; first = end) { /* images of one i and j */
+        const int32_t i = pairs.i[first], j = pairs.j[first];
+        end = end_of_images(&pairs, first);
+        for (int64_t e = end; e-- > first;) {
+            put_neighbor(&pairs, e, j, i, true, rows);
+        }
+        for (int64_t e = first; e < end; e++) {
+            put_neighbor(&pairs, e, i, j, false, rows);
+        }
     }
     hs_starts_of_ends(rows->first, rows->n + 1);
     return HS_OK;
@@ -249,6 +253,7 @@ hs_point_rows_free(hs_account *account, hs_point_rows *rows)
 {
     hs_free(account, rows->first);
     hs_free(account, rows->index);
+    hs_free(account, rows->shift);
     *rows = (hs_point_rows){.n = 0};
 }
 
@@ -321,8 +326,9 @@ word_rows_make(hs_account *account, const hs_point_rows *from, hs_word_rows *row
 
 /*
  * The neighbours of the first point of a pair are marked once for all pairs that it
- * begins; those of the second that are marked are common. Threads take ranges of pairs, whose
- * entries are written in the order of pairs; what they write beside that is how long entries are.
+ * begins; those of the second that are marked are common. With shifts, a mark says that there is
+ * some image, and the row of the first point which. Threads take ranges of pairs, whose entries are
+ * written in the order of pairs; what they write beside that is how long entries are.
  */
 
 /* Neighbours that are looked at between two calls of poll(). */
@@ -335,7 +341,7 @@ typedef struct merging {
     hs_call           *call;
     const hs_node_map *map;
     const double      *points;
-    int                ndim;
+    const hs_metric   *images;
     bool               ghost_pairs;
     hs_half_columns    half;
     hs_point_rows      rows;
@@ -351,6 +357,7 @@ typedef struct intersection_worker {
     hs_output      pairs;
     hs_bit_set     marked; /* as an array of bits, which are taken back one by one */
     int32_t       *common; /* owned; as many as the longest row has, and two */
+    int32_t       *shift;  /* owned; of each of them from i; NULL: none */
     int64_t       *next;   /* owned; where each list goes on, and one more */
     int64_t        looked;
 } intersection_worker;
@@ -368,6 +375,13 @@ longest_row(const hs_point_rows *rows)
 
 /* ---- a worker -------------------------------------------------------------------------------- */
 
+/* The columns of what is written. */
+static unsigned
+wanted_of(const hs_half_columns *half)
+{
+    return HS_WANT_J | (half->shift != NULL ? (unsigned)HS_WANT_SHIFT : 0u);
+}
+
 static hs_status
 open_intersection_worker(void *context, void *place)
 {
@@ -378,10 +392,15 @@ open_intersection_worker(void *context, void *place)
     me->options = all->call->options;
     me->committer.options = &me->options;
     me->committer.pairs = &me->pairs;
-    hs_output_init(NULL, 1, HS_WANT_J, 4, &me->pairs);
+    hs_output_init(NULL, all->half.ndim, wanted_of(&all->half), 4, &me->pairs);
     me->common = hs_alloc(account, HS_FOR_SORTING, all->longest + 2, sizeof *me->common);
     me->next = hs_alloc(account, HS_FOR_SORTING, all->map->n_lists + 1, sizeof *me->next);
+    if (all->half.shift != NULL) {
+        me->shift = hs_alloc(account, HS_FOR_SORTING, (all->longest + 2) * all->half.ndim,
+                             sizeof *me->shift);
+    }
     return me->common != NULL && me->next != NULL &&
+                   (me->shift != NULL) == (all->half.shift != NULL) &&
                    hs_bit_set_make(account, all->map->n, &me->marked)
                ? HS_OK
                : HS_ERR_MEMORY;
@@ -395,6 +414,7 @@ close_intersection_worker(void *context, void *place)
     intersection_worker *me = place;
     hs_bit_set_free(account, &me->marked);
     hs_free(account, me->common);
+    hs_free(account, me->shift);
     hs_free(account, me->next);
     hs_output_free(&me->pairs);
 }
@@ -412,24 +432,95 @@ mark(intersection_worker *me, int64_t i, bool on)
     }
 }
 
-/* Writes the common neighbours of the marked row's point i and of j to me->common; returns how many
- * there are. */
-static int64_t
-find_common(intersection_worker *me, int32_t i, int32_t j)
+/* Whether the row of point i has k with this shift. */
+static bool
+has_image(const hs_point_rows *rows, int32_t i, int32_t k, const int64_t *shift)
+{
+    const int d = rows->ndim;
+    int64_t   low = rows->first[i], high = rows->first[i + 1];
+    while (low < high) {
+        const int64_t  middle = low + (high - low) / 2;
+        const int32_t *own = rows->shift + middle * d;
+        int            side = (rows->index[middle] > k) - (rows->index[middle] < k);
+        for (int l = 0; side == 0 && l < d; l++) {
+            side = (own[l] > shift[l]) - (own[l] < shift[l]);
+        }
+        if (side == 0) {
+            return true;
+        }
+        if (side < 0) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    return false;
+}
+
+/* Of images: whether neighbour e of j is at `shift` from i a neighbour of i, between i and the
+ * image of j at `of_j`. Writes its shift. */
+static bool
+is_common_image(const intersection_worker *me, int32_t i, int32_t j, const int32_t *of_j, int64_t e,
+                int32_t *shift)
 {
     const merging *all = me->all;
-    const int      d = all->ndim;
+    const int      d = all->half.ndim;
+    const int32_t  k = all->rows.index[e];
+    int64_t        of_x[HS_MAX_DIM], of_q[HS_MAX_DIM];
+    for (int l = 0; l < d; l++) {
+        of_q[l] = of_j[l];
+        of_x[l] = (int64_t)all->rows.shift[e * d + l] + of_j[l];
+        shift[l] = (int32_t)of_x[l]; /* where it does not fit, row i does not have it */
+    }
+    return has_image(&all->rows, i, k, of_x) &&
+           hs_foot_is_between_images(all->images, all->points + (int64_t)k * d, of_x,
+                                     all->points + (int64_t)i * d, all->points + (int64_t)j * d,
+                                     of_q);
+}
+
+/* Writes the common neighbours of the marked row's point i and of j, the ends of pair number
+ * `pair`, to me->common; returns how many there are. */
+static int64_t
+find_common(intersection_worker *me, int64_t pair)
+{
+    const merging *all = me->all;
+    const int      d = all->images->ndim;
+    const int32_t  i = all->half.i[pair], j = all->half.j[pair];
     const double  *p = all->points + (int64_t)i * d, *q = all->points + (int64_t)j * d;
+    const int32_t *of_j = all->half.shift != NULL ? all->half.shift + pair * d : NULL;
     int64_t        n = 0;
     for (int64_t e = all->rows.first[j]; e < all->rows.first[j + 1]; e++) {
         const int32_t k = all->rows.index[e];
         if (hs_bit_set_has(&me->marked, k) &&
-            hs_foot_is_between(all->points + (int64_t)k * d, p, q, d)) {
+            (of_j == NULL ? hs_foot_is_between(all->points + (int64_t)k * d, p, q, d)
+                          : is_common_image(me, i, j, of_j, e, me->shift + n * d))) {
             me->common[n++] = k;
         }
     }
     me->looked += all->rows.first[j + 1] - all->rows.first[j];
     return n;
+}
+
+/* Adds the ends of a pair, the first one first, to n common points; of images, all shifts are from
+ * the first end. */
+static int64_t
+add_ends(intersection_worker *me, int64_t pair, bool turned, int64_t n)
+{
+    const hs_half_columns *half = &me->all->half;
+    const int              d = half->ndim;
+    me->common[n] = turned ? half->j[pair] : half->i[pair];
+    me->common[n + 1] = turned ? half->i[pair] : half->j[pair];
+    if (half->shift != NULL) {
+        const int32_t *of_j = half->shift + pair * d;
+        for (int64_t e = 0; turned && e < n * d; e++) {
+            me->shift[e] = (int32_t)((uint32_t)me->shift[e] - (uint32_t)of_j[e % d]);
+        }
+        for (int k = 0; k < d; k++) {
+            me->shift[n * d + k] = 0;
+            me->shift[(n + 1) * d + k] = turned ? (int32_t)(0u - (uint32_t)of_j[k]) : of_j[k];
+        }
+    }
+    return n + 2;
 }
 
 /* Puts n points, by their lists, behind what is written; their order in each list stays. length:
@@ -438,7 +529,9 @@ static void
 put(intersection_worker *me, int64_t n, int64_t *length)
 {
     const hs_node_map *map = me->all->map;
+    const int          d = me->all->half.ndim;
     int32_t           *to = hs_output_next(&me->pairs, HS_WANT_J);
+    int32_t           *shift = hs_output_next(&me->pairs, HS_WANT_SHIFT);
     memset(me->next, 0, (size_t)(map->n_lists + 1) * sizeof *me->next);
     for (int64_t e = 0; e < n; e++) {
         me->next[map->list[me->common[e]] + 1]++;
@@ -446,7 +539,11 @@ put(intersection_worker *me, int64_t n, int64_t *length)
     memcpy(length, me->next + 1, (size_t)map->n_lists * sizeof *length);
     hs_starts_of_lengths(me->next, (int64_t)map->n_lists + 1);
     for (int64_t e = 0; e < n; e++) {
-        to[me->next[map->list[me->common[e]]]++] = map->node[me->common[e]];
+        const int64_t at = me->next[map->list[me->common[e]]]++;
+        to[at] = map->node[me->common[e]];
+        if (shift != NULL) {
+            memcpy(shift + at * d, me->shift + e * d, (size_t)d * sizeof *shift);
+        }
     }
     me->pairs.n_pairs += n;
 }
@@ -482,9 +579,7 @@ merge_pairs(intersection_worker *me, int64_t first, int64_t last, int64_t *lengt
             mark(me, i, true);
             marked = i;
         }
-        int64_t n = find_common(me, i, j);
-        me->common[n++] = turned ? j : i;
-        me->common[n++] = turned ? i : j;
+        const int64_t n = add_ends(me, e, turned, find_common(me, e));
         status = hs_output_reserve(&me->pairs, n, 0.0);
         if (status == HS_OK) {
             put(me, n, length);
@@ -561,16 +656,17 @@ merge_all(merging *doing, const hs_output *half, hs_output *output, hs_failure *
 
 hs_status
 hs_intersection_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs, const hs_output *half,
-                     const double *points, int ndim, hs_pairs *result, hs_failure *failure)
+                     const double *points, const hs_metric *images, hs_pairs *result,
+                     hs_failure *failure)
 {
     merging       doing = {.call = call,
                            .map = map,
                            .points = points,
-                           .ndim = ndim,
+                           .images = images,
                            .ghost_pairs = ghost_pairs,
                            .half = hs_half_list_columns(half)};
     const int64_t n = hs_node_pairs_count(map, ghost_pairs, half) * map->n_lists + 1;
-    hs_output_init(&call->account, 1, HS_WANT_J, 4, &result->output);
+    hs_output_init(&call->account, doing.half.ndim, wanted_of(&doing.half), 4, &result->output);
     int64_t  *offsets = NULL;
     hs_status status = hs_pairs_open_offsets(&call->account, n, result, &offsets);
     if (status == HS_OK) {
@@ -696,6 +792,14 @@ space_order_make(hs_call *call, const double *points, int64_t n, int ndim, hs_sp
     return HS_OK;
 }
 
+/*
+ * overlap.c: row i is the union, over all k that i gathers, of the points that gather k. Under the
+ * numbers of the order of space these are few words of bits, which the union takes 64 points at a
+ * time. Its points are then put in order under their own numbers. Images are no bits: there all
+ * points that gather k are written down with their shifts, sorted, and looked through for those
+ * that differ. Threads take ranges of the order of space, whose rows are written in this order.
+ */
+
 /* Words that are looked at between two calls of poll(). */
 #define POLL_WORDS (INT64_C(1) << 22)
 /* Points of a range: some HS_RANGE_BYTES, and half a millisecond. */
@@ -707,6 +811,7 @@ typedef struct product {
     hs_point_rows  gather; /* of the points' own numbers */
     hs_space_order order;
     hs_word_rows   turned; /* of places, as `near` */
+    hs_point_rows  images; /* of places, in place of `turned` */
     int64_t       *first;  /* owned; where the row of each point begins in `all` */
     int64_t       *end;    /* part of first; how long it is, meanwhile */
     hs_output      all;    /* J: all rows, in the order of space */
@@ -719,6 +824,9 @@ typedef struct overlap_worker {
     hs_output    pairs;
     hs_bit_set   near, found;
     int32_t     *scratch; /* owned; a row */
+    uint64_t    *met;     /* owned; point and number of each image that is met, and room for more */
+    int32_t     *shift;   /* owned; of each of them, and of those of one point that differ */
+    int64_t      room;
     int64_t      looked;
 } overlap_worker;
 
@@ -735,7 +843,10 @@ open_overlap_worker(void *context, void *place)
     me->options = all->call->options;
     me->committer.options = &me->options;
     me->committer.pairs = &me->pairs;
-    hs_output_init(NULL, 1, HS_WANT_J, 4, &me->pairs);
+    hs_output_init(NULL, all->all.ndim, all->all.columns, 4, &me->pairs);
+    if (all->gather.shift != NULL) {
+        return HS_OK;
+    }
     me->scratch = hs_alloc(account, HS_FOR_SORTING, n, sizeof *me->scratch);
     const bool has_all = me->scratch != NULL && hs_bit_set_make(account, n, &me->near) &&
                          hs_bit_set_make(account, n, &me->found);
@@ -751,6 +862,8 @@ close_overlap_worker(void *context, void *place)
     hs_bit_set_free(account, &me->near);
     hs_bit_set_free(account, &me->found);
     hs_free(account, me->scratch);
+    hs_free(account, me->met);
+    hs_free(account, me->shift);
     hs_output_free(&me->pairs);
 }
 
@@ -779,6 +892,132 @@ meet(overlap_worker *me, int32_t i)
     return n - 1; /* i itself was among them */
 }
 
+/* Room for n images that are met. */
+static hs_status
+make_room(overlap_worker *me, int64_t n)
+{
+    hs_account *account = &me->all->call->account;
+    if (n > UINT32_MAX) {
+        return HS_ERR_TOO_MANY;
+    }
+    if (n > me->room) {
+        hs_free(account, me->met);
+        hs_free(account, me->shift);
+        me->room = 0;
+        me->met = hs_alloc(account, HS_FOR_SORTING, n, 2 * sizeof *me->met);
+        me->shift =
+            hs_alloc(account, HS_FOR_SORTING, n * me->all->gather.ndim, 2 * sizeof *me->shift);
+        if (me->met == NULL || me->shift == NULL) {
+            return HS_ERR_MEMORY;
+        }
+        me->room = n;
+    }
+    return HS_OK;
+}
+
+/* Writes down all images that gather what i gathers. */
+static hs_status
+meet_images(overlap_worker *me, int32_t i, int64_t *n)
+{
+    const product       *all = me->all;
+    const hs_point_rows *gather = &all->gather, *turned = &all->images;
+    const int            d = gather->ndim;
+    *n = 0;
+    for (int64_t e = gather->first[i]; e < gather->first[i + 1]; e++) {
+        const int32_t k = all->order.place[gather->index[e]];
+        *n += turned->first[k + 1] - turned->first[k];
+    }
+    const hs_status status = make_room(me, *n);
+    int64_t         at = 0;
+    for (int64_t e = gather->first[i]; status == HS_OK && e < gather->first[i + 1]; e++) {
+        const int32_t k = all->order.place[gather->index[e]];
+        for (int64_t w = turned->first[k]; w < turned->first[k + 1]; w++, at++) {
+            me->met[at] = (uint64_t)(uint32_t)all->order.order[turned->index[w]] << 32 |
+                          (uint64_t)at;
+            for (int l = 0; l < d; l++) {
+                const int64_t shift = (int64_t)gather->shift[e * d + l] - turned->shift[w * d + l];
+                me->shift[at * d + l] = (int32_t)shift;
+                if (shift != me->shift[at * d + l]) {
+                    return HS_ERR_SHIFT_RANGE;
+                }
+            }
+        }
+    }
+    me->looked += *n;
+    return status;
+}
+
+/* Puts a shift among n ascending ones, unless it is there; returns how many there are then. */
+static int64_t
+add_shift(const int32_t *shift, int ndim, int32_t *to, int64_t n)
+{
+    int64_t low = 0, high = n;
+    while (low < high) {
+        const int64_t middle = low + (high - low) / 2;
+        const int     side = compare_shifts(to + middle * ndim, shift, ndim);
+        if (side == 0) {
+            return n;
+        }
+        if (side < 0) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    memmove(to + (low + 1) * ndim, to + low * ndim, (size_t)((n - low) * ndim) * sizeof *to);
+    memcpy(to + low * ndim, shift, (size_t)ndim * sizeof *to);
+    return n + 1;
+}
+
+/* The row of point i, of images. */
+static hs_status
+write_images(overlap_worker *me, int32_t i, int64_t *length)
+{
+    const int d = me->all->gather.ndim;
+    int64_t   n;
+    hs_status status = meet_images(me, i, &n);
+    *length = 0;
+    if (status == HS_OK) {
+        hs_sort_numbers(me->met, n, me->met + me->room);
+    }
+    for (int64_t first = 0, end; status == HS_OK && first < n; first = end) {
+        const int32_t  j = (int32_t)(me->met[first] >> 32);
+        int32_t *const own = me->shift + me->room * d;
+        int64_t        n_own = 0;
+        for (end = first; end < n && (int32_t)(me->met[end] >> 32) == j; end++) {
+            n_own = add_shift(me->shift + (int64_t)(me->met[end] & UINT32_MAX) * d, d, own, n_own);
+        }
+        status = hs_output_reserve(&me->pairs, n_own, 0.0);
+        for (int64_t e = 0; status == HS_OK && e < n_own; e++) {
+            const int32_t *shift = own + e * d;
+            bool           is_self = j == i;
+            for (int k = 0; is_self && k < d; k++) {
+                is_self = shift[k] == 0;
+            }
+            if (!is_self) {
+                *(int32_t *)hs_output_next(&me->pairs, HS_WANT_J) = j;
+                memcpy(hs_output_next(&me->pairs, HS_WANT_SHIFT), shift, (size_t)d * sizeof *shift);
+                me->pairs.n_pairs++;
+                ++*length;
+            }
+        }
+    }
+    return status;
+}
+
+/* The row of point i, as bits. */
+static hs_status
+write_points(overlap_worker *me, int32_t i, int64_t *length)
+{
+    *length = meet(me, i);
+    const hs_status status = hs_output_reserve(&me->pairs, *length, 0.0);
+    if (status == HS_OK) {
+        (void)hs_bit_set_drain(&me->found, hs_output_next(&me->pairs, HS_WANT_J));
+        me->pairs.n_pairs += *length;
+    }
+    return status;
+}
+
 /* A hs_range_fn. */
 static hs_status
 multiply_range(void *context, int64_t range)
@@ -789,8 +1028,8 @@ multiply_range(void *context, int64_t range)
     const int64_t   last = first + RANGE_POINTS < n ? first + RANGE_POINTS : n;
     for (int64_t p = first; p < last; p++) {
         const int32_t i = all->order.order[p];
-        const int64_t length = meet(me, i);
-        hs_status     status = hs_output_reserve(&me->pairs, length, 0.0);
+        hs_status     status = all->gather.shift != NULL ? write_images(me, i, &all->end[i])
+                                                         : write_points(me, i, &all->end[i]);
         if (status == HS_OK && me->looked >= POLL_WORDS) {
             me->looked = 0;
             status = hs_poll(&me->options, (double)p / (double)n);
@@ -798,9 +1037,6 @@ multiply_range(void *context, int64_t range)
         if (status != HS_OK) {
             return status;
         }
-        (void)hs_bit_set_drain(&me->found, hs_output_next(&me->pairs, HS_WANT_J));
-        me->pairs.n_pairs += length;
-        all->end[i] = length;
     }
     return hs_commit(&me->committer, (double)last / (double)n, true);
 }
@@ -813,6 +1049,7 @@ free_product(hs_account *account, product *doing)
     hs_point_rows_free(account, &doing->gather);
     space_order_free(account, &doing->order);
     word_rows_free(account, &doing->turned);
+    hs_point_rows_free(account, &doing->images);
     hs_free(account, doing->first);
     hs_output_free(&doing->all);
 }
@@ -820,19 +1057,18 @@ free_product(hs_account *account, product *doing)
 static hs_status
 prepare(hs_call *call, const hs_index_rows *gather, const double *points, int ndim, product *doing)
 {
-    hs_account   *account = &call->account;
-    hs_point_rows turned;
-    hs_status     status = hs_point_rows_copy(account, gather, &doing->gather);
+    hs_account *account = &call->account;
+    hs_status   status = hs_point_rows_copy(account, gather, &doing->gather);
     if (status == HS_OK) {
         status = space_order_make(call, points, gather->n, ndim, &doing->order);
     }
     if (status == HS_OK) {
         status = point_rows_turn(account, &doing->gather, doing->order.order, doing->order.place,
-                                 &turned);
+                                 &doing->images);
     }
-    if (status == HS_OK) {
-        status = word_rows_make(account, &turned, &doing->turned);
-        hs_point_rows_free(account, &turned);
+    if (status == HS_OK && gather->shift == NULL) {
+        status = word_rows_make(account, &doing->images, &doing->turned);
+        hs_point_rows_free(account, &doing->images);
     }
     if (status == HS_OK) {
         doing->first = hs_alloc(account, HS_FOR_SORTING, gather->n, 2 * sizeof *doing->first);
@@ -870,8 +1106,10 @@ hs_status
 hs_overlap_fill(hs_call *call, const hs_node_map *map, const hs_index_rows *gather,
                 const double *points, int ndim, hs_pairs *rows, hs_failure *failure)
 {
-    product doing = {.call = call};
-    hs_output_init(&call->account, 1, HS_WANT_J, 4, &doing.all);
+    product        doing = {.call = call};
+    const bool     has_shifts = gather->shift != NULL;
+    const unsigned columns = HS_WANT_J | (has_shifts ? (unsigned)HS_WANT_SHIFT : 0u);
+    hs_output_init(&call->account, has_shifts ? gather->ndim : 1, columns, 4, &doing.all);
     hs_status status = gather->n == map->n ? HS_OK : HS_ERR_ARGUMENT;
     HS_ASSERT(map->n_rows == map->n);
     if (status == HS_OK) {
@@ -884,7 +1122,8 @@ hs_overlap_fill(hs_call *call, const hs_node_map *map, const hs_index_rows *gath
         const hs_rows_view found = {.first = doing.first,
                                     .end = doing.end,
                                     .index = hs_output_column(&doing.all, HS_WANT_J),
-                                    .ndim = 1};
+                                    .shift = hs_output_column(&doing.all, HS_WANT_SHIFT),
+                                    .ndim = doing.all.ndim};
         status = hs_row_split_fill(call, map, &found, rows);
     }
     if (status == HS_ERR_MEMORY) {

@@ -749,17 +749,24 @@ hs_metric_within_sum(const hs_metric *metric, hs_dw limit, const double *p, cons
 #define LARGEST_SIZE 0x1p1020
 
 /* Sign of (x - p).(q - p) by integers: four times that product is |x + q - 2 p|^2 - |x - q|^2. The
- * first vector is x - p + q - p: q and p are taken for box vectors, with the shift (1, -1). */
+ * first vector is x - p + q - p: q and p are taken for box vectors, with the shift (1, -1), beside
+ * those of the images of x and q. */
 static HS_NO_INLINE int
-sign_by_integers(const double *x, const double *p, const double *q, int ndim)
+sign_by_integers(const hs_metric *images, const double *x, const int64_t *of_x, const double *p,
+                 const double *q, const int64_t *of_q)
 {
-    const int64_t shift[2] = {1, -1};
-    hs_metric     metric = {.ndim = ndim, .n_rows = 2};
-    for (int k = 0; k < ndim; k++) {
+    int64_t   sum[HS_MAX_DIM] = {1, -1}, difference[HS_MAX_DIM] = {0};
+    hs_metric metric = {.ndim = images->ndim, .n_rows = 2 + images->n_rows};
+    for (int k = 0; k < images->ndim; k++) {
         metric.rows[0][k] = q[k];
         metric.rows[1][k] = p[k];
     }
-    return hs_integer_compare_two(&metric, &(hs_span){p, x, shift}, &(hs_span){q, x, NULL});
+    for (int l = 0; l < images->n_rows; l++) {
+        memcpy(metric.rows[2 + l], images->rows[l], sizeof metric.rows[l]);
+        sum[2 + l] = of_x[l] + of_q[l];
+        difference[2 + l] = of_x[l] - of_q[l];
+    }
+    return hs_integer_compare_two(&metric, &(hs_span){p, x, sum}, &(hs_span){q, x, difference});
 }
 
 HS_ALWAYS_INLINE bool
@@ -774,11 +781,67 @@ is_forward(const double *x, const double *p, const double *q, int ndim)
     if (size >= LEAST_SIZE && size <= LARGEST_SIZE && fabs(product) > FOOT_ERROR * size) {
         return product > 0.0;
     }
-    return sign_by_integers(x, p, q, ndim) >= 0;
+    const hs_metric plain = {.ndim = ndim};
+    return sign_by_integers(&plain, x, NULL, p, q, NULL) >= 0;
 }
 
 bool
 hs_foot_is_between(const double *x, const double *p, const double *q, int ndim)
 {
     return is_forward(x, p, q, ndim) && is_forward(x, q, p, ndim);
+}
+
+/*
+ * Of images, a component of x - p has a rounded difference and n <= 6 rounded products, none of
+ * which underflows, for whole numbers multiply, and n sums. With A the sum of the sizes of these as
+ * it is computed, its error is less than (n + 2) v A (1 + 2 (n + 2) v); so is that of q - p with
+ * its B, and that of the product less than (2 n + 6) v A B. With the sum of d <= 8 terms that is 27
+ * v m, where m is the computed sum of all A B.
+ */
+#define IMAGE_FOOT_ERROR (30.0 * 0x1p-53)
+
+/* Component k of q - p + shift * rows; *size: the sum of the sizes of its terms. */
+HS_ALWAYS_INLINE double
+component_of(const hs_metric *images, const double *p, const double *q, const int64_t *shift, int k,
+             double *size)
+{
+    double value = q[k] - p[k];
+    *size = fabs(value);
+    for (int l = 0; l < images->n_rows; l++) {
+        const double term = (double)shift[l] * images->rows[l][k];
+        value += term;
+        *size += fabs(term);
+    }
+    return value;
+}
+
+static bool
+is_forward_image(const hs_metric *images, const double *x, const int64_t *of_x, const double *p,
+                 const double *q, const int64_t *of_q)
+{
+    double product = 0.0, size = 0.0;
+    for (int k = 0; k < images->ndim; k++) {
+        double of_a, of_b;
+        product +=
+            component_of(images, p, x, of_x, k, &of_a) * component_of(images, p, q, of_q, k, &of_b);
+        size += of_a * of_b;
+    }
+    if (size >= LEAST_SIZE && size <= LARGEST_SIZE && fabs(product) > IMAGE_FOOT_ERROR * size) {
+        return product > 0.0;
+    }
+    return sign_by_integers(images, x, of_x, p, q, of_q) >= 0;
+}
+
+bool
+hs_foot_is_between_images(const hs_metric *images, const double *x, const int64_t *of_x,
+                          const double *p, const double *q, const int64_t *of_q)
+{
+    int64_t from_q[HS_MAX_DIM], back[HS_MAX_DIM];
+    HS_ASSERT(images->n_rows <= HS_MAX_DIM - 2);
+    for (int l = 0; l < images->n_rows; l++) {
+        from_q[l] = of_x[l] - of_q[l];
+        back[l] = -of_q[l];
+    }
+    return is_forward_image(images, x, of_x, p, q, of_q) &&
+           is_forward_image(images, x, from_q, q, p, back);
 }

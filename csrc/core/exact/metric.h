@@ -339,4 +339,9 @@ bool hs_metric_within_sum(const hs_metric *metric, hs_dw limit, const double *p,
  * through p and q lies on the closed segment between them. True where p and q are one point. */
 bool hs_foot_is_between(const double *x, const double *p, const double *q, int ndim);
 
+/* The same for x + of_x * rows and q + of_q * rows. images: ndim, and up to HS_MAX_DIM - 2 rows;
+ * shifts have n_rows numbers, of at most 33 bits. */
+bool hs_foot_is_between_images(const hs_metric *images, const double *x, const int64_t *of_x,
+                               const double *p, const double *q, const int64_t *of_q);
+
 #endif

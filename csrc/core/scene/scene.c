@@ -1439,6 +1439,21 @@ hs_scene_wrapped_like(hs_account *account, const hs_scene *kept, const hs_points
 }
 
 /* Reads the points, and the queries if there are any. */
+/* The range of the points becomes that of a domain, or reaches further: as if queries lay at its
+ * ends. */
+static void
+widen_cloud(const double *domain, hs_cloud *cloud)
+{
+    for (int k = 0; k < cloud->ndim && cloud->n > 0; k++) {
+        const double low = domain[k], high = domain[cloud->ndim + k];
+        if (low <= high) {
+            cloud->lower[k] = hs_smaller(low, cloud->lower[k]);
+            cloud->upper[k] = hs_larger(high, cloud->upper[k]);
+            cloud->largest = hs_larger(hs_larger(-low, high), cloud->largest);
+        }
+    }
+}
+
 static hs_status
 load_clouds(hs_account *account, hs_team *team, const hs_sets *sets, const hs_options *options,
             hs_scene *scene, hs_scene *asking, hs_failure *failure)
@@ -1447,6 +1462,9 @@ load_clouds(hs_account *account, hs_team *team, const hs_sets *sets, const hs_op
     if (status == HS_OK && asking != NULL) {
         status = hs_cloud_load(account, team, sets->queries, options, &asking->cloud, failure);
         failure->in_queries = status != HS_OK;
+    }
+    if (status == HS_OK && sets->domain != NULL) {
+        widen_cloud(sets->domain, &scene->cloud);
     }
     if (status == HS_OK && asking != NULL) {
         scene_join_clouds(scene, asking);

@@ -79,6 +79,8 @@ typedef struct hs_sets {
                                     * where there are several; 0: the cutoff alone */
     double within;       /* where is_wide: no pair further apart than this matters; 0: any */
     const struct hs_narrowing *narrowing; /* NULL: pairs lie within a ball, and fill it */
+    const double *domain; /* NULL, or what the range of the points reaches from and to at least, as
+                           * in hs_options */
 } hs_sets;
 
 /* For pairs that lie within less than a ball: how far normal . D of a pair can be from 0, in the

@@ -4,32 +4,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, Never
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _show
-from halfshell._convert.given import Given
+from halfshell._convert.call import DIRECTED, Call, take
+from halfshell._convert.foreign import is_a
 from halfshell._convert.listed import as_listed
 from halfshell._convert.memory import SMALL
 from halfshell._convert.options import as_flag
-from halfshell._convert.rules import DIRECTED
-from halfshell._convert.search import as_rest, as_search_of_each, refuse_indefinite
-from halfshell._convert.types import (
-    ArrayLike,
-    BoxLike,
-    PairCutoff,
-    PeriodicLike,
-    PointArray,
-    PointsLike,
-    Reach,
-    Rule,
-)
-from halfshell._functions.between import pairs_between as find_between
-from halfshell._functions.pairs import pairs as find_pairs
 from halfshell._objects.neighbor_table import NeighborTable
-from halfshell._unknown import refuse_unknown
+from halfshell._search import search
+from halfshell._settings import settings
+
+if TYPE_CHECKING:
+    from halfshell._check.right import Right
+    from halfshell._convert.types import (
+        ArrayLike,
+        BoxLike,
+        CutoffLike,
+        PeriodicLike,
+        PointsLike,
+        ProgressLike,
+        Rule,
+    )
 
 IntArray = npt.NDArray[np.int64]
 _CONFIRMED = 1000  # differences of each kind that are confirmed by rational arithmetic
@@ -92,50 +92,52 @@ class Verdict:
         return "\n".join(lines)
 
 
+@search()
 def verify(
     points: PointsLike,
-    cutoff: PairCutoff,
+    cutoff: CutoffLike,
     i: ArrayLike | NeighborTable,
     j: ArrayLike | None = None,
     S: ArrayLike | None = None,
     *,
     queries: PointsLike | None = None,
-    radii: ArrayLike | None = None,
-    query_radii: ArrayLike | None = None,
-    rule: Rule | None = None,
-    types: npt.ArrayLike | None = None,
-    query_types: npt.ArrayLike | None = None,
-    supports: ArrayLike | None = None,
-    query_supports: ArrayLike | None = None,
-    extent: float | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
+    rule: Rule | None = None,
+    exclude: ArrayLike | int | None = None,
+    min_distance: float | None = None,
+    indices: npt.ArrayLike | None = None,
     inclusive: bool = True,
     full: bool = False,
-    **unknown: Never,
+    threads: int | None = None,
+    progress: ProgressLike = None,
 ) -> Verdict:
     """Check a list of pairs, from any library; always exact.
 
     Parameters
     ----------
-    points, cutoff, box, periodic, inclusive
-        The scene, as in `pairs`. `inclusive` must be the rule of the list.
+    {points, cutoff}
     i, j : array_like of int, shape (m,)
         The pairs, in any order and orientation. Or, as `i` alone, a `NeighborTable`: its rows, with
-        their shifts if it has any; without `queries` they must be a full list.
+        their shifts if it has any.
     S : array_like of int, shape (m, d), optional
         Their shifts, with ``D = points[j] - points[i] + S @ box``. Without shifts, only the number
         of images of each pair of points is checked.
-    queries : array_like of float, shape (q, d), optional
-        Check a list of two sets, with i in `queries` and j in `points`, as from `pairs_between`
-        or from `neighbors` with queries.
-    radii, query_radii, rule, types, query_types, supports, query_supports, extent
-        As in `neighbors`. A list for the rules "gather" or "scatter" has a direction, like a list
-        of two sets.
+    queries : array_like of float, shape (q, d), or Points, optional
+        For a list of two sets, with i in `queries` and j in `points`, as from `pairs_between` or
+        from `neighbors` with queries. Such a list has a direction, and so have those for the rules
+        "gather" and "scatter".
+    {box, periodic, rule, exclude, min_distance}
+    indices : array_like of int, shape (r,), optional
+        For a list of the pairs that have one of these points; with `full`, or as a table, of their
+        rows.
+    inclusive : bool, default True
+        Whether a pair at exactly its cutoff counts: the rule of the list.
     full : bool, default False
         Whether the list must have both (i, j, S) and (j, i, -S). A list that has both is known for
         a full list without this: where it is wrong as a half list, and less so as a full one. Only
         for arrays, one set of points and a rule without direction.
+    {threads, progress}
 
     Returns
     -------
@@ -145,8 +147,7 @@ def verify(
     Raises
     ------
     TypeError
-        If `i`, `j` or `S` does not hold whole numbers, `inclusive` or `full` is not a bool, or a
-        part of the scene is of the wrong kind.
+        If `i`, `j` or `S` does not hold whole numbers, or another argument is of the wrong kind.
     ValueError
         If `i`, `j` and `S` do not fit each other or the points, a table belongs to other points, or
         to queries that are not given, `full` is given for two sets or a rule with a direction, or
@@ -154,6 +155,12 @@ def verify(
     OverflowError, MemoryError
         As for `pairs`, for the right list. Comparing it takes up to 20 times its memory, and for a
         full list 34 times, which must be available.
+
+    Notes
+    -----
+    With radii, types, supports, groups or excluded pairs the right list comes from searches that
+    have one cutoff each, and from what rational arithmetic says of the pairs that they find. The
+    first 1000 differences of a kind are confirmed in rational arithmetic in any case.
 
     Examples
     --------
@@ -167,65 +174,69 @@ def verify(
     >>> print(hs.verify(points, 2.0, hs.neighbors(points, 2.0)))
     correct: 4 pairs of a full list
     """
-    if unknown:
-        refuse_unknown(verify, unknown)
     full = as_flag(full, "full")
-    given = Given(
-        radii, query_radii, rule, types, query_types, supports, query_supports, extent
-    )
-    rest = as_rest(inclusive, "exact", None, None, None, None)
-    search, asking, reach = as_search_of_each(
-        points, cutoff, box, periodic, rest, given, queries, directed=True
-    )
-    if reach is not None:
-        refuse_indefinite(search, reach)
-    array, bound, vectors, bits = search[:4]
-    flags = [bool(bits >> axis & 1) for axis in range(array.shape[1])]
-    how: Any = {
-        "box": vectors, "periodic": flags if vectors is not None else None, "inclusive": rest[0],
-    }  # fmt: skip
-    is_directed = asking is not None or rule in DIRECTED
-    if isinstance(i, NeighborTable):
+    with settings(precision="exact"):
+        call = take(
+            points, cutoff, queries, box, periodic, rule, exclude, min_distance, indices, inclusive,
+            threads, progress, directed=True,
+        )  # fmt: skip
+    is_directed = call.queries is not None or call.rule in DIRECTED
+    if is_a(i, NeighborTable):
         if j is not None or S is not None or full:
             raise TypeError("a table has j, S and both directions itself: leave j, S and full out")
-        _check_table(i, len(array), None if asking is None else len(asking), is_directed)
+        table = cast("NeighborTable", i)
+        _check_table(table, call, is_directed)
         full = not is_directed
-        i, j, S = _columns(i)
+        i, j, S = _columns(table, call.indices)
     elif j is None:
         raise TypeError("j must be given, unless i is a NeighborTable")
     elif full and is_directed:
         raise ValueError("full is for pairs without a direction: leave out full, queries or rule")
-    rows = _rows(i, j, S, array, asking)
-    kind = "directed" if is_directed else LIST[full]
-    how["memory_limit"] = max(SMALL, _core.available_memory() / _COMPARING[kind])
-    right = _right(array, asking, bound, reach, how)
-    expected = right.rows(with_shifts=S is not None)
-    verdict = compare(expected, rows, kind)
+    n_queries = None if call.queries is None else len(call.queries)
+    columns = as_listed(i, j, S, call.array.shape[1], len(call.points), n_queries)
+    rows = np.column_stack(columns[: 2 if S is None else 3])  # type: ignore[arg-type]
+    kind: Kind = "directed" if is_directed else LIST[full]
+    limit = call.settings.memory_limit
+    limit = (_core.available_memory() if limit is None else limit) / _COMPARING[kind]
+    with settings(precision="exact", memory_limit=max(SMALL, limit)):
+        right = _RightOfAll(call)
+        expected = right.rows(with_shifts=S is not None)
+    if call.bar is not None:
+        call.bar.close()
+    verdict = compare(expected, rows, kind, call.indices)
     if kind == "half" and not verdict.ok and len(rows) > len(expected):
-        as_full = compare(expected, rows, "full")
+        as_full = compare(expected, rows, "full", call.indices)
         if as_full._n_wrong < verdict._n_wrong:
             verdict = as_full
     if S is not None:
-        _confirm(verdict, right, flags)
+        _confirm(verdict, right)
     return verdict
 
 
+Kind = Literal["half", "full", "directed"]
 #: What a list is, by whether it is full.
-LIST: dict[bool, Literal["half", "full"]] = {False: "half", True: "full"}
+LIST: dict[bool, Kind] = {False: "half", True: "full"}
 
 
 def compare(
-    expected: IntArray, given: IntArray, kind: Literal["half", "full", "directed"]
+    expected: IntArray, given: IntArray, kind: Kind, indices: IntArray | None = None
 ) -> Verdict:
     """The verdict on rows (i, j, *S).
 
     expected: each pair once. given: a half list in any orientation, a full list, or, of two sets,
-    rows that have one direction only.
+    rows that have one direction only. indices: those of which pairs, or rows, are expected.
     """
     if kind == "full":
         expected = np.concatenate([expected, _reversed(expected)])
     elif kind == "half":
         expected, given = _as_half(expected), _as_half(given)
+    if indices is not None:
+        most = max(expected[:, :2].max(initial=-1), indices.max(initial=-1))
+        times = np.bincount(indices, minlength=most + 1)
+        if kind == "half":
+            expected = expected[times[expected[:, :2]].any(axis=1)]
+        else:
+            expected = np.repeat(expected, times[expected[:, 0]], axis=0)
     missed, surplus = _differences(expected, given)
     known = {tuple(row) for row in expected.tolist()} if len(surplus) else set()
     twice = np.array([tuple(row) in known for row in surplus.tolist()], dtype=bool)
@@ -239,32 +250,26 @@ def compare(
     )
 
 
-def _check_table(table: NeighborTable, n: int, q: int | None, is_directed: bool) -> None:
-    """ValueError unless rows and points of a table are as many as those of the scene."""
+def _check_table(table: NeighborTable, call: Call, is_directed: bool) -> None:
+    """ValueError unless rows and points of a table are as many as those of the call."""
+    n = len(call.points)
     if table.n_points != n:
         raise ValueError(f"i is a table of {table.n_points} points, got {n} points")
-    if not is_directed:
+    if call.indices is None and not is_directed:
         table._refuse_queries("verify without queries")
-    elif q is not None and table.n_rows != q:
-        raise ValueError(f"i is a table of {table.n_rows} rows, got {q} queries")
-    elif q is None and table.n_rows != n:
-        raise ValueError(f"i is a table of {table.n_rows} rows, got {n} points")
+    what, wanted = "points", n
+    if call.queries is not None:
+        what, wanted = "queries", len(call.queries)
+    elif call.indices is not None:
+        what, wanted = "indices", len(call.indices)
+    if table.n_rows != wanted:
+        raise ValueError(f"i is a table of {table.n_rows} rows, got {wanted} {what}")
 
 
-def _columns(table: NeighborTable) -> tuple[Any, Any, Any]:
+def _columns(table: NeighborTable, indices: IntArray | None) -> tuple[Any, Any, Any]:
     """i, j and S of the entries; None for shifts that the table does not have."""
-    if "S" in table.quantities:
-        i, j, S = table.to_pairs(quantities="ijS")
-        return i, j, S
-    return *table.to_pairs(quantities="ij"), None
-
-
-def _rows(i: Any, j: Any, S: Any, points: PointArray, queries: PointArray | None) -> IntArray:
-    """The list as rows (i, j) or (i, j, *S), checked."""
-    n_queries = None if queries is None else len(queries)
-    first, second, shifts = as_listed(i, j, S, points.shape[1], len(points), n_queries)
-    parts = (first, second) if shifts is None else (first, second, shifts)
-    return np.column_stack(parts)
+    i, j, *S = table.to_pairs(quantities="ijS" if "S" in table.quantities else "ij")
+    return i if indices is None else indices[i], j, S[0] if S else None
 
 
 def _reversed(rows: IntArray) -> IntArray:
@@ -300,67 +305,55 @@ def _differences(expected: IntArray, given: IntArray) -> tuple[IntArray, IntArra
     return missed, surplus
 
 
-class _ByCutoff:
-    """The right list where all pairs have the same cutoff, and what decides on one of them."""
+class _RightOfAll:
+    """The right list of a call, system by system, and what decides on one of its pairs."""
 
-    def __init__(
-        self, points: PointArray, queries: PointArray | None, cutoff: float, how: dict[str, Any]
-    ) -> None:
-        self.points = points
-        self.asking = points if queries is None else queries
-        self.is_one_set = queries is None
-        self.cutoff = cutoff
-        self.how = how
+    def __init__(self, call: Call) -> None:
+        from halfshell._check.right import Right  # here, as fractions are slow to import
+
+        self._progress = call.progress
+        self._batches = call.points.batch, call.queries and call.queries.batch
+        self._systems: list[tuple[Right, int, int]]  # each with its first query and point
+        if call.points.batch is None:
+            self._systems = [(Right(call), 0, 0)]
+            return
+        from halfshell._convert.systems import each_system
+
+        asking = call.points.batch if call.queries is None else call.queries.batch
+        assert asking is not None
+        firsts = np.searchsorted(asking, np.arange(call.points.n_systems)).tolist()
+        self._systems = [
+            (Right(one), first_asking, first)
+            for (one, first), first_asking in zip(each_system(call), firsts, strict=True)
+        ]
 
     def rows(self, with_shifts: bool) -> IntArray:
         """(i, j) or (i, j, *S) of each pair, once."""
-        how = {"quantities": "ijS" if with_shifts else "ij", **self.how}
-        if self.is_one_set:
-            found = find_pairs(self.points, self.cutoff, **how)
-        else:
-            found = find_between(self.asking, self.points, self.cutoff, **how)
-        return np.column_stack(tuple(found)).astype(np.int64)
+        from halfshell._check.right import part_of
+
+        found = []
+        for k, (right, i, j) in enumerate(self._systems):
+            rows = right.rows(with_shifts, part_of(self._progress, k, len(self._systems)))
+            found.append(rows + ([i, j] + [0] * (rows.shape[1] - 2)) if k else rows)
+        return found[0] if len(found) == 1 else np.concatenate(found)
 
     def holds(self, i: int, j: int, *shift: int) -> bool:
-        """Whether this is within the cutoff, in rational arithmetic."""
-        # Here, because importing fractions takes longer than the rest.
-        from fractions import Fraction
-
-        from halfshell._check.reference import exact_square
-
-        square = exact_square((self.asking[i], self.points[j]), 0, 1, shift, self.how["box"])
-        limit = Fraction(self.cutoff) ** 2
-        return square <= limit if self.how["inclusive"] else square < limit
-
-
-def _right(
-    points: PointArray,
-    queries: PointArray | None,
-    bound: float,
-    reach: Reach | None,
-    how: dict[str, Any],
-) -> Any:
-    """The right list, for one cutoff or for a reach of each pair."""
-    if reach is None:
-        return _ByCutoff(points, queries, bound, how)
-    if reach[-1] is not None:
-        from halfshell._check.by_supports import BySupports
-
-        return BySupports(points, queries, bound, reach, how)
-    from halfshell._check.by_reach import ByReach  # here, as it imports fractions
-
-    return ByReach(points, queries, bound, reach, how)
+        """Whether this is one of the pairs, in rational arithmetic."""
+        own, asking = self._batches
+        s = 0
+        if own is not None:
+            s = int(own[j])
+            if s != (own if asking is None else asking)[i]:
+                return False
+        right, first_asking, first = self._systems[s]
+        return right.holds(i - first_asking, j - first, *shift)
 
 
-def _confirm(verdict: Verdict, right: Any, periodic: list[bool]) -> None:
+def _confirm(verdict: Verdict, right: _RightOfAll) -> None:
     """Recompute the differences in rational arithmetic, which shares nothing with the search."""
     for rows, should_hold in ((verdict.missed, True), (verdict.spurious, False)):
-        for i, j, *shift in rows[:_CONFIRMED].tolist():
-            if right.is_one_set and i == j and not any(shift):
-                continue  # a point with itself is never a pair
-            if any(s and not repeats for s, repeats in zip(shift, periodic)):
-                continue  # nor is anything across an axis that does not repeat
-            if right.holds(i, j, *shift) != should_hold:
+        for row in rows[:_CONFIRMED].tolist():
+            if right.holds(*row) != should_hold:
                 raise AssertionError(
-                    f"the search and rational arithmetic disagree on pair {(i, j, *shift)}"
+                    f"the search and rational arithmetic disagree on pair {tuple(row)}"
                 )

@@ -11,13 +11,14 @@ import time
 from argparse import Namespace
 from collections.abc import Callable
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 import halfshell as hs
-from halfshell._cli.errors import InputError, one_line
+from halfshell._cli.errors import InputError
 from halfshell._cli.files import Scene, read_scene
 from halfshell._cli.output import check_size, open_output, write_columns
 from halfshell._cli.scene import (
@@ -26,7 +27,11 @@ from halfshell._cli.scene import (
     describe_source,
     load_frames,
     load_scene,
+    named_cutoff,
     read_points,
+    require_matplotlib,
+    searching,
+    shown_cutoff,
     unit_suffix,
 )
 from halfshell._terminal import printable
@@ -52,16 +57,16 @@ def run_neighbors(args: Namespace) -> int:
         if given and not args.output:
             raise InputError(f"{name} is for what -o writes: give -o as well")
 
-    def find(scene: Scene, cutoff: float, asking: Scene, options: dict[str, Any]) -> Found:
+    def find(scene: Scene, cutoff: Any, asking: Scene, how: dict[str, Any]) -> Found:
         letters = args.quantities or ("ijdS" if any(scene.periodic) else "ijd")
         if not set(letters) <= set("ijdDS"):
             raise InputError(f"--quantities {letters}: rows have some of the letters i j d D S")
         wanted = letters.replace("i", "") or "j"
         if args.output:
-            n_rows = int(hs.coordination(scene.points, cutoff, **options).sum())
+            n_rows = int(hs.coordination(scene.known, cutoff, **how).sum())
             n, ndim = scene.points.shape
             check_size(args.output, letters, n_rows, n, ndim, args.max_output)
-        table = hs.neighbors(scene.points, cutoff, quantities=wanted, **options)
+        table = hs.neighbors(scene.known, cutoff, quantities=wanted, **how)
         arrays = table.to_pairs(quantities=letters)
         columns = dict(zip(letters, (arrays,) if len(letters) == 1 else arrays, strict=True))
         return Found(columns, *_of_counts(table.counts, asking))
@@ -72,12 +77,27 @@ def run_neighbors(args: Namespace) -> int:
 def run_coordination(args: Namespace) -> int:
     """Carry out ``halfshell coordination``."""
 
-    def find(scene: Scene, cutoff: float, asking: Scene, options: dict[str, Any]) -> Found:
-        counts = hs.coordination(scene.points, cutoff, **options)
+    def find(scene: Scene, cutoff: Any, asking: Scene, how: dict[str, Any]) -> Found:
+        counts = hs.coordination(scene.known, cutoff, by_type=args.by_type, **how)
+        each = {}
+        if args.by_type:
+            names = scene.known._kinds.names if scene.known._kinds else None
+            each = dict(zip(names or (), counts.T, strict=True))
+            counts = counts.sum(axis=1)
         columns: Columns = {"i": np.arange(len(counts)), "count": counts}
+        columns |= {f"count_{name}": column for name, column in each.items()}
         if asking.species is not None:
             columns["species"] = asking.species
-        return Found(columns, *_of_counts(counts, asking))
+        facts, lines = _of_counts(counts, asking)
+        if args.by_type:
+            means = {name: _means(column, asking) for name, column in each.items()}
+            centers = _means(counts, asking)
+            facts["by_type"] = {one: {name: means[name][one] for name in means} for one in centers}
+            lines += [
+                (f"  types of {one}", "  ".join(f"{name} {mean:.6g}" for name, mean in row.items()))
+                for one, row in facts["by_type"].items()
+            ]
+        return Found(columns, facts, lines)
 
     return _run(args, find)
 
@@ -86,15 +106,13 @@ def run_nearest(args: Namespace) -> int:
     """Carry out ``halfshell nearest``."""
     scene = read_points(args)
     asking = _asking(args, scene)
-    options = _options(scene, asking, args)
-    del options["inclusive"]
     letters = "jdS" if any(scene.periodic) else "jd"
     with ExitStack() as stack:
         output = open_output(args.output, args.file, stack, json=args.json)
         start = time.perf_counter()
-        found = _call(
-            scene, lambda: hs.nearest(scene.points, args.k, quantities=letters, **options)
-        )
+        with searching(scene, args):
+            queries = None if asking is scene else asking.points
+            found = hs.nearest(scene.known, args.k, queries=queries, quantities=letters)
         seconds = time.perf_counter() - start
         n, k = found[0].shape
         columns = {"i": np.repeat(np.arange(n), k), "rank": np.tile(np.arange(1, k + 1), n)}
@@ -127,11 +145,20 @@ def run_rdf(args: Namespace) -> int:
             result = found if result is None else result + found
             sizes.add(len(frame.points))
             n_frames += 1
-        columns: Columns = {"r": result.r, "g": result.g, "counts": result.counts}
-        highest = int(result.g.argmax())
-        peak = [float(result.r[highest]), float(result.g[highest])]
-        facts: dict[str, Any] = {"frames": n_frames, "bins": args.bins, "highest": peak}
-        facts["pairs"] = int(result.counts.sum())
+        if plot:
+            _draw(plot, result, first, args.plot)
+        columns: Columns = {"r": result.r}
+        peaks = {}
+        pairs = 0
+        for name, part in _parts(result).items():
+            columns[f"g{name}"], columns[f"counts{name}"] = part.g, part.counts
+            highest = int(part.g.argmax())
+            peaks[name[1:]] = [float(part.r[highest]), float(part.g[highest])]
+            pairs += int(part.counts.sum())
+        facts: dict[str, Any] = {
+            "frames": n_frames, "bins": args.bins, "pairs": pairs,
+            "highest": peaks if args.by_type else peaks[""],
+        }  # fmt: skip
         unit = unit_suffix(first)
         all_frames = f", of {n_frames:,} frames" if n_frames > 1 else ""
         if len(sizes) > 1:
@@ -139,48 +166,78 @@ def run_rdf(args: Namespace) -> int:
         lines = [
             ("bins", f"{args.bins:,}, of {cutoff / args.bins:.6g}{unit}"),
             ("pairs", f"{facts['pairs']:,}   (each once{all_frames})"),
-            ("highest g(r)", f"{peak[1]:.6g} at r = {peak[0]:.6g}{unit}"),
+            *(
+                (f"  of {name}" if name else "highest g(r)", f"{g:.6g} at r = {r:.6g}{unit}")
+                for name, (r, g) in peaks.items()
+            ),
         ]
+        if args.by_type:
+            lines.insert(2, ("highest g(r)", "of each two types"))
         return Found(columns, facts, lines)
 
     first, frames, cutoff, reason = load_frames(args)
-    return _run_loaded(args, first, cutoff, reason, find)
+    if args.plot:
+        require_matplotlib()
+    with ExitStack() as stack:
+        plot = open_output(args.plot, args.file, stack, (".png", ".pdf", ".svg"))
+        return _run_loaded(args, first, cutoff, reason, find)
+
+
+def _parts(result: Any) -> dict[str, Any]:
+    """g(r) of all points, or of each two types, by what its columns are called."""
+    if result.types is None:
+        return {"": result}
+    return {
+        f"_{one}-{other}": result[one, other]
+        for k, one in enumerate(result.types)
+        for other in result.types[k:]
+    }
+
+
+def _draw(stream: Any, result: Any, scene: Scene, name: str) -> None:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 4.0), layout="constrained")
+    axes = figure.subplots()
+    result.plot(ax=axes, unit="Å" if scene.unit else None)
+    axes.set_title(printable(Path(scene.source).name), fontsize=10, parse_math=False)
+    figure.savefig(stream, format=Path(name).suffix[1:], dpi=150)
 
 
 def _distribution(scene: Scene, cutoff: float, args: Namespace) -> Any:
-    if scene.box is None or not all(scene.periodic):
-        raise InputError(f"{scene.where}: g(r) needs a box that is periodic along every axis")
-    options = _options(scene, scene, args)
-    del options["inclusive"]
-    return _call(scene, lambda: hs.rdf(scene.points, cutoff, args.bins, **options))
+    if args.density is None and (scene.box is None or not all(scene.periodic)):
+        raise InputError(
+            f"{scene.where}: g(r) needs a box that is periodic along every axis, or --density"
+        )
+    with searching(scene, args):
+        return hs.rdf(scene.known, cutoff, args.bins, by_type=args.by_type, density=args.density)
 
 
 # ---- what they share -------------------------------------------------------------------------
 
 
-def _run(args: Namespace, find: Callable[[Scene, float, Scene, dict[str, Any]], Found]) -> int:
+def _run(args: Namespace, find: Callable[[Scene, Any, Scene, dict[str, Any]], Found]) -> int:
     """A command with a cutoff."""
     scene, cutoff, reason = load_scene(args)
     asking = _asking(args, scene)
-    options = _options(scene, asking, args)
-    return _run_loaded(
-        args, scene, cutoff, reason, lambda: find(scene, cutoff, asking, options)
-    )
+    queries = None if asking is scene else hs.Points(asking.points, types=asking.species)
+    how = {"queries": queries, "inclusive": not args.strict}
+    return _run_loaded(args, scene, cutoff, reason, lambda: find(scene, cutoff, asking, how))
 
 
 def _run_loaded(
-    args: Namespace, scene: Scene, cutoff: float, reason: str, find: Callable[[], Found]
+    args: Namespace, scene: Scene, cutoff: Any, reason: str, find: Callable[[], Found]
 ) -> int:
     with ExitStack() as stack:
         output = open_output(args.output, args.file, stack, json=args.json)
         start = time.perf_counter()
-        found = _call(scene, find)
+        with searching(scene, args):
+            found = find()
         seconds = time.perf_counter() - start
         if output:
             write_columns(output, args.output, found.columns)
-    chosen = f"   (chosen: {reason}; --cutoff sets it)" if reason else ""
-    facts = {"cutoff": cutoff, "cutoff_chosen": args.cutoff is None, **found.facts}
-    line = ("cutoff", f"{cutoff:.6g}{unit_suffix(scene)}{chosen}")
+    facts = {"cutoff": named_cutoff(cutoff), "cutoff_chosen": args.cutoff is None, **found.facts}
+    line = ("cutoff", shown_cutoff(cutoff, scene, reason))
     _print(args, scene, facts, [line, *found.lines], seconds)
     return 0
 
@@ -198,25 +255,6 @@ def _asking(args: Namespace, scene: Scene) -> Scene:
     return queries
 
 
-def _options(scene: Scene, asking: Scene, args: Namespace) -> dict[str, Any]:
-    queries = {} if asking is scene else {"queries": asking.points}
-    return {
-        **queries,
-        "box": scene.box,
-        "periodic": scene.periodic if scene.box is not None else None,
-        "inclusive": not getattr(args, "strict", False),
-        "kernel": args.kernel,
-        "threads": args.threads,
-    }
-
-
-def _call(scene: Scene, function: Callable[[], Any]) -> Any:
-    try:
-        return function()
-    except (ValueError, TypeError, OverflowError, MemoryError) as error:
-        raise InputError(f"{scene.where}: {one_line(error)}") from None
-
-
 def _of_counts(
     counts: NDArray[np.int64], asking: Scene
 ) -> tuple[dict[str, Any], list[tuple[str, str]]]:
@@ -232,10 +270,7 @@ def _of_counts(
                        f"{facts['least']:,} to {facts['most']:,}"),
     ]  # fmt: skip
     if asking.species is not None:
-        means = {
-            str(name): float(counts[asking.species == name].mean())
-            for name in np.unique(asking.species)
-        }
+        means = _means(counts, asking)
         facts["by_species"] = means
         lines += [(f"  of {name}", f"{mean:.6g} on average") for name, mean in means.items()]
     if len(numbers) <= MOST_SHOWN:
@@ -246,6 +281,14 @@ def _of_counts(
             (f"  {number:,}", f"{n:,} points") for number, n in zip(numbers, times, strict=True)
         ]
     return facts, lines
+
+
+def _means(counts: NDArray[np.int64], asking: Scene) -> dict[str, float]:
+    """The mean number by the element of the point that has them; of all, if it has none."""
+    if asking.species is None:
+        return {"all": float(counts.mean())}
+    names = np.unique(asking.species).tolist()
+    return {name: float(counts[asking.species == name].mean()) for name in names}
 
 
 def _print(
@@ -265,7 +308,8 @@ def _print(
         shown.append(("queries", args.queries))
     shown += [("box", describe_box(scene)), *lines]
     shown.append(("time", f"{took:.3g} s" if took >= 1 else f"{took * 1e3:.3g} ms"))
-    if args.output:
-        shown.append(("written to", args.output))
+    for what, target in (("", args.output), ("plot ", getattr(args, "plot", None))):
+        if target:
+            shown.append((f"{what}written to", target))
     text = [scene.source, *(f"  {name:<18}{value}" for name, value in shown)]
     print("\n".join(map(printable, text)))

@@ -15,6 +15,7 @@ import platform
 import re
 import sys
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from typing import Any, NoReturn
 
 import numpy as np
@@ -135,6 +136,7 @@ def _add_scene_options(
     has_rule: bool = True,
     has_kernel: bool = True,
     has_frames: bool = False,
+    by_elements: bool = False,
 ) -> None:
     """Add what says which points are meant, in which box."""
     command.add_argument(
@@ -147,9 +149,11 @@ def _add_scene_options(
     if has_cutoff:
         command.add_argument(
             "--cutoff",
-            type=values.cutoff,
+            type=values.cutoffs if by_elements else values.cutoff,
             metavar="R",
-            help="largest distance of a pair; default: one with about 50 neighbours",
+            help="largest distance of a pair"
+            + (", or of each two elements: Si-O=1.8,*-*=3" if by_elements else "")
+            + "; default: one with about 50 neighbours",
         )
     command.add_argument(
         "--box",
@@ -218,7 +222,7 @@ def _add_pairs(commands: Any) -> None:
     command = commands.add_parser(
         "pairs", help="find the pairs of a file, summarise them, save them, plot g(r)"
     )
-    _add_scene_options(command)
+    _add_scene_options(command, by_elements=True)
     _add_threads(command)
     command.add_argument(
         "-o", "--output", metavar="OUT",
@@ -240,7 +244,7 @@ def _add_pairs(commands: Any) -> None:
         help="how a pair near the cutoff is decided; default: exact",
     )
     _add_no_progress(command)
-    command.set_defaults(run=_run_pairs)
+    command.set_defaults(run=_later("halfshell._cli.pairs"))
 
 
 def _add_lists(commands: Any) -> None:
@@ -255,7 +259,7 @@ def _add_lists(commands: Any) -> None:
         command = commands.add_parser(name, help=words)
         _add_scene_options(
             command, name != "nearest", name in ("neighbors", "coordination"),
-            has_frames=name == "rdf",
+            has_frames=name == "rdf", by_elements=name != "rdf",
         )  # fmt: skip
         _add_threads(command)
         command.add_argument(
@@ -267,7 +271,7 @@ def _add_lists(commands: Any) -> None:
                 "--queries", metavar="FILE",
                 help="whose neighbours are wanted, in the box of the points; default: the points"
             )  # fmt: skip
-        command.set_defaults(run=_run_list, name=name)
+        command.set_defaults(run=_later("halfshell._cli.lists", f"run_{name}"))
         if name == "neighbors":
             command.add_argument(
                 "--quantities", type=values.quantities, metavar="LETTERS",
@@ -280,13 +284,23 @@ def _add_lists(commands: Any) -> None:
             command.add_argument(
                 "--bins", type=values.count, default=100, metavar="N", help="default: 100"
             )
+            command.add_argument(
+                "--density", type=values.number, metavar="RHO",
+                help="points per unit of volume, where the box has none or is not the whole",
+            )  # fmt: skip
+            command.add_argument("--plot", metavar="PNG", help="draw it: .png, .pdf or .svg")
+        if name in ("rdf", "coordination"):
+            command.add_argument(
+                "--by-type", action="store_true", help="of each two elements of the file"
+            )
 
 
 def _add_verify(commands: Any) -> None:
     command = commands.add_parser(
         "verify", help="check a list of pairs, of halfshell or another library, exactly"
     )
-    _add_scene_options(command)
+    _add_scene_options(command, by_elements=True)
+    _add_threads(command)
     command.add_argument(
         "list", nargs="?", metavar="LIST",
         help="a saved list: .csv, .npz, .parquet with columns i and j, or the like, and shifts"
@@ -304,7 +318,7 @@ def _add_verify(commands: Any) -> None:
         help="most points to check by integers, 0 for all; default: 400, or what takes seconds",
     )
     _add_no_progress(command)
-    command.set_defaults(run=_run_verify)
+    command.set_defaults(run=_later("halfshell._cli.verify"))
 
 
 def _add_bench(commands: Any) -> None:
@@ -312,7 +326,7 @@ def _add_bench(commands: Any) -> None:
         "bench", help="run times on a file, ours and other libraries', whose answers come first",
         fill=_fill_bench,
     )  # fmt: skip
-    command.set_defaults(run=_run_bench)
+    command.set_defaults(run=_later("halfshell_report.cli", "run_bench"))
 
 
 def _fill_bench(command: argparse.ArgumentParser) -> None:
@@ -327,7 +341,7 @@ def _add_report(commands: Any) -> None:
         "report", help="error against run time, of halfshell and other libraries, on hard scenes",
         fill=_fill_report,
     )  # fmt: skip
-    command.set_defaults(run=_run_report)
+    command.set_defaults(run=_later("halfshell_report.cli"))
 
 
 def _fill_report(command: argparse.ArgumentParser) -> None:
@@ -344,35 +358,13 @@ def _run_help(parser: argparse.ArgumentParser) -> int:
     return 0
 
 
-def _run_pairs(args: argparse.Namespace) -> int:
-    from halfshell._cli.pairs import run
+def _later(module: str, name: str = "run") -> Callable[[argparse.Namespace], int]:
+    """What carries out a command: a function that is imported when it is called."""
 
-    return run(args)
+    def run(args: argparse.Namespace) -> int:
+        return int(getattr(import_module(module), name)(args))
 
-
-def _run_list(args: argparse.Namespace) -> int:
-    from halfshell._cli import lists
-
-    run = getattr(lists, f"run_{args.name}")
-    return int(run(args))
-
-
-def _run_verify(args: argparse.Namespace) -> int:
-    from halfshell._cli.verify import run
-
-    return run(args)
-
-
-def _run_bench(args: argparse.Namespace) -> int:
-    from halfshell_report.cli import run_bench
-
-    return run_bench(args)
-
-
-def _run_report(args: argparse.Namespace) -> int:
-    from halfshell_report.cli import run
-
-    return run(args)
+    return run
 
 
 def _run_selftest(args: argparse.Namespace) -> int:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from halfshell._cli.errors import InputError, one_line
 from halfshell._convert.memory import refuse_unavailable
-from halfshell._convert.scene import MAX_DIM, MAX_POINTS
+from halfshell._convert.points import MAX_DIM, MAX_POINTS
 
 __all__ = ["is_numpy", "read_arrays"]
 

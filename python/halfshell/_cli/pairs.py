@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import halfshell as hs
 from halfshell import _core
-from halfshell._cli.errors import InputError, one_line
+from halfshell._cli.errors import InputError
 from halfshell._cli.files import Scene
 from halfshell._cli.output import check_size, open_output, write_columns
 from halfshell._cli.progress import progress_bar
@@ -25,14 +25,16 @@ from halfshell._cli.scene import (
     describe_points,
     describe_source,
     load_scene,
+    named_cutoff,
     plot_distribution,
     require_matplotlib,
+    searching,
+    shown_cutoff,
     unit_suffix,
 )
 from halfshell._terminal import printable
 
 __all__ = ["run"]
-
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class Summary:
     box: list[list[float]] | None
     no_box: str
     periodic: list[bool]
-    cutoff: float
+    cutoff: float | dict[str, float]
     cutoff_chosen: bool
     inclusive: bool
     pairs: int
@@ -67,7 +69,8 @@ def run(args: Namespace) -> int:
     wanted = args.quantities or ("ijdS" if any(scene.periodic) else "ijd")
     letters = wanted if args.output else ""
     letters += "" if "d" in letters else "d"
-    if args.plot and cutoff == 0:
+    largest = max(cutoff.values()) if isinstance(cutoff, dict) else cutoff
+    if args.plot and largest == 0:
         raise InputError("--plot needs a cutoff above 0")
     for name, given in (
         ("--quantities", args.quantities), ("--sort", args.sort), ("--max-output", args.max_output)
@@ -80,18 +83,24 @@ def run(args: Namespace) -> int:
         plot = open_output(args.plot, args.file, stack, (".png", ".pdf", ".svg"))
         if plot:
             require_matplotlib()
-        if output:
-            _check_size(scene, cutoff, wanted, args)
-        start = time.perf_counter()
-        columns = _search(scene, cutoff, letters, args)
-        seconds = time.perf_counter() - start
+        with searching(scene, args):
+            if output:  # what it takes to count refuses what is too large
+                n_pairs = hs.count_pairs(scene.known, cutoff, inclusive=not args.strict)
+                n, ndim = scene.points.shape
+                check_size(args.output, wanted, n_pairs, n, ndim, args.max_output)
+            hs.pairs(scene.known[:0], cutoff)  # loads what a first search loads, outside its time
+            start = time.perf_counter()
+            columns = _search(scene, cutoff, letters, args)
+            seconds = time.perf_counter() - start
         d = columns["d"]
         if output:
             chosen = {letter: columns[letter] for letter in wanted}
-            extra = {"n": len(scene.points), "cutoff": cutoff, "inclusive": not args.strict}
+            extra: dict[str, Any] = {"n": len(scene.points), "inclusive": not args.strict}
+            if largest is cutoff:  # one for all pairs
+                extra["cutoff"] = cutoff
             write_columns(output, args.output, chosen, **extra)
         if plot:
-            plot_distribution(plot, Path(args.plot).suffix[1:], d, scene, cutoff)
+            plot_distribution(plot, Path(args.plot).suffix[1:], d, scene, largest)
 
     box = scene.box_rows
     names, counts = np.unique([] if scene.species is None else scene.species, return_counts=True)
@@ -102,7 +111,7 @@ def run(args: Namespace) -> int:
         box=box.tolist() if box is not None else None,
         no_box=scene.no_box,
         periodic=list(scene.periodic),
-        cutoff=cutoff,
+        cutoff=named_cutoff(cutoff),
         cutoff_chosen=args.cutoff is None,
         inclusive=not args.strict,
         pairs=len(d),
@@ -115,60 +124,37 @@ def run(args: Namespace) -> int:
         plot=args.plot,
     )
     if args.output != "-":
-        print(json.dumps(vars(summary), indent=2) if args.json else _text(summary, scene, reason))
+        text = _text(summary, scene, shown_cutoff(cutoff, scene, reason))
+        print(json.dumps(vars(summary), indent=2) if args.json else text)
     return 0
 
 
 # The search --------------------------------------------------------------------------------
 
 
-def _options(scene: Scene, args: Namespace) -> dict[str, Any]:
-    """What counting and finding share."""
-    return {
-        "box": scene.box,
-        "periodic": scene.periodic if scene.box is not None else None,
-        "inclusive": not args.strict,
-        "precision": args.precision,
-        "kernel": args.kernel,
-        "threads": args.threads,
-    }
-
-
-def _check_size(scene: Scene, cutoff: float, letters: str, args: Namespace) -> None:
-    """Refuse an output that is too large, for what counting takes."""
-    n, ndim = scene.points.shape
-    try:
-        n_pairs = hs.count_pairs(scene.points, cutoff, **_options(scene, args))
-    except (ValueError, TypeError, OverflowError, MemoryError) as error:
-        raise InputError(f"{scene.source}: {one_line(error)}") from None
-    check_size(args.output, letters, n_pairs, n, ndim, args.max_output)
-
-
-def _search(scene: Scene, cutoff: float, letters: str, args: Namespace) -> dict[str, NDArray[Any]]:
+def _search(scene: Scene, cutoff: Any, letters: str, args: Namespace) -> dict[str, NDArray[Any]]:
     """Find the pairs; return one array for each letter."""
-    options = {**_options(scene, args), "quantities": letters, "sort": args.sort}
-    try:
-        with progress_bar(args.progress and not args.json, "searching") as advance:
-            found = hs.pairs(scene.points, cutoff, progress=advance, **options)
-    except (ValueError, TypeError, OverflowError, MemoryError) as error:
-        raise InputError(f"{scene.source}: {one_line(error)}") from None
+    with progress_bar(args.progress and not args.json, "searching") as advance:
+        found = hs.pairs(
+            scene.known, cutoff, inclusive=not args.strict, quantities=letters, sort=args.sort,
+            progress=advance,
+        )  # fmt: skip
     return dict(zip(letters, (found,) if len(letters) == 1 else found, strict=True))
 
 
 # The summary -------------------------------------------------------------------------------
 
 
-def _text(summary: Summary, scene: Scene, reason: str) -> str:
+def _text(summary: Summary, scene: Scene, cutoff: str) -> str:
     """Return the summary for a person: one aligned line an item."""
     unit = unit_suffix(scene)
     rule = "d <= cutoff" if summary.inclusive else "d < cutoff"
-    chosen = f"   (chosen: {reason}; --cutoff sets it)" if reason else ""
     nearest = summary.nearest_distance
     speed = summary.pairs / summary.seconds / 1e6 if summary.seconds else 0.0
     lines = [
         *describe_points(scene),
         ("box", describe_box(scene)),
-        ("cutoff", f"{summary.cutoff:.6g}{unit}{chosen}"),
+        ("cutoff", cutoff),
         ("pairs", f"{summary.pairs:,}   ({rule}, each pair once)"),
         ("mean coordination", f"{summary.mean_coordination:.6g}"),
         ("nearest distance", "no pair" if nearest is None else f"{nearest:.6g}{unit}"),

@@ -7,6 +7,7 @@ import math
 import sys
 from argparse import Namespace
 from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
 from typing import IO, Any
@@ -14,10 +15,11 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from halfshell._cli.errors import InputError, missing_extra
+from halfshell._cli.errors import InputError, missing_extra, one_line
 from halfshell._cli.files import Scene, read_frames, read_scene
 from halfshell._convert.memory import refuse_unavailable
-from halfshell._functions.ideal_gas import over_ideal_gas, shell_shares, unit_ball
+from halfshell._functions.rdf import over_ideal_gas, shell_shares, unit_ball
+from halfshell._settings import settings
 from halfshell._terminal import printable
 
 __all__ = [
@@ -27,10 +29,13 @@ __all__ = [
     "describe_source",
     "load_frames",
     "load_scene",
+    "named_cutoff",
     "plot_distribution",
     "radial_distribution",
     "read_points",
     "require_matplotlib",
+    "searching",
+    "shown_cutoff",
     "unit_suffix",
 ]
 
@@ -39,12 +44,37 @@ _COPIES = 5  # of the points, while a cutoff is chosen
 BINS = 200  # of g(r): a percent of the cutoff is two bins
 
 
-def load_scene(args: Namespace) -> tuple[Scene, float, str]:
+def load_scene(args: Namespace) -> tuple[Scene, Any, str]:
     """Return the scene that the options name, the cutoff, and how it was chosen if it was."""
     scene = read_points(args)
+    _check_elements(scene, args)
     if args.cutoff is not None:
         return scene, args.cutoff, ""
     return scene, *choose_cutoff(scene)
+
+
+def _check_elements(scene: Scene, args: Namespace) -> None:
+    """InputError where a file has no elements, and an option goes by them."""
+    by_elements = isinstance(args.cutoff, dict)
+    if scene.species is None and (by_elements or getattr(args, "by_type", False)):
+        option = "--cutoff of elements" if by_elements else "--by-type"
+        raise InputError(f"{scene.where}: has no elements, which {option} goes by")
+
+
+def shown_cutoff(cutoff: Any, scene: Scene, reason: str = "") -> str:
+    """Return a cutoff, or one for each two elements, and how it was chosen if it was."""
+    chosen = f"   (chosen: {reason}; --cutoff sets it)" if reason else ""
+    lengths = named_cutoff(cutoff)
+    if not isinstance(lengths, dict):
+        return f"{lengths:.6g}{unit_suffix(scene)}{chosen}"
+    return "  ".join(f"{name} {length:.6g}{unit_suffix(scene)}" for name, length in lengths.items())
+
+
+def named_cutoff(cutoff: Any) -> Any:
+    """Return the same for machines: a number, or numbers by names such as ``Si-O``."""
+    if not isinstance(cutoff, dict):
+        return cutoff
+    return {"-".join(names): length for names, length in cutoff.items()}
 
 
 def load_frames(args: Namespace) -> tuple[Scene, Iterator[Scene], float, str]:
@@ -60,6 +90,7 @@ def load_frames(args: Namespace) -> tuple[Scene, Iterator[Scene], float, str]:
     frames = read_frames(args.file, args.index, **_how_to_read(args))
     first = next(frames)
     _tell_remarks(first)
+    _check_elements(first, args)
     cutoff, reason = (args.cutoff, "") if args.cutoff is not None else choose_cutoff(first)
     return first, chain([first], frames), cutoff, reason
 
@@ -133,6 +164,18 @@ def _extents(points: NDArray[np.float64], longest: float) -> list[float]:
         floor = 1e-9 * max([longest, *sides])
         boxes.append([side for side in sides if side > floor])
     return min(boxes, key=lambda sides: (len(sides), math.prod(sides)))
+
+
+@contextmanager
+def searching(scene: Scene, args: Namespace) -> Iterator[None]:
+    """What is around the searches of a command: settings, and errors that name the file."""
+    names = ("kernel", "precision", "threads")
+    given = {name: getattr(args, name) for name in names if getattr(args, name, None)}
+    try:
+        with settings(**given):
+            yield
+    except (ValueError, TypeError, OverflowError, MemoryError) as error:
+        raise InputError(f"{scene.where}: {one_line(error)}") from None
 
 
 def unit_suffix(scene: Scene) -> str:

@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from halfshell._cli.errors import InputError, missing_extra, one_line
 from halfshell._cli.text_files import kind_of_file, open_bytes
-from halfshell._convert.foreign_box import placeholder
-from halfshell._convert.species import SYMBOLS
+from halfshell._convert.objects import SYMBOLS, placeholder
+from halfshell._convert.points import Points
 
 __all__ = ["Frames", "Scene", "UnknownFormat", "by_ase", "by_mdanalysis"]
 
@@ -81,6 +81,18 @@ class Scene:
     def where(self) -> str:
         """The file, and the frame of several."""
         return f"{self.source}: {self.frame}" if self.frame else self.source
+
+    @cached_property
+    def known(self) -> Points:
+        """What a search takes: points, box, periodicity, and elements as types.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If the box is none.
+        """
+        periodic = None if self.box is None else self.periodic
+        return Points(self.points, box=self.box, periodic=periodic, types=self.species)
 
     @property
     def box_rows(self) -> NDArray[np.float64] | None:

@@ -20,6 +20,20 @@ def cutoff(text: str) -> float:
     return value
 
 
+def cutoffs(text: str) -> float | dict[tuple[str, str], float]:
+    """A cutoff, or one for each two elements, as in ``Si-O=1.8,*-*=3``."""
+    if "=" not in text:
+        return cutoff(text)
+    found: dict[tuple[str, str], float] = {}
+    for part in text.split(","):
+        names, _, length = part.partition("=")
+        one, between, other = (word.strip() for word in names.partition("-"))
+        if not (one and between and other and length):
+            raise argparse.ArgumentTypeError(f"{part!r} is not like Si-O=1.8, or *-*=3")
+        found[one, other] = cutoff(length)
+    return found
+
+
 def number(text: str) -> float:
     try:
         value = float(text)

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import halfshell as hs
-from halfshell._check.reference import exact_square, reference_pairs
+from halfshell._check.reference import exact_square, reach_by_types, reference_pairs
 from halfshell._check.verify import LIST, compare
-from halfshell._cli.errors import InputError, one_line
+from halfshell._cli.errors import InputError
 from halfshell._cli.files import Scene
 from halfshell._cli.pair_files import read_list
 from halfshell._cli.progress import progress_bar
@@ -25,9 +25,12 @@ from halfshell._cli.scene import (
     describe_points,
     describe_source,
     load_scene,
+    named_cutoff,
     read_points,
-    unit_suffix,
+    searching,
+    shown_cutoff,
 )
+from halfshell._convert.call import take
 from halfshell._terminal import printable
 
 __all__ = ["Check", "PairList", "check_by_integers", "check_by_search", "run", "sample_points"]
@@ -95,7 +98,7 @@ class Check:
         return not any(map(len, self.faults.values()))
 
 
-def check_by_search(pairs: PairList, scene: Scene, cutoff: float) -> tuple[Check, bool]:
+def check_by_search(pairs: PairList, scene: Scene, cutoff: Any) -> tuple[Check, bool]:
     """Compare with the exact search; what differs is confirmed in rational arithmetic.
 
     Also returns whether the list is full, as `verify` finds.
@@ -103,17 +106,9 @@ def check_by_search(pairs: PairList, scene: Scene, cutoff: float) -> tuple[Check
     n = len(scene.points)
     rows = sample_points(scene, max(1, n * SEARCH_ROWS // max(SEARCH_ROWS, len(pairs.i))))
     part = pairs.among(rows, n)
-    points = scene.points if rows is None else scene.points[rows]
+    points = scene.known if rows is None else scene.known[rows]
     verdict = hs.verify(
-        points,
-        cutoff,
-        part.i,
-        part.j,
-        part.S,
-        box=scene.box,
-        periodic=scene.periodic if scene.box is not None else None,
-        inclusive=pairs.inclusive,
-        full=bool(pairs.full),
+        points, cutoff, part.i, part.j, part.S, inclusive=pairs.inclusive, full=bool(pairs.full)
     )
     return _check("search", verdict, rows, len(points)), verdict.is_full
 
@@ -121,7 +116,7 @@ def check_by_search(pairs: PairList, scene: Scene, cutoff: float) -> tuple[Check
 def check_by_integers(
     pairs: PairList,
     scene: Scene,
-    cutoff: float,
+    cutoff: Any,
     limit: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Check:
@@ -137,9 +132,13 @@ def check_by_integers(
     rows = sample_points(scene, limit)
     part = pairs.among(rows, n)
     points = scene.points if rows is None else scene.points[rows]
+    reach = cutoff
+    if isinstance(cutoff, dict):
+        types, table = _types_of(scene, cutoff)
+        reach = reach_by_types(types if rows is None else [types[row] for row in rows], table)
     periodic = scene.periodic if scene.box is not None else None
     truth = reference_pairs(
-        points, cutoff, scene.box, periodic, pairs.inclusive, progress=progress
+        points, reach, scene.box, periodic, pairs.inclusive, progress=progress
     )
     rows_of_truth = [(i, j, *shift) for i, j, shift in truth]
     columns = (part.i, part.j) if part.S is None else (part.i, part.j, part.S)
@@ -150,6 +149,15 @@ def check_by_integers(
         LIST[bool(pairs.full)],
     )
     return _check("integers", verdict, rows, len(points))
+
+
+def _types_of(scene: Scene, cutoff: Any) -> tuple[list[int], list[list[float]]]:
+    """The type of each point, and the cutoff of each two, negative if they form no pairs."""
+    reach = take(scene.known, cutoff).reach
+    assert reach is not None
+    types, _, table = reach[3:6]
+    assert types is not None and table is not None
+    return types.tolist(), table.tolist()
 
 
 def _check(
@@ -201,6 +209,8 @@ def run(args: Namespace) -> int:
     if args.list and (args.against or args.kernel):
         raise InputError("--against and --kernel make a list: leave them out, or the file of one")
     peer = None
+    if args.against and isinstance(args.cutoff, dict):
+        raise InputError("--against takes one cutoff for all pairs")
     if args.against:
         from halfshell_report.against import ask_peer, find_peer
 
@@ -210,7 +220,7 @@ def run(args: Namespace) -> int:
     else:
         scene, cutoff, _ = load_scene(args)
     checks = []
-    try:
+    with searching(scene, args):
         if peer:
             author, pairs = peer.name_and_version(), PairList(*ask_peer(peer, scene, cutoff))
         elif not args.list:
@@ -221,8 +231,6 @@ def run(args: Namespace) -> int:
             checks.append(check)
         with progress_bar(args.progress and not args.json, "checking by integers") as advance:
             checks.append(check_by_integers(pairs, scene, cutoff, args.sample, advance))
-    except (ValueError, TypeError, OverflowError, MemoryError) as error:
-        raise InputError(f"{scene.source}: {one_line(error)}") from None
     if args.json:
         print(_json(author, pairs, scene, cutoff, checks))
     else:
@@ -230,28 +238,21 @@ def run(args: Namespace) -> int:
     return 0 if all(check.ok for check in checks) else 1
 
 
-def _own_list(scene: Scene, cutoff: float, args: Namespace) -> PairList:
-    i, j, S = hs.pairs(
-        scene.points,
-        cutoff,
-        box=scene.box,
-        periodic=scene.periodic if scene.box is not None else None,
-        quantities="ijS",
-        inclusive=not args.strict,
-        kernel=args.kernel,
-    )
+def _own_list(scene: Scene, cutoff: Any, args: Namespace) -> PairList:
+    i, j, S = hs.pairs(scene.known, cutoff, quantities="ijS", inclusive=not args.strict)
     return PairList(i, j, S.astype(np.int64), inclusive=not args.strict, full=False)
 
 
-def _saved_list(args: Namespace) -> tuple[str, PairList, Scene, float]:
+def _saved_list(args: Namespace) -> tuple[str, PairList, Scene, Any]:
     """A list in a file: what it is, its pairs, the points that it is for, and the cutoff."""
-    scene = read_points(args)
+    scene = load_scene(args)[0] if args.cutoff is not None else read_points(args)
     found = read_list(args.list, *scene.points.shape)
     cutoff = found.cutoff if args.cutoff is None else args.cutoff
     if cutoff is None:
         raise InputError(f"{args.list}: does not tell its cutoff: give --cutoff")
     if found.cutoff not in (None, cutoff):
-        raise InputError(f"{args.list}: is a list for a cutoff of {found.cutoff}, not {cutoff}")
+        wanted = named_cutoff(cutoff)
+        raise InputError(f"{args.list}: is a list for a cutoff of {found.cutoff}, not {wanted}")
     inclusive = not args.strict
     if found.inclusive is False:
         inclusive = False
@@ -269,11 +270,11 @@ def _saved_list(args: Namespace) -> tuple[str, PairList, Scene, float]:
 # The report --------------------------------------------------------------------------------
 
 
-def _json(author: str, pairs: PairList, scene: Scene, cutoff: float, checks: list[Check]) -> str:
+def _json(author: str, pairs: PairList, scene: Scene, cutoff: Any, checks: list[Check]) -> str:
     report: dict[str, Any] = {
         **describe_source(scene),
         "list": author,
-        "cutoff": cutoff,
+        "cutoff": named_cutoff(cutoff),
         "inclusive": pairs.inclusive,
         "full": pairs.full,
         "rows": len(pairs.i),
@@ -293,14 +294,14 @@ def _json(author: str, pairs: PairList, scene: Scene, cutoff: float, checks: lis
     return json.dumps(report, indent=2)
 
 
-def _text(author: str, pairs: PairList, scene: Scene, cutoff: float, checks: list[Check]) -> str:
+def _text(author: str, pairs: PairList, scene: Scene, cutoff: Any, checks: list[Check]) -> str:
     rule = "d <= cutoff" if pairs.inclusive else "d < cutoff"
     kind = "both directions of each pair" if pairs.full else "each pair once"
     n = len(scene.points)
     lines = [
         *describe_points(scene),
         ("list of", author),
-        ("cutoff", f"{cutoff:.6g}{unit_suffix(scene)}   ({rule})"),
+        ("cutoff", f"{shown_cutoff(cutoff, scene)}   ({rule})"),
         ("rows", f"{len(pairs.i):,}   ({kind})"),
     ]
     for check in checks:
@@ -315,15 +316,23 @@ def _text(author: str, pairs: PairList, scene: Scene, cutoff: float, checks: lis
             line = f"  {name}: i={i} j={j}"
             if pairs.S is not None:
                 excess = _excess(scene, cutoff, i, j, shift)
-                line += f" S={shift}   distance - cutoff = {excess:+.3e}"
+                line += f" S={shift}   " + (
+                    "these elements form no pairs" if excess is None
+                    else f"distance - cutoff = {excess:+.3e}"
+                )  # fmt: skip
             text.append(line)
         if len(found) > EXAMPLES:
             text.append(f"  {name}: and {len(found) - EXAMPLES:,} more")
     return "\n".join(map(printable, text))
 
 
-def _excess(scene: Scene, cutoff: float, i: int, j: int, shift: list[int]) -> Decimal:
+def _excess(scene: Scene, cutoff: Any, i: int, j: int, shift: list[int]) -> Decimal | None:
     """Return distance - cutoff of a pair, from exact arithmetic, never 0 unless it is 0."""
+    if isinstance(cutoff, dict):
+        types, table = _types_of(scene, cutoff)
+        cutoff = table[types[i]][types[j]]
+        if cutoff < 0.0:
+            return None
     square = exact_square(scene.points, i, j, shift, scene.box)
     above = square - Fraction(cutoff) ** 2
     with localcontext() as context:

@@ -21,6 +21,7 @@ from halfshell._convert.foreign import (
     told,
 )
 from halfshell._convert.memory import refuse_large
+from halfshell._errors import brief
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 _BIGGEST_INTEGER = 2**53  # from here on float64 does not hold every integer
 
 
+@brief
 def as_real_array(
     values: Any,
     name: str,
@@ -70,6 +72,7 @@ def as_real_array(
     raise TypeError(f"{name} must {must}, got dtype {array.dtype}")
 
 
+@brief
 def as_array(values: Any, name: str, single: str = "hold real numbers") -> npt.NDArray[Any]:
     """An array of whatever dtype; TypeError or ValueError, with the name, if there is none.
 

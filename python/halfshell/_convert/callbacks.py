@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from halfshell._convert.foreign import kind_of, shown, told, whole_number
+from halfshell._convert.foreign import is_a, kind_of, shown, told, whole_number
 
 EXPECTED = "int (int64_t i, int64_t j, const int32_t *S, const double *D, double d2, void *user)"
 
@@ -53,13 +53,13 @@ class Target:
 
 def target_of(callback: Any, user_data: Any) -> Target:
     """TypeError for what cannot be called, or would be called with the wrong arguments."""
-    if isinstance(callback, tuple) and _is_from(callback, "scipy"):
+    if is_a(callback, tuple) and _is_from(callback, "scipy"):
         return _of_low_level(callback, user_data)
     user, keeps = _address_of_data(user_data)
     if _is_from(callback, "numba") and hasattr(callback, "_sig") and hasattr(callback, "address"):
         _check([str(callback._sig.return_type), *map(str, callback._sig.args)])
         return Target(_checked_address(callback.address), user, keeps)
-    if isinstance(callback, CFuncPtr):
+    if is_a(callback, CFuncPtr):
         return Target(_address_of_ctypes(callback), user, keeps)
     if _is_from(callback, "_cffi_backend"):
         function = _address_of_cffi(callback)
@@ -179,14 +179,14 @@ def _address_of_data(user_data: Any) -> tuple[int, object]:
     """The address, and what must stay alive for it to be valid."""
     if user_data is None:
         return 0, None
-    if isinstance(user_data, (int, np.integer)) and not isinstance(user_data, bool):
+    if is_a(user_data, (int, np.integer)) and not is_a(user_data, bool):
         address = whole_number(user_data, "user_data")
         if address is None:
             raise TypeError(f"user_data must be an address, got {kind_of(user_data)}")
         if not 0 <= address <= _MOST_ADDRESS:
             raise ValueError(f"user_data must be an address, got {shown(address)}")
         return address, None
-    if isinstance(user_data, (ctypes.c_void_p, ctypes._Pointer, ctypes.c_char_p)):
+    if is_a(user_data, (ctypes.c_void_p, ctypes._Pointer, ctypes.c_char_p)):
         return ctypes.cast(user_data, ctypes.c_void_p).value or 0, user_data
     if _is_from(user_data, "_cffi_backend"):
         return int(_cffi().cast("uintptr_t", user_data)), user_data

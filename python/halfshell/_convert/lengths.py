@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from halfshell._convert.arrays import as_real_array
-from halfshell._convert.foreign import is_a
+from halfshell._convert.foreign import is_a, shown
 from halfshell._convert.memory import refuse_large, refuse_unavailable
+from halfshell._errors import brief
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 _EDGE_COPIES = 4
 
 
+@brief
 def as_number(value: Any, name: str, single: str = "be a number") -> float:
     """A plain number; anything that float64 would have to round is refused."""
     if is_a(value, float):
@@ -97,20 +99,20 @@ def as_radii(value: Any, n: int) -> float | FloatArray | None:
     return array
 
 
-def as_edges(values: npt.ArrayLike) -> FloatArray:
+def as_edges(values: npt.ArrayLike, name: str = "edges") -> FloatArray:
     """Two or more limits of bins: finite, not negative, not descending."""
 
     def check(shape: tuple[int, ...]) -> None:
         if len(shape) != 1 or shape[0] < 2:
             raise ValueError(
-                f"edges must have shape (bins + 1,), with one bin at least, got {shape}"
+                f"{name} must have shape (bins + 1,), with one bin at least, got {shape}"
             )
 
-    array = as_real_array(values, "edges", check_shape=check)
-    refuse_unavailable(_EDGE_COPIES * 8 * len(array), f"edges of shape {array.shape}")
+    array = as_real_array(values, name, check_shape=check)
+    refuse_unavailable(_EDGE_COPIES * 8 * len(array), f"{name} of shape {array.shape}")
     array = array.astype(np.float64)
-    check_lengths(array, "edges")
-    check_ascending(array, "edges", "edges")
+    check_lengths(array, name)
+    check_ascending(array, name, name)
     return np.ascontiguousarray(array)
 
 
@@ -138,6 +140,6 @@ def as_length(value: float, name: str) -> float:
 
 def as_skin(value: Any) -> float:
     """A plain number, or "auto", which is no number and is settled before."""
-    if isinstance(value, str):
-        raise ValueError(f'skin must be a number or "auto", got {value!r}')
+    if is_a(value, str):
+        raise ValueError(f'skin must be a number or "auto", got {shown(value)}')
     return as_length(as_number(value, "skin", 'be a number or "auto"'), "skin")

@@ -9,7 +9,8 @@ import numpy as np
 
 from halfshell import _core
 from halfshell._convert.arrays import as_array
-from halfshell._convert.foreign import exact_number, is_a, kind_of, shown
+from halfshell._convert.foreign import exact_number, is_a, kind_of, shown, told
+from halfshell._convert.memory import refuse_large
 from halfshell._unknown import nearest_word
 
 # The default of `algorithm`: what is this string itself needs no conversion.
@@ -21,12 +22,10 @@ LETTERS = "ijdDSP"
 #: That of shells, which needs several cutoffs.
 SHELL = "k"
 
-# The same of `on_overflow`.
-RAISE = "raise"
-
 # Blocks are counted by int64, and two of them must be.
 _MOST_PAIRS = 2**62
 _MOST_BRICKS = 2**20
+_BYTES_OF_A_VIEW = 100
 
 
 def kernels() -> list[str]:
@@ -79,51 +78,56 @@ def most_pairs(max_pairs: Any) -> int:
     return min(as_count(max_pairs, "max_pairs"), _MOST_PAIRS)
 
 
-def as_room(capacity: Any, on_overflow: Any, out: Any) -> int | None:
-    """The length of the arrays, negative where the need is returned; None for as many as needed."""
-    flags = as_choice(on_overflow, "on_overflow", (RAISE, "flag")) == "flag"
-    if capacity is None:
-        if flags:
-            raise ValueError("on_overflow='flag' needs a capacity")
-        return None
-    length = min(as_count(capacity, "capacity"), _MOST_PAIRS)
-    if out is not None:
-        raise ValueError("capacity and out are two ways to say where the result goes: give one")
-    return -length if flags else length
-
-
 def as_list(value: Any, name: str, of_what: str) -> list[Any]:
     """What a sequence has."""
-    if not hasattr(type(value), "__iter__"):
+    if is_a(value, memoryview):
+        value = as_array(value, name)
+    is_array = is_a(value, np.ndarray)
+    if (
+        not hasattr(type(value), "__iter__")
+        or is_a(value, (str, bytes, dict))
+        or (is_array and not value.ndim)
+    ):
         raise TypeError(f"{name} must be a sequence of {of_what}, got {kind_of(value)}")
-    return list(as_array(value, name) if is_a(value, memoryview) else value)
+    if is_array:
+        refuse_large(_BYTES_OF_A_VIEW * len(value), value, name)
+    try:
+        return list(value)
+    except MemoryError as error:
+        raise MemoryError(f"{name} cannot be made a list: too many items") from error
+    except Exception as error:
+        raise TypeError(
+            f"{name} cannot be read: {kind_of(value)} raised {kind_of(error)}: {told(error)}"
+        ) from error
 
 
 def as_choice(value: Any, name: str, choices: tuple[str, ...]) -> str:
     """One of some words."""
-    if not isinstance(value, str):
+    if not is_a(value, str):
         raise TypeError(f"{name} must be a string, got {kind_of(value)}")
+    value = str.__str__(value)  # what it is, whatever it says
     if value not in choices:
         few = len(choices) <= 2
         words = " or ".join(map(repr, choices)) if few else f"one of {' '.join(choices)}"
         meant = nearest_word(value, choices)
         hint = f": did you mean {meant!r}?" if meant else ""
         raise ValueError(f"{name} must be {words}, got {shown(value)}{hint}")
-    return value
+    return str(value)
 
 
-def are_letters(text: str) -> bool:
+def are_letters(text: str, letters: str = LETTERS) -> bool:
     """Whether these are some of the letters of quantities, each at most once."""
-    return bool(text) and set(text) <= set(LETTERS) and len(set(text)) == len(text)
+    return bool(text) and set(text) <= set(letters) and len(set(text)) == len(text)
 
 
-def check_letters(quantities: Any) -> None:
-    """Raise unless these are some of the letters that `pairs` knows, each at most once."""
-    if not isinstance(quantities, str):
+def check_letters(quantities: Any, letters: str = LETTERS) -> None:
+    """Raise unless these are some of the letters, those of `pairs`, each at most once."""
+    if not is_a(quantities, str):
         raise TypeError(f"quantities must be a string, got {kind_of(quantities)}")
-    if not are_letters(quantities):
+    quantities = str.__str__(quantities)
+    if not are_letters(quantities, letters):
         raise ValueError(
-            f"quantities must be some of the letters {' '.join(LETTERS)}, each at most once, got "
+            f"quantities must be some of the letters {' '.join(letters)}, each at most once, got "
             f"{shown(quantities)}"
         )
 

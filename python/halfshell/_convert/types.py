@@ -113,91 +113,71 @@ class _HasDimensions(Protocol):
     def triclinic_dimensions(self) -> Any: ...
 
 
+class _IsPoints(Protocol):
+    """`Points`, which import this module."""
+
+    @property
+    def n_systems(self) -> int: ...
+
+
+class _KeepsCells(Protocol):
+    """A `CellList`."""
+
+    @property
+    def cell_start(self) -> Any: ...
+
+
 Number = float | np.floating[Any] | np.integer[Any]
 ArrayLike = npt.ArrayLike | _HandsOver
-PointsLike = ArrayLike | _BringsBox | _HasAtoms
-# A cutoff; one for each pair of types; none but what radii say.
-PairCutoff = (
+OnePoints = ArrayLike | _IsPoints | _BringsBox | _HasAtoms | _KeepsCells
+PointsLike = OnePoints | Sequence[OnePoints]
+# A cutoff; several, or one for each system; one for each pair of types; none but what radii say.
+CutoffLike = (
     Number | Sequence[float] | Sequence[Sequence[float]] | npt.NDArray[Any]
     | Mapping[tuple[int, int], float] | Mapping[tuple[str, str], float] | None
 )  # fmt: skip
 BoxLike = ArrayLike | _HasVectors | _HasMatrix | _HasCells | _HasDimensions
 PeriodicLike = ArrayLike
+ProgressLike = Callable[[float], object] | bool | None
 Out = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
 
 
-class SearchOptions(TypedDict, total=False):
+class Options(TypedDict, total=False):
     """For overloads: the keywords that all searches share."""
 
     box: BoxLike | None
     periodic: PeriodicLike | None
-    inclusive: bool
-    precision: Precision
-    algorithm: Algorithm
-    kernel: str | None
-    threads: int | None
-    memory_limit: float | None
-
-
-class ReachOptions(SearchOptions, total=False):
-    """The same, and a reach for each pair of one set."""
-
-    radii: ArrayLike | None
     rule: Rule | None
-    types: npt.ArrayLike | None
-    supports: ArrayLike | None
-    extent: float | None
-    groups: npt.ArrayLike | None
-    exclude: npt.ArrayLike | None
-    exclude_within: int | None
+    exclude: ArrayLike | int | None
     min_distance: float | None
+    inclusive: bool
+    threads: int | None
+    progress: ProgressLike
 
 
-class PairOptions(ReachOptions, total=False):
-    """Of `pairs`, without `quantities`."""
+class OptionsOfPoints(Options, total=False):
+    """The same, of searches that take some of the points."""
 
-    sort: bool
-    index_dtype: npt.DTypeLike
-    out: Out | None
-    capacity: int | None
-    progress: Progress | bool
-    batch: npt.ArrayLike | None
-    touching: npt.ArrayLike | None
+    indices: npt.ArrayLike | None
 
 
-class BetweenOptions(ReachOptions, total=False):
-    """Of `pairs_between`, without `quantities`."""
-
-    query_radii: ArrayLike | None
-    query_types: npt.ArrayLike | None
-    query_supports: ArrayLike | None
-    query_groups: npt.ArrayLike | None
-    query_exclude: npt.ArrayLike | None
-    index_dtype: npt.DTypeLike
-    out: Out | None
-    capacity: int | None
-    batch: npt.ArrayLike | None
-    query_batch: npt.ArrayLike | None
-
-
-class CountOptions(SearchOptions, total=False):
-    """Of `count_pairs`, without those that its type depends on."""
+class CountOptions(OptionsOfPoints, total=False):
+    """The same of `count_pairs`."""
 
     queries: PointsLike | None
-    radii: ArrayLike | None
-    query_radii: ArrayLike | None
-    rule: Rule | None
-    query_types: npt.ArrayLike | None
-    supports: ArrayLike | None
-    query_supports: ArrayLike | None
-    extent: float | None
-    groups: npt.ArrayLike | None
-    query_groups: npt.ArrayLike | None
-    exclude: npt.ArrayLike | None
-    query_exclude: npt.ArrayLike | None
-    exclude_within: int | None
-    min_distance: float | None
-    batch: None
+
+
+class NearestOptions(TypedDict, total=False):
+    """Of `nearest`, without `quantities`."""
+
+    max_distance: ArrayLike
+    queries: PointsLike | None
+    box: BoxLike | None
+    periodic: PeriodicLike | None
+    indices: npt.ArrayLike | None
+    index_dtype: npt.DTypeLike
+    threads: int | None
+    progress: ProgressLike
 
 
 Block = TypeVar("Block", covariant=True)

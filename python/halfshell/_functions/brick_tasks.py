@@ -15,13 +15,23 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell._convert.arrays import as_real_array
-from halfshell._functions.brick_pieces import Numbers, Part, Piece, split
-from halfshell._functions.brick_plan import Division, Summary, renumbered, summary
+from halfshell._convert.points import Points
+from halfshell._functions.bricks import (
+    Division,
+    Part,
+    Piece,
+    Summary,
+    renumbered,
+    split,
+    summary,
+)
 from halfshell._objects.brick import Brick, Bricks
 from halfshell._objects.neighbor_table import NeighborTable
+from halfshell._settings import settings
 
 Array = npt.NDArray[Any]
 Group = tuple[Array, ...]
+Known = dict[str, Any]  # what else is known of the points of a chunk
 
 
 def of_columns(frame: Any, dtype: np.dtype[Any]) -> Array:
@@ -32,8 +42,8 @@ def of_columns(frame: Any, dtype: np.dtype[Any]) -> Array:
     return array
 
 
-def of_chunk(chunk: Any, ndim: int, dtype: np.dtype[Any], place: int) -> Array:
-    """The coordinates of a chunk, if it is what the whole was said to be."""
+def of_chunk(chunk: Any, ndim: int, dtype: np.dtype[Any], place: int, known: Known) -> Points:
+    """The points of a chunk, if it is what the whole was said to be."""
     array = np.asanyarray(chunk)
     if array.ndim != 2 or array.shape[1] != ndim:
         raise ValueError(
@@ -44,22 +54,25 @@ def of_chunk(chunk: Any, ndim: int, dtype: np.dtype[Any], place: int) -> Array:
             f"points must be of {dtype} in every chunk, as the whole says; chunk {place} is of "
             f"{array.dtype}"
         )
-    return as_real_array(array, "points")
+    return Points(array, **known) if known else Points._of(array)
 
 
-def summary_of(chunk: Any, ndim: int, dtype: np.dtype[Any], place: int, n_chunks: int) -> Summary:
-    """What a division must know of a chunk; what is wrong with its coordinates is a part of it."""
+def summary_of(
+    chunk: Any, ndim: int, dtype: np.dtype[Any], place: int, known: Known, n_chunks: int
+) -> Summary:
+    """What a division must know of a chunk; what is wrong with its points is a part of it."""
     try:
-        return summary(of_chunk(chunk, ndim, dtype, place), n_chunks)
+        return summary(of_chunk(chunk, ndim, dtype, place, known), n_chunks)
     except (ValueError, OverflowError) as error:
-        return Summary(len(chunk) if np.ndim(chunk) else 0, 0.0, np.empty((0, ndim)), 1.0, error)
+        n_points = len(chunk) if np.ndim(chunk) else 0
+        return Summary(n_points, 0.0, np.empty((0, ndim)), 1.0, error=error)
 
 
 def pieces_of(
-    chunk: Any, ndim: int, dtype: np.dtype[Any], place: int, division: Division
+    chunk: Any, ndim: int, dtype: np.dtype[Any], place: int, known: Known, division: Division
 ) -> list[Piece]:
     """What a chunk gives to each brick."""
-    return split(of_chunk(chunk, ndim, dtype, place), division, place)
+    return split(of_chunk(chunk, ndim, dtype, place, known), division, place)
 
 
 def brick_of(part: Part) -> Brick:
@@ -68,57 +81,59 @@ def brick_of(part: Part) -> Brick:
 
 def bricks_of(division: Division, *made: Brick) -> Bricks:
     """All bricks."""
-    return Bricks(made, division.n_points)
+    return Bricks(made, division.scope.n_points)
 
 
-def pairs_of(part: Part, quantities: str, options: dict[str, Any]) -> tuple[Group, ...]:
+def pairs_of(part: Part, how: dict[str, Any], options: dict[str, Any]) -> tuple[Group, ...]:
     """One group: i, and a column for each letter."""
+    quantities = options["quantities"]
     letters = "i" + quantities.replace("i", "")
     brick, points = part.in_order()
-    with _numbered(lambda: brick.members):
-        found = brick.pairs(points, quantities=letters, **options)
+    with settings(**how), _numbered(brick.members):
+        found = brick.pairs(points, **{**options, "quantities": letters})
     arrays = list(found) if isinstance(found, tuple) else [found]
     columns = dict(zip(letters, arrays, strict=True))
     return ((arrays[0], *(columns[letter] for letter in quantities)),)
 
 
-def neighbors_of(part: Part, quantities: str, options: dict[str, Any]) -> tuple[Group, ...]:
+def neighbors_of(part: Part, how: dict[str, Any], options: dict[str, Any]) -> tuple[Group, ...]:
     """Two groups: points and how many neighbours they have; point and columns of each neighbour."""
     brick, points = part.in_order()
-    with _numbered(lambda: brick.members):
-        table = brick.neighbors(points, quantities=quantities, **options)
+    with settings(**how), _numbered(brick.members):
+        table = brick.neighbors(points, **options)
     names = {"j": "indices", "d": "distances", "D": "vectors", "S": "shifts"}
     owned, counts = brick.owned, np.asarray(table.counts, np.int64)
-    columns = [getattr(table, names[letter]) for letter in quantities]
+    columns = [getattr(table, names[letter]) for letter in options["quantities"]]
     return (owned, counts), (np.repeat(owned, counts), *columns)
 
 
-def coordination_of(part: Part, scene: Any, options: dict[str, Any]) -> tuple[Group, ...]:
+def coordination_of(part: Part, how: dict[str, Any], options: dict[str, Any]) -> tuple[Group, ...]:
     """One group: points, and how many neighbours they have."""
     import halfshell as hs
 
     brick, points = part.in_order()
-    with _numbered(lambda: brick.members):
-        of_all = hs.coordination(points, brick.cutoff, **scene, **options)
+    options = {**options, "exclude": brick._excluded(options.get("exclude"))}
+    with settings(**how), _numbered(brick.members):
+        of_all = hs.coordination(points, brick.cutoff, rule=part.scope.rule, **options)
     return ((brick.owned, of_all[brick.is_owned]),)
 
 
-def counts_of(part: Part, cutoff: Any, scene: Any, options: dict[str, Any]) -> Any:
+def counts_of(part: Part, how: dict[str, Any], cutoff: Any, options: dict[str, Any]) -> Any:
     """Pairs of owned points, and of these with points of later bricks."""
     import halfshell as hs
 
+    rule = part.scope.rule
     return _own(
-        part, lambda points, **more: hs.count_pairs(points, cutoff, **more, **scene, **options)
-    )
+        part, how, options,
+        lambda points, **more: hs.count_pairs(points, cutoff, rule=rule, **more),
+    )  # fmt: skip
 
 
-def histogram_of(part: Part, edges: Any, scene: Any, options: dict[str, Any]) -> Any:
+def histogram_of(part: Part, how: dict[str, Any], edges: Any, options: dict[str, Any]) -> Any:
     """As `counts_of`, in each bin."""
     import halfshell as hs
 
-    return _own(
-        part, lambda points, **more: hs.pair_histogram(points, edges, **more, **scene, **options)
-    )
+    return _own(part, how, options, lambda points, **more: hs.pair_histogram(points, edges, **more))
 
 
 def total(*counts: Any) -> Any:
@@ -128,7 +143,7 @@ def total(*counts: Any) -> Any:
 
 def cut(groups: Sequence[Group], division: Division, n: int) -> list[list[Group]]:
     """What belongs to each of n ranges of points, of equal length but for one."""
-    n_points = division.n_points
+    n_points = division.scope.n_points
     limits = np.array([n_points * k // n for k in range(n + 1)], np.int64)
     places = [np.searchsorted(group[0], limits) for group in groups]
     return [
@@ -153,38 +168,54 @@ def merged(*cuts: Sequence[Group]) -> list[Group]:
     return whole
 
 
-def table_of(quantities: str, division: Division, *found: Sequence[Group]) -> NeighborTable:
+def table_of(
+    quantities: str, is_full: bool, division: Division, *found: Sequence[Group]
+) -> NeighborTable:
     """The rows of all points, ascending, from what `neighbors_of` returns for each brick."""
     (_, counts), (_, *columns) = merged(*found)
     offsets = np.concatenate((np.zeros(1, np.int64), np.cumsum(counts, dtype=np.int64)))
-    return NeighborTable((offsets, *columns), quantities, division.n_points, False)
+    return NeighborTable((offsets, *columns), quantities, division.scope.n_points, is_full)
 
 
-def _own(part: Part, count: Callable[..., Any]) -> Any:
+def _own(
+    part: Part, how: dict[str, Any], options: dict[str, Any], count: Callable[..., Any]
+) -> Any:
     """What is counted of owned points, and of these with points of later bricks.
 
-    That is what is counted of both less that of the latter alone; where these are many, it is
-    counted as it is said, which takes two walks.
+    That is what is counted of both less that of the latter alone. Where these are many, it is
+    counted as it is said, which takes two walks; but not where pairs are excluded, which depends on
+    the order of the points.
     """
     n_owned, n_later, _ = part.sizes
-    points = part.points[: n_owned + n_later]
-    own, later = points[:n_owned], points[n_owned:]
-    if n_later <= n_owned:
+    both, later = slice(n_owned + n_later), slice(n_owned, n_owned + n_later)
+    with settings(**how):
+        if options.get("exclude") is not None:
+            numbers = part.numbers()[both]
+            order = np.argsort(numbers)
+            found = []
+            for rows in (order, order[order >= n_owned]):
+                named = Brick(numbers[rows], np.ones(len(rows), bool), part.scope)
+                exclude = named._excluded(options["exclude"])
+                with _numbered(named.members):
+                    found.append(count(part.points(rows), **{**options, "exclude": exclude}))
+            return found[0] - found[1]
+        if n_later <= n_owned:
+            with _numbered(part.numbers):
+                return count(part.points(both), **options) - count(part.points(later), **options)
+        own = part.points(slice(n_owned))
         with _numbered(part.numbers):
-            return count(points) - count(later)
-    with _numbered(part.numbers):
-        inner = count(own)
-    with _numbered(lambda: part.numbers()[n_owned:], part.numbers):
-        return inner + count(later, queries=own)
+            inner = count(own, **options)
+        with _numbered(lambda: part.numbers()[n_owned:], part.numbers):
+            return inner + count(part.points(later), queries=own, **options)
 
 
 @contextmanager
 def _numbered(
-    points: Callable[[], Numbers], queries: Callable[[], Numbers] | None = None
+    points: Array | Callable[[], Array], queries: Callable[[], Array] | None = None
 ) -> Iterator[None]:
     """Errors name points by their numbers among all points."""
     try:
         yield
     except (ValueError, OverflowError) as error:
-        names = {"points": points} if queries is None else {"points": points, "queries": queries}
-        raise renumbered(error, **{name: find() for name, find in names.items()}) from None
+        numbers = points() if callable(points) else points
+        raise renumbered(error, numbers, None if queries is None else queries()) from None

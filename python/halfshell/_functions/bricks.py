@@ -1,50 +1,66 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`bricks`: which points each part owns, and which it needs besides."""
+"""`bricks`: which points each part owns, and which it needs besides; of points in pieces, too.
+
+Points in pieces, none of which sees the others, are divided by what each piece says of itself in a
+`Summary`. Any cuts are right: a sample of the points only makes bricks of about equal size.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import Never
+import math
+import re
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple, Never, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.lengths import as_cutoff
+from halfshell._convert.call import Call, take
+from halfshell._convert.foreign import is_a
 from halfshell._convert.options import as_brick_count
-from halfshell._convert.scene import as_scene
-from halfshell._convert.types import BoxLike, FloatArray, Number, PeriodicLike, PointsLike
-from halfshell._functions.brick_places import Axes, axes_of, within
-from halfshell._objects.brick import Brick, Bricks
+from halfshell._convert.points import Points
+from halfshell._convert.types import BoxLike, CutoffLike, FloatArray, PeriodicLike, PointsLike, Rule
+from halfshell._objects.brick import Brick, Bricks, Columns, Numbers, Scope, aligned, labels_of
+from halfshell._search import document
 from halfshell._unknown import refuse_unknown
 
-_Numbers = npt.NDArray[np.int64]
+#: What may be known of each point that bricks go by.
+FIELDS = ("radii", "types", "supports", "groups", "labels")
+
+Array = npt.NDArray[Any]
+Bits = npt.NDArray[np.bool_]
+
+#: Points of each piece, and of all pieces, by which bricks are cut: not many more than these.
+_SAMPLE, _SAMPLES = 1 << 13, 1 << 22
+#: Points whose places along the axes stay in a cache.
+_TILE = 1 << 16
+#: Of what the smallest eigenvalue may be wrong by, in units of the norm.
+_UNSURE = 256.0 * np.finfo(np.float64).eps
 
 
 def bricks(
     points: PointsLike,
-    cutoff: Number,
+    cutoff: CutoffLike,
     n: int,
     *,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
+    rule: Rule | None = None,
     **unknown: Never,
 ) -> Bricks:
     """Divide points into bricks for other threads or machines; their pairs are always exact.
 
     Parameters
     ----------
-    points : array_like of float, shape (n_points, d)
-        Coordinates, as in `pairs`.
-    cutoff : float
-        Largest distance of a pair, in the unit of `points`; finite, not negative. It may be larger
-        than a brick, and than the box: bricks then need many other points, as `Bricks.overhead`
-        tells beforehand.
+    points : array_like of float, shape (n_points, d), or Points
+        As in `pairs`; radii, types, supports, groups and labels are those of the same points later.
+    {cutoff}
     n : int
         Number of bricks, 1 to 2**20. The numbers of points that they own differ by at most 1; with
         more bricks than points some own none.
-    box, periodic
-        As in `pairs`.
+    {box, periodic, rule}
 
     Returns
     -------
@@ -55,7 +71,8 @@ def bricks(
     Raises
     ------
     TypeError, ValueError, OverflowError
-        As `pairs`; ValueError also if `n` is not from 1 to 2**20.
+        As `pairs`; ValueError also if `n` is not from 1 to 2**20, and for a batch, whose systems
+        are apart already.
 
     See Also
     --------
@@ -66,9 +83,9 @@ def bricks(
     Points are halved again and again across their longest side [1]_, so that bricks follow the
     points, even in clusters, and not the volume. The points that a brick needs are found from the
     range of its points along each vector of a short basis of the box, or open axis, widened by the
-    cutoff and a bound on rounding, however long, short or skewed the box is. Each
-    brick is searched with the whole box and the points as given: its decisions and shifts are
-    those of a single search of all points.
+    largest distance of any pair and a bound on rounding, however long, short or skewed the box is.
+    `Bricks.overhead` tells beforehand how many they are. Each brick is searched with the whole box
+    and the points as given: its decisions and shifts are those of a single search of all points.
 
     References
     ----------
@@ -90,30 +107,36 @@ def bricks(
     """
     if unknown:
         refuse_unknown(bricks, unknown)
-    array, vectors, bits = as_scene(points, box, periodic)
-    largest, n_bricks = as_cutoff(cutoff), as_brick_count(n)
-    rest = (vectors, bits, False, "exact", None, None, None, 1, None, "auto")
+    call = take(points, cutoff, None, box, periodic, rule, directed=True)
+    call.refuse("bricks", batch="its systems are apart already")
+    n_bricks, array = as_brick_count(n), call.array
+    largest = float(max(array.max(initial=0.0), -array.min(initial=0.0)))
+    scope = _scope(call, cutoff, {k: v.names for k, v in labels_of(call.points).items()},
+                   len(array), _widest(call.points))  # fmt: skip
+    rest = (call.vectors, call.bits, False, "exact", None, None, None, 1, None, "auto")
+    if call.reach is None:
+        _core.count_pairs(array[:0], call.cutoff, *rest)
     try:  # refuses what a search would refuse, at the price of a search with the cutoff 0
         _core.count_pairs(array, 0.0, *rest)
     except ValueError:  # which needs more of a box than a larger cutoff
-        _core.count_pairs(array, largest, *rest)
-    n_points, ndim = array.shape
-    flags = tuple(bool(bits >> k & 1) for k in range(ndim))
-    largest_of_all = max(array.max(initial=0.0), -array.min(initial=0.0))
-    axes = axes_of(vectors, flags, largest, float(largest_of_all))
+        _core.count_pairs(array, min(scope.reach, sys.float_info.max), *rest)
+    axes = axes_of(scope, array.shape[1], largest)
     places = axes.places(array)
-    every, is_owned = np.arange(n_points), np.zeros(n_points, bool)
+    every, is_owned = np.arange(len(array)), np.zeros(len(array), bool)
     made = []
     for owned, members in _halved(places, axes, every, every, n_bricks):
         is_owned[owned] = True
-        made.append(Brick(members, is_owned[members], n_points, largest, (vectors, flags)))
+        made.append(Brick(members, is_owned[members], scope))
         is_owned[owned] = False
-    return Bricks(made, n_points)
+    return Bricks(made, len(array))
+
+
+document(bricks)
 
 
 def _halved(
-    places: FloatArray, axes: Axes, owned: _Numbers, near: _Numbers, n: int
-) -> Iterator[tuple[_Numbers, _Numbers]]:
+    places: FloatArray, axes: Axes, owned: Numbers, near: Numbers, n: int
+) -> Iterator[tuple[Numbers, Numbers]]:
     """Owned points in n parts, cut across their longest side, each with all that it may need."""
     if n == 1:
         yield owned, _near(places, axes, owned, near, range(len(places)))
@@ -128,14 +151,379 @@ def _halved(
 
 
 def _near(
-    places: FloatArray, axes: Axes, owned: _Numbers, numbers: _Numbers, along: Iterable[int]
-) -> _Numbers:
+    places: FloatArray, axes: Axes, owned: Numbers, numbers: Numbers, along: Iterable[int]
+) -> Numbers:
     """Of these points, those within reach of the range of the owned ones, along some axes."""
     if len(owned) == 0:
         return owned
     for axis in along:
         own, reach = places[axis][owned], axes.reach[axis]
         low, high = float(own.min()) - reach, float(own.max()) + reach
-        near = within(places[axis].take(numbers), low, high, axes.repeats[axis])
+        near = _within(places[axis].take(numbers), low, high, axes.repeats[axis])
         numbers = numbers.take(np.flatnonzero(near))  # quicker than numbers[near]
     return numbers
+
+
+# ---- how far pairs reach, and where points are ---------------------------------------------
+
+
+def _scope(
+    call: Call, cutoff: Any, names: dict[str, tuple[str, ...] | None], n: int, widest: float
+) -> Scope:
+    """What bricks are searched with. widest: the most that `_widest` is."""
+    reach = call.cutoff
+    if call.reach is not None:
+        rule, radii, extent = call.reach[0], call.reach[1], call.reach[8]
+        if extent is not None:
+            reach = extent * widest * (1.0 + 1e-12) if extent > 0.0 else 0.0
+        elif radii is not None:
+            reach = min(reach, 2.0 * widest if rule == 0 else widest)
+        else:
+            lengths = cutoff.values() if is_a(cutoff, Mapping) else np.ravel(cutoff)
+            reach = max([0.0, *map(float, lengths)])
+    kept: Any = call.cutoff
+    if is_a(cutoff, Mapping):
+        kept = dict(cutoff)
+    elif call.reach is not None:
+        kept = None if cutoff is None else np.array(cutoff, np.float64)
+    box = None if call.vectors is None else call.vectors.copy()
+    return Scope(n, kept, cast("Rule", call.rule), reach, box, call.bits, names)
+
+
+def _widest(points: Points) -> float:
+    """The largest radius; or by how much a vector may be longer than ``supports @ vector``."""
+    if points.radii is not None:
+        return float(points.radii.max(initial=0.0))
+    if points.supports is None or not len(points):
+        return 0.0
+    with np.errstate(over="ignore", invalid="ignore"):
+        norms = np.abs(points.supports).sum(axis=2).max(axis=1)
+        values = np.abs(np.linalg.eigvalsh(points.supports)).min(axis=1)
+        least = (values - _UNSURE * norms).min()
+        return float(1.0 / least) if least > 0.0 else math.inf  # also of what is no number
+
+
+class Axes(NamedTuple):
+    """What the core says of the axes of a box, which are not those of the box vectors."""
+
+    scene: tuple[FloatArray | None, int, float, float]  # box, periodic bits, cutoff, largest
+    repeats: tuple[bool, ...]  # places are from 0 to 1
+    reach: tuple[float, ...]  # how far places of a pair can be apart: infinite where unknown
+    widths: FloatArray  # what one unit of an axis is in a common unit
+
+    def places(self, points: Array) -> FloatArray:
+        """Places of shape (d, n), 0 along axes where the reach is infinite."""
+        return _places(points, self.scene)[0]
+
+
+def axes_of(scope: Scope, ndim: int, largest: float) -> Axes:
+    """Axes of a box, for coordinates up to `largest`."""
+    scene = (scope.box, scope.axes, min(scope.reach, sys.float_info.max), largest)
+    _, repeats, reach, widths = _places(np.empty((0, ndim)), scene)
+    if math.isinf(scope.reach):
+        reach = (math.inf,) * ndim
+    return Axes(scene, repeats, reach, np.array(widths))
+
+
+def _places(
+    points: Array, scene: tuple[FloatArray | None, int, float, float]
+) -> tuple[FloatArray, tuple[bool, ...], tuple[float, ...], tuple[float, ...]]:
+    box, periodic, cutoff, largest = scene
+    given = None if box is None else aligned(box)
+    return _core.box_places(aligned(points), given, periodic, cutoff, largest)
+
+
+def _within(places: FloatArray, low: float, high: float, repeats: bool) -> Bits:
+    """Which places are in a range, which may go on from the other side of an axis that repeats."""
+    if not repeats:
+        return (places >= low) & (places <= high)
+    if not high - low < 1.0:
+        return np.ones(len(places), bool)
+    turns = math.floor(low)
+    low, high = low - turns, high - turns
+    if high < 1.0:
+        return (places >= low) & (places <= high)
+    return (places >= low) | (places <= high - 1.0)
+
+
+# ---- where to cut points that are in pieces ------------------------------------------------
+
+
+class Summary(NamedTuple):
+    """What a division must know of a piece."""
+
+    n_points: int
+    largest: float  # of the coordinates, without signs
+    sample: Array  # of shape (k, d)
+    weight: float  # how many points each of the sample stands for
+    widest: float = 0.0  # how far its radii or supports reach
+    #: Of types, groups and labels that are known; None for numbers.
+    names: dict[str, tuple[str, ...] | None] = {}  # noqa: RUF012 - nothing writes to it
+    error: Exception | None = None  # why the piece cannot be searched
+
+
+class Cut(NamedTuple):
+    """A range along an axis that is cut in two, and what its parts are: bricks or cuts."""
+
+    axis: int
+    low: float
+    at: float
+    high: float
+    below: Cut | int
+    above: Cut | int
+
+
+class Division(NamedTuple):
+    """Where bricks are cut, and where the numbers of each piece begin."""
+
+    cuts: Cut | int
+    n_bricks: int
+    axes: Axes
+    firsts: tuple[int, ...]
+    scope: Scope
+
+
+class Terms(NamedTuple):
+    """What points in pieces will be searched with, known before they are."""
+
+    cutoff: Any
+    rule: Rule | None
+    box: FloatArray | None
+    periodic: tuple[bool, ...] | None
+    ndim: int
+    fields: tuple[str, ...]  # that are known of each point, in order
+
+    def of_none(self) -> Points:
+        """No points, of which the same is known."""
+        empty = {
+            name: np.empty((0, self.ndim, self.ndim) if name == "supports" else 0,
+                           np.float64 if name in ("supports", "radii") else np.int64)
+            for name in self.fields
+        }  # fmt: skip
+        return Points(np.empty((0, self.ndim)), box=self.box, periodic=self.periodic, **empty)
+
+    def call(self, directed: bool = True) -> Call:
+        """A search of no points; raises what is wrong with it."""
+        call = take(self.of_none(), self.cutoff, rule=self.rule, directed=directed)
+        call.run(_core.coordination, None, call.pairing, "auto", None)
+        return call
+
+
+def summary(points: Points, n_pieces: int) -> Summary:
+    """Sum up one of some pieces; points are named by their places in it."""
+    array, n_points = points.positions, len(points)
+    step = 1 + n_points // max(1, min(_SAMPLE, _SAMPLES // n_pieces))
+    largest = float(max(array.max(initial=0.0), -array.min(initial=0.0)))
+    error = None
+    if not np.isfinite(largest):
+        wrong = np.argwhere(~np.isfinite(array)).tolist()
+        row, column = wrong[0] if wrong else (0, 0)  # if another thread changes them
+        value = array[row, column]
+        error = ValueError(f"points must be finite, got points[{row}, {column}] = {value}")
+    sample = array[::step].astype(np.float64)
+    names = {name: labels.names for name, labels in labels_of(points).items()} if n_points else {}
+    weight = n_points / max(1, len(sample))
+    return Summary(n_points, largest, sample, weight, _widest(points), names, error)
+
+
+def divide(terms: Terms, n_bricks: int, *summaries: Summary) -> Division:
+    """Where to cut; raises what is wrong with the first piece that has an error."""
+    ends = np.cumsum([0, *(one.n_points for one in summaries)], dtype=np.int64).tolist()
+    for one, first in zip(summaries, ends, strict=False):
+        if one.error is not None:
+            raise renumbered(one.error, range(first, first + one.n_points))
+    widest = max((one.widest for one in summaries), default=0.0)
+    scope = _scope(terms.call(), terms.cutoff, _common_names(summaries), ends[-1], widest)
+    axes = axes_of(scope, terms.ndim, max((one.largest for one in summaries), default=0.0))
+    samples = [one.sample for one in summaries if len(one.sample)]
+    places = axes.places(np.concatenate(samples)) if samples else np.empty((terms.ndim, 0))
+    weights = np.repeat([one.weight for one in summaries], [len(one.sample) for one in summaries])
+    low = np.where(axes.repeats, 0.0, -np.inf)
+    high = np.where(axes.repeats, 1.0, np.inf)
+    cuts = _cut(places, weights, n_bricks, (low, high), axes.widths, iter(range(n_bricks)))
+    return Division(cuts, n_bricks, axes, tuple(ends[:-1]), scope)
+
+
+def _common_names(summaries: Iterable[Summary]) -> dict[str, tuple[str, ...] | None]:
+    """The names of all pieces, ascending."""
+    every: dict[str, tuple[str, ...] | None] = {}
+    for one in summaries:
+        for field, names in one.names.items():
+            known = every.setdefault(field, names)
+            if (known is None) != (names is None):
+                raise TypeError(f"{field} of all points must be numbers, or of all be names")
+            if known is not None and names is not None:
+                every[field] = tuple(sorted({*known, *names}))
+    return every
+
+
+def _cut(
+    places: Array, weights: Array, n_parts: int, region: tuple[Array, Array], widths: Array,
+    numbers: Iterator[int],
+) -> Cut | int:  # fmt: skip
+    """Cut a region across the longest side of its sample, so that both parts weigh their share."""
+    if n_parts == 1:
+        return next(numbers)
+    first, (low, high) = n_parts // 2, region
+    axis, at = 0, 0.0
+    if len(weights):
+        axis = int(np.argmax(np.ptp(places, axis=1) * widths))
+        order = np.argsort(places[axis], kind="stable")
+        sums = np.cumsum(weights[order])
+        above = int(np.searchsorted(sums, sums[-1] * first / n_parts, side="right"))
+        last, at = places[axis][order[[above - 1, above]]].tolist()
+        middle = 0.5 * last + 0.5 * at
+        at = middle if middle > last else at  # points at neither side of it need fewer others
+    is_below = places[axis] < at
+    ends, begins = high.copy(), low.copy()
+    ends[axis] = begins[axis] = at
+    return Cut(
+        axis, float(low[axis]), at, float(high[axis]),
+        _cut(places[:, is_below], weights[is_below], first, (low, ends), widths, numbers),
+        _cut(places[:, ~is_below], weights[~is_below], n_parts - first, (begins, high), widths,
+             numbers),
+    )  # fmt: skip
+
+
+def renumbered(error: Exception, points: Any, queries: Any = None) -> Exception:
+    """The same error with numbers among all points, of which both are some."""
+    own = "points|positions|radii|types|supports|groups|labels"
+
+    def other(found: re.Match[str]) -> str:
+        name, numbers = found[1], points
+        if name == "queries":
+            numbers = queries
+        if numbers is None or int(found[2]) >= len(numbers):
+            return found[0]
+        name = "points" if name in ("queries", "positions") else name
+        return f"{name}[{numbers[int(found[2])]}"
+
+    return type(error)(re.sub(rf"\b({own}|queries)\[(\d+)", other, str(error)))
+
+
+# ---- what each piece gives to every brick --------------------------------------------------
+
+
+class Piece:
+    """What one piece of the points gives to one brick.
+
+    Until it is sent it holds the whole piece, of which nothing is copied.
+    """
+
+    def __init__(
+        self, first: int, places: tuple[Array, ...], columns: Columns, is_whole: bool = True
+    ) -> None:
+        self.first = first  # number of the first point of the piece
+        # Where points are in the piece, ascending: those that the brick owns, and those it needs,
+        # which later bricks own, or earlier ones.
+        self.places = places
+        self.columns = columns  # of all of the piece, or of those at these places
+        self.is_whole = is_whole
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        columns = self.columns
+        if self.is_whole:
+            rows = np.concatenate(self.places)
+            columns = {name: one.take(rows, axis=0) for name, one in columns.items()}
+        return Piece, (self.first, self.places, columns, False)
+
+    def __sizeof__(self) -> int:
+        row = self.places[0].itemsize
+        row += sum(one[:1].nbytes for one in self.columns.values())
+        return int(row * sum(map(len, self.places)))
+
+    def put(self, name: str, which: int, target: Array) -> None:
+        """The rows of a column at places of one kind."""
+        column = self.columns[name]
+        if self.is_whole:
+            column.take(self.places[which], axis=0, out=target, mode="clip")  # without a buffer
+        else:
+            first = sum(map(len, self.places[:which]))
+            target[:] = column[first : first + len(target)]
+
+
+class Part(NamedTuple):
+    """A brick with its points: owned ones, then needed ones of later bricks, then of earlier."""
+
+    columns: Columns
+    sizes: tuple[int, ...]
+    places: list[tuple[int, tuple[Array, ...]]]  # `first` and `places` of each piece
+    scope: Scope
+
+    def numbers(self) -> Numbers:
+        """Numbers of the points among all of them."""
+        return np.concatenate(
+            [first + places[k].astype(np.int64) for k in range(3) for first, places in self.places]
+        )
+
+    def points(self, rows: Any) -> Points:
+        """Some of the points: numbers or a slice."""
+        return self.scope.points_of({name: one[rows] for name, one in self.columns.items()})
+
+    def in_order(self) -> tuple[Brick, Points]:
+        """The brick, and its members."""
+        members = self.numbers()
+        order = np.argsort(members)
+        brick = Brick(members.take(order), order < self.sizes[0], self.scope)
+        return brick, self.points(order)
+
+
+def split(points: Points, division: Division, place: int) -> list[Piece]:
+    """What a piece gives to each brick: points of its region, and those within reach of it."""
+    columns = {
+        name: np.ascontiguousarray(one) for name, one in division.scope.columns_of(points).items()
+    }
+    array = columns["positions"]
+    kind = np.int32 if len(array) <= 1 << 31 else np.int64
+    found: list[tuple[list[Array], ...]] = [([], [], []) for _ in range(division.n_bricks)]
+    for first in range(0, max(1, len(array)), _TILE):
+        places = division.axes.places(array[first : first + _TILE])
+        every = np.arange(places.shape[1])
+        owners = np.zeros(len(every), np.int64)
+        needed = []
+        for brick, (numbers, is_owned) in enumerate(
+            _leaves(division.cuts, places, division.axes, every, np.ones(len(every), bool))
+        ):
+            owned = numbers.take(np.flatnonzero(is_owned))
+            owners[owned] = brick
+            found[brick][0].append((owned + first).astype(kind))
+            needed.append(numbers.take(np.flatnonzero(~is_owned)))
+        for brick, numbers in enumerate(needed):
+            is_later = owners.take(numbers) > brick
+            found[brick][1].append((numbers[is_later] + first).astype(kind))
+            found[brick][2].append((numbers[~is_later] + first).astype(kind))
+    return [
+        Piece(division.firsts[place], tuple(map(np.concatenate, kinds)), columns) for kinds in found
+    ]
+
+
+def _leaves(
+    cut: Cut | int, places: Array, axes: Axes, numbers: Any, is_inside: Bits
+) -> Iterator[tuple[Any, Bits]]:
+    """Of each brick, points within reach of its region, and which of them are inside."""
+    if isinstance(cut, int):
+        yield numbers, is_inside
+        return
+    own = places[cut.axis].take(numbers)
+    reach, repeats = axes.reach[cut.axis], axes.repeats[cut.axis]
+    is_below = own < cut.at
+    for part, low, high, is_mine in (
+        (cut.below, cut.low, cut.at, is_below), (cut.above, cut.at, cut.high, ~is_below),
+    ):  # fmt: skip
+        near = np.flatnonzero(_within(own, low - reach, high + reach, repeats))
+        mine = (is_mine & is_inside).take(near)
+        yield from _leaves(part, places, axes, numbers.take(near), mine)
+
+
+def part_of(division: Division, *pieces: Piece) -> Part:
+    """A brick of what all pieces give to it."""
+    sizes = tuple(sum(len(piece.places[k]) for piece in pieces) for k in range(3))
+    columns: Columns = {}
+    for name, like in pieces[0].columns.items():
+        columns[name] = column = np.empty((sum(sizes), *like.shape[1:]), like.dtype)
+        end = 0
+        for which in range(3):
+            for piece in pieces:
+                first, end = end, end + len(piece.places[which])
+                piece.put(name, which, column[first:end])
+    return Part(columns, sizes, [(one.first, one.places) for one in pieces], division.scope)

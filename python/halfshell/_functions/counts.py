@@ -1,155 +1,103 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`count_pairs`: one cutoff in one search; several in one, each an edge of a histogram."""
+"""Numbers of pairs, of which none is stored: within cutoffs `count_pairs`, by distance
+`pair_histogram`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, cast, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, cast, overload
+
+import numpy as np
 
 from halfshell import _core
-from halfshell._convert.batch import as_systems, refuse_many
-from halfshell._convert.foreign import is_a
-from halfshell._convert.given import Chosen, Given
-from halfshell._convert.lengths import as_cutoffs
-from halfshell._convert.options import AUTO
-from halfshell._convert.quick import quick
-from halfshell._convert.search import as_rest, as_search_of_each, count_within
-from halfshell._objects.box import Box
-from halfshell._unknown import refuse_unknown
+from halfshell._convert.call import Call, _together, take
+from halfshell._convert.foreign import of_argument
+from halfshell._convert.lengths import as_edges
+from halfshell._convert.memory import refuse_unavailable
+from halfshell._convert.options import as_flag
+from halfshell._search import search
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from typing import Never, Unpack
+    from collections.abc import Mapping, Sequence
+    from typing import Unpack
 
-    import numpy as np
     import numpy.typing as npt
 
     from halfshell._convert.types import (
-        Algorithm,
         ArrayLike,
         BoxLike,
         CountOptions,
+        CutoffLike,
         FloatArray,
         Number,
-        PairCutoff,
         PeriodicLike,
         PointsLike,
-        Precision,
-        ReachOptions,
+        ProgressLike,
         Rule,
     )
 
+# The counts of one thread, of two numbers for each bin; their sum; and the result.
+_COPIES = 4
+_MANY_SYSTEMS = 1 << 20  # counts of fewer always fit
+
 
 @overload
 def count_pairs(
     points: PointsLike,
-    cutoff: Number | Mapping[tuple[int, int], float] | Mapping[tuple[str, str], float] | None,
-    *,
-    types: None = None,
-    **options: Unpack[CountOptions],
-) -> int: ...
-@overload
-def count_pairs(
-    points: PointsLike,
-    cutoff: PairCutoff,
-    *,
-    types: npt.ArrayLike,
+    cutoff: Number | Mapping[Any, float] | None,
     **options: Unpack[CountOptions],
 ) -> int: ...
 @overload
 def count_pairs(
     points: PointsLike,
     cutoff: Sequence[float] | npt.NDArray[Any],
-    *,
-    types: None = None,
     **options: Unpack[CountOptions],
 ) -> npt.NDArray[np.int64]: ...
 @overload
 def count_pairs(
-    points: PointsLike,
-    cutoff: npt.ArrayLike | PairCutoff,
-    *,
-    batch: npt.ArrayLike,
-    **options: Unpack[ReachOptions],
-) -> npt.NDArray[np.int64]: ...
-@overload
-def count_pairs(
-    points: PointsLike,
-    cutoff: npt.ArrayLike,
-    *,
-    types: None = None,
-    **options: Unpack[CountOptions],
+    points: PointsLike, cutoff: CutoffLike, **options: Unpack[CountOptions]
 ) -> int | npt.NDArray[np.int64]: ...
-@quick(_core.count_pairs)
+@search("count_pairs")
 def count_pairs(
     points: PointsLike,
-    cutoff: npt.ArrayLike | PairCutoff,
+    cutoff: CutoffLike,
     *,
     queries: PointsLike | None = None,
-    radii: ArrayLike | None = None,
-    query_radii: ArrayLike | None = None,
-    rule: Rule | None = None,
-    types: npt.ArrayLike | None = None,
-    query_types: npt.ArrayLike | None = None,
-    supports: ArrayLike | None = None,
-    query_supports: ArrayLike | None = None,
-    extent: float | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
-    inclusive: bool = True,
-    precision: Precision = "exact",
-    algorithm: Algorithm = "auto",
-    kernel: str | None = None,
-    threads: int | None = None,
-    memory_limit: float | None = None,
-    batch: npt.ArrayLike | None = None,
-    groups: npt.ArrayLike | None = None,
-    query_groups: npt.ArrayLike | None = None,
-    exclude: npt.ArrayLike | None = None,
-    query_exclude: npt.ArrayLike | None = None,
-    exclude_within: int | None = None,
+    rule: Rule | None = None,
+    exclude: ArrayLike | int | None = None,
     min_distance: float | None = None,
-    **unknown: Never,
+    indices: npt.ArrayLike | None = None,
+    inclusive: bool = True,
+    threads: int | None = None,
+    progress: ProgressLike = None,
 ) -> int | npt.NDArray[np.int64]:
     """Count the pairs of points within one or several cutoffs.
 
     Parameters
     ----------
-    points, box, periodic, inclusive, precision, algorithm, kernel, threads
-        As in `pairs`.
-    cutoff : float, array_like of float, shape (k,) or (t, t), dict or None
-        One cutoff, or several in ascending order, all counted by one search up to the largest
-        (k searches if `precision` is not "exact", or with `radii` or `supports`). With `batch`,
-        one for all systems, or one for each. With `radii` or `supports`, a further limit, or None;
-        with `types`, a table or a dict, as in `pairs`.
-    queries : array_like of float, shape (q, d), optional
-        Coordinates of queries: count pairs of a query and a point instead, as `pairs_between`
-        finds them.
-    radii, query_radii, rule, types, query_types, supports, query_supports, extent
-        As in `pairs`, and with `queries` as in `pairs_between`.
-    memory_limit : float, optional
-        Bytes that the search may take.
-    batch : array_like of int, shape (n,), optional
-        Count many systems in one call, as in `pairs`; not with `queries`.
-    groups, exclude, exclude_within, min_distance
-        As in `pairs`.
-    query_groups, query_exclude : array_like of int or str, shape (q,), optional
-        Labels of the queries, in addition to those of the points. With queries, each pair of
-        numbers in `exclude` is a query and a point.
+    {points}
+    cutoff : float, array_like of float, shape (k,), (s,) or (t, t), dict or None
+        As in `pairs`; several, ascending, are counted by one search up to the largest (by one
+        each with radii, `indices`, or a precision other than "exact").
+    queries : array_like of float, shape (q, d), or Points, optional
+        Count pairs of a query and a point instead, as `pairs_between` finds them.
+    {box, periodic, rule, exclude, min_distance}
+    indices : array_like of int, shape (r,), optional
+        Count only pairs that have at least one of these points; they are listed for this.
+    {inclusive, threads, progress}
 
     Returns
     -------
-    int or ndarray of int64, shape (k,)
-        The number of pairs in the half list, or of a query and a point, for each cutoff. With
-        `batch`, for each system: those for which `box` or `cutoff` is given, or up to the largest
-        number in `batch`.
+    int or ndarray of int64, shape (k,) or (s,)
+        The number of pairs in the half list, or of a query and a point, for each cutoff; of a
+        batch, for each system.
 
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As for `pairs` and `pairs_between`; ValueError also if several cutoffs are not ascending,
-        or if `queries` are given with `batch`. MemoryError only if the search itself would not
-        fit: no pair is stored.
+        As for `pairs` and `pairs_between`. MemoryError only if the search itself would not fit: no
+        pair is stored.
 
     See Also
     --------
@@ -164,65 +112,224 @@ def count_pairs(
     1
     >>> hs.count_pairs(points, [0.5, 1.0, 2.0]).tolist()
     [0, 1, 2]
-    >>> hs.count_pairs(points, 1.5, batch=[0, 0, 2]).tolist()
-    [1, 0, 0]
     >>> hs.count_pairs(points, 1.5, queries=[[2.0, 0.0]])
     2
-    >>> hs.count_pairs(points, None, radii=[0.5, 1.0, 1.0])
-    2
+    >>> hs.count_pairs(hs.Points(points, batch=[0, 0, 2]), 1.5).tolist()
+    [1, 0, 0]
     """
-    if unknown:
-        refuse_unknown(count_pairs, unknown)
-    if type(box) is Box:
-        box = box.vectors
-    if batch is None and (
-        radii is None and query_radii is None and rule is None
-        and types is None and query_types is None and algorithm is AUTO
-        and supports is None and query_supports is None and extent is None
-        and groups is None and exclude is None and exclude_within is None and min_distance is None
-        and query_groups is None and query_exclude is None
-    ):  # fmt: skip
-        result: Any = (
-            _core.plain(
-                _core.count_pairs, points, cutoff, box, periodic, inclusive, precision, kernel,
-                memory_limit, None, threads,
-            ) if queries is None else _core.plain(
-                _core.count_between, points, cutoff, box, periodic, inclusive, precision, kernel,
-                memory_limit, None, threads, queries,
-            )
-        )  # fmt: skip
-        if result is not NotImplemented:
-            return cast("int", result)
-    rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
-    given = Given(
-        radii, query_radii, rule, types, query_types, supports, query_supports, extent
-    )
-    chosen = Chosen(
-        groups, exclude, exclude_within, min_distance, query_groups, query_exclude
-    )
-    if batch is not None:
-        if queries is not None:
-            raise ValueError("batch and queries cannot be given together")
-        scene, own, reach, _ = as_systems(
-            points, cutoff, box, periodic, batch, given, chosen, precision
+    call = take(
+        points, cutoff, queries, box, periodic, rule, exclude, min_distance, indices, inclusive,
+        threads, progress, several="counts",
+    )  # fmt: skip
+    return counted(call)
+
+
+def counted(call: Call) -> int | npt.NDArray[np.int64]:
+    """How many pairs are within the cutoff of a call, or within each of several."""
+    if call.points.batch is not None:
+        return _count_systems(call)
+    cutoffs = call.shells
+    if cutoffs is None:
+        return _count(call)
+    is_exact = call.settings.precision == "exact" and call.reach is None and call.indices is None
+    if is_exact and len(cutoffs) > 1:
+        edges = np.ascontiguousarray(cutoffs)
+        between = binned(call, edges, _NO_MARKS, last=call.inclusive, name="cutoff")
+        return np.cumsum(between[0, 0])
+    # Without any, all else is checked as ever.
+    counts = []
+    for cutoff in cutoffs.tolist() or [0.0]:
+        call.cutoff = cutoff
+        counts.append(_count(call))
+    return np.array(counts[: len(cutoffs)], dtype=np.int64)
+
+
+def _count(call: Call) -> int:
+    if call.indices is not None:
+        from halfshell._convert.rows import pairs_of  # few calls need it
+
+        return len(pairs_of(call, "j", False, 4, None))
+    found = call.run(_core.count_pairs, call.pairing, call.settings.algorithm, call.asking)
+    return cast("int", found)
+
+
+def _count_systems(call: Call) -> npt.NDArray[np.int64]:
+    """Of each system of a batch."""
+    points, queries = call.points, call.queries
+    batch = points.batch
+    assert batch is not None and call.systems is not None
+    if call.system_cutoffs is None and points.box is None and len(batch):
+        last = int(batch[-1])
+        if last > _MANY_SYSTEMS:
+            refuse_unavailable(8 * (last + 1), f"counts of the systems up to {last} in batch")
+    n_systems = points.n_systems if call.system_cutoffs is None else len(call.system_cutoffs)
+    if call.indices is not None:
+        from halfshell._convert.rows import pairs_of  # few calls need it
+
+        i = cast("npt.NDArray[Any]", pairs_of(call, "i", False, 4, None))
+        return np.bincount(batch[i], minlength=n_systems)
+    if queries is not None:
+        found = call.run(
+            _core.coordination, call.asking, call.pairing, call.settings.algorithm, call.systems
         )
-        refuse_many(own)
-        return _core.batch_count(*(*scene, *rest, *own, reach, algorithm))
-    several = _several(cutoff, given)
-    one = cutoff if several is None else 0.0
-    search, asking, reach = as_search_of_each(
-        points, one, box, periodic, rest, given, queries, directed=queries is not None,
-        chosen=chosen,
+        ends = np.concatenate([[0], np.cumsum(found)])
+        asked = queries.batch
+        assert asked is not None
+        if len(asked):
+            n_systems = max(n_systems, 1 + int(asked[-1]))
+        return np.diff(ends[np.searchsorted(asked, np.arange(n_systems + 1))])
+    counts = call.run(
+        _core.count_pairs, call.pairing, call.settings.algorithm, None, call.systems
     )
-    array, largest, vectors, bits = search[:4]
-    within = largest if several is None else several
-    return count_within(within, array, vectors, bits, rest, asking, reach, algorithm)
+    return cast("npt.NDArray[np.int64]", counts)
 
 
-def _several(cutoff: Any, given: Given) -> FloatArray | None:
-    """Ascending cutoffs, if they are several; None if it is one, or one for each pair of types."""
-    by_types = given.types is not None or given.query_types is not None
-    if cutoff is None or by_types or is_a(cutoff, Mapping):
-        return None
-    cutoffs = as_cutoffs(cutoff)
-    return None if isinstance(cutoffs, float) else cutoffs
+# ---- by distance ---------------------------------------------------------------------------
+
+
+@search()
+def pair_histogram(
+    points: PointsLike,
+    edges: npt.ArrayLike,
+    *,
+    queries: PointsLike | None = None,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
+    exclude: ArrayLike | int | None = None,
+    min_distance: float | None = None,
+    by_type: bool = False,
+    threads: int | None = None,
+    progress: ProgressLike = None,
+) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
+    """Count pairs in bins of distance, always exact, without storing them.
+
+    Parameters
+    ----------
+    {points}
+    edges : array_like of float, shape (bins + 1,)
+        Limits of the bins in ascending order, in the unit of `points`; finite, not negative, any
+        spacing: ``np.linspace(0, 10, 101)``, ``np.geomspace(0.1, 10, 51)``. The largest is the
+        cutoff and may be larger than the box. Pairs closer than the first edge are not counted.
+    queries : array_like of float, shape (q, d), or Points, optional
+        Count pairs of a query and a point instead, as `pairs_between` finds them.
+    {box, periodic, exclude, min_distance}
+    by_type : bool, default False
+        One histogram for each pair of `types` of the points.
+    {threads, progress}
+
+    Returns
+    -------
+    ndarray of int64, or float64 if points or queries have weights
+        Shape (bins,), or (t, t, bins) by type, where t is one more than the largest type, or the
+        number of names, in the ascending order of ``np.unique``. Of a batch, the first axis is the
+        system.
+
+        Bins are half-open except the last, which is closed, as in ``numpy.histogram``: bin k counts
+        ``edges[k] <= d < edges[k + 1]``, with each pair decided exactly for the real values of all
+        inputs. A bin between two equal edges is empty, unless it is the last one.
+
+        Without queries each pair counts once (half list). Entry [a, b] then counts the pairs of a
+        point of type a with one of type b, whichever comes first: [b, a] is the same, and the
+        number of all pairs is the sum over ``a <= b``. With queries [a, b] counts queries of type
+        a with points of type b.
+
+        With weights each pair counts as the product of its two; a set without has ones. Sums are
+        exact and rounded once: the float64 nearest to the real sum of the real products.
+
+    Raises
+    ------
+    TypeError, ValueError, OverflowError, MemoryError
+        As for `pairs` and `pairs_between`; ValueError also if there are fewer than two edges, or
+        edges are negative, not finite or not ascending, or for `by_type` without types.
+
+    See Also
+    --------
+    count_pairs : cumulative counts.
+    rdf : the histogram divided by that of an ideal gas.
+
+    Notes
+    -----
+    Bins are found from float32 squares with a proven error bound; only pairs too close to an edge
+    to tell are decided again, as in `pairs`. So neither the kernel nor the number of threads
+    changes the result. The memory needed is that of the bins, once for each thread. Radii and
+    supports of points do not matter.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> points = hs.Points([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]], types=[0, 1, 1])
+    >>> hs.pair_histogram(points, [0.0, 1.0, 2.0, 3.0]).tolist()  # distances 1, 2 and 3
+    [0, 1, 2]
+    >>> hs.pair_histogram(points, [0.0, 1.5, 3.0], by_type=True).tolist()
+    [[[0, 0], [1, 1]], [[1, 1], [0, 1]]]
+    >>> hs.pair_histogram(points.replace(weights=[1.0, -1.0, 0.5]), [0.0, 1.5, 3.0]).tolist()
+    [-1.0, 0.0]
+    """
+    call = take(
+        points, 0.0, queries, box, periodic, None, exclude, min_distance, None, False, threads,
+        progress, by_reach=False,
+    )  # fmt: skip
+    return histogram_of(call, as_edges(edges), as_flag(by_type, "by_type"))
+
+
+def histogram_of(
+    call: Call, edges: FloatArray, by_type: bool
+) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
+    """The histogram of a call."""
+    marks = marks_of(call, by_type)
+    found = binned(call, edges, marks)
+    # What the core counts first are the pairs closer than the first edge.
+    return np.ascontiguousarray(found[..., 1:] if by_type else found[..., 0, 0, 1:])
+
+
+class Marks(NamedTuple):
+    """Types and weights of the points and of the queries, as the core takes them, and names."""
+
+    n_types: int
+    types: npt.NDArray[Any] | None
+    weights: npt.NDArray[Any] | None
+    query_types: npt.NDArray[Any] | None
+    query_weights: npt.NDArray[Any] | None
+    names: tuple[str, ...] | None = None
+
+
+_NO_MARKS = Marks(1, None, None, None, None)
+
+
+def marks_of(call: Call, by_type: bool, with_weights: bool = True) -> Marks:
+    """What a histogram tells pairs apart by, and adds up."""
+    types = query_types = names = None
+    n_types = 1
+    if by_type:
+        if call.points._kinds is None:
+            raise ValueError("by_type needs types, and points have none: Points(types=...)")
+        types, query_types, names = _together(call, "_kinds", "types")
+        largest = max(int(t.max(initial=0)) for t in (types, query_types) if t is not None)
+        n_types = 1 + largest if names is None else max(len(names), 1)
+    weights = query_weights = None
+    if with_weights:
+        weights = call.points.weights
+        query_weights = None if call.queries is None else call.queries.weights
+    return Marks(n_types, types, weights, query_types, query_weights, names)
+
+
+def binned(
+    call: Call, edges: FloatArray, marks: Marks, last: bool = True, name: str = "edges[-1]"
+) -> npt.NDArray[Any]:
+    """Counts or sums by system, if it is a batch, types and bin; the first bin is below all edges.
+
+    last: whether a pair at exactly the last edge counts. name: what a message calls that edge.
+    """
+    call.settings = call.settings._replace(precision="exact")
+    n_systems = call.points.n_systems
+    refuse_unavailable(
+        _COPIES * 8 * n_systems * marks.n_types**2 * len(edges),
+        f"counts for {len(edges) - 1} bins between edges and {marks.n_types}**2 pairs of types"
+        + ("" if call.points.batch is None else f" of {n_systems} systems"),
+    )
+    end: tuple[Any, ...] = (call.settings.algorithm, call.pairing)
+    if call.systems is not None:
+        end = (*end, call.systems)
+    with of_argument(name):
+        found = call.run(_core.histogram, edges, last, call.asking, *marks[:-1], *end)
+    return cast("npt.NDArray[Any]", found)

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell._convert.options import as_flag
+from halfshell._convert.points import Points
 from halfshell._errors import CapacityError
-from halfshell._functions.between import pairs_between
 from halfshell._functions.neighbors import neighbors
-from halfshell._functions.pairs import pairs
+from halfshell._functions.pairs import pairs, pairs_between
 
 __all__ = ["Entries", "check_rows", "entries_between", "entries_of"]
 
@@ -30,17 +30,12 @@ def entries_of(
     inclusive: bool,
 ) -> Entries:
     """Return i, j and S of a list, ascending by (i, j, S)."""
+    given = Points._of(points, "points", box, periodic, batch)
     if as_flag(half, "half"):
-        i, j, S = pairs(
-            points, cutoff, box=box, periodic=periodic, quantities="ijS", sort=True,
-            inclusive=inclusive, batch=batch,
-        )  # fmt: skip
-        return i, j, S
-    table = neighbors(
-        points, cutoff, box=box, periodic=periodic, quantities="jS", inclusive=inclusive,
-        batch=batch,
-    )  # fmt: skip
-    i, j, S = table.to_pairs(quantities="ijS")
+        i, j, S = pairs(given, cutoff, quantities="ijS", sort=True, inclusive=inclusive)
+    else:
+        table = neighbors(given, cutoff, quantities="jS", inclusive=inclusive)
+        i, j, S = table.to_pairs(quantities="ijS")
     return i, j, S
 
 
@@ -56,8 +51,9 @@ def entries_between(
     if batch is not None or query_batch is not None:  # a set without numbers is all of system 0
         batch = np.zeros(len(points), np.int64) if batch is None else batch
         query_batch = np.zeros(len(queries), np.int64) if query_batch is None else query_batch
+    asking = Points._of(queries, "queries", batch=query_batch)
     i, j = pairs_between(
-        queries, points, cutoff, inclusive=inclusive, batch=batch, query_batch=query_batch
+        asking, Points._of(points, "points", batch=batch), cutoff, inclusive=inclusive
     )
     return i, j
 

@@ -4,28 +4,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Never
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from halfshell import _core, _show
-from halfshell._convert.given import Given
+from halfshell._convert.call import take
 from halfshell._convert.options import as_flag, as_index_bytes
-from halfshell._convert.search import as_rest, as_search_of_each
-from halfshell._convert.types import (
-    Algorithm,
-    ArrayLike,
-    BoxLike,
-    PairCutoff,
-    PeriodicLike,
-    PointsLike,
-    Precision,
-    Reach,
-    Rule,
-)
-from halfshell._functions.parts import parts_of
-from halfshell._unknown import refuse_unknown
+from halfshell._search import search
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from halfshell._convert.types import (
+        ArrayLike,
+        BoxLike,
+        CutoffLike,
+        FloatArray,
+        PeriodicLike,
+        PointsLike,
+        ProgressLike,
+        Reach,
+        Rule,
+    )
 
 
 @dataclass(frozen=True)
@@ -119,42 +120,36 @@ class Explanation:
         return "\n".join(lines)
 
 
+@search()
 def explain(
     points: PointsLike,
-    cutoff: PairCutoff,
+    cutoff: CutoffLike,
     *,
-    radii: ArrayLike | None = None,
-    rule: Rule | None = None,
-    types: npt.ArrayLike | None = None,
-    supports: ArrayLike | None = None,
-    extent: float | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
-    quantities: str = "ij",
+    rule: Rule | None = None,
+    exclude: ArrayLike | int | None = None,
+    min_distance: float | None = None,
     inclusive: bool = True,
-    sort: bool = False,
+    quantities: str = "ij",
     index_dtype: npt.DTypeLike = np.int64,
-    precision: Precision = "exact",
-    algorithm: Algorithm = "auto",
-    kernel: str | None = None,
-    threads: int | None = None,
-    memory_limit: float | None = None,
+    sort: bool = False,
     measure: bool = False,
-    **unknown: Never,
+    threads: int | None = None,
+    progress: ProgressLike = None,
 ) -> Explanation:
     """Explain how `pairs` would search a scene, and which steps it leaves out.
 
     Parameters
     ----------
-    points, cutoff, radii, rule, types, supports, extent, box, periodic
+    {points, cutoff, box, periodic, rule, exclude, min_distance, inclusive}
+    quantities, sort
         As in `pairs`.
-    quantities, inclusive, sort
-        As in `pairs`.
-    index_dtype, precision, algorithm, kernel, threads, memory_limit
-        As in `pairs`.
+    {index_dtype}
     measure : bool, default False
         Also run the search, and report its counters: bytes allocated by purpose, candidates
         tested, and the number of decisions made by each stage.
+    {threads, progress}
 
     Returns
     -------
@@ -163,7 +158,7 @@ def explain(
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As `pairs`.
+        As `pairs`; ValueError also for a batch: each system has a plan of its own.
 
     Examples
     --------
@@ -172,15 +167,17 @@ def explain(
     >>> plan.algorithm, plan.shape, plan.measured["pairs"]
     ('all-pairs', (1, 1), 1)
     """
-    if unknown:
-        refuse_unknown(explain, unknown)
-    rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
-    given = Given(radii, None, rule, types, None, supports, None, extent)
-    search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)
+    call = take(
+        points, cutoff, None, box, periodic, rule, exclude, min_distance, None, inclusive, threads,
+        progress,
+    )  # fmt: skip
+    call.refuse("explain", batch="each system has a plan of its own")
     sort, index_bytes = as_flag(sort, "sort"), as_index_bytes(index_dtype)
-    plan = _core.explain(
-        *search, quantities, sort, index_bytes, as_flag(measure, "measure"), reach, algorithm
-    )
+    algorithm, reach = call.settings.algorithm, call.reach
+    plan = call.run(
+        _core.explain, quantities, sort, index_bytes, as_flag(measure, "measure"), call.pairing,
+        algorithm,
+    )  # fmt: skip
     ndim = plan["ndim"]
     reason = _reason(plan, algorithm == "auto")
     if reach is not None:
@@ -188,7 +185,7 @@ def explain(
     return Explanation(
         algorithm=plan["algorithm"],
         reason=reason,
-        n=len(search[0]),
+        n=len(call.points),
         ndim=ndim,
         shape=plan["shape"],
         n_cells=plan["n_cells"],
@@ -240,7 +237,7 @@ def _reason_of_reach(plan: dict[str, Any], reach: Reach, reason: str) -> str:
     if plan["n_searches"] == 1 and plan["algorithm"] != "hierarchy":
         return f"one search with the largest reach; {reason}"
     n = plan["n_searches"]
-    return f"{parts_of(reach)}, in {n} {'search' if n == 1 else 'searches'}"
+    return f"{_parts_of(reach)}, in {n} {'search' if n == 1 else 'searches'}"
 
 
 def _bytes_per_pair(quantities: str, ndim: int, index_bytes: int) -> int:
@@ -279,3 +276,44 @@ def _left_out(plan: dict[str, Any], quantities: str, sort: bool) -> tuple[str, .
     if not sort:
         left.append("sorting of pairs")
     return tuple(left)
+
+
+# ---- a hierarchy -----------------------------------------------------------------------
+
+
+def _parts_of(reach: Reach) -> str:
+    """Those of one set of points."""
+    radii, types, supports, extent = reach[1], reach[3], reach[6], reach[8]
+    if types is not None:
+        n = len(np.unique(types))
+        return f"{_several(n, 'type')}, each two of them searched with their own cutoff"
+    what = "radii"
+    if supports is not None and extent is not None:
+        radii, what = _spheres(supports, extent), "supports"
+    assert radii is not None
+    top = float(radii.max(initial=0.0))
+    return (
+        f"{_several(_octaves(radii, top), 'octave')} of {what} up to {top:.4g}, each searched "
+        "with cells of its own size"
+    )
+
+
+def _octaves(radii: FloatArray, top: float) -> int:
+    """How many have a point: counted from the largest, which with its half is of the first."""
+    if top == 0.0:
+        return min(len(radii), 1)
+    part = radii / top
+    exponents = np.where(part > 0.0, np.minimum(np.frexp(part)[1].astype(np.int64), 0), -(1 << 20))
+    return len(np.unique(exponents))
+
+
+def _spheres(supports: FloatArray, extent: float) -> FloatArray:
+    """About how far each support reaches."""
+    sizes = np.abs(supports).max(axis=(1, 2), initial=0.0)
+    least = np.linalg.eigvalsh(supports / sizes[:, None, None])[:, 0] * sizes
+    reach: FloatArray = extent / np.maximum(least, np.finfo(np.float64).tiny)
+    return reach
+
+
+def _several(n: int, what: str) -> str:
+    return f"{n} {what}{'' if n == 1 else 's'}"

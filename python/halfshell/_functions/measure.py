@@ -1,31 +1,44 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`measure`: signature, defaults and documentation; the work is done in C."""
+"""`measure`: the vectors and lengths of given pairs."""
 
 from __future__ import annotations
 
-from typing import Any, Literal, Never, TypedDict, Unpack, overload
+from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
 import numpy as np
-import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.foreign import kind_of
+from halfshell._convert.call import take
 from halfshell._convert.listed import as_listed
-from halfshell._convert.scene import as_scene
-from halfshell._convert.types import ArrayLike, Arrays, BoxLike, PeriodicLike, PointsLike
-from halfshell._unknown import refuse_unknown
+from halfshell._convert.options import check_letters
+from halfshell._convert.points import refuse_infinite
+from halfshell._search import search
+
+if TYPE_CHECKING:
+    from typing import TypedDict, Unpack
+
+    import numpy.typing as npt
+
+    from halfshell._convert.types import (
+        ArrayLike,
+        Arrays,
+        BoxLike,
+        PeriodicLike,
+        PointsLike,
+        ProgressLike,
+    )
+
+    class _MeasureOptions(TypedDict, total=False):
+        """For overloads: the keywords of `measure`, without `quantities`."""
+
+        queries: PointsLike | None
+        box: BoxLike | None
+        periodic: PeriodicLike | None
+        threads: int | None
+        progress: ProgressLike
+
 
 _LETTERS = "dDS"
-
-
-class _MeasureOptions(TypedDict, total=False):
-    """For overloads: the keywords of `measure`, without `quantities`."""
-
-    box: BoxLike | None
-    periodic: PeriodicLike | None
-    kernel: str | None
-    threads: int | None
-    memory_limit: float | None
 
 
 @overload
@@ -58,26 +71,25 @@ def measure(
     quantities: str,
     **options: Unpack[_MeasureOptions],
 ) -> Arrays: ...
+@search()
 def measure(
     points: PointsLike,
     i: ArrayLike,
     j: ArrayLike,
     S: ArrayLike | None = None,
     *,
+    queries: PointsLike | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     quantities: str = "dDS",
-    kernel: str | None = None,
     threads: int | None = None,
-    memory_limit: float | None = None,
-    **unknown: Never,
+    progress: ProgressLike = None,
 ) -> Arrays:
     """Measure given pairs, in the nearest image or in given images; always exact.
 
     Parameters
     ----------
-    points, box, periodic, kernel, threads
-        As in `pairs`.
+    {points}
     i, j : array_like of int, shape (m,)
         Point numbers of each pair, in any order; pairs may repeat, and i may equal j.
     S : array_like of int, shape (m, d), optional
@@ -85,12 +97,13 @@ def measure(
         i; of several equally near, the one with the lexicographically least S. This is decided
         exactly for the real values of the inputs. The nearest image of a point to itself is the
         point, S = 0.
+    queries : array_like of float, shape (q, d), or Points, optional
+        Where `i` numbers points of another set: their coordinates.
+    {box, periodic}
     quantities : str, default "dDS"
         Any of the letters ``d D S``, each at most once: distance, vector, shift. Only these are
         computed.
-    memory_limit : float, optional
-        Bytes that the result and a copy of the points may take. Default: what the machine and its
-        control group have available.
+    {threads, progress}
 
     Returns
     -------
@@ -113,7 +126,7 @@ def measure(
         If a point is more than 2**51 box vectors away and `S` is not given, an S to return
         does not fit int32, or a vector does not fit float64.
     MemoryError
-        If the result would not fit `memory_limit`.
+        If the result would not fit.
 
     See Also
     --------
@@ -139,20 +152,22 @@ def measure(
     >>> hs.measure(points, [0], [1], [[0, 0]], box=[1.0, 1.0], quantities="d").tolist()
     [0.8]
     """
-    if unknown:
-        refuse_unknown(measure, unknown)
-    if not isinstance(quantities, str):
-        raise TypeError(f"quantities must be a string, got {kind_of(quantities)}")
-    if not quantities or not set(quantities) <= set(_LETTERS) or (
-        len(set(quantities)) < len(quantities)
-    ):
-        raise ValueError(
-            f"quantities must be some of the letters {' '.join(_LETTERS)}, each at most once, got "
-            f"{quantities!r}"
+    check_letters(quantities, _LETTERS)
+    call = take(
+        points, 0.0, queries, box, periodic, threads=threads, progress=progress, by_reach=False
+    )
+    call.refuse("measure", batch="give the points of one system, or those of one box as arrays")
+    call.settings, call.cells = call.settings._replace(precision="exact"), None
+    array, n = call.array, len(call.array)
+    if call.asking is None:
+        first, second, shifts = as_listed(i, j, S, array.shape[1], n)
+    else:  # one set, the queries behind the points
+        first, second, shifts = as_listed(i, j, S, array.shape[1], n, len(call.asking))
+        refuse_infinite(array, "points")
+        refuse_infinite(call.asking, "queries")
+        call.points = call.points.replace(
+            **dict.fromkeys(("radii", "types", "supports", "groups", "labels", "weights")),
+            positions=np.concatenate([array, call.asking]),
         )
-    array, vectors, bits = as_scene(points, box, periodic)
-    first, second, shifts = as_listed(i, j, S, array.shape[1], len(array))
-    return _core.measure(
-        array, 0.0, vectors, bits, True, "exact", kernel, memory_limit, None, threads,
-        quantities, first, second, shifts,
-    )  # fmt: skip
+        first = first + n
+    return cast("Arrays", call.run(_core.measure, quantities, first, second, shifts))

@@ -1,118 +1,83 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`neighbors`: full lists; the work is done in C."""
+"""Rows of neighbours: all within a cutoff `neighbors`, their number `coordination`, k `nearest`."""
 
 from __future__ import annotations
 
-from typing import Any, Never
+from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
 import numpy as np
-import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.batch import as_systems, check_no_batch, refuse_indices
-from halfshell._convert.given import Chosen, Given
-from halfshell._convert.options import AUTO, as_index_bytes
-from halfshell._convert.rules import DIRECTED
-from halfshell._convert.search import as_rest, as_search_of_each
-from halfshell._convert.types import (
-    Algorithm,
-    ArrayLike,
-    BoxLike,
-    PairCutoff,
-    PeriodicLike,
-    PointsLike,
-    Precision,
-    Reach,
-    Rule,
-    Search,
-)
-from halfshell._objects.box import Box
+from halfshell._convert.call import DIRECTED, Call, take
+from halfshell._convert.memory import refuse_unavailable
+from halfshell._convert.nearest import as_k, check_max_distances, in_rows
+from halfshell._convert.options import AUTO, as_flag, as_index_bytes, check_letters
+from halfshell._objects.exact_order import Origin, copied
 from halfshell._objects.neighbor_table import NeighborTable
-from halfshell._objects.origin import Origin, shifts_of_search
-from halfshell._unknown import refuse_unknown
+from halfshell._search import search
+
+if TYPE_CHECKING:
+    from typing import Unpack
+
+    import numpy.typing as npt
+
+    from halfshell._convert.types import (
+        ArrayLike,
+        Arrays,
+        BoxLike,
+        CutoffLike,
+        NearestOptions,
+        PeriodicLike,
+        PointsLike,
+        ProgressLike,
+        Rule,
+    )
 
 
+# ---- a table -------------------------------------------------------------------------------
+
+
+def _as_table(arrays: Any, points: Any, cutoff: Any, **options: Any) -> NeighborTable:
+    """The table of a call with plain arguments, which C has answered."""
+    quantities = options.get("quantities", "j")
+    queries = options.get("queries")
+    if "d" not in quantities or "j" not in quantities:  # it cannot be sorted
+        return NeighborTable(arrays, quantities, len(points), queries is None)
+    given = {
+        name: options[name] for name in ("box", "periodic", "inclusive", "threads")
+        if name in options
+    }  # fmt: skip
+    call = take(points, cutoff, queries, directed=True, **given)
+    return _table_of(call, arrays, quantities)
+
+
+@search("neighbors", finish=_as_table)
 def neighbors(
     points: PointsLike,
-    cutoff: PairCutoff,
+    cutoff: CutoffLike,
     *,
     queries: PointsLike | None = None,
-    radii: ArrayLike | None = None,
-    query_radii: ArrayLike | None = None,
-    rule: Rule | None = None,
-    types: npt.ArrayLike | None = None,
-    query_types: npt.ArrayLike | None = None,
-    supports: ArrayLike | None = None,
-    query_supports: ArrayLike | None = None,
-    extent: float | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
-    quantities: str = "j",
-    inclusive: bool = True,
-    index_dtype: npt.DTypeLike = np.int64,
-    precision: Precision = "exact",
-    algorithm: Algorithm = "auto",
-    kernel: str | None = None,
-    threads: int | None = None,
-    memory_limit: float | None = None,
-    indices: npt.ArrayLike | None = None,
-    groups: npt.ArrayLike | None = None,
-    query_groups: npt.ArrayLike | None = None,
-    exclude: npt.ArrayLike | None = None,
-    query_exclude: npt.ArrayLike | None = None,
-    exclude_within: int | None = None,
+    rule: Rule | None = None,
+    exclude: ArrayLike | int | None = None,
     min_distance: float | None = None,
-    batch: npt.ArrayLike | None = None,
-    query_batch: npt.ArrayLike | None = None,
-    **unknown: Never,
+    indices: npt.ArrayLike | None = None,
+    inclusive: bool = True,
+    quantities: str = "j",
+    index_dtype: npt.DTypeLike = np.int64,
+    threads: int | None = None,
+    progress: ProgressLike = None,
 ) -> NeighborTable:
-    """Find all neighbours of each point, or of each query, as a table of rows.
+    """Find the neighbours of each point, or of each query, within a cutoff, as a table.
 
     Parameters
     ----------
-    points : array_like of float, shape (n, d)
-        Coordinates, as in `pairs`; an object such as ``ase.Atoms`` brings its own box.
-    cutoff : float, array_like of float, shape (t, t), dict or None
-        Largest distance of a neighbour, in the unit of `points`; finite, not negative. With `radii`
-        or `supports`, a further limit, or None; with `types`, one for each pair of types, as in
-        `pairs`.
-    queries : array_like of float, shape (q, d), optional
-        Coordinates of queries, in the unit of `points`; they may lie anywhere. The table then has
-        a row for each query, with the neighbours that `pairs_between` finds. Default: a row for
-        each point.
-    radii : array_like of float, shape (n,), optional
-        A radius for each point, as in `pairs`.
-    query_radii : array_like of float, shape (q,), optional
-        A radius for each query, in addition to `radii`; for "gather", without `radii`.
-    rule : {"sum", "mean", "max", "min", "gather", "scatter"}, optional
-        As in `pairs`, or with a direction: with "gather", row i holds the points within the radius
-        of i; with "scatter", the points whose radius reaches i.
-    types, query_types : array_like of int or str, shape (n,) and (q,), optional
-        As in `pairs_between`.
-    supports, query_supports : array_like of float, shape (n, d, d) and (q, d, d), optional
-        As in `pairs_between`; "gather": row i holds all within the support of i.
-    extent : float, optional
-        How far supports reach, as in `pairs`.
+    {points, cutoff, queries, box, periodic, rule, exclude, min_distance, indices, inclusive}
     quantities : str, default "j"
         Any of the letters ``j d D S``, each at most once: numbers of the neighbours, distances,
         vectors, shifts. Only these are computed, and the table has no others.
-    box, periodic, inclusive, index_dtype, precision, algorithm, kernel, threads, memory_limit
-        As in `pairs`.
-    indices : array_like of int, shape (r,), optional
-        Return only the rows of these points, in this order: row k belongs to point ``indices[k]``
-        and is the same as in the whole table. The cost depends on their number. Not with `queries`
-        or precision "single".
-    groups, exclude, exclude_within, min_distance
-        As in `pairs`.
-    query_groups, query_exclude : array_like of int or str, shape (q,), optional
-        Labels of the queries, in addition to those of the points. With queries, each pair of
-        numbers in `exclude` is a query and a point.
-    batch : array_like of int, shape (n,), optional
-        Many systems in one call, as in `pairs`: the system of each point, ascending. Neighbours are
-        in the same system. The result is that of one call for each system, in ascending order, but
-        indices number the points of all systems. Not with `indices`.
-    query_batch : array_like of int, shape (q,), optional
-        The system of each query, ascending; with `batch` and `queries`, and only then.
+    {index_dtype, threads, progress}
 
     Returns
     -------
@@ -128,7 +93,7 @@ def neighbors(
     ------
     TypeError, ValueError, OverflowError, MemoryError
         As for `pairs`. ValueError also if `queries` and `points` differ in their number of columns
-        or in their box, or if the queries lack the radii or types that they need.
+        or in their box, or one of them lacks what `rule` or `cutoff` go by.
 
     See Also
     --------
@@ -146,8 +111,6 @@ def neighbors(
     >>> import halfshell as hs
     >>> points = [[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]
     >>> table = hs.neighbors(points, 2.0, quantities="jd")
-    >>> table
-    NeighborTable(3 rows, 4 entries, quantities 'jd')
     >>> j, d = table[1]
     >>> j.tolist(), d.tolist()
     ([0, 2], [1.0, 2.0])
@@ -166,94 +129,346 @@ def neighbors(
 
     The neighbours of each point within its own radius:
 
-    >>> [row.tolist() for row in hs.neighbors(points, None, radii=[0.5, 1.5, 3.0], rule="gather")]
+    >>> balls = hs.Points(points, radii=[0.5, 1.5, 3.0])
+    >>> [row.tolist() for row in hs.neighbors(balls, None, rule="gather")]
     [[], [0], [0, 1]]
     """
-    if unknown:
-        refuse_unknown(neighbors, unknown)
-    if type(box) is Box:
-        box = box.vectors
-    found: Any = points  # these five as the core has them
-    largest: Any = cutoff
-    vectors: Any = box
-    periods: Any = periodic
-    asking: Any = queries
-    arrays: Any = NotImplemented
-    reach = None
-    if (
-        radii is None and query_radii is None and rule is None
-        and types is None and query_types is None and algorithm is AUTO
-        and supports is None and query_supports is None and extent is None and indices is None
-        and groups is None and exclude is None and exclude_within is None and min_distance is None
-        and query_groups is None and query_exclude is None
-        and batch is None and query_batch is None
-    ):  # fmt: skip
-        arrays = _core.plain(
-            _core.neighbors, points, cutoff, box, periodic, inclusive, precision, kernel,
-            memory_limit, None, threads, quantities, index_dtype, queries,
-        )
-    if arrays is NotImplemented:
-        rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
-        given = Given(
-            radii, query_radii, rule, types, query_types, supports, query_supports, extent
-        )
-        chosen = Chosen(
-            groups, exclude, exclude_within, min_distance, query_groups, query_exclude
-        )
-        if batch is not None:
-            from halfshell._functions.systems import rows_of_systems  # here: others do without
-
-            refuse_indices(indices)
-            return rows_of_systems(
-                as_systems(
-                    points, cutoff, box, periodic, batch, given, chosen, precision, queries,
-                    query_batch, directed=True,
-                ),
-                rest, quantities, index_dtype, algorithm, queries is None and rule not in DIRECTED,
-            )  # fmt: skip
-        check_no_batch(query_batch)
-        search, asking, reach = as_search_of_each(
-            points, cutoff, box, periodic, rest, given, queries, directed=True, chosen=chosen
-        )
-        if indices is not None:
-            return rows_alone(
-                search, indices, queries, quantities, as_index_bytes(index_dtype), reach, algorithm
-            )
-        arrays = _core.neighbors(
-            *search, quantities, as_index_bytes(index_dtype), asking, reach, algorithm
-        )
-        found, largest, vectors, periods = search[:4]
-    origin = None
-    if "d" in quantities and "j" in quantities:  # else it cannot be sorted
-        find_shifts = shifts_of_search(largest, inclusive, precision, threads, reach)
-        origin = Origin(found, asking, vectors, periods, find_shifts)
-    is_full = queries is None and rule not in DIRECTED
-    return NeighborTable(arrays, quantities, len(found), is_full, origin=origin)
+    call = take(
+        points, cutoff, queries, box, periodic, rule, exclude, min_distance, indices, inclusive,
+        threads, progress, directed=True,
+    )  # fmt: skip
+    index_bytes = as_index_bytes(index_dtype)
+    if call.indices is not None:
+        return _table_of_some(call, quantities, index_bytes)
+    return _table_of(call, listed(call, quantities, index_bytes), quantities)
 
 
-def rows_alone(
-    search: Search,
-    indices: Any,
-    queries: Any,
-    quantities: str,
-    index_bytes: int,
-    reach: Reach | None,
-    algorithm: str,
-) -> NeighborTable:
-    """The table of some points; sorting it exactly needs what the search found."""
-    from halfshell._convert.own_rows import check_alone, rows_of_points  # here: others do without
-    from halfshell._convert.touching import asked_by
+def listed(call: Call, quantities: str, index_bytes: int) -> Any:
+    """Offsets and columns of the rows of a call."""
+    return call.run(
+        _core.neighbors, quantities, index_bytes, call.asking, call.pairing,
+        call.settings.algorithm, call.systems,
+    )  # fmt: skip
 
-    check_alone(queries)
-    points, largest, vectors, bits, inclusive, precision = search[:6]
-    arrays, numbers, entries = rows_of_points(
-        search, points, indices, quantities, index_bytes, reach, algorithm
-    )
-    origin = None
-    if "d" in quantities and "j" in quantities:  # else it cannot be sorted
-        by = asked_by(reach, numbers)
-        find_shifts = shifts_of_search(largest, inclusive, precision, search[9], by)
-        origin = Origin(points, points[numbers], vectors, bits, find_shifts)
+
+def _table_of(call: Call, arrays: Any, quantities: str) -> NeighborTable:
+    is_full = call.queries is None and call.rule not in DIRECTED
+    origin = _origin_of(call, call.asking, call.pairing, call.systems, quantities)
+    return NeighborTable(arrays, quantities, len(call.points), is_full, origin=origin)
+
+
+def _table_of_some(call: Call, quantities: str, index_bytes: int) -> NeighborTable:
+    """The rows of some points; sorting them exactly needs what the search found."""
+    from halfshell._convert.rows import pairing_of, rows_of, systems_of  # few calls need them
+
+    rows = rows_of(call, quantities, index_bytes)
+    origin = _origin_of(
+        call, call.array[rows.numbers], pairing_of(call, rows.numbers),
+        systems_of(call, rows.numbers), quantities,
+    )  # fmt: skip
     return NeighborTable(
-        arrays, quantities, len(points), False, origin=origin, entries=entries
+        (rows.offsets, *rows.columns), quantities, len(call.points), False, origin=origin,
+        entries=rows.entries,
+    )  # fmt: skip
+
+
+def _origin_of(
+    call: Call, asking: Any, pairing: Any, systems: Any, quantities: str
+) -> Origin | None:
+    """What sorting a table by exact distance needs, where it can be sorted."""
+    if "d" not in quantities or "j" not in quantities:
+        return None
+    kept = copied((pairing, systems, call.vectors))  # the caller's arrays may change
+    cutoff, bits = call.cutoff, call.bits
+    rest: Any = list(call.rest)
+    rest[2:5] = None, None, None  # kernel, memory_limit, progress
+
+    def find_shifts(origin: Origin) -> npt.NDArray[Any]:
+        search: Any = (origin.points, cutoff, kept[2], bits, *rest)
+        arguments: Any = (*search, "S", 8, origin.queries, kept[0], AUTO, kept[1])
+        return _core.neighbors(*arguments)[1]
+
+    points, is_own = call.points, call.cells is not None  # cells own their points
+    if points.box is None or (points.box.ndim == 2 and not np.ndim(points._axes)):
+        asking = asking.copy() if is_own and asking is not None else asking
+        return Origin(points.positions, asking, points.box, bits, find_shifts, is_own=is_own)
+    flags = points.periodic  # what does not repeat is multiplied by no shift
+    assert flags is not None
+    boxes = np.broadcast_to(points.box, (points.n_systems, *points.box.shape[-2:]))
+    boxes = boxes * np.broadcast_to(flags, boxes.shape[:2])[:, :, None]
+    asked_in = kept[1][0] if kept[1][3] is None else kept[1][3]
+    return Origin(points.positions, asking, boxes, bits, find_shifts, asked_in)
+
+
+# ---- the lengths of its rows ---------------------------------------------------------------
+
+
+@search("coordination")
+def coordination(
+    points: PointsLike,
+    cutoff: CutoffLike,
+    *,
+    queries: PointsLike | None = None,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
+    rule: Rule | None = None,
+    exclude: ArrayLike | int | None = None,
+    min_distance: float | None = None,
+    indices: npt.ArrayLike | None = None,
+    inclusive: bool = True,
+    by_type: bool = False,
+    threads: int | None = None,
+    progress: ProgressLike = None,
+) -> npt.NDArray[np.int64]:
+    """Count the neighbours of each point, or of each query.
+
+    Parameters
+    ----------
+    {points, cutoff, queries, box, periodic, rule, exclude, min_distance, indices, inclusive}
+    by_type : bool, default False
+        Count the neighbours of each type separately, by the `types` of the points. They are listed
+        for this, and so they are for `indices`.
+    {threads, progress}
+
+    Returns
+    -------
+    ndarray of int64, shape (n,), (q,) or (r,)
+        Length of each row of the full list; each image counts. The sum is twice `count_pairs`, or
+        equal to it with `queries`, except for rules with a direction.
+
+        By type the shape is (n, t), (q, t) or (r, t): column k counts the neighbours of type k, or
+        those with name k of ``np.unique(types)``. The sum of a row is the count without types.
+
+    Raises
+    ------
+    TypeError, ValueError, OverflowError, MemoryError
+        As for `neighbors`; ValueError also for `by_type` without types.
+
+    See Also
+    --------
+    neighbors : the neighbours themselves.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> hs.coordination([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]], 2.0).tolist()
+    [1, 2, 1]
+    >>> balls = hs.Points([[0.0], [1.0], [3.0]], radii=[1.0, 0.5, 1.0])
+    >>> hs.coordination(balls, None, rule="max").tolist()
+    [1, 1, 0]
+
+    The number of neighbours of each element:
+
+    >>> atoms = hs.Points([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]], types=["Si", "O", "O"])
+    >>> hs.coordination(atoms, 2.0, by_type=True).tolist()  # columns: O, Si
+    [[1, 0], [1, 1], [1, 0]]
+    """
+    call = take(
+        points, cutoff, queries, box, periodic, rule, exclude, min_distance, indices, inclusive,
+        threads, progress, directed=True,
+    )  # fmt: skip
+    if as_flag(by_type, "by_type"):
+        return _count_by_type(call)
+    if call.indices is not None:
+        from halfshell._convert.rows import rows_of  # few calls need it
+
+        return np.diff(rows_of(call, "j", 4).offsets)
+    found = call.run(
+        _core.coordination, call.asking, call.pairing, call.settings.algorithm, call.systems
     )
+    return cast("npt.NDArray[np.int64]", found)
+
+
+def _count_by_type(call: Call) -> npt.NDArray[np.int64]:
+    if call.points._kinds is None:
+        raise ValueError("by_type needs types, and points have none: Points(types=...)")
+    numbers, names = call.points._kinds
+    n_types = 1 + int(numbers.max(initial=0)) if names is None else len(names)
+    n_rows = len(call.points if call.queries is None else call.queries)
+    if call.indices is not None:
+        n_rows = len(call.indices)
+    refuse_unavailable(8 * n_types * n_rows, f"counts for {n_types} types")
+    if call.indices is not None:
+        from halfshell._convert.rows import rows_of  # few calls need it
+
+        offsets, (j,), *_ = rows_of(call, "j", 4)
+    else:
+        offsets, j = listed(call, "j", 4)
+    places = np.repeat(np.arange(n_rows) * n_types, np.diff(offsets)) + numbers[j]
+    return np.bincount(places, minlength=n_rows * n_types).reshape(n_rows, n_types)
+
+
+# ---- k of them -----------------------------------------------------------------------------
+
+
+def _as_ranks(arrays: Any, points: Any, k: Any, **options: Any) -> Arrays:
+    """The rows of a call that C has answered."""
+    return in_rows(arrays, -1, k)
+
+
+@overload
+def nearest(
+    points: PointsLike,
+    k: int,
+    *,
+    quantities: Literal["jd"] = "jd",
+    **options: Unpack[NearestOptions],
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
+@overload
+def nearest(
+    points: PointsLike,
+    k: int,
+    *,
+    quantities: Literal["j", "d", "D", "S"],
+    **options: Unpack[NearestOptions],
+) -> npt.NDArray[Any]: ...
+@overload
+def nearest(
+    points: PointsLike, k: int, *, quantities: str, **options: Unpack[NearestOptions]
+) -> Arrays: ...
+@search("nearest", finish=_as_ranks)
+def nearest(
+    points: PointsLike,
+    k: int,
+    *,
+    max_distance: ArrayLike = np.inf,
+    queries: PointsLike | None = None,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
+    indices: npt.ArrayLike | None = None,
+    quantities: str = "jd",
+    index_dtype: npt.DTypeLike = np.int64,
+    threads: int | None = None,
+    progress: ProgressLike = None,
+) -> Arrays:
+    """Find the k nearest points of each point or query, in an order that is always exact.
+
+    Parameters
+    ----------
+    {points}
+    k : int
+        Number of neighbours, 1 or more. In a periodic box each image of a point counts separately,
+        so k may be larger than n.
+    max_distance : float or array_like of float, shape (s,), default infinity
+        Largest distance of a neighbour, inclusive; not negative. One for each system of a batch.
+    {queries, box, periodic}
+    indices : array_like of int, shape (r,), optional
+        Only the rows of these points, in this order.
+    quantities : str, default "jd"
+        Any of the letters ``j d D S``, each at most once: number of the point, distance, vector,
+        shift. Only these are computed.
+    {index_dtype, threads, progress}
+
+    Returns
+    -------
+    ndarray or tuple of ndarray
+        One array per letter of `quantities`, in that order; a bare array for one letter. With q
+        rows, one for each query or point: ``j`` of `index_dtype`, shape (q, k); ``d`` float64
+        (q, k); ``D`` float64 (q, k, d); ``S`` int32 (q, k, d). In real arithmetic
+        ``D = points[j] - queries[i] + S @ box``.
+
+        Rows ascend by exact distance, and at equal distances by (j, S). Without queries a point is
+        left out of its own row, but its images are not. If there are fewer than k points, or fewer
+        within `max_distance`, the rest of the row is j = -1, d = infinity, D = NaN and S = 0. d is
+        within 1 ulp, ascends along the row and is never above `max_distance`; each component of D
+        is within 1 ulp of d.
+
+    Raises
+    ------
+    TypeError
+        If `k` is not an integer, or another argument is of the wrong kind, as for `pairs`.
+    ValueError
+        If `k` is less than 1, `max_distance` is negative or NaN, `queries` do not have the
+        dimension of the points, or a letter is not one of ``j d D S``; otherwise as for `pairs`.
+        Also for points with groups: the nearest are found by distance alone.
+    OverflowError
+        As for `pairs`.
+    MemoryError
+        If the result would not fit; or if a query is so far from periodic points, well beyond
+        10**8 periods, that the images at nearly equal distances do not fit in memory.
+
+    See Also
+    --------
+    pairs : all pairs within a cutoff.
+
+    Notes
+    -----
+    Points are sorted into cells that each hold a few of them, whatever their density. A group of
+    neighbouring queries looks at the cells within a radius guessed from the local density.
+    float32 with a proven error bound discards distant points, float64 sorts the rest, and
+    distances too close to tell apart are compared in double-word arithmetic, then in integers. A
+    query that found too few is searched again with a radius that surely suffices. So the time
+    depends on n and k, even for strongly clustered points. Radii, types and supports of points
+    do not matter.
+
+    If you come from SciPy: missing neighbours have j = -1 here, not n, and the row of a point
+    does not begin with the point itself.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import halfshell as hs
+    >>> points = [[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]
+    >>> j, d = hs.nearest(points, 2)
+    >>> j.tolist(), d.tolist()
+    ([[1, 2], [0, 2], [1, 0]], [[1.0, 3.0], [1.0, 2.0], [2.0, 3.0]])
+
+    Rows with missing neighbours, masked:
+
+    >>> j, d = hs.nearest(points, 2, max_distance=1.5)
+    >>> np.ma.masked_equal(j, -1).tolist(), d[j >= 0].tolist()
+    ([[1, None], [0, None], [None, None]], [1.0, 1.0])
+
+    In a periodic box, and for queries:
+
+    >>> j, d, S = hs.nearest(points, 2, queries=[[3.5, 0.0]], box=4.0, quantities="jdS")
+    >>> j.tolist(), d.tolist(), S.tolist()
+    ([[0, 2]], [[0.5, 0.5]], [[[1, 0], [0, 0]]])
+    """
+    k = as_k(k)
+    call = take(
+        points, 0.0, queries, box, periodic, indices=indices, threads=threads, progress=progress,
+        by_reach=False,
+    )  # fmt: skip
+    call.refuse("nearest", selection="the nearest are found by distance alone")
+    distances = check_max_distances(max_distance)
+    if isinstance(distances, float):
+        call.cutoff = distances
+    elif call.points.batch is None:
+        raise ValueError(f"max_distance must be a number, got shape {distances.shape}")
+    else:
+        call.system_cutoffs = np.ascontiguousarray(distances, np.float64)
+    call.settings = call.settings._replace(precision="exact")
+    index_bytes = as_index_bytes(index_dtype)
+    if call.indices is not None:
+        return _nearest_of_some(call, k, quantities, index_bytes)
+    result = call.run(
+        _core.nearest, quantities, index_bytes, call.asking, k, call.systems
+    )
+    return in_rows(result, len(call.points if call.queries is None else call.queries), k)
+
+
+def _nearest_of_some(call: Call, k: int, quantities: str, index_bytes: int) -> Arrays:
+    """Rows of some points, found as those of queries, of which each finds itself too."""
+    from halfshell._convert.rows import systems_of  # few calls need it
+
+    check_letters(quantities, "jdDS")  # others are added, and left out again
+    numbers = call.indices
+    assert numbers is not None
+    order = np.arange(len(numbers))
+    if call.points.batch is not None:  # systems come one after the other
+        order = np.argsort(call.points.batch[numbers], kind="stable")
+    asked = numbers[order]
+    letters = quantities + "".join(letter for letter in "jS" if letter not in quantities)
+    result = call.run(
+        _core.nearest, letters, index_bytes, call.array[asked], k + 1, systems_of(call, asked)
+    )
+    columns = dict(zip(letters, in_rows(result, len(asked), k + 1), strict=True))
+    itself = (columns["j"] == asked[:, None]) & ~columns["S"].any(axis=2)
+    place = np.where(itself.any(axis=1), itself.argmax(axis=1), k)  # or the last one is too many
+    kept = np.arange(k) + (np.arange(k) >= place[:, None])
+    back = np.empty_like(order)
+    back[order] = np.arange(len(order))
+    rows = np.arange(len(asked))[:, None]
+    found = tuple(columns[letter][rows, kept][back] for letter in quantities)
+    return found[0] if len(found) == 1 else found

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert.labels import as_kinds
-from halfshell._convert.scene import as_scene
-from halfshell._convert.types import BoxLike, PeriodicLike, PointsLike
+from halfshell._convert.points import Points
 from halfshell._functions.measure import measure
 from halfshell._objects.pictures import (
     MOST_LINES,
@@ -20,18 +18,21 @@ from halfshell._objects.pictures import (
     draw_lines,
     finish,
 )
+from halfshell._search import search
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from halfshell._convert.types import BoxLike, PeriodicLike, PointsLike
 
+
+@search()
 def plot_pairs(
     points: PointsLike,
     i: npt.ArrayLike,
     j: npt.ArrayLike,
     S: npt.ArrayLike | None = None,
     *,
-    types: npt.ArrayLike | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     ax: Axes | None = None,
@@ -41,14 +42,13 @@ def plot_pairs(
 
     Parameters
     ----------
-    points, box, periodic
-        As in `pairs`.
+    {points}
+        Each of their types has a colour and an entry in the legend.
     i, j : array_like of int, shape (m,)
         The points of each pair.
     S : array_like of int, shape (m, d), optional
         The shift of each pair. Default: that of the nearest image, as `measure` finds it.
-    types : array_like of int or str, shape (n,), optional
-        The type of each point; each type has a colour and an entry in the legend.
+    {box, periodic}
     ax : matplotlib.axes.Axes, optional
         Axes to draw on; for points in three dimensions with ``projection="3d"``. Default: axes of
         a new figure.
@@ -66,7 +66,7 @@ def plot_pairs(
         If matplotlib is not installed: ``pip install matplotlib``.
     TypeError, ValueError, OverflowError
         As `measure`; ValueError also for points of more than three dimensions, axes that do not
-        fit, more than 200 000 pairs, or not one type for each point.
+        fit, or more than 200 000 pairs.
 
     Notes
     -----
@@ -80,12 +80,12 @@ def plot_pairs(
     >>> i, j, S = hs.pairs(points, 1.0, box=box, quantities="ijS")
     >>> ax = hs.plot_pairs(points, i, j, S, box=box)  # doctest: +SKIP
     """
-    array, vectors, _ = as_scene(points, box, periodic)
+    known = Points._of(points, "points", box, periodic)
+    array, vectors, kinds = known.positions, known.box, known.types
     ndim = array.shape[1]
-    D, shifts = measure(points, i, j, S, box=box, periodic=periodic, quantities="DS")
+    D, shifts = measure(known, i, j, S, quantities="DS")
     if len(D) > MOST_LINES:
         raise ValueError(f"at most {MOST_LINES} pairs can be drawn, got {len(D)}")
-    kinds = None if types is None else as_kinds(types, len(array))
     ax = axes_for(ndim, ax)
     start = array[np.asarray(i, dtype=np.int64).reshape(-1)].astype(np.float64)
     inside = ~shifts.any(axis=1)

@@ -3,75 +3,95 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator
-from typing import Any, Literal, Never, TypedDict, Unpack, overload
+import os
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert.foreign import kind_of
+from halfshell._convert.arrays import as_real_array
+from halfshell._convert.foreign import is_a, kind_of
 from halfshell._convert.frames import as_frame, frames_of, of_frame
 from halfshell._convert.options import as_flag, as_index_bytes, check_letters
+from halfshell._convert.points import Points
 from halfshell._convert.progress import as_progress
-from halfshell._convert.types import Arrays, BoxLike, Letter, Number, PeriodicLike, PointsLike
 from halfshell._errors import shorten
 from halfshell._functions.pairs import pairs
 from halfshell._objects.verlet_list import VerletList
-from halfshell._unknown import refuse_unknown
+from halfshell._search import search
+from halfshell._settings import current, settings
 
-# Below them a search takes no longer than to look at a list, as docs/verlet.md has measured.
+if TYPE_CHECKING:
+    from typing import Unpack
+
+    from halfshell._convert.types import (
+        ArrayLike,
+        Arrays,
+        BoxLike,
+        CutoffLike,
+        Letter,
+        Number,
+        OptionsOfPoints,
+        PeriodicLike,
+        PointsLike,
+        ProgressLike,
+        Rule,
+    )
+
+    _Frames = Iterable[PointsLike | tuple[PointsLike, BoxLike | None]]
+
+    class _FrameOptions(OptionsOfPoints, total=False):
+        """For overloads: the keywords of `trajectory_pairs`, without `quantities`."""
+
+        skin: Number | Literal["auto"] | None
+        sort: bool
+        index_dtype: npt.DTypeLike
+
+
+# Below them a search takes no longer than to look at a list, as docs/verlet.md has measured, and
+# handing a frame to another thread takes longer than the search.
 _FEW_POINTS = 1000
 
-_Frames = Iterable[PointsLike | tuple[PointsLike, BoxLike | None]]
-
-
-class _FrameOptions(TypedDict, total=False):
-    """For overloads: the keywords of `trajectory_pairs`, without `quantities`."""
-
-    skin: Number | Literal["auto"] | None
-    box: BoxLike | None
-    periodic: PeriodicLike | None
-    inclusive: bool
-    sort: bool
-    index_dtype: npt.DTypeLike
-    kernel: str | None
-    threads: int | None
-    memory_limit: float | None
-    progress: Callable[[float], object] | bool | None
+_Find = Callable[[Points], "Arrays"]
 
 
 @overload
 def trajectory_pairs(
     frames: _Frames,
-    cutoff: Number,
+    cutoff: CutoffLike,
     *,
     quantities: Literal["ij"] = "ij",
     **options: Unpack[_FrameOptions],
 ) -> Generator[tuple[npt.NDArray[Any], npt.NDArray[Any]], None, None]: ...
 @overload
 def trajectory_pairs(
-    frames: _Frames, cutoff: Number, *, quantities: Letter, **options: Unpack[_FrameOptions]
+    frames: _Frames, cutoff: CutoffLike, *, quantities: Letter, **options: Unpack[_FrameOptions]
 ) -> Generator[npt.NDArray[Any], None, None]: ...
 @overload
 def trajectory_pairs(
-    frames: _Frames, cutoff: Number, *, quantities: str, **options: Unpack[_FrameOptions]
+    frames: _Frames, cutoff: CutoffLike, *, quantities: str, **options: Unpack[_FrameOptions]
 ) -> Generator[Arrays, None, None]: ...
+@search()
 def trajectory_pairs(
     frames: _Frames,
-    cutoff: Number,
+    cutoff: CutoffLike,
     *,
     skin: Number | Literal["auto"] | None = "auto",
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
-    quantities: str = "ij",
+    rule: Rule | None = None,
+    exclude: ArrayLike | int | None = None,
+    min_distance: float | None = None,
+    indices: npt.ArrayLike | None = None,
     inclusive: bool = True,
-    sort: bool = False,
+    quantities: str = "ij",
     index_dtype: npt.DTypeLike = np.int64,
-    kernel: str | None = None,
+    sort: bool = False,
     threads: int | None = None,
-    memory_limit: float | None = None,
-    progress: Callable[[float], object] | bool | None = None,
-    **unknown: Never,
+    progress: ProgressLike = None,
 ) -> Generator[Any, None, None]:
     """Find the pairs of each frame of a trajectory, one frame after the other; always exact.
 
@@ -79,21 +99,25 @@ def trajectory_pairs(
     ----------
     frames : iterable
         The frames, each of them points as in `pairs`, or a tuple of two, (points, box), or an
-        object that brings its box: ``ase.Atoms``, a ``Timestep`` of MDAnalysis, an
+        object that brings its box: `Points`, ``ase.Atoms``, a ``Timestep`` of MDAnalysis, an
         ``mdtraj.Trajectory`` of one frame. An array of shape (f, n, d) has f frames, and so do
         ``universe.trajectory`` and an ``mdtraj.Trajectory``. A generator is read one frame at
         a time. Frames may differ in their number of points and in their box.
-    cutoff : float
-        Largest distance of a pair, in the unit of the points; finite, not negative.
+    {cutoff}
     skin : float, "auto" or None, default "auto"
         As in `VerletList`, which keeps a list from frame to frame; "auto" does so if that is
         faster, and always searches fewer than 1000 points. None: each frame is searched
-        separately, for frames that have little in common.
+        separately, for frames that have little in common. So it is where pairs are told apart by
+        more than one cutoff.
     box, periodic : optional
         As in `pairs`, for all frames without a box, including a frame (points, None).
         `periodic` also holds for the boxes of frames, except objects with their own.
-    quantities, inclusive, sort, index_dtype, kernel, memory_limit
-        As in `pairs`, for each frame.
+    {rule, exclude, min_distance, indices, inclusive}
+    quantities : str, default "ij"
+        As in `pairs`, but for the letter ``k``.
+    {index_dtype}
+    sort : bool, default False
+        As in `pairs`.
     threads : int, optional
         As in `pairs`, for each frame. With ``skin=None`` and a number above 1, this many frames of
         1000 points or more are searched at a time, by one thread each; as many are then read ahead
@@ -106,16 +130,15 @@ def trajectory_pairs(
     Returns
     -------
     generator of ndarray or tuple of ndarray
-        For each frame what `pairs` returns, in new arrays: the same pairs
-        and the same bits of d, D and S. Their order is that of `VerletList`; with `sort`, or
-        if each frame is searched, that of `pairs`.
+        For each frame what `pairs` returns, in new arrays: the same pairs and the same bits of d, D
+        and S. Their order is that of `VerletList`; with `sort`, or if each frame is searched, that
+        of `pairs`.
 
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        For all arguments but the frames, as for `VerletList`, by the call itself. For a frame, as
-        for `pairs`, when the iteration reaches it; a note names the frame, and the iteration
-        ends. ValueError also if a frame brings its box and `box` is given.
+        As for `pairs`, of a frame when the iteration reaches it; a note names the frame, and the
+        iteration ends. ValueError also if a frame brings its box and `box` is given.
 
     See Also
     --------
@@ -145,54 +168,65 @@ def trajectory_pairs(
     >>> [pairs.tolist() for pairs in found]
     [[[0, 1], [0, 2]], [[1, 2]]]
     """
-    if unknown:
-        refuse_unknown(trajectory_pairs, unknown)
     check_letters(quantities)
-    sort, index_dtype = as_flag(sort, "sort"), np.dtype(f"i{as_index_bytes(index_dtype)}")
+    wanted: Any = {
+        "quantities": quantities, "sort": as_flag(sort, "sort"),
+        "index_dtype": np.dtype(f"i{as_index_bytes(index_dtype)}"),
+    }  # fmt: skip
+    which: Any = {
+        "rule": rule, "exclude": exclude, "min_distance": min_distance, "indices": indices,
+        "inclusive": as_flag(inclusive, "inclusive"),
+    }  # fmt: skip
+    is_plain = is_a(cutoff, (float, int, np.floating, np.integer)) and not any(
+        value is not None for name, value in which.items() if name != "inclusive"
+    )
+    if not (is_plain or cutoff is None or is_a(cutoff, Mapping)):
+        as_real_array(cutoff, "cutoff", "be a number")  # refused before the first frame
+    given_skin: Any = 0.0 if skin is None else skin
     kept = VerletList(
-        cutoff, 0.0 if skin is None else skin, box=box, periodic=None if box is None else periodic,
-        inclusive=inclusive, kernel=kernel, threads=threads, memory_limit=memory_limit,
+        cast("Any", cutoff if is_plain else 1.0), given_skin, box=box,
+        periodic=None if box is None else periodic, inclusive=inclusive, threads=threads,
     )  # fmt: skip
     iterator, n_frames = frames_of(frames)
     told = as_progress(progress)
     if told is not None and n_frames is None:
         raise TypeError(f"progress needs frames that have a length, got {kind_of(frames)}")
-
     is_shared = skin is None and threads is not None and threads > 1
 
-    def search(points: Any, own: Any, repeats: Any) -> Arrays:
-        return pairs(
-            points, kept.cutoff, box=own, periodic=repeats, quantities=quantities,
-            inclusive=inclusive, sort=sort, index_dtype=index_dtype, kernel=kernel,
-            threads=1 if is_shared else threads, memory_limit=memory_limit,
-        )  # fmt: skip
+    how = current()._asdict()  # those of the call, whenever a frame is searched
 
-    def follow(points: Any, own: Any, repeats: Any) -> Arrays:
-        kept._given = own, repeats  # update() would take None as those before
-        kept.update(points)
-        return kept.pairs(quantities=quantities, sort=sort, index_dtype=index_dtype)
+    def find(points: Points) -> Arrays:
+        count = 1 if is_shared else threads
+        with settings(**how):
+            found: Arrays = pairs(points, cutoff, threads=count, **which, **wanted)
+        return found
 
-    def choose(points: Any, own: Any, repeats: Any) -> Arrays:
-        is_small = isinstance(points, (np.ndarray, list)) and len(points) < _FEW_POINTS
-        return (search if is_small else follow)(points, own, repeats)
+    def follow(points: Points) -> Arrays:
+        is_alike = is_plain and points.radii is None and points.supports is None
+        if not is_alike or points.groups is not None or points.batch is not None:
+            return find(points)
+        if is_a(skin, str) and len(points) < _FEW_POINTS:
+            return find(points)
+        kept._given = None, None  # update() would take no box as that before
+        with settings(**how):
+            kept.update(points)
+            listed: Arrays = kept.pairs(**wanted)
+            return listed
 
-    find = search if skin is None else choose if isinstance(skin, str) else follow
     if is_shared:
-        from halfshell._functions.frames_ahead import search_ahead  # here: others do without
-
         assert threads is not None
-        found = search_ahead(iterator, search, box, periodic, threads)
+        results: Generator[Any, None, None] = _ahead(iterator, find, box, periodic, threads)
     else:
-        found = _each(iterator, find, box, periodic)
-    return found if told is None else _told(found, n_frames or 1, told)
+        results = _each(iterator, find if skin is None else follow, box, periodic)
+    return results if told is None else _told(results, n_frames or 1, told)
 
 
 def _each(
-    frames: Iterator[Any], find: Callable[[Any, Any, Any], Arrays], box: Any, periodic: Any
+    frames: Iterator[Any], find: _Find, box: Any, periodic: Any
 ) -> Generator[Any, None, None]:
     for number, frame in enumerate(frames):
         try:
-            found = find(*as_frame(frame, box, periodic))
+            found = find(as_frame(frame, box, periodic))
         except Exception as error:
             of_frame(error, number)
             shorten(error)
@@ -209,3 +243,75 @@ def _told(
         progress(min((number + 1) / n_frames, 1.0))
         yield found
         del found
+
+
+# ---- several threads -----------------------------------------------------------------------
+
+
+def _ahead(
+    frames: Iterator[Any], find: _Find, box: Any, periodic: Any, n_threads: int
+) -> Generator[Arrays, None, None]:
+    """The pairs of frames that several threads search, one each at a time, in their order.
+
+    As many frames as there are threads are read ahead and copied, as a reader may hand out the same
+    object each time. Where the frames are small all is done by the caller's thread.
+    """
+    number = 0
+    waiting: deque[tuple[Points, Future[Arrays]]] = deque()
+    process, pool = os.getpid(), ThreadPoolExecutor(n_threads)
+
+    def search_again() -> None:
+        """In a child: threads are gone, and frames that they searched are searched anew."""
+        nonlocal process, pool, waiting
+        if process != os.getpid():
+            process, pool = os.getpid(), ThreadPoolExecutor(n_threads)
+            waiting = deque((points, _submit(points)) for points, _ in waiting)
+
+    def _submit(points: Points) -> Future[Arrays]:
+        return pool.submit(find, points)
+
+    def hand_out(most: int) -> Generator[Arrays, None, None]:
+        """The results of the frames that came first, until at most so many wait."""
+        nonlocal number
+        while len(waiting) > most:
+            search_again()
+            future = waiting.popleft()[1]
+            try:
+                found = future.result()
+            except Exception as error:
+                of_frame(error, number)
+                raise
+            del future  # its memory is the caller's
+            number += 1
+            yield found
+
+    try:
+        for frame in frames:
+            try:
+                points = as_frame(frame, box, periodic).replace()  # a copy
+            except Exception as error:
+                yield from hand_out(0)  # the frames before it come first
+                of_frame(error, number)
+                raise
+            search_again()
+            if len(points) >= _FEW_POINTS:
+                waiting.append((points, _submit(points)))
+                yield from hand_out(n_threads)
+            else:
+                yield from hand_out(0)
+                waiting.append((points, _done(find, points)))
+                yield from hand_out(0)
+        yield from hand_out(0)
+    finally:
+        if process == os.getpid():
+            pool.shutdown(cancel_futures=True)
+
+
+def _done(find: _Find, points: Points) -> Future[Arrays]:
+    """The search of a frame by this thread."""
+    future: Future[Arrays] = Future()
+    try:
+        future.set_result(find(points))
+    except Exception as error:
+        future.set_exception(error)
+    return future

@@ -11,13 +11,13 @@ import numpy as np
 from halfshell import _core
 from halfshell._convert.arrays import as_real_array
 from halfshell._convert.memory import refuse_large
-from halfshell._convert.scene import (
+from halfshell._convert.objects import vectors_of
+from halfshell._convert.points import (
     LENGTHS_AND_ANGLES,
     MAX_DIM,
     as_box,
     as_periodic_bits,
     as_points,
-    vectors_of,
 )
 
 if TYPE_CHECKING:
@@ -383,3 +383,6 @@ def _directions(angles: list[float]) -> list[list[float]]:
         [cos_gamma, sin_gamma, 0.0],
         [cos_beta, c_y, math.sqrt(square)],
     ]
+
+
+_core.know("Box", Box)

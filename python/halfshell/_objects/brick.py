@@ -4,29 +4,97 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _show
+from halfshell._convert.arrays import as_array
+from halfshell._convert.call import DIRECTED
+from halfshell._convert.foreign import whole_number
+from halfshell._convert.listed import as_point_numbers
 from halfshell._convert.options import check_letters
+from halfshell._convert.points import Labels, Points, setattr_
 from halfshell._objects.neighbor_table import NeighborTable
 
 if TYPE_CHECKING:
-    from halfshell._convert.types import ArrayLike, Arrays, FloatArray
+    from halfshell._convert.types import ArrayLike, Arrays, FloatArray, PointsLike, Rule
 
+Array = npt.NDArray[Any]
 Numbers = npt.NDArray[np.int64]
+#: What is known of points, by name, one row a point; of types, groups and labels the numbers.
+Columns = dict[str, Array]
 
 _AT_A_TIME = 1 << 14  # points whose pairs are counted
+_NAMED = ("types", "groups", "labels")
+
+
+class Scope(NamedTuple):
+    """What all bricks of a division are searched with."""
+
+    n_points: int
+    cutoff: Any  # as it was given, for the same search of any of the points
+    rule: Rule | None
+    reach: float  # no pair is further apart
+    box: FloatArray | None
+    axes: int  # bits of those that repeat
+    names: dict[str, tuple[str, ...] | None]  # of types, groups and labels among all points
+
+    def columns_of(self, points: Points) -> Columns:
+        """What a search goes by, with the same number for the same name in all parts."""
+        columns = {"positions": points.positions}
+        for name in ("radii", "supports"):
+            if getattr(points, name) is not None:
+                columns[name] = getattr(points, name)
+        for name, labels in labels_of(points).items():
+            names = self.names.get(name)
+            if labels.names is not None and labels.names != names:
+                places = {one: k for k, one in enumerate(names or ())}
+                unknown = [one for one in labels.names if one not in places]
+                if unknown:
+                    raise ValueError(f"{name} of the divided points have no {unknown[0]!r}")
+                every = np.array([places[one] for one in labels.names], labels.numbers.dtype)
+                columns[name] = every[labels.numbers]
+            else:
+                columns[name] = labels.numbers
+        return columns
+
+    def points_of(self, columns: Columns) -> Points:
+        """Points with these columns, which share memory with them where it is aligned."""
+        points = Points.__new__(Points)
+        for slot in Points.__slots__:
+            setattr_(points, slot, None)
+        for name, column in columns.items():
+            array = aligned(column).view()
+            array.flags.writeable = False
+            if name in _NAMED:
+                setattr_(points, f"_{name}", Labels(array, self.names.get(name)))
+            else:
+                setattr_(points, name, array)
+        setattr_(points, "_box", None if self.box is None else aligned(self.box))
+        setattr_(points, "_axes", self.axes)
+        setattr_(points, "tells_periodic", True)
+        return points
+
+
+def aligned(array: Array) -> Array:
+    """As the core takes it; between processes arrays may arrive at any address."""
+    return np.require(array, requirements=["C", "A"])
+
+
+def labels_of(points: Points) -> dict[str, Labels]:
+    """Types, groups and labels that are known."""
+    every = {"types": points._kinds, "groups": points._groups, "labels": points._labels}
+    return {name: labels for name, labels in every.items() if labels is not None}
 
 
 class Brick:
     """The points of one worker, and the other points that it needs.
 
-    Made by `bricks`. It can be pickled, and holds no coordinates. Methods take the coordinates of
-    all points, or of `members` alone, and return indices among all points: exactly what a single
-    search of all points finds for this brick.
+    Made by `bricks`. It can be pickled, and holds no coordinates. Methods take all points, or
+    `members` alone, with what is known of them, and return indices among all points: exactly what
+    a single search of all points finds for this brick.
 
     Attributes
     ----------
@@ -36,7 +104,8 @@ class Brick:
         Other points that may be within the cutoff of one of these, ascending.
     members : ndarray of int64, shape (m + k,)
         Both together, ascending.
-    cutoff : float
+    cutoff : float, ndarray, dict or None
+        As it was given.
     n_points : int
         The number of all points.
 
@@ -55,17 +124,8 @@ class Brick:
     __repr__ = _show.line
     _repr_html_ = _show.html
 
-    def __init__(
-        self,
-        members: Numbers,
-        is_owned: npt.NDArray[np.bool_],
-        n_points: int,
-        cutoff: float,
-        scene: tuple[FloatArray | None, tuple[bool, ...]],
-    ) -> None:
-        self.members, self.n_points, self.cutoff = members, n_points, cutoff
-        self.is_owned = is_owned  # of each member
-        self._box, self._periodic = scene
+    def __init__(self, members: Numbers, is_owned: npt.NDArray[np.bool_], scope: Scope) -> None:
+        self.members, self.is_owned, self._scope = members, is_owned, scope
 
     @property
     def owned(self) -> Numbers:
@@ -77,26 +137,36 @@ class Brick:
         """Other points that may be within the cutoff of one of these, ascending."""
         return self.members[~self.is_owned]
 
+    @property
+    def cutoff(self) -> Any:
+        """As it was given."""
+        return self._scope.cutoff
+
+    @property
+    def n_points(self) -> int:
+        """The number of all points."""
+        return self._scope.n_points
+
     def pairs(
         self,
-        points: ArrayLike,
+        points: PointsLike,
         *,
-        quantities: str = "ij",
+        exclude: ArrayLike | int | None = None,
+        min_distance: float | None = None,
         inclusive: bool = True,
-        kernel: str | None = None,
+        quantities: str = "ij",
         threads: int | None = None,
-        memory_limit: float | None = None,
     ) -> Arrays:
         """Find the pairs whose lower number is a point of this brick.
 
         Parameters
         ----------
-        points : array_like of float, shape (n, d) or (m + k, d)
-            Coordinates of all points, or of `members`.
+        points : array_like of float, shape (n, d) or (m + k, d), or Points
+            All points, or `members`; with radii, types and so on if they were divided with these.
+        exclude, min_distance, inclusive, threads
+            As in `pairs`, with numbers among all points.
         quantities : str, default "ij"
             Any of the letters ``i j d D S P``, as in `pairs`.
-        inclusive, kernel, threads, memory_limit
-            As in `pairs`.
 
         Returns
         -------
@@ -106,46 +176,51 @@ class Brick:
         import halfshell as hs
 
         check_letters(quantities)
-        members, own = self.members, self._places()
-        letters = quantities if "i" in quantities else "i" + quantities
+        own, places = self._of_members(points), np.flatnonzero(self.is_owned)
         # All pairs of the members are found sooner than those of half of them.
-        some = None if 2 * len(own) >= len(members) else own
+        some = None if 2 * len(places) >= len(self.members) else places
+        letters = quantities if "i" in quantities else "i" + quantities
         found: Any = hs.pairs(
-            self._of_members(points), self.cutoff, touching=some,
-            quantities=letters, sort=True,
-            **self._options(inclusive, kernel, threads, memory_limit),
+            own, self.cutoff, rule=self._scope.rule, exclude=self._excluded(exclude),
+            min_distance=min_distance, indices=some, inclusive=inclusive, quantities=letters,
+            sort=True, threads=threads,
         )  # fmt: skip
         columns = dict(zip(letters, found if isinstance(found, tuple) else (found,), strict=True))
         kept = self.is_owned[columns["i"]]
         arrays = []
         for letter in quantities:
             array = columns[letter][kept]
-            arrays.append(members[array] if letter in "ijP" else array)
+            arrays.append(self.members[array] if letter in "ijP" else array)
         return tuple(arrays) if len(arrays) > 1 else arrays[0]
 
     def count_pairs(
         self,
-        points: ArrayLike,
+        points: PointsLike,
         *,
+        exclude: ArrayLike | int | None = None,
+        min_distance: float | None = None,
         inclusive: bool = True,
-        kernel: str | None = None,
         threads: int | None = None,
-        memory_limit: float | None = None,
     ) -> int:
         """Count the pairs whose lower number is a point of this brick.
 
         Parameters
         ----------
-        points, inclusive, kernel, threads, memory_limit
+        points, exclude, min_distance, inclusive, threads
             As in `Brick.pairs`. Memory is that of the pairs of a few thousand points.
         """
         import halfshell as hs
 
-        own, places, count = self._of_members(points), self._places(), 0
-        options = self._options(inclusive, kernel, threads, memory_limit)
-        for first in range(0, len(places), _AT_A_TIME):
+        rule, excluded = self._scope.rule, self._excluded(exclude)
+        if rule in DIRECTED:
+            raise ValueError(f"rule {rule!r} has a direction, and these pairs have none")
+        own, places, count = self._of_members(points), np.flatnonzero(self.is_owned), 0
+        for first in range(0, max(1, len(places)), _AT_A_TIME):
             some = places[first : first + _AT_A_TIME]
-            table = hs.neighbors(own, self.cutoff, indices=some, **options)
+            table = hs.neighbors(
+                own, self.cutoff, rule=rule, exclude=excluded, min_distance=min_distance,
+                indices=some, inclusive=inclusive, threads=threads,
+            )  # fmt: skip
             row = np.repeat(some, table.counts)
             # An image of a point itself is there in both directions.
             count += int((table.indices > row).sum()) + int((table.indices == row).sum()) // 2
@@ -153,19 +228,19 @@ class Brick:
 
     def neighbors(
         self,
-        points: ArrayLike,
+        points: PointsLike,
         *,
-        quantities: str = "j",
+        exclude: ArrayLike | int | None = None,
+        min_distance: float | None = None,
         inclusive: bool = True,
-        kernel: str | None = None,
+        quantities: str = "j",
         threads: int | None = None,
-        memory_limit: float | None = None,
     ) -> NeighborTable:
         """Find all neighbours of the points of this brick.
 
         Parameters
         ----------
-        points, inclusive, kernel, threads, memory_limit
+        points, exclude, min_distance, inclusive, threads
             As in `Brick.pairs`.
         quantities : str, default "j"
             Any of the letters ``j d D S``, as in `neighbors`.
@@ -178,8 +253,10 @@ class Brick:
         import halfshell as hs
 
         table = hs.neighbors(
-            self._of_members(points), self.cutoff, indices=self._places(),
-            quantities=quantities, **self._options(inclusive, kernel, threads, memory_limit),
+            self._of_members(points), self.cutoff, rule=self._scope.rule,
+            exclude=self._excluded(exclude), min_distance=min_distance,
+            indices=np.flatnonzero(self.is_owned), inclusive=inclusive, quantities=quantities,
+            threads=threads,
         )  # fmt: skip
         columns = {"j": "indices", "d": "distances", "D": "vectors", "S": "shifts"}
         arrays = [getattr(table, columns[letter]) for letter in quantities]
@@ -187,27 +264,38 @@ class Brick:
             arrays[quantities.index("j")] = self.members[table.indices]
         return NeighborTable((table.offsets, *arrays), quantities, self.n_points, False)
 
-    def _options(
-        self, inclusive: bool, kernel: str | None, threads: int | None, memory_limit: float | None
-    ) -> dict[str, Any]:
-        scene = {"box": self._box, "periodic": None if self._box is None else self._periodic}
-        return scene | {
-            "inclusive": inclusive, "kernel": kernel, "threads": threads,
-            "memory_limit": memory_limit,
-        }  # fmt: skip
+    def _excluded(self, exclude: ArrayLike | int | None) -> Any:
+        """Pairs of members that do not count, by their places among them."""
+        if exclude is None or whole_number(exclude, "exclude") is not None:
+            return exclude
+        array = as_array(exclude, "exclude", "be pairs of numbers, (k, 2), or a whole number")
+        if array.ndim != 2 or array.shape[1] != 2:
+            return array  # which the search refuses
+        numbers = as_point_numbers(array.reshape(-1), "exclude", self.n_points, "points")
+        places = np.searchsorted(self.members, numbers)
+        is_member = np.append(self.members, -1)[places] == numbers
+        return places.reshape(-1, 2)[is_member.reshape(-1, 2).all(axis=1)]
 
-    def _places(self) -> Numbers:
-        """Where the points of this brick are among the members."""
-        return np.flatnonzero(self.is_owned)
-
-    def _of_members(self, points: Any) -> Any:
-        array, n_members = np.asarray(points), len(self.members)
-        if array.ndim != 2 or len(array) not in (self.n_points, n_members):
+    def _of_members(self, points: Any) -> Points:
+        """The members, from all points or as they are, in the box of the bricks."""
+        given, scope, n_members = Points._of(points), self._scope, len(self.members)
+        if len(given) not in (self.n_points, n_members):
             raise ValueError(
                 f"points must have shape (n, d) with n = {self.n_points}, all points, or "
-                f"{n_members}, the members of the brick; got {array.shape}"
+                f"{n_members}, the members of the brick; got {given.positions.shape}"
             )
-        return array[self.members] if len(array) == self.n_points else array
+        if given.batch is not None:
+            raise ValueError("bricks cannot be combined with a batch")
+        if given.box is not None and not (
+            scope.box is not None
+            and np.array_equal(given.box, scope.box)
+            and given._axes == scope.axes
+        ):
+            raise ValueError("points bring a box that is not that of the brick")
+        columns = scope.columns_of(given)
+        if len(given) == self.n_points:
+            columns = {name: one[self.members] for name, one in columns.items()}
+        return scope.points_of(columns)
 
 
 class Bricks(Sequence[Brick]):

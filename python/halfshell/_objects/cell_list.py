@@ -1,29 +1,57 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`CellList`: points that are sorted into cells once and asked many times; the work is in C.
 
-The class is made of files, for its documentation fills more than one: here it is made and shows its
-cells; `cell_pairs`, `cell_rows` and `cell_counts` have the searches, by what they return.
+Every search takes one in place of points: the methods of the same names are these calls.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, Never, Self, cast
+import inspect
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _show
-from halfshell._convert.lengths import as_cutoff, as_positive
-from halfshell._convert.scene import as_scene
-from halfshell._convert.types import BoxLike, Number, PeriodicLike, PointsLike, Precision
-from halfshell._objects.cell_counts import CellCounts
-from halfshell._objects.cell_pairs import CellPairs
-from halfshell._objects.cell_rows import CellRows
-from halfshell._objects.origin import Origin
+from halfshell._convert.arrays import as_real_array
+from halfshell._convert.call import same_boxes, take
+from halfshell._convert.foreign import exact_number, is_a, shown
+from halfshell._convert.lengths import as_cutoff, as_positive, as_radii
+from halfshell._convert.options import most_pairs
+from halfshell._convert.points import Points, refuse_infinite
+from halfshell._convert.starts import starts_of
+from halfshell._functions import clusters as _clusters
+from halfshell._functions import counts as _counts
+from halfshell._functions import neighbors as _rows
+from halfshell._functions import pairs as _pairs
+from halfshell._functions import rdf as _rdf
+from halfshell._search import document
 from halfshell._unknown import refuse_unknown
 
 if TYPE_CHECKING:
+    from typing import Never
+
     from matplotlib.axes import Axes
+
+    from halfshell._convert.types import (
+        ArrayLike,
+        Arrays,
+        BoxLike,
+        CutoffLike,
+        Number,
+        PairBlocks,
+        PeriodicLike,
+        PointsLike,
+    )
+    from halfshell._functions.clusters import Clusters
+    from halfshell._functions.rdf import RadialDistribution
+    from halfshell._objects.neighbor_table import NeighborTable
+
+# Whose candidates are listed at a time.
+_ASKED_AT_A_TIME = 4096  # points whose candidates are looked up together
+
+Method = TypeVar("Method", bound="Callable[..., Any]")
 
 
 class Candidates(NamedTuple):
@@ -43,34 +71,61 @@ class Candidates(NamedTuple):
         return _show.html(self)
 
 
-class CellList(CellPairs, CellRows, CellCounts):
+def _like(function: Callable[..., Any], *own: str) -> Callable[[Method], Method]:
+    """Decorate a method that calls a search with the cells as its points: its options are known.
+
+    own: arguments of the method, in place of those of the search that say the same.
+    """
+
+    def decorate(method: Method) -> Method:
+        signature = inspect.signature(function)
+        mine = inspect.signature(method).parameters
+        known = [one for name, one in mine.items() if name != "options"]
+        known += [
+            parameter for name, parameter in signature.parameters.items()
+            if name not in ("points", "box", "periodic", *mine, *own)
+        ]  # fmt: skip
+        known.sort(key=lambda parameter: (parameter.kind, parameter.default is not parameter.empty))
+        cast("Any", method).__signature__ = signature.replace(
+            parameters=known, return_annotation=inspect.signature(method).return_annotation
+        )
+        named = ", ".join(one.name for one in known if one.name not in mine)
+        method.__doc__ = (method.__doc__ or "").replace("**options", named)
+        return method
+
+    return decorate
+
+
+class CellList:
     """Points sorted into cells once, for many searches.
 
     Parameters
     ----------
-    points : array_like of float, shape (n, d)
-        Coordinates, as in `pairs`; they are copied. An object such as ``ase.Atoms`` brings its own
-        box.
+    {points}
     cutoff : float
         The largest cutoff that the cells are made for. They serve smaller ones too; a call with a
-        larger cutoff makes cells of its own.
-    box, periodic, precision
-        As in `pairs`.
+        larger cutoff, or with radii, supports or cutoffs by type, makes cells of its own.
+    {box, periodic}
     cell_size : float, optional
         The minimum width of a cell, in the unit of the points; finite, greater than 0. Each axis
         is cut into as many equal cells as that allows. It changes the layout and the run time, but
-        no answer (except with `precision` "single", which depends on the cells); a cell may be
+        no answer (except with the precision "single", which depends on the cells); a cell may be
         narrower than the cutoff. Cells are wider if there would be more than 2 n + 64 of them,
         or more than a few thousand rows of cells within the cutoff, and a few millionths wider if
         `cell_size` is the cutoff divided by a whole number. Default: a width that is fast for this
         cutoff and this number of points.
+    domain : tuple (low, high), optional
+        The lowest and the highest coordinates that the cells reach over along open axes, each a
+        number or shape (d,): with a `cell_size` the cells are the same for any points within, as
+        far as their number allows. Points beyond make it larger. In open space, and in boxes along
+        the coordinate axes.
     threads : int, optional
         Threads that sort the points; also the default of later calls.
-    memory_limit : float, optional
-        Bytes that the cells may take; later calls have limits of their own. As in `pairs`.
 
     Attributes
     ----------
+    points : Points
+        What is known of the points; a copy.
     cutoff : float
         As given.
     shape : tuple of int, length d
@@ -92,17 +147,17 @@ class CellList(CellPairs, CellRows, CellCounts):
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As for `pairs`.
+        As for `pairs`; ValueError for a batch.
 
     See Also
     --------
-    pairs, neighbors, pairs_between, count_pairs : the same searches without keeping the cells.
+    pairs, neighbors, pairs_between, count_pairs : take a CellList in place of points.
 
     Notes
     -----
-    A cell list is immutable, and any number of threads may search it at once. It holds the points
-    once as given, as float64, and once in cell order; its tables with distances refer to the
-    former and keep the list alive.
+    A cell list is immutable, and any number of threads may search it at once. A pickle has the
+    points, and the cells are made again from it. It holds the points once as given and once in
+    cell order.
 
     Cells are found by a counting sort in O(n + cells), and there are at most 2 n + 64 of them,
     however large the volume (Hockney and Eastwood, Computer Simulation Using Particles, 1981,
@@ -113,7 +168,7 @@ class CellList(CellPairs, CellRows, CellCounts):
     Examples
     --------
     >>> import halfshell as hs
-    >>> cells = hs.CellList([[0.5, 0.5], [1.5, 0.5], [3.5, 0.5]], 1.0, box=[4.0, 4.0])
+    >>> cells = hs.CellList([[0.5, 0.5], [1.5, 0.5], [3.5, 0.5]], 1.0, box=4.0)
     >>> i, j = cells.pairs(sort=True)
     >>> i.tolist(), j.tolist()
     ([0, 0], [1, 2])
@@ -123,7 +178,12 @@ class CellList(CellPairs, CellRows, CellCounts):
     0
     """
 
-    __slots__ = ()
+    __slots__ = ("_cell_size", "_cells", "_cutoff", "_domain", "_layout", "_threads", "points")
+
+    #: Told by `take` from other points.
+    _is_cell_list = True
+
+    points: Points
 
     def __init__(
         self,
@@ -133,37 +193,35 @@ class CellList(CellPairs, CellRows, CellCounts):
         box: BoxLike | None = None,
         periodic: PeriodicLike | None = None,
         cell_size: Number | None = None,
-        precision: Precision = "exact",
+        domain: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
         threads: int | None = None,
-        memory_limit: float | None = None,
         **unknown: Never,
     ) -> None:
         if unknown:
             refuse_unknown(CellList, unknown)
-        array, vectors, bits = as_scene(points, box, periodic)
-        self._cutoff = as_cutoff(cutoff)
-        self._cells = _core.cells_build(
-            array, self._cutoff, vectors, bits, True, precision, None, memory_limit, None, threads,
-            0.0 if cell_size is None else as_positive(cell_size, "cell_size"),
-        )
+        width = 0.0 if cell_size is None else as_positive(cell_size, "cell_size")
+        self._cutoff, self._cell_size, self._threads = as_cutoff(cutoff), width, threads
+        found = Points._of(points, "points", box, periodic)
+        self._domain = None if domain is None else _as_domain(domain, found)
+        self._build(found)
+
+    def _build(self, points: Points) -> None:
+        call = take(points, self._cutoff, threads=self._threads, by_reach=False)
+        call.refuse("CellList", batch="cells are those of one system")
+        self._cells = call.run(_core.cells_build, self._cell_size, self._domain)
         self._layout = _core.cells_layout(self._cells)
-        self._n_points: int = array.shape[0]
-        self._ndim: int = array.shape[1]
-        self._precision = precision
-        own_vectors = None if vectors is None else vectors.copy()
-        self._origin = Origin.of_own(self._layout["points"], None, own_vectors, bits)
-        self._threads = threads
+        self.points = points._over(self._layout["points"])
 
     def __len__(self) -> int:
         """Number of points."""
-        return self._n_points
+        return len(self.points)
 
     _repr_html_ = _show.html
 
     def __repr__(self) -> str:
         cells = len(self.cell_start) - 1
         kind = "cells" if self.cell_ids is None else "occupied cells"
-        return f"CellList({self._n_points} points, {cells} {kind}, cutoff {self.cutoff!r})"
+        return f"CellList({len(self)} points, {cells} {kind}, cutoff {self.cutoff!r})"
 
     def __copy__(self) -> Self:
         return self
@@ -172,7 +230,11 @@ class CellList(CellPairs, CellRows, CellCounts):
         return self  # it does not change
 
     def __reduce__(self) -> tuple[Any, ...]:
-        raise TypeError("a CellList cannot be pickled: pickle its points, and make it again")
+        return _restored, (self.points, *self._given)
+
+    @property
+    def _given(self) -> tuple[Any, ...]:
+        return self._cutoff, self._cell_size, self._domain, self._threads
 
     @property
     def cutoff(self) -> float:
@@ -198,6 +260,349 @@ class CellList(CellPairs, CellRows, CellCounts):
     def cell_ids(self) -> npt.NDArray[np.int64] | None:
         return cast("npt.NDArray[np.int64] | None", self._layout["cell_ids"])
 
+    # ---- searches --------------------------------------------------------------------------
+
+    def _or_own(self, cutoff: Any) -> Any:
+        return self._cutoff if cutoff is None else cutoff
+
+    @_like(_pairs.pairs)
+    def pairs(self, cutoff: CutoffLike = None, **options: Any) -> Arrays:
+        """Find every pair of points within a cutoff: `halfshell.pairs` of the cells.
+
+        Parameters
+        ----------
+        cutoff : float or array_like, optional
+            As in `halfshell.pairs`. Default: that of the list.
+        **options
+            As in `halfshell.pairs`.
+
+        Returns
+        -------
+        ndarray or tuple of ndarray
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
+        >>> cells.pairs(1.0, quantities="P").tolist()
+        [[0, 1]]
+        """
+        found: Arrays = _pairs.pairs(self, self._or_own(cutoff), **options)
+        return found
+
+    @_like(_pairs.iter_pairs)
+    def iter_pairs(self, cutoff: CutoffLike = None, **options: Any) -> PairBlocks[Any]:
+        """Iterate over the pairs in blocks: `halfshell.iter_pairs` of the cells.
+
+        Parameters
+        ----------
+        cutoff : float or array_like, optional
+            As in `halfshell.pairs`. Default: that of the list.
+        **options
+            As in `halfshell.iter_pairs`.
+
+        Returns
+        -------
+        iterator of ndarray or tuple of ndarray
+            It keeps the cells of the list alive.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
+        >>> sum(len(i) for i, j in cells.iter_pairs(max_pairs=1))
+        2
+        """
+        return _pairs.iter_pairs(self, self._or_own(cutoff), **options)
+
+    @_like(_pairs.for_each_pair)
+    def for_each_pair(self, callback: Any, cutoff: CutoffLike = None, **options: Any) -> int:
+        """Call a function for each pair: `halfshell.for_each_pair` of the cells.
+
+        Parameters
+        ----------
+        callback
+            As in `halfshell.for_each_pair`.
+        cutoff : float, optional
+            Default: that of the list.
+        **options
+            As in `halfshell.for_each_pair`.
+
+        Returns
+        -------
+        int
+            The number of pairs for which it was called.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
+        >>> cells.for_each_pair(lambda i, j, S, D, d2: print(i, j, d2))
+        0 1 1.0
+        1 2 4.0
+        2
+        """
+        return _pairs.for_each_pair(self, self._or_own(cutoff), callback, **options)
+
+    @_like(_rows.neighbors)
+    def neighbors(self, cutoff: CutoffLike = None, **options: Any) -> NeighborTable:
+        """All neighbours of each point, or of each query: `halfshell.neighbors` of the cells.
+
+        Parameters
+        ----------
+        cutoff : float or array_like, optional
+            Default: that of the list.
+        **options
+            As in `halfshell.neighbors`.
+
+        Returns
+        -------
+        NeighborTable
+
+        See Also
+        --------
+        query : a radius for each query.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
+        >>> [row.tolist() for row in cells.neighbors()]
+        [[1], [0, 2], [1]]
+        """
+        return _rows.neighbors(self, self._or_own(cutoff), **options)
+
+    @_like(_rows.neighbors, "cutoff", "queries", "indices")
+    def query(
+        self, queries: PointsLike, radius: ArrayLike | None = None, **options: Any
+    ) -> NeighborTable:
+        """All points within a radius of each query.
+
+        Parameters
+        ----------
+        queries : array_like of float, shape (q, d), or Points
+            Coordinates of queries, in the unit of the points; they may lie anywhere.
+        radius : float or array_like of float, shape (q,), optional
+            One for all queries, or one for each. Default: the cutoff of the list, up to which the
+            kept cells are used; larger radii take a separate search.
+        **options
+            As in `halfshell.neighbors`.
+
+        Returns
+        -------
+        NeighborTable
+            A row for each query, ascending by (j, S). A point that coincides with a query is its
+            neighbour at distance 0.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
+        >>> [row.tolist() for row in cells.query([[0.5], [9.0]])]
+        [[0, 1], []]
+        >>> [row.tolist() for row in cells.query([[0.0], [0.0]], [0.5, 3.0])]
+        [[0], [0, 1, 2]]
+        """
+        asking = self._asking(queries)
+        radii = as_radii(radius, len(asking))
+        cells = self._without_reach()
+        try:
+            if radii is None or isinstance(radii, float):
+                within = self._cutoff if radii is None else radii
+                return cells.neighbors(within, queries=asking, **options)
+            from halfshell._objects.radii import query_each  # few calls need it
+
+            return query_each(cells, asking, radii, options)
+        except MemoryError as error:
+            if radius is None:
+                raise
+            raise MemoryError(str(error).replace("cutoff", "radius")) from None
+
+    def _without_reach(self) -> CellList:
+        """The same cells, of points whose own radii or supports do not matter."""
+        if self.points.radii is None and self.points.supports is None:
+            return self
+        other = CellList.__new__(CellList)
+        for name in CellList.__slots__:
+            setattr(other, name, getattr(self, name))
+        other.points = self.points.replace(radii=None, supports=None)
+        return other
+
+    @_like(_rows.nearest)
+    def nearest(self, k: int, **options: Any) -> Arrays:
+        """Find the k nearest points: `halfshell.nearest` of the cells.
+
+        The first call builds a tree of the points; later calls, with any `k` and any queries,
+        reuse it. The cutoff of the list has no effect.
+
+        Parameters
+        ----------
+        k : int
+            Number of neighbours, 1 or more.
+        **options
+            As in `halfshell.nearest`. The tree must fit the memory limit by itself, but does not
+            count towards it otherwise.
+
+        Returns
+        -------
+        ndarray or tuple of ndarray
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0, box=8.0)
+        >>> j, d = cells.nearest(2)
+        >>> j.tolist(), d.tolist()
+        ([[1, 2], [0, 2], [1, 0]], [[1.0, 3.0], [1.0, 2.0], [2.0, 3.0]])
+        """
+        found: Arrays = _rows.nearest(self, k, **options)
+        return found
+
+    @_like(_counts.count_pairs)
+    def count_pairs(
+        self, cutoff: CutoffLike = None, **options: Any
+    ) -> int | npt.NDArray[np.int64]:
+        """Count the pairs within one or several cutoffs: `halfshell.count_pairs` of the cells.
+
+        Parameters
+        ----------
+        cutoff : float or array_like, optional
+            Default: that of the list.
+        **options
+            As in `halfshell.count_pairs`.
+
+        Returns
+        -------
+        int or ndarray of int64, shape (k,)
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
+        >>> cells.count_pairs(), cells.count_pairs(1.0), cells.count_pairs(queries=[[2.0]])
+        (2, 1, 3)
+        """
+        found: int | npt.NDArray[np.int64]
+        found = _counts.count_pairs(self, self._or_own(cutoff), **options)
+        return found
+
+    @_like(_rows.coordination)
+    def coordination(self, cutoff: CutoffLike = None, **options: Any) -> npt.NDArray[np.int64]:
+        """Count the neighbours of each point, or query: `halfshell.coordination` of the cells.
+
+        Parameters
+        ----------
+        cutoff : float or array_like, optional
+            Default: that of the list.
+        **options
+            As in `halfshell.coordination`.
+
+        Returns
+        -------
+        ndarray of int64, shape (n,), (q,) or (r,)
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> hs.CellList([[0.0], [1.0], [3.0]], 2.0).coordination().tolist()
+        [1, 2, 1]
+        """
+        return _rows.coordination(self, self._or_own(cutoff), **options)
+
+    @_like(_counts.pair_histogram)
+    def pair_histogram(
+        self, edges: npt.ArrayLike, **options: Any
+    ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
+        """Count the pairs by distance: `halfshell.pair_histogram` of the cells.
+
+        Parameters
+        ----------
+        edges : array_like of float, shape (bins + 1,)
+            Limits of the bins. The last one may be larger than the cutoff of the list: that costs
+            a search of its own.
+        **options
+            As in `halfshell.pair_histogram`.
+
+        Returns
+        -------
+        ndarray of int64, or with weights float64
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> hs.CellList([[0.0], [1.0], [3.0]], 3.0).pair_histogram([0.0, 1.0, 2.0, 3.0]).tolist()
+        [0, 1, 2]
+        """
+        return _counts.pair_histogram(self, edges, **options)
+
+    @_like(_rdf.rdf)
+    def rdf(
+        self, cutoff: Number | None = None, bins: int | ArrayLike = 100, **options: Any
+    ) -> RadialDistribution:
+        """Compute g(r): `halfshell.rdf` of the cells.
+
+        Parameters
+        ----------
+        cutoff : float, optional
+            The largest distance. Default: the cutoff of the list.
+        bins : int or array_like of float
+            As in `halfshell.rdf`.
+        **options
+            As in `halfshell.rdf`.
+
+        Returns
+        -------
+        RadialDistribution
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> hs.CellList([[0.0], [1.0], [3.0]], 2.0, box=4.0).rdf(bins=2).counts.tolist()
+        [0, 4]
+        """
+        if cutoff is None and exact_number(bins) is not None:
+            cutoff = self._cutoff
+        return _rdf.rdf(self, cutoff, bins, **options)
+
+    @_like(_clusters.clusters)
+    def clusters(self, cutoff: CutoffLike = None, **options: Any) -> Clusters:
+        """Group the points: `halfshell.clusters` of the cells.
+
+        Parameters
+        ----------
+        cutoff : float or array_like, optional
+            Default: that of the list.
+        **options
+            As in `halfshell.clusters`.
+
+        Returns
+        -------
+        Clusters
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> hs.CellList([[0.0], [1.0], [3.0]], 2.0).clusters(1.5).labels.tolist()
+        [0, 0, 1]
+        """
+        return _clusters.clusters(self, self._or_own(cutoff), **options)
+
+    # ---- cells -----------------------------------------------------------------------------
+
+    @property
+    def _ndim(self) -> int:
+        return int(self.points.positions.shape[1])
+
+    def _asking(self, queries: Any, name: str = "queries") -> Points:
+        """Points of as many dimensions, that bring no other box."""
+        found = Points._of(queries, name, ndim=self._ndim)
+        ndim = found.positions.shape[1]
+        if ndim != self._ndim:
+            raise ValueError(f"{name} must have {self._ndim} columns, as the cells, got {ndim}")
+        if found.box is not None and not same_boxes(found, self.points):
+            raise ValueError(f"{name} bring a box that is not that of points: give arrays")
+        return found
+
     def cell_of(self, points: PointsLike) -> npt.NDArray[np.int64]:
         """Find the cell that each given point would be in.
 
@@ -221,7 +626,7 @@ class CellList(CellPairs, CellRows, CellCounts):
         ...     for i, c in enumerate(found))
         True
         """
-        return _core.cells_find(self._cells, self._queries(points, "points"))
+        return _core.cells_find(self._cells, self._asking(points, "points").positions)
 
     def candidates(self, queries: PointsLike | None = None) -> Candidates:
         """The raw block of cells around each query, without a distance test.
@@ -254,9 +659,79 @@ class CellList(CellPairs, CellRows, CellCounts):
         >>> 2 in sum(found, [])
         True
         """
-        asking = None if queries is None else self._queries(queries)
-        search = self._arguments(None, (True, None, None, None))
-        return Candidates(*_core.cells_candidates(*search, asking))
+        asking = None if queries is None else self._asking(queries).positions
+        call = take(self, self._cutoff, by_reach=False)
+        return Candidates(*call.run(_core.cells_candidates, asking))
+
+    def candidate_pairs(
+        self, *, max_pairs: int = 1 << 20
+    ) -> Iterator[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]]:
+        """All pairs of points in neighbouring cells, without a distance test, in blocks.
+
+        Parameters
+        ----------
+        max_pairs : int, default 2**20
+            The most pairs in a block.
+
+        Returns
+        -------
+        iterator of (i, j), each ndarray of int64
+            i < j. Together they have at least all pairs within the cutoff of two different points,
+            once for each image in which their cells are neighbours.
+
+        Raises
+        ------
+        ValueError
+            If a single cell holds everything.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.5], [1.5], [9.5]], 1.0)
+        >>> any(((i == 0) & (j == 1)).any() for i, j in cells.candidate_pairs())
+        True
+        """
+        return self._candidate_pairs(most_pairs(max_pairs))
+
+    def _candidate_pairs(self, most: int) -> Iterator[Any]:
+        points, order = self.points.positions, self.order
+        for first in range(0, len(self), _ASKED_AT_A_TIME):
+            asking = order[first : first + _ASKED_AT_A_TIME]
+            block = self.candidates(points[asking])
+            row = np.repeat(np.arange(len(asking)), np.diff(block.offsets))
+            ends = starts_of(block.stop - block.start)
+            for begin in range(0, int(ends[-1]), most):
+                entries = np.arange(begin, min(begin + most, int(ends[-1])))
+                which = np.searchsorted(ends, entries, side="right") - 1
+                i = asking[row[which]].astype(np.int64)
+                j = order[block.start[which] + entries - ends[which]].astype(np.int64)
+                if len(i := i[keep := i < j]):
+                    yield i, j[keep]
+
+    def rebuild(self, points: PointsLike) -> CellList:
+        """A list of other points with the same box, cutoff and width of cells.
+
+        Parameters
+        ----------
+        points : array_like of float, shape (n, d), or Points
+            As in the constructor; any box that they bring is that of this list.
+
+        Returns
+        -------
+        CellList
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0]], 1.0, box=5.0)
+        >>> cells.rebuild([[0.0], [4.5], [2.0]]).count_pairs()
+        1
+        """
+        found = self._asking(points, "points")
+        if found.box is None and self.points.box is not None:
+            refuse_infinite(found.positions, "points")
+            found = found.replace(box=self.points.box, periodic=self.points.periodic)
+        return _restored(found, *self._given)
 
     def plot(self, ax: Axes | None = None, *, unit: str | None = None) -> Axes:
         """Draw the points in the colours of their cells, and the cells.
@@ -292,6 +767,46 @@ class CellList(CellPairs, CellRows, CellCounts):
         >>> import halfshell as hs
         >>> ax = hs.CellList([[0.5, 0.5], [1.5, 0.5]], 1.0).plot()  # doctest: +SKIP
         """
-        from halfshell._objects.cell_plot import draw_cells
+        from halfshell._objects.pictures import draw_cells
 
         return draw_cells(self, ax, unit)
+
+
+document(CellList)
+
+
+def _restored(
+    points: Points, cutoff: float, cell_size: float, domain: Any, threads: int | None
+) -> CellList:
+    cells = CellList.__new__(CellList)
+    cells._cutoff, cells._cell_size, cells._threads = cutoff, cell_size, threads
+    cells._domain = domain
+    cells._build(points)
+    return cells
+
+
+def _as_domain(
+    domain: Any, points: Points
+) -> npt.NDArray[np.float64]:
+    """Both ends along each axis; an empty range along those that repeat."""
+    positions, vectors, bits = points._scene
+    ndim = positions.shape[1]
+    ends_given = is_a(domain, (tuple, list)) or (is_a(domain, np.ndarray) and domain.ndim > 0)
+    if not ends_given or len(domain) != 2:
+        raise TypeError(f"domain must be a pair (low, high), got {shown(domain)}")
+    ends = np.empty((2, ndim))
+    for row, name, given in zip(ends, ("low", "high"), domain, strict=True):
+        end = as_real_array(given, f"{name} end of domain", "be a number or numbers")
+        if end.shape not in ((), (ndim,)):
+            raise ValueError(f"{name} end of domain must have shape ({ndim},), got {end.shape}")
+        row[:] = end
+    for k in np.flatnonzero(~(ends[0] <= ends[1]) | ~np.isfinite(ends).all(axis=0)):
+        low, high = ends[:, k].tolist()
+        raise ValueError(f"domain must be finite and not descend, got {low} to {high} in axis {k}")
+    for row in vectors if vectors is not None else ():
+        if bits and np.count_nonzero(row) > 1:
+            raise ValueError("domain is for open space and boxes along the coordinate axes")
+    for axis in range(ndim):
+        if vectors is not None and bits >> axis & 1:
+            ends[:, np.flatnonzero(vectors[axis])] = [[np.inf], [-np.inf]]
+    return ends

@@ -4,32 +4,50 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert.foreign import kind_of
-from halfshell._convert.options import as_choice, as_flag, as_list
-from halfshell._convert.scene import as_box_alone, as_own_box
-from halfshell._objects import node_check, node_cuts, node_patch
-from halfshell._objects.node_links import How, Links, search
-from halfshell._objects.node_list import NodeList
-from halfshell._objects.node_plot import NodePictures
-from halfshell._objects.node_removal import removed
-from halfshell._objects.node_supports import as_extent
-from halfshell._objects.nodes import as_morton_box, morton_number, nodes_of
+from halfshell import _core, _show
+from halfshell._convert.arrays import as_array, as_real_array, in_order
+from halfshell._convert.call import DIRECTED, RULES_OF_SUPPORTS
+from halfshell._convert.foreign import is_a, kind_of, shown
+from halfshell._convert.options import as_choice, as_flag, as_list, as_whole
+from halfshell._convert.points import as_box_alone, as_own_box, as_points
+from halfshell._convert.starts import starts_of
+from halfshell._objects import node_links, node_plot
+from halfshell._objects.node_links import How, Links, Rows
+from halfshell._objects.node_list import NodeList, as_extents
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from halfshell._convert.types import ArrayLike, BoxLike, PeriodicLike
-    from halfshell._objects.node_plot import Seen
+    from halfshell._objects.pair_table import PairTable
 
     Ints = npt.NDArray[np.int32]
+    Offsets = npt.NDArray[np.int64]
     #: i_node, i_list, j_node, j_list -> which of these pairs.
     Predicate = Callable[[Ints, Ints, Ints, Ints], npt.ArrayLike]
 
 
-class Connectivity(NodePictures):
+class GlobalNeighbors(NamedTuple):
+    """Ids of nodes, and of their neighbours row after row."""
+
+    ids: npt.NDArray[np.int64]
+    offsets: npt.NDArray[np.int64]
+    neighbors: npt.NDArray[np.int64]
+
+    def __repr__(self) -> str:
+        return _show.line(self)
+
+    def _repr_html_(self) -> str:
+        return _show.html(self)
+
+
+class Connectivity:
     """All neighbours of each node in each list, and each pair of neighbours once.
 
     Nodes i and j are neighbours if ``|x_i - x_j| <= extent * h_i`` or ``<= extent * h_j`` or,
@@ -41,8 +59,13 @@ class Connectivity(NodePictures):
     ----------
     lists : sequence of NodeList
         Lists are numbered in this order. Names must differ.
-    extent : float, default 2.0
-        How many smoothing lengths supports reach, in all lists; from 2**-64 to 2**64.
+    extent : float or array_like of float, shape (n_lists,), default 2.0
+        How many smoothing lengths supports reach, in all lists or in each; from 2**-64 to 2**64.
+    rule : {"max", "min", "gather", "scatter"}, default "max"
+        Within which supports neighbours are: of one of both, of both, or, in the row of i, j within
+        that of i ("gather") or i within that of j ("scatter"). By the last two a row may have j
+        and not the opposite: each entry of a row is then a pair, and there is no overlap and no
+        intersection, in which pairs have no direction.
     box : float, array_like of float, shape (d,) or (d, d), or Box, optional
         As in `pairs`. In a periodic box, rows and pairs have shifts.
     periodic : bool or sequence of bool, shape (d,), optional
@@ -51,10 +74,9 @@ class Connectivity(NodePictures):
         Whether ghosts have rows, and pairs with each other.
     overlap : bool, default False
         Whether to find nodes whose supports have a node in common; ghosts then have rows, too.
-        Not in a periodic box.
     intersection : bool, default False
         Whether to find the nodes between the two nodes of each pair. As for `overlap`, ghosts then
-        have rows, and the box must not be periodic.
+        have rows. In a periodic box, of at most 6 dimensions.
     order : {"index", "morton"}, default "index"
         Order of rows and pairs: by list and node, or by the place on the Z curve, which does not
         depend on how nodes are stored, nor on which are ghosts. With "morton" ghosts have rows.
@@ -66,15 +88,14 @@ class Connectivity(NodePictures):
         function of four such arrays that returns bools. Kept for `rebuild`.
     threads : int, optional
         As of `pairs`.
-    memory_limit : float, optional
-        As of `pairs`.
 
     Attributes
     ----------
     names : tuple of str
         Of the lists.
     pairs : PairTable
-        Each pair once, if one of its nodes is not a ghost, or `ghosts` is set.
+        Each pair once, if one of its nodes is not a ghost, or `ghosts` is set. With the rules
+        "gather" and "scatter", if the node whose row has it is not a ghost.
     offsets : ndarray of int64, shape (n_rows * n_lists + 1,)
         Where rows begin: ``indices[offsets[r]:offsets[r + 1]]`` are the neighbours in list m of
         node i of list l for ``r = (row_start[l] + i) * n_lists + m``.
@@ -85,21 +106,15 @@ class Connectivity(NodePictures):
         S of each entry, in a periodic box; entries of one neighbour ascend by S.
     row_start : ndarray of int64, shape (n_lists + 1,)
         Nodes with rows before each list.
-    overlap_offsets, overlap_indices : ndarray
+    overlap_offsets, overlap_indices, overlap_shifts : ndarray
         Rows of `overlap`, laid out as those of neighbours.
-    intersection_offsets, intersection_indices : ndarray
-        Entries of `intersection`: row ``k * n_lists + m`` is of pair k and list m.
+    intersection_offsets, intersection_indices, intersection_shifts : ndarray
+        Entries of `intersection`: row ``k * n_lists + m`` is of pair k and list m. Shifts are from
+        the first node of the pair.
     n_nodes, n_ghosts : tuple of int
         Of each list.
     nbytes : dict of str to int
         Bytes that each part takes now.
-
-    Raises
-    ------
-    TypeError, ValueError, OverflowError, MemoryError
-        As for `pairs`; ValueError also if names repeat, lists differ in their dimensions, `exclude`
-        names a node that does not exist, a node lies outside `morton_box`, or `overlap` or
-        `intersection` is set in a periodic box.
 
     See Also
     --------
@@ -108,14 +123,15 @@ class Connectivity(NodePictures):
 
     Notes
     -----
-    Lists are searched together, small supports apart from large ones. Only what you request is
-    computed or kept. A change that fails changes nothing.
+    Lists are searched together, small supports apart from large ones; with an extent for each list
+    once for each extent. Only what you request is computed or kept. Errors are those of `pairs`; a
+    change that fails changes nothing. Decisions are exact whatever the `settings` are.
 
     ``overlap`` holds all neighbours, and all nodes j such that the supports of i and j contain a
     common node of any list; touching supports are not enough. ``intersection`` of a pair holds
     the neighbours of both nodes whose foot on the line through these lies on the closed segment
     between them, decided exactly, and then the two nodes themselves; if the two coincide, all
-    common neighbours.
+    common neighbours. In a periodic box both hold images: each neighbour counts with its shift.
 
     Removed and excluded pairs count nowhere: not in rows, pairs and overlap, nor as a link from
     one node to another in overlap and intersection. So `remove` has the same effect as `exclude`.
@@ -132,17 +148,20 @@ class Connectivity(NodePictures):
     [[1], [0]]
     >>> [tuple(pair) for pair in c.pairs]
     [(0, 0, 1, 0), (1, 0, 2, 0), (2, 0, 0, 1)]
+    >>> c.n_neighbors("fluid").tolist(), c.n_neighbors("wall", 1)
+    ([1, 2, 2], 0)
     """
 
-    __slots__ = ("_bits", "_exclude", "_how", "_morton_box")
+    __slots__ = ("_exclude", "_how", "_links", "_seen")
 
     def __init__(
         self,
         lists: Sequence[NodeList],
-        extent: float = 2.0,
+        extent: float | npt.ArrayLike = 2.0,
         *,
         box: BoxLike | None = None,
         periodic: PeriodicLike | None = None,
+        rule: Literal["max", "min", "gather", "scatter"] = "max",
         ghosts: bool = False,
         overlap: bool = False,
         intersection: bool = False,
@@ -150,67 +169,55 @@ class Connectivity(NodePictures):
         morton_box: ArrayLike | None = None,
         exclude: npt.ArrayLike | Predicate | None = None,
         threads: int | None = None,
-        memory_limit: float | None = None,
     ) -> None:
         given = _as_lists(lists)
-        self._extent = as_extent(extent)
-        self._how = How(
-            as_flag(ghosts, "ghosts"), as_flag(overlap, "overlap"),
-            as_flag(intersection, "intersection"),
-            as_choice(order, "order", ("index", "morton")) == "morton", threads, memory_limit,
-        )  # fmt: skip
-        self._morton_box = as_morton_box(morton_box)
-        if self._morton_box is not None and not self._how.morton:
-            raise ValueError("morton_box needs order='morton'")
-        self._exclude = exclude
         d = next((one.positions.shape[1] for one in given if not one.is_anywhere), None)
         if d is None:
             d, *_ = as_box_alone(box, periodic)
-        self._box, self._bits = as_own_box(box, periodic, d)
-        if self._bits and (self._how.overlap or self._how.intersection):
+        how = self._how = How(
+            as_choice(rule, "rule", RULES_OF_SUPPORTS), as_extents(extent, len(given)),
+            *as_own_box(box, periodic, d), as_flag(ghosts, "ghosts"), as_flag(overlap, "overlap"),
+            as_flag(intersection, "intersection"),
+            as_choice(order, "order", ("index", "morton")) == "morton", _as_corners(morton_box),
+            threads,
+        )  # fmt: skip
+        if how.morton_box is not None and not how.morton:
+            raise ValueError("morton_box needs order='morton'")
+        if how.rule in DIRECTED and (how.overlap or how.intersection):
             raise ValueError(
-                "overlap and intersection need open space: give nodes beyond the box as ghosts, "
-                "NodeList(..., n_ghost=...), and no box that repeats"
+                f'overlap and intersection are of pairs without a direction: rule="{how.rule}" '
+                'has none, rule="max" and "min" have'
             )
-        self._links = self._built(given)
-        self._seen = [(one, None) for one in given]
+        if how.bits and how.intersection and d > 6:
+            raise ValueError(f"intersection in a periodic box needs at most 6 dimensions, got {d}")
+        self._exclude = exclude
+        self._links = node_links.built(given, how, exclude)
+        self._seen: list[node_plot.Seen] = [(one.positions, one.H) for one in given]
+
+    # ---- changes -----------------------------------------------------------------------------
 
     def rebuild(self, lists: Sequence[NodeList]) -> None:
         """Build again from the same lists, which may have other nodes.
 
-        Every older `PairField` becomes stale. Arrays that you hold stay valid; their memory is
-        reused once you delete them.
+        Every older `PairField` becomes stale, as after each change. Arrays that you hold stay
+        valid; their memory is reused once you delete them.
 
         Parameters
         ----------
         lists : sequence of NodeList
             With the same names, in the same order.
-
-        Raises
-        ------
-        ValueError
-            If names differ, and as for the constructor. Nothing has changed then.
-
-        Examples
-        --------
-        >>> import halfshell as hs
-        >>> c = hs.Connectivity([hs.NodeList("a", [[0.0], [1.0]], [1.0, 1.0])])
-        >>> c.rebuild([hs.NodeList("a", [[0.0], [9.0]], [1.0, 1.0])])
-        >>> len(c.pairs)
-        0
         """
         given = _as_lists(lists)
         names = tuple(one.name for one in given)
         if names != self.names:
             raise ValueError(f"rebuild needs the lists {self.names}, got {names}")
-        self._become(self._built(given), "rebuild", [(one, None) for one in given])
+        made = node_links.built(given, self._how, self._exclude)
+        self._become(made, "rebuild", [(one.positions, one.H) for one in given])
 
     def patch(
         self, keep: Sequence[npt.ArrayLike], old2new: Sequence[npt.ArrayLike] | None = None
     ) -> None:
-        """Leave nodes out; equal to a new connectivity of the remaining ones.
-
-        The coupling of pairs stays. Every older `PairField` becomes stale.
+        """Leave nodes out; equal to a new connectivity of the remaining ones, but coupling stays.
 
         Parameters
         ----------
@@ -220,12 +227,6 @@ class Connectivity(NodePictures):
             The new number of each node in its list; for removed nodes any. Ghosts must stay after
             other nodes. Default: in the same order, without gaps.
 
-        Raises
-        ------
-        TypeError, ValueError
-            If these do not fit the nodes, or `old2new` does not give each kept node a number of
-            its own. Then nothing has changed.
-
         Examples
         --------
         >>> import halfshell as hs
@@ -234,17 +235,12 @@ class Connectivity(NodePictures):
         >>> [tuple(pair) for pair in c.pairs]
         [(0, 0, 1, 0)]
         """
-        made, left = node_patch.patched(self._links, keep, old2new, self._morton_box)
-        seen: list[Seen] = [
-            (one, own if before is None else before[own])
-            for (one, before), own in zip(self._seen, left, strict=True)
-        ]
+        made, left = node_links.patched(self._links, keep, old2new)
+        seen = [(x[own], H[own]) for (x, H), own in zip(self._seen, left, strict=True)]
         self._become(made, "patch", seen)
 
     def remove(self, which: npt.ArrayLike | Predicate) -> None:
-        """Take pairs out of rows, pairs, overlap and intersection.
-
-        The coupling of other pairs stays. Every older `PairField` becomes stale.
+        """Take pairs out of rows, pairs, overlap and intersection; the coupling of others stays.
 
         Parameters
         ----------
@@ -254,11 +250,6 @@ class Connectivity(NodePictures):
             table's orientation, including pairs of two ghosts and pairs that merely overlap,
             so it may get a pair several times.
 
-        Raises
-        ------
-        TypeError, ValueError
-            If the mask does not hold a bool for each pair. Then nothing has changed.
-
         Examples
         --------
         >>> import halfshell as hs
@@ -267,53 +258,293 @@ class Connectivity(NodePictures):
         >>> [tuple(pair) for pair in c.pairs]
         [(0, 0, 1, 0)]
         """
-        made = removed(self._links, which)
-        self._become(made, "remove", self._seen)
+        self._become(node_links.removed(self._links, which), "remove", self._seen)
+
+    def _become(self, links: Links, because: str, seen: list[node_plot.Seen]) -> None:
+        """Nothing here can fail: what a change makes has been made."""
+        self._links.pairs._outdated = because
+        self._links = links
+        self._seen = seen
+
+    # ---- all of it ---------------------------------------------------------------------------
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self._links.nodes.names
+
+    @property
+    def n_nodes(self) -> tuple[int, ...]:
+        return tuple(self._links.nodes.counts.tolist())
+
+    @property
+    def n_ghosts(self) -> tuple[int, ...]:
+        return tuple(self._links.nodes.ghosts.tolist())
+
+    @property
+    def pairs(self) -> PairTable:
+        return self._links.pairs
+
+    @property
+    def offsets(self) -> Offsets:
+        return self._links.rows.offsets
+
+    @property
+    def indices(self) -> Ints:
+        return self._links.rows.indices
+
+    @property
+    def shifts(self) -> Ints:
+        return _shifts_of(self._links.rows)
+
+    @property
+    def row_start(self) -> Offsets:
+        return starts_of(self._how.with_rows(self._links.nodes))
+
+    @property
+    def overlap_offsets(self) -> Offsets:
+        return self._part("overlap").offsets
+
+    @property
+    def overlap_indices(self) -> Ints:
+        return self._part("overlap").indices
+
+    @property
+    def overlap_shifts(self) -> Ints:
+        return _shifts_of(self._part("overlap"))
+
+    @property
+    def intersection_offsets(self) -> Offsets:
+        return self._part("intersection").offsets
+
+    @property
+    def intersection_indices(self) -> Ints:
+        return self._part("intersection").indices
+
+    @property
+    def intersection_shifts(self) -> Ints:
+        return _shifts_of(self._part("intersection"))
+
+    @property
+    def nbytes(self) -> dict[str, int]:
+        links, pairs, nodes = self._links, self._links.pairs, self._links.nodes
+        columns = pairs._columns or (None,) * 5  # not yet looked at
+        parts: dict[str, tuple[Any, ...]] = {
+            "rows": links.rows[:2],
+            "pairs": columns[:4],
+            "shifts": (links.rows.shifts, columns[4]),
+            "coupling": (pairs._coupling,),
+            "lookup": (pairs._keys,),
+            "overlap": links.overlap or (),
+            "gather": links.gathered or (),
+            "intersection": links.intersection or (),
+            "order": (nodes.number, nodes._rank),
+            "points": (links.points,),
+        }
+        return {
+            name: sum(one.nbytes for one in arrays if one is not None)
+            for name, arrays in parts.items()
+        }
 
     def used(self) -> tuple[npt.NDArray[np.bool_], ...]:
-        """Which nodes are used: all but ghosts that are not a neighbour of any other node.
+        """For each list, which nodes are not ghosts without a neighbour; what `patch` takes to
+        leave out all of these.
 
         Returns
         -------
         tuple of ndarray of bool, each of shape (n,)
-            For each list; what `patch` takes, to leave out all other ghosts.
-
-        Examples
-        --------
-        >>> import halfshell as hs
-        >>> c = hs.Connectivity([hs.NodeList("a", [[0.0], [1.0], [5.0]], [0.5] * 3, n_ghost=2)])
-        >>> [one.tolist() for one in c.used()]
-        [[True, True, False]]
         """
-        nodes, pairs = self._links.nodes, self._links.pairs
-        internal = nodes.internal
-        flags = ~nodes.is_ghost(np.arange(nodes.n))
-        first, second = (
-            (nodes.first[lists] + node, node < internal[lists])
-            for node, lists in ((pairs.i_node, pairs.i_list), (pairs.j_node, pairs.j_list))
-        )
-        flags[first[0][second[1]]] = True
-        flags[second[0][first[1]]] = True
-        return tuple(np.split(flags, nodes.first[1:-1])) if nodes.n_lists else ()
+        nodes = self._links.nodes
+        i, j = nodes.ranks_of(self.pairs._all())
+        flags = ~nodes.is_ghost(np.arange(nodes.n))  # by rank
+        flags[np.concatenate((i[flags[j]], j[flags[i]]))] = True
+        return tuple(np.split(flags[nodes.rank(np.arange(nodes.n))], nodes.first[1:-1]))
+
+    def global_neighbors(self) -> GlobalNeighbors:
+        """The ids of all neighbours of each node that is no ghost.
+
+        Returns
+        -------
+        GlobalNeighbors
+            A named tuple (ids, offsets, neighbors): those of node k of ``ids``, int64, are
+            ``neighbors[offsets[k]:offsets[k + 1]]``. Nodes are in the order of lists and nodes;
+            neighbours as in their rows, list after list.
+        """
+        nodes, ids = self._links.nodes, self._links.nodes.global_ids()
+        internal = np.concatenate([
+            np.arange(n) < own
+            for n, own in zip(self._how.with_rows(nodes), nodes.internal, strict=True)
+        ] or [np.empty(0, np.bool_)])  # fmt: skip
+        lengths = np.diff(self.offsets)
+        lists = np.repeat(np.resize(np.arange(nodes.n_lists), len(lengths)), lengths)
+        counts = np.diff(self.offsets[:: max(nodes.n_lists, 1)])
+        others = ids[nodes.first[lists] + self.indices][np.repeat(internal, counts)]
+        owners = np.flatnonzero(~nodes.is_ghost(nodes.rank(np.arange(nodes.n))))
+        return GlobalNeighbors(ids[owners], starts_of(counts[internal]), others)
 
     def validate(self) -> None:
-        """Check the invariants of rows and pairs; for tests of programs and of this class.
+        """Make all but the search again: ValueError if something is not what the rows say."""
+        node_links.check(self._links)
+
+    # ---- of one list -------------------------------------------------------------------------
+
+    def traversal(self, list: int | str) -> npt.NDArray[np.int64]:
+        """The nodes of a list, by number or name, in the order in which to go through them.
+
+        Returns
+        -------
+        ndarray of int64
+            Those that are no ghosts, ascending; with "morton" all, by the Z curve.
+        """
+        nodes, which = self._links.nodes, self._list_of(list)
+        if nodes.number is None:
+            return np.arange(nodes.internal[which])
+        first, end = nodes.first[which : which + 2]
+        own = nodes.number[(nodes.number >= first) & (nodes.number < end)]
+        found: npt.NDArray[np.int64] = own.astype(np.int64) - first
+        return found
+
+    def morton_keys(self, list: int | str) -> npt.NDArray[np.uint64]:
+        """The place of each node of a list, by number or name, on the Z curve.
+
+        Returns
+        -------
+        ndarray of uint64, shape (n,)
+            ``63 // d`` bits for each coordinate in turns, those of the first axis lowest.
 
         Raises
         ------
         ValueError
-            If something is wrong; the message tells what.
+            If `order` is not "morton".
+        """
+        which = self._list_of(list)
+        if not self._how.morton:
+            raise ValueError('there are no keys: build with order="morton"')
+        return np.split(node_links.morton_keys(self._links), self._links.nodes.first[1:-1])[which]
 
-        Notes
-        -----
-        Takes time in proportion to the number of pairs.
+    def n_neighbors(self, list: int | str, node: int | None = None) -> Any:
+        """How many neighbours a node has in all lists, or each node of a list that has a row.
+
+        Returns
+        -------
+        int, or ndarray of int64
+        """
+        n_lists = len(self.names)
+        if node is not None:
+            row = self._row_of(list, node) * n_lists
+            return int(self.offsets[row + n_lists] - self.offsets[row])
+        which = self._list_of(list)
+        first, end = self.row_start[which : which + 2] * n_lists
+        return np.diff(self.offsets[first : end + 1 : n_lists])
+
+    # ---- of one node, or pair ----------------------------------------------------------------
+
+    def neighbors(self, list: int | str, node: int) -> tuple[Ints, ...]:
+        """The neighbours of a node in each list.
+
+        Parameters
+        ----------
+        list : int or str
+            Number or name of its list.
+        node : int
+            Its number there.
+
+        Returns
+        -------
+        tuple of ndarray of int32
+            For each list, ascending, or by the Z curve; read-only, without a copy.
+
+        Raises
+        ------
+        IndexError, ValueError
+            If there is no such list or node; if it is a ghost, and these have no rows.
+        """
+        return self._row(self._links.rows, self._row_of(list, node))
+
+    def overlap(self, list: int | str, node: int) -> tuple[Ints, ...]:
+        """The nodes in each list that are neighbours of a node or have one in common with it.
+
+        As in `neighbors`; ValueError if `overlap` was not built.
+        """
+        return self._row(self._part("overlap"), self._row_of(list, node))
+
+    def intersection(self, pair: int | npt.ArrayLike) -> tuple[Ints, ...]:
+        """The nodes in each list between the two of a pair, and these.
+
+        Parameters
+        ----------
+        pair : int or array_like of int, shape (4,)
+            Number of the pair, or (i_node, i_list, j_node, j_list) as for `PairTable.index`.
+
+        Returns
+        -------
+        tuple of ndarray of int32
+            For each list the common neighbours whose foot lies between the two, in the order of
+            rows; then those of the two that are of this list, the first one first.
+
+        Raises
+        ------
+        KeyError, IndexError, ValueError
+            If there is no such pair, or several images of it; if `intersection` was not built.
 
         Examples
         --------
         >>> import halfshell as hs
-        >>> hs.Connectivity([hs.NodeList("a", [[0.0], [1.0]], [1.0, 1.0])]).validate()
+        >>> a = hs.NodeList("a", [[0.0], [1.0], [2.0]], [1.0] * 3)
+        >>> hs.Connectivity([a], intersection=True).intersection((0, 0, 2, 0))
+        (array([1, 0, 2], dtype=int32),)
         """
-        node_check.check(self._links)
+        part = self._part("intersection")
+        is_one = as_array(pair, "pair", "be a number or four").ndim == 0
+        k = self.pairs._number(pair) if is_one else self.pairs.index(pair)
+        return self._row(part, k)
+
+    def union_of(
+        self, i_list: int | str, i_node: int, j_list: int | str, j_node: int
+    ) -> tuple[Ints, ...]:
+        """The neighbours of either of two nodes that have rows, in each list, in the order of rows.
+
+        The two are in it if they are neighbours. As in `neighbors`; ValueError also in a periodic
+        box, in which nodes have no neighbours but images.
+        """
+        nodes, ends = self._links.nodes, self._two_nodes(i_list, i_node, j_list, j_node)
+        found = []
+        for m, rows in enumerate(zip(*(self.neighbors(*end) for end in ends), strict=True)):
+            both = np.union1d(*rows)
+            found.append(both[np.argsort(nodes.rank(nodes.first[m] + both), kind="stable")])
+        return tuple(found)
+
+    def intersection_of(
+        self,
+        i_list: int | str,
+        i_node: int,
+        j_list: int | str,
+        j_node: int,
+        points: Sequence[ArrayLike] | None = None,
+    ) -> tuple[Ints, ...]:
+        """The common neighbours of any two nodes that have rows, and these, as in `intersection`.
+
+        Parameters
+        ----------
+        i_list, i_node, j_list, j_node : int
+            As in `union_of`.
+        points : sequence of array_like of float, each of shape (n, d), optional
+            Positions of the nodes of each list. With them only nodes whose foot lies between the
+            two count.
+        """
+        ends = self._two_nodes(i_list, i_node, j_list, j_node)
+        places = None if points is None else _as_places(points, self.n_nodes)
+        rows = [self.neighbors(*end) for end in ends]
+        found = []
+        for m, (first, second) in enumerate(zip(*rows, strict=True)):
+            common = first[np.isin(first, second, assume_unique=True)]
+            if places is not None and len(common):
+                p, q = (places[which][node] for which, node in ends)
+                common = common[_core.feet_between(places[m][common], p, q)]
+            own = [node for which, node in ends if which == m]
+            found.append(np.concatenate((common, np.array(own, np.int32))))
+        return tuple(found)
+
+    # ---- how it shows itself -----------------------------------------------------------------
 
     def __repr__(self) -> str:
         n, ghosts = sum(self.n_nodes), sum(self.n_ghosts)
@@ -322,40 +553,125 @@ class Connectivity(NodePictures):
             f"{len(self.pairs)} pairs)"
         )
 
-    # ---- how it is made ----------------------------------------------------------------------
+    def _repr_html_(self) -> str:
+        return node_plot.html_of(self._links)
 
-    def _built(self, lists: Sequence[NodeList]) -> Links:
-        nodes, points, supports = nodes_of(lists)
-        if self._box is not None and len(points) and points.shape[1] != len(self._box):
-            raise ValueError(f"nodes must have {len(self._box)} dimensions, as box has")
-        if self._box is not None and len(points) == 0:
-            points = np.empty((0, len(self._box)))  # lists without nodes have any dimensions
-        if self._how.morton:
-            nodes.number = morton_number(points, nodes.global_ids(), self._morton_box)
-            points, supports = points[nodes.number], supports[nodes.number]
-        elif self._how.keeps_points:
-            points = points.copy()  # the caller's may change
-        cut = node_cuts.cut_of_exclude(self._exclude, nodes)
-        return search(
-            points, supports, self._extent, self._box, self._bits, nodes, self._how, cut
+    def plot(self, axes: tuple[int, int] = (0, 1), ax: Axes | None = None) -> Axes:
+        """Draw the nodes by list, their supports and the pairs; ghosts are hollow.
+
+        Nodes are drawn where the arrays of their lists say: as they were given, if these have not
+        been written to since. Supports are shown for up to 2000 nodes, pairs up to 200000.
+
+        Parameters
+        ----------
+        axes : tuple of int, default (0, 1)
+            The two coordinates to draw. In one dimension each list has a line of its own.
+        ax : matplotlib.axes.Axes, optional
+            Where to draw. Default: axes of a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        return node_plot.draw(self._links, self._seen, axes, ax)
+
+    # ---- how rows are found ------------------------------------------------------------------
+
+    def _part(self, name: str) -> Rows:
+        part: Rows | None = getattr(self._links, name)
+        if part is None:
+            raise ValueError(f"{name} was not built: build with {name}=True")
+        return part
+
+    def _row(self, rows: Rows, row: int) -> tuple[Ints, ...]:
+        n_lists = len(self.names)
+        ends = rows.offsets[row * n_lists : (row + 1) * n_lists + 1].tolist()
+        return tuple(rows.indices[a:b] for a, b in pairwise(ends))
+
+    def _list_of(self, value: Any, name: str = "list") -> int:
+        names = self.names
+        if is_a(value, str):
+            called = str.__str__(value)  # not what it says
+            if called not in names:
+                raise IndexError(f"{name} must be one of {names}, got {shown(called)}")
+            return names.index(called)
+        number = as_whole(value, name)
+        if not 0 <= number < len(names):
+            raise IndexError(f"there are {len(names)} lists, got {shown(number)}")
+        return number
+
+    def _node_of(self, which: int, value: Any, name: str = "node") -> int:
+        number = as_whole(value, name)
+        count = self.n_nodes[which]
+        if not 0 <= number < count:
+            raise IndexError(f"list {self.names[which]!r} has {count} nodes, got {shown(number)}")
+        return number
+
+    def _row_of(self, value: Any, node: Any) -> int:
+        which = self._list_of(value)
+        number = self._node_of(which, node)
+        if number >= self._how.with_rows(self._links.nodes)[which]:
+            raise ValueError(
+                f"node {number} of {self.names[which]!r} is a ghost, and these have no rows: "
+                "build with ghosts=True"
+            )
+        return int(self.row_start[which]) + number
+
+    def _two_nodes(self, *four: Any) -> tuple[tuple[int, int], tuple[int, int]]:
+        if self._links.rows.shifts is not None:
+            raise ValueError(
+                "in a periodic box, nodes have no common neighbours without their images: "
+                "build with intersection=True, or give images as ghosts"
+            )
+        first, second = self._list_of(four[0], "i_list"), self._list_of(four[2], "j_list")
+        return (
+            (first, self._node_of(first, four[1], "i_node")),
+            (second, self._node_of(second, four[3], "j_node")),
         )
 
-    def _become(self, links: Links, because: str, seen: list[Seen]) -> None:
-        """Nothing here can fail: what a change makes has been made."""
-        self._links.pairs._outdated = because
-        self._links = links
-        self._seen = seen
+
+def _shifts_of(rows: Rows) -> Ints:
+    if rows.shifts is None:
+        raise AttributeError("these rows have no shifts: there is no periodic box")
+    return rows.shifts
 
 
 def _as_lists(lists: Any) -> list[NodeList]:
-    if isinstance(lists, NodeList):
+    if is_a(lists, NodeList):
         raise TypeError("lists must be a sequence of NodeList: put the one into a list")
     given = as_list(lists, "lists", "NodeList")
     for one in given:
-        if not isinstance(one, NodeList):
+        if not is_a(one, NodeList):
             raise TypeError(f"lists must be of NodeList, got {kind_of(one)}")
     names = [one.name for one in given]
     for name in names:
         if names.count(name) > 1:
             raise ValueError(f"names must differ, got {name!r} twice")
     return given
+
+
+def _as_corners(values: Any) -> npt.NDArray[np.float64] | None:
+    """The lowest and the highest coordinates of the box of the Z curve, or None."""
+    if values is None:
+        return None
+    array = in_order(as_real_array(values, "morton_box", "hold two corners"), np.float64)
+    if array.ndim != 2 or array.shape[0] != 2:
+        raise ValueError(f"morton_box must have shape (2, d), low and high, got {array.shape}")
+    if not np.isfinite(array).all() or (array[0] > array[1]).any():
+        raise ValueError("morton_box must be finite, and low must not be above high")
+    return array
+
+
+def _as_places(points: Sequence[Any], counts: tuple[int, ...]) -> list[npt.NDArray[Any]]:
+    arrays = [
+        in_order(as_points(one, f"points[{k}]"), np.float64)
+        for k, one in enumerate(as_list(points, "points", "arrays"))
+    ]
+    if len(arrays) != len(counts):
+        raise ValueError(
+            f"points must have an array for each of {len(counts)} lists, got {len(arrays)}"
+        )
+    dims = {array.shape[1:] for array, n in zip(arrays, counts, strict=True) if n}
+    if len(dims) > 1 or any(len(a) != n for a, n in zip(arrays, counts, strict=True)):
+        raise ValueError(f"points must have a row for each node of {counts}")
+    return arrays

@@ -9,21 +9,31 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _show
-from halfshell._convert import dynamic
-from halfshell._convert.arrays import in_order
+from halfshell._convert.arrays import as_array, as_real_array, in_order
+from halfshell._convert.foreign import shown
 from halfshell._convert.lengths import as_positive
-from halfshell._convert.options import as_flag
-from halfshell._convert.scene import as_own_box
+from halfshell._convert.options import as_choice, as_flag, as_whole
+from halfshell._convert.points import MAX_DIM, as_own_box, as_points
 from halfshell._unknown import refuse_unknown
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from halfshell._convert.types import ArrayLike, BoxLike, Number, PeriodicLike, PointsLike
+    from halfshell._convert.types import (
+        ArrayLike,
+        BoxLike,
+        FloatArray,
+        Number,
+        PeriodicLike,
+        PointArray,
+        PointsLike,
+    )
 
     Key = int | tuple[int, int]
     _Given = tuple[int, float, Any, int, int, float, bool, bool]
 
+#: By their numbers in the core.
+_STORAGES = ("hash", "dense", "all-pairs")
 _PICKLE_VERSION = 1
 _BLOCK = 1024  # keys that an iterator takes at a time
 
@@ -108,14 +118,17 @@ class DynamicCellList:
     ) -> None:
         if unknown:
             refuse_unknown(DynamicCellList, unknown)
-        ndim, kind = dynamic.as_dim(dim), dynamic.as_storage(storage)
+        ndim = as_whole(dim, "dim")
+        if not 1 <= ndim <= MAX_DIM:
+            raise ValueError(f"dim must be from 1 to {MAX_DIM}, got {shown(ndim)}")
+        kind = _STORAGES.index(as_choice(storage, "storage", _STORAGES))
         vectors, bits = as_own_box(box, periodic, ndim)
         radius = 0.0 if max_radius is None else as_positive(max_radius, "max_radius")
         self._given: _Given = (
             ndim, as_positive(cell_size, "cell_size"), vectors, bits, kind,
             radius, as_flag(inclusive, "inclusive"), as_flag(tagged, "tagged"),
         )  # fmt: skip
-        self._cells = _core.dynamic_new(*self._given, dynamic.as_position)
+        self._cells = _core.dynamic_new(*self._given, _as_position)
 
     @property
     def dim(self) -> int:
@@ -135,7 +148,7 @@ class DynamicCellList:
     @property
     def storage(self) -> str:
         """How cells are stored: "hash", "dense" or "all-pairs"."""
-        return dynamic.STORAGES[self._given[4]]
+        return _STORAGES[self._given[4]]
 
     @property
     def inclusive(self) -> bool:
@@ -151,6 +164,26 @@ class DynamicCellList:
     def nbytes(self) -> int:
         """Bytes of memory that the list holds."""
         return int(self._cells.look()["bytes"])
+
+    @property
+    def keys(self) -> npt.NDArray[np.int64]:
+        """All keys, in the order of iteration: a new array, shape (n,), or (n, 2) with `tagged`."""
+        return self._all()[0]
+
+    @property
+    def positions(self) -> npt.NDArray[np.float64]:
+        """The positions of all `keys`, in their order: a new array, shape (n, dim).
+
+        NaN for keys that have none.
+        """
+        keys, cells = self._all()
+        found: npt.NDArray[np.float64] = cells.positions(keys)
+        return found
+
+    def _all(self) -> tuple[npt.NDArray[np.int64], Any]:
+        """The keys, and a copy of the list: other threads may change this one meanwhile."""
+        cells = self._cells.copy()
+        return cells.keys(0, max(len(cells), 1))[1], cells
 
     def insert(self, key: Key, position: ArrayLike | None) -> None:
         """Add a point, or move the one that has this key.
@@ -201,6 +234,17 @@ class DynamicCellList:
         """
         return self._cells.cell(key)
 
+    def cell_of(self, position: ArrayLike) -> tuple[int, ...]:
+        """Indices of the cell that a position would be in, as `cell`, whether or not it is empty.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> hs.DynamicCellList(2, 2.0).cell_of([-41.5, 18.5])
+        (-21, 9)
+        """
+        return self._cells.cell_of(position)
+
     def near(self, position: ArrayLike, radius: Number) -> npt.NDArray[np.int64]:
         """Keys of all points in the cells that a ball meets: a superset of those within.
 
@@ -216,10 +260,6 @@ class DynamicCellList:
         ndarray of int64, shape (m,), or (m, 2) with `tagged`
             Each key once, however many of its images are near. No distance is computed.
 
-        Raises
-        ------
-        TypeError, ValueError, OverflowError
-            For a position as in `insert`, and a radius beyond `max_radius`.
         """
         return self._cells.near(position, radius)
 
@@ -243,8 +283,10 @@ class DynamicCellList:
 
         Raises
         ------
-        TypeError, ValueError, OverflowError
-            As `near`; ValueError if a key has no position; OverflowError if S does not fit int32.
+        ValueError
+            If a key has no position.
+        OverflowError
+            If S does not fit int32.
 
         Examples
         --------
@@ -270,8 +312,8 @@ class DynamicCellList:
 
         Raises
         ------
-        TypeError, ValueError, OverflowError, KeyError
-            As for `within`; KeyError if the key to skip does not exist.
+        KeyError
+            If the key to skip does not exist.
         """
         return self._cells.any_within(position, radius, skip)
 
@@ -286,20 +328,20 @@ class DynamicCellList:
 
         Raises
         ------
-        TypeError, ValueError, OverflowError, MemoryError
-            As for `insert`; ValueError names a repeated key. The list is then unchanged.
+        ValueError
+            If a key is repeated; else as `insert`. The list is then unchanged.
         """
-        ids, tags = dynamic.as_keys(keys, self.tagged)
-        self._cells.insert_many(ids, tags, dynamic.as_positions(positions, self.dim, len(ids)))
+        ids, tags = _as_keys(keys, self.tagged)
+        self._cells.insert_many(ids, tags, _as_positions(positions, self.dim, len(ids)))
 
     def move_many(self, keys: ArrayLike, positions: PointsLike) -> None:
         """Move many points, all or none. As `insert_many`, but KeyError for an absent key."""
-        ids, tags = dynamic.as_keys(keys, self.tagged)
-        self._cells.move_many(ids, tags, dynamic.as_positions(positions, self.dim, len(ids)))
+        ids, tags = _as_keys(keys, self.tagged)
+        self._cells.move_many(ids, tags, _as_positions(positions, self.dim, len(ids)))
 
     def remove_many(self, keys: ArrayLike) -> npt.NDArray[np.bool_]:
         """Remove many points. Returns which of them existed; ValueError if a key is repeated."""
-        return self._cells.remove_many(*dynamic.as_keys(keys, self.tagged))
+        return self._cells.remove_many(*_as_keys(keys, self.tagged))
 
     def within_many(self, positions: PointsLike, radius: Number, *, shifts: bool = False) -> Any:
         """The points within each of many balls: `within` for each row.
@@ -320,12 +362,8 @@ class DynamicCellList:
         S : ndarray of int32, shape (m, dim)
             Only with `shifts`.
 
-        Raises
-        ------
-        TypeError, ValueError, OverflowError, MemoryError
-            As `within`.
         """
-        centres = in_order(dynamic.as_positions(positions, self.dim), np.float64)
+        centres = in_order(_as_positions(positions, self.dim), np.float64)
         offsets, found = self._cells.within_many(centres, radius, as_flag(shifts, "shifts"))
         return (offsets, *found) if shifts else (offsets, found)
 
@@ -373,8 +411,7 @@ class DynamicCellList:
             yield tuple(key) if self.tagged else key
 
     def __reduce__(self) -> tuple[Any, ...]:
-        cells = self._cells.copy()  # other threads may change the list meanwhile
-        keys = cells.keys(0, max(len(cells), 1))[1]
+        keys, cells = self._all()
         return _unpickled, (_PICKLE_VERSION, self._given, keys, cells.positions(keys))
 
     _repr_html_ = _show.html
@@ -392,9 +429,50 @@ def _unpickled(version: int, given: _Given, keys: Any, positions: Any) -> Dynami
         raise ValueError(f"this DynamicCellList was pickled by another version ({version!r})")
     made = object.__new__(DynamicCellList)
     made._given = given
-    made._cells = _core.dynamic_new(*given, dynamic.as_position)
+    made._cells = _core.dynamic_new(*given, _as_position)
     placed = ~np.isnan(positions[:, 0])
     made.insert_many(keys[placed], positions[placed])
     for key in keys[~placed].tolist():
         made.insert(tuple(key) if made.tagged else key, None)
     return made
+
+
+def _as_position(position: Any, dim: int) -> FloatArray:
+    """One position; the core calls this for what is not plain."""
+
+    def check(shape: tuple[int, ...]) -> None:
+        if shape != (dim,):
+            raise ValueError(f"position must have shape ({dim},), got {shape}")
+
+    return in_order(as_real_array(position, "position", check_shape=check), np.float64)
+
+
+def _as_positions(positions: Any, dim: int, n: int | None = None) -> PointArray:
+    """Positions of shape (n, dim)."""
+    array = as_points(positions, "positions", dim)
+    if array.shape[1] != dim or n not in (None, len(array)):
+        rows = "q" if n is None else n
+        raise ValueError(f"positions must have shape ({rows}, {dim}), got {array.shape}")
+    return array
+
+
+def _as_keys(keys: Any, tagged: bool) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int32] | None]:
+    """Integers and tags, if these keys have them."""
+    array = as_array(keys, "keys")
+    if array.shape == (0,):
+        array = np.empty((0, 2) if tagged else 0, np.int64)
+    if array.dtype.kind not in "iu":
+        if array.dtype.kind == "O" and all(type(key) is int for key in array.flat):
+            raise OverflowError("keys must fit int64")
+        raise TypeError(f"keys must be integers, got dtype {array.dtype}")
+    if array.ndim != (2 if tagged else 1) or (tagged and array.shape[1] != 2):
+        form = "(n, 2), of tags and integers" if tagged else "(n,)"
+        raise ValueError(f"keys must have shape {form}, got {array.shape}")
+    if array.dtype.kind == "u" and (array > np.uint64(2**63 - 1)).any():
+        raise OverflowError("keys must fit int64")
+    if not tagged:
+        return in_order(array, np.int64), None
+    tags = array[:, 0].astype(np.int64)
+    if ((tags < -(2**31)) | (tags >= 2**31)).any():
+        raise OverflowError("the tags of keys must fit int32")
+    return in_order(array[:, 1], np.int64), in_order(tags, np.int32)

@@ -9,20 +9,182 @@ their digits, so that NumPy works on all entries of a group, and of many groups,
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from halfshell import _core
+from halfshell._convert.lengths import as_cutoff
 from halfshell._convert.memory import refuse_unavailable
+from halfshell._convert.options import AUTO, as_flag
+from halfshell._convert.points import Points
+from halfshell._convert.types import PointArray, Reach
+from halfshell._objects.rows import order_in_rows, part_of, rows_of
 
 Array = npt.NDArray[Any]
 Integers = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float64]
+FindShifts = Callable[["Origin"], Array]
 
 CLOSE = 4  # ulps: more than two distances lose together
 BITS = 24  # of a digit: sums of the products of two fit int64, for 8 axes and any exponents
 AT_A_TIME = 1 << 21  # int64s, 16 MB: but a group is never cut
+SORTED_AT_A_TIME = 1 << 17  # entries: some milliseconds
+
+
+class Origin:
+    """What exact sorting needs of the search that a table comes from.
+
+    Parameters
+    ----------
+    points, queries : ndarray of float, shape (n, d) and (q, d)
+        `queries` is None where the points themselves ask. They and the box are copied, for the
+        caller's may change, unless they are its own.
+    box : ndarray of float64, shape (d,) or (d, d), or None; with `systems` (s, d, d)
+    periodic
+        As users pass it, or as bits.
+    find : callable, optional
+        Returns S of all entries of all rows, for tables that have no shifts: called with this
+        object when they are first needed.
+    systems : ndarray of int64, shape (rows,), optional
+        Which box each row has.
+    shifts, numbers : ndarray, optional
+        All shifts, and the numbers of `points`, ascending, if they are not all.
+    """
+
+    __slots__ = (
+        "_box", "_find", "_numbers", "_periodic", "_shifts", "_systems", "points", "queries",
+    )  # fmt: skip
+
+    def __init__(
+        self, points: PointArray, queries: PointArray | None, box: Floats | None, periodic: Any,
+        find: FindShifts | None = None, systems: Integers | None = None, *,
+        shifts: Array | None = None, numbers: Array | None = None, is_own: bool = False,
+    ) -> None:  # fmt: skip
+        self.points = points if is_own else points.copy()
+        self.queries = queries if is_own or queries is None else queries.copy()
+        self._box = box if is_own or box is None else box.copy()
+        self._periodic = tuple(periodic) if isinstance(periodic, list) else periodic
+        self._find = find
+        self._systems = systems
+        self._shifts = shifts
+        self._numbers = numbers
+
+    def part(self, rows: slice | Array, indices: Array, shifts: Array | None) -> dict[str, Any]:
+        """The arguments that make one for these rows alone, without a search.
+
+        It has the points that their entries name; `shifts` are those of the entries, if the table
+        has none.
+        """
+        points, numbers, queries = self.points, self._numbers, self.queries
+        if queries is not None or not (isinstance(rows, slice) and rows == slice(0, len(points))):
+            queries = self._asking[rows]
+            named = np.unique(indices)
+            taken = points[self._places_of(named)]
+            if taken.nbytes + named.nbytes < points.nbytes:
+                points, numbers = taken, named
+        _, box, bits = self.scene()
+        systems = None if self._systems is None else self._systems[rows]
+        return {
+            "points": points, "queries": queries, "box": box, "periodic": bits,
+            "systems": systems, "shifts": shifts, "numbers": numbers,
+        }  # fmt: skip
+
+    def scene(self) -> tuple[PointArray, Floats | None, int]:
+        """Points, box vectors and periodic bits as the core takes them."""
+        if isinstance(self._periodic, int) and not isinstance(self._periodic, bool):
+            return self.points, self._box, self._periodic
+        return Points._of(self.points, "points", self._box, self._periodic)._scene
+
+    @property
+    def has_images(self) -> bool:
+        """Whether shifts may be other than zero."""
+        return self.scene()[2] != 0
+
+    def shifts(self) -> Array:
+        """S of all entries of all rows. Threads may ask at once: each then searches."""
+        find = self._find  # before the shifts are looked at, which come before it goes
+        found = self._shifts
+        if found is None:
+            assert find is not None
+            self._shifts = found = find(self)
+            self._find = None
+        return found
+
+    @property
+    def _asking(self) -> PointArray:
+        return self.points if self.queries is None else self.queries
+
+    def _places_of(self, indices: Array) -> Array:
+        """Where in `points` these are, by their numbers."""
+        return indices if self._numbers is None else np.searchsorted(self._numbers, indices)
+
+    def order(
+        self, rows: slice | Array, offsets: Array, indices: Array, distances: Array,
+        shifts: Array | None,
+    ) -> Integers:  # fmt: skip
+        """The entries of these rows by row and true distance.
+
+        Some rows are done at a time, between which Ctrl-C works. `shifts` is None where all are
+        zero.
+        """
+        order = np.empty(len(distances), np.int64)
+        places = self._places_of(indices)
+        _, box, bits = self.scene()
+        ndim = self.points.shape[1]
+        repeats = np.array([bits >> k & 1 for k in range(ndim)], np.float64)
+        # Those that repeat; others are multiplied by no shift.
+        vectors = np.zeros((ndim, ndim)) if box is None else box * repeats[:, None]
+        for first, end in _parts_of(offsets):
+            own = offsets[first : end + 1]
+            a, b = int(own[0]), int(own[-1])
+            row = rows_of(own)  # from 0 on: two rows of one point are two
+            order[a:b] = a + order_in_rows(row, distances[a:b])
+            these = part_of(rows, slice(first, end))
+            of_rows = vectors
+            if self._systems is not None:
+                of_rows = vectors[self._systems[these]].transpose(1, 0, 2)
+            settle(
+                order[a:b], row, places, distances, shifts, self.points, self._asking[these],
+                of_rows,
+            )  # fmt: skip
+        return order
+
+
+def _parts_of(offsets: Array) -> Iterator[tuple[int, int]]:
+    """Whole rows, first and end, of so many entries at most, or one row that has more."""
+    first, n_rows = 0, len(offsets) - 1
+    while first < n_rows:
+        most = offsets[first] + SORTED_AT_A_TIME
+        end = max(first + 1, int(np.searchsorted(offsets, most, side="right")) - 1)
+        yield first, end
+        first = end
+
+
+def shifts_of_search(
+    cutoff: Any, inclusive: Any, precision: Any, threads: int | None, reach: Reach | None = None
+) -> FindShifts:
+    """A search for the shifts of all rows that `neighbors` returns for these arguments."""
+    largest, includes_cutoff = as_cutoff(cutoff), as_flag(inclusive, "inclusive")
+    own: Any = copied(reach)  # the caller's arrays may change
+
+    def find(origin: Origin) -> Array:
+        points, vectors, bits = origin.scene()
+        return _core.neighbors(
+            points, largest, vectors, bits, includes_cutoff, precision, None, None, None, threads,
+            "S", 8, origin.queries, own, AUTO,
+        )[1]
+
+    return find
+
+
+def copied(part: Any) -> Any:
+    """A tuple with copies of the arrays in it."""
+    if isinstance(part, tuple):
+        return tuple(copied(one) for one in part)
+    return part.copy() if isinstance(part, np.ndarray) else part
 
 
 def settle(

@@ -1,117 +1,139 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a `Connectivity` holds: made by a search, or from a half list, as by every change.
-
-A half list is i and j, ranks of nodes, each pair once and ascending, and the shifts of the pairs or
-None. All that follows from one is made here, so that a change is a change of half lists.
-"""
+"""What a `Connectivity` holds: rows of all nodes, and what follows from these."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from halfshell import _core
+from halfshell._convert.arrays import as_array
+from halfshell._convert.call import DIRECTED
+from halfshell._convert.foreign import kind_of
+from halfshell._convert.options import as_list
 from halfshell._convert.starts import starts_of
-from halfshell._objects.node_supports import reach_of
-from halfshell._objects.pair_table import Columns, PairTable
+from halfshell._objects.node_list import reach_of
+from halfshell._objects.nodes import Nodes, corners_of, morton_number, nodes_of
+from halfshell._objects.pair_table import Columns, PairTable, as_pair_rows
+from halfshell._settings import current
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Sequence
 
     import numpy.typing as npt
 
     from halfshell._convert.types import FloatArray
-    from halfshell._objects.nodes import Nodes
+    from halfshell._objects.node_list import NodeList
 
+    Array = npt.NDArray[Any]
+    Bools = npt.NDArray[np.bool_]
     Ints = npt.NDArray[np.int32]
     Offsets = npt.NDArray[np.int64]
-    Resources = tuple[
-        FloatArray, float, None, int, bool, str, None, float | None, None, int | None
-    ]
-    #: Which pairs of ranks are to go.
-    Cut = Callable[[npt.NDArray[Any], npt.NDArray[Any]], npt.NDArray[np.bool_]]
+    #: Points, cutoff, box, periodic bits, and what follows in every call of the core.
+    Search = tuple[
+        FloatArray, float, FloatArray | None, int, bool, str, str | None, float | None, None,
+        int | None,
+    ]  # fmt: skip
+    #: Which pairs of a half list are to go.
+    Cut = Callable[["Half"], Bools]
 
-_GHOST_ROWS, _GHOST_PAIRS, _ROWS_ONLY = 1, 2, 4
-#: For calls that need no points.
+# Flags of the core.
+_GHOST_ROWS, _GHOST_PAIRS, _ROWS_ONLY, _DIRECTED = 1, 2, 4, 8
 _NOWHERE = np.empty((0, 1))
 
 
 @dataclass(frozen=True)
-class Half:
-    """A half list."""
-
-    i: Ints
-    j: Ints
-    shifts: Ints | None
-
-    def keep(self, mask: npt.NDArray[np.bool_]) -> Half:
-        if mask.all():
-            return self
-        return Half(
-            self.i[mask], self.j[mask], None if self.shifts is None else self.shifts[mask]
-        )
-
-
-@dataclass(frozen=True)
-class Gathered:
-    """What each node's own support reaches: a row of ranks for each rank."""
-
-    offsets: Offsets
-    indices: Ints
-
-    @property
-    def owners(self) -> npt.NDArray[Any]:
-        return np.repeat(np.arange(len(self.offsets) - 1), np.diff(self.offsets))
-
-    def keep(self, mask: npt.NDArray[np.bool_]) -> Gathered:
-        if mask.all():
-            return self
-        before = starts_of(mask)
-        return Gathered(before[self.offsets], self.indices[mask])
-
-
-@dataclass(frozen=True)
 class How:
-    """What is built, and with what."""
+    """What is built. extent: one for all lists, or an array of one for each."""
 
-    ghost_pairs: bool
+    rule: str
+    extent: float | FloatArray
+    box: FloatArray | None
+    bits: int
+    ghosts: bool
     overlap: bool
     intersection: bool
     morton: bool
+    morton_box: FloatArray | None
     threads: int | None
-    memory_limit: float | None
-    ghost_rows_too: bool = False
-
-    @property
-    def ghost_rows(self) -> bool:
-        wants = self.ghost_pairs or self.overlap or self.intersection or self.morton
-        return wants or self.ghost_rows_too
-
-    @property
-    def flags(self) -> int:
-        """As the core takes them."""
-        return (_GHOST_ROWS if self.ghost_rows else 0) | (_GHOST_PAIRS if self.ghost_pairs else 0)
 
     @property
     def keeps_points(self) -> bool:
         return self.overlap or self.intersection or self.morton
 
-    def rest(self) -> tuple[bool, str, None, float | None, None, int | None]:
-        return True, "exact", None, self.memory_limit, None, self.threads
+    @property
+    def ghost_rows(self) -> bool:
+        return self.ghosts or self.keeps_points
 
-    def resources(self, points: FloatArray) -> Resources:
-        """The arguments of a search, for a call that searches nothing."""
-        return points, 0.0, None, 0, *self.rest()
+    def with_rows(self, nodes: Nodes) -> Offsets:
+        """How many nodes of each list have rows."""
+        return nodes.counts if self.ghost_rows else nodes.internal
 
-    def pairs_of_rows(self, nodes: Nodes) -> bool:
-        """Whether the rows of all nodes are there, in the order in which pairs are."""
-        return nodes.number is None and (self.ghost_rows or not nodes.ghosts.any())
+    @property
+    def flags(self) -> int:
+        """As the core takes them."""
+        rows = _GHOST_ROWS if self.ghost_rows else 0
+        pairs = _GHOST_PAIRS if self.ghosts else 0
+        return rows | pairs | (_DIRECTED if self.rule in DIRECTED else 0)
 
-    def flags_for(self, nodes: Nodes) -> int:
-        """Of rows, with the pairs unless these can be made of them later."""
-        return self.flags | (_ROWS_ONLY if self.pairs_of_rows(nodes) else 0)
+    def search(self, points: FloatArray) -> Search:
+        """The first arguments of the core. Its decisions are exact, whatever the settings are."""
+        own = current()
+        threads = own.threads if self.threads is None else self.threads
+        box = self.box if self.bits else None
+        return (
+            points, np.inf, box, self.bits, True, "exact", own.kernel, own.memory_limit, None,
+            threads,
+        )  # fmt: skip
+
+    def call(self, n: int) -> Search:
+        """The same of a call about n nodes that looks at no points."""
+        return np.empty((n, 1)), 0.0, None, 0, *self.search(_NOWHERE)[4:]
+
+
+class Rows(NamedTuple):
+    """Rows as the core gives and takes them."""
+
+    offsets: Offsets
+    indices: Ints
+    shifts: Ints | None
+
+    @classmethod
+    def of(cls, made: Any) -> Rows:
+        offsets, indices, *shifts = made
+        return cls(offsets, indices, shifts[0] if shifts else None)
+
+
+class Half(NamedTuple):
+    """Pairs of ranks, each once; a half list if they ascend. Of directed rules j is in i's row."""
+
+    i: Array
+    j: Array
+    shifts: Ints | None
+
+    def keep(self, which: Any) -> Half:
+        """Some of them, by a mask or by their places."""
+        return Half(
+            self.i[which], self.j[which], None if self.shifts is None else self.shifts[which]
+        )
+
+    def forward(self) -> Half:
+        """With the lower rank first, and forward images of one node."""
+        back: Any = self.i > self.j
+        shifts = self.shifts
+        if shifts is not None:
+            first = shifts[np.arange(len(shifts)), np.argmax(shifts != 0, axis=1)]
+            back |= (self.i == self.j) & (first < 0)
+            shifts = np.where(back[:, None], -shifts, shifts)
+        return Half(np.where(back, self.j, self.i), np.where(back, self.i, self.j), shifts)
+
+    def order(self) -> Offsets:
+        """What sorts them."""
+        shifts = () if self.shifts is None else self.shifts.T[::-1]
+        return np.lexsort((*shifts, self.j, self.i))
 
 
 @dataclass(frozen=True)
@@ -120,263 +142,386 @@ class Links:
 
     nodes: Nodes
     how: How
-    offsets: Offsets
-    indices: Ints
-    shifts: Ints | None
+    rows: Rows
     pairs: PairTable
-    gathered: Gathered | None
-    overlap: tuple[Offsets, Ints] | None
-    cut: npt.NDArray[np.int64]  # keys of pairs that overlap no longer has, ascending
-    intersection: tuple[Offsets, Ints] | None
-    points: FloatArray | None  # by rank
+    gathered: Rows | None  # for overlap: what the support of each rank reaches, by ranks
+    overlap: Rows | None
+    cut: Half | None  # pairs that overlap is not to have
+    intersection: Rows | None
+    points: FloatArray  # by rank, where overlap, intersection or the Z curve needs them
 
 
-def search(
-    points: FloatArray, supports: FloatArray, extent: float, box: FloatArray | None, bits: int,
-    nodes: Nodes, how: How, cut: Cut | None,
-) -> Links:  # fmt: skip
-    """The links of all nodes, whose points and supports are by rank."""
-    first = (points, np.inf, box, bits, *how.rest())
-    counts = (nodes.counts, nodes.ghosts, nodes.number, how.flags_for(nodes))
-    gathered = None
-    if how.overlap:
-        by = reach_of("gather", supports, extent)
-        gathered = Gathered(*_core.neighbors(*first, "j", 4, None, by, "auto")[:2])
-    by = reach_of("max", supports, extent)
-    if cut is None:
-        rows, pairs = _core.connect_search(*first, *counts, by)
-        return with_parts(nodes, how, rows, pairs, None, gathered, points)
-    found: Any = _core.pairs(*first, "ijS" if bits else "ij", True, 4, None, by, "auto", None)
-    half = Half(found[0], found[1], found[2] if bits else None)
-    return link(nodes, how, half, gathered, points, cut)
+# ---- all of it --------------------------------------------------------------------------------
 
 
-def link(
-    nodes: Nodes, how: How, half: Half, gathered: Gathered | None, points: FloatArray,
-    cut: Cut | None = None, cut_before: npt.NDArray[np.int64] | None = None,
-) -> Links:  # fmt: skip
-    """All that is wanted, of these pairs without those that `cut` takes out.
-
-    cut_before: keys of further pairs that overlap is not to have.
-    """
+def built(lists: Sequence[NodeList], how: How, exclude: Any) -> Links:
+    """The links of these lists."""
+    nodes, points, supports = nodes_of(lists, how.box, how.rule in DIRECTED)
+    if how.morton:
+        nodes.number = morton_number(points, nodes.global_ids(), how.morton_box)
+        points, supports = points[nodes.number], supports[nodes.number]
+    elif how.keeps_points:
+        points = points.copy()  # the caller's may change
+    cut = None if exclude is None else _cut_of(exclude, "exclude", nodes)
+    rows, gathered = _search(points, supports, nodes, how)
     if cut is not None:
-        half = half.keep(~cut(half.i, half.j))
-        if gathered is not None:
-            owners = gathered.owners
-            low, high = np.minimum(owners, gathered.indices), np.maximum(owners, gathered.indices)
-            gathered = gathered.keep(~cut(low, high))
-    rows, pairs = _core.connect(
-        *how.resources(points), half.i, half.j, half.shifts, nodes.counts, nodes.ghosts,
-        nodes.number, how.flags_for(nodes),
-    )  # fmt: skip
-    return with_parts(nodes, how, rows, pairs, half, gathered, points, cut, cut_before)
+        half = _half_of(nodes, how, rows)
+        rows, gathered = _without(nodes, how, rows, gathered, half.keep(cut(half)), cut)
+    return _completed(nodes, how, points, rows, gathered, cut)
 
 
-def with_parts(
-    nodes: Nodes, how: How, rows: Any, pairs: Any, half: Half | None, gathered: Gathered | None,
-    points: FloatArray, cut: Cut | None = None, cut_before: npt.NDArray[np.int64] | None = None,
-    intersection: tuple[Offsets, Ints] | None = None,
+def _completed(
+    nodes: Nodes, how: How, points: FloatArray, rows: Rows, gathered: Rows | None,
+    cut: Cut | None = None, before: Half | None = None, intersection: Rows | None = None,
 ) -> Links:  # fmt: skip
-    """The links of these rows and pairs, with what is wanted besides.
-
-    pairs: None where they are made of the rows later. half: that of the pairs, if it is at hand;
-    intersection, too.
-    """
-    offsets, indices, *shifts = rows
-    made = _columns_of(pairs) if pairs is not None else _later(nodes, how, rows)
-    links = Links(
-        nodes, how, offsets, indices, shifts[0] if shifts else None, PairTable(nodes, made),
-        gathered, None, np.empty(0, np.int64), intersection, points if how.keeps_points else None,
-    )  # fmt: skip
-    counts = (nodes.counts, nodes.ghosts, nodes.number, how.flags)
+    """The links of these rows. cut, before: what overlap is not to have."""
+    lists = nodes.lists(how.flags)
+    overlap = gone = None
     if gathered is not None:
-        rows_of = (*how.resources(points), gathered.offsets, gathered.indices)
-        if cut is None and (cut_before is None or len(cut_before) == 0):
-            links = replace(links, overlap=_core.overlap(*rows_of, *counts))
-        else:
-            one = (np.array([nodes.n]), np.array([0]), None, how.flags)
-            apart, keys = _without(*_core.overlap(*rows_of, *one), nodes, cut, cut_before)
-            links = replace(links, overlap=link_rows(nodes, how, apart, points), cut=keys)
+        overlap = Rows.of(_core.overlap(*how.search(points), *gathered, *lists))
+    if overlap is not None and (cut is not None or before is not None):
+        half = _half_of(nodes, how, overlap)
+        mask = np.zeros(len(half.i), np.bool_)
+        for some in (cut, None if before is None else _cut_of_half(before, nodes)):
+            if some is not None:
+                mask |= some(half)
+        gone = half.keep(mask) if mask.any() else None
+        overlap = _connected(nodes, how, half.keep(~mask))
     if how.intersection and intersection is None:
-        half = half_of(links) if half is None else half
-        found = _core.intersect(*how.resources(points), half.i, half.j, *counts)
-        links = replace(links, intersection=found)
-    return links
+        half = _half_of(nodes, how, rows)
+        intersection = Rows.of(_core.intersect(*how.search(points), *half, *lists))
+    pairs = PairTable(nodes, lambda: _paired(nodes, how, rows, how.flags))
+    kept = points if how.keeps_points else points[:0]
+    return Links(nodes, how, rows, pairs, gathered, overlap, gone, intersection, kept)
 
 
-def _columns_of(pairs: Any) -> Columns:
-    (i_node, j_node, *shifts), (i_list, j_list) = pairs
+def _paired(nodes: Nodes, how: How, rows: Rows, flags: int) -> Columns:
+    """The pairs of rows."""
+    made = _core.pair_rows(*how.call(nodes.n), *rows, *nodes.lists(flags))
+    (i_node, j_node, *shifts), (i_list, j_list) = made[1]
     return Columns(i_node, i_list, j_node, j_list, shifts[0] if shifts else None)
 
 
-def _later(nodes: Nodes, how: How, rows: Any) -> Callable[[], Columns]:
-    """What makes the pairs of these rows, of all nodes."""
-
-    def make() -> Columns:
-        offsets, indices, *shifts = rows
-        made = _core.pair_rows(
-            *how.resources(_NOWHERE), offsets, indices, shifts[0] if shifts else None,
-            nodes.counts, nodes.ghosts, None, how.flags,
-        )  # fmt: skip
-        return _columns_of(made[1])
-
-    return make
+def _half_of(nodes: Nodes, how: How, rows: Rows) -> Half:
+    """All pairs of rows, those of two ghosts as well."""
+    return _half_of_pairs(nodes, _paired(nodes, how, rows, how.flags | _GHOST_PAIRS))
 
 
-def link_rows(nodes: Nodes, how: How, half: Half, points: FloatArray) -> tuple[Offsets, Ints]:
-    """Rows alone."""
-    rows: tuple[Offsets, Ints] = _core.connect(
-        *how.resources(points), half.i, half.j, half.shifts, nodes.counts, nodes.ghosts,
-        nodes.number, how.flags | _ROWS_ONLY,
-    )[0]  # fmt: skip
-    return rows
+def _half_of_pairs(nodes: Nodes, pairs: Any) -> Half:
+    half = Half(*nodes.ranks_of(pairs), pairs[4])
+    if not nodes.directed and nodes.ghosts.any():  # which come behind other nodes in the table
+        half = half.forward()
+    return half
+
+
+def _connected(nodes: Nodes, how: How, half: Half) -> Rows:
+    """The rows of a half list."""
+    i, j = (one.astype(np.int32, copy=False) for one in half[:2])
+    shifts = None if half.shifts is None else np.ascontiguousarray(half.shifts, np.int32)
+    lists = nodes.lists(how.flags | _ROWS_ONLY)
+    return Rows.of(_core.connect(*how.call(nodes.n), i, j, shifts, *lists)[0])
+
+
+# ---- the search -------------------------------------------------------------------------------
+
+
+def _search(
+    points: FloatArray, supports: FloatArray, nodes: Nodes, how: How
+) -> tuple[Rows, Rows | None]:
+    """The rows of all nodes, and, for overlap, what each one's own support reaches, by ranks."""
+    search, letters = how.search(points), "jS" if how.bits else "j"
+    gathered = None
+    if isinstance(how.extent, float):
+        if how.overlap:
+            by = reach_of("gather", how.extent, supports)
+            gathered = Rows.of(_core.neighbors(*search, letters, 4, None, by, "auto"))
+        by = reach_of(how.rule, how.extent, supports)
+        lists = nodes.lists(how.flags | _ROWS_ONLY)
+        return Rows.of(_core.connect_search(*search, *lists, by)[0]), gathered
+    extents = np.repeat(how.extent, nodes.counts)[nodes.numbers(np.arange(nodes.n))]
+    parts = []
+    for extent in np.unique(how.extent).tolist():  # each support among all nodes
+        who = np.flatnonzero(extents == extent).astype(np.int32)
+        by = reach_of("gather", extent, None, supports[who])
+        rows = Rows.of(_core.neighbors(*search, letters, 4, points[who], by, "auto"))
+        half = Half(np.repeat(who, np.diff(rows.offsets)), *rows[1:])
+        apart = half.i != half.j
+        parts.append(half.keep(apart if half.shifts is None else apart | half.shifts.any(axis=1)))
+    i, j, shifts = (np.concatenate(some) if some[0] is not None else None for some in zip(*parts))
+    assert i is not None and j is not None
+    half = Half(i, j, shifts).keep(np.argsort(i, kind="stable"))
+    if how.overlap:
+        gathered = Rows(starts_of(np.bincount(half.i, minlength=nodes.n)), *half[1:])
+    return _connected(nodes, how, _by_rule(half, how.rule)), gathered
+
+
+def _by_rule(gathered: Half, rule: str) -> Half:
+    """The pairs of a rule, from all (i, j, S) such that j is in the support of i."""
+    if rule == "gather":
+        return gathered
+    if rule == "scatter":
+        i, j, shifts = gathered
+        half = Half(j, i, None if shifts is None else -shifts)
+        return half.keep(half.order())
+    half = gathered.forward()
+    half = half.keep(half.order())
+    new = np.ones(len(half.i), np.bool_)
+    new[1:] = (half.i[1:] != half.i[:-1]) | (half.j[1:] != half.j[:-1])
+    if half.shifts is not None:
+        new[1:] |= (half.shifts[1:] != half.shifts[:-1]).any(axis=1)
+    places = np.flatnonzero(new)
+    if rule == "min":  # within both supports: there twice
+        places = places[np.diff(np.append(places, len(new))) == 2]
+    return half.keep(places)
+
+
+# ---- pairs that go ----------------------------------------------------------------------------
+
+
+def removed(links: Links, which: Any) -> Links:
+    """The links without the pairs of a mask of the table, or those that a function chooses."""
+    nodes, how, pairs = links.nodes, links.how, links.pairs
+    if callable(which):
+        cut = _cut_of(which, "which", nodes)
+        half = _half_of(nodes, how, links.rows)
+        mask = cut(half)
+        gone = half.keep(mask)
+        if not how.ghosts:
+            ghosts = nodes.is_ghost(half.i)
+            listed = ~ghosts if nodes.directed else ~(ghosts & nodes.is_ghost(half.j))
+            mask = mask[listed]
+    else:
+        mask = as_array(which, "which")
+        if mask.dtype.kind != "b":
+            raise TypeError(f"which must hold bools, got dtype {mask.dtype}")
+        if mask.shape != (len(pairs),):
+            shape = f"({len(pairs)},), one for each pair"
+            raise ValueError(f"which must have shape {shape}, got {mask.shape}")
+        mask = np.array(mask)  # another thread may change the caller's
+        places = np.flatnonzero(mask)
+        gone = _half_of_pairs(nodes, [one if one is None else one[places] for one in pairs._all()])
+        cut = _cut_of_half(gone, nodes)
+    rows, gathered = _without(nodes, how, links.rows, links.gathered, gone, cut)
+    made = _completed(nodes, how, links.points, rows, gathered, cut, links.cut)
+    if pairs._coupling is not None:
+        made.pairs.coupling = pairs._coupling[~mask]
+    return made
 
 
 def _without(
-    offsets: Offsets, indices: Ints, nodes: Nodes, cut: Cut | None,
-    before: npt.NDArray[np.int64] | None,
-) -> tuple[Half, npt.NDArray[np.int64]]:  # fmt: skip
-    """Of the overlap of each rank, pairs that stay, and the keys of the others."""
-    owners = np.repeat(np.arange(nodes.n, dtype=np.int32), np.diff(offsets))
-    apart = Half(owners, indices, None).keep(owners < indices)
-    gone: npt.NDArray[np.bool_] = np.zeros(len(apart.i), np.bool_)
-    keys = nodes.keys_of(apart.i, apart.j)
-    if cut is not None:
-        gone |= cut(apart.i, apart.j)
-    if before is not None:
-        gone |= is_one_of(keys, before)
-    return apart.keep(~gone), keys[gone]
-
-
-def is_one_of(keys: npt.NDArray[Any], some: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-    """Of each key whether it is one of some, which ascend."""
-    if len(some) == 0:
-        return np.zeros(len(keys), np.bool_)
-    places = np.minimum(np.searchsorted(some, keys), len(some) - 1)
-    found: npt.NDArray[np.bool_] = some[places] == keys
-    return found
-
-
-# ---- less of the same -------------------------------------------------------------------------
-
-
-def keep_rows(
-    how: How, rows: tuple[Offsets, Ints, Ints | None], counts: npt.NDArray[np.int64],
-    target: npt.NDArray[np.int32],
-    place: npt.NDArray[np.int32] | None, source: npt.NDArray[np.int64],
-) -> Any:  # fmt: skip
-    """Some of these rows, without the nodes that go."""
-    offsets, indices, shifts = rows
-    return _core.keep_rows(
-        *how.resources(_NOWHERE), offsets, indices, shifts, counts, target, place, source
-    )
-
-
-def keep_pairs(
-    how: How, pairs: PairTable, counts: npt.NDArray[np.int64] | None,
-    target: npt.NDArray[np.int32] | None, keep: npt.NDArray[np.bool_] | None,
-) -> Any:  # fmt: skip
-    """The pairs whose nodes stay and that are kept."""
-    made = _core.keep_pairs(*how.resources(_NOWHERE), *pairs._all(), counts, target, keep)
-    return made[1]
-
-
-def without(links: Links, gone: Half) -> tuple[Any, Gathered | None]:
-    """Rows, and what each node reaches, without these pairs, which are in the rows."""
-    nodes, how = links.nodes, links.how
-    resources = how.resources(np.empty((nodes.n, 1)))
-    flags = how.flags | _ROWS_ONLY
-    (offsets, indices, *shifts), _ = _core.connect(
-        *resources, gone.i, gone.j, gone.shifts, nodes.counts, nodes.ghosts, nodes.number, flags
-    )
-    rows = _core.rows_without(
-        *resources, links.offsets, links.indices, links.shifts, offsets, indices,
-        shifts[0] if shifts else None, nodes.n_lists, nodes.number is None,
-    )  # fmt: skip
-    gathered = links.gathered
+    nodes: Nodes, how: How, rows: Rows, gathered: Rows | None, gone: Half, cut: Cut
+) -> tuple[Rows, Rows | None]:
+    """Rows without some of their pairs, and what nodes gather without what is cut."""
+    left = Rows.of(_core.rows_without(
+        *how.call(nodes.n), *rows, *_connected(nodes, how, gone), nodes.n_lists,
+        nodes.number is None,
+    ))  # fmt: skip
     if gathered is not None:
-        (offsets, indices), _ = _core.connect(
-            *resources, gone.i, gone.j, None, np.array([nodes.n]), np.array([0]), None, flags
+        offsets, j, shifts = gathered
+        half = Half(np.repeat(np.arange(nodes.n, dtype=np.int32), np.diff(offsets)), j, shifts)
+        stays = ~cut(half.forward())
+        gathered = Rows(starts_of(stays)[offsets], *half.keep(stays)[1:])
+    return left, gathered
+
+
+def _cut_of(which: Any, name: str, nodes: Nodes) -> Cut:
+    """What a function, or rows (i_node, i_list, j_node, j_list), take out."""
+    if not callable(which):
+        rows = as_pair_rows(which, name)
+        for row in rows[~nodes.exist(rows)]:
+            raise ValueError(f"{name} names a node that does not exist: {row.tolist()}")
+        i, j = nodes.ranks_of(rows.T)
+        for row in rows[i == j]:
+            raise ValueError(f"{name} must name two nodes, got one with itself: {row.tolist()}")
+        keys = np.concatenate((nodes.keys_of(i, j), nodes.keys_of(j, i)))
+        return lambda half: np.isin(nodes.keys_of(half.i, half.j), keys)
+
+    def cut(half: Half) -> Bools:
+        i, j = half.i, half.j
+        if nodes.number is None and not nodes.directed:  # as in the table
+            turned = nodes.is_ghost(i) & ~nodes.is_ghost(j)
+            i, j = np.where(turned, j, i), np.where(turned, i, j)
+        four: list[Array] = []
+        for rank in (i, j):
+            number = nodes.numbers(rank)
+            lists = np.searchsorted(nodes.first[1:], number, side="right").astype(np.int32)
+            four += (number - nodes.first[lists]).astype(np.int32), lists
+        mask = np.asarray(which(*four))
+        if mask.dtype.kind != "b" or mask.shape not in ((), i.shape):
+            what = f"{mask.dtype} {mask.shape}" if mask.dtype.kind != "O" else kind_of(mask)
+            raise ValueError(f"{name} must return a bool for each of {len(i)} pairs, got {what}")
+        return np.broadcast_to(mask, i.shape)
+
+    return cut
+
+
+def _cut_of_half(some: Half, nodes: Nodes) -> Cut:
+    """These pairs, image by image."""
+
+    def cut(half: Half) -> Bools:
+        keys, others = (nodes.keys_of(one.i, one.j) for one in (half, some))
+        if half.shifts is not None and some.shifts is not None:
+            images = (np.column_stack(two) for two in ((keys, half.shifts), (others, some.shifts)))
+            number = np.unique(np.concatenate([*images]), axis=0, return_inverse=True)[1]
+            keys, others = np.split(number.reshape(-1), [len(half.i)])
+        return np.isin(keys, others)
+
+    return cut
+
+
+# ---- nodes that go ----------------------------------------------------------------------------
+
+
+def patched(links: Links, keep: Any, old2new: Any) -> tuple[Links, list[Offsets]]:
+    """The links of the nodes that are kept, and which these are, by their new numbers.
+
+    Rows are copied without the nodes that go, and sorted where nodes come in another order.
+    """
+    old, how = links.nodes, links.how
+    kept, new = _as_change(keep, old2new, old)
+    nodes, points, rank = _shrunk(links, kept, new)
+    order = [np.argsort(one, kind="stable")[(one < 0).sum() :] for one in new]
+    left = rank[rank >= 0]
+    is_sorted = bool((left[1:] > left[:-1]).all())
+    place = None
+    if not is_sorted:
+        place = np.empty_like(rank)
+        place[old.numbers(np.arange(old.n))] = rank
+
+    def kept_rows(rows: Rows, *change: Any) -> Rows:
+        return Rows.of(_core.keep_rows(*how.call(0), *rows, *change))
+
+    target = np.concatenate([*new, np.empty(0, np.int64)]).astype(np.int32)
+    starts = starts_of(how.with_rows(old))
+    of_row = [
+        start + own[:n] for start, own, n in zip(starts, order, how.with_rows(nodes), strict=False)
+    ]
+    source = np.concatenate([*of_row, np.empty(0, np.int64)]).astype(np.int64)
+    rows = kept_rows(links.rows, old.counts, target, place, source)
+    gathered = cut = intersection = None
+    if links.gathered is not None:
+        by_rank = np.empty(nodes.n, np.int64)
+        by_rank[left] = np.flatnonzero(rank >= 0)
+        change = (np.array([old.n]), rank, None if is_sorted else rank, by_rank)
+        gathered = kept_rows(links.gathered, *change)
+    if links.cut is not None:
+        half = Half(rank[links.cut.i], rank[links.cut.j], links.cut.shifts)
+        cut = half.keep((half.i >= 0) & (half.j >= 0)).forward()
+    stays = None
+    if (is_sorted and links.intersection is not None) or links.pairs._coupling is not None:
+        columns = links.pairs._all()
+        i, j = (rank[one] for one in old.ranks_of(columns))
+        half = Half(i, j, columns.shifts)
+        stays = np.flatnonzero((half.i >= 0) & (half.j >= 0))
+    if is_sorted and stays is not None and links.intersection is not None:
+        intersection = kept_rows(links.intersection, old.counts, target, None, stays)
+    made = _completed(nodes, how, points, rows, gathered, None, cut, intersection)
+    if stays is not None and links.pairs._coupling is not None:
+        half = half.keep(stays)
+        by = (half if nodes.directed else half.forward()).order()
+        made.pairs.coupling = links.pairs._coupling[stays[by]]
+    return made, order
+
+
+def _as_change(keep: Any, old2new: Any, nodes: Nodes) -> tuple[list[Bools], list[Offsets]]:
+    """Of each list which nodes stay, and the new number of each, -1 for those that go."""
+    masks, numbers = [], []
+    for name, count, mask in _of_lists(keep, "keep", nodes):
+        if mask.shape != (count,):
+            raise ValueError(f"keep must have shape ({count},) for {name!r}, got {mask.shape}")
+        if mask.dtype.kind in "iu" and ((mask == 0) | (mask == 1)).all():
+            mask = mask.astype(np.bool_)
+        if mask.dtype.kind != "b" and mask.size:
+            raise TypeError(f"keep must hold bools, got dtype {mask.dtype} for {name!r}")
+        masks.append(mask.astype(np.bool_))
+    if old2new is None:
+        return masks, [np.where(mask, np.cumsum(mask) - 1, -1) for mask in masks]
+    given = _of_lists(old2new, "old2new", nodes)
+    for (name, _, array), mask, internal in zip(given, masks, nodes.internal, strict=True):
+        if array.shape != mask.shape:
+            raise ValueError(
+                f"old2new must have shape {mask.shape} for {name!r}, got {array.shape}"
+            )
+        if array.size and array.dtype.kind not in "iu":
+            raise TypeError(f"old2new must hold whole numbers, got dtype {array.dtype}")
+        new = np.where(mask, array, -1).astype(np.int64)
+        n = int(mask.sum())
+        if (np.sort(new[mask]) != np.arange(n)).any():
+            raise ValueError(
+                f"old2new must give the {n} nodes of {name!r} that are kept the numbers from 0 to "
+                f"{n - 1}, each once"
+            )
+        if (new[:internal] >= mask[:internal].sum()).any():
+            raise ValueError(f"old2new must keep the ghosts of {name!r} behind its other nodes")
+        numbers.append(new)
+    return masks, numbers
+
+
+def _of_lists(values: Any, name: str, nodes: Nodes) -> list[tuple[str, int, Array]]:
+    """Names and counts of the lists, with an array for each."""
+    given = as_list(values, name, "arrays, one for each list")
+    if len(given) != nodes.n_lists:
+        raise ValueError(
+            f"{name} must have an array for each of {nodes.n_lists} lists, got {len(given)}"
         )
-        gathered = Gathered(*_core.rows_without(
-            *resources, gathered.offsets, gathered.indices, None, offsets, indices, None, 1, True
-        ))  # fmt: skip
-    return rows, gathered
+    arrays = [as_array(one, name) for one in given]
+    return list(zip(nodes.names, nodes.counts.tolist(), arrays, strict=True))
 
 
-# ---- back to half lists ------------------------------------------------------------------------
+def _shrunk(links: Links, kept: list[Bools], new: list[Offsets]) -> tuple[Nodes, FloatArray, Ints]:
+    """The nodes that are left, their points by rank, and the new rank, or -1, of each old one."""
+    old, how = links.nodes, links.how
+    counts = np.array([mask.sum() for mask in kept], np.int64)
+    internal = [mask[:n].sum() for mask, n in zip(kept, old.internal, strict=True)]
+    ghosts = counts - np.array(internal, np.int64)
+    first = starts_of(counts)
+    number = np.concatenate([
+        np.empty(0, np.int64),
+        *(np.where(one >= 0, one + at, -1) for one, at in zip(new, first, strict=False)),
+    ])  # fmt: skip
+    stays = number >= 0
+    ids = np.empty(int(stays.sum()), np.int64)
+    ids[number[stays]] = old.global_ids()[stays]
+    points, order = links.points, None
+    if how.keeps_points:
+        by_number = old.rank(np.arange(old.n))
+        points = np.empty((len(ids), points.shape[1]))
+        points[number[stays]] = links.points[by_number[stays]]
+        if how.morton:
+            order = morton_number(points, ids, how.morton_box)
+            points = points[order]
+    nodes = Nodes(old.names, counts, ghosts, ids, order, old.directed)
+    rank = np.full(old.n, -1, np.int32)
+    rank[stays] = nodes.rank(number[stays])
+    return nodes, points, rank[old.numbers(np.arange(old.n))]
 
 
-def half_of(links: Links) -> Half:
-    """The half list that links were made of."""
-    nodes = links.nodes
-    if links.how.ghost_pairs or not links.how.ghost_rows or not nodes.ghosts.any():
-        return half_of_pairs(nodes, links.pairs._all())
-    return _half_of_rows(links)
+def morton_keys(links: Links) -> npt.NDArray[np.uint64]:
+    """The key of each node by its number."""
+    keys = np.empty(links.nodes.n, np.uint64)
+    if len(keys):
+        low, high = corners_of(links.points, links.how.morton_box)
+        keys[links.nodes.number] = _core.morton_keys(links.points, low, high)
+    return keys
 
 
-def half_of_pairs(nodes: Nodes, pairs: Columns) -> Half:
-    """The half list of some pairs, in the order of the table."""
-    first, second = nodes.ranks_of_columns(pairs)
-    shifts = pairs.shifts
-    if nodes.ghosts.any():  # which come behind the other nodes of their pairs
-        turned = first > second
-        first, second = np.minimum(first, second), np.maximum(first, second)
-        shifts = None if shifts is None else np.where(turned[:, None], -shifts, shifts)
-    return Half(first.astype(np.int32, copy=False), second.astype(np.int32, copy=False), shifts)
+# ---- what holds of it -------------------------------------------------------------------------
 
 
-def _half_of_rows(links: Links) -> Half:
-    """Rows of all nodes have each pair twice."""
-    nodes = links.nodes
-    owner, other = rank_rows(links, links.offsets, links.indices)
-    once = owner < other
-    if links.shifts is not None:
-        once |= (owner == other) & _is_forward(links.shifts)
-    i, j = owner[once].astype(np.int32), other[once].astype(np.int32)
-    shifts = None if links.shifts is None else links.shifts[once]
-    if nodes.number is not None:
-        order = np.argsort(nodes.keys_of(i, j), kind="stable")
-        i, j, shifts = i[order], j[order], None if shifts is None else shifts[order]
-    return Half(i, j, shifts)
-
-
-def _is_forward(shifts: Ints) -> npt.NDArray[np.bool_]:
-    """Whether the first component that is not 0 is positive."""
-    first = np.argmax(shifts != 0, axis=1)
-    forward: npt.NDArray[np.bool_] = shifts[np.arange(len(shifts)), first] > 0
-    return forward
-
-
-def row_starts(links: Links) -> npt.NDArray[np.int64]:
-    """How many nodes of the lists before each one have rows, and at last of all."""
-    counts = links.nodes.counts if links.how.ghost_rows else links.nodes.internal
-    return starts_of(counts)
-
-
-def are_listed(links: Links, half: Half) -> npt.NDArray[np.bool_]:
-    """Which pairs of the half list are in the table."""
-    nodes = links.nodes
-    if links.how.ghost_pairs or not nodes.ghosts.any():
-        return np.ones(len(half.i), np.bool_)
-    ghost = [nodes.is_ghost(nodes.numbers(one)) for one in (half.i, half.j)]
-    return ~(ghost[0] & ghost[1])
-
-
-def stored(links: Links) -> npt.NDArray[np.int64]:
-    """The numbers among all nodes of those that have rows, in the order of rows."""
-    nodes = links.nodes
-    if links.how.ghost_rows:
-        return np.arange(nodes.n)
-    return np.flatnonzero(~nodes.is_ghost(np.arange(nodes.n)))
-
-
-def rank_rows(
-    links: Links, offsets: Offsets, indices: Ints
-) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Ranks of the owner of each entry of rows, and of the node that it names."""
-    nodes = links.nodes
-    lengths = np.diff(offsets)
-    owner = np.repeat(np.repeat(stored(links), nodes.n_lists), lengths)
-    lists = np.repeat(np.resize(np.arange(nodes.n_lists), len(lengths)), lengths)
-    return nodes.rank(owner), nodes.rank(nodes.first[lists] + indices)
+def check(links: Links) -> None:
+    """ValueError unless rows are those of the pairs that they tell, and all else is what these
+    give: so all is ascending, each pair once, and rows mirror each other."""
+    nodes, how = links.nodes, links.how
+    try:
+        rows = _connected(nodes, how, _half_of(nodes, how, links.rows))
+    except ValueError as error:
+        raise ValueError(f"rows are not each there once, in order: {error}") from error
+    again = _completed(nodes, how, links.points, rows, links.gathered, None, links.cut)
+    for name in ("rows", "pairs", "overlap", "intersection"):
+        one, other = getattr(links, name), getattr(again, name)
+        if name == "pairs":
+            one, other = one._all(), other._all()
+        if one is not None and not all(map(np.array_equal, one, other)):
+            raise ValueError(f"{name} are not what the rows say")
+    if nodes.number is not None and (np.sort(nodes.number) != np.arange(nodes.n)).any():
+        raise ValueError("the traversal does not have each node once")

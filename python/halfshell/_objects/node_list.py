@@ -3,22 +3,32 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from halfshell import _core, _show
-from halfshell._convert.arrays import as_array, in_order
-from halfshell._convert.foreign import kind_of
+from halfshell._convert.arrays import as_array, as_real_array, in_order
+from halfshell._convert.call import reach_by_radii, reach_by_supports
+from halfshell._convert.foreign import exact_number, is_a, kind_of, shown
+from halfshell._convert.lengths import as_positive, check_lengths
 from halfshell._convert.options import as_whole
-from halfshell._convert.scene import as_points
-from halfshell._objects.node_planes import are_parallel, as_plane, touched_by
-from halfshell._objects.node_supports import as_extent, as_supports, reach_of
+from halfshell._convert.points import as_points, refuse_infinite
+from halfshell._objects.rational import as_fractions, is_definite, solved
+from halfshell._settings import current
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from halfshell._convert.types import ArrayLike, FloatArray
+    from halfshell._convert.types import ArrayLike, FloatArray, Reach
+
+#: Supports whose product with an extent is known to the last bit, and extents that the core takes.
+_SUPPORTS, _EXTENTS = (2.0**-500, 2.0**500), (2.0**-64, 2.0**64)
+#: Roundings of a distance from a plane, and of a support in its units, relative to their terms.
+_PLANE_ERROR = 64 * 2.0**-53
+#: Squares of lengths down to this, and of their inverses, are ordinary numbers.
+_LEAST = 2.0**-400
 
 
 class NodeList:
@@ -54,15 +64,6 @@ class NodeList:
     n_nodes, n_internal, n_ghost : int
         Numbers of all nodes, of those that are not ghosts, and of ghosts.
 
-    Raises
-    ------
-    TypeError
-        If an argument is of the wrong kind.
-    ValueError
-        If a shape does not fit, a position is not finite, a support is negative, not finite, out
-        of range or not a symmetric positive definite matrix, or `n_ghost` is less than 0 or more
-        than n.
-
     See Also
     --------
     Connectivity : which nodes of several lists are neighbours.
@@ -86,15 +87,15 @@ class NodeList:
         n_ghost: int = 0,
         ids: npt.ArrayLike | None = None,
     ) -> None:
-        if not isinstance(name, str):
+        if not is_a(name, str):
             raise TypeError(f"name must be a string, got {kind_of(name)}")
         points = as_points(positions, "positions")
         n = len(points)
         self.name = name
         self.is_anywhere = n == 0 and np.ndim(cast("Any", positions)) == 1
         self.positions = _locked(in_order(points, np.float64))
-        _refuse_infinite(self.positions)
-        self.H = _locked(as_supports(H, n, self.positions.shape[1]))
+        refuse_infinite(self.positions, "positions")
+        self.H = _locked(_as_supports(H, n, self.positions.shape[1]))
         self.n_ghost = _as_ghosts(n_ghost, n)
         self.ids = None if ids is None else _locked(_as_ids(ids, n))
 
@@ -146,12 +147,6 @@ class NodeList:
             Nodes that are within reach of the image of one of them, ascending: by the support of
             either, exactly, for the images as float64 rounds them.
 
-        Raises
-        ------
-        ValueError
-            If a shape does not fit, a number is not finite, a normal is zero, or the planes are
-            not parallel.
-
         Notes
         -----
         Ghosts count like any other node. Spheral's ``setMasterList`` does the same with two planes.
@@ -166,18 +161,90 @@ class NodeList:
         """
         d = self.positions.shape[1]
         factor = as_extent(extent)
-        point, normal = as_plane(enter, "enter", d)
-        other, other_normal = as_plane(exit, "exit", d)
-        if not are_parallel(normal, other_normal):
+        point, normal = _as_plane(enter, "enter", d)
+        other, other_normal = _as_plane(exit, "exit", d)
+        a, b = ([Fraction(x) for x in one.tolist()] for one in (normal, other_normal))
+        if any(a[k] * b[m] != a[m] * b[k] for k in range(d) for m in range(k)):
             raise ValueError("enter and exit must be parallel planes")
-        near = np.flatnonzero(touched_by(self.positions, self.H, factor, point, normal))
+        near = np.flatnonzero(_are_touched(self.positions, self.H, factor, point, normal))
         images = self.positions[near] + (other - point)
-        _refuse_infinite(images)
+        refuse_infinite(images, "positions")
+        own = current()
         found = _core.pairs_between(
-            self.positions, np.inf, None, 0, True, "exact", None, None, None, None, "j", False, 8,
-            None, images, reach_of("max", self.H, factor, self.H[near]), "auto",
+            self.positions, np.inf, None, 0, True, "exact", own.kernel, own.memory_limit, None,
+            own.threads, "j", False, 8, None, images,
+            reach_of("max", factor, self.H, self.H[near]), "auto",
         )  # fmt: skip
         return near, np.unique(found)
+
+
+def as_extent(value: Any) -> float:
+    """How many times supports count."""
+    return _checked_extent(as_positive(value, "extent"), "")
+
+
+def as_extents(values: Any, n: int) -> float | FloatArray:
+    """One for all lists, also where all are equal, or one for each."""
+    if exact_number(values) is not None or as_array(values, "extent", "be a number").ndim == 0:
+        return as_extent(values)
+
+    def check(shape: tuple[int, ...]) -> None:
+        if shape != (n,):
+            raise ValueError(
+                f"extent must be a number or have shape ({n},), one for each list, got {shape}"
+            )
+
+    extents = in_order(as_real_array(values, "extent", check_shape=check), np.float64)
+    for k, extent in enumerate(extents.tolist()):
+        _checked_extent(extent, f"extent[{k}] = ")
+    return extents if len(np.unique(extents)) > 1 else float(extents[0]) if n else 1.0
+
+
+def _checked_extent(extent: float, where: str) -> float:
+    if not _EXTENTS[0] <= extent <= _EXTENTS[1]:
+        raise ValueError(f"extent must be from 2**-64 to 2**64, got {where}{extent}")
+    return extent
+
+
+def reach_of(rule: str, extent: float, supports: Any, of_queries: Any = None) -> Reach:
+    """What the core takes for a reach by such supports."""
+    given = of_queries if supports is None else supports
+    if given.ndim == 1:
+        return reach_by_radii(rule, supports, of_queries, extent)
+    return reach_by_supports(rule, supports, of_queries, extent)
+
+
+def _as_supports(values: Any, n: int, d: int) -> FloatArray:
+    def check(shape: tuple[int, ...]) -> None:
+        if shape not in ((n,), (n, d, d)):
+            raise ValueError(
+                f"H must have shape ({n},) or ({n}, {d}, {d}), one h or matrix for each node, got "
+                f"{shape}"
+            )
+
+    supports = in_order(as_real_array(values, "H", check_shape=check), np.float64)
+    if supports.ndim == 1:
+        check_lengths(supports, "H")
+        least, largest = _SUPPORTS
+        for k in np.flatnonzero((supports > largest) | ((supports > 0.0) & (supports < least))):
+            raise ValueError(f"H must be 0 or from 2**-500 to 2**500, got H[{k}] = {supports[k]}")
+        return supports
+    if d > 3:
+        raise ValueError(f"H can be matrices in 1 to 3 dimensions, got {d}")
+    for k, a, b in np.argwhere(~np.isfinite(supports)):
+        raise ValueError(f"H must be finite, got H[{k}, {a}, {b}] = {supports[k, a, b]}")
+    for k, a, b in np.argwhere(supports != supports.transpose(0, 2, 1)):
+        raise ValueError(
+            f"H must be symmetric, got H[{k}, {a}, {b}] = {supports[k, a, b]} and "
+            f"H[{k}, {b}, {a}] = {supports[k, b, a]}"
+        )
+    sizes = np.abs(supports).max(axis=(1, 2), initial=0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        least_values = np.linalg.eigvalsh(np.nan_to_num(supports / sizes[:, None, None]))[:, 0]
+    for k in np.flatnonzero(least_values < 2.0**-40):  # which is not certain
+        if not is_definite(as_fractions(supports[k])):
+            raise ValueError(f"H must be positive definite, got H[{k}] = {supports[k].tolist()}")
+    return supports
 
 
 def _locked(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -187,15 +254,10 @@ def _locked(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return view
 
 
-def _refuse_infinite(points: FloatArray) -> None:
-    for i, k in np.argwhere(~np.isfinite(points)):
-        raise ValueError(f"positions must be finite, got positions[{i}, {k}] = {points[i, k]}")
-
-
 def _as_ghosts(value: Any, n: int) -> int:
     number = as_whole(value, "n_ghost")
     if not 0 <= number <= n:
-        raise ValueError(f"n_ghost must be from 0 to {n}, the number of nodes, got {number}")
+        raise ValueError(f"n_ghost must be from 0 to {n}, the number of nodes, got {shown(number)}")
     return number
 
 
@@ -210,3 +272,67 @@ def _as_ids(values: Any, n: int) -> npt.NDArray[np.int64]:
     if array.dtype == np.uint64 and (array > np.iinfo(np.int64).max).any():
         raise OverflowError("ids must be less than 2**63")
     return np.ascontiguousarray(array, np.int64)
+
+
+# ---- planes -----------------------------------------------------------------------------------
+
+
+def _as_plane(values: Any, name: str, d: int) -> tuple[FloatArray, FloatArray]:
+    """A point and a normal."""
+    if not is_a(values, (tuple, list)) or len(values) != 2:
+        raise ValueError(f"{name} must be a point and a normal")
+
+    def check(shape: tuple[int, ...]) -> None:
+        if shape != (d,):
+            raise ValueError(f"{name} must have a point and a normal of shape ({d},), got {shape}")
+
+    point, normal = (
+        in_order(as_real_array(one, name, check_shape=check), np.float64) for one in values
+    )
+    if not (np.isfinite(point).all() and np.isfinite(normal).all() and normal.any()):
+        raise ValueError(f"{name} must be finite, and its normal must not be zero")
+    return point, normal
+
+
+def _are_touched(
+    positions: FloatArray, supports: FloatArray, extent: float, point: FloatArray,
+    normal: FloatArray,
+) -> npt.NDArray[np.bool_]:  # fmt: skip
+    """Whether each support touches a plane: in floats where these can tell, else in fractions."""
+    with np.errstate(over="ignore", invalid="ignore", under="ignore"):
+        terms = (positions - point) * normal
+        height, size = np.abs(terms.sum(axis=1)), np.abs(terms).sum(axis=1)
+        reach, error = _reach_along(normal, supports, extent)
+        margin = _PLANE_ERROR * (size + reach) + error
+        within = height < reach - margin
+        unsure = ~(within | (height > reach + margin)) | ~np.isfinite(margin)
+        unsure |= (size < 2.0**-900) | (reach < 2.0**-900)
+        unsure |= not _LEAST < np.abs(normal).max() < 1.0 / _LEAST
+    n = as_fractions(normal[:, None])
+    for k in np.flatnonzero(unsure):
+        terms_of_k = zip(n, positions[k].tolist(), point.tolist(), strict=True)
+        exact = sum((a * (Fraction(x) - Fraction(p)) for (a,), x, p in terms_of_k), Fraction(0))
+        if supports.ndim == 1:
+            along = [[Fraction(float(supports[k])) * a] for (a,) in n]
+        else:
+            along = solved(as_fractions(supports[k]), n)
+        squares = sum((a * a for (a,) in along), Fraction(0))
+        within[k] = exact * exact <= Fraction(extent) ** 2 * squares
+    found: npt.NDArray[np.bool_] = within
+    return found
+
+
+def _reach_along(
+    normal: FloatArray, supports: FloatArray, extent: float
+) -> tuple[FloatArray, FloatArray]:
+    """How far each support reaches along a normal, times its length, and a bound of the error."""
+    if supports.ndim == 1:
+        return extent * supports * np.sqrt((normal * normal).sum()), np.zeros(len(supports))
+    spread = np.linalg.cond(supports)
+    is_sure = spread < 2.0**30
+    ordinary = np.where(is_sure[:, None, None], supports, np.eye(len(normal)))
+    columns = np.broadcast_to(normal, (len(supports), len(normal)))[:, :, None]
+    size = np.linalg.norm(np.linalg.solve(ordinary, columns)[:, :, 0], axis=1)
+    is_sure &= (size > _LEAST) & (size < 1.0 / _LEAST)
+    reach = extent * size
+    return reach, np.where(is_sure, 2.0**-40 * spread, np.inf) * reach

@@ -19,10 +19,9 @@ __all__ = ["PairChanges", "Step", "compare"]
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 Columns = tuple[npt.NDArray[Any], ...]
-Flags = npt.NDArray[np.bool_]
 
 MOST_KEYS = 2**62  # i, j and the image of a pair are one number where there are fewer
-MOST_PLAIN = 400  # exponents of numbers whose products are ordinary numbers
+PLAIN = (2.0**-400, 2.0**400)  # between these products of numbers are ordinary ones
 MOST_TURNS = 2**60  # more than any pair goes on by: S is int32
 
 
@@ -90,26 +89,12 @@ def compare(before: Step, old: Columns, now: Step, new: Columns) -> tuple[Intege
     was, then = _Pairs(*old), _Pairs(*new)
     if before.points.shape[1] != now.points.shape[1]:
         return np.arange(len(was.i)), np.arange(len(then.i))
-    keys = _keys_of_both(before, was, now, then)
-    every = np.sort(np.concatenate(keys), kind="stable")
-    twice = every[1:] == every[:-1]
+    every = np.concatenate(_keys_of_both(before, was, now, then))
+    order = np.argsort(every, kind="stable")  # of two lists that ascend, mostly
+    twice = every[order[1:]] == every[order[:-1]]
     alone = np.ones(len(every), bool)
-    alone[1:] &= ~twice
-    alone[:-1] &= ~twice
-    single = every[alone]
-    return _places_of(single, keys[0]), _places_of(single, keys[1])
-
-
-def _places_of(single: Integers, keys: Integers) -> Integers:
-    """Where those of these numbers are that are among the keys, each once."""
-    if not np.all(keys[1:] > keys[:-1]):  # there were jumps
-        places: Integers = np.flatnonzero(np.isin(keys, single))
-        return places
-    places = keys.searchsorted(single)
-    inside = places < len(keys)
-    places, single = places[inside], single[inside]
-    found: Integers = places[keys[places] == single]
-    return found
+    alone[order[1:][twice]] = alone[order[:-1][twice]] = False
+    return np.flatnonzero(alone[: len(was.i)]), np.flatnonzero(alone[len(was.i) :])
 
 
 def _keys_of_both(before: Step, was: _Pairs, now: Step, then: _Pairs) -> tuple[Integers, Integers]:
@@ -127,8 +112,14 @@ def _keys_of_both(before: Step, was: _Pairs, now: Step, then: _Pairs) -> tuple[I
         keys = _keys(was, was.S, then, new)
         if keys is not None:
             return keys
-    images = _images(was, then, axes, change, moves)
-    return _keys(was, images[0], then, images[1]) or _rows_as_keys(was, images[0], then, images[1])
+    change_of = np.eye(then.S.shape[1], dtype=np.int64)
+    change_of[np.ix_(np.array(axes), np.array(axes))] = change
+    new = then.S @ change_of
+    goes_on = (then.i < moves.n) & (then.j < moves.n)
+    turns = moves.apart(then.i[goes_on], then.j[goes_on])
+    new[np.ix_(np.flatnonzero(goes_on), np.array(axes))] += turns
+    old, new = _upright(was.S, was), _upright(new, then)
+    return _keys(was, old, then, new) or _rows_as_keys(was, old, then, new)
 
 
 class _Moves:
@@ -145,13 +136,11 @@ class _Moves:
         self.n_all = max(len(old), len(new))
         self._points, self._to_units = (old, new), (to_old, to_new)
         self._known: dict[int, list[Fraction]] = {}
-        self.old, error_of_old = _in_units(old, to_old)
-        places, error_of_new = _in_units(new, to_new)
-        with np.errstate(over="ignore", invalid="ignore"):
-            self.floats = places[: self.n] - self.old[: self.n]
-            largest = _largest(self.floats)
-            # Of the difference of two moves, and of each itself.
-            self.error = error_of_old + error_of_new + 2.0**-50 * largest
+        places, error_of_old = _in_units(old, to_old)
+        places_now, error_of_new = _in_units(new, to_new)
+        self.floats = places_now[: self.n] - places[: self.n]
+        # Of the difference of two moves, and of each itself.
+        self.error = error_of_old + error_of_new + 2.0**-50 * _largest(self.floats)
 
     def turns(self) -> Integers | None:
         """Whole box vectors that each point has jumped by, where that is clear, but for a drift.
@@ -160,23 +149,21 @@ class _Moves:
         than a half. 0 for points that one step does not have: they have no pairs to go on.
         """
         for drift in (0.0, self.floats[:1]):
-            with np.errstate(over="ignore", invalid="ignore"):
-                rest = self.floats - drift
-                whole = np.rint(rest)
-                if np.all(np.abs(rest - whole) + 2.0 * self.error < 0.2499):
-                    turns = np.zeros((self.n_all, whole.shape[1]), np.int64)
-                    turns[: self.n] = whole
-                    return turns
+            rest = self.floats - drift
+            whole = np.rint(rest)
+            if np.all(np.abs(rest - whole) + 2.0 * self.error < 0.2499):
+                turns = np.zeros((self.n_all, whole.shape[1]), np.int64)
+                turns[: self.n] = whole
+                return turns
         return None
 
     def apart(self, i: npt.NDArray[Any], j: npt.NDArray[Any]) -> Integers:
         """The integer nearest to what j has moved by more than i; of two, the larger one."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            more = self.floats[j] - self.floats[i] + 0.5
-            whole = np.floor(more)
-            is_sure = np.minimum(more - whole, whole + 1.0 - more) > 2.0 * self.error
-            is_sure &= np.abs(more) < MOST_TURNS
-        found = _whole(np.where(is_sure, whole, 0.0))
+        more = self.floats[j] - self.floats[i] + 0.5
+        whole = np.floor(more)
+        is_sure = np.minimum(more - whole, whole + 1.0 - more) > 2.0 * self.error
+        is_sure &= np.abs(more) < MOST_TURNS
+        found = np.where(is_sure, whole, 0.0).astype(np.int64)
         for k in np.flatnonzero(~is_sure.all(axis=1)):
             pair = zip(self._exactly(int(i[k])), self._exactly(int(j[k])), strict=True)
             nearest = (math.floor(b - a + Fraction(1, 2)) for a, b in pair)
@@ -193,28 +180,6 @@ class _Moves:
             move = [b - a for a, b in zip(old, new, strict=True)]
             self._known[point] = move
         return move
-
-
-def _images(
-    was: _Pairs, then: _Pairs, axes: list[int], change: Integers, moves: _Moves
-) -> tuple[Integers, Integers]:
-    """An image for each pair, small numbers that are the same for a pair that goes on."""
-    others = [k for k in range(was.S.shape[1]) if k not in axes]
-
-    def before(of: _Pairs) -> Integers:
-        """Any integers that depend on the two points alone: these make the numbers small."""
-        last = len(moves.old) - 1
-        first, second = (moves.old[np.minimum(last, numbers)] for numbers in (of.i, of.j))
-        with np.errstate(over="ignore", invalid="ignore"):
-            return _whole(np.nan_to_num(second - first))
-
-    goes_on = (then.i < moves.n) & (then.j < moves.n)
-    new = then.S[:, axes] @ change + before(then)
-    new[goes_on] += moves.apart(then.i[goes_on], then.j[goes_on])
-    return (
-        _upright(np.hstack([was.S[:, axes] + before(was), was.S[:, others]]), was.i == was.j),
-        _upright(np.hstack([new, then.S[:, others]]), then.i == then.j),
-    )
 
 
 def _moves_between(before: Step, now: Step, axes: list[int]) -> tuple[Integers, _Moves]:
@@ -249,24 +214,17 @@ def _right_inverse(vectors: list[list[Fraction]]) -> list[list[Fraction]]:
 
 
 def _in_units(points: Floats, to_units: list[list[Fraction]]) -> tuple[Floats, Floats]:
-    """points @ to_units, rounded, and a bound on the error, for each column."""
+    """points @ to_units, rounded, and a bound on the error, for each column.
+
+    It is infinite for units in which floats would overflow or vanish: only fractions tell there.
+    """
     largest = _largest(points)
-    size = int(np.frexp(largest.max(initial=0.0))[1])
-    columns = transposed(to_units)
-    most = [max(abs(x) for x in column) for column in columns]  # none is 0
-    sizes = np.array([x.numerator.bit_length() - x.denominator.bit_length() for x in most])
-    factors = np.array(
-        [
-            [float(x / Fraction(2) ** int(of_column)) for x in column]
-            for column, of_column in zip(columns, sizes, strict=True)
-        ]
-    ).T
-    with np.errstate(over="ignore", under="ignore"):
-        errors = np.ldexp(largest, -size) @ np.abs(factors) * 2.0**-48 + 2.0**-1000
-        if max(abs(size), *np.abs(sizes)) < MOST_PLAIN:
-            return points @ np.ldexp(factors, sizes), np.ldexp(errors, size + sizes) + 2.0**-1000
-        places = np.ldexp(points, -size) @ factors
-        return np.ldexp(places, size + sizes), np.ldexp(errors, size + sizes)
+    most = [max(abs(x) for x in column) for column in transposed(to_units)]  # none is 0
+    sizes = [*(x for x in most), *(Fraction(x) for x in largest[largest > 0.0].tolist())]
+    if not all(PLAIN[0] < size < PLAIN[1] for size in sizes):
+        return np.zeros((len(points), len(most))), np.full(len(most), np.inf)
+    factors = np.array([[float(x) for x in row] for row in to_units])
+    return points @ factors, largest @ np.abs(factors) * 2.0**-48 + 2.0**-600
 
 
 def _largest(x: Floats) -> Floats:
@@ -274,14 +232,12 @@ def _largest(x: Floats) -> Floats:
     return np.array([np.abs(column).max(initial=0.0) for column in x.T])
 
 
-def _whole(x: Floats) -> Integers:
-    return np.rint(np.clip(x, -MOST_TURNS, MOST_TURNS)).astype(np.int64)
-
-
-def _upright(images: Integers, is_own: Flags) -> Integers:
+def _upright(images: Integers, pairs: _Pairs) -> Integers:
     """A pair of a point and its own image has two, opposite ones: the first number not 0 > 0."""
+    is_own = pairs.i == pairs.j
     rows = images[is_own]
     first = (rows != 0).argmax(axis=1)
+    images = images.copy()
     images[is_own] *= np.sign(rows[np.arange(len(rows)), first])[:, None]
     return images
 

@@ -10,10 +10,21 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _show
-from halfshell._convert.foreign import kind_of
+from halfshell._convert.foreign import is_a, kind_of, shown
+from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import as_count
 from halfshell._errors import StaleError
 from halfshell._objects.pair_table import Pair, PairTable
+
+
+def _as_dtype(value: Any) -> np.dtype[Any]:
+    try:
+        dtype: np.dtype[Any] = np.dtype(value)
+        return dtype
+    except MemoryError:
+        raise
+    except Exception as error:
+        raise TypeError(f"dtype must be one of NumPy's, got {shown(value)}") from error
 
 
 class PairField:
@@ -33,22 +44,18 @@ class PairField:
     values : ndarray of `dtype`, shape (m,), or (m, n_elements) if there are several
         All values, zero at first; can be written to.
     pairs : PairTable
-        The pairs to which they belong.
 
     Raises
     ------
     StaleError
-        On every access, by number, by pair, to `values` or to `pairs`, after the connectivity has
-        been rebuilt or patched, or pairs have been removed. An array taken from
-        `values` before that is a plain NumPy array, and stays as it was.
-    KeyError
-        On access to a pair that is not in the table.
+        On every access after the connectivity has been rebuilt or patched, or pairs have been
+        removed. An array taken from `values` before that is a plain NumPy array, and stays.
 
     Notes
     -----
     ``field[k]`` is the value of pair k, or its row of values; ``field[i_node, i_list, j_node,
-    j_list]`` that of a pair, in whatever order its nodes are given. Slices, masks and arrays of
-    numbers select as they do in ``values``. All of them can be assigned to.
+    j_list]`` that of a pair, as `PairTable.index` finds it. Slices, masks and arrays of numbers
+    select as they do in ``values``. All of them can be assigned to.
 
     Examples
     --------
@@ -65,13 +72,16 @@ class PairField:
     def __init__(
         self, pairs: PairTable, dtype: npt.DTypeLike = np.float64, n_elements: int = 1
     ) -> None:
-        if not isinstance(pairs, PairTable):
+        if not is_a(pairs, PairTable):
             raise TypeError(f"pairs must be a PairTable, got {kind_of(pairs)}")
         self.n_elements = as_count(n_elements, "n_elements")
         self._pairs = pairs
         self._refuse_stale()
+        refuse_unavailable(
+            len(pairs) * self.n_elements, f"values with n_elements = {shown(n_elements)}"
+        )
         shape = (len(pairs),) if self.n_elements == 1 else (len(pairs), self.n_elements)
-        self._values: npt.NDArray[Any] = np.zeros(shape, dtype)
+        self._values: npt.NDArray[Any] = np.zeros(shape, _as_dtype(dtype))
 
     @property
     def values(self) -> npt.NDArray[Any]:
@@ -84,12 +94,10 @@ class PairField:
         return self._pairs
 
     def __len__(self) -> int:
-        self._refuse_stale()
-        return len(self._values)
+        return len(self.values)
 
     def __iter__(self) -> Iterator[Any]:
-        self._refuse_stale()
-        return iter(self._values)
+        return iter(self.values)
 
     _repr_html_ = _show.html
 
@@ -98,46 +106,23 @@ class PairField:
         return f"PairField({len(self._values)} x {self.n_elements} {self._values.dtype}{state})"
 
     def __getitem__(self, key: Any) -> Any:
-        self._refuse_stale()
-        return self._values[self._place(key)]
+        return self.values[self._place(key)]
 
     def __setitem__(self, key: Any, value: Any) -> None:
-        self._refuse_stale()
-        self._values[self._place(key)] = value
+        self.values[self._place(key)] = value
 
     def zero(self) -> None:
-        """Set all values to zero.
-
-        Examples
-        --------
-        >>> import halfshell as hs
-        >>> c = hs.Connectivity([hs.NodeList("a", [[0.0], [1.0]], [1.0, 1.0])])
-        >>> field = hs.PairField(c.pairs)
-        >>> field[0] = 1.0
-        >>> field.zero()
-        >>> field.values.tolist()
-        [0.0]
-        """
-        self._refuse_stale()
-        self._values[...] = 0
+        """Set all values to zero."""
+        self.values[...] = 0
 
     def copy(self) -> PairField:
-        """Another field of these pairs, with the same values.
-
-        Examples
-        --------
-        >>> import halfshell as hs
-        >>> c = hs.Connectivity([hs.NodeList("a", [[0.0], [1.0]], [1.0, 1.0])])
-        >>> field = hs.PairField(c.pairs)
-        >>> field.copy().pairs is c.pairs
-        True
-        """
+        """Another field of these pairs, with the same values."""
         other = PairField(self.pairs, self._values.dtype, self.n_elements)
         other._values[...] = self._values
         return other
 
     def _place(self, key: Any) -> Any:
-        if isinstance(key, Pair) or (isinstance(key, tuple) and len(key) == 4):
+        if is_a(key, Pair) or (is_a(key, tuple) and len(key) == 4):
             return self._pairs.index(key)
         return key
 

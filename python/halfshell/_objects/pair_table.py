@@ -10,6 +10,7 @@ import numpy as np
 
 from halfshell import _show
 from halfshell._convert.arrays import as_array, as_real_array
+from halfshell._convert.foreign import shown
 from halfshell._convert.options import as_whole
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ class PairTable:
     """Every pair of nodes that are neighbours, each once.
 
     Made by `Connectivity`, as its attribute ``pairs``. Only `coupling` can be changed; all other
-    arrays are read-only.
+    arrays are read-only, and made from the rows when you first access one of them.
 
     Attributes
     ----------
@@ -75,9 +76,8 @@ class PairTable:
     -----
     The lower (list, node) comes first, but an internal node comes before a ghost. Pairs ascend by
     the lower and the higher of the two. With ``order="morton"`` both go by the order of the nodes
-    on the Z curve.
-
-    The arrays are made from the rows when you first access one of them.
+    on the Z curve. With the rules "gather" and "scatter", (i, j) is there if j is in the row of i,
+    and (j, i) is another pair; pairs ascend by i and j.
 
     ``pairs[k]`` is pair k as a tuple (i_node, i_list, j_node, j_list), and ``len(pairs)`` the
     number of pairs.
@@ -95,20 +95,12 @@ class PairTable:
     1
     """
 
-    __slots__ = (
-        "__weakref__",
-        "_columns",
-        "_coupling",
-        "_keys",
-        "_make",
-        "_nodes",
-        "_outdated",
-    )  # fmt: skip
+    __slots__ = ("__weakref__", "_columns", "_coupling", "_keys", "_make", "_nodes", "_outdated")
 
-    def __init__(self, nodes: Nodes, made: Columns | Callable[[], Columns]) -> None:
+    def __init__(self, nodes: Nodes, make: Callable[[], Columns]) -> None:
         self._nodes = nodes
-        self._make: Callable[[], Columns] | None = made if callable(made) else None
-        self._columns: Columns | None = None if callable(made) else made
+        self._make: Callable[[], Columns] | None = make
+        self._columns: Columns | None = None
         self._coupling: FloatArray | None = None
         self._keys: npt.NDArray[np.int64] | None = None
         self._outdated: str | None = None  # by what
@@ -122,10 +114,6 @@ class PairTable:
             self._columns = columns = make()
             self._make = None
         return columns
-
-    @property
-    def _are_made(self) -> bool:
-        return self._columns is not None
 
     @property
     def i_node(self) -> Ints:
@@ -144,31 +132,11 @@ class PairTable:
         return self._all().j_list
 
     @property
-    def _shifts(self) -> Ints | None:
-        return self._all().shifts
-
-    def __len__(self) -> int:
-        return len(self.i_node)
-
-    _repr_html_ = _show.html
-
-    def __repr__(self) -> str:
-        return f"PairTable({len(self)} pair{'s' * (len(self) != 1)})"
-
-    def __getitem__(self, k: int) -> Pair:
-        k = self._number(k)
-        return Pair(
-            int(self.i_node[k]), int(self.i_list[k]), int(self.j_node[k]), int(self.j_list[k])
-        )
-
-    def __iter__(self) -> Iterator[Pair]:
-        return (self[k] for k in range(len(self)))
-
-    @property
     def shifts(self) -> Ints:
-        if self._shifts is None:
+        shifts = self._all().shifts
+        if shifts is None:
             raise AttributeError("these pairs have no shifts: there is no periodic box")
-        return self._shifts
+        return shifts
 
     @property
     def coupling(self) -> FloatArray:
@@ -186,23 +154,26 @@ class PairTable:
             )
         self._coupling = np.array(np.broadcast_to(array, (len(self),)), np.float64)
 
+    def __len__(self) -> int:
+        return len(self.i_node)
+
+    def __getitem__(self, k: int) -> Pair:
+        k = self._number(k)
+        return Pair(*(int(column[k]) for column in self._all()[:4]))
+
+    def __iter__(self) -> Iterator[Pair]:
+        return (self[k] for k in range(len(self)))
+
+    _repr_html_ = _show.html
+
+    def __repr__(self) -> str:
+        return f"PairTable({len(self)} pair{'s' * (len(self) != 1)})"
+
     def view(self) -> npt.NDArray[Any]:
-        """All pairs as one structured array.
-
-        Returns
-        -------
-        ndarray, shape (m,)
-            A new one, with the fields i_node, i_list, j_node, j_list of int32 and coupling of
-            float64.
-
-        Examples
-        --------
-        >>> import halfshell as hs
-        >>> c = hs.Connectivity([hs.NodeList("a", [[0.0], [1.0]], [1.0, 1.0])])
-        >>> c.pairs.view()["j_node"].tolist()
-        [1]
+        """All pairs as a new structured array, with the fields i_node, i_list, j_node, j_list of
+        int32 and coupling of float64.
         """
-        names = ("i_node", "i_list", "j_node", "j_list")
+        names = Columns._fields[:4]
         table = np.empty(len(self), [*((name, np.int32) for name in names), ("coupling", float)])
         for name in (*names, "coupling"):
             table[name] = getattr(self, name)
@@ -214,13 +185,15 @@ class PairTable:
         Parameters
         ----------
         pair : array_like of int, shape (4,) or (k, 4)
-            (i_node, i_list, j_node, j_list), or several such rows.
+            (i_node, i_list, j_node, j_list), or several such rows. With the rules "gather" and
+            "scatter" the order counts.
         shift : array_like of int, shape (d,), optional
             S of a single pair that the table has in several images.
 
         Returns
         -------
         int, or ndarray of int64, shape (k,)
+            By binary search: the first call makes an index of 8 bytes per pair.
 
         Raises
         ------
@@ -229,71 +202,47 @@ class PairTable:
         TypeError, ValueError
             If these are not pairs, a pair occurs in several images and `shift` does not tell
             which, or `shift` is given without a periodic box.
-
-        Notes
-        -----
-        The first call makes an index of 8 bytes per pair; then each pair takes a binary search.
-
-        Examples
-        --------
-        >>> import halfshell as hs
-        >>> c = hs.Connectivity([hs.NodeList("a", [[0.0], [1.0], [2.0]], [0.5] * 3)])
-        >>> c.pairs.index((2, 0, 1, 0))
-        1
-        >>> c.pairs.index([(1, 0, 0, 0), (1, 0, 2, 0)]).tolist()
-        [0, 1]
         """
-        rows = as_pair_rows(pair, "pair", single=True)
-        ranks = self._nodes.ranks_of(rows)
-        if ranks is None:
+        rows, nodes = as_pair_rows(pair, "pair", single=True), self._nodes
+        if not nodes.exist(rows).all():
             raise KeyError(f"there is no such node: {pair!r}")
-        wanted = self._nodes.keys_of(*ranks)
-        keys = self._lookup()
-        first = np.searchsorted(keys, wanted)
-        end = np.searchsorted(keys, wanted, side="right")
-        if (first == end).any():
-            missing = tuple(rows[np.flatnonzero(first == end)[0]].tolist())
-            raise KeyError(f"{missing} is no pair")
+        if self._keys is None:
+            self._keys = nodes.keys_of(*nodes.ranks_of(self._all()))
+        wanted = nodes.keys_of(*nodes.ranks_of(rows.T))
+        first = np.searchsorted(self._keys, wanted)
+        end = np.searchsorted(self._keys, wanted, side="right")
+        for k in np.flatnonzero(first == end):
+            raise KeyError(f"{tuple(rows[k].tolist())} is no pair")
         if shift is not None:
-            return self._index_of_image(int(first[0]), int(end[0]), ranks, shift)
-        if (end - first > 1).any():
-            missing = tuple(rows[np.flatnonzero(end - first > 1)[0]].tolist())
-            raise ValueError(f"{missing} is a pair in several images: choose one by shift")
+            return self._index_of_image(int(first[0]), int(end[0]), rows, shift)
+        for k in np.flatnonzero(end - first > 1):
+            several = tuple(rows[k].tolist())
+            raise ValueError(f"{several} is a pair in several images: choose one by shift")
         return int(first[0]) if np.ndim(pair) == 1 else first.astype(np.int64)
 
-    def _index_of_image(
-        self, first: int, end: int, ranks: tuple[npt.NDArray[Any], npt.NDArray[Any]], shift: Any
-    ) -> int:
-        given = as_array(shift, "shift")
-        if self._shifts is None:
+    def _index_of_image(self, first: int, end: int, rows: npt.NDArray[Any], shift: Any) -> int:
+        """The place, from first to end, of a pair and a shift."""
+        given, shifts = as_array(shift, "shift"), self._all().shifts
+        if shifts is None:
             raise ValueError("shift is for periodic boxes: these pairs have none")
-        shifts = self.shifts
-        if given.dtype.kind not in "iu" or given.shape != shifts.shape[1:] or len(ranks[0]) != 1:
+        if given.dtype.kind not in "iu" or given.shape != shifts.shape[1:] or len(rows) != 1:
             raise ValueError(
                 f"shift must be {shifts.shape[1]} whole numbers, and pair a single one"
             )
-        first_rank, second_rank = (int(rank[0]) for rank in ranks)
+        pair = tuple(rows[0].tolist())
+        turned = (*pair[2:], *pair[:2])
         for k in range(first, end):
-            own = self._nodes.ranks_of(np.array([self[k]]))
-            turned = own is not None and int(own[0][0]) != first_rank
-            either = first_rank == second_rank
-            row = shifts[k].astype(np.int64)
-            if (turned or either) and (row == -given).all():
+            image = shifts[k].astype(np.int64)
+            if self[k] == pair and (image == given).all():
                 return k
-            if not turned and (row == given).all():
+            if not self._nodes.directed and self[k] == turned and (image == -given).all():
                 return k
         raise KeyError(f"there is no pair of these nodes with the shift {given.tolist()}")
-
-    def _lookup(self) -> npt.NDArray[np.int64]:
-        if self._keys is None:
-            first, second = self._nodes.ranks_of_columns(self)
-            self._keys = self._nodes.keys_of(first, second)
-        return self._keys
 
     def _number(self, k: Any) -> int:
         number = as_whole(k, "the number of a pair")
         if not -len(self) <= number < len(self):
-            raise IndexError(f"there are {len(self)} pairs, got {number}")
+            raise IndexError(f"there are {len(self)} pairs, got {shown(number)}")
         return number % len(self)
 
 

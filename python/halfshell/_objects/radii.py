@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rows of queries that have a radius each.
+"""Rows of queries that have a radius each, among the points of a cell list.
 
 The core divides queries by octave of their radius and sorts the points anew for each octave. Few
 queries among many points, within the cutoff that cells were made for, are sooner done by one search
@@ -14,8 +14,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from halfshell._convert.call import take
 from halfshell._convert.memory import gigabytes
+from halfshell._convert.options import as_index_bytes
+from halfshell._convert.points import Points
 from halfshell._convert.starts import starts_of
+from halfshell._functions.neighbors import listed
+from halfshell._objects.exact_order import Origin, copied
+from halfshell._objects.neighbor_table import NeighborTable
+from halfshell._settings import current, settings
 
 Columns = tuple[npt.NDArray[Any], ...]
 Radii = npt.NDArray[np.float64]
@@ -25,7 +32,48 @@ _SORTED_MEANWHILE = 2048
 _LARGEST_GATHERED = 2.0**1022  # the core has no larger radii in one search
 
 
-def search_apart(radii: Radii, cutoff: float, n_points: int) -> bool:
+def query_each(
+    cells: Any, queries: Points, radii: Radii, options: dict[str, Any]
+) -> NeighborTable:
+    """The table of all points within the radius of each query."""
+    quantities = options.pop("quantities", "j")
+    index_bytes = as_index_bytes(options.pop("index_dtype", np.int64))
+    how = current()
+    # What sorting by distance searches again is that of now; the caller's arrays may change.
+    queries = queries._over(queries.positions.copy())
+    options = {name: copied(value) for name, value in options.items()}
+
+    def rows(asking: Points, letters: str) -> Columns:
+        if not len(radii) or not _search_apart(radii, cells.cutoff, len(cells)):
+            call = take(
+                cells.points, None, asking.replace(radii=radii), rule="gather", directed=True,
+                **options,
+            )  # fmt: skip
+            found: Columns = listed(call, letters, index_bytes)
+            return found
+
+        def search(members: npt.NDArray[np.intp], radius: float, room: float | None) -> Columns:
+            with settings(memory_limit=how.memory_limit if room is None else room):
+                call = take(cells, radius, asking[members], directed=True, **options)
+                part: Columns = listed(call, letters, index_bytes)
+            return part
+
+        return _search_each(search, radii, how.memory_limit)
+
+    def find_shifts(origin: Origin) -> npt.NDArray[Any]:
+        options.pop("progress", None)
+        with settings(precision=how.precision, algorithm=how.algorithm):
+            return rows(queries, "S")[1]
+
+    arrays = rows(queries, quantities)
+    origin = None
+    if "d" in quantities and "j" in quantities:
+        points, box, bits = cells.points._scene
+        origin = Origin(points, queries.positions, box, bits, find_shifts, is_own=True)
+    return NeighborTable(arrays, quantities, len(cells), False, origin=origin)
+
+
+def _search_apart(radii: Radii, cutoff: float, n_points: int) -> bool:
     """Whether one search for each radius takes less time than sorting the points, or must be."""
     largest = float(radii.max())
     if largest > _LARGEST_GATHERED:
@@ -36,7 +84,7 @@ def search_apart(radii: Radii, cutoff: float, n_points: int) -> bool:
     return len(radii) <= limit or len(np.unique(radii)) <= limit
 
 
-def search_each(
+def _search_each(
     search: Callable[[npt.NDArray[np.intp], float, float | None], Columns],
     radii: Radii,
     limit: float | None,

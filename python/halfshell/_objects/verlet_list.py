@@ -1,26 +1,40 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A pair list that is built with a skin and used for many steps."""
+"""A pair list that is built with a skin and used for many steps, and the choice of the skin."""
 
 from __future__ import annotations
 
-from contextlib import suppress
+import math
+import os
+import threading
+import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from typing import Any, Literal, Never, NoReturn, TypedDict, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _show
-from halfshell._convert.foreign import of_argument
+from halfshell._convert.foreign import is_a, of_argument
 from halfshell._convert.lengths import as_cutoff, as_length, as_skin
-from halfshell._convert.options import AUTO, as_flag, as_index_bytes
-from halfshell._convert.scene import as_box_alone, as_scene
-from halfshell._convert.types import Arrays, BoxLike, Letter, Number, Out, PeriodicLike, PointsLike
-from halfshell._objects.alone import Alone
-from halfshell._objects.pair_changes import PairChanges, Step
-from halfshell._objects.skin import AutoSkin
-from halfshell._objects.tracked_steps import TrackedSteps
-from halfshell._objects.verlet_rows import VerletRows
+from halfshell._convert.options import as_flag, as_index_bytes, check_letters
+from halfshell._convert.points import Points, as_box_alone
+from halfshell._convert.types import (
+    Arrays,
+    BoxLike,
+    Letter,
+    Number,
+    Out,
+    PeriodicLike,
+    PointsLike,
+    Rest,
+)
+from halfshell._objects.neighbor_table import NeighborTable
+from halfshell._objects.pair_changes import PairChanges, Step, compare
+from halfshell._settings import current
 from halfshell._unknown import refuse_unknown
+
+_LISTS: weakref.WeakSet[VerletList] = weakref.WeakSet()
 
 
 class _PairOptions(TypedDict, total=False):
@@ -31,7 +45,7 @@ class _PairOptions(TypedDict, total=False):
     out: Out | None
 
 
-class VerletList(VerletRows):
+class VerletList:
     """A list of pairs that is kept for many steps and is always exact.
 
     The list is built with a larger cutoff, `cutoff` + `skin`. As long as no points can have moved
@@ -51,20 +65,11 @@ class VerletList(VerletRows):
     box, periodic : optional
         As in `pairs`; `update` may give others.
     inclusive : bool, default True
-        Whether a pair at exactly `cutoff` counts.
+        As in `pairs`.
     track_changes : bool, default False
         Whether to allow calls of `changes`, for which the points of the previous step are kept.
-    kernel, threads, memory_limit : optional
+    threads : int, optional
         As in `pairs`.
-
-    Raises
-    ------
-    TypeError, ValueError, OverflowError
-        As for `pairs`; ValueError also if `skin` is negative or not finite.
-
-    See Also
-    --------
-    pairs : the same pairs for one set of points.
 
     Notes
     -----
@@ -102,22 +107,24 @@ class VerletList(VerletRows):
         periodic: PeriodicLike | None = None,
         inclusive: bool = True,
         track_changes: bool = False,
-        kernel: str | None = None,
         threads: int | None = None,
-        memory_limit: float | None = None,
         **unknown: Never,
     ) -> None:
         if unknown:
             refuse_unknown(VerletList, unknown)
         self._cutoff = as_length(as_cutoff(cutoff), "cutoff")
-        self._given_skin = None if isinstance(skin, str) and skin == "auto" else as_skin(skin)
+        is_auto = is_a(skin, str) and str.__str__(skin) == "auto"
+        self._given_skin = None if is_auto else as_skin(skin)
         self._given = box, periodic  # until `update` brings others
         self._inclusive = as_flag(inclusive, "inclusive")
         self._tracks = as_flag(track_changes, "track_changes")
         self._threads = threads
-        self._kernel = kernel
-        self._memory_limit = memory_limit
-        self._check()
+        ndim, vectors, bits = as_box_alone(box, periodic)
+        with suppress(MemoryError):  # each step says whether it fits
+            _core.count_pairs(
+                np.empty((0, ndim)), 0.0, vectors, 0 if vectors is None else bits, *self._how(),
+                None, current().algorithm,
+            )  # fmt: skip
         self._n_builds = 0
         self._n_updates = 0
         self._start("there are no points yet: call update first")
@@ -128,28 +135,52 @@ class VerletList(VerletRows):
         self._without_points = without_points
         self._list = _core.verlet_new()
         self._searched: Step | None = None  # the last step's scene, if it has no list
-        self._tracked = TrackedSteps() if self._tracks else None
+        self._steps: list[Step] = []  # with changes tracked, the last and the one before
+        self._known: list[dict[tuple[str, int], Any]] = []  # their pairs, where these are known
         auto, given = AutoSkin(self._cutoff), self._given_skin
         self._auto = auto if given is None else None
         self._skin = auto.skin if given is None else given
         self._updates = False  # in the middle of one
 
-    def _interrupted(self) -> None:
-        if self._updates:
-            # The list of before is never freed: the frames of a thread that is gone keep theirs.
-            self._start(
-                "this process was forked off while another thread was in update: call it first"
-            )
+    def _how(self) -> Rest:
+        """What the core takes behind the box."""
+        how = current()
+        threads = how.threads if self._threads is None else self._threads
+        return self._inclusive, "exact", how.kernel, how.memory_limit, None, threads
 
-    def _check(self) -> None:
-        """Refuse what no step could be taken with, by a search among no points."""
-        ndim, vectors, bits = as_box_alone(*self._given)
-        with suppress(MemoryError):  # each step says whether it fits
-            _core.count_pairs(
-                np.empty((0, ndim)), 0.0, vectors, 0 if vectors is None else bits,
-                self._inclusive, "exact", self._kernel, self._memory_limit, None, self._threads,
-                None, AUTO,
-            )
+    # ---- one call at a time, also in a child that was forked off in the middle of one ------
+
+    def _make_lock(self) -> None:
+        self._lock, self._caller = threading.RLock(), 0  # 0: no thread is in a call
+        _LISTS.add(self)
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Other threads wait, a call from within a call is an error."""
+        with self._lock:  # which a fork may replace meanwhile
+            if self._caller:  # a signal handler, called while the core looks for signals
+                raise RuntimeError("this VerletList is in the middle of another call")
+            self._caller = threading.get_ident()
+            try:
+                yield
+            finally:
+                self._caller = 0
+
+    @staticmethod
+    def _forked() -> None:
+        """In a child there is one thread, which may be in a call; others left locks taken."""
+        for each in list(_LISTS):
+            caller = each._caller
+            if caller == threading.get_ident():
+                continue
+            each._make_lock()
+            if caller and each._updates:
+                # The list of before is never freed: frames of a thread that is gone keep theirs.
+                each._start(
+                    "this process was forked off while another thread was in update: call it first"
+                )
+
+    # ---- steps -----------------------------------------------------------------------------
 
     def update(
         self,
@@ -189,10 +220,11 @@ class VerletList(VerletRows):
         >>> pair_list.pairs(quantities="d").tolist()
         [0.95]
         """
-        with Alone(self):
+        with self._alone():
             before = self._given
             given = (before[0] if box is None else box, before[1] if periodic is None else periodic)
-            scene = as_scene(points, *given)
+            brings = type(points) is Points and points.box is not None
+            scene = Points._of(points, "points", *((None, None) if brings else given))._scene
             self._updates = True
             try:
                 rebuilt = self._update(*scene)
@@ -202,7 +234,7 @@ class VerletList(VerletRows):
             return rebuilt
 
     def _update(self, array: Any, vectors: Any, bits: int) -> bool:
-        if self._tracked is not None:
+        if self._tracks:
             array = array.copy()
         auto = self._auto
         if auto is not None and auto.searches:
@@ -214,8 +246,7 @@ class VerletList(VerletRows):
         skin = auto.next_skin() if auto is not None else self._skin
         with of_argument("cutoff + skin" if skin > 0.0 and auto is None else "cutoff"):
             rebuilt = _core.verlet_update(
-                self._list, array, self._cutoff, vectors, bits, self._inclusive, "exact",
-                self._kernel, self._memory_limit, None, self._threads, skin, change,
+                self._list, array, self._cutoff, vectors, bits, *self._how(), skin, change
             )
         self._searched = None
         self._taken(array, vectors, bits)
@@ -240,18 +271,21 @@ class VerletList(VerletRows):
     def _taken(self, points: Any, vectors: Any, bits: int) -> None:
         """A step has been taken; its points are a copy where changes are tracked."""
         self._n_updates += 1
-        if self._tracked is not None:
-            self._tracked.take(Step(points, None if vectors is None else vectors.copy(), bits))
+        if self._tracks:
+            step = Step(points, None if vectors is None else vectors.copy(), bits)
+            self._steps = [*self._steps[-1:], step]
+            self._known = [*self._known[-1:], {}]
 
     def _search(
         self, scene: Step, quantities: str, sort: bool, index_bytes: int, out: Any
     ) -> Arrays:
         points, vectors, bits = scene
         return _core.pairs(
-            points, self._cutoff, vectors, bits, self._inclusive, "exact", self._kernel,
-            self._memory_limit, None, self._threads, quantities, sort, index_bytes, out, None,
-            AUTO, None,
-        )
+            points, self._cutoff, vectors, bits, *self._how(), quantities, sort, index_bytes, out,
+            None, current().algorithm, None,
+        )  # fmt: skip
+
+    # ---- pairs -----------------------------------------------------------------------------
 
     @overload
     def pairs(
@@ -292,8 +326,6 @@ class VerletList(VerletRows):
         ------
         RuntimeError
             Before the first `update`.
-        TypeError, ValueError, CapacityError, OverflowError, MemoryError
-            As `halfshell.pairs`.
 
         Examples
         --------
@@ -305,7 +337,7 @@ class VerletList(VerletRows):
         >>> i.tolist(), j.tolist(), S.tolist()
         ([0, 0], [1, 2], [[0, 0], [-1, 0]])
         """
-        with Alone(self):
+        with self._alone():
             return self._find(quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out)
 
     def _find(self, quantities: str, sort: bool, index_bytes: int, out: Any) -> Arrays:
@@ -314,9 +346,59 @@ class VerletList(VerletRows):
             return self._search(self._searched, quantities, sort, index_bytes, out)
         return _core.verlet_pairs(
             self._list, np.empty((0, self._state()["ndim"])), self._cutoff, None, 0,
-            self._inclusive, "exact", self._kernel, self._memory_limit, None, self._threads,
-            quantities, sort, index_bytes, out,
-        )
+            *self._how(), quantities, sort, index_bytes, out,
+        )  # fmt: skip
+
+    def neighbors(
+        self, *, quantities: str = "j", index_dtype: npt.DTypeLike = np.int64
+    ) -> NeighborTable:
+        """All neighbours of each point of the last step, as `halfshell.neighbors` finds them.
+
+        Parameters
+        ----------
+        quantities, index_dtype
+            As in `halfshell.neighbors`.
+
+        Returns
+        -------
+        NeighborTable
+            The table of `halfshell.neighbors`, bit for bit, but without the points, which its
+            ``sort()`` would need.
+
+        Raises
+        ------
+        RuntimeError
+            Before the first `update`.
+        OverflowError
+            As `pairs`; also for a shift of -2**31, which has no opposite in int32.
+
+        Notes
+        -----
+        The pairs are sorted into rows, which takes longer than `pairs`. It pays if you need the
+        rows and the list lasts for many steps.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> pair_list = hs.VerletList(1.5, box=[4.0, 4.0])
+        >>> pair_list.update([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]])
+        True
+        >>> [row.tolist() for row in pair_list.neighbors()]
+        [[1, 2], [0], [0]]
+        """
+        check_letters(quantities)
+        if not set(quantities) <= set("jdDS"):
+            raise ValueError(
+                "quantities must be some of the letters j d D S, each at most once (i is the row "
+                f"itself), got {quantities!r}"
+            )
+        index_bytes = as_index_bytes(index_dtype)
+        letters = "ij" + quantities.replace("j", "")
+        with self._alone():
+            half = self._find(letters, True, index_bytes, None)
+            n = self.n_points
+        columns = dict(zip(letters, half, strict=True))
+        return NeighborTable._of_columns(columns, quantities, (n, n), True, True, is_in_order=True)
 
     def changes(
         self, *, quantities: str = "ij", index_dtype: npt.DTypeLike = np.int64
@@ -347,7 +429,7 @@ class VerletList(VerletRows):
         ------
         RuntimeError
             Before the first `update`, or if the list was made without `track_changes`.
-        TypeError, ValueError, OverflowError, MemoryError
+        OverflowError
             As for `pairs` with S.
 
         Examples
@@ -361,13 +443,31 @@ class VerletList(VerletRows):
         [[0], [1]] [[], []]
         [[], []] [[0], [2]]
         """
-        with Alone(self):
-            if self._tracked is None:
+        with self._alone():
+            if not self._tracks:
                 raise RuntimeError("changes are not tracked: make it with track_changes=True")
             if self._searched is None:
                 self._state()
             index_bytes = as_index_bytes(index_dtype)
-            return self._tracked.changes(quantities, index_bytes, self._find, self._search)
+            check_letters(quantities)
+            letters = quantities + "".join(letter for letter in "ijS" if letter not in quantities)
+            key, now = (letters, index_bytes), self._steps[-1]
+            new = self._known[-1].get(key) or self._find(letters, True, index_bytes, None)
+            nothing = Step(now.points[:0], now.vectors, now.bits)
+            before = self._steps[0] if len(self._steps) == 2 else nothing
+            old = self._known[0].get(key) if before is not nothing else None
+            old = old or self._search(before, letters, True, index_bytes, None)
+            self._known = [{key: old}, {key: new}][-len(self._steps) :]
+            column = [letters.index(letter) for letter in "ijS"]
+            broken, formed = compare(
+                before, tuple(old[k] for k in column), now, tuple(new[k] for k in column)
+            )
+
+        def rows(columns: Any, which: npt.NDArray[Any]) -> Arrays:
+            chosen = tuple(column[which] for column in columns[: len(quantities)])
+            return chosen[0] if len(chosen) == 1 else chosen
+
+        return PairChanges(rows(new, formed), rows(old, broken))
 
     @property
     def cutoff(self) -> float:
@@ -420,3 +520,125 @@ class VerletList(VerletRows):
     def __repr__(self) -> str:
         done = f"{self.n_points} points, {self._n_builds} builds in {self._n_updates} updates"
         return f"VerletList({self._cutoff!r}, skin={self._skin!r}): {done}"
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=VerletList._forked)
+
+
+# ---- the skin that is chosen ---------------------------------------------------------------
+
+FIRST_SHARE = 0.1  # of the cutoff: the first skin
+SHARES = [2.0 ** (k / 4.0) for k in range(-40, 1)]  # of the cutoff: all skins that are considered
+MOST_CHANGES = 6  # then it is settled, whatever it is
+STEPS_TO_WAIT = 32  # a list that lasts longer than this is looked at all the same
+WORTHWHILE = 0.95  # a change must promise at most this share of the time
+SEARCHES = 1000  # steps that are searched before a list is tried again
+
+# Nanoseconds, as benchmarks/verlet.py has measured them for i and j in three dimensions, without
+# what writing the pairs takes, which is the same for both: each call, each point, each pair that
+# is listed or found.
+_USE = (50e3, 50.0, 0.95)
+_BUILD = (50e3, 170.0, 4.6)
+_SEARCH = (15e3, 80.0, 2.1)
+
+
+class AutoSkin:
+    """Chooses a skin, or a search in every step, by what has to be done.
+
+    With a skin s a step takes ``build / lasts(s) + use``, each of which grows with the pairs that
+    are listed, and these with ``(cutoff + s)**d``. lasts(s) is s over what a step has used up of
+    the skin.
+
+    It looks when a list is used up, and at one that lasts long after STEPS_TO_WAIT steps. There are
+    at most MOST_CHANGES changes, and none after a look that found nothing WORTHWHILE: it settles.
+    In three dimensions it also compares with a search, at every look: `searches` says that no list
+    is wanted for the next SEARCHES steps.
+    """
+
+    def __init__(self, cutoff: float) -> None:
+        self.cutoff = cutoff
+        self._start()
+
+    def _start(self) -> None:
+        self.skin = FIRST_SHARE * self.cutoff  # of the list in use
+        self.is_settled = self.cutoff == 0.0  # there is no length to go by
+        self.searches = False
+        self._chosen = self.skin  # for the next one
+        self._n_changes = 0
+        self._n_points = 0  # of the list in use
+        self._n_listed = 0
+        self._steps = 0  # since it was built
+        self._spent = 0.0  # of the skin, since then
+        self._searched = 0
+
+    def next_skin(self) -> float:
+        """The skin for the list that is built next."""
+        return self._chosen
+
+    def wants_change(self, ndim: int) -> bool:
+        """Whether to build now, though it may not be needed."""
+        if self._steps >= STEPS_TO_WAIT and not self.is_settled:
+            self._look(self._spent / self._steps, ndim)
+        return self._chosen != self.skin
+
+    def searched(self) -> None:
+        """A step was searched."""
+        self._searched += 1
+        if self._searched == SEARCHES:
+            self._start()
+
+    def updated(
+        self, rebuilt: bool, margin: float, ndim: int, n_points: int, n_listed: int
+    ) -> None:
+        """A step was taken; `margin` is what it would have left of the list before."""
+        if not rebuilt:
+            self._steps += 1
+            self._spent = max(self._spent, self.skin - margin)
+            return
+        if self._chosen != self.skin:
+            self.skin = self._chosen
+        elif not math.isinf(margin):
+            self._look((self.skin - margin) / (self._steps + 1), ndim)
+        self._n_points = n_points
+        self._n_listed = n_listed
+        self._steps = 0
+        self._spent = 0.0
+
+    def _look(self, a_step: float, ndim: int) -> None:
+        """Choose what promises most, for points that use up so much of the skin in a step."""
+        if self.cutoff == 0.0:
+            return
+        times = {
+            share * self.cutoff: self.list_time(share * self.cutoff, a_step, ndim)
+            for share in SHARES
+        }
+        best = min(times, key=lambda skin: times[skin])
+        if ndim == 3 and self.search_time(ndim) < WORTHWHILE * times[best]:
+            self.searches = True
+            return
+        if self.is_settled:
+            return
+        now = self.list_time(self.skin, a_step, ndim)
+        if self._n_changes == MOST_CHANGES or not times[best] < WORTHWHILE * now:
+            self.is_settled = True
+            return
+        self._n_changes += 1
+        self._chosen = best
+
+    def list_time(self, skin: float, a_step: float, ndim: int) -> float:
+        """Nanoseconds a step with a list of this skin."""
+        lasts = max(1.0, skin / a_step) if a_step > 0.0 else math.inf
+        listed = self._pairs_within(skin, ndim)
+        return self._time(_BUILD, listed) / lasts + self._time(_USE, listed)
+
+    def search_time(self, ndim: int) -> float:
+        """Nanoseconds a step that is searched."""
+        return self._time(_SEARCH, self._pairs_within(0.0, ndim))
+
+    def _pairs_within(self, skin: float, ndim: int) -> float:
+        """About how many pairs there are within the cutoff and that skin."""
+        return self._n_listed * ((self.cutoff + skin) / (self.cutoff + self.skin)) ** ndim
+
+    def _time(self, parts: tuple[float, float, float], pairs: float) -> float:
+        return parts[0] + parts[1] * self._n_points + parts[2] * pairs

@@ -122,7 +122,8 @@ class TreeSearches:
         if isinstance(radii, float):
             rows = hs.neighbors(points, radii, **each)
         else:
-            rows = hs.neighbors(points, None, query_radii=radii, rule="gather", **each)
+            each["queries"] = hs.Points(asked, radii=radii)
+            rows = hs.neighbors(points, None, rule="gather", **each)
         return rows.offsets, rows.indices if numbers is None else numbers[rows.indices]
 
     def _nearest(self, asked: Points, k: int, bound: float, threads: int) -> tuple[Any, Any]:

@@ -162,18 +162,26 @@ def primitive_neighbor_list(
     else:
         if use_scaled_positions:
             positions = np.dot(positions, cell)
-        reach = _reach(cutoff, numbers)
+        length, each = _reach(cutoff, numbers)
+        points = hs.Points(positions, box=np.asarray(cell), periodic=pbc, **each)
         wanted = "".join(dict.fromkeys(letters)) or "i"
-        scene = {"box": np.asarray(cell), "periodic": pbc, "inclusive": False}
-        found = (_with_selves if self_interaction else _without_selves)(
-            wanted, positions, *reach, scene
-        )
+        # As a query each point finds itself, if its reach is above zero.
+        table = hs.neighbors(
+            points, length, queries=points if self_interaction else None, inclusive=False,
+            quantities=wanted.replace("i", "") or "j",
+        )  # fmt: skip
+        arrays = table.to_pairs(quantities=wanted)
+        columns = arrays if isinstance(arrays, tuple) else (arrays,)
+        found = {  # in ASE's type, and the caller's to write to
+            one: np.require(array, _EMPTY[one][0], "W")
+            for one, array in zip(wanted, columns, strict=True)
+        }
     arrays = tuple(found[letter] for letter in letters)
     return arrays[0] if len(arrays) == 1 else arrays
 
 
 def _reach(cutoff: Any, numbers: Any) -> tuple[Any, dict[str, Any]]:
-    """The cutoff of halfshell, and what each atom brings to it."""
+    """The cutoff of halfshell, and what `halfshell.Points` are to know of each atom."""
     if isinstance(cutoff, Mapping):
         if numbers is None:
             raise TypeError("numbers must be given if cutoff is a dict")
@@ -194,34 +202,6 @@ def _not_negative(length: Any) -> Any:
     """0 for what is less, within which there are no pairs; all else is for halfshell to judge."""
     length = length[()] if isinstance(length, np.ndarray) else length
     return 0.0 if isinstance(length, Real) and float(length) < 0.0 else length
-
-
-def _without_selves(
-    wanted: str, points: Any, cutoff: Any, each: dict[str, Any], scene: dict[str, Any]
-) -> dict[str, npt.NDArray[Any]]:
-    asked = wanted.replace("i", "") or "j"
-    table = hs.neighbors(points, cutoff, quantities=asked, **each, **scene)
-    arrays = _several(table.to_pairs(quantities=wanted))
-    return {one: _own(one, array) for one, array in zip(wanted, arrays)}
-
-
-def _with_selves(
-    wanted: str, points: Any, cutoff: Any, each: dict[str, Any], scene: dict[str, Any]
-) -> dict[str, npt.NDArray[Any]]:
-    """Between two equal sets, where each point finds itself if its reach is above zero."""
-    both = each | {f"query_{name}": values for name, values in each.items()}
-    found = hs.pairs_between(points, points, cutoff, quantities=wanted, **both, **scene)
-    arrays = _several(found)
-    return {one: _own(one, array) for one, array in zip(wanted, arrays)}
-
-
-def _several(arrays: Any) -> tuple[npt.NDArray[Any], ...]:
-    return arrays if isinstance(arrays, tuple) else (arrays,)
-
-
-def _own(letter: str, array: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """In ASE's type, and the caller's to write to."""
-    return np.require(array, _EMPTY[letter][0], "W")
 
 
 class NewPrimitiveNeighborList(_owner.NewPrimitiveNeighborList):

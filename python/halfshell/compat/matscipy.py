@@ -160,12 +160,11 @@ def _cutoff(cutoff: Any, numbers: npt.NDArray[Any]) -> Any:
     return {pair: lengths[pair] for pair in product(kinds, repeat=2)}
 
 
-def _rows(atoms: Any, cutoff: Any, **parts: Any) -> tuple[tuple[Any, Any], dict[str, Any]]:
-    """What `halfshell.neighbors` takes, and `halfshell.coordination`."""
+def _points(atoms: Any, cutoff: Any, **parts: Any) -> tuple[hs.Points, Any]:
+    """Points and cutoff of halfshell."""
     scene, cutoff = _scene(atoms, cutoff, **parts)
     cutoff, each = _reach(cutoff, scene["numbers"])
-    box = {"box": scene["cell"], "periodic": scene["pbc"], "inclusive": False}
-    return (scene["positions"], cutoff), each | box
+    return hs.Points(scene["positions"], box=scene["cell"], periodic=scene["pbc"], **each), cutoff
 
 
 def coordination(
@@ -205,8 +204,8 @@ def coordination(
     [2, 1, 1]
     """
     parts = {"positions": positions, "cell": cell, "pbc": pbc, "numbers": numbers}
-    search, options = _rows(structure, cutoff, **parts, cell_origin=cell_origin)
-    return hs.coordination(*search, **options)
+    points, cutoff = _points(structure, cutoff, **parts, cell_origin=cell_origin)
+    return hs.coordination(points, cutoff, inclusive=False)
 
 
 def neighbour_matrix(
@@ -264,8 +263,8 @@ def neighbour_matrix(
     if device not in (None, "cpu"):
         raise ValueError(f"device must be None or 'cpu', got {device!r}")
     parts = {"positions": positions, "cell": cell, "pbc": pbc, "numbers": numbers}
-    search, options = _rows(atoms, cutoff, **parts, cell_origin=cell_origin)
-    table = hs.neighbors(*search, quantities="jD", **options)
+    points, cutoff = _points(atoms, cutoff, **parts, cell_origin=cell_origin)
+    table = hs.neighbors(points, cutoff, quantities="jD", inclusive=False)
     idx, dist = (table.to_padded(max_neighbours, 0, quantity=letter) for letter in "jD")
     made = idx, dist, table.counts
     if array_namespace in (None, "dlpack"):
@@ -428,7 +427,7 @@ def triplet_list(
     ([0, 1], [1, 0])
     """
     from halfshell._convert.starts import starts_of
-    from halfshell._objects.table_triplets import triplets
+    from halfshell._objects.rows import triplets
 
     starts = np.maximum(np.asarray(first_neighbours).astype(np.int64), 0)
     if abs_dr_p is None or cutoff is None:

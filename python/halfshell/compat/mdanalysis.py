@@ -19,9 +19,7 @@ except ImportError as error:  # pragma: no cover
     message = "halfshell.compat.mdanalysis needs MDAnalysis: pip install MDAnalysis"
     raise ImportError(message) from error
 
-from halfshell._functions.between import pairs_between
-from halfshell._functions.pairs import pairs
-from halfshell._objects.box import Box
+import halfshell as hs
 
 __all__ = ["capped_distance", "self_capped_distance"]
 
@@ -80,7 +78,7 @@ def _nearest_images(entries: Entries, box: dict[str, Any], cutoff: float, selves
     both, d = entries
     if box["box"] is None or not len(d):
         return both, d
-    heights = Box.from_matrix(np.where(box["periodic"], box["box"], np.eye(3)))
+    heights = hs.Box.from_matrix(np.where(box["periodic"], box["box"], np.eye(3)))
     nearest = heights.perpendicular_heights[box["periodic"]].min()
     if 2.0 * cutoff < nearest * (1.0 - 1e-9):  # which is rounded
         return both, d
@@ -170,7 +168,7 @@ def capped_distance(
     """
     _check(method, backend)
     sets = reference, configuration
-    return _answer(pairs_between, max_cutoff, min_cutoff, _box(box), sets, return_distances)
+    return _answer(hs.pairs_between, max_cutoff, min_cutoff, _box(box), sets, return_distances)
 
 
 @check_coords("reference", **_KEPT)
@@ -214,4 +212,4 @@ def self_capped_distance(
     ([[0, 1]], [5.0])
     """
     _check(method, backend)
-    return _answer(pairs, max_cutoff, min_cutoff, _box(box), (reference,), return_distances)
+    return _answer(hs.pairs, max_cutoff, min_cutoff, _box(box), (reference,), return_distances)

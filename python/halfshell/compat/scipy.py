@@ -29,10 +29,8 @@ except ImportError as error:  # pragma: no cover
     raise ImportError(message) from error
 
 import halfshell as hs
-from halfshell import _core
-from halfshell._convert.marks import as_marks
-from halfshell._convert.scene import as_sets
-from halfshell._convert.search import as_rest
+from halfshell._convert.call import take
+from halfshell._functions.counts import Marks, binned
 from halfshell.compat._trees import (
     TreeSearches,
     as_bound,
@@ -229,12 +227,8 @@ class _Searches(TreeSearches):
         if limits is None or marks is None or not self._is_for(p, 0.0) or not self._fits(other):
             return super().count_neighbors(other, r, p, weights, cumulative)  # type: ignore[misc]
         within, places = limits
-        asking, points, vectors, bits = as_sets(self.data, other.data, **self._box())
-        rest = as_rest(True, "exact", None, None, None, None)
-        of_each = as_marks(len(points), asking, None, None, marks[1], marks[0])
-        bins = _core.histogram(
-            points, 0.0, vectors, bits, *rest, within, True, asking, *of_each, "auto"
-        )[0, 0]
+        call = take(other.data, 0.0, self.data, **self._box(), by_reach=False)
+        bins = binned(call, within, Marks(1, None, marks[1], None, marks[0]))[0, 0]
         if cumulative:
             found = np.cumsum(bins)[places]
         else:  # an edge that is repeated has nothing between it and itself

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from halfshell import _show
 from halfshell._convert.options import as_flag
+from halfshell._convert.points import Points
 
 __all__ = [
     "SIZES", "Floats", "Motion", "Rule", "Scene", "Size", "Updates", "add", "load", "names",
@@ -200,18 +201,21 @@ class Scene:
     @property
     def arguments(self) -> dict[str, Any]:
         """The arguments of `halfshell.pairs` that make up the scene."""
-        arguments = {
-            "points": self.points,
-            "cutoff": self.cutoff,
-            "box": self.box,
-            "periodic": self.periodic,
-            "inclusive": self.inclusive,
-        }
-        return arguments | self.reach
+        return self.arguments_of(self.points)
+
+    def arguments_of(self, points: NDArray[Any]) -> dict[str, Any]:
+        """The same, for other coordinates of its points."""
+        box = {"box": self.box, "periodic": self.periodic if self.box is not None else None}
+        how = {"cutoff": self.cutoff, "inclusive": self.inclusive}
+        if not self.reach:
+            return {"points": points, **how, **box}
+        own = Points(points, **box, radii=self.radii, supports=self.supports)
+        cutoff = self.cutoff if self.supports is None else self.extent
+        return {"points": own, **how, "cutoff": cutoff, "rule": self.rule}
 
     @property
     def reach(self) -> dict[str, Any]:
-        """Those of them that give each pair a reach of its own; none where the cutoff does."""
+        """What gives each pair a reach of its own; nothing where the cutoff does."""
         if self.radii is not None:
             return {"radii": self.radii, "rule": self.rule}
         if self.supports is not None:

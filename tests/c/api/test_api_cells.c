@@ -250,9 +250,47 @@ cells_with_everything_have_no_ranges(void)
     hs_cells_free(cells);
 }
 
+/* Cells reach from end to end, whatever points lie within; further where points lie beyond; and along
+ * axes where nothing is fixed as if there were no domain. */
+static void
+cells_reach_over_their_domain(void)
+{
+    const double    x[6] = {1.0, 1.0, 1.5, 1.25, 9.0, 0.5}, beyond[4] = {-4.0, 1.0, -3.5, 1.0};
+    const double    domain[4] = {0.0, 1.0, 20.0, -1.0}, bad[4] = {0.0, 0.0, INFINITY, 1.0};
+    const double    nothing[4] = {0.0, NAN, 1.0, 1.0};
+    const hs_points points = {x, 3, 2, HS_FLOAT64, 16, 8}, one = {x, 1, 2, HS_FLOAT64, 16, 8};
+    const hs_points other = {beyond, 2, 2, HS_FLOAT64, 16, 8};
+    const hs_points sets[3] = {points, one, other};
+    hs_options      options = hs_options_default();
+    options.cutoff = 1.0;
+    options.cell_size = 2.0;
+    options.domain = domain;
+    for (int s = 0; s < 3; s++) {
+        hs_cells *cells = NULL;
+        hs_layout layout;
+        int64_t   count = -1, cell[3];
+        CHECK(hs_cells_build(&sets[s], NULL, &options, &cells, NULL) == HS_OK);
+        hs_cells_layout(cells, &layout);
+        CHECK(layout.shape[0] == (s == 2 ? 12 : 10) && layout.shape[1] == 1);
+        CHECK(layout.cell_size[0] == 2.0);
+        CHECK(hs_cells_find(cells, &points, cell, NULL) == HS_OK);
+        CHECK(cell[0] == (s == 2 ? 2 : 0) && cell[1] == cell[0] && cell[2] == cell[0] + 4);
+        CHECK(hs_pairs_count(IN_CELLS(cells), &options, &count, NULL) == HS_OK);
+        CHECK(count == (s == 1 ? 0 : 1));
+        hs_cells_free(cells);
+    }
+    hs_cells *cells = NULL;
+    options.domain = bad;
+    CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_ERR_ARGUMENT);
+    options.domain = nothing;
+    CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_ERR_ARGUMENT);
+    CHECK(cells == NULL);
+}
+
 void
 test_api_cells(void)
 {
+    RUN(cells_reach_over_their_domain);
     RUN(indices_are_where_points_are);
     RUN(empty_cells_have_no_id);
     RUN(ranges_that_are_refused);

@@ -412,6 +412,15 @@ cells_are_those_of_the_coordinates(void)
     int64_t            cell[3] = {9, 9, 9};
     CHECK(hs_dynamic_cell(list, (hs_key){1, 0}, cell) == HS_OK);
     CHECK(cell[0] == 0 && cell[1] == 1 && cell[2] == -3);
+    const double far[3] = {7.5, -0.25, 1e300}, bad[3] = {0.0, NAN, 0.0};
+    hs_failure   failure;
+    CHECK(hs_dynamic_cell_of(list, (double[3]){7.5, -0.25, 3.0}, cell, NULL) == HS_OK);
+    CHECK(cell[0] == 7 && cell[1] == -1 && cell[2] == 3 && hs_dynamic_length(list) == 2);
+    CHECK(hs_dynamic_cell_of(list, bad, cell, &failure) == HS_ERR_NOT_FINITE);
+    CHECK(failure.column == 1 && cell[0] == 7);
+    CHECK(hs_dynamic_cell_of(NULL, far, cell, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_cell_of(list, NULL, cell, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_dynamic_cell_of(list, far, NULL, NULL) == HS_ERR_ARGUMENT);
     CHECK(hs_dynamic_cell(list, (hs_key){3, 0}, cell) == HS_ERR_KEY);
     hs_dynamic_free(list);
     options.ndim = 2;
@@ -422,6 +431,8 @@ cells_are_those_of_the_coordinates(void)
         CHECK(hs_dynamic_insert(list, (hs_key){id, 0}, x, NULL) == HS_OK);
         CHECK(hs_dynamic_cell(list, (hs_key){id, 0}, cell) == HS_OK);
         CHECK(cell[0] == (id + 1) % 6 && cell[1] == id - 6);
+        CHECK(hs_dynamic_cell_of(list, (const double[2]){x[0] + 60.0, 3.5}, cell, NULL) == HS_OK);
+        CHECK(cell[0] == (id + 1) % 6 && cell[1] == 3);
     }
     hs_dynamic_free(list);
     options.box = NULL;

@@ -71,7 +71,8 @@ enum { KINDS = sizeof kinds / sizeof kinds[0] };
 /*
  * ---- alloc calls ----
  *
- * Every function of halfshell.h, on scenes of several kinds, while allocation 1, 2, 3, .
+ * Every function of halfshell.h, on scenes of several kinds, while allocation 1, 2, 3, ... is
+ * refused.
  */
 
 enum { MOST_ALLOCATIONS = 1000 }; /* of one call here */

@@ -159,7 +159,7 @@ arguments_that_do_not_fit_are_refused(void)
     CHECK(hs_connectivity_link(&none, &wrong, &options, &made, NULL) == HS_ERR_ARGUMENT);
     CHECK(hs_connectivity_link(NULL, &lists, &options, &made, NULL) == HS_ERR_ARGUMENT);
     CHECK(hs_connectivity_link(&none, &lists, &options, NULL, NULL) == HS_ERR_ARGUMENT);
-    const hs_index_rows no_rows = {0, NULL, 0, NULL};
+    const hs_index_rows no_rows = {.n = 0};
     const int32_t       shift[1] = {0};
     const hs_half_list  shifted = {.n = 0, .shift = shift, .ndim = 1};
     CHECK(hs_connectivity_overlap(&points, &no_rows, NULL, &options, &rows, NULL) ==
@@ -168,19 +168,47 @@ arguments_that_do_not_fit_are_refused(void)
     CHECK(hs_connectivity_overlap(&points, &no_rows, &lists, NULL, &rows, NULL) == HS_ERR_ARGUMENT);
     CHECK(hs_connectivity_overlap(&points, &no_rows, &lists, &options, &rows, NULL) ==
           HS_ERR_ARGUMENT);
-    CHECK(hs_connectivity_intersect(&points, &none, NULL, &options, &rows, NULL) ==
+    CHECK(hs_connectivity_intersect(&points, NULL, &none, NULL, &options, &rows, NULL) ==
           HS_ERR_ARGUMENT);
-    CHECK(hs_connectivity_intersect(&points, NULL, &lists, &options, &rows, NULL) ==
+    CHECK(hs_connectivity_intersect(&points, NULL, NULL, &lists, &options, &rows, NULL) ==
           HS_ERR_ARGUMENT);
-    CHECK(hs_connectivity_intersect(&points, &none, &lists, NULL, &rows, NULL) == HS_ERR_ARGUMENT);
-    CHECK(hs_connectivity_intersect(&points, &shifted, &lists, &options, &rows, NULL) ==
+    CHECK(hs_connectivity_intersect(&points, NULL, &none, &lists, NULL, &rows, NULL) ==
+          HS_ERR_ARGUMENT);
+    CHECK(hs_connectivity_intersect(&points, NULL, &shifted, &lists, &options, &rows, NULL) ==
           HS_ERR_ARGUMENT);
     hs_points too_many_axes = points;
     too_many_axes.ndim = HS_MAX_DIM + 1;
     CHECK(hs_connectivity_overlap(&too_many_axes, &no_rows, &lists, &options, &rows, NULL) ==
           HS_ERR_ARGUMENT);
-    CHECK(hs_connectivity_intersect(&too_many_axes, &none, &lists, &options, &rows, NULL) ==
+    CHECK(hs_connectivity_intersect(&too_many_axes, NULL, &none, &lists, &options, &rows, NULL) ==
           HS_ERR_ARGUMENT);
+    const hs_box       plane = {.ndim = 2, .periodic = {true}, .rows = {{1.0, 0.0}}};
+    const hs_box       skewed = {.ndim = 2, .periodic = {true}};
+    const hs_box       solid = {.ndim = 3, .periodic = {true}, .rows = {{1.0, 0.0, 0.0}}};
+    const hs_half_list two = {.n = 0, .shift = shift, .ndim = 2};
+    const struct {
+        const hs_box       *box;
+        const hs_half_list *pairs;
+    } images[] = {{&plane, &none}, {&plane, &shifted}, {&solid, &two}, {&skewed, &two}};
+    for (size_t k = 0; k < sizeof images / sizeof *images; k++) {
+        CHECK(hs_connectivity_intersect(&points, images[k].box, images[k].pairs, &lists, &options,
+                                        &rows, NULL) != HS_OK);
+        CHECK(rows == NULL);
+    }
+    CHECK(hs_connectivity_intersect(&points, &plane, &two, &lists, &options, &rows, NULL) == HS_OK);
+    hs_pairs_free(rows);
+    wrong = lists;
+    wrong.directed = true;
+    CHECK(hs_connectivity_intersect(&points, NULL, &none, &wrong, &options, &rows, NULL) ==
+          HS_ERR_ARGUMENT);
+    static const double  origin[7] = {0.0};
+    static const int64_t one_node[1] = {1};
+    const hs_points      seven = {origin, 1, 7, HS_FLOAT64, 56, 8};
+    const hs_box         seven_axes = {.ndim = 7};
+    const hs_half_list   seven_shifts = {.n = 0, .shift = shift, .ndim = 7};
+    const hs_node_lists  of_one = {.n_lists = 1, .n_nodes = one_node};
+    CHECK(hs_connectivity_intersect(&seven, &seven_axes, &seven_shifts, &of_one, &options, &rows,
+                                    NULL) == HS_ERR_ARGUMENT);
     const hs_box flat = {.ndim = HS_MAX_DIM + 1};
     among.box = &flat;
     CHECK(hs_connectivity_build(&among, &lists, &options, &made, NULL) == HS_ERR_ARGUMENT);
@@ -192,11 +220,12 @@ arguments_that_do_not_fit_are_refused(void)
           HS_ERR_ARGUMENT);
     CHECK(hs_connectivity_overlap(&points, &no_rows, &lists, &options, NULL, NULL) ==
           HS_ERR_ARGUMENT);
-    CHECK(hs_connectivity_intersect(NULL, &none, &lists, &options, &rows, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_connectivity_intersect(NULL, NULL, &none, &lists, &options, &rows, NULL) ==
+          HS_ERR_ARGUMENT);
     options.memory_limit = NAN;
     CHECK(hs_connectivity_overlap(&points, &no_rows, &lists, &options, &rows, NULL) ==
           HS_ERR_ARGUMENT);
-    CHECK(hs_connectivity_intersect(&points, &none, &lists, &options, &rows, NULL) ==
+    CHECK(hs_connectivity_intersect(&points, NULL, &none, &lists, &options, &rows, NULL) ==
           HS_ERR_ARGUMENT);
     wrong = (hs_node_lists){.n_lists = 0};
     CHECK(hs_connectivity_link(&none, &wrong, &options, &made, NULL) == HS_ERR_ARGUMENT);
@@ -282,7 +311,6 @@ static const int32_t        zero[1] = {0};
 static const hs_list_rows   rows_node_changes = {1, 1, ends, 0, NULL, NULL, 1};
 static const hs_node_lists  lists_node_changes = {.n_lists = 1, .n_nodes = count};
 static const hs_node_change change = {1, count, zero, NULL};
-static const hs_node_pairs  pairs_node_changes = {0, NULL, NULL, NULL, NULL, NULL, 1};
 
 static void
 what_is_missing_is_refused(void)
@@ -301,11 +329,6 @@ what_is_missing_is_refused(void)
     CHECK(hs_connectivity_pair(&rows_node_changes, &lists_node_changes, NULL, &made, NULL) ==
           HS_ERR_ARGUMENT);
     CHECK(hs_connectivity_pair(&rows_node_changes, &lists_node_changes, &options, NULL, NULL) ==
-          HS_ERR_ARGUMENT);
-    CHECK(hs_node_pairs_keep(NULL, NULL, NULL, &options, &made, NULL) == HS_ERR_ARGUMENT);
-    CHECK(hs_node_pairs_keep(&pairs_node_changes, NULL, NULL, NULL, &made, NULL) ==
-          HS_ERR_ARGUMENT);
-    CHECK(hs_node_pairs_keep(&pairs_node_changes, NULL, NULL, &options, NULL, NULL) ==
           HS_ERR_ARGUMENT);
     CHECK(hs_rows_keep(NULL, &change, NULL, 1, &options, &kept, NULL) == HS_ERR_ARGUMENT);
     CHECK(kept == NULL);
@@ -330,8 +353,6 @@ resources_are_checked(void)
     hs_pairs        *kept;
     options.memory_limit = NAN;
     CHECK(hs_connectivity_pair(&rows_node_changes, &lists_node_changes, &options, &made, NULL) ==
-          HS_ERR_ARGUMENT);
-    CHECK(hs_node_pairs_keep(&pairs_node_changes, NULL, NULL, &options, &made, NULL) ==
           HS_ERR_ARGUMENT);
     CHECK(hs_rows_keep(&rows_node_changes, &change, NULL, 1, &options, &kept, NULL) ==
           HS_ERR_ARGUMENT);

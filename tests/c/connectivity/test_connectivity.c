@@ -7,7 +7,7 @@
 
 void test_connectivity(void);
 
-/* ---- each point is the node that its number says, and what is no map is refused ---- */
+/* Node map: each point is the node that its number says, and what is no map is refused. */
 
 static node_scene scene;
 
@@ -61,7 +61,7 @@ what_is_no_map_is_refused(void)
     CHECK(hs_node_map_make(NULL, NULL, 0, &map) == HS_ERR_ARGUMENT);
 }
 
-/* ---- pairs are copied as they are ---- */
+/* Half list: pairs are copied as they are. */
 
 /* The row of the failure, -1 for none. */
 static int64_t
@@ -69,7 +69,7 @@ first_wrong(const hs_half_list *pairs, int64_t n)
 {
     hs_failure      failure = {.row = -1};
     hs_output       copy;
-    const hs_status status = hs_half_list_copy(NULL, pairs, n, &copy, &failure);
+    const hs_status status = hs_half_list_copy(NULL, pairs, n, false, &copy, &failure);
     if (status == HS_OK) {
         const hs_half_columns columns = hs_half_list_columns(&copy);
         const size_t          bytes = (size_t)pairs->n * sizeof(int32_t);
@@ -138,7 +138,7 @@ what_is_no_half_list_is_refused(void)
     const hs_half_list good = {.n = 4, .i = i, .j = j};
     options.memory_limit = 1.0;
     hs_account_init(&account, &options);
-    CHECK(hs_half_list_copy(&account, &good, 4, &copy, &failure) == HS_ERR_MEMORY);
+    CHECK(hs_half_list_copy(&account, &good, 4, false, &copy, &failure) == HS_ERR_MEMORY);
     hs_output_free(&copy);
     hs_account_close(&account);
     const hs_half_list wrong[] = {
@@ -149,36 +149,167 @@ what_is_no_half_list_is_refused(void)
         {.n = 1, .i = i, .j = j, .shift = j, .ndim = HS_MAX_DIM + 1},
     };
     for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
-        CHECK(hs_half_list_copy(NULL, &wrong[k], 4, &copy, &failure) == HS_ERR_ARGUMENT);
+        CHECK(hs_half_list_copy(NULL, &wrong[k], 4, false, &copy, &failure) == HS_ERR_ARGUMENT);
         hs_output_free(&copy);
     }
 }
 
-/* ---- rows of points become rows of nodes and half lists, with their shifts ---- */
-
+/* Of directed lists pairs may be turned, and there are both. */
 static void
-images_go_once_and_with_their_shifts(void)
+what_is_no_directed_list_is_refused(void)
 {
-    static const int64_t first[3] = {0, 3, 7};
-    static const int32_t index[7] = {0, 0, 1, 0, 0, 1, 1};
-    static const int32_t shift[14] = {0, -1, 0, 1, 3, 5, -3, -5, -2, 0, 0, -4, 0, 4};
-    static const int32_t of_half[6] = {0, 1, 3, 5, 0, 4};
-    const hs_rows_view   view = {first, first + 1, index, shift, 2};
-    const hs_options     options = hs_options_default();
-    hs_call              call;
-    hs_output            half;
-    (void)hs_call_enter(&options, NULL, &call);
-    CHECK(hs_row_split_half(&call, 2, &view, &half) == HS_OK);
-    const hs_half_columns found = hs_half_list_columns(&half);
-    CHECK(found.n == 3 && memcmp(found.shift, of_half, sizeof of_half) == 0);
-    CHECK(found.i[0] == 0 && found.j[0] == 0 && found.i[1] == 0 && found.j[1] == 1);
-    CHECK(found.i[2] == 1 && found.j[2] == 1);
-    hs_output_free(&half);
-    hs_call_leave(&call, 0);
-    hs_account_close(&call.account);
+    static const int32_t i[4] = {0, 1, 1, 1}, j[4] = {1, 0, 1, 1};
+    static const int32_t shift[4] = {3, -3, -2, 2}, zero[4] = {3, -3, 0, 2}, back[4] = {3, 3, 2, 1};
+    hs_half_list         half = {.n = 4, .i = i, .j = j, .shift = shift, .ndim = 1};
+    hs_output            copy;
+    hs_failure           failure = {.row = -1};
+    CHECK(hs_half_list_copy(NULL, &half, 2, true, &copy, &failure) == HS_OK && failure.row == -1);
+    hs_output_free(&copy);
+    const struct {
+        const int32_t *shift;
+        int64_t        n, row;
+    } wrong[] = {{zero, 2, 2}, {back, 2, 3}, {NULL, 2, 2}, {shift, 1, 0}};
+    for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
+        half.shift = wrong[k].shift;
+        CHECK(hs_half_list_copy(NULL, &half, wrong[k].n, true, &copy, &failure) == HS_ERR_ARGUMENT);
+        CHECK(failure.row == wrong[k].row);
+        hs_output_free(&copy);
+    }
 }
 
-/* ---- rows and pairs of many pairs ask the caller, and leave nothing when they end early ---- */
+/* Pairs of rows: of all nodes or of those that are no ghosts, in any order, with and without
+ * images, both ways or one: what a link made beside the rows. */
+
+static int32_t i_images[4 * NODE_PAIRS], j_images[4 * NODE_PAIRS], s_images[4 * NODE_PAIRS];
+
+/* Pairs of a matrix, of which some have several images, and some points one of their own. */
+static hs_half_list
+images_of(harness_random *random, bool directed, bool has_shift)
+{
+    int64_t n = 0;
+    for (int32_t i = 0; i < scene.n; i++) {
+        for (int32_t j = directed ? 0 : i; j < scene.n; j++) {
+            const bool    is_near = i == j ? has_shift : scene.near[i][j];
+            const int32_t first = directed || i != j ? -1 : 1;
+            for (int32_t s = first; is_near && s <= (has_shift ? 2 : first); s++) {
+                if ((i == j && s == 0) || random_unit(random) < 0.5)
+                    continue;
+                i_images[n] = i;
+                j_images[n] = j;
+                s_images[n++] = s;
+            }
+        }
+    }
+    return (hs_half_list){
+        .n = n, .i = i_images, .j = j_images, .shift = has_shift ? s_images : NULL, .ndim = 1};
+}
+
+static hs_list_rows
+rows_made(hs_connectivity *made, int32_t n_lists)
+{
+    const hs_pairs *rows = hs_connectivity_rows(made);
+    return (hs_list_rows){.n = n_lists > 0 ? hs_pairs_rows(rows) / n_lists : 0,
+                          .n_lists = n_lists,
+                          .offsets = hs_pairs_offsets(rows),
+                          .n_indices = hs_pairs_length(rows),
+                          .indices = hs_pairs_array(rows, HS_WANT_J),
+                          .shift = hs_pairs_array(rows, HS_WANT_SHIFT),
+                          .ndim = 1};
+}
+
+static bool
+same_columns(const hs_pairs *one, const hs_pairs *other, unsigned columns)
+{
+    const int64_t n = hs_pairs_length(one);
+    bool          same = n == hs_pairs_length(other);
+    for (unsigned c = 1; c <= HS_WANT_SHIFT; c <<= 1) {
+        const void *a = hs_pairs_array(one, c), *b = hs_pairs_array(other, c);
+        same = same && (!(columns & c) || (a == NULL) == (b == NULL)) &&
+               (!(columns & c) || a == NULL || memcmp(a, b, (size_t)n * 4) == 0);
+    }
+    return same;
+}
+
+static void
+pairs_of_rows_are_those_of_links(void)
+{
+    harness_random random = {71};
+    int64_t        n = 0;
+    for (int trial = 0; trial < TRIALS(320); trial++) {
+        const bool shuffled = trial & 1, ghost_rows = trial & 2, has_shift = trial & 4;
+        const bool ghost_pairs = ghost_rows && (trial & 8), directed = trial & 16;
+        node_scene_fill(&random, shuffled, &scene);
+        const hs_half_list half = images_of(&random, directed, has_shift);
+        hs_node_lists      lists = node_lists_of(&scene, shuffled, ghost_rows, ghost_pairs);
+        const hs_options   options = hs_options_default();
+        hs_connectivity   *made, *paired;
+        lists.directed = directed;
+        CHECK(hs_connectivity_link(&half, &lists, &options, &made, NULL) == HS_OK);
+        const hs_list_rows rows = rows_made(made, scene.n_lists);
+        CHECK(hs_connectivity_pair(&rows, &lists, &options, &paired, NULL) == HS_OK);
+        CHECK(same_columns(hs_connectivity_pairs(made), hs_connectivity_pairs(paired),
+                           HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT));
+        CHECK(same_columns(hs_connectivity_lists(made), hs_connectivity_lists(paired),
+                           HS_WANT_I | HS_WANT_J));
+        CHECK(!directed || !ghost_pairs ||
+              (rows.n_indices == half.n && hs_pairs_length(hs_connectivity_pairs(made)) == half.n));
+        n += hs_pairs_length(hs_connectivity_pairs(made));
+        hs_connectivity_free(made);
+        hs_connectivity_free(paired);
+    }
+    CHECK(n > TRIALS(320) * 50);
+}
+
+/* One internal node and one ghost, in rows of the first alone. */
+static hs_status
+pair_with_a_ghost(void *context)
+{
+    static const int64_t counts[2] = {1, 1}, ghosts[2] = {1, 0}, offsets[3] = {0, 2, 2};
+    static const int32_t indices[2] = {0, 0}, images[2] = {-4, 3};
+    const hs_node_lists  lists = {.n_lists = 2, .n_nodes = counts, .n_ghosts = ghosts};
+    const hs_list_rows   rows = {1, 2, offsets, 2, indices, images, 1};
+    hs_options           options = hs_options_default();
+    hs_connectivity     *made;
+    options.memory_limit = *(double *)context;
+    const hs_status status = hs_connectivity_pair(&rows, &lists, &options, &made, NULL);
+    if (status == HS_OK) {
+        const hs_pairs *pairs = hs_connectivity_pairs(made), *of = hs_connectivity_lists(made);
+        const int32_t  *s = hs_pairs_array(pairs, HS_WANT_SHIFT);
+        CHECK(hs_pairs_length(pairs) == 2 && s[0] == 3 && s[1] == -4); /* by those of the ghost */
+        CHECK(((const int32_t *)hs_pairs_array(of, HS_WANT_I))[0] == 1);
+    }
+    CHECK((made != NULL) == (status == HS_OK));
+    hs_connectivity_free(made);
+    return status;
+}
+
+static void
+pairs_of_rows_that_are_none_are_refused(void)
+{
+    static const int64_t counts[1] = {2}, good[3] = {0, 1, 2};
+    static const int64_t low[3] = {-1, 1, 2}, back[3] = {0, 2, 1}, far[3] = {0, 1, 3};
+    static const int32_t number[2] = {1, 0}, indices[3] = {1, 0, 0}, none[2] = {-1, 0};
+    static const int32_t beyond[2] = {2, 0};
+    const hs_node_lists  lists = {
+         .n_lists = 1, .n_nodes = counts, .number = number, .ghost_rows = true};
+    const hs_list_rows wrong[] = {
+        {2, 1, low, 2, indices, NULL, 1},  {2, 1, back, 2, indices, NULL, 1},
+        {2, 1, far, 2, indices, NULL, 1},  {2, 1, good, 2, none, NULL, 1},
+        {2, 1, good, 2, beyond, NULL, 1},  {1, 1, good, 2, indices, NULL, 1},
+        {2, 2, good, 2, indices, NULL, 1},
+    };
+    const hs_options options = hs_options_default();
+    hs_connectivity *made;
+    for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++)
+        CHECK(hs_connectivity_pair(&wrong[k], &lists, &options, &made, NULL) == HS_ERR_ARGUMENT);
+    double limit_of_pairs = HUGE_VAL;
+    CHECK(pair_with_a_ghost(&limit_of_pairs) == HS_OK);
+    CHECK(fail_each_allocation(pair_with_a_ghost, &limit_of_pairs, 200) > 8);
+    check_arena(pair_with_a_ghost, &limit_of_pairs);
+    CHECK(raise_memory_limit(pair_with_a_ghost, &limit_of_pairs, &limit_of_pairs) > 5);
+}
+
+/* Node rows: rows and pairs of many pairs ask the caller, and leave nothing when they end early. */
 
 enum { MANY = 1500, MANY_PAIRS = MANY * (MANY - 1) / 2 };
 
@@ -248,7 +379,7 @@ no_limit_of_memory_leaves_anything(void)
     CHECK(raise_memory_limit(link_scene, NULL, &limit) > 10);
 }
 
-/* ---- rows give the pairs that the half list gives, with their shifts ---- */
+/* Row pairs: rows give the pairs that the half list gives, with their shifts. */
 
 /* Rows of a connectivity, as given to another one. */
 static hs_list_rows
@@ -327,7 +458,7 @@ what_are_no_rows_of_all_is_refused(void)
     static const int64_t counts[1] = {2}, good[3] = {0, 1, 2}, descending[3] = {1, 0, 2};
     static const int64_t late[3] = {0, 1, 3}, below[3] = {-1, 1, 2}, one_row[2] = {0, 2};
     static const int64_t ghosts[1] = {1};
-    static const int32_t index[2] = {1, 0}, high[2] = {1, 5}, number[2] = {1, 0};
+    static const int32_t index[2] = {1, 0}, high[2] = {1, 5};
     const hs_options     options = hs_options_default();
     hs_node_lists        lists = {.n_lists = 1, .n_nodes = counts, .ghost_rows = true};
     hs_list_rows         rows = {2, 1, good, 2, index, NULL, 1};
@@ -360,8 +491,6 @@ what_are_no_rows_of_all_is_refused(void)
     CHECK(hs_connectivity_pair(&unmatched, &two, &options, &made, NULL) == HS_ERR_ARGUMENT);
     lists = (hs_node_lists){.n_lists = 1, .n_nodes = counts, .n_ghosts = ghosts};
     rows.indices = index;
-    CHECK(hs_connectivity_pair(&rows, &lists, &options, &made, NULL) == HS_ERR_ARGUMENT);
-    lists = (hs_node_lists){.n_lists = 1, .n_nodes = counts, .number = number};
     CHECK(hs_connectivity_pair(&rows, &lists, &options, &made, NULL) == HS_ERR_ARGUMENT);
     lists = (hs_node_lists){.n_lists = 1, .n_nodes = counts};
     const hs_list_rows few = {1, 1, one_row, 2, index, NULL, 1};
@@ -419,7 +548,7 @@ failures_leave_nothing(void)
     hs_connectivity_free(made);
 }
 
-/* ---- rows and pairs of a half list are those of its matrix ---- */
+/* Connectivity: rows and pairs of a half list are those of its matrix. */
 
 static void
 shifts_are_opposite_in_the_other_row(void)
@@ -560,7 +689,7 @@ rows_that_are_found_may_be_too_many(void)
 }
 
 static hs_status
-link_small_scene(void *context)
+link_scene_connectivity(void *context)
 {
     const hs_half_list  half = node_half_of(&scene);
     const hs_node_lists lists = node_lists_of(&scene, true, true, true);
@@ -578,32 +707,33 @@ no_allocation_that_fails_leaves_anything(void)
 {
     harness_random random = {9};
     node_scene_fill(&random, true, &scene);
-    CHECK(fail_each_allocation(link_small_scene, NULL, 200) > 5);
-    check_arena(link_small_scene, NULL);
+    CHECK(fail_each_allocation(link_scene_connectivity, NULL, 200) > 5);
+    check_arena(link_scene_connectivity, NULL);
     hs_connectivity_free(NULL);
     CHECK(hs_connectivity_rows(NULL) == NULL && hs_connectivity_pairs(NULL) == NULL);
     CHECK(hs_connectivity_lists(NULL) == NULL);
 }
 
-/* ---- rows without nodes, in their order or in another, and without entries ---- */
+/* Kept rows: rows without nodes, in their order or in another, and without entries. */
 
 enum { ROWS = NODE_POINTS * NODE_LISTS + 1 };
-static int64_t row_offsets[ROWS], fewer_offsets[ROWS], source[NODE_POINTS];
+static int64_t offsets_kept_rows[ROWS], fewer_offsets[ROWS], source[NODE_POINTS];
 static int32_t indices[2 * NODE_PAIRS], fewer_indices[2 * NODE_PAIRS];
-static int32_t row_shifts[4 * NODE_PAIRS], fewer_shift[4 * NODE_PAIRS];
+static int32_t shift_kept_rows[4 * NODE_PAIRS], fewer_shift[4 * NODE_PAIRS];
 static int32_t target[NODE_POINTS], place[NODE_POINTS];
 static bool    gone[NODE_POINTS][NODE_POINTS];
 
 static hs_list_rows
 rows_given(bool has_shift)
 {
-    const int64_t n = node_rows_fill(&scene, scene.near, row_offsets, indices, row_shifts);
+    const int64_t n =
+        node_rows_fill(&scene, scene.near, offsets_kept_rows, indices, shift_kept_rows);
     return (hs_list_rows){.n = scene.n_lists > 0 ? scene.n : 0,
                           .n_lists = scene.n_lists,
-                          .offsets = row_offsets,
+                          .offsets = offsets_kept_rows,
                           .n_indices = n,
                           .indices = indices,
-                          .shift = has_shift ? row_shifts : NULL,
+                          .shift = has_shift ? shift_kept_rows : NULL,
                           .ndim = 2};
 }
 
@@ -707,8 +837,8 @@ rows_have_the_nodes_that_stay(void)
             int64_t base = 0;
             for (int32_t l = 0; l < scene.n_lists; l++) {
                 const int64_t e = k * scene.n_lists + l, old = source[k] * scene.n_lists + l;
-                CHECK(entry_is(kept, ends[e], ends[e + 1], row_offsets[old], row_offsets[old + 1],
-                               base, in_order));
+                CHECK(entry_is(kept, ends[e], ends[e + 1], offsets_kept_rows[old],
+                               offsets_kept_rows[old + 1], base, in_order));
                 base += scene.n_nodes[l];
             }
         }
@@ -717,7 +847,7 @@ rows_have_the_nodes_that_stay(void)
     }
 }
 
-/* ---- entries that go ---- */
+/* ---- entries that go ----------------------------------------------------------------------- */
 
 /* Some of the entries, or pairs that are none besides; with those of `rows`, whose shifts are the
  * numbers of their entries. */
@@ -739,11 +869,11 @@ fewer_given(harness_random *random, const hs_list_rows *rows, bool with_others)
     } else { /* every third entry, with its shift */
         for (int64_t k = 0; k < rows->n * rows->n_lists; k++) {
             fewer_offsets[k] = at;
-            for (int64_t e = row_offsets[k]; e < row_offsets[k + 1]; e++) {
+            for (int64_t e = offsets_kept_rows[k]; e < offsets_kept_rows[k + 1]; e++) {
                 if (e % 3 == 0) {
                     fewer_indices[at] = indices[e];
-                    fewer_shift[2 * at] = row_shifts[2 * e];
-                    fewer_shift[2 * at++ + 1] = row_shifts[2 * e + 1];
+                    fewer_shift[2 * at] = shift_kept_rows[2 * e];
+                    fewer_shift[2 * at++ + 1] = shift_kept_rows[2 * e + 1];
                 }
             }
         }
@@ -831,7 +961,7 @@ images_go_by_their_shifts(void)
     hs_pairs_free(kept);
 }
 
-/* ---- what is refused ---- */
+/* ---- what is refused ----------------------------------------------------------------------- */
 
 static void
 what_are_no_rows_is_refused(void)
@@ -936,7 +1066,7 @@ keep_once(void *context)
 }
 
 static void
-failures_leave_no_kept_rows(void)
+failures_leave_nothing_kept_rows(void)
 {
     harness_random random = {81};
     do {
@@ -979,155 +1109,15 @@ long_rows_ask_the_caller(void)
     hs_pairs_free(kept);
 }
 
-/* ---- a table has the pairs that stay, in its order and with their shifts ---- */
-
-static int32_t i_node[NODE_PAIRS], i_list[NODE_PAIRS], j_node[NODE_PAIRS], j_list[NODE_PAIRS];
-static int32_t pair_shifts[2 * NODE_PAIRS], new_number[NODE_POINTS];
-static bool    stays[NODE_PAIRS];
-
-static hs_node_pairs
-pairs_given(bool has_shift)
-{
-    for (int64_t e = 0; e < scene.n_pairs; e++) {
-        i_node[e] = scene.node[scene.i[e]];
-        i_list[e] = scene.list[scene.i[e]];
-        j_node[e] = scene.node[scene.j[e]];
-        j_list[e] = scene.list[scene.j[e]];
-        pair_shifts[2 * e] = (int32_t)e;
-        pair_shifts[2 * e + 1] = INT32_MIN;
-    }
-    return (hs_node_pairs){.n = scene.n_pairs,
-                           .i_node = i_node,
-                           .i_list = i_list,
-                           .j_node = j_node,
-                           .j_list = j_list,
-                           .shift = has_shift ? pair_shifts : NULL,
-                           .ndim = 2};
-}
-
-static hs_node_change
-change_given_pairs(void)
-{
-    return (hs_node_change){
-        .n_lists = scene.n_lists, .n_nodes = scene.n_nodes, .target = new_number};
-}
-
-static void
-fill(harness_random *random)
-{
-    node_scene_fill(random, true, &scene);
-    for (int32_t p = 0; p < scene.n; p++)
-        new_number[p] = random_bits(random) % 3 > 0 ? (int32_t)(random_bits(random) % 1000) : -1;
-    for (int64_t e = 0; e < scene.n_pairs; e++)
-        stays[e] = random_bits(random) % 2 > 0;
-}
-
-static int32_t
-target_of(int32_t point, bool has_change)
-{
-    return has_change ? new_number[scene.number[point]] : scene.node[point];
-}
-
-static void
-what_are_no_pairs_is_refused(void)
-{
-    static const int32_t zero[1] = {0}, one[1] = {1}, below[1] = {-1};
-    static const int64_t count[1] = {1}, negative[1] = {-1};
-    const hs_options     options = hs_options_default();
-    const hs_node_change change = {1, count, zero, NULL};
-    hs_connectivity     *made;
-    const hs_node_pairs  wrong[] = {
-         {-1, zero, zero, zero, zero, NULL, 1},
-         {1, NULL, zero, zero, zero, NULL, 1},
-         {1, zero, NULL, zero, zero, NULL, 1},
-         {1, zero, zero, NULL, zero, NULL, 1},
-         {1, zero, zero, zero, NULL, NULL, 1},
-         {1, zero, zero, zero, zero, zero, 0},
-         {1, zero, zero, zero, zero, zero, HS_MAX_DIM + 1},
-         {1, one, zero, zero, zero, NULL, 1},
-         {1, below, zero, zero, zero, NULL, 1},
-         {1, zero, one, zero, zero, NULL, 1},
-         {1, zero, below, zero, zero, NULL, 1},
-         {1, zero, zero, one, zero, NULL, 1},
-    };
-    for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
-        CHECK(hs_node_pairs_keep(&wrong[k], &change, NULL, &options, &made, NULL) ==
-              HS_ERR_ARGUMENT);
-        CHECK(made == NULL);
-    }
-    const hs_node_pairs  none = {0, NULL, NULL, NULL, NULL, NULL, 1};
-    const hs_node_change bad[] = {{-1, count, zero, NULL},
-                                  {1, NULL, zero, NULL},
-                                  {1, count, NULL, NULL},
-                                  {1, negative, zero, NULL}};
-    for (size_t k = 0; k < sizeof bad / sizeof *bad; k++)
-        CHECK(hs_node_pairs_keep(&none, &bad[k], NULL, &options, &made, NULL) == HS_ERR_ARGUMENT);
-    const hs_node_change empty = {0, NULL, NULL, NULL};
-    CHECK(hs_node_pairs_keep(&none, &empty, NULL, &options, &made, NULL) == HS_OK);
-    hs_connectivity_free(made);
-}
-
-/* Pairs that keep both nodes and are kept themselves. */
-static int64_t
-count_kept(void)
-{
-    int64_t n = 0;
-    for (int64_t e = 0; e < scene.n_pairs; e++)
-        n += stays[e] && target_of(scene.i[e], true) >= 0 && target_of(scene.j[e], true) >= 0;
-    return n;
-}
-
-static hs_status
-keep_pairs_once(void *context)
-{
-    const hs_node_pairs  pairs = pairs_given(true);
-    const hs_node_change change = change_given_pairs();
-    hs_options           options = hs_options_default();
-    hs_connectivity     *made = NULL;
-    (void)context;
-    options.memory_limit = limit;
-    const hs_status status = hs_node_pairs_keep(&pairs, &change, stays, &options, &made, NULL);
-    CHECK((made != NULL) == (status == HS_OK));
-    if (status == HS_OK) {
-        const int64_t n = count_kept();
-        CHECK(n > 0 && n < scene.n_pairs);
-        CHECK(hs_pairs_length(hs_connectivity_pairs(made)) == n);
-    }
-    hs_connectivity_free(made);
-    return status;
-}
-
-static void
-failures_leave_no_kept_pairs(void)
-{
-    enum { LONG = 1 << 20 };
-    static int32_t      many[LONG];
-    const hs_node_pairs pairs = {LONG, many, many, many, many, NULL, 1};
-    harness_random      random = {52};
-    hs_options          options = hs_options_default();
-    int64_t             left = 0;
-    hs_connectivity    *made;
-    do {
-        fill(&random);
-    } while (scene.n_pairs < 20);
-    CHECK(fail_each_allocation(keep_pairs_once, NULL, 100) > 5);
-    check_arena(keep_pairs_once, NULL);
-    CHECK(raise_memory_limit(keep_pairs_once, NULL, &limit) > 5);
-    options.poll = stop_after;
-    options.poll_context = &left;
-    CHECK(hs_node_pairs_keep(&pairs, NULL, NULL, &options, &made, NULL) == HS_ERR_INTERRUPTED);
-    left = 1;
-    CHECK(hs_node_pairs_keep(&pairs, NULL, NULL, &options, &made, NULL) == HS_OK && left == 0);
-    hs_connectivity_free(made);
-}
-
 void
 test_connectivity(void)
 {
     RUN(what_is_no_map_is_refused);
     RUN(pairs_in_images_ascend_by_shift);
     RUN(what_is_no_half_list_is_refused);
-    RUN(images_go_once_and_with_their_shifts);
+    RUN(what_is_no_directed_list_is_refused);
+    RUN(pairs_of_rows_are_those_of_links);
+    RUN(pairs_of_rows_that_are_none_are_refused);
     RUN(many_pairs_ask_the_caller);
     RUN(no_limit_of_memory_leaves_anything);
     RUN(images_keep_their_shifts);
@@ -1141,8 +1131,6 @@ test_connectivity(void)
     RUN(rows_lose_the_entries_that_go);
     RUN(images_go_by_their_shifts);
     RUN(what_are_no_rows_is_refused);
-    RUN(failures_leave_no_kept_rows);
+    RUN(failures_leave_nothing_kept_rows);
     RUN(long_rows_ask_the_caller);
-    RUN(what_are_no_pairs_is_refused);
-    RUN(failures_leave_no_kept_pairs);
 }

@@ -9,12 +9,8 @@
 
 void test_overlap(void);
 
-/*
- * ---- point rows ----
- *
- * Rows that are given are copied with their own numbers, turned under others, and made of half
- * lists.
- */
+/* Point rows: rows that are given are copied with their own numbers, turned under others, and made
+ * of half lists. */
 
 static void
 what_are_no_rows_is_refused(void)
@@ -22,21 +18,21 @@ what_are_no_rows_is_refused(void)
     static const int64_t ends[3] = {0, 1, 1}, none[3] = {0, 0, 0};
     static const int32_t one[1] = {1};
     hs_point_rows        rows;
-    const hs_index_rows  wrong[] = {{-1, ends, 1, one},
-                                    {INT64_C(1) << 31, ends, 1, one},
-                                    {2, NULL, 1, one},
-                                    {2, ends, 1, NULL},
-                                    {2, ends, 0, NULL}};
+    const hs_index_rows  wrong[] = {{-1, ends, 1, one, NULL, 1},
+                                    {INT64_C(1) << 31, ends, 1, one, NULL, 1},
+                                    {2, NULL, 1, one, NULL, 1},
+                                    {2, ends, 1, NULL, NULL, 1},
+                                    {2, ends, 0, NULL, NULL, 1}};
     for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
         CHECK(hs_point_rows_copy(NULL, &wrong[k], &rows) == HS_ERR_ARGUMENT);
         CHECK(rows.first == NULL && rows.index == NULL);
     }
-    const hs_index_rows empty = {2, none, 0, NULL};
+    const hs_index_rows empty = {2, none, 0, NULL, NULL, 1};
     CHECK(hs_point_rows_copy(NULL, &empty, &rows) == HS_OK && rows.first[2] == 2);
     hs_point_rows_free(NULL, &rows);
 }
 
-/* ---- rows are the pattern of the product of matrices ---- */
+/* Overlap: rows are the pattern of the product of matrices. */
 
 static node_scene scene;
 static bool       gathers[NODE_POINTS][NODE_POINTS], common[NODE_POINTS][NODE_POINTS];
@@ -186,7 +182,7 @@ find_crowd(int threads, int64_t polls, hs_pairs **rows)
         }
     }
     ends[CROWD] = at;
-    const hs_index_rows gather = {CROWD, ends, at, others};
+    const hs_index_rows gather = {CROWD, ends, at, others, NULL, 1};
     const hs_points     points = {x, CROWD, 1, HS_FLOAT64, sizeof *x, sizeof *x};
     const hs_node_lists lists = {.n_lists = 2, .n_nodes = counts};
     hs_options          options = hs_options_default();
@@ -215,12 +211,8 @@ long_rows_ask_the_caller(void)
     }
 }
 
-/*
- * ---- intersection ----
- *
- * For each pair the common neighbours whose foot, by whole numbers, lies between the ends, and the
- * ends.
- */
+/* Intersection: for each pair the common neighbours whose foot, by whole numbers, lies between the
+ * ends, and the ends. */
 
 enum { DIM = 2 };
 
@@ -237,8 +229,7 @@ is_between(int32_t k, int32_t i, int32_t j)
     return along >= 0.0 && along <= square;
 }
 
-/* Whether offsets and indices from here on, one range for each list, are those of the pair
- * (i, j). */
+/* Whether entries from *entry on, one for each list, are those of the pair (i, j). */
 static bool
 entry_is(int32_t i, int32_t j, const int64_t *offsets, const int32_t *indices)
 {
@@ -279,7 +270,7 @@ find_intersection(bool shuffled, bool ghost_pairs, hs_pairs **result, hs_failure
                                   .row_stride = DIM * sizeof(double),
                                   .column_stride = sizeof(double)};
     options.memory_limit = limit;
-    return hs_connectivity_intersect(&points, &half, &lists, &options, result, failure);
+    return hs_connectivity_intersect(&points, NULL, &half, &lists, &options, result, failure);
 }
 
 static void
@@ -365,7 +356,7 @@ find_crowd_intersection(int threads, int64_t polls, hs_pairs **result)
     options.threads = threads;
     options.poll = stop_after;
     options.poll_context = &polls;
-    return hs_connectivity_intersect(&points, &half, &lists, &options, result, NULL);
+    return hs_connectivity_intersect(&points, NULL, &half, &lists, &options, result, NULL);
 }
 
 static void
@@ -387,7 +378,291 @@ threads_change_nothing(void)
     hs_pairs_free(alone);
 }
 
-/* ---- slices never descend, bits come in turns, and points are put in order by them ---- */
+/* Images: overlaps and intersections of points in a box that repeats along one axis, held against
+ * their definitions. */
+
+enum { FEW = 9, REACH = 4, WIDE = 2 * REACH + 1, MOST_IMAGES = FEW * FEW * WIDE };
+
+static bool    has[FEW][FEW][WIDE]; /* row i has j at shift S - REACH */
+static int64_t ends_of_images[FEW + 1], counts_of_images[2], ghosts_of_images[2];
+static int32_t index_of_images[MOST_IMAGES], shift_of_images[2 * MOST_IMAGES];
+static int32_t i_of_images[MOST_IMAGES];
+static double  x_of_images[2 * FEW];
+static bool    turned_order;
+
+/* Shifts of up to `most`; both ways: with each (i, j, S) there is (j, i, -S). The second axis does
+ * not repeat. */
+static void
+fill_images(harness_random *random, int most, bool both_ways)
+{
+    static const double side[3] = {0.5, 0.05, 0.2};
+    const double        share = side[random_bits(random) % 3];
+    memset(has, 0, sizeof has);
+    for (int32_t i = 0; i < FEW; i++)
+        for (int32_t j = 0; j < FEW; j++)
+            for (int32_t s = -most; s <= most; s++)
+                if ((i != j || s != 0) && random_unit(random) < share) {
+                    has[i][j][REACH + s] = true;
+                    has[j][i][REACH - s] |= both_ways;
+                }
+    counts_of_images[0] = (int64_t)(random_bits(random) % (FEW + 1));
+    counts_of_images[1] = FEW - counts_of_images[0];
+    for (int l = 0; l < 2; l++)
+        ghosts_of_images[l] = (int64_t)(random_bits(random) % (uint64_t)(counts_of_images[l] + 1));
+    for (int k = 0; k < 2 * FEW; k++)
+        x_of_images[k] = (double)(random_bits(random) % 4);
+    turned_order = random_bits(random) & 1;
+}
+
+/* Row after row; of pairs that are there both ways one. Returns how many. */
+static int64_t
+list_images(bool once)
+{
+    int64_t n = 0;
+    for (int32_t i = 0; i < FEW; i++) {
+        ends_of_images[i] = n;
+        for (int32_t j = once ? i : 0; j < FEW; j++)
+            for (int32_t s = once && i == j ? 1 : -REACH; s <= REACH; s++)
+                if (has[i][j][REACH + s]) {
+                    i_of_images[n] = i;
+                    index_of_images[n] = j;
+                    shift_of_images[2 * n] = s;
+                    shift_of_images[2 * n++ + 1] = 0;
+                }
+    }
+    ends_of_images[FEW] = n;
+    return n;
+}
+
+static hs_points
+image_points(void)
+{
+    return (hs_points){x_of_images, FEW, 2, HS_FLOAT64, 16, 8};
+}
+
+static hs_node_lists
+image_lists(void)
+{
+    static const int32_t number[FEW] = {8, 7, 6, 5, 4, 3, 2, 1, 0};
+    return (hs_node_lists){.n_lists = 2,
+                           .n_nodes = counts_of_images,
+                           .n_ghosts = ghosts_of_images,
+                           .number = turned_order ? number : NULL,
+                           .ghost_rows = true};
+}
+
+/* The node of a point among all. */
+static int32_t
+node_of(int32_t point)
+{
+    return turned_order ? FEW - 1 - point : point;
+}
+
+static bool
+is_of_list(int32_t point, int l)
+{
+    return (node_of(point) >= counts_of_images[0]) == (l == 1);
+}
+
+static int32_t
+number_of(int32_t point)
+{
+    const int32_t node = node_of(point);
+    return node - (node >= counts_of_images[0] ? (int32_t)counts_of_images[0] : 0);
+}
+
+static hs_status
+overlap_images(void *context)
+{
+    const hs_points     points = image_points();
+    const hs_node_lists lists = image_lists();
+    const int64_t       n = list_images(false);
+    const hs_index_rows gather = {FEW, ends_of_images, n, index_of_images, shift_of_images, 2};
+    hs_options          options = hs_options_default();
+    hs_pairs           *made = NULL;
+    options.memory_limit = limit;
+    const hs_status status =
+        hs_connectivity_overlap(&points, &gather, &lists, &options, &made, NULL);
+    CHECK((made != NULL) == (status == HS_OK));
+    if (context != NULL)
+        *(hs_pairs **)context = made;
+    else
+        hs_pairs_free(made);
+    return status;
+}
+
+/* Whether i and (j, s) have an image in common; each has itself. */
+static bool
+have_common(int32_t i, int32_t j, int s)
+{
+    for (int32_t k = 0; k < FEW; k++)
+        for (int t = -REACH; t <= REACH; t++) {
+            const int  u = t - s;
+            const bool of_i = (k == i && t == 0) || has[i][k][REACH + t];
+            if (of_i && u >= -REACH && u <= REACH && ((k == j && u == 0) || has[j][k][REACH + u]))
+                return true;
+        }
+    return false;
+}
+
+static void
+overlaps_have_every_image(void)
+{
+    harness_random random = {91};
+    for (int trial = 0; trial < TRIALS(60); trial++) {
+        hs_pairs *made;
+        fill_images(&random, 2, false);
+        CHECK(overlap_images(&made) == HS_OK);
+        const int64_t *first = hs_pairs_offsets(made);
+        const int32_t *j = hs_pairs_array(made, HS_WANT_J),
+                      *s = hs_pairs_array(made, HS_WANT_SHIFT);
+        bool right = true;
+        for (int32_t node = 0; node < FEW; node++) {
+            const int32_t i = turned_order ? FEW - 1 - node : node;
+            for (int l = 0; l < 2; l++) {
+                int64_t at = first[2 * node + l];
+                for (int32_t q = 0; q < FEW; q++)
+                    for (int t = -REACH; is_of_list(q, l) && t <= REACH; t++)
+                        if ((q != i || t != 0) && have_common(i, q, t)) {
+                            right = right && j[at] == number_of(q) && s[2 * at] == t;
+                            right = right && s[2 * at++ + 1] == 0;
+                        }
+                right = right && at == first[2 * node + l + 1];
+            }
+        }
+        CHECK(right);
+        hs_pairs_free(made);
+    }
+    fill_images(&random, 2, false);
+    CHECK(fail_each_allocation(overlap_images, NULL, 200) > 8);
+    check_arena(overlap_images, NULL);
+    CHECK(raise_memory_limit(overlap_images, NULL, &limit) > 10);
+}
+
+static void
+images_that_are_no_rows_are_refused(void)
+{
+    static const int64_t counts[1] = {2}, all[3] = {0, 2, 2};
+    static const int32_t index[2] = {1, 1}, falling[2] = {1, 0}, own[2] = {0, 1},
+                         beyond[2] = {1, 2};
+    static const int32_t below[2] = {-1, 1}, shift[2] = {0, 1}, same[2] = {1, 1};
+    static const int32_t least[2] = {INT32_MIN, INT32_MAX};
+    const hs_points      points = {x_of_images, 2, 1, HS_FLOAT64, 8, 8};
+    const hs_node_lists  lists = {.n_lists = 1, .n_nodes = counts};
+    const hs_options     options = hs_options_default();
+    const hs_index_rows  wrong[] = {
+         {2, all, 2, falling, shift, 1},
+         {2, all, 2, own, shift, 1},
+         {2, all, 2, beyond, shift, 1},
+         {2, all, 2, below, shift, 1},
+         {2, all, 2, index, same, 1},
+         {2, all, 2, index, shift, 0},
+         {2, all, 2, index, shift, HS_MAX_DIM + 1},
+    };
+    hs_pairs *rows;
+    for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++)
+        CHECK(hs_connectivity_overlap(&points, &wrong[k], &lists, &options, &rows, NULL) ==
+              HS_ERR_ARGUMENT);
+    const hs_index_rows far = {2, all, 2, index, least, 1}; /* their difference is no shift */
+    CHECK(hs_connectivity_overlap(&points, &far, &lists, &options, &rows, NULL) ==
+          HS_ERR_SHIFT_RANGE);
+    CHECK(rows == NULL);
+}
+
+static const hs_box image_box = {
+    .ndim = 2, .periodic = {true, false}, .rows = {{3.0, 1.0}, {0.0, 4.0}}};
+
+static hs_status
+intersect_images(void *context)
+{
+    const hs_points     points = image_points();
+    const hs_node_lists lists = image_lists();
+    const hs_half_list half = {list_images(true), i_of_images, index_of_images, shift_of_images, 2};
+    hs_options         options = hs_options_default();
+    hs_pairs          *made = NULL;
+    options.memory_limit = limit;
+    const hs_status status =
+        hs_connectivity_intersect(&points, &image_box, &half, &lists, &options, &made, NULL);
+    CHECK((made != NULL) == (status == HS_OK));
+    if (context != NULL)
+        *(hs_pairs **)context = made;
+    else
+        hs_pairs_free(made);
+    return status;
+}
+
+/* Of small whole numbers. */
+static bool
+is_between_images(int32_t k, int t, int32_t i, int32_t j, int s)
+{
+    double along = 0.0, square = 0.0;
+    for (int d = 0; d < 2; d++) {
+        const double p = x_of_images[2 * i + d], row = image_box.rows[0][d];
+        const double q = x_of_images[2 * j + d] + s * row - p;
+        along += (x_of_images[2 * k + d] + t * row - p) * q;
+        square += q * q;
+    }
+    return along >= 0.0 && along <= square;
+}
+
+static void
+intersections_have_every_image(void)
+{
+    harness_random random = {92};
+    for (int trial = 0; trial < TRIALS(60); trial++) {
+        hs_pairs *made;
+        fill_images(&random, 2, true);
+        const hs_node_lists lists = image_lists();
+        CHECK(intersect_images(&made) == HS_OK);
+        const int64_t *first = hs_pairs_offsets(made), n = list_images(true);
+        const int32_t *node = hs_pairs_array(made, HS_WANT_J);
+        const int32_t *shift = hs_pairs_array(made, HS_WANT_SHIFT);
+        bool           right = true;
+        for (int64_t e = 0; e < n; e++) {
+            int32_t ends[2] = {i_of_images[e], index_of_images[e]};
+            int     s = shift_of_images[2 * e];
+            bool    ghost[2];
+            for (int k = 0; k < 2; k++) {
+                const int l = is_of_list(ends[k], 1);
+                ghost[k] = number_of(ends[k]) >= counts_of_images[l] - ghosts_of_images[l];
+            }
+            if (ghost[0] && ghost[1])
+                continue;
+            if (ghost[0] && lists.number == NULL) {
+                ends[0] = index_of_images[e];
+                ends[1] = i_of_images[e];
+                s = -s;
+            }
+            for (int l = 0; l < 2; l++) {
+                int64_t at = *first++;
+                for (int32_t k = 0; k < FEW; k++)
+                    for (int t = -REACH; is_of_list(k, l) && t <= REACH; t++) {
+                        const int u = t - s;
+                        if (has[ends[0]][k][REACH + t] && u >= -REACH && u <= REACH &&
+                            has[ends[1]][k][REACH + u] &&
+                            is_between_images(k, t, ends[0], ends[1], s)) {
+                            right = right && node[at] == number_of(k) && shift[2 * at] == t;
+                            right = right && shift[2 * at++ + 1] == 0;
+                        }
+                    }
+                for (int k = 0; k < 2; k++)
+                    if (is_of_list(ends[k], l)) {
+                        right = right && node[at] == number_of(ends[k]);
+                        right = right && shift[2 * at++] == (k == 0 ? 0 : s);
+                    }
+                right = right && at == *first;
+            }
+        }
+        CHECK(right);
+        hs_pairs_free(made);
+    }
+    fill_images(&random, 1, true);
+    CHECK(fail_each_allocation(intersect_images, NULL, 200) > 8);
+    check_arena(intersect_images, NULL);
+    CHECK(raise_memory_limit(intersect_images, NULL, &limit) > 10);
+}
+
+/* Morton: slices never descend, bits come in turns, and points are put in order by them. */
 
 static void
 slices_never_descend(void)
@@ -426,5 +701,8 @@ test_overlap(void)
     RUN(entries_are_those_of_the_definition);
     RUN(threads_change_nothing);
     RUN(failures_leave_nothing);
+    RUN(overlaps_have_every_image);
+    RUN(images_that_are_no_rows_are_refused);
+    RUN(intersections_have_every_image);
     RUN(slices_never_descend);
 }

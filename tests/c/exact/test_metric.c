@@ -1296,6 +1296,61 @@ feet_are_where_whole_numbers_say(void)
     CHECK(ties > TRIALS(300));
 }
 
+/* Sign of (x + S * rows - p).(q + T * rows - p). */
+static int
+true_sign_of_images(const hs_metric *images, const double *x, const int64_t *of_x, const double *p,
+                    const double *q, const int64_t *of_q)
+{
+    big sum = big_from_int(0);
+    for (int k = 0; k < images->ndim; k++) {
+        const big origin = big_from_double(p[k]);
+        big       a = big_difference(big_from_double(x[k]), origin);
+        big       b = big_difference(big_from_double(q[k]), origin);
+        for (int l = 0; l < images->n_rows; l++) {
+            const big row = big_from_double(images->rows[l][k]);
+            a = big_sum(a, big_product(big_from_int(of_x[l]), row));
+            b = big_sum(b, big_product(big_from_int(of_q[l]), row));
+        }
+        sum = big_sum(sum, big_product(a, b));
+    }
+    return sum.sign;
+}
+
+static void
+feet_of_images_are_where_whole_numbers_say(void)
+{
+    harness_random random = {19};
+    int            ties = 0;
+    for (int trial = 0; trial < TRIALS(4200); trial++) {
+        const int kind = trial / 6 % 7;
+        hs_metric images = {.ndim = 1 + trial % 6, .n_rows = 1 + trial % 6};
+        double    x[6], p[6], q[6];
+        int64_t   of_x[6], of_q[6], from_q[6], back[6];
+        for (int k = 0; k < images.ndim; k++) {
+            x[k] = a_number(&random, kind);
+            p[k] = a_number(&random, kind);
+            q[k] = trial % 11 == 0 ? p[k] : a_number(&random, kind);
+            of_x[k] = (int64_t)(random_bits(&random) % 7) - 3;
+            of_q[k] = trial % 11 == 0 ? 0 : (int64_t)(random_bits(&random) % 7) - 3;
+            if (trial % 13 == 0)
+                of_x[k] *= INT32_MAX;
+            for (int l = 0; l < images.n_rows; l++)
+                images.rows[l][k] = random_bits(&random) & 1 ? a_number(&random, kind) : 0.0;
+        }
+        for (int l = 0; l < images.n_rows; l++) {
+            from_q[l] = of_x[l] - of_q[l];
+            back[l] = -of_q[l];
+        }
+        const int at_p = true_sign_of_images(&images, x, of_x, p, q, of_q);
+        const int at_q = true_sign_of_images(&images, x, from_q, q, p, back);
+        ties += at_p == 0 || at_q == 0;
+        CHECK(hs_foot_is_between_images(&images, x, of_x, p, q, of_q) == (at_p >= 0 && at_q >= 0));
+        CHECK(hs_foot_is_between_images(&images, x, from_q, q, p, back) ==
+              (at_p >= 0 && at_q >= 0));
+    }
+    CHECK(ties > TRIALS(300));
+}
+
 /* q - p is (a, b), and x - p nearly (-b, a). */
 static void
 a_hair_beside_a_right_angle_is_told(void)
@@ -1352,5 +1407,6 @@ test_metric(void)
     RUN(a_single_number_is_a_cutoff);
     RUN(a_cutoff_is_set_and_no_more);
     RUN(feet_are_where_whole_numbers_say);
+    RUN(feet_of_images_are_where_whole_numbers_say);
     RUN(a_hair_beside_a_right_angle_is_told);
 }

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 
 RNG = np.random.default_rng(5)
 POINTS, QUERIES = RNG.random((200, 3)), RNG.random((60, 3))
@@ -72,7 +73,7 @@ def answers(points, queries):
         *(a for t in tables for a in (t.offsets, t.indices, t.distances, t.vectors, t.shifts)),
         hs.coordination(points, 0.3, queries=queries, box=BOX),
         hs.pair_histogram(points, EDGES, queries=queries, box=BOX),
-        hs.pair_histogram(points, EDGES, types=TYPES, weights=WEIGHTS, box=BOX),
+        call(hs.pair_histogram, points, EDGES, types=TYPES, weights=WEIGHTS, box=BOX),
         hs.count_pairs(points, [0.1, 0.3], queries=queries, box=BOX),
         hs.rdf(points, 0.4, 7, queries=queries, box=BOX).g,
         cells.cell_of(queries),
@@ -151,16 +152,22 @@ TAKEN = {
         (POINTS, np.array([True, False, True])),
     ),
     "cutoffs": (lambda c: hs.pairs(POINTS, c, quantities="ijk"), (np.array([0.05, 0.1]),)),
-    "radii": (lambda r: hs.neighbors(POINTS, None, radii=r).indices, (RADII,)),
-    "supports": (lambda H: hs.neighbors(POINTS, None, supports=H, extent=1.0).indices, (MATRICES,)),
-    "types": (lambda t: hs.rdf(POINTS, 0.1, types=t, box=BOX).counts, (TYPES,)),
-    "batch": (lambda k: hs.pairs(POINTS, 0.1, batch=k), (NUMBERS // 50,)),
+    "radii": (lambda r: call(hs.neighbors, POINTS, None, radii=r).indices, (RADII,)),
+    "supports": (
+        lambda H: hs.neighbors(hs.Points(POINTS, supports=H), 1.0).indices,
+        (MATRICES,),
+    ),
+    "types": (lambda t: call(hs.rdf, POINTS, 0.1, types=t, box=BOX).counts, (TYPES,)),
+    "batch": (lambda k: call(hs.pairs, POINTS, 0.1, batch=k), (NUMBERS // 50,)),
     "pairs": (lambda k: hs.pairs(POINTS, 0.2, exclude=k), (np.array([[0, 1], [2, 3]]),)),
-    "labels": (lambda k: hs.pairs(POINTS, 0.2, exclude=k), (NUMBERS // 3,)),
-    "groups": (lambda k: hs.pairs(POINTS, 0.2, groups=k), (NUMBERS // 3,)),
-    "touching": (lambda k: hs.pairs(POINTS, 0.2, touching=k), (NUMBERS[5:9],)),
+    "labels": (lambda k: hs.pairs(hs.Points(POINTS, labels=k), 0.2, exclude=0), (NUMBERS // 3,)),
+    "groups": (lambda k: call(hs.pairs, POINTS, 0.2, groups=k), (NUMBERS // 3,)),
+    "touching": (lambda k: hs.pairs(POINTS, 0.2, indices=k), (NUMBERS[5:9],)),
     "indices": (lambda k: hs.neighbors(POINTS, 0.2, indices=k).indices, (NUMBERS[5:9],)),
-    "edges, weights": (lambda e, w: hs.pair_histogram(POINTS, e, weights=w), (EDGES, WEIGHTS)),
+    "edges, weights": (
+        lambda e, w: hs.pair_histogram(hs.Points(POINTS, weights=w), e),
+        (EDGES, WEIGHTS),
+    ),
     "lists": (lambda i, j: hs.measure(POINTS, i, j), (NUMBERS[:9], NUMBERS[1:10])),
     "checked": (lambda i, j: str(hs.verify(POINTS, 0.2, i, j)), hs.pairs(POINTS, 0.2)),
     "rows": (lambda k: hs.neighbors(POINTS, 0.2)[k].indices, (NUMBERS[5:9],)),

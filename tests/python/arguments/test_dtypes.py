@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 from oracles import as_set, check, same_arrays
 
 BOX = np.array([[1.5, 0.0, 0.0], [0.25, 1.75, 0.0], [-0.5, 0.125, 2.0]])
@@ -20,7 +21,7 @@ def points(rng):
 
 
 def solve(points, box=BOX, **how):
-    return hs.pairs(points, CUTOFF, box=box, quantities="ijSdD", **how)
+    return call(hs.pairs, points, CUTOFF, box=box, quantities="ijSdD", **how)
 
 
 def test_every_float_width_gives_the_same_pairs(points):
@@ -36,12 +37,12 @@ def test_integers_and_booleans_are_taken_as_they_are(rng):
             whole = rng.integers(0, 2 if dtype == "?" else 12, (25, 3)).astype(dtype)
             plain = whole.astype(float)
             assert same_arrays(
-                hs.pairs(whole, 3, quantities="ijd", kernel=kernel),
-                hs.pairs(plain, 3.0, quantities="ijd", kernel=kernel),
+                call(hs.pairs, whole, 3, quantities="ijd", kernel=kernel),
+                call(hs.pairs, plain, 3.0, quantities="ijd", kernel=kernel),
             )
             assert same_arrays(
-                hs.pairs(whole, 3, box=[5, 6, 7], quantities="ijdS", kernel=kernel),
-                hs.pairs(plain, 3.0, box=[5.0, 6.0, 7.0], quantities="ijdS", kernel=kernel),
+                call(hs.pairs, whole, 3, box=[5, 6, 7], quantities="ijdS", kernel=kernel),
+                call(hs.pairs, plain, 3.0, box=[5.0, 6.0, 7.0], quantities="ijdS", kernel=kernel),
             )
 
 

@@ -9,7 +9,8 @@ import pytest
 import scipy.sparse
 
 import halfshell as hs
-from halfshell._convert.scene import as_points
+from calls import call
+from halfshell._convert.points import as_points
 
 POINTS = np.random.default_rng(5).uniform(-1.0, 6.0, (60, 3))
 ROWS = np.array([[4.0, 0.0, 0.0], [2.5, 3.0, 0.0], [1.5, 2.0, 3.5]])
@@ -126,8 +127,7 @@ def test_tensors_that_need_a_gradient():
         (lambda: hs.pairs(tensor, 1.0), "points"),
         (lambda: hs.pairs(POINTS, 1.0, box=Converted(ROWS, requires_grad=True)), "box"),
         (lambda: hs.pairs_between(tensor, POINTS, 1.0), "queries"),
-        (lambda: hs.neighbors(POINTS, None, radii=Converted(POINTS[:, 0], requires_grad=True)),
-         "radii"),
+        (lambda: hs.Points(POINTS, radii=Converted(POINTS[:, 0], requires_grad=True)), "radii"),
     ):  # fmt: skip
         with pytest.raises(TypeError, match=f"{name} must not need a gradient.*detach"):
             find()
@@ -185,7 +185,7 @@ def freud_box(rows, periodic=(True, True, True), dimensions=3):
 def check_box(box, rows, points=POINTS, periodic=None, **options):
     expected = hs.pairs(points, 1.3, box=rows, periodic=periodic, quantities=LETTERS)
     assert len(expected[0]) > 20
-    same(hs.pairs(points, 1.3, box=box, quantities=LETTERS, **options), expected)
+    same(call(hs.pairs, points, 1.3, box=box, quantities=LETTERS, **options), expected)
     found = hs.CellList(points, 1.3, box=box, **options).pairs(quantities=LETTERS, sort=True)
     sorted_ = hs.pairs(points, 1.3, box=rows, periodic=periodic, quantities=LETTERS, sort=True)
     same(found, sorted_)
@@ -193,7 +193,7 @@ def check_box(box, rows, points=POINTS, periodic=None, **options):
     steps.update(points)
     same(steps.pairs(quantities=LETTERS, sort=True), sorted_)
     batch = np.zeros(len(points), int)
-    same(hs.pairs(points, 1.3, box=box, quantities=LETTERS, batch=batch, **options), expected)
+    same(call(hs.pairs, points, 1.3, box=box, quantities=LETTERS, batch=batch, **options), expected)
 
 
 def test_boxes_of_freud():
@@ -292,16 +292,16 @@ def test_structures_of_pymatgen(made, pbc):
     structure = made(pbc)
     points, rows = np.asarray(structure.cart_coords), np.asarray(structure.lattice.matrix)
     how = {"box": rows, "periodic": list(pbc)} if any(pbc) else {}
-    expected = hs.pairs(points, 1.5, quantities="ijS", **how)
+    expected = call(hs.pairs, points, 1.5, quantities="ijS", **how)
     cells = hs.CellList(structure, 1.5).pairs(quantities="ijS", sort=True)
     for one, other in zip(hs.pairs(structure, 1.5, quantities="ijS"), expected, strict=True):
         assert np.array_equal(one, other)
     for one, other in zip(
-        cells, hs.pairs(points, 1.5, quantities="ijS", sort=True, **how), strict=True
+        cells, call(hs.pairs, points, 1.5, quantities="ijS", sort=True, **how), strict=True
     ):
         assert np.array_equal(one, other)
     cutoffs = {("Na", "Cl"): 1.5}
-    of_types = hs.neighbors(points, cutoffs, types=["Na", "Cl"] * 30, **how)
+    of_types = call(hs.neighbors, points, cutoffs, types=["Na", "Cl"] * 30, **how)
     assert np.array_equal(hs.neighbors(structure, cutoffs).indices, of_types.indices)
     with pytest.raises(ValueError, match=r"points of type \w*Structure bring their own box"):
         hs.pairs(structure, 1.0, box=ROWS)

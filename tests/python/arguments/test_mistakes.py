@@ -2,70 +2,36 @@
 """What a user's mistake is answered: the keyword that is meant, and a short traceback."""
 
 import inspect
-import os
 import traceback
 
 import numpy as np
 import pytest
 
 import halfshell as hs
+from boundary import called_with, frames_of_ours
+from calls import call
 
-HERE = os.path.dirname(hs.__file__)
 POINTS = np.random.default_rng(0).random((10, 3))
 
 CALLS = {
-    "pairs": lambda x, **how: hs.pairs(x, 1.0, **how),
-    "pairs_between": lambda x, **how: hs.pairs_between(x, POINTS, 1.0, **how),
-    "neighbors": lambda x, **how: hs.neighbors(x, 1.0, **how),
-    "coordination": lambda x, **how: hs.coordination(x, 1.0, **how),
-    "count_pairs": lambda x, **how: hs.count_pairs(x, 1.0, **how),
-    "nearest": lambda x, **how: hs.nearest(x, 2, **how),
-    "pair_histogram": lambda x, **how: hs.pair_histogram(x, [0.0, 1.0], **how),
-    "rdf": lambda x, **how: hs.rdf(x, 1.0, **{"box": 5.0, **how}),
-    "iter_pairs": lambda x, **how: list(hs.iter_pairs(x, 1.0, **how)),
-    "for_each_pair": lambda x, **how: hs.for_each_pair(x, 1.0, print, **how),
-    "clusters": lambda x, **how: hs.clusters(x, 1.0, **how),
-    "explain": lambda x, **how: hs.explain(x, 1.0, **how),
-    "measure": lambda x, **how: hs.measure(x, [0], [1], **how),
-    "bricks": lambda x, **how: hs.bricks(x, 1.0, 2, **how),
-    "trajectory_pairs": lambda x, **how: list(hs.trajectory_pairs([x], 1.0, **how)),
+    "pairs": lambda x, **how: call(hs.pairs, x, 1.0, **how),
+    "pairs_between": lambda x, **how: call(hs.pairs_between, x, POINTS, 1.0, **how),
+    "neighbors": lambda x, **how: call(hs.neighbors, x, 1.0, **how),
+    "coordination": lambda x, **how: call(hs.coordination, x, 1.0, **how),
+    "count_pairs": lambda x, **how: call(hs.count_pairs, x, 1.0, **how),
+    "nearest": lambda x, **how: call(hs.nearest, x, 2, **how),
+    "pair_histogram": lambda x, **how: call(hs.pair_histogram, x, [0.0, 1.0], **how),
+    "rdf": lambda x, **how: call(hs.rdf, x, 1.0, **{"box": 5.0, **how}),
+    "iter_pairs": lambda x, **how: list(call(hs.iter_pairs, x, 1.0, **how)),
+    "for_each_pair": lambda x, **how: call(hs.for_each_pair, x, 1.0, print, **how),
+    "clusters": lambda x, **how: call(hs.clusters, x, 1.0, **how),
+    "explain": lambda x, **how: call(hs.explain, x, 1.0, **how),
+    "measure": lambda x, **how: call(hs.measure, x, [0], [1], **how),
+    "bricks": lambda x, **how: call(hs.bricks, x, 1.0, 2, **how),
+    "trajectory_pairs": lambda x, **how: list(call(hs.trajectory_pairs, [x], 1.0, **how)),
     "CellList": lambda x, **how: hs.CellList(x, 1.0, **how),
     "VerletList": lambda x, **how: hs.VerletList(1.0, 0.1, **how).update(x),
 }
-
-WRONG_POINTS = {
-    "one axis": np.zeros(3),
-    "nan": np.array([[0.0, np.nan, 1.0]]),
-    "words": ["a", "b"],
-    "object": object(),
-    "complex": np.zeros((2, 3), complex),
-}
-
-WRONG_ARGUMENTS = [
-    {"box": [1, 2]}, {"box": "x"}, {"box": np.zeros((3, 3))}, {"box": 5.0, "periodic": "x"},
-    {"periodic": [1, 2, 3]}, {"radii": [1.0]}, {"types": ["a"]}, {"supports": [1.0]},
-    {"kernel": "x"}, {"threads": -1}, {"memory_limit": "much"}, {"groups": [1]}, {"batch": [3]},
-    {"exclude": [[0, 99]]}, {"algorithm": "gird"}, {"quantities": "xy"}, {"precision": "exat"},
-    {"index_dtype": "float"}, {"queries": [[1.0]]}, {"indices": [99]}, {"unheard_of": 3},
-]  # fmt: skip
-
-
-def frames_of_ours(call):
-    """How many frames of the package a refused call has; None if it was not refused."""
-    try:
-        call()
-    except Exception as error:
-        frames = traceback.extract_tb(error.__traceback__)
-        return sum(frame.filename.startswith(HERE) for frame in frames)
-    return None
-
-
-@pytest.mark.parametrize("name", CALLS)
-def test_tracebacks_are_short(name):
-    for points in WRONG_POINTS.values():
-        assert frames_of_ours(lambda points=points: CALLS[name](points)) <= 5
-    for how in WRONG_ARGUMENTS:
-        assert (frames_of_ours(lambda how=how: CALLS[name](POINTS, **how)) or 0) <= 5, how
 
 
 def test_frames_of_the_users_own_code_stay():
@@ -111,7 +77,6 @@ MEANT = {"pbc": "periodic", "cell": "box", "boxsize": "box", "workers": "threads
 @pytest.mark.parametrize("name", [name for name in CALLS if name.islower()])
 def test_keywords_of_other_libraries_are_answered_with_ours(name):
     known = inspect.signature(getattr(hs, name)).parameters
-    assert list(known)[-1] == "unknown"
     for theirs, ours in MEANT.items():
         if ours not in known:
             continue
@@ -127,10 +92,40 @@ def test_keywords_of_other_libraries_are_answered_by_classes_too():
         (lambda **how: hs.CellList(POINTS, 1.0, **how), "pbc", "periodic"),
         (lambda **how: hs.VerletList(1.0, **how), "cell", "box"),
         (lambda **how: hs.DynamicCellList(3, 1.0, **how), "boxsize", "box"),
-        (lambda **how: hs.verify(POINTS, 1.0, [0], [1], **how), "pbc", "periodic"),
+        (lambda **how: call(hs.verify, POINTS, 1.0, [0], [1], **how), "pbc", "periodic"),
     ]:
         with pytest.raises(TypeError, match=rf"\w\(\) got .* '{given}': did you mean {meant}=\?$"):
             make(**{given: None})
+
+
+#: Keywords that there were -> what stands in their place.
+OLD = {
+    **{name: f"set it around the call, with hs.settings({name}=...)"
+       for name in ("kernel", "algorithm", "precision", "memory_limit")},
+    **{name: f"it is known of the points: hs.Points(points, {name}=...)"
+       for name in ("radii", "types", "supports", "groups", "weights", "batch")},
+    **{f"query_{name}": f"it is known of the points: hs.Points(queries, {name}=...)"
+       for name in ("radii", "types", "supports", "groups", "weights", "batch")},
+    "query_exclude": "labels are those of hs.Points(queries, labels=...)",
+    "capacity": "out= takes arrays of a fixed length, and halfshell.jax has fixed shapes",
+    "on_overflow": "out= takes arrays of a fixed length, and halfshell.jax has fixed shapes",
+    "exclude_within": "did you mean exclude=?", "extent": "did you mean cutoff=?",
+    "touching": "did you mean indices=?", "winding": "Clusters.spans is there in every case",
+    "r_max": "did you mean cutoff=?",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("old", OLD)
+def test_old_keywords_are_answered_with_what_stands_in_their_place(old):
+    meant = OLD[old].removeprefix("did you mean ").removesuffix("=?")
+    for name in (*CALLS, "verify"):
+        function = getattr(hs, name)
+        if meant != OLD[old] and meant not in inspect.signature(function).parameters:
+            continue  # it has no such argument
+        with pytest.raises(TypeError, match=f"unexpected keyword argument '{old}'") as refused:
+            called_with(name, function, **{old: None})
+        assert str(refused.value).endswith(OLD[old]), name
+        assert frames_of_ours(refused.value) <= 5
 
 
 class Universe:
@@ -156,19 +151,21 @@ HINTS = {
     ),
     r"as in reshape\(3, 3\)$": lambda: hs.pairs(POINTS, 1.0, box=np.eye(3).ravel()),
     r"one length does not say how many dimensions$": lambda: hs.Box(5.0),
-    r"keys, such as \('Si', 'O'\), got 'Si-O'$": lambda: hs.pairs(
-        POINTS, {"Si-O": 1.0}, types=["Si"] * 10
+    r"keys, such as \('Si', 'O'\), got 'Si-O'$": lambda: call(
+        hs.pairs, POINTS, {"Si-O": 1.0}, types=["Si"] * 10
     ),
     r"use np\.flatnonzero\(indices\)$": lambda: hs.neighbors(
         POINTS, 1.0, indices=POINTS[:, 0] > 0.5
     ),
     r"got indices\[1\] = 10$": lambda: hs.neighbors(POINTS, 1.0, indices=[0, 10]),
     r"one pair is \[\[i, j\]\]$": lambda: hs.pairs(POINTS, 1.0, exclude=[0, 1]),
-    r"letter k of pairs, a length for each point is one of radii$": lambda: hs.neighbors(
+    r"a radius for each point is one of Points\(radii=\.\.\.\)": lambda: hs.neighbors(
         POINTS, np.ones(10)
     ),
     r"\(i is the row itself\), got 'ijd'$": lambda: hs.neighbors(POINTS, 1.0, quantities="ijd"),
-    r"pair_histogram takes edges$": lambda: hs.rdf(POINTS, 1.0, bins=[0.0, 1.0], box=5.0),
+    r"cutoff must be None, or the last edge of bins, 2\.0, got 1\.0$": lambda: hs.rdf(
+        POINTS, 1.0, bins=[0.0, 2.0], box=5.0
+    ),
     r"did you mean neighbors\?$": lambda: hs.neighbours,
     r"no point is its own neighbour, unless queries= are the points$": lambda: hs.neighbors(
         POINTS, 1.0, include_self=True
@@ -178,9 +175,20 @@ HINTS = {
     r"'sort': it is an argument of pairs and trajectory_pairs$": lambda: hs.neighbors(
         POINTS, 1.0, sort=True
     ),
-    r"'indices': did you mean touching=\?$": lambda: hs.pairs(POINTS, 1.0, indices=[1]),
+    r"'touching': did you mean indices=\?$": lambda: hs.pairs(POINTS, 1.0, touching=[1]),
+    r"'radii': it is known of the points: hs\.Points\(points, radii=\.\.\.\)$": lambda: hs.pairs(
+        POINTS, None, radii=[1.0] * 10
+    ),
+    r"'query_types': it is known of the points: hs\.Points\(queries, types=": lambda: hs.neighbors(
+        POINTS, 1.0, queries=POINTS, query_types=[0] * 10
+    ),
+    r"'kernel': set it around the call, with hs\.settings\(kernel=": lambda: hs.pairs(
+        POINTS, 1.0, kernel="scalar"
+    ),
     r"argument 'zzz'$": lambda: hs.pairs(POINTS, 1.0, zzz=1),
-    r"several systems are one array of points, with batch$": lambda: hs.pairs([Atoms()] * 2, 1.0),
+    r"are a list of arrays, as in Points\.stack\(list\(points\)\)$": lambda: hs.pairs(
+        np.zeros((2, 3, 3)), 1.0
+    ),
 }
 
 
@@ -205,6 +213,6 @@ def test_what_is_spelled_alike_is_named(search, given, message):
 
 def test_words_that_are_spelled_alike_are_named():
     with pytest.raises(ValueError, match=r"got 'maxx': did you mean 'max'\?"):
-        hs.pairs(POINTS, None, radii=np.ones(10), rule="maxx")
+        call(hs.pairs, POINTS, None, radii=np.ones(10), rule="maxx")
     with pytest.raises(ValueError, match=r"rule must be one of .* got 'zzz'$"):
-        hs.pairs(POINTS, None, radii=np.ones(10), rule="zzz")
+        call(hs.pairs, POINTS, None, radii=np.ones(10), rule="zzz")

@@ -271,20 +271,12 @@ def test_pairs_of_a_batch_are_judged_in_the_box_of_their_system(bench: SimpleNam
     assert not bench.agreement.is_pair(scene, 2, 3, None, True)[0]
 
 
-def test_what_the_installed_version_lacks_is_refused(
-    bench: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    ours = bench.contestant.Halfshell()
-    monkeypatch.setattr(bench.contestant, "_accepts", lambda *arguments: False)
-    assert ours.refuses(bench.scenes.load("batch-30")) == "no batches in this version"
-    assert ours.refuses(bench.scenes.load("threads-pairs-1e5-k52")) == "no threads in this version"
-    assert ours.refuses(bench.scenes.load("single-10")) is None
-    assert "threads" not in ours.prepare(bench.scenes.load("single-10")).keywords
-    monkeypatch.setattr(bench.contestant, "_accepts", lambda *arguments: True)
-    assert ours.refuses(bench.scenes.load("batch-30")) is None
-    assert ours.prepare(bench.scenes.load("threads-pairs-1e5-k52")).keywords["threads"] == 2
-    one = bench.contestant.Halfshell({"threads": 1})
-    assert one.prepare(bench.scenes.load("threads-pairs-1e5-k52")).keywords["threads"] == 1
+def test_options_are_keywords_or_set_around_the_call(bench: SimpleNamespace) -> None:
+    scene = bench.scenes.load("threads-pairs-1e5-k52")
+    assert bench.contestant.Halfshell().prepare(scene).keywords["threads"] == 2
+    assert bench.contestant.Halfshell({"threads": 1}).prepare(scene).keywords["threads"] == 1
+    single = bench.contestant.Halfshell({"precision": "single"}).prepare(scene)
+    assert single.func.__name__ == "run" and "precision" not in single.keywords
 
 
 def test_groups_choose_scenes(bench: SimpleNamespace, capsys: pytest.CaptureFixture[str]) -> None:

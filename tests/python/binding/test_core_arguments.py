@@ -25,9 +25,10 @@ def count(points, box=None, periodic=0):
 
 def batch(name, numbers, cutoffs=None, boxes=None, box=None, periodic=0):
     shared = (POINTS, 1.5, box, periodic, True, "exact", None, None, None, None)
-    if name == "batch_pairs":
-        return _core.batch_pairs(*shared, "ij", False, 8, None, numbers, cutoffs, boxes, None, None)
-    return _core.batch_count(*shared, numbers, cutoffs, boxes, None, None)
+    own = numbers, cutoffs, boxes, None, None
+    if name == "pairs":
+        return _core.pairs(*shared, "ij", False, 8, None, None, "auto", None, None, own)
+    return _core.count_pairs(*shared, None, "auto", None, own)
 
 
 def refuse_points(points):
@@ -119,7 +120,7 @@ def test_periodic_is_bits(periodic):
         count(POINTS, np.eye(3), "7")
 
 
-@pytest.mark.parametrize("name", ["batch_pairs", "batch_count"])
+@pytest.mark.parametrize("name", ["pairs", "count_pairs"])
 def test_numbers_are_int64_one_a_point(name):
     for numbers in (
         None, BATCH.tolist(), BATCH.astype(np.int32), BATCH.astype(float), BATCH.astype(">i8"),
@@ -129,7 +130,7 @@ def test_numbers_are_int64_one_a_point(name):
             batch(name, numbers)
 
 
-@pytest.mark.parametrize("name", ["batch_pairs", "batch_count"])
+@pytest.mark.parametrize("name", ["pairs", "count_pairs"])
 def test_cutoffs_are_float64(name):
     for cutoffs in (
         1.5, CUTOFFS.tolist(), CUTOFFS.astype(np.float32), CUTOFFS.astype(int),
@@ -139,7 +140,7 @@ def test_cutoffs_are_float64(name):
             batch(name, BATCH, cutoffs)
 
 
-@pytest.mark.parametrize("name", ["batch_pairs", "batch_count"])
+@pytest.mark.parametrize("name", ["pairs", "count_pairs"])
 def test_boxes_are_float64(name):
     for boxes in (
         3.0, BOXES.tolist(), BOXES.astype(np.float32), BOXES[0], BOXES[None], np.tri(3) + BOXES.T,
@@ -149,7 +150,7 @@ def test_boxes_are_float64(name):
             batch(name, BATCH, None, boxes, np.eye(3), 7)
 
 
-@pytest.mark.parametrize("name", ["batch_pairs", "batch_count"])
+@pytest.mark.parametrize("name", ["pairs", "count_pairs"])
 def test_boxes_fit(name):
     for boxes, cutoffs, box in [
         (BOXES, None, None),
@@ -204,7 +205,7 @@ WITH_NUMBERS = {
     ),
     "cells": (
         1.0, lambda p, n: len(_core.cells_layout(
-            _core.cells_build(p, 9.0, None, 0, *SHARED, n)
+            _core.cells_build(p, 9.0, None, 0, *SHARED, n, None)
         )["order"]), 2,
     ),
 }  # fmt: skip

@@ -30,19 +30,17 @@ ROWS = {
 }
 GONE = {f"gone {name}": array for name, array in ROWS.items()}
 TARGET = {"n_nodes": longs(3, 1), "target": ints(0, 1, 2, 0)}
-COLUMNS = {"i_node": ints(0, 1), "i_list": ints(0, 0), "j_node": ints(1, 0), "j_list": ints(0, 1)}
 
 # What each function is called with besides the arguments that all searches share.
 CALLS = {
     "connect": HALF | SHIFTS | LISTS | NUMBER | {"flags": 0},
     "connect_search": LISTS | NUMBER | {"flags": 0},
-    "overlap": {"offsets": longs(0, 1, 3, 3, 4), "indices": ints(1, 0, 3, 1)} | LISTS | NUMBER
-    | {"flags": 0},
-    "intersect": HALF | LISTS | NUMBER | {"flags": 0},
+    "overlap": {"offsets": longs(0, 1, 3, 3, 4), "indices": ints(1, 0, 3, 1)}
+    | {"shifts": np.zeros((4, 1), np.int32)} | LISTS | NUMBER | {"flags": 0},
+    "intersect": HALF | {"shifts": None} | LISTS | NUMBER | {"flags": 0},
     "pair_rows": ROWS | LISTS | {"number": None, "flags": 0},
     "keep_rows": ROWS | TARGET | {"place": ints(0, 1, 2, 0), "source": longs(0, 1, 2, 3)},
     "rows_without": ROWS | GONE | {"n_lists": 2, "ascend": True},
-    "keep_pairs": COLUMNS | SHIFTS | TARGET | {"keep": np.ones(2, bool)},
 }  # fmt: skip
 ARRAYS = arrays_among(CALLS)
 # Arrays of any length: their values say what they must go with, and the core looks at these.
@@ -85,9 +83,3 @@ def test_an_array_has_at_most_8_shifts_a_row():
     for width in (0, 9):
         with pytest.raises(TypeError, match="shifts must be an int32 array of a row for each"):
             call("connect", shifts=np.zeros((2, width), np.int32))
-
-
-def test_no_node_goes_where_no_numbers_of_nodes_are_given():
-    nodes, lists = call("keep_pairs", n_nodes=None, target=np.full(4, -1, np.int32))[1]
-    for kept, name in zip((*nodes[:2], *lists), ("i_node", "j_node", "i_list", "j_list")):
-        np.testing.assert_array_equal(kept, COLUMNS[name])

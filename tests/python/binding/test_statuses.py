@@ -21,7 +21,7 @@ def probe(tmp_path_factory):
     binding = CSRC / "binding"
     path = build_extension(
         tmp_path_factory.mktemp("probe"), PROBE, "-std=c11", "-Wall", "-Wextra", "-Werror",
-        f"-I{binding}", "-isystem", np.get_include(), binding / "errors.c", binding / "tuples.c",
+        f"-I{binding}", "-isystem", np.get_include(), binding / "errors.c",
         CSRC / "core/base/status.c",
     )  # fmt: skip
     spec = importlib.util.spec_from_file_location(PROBE.stem, path)

@@ -10,6 +10,7 @@ import pytest
 
 import halfshell as hs
 from halfshell import cli
+from halfshell.structures import ALPHA_QUARTZ_CIF, alpha_quartz
 
 POINTS = np.random.default_rng(5).random((60, 3)) * 8
 LENGTHS = [8.0, 7.5, 9.0]
@@ -113,6 +114,70 @@ def test_rdf(told, run, text, tmp_path):
     assert (status, out) == (2, "") and "needs a box that is periodic" in err
 
 
+def test_cutoffs_and_counts_by_elements(told, run, tmp_path):
+    pytest.importorskip("ase")
+    positions, box, species = alpha_quartz()
+    points = hs.Points(positions, box=box, types=species)
+    cutoff = {("O", "Si"): 1.7, ("*", "*"): 3.2}
+    option = "Si-O=1.7, *-*=3.2"
+    out = tmp_path / "counts.csv"
+    facts = told("coordination", "--cutoff", option, "--by-type", "-o", out)
+    counts = hs.coordination(points, cutoff, by_type=True)
+    found = columns_of(out)
+    assert numbers(found["count_O"]) == counts[:, 0].tolist()
+    assert numbers(found["count"]) == counts.sum(axis=1).tolist()
+    assert facts["cutoff"] == {"Si-O": 1.7, "*-*": 3.2}
+    assert facts["by_type"]["Si"] == {
+        "O": 4.0, "Si": counts[species == "Si", 1].mean()
+    }  # fmt: skip
+    assert "types of Si" in run("coordination", "--cutoff", option, "--by-type")[1]
+    assert told("neighbors", "--cutoff", option)["entries"] == counts.sum()
+    pairs = told("pairs", ALPHA_QUARTZ_CIF, "--cutoff", option, "-o", tmp_path / "list.npz")
+    assert pairs["cutoff"] == facts["cutoff"] and pairs["pairs"] * 512 * 2 == counts.sum()
+    verdict = told("verify", ALPHA_QUARTZ_CIF, tmp_path / "list.npz", "--cutoff", option)
+    assert verdict["ok"] and len(verdict["checks"]) == 2
+    status, said, _ = run("verify", ALPHA_QUARTZ_CIF, tmp_path / "list.npz", "--cutoff", "Si-O=1.7")
+    assert status == 1 and "these elements form no pairs" in said and "WRONG" in said
+    assert "rows              6" in run("verify", ALPHA_QUARTZ_CIF, "--cutoff", "O-Si=1.606")[1]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["pairs", "--cutoff", "Si-O=1.7,O"], "'O' is not like Si-O=1.8, or *-*=3"),
+        (["pairs", "--cutoff", "Si-O=-1"], "-1 is negative"),
+        (["pairs", "--cutoff", "Si-Xx=1"], "'Xx' is neither an element nor a type"),
+        (["rdf", "--cutoff", "Si-O=1.7"], "is not a number"),
+        (["verify", "--cutoff", "Si-O=1.7", "--against", "ase"], "--against takes one cutoff"),
+        (["coordination", "TEXT", "--cutoff", "Si-O=1.7"], "has no elements, which --cutoff of"),
+        (["rdf", "TEXT", "--cutoff", "2", "--by-type"], "has no elements, which --by-type"),
+        (["rdf", "TEXT", "--cutoff", "2"], "periodic along every axis, or --density"),
+        (["rdf", "--plot", "g.gif"], "the name must end in"),
+    ],
+)
+def test_elements_that_cannot_be(run, text, words, said):
+    status, out, err = run(*[text if word == "TEXT" else word for word in words])
+    assert (status, out) == (2, "") and said in err and err.count("\n") == 1
+
+
+def test_partial_distributions_and_their_picture(told, text, tmp_path):
+    pytest.importorskip("matplotlib")
+    out, plot = tmp_path / "g.csv", tmp_path / "g.png"
+    options = ["--cutoff", 5, "--bins", 50, "--by-type", "--plot", plot, "-o", out]
+    facts = told("rdf", *options)
+    positions, box, species = alpha_quartz()
+    result = hs.rdf(hs.Points(positions, box=box, types=species), 5.0, 50, by_type=True)
+    found = columns_of(out)
+    assert list(found) == ["r", *(f"{what}_{two}" for two in ("O-O", "O-Si", "Si-Si")
+                                  for what in ("g", "counts"))]  # fmt: skip
+    assert numbers(found["g_O-Si"]) == result["O", "Si"].g.tolist()
+    assert facts["pairs"] == hs.count_pairs(positions, 5.0, box=box)
+    assert facts["highest"]["O-Si"][1] == result["O", "Si"].g.max()
+    assert plot.read_bytes().startswith(b"\x89PNG")
+    open_space = told("rdf", text, "--cutoff", 2, "--density", 0.25)
+    assert open_space["highest"][1] == hs.rdf(POINTS, 2.0, density=0.25).g.max()
+
+
 def test_summaries_for_people(run, text):
     for command in ("neighbors", "coordination", "rdf", "nearest"):
         status, out, err = run(command, text, "--box", "8,7.5,9")
@@ -179,7 +244,7 @@ def test_options_that_cannot_be(run):
     for args in (
         ["nearest", "--cutoff", "3"], ["nearest", "--strict"], ["rdf", "--strict"],
         ["rdf", "--bins", "0"], ["nearest", "-k", "0"], ["nearest", "-k", "x"],
-        ["pairs", "--threads", "0"], ["verify", "--threads", "2"],
+        ["pairs", "--threads", "0"], ["verify", "--threads", "0"],
         ["neighbors", "--quantities", "ijP"], ["coordination", "-o", "out.txt"],
         ["pairs", "-o", "-", "--json"], ["coordination", "-o", "-", "--json"],
         ["rdf", "--cutoff", "0"],

@@ -150,7 +150,7 @@ def test_what_is_refused():
     for error, quantities, points, cutoff, match in (
         (ValueError, "ix", np.zeros((2, 3)), 1.0, "quantities"),
         (ValueError, "x", np.zeros((0, 3)), 1.0, "quantities"),
-        (ValueError, "i", [[0.0, 0.0, np.nan]], 1.0, "points"),
+        (ValueError, "i", [[0.0, 0.0, np.nan]], 1.0, "positions must be finite"),
         (ValueError, "i", np.zeros((2, 2)), 1.0, "box"),
         (ValueError, "i", np.zeros((2, 3)), np.nan, "cutoff"),
         (ValueError, "i", np.zeros((2, 3)), [1.0], "radii"),

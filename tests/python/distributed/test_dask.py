@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from brick_scenes import LETTERS, in_order, same, scenes, serial
+from brick_scenes import LETTERS, in_order, known_scenes, same, scenes, serial
 from checkout import ROOT
 from refused_calls import check_refusals
 
@@ -74,6 +74,76 @@ def test_it_is_one_search(number, name):
         check_all(*scenes()[name], CHUNKS[chunks], n=5 if chunks == "one" else None)
 
 
+@pytest.mark.parametrize("number, name", [*enumerate(known_scenes())])
+def test_what_is_known_of_points_goes_with_them(number, name):
+    known, cutoff, scene, which = known_scenes()[name]
+    points = hs.Points(**known, **scene)
+    fields = dict(known)
+    positions = collection(fields.pop("positions"), [40, -1, "uneven"][number % 3])
+    if number % 2:  # in other chunks
+        fields = {key: da.from_array(one, chunks=7) for key, one in fields.items()}
+    given = hd.Points(positions, **fields, **scene)
+    rest = {key: value for key, value in which.items() if key != "rule"}
+    with dask.config.set(scheduler=at_odd_addresses()):
+        for n in (None, 3):
+            rows = hd.neighbors(given, cutoff, n=n, quantities="jd", **which)
+            found = dask.compute(
+                *hd.pairs(given, cutoff, n=n, quantities=LETTERS, sort=True, **which),
+                hd.coordination(given, cutoff, n=n, **which),
+                hd.count_pairs(given, cutoff, n=n, **which),
+                hd.pair_histogram(given, [0.0, 0.5, 1.0], n=n, **rest),
+            )
+            table = rows.table.compute()
+            expected = hs.pairs(points, cutoff, quantities=LETTERS, sort=True, **which)
+            assert same(found[:6], expected) and len(expected[0])
+            assert same([found[6]], [hs.coordination(points, cutoff, **which)])
+            assert found[7] == len(expected[0])
+            assert same([found[8]], [hs.pair_histogram(points, [0.0, 0.5, 1.0], **rest)])
+            whole = hs.neighbors(points, cutoff, quantities="jd", **which)
+            columns = ("offsets", "indices", "distances")
+            assert same([getattr(table, c) for c in columns], [getattr(whole, c) for c in columns])
+            assert np.array_equal(table.reverse(), whole.reverse())
+
+
+def test_rules_with_a_direction_have_rows_and_no_pairs():
+    rng = np.random.default_rng(8)
+    points = hs.Points(rng.random((80, 2)) * 4.0, box=4.0, radii=rng.random(80))
+    given = hd.Points(collection(points.positions, 30), radii=points.radii, box=4.0)
+    rows = hd.neighbors(given, None, rule="gather").table.compute()
+    assert np.array_equal(rows.indices, hs.neighbors(points, None, rule="gather").indices)
+    for call in (hd.pairs, hd.count_pairs):
+        with pytest.raises(ValueError, match="has a direction"):
+            call(given, None, rule="gather")
+
+
+def test_settings_hold_for_tasks():
+    given = collection(np.random.default_rng(0).random((20_000, 3)), 20_000)
+    with hs.settings(memory_limit=2e6):
+        refused = hd.pairs(given, 0.1)
+    with pytest.raises(MemoryError, match=r"2 MB are allowed"):
+        dask.compute(*refused)
+    with pytest.raises(ValueError, match="bricks need precision 'exact', got 'double'"):
+        with hs.settings(precision="double"):
+            hd.pairs(given, 0.1)
+
+
+def test_what_is_known_has_the_rows_of_the_points():
+    positions = da.zeros((10, 3), chunks=5)
+    with pytest.raises(ValueError, match="radii must have a row for each of 10 points, got 9"):
+        hd.Points(positions, radii=np.ones(9))
+    unknown = da.from_delayed(dask.delayed(np.zeros)((5, 3)), (np.nan, 3), float)
+    with pytest.raises(ValueError, match=r"radii must have the chunks of points.*: 1, got 2"):
+        hd.Points(unknown, radii=da.ones(10, chunks=5))
+    short = hd.Points(unknown, radii=da.ones(4, chunks=4))
+    with pytest.raises(ValueError, match=r"radii must have shape \(5,\)"):
+        hd.count_pairs(short, None).compute()
+    negative = hd.Points(positions, radii=np.where(np.arange(10) == 7, -1.0, 1.0))
+    with pytest.raises(ValueError, match=r"radii\[7\] = -1"):
+        hd.count_pairs(negative, None).compute()
+    with pytest.raises(ValueError, match="Points bring their own box"):
+        hd.pairs(hd.Points(positions, box=1.0), 1.0, box=1.0)
+
+
 @pytest.mark.parametrize("workers", [1, 4])
 def test_threads(workers):
     with dask.config.set(scheduler="threads", num_workers=workers):
@@ -109,13 +179,17 @@ def unpacked(given):
     return pickle.loads(frame, buffers=[memoryview(one)[1:] for one in buffers])
 
 
-@pytest.mark.parametrize("name", NAMES[:12] + NAMES[12::3])
-def test_what_a_task_receives_may_be_at_any_address(name):
-    get = functools.partial(
+def at_odd_addresses():
+    """A scheduler that sends all that a task receives."""
+    return functools.partial(
         dask.local.get_async, dask.local.SynchronousExecutor().submit, 1, dumps=packed,
         loads=unpacked,
     )  # fmt: skip
-    with dask.config.set(scheduler=get):
+
+
+@pytest.mark.parametrize("name", NAMES[:12] + NAMES[12::3])
+def test_what_a_task_receives_may_be_at_any_address(name):
+    with dask.config.set(scheduler=at_odd_addresses()):
         check_all(*scenes()[name], 50)
 
 
@@ -304,7 +378,8 @@ def test_numbers_of_one_letter_and_of_strict_cutoffs():
     given = collection(points, 10)
     for inclusive in (False, True):
         how = {"inclusive": inclusive, **scene}
-        found = hd.pairs(given, cutoff, quantities="P", sort=True, kernel="scalar", **how)
+        with hs.settings(kernel="scalar"):
+            found = hd.pairs(given, cutoff, quantities="P", sort=True, **how)
         assert same([found.compute()], [hs.pairs(points, cutoff, quantities="P", sort=True, **how)])
         assert hd.count_pairs(given, cutoff, **how).compute() == len(found.compute())
 
@@ -327,7 +402,10 @@ def test_bad_arguments_are_refused_at_once():
         ((4, 3), {"periodic": True}, ValueError, "periodic needs a box"),
         ((4, 3), {"n": 0}, ValueError, "n must be 1"),
         ((4, 3), {"n": 10**30}, ValueError, "n must be at most 1,048,576 bricks"),
-        ((4, 3), {"kernel": "none"}, ValueError, "kernel"),
+        ((4, 3), {"kernel": "scalar"}, TypeError, "kernel"),
+        ((4, 3), {"cutoff": None}, TypeError, "radii"),
+        ((4, 3), {"rule": "max"}, ValueError, "rule needs radii"),
+        ((4, 3), {"exclude": 0}, ValueError, "labels"),
         ((4, 3), {"threads": 0}, ValueError, "threads"),
         ((4, 3), {"quantities": "x"}, ValueError, "quantities"),
         ((4, 3), {"sort": 1.5}, TypeError, "sort"),
@@ -342,9 +420,9 @@ def test_bad_arguments_are_refused_at_once():
 
 
 def test_bad_collections_are_refused_at_once():
-    with pytest.raises(TypeError, match=r"dask array or dataframe, got .*from_array"):
+    with pytest.raises(TypeError, match=r"dask array or dataframe, .*got ndarray.*from_array"):
         hd.count_pairs(np.zeros((3, 3)), 1.0)
-    with pytest.raises(TypeError, match=r"dask array or dataframe, got .*Delayed"):
+    with pytest.raises(TypeError, match=r"dask array or dataframe, .*got Delayed"):
         hd.count_pairs(dask.delayed(np.zeros((3, 3))), 1.0)
     with pytest.raises(TypeError, match="real numbers, got complex128"):
         hd.count_pairs(da.zeros((3, 3), dtype=complex), 1.0)

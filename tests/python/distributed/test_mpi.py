@@ -14,7 +14,8 @@ import pytest
 import halfshell as hs
 from brick_scenes import LETTERS, in_order, same, scenes, serial
 from checkout import ROOT, SUPPORT
-from halfshell._functions.brick_plan import summary
+from halfshell._convert.points import Points
+from halfshell._functions.bricks import summary
 from halfshell.mpi import exchange
 
 
@@ -34,7 +35,7 @@ def mpiexec():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("what", ["answers", "refusals"])
+@pytest.mark.parametrize("what", ["answers", "known", "refusals"])
 @pytest.mark.parametrize("ranks", [1, 2, 4])
 def test_ranks(ranks, what):
     start(ranks, SUPPORT / "ranks.py", what)
@@ -83,13 +84,15 @@ class Alone:
 
 
 class Others(Alone):
-    """A communicator in which other ranks bring what they are told to."""
+    """A communicator in which another rank brings what it is told to."""
 
-    def __init__(self, *others):
-        self.others = others
+    def __init__(self, change):
+        self.change = change
 
     def gather(self, one):
-        return [one, *(one._replace(**changes) for changes in self.others)]
+        fields = {name: self.change[name] for name in self.change if hasattr(one, name)}
+        terms = {name: self.change[name] for name in self.change if name not in fields}
+        return [one, one._replace(terms=one.terms._replace(**terms), **fields)]
 
 
 class Beyond(Alone):
@@ -117,11 +120,13 @@ def test_one_rank():
     ("changes", "words"),
     [
         ({"cutoff": 2.0}, r"cutoff must be the same .*got 1.0 on rank 0 and 2.0 on rank 1"),
-        ({"box": None}, "box must be the same on all ranks; rank 1 has another than rank 0"),
-        ({"periodic": 1}, "periodic must be the same"),
+        ({"box": None}, r"box must be the same on all ranks, got \[\[.* and None on rank 1"),
+        ({"periodic": (True, False, True)}, "periodic must be the same"),
+        ({"rule": "max"}, "rule must be the same .*None on rank 0 and 'max' on rank 1"),
+        ({"fields": ("radii",)}, "what is known of points must be the same"),
         ({"ndim": 2}, "one width and type on all ranks, got 3 columns of float64"),
         ({"dtype": "float32"}, "3 of float32 on rank 1"),
-        ({"summary": summary(np.full((2, 3), np.nan), 2)}, r"points\[4, 0\]"),
+        ({"summary": summary(Points._of(np.full((2, 3), np.nan)), 2)}, r"points\[4, 0\]"),
         ({"error": ValueError("no points")}, "rank 1: no points"),
     ],
 )

@@ -250,7 +250,7 @@ def test_too_many_neighbors_are_an_error_and_not_left_out():
         (lambda x: ht.neighbor_list(x, 1.0, batch=x[:, 0]), TypeError, "batch .*float64"),
         (lambda x: ht.radius_graph(x, 1.0, flow="up"), ValueError, "flow"),
         (lambda x: ht.radius_graph(x, 1.0, max_num_neighbors=-1), ValueError, "max_num"),
-        (lambda x: ht.radius(x, x, 1.0, torch.arange(30).flip(0)), ValueError, "ascending"),
+        (lambda x: ht.radius(x, x, 1.0, torch.arange(30).flip(0)), ValueError, "ascend"),
         (lambda x: ht.radius(x, x, 1.0, torch.arange(3)), ValueError, "shape"),
     ],
 )

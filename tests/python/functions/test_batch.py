@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Many systems in one call: the same as one call for each, one behind the other."""
+"""Many systems in one call: the same as one call for each, one behind the other; with axes of each
+that repeat, and with radii, types or supports."""
+
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
+from halfshell_report import scenes
 from oracles import same_arrays
+from reach_scenes import SYMMETRIC
 from refused_calls import LIMIT
 from subprocesses import RESIDENT, run
 
@@ -25,7 +31,7 @@ def one_by_one(points, cutoff, batch, *, n_systems=0, box=None, quantities="ij",
         first, end = np.searchsorted(batch, [s, s + 1])
         own = None if box is None else box[s] if np.ndim(box) == 3 else box
         within = cutoff[s] if np.ndim(cutoff) else cutoff
-        found = hs.pairs(points[first:end], within, box=own, quantities=quantities, **options)
+        found = call(hs.pairs, points[first:end], within, box=own, quantities=quantities, **options)
         found = found if isinstance(found, tuple) else (found,)
         parts.append([offset(a, q, first) for a, q in zip(found, quantities, strict=True)])
         counts.append(len(found[0]))
@@ -58,9 +64,11 @@ def test_open_systems_of_all_sizes(rng):
             points, batch, _ = systems_of(rng, SIZES)
             expected, counts = one_by_one(points, 1.4, batch, quantities="ijdDSP", sort=sort)
             how = {"batch": batch, "threads": threads}
-            found = hs.pairs(points, 1.4, quantities="ijdDSP", sort=sort, **how)
+            found = call(hs.pairs, points, 1.4, quantities="ijdDSP", sort=sort, **how)
             assert same_arrays(found, expected)
-            assert hs.count_pairs(points, 1.4, batch=batch, threads=threads).tolist() == counts
+            assert (
+                call(hs.count_pairs, points, 1.4, batch=batch, threads=threads).tolist() == counts
+            )
 
 
 @pytest.mark.slow
@@ -69,7 +77,7 @@ def test_crowded_systems_keep_their_order_behind_others():
     points, batch = rng.random((4060 + 2 * 4200, 1)), np.repeat([0, 1, 2], [4060, 4200, 4200])
     expected, _ = one_by_one(points, 0.3, batch)
     for threads in (1, 2, 3):
-        found = hs.pairs(points, 0.3, batch=batch, threads=threads)
+        found = call(hs.pairs, points, 0.3, batch=batch, threads=threads)
         assert same_arrays(found, expected)
 
 
@@ -85,9 +93,9 @@ def test_boxes_and_cutoffs_of_each_system(rng, d, skew):
         expected, counts = one_by_one(points, cutoffs, batch, **options)
         del options["n_systems"]
         for threads in (1, 2, 4):
-            found = hs.pairs(points, cutoffs, batch=batch, threads=threads, **options)
+            found = call(hs.pairs, points, cutoffs, batch=batch, threads=threads, **options)
             assert same_arrays(found, expected)
-            count = hs.count_pairs(points, cutoffs, batch=batch, box=boxes, threads=threads)
+            count = call(hs.count_pairs, points, cutoffs, batch=batch, box=boxes, threads=threads)
             assert count.dtype == np.int64 and count.tolist() == counts
     assert sum(counts) > 50
 
@@ -99,11 +107,11 @@ def test_every_kernel_gives_the_same(rng):
     for box in (None, boxes, boxes[5]):
         expected, _ = one_by_one(points, 0.9, batch, box=box, n_systems=len(SIZES), **options)
         for kernel in hs.kernels():
-            found = hs.pairs(points, 0.9, batch=batch, box=box, kernel=kernel, **options)
+            found = call(hs.pairs, points, 0.9, batch=batch, box=box, kernel=kernel, **options)
             assert same_arrays(found, expected)
     for number, letter in enumerate("ijdDS"):
-        found = hs.pairs(
-            points, 0.9, batch=batch, box=boxes[5], **{**options, "quantities": letter}
+        found = call(
+            hs.pairs, points, 0.9, batch=batch, box=boxes[5], **{**options, "quantities": letter}
         )
         assert same_arrays(found, expected[number])
 
@@ -118,9 +126,11 @@ def test_options_hold_for_every_system(rng, options):
     boxes = boxes_of(rng, edge, 3, 0.0)
     expected, counts = one_by_one(points, 1.25, batch, box=boxes, **options)
     for threads in (1, 2):
-        found = hs.pairs(points, 1.25, batch=batch, box=boxes, threads=threads, **options)
+        found = call(hs.pairs, points, 1.25, batch=batch, box=boxes, threads=threads, **options)
         assert same_arrays(found, expected)
-        count = hs.count_pairs(points, 1.25, batch=batch, box=boxes, threads=threads, **options)
+        count = call(
+            hs.count_pairs, points, 1.25, batch=batch, box=boxes, threads=threads, **options
+        )
         assert count.tolist() == counts
 
 
@@ -131,24 +141,24 @@ def test_arrays_of_the_caller(rng):
         m = sum(counts)
         options = {"batch": batch, "quantities": "ijd", "sort": sort, "threads": threads}
         out = (np.full(m + 5, -1), np.full(m + 5, -1), np.full(m + 5, -1.0))
-        found = hs.pairs(points, 1.3, out=out, **options)
+        found = call(hs.pairs, points, 1.3, out=out, **options)
         assert same_arrays(found, expected)
         assert all(np.shares_memory(a, b) for a, b in zip(found, out, strict=True))
         assert all((a[m:] == -1).all() for a in out)
         with pytest.raises(hs.CapacityError) as caught:
-            hs.pairs(points, 1.3, out=tuple(a[: m - 1] for a in out), **options)
+            call(hs.pairs, points, 1.3, out=tuple(a[: m - 1] for a in out), **options)
         assert caught.value.needed == m
 
 
 def test_numbers_may_be_far_apart(rng):
     points, batch, _ = systems_of(rng, [10, 20, 30])
-    expected = hs.pairs(points, 1.5, batch=batch)
+    expected = call(hs.pairs, points, 1.5, batch=batch)
     far = np.array([3, 10**9, 2**61])[batch]
-    assert same_arrays(hs.pairs(points, 1.5, batch=far), expected)
+    assert same_arrays(call(hs.pairs, points, 1.5, batch=far), expected)
     few = np.array([0, 3, 7])[batch]
-    counts = hs.count_pairs(points, 1.5, batch=few)
+    counts = call(hs.count_pairs, points, 1.5, batch=few)
     assert counts.shape == (8,)
-    assert counts[[0, 3, 7]].tolist() == hs.count_pairs(points, 1.5, batch=batch).tolist()
+    assert counts[[0, 3, 7]].tolist() == call(hs.count_pairs, points, 1.5, batch=batch).tolist()
     assert counts.sum() == len(expected[0])
 
 
@@ -156,10 +166,10 @@ def test_integers_of_every_kind(rng):
     for dtype in (np.int8, np.uint8, np.int32, ">i8", np.uint64):
         points, batch, _ = systems_of(rng, [10, 20, 30])
         wide = np.repeat(batch.astype(dtype), 2)
-        expected = hs.pairs(points, 1.5, batch=batch)
-        assert same_arrays(hs.pairs(points, 1.5, batch=wide[::2]), expected)
-        assert same_arrays(hs.pairs(points, 1.5, batch=batch.tolist()), expected)
-        assert same_arrays(hs.pairs(points.tolist(), 1.5, batch=batch), expected)
+        expected = call(hs.pairs, points, 1.5, batch=batch)
+        assert same_arrays(call(hs.pairs, points, 1.5, batch=wide[::2]), expected)
+        assert same_arrays(call(hs.pairs, points, 1.5, batch=batch.tolist()), expected)
+        assert same_arrays(call(hs.pairs, points.tolist(), 1.5, batch=batch), expected)
 
 
 def test_other_points_and_boxes(rng):
@@ -167,38 +177,44 @@ def test_other_points_and_boxes(rng):
     expected, _ = one_by_one(points.astype(np.float32), 1.0, batch, box=[2.0, 3.0, 4.0])
     for box in ([2.0, 3.0, 4.0], np.diag([2.0, 3.0, 4.0]), hs.Box.orthorhombic([2.0, 3.0, 4.0])):
         for strided in (points.astype(np.float32), points.astype(np.float32, order="F")):
-            assert same_arrays(hs.pairs(strided, 1.0, batch=batch, box=box), expected)
+            assert same_arrays(call(hs.pairs, strided, 1.0, batch=batch, box=box), expected)
 
 
 def test_no_points_and_no_systems():
-    i, j = hs.pairs(np.empty((0, 3)), 1.0, batch=[])
+    i, j = call(hs.pairs, np.empty((0, 3)), 1.0, batch=[])
     assert i.shape == j.shape == (0,) and i.dtype == np.int64
-    assert hs.count_pairs([], 1.0, batch=[]).shape == (0,)
-    assert hs.count_pairs([], [1.0, 2.0], batch=[]).tolist() == [0, 0]
-    assert hs.count_pairs([], 1.0, batch=[], box=np.empty((0, 3, 3))).shape == (0,)
+    assert call(hs.count_pairs, [], 1.0, batch=[]).shape == (0,)
+    assert call(hs.count_pairs, [], [1.0, 2.0], batch=[]).tolist() == [0, 0]
+    assert call(hs.count_pairs, [], 1.0, batch=[], box=np.empty((0, 3, 3))).shape == (0,)
     for bad in (-1.0, np.nan):
         with pytest.raises(ValueError, match="cutoff must be finite and not negative"):
-            hs.pairs([], bad, batch=[])
+            call(hs.pairs, [], bad, batch=[])
     with pytest.raises(ValueError, match="box must be finite"):
-        hs.pairs([], 1.0, batch=[], box=[1.0, np.nan, 1.0])
+        call(hs.pairs, [], 1.0, batch=[], box=[1.0, np.nan, 1.0])
     with pytest.raises(ValueError, match="kernel must be one of"):
-        hs.pairs([], 1.0, batch=[], kernel="none")
+        call(hs.pairs, [], 1.0, batch=[], kernel="none")
 
 
 def test_an_object_with_its_own_box(rng):
     ase = pytest.importorskip("ase")
     points, batch, _ = systems_of(rng, [10, 20, 30])
-    atoms = ase.Atoms("H60", points, cell=[2.0, 3.0, 4.0], pbc=[True, True, False])
-    expected, _ = one_by_one(points, 1.0, batch, box=[2.0, 3.0, 4.0], periodic=[True, True, False])
-    assert same_arrays(hs.pairs(atoms, 1.0, batch=batch), expected)
-    for box in (np.ones((3, 3, 3)), [2.0, 3.0, 4.0]):
+    cell, pbc = [2.0, 3.0, 4.0], [True, True, False]
+    expected, _ = one_by_one(points, 1.0, batch, box=cell, periodic=pbc)
+    atoms = [
+        ase.Atoms(f"H{n}", points[batch == s], cell=cell, pbc=pbc)
+        for s, n in enumerate((10, 20, 30))
+    ]
+    assert same_arrays(hs.pairs(atoms, 1.0), expected)
+    for box in (np.ones((3, 3, 3)), cell):
         with pytest.raises(ValueError, match="of type Atoms bring their own box: leave box"):
-            hs.pairs(atoms, 1.0, batch=batch, box=box)
+            hs.pairs(atoms, 1.0, box=box)
+    with pytest.raises(ValueError, match="of type Atoms are one system: leave batch out"):
+        hs.Points(atoms[0], batch=np.zeros(10, int))
 
 
 @pytest.mark.parametrize("batch, kind, message", [
-    ([0, 0, 1, 0], ValueError, r"must be ascending, got batch\[2\] = 1 before batch\[3\] = 0"),
-    ([-1, 0, 0, 0], ValueError, r"batch must not be negative, got batch\[0\] = -1"),
+    ([0, 0, 1, 0], ValueError, r"must ascend, got batch\[2\] = 1 before 0"),
+    ([-1, 0, 0, 0], ValueError, r"batch must be from 0 on, got batch\[0\] = -1"),
     ([0, 0, 0, 2**62], ValueError, r"batch must be less than 2\*\*62, got batch\[3\]"),
     (np.array([0, 0, 0, 2**64 - 1], dtype=np.uint64), ValueError, r"2\*\*62, got batch\[3\]"),
     ([0, 0, 1], ValueError, r"batch must have shape \(4,\), one number for each point, got \(3,\)"),
@@ -211,7 +227,7 @@ def test_an_object_with_its_own_box(rng):
 def test_bad_numbers_are_named(batch, kind, message):
     for search in (hs.pairs, hs.count_pairs):
         with pytest.raises(kind, match=message):
-            search(np.zeros((4, 3)), 1.0, batch=batch)
+            call(search, np.zeros((4, 3)), 1.0, batch=batch)
 
 
 def stack(entry, system):
@@ -226,13 +242,13 @@ def stack(entry, system):
     (1.0, np.tile(np.eye(3), (2, 1, 1)), r"number of systems .*, 2, got batch\[3\] = 2"),
     ([1.0, 2.0, 3.0], np.tile(np.eye(3), (4, 1, 1)), "same number of systems, got 4 and 3"),
     ([1.0, -2.0, 1.0], None, r"must be finite and not negative, got cutoff\[1\] = -2.0"),
-    (1.0, stack(np.inf, 1), r"box must be finite, got box\[1, 0, 0\] = inf"),
-    (1.0, stack(1.0, 2), r"vectors of box\[2\] must be linearly independent"),
-    (1.0, stack(1.0, 1), r"vectors of box\[1\] must be linearly independent"),
+    (1.0, stack(np.inf, 1), r"box must be finite, got box\[0, 0\] = inf\nin system 1"),
+    (1.0, stack(1.0, 2), r"vectors of box must be linearly independent.*\nin system 2"),
+    (1.0, stack(1.0, 1), r"vectors of box must be linearly independent.*\nin system 1"),
     (1.0, np.ones((3, 3)), "vectors of box must be linearly independent"),
-    (1.0, np.ones((4, 3)), r"or one for each system \(s, d, d\), got \(4, 3\)"),
+    (1.0, np.ones((4, 3)), r"shape \(3,\) or \(3, 3\), or be one length, .* got \(4, 3\)"),
     (1.0, np.ones((4, 3, 2)), r"shape .* one for each system \(s, 3, 3\).* got \(4, 3, 2\)"),
-    (np.ones((2, 2)), None, r"have shape \(s,\), one for each system, got \(2, 2\)"),
+    (np.ones((2, 2)), None, r"a table of cutoffs needs types"),
     (-1.0, None, "cutoff must be finite and not negative, got -1.0"),
 ])  # fmt: skip
 def test_bad_boxes_and_cutoffs_are_named(cutoff, box, message):
@@ -240,43 +256,46 @@ def test_bad_boxes_and_cutoffs_are_named(cutoff, box, message):
     for search in (hs.pairs, hs.count_pairs):
         for threads in (1, 2):
             with pytest.raises(ValueError, match=message):
-                search(np.zeros((4, 3)), cutoff, batch=[0, 0, 0, 2], box=box, threads=threads)
+                call(search, np.zeros((4, 3)), cutoff, batch=[0, 0, 0, 2], box=box, threads=threads)
 
 
 def test_a_bad_coordinate_is_named_by_its_row_among_all(rng):
     points, batch, _ = systems_of(rng, [10, 20, 30])
     points[37, 1] = np.nan
     for search in (hs.pairs, hs.count_pairs):
-        with pytest.raises(ValueError, match=r"points must be finite, got points\[37, 1\] = nan"):
-            search(points, 1.0, batch=batch)
+        with pytest.raises(
+            ValueError, match=r"positions must be finite, got positions\[37, 1\] = nan"
+        ):
+            call(search, points, 1.0, batch=batch)
     points[37, 1] = 2.0**60
     for box in (np.eye(3), np.tile(np.eye(3), (3, 1, 1))):
         with pytest.raises(OverflowError, match=r"points\[37\] lies too many box vectors away"):
-            hs.pairs(points, 1.0, batch=batch, box=box, quantities="S")
+            call(hs.pairs, points, 1.0, batch=batch, box=box, quantities="S")
 
 
 def test_a_result_that_does_not_fit_is_refused(rng):
     points, batch, _ = systems_of(rng, [100] * 200)
-    m = int(hs.count_pairs(points, 10.0, batch=batch).sum())
+    m = int(call(hs.count_pairs, points, 10.0, batch=batch).sum())
     for threads in (1, 2):
         for sort in (False, True):
             options = {"batch": batch, "threads": threads, "sort": sort}
             with pytest.raises(MemoryError):
-                hs.pairs(points, 10.0, memory_limit=8e6, **options)
-            assert len(hs.pairs(points, 10.0, memory_limit=1e9, **options)[0]) == m
+                call(hs.pairs, points, 10.0, memory_limit=8e6, **options)
+            assert len(call(hs.pairs, points, 10.0, memory_limit=1e9, **options)[0]) == m
 
 
 def test_many_systems_do_not_depend_on_threads(rng):
     sizes = rng.integers(0, 60, 10_000)
     points, batch, edge = systems_of(rng, sizes)
     boxes = edge[:, None, None] * np.eye(3)
-    one = hs.pairs(points, 1.1, batch=batch, box=boxes, quantities="ijS", threads=1)
+    one = call(hs.pairs, points, 1.1, batch=batch, box=boxes, quantities="ijS", threads=1)
     for threads in (2, 3, 4):
         assert same_arrays(
-            hs.pairs(points, 1.1, batch=batch, box=boxes, quantities="ijS", threads=threads), one
+            call(hs.pairs, points, 1.1, batch=batch, box=boxes, quantities="ijS", threads=threads),
+            one,
         )
     assert (batch[one[0]] == batch[one[1]]).all()
-    counts = hs.count_pairs(points, 1.1, batch=batch, box=boxes)
+    counts = call(hs.count_pairs, points, 1.1, batch=batch, box=boxes)
     assert counts.tolist() == np.bincount(batch[one[0]], minlength=len(counts)).tolist()
     some = [17, 4000, 9999]
     for s in some:
@@ -298,7 +317,8 @@ import numpy as np
 import halfshell as hs
 points = np.random.default_rng(1).random((600_000, 3))
 batch = np.repeat(np.arange(20_000), 30)
-hs.count_pairs(points[:3000], 0.3, batch=batch[:3000])
+hs.count_pairs(hs.Points(points[:3000], batch=batch[:3000]), 0.3)
+systems = hs.Points(points, batch=batch, box=np.ones(3))
 gc.collect()
 before = resident()
 sent = []
@@ -311,9 +331,8 @@ timer = threading.Timer(0.2, interrupt)
 timer.start()
 try:
     while True:
-        {search}(
-            points, 2.0, batch=batch, box=np.ones(3), threads={threads}, memory_limit=1e13
-        )
+        with hs.settings(memory_limit=1e13):
+            {search}(systems, 2.0, threads={threads})
 except KeyboardInterrupt:
     outcome = "interrupted"
 delay = time.perf_counter() - (sent or [0.0])[0]
@@ -325,3 +344,362 @@ print(json.dumps([outcome, delay, resident() - before]))
     assert outcome == "interrupted"
     assert delay < 2.0 * LIMIT
     assert grown < 60_000_000
+
+
+# ---- axes that repeat, of each system ----------------------------------------------------------
+
+
+N_SYSTEMS = 14
+
+
+class Slabs:
+    def __init__(self, d, has_boxes, seed=0):
+        rng = np.random.default_rng([seed, d])
+        sizes = rng.integers(0, 30, N_SYSTEMS)
+        sizes[4] = 0
+        self.batch = np.repeat(np.arange(N_SYSTEMS), sizes)
+        self.query_batch = np.repeat(np.arange(N_SYSTEMS), 3)
+        self.points = rng.integers(-8, 40, (sizes.sum(), d)) / 8.0
+        self.queries = rng.integers(-8, 40, (3 * N_SYSTEMS, d)) / 8.0
+        self.periodic = rng.integers(0, 2, (N_SYSTEMS, d)).astype(bool)
+        self.periodic[:2] = [[False] * d, [True] * d]
+        boxes = np.eye(d) * 4.0 + rng.integers(-2, 3, (N_SYSTEMS, d, d)) / 4.0
+        self.box = boxes if has_boxes else boxes[0]
+        self.bonds = rng.integers(0, sizes.sum(), (60, 2))
+
+    def parts(self):
+        for s in range(N_SYSTEMS):
+            own, asked = np.flatnonzero(self.batch == s), np.flatnonzero(self.query_batch == s)
+            box = self.box[s] if self.box.ndim == 3 else self.box
+            yield own, asked, {"box": box, "periodic": self.periodic[s]}
+
+
+@pytest.mark.parametrize(
+    ("d", "has_boxes", "threads"),
+    [(1, True, 2), (2, False, 1), (3, True, 1), (3, False, 2), (8, True, 2), (8, False, 1)],
+)
+def test_axes_of_each_system(d, has_boxes, threads):
+    scene = Slabs(d, has_boxes)
+    cutoff = min(1.5 + 0.5 * d, 4.0)
+    periodic = scene.periodic if threads == 1 else scene.periodic.astype(int).tolist()
+    how = {"box": scene.box, "batch": scene.batch, "threads": threads, "periodic": periodic}
+    found = call(hs.pairs, scene.points, cutoff, quantities="ijdS", sort=True, **how)
+    table = call(hs.neighbors, scene.points, cutoff, quantities="jdS", **how)
+    asked = {"queries": scene.queries, "query_batch": scene.query_batch}
+    rows = call(hs.neighbors, scene.points, cutoff, quantities="jdS", **how, **asked)
+    near = call(hs.nearest, scene.points, 3, quantities="jdS", **how, **asked)
+    counts = call(hs.count_pairs, scene.points, cutoff, **how)
+    binned = call(hs.pair_histogram, scene.points, [0.0, 1.0, cutoff], **how)
+    at = row_at = 0
+    for s, (own, asking, one) in enumerate(scene.parts()):
+        first = own[0] if len(own) else 0
+        i, j, length, S = call(
+            hs.pairs, scene.points[own], cutoff, quantities="ijdS", sort=True, **one
+        )
+        part = slice(at, at + len(i))
+        for ours, theirs in zip(found, (i + first, j + first, length, S), strict=True):
+            assert np.array_equal(ours[part], theirs)
+        at += len(i)
+        assert counts[s] == len(i) and binned[s].sum() == len(i)
+        each = call(hs.neighbors, scene.points[own], cutoff, quantities="jdS", **one)
+        many = table[own]
+        assert np.array_equal(many.indices, each.indices + first)
+        assert np.array_equal(many.shifts, each.shifts)
+        assert np.array_equal(many.sort().indices, each.sort().indices + first)
+        mine = scene.queries[asking]
+        each = call(hs.neighbors, scene.points[own], cutoff, queries=mine, quantities="jdS", **one)
+        part = slice(row_at, row_at + each.n_entries)
+        assert np.array_equal(rows.indices[part], each.indices + first)
+        assert np.array_equal(rows.distances[part], each.distances)
+        row_at += each.n_entries
+        j, length, S = call(hs.nearest, scene.points[own], 3, queries=mine, quantities="jdS", **one)
+        assert np.array_equal(near[0][asking], np.where(j < 0, -1, j + first))
+        assert np.array_equal(near[1][asking], length)
+        assert np.array_equal(near[2][asking], S)
+    assert at == len(found[0]) > 50 and row_at == rows.n_entries > 20
+
+
+def test_nearest_images_of_excluded_pairs_are_those_of_each_system():
+    scene = Slabs(3, True, seed=1)
+    found = call(hs.pairs,
+        scene.points, 4.0, box=scene.box, periodic=scene.periodic, batch=scene.batch,
+        exclude=scene.bonds, quantities="ijS", sort=True,
+    )  # fmt: skip
+    at = 0
+    for own, _, one in scene.parts():
+        first = own[0] if len(own) else 0
+        bonds = scene.bonds[np.isin(scene.bonds, own).all(axis=1)] - first
+        i, j, S = call(
+            hs.pairs, scene.points[own], 4.0, exclude=bonds, quantities="ijS", sort=True, **one
+        )
+        part = slice(at, at + len(i))
+        assert np.array_equal(found[0][part], i + first)
+        assert np.array_equal(found[1][part], j + first)
+        assert np.array_equal(found[2][part], S)
+        at += len(i)
+    assert at == len(found[0])
+
+
+def test_rdf_needs_all_axes_of_each():
+    scene = Slabs(3, True, seed=2)
+    how = {"box": scene.box, "batch": scene.batch}
+    every = np.ones((N_SYSTEMS, 3), bool)
+    plain, given = (
+        call(hs.rdf, scene.points, 2.0, 5, **how),
+        call(hs.rdf, scene.points, 2.0, 5, periodic=every, **how),
+    )
+    assert np.array_equal(plain.g, given.g)
+    with pytest.raises(ValueError, match="rdf needs a box that is periodic along every axis"):
+        call(hs.rdf, scene.points, 2.0, 5, periodic=scene.periodic, **how)
+
+
+@pytest.mark.parametrize("search", [hs.pairs, hs.neighbors, hs.count_pairs])
+def test_bad_input(search):
+    points, batch, box = np.zeros((3, 3)), [0, 0, 1], np.array([np.eye(3)] * 2)
+    good = np.ones((2, 3), bool)
+    with pytest.raises(ValueError, match="periodic needs a box"):
+        call(search, points, 1.0, batch=batch, periodic=good)
+    with pytest.raises(ValueError, match=r"these for each system, \(s, 3\), got shape \(2, 2\)"):
+        call(search, points, 1.0, batch=batch, box=box, periodic=good[:, :2])
+    with pytest.raises(ValueError, match="the same number of systems, got 2 and 1"):
+        call(search, points, 1.0, batch=batch, box=box, periodic=good[:1])
+    with pytest.raises(ValueError, match="the same number of systems, got 3 and 2"):
+        call(search, points, [1.0, 1.0], batch=batch, box=np.eye(3), periodic=np.ones((3, 3), bool))
+    with pytest.raises(TypeError, match=r"periodic must hold bools, got dtype.*float64"):
+        call(search, points, 1.0, batch=batch, box=box, periodic=good.astype(float))
+    with pytest.raises(TypeError, match="periodic must hold bools"):
+        call(search, points, 1.0, batch=batch, box=box, periodic=good * 2)
+    with pytest.raises(ValueError, match=r"less than the number of .* periodic .*, 2, got"):
+        call(search, points, 1.0, batch=[0, 1, 2], box=np.eye(3), periodic=good)
+    with pytest.raises(ValueError, match="periodic must be a bool or 3 bools"):
+        call(search, points, 1.0, box=np.eye(3), periodic=good)  # without a batch
+    skewed = box.copy()
+    skewed[1, 2] = 0.0  # of an axis that does not repeat
+    good[1, 2] = False
+    call(search, points, 0.5, batch=batch, box=skewed, periodic=good)
+    good[1, 2] = True
+    with pytest.raises(ValueError, match="vector 2 of box"):
+        call(search, points, 0.5, batch=batch, box=skewed, periodic=good)
+
+
+# ---- radii, types and supports -----------------------------------------------------------------
+
+
+COVER = [(False, 1, True), (True, 3, False)]  # periodic, threads, sort
+FEWER = [30, 0, 1, 2, 7, 64, 65, 0, 0, 200, 30, 3, 0]
+
+
+def known_one_by_one(points, cutoff, batch, n_systems, marks, box=None, **options):
+    """What the batch must give, from single calls: i, j, d, S, and the count of each system."""
+    parts, counts = [], []
+    for s in range(n_systems):
+        first, end = np.searchsorted(batch, [s, s + 1])
+        own = None if box is None else box[s] if np.ndim(box) == 3 else box
+        of_all = ("rule", "extent")
+        given = {k: v if k in of_all else v[first:end] for k, v in marks.items()}
+        within = cutoff[s] if isinstance(cutoff, np.ndarray) and cutoff.ndim == 1 else cutoff
+        i, j, d, S = call(
+            hs.pairs, points[first:end], within, box=own, quantities="ijdS", **given, **options
+        )
+        parts.append((i + first, j + first, d, S))
+        counts.append(len(i))
+    return tuple(np.concatenate(columns) for columns in zip(*parts, strict=True)), counts
+
+
+@pytest.fixture(scope="module")
+def systems():
+    """Points of all systems, their numbers, boxes and radii over a decade."""
+    rng = np.random.default_rng(12)
+    batch = np.repeat(np.arange(len(FEWER)), FEWER)
+    edge = np.maximum(np.asarray(FEWER, dtype=float), 1.0) ** (1.0 / 3.0)
+    points = rng.random((len(batch), 3)) * edge[batch][:, None]
+    boxes = (np.eye(3) + 0.2 * rng.uniform(-1.0, 1.0, (len(FEWER), 3, 3))) * edge[:, None, None]
+    return points, batch, boxes, 10.0 ** rng.uniform(-1.0, 0.0, len(batch))
+
+
+@pytest.mark.parametrize("periodic, threads, sort", COVER)
+@pytest.mark.parametrize("rule", SYMMETRIC)
+def test_radii_are_those_of_single_calls(systems, rule, periodic, threads, sort):
+    points, batch, boxes, radii = systems
+    box = boxes if periodic else None
+    marks = {"radii": radii, "rule": rule}
+    for cutoff in (None, 0.7, np.linspace(0.2, 1.2, len(FEWER))):
+        expected, counts = known_one_by_one(
+            points, cutoff, batch, len(FEWER), marks, box, sort=sort
+        )
+        found = call(hs.pairs,
+            points, cutoff, batch=batch, box=box, quantities="ijdS", sort=sort, threads=threads,
+            **marks,
+        )  # fmt: skip
+        assert same_arrays(found, expected)
+        by_system = call(
+            hs.count_pairs, points, cutoff, batch=batch, box=box, threads=threads, **marks
+        )
+        assert by_system.tolist() == counts[: len(by_system)]
+        assert not any(counts[len(by_system) :])
+
+
+def test_types_are_those_of_single_calls(systems):
+    for threads in (1, 3):
+        points, batch, boxes, _ = systems
+        types = np.random.default_rng(1).integers(0, 3, len(points))
+        table = np.array([[0.2, 0.9, 0.5], [0.9, 1.1, 0.0], [0.5, 0.0, 0.7]])
+        for cutoff in (table, {(0, 1): 1.0, (2, 2): 0.5}):
+            for box in (None, boxes):
+                expected, counts = known_one_by_one(
+                    points, cutoff, batch, len(FEWER), {"types": types}, box, sort=True
+                )
+                found = call(hs.pairs,
+                    points, cutoff, types=types, batch=batch, box=box, quantities="ijdS", sort=True,
+                    threads=threads,
+                )  # fmt: skip
+                assert same_arrays(found, expected)
+                by_system = call(hs.count_pairs, points, cutoff, types=types, batch=batch, box=box)
+                assert by_system.tolist() == counts[: len(by_system)]
+
+
+def needles(rng, n, d, aspect):
+    """Supports turned every way, which reach 0.3 to 1.2."""
+    axes = np.linalg.qr(rng.standard_normal((n, d, d)))[0]
+    values = rng.uniform(0.8, 3.0, (n, 1)) * aspect ** rng.random((n, d))
+    H = np.einsum("kab,kb,kcb->kac", axes, values, axes)
+    return (H + H.transpose(0, 2, 1)) / 2.0
+
+
+@pytest.mark.parametrize("periodic, threads, sort", COVER)
+@pytest.mark.parametrize("rule", ["max", "min"])
+def test_supports_are_those_of_single_calls(systems, rule, periodic, threads, sort):
+    points, batch, boxes, _ = systems
+    box = boxes if periodic else None
+    for aspect in (1.5, 1e3):
+        H = needles(np.random.default_rng(8), len(points), 3, aspect)
+        marks = {"supports": H, "extent": 1.0, "rule": rule}
+        expected, counts = known_one_by_one(points, None, batch, len(FEWER), marks, box, sort=sort)
+        assert sum(counts) > (20 if aspect < 2.0 else -1)
+        how = {"batch": batch, "box": box, "threads": threads, **marks}
+        found = call(hs.pairs, points, None, quantities="ijdS", sort=sort, **how)
+        assert same_arrays(found, expected)
+        by_system = call(hs.count_pairs, points, None, **how)
+        assert by_system.tolist() == counts[: len(by_system)]
+        assert not any(counts[len(by_system) :])
+
+
+@pytest.mark.parametrize(("d", "dtype"), [(1, np.float64), (2, np.float32), (3, np.float64)])
+def test_supports_of_a_batch_in_each_dimension_and_kernel(d, dtype):
+    rng = np.random.default_rng(d)
+    batch = np.sort(rng.integers(0, 40, 600)) + 3
+    points = (rng.random((600, d)) * 3.0).astype(dtype)
+    points[5] = points[4]
+    for rule, extent in (("max", 0.7), ("min", 1.4), ("max", 0.0)):
+        marks = {"supports": needles(rng, 600, d, 10.0), "extent": extent, "rule": rule}
+        expected, counts = known_one_by_one(points, None, batch, 43, marks, np.eye(d) * 3.0)
+        how = {"batch": batch, "box": [3.0] * d, **marks}
+        for kernel in hs.kernels():
+            found = call(hs.pairs, points, None, quantities="ijdS", kernel=kernel, **how)
+            assert same_arrays(found, expected)
+        assert call(hs.count_pairs, points, None, **how).tolist() == counts
+
+
+def test_the_needles_of_a_batch_are_decided_exactly():
+    scene = scenes.load("needles", "small")
+    expected = call(hs.pairs, **scene.arguments, sort=True)
+    assert len(expected[0]) > 20
+    points, H = np.tile(scene.points, (3, 1)), np.tile(scene.supports, (3, 1, 1))
+    n = scene.n_points
+    found = call(hs.pairs,
+        points, None, box=scene.box, supports=H, extent=scene.extent, rule=scene.rule,
+        batch=np.repeat([0, 4, 5], n), sort=True,
+    )  # fmt: skip
+    for column, one in zip(found, expected, strict=True):
+        assert np.array_equal(column, np.concatenate([one, one + n, one + 2 * n]))
+
+
+def test_every_algorithm_finds_them(systems):
+    for algorithm in ("all-pairs", "grid", "hash", "hierarchy"):
+        points, batch, boxes, radii = systems
+        H = needles(np.random.default_rng(2), len(points), 3, 5.0)
+        for marks in ({"radii": radii}, {}, {"supports": H, "extent": 1.0}):
+            cutoff = None if marks else 1.1
+            expected, _ = known_one_by_one(
+                points, cutoff, batch, len(FEWER), marks, boxes, algorithm=algorithm
+            )
+            found = call(
+                hs.pairs,
+                points,
+                cutoff,
+                batch=batch,
+                box=boxes,
+                quantities="ijdS",
+                algorithm=algorithm,
+                **marks,
+            )
+            assert same_arrays(found, expected)
+
+
+def test_balls_of_a_batch_touch_by_rational_arithmetic():
+    rng = np.random.default_rng(3)
+    radii = rng.choice([0.1, 0.2, 0.3, 0.7], 60)
+    points = np.round(rng.uniform(0.0, 1.5, (60, 2)), 1)
+    batch = np.repeat([2, 3, 9], 20)
+    expected = set()
+    for i in range(60):
+        for j in range(i + 1, 60):
+            D = [Fraction(float(b)) - Fraction(float(a)) for a, b in zip(points[i], points[j])]
+            reach = Fraction(float(radii[i])) + Fraction(float(radii[j]))
+            if batch[i] == batch[j] and sum(x * x for x in D) <= reach * reach:
+                expected.add((i, j))
+    i, j = call(hs.pairs, points, None, radii=radii, batch=batch)
+    assert len(expected) > 50 and set(zip(i.tolist(), j.tolist())) == expected
+
+
+def test_memory_and_bytes_are_the_callers(systems):
+    points, batch, _, radii = systems
+    i, j = call(hs.pairs, points, None, radii=radii, batch=batch, index_dtype=np.int32)
+    out = np.empty(1000, np.int32), np.empty(1000, np.int32)
+    a, b = call(hs.pairs, points, None, radii=radii, batch=batch, index_dtype=np.int32, out=out)
+    assert same_arrays((a, b), (i, j)) and a.base is out[0]
+    with pytest.raises(hs.CapacityError):
+        call(
+            hs.pairs,
+            points,
+            None,
+            radii=radii,
+            batch=batch,
+            quantities="i",
+            out=np.empty(3, np.int64),
+        )
+    with pytest.raises(MemoryError):
+        call(hs.pairs, points, None, radii=radii, batch=batch, memory_limit=1000)
+
+
+def test_what_is_wrong_is_named(systems):
+    points, batch, _, radii = systems
+    bad = radii.copy()
+    bad[40] = -1.0
+    refused = [
+        ({"radii": bad}, r"radii\[40\] = -1"),
+        ({"radii": radii[:-1]}, "radii must have shape"),
+        ({"radii": radii, "rule": "gather"}, "has a direction"),
+        ({"rule": "sum"}, "rule needs radii|cutoff must"),
+        ({"types": np.zeros(len(points), int)}, "cutoff must"),
+        ({"supports": -np.tile(np.eye(3), (len(points), 1, 1)), "extent": 1.0}, r"supports\[0\]"),
+    ]
+    for marks, message in refused:
+        with pytest.raises((TypeError, ValueError), match=message):
+            call(hs.pairs, points, None, batch=batch, **marks)
+    cutoffs = np.ones(len(FEWER))
+    cutoffs[5] = -2.0
+    with pytest.raises(ValueError, match=r"cutoff\[5\]|cutoff.*-2"):
+        call(hs.pairs, points, cutoffs, radii=radii, batch=batch)
+    with pytest.raises(ValueError, match="a table of cutoffs needs types"):
+        call(hs.pairs, points, np.ones((2, 2)), radii=radii, batch=batch)
+
+
+def test_no_points_are_no_pairs():
+    nothing, batch = np.zeros((0, 3)), np.zeros(0, int)
+    supports = {"cutoff": None, "supports": np.zeros((0, 3, 3)), "extent": 1.0}
+    for given in (
+        {"cutoff": None, "radii": []}, {"cutoff": np.ones((1, 1)), "types": []}, supports
+    ):  # fmt: skip
+        i, j = call(hs.pairs, nothing, batch=batch, **given)
+        assert len(i) == len(j) == 0

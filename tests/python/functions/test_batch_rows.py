@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 
 KINDS = ["open", "shared box", "boxes", "cutoffs", "boxes and cutoffs"]
 
@@ -96,13 +97,16 @@ def test_rows_are_those_of_one_call_each(kind, d, threads):
             asked_tables.append((hs.neighbors(
                 scene.points[own], cutoff, queries=scene.queries[asked], box=box,
                 quantities=quantities), first))  # fmt: skip
-        found = hs.neighbors(scene.points, scene.cutoff, quantities=quantities, **how)
+        found = call(hs.neighbors, scene.points, scene.cutoff, quantities=quantities, **how)
         check_table(found, tables)
-        assert hs.coordination(scene.points, scene.cutoff, **how).tolist() == found.counts.tolist()
+        assert (
+            call(hs.coordination, scene.points, scene.cutoff, **how).tolist()
+            == found.counts.tolist()
+        )
         asked = dict(how, queries=scene.queries, query_batch=scene.query_batch)
-        rows = hs.neighbors(scene.points, scene.cutoff, quantities=quantities, **asked)
+        rows = call(hs.neighbors, scene.points, scene.cutoff, quantities=quantities, **asked)
         check_table(rows, asked_tables)
-        counts = hs.coordination(scene.points, scene.cutoff, **asked)
+        counts = call(hs.coordination, scene.points, scene.cutoff, **asked)
         assert counts.tolist() == rows.counts.tolist()
         assert found.n_entries > 0 and rows.n_entries > 0
 
@@ -132,25 +136,18 @@ def test_pairs_between_are_those_of_one_call_each(kind, index_dtype):
             column.append(values)
     expected = [np.concatenate(column) for column in expected]
     args = scene.queries, scene.points, scene.cutoff
-    for one, other in zip(hs.pairs_between(*args, **how), expected, strict=True):
+    for one, other in zip(call(hs.pairs_between, *args, **how), expected, strict=True):
         assert np.array_equal(one, other)
     m = len(expected[0])
     out = tuple(
         np.full_like(c, 7, dtype=index_dtype if k in (0, 1, 5) else None)
         for k, c in enumerate(np.concatenate((c, c)) for c in expected)
     )
-    filled = hs.pairs_between(*args, out=out, **how)
+    filled = call(hs.pairs_between, *args, out=out, **how)
     for one, whole, other in zip(filled, out, expected, strict=True):
         assert np.array_equal(one, other) and (whole[m:] == 7).all()
-    *arrays, needed = hs.pairs_between(*args, capacity=m + 5, on_overflow="flag", **how)
-    assert needed == m and all(len(one) == m + 5 for one in arrays)
-    assert all(np.array_equal(one[:m], other) for one, other in zip(arrays, expected, strict=True))
     with pytest.raises(hs.CapacityError):
-        hs.pairs_between(*args, capacity=m - 1, **how)
-    with pytest.raises(ValueError, match="share memory with query_batch"):
-        hs.pairs_between(
-            *args, **{**how, "quantities": "i", "index_dtype": np.int64}, out=scene.query_batch
-        )
+        call(hs.pairs_between, *args, out=tuple(one[: m - 1] for one in out), **how)
 
 
 @pytest.mark.parametrize(
@@ -168,22 +165,22 @@ def test_radii_and_rules(kind, rule):
             "radii": scene.radii[own], "rule": rule, "box": box, "quantities": "jdS",
         }  # fmt: skip
         limit = None if cutoff is None else own_cutoff
-        tables.append((hs.neighbors(scene.points[own], limit, **each), first))
+        tables.append((call(hs.neighbors, scene.points[own], limit, **each), first))
         both = {**each, "queries": scene.queries[asked], "query_radii": scene.query_radii[asked]}
         both = {name: values for name, values in both.items() if name != unused}
-        asked_tables.append((hs.neighbors(scene.points[own], limit, **both), first))
+        asked_tables.append((call(hs.neighbors, scene.points[own], limit, **both), first))
     how = {
         "radii": scene.radii, "rule": rule, "box": scene.box, "quantities": "jdS",
         "batch": scene.batch,
     }  # fmt: skip
-    found = hs.neighbors(scene.points, cutoff, **how)
+    found = call(hs.neighbors, scene.points, cutoff, **how)
     check_table(found, tables)
     how |= {
         "queries": scene.queries, "query_radii": scene.query_radii,
         "query_batch": scene.query_batch,
     }  # fmt: skip
     how.pop(unused, None)
-    check_table(hs.neighbors(scene.points, cutoff, **how), asked_tables)
+    check_table(call(hs.neighbors, scene.points, cutoff, **how), asked_tables)
     if rule in ("gather", "scatter"):
         with pytest.raises(ValueError, match="direction"):
             found.reverse()
@@ -225,23 +222,23 @@ def test_selections(kind, what):
         each = {"box": box, "quantities": "jS"}
         bonds = scene.among(own, scene.bonds)
         tables.append(
-            (hs.neighbors(scene.points[own], cutoff, **chosen(own, bonds), **each), first)
+            (call(hs.neighbors, scene.points[own], cutoff, **chosen(own, bonds), **each), first)
         )
         mine = between[np.isin(between[:, 0], asked) & np.isin(between[:, 1], own)]
         mine = mine - [asked[0] if len(asked) else 0, first]
-        asked_tables.append((hs.neighbors(
+        asked_tables.append((call(hs.neighbors,
             scene.points[own], cutoff, queries=scene.queries[asked], **each,
             **chosen(own, mine), **asked_chosen(asked)), first))  # fmt: skip
     how = {"box": scene.box, "quantities": "jS", "batch": scene.batch}
     every = slice(None)
-    found = hs.neighbors(scene.points, scene.cutoff, **how, **chosen(every, scene.bonds))
+    found = call(hs.neighbors, scene.points, scene.cutoff, **how, **chosen(every, scene.bonds))
     check_table(found, tables)
-    rows = hs.neighbors(
+    rows = call(hs.neighbors,
         scene.points, scene.cutoff, queries=scene.queries, query_batch=scene.query_batch, **how,
         **chosen(every, between), **asked_chosen(every),
     )  # fmt: skip
     check_table(rows, asked_tables)
-    half = hs.pairs(scene.points, scene.cutoff, box=scene.box, batch=scene.batch,
+    half = call(hs.pairs, scene.points, scene.cutoff, box=scene.box, batch=scene.batch,
                     **chosen(every, scene.bonds))  # fmt: skip
     assert 2 * len(half[0]) == found.n_entries
 
@@ -258,7 +255,7 @@ def test_nearest_of_each(kind, threads):
             "quantities": "jdDS",
         }  # fmt: skip
         for columns, queries in ((expected, None), (asked_expected, scene.queries[asked])):
-            found = hs.nearest(scene.points[own], 5, queries=queries, **each)
+            found = call(hs.nearest, scene.points[own], 5, queries=queries, **each)
             for column, values in zip(columns, found, strict=True):
                 is_number = values.dtype == np.int64
                 column.append(np.where(values < 0, -1, values + first) if is_number else values)
@@ -266,12 +263,14 @@ def test_nearest_of_each(kind, threads):
         "max_distance": limit, "box": scene.box, "quantities": "jdDS", "batch": scene.batch,
         "threads": threads,
     }  # fmt: skip
-    for one, columns in zip(hs.nearest(scene.points, 5, **how), expected, strict=True):
+    for one, columns in zip(call(hs.nearest, scene.points, 5, **how), expected, strict=True):
         assert np.array_equal(one, np.concatenate(columns), equal_nan=one.dtype.kind == "f")
     asked = dict(how, queries=scene.queries, query_batch=scene.query_batch, index_dtype=np.int32)
-    for one, columns in zip(hs.nearest(scene.points, 5, **asked), asked_expected, strict=True):
+    for one, columns in zip(
+        call(hs.nearest, scene.points, 5, **asked), asked_expected, strict=True
+    ):
         assert np.array_equal(one, np.concatenate(columns), equal_nan=one.dtype.kind == "f")
-    assert len(hs.nearest(scene.points, 2, batch=scene.batch)[0]) == len(scene.points)
+    assert len(call(hs.nearest, scene.points, 2, batch=scene.batch)[0]) == len(scene.points)
 
 
 @pytest.mark.parametrize(
@@ -301,8 +300,8 @@ def test_histograms_of_each(kind, marks):
 
     every = slice(None)
     how = {"box": scene.box, "batch": scene.batch}
-    found = hs.pair_histogram(scene.points, edges, **how, **of(every))
-    asked_found = hs.pair_histogram(
+    found = call(hs.pair_histogram, scene.points, edges, **how, **of(every))
+    asked_found = call(hs.pair_histogram,
         scene.points, edges, queries=scene.queries, query_batch=scene.query_batch, **how,
         **of(every, every),
     )  # fmt: skip
@@ -313,8 +312,8 @@ def test_histograms_of_each(kind, marks):
     for s, own, asked, _ in scene.parts():
         box, _ = scene.at(s)
         for whole, one in (
-            (found, hs.pair_histogram(scene.points[own], edges, box=box, **of(own))),
-            (asked_found, hs.pair_histogram(
+            (found, call(hs.pair_histogram, scene.points[own], edges, box=box, **of(own))),
+            (asked_found, call(hs.pair_histogram,
                 scene.points[own], edges, queries=scene.queries[asked], box=box,
                 **of(own, asked))),
         ):  # fmt: skip
@@ -342,18 +341,18 @@ def test_rdf_is_that_of_all_frames(kind, has_types, has_queries):
         whole["queries"], whole["query_batch"] = scene.queries, scene.query_batch
         if has_types:
             whole["query_types"] = np.array(["O", "Si", "H"])[scene.query_labels]
-    found = hs.rdf(scene.points, 1.5, 6, box=scene.box, batch=scene.batch, **whole)
+    found = call(hs.rdf, scene.points, 1.5, 6, box=scene.box, batch=scene.batch, **whole)
     each = []
     for s, own, asked, _ in scene.parts():
         if len(own) + (len(asked) if has_queries else 0) == 0:
             continue
         part = {k: v[own if k == "types" else asked] for k, v in whole.items()}
         part.pop("query_batch", None)
-        each.append(hs.rdf(scene.points[own], 1.5, 6, box=scene.at(s)[0], **part))
+        each.append(call(hs.rdf, scene.points[own], 1.5, 6, box=scene.at(s)[0], **part))
     expected = sum(each)
     assert np.array_equal(found.counts, expected.counts) and found.types == expected.types
     assert np.allclose(found.g, expected.g, rtol=1e-13, atol=0.0)
-    assert np.allclose(found.n_r, expected.n_r, rtol=1e-13, atol=0.0)
+    assert np.allclose(found.n, expected.n, rtol=1e-13, atol=0.0)
     assert found.n_frames == len(each)
     assert found.g.max() > 0.5
 
@@ -362,27 +361,37 @@ def test_coordination_by_type():
     scene = Scene("boxes and cutoffs", seed=8)
     names = np.array(["H", "O", "Si"])[scene.labels]
     how = {"box": scene.box, "batch": scene.batch}
-    found = hs.coordination(scene.points, scene.cutoff, types=names, **how)
-    asked = hs.coordination(
-        scene.points, scene.cutoff, types=names, queries=scene.queries,
+    found = call(hs.coordination, scene.points, scene.cutoff, types=names, by_type=True, **how)
+    asked = call(hs.coordination,
+        scene.points, scene.cutoff, types=names, by_type=True, queries=scene.queries,
         query_batch=scene.query_batch, **how,
     )  # fmt: skip
     for s, own, rows, _ in scene.parts():
         box, cutoff = scene.at(s)
         if len(set(names[own])) == 3:
-            one = hs.coordination(scene.points[own], cutoff, types=names[own], box=box)
+            one = call(
+                hs.coordination, scene.points[own], cutoff, types=names[own], by_type=True, box=box
+            )
             assert np.array_equal(found[own], one)
-            one = hs.coordination(
-                scene.points[own], cutoff, types=names[own], box=box, queries=scene.queries[rows]
+            one = call(
+                hs.coordination,
+                scene.points[own],
+                cutoff,
+                types=names[own],
+                by_type=True,
+                box=box,
+                queries=scene.queries[rows],
             )
             assert np.array_equal(asked[rows], one)
     table = np.array([[0.5, 1.0, 0.8], [1.0, 0.2, 1.2], [0.8, 1.2, 1.5]])
     numbers = {"types": scene.labels, "box": scene.box, "batch": scene.batch}
-    by_type = hs.coordination(scene.points, table, by_type=True, **numbers)
-    assert np.array_equal(by_type.sum(axis=1), hs.coordination(scene.points, table, **numbers))
+    by_type = call(hs.coordination, scene.points, table, by_type=True, **numbers)
+    assert np.array_equal(
+        by_type.sum(axis=1), call(hs.coordination, scene.points, table, **numbers)
+    )
     assert by_type.shape == (len(scene.points), 3) and by_type.any()
     with pytest.raises(ValueError, match="by_type needs types"):
-        hs.coordination(scene.points, 1.0, batch=scene.batch, by_type=True)
+        call(hs.coordination, scene.points, 1.0, batch=scene.batch, by_type=True)
 
 
 @pytest.mark.parametrize("kind, quantities", [*zip(KINDS, ("jd", "jdS", "jdS", "jd", "jd"))])
@@ -395,8 +404,8 @@ def test_tables_are_sorted_by_distance_exactly(kind, quantities):
     scene.cutoffs += 1.5
     scene.box = scene.boxes if scene.has_boxes else scene.box
     cutoff = scene.cutoffs if scene.has_cutoffs else 2.5
-    found = hs.neighbors(
-        scene.points, cutoff, box=scene.box, batch=scene.batch, quantities=quantities
+    found = call(
+        hs.neighbors, scene.points, cutoff, box=scene.box, batch=scene.batch, quantities=quantities
     )
     again = pickle.loads(pickle.dumps(found))
     rows = np.array([5, 3, 40, 41, 3])
@@ -423,79 +432,116 @@ def test_bad_input():
     queries, asked = np.zeros((2, 3)), np.array([0, 2])
     for search in (hs.neighbors, hs.coordination, lambda p, c, **h: hs.nearest(p, 2, **h),
                    lambda p, c, **h: hs.pair_histogram(p, [0.0, 1.0], **h)):  # fmt: skip
-        with pytest.raises(ValueError, match="query_batch needs batch"):
-            search(points, 1.0, queries=queries, query_batch=asked)
-        for given in ({"queries": queries}, {"query_batch": asked}):
-            with pytest.raises(ValueError, match="queries and query_batch must be given together"):
-                search(points, 1.0, batch=batch, **given)
-        with pytest.raises(ValueError, match=r"batch must be ascending, got batch\[0\] = 1 before"):
-            search(points, 1.0, batch=[1, 0, 1, 2])
-        with pytest.raises(ValueError, match=r"query_batch must be ascending, got query_b"):
-            search(points, 1.0, batch=batch, queries=queries, query_batch=[2, 0])
-        with pytest.raises(ValueError, match=r"query_batch must not be negative"):
-            search(points, 1.0, batch=batch, queries=queries, query_batch=[-2, 0])
-        with pytest.raises(ValueError, match=r"shape .2,., one number for each q"):
-            search(points, 1.0, batch=batch, queries=queries, query_batch=[0])
-        with pytest.raises(TypeError, match="query_batch must hold integers"):
-            search(points, 1.0, batch=batch, queries=queries, query_batch=[0.0, 1.0])
+        with pytest.raises(ValueError, match="queries have a batch, and points have none"):
+            call(search, points, 1.0, queries=queries, query_batch=asked)
+        with pytest.raises(ValueError, match="points have a batch, and queries have none"):
+            call(search, points, 1.0, batch=batch, queries=queries)
+        with pytest.raises(ValueError, match=r"batch must ascend, got batch\[0\] = 1 before 0"):
+            call(search, points, 1.0, batch=[1, 0, 1, 2])
+        with pytest.raises(ValueError, match=r"batch must ascend, got batch"):
+            call(search, points, 1.0, batch=batch, queries=queries, query_batch=[2, 0])
+        with pytest.raises(ValueError, match="batch must be from 0 on"):
+            call(search, points, 1.0, batch=batch, queries=queries, query_batch=[-2, 0])
+        with pytest.raises(ValueError, match=r"shape .2,., one number for each"):
+            call(search, points, 1.0, batch=batch, queries=queries, query_batch=[0])
+        with pytest.raises(TypeError, match="batch must hold integers"):
+            call(search, points, 1.0, batch=batch, queries=queries, query_batch=[0.0, 1.0])
         with pytest.raises(ValueError, match="same number of columns"):
-            search(points, 1.0, batch=batch, queries=np.zeros((2, 2)), query_batch=asked)
-        with pytest.raises(ValueError, match=r"query_batch must be less than the number of"):
-            search(points, 1.0, batch=batch, queries=queries, query_batch=[0, 3],
+            call(search, points, 1.0, batch=batch, queries=np.zeros((2, 2)), query_batch=asked)
+        with pytest.raises(ValueError, match=r"batch must be less than the number of"):
+            call(search, points, 1.0, batch=batch, queries=queries, query_batch=[0, 3],
                    box=np.array([np.eye(3)] * 3))  # fmt: skip
         worse = points.copy()
         worse[3, 1] = np.nan
-        with pytest.raises(ValueError, match=r"points\[3, 1\] = nan"):
-            search(worse, 1.0, batch=batch)
+        with pytest.raises(ValueError, match=r"positions\[3, 1\] = nan"):
+            call(search, worse, 1.0, batch=batch)
         asking = queries.copy()
         asking[1, 2] = np.inf
-        with pytest.raises(ValueError, match=r"queries\[1, 2\] = inf"):
-            search(points, 1.0, batch=batch, queries=asking, query_batch=asked)
+        with pytest.raises(ValueError, match=r"positions\[1, 2\] = inf"):
+            call(search, points, 1.0, batch=batch, queries=asking, query_batch=asked)
         with pytest.raises(ValueError, match=r"box"):
-            search(points, 1.0, batch=batch, box=np.array([np.eye(3), np.eye(3), np.zeros((3, 3))]))
-        atoms = pytest.importorskip("ase").Atoms("H", positions=[[0.0, 0.0, 0.0]])
-        with pytest.raises(ValueError, match="queries must be an array"):
-            search(points, 1.0, batch=batch, queries=atoms, query_batch=[0])
+            call(
+                search,
+                points,
+                1.0,
+                batch=batch,
+                box=np.array([np.eye(3), np.eye(3), np.zeros((3, 3))]),
+            )
     for search in (hs.neighbors, hs.coordination):
-        with pytest.raises(ValueError, match="indices cannot be combined with batch"):
-            search(points, 1.0, batch=batch, indices=[0])
         with pytest.raises(ValueError, match=r"radii.*radii\[2\] = -1"):
-            search(points, None, batch=batch, radii=[1.0, 1.0, -1.0, 1.0])
+            call(search, points, None, batch=batch, radii=[1.0, 1.0, -1.0, 1.0])
         with pytest.raises(ValueError, match="cutoff"):
-            search(points, -1.0, batch=batch)
+            call(search, points, -1.0, batch=batch)
         with pytest.raises(ValueError, match="cutoff"):
-            search(points[:0], -1.0, batch=batch[:0])
+            call(search, points[:0], -1.0, batch=batch[:0])
         with pytest.raises(ValueError, match="cutoff"):
-            search(points, [1.0, -1.0, 1.0], batch=batch)
+            call(search, points, [1.0, -1.0, 1.0], batch=batch)
     with pytest.raises(ValueError, match=r"max_distance\[1\] = -1"):
-        hs.nearest(points, 2, batch=batch, max_distance=[1.0, -1.0, 1.0])
+        call(hs.nearest, points, 2, batch=batch, max_distance=[1.0, -1.0, 1.0])
     with pytest.raises(ValueError, match=r"max_distance must be a number or"):
-        hs.nearest(points, 2, batch=batch, max_distance=np.ones((2, 2)))
+        call(hs.nearest, points, 2, batch=batch, max_distance=np.ones((2, 2)))
     with pytest.raises(ValueError, match="rdf needs a box"):
-        hs.rdf(points, 1.0, batch=batch)
+        call(hs.rdf, points, 1.0, batch=batch)
     with pytest.raises(MemoryError):
-        hs.pair_histogram(points, [0.0, 1.0], batch=[0, 0, 1, 2**40])
-    assert hs.pair_histogram(points, [0.0, 1.0], batch=[0, 0, 1, 2**10]).shape == (1025, 1)
+        call(hs.pair_histogram, points, [0.0, 1.0], batch=[0, 0, 1, 2**40])
+    assert call(hs.pair_histogram, points, [0.0, 1.0], batch=[0, 0, 1, 2**10]).shape == (1025, 1)
 
 
 def test_systems_before_the_first_that_has_points_are_empty():
     points = np.array([[0.0], [0.5], [0.0], [0.5], [0.9]])
-    found = hs.pair_histogram(points, [0.0, 1.0], batch=[1, 1, 3, 3, 3])
+    found = call(hs.pair_histogram, points, [0.0, 1.0], batch=[1, 1, 3, 3, 3])
     assert found.tolist() == [[0], [1], [0], [3]]
 
 
 def test_nothing():
     none = np.zeros((0, 3))
     batch = np.zeros(0, int)
-    assert len(hs.neighbors(none, 1.0, batch=batch)) == 0
-    assert hs.coordination(none, 1.0, batch=batch).shape == (0,)
-    assert hs.nearest(none, 2, batch=batch)[0].shape == (0, 2)
-    assert hs.pair_histogram(none, [0.0, 1.0], batch=batch).shape == (0, 1)
-    rows = hs.neighbors(none, 1.0, batch=batch, queries=np.zeros((2, 3)), query_batch=[4, 9])
+    assert len(call(hs.neighbors, none, 1.0, batch=batch)) == 0
+    assert call(hs.coordination, none, 1.0, batch=batch).shape == (0,)
+    assert call(hs.nearest, none, 2, batch=batch)[0].shape == (0, 2)
+    assert call(hs.pair_histogram, none, [0.0, 1.0], batch=batch).shape == (0, 1)
+    rows = call(hs.neighbors, none, 1.0, batch=batch, queries=np.zeros((2, 3)), query_batch=[4, 9])
     assert rows.counts.tolist() == [0, 0]
-    j, d = hs.nearest(none, 2, batch=batch, queries=np.zeros((2, 3)), query_batch=[4, 9])
+    j, d = call(hs.nearest, none, 2, batch=batch, queries=np.zeros((2, 3)), query_batch=[4, 9])
     assert (j == -1).all() and np.isinf(d).all()
-    i, _ = hs.pairs_between(np.zeros((2, 3)), none, 1.0, batch=batch, query_batch=[0, 0])
+    i, _ = call(hs.pairs_between, np.zeros((2, 3)), none, 1.0, batch=batch, query_batch=[0, 0])
     assert i.size == 0
-    empty = hs.rdf(none, 1.0, box=np.eye(3), batch=batch)
+    empty = call(hs.rdf, none, 1.0, box=np.eye(3), batch=batch)
     assert empty.counts.sum() == 0 and np.isfinite(empty.g).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_counts_and_streams_of_each(kind):
+    scene = Scene(kind, seed=12)
+    points = hs.Points(scene.points, box=scene.box, batch=scene.batch)
+    queries = hs.Points(scene.queries, batch=scene.query_batch)
+    some = np.random.default_rng(2).permutation(len(scene.points))[:30]
+    asked_counts = hs.count_pairs(points, scene.cutoff, queries=queries)
+    some_counts = hs.count_pairs(points, scene.cutoff, indices=some)
+    found = hs.pairs(points, scene.cutoff, indices=some, quantities="ijd", sort=True)
+    rows = hs.neighbors(points, scene.cutoff, indices=some)
+    at, first_asked = 0, 0
+    for s, own, asked, first in scene.parts():
+        box, cutoff = scene.at(s)
+        one, mine = hs.Points(scene.points[own], box=box), some[np.isin(some, own)] - first
+        expected = hs.pairs(one, cutoff, indices=mine, quantities="ijd", sort=True)
+        part = slice(at, at + len(expected[0]))
+        for ours, theirs, more in zip(found, expected, (first, first, 0)):
+            assert np.array_equal(ours[part], theirs + more)
+        at = part.stop
+        counted = hs.count_pairs(one, cutoff, queries=scene.queries[asked])
+        for counts, count in ((some_counts, len(expected[0])), (asked_counts, counted)):
+            assert (counts[s] if s < len(counts) else 0) == count
+        first_asked += len(asked)
+    assert at == len(found[0]) == some_counts.sum() > 10
+    table = hs.neighbors(points, scene.cutoff)
+    assert all(np.array_equal(rows[k], table[i]) for k, i in enumerate(some))
+    for most in (17, 1 << 20):
+        blocks = list(hs.iter_pairs(points, scene.cutoff, quantities="ijd", max_pairs=most))
+        assert all(len(block[0]) <= most for block in blocks)
+        joined = [np.concatenate(column) for column in zip(*blocks)]
+        order = np.lexsort(joined[::-1])
+        whole = hs.pairs(points, scene.cutoff, quantities="ijd")
+        assert len(joined[0]) == len(whole[0])
+        for ours, theirs in zip(joined, whole):
+            assert np.array_equal(ours[order], theirs[np.lexsort(whole[::-1])])

@@ -95,10 +95,11 @@ def test_a_box_that_no_cutoff_of_0_can_be_searched_in():
 @pytest.mark.parametrize("inclusive", [False, True])
 def test_rules_and_quantities(inclusive):
     points, cutoff, options = SCENES["on the cuts"]
-    how = {"inclusive": inclusive, "threads": 2, "kernel": "scalar"}
+    how = {"inclusive": inclusive, "threads": 2}
     whole = hs.pairs(points, cutoff, sort=True, quantities="P", **options, **how)
     parts = hs.bricks(points, cutoff, 5, **options)
-    found = np.concatenate([part.pairs(points, quantities="P", **how) for part in parts])
+    with hs.settings(kernel="scalar"):
+        found = np.concatenate([part.pairs(points, quantities="P", **how) for part in parts])
     assert sorted(map(tuple, found.tolist())) == sorted(map(tuple, whole.tolist()))
     assert sum(part.count_pairs(points, **how) for part in parts) == len(whole)
     assert [len(part.pairs(points, quantities="d", **how)) for part in parts] == [
@@ -163,3 +164,69 @@ def test_bad_boxes_and_other_points():
             part.pairs(bad)
     with pytest.raises(ValueError, match="quantities"):
         part.pairs(np.zeros((10, 1)), quantities="x")
+
+
+@pytest.mark.parametrize("name", brick_scenes.known_scenes())
+def test_what_is_known_of_points_goes_with_them(name):
+    known, cutoff, scene, which = brick_scenes.known_scenes()[name]
+    points = hs.Points(**known, **scene)
+    rule = {key: value for key, value in which.items() if key == "rule"}
+    rest = {key: value for key, value in which.items() if key != "rule"}
+    whole = hs.pairs(points, cutoff, quantities="ijdDS", sort=True, **which)
+    assert len(whole[0])
+    table = hs.neighbors(points, cutoff, quantities="jd", **which)
+    for n in (1, 5):
+        parts = hs.bricks(points, cutoff, n, **rule)
+        found = [part.pairs(points, quantities="ijdDSP", **rest) for part in parts]
+        columns = brick_scenes.in_order([np.concatenate(column) for column in zip(*found)])
+        assert brick_scenes.same(columns[:5], whole)
+        assert sum(part.count_pairs(points, **rest) for part in parts) == len(whole[0])
+        for part in pickle.loads(pickle.dumps(list(parts))):
+            some = hs.Points(**brick_scenes.rows_of(known, part.members))  # with names of its own
+            rows = part.neighbors(some, quantities="jd", **rest)
+            expected = table[part.owned]
+            assert brick_scenes.same(
+                (rows.counts, rows.indices, rows.distances),
+                (expected.counts, expected.indices, expected.distances),
+            )
+
+
+def test_rules_with_a_direction_have_rows_and_no_pairs():
+    rng = np.random.default_rng(8)
+    points = hs.Points(rng.random((80, 2)) * 4.0, box=4.0, radii=rng.random(80))
+    table = hs.neighbors(points, None, rule="scatter")
+    parts = hs.bricks(points, None, 3, rule="scatter")
+    for part in parts:
+        assert np.array_equal(part.neighbors(points).indices, table[part.owned].indices)
+        for method in (part.pairs, part.count_pairs):
+            with pytest.raises(ValueError, match="'scatter' has a direction"):
+                method(points)
+
+
+def test_supports_that_are_nearly_flat_need_many_points():
+    flat = np.array([[1.0, 0.0], [0.0, 1e-17]])
+    points = np.array([[0.0, 0.0], [0.0, 5e16], [0.5, 1e17], [3.0, 0.0], [1e18, 0.0], [0.0, 2e18]])
+    given = hs.Points(points, supports=np.broadcast_to(flat, (6, 2, 2)))
+    parts = hs.bricks(given, 1.5, 3)
+    found = np.concatenate([part.pairs(given, quantities="P") for part in parts])
+    assert sorted(map(tuple, found.tolist())) == [(0, 1), (0, 2), (1, 2)]
+    assert sorted(map(tuple, hs.pairs(given, 1.5, quantities="P").tolist())) == [
+        (0, 1), (0, 2), (1, 2)]  # fmt: skip
+
+
+def test_what_a_brick_does_not_take():
+    points = hs.Points(np.arange(10.0)[:, None], box=20.0, types=["A", "B"] * 5)
+    with pytest.raises(ValueError, match="bricks cannot be combined with batch"):
+        hs.bricks([[[0.0]], [[1.0]]], 1.0, 2)
+    with pytest.raises(TypeError, match="cutoff must be a number"):
+        hs.bricks(points, [1.0, 2.0], 2)
+    part = hs.bricks(points, {("A", "B"): 1.0}, 2)[0]
+    with pytest.raises(ValueError, match="a box that is not that of the brick"):
+        part.pairs(hs.Points(points.positions, box=10.0))
+    with pytest.raises(ValueError, match="types of the divided points have no 'C'"):
+        part.pairs(points.replace(types=["A", "C"] * 5))
+    with pytest.raises(ValueError, match="exclude must be numbers of points, from 0 to 9"):
+        part.pairs(points, exclude=[[0, 10]])
+    for bad in ([0, 1], [[0.5, 1.0]], "x"):
+        with pytest.raises((TypeError, ValueError), match="exclude"):
+            part.pairs(points, exclude=bad)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`clusters` are the components of the graph of `pairs`, and DBSCAN's, and wind as replicas say."""
+"""`clusters` are the components of the graph of `pairs`, and DBSCAN's, and span boxes as replicas
+say."""
 
 import itertools
 
@@ -9,6 +10,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 import halfshell as hs
+from calls import call
 
 TRICLINIC = np.array([[1.0, 0.0, 0.0], [0.3, 0.9, 0.0], [-0.2, 0.4, 1.1]])
 BOXES = {
@@ -29,7 +31,7 @@ def components(n, i, j):
 def dbscan(points, cutoff, least, **options):
     """From the definition, by sets of neighbours."""
     n = len(points)
-    rows = hs.neighbors(points, cutoff, **options)
+    rows = call(hs.neighbors, points, cutoff, **options)
     core = np.diff(rows.offsets) + 1 >= least
     labels = np.full(n, -1)
     for start in np.flatnonzero(core):
@@ -50,9 +52,9 @@ def dbscan(points, cutoff, least, **options):
     return labels, core
 
 
-def winds(points, members, cutoff, rows, axes):
-    """Whether a component winds along each axis, by its copies in a ring of seven boxes along it:
-    they hang together if it winds, unless by a multiple of seven boxes, which is far from here."""
+def spanned(points, members, cutoff, rows, axes):
+    """Whether a component spans each axis, by its copies in a ring of seven boxes along it:
+    they hang together if it does, unless by a multiple of seven boxes, which is far from here."""
     found = []
     for axis in range(len(rows)):
         i, j, S = hs.pairs(points, cutoff, box=rows, periodic=axes, quantities="ijS")
@@ -71,12 +73,12 @@ def winds(points, members, cutoff, rows, axes):
 def test_components_are_scipys(name, rng):
     for n, cutoff in [(40, 0.15), (300, 0.09), (2000, 0.06)]:
         points = rng.uniform(-1.0, 2.0, (n, 3))
-        expected = components(n, *hs.pairs(points, cutoff, **BOXES[name]))
+        expected = components(n, *call(hs.pairs, points, cutoff, **BOXES[name]))
         for kernel, threads in itertools.product(hs.kernels(), (1, 2)):
-            found = hs.clusters(points, cutoff, kernel=kernel, threads=threads, **BOXES[name])
+            found = call(hs.clusters, points, cutoff, kernel=kernel, threads=threads, **BOXES[name])
             assert np.array_equal(found.labels, expected)
             assert np.array_equal(found.sizes, np.bincount(expected))
-            assert found.core.all() and found.winding is None
+            assert found.core.all()
             assert found.labels.dtype == found.sizes.dtype == np.int64
 
 
@@ -84,7 +86,7 @@ def test_components_are_scipys(name, rng):
 def test_core_points_are_those_of_the_definition(name, rng):
     for n, cutoff, least in [(60, 0.2, 2), (300, 0.12, 4), (300, 0.12, 9), (50, 0.1, 1000)]:
         points = rng.random((n, 3))
-        found = hs.clusters(points, cutoff, min_points=least, **BOXES[name])
+        found = call(hs.clusters, points, cutoff, min_points=least, **BOXES[name])
         labels, core = dbscan(points, cutoff, least, **BOXES[name])
         assert np.array_equal(found.labels, labels) and np.array_equal(found.core, core)
         assert np.array_equal(found.sizes, np.bincount(labels[labels >= 0]))
@@ -96,39 +98,39 @@ def test_any_dimension(dim, rng):
         points = rng.random((60, dim)).astype(dtype)
         cutoff = 0.5 * 60 ** (-1.0 / dim) if dim > 1 else 0.01
         for options in [{}, {"box": [1.0] * dim}]:
-            i, j = hs.pairs(points, cutoff, **options)
-            found = hs.clusters(points, cutoff, winding=True, **options)
+            i, j = call(hs.pairs, points, cutoff, **options)
+            found = call(hs.clusters, points, cutoff, **options)
             assert np.array_equal(found.labels, components(60, i, j))
-            assert found.winding.shape == (len(found.sizes), dim) and found.winding.dtype == bool
-            assert options or not found.winding.any()
+            assert found.spans.shape == (len(found.sizes), dim) and found.spans.dtype == bool
+            assert options or not found.spans.any()
 
 
 @pytest.mark.parametrize("periodic", list(itertools.product([True, False], repeat=3)))
-def test_clusters_wind_as_copies_of_them_hang_together(periodic, rng):
+def test_clusters_span_a_box_as_copies_of_them_hang_together(periodic, rng):
     for trial in range(6):
         n = int(rng.integers(1, 40))
         rows = TRICLINIC if trial % 2 else np.eye(3)
         points = rng.uniform(-3.0, 3.0, (n, 3))  # not wrapped
         cutoff = float(rng.uniform(0.15, 0.5))
-        found = hs.clusters(points, cutoff, box=rows, periodic=periodic, winding=True)
-        for k, winding in enumerate(found.winding):
+        found = hs.clusters(points, cutoff, box=rows, periodic=periodic)
+        for k, spans in enumerate(found.spans):
             members = found.labels == k
-            assert winding.tolist() == winds(points, members, cutoff, rows, periodic)
+            assert spans.tolist() == spanned(points, members, cutoff, rows, periodic)
 
 
-def test_a_point_that_meets_its_own_image_winds():
-    found = hs.clusters([[0.5, 0.5]], 1.0, box=[1.0, 3.0], winding=True)
-    assert found.winding.tolist() == [[True, False]]
-    diagonal = hs.clusters([[0.0, 0.0]], 1.0, box=[[0.5, 0.5], [0.0, 9.0]], winding=True)
-    assert diagonal.winding.tolist() == [[True, False]]
+def test_a_point_that_meets_its_own_image_spans_the_box():
+    found = hs.clusters([[0.5, 0.5]], 1.0, box=[1.0, 3.0])
+    assert found.spans.tolist() == [[True, False]]
+    diagonal = hs.clusters([[0.0, 0.0]], 1.0, box=[[0.5, 0.5], [0.0, 9.0]])
+    assert diagonal.spans.tolist() == [[True, False]]
 
 
-def test_a_ring_within_the_box_does_not_wind():
+def test_a_ring_within_the_box_does_not_span_it():
     angles = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
     ring = np.column_stack([np.cos(angles), np.sin(angles)])
     for offset in (0.0, 1.7, 40.0):  # across the faces of the box, too
-        found = hs.clusters(ring + offset, 0.2, box=[4.0, 4.0], winding=True)
-        assert found.sizes.tolist() == [40] and not found.winding.any()
+        found = hs.clusters(ring + offset, 0.2, box=[4.0, 4.0])
+        assert found.sizes.tolist() == [40] and not found.spans.any()
 
 
 def test_the_cutoff_is_decided_exactly():
@@ -148,19 +150,19 @@ def test_radii_types_and_supports(rng):
         {"cutoff": None, "supports": np.eye(3) / radii[:, None, None], "extent": 1.2},
     ]
     for way, options in itertools.product(ways, BOXES.values()):
-        i, j = hs.pairs(points, **way, **options)
-        found = hs.clusters(points, **way, **options)
+        i, j = call(hs.pairs, points, **way, **options)
+        found = call(hs.clusters, points, **way, **options)
         assert np.array_equal(found.labels, components(200, i, j))
-        found = hs.clusters(points, min_points=3, **way, **options)
+        found = call(hs.clusters, points, min_points=3, **way, **options)
         counts = np.bincount(np.concatenate([i, j]), minlength=200) + 1
         assert np.array_equal(found.core, counts >= 3)
 
 
 def test_nothing_and_one_point():
     for dim in (1, 3):
-        found = hs.clusters(np.empty((0, dim)), 1.0, box=[2.0] * dim, winding=True, min_points=2)
+        found = hs.clusters(np.empty((0, dim)), 1.0, box=[2.0] * dim, min_points=2)
         assert found.labels.shape == found.core.shape == found.sizes.shape == (0,)
-        assert found.winding.shape == (0, dim)
+        assert found.spans.shape == (0, dim)
     alone = hs.clusters([[1.0, 2.0]], 1.0, min_points=2)
     assert alone.labels.tolist() == [-1] and alone.sizes.shape == (0,)
 
@@ -178,12 +180,12 @@ def test_labels_are_those_of_scikit_learn(rng):
 
 def test_extreme_scales(rng):
     points = rng.random((50, 2))
-    plain = hs.clusters(points, 0.125, box=[1.0, 1.0], winding=True)
+    plain = hs.clusters(points, 0.125, box=[1.0, 1.0])
     for exponent in (-1000, -300, 300, 1000):
         scale = 2.0**exponent
-        found = hs.clusters(points * scale, 0.125 * scale, box=[scale] * 2, winding=True)
+        found = hs.clusters(points * scale, 0.125 * scale, box=[scale] * 2)
         assert np.array_equal(found.labels, plain.labels)
-        assert np.array_equal(found.winding, plain.winding)
+        assert np.array_equal(found.spans, plain.spans)
     far = hs.clusters([[0.0], [1.0], [1e300]], 1.0)
     assert far.labels.tolist() == [0, 0, 1]
 
@@ -194,7 +196,6 @@ def test_extreme_scales(rng):
         ({"min_points": 0}, ValueError, "min_points"),
         ({"min_points": 2.5}, TypeError, "min_points"),
         ({"min_points": True}, TypeError, "min_points"),
-        ({"winding": "yes"}, TypeError, "winding"),
         ({"rule": "gather", "radii": [1.0] * 3, "cutoff": None}, ValueError, "gather"),
         ({"cutoff": -1.0}, ValueError, "cutoff"),
         ({"cutoff": [1.0, 2.0]}, TypeError, "cutoff"),
@@ -205,11 +206,121 @@ def test_extreme_scales(rng):
 def test_bad_arguments(options, error, message):
     arguments = {"points": [[0.0], [1.0], [2.0]], "cutoff": 1.0, **options}
     with pytest.raises(error, match=message):
-        hs.clusters(**arguments)
+        call(hs.clusters, **arguments)
 
 
 def test_the_memory_limit_holds_for_what_is_noted_for_each_point(rng):
     points = rng.random((100_000, 3))
     with pytest.raises(MemoryError):
-        hs.clusters(points, 0.001, memory_limit=300_000)
-    assert len(hs.clusters(points, 0.001, memory_limit=100e6).labels) == 100_000
+        call(hs.clusters, points, 0.001, memory_limit=300_000)
+    assert len(call(hs.clusters, points, 0.001, memory_limit=100e6).labels) == 100_000
+
+
+# ---- made whole, and their centres -----------------------------------------------------------
+
+
+def whole_by_fractions(points, found, cutoff, rows, periodic):
+    """Whether each cluster that spans nothing is joined by pairs with S = 0 once unwrapped."""
+    moved, x = found.unwrap(), np.asarray(points, float)
+    i, j, S = hs.pairs(x, cutoff, box=rows, periodic=periodic, quantities="ijS")
+    shifts = np.rint(np.linalg.solve(rows.T, (moved - x).T).T).astype(int)
+    assert np.allclose(x + shifts @ rows, moved, rtol=0.0, atol=1e-12)
+    assert not shifts[:, ~np.asarray(periodic)].any()
+    inside = (found.labels[i] == found.labels[j]) & ~found.spans.any(axis=1)[found.labels[i]]
+    assert np.array_equal((shifts[j] - shifts[i])[inside], S[inside])
+    lowest = [np.argmax(found.labels == k) for k in range(found.n_clusters)]
+    assert not shifts[lowest].any()
+    means = [moved[found.labels == k].mean(axis=0) for k in range(found.n_clusters)]
+    assert np.allclose(found.centers(), np.reshape(means, (-1, x.shape[1])), atol=1e-12)
+
+
+@pytest.mark.parametrize("periodic", list(itertools.product([True, False], repeat=3)))
+def test_unwrapped_clusters_are_whole(periodic, rng):
+    for rows in (TRICLINIC, np.diag([1.0, 1.25, 0.75])):
+        for n, cutoff in ((40, 0.3), (100, 0.3), (300, 0.15)):
+            spread = np.where(periodic, 5.0, 1.0)
+            points = rng.uniform(-2.0, -2.0 + spread, (n, 3))
+            found = hs.clusters(points, cutoff, box=rows, periodic=periodic)
+            assert found.sizes.max() > 2
+            whole_by_fractions(points, found, cutoff, rows, periodic)
+
+
+@pytest.mark.parametrize("dim", range(1, 9))
+def test_unwrapping_in_any_dimension(dim, rng):
+    points = rng.random((50, dim)).astype(np.float32)
+    cutoff = 0.45 * 50 ** (-1.0 / dim) if dim > 1 else 0.02
+    whole_by_fractions(points, hs.clusters(points, cutoff, box=[1.0] * dim), cutoff, np.eye(dim),
+                       [True] * dim)  # fmt: skip
+
+
+def test_a_chain_across_faces_is_one_line():
+    for scale in (1.0, 2.0**-900, 2.0**900):
+        line = np.arange(40.0)[:, None] * [0.5, 0.25]
+        box = np.diag([4.0, 64.0])
+        wrapped = hs.Box(box).wrap(line)[0]
+        found = hs.clusters(wrapped * scale, 0.6 * scale, box=box * scale)
+        assert found.n_clusters == 1 and not found.spans[0, 1]
+        if not found.spans.any():
+            assert np.array_equal(found.unwrap(), line * scale)
+        far = hs.clusters(wrapped * scale, 0.6 * scale, box=np.diag([64.0, 64.0]) * scale)
+        assert np.array_equal(far.unwrap(), wrapped * scale)  # nothing to move
+    line = np.arange(12.0)[:, None] * [0.5, 0.25]
+    found = hs.clusters(hs.Box([8.0, 1.0]).wrap(line)[0], 0.6, box=[8.0, 1.0])
+    assert found.n_clusters == 1 and not found.spans.any()
+    assert np.array_equal(found.unwrap(), line)
+    assert found.centers().tolist() == [line.mean(axis=0).tolist()]
+
+
+def test_weights_types_and_points_of_no_cluster():
+    x = [[0.25], [3.75], [2.0], [9.0], [9.5]]
+    points = hs.Points(x[:3], weights=[3.0, 1.0, 5.0], box=4.0)
+    found = hs.clusters(points, 0.5)
+    assert found.unwrap().tolist() == [[0.25], [-0.25], [2.0]]
+    assert found.centers().tolist() == [[0.125], [2.0]]
+    lonely = hs.clusters(points, 0.5, min_points=2)
+    assert lonely.labels.tolist() == [0, 0, -1]
+    assert lonely.unwrap().tolist() == [[0.25], [-0.25], [2.0]]
+    assert lonely.centers().tolist() == [[0.125]]
+    # 3.75 is a core point; 0.25 and 3.25 lie at its sides, and are of its cluster.
+    dense = hs.clusters([[0.25], [3.25], [3.75]], 0.5, min_points=3, box=4.0)
+    assert dense.labels.tolist() == [0, 0, 0] and dense.core.tolist() == [False, False, True]
+    assert dense.unwrap().tolist() == [[4.25], [3.25], [3.75]]
+    open_space = hs.clusters(x, 0.5)
+    assert open_space.unwrap().tolist() == x and not open_space.spans.any()
+    nothing = hs.clusters(np.empty((0, 2)), 1.0, box=1.0)
+    assert nothing.unwrap().shape == nothing.centers().shape == (0, 2)
+
+
+@pytest.mark.parametrize("least", [1, 3])
+def test_clusters_of_a_batch_are_those_of_each_system(least, rng):
+    boxes = [TRICLINIC, np.eye(3), 1.5 * np.eye(3), None]
+    flags = [True, [True, False, True], False, None]
+    each = [
+        hs.Points(rng.uniform(-1.0, 2.0, (n, 3)), box=box, periodic=axes, weights=rng.random(n))
+        for n, box, axes in zip((80, 0, 60, 40), boxes, flags)
+    ]
+    found = hs.clusters(each, 0.2, min_points=least)
+    first = number = 0
+    for one in each:
+        alone = hs.clusters(one, 0.2, min_points=least)
+        own, some = slice(first, first + len(one)), slice(number, number + alone.n_clusters)
+        labels = np.where(alone.labels < 0, -1, alone.labels + number)
+        assert np.array_equal(found.labels[own], labels)
+        assert np.array_equal(found.core[own], alone.core)
+        assert np.array_equal(found.sizes[some], alone.sizes)
+        assert np.array_equal(found.spans[some], alone.spans)
+        assert np.array_equal(found.unwrap()[own], alone.unwrap())
+        assert np.allclose(found.centers()[some], alone.centers())
+        first, number = own.stop, some.stop
+    assert found.n_clusters == number > 5
+
+
+def test_exclusions_and_groups_join_nothing(rng):
+    points = rng.random((60, 2))
+    groups = rng.integers(0, 3, 60)
+    found = hs.clusters(
+        hs.Points(points, groups=groups, labels=np.arange(60) // 2), 0.15, exclude=0
+    )
+    i, j = hs.pairs(points, 0.15)
+    kept = (groups[i] == groups[j]) & (i // 2 != j // 2)
+    assert np.array_equal(found.labels, components(60, i[kept], j[kept]))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 from full_lists import full_list, list_between
 from halfshell._check.reference import exact_square
 from rational_images import Images, between, exact
@@ -149,44 +150,44 @@ def test_one_set(seeds):
 
 def check_half_lists(points, cutoff, half, chosen, options):
     every = {**chosen, **options}
-    assert entries_of(*hs.pairs(points, cutoff, quantities="ijS", **every)) == half
-    i, j, d, _, S = hs.pairs(points, cutoff, quantities="ijdDS", **every)
+    assert entries_of(*call(hs.pairs, points, cutoff, quantities="ijS", **every)) == half
+    i, j, d, _, S = call(hs.pairs, points, cutoff, quantities="ijdDS", **every)
     assert entries_of(i, j, S) == half
     assert (d >= (chosen["min_distance"] or 0.0)).all() and (d <= cutoff).all()
-    found = hs.pairs(points, cutoff, quantities="P", **every).tolist()
+    found = call(hs.pairs, points, cutoff, quantities="P", **every).tolist()
     assert sorted(map(tuple, found)) == sorted(entry[:2] for entry in half)
-    assert hs.count_pairs(points, cutoff, **every) == len(half)
-    assert hs.count_pairs(points, [cutoff / 2, cutoff], **every)[1] == len(half)
-    blocks = list(hs.iter_pairs(points, cutoff, quantities="ijS", max_pairs=3, **every))
+    assert call(hs.count_pairs, points, cutoff, **every) == len(half)
+    assert call(hs.count_pairs, points, [cutoff / 2, cutoff], **every)[1] == len(half)
+    blocks = list(call(hs.iter_pairs, points, cutoff, quantities="ijS", max_pairs=3, **every))
     assert set().union(*(entries_of(*block) for block in blocks)) == half
     reach = {"radii": np.full(len(points), cutoff), "rule": "max"}
-    assert entries_of(*hs.pairs(points, None, quantities="ijS", **reach, **every)) == half
+    assert entries_of(*call(hs.pairs, points, None, quantities="ijS", **reach, **every)) == half
     if options["inclusive"] and not chosen["min_distance"]:
         scene = {key: options[key] for key in options if key != "inclusive"}
         scene |= {key: chosen[key] for key in chosen if key != "min_distance"}
-        bins = hs.pair_histogram(points, [0.0, cutoff / 2, cutoff], **scene)
+        bins = call(hs.pair_histogram, points, [0.0, cutoff / 2, cutoff], **scene)
         assert bins.sum() == len(half)
 
 
 def check_rows(points, cutoff, full, every):
-    table = hs.neighbors(points, cutoff, quantities="jS", **every)
+    table = call(hs.neighbors, points, cutoff, quantities="jS", **every)
     assert of_table(table) == full
-    assert hs.neighbors(points, cutoff, **every).indices.tolist() == table.indices.tolist()
-    assert hs.coordination(points, cutoff, **every).tolist() == table.counts.tolist()
+    assert call(hs.neighbors, points, cutoff, **every).indices.tolist() == table.indices.tolist()
+    assert call(hs.coordination, points, cutoff, **every).tolist() == table.counts.tolist()
 
 
 def check_some_points(draw, points, cutoff, full, half, chosen, options):
     n, every = len(points), {**chosen, **options}
     some = np.array(sorted(draw.sample(range(n), draw.randint(0, n))), np.int64)
-    table = hs.neighbors(points, cutoff, quantities="jS", indices=some, **every)
+    table = call(hs.neighbors, points, cutoff, quantities="jS", indices=some, **every)
     assert of_table(table, some) == {entry for entry in full if entry[0] in some}
     if chosen["exclude"] is None or chosen["exclude"].ndim == 1 or n:
-        found = hs.pairs(points, cutoff, quantities="ijS", touching=some, **every)
+        found = call(hs.pairs, points, cutoff, quantities="ijS", indices=some, **every)
         assert entries_of(*found) == {e for e in half if e[0] in some or e[1] in some}
     batch = np.sort(labels_of(draw, n, 0))
-    found = hs.pairs(points, cutoff, quantities="ijS", batch=batch, **every)
+    found = call(hs.pairs, points, cutoff, quantities="ijS", batch=batch, **every)
     assert entries_of(*found) == {e for e in half if batch[e[0]] == batch[e[1]]}
-    assert hs.count_pairs(points, cutoff, batch=batch, **every).sum() == len(found[0])
+    assert call(hs.count_pairs, points, cutoff, batch=batch, **every).sum() == len(found[0])
 
 
 @in_parts(200)
@@ -199,12 +200,12 @@ def test_two_sets(seeds):
         rule = Rule((points, cutoff, options), chosen, {"queries": queries, **of_queries})
         expected = rule.entries()
         every = {**chosen, **of_queries, **options}
-        found = hs.pairs_between(queries, points, cutoff, quantities="ijS", **every)
+        found = call(hs.pairs_between, queries, points, cutoff, quantities="ijS", **every)
         assert entries_of(*found) == expected
-        assert hs.count_pairs(points, cutoff, queries=queries, **every) == len(expected)
-        table = hs.neighbors(points, cutoff, queries=queries, quantities="jS", **every)
+        assert call(hs.count_pairs, points, cutoff, queries=queries, **every) == len(expected)
+        table = call(hs.neighbors, points, cutoff, queries=queries, quantities="jS", **every)
         assert of_table(table) == expected
-        counts = hs.coordination(points, cutoff, queries=queries, **every)
+        counts = call(hs.coordination, points, cutoff, queries=queries, **every)
         assert counts.tolist() == table.counts.tolist()
 
 
@@ -215,8 +216,15 @@ def test_large_scenes_are_those_of_a_filter():
     i, j, d = hs.pairs(points, 0.6, box=box, quantities="ijd", sort=True)
     other = molecule[i] != molecule[j]
     for threads in (1, 2):
-        found = hs.pairs(
-            points, 0.6, box=box, quantities="ijd", sort=True, exclude=molecule, threads=threads
+        found = call(
+            hs.pairs,
+            points,
+            0.6,
+            box=box,
+            quantities="ijd",
+            sort=True,
+            exclude=molecule,
+            threads=threads,
         )
         for column, all_of_it in zip(found, (i, j, d), strict=True):
             assert column.tobytes() == all_of_it[other].tobytes()
@@ -224,8 +232,15 @@ def test_large_scenes_are_those_of_a_filter():
             points, 0.6, box=box, quantities="ij", sort=True, min_distance=0.3, threads=threads
         )
         assert found[0].tobytes() == i[d >= 0.3].tobytes()
-        found = hs.pairs(
-            points, 0.6, box=box, quantities="ij", sort=True, groups=molecule % 7, threads=threads
+        found = call(
+            hs.pairs,
+            points,
+            0.6,
+            box=box,
+            quantities="ij",
+            sort=True,
+            groups=molecule % 7,
+            threads=threads,
         )
         assert found[0].tobytes() == i[molecule[i] % 7 == molecule[j] % 7].tobytes()
 
@@ -233,10 +248,16 @@ def test_large_scenes_are_those_of_a_filter():
 def test_names_are_labels_too():
     points = [[0.0], [1.0], [2.0]]
     for labels in (["a", "a", "b"], np.array(["a", "a", "b"]), np.array(["a", "a", "b"], object)):
-        assert hs.pairs(points, 1.0, groups=labels, quantities="P").tolist() == [[0, 1]]
-        assert hs.pairs(points, 1.0, exclude=labels, quantities="P").tolist() == [[1, 2]]
-    found = hs.pairs_between(
-        [[0.0]], points, 5.0, groups=["a", "b", "a"], query_groups=["b"], quantities="j"
+        assert call(hs.pairs, points, 1.0, groups=labels, quantities="P").tolist() == [[0, 1]]
+        assert call(hs.pairs, points, 1.0, exclude=labels, quantities="P").tolist() == [[1, 2]]
+    found = call(
+        hs.pairs_between,
+        [[0.0]],
+        points,
+        5.0,
+        groups=["a", "b", "a"],
+        query_groups=["b"],
+        quantities="j",
     )
     assert found.tolist() == [1]
 
@@ -244,8 +265,8 @@ def test_names_are_labels_too():
 def test_the_largest_labels():
     labels = [np.iinfo(np.int64).min, np.iinfo(np.int64).max]
     points = [[0.0], [1.0]]
-    assert hs.count_pairs(points, 1.0, exclude=labels, exclude_within=2**63 - 1) == 1
-    assert hs.count_pairs(points, 1.0, exclude=[0, labels[1]], exclude_within=2**63 - 1) == 0
+    assert call(hs.count_pairs, points, 1.0, exclude=labels, exclude_within=2**63 - 1) == 1
+    assert call(hs.count_pairs, points, 1.0, exclude=[0, labels[1]], exclude_within=2**63 - 1) == 0
 
 
 def test_extreme_units():
@@ -274,20 +295,22 @@ BAD = [
     ({"groups": [0.0, 1.0, 2.0]}, TypeError, "groups must hold integers or names"),
     ({"groups": [True, False, True]}, TypeError, "groups must hold integers or names"),
     ({"groups": np.array([2**64 - 1, 0, 0], np.uint64)}, ValueError, "groups must be less than"),
-    ({"query_groups": [0]}, ValueError, "query_groups needs queries"),
-    ({"exclude": [0.5, 1, 2]}, TypeError, "exclude must hold integers"),
-    ({"exclude": [0, 1]}, ValueError, r"exclude must have shape \(k, 2\), .* or \(3,\)"),
-    ({"exclude": [[0, 1, 2]]}, ValueError, r"exclude must have shape \(k, 2\)"),
+    ({"exclude": [0.5, 1, 2]}, TypeError, "labels must hold integers or names"),
+    ({"exclude": [0, 1]}, ValueError, r"labels must have shape \(3,\)"),
+    ({"exclude": [[0, 1, 2]]}, ValueError, r"exclude must be pairs of numbers, shape \(k, 2\)"),
     ({"exclude": [[0, 3]]}, ValueError, r"exclude\[:, 1\] must be numbers of points, from 0 to 2"),
     ({"exclude": [[-1, 0]]}, ValueError, r"exclude\[:, 0\] must be numbers of points"),
     ({"exclude": [[0.0, 1.0]]}, TypeError, "must hold integers"),
-    ({"exclude": [[0, 1]], "query_exclude": [0]}, ValueError, "query_exclude needs labels"),
-    ({"exclude_within": 1}, ValueError, "exclude_within needs labels"),
-    ({"exclude": [[0, 1]], "exclude_within": 1}, ValueError, "exclude_within needs labels"),
-    ({"exclude": [0, 1, 2], "exclude_within": -1}, ValueError, "exclude_within must be from 0"),
-    ({"exclude": [0, 1, 2], "exclude_within": 2**63}, ValueError, "exclude_within must be from 0"),
-    ({"exclude": [0, 1, 2], "exclude_within": 0.5}, TypeError, "whole number"),
-    ({"exclude": ["a", "b", "c"], "exclude_within": 1}, TypeError, "exclude must hold integers"),
+    ({"exclude": 1}, ValueError, "a whole number as exclude needs labels, and points have none"),
+    ({"exclude": True}, TypeError, "exclude must be pairs of numbers, .* got True"),
+    (
+        {"exclude": 0.5},
+        TypeError,
+        "exclude must be pairs of numbers, .* or a whole number, got 0.5",
+    ),
+    ({"exclude": -1, "labels": [0, 1, 2]}, ValueError, "exclude must be from 0"),
+    ({"exclude": 2**63, "labels": [0, 1, 2]}, ValueError, "exclude must be from 0"),
+    ({"exclude": 1, "labels": ["a", "b", "c"]}, ValueError, "exclude must be 0 where labels are"),
     ({"min_distance": -1.0}, ValueError, "min_distance must be finite and not negative"),
     ({"min_distance": np.nan}, ValueError, "min_distance must be finite and not negative"),
     ({"min_distance": np.inf}, ValueError, "min_distance must be finite and not negative"),
@@ -299,27 +322,26 @@ BAD = [
 def test_bad_choices():
     for chosen, kind, words in BAD:
         points = [[0.0], [1.0], [2.0]]
-        alone = {name: value for name, value in chosen.items() if not name.startswith("query_")}
-        if alone == chosen:
-            with pytest.raises(kind, match=words):
-                hs.pairs(points, 1.0, **chosen)
-            with pytest.raises(kind, match=words):
-                hs.pairs(points, 1.0, batch=[0, 0, 0], **chosen)
-            with pytest.raises(kind, match=words):
-                hs.iter_pairs(points, 1.0, **chosen)
-        for search in (hs.neighbors, hs.count_pairs, hs.coordination):
-            with pytest.raises(kind, match=words):
-                search(points, 1.0, **chosen)
+        for batch in (None, [0, 0, 0]):
+            for search in (hs.pairs, hs.iter_pairs, hs.neighbors, hs.count_pairs, hs.coordination):
+                with pytest.raises(kind, match=words):
+                    call(search, points, 1.0, batch=batch, **chosen)
+    with pytest.raises(ValueError, match=r"got shape \(3,\): labels are those of Points"):
+        hs.pairs(points, 1.0, exclude=[0, 1, 2])
+    with pytest.raises(ValueError, match=r"got shape \(2,\): one pair is \[\[i, j\]\]"):
+        hs.pairs(points, 1.0, exclude=[0, 1])
 
 
 def test_labels_of_both_sets():
     points, queries = [[0.0], [1.0]], [[0.5]]
-    with pytest.raises(ValueError, match="groups and query_groups must be given together"):
-        hs.pairs_between(queries, points, 1.0, groups=[0, 1])
-    with pytest.raises(ValueError, match="exclude and query_exclude must be given together"):
-        hs.pairs_between(queries, points, 1.0, query_exclude=[0])
+    with pytest.raises(
+        ValueError, match="points have groups, and queries have none: both need them"
+    ):
+        call(hs.pairs_between, queries, points, 1.0, groups=[0, 1])
+    with pytest.raises(ValueError, match="exclude needs labels, and points have none"):
+        call(hs.pairs_between, queries, points, 1.0, query_exclude=[0], exclude=0)
     with pytest.raises(TypeError, match="both be numbers or both be names"):
-        hs.pairs_between(queries, points, 1.0, groups=[0, 1], query_groups=["a"])
+        call(hs.pairs_between, queries, points, 1.0, groups=[0, 1], query_groups=["a"])
     with pytest.raises(ValueError, match=r"exclude\[:, 0\] must be numbers of queries"):
         hs.pairs_between(queries, points, 1.0, exclude=[[1, 0]])
 
@@ -333,7 +355,7 @@ def test_inputs_stay_and_empty_ones_are_nothing():
     for nothing in ([], np.empty((0, 2), int)):
         assert hs.count_pairs(points, 1.0, exclude=nothing) == 1
     empty = np.empty((0, 3))
-    assert hs.count_pairs(empty, 1.0, groups=[], exclude=[], min_distance=0.5) == 0
+    assert call(hs.count_pairs, empty, 1.0, groups=[], exclude=[], min_distance=0.5) == 0
 
 
 def test_counts_by_type():
@@ -344,19 +366,32 @@ def test_counts_by_type():
         chosen, of_queries = chosen_of(draw, n, n, cutoff)
         types = labels_of(draw, n, 0)
         every = {**chosen, **options}
-        table = hs.neighbors(points, cutoff, **every)
+        table = call(hs.neighbors, points, cutoff, **every)
         wanted = np.zeros((n, 1 + types.max(initial=0)), int)
         np.add.at(wanted, (np.repeat(np.arange(n), table.counts), types[table.indices]), 1)
-        assert hs.coordination(points, cutoff, types=types, **every).tolist() == wanted.tolist()
+        assert (
+            call(hs.coordination, points, cutoff, types=types, by_type=True, **every).tolist()
+            == wanted.tolist()
+        )
         some = [k for k in range(n) if draw.random() < 0.5]
-        found = hs.coordination(points, cutoff, types=types, indices=some, **every)
+        found = call(
+            hs.coordination, points, cutoff, types=types, by_type=True, indices=some, **every
+        )
         assert found.tolist() == wanted[some].tolist()
         queried = {**every, **of_queries}
         if chosen["exclude"] is None or chosen["exclude"].ndim == 1:
-            table = hs.neighbors(points, cutoff, queries=points, **queried)
+            table = call(hs.neighbors, points, cutoff, queries=points, **queried)
             wanted = np.zeros_like(wanted)
             np.add.at(wanted, (np.repeat(np.arange(n), table.counts), types[table.indices]), 1)
-            found = hs.coordination(points, cutoff, queries=points, types=types, **queried)
+            found = call(
+                hs.coordination,
+                points,
+                cutoff,
+                queries=points,
+                types=types,
+                by_type=True,
+                **queried,
+            )
             assert found.tolist() == wanted.tolist()
 
 
@@ -364,9 +399,11 @@ def test_g_of_r_between_molecules():
     points = np.random.default_rng(6).random((600, 3)) * 5.0
     molecule = np.arange(600) // 3
     whole = hs.rdf(points, 2.0, 20, box=[5.0] * 3)
-    parts = [hs.rdf(points, 2.0, 20, box=[5.0] * 3, exclude=molecule),
-             hs.rdf(points, 2.0, 20, box=[5.0] * 3, groups=molecule)]  # fmt: skip
+    parts = [call(hs.rdf, points, 2.0, 20, box=[5.0] * 3, exclude=molecule),
+             call(hs.rdf, points, 2.0, 20, box=[5.0] * 3, groups=molecule)]  # fmt: skip
     assert (parts[0].counts + parts[1].counts == whole.counts).all() and parts[1].counts.sum() > 0
     assert np.allclose(parts[0].g + parts[1].g, whole.g)
-    named = hs.rdf(points, 2.0, 20, box=[5.0] * 3, exclude=molecule, types=["a", "b", "a"] * 200)
+    named = call(
+        hs.rdf, points, 2.0, 20, box=[5.0] * 3, exclude=molecule, types=["a", "b", "a"] * 200
+    )
     assert (np.array(named.counts).shape) == (2, 2, 20)

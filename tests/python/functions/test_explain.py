@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 from oracles import lattice, random_scene, rotation
 
 
@@ -19,7 +20,7 @@ def scene(rng):
 def test_it_names_the_kernel_and_the_algorithm(scene):
     for kernel in hs.kernels():
         points, cutoff, box = scene
-        plan = hs.explain(points, cutoff, box=box, kernel=kernel)
+        plan = call(hs.explain, points, cutoff, box=box, kernel=kernel)
         assert plan.kernel == kernel
         assert plan.algorithm in ("all-pairs", "grid", "hash", "hierarchy")
         assert plan.reason
@@ -72,7 +73,7 @@ def test_without_measuring_nothing_is_measured(scene):
 def test_measured_counters_add_up(scene):
     for kernel in hs.kernels():
         points, cutoff, box = scene
-        measured = hs.explain(points, cutoff, box=box, kernel=kernel, measure=True).measured
+        measured = call(hs.explain, points, cutoff, box=box, kernel=kernel, measure=True).measured
         assert measured["pairs"] == hs.count_pairs(points, cutoff, box=box)
         assert measured["candidates"] >= measured["pairs"]
         stages = (measured[k] for k in ("by_float64", "by_double_word", "by_integers"))
@@ -81,6 +82,21 @@ def test_measured_counters_add_up(scene):
         assert measured["bytes_peak"] >= 16 * measured["pairs"] // 2
         assert measured["bytes_peak"] <= sum(measured["bytes"].values())
         assert "candidates" in str(hs.explain(points, cutoff, box=box, measure=True))
+
+
+def test_pairs_that_do_not_count_change_no_plan_and_are_not_measured(scene):
+    points, cutoff, box = scene
+    halves = hs.Points(points, box=box, groups=np.arange(len(points)) % 2)
+    plain = hs.explain(points, cutoff, box=box)
+    for known, how in (
+        (halves, {}),
+        (halves.replace(groups=None, labels=halves.groups), {"exclude": 0}),
+        (halves.replace(groups=None), {"exclude": [[0, 1]]}),
+        (halves.replace(groups=None), {"min_distance": 0.5 * cutoff}),
+    ):
+        assert hs.explain(known, cutoff, **how).shape == plain.shape
+        measured = hs.explain(known, cutoff, measure=True, **how).measured
+        assert measured["pairs"] == hs.count_pairs(known, cutoff, **how)
 
 
 def test_ties_reach_the_later_stages(rng):
@@ -99,7 +115,10 @@ def test_counters_do_not_depend_on_the_kernel(scene):
     points, cutoff, box = scene
     names = ("pairs", "candidates", "groups")
     results = [
-        [hs.explain(points, cutoff, box=box, kernel=k, measure=True).measured[n] for n in names]
+        [
+            call(hs.explain, points, cutoff, box=box, kernel=k, measure=True).measured[n]
+            for n in names
+        ]
         for k in hs.kernels()
     ]
     assert all(result == results[0] for result in results)
@@ -161,4 +180,4 @@ def test_bad_input_is_refused_as_by_pairs():
         ({"points": points, "cutoff": 1.0, "periodic": True}, ValueError, "periodic"),
     ):
         with pytest.raises(exception, match=word):
-            hs.explain(**arguments)
+            call(hs.explain, **arguments)

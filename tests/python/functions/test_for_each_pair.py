@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 from stream_scenes import BOX, SCENES
 from subprocesses import run
 
@@ -22,7 +23,7 @@ POINTS = np.random.default_rng(3).random((50, 3))
 def visited(points, cutoff, **options):
     """What a Python callable sees, as the arrays of `pairs`, and how many that was."""
     seen = []
-    n = hs.for_each_pair(points, cutoff, lambda *pair: seen.append(pair), **options)
+    n = call(hs.for_each_pair, points, cutoff, lambda *pair: seen.append(pair), **options)
     d = np.shape(points)[1]
     i, j, S, D, d2 = zip(*seen) if seen else [()] * 5
     return (
@@ -37,7 +38,7 @@ def visited(points, cutoff, **options):
 
 def assert_visits_the_pairs(points, cutoff, **options):
     n, i, j, S, D, d2 = visited(points, cutoff, **options)
-    of_pairs = hs.pairs(points, cutoff, quantities="ijSDd", **options)
+    of_pairs = call(hs.pairs, points, cutoff, quantities="ijSDd", **options)
     assert n == len(i) == len(of_pairs[0])
     for got, wanted in zip((i, j, S, D), of_pairs):
         assert got.tobytes() == wanted.tobytes()
@@ -349,12 +350,12 @@ def test_other_things_are_refused():
 def test_wrong_arguments_are_refused(change, error):
     arguments = {"points": POINTS, "cutoff": 0.5, "callback": lambda *pair: None} | change
     with pytest.raises(error):
-        hs.for_each_pair(**arguments)
+        call(hs.for_each_pair, **arguments)
 
 
 def test_results_of_any_size_are_visited():
-    total = hs.for_each_pair(
-        np.zeros((300, 1)), 0.0, lambda *pair: None, memory_limit=3e6, threads=1
+    total = call(
+        hs.for_each_pair, np.zeros((300, 1)), 0.0, lambda *pair: None, memory_limit=3e6, threads=1
     )
     assert total == 300 * 299 // 2
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pairs by distance: every edge decided exactly, by types, with weights, of one set and of two."""
+"""Counts of pairs, within cutoffs and by distance."""
 
+import itertools
 import math
 from fractions import Fraction
 
@@ -10,8 +11,91 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import halfshell as hs
+from calls import call
 from halfshell._check.reference import exact_square, reference_pairs
 from oracles import BOX_KINDS, lattice, random_scene, rotation, same_arrays
+
+
+@pytest.mark.parametrize("kind", BOX_KINDS)
+def test_count_is_the_length_of_the_list(kind, rng):
+    for n in (0, 1, 2, 30, 300):
+        points, cutoff, box, _ = random_scene(rng, n, 3, kind, neighbours=20, spread=2)
+        for flags, inclusive in itertools.product((True, [True, False, True]), (True, False)):
+            how = {"box": box, "periodic": flags, "inclusive": inclusive}
+            expected = len(call(hs.pairs, points, cutoff, quantities="i", **how))
+            for kernel in hs.kernels():
+                assert call(hs.count_pairs, points, cutoff, kernel=kernel, **how) == expected
+
+
+def test_one_cutoff_gives_an_int(rng):
+    points = rng.random((20, 3))
+    for cutoff in (0.5, 1, np.float32(0.5), np.array(0.5)):
+        assert type(hs.count_pairs(points, cutoff)) is int
+
+
+def test_several_cutoffs_give_an_array(rng):
+    points = rng.random((60, 3))
+    cutoffs = [0.0, 0.1, 0.25, 0.5, 2.0]
+    for form in (list, tuple, np.array):
+        counts = hs.count_pairs(points, form(cutoffs))
+        assert counts.dtype == np.int64 and counts.shape == (5,)
+        assert counts.tolist() == [hs.count_pairs(points, c) for c in cutoffs]
+        assert counts[0] == 0 and counts[-1] == 60 * 59 // 2
+        assert hs.count_pairs(points, form([0.5])).shape == (1,)
+
+
+def test_several_cutoffs_at_ties(rng):
+    for inclusive in (True, False):
+        for kernel in hs.kernels():
+            points, box = lattice("fcc", (3, 3, 3))
+            turn = rotation(rng)
+            roots = [math.sqrt(k) for k in (2, 4, 6, 8)]
+            cutoffs = sorted(
+                x for r in roots for x in (math.nextafter(r, 0), r, math.nextafter(r, 9))
+            )
+            for crystal, frame in (
+                (points, box),
+                (points @ turn, box @ turn),
+                (points @ turn, None),
+            ):
+                how = {"box": frame, "inclusive": inclusive, "kernel": kernel}
+                counts = call(hs.count_pairs, crystal, cutoffs, **how)
+                assert counts.tolist() == [
+                    len(call(hs.pairs, crystal, c, quantities="j", **how)) for c in cutoffs
+                ]
+
+
+def test_counts_of_coincident_points():
+    for kernel in hs.kernels():
+        assert call(hs.count_pairs, np.full((2000, 2), 0.3), 0.0, kernel=kernel) == 2000 * 1999 // 2
+        assert (
+            call(hs.count_pairs, np.full((200, 2), 0.3), 0.0, inclusive=False, kernel=kernel) == 0
+        )
+
+
+def test_counting_needs_no_memory_for_the_list(rng):
+    # 5e7 pairs would take 800 MB; counting them fits into far less.
+    points = rng.random((10_000, 3))
+    assert call(hs.count_pairs, points, 2.0, memory_limit=50_000_000) == 10_000 * 9_999 // 2
+
+
+def test_precision_may_be_anything():
+    for odd in (np.zeros(2), np.zeros(0), np.zeros(2, "V3"), 5, b"exact"):
+        with pytest.raises(TypeError, match="precision"):
+            call(hs.count_pairs, [[0.0], [1.0]], [0.5, 1.0], precision=odd)
+
+
+def test_without_cutoffs_all_else_is_checked():
+    assert hs.count_pairs([[0.0], [1.0]], []).tolist() == []
+    with pytest.raises(ValueError, match=r"points\[0, 0\]"):
+        hs.count_pairs([[np.nan]], [])
+    with pytest.raises(ValueError, match="kernel"):
+        call(hs.count_pairs, [[0.0]], [], kernel="none")
+    with pytest.raises(ValueError, match="queries"):
+        hs.count_pairs([[0.0]], [], queries=[[np.inf]])
+
+
+# ---- by distance -------------------------------------------------------------------------------
 
 
 def bin_of(square, limits):
@@ -59,7 +143,7 @@ def test_bins_are_those_of_rational_arithmetic(kind, rng):
             answer = expected(points, edges, box, periodic, **how)
             how |= {"box": box, "periodic": periodic}
             for kernel in hs.kernels():
-                found = hs.pair_histogram(points, edges, kernel=kernel, **how)
+                found = call(hs.pair_histogram, points, edges, kernel=kernel, **how)
                 assert same_arrays(found, answer), (ndim, how)
 
 
@@ -69,7 +153,7 @@ def test_edges_on_shells_of_a_crystal():
             points, box = lattice(name, (2, 2, 2))
             squares = [k for k in range(40) if math.isqrt(k) ** 2 == k]  # shells that are numbers
             edges = [0.0, *(math.sqrt(k) for k in squares if k > 0)]
-            between = hs.pair_histogram(points, edges, box=box, kernel=kernel)
+            between = call(hs.pair_histogram, points, edges, box=box, kernel=kernel)
             strict = [hs.count_pairs(points, e, box=box, inclusive=False) for e in edges[:-1]]
             closed = hs.count_pairs(points, edges[-1], box=box)
             assert between.tolist() == np.diff([*strict, closed]).tolist()
@@ -83,7 +167,7 @@ def test_edges_beside_irrational_shells(rng):
         roots = [math.sqrt(k) for k in (2, 4, 6, 8)]
         edges = sorted(x for r in roots for x in (math.nextafter(r, 0), r, math.nextafter(r, 9)))
         for crystal, frame in ((points, box), (points @ turn, box @ turn)):
-            found = hs.pair_histogram(crystal, edges, box=frame, kernel=kernel)
+            found = call(hs.pair_histogram, crystal, edges, box=frame, kernel=kernel)
             below = [hs.count_pairs(crystal, e, box=frame, inclusive=False) for e in edges[:-1]]
             below.append(hs.count_pairs(crystal, edges[-1], box=frame))
             assert found.tolist() == np.diff(below).tolist()
@@ -102,7 +186,7 @@ def test_away_from_edges_numpy_finds_the_same(dtype, bins, rng):
         previous = edges[np.clip(np.searchsorted(edges, d) - 1, 0, len(edges) - 1)]
         assert min(np.abs(d - nearest).min(), np.abs(d - previous).min()) > 1e-13 * cutoff
         for kernel in hs.kernels():
-            found = hs.pair_histogram(points, edges, box=box, kernel=kernel)
+            found = call(hs.pair_histogram, points, edges, box=box, kernel=kernel)
             assert found.dtype == np.int64
             assert np.array_equal(found, np.histogram(d, edges)[0])
 
@@ -130,11 +214,12 @@ def test_queries_meet_all_points(rng):
         queries = np.concatenate([points[:20], random_scene(rng, 80, spread=3)[0]])
         edges = np.linspace(0.0, cutoff, 9)
         i, j, d = hs.pairs_between(queries, points, cutoff, box=box, quantities="ijd")
-        found = hs.pair_histogram(points, edges, queries=queries, box=box, kernel=kernel)
+        found = call(hs.pair_histogram, points, edges, queries=queries, box=box, kernel=kernel)
         assert found.tolist() == np.histogram(d, edges)[0].tolist()
         assert found[0] >= 20  # each of those finds itself
         types, query_types = rng.integers(0, 2, 400), rng.integers(0, 3, 100)
-        by_type = hs.pair_histogram(
+        by_type = call(
+            hs.pair_histogram,
             points,
             edges,
             queries=queries,
@@ -151,7 +236,8 @@ def test_queries_meet_all_points(rng):
         weights, query_weights = rng.integers(-5, 6, 400), rng.integers(-5, 6, 100)
         for own, asking in ((weights, None), (None, query_weights), (weights, query_weights)):
             terms = (1 if own is None else own[j]) * (1 if asking is None else asking[i])
-            sums = hs.pair_histogram(
+            sums = call(
+                hs.pair_histogram,
                 points,
                 edges,
                 queries=queries,
@@ -172,7 +258,7 @@ def test_weights_are_summed_exactly(scale, rng):
     answer = expected(points, edges, weights=weights)
     for kernel in hs.kernels():
         for k in (slice(None), order):
-            found = hs.pair_histogram(points[k], edges, weights=weights[k], kernel=kernel)
+            found = call(hs.pair_histogram, points[k], edges, weights=weights[k], kernel=kernel)
             assert same_arrays(found, answer)
 
 
@@ -180,10 +266,12 @@ def test_sums_that_cancel():
     for kernel in hs.kernels():
         points = np.arange(4.0)[:, None]
         weights = [1e16, 1.0, 1e16, -1.0]  # 1e16 - 1e16 + ... of neighbours: 1e16 + 1e16 - 1e16
-        found = hs.pair_histogram(points, [0.0, 1.0], weights=weights, kernel=kernel)
+        found = call(hs.pair_histogram, points, [0.0, 1.0], weights=weights, kernel=kernel)
         assert found.tolist() == [1e16]
-        assert hs.pair_histogram(points, [5.0, 6.0], weights=weights).tolist() == [0.0]
-        huge = hs.pair_histogram(points[:2], [0.0, 1.0], weights=[1e200, 1e200], kernel=kernel)
+        assert call(hs.pair_histogram, points, [5.0, 6.0], weights=weights).tolist() == [0.0]
+        huge = call(
+            hs.pair_histogram, points[:2], [0.0, 1.0], weights=[1e200, 1e200], kernel=kernel
+        )
         assert huge.tolist() == [math.inf]
 
 
@@ -193,21 +281,25 @@ def test_nothing_depends_on_kernels_and_threads(box, rng):
     how = {"types": rng.integers(0, 3, 30_000), "weights": rng.normal(size=30_000)}
     edges = np.linspace(0.0, 0.08, 81)
     results = [
-        hs.pair_histogram(points, edges, box=box, kernel=kernel, threads=threads, **how)
+        call(hs.pair_histogram, points, edges, box=box, kernel=kernel, threads=threads, **how)
         for kernel in hs.kernels()
         for threads in (1, 2, 5)
     ]
     assert all(same_arrays(results[0], other) for other in results)
     order = rng.permutation(30_000)
-    again = hs.pair_histogram(
-        points[order], edges, box=box, **{name: values[order] for name, values in how.items()}
+    again = call(
+        hs.pair_histogram,
+        points[order],
+        edges,
+        box=box,
+        **{name: values[order] for name, values in how.items()},
     )
     assert same_arrays(results[0], again)
 
 
 def test_images_beyond_the_box():
     for kernel in hs.kernels():
-        found = hs.pair_histogram([[0.25]], [0.0, 1.0, 2.5, 3.0], box=[1.0], kernel=kernel)
+        found = call(hs.pair_histogram, [[0.25]], [0.0, 1.0, 2.5, 3.0], box=[1.0], kernel=kernel)
         assert found.tolist() == [0, 2, 1]  # itself at 1 and 2; at 3, as the last bin is closed
 
 
@@ -215,24 +307,27 @@ def test_types_are_counted_both_ways(rng):
     points = rng.random((200, 2))
     types = rng.integers(0, 4, 200)
     edges = np.linspace(0.0, 0.3, 7)
-    found = hs.pair_histogram(points, edges, types=types)
+    found = call(hs.pair_histogram, points, edges, types=types)
     assert np.array_equal(found, found.transpose(1, 0, 2))
     upper = sum(found[a, b] for a in range(4) for b in range(a, 4))
     assert upper.tolist() == hs.pair_histogram(points, edges).tolist()
-    assert hs.pair_histogram(points, edges, types=np.zeros(200, np.uint8)).shape == (1, 1, 6)
+    assert call(hs.pair_histogram, points, edges, types=np.zeros(200, np.uint8)).shape == (1, 1, 6)
 
 
 def test_scenes_without_pairs():
     for kernel in hs.kernels():
         for points in ([], [[0.5, 0.5]], np.empty((0, 2)), [[0.0], [9.0]]):
-            assert hs.pair_histogram(points, [0.0, 1.0, 2.0], kernel=kernel).tolist() == [0, 0]
-        assert hs.pair_histogram([], [0.0, 1.0], types=[]).tolist() == [[[0]]]
-        assert hs.pair_histogram([], [0.0, 1.0], weights=[]).tolist() == [0.0]
+            assert call(hs.pair_histogram, points, [0.0, 1.0, 2.0], kernel=kernel).tolist() == [
+                0,
+                0,
+            ]
+        assert call(hs.pair_histogram, [], [0.0, 1.0], types=[]).tolist() == [[[0]]]
+        assert call(hs.pair_histogram, [], [0.0, 1.0], weights=[]).tolist() == [0.0]
         assert hs.pair_histogram([[0.0]], [0.0, 1.0], queries=[]).tolist() == [0]
         same_place = np.full((100, 3), 0.7)
-        assert hs.pair_histogram(same_place, [0.0, 0.0], kernel=kernel).tolist() == [4950]
-        assert hs.pair_histogram(same_place, [0.0, 1e-300], kernel=kernel).tolist() == [4950]
-        assert hs.pair_histogram(same_place, [5e-324, 1.0], kernel=kernel).tolist() == [0]
+        assert call(hs.pair_histogram, same_place, [0.0, 0.0], kernel=kernel).tolist() == [4950]
+        assert call(hs.pair_histogram, same_place, [0.0, 1e-300], kernel=kernel).tolist() == [4950]
+        assert call(hs.pair_histogram, same_place, [5e-324, 1.0], kernel=kernel).tolist() == [0]
 
 
 def test_counts_of_many_cutoffs_are_those_of_single_ones(rng):
@@ -242,20 +337,20 @@ def test_counts_of_many_cutoffs_are_those_of_single_ones(rng):
             cutoffs = [0.0, 1e-9, *np.sort(cutoff * rng.random(30)), cutoff, cutoff]
             how = {"box": box, "inclusive": inclusive, "kernel": kernel}
             for queries in (None, points[:100]):
-                found = hs.count_pairs(points, cutoffs, queries=queries, **how)
+                found = call(hs.count_pairs, points, cutoffs, queries=queries, **how)
                 assert found.dtype == np.int64
                 assert found.tolist() == [
-                    hs.count_pairs(points, c, queries=queries, **how) for c in cutoffs
+                    call(hs.count_pairs, points, c, queries=queries, **how) for c in cutoffs
                 ]
 
 
 def test_memory_is_that_of_the_bins(rng):
     points = rng.random((10_000, 3))  # 5e7 pairs
     edges = np.linspace(0.0, 2.0, 101)
-    found = hs.pair_histogram(points, edges, memory_limit=50_000_000)
+    found = call(hs.pair_histogram, points, edges, memory_limit=50_000_000)
     assert found.sum() == 10_000 * 9_999 // 2
     with pytest.raises(MemoryError):
-        hs.pair_histogram(points, edges, types=np.arange(10_000), memory_limit=50_000_000)
+        call(hs.pair_histogram, points, edges, types=np.arange(10_000), memory_limit=50_000_000)
 
 
 BAD_EDGES = {
@@ -286,14 +381,12 @@ BAD_MARKS = {
     "weights of another length": ({"weights": [1.0]}, ValueError, r"shape \(2,\)"),
     "a weight that is NaN": ({"weights": [1.0, math.nan]}, ValueError, r"weights\[1\] = nan"),
     "weights that are complex": ({"weights": [1j, 2.0]}, TypeError, "weights"),
-    "query_types alone": ({"query_types": [0]}, ValueError, "query_types needs queries"),
-    "query_weights alone": ({"query_weights": [1.0]}, ValueError, "query_weights needs queries"),
-    "types of one set": ({"queries": [[0.0]], "types": [0, 1]}, ValueError, "together"),
+    "types of one set": ({"queries": [[0.0]], "types": [0, 1]}, ValueError, "queries have none"),
     "query_weights of another length": (
         {"queries": [[0.0]], "query_weights": [1.0, 2.0]}, ValueError, r"shape \(1,\)",
     ),
     "an infinite query weight": (
-        {"queries": [[0.0]], "query_weights": [math.inf]}, ValueError, r"query_weights\[0\] = inf",
+        {"queries": [[0.0]], "query_weights": [math.inf]}, ValueError, r"weights\[0\] = inf",
     ),
     "queries of another dimension": ({"queries": [[0.0, 1.0]]}, ValueError, "columns"),
 }  # fmt: skip
@@ -302,14 +395,14 @@ BAD_MARKS = {
 def test_bad_types_and_weights_are_refused():
     for marks, error, text in BAD_MARKS.values():
         with pytest.raises(error, match=text):
-            hs.pair_histogram([[0.0], [1.0]], [0.0, 1.0], **marks)
+            call(hs.pair_histogram, [[0.0], [1.0]], [0.0, 1.0], **marks)
 
 
 def test_results_beyond_memory_are_refused_at_once():
     points = np.zeros((2, 1))
     for last in (10**5, 2**31 - 2):
         with pytest.raises(MemoryError, match="types"):
-            hs.pair_histogram(points, [0.0, 1.0], types=[0, last])
+            call(hs.pair_histogram, points, [0.0, 1.0], types=[0, last])
     with pytest.raises(MemoryError, match="edges"):
         hs.pair_histogram(points, np.broadcast_to(1.0, 2**40))
     with pytest.raises(ValueError, match="edges must have shape"):  # before it is copied

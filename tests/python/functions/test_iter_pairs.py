@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 from stream_scenes import BOX, SCENES
 from subprocesses import RESIDENT, run
 
@@ -40,9 +41,9 @@ def test_blocks_are_the_pairs_in_their_order(scene):
     points, cutoff, options = scene
     for quantities in ("ij", "P", "ijdDS"):
         options = {**options, "quantities": quantities}
-        expected = hs.pairs(points, cutoff, **options)
+        expected = call(hs.pairs, points, cutoff, **options)
         for max_pairs in (7, 1009, 1 << 20, 10**30) if quantities != "P" else (1,):
-            blocks = list(hs.iter_pairs(points, cutoff, max_pairs=max_pairs, **options))
+            blocks = list(call(hs.iter_pairs, points, cutoff, max_pairs=max_pairs, **options))
             assert_same(blocks, expected, quantities, max_pairs)
 
 
@@ -50,12 +51,12 @@ def test_blocks_are_the_pairs_in_their_order(scene):
 def test_any_kernel_and_any_number_of_threads(index_dtype, rng):
     points = rng.random((6000, 3))
     options = {"box": BOX, "index_dtype": index_dtype, "quantities": "jSd"}
-    expected = hs.pairs(points, 0.14, **options)
+    expected = call(hs.pairs, points, 0.14, **options)
     assert len(expected[0]) > 200_000
     for kernel, threads in zip([*hs.kernels(), None], (1, 2, 3, 2)):
         how = {"kernel": kernel, "threads": threads, **options}
         for max_pairs in (65_536, 99_991):
-            blocks = list(hs.iter_pairs(points, 0.14, max_pairs=max_pairs, **how))
+            blocks = list(call(hs.iter_pairs, points, 0.14, max_pairs=max_pairs, **how))
             assert_same(blocks, expected, "jSd", max_pairs)
 
 
@@ -64,9 +65,9 @@ def test_quantities_one_by_one(precision, rng):
     for letter in "ijdDSP":
         points = rng.random((200, 2))
         options = {"box": [1.0, 1.0], "quantities": letter, "precision": precision}
-        blocks = list(hs.iter_pairs(points, 0.3, max_pairs=501, **options))
+        blocks = list(call(hs.iter_pairs, points, 0.3, max_pairs=501, **options))
         assert all(isinstance(block, np.ndarray) for block in blocks)
-        assert_same(blocks, hs.pairs(points, 0.3, **options), letter, 501)
+        assert_same(blocks, call(hs.pairs, points, 0.3, **options), letter, 501)
 
 
 def test_one_group_with_more_pairs_than_a_block(rng):
@@ -126,7 +127,7 @@ def test_changed_points_change_nothing(rng):
 def test_wrong_arguments_are_refused_by_the_call(change, error):
     arguments = {"points": [[0.0, 0.0], [1.0, 0.0]], "cutoff": 1.0} | change
     with pytest.raises(error):
-        hs.iter_pairs(**arguments)
+        call(hs.iter_pairs, **arguments)
 
 
 def test_it_is_an_iterator_that_ends_for_good():
@@ -153,7 +154,7 @@ def test_progress_never_falls_and_ends_at_one(rng, threads, max_pairs):
     seen = []
     points = rng.random((20_000, 3))
     options = {"quantities": "d", "max_pairs": max_pairs, "threads": threads}
-    n = sum(len(d) for d in hs.iter_pairs(points, 0.12, progress=seen.append, **options))
+    n = sum(len(d) for d in call(hs.iter_pairs, points, 0.12, progress=seen.append, **options))
     assert n == hs.count_pairs(points, 0.12)
     assert seen == sorted(seen) and seen[0] >= 0.0 and seen[-1] == 1.0
     assert len(set(seen)) >= min(n // max_pairs, 5)
@@ -194,8 +195,8 @@ def test_progress_of_batches_and_of_cells_never_falls(rng):
     points, batch = rng.random((60_000, 3)), np.arange(60_000) // 20_000
     cells = hs.CellList(points, 0.08)
     for search in (
-        lambda **how: hs.pairs(points, 0.08, batch=batch, **how),
-        lambda **how: hs.pairs(points.tolist(), 0.08, **how),
+        lambda **how: call(hs.pairs, points, 0.08, batch=batch, **how),
+        lambda **how: call(hs.pairs, points.tolist(), 0.08, **how),
         cells.pairs,
     ):
         told = []
@@ -210,7 +211,10 @@ def test_exceptions_of_the_hook_end_the_search(rng):
     def hook(fraction):
         raise KeyError(fraction)
 
-    for search in (lambda **how: hs.pairs(points, 0.08, **how), hs.CellList(points, 0.08).pairs):
+    for search in (
+        lambda **how: call(hs.pairs, points, 0.08, **how),
+        hs.CellList(points, 0.08).pairs,
+    ):
         with pytest.raises(KeyError):
             search(progress=hook)
         with pytest.raises(TypeError, match="progress must be callable or a bool, got int"):
@@ -279,16 +283,16 @@ def test_shifts_that_do_not_fit_are_refused():
 
 def test_a_block_that_does_not_fit_is_refused(rng):
     points = rng.random((4000, 2))
-    blocks = hs.iter_pairs(points, 2.0, max_pairs=4_000_000, memory_limit=20e6)
+    blocks = call(hs.iter_pairs, points, 2.0, max_pairs=4_000_000, memory_limit=20e6)
     with pytest.raises(MemoryError, match="max_pairs"):
         next(blocks)
-    fitting = hs.iter_pairs(points, 2.0, max_pairs=100_000, memory_limit=20e6, threads=1)
+    fitting = call(hs.iter_pairs, points, 2.0, max_pairs=100_000, memory_limit=20e6, threads=1)
     assert sum(len(i) for i, _ in fitting) == 4000 * 3999 // 2
 
 
 def test_refusals_of_pairs_point_here(rng):
     with pytest.raises(MemoryError, match="iter_pairs"):
-        hs.pairs(rng.random((4000, 2)), 2.0, memory_limit=20e6)
+        call(hs.pairs, rng.random((4000, 2)), 2.0, memory_limit=20e6)
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ import pytest
 from support.rational_images import Images, between, dot, exact
 
 import halfshell as hs
+from calls import call
 
 
 def vector_of(points, i, j, S, box, periodic):
@@ -40,7 +41,7 @@ def ulps(value, true):
 def check(points, i, j, box=None, periodic=None, **options):
     """Each pair is that of the nearest image with the least S, and measured to an ulp."""
     points = np.asarray(points)
-    d, D, S = hs.measure(points, i, j, box=box, periodic=periodic, **options)
+    d, D, S = call(hs.measure, points, i, j, box=box, periodic=periodic, **options)
     assert d.dtype == D.dtype == np.float64 and S.dtype == np.int32
     assert d.shape == (len(i),) and D.shape == S.shape == (len(i), points.shape[1])
     images = Images(points.shape[1], box, periodic)
@@ -58,7 +59,7 @@ def check(points, i, j, box=None, periodic=None, **options):
         unit = Fraction(math.ulp(float(max(length, Fraction(5e-324)))))
         for k, component in enumerate(true):
             assert abs(Fraction(float(D[e, k])) - component) <= unit
-    again = hs.measure(points, i, j, S, box=box, periodic=periodic, **options)
+    again = call(hs.measure, points, i, j, S, box=box, periodic=periodic, **options)
     for one, other in zip((d, D, S), again, strict=True):
         np.testing.assert_array_equal(one, other)
     return d, D, S
@@ -159,12 +160,12 @@ def test_pairs_that_are_found_have_the_same_bits(kind, dtype):
     points = rng.uniform(-2.0, 5.0, (400, 3)).astype(dtype)
     box = np.diag([2.0, 3.1, 2.7]) + (np.tri(3, k=-1) * 1.3 if kind == "skewed" else 0.0)
     options = {} if kind == "open" else {"box": box, "periodic": [True, kind != "mixed", True]}
-    i, j, d, D, S = hs.pairs(points, 1.9, quantities="ijdDS", **options)
+    i, j, d, D, S = call(hs.pairs, points, 1.9, quantities="ijdDS", **options)
     assert len(i) > 1000
     for kernel in hs.kernels():
         options["kernel"] = kernel
-        found = hs.measure(points, i, j, S, **options)
-        turned = hs.measure(points, j, i, -S, quantities="SDd", **options)
+        found = call(hs.measure, points, i, j, S, **options)
+        turned = call(hs.measure, points, j, i, -S, quantities="SDd", **options)
         for one, other in zip((*found, *turned), (d, D, S, -S, -D + 0.0, d), strict=True):
             assert one.tobytes() == other.tobytes()
 
@@ -253,7 +254,7 @@ POINTS, BOX = np.zeros((3, 2)), [1.0, 1.0]
 )
 def test_what_is_wrong_is_said(arguments, options, error, message):
     with pytest.raises(error, match=re.escape(message)):
-        hs.measure(POINTS, *arguments, **options)
+        call(hs.measure, POINTS, *arguments, **options)
 
 
 def test_what_no_float_holds_is_refused():

@@ -11,15 +11,8 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 import halfshell as hs
-from oracles import (
-    BOX_KINDS,
-    EXACT_ROTATION,
-    full_box,
-    lattice,
-    random_box,
-    same_arrays,
-    whole,
-)
+from calls import call
+from oracles import BOX_KINDS, EXACT_ROTATION, full_box, lattice, random_box, same_arrays, whole
 
 
 def whole_rows(rows):
@@ -86,7 +79,8 @@ def check(points, k, **how):
     scene = {key: value for key, value in how.items() if key != "max_distance"}
     expected = expected_rows(points, k, max_distance=limit, **scene)
     arrays, *others = (
-        hs.nearest(points, k, quantities="jdDS", kernel=kernel, **how) for kernel in hs.kernels()
+        call(hs.nearest, points, k, quantities="jdDS", kernel=kernel, **how)
+        for kernel in hs.kernels()
     )
     assert all(same_arrays(arrays, other) for other in others)
     j, d, D, S = arrays
@@ -199,7 +193,7 @@ def test_queries_far_outside(rng):
     check(points[:3], 5, queries=[[0.3, 0.2, 6.0], [5.1, 0.2, -9.0]], **slab)
     # The nearest is the one with the least distance in the plane among those of the top layer.
     points[:, 2] = 0.0
-    j = hs.nearest(points, 1, queries=[[0.5, 0.5, 1e4]], quantities="j", **slab)
+    j = call(hs.nearest, points, 1, queries=[[0.5, 0.5, 1e4]], quantities="j", **slab)
     lateral = np.hypot(*(points[:, :2] - 0.5).T)
     assert j[0, 0] == np.argmin(lateral)
 
@@ -268,7 +262,7 @@ def scenes_of_all_densities(rng, n):
 def test_distances_are_those_of_a_tree(rng):
     for kernel in hs.kernels():
         for name, points in scenes_of_all_densities(rng, 4000).items():
-            j, d = hs.nearest(points, 9, kernel=kernel)
+            j, d = call(hs.nearest, points, 9, kernel=kernel)
             rest = np.abs(points).max(axis=1) < 1e200
             near = points[rest]
             unit = 2.0**-500 if name.startswith("tiny") else 1.0  # the tree squares
@@ -282,7 +276,7 @@ def test_many_neighbours(rng):
     for kernel in hs.kernels():
         points = rng.random((3000, 3))
         for k in (100, 700, 2999, 3100):
-            j, d = hs.nearest(points[:], k, queries=points[:20], kernel=kernel)
+            j, d = call(hs.nearest, points[:], k, queries=points[:20], kernel=kernel)
             expected, numbers = cKDTree(points).query(points[:20], min(k, 3000))
             np.testing.assert_allclose(d[:, :3000], expected, rtol=1e-14)
             assert np.array_equal(j[:, :3000], numbers) and (j[:, 3000:] == -1).all()
@@ -291,10 +285,12 @@ def test_many_neighbours(rng):
 def test_the_same_bits_for_any_kernel_and_number_of_threads(rng):
     points, box = rng.random((6000, 3)), random_box(rng, "rotated")
     points[:500] = np.round(points[:500], 1)
-    one = hs.nearest(points, 12, box=box, quantities="jdDS", kernel="scalar", threads=1)
+    one = call(hs.nearest, points, 12, box=box, quantities="jdDS", kernel="scalar", threads=1)
     for name in hs.kernels():
         for threads in (1, 2, 3):
-            other = hs.nearest(points, 12, box=box, quantities="jdDS", kernel=name, threads=threads)
+            other = call(
+                hs.nearest, points, 12, box=box, quantities="jdDS", kernel=name, threads=threads
+            )
             assert same_arrays(one, other)
 
 
@@ -360,7 +356,7 @@ def test_a_point_and_an_identical_query():
         (MemoryError, "more than fits in any memory", {"k": 2**70}),
         (ValueError, "max_distance must not be negative", {"max_distance": -1.0}),
         (ValueError, "max_distance must not be negative or NaN", {"max_distance": math.nan}),
-        (TypeError, "max_distance must be a number", {"max_distance": [1.0, 2.0]}),
+        (ValueError, "max_distance must be a number", {"max_distance": [1.0, 2.0]}),
         (TypeError, "max_distance must be a number", {"max_distance": "1"}),
         (ValueError, "same number of columns", {"queries": [[1.0, 2.0, 3.0]]}),
         (ValueError, r"queries must have shape \(n, d\)", {"queries": [1.0, 2.0]}),
@@ -383,7 +379,7 @@ def test_a_point_and_an_identical_query():
 def test_bad_arguments(error, match, how):
     arguments = {"k": 2, **how}
     with pytest.raises(error, match=match):
-        hs.nearest([[0.0, 0.0], [1.0, 0.0]], **arguments)
+        call(hs.nearest, [[0.0, 0.0], [1.0, 0.0]], **arguments)
 
 
 def test_shifts_that_do_not_fit_are_refused():
@@ -404,3 +400,31 @@ def test_more_images_than_memory_are_refused():
             np.zeros((2, 3)), 1, queries=[[0.0, 0.0, 1e10]], box=np.ones(3),
             periodic=[True, True, False],
         )  # fmt: skip
+
+
+@pytest.mark.parametrize("d", [1, 2, 3, 8])
+def test_rows_of_some_points_only(d, rng):
+    points = np.repeat(rng.integers(0, 6, (60, d)) / 4.0, 2, axis=0)  # many that coincide
+    for how in ({}, {"box": [1.5] * d}, {"box": [1.5] * d, "periodic": [True] + [False] * (d - 1)}):
+        for k in (1, 4, 200):
+            every = hs.nearest(points, k, quantities="jdDS", **how)
+            for some in ([7], [3, 119, 3, 0], np.arange(119, -1, -7), []):
+                found = hs.nearest(points, k, quantities="jdDS", indices=some, **how)
+                for one, other in zip(found, every):
+                    rows = other[np.asarray(some, int)]
+                    assert one.dtype == rows.dtype and one.shape == rows.shape
+                    if other is every[1]:
+                        assert np.array_equal(one, rows)
+                exact = hs.measure(points, np.repeat(some, k)[found[0].ravel() >= 0].astype(int),
+                                   found[0][found[0] >= 0], found[3][found[0] >= 0],
+                                   quantities="d", **how)  # fmt: skip
+                assert np.array_equal(exact, found[1][found[0] >= 0])
+                assert how or not (found[0] == np.reshape(some, (-1, 1))).any()
+    systems = hs.Points.stack([points[:50], points[50:]])
+    found = hs.nearest(systems, 3, indices=[110, 4, 60])
+    assert np.array_equal(found[1], hs.nearest(systems, 3)[1][[110, 4, 60]])
+    assert (found[0][0] >= 50).all() and (found[0][1] < 50).all()
+    with pytest.raises(ValueError, match="indices select rows of the points: do not give queries"):
+        hs.nearest(points, 2, indices=[0], queries=points)
+    with pytest.raises(ValueError, match=r"indices must be numbers of points.*indices\[1\] = 120"):
+        hs.nearest(points, 2, indices=[0, 120])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 from halfshell._convert import progress as bar
 
 HIDE, SHOW = "\x1b[?25l", "\x1b[?25h"  # the cursor
@@ -50,15 +51,18 @@ def searches(points):
     cells = hs.CellList(points, 0.08)
     return {
         "pairs": lambda progress: hs.pairs(points, 0.08, threads=1, progress=progress),
-        "batch": lambda progress: hs.pairs(
-            points, 0.08, batch=np.arange(len(points)) // 20_000, threads=1, progress=progress
+        "batch": lambda progress: call(
+            hs.pairs,
+            points,
+            0.08,
+            batch=np.arange(len(points)) // 20_000,
+            threads=1,
+            progress=progress,
         ),
         "blocks": lambda progress: list(hs.iter_pairs(points, 0.08, progress=progress)),
         "cells": lambda progress: cells.pairs(threads=1, progress=progress),
         "cells, blocks": lambda progress: list(cells.iter_pairs(progress=progress)),
-        "frames": lambda progress: list(
-            hs.trajectory_pairs([points] * 3, 0.08, progress=progress)
-        ),
+        "frames": lambda progress: list(hs.trajectory_pairs([points] * 3, 0.08, progress=progress)),
     }
 
 
@@ -115,7 +119,7 @@ def test_blocks_that_are_given_up_leave_no_bar(points, slow, terminal):
 def test_errors_leave_no_bar(points, slow, terminal):
     screen = terminal()
     with pytest.raises(MemoryError):
-        hs.pairs(points, 0.3, progress=True, threads=1, memory_limit=5e6)
+        call(hs.pairs, points, 0.3, progress=True, threads=1, memory_limit=5e6)
     with pytest.raises(TypeError, match="box="):
         hs.pairs(points, 0.1, progress=True, cell=3)
     with pytest.raises(ValueError, match="cutoff"):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 from full_lists import assert_last_place
 from halfshell._check.reference import exact_square
 from halfshell._convert.options import LETTERS, SHELL
@@ -89,7 +90,7 @@ def test_vector_is_j_minus_i_plus_shift_times_box(kind, rng):
     for spread, inclusive in itertools.product((1, 3, 10**6), (True, False)):
         points, cutoff, box, _ = random_scene(rng, 12, 3, kind, 8, spread)
         how = {"box": box, "quantities": "ijSdD", "inclusive": inclusive}
-        first, *others = (hs.pairs(points, cutoff, kernel=k, **how) for k in hs.kernels())
+        first, *others = (call(hs.pairs, points, cutoff, kernel=k, **how) for k in hs.kernels())
         assert all(same_arrays(first, other) for other in others)
         assert len(first[0])
         assert_last_place(points, cutoff, box, [x.tolist() for x in first], inclusive)
@@ -105,7 +106,8 @@ def test_distances_never_contradict_the_decision(rng):
                 rotated, frame = points @ turn, box @ turn
                 for square in (2, 4, 6):
                     cutoff = math.sqrt(square)
-                    d = hs.pairs(
+                    d = call(
+                        hs.pairs,
                         rotated,
                         cutoff,
                         box=frame,
@@ -120,11 +122,9 @@ def test_distances_never_contradict_the_decision(rng):
 def test_distance_at_the_cutoff_is_the_cutoff():
     for kernel in hs.kernels():
         points = np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 0.0], [1.0, 2.0, -2.0]]) / 8
-        assert hs.pairs(points, 5 / 8, quantities="Pd", sort=True, kernel=kernel)[1].tolist() == [
-            5 / 8,
-            3 / 8,
-            math.sqrt(12) / 8,
-        ]
+        assert call(hs.pairs, points, 5 / 8, quantities="Pd", sort=True, kernel=kernel)[
+            1
+        ].tolist() == [5 / 8, 3 / 8, math.sqrt(12) / 8]
 
 
 def test_cancellation_does_not_cost_digits():
@@ -133,7 +133,7 @@ def test_cancellation_does_not_cost_digits():
         box = np.array([[0.1, 0.0, 0.0], [0.03, 0.11, 0.0], [0.02, -0.05, 0.13]])
         points = np.array([[0.01, 0.02, 0.03], [0.01, 0.02, 0.03]])
         points[1] += np.array([999_983, -1_000_003, 777_777]) @ box
-        found = hs.pairs(points, 0.09, box=box, quantities="ijSdD", kernel=kernel)
+        found = call(hs.pairs, points, 0.09, box=box, quantities="ijSdD", kernel=kernel)
         assert len(found[0])
         assert_last_place(points, 0.09, box, [x.tolist() for x in found])
 
@@ -144,10 +144,10 @@ def test_last_place_at_extreme_magnitudes(rng):
         for exponent in (-1070, -1000, -540, -500, 480, 520, 1000):
             scale = 2.0**exponent
             scaled, cutoff = points * scale, 0.7 * scale
-            found = hs.pairs(scaled, cutoff, quantities="ijSdD", kernel=kernel)
+            found = call(hs.pairs, scaled, cutoff, quantities="ijSdD", kernel=kernel)
             assert_last_place(scaled, cutoff, None, [x.tolist() for x in found])
             box = np.eye(3) * scale
-            found = hs.pairs(scaled, cutoff, box=box, quantities="ijSdD", kernel=kernel)
+            found = call(hs.pairs, scaled, cutoff, box=box, quantities="ijSdD", kernel=kernel)
             assert_last_place(scaled, cutoff, box, [x.tolist() for x in found])
 
 
@@ -155,7 +155,7 @@ def test_last_place_in_eight_dimensions(rng):
     for kernel in hs.kernels():
         for ndim in (1, 2, 4, 5, 8):
             points = rng.normal(size=(12, ndim))
-            found = hs.pairs(points, 3.0, quantities="ijSdD", kernel=kernel)
+            found = call(hs.pairs, points, 3.0, quantities="ijSdD", kernel=kernel)
             assert_last_place(points, 3.0, None, [x.tolist() for x in found])
 
 
@@ -193,7 +193,7 @@ def test_double_is_one_fixed_float64_formula(ndim, rng):
         expected = rounded_pairs(points, cutoff, box, inclusive)
         how = {"box": box, "quantities": "ijS", "inclusive": inclusive, "precision": "double"}
         for kernel in hs.kernels():
-            assert as_set(*hs.pairs(points, cutoff, kernel=kernel, **how)) == expected
+            assert as_set(*call(hs.pairs, points, cutoff, kernel=kernel, **how)) == expected
 
 
 @pytest.mark.parametrize("ndim, size", [(1, 500), (2, 25)])
@@ -208,9 +208,9 @@ def test_double_rounds_far_away_as_the_formula_does(ndim, size, rng):
                 points = grid @ turn + np.round(rng.uniform(-spread, spread, grid.shape)) @ box
                 for cutoff in (1.1, 2.2):
                     how = {"box": box, "quantities": "ijS", "kernel": kernel}
-                    found = as_set(*hs.pairs(points, cutoff, precision="double", **how))
+                    found = as_set(*call(hs.pairs, points, cutoff, precision="double", **how))
                     assert found == rounded_pairs(points, cutoff, box, True, margin=1e-2)
-                    differences += len(found - as_set(*hs.pairs(points, cutoff, **how)))
+                    differences += len(found - as_set(*call(hs.pairs, points, cutoff, **how)))
         assert differences > 100
 
 
@@ -220,7 +220,8 @@ def test_double_and_exact_differ_on_a_rotated_crystal(rng):
     points, box = points @ turn, box @ turn
     counts = {
         precision: [
-            hs.count_pairs(points, math.sqrt(k), box=box, precision=precision) for k in (1, 2, 3, 5)
+            call(hs.count_pairs, points, math.sqrt(k), box=box, precision=precision)
+            for k in (1, 2, 3, 5)
         ]
         for precision in ("exact", "double")
     }
@@ -236,8 +237,14 @@ def test_single_errs_only_next_to_the_cutoff(dtype, rng):
             points = points.astype(dtype)
             sets = []
             for precision in ("exact", "single"):
-                i, j, S = hs.pairs(
-                    points, cutoff, box=box, quantities="ijS", precision=precision, kernel=kernel
+                i, j, S = call(
+                    hs.pairs,
+                    points,
+                    cutoff,
+                    box=box,
+                    quantities="ijS",
+                    precision=precision,
+                    kernel=kernel,
                 )
                 sets.append(set(zip(i.tolist(), j.tolist(), map(tuple, S.tolist()))))
             for i, j, S in sets[0] ^ sets[1]:
@@ -253,5 +260,6 @@ def test_rounded_rules_agree_with_the_exact_one_away_from_the_cutoff(precision, 
         for box in (None, [3.0, 3.0, 3.0]):
             how = {"box": box, "quantities": "ijS", "sort": True, "kernel": kernel}
             assert same_arrays(
-                hs.pairs(points, 1.01, precision=precision, **how), hs.pairs(points, 1.01, **how)
+                call(hs.pairs, points, 1.01, precision=precision, **how),
+                call(hs.pairs, points, 1.01, **how),
             )

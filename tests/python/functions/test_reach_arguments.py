@@ -1,14 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Radii and rules as they may be given, and all that is refused, before anything is searched."""
+"""Radii, rules, types and cutoffs by type as they may be given, and all that is refused."""
 
-import threading
+import math
 
 import numpy as np
 import pytest
+from ase import Atoms
+from ase.build import bulk, molecule
+from ase.data import chemical_symbols
+from ase.neighborlist import natural_cutoffs, neighbor_list
 
 import halfshell as hs
+from boundary import as_if_atoms
+from calls import call
+from halfshell._convert.objects import SYMBOLS
 from oracles import same_arrays
-from reach_scenes import RULES, SYMMETRIC
+from reach_scenes import BOXES, SYMMETRIC, Reaching, boxed, check
 from refused_calls import INF, NAN, assert_refused
 
 RNG = np.random.default_rng(11)
@@ -26,14 +33,14 @@ def with_radius(k, value, n=30):
 def calls(points=POINTS, **how):
     """Every function of one set, with these keywords."""
     return [
-        lambda: hs.pairs(points, None, **how),
-        lambda: hs.count_pairs(points, None, **how),
-        lambda: hs.neighbors(points, None, **how),
-        lambda: hs.coordination(points, None, **how),
-        lambda: hs.iter_pairs(points, None, **how),
-        lambda: hs.for_each_pair(points, None, lambda *pair: None, **how),
-        lambda: hs.verify(points, None, [0], [1], **how),
-        lambda: hs.explain(points, None, **how),
+        lambda: call(hs.pairs, points, None, **how),
+        lambda: call(hs.count_pairs, points, None, **how),
+        lambda: call(hs.neighbors, points, None, **how),
+        lambda: call(hs.coordination, points, None, **how),
+        lambda: call(hs.iter_pairs, points, None, **how),
+        lambda: call(hs.for_each_pair, points, None, lambda *pair: None, **how),
+        lambda: call(hs.verify, points, None, [0], [1], **how),
+        lambda: call(hs.explain, points, None, **how),
     ]
 
 
@@ -41,7 +48,7 @@ def calls(points=POINTS, **how):
 
 
 def test_radii_may_have_any_form():
-    expected = hs.pairs(POINTS, None, radii=RADII, sort=True)
+    expected = call(hs.pairs, POINTS, None, radii=RADII, sort=True)
     assert len(expected[0]) > 10
     read_only = RADII.copy()
     read_only.flags.writeable = False
@@ -49,36 +56,37 @@ def test_radii_may_have_any_form():
     for radii in (RADII.tolist(), tuple(RADII), RADII.astype(np.float32), RADII.astype(">f8"),
                   RADII.astype(np.float16), np.repeat(RADII, 3)[::3], RADII[::-1].copy()[::-1],
                   memoryview(RADII), read_only, unaligned, RADII.astype(object)):  # fmt: skip
-        assert same_arrays(hs.pairs(POINTS, None, radii=radii, sort=True), expected)
+        assert same_arrays(call(hs.pairs, POINTS, None, radii=radii, sort=True), expected)
     whole = np.ones(30, np.int64)
     for kind in (np.int64, np.uint8, np.bool_):
-        found = hs.count_pairs(POINTS, 0.5, radii=whole.astype(kind))
+        found = call(hs.count_pairs, POINTS, 0.5, radii=whole.astype(kind))
         assert found == hs.count_pairs(POINTS, 0.5)
 
 
 def test_the_sum_is_the_rule_unless_another_is_named():
     assert same_arrays(
-        hs.pairs(POINTS, None, radii=RADII), hs.pairs(POINTS, None, radii=RADII, rule="sum")
+        call(hs.pairs, POINTS, None, radii=RADII),
+        call(hs.pairs, POINTS, None, radii=RADII, rule="sum"),
     )
-    counts = [hs.count_pairs(POINTS, None, radii=RADII, rule=rule) for rule in SYMMETRIC]
+    counts = [call(hs.count_pairs, POINTS, None, radii=RADII, rule=rule) for rule in SYMMETRIC]
     assert counts[0] > counts[2] > counts[1] > counts[3] > 0
 
 
 def test_several_upper_bounds_are_counted_at_once():
     bounds = [0.0, 0.1, 0.2, 0.4, 2.0]
     for how in ({"radii": RADII}, {"radii": RADII, "rule": "max", "box": 1.0}):
-        several = hs.count_pairs(POINTS, bounds, **how)
+        several = call(hs.count_pairs, POINTS, bounds, **how)
         assert several.dtype == np.int64
-        assert several.tolist() == [hs.count_pairs(POINTS, bound, **how) for bound in bounds]
-        assert several[-1] == hs.count_pairs(POINTS, None, **how)
+        assert several.tolist() == [call(hs.count_pairs, POINTS, bound, **how) for bound in bounds]
+        assert several[-1] == call(hs.count_pairs, POINTS, None, **how)
 
 
 def test_inputs_are_not_changed_and_may_change_later():
     radii, points = RADII.copy(), POINTS.copy()
-    table = hs.neighbors(points, None, radii=radii, quantities="jd", box=1.0)
+    table = call(hs.neighbors, points, None, radii=radii, quantities="jd", box=1.0)
     expected = table.sort().indices.tolist()
-    again = hs.neighbors(points, None, radii=radii, quantities="jd", box=1.0)
-    blocks = hs.iter_pairs(points, None, radii=radii, max_pairs=10)
+    again = call(hs.neighbors, points, None, radii=radii, quantities="jd", box=1.0)
+    blocks = call(hs.iter_pairs, points, None, radii=radii, max_pairs=10)
     first = next(blocks)
     assert np.array_equal(radii, RADII)
     radii[:] = 0.0
@@ -86,39 +94,10 @@ def test_inputs_are_not_changed_and_may_change_later():
     assert again.sort().indices.tolist() == expected
     rest = [first, *blocks]
     found = tuple(np.concatenate(columns) for columns in zip(*rest))
-    assert same_arrays(found, hs.pairs(POINTS, None, radii=RADII))
+    assert same_arrays(found, call(hs.pairs, POINTS, None, radii=RADII))
 
 
 # ---- radii ---------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "value, fragments",
-    [
-        (-1.0, [r"finite and not negative", r"radii\[7\] = -1"]),
-        (-5e-324, [r"finite and not negative", r"radii\[7\] = -"]),
-        (NAN, [r"finite and not negative", r"radii\[7\] = nan"]),
-        (INF, [r"finite and not negative", r"radii\[7\] = inf"]),
-        (-INF, [r"finite and not negative", r"radii\[7\] = -inf"]),
-        (np.nextafter(2.0**1022, INF), [r"2\*\*1022", r"radii\[7\]"]),
-    ],
-)
-def test_radii_that_are_no_lengths(value, fragments):
-    for call in calls(radii=with_radius(7, value)):
-        assert_refused(call, ValueError, *fragments)
-    for rule in RULES[1:]:
-        assert_refused(
-            lambda rule=rule: hs.neighbors(
-                POINTS, None, radii=with_radius(7, value), rule=rule
-            ), ValueError, *fragments,
-        )  # fmt: skip
-    fragments = [fragment.replace("radii", "query_radii") for fragment in fragments]
-    for how in ({"rule": "gather"}, {"radii": RADII}):
-        assert_refused(
-            lambda how=how: hs.pairs_between(
-                POINTS, POINTS, None, query_radii=with_radius(7, value), **how
-            ), ValueError, *fragments,
-        )  # fmt: skip
 
 
 @pytest.mark.parametrize("row", [5, 140_000, 299_999])
@@ -129,101 +108,60 @@ def test_the_first_wrong_row_of_many(row):
     radii, table = with_radius(row, NAN, n), [[0.25]]
 
     def count(cutoff, **how):
-        return lambda: hs.count_pairs(points, cutoff, **how)
+        return lambda: call(hs.count_pairs, points, cutoff, **how)
 
     assert_refused(count(None, radii=radii), ValueError, rf"radii\[{row}\]")
     types[row] = 7
-    assert_refused(count(table, types=types), ValueError, rf"types\[{row}\]")
+    assert_refused(count(table, types=types), ValueError, rf"type 7 of points\[{row}\]")
     points[row] = NAN
     radii[row], types[row] = 0.01, 0
-    assert_refused(count(None, radii=radii), ValueError, rf"points\[{row}")
-    assert_refused(count(table, types=types), ValueError, rf"points\[{row}")
+    assert_refused(count(None, radii=radii), ValueError, rf"(points|positions)\[{row}")
+    assert_refused(count(table, types=types), ValueError, rf"(points|positions)\[{row}")
 
 
 def test_radii_that_cannot_be_halved():
     small = np.nextafter(2.0**-1021, 0.0)
-    for call in calls(radii=with_radius(7, small), rule="mean"):
-        assert_refused(call, ValueError, r"2\*\*-1021", "mean", r"radii\[7\]")
+    for refused in calls(radii=with_radius(7, small), rule="mean"):
+        assert_refused(refused, ValueError, r"2\*\*-1021", "mean", r"radii\[7\]")
     for radii in (with_radius(7, 2.0**-1021), with_radius(7, 0.0)):
-        assert hs.count_pairs(POINTS, None, radii=radii, rule="mean") == 0
+        assert call(hs.count_pairs, POINTS, None, radii=radii, rule="mean") == 0
     for rule in ("sum", "max", "min"):
-        assert hs.count_pairs(POINTS, None, radii=with_radius(7, small), rule=rule) == 0
+        assert call(hs.count_pairs, POINTS, None, radii=with_radius(7, small), rule=rule) == 0
 
 
 def test_the_largest_radii_meet():
     points = np.array([[-(2.0**1022)], [2.0**1022]])
     for rule, count in (("sum", 1), ("mean", 0), ("max", 0)):
-        assert hs.count_pairs(points, None, radii=[2.0**1022] * 2, rule=rule) == count
-
-
-@pytest.mark.parametrize("shape", [(), (29,), (31,), (30, 1), (1, 30), (0,)])
-def test_radii_of_a_wrong_shape(shape):
-    for call in calls(radii=np.ones(shape)):
-        assert_refused(call, ValueError, r"radii must have shape \(30,\)", str(shape)[1:-1])
-    assert_refused(
-        lambda: hs.pairs_between(
-            POINTS[:3], POINTS, None, query_radii=np.ones(shape), radii=RADII
-        ), ValueError, r"query_radii must have shape \(3,\)",
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    "radii", ["wide", b"wide", ["a"] * 30, np.ones(30, complex), np.ones(30, np.longdouble),
-              np.zeros(30, "M8[s]"), [None] * 30, {1: 2}, object(), {"r": 1.0}],
-)  # fmt: skip
-def test_radii_of_a_wrong_kind(radii):
-    if isinstance(radii, np.ndarray) and radii.dtype == np.float64:
-        pytest.skip("long double is float64 on this machine")
-    for call in calls(radii=radii):
-        assert_refused(call, TypeError, "radii")
-
-
-def test_masked_radii_and_integers_that_are_no_float64():
-    masked = np.ma.array(RADII, mask=np.arange(30) == 4)
-    for call in calls(radii=masked):
-        assert_refused(call, ValueError, r"radii\[4\] must not be masked")
-    for call in calls(radii=[2**53 + 1] * 30):
-        assert_refused(call, ValueError, r"radii\[0\]", "float64")
-
-
-def test_bad_radii_are_refused_before_anything_is_searched():
-    for row, value in ((99_999, NAN), (50_000, -1.0)):
-        radii = with_radius(row, value, 100_000)
-        radii[0] = 5.0
-        for call in (hs.pairs, hs.count_pairs, hs.neighbors, hs.coordination):
-            assert_refused(
-                lambda call=call, radii=radii: call(LARGE, None, radii=radii), ValueError,
-                rf"radii\[{row}\]",
-            )  # fmt: skip
+        assert call(hs.count_pairs, points, None, radii=[2.0**1022] * 2, rule=rule) == count
 
 
 # ---- rules and what goes together ----------------------------------------------------------
 
 
 def test_cutoff_is_needed_without_radii():
-    for call in calls():
-        assert_refused(call, TypeError, "cutoff")
+    for refused in calls():
+        assert_refused(refused, TypeError, "cutoff")
     for value in (-1.0, NAN, -5e-324):
-        for call in (hs.pairs, hs.count_pairs, hs.neighbors, hs.coordination):
+        for search in (hs.pairs, hs.count_pairs, hs.neighbors, hs.coordination):
             assert_refused(
-                lambda call=call, value=value: call(POINTS, value, radii=RADII), ValueError,
-                "cutoff", "negative",
+                lambda search=search, value=value: call(search, POINTS, value, radii=RADII),
+                ValueError, "cutoff", "negative",
             )  # fmt: skip
     for value in ("far", 1j, [1.0] * 3, object()):
         assert_refused(
-            lambda value=value: hs.pairs(POINTS, value, radii=RADII), TypeError, "cutoff"
+            lambda value=value: call(hs.pairs, POINTS, value, radii=RADII), TypeError, "cutoff"
         )
 
 
 @pytest.mark.parametrize("rule", ["Sum", "", "diameter", "gather ", 1, b"sum", ("sum",)])
 def test_rules_that_are_none(rule):
     exception = ValueError if isinstance(rule, str) else TypeError
-    for call in calls(radii=RADII, rule=rule):
-        assert_refused(call, exception, "rule")
+    for refused in calls(radii=RADII, rule=rule):
+        assert_refused(refused, exception, "rule")
 
 
 def test_rules_need_radii():
-    for rule in ("sum", "gather", "nonsense"):
+    for rule in ("sum", "gather"):
         assert_refused(lambda rule=rule: hs.pairs(POINTS, 0.5, rule=rule), ValueError, "rule needs")
         assert_refused(
             lambda rule=rule: hs.pairs_between(POINTS, POINTS, 0.5, rule=rule), ValueError,
@@ -234,71 +172,60 @@ def test_rules_need_radii():
 @pytest.mark.parametrize("rule", ["gather", "scatter"])
 def test_rules_with_a_direction_are_for_rows_and_two_sets(rule):
     how = {"radii": RADII, "rule": rule}
-    for call in (
-        lambda: hs.pairs(POINTS, None, **how),
-        lambda: hs.iter_pairs(POINTS, None, **how),
-        lambda: hs.for_each_pair(POINTS, None, print, **how),
-        lambda: hs.count_pairs(POINTS, None, **how),
-        lambda: hs.explain(POINTS, None, **how),
+    for refused in (
+        lambda: call(hs.pairs, POINTS, None, **how),
+        lambda: call(hs.iter_pairs, POINTS, None, **how),
+        lambda: call(hs.for_each_pair, POINTS, None, print, **how),
+        lambda: call(hs.count_pairs, POINTS, None, **how),
+        lambda: call(hs.explain, POINTS, None, **how),
     ):
-        assert_refused(call, ValueError, rule, "neighbors")
-    assert hs.neighbors(POINTS, None, **how).n_entries == hs.coordination(POINTS, None, **how).sum()
+        assert_refused(refused, ValueError, rule, "neighbors")
+    assert (
+        call(hs.neighbors, POINTS, None, **how).n_entries
+        == call(hs.coordination, POINTS, None, **how).sum()
+    )
 
 
 def test_radii_of_two_sets():
-    queries = {"queries": POINTS[:4]}
-    for given, fragments in (
-        ({"radii": RADII}, ["radii and query_radii must be given together"]),
-        ({"query_radii": RADII[:4]}, ["radii and query_radii must be given together"]),
-        ({"radii": RADII, "query_radii": RADII[:4], "rule": "gather"}, ["query_radii alone"]),
-        ({"radii": RADII, "rule": "gather"}, ["query_radii alone"]),
-        ({"query_radii": RADII[:4], "rule": "scatter"}, ["radii alone"]),
-        ({"radii": RADII, "query_radii": RADII[:4], "rule": "scatter"}, ["radii alone"]),
+    queries, both = {"queries": POINTS[:4]}, "both sets need them, or rule 'gather' or 'scatter'"
+    for given, fragment in (
+        ({"radii": RADII}, "queries have no radii: " + both),
+        ({"query_radii": RADII[:4]}, "points have no radii: " + both),
+        ({"radii": RADII, "rule": "gather"}, "'gather' goes by the radii of queries"),
+        ({"query_radii": RADII[:4], "rule": "scatter"}, "'scatter' goes by the radii of points"),
     ):
-        for call in (hs.neighbors, hs.count_pairs, hs.coordination):
+        for search in (hs.neighbors, hs.count_pairs, hs.coordination):
             assert_refused(
-                lambda call=call, given=given: call(POINTS, None, **given, **queries), ValueError,
-                *fragments,
+                lambda search=search, given=given: call(search, POINTS, None, **given, **queries),
+                ValueError, fragment,
             )  # fmt: skip
-    for call in (hs.neighbors, hs.count_pairs, hs.coordination):
-        assert_refused(
-            lambda call=call: call(POINTS, None, query_radii=RADII), ValueError,
-            "query_radii needs queries",
-        )  # fmt: skip
-        assert_refused(
-            lambda call=call: call(POINTS, None, radii=RADII, query_radii=RADII), ValueError,
-            "query_radii needs queries",
-        )  # fmt: skip
+    given = {"radii": RADII, "query_radii": RADII[:4], **queries}  # one of them has no say
+    for rule, other in (("gather", "radii"), ("scatter", "query_radii")):
+        one = {name: values for name, values in given.items() if name != other}
+        assert call(hs.count_pairs, POINTS, None, rule=rule, **given) == (
+            call(hs.count_pairs, POINTS, None, rule=rule, **one)
+        )
 
 
 @pytest.mark.parametrize("batch", [{}, {"batch": [0] * 30}], ids=["", "batch"])
-def test_radii_go_with_no_types(batch):
-    for call in (hs.pairs, hs.count_pairs):
+def test_radii_go_with_no_cutoffs_by_type(batch):
+    for search in (hs.pairs, hs.count_pairs):
         assert_refused(
-            lambda call=call: call(POINTS, 1.0, radii=RADII, types=[0] * 30, **batch), ValueError,
-            "radii", "together", "types",
+            lambda search=search: call(
+                search, POINTS, {(0, 0): 1.0}, radii=RADII, types=[0] * 30, **batch
+            ),
+            ValueError, "a cutoff for each pair of types cannot be combined with radii",
         )  # fmt: skip
-
-
-def test_out_is_apart_from_radii():
-    radii = np.ones(40)
-    assert_refused(
-        lambda: hs.pairs(POINTS, None, radii=radii[:30], quantities="d", out=radii), ValueError,
-        "out must not share memory with radii",
-    )  # fmt: skip
-    assert_refused(
-        lambda: hs.pairs_between(
-            POINTS, POINTS, None, query_radii=radii[:30], rule="gather", quantities="d", out=radii
-        ), ValueError, "out must not share memory with query_radii",
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize("rule", SYMMETRIC)
 def test_results_that_do_not_fit_are_refused(rule):
     radii = np.full(100_000, 1.0)
-    for call in (hs.pairs, hs.neighbors):
+    for search in (hs.pairs, hs.neighbors):
         assert_refused(
-            lambda call=call: call(LARGE, None, radii=radii, rule=rule, memory_limit=1e8),
+            lambda search=search: call(
+                search, LARGE, None, radii=radii, rule=rule, memory_limit=1e8
+            ),
             MemoryError, "fit",
         )  # fmt: skip
 
@@ -306,33 +233,422 @@ def test_results_that_do_not_fit_are_refused(rule):
 def test_a_further_cutoff_is_a_length():
     for cutoff in (INF, NAN, -1.0):
         with pytest.raises(ValueError, match="cutoff must be finite and not negative"):
-            hs.count_pairs([[0.0], [1.0]], cutoff, radii=[1.0, 1.0])
+            call(hs.count_pairs, [[0.0], [1.0]], cutoff, radii=[1.0, 1.0])
 
 
-def test_radii_that_change_meanwhile_do_no_harm():
-    points, radii = LARGE[:1500], 0.04 * 2.0 ** -RNG.integers(0, 6, 1500)
-    radii[:3] = 0.4
-    stop = threading.Event()
+# ---- a cutoff for each two types ---------------------------------------------------------------
 
-    def write():
-        k = 0
-        values = (np.nan, -1.0, 0.3, 1e308, 0.0, np.inf, 0.01)
-        while not stop.is_set():
-            radii[k % len(radii)] = values[k % len(values)]
-            radii[:] = 0.03
-            k += 1
 
-    writer = threading.Thread(target=write)
-    writer.start()
-    try:
-        for _ in range(15):
-            for search in (hs.pairs, hs.coordination, hs.count_pairs):
-                try:
-                    search(points, 0.1, radii=radii, threads=2)
-                except ValueError as refused:
-                    assert "radii" in str(refused)
-    finally:
-        stop.set()
-        writer.join()
-    i, j = hs.pairs(points, None, radii=radii)
-    assert (i < j).all()
+TABLE = np.array([[0.3, 0.5, 0.0, 0.1], [0.5, 0.0, 0.2, 0.6], [0.0, 0.2, 0.7, 0.4],
+                  [0.1, 0.6, 0.4, 0.25]])  # fmt: skip
+PAIRS = {(0, 1): 0.5, (2, 2): 0.7, (3, 0): 0.25, (7, 1): 0.3}
+FEW = np.random.default_rng(5).random((20, 3))
+TYPES = np.arange(20) % 3
+
+
+@pytest.mark.parametrize("kind", BOXES)
+def test_equals_the_definition(kind, rng):
+    for ndim in (1, 2, 3, 4):
+        for cutoff in (TABLE, PAIRS):
+            points, scene = boxed(rng, kind, ndim, 18)
+            types = rng.integers(0, 4, 18)
+            for inclusive in (True, False):
+                scene |= {"inclusive": inclusive}
+                one = Reaching(points, cutoff, types=types, **scene)
+                check(one)
+                check(one.but(n_queries=7))
+                check(one.but(points=points.astype(np.float32)))
+
+
+def test_types_that_nobody_has_and_types_that_pair_with_nobody(rng):
+    points = rng.random((20, 2))
+    for types in (np.full(20, 2), rng.choice([1, 3], 20), rng.integers(0, 9, 20)):
+        for cutoff in ({(1, 3): 0.4}, {(2, 2): 0.3}, {(5, 6): 0.5, (6, 8): 0.3}, {}):
+            check(Reaching(points, cutoff, types=types))
+            check(Reaching(points, cutoff, 8, types=types))
+    for types in (np.full(20, 2), rng.choice([1, 3], 20)):
+        check(Reaching(points, TABLE, types=types))
+    assert call(hs.count_pairs, points, np.zeros((1, 1)), types=[0] * 20) == 0
+
+
+def test_ties_at_each_cutoff(rng):
+    points = rng.integers(-6, 7, (30, 2)) / 4.0
+    table = rng.integers(0, 7, (3, 3)) / 4.0
+    table = np.maximum(table, table.T)
+    for inclusive in (True, False):
+        one = Reaching(points, table, types=rng.integers(0, 3, 30), inclusive=inclusive)
+        check(one)
+        check(one.but(box=[3.0, 3.0]))
+        check(one.but(n_queries=11))
+
+
+def test_cutoffs_of_every_size(rng):
+    points = np.concatenate([rng.random((12, 2)), 1e-5 * rng.random((12, 2))])
+    table = [[0.5, 1e-3, 1e-9], [1e-3, 3e-6, 0.0], [1e-9, 0.0, 4e-6]]
+    assert check(Reaching(points, np.array(table), types=rng.integers(0, 3, 24)))
+
+
+def test_cutoffs_larger_than_the_box(rng):
+    for kind in ("periodic", "triclinic"):
+        points, scene = boxed(rng, kind, 2, 5)
+        cutoffs = {(0, 0): 2.5, (0, 1): 0.3, (1, 1): 1.1}
+        found = check(Reaching(points, cutoffs, types=[0, 1, 1, 0, 2], **scene))
+        assert any(i == j for i, j, _ in found)
+
+
+def test_one_cutoff_for_all_types_is_one_cutoff(rng):
+    for kernel in hs.kernels():
+        points = rng.random((500, 3))
+        how = {"quantities": "ijSdD", "sort": True, "box": 1.0, "kernel": kernel}
+        table = np.full((5, 5), 0.2)
+        found = call(hs.pairs, points, table, types=rng.integers(0, 5, 500), **how)
+        assert same_arrays(found, call(hs.pairs, points, 0.2, **how))
+
+
+@pytest.mark.parametrize("t", [1, 8, 9, 40])
+def test_tables_of_many_types_with_pairs_left_out(t):
+    rng = np.random.default_rng(t)
+    points, types = rng.integers(0, 8, (300, 3)) / 8.0, rng.integers(0, t, 300)
+    table = rng.choice([0.0, 0.125, 0.25, 0.375, math.nextafter(0.25, 0)], (t, t))
+    table = np.maximum(table, table.T)
+    left_out = rng.random((t, t)) < 0.3
+    left_out[0, 0] = False
+    left_out |= left_out.T
+    cutoffs = {(a, b): table[a, b] for a in range(t) for b in range(a, t) if not left_out[a, b]}
+    # whole eighths: squares are exact, and roots of those that are no squares are far from them
+    distance = np.sqrt(((points[None] - points[:, None]) ** 2).sum(-1))
+    reach = table[np.ix_(types, types)]
+    kept = ~left_out[np.ix_(types, types)] & np.triu(np.ones((300, 300), bool), 1)
+    for inclusive in (True, False):
+        near = distance <= reach if inclusive else distance < reach
+        i, j = call(hs.pairs, points, cutoffs, types=types, inclusive=inclusive, sort=True)
+        assert np.array_equal(np.argwhere(near & kept), np.column_stack([i, j]))
+
+
+# ---- forms ---------------------------------------------------------------------------------
+
+
+def test_a_table_may_have_any_form():
+    expected = call(hs.pairs, FEW, TABLE, types=TYPES, sort=True)
+    assert len(expected[0]) > 0
+    for cutoff in (TABLE.tolist(), np.asfortranarray(TABLE), TABLE.astype(">f8"),
+                   np.repeat(TABLE, 2, axis=1)[:, ::2]):  # fmt: skip
+        for types in (TYPES.tolist(), TYPES.astype(np.uint8), TYPES.astype(">i8"),
+                      np.repeat(TYPES, 2)[::2]):  # fmt: skip
+            found = call(hs.pairs, FEW, cutoff, types=types, sort=True)
+            assert same_arrays(found, expected)
+    whole = np.array([[1, 0], [0, 0]])
+    assert call(hs.count_pairs, FEW, whole, types=TYPES % 2) == call(
+        hs.count_pairs, FEW, whole.astype(np.float32), types=TYPES % 2
+    )
+
+
+def test_a_dict_counts_both_ways_and_may_have_names():
+    numbers = {(0, 1): 0.5, (2, 0): 0.25, (1, 1): 0.4}
+    expected = call(hs.pairs, FEW, numbers, types=TYPES, sort=True)
+    assert len(expected[0]) > 0
+    turned = {(b, a): length for (a, b), length in numbers.items()}
+    assert same_arrays(call(hs.pairs, FEW, turned, types=TYPES, sort=True), expected)
+    assert same_arrays(call(hs.pairs, FEW, turned | numbers, types=TYPES, sort=True), expected)
+    names = np.array(["H", "CA", "solvent"])
+    by_name = {(names[a], names[b]): length for (a, b), length in numbers.items()}
+    labels = names[TYPES]
+    for types in (labels, labels.tolist(), labels.astype(object), labels.astype("U20")):
+        assert same_arrays(call(hs.pairs, FEW, by_name, types=types, sort=True), expected)
+        q = call(
+            hs.count_pairs,
+            FEW[5:],
+            by_name,
+            types=types[5:],
+            queries=FEW[:5],
+            query_types=types[:5],
+        )
+        assert q == sum(i < 5 <= j for i, j in zip(*(column.tolist() for column in expected)))
+    # Elements may be named that no point is.
+    absent = by_name | {("O", "Og"): 0.3, ("H", "O"): 0.2}
+    assert same_arrays(call(hs.pairs, FEW, absent, types=labels, sort=True), expected)
+
+
+def test_of_no_points_types_may_be_anything():
+    for cutoff in (TABLE, PAIRS, {("H", "CA"): 1.0}):
+        assert call(hs.count_pairs, np.empty((0, 2)), cutoff, types=[]) == 0
+
+
+# ---- what is refused -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "table, fragments",
+    [
+        ([[1.0, 2.0], [2.5, 1.0]], [r"symmetric.*cutoff\[0, 1\] = 2.0.*cutoff\[1, 0\] = 2.5"]),
+        ([[1.0, 2.0]], [r"\(t, t\)", r"\(1, 2\)"]),
+        (np.ones((2, 2, 2)), [r"\(t, t\)", r"\(2, 2, 2\)"]),
+        ([[1.0, -2.0], [-2.0, 1.0]], [r"not negative.*cutoff\[0, 1\] = -2"]),
+        ([[1.0, NAN], [NAN, 1.0]], [r"finite.*cutoff\[0, 1\] = nan"]),
+        ([[INF]], [r"finite.*cutoff\[0, 0\] = inf"]),
+    ],
+)
+def test_tables_that_are_none(table, fragments):
+    types = np.zeros(20, int)
+    for search in (hs.pairs, hs.count_pairs, hs.neighbors, hs.iter_pairs):
+        assert_refused(
+            lambda search=search: call(search, FEW, table, types=types),
+            ValueError,
+            "cutoff",
+            *fragments,
+        )
+
+
+@pytest.mark.parametrize(
+    "cutoff, types, exception, fragments",
+    [
+        ({(0, 1): 1.0, (1, 0): 2.0}, TYPES, ValueError, ["contradicts", r"\(1, 0\)"]),
+        ({(0, 1): -1.0}, TYPES, ValueError, ["not negative", r"\(0, 1\)"]),
+        ({(0, 1): NAN}, TYPES, ValueError, ["finite", "nan"]),
+        ({(0, 1): "far"}, TYPES, TypeError, [r"cutoff\[\(0, 1\)\]"]),
+        ({(0, 1, 2): 1.0}, TYPES, TypeError, ["pairs of types"]),
+        ({0: 1.0}, TYPES, TypeError, ["pairs of types"]),
+        ({(0, 1.5): 1.0}, TYPES, TypeError, ["1.5"]),
+        ({(0, True): 1.0}, TYPES, TypeError, ["True"]),
+        ({(0, -1): 1.0}, TYPES, ValueError, ["-1"]),
+        ({("H", "O"): 1.0}, TYPES, ValueError, ["names.*types are numbers"]),
+        ({(0, 1): 1.0}, ["H"] * 20, ValueError, ["numbers.*types are names"]),
+        ({("H", "Hx"): 1.0}, ["H"] * 20, ValueError, ["'Hx' is neither an element"]),
+        ({(0, 1): 1.0}, None, ValueError, ["a dict of cutoffs needs types"]),
+        ({(0, 1): 1.0}, [0, 1], ValueError, [r"types.*\(20,\).*\(2,\)"]),
+        ({(0, 1): 1.0}, np.full(20, -1), ValueError, [r"types.*types\[0\] = -1"]),
+        ({(0, 1): 1.0}, np.zeros(20), TypeError, ["types.*float64"]),
+        (TABLE, TYPES + 2, ValueError, [r"types must be less than 4.*type 4 of points\[2\]"]),
+        (TABLE, None, ValueError, ["a table of cutoffs needs types"]),
+        (None, TYPES, TypeError, ["cutoff"]),
+    ],
+)
+def test_types_and_dicts_that_do_not_fit(cutoff, types, exception, fragments):
+    for search in (hs.pairs, hs.coordination, hs.iter_pairs):
+        assert_refused(
+            lambda search=search: call(search, FEW, cutoff, types=types), exception, *fragments
+        )
+
+
+def test_types_of_two_sets_go_together():
+    queries = {"queries": FEW[:4]}
+    for given, fragments in (
+        ({"types": TYPES}, ["a table of cutoffs needs types, and queries have none"]),
+        ({"query_types": TYPES[:4]}, ["a table of cutoffs needs types, and points have none"]),
+        ({"types": TYPES, "query_types": TYPES}, [r"types.*\(4,\).*\(20,\)"]),
+        ({"types": TYPES, "query_types": TYPES[:4] + 9}, [r"less than 4.*type 9 of queries\[0\]"]),
+    ):
+        assert_refused(
+            lambda given=given: call(hs.count_pairs, FEW, TABLE, **given, **queries),
+            ValueError, *fragments,
+        )  # fmt: skip
+    assert_refused(
+        lambda: call(hs.count_pairs,
+            FEW, {(0, 1): 1.0}, types=TYPES, query_types=["H"] * 4, **queries
+        ),
+        TypeError, "both be numbers",
+    )  # fmt: skip
+
+
+def test_types_with_other_arguments():
+    for given in ({"radii": np.ones(20)}, {"rule": "sum"}):
+        assert_refused(
+            lambda given=given: call(hs.pairs, FEW, TABLE, types=TYPES, **given), ValueError,
+            *given, "combined with radii|needs radii",
+        )  # fmt: skip
+
+
+def test_a_table_of_no_types_holds_for_no_points():
+    nothing, table = np.zeros((0, 3)), np.zeros((0, 0))
+    i, j = call(hs.pairs, nothing, table, types=[])
+    assert len(i) == len(j) == call(hs.count_pairs, nothing, table, types=[]) == 0
+    assert call(hs.neighbors, nothing, table, types=[]).n_rows == 0
+
+
+# ---- stars ---------------------------------------------------------------------------------
+
+
+def written_out(cutoffs, names):
+    """The same, with a key for each two of these types: one with fewer stars wins."""
+    found = {}
+    for a in names:
+        for b in names:
+            for key in ((a, b), (b, a), (a, "*"), ("*", a), ("*", b), (b, "*"), ("*", "*")):
+                if key in cutoffs:
+                    found[a, b] = cutoffs[key]
+                    break
+    return found
+
+
+@pytest.mark.parametrize("cutoffs", [
+    {("*", "*"): 0.4},
+    {("*", "*"): 0.2, ("O", "H"): 0.5},
+    {("*", "*"): 0.2, ("O", "*"): 0.4, ("O", "H"): 0.1},
+    {("*", "Si"): 0.3},
+    {("Si", "*"): 0.3, ("O", "*"): 0.3, ("H", "H"): 0.6},
+    {("Si", "*"): 0.3, ("O", "*"): 0.5, ("Si", "O"): 0.0},
+    {("Xe", "*"): 0.3, ("*", "*"): 0.25},
+])  # fmt: skip
+def test_a_key_with_fewer_stars_wins(cutoffs, rng):
+    names = np.array(["Si", "O", "H", "N"])
+    kinds = rng.integers(0, 4, 150)
+    points, queries = rng.random((150, 3)), rng.random((40, 3))
+    asked = names[rng.integers(1, 4, 40)]
+    expected = written_out(cutoffs, names.tolist())
+    numbers = {
+        tuple(p if p == "*" else {"Si": 0, "O": 1, "H": 2, "N": 3, "Xe": 9}[p] for p in key): length
+        for key, length in cutoffs.items()
+    }
+    for box in (None, 1.0):
+        named = hs.Points(points, types=names[kinds], box=box)
+        found = hs.pairs(named, cutoffs, quantities="ijS" if box else "ij", sort=True)
+        same = hs.pairs(named, expected, quantities="ijS" if box else "ij", sort=True)
+        assert same_arrays(found, same) and len(found[0]) > 10
+        numbered = named.replace(types=kinds)
+        assert hs.count_pairs(numbered, numbers) == len(found[0])
+        both = {"queries": hs.Points(queries, types=asked)}
+        assert np.array_equal(
+            hs.coordination(named, cutoffs, **both), hs.coordination(named, expected, **both)
+        )
+        assert (
+            hs.clusters(named, cutoffs).labels.tolist()
+            == hs.clusters(named, expected).labels.tolist()
+        )
+
+
+def test_stars_that_contradict():
+    points = hs.Points(FEW, types=np.array(["H", "O", "N"])[TYPES])
+    with pytest.raises(
+        ValueError, match=r"differ, and both are of the pair \('H', 'O'\): give it a"
+    ):
+        hs.pairs(points, {("O", "*"): 0.5, ("H", "*"): 0.25})
+    assert hs.count_pairs(points, {("O", "*"): 0.5, ("H", "*"): 0.25, ("O", "H"): 0.1}) > 0
+    assert hs.count_pairs(points, {("O", "*"): 0.5, ("Xe", "*"): 0.25}) > 0  # no point is Xe
+    with pytest.raises(ValueError, match="contradicts another cutoff of the same two"):
+        hs.pairs(points, {("O", "*"): 0.5, ("*", "O"): 0.25})
+    with pytest.raises(ValueError, match="is neither an element nor a type of a point"):
+        hs.pairs(points, {("O", "**"): 0.5})
+
+
+# ---- elements, and the lists of ASE and matscipy -----------------------------------------------
+
+
+CUTOFFS = {("O", "H"): 1.2, ("O", "O"): 3.1, ("H", "H"): 0.8}
+
+
+def water(n=3):
+    """Molecules in a skewed box that is too small for them, shaken."""
+    atoms = molecule("H2O")
+    atoms.set_cell([[3.1, 0.0, 0.0], [0.4, 3.3, 0.0], [-0.3, 0.2, 3.2]])
+    atoms.pbc = [True, True, False]
+    atoms = atoms.repeat((n, n, 1))
+    atoms.rattle(0.1, seed=4)
+    return atoms
+
+
+def oxide():
+    atoms = bulk("MgO", "rocksalt", a=4.21, cubic=True) * (2, 2, 2)
+    atoms.rattle(0.05, seed=2)
+    return atoms
+
+
+def rows(i, j, S):
+    return sorted(zip(i.tolist(), j.tolist(), map(tuple, np.asarray(S, int).tolist())))
+
+
+def ours(atoms, cutoff, **how):
+    """As ASE makes lists: both directions, pairs at the cutoff left out."""
+    table = call(hs.neighbors, atoms, cutoff, quantities="jS", inclusive=False, **how)
+    return rows(*table.to_pairs(quantities="ijS"))
+
+
+@pytest.mark.parametrize("make", [water, oxide])
+def test_the_dict_of_ase(make):
+    atoms = make()
+    for cutoffs in (CUTOFFS, {("Mg", "O"): 2.3, ("O", "O"): 3.1}, {("Mg", "Mg"): 4.5}):
+        assert ours(atoms, cutoffs) == rows(*neighbor_list("ijS", atoms, cutoffs))
+
+
+@pytest.mark.parametrize("make", [water, oxide])
+@pytest.mark.parametrize("factor", [0.5, 1.0, 1.2])
+def test_covalent_radii_of_ase(make, factor):
+    atoms = make()
+    radii = np.array(natural_cutoffs(atoms, mult=factor))
+    found = ours(atoms, None, radii=radii)
+    assert found == rows(*neighbor_list("ijS", atoms, radii))
+    assert found or factor < 1.0
+
+
+def test_water_has_two_bonds_a_molecule():
+    atoms = molecule("H2O")
+    radii = natural_cutoffs(atoms, mult=1.1)
+    i, j = call(hs.pairs, atoms, None, radii=radii, sort=True)
+    assert [{atoms.symbols[a], atoms.symbols[b]} for a, b in zip(i, j)] == [{"O", "H"}] * 2
+
+
+def test_matscipy_agrees():
+    neighbours = pytest.importorskip("matscipy.neighbours", reason="matscipy is not installed")
+    atoms = oxide()
+    for cutoffs in ({("Mg", "O"): 2.3, ("O", "O"): 3.1}, {("Mg", "Mg"): 4.5}):
+        assert ours(atoms, cutoffs) == rows(*neighbours.neighbour_list("ijS", atoms, cutoffs))
+
+
+def test_the_symbols_are_those_of_ase():
+    assert chemical_symbols == SYMBOLS
+
+
+def test_elements_of_two_sets():
+    atoms = water()
+    probe = Atoms("OH", positions=[[0.5, 0.5, 0.5], [2.0, 2.0, 0.0]])
+    given = hs.Points(atoms.positions, types=atoms.get_chemical_symbols(), box=atoms.cell[:],
+                      periodic=atoms.pbc)  # fmt: skip
+    expected = hs.pairs_between(hs.Points(probe.positions, types=["O", "H"]), given, CUTOFFS)
+    assert len(expected[0]) > 0
+    within = Atoms("OH", positions=probe.positions, cell=atoms.cell, pbc=atoms.pbc)
+    assert same_arrays(hs.pairs_between(within, atoms, CUTOFFS), expected)
+    for symbols in (["O", "H"], np.array(["O", "H"])):
+        found = call(hs.pairs_between, probe.positions, atoms, CUTOFFS, query_types=symbols)
+        assert same_arrays(found, expected)
+    assert_refused(
+        lambda: hs.pairs_between(probe.positions, atoms, CUTOFFS), ValueError,
+        "queries have none",
+    )  # fmt: skip
+    assert_refused(
+        lambda: hs.pairs_between(hs.Points(probe.positions, types=[8, 1]), atoms, CUTOFFS),
+        TypeError, "both be numbers",
+    )  # fmt: skip
+
+
+def test_types_are_elements_or_given():
+    with pytest.raises(ValueError, match="of type Atoms bring their own types: leave types out"):
+        hs.Points(oxide(), types=np.arange(64) % 2)
+    points = hs.Points(oxide())
+    assert np.array_equal(points.types, oxide().get_chemical_symbols())
+    other = points.replace(types=np.arange(64) % 2)
+    assert other.types.dtype == np.int32 and np.array_equal(other.box, points.box)
+
+
+def test_objects_that_have_symbols_only():
+    atoms = water()
+
+    class Symbols:
+        positions, cell, pbc = atoms.positions, atoms.cell[:], atoms.pbc
+
+        def get_chemical_symbols(self):
+            return atoms.get_chemical_symbols()
+
+    assert same_arrays(hs.pairs(Symbols(), CUTOFFS), hs.pairs(atoms, CUTOFFS))
+    bare = as_if_atoms(atoms.positions, atoms.cell[:], atoms.pbc)
+    assert_refused(lambda: hs.pairs(bare, CUTOFFS), ValueError, "needs types")
+
+
+def test_keys_that_are_no_elements():
+    for cutoffs in ({("H", "Hx"): 1.0}, {("h", "O"): 1.0}, {("H", ""): 1.0}):
+        assert_refused(lambda cutoffs=cutoffs: hs.pairs(water(), cutoffs), ValueError, "an element")
+    assert_refused(lambda: hs.pairs(water(), {(1, 8): 1.0}), ValueError, "types are names")
+    assert_refused(
+        lambda: hs.pairs(water(), {("H", "O"): 1.0, ("O", "H"): 2.0}), ValueError, "contradicts"
+    )
+    strange = water()
+    strange.numbers[3] = 300
+    assert_refused(lambda: hs.pairs(strange, CUTOFFS), ValueError, r"numbers\[3\] = 300")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 from full_lists import same_tables
 from oracles import same_arrays
 from reach_scenes import RULES, SYMMETRIC, boxed, spread_radii
@@ -34,17 +35,17 @@ def test_quantities_are_those_of_pairs(name):
     for kernel in hs.kernels():
         cutoff, how = SCENES[name]
         how = how | {"kernel": kernel}
-        i, j, S, d, D, P = hs.pairs(POINTS, cutoff, quantities="ijSdDP", sort=True, **how)
+        i, j, S, d, D, P = call(hs.pairs, POINTS, cutoff, quantities="ijSdDP", sort=True, **how)
         assert len(i) > 100
         assert (i.dtype, S.dtype, d.dtype, D.shape) == (np.int64, np.int32, np.float64, (len(i), 3))
         assert np.array_equal(P, np.column_stack((i, j)))
         for letter, column in (("i", i), ("d", d), ("D", D), ("S", S), ("P", P)):
             assert same_arrays(
-                hs.pairs(POINTS, cutoff, quantities=letter, sort=True, **how), column
+                call(hs.pairs, POINTS, cutoff, quantities=letter, sort=True, **how), column
             )
         # Each is one of the pairs within the longest distance, with the same numbers.
         scene = {key: how[key] for key in ("box", "periodic", "kernel") if key in how}
-        plain = hs.pairs(POINTS, 1.01 * d.max(), quantities="ijSdD", sort=True, **scene)
+        plain = call(hs.pairs, POINTS, 1.01 * d.max(), quantities="ijSdD", sort=True, **scene)
         rows = {row: k for k, row in enumerate(zip(*(c.tolist() for c in plain[:2]),
                                                     map(tuple, plain[2].tolist())))}  # fmt: skip
         places = [rows[row] for row in zip(i.tolist(), j.tolist(), map(tuple, S.tolist()))]
@@ -55,46 +56,48 @@ def test_quantities_are_those_of_pairs(name):
 def test_kernels_and_threads_give_the_same_arrays(name):
     cutoff, how = SCENES[name]
     calls = {
-        "pairs": lambda **by: hs.pairs(POINTS, cutoff, quantities="ijSdD", **how, **by),
-        "sorted": lambda **by: hs.pairs(POINTS, cutoff, sort=True, **how, **by),
-        "rows": lambda **by: hs.neighbors(POINTS, cutoff, quantities="jd", **how, **by)._arrays,
-        "counts": lambda **by: hs.coordination(POINTS, cutoff, **how, **by),
+        "pairs": lambda **by: call(hs.pairs, POINTS, cutoff, quantities="ijSdD", **how, **by),
+        "sorted": lambda **by: call(hs.pairs, POINTS, cutoff, sort=True, **how, **by),
+        "rows": lambda **by: (
+            call(hs.neighbors, POINTS, cutoff, quantities="jd", **how, **by)._arrays
+        ),
+        "counts": lambda **by: call(hs.coordination, POINTS, cutoff, **how, **by),
     }
-    for call in calls.values():
-        expected = call(kernel="scalar", threads=1)
+    for search in calls.values():
+        expected = search(kernel="scalar", threads=1)
         for kernel in hs.kernels():
             for threads in (1, 2, 3):
-                assert same_arrays(call(kernel=kernel, threads=threads), expected)
+                assert same_arrays(search(kernel=kernel, threads=threads), expected)
 
 
 @every_scene
 def test_int32_and_out(name):
     cutoff, how = SCENES[name]
-    expected = hs.pairs(POINTS, cutoff, quantities="ijSd", **how)
-    short = hs.pairs(POINTS, cutoff, quantities="ijSd", index_dtype=np.int32, **how)
+    expected = call(hs.pairs, POINTS, cutoff, quantities="ijSd", **how)
+    short = call(hs.pairs, POINTS, cutoff, quantities="ijSd", index_dtype=np.int32, **how)
     assert short[0].dtype == short[1].dtype == np.int32
     assert all(np.array_equal(a, b) for a, b in zip(short, expected))
     m = len(expected[0])
     out = (np.empty(m + 9, np.int64), np.empty(m, np.int64), np.empty((m + 1, 3), np.int32),
            np.empty(m))  # fmt: skip
-    found = hs.pairs(POINTS, cutoff, quantities="ijSd", out=out, **how)
+    found = call(hs.pairs, POINTS, cutoff, quantities="ijSd", out=out, **how)
     assert same_arrays(found, expected)
     assert all(np.shares_memory(a, b) for a, b in zip(found, out))
     with pytest.raises(hs.CapacityError) as caught:
-        hs.pairs(POINTS, cutoff, quantities="i", out=np.empty(m - 1, np.int64), **how)
+        call(hs.pairs, POINTS, cutoff, quantities="i", out=np.empty(m - 1, np.int64), **how)
     assert caught.value.needed == m
-    table = hs.neighbors(POINTS, cutoff, index_dtype=np.int32, **how)
+    table = call(hs.neighbors, POINTS, cutoff, index_dtype=np.int32, **how)
     assert table.indices.dtype == np.int32 and table.n_entries == 2 * m
 
 
 @every_scene
 def test_blocks_and_calls_are_pairs_in_their_order(name):
     cutoff, how = SCENES[name]
-    expected = hs.pairs(POINTS, cutoff, quantities="ijSdD", **how)
+    expected = call(hs.pairs, POINTS, cutoff, quantities="ijSdD", **how)
     for most in (1 << 20, 1000, 37):
         for threads in (1, 2):
             seen = []
-            blocks = list(hs.iter_pairs(
+            blocks = list(call(hs.iter_pairs,
                 POINTS, cutoff, quantities="ijSdD", max_pairs=most, threads=threads,
                 progress=seen.append, **how,
             ))  # fmt: skip
@@ -103,28 +106,30 @@ def test_blocks_and_calls_are_pairs_in_their_order(name):
             found = tuple(np.concatenate(columns) for columns in zip(*blocks))
             assert same_arrays(found, expected)
     visited = []
-    count = hs.for_each_pair(POINTS, cutoff, lambda *pair: visited.append(pair), **how)
+    count = call(hs.for_each_pair, POINTS, cutoff, lambda *pair: visited.append(pair), **how)
     i, j, S, d, D = expected
     assert count == len(i)
     assert visited == list(zip(i.tolist(), j.tolist(), map(tuple, S.tolist()),
                                map(tuple, D.tolist()), (d * d).tolist()))  # fmt: skip
     stopped = []
     how = how | {"threads": 1}
-    assert hs.for_each_pair(POINTS, cutoff, lambda i, *_: stopped.append(i) or i == 3, **how) == (
-        len(stopped)
-    )
+    assert call(
+        hs.for_each_pair, POINTS, cutoff, lambda i, *_: stopped.append(i) or i == 3, **how
+    ) == (len(stopped))
 
 
 def test_rows_are_pairs_with_their_direction():
     for rule in RULES:
         how = {"radii": RADII, "rule": rule, "box": 1.0}
-        table = hs.neighbors(POINTS, None, quantities="jdDS", **how)
-        assert same_arrays(hs.coordination(POINTS, None, **how), table.counts)
+        table = call(hs.neighbors, POINTS, None, quantities="jdDS", **how)
+        assert same_arrays(call(hs.coordination, POINTS, None, **how), table.counts)
         i, j, d, D, S = table.to_pairs(quantities="ijdDS")
         if rule in SYMMETRIC:
             assert same_arrays(table.distances[table.reverse()], table.distances)
             half = table.to_pairs(quantities="ijS", half=True)
-            assert same_arrays(half, hs.pairs(POINTS, None, quantities="ijS", sort=True, **how))
+            assert same_arrays(
+                half, call(hs.pairs, POINTS, None, quantities="ijS", sort=True, **how)
+            )
         else:
             with pytest.raises(ValueError, match="needs a table of one set"):
                 table.reverse()
@@ -164,18 +169,20 @@ def test_large_scenes_are_right(name, rule, kind, rng):
     points, scene = boxed(rng, kind, 3, n)
     radii = LARGE[name](n, rng) * 0.04 * (1 if rule == "sum" else 2)
     how = {"radii": radii, "rule": rule, **scene}
-    verdict = hs.verify(points, None, hs.neighbors(points, None, quantities="jS", **how), **how)
+    verdict = call(
+        hs.verify, points, None, call(hs.neighbors, points, None, quantities="jS", **how), **how
+    )
     assert verdict, str(verdict)
     assert verdict.n_expected > 0
     if rule in SYMMETRIC:
-        found = hs.pairs(points, None, quantities="ijS", **how)
-        assert hs.verify(points, None, *found, **how)
+        found = call(hs.pairs, points, None, quantities="ijS", **how)
+        assert call(hs.verify, points, None, *found, **how)
     queries = {"queries": points[:300], "query_radii": radii[:300], "radii": radii[300:]}
     if rule in ("gather", "scatter"):
         del queries["radii" if rule == "gather" else "query_radii"]
     how = scene | {"rule": rule} | queries
-    table = hs.neighbors(points[300:], None, quantities="jS", **how)
-    assert hs.verify(points[300:], None, table, **how)
+    table = call(hs.neighbors, points[300:], None, quantities="jS", **how)
+    assert call(hs.verify, points[300:], None, table, **how)
 
 
 def test_many_types_in_a_large_scene(rng):
@@ -183,11 +190,11 @@ def test_many_types_in_a_large_scene(rng):
     types = rng.integers(0, 12, 4000)
     table = rng.uniform(0.0, 0.12, (12, 12))
     table = np.minimum(table, table.T)
-    found = hs.pairs(points, table, types=types, quantities="ijS", **scene)
-    assert hs.verify(points, table, *found, types=types, **scene)
-    again = hs.neighbors(points, table, types=types, quantities="jS", **scene)
-    assert hs.verify(points, table, again, types=types, **scene)
-    assert not same_tables(again, hs.neighbors(points, 0.12, quantities="jS", **scene))
+    found = call(hs.pairs, points, table, types=types, quantities="ijS", **scene)
+    assert call(hs.verify, points, table, *found, types=types, **scene)
+    again = call(hs.neighbors, points, table, types=types, quantities="jS", **scene)
+    assert call(hs.verify, points, table, again, types=types, **scene)
+    assert not same_tables(again, call(hs.neighbors, points, 0.12, quantities="jS", **scene))
 
 
 def test_dwarfs_in_a_giant_cost_what_they_find(rng):
@@ -196,5 +203,5 @@ def test_dwarfs_in_a_giant_cost_what_they_find(rng):
     points = rng.random((n, 3))
     radii = np.full(n, 1e-3)
     radii[7] = 2.0
-    assert hs.count_pairs(points, None, radii=radii, threads=1) < 3 * n
-    assert len(hs.pairs(points, None, radii=radii, quantities="i", memory_limit=2e8)) < 3 * n
+    assert call(hs.count_pairs, points, None, radii=radii, threads=1) < 3 * n
+    assert len(call(hs.pairs, points, None, radii=radii, quantities="i", memory_limit=2e8)) < 3 * n

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell._check.by_reach import ByReach
+from calls import call
+from halfshell._check.right import Right
 from reach_scenes import RULES, SYMMETRIC, Reaching, boxed, spread_radii
 from refused_calls import assert_refused
 
@@ -21,48 +22,48 @@ def columns_of(rows, ndim=3):
 
 def test_faults_are_named():
     how = {"radii": RADII}
-    assert str(hs.verify(POINTS, None, [0, 2], [1, 1], **how)) == "correct: 2 pairs"
+    assert str(call(hs.verify, POINTS, None, [0, 2], [1, 1], **how)) == "correct: 2 pairs"
     for i, j, kind, row in (
         ([0], [1], "missed", [1, 2]),
         ([0, 1, 2], [1, 2, 3], "spurious", [2, 3]),
         ([0, 1, 1], [1, 2, 0], "duplicate", [0, 1]),
     ):
-        verdict = hs.verify(POINTS, None, i, j, **how)
+        verdict = call(hs.verify, POINTS, None, i, j, **how)
         assert not verdict and getattr(verdict, kind).tolist() == [row]
-    assert hs.verify(POINTS, None, [], [], inclusive=False, **how)
-    assert hs.verify(POINTS, 1.5, [0], [1], **how)
-    assert hs.verify(POINTS, None, [0, 1, 1, 2], [1, 0, 2, 1], full=True, **how)
+    assert call(hs.verify, POINTS, None, [], [], inclusive=False, **how)
+    assert call(hs.verify, POINTS, 1.5, [0], [1], **how)
+    assert call(hs.verify, POINTS, None, [0, 1, 1, 2], [1, 0, 2, 1], full=True, **how)
 
 
 def test_faults_in_lists_with_a_direction():
     how = {"radii": [1.0, 0.0, 2.0, 0.0], "rule": "gather"}
-    assert hs.verify(POINTS, None, [0, 2], [1, 1], **how)
-    verdict = hs.verify(POINTS, None, [0, 1], [1, 2], **how)
+    assert call(hs.verify, POINTS, None, [0, 2], [1, 1], **how)
+    verdict = call(hs.verify, POINTS, None, [0, 1], [1, 2], **how)
     assert verdict.missed.tolist() == [[2, 1]] and verdict.spurious.tolist() == [[1, 2]]
-    assert hs.verify(POINTS, None, [1, 1], [0, 2], **how | {"rule": "scatter"})
+    assert call(hs.verify, POINTS, None, [1, 1], [0, 2], **how | {"rule": "scatter"})
     assert_refused(
-        lambda: hs.verify(POINTS, None, [0, 2], [1, 1], full=True, **how), ValueError, "full"
+        lambda: call(hs.verify, POINTS, None, [0, 2], [1, 1], full=True, **how), ValueError, "full"
     )
-    table = hs.neighbors(POINTS, None, **how)
-    assert hs.verify(POINTS, None, table, **how)
-    assert not hs.verify(POINTS, None, table, **how | {"rule": "scatter"})
-    assert_refused(lambda: hs.verify(POINTS, None, table[:2], **how), ValueError, "2 rows")
+    table = call(hs.neighbors, POINTS, None, **how)
+    assert call(hs.verify, POINTS, None, table, **how)
+    assert not call(hs.verify, POINTS, None, table, **how | {"rule": "scatter"})
+    assert_refused(lambda: call(hs.verify, POINTS, None, table[:2], **how), ValueError, "2 rows")
     assert_refused(
-        lambda: hs.verify(POINTS, None, table, radii=RADII), ValueError, "one set of points"
+        lambda: call(hs.verify, POINTS, None, table, radii=RADII), ValueError, "one set of points"
     )
 
 
 def test_types_and_queries():
     cutoffs, types = {(0, 1): 2.0, (1, 1): 3.0}, [0, 0, 1, 1]
-    assert hs.verify(POINTS, cutoffs, [1, 2], [2, 3], types=types)
-    verdict = hs.verify(POINTS, cutoffs, [0, 2], [1, 3], types=types, inclusive=True)
+    assert call(hs.verify, POINTS, cutoffs, [1, 2], [2, 3], types=types)
+    verdict = call(hs.verify, POINTS, cutoffs, [0, 2], [1, 3], types=types, inclusive=True)
     assert verdict.spurious.tolist() == [[0, 1]] and verdict.missed.tolist() == [[1, 2]]
     queries = {"queries": [[2.0], [5.0]], "types": types, "query_types": [0, 1]}
-    assert hs.verify(POINTS, cutoffs, [0, 1, 1], [2, 2, 3], **queries)
-    assert not hs.verify(POINTS, cutoffs, [0, 1], [2, 2], **queries)
+    assert call(hs.verify, POINTS, cutoffs, [0, 1, 1], [2, 2, 3], **queries)
+    assert not call(hs.verify, POINTS, cutoffs, [0, 1], [2, 2], **queries)
     shifts = [[0], [0], [0]]
-    assert hs.verify(POINTS, cutoffs, [0, 1, 1], [2, 2, 3], shifts, **queries)
-    wrong = hs.verify(POINTS, cutoffs, [0, 0, 1], [2, 0, 3], shifts, **queries)
+    assert call(hs.verify, POINTS, cutoffs, [0, 1, 1], [2, 2, 3], shifts, **queries)
+    wrong = call(hs.verify, POINTS, cutoffs, [0, 0, 1], [2, 0, 3], shifts, **queries)
     assert wrong.spurious.tolist() == [[0, 0, 0]] and wrong.missed.tolist() == [[1, 2, 0]]
 
 
@@ -77,19 +78,19 @@ def test_the_right_list_is_that_of_rational_arithmetic(rule, kind, rng):
             one = Reaching(points, cutoff, radii=radii, rule=rule, **scene)
             full = one.full()
             is_full = rule in SYMMETRIC
-            assert hs.verify(**one.arguments, **columns_of(full), full=is_full)
+            assert call(hs.verify, **one.arguments, **columns_of(full), full=is_full)
             for k in range(0, len(full), 1 + len(full) // 4):
                 fewer = columns_of(full[:k] + full[k + 1 :])
-                verdict = hs.verify(**one.arguments, **fewer, full=is_full)
+                verdict = call(hs.verify, **one.arguments, **fewer, full=is_full)
                 i, j, S = full[k]
                 assert verdict.missed.tolist() == [[i, j, *S]]
             between = one.but(n_queries=9)
-            assert hs.verify(**between.of_two_sets, **columns_of(between.between()))
+            assert call(hs.verify, **between.of_two_sets, **columns_of(between.between()))
 
 
 def test_differences_are_decided_again(monkeypatch):
     """A right list that is wrong would not stand against rational arithmetic."""
-    rows = ByReach.rows
-    monkeypatch.setattr(ByReach, "rows", lambda *given, **how: rows(*given, **how)[1:])
+    rows = Right.rows
+    monkeypatch.setattr(Right, "rows", lambda *given, **how: rows(*given, **how)[1:])
     with pytest.raises(AssertionError, match="rational arithmetic disagree"):
-        hs.verify(POINTS, None, [0, 1], [1, 2], [[0], [0]], radii=RADII)
+        call(hs.verify, POINTS, None, [0, 1], [1, 2], [[0], [0]], radii=RADII)

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pairs by supports against a brute force in rational arithmetic, which meets every image of every
-two points: rules, boxes, dimensions, needles, sizes, ties."""
+"""Ellipsoids around points: every pair by rational arithmetic, and supports that are refused."""
 
 import itertools
 import math
+import time
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
+from halfshell._check.right import spheres_of
 
 RULES = ("max", "min", "gather", "scatter")
 
@@ -33,9 +35,7 @@ def most_images(H, extent, box, periodic):
     return [int(longest / h) + 2 if p else 0 for h, p in zip(heights, periodic)]
 
 
-def brute(
-    x, H, extent, rule, box=None, periodic=None, inclusive=True, q=None, Hq=None, cutoff=None
-):
+def brute(x, H, extent, rule, box=None, periodic=None, inclusive=True, q=None, Hq=None):
     """All (i, j, S): of one set each pair once, or rows of it for rules with a direction."""
     d = x.shape[1]
     directed = q is not None or rule in ("gather", "scatter")
@@ -48,7 +48,6 @@ def brute(
         *([] if h is None else h.reshape(len(h), d * d).tolist() for h in (H, of_asking))
     )
     limit = (Fraction(extent) * unit * of_entries) ** 2
-    ball = None if cutoff is None else (Fraction(cutoff) * unit) ** 2
     every = np.concatenate([h for h in (H, of_asking) if h is not None])
     shifts = [(0,) * d]
     if box is not None:
@@ -74,8 +73,6 @@ def brute(
                     if first == 0 or (not directed and first < 0):
                         continue
                 D = [r[k] - p[k] + sum(s * row[k] for s, row in zip(S, rows)) for k in range(d)]
-                if ball is not None and not below(sum(a * a for a in D), ball):
-                    continue
                 judged = []
                 if rule != "scatter":
                     judged.append(below(norm2(A[i], D), limit))
@@ -107,28 +104,21 @@ def rows_of(result):
     return sorted(zip(i.tolist(), j.tolist(), *S.T.tolist()))
 
 
-def found(x, rule, *, kernel=None, threads=None, **how):
-    if rule in ("gather", "scatter") and "queries" not in how:
-        table = hs.neighbors(x, how.pop("cutoff", None), rule=rule, quantities="jS", kernel=kernel,
-                             threads=threads, **how)  # fmt: skip
-        return rows_of(table.to_pairs(quantities="ijS"))
-    cutoff = how.pop("cutoff", None)
+def found(x, rule, **how):
+    how = {"rule": rule, "quantities": "ijS", **how}
     if "queries" in how:
-        return rows_of(hs.pairs_between(how.pop("queries"), x, cutoff, rule=rule, quantities="ijS",
-                                        kernel=kernel, threads=threads, **how))  # fmt: skip
-    return rows_of(
-        hs.pairs(x, cutoff, rule=rule, quantities="ijS", kernel=kernel, threads=threads, **how)
-    )
+        return rows_of(call(hs.pairs_between, how.pop("queries"), x, None, **how))
+    if rule in ("gather", "scatter"):
+        table = call(hs.neighbors, x, None, **{**how, "quantities": "jS"})
+        return rows_of(table.to_pairs(quantities="ijS"))
+    return rows_of(call(hs.pairs, x, None, **how))
 
 
 BOXES = {
     "open": (lambda d: None, lambda d: None),
     "periodic": (lambda d: np.eye(d), lambda d: [True] * d),
     "mixed": (lambda d: np.eye(d) * 1.25, lambda d: [k % 2 == 0 for k in range(d)]),
-    "triclinic": (
-        lambda d: np.eye(d) + 0.375 * np.tril(np.ones((d, d)), -1),
-        lambda d: [True] * d,
-    ),
+    "triclinic": (lambda d: np.eye(d) + 0.375 * np.tril(np.ones((d, d)), -1), lambda d: [True] * d),
     "images": (lambda d: np.diag([0.5, 1.5, 2.0][:d]), lambda d: [True] + [False] * (d - 1)),
 }
 
@@ -147,12 +137,12 @@ def test_the_brute_force_agrees(kind, rule):
             expected = brute(x, H, 1.0, rule, box, periodic)
             assert found(x, rule, supports=H, extent=1.0, **how) == expected
             if rule in ("max", "min"):
-                table = hs.neighbors(
-                    x, None, supports=H, extent=1.0, rule=rule, quantities="jS", **how
+                table = call(
+                    hs.neighbors, x, None, supports=H, extent=1.0, rule=rule, quantities="jS", **how
                 )
                 both = [(j, i, *(-s for s in S)) for i, j, *S in expected]
                 assert rows_of(table.to_pairs(quantities="ijS")) == sorted(expected + both)
-                count = hs.count_pairs(x, None, supports=H, extent=1.0, rule=rule, **how)
+                count = call(hs.count_pairs, x, None, supports=H, extent=1.0, rule=rule, **how)
                 assert count == len(expected)
 
 
@@ -169,9 +159,9 @@ def test_two_sets_agree(rule):
             expected = brute(x, own, 2.0, rule, box, periodic, q=q, Hq=asking)
             given = {"supports": own, "query_supports": asking, "extent": 2.0, **how}
             assert found(x, rule, queries=q, **given) == expected
-            counts = hs.coordination(x, None, queries=q, rule=rule, **given)
+            counts = call(hs.coordination, x, None, queries=q, rule=rule, **given)
             assert counts.tolist() == [sum(row[0] == i for row in expected) for i in range(len(q))]
-            assert hs.count_pairs(x, None, queries=q, rule=rule, **given) == len(expected)
+            assert call(hs.count_pairs, x, None, queries=q, rule=rule, **given) == len(expected)
 
 
 @pytest.mark.parametrize("d", [2, 3])
@@ -190,7 +180,9 @@ def test_rotated_needles_a_million_times_as_long_as_wide(d):
         assert found(x, "max", supports=H, extent=1.0, kernel=kernel) == expected
     for rule in RULES:
         assert found(x, rule, supports=H, extent=1.0) == brute(x, H, 1.0, rule)
-    assert hs.verify(x, None, *hs.pairs(x, None, supports=H, extent=1.0), supports=H, extent=1.0)
+    assert call(
+        hs.verify, x, None, *call(hs.pairs, x, None, supports=H, extent=1.0), supports=H, extent=1.0
+    )
 
 
 @pytest.mark.parametrize("rule", RULES)
@@ -243,8 +235,8 @@ def test_lattices_of_ties():
             x = g * unit
             H = np.tile(factor * np.diag([2.0, 1.0, 0.5]) / 2.0, (len(x), 1, 1))
             args = {"supports": H, "extent": 0.5, "inclusive": inclusive}
-            got = hs.pairs(x, None, quantities="ijS", **args)
-            assert hs.verify(x, None, *got, **args)
+            got = call(hs.pairs, x, None, quantities="ijS", **args)
+            assert call(hs.verify, x, None, *got, **args)
             few = slice(0, 30)
             part = {**args, "supports": H[few]}
             expected = brute(x[few], H[few], 0.5, "max", inclusive=inclusive)
@@ -263,8 +255,10 @@ def test_round_supports_are_radii(d):
             H = np.eye(d) / radii[:, None, None]
             for box in (None, [1.0] * d):
                 same = {"box": box, "inclusive": inclusive, "rule": rule}
-                by_radii = hs.neighbors(x, None, radii=radii, quantities="jS", **same)
-                by_supports = hs.neighbors(x, None, supports=H, extent=1.0, quantities="jS", **same)
+                by_radii = call(hs.neighbors, x, None, radii=radii, quantities="jS", **same)
+                by_supports = call(
+                    hs.neighbors, x, None, supports=H, extent=1.0, quantities="jS", **same
+                )
                 assert np.array_equal(by_radii.offsets, by_supports.offsets)
                 assert np.array_equal(by_radii.indices, by_supports.indices)
                 assert np.array_equal(by_radii.shifts, by_supports.shifts)
@@ -275,38 +269,23 @@ def test_every_function_gives_the_same_pairs(rule):
     rng = np.random.default_rng(3)
     x = rng.random((500, 3))
     args = {"supports": tensors(rng, 500, 3, 0.2, 4.0), "extent": 1.0, "rule": rule, "box": 1.0}
-    reference = hs.pairs(x, None, quantities="ijSdD", sort=True, **args)
+    reference = call(hs.pairs, x, None, quantities="ijSdD", sort=True, **args)
     i, j, S, d, D = reference
     assert np.allclose(np.linalg.norm(D, axis=1), d)
-    unsorted = hs.pairs(x, None, quantities="ijSdD", **args)
+    unsorted = call(hs.pairs, x, None, quantities="ijSdD", **args)
     for kernel, threads in itertools.product(hs.kernels(), (1, 2, 3)):
-        again = hs.pairs(x, None, quantities="ijSdD", kernel=kernel, threads=threads, **args)
+        again = call(hs.pairs, x, None, quantities="ijSdD", kernel=kernel, threads=threads, **args)
         assert all(np.array_equal(a, b) for a, b in zip(again, unsorted))
-    blocks = list(hs.iter_pairs(x, None, quantities="ijSdD", max_pairs=1000, **args))
+    blocks = list(call(hs.iter_pairs, x, None, quantities="ijSdD", max_pairs=1000, **args))
     assert all(np.array_equal(np.concatenate(a), b) for a, b in zip(zip(*blocks), unsorted))
     seen = []
-    hs.for_each_pair(x, None, lambda i, j, S, D, d2: seen.append((i, j, *S)), **args)
+    call(hs.for_each_pair, x, None, lambda i, j, S, D, d2: seen.append((i, j, *S)), **args)
     assert sorted(seen) == rows_of((i, j, S))
-    assert hs.count_pairs(x, None, **args) == len(i)
+    assert call(hs.count_pairs, x, None, **args) == len(i)
     degree = np.bincount(i, minlength=500) + np.bincount(j, minlength=500)
-    assert np.array_equal(hs.coordination(x, None, **args), degree)
-    assert hs.verify(x, None, i, j, S, **args)
-    assert hs.verify(x, None, hs.neighbors(x, None, quantities="jS", **args), **args)
-
-
-def test_a_cutoff_is_a_further_limit():
-    for inclusive in (True, False):
-        rng = np.random.default_rng(11)
-        x = np.round(rng.random((14, 2)) * 16) / 16
-        H = tensors(rng, 14, 2, 0.6, 3.0)
-        for cutoff in (0.0, 0.125, 0.3125, 0.5, 5.0):
-            for box in (None, np.eye(2)):
-                how = {} if box is None else {"box": box}
-                expected = brute(x, H, 1.0, "max", box, [True] * 2, inclusive, cutoff=cutoff)
-                args = {"supports": H, "extent": 1.0, "inclusive": inclusive, **how}
-                assert found(x, "max", cutoff=cutoff, **args) == expected
-                i, j, S = hs.pairs(x, cutoff, quantities="ijS", **args)
-                assert hs.verify(x, cutoff, i, j, S, **args)
+    assert np.array_equal(call(hs.coordination, x, None, **args), degree)
+    assert call(hs.verify, x, None, i, j, S, **args)
+    assert call(hs.verify, x, None, call(hs.neighbors, x, None, quantities="jS", **args), **args)
 
 
 def test_an_extent_of_zero_holds_coincident_points():
@@ -441,5 +420,236 @@ def test_many_needles_in_many_cells():
             matrices = (matrices + matrices.transpose(0, 2, 1)) / 2.0
             for box in (1.0, SKEWED, None):
                 args = {"supports": matrices, "extent": 1.0, "box": box}
-                result = hs.pairs(x, None, quantities="ijS", **args)
-                assert hs.verify(x, None, *result, **args)
+                result = call(hs.pairs, x, None, quantities="ijS", **args)
+                assert call(hs.verify, x, None, *result, **args)
+
+
+# ---- what is refused ---------------------------------------------------------------------------
+
+
+X, BATCH = np.random.default_rng(0).random((6, 3)), [0, 0, 1, 1, 1, 7]
+H = np.tile(np.diag([1.0, 2.0, 4.0]), (6, 1, 1))
+
+
+def changed(k, a, b, value, both=True):
+    matrices = H.copy()
+    matrices[k, a, b] = value
+    if both:
+        matrices[k, b, a] = value
+    return matrices
+
+
+CALLS = {
+    "pairs": lambda **how: call(hs.pairs, X, None, **how),
+    "neighbors": lambda **how: call(hs.neighbors, X, None, **how),
+    "coordination": lambda **how: call(hs.coordination, X, None, **how),
+    "count_pairs": lambda **how: call(hs.count_pairs, X, None, **how),
+    "pairs_between": lambda **how: call(
+        hs.pairs_between, X, X, None, query_supports=how.get("supports"), **how
+    ),
+    "iter_pairs": lambda **how: list(call(hs.iter_pairs, X, None, **how)),
+    "for_each_pair": lambda **how: call(hs.for_each_pair, X, None, lambda *pair: None, **how),
+    "verify": lambda **how: call(hs.verify, X, None, [], [], **how),
+    "explain": lambda **how: call(hs.explain, X, None, **how),
+    "pairs of a batch": lambda **how: call(hs.pairs, X, None, batch=BATCH, **how),
+    "count_pairs of a batch": lambda **how: call(hs.count_pairs, X, None, batch=BATCH, **how),
+}
+
+REFUSED = [
+    ({"supports": H, "extent": -1.0}, ValueError, "cutoff must be finite and not negative, got -1"),
+    ({"supports": H, "extent": np.nan}, ValueError, "cutoff must be finite"),
+    ({"supports": H, "extent": np.inf}, ValueError, "cutoff must be finite"),
+    ({"supports": H, "extent": "2"}, TypeError, "cutoff"),
+    ({"supports": H}, TypeError, "with supports it is the extent"),
+    ({"supports": H[:5], "extent": 1.0}, ValueError, r"shape \(6, 3, 3\)"),
+    ({"supports": H[:, :2, :2], "extent": 1.0}, ValueError, r"shape \(6, 3, 3\)"),
+    ({"supports": H[0], "extent": 1.0}, ValueError, r"shape \(6, 3, 3\)"),
+    ({"supports": 1.0, "extent": 1.0}, (TypeError, ValueError), "supports must"),
+    ({"supports": H.astype(complex), "extent": 1.0}, TypeError, "supports"),
+    ({"supports": changed(3, 2, 1, 0.5, False), "extent": 1.0}, ValueError,
+     r"supports must be symmetric, got supports\[3, 2, 1\] = 0.5 and supports\[3, 1, 2\] = 0.0"),
+    ({"supports": changed(4, 2, 1, np.nan), "extent": 1.0}, ValueError,
+     r"supports must be finite, got supports\[4, 1, 2\] = nan"),
+    ({"supports": changed(4, 0, 0, np.inf), "extent": 1.0}, ValueError, r"supports\[4, 0, 0\]"),
+    ({"supports": changed(2, 0, 0, 0.0), "extent": 1.0}, ValueError,
+     r"positive definite; supports\[2\] is not"),
+    ({"supports": changed(5, 1, 1, -2.0), "extent": 1.0}, ValueError, r"supports\[5\]"),
+    ({"supports": changed(1, 0, 1, 2.0), "extent": 1.0}, ValueError, r"supports\[1\]"),
+    ({"supports": H * 0.0, "extent": 1.0}, ValueError, r"supports\[0\]"),
+    ({"supports": H * 1e-308, "extent": 4.0}, ValueError, r"supports\[0\] reaches further"),
+    ({"supports": H, "extent": 1.0, "rule": "sum"}, ValueError, "rule must be one of"),
+    ({"supports": H, "extent": 1.0, "rule": "mean"}, ValueError, "rule must be one of"),
+    ({"supports": H, "extent": 1.0, "radii": np.ones(6)}, ValueError,
+     "radii and supports cannot be given together"),
+    ({"supports": H, "extent": {(0, 0): 1.0}, "types": np.zeros(6, int)}, ValueError,
+     "types cannot be combined with supports|queries have none"),
+    ({"rule": "max"}, ValueError, "rule needs radii or supports"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("how", "error", "message"), REFUSED)
+def test_what_is_refused_says_why(how, error, message):
+    for search in CALLS.values():
+        with pytest.raises(error, match=message):
+            search(**how)
+
+
+def test_rules_with_a_direction_are_for_rows():
+    for name in ("pairs", "pairs of a batch", "iter_pairs", "for_each_pair", "explain"):
+        for rule in ("gather", "scatter"):
+            with pytest.raises(ValueError, match="has a direction"):
+                CALLS[name](supports=H, extent=1.0, rule=rule)
+
+
+def test_supports_of_two_sets_go_together():
+    q = X[:4]
+    with pytest.raises(ValueError, match="queries have no supports: both sets need them"):
+        call(hs.pairs_between, q, X, None, supports=H, extent=1.0)
+    with pytest.raises(
+        ValueError, match="'gather' goes by the supports of queries, which have none"
+    ):
+        call(hs.pairs_between, q, X, None, supports=H, extent=1.0, rule="gather")
+    with pytest.raises(ValueError, match=r"supports must have shape \(4, 3, 3\)"):
+        call(hs.pairs_between, q, X, None, query_supports=H, extent=1.0, rule="gather")
+    with pytest.raises(ValueError, match=r"supports\[2\] is not"):
+        call(
+            hs.pairs_between,
+            q,
+            X,
+            None,
+            query_supports=changed(2, 0, 0, -1.0)[:4],
+            extent=1.0,
+            rule="gather",
+        )
+
+
+def test_more_than_three_dimensions_are_refused():
+    d = 4
+    with pytest.raises(ValueError, match=f"1 to 3 dimensions, got {d}"):
+        call(hs.pairs, np.zeros((2, d)), None, supports=np.tile(np.eye(d), (2, 1, 1)), extent=1.0)
+
+
+def test_a_large_scene_is_refused_before_it_is_searched():
+    n = 200_000
+    x = np.random.default_rng(1).random((n, 3))
+    matrices = np.tile(np.eye(3), (n, 1, 1))
+    matrices[n - 1, 2, 2] = 0.0  # every support reaches across the box
+    begun = time.perf_counter()
+    with pytest.raises(ValueError, match=rf"supports\[{n - 1}\] is not"):
+        call(hs.pairs, x, None, supports=matrices, extent=1.0, box=1.0)
+    assert time.perf_counter() - begun < 1.0
+
+
+def singular(kind):
+    """Singular in exact arithmetic, and the entry that makes it otherwise."""
+    if kind == "two":  # of thirds: 1/3 * 3 is rounded to 1
+        a, b = 1.0 / 3.0, 1.0
+        return np.array([[a * a, a * b], [a * b, b * b]]), (0, 0)
+    if kind == "exact":
+        return np.array([[1.0, 3.0], [3.0, 9.0]]), (1, 1)
+    if kind == "tiny":
+        return np.array([[2.0**-600, 2.0**-300], [2.0**-300, 1.0]]), (0, 0)
+    v = np.array([1.0, 3.0, 5.0])
+    return np.outer(v, v) + np.outer([2.0, 1.0, 0.0], [2.0, 1.0, 0.0]), (2, 2)
+
+
+def is_definite(matrix):
+    """By leading minors of fractions."""
+    rows = [[Fraction(x) for x in row] for row in matrix.tolist()]
+
+    def determinant(m):
+        if len(m) == 1:
+            return m[0][0]
+        return sum(
+            (-1) ** k * m[0][k] * determinant([row[:k] + row[k + 1 :] for row in m[1:]])
+            for k in range(len(m))
+        )
+
+    return all(determinant([row[:k] for row in rows[:k]]) > 0 for k in range(1, len(rows) + 1))
+
+
+@pytest.mark.parametrize("kind", ["two", "exact", "tiny", "three"])
+def test_singular_ones_are_told_exactly(kind):
+    matrix, (a, b) = singular(kind)
+    d = len(matrix)
+    seen = set()
+    for step in range(-3, 4):
+        beside = matrix.copy()
+        for _ in range(abs(step)):
+            beside[a, b] = np.nextafter(beside[a, b], np.inf * step)
+        args = {"supports": beside[None], "extent": 1.0}
+        seen.add(is_definite(beside))
+        if is_definite(beside):
+            assert call(hs.count_pairs, np.zeros((1, d)), None, **args) == 0
+            radius = spheres_of(beside[None], 1.0)[0]
+            assert radius > 1e6
+        else:
+            with pytest.raises(ValueError, match=r"supports\[0\] is not"):
+                call(hs.count_pairs, np.zeros((1, d)), None, **args)
+    assert seen == {True, False}
+
+
+def test_random_matrices_near_the_border_are_told_exactly():
+    rng = np.random.default_rng(12)
+    counts = [0, 0]
+    for trial in range(300):
+        d = 2 + trial % 2
+        v = rng.integers(-40, 40, (d, d - 1)).astype(float)
+        matrix = v @ v.T  # singular
+        for _ in range(trial % 4):
+            k = rng.integers(d)
+            matrix[k, k] += rng.integers(-1, 2) * 2.0 ** -rng.integers(0, 30)
+        expected = is_definite(matrix)
+        counts[expected] += 1
+        try:
+            call(hs.count_pairs, np.zeros((1, d)), None, supports=matrix[None], extent=1.0)
+            assert expected
+        except ValueError as error:
+            assert not expected and "positive definite" in str(error)
+    assert min(counts) > 40
+
+
+def test_other_types_are_converted_exactly():
+    for dtype in (np.float32, np.int64, ">f8", np.float16):
+        expected = call(hs.pairs, X, None, supports=H, extent=1.5)
+        again = call(hs.pairs, X, None, supports=H.astype(dtype), extent=1.5)
+        assert all(np.array_equal(a, b) for a, b in zip(expected, again))
+        strided = np.empty((12, 3, 6))[::2, :, ::2]
+        strided[...] = H
+        strided.flags.writeable = False
+        again = call(hs.pairs, X, None, supports=strided, extent=1.5)
+        assert all(np.array_equal(a, b) for a, b in zip(expected, again))
+
+
+def test_no_points_and_one_point():
+    assert (
+        call(hs.pairs, np.empty((0, 3)), None, supports=np.empty((0, 3, 3)), extent=1.0)[0].size
+        == 0
+    )
+    table = call(
+        hs.neighbors, [[0.0]], None, supports=[[[1.0]]], extent=2.5, box=1.0, quantities="jS"
+    )
+    assert table.shifts.ravel().tolist() == [-2, -1, 1, 2]
+
+
+def test_a_scene_without_supports_pays_for_none():
+    x = np.random.default_rng(2).random((5000, 3))
+    measured = hs.explain(x, 0.1, box=1.0, measure=True).measured["bytes"]
+    assert measured["supports"] == 0
+    assert measured["points"] > 0
+
+
+def test_the_plan_names_octaves_of_supports():
+    plan = call(hs.explain, X, None, supports=H, extent=1.0, algorithm="hierarchy")
+    assert plan.algorithm == "hierarchy"
+    assert plan.reason.startswith("1 octave of supports up to 1, each searched with cells of its")
+
+
+def test_verify_finds_what_is_missed_and_what_is_spurious():
+    x = np.array([[0.0, 0.0], [0.9, 0.0], [0.0, 0.9]])
+    narrow = np.tile(np.diag([1.0, 2.0]), (3, 1, 1))
+    assert call(hs.verify, x, None, [0], [1], supports=narrow, extent=1.0)
+    verdict = call(hs.verify, x, None, [0], [2], supports=narrow, extent=1.0)
+    assert verdict.missed.tolist() == [[0, 1]] and verdict.spurious.tolist() == [[0, 2]]
+    wide = call(hs.verify, x, None, [0, 0], [1, 2], supports=narrow[:, ::-1, ::-1], extent=1.0)
+    assert wide.spurious.tolist() == [[0, 1]]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 
 LETTERS = "ijdDS"
 SKEWED = np.array([[4.0, 0.0, 0.0], [2.5, 3.0, 0.0], [1.5, 2.0, 3.5]])
@@ -23,7 +24,7 @@ def walk(n_frames=12, n=80, d=3, step=0.02, seed=0):
 
 
 def fresh(points, cutoff=1.3, **options):
-    return hs.pairs(points, cutoff, quantities=LETTERS, sort=True, **options)
+    return call(hs.pairs, points, cutoff, quantities=LETTERS, sort=True, **options)
 
 
 def check(found, expected):
@@ -36,7 +37,7 @@ def check(found, expected):
 
 
 def follow(frames, cutoff=1.3, **options):
-    return hs.trajectory_pairs(frames, cutoff, quantities=LETTERS, sort=True, **options)
+    return call(hs.trajectory_pairs, frames, cutoff, quantities=LETTERS, sort=True, **options)
 
 
 @pytest.mark.parametrize("skin", SKINS)
@@ -162,7 +163,7 @@ def test_readers_that_use_their_memory_again(skin):
     done = []
     check(follow(Reader(points, boxes), skin=skin, progress=done.append), expected)
     assert done == [0.2, 0.4, 0.6, 0.8, 1.0]
-    with pytest.raises(ValueError, match="box is given twice: Timestep bring their own"):
+    with pytest.raises(ValueError, match="of type Timestep bring their own box: leave box out"):
         next(follow(Reader(points, boxes), skin=skin, box=4.0))
 
 
@@ -182,7 +183,7 @@ def test_trajectories_as_wholes_and_frame_by_frame(skin):
     check(follow(trajectory(points, None), skin=skin), [fresh(one) for one in points])
     check(follow(trajectory(points, None), skin=skin, box=4.0),
           [fresh(one, box=4.0) for one in points])  # fmt: skip
-    with pytest.raises(ValueError, match="a SimpleNamespace in frames must be one frame, got 4"):
+    with pytest.raises(ValueError, match="frames must be one frame, got a SimpleNamespace of 4"):
         next(follow([trajectory(points, boxes)], skin=skin))
     with pytest.raises(ValueError, match="box is given twice"):
         next(follow(trajectory(points, boxes), skin=skin, box=4.0))
@@ -273,17 +274,17 @@ def test_progress():
 ])  # fmt: skip
 def test_bad_arguments_are_refused_by_the_call(options, kind, message):
     with pytest.raises(kind, match=message):
-        hs.trajectory_pairs(**{"frames": walk(2), "cutoff": 1.0} | options)
+        call(hs.trajectory_pairs, **{"frames": walk(2), "cutoff": 1.0} | options)
 
 
 @pytest.mark.parametrize("skin", SKINS)
 @pytest.mark.parametrize("bad, kind, message", [
     (np.full((3, 3), np.nan), ValueError, r"points\[0, 0\] = nan"),
-    ("abc", TypeError, "points"),
+    ("abc", TypeError, "frames must hold real numbers, got str"),
     (np.zeros(3), ValueError, "shape"),
     ((np.zeros((3, 3)), np.zeros((2, 2))), ValueError, "box"),
     ((np.zeros((3, 3)), np.zeros((3, 3))), ValueError, "box"),
-    (np.zeros((3, 3), complex), TypeError, "points"),
+    (np.zeros((3, 3), complex), TypeError, "frames must hold real numbers"),
 ])  # fmt: skip
 def test_bad_frames_are_named(skin, bad, kind, message):
     found = follow([*walk(2), bad, *walk(2)], skin=skin)
@@ -300,7 +301,7 @@ def test_periodic_needs_a_box_and_none_of_its_own(skin):
     with pytest.raises(ValueError, match="periodic needs a box"):
         next(follow(walk(1), skin=skin, periodic=True))
     atoms = ase.Atoms("C80", positions=walk(1)[0], cell=SKEWED, pbc=True)
-    with pytest.raises(ValueError, match="of type Atoms bring their own box: leave periodic"):
+    with pytest.raises(ValueError, match="of type Atoms bring their own periodic: leave periodic"):
         next(follow([atoms], skin=skin, periodic=True))
     frames = [(points, SKEWED) for points in walk(3)]
     periodic = [True, False, True]
@@ -310,7 +311,7 @@ def test_periodic_needs_a_box_and_none_of_its_own(skin):
 
 def test_a_result_that_does_not_fit():
     with pytest.raises(MemoryError) as caught:
-        next(hs.trajectory_pairs(walk(1, 3000), 5.0, memory_limit=1e5))
+        next(call(hs.trajectory_pairs, walk(1, 3000), 5.0, memory_limit=1e5))
     assert caught.value.__notes__ == ["in frame 0 of trajectory_pairs"]
 
 
@@ -329,7 +330,7 @@ def test_frames_are_shared_out_among_threads(threads, box):
     expected = [fresh(points, box=box) for points in frames]
     how = {"skin": None, "box": box, "threads": threads}
     check(follow(frames, **how), expected)
-    unsorted = hs.trajectory_pairs(frames, 1.3, quantities=LETTERS, **how)
+    unsorted = call(hs.trajectory_pairs, frames, 1.3, quantities=LETTERS, **how)
     check(unsorted, [hs.pairs(x, 1.3, quantities=LETTERS, box=box) for x in frames])
     done = []
     for k, _ in enumerate(follow(frames, progress=done.append, **how)):

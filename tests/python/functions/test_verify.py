@@ -288,7 +288,7 @@ def test_a_list_that_could_not_be_compared_is_refused_before_it_is_found(monkeyp
     monkeypatch.setattr(hs._core, "available_memory", lambda: 0.0)
     for radii in (None, np.full(4000, 1.0)):
         with pytest.raises(MemoryError, match="would not fit"):
-            hs.verify(points, 2.0 if radii is None else None, [0], [1], radii=radii)
+            hs.verify(hs.Points(points, radii=radii), 2.0, [0], [1])
     assert hs.verify(points[:3], 2.0, [0, 0, 1], [1, 2, 2]).ok  # little is found anyway
 
 

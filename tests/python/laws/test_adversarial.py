@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 from halfshell._check.reference import exact_square
 from oracles import as_integers
 
@@ -152,7 +153,8 @@ class Scene:
     def search(self, quantities, **how):
         """Some quantities for the pairs between two sides, and who they are."""
         letters = "ij" if np.abs(self.shift).max() > 2**29 else "ijS"
-        i, j, *more = hs.pairs(
+        i, j, *more = call(
+            hs.pairs,
             self.points,
             self.cutoff,
             box=self.box,

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 from full_lists import entries
 from oracles import same_arrays, triples
 from rational_images import Images, between, exact
@@ -160,26 +161,28 @@ def test_half_lists_and_reductions(seeds):
         half = brute.half()
         strict = [pair for pair in half if pair[3] < brute.limit]
         for inclusive, expected in ((True, half), (False, strict)):
-            i, j, S, d, D = hs.pairs(
-                points, cutoff, quantities="ijSdD", sort=True, inclusive=inclusive, **how
+            i, j, S, d, D = call(
+                hs.pairs, points, cutoff, quantities="ijSdD", sort=True, inclusive=inclusive, **how
             )
             assert triples(i, j, S) == keys(expected)
             largest = cutoff if inclusive else math.nextafter(cutoff, 0.0)
             for pair, length, vector in zip(expected, d.tolist(), D, strict=True):
                 brute.check_numbers(pair, length, vector, largest)
-        assert hs.pair_histogram(points, scene.edges, **how).tolist() == histogram(
+        assert call(hs.pair_histogram, points, scene.edges, **how).tolist() == histogram(
             brute, half, scene.edges
         )
-        by_type = hs.pair_histogram(points, scene.edges, types=scene.types, **how)
+        by_type = call(hs.pair_histogram, points, scene.edges, types=scene.types, **how)
         for a in range(3):
             for b in range(a, 3):
                 mine = [p for p in half if sorted(scene.types[[p[0], p[1]]].tolist()) == [a, b]]
                 counts = histogram(brute, mine, scene.edges)
                 assert by_type[a, b].tolist() == by_type[b, a].tolist() == counts
         within = [sum(p[3] < brute.squared(c) for p in half) for c in scene.edges]
-        assert hs.count_pairs(points, scene.edges, inclusive=False, **how).tolist() == within
+        assert call(hs.count_pairs, points, scene.edges, inclusive=False, **how).tolist() == within
         parts = []
-        blocks = list(hs.iter_pairs(points, cutoff, max_pairs=2, progress=parts.append, **how))
+        blocks = list(
+            call(hs.iter_pairs, points, cutoff, max_pairs=2, progress=parts.append, **how)
+        )
         assert sorted((a, b) for i, j in blocks for a, b in zip(i, j, strict=True)) == sorted(
             pair[:2] for pair in half
         )
@@ -194,12 +197,12 @@ def test_tables_of_points_and_of_queries(seeds):
         for asking in (None, queries):
             brute = scene.brute(asking)
             options = {"queries": asking, **scene.how, **scene.some}
-            table = hs.neighbors(points, cutoff, quantities="jSdD", **options)
+            table = call(hs.neighbors, points, cutoff, quantities="jSdD", **options)
             largest = [cutoff] * len(table)
             check_table(scene, table, brute, brute.pairs, largest)
-            bare = hs.neighbors(points, cutoff, quantities="jd", **options).sort()
+            bare = call(hs.neighbors, points, cutoff, quantities="jd", **options).sort()
             assert same_arrays(bare.indices, table.sort().indices)
-            j, S = hs.nearest(points, 3, max_distance=cutoff, quantities="jS", **options)
+            j, S = call(hs.nearest, points, 3, max_distance=cutoff, quantities="jS", **options)
             for i, (row, shifts) in enumerate(zip(j.tolist(), S.tolist(), strict=True)):
                 mine = [key[1:] for key in by_distance(p for p in brute.pairs if p[0] == i)][:3]
                 assert [(a, tuple(s)) for a, s in zip(row, shifts) if a >= 0] == mine
@@ -213,7 +216,9 @@ def test_cells_are_asked_with_a_radius_for_each_query(seeds):
         brute = scene.brute(scene.queries)
         radii = [scene.random.choice([0.0, 0.5, 0.9, 1.0]) * scene.cutoff for _ in scene.queries]
         pairs = [pair for pair in brute.pairs if pair[3] <= brute.squared(radii[pair[0]])]
-        table = cells.query(scene.queries, radii, quantities="jSdD", kernel=scene.some["kernel"])
+        table = call(
+            cells.query, scene.queries, radii, quantities="jSdD", kernel=scene.some["kernel"]
+        )
         check_table(scene, table, brute, pairs, radii)
         block = cells.candidates()
         everything = scene.brute()
@@ -258,14 +263,22 @@ def test_tables_that_are_sorted_have_the_same_bytes_for_any_kernel_and_threads(s
     for kernel in hs.kernels():
         for threads in (1, 4):
             how = {"kernel": kernel, "threads": threads}
-            table = hs.neighbors(
-                points, cutoff, queries=queries, box=box, quantities="jd", **how
+            table = call(
+                hs.neighbors, points, cutoff, queries=queries, box=box, quantities="jd", **how
             ).sort()
             cells = hs.CellList(points, cutoff, box=box, threads=threads)
-            asked = cells.query(queries, cutoff, quantities="jdS", kernel=kernel).sort()
+            asked = call(cells.query, queries, cutoff, quantities="jdS", kernel=kernel).sort()
             parts = []
             blocks = list(
-                hs.iter_pairs(points, cutoff, box=box, max_pairs=997, progress=parts.append, **how)
+                call(
+                    hs.iter_pairs,
+                    points,
+                    cutoff,
+                    box=box,
+                    max_pairs=997,
+                    progress=parts.append,
+                    **how,
+                )
             )
             assert parts == sorted(parts) and parts[-1] == 1.0
             found = (

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 from full_lists import assert_last_place, entries, full_list, joined, list_between
 from halfshell._check.reference import exact_square, reference_pairs
 from oracles import as_set, remembered
@@ -175,36 +176,40 @@ def check_half(scene):
     points, cutoff, options = scene.points, scene.cutoff, scene.options
     expected = remembered(reference_pairs, points, *scene.exact)
     squares = distances_of(scene, expected, points)
-    i, j = hs.pairs(points, cutoff, **options)
+    i, j = call(hs.pairs, points, cutoff, **options)
     assert sorted(zip(i.tolist(), j.tolist())) == indices(expected)
-    found = unless_too_far(scene, lambda: hs.pairs(points, cutoff, quantities="ijSdD", **options))
+    found = unless_too_far(
+        scene, lambda: call(hs.pairs, points, cutoff, quantities="ijSdD", **options)
+    )
     if found is not None:
         assert as_set(*found[:3]) == set(expected)
         assert_last_place(points, cutoff, scene.box, found)
-    blocks = list(hs.iter_pairs(points, cutoff, max_pairs=3, **options))
+    blocks = list(call(hs.iter_pairs, points, cutoff, max_pairs=3, **options))
     assert sorted((i, j) for a, b in blocks for i, j in zip(a, b)) == indices(expected)
     seen = []
     if (
         unless_too_far(
             scene,
-            lambda: hs.for_each_pair(
-                points, cutoff, lambda *pair: seen.append(pair[:3]), **options
+            lambda: call(
+                hs.for_each_pair, points, cutoff, lambda *pair: seen.append(pair[:3]), **options
             ),
         )
         is not None
     ):
         assert sorted(seen) == expected
-    assert hs.count_pairs(points, cutoff, **options) == len(expected)
+    assert call(hs.count_pairs, points, cutoff, **options) == len(expected)
     strict = sum(s < Fraction(cutoff) ** 2 for s in squares)
-    assert hs.count_pairs(points, cutoff, inclusive=False, **options) == strict
+    assert call(hs.count_pairs, points, cutoff, inclusive=False, **options) == strict
     counts = [sum(s <= Fraction(c) ** 2 for s in squares) for c in scene.edges]
-    assert hs.count_pairs(points, scene.edges, **options).tolist() == counts
-    assert hs.pair_histogram(points, scene.edges, **options).tolist() == binned(
+    assert call(hs.count_pairs, points, scene.edges, **options).tolist() == counts
+    assert call(hs.pair_histogram, points, scene.edges, **options).tolist() == binned(
         squares, scene.edges
     )
-    assert hs.explain(points, cutoff, measure=True, **options).measured["pairs"] == len(expected)
+    assert call(hs.explain, points, cutoff, measure=True, **options).measured["pairs"] == len(
+        expected
+    )
     twice = np.concatenate([points, points])
-    i, j = hs.pairs(twice, cutoff, batch=np.arange(12) // 6, **options)
+    i, j = call(hs.pairs, twice, cutoff, batch=np.arange(12) // 6, **options)
     assert sorted(zip(i.tolist(), j.tolist())) == sorted(
         indices(expected) + [(i + 6, j + 6) for i, j in indices(expected)]
     )
@@ -218,14 +223,14 @@ def check_full(scene):
         (queries, list_between(queries, points, *scene.exact)),
     ):
         sets = {} if asking is None else {"queries": asking}
-        table = hs.neighbors(points, cutoff, **sets, **options)
+        table = call(hs.neighbors, points, cutoff, **sets, **options)
         counts = [sum(i == row for i, *_ in expected) for row in range(table.n_rows)]
         assert sorted(pairs_of(table)) == indices(expected)
         found = unless_too_far(
             scene, partial(hs.neighbors, points, cutoff, quantities="jS", **sets, **options)
         )
         assert found is None or entries(found) == expected
-        assert hs.coordination(points, cutoff, **sets, **options).tolist() == counts
+        assert call(hs.coordination, points, cutoff, **sets, **options).tolist() == counts
 
 
 def check_between(scene):
@@ -233,20 +238,21 @@ def check_between(scene):
     expected = list_between(queries, points, *scene.exact)
     everything = joined(queries, points)
     squares = distances_of(scene, [(i, j + 3, S) for i, j, S in expected], everything)
-    i, j = hs.pairs_between(queries, points, cutoff, **options)
+    i, j = call(hs.pairs_between, queries, points, cutoff, **options)
     assert sorted(zip(i.tolist(), j.tolist())) == indices(expected)
     found = unless_too_far(
-        scene, lambda: hs.pairs_between(queries, points, cutoff, quantities="ijSdD", **options)
+        scene,
+        lambda: call(hs.pairs_between, queries, points, cutoff, quantities="ijSdD", **options),
     )
     if found is not None:
         assert as_set(*found[:3]) == set(expected)
         i, j, *rest = found
         assert_last_place(everything, cutoff, scene.box, [i, j + 3, *rest])
-    assert hs.count_pairs(points, cutoff, queries=queries, **options) == len(expected)
+    assert call(hs.count_pairs, points, cutoff, queries=queries, **options) == len(expected)
     counts = [sum(s <= Fraction(c) ** 2 for s in squares) for c in scene.edges]
-    found = hs.count_pairs(points, scene.edges, queries=queries, **options)
+    found = call(hs.count_pairs, points, scene.edges, queries=queries, **options)
     assert found.tolist() == counts
-    found = hs.pair_histogram(points, scene.edges, queries=queries, **options)
+    found = call(hs.pair_histogram, points, scene.edges, queries=queries, **options)
     assert found.tolist() == binned(squares, scene.edges)
 
 

@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import halfshell as hs
+from calls import call
 from full_lists import full_list
 
 #: Cells in which the original's cell list loses pairs, with cutoffs for which it does.
@@ -31,7 +32,7 @@ def by_rule(points, cutoff, box, periodic=(True, True, True)):
 
 def edges(points, cutoff, **options):
     """All edges of `halfshell.neighbors`, strict, as the original's self graph has them."""
-    table = hs.neighbors(points, cutoff, quantities="jS", inclusive=False, **options)
+    table = call(hs.neighbors, points, cutoff, quantities="jS", inclusive=False, **options)
     i, j, S = table.to_pairs(quantities="ijS")
     found = list(zip(i.tolist(), j.tolist(), map(tuple, S.tolist())))
     assert len(set(found)) == len(found)
@@ -54,7 +55,7 @@ def test_no_edge_is_lost_in_skewed_cells(name):
     assert (np.abs(d - cutoff) > 1e-12).all()
     how = {"box": box, "inclusive": False, "quantities": "ijS", "sort": True}
     for algorithm in ("all-pairs", "grid", "hash", "hierarchy"):
-        found = hs.pairs(points, cutoff, algorithm=algorithm, **how)
+        found = call(hs.pairs, points, cutoff, algorithm=algorithm, **how)
         for ours, theirs in zip(found, (i[near], j[near], S[near])):
             assert_array_equal(ours, theirs)
 
@@ -134,7 +135,7 @@ def test_systems_do_not_mix():
     parts = [rng.random((n, 3)) @ box for n, box in zip((7, 12, 9), boxes)]
     batch = np.repeat(np.arange(3), [7, 12, 9])
     found = both_ways(
-        *hs.pairs(
+        *call(hs.pairs,
             np.concatenate(parts), cutoffs, box=boxes, batch=batch, inclusive=False,
             quantities="ijS",
         )
@@ -167,26 +168,17 @@ def test_vectors_are_those_of_edges():
 
 
 def test_sizes_are_exact_or_fixed_and_never_cut():
-    """Without a capacity there is none to choose; with one, sentinels are behind the valid rows."""
+    """Without arrays of the caller's there is no size to choose; what does not fit them is told."""
     points = np.random.default_rng(9).random((100, 3))
-    i, j, S = hs.pairs(points, 0.3, box=[1.0] * 3, quantities="ijS", inclusive=False)
+    how = {"box": [1.0] * 3, "quantities": "ij", "inclusive": False}
+    i, j = hs.pairs(points, 0.3, **how)
     m = len(i)
-    for capacity in (m, 2 * m):
-        *fixed, needed = hs.pairs(
-            points, 0.3, box=[1.0] * 3, quantities="ijS", inclusive=False, capacity=capacity,
-            on_overflow="flag",
-        )  # fmt: skip
-        assert needed == m
-        for ours, plain, none in zip(fixed, (i, j, S), (100, 100, 0)):
-            assert_array_equal(ours[:m], plain)
-            assert len(ours) == capacity and (ours[m:] == none).all()
+    for size in (m, 2 * m):
+        found = hs.pairs(points, 0.3, out=(np.empty(size, int), np.empty(size, int)), **how)
+        assert_array_equal(found, (i, j))
     with pytest.raises(hs.CapacityError) as caught:
-        hs.pairs(points, 0.3, box=[1.0] * 3, inclusive=False, capacity=m - 1)
+        hs.pairs(points, 0.3, out=(np.empty(m - 1, int), np.empty(m, int)), **how)
     assert caught.value.needed == m
-    i, j, needed = hs.pairs(
-        points, 0.3, box=[1.0] * 3, inclusive=False, capacity=m - 1, on_overflow="flag"
-    )
-    assert needed == m and (i == 100).all() and (j == 100).all()  # nothing of it is used unseen
 
 
 def nearest_image(points, i, j, box, near):
@@ -230,9 +222,9 @@ def test_edges_of_some_points():
     ids = [3, 17, 8]
     every = edges(points, 1.0, box=box, exclude=np.arange(40) // 2)
     options = {"box": box, "inclusive": False, "exclude": np.arange(40) // 2}
-    half = both_ways(*hs.pairs(points, 1.0, touching=ids, quantities="ijS", **options))
+    half = both_ways(*call(hs.pairs, points, 1.0, indices=ids, quantities="ijS", **options))
     assert half == {edge for edge in every if edge[0] in ids or edge[1] in ids}
-    table = hs.neighbors(points, 1.0, indices=ids, quantities="jS", **options)
+    table = call(hs.neighbors, points, 1.0, indices=ids, quantities="jS", **options)
     row, j, S = table.to_pairs(quantities="ijS")
     found = zip(np.array(ids)[row].tolist(), j.tolist(), map(tuple, S.tolist()))
     assert set(found) == {edge for edge in every if edge[0] in ids}

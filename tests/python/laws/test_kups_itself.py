@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 
 kups = pytest.importorskip(
     "kups.core.neighborlist", reason="kups is not installed: it asks for Python 3.13"
@@ -100,8 +101,15 @@ def as_set(i, j, S):
 
 
 def ours(points, box, periodic, cutoff, **more):
-    table = hs.neighbors(
-        points.x, cutoff, box=box, periodic=periodic, quantities="jS", inclusive=False, **more
+    table = call(
+        hs.neighbors,
+        points.x,
+        cutoff,
+        box=box,
+        periodic=periodic,
+        quantities="jS",
+        inclusive=False,
+        **more,
     )
     return as_set(*table.to_pairs(quantities="ijS"))
 

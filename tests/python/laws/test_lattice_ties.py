@@ -14,16 +14,8 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from oracles import (
-    EXACT_ROTATION,
-    LATTICES,
-    as_rows,
-    as_set,
-    check,
-    check_large,
-    lattice,
-    rotation,
-)
+from calls import call
+from oracles import EXACT_ROTATION, LATTICES, as_rows, as_set, check, check_large, lattice, rotation
 
 # Cutoffs that are integers and the radius of a shell: of the lattice as `LATTICES` writes it.
 EXACT_SHELLS = {"sc": (1, 2, 3, 5), "bcc": (2, 4), "fcc": (2, 4), "diamond": (4,), "hcp": (6,)}
@@ -67,8 +59,14 @@ def test_a_shell_at_the_cutoff_is_all_in_or_all_out(name, cutoff):
             points, box = lattice(name, repeats)
             cells = math.prod(repeats)
             for inclusive, expected in ((True, within), (False, within - at)):
-                i, j, S, d = hs.pairs(
-                    points, cutoff, box=box, quantities="ijSd", inclusive=inclusive, kernel=kernel
+                i, j, S, d = call(
+                    hs.pairs,
+                    points,
+                    cutoff,
+                    box=box,
+                    quantities="ijSd",
+                    inclusive=inclusive,
+                    kernel=kernel,
                 )
                 assert 2 * len(i) == cells * expected
                 rows = as_rows(i, j, S)
@@ -87,7 +85,9 @@ def test_an_exactly_rotated_crystal_has_the_same_ties(name, cutoff):
         points, box = lattice(name, (4, 3, 5))
         points, box = points @ EXACT_ROTATION, box @ EXACT_ROTATION
         for inclusive, expected in ((True, within), (False, within - at)):
-            found = hs.count_pairs(points, 3 * cutoff, box=box, inclusive=inclusive, kernel=kernel)
+            found = call(
+                hs.count_pairs, points, 3 * cutoff, box=box, inclusive=inclusive, kernel=kernel
+            )
             assert 2 * found == 60 * expected
 
 
@@ -99,7 +99,7 @@ def test_one_ulp_of_cutoff_moves_a_whole_shell(name):
             within, at = neighbours_within(name, cutoff**2)
             below, above = math.nextafter(cutoff, 0), math.nextafter(cutoff, math.inf)
             counts = [
-                hs.count_pairs(points, c, box=box, inclusive=inclusive, kernel=kernel) / 18
+                call(hs.count_pairs, points, c, box=box, inclusive=inclusive, kernel=kernel) / 18
                 for c, inclusive in ((below, True), (cutoff, False), (cutoff, True), (above, False))
             ]
             assert counts == [within - at, within - at, within, within]
@@ -115,7 +115,7 @@ def test_irrational_shells_follow_the_rounding_of_their_root(name):
             a, b = cutoff.as_integer_ratio()
             within, at = neighbours_within(name, square)
             expected = within if a * a >= square * b * b else within - at
-            assert hs.count_pairs(points, cutoff, box=box, kernel=kernel) == 18 * expected
+            assert call(hs.count_pairs, points, cutoff, box=box, kernel=kernel) == 18 * expected
 
 
 @pytest.mark.parametrize("name", LATTICES)
@@ -179,6 +179,6 @@ def test_pythagorean_ties_do_not_depend_on_where_they_are():
         within, at = neighbours_within("sc", 25)
         assert at == 30
         for offset in (0.0, 0.5, -1e6, 2.0**40):
-            d = hs.pairs(points + offset, 5.0, box=box, quantities="d", kernel=kernel)
+            d = call(hs.pairs, points + offset, 5.0, box=box, quantities="d", kernel=kernel)
             assert len(d) == 864 * within
             assert np.count_nonzero(d == 5.0) == 864 * at

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 
 SHEAR = {1: [[1.0]], 2: [[1.0, 0.0], [0.5, 1.0]], 3: [[1.0, 0, 0], [0.5, 1.0, 0], [0, 0.5, 1.0]]}
 
@@ -53,19 +54,21 @@ def of_all(points, **options):
     """What each function says."""
     q = points[::2]
     for algorithm in ("auto", "grid", "hash", "all-pairs", "hierarchy"):
-        yield from hs.pairs(
-            points, 1.0, quantities="ijdDS", sort=True, algorithm=algorithm, **options
+        yield from call(
+            hs.pairs, points, 1.0, quantities="ijdDS", sort=True, algorithm=algorithm, **options
         )
-        yield hs.count_pairs(points, 1.0, inclusive=False, algorithm=algorithm, **options)
-        yield hs.count_pairs(points, [0.0, 1.0, 2.0], algorithm=algorithm, **options)
-    yield from hs.pairs(points, [0.0, 1.0, 1.5], quantities="ijk", sort=True, **options)
-    yield from hs.pairs_between(q, points, 1.0, quantities="ijdDS", **options)
-    table = hs.neighbors(points, 1.0, quantities="jdDS", **options)
+        yield call(hs.count_pairs, points, 1.0, inclusive=False, algorithm=algorithm, **options)
+        yield call(hs.count_pairs, points, [0.0, 1.0, 2.0], algorithm=algorithm, **options)
+    yield from call(hs.pairs, points, [0.0, 1.0, 1.5], quantities="ijk", sort=True, **options)
+    yield from call(hs.pairs_between, q, points, 1.0, quantities="ijdDS", **options)
+    table = call(hs.neighbors, points, 1.0, quantities="jdDS", **options)
     yield from (table.offsets, table.indices, table.distances, table.vectors, table.shifts)
-    yield hs.coordination(points, 1.0, **options)
-    yield hs.pair_histogram(points, [0.0, 1.0, 1.5, 2.0], **options)
-    yield from hs.nearest(points, 3, quantities="jdDS", **options)
-    yield from hs.pairs(points, None, radii=[0.5] * len(points), quantities="ijdDS", **options)
+    yield call(hs.coordination, points, 1.0, **options)
+    yield call(hs.pair_histogram, points, [0.0, 1.0, 1.5, 2.0], **options)
+    yield from call(hs.nearest, points, 3, quantities="jdDS", **options)
+    yield from call(
+        hs.pairs, points, None, radii=[0.5] * len(points), quantities="ijdDS", **options
+    )
     cells = hs.CellList(points, 1.0, **options)
     yield from cells.pairs(quantities="ijdS")
     yield cells.cell_of(points)
@@ -73,7 +76,7 @@ def of_all(points, **options):
     listed = hs.VerletList(1.0, 0.0, **options)
     listed.update(points)
     yield from listed.pairs(quantities="ijdS")
-    found = hs.clusters(points, 1.0, **options)
+    found = call(hs.clusters, points, 1.0, **options)
     yield found.labels
 
 
@@ -92,7 +95,7 @@ def test_neighbours_of_a_lattice_are_counted():
                 options = {"box": [float(length)] * ndim} if is_periodic else {}
                 each = length if is_periodic else length - 1
                 for algorithm in ("auto", "grid", "hash", "all-pairs"):
-                    found = hs.count_pairs(points, 1.0, algorithm=algorithm, **options)
+                    found = call(hs.count_pairs, points, 1.0, algorithm=algorithm, **options)
                     assert found == ndim * each * length ** (ndim - 1)
 
 

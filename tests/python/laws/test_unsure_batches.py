@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 from oracles import same_arrays
 
 RADIUS = 32045  # the square is a sum of two squares in 324 ways, with signs and order
@@ -32,7 +33,7 @@ def test_points_on_a_circle_about_one(m, box):
     points[1:] = np.random.default_rng(m).permutation(RING)[:m]
     outside = np.arange(1, m + 1, 3)
     points[outside] = np.nextafter(points[outside], 2.0 * points[outside])
-    i, j = by_all(lambda **how: hs.pairs(points, float(RADIUS), box=box, sort=True, **how))
+    i, j = by_all(lambda **how: call(hs.pairs, points, float(RADIUS), box=box, sort=True, **how))
     assert set(j[i == 0].tolist()) == set(range(1, m + 1)) - set(outside.tolist())
     assert hs.explain(points, float(RADIUS), box=box, measure=True).measured["ambiguous"] == m
 
@@ -42,7 +43,7 @@ def test_crowds_that_are_the_cutoff_apart_across_a_face(a, b):
     points = np.repeat([[0.5, 0.5, 0.5], [29.5, 28.5, 0.5]], [a, b], axis=0)
     points[::2] += [64.0, 0.0, -32.0]
     box, own = [32.0] * 3, a * (a - 1) // 2 + b * (b - 1) // 2
-    found = by_all(lambda **how: hs.pairs(points, 5.0, box=box, quantities="ijS", **how))
+    found = by_all(lambda **how: call(hs.pairs, points, 5.0, box=box, quantities="ijS", **how))
     assert len(found[0]) == own + a * b
     assert hs.count_pairs(points, 5.0, box=box, inclusive=False) == own
     around = [np.nextafter(5.0, 0.0), 5.0, np.nextafter(5.0, 6.0)]
@@ -61,10 +62,10 @@ def test_a_lattice_of_which_only_some_groups_have_images(periodic):
     points += (rng.integers(-(2**20), 2**20, points.shape) * periodic) @ box
     how = {"box": box, "periodic": periodic}
     i, _, _, d = by_all(
-        lambda **by: hs.pairs(points, 1.0, quantities="ijSd", sort=True, **how, **by)
+        lambda **by: call(hs.pairs, points, 1.0, quantities="ijSd", sort=True, **how, **by)
     )
     n = len(points)
     expected = sum(n if p else n * (k - 1) // k for p, k in zip(periodic, shape, strict=True))
     assert len(i) == expected and (d == 1.0).all()
-    assert hs.count_pairs(points, np.nextafter(1.0, 0.0), **how) == 0
-    assert hs.coordination(points, 1.0, **how).sum() == 2 * expected
+    assert call(hs.count_pairs, points, np.nextafter(1.0, 0.0), **how) == 0
+    assert call(hs.coordination, points, 1.0, **how).sum() == 2 * expected

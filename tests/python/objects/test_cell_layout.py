@@ -3,6 +3,9 @@
 
 import gc
 import math
+import pickle
+from collections import Counter
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,6 +13,7 @@ from numpy.testing import assert_array_equal
 
 import halfshell as hs
 from cell_scenes import SCENES, WIDTHS, queries_of, scene_of
+from halfshell._objects import cell_list as cells_module
 from refused_calls import check_refusals
 
 
@@ -100,6 +104,54 @@ def test_any_number_that_pairs_takes_is_a_size():
         assert hs.CellList(points, 0.2, cell_size=size).count_pairs() == hs.count_pairs(points, 0.2)
 
 
+@pytest.mark.parametrize(
+    "box", [None, [5.0, 4.0, 3.0], [[0.0, 4.0, 0.0], [5.0, 0.0, 0.0], [0.0, 0.0, 3.0]]], ids=str
+)
+def test_a_domain_has_the_same_cells_for_any_points(box, rng):
+    repeats = None if box is None else [True, False, False]
+    low, high = [-1.0, 2.0, 3.0], [9.0, 12.0, 6.0]
+    layouts = []
+    for n, part in ((300, 1.0), (500, 0.2)):
+        points = low + rng.random((n, 3)) * part * np.subtract(high, low)
+        options = {"box": box, "periodic": repeats}
+        cells = hs.CellList(points, 0.8, cell_size=1.0, domain=(low, high), **options)
+        places = [[x, y, z] for x in (0.5, 4.5) for y in (2.5, 7.5, 11.5) for z in (3.25, 5.75)]
+        layouts.append((cells.shape, cells.cell_sizes, cells.cell_of(places).tolist()))
+        own = hs.CellList(points, 0.8, **options)
+        wanted = own.pairs(quantities="ijdS", sort=True)
+        for again in (cells, cells.rebuild(points), pickle.loads(pickle.dumps(cells))):
+            assert again.shape == cells.shape
+            found = again.pairs(quantities="ijdS", sort=True)
+            for one, other in zip(found, wanted, strict=True):
+                assert_array_equal(one, other)
+        queries = points[:50] + 3.0
+        found, wanted = (each.neighbors(queries=queries).indices for each in (cells, own))
+        assert_array_equal(found, wanted)
+    assert layouts[0] == layouts[1]
+    axes = [k for k in range(3) if box is None or k != (1 if isinstance(box[0], list) else 0)]
+    assert all(layouts[0][0][k] == (10, 10, 3)[k] for k in axes)
+    beyond = hs.CellList(np.append(points, [[10.9, 2.0, 3.0]], axis=0), 0.8, cell_size=1.0,
+                         domain=(low, high))  # fmt: skip
+    assert beyond.shape == (11, 10, 3) and len(beyond) == len(points) + 1
+
+
+def test_what_is_no_domain_is_refused():
+    skewed = {"box": [[1.0, 0.0], [0.3, 1.0]], "periodic": [True, False]}
+    make = partial(hs.CellList, [[0.0, 0.0]], 1.0)
+    check_refusals([
+        (partial(make, domain=3.0), TypeError, "domain must be a pair"),
+        (partial(make, domain=(0.0, 1.0, 2.0)), TypeError, "domain must be a pair"),
+        (partial(make, domain=(0.0, "a")), TypeError, "high end of domain"),
+        (partial(make, domain=([0.0], 1.0)), ValueError, "low end of domain must have shape"),
+        (partial(make, domain=(0.0, np.nan)), ValueError, "finite and not descend"),
+        (partial(make, domain=(-np.inf, 0.0)), ValueError, "finite and not descend"),
+        (partial(make, domain=([0.0, 2.0], 1.0)), ValueError, "got 2.0 to 1.0 in axis 1"),
+        (partial(make, domain=(0.0, 1.0), **skewed), ValueError, "along the coordinate axes"),
+    ])
+    assert make(domain=(0.0, 0.0)).shape == (1, 1)
+    assert hs.CellList(np.empty((0, 2)), 1.0, domain=(0.0, 9.0)).count_pairs() == 0
+
+
 def test_what_is_no_size_is_refused():
     cases = [
         (0.0, ValueError, "cell_size must be finite and greater than 0, got 0.0"),
@@ -123,9 +175,12 @@ def test_one_cell_with_everything_says_so():
     cells = hs.CellList(points, 2.0**-899, box=box, periodic=[True, False])
     assert cells.cell_sizes == (np.inf, np.inf) and cells.shape == (1, 1)
     assert cells.cell_of(points).tolist() == [0, 0] and cells.count_pairs() == 4
-    for queries in (None, [[0.0, 0.0]]):
+    calls = cells.candidates, lambda: cells.candidates([[0.0, 0.0]])
+    for call in (*calls, lambda: list(cells.candidate_pairs())):
         with pytest.raises(ValueError, match="one cell holds everything"):
-            cells.candidates(queries)
+            call()
+    with pytest.raises(ValueError, match="max_pairs must be 1 or more"):
+        cells.candidate_pairs(max_pairs=0)
 
 
 # ---- candidates ----------------------------------------------------------------------------------
@@ -137,6 +192,33 @@ def test_candidates_of_the_points_hold_each_pair_both_ways(rng):
     for i, j in zip(*cells.pairs(), strict=True):
         assert j in held[i] and i in held[j]
     assert all(i in row for i, row in enumerate(held))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_candidate_pairs_hold_all_pairs_of_two_points_in_each_image(name, monkeypatch):
+    points, cutoff, scene = scene_of(name)
+    cells = hs.CellList(points, cutoff, **scene)
+    monkeypatch.setattr(cells_module, "_ASKED_AT_A_TIME", 7)
+    whole = Counter()
+    for most in (1000, 1 << 20):
+        blocks = list(cells.candidate_pairs(max_pairs=most))
+        assert all(i.dtype == j.dtype == np.int64 and 0 < len(i) <= most for i, j in blocks)
+        i, j = (np.concatenate([block[k] for block in blocks] or [[]]).tolist() for k in (0, 1))
+        assert all(a < b for a, b in zip(i, j, strict=True))
+        found = Counter(zip(i, j, strict=True))
+        assert whole in (Counter(), found)
+        whole = found
+    i, j = cells.pairs()
+    expected = Counter((a, b) for a, b in zip(i.tolist(), j.tolist(), strict=True) if a != b)
+    assert expected <= whole
+
+
+def test_candidate_pairs_are_those_of_neighbouring_cells():
+    cells = hs.CellList(np.arange(1000.0)[::-1, None], 1.0, cell_size=2.0)
+    ((i, j),) = cells.candidate_pairs()
+    assert np.abs(np.diff(cells.cell_of([[0.0], [1.5], [9.0]]))).tolist() == [0, 4]
+    apart = cells.cell_of(999.0 - i[:, None]) - cells.cell_of(999.0 - j[:, None])
+    assert np.abs(apart).max() == 1 and 1000 <= len(i) < 6000
 
 
 def test_candidates_take_the_memory_of_their_ranges_only(rng):

@@ -18,6 +18,7 @@ from ase.build import bulk
 from numpy.testing import assert_array_equal
 
 import halfshell as hs
+from calls import call
 from cell_scenes import SCENES, WIDTHS, queries_of, scene_of
 from full_lists import same_tables
 from halfshell._objects import radii as radii_module
@@ -36,7 +37,7 @@ class Alone:
         return partial(getattr(hs, name), self.points, **self.scene)
 
     def query(self, queries, radius, **how):
-        return hs.neighbors(self.points, radius, queries=queries, **how, **self.scene)
+        return call(hs.neighbors, self.points, radius, queries=queries, **how, **self.scene)
 
 
 def same(found, expected):
@@ -83,7 +84,7 @@ def test_answers_are_those_of_a_search_of_its_own(name):
 def edges_of(points, cutoff, scene, factor):
     """Edges up to a part of the cutoff or more, some of them exactly at distances."""
     last = cutoff * factor
-    d = hs.pairs(points, last, quantities="d", **scene)[:3]
+    d = call(hs.pairs, points, last, quantities="d", **scene)[:3]
     return np.sort(np.concatenate([[0.0, 0.3 * last, 0.3 * last, last], np.minimum(d, last)]))
 
 
@@ -91,22 +92,30 @@ def edges_of(points, cutoff, scene, factor):
 def test_histograms_are_those_of_a_search_of_its_own(name, rng):
     points, cutoff, scene = scene_of(name)
     queries = queries_of(name)
-    lists = [hs.CellList(points, cutoff, cell_size=s, **scene) for s in (None, cutoff / 2 or 1.0)]
     types, weights = rng.integers(0, 3, len(points)), rng.normal(size=len(points))
-    asked = {"queries": queries}
+    plain = hs.Points(points, **scene)
+    asks = [
+        (plain, False, None),
+        (plain.replace(types=types), True, None),
+        (plain.replace(types=types, weights=weights), True, None),
+        (plain, False, queries),
+        (
+            plain.replace(types=types), True,
+            hs.Points(queries, types=rng.integers(0, 2, len(queries))),
+        ),
+        (
+            plain.replace(weights=weights), False,
+            hs.Points(queries, weights=rng.normal(size=len(queries))),
+        ),
+    ]  # fmt: skip
     for factor in (1.0, 0.5, 0.001, 1.25):
         edges = edges_of(points, cutoff, scene, factor)
-        for marks in (
-            {},
-            {"types": types},
-            {"types": types, "weights": weights},
-            asked,
-            {**asked, "types": types, "query_types": rng.integers(0, 2, len(queries))},
-            {**asked, "weights": weights, "query_weights": rng.normal(size=len(queries))},
-        ):
-            expected = hs.pair_histogram(points, edges, **marks, **scene)
-            for cells in lists:
-                assert same_arrays(cells.pair_histogram(edges, **marks), expected)
+        for known, by_type, asking in asks:
+            options = {"queries": asking, "by_type": by_type}
+            expected = hs.pair_histogram(known, edges, **options)
+            for width in (None, cutoff / 2 or 1.0):
+                cells = hs.CellList(known, cutoff, cell_size=width)
+                assert same_arrays(cells.pair_histogram(edges, **options), expected)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -123,14 +132,16 @@ def test_nearest_are_those_of_a_search_of_its_own(name):
 def test_nearest_do_not_depend_on_what_the_cells_are_for():
     points = np.stack(np.meshgrid(*[np.arange(4.0)] * 3), -1).reshape(-1, 3) * 0.1
     for cutoff, precision in ((0.0, "exact"), (0.1, "single"), (1e200, "double")):
-        cells = hs.CellList(points, cutoff, precision=precision)
-        assert same_arrays(cells.nearest(14), hs.nearest(points, 14))
         far = points[:5] * 100.0
-        assert same_arrays(cells.nearest(3, queries=far), hs.nearest(points, 3, queries=far))
+        with hs.settings(precision=precision):
+            cells = hs.CellList(points, cutoff)
+            found = cells.nearest(14), cells.nearest(3, queries=far)
+        assert same_arrays(found[0], hs.nearest(points, 14))
+        assert same_arrays(found[1], hs.nearest(points, 3, queries=far))
     scene = np.array([[1e300, 0.0], [1e-300, 0.0], [0.0, 3e-300], [0.0, 0.0]])
     cells = hs.CellList(scene, 1.0)
     for how in ({}, {"queries": scene}, {"max_distance": 2e-300}):
-        assert same_arrays(cells.nearest(2, **how), hs.nearest(scene, 2, **how))
+        assert same_arrays(cells.nearest(2, **how), call(hs.nearest, scene, 2, **how))
 
 
 def test_shells_of_a_lattice_by_whole_numbers():
@@ -157,24 +168,27 @@ def test_shells_of_a_lattice_by_whole_numbers():
 def test_histograms_are_exact_for_any_precision(precision):
     points = np.stack(np.meshgrid(*[np.arange(6.0) * 0.1] * 3), -1).reshape(-1, 3)
     box, edges = [0.6] * 3, np.array([0.0, 0.1, 0.2, 0.3])
-    cells = hs.CellList(points, 0.3, box=box, precision=precision)
-    assert_array_equal(cells.pair_histogram(edges), hs.pair_histogram(points, edges, box=box))
-    # Counts are by the precision of the list, for one cutoff and for several.
-    assert cells.count_pairs(edges).tolist() == [cells.count_pairs(one) for one in edges]
-    if precision == "double":  # single depends on the cells
-        expected = hs.count_pairs(points, edges, box=box, precision="double")
-        assert_array_equal(cells.count_pairs(edges), expected)
+    cells = hs.CellList(points, 0.3, box=box)
+    exact = hs.pair_histogram(points, edges, box=box)
+    with hs.settings(precision=precision):
+        assert_array_equal(cells.pair_histogram(edges), exact)
+        # Counts are by the precision that is set, for one cutoff and for several.
+        counts = cells.count_pairs(edges)
+        assert counts.tolist() == [cells.count_pairs(one) for one in edges]
+        if precision == "double":  # single depends on the cells
+            assert_array_equal(counts, hs.count_pairs(points, edges, box=box))
 
 
 def test_neither_kernel_nor_threads_matter(rng):
     points, queries = rng.random((25_000, 3)), rng.random((900, 3))
     weights, edges = rng.normal(size=len(points)), np.linspace(0.0, 0.05, 12)
     asks = [
-        lambda cells, how: cells.pair_histogram(edges, weights=weights, **how),
-        lambda cells, how: cells.query(queries, quantities="jd", **how),
-        lambda cells, how: cells.pairs(quantities="P", **how),
+        lambda cells, how: call(cells.pair_histogram, edges, **how),
+        lambda cells, how: call(cells.query, queries, quantities="jd", **how),
+        lambda cells, how: call(cells.pairs, quantities="P", **how),
     ]
-    lists = [hs.CellList(points, 0.05, box=1.0, threads=threads) for threads in (1, 2)]
+    known = hs.Points(points, weights=weights, box=1.0)
+    lists = [hs.CellList(known, 0.05, threads=threads) for threads in (1, 2)]
     for ask in asks:
         expected = ask(lists[0], {"kernel": "scalar", "threads": 1})
         for cells, kernel, more in itertools.product(lists, hs.kernels(), ({}, {"threads": 2})):
@@ -238,9 +252,10 @@ def test_each_query_may_have_a_radius_of_its_own(name, monkeypatch):
 @pytest.mark.parametrize("precision", ["exact", "double"])
 def test_a_table_of_radii_is_a_table_of_queries(sorted_meanwhile, precision, monkeypatch, rng):
     monkeypatch.setattr(radii_module, "_SORTED_MEANWHILE", sorted_meanwhile)
-    cells = hs.CellList(rng.random((300, 3)), 0.5, box=1.0, precision=precision)
+    cells = hs.CellList(rng.random((300, 3)), 0.5, box=1.0)
     queries, radii = rng.random((40, 3)), rng.choice([0.1, 0.2, 0.3, 0.4], 40)
-    table = cells.query(queries, radii, quantities="jd", index_dtype=np.int32)
+    with hs.settings(precision=precision):
+        table = cells.query(queries, radii, quantities="jd", index_dtype=np.int32)
     assert table.quantities == "jd" and table.n_points == 300
     assert not any(array.flags.writeable for array in table._arrays)
     queries[:], kept = 0.0, queries.copy()
@@ -263,17 +278,18 @@ def test_special_radii():
         assert_array_equal(cells.query(points, radius).indices, cells.query(points, 0.5).indices)
 
 
-def test_radii_are_decided_by_the_precision_of_the_list():
+def test_radii_are_decided_by_the_precision_that_is_set():
     # Far outside the box rounded and exact distances differ by many last places.
     points, box = np.random.default_rng(4).random((300, 2)) * 1e6, [3.9, 3.7]
-    cells = hs.CellList(points, 0.5, precision="double", box=box)
+    cells = hs.CellList(points, 0.5, box=box)
     queries = points[:100]
     near = hs.neighbors(points, 0.5, queries=queries, quantities="d", box=box)
     radii = np.array([d[-1] for d in near]) * (1.0 + 1e-12)
-    table = cells.query(queries, radii, quantities="jS")
+    rounded = partial(call, cells.query, quantities="jS", precision="double")
+    table = rounded(queries, radii)
     differ = 0
     for i, radius in enumerate(radii.tolist()):
-        alone = cells.query(queries[i : i + 1], radius, quantities="jS")[0]
+        alone = rounded(queries[i : i + 1], radius)[0]
         assert same_arrays(table[i], alone)
         exact = hs.neighbors(points, radius, queries=queries[i : i + 1], box=box)
         differ += len(exact[0]) != len(alone[0])
@@ -287,13 +303,27 @@ def shell(rng, n=3000):
     return hs.CellList(v * rng.uniform(1.1, 1.8, (n, 1)), 2.0)
 
 
+def test_sorting_a_table_of_radii_searches_as_it_was_asked():
+    """What is set, and what the caller's arrays hold, may be something else by then."""
+    lattice = np.stack(np.meshgrid(*[np.arange(5.0) * 0.1] * 3), -1).reshape(-1, 3)
+    cells = hs.CellList(lattice, 0.3, box=[0.5] * 3)
+    for precision, sizes in itertools.product(("double", "exact"), ([0.1, 0.2], [0.2])):
+        queries, exclude = lattice[:60].copy(), np.array([[0, 1]])
+        radii = np.resize(sizes, 60)
+        with hs.settings(precision=precision):
+            table = cells.query(queries, radii, quantities="jd", exclude=exclude)
+            whole = cells.query(queries, radii, quantities="jdS", exclude=exclude).sort()
+        queries[:], radii[:], exclude[:] = 0.25, 0.0, 7
+        assert_array_equal(table.sort().indices, whole.indices)
+
+
 def test_small_results_of_radii_take_little_memory(rng):
     # With the largest radius of all, each query at the origin would find every point.
     cells, origin = shell(rng), np.zeros((3000, 3))
     for near in (np.full(3000, 1.0), rng.uniform(1.0, 1.09, 3000)):
         queries, radii = np.vstack([origin, [[50.0, 0.0, 0.0]]]), np.append(near, 1.99)
         for letters in ("j", "jdDS"):
-            table = cells.query(queries, radii, quantities=letters, memory_limit=20e6)
+            table = call(cells.query, queries, radii, quantities=letters, memory_limit=20e6)
             assert table.n_entries == 0 and len(table) == 3001
     near = np.append(rng.uniform(1.0, 1.09, 2999), 1.18)  # one band, and 1.18 finds some points
     tracemalloc.start()
@@ -305,10 +335,10 @@ def test_small_results_of_radii_take_little_memory(rng):
     assert table.counts[:-1].sum() == 0 and table.counts[-1] > 0
     assert peak < 40e6
     radii = np.append(np.full(200, 1.95), np.full(200, 1.99))  # 3000 neighbours each, 8 bytes
-    assert cells.query(origin[:400], radii, memory_limit=40e6).n_entries == 1_200_000
+    assert call(cells.query, origin[:400], radii, memory_limit=40e6).n_entries == 1_200_000
     for limit in (3e6, 8e6):
         with pytest.raises(MemoryError, match="would not fit"):
-            cells.query(origin[:400], radii, memory_limit=limit)
+            call(cells.query, origin[:400], radii, memory_limit=limit)
 
 
 # ---- blocks and visits ---------------------------------------------------------------------------
@@ -346,11 +376,12 @@ def test_large_lists_are_streamed_in_the_order_of_the_pairs(built_for, tilt):
 
 def test_more_pairs_than_memory_holds_are_counted_and_streamed(rng):
     points = rng.random((2000, 3))
-    cells = hs.CellList(points, 1.5, box=[1.0] * 3, memory_limit=5e6)
-    assert next(cells.iter_pairs(max_pairs=10))[0].shape == (10,)
-    assert cells.count_pairs(0.1) == hs.count_pairs(points, 0.1, box=[1.0] * 3)
-    with pytest.raises(MemoryError, match="pairs"):
-        cells.pairs(memory_limit=5e6)
+    with hs.settings(memory_limit=5e6):
+        cells = hs.CellList(points, 1.5, box=[1.0] * 3)
+        assert next(cells.iter_pairs(max_pairs=10))[0].shape == (10,)
+        assert cells.count_pairs(0.1) == hs.count_pairs(points, 0.1, box=[1.0] * 3)
+        with pytest.raises(MemoryError, match="pairs"):
+            cells.pairs()
 
 
 def test_an_iterator_keeps_its_cells(rng):
@@ -420,7 +451,7 @@ def test_queries_may_bring_the_box_of_the_list():
     probe = Atoms("H2", positions=[[0.9, 0.9, 0.9], [30.0, -8.0, 1.0]], cell=crystal.cell, pbc=True)
     cells = hs.CellList(crystal, 3.0)
     found, whole = cells.pairs(quantities="ijS", sort=True), {"quantities": "ijS", "sort": True}
-    assert same_arrays(found, hs.pairs(crystal, 3.0, **whole))
+    assert same_arrays(found, call(hs.pairs, crystal, 3.0, **whole))
     calls = [
         lambda asking: cells.neighbors(queries=asking).indices,
         lambda asking: cells.query(asking, [3.0, 2.0]).indices,
@@ -431,40 +462,81 @@ def test_queries_may_bring_the_box_of_the_list():
         lambda asking: cells.candidates(asking).start,
         lambda asking: cells.cell_of(asking),
     ]
-    other = Atoms("H2", positions=probe.positions)
-    for call in calls:
-        assert_array_equal(call(probe), call(probe.positions))
+    bare = Atoms("H2", positions=probe.positions)
+    other = Atoms("H2", positions=probe.positions, cell=2.0 * crystal.cell, pbc=True)
+    for ask in calls:
+        for asking in (probe, bare):
+            assert_array_equal(ask(asking), ask(probe.positions))
         with pytest.raises(ValueError, match="bring a box that is not that of points"):
-            call(other)
+            ask(other)
     in_open_space = hs.CellList(crystal.positions, 3.0)
     assert_array_equal(
-        in_open_space.neighbors(queries=other).indices,
-        hs.neighbors(crystal.positions, 3.0, queries=other).indices,
+        in_open_space.neighbors(queries=bare).indices,
+        hs.neighbors(crystal.positions, 3.0, queries=bare).indices,
     )
     with pytest.raises(ValueError, match="bring a box that is not that of points"):
         in_open_space.neighbors(queries=probe)
-    with pytest.raises(ValueError, match="queries must have 2 columns"):
+    with pytest.raises(ValueError, match="same number of columns"):
         hs.CellList([[0.0, 0.0]], 1.0).neighbors(queries=probe)
 
 
 def test_a_list_does_not_change(rng):
-    points = rng.random((100, 3)) * 9.0
-    cells = hs.CellList(points, 1.0)
-    expected = cells.count_pairs(), cells.count_pairs(3.0)
-    points[:] = 0.0
-    assert (cells.count_pairs(), cells.count_pairs(3.0)) == expected
-    edges, types = np.array([0.0, 0.5, 1.0]), np.zeros(100, dtype=np.int64)
-    for array in (edges, types):
-        array.flags.writeable = False
-    first = cells.pair_histogram(edges, types=types)
+    points, types = rng.random((100, 3)) * 9.0, np.zeros(100, dtype=np.int64)
+    for given in (points, hs.Points(points, types=types)):
+        cells = hs.CellList(given, 1.0)
+        expected = cells.count_pairs(), cells.count_pairs(3.0)
+        points[:], kept = 0.0, points.copy()
+        types[:] = 1
+        assert (cells.count_pairs(), cells.count_pairs(3.0)) == expected
+        assert_array_equal(cells.points.positions, kept)
+        points[:] = kept
+    edges = np.array([0.0, 0.5, 1.0])
+    edges.flags.writeable = False
+    first = cells.pair_histogram(edges, by_type=True)
     assert first.flags.writeable and first.shape == (1, 1, 2)
     first[:] = -1
-    assert (cells.pair_histogram(edges, types=types) >= 0).all()
+    assert (cells.pair_histogram(edges, by_type=True) >= 0).all()
     with pytest.raises(AttributeError):
         cells.cutoff = 2.0
     assert copy.copy(cells) is cells and copy.deepcopy([cells])[0] is cells
-    with pytest.raises(TypeError, match="a CellList cannot be pickled"):
-        pickle.dumps(cells)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_pickles_and_lists_of_other_points_have_the_same_cells(name):
+    points, cutoff, scene = scene_of(name)
+    width = 0.7 * cutoff or 1.0
+    for how in ({}, {"threads": 2}, {"cell_size": width}):
+        cells = hs.CellList(points, cutoff, **how, **scene)
+        other = hs.CellList(points[::2], cutoff, **how, **scene)
+        for again in (pickle.loads(pickle.dumps(cells)), other.rebuild(points),
+                      pickle.loads(pickle.dumps(pickle.loads(pickle.dumps(other)))).rebuild(points)):
+            assert repr(again) == repr(cells) and again.cell_sizes == cells.cell_sizes
+            assert again.shape == cells.shape and len(other) == len(points[::2])
+            assert_array_equal(again.order, cells.order)
+            assert_array_equal(again.cell_start, cells.cell_start)
+            assert same(again.pairs(quantities="ijdDS"), cells.pairs(quantities="ijdDS"))
+            table = again.neighbors(quantities="jd").sort()
+            assert same(table, cells.neighbors(quantities="jd").sort())
+
+
+def test_processes_share_a_list(tmp_path):
+    path = tmp_path / "cells.pickle"
+    cells = hs.CellList(np.random.default_rng(3).random((500, 3)), 0.1, box=[1.0] * 3)
+    path.write_bytes(pickle.dumps(cells))
+    script = f"import json, pickle; cells = pickle.load(open({str(path)!r}, 'rb'))\n"
+    found = run(script + "print(json.dumps([each.tolist() for each in cells.pairs()]))")
+    assert found == [each.tolist() for each in cells.pairs()]
+
+
+def test_other_points_are_those_of_the_list_in_kind(rng):
+    cells = hs.CellList(rng.random((10, 3)), 0.2, box=[1.0] * 3)
+    check_refusals([
+        (lambda: cells.rebuild(np.zeros((3, 2))), ValueError, "points must have 3 columns"),
+        (lambda: cells.rebuild([[np.nan] * 3]), ValueError, "finite"),
+        (lambda: cells.rebuild("abc"), TypeError, "points"),
+        (lambda: cells.rebuild(Atoms("H", cell=[2.0] * 3, pbc=True)), ValueError, "box"),
+    ])  # fmt: skip
+    assert len(cells.rebuild(np.empty((0, 3)))) == 0
 
 
 def test_a_list_can_be_collected(rng):
@@ -493,6 +565,7 @@ def test_empty_lists():
 
 CELLS = hs.CellList([[0.0, 0.0], [1.0, 1.0]], 2.0)
 PERIODIC = hs.CellList([[0.1, 0.1, 0.1], [0.7, 0.2, 0.4]], 0.5, box=[1.0] * 3)
+TYPED = hs.Points([[0.0, 0.0], [1.0, 1.0]], types=[0, 1])
 EDGES = [0.0, 1.0]
 
 
@@ -504,7 +577,7 @@ def test_bad_input_is_named():
         (lambda: build([[0.0]], -1.0), ValueError, "cutoff"),
         (lambda: build([[0.0]], 1.0, periodic=True), ValueError, "periodic needs a box"),
         (lambda: build("ab", 1.0), TypeError, "points"),
-        (lambda: query([[0.0]]), ValueError, "queries must have 2 columns"),
+        (lambda: query([[0.0]]), ValueError, "(must have 2|same number of) columns"),
         (lambda: query([[0.0, np.inf]]), ValueError, r"queries\[0, 1\]"),
         (lambda: query([[0.0, 0.0]], -1.0), ValueError, "radius .* got -1.0"),
         (lambda: query([[0.0, 0.0]], np.nan), ValueError, "radius .* got nan"),
@@ -520,40 +593,41 @@ def test_bad_input_is_named():
         (lambda: CELLS.pairs(np.nan), ValueError, "cutoff"),
         (lambda: CELLS.pairs(wrong=1), TypeError, "wrong"),
         (lambda: CELLS.candidates([[0, 0], [0, -1e300]]), ValueError, r"queries\[1, 1\] = -1e"),
-        (lambda: CELLS.cell_of([[1.0, 2.0, 3.0]]), ValueError, "2 columns"),
+        (lambda: CELLS.cell_of([[1.0, 2.0, 3.0]]), ValueError, "(2|number of) columns"),
         (lambda: CELLS.iter_pairs(progress=3), TypeError, "progress must be callable or a bool, g"),
         (lambda: CELLS.iter_pairs(max_pairs=0), ValueError, "max_pairs must be 1 or more"),
         (lambda: CELLS.for_each_pair(3), TypeError, "callback must be"),
         (lambda: CELLS.iter_pairs(sort=True), TypeError, "sort"),
-        (lambda: counts(kernel="none"), ValueError, "kernel"),
+        (lambda: counts(kernel="none"), TypeError, r"hs.settings\(kernel="),
         (lambda: counts([1.0, 0.5]), ValueError, r"cutoff\[0\] = 1.0 before"),
         (lambda: counts([0.5, np.nan]), ValueError, r"cutoff\[1\] = nan"),
         (lambda: counts([[1.0]]), ValueError, "cutoff"),
-        (lambda: counts([0.5, 1.0], queries=[[1.0]]), ValueError, "2 columns"),
+        (lambda: counts([0.5, 1.0], queries=[[1.0]]), ValueError, "number of columns"),
         (lambda: nearest(0), ValueError, "k must be 1 or more"),
         (lambda: nearest(1.0), TypeError, "k must be a whole number"),
-        (lambda: nearest(1, queries=[[0.0]]), ValueError, "queries must have 2 columns"),
+        (lambda: nearest(1, queries=[[0.0]]), ValueError, "number of columns"),
         (lambda: nearest(1, queries=[[np.nan, 0.0]]), ValueError, r"queries\[0, 0\]"),
         (lambda: nearest(1, max_distance=-1.0), ValueError, "max_distance"),
         (lambda: nearest(1, quantities="ij"), ValueError, "quantities"),
         (lambda: nearest(1, inclusive=False), TypeError, "inclusive"),
         (lambda: nearest(1, wrong=False), TypeError, "wrong"),
-        (lambda: nearest(1, memory_limit=10.0), MemoryError, "would not fit"),
+        (lambda: call(nearest, 1, memory_limit=10.0), MemoryError, "would not fit"),
         (lambda: histogram([0.0, 2.0, 1.0]), ValueError, r"edges\[1\]"),
         (lambda: histogram([1.0]), ValueError, "edges must have shape"),
         (lambda: histogram([-1.0, 1.0]), ValueError, r"edges\[0\] = -1.0"),
         (lambda: histogram([0.0, np.nan]), ValueError, r"edges\[1\]"),
         (lambda: histogram(["a", "b"]), TypeError, "edges"),
         (lambda: histogram(), TypeError, "edges"),
-        (lambda: histogram(EDGES, queries=[[1.0]]), ValueError, "2 columns"),
-        (lambda: histogram(EDGES, types=[0]), ValueError, r"types must have shape \(2,\)"),
-        (lambda: histogram(EDGES, types=[0, 1], queries=[[0.0, 0.0]]), ValueError, "together"),
-        (lambda: histogram(EDGES, query_weights=[1.0]), ValueError, "needs queries"),
-        (lambda: histogram(EDGES, weights=[1.0, np.nan]), ValueError, r"weights\[1\]"),
-        (lambda: histogram(EDGES, inclusive=True), TypeError, "inclusive"),
-        (lambda: histogram(EDGES, kernel="none"), ValueError, "kernel"),
+        (lambda: histogram(EDGES, queries=[[1.0]]), ValueError, "number of columns"),
+        (lambda: histogram(EDGES, types=[0, 1]), TypeError, r"hs.Points\(points, types="),
+        (lambda: histogram(EDGES, by_type=True), ValueError, "by_type needs types"),
         (
-            lambda: histogram(np.linspace(0.0, 1.0, 100_000), memory_limit=1e4), MemoryError,
+            lambda: build(TYPED, 1.0).pair_histogram(EDGES, queries=[[0.0, 0.0]], by_type=True),
+            ValueError, "queries have none: both need them",
+        ),
+        (lambda: histogram(EDGES, inclusive=True), TypeError, "inclusive"),
+        (
+            lambda: call(histogram, np.linspace(0.0, 1.0, 100_000), memory_limit=1e4), MemoryError,
             "counts: 10 kB are allowed",
         ),
     ])  # fmt: skip

@@ -299,19 +299,14 @@ def test_a_support_larger_than_the_scene_reaches_all():
 
 
 def test_a_box_without_nodes_has_no_shifts_of_any():
-    for lists in ([], [hs.NodeList("a", [], [])], [hs.NodeList("a", np.empty((0, 2)), [])]):
+    none = [hs.NodeList("a", [], []), hs.NodeList("b", np.empty((0, 2)), [])]
+    for lists in ([], none[:1], none[1:], none):
         c = hs.Connectivity(lists, box=[2.0, 3.0], exclude=[])
         assert c.shifts.shape == c.pairs.shifts.shape == (0, 2)
         c.patch([[]] * len(lists))
+        apart = hs.Connectivity(lists, [1.0, 2.0][: len(lists)], box=[2.0, 3.0], overlap=True)
+        assert apart.shifts.shape == apart.overlap_shifts.shape == (0, 2)
         assert len(hs.Connectivity(lists, box=[2.0, 3.0]).shifts) == 0
-
-
-@pytest.mark.parametrize("option", ["overlap", "intersection"])
-def test_a_box_that_repeats_refuses_what_needs_ghosts(option):
-    lists = [hs.NodeList("a", [[0.0]], [1.0])]
-    with pytest.raises(ValueError, match="ghost"):
-        hs.Connectivity(lists, box=[3.0], **{option: True})
-    hs.Connectivity(lists, box=[3.0], periodic=False, **{option: True})
 
 
 def test_rows_are_read_only_and_flat():

@@ -115,59 +115,6 @@ def test_a_patch_by_used_drops_ghosts_that_no_node_sees():
     assert_equal(c, hs.Connectivity(culled(lists, keep, [np.cumsum(m) - 1 for m in keep])))
 
 
-def test_a_patch_in_a_box_keeps_shifts():
-    rng = np.random.default_rng(6)
-    lists = with_ids(random_lists(rng, (14, 9), 2, size=5.0, h=(0.1, 0.7)), rng)
-    for seed in range(6):
-        rng = np.random.default_rng(seed)
-        c = hs.Connectivity(lists, box=[2.0, 3.0], ghosts=bool(seed % 2))
-        keep, old2new = random_culling(lists, rng, shuffled=True)
-        c.patch(keep, old2new)
-        other = hs.Connectivity(
-            culled(lists, keep, old2new), box=[2.0, 3.0], ghosts=bool(seed % 2)
-        )
-        assert_equal(c, other)
-        assert (c.shifts == other.shifts).all()
-        assert (c.pairs.shifts == other.pairs.shifts).all()
-
-
-@pytest.mark.parametrize("ghosts", [False, True])
-def test_a_mask_takes_single_images(ghosts):
-    """In a box, where two nodes are a pair in several images: rows lose these as well."""
-    for seed in range(6):
-        rng = np.random.default_rng([seed, 9])
-        lists = random_lists(rng, (12, 0, 9), 2, size=5.0, h=(0.1, 0.8))
-        c = hs.Connectivity(lists, box=[[1.6, 0.0], [0.3, 1.8]], ghosts=ghosts)
-        rows = _rows_with_shifts(c)
-        mask = rng.random(len(c.pairs)) < 0.4
-        c.pairs.coupling = np.arange(len(mask))
-        table = np.column_stack([*(getattr(c.pairs, name) for name in COLUMNS), c.pairs.shifts])
-        several = np.unique(table[:, :4], axis=0, return_counts=True)[1]
-        assert (several > 1).any()
-        for i, a, j, b, *s in table[mask].tolist():
-            rows.discard((a, i, b, j, *s))
-            rows.discard((b, j, a, i, *(-k for k in s)))
-        c.remove(mask)
-        assert _rows_with_shifts(c) == rows
-        left = np.column_stack([*(getattr(c.pairs, name) for name in COLUMNS), c.pairs.shifts])
-        assert (left == table[~mask]).all()
-        assert c.pairs.coupling.tolist() == np.flatnonzero(~mask).tolist()
-        c.validate()
-
-
-def _rows_with_shifts(c):
-    """(list, node, list and node of a neighbour, S) of all entries."""
-    found = set()
-    for a, start in enumerate(c.row_start[:-1]):
-        for row in range(start, c.row_start[a + 1]):
-            for b in range(len(c.names)):
-                at = row * len(c.names) + b
-                for e in range(c.offsets[at], c.offsets[at + 1]):
-                    found.add((a, int(row - start), b, int(c.indices[e]), *c.shifts[e].tolist()))
-    assert len(found) == len(c.indices)
-    return found
-
-
 def test_remove_equals_exclude():
     for seed in range(16):
         rng = np.random.default_rng([seed, 2])

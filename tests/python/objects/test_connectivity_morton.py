@@ -37,6 +37,22 @@ def test_keys():
         ] * int((x == high).all(axis=1).sum())
 
 
+def test_keys_of_lists_can_be_read():
+    rng = np.random.default_rng(3)
+    x = rng.random((30, 2))
+    lists = [hs.NodeList("a", x[:12], np.full(12, 0.2), 5), hs.NodeList("b", x[12:], [0.1] * 18)]
+    c = hs.Connectivity(lists, order="morton")
+    for k, one in enumerate(lists):
+        keys = c.morton_keys(one.name)
+        want = [key_of(place, x.min(axis=0), x.max(axis=0)) for place in one.positions]
+        assert keys.tolist() == want
+        assert (np.diff(keys[c.traversal(k)].astype(np.int64)) >= 0).all()
+    c.patch([np.arange(12) < 0, np.ones(18, bool)])
+    assert c.morton_keys(0).tolist() == []
+    low, high = x[12:].min(axis=0), x[12:].max(axis=0)
+    assert c.morton_keys(1).tolist() == [key_of(place, low, high) for place in x[12:]]
+
+
 def test_a_grid_has_as_many_keys_as_nodes():
     """Of 512 nodes of such a grid, Spheral's keys tell 148 apart."""
     grid = np.stack(np.meshgrid(*[np.arange(8.0)] * 3), -1).reshape(-1, 3)
@@ -126,26 +142,6 @@ def test_a_part_of_a_divided_scene_has_the_pairs_of_the_whole_in_their_order():
         mine = set(ids[own].tolist())
         want = [(a, b) for a, b in whole if a in mine or b in mine]
         assert id_pairs(hs.Connectivity(parts, **options), parts) == want
-
-
-def test_overlap_and_intersection_do_not_depend_on_the_order():
-    rng = np.random.default_rng(9)
-    x, h, which, ids = scene(rng, 50, 2, True)
-    lists = lists_of(x, h, which, ids, rng.random(50) < 0.3)
-    options = {"overlap": True, "intersection": True}
-    plain = hs.Connectivity(lists, **options)
-    curved = hs.Connectivity(lists, order="morton", **options)
-    for k in range(2):
-        for i in range(lists[k].n_nodes):
-            for one, other in zip(plain.overlap(k, i), curved.overlap(k, i), strict=True):
-                assert one.tolist() == sorted(other.tolist())
-    assert len(plain.pairs) == len(curved.pairs)
-    for p, pair in enumerate(curved.pairs):
-        other = plain.intersection(pair)
-        for m, row in enumerate(curved.intersection(p)):
-            assert sorted(row.tolist()) == sorted(other[m].tolist())
-            ends = [node for node, which_list in (pair[:2], pair[2:]) if which_list == m]
-            assert row[len(row) - len(ends) :].tolist() == ends
 
 
 def test_nodes_outside_the_box_are_refused():

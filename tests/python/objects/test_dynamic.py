@@ -222,7 +222,16 @@ def test_radii_about_multiples_of_the_cell_size(storage):
 def test_cells_are_those_of_the_original():
     cells = hs.DynamicCellList(3, 2.0)
     cells.insert(0, (-41.5, 18.5, -0.125))
-    assert cells.cell(0) == (-21, 9, -1)
+    assert cells.cell(0) == cells.cell_of((-41.5, 18.5, -0.125)) == (-21, 9, -1)
+
+
+def test_cells_of_positions_that_hold_nothing():
+    cells = hs.DynamicCellList(2, 1.0, box=[4.0, 0.0], periodic=[True, False])
+    for turns in (0, 1, -3):
+        assert cells.cell_of([-1.75 + 4.0 * turns, -0.5]) == (0, -1)
+        assert cells.cell_of([1.75 + 4.0 * turns, 7.5]) == (3, 7)
+    assert len(cells) == 0 and cells.keys.shape == (0,) and cells.positions.shape == (0, 2)
+    assert hs.DynamicCellList(1, 1.0, tagged=True).keys.shape == (0, 2)
 
 
 def test_cells_come_nearest_first():
@@ -421,15 +430,16 @@ class NoInteger:
 
 
 @pytest.mark.parametrize("tagged", [False, True])
-def test_errors_of_keys_pass_through(tagged):
+def test_errors_of_keys_are_the_cause(tagged):
     cells = hs.DynamicCellList(2, 1.0, tagged=tagged)
     for key in ((0, NoInteger()), (NoInteger(), 0)) if tagged else (NoInteger(),):
         for call in (
             lambda key=key: cells.insert(key, [0.0, 0.0]), lambda key=key: cells.remove(key),
             lambda key=key: key in cells, lambda key=key: cells.position(key),
         ):  # fmt: skip
-            with pytest.raises(LookupError, match="no integer"):
+            with pytest.raises(TypeError, match=r"key must be .*, got NoInteger") as refused:
                 call()
+            assert isinstance(refused.value.__cause__, LookupError)
     assert len(cells) == 0
 
 
@@ -475,8 +485,11 @@ def test_bad_positions_and_radii():
     for radius in ("1", None, True, 1j):
         with pytest.raises(TypeError, match="radius must be a number"):
             cells.within([0.0, 0.0], radius)
-    with pytest.raises(OverflowError, match=r"position lies 2\*\*51 boxes away, or more"):
-        cells.near([1e300, 0.0], 1.0)
+    for call in (cells.cell_of, partial(cells.near, radius=1.0)):
+        with pytest.raises(OverflowError, match=r"position lies 2\*\*51 boxes away, or more"):
+            call([1e300, 0.0])
+    with pytest.raises(ValueError, match=r"position\[1\] must be finite"):
+        cells.cell_of([0.0, math.nan])
     for call in (
         lambda rows: cells.insert_many([2, 3], rows),
         lambda rows: cells.within_many(rows, 1.0),
@@ -497,6 +510,8 @@ def test_keys_without_positions():
     cells.insert((0, 1), None)
     cells.insert((1, 1), [0.0, 0.0])
     assert sorted(keys_of(cells.near([9.0, 9.0], 0.5))) == [(0, 1), (1, 1)]
+    positions = dict(zip(keys_of(cells.keys), cells.positions.tolist(), strict=True))
+    assert positions[1, 1] == [0.0, 0.0] and all(map(math.isnan, positions[0, 1]))
     for call in (cells.within, cells.any_within):
         with pytest.raises(ValueError, match="distances need positions"):
             call([0.0, 0.0], 1.0)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 
 BOXES = {
     1: np.array([[4.0]]),
@@ -87,10 +88,10 @@ def test_without_shifts_they_are_the_nearest_images(pyplot, scene):
 def test_types_have_colours_and_names(pyplot, scene):
     points, box = scene
     kinds = np.array(["O", "Si"])[np.arange(40) % 2]
-    axes = hs.plot_pairs(points, [], [], types=kinds, box=box)
+    axes = call(hs.plot_pairs, points, [], [], types=kinds, box=box)
     assert labels(axes) == ["O", "Si"]
     assert [len(dots(some)) for some in axes.collections[3:]] == [20, 20]
-    assert labels(hs.plot_pairs(points, [], [], types=np.arange(40) % 3)) == ["0", "1", "2"]
+    assert labels(call(hs.plot_pairs, points, [], [], types=np.arange(40) % 3)) == ["0", "1", "2"]
 
 
 def test_one_number_is_a_square(pyplot):
@@ -118,9 +119,9 @@ def test_what_cannot_be_drawn_is_refused(pyplot):
     with pytest.raises(ValueError, match="axes of two dimensions"):
         hs.plot_pairs(np.zeros((2, 2)), [0], [1], ax=solid)
     with pytest.raises(ValueError, match=r"types must have shape \(2,\)"):
-        hs.plot_pairs(np.zeros((2, 2)), [0], [1], types=["A"])
+        call(hs.plot_pairs, np.zeros((2, 2)), [0], [1], types=["A"])
     with pytest.raises(TypeError, match="integers or names"):
-        hs.plot_pairs(np.zeros((2, 2)), [0], [1], types=[0.5, 1.0])
+        call(hs.plot_pairs, np.zeros((2, 2)), [0], [1], types=[0.5, 1.0])
     many = np.zeros(200_001, int)
     with pytest.raises(ValueError, match="at most 200000 pairs"):
         hs.plot_pairs(np.zeros((2, 2)), many, many + 1)

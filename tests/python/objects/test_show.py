@@ -62,6 +62,7 @@ SHOWN = {
     "PairChanges": _verlet().changes(),
     "PairField": hs.PairField(LINKS.pairs),
     "PairTable": LINKS.pairs,
+    "Points": hs.Points(POINTS, box=BOX, types=["<script>&"] * len(POINTS)),
     "RadialDistribution": hs.rdf(POINTS, 0.5, box=BOX),
     "ReportRow": ROWS[0],
     "Scene": SCENE,
@@ -77,13 +78,15 @@ def test_every_public_class_is_here():
         name for name in hs.__all__
         if inspect.isclass(getattr(hs, name)) and not issubclass(getattr(hs, name), Exception)
     }  # fmt: skip
-    assert classes <= SHOWN.keys()
+    assert classes - {"settings"} <= SHOWN.keys()
 
 
 def test_repr_is_short_and_names_the_class():
     for name, shown in SHOWN.items():
-        text = repr(shown)
-        assert text.startswith(f"{name}(") and "\n" not in text
+        text, *rows = repr(shown).split("\n")
+        in_rows = name in ("NeighborTable", "Points")
+        assert text.startswith(f"{name}(") and len(rows) == (6 if in_rows else 0)
+        assert max(map(len, rows), default=0) < 130
         assert len(text) < 300 and "array" not in text and " at 0x" not in text, name
 
 
@@ -102,10 +105,12 @@ def test_names_are_escaped():
 
 def test_what_is_told():
     found = hs.clusters([[0.0], [1.0], [5.0]], 1.5)
-    assert repr(found) == "Clusters(labels=[0, 0, 1], sizes=[2, 1], core=[True, True, True])"
+    assert repr(found) == (
+        "Clusters(n_clusters=2, sizes=[2, 1], labels=[0, 0, 1], spans=[[False], [False]])"
+    )
     assert repr(hs.rdf(POINTS, 0.4, box=BOX)) == (
         "RadialDistribution(r=float64 (100,), g=float64 (100,), counts=int64 (100,), "
-        "edges=float64 (101,), n_r=float64 (100,), expected=float64 (100,), n_centers=40, "
+        "edges=float64 (101,), n=float64 (100,), expected=float64 (100,), n_centers=40, "
         "n_frames=1, is_half=True)"
     )
     row = ROWS[0]
@@ -113,7 +118,10 @@ def test_what_is_told():
     assert "ok=False" in repr(SHOWN["Verdict"])
     assert str(SHOWN["Verdict"]).startswith("wrong: 9 rows")
     assert str(SHOWN["Explanation"]).startswith("40 points in 3 dimensions")
-    assert '<td style="text-align: left">40</td>' in TABLE._repr_html_()
+    told = SHOWN["Points"]._repr_html_()
+    assert "float64 (40, 3)" in told and "<U9" not in told and "types" in told
+    assert "radii" not in told and "periodic" in told
+    assert "NeighborTable(40 rows" in TABLE._repr_html_() and "<th>4</th>" in TABLE._repr_html_()
 
 
 def test_boxes():
@@ -128,7 +136,7 @@ def test_boxes():
 def test_of_nothing_and_of_one(n):
     points = np.zeros((n, 2))
     made = [
-        hs.neighbors(points, 1.0), hs.CellList(points, 1.0), hs.clusters(points, 1.0),
+        hs.CellList(points, 1.0), hs.clusters(points, 1.0), hs.Points(points[:0]),
         hs.explain(points, 1.0), hs.VerletList(1.0), hs.DynamicCellList(2, 1.0),
         hs.Connectivity([]), hs.Connectivity([]).pairs, hs.rdf(points, 0.5, box=[1.0, 1.0]),
     ]  # fmt: skip

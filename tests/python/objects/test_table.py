@@ -2,6 +2,7 @@
 """Tables of neighbours: rows, and what they turn into."""
 
 import copy
+import io
 import itertools
 import pickle
 from functools import partial
@@ -52,7 +53,24 @@ def test_facts(table):
     assert table.shape == (30, 30) and with_queries().shape == (5, 30)
     assert table.n_entries == len(table.indices) == table.counts.sum() == table.offsets[-1]
     assert table.counts.dtype == np.int64
-    assert repr(table) == f"NeighborTable(30 rows, {table.n_entries} entries, quantities 'jdDS')"
+    heading = f"NeighborTable(30 rows, {table.n_entries} entries, quantities 'jdDS')"
+    assert repr(table).startswith(heading + "\n0: ")
+
+
+def test_first_rows_are_shown():
+    points = np.append(np.zeros(12), [5.0, 9.0])[:, None]
+    lines = repr(hs.neighbors(points, 4.0, quantities="dj")).split("\n")
+    assert lines[1] == "0: " + ", ".join(f"{k} (0)" for k in range(1, 9)) + ", ..."
+    assert len(lines) == 7 and lines[-1] == "..."
+    table = hs.neighbors([[0.0], [1 / 3], [9.0]], 1.0, quantities="Dd")
+    assert repr(table) == (
+        "NeighborTable(3 rows, 2 entries, quantities 'Dd')\n0: 0.3333\n1: 0.3333\n2:"
+    )
+    assert repr(hs.neighbors([[0.0, 1.0], [0.0, 0.5]], 1.0, quantities="D")).endswith("[0 0.5]")
+    assert repr(hs.neighbors(np.empty((0, 2)), 1.0)) == (
+        "NeighborTable(0 rows, 0 entries, quantities 'j')"
+    )
+    assert "<th>1</th>" in table._repr_html_() and "0.3333" in table._repr_html_()
 
 
 def test_rows_are_views(table):
@@ -141,6 +159,90 @@ def test_rows_outlive_the_table():
     before = row.copy()
     [hs.neighbors(POINTS + k, 1.0) for k in range(20)]
     assert np.array_equal(row, before)
+
+
+# ---- files ---------------------------------------------------------------------------------
+
+
+def through_a_file(table):
+    file = io.BytesIO()
+    table.save(file)
+    file.seek(0)
+    return hs.NeighborTable.load(file)
+
+
+@given(scenes(), st.sampled_from(["j", "jd", "dSj", "DdjS", "S"]), st.booleans())
+def test_files_give_the_same_table(scene, letters, of_queries):
+    queries = scene.points[::2] if of_queries else None
+    table = hs.neighbors(
+        scene.points, scene.cutoff, box=scene.box, periodic=scene.periodic,
+        inclusive=scene.inclusive, quantities=letters, queries=queries,
+    )  # fmt: skip
+    for part in (table, table[1:], table[[0, 0]] if len(table) else table):
+        again = through_a_file(part)
+        assert same_tables(part, again) and again.shape == part.shape
+        assert not again.offsets.flags.writeable
+        if {"j", "d"} <= set(letters):
+            assert same_tables(part.sort(), again.sort())
+            assert same_tables(part.sort(), through_a_file(through_a_file(part)).sort())
+        if "j" in letters and queries is None:
+            assert np.array_equal(through_a_file(table).reverse(), table.reverse())
+
+
+def test_files_of_many_systems_and_few_rows(rng):
+    points, batch = rng.random((60, 3)), np.repeat([0, 1, 2], 20)
+    boxes = np.stack([np.eye(3) * size for size in (1.0, 1.1, 1.2)])
+    known = hs.Points(points, box=boxes, batch=batch)
+    for letters in ("jd", "jdS"):
+        table = hs.neighbors(known, 0.5, quantities=letters)
+        for part in (table, table[25:31], table[[59, 3]]):
+            assert same_tables(through_a_file(part).sort(), part.sort())
+            assert same_tables(pickle.loads(pickle.dumps(part)).sort(), part.sort())
+
+
+def test_files_have_the_name_they_are_given(table, tmp_path):
+    for name in (tmp_path / "rows", str(tmp_path / "rows.table")):
+        table.save(name)
+        assert same_tables(hs.NeighborTable.load(name), table)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["rows", "rows.table"]
+    with pytest.raises(FileNotFoundError):
+        hs.NeighborTable.load(tmp_path / "other")
+
+
+def test_broken_files_are_refused(table, tmp_path):
+    path, load = tmp_path / "rows.npz", partial(hs.NeighborTable.load, tmp_path / "rows.npz")
+    table.sort().save(path)
+    whole = path.read_bytes()
+    array = io.BytesIO()
+    np.save(array, np.arange(3))
+    path.write_bytes(array.getvalue())
+    assert_refused(load, ValueError, "no file of a NeighborTable")
+    for end in (0, 1, 50, len(whole) // 2, len(whole) - 1):
+        path.write_bytes(whole[:end])
+        assert_refused(load, ValueError, "^this is no file of a NeighborTable, or is broken: ")
+    for at in range(40, len(whole), 997):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 8]) + whole[at + 1 :])
+        try:
+            assert same_tables(load(), table.sort())  # where it says nothing of the arrays
+        except ValueError as error:
+            assert "\n" not in str(error)
+    np.savez(path, i=np.arange(3))
+    assert_refused(load, ValueError, "no file of a NeighborTable")
+    path.write_bytes(whole)
+    with np.load(path) as stored:
+        state = dict(stored)
+    m, d = table.n_entries, table.distances
+    for other in (
+        {"j": np.full(m, 30)}, {"j": np.full(m, -1)}, {"d": d[1:]}, {"S": np.zeros((m, 2))},
+        {"offsets": np.arange(31)}, {"offsets": np.array([], int)}, {"quantities": "jk"},
+        {"n_points": 29}, {"n_points": -1}, {"offsets": table.offsets[::-1]}, {"D": d},
+        {"quantities": 3}, {"j": np.full(m, object())}, {"j": table.indices.astype(">i8")},
+        {"origin_points": np.zeros((30, 3))}, {"origin_points": np.zeros(30)}, {"d": "words"},
+    ):  # fmt: skip
+        np.savez(path, **(state | other))
+        assert_refused(load, ValueError, "^this is no file of a NeighborTable, or is broken: ")
+    np.savez(path, **(state | {"format": 2}))
+    assert_refused(load, ValueError, "in format 2, and this version of halfshell reads format 1$")
 
 
 # ---- filter and sort -----------------------------------------------------------------------
@@ -247,6 +349,74 @@ def test_to_pairs_refuses_other_letters(table):
     assert_refused(lambda: bare.to_pairs(), AttributeError, "'j' in quantities")
     assert_refused(lambda: bare.to_pairs(quantities="iS"), AttributeError, "'S' in quantities")
     assert_refused(lambda: bare.to_pairs(quantities="P"), AttributeError, "'j' in quantities")
+
+
+@given(scenes(), st.randoms(), st.booleans())
+def test_from_pairs_makes_the_table_of_a_search(scene, random, is_half):
+    how = {"box": scene.box, "periodic": scene.periodic, "inclusive": scene.inclusive}
+    table = hs.neighbors(scene.points, scene.cutoff, quantities="jdDS", **how)
+    if is_half:
+        i, j, d, D, S = hs.pairs(scene.points, scene.cutoff, quantities="ijdDS", **how)
+    else:
+        i, j, d, D, S = table.to_pairs(quantities="ijdDS")
+    order = random.sample(range(len(i)), len(i))
+    i, j, d, D, S = (column[order] for column in (i, j, d, D, S))
+    made = hs.NeighborTable.from_pairs(
+        i, j, S, n_points=len(scene.points), distances=d, vectors=D, half=is_half
+    )
+    assert same_tables(made, table)
+    assert np.array_equal(made.reverse(), table.reverse())
+    assert same_arrays(made.to_pairs(half=True), table.to_pairs(half=True))
+    bare = hs.NeighborTable.from_pairs(i, j, n_points=len(scene.points), half=is_half)
+    assert np.array_equal(bare.indices, table.indices) and bare.quantities == "j"
+    assert np.array_equal(bare.offsets, table.offsets)
+    if len(np.unique(np.stack([i, j]), axis=1).T) == len(i):
+        assert np.array_equal(bare.reverse(), table.reverse())
+    else:
+        assert_refused(bare.reverse, AttributeError, "'S' in quantities")
+
+
+def test_from_pairs_of_queries_and_directions():
+    expected = with_queries(box=[4.0, 4.0])
+    i, j, d, S = expected.to_pairs(quantities="ijdS")
+    made = hs.NeighborTable.from_pairs(
+        i[::-1], j[::-1], S[::-1], n_points=30, n_queries=5, distances=d[::-1]
+    )
+    assert same_tables(made, expected) and made.shape == (5, 30)
+    assert_refused(made.reverse, ValueError, "one set of points")
+    one_way = hs.NeighborTable.from_pairs([0, 1], [1, 2], n_points=3)
+    assert one_way.counts.tolist() == [1, 1, 0]
+    assert_refused(lambda: one_way.to_pairs(half=True), ValueError, "both directions")
+    assert hs.NeighborTable.from_pairs([], [], n_points=0, half=True).shape == (0, 0)
+    assert hs.NeighborTable.from_pairs([], [], n_points=3).counts.tolist() == [0, 0, 0]
+
+
+def test_from_pairs_refuses_what_are_no_pairs():
+    make = partial(hs.NeighborTable.from_pairs, n_points=3)
+    for call, kind, words in (
+        (partial(make, [0], [3]), ValueError, "j must be numbers of points, from 0 to 2"),
+        (partial(make, [-1], [0]), ValueError, "i must be numbers"),
+        (partial(make, [5], [0], n_queries=5), ValueError, "queries, from 0 to 4"),
+        (partial(make, [0, 1], [1]), ValueError, "same length"),
+        (partial(make, [0.0], [1]), TypeError, "integers"),
+        (partial(make, [0], [1], [[0.5]]), TypeError, "S must hold whole"),
+        (partial(make, [0], [1], [0]), ValueError, "S must have shape"),
+        (partial(make, [0], [1], 0), ValueError, "S must have shape"),
+        (partial(make, [0], [1], [[2**31]]), OverflowError, "S must fit int32"),
+        (partial(make, [0], [1], [[-(2**31)]], half=True), OverflowError, "no opposite"),
+        (partial(make, [0], [1], distances=[1.0, 2.0]), ValueError, "distances must be one"),
+        (partial(make, [0], [1], vectors=[1.0]), ValueError, "vectors must be one"),
+        (partial(make, [0], [1], distances=["a"]), TypeError, "distances"),
+        (partial(make, [0, 0], [1, 1], [[1], [1]]), ValueError, "there twice with S = "),
+        (partial(make, [0, 1], [1, 0], [[1], [-1]], half=True), ValueError, "there twice"),
+        (partial(make, [0, 1], [1, 1], [[1], [0]]), ValueError, "pair 1 is point 1 and itself"),
+        (partial(make, [0], [1], half=True, n_queries=3), ValueError, "do not give n_queries"),
+        (partial(make, [0], [1], half=1), TypeError, "half"),
+        (partial(make, [0], [1], n_points=-1), ValueError, "n_points must be from 0"),
+        (partial(make, [0], [1], n_points=2**31), ValueError, "n_points must be from 0"),
+        (partial(make, [0], [1], n_points=3.0), TypeError, "n_points"),
+    ):
+        assert_refused(call, kind, words)
 
 
 # ---- graphs and matrices -------------------------------------------------------------------

@@ -19,8 +19,9 @@ points = [[0.0], [1.0]]
 told = {"default": _core.default_kernel()}
 for name, how in (("unnamed", {}), ("named", {"kernel": "scalar"})):
     try:
-        told[name] = hs.explain(points, 1.0, **how).kernel
-        assert hs.count_pairs(points, 1.0, **how) == len(hs.pairs(points, 1.0, **how)[0]) == 1
+        with hs.settings(**how):
+            told[name] = hs.explain(points, 1.0).kernel
+            assert hs.count_pairs(points, 1.0) == len(hs.pairs(points, 1.0)[0]) == 1
     except ValueError as error:
         told[name] = str(error)
 print(json.dumps(told))

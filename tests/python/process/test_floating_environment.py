@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 from oracles import lattice, random_scene, rotation, same_arrays
 
 ARM = platform.machine().lower() in ("arm64", "aarch64")
@@ -144,10 +145,10 @@ def test_same_bytes_in_every_environment(name):
     for kernel in hs.kernels():
         how = {"box": box, "kernel": kernel}
         searches = [
-            lambda how=how: hs.pairs(points, cutoff, quantities="ijSdD", **how),
-            lambda how=how: np.array(hs.count_pairs(points, cutoff, inclusive=False, **how)),
-            lambda how=how: hs.pairs(points, cutoff, precision="double", **how),
-            lambda how=how: hs.pairs(points, cutoff, precision="single", **how),
+            lambda how=how: call(hs.pairs, points, cutoff, quantities="ijSdD", **how),
+            lambda how=how: np.array(call(hs.count_pairs, points, cutoff, inclusive=False, **how)),
+            lambda how=how: call(hs.pairs, points, cutoff, precision="double", **how),
+            lambda how=how: call(hs.pairs, points, cutoff, precision="single", **how),
         ]
         for number, search in enumerate(searches):
             expected = search()
@@ -167,7 +168,7 @@ def test_the_environment_survives_a_refused_call():
             except ValueError:
                 refused = True
             try:
-                hs.pairs(np.zeros((100_000, 3)), 1.0, memory_limit=10**6)
+                call(hs.pairs, np.zeros((100_000, 3)), 1.0, memory_limit=10**6)
             except MemoryError:
                 refused_later = True
         assert refused and refused_later
@@ -205,8 +206,8 @@ def test_traps_of_the_caller_end_no_search(threads):
     cells = hs.CellList(points, cutoff, box=box)
 
     def searches():
-        yield hs.pairs(points, cutoff, box=box, **how)
-        yield hs.pairs_between(points, points, cutoff, box=box, **how)
+        yield call(hs.pairs, points, cutoff, box=box, **how)
+        yield call(hs.pairs_between, points, points, cutoff, box=box, **how)
         yield hs.coordination(points, cutoff, threads=threads)
         yield hs.neighbors(points, cutoff, queries=points, threads=threads).indices
         yield np.array(hs.count_pairs(points, cutoff, threads=threads))

@@ -8,30 +8,28 @@ from subprocesses import RESIDENT, run
 pytestmark = pytest.mark.slow
 
 SEARCHES = {
-    "pairs": "hs.pairs(points, 0.16, memory_limit=1e13)",
-    "sorted pairs": "hs.pairs(points, 0.16, sort=True, quantities='ijdDS', memory_limit=1e13)",
-    "neighbors": "hs.neighbors(points, 0.16, quantities='jdDS', memory_limit=1e13)",
+    "pairs": "hs.pairs(points, 0.16)",
+    "sorted pairs": "hs.pairs(points, 0.16, sort=True, quantities='ijdDS')",
+    "neighbors": "hs.neighbors(points, 0.16, quantities='jdDS')",
     "coordination": "hs.coordination(points, 0.5)",
-    "pairs of two sets": "hs.pairs_between(points[1::2], points, 0.16, memory_limit=1e13)",
+    "pairs of two sets": "hs.pairs_between(points[1::2], points, 0.16)",
     "count of two sets": "hs.count_pairs(points[::2], 0.7, queries=points[1::2])",
     "count": "hs.count_pairs(points, 0.5)",
     "count of coincident points": "hs.count_pairs(points * 0, 0.0)",
     "count of many cutoffs": "hs.count_pairs(points, np.linspace(0.4, 0.5, 50))",
     "clusters": "hs.clusters(points, 0.3)",
     "clusters of core points": "hs.clusters(points, 0.3, min_points=10**6)",
-    "pairs of balls": "hs.pairs(points, None, radii=sizes, sort=True, memory_limit=1e13)",
-    "count of balls": "hs.count_pairs(points, None, radii=4 * sizes)",
-    "rows of balls": "hs.neighbors(points, None, radii=sizes, rule='max', memory_limit=1e13)",
-    "count of ellipsoids": "hs.count_pairs(points, None, supports=tensors, extent=4.0)",
-    "batch of ellipsoids": """hs.pairs(
-        points, None, supports=tensors, extent=4.0, batch=kinds_ascending, memory_limit=1e13
-    )""",
-    "pairs by type": "hs.pairs(points, np.eye(9) * 0.3, types=kinds, memory_limit=1e13)",
+    "pairs of balls": "hs.pairs(balls, None, sort=True)",
+    "count of balls": "hs.count_pairs(balls.replace(radii=4 * balls.radii), None)",
+    "rows of balls": "hs.neighbors(balls, None, rule='max')",
+    "count of ellipsoids": "hs.count_pairs(ellipsoids, 4.0)",
+    "batch of ellipsoids": "hs.pairs(ellipsoids.replace(batch=np.sort(kinds)), 4.0)",
+    "pairs by type": "hs.pairs(hs.Points(points, types=kinds), np.eye(9) * 0.3)",
     "histogram": "hs.pair_histogram(points, np.linspace(0.0, 0.5, 100))",
     "measure": """i = np.arange(10**6) % 500
     while True:
         hs.measure(points, i, i + 1, box=[[0.3, 0.1, 0], [0, 0.3, 0], [0, 0, 0.3]])""",
-    "nearest": "hs.nearest(points, 100, memory_limit=1e13)",
+    "nearest": "hs.nearest(points, 100)",
     "nearest, all equally far": """hs.nearest(
         np.concatenate([points > 0.5] * 5), 1_000_000, queries=points[:9] * 0 + 0.5
     )""",
@@ -43,14 +41,14 @@ SEARCHES = {
         points[:2000], 2.0, box=[[0.3, 0.1, 0], [0, 0.3, 0], [0, 0, 0.3]],
         exclude=np.stack(np.triu_indices(2000, 1), axis=1),
     )""",
-    "count of many images": "hs.count_pairs(points[:1000], 60.0, box=[1.0] * 3, memory_limit=1e13)",
+    "count of many images": "hs.count_pairs(points[:1000], 60.0, box=[1.0] * 3)",
     "wrap": "hs.Box([[1, 0, 0], [0.4, 1, 0], [0.3, 0.2, 1]]).wrap(np.concatenate([points] * 16))",
-    "connectivity": "hs.Connectivity(lists(0.08), memory_limit=1e13)",
-    "overlap": "hs.Connectivity(lists(0.02), overlap=True, memory_limit=1e13)",
-    "intersection": "hs.Connectivity(lists(0.02), intersection=True, memory_limit=1e13)",
-    "intersection by threads": """hs.Connectivity(
-        lists(0.02), intersection=True, memory_limit=1e13, threads=2
-    )""",
+    "connectivity": "hs.Connectivity(lists(0.08))",
+    "overlap": "hs.Connectivity(lists(0.02), overlap=True)",
+    "overlap of images": "hs.Connectivity(lists(0.02), box=1.0, overlap=True)",
+    "intersection": "hs.Connectivity(lists(0.02), intersection=True)",
+    "intersection of images": "hs.Connectivity(lists(0.02), box=1.0, intersection=True)",
+    "intersection by threads": "hs.Connectivity(lists(0.02), intersection=True, threads=2)",
     "rebuild": """c = hs.Connectivity(lists(0.001))
     c.rebuild(lists(0.08))""",
     "patches": """c = hs.Connectivity(lists(0.015))
@@ -69,6 +67,7 @@ def test_an_interrupt_stops_the_search(search):
     # The signal is raised by a second thread, which also shows that the lock is released. What a
     # search still does is told by processor time, of all its threads: it is that of no other
     # program.
+    body = search.replace("\n", "\n    ")
     result = run(
         RESIDENT
         + f"""
@@ -79,8 +78,8 @@ import halfshell as hs
 rng = np.random.default_rng(1)
 points = rng.random((400_000, 3))
 sizes, kinds = 0.08 * 2.0 ** -rng.random(len(points)), np.arange(len(points)) % 9
-tensors = np.eye(3) / sizes[:, None, None]
-kinds_ascending = np.sort(kinds)
+balls, tensors = hs.Points(points, radii=sizes), np.eye(3) / sizes[:, None, None]
+ellipsoids = hs.Points(points, supports=tensors)  # none is freed: malloc would keep as much later
 grid = np.stack(np.meshgrid(*[np.arange(60.0)] * 3), axis=-1).reshape(-1, 3)
 small = points[:500]
 
@@ -100,9 +99,11 @@ def interrupt():
     sent.extend([time.process_time(), time.perf_counter()])
     signal.raise_signal(signal.SIGINT)
 
+limit = hs.settings(memory_limit=1e13)
 threading.Timer(0.4, interrupt).start()
 try:
-    {search}
+    with limit:
+        {body}
     outcome = "finished"
 except KeyboardInterrupt:
     outcome = "interrupted"
@@ -194,7 +195,8 @@ def interrupt():
 
 threading.Thread(target=interrupt, daemon=True).start()
 try:
-    hs.neighbors(points, 3.0, box=[1.0] * 8, memory_limit=1e13)
+    with hs.settings(memory_limit=1e13):
+        hs.neighbors(points, 3.0, box=[1.0] * 8)
     outcome = "finished"
 except KeyboardInterrupt:
     outcome = "interrupted"

@@ -25,8 +25,8 @@ CALLS = {
     "bad shape": "fails(lambda: hs.pairs(points[0], 0.3))",
     "bad kind": 'fails(lambda: hs.pairs("points", 0.3))',
     "bad quantities": 'fails(lambda: hs.pairs(points, 0.3, quantities="xyz"))',
-    "bad kernel": 'fails(lambda: hs.pairs(points, 0.3, kernel="none"))',
-    "memory limit": "fails(lambda: hs.pairs(points, 0.9, box=box, memory_limit=1))",
+    "bad kernel": 'fails(lambda: hs.settings(kernel="none"))',
+    "memory limit": "fails(lambda: little(1, hs.pairs, points, 0.9, box=box))",
     "shift overflow": 'fails(lambda: hs.pairs(far, 0.3, box=box, quantities="S"))',
     "tiny box": "fails(lambda: hs.pairs(points, 0.3, box=[1e-9] * 3))",
     "blocks": 'list(hs.iter_pairs(points, 0.3, box=box, quantities="ijdDS", max_pairs=7))',
@@ -34,8 +34,8 @@ CALLS = {
     "refused blocks": "fails(lambda: hs.iter_pairs(broken, 0.3, box=box))",
     "visits": "hs.for_each_pair(points, 0.2, lambda *pair: None, box=box)",
     "failing visits": "fails(lambda: hs.for_each_pair(points, 0.3, lambda: None, box=box))",
-    "clusters": "hs.clusters(points, 0.2, box=box, min_points=2, winding=True)",
-    "failing clusters": "fails(lambda: hs.clusters(points, 0.2, box=box, memory_limit=9))",
+    "clusters": "hs.clusters(points, 0.2, box=box, min_points=2)",
+    "failing clusters": "fails(lambda: little(9, hs.clusters, points, 0.2, box=box))",
     "box": "hs.Box.from_matrix(box).wrap(points)",
     "verify": "hs.verify(points, 0.1, *hs.pairs(points, 0.1))",
     "explain": "str(hs.explain(points, 0.3, box=box))",
@@ -65,6 +65,10 @@ broken = points.copy()
 broken[30, 1] = np.nan
 far = points + np.array([1e10, 0, 0]) * (np.arange(40) % 2)[:, None]
 box = np.eye(3)
+
+def little(limit, search, *arguments, **options):
+    with hs.settings(memory_limit=limit):
+        search(*arguments, **options)
 
 def fails(call):
     try:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from calls import call
 from oracles import random_scene, same_arrays
 from subprocesses import run
 
@@ -42,7 +43,7 @@ def test_different_searches_in_many_threads(rng):
     def work(k):
         points, cutoff, box, flags = scenes[k]
         return [
-            hs.pairs(
+            call(hs.pairs,
                 points,
                 cutoff,
                 box=box,
@@ -160,11 +161,12 @@ turn = 0
 while time.perf_counter() < end:
     turn += 1
     try:
-        if turn % 3:
-            hs.pairs(points, 0.02, box=box if turn % 2 else [1.0] * 3, quantities="ijdDS",
-                     sort=turn % 5 == 0, memory_limit=3e8)
-        else:
-            hs.pairs(points, 0.02, memory_limit=3e8)
+        with hs.settings(memory_limit=3e8):
+            if turn % 3:
+                hs.pairs(points, 0.02, box=box if turn % 2 else [1.0] * 3, quantities="ijdDS",
+                         sort=turn % 5 == 0)
+            else:
+                hs.pairs(points, 0.02)
     except (ValueError, OverflowError, MemoryError):
         pass
 stop = True
@@ -250,7 +252,7 @@ class _Elements:
 
 
 CHANGING = {
-    "touching": (_NUMBERS, 10**6, lambda x: hs.pairs(_PLACES, 0.5, touching=x)),
+    "touching": (_NUMBERS, 10**6, lambda x: hs.pairs(_PLACES, 0.5, indices=x)),
     "indices": (_NUMBERS, -7, lambda x: hs.neighbors(_PLACES, 0.5, indices=x)),
     "nodes": (_PLACES, np.nan, lambda x: hs.NodeList("a", x, _RADII)),
     "h": (_RADII, np.nan, lambda x: hs.NodeList("a", _PLACES, x)),
@@ -266,21 +268,25 @@ CHANGING = {
     "excluded nodes": (_ROWS, 10**6, lambda x: hs.Connectivity([_FEW], exclude=x)),
     "types": (
         (_NUMBERS % 3).astype(np.int32), 50,
-        lambda x: hs.rdf(_PLACES, 0.5, 9, box=[8.0] * 3, types=x),
+        lambda x: call(hs.rdf, _PLACES, 0.5, 9, box=[8.0] * 3, types=x),
     ),
     "types as they are": (
-        _NUMBERS // 500, -1, lambda x: hs.pairs(_PLACES, [[0.3, 0.2, 0.1]] * 3, types=x),
+        _NUMBERS // 500, -1, lambda x: call(hs.pairs, _PLACES, [[0.3, 0.2, 0.1]] * 3, types=x),
     ),
     "systems": (
-        (_NUMBERS // 500).astype(np.uint64), 2**63, lambda x: hs.pairs(_PLACES, 0.5, batch=x),
+        (_NUMBERS // 500).astype(np.uint64), 2**63, lambda x: call(hs.pairs, _PLACES, 0.5, batch=x),
     ),
     "systems of a histogram": (
         _NUMBERS // 500, 10**4,
-        lambda x: hs.rdf(_PLACES, 0.5, 9, box=np.tile(np.eye(3) * 8.0, (3, 1, 1)), batch=x),
+        lambda x: call(hs.rdf, _PLACES, 0.5, 9, box=np.tile(np.eye(3) * 8.0, (3, 1, 1)), batch=x),
     ),
-    "names": (_NAMES, "Zz", lambda x: hs.rdf(_PLACES, 0.5, 9, box=[8.0] * 3, types=x)["H", "O"]),
+    "names": (
+        _NAMES,
+        "Zz",
+        lambda x: call(hs.rdf, _PLACES, 0.5, 9, box=[8.0] * 3, types=x)["H", "O"],
+    ),
     "elements": (_NUMBERS % 90, 10**6, lambda x: hs.pairs(_Elements(x), {("H", "He"): 0.5})),
-    "species": (_NAMES, "Zz", lambda x: hs.pairs(_PLACES, {("H", "O"): 0.5}, types=x)),
+    "species": (_NAMES, "Zz", lambda x: call(hs.pairs, _PLACES, {("H", "O"): 0.5}, types=x)),
     "large integers": (
         np.full(1500, 2**53), 2**53 + 1, lambda x: hs.count_pairs(x[:, None], 0.5),
     ),

@@ -13,7 +13,7 @@ FILES = sorted((ROOT / "python").rglob("*.py"))
 #: `halfshell_report` is a folder here, of which only the command line knows.
 ALLOWED = {
     "_convert": {""},
-    "_objects": {"", "_convert"},
+    "_objects": {"", "_convert", "_functions"},  # a cell list asks functions, which make tables
     "_functions": {"", "_convert", "_objects"},
     "_check": {"", "_convert", "_functions", "_objects"},
     "_cli": {"", "_convert", "_functions", "_check", "halfshell_report"},

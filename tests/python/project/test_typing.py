@@ -32,7 +32,9 @@ assert_type(
     hs.pairs(p, 1.0, quantities=quantities), npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
 )
 total = hs.pairs(p, 1.0, box=[2.0] * 3, periodic=True, quantities="d").sum()
-i, j = hs.pairs(p, 1.0, index_dtype=np.int32, precision="double", kernel=None, memory_limit=1e9)
+i, j = hs.pairs(p, 1.0, index_dtype=np.int32)
+with hs.settings(precision="double", kernel=None, memory_limit=1e9):
+    i, j = hs.pairs(p, 1.0)
 i, j, d, S = hs.pairs(p, 1.0, quantities="ijdS", inclusive=False)
 hs.pairs(p, 1.0, **options)
 
@@ -47,7 +49,7 @@ m: int = hs.for_each_pair(p, 1.0, lambda i, j, S, D, d2: None, box=[1.0] * 3, th
 
 n: int = hs.count_pairs(p, 1.0)
 assert_type(hs.count_pairs(p, 1), int)
-assert_type(hs.count_pairs(p, np.float32(1.0), precision="single"), int)
+assert_type(hs.count_pairs(p, np.float32(1.0)), int)
 assert_type(hs.count_pairs(p, [0.5, 1.0]), npt.NDArray[np.int64])
 assert_type(hs.count_pairs(p, (1, 2), inclusive=False), npt.NDArray[np.int64])
 assert_type(hs.count_pairs(p, np.linspace(0.0, 1.0)), npt.NDArray[np.int64])
@@ -64,18 +66,20 @@ assert_type(table.distances, npt.NDArray[np.float64])
 assert_type(table.reverse(), npt.NDArray[np.int64])
 assert_type(hs.coordination(p, 1.0, box=[2.0] * 3), npt.NDArray[np.int64])
 
-i, j = hs.pairs(p, None, radii=[0.5, 1.0, 1.5], rule="max")
-i, j, d = hs.pairs(p, {("H", "O"): 1.0}, types=["H", "O", "O"], quantities="ijd")
-assert_type(hs.count_pairs(p, None, radii=p[:, 0]), int)
-assert_type(hs.count_pairs(p, np.eye(2), types=[0, 1, 1]), int)
-assert_type(hs.count_pairs(p, {(0, 1): 1}, types=[0, 1, 1]), int)
-assert_type(hs.count_pairs(p, [0.5, 1.0], radii=p[:, 0]), npt.NDArray[np.int64])
-assert_type(hs.neighbors(p, None, radii=p[:, 0], rule="gather"), hs.NeighborTable)
-i, j = hs.pairs_between(p, p, None, query_radii=p[:, 0], rule="gather")
-for i, j in hs.iter_pairs(p, 1.0, radii=p[:, 0], rule="min"):
+i, j = hs.pairs(hs.Points(p, radii=[0.5, 1.0, 1.5]), None, rule="max")
+i, j, d = hs.pairs(hs.Points(p, types=["H", "O", "O"]), {("H", "O"): 1.0}, quantities="ijd")
+balls = hs.Points(p, radii=p[:, 0])
+assert_type(balls, hs.Points)
+assert_type(hs.count_pairs(balls, None), int)
+assert_type(hs.count_pairs(hs.Points(p, types=[0, 1, 1]), {(0, 0): 1.0, (1, 1): 1.0}), int)
+assert_type(hs.count_pairs(hs.Points(p, types=[0, 1, 1]), {(0, 1): 1}), int)
+assert_type(hs.count_pairs(balls, [0.5, 1.0]), npt.NDArray[np.int64])
+assert_type(hs.neighbors(balls, None, rule="gather"), hs.NeighborTable)
+i, j = hs.pairs_between(balls, p, None, rule="gather")
+for i, j in hs.iter_pairs(balls, 1.0, rule="min"):
     i.sum()
 
-plan: hs.Explanation = hs.explain(p, 1.0, precision="exact")
+plan: hs.Explanation = hs.explain(p, 1.0, quantities="ijd")
 verdict: hs.Verdict = hs.verify(p, 1.0, i, j)
 box = hs.Box.orthorhombic(1.0, 1.0)
 assert_type(box.vectors, npt.NDArray[np.float64])
@@ -104,17 +108,17 @@ assert_type(hs.cache_info().held, int)
 """
 
 BAD = {
-    "hs.pairs(p, 1.0, precision='half')": "arg-type|call-overload",
+    "hs.settings(precision='half')": "arg-type",
     "hs.pairs(p, 1.0, boks=None)": "call-overload",
     "hs.pairs(p, 1.0).sum()": "attr-defined",
     "m: int = hs.count_pairs(p, [1.0])": "assignment",
     "hs.count_pairs(p, 1.0, sort=True)": "call-overload",
-    "hs.explain(p, 1.0, precision='half')": "arg-type",
-    "hs.neighbors(p, 1.0, sort=True)": "arg-type",
+    "hs.explain(p, 1.0, precision='exact')": "call-arg",
+    "hs.neighbors(p, 1.0, sort=True)": "call-arg",
     "hs.neighbors(p, 1.0).indices = p": "misc",
     "hs.pairs_between(p, 1.0)": "call-overload",
     "hs.iter_pairs(p, 1.0, sort=True)": "call-overload",
-    "hs.for_each_pair(p, 1.0, print, sort=True)": "arg-type",
+    "hs.for_each_pair(p, 1.0, print, sort=True)": "call-arg",
     "hs.Box([1.0]).vectors = p": "misc",
     "hs.pairs_between(p, p, 1.0, sort=True)": "call-overload",
     "hs.neighbors(p, 'far')": "arg-type",
@@ -123,7 +127,9 @@ BAD = {
     "hs.CellList(p, 1.0).neighbors(boks=1)": "call-arg",
     "hs.CellList(p, 1.0).nearest(1, p)": "call-arg|misc",
     "hs.VerletList(1.0).pairs('ij')": "call-overload",
-    "hs.neighbors(p, None, radii=p[0], rule='product')": "arg-type",
+    "hs.neighbors(p, None, rule='product')": "arg-type",
+    "hs.neighbors(p, None, radii=p[0])": "call-arg",
+    "hs.Points(p, radius=p[0])": "call-arg",
     "hs.pairs(p, None, query_radii=p[0])": "call-overload",
 }
 

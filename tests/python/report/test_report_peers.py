@@ -141,7 +141,7 @@ def test_supports_in_float64_are_right_where_nothing_is_hard(name, rule, rng):
         library = LIBRARIES[name]
         assert library.refuses(asked) is None
         box = {} if rows is None else {"box": rows, "periodic": periodic}
-        expected = hs.pairs(points, None, supports=H, extent=1.0, rule=rule, **box)
+        expected = hs.pairs(hs.Points(points, supports=H, **box), 1.0, rule=rule)
         i, j = library.indices(library.prepare(asked)())
         assert set(zip(i.tolist(), j.tolist())) == set(zip(*(x.tolist() for x in expected)))
         assert len(i) > 20

@@ -88,3 +88,55 @@ def in_order(columns):
 def serial(points, cutoff, options):
     """All pairs by one search, ascending."""
     return hs.pairs(points, cutoff, quantities=LETTERS, sort=True, **options)
+
+
+def known_scenes():
+    """Name -> what is known of each point, cutoff, box, and which pairs count."""
+    rng = np.random.default_rng(11)
+    n = 150
+    points = rng.random((n, 3)) * 6.0 - 1.0
+    skewed = {"box": np.array([[4.0, 0.0, 0.0], [1.5, 3.0, 0.0], [-0.5, 0.75, 5.0]])}
+    radii = rng.random(n) * 0.5
+    radii[7] = 1.5
+    elements = rng.choice(["A", "B", "Si"], n)
+    elements[rng.random(n) < 0.9] = "B"  # some bricks and chunks have no "A"
+    pairs = hs.pairs(points, 0.9, quantities="P", **skewed)[::3]
+    grid = np.stack(np.meshgrid(*[np.arange(6.0)] * 2), -1).reshape(-1, 2)
+    halves = hs.pairs(np.arange(8.0)[:, None], 4.0, box=8.0, quantities="P")
+    a = rng.normal(size=(n, 3, 3))
+    supports = a @ a.transpose(0, 2, 1) + 2.0 * np.eye(3)
+    supports += supports.transpose(0, 2, 1)
+    shape = {"positions": points, "supports": supports}
+    by_name = {("A", "*"): 1.2, ("Si", "Si"): 0.8, ("B", "B"): 0.5}
+    table = np.array([[0.4, 0.9, 0.0], [0.9, 0.5, 0.7], [0.0, 0.7, 1.1]])
+    balls = {"positions": points, "radii": radii}
+    return {
+        "radii": (balls, None, skewed, {}),
+        "the larger radius, at most": (balls, 1.0, {}, {"rule": "max"}),
+        "half of the sum": (balls, None, skewed, {"rule": "mean", "exclude": pairs}),
+        "by name": ({"positions": points, "types": elements}, by_name, skewed, {}),
+        "a table of names": ({"positions": points, "types": elements}, table, {}, {}),
+        "by number": (
+            {"positions": points, "types": rng.integers(0, 3, n)}, {(0, 1): 0.9, (2, 2): 1.1},
+            skewed, {"min_distance": 0.3},
+        ),
+        "supports": (shape, 2.0, skewed, {}),
+        "in both supports": (shape, 2.5, {}, {"rule": "min"}),
+        "groups": ({"positions": points, "groups": elements}, 0.9, skewed, {}),
+        "labels": ({"positions": points, "labels": np.arange(n) // 4}, 0.9, skewed, {"exclude": 1}),
+        "names of labels": ({"positions": points, "labels": elements}, 0.9, {}, {"exclude": 0}),
+        "excluded pairs": ({"positions": points}, 0.9, skewed, {"exclude": pairs}),
+        "two nearest images": (
+            {"positions": np.arange(8.0)[[3, 0, 6, 1, 7, 5, 2, 4], None]}, 5.0, {"box": 8.0},
+            {"exclude": halves},
+        ),
+        "on the cuts": (
+            {"positions": grid, "radii": np.full(36, 0.5), "groups": grid[:, 0].astype(int) // 3},
+            None, {"box": [6.0, 6.0], "periodic": [True, False]}, {"min_distance": 1.0},
+        ),
+    }  # fmt: skip
+
+
+def rows_of(known, some):
+    """What is known of some of the points."""
+    return {name: values[some] for name, values in known.items()}

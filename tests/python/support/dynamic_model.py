@@ -73,6 +73,9 @@ def check_points(cells, model):
     """The list has the keys and positions of the model."""
     assert len(cells) == len(model.points)
     assert sorted(cells) == sorted(model.points)
+    assert keys_of(cells.keys) == list(cells)
+    positions = dict(zip(cells, cells.positions.tolist(), strict=True))
     for key, point in model.points.items():
         assert key in cells
-        assert cells.position(key).tolist() == [x / (1 << 1074) for x in point]
+        assert cells.position(key).tolist() == positions[key] == [x / (1 << 1074) for x in point]
+        assert cells.cell_of(positions[key]) == cells.cell(key)

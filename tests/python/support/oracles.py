@@ -17,6 +17,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import halfshell as hs
+from calls import call
 from halfshell._check.reference import exact_square, reference_pairs
 
 EPS = 2.0**-53
@@ -54,7 +55,7 @@ def check(points, cutoff, box=None, periodic=None, inclusive=True, **how):
     scene = {"box": box, "periodic": periodic, "inclusive": inclusive}
     expected = set(reference_pairs(points, cutoff, box, periodic, inclusive))
     for by in by_kernels(how):
-        found = as_set(*hs.pairs(points, cutoff, quantities="ijS", **scene, **by))
+        found = as_set(*call(hs.pairs, points, cutoff, quantities="ijS", **scene, **by))
         assert found == expected, describe(found, expected, points, cutoff, box, by)
     return expected
 
@@ -64,7 +65,7 @@ def check_large(points, cutoff, box=None, periodic=None, inclusive=True, **how):
     scene = {"box": box, "periodic": periodic, "inclusive": inclusive}
     expected = exact_pairs(points, cutoff, box, periodic, inclusive)
     for by in by_kernels(how):
-        found = as_rows(*hs.pairs(points, cutoff, quantities="ijS", **scene, **by))
+        found = as_rows(*call(hs.pairs, points, cutoff, quantities="ijS", **scene, **by))
         if not np.array_equal(found, expected):
             one, other = ({tuple(row) for row in rows.tolist()} for rows in (found, expected))
             assert len(one) == len(found), f"{len(found) - len(one)} pairs are listed twice"

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* probe_errors.c: csrc/binding/errors.c alone, for test_statuses.py to raise what no call does. */
+#define HS_IMPORTS_NUMPY /* its table, which nothing here looks into */
 #include "errors.h"
 
-#include "environment.h"
+#include "system.h"
 
 /* What errors.c asks of others. */
 int

@@ -7,7 +7,7 @@ import numpy as np
 from mpi4py import MPI
 
 import halfshell as hs
-from brick_scenes import LETTERS, in_order, same, scenes, serial
+from brick_scenes import LETTERS, in_order, known_scenes, rows_of, same, scenes, serial
 from halfshell.mpi import exchange
 
 COMM = MPI.COMM_WORLD
@@ -33,6 +33,24 @@ def answers():
             for owned, row in rows:
                 of_each[owned] = row
             assert np.array_equal(of_each, hs.coordination(points, cutoff, **scene)), name
+
+
+def known():
+    """Radii, types and so on go with their points."""
+    for name, (fields, cutoff, scene, which) in known_scenes().items():
+        n = len(fields["positions"])
+        own = rows_of(fields, slice(n * RANK // SIZE, n * (RANK + 1) // SIZE))
+        rest = {key: value for key, value in which.items() if key != "rule"}
+        brick, held = exchange(
+            COMM, hs.Points(**own, **scene), cutoff, rule=which.get("rule")
+        )
+        found = COMM.gather(brick.pairs(held, quantities=LETTERS, **rest))
+        if RANK == 0:
+            expected = hs.pairs(
+                hs.Points(**fields, **scene), cutoff, quantities=LETTERS, sort=True, **which
+            )
+            columns = [np.concatenate(column) for column in zip(*found, strict=True)]
+            assert same(in_order(columns), expected) and len(expected[0]), name
 
 
 def refusals():
@@ -61,6 +79,10 @@ def refusals():
             ((points, 1.0), mixed, ValueError, "periodic must be the same"),
             ((narrow, 1.0), {}, ValueError, "one width and type"),
             ((flat, 1.0), {}, ValueError, "one width and type"),
+            ((hs.Points(points, radii=[0.5] * 5), 1.0), {"rule": "max" if last else "min"},
+             ValueError, "rule must be the same"),
+            ((hs.Points(points, labels=[1] * 5) if last else points, 1.0), {}, ValueError,
+             "what is known of points must be the same"),
         ]
     for arguments, options, kind, words in cases:
         try:
@@ -75,7 +97,7 @@ def refusals():
 
 if __name__ == "__main__":
     try:
-        {"answers": answers, "refusals": refusals}[sys.argv[1]]()
+        {"answers": answers, "known": known, "refusals": refusals}[sys.argv[1]]()
     except BaseException:
         sys.excepthook(*sys.exc_info())
         sys.stderr.flush()

@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 
 import halfshell as hs
+from calls import call
 from full_lists import both_ways, entries
 from halfshell._check.reference import (
     exact_square,
@@ -118,15 +119,16 @@ def check(scene, **how):
     full = scene.full()
     half = None if scene.rule not in SYMMETRIC else [p for p in full if _is_of_half(*p)]
     for by in by_kernels(how):
-        table = hs.neighbors(**scene.arguments, quantities="jS", **by)
+        table = call(hs.neighbors, **scene.arguments, quantities="jS", **by)
         assert entries(table) == full
-        counts = hs.coordination(**scene.arguments, **by)
+        counts = call(hs.coordination, **scene.arguments, **by)
         assert counts.tolist() == table.counts.tolist()
         if half is not None:
-            found = hs.pairs(**scene.arguments, quantities="ijS", sort=True, **by)
+            found = call(hs.pairs, **scene.arguments, quantities="ijS", sort=True, **by)
             assert triples(*found) == half
-            assert sorted(triples(*hs.pairs(**scene.arguments, quantities="ijS", **by))) == half
-            assert hs.count_pairs(**scene.arguments, **by) == len(half)
+            unsorted = call(hs.pairs, **scene.arguments, quantities="ijS", **by)
+            assert sorted(triples(*unsorted)) == half
+            assert call(hs.count_pairs, **scene.arguments, **by) == len(half)
     return full if half is None else half
 
 
@@ -139,10 +141,10 @@ def _check_between(scene, how):
     arguments = scene.of_two_sets
     numbers = np.bincount([i for i, _, _ in expected], minlength=scene.n_queries).tolist()
     for by in by_kernels(how):
-        assert triples(*hs.pairs_between(**arguments, quantities="ijS", **by)) == expected
-        assert entries(hs.neighbors(**arguments, quantities="jS", **by)) == expected
-        assert hs.count_pairs(**arguments, **by) == len(expected)
-        assert hs.coordination(**arguments, **by).tolist() == numbers
+        assert triples(*call(hs.pairs_between, **arguments, quantities="ijS", **by)) == expected
+        assert entries(call(hs.neighbors, **arguments, quantities="jS", **by)) == expected
+        assert call(hs.count_pairs, **arguments, **by) == len(expected)
+        assert call(hs.coordination, **arguments, **by).tolist() == numbers
     return expected
 
 

@@ -42,7 +42,7 @@ def check_refusals(cases):
         except kind as error:
             if not re.search(pattern, str(error)):
                 wrong[name] = f"says: {error}"
-    assert wrong == {}
+    assert wrong == {}, wrong
 
 
 def arrays_among(arguments):

@@ -9,6 +9,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 import halfshell as hs
+from calls import call
 from halfshell._check.reference import exact_square
 from oracles import as_set, full_box
 
@@ -50,7 +51,7 @@ class Scene:
         return Scene(**{**vars(self), **changes})
 
     def arrays(self, quantities="ijS", **how):
-        return hs.pairs(
+        return call(hs.pairs,
             self.points,
             self.cutoff,
             box=self.box,

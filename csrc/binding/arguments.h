@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * arguments.h: what the functions of the table share. Each takes its arguments as views, lets
+ * others run Python meanwhile, calls the core, and makes arrays or an exception of the outcome.
+ *
+ * Types and shapes are checked here, values in the core. Numbers of Python may run code of their
+ * own, which may give an array another shape or other memory: so all numbers are read first, and
+ * views of arrays are taken last, here and nowhere else.
+ */
+#ifndef HS_ARGUMENTS_H
+#define HS_ARGUMENTS_H
+
+#include "interface.h"
+
+#include "../halfshell.h"
+
+#include <stdbool.h>
+
+/*
+ * The systems as the core takes them. Where all share box and cutoff, those without points are left
+ * out: numbers may be as far apart as users like. Otherwise each has its place.
+ */
+typedef struct hs_batch {
+    bool       is_given; /* else there is one system, and nothing below is set */
+    hs_systems systems;
+    int64_t   *first;       /* owned */
+    int64_t   *first_query; /* owned; NULL where there are no queries */
+    int64_t   *number;      /* owned: of each system; NULL where that is its place */
+    int64_t    capacity;    /* of these */
+    int64_t    n_numbers;   /* systems, those without points counted */
+} hs_batch;
+
+/* The arguments of a search, as views; the Python arguments that they borrow from must stay
+ * alive. It borrows from itself: it cannot be moved. */
+typedef struct hs_py_call {
+    hs_among         among; /* what is searched; `points` is NULL where there are cells */
+    hs_points        points, queries;
+    hs_box           box;
+    hs_reach         reach;
+    hs_selection     selection;
+    hs_options       options;
+    hs_failure       failure;
+    hs_batch         batch;
+    const char      *letters;  /* borrowed: the quantities */
+    PyObject        *out;      /* borrowed: of the caller, or NULL: new arrays */
+    hs_pair_arrays   arrays;   /* those of out */
+    PyObject        *room;     /* owned: new arrays of a fixed length that `out` is then, or NULL */
+    int64_t          capacity; /* that length, or 0; negative: the number needed is returned too */
+    bool             flag;
+    int64_t          integer;
+    double           real;
+    PyObject *const *own;      /* borrowed: the arguments beyond those of every search */
+    PyObject        *progress; /* borrowed; called with the fraction done, or NULL */
+    PyThreadState   *thread;   /* saved while the GIL is released, else NULL */
+} hs_py_call;
+
+/* Takes the positional arguments of this function, see interface.h, and room for a capacity. False
+ * with an exception set, and nothing to release; else hs_py_call_end() must follow. */
+bool hs_py_call_take(hs_py_call *call, hs_function_number number, PyObject *const *arguments,
+                     Py_ssize_t n_arguments);
+
+/* Release and take the GIL around a call of the core; poll() takes it in between. With few points
+ * it stays taken until the first poll: handing it over costs a tenth of a small search. */
+void hs_py_call_release(hs_py_call *call);
+void hs_py_call_acquire(hs_py_call *call);
+
+/* Gives back what the arguments took, after the call of the core. Idempotent. */
+void hs_py_call_end(hs_py_call *call);
+
+/* Whether a function got as many arguments as it takes; false with an exception set. */
+bool hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected);
+
+/* Whether it is a native, C-contiguous array of this type of NumPy with so many axes. */
+bool hs_is_array(PyObject *object, int type, int n_axes);
+
+/* The entries of such an array, of which axis 0 has this length (-1: any) and the others `width`,
+ * or NULL for None. False with a TypeError, `must`. */
+bool hs_entries_of(PyObject *object, int type, int n_axes, int64_t length, int64_t width,
+                   const char *must, const void **entries);
+
+/* The length of axis 0 of an array, 0 for None. */
+int64_t hs_length_of(PyObject *object);
+
+/* A native float32 or float64 array of shape (n, d), 1 <= d <= 8. The view borrows from it. `name`
+ * is that of the argument, for messages. */
+bool hs_points_of(PyObject *object, const char *name, hs_points *points);
+
+/* The cells in an object of _core.cells_build, borrowed; NULL, without an exception, for others. */
+hs_cells *hs_cells_of(PyObject *object);
+#define HS_CELLS_NAME "halfshell.cells"
+
+/* periodic: int, bit l set when box vector l repeats. */
+bool hs_repeats_of(PyObject *periodic, unsigned long *repeats);
+
+/* box: None, or a C-contiguous float64 array: rows (d, d), or edge lengths (d,). *given tells
+ * whether there is a box at all. */
+bool hs_box_of(PyObject *object, unsigned long repeats, int ndim, hs_box *box, bool *given);
+
+/* A string of the known letters, which are some of HS_LETTERS, each at most once. */
+#define HS_LETTERS     "ijdDSPk"
+#define HS_ALL_LETTERS "ijdDSP" /* those that every list of pairs has: k needs several cutoffs */
+#define HS_ROW_LETTERS "jdDS"   /* a row says itself what i is */
+
+/* By number of the algorithm. */
+extern const char *const hs_algorithm_names[HS_ALGORITHM_END];
+
+/*
+ * many_systems.c: the batch of a call, a tuple of five: numbers, int64 (n,); cutoffs, None or
+ * float64 (s,); boxes, None or float64 (s, d, d), for which the call's box has the axes that
+ * repeat; the numbers of queries, int64 (q,), or None where there are none; bits of the axes that
+ * repeat in each system, uint8 (s,), or None where they are those of the call. False with an
+ * exception set.
+ */
+bool hs_batch_take(PyObject *given, const hs_py_call *call, hs_batch *batch);
+void hs_batch_free(hs_batch *batch);
+
+/* Zeros of shape (numbers, ...), for as many more axes; NULL with an exception set. */
+PyObject *hs_batch_zeros(const hs_batch *batch, int n_axes, const npy_intp *shape, int type);
+
+#endif

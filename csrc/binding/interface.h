@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * table.h: what each function that searches takes, said once. py_call.h reads the arguments by it,
+ * and the module makes its functions of it.
+ */
+#ifndef HS_TABLE_H
+#define HS_TABLE_H
+
+#include "numpy_api.h"
+
+#include <stdbool.h>
+
+/* What an argument becomes, see py_call.h. */
+typedef enum hs_kind {
+    HS_ARG_END, /* of a list */
+    /* Of every search, in this order. */
+    HS_ARG_POINTS,   /* an array; or cells of cells_build, with None as box and 0 as periodic */
+    HS_ARG_CUTOFF,   /* a float */
+    HS_ARG_BOX,      /* float64 (d,) or (d, d), or None */
+    HS_ARG_PERIODIC, /* bits */
+    HS_ARG_INCLUSIVE,
+    HS_ARG_PRECISION,
+    HS_ARG_KERNEL,
+    HS_ARG_MEMORY_LIMIT, /* None: what the machine has */
+    HS_ARG_PROGRESS,     /* None: no calls */
+    HS_ARG_THREADS,      /* None: as many as pay */
+    /* Of some. */
+    HS_ARG_QUANTITIES,       /* some of HS_ALL_LETTERS */
+    HS_ARG_SHELL_QUANTITIES, /* some of HS_LETTERS, where there may be shells */
+    HS_ARG_ROW_QUANTITIES,   /* some of HS_ROW_LETTERS */
+    HS_ARG_SORT,
+    HS_ARG_INDEX,        /* bytes of an index */
+    HS_ARG_OUT,          /* arrays, or None */
+    HS_ARG_OTHER_POINTS, /* queries, which there must be */
+    HS_ARG_FLAG,         /* `flag`, `integer` and `real` of the call */
+    HS_ARG_INTEGER,
+    HS_ARG_REAL,
+    HS_ARG_MAX_DISTANCE, /* what a cutoff is to users of `nearest` */
+    HS_ARG_OWN,          /* left to the function, which runs no Python code for it */
+    /* Of some: None, or what may be left out with all that follow. */
+    HS_ARG_QUERIES,
+    HS_ARG_REACH,     /* of reach.h; or a tuple of that, or None, and a selection */
+    HS_ARG_ALGORITHM, /* a name */
+    HS_ARG_SHELLS,    /* several cutoffs, with the letter k */
+    HS_ARG_CAPACITY,  /* an int, negative where the number of pairs is returned too, and pairs
+                                that do not fit are no error */
+    HS_ARG_BATCH      /* of many_systems.h */
+} hs_kind;
+
+#define HS_KINDS (HS_ARG_BATCH + 1)
+
+#define HS_ARG_FIRST_OPTIONAL HS_ARG_QUERIES
+
+typedef struct hs_argument {
+    const char *name; /* NULL at the end of a list */
+    hs_kind     kind;
+    const char *usual; /* what users leave out, as Python writes it; NULL: it must be given */
+} hs_argument;
+
+/* Of every search; beyond them, with the end; as users give them, with a star and the end. */
+enum { HS_CALL_ARGUMENTS = 10, HS_MOST_OWN = 12, HS_MOST_PUBLIC = 20 };
+
+typedef PyObject *hs_py_search(PyObject *module, PyObject *const *arguments,
+                               Py_ssize_t n_arguments);
+
+typedef struct hs_function {
+    const char   *name;
+    hs_py_search *body;
+    hs_argument   own[HS_MOST_OWN]; /* what it takes beyond HS_EVERY_SEARCH */
+    /* Names of the arguments as users give them, positional ones before the star; none where it is
+     * no function for users. */
+    const char *users[HS_MOST_PUBLIC];
+    /* Whether the cutoff is the largest distance of what is near, decided exactly in any case. */
+    bool is_by_rank;
+} hs_function;
+
+extern const hs_argument HS_EVERY_SEARCH[HS_CALL_ARGUMENTS], HS_MAX_DISTANCE;
+
+/* What users give and the core does not take as it is: radii, types and choices become one. */
+extern const hs_argument HS_ONLY_PYTHON[];
+
+/* The argument at this place in the order of the core; its name is NULL behind the last. */
+static inline const hs_argument *
+hs_argument_at(const hs_function *function, int place)
+{
+    return place >= HS_CALL_ARGUMENTS           ? &function->own[place - HS_CALL_ARGUMENTS]
+           : place == 1 && function->is_by_rank ? &HS_MAX_DISTANCE
+                                                : &HS_EVERY_SEARCH[place];
+}
+
+typedef enum hs_function_number {
+    HS_FN_PAIRS,
+    HS_FN_COUNT_PAIRS,
+    HS_FN_PAIRS_BETWEEN,
+    HS_FN_NEIGHBORS,
+    HS_FN_COORDINATION,
+    HS_FN_NEAREST,
+    HS_FN_HISTOGRAM,
+    HS_FN_CLUSTERS,
+    HS_FN_ITER_PAIRS,
+    HS_FN_FOR_EACH_PAIR,
+    HS_FN_MEASURE,
+    HS_FN_EXPLAIN,
+    HS_FN_CELLS_BUILD,
+    HS_FN_CELLS_CANDIDATES,
+    HS_FN_VERLET_UPDATE,
+    HS_FN_VERLET_PAIRS,
+    HS_FN_CONNECT,
+    HS_FN_CONNECT_SEARCH,
+    HS_FN_OVERLAP,
+    HS_FN_INTERSECT,
+    HS_FN_PAIR_ROWS,
+    HS_FN_KEEP_ROWS,
+    HS_FN_ROWS_WITHOUT,
+    HS_FUNCTIONS
+} hs_function_number;
+
+extern const hs_function hs_functions[HS_FUNCTIONS];
+
+#endif

@@ -1,0 +1,450 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* py_nodes.c: rows and pairs of node lists, and what is made of them or left of them when nodes or
+ * pairs go. The Python layer keeps the arrays, and puts what it gives in here together from them.
+ */
+#include "py_functions.h"
+
+#include "errors.h"
+#include "outputs.h"
+
+#include "../halfshell_nodes.h"
+
+/* ---- arguments and results ---------------------------------------------------------------- */
+
+/* The arguments of one call; it cannot be moved, as hs_py_call. */
+typedef struct node_call {
+    hs_py_call       call;
+    hs_node_lists    lists;
+    PyObject *const *own; /* borrowed: the arguments behind those of every search */
+} node_call;
+
+/* The bits of `flags`. */
+enum { GHOST_ROWS = 1, GHOST_PAIRS = 2, ROWS_ONLY = 4, DIRECTED = 8 };
+
+/* The entries of a C-contiguous array of this type with n entries, or with any number where n is
+ * -1; *length, unless NULL, is that number. NULL with an exception set. */
+static const void *
+entries_of(PyObject *object, int type, int64_t n, int64_t *length)
+{
+    PyArrayObject *array = (PyArrayObject *)object;
+    if (!hs_is_array(object, type, 1) || (n >= 0 && PyArray_DIM(array, 0) != n)) {
+        PyErr_SetString(PyExc_TypeError, "expected arrays of the types and lengths of node lists");
+        return NULL;
+    }
+    if (length != NULL) {
+        *length = PyArray_DIM(array, 0);
+    }
+    return PyArray_DATA(array);
+}
+
+/* The same of an array or None: false with an exception set. */
+static bool
+entries_or_none(PyObject *object, int type, int64_t n, const void **entries)
+{
+    *entries = object != Py_None ? entries_of(object, type, n, NULL) : NULL;
+    return object == Py_None || *entries != NULL;
+}
+
+/* Shifts of n entries, or NULL and 1 dimension for None. */
+static bool
+take_shifts(PyObject *object, int64_t n, const int32_t **shift, int *ndim)
+{
+    PyArrayObject *array = (PyArrayObject *)object;
+    *shift = NULL;
+    *ndim = 1;
+    if (object == Py_None) {
+        return true;
+    }
+    if (!hs_is_array(object, NPY_INT32, 2) || PyArray_DIM(array, 0) != n ||
+        PyArray_DIM(array, 1) < 1 || PyArray_DIM(array, 1) > HS_MAX_DIM) {
+        PyErr_SetString(PyExc_TypeError, "shifts must be an int32 array of a row for each pair");
+        return false;
+    }
+    *shift = PyArray_DATA(array);
+    *ndim = (int)PyArray_DIM(array, 1);
+    return true;
+}
+
+/* i, j and shift of a half list. */
+static bool
+take_half(PyObject *const *arguments, PyObject *shift, hs_half_list *half)
+{
+    *half = (hs_half_list){.ndim = 1};
+    half->i = entries_of(arguments[0], NPY_INT32, -1, &half->n);
+    half->j = half->i != NULL ? entries_of(arguments[1], NPY_INT32, half->n, NULL) : NULL;
+    return half->j != NULL && take_shifts(shift, half->n, &half->shift, &half->ndim);
+}
+
+/* offsets, indices, shifts or None of rows of n_lists lists. */
+static bool
+take_rows(PyObject *const *arguments, int64_t n_lists, hs_list_rows *rows)
+{
+    int64_t n_offsets = 0;
+    *rows = (hs_list_rows){.n_lists = (int32_t)n_lists};
+    rows->offsets = entries_of(arguments[0], NPY_INT64, -1, &n_offsets);
+    rows->indices =
+        rows->offsets != NULL ? entries_of(arguments[1], NPY_INT32, -1, &rows->n_indices) : NULL;
+    if (rows->indices == NULL) {
+        return false;
+    }
+    if (n_lists < 0 || n_lists > INT32_MAX || n_offsets < 1 ||
+        (n_lists > 0 ? (n_offsets - 1) % n_lists != 0 : n_offsets != 1)) {
+        PyErr_SetString(PyExc_TypeError, "offsets must have an entry for each row and list");
+        return false;
+    }
+    rows->n = n_lists > 0 ? (n_offsets - 1) / n_lists : 0;
+    return take_shifts(arguments[2], rows->n_indices, &rows->shift, &rows->ndim);
+}
+
+/* n_nodes, n_ghosts, number, for n points; flags are those of the call. */
+static bool
+take_lists(PyObject *const *arguments, const hs_py_call *call, hs_node_lists *lists)
+{
+    int64_t     n_lists = 0;
+    const void *number = NULL;
+    *lists = (hs_node_lists){.ghost_rows = (call->integer & GHOST_ROWS) != 0,
+                             .ghost_pairs = (call->integer & GHOST_PAIRS) != 0,
+                             .rows_only = (call->integer & ROWS_ONLY) != 0,
+                             .directed = (call->integer & DIRECTED) != 0};
+    lists->n_nodes = entries_of(arguments[0], NPY_INT64, -1, &n_lists);
+    if (lists->n_nodes == NULL) {
+        return false;
+    }
+    if (n_lists > INT32_MAX) {
+        PyErr_SetString(PyExc_OverflowError, "there must be fewer than 2**31 lists");
+        return false;
+    }
+    lists->n_lists = (int32_t)n_lists;
+    lists->n_ghosts = entries_of(arguments[1], NPY_INT64, n_lists, NULL);
+    if (lists->n_ghosts == NULL ||
+        !entries_or_none(arguments[2], NPY_INT32, call->points.n, &number)) {
+        return false;
+    }
+    lists->number = number;
+    return true;
+}
+
+/* Takes the arguments of a function. n_nodes, n_ghosts and number are own[lists_at] and those
+ * behind it, and the call's integer has the flags, unless lists_at is -1. */
+static bool
+take_call(node_call *call, hs_function_number number, int lists_at, PyObject *const *arguments,
+          Py_ssize_t n_arguments)
+{
+    call->own = arguments + HS_CALL_ARGUMENTS;
+    call->lists = (hs_node_lists){.n_lists = 0};
+    return hs_py_call_take(&call->call, number, arguments, n_arguments) &&
+           (lists_at < 0 || take_lists(call->own + lists_at, &call->call, &call->lists));
+}
+
+/* Arrays that cannot be written to, as a tuple; takes the reference. */
+static PyObject *
+read_only(PyObject *arrays)
+{
+    for (Py_ssize_t k = 0; arrays != NULL && k < PyTuple_GET_SIZE(arrays); k++) {
+        PyArray_CLEARFLAGS((PyArrayObject *)PyTuple_GET_ITEM(arrays, k), NPY_ARRAY_WRITEABLE);
+    }
+    return arrays;
+}
+
+static bool
+has_shifts(const hs_pairs *pairs)
+{
+    return hs_pairs_array(pairs, HS_WANT_SHIFT) != NULL;
+}
+
+static PyObject *
+rows_of(hs_pairs *rows, int ndim)
+{
+    return hs_table_of(rows, has_shifts(rows) ? "jS" : "j", ndim, 4);
+}
+
+/* Nodes and lists of pairs. */
+static PyObject *
+pairs_of(hs_connectivity *made, int ndim)
+{
+    hs_pairs *const nodes = hs_connectivity_pairs(made);
+    PyObject *of_nodes = read_only(hs_arrays_of(nodes, has_shifts(nodes) ? "ijS" : "ij", ndim, 4));
+    PyObject *of_lists = read_only(hs_arrays_of(hs_connectivity_lists(made), "ij", ndim, 4));
+    if (of_nodes == NULL || of_lists == NULL) {
+        Py_XDECREF(of_nodes);
+        Py_XDECREF(of_lists);
+        return NULL;
+    }
+    return Py_BuildValue("(NN)", of_nodes, of_lists);
+}
+
+/* What a function returns, the GIL taken, from a result that is freed; NULL with an exception set
+ * for a status other than HS_OK. Of rows offsets and indices, and shifts of ndim components where
+ * there are any; of a connectivity (rows, (nodes, lists)), None for what is not wanted. */
+static PyObject *
+give_rows(node_call *call, hs_status status, hs_pairs *rows, int ndim)
+{
+    if (status != HS_OK) {
+        return hs_raise(status, &call->call.failure, &call->call.options);
+    }
+    PyObject *arrays = rows_of(rows, ndim);
+    hs_pairs_free(rows);
+    return arrays;
+}
+
+enum { ROWS_WANTED = 1, PAIRS_WANTED = 2 };
+
+static PyObject *
+give_parts(node_call *call, hs_status status, hs_connectivity *made, int wanted, int ndim)
+{
+    if (status != HS_OK) {
+        return hs_raise(status, &call->call.failure, &call->call.options);
+    }
+    PyObject *rows = wanted & ROWS_WANTED ? rows_of(hs_connectivity_rows(made), ndim)
+                                          : Py_NewRef(Py_None);
+    PyObject *pairs = wanted & PAIRS_WANTED ? pairs_of(made, ndim) : Py_NewRef(Py_None);
+    hs_connectivity_free(made);
+    if (rows == NULL || pairs == NULL) {
+        Py_XDECREF(rows);
+        Py_XDECREF(pairs);
+        return NULL;
+    }
+    return Py_BuildValue("(NN)", rows, pairs);
+}
+
+/* ---- functions ---------------------------------------------------------------------------- */
+
+/* What the caller wants of a connectivity. */
+static int
+wanted_of(const node_call *call)
+{
+    return call->lists.rows_only ? ROWS_WANTED : ROWS_WANTED | PAIRS_WANTED;
+}
+
+PyObject *
+hs_py_connect(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    node_call        c;
+    hs_half_list     half;
+    hs_connectivity *made = NULL;
+    (void)module;
+    if (!take_call(&c, HS_FN_CONNECT, 3, arguments, n_arguments) ||
+        !take_half(c.own, c.own[2], &half)) {
+        return NULL;
+    }
+    hs_py_call_release(&c.call);
+    const hs_status status =
+        hs_connectivity_link(&half, &c.lists, &c.call.options, &made, &c.call.failure);
+    hs_py_call_acquire(&c.call);
+    return give_parts(&c, status, made, wanted_of(&c), half.ndim);
+}
+
+PyObject *
+hs_py_connect_search(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    node_call        c;
+    hs_connectivity *made = NULL;
+    (void)module;
+    if (!take_call(&c, HS_FN_CONNECT_SEARCH, 0, arguments, n_arguments)) {
+        return NULL;
+    }
+    hs_py_call_release(&c.call);
+    const hs_status status =
+        hs_connectivity_build(&c.call.among, &c.lists, &c.call.options, &made, &c.call.failure);
+    hs_py_call_acquire(&c.call);
+    return give_parts(&c, status, made, wanted_of(&c), c.call.points.ndim);
+}
+
+PyObject *
+hs_py_overlap(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    node_call     c;
+    hs_index_rows gather;
+    hs_pairs     *rows = NULL;
+    (void)module;
+    if (!take_call(&c, HS_FN_OVERLAP, 3, arguments, n_arguments)) {
+        return NULL;
+    }
+    gather.n = c.call.points.n;
+    gather.offsets = entries_of(c.own[0], NPY_INT64, gather.n + 1, NULL);
+    gather.indices = gather.offsets != NULL ? entries_of(c.own[1], NPY_INT32, -1, &gather.n_indices)
+                                            : NULL;
+    if (gather.indices == NULL ||
+        !take_shifts(c.own[2], gather.n_indices, &gather.shift, &gather.ndim)) {
+        return NULL;
+    }
+    hs_py_call_release(&c.call);
+    const hs_status status = hs_connectivity_overlap(&c.call.points, &gather, &c.lists,
+                                                     &c.call.options, &rows, &c.call.failure);
+    hs_py_call_acquire(&c.call);
+    return give_rows(&c, status, rows, gather.ndim);
+}
+
+PyObject *
+hs_py_intersect(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    node_call    c;
+    hs_half_list half;
+    hs_pairs    *result = NULL;
+    (void)module;
+    if (!take_call(&c, HS_FN_INTERSECT, 3, arguments, n_arguments) ||
+        !take_half(c.own, c.own[2], &half)) {
+        return NULL;
+    }
+    hs_py_call_release(&c.call);
+    const hs_status status = hs_connectivity_intersect(&c.call.points, c.call.among.box, &half,
+                                                       &c.lists, &c.call.options, &result,
+                                                       &c.call.failure);
+    hs_py_call_acquire(&c.call);
+    return give_rows(&c, status, result, half.ndim);
+}
+
+/* A new array, or an exception for a status other than HS_OK; takes the reference. */
+static PyObject *
+checked(PyObject *array, hs_status status, const hs_failure *failure)
+{
+    if (status == HS_OK) {
+        return array;
+    }
+    Py_DECREF(array);
+    return hs_raise(status, failure, NULL);
+}
+
+/* points, p, q -> whether the foot of each is between them. */
+PyObject *
+hs_py_feet_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_points  points;
+    hs_failure failure;
+    (void)module;
+    if (!hs_expect_arguments("feet_between", n_arguments, 3) ||
+        !hs_points_of(arguments[0], "points", &points)) {
+        return NULL;
+    }
+    const double *p = entries_of(arguments[1], NPY_DOUBLE, points.ndim, NULL);
+    const double *q = p != NULL ? entries_of(arguments[2], NPY_DOUBLE, points.ndim, NULL) : NULL;
+    npy_intp      n = (npy_intp)points.n;
+    PyObject     *array = q != NULL ? PyArray_SimpleNew(1, &n, NPY_BOOL) : NULL;
+    if (array == NULL) {
+        return NULL;
+    }
+    const hs_status status =
+        hs_feet_between(&points, p, q, PyArray_DATA((PyArrayObject *)array), &failure);
+    return checked(array, status, &failure);
+}
+
+/* points, low, high -> uint64 keys. */
+PyObject *
+hs_py_morton_keys(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_points  points;
+    hs_failure failure;
+    hs_status  status;
+    (void)module;
+    if (!hs_expect_arguments("morton_keys", n_arguments, 3) ||
+        !hs_points_of(arguments[0], "points", &points)) {
+        return NULL;
+    }
+    const double *low = entries_of(arguments[1], NPY_DOUBLE, points.ndim, NULL);
+    const double *high = low != NULL ? entries_of(arguments[2], NPY_DOUBLE, points.ndim, NULL)
+                                     : NULL;
+    npy_intp      n = (npy_intp)points.n;
+    PyObject     *array = high != NULL ? PyArray_SimpleNew(1, &n, NPY_UINT64) : NULL;
+    if (array == NULL) {
+        return NULL;
+    }
+    uint64_t *keys = PyArray_DATA((PyArrayObject *)array);
+    Py_BEGIN_ALLOW_THREADS
+    status = hs_morton_keys(&points, low, high, keys, &failure);
+    Py_END_ALLOW_THREADS
+    return checked(array, status, &failure);
+}
+
+PyObject *
+hs_py_pair_rows(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    node_call        c;
+    hs_list_rows     rows;
+    hs_connectivity *made = NULL;
+    (void)module;
+    if (!take_call(&c, HS_FN_PAIR_ROWS, 3, arguments, n_arguments) ||
+        !take_rows(c.own, c.lists.n_lists, &rows)) {
+        return NULL;
+    }
+    hs_py_call_release(&c.call);
+    const hs_status status =
+        hs_connectivity_pair(&rows, &c.lists, &c.call.options, &made, &c.call.failure);
+    hs_py_call_acquire(&c.call);
+    return give_parts(&c, status, made, PAIRS_WANTED, rows.ndim);
+}
+
+/* n_nodes, target, place or None. */
+static bool
+take_change(PyObject *n_nodes, PyObject *target, PyObject *places, hs_node_change *change)
+{
+    int64_t     n_lists = 0, n = 0;
+    const void *place = NULL;
+    *change = (hs_node_change){.n_lists = 0};
+    change->n_nodes = entries_of(n_nodes, NPY_INT64, -1, &n_lists);
+    change->target = change->n_nodes != NULL ? entries_of(target, NPY_INT32, -1, &n) : NULL;
+    if (change->target == NULL || !entries_or_none(places, NPY_INT32, n, &place)) {
+        return false;
+    }
+    for (int64_t l = 0; l < n_lists; l++) {
+        const int64_t count = change->n_nodes[l];
+        n = count < 0 || count > n ? -1 : n - count;
+        if (n < 0) {
+            break;
+        }
+    }
+    if (n_lists > INT32_MAX || n != 0) {
+        PyErr_SetString(PyExc_TypeError, "target must have an entry for each node");
+        return false;
+    }
+    change->place = place;
+    change->n_lists = (int32_t)n_lists;
+    return true;
+}
+
+PyObject *
+hs_py_keep_rows(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    node_call      c;
+    hs_node_change change;
+    hs_list_rows   rows;
+    const int64_t *source = NULL;
+    int64_t        n = 0;
+    hs_pairs      *result = NULL;
+    (void)module;
+    if (!take_call(&c, HS_FN_KEEP_ROWS, -1, arguments, n_arguments) ||
+        !take_change(c.own[3], c.own[4], c.own[5], &change) ||
+        !take_rows(c.own, change.n_lists, &rows)) {
+        return NULL;
+    }
+    n = rows.n;
+    if (c.own[6] != Py_None) {
+        source = entries_of(c.own[6], NPY_INT64, -1, &n);
+        if (source == NULL) {
+            return NULL;
+        }
+    }
+    hs_py_call_release(&c.call);
+    const hs_status status =
+        hs_rows_keep(&rows, &change, source, n, &c.call.options, &result, &c.call.failure);
+    hs_py_call_acquire(&c.call);
+    return give_rows(&c, status, result, rows.ndim);
+}
+
+PyObject *
+hs_py_rows_without(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    node_call    c;
+    hs_list_rows rows, without;
+    hs_pairs    *result = NULL;
+    (void)module;
+    if (!take_call(&c, HS_FN_ROWS_WITHOUT, -1, arguments, n_arguments) ||
+        !take_rows(c.own, c.call.integer, &rows) ||
+        !take_rows(c.own + 3, c.call.integer, &without)) {
+        return NULL;
+    }
+    hs_py_call_release(&c.call);
+    const hs_status status =
+        hs_rows_without(&rows, &without, c.call.flag, &c.call.options, &result, &c.call.failure);
+    hs_py_call_acquire(&c.call);
+    return give_rows(&c, status, result, rows.ndim);
+}

@@ -1,0 +1,523 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* py_searches.c: functions of the module that look for pairs and return all of them, or numbers of
+ * them. */
+#include "py_functions.h"
+
+#include "errors.h"
+#include "outputs.h"
+#include "system.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+/* What the core fills for a call, without the GIL. */
+typedef hs_status find_fn(hs_py_call *call, void *found);
+
+static hs_status
+without_gil(hs_py_call *call, find_fn *find, void *found)
+{
+    hs_py_call_release(call);
+    const hs_status status = find(call, found);
+    hs_py_call_acquire(call);
+    hs_py_call_end(call);
+    return status;
+}
+
+/* An array that the core has filled, or has failed to; takes the reference. */
+static PyObject *
+filled(const hs_py_call *call, hs_status status, PyObject *array)
+{
+    if (status != HS_OK) {
+        Py_DECREF(array);
+        return hs_raise(status, &call->failure, &call->options);
+    }
+    return array;
+}
+
+/* ---- pairs and rows ----------------------------------------------------------------------- */
+
+static hs_status
+find_half(hs_py_call *call, void *found)
+{
+    hs_pairs **pairs = found;
+    return call->batch.is_given
+               ? hs_systems_find(&call->points, &call->batch.systems, &call->options, pairs,
+                                 &call->failure)
+               : hs_pairs_find(&call->among, &call->options, pairs, &call->failure);
+}
+
+static hs_status
+find_full(hs_py_call *call, void *found)
+{
+    hs_pairs **rows = found;
+    return call->batch.is_given
+               ? hs_systems_neighbors(&call->points, call->among.queries, &call->batch.systems,
+                                      &call->options, rows, &call->failure)
+               : hs_neighbors_find(&call->among, &call->options, rows, &call->failure);
+}
+
+static hs_status
+find_nearest(hs_py_call *call, void *found)
+{
+    hs_pairs **rows = found;
+    return call->batch.is_given
+               ? hs_systems_nearest(&call->points, call->among.queries, &call->batch.systems,
+                                    call->integer, &call->options, rows, &call->failure)
+               : hs_nearest_find(&call->among, call->integer, &call->options, rows, &call->failure);
+}
+
+PyObject *
+hs_py_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_py_call call;
+    hs_pairs  *pairs = NULL;
+    (void)module;
+    if (!hs_py_call_take(&call, HS_FN_PAIRS, arguments, n_arguments)) {
+        return NULL;
+    }
+    const hs_status status = without_gil(&call, find_half, &pairs);
+    return hs_py_call_pairs(&call, status, pairs);
+}
+
+PyObject *
+hs_py_pairs_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_py_call call;
+    hs_pairs  *pairs = NULL;
+    (void)module;
+    if (!hs_py_call_take(&call, HS_FN_PAIRS_BETWEEN, arguments, n_arguments)) {
+        return NULL;
+    }
+    const hs_status status = without_gil(&call, find_full, &pairs);
+    return hs_py_call_pairs(&call, status, pairs);
+}
+
+PyObject *
+hs_py_neighbors(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_py_call call;
+    hs_pairs  *rows = NULL;
+    (void)module;
+    if (!hs_py_call_take(&call, HS_FN_NEIGHBORS, arguments, n_arguments)) {
+        return NULL;
+    }
+    const hs_status status = without_gil(&call, find_full, &rows);
+    return hs_py_call_table(&call, status, rows);
+}
+
+/* Rows have k entries: what they need is known, and fewer would do. */
+static PyObject *
+raise_memory_of_rows(const hs_failure *failure)
+{
+    char text[320], needed[32], limit[48];
+    hs_format_limit(failure->limit_bytes, limit, sizeof limit);
+    if (failure->expected_bytes > 0.0 && !isinf(failure->expected_bytes)) {
+        hs_format_bytes(failure->expected_bytes, needed, sizeof needed);
+        snprintf(text, sizeof text,
+                 "the result would not fit: %.3g entries (%s), %s%s; use a smaller k, fewer "
+                 "quantities, or fewer queries at a time",
+                 failure->expected_pairs, needed, limit,
+                 hs_took_more(failure) ? " for them and the search" : "");
+    } else {
+        snprintf(text, sizeof text,
+                 "no memory for the search: %s; perhaps a point is so far from the others, or "
+                 "the box so small, that too many images are about as near",
+                 limit);
+    }
+    PyErr_SetString(PyExc_MemoryError, text);
+    return NULL;
+}
+
+PyObject *
+hs_py_nearest(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_py_call call;
+    hs_pairs  *rows = NULL;
+    (void)module;
+    if (!hs_py_call_take(&call, HS_FN_NEAREST, arguments, n_arguments)) {
+        return NULL;
+    }
+    if (call.integer < 1) {
+        hs_py_call_end(&call);
+        PyErr_SetString(PyExc_ValueError, "k must be 1 or more");
+        return NULL;
+    }
+    const hs_status status = without_gil(&call, find_nearest, &rows);
+    return status == HS_ERR_MEMORY ? raise_memory_of_rows(&call.failure)
+                                   : hs_py_call_pairs(&call, status, rows);
+}
+
+/* ---- counts ------------------------------------------------------------------------------- */
+
+static hs_status
+count_all(hs_py_call *call, void *found)
+{
+    int64_t *counts = found;
+    return call->batch.is_given
+               ? hs_systems_count(&call->points, &call->batch.systems, &call->options, counts,
+                                  &call->failure)
+               : hs_pairs_count(&call->among, &call->options, counts, &call->failure);
+}
+
+static hs_status
+count_each(hs_py_call *call, void *found)
+{
+    int64_t *counts = found;
+    return call->batch.is_given
+               ? hs_systems_coordination(&call->points, call->among.queries, &call->batch.systems,
+                                         &call->options, counts, &call->failure)
+               : hs_neighbors_count(&call->among, &call->options, counts, &call->failure);
+}
+
+/* The results of systems that have points stand one behind the other, of so many bytes each: moves
+ * each to the place of its number, the last one first. The rest are zeros. */
+static void
+spread(const hs_batch *batch, char *results, size_t bytes)
+{
+    for (int64_t s = batch->systems.n - 1; batch->number != NULL && s >= 0; s--) {
+        const size_t from = (size_t)s * bytes, to = (size_t)batch->number[s] * bytes;
+        if (to != from) {
+            memcpy(results + to, results + from, bytes);
+            memset(results + from, 0, bytes);
+        }
+    }
+}
+
+/* As without_gil, of results of so many bytes for each number of a batch. */
+static hs_status
+of_systems(hs_py_call *call, find_fn *find, void *found, void *results, size_t bytes)
+{
+    hs_py_call_release(call);
+    const hs_status status = find(call, found);
+    hs_py_call_acquire(call);
+    if (status == HS_OK && call->batch.is_given) {
+        spread(&call->batch, results, bytes);
+    }
+    hs_py_call_end(call);
+    return status;
+}
+
+PyObject *
+hs_py_count_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_py_call call;
+    int64_t    n = 0;
+    (void)module;
+    if (!hs_py_call_take(&call, HS_FN_COUNT_PAIRS, arguments, n_arguments)) {
+        return NULL;
+    }
+    if (!call.batch.is_given) {
+        const hs_status status = without_gil(&call, count_all, &n);
+        return status == HS_OK ? PyLong_FromLongLong(n)
+                               : hs_raise(status, &call.failure, &call.options);
+    }
+    PyObject *counts = hs_batch_zeros(&call.batch, 0, NULL, NPY_INT64);
+    if (counts == NULL) {
+        hs_py_call_end(&call);
+        return NULL;
+    }
+    void *data = PyArray_DATA((PyArrayObject *)counts);
+    return filled(&call, of_systems(&call, count_all, data, data, sizeof(int64_t)), counts);
+}
+
+PyObject *
+hs_py_coordination(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_py_call call;
+    (void)module;
+    if (!hs_py_call_take(&call, HS_FN_COORDINATION, arguments, n_arguments)) {
+        return NULL;
+    }
+    npy_intp  n_rows = (npy_intp)(call.among.queries != NULL ? call.queries.n : call.points.n);
+    PyObject *counts = PyArray_SimpleNew(1, &n_rows, NPY_INT64);
+    if (counts == NULL) {
+        hs_py_call_end(&call);
+        return NULL;
+    }
+    void *data = PyArray_DATA((PyArrayObject *)counts);
+    return filled(&call, without_gil(&call, count_each, data), counts);
+}
+
+/* ---- pairs by distance -------------------------------------------------------------------- */
+
+/* Types and weights, each an array or None. */
+static bool
+take_marks(PyObject *const *given, const char *must, int64_t n, hs_marks *marks)
+{
+    const void *types, *weights;
+    const bool  are_taken = hs_entries_of(given[0], NPY_INT32, 1, n, 0, must, &types) &&
+                           hs_entries_of(given[1], NPY_DOUBLE, 1, n, 0, must, &weights);
+    if (are_taken) {
+        *marks = (hs_marks){types, weights};
+    }
+    return are_taken;
+}
+
+/* edges, last_inclusive, queries, n_types; types and weights of the points and of the queries. */
+static bool
+take_histogram(const hs_py_call *call, hs_histogram *wanted)
+{
+    static const char *const must = "edges, types and weights must be arrays of the expected types "
+                                    "and lengths";
+    const int64_t            n_queries = call->among.queries != NULL ? call->queries.n : 0;
+    const void              *edges;
+    if (!hs_entries_of(call->own[0], NPY_DOUBLE, 1, -1, 0, must, &edges)) {
+        return false;
+    }
+    if (edges == NULL || call->integer < 1 || call->integer > INT32_MAX) {
+        PyErr_SetString(PyExc_ValueError, "edges and a number of types are expected");
+        return false;
+    }
+    *wanted = (hs_histogram){.n_edges = hs_length_of(call->own[0]),
+                             .edges = edges,
+                             .inclusive = call->options.inclusive,
+                             .last_inclusive = call->flag,
+                             .n_types = (int32_t)call->integer};
+    return take_marks(call->own + 4, must, call->points.n, &wanted->of_points) &&
+           take_marks(call->own + 6, must, n_queries, &wanted->of_queries);
+}
+
+static hs_status
+find_histogram(hs_py_call *call, void *found)
+{
+    const hs_histogram *wanted = found;
+    return call->batch.is_given
+               ? hs_systems_histogram(&call->points, call->among.queries, &call->batch.systems,
+                                      &call->options, wanted, &call->failure)
+               : hs_pairs_histogram(&call->among, &call->options, wanted, &call->failure);
+}
+
+/* Counts, or sums where there are weights, of shape (n_types, n_types, n_edges), before these the
+ * systems if there is a batch. */
+PyObject *
+hs_py_histogram(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_py_call   call;
+    hs_histogram wanted;
+    PyObject    *array = NULL;
+    (void)module;
+    if (!hs_py_call_take(&call, HS_FN_HISTOGRAM, arguments, n_arguments)) {
+        return NULL;
+    }
+    if (take_histogram(&call, &wanted)) {
+        npy_intp   shape[3] = {wanted.n_types, wanted.n_types, (npy_intp)wanted.n_edges};
+        const bool sums = wanted.of_points.weights != NULL || wanted.of_queries.weights != NULL;
+        const int  type = sums ? NPY_DOUBLE : NPY_INT64;
+        array = call.batch.is_given ? hs_batch_zeros(&call.batch, 3, shape, type)
+                                    : PyArray_ZEROS(3, shape, type, 0);
+    }
+    if (array == NULL) {
+        hs_py_call_end(&call);
+        return NULL;
+    }
+    void *data = PyArray_DATA((PyArrayObject *)array);
+    if (PyArray_TYPE((PyArrayObject *)array) == NPY_DOUBLE) {
+        wanted.sums = data;
+    } else {
+        wanted.counts = data;
+    }
+    const size_t bytes =
+        (size_t)wanted.n_types * (size_t)wanted.n_types * (size_t)wanted.n_edges * sizeof(int64_t);
+    return filled(&call, of_systems(&call, find_histogram, &wanted, data, bytes), array);
+}
+
+/* ---- clusters ----------------------------------------------------------------------------- */
+
+PyObject *
+hs_py_clusters(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_py_call  call;
+    const void *core;
+    int64_t     n_clusters = 0;
+    PyObject   *result = NULL;
+    (void)module;
+    if (!hs_py_call_take(&call, HS_FN_CLUSTERS, arguments, n_arguments) ||
+        !hs_entries_of(call.own[0], NPY_BOOL, 1, call.points.n, 0,
+                       "core is no array of a bool for each point", &core)) {
+        return NULL;
+    }
+    npy_intp  n = (npy_intp)call.points.n;
+    PyObject *labels = PyArray_SimpleNew(1, &n, NPY_INT64);
+    PyObject *winding = call.flag ? PyArray_SimpleNew(1, &n, NPY_UINT8) : Py_NewRef(Py_None);
+    if (labels != NULL && winding != NULL) {
+        int64_t *to = PyArray_DATA((PyArrayObject *)labels);
+        uint8_t *bits = call.flag ? PyArray_DATA((PyArrayObject *)winding) : NULL;
+        hs_py_call_release(&call);
+        const hs_status status = hs_clusters_find(&call.among, &call.options, core, to, bits,
+                                                  &n_clusters, &call.failure);
+        hs_py_call_acquire(&call);
+        result = status == HS_OK ? Py_BuildValue("LOO", (long long)n_clusters, labels, winding)
+                                 : hs_raise(status, &call.failure, &call.options);
+    }
+    Py_XDECREF(labels);
+    Py_XDECREF(winding);
+    return result;
+}
+
+/* ---- pairs that are known ----------------------------------------------------------------- */
+
+/* What is said of a pair, and not of a point. */
+static PyObject *
+raise_of_pair(hs_status status, hs_py_call *call)
+{
+    const long long row = (long long)call->failure.row;
+    if (row >= 0 && status == HS_ERR_SHIFT_RANGE) {
+        PyErr_Format(PyExc_OverflowError,
+                     "pair %lld: a point lies too many box vectors away: they are counted up to "
+                     "2**51, and S holds 2**31; wrap the points first",
+                     row);
+    } else if (row >= 0 && status == HS_ERR_FAR) {
+        PyErr_Format(PyExc_OverflowError, "pair %lld: the vector is too long for float64", row);
+    } else if (row >= 0 && status == HS_ERR_ARGUMENT) {
+        PyErr_Format(PyExc_ValueError,
+                     "pair %lld: i and j must be numbers of points, and S whole numbers below "
+                     "2**62, 0 along axes that do not repeat",
+                     row);
+    } else {
+        return hs_raise(status, &call->failure, &call->options);
+    }
+    return NULL;
+}
+
+/* i, j, S or None. */
+static bool
+take_numbers(const hs_py_call *call, hs_pair_numbers *pairs)
+{
+    static const char *const        must = "i and j must be int64 arrays of one length",
+                             *const must_be_rows =
+                                 "S must be an int64 array of a row for each pair";
+    PyObject *const *own = call->own + 1;
+    const void      *i, *j, *shift;
+    if (!hs_entries_of(own[0], NPY_INT64, 1, -1, 0, must, &i)) {
+        return false;
+    }
+    pairs->n = hs_length_of(own[0]);
+    if (!hs_entries_of(own[1], NPY_INT64, 1, pairs->n, 0, must, &j) ||
+        !hs_entries_of(own[2], NPY_INT64, 2, pairs->n, call->points.ndim, must_be_rows, &shift)) {
+        return false;
+    }
+    if (i == NULL || j == NULL) {
+        PyErr_SetString(PyExc_TypeError, must);
+        return false;
+    }
+    pairs->i = i;
+    pairs->j = j;
+    pairs->shift = shift;
+    return true;
+}
+
+PyObject *
+hs_py_measure(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_py_call      call;
+    hs_pair_numbers pairs;
+    hs_pairs       *measured = NULL;
+    (void)module;
+    if (!hs_py_call_take(&call, HS_FN_MEASURE, arguments, n_arguments) ||
+        !take_numbers(&call, &pairs)) {
+        return NULL;
+    }
+    if (call.among.points == NULL || call.options.want & HS_WANT_J) {
+        PyErr_SetString(PyExc_TypeError, "measure takes points, and quantities of d D S");
+        return NULL;
+    }
+    if (arguments[9] == Py_None && pairs.n >= HS_POINTS_FOR_THREADS) { /* however few points */
+        call.options.threads = -hs_default_threads();
+    }
+    hs_py_call_release(&call);
+    const hs_status status =
+        hs_measure(&call.points, call.among.box, &pairs, &call.options, &measured, &call.failure);
+    hs_py_call_acquire(&call);
+    return status != HS_OK ? raise_of_pair(status, &call)
+                           : hs_py_call_pairs(&call, status, measured);
+}
+
+/* ---- what would be done, and what was done ------------------------------------------------ */
+
+/* A new dictionary, or NULL. */
+static PyObject *
+plan_as_dict(const hs_plan *plan)
+{
+    const int d = plan->ndim;
+    return Py_BuildValue(
+        "{sisisNsNsNsssLsLsNsNsNsNsNsNsLsdsiss}", "ndim", d, "n_periodic", plan->n_periodic,
+        "aligned", PyBool_FromLong(plan->aligned), "reduced", PyBool_FromLong(plan->reduced),
+        "keeps_originals", PyBool_FromLong(plan->keeps_originals), "algorithm",
+        hs_algorithm_names[plan->algorithm], "n_searches", (long long)plan->n_searches, "n_cells",
+        (long long)plan->n_cells, "all_pairs", PyBool_FromLong(plan->all_pairs), "sparse",
+        PyBool_FromLong(plan->sparse), "shape", hs_tuple_of_integers(plan->shape, d), "cell_sizes",
+        hs_tuple_of_reals(plan->cell_size, d), "reach", hs_tuple_of_integers(plan->reach, d),
+        "images", hs_tuple_of_integers(plan->images, d), "stencil_rows",
+        (long long)plan->stencil_rows, "expected_pairs", plan->expected_pairs, "threads",
+        plan->threads, "kernel", plan->kernel);
+}
+
+/* The bytes that a search took, by purpose; a new dictionary, or NULL. */
+static PyObject *
+bytes_as_dict(const hs_counters *counters)
+{
+    static const char *const names[HS_PURPOSE_END] = {
+        [HS_FOR_POINTS] = "points",         [HS_FOR_ORIGINALS] = "originals",
+        [HS_FOR_WRAPS] = "wraps",           [HS_FOR_ORDER] = "order",
+        [HS_FOR_CELLS] = "cells",           [HS_FOR_STENCIL] = "stencil",
+        [HS_FOR_CANDIDATES] = "candidates", [HS_FOR_INDICES] = "indices",
+        [HS_FOR_DISTANCES] = "distances",   [HS_FOR_VECTORS] = "vectors",
+        [HS_FOR_SHIFTS] = "shifts",         [HS_FOR_SORTING] = "sorting",
+        [HS_FOR_SUPPORTS] = "supports",
+    };
+    PyObject *dict = PyDict_New();
+    for (int p = 0; dict != NULL && p < HS_PURPOSE_END; p++) {
+        if (!hs_dict_put(dict, names[p], PyLong_FromLongLong(counters->bytes[p]))) {
+            Py_CLEAR(dict);
+        }
+    }
+    return dict;
+}
+
+/* What is planned, and what was counted, if it was. */
+static PyObject *
+dictionary_of(const hs_plan *plan, const hs_counters *counted)
+{
+    PyObject *dict = plan_as_dict(plan);
+    PyObject *counters =
+        dict == NULL || counted == NULL
+            ? NULL
+            : Py_BuildValue("{sNsLsLsLsLsLsLsLsL}", "bytes", bytes_as_dict(counted), "bytes_peak",
+                            (long long)counted->bytes_peak, "groups", (long long)counted->groups,
+                            "candidates", (long long)counted->candidates, "pairs",
+                            (long long)counted->pairs, "ambiguous", (long long)counted->ambiguous,
+                            "by_float64", (long long)counted->by_float64, "by_double_word",
+                            (long long)counted->by_double_word, "by_integers",
+                            (long long)counted->by_integers);
+    if (counted != NULL && (counters == NULL || PyDict_Update(dict, counters) < 0)) {
+        Py_CLEAR(dict);
+    }
+    Py_XDECREF(counters);
+    return dict;
+}
+
+PyObject *
+hs_py_explain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_py_call  call;
+    hs_plan     plan;
+    hs_counters counters = {0};
+    hs_pairs   *pairs = NULL;
+    (void)module;
+    if (!hs_py_call_take(&call, HS_FN_EXPLAIN, arguments, n_arguments)) {
+        return NULL;
+    }
+    hs_py_call_release(&call);
+    hs_among all = call.among; /* what is left out changes no plan */
+    all.selection = NULL;
+    hs_status status = hs_plan_make(&all, &call.options, &plan, &call.failure);
+    if (status == HS_OK && call.flag) {
+        call.options.counters = &counters;
+        status = hs_pairs_find(&call.among, &call.options, &pairs, &call.failure);
+    }
+    hs_py_call_acquire(&call);
+    hs_pairs_free(pairs);
+    return status == HS_OK ? dictionary_of(&plan, call.flag ? &counters : NULL)
+                           : hs_raise(status, &call.failure, &call.options);
+}

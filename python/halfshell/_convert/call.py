@@ -1,0 +1,686 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The arguments that all searches share, as the core takes them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from halfshell._convert.arrays import as_array, as_real_array, in_order
+from halfshell._convert.foreign import is_a, kind_of, shown, told, whole_number
+from halfshell._convert.lengths import as_number, check_ascending, check_lengths
+from halfshell._convert.memory import refuse_large
+from halfshell._convert.objects import SYMBOLS
+from halfshell._convert.options import as_choice, as_flag
+from halfshell._convert.points import Labels, Points
+from halfshell._errors import shorten
+from halfshell._settings import Settings, current
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from halfshell._convert.types import FloatArray, Reach, Selection, Systems
+
+#: Rules by which two radii or supports make the reach of a pair, in the order of the core.
+RULES = ("sum", "mean", "max", "min", "gather", "scatter")
+#: Those by which i may reach j, and j not i.
+DIRECTED = ("gather", "scatter")
+#: Supports do not add up.
+RULES_OF_SUPPORTS = ("max", "min", *DIRECTED)
+
+_LEAST_HALVED = 2.0**-1021  # halves lose no bit
+_NO_PAIRS = -1.0  # the cutoff of two types that form none
+
+
+class Call:
+    """One search: its points, queries and cutoff, which pairs count, and how it is made."""
+
+    __slots__ = (
+        "bar",
+        "cells",
+        "cutoff",
+        "inclusive",
+        "indices",
+        "points",
+        "progress",
+        "queries",
+        "reach",
+        "rule",
+        "selection",
+        "settings",
+        "shells",
+        "system_cutoffs",
+        "threads",
+    )
+
+    bar: Any  # to be closed at the end, or None
+    cells: Any  # of the core, in place of points and box; or None
+    inclusive: bool
+    progress: Any
+    threads: int | None
+    points: Points
+    queries: Points | None
+    cutoff: float  # the largest distance of any pair, or infinity
+    shells: FloatArray | None  # several cutoffs, ascending
+    system_cutoffs: FloatArray | None  # one for each system
+    rule: str | None
+    reach: Reach | None  # of each pair, by radii, supports or types
+    selection: Selection | None  # which pairs count
+    indices: npt.NDArray[np.int64] | None
+    settings: Settings
+
+    # ---- as the core takes it --------------------------------------------------------------
+
+    @property
+    def array(self) -> npt.NDArray[Any]:
+        return self.points.positions
+
+    @property
+    def asking(self) -> npt.NDArray[Any] | None:
+        return None if self.queries is None else self.queries.positions
+
+    @property
+    def vectors(self) -> FloatArray | None:
+        """The box of all systems, or any of its shape where each has its own."""
+        box = self.points.box
+        return np.eye(box.shape[1]) if box is not None and box.ndim == 3 else box
+
+    @property
+    def bits(self) -> int:
+        axes = self.points._axes
+        if isinstance(axes, np.ndarray):
+            return (1 << int(self.array.shape[1])) - 1
+        return int(axes)
+
+    @property
+    def core(self) -> tuple[Any, ...]:
+        """The first ten arguments of every search of the core."""
+        if self.cells is not None and self.reach is None:
+            return (self.cells, self.cutoff, None, 0, *self.rest)
+        return (self.array, self.cutoff, self.vectors, self.bits, *self.rest)
+
+    @property
+    def rest(self) -> tuple[Any, ...]:
+        """The last six of these."""
+        set_ = self.settings
+        return (
+            self.inclusive, set_.precision, set_.kernel, set_.memory_limit, self.progress,
+            self.threads,
+        )  # fmt: skip
+
+    @property
+    def pairing(self) -> Any:
+        """The reach of each pair, with which pairs count; None for one cutoff of all."""
+        return self.reach if self.selection is None else (self.reach, self.selection)
+
+    @property
+    def systems(self) -> Systems | None:
+        points, queries = self.points, self.queries
+        if points.batch is None:
+            return None
+        boxes = points.box if points.box is not None and points.box.ndim == 3 else None
+        axes = points._axes if isinstance(points._axes, np.ndarray) else None
+        return (
+            points.batch, self.system_cutoffs, boxes, None if queries is None else queries.batch,
+            axes,
+        )  # fmt: skip
+
+    def run(self, search: Callable[..., Any], *own: Any) -> Any:
+        """Call a search of the core, with a bar that goes away at its end."""
+        try:
+            return search(*self.core, *own)
+        finally:
+            if self.bar is not None:
+                self.bar.close()
+
+    def refuse(self, function: str, **reasons: str) -> None:
+        """ValueError for what is given and means nothing there, with why.
+
+        reasons: of "queries", "batch", "reach", "selection", "indices", "shells", "types".
+        """
+        given = {
+            "queries": self.queries is not None,
+            "batch": self.points.batch is not None,
+            "radii": self.reach is not None and self.reach[3] is None and self.reach[8] is None,
+            "supports": self.reach is not None and self.reach[8] is not None,
+            "types": self.reach is not None and self.reach[3] is not None,
+            "selection": self.selection is not None,
+            "indices": self.indices is not None,
+            "shells": self.shells is not None,
+        }
+        for name, reason in reasons.items():
+            words = ("radii", "supports", "types") if name == "reach" else (name,)
+            for word in words:
+                if given[word]:
+                    what = _WORDS.get(word, word)
+                    raise ValueError(f"{function} cannot be combined with {what}: {reason}")
+
+
+_WORDS = {
+    "selection": "groups, exclude or min_distance",
+    "shells": "several cutoffs",
+    "types": "a cutoff for each pair of types",
+}
+
+
+def take(
+    points: Any,
+    cutoff: Any,
+    queries: Any = None,
+    box: Any = None,
+    periodic: Any = None,
+    rule: Any = None,
+    exclude: Any = None,
+    min_distance: Any = None,
+    indices: Any = None,
+    inclusive: Any = True,
+    threads: Any = None,
+    progress: Any = None,
+    *,
+    directed: bool = False,
+    several: str = "",
+    by_reach: bool = True,
+) -> Call:
+    """What a call has for the shared arguments, converted and checked once.
+
+    directed: the result has a direction, so that the rule may have one. several: what a function
+    makes of several cutoffs: "shells" or "counts"; nothing: they are refused. by_reach: whether
+    radii, supports and types say how far pairs reach.
+    """
+    try:
+        call = Call()
+        call.settings = current()
+        call.cells = None
+        if getattr(type(points), "_is_cell_list", False):
+            call.cells, threads = points._cells, points._threads if threads is None else threads
+            points = points.points
+        ndim = 3
+        if queries is not None and type(points) in (list, tuple) and not points:
+            ndim = Points._of(queries, "queries").positions.shape[1]
+        call.points = Points._of(points, "points", box, periodic, ndim=ndim)
+        call.queries = _queries_of(queries, call.points)
+        call.inclusive = inclusive if type(inclusive) is bool else as_flag(inclusive, "inclusive")
+        call.threads = call.settings.threads if threads is None else threads
+        call.bar = call.progress = None
+        if progress is not None and progress is not False:
+            _take_progress(call, progress)
+        call.rule = rule
+        call.reach = call.shells = call.system_cutoffs = None
+        if by_reach:
+            _take_cutoff(call, cutoff, directed or call.queries is not None, several)
+        else:
+            call.cutoff = cutoff
+        call.selection = _selection(call, exclude, min_distance)
+        call.indices = None
+        if indices is not None:
+            _take_indices(call, indices)
+        return call
+    except Exception as error:
+        shorten(error)
+        raise
+
+
+def _take_progress(call: Call, progress: Any) -> None:
+    from halfshell._convert.progress import ProgressBar, as_progress  # few calls need it
+
+    call.progress = as_progress(progress)
+    if isinstance(call.progress, ProgressBar):
+        call.bar = call.progress
+
+
+# ---- queries, and rows of some points ------------------------------------------------------
+
+
+def _queries_of(queries: Any, points: Points) -> Points | None:
+    if queries is None:
+        return None
+    found = Points._of(queries, "queries", ndim=points.positions.shape[1])
+    asking, array = found.positions, points.positions
+    if asking.shape[1] != array.shape[1]:
+        raise ValueError(
+            "queries and points must have the same number of columns, got shapes "
+            f"{asking.shape} and {array.shape}"
+        )
+    if (found.batch is None) != (points.batch is None):
+        one, other = ("points", "queries") if found.batch is None else ("queries", "points")
+        raise ValueError(f"{one} have a batch, and {other} have none: both need one")
+    if found.box is not None and not same_boxes(found, points):
+        raise ValueError(
+            "queries bring a box that is not that of points: give arrays, and box and periodic"
+        )
+    return found
+
+
+def same_boxes(one: Points, other: Points) -> bool:
+    """Whether the same axes repeat by the same vectors."""
+    if one.box is None or other.box is None:
+        return one.box is other.box
+    mine, theirs = one.periodic, other.periodic
+    if not one.tells_periodic:
+        mine = theirs
+    assert mine is not None and theirs is not None
+    if one.box.shape != other.box.shape or not np.array_equal(mine, theirs):
+        return False
+    return np.array_equal(one.box[mine], other.box[mine]) if mine.ndim == 1 else np.array_equal(
+        one.box, other.box
+    )
+
+
+def _take_indices(call: Call, indices: Any) -> None:
+    if call.queries is not None:
+        raise ValueError("indices select rows of the points: do not give queries as well")
+    if call.settings.precision == "single":
+        raise ValueError("indices cannot be combined with precision 'single'")
+    from halfshell._convert.listed import as_point_numbers  # few calls need it
+
+    call.indices = as_point_numbers(indices, "indices", len(call.points), "points")
+
+
+# ---- the cutoff, and the reach of each pair ------------------------------------------------
+
+
+def _take_cutoff(call: Call, cutoff: Any, directed: bool, several: str) -> None:
+    """The cutoff of a call, be it a number, several, one a system, or one for each two types."""
+    both = [one for one in (call.points, call.queries) if one is not None]
+    has_radii = any(one.radii is not None for one in both)
+    has_supports = any(one.supports is not None for one in both)
+    if has_radii and has_supports:
+        raise ValueError("radii and supports cannot be given together")
+    if call.rule is not None:
+        rules = RULES_OF_SUPPORTS if has_supports else RULES
+        call.rule = as_choice(call.rule, "rule", rules)
+        if not (has_radii or has_supports):
+            raise ValueError("rule needs radii or supports")
+        if call.rule in DIRECTED and not directed:
+            raise ValueError(
+                f"rule {call.rule!r} has a direction, and these pairs have none: use neighbors, "
+                "which has a row for each point"
+            )
+    if type(cutoff) is float or type(cutoff) is int:
+        call.cutoff = as_number(cutoff, "cutoff")
+    elif is_a(cutoff, Mapping):
+        _take_table(call, *_table_of_pairs(cutoff, call))
+    elif cutoff is None:
+        if not has_radii:
+            hint = "with supports it is the extent" if has_supports else "None needs radii"
+            raise TypeError(f"cutoff must be a number, got NoneType: {hint}")
+        call.cutoff = math.inf
+    else:
+        _take_cutoffs(call, cutoff, several)
+    if call.reach is not None and (has_radii or has_supports):
+        what = "radii" if has_radii else "supports"
+        raise ValueError(f"a cutoff for each pair of types cannot be combined with {what}")
+    if call.shells is not None and (has_radii or has_supports) and several != "counts":
+        what = "radii" if has_radii else "supports"
+        raise ValueError(f"several cutoffs cannot be combined with {what}")
+    if has_radii:
+        _take_radii(call, cutoff)
+    elif has_supports:
+        _take_supports(call)
+
+
+def _take_cutoffs(call: Call, cutoff: Any, several: str) -> None:
+    """An array: a number, one a system, ascending ones, or a table of types."""
+    has_batch = call.points.batch is not None
+
+    def check(shape: tuple[int, ...]) -> None:
+        if len(shape) == 1 and not has_batch and not several:
+            raise TypeError(
+                "cutoff must be a number; several are for count_pairs and the letter k of pairs, "
+                f"a radius for each point is one of Points(radii=...), got shape {shape}"
+            )
+        if len(shape) == 1 and not has_batch and shape[0] == 0 and several != "counts":
+            raise ValueError(
+                f"several cutoffs must have shape (k,), with one at least, got {shape}"
+            )
+        if len(shape) > 2 or (len(shape) == 2 and shape[0] != shape[1]):
+            raise ValueError(
+                "cutoff must be a number, have shape (t, t), one for each pair of types, or be a "
+                f"dict, got shape {shape}"
+            )
+
+    array = as_real_array(cutoff, "cutoff", "be a number", check)
+    if array.ndim == 0:
+        call.cutoff = float(array)
+        return
+    refuse_large(8 * array.size, array, "cutoff")
+    values = in_order(array, np.float64)
+    if array.ndim == 2:
+        _take_table(call, *_table_of_types(values, call))
+    elif has_batch:
+        call.system_cutoffs, call.cutoff = values, 0.0
+        box, axes = call.points.box, call.points._axes
+        for own in (box if box is not None and box.ndim == 3 else None, axes):
+            if isinstance(own, np.ndarray) and len(own) != len(values):
+                raise ValueError(
+                    "box and cutoff must be given for the same number of systems, got "
+                    f"{len(own)} and {len(values)}"
+                )
+    else:
+        check_lengths(values, "cutoff")
+        check_ascending(values, "cutoff", "several cutoffs")
+        call.shells = values
+        call.cutoff = float(values[-1]) if len(values) else 0.0
+
+
+def _take_radii(call: Call, cutoff: Any) -> None:
+    """A reach by radii, within the cutoff as a further limit."""
+    rule = "sum" if call.rule is None else call.rule
+    if cutoff is not None and not (math.isfinite(call.cutoff) and call.cutoff >= 0.0):
+        raise ValueError(
+            f"cutoff must be finite and not negative, or None, got {call.cutoff}"
+        )
+    own, asking = _sides(call, rule, "radii")
+    for radii in (own, asking):
+        if rule == "mean" and radii is not None:
+            for k in np.flatnonzero((radii > 0.0) & (radii < _LEAST_HALVED)):
+                raise ValueError(
+                    "radii must be 0 or at least 2**-1021 for the rule 'mean', got "
+                    f"radii[{k}] = {radii[k]}"
+                )
+    if call.system_cutoffs is None and cutoff is None:
+        call.cutoff = math.inf
+    call.reach = reach_by_radii(rule, own, asking)
+
+
+def _take_supports(call: Call) -> None:
+    """A reach by supports, of which the cutoff is the extent."""
+    rule = "max" if call.rule is None else call.rule
+    if call.system_cutoffs is not None:
+        raise ValueError("supports have one extent: cutoff must be a number")
+    if not (math.isfinite(call.cutoff) and call.cutoff >= 0.0):
+        raise ValueError(f"cutoff must be finite and not negative, got {call.cutoff}")
+    own, asking = _sides(call, rule, "supports")
+    call.reach = reach_by_supports(rule, own, asking, call.cutoff + 0.0)
+    call.cutoff = math.inf
+
+
+def _sides(call: Call, rule: str, what: str) -> tuple[Any, Any]:
+    """The radii or supports of points and of queries that a rule goes by; None for the others."""
+    own = getattr(call.points, what)
+    if call.queries is None:
+        return own, None
+    asking = getattr(call.queries, what)
+    needed = {"gather": ("queries",), "scatter": ("points",)}.get(rule, ("points", "queries"))
+    for name, values in (("points", own), ("queries", asking)):
+        if name in needed and values is None:
+            if len(needed) == 2:
+                raise ValueError(
+                    f"{name} have no {what}: both sets need them, or rule 'gather' or 'scatter', "
+                    "which goes by those of queries or of points"
+                )
+            raise ValueError(f"rule {rule!r} goes by the {what} of {name}, which have none")
+    return (
+        own if "points" in needed else None,
+        asking if "queries" in needed else None,
+    )
+
+
+def reach_by_radii(
+    rule: str, radii: Any, query_radii: Any, extent: float | None = None
+) -> Reach:
+    """Of radii that are known to be right. extent: how many times they count, once if None."""
+    return RULES.index(rule), radii, query_radii, None, None, None, None, None, extent
+
+
+def reach_by_supports(rule: str, supports: Any, query_supports: Any, extent: float) -> Reach:
+    """Of supports whose shapes and entries are known to be right."""
+    return RULES.index(rule), None, None, None, None, None, supports, query_supports, extent
+
+
+def reach_by_types(types: Any, query_types: Any, cutoffs: FloatArray) -> Reach:
+    """Of types that are known to be rows of this table; the core needs no rule."""
+    return 0, None, None, types, query_types, cutoffs, None, None, None
+
+
+# ---- cutoffs by type -----------------------------------------------------------------------
+
+
+class _Kinds(NamedTuple):
+    """The types of both sets as numbers of one list of names, if they are names."""
+
+    own: npt.NDArray[np.int32]
+    asking: npt.NDArray[np.int32] | None
+    names: tuple[str, ...] | None
+
+
+def _take_table(
+    call: Call, own: npt.NDArray[Any], asking: npt.NDArray[Any] | None, table: FloatArray
+) -> None:
+    if len(table) == 0:
+        table = np.full((1, 1), _NO_PAIRS)  # of no points: the core wants one type at least
+    call.cutoff = max(float(table.max(initial=0.0)), 0.0)
+    call.reach = reach_by_types(own, asking, table)
+
+
+def kinds_of(call: Call, reason: str) -> _Kinds:
+    """The types of both sets. reason: what needs them."""
+    for name, one in (("points", call.points), ("queries", call.queries)):
+        if one is not None and one._kinds is None:
+            raise ValueError(f"{reason} needs types, and {name} have none: Points(types=...)")
+    own, asking, names = _together(call, "_kinds", "types")
+    assert own is not None
+    return _Kinds(own, asking, names)
+
+
+def _together(
+    call: Call, attribute: str, name: str
+) -> tuple[Any, Any, tuple[str, ...] | None]:
+    """Numbers of both sets, of which the same name has the same one; names, if they are some."""
+    own: Labels | None = getattr(call.points, attribute)
+    asking: Labels | None = None if call.queries is None else getattr(call.queries, attribute)
+    if call.queries is not None and (own is None) != (asking is None):
+        one, other = ("points", "queries") if asking is None else ("queries", "points")
+        raise ValueError(f"{one} have {name}, and {other} have none: both need them")
+    if own is None:
+        return None, None, None
+    if asking is None:
+        return own.numbers, None, own.names
+    if (own.names is None) != (asking.names is None):
+        if len(own.numbers) and len(asking.numbers):
+            raise TypeError(f"{name} of points and queries must both be numbers or both be names")
+        names = own.names if len(own.numbers) else asking.names
+        return own.numbers, asking.numbers, names
+    if own.names is None or own.names == asking.names:
+        return own.numbers, asking.numbers, own.names
+    assert asking.names is not None
+    every = sorted({*own.names, *asking.names})
+    places = {one: k for k, one in enumerate(every)}
+    mapped = [
+        np.array([places[one] for one in labels.names or ()], labels.numbers.dtype)[labels.numbers]
+        if len(labels.numbers) else labels.numbers
+        for labels in (own, asking)
+    ]  # fmt: skip
+    return mapped[0], mapped[1], tuple(every)
+
+
+def _table_of_types(
+    table: FloatArray, call: Call
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any] | None, FloatArray]:
+    """A symmetric table with a row for each type."""
+    for a, b in np.argwhere(~(np.isfinite(table) & (table >= 0.0))):
+        raise ValueError(
+            f"cutoff must be finite and not negative, got cutoff[{a}, {b}] = {table[a, b]}"
+        )
+    for a, b in np.argwhere(table != table.T):
+        raise ValueError(
+            f"cutoff must be symmetric, got cutoff[{a}, {b}] = {table[a, b]} and "
+            f"cutoff[{b}, {a}] = {table[b, a]}"
+        )
+    own, asking, _ = kinds_of(call, "a table of cutoffs")
+    for name, types in (("points", own), ("queries", asking)):
+        if types is None:
+            continue
+        for k in np.flatnonzero(types >= len(table)):
+            raise ValueError(
+                f"types must be less than {len(table)}, the types that cutoff is given for, got "
+                f"type {types[k]} of {name}[{k}]"
+            )
+    return own, asking, table
+
+
+def _table_of_pairs(
+    cutoff: Mapping[Any, Any], call: Call
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any] | None, FloatArray]:
+    """A table of the types that the keys name and, in the last row, of all others.
+
+    A key with fewer stars wins. Types that no key names pair as "*" and "*" do, or not at all.
+    """
+    own, asking, names = kinds_of(call, "a dict of cutoffs")
+    present = [types for types in (own, asking) if types is not None and len(types)]
+    lengths = _lengths(cutoff, names, present) if present else {}
+    rows = sorted({part for pair in lengths for part in pair if part != "*"})
+    place = {part: row for row, part in enumerate(rows)}
+    last = len(rows)
+    table = np.full((last + 1, last + 1), lengths.get(("*", "*"), _NO_PAIRS))
+    set_by: dict[tuple[int, int], float] = {}
+    for part, row in place.items():
+        length = lengths.get(("*", part))
+        if length is None:
+            continue
+        for other in range(last + 1):
+            both = min(row, other), max(row, other)
+            named = other < last and (min(part, rows[other]), max(part, rows[other])) in lengths
+            if not named and set_by.setdefault(both, length) != length:
+                raise ValueError(
+                    f"cutoff[{(rows[both[0]], '*')}] and cutoff[{(rows[both[1]], '*')}] differ, "
+                    f"and both are of the pair {(rows[both[0]], rows[both[1]])}: give it a key"
+                )
+            table[row, other] = table[other, row] = length
+    for (a, b), length in lengths.items():
+        if a != "*":
+            table[place[a], place[b]] = table[place[b], place[a]] = length
+    numbers = [names.index(part) for part in rows] if names is not None else rows
+    return _places(own, numbers), None if asking is None else _places(asking, numbers), table
+
+
+def _places(types: npt.NDArray[Any], numbers: list[int]) -> npt.NDArray[np.int32]:
+    """Where each is among numbers, which ascend; their count for all that are not there."""
+    if not numbers:
+        return np.zeros(len(types), np.int32)
+    known = np.array(numbers)
+    places = np.minimum(np.searchsorted(known, types), len(known) - 1)
+    return np.where(known[places] == types, places, len(known)).astype(np.int32)
+
+
+def _lengths(
+    cutoff: Mapping[Any, Any], names: tuple[str, ...] | None, present: list[npt.NDArray[Any]]
+) -> dict[tuple[Any, Any], float]:
+    """The cutoff of each pair of types, in one order of the two; "*" comes first."""
+    try:
+        items = list(cutoff.items())
+    except MemoryError:
+        raise
+    except Exception as error:
+        raise TypeError(
+            f"cutoff cannot be read: {kind_of(cutoff)} raised {kind_of(error)}: {told(error)}"
+        ) from error
+    lengths: dict[tuple[Any, Any], float] = {}
+    for key, value in items:
+        where = f"cutoff[{shown(key)}]"
+        if not is_a(key, tuple) or len(key) != 2:
+            raise TypeError(
+                f"cutoff must have pairs of types as keys, such as ('Si', 'O'), got {shown(key)}"
+            )
+        length = as_number(value, where)
+        if not (math.isfinite(length) and length >= 0.0):
+            raise ValueError(f"{where} must be finite and not negative, got {length}")
+        one, other = (_type_of(part, where, names) for part in key)
+        if "*" in (one, other):
+            pair = ("*", other if one == "*" else one)
+        else:
+            pair = min((one, other), (other, one))
+        if lengths.setdefault(pair, length) != length:
+            raise ValueError(
+                f"{where} = {length} contradicts another cutoff of the same two, {lengths[pair]}"
+            )
+    if names is None:
+        return lengths
+    # Elements that no point is of need no row.
+    return {pair: length for pair, length in lengths.items() if {*pair} <= {"*", *names}}
+
+
+def _type_of(part: Any, where: str, names: tuple[str, ...] | None) -> Any:
+    """A part of a key: "*", a number, or a name."""
+    if is_a(part, str):
+        name = str.__str__(part)
+        if name == "*":
+            return name
+        if names is None:
+            raise ValueError(f"{where} has names, and types are numbers")
+        if name not in names and name not in SYMBOLS:
+            raise ValueError(f"{where}: {shown(part)} is neither an element nor a type of a point")
+        return name
+    number = whole_number(part, "cutoff")
+    if number is None or is_a(number, bool):
+        raise TypeError(f"{where} must have types or names as its key, got {shown(part)}")
+    if names is not None:
+        raise ValueError(f"{where} has numbers, and types are names, such as {names[0]!r}")
+    if not 0 <= number < 2**31 - 1:
+        raise ValueError(f"{where} must have types from 0 to {2**31 - 2}, got {shown(part)}")
+    return number
+
+
+# ---- which pairs count ---------------------------------------------------------------------
+
+
+def _selection(call: Call, exclude: Any, min_distance: Any) -> Selection | None:
+    groups, asking_groups, _ = _together(call, "_groups", "groups")
+    least = 0.0
+    if min_distance is not None:
+        least = as_number(min_distance, "min_distance")
+        if not (math.isfinite(least) and least >= 0.0):
+            raise ValueError(f"min_distance must be finite and not negative, got {least}")
+        if least > 0.0 and call.settings.precision == "single":
+            raise ValueError("min_distance cannot be combined with precision 'single'")
+    labels = asking_labels = excluded = None
+    within = 0
+    if exclude is not None:
+        number = None if is_a(exclude, (bool, np.bool_)) else whole_number(exclude, "exclude")
+        if number is not None:
+            within = number
+            labels, asking_labels = _labels(call, number)
+        else:
+            excluded = _excluded(exclude, call)
+    if groups is labels is excluded is None and least == 0.0 and exclude is None:
+        return None
+    return groups, asking_groups, labels, asking_labels, None, within, excluded, least
+
+
+def _labels(call: Call, within: int) -> tuple[Any, Any]:
+    for name, one in (("points", call.points), ("queries", call.queries)):
+        if one is not None and one._labels is None:
+            raise ValueError(
+                f"a whole number as exclude needs labels, and {name} have none: Points(labels=...)"
+            )
+    if not 0 <= within < 2**63:
+        raise ValueError(f"exclude must be from 0 on and below 2**63, got {within}")
+    own, asking, names = _together(call, "_labels", "labels")
+    if names is not None and within:
+        raise ValueError(f"exclude must be 0 where labels are names, got {within}")
+    return own, asking
+
+
+def _excluded(exclude: Any, call: Call) -> npt.NDArray[np.int64]:
+    """Numbers of two points, or of a query and a point, (k, 2)."""
+    from halfshell._convert.listed import as_point_numbers  # few calls need it
+
+    array = as_array(exclude, "exclude", "be pairs of numbers, (k, 2), or a whole number")
+    if array.shape == (0,):
+        array = np.empty((0, 2), np.int64)
+    if array.ndim != 2 or array.shape[1] != 2:
+        hint = ": one pair is [[i, j]]" if array.shape == (2,) else ""
+        if array.ndim == 1 and len(array) == len(call.points):
+            hint = ": labels are those of Points(labels=...), with a whole number as exclude"
+        raise (TypeError if array.ndim == 0 else ValueError)(
+            "exclude must be pairs of numbers, shape (k, 2), or a whole number, got "
+            + (shown(exclude) if array.ndim == 0 else f"shape {array.shape}{hint}")
+        )
+    n = len(call.points)
+    asking = (n, "points") if call.queries is None else (len(call.queries), "queries")
+    first = as_point_numbers(array[:, 0], "exclude[:, 0]", *asking)
+    second = as_point_numbers(array[:, 1], "exclude[:, 1]", n, "points")
+    return np.ascontiguousarray(np.stack([first, second], axis=1))

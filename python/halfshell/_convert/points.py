@@ -1,0 +1,933 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`Points`: coordinates, and what is known of each point."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from halfshell import _core
+from halfshell._convert.arrays import as_array, as_real_array, in_order, one_each
+from halfshell._convert.foreign import attribute, is_a, kind_of, shown
+from halfshell._convert.lengths import as_number, check_lengths
+from halfshell._convert.memory import refuse_large
+from halfshell._convert.objects import (
+    SYMBOLS,
+    Parts,
+    parts_of,
+    periodic_of,
+    vectors_of,
+    without_placeholder,
+)
+from halfshell._convert.options import as_list
+from halfshell._errors import brief, shorten
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from halfshell._convert.types import ArrayLike, BoxLike, FloatArray, PeriodicLike, PointsLike
+
+MAX_DIM = 8
+MAX_POINTS = 2**31 - 1
+MOST_AXES_OF_SUPPORTS = 3
+LENGTHS_AND_ANGLES = (
+    "six numbers may be lengths and angles: use Box.from_dimensions((a, b, c, alpha, ...))"
+)
+_LARGEST_RADIUS = 2.0**1022  # sums of two are finite
+_SHOWN_ROWS = 5
+_FIELDS = ("radii", "types", "supports", "groups", "labels", "weights", "batch")
+
+
+class Labels(NamedTuple):
+    """A number for each point, and what the numbers stand for, if they were given as names."""
+
+    numbers: npt.NDArray[Any]
+    names: tuple[str, ...] | None = None
+
+    def __getitem__(self, places: Any) -> Any:
+        return Labels(self.numbers[places], self.names)
+
+    def as_given(self) -> npt.NDArray[Any]:
+        if self.names is None:
+            return self.numbers
+        return np.array(self.names, np.str_)[self.numbers] if self.names else np.array([], np.str_)
+
+
+class Points:
+    """Points and what is known of each, for `points` and `queries` of all functions.
+
+    Parameters
+    ----------
+    positions : array_like of float, shape (n, d)
+        Coordinates, any length unit, 1 <= d <= 8. float32 and float64 values are used as they are;
+        integers, booleans and float16 are converted exactly or refused. Points may lie anywhere,
+        even outside the box. ``[]`` counts as shape (0, 3). An object of another library brings its
+        box, its periodicity and its elements as `types`: ``ase.Atoms``, a group or ``Universe`` of
+        MDAnalysis (with the box of the present frame), a ``Structure`` or ``Molecule`` of pymatgen,
+        a frame of mdtraj, a system of freud, a data frame with columns x, y and z. A list of these
+        is stacked.
+    box : float, array_like of float, shape (d,), (d, d) or (s, d, d), or Box, optional
+        One length for all edges, a length for each, or edge vectors as rows, in the unit of
+        `positions`; with `batch` also vectors for each system. None: open space. Rows of axes that
+        are not periodic may be anything finite, such as zero.
+    periodic : bool or sequence of bool, shape (d,) or (s, d), optional
+        Which box vectors are periodic. Default: all with a box, none without.
+    radii : array_like of float, shape (n,), or dict, optional
+        A radius for each point, in the unit of `positions`; finite, not negative, at most 2**1022;
+        or for each type, such as ``{"C": 0.76, "O": 0.66}``. The cutoff of a pair is then what
+        `rule` makes of its two radii, and at most `cutoff`.
+    types : array_like of int or str, shape (n,), optional
+        The type of each point, for cutoffs by type and counts by type. Numbers are from 0 on.
+    supports : array_like of float, shape (n, d, d), optional
+        An ellipsoid around each point, as a symmetric positive definite matrix H, in the inverse
+        unit of `positions`; d <= 3. `cutoff` is then the extent: a pair with the vector D counts if
+        ``|H @ D| <= cutoff`` for the matrices that `rule` says. Not with `radii`.
+    groups : array_like of int or str, shape (n,), optional
+        Only pairs of two points of the same group count.
+    labels : array_like of int or str, shape (n,), optional
+        What a whole number as `exclude` goes by, such as numbers of residues.
+    weights : array_like of float, shape (n,), optional
+        Weights for histograms; a pair counts as the product of its two.
+    batch : array_like of int, shape (n,), optional
+        The system that each point belongs to, ascending from 0: only points of one system are
+        pairs. `stack` makes it from a list.
+
+    Attributes
+    ----------
+    positions, radii, types, supports, groups, labels, weights, batch : ndarray or None
+        What was given; read-only.
+    box : ndarray of float64, shape (d, d) or (s, d, d), or None
+        Box vectors as rows; read-only.
+    periodic : ndarray of bool, shape (d,) or (s, d), or None
+        Which of them repeat; None without a box.
+    n_systems : int
+        The number of systems; 1 without `batch`.
+
+    Raises
+    ------
+    TypeError
+        If something has the wrong kind, or `positions` brings what is given again.
+    ValueError
+        If a shape or a value is wrong: the message says where, and what is allowed.
+
+    Notes
+    -----
+    Points are immutable: arrays are copied, converted and checked once.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> points = hs.Points([[0.0, 0.0], [1.5, 0.0], [9.5, 0.0]], box=10.0, radii=[0.5, 1.0, 0.5])
+    >>> hs.pairs(points, None)[0].tolist()
+    [0, 0]
+    >>> points
+    Points(n=3, d=2, float64, box 10 x 10 periodic, radii from 0.5 to 1)
+      0    0  0.5
+      1.5  0  1
+      9.5  0  0.5
+    >>> hs.pairs(points.replace(radii=None), 0.6)[0].tolist()
+    [0]
+    """
+
+    __slots__ = (
+        "_axes",  # bits of the axes that repeat, or uint8 (s,); 0 without a box
+        "_box",  # float64 (d, d) or (s, d, d), or None
+        "_elements",  # atomic numbers of an object that brought them, until they are looked at
+        "_groups",  # Labels or None, as the next two
+        "_labels",
+        "_types",
+        "batch",
+        "positions",
+        "radii",
+        "supports",
+        "tells_periodic",  # False: what it came from does not say which axes repeat
+        "weights",
+    )
+
+    #: In a notebook.
+    _shown = ("positions", "box", "periodic", *_FIELDS)
+
+    positions: npt.NDArray[Any]
+    radii: FloatArray | None
+    supports: FloatArray | None
+    weights: FloatArray | None
+    batch: npt.NDArray[np.int64] | None
+    tells_periodic: bool
+    _axes: Any
+    _box: FloatArray | None
+    _elements: npt.NDArray[np.int32] | None
+    _types: Labels | None
+    _groups: Labels | None
+    _labels: Labels | None
+
+    def __init__(
+        self,
+        positions: PointsLike,
+        *,
+        box: BoxLike | None = None,
+        periodic: PeriodicLike | None = None,
+        radii: ArrayLike | Mapping[Any, float] | None = None,
+        types: npt.ArrayLike | None = None,
+        supports: ArrayLike | None = None,
+        groups: npt.ArrayLike | None = None,
+        labels: npt.ArrayLike | None = None,
+        weights: ArrayLike | None = None,
+        batch: npt.ArrayLike | None = None,
+    ) -> None:
+        try:
+            found = Points._of(positions, "positions", box, periodic, batch)
+            for name in Points.__slots__:
+                setattr_(self, name, getattr(found, name))
+            n, d = self.positions.shape
+            own = {"types": types, "groups": groups, "labels": labels}
+            for name, values in own.items():
+                if values is None:
+                    continue
+                if name == "types" and (self._types is not None or self._elements is not None):
+                    raise ValueError(_twice("types", positions))
+                setattr_(self, f"_{name}", _as_labels(values, name, n, name == "types"))
+            if supports is not None:
+                if radii is not None:
+                    raise ValueError("radii and supports cannot be given together")
+                setattr_(self, "supports", as_supports(supports, n, d))
+            if radii is not None:
+                setattr_(self, "radii", self._as_radii(radii))
+            if weights is not None:
+                setattr_(self, "weights", _as_weights(weights, n))
+            self._own_all()
+        except Exception as error:
+            shorten(error)
+            raise
+
+    # ---- how they are made -----------------------------------------------------------------
+
+    @staticmethod
+    @brief
+    def _of(
+        values: Any,
+        name: str = "points",
+        box: Any = None,
+        periodic: Any = None,
+        batch: Any = None,
+        ndim: int = 3,
+    ) -> Points:
+        """Points of what users give for them; those of an array share its memory."""
+        if type(values) is Points:
+            for what, given in (("box", box), ("periodic", periodic), ("batch", batch)):
+                if given is not None:
+                    raise ValueError(_twice(what, values))
+            return values
+        if type(values) in (list, tuple) and len(values) and _is_system(values[0], name):
+            if batch is not None:
+                raise ValueError("a list of systems brings its batch: leave batch out")
+            stacked = Points.stack(values, name)
+            if box is not None or periodic is not None:
+                stacked = stacked._with_box(box, periodic, values[0])
+            return stacked
+        points = Points.__new__(Points)
+        for slot in Points.__slots__:
+            setattr_(points, slot, None)
+        setattr_(points, "_axes", 0)
+        plain = NotImplemented if batch is not None else _core.scene(values, None, box, periodic)
+        if plain is not NotImplemented:
+            for slot, part in zip(("positions", "_box", "_axes"), plain[1:], strict=True):
+                setattr_(points, slot, part)
+            return points
+        parts = parts_of(values, name)
+        setattr_(points, "tells_periodic", True)
+        array = as_points(values if parts is None else parts.positions, name, ndim)
+        setattr_(points, "positions", array)
+        if batch is not None:
+            setattr_(points, "batch", _as_batch(batch, len(array)))
+        if parts is None:
+            points._take_box(box, periodic)
+        else:
+            points._take_parts(parts, name, values, box, periodic)
+        return points
+
+    @classmethod
+    def stack(cls, systems: Iterable[PointsLike], name: str = "systems") -> Points:
+        """Points of several systems, one behind the other, each with its own box.
+
+        Parameters
+        ----------
+        systems : sequence
+            Anything that `positions` may be, or Points, each one system without `batch`. All have
+            as many dimensions, and know the same of their points.
+
+        Returns
+        -------
+        Points
+            With `batch`, and if any of them has a box, one for each.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> both = hs.Points.stack([[[0.0], [1.0]], hs.Points([[0.0], [4.5]], box=5.0)])
+        >>> hs.count_pairs(both, 1.0).tolist()
+        [1, 1]
+        """
+        every = [
+            cls._of(one, f"{name}[{k}]") for k, one in enumerate(as_list(systems, name, "points"))
+        ]
+        if not every:
+            return cls(np.empty((0, 3)), batch=np.empty(0, np.int64))
+        ndim = {one.positions.shape[1] for one in every if len(one)} or {3}
+        if len(ndim) > 1:
+            raise ValueError(
+                f"{name} must have the same number of columns, got {sorted(ndim)}"
+            )
+        d = ndim.pop()
+        for k, one in enumerate(every):
+            if one.batch is not None:
+                raise ValueError(f"{name}[{k}] must be one system, and has a batch")
+        fields: dict[str, Any] = {}
+        for field in _FIELDS[:-1]:
+            columns = [getattr(one, field) for one in every]
+            known = [column is not None for column in columns]
+            if any(known) and not all(known[k] for k, one in enumerate(every) if len(one)):
+                raise ValueError(
+                    f"{name}[{known.index(True)}] has {field}, and {name}[{known.index(False)}] "
+                    "has none: all must know the same"
+                )
+            if any(known):
+                fields[field] = np.concatenate([c for c in columns if c is not None])
+        if any(one.box is not None for one in every):
+            fields["box"] = np.array(
+                [np.eye(d) if one._box is None else one._box for one in every]
+            )
+            fields["periodic"] = flags_of(np.array([one._axes for one in every], np.uint8), d)
+        positions = np.concatenate([one.positions.reshape(len(one), d) for one in every])
+        return cls(
+            positions, batch=np.repeat(np.arange(len(every)), [len(one) for one in every]), **fields
+        )
+
+    def _take_box(self, box: Any, periodic: Any) -> None:
+        """Box and periodicity of points that bring none."""
+        ndim = self.positions.shape[1]
+        boxes, axes = as_boxes(box, periodic, ndim, self.batch is not None)
+        setattr_(self, "_box", boxes)
+        setattr_(self, "_axes", axes)
+
+    def _take_parts(self, parts: Parts, name: str, owner: Any, box: Any, periodic: Any) -> None:
+        """What an object knows; `box` and `periodic` are those of the call."""
+        tells = parts.box is not None or parts.periodic is not None
+        if tells and box is not None:
+            raise ValueError(_twice("box", owner))
+        if parts.periodic is not None and periodic is not None:
+            raise ValueError(_twice("periodic", owner))
+        if not tells:
+            self._take_box(box, periodic)
+        elif self.batch is not None:
+            raise ValueError(f"{name} of type {kind_of(owner)} are one system: leave batch out")
+        else:
+            self._take_own_box(parts, name, owner, periodic)
+        if parts.types is None:
+            return
+        if parts.are_elements:
+            one_each(f"{name}.numbers", len(self))(parts.types.shape)
+            setattr_(self, "_elements", parts.types)
+        else:
+            names = as_array(parts.types, f"elements of {name}", "hold names")
+            if names.size and as_names(names) is not None:
+                known = _as_labels(names, f"elements of {name}", len(self), are_types=True)
+                setattr_(self, "_types", known)
+
+    def _take_own_box(self, parts: Parts, name: str, owner: Any, periodic: Any) -> None:
+        ndim = self.positions.shape[1]
+        try:
+            told = periodic if parts.periodic is None else parts.periodic
+            bits = as_periodic_bits(told, ndim, default=parts.periodic is None)
+            arrays = attribute(owner, "arrays", name)
+            is_pdb = is_a(arrays, dict) and "residuenames" in arrays
+            rows = None if parts.box is None else vectors_of(parts.box, "box", ndim)
+            if rows is not None:
+                rows = without_placeholder(as_array(rows, "box"), name, is_pdb) if bits else None
+            if rows is not None:
+                setattr_(self, "_box", as_box(rows, ndim))
+                setattr_(self, "_axes", bits)
+                setattr_(self, "tells_periodic", told is not None)
+        except (TypeError, ValueError, OverflowError) as error:
+            kinds = (TypeError, OverflowError, ValueError)
+            kind = next(one for one in kinds if isinstance(error, one))
+            raise kind(f"the box of {name}: {error}") from error
+
+    def _with_box(self, box: Any, periodic: Any, owner: Any) -> Points:
+        if self._box is not None:
+            raise ValueError(_twice("box" if box is not None else "periodic", owner))
+        return self.replace(box=box, periodic=periodic)
+
+    def _own_arrays(self, with_positions: bool = True) -> None:
+        """Copies that do not change."""
+        for name in ("positions", "_box", "_axes", "radii", "supports", "weights", "batch"):
+            array = getattr(self, name)
+            if is_a(array, np.ndarray) and (with_positions or name != "positions"):
+                array = np.array(array, order="C")
+                array.flags.writeable = False
+                setattr_(self, name, array)
+        for name in ("_types", "_groups", "_labels"):
+            kept = getattr(self, name)
+            if kept is not None:
+                kept.numbers.flags.writeable = False
+
+    def _own_all(self) -> None:
+        """The same, of finite coordinates in a box that is one."""
+        self._own_arrays()
+        refuse_infinite(self.positions, "positions")
+        if self._box is not None:
+            rows = self._box.reshape(-1, *self._box.shape[-2:])
+            bits = np.atleast_1d(self._axes).tolist()
+            count = max(len(rows), len(bits)) if len(rows) else 0
+            for s in range(count):
+                try:
+                    vectors = np.ascontiguousarray(rows[min(s, len(rows) - 1)])
+                    _core.box_measure(vectors, bits[min(s, len(bits) - 1)])
+                except ValueError as error:
+                    if self._box.ndim == 2:
+                        raise
+                    raise ValueError(f"{error}\nin system {s}") from None
+
+    # ---- what they tell --------------------------------------------------------------------
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    @property
+    def _scene(self) -> tuple[npt.NDArray[Any], FloatArray | None, int]:
+        """Positions, box vectors and bits of those that repeat, of one system."""
+        assert self.batch is None
+        return self.positions, self._box, self._axes
+
+    @property
+    def box(self) -> FloatArray | None:
+        """Box vectors as rows, shape (d, d) or (s, d, d); None in open space."""
+        return self._box
+
+    @property
+    def periodic(self) -> npt.NDArray[np.bool_] | None:
+        """Which box vectors repeat, shape (d,) or (s, d); None in open space."""
+        if self._box is None:
+            return None
+        flags = flags_of(np.atleast_1d(np.asarray(self._axes, np.uint8)), self.positions.shape[1])
+        return flags if np.ndim(self._axes) else flags[0]
+
+    @property
+    def types(self) -> npt.NDArray[Any] | None:
+        """Numbers or names, shape (n,)."""
+        kinds = self._kinds
+        return None if kinds is None else kinds.as_given()
+
+    @property
+    def groups(self) -> npt.NDArray[Any] | None:
+        """Numbers or names, shape (n,)."""
+        return None if self._groups is None else self._groups.as_given()
+
+    @property
+    def labels(self) -> npt.NDArray[Any] | None:
+        """Numbers or names, shape (n,)."""
+        return None if self._labels is None else self._labels.as_given()
+
+    @property
+    def _kinds(self) -> Labels | None:
+        """The types as numbers from 0 on, and their names in ascending order, if they have some."""
+        if self._types is None and self._elements is not None:
+            numbers, places = np.unique(self._elements, return_inverse=True)
+            symbols = np.array(SYMBOLS)[numbers]
+            order = np.argsort(symbols)
+            ranks = np.empty(len(order), np.int32)
+            ranks[order] = np.arange(len(order))
+            named = Labels(ranks[places.reshape(-1)], tuple(symbols[order].tolist()))
+            setattr_(self, "_types", named)
+        return self._types
+
+    @property
+    def n_systems(self) -> int:
+        """The number of systems: those that have a box, or up to the largest number."""
+        if self.batch is None:
+            return 1
+        own: Any
+        for own in (self._box, self._axes):
+            if is_a(own, np.ndarray) and own.ndim in (1, 3):
+                return len(own)
+        return 1 + int(self.batch[-1]) if len(self.batch) else 0
+
+    def __getitem__(self, places: Any) -> Points:
+        """Some of the points: a slice, a mask, or numbers of points, with a batch ascending."""
+        if is_a(places, (int, np.integer)):
+            raise TypeError(f"Points[...] takes a slice, a mask or numbers, got {shown(places)}")
+        chosen = self.positions[places]
+        if chosen.ndim != 2 or chosen.shape[1] != self.positions.shape[1]:
+            raise TypeError("Points[...] takes a slice, a mask or numbers of points")
+        fields = {
+            name: None if getattr(self, name) is None else getattr(self, name)[places]
+            for name in _FIELDS
+        }
+        return Points(chosen, box=self._box, periodic=self.periodic, **fields)
+
+    def replace(self, **changes: Any) -> Points:
+        """Points with something else instead, or with None for nothing.
+
+        Parameters
+        ----------
+        **changes
+            What the constructor takes.
+
+        Returns
+        -------
+        Points
+        """
+        fields = {
+            "positions": self.positions, "box": self._box, "periodic": self.periodic,
+            **{name: getattr(self, name) for name in _FIELDS},
+        }  # fmt: skip
+        for name in changes:
+            if name not in fields:
+                raise TypeError(f"Points have no {name!r}: they have {', '.join(fields)}")
+        if "box" in changes:
+            fields["periodic"] = None
+        return Points(**{**fields, **changes})
+
+    def _over(self, positions: npt.NDArray[Any]) -> Points:
+        """These points, with the same positions in other memory that does not change."""
+        other = Points.__new__(Points)
+        for name in Points.__slots__:
+            setattr_(other, name, getattr(self, name))
+        setattr_(other, "positions", positions)
+        other._own_arrays(with_positions=False)
+        return other
+
+    def __reduce__(self) -> tuple[Any, tuple[dict[str, Any]]]:
+        state = {
+            "positions": self.positions, "box": self._box, "periodic": self.periodic,
+            **{name: getattr(self, name) for name in _FIELDS},
+        }  # fmt: skip
+        return _restored, (state,)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError("Points are immutable: replace() gives others")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError("Points are immutable: replace() gives others")
+
+    def __repr__(self) -> str:
+        n, d = self.positions.shape
+        words = [f"n={n}, d={d}, {self.positions.dtype}"]
+        if self._box is not None:
+            words.append(self._shown_box())
+        if self.radii is not None and n:
+            words.append(f"radii from {self.radii.min():g} to {self.radii.max():g}")
+        kinds = self._kinds
+        if kinds is not None and n:
+            few = kinds.names and len(kinds.names) <= 6
+            count = len(np.unique(kinds.numbers))
+            words.append("types " + " ".join(kinds.names or ()) if few else f"{count} types")
+        words += [
+            name for name in ("supports", "groups", "labels", "weights")
+            if getattr(self, name) is not None
+        ]  # fmt: skip
+        if self.batch is not None:
+            words.append(f"{self.n_systems} systems")
+        columns = [self.positions[:_SHOWN_ROWS, axis] for axis in range(d)]
+        columns += [
+            getattr(self, name)[:_SHOWN_ROWS]
+            for name in ("radii", "types")
+            if getattr(self, name) is not None
+        ]
+        text = [
+            [f"{value:g}" if is_a(value, np.floating) else str(value) for value in column]
+            for column in columns
+        ]
+        widths = [max(map(len, column), default=0) for column in text]
+        rows = [
+            "  " + "  ".join(map(str.ljust, row, widths)).rstrip()
+            for row in zip(*text, strict=True)
+        ]
+        more = ["  ..."] if n > _SHOWN_ROWS else []
+        return "\n".join([f"Points({', '.join(words)})", *rows, *more])
+
+    def _repr_html_(self) -> str:
+        from halfshell import _show  # few calls need it
+
+        return _show.html(self)
+
+    def _shown_box(self) -> str:
+        box, d = self._box, self.positions.shape[1]
+        assert box is not None
+        if box.ndim == 3:
+            return f"{len(box)} boxes"
+        lengths = np.diag(box)
+        size = (
+            " x ".join(f"{length:g}" for length in lengths)
+            if np.array_equal(box, np.diag(lengths)) else f"of {d} vectors"
+        )  # fmt: skip
+        if np.ndim(self._axes) or self._axes != (1 << d) - 1:
+            return f"box {size} partly periodic"
+        return f"box {size} periodic"
+
+    # ---- columns ---------------------------------------------------------------------------
+
+    def _as_radii(self, values: Any) -> FloatArray:
+        n = len(self)
+        if is_a(values, Mapping):
+            values = self._radii_by_type(values)
+        array = as_real_array(values, "radii", check_shape=one_each("radii", n))
+        if array.dtype != np.float64:
+            refuse_large(8 * array.size, array, "radii")
+        radii = in_order(array, np.float64)
+        if n and not (radii.min() >= 0.0 and radii.max() <= _LARGEST_RADIUS):
+            check_lengths(radii, "radii")
+            for k in np.flatnonzero(radii > _LARGEST_RADIUS):
+                raise ValueError(f"radii must be at most 2**1022, got radii[{k}] = {radii[k]}")
+        return radii
+
+    def _radii_by_type(self, values: Mapping[Any, Any]) -> FloatArray:
+        kinds = self._kinds
+        if kinds is None:
+            raise ValueError("radii by type need types")
+        lengths = {key: as_number(value, f"radii[{shown(key)}]") for key, value in values.items()}
+        every = range(1 + int(kinds.numbers.max(initial=-1)))
+        present = set(np.unique(kinds.numbers).tolist())
+        table = np.zeros(len(every))
+        for number in every:
+            name = number if kinds.names is None else kinds.names[number]
+            if number in present and name not in lengths and "*" not in lengths:
+                raise ValueError(
+                    f"radii must have a radius for each type, and have none for {name!r}"
+                )
+            table[number] = lengths.get(name, lengths.get("*", 0.0))
+        radii: FloatArray = table[kinds.numbers]
+        return radii
+
+
+setattr_ = object.__setattr__
+_core.know("Points", Points)
+
+
+def _restored(state: dict[str, Any]) -> Points:
+    return Points(**state)
+
+
+def _is_system(value: Any, name: str) -> bool:
+    """Whether the first of a list is a set of points of its own, and no point."""
+    if type(value) in (list, tuple):
+        row: Any = value[0] if len(value) else None
+        return type(row) is np.ndarray or (
+            type(row) in (list, tuple)
+            and not (len(row) and type(row[0]) in (list, tuple, np.ndarray))
+        )
+    if type(value) is np.ndarray:
+        return value.ndim == 2
+    return type(value) is Points or parts_of(value, name) is not None
+
+
+def _twice(what: str, owner: Any) -> str:
+    kind = "Points" if type(owner) is Points else f"points of type {kind_of(owner)}"
+    return f"{kind} bring their own {what}: leave {what} out, or give arrays"
+
+
+# ---- positions, boxes, periodicity ---------------------------------------------------------
+
+
+@brief
+def as_points(values: Any, name: str = "points", ndim: int = 3) -> npt.NDArray[Any]:
+    """Coordinates of shape (n, d); a list without elements counts as n = 0, d = `ndim`."""
+
+    def check(shape: tuple[int, ...]) -> None:
+        if shape != (0,) and (len(shape) != 2 or not 1 <= shape[1] <= MAX_DIM):
+            raise ValueError(
+                f"{name} must have shape (n, d) with 1 <= d <= {MAX_DIM}, got {shape}"
+                f"{_hint_of_shape(shape, name)}"
+            )
+        if shape[0] > MAX_POINTS:
+            raise OverflowError(f"fewer than 2**31 {name} can be searched, got {shape[0]}")
+
+    if type(values) not in (np.ndarray, list, tuple):
+        try:
+            parts = parts_of(values, name)
+        except Exception as error:
+            shorten(error)
+            raise
+        if parts is not None:
+            if parts.box is not None:
+                raise ValueError(
+                    f"{name} must be an array: a {kind_of(values)} brings a box, for which there "
+                    "is no place here"
+                )
+            values = parts.positions
+    array = as_real_array(values, name, check_shape=check)
+    return np.empty((0, ndim)) if array.shape == (0,) else array
+
+
+def refuse_infinite(array: npt.NDArray[Any], name: str) -> None:
+    """ValueError, with the place, for coordinates that are not finite."""
+    for k, axis in np.argwhere(~np.isfinite(array))[:1]:
+        raise ValueError(f"{name} must be finite, got {name}[{k}, {axis}] = {array[k, axis]}")
+
+
+def _hint_of_shape(shape: tuple[int, ...], name: str) -> str:
+    """What may be meant by points of this shape, if it is clear."""
+    if len(shape) == 2 and 1 <= shape[0] <= MAX_DIM < shape[1]:
+        return f": one row for each point, as in {name}.T"
+    if len(shape) == 3:
+        return f": several systems are a list of arrays, as in Points.stack(list({name}))"
+    if len(shape) == 1:
+        return f": one point is {name}[None, :], points on a line are {name}[:, None]"
+    return ""
+
+
+@brief
+def as_box(values: Any, ndim: int) -> FloatArray:
+    """Box vectors as the rows of a float64 array (ndim, ndim).
+
+    values: rows, lengths, the length of all edges, or a Box.
+    """
+
+    def check(shape: tuple[int, ...]) -> None:
+        if shape not in ((), (ndim,), (ndim, ndim)):
+            hint = f": {LENGTHS_AND_ANGLES}" if shape == (6,) else ""
+            if shape == (ndim * ndim,):
+                hint = f": one row for each vector, as in reshape({ndim}, {ndim})"
+            if len(shape) == 3:
+                hint = ": a box for each system needs Points with a batch"
+            raise ValueError(
+                f"box must have shape ({ndim},) or ({ndim}, {ndim}), or be one length, for points "
+                f"in {ndim} dimensions, got {shape}{hint}"
+            )
+
+    array = as_real_array(vectors_of(values, "box", ndim), "box", "be lengths or vectors", check)
+    if array.ndim == 2:
+        return in_order(array, np.float64)
+    if array.ndim == 1:
+        return np.diag(array.astype(np.float64))
+    if is_a(values, (bool, np.bool_)):
+        raise TypeError(f"box must be lengths or vectors, got {values}; see periodic")
+    return np.diag(np.full(ndim, array, np.float64))
+
+
+def as_periodic_bits(values: Any, ndim: int, default: bool) -> int:
+    """Which axes repeat, as an integer with bit l set for box vector l."""
+    if values is None:
+        return (1 << ndim) - 1 if default else 0
+    if is_a(values, (bool, np.bool_)):
+        return (1 << ndim) - 1 if values else 0
+    if is_a(values, (str, bytes)):
+        raise TypeError(f"periodic must be a bool or {ndim} bools, got {shown(values)}")
+    array = as_array(values, "periodic")
+    if array.shape not in ((), (ndim,)) and array.dtype.kind in "biu":
+        raise ValueError(f"periodic must be a bool or {ndim} bools, got shape {array.shape}")
+    _check_bools(array, f"be a bool or {ndim} bools", values)
+    if array.shape == ():
+        return (1 << ndim) - 1 if array else 0
+    return sum(1 << axis for axis in range(ndim) if array[axis])
+
+
+def as_boxes(
+    box: Any, periodic: Any, ndim: int, has_batch: bool
+) -> tuple[FloatArray | None, int | npt.NDArray[np.uint8]]:
+    """Vectors and bits of the axes that repeat, of all systems or of each one."""
+    rows: FloatArray | None = None
+    if box is not None:
+        rows = _as_many_boxes(box, ndim) if has_batch else None
+        rows = as_box(box, ndim) if rows is None else rows
+        periodic = periodic_of(box, periodic, ndim)
+    axes: int | npt.NDArray[np.uint8]
+    many = None
+    if has_batch and periodic is not None and not is_a(periodic, (bool, str, bytes)):
+        many = as_array(periodic, "periodic")
+    if many is not None and many.ndim == 2:
+        axes = _as_many_bits(many, ndim)
+        if rows is not None and rows.ndim == 3 and len(rows) != len(axes):
+            raise ValueError(
+                "box and periodic must be given for the same number of systems, got "
+                f"{len(rows)} and {len(axes)}"
+            )
+    else:
+        axes = as_periodic_bits(periodic, ndim, default=box is not None)
+    if box is None:
+        if np.any(axes):
+            raise ValueError("periodic needs a box: give box, or leave periodic out")
+        return None, 0
+    return rows, axes
+
+
+def as_own_box(box: Any, periodic: Any, ndim: int) -> tuple[FloatArray | None, int]:
+    """Vectors and bits of the axes that repeat, of one system."""
+    rows, axes = as_boxes(box, periodic, ndim, has_batch=False)
+    return rows, int(axes)
+
+
+@brief
+def as_box_alone(box: Any, periodic: Any) -> tuple[int, FloatArray | None, int]:
+    """Dimensions, box vectors and periodic bits for points that come later.
+
+    The box says how many dimensions there are, or else `periodic`; 3 if neither does.
+    """
+    counts = [3]
+
+    def check_box(shape: tuple[int, ...]) -> None:
+        if len(shape) > 2 or len(set(shape)) > 1 or not all(1 <= d <= MAX_DIM for d in shape):
+            raise ValueError(
+                f"box must have shape (d,) or (d, d) with 1 <= d <= {MAX_DIM}, or be one length, "
+                f"got {shape}"
+            )
+        counts[:0] = shape
+
+    if box is not None:
+        as_real_array(vectors_of(box), "box", "be lengths or vectors", check_box)
+    if len(counts) == 1 and periodic is not None and not is_a(periodic, (str, bytes)):
+        axes = as_array(periodic, "periodic").shape
+        counts[:0] = axes if len(axes) == 1 and 1 <= axes[0] <= MAX_DIM else ()
+    ndim = counts[0]
+    vectors = None if box is None else as_box(box, ndim)
+    periodic = periodic_of(box, periodic, ndim)
+    return ndim, vectors, as_periodic_bits(periodic, ndim, default=box is not None)
+
+
+def _as_many_boxes(box: Any, ndim: int) -> FloatArray | None:
+    """Vectors of each system, or None for those of all."""
+    array = as_real_array(vectors_of(box, "box", ndim), "box", "be lengths or vectors")
+    if array.ndim != 3:
+        return None
+    if array.shape[1:] != (ndim, ndim):
+        raise ValueError(
+            f"box must have shape ({ndim},) or ({ndim}, {ndim}), or one for each system "
+            f"(s, {ndim}, {ndim}), for points in {ndim} dimensions, got {array.shape}"
+        )
+    refuse_large(8 * array.size, array, "box")
+    return in_order(array, np.float64)
+
+
+def _as_many_bits(flags: npt.NDArray[Any], ndim: int) -> npt.NDArray[np.uint8]:
+    if flags.shape[1] != ndim:
+        raise ValueError(
+            f"periodic must be a bool, {ndim} bools, or these for each system, (s, {ndim}), "
+            f"got shape {flags.shape}"
+        )
+    _check_bools(flags, "hold bools", flags.dtype)
+    bits: npt.NDArray[np.uint8] = (flags != 0) @ (1 << np.arange(ndim)).astype(np.uint8)
+    return np.ascontiguousarray(bits.astype(np.uint8))
+
+
+def _check_bools(array: npt.NDArray[Any], must: str, got: Any) -> None:
+    if array.dtype.kind != "b" and not (
+        array.dtype.kind in "iu" and bool(((array == 0) | (array == 1)).all())
+    ):
+        raise TypeError(f"periodic must {must}, got {shown(got)}")
+
+
+def flags_of(bits: npt.NDArray[np.uint8], ndim: int) -> npt.NDArray[np.bool_]:
+    """Bit l of each number as entry l of its row.
+
+    Not by shifts of a table: where memory is refused, NumPy 2.4 crashes in loops that broadcast.
+    """
+    rows = np.unpackbits(bits[:, None], axis=1, count=ndim, bitorder="little")
+    return rows.view(np.bool_)
+
+
+# ---- what is known of each point -----------------------------------------------------------
+
+
+def as_names(array: npt.NDArray[Any]) -> npt.NDArray[np.str_] | None:
+    """An array of strings as NumPy's own; None for what holds something else."""
+    if array.dtype.kind == "T" or (
+        array.dtype.kind == "O" and array.size and all(is_a(one, str) for one in array.flat)
+    ):
+        return array.astype(np.str_)
+    return array if array.dtype.kind == "U" else None
+
+
+def _as_labels(values: Any, name: str, n: int, are_types: bool = False) -> Labels:
+    """Whole numbers, or names, which are numbered in ascending order."""
+    array = as_array(values, name, "hold integers or names")
+    names = as_names(array)
+    one_each(name, n)(array.shape)
+    if names is not None and is_a(values, (list, tuple)):  # NumPy makes names of numbers
+        for place, one in enumerate(values):
+            if not is_a(one, str):
+                raise TypeError(
+                    f"{name} must be all integers or all names, got {name}[{place}] = {shown(one)}"
+                )
+    if names is not None:
+        every, numbers = np.unique(names, return_inverse=True)
+        kind = np.int32 if are_types else np.int64
+        return Labels(numbers.reshape(-1).astype(kind), tuple(every.tolist()))
+    if array.dtype.kind not in "iu" and n:
+        raise TypeError(f"{name} must hold integers or names, got dtype {array.dtype}")
+    array = array.copy()  # it may change meanwhile
+    if are_types:
+        for k in np.flatnonzero((array < 0) | (array >= 2**31 - 1)):
+            raise ValueError(
+                f"types must be from 0 on and below 2**31 - 1, got types[{k}] = {array[k]}"
+            )
+        return Labels(np.ascontiguousarray(array, np.int32))
+    if array.dtype == np.uint64:
+        for k in np.flatnonzero(array >= np.uint64(2**63)):
+            raise ValueError(f"{name} must be less than 2**63, got {name}[{k}] = {array[k]}")
+    return Labels(np.ascontiguousarray(array, np.int64))
+
+
+def as_types(values: Any, n: int) -> npt.NDArray[Any]:
+    """Integers or names, one for each of n points."""
+    return _as_labels(values, "types", n, are_types=True).as_given()
+
+
+def as_supports(values: Any, n: int, d: int) -> FloatArray:
+    """Symmetric matrices of finite numbers; the core decides whether they are definite."""
+    if d > MOST_AXES_OF_SUPPORTS:
+        raise ValueError(f"supports are for points of 1 to 3 dimensions, got {d}")
+
+    def check(shape: tuple[int, ...]) -> None:
+        if shape != (n, d, d):
+            raise ValueError(
+                f"supports must have shape ({n}, {d}, {d}), a matrix for each point, got {shape}"
+            )
+
+    array = as_real_array(values, "supports", check_shape=check)
+    if array.dtype != np.float64:
+        refuse_large(8 * array.size, array, "supports")
+    matrices = in_order(array, np.float64)
+    for k, a, b in np.argwhere(~np.isfinite(matrices))[:1]:
+        raise ValueError(
+            f"supports must be finite, got supports[{k}, {a}, {b}] = {matrices[k, a, b]}"
+        )
+    for k, a, b in np.argwhere(matrices != matrices.transpose(0, 2, 1))[:1]:
+        a, b = max(a, b), min(a, b)
+        raise ValueError(
+            f"supports must be symmetric, got supports[{k}, {a}, {b}] = {matrices[k, a, b]} and "
+            f"supports[{k}, {b}, {a}] = {matrices[k, b, a]}"
+        )
+    return matrices
+
+
+def _as_weights(values: Any, n: int) -> FloatArray:
+    array = as_real_array(values, "weights", check_shape=one_each("weights", n))
+    weights = np.ascontiguousarray(array, dtype=np.float64)
+    for k in np.flatnonzero(~np.isfinite(weights))[:1]:
+        raise ValueError(f"weights must be finite, got weights[{k}] = {weights[k]}")
+    return weights
+
+
+def _as_batch(values: Any, n: int) -> npt.NDArray[np.int64]:
+    """System numbers, ascending."""
+    array = as_array(values, "batch", "hold integers")
+    if array.shape != (n,):
+        raise ValueError(
+            f"batch must have shape ({n},), one number for each point, got {array.shape}"
+        )
+    if array.dtype.kind not in "iu" and n > 0:
+        raise TypeError(f"batch must hold integers, got dtype {array.dtype}")
+    array = array.copy()  # it may change meanwhile
+    if array.dtype.itemsize == 8 and array.dtype.kind in "iu":
+        for k in np.flatnonzero(array >= 2**62):
+            raise ValueError(f"batch must be less than 2**62, got batch[{k}] = {array[k]}")
+    numbers = in_order(array, np.int64)
+    for k in np.flatnonzero(numbers[1:] < numbers[:-1])[:1]:
+        raise ValueError(
+            f"batch must ascend, got batch[{k}] = {numbers[k]} before {numbers[k + 1]}"
+        )
+    if n and numbers[0] < 0:
+        raise ValueError(f"batch must be from 0 on, got batch[0] = {numbers[0]}")
+    return numbers
+

@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Only some of the points: their rows, found as those of queries, and the pairs they are in."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell import _core
+from halfshell._convert.foreign import is_a
+from halfshell._convert.options import check_letters
+from halfshell._errors import CapacityError
+
+if TYPE_CHECKING:
+    from halfshell._convert.call import Call
+    from halfshell._convert.types import Arrays, Reach, Selection, Systems
+
+Array = npt.NDArray[Any]
+
+# A mark for each of so many points takes less time than one look-up among numbers that ascend.
+_POINTS_PER_LOOKUP = 32
+
+_NUMBERS_OF_QUERIES = 4  # which field of a selection these are
+
+
+class Rows(NamedTuple):
+    """Rows of some points, without the points themselves."""
+
+    offsets: npt.NDArray[np.int64]
+    columns: tuple[Array, ...]
+    numbers: npt.NDArray[np.int64]  # whose rows they are
+    entries: npt.NDArray[np.int64]  # which of those that a search for these as queries finds
+
+
+def rows_of(call: Call, quantities: str, index_bytes: int) -> Rows:
+    """The rows of `call.indices`, each ascending by (j, S)."""
+    check_letters(quantities)
+    numbers = call.indices
+    assert numbers is not None
+    letters = quantities if "j" in quantities else "j" + quantities
+    order = None
+    if call.points.batch is not None:  # systems come one after the other
+        order = np.argsort(call.points.batch[numbers], kind="stable")
+        numbers = numbers[order]
+    offsets, *columns = call.run(
+        _core.neighbors, letters, index_bytes, call.array[numbers],
+        pairing_of(call, numbers), call.settings.algorithm, systems_of(call, numbers),
+    )  # fmt: skip
+    j = columns[letters.index("j")]
+    row = np.repeat(np.arange(len(numbers)), np.diff(offsets))
+    # A point meets its images in the order of S: the middle one is itself, at S = 0.
+    own = np.flatnonzero(j == numbers[row])
+    first = np.searchsorted(own, offsets)
+    n_own = np.diff(first)
+    found = np.flatnonzero(n_own % 2)
+    itself = own[first[found] + n_own[found] // 2]
+    entries = np.delete(np.arange(len(j)), itself)
+    fewer = np.zeros(len(offsets), np.int64)
+    fewer[1:] = np.cumsum(n_own % 2)
+    offsets = offsets - fewer
+    if order is not None:
+        entries, offsets, numbers = _reordered(entries, offsets, numbers, order)
+    kept = tuple(columns[letters.index(letter)][entries] for letter in quantities)
+    for array in (offsets, *kept):
+        array.flags.writeable = False
+    return Rows(offsets, kept, numbers, entries)
+
+
+def _reordered(
+    entries: Array, offsets: Array, numbers: Array, order: Array
+) -> tuple[Array, Array, Array]:
+    """Rows as they were asked for, of rows that were found in another order."""
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    lengths = np.diff(offsets)[place]
+    begins = np.zeros(len(offsets), np.int64)
+    begins[1:] = np.cumsum(lengths)
+    among = np.arange(begins[-1]) - np.repeat(begins[:-1], lengths)
+    return entries[np.repeat(offsets[:-1][place], lengths) + among], begins, numbers[place]
+
+
+def pairing_of(call: Call, numbers: npt.NDArray[np.int64]) -> Any:
+    """The reach and the selection of points, for some of them as queries too."""
+    reach = None
+    if call.reach is not None:
+        fields: list[Any] = list(call.reach)
+        for own in (1, 3, 6):  # radii, types and supports, before those of queries
+            fields[own + 1] = None if fields[own] is None else fields[own][numbers]
+        reach = cast("Reach", tuple(fields))
+    if call.selection is None:
+        return reach
+    fields = list(call.selection)
+    fields[_NUMBERS_OF_QUERIES] = numbers
+    return reach, cast("Selection", tuple(fields))
+
+
+def systems_of(call: Call, numbers: npt.NDArray[np.int64]) -> Systems | None:
+    """The systems of a batch, for some of its points as queries too."""
+    own = call.systems
+    return None if own is None else (*own[:3], np.ascontiguousarray(own[0][numbers]), own[4])
+
+
+def pairs_of(
+    call: Call, quantities: str, sort: bool, index_bytes: int, out: Any
+) -> Arrays:
+    """Pairs with one of `call.indices`, as a half list."""
+    check_letters(quantities)
+    numbers = call.indices
+    assert numbers is not None
+    ascending = np.sort(numbers)
+    for k in np.flatnonzero(ascending[1:] == ascending[:-1]):
+        raise ValueError(f"indices must name each point once, got {ascending[k]} twice")
+    if out is not None:  # its types and shapes, before anything is searched for
+        _core.pairs(
+            np.empty((0, call.array.shape[1])), 0.0, None, 0, *call.rest[:4], None, call.threads,
+            quantities, sort, index_bytes, out, None, "auto", None,
+        )  # fmt: skip
+    letters = "j" + "".join(letter for letter in quantities if letter in "dDS")
+    asked = np.sort(numbers)  # of a batch, systems come one after the other
+    offsets, *columns = call.run(
+        _core.neighbors, letters, index_bytes, call.array[asked], pairing_of(call, asked),
+        call.settings.algorithm, systems_of(call, asked),
+    )  # fmt: skip
+    found = dict(zip(letters, columns, strict=True))
+    row = np.repeat(np.arange(len(asked)), np.diff(offsets))
+    found = _half_list(found, row, asked, len(call.points), sort)
+    if "P" in quantities:
+        found["P"] = np.stack([found["i"], found["j"]], axis=1)
+    arrays = tuple(found[letter] for letter in quantities)
+    if out is not None:
+        arrays = _filled(arrays, out if is_a(out, tuple) else (out,))
+    return arrays[0] if len(arrays) == 1 else arrays
+
+
+def _half_list(
+    columns: dict[str, Array], row: Array, numbers: npt.NDArray[np.int64], n_points: int, sort: bool
+) -> dict[str, Array]:
+    """Rows of these points, ascending by (j, S), as pairs that are there once."""
+    j = columns["j"]
+    i = numbers.astype(j.dtype)[row]
+    keep = ~_are_among(j, numbers, n_points) | (i < j)
+    # A point meets its images in the order of S: the middle one is itself, at S = 0, and those
+    # behind it have a positive first component.
+    own = np.flatnonzero(i == j)
+    n_own = np.bincount(row[own], minlength=len(numbers))
+    rank = np.arange(len(own)) - np.repeat(np.cumsum(n_own) - n_own, n_own)
+    keep[own] = rank > np.repeat(n_own // 2, n_own)
+    entries = np.flatnonzero(keep)
+    kept = {letter: array[entries] for letter, array in columns.items() if letter in "dDS"}
+    i, j = i[entries], j[entries]
+    back = np.flatnonzero(j < i)  # these come from their second point
+    i[back], j[back] = j[back], i[back]
+    if "D" in kept:
+        kept["D"][back] = 0.0 - kept["D"][back]  # a zero has no sign
+    if "S" in kept:
+        _check_opposites(kept["S"][back])
+        kept["S"][back] *= -1
+    kept.update(i=i, j=j)
+    if sort:
+        place = np.arange(len(i))
+        place[back] *= -1  # their shifts, turned round, descend
+        order = np.lexsort((place, j, i))
+        kept = {letter: array[order] for letter, array in kept.items()}
+    return kept
+
+
+def _are_among(j: Array, numbers: npt.NDArray[np.int64], n_points: int) -> npt.NDArray[np.bool_]:
+    """Whether each of j is one of these numbers, which ascend."""
+    if len(j) > n_points // _POINTS_PER_LOOKUP:
+        is_named = np.zeros(n_points, dtype=bool)
+        is_named[numbers] = True
+        return is_named[j]
+    ascending = np.append(numbers, -1)  # behind the last one
+    found: npt.NDArray[np.bool_] = ascending[np.searchsorted(numbers, j)] == j
+    return found
+
+
+def _check_opposites(shifts: Array) -> None:
+    if shifts.min(initial=0) == np.iinfo(shifts.dtype).min:
+        raise OverflowError("a shift does not fit int32: -2**31 has no opposite there")
+
+
+def _filled(arrays: tuple[Array, ...], out: tuple[Any, ...]) -> tuple[Array, ...]:
+    """The front of each array of `out`, with what was found."""
+    needed = len(arrays[0])
+    if min(len(array) for array in out) < needed:
+        raise CapacityError(
+            f"out is too small: there are {needed} pairs, each array needs room for all", needed
+        )
+    views = tuple(np.asarray(array)[:needed] for array in out)
+    for view, array in zip(views, arrays, strict=True):
+        view[...] = array
+    return views

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What all searches are decorated with: one description of each shared argument, calls with the
+usual arguments that go to C at once, and an answer to keywords that there are none of."""
+
+from __future__ import annotations
+
+from functools import wraps
+from typing import TYPE_CHECKING, Any, TypeVar, cast
+
+from halfshell import _core
+from halfshell._errors import REFUSALS, shorten
+from halfshell._unknown import refuse_unknown
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+Function = TypeVar("Function", bound="Callable[..., Any]")
+
+#: Arguments that mean the same in every search, as their docstrings have them.
+SHARED = {
+    "points": """
+    points : array_like of float, shape (n, d), or Points
+        Coordinates, any length unit, 1 <= d <= 8; or `Points`, or an object of another library,
+        which bring what they know: box, periodicity, types, radii, ... Several systems are a
+        list of these.
+    """,
+    "cutoff": """
+    cutoff : float, array_like of float, shape (k,), (s,) or (t, t), dict or None
+        Largest distance of a pair, in the unit of `points`; finite, not negative; it may be larger
+        than the box. One for each system of a batch, shape (s,). By type: a dict such as
+        ``{("H", "O"): 1.2, ("*", "*"): 2.0}``, in which a key with fewer stars wins and two types
+        without a key form no pairs, or a symmetric table with a row for each type. With radii a
+        further limit, or None. With supports the extent: ``|H @ D| <= cutoff``.
+    """,
+    "queries": """
+    queries : array_like of float, shape (q, d), or Points, optional
+        Where neighbours are looked for, in place of at each of the points. Nothing is left out
+        then: a point at the place of a query is a neighbour at distance 0.
+    """,
+    "box": """
+    box : float, array_like of float, shape (d,) or (d, d), or Box, optional
+        One length for all edges, a length for each, or edge vectors as rows, in the unit of
+        `points`; finite. None: open space, or the box that `points` bring. Rows of axes that are
+        not periodic may be anything finite, such as zero.
+    """,
+    "periodic": """
+    periodic : bool or sequence of bool, shape (d,), optional
+        Which box vectors are periodic. Default: all with a box, none without.
+    """,
+    "rule": """
+    rule : {"sum", "mean", "max", "min", "gather", "scatter"}, optional
+        How the two radii of a pair make its cutoff: their sum (default), half of it, the larger or
+        the smaller one; in rows and with queries also "gather", that of the query, or point i, and
+        "scatter", that of j. With supports, "max" (default) means within either, "min" within both.
+    """,
+    "exclude": """
+    exclude : array_like of int, shape (k, 2), or int, optional
+        Pairs that do not count, in their nearest image, which is decided exactly: numbers of two
+        points, or of a query and a point, such as `bonded` gives; or a whole number w: pairs whose
+        `labels` differ by at most w, 0 for equal ones.
+    """,
+    "min_distance": """
+    min_distance : float, optional
+        Pairs that are nearer do not count; finite, not negative.
+    """,
+    "indices": """
+    indices : array_like of int, shape (r,), optional
+        Only these points: their rows, in this order, or the pairs that have at least one of them.
+        The time that it takes depends on their number.
+    """,
+    "inclusive": """
+    inclusive : bool, default True
+        Whether a pair at exactly its cutoff counts.
+    """,
+    "index_dtype": """
+    index_dtype : numpy.int64 or numpy.int32, default numpy.int64
+        Type of numbers of points.
+    """,
+    "threads": """
+    threads : int, optional
+        Maximum number of threads. Default: one for small scenes, otherwise ``OMP_NUM_THREADS``, or
+        the number of cores that this process may run on. The result is the same for any number.
+    """,
+    "progress": """
+    progress : bool or callable, optional
+        True: show a bar in a long search. A function is called now and then as
+        ``progress(fraction)``, from 0 to 1, never falling; an exception ends the search.
+    """,
+}
+
+
+def search(
+    name: str = "", *, finish: Callable[..., Any] | None = None
+) -> Callable[[Function], Function]:
+    """Decorate a search: a function of points, cutoff and keywords.
+
+    name: what the table in C calls it (csrc/binding/interface.c). C then answers calls of which it
+    can convert all arguments (csrc/binding/quick.c), by one attempt; other calls the function
+    answers. finish: makes the result of what C returns and of the arguments.
+    """
+
+    def decorate(function: Function) -> Function:
+        document(function)
+        code = function.__code__
+        known = frozenset(code.co_varnames[: code.co_argcount + code.co_kwonlyargcount])
+        attempt = _core.quick(name) if name else None
+
+        @wraps(function)
+        def call(*arguments: Any, **options: Any) -> Any:
+            if attempt is not None:
+                result = attempt(arguments, options)
+                if result is not NotImplemented:
+                    return result if finish is None else finish(result, *arguments, **options)
+            if not options.keys() <= known:
+                refuse_unknown(function, [name for name in options if name not in known])
+            try:
+                return function(*arguments, **options)
+            except REFUSALS as error:
+                shorten(error)
+                raise
+
+        return cast("Function", call)
+
+    return decorate
+
+
+def document(function: Any, **changed: str) -> None:
+    """Put the description of each shared argument where a docstring has its name in braces.
+
+    changed: what some of them say there instead.
+    """
+    if not function.__doc__:
+        return
+    texts = {**SHARED, **changed}
+    lines = []
+    for line in function.__doc__.split("\n"):
+        stripped = line.strip()
+        names = stripped[1:-1].split(", ")
+        if stripped[:1] != "{" or stripped[-1:] != "}" or names[0] not in texts:
+            lines.append(line)
+            continue
+        margin = line[: len(line) - len(line.lstrip())]
+        for name in names:
+            lines += [margin + one[4:] for one in texts[name].strip("\n").rstrip().split("\n")]
+    function.__doc__ = "\n".join(lines)

@@ -1,0 +1,392 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`Points`: what they hold and refuse, their parts and stacks, and that all searches take them."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from calls import FIELDS
+from oracles import same_arrays
+
+RNG = np.random.default_rng(7)
+X = RNG.random((12, 2))
+SKEWED = np.array([[1.0, 0.0], [0.4, 0.9]])
+KNOWN = {
+    "box": SKEWED, "periodic": [True, False], "radii": RNG.uniform(0.1, 0.4, 12),
+    "types": np.array(["Si", "O", "Na"] * 4), "groups": [1, 1, 2] * 4, "labels": ["a", "b"] * 6,
+    "weights": RNG.random(12),
+}  # fmt: skip
+
+
+def alike(one, other):
+    """Whether two hold the same bits."""
+    fields = ("positions", "box", "periodic", *FIELDS)
+    return all(same(getattr(one, name), getattr(other, name)) for name in fields)
+
+
+def same(a, b):
+    return a is b or (a is not None and b is not None and same_arrays(a, b))
+
+
+# ---- what they hold ------------------------------------------------------------------------
+
+
+def test_attributes_are_what_was_given():
+    points = hs.Points(X, **KNOWN)
+    assert len(points) == 12 and points.n_systems == 1 and points.batch is points.supports is None
+    assert same_arrays(points.positions, X) and same_arrays(points.box, SKEWED)
+    assert points.periodic.tolist() == [True, False] and points.periodic.dtype == bool
+    assert points.radii.dtype == points.weights.dtype == np.float64
+    for name in ("radii", "types", "groups", "labels", "weights"):
+        assert getattr(points, name).tolist() == np.asarray(KNOWN[name]).tolist()
+    assert hs.Points(X, types=[3] * 12).types.dtype == np.int32
+    assert hs.Points(X, groups=np.arange(12, dtype=np.uint8)).groups.dtype == np.int64
+    bare = hs.Points(X.astype(np.float32))
+    assert bare.positions.dtype == np.float32 and bare.box is bare.periodic is bare.types is None
+    assert hs.Points(X, box=2.0).box.tolist() == [[2.0, 0.0], [0.0, 2.0]]
+    assert hs.Points([]).positions.shape == (0, 3)
+    assert hs.Points(bare).positions.dtype == np.float32  # Points of Points
+
+
+@pytest.mark.parametrize("d", range(1, 9))
+def test_every_dimension_and_kind_of_number(d):
+    whole = RNG.integers(-9, 9, (5, d))
+    for dtype in (np.int8, np.int64, np.float16, np.float32, ">f8", bool):
+        given = whole.astype(dtype)
+        points = hs.Points(np.repeat(given, 2, axis=0)[::2], box=[30.0] * d)
+        assert np.array_equal(points.positions, given) and points.box.shape == (d, d)
+        assert points.positions.flags.c_contiguous and points.positions.dtype.isnative
+        assert hs.count_pairs(points, 3.0) == hs.count_pairs(given, 3.0, box=[30.0] * d)
+
+
+def test_they_do_not_change():
+    given = {name: np.array(value) for name, value in KNOWN.items()}
+    x = X.copy()
+    points = hs.Points(x, **given)
+    x[:] = 0.0
+    for array in given.values():
+        array[...] = array.flat[0]
+    assert alike(points, hs.Points(X, **KNOWN))
+    for name in ("positions", "box", "radii", "weights"):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(points, name)[0] = 1.0
+    for change in (lambda: setattr(points, "radii", None), lambda: delattr(points, "radii")):
+        with pytest.raises(AttributeError, match=r"Points are immutable: replace\(\) gives others"):
+            change()
+    points.types[:] = "X"  # a copy
+    assert alike(points, hs.Points(X, **KNOWN))
+
+
+def test_pickles_and_copies():
+    systems = hs.Points.stack(
+        [hs.Points(X, radii=[0.1] * 12, box=1.0), hs.Points(X, radii=[0.2] * 12)]
+    )
+    supports = hs.Points(X, supports=np.tile(np.eye(2), (12, 1, 1)))
+    for points in (hs.Points(X, **KNOWN), systems, supports, hs.Points([]), hs.Points(X, box=1.0)):
+        for again in (pickle.loads(pickle.dumps(points)), copy.copy(points), copy.deepcopy(points)):
+            assert type(again) is hs.Points and alike(points, again)
+    again = pickle.loads(pickle.dumps(systems))
+    assert same_arrays(hs.pairs(again, None), hs.pairs(systems, None))
+
+
+def test_parts():
+    points = hs.Points(X, **KNOWN)
+    numbers = np.array([7, 2, 2, 11])
+    for places in (
+        slice(3, 9),
+        slice(None, None, -2),
+        X[:, 0] > 0.5,
+        numbers,
+        numbers.tolist(),
+        [],
+    ):
+        part, rows = points[places], np.arange(12)[places]
+        rows = rows.astype(int)
+        expected = {name: np.asarray(KNOWN[name])[rows] for name in FIELDS if name in KNOWN}
+        assert alike(part, hs.Points(X[rows], box=SKEWED, periodic=[True, False], **expected))
+    for wrong in (3, np.int64(3), (0, 1), (slice(None), 0), None):
+        with pytest.raises(TypeError, match=r"Points\[...\] takes a slice, a mask or numbers"):
+            points[wrong]
+    systems = hs.Points(X, batch=np.repeat([0, 2], 6), box=np.stack([SKEWED] * 3))
+    assert systems[4:8].batch.tolist() == [0, 0, 2, 2] and systems[4:8].n_systems == 3
+    with pytest.raises(ValueError, match="batch must ascend"):
+        systems[::-1]
+
+
+def test_replaced():
+    points = hs.Points(X, **KNOWN)
+    assert alike(points.replace(), points)
+    assert points.replace(radii=None).radii is None
+    assert points.replace(box=3.0).periodic.tolist() == [True, True]
+    assert points.replace(box=None).periodic is None
+    assert points.replace(periodic=True).periodic.tolist() == [True, True]
+    moved = points.replace(positions=X + 1.0)
+    assert (
+        np.array_equal(moved.positions, X + 1.0) and moved.types.tolist() == points.types.tolist()
+    )
+    with pytest.raises(ValueError, match=r"types must have shape \(3,\)"):
+        points.replace(positions=X[:3])
+    with pytest.raises(TypeError, match="Points have no 'color': they have positions, box, peri"):
+        points.replace(color=1)
+
+
+def test_how_they_show_themselves():
+    small = hs.Points([[0.0, 1.5], [2.0, 3.0]])
+    assert repr(small) == "Points(n=2, d=2, float64)\n  0  1.5\n  2  3"
+    assert repr(hs.Points([])) == "Points(n=0, d=3, float64)"
+    first, *rows = repr(hs.Points(X, **KNOWN)).splitlines()
+    assert first.startswith("Points(n=12, d=2, float64, box of 2 vectors partly periodic, radii ")
+    assert first.endswith("types Na O Si, groups, labels, weights)")
+    assert len(rows) == 6 and rows[0].endswith("Si") and rows[-1] == "  ..."
+    systems = hs.Points.stack([hs.Points(X, box=1.0), X, X])
+    assert ", 3 boxes, 3 systems)" in repr(systems)
+    assert "box 2 x 2 periodic, 12 types" in repr(hs.Points(X, box=2.0, types=range(12)))
+
+
+# ---- radii by type -------------------------------------------------------------------------
+
+
+def test_radii_by_type():
+    names, numbers = ["C", "O", "C"], [4, 1, 4]
+    x = X[:3]
+    assert hs.Points(x, types=names, radii={"C": 0.5, "O": 0.25}).radii.tolist() == [0.5, 0.25, 0.5]
+    assert hs.Points(x, types=numbers, radii={4: 0.5, 1: 0.25}).radii.tolist() == [0.5, 0.25, 0.5]
+    others = {"C": 0.5, "*": 1.0, "Xe": 9.0}
+    assert hs.Points(x, types=names, radii=others).radii.tolist() == [0.5, 1.0, 0.5]
+    assert hs.Points([], types=[], radii={"C": 1.0}).radii.shape == (0,)
+    for radii, types, error, message in (
+        ({"C": 0.5}, names, ValueError, "have none for 'O'"),
+        ({4: 0.5}, numbers, ValueError, "have none for 1"),
+        ({"C": 0.5}, None, ValueError, "radii by type need types"),
+        ({"C": -0.5, "O": 1.0}, names, ValueError, r"radii\[0\] = -0.5"),
+        ({"C": "wide", "O": 1.0}, names, TypeError, r"radii\['C'\] must be a number"),
+        ({"C": [1.0], "O": 1.0}, names, TypeError, r"radii\['C'\] must be a number"),
+    ):
+        with pytest.raises(error, match=message):
+            hs.Points(x, types=types, radii=radii)
+
+
+# ---- stacks --------------------------------------------------------------------------------
+
+
+def test_stacks_are_systems_one_behind_the_other():
+    one = hs.Points(X, types=["A", "B"] * 6, box=SKEWED, periodic=[False, True])
+    other = hs.Points(X[:5] + 3.0, types=["C"] * 5)
+    none = hs.Points(np.empty((0, 2)))
+    systems = hs.Points.stack([one, none, other])
+    assert systems.n_systems == 3 and systems.batch.tolist() == [0] * 12 + [2] * 5
+    assert systems.types.tolist() == ["A", "B"] * 6 + ["C"] * 5
+    assert systems.box.shape == (3, 2, 2) and same_arrays(systems.box[0], SKEWED)
+    assert systems.periodic.tolist() == [[False, True], [False, False], [False, False]]
+    found = hs.pairs(systems, 0.4, quantities="P", sort=True)
+    parts = [
+        hs.pairs(one, 0.4, quantities="P", sort=True),
+        hs.pairs(other, 0.4, quantities="P", sort=True),
+    ]
+    assert np.array_equal(found, np.concatenate([parts[0], parts[1] + 12]))
+    assert hs.count_pairs(systems, 0.4).tolist() == [len(parts[0]), 0, len(parts[1])]
+    assert hs.Points.stack([]).n_systems == 0
+    assert hs.Points.stack(x for x in (X, X)).n_systems == 2
+
+
+def test_lists_of_systems_are_stacks():
+    for systems in ([X, X[:4]], [X.tolist(), X[:4].tolist()], (X, X[:4]), [hs.Points(X), X[:4]]):
+        assert hs.count_pairs(systems, 0.3).tolist() == [
+            hs.count_pairs(X, 0.3),
+            hs.count_pairs(X[:4], 0.3),
+        ]
+        assert alike(hs.Points(systems), hs.Points.stack(systems))
+    boxed = hs.count_pairs([X, X[:4]], 0.3, box=1.0)
+    assert boxed.tolist() == [hs.count_pairs(x, 0.3, box=1.0) for x in (X, X[:4])]
+    each = hs.pairs([X, X[:4]], [0.3, 0.6])  # a cutoff for each system
+    assert len(each[0]) == hs.count_pairs(X, 0.3) + hs.count_pairs(X[:4], 0.6)
+    both = hs.pairs_between([X[:3], X[:2]], [X, X[:4]], 0.3)
+    assert len(both[0]) == sum(
+        hs.count_pairs(x, 0.3, queries=q) for q, x in ((X[:3], X), (X[:2], X[:4]))
+    )
+
+
+@pytest.mark.parametrize(("systems", "error", "message"), [
+    ([X, np.zeros((2, 3))], ValueError, r"the same number of columns, got \[2, 3\]"),
+    ([hs.Points(X, radii=[1.0] * 12), X], ValueError, r"systems\[0\] has radii, and systems"),
+    ([X, hs.Points(X, batch=[0] * 12)], ValueError, r"systems\[1\] must be one system"),
+    ([X, "water"], TypeError, r"systems\[1\] must hold real numbers, got str"),
+    ([X, np.full((2, 2), np.nan)], ValueError, r"positions\[12, 0\] = nan"),
+    (3, TypeError, "systems must be a sequence of points, got int"),
+])  # fmt: skip
+def test_what_is_no_stack(systems, error, message):
+    with pytest.raises(error, match=message):
+        hs.Points.stack(systems)
+
+
+# ---- what is refused -----------------------------------------------------------------------
+
+WRONG = np.arange(12.0)
+WRONG[5] = np.nan
+
+
+@pytest.mark.parametrize(("known", "error", "message"), [
+    ({"positions": [[0.0, np.inf]]}, ValueError, r"must be finite, got positions\[0, 1\] = inf"),
+    ({"positions": np.zeros((2, 9))}, ValueError, r"shape \(n, d\) with 1 <= d <= 8.*positions.T"),
+    ({"positions": np.zeros(4)}, ValueError, r"one point is positions\[None, :\]"),
+    ({"positions": "points"}, TypeError, "positions must hold real numbers, got str"),
+    ({"positions": None}, TypeError, "positions must hold real numbers, got NoneType"),
+    ({"positions": X + 1j}, TypeError, "positions must hold real numbers, got dtype complex128"),
+    ({"positions": [[2**53 + 1, 0]]}, ValueError, r"positions\[0, 0\]"),
+    ({"box": [1.0, 2.0, 3.0]}, ValueError, r"box must have shape \(2,\) or \(2, 2\)"),
+    ({"box": [1.0, 1.0, 1.0, 90.0, 90.0, 90.0]}, ValueError, "use Box.from_dimensions"),
+    ({"box": np.stack([SKEWED] * 2)}, ValueError, "a box for each system needs Points"),
+    ({"box": [[1.0, 2.0], [2.0, 4.0]]}, ValueError, "linearly independent"),
+    ({"box": [1.0, np.nan]}, ValueError, r"box\[1, 1\] = nan"),
+    ({"periodic": True}, ValueError, "periodic needs a box"),
+    ({"box": 1.0, "periodic": "xy"}, TypeError, "periodic must be a bool or 2 bools, got 'xy'"),
+    ({"box": 1.0, "periodic": [True] * 3}, ValueError, r"2 bools, got shape \(3,\)"),
+    ({"radii": [0.1] * 11}, ValueError, r"radii must have shape \(12,\)"),
+    ({"radii": WRONG}, ValueError, r"radii\[5\] = nan"),
+    ({"radii": -np.arange(12.0)}, ValueError, r"radii\[1\] = -1"),
+    ({"radii": [2.0**1023] * 12}, ValueError, r"radii must be at most 2\*\*1022, got radii\[0\]"),
+    ({"radii": ["1"] * 12}, TypeError, "radii must hold real numbers"),
+    ({"radii": [2**53 + 1] * 12}, ValueError, r"radii\[0\].*float64"),
+    ({"types": [0.0] * 12}, TypeError, "types must hold integers or names, got dtype float64"),
+    ({"types": -np.arange(12)}, ValueError, r"types\[1\] = -1"),
+    ({"types": [2**31 - 1] * 12}, ValueError, r"types must be .* below 2\*\*31 - 1"),
+    ({"types": ["A"] * 3}, ValueError, r"types must have shape \(12,\)"),
+    ({"groups": [None] * 12}, TypeError, "groups must hold integers or names"),
+    ({"labels": np.zeros((12, 1), int)}, ValueError, r"labels must have shape \(12,\)"),
+    ({"weights": WRONG}, ValueError, r"weights\[5\] = nan"),
+    ({"weights": [1j] * 12}, TypeError, "weights"),
+    ({"supports": np.ones((12, 2))}, ValueError, r"supports must have shape \(12, 2, 2\)"),
+    ({"supports": np.tile(np.eye(2), (12, 1, 1)), "radii": [1.0] * 12}, ValueError, "together"),
+    ({"batch": [0, 1] * 6}, ValueError, r"batch must ascend, got batch\[1\] = 1 before 0"),
+    ({"batch": [-1] * 12}, ValueError, r"from 0 on, got batch\[0\] = -1"),
+    ({"positions": hs.Points(X, box=1.0), "box": 1.0}, ValueError, "Points bring their own box"),
+    ({"positions": [X, X], "batch": [0] * 24}, ValueError, "a list of systems brings its batch"),
+])  # fmt: skip
+def test_what_is_refused_says_where(known, error, message):
+    with pytest.raises(error, match=message) as caught:
+        hs.Points(**{"positions": X, **known})
+    assert "\n" not in str(caught.value)
+
+
+def test_masked_and_huge_input():
+    masked = np.ma.array(X, mask=False)
+    masked[3, 1] = np.ma.masked
+    with pytest.raises(ValueError, match=r"positions\[3, 1\] must not be masked"):
+        hs.Points(masked)
+    with pytest.raises(OverflowError, match=r"fewer than 2\*\*31 positions"):
+        hs.Points(np.broadcast_to(np.float32(0.0), (2**31, 1)))
+
+
+# ---- in searches ---------------------------------------------------------------------------
+
+
+def test_every_search_takes_them():
+    points, queries = hs.Points(X, box=SKEWED), hs.Points(X[:4] + 0.1)
+    how = {"box": SKEWED}
+    for search in (
+        lambda x, **h: hs.pairs(x, 0.3, **h),
+        lambda x, **h: hs.neighbors(x, 0.3, **h).to_pairs(),
+        lambda x, **h: hs.coordination(x, 0.3, **h),
+        lambda x, **h: hs.count_pairs(x, [0.2, 0.3], **h),
+        lambda x, **h: hs.nearest(x, 3, **h),
+        lambda x, **h: hs.pair_histogram(x, [0.0, 0.2, 0.4], **h),
+        lambda x, **h: hs.rdf(x, 0.4, 5, **h).g,
+        lambda x, **h: hs.clusters(x, 0.1, **h).labels,
+        lambda x, **h: next(hs.iter_pairs(x, 0.3, **h)),
+        lambda x, **h: next(hs.trajectory_pairs([x], 0.3, **h)),
+        lambda x, **h: hs.measure(x, [0], [1], quantities="dD", **h),
+        lambda x, **h: hs.CellList(x, 0.3, **h).pairs(),
+        lambda x, **h: hs.pairs_between(queries, x, 0.3, **h),
+        lambda x, **h: hs.count_pairs(x, 0.3, queries=queries, **h),
+    ):
+        assert same_arrays(as_arrays(search(points)), as_arrays(search(X, **how)))
+        with pytest.raises(ValueError, match="Points bring their own box: leave box out"):
+            search(points, **how)
+    assert hs.for_each_pair(points, 0.3, lambda *pair: None) == hs.count_pairs(X, 0.3, **how)
+    assert hs.explain(points, 0.3).algorithm == hs.explain(X, 0.3, **how).algorithm
+
+
+def as_arrays(found):
+    return found if isinstance(found, tuple) else (np.asarray(found),)
+
+
+def test_queries_go_with_their_points():
+    points = hs.Points(X, box=SKEWED)
+    assert hs.count_pairs(points, 0.3, queries=points) == hs.count_pairs(
+        X, 0.3, queries=X, box=SKEWED
+    )
+    for queries, message in (
+        (hs.Points(X, box=1.0), "queries bring a box that is not that of points"),
+        (hs.Points(X, batch=[0] * 12), "queries have a batch, and points have none"),
+        (np.zeros((2, 3)), "same number of columns"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            hs.count_pairs(points, 0.3, queries=queries)
+    named = hs.Points(X, types=["A", "B"] * 6)
+    other = hs.Points(X[:4], types=["B", "C", "B", "C"])
+    table = hs.neighbors(named, {("A", "C"): 2.0}, queries=other)
+    assert table.counts.tolist() == [0, 6, 0, 6]
+
+
+def test_a_few_of_these_objects_bring_all():
+    ase = pytest.importorskip("ase")
+    atoms = ase.Atoms("H2O", positions=[[0.0, 0.0, 0.0], [1.5, 0.0, 0.0], [0.7, 0.5, 0.0]],
+                      cell=[4.0, 5.0, 6.0], pbc=[True, False, False])  # fmt: skip
+    points = hs.Points(atoms)
+    assert points.types.tolist() == ["H", "H", "O"] and points.periodic.tolist() == [
+        True,
+        False,
+        False,
+    ]
+    for name, value in (("box", 1.0), ("periodic", True), ("types", [0, 1, 2])):
+        with pytest.raises(ValueError, match=f"Atoms bring their own {name}: leave {name} out"):
+            hs.Points(atoms, **{name: value})
+    radii = {"H": 0.31, "O": 0.66}
+    assert hs.pairs(hs.Points(atoms, radii=radii), None, sort=True)[1].tolist() == [2, 2]
+    two = hs.Points([atoms, atoms])
+    assert two.n_systems == 2 and two.types.tolist() == ["H", "H", "O"] * 2
+    atoms.pbc = False
+    assert hs.Points(atoms).box is None
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame({"x": [0.0, 1.0], "Y": [0.0, 0.0], "element": ["Si", "O"]})
+    assert hs.Points(frame).types.tolist() == ["Si", "O"] and hs.Points(frame).positions.shape == (
+        2,
+        2,
+    )
+
+
+@pytest.mark.parametrize("shape", [(), (11,), (13,), (12, 1), (1, 12), (0,)])
+def test_a_column_has_a_number_for_each_point(shape):
+    for name in ("radii", "types", "groups", "labels", "weights", "batch"):
+        with pytest.raises(
+            ValueError, match=rf"{name} must have shape \(12,\).*{str(shape)[1:-1]}"
+        ):
+            hs.Points(X, **{name: np.ones(shape, int)})
+
+
+WIDE = [
+    "wide", b"wide", ["a"] * 12, np.ones(12, complex), np.zeros(12, "M8[s]"), [None] * 12, object(),
+]  # fmt: skip
+WIDE += [np.ones(12, np.longdouble)] if np.longdouble != np.float64 else []
+
+
+@pytest.mark.parametrize("values", WIDE)
+def test_radii_and_weights_are_real_numbers(values):
+    for name in ("radii", "weights"):
+        with pytest.raises(TypeError, match=name):
+            hs.Points(X, **{name: values})
+
+
+def test_the_bounds_of_radii():
+    for value, fragment in (
+        (-5e-324, "not negative"), (np.inf, "finite"), (-np.inf, "finite"),
+        (np.nextafter(2.0**1022, np.inf), r"2\*\*1022"),
+    ):  # fmt: skip
+        radii = np.full(100_000, 0.01)
+        radii[99_999] = value
+        with pytest.raises(ValueError, match=rf"{fragment}.*radii\[99999\]"):
+            hs.Points(np.zeros((100_000, 1)), radii=radii)
+    assert hs.Points(X, radii=[2.0**1022] * 12).radii[0] == 2.0**1022

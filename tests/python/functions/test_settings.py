@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`settings`: what they set, for whom, and how long."""
+
+import asyncio
+import contextvars
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from halfshell._settings import USUAL, current
+from oracles import same_arrays
+
+X = np.random.default_rng(3).random((3000, 3))
+# A lattice of 0.1 and a cutoff on one of its shells: a comparison of doubles is wrong twice.
+LATTICE = 0.1 * np.stack(np.meshgrid(*[np.arange(4.0)] * 2), -1).reshape(-1, 2)
+SHELL, EXACT, DOUBLE = 0.1 * np.sqrt(8.0), 88, 90
+
+
+def algorithm():
+    """That which a search of this thread or task would be made by."""
+    return hs.explain(X, 0.1).algorithm
+
+
+# ---- what they set -------------------------------------------------------------------------
+
+
+def test_each_one_reaches_the_searches():
+    for name in ("all-pairs", "grid", "hash"):
+        with hs.settings(algorithm=name):
+            assert algorithm() == name
+            assert hs.count_pairs(X, 0.05) == hs.count_pairs(hs.CellList(X, 0.05), 0.05)
+    with hs.settings(memory_limit=1e4):
+        for search in (hs.pairs, hs.neighbors, hs.clusters):
+            with pytest.raises(MemoryError):
+                search(X, 0.3)
+        with pytest.raises(MemoryError):
+            hs.nearest(X, 5)
+    expected = hs.pairs(X, 0.1, quantities="ijd")
+    for kernel in hs.kernels():
+        for threads in (1, 2):
+            with hs.settings(kernel=kernel, threads=threads):
+                assert hs.explain(X, 0.1).kernel == kernel
+                assert same_arrays(hs.pairs(X, 0.1, quantities="ijd"), expected)
+    assert hs.count_pairs(LATTICE, SHELL) == EXACT
+    with hs.settings(precision="double"):
+        assert hs.count_pairs(LATTICE, SHELL) == DOUBLE
+        assert hs.CellList(LATTICE, SHELL).count_pairs() == DOUBLE
+        assert sum(len(i) for i, _ in hs.iter_pairs(LATTICE, SHELL)) == DOUBLE
+        assert hs.pair_histogram(LATTICE, [0.0, SHELL]).tolist() == [EXACT]  # always exact
+
+
+def test_threads_of_a_call_come_first():
+    with hs.settings(threads=2):
+        assert hs.explain(X, 0.3).threads == 2
+        assert hs.explain(X, 0.3, threads=1).threads == 1
+
+
+# ---- how long ------------------------------------------------------------------------------
+
+
+def test_nested_ones_change_what_they_name():
+    with hs.settings(algorithm="hash", threads=1) as outer:
+        assert outer == (None, "hash", "exact", None, 1) and current() is outer
+        with hs.settings(precision="double", algorithm="grid"):
+            assert current() == (None, "grid", "double", None, 1)
+            with hs.settings(threads=None, algorithm="auto"):
+                assert current() == (None, "auto", "double", None, None)
+        assert current() is outer
+    assert current() is USUAL
+    with hs.settings():
+        assert current() == USUAL
+
+
+def test_errors_end_them_too():
+    with pytest.raises(KeyError), hs.settings(algorithm="hash"):
+        raise KeyError
+    assert current() is USUAL
+    with hs.settings(memory_limit=0.0):
+        with pytest.raises(MemoryError):
+            hs.pairs(X, 0.1)
+    assert len(hs.pairs(X, 0.1)[0]) > 0
+
+
+def test_one_object_may_be_used_again_and_within_itself():
+    how = hs.settings(algorithm="hash")
+    for _ in range(2):
+        with how, hs.settings(algorithm="grid"):
+            with how:
+                assert algorithm() == "hash"
+            assert algorithm() == "grid"
+        assert current() is USUAL
+    assert repr(how) == "settings(algorithm='hash')" and repr(hs.settings()) == "settings()"
+    assert repr(hs.settings(kernel=None, threads=3)) == "settings(kernel=None, threads=3)"
+
+
+# ---- for whom ------------------------------------------------------------------------------
+
+
+def test_threads_do_not_see_each_others():
+    met = threading.Barrier(3, timeout=60)
+
+    def work(name):
+        with hs.settings(algorithm=name):
+            met.wait()
+            found = algorithm()
+            met.wait()
+        return found, current() is USUAL
+
+    with ThreadPoolExecutor(3) as pool, hs.settings(algorithm="all-pairs"):
+        names = ["grid", "hash", "all-pairs"]
+        assert list(pool.map(work, names)) == [(name, True) for name in names]
+        assert pool.submit(current).result() is USUAL
+        copied = contextvars.copy_context()
+        assert pool.submit(copied.run, algorithm).result() == "all-pairs"
+
+
+def test_tasks_keep_those_they_began_with():
+    async def work(name, begun, go):
+        before = algorithm()
+        with hs.settings(algorithm=name):
+            begun.set()
+            await go.wait()
+            return before, algorithm()
+
+    async def main():
+        go, found = asyncio.Event(), []
+        with hs.settings(algorithm="all-pairs"):
+            for name in ("grid", "hash"):
+                begun = asyncio.Event()
+                found.append(asyncio.create_task(work(name, begun, go)))
+                await begun.wait()
+                assert algorithm() == "all-pairs"
+        assert current() is USUAL
+        go.set()
+        return [await task for task in found] + [await asyncio.to_thread(algorithm)]
+
+    *tasks, last = asyncio.run(main())
+    assert tasks == [("all-pairs", "grid"), ("all-pairs", "hash")]
+    assert last not in ("all-pairs",)
+
+
+def test_iterators_keep_those_of_their_call():
+    large = [np.concatenate([LATTICE, 9.0 + np.arange(2000.0).reshape(-1, 2)])] * 3
+    with hs.settings(precision="double"):
+        blocks = hs.iter_pairs(LATTICE, SHELL, max_pairs=1)
+        frames = hs.trajectory_pairs([LATTICE] * 3, SHELL, skin=None)
+        ahead = hs.trajectory_pairs(large, SHELL, skin=None, threads=2)
+    with hs.settings(precision="exact"):
+        assert sum(len(i) for i, _ in blocks) == DOUBLE
+        for found in (frames, ahead):
+            for i, _ in found:
+                assert len(i) == DOUBLE and current().precision == "exact"  # nothing leaks from it
+    with hs.settings(memory_limit=1.0):
+        assert len(list(hs.trajectory_pairs(iter([]), 0.2))) == 0
+
+
+# ---- what is refused -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("how", "error", "message"), [
+    ({"kernel": "abacus"}, ValueError, "kernel must be"),
+    ({"kernel": 3}, TypeError, "kernel must be a string, got int"),
+    ({"algorithm": "tree"}, ValueError, "one of auto all-pairs grid hash hierarchy"),
+    ({"algorithm": "gird"}, ValueError, "did you mean 'grid'"),
+    ({"algorithm": None}, TypeError, "algorithm must be a string"),
+    ({"precision": "half"}, ValueError, "precision must be one of exact double single"),
+    ({"memory_limit": -1}, ValueError, "memory_limit must be a number of bytes, got -1"),
+    ({"memory_limit": float("nan")}, ValueError, "memory_limit must be a number of bytes"),
+    ({"memory_limit": "1 GB"}, TypeError, "memory_limit must be a number of bytes"),
+    ({"threads": 0}, ValueError, "threads must be a whole number from 1 to 1024 or None, got 0"),
+    ({"threads": 2.0}, TypeError, "threads must be a whole number"),
+    ({"threads": True}, TypeError, "threads must be a whole number"),
+    ({"cutoff": 1.0}, TypeError, "cutoff"),
+])  # fmt: skip
+def test_wrong_ones_are_refused_when_they_are_made(how, error, message):
+    with pytest.raises(error, match=message):
+        hs.settings(**how)
+    assert current() is USUAL
+
+
+def test_what_is_set_around_calls_is_no_keyword_of_them():
+    for name in ("kernel", "algorithm", "precision", "memory_limit"):
+        for search in (hs.pairs, hs.neighbors, hs.count_pairs, hs.clusters, hs.iter_pairs):
+            with pytest.raises(TypeError, match=rf"with hs.settings\({name}="):
+                search(LATTICE, 0.3, **{name: None})
+    for name in ("radii", "types", "supports", "groups", "labels", "weights", "batch"):
+        with pytest.raises(TypeError, match=rf"of the points: hs.Points\(points, {name}="):
+            hs.pairs(LATTICE, 0.3, **{name: [1] * 16})
+    for given, meant in (
+        ({"touching": [0]}, "indices"),
+        ({"exclude_within": 1}, "exclude"),
+        ({"pbc": True}, "periodic"),
+    ):
+        with pytest.raises(TypeError, match=meant):
+            hs.pairs(LATTICE, 0.3, **given)
