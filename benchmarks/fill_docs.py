@@ -161,21 +161,6 @@ def threads(rows: Sequence[Row]) -> Lines:
     return table(["scene", "one thread over two"], body)
 
 
-def goals(rows: Sequence[Row]) -> Lines:
-    """Set the ratios that are wanted, of results dropped, beside those that are reached."""
-    wanted = {row.one.scene: float(row.facts["want"]) for row in rows if row.facts["want"]}
-    mine = [row.one for row in rows if row.one.scene in wanted]
-    body = [
-        [f"`{one.scene}`", "the fastest other library", f"{one.recycled:.1f}", f"{one.want:g}"]
-        for one in ratio_rows(mine, wanted)
-    ] + [
-        [f"`{scene}`", "one thread", f"{1.0 / value:.2f}", f"{1.0 / limit.at_most:.1f}"]
-        for limit, scene, value in _limits(rows, ("variant",))
-        if "threads" in limit.options and limit.at_most
-    ]
-    return table(["scene", "against", "ratio", "goal"], body)
-
-
 def latency(rows: Sequence[Row]) -> Lines:
     """Show median and 99th percentile of single calls, ours and of the fastest other."""
     body = []
@@ -233,7 +218,6 @@ SECTIONS: dict[str, Callable[[Sequence[Row]], Lines]] = {
     "growth": growth,
     "threads": threads,
     "latency": latency,
-    "goals": goals,
 }
 
 

@@ -17,12 +17,10 @@ from pathlib import Path
 
 from halfshell_report.findings import (
     SUMMARY,
-    duration,
     findings,
     method_label,
     methods_of,
     number,
-    ratios,
     summary_cells,
 )
 from halfshell_report.rows import ReportRow, read_csv
@@ -51,8 +49,8 @@ def machine(facts: Facts, rows: Rows) -> Lines:
 
 
 def found(facts: Facts, rows: Rows) -> Lines:
-    """The words of the report."""
-    return [f"* {text}" for text in findings(rows)]
+    """The words of the report on our own methods; the tables tell of others."""
+    return [f"* {text}" for text in findings([row for row in rows if row.kind != "peer"])]
 
 
 def methods(facts: Facts, rows: Rows) -> Lines:
@@ -61,7 +59,7 @@ def methods(facts: Facts, rows: Rows) -> Lines:
 
 
 def scenes(facts: Facts, rows: Rows) -> Lines:
-    """Wrong pairs of every method on every scene where anybody errs or fails."""
+    """Wrong pairs of every method on the scenes where a library or "double" errs."""
     plain = [row for row in rows if row.kind in ("halfshell", "peer")]
     names = methods_of(plain, "halfshell", "peer")
     body = []
@@ -76,7 +74,7 @@ def scenes(facts: Facts, rows: Rows) -> Lines:
 
 
 def _notable(row: ReportRow) -> bool:
-    return bool(row.wrong) or row.status in ("failed", "crashed", "timed out")
+    return bool(row.wrong) and row.method not in ("single", "float32")
 
 
 def _cell(row: ReportRow | None) -> str:
@@ -85,19 +83,6 @@ def _cell(row: ReportRow | None) -> str:
     if row.status != "ok":
         return "-" if row.status == "not offered" else row.status
     return number(row.wrong) if row.wrong == 0 else f"**{number(row.wrong)}**"
-
-
-def cost(facts: Facts, rows: Rows) -> Lines:
-    """What the exact decision costs, scene by scene."""
-    double, single = (ratios(rows, "exact", other) for other in ("double", "single"))
-    times = {row.scene: row.seconds_least for row in rows
-             if row.kind == "halfshell" and row.method == "exact"}  # fmt: skip
-    body = [
-        [f"`{scene}`", duration(times[scene]), f"{double[scene]:.2f}",
-         f"{single[scene]:.2f}" if scene in single else ""]
-        for scene in double
-    ]  # fmt: skip
-    return table(["scene", "exact", "over double", "over single"], body)
 
 
 def kept(facts: Facts, rows: Rows) -> Lines:
@@ -111,24 +96,12 @@ def kept(facts: Facts, rows: Rows) -> Lines:
     return table(["scene", "lists", "built", "steps", "missed", "energy drift"], body)
 
 
-def failures(facts: Facts, rows: Rows) -> Lines:
-    """What libraries said instead of an answer."""
-    body = [
-        [f"`{row.scene}`", row.method, row.status, row.note.replace("|", "/")]
-        for row in rows
-        if row.kind == "peer" and row.status in ("failed", "crashed")
-    ]
-    return table(["scene", "library", "", "what it said"], body)
-
-
 SECTIONS: dict[str, Callable[[Facts, Rows], Lines]] = {
     "machine": machine,
     "found": found,
     "methods": methods,
     "scenes": scenes,
-    "cost": cost,
     "kept": kept,
-    "failures": failures,
 }
 
 FULL_SECTIONS = {f"full {name}": SECTIONS[name] for name in ("machine", "methods", "scenes")}

@@ -108,6 +108,26 @@ typedef struct hs_points {
     ptrdiff_t   column_stride;
 } hs_points;
 
+/*
+ * A set of points, and what is known of each; borrowed like them. NULL: it is not known. What a
+ * search goes by is said by its hs_reach, hs_selection or hs_histogram: all else is not looked at.
+ *
+ * A set of several systems has one behind the other, and no pair of two of them: system s has
+ * points first[s] to first[s + 1].
+ */
+typedef struct hs_set {
+    hs_points      at;
+    const double  *radii;     /* n, from 0 to 2^1022, with HS_RULE_MEAN 0 or 2^-1021 at least, as
+                               * halves are exact */
+    const double  *supports;  /* n * ndim * ndim: a matrix of each, see hs_reach */
+    const double  *weights;   /* n, finite; NULL: all 1 */
+    const int32_t *types;     /* n, from 0 on */
+    const int64_t *groups;    /* n */
+    const int64_t *labels;    /* n */
+    int64_t        n_systems; /* 0 <= n_systems < 2^31; not looked at where there is one system */
+    const int64_t *first;     /* n_systems + 1, from 0, not descending, to n; NULL: one system */
+} hs_set;
+
 /* The box. Rows of axes that do not repeat must be finite, and are otherwise ignored. */
 typedef struct hs_box {
     int    ndim;
@@ -259,7 +279,7 @@ typedef enum hs_rule {
 } hs_rule;
 
 /*
- * A reach for each pair, by the radii of its points, by their types or by their supports; all is
+ * A reach for each pair, by what is known of its points: radii, types or supports. Cutoffs are
  * borrowed. With it options->cutoff is a further limit, which may be infinite but for types, and
  * failure->row may be that of a radius, type or support.
  *
@@ -269,25 +289,18 @@ typedef enum hs_rule {
  * HS_RULE_SCATTER, that of j. For 1, 2 and 3 dimensions.
  */
 typedef struct hs_reach {
-    hs_rule        rule;
-    const double  *radii;         /* n, from 0 to 2^1022, with HS_RULE_MEAN 0 or 2^-1021 at least,
-                                   * as halves are exact; NULL where the rule needs none */
-    const double  *query_radii;   /* of queries, if there are any; NULL where the rule needs none */
-    int32_t        n_types;       /* in place of radii, if not 0: */
-    const int32_t *types;         /* n, from 0 to n_types - 1 */
-    const int32_t *query_types;   /* of queries, if there are any */
-    const double  *cutoffs;       /* n_types * n_types, finite and symmetric; negative: no pairs */
-    bool           has_supports;  /* in place of radii and types: */
-    const double  *supports;      /* n * ndim * ndim; NULL where the rule needs none */
-    const double *query_supports; /* of queries, if there are any; NULL where the rule needs none */
+    hs_rule       rule;         /* a set whose radii or supports it does not need may lack them */
+    int32_t       n_types;      /* in place of radii, if not 0: types are below it */
+    const double *cutoffs;      /* n_types * n_types, finite and symmetric; negative: no pairs */
+    bool          has_supports; /* in place of radii and types */
     double extent; /* of supports: finite, not negative. Radii count so many times, as real numbers:
                     * from 2^-64 to 2^64, with radii of 0 or from 2^-500 to 2^500, and rules that
                     * take one of two radii; 0 as 1, without these bounds */
 } hs_reach;
 
 /*
- * Which pairs count, of those within reach; all is borrowed, by a stream only until it is open. No
- * array, and 0, mean that all do. Distances that are returned are not below min_distance.
+ * Which pairs count, of those within reach; arrays are borrowed, by a stream only until it is open.
+ * Where all is 0, all do. Distances that are returned are not below min_distance.
  *
  * The nearest image of a pair is decided for the real numbers that were given. Of images that are
  * equally near it is the one with the lexicographically least S, as seen from the query, or else
@@ -295,21 +308,28 @@ typedef struct hs_reach {
  * point; a point and a query are excluded like any pair.
  */
 typedef struct hs_selection {
-    const int64_t *groups;        /* n: both points of a pair must be of one group */
-    const int64_t *query_groups;  /* of queries, if there are any */
-    const int64_t *labels;        /* n: pairs whose labels differ by at most `within` are excluded,
-                                  * in their nearest image */
-    const int64_t *query_labels;  /* of queries, if there are any */
-    const int64_t *query_numbers; /* in place of these two and for `excluded`: of queries that are
-                                   * points themselves, their numbers. They then pair as points do:
-                                   * a point is not excluded from itself at S = 0, nor too near */
+    bool           has_groups;    /* both points of a pair must be of one group */
+    bool           has_labels;    /* pairs whose labels differ by at most `within` are excluded, in
+                                   * their nearest image */
     int64_t        within;        /* not negative */
     int64_t        n_excluded;    /* not negative */
     const int64_t *excluded;      /* n_excluded * 2, in place of labels: numbers of points, or of a
-                                  * query and a point, whose pair is excluded likewise */
-    double         min_distance; /* finite, not negative: pairs that are nearer do not count; 0 with
-                                  * HS_SINGLE */
+                                   * query and a point, whose pair is excluded likewise */
+    const int64_t *query_numbers; /* of queries that are points themselves, of the same system:
+                                   * their numbers, by which groups, labels and `excluded` are
+                                   * those of the points. They then pair as points do: a point is
+                                   * not excluded from itself at S = 0, nor too near */
+    double         min_distance;  /* finite, not negative: pairs that are nearer do not count; 0
+                                   * with HS_SINGLE */
 } hs_selection;
+
+/* What each of several systems has of its own, in place of what all share; borrowed, each NULL
+ * where all share it. */
+typedef struct hs_each_system {
+    const double  *rows;     /* n_systems * ndim * ndim, in place of box->rows */
+    const uint8_t *periodic; /* n_systems, in place of box->periodic: bit l for row l */
+    const double  *cutoffs;  /* n_systems, in place of options->cutoff */
+} hs_each_system;
 
 /*
  * What a search looks among: points in a box, or cells, which have both. All borrowed: points must
@@ -317,17 +337,27 @@ typedef struct hs_selection {
  * each number is read once). With cells, counters tell what the call took, not what the cells hold;
  * the first hs_nearest_find builds a tree of the points, which stays with the cells and is not
  * counted as memory of the call.
+ *
+ * Several systems are for hs_pairs_find, hs_pairs_count, hs_neighbors_*, hs_nearest_find and
+ * hs_pairs_histogram, and not for cells: they are searched one after the other, and the result is
+ * that of so many calls, one behind the other, with numbers among all points and queries. Threads
+ * share the systems out. A failure names the point among all, and the system where that says more;
+ * failure.system is also where `first` descends. options->counters: bytes_peak is the sum of what
+ * each thread held at most.
  */
 typedef struct hs_among {
-    const hs_points    *points;
-    const hs_box       *box;     /* NULL: open space */
-    const hs_points    *queries; /* where neighbours are looked for; NULL: at each of the points */
-    const hs_cells     *cells;   /* in place of points and box, which are NULL then; or NULL */
-    const hs_reach     *reach;   /* NULL: the cutoff holds for all pairs. Else for hs_pairs_find,
-                               * hs_pairs_count, hs_neighbors_*, hs_stream_open, hs_pairs_visit,
-                               * hs_clusters_find, hs_plan_make */
-    const hs_selection *selection; /* NULL: all of them count. Else for hs_pairs_histogram and the
-                                    * same functions, but for hs_plan_make */
+    const hs_set         *points;
+    const hs_box         *box;     /* NULL: open space */
+    const hs_set         *queries; /* where neighbours are looked for, of as many systems; NULL: at
+                                    * each of the points */
+    const hs_cells       *cells;   /* in place of box and points, which are NULL then, or have no
+                                    * data and say what is known of the points of the cells */
+    const hs_reach       *reach;   /* NULL: the cutoff holds for all pairs. Else for hs_pairs_find,
+                                    * hs_pairs_count, hs_neighbors_*, hs_stream_open,
+                                    * hs_pairs_visit, hs_clusters_find, hs_plan_make */
+    const hs_selection   *selection; /* NULL: all of them count. Else for hs_pairs_histogram and the
+                                      * same functions, but for hs_plan_make */
+    const hs_each_system *each;      /* of several systems; NULL: they share all */
 } hs_among;
 
 /* A finished search: opaque, owned by the caller. */
@@ -347,7 +377,8 @@ hs_status hs_pairs_find(const hs_among *among, const hs_options *options, hs_pai
                         hs_failure *failure);
 
 /* The number of pairs of hs_pairs_find; options->want and ->sorted are ignored. With queries: every
- * neighbour of each, the sum of what hs_neighbors_count counts. */
+ * neighbour of each, the sum of what hs_neighbors_count counts. count: of several systems, one for
+ * each, unspecified on failure. */
 hs_status hs_pairs_count(const hs_among *among, const hs_options *options, int64_t *count,
                          hs_failure *failure);
 
@@ -368,30 +399,22 @@ hs_status hs_neighbors_find(const hs_among *among, const hs_options *options, hs
 hs_status hs_neighbors_count(const hs_among *among, const hs_options *options, int64_t *counts,
                              hs_failure *failure);
 
-/* What is known of each point of a set beside its place; borrowed. */
-typedef struct hs_marks {
-    const int32_t *types;   /* n, from 0 on; NULL where n_types is 1 */
-    const double  *weights; /* n, finite; NULL: all 1 */
-} hs_marks;
-
 /* Pairs by distance, and where the numbers go. Everything is borrowed. */
 typedef struct hs_histogram {
     int64_t       n_edges;   /* at least 1, less than 2^30 */
     const double *edges;     /* finite, not negative, not descending */
     bool          inclusive; /* a pair at exactly an edge counts below it, not from it on ... */
     bool          last_inclusive; /* ... and at the last one, the cutoff; if inclusive, this too */
-    int32_t       n_types;        /* at least 1 */
-    hs_marks      of_points;
-    hs_marks      of_queries;
-    int64_t      *counts; /* n_types * n_types * n_edges, or NULL */
-    double       *sums;   /* n_types * n_types * n_edges, or NULL */
+    int32_t       n_types;        /* at least 1; types of 1 are not needed */
+    int64_t      *counts; /* n_types * n_types * n_edges, so many for each system; or NULL */
+    double       *sums;   /* as many, or NULL */
 } hs_histogram;
 
 /*
  * Sort all pairs into a histogram by their distance, each decided exactly at each edge, and store
  * none. counts[(a * n_types + b) * n_edges + k]: how many lie below edge k and not below edge
- * k - 1, if there is one. sums: of the products of their two weights, exact until they are rounded
- * once.
+ * k - 1, if there is one. sums: of the products of the weights of both points, exact until they are
+ * rounded once.
  *
  * Without queries: each pair of points once (half list); a and b are its two types, and [a][b] is
  * [b][a]. Otherwise each query with each point: a is the type of the query, b that of the point.
@@ -408,12 +431,12 @@ hs_status hs_pairs_histogram(const hs_among *among, const hs_options *options,
  * exact distance and, where distances are equal, by (j, S). In a periodic box each image of a point
  * counts for itself. Without queries: of each point among the points, itself left out where S = 0.
  *
- * options->cutoff is the largest distance that counts, itself included, and may be infinite. What a
- * row lacks is j = -1, distance infinity, vector NaN, S = 0. Of options->want only j, distance,
- * vector and shift count; inclusive, sorted, precision and out are ignored. hs_pairs_length is k
- * times the number of queries. Memory and failures as for hs_neighbors_find; HS_ERR_MEMORY also
- * when a query is so far from points that repeat that more of their images than memory holds are
- * about as near.
+ * options->cutoff is the largest distance that counts, itself included if options->inclusive, and
+ * may be infinite. A selection says which points count; a reach is refused. What a row lacks is
+ * j = -1, distance infinity, vector NaN, S = 0. Of options->want only j, distance, vector and shift
+ * count; sorted, precision and out are ignored. hs_pairs_length is k times the number of queries.
+ * Memory and failures as for hs_neighbors_find; HS_ERR_MEMORY also when a query is so far from
+ * points that repeat that more of their images than memory holds are about as near.
  */
 hs_status hs_nearest_find(const hs_among *among, int64_t k, const hs_options *options,
                           hs_pairs **rows, hs_failure *failure);
@@ -600,54 +623,6 @@ hs_status hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t 
  */
 hs_status hs_cells_candidates(const hs_cells *cells, const hs_points *queries,
                               const hs_options *options, hs_pairs **ranges, hs_failure *failure);
-
-/*
- * Several systems, searched in one call: system s has points first[s] to first[s + 1] and no pair
- * with another. All arrays are borrowed.
- */
-typedef struct hs_systems {
-    int64_t             n;           /* 0 <= n < 2^31 */
-    const int64_t      *first;       /* n + 1; from 0, not descending, to the number of points */
-    const hs_box       *box;         /* of all; NULL: open space */
-    const double       *rows;        /* n * ndim * ndim, in place of box->rows: of each; or NULL */
-    const double       *cutoffs;     /* n, in place of options->cutoff; or NULL */
-    const hs_reach     *reach;       /* of all points; the cutoffs are further limits; or NULL */
-    const hs_selection *selection;   /* of all points; or NULL */
-    const int64_t      *first_query; /* as first, of queries, where there are any; or NULL */
-    const uint8_t      *periodic;    /* n, in place of box->periodic: bit l for row l; or NULL */
-} hs_systems;
-
-/*
- * As hs_pairs_find for one system after the other: the result is that of so many calls, one behind
- * the other, with numbers of all points as i and j. Threads share the systems out. A failure names
- * the point among all, and the system where that says more. options->counters: bytes_peak is the
- * sum of what each thread held at most.
- */
-hs_status hs_systems_find(const hs_points *points, const hs_systems *systems,
-                          const hs_options *options, hs_pairs **pairs, hs_failure *failure);
-
-/* The number of pairs of each system; counts: n, unspecified on failure. */
-hs_status hs_systems_count(const hs_points *points, const hs_systems *systems,
-                           const hs_options *options, int64_t *counts, hs_failure *failure);
-
-/* As hs_neighbors_find, hs_neighbors_count and hs_nearest_find for one system after the other:
- * rows of all points, or of all queries, with numbers among all. queries: NULL, or with
- * systems->first_query. A selection has no query_numbers. */
-hs_status hs_systems_neighbors(const hs_points *points, const hs_points *queries,
-                               const hs_systems *systems, const hs_options *options,
-                               hs_pairs **rows, hs_failure *failure);
-hs_status hs_systems_coordination(const hs_points *points, const hs_points *queries,
-                                  const hs_systems *systems, const hs_options *options,
-                                  int64_t *counts, hs_failure *failure);
-hs_status hs_systems_nearest(const hs_points *points, const hs_points *queries,
-                             const hs_systems *systems, int64_t k, const hs_options *options,
-                             hs_pairs **rows, hs_failure *failure);
-
-/* As hs_pairs_histogram for one system after the other: marks are of all points or queries, counts
- * and sums have n times as many entries. No cutoff is looked at; there is no reach. */
-hs_status hs_systems_histogram(const hs_points *points, const hs_points *queries,
-                               const hs_systems *systems, const hs_options *options,
-                               const hs_histogram *histogram, hs_failure *failure);
 
 /*
  * A list of pairs that is used for many steps: built with a skin, kept as long as no pair within

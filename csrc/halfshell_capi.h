@@ -33,7 +33,7 @@ extern "C" {
 
 /* Of the structs, enums and signatures in halfshell.h. It grows when one changes such that modules
  * that were compiled before would misread it; not when functions are appended to the table. */
-#define HS_CAPI_VERSION 7
+#define HS_CAPI_VERSION 8
 
 #define HS_CAPI_NAME "halfshell._core._C_API"
 
@@ -83,22 +83,6 @@ typedef struct hs_capi {
     hs_status (*cells_candidates)(const hs_cells *cells, const hs_points *queries,
                                   const hs_options *options, hs_pairs **ranges,
                                   hs_failure *failure);
-    hs_status (*systems_find)(const hs_points *points, const hs_systems *systems,
-                              const hs_options *options, hs_pairs **pairs, hs_failure *failure);
-    hs_status (*systems_count)(const hs_points *points, const hs_systems *systems,
-                               const hs_options *options, int64_t *counts, hs_failure *failure);
-    hs_status (*systems_neighbors)(const hs_points *points, const hs_points *queries,
-                                   const hs_systems *systems, const hs_options *options,
-                                   hs_pairs **rows, hs_failure *failure);
-    hs_status (*systems_coordination)(const hs_points *points, const hs_points *queries,
-                                      const hs_systems *systems, const hs_options *options,
-                                      int64_t *counts, hs_failure *failure);
-    hs_status (*systems_nearest)(const hs_points *points, const hs_points *queries,
-                                 const hs_systems *systems, int64_t k, const hs_options *options,
-                                 hs_pairs **rows, hs_failure *failure);
-    hs_status (*systems_histogram)(const hs_points *points, const hs_points *queries,
-                                   const hs_systems *systems, const hs_options *options,
-                                   const hs_histogram *histogram, hs_failure *failure);
     hs_verlet *(*verlet_new)(void);
     hs_status (*verlet_update)(hs_verlet *list, const hs_points *points, const hs_box *box,
                                const hs_options *options, double skin, bool rebuild, bool *rebuilt,

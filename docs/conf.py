@@ -11,9 +11,9 @@ author = "The halfshell developers"
 project_copyright = author
 version = release = halfshell.__version__
 
-extensions = ["sphinx.ext.autodoc", "numpydoc", "myst_nb"]
-source_suffix = {".md": "myst-nb"}
-exclude_patterns = ["_build", "report/*.html"]
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "myst_nb"]
+source_suffix = {".rst": "restructuredtext", ".md": "myst-nb"}  # the first is that of stubs
+exclude_patterns = ["_build", "report/*.html", "templates"]
 root_doc = "index"
 nitpicky = True
 
@@ -22,7 +22,7 @@ html_title = "halfshell"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_show_sphinx = False
-templates_path: list[str] = []
+templates_path = ["templates"]
 
 # Pages that begin with a `jupytext` header are notebooks, run at each build. Nothing is kept.
 nb_execution_mode = "force"
@@ -37,17 +37,26 @@ myst_links_external_new_tab = False
 autodoc_typehints = "none"  # the docstrings say it in words
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True}
+# A page for each name in the tables of reference/index.md, in reference/api. Where case does not
+# tell files apart, `Clusters` and `clusters` need different names.
+autosummary_generate = True
+autosummary_filename_map = {
+    f"halfshell.{name}": f"halfshell.{name}-class"
+    for name in halfshell.__all__
+    if name.lower() != name
+}
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
 
 
 def leave_out_signature(app, what, name, _obj, _options, signature, returned):
     """Return no signature for classes that users do not call, but get; else what users may give."""
-    results = Path(app.srcdir, "reference", "results.md").read_text(encoding="utf-8")
-    is_result = f"autoclass:: {name.rpartition('.')[2]}\n" in results
-    if what == "class" and is_result:
+    page = Path(app.srcdir, "reference", "index.md").read_text(encoding="utf-8")
+    results = page.partition("## Results")[2].partition("##")[0]
+    if what == "class" and name.rpartition(".")[2] in results.split():
         return "", None
-    return signature and re.sub(r", \*\*unknown\b[^,)]*", "", signature), returned
+    shown = re.sub(r", \*\*unknown\b[^,)]*", "", signature or "")
+    return re.sub(r"<class '([\w.]+)'>", r"\1", shown) or signature, returned
 
 
 def link_public_names(_app, _what, _name, _obj, _options, lines):
@@ -57,19 +66,6 @@ def link_public_names(_app, _what, _name, _obj, _options, lines):
         lines[k] = re.sub(rf"(?<![`:])`({names})`(?!`)", r":py:obj:`~halfshell.\1`", line)
 
 
-def place_new_names(app, docname, source):
-    """Put public names that no page of the reference mentions on the page of tools."""
-    if docname == "reference/tools":
-        pages = Path(app.srcdir, "reference").glob("*.md")
-        placed = "".join(page.read_text(encoding="utf-8") for page in pages)
-        for name in halfshell.__all__:
-            if f":: {name}\n" not in placed:
-                kind = "class" if isinstance(getattr(halfshell, name), type) else "function"
-                source[0] = source[0].rstrip().removesuffix("```")
-                source[0] += f"\n.. auto{kind}:: halfshell.{name}\n```\n"
-
-
 def setup(app):
-    app.connect("source-read", place_new_names)
     app.connect("autodoc-process-docstring", link_public_names)
     app.connect("autodoc-process-signature", leave_out_signature)

@@ -61,6 +61,24 @@ class MatscipyNeighbours(adapters.MatscipyNeighbours, Contestant):
     """matscipy-neighbours."""
 
 
+class Linkcell(Contestant):
+    """linkcell, of Python 3.12 on: i, j, S and squared distances, whatever is wanted of them."""
+
+    name = distribution = module = "linkcell"
+    quantities = "ijS"
+    open_space = some_axes = False
+
+    def prepare(self, scene: Scene) -> Call:
+        """Hand points and rows over as they are."""
+        find = importlib.import_module("linkcell").pairs_within
+        asked = (scene.points, scene.rows, scene.cutoff)
+        return lambda: [np.from_dlpack(column) for column in find(*asked, half=True)]
+
+    def shifts(self, result: Any) -> Any:
+        """Return S, which comes before the squared distances."""
+        return result[2]
+
+
 class MDAnalysis(adapters.MDAnalysis, Contestant):
     """MDAnalysis."""
 
@@ -142,6 +160,7 @@ PEERS: dict[str, Contestant] = {
         CKDTree(),
         NeighborlistRs(),
         MatscipyNeighbours(),
+        Linkcell(),
         MDAnalysis(),
         Freud(),
         Pymatgen(),

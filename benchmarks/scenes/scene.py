@@ -30,6 +30,7 @@ LIST_PEERS = (
     "cKDTree",
     "neighborlist-rs",
     "matscipy-neighbours",
+    "linkcell",
     "MDAnalysis",
     "pymatgen",
     "freud",

@@ -182,7 +182,7 @@ take_quantities(PyObject *object, const char *known, const char **letters, unsig
 {
     unsigned seen = 0;
     if (!PyUnicode_Check(object)) {
-        PyErr_Format(PyExc_TypeError, "quantities must be a string, got %s",
+        PyErr_Format(PyExc_TypeError, "quantities must be a string of letters, got %s",
                      Py_TYPE(object)->tp_name);
         return false;
     }
@@ -345,6 +345,8 @@ take_number(hs_kind kind, PyObject *object, hs_py_call *call)
         return take_quantities(object, HS_LETTERS, &call->letters, &options->want);
     case HS_ARG_ROW_QUANTITIES:
         return take_quantities(object, HS_ROW_LETTERS, &call->letters, &options->want);
+    case HS_ARG_SHELL_ROW_QUANTITIES:
+        return take_quantities(object, HS_SHELL_ROW_LETTERS, &call->letters, &options->want);
     case HS_ARG_SORT: return take_truth(object, &options->sorted);
     case HS_ARG_INDEX: return take_index_bytes(object, &options->index_bytes);
     case HS_ARG_FLAG: return take_truth(object, &call->flag);
@@ -362,16 +364,17 @@ take_scene(PyObject *points, PyObject *box, unsigned long repeats, hs_py_call *c
 {
     hs_among *among = &call->among;
     bool      has_box;
+    among->points = &call->points;
     among->cells = hs_cells_of(points);
     if (among->cells != NULL) {
-        hs_cells_points(among->cells, &call->points);
+        hs_cells_points(among->cells, &call->points.at);
+        call->points.at.data = NULL;
         return true;
     }
-    if (!hs_points_of(points, "points", &call->points) ||
-        !hs_box_of(box, repeats, call->points.ndim, &call->box, &has_box)) {
+    if (!hs_points_of(points, "points", &call->points.at) ||
+        !hs_box_of(box, repeats, call->points.at.ndim, &call->box, &has_box)) {
         return false;
     }
-    among->points = &call->points;
     among->box = has_box ? &call->box : NULL;
     return true;
 }
@@ -379,8 +382,8 @@ take_scene(PyObject *points, PyObject *box, unsigned long repeats, hs_py_call *c
 static bool
 take_queries(PyObject *object, hs_py_call *call)
 {
-    const hs_points *points = &call->points, *queries = &call->queries;
-    if (!hs_points_of(object, "queries", &call->queries)) {
+    const hs_points *points = &call->points.at, *queries = &call->queries.at;
+    if (!hs_points_of(object, "queries", &call->queries.at)) {
         return false;
     }
     if (queries->ndim != points->ndim) {
@@ -390,7 +393,7 @@ take_queries(PyObject *object, hs_py_call *call)
                      (long long)queries->n, queries->ndim, (long long)points->n, points->ndim);
         return false;
     }
-    call->among.queries = queries;
+    call->among.queries = &call->queries;
     return true;
 }
 
@@ -400,7 +403,8 @@ take_out(PyObject *object, hs_py_call *call)
     hs_options *options = &call->options;
     call->out = object;
     options->out = &call->arrays;
-    return hs_out_of(object, call->letters, call->points.ndim, options->index_bytes, &call->arrays);
+    return hs_out_of(object, call->letters, call->points.at.ndim, options->index_bytes,
+                     &call->arrays);
 }
 
 /* The cutoffs of shells, which go with their letter; NULL: one cutoff. */
@@ -424,7 +428,24 @@ take_shells(PyObject *object, hs_options *options)
     return true;
 }
 
-/* ---- a reach, a selection ----------------------------------------------------------------- */
+/* ---- what is known of points; a reach, a selection --------------------------------------- */
+
+bool
+hs_known_take(PyObject *of_points, PyObject *of_queries, int type, int n_axes, const char *must,
+              size_t member, hs_py_call *call)
+{
+    PyObject *const given[] = {of_points, of_queries};
+    hs_set *const   sets[] = {&call->points, &call->queries}; /* without queries, of none */
+    for (int k = 0; k < 2; k++) {
+        const void *entries;
+        if (!hs_entries_of(given[k], type, n_axes, sets[k]->at.n, call->points.at.ndim, must,
+                           &entries)) {
+            return false;
+        }
+        memcpy((char *)sets[k] + member, &entries, sizeof entries);
+    }
+    return true;
+}
 
 /*
  * A tuple (rule, radii, query_radii, types, query_types, table, supports, query_supports, extent):
@@ -434,7 +455,7 @@ take_shells(PyObject *object, hs_options *options)
  * may be None.
  */
 static bool
-take_limits(PyObject *object, const hs_py_call *call, hs_reach *reach)
+take_limits(PyObject *object, hs_py_call *call, hs_reach *reach)
 {
     static const char *const must = "radii and types must be arrays of one entry for each point or "
                                     "query",
@@ -442,8 +463,6 @@ take_limits(PyObject *object, const hs_py_call *call, hs_reach *reach)
                                                        "matrix for each point or query",
                              *const must_be_table = "the table of cutoffs must be a square float64 "
                                                     "array";
-    const int64_t n = call->points.n, n_queries = call->among.queries != NULL ? call->queries.n : 0;
-    const int     d = call->points.ndim;
     *reach = (hs_reach){.n_types = 0};
     if (!PyTuple_CheckExact(object) || PyTuple_GET_SIZE(object) != 9 ||
         !PyLong_CheckExact(PyTuple_GET_ITEM(object, 0))) {
@@ -451,7 +470,7 @@ take_limits(PyObject *object, const hs_py_call *call, hs_reach *reach)
         return false;
     }
     PyObject *const *of = &PyTuple_GET_ITEM(object, 0);
-    const void      *radii, *query_radii, *types, *query_types, *table, *supports, *query_supports;
+    const void      *table;
     const long       rule = PyLong_AsLong(of[0]);
     if (rule < 0 || rule >= HS_RULE_END) {
         PyErr_Clear(); /* of a number that is no long */
@@ -461,10 +480,8 @@ take_limits(PyObject *object, const hs_py_call *call, hs_reach *reach)
     const int64_t n_types = PyArray_Check(of[5]) && PyArray_NDIM((PyArrayObject *)of[5]) > 0
                                 ? PyArray_DIM((PyArrayObject *)of[5], 0)
                                 : 0;
-    if (!hs_entries_of(of[1], NPY_DOUBLE, 1, n, 0, must, &radii) ||
-        !hs_entries_of(of[2], NPY_DOUBLE, 1, n_queries, 0, must, &query_radii) ||
-        !hs_entries_of(of[3], NPY_INT32, 1, n, 0, must, &types) ||
-        !hs_entries_of(of[4], NPY_INT32, 1, n_queries, 0, must, &query_types) ||
+    if (!hs_known_take(of[1], of[2], NPY_DOUBLE, 1, must, offsetof(hs_set, radii), call) ||
+        !hs_known_take(of[3], of[4], NPY_INT32, 1, must, offsetof(hs_set, types), call) ||
         !hs_entries_of(of[5], NPY_DOUBLE, 2, n_types, n_types, must_be_table, &table)) {
         return false;
     }
@@ -472,13 +489,7 @@ take_limits(PyObject *object, const hs_py_call *call, hs_reach *reach)
         PyErr_SetString(PyExc_TypeError, must_be_table);
         return false;
     }
-    *reach = (hs_reach){.rule = (hs_rule)rule,
-                        .radii = radii,
-                        .query_radii = query_radii,
-                        .types = types,
-                        .query_types = query_types,
-                        .n_types = (int32_t)n_types,
-                        .cutoffs = table};
+    *reach = (hs_reach){.rule = (hs_rule)rule, .n_types = (int32_t)n_types, .cutoffs = table};
     if (of[8] == Py_None) {
         return true;
     }
@@ -486,14 +497,12 @@ take_limits(PyObject *object, const hs_py_call *call, hs_reach *reach)
         PyErr_SetString(PyExc_TypeError, "extent must be a float");
         return false;
     }
-    if (!hs_entries_of(of[6], NPY_DOUBLE, 3, n, d, must_be_matrices, &supports) ||
-        !hs_entries_of(of[7], NPY_DOUBLE, 3, n_queries, d, must_be_matrices, &query_supports)) {
+    if (!hs_known_take(of[6], of[7], NPY_DOUBLE, 3, must_be_matrices, offsetof(hs_set, supports),
+                       call)) {
         return false;
     }
     reach->has_supports = of[6] != Py_None || of[7] != Py_None;
     reach->extent = PyFloat_AS_DOUBLE(of[8]);
-    reach->supports = supports;
-    reach->query_supports = query_supports;
     return true;
 }
 
@@ -503,11 +512,10 @@ take_limits(PyObject *object, const hs_py_call *call, hs_reach *reach)
  * columns; and a float. Arrays may be None.
  */
 static bool
-take_selection(PyObject *object, const hs_py_call *call, hs_selection *selection)
+take_selection(PyObject *object, hs_py_call *call, hs_selection *selection)
 {
     static const char *const must = "labels must be int64 arrays of one entry for each point or "
                                     "query";
-    const int64_t n = call->points.n, n_queries = call->among.queries != NULL ? call->queries.n : 0;
     if (!PyTuple_CheckExact(object) || PyTuple_GET_SIZE(object) != 8 ||
         !PyLong_CheckExact(PyTuple_GET_ITEM(object, 5)) ||
         !PyFloat_CheckExact(PyTuple_GET_ITEM(object, 7))) {
@@ -515,28 +523,25 @@ take_selection(PyObject *object, const hs_py_call *call, hs_selection *selection
         return false;
     }
     PyObject *const *of = &PyTuple_GET_ITEM(object, 0);
-    const void      *entries[5], *excluded;
+    const void      *numbers, *excluded;
     const long long  within = PyLong_AsLongLong(of[5]);
     if (within < 0) {
         PyErr_Clear(); /* of a number that is no long long */
         PyErr_SetString(PyExc_ValueError, "labels cannot differ by so much");
         return false;
     }
-    for (int k = 0; k < 5; k++) {
-        const int64_t length = k == 0 || k == 2 ? n : n_queries;
-        if (!hs_entries_of(of[k], NPY_INT64, 1, length, 0, must, &entries[k])) {
-            return false;
-        }
+    if (!hs_known_take(of[0], of[1], NPY_INT64, 1, must, offsetof(hs_set, groups), call) ||
+        !hs_known_take(of[2], of[3], NPY_INT64, 1, must, offsetof(hs_set, labels), call) ||
+        !hs_entries_of(of[4], NPY_INT64, 1, call->queries.at.n, 0, must, &numbers)) {
+        return false;
     }
     if (!hs_entries_of(of[6], NPY_INT64, 2, -1, 2, "excluded must be an int64 array of two columns",
                        &excluded)) {
         return false;
     }
-    *selection = (hs_selection){.groups = entries[0],
-                                .query_groups = entries[1],
-                                .labels = entries[2],
-                                .query_labels = entries[3],
-                                .query_numbers = entries[4],
+    *selection = (hs_selection){.has_groups = of[0] != Py_None || of[1] != Py_None,
+                                .has_labels = of[2] != Py_None || of[3] != Py_None,
+                                .query_numbers = numbers,
                                 .within = within,
                                 .n_excluded = hs_length_of(of[6]),
                                 .excluded = excluded,
@@ -602,13 +607,13 @@ take_views(PyObject *const *of, unsigned long repeats, hs_py_call *call)
          !hs_out_is_apart(out, call->letters, box, "box"))) {
         return false;
     }
-    return batch == NULL || hs_batch_take(batch, call, &call->batch);
+    return batch == NULL || hs_batch_take(batch, call);
 }
 
 static int64_t
 count_points(const hs_py_call *call)
 {
-    return call->points.n + (call->among.queries != NULL ? call->queries.n : 0);
+    return call->points.at.n + (call->among.queries != NULL ? call->queries.at.n : 0);
 }
 
 bool
@@ -664,6 +669,7 @@ hs_py_call_take(hs_py_call *call, hs_function_number number, PyObject *const *ar
     }
     *options = hs_options_default();
     call->among = (hs_among){.points = NULL};
+    call->points = call->queries = (hs_set){.first = NULL};
     call->batch = (hs_batch){.is_given = false};
     call->own = arguments + HS_CALL_ARGUMENTS;
     call->letters = "ij";
@@ -692,7 +698,7 @@ hs_py_call_take(hs_py_call *call, hs_function_number number, PyObject *const *ar
 void
 hs_py_call_end(hs_py_call *call)
 {
-    if (call->batch.number != NULL) {
+    if (call->batch.is_given && !call->batch.are_all) {
         call->failure.system = -1; /* systems are named where each has something of its own */
     }
     hs_batch_free(&call->batch);

@@ -17,27 +17,29 @@
 #include <stdbool.h>
 
 /*
- * The systems as the core takes them. Where all share box and cutoff, those without points are left
- * out: numbers may be as far apart as users like. Otherwise each has its place.
+ * Several systems. Where all share box and cutoff, those without points are left out: numbers may
+ * be as far apart as users like. Otherwise each has its place.
  */
 typedef struct hs_batch {
-    bool       is_given; /* else there is one system, and nothing below is set */
-    hs_systems systems;
-    int64_t   *first;       /* owned */
-    int64_t   *first_query; /* owned; NULL where there are no queries */
-    int64_t   *number;      /* owned: of each system; NULL where that is its place */
-    int64_t    capacity;    /* of these */
-    int64_t    n_numbers;   /* systems, those without points counted */
+    bool     is_given;    /* else there is one system, and nothing below is set */
+    int64_t  n;           /* systems */
+    int64_t *first;       /* owned */
+    int64_t *first_query; /* owned; NULL where there are no queries */
+    int64_t *number;      /* owned: of each system */
+    bool     are_all;     /* each number is its place */
+    int64_t  capacity;    /* of these arrays */
+    int64_t  n_numbers;   /* systems, those without points counted */
 } hs_batch;
 
 /* The arguments of a search, as views; the Python arguments that they borrow from must stay
  * alive. It borrows from itself: it cannot be moved. */
 typedef struct hs_py_call {
-    hs_among         among; /* what is searched; `points` is NULL where there are cells */
-    hs_points        points, queries;
+    hs_among         among;
+    hs_set           points, queries; /* those of cells have no data */
     hs_box           box;
     hs_reach         reach;
     hs_selection     selection;
+    hs_each_system   each;
     hs_options       options;
     hs_failure       failure;
     hs_batch         batch;
@@ -78,6 +80,11 @@ bool hs_is_array(PyObject *object, int type, int n_axes);
 bool hs_entries_of(PyObject *object, int type, int n_axes, int64_t length, int64_t width,
                    const char *must, const void **entries);
 
+/* What is known of each point and of each query, arrays or None: to the member of their sets that
+ * is so far from the beginning. False with a TypeError, `must`. */
+bool hs_known_take(PyObject *of_points, PyObject *of_queries, int type, int n_axes,
+                   const char *must, size_t member, hs_py_call *call);
+
 /* The length of axis 0 of an array, 0 for None. */
 int64_t hs_length_of(PyObject *object);
 
@@ -96,10 +103,12 @@ bool hs_repeats_of(PyObject *periodic, unsigned long *repeats);
  * whether there is a box at all. */
 bool hs_box_of(PyObject *object, unsigned long repeats, int ndim, hs_box *box, bool *given);
 
-/* A string of the known letters, which are some of HS_LETTERS, each at most once. */
-#define HS_LETTERS     "ijdDSPk"
-#define HS_ALL_LETTERS "ijdDSP" /* those that every list of pairs has: k needs several cutoffs */
-#define HS_ROW_LETTERS "jdDS"   /* a row says itself what i is */
+/* A string of the known letters, which are some of HS_LETTERS, each at most once: of lists of
+ * pairs, of those that have no k, and of rows, which say themselves what i is. */
+#define HS_LETTERS           "ijdDSPk"
+#define HS_ALL_LETTERS       "ijdDSP"
+#define HS_ROW_LETTERS       "jdDS"
+#define HS_SHELL_ROW_LETTERS "jdDSk"
 
 /* By number of the algorithm. */
 extern const char *const hs_algorithm_names[HS_ALGORITHM_END];
@@ -111,7 +120,7 @@ extern const char *const hs_algorithm_names[HS_ALGORITHM_END];
  * repeat in each system, uint8 (s,), or None where they are those of the call. False with an
  * exception set.
  */
-bool hs_batch_take(PyObject *given, const hs_py_call *call, hs_batch *batch);
+bool hs_batch_take(PyObject *given, hs_py_call *call);
 void hs_batch_free(hs_batch *batch);
 
 /* Zeros of shape (numbers, ...), for as many more axes; NULL with an exception set. */

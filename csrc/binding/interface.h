@@ -1,16 +1,17 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * table.h: what each function that searches takes, said once. py_call.h reads the arguments by it,
- * and the module makes its functions of it.
+ * The table of the interface: what each function that searches takes, said once. By it arguments.h
+ * reads the arguments of a call and quick.h those that users give, the module makes its functions,
+ * and tests/core_stub.py writes the stub.
  */
-#ifndef HS_TABLE_H
-#define HS_TABLE_H
+#ifndef HS_INTERFACE_H
+#define HS_INTERFACE_H
 
 #include "numpy_api.h"
 
 #include <stdbool.h>
 
-/* What an argument becomes, see py_call.h. */
+/* What an argument becomes, see arguments.h. */
 typedef enum hs_kind {
     HS_ARG_END, /* of a list */
     /* Of every search, in this order. */
@@ -25,9 +26,10 @@ typedef enum hs_kind {
     HS_ARG_PROGRESS,     /* None: no calls */
     HS_ARG_THREADS,      /* None: as many as pay */
     /* Of some. */
-    HS_ARG_QUANTITIES,       /* some of HS_ALL_LETTERS */
-    HS_ARG_SHELL_QUANTITIES, /* some of HS_LETTERS, where there may be shells */
-    HS_ARG_ROW_QUANTITIES,   /* some of HS_ROW_LETTERS */
+    HS_ARG_QUANTITIES,           /* some of HS_ALL_LETTERS */
+    HS_ARG_SHELL_QUANTITIES,     /* some of HS_LETTERS, where there may be shells */
+    HS_ARG_ROW_QUANTITIES,       /* some of HS_ROW_LETTERS */
+    HS_ARG_SHELL_ROW_QUANTITIES, /* some of HS_SHELL_ROW_LETTERS */
     HS_ARG_SORT,
     HS_ARG_INDEX,        /* bytes of an index */
     HS_ARG_OUT,          /* arrays, or None */
@@ -39,12 +41,12 @@ typedef enum hs_kind {
     HS_ARG_OWN,          /* left to the function, which runs no Python code for it */
     /* Of some: None, or what may be left out with all that follow. */
     HS_ARG_QUERIES,
-    HS_ARG_REACH,     /* of reach.h; or a tuple of that, or None, and a selection */
+    HS_ARG_REACH,     /* of arguments.h; or a tuple of that, or None, and a selection */
     HS_ARG_ALGORITHM, /* a name */
     HS_ARG_SHELLS,    /* several cutoffs, with the letter k */
     HS_ARG_CAPACITY,  /* an int, negative where the number of pairs is returned too, and pairs
                                 that do not fit are no error */
-    HS_ARG_BATCH      /* of many_systems.h */
+    HS_ARG_BATCH      /* of arguments.h */
 } hs_kind;
 
 #define HS_KINDS (HS_ARG_BATCH + 1)

@@ -41,17 +41,13 @@ grow_one(int64_t **array, int64_t n)
     return true;
 }
 
-/* Arrays for twice as many systems, or for the first. */
+/* Arrays for so many systems. */
 static bool
-grow(hs_batch *batch, bool has_queries)
+grow(hs_batch *batch, int64_t capacity, bool has_queries)
 {
-    const int64_t capacity = batch->capacity > 0 ? 2 * batch->capacity : FIRST_CAPACITY;
-    if (!grow_one(&batch->first, capacity + 1) || !grow_one(&batch->number, capacity) ||
-        (has_queries && !grow_one(&batch->first_query, capacity + 1))) {
-        return false;
-    }
     batch->capacity = capacity;
-    return true;
+    return grow_one(&batch->first, capacity + 1) && grow_one(&batch->number, capacity + 1) &&
+           (!has_queries || grow_one(&batch->first_query, capacity + 1));
 }
 
 static bool
@@ -116,83 +112,39 @@ pass(numbered *set, int64_t number, int64_t n_systems)
     return true;
 }
 
-/* Systems that have points, or queries. */
+/* Where each system begins: all of n_systems, or, where that is MOST_NUMBER, those that have points
+ * or queries. */
 static bool
-find_occupied(numbered *points, numbered *queries, hs_batch *batch)
+find_systems(numbered *points, numbered *queries, int64_t n_systems, hs_batch *batch)
 {
-    const bool has_queries = queries->number != NULL;
+    const bool are_all = n_systems < MOST_NUMBER, has_queries = queries->number != NULL;
     int64_t    n = 0, number = -1;
-    if (!begin(points, MOST_NUMBER) || !begin(queries, MOST_NUMBER)) {
+    if (!grow(batch, are_all ? n_systems : FIRST_CAPACITY, has_queries) ||
+        !begin(points, n_systems) || !begin(queries, n_systems)) {
         return false;
     }
-    while (points->next < MOST_NUMBER || queries->next < MOST_NUMBER) {
-        if (n == batch->capacity && !grow(batch, has_queries)) {
+    while (are_all ? n < n_systems : points->at < points->n || queries->at < queries->n) {
+        if (n == batch->capacity && !grow(batch, 2 * n, has_queries)) {
             return false;
         }
-        number = points->next < queries->next ? points->next : queries->next;
+        number = are_all ? n : points->next < queries->next ? points->next : queries->next;
         batch->first[n] = points->at;
         if (has_queries) {
             batch->first_query[n] = queries->at;
         }
         batch->number[n++] = number;
-        if (!pass(points, number, MOST_NUMBER) || !pass(queries, number, MOST_NUMBER)) {
+        if (!pass(points, number, n_systems) || !pass(queries, number, n_systems)) {
             return false;
         }
-    }
-    if (batch->first == NULL && !grow(batch, has_queries)) {
-        return false;
     }
     batch->first[n] = points->n;
     if (has_queries) {
         batch->first_query[n] = queries->n;
     }
-    batch->systems.n = n;
+    batch->are_all = are_all;
+    batch->n = n;
     batch->n_numbers = number + 1;
     return true;
-}
-
-/* Where each of n_systems begins in a set, with or without points. */
-static bool
-find_all(numbered *set, int64_t n_systems, int64_t **first)
-{
-    if (!grow_one(first, n_systems + 1) || !begin(set, n_systems)) {
-        return false;
-    }
-    for (int64_t s = 0; s < n_systems; s++) {
-        (*first)[s] = set->at;
-        if (!pass(set, s, n_systems)) {
-            return false;
-        }
-    }
-    (*first)[n_systems] = set->n;
-    return true;
-}
-
-static bool
-find_systems(numbered *points, numbered *queries, int64_t n_systems, hs_batch *batch)
-{
-    if (n_systems == MOST_NUMBER) {
-        return find_occupied(points, queries, batch);
-    }
-    batch->systems.n = batch->n_numbers = n_systems;
-    return find_all(points, n_systems, &batch->first) &&
-           (queries->number == NULL || find_all(queries, n_systems, &batch->first_query));
-}
-
-/* A C-contiguous float64 array with so many axes, or None: its length, else -1. */
-static int64_t
-length_of(PyObject *object, int n_axes, int64_t otherwise, const double **data)
-{
-    *data = NULL;
-    if (object == Py_None) {
-        return otherwise;
-    }
-    if (!hs_is_array(object, NPY_DOUBLE, n_axes)) {
-        PyErr_Format(PyExc_TypeError, "a float64 array with %d axes is expected", n_axes);
-        return -1;
-    }
-    *data = PyArray_DATA((PyArrayObject *)object);
-    return PyArray_DIM((PyArrayObject *)object, 0);
 }
 
 /* An int64 array with a number for each of n. */
@@ -209,64 +161,48 @@ take_numbers(PyObject *object, int64_t n, const char *name, numbered *set)
     return true;
 }
 
-/* Boxes fit the points and the call's box; else an exception is set. */
-static bool
-boxes_fit(PyObject *boxes, const hs_py_call *call)
-{
-    const npy_intp *shape = PyArray_DIMS((PyArrayObject *)boxes);
-    if (call->among.box == NULL || shape[1] != call->points.ndim || shape[2] != shape[1]) {
-        PyErr_SetString(PyExc_ValueError, "boxes do not fit points, box and cutoffs");
-        return false;
-    }
-    return true;
-}
-
-/* Bits of the axes that repeat, or None. */
-static bool
-take_bits(PyObject *object, const hs_py_call *call, hs_systems *systems)
-{
-    if (object == Py_None) {
-        return true;
-    }
-    if (!hs_is_array(object, NPY_UINT8, 1) || call->among.box == NULL) {
-        PyErr_SetString(PyExc_TypeError, "axes that repeat must be uint8, beside a box");
-        return false;
-    }
-    systems->periodic = PyArray_DATA((PyArrayObject *)object);
-    return true;
-}
-
 /* What systems have of their own; returns how many there are, MOST_NUMBER where all share it, or -1
  * with an exception set. */
 static int64_t
-take_own(PyObject *const *given, const hs_py_call *call, hs_systems *systems)
+take_own(PyObject *const *given, const hs_py_call *call, hs_each_system *each)
 {
-    PyObject     *bits = given[4];
-    const int64_t n_cutoffs = length_of(given[1], 1, MOST_NUMBER, &systems->cutoffs);
-    const int64_t n_boxes = length_of(given[2], 3, MOST_NUMBER, &systems->rows);
-    if (n_cutoffs < 0 || n_boxes < 0 || (systems->rows != NULL && !boxes_fit(given[2], call)) ||
-        !take_bits(bits, call, systems)) {
-        return -1;
-    }
-    const int64_t lengths[] = {n_cutoffs, n_boxes,
-                               systems->periodic != NULL ? PyArray_DIM((PyArrayObject *)bits, 0)
-                                                         : MOST_NUMBER};
-    int64_t       n = MOST_NUMBER;
+    static const struct {
+        int         at, type, n_axes;
+        const char *name;
+    } own[] = {
+        {1, NPY_DOUBLE, 1, "float64"}, {2, NPY_DOUBLE, 3, "float64"}, {4, NPY_UINT8, 1, "uint8"}};
+    const void *data[3] = {NULL, NULL, NULL};
+    int64_t     n = MOST_NUMBER;
     for (int k = 0; k < 3; k++) {
-        if (lengths[k] != MOST_NUMBER && n != MOST_NUMBER && lengths[k] != n) {
+        PyArrayObject *array = (PyArrayObject *)given[own[k].at];
+        if (given[own[k].at] == Py_None) {
+            continue;
+        }
+        if (!hs_is_array(given[own[k].at], own[k].type, own[k].n_axes)) {
+            PyErr_Format(PyExc_TypeError, "a %s array with %d axes is expected", own[k].name,
+                         own[k].n_axes);
+            return -1;
+        }
+        const npy_intp *shape = PyArray_DIMS(array), d = call->points.at.ndim;
+        if ((n != MOST_NUMBER && shape[0] != n) || (k == 1 && call->among.box == NULL) ||
+            (k == 1 && (shape[1] != d || shape[2] != d))) {
             PyErr_SetString(PyExc_ValueError, "boxes do not fit points, box and cutoffs");
             return -1;
         }
-        n = lengths[k] < n ? lengths[k] : n;
+        n = shape[0];
+        data[k] = PyArray_DATA(array);
     }
+    /* In open space the axes only tell how many systems there are. */
+    *each = (hs_each_system){
+        .cutoffs = data[0], .rows = data[1], .periodic = call->among.box != NULL ? data[2] : NULL};
     return n;
 }
 
 bool
-hs_batch_take(PyObject *given, const hs_py_call *call, hs_batch *batch)
+hs_batch_take(PyObject *given, hs_py_call *call)
 {
     static const char *const names[] = {"batch", "cutoff", "box", "query_batch", "periodic"};
-    hs_systems              *systems = &batch->systems;
+    hs_batch                *batch = &call->batch;
     numbered                 points, queries = {.name = "query_batch"};
     *batch = (hs_batch){.is_given = true};
     if (!PyTuple_CheckExact(given) || PyTuple_GET_SIZE(given) != 5 || call->among.cells != NULL) {
@@ -279,21 +215,20 @@ hs_batch_take(PyObject *given, const hs_py_call *call, hs_batch *batch)
             return false;
         }
     }
-    if (!take_numbers(parts[0], call->points.n, "batch", &points) ||
+    if (!take_numbers(parts[0], call->points.at.n, "batch", &points) ||
         ((call->among.queries != NULL || parts[3] != Py_None) &&
-         !take_numbers(parts[3], call->queries.n, "query_batch", &queries))) {
+         !take_numbers(parts[3], call->queries.at.n, "query_batch", &queries))) {
         return false;
     }
-    systems->box = call->among.box;
-    systems->reach = call->among.reach;
-    systems->selection = call->among.selection;
-    const int64_t n_systems = take_own(parts, call, systems);
+    const int64_t n_systems = take_own(parts, call, &call->each);
     if (n_systems < 0 || !find_systems(&points, &queries, n_systems, batch)) {
         hs_batch_free(batch);
         return false;
     }
-    systems->first = batch->first;
-    systems->first_query = batch->first_query;
+    call->among.each = &call->each;
+    call->points.n_systems = call->queries.n_systems = batch->n;
+    call->points.first = batch->first;
+    call->queries.first = batch->first_query;
     return true;
 }
 

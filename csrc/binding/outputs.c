@@ -363,7 +363,7 @@ bool
 hs_out_make_room(hs_py_call *call)
 {
     const hs_options *options = &call->options;
-    const int         ndim = call->points.ndim, index_bytes = options->index_bytes;
+    const int         ndim = call->points.at.ndim, index_bytes = options->index_bytes;
     const int64_t     capacity = call->capacity < 0 ? -call->capacity : call->capacity;
     if (capacity == 0) {
         return true;
@@ -416,8 +416,8 @@ padded(hs_py_call *call, hs_status status, int64_t n_pairs)
     const int64_t needed = fits ? n_pairs : hs_pairs_needed(&call->failure);
     PyObject     *result = NULL;
     if (fits || (status == HS_ERR_CAPACITY && call->capacity < 0)) {
-        const hs_points *asking = call->among.queries != NULL ? &call->queries : &call->points;
-        out_pad(call->room, call->letters, fits ? needed : 0, asking->n, call->points.n,
+        const hs_set *asking = call->among.queries != NULL ? &call->queries : &call->points;
+        out_pad(call->room, call->letters, fits ? needed : 0, asking->at.n, call->points.at.n,
                 call->options.n_shells);
         Py_INCREF(call->room);
         result = call->room;
@@ -448,7 +448,7 @@ hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs)
     PyObject *arrays =
         call->out != NULL
             ? out_filled(call->out, call->letters, hs_pairs_length(pairs))
-            : hs_arrays_of(pairs, call->letters, call->points.ndim, call->options.index_bytes);
+            : hs_arrays_of(pairs, call->letters, call->points.at.ndim, call->options.index_bytes);
     hs_pairs_free(pairs);
     return arrays;
 }
@@ -461,7 +461,7 @@ hs_py_call_table(hs_py_call *call, hs_status status, hs_pairs *rows)
         return hs_raise(status, &call->failure, &call->options);
     }
     PyObject *table =
-        hs_table_of(rows, call->letters, call->points.ndim, call->options.index_bytes);
+        hs_table_of(rows, call->letters, call->points.at.ndim, call->options.index_bytes);
     hs_pairs_free(rows);
     return table;
 }

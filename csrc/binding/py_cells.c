@@ -30,7 +30,7 @@ hs_py_cells_build(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     PyObject *domain = arguments[HS_CALL_ARGUMENTS + 1];
     if (domain != Py_None) {
         if (!hs_is_array(domain, NPY_DOUBLE, 2) || PyArray_DIM((PyArrayObject *)domain, 0) != 2 ||
-            PyArray_DIM((PyArrayObject *)domain, 1) != call.points.ndim) {
+            PyArray_DIM((PyArrayObject *)domain, 1) != call.points.at.ndim) {
             PyErr_SetString(PyExc_TypeError, "domain must be None or an array of two rows");
             return NULL;
         }
@@ -38,7 +38,7 @@ hs_py_cells_build(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     }
     hs_py_call_release(&call);
     const hs_status status =
-        hs_cells_build(&call.points, call.among.box, &call.options, &cells, &call.failure);
+        hs_cells_build(&call.points.at, call.among.box, &call.options, &cells, &call.failure);
     hs_py_call_acquire(&call);
     if (status != HS_OK) {
         return hs_raise(status, &call.failure, &call.options);
@@ -160,8 +160,9 @@ hs_py_cells_candidates(PyObject *module, PyObject *const *arguments, Py_ssize_t 
         return NULL;
     }
     hs_py_call_release(&call);
-    const hs_status status = hs_cells_candidates(call.among.cells, call.among.queries,
-                                                 &call.options, &ranges, &call.failure);
+    const hs_points *queries = call.among.queries != NULL ? &call.queries.at : NULL;
+    const hs_status  status =
+        hs_cells_candidates(call.among.cells, queries, &call.options, &ranges, &call.failure);
     hs_py_call_acquire(&call);
     return hs_py_call_table(&call, status, ranges); /* "ij": where each begins and ends */
 }
@@ -215,7 +216,7 @@ hs_py_verlet_update(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
         return NULL;
     }
     hs_py_call_release(&call);
-    const hs_status status = hs_verlet_update(list, &call.points, call.among.box, &call.options,
+    const hs_status status = hs_verlet_update(list, &call.points.at, call.among.box, &call.options,
                                               call.real, call.flag, &rebuilt, &call.failure);
     hs_py_call_acquire(&call);
     return status == HS_OK ? PyBool_FromLong(rebuilt)
@@ -233,11 +234,11 @@ hs_py_verlet_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_ar
         return NULL;
     }
     const hs_verlet_state state = hs_verlet_look(list);
-    if (call.points.ndim != state.ndim) {
+    if (call.points.at.ndim != state.ndim) {
         PyErr_Format(PyExc_ValueError, "points must have %d dimensions here", state.ndim);
         return NULL;
     }
-    call.points.n = state.n_points; /* those given are none: the list has its own */
+    call.points.at.n = state.n_points; /* those given are none: the list has its own */
     if (arguments[HS_CALL_ARGUMENTS] == Py_None) {
         call.options.threads = -hs_default_threads();
     }

@@ -117,7 +117,7 @@ take_lists(PyObject *const *arguments, const hs_py_call *call, hs_node_lists *li
     lists->n_lists = (int32_t)n_lists;
     lists->n_ghosts = entries_of(arguments[1], NPY_INT64, n_lists, NULL);
     if (lists->n_ghosts == NULL ||
-        !entries_or_none(arguments[2], NPY_INT32, call->points.n, &number)) {
+        !entries_or_none(arguments[2], NPY_INT32, call->points.at.n, &number)) {
         return false;
     }
     lists->number = number;
@@ -247,7 +247,7 @@ hs_py_connect_search(PyObject *module, PyObject *const *arguments, Py_ssize_t n_
     const hs_status status =
         hs_connectivity_build(&c.call.among, &c.lists, &c.call.options, &made, &c.call.failure);
     hs_py_call_acquire(&c.call);
-    return give_parts(&c, status, made, wanted_of(&c), c.call.points.ndim);
+    return give_parts(&c, status, made, wanted_of(&c), c.call.points.at.ndim);
 }
 
 PyObject *
@@ -260,7 +260,7 @@ hs_py_overlap(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argumen
     if (!take_call(&c, HS_FN_OVERLAP, 3, arguments, n_arguments)) {
         return NULL;
     }
-    gather.n = c.call.points.n;
+    gather.n = c.call.points.at.n;
     gather.offsets = entries_of(c.own[0], NPY_INT64, gather.n + 1, NULL);
     gather.indices = gather.offsets != NULL ? entries_of(c.own[1], NPY_INT32, -1, &gather.n_indices)
                                             : NULL;
@@ -269,7 +269,7 @@ hs_py_overlap(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argumen
         return NULL;
     }
     hs_py_call_release(&c.call);
-    const hs_status status = hs_connectivity_overlap(&c.call.points, &gather, &c.lists,
+    const hs_status status = hs_connectivity_overlap(&c.call.points.at, &gather, &c.lists,
                                                      &c.call.options, &rows, &c.call.failure);
     hs_py_call_acquire(&c.call);
     return give_rows(&c, status, rows, gather.ndim);
@@ -287,7 +287,7 @@ hs_py_intersect(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argum
         return NULL;
     }
     hs_py_call_release(&c.call);
-    const hs_status status = hs_connectivity_intersect(&c.call.points, c.call.among.box, &half,
+    const hs_status status = hs_connectivity_intersect(&c.call.points.at, c.call.among.box, &half,
                                                        &c.lists, &c.call.options, &result,
                                                        &c.call.failure);
     hs_py_call_acquire(&c.call);

@@ -40,31 +40,19 @@ filled(const hs_py_call *call, hs_status status, PyObject *array)
 static hs_status
 find_half(hs_py_call *call, void *found)
 {
-    hs_pairs **pairs = found;
-    return call->batch.is_given
-               ? hs_systems_find(&call->points, &call->batch.systems, &call->options, pairs,
-                                 &call->failure)
-               : hs_pairs_find(&call->among, &call->options, pairs, &call->failure);
+    return hs_pairs_find(&call->among, &call->options, found, &call->failure);
 }
 
 static hs_status
 find_full(hs_py_call *call, void *found)
 {
-    hs_pairs **rows = found;
-    return call->batch.is_given
-               ? hs_systems_neighbors(&call->points, call->among.queries, &call->batch.systems,
-                                      &call->options, rows, &call->failure)
-               : hs_neighbors_find(&call->among, &call->options, rows, &call->failure);
+    return hs_neighbors_find(&call->among, &call->options, found, &call->failure);
 }
 
 static hs_status
 find_nearest(hs_py_call *call, void *found)
 {
-    hs_pairs **rows = found;
-    return call->batch.is_given
-               ? hs_systems_nearest(&call->points, call->among.queries, &call->batch.systems,
-                                    call->integer, &call->options, rows, &call->failure)
-               : hs_nearest_find(&call->among, call->integer, &call->options, rows, &call->failure);
+    return hs_nearest_find(&call->among, call->integer, &call->options, found, &call->failure);
 }
 
 PyObject *
@@ -153,21 +141,13 @@ hs_py_nearest(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argumen
 static hs_status
 count_all(hs_py_call *call, void *found)
 {
-    int64_t *counts = found;
-    return call->batch.is_given
-               ? hs_systems_count(&call->points, &call->batch.systems, &call->options, counts,
-                                  &call->failure)
-               : hs_pairs_count(&call->among, &call->options, counts, &call->failure);
+    return hs_pairs_count(&call->among, &call->options, found, &call->failure);
 }
 
 static hs_status
 count_each(hs_py_call *call, void *found)
 {
-    int64_t *counts = found;
-    return call->batch.is_given
-               ? hs_systems_coordination(&call->points, call->among.queries, &call->batch.systems,
-                                         &call->options, counts, &call->failure)
-               : hs_neighbors_count(&call->among, &call->options, counts, &call->failure);
+    return hs_neighbors_count(&call->among, &call->options, found, &call->failure);
 }
 
 /* The results of systems that have points stand one behind the other, of so many bytes each: moves
@@ -175,7 +155,7 @@ count_each(hs_py_call *call, void *found)
 static void
 spread(const hs_batch *batch, char *results, size_t bytes)
 {
-    for (int64_t s = batch->systems.n - 1; batch->number != NULL && s >= 0; s--) {
+    for (int64_t s = batch->n - 1; s >= 0; s--) {
         const size_t from = (size_t)s * bytes, to = (size_t)batch->number[s] * bytes;
         if (to != from) {
             memcpy(results + to, results + from, bytes);
@@ -229,7 +209,7 @@ hs_py_coordination(PyObject *module, PyObject *const *arguments, Py_ssize_t n_ar
     if (!hs_py_call_take(&call, HS_FN_COORDINATION, arguments, n_arguments)) {
         return NULL;
     }
-    npy_intp  n_rows = (npy_intp)(call.among.queries != NULL ? call.queries.n : call.points.n);
+    npy_intp n_rows = (npy_intp)(call.among.queries != NULL ? call.queries.at.n : call.points.at.n);
     PyObject *counts = PyArray_SimpleNew(1, &n_rows, NPY_INT64);
     if (counts == NULL) {
         hs_py_call_end(&call);
@@ -241,26 +221,12 @@ hs_py_coordination(PyObject *module, PyObject *const *arguments, Py_ssize_t n_ar
 
 /* ---- pairs by distance -------------------------------------------------------------------- */
 
-/* Types and weights, each an array or None. */
-static bool
-take_marks(PyObject *const *given, const char *must, int64_t n, hs_marks *marks)
-{
-    const void *types, *weights;
-    const bool  are_taken = hs_entries_of(given[0], NPY_INT32, 1, n, 0, must, &types) &&
-                           hs_entries_of(given[1], NPY_DOUBLE, 1, n, 0, must, &weights);
-    if (are_taken) {
-        *marks = (hs_marks){types, weights};
-    }
-    return are_taken;
-}
-
 /* edges, last_inclusive, queries, n_types; types and weights of the points and of the queries. */
 static bool
-take_histogram(const hs_py_call *call, hs_histogram *wanted)
+take_histogram(hs_py_call *call, hs_histogram *wanted)
 {
     static const char *const must = "edges, types and weights must be arrays of the expected types "
                                     "and lengths";
-    const int64_t            n_queries = call->among.queries != NULL ? call->queries.n : 0;
     const void              *edges;
     if (!hs_entries_of(call->own[0], NPY_DOUBLE, 1, -1, 0, must, &edges)) {
         return false;
@@ -274,18 +240,15 @@ take_histogram(const hs_py_call *call, hs_histogram *wanted)
                              .inclusive = call->options.inclusive,
                              .last_inclusive = call->flag,
                              .n_types = (int32_t)call->integer};
-    return take_marks(call->own + 4, must, call->points.n, &wanted->of_points) &&
-           take_marks(call->own + 6, must, n_queries, &wanted->of_queries);
+    PyObject *const *own = call->own;
+    return hs_known_take(own[4], own[6], NPY_INT32, 1, must, offsetof(hs_set, types), call) &&
+           hs_known_take(own[5], own[7], NPY_DOUBLE, 1, must, offsetof(hs_set, weights), call);
 }
 
 static hs_status
 find_histogram(hs_py_call *call, void *found)
 {
-    const hs_histogram *wanted = found;
-    return call->batch.is_given
-               ? hs_systems_histogram(&call->points, call->among.queries, &call->batch.systems,
-                                      &call->options, wanted, &call->failure)
-               : hs_pairs_histogram(&call->among, &call->options, wanted, &call->failure);
+    return hs_pairs_histogram(&call->among, &call->options, found, &call->failure);
 }
 
 /* Counts, or sums where there are weights, of shape (n_types, n_types, n_edges), before these the
@@ -302,7 +265,7 @@ hs_py_histogram(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argum
     }
     if (take_histogram(&call, &wanted)) {
         npy_intp   shape[3] = {wanted.n_types, wanted.n_types, (npy_intp)wanted.n_edges};
-        const bool sums = wanted.of_points.weights != NULL || wanted.of_queries.weights != NULL;
+        const bool sums = call.own[5] != Py_None || call.own[7] != Py_None;
         const int  type = sums ? NPY_DOUBLE : NPY_INT64;
         array = call.batch.is_given ? hs_batch_zeros(&call.batch, 3, shape, type)
                                     : PyArray_ZEROS(3, shape, type, 0);
@@ -333,11 +296,11 @@ hs_py_clusters(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argume
     PyObject   *result = NULL;
     (void)module;
     if (!hs_py_call_take(&call, HS_FN_CLUSTERS, arguments, n_arguments) ||
-        !hs_entries_of(call.own[0], NPY_BOOL, 1, call.points.n, 0,
+        !hs_entries_of(call.own[0], NPY_BOOL, 1, call.points.at.n, 0,
                        "core is no array of a bool for each point", &core)) {
         return NULL;
     }
-    npy_intp  n = (npy_intp)call.points.n;
+    npy_intp  n = (npy_intp)call.points.at.n;
     PyObject *labels = PyArray_SimpleNew(1, &n, NPY_INT64);
     PyObject *winding = call.flag ? PyArray_SimpleNew(1, &n, NPY_UINT8) : Py_NewRef(Py_None);
     if (labels != NULL && winding != NULL) {
@@ -394,7 +357,8 @@ take_numbers(const hs_py_call *call, hs_pair_numbers *pairs)
     }
     pairs->n = hs_length_of(own[0]);
     if (!hs_entries_of(own[1], NPY_INT64, 1, pairs->n, 0, must, &j) ||
-        !hs_entries_of(own[2], NPY_INT64, 2, pairs->n, call->points.ndim, must_be_rows, &shift)) {
+        !hs_entries_of(own[2], NPY_INT64, 2, pairs->n, call->points.at.ndim, must_be_rows,
+                       &shift)) {
         return false;
     }
     if (i == NULL || j == NULL) {
@@ -418,7 +382,7 @@ hs_py_measure(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argumen
         !take_numbers(&call, &pairs)) {
         return NULL;
     }
-    if (call.among.points == NULL || call.options.want & HS_WANT_J) {
+    if (call.among.cells != NULL || call.options.want & HS_WANT_J) {
         PyErr_SetString(PyExc_TypeError, "measure takes points, and quantities of d D S");
         return NULL;
     }
@@ -426,8 +390,8 @@ hs_py_measure(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argumen
         call.options.threads = -hs_default_threads();
     }
     hs_py_call_release(&call);
-    const hs_status status =
-        hs_measure(&call.points, call.among.box, &pairs, &call.options, &measured, &call.failure);
+    const hs_status status = hs_measure(&call.points.at, call.among.box, &pairs, &call.options,
+                                        &measured, &call.failure);
     hs_py_call_acquire(&call);
     return status != HS_OK ? raise_of_pair(status, &call)
                            : hs_py_call_pairs(&call, status, measured);

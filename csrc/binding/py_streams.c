@@ -211,7 +211,7 @@ hs_py_iter_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argu
         Py_DECREF(self);
         return nothing;
     }
-    call->points.data = NULL; /* these are the caller's again */
+    call->points.at.data = NULL; /* these are the caller's again */
     call->options.kernel = NULL;
     return (PyObject *)self;
 }
@@ -222,6 +222,7 @@ hs_py_iter_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argu
 typedef struct callable {
     PyObject *function; /* borrowed */
     int       ndim;
+    int64_t   first; /* what is added to numbers of points */
     bool      stops; /* it wants to, or has failed; guarded by the lock of the function */
     PyObject *type, *value, *traceback; /* owned; of the first failure */
 } callable;
@@ -271,14 +272,15 @@ tuple_of_shift(const int32_t *S, int ndim)
 static bool
 call_with(const callable *to_call, const hs_pair_arrays *pairs, int64_t e)
 {
-    const int    ndim = to_call->ndim;
-    const double d = pairs->distance[e];
-    PyObject    *arguments[5] = {PyLong_FromLongLong(((const int64_t *)pairs->i)[e]),
-                                 PyLong_FromLongLong(((const int64_t *)pairs->j)[e]),
-                                 tuple_of_shift(pairs->shift + e * ndim, ndim),
-                                 hs_tuple_of_reals(pairs->vector + e * ndim, ndim),
-                                 PyFloat_FromDouble(d * d)};
-    bool         complete = true;
+    const int     ndim = to_call->ndim;
+    const double  d = pairs->distance[e];
+    const int64_t first = to_call->first;
+    PyObject     *arguments[5] = {PyLong_FromLongLong(((const int64_t *)pairs->i)[e] + first),
+                                  PyLong_FromLongLong(((const int64_t *)pairs->j)[e] + first),
+                                  tuple_of_shift(pairs->shift + e * ndim, ndim),
+                                  hs_tuple_of_reals(pairs->vector + e * ndim, ndim),
+                                  PyFloat_FromDouble(d * d)};
+    bool          complete = true;
     for (int k = 0; k < 5; k++) {
         complete = complete && arguments[k] != NULL;
     }
@@ -310,14 +312,44 @@ call_python(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user
     return stops;
 }
 
+/* A compiled function, which several threads may call. */
+typedef struct compiled {
+    hs_pair_fn       pair;
+    void            *user;
+    int              ndim;
+    int64_t          first; /* what is added to numbers of points */
+    volatile int64_t stops; /* it wants to; only ever set to 1 */
+} compiled;
+
+/* An hs_pairs_fn. */
+static int
+call_compiled(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user)
+{
+    compiled      *to_call = user;
+    const int64_t *i = pairs->i, *j = pairs->j, first = to_call->first;
+    const int      ndim = to_call->ndim;
+    for (int64_t e = 0; e < n; e++) {
+        const double d = pairs->distance[e];
+        if (to_call->pair(i[e] + first, j[e] + first, pairs->shift + e * ndim,
+                          pairs->vector + e * ndim, d * d, to_call->user) != 0) {
+            to_call->stops = 1;
+            *n_taken = e + 1;
+            return 1;
+        }
+    }
+    return 0;
+}
+
 /* What shall be called, by the address of a function or a callable. */
 static bool
-take_function(PyObject *const *arguments, callable *to_call, hs_visit *visit)
+take_function(PyObject *const *arguments, callable *to_call, compiled *to_run, hs_visit *visit)
 {
     if (PyLong_Check(arguments[0])) {
         const uintptr_t address = (uintptr_t)PyLong_AsVoidPtr(arguments[0]);
-        visit->pair = (hs_pair_fn)address;
-        visit->user = PyLong_AsVoidPtr(arguments[1]);
+        to_run->pair = (hs_pair_fn)address;
+        to_run->user = PyLong_AsVoidPtr(arguments[1]);
+        visit->pairs = call_compiled;
+        visit->user = to_run;
     } else {
         visit->pairs = call_python;
         visit->user = to_call;
@@ -330,16 +362,18 @@ hs_py_for_each_pair(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
 {
     hs_py_call call;
     callable   to_call = {0};
+    compiled   to_run = {0};
     hs_visit   visit = {0};
     int64_t    n = 0;
     (void)module;
     if (!hs_py_call_take(&call, HS_FN_FOR_EACH_PAIR, arguments, n_arguments) ||
-        !take_function(arguments + HS_CALL_ARGUMENTS, &to_call, &visit)) {
+        !take_function(arguments + HS_CALL_ARGUMENTS, &to_call, &to_run, &visit)) {
         return NULL;
     }
     visit.thread_safe = call.flag;
     to_call.function = arguments[HS_CALL_ARGUMENTS];
-    to_call.ndim = call.points.ndim;
+    to_call.ndim = to_run.ndim = call.points.at.ndim;
+    to_call.first = to_run.first = call.integer;
     call.thread = PyEval_SaveThread(); /* also with few points: other threads may need it */
     const hs_status status = hs_pairs_visit(&call.among, &call.options, &visit, &n, &call.failure);
     hs_py_call_acquire(&call);
@@ -350,6 +384,6 @@ hs_py_for_each_pair(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
     Py_XDECREF(to_call.type);
     Py_XDECREF(to_call.value);
     Py_XDECREF(to_call.traceback);
-    return status == HS_OK ? PyLong_FromLongLong(n)
+    return status == HS_OK ? Py_BuildValue("Li", (long long)n, to_call.stops || to_run.stops != 0)
                            : hs_raise(status, &call.failure, &call.options);
 }

@@ -387,13 +387,26 @@ take_periodic(quick_call *call, PyObject **place, bool has_box)
 /* ---- other arguments ---------------------------------------------------------------------- */
 
 static outcome
-take_cutoff(quick_call *call, PyObject **place)
+take_length(quick_call *call, PyObject **place)
 {
     double value;
     if (PyFloat_Check(*place)) {
         return IS_PLAIN;
     }
     return scalar_of(*place, &value) ? put(call, place, PyFloat_FromDouble(value)) : IS_NOT_PLAIN;
+}
+
+/* Where it is infinite, a finite one is found that holds all pairs. Bits are compared, as a
+ * subnormal number may be a trap. */
+static outcome
+take_cutoff(quick_call *call, PyObject **place)
+{
+    const double  endless = (double)INFINITY;
+    const outcome result = take_length(call, place);
+    return result == IS_PLAIN &&
+                   memcmp(&((PyFloatObject *)*place)->ob_fval, &endless, sizeof endless) == 0
+               ? IS_NOT_PLAIN
+               : result;
 }
 
 static outcome
@@ -408,7 +421,7 @@ take_flag(quick_call *call, PyObject **place)
 static outcome
 take_max_distance(quick_call *call, PyObject **place)
 {
-    const outcome result = take_cutoff(call, place);
+    const outcome result = take_length(call, place);
     return result == IS_PLAIN && !(PyFloat_AS_DOUBLE(*place) >= 0.0) ? IS_NOT_PLAIN : result;
 }
 
@@ -613,6 +626,9 @@ convert_all(const quick_row *row, quick_call *call)
     }
     call->placed |= PERIODIC; /* which depends on the box */
     call->placed &= has_bits ? ~PERIODIC : ~0u;
+    if (result == IS_PLAIN && call->given[1] == Py_None) { /* left out: by radii, or refused */
+        return IS_NOT_PLAIN;
+    }
     for (int k = 0; result == IS_PLAIN && k < call->n; k++) {
         if (call->placed >> k & 1) {
             const hs_kind kind = hs_argument_at(row->function, k)->kind;
@@ -817,10 +833,20 @@ hs_py_quick(PyObject *module, PyObject *name)
     return made;
 }
 
-/* Name, usual value and whether it is positional, of each argument for users; gives up the list
- * where that fails. */
+/* Appends a new reference to the list, or gives up both. */
 static PyObject *
-arguments_of(const hs_function *function)
+appended(PyObject *list, PyObject *entry)
+{
+    if (list != NULL && (entry == NULL || PyList_Append(list, entry) < 0)) {
+        Py_CLEAR(list);
+    }
+    Py_XDECREF(entry);
+    return list;
+}
+
+/* Name, usual value and whether it is positional, of each argument for users. */
+static PyObject *
+arguments_of_users(const hs_function *function)
 {
     PyObject *list = PyList_New(0);
     bool      is_positional = true;
@@ -830,12 +856,23 @@ arguments_of(const hs_function *function)
             is_positional = false;
             continue;
         }
-        PyObject *entry = Py_BuildValue("(szO)", *name, argument_of(function, *name, &place)->usual,
-                                        is_positional ? Py_True : Py_False);
-        if (entry == NULL || PyList_Append(list, entry) < 0) {
-            Py_CLEAR(list);
-        }
-        Py_XDECREF(entry);
+        list = appended(list,
+                        Py_BuildValue("(szO)", *name, argument_of(function, *name, &place)->usual,
+                                      is_positional ? Py_True : Py_False));
+    }
+    return list;
+}
+
+/* Name of each argument in the order of the core, and whether it may be left out with all that
+ * follow. */
+static PyObject *
+arguments_of_core(const hs_function *function)
+{
+    PyObject          *list = PyList_New(0);
+    const hs_argument *argument;
+    for (int k = 0; list != NULL && (argument = hs_argument_at(function, k))->name != NULL; k++) {
+        const bool may_lack = argument->kind >= HS_ARG_FIRST_OPTIONAL;
+        list = appended(list, Py_BuildValue("(sO)", argument->name, may_lack ? Py_True : Py_False));
     }
     return list;
 }
@@ -847,8 +884,10 @@ hs_py_table(PyObject *module, PyObject *ignored)
     (void)module;
     (void)ignored;
     for (int k = 0; dict != NULL && k < HS_FUNCTIONS; k++) {
-        if (hs_functions[k].users[0] != NULL &&
-            !hs_dict_put(dict, hs_functions[k].name, arguments_of(&hs_functions[k]))) {
+        PyObject *core = arguments_of_core(&hs_functions[k]);
+        PyObject *users = core != NULL ? arguments_of_users(&hs_functions[k]) : NULL;
+        /* "N" takes both over, also where one is NULL. */
+        if (!hs_dict_put(dict, hs_functions[k].name, Py_BuildValue("(NN)", core, users))) {
             Py_CLEAR(dict);
         }
     }

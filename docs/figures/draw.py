@@ -10,6 +10,8 @@ import numpy as np
 
 import halfshell as hs
 from halfshell.structures import alpha_quartz
+from halfshell_report.findings import standings
+from halfshell_report.rows import read_csv
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -22,7 +24,7 @@ BLUE, ORANGE, RED, GREY, LIGHT = "tab:blue", "tab:orange", "tab:red", "0.45", "#
 
 def quartz():
     """The bonds of a block of alpha-quartz, and its g(r) by element."""
-    fig = plt.figure(figsize=(9.0, 3.9), layout="constrained")
+    fig = plt.figure(figsize=(7.0, 3.2), layout="constrained")
     left = fig.add_subplot(1, 2, 1, projection="3d")
     right = fig.add_subplot(1, 2, 2)
     points, box, species = alpha_quartz((3, 3, 2))
@@ -154,34 +156,116 @@ def levels():
     return fig
 
 
-def times(ink):
-    """The same list of pairs by eight libraries, in ink that suits a light or a dark page."""
-    with open(FOLDER.parents[1] / "benchmarks/results" / TIMED, newline="") as file:
-        rows = [row for row in csv.DictReader(file) if row["scene"] == "pairs-1e5-k52"]
-    found = {row["contestant"]: 1e3 * float(row["fresh_median"]) for row in rows}
-    names = sorted((name for name in found if "[" not in name), key=found.get, reverse=True)
-    fig, ax = plt.subplots(figsize=(7.6, 3.0), layout="constrained")
-    ours = [name == "halfshell" for name in names]
-    bars = ax.barh(
-        names, [found[name] for name in names], color=[ORANGE if own else GREY for own in ours]
-    )
-    labels = [f"{found[name]:,.0f} ms" for name in names]
-    for text, own in zip(ax.bar_label(bars, labels, padding=4, color=ink), ours):
-        text.set_fontweight("bold" if own else "normal")
+def rows_of(path):
+    with open(FOLDER.parents[1] / path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def bars(ax, lengths, labels, own, ink):
+    """One bar a name, the first at the top, in ink that suits the page."""
+    drawn = ax.barh(list(lengths), list(lengths.values()), color=[ORANGE if name in own else GREY
+                                                                 for name in lengths])  # fmt: skip
+    for name, text in zip(lengths, ax.bar_label(drawn, labels, padding=4, color=ink)):
+        text.set_fontweight("bold" if name in own else "normal")
+    ax.invert_yaxis()
     ax.tick_params(left=False, bottom=False, labelbottom=False, labelcolor=ink)
     ax.spines[:].set_visible(False)
-    ax.set_title("2.6 million pairs of 100,000 points, one thread", color=ink, fontsize=10)
-    fig.patch.set_alpha(0.0)
-    ax.patch.set_alpha(0.0)
+    ax.margins(x=0.18, y=0.02)
+
+
+def clear(fig):
+    for patch in (fig.patch, *(ax.patch for ax in fig.axes)):
+        patch.set_alpha(0.0)
     return fig
 
 
-#: The newest measurement with all libraries.
-TIMED = "amd-epyc/2026-11-25.csv"
+def times(ink):
+    """The same list of pairs by nine libraries, each in the better of two measurements."""
+    found = {}
+    for path in TIMED:
+        for row in rows_of(path):
+            name, time = row["contestant"], 1e3 * float(row["fresh_median"])
+            if row["scene"] == "pairs-1e5-k52" and "[" not in name:
+                found[name] = min(time, found.get(name, time))
+    found = dict(sorted(found.items(), key=lambda one: one[1]))
+    fig, ax = plt.subplots(figsize=(5.6, 3.3), layout="constrained")
+    bars(ax, found, [f"{time:,.0f} ms" for time in found.values()], ["halfshell"], ink)
+    fig.suptitle("2.6 million pairs of 100,000 points, one thread", color=ink, fontsize=11)
+    return clear(fig)
+
+
+def ratios():
+    """How many times as long the fastest other library takes, for searches of many kinds."""
+    rows, faster, labels = rows_of(COMPARED), {}, []
+    for scene, name in KINDS.items():
+        mine = [row for row in rows if row["scene"] == scene and row["complete"] == "True"]
+        *_, own = (row for row in mine if row["contestant"] == "halfshell")  # as the page's table
+        others = [row for row in mine if not row["contestant"].startswith("halfshell")]
+        best = min(others, key=lambda row: float(row["fresh_median"]))
+        faster[name] = float(best["fresh_median"]) / float(own["fresh_median"])
+        labels.append(f"{faster[name]:.1f}, {best['contestant']}")
+    fig, ax = plt.subplots(figsize=(5.6, 5.0), layout="constrained")
+    bars(ax, faster, labels, KINDS.values(), "black")
+    ax.margins(x=0.5)
+    ax.axvline(1.0, color="black", linewidth=0.8)
+    fig.suptitle("time of the fastest other library / ours", fontsize=11)
+    return clear(fig)
+
+
+def errors():
+    """What became of the scenes of the report, for each method."""
+    with open(FOLDER.parent / "report" / "report.csv", newline="", encoding="utf-8") as file:
+        _, rows = read_csv(file)
+    standing = [one for one in standings(rows) if one.method not in ("double", "single", "float32")]
+    names = ["halfshell" if one.method == "exact" else one.method for one in standing]
+    parts = {
+        "right": (BLUE, [one.right for one in standing]),
+        "wrong": (RED, [one.wrong for one in standing]),
+        "error, crash or\ntime-out": (ORANGE, [one.failed + one.late for one in standing]),
+        "not offered": ("0.82", [one.not_offered for one in standing]),
+    }
+    fig, ax = plt.subplots(figsize=(5.6, 4.2), layout="constrained")
+    start = np.zeros(len(names))
+    for label, (colour, counts) in parts.items():
+        ax.barh(names, counts, left=start, color=colour, label=label)
+        start += counts
+    ax.invert_yaxis()
+    ax.tick_params(left=False)
+    ax.spines[["top", "right", "left"]].set_visible(False)
+    ax.set_xlabel("scenes")
+    fig.legend(loc="outside upper center", ncols=4, frameon=False, fontsize=9,
+               columnspacing=1.0, handlelength=1.0)  # fmt: skip
+    return clear(fig)
+
+
+#: With all libraries, and with linkcell, which needs a newer Python.
+TIMED = [f"benchmarks/results/amd-epyc/2026-11-{day}.csv" for day in (25, 27)]
+
+#: What fills the tables of docs/performance.md, and what some of its scenes are.
+COMPARED = "benchmarks/results/intel-xeon-vm/2026-11-26-2.csv"
+KINDS = {
+    "pairs-1e5-k52": "pairs of 100,000 points",
+    "pairs-1e5-k419": "419 neighbours each",
+    "vectors-1e5-k52": "with distances, vectors",
+    "open-1e4": "10,000 points, no box",
+    "triclinic-1e4-k52": "a triclinic box",
+    "plane-1e5-k20": "a plane",
+    "clusters-1e5": "dense clusters",
+    "fcc-tie": "a crystal, cutoff on a shell",
+    "rows-1e5-k52": "table of all neighbours",
+    "between-1e5": "two sets",
+    "nearest-1e5-periodic": "12 nearest",
+    "count-1e5-k419": "numbers of pairs",
+    "histogram-1e5-k419-100": "histogram, 100 bins",
+    "batch-30": "2000 molecules of 30",
+    "molecule-30": "30 points",
+    "call-2": "2 points",
+}
 
 DRAWINGS = {
     "quartz": quartz, "half-shell": half_shell, "stages": stages, "images": images,
     "levels": levels, "times": partial(times, "#1f2328"), "times-dark": partial(times, "#e6edf3"),
+    "ratios": ratios, "errors": errors,
 }  # fmt: skip
 
 

@@ -208,12 +208,12 @@ static int64_t
 count_overlaps(const hard_gas *gas)
 {
     const ptrdiff_t width = (ptrdiff_t)sizeof(double);
-    const hs_points points = {.data = gas->x,
-                              .n = gas->n,
-                              .ndim = gas->ndim,
-                              .real = HS_FLOAT64,
-                              .row_stride = gas->ndim * width,
-                              .column_stride = width};
+    const hs_set    points = {.at = {.data = gas->x,
+                                     .n = gas->n,
+                                     .ndim = gas->ndim,
+                                     .real = HS_FLOAT64,
+                                     .row_stride = gas->ndim * width,
+                                     .column_stride = width}};
     hs_box          box = {.ndim = gas->ndim};
     hs_options      options = hs_options_default();
     int64_t         count = -1;

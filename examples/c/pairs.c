@@ -66,7 +66,7 @@ static hs_status
 print_neighbors(const hs_cells *cells, const hs_options *options, hs_failure *failure)
 {
     static const double origin[NDIM] = {0.0, 0.0, 0.0};
-    const hs_points     query = view_of(origin, 1);
+    const hs_set        query = {.at = view_of(origin, 1)};
     const hs_among      among = {.cells = cells, .queries = &query};
     hs_options          list = *options;
     hs_pairs           *rows;

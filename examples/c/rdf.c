@@ -2,7 +2,7 @@
 /*
  * rdf.c: the radial distribution function of a warm crystal, from halfshell.h alone.
  *
- *     make; build/rdf [cells [r_max [bins]]]
+ *     make; build/rdf [cells [cutoff [bins]]]
  *
  * Prints one line a bin: its middle, g(r), and the pairs in it. The lattice is face-centred cubic,
  * of `cells` cells of length 1 along each axis, and periodic.
@@ -18,7 +18,7 @@ enum { NDIM = 3, MOST_CELLS = 200 };
 
 typedef struct settings {
     long   cells;
-    double r_max;
+    double cutoff;
     long   bins;
 } settings;
 
@@ -54,21 +54,21 @@ static hs_status
 count_pairs(const settings *job, const double *points, int64_t n, double *edges, int64_t *counts,
             hs_failure *failure)
 {
-    const hs_points view = {.data = points,
-                            .n = n,
-                            .ndim = NDIM,
-                            .real = HS_FLOAT64,
-                            .row_stride = NDIM * sizeof(double),
-                            .column_stride = sizeof(double)};
-    hs_box          box = {.ndim = NDIM};
+    const hs_set set = {.at = {.data = points,
+                               .n = n,
+                               .ndim = NDIM,
+                               .real = HS_FLOAT64,
+                               .row_stride = NDIM * sizeof(double),
+                               .column_stride = sizeof(double)}};
+    hs_box       box = {.ndim = NDIM};
     for (int k = 0; k < NDIM; k++) {
         box.periodic[k] = true;
         box.rows[k][k] = (double)job->cells;
     }
     for (long e = 0; e < job->bins; e++) {
-        edges[e] = (double)e * (job->r_max / (double)job->bins);
+        edges[e] = (double)e * (job->cutoff / (double)job->bins);
     }
-    edges[job->bins] = job->r_max;
+    edges[job->bins] = job->cutoff;
     const hs_histogram histogram = {.n_edges = job->bins + 1,
                                     .edges = edges,
                                     .last_inclusive = true,
@@ -76,7 +76,7 @@ count_pairs(const settings *job, const double *points, int64_t n, double *edges,
                                     .counts = counts};
     hs_options         options = hs_options_default();
     options.threads = -2; /* two, where that pays */
-    const hs_among among = {.points = &view, .box = &box};
+    const hs_among among = {.points = &set, .box = &box};
     return hs_pairs_histogram(&among, &options, &histogram, failure);
 }
 
@@ -131,15 +131,15 @@ read_number(const char *text, double least, double most, double *number)
 int
 main(int n_arguments, char **arguments)
 {
-    double cells = 8.0, r_max = 2.0, bins = 40.0;
+    double cells = 8.0, cutoff = 2.0, bins = 40.0;
     if (n_arguments > 4 ||
         (n_arguments > 1 && !read_number(arguments[1], 1.0, MOST_CELLS, &cells)) ||
-        (n_arguments > 2 && !read_number(arguments[2], 1e-9, 1e9, &r_max)) ||
+        (n_arguments > 2 && !read_number(arguments[2], 1e-9, 1e9, &cutoff)) ||
         (n_arguments > 3 && !read_number(arguments[3], 1.0, 1e6, &bins))) {
-        fprintf(stderr, "usage: rdf [cells (1 to %d) [r_max (1e-9 to 1e9) [bins (1 to 1e6)]]]\n",
+        fprintf(stderr, "usage: rdf [cells (1 to %d) [cutoff (1e-9 to 1e9) [bins (1 to 1e6)]]]\n",
                 MOST_CELLS);
         return EXIT_FAILURE;
     }
-    const settings job = {.cells = (long)cells, .r_max = r_max, .bins = (long)bins};
+    const settings job = {.cells = (long)cells, .cutoff = cutoff, .bins = (long)bins};
     return run(&job);
 }

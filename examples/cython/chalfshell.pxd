@@ -28,6 +28,9 @@ cdef extern from "halfshell_capi.h" nogil:
         ptrdiff_t row_stride
         ptrdiff_t column_stride
 
+    ctypedef struct hs_set:
+        hs_points at
+
     ctypedef struct hs_box:
         int ndim
         c_bool periodic[8]
@@ -43,9 +46,9 @@ cdef extern from "halfshell_capi.h" nogil:
         pass
 
     ctypedef struct hs_among:
-        const hs_points *points
+        const hs_set *points
         const hs_box *box
-        const hs_points *queries
+        const hs_set *queries
         const hs_cells *cells
         const hs_reach *reach
         const hs_selection *selection

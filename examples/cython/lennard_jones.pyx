@@ -4,9 +4,10 @@
 
 from chalfshell cimport (
     HS_FLOAT64, HS_OK, HS_WANT_DISTANCE, hs_among, hs_box, hs_capi, hs_capi_import, hs_failure,
-    hs_options, hs_pairs, hs_points, hs_status,
+    hs_options, hs_pairs, hs_set, hs_status,
 )
 from libc.stdint cimport int64_t
+from libc.string cimport memset
 
 # Asked for once, when this module is imported; an ImportError if it does not fit.
 cdef const hs_capi *halfshell = hs_capi_import()
@@ -31,13 +32,14 @@ def energy(const double[:, :] points, double cutoff, const double[:] lengths):
     cdef int ndim = <int> points.shape[1]
     if not 1 <= ndim <= 8 or lengths.shape[0] != ndim:
         raise ValueError(f"points must be (n, d) and lengths (d,), d from 1 to 8, got d = {ndim}")
-    cdef hs_points view
-    view.data = &points[0, 0] if points.shape[0] > 0 else NULL
-    view.n = points.shape[0]
-    view.ndim = ndim
-    view.real = HS_FLOAT64
-    view.row_stride = points.strides[0]
-    view.column_stride = points.strides[1]
+    cdef hs_set view
+    memset(&view, 0, sizeof(view))
+    view.at.data = &points[0, 0] if points.shape[0] > 0 else NULL
+    view.at.n = points.shape[0]
+    view.at.ndim = ndim
+    view.at.real = HS_FLOAT64
+    view.at.row_stride = points.strides[0]
+    view.at.column_stride = points.strides[1]
 
     cdef hs_box box
     cdef int k, l
@@ -48,12 +50,9 @@ def energy(const double[:, :] points, double cutoff, const double[:] lengths):
             box.rows[l][k] = lengths[l] if k == l else 0.0
 
     cdef hs_among among
+    memset(&among, 0, sizeof(among))
     among.points = &view
     among.box = &box
-    among.queries = NULL
-    among.cells = NULL
-    among.reach = NULL
-    among.selection = NULL
 
     cdef hs_options options = halfshell.options_default()
     options.cutoff = cutoff

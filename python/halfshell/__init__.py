@@ -24,13 +24,10 @@ ASE, SciPy, matscipy, MDAnalysis and scikit-learn; `halfshell.torch`, `halfshell
 import importlib
 from typing import TYPE_CHECKING
 
-from halfshell._convert.memory import CacheInfo, cache_info, clear_cache, set_cache_limit
+from halfshell import _core as _core  # first: NumPy may crash where this refuses to be loaded
 from halfshell._convert.options import kernels
-from halfshell._convert.points import Points
 from halfshell._errors import CapacityError, StaleError
-from halfshell._functions.counts import count_pairs, pair_histogram
 from halfshell._functions.pairs import for_each_pair, iter_pairs, pairs, pairs_between
-from halfshell._objects.box import Box
 from halfshell._settings import settings
 
 if TYPE_CHECKING:
@@ -41,26 +38,28 @@ if TYPE_CHECKING:
     from halfshell import structures as structures
     from halfshell import torch as torch
     from halfshell._check.verify import Verdict, verify
+    from halfshell._convert.memory import CacheInfo, cache_info, clear_cache, set_cache_limit
+    from halfshell._convert.points import Points
     from halfshell._functions.bonded import bonded
     from halfshell._functions.bricks import bricks
     from halfshell._functions.clusters import Clusters, clusters
+    from halfshell._functions.counts import count_pairs, pair_histogram
     from halfshell._functions.explain import Explanation, explain
     from halfshell._functions.measure import measure
     from halfshell._functions.neighbors import coordination, nearest, neighbors
     from halfshell._functions.plot_pairs import plot_pairs
     from halfshell._functions.rdf import RadialDistribution, rdf
     from halfshell._functions.trajectory import trajectory_pairs
-    from halfshell._include import get_include
+    from halfshell._machine import get_include
+    from halfshell._objects.box import Box
     from halfshell._objects.brick import Brick, Bricks
     from halfshell._objects.cell_list import CellList
     from halfshell._objects.connectivity import Connectivity
     from halfshell._objects.dynamic_cell_list import DynamicCellList
     from halfshell._objects.neighbor_table import Graph, NeighborTable
     from halfshell._objects.node_list import NodeList
-    from halfshell._objects.pair_changes import PairChanges
-    from halfshell._objects.pair_field import PairField
-    from halfshell._objects.pair_table import PairTable
-    from halfshell._objects.verlet_list import VerletList
+    from halfshell._objects.pair_table import PairField, PairTable
+    from halfshell._objects.verlet_list import PairChanges, VerletList
 
 __version__ = "0.1.0"
 
@@ -114,8 +113,10 @@ __all__ = [
 
 #: Where names are that are imported when they are first used, for a quick start.
 _LATER = {
+    "Box": "_objects.box",
     "Brick": "_objects.brick",
     "Bricks": "_objects.brick",
+    "CacheInfo": "_convert.memory",
     "CellList": "_objects.cell_list",
     "Clusters": "_functions.clusters",
     "Connectivity": "_objects.connectivity",
@@ -124,23 +125,29 @@ _LATER = {
     "Graph": "_objects.neighbor_table",
     "NeighborTable": "_objects.neighbor_table",
     "NodeList": "_objects.node_list",
-    "PairChanges": "_objects.pair_changes",
-    "PairField": "_objects.pair_field",
+    "PairChanges": "_objects.verlet_list",
+    "PairField": "_objects.pair_table",
     "PairTable": "_objects.pair_table",
+    "Points": "_convert.points",
     "RadialDistribution": "_functions.rdf",
     "Verdict": "_check.verify",
     "VerletList": "_objects.verlet_list",
     "bonded": "_functions.bonded",
     "bricks": "_functions.bricks",
+    "cache_info": "_convert.memory",
+    "clear_cache": "_convert.memory",
     "clusters": "_functions.clusters",
     "coordination": "_functions.neighbors",
+    "count_pairs": "_functions.counts",
     "explain": "_functions.explain",
-    "get_include": "_include",
+    "get_include": "_machine",
     "measure": "_functions.measure",
     "nearest": "_functions.neighbors",
     "neighbors": "_functions.neighbors",
+    "pair_histogram": "_functions.counts",
     "plot_pairs": "_functions.plot_pairs",
     "rdf": "_functions.rdf",
+    "set_cache_limit": "_convert.memory",
     "trajectory_pairs": "_functions.trajectory",
     "verify": "_check.verify",
 }
@@ -161,10 +168,9 @@ if not TYPE_CHECKING:  # for type checkers they are there
         if name in _MODULES:
             return importlib.import_module(f"{__name__}.{name}")
         if name not in _LATER:
-            from halfshell._unknown import nearest_word
+            from halfshell._unknown import hint_of_name
 
-            meant = None if name.startswith("_") else nearest_word(name, __all__)
-            hint = f": did you mean {meant}?" if meant else ""
+            hint = hint_of_name(name, __all__)
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}")
         value = getattr(importlib.import_module(f"{__name__}.{_LATER[name]}"), name)
         globals()[name] = value

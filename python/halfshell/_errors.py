@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The exceptions that have no counterpart in Python."""
+"""The exceptions that have no counterpart in Python, and what errors say and show."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Function = TypeVar("Function", bound="Callable[..., Any]")
 
 
 class CapacityError(ValueError):
-    """The given arrays or capacity are too small for the result.
+    """Arrays of `out`, or a capacity, are too small for the result.
 
     Attributes
     ----------
@@ -24,7 +24,7 @@ class CapacityError(ValueError):
 
     See Also
     --------
-    pairs : its `capacity`, and ``on_overflow="flag"`` to return the number instead.
+    pairs : its `out`.
 
     Examples
     --------
@@ -93,3 +93,15 @@ def brief(function: Function) -> Function:
             raise
 
     return cast("Function", looked)
+
+
+# ---- packages that are optional --------------------------------------------------------------
+
+def how_to_install(*packages: str) -> str:
+    """Return the command that brings them, whether or not there is a release of ours."""
+    return f"pip install {' '.join(packages)}"
+
+
+def needs(what: str, *packages: str) -> str:
+    """Return a sentence for what cannot be done without these packages."""
+    return f"{what} needs {' and '.join(packages)}: {how_to_install(*packages)}"

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from halfshell import _core
 from halfshell._errors import REFUSALS, shorten
-from halfshell._unknown import refuse_unknown
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 Function = TypeVar("Function", bound="Callable[..., Any]")
 
-#: Arguments that mean the same in every search, as their docstrings have them.
+#: Arguments that mean the same everywhere, as their docstrings have them, and what pictures are.
 SHARED = {
     "points": """
     points : array_like of float, shape (n, d), or Points
@@ -26,8 +25,18 @@ SHARED = {
     """,
     "cutoff": """
     cutoff : float, array_like of float, shape (k,), (s,) or (t, t), dict or None
+        Largest distance of a pair, in the unit of `points`; not negative; it may be larger than the
+        box, and infinite where no axis is periodic. One for each system of a batch, shape (s,). By
+        type: a dict such as ``{("H", "O"): 1.2, ("*", "*"): 2.0}``, in which a key with fewer stars
+        wins and two types without a key form no pairs, or a symmetric table with a row for each
+        type. With radii a further limit, or left out. With supports the extent: ``|H @ D| <=
+        cutoff``. Of a `CellList` its own, if it is left out.
+    """,
+    "shells": """
+    cutoff : float, array_like of float, shape (k,), (s,) or (t, t), dict or None
         Largest distance of a pair, in the unit of `points`; finite, not negative; it may be larger
-        than the box. One for each system of a batch, shape (s,). By type: a dict such as
+        than the box. Several ascending ones, shape (k,), go with the letter ``k``. One for each
+        system of a batch, shape (s,). By type: a dict such as
         ``{("H", "O"): 1.2, ("*", "*"): 2.0}``, in which a key with fewer stars wins and two types
         without a key form no pairs, or a symmetric table with a row for each type. With radii a
         further limit, or None. With supports the extent: ``|H @ D| <= cutoff``.
@@ -86,6 +95,26 @@ SHARED = {
         True: show a bar in a long search. A function is called now and then as
         ``progress(fraction)``, from 0 to 1, never falling; an exception ends the search.
     """,
+    "ax": """
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw on; for points in three dimensions with ``projection="3d"``. Default: axes of
+        a new figure.
+    """,
+    "unit": """
+    unit : str, optional
+        The unit of lengths, for the labels of the axes: "Å".
+    """,
+    "drawn": """
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    ImportError
+        If matplotlib is not installed: ``pip install matplotlib``.
+    """,
 }
 
 
@@ -112,7 +141,13 @@ def search(
                 if result is not NotImplemented:
                     return result if finish is None else finish(result, *arguments, **options)
             if not options.keys() <= known:
+                from halfshell._unknown import refuse_unknown
+
                 refuse_unknown(function, [name for name in options if name not in known])
+            if len(arguments) > code.co_argcount:
+                from halfshell._unknown import refuse_count
+
+                refuse_count(function, len(arguments), code.co_argcount)
             try:
                 return function(*arguments, **options)
             except REFUSALS as error:
@@ -124,13 +159,13 @@ def search(
     return decorate
 
 
-def document(function: Any, **changed: str) -> None:
-    """Put the description of each shared argument where a docstring has its name in braces.
+def document(function: Function, **changed: str) -> Function:
+    """Decorate what has shared arguments: their descriptions come where it has names in braces.
 
     changed: what some of them say there instead.
     """
     if not function.__doc__:
-        return
+        return function
     texts = {**SHARED, **changed}
     lines = []
     for line in function.__doc__.split("\n"):
@@ -141,5 +176,7 @@ def document(function: Any, **changed: str) -> None:
             continue
         margin = line[: len(line) - len(line.lstrip())]
         for name in names:
-            lines += [margin + one[4:] for one in texts[name].strip("\n").rstrip().split("\n")]
+            text = texts[name].strip("\n").rstrip()
+            lines += [(margin + one[4:]).rstrip() for one in text.split("\n")]
     function.__doc__ = "\n".join(lines)
+    return function

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from halfshell import _core
 from halfshell._convert.foreign import exact_number, is_a, kind_of, shown
 from halfshell._convert.options import as_choice
+from halfshell._search import search
 
 if TYPE_CHECKING:
     from contextvars import Token
@@ -88,6 +89,7 @@ class settings:
 
     __slots__ = ("_changes", "_tokens")
 
+    @search()
     def __init__(
         self,
         *,
@@ -127,12 +129,6 @@ class settings:
         return f"settings({changes})"
 
 
-def _as_kernel(value: Any) -> str | None:
-    if value is None:
-        return None
-    return as_choice(value, "kernel", tuple(_core.kernels()))
-
-
 def _as_memory_limit(value: Any) -> float | None:
     from halfshell._convert.lengths import as_number  # which imports much
 
@@ -169,7 +165,9 @@ def _as_threads(value: Any) -> int | None:
 
 
 _CHECKS: dict[str, Any] = {
-    "kernel": _as_kernel,
+    "kernel": lambda value: (
+        None if value is None else as_choice(value, "kernel", tuple(_core.kernels()))
+    ),
     "algorithm": lambda value: as_choice(value, "algorithm", ALGORITHMS),
     "precision": lambda value: as_choice(value, "precision", PRECISIONS),
     "memory_limit": _as_memory_limit,

@@ -2,7 +2,7 @@
 """How objects show themselves: in one line as text, in a small table in a notebook.
 
 A class takes ``__repr__ = _show.line`` and ``_repr_html_ = _show.html`` into its body; named tuples
-have methods that call these. What is shown are the attributes that `_shown` names, or else the
+are decorated by `shown`. What is shown are the attributes that `_shown` names, or else the
 fields, but not what is None or empty. Of arrays with more than a few numbers it is type and shape.
 Nothing is computed for it, and no colour is set: a notebook's own are used.
 """
@@ -13,8 +13,6 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
-
-__all__ = ["facts", "html", "line"]
 
 _WIDTH = 60  # characters of one value
 _FEW = 9  # numbers of a tuple, or of an array, that are written out
@@ -43,6 +41,12 @@ def html(value: Any) -> str:
     )
 
 
+def shown(kind: Any) -> Any:
+    """Decorate a named tuple, to show itself so."""
+    kind.__repr__, kind._repr_html_ = line, html
+    return kind
+
+
 def facts(value: Any) -> list[tuple[str, str]]:
     """The attributes to show, by name, as text; none for a class without `_shown` and fields."""
     kind = type(value)
@@ -50,11 +54,10 @@ def facts(value: Any) -> list[tuple[str, str]]:
     if names is None:
         names = [field.name for field in fields(value)] if is_dataclass(value) else []
     told = ((name, getattr(value, name)) for name in names)
-    return [(name, _brief(each)) for name, each in told if not _is_nothing(each)]
-
-
-def _is_nothing(value: Any) -> bool:
-    return value is None or (type(value) in (str, tuple, list, dict) and not value)
+    return [
+        (name, _brief(each)) for name, each in told
+        if each is not None and (type(each) not in (str, tuple, list, dict) or each)
+    ]  # fmt: skip
 
 
 def _brief(value: Any) -> str:

@@ -21,7 +21,7 @@ from halfshell._convert.lengths import as_edges
 from halfshell._convert.options import as_brick_count, as_flag, check_letters
 from halfshell._convert.points import MAX_DIM
 from halfshell._convert.points import Points as _Points
-from halfshell._extras import needs
+from halfshell._errors import needs
 from halfshell._functions import brick_tasks
 from halfshell._functions.bricks import Terms, divide, part_of
 from halfshell._functions.counts import count_pairs as _count_pairs
@@ -475,7 +475,6 @@ document(pairs)
 
 # ---- parts of a division, and what is found in them ----------------------------------------
 
-
 def _task(function: Callable[..., Any]) -> Callable[..., Any]:
     made: Callable[..., Any] = dask.delayed(function, pure=True)
     return made
@@ -554,7 +553,6 @@ def _columns(found: Sequence[Any], group: int, quantities: str, ndim: int) -> An
 
 
 # ---- chunks --------------------------------------------------------------------------------
-
 
 def _chunks(points: Any) -> tuple[list[Any], tuple[float, ...], int, np.dtype[Any]]:
     """Delayed arrays of rows, how many rows (NaN if unknown) and columns they have, their type."""

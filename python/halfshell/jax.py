@@ -14,7 +14,7 @@ import numpy as np
 
 from halfshell import _show
 from halfshell._convert.foreign import shown
-from halfshell._extras import needs
+from halfshell._errors import needs
 from halfshell._functions.directed import entries_of
 from halfshell._objects.box import Box
 
@@ -31,6 +31,7 @@ __all__ = ["NeighborList", "neighbor_list"]
 Array = Any  # jax.Array, also for type checkers where JAX is not installed
 
 
+@_show.shown
 class NeighborList(NamedTuple):
     """The result of `neighbor_list`: entries up to `needed`, then padding up to the capacity.
 
@@ -63,12 +64,6 @@ class NeighborList(NamedTuple):
     d: Array
     needed: Array
     overflow: Array
-
-    def __repr__(self) -> str:
-        return _show.line(self)
-
-    def _repr_html_(self) -> str:
-        return _show.html(self)
 
 
 def neighbor_list(

@@ -163,7 +163,7 @@ def _divided(given: list[_Given]) -> Division:
             )
         for name in ("cutoff", "rule", "box", "periodic", "fields"):
             mine, other = getattr(terms, name), getattr(first, name)
-            if not _is_same(mine, other):
+            if not np.array_equal(mine, other):
                 what = "what is known of points" if name == "fields" else name
                 raise ValueError(
                     f"{what} must be the same on all ranks, got {_shown(other)} on rank 0 and "
@@ -171,12 +171,6 @@ def _divided(given: list[_Given]) -> Division:
                 )
     summaries = [one.summary for one in given if one.summary is not None]
     return divide(first, len(given), *summaries)
-
-
-def _is_same(one: Any, other: Any) -> bool:
-    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
-        return np.array_equal(one, other)
-    return bool(one == other)
 
 
 def _shown(value: Any) -> str:

@@ -18,6 +18,11 @@ from halfshell import _show
 
 __all__ = ["ALPHA_QUARTZ_CIF", "Structure", "alpha_quartz"]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 #: The unit cell (9 points) as a CIF file.
 ALPHA_QUARTZ_CIF = Path(__file__).with_name("data") / "alpha_quartz.cif"
 
@@ -28,6 +33,7 @@ _SI_U = 0.4697
 _O_XYZ = (0.4135, 0.2669, 0.1191)
 
 
+@_show.shown
 class Structure(NamedTuple):
     """Points with their box.
 
@@ -44,12 +50,6 @@ class Structure(NamedTuple):
     positions: NDArray[np.float64]
     box: NDArray[np.float64]
     species: NDArray[np.str_]
-
-    def __repr__(self) -> str:
-        return _show.line(self)
-
-    def _repr_html_(self) -> str:
-        return _show.html(self)
 
 
 def alpha_quartz(repeat: tuple[int, int, int] = (8, 8, 8)) -> Structure:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from halfshell._extras import needs
+from halfshell._errors import needs
 from halfshell._functions.directed import check_rows, entries_between, entries_of
 from halfshell._objects.box import Box
 

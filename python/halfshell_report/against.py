@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from halfshell._cli.errors import InputError, one_line
-from halfshell._cli.files import Scene
-from halfshell._extras import how_to_install
+from halfshell._cli.structure_files import Scene
+from halfshell._errors import how_to_install
 from halfshell_report.peers import LIBRARIES, Library, Question, wrapped
 
 __all__ = ["PEERS", "Peer", "ask_peer", "find_peer"]

@@ -13,14 +13,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from halfshell._cli.errors import InputError, missing_extra, one_line
+from halfshell._cli.errors import InputError, missing_extra, one_line, printable
 from halfshell._cli.files import replacing
 from halfshell._cli.scene import describe_source, load_scene, unit_suffix
 from halfshell._machine import cpu_name, unknown_kernel, usable_cpus
-from halfshell._terminal import printable
 
 if TYPE_CHECKING:
-    from halfshell._cli.files import Scene
+    from halfshell._cli.structure_files import Scene
     from halfshell_report.rows import ReportRow
     from halfshell_report.run import Plan
 

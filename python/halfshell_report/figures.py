@@ -88,7 +88,8 @@ def called(name: str) -> str:
     """The name of a method where it stands by itself."""
     if name == "float32":
         return "float32 input"
-    return f"precision {name}" if name in ("exact", "double", "single") else name
+    own = {"exact": "halfshell", "double": "halfshell, double", "single": "halfshell, single"}
+    return own.get(name, name)
 
 
 def mark(name: str) -> Any:
@@ -166,7 +167,7 @@ def overview_figure(rows: Sequence[ReportRow]) -> Any | None:
         _label(figure, axes, shown, places)
         axes.set_xticks(range(low, high + 1), [power(k) for k in range(low, high + 1)])
         axes.set_yticks(range(0, 101, 20), [f"{k} %" for k in range(0, 101, 20)])
-        axes.set_xlabel("median run time, relative to precision 'exact'")
+        axes.set_xlabel("median run time, relative to halfshell")
         axes.set_title("scenes with a right list, of those that the method offers", fontsize=8,
                        loc="left")  # fmt: skip
     return figure
@@ -253,7 +254,7 @@ def map_figure(rows: Sequence[ReportRow]) -> Any:
             elif row.status == "ok" and row.seconds and row.scene in exact:
                 axes.text(across, down, _short(row.seconds / exact[row.scene]), fontsize=7,
                           ha="center", va="center", color="white" if dark else "0.15")  # fmt: skip
-        axes.set_xticks(range(len(columns)), columns, rotation=55, ha="left",
+        axes.set_xticks(range(len(columns)), list(map(called, columns)), rotation=55, ha="left",
                         rotation_mode="anchor")  # fmt: skip
         axes.xaxis.tick_top()
         axes.set_yticks(range(len(scenes)), scenes)

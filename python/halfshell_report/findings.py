@@ -289,7 +289,7 @@ def headline(rows: Sequence[ReportRow]) -> str:
     if ours is not None:
         right = f"all {ours.asked}" if ours.right == ours.asked else f"{ours.right} of {ours.asked}"
         where = "the one scene" if ours.right == ours.asked == 1 else f"{right} scenes"
-        parts.append(f"Precision 'exact' was right on {where}.")
+        parts.append(f"halfshell was right on {where}.")
     if others:
         best = max(others, key=lambda one: (one.share, one.right))
         many = f"Of {len(others)} other libraries the best one, {best.method}," if others[1:] else (

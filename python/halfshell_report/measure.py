@@ -36,7 +36,7 @@ import numpy as np
 
 import halfshell as hs
 from halfshell import _core
-from halfshell._extras import how_to_install
+from halfshell._errors import how_to_install
 from halfshell._machine import cpu_name, usable_cpus
 from halfshell_report.accuracy import Answer
 from halfshell_report.peers import LIBRARIES, Question, wrapped

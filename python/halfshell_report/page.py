@@ -39,7 +39,8 @@ _STYLE = """
 :root { color-scheme: light dark; --text: #222; --page: #fff; --quiet: #666; --line: #e4e4e4;
   --wrong: #a3121f; --link: #0b57a4; }
 @media (prefers-color-scheme: dark) { :root { --text: #ddd; --page: #16181b; --quiet: #a0a0a0;
-  --line: #34373b; --wrong: #ff8a80; --link: #8ab4f8; } }
+  --line: #34373b; --wrong: #ff8a80; --link: #8ab4f8; }
+  img { filter: invert(0.91) hue-rotate(180deg); } }
 body { font: 15px/1.5 system-ui, sans-serif; color: var(--text); background: var(--page);
   margin: 2rem auto; max-width: 62rem; padding: 0 1rem; }
 h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
@@ -109,12 +110,12 @@ def page(facts: Mapping[str, str], rows: Sequence[ReportRow]) -> str:
         *_picture(overview_figure(rows), "how often each method is right, against its run time"),
         "<h2>Who errs where</h2>",
         "<p>Each row is a scene, each column a method. The number in a field is the run time "
-        "divided by that of precision 'exact'; the darker the red, the more pairs are wrong.</p>",
+        "divided by that of halfshell; the stronger the red, the more pairs are wrong.</p>",
         *_picture(map_figure(rows), "wrong pairs by scene and method"),
         "<h2>All methods</h2>",
         "<p>The number of scenes with a right list, a wrong one or none; the wrong pairs of all "
         "lists together; the largest error of a distance; the median run time divided by that of "
-        "precision 'exact'. The method with the most right lists comes first.</p>",
+        "precision 'exact', halfshell's own. The method with the most right lists comes first.</p>",
         _table(SUMMARY, [(line, False) for line in summary_cells(rows)]),
         "<details><summary>In words</summary><ul>",
         *(f"<li>{escape(text)}</li>" for text in findings(rows)),

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from halfshell._terminal import printable
+from halfshell._cli.errors import printable
 from halfshell_report import measure, physics
 from halfshell_report import scenes as catalogue
 from halfshell_report.accuracy import Answer, Sample, pair_errors, quantity_errors, sample_of

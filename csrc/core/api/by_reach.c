@@ -15,15 +15,15 @@
 /* Several searches take as long for each point as one that has so many pairs of it, at least. */
 #define PAIRS_PER_POINT 60.0
 
-/* Whether a set of points has what the rule goes by. */
+/* Whether a set has what the reach goes by. */
 static bool
-has_marks(const hs_reach *reach, const hs_points *points, const double *numbers,
-          const int32_t *types, bool needs_numbers)
+has_marks(const hs_reach *reach, const hs_points *points, const hs_set *known, bool is_needed)
 {
-    if (reach->n_types > 0) {
-        return types != NULL || points->n == 0;
-    }
-    return numbers != NULL || points->n == 0 || !needs_numbers;
+    const hs_set set = hs_set_with(points, known);
+    return set.at.n == 0 || (reach->n_types > 0    ? set.types != NULL
+                             : !is_needed          ? true
+                             : reach->has_supports ? set.supports != NULL
+                                                   : set.radii != NULL);
 }
 
 /* Whether the limit is that of one of the two points: supports do not add up, and neither do radii
@@ -51,8 +51,6 @@ hs_by_reach_check(const hs_request *request, hs_failure *failure)
     const bool      asks = hs_rule_needs_asking(reach->rule);
     const bool      meets = hs_rule_needs_other(reach->rule);
     const double    cutoff = request->options->cutoff;
-    const double   *own = reach->has_supports ? reach->supports : reach->radii;
-    const double   *of_queries = reach->has_supports ? reach->query_supports : reach->query_radii;
     if ((unsigned)reach->rule >= HS_RULE_END || reach->n_types < 0 || !may_extend(reach) ||
         (reach->n_types > 0 && reach->cutoffs == NULL) ||
         (reach->has_supports &&
@@ -68,26 +66,29 @@ hs_by_reach_check(const hs_request *request, hs_failure *failure)
         failure->value = reach->extent;
         return HS_ERR_EXTENT;
     }
-    if (sets->queries == NULL) {
-        return has_marks(reach, sets->points, own, reach->types, true) ? HS_OK : HS_ERR_ARGUMENT;
-    }
-    return has_marks(reach, sets->points, own, reach->types, meets) &&
-                   has_marks(reach, sets->queries, of_queries, reach->query_types, asks)
+    return has_marks(reach, sets->points, sets->of_points, meets || sets->queries == NULL) &&
+                   (sets->queries == NULL ||
+                    has_marks(reach, sets->queries, sets->of_queries, asks))
                ? HS_OK
                : HS_ERR_ARGUMENT;
 }
 
-/* The caller's reach, without what its rule does not look at. */
-static hs_reach
-needed_of(const hs_request *request)
+/* Divides the sets of a request by its reach, without what its rule does not look at. */
+static hs_status
+divide(const hs_request *request, hs_call *call, hs_levels *levels, hs_failure *failure)
 {
-    hs_reach reach = *request->reach;
-    if (request->sets.queries != NULL && !hs_rule_needs_other(reach.rule)) {
-        reach.radii = reach.supports = NULL;
-    } else if (!hs_rule_needs_asking(reach.rule)) {
-        reach.query_radii = reach.query_supports = NULL;
+    const hs_sets  *sets = &request->sets;
+    const hs_reach *reach = request->reach;
+    const bool      has_queries = sets->queries != NULL;
+    hs_set          points = hs_set_with(sets->points, sets->of_points);
+    hs_set          queries = hs_set_with(sets->queries, sets->of_queries);
+    if (has_queries && !hs_rule_needs_other(reach->rule)) {
+        points.radii = points.supports = NULL;
+    } else if (!hs_rule_needs_asking(reach->rule)) {
+        queries.radii = queries.supports = NULL;
     }
-    return reach;
+    return hs_levels_divide(&call->account, &call->options, &points, has_queries ? &queries : NULL,
+                            reach, levels, failure);
 }
 
 hs_status
@@ -106,12 +107,10 @@ hs_by_reach_open(const hs_request *request, hs_call *call, hs_by_reach *by, hs_f
     if (status != HS_OK) {
         return status;
     }
-    const hs_reach reach = needed_of(request);
-    const int64_t  n = sets->points->n + (sets->queries != NULL ? sets->queries->n : 0);
+    const int64_t n = sets->points->n + (sets->queries != NULL ? sets->queries->n : 0);
     hs_call_gather(call, n);
     hs_call_gather_for(call, n, PAIRS_PER_POINT * (double)n);
-    status = hs_levels_divide(&call->account, &call->options, sets->points, sets->queries, &reach,
-                              &by->levels, failure);
+    status = divide(request, call, &by->levels, failure);
     if (status == HS_OK) {
         status = hs_level_plan_choose(&call->account, &call->options, &by->levels, by->box,
                                       request->options->cutoff, request->options->algorithm,
@@ -140,9 +139,12 @@ static hs_status
 use_step(const hs_by_reach *by, int64_t step, bool keeps_none, hs_call *call, hs_use_fn use,
          void *context, int64_t *n_pairs, hs_failure *failure)
 {
-    hs_level_search open;
-    int64_t         n = 0;
-    hs_status       status =
+    hs_level_search  open;
+    int64_t          n = 0;
+    const double     n_steps = (double)by->plan.n;
+    const hs_stretch whole =
+        hs_call_begin_part(call, (double)step / n_steps, ((double)step + 1.0) / n_steps);
+    hs_status status =
         hs_level_open(&by->levels, &by->plan, step, by->box, keeps_none, call, &open, failure);
     if (status == HS_OK) {
         status = use(context, &open.search, &n, failure);
@@ -150,6 +152,7 @@ use_step(const hs_by_reach *by, int64_t step, bool keeps_none, hs_call *call, hs
         *n_pairs += n;
         failure->in_queries = failure->in_queries && by->levels.has_queries;
     }
+    hs_call_end_part(call, whole);
     return status;
 }
 

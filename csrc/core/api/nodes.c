@@ -147,7 +147,8 @@ hs_connectivity_build(const hs_among *among, const hs_node_lists *lists, const h
     int64_t   n = 0;
     hs_pairs *found = NULL;
     hs_status status = count_nodes(lists, &n);
-    if (!can_connect(result, options) || among == NULL || status != HS_OK) {
+    if (!can_connect(result, options) || among == NULL || hs_has_systems(among) ||
+        status != HS_OK) {
         return hs_end_early(status != HS_OK ? status : HS_ERR_ARGUMENT, options, failure);
     }
     const hs_options search = options_of_all_neighbours(among, options);

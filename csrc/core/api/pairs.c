@@ -7,8 +7,10 @@
 #include "../search/walk.h"
 #include "../rows/table.h"
 #include "../nearest/nearest.h"
+#include "../search/choice.h"
 #include "../histogram/histogram.h"
 #include "stream.h"
+#include "systems.h"
 #include "../collect/components.h"
 
 #include <math.h>
@@ -74,6 +76,9 @@ hs_pairs_find(const hs_among *among, const hs_options *options, hs_pairs **resul
     if (!hs_can_return(result, options)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
+    if (hs_has_systems(among)) {
+        return hs_systems_pairs(among, options, result, failure);
+    }
     return request.reach != NULL ? hs_by_reach_pairs(&request, result, failure)
                                  : hs_request_fill(&request, fill_pairs, result, failure);
 }
@@ -97,6 +102,9 @@ hs_pairs_count(const hs_among *among, const hs_options *options, int64_t *count,
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     const hs_options counting = hs_options_of_count(options);
+    if (hs_has_systems(among)) {
+        return hs_systems_count(among, &counting, count, failure);
+    }
     const hs_request request = hs_request_among(among, HS_HALF_OR_QUERIES, &counting);
     int64_t          n_pairs = 0;
     const hs_status  status = hs_by_reach_each_step(&request, count_pairs, &n_pairs, failure);
@@ -188,6 +196,9 @@ hs_neighbors_find(const hs_among *among, const hs_options *options, hs_pairs **r
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     const hs_options of_rows = options_of_rows(options);
+    if (hs_has_systems(among)) {
+        return hs_systems_neighbors(among, &of_rows, result, failure);
+    }
     const hs_request request = hs_request_among(among, HS_FULL_LIST, &of_rows);
     return request.reach != NULL ? hs_by_reach_rows(&request, find_rows, result, failure)
                                  : hs_request_fill(&request, find_rows, result, failure);
@@ -210,14 +221,18 @@ hs_status
 hs_neighbors_count(const hs_among *among, const hs_options *options, int64_t *counts,
                    hs_failure *failure)
 {
-    hs_request       request = hs_request_among(among, HS_FULL_LIST, options);
-    const hs_sets   *sets = &request.sets;
-    const hs_points *asking = sets->queries != NULL ? sets->queries : sets->points;
-    if (options == NULL || !hs_has_entries(counts, asking)) {
+    if (options == NULL) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     const hs_options counting = hs_options_of_count(options);
-    request.options = &counting;
+    if (hs_has_systems(among)) {
+        return hs_systems_neighbors_count(among, &counting, counts, failure);
+    }
+    const hs_request request = hs_request_among(among, HS_FULL_LIST, &counting);
+    const hs_sets   *sets = &request.sets;
+    if (!hs_has_entries(counts, sets->queries != NULL ? sets->queries : sets->points)) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
     return request.reach != NULL ? hs_by_reach_count_rows(&request, count_rows, counts, failure)
                                  : hs_request_use(&request, count_rows, counts, failure);
 }
@@ -241,14 +256,18 @@ make_nearest_room(hs_nearest *near, int64_t n_asking, hs_failure *failure)
 }
 
 static hs_status
-find_nearest(hs_nearest *near, const hs_sets *sets, const hs_box *box, hs_failure *failure)
+find_nearest(hs_nearest *near, const hs_request *request, hs_failure *failure)
 {
-    hs_search    *search = near->search;
-    const int64_t n_asking = sets->queries != NULL ? sets->queries->n : sets->points->n;
-    const double  limit = search->call->options.cutoff;
-    hs_status     status = make_nearest_room(near, n_asking, failure);
+    const hs_sets *sets = &request->sets;
+    hs_search     *search = near->search;
+    const int64_t  n_asking = sets->queries != NULL ? sets->queries->n : sets->points->n;
+    const double   limit = search->call->options.cutoff;
+    hs_status      status = make_nearest_room(near, n_asking, failure);
     if (status == HS_OK) {
-        status = hs_nearest_prepare(near, sets, box, limit, failure);
+        status = hs_choice_of_request(request, limit, search->call, failure);
+    }
+    if (status == HS_OK) {
+        status = hs_nearest_prepare(near, sets, request->box, limit, failure);
     }
     if (status == HS_OK) { /* rows are written in the order of the tree */
         status = hs_touch_output(search->call->team, &search->call->options, near->rows);
@@ -259,6 +278,7 @@ find_nearest(hs_nearest *near, const hs_sets *sets, const hs_box *box, hs_failur
     hs_call_tell_limit(search->call, status, failure);
     hs_nearest_release(near);
     hs_search_close(search);
+    hs_choice_close(search->call);
     return status;
 }
 
@@ -287,24 +307,28 @@ hs_nearest_find(const hs_among *among, int64_t k, const hs_options *options, hs_
     if (!hs_can_return(result, options)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    sets->is_plain = sets->is_wide = true;
     const hs_options of_rows = hs_options_of_nearest(options);
-    hs_pairs        *rows = hs_pairs_begin(&of_rows, &failure);
+    if (hs_has_systems(among)) {
+        return hs_systems_nearest(among, k, &of_rows, result, failure);
+    }
+    sets->is_plain = sets->is_wide = true;
+    hs_pairs *rows = hs_pairs_begin(&of_rows, &failure);
     if (rows == NULL) {
         return HS_ERR_MEMORY;
     }
     hs_search_begin(&rows->call, &search);
     hs_nearest near = {.search = &search,
                        .k = k,
-                       .of_spot = k < INT32_MAX - 1 ? (int32_t)k + 1 : INT32_MAX,
+                       .of_spot = k < INT32_MAX - 1 && request.selection == NULL ? (int32_t)k + 1
+                                                                                 : INT32_MAX,
                        .omits_self = sets->queries == NULL,
                        .rows = &rows->output};
-    hs_status  status = request.reach == NULL && request.selection == NULL
+    hs_status  status = request.reach == NULL
                             ? check_nearest(sets, request.box, k, &of_rows, failure)
-                            : HS_ERR_ARGUMENT; /* which this search knows neither of */
+                            : HS_ERR_ARGUMENT; /* which this search does not know */
     if (status == HS_OK) {
         hs_pairs_open(rows, sets->points->ndim);
-        status = find_nearest(&near, sets, request.box, failure);
+        status = find_nearest(&near, &request, failure);
     }
     return hs_pairs_finish(rows, status, rows->output.n_pairs, result);
 }
@@ -315,6 +339,7 @@ hs_nearest_find(const hs_among *among, int64_t k, const hs_options *options, hs_
 typedef struct counting {
     hs_search          *search;
     const hs_histogram *histogram;
+    const hs_sets      *sets;
     hs_tally_plan       plan;
 } counting;
 
@@ -422,12 +447,14 @@ options_of_histogram(const hs_histogram *histogram, const hs_options *options)
 static hs_status
 fill_histogram(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
 {
-    counting  shared = {.search = search, .histogram = context};
-    hs_status status = hs_tally_plan_open(search, shared.histogram, &shared.plan, failure);
+    counting *shared = context;
+    shared->search = search;
+    hs_status status =
+        hs_tally_plan_open(search, shared->histogram, shared->sets, &shared->plan, failure);
     if (status == HS_OK) {
-        status = tally_pairs(&shared, n_pairs, failure);
+        status = tally_pairs(shared, n_pairs, failure);
     }
-    hs_tally_plan_close(&shared.plan);
+    hs_tally_plan_close(&shared->plan);
     return status;
 }
 
@@ -441,13 +468,13 @@ find_histogram(const hs_among *among, const hs_options *options, const hs_histog
         hs_clear_counters(options);
         return status;
     }
-    hs_histogram     filled = *histogram;
     const hs_options of_search = options_of_histogram(histogram, options);
     hs_request       request = hs_request_among(among, HS_HALF_OR_QUERIES, &of_search);
     request.sets.is_plain = true;
     request.sets.keeps_none = true;
     request.sets.least_cutoff = hs_least_length(histogram->edges, histogram->n_edges);
-    return hs_request_use(&request, fill_histogram, &filled, failure);
+    counting shared = {.histogram = histogram, .sets = &request.sets};
+    return hs_request_use(&request, fill_histogram, &shared, failure);
 }
 
 /* Enters the floating-point environment itself, because edges are compared before the
@@ -457,6 +484,9 @@ hs_pairs_histogram(const hs_among *among, const hs_options *options, const hs_hi
                    hs_failure *failure)
 {
     hs_entry entry;
+    if (options != NULL && hs_has_systems(among)) {
+        return hs_systems_histogram(among, options, histogram, failure);
+    }
     failure = hs_enter(failure, &entry);
     const hs_status status = find_histogram(among, options, histogram, failure);
     hs_leave(&entry);

@@ -95,23 +95,23 @@ hs_check_points(const hs_points *points, hs_failure *failure)
 }
 
 hs_status
-hs_check_systems(const hs_systems *systems, int64_t n_points, hs_failure *failure)
+hs_check_systems(const hs_set *set, hs_failure *failure)
 {
-    if (systems == NULL || systems->n < 0 || (systems->n > 0 && systems->first == NULL)) {
+    const int64_t *first = set->first;
+    if (set->n_systems < 0 || first == NULL) {
         return HS_ERR_ARGUMENT;
     }
-    if (systems->n > INT32_MAX) {
-        failure->value = (double)systems->n;
+    if (set->n_systems > INT32_MAX) {
+        failure->value = (double)set->n_systems;
         return HS_ERR_TOO_MANY;
     }
-    for (int64_t s = 0; s < systems->n; s++) {
-        if (systems->first[s + 1] < systems->first[s]) {
+    for (int64_t s = 0; s < set->n_systems; s++) {
+        if (first[s + 1] < first[s]) {
             failure->system = s;
             return HS_ERR_ARGUMENT;
         }
     }
-    return status_of(systems->n == 0 ||
-                     (systems->first[0] == 0 && systems->first[systems->n] == n_points));
+    return status_of(first[0] == 0 && first[set->n_systems] == set->at.n);
 }
 
 hs_status
@@ -241,12 +241,13 @@ hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_b
     return status == HS_OK ? hs_check_options(options) : status;
 }
 
-/* The same for half lists, which may have shells. */
+/* The same for lists of pairs, which may have shells. */
 static hs_status
-check_half_list(const hs_points *points, const hs_box *box, const hs_options *options,
-                hs_failure *failure)
+check_request(const hs_request *request, hs_failure *failure)
 {
-    hs_status status = check_sets(points, NULL, box, failure);
+    const hs_sets    *sets = &request->sets;
+    const hs_options *options = request->options;
+    hs_status         status = check_sets(sets->points, sets->queries, request->box, failure);
     if (status == HS_OK) {
         status = check_options(options, HS_WANT_ALL | HS_WANT_SHELL);
     }
@@ -270,17 +271,21 @@ hs_request
 hs_request_among(const hs_among *among, hs_list_kind kind, const hs_options *options)
 {
     hs_request request = {.options = options};
-    if (among == NULL || (kind == HS_HALF_LIST && among->queries != NULL)) {
+    if (hs_has_systems(among) || among == NULL ||
+        (kind == HS_HALF_LIST && among->queries != NULL)) {
         return request;
     }
+    const hs_set *points = among->points, *queries = among->queries;
     request.reach = among->reach;
     request.selection = among->selection;
-    request.sets.queries = among->queries;
-    request.sets.is_full = kind == HS_FULL_LIST || among->queries != NULL;
+    request.sets.of_points = points;
+    request.sets.of_queries = queries;
+    request.sets.queries = queries != NULL ? &queries->at : NULL;
+    request.sets.is_full = kind == HS_FULL_LIST || queries != NULL;
     if (among->cells == NULL) {
-        request.sets.points = among->points;
+        request.sets.points = points != NULL ? &points->at : NULL;
         request.box = among->box;
-    } else if (among->points == NULL && among->box == NULL) {
+    } else if ((points == NULL || points->at.data == NULL) && among->box == NULL) {
         const hs_cells *cells = among->cells;
         request.sets.points = &cells->points;
         request.sets.built = &cells->search;
@@ -295,9 +300,7 @@ hs_request_open(const hs_request *request, hs_call *call, hs_search *search, hs_
 {
     const hs_options *options = request->options;
     hs_sets           sets = request->sets;
-    hs_status         sound =
-        sets.is_full ? hs_check_arguments(sets.points, sets.queries, request->box, options, failure)
-                             : check_half_list(sets.points, request->box, options, failure);
+    hs_status         sound = check_request(request, failure);
     if (request->reach != NULL) { /* which this search does not know */
         sound = HS_ERR_ARGUMENT;
     }

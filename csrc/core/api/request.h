@@ -38,8 +38,8 @@ bool hs_has_entries(const void *array, const hs_points *points);
 /* HS_OK, HS_ERR_ARGUMENT, or HS_ERR_TOO_MANY for points and systems from 2^31 on. */
 hs_status hs_check_points(const hs_points *points, hs_failure *failure);
 
-/* first and n of systems that share out so many points; what it reads is first alone. */
-hs_status hs_check_systems(const hs_systems *systems, int64_t n_points, hs_failure *failure);
+/* n_systems and first of a set of several systems; what it reads is first alone. */
+hs_status hs_check_systems(const hs_set *set, hs_failure *failure);
 
 /* HS_OK or HS_ERR_ARGUMENT. The box may be NULL; ndim is that of the points. */
 hs_status hs_check_box(const hs_box *box, int ndim);
@@ -67,6 +67,15 @@ hs_status hs_check_arguments(const hs_points *points, const hs_points *queries, 
  * and from its end to what the caller gets. What each does with the search is its own.
  */
 
+/* Whether these are several systems, or may be. */
+HS_ALWAYS_INLINE bool
+hs_has_systems(const hs_among *among)
+{
+    return among != NULL &&
+           ((among->points != NULL && among->points->first != NULL) ||
+            (among->queries != NULL && among->queries->first != NULL) || among->each != NULL);
+}
+
 /* What to search for, all borrowed. */
 typedef struct hs_request {
     hs_sets             sets;
@@ -80,7 +89,8 @@ typedef struct hs_request {
  * query; or the first without queries and the second with them. */
 typedef enum hs_list_kind { HS_HALF_LIST, HS_FULL_LIST, HS_HALF_OR_QUERIES } hs_list_kind;
 
-/* `among` may be NULL or contradict itself: then no points are set, which opening refuses. */
+/* `among` may be NULL, contradict itself or have several systems: then no points are set, which
+ * opening refuses. */
 hs_request hs_request_among(const hs_among *among, hs_list_kind kind, const hs_options *options);
 
 /* Checks the arguments, and opens a search of them for a call that has begun. On failure it is

@@ -470,13 +470,14 @@ hs_sums_round(const hs_sums *sums, int64_t k)
 }
 
 static hs_status
-marked_init(hs_account *account, const hs_marks *marks, const int32_t *order, int64_t n,
-            int32_t n_types, hs_marked *marked, hs_failure *failure)
+marked_init(hs_account *account, const hs_set *known, const int32_t *order, int64_t n,
+            const hs_tally_plan *plan, hs_marked *marked, hs_failure *failure)
 {
+    const hs_set set = hs_set_with(NULL, known);
     *marked = (hs_marked){.type = NULL};
-    hs_status status =
-        hs_weights_init(account, marks->weights, order, n, &marked->weights, failure);
-    if (status != HS_OK || marks->types == NULL) {
+    hs_status status = hs_weights_init(account, plan->sums ? set.weights : NULL, order, n,
+                                       &marked->weights, failure);
+    if (status != HS_OK || set.types == NULL || !plan->has_types) {
         return status;
     }
     marked->type = hs_alloc(account, HS_FOR_POINTS, n, sizeof(int32_t));
@@ -484,8 +485,8 @@ marked_init(hs_account *account, const hs_marks *marks, const int32_t *order, in
         return HS_ERR_MEMORY;
     }
     for (int64_t i = 0; i < n; i++) {
-        marked->type[i] = marks->types[order[i]];
-        if (marked->type[i] < 0 || marked->type[i] >= n_types) {
+        marked->type[i] = set.types[order[i]];
+        if (marked->type[i] < 0 || marked->type[i] >= plan->n_types) {
             failure->row = order[i];
             failure->value = marked->type[i];
             return HS_ERR_TYPES;
@@ -892,8 +893,8 @@ plan_groups(bool has_queries, hs_tally_plan *plan)
 }
 
 hs_status
-hs_tally_plan_open(hs_search *search, const hs_histogram *histogram, hs_tally_plan *plan,
-                   hs_failure *failure)
+hs_tally_plan_open(hs_search *search, const hs_histogram *histogram, const hs_sets *sets,
+                   hs_tally_plan *plan, hs_failure *failure)
 {
     hs_account *account = &search->call->account;
     plan->account = account;
@@ -904,12 +905,12 @@ hs_tally_plan_open(hs_search *search, const hs_histogram *histogram, hs_tally_pl
     hs_status status =
         edges_init(account, &search->scene, search->filter_error, histogram, &plan->edges);
     if (status == HS_OK) {
-        status = marked_init(account, &histogram->of_points, search->bins.order, search->bins.n,
-                             plan->n_types, &plan->points, failure);
+        status = marked_init(account, sets->of_points, search->bins.order, search->bins.n, plan,
+                             &plan->points, failure);
     }
     if (status == HS_OK && search->has_queries) {
-        status = marked_init(account, &histogram->of_queries, search->query_bins.order,
-                             search->query_bins.n, plan->n_types, &plan->queries, failure);
+        status = marked_init(account, sets->of_queries, search->query_bins.order,
+                             search->query_bins.n, plan, &plan->queries, failure);
         failure->in_queries = status == HS_ERR_TYPES || status == HS_ERR_WEIGHTS;
     }
     if (status == HS_OK && plan->has_types &&

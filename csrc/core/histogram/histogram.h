@@ -177,10 +177,10 @@ typedef struct hs_tally_plan {
     int32_t         *group;    /* owned; n_types * n_types; when has_types */
 } hs_tally_plan;
 
-/* The plan is zero before. hs_tally_plan_close must follow, also on failure: of
- * HS_ERR_MEMORY, HS_ERR_EDGES, HS_ERR_TYPES and HS_ERR_WEIGHTS. */
-hs_status hs_tally_plan_open(hs_search *search, const hs_histogram *histogram, hs_tally_plan *plan,
-                             hs_failure *failure);
+/* sets: what is known of the points. The plan is zero before. hs_tally_plan_close must follow, also
+ * on failure: of HS_ERR_MEMORY, HS_ERR_EDGES, HS_ERR_TYPES and HS_ERR_WEIGHTS. */
+hs_status hs_tally_plan_open(hs_search *search, const hs_histogram *histogram, const hs_sets *sets,
+                             hs_tally_plan *plan, hs_failure *failure);
 void      hs_tally_plan_close(hs_tally_plan *plan);
 
 #define HS_TALLY_TABLES 4 /* extents that a walk may meet again; each a power of two */

@@ -464,28 +464,34 @@ divide(hs_division *by, hs_level_input *points, hs_level_input *queries, hs_leve
     return status;
 }
 
+/* A set, which may be NULL, as far as the reach goes by it. */
+static hs_level_input
+level_input(const hs_set *set, const hs_reach *reach, bool are_queries)
+{
+    hs_level_input input = {.are_queries = are_queries};
+    if (set != NULL) {
+        input.points = &set->at;
+        input.radii = reach->n_types == 0 && !reach->has_supports ? set->radii : NULL;
+        input.types = reach->n_types > 0 ? set->types : NULL;
+        input.supports = reach->has_supports ? set->supports : NULL;
+    }
+    return input;
+}
+
 hs_status
-hs_levels_divide(hs_account *account, const hs_options *options, const hs_points *points,
-                 const hs_points *queries, const hs_reach *reach, hs_levels *levels,
+hs_levels_divide(hs_account *account, const hs_options *options, const hs_set *points,
+                 const hs_set *queries, const hs_reach *reach, hs_levels *levels,
                  hs_failure *failure)
 {
-    const bool     has_supports = reach->has_supports, has_types = reach->n_types > 0;
-    const bool     has_own = !has_types && !has_supports; /* radii */
+    const bool     has_own = reach->n_types == 0 && !reach->has_supports; /* radii */
     const double   factor = has_own && reach->extent != 0.0 ? reach->extent : 1.0;
     hs_division    by = {.account = account, .options = options, .reach = reach, .factor = factor};
-    hs_level_input of_points = {.points = points,
-                                .radii = has_own ? reach->radii : NULL,
-                                .types = reach->types,
-                                .supports = has_supports ? reach->supports : NULL};
-    hs_level_input of_queries = {.points = queries,
-                                 .radii = has_own ? reach->query_radii : NULL,
-                                 .types = reach->query_types,
-                                 .supports = has_supports ? reach->query_supports : NULL,
-                                 .are_queries = true};
+    hs_level_input of_points = level_input(points, reach, false);
+    hs_level_input of_queries = level_input(queries, reach, true);
     *levels = (hs_levels){.rule = reach->rule,
                           .factor = factor,
                           .has_queries = queries != NULL,
-                          .has_supports = has_supports,
+                          .has_supports = reach->has_supports,
                           .extent = reach->extent};
     const hs_status status = divide(&by, &of_points, &of_queries, levels, failure);
     level_input_free(account, &of_points);

@@ -77,8 +77,8 @@ typedef struct hs_levels {
  * first row that is wrong, HS_ERR_CUTOFF a table that is not symmetric or not finite. queries may
  * be NULL. HS_ERR_INTERRUPTED where the poll of the options says so. On failure holds nothing.
  */
-hs_status hs_levels_divide(hs_account *account, const hs_options *options, const hs_points *points,
-                           const hs_points *queries, const hs_reach *reach, hs_levels *levels,
+hs_status hs_levels_divide(hs_account *account, const hs_options *options, const hs_set *points,
+                           const hs_set *queries, const hs_reach *reach, hs_levels *levels,
                            hs_failure *failure);
 
 /* Counts the points from `first` on: they are part of more. */

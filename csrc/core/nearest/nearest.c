@@ -83,7 +83,7 @@ hs_nearest_kept_end(hs_nearest_kept *kept, bool done)
 /* The nearest of a point take as long as so many pairs of a search with a cutoff, for which it is
  * known how many threads they are worth. */
 #define PAIRS_PER_POINT 200.0
-/* Largest distances below this scale the scene by themselves. */
+/* Lengths that distances are compared with scale the scene by themselves below this. */
 #define SMALL_LIMIT 0x1p-800
 /* Periods below this do. */
 #define SMALL_BOX 0x1p-500
@@ -94,8 +94,15 @@ limit_is_small(double limit)
     return limit > 0.0 && limit < SMALL_LIMIT;
 }
 
+/* The smallest length above 0 that distances are compared with. */
+static double
+smallest_length(const hs_nearest *near, double limit)
+{
+    return hs_choice_least_length(near->search->call->choice, limit);
+}
+
 /* Which cutoff lets the scene keep every digit: one that leaves ordinary numbers as they are; the
- * box's own size, or the largest distance, where these are too small for that. */
+ * box's own size, or what distances are compared with, where these are too small for that. */
 static double
 scene_cutoff(const hs_box *box, double limit)
 {
@@ -110,16 +117,34 @@ scene_cutoff(const hs_box *box, double limit)
     return limit_is_small(limit) ? limit : short_row < SMALL_BOX ? 0.0 : 1.0;
 }
 
-/* Sets the largest distance, in the scene's unit and for the metric. */
+/* Sets the largest and the least distance, in the scene's unit and for the metrics. */
 static void
 set_limit(hs_nearest *near, double limit)
 {
     const hs_scene  *scene = &near->search->scene;
     const hs_metric *metric = &scene->metric;
+    const hs_choice *choice = near->search->call->choice;
     near->limit = hs_scale_apply(scene->scale, limit);
     const double of_metric = scene->extreme ? limit : near->limit;
     hs_metric_init(&near->within, scene->ndim, metric->n_rows, metric->rows,
-                   of_metric < INFINITY ? of_metric : 1.0, true);
+                   of_metric < INFINITY ? of_metric : 1.0, near->search->call->options.inclusive);
+    if (choice != NULL && choice->min_distance > 0.0) {
+        near->least = hs_scale_apply(scene->scale, choice->min_distance);
+        hs_metric_init(&near->nearer, scene->ndim, metric->n_rows, metric->rows,
+                       hs_choice_least(choice, scene), false);
+    }
+}
+
+/* The call's options for its scene. Where images are compared, S is needed of all pairs. */
+static hs_options
+options_of_scene(const hs_nearest *near, double limit)
+{
+    const hs_call *call = near->search->call;
+    hs_options     options = call->options;
+    if (call->choice != NULL && hs_choice_needs_places(call->choice, limit)) {
+        options.want |= HS_WANT_SHIFT;
+    }
+    return options;
 }
 
 /* Builds the tree of the points and measures them: all that searches with other k and other queries
@@ -161,11 +186,11 @@ prepare_anew(hs_nearest *near, const hs_sets *sets, const hs_box *box, double li
 {
     hs_search    *search = near->search;
     hs_scene      queries, *asking = sets->queries != NULL ? &queries : NULL;
-    hs_options    options = search->call->options;
+    hs_options    options = options_of_scene(near, limit);
     const int32_t leaf_points = near->k < 4 * LEAF_POINTS ? LEAF_POINTS : 2 * LEAF_POINTS;
     hs_sets       bounded = *sets;
     bounded.within = limit < INFINITY ? limit : 0.0;
-    options.cutoff = scene_cutoff(box, limit);
+    options.cutoff = scene_cutoff(box, smallest_length(near, limit));
     near->asking = &near->tree;
     hs_status status = hs_scene_init_sets(&search->call->account, search->call->team, &bounded, box,
                                           &options, &search->scene, asking, failure);
@@ -245,7 +270,7 @@ prepare_from_kept(hs_nearest *near, const hs_sets *sets, const hs_box *box, doub
     hs_nearest *room;
     hs_scene    asking;
     hs_status   status = HS_OK;
-    if (limit_is_small(limit)) {
+    if (limit_is_small(smallest_length(near, limit))) {
         return HS_REBUILD;
     }
     const hs_nearest *kept = hs_nearest_kept_get(sets->trees, &room);
@@ -264,9 +289,10 @@ prepare_from_kept(hs_nearest *near, const hs_sets *sets, const hs_box *box, doub
         return HS_REBUILD;
     }
     if (sets->queries != NULL) {
+        const hs_options options = options_of_scene(near, limit);
         status = hs_scene_from_kept(&search->call->account, search->call->team,
-                                    &kept->search->scene, sets->queries, &search->call->options,
-                                    &asking, failure);
+                                    &kept->search->scene, sets->queries, &options, &asking,
+                                    failure);
         if (status != HS_OK) {
             return status;
         }
@@ -316,6 +342,8 @@ hs_nearest_release(hs_nearest *near)
 /* Standard deviations of their number that a first radius makes room for. Measured: with 3 the time
  * differs by less than the noise. */
 #define SPREAD 3.5
+/* Points whose labels say how many more are to be looked at. */
+#define MOST_LABELS 512
 
 int
 hs_nearest_exponent(double radius)
@@ -509,17 +537,39 @@ widen_at_edges(const hs_nearest *near, const hs_nearest_group *group, double rad
     return part < 1.0 ? radius * pow(part, -1.0 / tree->ndim) : radius;
 }
 
+/* How many points of the node, or of as many as are looked at, do not count by their labels: for a
+ * point of the group. */
+static int32_t
+count_left_out(const hs_nearest *near, const hs_nearest_group *group, const hs_tree_node *node)
+{
+    const int32_t *order = near->search->bins.order;
+    const int32_t  end = node->end - node->first < MOST_LABELS ? node->end
+                                                               : node->first + MOST_LABELS;
+    hs_chooser     chooser;
+    int32_t        n = 0;
+    hs_chooser_set(near->search->call->choice,
+                   hs_search_asking(near->search)->order[(group->first + group->last) / 2],
+                   &chooser);
+    for (int32_t sj = node->first; sj < end; sj++) {
+        n += !hs_chooser_is_of_group(&chooser, order[sj]) ||
+             hs_chooser_excludes(&chooser, order[sj]);
+    }
+    return n;
+}
+
 void
 hs_nearest_guess(const hs_nearest *near, hs_nearest_group *group)
 {
     const hs_tree    *tree = &near->tree;
     const hs_lattice *lattice = &near->search->scene.lattice;
     const double      k = (double)near->k + near->omits_self;
-    const double      wanted = k + SPREAD * sqrt(k) + 1.0;
+    double            wanted = k + SPREAD * sqrt(k) + 1.0;
     double            away, sides[HS_MAX_DIM];
     const int32_t     number =
         find_node(tree, group, POINTS_PER_WANTED * hs_larger(wanted, 16.0), sides, &away);
     const hs_tree_node *node = &tree->nodes[number];
+    group->more = near->search->call->choice != NULL ? count_left_out(near, group, node) : 0.0;
+    wanted += group->more;
     near_region region = {.ndim = tree->ndim, .n_points = (double)(node->end - node->first)};
     for (int axis = 0; axis < tree->ndim; axis++) {
         region.side[axis] = log2(sides[axis]);
@@ -528,7 +578,13 @@ hs_nearest_guess(const hs_nearest *near, hs_nearest_group *group)
         take_box(lattice, &region);
     }
     const double farthest = nearest_farthest(near, group);
-    const double inside = exp2(radius_of(&region, wanted));
+    double       inside = exp2(radius_of(&region, wanted));
+    if (near->least > 0.0) { /* a shell around a ball holds as many as are wanted */
+        const double ratio = pow(near->least / inside, tree->ndim);
+        const double wider = inside * pow(1.0 + ratio, 1.0 / tree->ndim);
+        group->more += wanted * ratio;
+        inside = wider < INFINITY ? wider : near->least;
+    }
     group->radius = hs_larger(widen_at_edges(near, group, inside) + away, HS_NEAREST_LEAST_RADIUS);
     group->is_complete = group->radius >= farthest ||
                          (lattice->n_periodic == 0 && (double)tree->nodes[0].end <= k);
@@ -564,6 +620,8 @@ hs_nearest_bounder_free(const hs_nearest *near, hs_nearest_bounder *bounder)
 #define BOUND_ROOM 0x1p-36
 /* Nodes and points between two polls: some milliseconds. */
 #define POLL_WORK (INT64_C(1) << 20)
+/* What deciding whether a point counts may take, in points: images of it are compared. */
+#define WORK_OF_CHOICE 512
 /* Squares outside this are near underflow or overflow: another unit is needed. */
 #define LEAST_SQUARE 0x1p-600
 #define MOST_SQUARE  0x1p600
@@ -571,19 +629,25 @@ hs_nearest_bounder_free(const hs_nearest *near, hs_nearest_bounder *bounder)
 
 /* An asking point, in one image and unit. */
 typedef struct near_probe {
-    const hs_nearest   *near;
-    hs_nearest_bounder *bounder;
-    int32_t             self;           /* the point itself is left out; -1 in other images */
-    double              at[HS_MAX_DIM]; /* its X less the image's displacement */
-    double              unit;
+    const hs_nearest    *near;
+    const hs_options    *options; /* polled */
+    hs_nearest_bounder  *bounder;
+    int32_t              self;           /* the point itself is left out; -1 in other images */
+    double               at[HS_MAX_DIM]; /* its X less the image's displacement */
+    double               unit;
+    double               most;      /* what has a larger square is beyond the largest distance */
+    hs_chooser           chooser;   /* if the call has a choice */
+    hs_nearest_candidate candidate; /* for that */
+    hs_stages            stages;
 } near_probe;
 
-/* Largest of the k least squares, infinity as long as there are fewer. */
+/* Largest of the k least squares; as long as there are fewer, any that may be within the largest
+ * distance. */
 static double
 worst(const near_probe *probe)
 {
     const hs_nearest_bounder *bounder = probe->bounder;
-    return bounder->n < probe->near->k ? INFINITY : bounder->least[0];
+    return bounder->n < probe->near->k ? probe->most : bounder->least[0];
 }
 
 static void
@@ -629,23 +693,49 @@ note_square(near_probe *probe, double square)
     return true;
 }
 
-static bool
+/* Whether a point that is nearer than all that was found counts, by the call's choice. */
+static hs_status
+probe_counts(near_probe *probe, int32_t sj, double square, bool *counts)
+{
+    probe->candidate.sj = sj;
+    probe->candidate.square = square;
+    probe->bounder->work += WORK_OF_CHOICE;
+    if (probe->bounder->work > POLL_WORK) {
+        probe->bounder->work = 0;
+        const hs_status status = hs_poll(probe->options, 0.0);
+        if (status != HS_OK) {
+            return status;
+        }
+    }
+    return hs_nearest_counts(probe->near, &probe->chooser, &probe->candidate, &probe->stages,
+                             counts);
+}
+
+static hs_status
 note_leaf(near_probe *probe, const hs_tree_node *node)
 {
-    const hs_bins *bins = &probe->near->search->bins;
-    const int32_t  n = hs_nearest_of_leaf(probe->near, node);
+    const hs_search *search = probe->near->search;
+    const hs_bins   *bins = &search->bins;
+    const int32_t    n = hs_nearest_of_leaf(probe->near, node);
     for (int32_t si = node->first; si < node->first + n; si++) {
         double square = 0.0;
         for (int k = 0; k < bins->ndim; k++) {
             const double along = (bins->x[k][si] - probe->at[k]) * probe->unit;
             square += along * along;
         }
-        if (si != probe->self && !note_square(probe, square)) {
-            return false;
+        bool counts = si != probe->self && square <= worst(probe);
+        if (counts && search->call->choice != NULL) {
+            const hs_status status = probe_counts(probe, si, square, &counts);
+            if (status != HS_OK) {
+                return status;
+            }
+        }
+        if (counts && !note_square(probe, square)) {
+            return HS_ERR_MEMORY;
         }
     }
     probe->bounder->work += n;
-    return true;
+    return HS_OK;
 }
 
 static hs_status
@@ -664,8 +754,9 @@ walk_image(near_probe *probe)
             continue;
         }
         if (node->left == 0) {
-            if (!note_leaf(probe, node)) {
-                return HS_ERR_MEMORY;
+            const hs_status status = note_leaf(probe, node);
+            if (status != HS_OK) {
+                return status;
             }
             continue;
         }
@@ -683,14 +774,21 @@ walk_image(near_probe *probe)
 
 /* The k least squares among all images within group->radius, or as many as there are. */
 static hs_status
-walk_images(const hs_nearest *near, const hs_options *options, const hs_nearest_group *group,
-            near_probe *probe, double *error)
+walk_images(const hs_nearest_group *group, near_probe *probe, double *error)
 {
+    const hs_nearest *near = probe->near;
     const hs_bins    *bins = hs_search_asking(near->search);
     hs_nearest_images images;
     hs_status         status = hs_nearest_images_start(near, group, &images);
     *error = images.error;
+    const double reach =
+        (near->limit + 8.0 * sqrt(near->tree.ndim) * images.error) * (1.0 + BOUND_ROOM);
+    probe->most = reach * probe->unit * (reach * probe->unit);
     probe->bounder->n = 0;
+    probe->candidate = (hs_nearest_candidate){.si = group->first,
+                                              .image = images.shift,
+                                              .unit = probe->unit,
+                                              .error = images.error * probe->unit};
     while (status == HS_OK && hs_nearest_images_next(&images)) {
         int32_t any = 0;
         for (int r = 0; r < bins->n_periodic; r++) {
@@ -703,7 +801,7 @@ walk_images(const hs_nearest *near, const hs_options *options, const hs_nearest_
         status = walk_image(probe);
         if (status == HS_OK && probe->bounder->work > POLL_WORK) {
             probe->bounder->work = 0;
-            status = hs_poll(options, 0.0);
+            status = hs_poll(probe->options, 0.0);
         }
     }
     return status;
@@ -712,13 +810,13 @@ walk_images(const hs_nearest *near, const hs_options *options, const hs_nearest_
 /* The k least squares, in a unit in which the largest of them is an ordinary number. A unit changes
  * by powers that bring no square from one end to the other: a few times at most. */
 static hs_status
-walk_scaled(const hs_nearest *near, const hs_options *options, const hs_nearest_group *group,
-            near_probe *probe, double *error)
+walk_scaled(const hs_nearest_group *group, near_probe *probe, double *error)
 {
-    int exponent = -hs_nearest_exponent(group->radius);
+    const hs_nearest *near = probe->near;
+    int               exponent = -hs_nearest_exponent(group->radius);
     for (;;) {
         probe->unit = hs_power_of_two(exponent);
-        const hs_status status = walk_images(near, options, group, probe, error);
+        const hs_status status = walk_images(group, probe, error);
         const double    square = worst(probe);
         int             better = exponent;
         if (status == HS_OK && probe->bounder->n == near->k && square < LEAST_SQUARE) {
@@ -747,14 +845,18 @@ hs_nearest_bound(const hs_nearest *near, const hs_options *options, hs_nearest_b
 {
     const bool   is_open = near->search->scene.lattice.n_periodic == 0;
     const double farthest = nearest_farthest(near, group);
-    near_probe   probe = {.near = near, .bounder = bounder};
+    near_probe   probe = {.near = near, .options = options, .bounder = bounder};
     double       error, along = hs_smaller(group->radius, near->smallest_period);
+    if (near->search->call->choice != NULL) {
+        hs_chooser_set(near->search->call->choice,
+                       hs_search_asking(near->search)->order[group->first], &probe.chooser);
+    }
     /* Each time twice as far: some times, until hs_nearest_images_start refuses so many images. */
     for (;;) {
         /* The radius only says which images are looked at, as yet: `along` the axes that repeat. */
         group->radius = group->away > 0.0 ? hypot(group->away, along) : along;
         group->radius = hs_smaller(group->radius, hs_larger(farthest, HS_NEAREST_LEAST_RADIUS));
-        const hs_status status = walk_scaled(near, options, group, &probe, &error);
+        const hs_status status = walk_scaled(group, &probe, &error);
         if (status != HS_OK) {
             return status;
         }
@@ -828,31 +930,41 @@ typedef struct nearest_worker {
     int64_t            n_groups, n_candidates;
 } nearest_worker;
 
+/* The status of what was done for an asking point, which is named where its shift is too long. */
 static hs_status
-fail_shift(nearest_worker *worker)
+of_point(nearest_worker *worker, int32_t si, hs_status status)
 {
-    worker->committer.failure.row = worker->writer.failed;
-    worker->committer.failure.in_queries = worker->job->near->search->has_queries;
-    return HS_ERR_SHIFT_RANGE;
+    const hs_search *search = worker->job->near->search;
+    if (status == HS_ERR_SHIFT_RANGE) {
+        worker->committer.failure.row = hs_search_asking(search)->order[si];
+        worker->committer.failure.in_queries = search->has_queries;
+    }
+    return status;
 }
 
-/* Ranks and writes one point's hits; *done: whether the group's radius sufficed. */
+/* Ranks and writes those of one point's hits that count; *done: whether the group's radius
+ * sufficed. */
 static hs_status
 finish_point(nearest_worker *worker, const hs_nearest_group *group, int32_t si, int32_t begin,
              int32_t end, bool *done)
 {
     const hs_nearest_block *block = &worker->block;
-    const int32_t          *hits = block->hits + begin;
+    int32_t                *hits = block->hits + begin, n = end - begin;
+    float                  *squares = block->has_squares ? block->squares + begin : NULL;
     int64_t                 count;
     hs_status               status = HS_OK;
-    if (!block->has_squares || !hs_nearest_rank_fast(&worker->ranker, si, hits,
-                                                     block->squares + begin, end - begin, &count)) {
-        status = hs_nearest_rank(&worker->ranker, group, si, hits, end - begin, &count);
+    if (worker->job->near->search->call->choice != NULL) {
+        status = hs_nearest_choose(&worker->ranker, si, hits, squares, &n);
+        if (status != HS_OK) {
+            return of_point(worker, si, status);
+        }
+    }
+    if (squares == NULL || !hs_nearest_rank_fast(&worker->ranker, si, hits, squares, n, &count)) {
+        status = hs_nearest_rank(&worker->ranker, group, si, hits, n, &count);
     }
     *done = count >= 0;
     if (status == HS_OK && *done) {
-        status = hs_nearest_write(&worker->writer, &worker->ranker, count);
-        status = status == HS_ERR_SHIFT_RANGE ? fail_shift(worker) : status;
+        status = of_point(worker, si, hs_nearest_write(&worker->writer, &worker->ranker, count));
     }
     return status;
 }
@@ -883,6 +995,25 @@ finish_block(nearest_worker *worker, const hs_nearest_group *group, uint64_t *le
     return status;
 }
 
+/* Whether points repeat without end and none of them is of the asking one's group. */
+static bool
+is_endless(const hs_nearest *near, int32_t si)
+{
+    const hs_search *search = near->search;
+    hs_chooser       chooser;
+    if (search->call->choice == NULL || search->call->choice->group == NULL ||
+        search->scene.lattice.n_periodic == 0 || near->limit < INFINITY) {
+        return false;
+    }
+    hs_chooser_set(search->call->choice, hs_search_asking(search)->order[si], &chooser);
+    for (int64_t j = 0; j < search->bins.n; j++) {
+        if (hs_chooser_is_of_group(&chooser, (int32_t)j)) {
+            return false;
+        }
+    }
+    return true;
+}
+
 /* Does one point within a radius that surely suffices; a larger one where rounding makes it fall
  * short. */
 static hs_status
@@ -893,7 +1024,12 @@ search_point(nearest_worker *worker, int32_t si, double guess)
     uint64_t          left = 1;
     hs_nearest_group_set(near, si, si + 1, &alone);
     alone.radius = guess;
-    hs_status status = hs_nearest_bound(near, &worker->options, &worker->bounder, &alone);
+    if (is_endless(near, si)) {
+        hs_nearest_write_nothing(near, hs_search_asking(near->search)->order[si], 0);
+        return HS_OK;
+    }
+    hs_status status =
+        of_point(worker, si, hs_nearest_bound(near, &worker->options, &worker->bounder, &alone));
     while (status == HS_OK && left != 0) {
         status =
             hs_nearest_block_fill(near, &worker->options, &alone, INFINITY, NULL, &worker->block);
@@ -911,11 +1047,11 @@ search_group(nearest_worker *worker, hs_nearest_group *group)
     const hs_nearest *near = worker->job->near;
     const int32_t     n_points = group->last - group->first;
     const double      more = pow(MOST_PER_AXIS, fmax(near->tree.ndim - 3.0, 0.0));
-    const double      most = more * MOST_CANDIDATES * ((double)near->k + n_points) + 64.0;
-    uint64_t          left = UINT64_MAX;
-    hs_status         status = hs_nearest_block_fill(near, &worker->options, group,
+    const double most = more * MOST_CANDIDATES * ((double)near->k + group->more + n_points) + 64.0;
+    uint64_t     left = UINT64_MAX;
+    hs_status    status = hs_nearest_block_fill(near, &worker->options, group,
                                              n_points == 1 && group->is_complete ? INFINITY : most,
-                                                     &worker->leaves, &worker->block);
+                                                &worker->leaves, &worker->block);
     if (status == HS_OK) {
         status = finish_block(worker, group, &left);
     } else if (status == HS_TRY_OTHER) {

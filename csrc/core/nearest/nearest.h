@@ -18,10 +18,13 @@ typedef struct hs_nearest {
     hs_tree        asking_tree; /* owned; of the queries, if there are any */
     const hs_tree *asking;      /* the tree of the asking points */
     int64_t        k;           /* points wanted for each */
-    int32_t        of_spot;     /* of one spot, in one image, no more points than this can count */
+    int32_t        of_spot;     /* of one spot, in one image, no more points than this can be of
+                                 * use */
     bool           omits_self;  /* without queries: a point is not its own neighbour */
     double         limit;       /* largest distance in the scene's unit; infinity: none */
     hs_metric      within;      /* decides on the largest distance, if there is one */
+    double         least;       /* and the least one that counts; 0: none */
+    hs_metric      nearer;      /* decides on that */
     hs_metric      order;       /* decides which is nearer */
     double         drift[HS_MAX_DIM][HS_MAX_DIM]; /* [k][r]: how far row r of B moves t_k beyond
                                                    * whole periods */
@@ -41,6 +44,7 @@ typedef struct hs_nearest_group {
     double  t_upper[HS_MAX_DIM];
     double  away;        /* no point is nearer than this, for the open axes alone */
     double  radius;      /* everything up to here is looked at */
+    double  more;        /* points there that do not count, by a first guess */
     bool    is_complete; /* and beyond there is nothing that could be wanted */
 } hs_nearest_group;
 
@@ -128,7 +132,8 @@ int hs_nearest_exponent(double radius);
  * A scene and trees, made anew or borrowed from cells that keep them: everything of `near` but k,
  * of_spot, omits_self and rows, which are set already, as is its search but for scene, bins, kernel
  * and threads. sets->trees: NULL, or what keeps a tree of the points. `limit`: the largest
- * distance. hs_nearest_release in any case.
+ * distance. Which points count is the call's choice, if it has one. hs_nearest_release in any
+ * case.
  */
 hs_status hs_nearest_prepare(hs_nearest *near, const hs_sets *sets, const hs_box *box, double limit,
                              hs_failure *failure);

@@ -132,22 +132,20 @@ closeness(const hs_nearest_ranker *ranker, double square)
     return 2.0 * hs_nearest_error(ranker->block, ranker->near->tree.ndim, square);
 }
 
-/* What the metric measures to, and its shift; also S over the periodic box vectors as given when
- * `given` is not NULL. False when a shift passes its range. */
+/* What the metric measures to, and its shift, of point sj in this image; also S over the periodic
+ * box vectors as given when `given` is not NULL. False when a shift passes its range. */
 static bool
-nearest_pair(const hs_nearest *near, const hs_nearest_block *block, int32_t si, int32_t place,
-             double *q, int64_t *shift, int64_t *given)
+pair_in_image(const hs_nearest *near, int32_t si, int32_t sj, const int32_t *image, double *q,
+              int64_t *shift, int64_t *given)
 {
-    const hs_bins          *bins = &near->search->bins, *asking = hs_search_asking(near->search);
-    const hs_nearest_image *image = hs_nearest_image_of(block, place);
-    const int32_t           sj = block->number[place];
-    const int               m = bins->n_periodic;
-    int64_t                 turned[HS_MAX_DIM] = {0}, as_given[HS_MAX_DIM];
+    const hs_bins *bins = &near->search->bins, *asking = hs_search_asking(near->search);
+    const int      m = bins->n_periodic;
+    int64_t        turned[HS_MAX_DIM] = {0}, as_given[HS_MAX_DIM];
     for (int k = 0; k < bins->ndim; k++) {
         q[k] = bins->keeps_originals ? bins->originals[k][sj] : bins->x[k][sj];
     }
     for (int r = 0; r < m; r++) {
-        shift[r] = image->shift[r];
+        shift[r] = image[r];
     }
     if (m == 0 || (given == NULL && !bins->keeps_originals)) {
         return true;
@@ -169,6 +167,15 @@ nearest_pair(const hs_nearest *near, const hs_nearest_block *block, int32_t si, 
     return true;
 }
 
+/* The same of the candidate at a place of the block. */
+static bool
+nearest_pair(const hs_nearest *near, const hs_nearest_block *block, int32_t si, int32_t place,
+             double *q, int64_t *shift, int64_t *given)
+{
+    return pair_in_image(near, si, block->number[place], hs_nearest_image_of(block, place)->shift,
+                         q, shift, given);
+}
+
 /* Copies the coordinates of the asking point that the metric measures from. */
 static void
 take_origin(const hs_nearest *near, int32_t si, double *p)
@@ -178,6 +185,135 @@ take_origin(const hs_nearest *near, int32_t si, double *p)
         p[k] = asking->keeps_originals ? asking->originals[k][si] : asking->x[k][si];
     }
 }
+
+/* ---- which of them count: what the call's choice leaves out ---- */
+
+/* How far a squared length may be from the true one, in either direction. */
+static double
+square_error(const hs_nearest *near, const hs_nearest_candidate *candidate, double square)
+{
+    const double along = sqrt(near->tree.ndim) * candidate->error;
+    return 2.0 * ((near->tree.ndim + 4) * 0x1p-51 * square + 2.1 * along * (sqrt(square) + along) +
+                  0x1p-1000);
+}
+
+/* Whether a pair that is excluded in its nearest image is in this one. */
+static hs_status
+is_excluded_here(const hs_nearest *near, const hs_chooser *chooser,
+                 const hs_nearest_candidate *candidate, bool *excluded)
+{
+    const hs_search *search = near->search;
+    const hs_choice *choice = chooser->choice;
+    double           q[HS_MAX_DIM];
+    int64_t          shift[HS_MAX_DIM], given[HS_MAX_DIM];
+    *excluded = true;
+    if (choice->shortest == INFINITY) { /* there are no others */
+        return HS_OK;
+    }
+    const double square = candidate->square + square_error(near, candidate, candidate->square);
+    const double far = hs_scale_apply(search->scene.unscale, sqrt(square) / candidate->unit);
+    if (!hs_choice_compares(choice, hs_smaller(far, search->call->options.cutoff))) {
+        return HS_OK;
+    }
+    *excluded = false;
+    /* Shifts that pass their range are found when the pair is written. */
+    return pair_in_image(near, candidate->si, candidate->sj, candidate->image, q, shift, given)
+               ? hs_choice_is_nearest(choice, chooser->point, search->bins.order[candidate->sj],
+                                      given, excluded)
+               : HS_OK;
+}
+
+/* Whether a pair is that of a point with itself. */
+static bool
+is_itself(const hs_nearest *near, const hs_chooser *chooser, const hs_nearest_candidate *candidate)
+{
+    double  q[HS_MAX_DIM];
+    int64_t shift[HS_MAX_DIM], given[HS_MAX_DIM] = {0}, any = 0;
+    if (near->search->bins.order[candidate->sj] != chooser->excluding.itself ||
+        !pair_in_image(near, candidate->si, candidate->sj, candidate->image, q, shift, given)) {
+        return false;
+    }
+    for (int r = 0; r < near->search->bins.n_periodic; r++) {
+        any |= given[r];
+    }
+    return any == 0;
+}
+
+/* Whether a pair is nearer than the least distance. */
+static bool
+is_too_near(const hs_nearest *near, const hs_chooser *chooser,
+            const hs_nearest_candidate *candidate, hs_stages *stages)
+{
+    const double least = near->least * candidate->unit, square = least * least;
+    const double error = square_error(near, candidate, hs_larger(square, candidate->square));
+    double       p[HS_MAX_DIM], q[HS_MAX_DIM];
+    int64_t      shift[HS_MAX_DIM];
+    if (near->least == 0.0 || candidate->square - error > square) {
+        return false;
+    }
+    if (!(candidate->square + error < square)) {
+        take_origin(near, candidate->si, p);
+        if (!pair_in_image(near, candidate->si, candidate->sj, candidate->image, q, shift, NULL) ||
+            !hs_metric_within(&near->nearer, p, q, shift, stages)) {
+            return false;
+        }
+    }
+    return !is_itself(near, chooser, candidate);
+}
+
+hs_status
+hs_nearest_counts(const hs_nearest *near, const hs_chooser *chooser,
+                  const hs_nearest_candidate *candidate, hs_stages *stages, bool *counts)
+{
+    const int32_t number = near->search->bins.order[candidate->sj];
+    bool          excluded = false;
+    hs_status     status = HS_OK;
+    *counts = hs_chooser_is_of_group(chooser, number);
+    if (*counts && hs_chooser_excludes(chooser, number)) {
+        status = is_excluded_here(near, chooser, candidate, &excluded);
+    }
+    *counts = *counts && !excluded && !is_too_near(near, chooser, candidate, stages);
+    return status;
+}
+
+hs_status
+hs_nearest_choose(hs_nearest_ranker *ranker, int32_t si, int32_t *hits, float *squares, int32_t *n)
+{
+    const hs_nearest       *near = ranker->near;
+    const hs_nearest_block *block = ranker->block;
+    const hs_bins          *bins = &near->search->bins, *asking = hs_search_asking(near->search);
+    hs_chooser              chooser;
+    hs_nearest_candidate    candidate = {.si = si, .unit = block->unit, .error = block->error};
+    int32_t                 kept = 0;
+    hs_status               status = HS_OK;
+    hs_chooser_set(near->search->call->choice, asking->order[si], &chooser);
+    for (int32_t h = 0; h < *n && status == HS_OK; h++) {
+        const int32_t           place = hits[h];
+        const hs_nearest_image *image = hs_nearest_image_of(block, place);
+        bool                    counts;
+        candidate.sj = block->number[place];
+        candidate.image = image->shift;
+        candidate.square = 0.0;
+        for (int k = 0; k < bins->ndim; k++) {
+            const double along =
+                (bins->x[k][candidate.sj] + image->moved[k] - asking->x[k][si]) * block->unit;
+            candidate.square += along * along;
+        }
+        status = hs_nearest_counts(near, &chooser, &candidate, &ranker->stages, &counts);
+        hits[kept] = place;
+        if (squares != NULL) {
+            squares[kept] = squares[h];
+        }
+        kept += counts;
+        if (status == HS_OK && !hs_nearest_goes_on(&ranker->pace, 1)) {
+            status = ranker->pace.status;
+        }
+    }
+    *n = kept;
+    return status;
+}
+
+/* ---- which is nearer ---- */
 
 /* Sign of the difference of two distances. */
 static int
@@ -506,7 +642,8 @@ put_distances(hs_nearest_writer *writer, double *to)
     hs_measured     *pairs = &writer->pairs;
     hs_restore_distances(pairs->distance, pairs->n, hs_measures_unscale(&search->scene));
     if (search->call->options.cutoff < INFINITY) {
-        hs_keep_all_within(pairs->distance, pairs->n, search->call->options.cutoff, true);
+        hs_keep_all_within(pairs->distance, pairs->n, search->call->options.cutoff,
+                           search->call->options.inclusive);
     }
     double before = pairs->n > 0 && !writer->is_first[0] ? to[writer->at[0] - 1] : 0.0;
     for (int32_t e = 0; e < pairs->n; e++) {
@@ -584,7 +721,6 @@ put_given(hs_nearest_writer *writer, const hs_nearest_ranker *ranker, const hs_n
         int64_t shift[HS_MAX_DIM], given[HS_MAX_DIM];
         if (!nearest_pair(near, ranker->block, ranker->si, keys[e].place, q, shift, given) ||
             (writer->S != NULL && !put_shift(near, given, writer->S + (at + e) * asking->ndim))) {
-            writer->failed = asking->order[ranker->si];
             return HS_ERR_SHIFT_RANGE;
         }
         for (int r = 0; r < asking->n_periodic; r++) {

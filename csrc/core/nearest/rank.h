@@ -5,6 +5,7 @@
 #include "../base/os.h"
 #include "candidates.h"
 #include "../collect/record.h"
+#include "../search/choice.h"
 
 /*
  * rank.h: the nearest of the hits in order: keys, comparisons that floats cannot tell, and rows of
@@ -116,6 +117,25 @@ typedef struct hs_nearest_ranker {
 
 void hs_nearest_ranker_free(hs_nearest_ranker *ranker);
 
+/* Point sj in one image, as asking point si sees it. */
+typedef struct hs_nearest_candidate {
+    int32_t        si, sj;
+    const int32_t *image;  /* shifts over the rows of B */
+    double         square; /* about |D|^2, of lengths times the unit */
+    double         unit;
+    double         error; /* of each component of D, times the unit */
+} hs_nearest_candidate;
+
+/* Whether the call's choice lets it count, decided exactly. The point itself does, unless it is of
+ * another group. Any status of hs_choice_is_nearest. */
+hs_status hs_nearest_counts(const hs_nearest *near, const hs_chooser *chooser,
+                            const hs_nearest_candidate *candidate, hs_stages *stages, bool *counts);
+
+/* Takes out of the *n hits of point si, and of their squares unless these are NULL, what does not
+ * count. Any status of hs_nearest_counts, or HS_ERR_INTERRUPTED. */
+hs_status hs_nearest_choose(hs_nearest_ranker *ranker, int32_t si, int32_t *hits, float *squares,
+                            int32_t *n);
+
 /* Ranks as hs_nearest_rank does, but from squares in float32, for a block that has them: false when
  * these cannot tell. */
 bool hs_nearest_rank_fast(hs_nearest_ranker *ranker, int32_t si, const int32_t *hits,
@@ -141,7 +161,6 @@ typedef struct hs_nearest_writer {
     int64_t           at[HS_BATCH];       /* entry of the output */
     bool              is_first[HS_BATCH]; /* of its row */
     hs_measured       pairs;              /* shifts are zero from the first entry that is free on */
-    int32_t           failed; /* the asking point, in the caller's numbers, of HS_ERR_SHIFT_RANGE */
 } hs_nearest_writer;
 
 void hs_nearest_writer_init(const hs_nearest *near, hs_nearest_writer *writer);

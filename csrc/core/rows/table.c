@@ -13,7 +13,7 @@
  * column is copied. */
 
 /* Columns of a table that are measured, not numbers. */
-#define MEASURES (HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)
+#define MEASURES (HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT | HS_WANT_SHELL)
 
 /* Bytes of rows that wait for their places. */
 #define MOST_KEPT (6 << 20)
@@ -87,8 +87,8 @@ static void
 put_measures(const row_filler *fill, int64_t at, int64_t hit, int32_t n)
 {
     const hs_output *entries = fill->to;
-    for (unsigned bit = HS_WANT_DISTANCE; bit <= HS_WANT_SHIFT && n > 0; bit <<= 1) {
-        char *to = hs_output_column(entries, bit);
+    for (unsigned bit = HS_WANT_DISTANCE; bit <= HS_WANT_SHELL && n > 0; bit <<= 1) {
+        char *to = bit & MEASURES ? hs_output_column(entries, bit) : NULL;
         if (to != NULL) {
             const size_t width = hs_output_width(entries, bit);
             const char  *from = hs_output_column(&fill->part, bit);
@@ -292,8 +292,10 @@ static hs_status
 filler_open(hs_table *table, hs_output *to, row_filler *fill)
 {
     hs_account *account = &table->search->call->account;
+    unsigned    columns = to->columns & MEASURES;
+    columns |= columns & HS_WANT_SHELL ? HS_WANT_DISTANCE : 0; /* by which shells are told */
     *fill = (row_filler){.table = table, .to = to};
-    hs_output_init(NULL, to->ndim, to->columns & MEASURES, to->index_bytes, &fill->part);
+    hs_output_init(NULL, to->ndim, columns, to->index_bytes, &fill->part);
     fill->numbers =
         hs_alloc(account, HS_FOR_CANDIDATES, table->most.candidates + 1, sizeof *fill->numbers);
     /* It keeps no numbers of hits: no pair must be turned round. */
@@ -362,13 +364,21 @@ hs_table_count(hs_search *search, int64_t *counts, hs_failure *failure)
 }
 
 /* In a small scene a bound on the largest neighbourhood does, which is small as well. */
+/* Where the walks that prepare a table and count its entries end, as parts of the work. */
+#define PREPARED 0.1
+#define COUNTED  0.4
+
 hs_status
 hs_table_prepare(hs_table *table, hs_failure *failure)
 {
     const hs_visitors sizes = {.use = HS_BLOCK_SIZES, .contexts = table};
-    return hs_walker_bound(table->search, &table->most)
-               ? HS_OK
-               : hs_parallel_visit(table->search, &sizes, &table->most, failure);
+    hs_status         status = HS_OK;
+    if (!hs_walker_bound(table->search, &table->most)) {
+        const hs_stretch whole = hs_call_begin_part(table->search->call, 0.0, PREPARED);
+        status = hs_parallel_visit(table->search, &sizes, &table->most, failure);
+        hs_call_end_part(table->search->call, whole);
+    }
+    return status;
 }
 
 /* Offsets that hold the number of each row's entries: where it begins. */
@@ -424,10 +434,15 @@ keep_all(hs_table *table, hs_failure *failure)
 hs_status
 hs_table_measure(hs_table *table, hs_failure *failure)
 {
-    hs_status status = will_keep(table) ? keep_all(table, failure) : HS_TRY_OTHER;
+    hs_call   *call = table->search->call;
+    hs_stretch whole = hs_call_begin_part(call, PREPARED, 1.0);
+    hs_status  status = will_keep(table) ? keep_all(table, failure) : HS_TRY_OTHER;
+    hs_call_end_part(call, whole);
     if (status == HS_TRY_OTHER) {
         hs_table_free(table);
+        whole = hs_call_begin_part(call, PREPARED, COUNTED);
         status = hs_table_count(table->search, table->offsets, failure);
+        hs_call_end_part(call, whole);
     }
     table_sum(table);
     return status;
@@ -470,11 +485,14 @@ fill_all(hs_table *table, hs_failure *failure)
 hs_status
 hs_table_fill(hs_table *table, hs_failure *failure)
 {
-    if (table->kept.columns == 0) {
-        return fill_all(table, failure);
+    if (table->kept.columns != 0) {
+        move_rows(table);
+        return HS_OK;
     }
-    move_rows(table);
-    return HS_OK;
+    const hs_stretch whole = hs_call_begin_part(table->search->call, COUNTED, 1.0);
+    const hs_status  status = fill_all(table, failure);
+    hs_call_end_part(table->search->call, whole);
+    return status;
 }
 
 void

@@ -61,8 +61,9 @@ typedef struct hs_scene {
 /* The points to search among, and the points whose neighbours are sought; borrowed. */
 typedef struct hs_sets {
     const hs_points *points;
-    const hs_points *queries;  /* NULL: the points themselves; else of the same dimension */
-    bool             is_kept;  /* queries come later: bounds with room for them */
+    const hs_points *queries; /* NULL: the points themselves; else of the same dimension */
+    const hs_set    *of_points, *of_queries; /* what is known of them; NULL: nothing */
+    bool             is_kept;                /* queries come later: bounds with room for them */
     bool             is_plain; /* the cutoff is taken as it is, however far beyond all distances,
                                 * and gaps are closed only if need be */
     bool             is_wide;  /* X is not made float32: it may be larger than that holds */
@@ -82,6 +83,16 @@ typedef struct hs_sets {
     const double *domain; /* NULL, or what the range of the points reaches from and to at least, as
                            * in hs_options */
 } hs_sets;
+
+/* These points, with what is known of them; either may be NULL. */
+HS_ALWAYS_INLINE hs_set
+hs_set_with(const hs_points *points, const hs_set *known)
+{
+    hs_set set = {.n_systems = 0};
+    set = known != NULL ? *known : set;
+    set.at = points != NULL ? *points : set.at;
+    return set;
+}
 
 /* For pairs that lie within less than a ball: how far normal . D of a pair can be from 0, in the
  * caller's unit, for a normal of a grid axis; any larger number where it is `enough` or more. HS_OK

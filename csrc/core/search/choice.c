@@ -197,14 +197,13 @@ hs_choice_set_scene(const hs_sets *sets, const hs_box *box, double cutoff, hs_ca
                : status;
 }
 
-/* Whether an array of labels is there for each set that has points, if there is one at all. */
+/* Whether a set has what labels are needed of it; it may be NULL, or have no points. */
 static bool
-has_both(const int64_t *of_points, const int64_t *of_queries, const hs_sets *sets, bool are_points)
+has_labels(const hs_selection *selection, const hs_points *points, const hs_set *known)
 {
-    const bool is_there = of_points != NULL || of_queries != NULL;
-    const bool has_queries = sets->queries != NULL && sets->queries->n > 0 && !are_points;
-    return !is_there ||
-           ((of_points != NULL || sets->points->n == 0) && (of_queries != NULL || !has_queries));
+    const hs_set set = hs_set_with(points, known);
+    return set.at.n == 0 || ((set.groups != NULL || !selection->has_groups) &&
+                             (set.labels != NULL || !selection->has_labels));
 }
 
 /* Whether all queries have the number of a point, if they have one at all. */
@@ -229,8 +228,9 @@ is_sound(const hs_selection *selection, const hs_sets *sets, const hs_options *o
            isfinite(selection->min_distance) &&
            (selection->min_distance == 0.0 || options->precision != HS_SINGLE) &&
            are_numbers(selection->query_numbers, sets) &&
-           has_both(selection->groups, selection->query_groups, sets, are_points) &&
-           has_both(selection->labels, selection->query_labels, sets, are_points);
+           has_labels(selection, sets->points, sets->of_points) &&
+           (are_points || sets->queries == NULL ||
+            has_labels(selection, sets->queries, sets->of_queries));
 }
 
 hs_status
@@ -259,11 +259,13 @@ hs_choice_open(const hs_selection *selection, const hs_sets *sets, hs_call *call
     if (choice == NULL) {
         return HS_ERR_MEMORY;
     }
+    const hs_set points = hs_set_with(sets->points, sets->of_points);
+    const hs_set asking = has_queries ? hs_set_with(sets->queries, sets->of_queries) : points;
     *choice = (hs_choice){
-        .group = selection->groups,
-        .asking_group = has_queries ? selection->query_groups : selection->groups,
-        .label = selection->labels,
-        .asking_label = has_queries ? selection->query_labels : selection->labels,
+        .group = selection->has_groups ? points.groups : NULL,
+        .asking_group = selection->has_groups ? asking.groups : NULL,
+        .label = selection->has_labels ? points.labels : NULL,
+        .asking_label = selection->has_labels ? asking.labels : NULL,
         .number = selection->query_numbers,
         .within = (uint64_t)selection->within,
         .min_distance = selection->min_distance,
@@ -337,29 +339,42 @@ is_left_out(const hs_asking *asking, int32_t id, const hs_label_test test)
     }
 }
 
-/* The test by which pairs of this point are excluded; false where none are. */
+/* The partners that pairs of the chooser's point are excluded with; false where it has none. */
 static bool
-labels_find(const hs_choice *choice, int32_t point, hs_asking *asking, hs_label_test *test)
+find_partners(const hs_choice *choice, hs_chooser *chooser)
 {
-    *asking = (hs_asking){.itself = choice->has_queries ? -1 : point};
-    *test = HS_OF_PARTNER;
-    if (choice->label != NULL) {
-        asking->label = choice->label;
-        asking->own = choice->asking_label[point];
-        asking->within = choice->within;
-        *test = choice->within == 0 ? HS_OF_EQUAL_LABEL : HS_OF_NEAR_LABEL;
-        return true;
-    }
     const hs_partners *partners = &choice->partners;
+    hs_asking         *asking = &chooser->excluding;
     if (partners->first == NULL) {
         return false;
     }
-    asking->partner = partners->number + partners->first[point];
-    asking->n_partners = partners->first[point + 1] - partners->first[point];
+    asking->partner = partners->number + partners->first[chooser->point];
+    asking->n_partners = partners->first[chooser->point + 1] - partners->first[chooser->point];
     for (int64_t p = 0; p < asking->n_partners && asking->bits != UINT64_MAX; p++) {
         asking->bits |= UINT64_C(1) << (asking->partner[p] & 63);
     }
     return asking->n_partners > 0;
+}
+
+void
+hs_chooser_set(const hs_choice *choice, int32_t asking, hs_chooser *chooser)
+{
+    const int32_t point = choice->number != NULL ? (int32_t)choice->number[asking] : asking;
+    *chooser = (hs_chooser){.choice = choice, .point = point, .test = HS_OF_PARTNER};
+    chooser->excluding.itself = choice->has_queries ? -1 : point;
+    if (choice->group != NULL) {
+        chooser->of_group.label = choice->group;
+        chooser->of_group.own = choice->asking_group[point];
+    }
+    if (choice->label != NULL) {
+        chooser->excluding.label = choice->label;
+        chooser->excluding.own = choice->asking_label[point];
+        chooser->excluding.within = choice->within;
+        chooser->test = choice->within == 0 ? HS_OF_EQUAL_LABEL : HS_OF_NEAR_LABEL;
+        chooser->excludes = true;
+    } else {
+        chooser->excludes = find_partners(choice, chooser);
+    }
 }
 
 HS_ALWAYS_INLINE int32_t
@@ -380,11 +395,21 @@ keep_chosen(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, i
     return to;
 }
 
-/* Whether a test that excludes leaves out the pair of the asking point with another one. */
-static bool
-labels_leave_out(const hs_asking *asking, int32_t number, hs_label_test test)
+bool
+hs_chooser_is_of_group(const hs_chooser *chooser, int32_t number)
 {
-    switch (test) {
+    return chooser->of_group.label == NULL ||
+           !is_left_out(&chooser->of_group, number, HS_OF_OTHER_GROUP);
+}
+
+bool
+hs_chooser_excludes(const hs_chooser *chooser, int32_t number)
+{
+    const hs_asking *asking = &chooser->excluding;
+    if (!chooser->excludes) {
+        return false;
+    }
+    switch (chooser->test) {
     case HS_OF_EQUAL_LABEL: return is_left_out(asking, number, HS_OF_EQUAL_LABEL);
     case HS_OF_NEAR_LABEL: return is_left_out(asking, number, HS_OF_NEAR_LABEL);
     default: return is_left_out(asking, number, HS_OF_PARTNER);
@@ -414,16 +439,14 @@ keep_by_label(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking,
     }
 }
 
-/* The same by the groups of the call's choice; without groups all are moved. */
+/* The same by the point's group; without groups all are moved. */
 static int32_t
-keep_by_group(const hs_scanner *scanner, hs_scan *scan, int32_t point, int32_t from, int32_t end,
-              int32_t to)
+keep_by_group(const hs_scanner *scanner, hs_scan *scan, const hs_chooser *chooser, int32_t from,
+              int32_t end, int32_t to)
 {
-    const hs_choice *choice = scanner->search->call->choice;
-    const size_t     n = (size_t)(end - from);
-    if (choice->group != NULL) {
-        const hs_asking asking = {.label = choice->group, .own = choice->asking_group[point]};
-        return keep_by_label(scanner, scan, &asking, from, end, to, HS_OF_OTHER_GROUP);
+    const size_t n = (size_t)(end - from);
+    if (chooser->of_group.label != NULL) {
+        return keep_by_label(scanner, scan, &chooser->of_group, from, end, to, HS_OF_OTHER_GROUP);
     }
     if (to < from) {
         memmove(scan->hits + to, scan->hits + from, n * sizeof *scan->hits);
@@ -489,19 +512,17 @@ point_of(const hs_cloud *cloud, int32_t point, double *x)
     }
 }
 
-/* Whether this shift is that of the nearest image, as seen from the lower number of two points of
- * one set, or from a query. */
-static hs_status
-is_nearest(const hs_choice *choice, const hit_batch *batch, int32_t h, int64_t *shift,
-           bool *nearest)
+hs_status
+hs_choice_is_nearest(const hs_choice *choice, int32_t point, int32_t number, int64_t *shift,
+                     bool *nearest)
 {
     const int       m = choice->images.lattice.n_periodic;
-    const bool      turns = !choice->has_queries && batch->id[h] < batch->point;
+    const bool      turns = !choice->has_queries && number < point;
     const hs_cloud *asking = choice->has_queries ? &choice->asking_cloud : &choice->cloud;
     double          p[HS_MAX_DIM], q[HS_MAX_DIM];
     int64_t         near[HS_MAX_DIM];
-    point_of(asking, batch->point, turns ? q : p);
-    point_of(&choice->cloud, batch->id[h], turns ? p : q);
+    point_of(asking, point, turns ? q : p);
+    point_of(&choice->cloud, number, turns ? p : q);
     for (int r = 0; turns && r < m; r++) {
         shift[r] = -shift[r];
     }
@@ -521,7 +542,7 @@ drop_nearest(const hs_choice *choice, hit_batch *batch)
     for (int32_t e = 0; status == HS_OK && e < batch->n; e++) {
         bool nearest;
         given_shift(&scanner->pair_batch, e, shift);
-        status = is_nearest(choice, batch, e, shift, &nearest);
+        status = hs_choice_is_nearest(choice, batch->point, batch->id[e], shift, &nearest);
         if (status != HS_OK) {
             scanner->failed_point = batch->point;
         }
@@ -600,14 +621,13 @@ close_up(hs_scan *scan, int32_t from, int32_t end)
 
 /* Marks those of hits [from, end) of a point that are excluded and in their nearest image. */
 static hs_status
-drop_images(const hs_asking *asking, hs_label_test test, int32_t from, int32_t end,
-            hit_batch *batch, hs_scan *scan)
+drop_images(const hs_chooser *chooser, int32_t from, int32_t end, hit_batch *batch, hs_scan *scan)
 {
     const hs_choice *choice = batch->scanner->search->call->choice;
     hs_status        status = HS_OK;
     for (int32_t h = from; status == HS_OK && h < end; h++) {
         const int32_t id = hs_hit_number(batch->scanner, scan->hits[h]);
-        if (labels_leave_out(asking, id, test)) {
+        if (hs_chooser_excludes(chooser, id)) {
             add_hit(scan, h, batch);
         }
         if (batch->n == HS_BATCH) {
@@ -661,21 +681,18 @@ surely_far(const hs_scanner *scanner, const hs_choice *choice)
 /* Chooses among hits [from, scan->end[t]) of a point, and moves those that count to `to`; *end:
  * where they end. */
 static hs_status
-choose_of_point(hit_batch *batch, hs_scan *scan, float out, int32_t from, int32_t to, int32_t *end)
+choose_of_point(const hs_chooser *chooser, hit_batch *batch, hs_scan *scan, float out, int32_t from,
+                int32_t to, int32_t *end)
 {
     const hs_scanner *scanner = batch->scanner;
-    const hs_choice  *choice = scanner->search->call->choice;
-    const int32_t     point = batch->point;
-    hs_asking         asking;
-    hs_label_test     test;
+    const hs_choice  *choice = chooser->choice;
     hs_status         status = HS_OK;
-    *end = keep_by_group(scanner, scan, point, from, scan->end[batch->t], to);
-    const bool excludes = labels_find(choice, point, &asking, &test);
+    *end = keep_by_group(scanner, scan, chooser, from, scan->end[batch->t], to);
     const bool compares = hs_choice_compares(choice, scanner->options.cutoff);
-    if (excludes && !compares) {
-        *end = keep_by_label(scanner, scan, &asking, to, *end, to, test);
-    } else if (excludes) {
-        status = drop_images(&asking, test, to, *end, batch, scan);
+    if (chooser->excludes && !compares) {
+        *end = keep_by_label(scanner, scan, &chooser->excluding, to, *end, to, chooser->test);
+    } else if (chooser->excludes) {
+        status = drop_images(chooser, to, *end, batch, scan);
         *end = close_up(scan, to, *end);
     }
     if (status == HS_OK && choice->min_distance > 0.0) {
@@ -714,12 +731,11 @@ hs_choose(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
     hs_status        status = HS_OK;
     for (int32_t t = first; status == HS_OK && t < next; t++) {
         const int32_t end = scan->end[t];
+        hs_chooser    chooser;
+        hs_chooser_set(choice, asking->order[scanner->group.first + t], &chooser);
         batch.t = t;
-        batch.point = asking->order[scanner->group.first + t];
-        if (choice->number != NULL) {
-            batch.point = (int32_t)choice->number[batch.point];
-        }
-        status = choose_of_point(&batch, scan, out, from, kept, &kept);
+        batch.point = chooser.point;
+        status = choose_of_point(&chooser, &batch, scan, out, from, kept, &kept);
         from = end;
         scan->end[t] = kept;
     }

@@ -148,6 +148,30 @@ typedef struct hs_asking {
     uint64_t       bits; /* one for the last six bits of each partner */
 } hs_asking;
 
+/* One asking point, and by what its pairs with others are left out. */
+typedef struct hs_chooser {
+    const hs_choice *choice;    /* borrowed */
+    int32_t          point;     /* the asking one: its number among the points, or the queries */
+    hs_asking        of_group;  /* label NULL: there are no groups */
+    hs_asking        excluding; /* if `excludes` */
+    hs_label_test    test;
+    bool             excludes; /* some pairs of this point are excluded, in their nearest image */
+} hs_chooser;
+
+/* asking: in the order of the call. */
+void hs_chooser_set(const hs_choice *choice, int32_t asking, hs_chooser *chooser);
+
+/* Whether the point with this number is of the same group, or there are no groups; whether the pair
+ * with it is excluded, in its nearest image. */
+bool hs_chooser_is_of_group(const hs_chooser *chooser, int32_t number);
+bool hs_chooser_excludes(const hs_chooser *chooser, int32_t number);
+
+/* Whether this shift, over the periodic box vectors as given, which may be turned round, is that of
+ * the nearest image, as seen from the lower number of two points of one set, or from a query. For a
+ * choice that compares. Any status of hs_near_image. */
+hs_status hs_choice_is_nearest(const hs_choice *choice, int32_t point, int32_t number,
+                               int64_t *shift, bool *nearest);
+
 /* The candidate that a hit is: its place in the block as it was gathered. */
 HS_ALWAYS_INLINE int32_t
 hs_hit_place(const hs_scanner *scanner, int32_t hit)

@@ -154,13 +154,29 @@ hs_team_free(hs_team *team)
     hs_free(NULL, team);
 }
 
-/* An hs_poll_fn: the caller's, counted. */
+/* An hs_poll_fn: the caller's, counted, and told of all parts. */
 static bool
 counted_poll(void *context, double fraction)
 {
     hs_call *call = context;
     call->done.polls++;
-    return call->callers_poll(call->callers_context, fraction);
+    call->told = hs_larger(call->part.from + call->part.share * fraction, call->told);
+    return call->callers_poll(call->callers_context, call->told);
+}
+
+hs_stretch
+hs_call_begin_part(hs_call *call, double from, double to)
+{
+    const hs_stretch outer = call->part;
+    call->part.from = outer.from + outer.share * from;
+    call->part.share = outer.share * (to - from);
+    return outer;
+}
+
+void
+hs_call_end_part(hs_call *call, hs_stretch outer)
+{
+    call->part = outer;
 }
 
 void
@@ -180,6 +196,8 @@ hs_call_begin(const hs_options *options, hs_call *call)
     call->team = NULL;
     call->done = (hs_counters){.pairs = 0};
     call->choice = NULL;
+    call->part = (hs_stretch){0.0, 1.0};
+    call->told = 0.0;
     hs_call_set_poll(options->poll, options->poll_context, call);
     hs_account_init(&call->account, options);
 }
@@ -308,10 +326,12 @@ void
 hs_call_restart(hs_call *call)
 {
     const hs_account before = call->account;
-    hs_account_close(&call->account);
-    hs_account_init(&call->account, &call->options);
-    call->account.limit = before.limit;
-    call->account.find_limit = before.find_limit;
+    if (call->choice == NULL) {
+        hs_account_close(&call->account);
+        hs_account_init(&call->account, &call->options);
+        call->account.limit = before.limit;
+        call->account.find_limit = before.find_limit;
+    }
     call->done = (hs_counters){.polls = call->done.polls};
 }
 

@@ -48,6 +48,11 @@ typedef struct hs_entry {
     hs_fpenv   saved;   /* the caller's floating-point environment */
 } hs_entry;
 
+/* The part of a call's work whose progress polls tell: where it begins, and how much it is. */
+typedef struct hs_stretch {
+    double from, share;
+} hs_stretch;
+
 typedef struct hs_call {
     hs_account        account;
     hs_options        options;      /* the caller's; their poll counts how often it is called */
@@ -56,6 +61,8 @@ typedef struct hs_call {
     hs_counters       done;         /* by walkers that have finished */
     hs_poll_fn        callers_poll; /* behind options.poll */
     void             *callers_context;
+    hs_stretch        part;
+    double            told;   /* the fraction that was told last: it never falls */
     struct hs_choice *choice; /* owned, search/choice.h; NULL: all pairs within reach count */
     hs_entry          entry;
 } hs_call;
@@ -75,6 +82,11 @@ hs_failure *hs_call_enter(const hs_options *options, hs_failure *failure, hs_cal
 /* Ends the threads, writes the counters if they are wanted, and restores the caller's environment.
  * The account stays open for the result. */
 void hs_call_leave(hs_call *call, int64_t n_pairs);
+
+/* What follows is the work from `from` to `to` of the call, or of its present part, which is
+ * returned. hs_call_end_part makes that the present one again. */
+hs_stretch hs_call_begin_part(hs_call *call, double from, double to);
+void       hs_call_end_part(hs_call *call, hs_stretch outer);
 
 /* Calls this in place of the options' poll; NULL: nothing. */
 void hs_call_set_poll(hs_poll_fn poll, void *context, hs_call *call);
@@ -111,7 +123,7 @@ void hs_call_report(const hs_call *call, int64_t n_pairs);
 void hs_call_tell_limit(const hs_call *call, hs_status status, hs_failure *failure);
 
 /* Forgets what has been done and held, except polls and the limit that was found. Nothing may be
- * held any more. */
+ * held any more but the choice, whose bytes then still count with all before. */
 void hs_call_restart(hs_call *call);
 
 /* Gives up what points to the caller's memory, for a call that is kept inside an object; only the

@@ -22,15 +22,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = [
-    "exact_square",
-    "exact_vector",
-    "reach_by_radii",
-    "reach_by_types",
-    "reference_pairs",
-    "ulp_error",
-]
-
 _Vector = list[int]
 _Pair = tuple[int, int, tuple[int, ...]]
 _Reach = list[list[Fraction | None]]
@@ -47,33 +38,14 @@ def reference_pairs(
 ) -> list[_Pair]:
     """Find every pair within the cutoff, each once, in exact arithmetic.
 
-    Parameters
-    ----------
-    points : array_like, shape (n, d)
-        Floats of any width, integers or Fractions; all finite.
-    cutoff : float or list of lists
-        Largest distance, not negative; or a table of one for each i and j (those with j >= i are
-        used), None for those that are no pairs, as `reach_by_radii` and `reach_by_types` make it.
-    box : float or array_like, shape (d,) or (d, d), optional
-        Edge lengths, or edge vectors as rows; the rows of axes that do not repeat are not
-        used. None: open space.
-    periodic : bool or sequence of bool, shape (d,), optional
-        Which axes repeat. Default: all with a box, none without.
-    inclusive : bool, default True
-        Whether a pair at exactly `cutoff` counts.
-    progress : callable, optional
-        Called with the fraction of the work done, from 0 to 1.
+    points: floats of any width, integers or Fractions, shape (n, d), all finite. cutoff: not
+    negative; or a table of one for each i and j (those with j >= i are used), None for those that
+    are no pairs, as `reach_by_radii` and `reach_by_types` make it. box: edge lengths, or edge
+    vectors as rows; rows of axes that do not repeat are not used. periodic: which axes repeat, by
+    default all with a box. progress: called with the fraction of the work done.
 
-    Returns
-    -------
-    list of (int, int, tuple of int)
-        The half list as ``(i, j, S)``, ascending.
-
-    Raises
-    ------
-    ValueError
-        If the periodic rows of `box` are linearly dependent, `cutoff` is negative, or
-        `periodic` is true without a box.
+    Returns the half list as (i, j, S), ascending. ValueError if the periodic rows of `box` are
+    linearly dependent, `cutoff` is negative, or `periodic` is true without a box.
 
     Examples
     --------
@@ -117,13 +89,8 @@ def reference_pairs(
 def reach_by_radii(radii: Sequence[Any], rule: str = "sum", cutoff: Any = None) -> _Reach:
     """Return how far i reaches j, as a table of exact rational numbers.
 
-    Parameters
-    ----------
-    radii : sequence of float, length n
-    rule : {"sum", "mean", "max", "min", "gather", "scatter"}
-        Of two radii their sum, half of it, the larger, the smaller, that of i, that of j.
-    cutoff : float, optional
-        Largest distance of any pair.
+    rule: of two radii "sum", "mean" (half of it), "max", "min", "gather" (that of i), "scatter"
+    (that of j). cutoff: the largest distance of any pair.
 
     Examples
     --------
@@ -149,12 +116,7 @@ def reach_by_radii(radii: Sequence[Any], rule: str = "sum", cutoff: Any = None) 
 def reach_by_types(types: Sequence[Any], cutoffs: Any) -> _Reach:
     """Return how far i reaches j by their types, None for those that are no pairs.
 
-    Parameters
-    ----------
-    types : sequence, length n
-        Rows of a table, or what the keys of a dict are made of.
-    cutoffs : array_like, shape (t, t), or dict
-        Symmetric; a key of a dict counts both ways.
+    types: rows of a symmetric table, or what the keys of a dict are made of, which count both ways.
 
     Examples
     --------
@@ -238,16 +200,6 @@ def exact_vector(
 ) -> list[Fraction]:
     """Return ``points[j] - points[i] + S @ box`` as exact rational numbers.
 
-    Parameters
-    ----------
-    points : array_like, shape (n, d)
-    i, j : int
-        Row numbers.
-    S : sequence of int, shape (d,), optional
-        Shift; None: zero.
-    box : array_like, shape (d,) or (d, d), optional
-        Needed where S is not zero.
-
     Examples
     --------
     >>> exact_vector([[0.0], [0.75]], 0, 1, S=(-1,), box=[1.0])
@@ -275,13 +227,6 @@ def ulp_error(distance: float, square: Fraction) -> Fraction:
     """Return ``|distance - sqrt(square)|`` in units in the last place of the true distance.
 
     The result is never too small, and too large by less than 2**-60.
-
-    Parameters
-    ----------
-    distance : float
-        A rounded distance.
-    square : Fraction
-        The exact squared distance, as from `exact_square`.
 
     Examples
     --------

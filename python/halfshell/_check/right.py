@@ -19,10 +19,10 @@ import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._check.reference import exact_vector, reach_by_radii, reference_pairs
-from halfshell._convert.call import DIRECTED, RULES, Call, reach_by_supports
+from halfshell._convert.call import DIRECTED, RULES, Call, part_of, reach_by_supports
 from halfshell._functions.pairs import pairs as find_pairs
 from halfshell._functions.pairs import pairs_between as find_between
-from halfshell._objects.rational import is_definite
+from halfshell._objects.exact import is_definite
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -343,14 +343,9 @@ class Right:
             z = np.sqrt((np.einsum("kab,kb->ka", matrices, D) ** 2).sum(axis=1))
             doubt = _DOUBT * np.einsum("kab,kb->k", np.abs(matrices), size) + 2.0**-500
             return (
-                z + doubt < self.extent * (1.0 - _DOUBT),
-                z - doubt > self.extent * (1.0 + _DOUBT),
+                z + doubt < self.extent * (1.0 - _DOUBT),  # squares may overflow
+                np.isfinite(z) & (z - doubt > self.extent * (1.0 + _DOUBT)),
             )
-
-
-def part_of(progress: Any, k: int, n: int) -> Any:
-    """What is told of the k-th of n searches."""
-    return progress and (lambda fraction: progress((k + fraction) / n))
 
 
 def _are_near(lengths: Any, other: Any) -> _Bools:
@@ -378,7 +373,6 @@ def exact_norm(matrix: Any, vector: list[Fraction]) -> Fraction:
 
 
 # ---- spheres around supports ---------------------------------------------------------------
-
 
 def _refuse_indefinite(call: Call, supports: Any, query_supports: Any) -> None:
     """What the core says of supports that are not positive definite or reach too far.

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, cast
 
@@ -10,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _show
-from halfshell._convert.call import DIRECTED, Call, take
+from halfshell._convert.arrays import as_listed
+from halfshell._convert.call import DIRECTED, Call, part_of, take
 from halfshell._convert.foreign import is_a
-from halfshell._convert.listed import as_listed
 from halfshell._convert.memory import SMALL
 from halfshell._convert.options import as_flag
 from halfshell._objects.neighbor_table import NeighborTable
@@ -89,7 +90,20 @@ class Verdict:
                 shown = ", ".join(str(tuple(row)) for row in rows[:5].tolist())
                 more = ", ..." if len(rows) > 5 else ""
                 lines.append(f"  {name:9} {len(rows)}: {shown}{more}")
-        return "\n".join(lines)
+        cause = cause_of(self.missed, self.spurious)
+        return "\n".join([*lines, f"  {cause}"] if cause else lines)
+
+
+def cause_of(missed: IntArray, spurious: IntArray) -> str:
+    """What explains all differences, if they are those of shifts that mean something else."""
+    if not len(missed) or missed.shape[1] < 3:
+        return ""
+    turned = spurious * np.repeat([1, -1], [2, missed.shape[1] - 2])
+    if not any(map(len, _differences(missed, turned))):
+        return "S has the other sign: a pair is points[j] - points[i] + S @ box"
+    if not any(map(len, _differences(missed[:, :2], spurious[:, :2]))):
+        return "only S is wrong: it belongs to the points as given, wrapped into the box or not"
+    return ""
 
 
 @search()
@@ -189,7 +203,7 @@ def verify(
         full = not is_directed
         i, j, S = _columns(table, call.indices)
     elif j is None:
-        raise TypeError("j must be given, unless i is a NeighborTable")
+        raise TypeError("j must be given, unless i is a NeighborTable; of pairs P: i, j = P.T")
     elif full and is_directed:
         raise ValueError("full is for pairs without a direction: leave out full, queries or rule")
     n_queries = None if call.queries is None else len(call.queries)
@@ -208,8 +222,13 @@ def verify(
         as_full = compare(expected, rows, "full", call.indices)
         if as_full._n_wrong < verdict._n_wrong:
             verdict = as_full
-    if S is not None:
-        _confirm(verdict, right)
+    if S is not None:  # confirmed in rational arithmetic, which shares nothing with the search
+        for wrong, should_hold in ((verdict.missed, True), (verdict.spurious, False)):
+            for row in wrong[:_CONFIRMED].tolist():
+                if right.holds(*row) != should_hold:
+                    raise AssertionError(
+                        f"the search and rational arithmetic disagree on pair {tuple(row)}"
+                    )
     return verdict
 
 
@@ -312,6 +331,7 @@ class _RightOfAll:
         from halfshell._check.right import Right  # here, as fractions are slow to import
 
         self._progress = call.progress
+        self._n_dims = call.array.shape[1]
         self._batches = call.points.batch, call.queries and call.queries.batch
         self._systems: list[tuple[Right, int, int]]  # each with its first query and point
         if call.points.batch is None:
@@ -321,7 +341,7 @@ class _RightOfAll:
 
         asking = call.points.batch if call.queries is None else call.queries.batch
         assert asking is not None
-        firsts = np.searchsorted(asking, np.arange(call.points.n_systems)).tolist()
+        firsts = np.searchsorted(asking, np.unique(call.points.batch)).tolist()
         self._systems = [
             (Right(one), first_asking, first)
             for (one, first), first_asking in zip(each_system(call), firsts, strict=True)
@@ -329,31 +349,19 @@ class _RightOfAll:
 
     def rows(self, with_shifts: bool) -> IntArray:
         """(i, j) or (i, j, *S) of each pair, once."""
-        from halfshell._check.right import part_of
-
-        found = []
+        found = [np.empty((0, 2 + self._n_dims * with_shifts), np.int64)]
         for k, (right, i, j) in enumerate(self._systems):
             rows = right.rows(with_shifts, part_of(self._progress, k, len(self._systems)))
-            found.append(rows + ([i, j] + [0] * (rows.shape[1] - 2)) if k else rows)
-        return found[0] if len(found) == 1 else np.concatenate(found)
+            found.append(rows + ([i, j] + [0] * (rows.shape[1] - 2)) if i or j else rows)
+        return np.concatenate(found) if len(found) > 2 else found[-1]
 
     def holds(self, i: int, j: int, *shift: int) -> bool:
         """Whether this is one of the pairs, in rational arithmetic."""
         own, asking = self._batches
-        s = 0
+        k = 0
         if own is not None:
-            s = int(own[j])
-            if s != (own if asking is None else asking)[i]:
+            if own[j] != (own if asking is None else asking)[i]:
                 return False
-        right, first_asking, first = self._systems[s]
+            k = bisect_right([first for *_, first in self._systems], j) - 1
+        right, first_asking, first = self._systems[k]
         return right.holds(i - first_asking, j - first, *shift)
-
-
-def _confirm(verdict: Verdict, right: _RightOfAll) -> None:
-    """Recompute the differences in rational arithmetic, which shares nothing with the search."""
-    for rows, should_hold in ((verdict.missed, True), (verdict.spurious, False)):
-        for row in rows[:_CONFIRMED].tolist():
-            if right.holds(*row) != should_hold:
-                raise AssertionError(
-                    f"the search and rational arithmetic disagree on pair {tuple(row)}"
-                )

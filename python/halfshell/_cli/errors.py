@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the caller of the command line can put right, said in one line."""
+"""What the caller of the command line can put right, said in one line.
+
+Names of files and arrays may hold what a terminal would obey: all that is printed is escaped.
+"""
 
 from __future__ import annotations
 
-from halfshell._extras import needs
-from halfshell._terminal import printable
-
-__all__ = ["InputError", "missing_extra", "one_line"]
+from halfshell._errors import needs
 
 MOST_CHARACTERS = 1000  # of a line that says what is wrong
 
@@ -35,3 +35,15 @@ def one_line(error: BaseException) -> str:
 def missing_extra(what: str, *packages: str) -> InputError:
     """Return the error for optional packages that are not installed."""
     return InputError(needs(what, *packages))
+
+
+# ---- text for a terminal ---------------------------------------------------------------------
+
+def printable(text: str) -> str:
+    r"""Return one line of text with control characters and their like escaped, as in ``\x1b``."""
+    if text.isprintable():
+        return text
+    return "".join(
+        letter if letter.isprintable() else letter.encode("unicode_escape").decode()
+        for letter in text
+    )

@@ -36,9 +36,11 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any
 
@@ -46,15 +48,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import halfshell as hs
-from halfshell._cli.cloud_files import CLOUDS, read_cloud
-from halfshell._cli.errors import InputError, one_line
+from halfshell._cli.errors import InputError, missing_extra, one_line, printable
 from halfshell._cli.numpy_files import is_numpy, read_arrays
 from halfshell._cli.pair_files import refuse_list
 from halfshell._cli.structure_files import Frames, Scene, UnknownFormat, by_ase, by_mdanalysis
 from halfshell._cli.text_files import kind_of_file, read_points
-from halfshell._terminal import printable
-
-__all__ = ["Scene", "read_frames", "read_scene", "replacing"]
 
 _TEXT_ALONE, _TEXT_FIRST = (".csv", ".tsv", ".pts"), (".txt", ".dat", "")
 ROWS_CHECKED = 1 << 16  # at a time: some megabytes
@@ -77,30 +75,10 @@ def read_scene(
     box: NDArray[np.float64] | None = None,
     periodic: tuple[bool, ...] | None = None,
 ) -> Scene:
-    """Read points and box from a file, by the rule above.
+    """Read points and box from a file, by the rule above; without one, those of alpha-quartz.
 
-    Parameters
-    ----------
-    file : str or None
-        Its name, or ``-`` for standard input. None: the block of alpha-quartz that ships with the
-        package.
-    file_format : str, optional
-        Name of a format of ASE or MDAnalysis; default: told from the file.
-    index : int, optional
-        Frame, for formats with several; default: the last.
-    columns : sequence of str, optional
-        Of a text file, the columns that are coordinates: names, or numbers from 1 on.
-    trajectory : str, optional
-        A file with frames, of which `file` is the topology, as MDAnalysis reads both.
-    box : ndarray, shape (d,) or (d, d), optional
-        Takes the place of the file's box; all axes repeat unless `periodic` says otherwise.
-    periodic : tuple of bool, length 1 or d, optional
-        Takes the place of the file's.
-
-    Raises
-    ------
-    InputError
-        With the reason in one line.
+    file_format, index, columns, trajectory: what the options of these names say. box, periodic:
+    take the place of the file's; with a box all axes repeat unless `periodic` says otherwise.
     """
     if file is None:
         options = (("--index", index), ("--format", file_format), ("--columns", columns),
@@ -108,7 +86,12 @@ def read_scene(
         for option, value in options:
             if value is not None:
                 raise InputError(f"{option} needs a file: give one")
-        return _with_overrides(_shipped_scene(), box, periodic)
+        from halfshell.structures import alpha_quartz
+
+        positions, rows, species = alpha_quartz()
+        source = "alpha-quartz (ships with halfshell)"
+        scene = Scene(positions, rows, (True,) * 3, source, species, "angstrom")
+        return _with_overrides(scene, box, periodic)
     (scene,) = _read(file, file_format, index, columns, trajectory)
     return _with_overrides(scene, box, periodic)
 
@@ -127,22 +110,9 @@ def read_frames(
 
     None is kept. The reader is chosen by the first; one that fails later is an error that names
     the frame.
-
-    Raises
-    ------
-    InputError
-        With the reason in one line.
     """
     for scene in _read(file, file_format, frames, columns, trajectory):
         yield _with_overrides(scene, box, periodic)
-
-
-def _shipped_scene() -> Scene:
-    from halfshell.structures import alpha_quartz
-
-    positions, box, species = alpha_quartz()
-    source = "alpha-quartz (ships with halfshell)"
-    return Scene(positions, box, (True,) * 3, source, species, "angstrom")
 
 
 def _read(
@@ -180,7 +150,11 @@ def _read(
                     scene = replace(scene, source=source)
                     _check(scene)
                     is_chosen = True
-                    yield _with_claim(scene, claimed)
+                    if len(scene.points) < claimed:
+                        were = f"{len(scene.points):,} were read"
+                        remark = f"its header says {claimed:,} points, {were}"
+                        scene = replace(scene, remarks=(*scene.remarks, remark))
+                    yield scene
                 if is_chosen:
                     return
                 raise InputError("has none of these frames")
@@ -213,14 +187,6 @@ def _forget(error: BaseException) -> None:
         traceback.clear_frames(error.__traceback__)
     finally:
         sys.unraisablehook = hook
-
-
-def _with_claim(scene: Scene, claimed: int) -> Scene:
-    """The scene with a remark if it has fewer points than the header of its file says."""
-    if len(scene.points) >= claimed:
-        return scene
-    remark = f"its header says {claimed:,} points, {len(scene.points):,} were read"
-    return replace(scene, remarks=(*scene.remarks, remark))
 
 
 def _refusal(said: dict[str, str], unknown: list[str], file_format: str | None) -> str:
@@ -277,7 +243,7 @@ def _readers(
     if is_numpy(path):
         return [("NumPy", _by_numpy)]
     if suffix in CLOUDS:
-        return [(one[0], partial(_by_cloud, reader=one)) for one in CLOUDS[suffix]]
+        return [(one[0], partial(_by_cloud, library=one)) for one in CLOUDS[suffix]]
     if suffix in _TEXT_ALONE:
         return text
     if suffix in _TEXT_FIRST:
@@ -306,11 +272,6 @@ def _by_numpy(path: str) -> list[Scene]:
 def _by_text(path: str, columns: Sequence[str], is_pts: bool, least: int = 1) -> list[Scene]:
     points, what = read_points(path, columns, is_pts, least)
     return [Scene(points, None, (False,) * points.shape[1], reader=f"text, {what}")]
-
-
-def _by_cloud(path: str, reader: Any) -> list[Scene]:
-    points, name = read_cloud(path, reader)
-    return [Scene(points, reader=name)]
 
 
 # What headers say of the number of points, the least number of bytes for each of them, and the
@@ -425,6 +386,43 @@ def _with_overrides(
     return scene
 
 
+# Point clouds ------------------------------------------------------------------------------
+
+
+def _by_plyfile(library: Any, file: str) -> NDArray[Any]:
+    vertices = library.PlyData.read(file)["vertex"]
+    return np.stack([np.asarray(vertices[axis]) for axis in "xyz"], axis=1)
+
+
+def _by_pypcd4(library: Any, file: str) -> NDArray[Any]:
+    return np.asarray(library.PointCloud.from_path(file).numpy(("x", "y", "z")))
+
+
+def _by_pyvista(library: Any, file: str) -> NDArray[Any]:
+    return np.array(library.read(file).points)
+
+
+_Cloud = tuple[str, Callable[[Any, str], NDArray[Any]]]
+_PLYFILE, _PYPCD4, _PYVISTA = (
+    ("plyfile", _by_plyfile), ("pypcd4", _by_pypcd4), ("pyvista", _by_pyvista)
+)  # fmt: skip
+# The libraries that read a format, the lighter one first.
+CLOUDS: dict[str, tuple[_Cloud, ...]] = {
+    ".ply": (_PLYFILE, _PYVISTA), ".pcd": (_PYPCD4,),
+    **dict.fromkeys((".obj", ".stl", ".vtk", ".vtp", ".vtu", ".vts", ".vti", ".vtr"), (_PYVISTA,)),
+}  # fmt: skip
+
+
+def _by_cloud(path: str, library: _Cloud) -> list[Scene]:
+    name, read = library
+    try:
+        module: Any = import_module(name)
+    except ImportError:
+        raise missing_extra("reading this file", name) from None
+    reader = f"{name} {getattr(module, '__version__', '')}".strip()
+    return [Scene(read(module, path), reader=reader)]
+
+
 # Writing -----------------------------------------------------------------------------------
 
 
@@ -435,21 +433,6 @@ def replacing(target: str) -> Iterator[IO[bytes]]:
     On any failure, Ctrl-C included, the new file is removed and `target` stays as it was.
     Opening it is also the test that `target` can be written, so enter the block before any
     long work.
-
-    Parameters
-    ----------
-    target : str
-        The file to replace or to make.
-
-    Yields
-    ------
-    binary file
-        Open for writing.
-
-    Raises
-    ------
-    InputError
-        If `target` cannot be written.
     """
     if "\0" in target:
         raise InputError(f"{target!r}: cannot be written: no file has such a name")
@@ -477,3 +460,119 @@ def replacing(target: str) -> Iterator[IO[bytes]]:
     finally:
         if os.path.exists(temporary):
             os.remove(temporary)
+
+
+# Columns -----------------------------------------------------------------------------------
+
+MOST_BYTES = 1e9  # of an output, unless --max-output says otherwise
+
+# About how many characters a number has in text, with what separates it from the next.
+_DIGITS_OF_FLOAT, _DIGITS_OF_SHIFT = 19, 3
+_ROWS = 1 << 16  # written at a time: some megabytes of text
+_PARQUET_ROWS = 1 << 20  # of a row group
+
+
+def open_output(
+    target: str | None,
+    source: str | None,
+    stack: ExitStack,
+    suffixes: tuple[str, ...] = (".npz", ".csv", ".parquet"),
+    json: bool = False,
+) -> IO[bytes] | None:
+    """Open what will replace `target`, before the search; ``-`` is standard output."""
+    if target is None:
+        return None
+    if target == "-" and ".csv" in suffixes:
+        if json:
+            raise InputError("-o - and --json would both print: give -o the name of a file")
+        sys.stdout.flush()
+        return sys.stdout.buffer
+    if not target.lower().endswith(suffixes):
+        *first, last = suffixes
+        raise InputError(f"{target}: the name must end in {', '.join(first)} or {last}")
+    if target.lower().endswith(".parquet") and find_spec("pyarrow") is None:
+        raise missing_extra(f"{target}: writing Parquet", "pyarrow")
+    exist = source is not None and os.path.exists(target) and os.path.exists(source)
+    if source is not None and exist and os.path.samefile(target, source):
+        raise InputError(f"{target}: is the input; it is not overwritten")
+    return stack.enter_context(replacing(target))
+
+
+def check_size(
+    target: str, letters: str, n_pairs: int, n_points: int, ndim: int, most: float | None
+) -> None:
+    """InputError for an output that would be larger than `most` bytes, told beforehand."""
+    most = MOST_BYTES if most is None else most
+    in_text = not target.lower().endswith((".npz", ".parquet"))
+    number = (len(str(n_points)) + 1, _DIGITS_OF_FLOAT, _DIGITS_OF_SHIFT) if in_text else (8, 8, 4)
+    of_each = {
+        "i": number[0], "j": number[0], "P": 2 * number[0], "d": number[1],
+        "D": ndim * number[1], "S": ndim * number[2],
+    }  # fmt: skip
+    size = n_pairs * sum(of_each[letter] for letter in letters)
+    if size > most:
+        raise InputError(
+            f"{target}: would have {n_pairs:,} pairs in about {_readable(size)}, more than "
+            f"--max-output {_readable(most)}: raise it, or choose fewer --quantities"
+        )
+
+
+def _readable(size: float) -> str:
+    for unit in ("bytes", "kB", "MB", "GB"):
+        if size < 1000.0:
+            return f"{size:.3g} {unit}"
+        size /= 1000.0
+    return f"{size:.3g} TB"
+
+
+def write_columns(
+    stream: IO[bytes], target: str, columns: dict[str, NDArray[Any]], **extra: Any
+) -> None:
+    """Write them as the name says; `extra` goes into archives alone."""
+    if target.lower().endswith(".npz"):
+        np.savez(stream, **columns, **extra)  # type: ignore[arg-type]
+    elif target.lower().endswith(".parquet"):
+        write_parquet(stream, columns)
+    else:
+        write_csv(stream, columns)
+    stream.flush()
+
+
+def write_parquet(stream: IO[bytes], columns: dict[str, NDArray[Any]]) -> None:
+    """Write columns of their own types, vectors as in `write_csv`, in row groups."""
+    pyarrow: Any = import_module("pyarrow")
+    parquet: Any = import_module("pyarrow.parquet")
+
+    series = dict(_series(columns))
+    n_rows = len(next(iter(series.values())))
+
+    def rows(first: int) -> Any:
+        some = {name: values[first : first + _PARQUET_ROWS] for name, values in series.items()}
+        return pyarrow.table({name: np.ascontiguousarray(one) for name, one in some.items()})
+
+    with parquet.ParquetWriter(stream, rows(0).schema) as writer:
+        for first in range(0, n_rows, _PARQUET_ROWS):
+            writer.write_table(rows(first))
+
+
+def _series(columns: dict[str, NDArray[Any]]) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Each column, and each component of a vector: ``S0``, ``S1``, ``S2``."""
+    for letter, column in columns.items():
+        if column.ndim == 1:
+            yield letter, column
+        else:
+            yield from ((f"{letter}{k}", column[:, k]) for k in range(column.shape[1]))
+
+
+def write_csv(stream: IO[bytes], columns: dict[str, NDArray[Any]]) -> None:
+    """Write one line an entry; vectors take a column for each component: ``S0,S1,S2``.
+
+    Floats are written with the fewest digits that read back as the same number.
+    """
+    names, series = zip(*_series(columns), strict=True)
+    stream.write((",".join(names) + "\n").encode())
+    line = ",".join("%s" if values.dtype.kind == "U" else "%r" for values in series)
+    for start in range(0, len(series[0]), _ROWS):
+        parts = [values[start : start + _ROWS].tolist() for values in series]
+        rows = zip(*parts, strict=True)
+        stream.writelines((line % row + "\n").encode() for row in rows)

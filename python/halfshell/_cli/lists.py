@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``halfshell neighbors``, ``coordination``, ``nearest`` and ``rdf``: full lists, counts, g(r).
+"""``halfshell pairs``, ``neighbors``, ``coordination``, ``nearest`` and ``rdf``.
 
 Each finds its columns, says in a few lines what they are, and writes them where that is wanted.
 """
@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import halfshell as hs
-from halfshell._cli.errors import InputError
-from halfshell._cli.files import Scene, read_scene
-from halfshell._cli.output import check_size, open_output, write_columns
+from halfshell import _core
+from halfshell._cli.errors import InputError, printable
+from halfshell._cli.files import check_size, open_output, read_scene, write_columns
 from halfshell._cli.scene import (
     describe_box,
     describe_points,
@@ -28,15 +28,15 @@ from halfshell._cli.scene import (
     load_frames,
     load_scene,
     named_cutoff,
+    plot_distribution,
     read_points,
     require_matplotlib,
     searching,
     shown_cutoff,
     unit_suffix,
 )
-from halfshell._terminal import printable
-
-__all__ = ["run_coordination", "run_nearest", "run_neighbors", "run_rdf"]
+from halfshell._cli.structure_files import Scene
+from halfshell._convert.progress import progress_bar
 
 Columns = dict[str, NDArray[Any]]
 MOST_SHOWN = 12  # lines of a histogram
@@ -50,12 +50,75 @@ class Found(NamedTuple):
     lines: list[tuple[str, str]]
 
 
+def run_pairs(args: Namespace) -> int:
+    """Carry out ``halfshell pairs``."""
+    scene, cutoff, reason = load_scene(args)
+    wanted = args.quantities or ("ijdS" if any(scene.periodic) else "ijd")
+    letters = wanted if args.output else ""
+    letters += "" if "d" in letters else "d"
+    largest = max(cutoff.values()) if isinstance(cutoff, dict) else cutoff
+    if args.plot and largest == 0:
+        raise InputError("--plot needs a cutoff above 0")
+    _refuse_without_output(args, "quantities", "sort", "max_output")
+    with ExitStack() as stack:
+        output = open_output(args.output, args.file, stack, json=args.json)
+        plot = open_output(args.plot, args.file, stack, (".png", ".pdf", ".svg"))
+        if plot:
+            require_matplotlib()
+        with searching(scene, args):
+            if output:  # what it takes to count refuses what is too large
+                n_pairs = hs.count_pairs(scene.known, cutoff, inclusive=not args.strict)
+                n, ndim = scene.points.shape
+                check_size(args.output, wanted, n_pairs, n, ndim, args.max_output)
+            hs.pairs(scene.known[:0], cutoff)  # loads what a first search loads, outside its time
+            start = time.perf_counter()
+            with progress_bar(args.progress and not args.json, "searching") as advance:
+                found = hs.pairs(
+                    scene.known, cutoff, inclusive=not args.strict, quantities=letters,
+                    sort=args.sort, progress=advance,
+                )  # fmt: skip
+            seconds = time.perf_counter() - start
+        columns = dict(zip(letters, (found,) if len(letters) == 1 else found, strict=True))
+        d = columns["d"]
+        if output:
+            chosen = {letter: columns[letter] for letter in wanted}
+            extra: dict[str, Any] = {"n": len(scene.points), "inclusive": not args.strict}
+            if largest is cutoff:  # one for all pairs
+                extra["cutoff"] = cutoff
+            write_columns(output, args.output, chosen, **extra)
+        if plot:
+            plot_distribution(plot, Path(args.plot).suffix[1:], d, scene, largest)
+
+    box, unit = scene.box_rows, unit_suffix(scene)
+    names, counts = np.unique([] if scene.species is None else scene.species, return_counts=True)
+    mean, nearest = 2 * len(d) / len(scene.points), float(d.min()) if len(d) else None
+    kernel = args.kernel or _core.default_kernel()
+    facts = {
+        "species": dict(zip(names.tolist(), counts.tolist(), strict=True)),
+        "unit": scene.unit, "box": None if box is None else box.tolist(), "no_box": scene.no_box,
+        "periodic": list(scene.periodic), "cutoff": named_cutoff(cutoff),
+        "cutoff_chosen": args.cutoff is None, "inclusive": not args.strict, "pairs": len(d),
+        "mean_coordination": mean, "nearest_distance": nearest, "seconds": seconds,
+        "kernel": kernel, "precision": args.precision, "output": args.output, "plot": args.plot,
+    }  # fmt: skip
+    rule = "d < cutoff" if args.strict else "d <= cutoff"
+    speed = len(d) / seconds / 1e6 if seconds else 0.0
+    lines = [
+        ("cutoff", shown_cutoff(cutoff, scene, reason)),
+        ("pairs", f"{len(d):,}   ({rule}, each pair once)"),
+        ("mean coordination", f"{mean:.6g}"),
+        ("nearest distance", "no pair" if nearest is None else f"{nearest:.6g}{unit}"),
+        ("time", f"{_duration(seconds)}   ({speed:.3g} million pairs a second)"),
+        ("kernel", f"{kernel}, precision {args.precision}"),
+    ]
+    _print(args, scene, facts, lines, "pairs ")
+    return 0
+
+
 def run_neighbors(args: Namespace) -> int:
     """Carry out ``halfshell neighbors``."""
 
-    for name, given in (("--quantities", args.quantities), ("--max-output", args.max_output)):
-        if given and not args.output:
-            raise InputError(f"{name} is for what -o writes: give -o as well")
+    _refuse_without_output(args, "quantities", "max_output")
 
     def find(scene: Scene, cutoff: Any, asking: Scene, how: dict[str, Any]) -> Found:
         letters = args.quantities or ("ijdS" if any(scene.periodic) else "ijd")
@@ -124,12 +187,13 @@ def run_nearest(args: Namespace) -> int:
             write_columns(output, args.output, columns)
     d, unit = columns["d"], unit_suffix(scene)
     largest = float(d.max()) if len(d) else None
-    facts = {"k": k, "entries": len(d), "largest_distance": largest}
+    facts = {"k": k, "entries": len(d), "largest_distance": largest, "seconds": seconds}
     lines = [
         ("nearest points", f"{k:,} of each of {n:,}: {len(d):,} entries"),
         ("largest distance", "none" if largest is None else f"{largest:.6g}{unit}"),
+        ("time", _duration(seconds)),
     ]
-    _print(args, scene, facts, lines, seconds)
+    _print(args, scene, facts, lines)
     return 0
 
 
@@ -141,7 +205,15 @@ def run_rdf(args: Namespace) -> int:
         sizes: set[int] = set()
         n_frames = 0
         for frame in frames:
-            found = _distribution(frame, cutoff, args)
+            if args.density is None and (frame.box is None or not all(frame.periodic)):
+                raise InputError(
+                    f"{frame.where}: g(r) needs a box that is periodic along every axis, or "
+                    "--density"
+                )
+            with searching(frame, args):
+                found = hs.rdf(
+                    frame.known, cutoff, args.bins, by_type=args.by_type, density=args.density
+                )
             result = found if result is None else result + found
             sizes.add(len(frame.points))
             n_frames += 1
@@ -204,17 +276,14 @@ def _draw(stream: Any, result: Any, scene: Scene, name: str) -> None:
     figure.savefig(stream, format=Path(name).suffix[1:], dpi=150)
 
 
-def _distribution(scene: Scene, cutoff: float, args: Namespace) -> Any:
-    if args.density is None and (scene.box is None or not all(scene.periodic)):
-        raise InputError(
-            f"{scene.where}: g(r) needs a box that is periodic along every axis, or --density"
-        )
-    with searching(scene, args):
-        return hs.rdf(scene.known, cutoff, args.bins, by_type=args.by_type, density=args.density)
-
-
 # ---- what they share -------------------------------------------------------------------------
 
+
+def _refuse_without_output(args: Namespace, *names: str) -> None:
+    for name in names:
+        if getattr(args, name) and not args.output:
+            option = name.replace("_", "-")
+            raise InputError(f"--{option} is for what -o writes: give -o as well")
 
 def _run(args: Namespace, find: Callable[[Scene, Any, Scene, dict[str, Any]], Found]) -> int:
     """A command with a cutoff."""
@@ -236,9 +305,12 @@ def _run_loaded(
         seconds = time.perf_counter() - start
         if output:
             write_columns(output, args.output, found.columns)
-    facts = {"cutoff": named_cutoff(cutoff), "cutoff_chosen": args.cutoff is None, **found.facts}
+    facts = {
+        "cutoff": named_cutoff(cutoff), "cutoff_chosen": args.cutoff is None, **found.facts,
+        "seconds": seconds,
+    }  # fmt: skip
     line = ("cutoff", shown_cutoff(cutoff, scene, reason))
-    _print(args, scene, facts, [line, *found.lines], seconds)
+    _print(args, scene, facts, [line, *found.lines, ("time", _duration(seconds))])
     return 0
 
 
@@ -292,24 +364,29 @@ def _means(counts: NDArray[np.int64], asking: Scene) -> dict[str, float]:
 
 
 def _print(
-    args: Namespace, scene: Scene, facts: dict[str, Any], lines: list[tuple[str, str]], took: float
-) -> None:
-    """The summary, unless the columns went to standard output."""
+    args: Namespace, scene: Scene, facts: dict[str, Any], lines: list[tuple[str, str]],
+    what: str = "",
+) -> None:  # fmt: skip
+    """The summary, unless the columns, which are called `what`, went to standard output."""
     if args.output == "-":
         return
+    queries = getattr(args, "queries", None)
     if args.json:
         first = describe_source(scene) | ({"no_box": scene.no_box} if scene.no_box else {})
-        if getattr(args, "queries", None) is not None:
-            first["queries"] = args.queries
-        print(json.dumps({**first, **facts, "seconds": took, "output": args.output}, indent=2))
+        if queries is not None:
+            first["queries"] = queries
+        print(json.dumps({**first, **facts, "output": args.output}, indent=2))
         return
     shown = describe_points(scene)
-    if getattr(args, "queries", None) is not None:
-        shown.append(("queries", args.queries))
+    if queries is not None:
+        shown.append(("queries", queries))
     shown += [("box", describe_box(scene)), *lines]
-    shown.append(("time", f"{took:.3g} s" if took >= 1 else f"{took * 1e3:.3g} ms"))
-    for what, target in (("", args.output), ("plot ", getattr(args, "plot", None))):
+    for name, target in ((what, args.output), ("plot ", getattr(args, "plot", None))):
         if target:
-            shown.append((f"{what}written to", target))
+            shown.append((f"{name}written to", target))
     text = [scene.source, *(f"  {name:<18}{value}" for name, value in shown)]
     print("\n".join(map(printable, text)))
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.3g} s" if seconds >= 1 else f"{seconds * 1e3:.3g} ms"

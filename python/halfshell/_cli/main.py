@@ -22,33 +22,22 @@ import numpy as np
 
 import halfshell as hs
 from halfshell._cli import values
-from halfshell._cli.errors import InputError, one_line
+from halfshell._cli.errors import InputError, one_line, printable
 from halfshell._machine import cpu_name, unknown_kernel, usable_cpus
-from halfshell._terminal import printable
 from halfshell._unknown import nearest_word
-
-__all__ = ["main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Parameters
-    ----------
-    argv : sequence of str, optional
-        Arguments without the program's name. Default: those of the process.
-
-    Returns
-    -------
-    int
-        The exit status.
-    """
+    """Run the command line, by these arguments or those of the process; its exit status."""
     if argv is None and hasattr(sys.stdout, "reconfigure"):
         # A name of a file may hold what the terminal cannot show, as on standard error.
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
-        args = _parser().parse_args(argv)
-        status = int(args.run(args))
+        parser = _parser()
+        args = parser.parse_args(argv)
+        status = 0 if args.run is None else int(args.run(args))
+        if args.run is None:
+            parser.print_help()
         sys.stdout.flush()
         return status
     except (InputError, MemoryError) as error:
@@ -113,20 +102,19 @@ def _parser() -> _Parser:
         description="Every pair of points within a cutoff, each decided exactly.",
     )
     parser.add_argument("--version", action="version", version=f"halfshell {hs.__version__}")
-    parser.set_defaults(run=lambda args: _run_help(parser))
+    parser.set_defaults(run=None)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND")
     _add_pairs(commands)
     _add_lists(commands)
     _add_verify(commands)
-    _add_bench(commands)
-    _add_report(commands)
+    _add_measuring(commands)
     info = commands.add_parser("info", help="what this installation consists of")
     info.add_argument("--json", action="store_true", help="the same for machines")
     info.set_defaults(run=_run_info)
     selftest = commands.add_parser(
         "selftest", help="check every kernel of this CPU against integers (under 5 s)"
     )
-    selftest.set_defaults(run=_run_selftest)
+    selftest.set_defaults(run=lambda args: import_module("halfshell.selftest").main())
     return parser
 
 
@@ -244,7 +232,7 @@ def _add_pairs(commands: Any) -> None:
         help="how a pair near the cutoff is decided; default: exact",
     )
     _add_no_progress(command)
-    command.set_defaults(run=_later("halfshell._cli.pairs"))
+    command.set_defaults(run=_later("halfshell._cli.lists", "run_pairs"))
 
 
 def _add_lists(commands: Any) -> None:
@@ -321,41 +309,33 @@ def _add_verify(commands: Any) -> None:
     command.set_defaults(run=_later("halfshell._cli.verify"))
 
 
-def _add_bench(commands: Any) -> None:
-    command = commands.add_parser(
+def _add_measuring(commands: Any) -> None:
+    """Commands of `halfshell_report`, which is imported when they are called."""
+
+    def fill_bench(command: argparse.ArgumentParser) -> None:
+        from halfshell_report.cli import add_peers
+
+        _add_scene_options(command, has_kernel=False)
+        add_peers(command)
+
+    def fill_report(command: argparse.ArgumentParser) -> None:
+        from halfshell_report.cli import add_options
+
+        add_options(command)
+
+    bench = commands.add_parser(
         "bench", help="run times on a file, ours and other libraries', whose answers come first",
-        fill=_fill_bench,
+        fill=fill_bench,
     )  # fmt: skip
-    command.set_defaults(run=_later("halfshell_report.cli", "run_bench"))
-
-
-def _fill_bench(command: argparse.ArgumentParser) -> None:
-    from halfshell_report.cli import add_peers
-
-    _add_scene_options(command, has_kernel=False)
-    add_peers(command)
-
-
-def _add_report(commands: Any) -> None:
-    command = commands.add_parser(
+    bench.set_defaults(run=_later("halfshell_report.cli", "run_bench"))
+    report = commands.add_parser(
         "report", help="error against run time, of halfshell and other libraries, on hard scenes",
-        fill=_fill_report,
+        fill=fill_report,
     )  # fmt: skip
-    command.set_defaults(run=_later("halfshell_report.cli"))
-
-
-def _fill_report(command: argparse.ArgumentParser) -> None:
-    from halfshell_report.cli import add_options
-
-    add_options(command)
+    report.set_defaults(run=_later("halfshell_report.cli"))
 
 
 # Commands ----------------------------------------------------------------------------------
-
-
-def _run_help(parser: argparse.ArgumentParser) -> int:
-    parser.print_help()
-    return 0
 
 
 def _later(module: str, name: str = "run") -> Callable[[argparse.Namespace], int]:
@@ -365,12 +345,6 @@ def _later(module: str, name: str = "run") -> Callable[[argparse.Namespace], int
         return int(getattr(import_module(module), name)(args))
 
     return run
-
-
-def _run_selftest(args: argparse.Namespace) -> int:
-    from halfshell import selftest
-
-    return selftest.main()
 
 
 def _run_info(args: argparse.Namespace) -> int:

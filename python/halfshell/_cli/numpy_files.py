@@ -22,8 +22,6 @@ from halfshell._cli.errors import InputError, one_line
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.points import MAX_DIM, MAX_POINTS
 
-__all__ = ["is_numpy", "read_arrays"]
-
 _SCENE = ("points", "box", "periodic")
 _MAGIC = np.lib.format.MAGIC_PREFIX
 MOST_HEADER = 10_000  # bytes, as np.load has it
@@ -43,23 +41,10 @@ def is_numpy(file: str) -> bool:
 def read_arrays(
     file: str, wanted: Sequence[str] = _SCENE
 ) -> tuple[dict[str, NDArray[Any]], list[str]]:
-    """Read some arrays, as far as they are there.
+    """Read some arrays, by name, as far as they are there; and the names of all that it holds.
 
-    Returns
-    -------
-    arrays : dict
-        The arrays by name; that of a ``.npy`` file is `points`, or ``alone`` if others are wanted.
-    names : list of str
-        All that the file holds.
-
-    Raises
-    ------
-    InputError
-        If an array is refused for its header, or the file is broken.
-    MemoryError
-        If it would not fit.
-    OSError
-        If the file cannot be read.
+    That of a ``.npy`` file is `points`, or ``alone`` if others are wanted. MemoryError if they
+    would not fit, OSError if the file cannot be read.
     """
     try:
         return _read(file, wanted)

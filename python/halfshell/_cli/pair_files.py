@@ -23,8 +23,6 @@ from halfshell._cli.errors import InputError, missing_extra, one_line
 from halfshell._cli.numpy_files import read_arrays
 from halfshell._cli.text_files import shown_names
 
-__all__ = ["ListFile", "read_list", "refuse_list"]
-
 # Names of the two points, in lower case and without anything but letters and digits.
 _WORDS = (
     ("source", "target"), ("src", "dst"), ("first", "second"), ("from", "to"),
@@ -91,16 +89,8 @@ def refuse_list(file: str, source: str) -> None:
 def read_list(file: str, n: int, ndim: int) -> ListFile:
     """Read a list of pairs of `n` points with `ndim` coordinates.
 
-    Parameters
-    ----------
-    file : str
-        ``.csv``, ``.txt``, ``.dat`` or ``.tsv`` with a line of names, ``.npz``, or ``.parquet``.
-        Without names, the columns of text and of a ``.npy`` file are i, j, and perhaps the shift.
-
-    Raises
-    ------
-    InputError
-        With the reason in one line.
+    Text, ``.npz`` and ``.parquet`` have names of columns. Without names, those of text and of a
+    ``.npy`` file are i, j, and perhaps the shift.
     """
     try:
         return _read(file, n, ndim)
@@ -143,7 +133,6 @@ def _read(file: str, n: int, ndim: int) -> ListFile:
 
 
 # ---- which columns ---------------------------------------------------------------------------
-
 
 def _plain(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", name.lower())
@@ -190,7 +179,6 @@ def _unnamed(n_columns: int, ndim: int) -> list[str]:
 
 
 # ---- formats ---------------------------------------------------------------------------------
-
 
 def _header(file: str) -> tuple[list[str] | None, str | None, int]:
     """Names of the columns of a text, what is between them, and lines before the first of numbers.
@@ -277,7 +265,6 @@ def _parquet(file: str) -> tuple[list[str], Any]:
 
 
 # ---- values ----------------------------------------------------------------------------------
-
 
 def _whole(name: str, column: NDArray[Any]) -> NDArray[np.int64]:
     """A column as integers; InputError if there is one that is none."""

@@ -15,29 +15,12 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from halfshell._cli.errors import InputError, missing_extra, one_line
-from halfshell._cli.files import Scene, read_frames, read_scene
+from halfshell._cli.errors import InputError, missing_extra, one_line, printable
+from halfshell._cli.files import read_frames, read_scene
+from halfshell._cli.structure_files import Scene
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._functions.rdf import over_ideal_gas, shell_shares, unit_ball
 from halfshell._settings import settings
-from halfshell._terminal import printable
-
-__all__ = [
-    "choose_cutoff",
-    "describe_box",
-    "describe_points",
-    "describe_source",
-    "load_frames",
-    "load_scene",
-    "named_cutoff",
-    "plot_distribution",
-    "radial_distribution",
-    "read_points",
-    "require_matplotlib",
-    "searching",
-    "shown_cutoff",
-    "unit_suffix",
-]
 
 NEIGHBORS_WANTED = 50  # what a chosen cutoff aims at: two or three shells of a dense system
 _COPIES = 5  # of the points, while a cutoff is chosen
@@ -117,13 +100,7 @@ def choose_cutoff(scene: Scene) -> tuple[float, str]:
 
     The density is that of the box along periodic axes and of the points' extent along the
     others, which is left out where it is zero (points in a plane or on a line). Of few points
-    in open space all are neighbours.
-
-    Raises
-    ------
-    InputError
-        If the scene has no length to choose by: a single point in open space, or points that
-        coincide.
+    in open space all are neighbours. InputError if the scene has no length to choose by.
     """
     n, ndim = scene.points.shape
     refuse_unavailable(_COPIES * 8 * n * ndim, f"choosing a cutoff for {n:,} points")

@@ -22,8 +22,6 @@ from halfshell._cli.text_files import kind_of_file, open_bytes
 from halfshell._convert.objects import SYMBOLS, placeholder
 from halfshell._convert.points import Points
 
-__all__ = ["Frames", "Scene", "UnknownFormat", "by_ase", "by_mdanalysis"]
-
 Frames = int | slice | None
 
 _OF_CELL = ((0, 9), (9, 9), (18, 9), (27, 7), (34, 7), (41, 7))  # numbers of a line CRYST1
@@ -40,42 +38,18 @@ class UnknownFormat(Exception):
 
 @dataclass(frozen=True)
 class Scene:
-    """Points with their box, and where they come from.
+    """Points with their box, and where they come from."""
 
-    Attributes
-    ----------
-    points : ndarray, shape (n, d)
-        Finite, n >= 1.
-    box : ndarray, shape (d,) or (d, d), or None
-        Edge lengths, or edge vectors as rows.
-    periodic : tuple of bool, length d
-        Which axes repeat.
-    source : str
-        The file, or what ships with the package; for messages.
-    species : ndarray of str, shape (n,), or None
-        Chemical symbols, where the file has them.
-    unit : str
-        ``"angstrom"`` where it is known, else empty.
-    remarks : tuple of str
-        What the reader of the file warned of.
-    reader : str
-        What read the file, and what of it; empty for what ships with the package.
-    no_box : str
-        Why the box that the file has is none, or nothing.
-    frame : str
-        Which of several frames this is, for messages.
-    """
-
-    points: NDArray[Any]
-    box: NDArray[Any] | None = None
+    points: NDArray[Any]  # (n, d), finite, n >= 1
+    box: NDArray[Any] | None = None  # edge lengths (d,), or edge vectors as rows (d, d)
     periodic: tuple[bool, ...] = (False,) * 3
-    source: str = ""
-    species: NDArray[np.str_] | None = None
-    unit: str = ""
-    remarks: tuple[str, ...] = ()
-    reader: str = ""
-    no_box: str = ""
-    frame: str = ""
+    source: str = ""  # the file, or what ships with the package; for messages
+    species: NDArray[np.str_] | None = None  # chemical symbols, where the file has them
+    unit: str = ""  # "angstrom" where it is known
+    remarks: tuple[str, ...] = ()  # what the reader of the file warned of
+    reader: str = ""  # what read the file, and what of it; empty for what ships with the package
+    no_box: str = ""  # why the box that the file has is none
+    frame: str = ""  # which of several frames this is, for messages
 
     @property
     def where(self) -> str:
@@ -84,13 +58,7 @@ class Scene:
 
     @cached_property
     def known(self) -> Points:
-        """What a search takes: points, box, periodicity, and elements as types.
-
-        Raises
-        ------
-        TypeError, ValueError
-            If the box is none.
-        """
+        """What a search takes: points, box, periodicity, and elements as types."""
         periodic = None if self.box is None else self.periodic
         return Points(self.points, box=self.box, periodic=periodic, types=self.species)
 
@@ -105,18 +73,13 @@ class Scene:
 
 # ---- ASE ---------------------------------------------------------------------------------------
 
-
 def by_ase(file: str, file_format: str | None, frames: Frames) -> Iterator[Scene]:
     """Frames as ASE reads them: one, by default the last, unless `frames` is a range.
 
     Those of a range are read one by one, where the reader of the format does so.
 
-    LAMMPS data, mmCIF and VASP 4 are told from what the file holds, because ASE does not.
-
-    Raises
-    ------
-    UnknownFormat, InputError, Exception
-        ASE may raise anything for a broken file.
+    LAMMPS data, mmCIF and VASP 4 are told from what the file holds, because ASE does not. It may
+    raise anything for a broken file.
     """
     try:
         import ase
@@ -298,7 +261,6 @@ def _of_vasp4(file: str) -> list[Any]:
 
 # ---- MDAnalysis --------------------------------------------------------------------------------
 
-
 # What it does not know by these names.
 _NAMES_OF_MDANALYSIS = {
     "RST7": "INPCRD", "RST": "INPCRD", "LAMMPSTRJ": "LAMMPSDUMP", "DUMP": "LAMMPSDUMP",
@@ -460,15 +422,12 @@ def _species(symbols: Any, names: Any, residues: Any) -> tuple[NDArray[np.str_] 
     if symbols is None:
         return None, ""
     species, how = np.array([str(symbol).capitalize() or "X" for symbol in symbols]), ""
-    if names is not None and residues is not None and not _plausible(species, residues):
-        species, how = _elements(names, residues), ": elements by names of atoms"
+    if names is not None and residues is not None:
+        kinds = set(zip(species.tolist(), map(str, residues)))
+        known = [s for s, residue in kinds if residue.strip().upper() in _RESIDUES]
+        if not _LIGHT.issuperset(known):  # no amino acid, nucleotide or water has that element
+            species, how = _elements(names, residues), ": elements by names of atoms"
     return None if (species == "X").all() else species, how
-
-
-def _plausible(species: Any, residues: Any) -> bool:
-    """Whether no amino acid, nucleotide or water has an element that it cannot have."""
-    kinds = set(zip(species.tolist(), map(str, residues)))
-    return all(s in _LIGHT for s, residue in kinds if residue.strip().upper() in _RESIDUES)
 
 
 def _elements(names: Sequence[Any], residues: Sequence[Any]) -> NDArray[np.str_]:

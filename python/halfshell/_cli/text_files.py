@@ -22,9 +22,8 @@ from numpy.typing import NDArray
 
 from halfshell._cli.errors import InputError
 
-__all__ = ["kind_of_file", "open_bytes", "read_points", "shown_names"]
-
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
 _MOST_UNNAMED = 3
 _MOST_AXES = 8
@@ -77,23 +76,9 @@ def read_points(
     names; so is a remark right before the first point whose words name its columns. A first line
     that holds one whole number, where others hold more, says how many points there are.
 
-    Parameters
-    ----------
-    file : str
-        Its name.
-    columns : sequence of str
-        Names, or numbers from 1 on, of those that are coordinates; default: told from the names.
-    is_pts : bool
-        Columns without names are those of a PTS file: x y z, intensity, colours.
-    least : int
-        Of coordinates, in a file that its name does not tell to be text.
-
-    Raises
-    ------
-    InputError
-        With the number of the line, from 1 on, and of the field; or if it is not text.
-    OSError
-        If the file cannot be read.
+    columns: names, or numbers from 1 on, of those that are coordinates; default: told from the
+    names. is_pts: columns without names are those of a PTS file: x y z, intensity, colours. least:
+    of coordinates, in a file that its name does not tell to be text.
     """
     with open_bytes(file) as stream:
         lines = io.TextIOWrapper(stream, encoding="utf-8-sig")
@@ -176,7 +161,6 @@ def _read(
 
 # ---- fields ------------------------------------------------------------------------------------
 
-
 def _separator(line: tuple[int, str]) -> str | None:
     """What separates the fields of a line; None for white space."""
     number, text = line
@@ -225,13 +209,12 @@ def _number(word: str, line: int, k: int, commas: _Commas) -> float:
         raise InputError(f"{where}: {word} is not a finite number")
     if not word:
         raise InputError(f"{where}: is empty")
-    if re.fullmatch(r"[+-]?(nan|inf|infinity)", word, re.IGNORECASE):
+    if _NOT_FINITE.fullmatch(word):
         raise InputError(f"{where}: {word} is not a finite number")
     raise InputError(f"{where}: {word!r} is not a number")
 
 
 # ---- columns -----------------------------------------------------------------------------------
-
 
 def _names_of(fields: list[str]) -> list[str] | None:
     """The fields of a first line as names, or None if it is a point.
@@ -240,12 +223,8 @@ def _names_of(fields: list[str]) -> list[str] | None:
     """
     numbers = [field for field in fields if _NUMBER.fullmatch(field.replace(",", "."))]
     is_frame = len(fields) > 1 and fields == ["", *map(str, range(len(fields) - 1))]
-    are_names = any(fields) and not numbers and not all(map(_is_not_finite, fields))
+    are_names = any(fields) and not numbers and not all(map(_NOT_FINITE.fullmatch, fields))
     return fields if is_frame or are_names else None
-
-
-def _is_not_finite(word: str) -> bool:
-    return word.lower().lstrip("+-") in ("nan", "inf", "infinity")
 
 
 def _choose(

@@ -9,18 +9,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from decimal import Decimal, localcontext
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 import halfshell as hs
 from halfshell._check.reference import exact_square, reach_by_types, reference_pairs
-from halfshell._check.verify import LIST, compare
-from halfshell._cli.errors import InputError
-from halfshell._cli.files import Scene
+from halfshell._check.verify import LIST, cause_of, compare
+from halfshell._cli.errors import InputError, printable
 from halfshell._cli.pair_files import read_list
-from halfshell._cli.progress import progress_bar
 from halfshell._cli.scene import (
     describe_points,
     describe_source,
@@ -30,10 +28,9 @@ from halfshell._cli.scene import (
     searching,
     shown_cutoff,
 )
+from halfshell._cli.structure_files import Scene
 from halfshell._convert.call import take
-from halfshell._terminal import printable
-
-__all__ = ["Check", "PairList", "check_by_integers", "check_by_search", "run", "sample_points"]
+from halfshell._convert.progress import progress_bar
 
 BLOCKS = 4  # neighbourhoods that a sample is made of
 EXAMPLES = 5  # wrong pairs that are shown
@@ -43,24 +40,13 @@ SEARCH_ROWS = 2_000_000  # rows that are compared with the search: some seconds
 
 @dataclass(frozen=True)
 class PairList:
-    """A list of pairs that is to be checked.
-
-    Attributes
-    ----------
-    i, j : ndarray of int64, shape (m,)
-    S : ndarray of int64, shape (m, d), or None
-        None of a file that has no shifts.
-    inclusive : bool
-        The rule of its author: ``d <= cutoff``, or ``d < cutoff``.
-    full : bool or None
-        Whether it has both directions of every pair; None as long as this is not known.
-    """
+    """A list of pairs that is to be checked."""
 
     i: NDArray[np.int64]
     j: NDArray[np.int64]
-    S: NDArray[np.int64] | None
-    inclusive: bool
-    full: bool | None
+    S: NDArray[np.int64] | None  # None of a file that has no shifts
+    inclusive: bool  # the rule of its author: d <= cutoff, or d < cutoff
+    full: bool | None  # whether it has both directions of every pair; None: not yet known
 
     def among(self, rows: NDArray[np.intp] | None, n: int) -> PairList:
         """Return the pairs among some of n points, numbered by their place among these."""
@@ -77,20 +63,12 @@ class PairList:
 # Two checks --------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Check:
+class Check(NamedTuple):
     """What one way of checking found; rows are (i, j, *S), numbered as in the file."""
 
     by: str
     points: int
-    missed: NDArray[np.int64]
-    spurious: NDArray[np.int64]
-    duplicate: NDArray[np.int64]
-
-    @property
-    def faults(self) -> dict[str, NDArray[np.int64]]:
-        """The three kinds of wrong rows by name."""
-        return {"missed": self.missed, "spurious": self.spurious, "duplicate": self.duplicate}
+    faults: dict[str, NDArray[np.int64]]  # the three kinds of wrong rows by name
 
     @property
     def ok(self) -> bool:
@@ -160,11 +138,13 @@ def _types_of(scene: Scene, cutoff: Any) -> tuple[list[int], list[list[float]]]:
     return types.tolist(), table.tolist()
 
 
-def _check(
-    by: str, verdict: hs.Verdict, rows: NDArray[np.intp] | None, n: int
-) -> Check:
-    found = (verdict.missed, verdict.spurious, verdict.duplicate)
-    return Check(by, n, *(_as_given(wrong, rows) for wrong in found))
+def _check(by: str, verdict: hs.Verdict, rows: NDArray[np.intp] | None, n: int) -> Check:
+    """The verdict on some points, numbered as in the file again."""
+    faults = {name: getattr(verdict, name) for name in ("missed", "spurious", "duplicate")}
+    if rows is not None:
+        for name, found in faults.items():
+            faults[name] = np.concatenate([rows[found[:, :2]], found[:, 2:]], axis=1)
+    return Check(by, n, faults)
 
 
 def sample_points(scene: Scene, limit: int) -> NDArray[np.intp] | None:
@@ -192,13 +172,6 @@ def sample_points(scene: Scene, limit: int) -> NDArray[np.intp] | None:
     return np.array(sorted(chosen), dtype=np.intp)
 
 
-def _as_given(found: NDArray[np.int64], rows: NDArray[np.intp] | None) -> NDArray[np.int64]:
-    """Number the points of rows (i, j, *S) as in the file again."""
-    if rows is None or not len(found):
-        return found
-    return np.concatenate([rows[found[:, :2]], found[:, 2:]], axis=1)
-
-
 # The command -------------------------------------------------------------------------------
 
 
@@ -224,7 +197,9 @@ def run(args: Namespace) -> int:
         if peer:
             author, pairs = peer.name_and_version(), PairList(*ask_peer(peer, scene, cutoff))
         elif not args.list:
-            author, pairs = f"halfshell {hs.__version__}", _own_list(scene, cutoff, args)
+            author, inclusive = f"halfshell {hs.__version__}", not args.strict
+            i, j, S = hs.pairs(scene.known, cutoff, quantities="ijS", inclusive=inclusive)
+            pairs = PairList(i, j, S.astype(np.int64), inclusive, full=False)
         if args.list or peer:
             check, full = check_by_search(pairs, scene, cutoff)
             pairs = replace(pairs, full=full)
@@ -236,11 +211,6 @@ def run(args: Namespace) -> int:
     else:
         print(_text(author, pairs, scene, cutoff, checks))
     return 0 if all(check.ok for check in checks) else 1
-
-
-def _own_list(scene: Scene, cutoff: Any, args: Namespace) -> PairList:
-    i, j, S = hs.pairs(scene.known, cutoff, quantities="ijS", inclusive=not args.strict)
-    return PairList(i, j, S.astype(np.int64), inclusive=not args.strict, full=False)
 
 
 def _saved_list(args: Namespace) -> tuple[str, PairList, Scene, Any]:
@@ -323,6 +293,9 @@ def _text(author: str, pairs: PairList, scene: Scene, cutoff: Any, checks: list[
             text.append(line)
         if len(found) > EXAMPLES:
             text.append(f"  {name}: and {len(found) - EXAMPLES:,} more")
+    cause = wrong and cause_of(wrong["missed"], wrong["spurious"])
+    if cause:
+        text.append(f"  {cause}")
     return "\n".join(map(printable, text))
 
 

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
     from halfshell._convert.types import FloatArray
 
+    IntArray = npt.NDArray[np.int64]
+
 _BIGGEST_INTEGER = 2**53  # from here on float64 does not hold every integer
 
 
@@ -89,7 +91,7 @@ def as_array(values: Any, name: str, single: str = "hold real numbers") -> npt.N
         refuse_deep_lists(values, name)
         _refuse_masked_items(values, name)
     elif type(values) not in (float, int, bool, type(None)):
-        from halfshell._convert.tensors import refuse_tensor  # which few calls need
+        from halfshell._convert.foreign import refuse_tensor  # which few calls need
 
         refuse_tensor(values, name)
     try:
@@ -195,3 +197,76 @@ def _from_objects(array: npt.NDArray[Any], name: str, single: str) -> FloatArray
         if is_a(number, int) and int(result[where]) != number:
             raise ValueError(f"{_element(name, where)} = {shown(number)} is not a float64")
     return result
+
+
+# ---- rows of arrays --------------------------------------------------------------------------
+
+def starts_of(lengths: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    """Where each part begins, and at last where all of them end: one number more than parts. A
+    mask counts as parts of length 1 and 0."""
+    starts = np.zeros(len(lengths) + 1, np.int64)
+    np.cumsum(lengths, out=starts[1:])
+    return starts
+
+
+def rows_of(
+    offsets: npt.NDArray[Any], dtype: npt.DTypeLike = np.int64
+) -> npt.NDArray[Any]:
+    """The number of the row of each entry."""
+    return np.repeat(np.arange(len(offsets) - 1, dtype=dtype), np.diff(offsets))
+
+
+def entries_of(
+    offsets: npt.NDArray[Any], rows: npt.NDArray[Any]
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Offsets of these rows alone, and the entries that are in them."""
+    counts = offsets[rows + 1] - offsets[rows]
+    ends = starts_of(counts)
+    return ends, np.repeat(offsets[rows] - ends[:-1], counts) + np.arange(ends[-1])
+
+
+# ---- numbers of points -----------------------------------------------------------------------
+
+def as_point_numbers(values: Any, name: str, n: int, numbered: str) -> IntArray:
+    """Numbers of n points or queries."""
+    column = as_array(values, name)
+    if column.size and column.dtype.kind not in "iu":
+        hint = f": use np.flatnonzero({name})" if column.dtype.kind == "b" else ""
+        raise TypeError(f"{name} must hold integers, got dtype {column.dtype}{hint}")
+    if column.ndim != 1:
+        raise ValueError(f"{name} must have shape (m,), got {column.shape}")
+    if column.size and n == 0:
+        raise ValueError(f"{name} must be empty: there are no {numbered}")
+    numbers = np.array(column, np.int64)  # one's own, as another thread may change the caller's
+    for k in np.flatnonzero((numbers < 0) | (numbers >= n)):
+        raise ValueError(
+            f"{name} must be numbers of {numbered}, from 0 to {n - 1}, got {name}[{k}] = "
+            f"{column[k]}"
+        )
+    return numbers
+
+
+def as_listed(
+    i: Any, j: Any, S: Any, ndim: int, n_points: int, n_queries: int | None = None
+) -> tuple[IntArray, IntArray, IntArray | None]:
+    """i, j and the shifts, or None, as int64 arrays.
+
+    i numbers the queries, if there are any; all else are points.
+    """
+    asking, numbered = (n_points, "points") if n_queries is None else (n_queries, "queries")
+    first = as_point_numbers(i, "i", asking, numbered)
+    second = as_point_numbers(j, "j", n_points, "points")
+    if first.shape != second.shape:
+        raise ValueError(
+            f"i and j must have the same length, got {len(first)} and {len(second)}"
+        )
+    if S is None:
+        return first, second, None
+    shifts = as_array(S, "S")
+    if shifts.shape != (len(first), ndim):
+        raise ValueError(f"S must have shape ({len(first)}, {ndim}), got {shifts.shape}")
+    if shifts.size and (shifts.dtype.kind not in "iuf" or (shifts != np.rint(shifts)).any()):
+        raise TypeError("S must hold whole numbers")
+    if shifts.size and not (np.abs(shifts.astype(np.float64)) < 2.0**62).all():
+        raise OverflowError("S must hold whole numbers below 2**62")
+    return first, second, np.ascontiguousarray(shifts, np.int64)

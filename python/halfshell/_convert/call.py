@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ from halfshell._convert.foreign import is_a, kind_of, shown, told, whole_number
 from halfshell._convert.lengths import as_number, check_ascending, check_lengths
 from halfshell._convert.memory import refuse_large
 from halfshell._convert.objects import SYMBOLS
-from halfshell._convert.options import as_choice, as_flag
+from halfshell._convert.options import SHELL, as_choice, as_flag
 from halfshell._convert.points import Labels, Points
 from halfshell._errors import shorten
 from halfshell._settings import Settings, current
@@ -92,7 +92,7 @@ class Call:
     def bits(self) -> int:
         axes = self.points._axes
         if isinstance(axes, np.ndarray):
-            return (1 << int(self.array.shape[1])) - 1
+            return 0 if self.points.box is None else (1 << int(self.array.shape[1])) - 1
         return int(axes)
 
     @property
@@ -159,6 +159,49 @@ class Call:
                     raise ValueError(f"{function} cannot be combined with {what}: {reason}")
 
 
+def shells_of(quantities: Any) -> str:
+    """What several cutoffs are for, if the letter k is wanted."""
+    return "shells" if is_a(quantities, str) and SHELL in quantities else ""
+
+
+def check_shells(call: Call, quantities: Any) -> None:
+    """ValueError for the letter k without several cutoffs, or where they are not decided."""
+    if not shells_of(quantities):
+        return
+    if call.points.batch is not None:
+        raise ValueError("the letter k in quantities cannot be combined with a batch")
+    if call.reach is not None:
+        raise ValueError(
+            "the letter k in quantities cannot be combined with radii, supports or cutoffs by type"
+        )
+    if call.shells is None:
+        raise ValueError("the letter k in quantities needs several cutoffs, got one")
+    if call.settings.precision != "exact":
+        raise ValueError(
+            "the letter k in quantities needs precision 'exact', got "
+            f"{call.settings.precision!r}"
+        )
+
+
+def part_of(progress: Any, k: int, n: int) -> Any:
+    """What is told of the k-th of n searches."""
+    return progress and (lambda fraction: progress((k + fraction) / n))
+
+
+def each_cutoff(call: Call) -> Iterator[Call]:
+    """The call with each of its several cutoffs in turn, as parts of one search."""
+    assert call.shells is not None
+    cutoffs, told, bar = call.shells.tolist(), call.progress, call.bar
+    call.shells = call.bar = None
+    try:
+        for k, cutoff in enumerate(cutoffs):
+            call.cutoff, call.progress = cutoff, part_of(told, k, len(cutoffs))
+            yield call
+    finally:
+        if bar is not None:
+            bar.close()
+
+
 _WORDS = {
     "selection": "groups, exclude or min_distance",
     "shells": "several cutoffs",
@@ -196,6 +239,7 @@ def take(
         call.cells = None
         if getattr(type(points), "_is_cell_list", False):
             call.cells, threads = points._cells, points._threads if threads is None else threads
+            cutoff = cutoff if points.points.radii is not None else points._or_own(cutoff)
             points = points.points
         ndim = 3
         if queries is not None and type(points) in (list, tuple) and not points:
@@ -233,7 +277,6 @@ def _take_progress(call: Call, progress: Any) -> None:
 
 # ---- queries, and rows of some points ------------------------------------------------------
 
-
 def _queries_of(queries: Any, points: Points) -> Points | None:
     if queries is None:
         return None
@@ -262,11 +305,11 @@ def same_boxes(one: Points, other: Points) -> bool:
     if not one.tells_periodic:
         mine = theirs
     assert mine is not None and theirs is not None
-    if one.box.shape != other.box.shape or not np.array_equal(mine, theirs):
+    of_systems = {len(box) for box in (one.box, other.box) if box.ndim == 3}
+    of_systems |= {len(axes) for axes in (mine, theirs) if axes.ndim == 2}
+    if len(of_systems) > 1:
         return False
-    return np.array_equal(one.box[mine], other.box[mine]) if mine.ndim == 1 else np.array_equal(
-        one.box, other.box
-    )
+    return bool((mine == theirs).all() and ((one.box == other.box).all(axis=-1) | ~mine).all())
 
 
 def _take_indices(call: Call, indices: Any) -> None:
@@ -274,13 +317,12 @@ def _take_indices(call: Call, indices: Any) -> None:
         raise ValueError("indices select rows of the points: do not give queries as well")
     if call.settings.precision == "single":
         raise ValueError("indices cannot be combined with precision 'single'")
-    from halfshell._convert.listed import as_point_numbers  # few calls need it
+    from halfshell._convert.arrays import as_point_numbers  # few calls need it
 
     call.indices = as_point_numbers(indices, "indices", len(call.points), "points")
 
 
 # ---- the cutoff, and the reach of each pair ------------------------------------------------
-
 
 def _take_cutoff(call: Call, cutoff: Any, directed: bool, several: str) -> None:
     """The cutoff of a call, be it a number, several, one a system, or one for each two types."""
@@ -305,7 +347,9 @@ def _take_cutoff(call: Call, cutoff: Any, directed: bool, several: str) -> None:
         _take_table(call, *_table_of_pairs(cutoff, call))
     elif cutoff is None:
         if not has_radii:
-            hint = "with supports it is the extent" if has_supports else "None needs radii"
+            hint = "points without it need radii"
+            if has_supports:
+                hint = "with supports it is the extent"
             raise TypeError(f"cutoff must be a number, got NoneType: {hint}")
         call.cutoff = math.inf
     else:
@@ -320,6 +364,28 @@ def _take_cutoff(call: Call, cutoff: Any, directed: bool, several: str) -> None:
         _take_radii(call, cutoff)
     elif has_supports:
         _take_supports(call)
+    elif call.reach is None and call.cells is None and call.cutoff == math.inf:
+        call.cutoff = _beyond_all(both)
+
+
+def _beyond_all(sets: list[Points]) -> float:
+    """A cutoff that is larger than any distance, for an infinite one."""
+    box, axes = sets[0].box, sets[0].periodic
+    if box is not None and np.any(axes):
+        raise ValueError(
+            "cutoff must be finite where box vectors repeat, got inf: there is no end of images"
+        )
+    arrays = [one.positions for one in sets if len(one)]
+    if not arrays:
+        return 0.0
+    low = np.min([array.min(axis=0) for array in arrays], axis=0).tolist()
+    high = np.max([array.max(axis=0) for array in arrays], axis=0).tolist()
+    if not all(map(math.isfinite, low + high)):
+        return 0.0  # the search names the coordinate
+    farthest = math.nextafter(math.dist(low, high) * (1.0 + 2.0**-40), math.inf)
+    if farthest == math.inf:
+        raise OverflowError("points lie so far apart that some distances do not fit float64")
+    return farthest
 
 
 def _take_cutoffs(call: Call, cutoff: Any, several: str) -> None:
@@ -329,7 +395,7 @@ def _take_cutoffs(call: Call, cutoff: Any, several: str) -> None:
     def check(shape: tuple[int, ...]) -> None:
         if len(shape) == 1 and not has_batch and not several:
             raise TypeError(
-                "cutoff must be a number; several are for count_pairs and the letter k of pairs, "
+                "cutoff must be a number; several are for counts and the letter k in quantities, "
                 f"a radius for each point is one of Points(radii=...), got shape {shape}"
             )
         if len(shape) == 1 and not has_batch and shape[0] == 0 and several != "counts":
@@ -438,7 +504,6 @@ def reach_by_types(types: Any, query_types: Any, cutoffs: FloatArray) -> Reach:
 
 # ---- cutoffs by type -----------------------------------------------------------------------
 
-
 class _Kinds(NamedTuple):
     """The types of both sets as numbers of one list of names, if they are names."""
 
@@ -510,7 +575,13 @@ def _table_of_types(
             f"cutoff must be symmetric, got cutoff[{a}, {b}] = {table[a, b]} and "
             f"cutoff[{b}, {a}] = {table[b, a]}"
         )
-    own, asking, _ = kinds_of(call, "a table of cutoffs")
+    own, asking, names = kinds_of(call, "a table of cutoffs")
+    if names and len(names) != len(table):
+        raise ValueError(
+            f"cutoff must have a row for each type, {', '.join(map(shown, names[:8]))}"
+            f"{', ...' if len(names) > 8 else ''}, in this order, got shape {table.shape}: a dict "
+            "may have more types"
+        )
     for name, types in (("points", own), ("queries", asking)):
         if types is None:
             continue
@@ -626,7 +697,6 @@ def _type_of(part: Any, where: str, names: tuple[str, ...] | None) -> Any:
 
 # ---- which pairs count ---------------------------------------------------------------------
 
-
 def _selection(call: Call, exclude: Any, min_distance: Any) -> Selection | None:
     groups, asking_groups, _ = _together(call, "_groups", "groups")
     least = 0.0
@@ -666,7 +736,7 @@ def _labels(call: Call, within: int) -> tuple[Any, Any]:
 
 def _excluded(exclude: Any, call: Call) -> npt.NDArray[np.int64]:
     """Numbers of two points, or of a query and a point, (k, 2)."""
-    from halfshell._convert.listed import as_point_numbers  # few calls need it
+    from halfshell._convert.arrays import as_point_numbers  # few calls need it
 
     array = as_array(exclude, "exclude", "be pairs of numbers, (k, 2), or a whole number")
     if array.shape == (0,):

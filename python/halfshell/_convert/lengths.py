@@ -10,7 +10,9 @@ import numpy as np
 
 from halfshell._convert.arrays import as_real_array
 from halfshell._convert.foreign import is_a, shown
-from halfshell._convert.memory import refuse_large, refuse_unavailable
+from halfshell._convert.memory import refuse_unavailable
+from halfshell._convert.options import as_count
+from halfshell._convert.types import Arrays
 from halfshell._errors import brief
 
 if TYPE_CHECKING:
@@ -27,6 +29,8 @@ def as_number(value: Any, name: str, single: str = "be a number") -> float:
     """A plain number; anything that float64 would have to round is refused."""
     if is_a(value, float):
         return float.__float__(value)
+    if type(value) is int and -(2**53) <= value <= 2**53:
+        return float(value)
 
     def check(shape: tuple[int, ...]) -> None:
         if shape != ():
@@ -52,31 +56,6 @@ def as_positive(value: Any, name: str) -> float:
 def as_cutoff(value: Any) -> float:
     """One cutoff; the core checks its value."""
     return as_number(value, "cutoff")
-
-
-def refuse_none(cutoff: Any) -> None:
-    """TypeError for None, where nothing else says how far pairs reach but might have."""
-    if cutoff is None:
-        raise TypeError("cutoff must be a number, got NoneType: None needs radii or supports")
-
-
-def as_cutoffs(value: Any) -> float | FloatArray:
-    """One cutoff, or several in ascending order, which are finite and not negative."""
-    if is_a(value, float):
-        return float.__float__(value)
-
-    def check(shape: tuple[int, ...]) -> None:
-        if len(shape) > 1:
-            raise ValueError(f"cutoff must be a number or have shape (k,), got {shape}")
-
-    array = as_real_array(value, "cutoff", "be a number", check)
-    if array.ndim == 0:
-        return float(array)
-    refuse_large(8 * array.size, array, "cutoff")
-    array = array.astype(np.float64)
-    check_lengths(array, "cutoff")
-    check_ascending(array, "cutoff", "several cutoffs")
-    return array
 
 
 def as_radii(value: Any, n: int) -> float | FloatArray | None:
@@ -106,6 +85,7 @@ def as_edges(values: npt.ArrayLike, name: str = "edges") -> FloatArray:
         if len(shape) != 1 or shape[0] < 2:
             raise ValueError(
                 f"{name} must have shape (bins + 1,), with one bin at least, got {shape}"
+                f"{'' if shape else ': as from np.linspace(0.0, cutoff, bins + 1)'}"
             )
 
     array = as_real_array(values, name, check_shape=check)
@@ -143,3 +123,50 @@ def as_skin(value: Any) -> float:
     if is_a(value, str):
         raise ValueError(f'skin must be a number or "auto", got {shown(value)}')
     return as_length(as_number(value, "skin", 'be a number or "auto"'), "skin")
+
+
+# ---- the nearest -----------------------------------------------------------------------------
+
+_MOST = 2**56  # more entries than any memory holds; NumPy has shapes (0, _MOST, 8)
+
+
+def as_k(k: Any) -> int:
+    """How many are wanted: a whole number from 1 on."""
+    number = as_count(k, "k")
+    if number > _MOST:
+        raise MemoryError(f"k = {shown(number)} is more than fits in any memory")
+    return number
+
+
+def as_max_distance(value: Any) -> float:
+    """A number that is not negative; infinity is one."""
+    number = as_number(value, "max_distance")
+    if not number >= 0.0:
+        raise ValueError(f"max_distance must not be negative or NaN, got {number}")
+    return number
+
+
+def check_max_distances(values: Any) -> Any:
+    """One for all systems or one a system, which are returned: as cutoffs they are converted."""
+    if is_a(values, float):
+        return as_max_distance(values)
+    array = as_real_array(values, "max_distance", "be a number")
+    if array.ndim == 0:
+        return as_max_distance(values)
+    if array.ndim > 1:
+        raise ValueError(
+            "max_distance must be a number or have shape (s,), one for each system, got "
+                f"{array.shape}"
+        )
+    for s in np.flatnonzero(~(array >= 0.0)):
+        raise ValueError(
+            f"max_distance must not be negative or NaN, got max_distance[{s}] = {array[s]}"
+        )
+    return array
+
+
+def in_rows(arrays: Arrays, n_rows: int, k: int) -> Arrays:
+    """The arrays of the core, each with its entries as (rows, k)."""
+    if isinstance(arrays, tuple):
+        return tuple(column.reshape(n_rows, k, *column.shape[1:]) for column in arrays)
+    return arrays.reshape(n_rows, k, *arrays.shape[1:])

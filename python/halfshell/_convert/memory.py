@@ -30,7 +30,9 @@ def gigabytes(n_bytes: int) -> str:
 
 def refuse_large(needed: int, array: npt.NDArray[Any], name: str) -> None:
     """MemoryError before a copy that would make the machine swap: views may be huge."""
-    refuse_unavailable(needed, f"{name} of shape {array.shape} and dtype {array.dtype}, copied,")
+    if needed > SMALL:
+        what = f"{name} of shape {array.shape} and dtype {array.dtype}, copied,"
+        refuse_unavailable(needed, what)
 
 
 class CacheInfo(NamedTuple):

@@ -10,12 +10,15 @@ from __future__ import annotations
 
 import sys
 import warnings
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from halfshell._convert.arrays import as_array
-from halfshell._convert.foreign import attribute, is_a, kind_of, shown, told
+from halfshell._convert.arrays import as_array, one_each
+from halfshell._convert.foreign import attribute, kind_of, told
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
 # By atomic number; 0 stands for what is no element.
 SYMBOLS = """
@@ -37,8 +40,8 @@ class Parts(NamedTuple):
     positions: Any
     box: Any = None
     periodic: Any = None  # None with a box: it does not say which axes repeat
-    types: Any = None  # numbers of elements, symbols or other names
-    are_elements: bool = False  # types are atomic numbers
+    types: Any = None  # symbols or other names
+    numbers: Any = None  # those of elements, which as_elements looks at where they count
 
 
 def parts_of(values: Any, name: str) -> Parts | None:
@@ -47,7 +50,10 @@ def parts_of(values: Any, name: str) -> Parts | None:
         return None
 
     def has(*attributes: str) -> bool:
-        return all(attribute(values, one, name, MISSING) is not MISSING for one in attributes)
+        for one in attributes:
+            if attribute(values, one, name, MISSING) is MISSING:
+                return False
+        return True
 
     if has("positions", "cell", "pbc"):
         return _of_atoms(values, name)
@@ -70,6 +76,8 @@ def parts_of(values: Any, name: str) -> Parts | None:
 def _of_atoms(atoms: Any, name: str) -> Parts:
     """ASE's Atoms, and what is like them."""
     cell, periodic = attribute(atoms, "cell", "box"), attribute(atoms, "pbc", "periodic")
+    rows = attribute(cell, "array", "box")  # of a Cell of ASE
+    cell = rows if type(rows) is np.ndarray else cell
     return Parts(atoms.positions, cell, periodic, *_elements(atoms, name))
 
 
@@ -116,35 +124,37 @@ def _of_mdtraj(frame: Any, name: str) -> Parts:
 
 
 def _of_frame(table: Any, name: str) -> Parts | None:
-    """A data frame of pandas or polars: its columns x, y, z, or all where it has no x."""
+    """A data frame of pandas or polars: its columns x, y, z, or all where it has none of them."""
     columns = {str(column).lower(): column for column in table.columns}
+    every = [str(column) for column in table.columns]
+    for column in set(every) & {*"xyzXYZ"}:
+        if every.count(column) > 1:
+            raise ValueError(f"{name} must have one column {column}, got {every.count(column)}")
     axes = [columns[axis] for axis in "xyz" if axis in columns]
-    if not axes or "x" not in columns:
+    if axes and "x" not in columns:
+        raise ValueError(
+            f"{name} must have a column x beside {axes[0]}, got {', '.join(columns)}: "
+            "name the columns x, y, z, or give those that are coordinates as an array"
+        )
+    if not axes:
         return None
     of_type = next((columns[one] for one in _TYPE_COLUMNS if one in columns), None)
     types = None if of_type is None else as_array(table[of_type], "types", "hold names")
     return Parts(as_array(table[axes], name), types=types)
 
 
-def _elements(owner: Any, name: str) -> tuple[Any, bool]:
-    """Atomic numbers and True, or names and False, or None."""
+def _elements(owner: Any, name: str) -> tuple[Any, Any]:
+    """Names, or None, and atomic numbers, or None."""
     numbers = attribute(owner, "numbers", name)
     if numbers is None:
         numbers = attribute(owner, "atomic_numbers", name)  # of pymatgen
     if numbers is not None:
-        array = as_array(numbers, f"{name}.numbers", "hold integers").copy()  # it may change
-        if array.dtype.kind not in "iu" and array.size:
-            raise TypeError(f"{name}.numbers must hold integers, got dtype {array.dtype}")
-        for k in np.flatnonzero((array < 0) | (array >= len(SYMBOLS))):
-            raise ValueError(
-                f"{name}.numbers must be below {len(SYMBOLS)}, got numbers[{k}] = {array[k]}"
-            )
-        return array.astype(np.int32), True
+        return None, numbers
     symbols = attribute(owner, "get_chemical_symbols", name)
     if symbols is None:
-        return None, False
+        return None, None
     try:
-        return symbols(), False
+        return symbols(), None
     except MemoryError:
         raise
     except Exception as error:
@@ -154,8 +164,20 @@ def _elements(owner: Any, name: str) -> tuple[Any, bool]:
         ) from error
 
 
-# ---- boxes ---------------------------------------------------------------------------------
+def as_elements(values: Any, name: str, n: int) -> npt.NDArray[np.int32]:
+    """Atomic numbers of n points."""
+    array = as_array(values, name, "hold integers").copy()  # it may change
+    one_each(name, n)(array.shape)
+    if array.dtype.kind not in "iu" and array.size:
+        raise TypeError(f"{name} must hold integers, got dtype {array.dtype}")
+    for k in np.flatnonzero((array < 0) | (array >= len(SYMBOLS))):
+        raise ValueError(
+            f"{name} must be below {len(SYMBOLS)}, got numbers[{k}] = {array[k]}"
+        )
+    return array.astype(np.int32)
 
+
+# ---- boxes ---------------------------------------------------------------------------------
 
 def vectors_of(values: Any, name: str = "box", ndim: int | None = None) -> Any:
     """The vectors of a Box, or of another object that has some, as rows; else the object itself.
@@ -246,18 +268,3 @@ def without_placeholder(vectors: Any, name: str, is_pdb: bool = False) -> Any:
         level, frame = level + 1, frame.f_back
     warnings.warn(f"the box of {name} is left out: {reason}", UserWarning, stacklevel=level)
     return None
-
-
-def symbol_of(key: str, where: str) -> str:
-    """The symbol of an element, as it is written."""
-    symbol = key.strip().capitalize()
-    if symbol not in SYMBOLS:
-        raise ValueError(f"{where}: {shown(key)} is not the symbol of an element")
-    return symbol
-
-
-def is_list_of_objects(values: Any, name: str) -> bool:
-    """Whether it is a list, of which the first is an object that is no array of its own."""
-    return (
-        is_a(values, (list, tuple)) and len(values) > 0 and parts_of(values[0], name) is not None
-    )

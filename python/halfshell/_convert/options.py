@@ -8,10 +8,7 @@ from typing import Any
 import numpy as np
 
 from halfshell import _core
-from halfshell._convert.arrays import as_array
 from halfshell._convert.foreign import exact_number, is_a, kind_of, shown, told
-from halfshell._convert.memory import refuse_large
-from halfshell._unknown import nearest_word
 
 # The default of `algorithm`: what is this string itself needs no conversion.
 AUTO = "auto"
@@ -80,6 +77,9 @@ def most_pairs(max_pairs: Any) -> int:
 
 def as_list(value: Any, name: str, of_what: str) -> list[Any]:
     """What a sequence has."""
+    from halfshell._convert.arrays import as_array  # here, as the next one: few calls need them
+    from halfshell._convert.memory import refuse_large
+
     if is_a(value, memoryview):
         value = as_array(value, name)
     is_array = is_a(value, np.ndarray)
@@ -107,6 +107,8 @@ def as_choice(value: Any, name: str, choices: tuple[str, ...]) -> str:
         raise TypeError(f"{name} must be a string, got {kind_of(value)}")
     value = str.__str__(value)  # what it is, whatever it says
     if value not in choices:
+        from halfshell._unknown import nearest_word
+
         few = len(choices) <= 2
         words = " or ".join(map(repr, choices)) if few else f"one of {' '.join(choices)}"
         meant = nearest_word(value, choices)
@@ -123,7 +125,7 @@ def are_letters(text: str, letters: str = LETTERS) -> bool:
 def check_letters(quantities: Any, letters: str = LETTERS) -> None:
     """Raise unless these are some of the letters, those of `pairs`, each at most once."""
     if not is_a(quantities, str):
-        raise TypeError(f"quantities must be a string, got {kind_of(quantities)}")
+        raise TypeError(f"quantities must be a string of letters, got {kind_of(quantities)}")
     quantities = str.__str__(quantities)
     if not are_letters(quantities, letters):
         raise ValueError(

@@ -16,13 +16,16 @@ from halfshell._convert.memory import refuse_large
 from halfshell._convert.objects import (
     SYMBOLS,
     Parts,
+    as_elements,
     parts_of,
     periodic_of,
+    placeholder,
     vectors_of,
     without_placeholder,
 )
 from halfshell._convert.options import as_list
 from halfshell._errors import brief, shorten
+from halfshell._search import search
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -132,9 +135,9 @@ class Points:
     """
 
     __slots__ = (
-        "_axes",  # bits of the axes that repeat, or uint8 (s,); 0 without a box
+        "_axes",  # bits of the axes that repeat, or uint8 (s,), which tells s; 0 without a box
         "_box",  # float64 (d, d) or (s, d, d), or None
-        "_elements",  # atomic numbers of an object that brought them, until they are looked at
+        "_elements",  # atomic numbers of an object, and what they are, until they are types
         "_groups",  # Labels or None, as the next two
         "_labels",
         "_types",
@@ -145,6 +148,9 @@ class Points:
         "tells_periodic",  # False: what it came from does not say which axes repeat
         "weights",
     )
+
+    #: They are no sequence of their rows.
+    __iter__ = None
 
     #: In a notebook.
     _shown = ("positions", "box", "periodic", *_FIELDS)
@@ -157,11 +163,12 @@ class Points:
     tells_periodic: bool
     _axes: Any
     _box: FloatArray | None
-    _elements: npt.NDArray[np.int32] | None
+    _elements: tuple[Any, str] | None
     _types: Labels | None
     _groups: Labels | None
     _labels: Labels | None
 
+    @search()
     def __init__(
         self,
         positions: PointsLike,
@@ -222,9 +229,16 @@ class Points:
         if type(values) in (list, tuple) and len(values) and _is_system(values[0], name):
             if batch is not None:
                 raise ValueError("a list of systems brings its batch: leave batch out")
-            stacked = Points.stack(values, name)
+            stacked = Points._stack(values, name)
             if box is not None or periodic is not None:
                 stacked = stacked._with_box(box, periodic, values[0])
+                if stacked.n_systems > len(values):
+                    raise ValueError(
+                        f"box and periodic must be given for the {len(values)} systems of {name}, "
+                        f"got {stacked.n_systems}"
+                    )
+                if stacked.n_systems < len(values):  # the last are empty
+                    stacked._counting(len(values))
             return stacked
         points = Points.__new__(Points)
         for slot in Points.__slots__:
@@ -248,7 +262,7 @@ class Points:
         return points
 
     @classmethod
-    def stack(cls, systems: Iterable[PointsLike], name: str = "systems") -> Points:
+    def stack(cls, systems: Iterable[PointsLike]) -> Points:
         """Points of several systems, one behind the other, each with its own box.
 
         Parameters
@@ -269,12 +283,20 @@ class Points:
         >>> hs.count_pairs(both, 1.0).tolist()
         [1, 1]
         """
+        return cls._stack(systems, "systems")
+
+    @classmethod
+    def _stack(cls, systems: Any, name: str) -> Points:
         every = [
             cls._of(one, f"{name}[{k}]") for k, one in enumerate(as_list(systems, name, "points"))
         ]
         if not every:
             return cls(np.empty((0, 3)), batch=np.empty(0, np.int64))
-        ndim = {one.positions.shape[1] for one in every if len(one)} or {3}
+        # Systems without points may be lists: only a box, or the number of columns, says more.
+        ndim = {
+            one.positions.shape[1] for one in every
+            if len(one) or one._box is not None or one.positions.shape[1] != 3
+        } or {3}  # fmt: skip
         if len(ndim) > 1:
             raise ValueError(
                 f"{name} must have the same number of columns, got {sorted(ndim)}"
@@ -300,9 +322,8 @@ class Points:
             )
             fields["periodic"] = flags_of(np.array([one._axes for one in every], np.uint8), d)
         positions = np.concatenate([one.positions.reshape(len(one), d) for one in every])
-        return cls(
-            positions, batch=np.repeat(np.arange(len(every)), [len(one) for one in every]), **fields
-        )
+        batch = np.repeat(np.arange(len(every)), [len(one) for one in every])
+        return cls(positions, batch=batch, **fields)._counting(len(every))
 
     def _take_box(self, box: Any, periodic: Any) -> None:
         """Box and periodicity of points that bring none."""
@@ -313,6 +334,8 @@ class Points:
 
     def _take_parts(self, parts: Parts, name: str, owner: Any, box: Any, periodic: Any) -> None:
         """What an object knows; `box` and `periodic` are those of the call."""
+        if box is not None and _is_placeholder(parts, name, owner):
+            parts = parts._replace(box=None, periodic=None)
         tells = parts.box is not None or parts.periodic is not None
         if tells and box is not None:
             raise ValueError(_twice("box", owner))
@@ -324,14 +347,12 @@ class Points:
             raise ValueError(f"{name} of type {kind_of(owner)} are one system: leave batch out")
         else:
             self._take_own_box(parts, name, owner, periodic)
-        if parts.types is None:
-            return
-        if parts.are_elements:
-            one_each(f"{name}.numbers", len(self))(parts.types.shape)
-            setattr_(self, "_elements", parts.types)
-        else:
+        if parts.numbers is not None:
+            setattr_(self, "_elements", (parts.numbers, f"{name}.numbers"))
+        elif parts.types is not None:
             names = as_array(parts.types, f"elements of {name}", "hold names")
-            if names.size and as_names(names) is not None:
+            are_numbers = names.dtype.kind in "iu" and names.size and names.min() >= 0
+            if names.size and (are_numbers or as_names(names) is not None):
                 known = _as_labels(names, f"elements of {name}", len(self), are_types=True)
                 setattr_(self, "_types", known)
 
@@ -340,11 +361,10 @@ class Points:
         try:
             told = periodic if parts.periodic is None else parts.periodic
             bits = as_periodic_bits(told, ndim, default=parts.periodic is None)
-            arrays = attribute(owner, "arrays", name)
-            is_pdb = is_a(arrays, dict) and "residuenames" in arrays
             rows = None if parts.box is None else vectors_of(parts.box, "box", ndim)
             if rows is not None:
-                rows = without_placeholder(as_array(rows, "box"), name, is_pdb) if bits else None
+                rows = as_array(rows, "box")
+                rows = without_placeholder(rows, name, _is_pdb(owner, name)) if bits else None
             if rows is not None:
                 setattr_(self, "_box", as_box(rows, ndim))
                 setattr_(self, "_axes", bits)
@@ -359,8 +379,20 @@ class Points:
             raise ValueError(_twice("box" if box is not None else "periodic", owner))
         return self.replace(box=box, periodic=periodic)
 
+    def _counting(self, n_systems: int) -> Points:
+        """The same, told how many systems there are: the last ones may have no points."""
+        if self.batch is not None and not is_a(self._axes, np.ndarray):
+            setattr_(self, "_axes", np.full(n_systems, self._axes, np.uint8))
+            self._axes.flags.writeable = False
+        return self
+
+    def _counting_as(self, other: Points) -> Points:
+        """The same, of as many systems as others, where these are told how many."""
+        return self._counting(len(other._axes)) if is_a(other._axes, np.ndarray) else self
+
     def _own_arrays(self, with_positions: bool = True) -> None:
         """Copies that do not change."""
+        setattr_(self, "_types", self._kinds)
         for name in ("positions", "_box", "_axes", "radii", "supports", "weights", "batch"):
             array = getattr(self, name)
             if is_a(array, np.ndarray) and (with_positions or name != "positions"):
@@ -397,7 +429,8 @@ class Points:
     @property
     def _scene(self) -> tuple[npt.NDArray[Any], FloatArray | None, int]:
         """Positions, box vectors and bits of those that repeat, of one system."""
-        assert self.batch is None
+        if self.batch is not None:
+            raise ValueError(f"points must be one system, and have a batch of {self.n_systems}")
         return self.positions, self._box, self._axes
 
     @property
@@ -432,19 +465,21 @@ class Points:
     @property
     def _kinds(self) -> Labels | None:
         """The types as numbers from 0 on, and their names in ascending order, if they have some."""
-        if self._types is None and self._elements is not None:
-            numbers, places = np.unique(self._elements, return_inverse=True)
+        if self._elements is not None:
+            elements = as_elements(*self._elements, len(self))
+            numbers, places = np.unique(elements, return_inverse=True)
             symbols = np.array(SYMBOLS)[numbers]
             order = np.argsort(symbols)
             ranks = np.empty(len(order), np.int32)
             ranks[order] = np.arange(len(order))
             named = Labels(ranks[places.reshape(-1)], tuple(symbols[order].tolist()))
             setattr_(self, "_types", named)
+            setattr_(self, "_elements", None)
         return self._types
 
     @property
     def n_systems(self) -> int:
-        """The number of systems: those that have a box, or up to the largest number."""
+        """The number of systems: of a list, of those that have a box, or up to the largest one."""
         if self.batch is None:
             return 1
         own: Any
@@ -455,16 +490,20 @@ class Points:
 
     def __getitem__(self, places: Any) -> Points:
         """Some of the points: a slice, a mask, or numbers of points, with a batch ascending."""
-        if is_a(places, (int, np.integer)):
-            raise TypeError(f"Points[...] takes a slice, a mask or numbers, got {shown(places)}")
+        if not is_a(places, slice):
+            places = as_array(places, "Points[...]", "take a slice, a mask or numbers of points")
+            if places.ndim != 1 or places.dtype.kind not in ("biu" if places.size else "biuf"):
+                raise TypeError(
+                    "Points[...] must take a slice, a mask or numbers of points, got shape "
+                    f"{places.shape} and dtype {places.dtype}"
+                )
+            places = places if places.size else np.empty(0, np.int64)
         chosen = self.positions[places]
-        if chosen.ndim != 2 or chosen.shape[1] != self.positions.shape[1]:
-            raise TypeError("Points[...] takes a slice, a mask or numbers of points")
         fields = {
             name: None if getattr(self, name) is None else getattr(self, name)[places]
             for name in _FIELDS
         }
-        return Points(chosen, box=self._box, periodic=self.periodic, **fields)
+        return Points(chosen, box=self._box, periodic=self.periodic, **fields)._counting_as(self)
 
     def replace(self, **changes: Any) -> Points:
         """Points with something else instead, or with None for nothing.
@@ -487,7 +526,8 @@ class Points:
                 raise TypeError(f"Points have no {name!r}: they have {', '.join(fields)}")
         if "box" in changes:
             fields["periodic"] = None
-        return Points(**{**fields, **changes})
+        changed = Points(**{**fields, **changes})
+        return changed if "batch" in changes else changed._counting_as(self)
 
     def _over(self, positions: npt.NDArray[Any]) -> Points:
         """These points, with the same positions in other memory that does not change."""
@@ -498,12 +538,12 @@ class Points:
         other._own_arrays(with_positions=False)
         return other
 
-    def __reduce__(self) -> tuple[Any, tuple[dict[str, Any]]]:
+    def __reduce__(self) -> tuple[Any, tuple[dict[str, Any], int]]:
         state = {
             "positions": self.positions, "box": self._box, "periodic": self.periodic,
             **{name: getattr(self, name) for name in _FIELDS},
         }  # fmt: skip
-        return _restored, (state,)
+        return _restored, (state, self.n_systems)
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError("Points are immutable: replace() gives others")
@@ -605,8 +645,9 @@ setattr_ = object.__setattr__
 _core.know("Points", Points)
 
 
-def _restored(state: dict[str, Any]) -> Points:
-    return Points(**state)
+def _restored(state: dict[str, Any], n_systems: int) -> Points:
+    points = Points(**state)
+    return points if points.n_systems == n_systems else points._counting(n_systems)
 
 
 def _is_system(value: Any, name: str) -> bool:
@@ -622,13 +663,26 @@ def _is_system(value: Any, name: str) -> bool:
     return type(value) is Points or parts_of(value, name) is not None
 
 
+def _is_pdb(owner: Any, name: str) -> bool:
+    """Whether ASE's Atoms seem to come from a PDB or mmCIF file."""
+    arrays = attribute(owner, "arrays", name)
+    return is_a(arrays, dict) and "residuenames" in arrays
+
+
+def _is_placeholder(parts: Parts, name: str, owner: Any) -> bool:
+    """Whether the box that an object brings is none, as that of a molecule in ASE."""
+    if parts.box is None:
+        return False
+    rows = as_array(vectors_of(parts.box), "box")
+    return rows.dtype.kind in "fiu" and bool(placeholder(rows, _is_pdb(owner, name)))
+
+
 def _twice(what: str, owner: Any) -> str:
     kind = "Points" if type(owner) is Points else f"points of type {kind_of(owner)}"
     return f"{kind} bring their own {what}: leave {what} out, or give arrays"
 
 
 # ---- positions, boxes, periodicity ---------------------------------------------------------
-
 
 @brief
 def as_points(values: Any, name: str = "points", ndim: int = 3) -> npt.NDArray[Any]:
@@ -645,7 +699,7 @@ def as_points(values: Any, name: str = "points", ndim: int = 3) -> npt.NDArray[A
 
     if type(values) not in (np.ndarray, list, tuple):
         try:
-            parts = parts_of(values, name)
+            parts = values if type(values) is Points else parts_of(values, name)
         except Exception as error:
             shorten(error)
             raise
@@ -828,12 +882,11 @@ def flags_of(bits: npt.NDArray[np.uint8], ndim: int) -> npt.NDArray[np.bool_]:
 
 # ---- what is known of each point -----------------------------------------------------------
 
-
 def as_names(array: npt.NDArray[Any]) -> npt.NDArray[np.str_] | None:
     """An array of strings as NumPy's own; None for what holds something else."""
-    if array.dtype.kind == "T" or (
-        array.dtype.kind == "O" and array.size and all(is_a(one, str) for one in array.flat)
-    ):
+    if array.dtype.kind == "T":
+        array = array.astype(object)
+    if array.dtype.kind == "O" and array.size and all(is_a(one, str) for one in array.flat):
         return array.astype(np.str_)
     return array if array.dtype.kind == "U" else None
 
@@ -855,7 +908,7 @@ def _as_labels(values: Any, name: str, n: int, are_types: bool = False) -> Label
         return Labels(numbers.reshape(-1).astype(kind), tuple(every.tolist()))
     if array.dtype.kind not in "iu" and n:
         raise TypeError(f"{name} must hold integers or names, got dtype {array.dtype}")
-    array = array.copy()  # it may change meanwhile
+    array = array.copy() if n else np.empty(0, np.int64)  # it may change meanwhile
     if are_types:
         for k in np.flatnonzero((array < 0) | (array >= 2**31 - 1)):
             raise ValueError(

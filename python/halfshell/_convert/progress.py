@@ -6,14 +6,13 @@ from __future__ import annotations
 import sys
 import time
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import Any
 
 from halfshell._convert.foreign import kind_of
-from halfshell._extras import needs
-
-__all__ = ["ProgressBar", "as_progress"]
+from halfshell._errors import needs
 
 BAR_AFTER = 0.5  # seconds without a bar
 _BETWEEN = 0.1  # seconds from one drawing to the next
@@ -101,3 +100,18 @@ def _on_page(text: str) -> tuple[Callable[[float], None], Callable[[], None]]:
         shown.update(page.HTML(f"{text} {bar} {fraction:.0%}"))
 
     return draw, lambda: shown.update(page.HTML(""))
+
+
+# ---- of the command line ---------------------------------------------------------------------
+
+@contextmanager
+def progress_bar(wanted: bool, text: str) -> Iterator[Callable[[float], None] | None]:
+    """Yield a function to tell the work done, or None where no bar could be shown."""
+    if not (wanted and sys.stderr.isatty() and find_spec("rich")):
+        yield None
+        return
+    bar = ProgressBar(text)
+    try:
+        yield bar
+    finally:
+        bar.close()

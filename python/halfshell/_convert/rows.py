@@ -3,18 +3,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
+from halfshell._convert.arrays import entries_of
+from halfshell._convert.call import Call, part_of
 from halfshell._convert.foreign import is_a
 from halfshell._convert.options import check_letters
 from halfshell._errors import CapacityError
 
 if TYPE_CHECKING:
-    from halfshell._convert.call import Call
     from halfshell._convert.types import Arrays, Reach, Selection, Systems
 
 Array = npt.NDArray[Any]
@@ -23,6 +25,8 @@ Array = npt.NDArray[Any]
 _POINTS_PER_LOOKUP = 32
 
 _NUMBERS_OF_QUERIES = 4  # which field of a selection these are
+
+_POINTS_OF_PART = 4096  # whose pairs are held at a time, where not all are
 
 
 class Rows(NamedTuple):
@@ -36,7 +40,7 @@ class Rows(NamedTuple):
 
 def rows_of(call: Call, quantities: str, index_bytes: int) -> Rows:
     """The rows of `call.indices`, each ascending by (j, S)."""
-    check_letters(quantities)
+    check_letters(quantities, "jdDSk")
     numbers = call.indices
     assert numbers is not None
     letters = quantities if "j" in quantities else "j" + quantities
@@ -46,7 +50,7 @@ def rows_of(call: Call, quantities: str, index_bytes: int) -> Rows:
         numbers = numbers[order]
     offsets, *columns = call.run(
         _core.neighbors, letters, index_bytes, call.array[numbers],
-        pairing_of(call, numbers), call.settings.algorithm, systems_of(call, numbers),
+        pairing_of(call, numbers), call.settings.algorithm, call.shells, systems_of(call, numbers),
     )  # fmt: skip
     j = columns[letters.index("j")]
     row = np.repeat(np.arange(len(numbers)), np.diff(offsets))
@@ -61,24 +65,14 @@ def rows_of(call: Call, quantities: str, index_bytes: int) -> Rows:
     fewer[1:] = np.cumsum(n_own % 2)
     offsets = offsets - fewer
     if order is not None:
-        entries, offsets, numbers = _reordered(entries, offsets, numbers, order)
+        place = np.empty_like(order)
+        place[order] = np.arange(len(order))
+        offsets, chosen = entries_of(offsets, place)
+        entries, numbers = entries[chosen], numbers[place]
     kept = tuple(columns[letters.index(letter)][entries] for letter in quantities)
     for array in (offsets, *kept):
         array.flags.writeable = False
     return Rows(offsets, kept, numbers, entries)
-
-
-def _reordered(
-    entries: Array, offsets: Array, numbers: Array, order: Array
-) -> tuple[Array, Array, Array]:
-    """Rows as they were asked for, of rows that were found in another order."""
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
-    lengths = np.diff(offsets)[place]
-    begins = np.zeros(len(offsets), np.int64)
-    begins[1:] = np.cumsum(lengths)
-    among = np.arange(begins[-1]) - np.repeat(begins[:-1], lengths)
-    return entries[np.repeat(offsets[:-1][place], lengths) + among], begins, numbers[place]
 
 
 def pairing_of(call: Call, numbers: npt.NDArray[np.int64]) -> Any:
@@ -106,41 +100,115 @@ def pairs_of(
     call: Call, quantities: str, sort: bool, index_bytes: int, out: Any
 ) -> Arrays:
     """Pairs with one of `call.indices`, as a half list."""
-    check_letters(quantities)
-    numbers = call.indices
-    assert numbers is not None
-    ascending = np.sort(numbers)
-    for k in np.flatnonzero(ascending[1:] == ascending[:-1]):
-        raise ValueError(f"indices must name each point once, got {ascending[k]} twice")
+    check_letters(quantities, "ijdDSPk")
+    asked = named_once(call)
     if out is not None:  # its types and shapes, before anything is searched for
-        _core.pairs(
-            np.empty((0, call.array.shape[1])), 0.0, None, 0, *call.rest[:4], None, call.threads,
-            quantities, sort, index_bytes, out, None, "auto", None,
+        least = 0.0 if call.shells is None else call.cutoff
+        arguments: Any = (
+            np.empty((0, call.array.shape[1])), least, None, 0, *call.rest[:4], None, call.threads,
+            quantities, sort, index_bytes, out, None, "auto", call.shells,
         )  # fmt: skip
-    letters = "j" + "".join(letter for letter in quantities if letter in "dDS")
-    asked = np.sort(numbers)  # of a batch, systems come one after the other
-    offsets, *columns = call.run(
-        _core.neighbors, letters, index_bytes, call.array[asked], pairing_of(call, asked),
-        call.settings.algorithm, systems_of(call, asked),
-    )  # fmt: skip
-    found = dict(zip(letters, columns, strict=True))
-    row = np.repeat(np.arange(len(asked)), np.diff(offsets))
-    found = _half_list(found, row, asked, len(call.points), sort)
-    if "P" in quantities:
-        found["P"] = np.stack([found["i"], found["j"]], axis=1)
-    arrays = tuple(found[letter] for letter in quantities)
+        _core.pairs(*arguments)
+    arrays = _pairs_of_part(call, asked, slice(None), quantities, sort, index_bytes)
     if out is not None:
         arrays = _filled(arrays, out if is_a(out, tuple) else (out,))
     return arrays[0] if len(arrays) == 1 else arrays
 
 
+def parts_of(call: Call, quantities: str, index_bytes: int) -> Iterator[tuple[Array, ...]]:
+    """The same, not sorted, of some of these points at a time."""
+    check_letters(quantities, "ijdDSPk")
+    asked = named_once(call)
+    told, bar, call.progress, call.bar = call.progress, call.bar, None, None
+    if call.cells is None and call.reach is None and call.points.batch is None:
+        call.cells = call.run(_core.cells_build, 0.0, None)
+    n = max(-(-len(asked) // _POINTS_OF_PART), 1)
+
+    def each() -> Iterator[tuple[Array, ...]]:
+        for k in range(n):
+            some = slice(k * _POINTS_OF_PART, (k + 1) * _POINTS_OF_PART)
+            call.progress = part_of(told, k, n)
+            yield _pairs_of_part(call, asked, some, quantities, False, index_bytes)
+        if bar is not None:
+            bar.close()
+
+    return each()
+
+
+def named_once(call: Call) -> npt.NDArray[np.int64]:
+    """`call.indices`, ascending: of a batch, systems come one after the other."""
+    assert call.indices is not None
+    ascending = np.sort(call.indices)
+    for k in np.flatnonzero(ascending[1:] == ascending[:-1]):
+        raise ValueError(f"indices must name each point once, got {ascending[k]} twice")
+    return ascending
+
+
+def within_and_beyond(
+    call: Call, numbers: npt.NDArray[np.int64]
+) -> list[tuple[Call, npt.NDArray[np.int64], npt.NDArray[np.int64] | None]]:
+    """Calls for pairs of two of these points, and of one as a query with another point; with the
+    numbers of their points and queries. They have no reach."""
+    is_named = np.zeros(len(call.points), bool)
+    is_named[numbers] = True
+    rest = np.flatnonzero(~is_named)
+    place = np.empty(len(call.points), np.int64)
+    place[numbers], place[rest] = np.arange(len(numbers)), np.arange(len(rest))
+    found: list[Any] = []
+    for own, asking in ((numbers, None), (rest, numbers)):
+        one = Call()
+        for name in Call.__slots__:
+            setattr(one, name, getattr(call, name))
+        one.cells = one.indices = None
+        one.points = call.points[own]
+        one.queries = None if asking is None else call.points[asking]
+        if call.selection is not None:
+            fields: list[Any] = list(call.selection)
+            for at in (0, 2):
+                labels = fields[at]
+                if labels is not None:
+                    fields[at] = labels[own]
+                    fields[at + 1] = None if asking is None else labels[asking]
+            if fields[6] is not None:
+                pairs = fields[6]
+                if asking is None:
+                    pairs = pairs[is_named[pairs].all(axis=1)]
+                else:
+                    pairs = np.concatenate([pairs, pairs[:, ::-1]])
+                    pairs = pairs[is_named[pairs[:, 0]] & ~is_named[pairs[:, 1]]]
+                fields[6] = np.ascontiguousarray(place[pairs])
+            one.selection = cast("Selection", tuple(fields))
+        found.append((one, own, asking))
+    return found
+
+
+def _pairs_of_part(
+    call: Call, asked: npt.NDArray[np.int64], some: slice, quantities: str, sort: bool,
+    index_bytes: int,
+) -> tuple[Array, ...]:  # fmt: skip
+    """Pairs that have some of the points asked for, and no pair that another part has."""
+    letters = "j" + "".join(letter for letter in quantities if letter in "dDSk")
+    part = asked[some]
+    offsets, *columns = call.run(
+        _core.neighbors, letters, index_bytes, call.array[part], pairing_of(call, part),
+        call.settings.algorithm, call.shells, systems_of(call, part),
+    )  # fmt: skip
+    found = dict(zip(letters, columns, strict=True))
+    row = np.repeat(np.arange(len(part)), np.diff(offsets))
+    found = _half_list(found, row, part, asked, len(call.points), sort)
+    if "P" in quantities:
+        found["P"] = np.stack([found["i"], found["j"]], axis=1)
+    return tuple(found[letter] for letter in quantities)
+
+
 def _half_list(
-    columns: dict[str, Array], row: Array, numbers: npt.NDArray[np.int64], n_points: int, sort: bool
-) -> dict[str, Array]:
-    """Rows of these points, ascending by (j, S), as pairs that are there once."""
+    columns: dict[str, Array], row: Array, numbers: npt.NDArray[np.int64],
+    every: npt.NDArray[np.int64], n_points: int, sort: bool,
+) -> dict[str, Array]:  # fmt: skip
+    """Rows of these points, ascending by (j, S), as pairs that are there once in rows of every."""
     j = columns["j"]
     i = numbers.astype(j.dtype)[row]
-    keep = ~_are_among(j, numbers, n_points) | (i < j)
+    keep = ~_are_among(j, every, n_points) | (i < j)
     # A point meets its images in the order of S: the middle one is itself, at S = 0, and those
     # behind it have a positive first component.
     own = np.flatnonzero(i == j)
@@ -148,14 +216,15 @@ def _half_list(
     rank = np.arange(len(own)) - np.repeat(np.cumsum(n_own) - n_own, n_own)
     keep[own] = rank > np.repeat(n_own // 2, n_own)
     entries = np.flatnonzero(keep)
-    kept = {letter: array[entries] for letter, array in columns.items() if letter in "dDS"}
+    kept = {letter: array[entries] for letter, array in columns.items() if letter in "dDSk"}
     i, j = i[entries], j[entries]
     back = np.flatnonzero(j < i)  # these come from their second point
     i[back], j[back] = j[back], i[back]
     if "D" in kept:
         kept["D"][back] = 0.0 - kept["D"][back]  # a zero has no sign
     if "S" in kept:
-        _check_opposites(kept["S"][back])
+        if kept["S"][back].min(initial=0) == np.iinfo(kept["S"].dtype).min:
+            raise OverflowError("a shift does not fit int32: -2**31 has no opposite there")
         kept["S"][back] *= -1
     kept.update(i=i, j=j)
     if sort:
@@ -175,11 +244,6 @@ def _are_among(j: Array, numbers: npt.NDArray[np.int64], n_points: int) -> npt.N
     ascending = np.append(numbers, -1)  # behind the last one
     found: npt.NDArray[np.bool_] = ascending[np.searchsorted(numbers, j)] == j
     return found
-
-
-def _check_opposites(shifts: Array) -> None:
-    if shifts.min(initial=0) == np.iinfo(shifts.dtype).min:
-        raise OverflowError("a shift does not fit int32: -2**31 has no opposite there")
 
 
 def _filled(arrays: tuple[Array, ...], out: tuple[Any, ...]) -> tuple[Array, ...]:

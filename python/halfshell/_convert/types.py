@@ -41,7 +41,6 @@ Reach = tuple[
 _Labels = npt.NDArray[np.int64] | None
 Selection = tuple[_Labels, _Labels, _Labels, _Labels, _Labels, int, _Labels, float]
 
-# What the core takes from `inclusive` to `threads`.
 # What each system of a batch has of its own: numbers, one a point; cutoffs and boxes, one a
 # system; numbers of the queries, where there are any; bits of the axes that repeat, one a system.
 Systems = tuple[
@@ -49,14 +48,8 @@ Systems = tuple[
     npt.NDArray[np.uint8] | None,
 ]  # fmt: skip
 
+# What the core takes from `inclusive` to `threads`.
 Rest = tuple[bool, Precision, str | None, float | None, Progress, int | None]
-
-# The first arguments of all its searches: points, cutoff, box and periodic before these, or cells
-# in place of points and box.
-Search = tuple[
-    Any, float, FloatArray | None, int,
-    bool, Precision, str | None, float | None, Progress, int | None,
-]  # fmt: skip
 
 
 class _HandsOver(Protocol):
@@ -142,17 +135,22 @@ ProgressLike = Callable[[float], object] | bool | None
 Out = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
 
 
-class Options(TypedDict, total=False):
-    """For overloads: the keywords that all searches share."""
+class OptionsOfCells(TypedDict, total=False):
+    """For overloads and methods of a `CellList`: the keywords that all searches share."""
 
-    box: BoxLike | None
-    periodic: PeriodicLike | None
     rule: Rule | None
     exclude: ArrayLike | int | None
     min_distance: float | None
     inclusive: bool
     threads: int | None
     progress: ProgressLike
+
+
+class Options(OptionsOfCells, total=False):
+    """The same, with the box that cells have."""
+
+    box: BoxLike | None
+    periodic: PeriodicLike | None
 
 
 class OptionsOfPoints(Options, total=False):
@@ -167,6 +165,30 @@ class CountOptions(OptionsOfPoints, total=False):
     queries: PointsLike | None
 
 
+class QueryOptions(OptionsOfCells, total=False):
+    """Of methods of a `CellList`, with what only some of them take, and refuse otherwise."""
+
+    indices: npt.ArrayLike | None
+    quantities: str
+    index_dtype: npt.DTypeLike
+    sort: bool
+    out: Out | None
+    max_pairs: int
+    user_data: Any
+    thread_safe: bool
+    max_distance: ArrayLike
+    min_points: int
+    by_type: bool
+    density: float | None
+    finite_size: bool
+
+
+class MethodOptions(QueryOptions, total=False):
+    """The same, of methods that queries are a keyword of."""
+
+    queries: PointsLike | None
+
+
 class NearestOptions(TypedDict, total=False):
     """Of `nearest`, without `quantities`."""
 
@@ -174,7 +196,10 @@ class NearestOptions(TypedDict, total=False):
     queries: PointsLike | None
     box: BoxLike | None
     periodic: PeriodicLike | None
+    exclude: ArrayLike | int | None
+    min_distance: float | None
     indices: npt.ArrayLike | None
+    inclusive: bool
     index_dtype: npt.DTypeLike
     threads: int | None
     progress: ProgressLike

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert.arrays import as_array
-from halfshell._convert.listed import as_point_numbers
+from halfshell._convert.arrays import as_array, as_point_numbers
 from halfshell._convert.options import as_count, as_whole
 
 

@@ -11,7 +11,7 @@ import math
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, NamedTuple, Never, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -23,8 +23,7 @@ from halfshell._convert.options import as_brick_count
 from halfshell._convert.points import Points
 from halfshell._convert.types import BoxLike, CutoffLike, FloatArray, PeriodicLike, PointsLike, Rule
 from halfshell._objects.brick import Brick, Bricks, Columns, Numbers, Scope, aligned, labels_of
-from halfshell._search import document
-from halfshell._unknown import refuse_unknown
+from halfshell._search import search
 
 #: What may be known of each point that bricks go by.
 FIELDS = ("radii", "types", "supports", "groups", "labels")
@@ -40,6 +39,7 @@ _TILE = 1 << 16
 _UNSURE = 256.0 * np.finfo(np.float64).eps
 
 
+@search()
 def bricks(
     points: PointsLike,
     cutoff: CutoffLike,
@@ -48,7 +48,6 @@ def bricks(
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     rule: Rule | None = None,
-    **unknown: Never,
 ) -> Bricks:
     """Divide points into bricks for other threads or machines; their pairs are always exact.
 
@@ -105,8 +104,7 @@ def bricks(
     >>> hs.count_pairs(points, 0.1, box=[1.0, 1.0, 1.0])
     2099
     """
-    if unknown:
-        refuse_unknown(bricks, unknown)
+    _refuse_endless(cutoff)
     call = take(points, cutoff, None, box, periodic, rule, directed=True)
     call.refuse("bricks", batch="its systems are apart already")
     n_bricks, array = as_brick_count(n), call.array
@@ -129,9 +127,6 @@ def bricks(
         made.append(Brick(members, is_owned[members], scope))
         is_owned[owned] = False
     return Bricks(made, len(array))
-
-
-document(bricks)
 
 
 def _halved(
@@ -165,6 +160,12 @@ def _near(
 
 
 # ---- how far pairs reach, and where points are ---------------------------------------------
+
+def _refuse_endless(cutoff: Any) -> None:
+    """Bricks reach beyond themselves by the cutoff, whatever points come later."""
+    is_number = is_a(cutoff, (float, np.floating, np.ndarray)) and np.ndim(cutoff) == 0
+    if is_number and cutoff == np.inf:
+        raise ValueError("cutoff must be finite for bricks, got inf")
 
 
 def _scope(
@@ -248,7 +249,6 @@ def _within(places: FloatArray, low: float, high: float, repeats: bool) -> Bits:
 
 # ---- where to cut points that are in pieces ------------------------------------------------
 
-
 class Summary(NamedTuple):
     """What a division must know of a piece."""
 
@@ -304,6 +304,7 @@ class Terms(NamedTuple):
 
     def call(self, directed: bool = True) -> Call:
         """A search of no points; raises what is wrong with it."""
+        _refuse_endless(self.cutoff)
         call = take(self.of_none(), self.cutoff, rule=self.rule, directed=directed)
         call.run(_core.coordination, None, call.pairing, "auto", None)
         return call
@@ -402,7 +403,6 @@ def renumbered(error: Exception, points: Any, queries: Any = None) -> Exception:
 
 
 # ---- what each piece gives to every brick --------------------------------------------------
-
 
 class Piece:
     """What one piece of the points gives to one brick.

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 @search()
 def clusters(
     points: PointsLike,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     min_points: int = 1,
     box: BoxLike | None = None,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast, overload
 import numpy as np
 
 from halfshell import _core
-from halfshell._convert.call import Call, _together, take
+from halfshell._convert.call import Call, _together, each_cutoff, part_of, take
 from halfshell._convert.foreign import of_argument
 from halfshell._convert.lengths import as_edges
 from halfshell._convert.memory import refuse_unavailable
@@ -43,7 +43,7 @@ _MANY_SYSTEMS = 1 << 20  # counts of fewer always fit
 @overload
 def count_pairs(
     points: PointsLike,
-    cutoff: Number | Mapping[Any, float] | None,
+    cutoff: Number | Mapping[Any, float] | None = None,
     **options: Unpack[CountOptions],
 ) -> int: ...
 @overload
@@ -54,12 +54,12 @@ def count_pairs(
 ) -> npt.NDArray[np.int64]: ...
 @overload
 def count_pairs(
-    points: PointsLike, cutoff: CutoffLike, **options: Unpack[CountOptions]
+    points: PointsLike, cutoff: CutoffLike = None, **options: Unpack[CountOptions]
 ) -> int | npt.NDArray[np.int64]: ...
 @search("count_pairs")
 def count_pairs(
     points: PointsLike,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     queries: PointsLike | None = None,
     box: BoxLike | None = None,
@@ -136,12 +136,10 @@ def counted(call: Call) -> int | npt.NDArray[np.int64]:
         edges = np.ascontiguousarray(cutoffs)
         between = binned(call, edges, _NO_MARKS, last=call.inclusive, name="cutoff")
         return np.cumsum(between[0, 0])
-    # Without any, all else is checked as ever.
-    counts = []
-    for cutoff in cutoffs.tolist() or [0.0]:
-        call.cutoff = cutoff
-        counts.append(_count(call))
-    return np.array(counts[: len(cutoffs)], dtype=np.int64)
+    counts = [_count(one) for one in each_cutoff(call)]
+    if not counts:
+        _count(call)  # all else is checked as ever
+    return np.array(counts, dtype=np.int64)
 
 
 def _count(call: Call) -> int:
@@ -186,7 +184,6 @@ def _count_systems(call: Call) -> npt.NDArray[np.int64]:
 
 # ---- by distance ---------------------------------------------------------------------------
 
-
 @search()
 def pair_histogram(
     points: PointsLike,
@@ -197,6 +194,7 @@ def pair_histogram(
     periodic: PeriodicLike | None = None,
     exclude: ArrayLike | int | None = None,
     min_distance: float | None = None,
+    indices: npt.ArrayLike | None = None,
     by_type: bool = False,
     threads: int | None = None,
     progress: ProgressLike = None,
@@ -213,6 +211,9 @@ def pair_histogram(
     queries : array_like of float, shape (q, d), or Points, optional
         Count pairs of a query and a point instead, as `pairs_between` finds them.
     {box, periodic, exclude, min_distance}
+    indices : array_like of int, shape (r,), optional
+        Count only pairs that have at least one of these points, each named once. Not with weights,
+        whose sums are rounded once.
     by_type : bool, default False
         One histogram for each pair of `types` of the points.
     {threads, progress}
@@ -266,7 +267,7 @@ def pair_histogram(
     [-1.0, 0.0]
     """
     call = take(
-        points, 0.0, queries, box, periodic, None, exclude, min_distance, None, False, threads,
+        points, 0.0, queries, box, periodic, None, exclude, min_distance, indices, False, threads,
         progress, by_reach=False,
     )  # fmt: skip
     return histogram_of(call, as_edges(edges), as_flag(by_type, "by_type"))
@@ -277,9 +278,40 @@ def histogram_of(
 ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
     """The histogram of a call."""
     marks = marks_of(call, by_type)
-    found = binned(call, edges, marks)
+    found = binned(call, edges, marks) if call.indices is None else _of_some(call, edges, marks)
     # What the core counts first are the pairs closer than the first edge.
     return np.ascontiguousarray(found[..., 1:] if by_type else found[..., 0, 0, 1:])
+
+
+def _of_some(call: Call, edges: FloatArray, marks: Marks) -> npt.NDArray[Any]:
+    """Counts of the pairs that have one of some points: those of two, and those with another."""
+    from halfshell._convert.rows import named_once, within_and_beyond  # few calls need them
+
+    if marks.weights is not None:
+        raise ValueError(
+            "indices cannot be combined with weights: their sums are rounded once, and these are "
+            "sums of two parts"
+        )
+    numbers = named_once(call)
+    parts = within_and_beyond(call, numbers)
+    types, n_systems = marks.types, call.points.n_systems
+    sums = np.zeros((n_systems, marks.n_types, marks.n_types, len(edges)), np.int64)
+    for k, (one, own, asking) in enumerate(parts):
+        one.progress, one.bar = part_of(call.progress, k, len(parts)), None
+        of_part = marks._replace(
+            types=None if types is None else types[own],
+            query_types=None if types is None or asking is None else types[asking],
+        )
+        found = binned(one, edges, of_part)
+        found = found.reshape(-1, *sums.shape[1:])
+        if asking is not None:  # either may come first
+            found = found + found.swapaxes(1, 2)
+            same = np.arange(marks.n_types)
+            found[:, same, same] //= 2
+        sums[: len(found)] += found
+    if call.bar is not None:
+        call.bar.close()
+    return sums if call.points.batch is not None else sums[0]
 
 
 class Marks(NamedTuple):

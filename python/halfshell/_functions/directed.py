@@ -14,8 +14,6 @@ from halfshell._errors import CapacityError
 from halfshell._functions.neighbors import neighbors
 from halfshell._functions.pairs import pairs, pairs_between
 
-__all__ = ["Entries", "check_rows", "entries_between", "entries_of"]
-
 #: i, j: int64 (m,); S: int32 (m, d).
 Entries = tuple[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from halfshell import _core, _show
-from halfshell._convert.call import take
+from halfshell._convert.call import check_shells, shells_of, take
 from halfshell._convert.options import as_flag, as_index_bytes
 from halfshell._search import search
 
@@ -102,12 +102,14 @@ class Explanation:
         if self.algorithm == "hash":
             cells = f"{self.n_cells} that hold points"
         sizes = " x ".join(f"{k:.4g}" for k in self.cell_sizes)
+        away = f"up to {self.images} periods away"
         lines = [
-            f"{self.n} points in {self.ndim} dimension{'s' if self.ndim > 1 else ''}",
+            f"{self.n:,} points in {self.ndim} dimension{'s' if self.ndim > 1 else ''}",
             f"algorithm       {self.algorithm}: {self.reason}",
             f"cells           {cells}, each {sizes}",
-            f"images          {self.images}",
-            f"expected        {self.expected_pairs:.4g} pairs, {self.expected_bytes:.4g} bytes",
+            f"images          {away if any(self.images) else 'none'}",
+            f"expected        about {self.expected_pairs:,.0f} pairs, "
+            f"{self.expected_bytes / 1e6:,.3g} MB",
             f"kernel          {self.kernel}",
             f"threads         {self.threads}",
             *(f"leaves out      {what}" for what in self.leaves_out),
@@ -123,7 +125,7 @@ class Explanation:
 @search()
 def explain(
     points: PointsLike,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
@@ -142,7 +144,7 @@ def explain(
 
     Parameters
     ----------
-    {points, cutoff, box, periodic, rule, exclude, min_distance, inclusive}
+    {points, shells, box, periodic, rule, exclude, min_distance, inclusive}
     quantities, sort
         As in `pairs`.
     {index_dtype}
@@ -169,14 +171,15 @@ def explain(
     """
     call = take(
         points, cutoff, None, box, periodic, rule, exclude, min_distance, None, inclusive, threads,
-        progress,
+        progress, several=shells_of(quantities),
     )  # fmt: skip
+    check_shells(call, quantities)
     call.refuse("explain", batch="each system has a plan of its own")
     sort, index_bytes = as_flag(sort, "sort"), as_index_bytes(index_dtype)
     algorithm, reach = call.settings.algorithm, call.reach
     plan = call.run(
         _core.explain, quantities, sort, index_bytes, as_flag(measure, "measure"), call.pairing,
-        algorithm,
+        algorithm, call.shells,
     )  # fmt: skip
     ndim = plan["ndim"]
     reason = _reason(plan, algorithm == "auto")
@@ -248,6 +251,7 @@ def _bytes_per_pair(quantities: str, ndim: int, index_bytes: int) -> int:
         "d": 8,
         "D": 8 * ndim,
         "S": 4 * ndim,
+        "k": 4,
     }
     return sum(sizes[letter] for letter in quantities)
 
@@ -255,7 +259,7 @@ def _bytes_per_pair(quantities: str, ndim: int, index_bytes: int) -> int:
 def _left_out(plan: dict[str, Any], quantities: str, sort: bool) -> tuple[str, ...]:
     names = {"d": "distances", "D": "vectors", "S": "shifts"}
     missing = [name for letter, name in names.items() if letter not in quantities]
-    left = [f"{name}: not in quantities" for name in missing]
+    left = [f"{', '.join(missing)}: not in quantities"] if missing else []
     if plan["ndim"] < 3:
         axes = "y and z" if plan["ndim"] == 1 else "z"
         left.append(f"coordinates {axes}: the scene has {plan['ndim']} dimension(s)")
@@ -264,22 +268,21 @@ def _left_out(plan: dict[str, Any], quantities: str, sort: bool) -> tuple[str, .
     elif not any(plan["images"]):
         left.append("images: no neighbour is across a face")
     if plan["n_periodic"] and plan["aligned"]:
-        left.append("box algebra: every periodic vector lies along a coordinate axis")
-    if not plan["keeps_originals"]:
-        left.append("a second copy of the points: the wrapped ones hold every digit")
+        left.append("arithmetic of tilted boxes: this one lies along the axes")
+    if plan["n_periodic"] and not plan["keeps_originals"]:
+        left.append("memory for points as given: moved into the box, they lose no digit")
     if plan["threads"] == 1:
-        left.append("further threads: the scene is small, or threads=1")
+        left.append("more threads: they would not pay, or threads=1")
     if plan["all_pairs"]:
         left.append("cells and sorting into them")
     elif plan["sparse"]:
         left.append("empty cells: only occupied ones are stored")
     if not sort:
-        left.append("sorting of pairs")
+        left.append("sorting of pairs: sort=True does it")
     return tuple(left)
 
 
 # ---- a hierarchy -----------------------------------------------------------------------
-
 
 def _parts_of(reach: Reach) -> str:
     """Those of one set of points."""

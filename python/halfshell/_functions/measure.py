@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+import re
+from contextlib import closing, nullcontext
 from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
 import numpy as np
 
 from halfshell import _core
-from halfshell._convert.call import take
-from halfshell._convert.listed import as_listed
+from halfshell._convert.arrays import as_listed
+from halfshell._convert.call import Call, part_of, take
 from halfshell._convert.options import check_letters
 from halfshell._convert.points import refuse_infinite
 from halfshell._search import search
@@ -91,7 +93,8 @@ def measure(
     ----------
     {points}
     i, j : array_like of int, shape (m,)
-        Point numbers of each pair, in any order; pairs may repeat, and i may equal j.
+        Point numbers of each pair, in any order; pairs may repeat, and i may equal j. Of a batch
+        both are points of one system.
     S : array_like of int, shape (m, d), optional
         The image of j, 0 along axes that are not periodic. Default: the image nearest to
         i; of several equally near, the one with the lexicographically least S. This is decided
@@ -156,18 +159,69 @@ def measure(
     call = take(
         points, 0.0, queries, box, periodic, threads=threads, progress=progress, by_reach=False
     )
-    call.refuse("measure", batch="give the points of one system, or those of one box as arrays")
     call.settings, call.cells = call.settings._replace(precision="exact"), None
-    array, n = call.array, len(call.array)
-    if call.asking is None:
-        first, second, shifts = as_listed(i, j, S, array.shape[1], n)
-    else:  # one set, the queries behind the points
-        first, second, shifts = as_listed(i, j, S, array.shape[1], n, len(call.asking))
-        refuse_infinite(array, "points")
+    n, ndim = call.array.shape
+    n_queries = None if call.queries is None else len(call.queries)
+    pairs = as_listed(i, j, S, ndim, n, n_queries)
+    if call.points.batch is None:
+        return _measured(call, quantities, *pairs)
+    return _measured_in_systems(call, quantities, *pairs)
+
+
+def _measured(call: Call, quantities: str, first: Any, second: Any, shifts: Any) -> Arrays:
+    if call.asking is not None:  # one set, the queries behind the points
+        refuse_infinite(call.array, "points")
         refuse_infinite(call.asking, "queries")
+        first = first + len(call.points)
         call.points = call.points.replace(
             **dict.fromkeys(("radii", "types", "supports", "groups", "labels", "weights")),
-            positions=np.concatenate([array, call.asking]),
+            positions=np.concatenate([call.array, call.asking]),
         )
-        first = first + n
     return cast("Arrays", call.run(_core.measure, quantities, first, second, shifts))
+
+
+def _measured_in_systems(
+    call: Call, quantities: str, first: Any, second: Any, shifts: Any
+) -> Arrays:
+    """Each pair in the box of the one system that it is of."""
+    from halfshell._convert.systems import each_system  # few calls need it
+
+    own = call.points.batch
+    asking = own if call.queries is None else call.queries.batch
+    assert own is not None and asking is not None
+    if not len(call.points):
+        call.points = call.points.replace(box=None, batch=None)
+        return _measured(call, quantities, first, second, shifts)
+    for n in np.flatnonzero(asking[first] != own[second]):
+        raise ValueError(
+            f"pair {n} is of two systems: i[{n}] of system {asking[first[n]]}, j[{n}] of system "
+            f"{own[second[n]]}"
+        )
+    bar, told, call.bar = call.bar, call.progress, None
+    order = np.argsort(own[second], kind="stable")
+    sorted_systems = own[second][order]
+    n_systems = 1 + int(np.count_nonzero(np.diff(own)))  # that have points
+    columns: list[list[Any]] = [[] for _ in quantities]
+    with nullcontext() if bar is None else closing(bar):
+        for k, (one, begin) in enumerate(each_system(call)):
+            s = own[begin]
+            some = order[slice(*np.searchsorted(sorted_systems, [s, s + 1]))]
+            if not len(some) and k:  # but the first, for the shapes
+                continue
+            one.progress = told and part_of(told, k, n_systems)
+            try:
+                found = _measured(
+                    one, quantities, first[some] - np.searchsorted(asking, s), second[some] - begin,
+                    None if shifts is None else shifts[some],
+                )  # fmt: skip
+            except (OverflowError, ValueError) as error:
+                if named := re.match(r"pair (\d+)", str(error)):  # of those of this system
+                    rest = str(error)[named.end() :]
+                    raise type(error)(f"pair {some[int(named[1])]}{rest}") from None
+                raise
+            parts = found if len(quantities) > 1 else [found]
+            for column, part in zip(columns, parts, strict=True):
+                column.append(part)
+    back = np.argsort(order)
+    arrays = tuple(np.concatenate(column)[back] for column in columns)
+    return arrays if len(arrays) > 1 else arrays[0]

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal, cast, overload
 import numpy as np
 
 from halfshell import _core
-from halfshell._convert.call import DIRECTED, Call, take
+from halfshell._convert.call import DIRECTED, Call, check_shells, each_cutoff, shells_of, take
+from halfshell._convert.lengths import as_k, check_max_distances, in_rows
 from halfshell._convert.memory import refuse_unavailable
-from halfshell._convert.nearest import as_k, check_max_distances, in_rows
 from halfshell._convert.options import AUTO, as_flag, as_index_bytes, check_letters
-from halfshell._objects.exact_order import Origin, copied
+from halfshell._objects.exact import Origin, copied
 from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._search import search
 
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
 # ---- a table -------------------------------------------------------------------------------
 
-
 def _as_table(arrays: Any, points: Any, cutoff: Any, **options: Any) -> NeighborTable:
     """The table of a call with plain arguments, which C has answered."""
     quantities = options.get("quantities", "j")
@@ -54,7 +53,7 @@ def _as_table(arrays: Any, points: Any, cutoff: Any, **options: Any) -> Neighbor
 @search("neighbors", finish=_as_table)
 def neighbors(
     points: PointsLike,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     queries: PointsLike | None = None,
     box: BoxLike | None = None,
@@ -73,10 +72,11 @@ def neighbors(
 
     Parameters
     ----------
-    {points, cutoff, queries, box, periodic, rule, exclude, min_distance, indices, inclusive}
+    {points, shells, queries, box, periodic, rule, exclude, min_distance, indices, inclusive}
     quantities : str, default "j"
         Any of the letters ``j d D S``, each at most once: numbers of the neighbours, distances,
-        vectors, shifts. Only these are computed, and the table has no others.
+        vectors, shifts. Only these are computed, and the table has no others. With several cutoffs
+        also ``k``, as in `pairs`: the `shells` of the table.
     {index_dtype, threads, progress}
 
     Returns
@@ -132,11 +132,18 @@ def neighbors(
     >>> balls = hs.Points(points, radii=[0.5, 1.5, 3.0])
     >>> [row.tolist() for row in hs.neighbors(balls, None, rule="gather")]
     [[], [0], [0, 1]]
+
+    The first and the second shell:
+
+    >>> table = hs.neighbors(points, [1.0, 3.0], quantities="jk")
+    >>> [list(zip(j.tolist(), k.tolist())) for j, k in table]
+    [[(1, 0), (2, 1)], [(0, 0), (2, 1)], [(0, 1), (1, 1)]]
     """
     call = take(
         points, cutoff, queries, box, periodic, rule, exclude, min_distance, indices, inclusive,
-        threads, progress, directed=True,
+        threads, progress, directed=True, several=shells_of(quantities),
     )  # fmt: skip
+    check_shells(call, quantities)
     index_bytes = as_index_bytes(index_dtype)
     if call.indices is not None:
         return _table_of_some(call, quantities, index_bytes)
@@ -147,7 +154,7 @@ def listed(call: Call, quantities: str, index_bytes: int) -> Any:
     """Offsets and columns of the rows of a call."""
     return call.run(
         _core.neighbors, quantities, index_bytes, call.asking, call.pairing,
-        call.settings.algorithm, call.systems,
+        call.settings.algorithm, call.shells, call.systems,
     )  # fmt: skip
 
 
@@ -162,9 +169,13 @@ def _table_of_some(call: Call, quantities: str, index_bytes: int) -> NeighborTab
     from halfshell._convert.rows import pairing_of, rows_of, systems_of  # few calls need them
 
     rows = rows_of(call, quantities, index_bytes)
+    numbers, order = rows.numbers, None
+    if call.points.batch is not None:  # a search has systems one after the other
+        order = np.argsort(call.points.batch[numbers], kind="stable")
+        numbers = numbers[order]
     origin = _origin_of(
-        call, call.array[rows.numbers], pairing_of(call, rows.numbers),
-        systems_of(call, rows.numbers), quantities,
+        call, call.array[rows.numbers], pairing_of(call, numbers), systems_of(call, numbers),
+        quantities, order,
     )  # fmt: skip
     return NeighborTable(
         (rows.offsets, *rows.columns), quantities, len(call.points), False, origin=origin,
@@ -173,9 +184,12 @@ def _table_of_some(call: Call, quantities: str, index_bytes: int) -> NeighborTab
 
 
 def _origin_of(
-    call: Call, asking: Any, pairing: Any, systems: Any, quantities: str
+    call: Call, asking: Any, pairing: Any, systems: Any, quantities: str, order: Any = None
 ) -> Origin | None:
-    """What sorting a table by exact distance needs, where it can be sorted."""
+    """What sorting a table by exact distance needs, where it can be sorted.
+
+    order: of queries, as pairing and systems have them.
+    """
     if "d" not in quantities or "j" not in quantities:
         return None
     kept = copied((pairing, systems, call.vectors))  # the caller's arrays may change
@@ -185,7 +199,9 @@ def _origin_of(
 
     def find_shifts(origin: Origin) -> npt.NDArray[Any]:
         search: Any = (origin.points, cutoff, kept[2], bits, *rest)
-        arguments: Any = (*search, "S", 8, origin.queries, kept[0], AUTO, kept[1])
+        queries: Any = origin.queries
+        queries = queries if order is None else queries[order]
+        arguments: Any = (*search, "S", 8, queries, kept[0], AUTO, None, kept[1])
         return _core.neighbors(*arguments)[1]
 
     points, is_own = call.points, call.cells is not None  # cells own their points
@@ -197,16 +213,17 @@ def _origin_of(
     boxes = np.broadcast_to(points.box, (points.n_systems, *points.box.shape[-2:]))
     boxes = boxes * np.broadcast_to(flags, boxes.shape[:2])[:, :, None]
     asked_in = kept[1][0] if kept[1][3] is None else kept[1][3]
+    if order is not None:
+        asked_in = asked_in[np.argsort(order)]
     return Origin(points.positions, asking, boxes, bits, find_shifts, asked_in)
 
 
 # ---- the lengths of its rows ---------------------------------------------------------------
 
-
 @search("coordination")
 def coordination(
     points: PointsLike,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     queries: PointsLike | None = None,
     box: BoxLike | None = None,
@@ -224,7 +241,10 @@ def coordination(
 
     Parameters
     ----------
-    {points, cutoff, queries, box, periodic, rule, exclude, min_distance, indices, inclusive}
+    {points}
+    cutoff : float, array_like of float, shape (k,), (s,) or (t, t), dict or None
+        As in `pairs`; with several, ascending, there are counts for each.
+    {queries, box, periodic, rule, exclude, min_distance, indices, inclusive}
     by_type : bool, default False
         Count the neighbours of each type separately, by the `types` of the points. They are listed
         for this, and so they are for `indices`.
@@ -238,6 +258,9 @@ def coordination(
 
         By type the shape is (n, t), (q, t) or (r, t): column k counts the neighbours of type k, or
         those with name k of ``np.unique(types)``. The sum of a row is the count without types.
+
+        With several cutoffs, ascending, each has such an array: they come first, as one more axis.
+        Each of them is searched for.
 
     Raises
     ------
@@ -256,6 +279,8 @@ def coordination(
     >>> balls = hs.Points([[0.0], [1.0], [3.0]], radii=[1.0, 0.5, 1.0])
     >>> hs.coordination(balls, None, rule="max").tolist()
     [1, 1, 0]
+    >>> hs.coordination([[0.0], [1.0], [3.0]], [1.0, 2.0, 3.0]).tolist()
+    [[1, 1, 0], [1, 2, 1], [2, 2, 2]]
 
     The number of neighbours of each element:
 
@@ -265,9 +290,18 @@ def coordination(
     """
     call = take(
         points, cutoff, queries, box, periodic, rule, exclude, min_distance, indices, inclusive,
-        threads, progress, directed=True,
+        threads, progress, directed=True, several="counts",
     )  # fmt: skip
-    if as_flag(by_type, "by_type"):
+    is_by_type = as_flag(by_type, "by_type")
+    if call.shells is None:
+        return _lengths(call, is_by_type)
+    counts = [_lengths(one, is_by_type) for one in each_cutoff(call)]
+    return np.stack(counts) if counts else _lengths(call, is_by_type)[None][:0]
+
+
+def _lengths(call: Call, by_type: bool) -> npt.NDArray[np.int64]:
+    """How many neighbours each row has, or how many of each type."""
+    if by_type:
         return _count_by_type(call)
     if call.indices is not None:
         from halfshell._convert.rows import rows_of  # few calls need it
@@ -299,7 +333,6 @@ def _count_by_type(call: Call) -> npt.NDArray[np.int64]:
 
 
 # ---- k of them -----------------------------------------------------------------------------
-
 
 def _as_ranks(arrays: Any, points: Any, k: Any, **options: Any) -> Arrays:
     """The rows of a call that C has answered."""
@@ -335,7 +368,10 @@ def nearest(
     queries: PointsLike | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
+    exclude: ArrayLike | int | None = None,
+    min_distance: float | None = None,
     indices: npt.ArrayLike | None = None,
+    inclusive: bool = True,
     quantities: str = "jd",
     index_dtype: npt.DTypeLike = np.int64,
     threads: int | None = None,
@@ -350,10 +386,12 @@ def nearest(
         Number of neighbours, 1 or more. In a periodic box each image of a point counts separately,
         so k may be larger than n.
     max_distance : float or array_like of float, shape (s,), default infinity
-        Largest distance of a neighbour, inclusive; not negative. One for each system of a batch.
-    {queries, box, periodic}
+        Largest distance of a neighbour; not negative. One for each system of a batch.
+    {queries, box, periodic, exclude, min_distance}
     indices : array_like of int, shape (r,), optional
         Only the rows of these points, in this order.
+    inclusive : bool, default True
+        Whether a point at exactly `max_distance` counts.
     quantities : str, default "jd"
         Any of the letters ``j d D S``, each at most once: number of the point, distance, vector,
         shift. Only these are computed.
@@ -368,10 +406,11 @@ def nearest(
         ``D = points[j] - queries[i] + S @ box``.
 
         Rows ascend by exact distance, and at equal distances by (j, S). Without queries a point is
-        left out of its own row, but its images are not. If there are fewer than k points, or fewer
-        within `max_distance`, the rest of the row is j = -1, d = infinity, D = NaN and S = 0. d is
-        within 1 ulp, ascends along the row and is never above `max_distance`; each component of D
-        is within 1 ulp of d.
+        left out of its own row, but its images are not. Those that count are of the same group, if
+        points have groups, not excluded, and not nearer than `min_distance`. If they are fewer
+        than k, or fewer within `max_distance`, the rest of the row is j = -1, d = infinity, D = NaN
+        and S = 0. d is within 1 ulp, ascends along the row and is never above `max_distance`; each
+        component of D is within 1 ulp of d.
 
     Raises
     ------
@@ -380,7 +419,6 @@ def nearest(
     ValueError
         If `k` is less than 1, `max_distance` is negative or NaN, `queries` do not have the
         dimension of the points, or a letter is not one of ``j d D S``; otherwise as for `pairs`.
-        Also for points with groups: the nearest are found by distance alone.
     OverflowError
         As for `pairs`.
     MemoryError
@@ -398,8 +436,8 @@ def nearest(
     float32 with a proven error bound discards distant points, float64 sorts the rest, and
     distances too close to tell apart are compared in double-word arithmetic, then in integers. A
     query that found too few is searched again with a radius that surely suffices. So the time
-    depends on n and k, even for strongly clustered points. Radii, types and supports of points
-    do not matter.
+    depends on n and k, even for strongly clustered points. With points that do not count it also
+    depends on how many of these are nearer. Radii, types and supports of points do not matter.
 
     If you come from SciPy: missing neighbours have j = -1 here, not n, and the row of a point
     does not begin with the point itself.
@@ -419,6 +457,12 @@ def nearest(
     >>> np.ma.masked_equal(j, -1).tolist(), d[j >= 0].tolist()
     ([[1, None], [0, None], [None, None]], [1.0, 1.0])
 
+    The nearest atom of another molecule:
+
+    >>> atoms = hs.Points([[0.0], [1.0], [1.5], [4.0]], labels=["a", "a", "a", "b"])
+    >>> hs.nearest(atoms, 1, exclude=0, quantities="j").ravel().tolist()
+    [3, 3, 3, 2]
+
     In a periodic box, and for queries:
 
     >>> j, d, S = hs.nearest(points, 2, queries=[[3.5, 0.0]], box=4.0, quantities="jdS")
@@ -427,10 +471,9 @@ def nearest(
     """
     k = as_k(k)
     call = take(
-        points, 0.0, queries, box, periodic, indices=indices, threads=threads, progress=progress,
-        by_reach=False,
+        points, 0.0, queries, box, periodic, None, exclude, min_distance, indices, inclusive,
+        threads, progress, by_reach=False,
     )  # fmt: skip
-    call.refuse("nearest", selection="the nearest are found by distance alone")
     distances = check_max_distances(max_distance)
     if isinstance(distances, float):
         call.cutoff = distances
@@ -443,14 +486,14 @@ def nearest(
     if call.indices is not None:
         return _nearest_of_some(call, k, quantities, index_bytes)
     result = call.run(
-        _core.nearest, quantities, index_bytes, call.asking, k, call.systems
+        _core.nearest, quantities, index_bytes, call.asking, k, call.pairing, call.systems
     )
     return in_rows(result, len(call.points if call.queries is None else call.queries), k)
 
 
 def _nearest_of_some(call: Call, k: int, quantities: str, index_bytes: int) -> Arrays:
     """Rows of some points, found as those of queries, of which each finds itself too."""
-    from halfshell._convert.rows import systems_of  # few calls need it
+    from halfshell._convert.rows import pairing_of, systems_of  # few calls need them
 
     check_letters(quantities, "jdDS")  # others are added, and left out again
     numbers = call.indices
@@ -461,8 +504,9 @@ def _nearest_of_some(call: Call, k: int, quantities: str, index_bytes: int) -> A
     asked = numbers[order]
     letters = quantities + "".join(letter for letter in "jS" if letter not in quantities)
     result = call.run(
-        _core.nearest, letters, index_bytes, call.array[asked], k + 1, systems_of(call, asked)
-    )
+        _core.nearest, letters, index_bytes, call.array[asked], k + 1, pairing_of(call, asked),
+        systems_of(call, asked),
+    )  # fmt: skip
     columns = dict(zip(letters, in_rows(result, len(asked), k + 1), strict=True))
     itself = (columns["j"] == asked[:, None]) & ~columns["S"].any(axis=2)
     place = np.where(itself.any(axis=1), itself.argmax(axis=1), k)  # or the last one is too many

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any, cast, overload
 import numpy as np
 
 from halfshell import _core
-from halfshell._convert.call import Call, take
 from halfshell._convert.foreign import is_a
-from halfshell._convert.options import SHELL, as_flag, as_index_bytes, most_pairs
+from halfshell._convert.options import as_flag, as_index_bytes, most_pairs
 from halfshell._search import search
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
     from typing import Literal, Unpack
 
     import numpy.typing as npt
 
+    from halfshell._convert.call import Call
     from halfshell._convert.types import (
         ArrayLike,
         Arrays,
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
         index_dtype: npt.DTypeLike
         out: Out | None
 
-    class _BlockOptions(Options, total=False):
+    class _BlockOptions(OptionsOfPoints, total=False):
         """The same of `iter_pairs`."""
 
         index_dtype: npt.DTypeLike
@@ -57,11 +57,10 @@ if TYPE_CHECKING:
 
 # ---- pairs ---------------------------------------------------------------------------------
 
-
 @overload
 def pairs(
     points: PointsLike,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     quantities: Literal["ij"] = "ij",
     **options: Unpack[_PairOptions],
@@ -69,7 +68,7 @@ def pairs(
 @overload
 def pairs(
     points: PointsLike,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     quantities: Letter,
     **options: Unpack[_PairOptions],
@@ -77,7 +76,7 @@ def pairs(
 @overload
 def pairs(
     points: PointsLike,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     quantities: str,
     **options: Unpack[_PairOptions],
@@ -85,7 +84,7 @@ def pairs(
 @search("pairs")
 def pairs(
     points: PointsLike,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
@@ -105,15 +104,7 @@ def pairs(
 
     Parameters
     ----------
-    {points}
-    cutoff : float, array_like of float, shape (k,), (s,) or (t, t), dict or None
-        Largest distance of a pair, in the unit of `points`; finite, not negative; it may be larger
-        than the box. Several ascending ones, shape (k,), go with the letter ``k``. One for each
-        system of a batch, shape (s,). By type: a dict such as
-        ``{("H", "O"): 1.2, ("*", "*"): 2.0}``, in which a key with fewer stars wins and two types
-        without a key form no pairs, or a symmetric table with a row for each type. With radii a
-        further limit, or None. With supports the extent: ``|H @ D| <= cutoff``.
-    {box, periodic, rule, exclude, min_distance}
+    {points, shells, box, periodic, rule, exclude, min_distance}
     indices : array_like of int, shape (r,), optional
         Only pairs that have at least one of these points, each named once. The time depends on
         their number, once all points are in cells.
@@ -233,6 +224,8 @@ def pairs(
     >>> i.tolist(), j.tolist()
     ([0, 2], [1, 3])
     """
+    from halfshell._convert.call import check_shells, shells_of, take  # for what C does not convert
+
     check_apart(out, points=points, cutoff=cutoff, box=box, exclude=exclude, indices=indices)
     call = take(
         points, cutoff, None, box, periodic, rule, exclude, min_distance, indices, inclusive,
@@ -243,7 +236,6 @@ def pairs(
     if call.indices is not None:
         from halfshell._convert.rows import pairs_of  # few calls need it
 
-        call.refuse("indices", shells="give one cutoff")
         return pairs_of(call, *wanted)
     return pairs_wanted(call, *wanted)
 
@@ -255,30 +247,6 @@ def pairs_wanted(
     wanted = quantities, sort, index_bytes, out
     end = call.pairing, call.settings.algorithm, call.shells, room, call.systems
     return cast("Arrays", call.run(_core.pairs, *wanted, *end))
-
-
-def shells_of(quantities: Any) -> str:
-    """What several cutoffs are for, if the letter k is wanted."""
-    return "shells" if is_a(quantities, str) and SHELL in quantities else ""
-
-
-def check_shells(call: Call, quantities: Any) -> None:
-    """ValueError for the letter k without several cutoffs, or where they are not decided."""
-    if not shells_of(quantities):
-        return
-    if call.points.batch is not None:
-        raise ValueError("the letter k in quantities cannot be combined with a batch")
-    if call.reach is not None:
-        raise ValueError(
-            "the letter k in quantities cannot be combined with radii, supports or cutoffs by type"
-        )
-    if call.shells is None:
-        raise ValueError("the letter k in quantities needs several cutoffs, got one")
-    if call.settings.precision != "exact":
-        raise ValueError(
-            "the letter k in quantities needs precision 'exact', got "
-            f"{call.settings.precision!r}"
-        )
 
 
 def check_apart(out: Any, **inputs: Any) -> None:
@@ -298,12 +266,11 @@ def check_apart(out: Any, **inputs: Any) -> None:
 
 # ---- pairs of two sets ---------------------------------------------------------------------
 
-
 @overload
 def pairs_between(
     queries: PointsLike,
     points: PointsLike,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     quantities: Literal["ij"] = "ij",
     **options: Unpack[_BetweenOptions],
@@ -312,7 +279,7 @@ def pairs_between(
 def pairs_between(
     queries: PointsLike,
     points: PointsLike,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     quantities: Letter,
     **options: Unpack[_BetweenOptions],
@@ -321,7 +288,7 @@ def pairs_between(
 def pairs_between(
     queries: PointsLike,
     points: PointsLike,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     quantities: str,
     **options: Unpack[_BetweenOptions],
@@ -330,7 +297,7 @@ def pairs_between(
 def pairs_between(
     queries: PointsLike,
     points: PointsLike,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
@@ -351,9 +318,10 @@ def pairs_between(
     queries : array_like of float, shape (q, d), or Points
         Coordinates of queries, in the unit of `points` and with as many columns. They may lie
         anywhere. float32 and float64 may be mixed: each number is used as it is.
-    {points, cutoff, box, periodic, rule, exclude, min_distance, inclusive}
+    {points, shells, box, periodic, rule, exclude, min_distance, inclusive}
     quantities : str, default "ij"
-        Any of the letters ``i j d D S P``, each at most once, as in `pairs`.
+        Any of the letters ``i j d D S P``, each at most once, as in `pairs`; with several cutoffs
+        also ``k``.
     {index_dtype}
     out : ndarray or tuple of ndarray, optional
         As in `pairs`.
@@ -400,13 +368,16 @@ def pairs_between(
     >>> i.tolist(), j.tolist()
     ([0, 0, 1, 1, 1], [0, 1, 0, 1, 2])
     """
+    from halfshell._convert.call import check_shells, shells_of, take  # as above
+
     check_apart(
         out, queries=queries, points=points, cutoff=cutoff, box=box, exclude=exclude
     )
     call = take(
         points, cutoff, queries, box, periodic, rule, exclude, min_distance, None, inclusive,
-        threads, progress, directed=True,
+        threads, progress, directed=True, several=shells_of(quantities),
     )  # fmt: skip
+    check_shells(call, quantities)
     return between_wanted(call, quantities, as_index_bytes(index_dtype), out)
 
 
@@ -416,18 +387,17 @@ def between_wanted(
     """The pairs of a call with queries."""
     found = call.run(
         _core.pairs_between, quantities, True, index_bytes, out, call.asking, call.pairing,
-        call.settings.algorithm, room, call.systems,
+        call.settings.algorithm, call.shells, room, call.systems,
     )  # fmt: skip
     return cast("Arrays", found)
 
 
 # ---- none or few of them held --------------------------------------------------------------
 
-
 @overload
 def iter_pairs(
     points: PointsLike,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     quantities: Literal["ij"] = "ij",
     **options: Unpack[_BlockOptions],
@@ -435,7 +405,7 @@ def iter_pairs(
 @overload
 def iter_pairs(
     points: PointsLike,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     quantities: Letter,
     **options: Unpack[_BlockOptions],
@@ -443,7 +413,7 @@ def iter_pairs(
 @overload
 def iter_pairs(
     points: PointsLike,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     quantities: str,
     **options: Unpack[_BlockOptions],
@@ -451,13 +421,14 @@ def iter_pairs(
 @search("iter_pairs")
 def iter_pairs(
     points: PointsLike,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     rule: Rule | None = None,
     exclude: ArrayLike | int | None = None,
     min_distance: float | None = None,
+    indices: npt.ArrayLike | None = None,
     inclusive: bool = True,
     quantities: str = "ij",
     index_dtype: npt.DTypeLike = np.int64,
@@ -469,7 +440,10 @@ def iter_pairs(
 
     Parameters
     ----------
-    {points, cutoff, box, periodic, rule, exclude, min_distance, inclusive}
+    {points, shells, box, periodic, rule, exclude, min_distance}
+    indices : array_like of int, shape (r,), optional
+        As in `pairs`.
+    {inclusive}
     quantities : str, default "ij"
         As in `pairs`.
     {index_dtype}
@@ -480,7 +454,8 @@ def iter_pairs(
         As in `pairs`. Threads run while a block is being made and end before it is returned.
     progress : bool or callable, optional
         As in `pairs`, with the fraction of the points that are done, until the iterator ends or is
-        closed. An exception ends the call; the iterator can continue afterwards.
+        closed. An exception ends the call; the iterator can continue afterwards, but for `indices`
+        and a batch.
 
     Returns
     -------
@@ -525,13 +500,24 @@ def iter_pairs(
     >>> int(histogram.sum()) == hs.count_pairs(points, 0.1, box=1.0)
     True
     """
+    from halfshell._convert.call import check_shells, shells_of, take  # as above
+
     most = most_pairs(max_pairs)
     call = take(
-        points, cutoff, None, box, periodic, rule, exclude, min_distance, None, inclusive, threads,
-        progress, several=shells_of(quantities),
+        points, cutoff, None, box, periodic, rule, exclude, min_distance, indices, inclusive,
+        threads, progress, several=shells_of(quantities),
     )  # fmt: skip
     check_shells(call, quantities)
     index_bytes = as_index_bytes(index_dtype)
+    if call.indices is not None:
+        from halfshell._convert.rows import parts_of  # few calls need them
+        from halfshell._objects.exact import copied
+
+        call.points = call.points.replace()  # a copy, as the caller's arrays may change
+        for name in ("reach", "selection", "shells", "system_cutoffs"):
+            setattr(call, name, copied(getattr(call, name)))
+        parts = parts_of(call, quantities, index_bytes)
+        return cast("PairBlocks[Any]", _in_blocks(parts, quantities, most))
     if call.points.batch is not None:
         return cast("PairBlocks[Any]", _blocks_of_systems(call, quantities, index_bytes, most))
     return cast("PairBlocks[Any]", _blocks(call, quantities, index_bytes, most))
@@ -548,30 +534,36 @@ def _blocks_of_systems(
     call: Call, quantities: str, index_bytes: int, most: int
 ) -> Iterator[Any]:
     """Blocks of one system after the other, of which several make one block where they fit."""
-    from halfshell._convert.systems import each_system  # few calls need it
+    parts = [(_blocks(one, quantities, index_bytes, most), first) for one, first in _systems(call)]
 
-    parts = [
-        (_blocks(one, quantities, index_bytes, most), first) for one, first in each_system(call)
-    ]
-
-    def iterate() -> Iterator[Any]:
-        held: list[list[npt.NDArray[Any]]] = [[] for _ in quantities]
-        n_held = 0
+    def each() -> Iterator[Any]:
         for blocks, first in parts:
             for block in blocks:
                 columns = block if isinstance(block, tuple) else (block,)
-                for column, letter, kept in zip(columns, quantities, held, strict=True):
-                    kept.append(column + first if letter in "ijP" else column)
-                n_held += len(columns[0])
-                while n_held >= most:
-                    whole = [np.concatenate(kept) for kept in held]
-                    yield _as_block([column[:most] for column in whole])
-                    held = [[column[most:]] for column in whole]
-                    n_held -= most
-        if n_held:
-            yield _as_block([np.concatenate(kept) for kept in held])
+                yield [
+                    column + first if letter in "ijP" else column
+                    for column, letter in zip(columns, quantities, strict=True)
+                ]
 
-    return iterate()
+    return _in_blocks(each(), quantities, most)
+
+
+def _in_blocks(parts: Iterator[Any], quantities: str, most: int) -> Iterator[Any]:
+    """Columns of some pairs at a time, as blocks of one length."""
+    held: list[list[npt.NDArray[Any]]] = [[] for _ in quantities]
+    n_held = 0
+    for columns in parts:
+        for column, kept in zip(columns, held, strict=True):
+            kept.append(column)
+        n_held += len(columns[0])
+        if n_held >= most:
+            whole = [np.concatenate(kept) for kept in held]
+            for first in range(0, n_held - most + 1, most):
+                yield _as_block([column[first : first + most].copy() for column in whole])
+            n_held %= most
+            held = [[column[len(column) - n_held :]] for column in whole]
+    if n_held:
+        yield _as_block([np.concatenate(kept) for kept in held])
 
 
 def _as_block(columns: list[npt.NDArray[Any]]) -> Any:
@@ -633,7 +625,7 @@ def for_each_pair(
         otherwise as for `pairs`.
     ValueError, OverflowError, MemoryError
         As for `pairs`; OverflowError also if a shift does not fit int32. ValueError if a pointer
-        is NULL, and for a batch: call it for each system.
+        is NULL.
     Exception
         Whatever a Python callable raises. An exception within a ctypes callback is printed by
         ctypes and not seen here.
@@ -646,7 +638,8 @@ def for_each_pair(
     Notes
     -----
     Each pair comes once, with ``i < j`` or oriented as in `pairs`, in the order of
-    `pairs` with ``sort=False``. S is zero along axes that are not periodic. D is that of `pairs`,
+    `pairs` with ``sort=False``. Systems of a batch come one after the other, with numbers among all
+    points. S is zero along axes that are not periodic. D is that of `pairs`,
     and ``d2`` is ``d * d``, rounded once, of its d: sqrt(d2) gives d back, unless d * d overflows
     or is subnormal. With `inclusive`, d2 <= cutoff * cutoff as float64 rounds it.
 
@@ -664,15 +657,29 @@ def for_each_pair(
     >>> sorted(bonds)
     [(0, 1, (1.0,), 1.0), (1, 2, (1.5,), 2.25)]
     """
+    from halfshell._convert.call import take  # as above
     from halfshell._convert.callbacks import target_of  # few calls need it
 
     target = target_of(callback, user_data)
     call = take(
         points, cutoff, None, box, periodic, rule, exclude, min_distance, None, inclusive, threads
     )
-    call.refuse("for_each_pair", batch="a function knows numbers of one system")
-    found = call.run(
-        _core.for_each_pair, target.function, target.user, as_flag(thread_safe, "thread_safe"),
-        call.pairing, call.settings.algorithm,
-    )  # fmt: skip
-    return cast("int", found)
+    own = target.function, target.user, as_flag(thread_safe, "thread_safe")
+    n_pairs = 0
+    for one, first in _systems(call):
+        found, is_ended = one.run(
+            _core.for_each_pair, *own, first, one.pairing, one.settings.algorithm
+        )
+        n_pairs += found
+        if is_ended:
+            break
+    return n_pairs
+
+
+def _systems(call: Call) -> Iterable[tuple[Call, int]]:
+    """A call for each system, and the number of its first point among all."""
+    if call.points.batch is None:
+        return ((call, 0),)
+    from halfshell._convert.systems import each_system  # few calls need it
+
+    return each_system(call)

@@ -49,21 +49,9 @@ def plot_pairs(
     S : array_like of int, shape (m, d), optional
         The shift of each pair. Default: that of the nearest image, as `measure` finds it.
     {box, periodic}
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw on; for points in three dimensions with ``projection="3d"``. Default: axes of
-        a new figure.
-    unit : str, optional
-        The unit of the points, for the labels of the axes: "Å".
+    {ax, unit}
 
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes drawn on.
-
-    Raises
-    ------
-    ImportError
-        If matplotlib is not installed: ``pip install matplotlib``.
+    {drawn}
     TypeError, ValueError, OverflowError
         As `measure`; ValueError also for points of more than three dimensions, axes that do not
         fit, or more than 200 000 pairs.

@@ -22,8 +22,8 @@ from halfshell._convert.lengths import as_edges, as_positive
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import as_choice, as_count, as_flag
 from halfshell._functions.counts import Marks, binned, marks_of
-from halfshell._plot import new_axes
-from halfshell._search import search
+from halfshell._objects.pictures import axes_of
+from halfshell._search import document, search
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -210,7 +210,6 @@ def _edges(cutoff: Any, bins: Any) -> FloatArray:
 
 # ---- the ideal gas -------------------------------------------------------------------------
 
-
 def _shares_of(call: Call, edges: FloatArray, density: float | None) -> Any:
     """A function that gives the part of all partners in each shell, for each system."""
     points = call.points
@@ -314,7 +313,6 @@ def _centers(call: Call, marks: Marks) -> npt.NDArray[np.int64]:
 
 
 # ---- the result ----------------------------------------------------------------------------
-
 
 @dataclass(frozen=True, eq=False)
 class RadialDistribution:
@@ -466,6 +464,7 @@ class RadialDistribution:
 
     # ---- pictures --------------------------------------------------------------------------
 
+    @document
     def plot(
         self,
         ax: Axes | None = None,
@@ -484,15 +483,7 @@ class RadialDistribution:
         unit : str, optional
             The unit of the points, for the label of the axis: "Å".
 
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The axes drawn on.
-
-        Raises
-        ------
-        ImportError
-            If matplotlib is not installed: ``pip install matplotlib``.
+        {drawn}
         ValueError
             If `quantity` is neither "g" nor "n".
 
@@ -501,7 +492,7 @@ class RadialDistribution:
         Infinite values are left out. Pairs of types that never meet have no line.
         """
         as_choice(quantity, "quantity", ("g", "n"))
-        ax = new_axes() if ax is None else ax
+        ax = axes_of(ax)
         values = self.g if quantity == "g" else self.n
         for line, label in self._lines(values, quantity):
             if quantity == "g":

@@ -14,10 +14,10 @@ import numpy.typing as npt
 
 from halfshell._convert.arrays import as_real_array
 from halfshell._convert.foreign import is_a, kind_of
-from halfshell._convert.frames import as_frame, frames_of, of_frame
-from halfshell._convert.options import as_flag, as_index_bytes, check_letters
+from halfshell._convert.options import LETTERS, SHELL, as_flag, as_index_bytes, check_letters
 from halfshell._convert.points import Points
 from halfshell._convert.progress import as_progress
+from halfshell._convert.systems import as_frame, frames_of, of_frame
 from halfshell._errors import shorten
 from halfshell._functions.pairs import pairs
 from halfshell._objects.verlet_list import VerletList
@@ -61,23 +61,27 @@ _Find = Callable[[Points], "Arrays"]
 @overload
 def trajectory_pairs(
     frames: _Frames,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     quantities: Literal["ij"] = "ij",
     **options: Unpack[_FrameOptions],
 ) -> Generator[tuple[npt.NDArray[Any], npt.NDArray[Any]], None, None]: ...
 @overload
 def trajectory_pairs(
-    frames: _Frames, cutoff: CutoffLike, *, quantities: Letter, **options: Unpack[_FrameOptions]
+    frames: _Frames,
+    cutoff: CutoffLike = None,
+    *,
+    quantities: Letter,
+    **options: Unpack[_FrameOptions],
 ) -> Generator[npt.NDArray[Any], None, None]: ...
 @overload
 def trajectory_pairs(
-    frames: _Frames, cutoff: CutoffLike, *, quantities: str, **options: Unpack[_FrameOptions]
+    frames: _Frames, cutoff: CutoffLike = None, *, quantities: str, **options: Unpack[_FrameOptions]
 ) -> Generator[Arrays, None, None]: ...
 @search()
 def trajectory_pairs(
     frames: _Frames,
-    cutoff: CutoffLike,
+    cutoff: CutoffLike = None,
     *,
     skin: Number | Literal["auto"] | None = "auto",
     box: BoxLike | None = None,
@@ -103,7 +107,7 @@ def trajectory_pairs(
         ``mdtraj.Trajectory`` of one frame. An array of shape (f, n, d) has f frames, and so do
         ``universe.trajectory`` and an ``mdtraj.Trajectory``. A generator is read one frame at
         a time. Frames may differ in their number of points and in their box.
-    {cutoff}
+    {shells}
     skin : float, "auto" or None, default "auto"
         As in `VerletList`, which keeps a list from frame to frame; "auto" does so if that is
         faster, and always searches fewer than 1000 points. None: each frame is searched
@@ -114,7 +118,7 @@ def trajectory_pairs(
         `periodic` also holds for the boxes of frames, except objects with their own.
     {rule, exclude, min_distance, indices, inclusive}
     quantities : str, default "ij"
-        As in `pairs`, but for the letter ``k``.
+        As in `pairs`.
     {index_dtype}
     sort : bool, default False
         As in `pairs`.
@@ -168,7 +172,7 @@ def trajectory_pairs(
     >>> [pairs.tolist() for pairs in found]
     [[[0, 1], [0, 2]], [[1, 2]]]
     """
-    check_letters(quantities)
+    check_letters(quantities, LETTERS + SHELL)
     wanted: Any = {
         "quantities": quantities, "sort": as_flag(sort, "sort"),
         "index_dtype": np.dtype(f"i{as_index_bytes(index_dtype)}"),

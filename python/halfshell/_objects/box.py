@@ -19,6 +19,7 @@ from halfshell._convert.points import (
     as_periodic_bits,
     as_points,
 )
+from halfshell._search import document
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -107,11 +108,8 @@ class Box:
 
         Raises
         ------
-        TypeError
-            If the entries are not real numbers, or are long doubles.
-        ValueError
-            If `matrix` is not square, an entry is not finite, or the vectors are exactly linearly
-            dependent.
+        TypeError, ValueError
+            As the constructor; ValueError also if `matrix` is not square.
 
         Examples
         --------
@@ -140,10 +138,8 @@ class Box:
 
         Raises
         ------
-        TypeError
-            If a length is not a real number, or is a long double.
-        ValueError
-            If a length is zero or not finite, or there are none or more than 8.
+        TypeError, ValueError
+            As the constructor; ValueError also if there are no lengths or more than 8.
 
         Examples
         --------
@@ -175,11 +171,9 @@ class Box:
 
         Raises
         ------
-        TypeError
-            If the entries are not real numbers, or are long doubles.
-        ValueError
-            If there are not 3 and 3 or 2 and 1 of them, a length is not finite and positive, an
-            angle is not between 0 and 180 degrees, or no cell has these angles.
+        TypeError, ValueError
+            As the constructor; ValueError also if there are not 3 and 3 or 2 and 1 of them, a
+            length is not positive, an angle is not between 0 and 180 degrees, or no cell has these.
 
         Examples
         --------
@@ -221,11 +215,8 @@ class Box:
 
         Raises
         ------
-        TypeError
-            If the entries are not real numbers, or are long doubles.
-        ValueError
-            If there are not six of them, or as for `from_lengths_angles`; MDAnalysis has zeros if
-            there is no box.
+        TypeError, ValueError
+            As `from_lengths_angles`; MDAnalysis has zeros if there is no box.
 
         Examples
         --------
@@ -333,26 +324,15 @@ class Box:
 
         return _show.html(self)
 
+    @document
     def plot(self, ax: Axes | None = None, *, unit: str | None = None) -> Axes:
         """Draw the edges of the box, with a corner at the origin, and name its vectors.
 
         Parameters
         ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; for three dimensions with ``projection="3d"``. Default: axes of a new
-            figure.
-        unit : str, optional
-            The unit of the vectors, for the labels of the axes: "Å".
+        {ax, unit}
 
-        Returns
-        -------
-        matplotlib.axes.Axes
-            What has been drawn on.
-
-        Raises
-        ------
-        ImportError
-            If matplotlib is not installed: ``pip install matplotlib``.
+        {drawn}
         ValueError
             If the box has more than three dimensions, or axes do not fit.
         """

@@ -10,12 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _show
-from halfshell._convert.arrays import as_array
+from halfshell._convert.arrays import as_array, as_point_numbers
 from halfshell._convert.call import DIRECTED
 from halfshell._convert.foreign import whole_number
-from halfshell._convert.listed import as_point_numbers
 from halfshell._convert.options import check_letters
 from halfshell._convert.points import Labels, Points, setattr_
+from halfshell._functions.neighbors import neighbors as find_neighbors
+from halfshell._functions.pairs import pairs as find_pairs
 from halfshell._objects.neighbor_table import NeighborTable
 
 if TYPE_CHECKING:
@@ -173,14 +174,12 @@ class Brick:
         ndarray or tuple of ndarray
             As from `pairs`, ascending by (i, j, S), with indices among all points.
         """
-        import halfshell as hs
-
         check_letters(quantities)
         own, places = self._of_members(points), np.flatnonzero(self.is_owned)
         # All pairs of the members are found sooner than those of half of them.
         some = None if 2 * len(places) >= len(self.members) else places
         letters = quantities if "i" in quantities else "i" + quantities
-        found: Any = hs.pairs(
+        found: Any = find_pairs(
             own, self.cutoff, rule=self._scope.rule, exclude=self._excluded(exclude),
             min_distance=min_distance, indices=some, inclusive=inclusive, quantities=letters,
             sort=True, threads=threads,
@@ -209,15 +208,13 @@ class Brick:
         points, exclude, min_distance, inclusive, threads
             As in `Brick.pairs`. Memory is that of the pairs of a few thousand points.
         """
-        import halfshell as hs
-
         rule, excluded = self._scope.rule, self._excluded(exclude)
         if rule in DIRECTED:
             raise ValueError(f"rule {rule!r} has a direction, and these pairs have none")
         own, places, count = self._of_members(points), np.flatnonzero(self.is_owned), 0
         for first in range(0, max(1, len(places)), _AT_A_TIME):
             some = places[first : first + _AT_A_TIME]
-            table = hs.neighbors(
+            table = find_neighbors(
                 own, self.cutoff, rule=rule, exclude=excluded, min_distance=min_distance,
                 indices=some, inclusive=inclusive, threads=threads,
             )  # fmt: skip
@@ -250,9 +247,7 @@ class Brick:
         NeighborTable
             Row k belongs to point ``owned[k]``, with indices among all points.
         """
-        import halfshell as hs
-
-        table = hs.neighbors(
+        table = find_neighbors(
             self._of_members(points), self.cutoff, rule=self._scope.rule,
             exclude=self._excluded(exclude), min_distance=min_distance,
             indices=np.flatnonzero(self.is_owned), inclusive=inclusive, quantities=quantities,

@@ -8,29 +8,33 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar, cast, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _show
-from halfshell._convert.arrays import as_real_array
+from halfshell._convert.arrays import as_real_array, starts_of
 from halfshell._convert.call import same_boxes, take
 from halfshell._convert.foreign import exact_number, is_a, shown
 from halfshell._convert.lengths import as_cutoff, as_positive, as_radii
-from halfshell._convert.options import most_pairs
+from halfshell._convert.memory import gigabytes
+from halfshell._convert.options import as_index_bytes, most_pairs
 from halfshell._convert.points import Points, refuse_infinite
-from halfshell._convert.starts import starts_of
 from halfshell._functions import clusters as _clusters
 from halfshell._functions import counts as _counts
 from halfshell._functions import neighbors as _rows
 from halfshell._functions import pairs as _pairs
 from halfshell._functions import rdf as _rdf
-from halfshell._search import document
-from halfshell._unknown import refuse_unknown
+from halfshell._functions.neighbors import listed
+from halfshell._objects.exact import Origin, copied
+from halfshell._objects.neighbor_table import NeighborTable
+from halfshell._search import document, search
+from halfshell._settings import current, settings
 
 if TYPE_CHECKING:
-    from typing import Never
+    from collections.abc import Mapping, Sequence
+    from typing import Unpack
 
     from matplotlib.axes import Axes
 
@@ -39,10 +43,12 @@ if TYPE_CHECKING:
         Arrays,
         BoxLike,
         CutoffLike,
+        MethodOptions,
         Number,
         PairBlocks,
         PeriodicLike,
         PointsLike,
+        QueryOptions,
     )
     from halfshell._functions.clusters import Clusters
     from halfshell._functions.rdf import RadialDistribution
@@ -54,6 +60,7 @@ _ASKED_AT_A_TIME = 4096  # points whose candidates are looked up together
 Method = TypeVar("Method", bound="Callable[..., Any]")
 
 
+@_show.shown
 class Candidates(NamedTuple):
     """Ranges of `CellList.order` for each query: what the cells around it hold."""
 
@@ -63,12 +70,6 @@ class Candidates(NamedTuple):
     """Where each range begins in `CellList.order`; shape (m,)."""
     stop: npt.NDArray[np.int64]
     """Where it ends, not included; shape (m,)."""
-
-    def __repr__(self) -> str:
-        return _show.line(self)
-
-    def _repr_html_(self) -> str:
-        return _show.html(self)
 
 
 def _like(function: Callable[..., Any], *own: str) -> Callable[[Method], Method]:
@@ -90,8 +91,16 @@ def _like(function: Callable[..., Any], *own: str) -> Callable[[Method], Method]
             parameters=known, return_annotation=inspect.signature(method).return_annotation
         )
         named = ", ".join(one.name for one in known if one.name not in mine)
-        method.__doc__ = (method.__doc__ or "").replace("**options", named)
-        return method
+        like = f"As in `halfshell.{function.__name__}`."
+        options = f"    {named}\n        {like}"
+        cutoff = "    cutoff : float or array_like, optional\n"
+        cutoff += f"        {like} Default: that of the list."
+        returned = (function.__doc__ or "").partition("Returns\n    -------\n")[2]
+        both = (
+            f"    Parameters\n    ----------\n{cutoff}\n{options}\n\n"
+            f"    Returns\n    -------\n{returned.partition(chr(10))[0]}"
+        )
+        return document(method, cutoff=cutoff, options=options, like=both)
 
     return decorate
 
@@ -185,6 +194,7 @@ class CellList:
 
     points: Points
 
+    @search()
     def __init__(
         self,
         points: PointsLike,
@@ -195,10 +205,7 @@ class CellList:
         cell_size: Number | None = None,
         domain: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
         threads: int | None = None,
-        **unknown: Never,
     ) -> None:
-        if unknown:
-            refuse_unknown(CellList, unknown)
         width = 0.0 if cell_size is None else as_positive(cell_size, "cell_size")
         self._cutoff, self._cell_size, self._threads = as_cutoff(cutoff), width, threads
         found = Points._of(points, "points", box, periodic)
@@ -266,19 +273,10 @@ class CellList:
         return self._cutoff if cutoff is None else cutoff
 
     @_like(_pairs.pairs)
-    def pairs(self, cutoff: CutoffLike = None, **options: Any) -> Arrays:
+    def pairs(self, cutoff: CutoffLike = None, **options: Unpack[MethodOptions]) -> Arrays:
         """Find every pair of points within a cutoff: `halfshell.pairs` of the cells.
 
-        Parameters
-        ----------
-        cutoff : float or array_like, optional
-            As in `halfshell.pairs`. Default: that of the list.
-        **options
-            As in `halfshell.pairs`.
-
-        Returns
-        -------
-        ndarray or tuple of ndarray
+        {like}
 
         Examples
         --------
@@ -287,19 +285,18 @@ class CellList:
         >>> cells.pairs(1.0, quantities="P").tolist()
         [[0, 1]]
         """
-        found: Arrays = _pairs.pairs(self, self._or_own(cutoff), **options)
+        found: Arrays = _pairs.pairs(self, self._or_own(cutoff), **cast("Any", options))
         return found
 
     @_like(_pairs.iter_pairs)
-    def iter_pairs(self, cutoff: CutoffLike = None, **options: Any) -> PairBlocks[Any]:
+    def iter_pairs(
+        self, cutoff: CutoffLike = None, **options: Unpack[MethodOptions]
+    ) -> PairBlocks[Any]:
         """Iterate over the pairs in blocks: `halfshell.iter_pairs` of the cells.
 
         Parameters
         ----------
-        cutoff : float or array_like, optional
-            As in `halfshell.pairs`. Default: that of the list.
-        **options
-            As in `halfshell.iter_pairs`.
+        {cutoff, options}
 
         Returns
         -------
@@ -313,20 +310,19 @@ class CellList:
         >>> sum(len(i) for i, j in cells.iter_pairs(max_pairs=1))
         2
         """
-        return _pairs.iter_pairs(self, self._or_own(cutoff), **options)
+        return _pairs.iter_pairs(self, self._or_own(cutoff), **cast("Any", options))
 
     @_like(_pairs.for_each_pair)
-    def for_each_pair(self, callback: Any, cutoff: CutoffLike = None, **options: Any) -> int:
+    def for_each_pair(
+        self, callback: Any, cutoff: CutoffLike = None, **options: Unpack[MethodOptions]
+    ) -> int:
         """Call a function for each pair: `halfshell.for_each_pair` of the cells.
 
         Parameters
         ----------
         callback
             As in `halfshell.for_each_pair`.
-        cutoff : float, optional
-            Default: that of the list.
-        **options
-            As in `halfshell.for_each_pair`.
+        {cutoff, options}
 
         Returns
         -------
@@ -342,22 +338,15 @@ class CellList:
         1 2 4.0
         2
         """
-        return _pairs.for_each_pair(self, self._or_own(cutoff), callback, **options)
+        return _pairs.for_each_pair(self, self._or_own(cutoff), callback, **cast("Any", options))
 
     @_like(_rows.neighbors)
-    def neighbors(self, cutoff: CutoffLike = None, **options: Any) -> NeighborTable:
+    def neighbors(
+        self, cutoff: CutoffLike = None, **options: Unpack[MethodOptions]
+    ) -> NeighborTable:
         """All neighbours of each point, or of each query: `halfshell.neighbors` of the cells.
 
-        Parameters
-        ----------
-        cutoff : float or array_like, optional
-            Default: that of the list.
-        **options
-            As in `halfshell.neighbors`.
-
-        Returns
-        -------
-        NeighborTable
+        {like}
 
         See Also
         --------
@@ -370,11 +359,11 @@ class CellList:
         >>> [row.tolist() for row in cells.neighbors()]
         [[1], [0, 2], [1]]
         """
-        return _rows.neighbors(self, self._or_own(cutoff), **options)
+        return _rows.neighbors(self, self._or_own(cutoff), **cast("Any", options))
 
     @_like(_rows.neighbors, "cutoff", "queries", "indices")
     def query(
-        self, queries: PointsLike, radius: ArrayLike | None = None, **options: Any
+        self, queries: PointsLike, radius: ArrayLike | None = None, **options: Unpack[QueryOptions]
     ) -> NeighborTable:
         """All points within a radius of each query.
 
@@ -385,8 +374,7 @@ class CellList:
         radius : float or array_like of float, shape (q,), optional
             One for all queries, or one for each. Default: the cutoff of the list, up to which the
             kept cells are used; larger radii take a separate search.
-        **options
-            As in `halfshell.neighbors`.
+        {options}
 
         Returns
         -------
@@ -409,10 +397,8 @@ class CellList:
         try:
             if radii is None or isinstance(radii, float):
                 within = self._cutoff if radii is None else radii
-                return cells.neighbors(within, queries=asking, **options)
-            from halfshell._objects.radii import query_each  # few calls need it
-
-            return query_each(cells, asking, radii, options)
+                return cells.neighbors(within, queries=asking, **cast("Any", options))
+            return query_each(cells, asking, radii, cast("Any", options))
         except MemoryError as error:
             if radius is None:
                 raise
@@ -429,7 +415,7 @@ class CellList:
         return other
 
     @_like(_rows.nearest)
-    def nearest(self, k: int, **options: Any) -> Arrays:
+    def nearest(self, k: int, **options: Unpack[MethodOptions]) -> Arrays:
         """Find the k nearest points: `halfshell.nearest` of the cells.
 
         The first call builds a tree of the points; later calls, with any `k` and any queries,
@@ -439,9 +425,8 @@ class CellList:
         ----------
         k : int
             Number of neighbours, 1 or more.
-        **options
-            As in `halfshell.nearest`. The tree must fit the memory limit by itself, but does not
-            count towards it otherwise.
+        {options}
+            The tree must fit the memory limit by itself, but does not count towards it otherwise.
 
         Returns
         -------
@@ -455,25 +440,26 @@ class CellList:
         >>> j.tolist(), d.tolist()
         ([[1, 2], [0, 2], [1, 0]], [[1.0, 3.0], [1.0, 2.0], [2.0, 3.0]])
         """
-        found: Arrays = _rows.nearest(self, k, **options)
+        found: Arrays = _rows.nearest(self, k, **cast("Any", options))
         return found
 
+    @overload
+    def count_pairs(
+        self,
+        cutoff: Number | Mapping[Any, float] | None = None,
+        **options: Unpack[MethodOptions],
+    ) -> int: ...
+    @overload
+    def count_pairs(
+        self, cutoff: Sequence[float] | npt.NDArray[Any], **options: Unpack[MethodOptions]
+    ) -> npt.NDArray[np.int64]: ...
     @_like(_counts.count_pairs)
     def count_pairs(
-        self, cutoff: CutoffLike = None, **options: Any
+        self, cutoff: CutoffLike = None, **options: Unpack[MethodOptions]
     ) -> int | npt.NDArray[np.int64]:
         """Count the pairs within one or several cutoffs: `halfshell.count_pairs` of the cells.
 
-        Parameters
-        ----------
-        cutoff : float or array_like, optional
-            Default: that of the list.
-        **options
-            As in `halfshell.count_pairs`.
-
-        Returns
-        -------
-        int or ndarray of int64, shape (k,)
+        {like}
 
         Examples
         --------
@@ -483,23 +469,16 @@ class CellList:
         (2, 1, 3)
         """
         found: int | npt.NDArray[np.int64]
-        found = _counts.count_pairs(self, self._or_own(cutoff), **options)
+        found = _counts.count_pairs(self, self._or_own(cutoff), **cast("Any", options))
         return found
 
     @_like(_rows.coordination)
-    def coordination(self, cutoff: CutoffLike = None, **options: Any) -> npt.NDArray[np.int64]:
+    def coordination(
+        self, cutoff: CutoffLike = None, **options: Unpack[MethodOptions]
+    ) -> npt.NDArray[np.int64]:
         """Count the neighbours of each point, or query: `halfshell.coordination` of the cells.
 
-        Parameters
-        ----------
-        cutoff : float or array_like, optional
-            Default: that of the list.
-        **options
-            As in `halfshell.coordination`.
-
-        Returns
-        -------
-        ndarray of int64, shape (n,), (q,) or (r,)
+        {like}
 
         Examples
         --------
@@ -507,11 +486,11 @@ class CellList:
         >>> hs.CellList([[0.0], [1.0], [3.0]], 2.0).coordination().tolist()
         [1, 2, 1]
         """
-        return _rows.coordination(self, self._or_own(cutoff), **options)
+        return _rows.coordination(self, self._or_own(cutoff), **cast("Any", options))
 
     @_like(_counts.pair_histogram)
     def pair_histogram(
-        self, edges: npt.ArrayLike, **options: Any
+        self, edges: npt.ArrayLike, **options: Unpack[MethodOptions]
     ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
         """Count the pairs by distance: `halfshell.pair_histogram` of the cells.
 
@@ -520,8 +499,7 @@ class CellList:
         edges : array_like of float, shape (bins + 1,)
             Limits of the bins. The last one may be larger than the cutoff of the list: that costs
             a search of its own.
-        **options
-            As in `halfshell.pair_histogram`.
+        {options}
 
         Returns
         -------
@@ -533,11 +511,14 @@ class CellList:
         >>> hs.CellList([[0.0], [1.0], [3.0]], 3.0).pair_histogram([0.0, 1.0, 2.0, 3.0]).tolist()
         [0, 1, 2]
         """
-        return _counts.pair_histogram(self, edges, **options)
+        return _counts.pair_histogram(self, edges, **cast("Any", options))
 
     @_like(_rdf.rdf)
     def rdf(
-        self, cutoff: Number | None = None, bins: int | ArrayLike = 100, **options: Any
+        self,
+        cutoff: Number | None = None,
+        bins: int | ArrayLike = 100,
+        **options: Unpack[MethodOptions],
     ) -> RadialDistribution:
         """Compute g(r): `halfshell.rdf` of the cells.
 
@@ -547,8 +528,7 @@ class CellList:
             The largest distance. Default: the cutoff of the list.
         bins : int or array_like of float
             As in `halfshell.rdf`.
-        **options
-            As in `halfshell.rdf`.
+        {options}
 
         Returns
         -------
@@ -562,22 +542,13 @@ class CellList:
         """
         if cutoff is None and exact_number(bins) is not None:
             cutoff = self._cutoff
-        return _rdf.rdf(self, cutoff, bins, **options)
+        return _rdf.rdf(self, cutoff, bins, **cast("Any", options))
 
     @_like(_clusters.clusters)
-    def clusters(self, cutoff: CutoffLike = None, **options: Any) -> Clusters:
+    def clusters(self, cutoff: CutoffLike = None, **options: Unpack[MethodOptions]) -> Clusters:
         """Group the points: `halfshell.clusters` of the cells.
 
-        Parameters
-        ----------
-        cutoff : float or array_like, optional
-            Default: that of the list.
-        **options
-            As in `halfshell.clusters`.
-
-        Returns
-        -------
-        Clusters
+        {like}
 
         Examples
         --------
@@ -585,7 +556,7 @@ class CellList:
         >>> hs.CellList([[0.0], [1.0], [3.0]], 2.0).clusters(1.5).labels.tolist()
         [0, 0, 1]
         """
-        return _clusters.clusters(self, self._or_own(cutoff), **options)
+        return _clusters.clusters(self, self._or_own(cutoff), **cast("Any", options))
 
     # ---- cells -----------------------------------------------------------------------------
 
@@ -733,26 +704,15 @@ class CellList:
             found = found.replace(box=self.points.box, periodic=self.points.periodic)
         return _restored(found, *self._given)
 
+    @document
     def plot(self, ax: Axes | None = None, *, unit: str | None = None) -> Axes:
         """Draw the points in the colours of their cells, and the cells.
 
         Parameters
         ----------
-        ax : matplotlib.axes.Axes, optional
-            Axes to draw on; for points in three dimensions with ``projection="3d"``. Default: axes
-            of a new figure.
-        unit : str, optional
-            The unit of the points, for the labels of the axes: "Å".
+        {ax, unit}
 
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The axes drawn on.
-
-        Raises
-        ------
-        ImportError
-            If matplotlib is not installed: ``pip install matplotlib``.
+        {drawn}
         ValueError
             If there are more than 500 000 points or three dimensions, or axes do not fit.
 
@@ -785,9 +745,7 @@ def _restored(
     return cells
 
 
-def _as_domain(
-    domain: Any, points: Points
-) -> npt.NDArray[np.float64]:
+def _as_domain(domain: Any, points: Points) -> npt.NDArray[np.float64]:
     """Both ends along each axis; an empty range along those that repeat."""
     positions, vectors, bits = points._scene
     ndim = positions.shape[1]
@@ -810,3 +768,109 @@ def _as_domain(
         if vectors is not None and bits >> axis & 1:
             ends[:, np.flatnonzero(vectors[axis])] = [[np.inf], [-np.inf]]
     return ends
+
+
+# ---- a radius for each query -----------------------------------------------------------------
+
+Columns = tuple[npt.NDArray[Any], ...]
+Radii = npt.NDArray[np.float64]
+
+#: Points that are sorted in the time of one search of cells.
+_SORTED_MEANWHILE = 2048
+_LARGEST_GATHERED = 2.0**1022  # the core has no larger radii in one search
+
+
+def query_each(cells: Any, queries: Points, radii: Radii, options: dict[str, Any]) -> NeighborTable:
+    """The table of all points within the radius of each query."""
+    quantities = options.pop("quantities", "j")
+    index_bytes = as_index_bytes(options.pop("index_dtype", np.int64))
+    how = current()
+    # What sorting by distance searches again is that of now; the caller's arrays may change.
+    queries = queries._over(queries.positions.copy())
+    options = {name: copied(value) for name, value in options.items()}
+
+    def rows(asking: Points, letters: str) -> Columns:
+        if not len(radii) or not _search_apart(radii, cells.cutoff, len(cells)):
+            call = take(
+                cells.points, None, asking.replace(radii=radii), rule="gather", directed=True,
+                **options,
+            )  # fmt: skip
+            found: Columns = listed(call, letters, index_bytes)
+            return found
+
+        def search(members: npt.NDArray[np.intp], radius: float, room: float | None) -> Columns:
+            with settings(memory_limit=how.memory_limit if room is None else room):
+                call = take(cells, radius, asking[members], directed=True, **options)
+                part: Columns = listed(call, letters, index_bytes)
+            return part
+
+        return _search_each(search, radii, how.memory_limit)
+
+    def find_shifts(origin: Origin) -> npt.NDArray[Any]:
+        options.pop("progress", None)
+        with settings(precision=how.precision, algorithm=how.algorithm):
+            return rows(queries, "S")[1]
+
+    arrays = rows(queries, quantities)
+    origin = None
+    if "d" in quantities and "j" in quantities:
+        points, box, bits = cells.points._scene
+        origin = Origin(points, queries.positions, box, bits, find_shifts, is_own=True)
+    return NeighborTable(arrays, quantities, len(cells), False, origin=origin)
+
+
+def _search_apart(radii: Radii, cutoff: float, n_points: int) -> bool:
+    """Whether one search for each radius takes less time than sorting the points, or must be."""
+    largest = float(radii.max())
+    if largest > _LARGEST_GATHERED:
+        return True
+    limit = n_points // _SORTED_MEANWHILE
+    if largest > cutoff or limit == 0:
+        return False
+    return len(radii) <= limit or len(np.unique(radii)) <= limit
+
+
+def _search_each(
+    search: Callable[[npt.NDArray[np.intp], float, float | None], Columns],
+    radii: Radii,
+    limit: float | None,
+) -> Columns:
+    """Offsets and arrays of all rows, in the order of the queries.
+
+    search: returns those of some queries, by number, within one radius, and takes so many bytes;
+    None: the limit of all.
+    """
+    lengths, which = np.unique(radii, return_inverse=True)
+    order = np.argsort(which.reshape(-1), kind="stable")
+    parts: list[Columns] = []
+    held = 0
+    ends = np.searchsorted(which.reshape(-1)[order], np.arange(len(lengths)), side="right")
+    for radius, members in zip(lengths.tolist(), np.split(order, ends[:-1])):
+        room = None if limit is None or held == 0 else max(0.0, float(limit) - held)
+        parts.append(search(members, radius, room))
+        held += sum(column.nbytes for column in parts[-1])
+    if limit is not None and len(parts) > 1 and 2 * held > limit:
+        raise MemoryError(
+            f"the result would not fit: joined from rows of different radii it takes "
+            f"{gigabytes(2 * held)} GB, {float(limit) / 1e9:.3g} GB are allowed"
+        )
+    return parts[0] if len(parts) == 1 else _joined(parts, order)
+
+
+def _joined(parts: list[Columns], order: npt.NDArray[np.intp]) -> Columns:
+    """One table of parts whose rows are in this order."""
+    counts = np.concatenate([np.diff(part[0]) for part in parts])
+    lengths = np.empty(len(order), np.int64)
+    lengths[order] = counts
+    offsets = starts_of(lengths)
+    starts = offsets[:-1][order] - starts_of(counts)[:-1]
+    to = np.arange(int(offsets[-1])) + np.repeat(starts, counts)
+    joined = [offsets]
+    for columns in list(zip(*parts))[1:]:
+        together = np.concatenate(columns)
+        column = np.empty_like(together)
+        column[to] = together
+        joined.append(column)
+    for array in joined:
+        array.flags.writeable = False
+    return tuple(joined)

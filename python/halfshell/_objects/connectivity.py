@@ -11,13 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _show
-from halfshell._convert.arrays import as_array, as_real_array, in_order
+from halfshell._convert.arrays import as_array, as_real_array, in_order, starts_of
 from halfshell._convert.call import DIRECTED, RULES_OF_SUPPORTS
 from halfshell._convert.foreign import is_a, kind_of, shown
 from halfshell._convert.options import as_choice, as_flag, as_list, as_whole
 from halfshell._convert.points import as_box_alone, as_own_box, as_points
-from halfshell._convert.starts import starts_of
-from halfshell._objects import node_links, node_plot
+from halfshell._objects import node_links, pictures
 from halfshell._objects.node_links import How, Links, Rows
 from halfshell._objects.node_list import NodeList, as_extents
 
@@ -33,18 +32,13 @@ if TYPE_CHECKING:
     Predicate = Callable[[Ints, Ints, Ints, Ints], npt.ArrayLike]
 
 
+@_show.shown
 class GlobalNeighbors(NamedTuple):
     """Ids of nodes, and of their neighbours row after row."""
 
     ids: npt.NDArray[np.int64]
     offsets: npt.NDArray[np.int64]
     neighbors: npt.NDArray[np.int64]
-
-    def __repr__(self) -> str:
-        return _show.line(self)
-
-    def _repr_html_(self) -> str:
-        return _show.html(self)
 
 
 class Connectivity:
@@ -192,7 +186,7 @@ class Connectivity:
             raise ValueError(f"intersection in a periodic box needs at most 6 dimensions, got {d}")
         self._exclude = exclude
         self._links = node_links.built(given, how, exclude)
-        self._seen: list[node_plot.Seen] = [(one.positions, one.H) for one in given]
+        self._seen: list[pictures.Seen] = [(one.positions, one.H) for one in given]
 
     # ---- changes -----------------------------------------------------------------------------
 
@@ -260,7 +254,7 @@ class Connectivity:
         """
         self._become(node_links.removed(self._links, which), "remove", self._seen)
 
-    def _become(self, links: Links, because: str, seen: list[node_plot.Seen]) -> None:
+    def _become(self, links: Links, because: str, seen: list[pictures.Seen]) -> None:
         """Nothing here can fail: what a change makes has been made."""
         self._links.pairs._outdated = because
         self._links = links
@@ -554,7 +548,7 @@ class Connectivity:
         )
 
     def _repr_html_(self) -> str:
-        return node_plot.html_of(self._links)
+        return pictures.html_of(self._links)
 
     def plot(self, axes: tuple[int, int] = (0, 1), ax: Axes | None = None) -> Axes:
         """Draw the nodes by list, their supports and the pairs; ghosts are hollow.
@@ -573,7 +567,7 @@ class Connectivity:
         -------
         matplotlib.axes.Axes
         """
-        return node_plot.draw(self._links, self._seen, axes, ax)
+        return pictures.draw_nodes(self._links, self._seen, axes, ax)
 
     # ---- how rows are found ------------------------------------------------------------------
 

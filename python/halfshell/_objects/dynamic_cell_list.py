@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, Never
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ from halfshell._convert.foreign import shown
 from halfshell._convert.lengths import as_positive
 from halfshell._convert.options import as_choice, as_flag, as_whole
 from halfshell._convert.points import MAX_DIM, as_own_box, as_points
-from halfshell._unknown import refuse_unknown
+from halfshell._search import search
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -103,6 +103,7 @@ class DynamicCellList:
 
     __slots__ = ("__weakref__", "_cells", "_given")
 
+    @search()
     def __init__(
         self,
         dim: int,
@@ -114,10 +115,7 @@ class DynamicCellList:
         max_radius: Number | None = None,
         inclusive: bool = True,
         tagged: bool = False,
-        **unknown: Never,
     ) -> None:
-        if unknown:
-            refuse_unknown(DynamicCellList, unknown)
         ndim = as_whole(dim, "dim")
         if not 1 <= ndim <= MAX_DIM:
             raise ValueError(f"dim must be from 1 to {MAX_DIM}, got {shown(ndim)}")

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import importlib
 import itertools
+import math
 import operator
 import os
 import zipfile
@@ -15,28 +17,42 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _show
-from halfshell._convert.arrays import as_array, as_real_array
-from halfshell._convert.foreign import shown, told
-from halfshell._convert.listed import as_listed
+from halfshell._convert.arrays import (
+    as_array,
+    as_listed,
+    as_real_array,
+    entries_of,
+    rows_of,
+    starts_of,
+)
+from halfshell._convert.foreign import is_a, kind_of, shown, told, whole_number
+from halfshell._convert.lengths import as_number
+from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import as_choice, as_count, as_flag, as_whole, check_letters
-from halfshell._convert.starts import starts_of
-from halfshell._objects import rows as in_rows
-from halfshell._objects.exact_order import Origin
-from halfshell._objects.rows import Array, part_of, read_only, rows_of
+from halfshell._errors import CapacityError, needs
+from halfshell._objects.exact import Array, Origin, order_by_index, order_in_rows, part_of
+from halfshell._search import document
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from halfshell._convert.types import ArrayLike
 
+Positions = npt.NDArray[np.int64]
 Row = Array | tuple[Array, ...]
 Chosen = Array | list[int] | list[bool]
 
-_NAMES = {"j": "indices", "d": "distances", "D": "vectors", "S": "shifts"}
+_NAMES = {"j": "indices", "d": "distances", "D": "vectors", "S": "shifts", "k": "shells"}
 _FORMAT = 1  # of files and pickles
+_LEAST_SHIFT = -(2**31)
+_COPIES = 5  # arrays of int64 that triplets have at one time, of the length of the result
+
+#: What is summed in which type, by the kind of the dtype.
+_SUMMED_IN = {"b": np.int64, "i": np.int64, "u": np.uint64, "f": np.float64}
 _ROWS_SHOWN, _ENTRIES_SHOWN = 5, 8
 
 
+@_show.shown
 class Graph(NamedTuple):
     """A graph, as `NeighborTable.graph` returns it.
 
@@ -65,12 +81,6 @@ class Graph(NamedTuple):
     vectors: npt.NDArray[np.float64]
     distances: npt.NDArray[np.float64] | None
 
-    def __repr__(self) -> str:
-        return _show.line(self)
-
-    def _repr_html_(self) -> str:
-        return _show.html(self)
-
 
 class NeighborTable:
     """All neighbours of each point, or of each query, row after row.
@@ -93,8 +103,10 @@ class NeighborTable:
         The vector D from i to it; with 'D' in `quantities`.
     shifts : ndarray of int32, shape (m, d)
         Its shift S; with 'S' in `quantities`.
+    shells : ndarray of int32, shape (m,)
+        The smallest of several cutoffs that it is within, from 0 on; with 'k' in `quantities`.
     quantities : str
-        What the table holds: some of the letters ``j d D S``, in the order of `quantities`.
+        What the table holds: some of the letters ``j d D S k``, in the order of `quantities`.
     n_rows, n_points, n_entries : int
         Points or queries with a row; points to find; neighbours in all rows, m.
     shape : tuple of int
@@ -264,7 +276,7 @@ class NeighborTable:
         """A table of columns i, j and more. `is_in_order`: pairs ascend by (i, j, S), though S may
         not be there."""
         if is_half:
-            columns = in_rows.both_directions(columns)
+            columns = _both_directions(columns)
         i, j, shifts = columns["i"], columns["j"], columns.get("S")
         key = i.astype(np.int64) * max(shape[1], 1) + j
         order = np.argsort(key, kind="stable")
@@ -281,9 +293,9 @@ class NeighborTable:
         has_both = is_of_one_set
         if is_of_one_set and not is_half:
             other = np.empty((len(j), 0)) if shifts is None else shifts[order]
-            has_both = in_rows.reverse_by_shift(offsets, j[order], other) is not None
+            has_both = _reverse_by_shift(offsets, j[order], other) is not None
         return cls(
-            tuple(map(read_only, arrays)), quantities, shape[1], has_both, is_in_order=is_in_order
+            tuple(map(_read_only, arrays)), quantities, shape[1], has_both, is_in_order=is_in_order
         )
 
     def save(self, file: str | os.PathLike[str] | IO[bytes]) -> None:
@@ -378,7 +390,7 @@ class NeighborTable:
             origin = Origin(**parts, is_own=True)
         # Arrays that are unpickled or deep-copied can be written to.
         return cls(
-            tuple(map(read_only, arrays)), letters, state["n_points"], state["is_of_one_set"],
+            tuple(map(_read_only, arrays)), letters, state["n_points"], state["is_of_one_set"],
             state["is_complete"], state["is_in_order"], origin,
         )  # fmt: skip
 
@@ -396,7 +408,7 @@ class NeighborTable:
 
     @property
     def counts(self) -> npt.NDArray[np.int64]:
-        return read_only(np.diff(self._arrays[0]))
+        return _read_only(np.diff(self._arrays[0]))
 
     @property
     def indices(self) -> Array:
@@ -413,6 +425,10 @@ class NeighborTable:
     @property
     def shifts(self) -> npt.NDArray[np.int32]:
         return self._column("S")
+
+    @property
+    def shells(self) -> npt.NDArray[np.int32]:
+        return self._column("k")
 
     @property
     def quantities(self) -> str:
@@ -504,8 +520,8 @@ class NeighborTable:
         try:
             i = operator.index(row)  # type: ignore[arg-type]
         except TypeError:
-            rows = in_rows.as_rows(row, len(self))
-            return self._with(*in_rows.entries_of(self._arrays[0], rows), rows)
+            rows = _as_rows(row, len(self))
+            return self._with(*entries_of(self._arrays[0], rows), rows)
         n = len(self)
         if not -n <= i < n:
             raise IndexError(f"row {shown(i)} of a table of {n} rows")
@@ -524,9 +540,9 @@ class NeighborTable:
         is_complete: bool = True, is_in_order: bool = True,
     ) -> Self:  # fmt: skip
         """A table of some entries, in rows that begin there: those of all rows, or of these."""
-        columns = (read_only(column[entries]) for column in self._arrays[1:])
+        columns = (_read_only(column[entries]) for column in self._arrays[1:])
         return type(self)(
-            (read_only(offsets), *columns), self._quantities, self._n_points,
+            (_read_only(offsets), *columns), self._quantities, self._n_points,
             self._is_of_one_set and rows is None, self._is_complete and is_complete,
             self._is_in_order and is_in_order, self._origin,
             self._rows if rows is None else part_of(self._rows, rows),
@@ -552,7 +568,15 @@ class NeighborTable:
         >>> [j.tolist() for j, d in table.filter(table.distances > 1.5)]
         [[], [2], [1]]
         """
-        keep = in_rows.as_mask(mask, self.n_entries)
+        keep = as_array(mask, "mask", "hold bools")
+        if keep.shape != (self.n_entries,):
+            raise ValueError(
+                f"mask must have shape ({self.n_entries},), one bool for each entry, got "
+                f"{keep.shape}"
+            )
+        if keep.dtype != np.bool_ and self.n_entries > 0:
+            raise TypeError(f"mask must hold bools, got dtype {keep.dtype}")
+        keep = keep.astype(np.bool_)  # a copy, as another thread may change the caller's
         starts, all_stay = starts_of(keep)[self.offsets], bool(keep.all())
         return self._with(starts, np.flatnonzero(keep), is_complete=all_stay)
 
@@ -611,7 +635,20 @@ class NeighborTable:
             uint64, which both wrap as in NumPy; floats in float64.
 
         """
-        return in_rows.row_sums(self.offsets, values)
+        array, offsets = as_array(values, "values"), self.offsets
+        if array.ndim == 0 or len(array) != self.n_entries:
+            raise ValueError(
+                f"values must have shape ({self.n_entries}, ...), one for each entry, got "
+                f"{array.shape}"
+            )
+        dtype = _SUMMED_IN.get(array.dtype.kind)
+        if dtype is None or array.dtype.itemsize > 8:
+            raise TypeError(f"values must hold real numbers, got dtype {array.dtype}")
+        sums = np.zeros((len(self), *array.shape[1:]), dtype)
+        filled = np.flatnonzero(np.diff(offsets))
+        if len(filled):  # rows without entries are passed over: between two of these are none
+            sums[filled] = np.add.reduceat(array, offsets[filled], axis=0, dtype=dtype)
+        return sums
 
     @overload
     def triplets(
@@ -654,8 +691,8 @@ class NeighborTable:
         """
         both = as_flag(ordered, "ordered")
         if block is None:
-            return in_rows.triplets(self.offsets, both)
-        return in_rows.blocks_of_triplets(self.offsets, both, as_count(block, "block"))
+            return triplets_of(self.offsets, both)
+        return _blocks_of_triplets(self.offsets, both, as_count(block, "block"))
 
     # ---- other forms -----------------------------------------------------------------------
 
@@ -665,7 +702,7 @@ class NeighborTable:
         Parameters
         ----------
         quantities : str, default "ij"
-            Any of the letters ``i j d D S P``, each at most once, that the table has.
+            Any of the letters ``i j d D S P k``, each at most once, that the table has.
         half : bool, default False
             Each pair once, as in `pairs`: i < j, or i == j and the first nonzero component of S is
             positive. Only for a table of one set of points; it needs shifts if a point has its own
@@ -688,7 +725,7 @@ class NeighborTable:
         >>> i.tolist(), j.tolist()
         ([0, 1], [1, 2])
         """
-        check_letters(quantities)
+        check_letters(quantities, "ijdDSPk")
         half = as_flag(half, "half")
         rows = self._row_numbers()
         columns = {"i": rows}
@@ -697,7 +734,13 @@ class NeighborTable:
         columns |= {letter: self._column(letter) for letter in quantities if letter not in "iP"}
         if half:
             self._refuse_queries("half=True")
-            keep = in_rows.first_halves(rows, self.indices, lambda: self.shifts)
+            keep = rows < self.indices
+            own = np.flatnonzero(rows == self.indices)
+            if len(own) > 0:  # those whose first nonzero component is positive
+                sign = np.zeros(len(own), np.int32)
+                for column in self.shifts[own].T[::-1]:
+                    sign = np.where(column != 0, column, sign)
+                keep[own] = sign > 0
             columns = {letter: column[keep] for letter, column in columns.items()}
         arrays = tuple(columns[letter] for letter in quantities)
         return arrays if len(arrays) > 1 else arrays[0]
@@ -726,11 +769,29 @@ class NeighborTable:
         as_choice(duplicates, "duplicates", ("raise", "min"))
         indices, distances = self.indices, self.distances
         if not self._is_in_order:
-            order = in_rows.order_in_rows(rows_of(self.offsets), indices)
+            order = order_in_rows(rows_of(self.offsets), indices)
             indices, distances = indices[order], distances[order]
-        return in_rows.sparse_array(
-            self.offsets, indices, distances, self._n_points, duplicates == "min"
-        )
+        try:
+            sparse = importlib.import_module("scipy.sparse")
+        except ImportError as error:
+            raise ImportError(needs("to_scipy", "scipy")) from error
+        offsets = self.offsets
+        is_first = np.ones(len(indices), np.bool_)
+        is_first[1:] = indices[1:] != indices[:-1]
+        is_first[offsets[:-1][np.diff(offsets) > 0]] = True
+        if is_first.all():
+            parts = distances, indices, offsets
+            return sparse.csr_array(parts, shape=self.shape, copy=True)
+        if duplicates != "min":
+            k = int(np.flatnonzero(~is_first)[0])
+            row = int(np.searchsorted(offsets, k, side="right")) - 1
+            raise ValueError(
+                f"row {row} has several images of point {indices[k]}, and a matrix has one entry "
+                "for them: duplicates='min' keeps the nearest"
+            )
+        nearest = np.minimum.reduceat(distances, np.flatnonzero(is_first))
+        parts = nearest, indices[is_first], starts_of(is_first)[offsets]
+        return sparse.csr_array(parts, shape=self.shape)
 
     def to_padded(
         self, capacity: int | None = None, fill: Any = -1, *, quantity: str = "j"
@@ -742,9 +803,9 @@ class NeighborTable:
         capacity : int, optional
             Length of the rows. Default: that of the longest one.
         fill : number, default -1
-            Padding value: for `quantity` "j" and "S" a whole number that fits their type,
+            Padding value: for `quantity` "j", "S" and "k" a whole number that fits their type,
             otherwise any number, such as ``math.inf``.
-        quantity : {"j", "d", "D", "S"}, default "j"
+        quantity : {"j", "d", "D", "S", "k"}, default "j"
             The quantity, which the table must have.
 
         Returns
@@ -770,7 +831,23 @@ class NeighborTable:
         2
         """
         as_choice(quantity, "quantity", tuple(_NAMES))
-        return in_rows.padded(self.offsets, self._column(quantity), capacity, fill)
+        column, counts = self._column(quantity), np.diff(self.offsets)
+        needed = int(counts.max(initial=0))
+        length = needed if capacity is None else _as_capacity(capacity)
+        if length < needed:
+            raise CapacityError(
+                f"capacity is too small: row {int(counts.argmax())} has {needed} entries, got "
+                f"{length}",
+                needed,
+            )
+        shape = (len(counts), length, *column.shape[1:])
+        # And a bool for each entry.
+        n_rows = max(len(counts), 1)
+        needed_bytes = n_rows * math.prod(shape[1:]) * column.dtype.itemsize + n_rows * length
+        refuse_unavailable(needed_bytes, f"rows padded to a capacity of {shown(length)}")
+        array = np.full(shape, _as_fill(fill, column.dtype), column.dtype)
+        array[np.arange(length) < counts[:, None]] = column
+        return array
 
     def edge_index(self) -> Array:
         """The entries as edges of a graph, from neighbour to point.
@@ -820,7 +897,7 @@ class NeighborTable:
                 "a graph needs indices, vectors and shifts: request them with quantities='jDS', "
                 f"got {self._quantities!r} without {lacking!r}"
             )
-        shifts, vectors = in_rows.opposite(self.shifts), 0.0 - self.vectors
+        shifts, vectors = _opposite(self.shifts), 0.0 - self.vectors
         distances = self.distances if "d" in self._quantities else None
         return Graph(self.edge_index(), shifts, vectors, distances)
 
@@ -850,8 +927,8 @@ class NeighborTable:
         """
         self._refuse_queries("reverse()")
         if self._is_complete and self._is_in_order:
-            return in_rows.reverse_in_order(self.offsets, self.indices)
-        reverse = in_rows.reverse_by_shift(self.offsets, self.indices, self.shifts)
+            return _reverse_in_order(self.offsets, self.indices)
+        reverse = _reverse_by_shift(self.offsets, self.indices, self.shifts)
         if reverse is None:
             raise ValueError(
                 "an entry has no reverse in this table: filter both directions of a pair alike"
@@ -866,6 +943,7 @@ class NeighborTable:
                 "rows of another table"
             )
 
+    @document
     def plot(
         self,
         row: SupportsIndex = 0,
@@ -883,16 +961,9 @@ class NeighborTable:
         types : array_like of int or str, shape (n_points,), optional
             A colour for each type of a neighbour, and an entry of the legend. The table must have
             'j' for it.
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; for points in three dimensions with ``projection="3d"``. Default: axes
-            of a new figure.
-        unit : str, optional
-            The unit of the points, for the labels of the axes: "Å".
+        {ax, unit}
 
-        Returns
-        -------
-        matplotlib.axes.Axes
-            What has been drawn on.
+        {drawn}
 
         Notes
         -----
@@ -912,6 +983,11 @@ class NeighborTable:
         near = self.indices[some] if "j" in self.quantities or types is not None else None
         kinds = None if types is None else as_types(types, self.n_points)
         return draw_neighbors(f"row {k}", vectors, near, kinds, ax, unit)
+
+
+def _read_only(array: Array) -> Array:
+    array.flags.writeable = False
+    return array
 
 
 def _brief(value: Any) -> str:
@@ -935,7 +1011,8 @@ def _check_state(state: dict[str, Any]) -> None:
     d = points.shape[1]
     expected = {
         "offsets": ("i8", (n_rows + 1,)), "j": ("i4 i8", (m,)), "d": ("f8", (m,)),
-        "D": ("f8", (m, ...)), "S": ("i4", (m, ...)), "origin_points": ("f4 f8", (len(points), d)),
+        "D": ("f8", (m, ...)), "S": ("i4", (m, ...)), "k": ("i4", (m,)),
+        "origin_points": ("f4 f8", (len(points), d)),
         "origin_queries": ("f4 f8", (n_rows, d)), "origin_box": ("f8", (..., d)),
         "origin_systems": ("i8", (n_rows,)), "origin_shifts": ("i4", (m, d)),
         "origin_numbers": ("i4 i8", (len(points),)),
@@ -954,3 +1031,169 @@ def _check_state(state: dict[str, Any]) -> None:
         and (n_rows == n or not state["is_of_one_set"])
     ):  # fmt: skip
         raise ValueError("its numbers do not fit each other")
+
+
+# ---- rows, and both directions of entries ----------------------------------------------------
+
+def _opposite(shifts: Array) -> Array:
+    """-S, where all of them have one."""
+    if shifts.min(initial=0) == _LEAST_SHIFT:
+        raise OverflowError("a shift S of -2**31 has no opposite that fits int32")
+    return -shifts
+
+
+def _as_rows(chosen: Any, n_rows: int) -> Positions:
+    """Numbers of rows from 0 on, of an array of whole numbers or a mask."""
+    if not (is_a(chosen, (list, np.ndarray, memoryview)) or hasattr(type(chosen), "__array__")):
+        raise _refused(type(chosen).__name__)
+    array = as_array(chosen, "rows", "hold whole numbers or bools")
+    if array.ndim == 0:
+        raise _refused(type(chosen).__name__)
+    if array.ndim != 1:
+        raise ValueError(f"rows must be chosen by an array of one axis, got shape {array.shape}")
+    if array.dtype.kind == "b":
+        if len(array) != n_rows:
+            raise ValueError(
+                f"a mask of rows must have shape ({n_rows},), one bool for each row, got "
+                f"{array.shape}"
+            )
+        return np.flatnonzero(array.copy())  # another thread may change the caller's
+    if len(array) == 0 and is_a(chosen, list):
+        return np.empty(0, np.int64)
+    if array.dtype.kind not in "iu":
+        raise _refused(f"an array of {array.dtype}")
+    array = array.copy()
+    for k in np.flatnonzero((array >= n_rows) | (array < -n_rows)):
+        raise IndexError(f"row {array[k]} (at [{k}]) of a table of {n_rows} rows")
+    rows: Positions = array.astype(np.int64)
+    rows[rows < 0] += n_rows
+    return rows
+
+
+def _refused(kind: str) -> TypeError:
+    return TypeError(
+        "a row is chosen by a whole number, rows by a slice, an array of whole numbers or a mask, "
+        f"got {kind}"
+    )
+
+
+def _as_capacity(value: Any) -> int:
+    capacity = whole_number(value, "capacity")
+    if capacity is None or is_a(capacity, bool):
+        raise TypeError(f"capacity must be a whole number, got {kind_of(value)}")
+    if capacity < 0:
+        raise ValueError(f"capacity must not be negative, got {shown(capacity)}")
+    return capacity
+
+
+def _as_fill(value: Any, dtype: np.dtype[Any]) -> Any:
+    """A number that this type holds as it is."""
+    number = as_number(value, "fill")
+    if dtype.kind == "f":
+        return number
+    limits = np.iinfo(dtype)
+    if not number.is_integer() or not limits.min <= int(number) <= limits.max:
+        raise ValueError(f"fill must be a whole number that {dtype} holds, got {shown(value)}")
+    return int(number)
+
+
+def _both_directions(columns: dict[str, Array]) -> dict[str, Array]:
+    """Entries of both points of each pair, whose columns are i, j and any of d, D and S.
+
+    Backwards first, in reverse: where pairs ascend by (i, j, S), so do all entries of one (i, j),
+    for -S of pairs backwards ascend as well, and those of a point and its images come before S.
+    """
+    found = {
+        "i": np.concatenate((columns["j"][::-1], columns["i"])),
+        "j": np.concatenate((columns["i"][::-1], columns["j"])),
+    }
+    for letter in columns.keys() - {"i", "j"}:
+        back = column = columns[letter][::-1]
+        if letter != "d":
+            back = _opposite(column) if letter == "S" else 0.0 - column  # of 0.0 it is 0.0
+        found[letter] = np.concatenate((back, columns[letter]))
+    return found
+
+
+def _reverse_in_order(offsets: Array, indices: Array) -> Positions:
+    """Where (j, i, -S) of each (i, j, S) is, in all of a full list that ascends by (i, j, S).
+
+    A stable sort by j orders entries by (j, i, S), and so puts in place k the one whose other
+    direction is entry k; but where several images of j are in one row these come out by S and
+    not by -S: they are turned round.
+    """
+    order = order_by_index(indices)
+    rows = rows_of(offsets, indices.dtype)
+    m = len(indices)
+    is_first = np.ones(m, np.bool_)
+    is_first[1:] = (indices[1:] != indices[:-1]) | (rows[1:] != rows[:-1])
+    if is_first.all():
+        return order
+    starts = np.flatnonzero(is_first)
+    ends = np.append(starts[1:], m)
+    image = np.cumsum(is_first) - 1  # which run of images each entry is in
+    turned: Positions = order[starts[image] + ends[image] - 1 - np.arange(m)]
+    return turned
+
+
+def _reverse_by_shift(offsets: Array, indices: Array, shifts: Array) -> Positions | None:
+    """The same for entries in any order; None where that of one of them is missing."""
+    rows = rows_of(offsets, indices.dtype)
+    columns = tuple(shifts.T[::-1])
+    order = np.lexsort((*columns, indices, rows))
+    other = np.lexsort((*(-column for column in columns), rows, indices))
+    if not (
+        np.array_equal(rows[order], indices[other])
+        and np.array_equal(indices[order], rows[other])
+        and np.array_equal(shifts[order], -shifts[other])
+    ):
+        return None
+    reverse = np.empty(len(order), np.int64)
+    reverse[order] = other
+    return reverse
+
+
+# ---- two entries of a row ------------------------------------------------------------------
+
+def triplets_of(offsets: Positions, ordered: bool) -> tuple[Positions, Positions]:
+    """All of them, as positions among the entries."""
+    counts = np.diff(offsets)
+    # As Python numbers: a product of the counts of a huge row may pass int64 when it is summed.
+    total = int(np.dot(counts.astype(object), counts - 1)) if len(counts) else 0
+    total = total if ordered else total // 2
+    refuse_unavailable(8 * _COPIES * total, f"{total} triplets")
+    return _triplets_of(offsets[:-1], counts, ordered)
+
+
+def _blocks_of_triplets(
+    offsets: Positions, ordered: bool, most: int
+) -> Iterator[tuple[Positions, Positions]]:
+    """Whole rows at a time, together of at most so many triplets, or one row that has more."""
+    counts = np.diff(offsets)
+    several = counts * (counts - 1)
+    sums = np.cumsum(several if ordered else several // 2)
+    first = 0
+    while first < len(counts):
+        before = int(sums[first - 1]) if first else 0
+        end = max(first + 1, int(np.searchsorted(sums, before + most, side="right")))
+        refuse_unavailable(8 * _COPIES * (int(sums[end - 1]) - before), "the triplets of one row")
+        if int(sums[end - 1]) > before:
+            yield _triplets_of(offsets[first:end], counts[first:end], ordered)
+        first = end
+
+
+def _triplets_of(starts: Positions, counts: Array, ordered: bool) -> tuple[Positions, Positions]:
+    """Of these rows; each entry as the first one, with those behind it or all others."""
+    n_entries = int(counts.sum())
+    row_start = np.repeat(starts, counts)
+    entry = np.arange(n_entries) + (int(starts[0]) if len(starts) else 0)
+    place = entry - row_start
+    others = np.repeat(counts, counts) - 1 - (0 if ordered else place)
+    first = np.repeat(entry, others)
+    step = np.arange(len(first)) - np.repeat(np.cumsum(others) - others, others)
+    if not ordered:
+        return first, first + 1 + step
+    # Those before the entry, then those behind it.
+    second = np.repeat(row_start, others) + step
+    second += step >= np.repeat(place, others)
+    return first, second

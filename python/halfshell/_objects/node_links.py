@@ -10,13 +10,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from halfshell import _core
-from halfshell._convert.arrays import as_array
+from halfshell._convert.arrays import as_array, starts_of
 from halfshell._convert.call import DIRECTED
 from halfshell._convert.foreign import kind_of
 from halfshell._convert.options import as_list
-from halfshell._convert.starts import starts_of
-from halfshell._objects.node_list import reach_of
-from halfshell._objects.nodes import Nodes, corners_of, morton_number, nodes_of
+from halfshell._objects.node_list import Nodes, corners_of, morton_number, nodes_of, reach_of
 from halfshell._objects.pair_table import Columns, PairTable, as_pair_rows
 from halfshell._settings import current
 
@@ -153,7 +151,6 @@ class Links:
 
 # ---- all of it --------------------------------------------------------------------------------
 
-
 def built(lists: Sequence[NodeList], how: How, exclude: Any) -> Links:
     """The links of these lists."""
     nodes, points, supports = nodes_of(lists, how.box, how.rule in DIRECTED)
@@ -224,7 +221,6 @@ def _connected(nodes: Nodes, how: How, half: Half) -> Rows:
 
 # ---- the search -------------------------------------------------------------------------------
 
-
 def _search(
     points: FloatArray, supports: FloatArray, nodes: Nodes, how: How
 ) -> tuple[Rows, Rows | None]:
@@ -276,7 +272,6 @@ def _by_rule(gathered: Half, rule: str) -> Half:
 
 
 # ---- pairs that go ----------------------------------------------------------------------------
-
 
 def removed(links: Links, which: Any) -> Links:
     """The links without the pairs of a mask of the table, or those that a function chooses."""
@@ -370,7 +365,6 @@ def _cut_of_half(some: Half, nodes: Nodes) -> Cut:
 
 
 # ---- nodes that go ----------------------------------------------------------------------------
-
 
 def patched(links: Links, keep: Any, old2new: Any) -> tuple[Links, list[Offsets]]:
     """The links of the nodes that are kept, and which these are, by their new numbers.
@@ -506,7 +500,6 @@ def morton_keys(links: Links) -> npt.NDArray[np.uint64]:
 
 
 # ---- what holds of it -------------------------------------------------------------------------
-
 
 def check(links: Links) -> None:
     """ValueError unless rows are those of the pairs that they tell, and all else is what these

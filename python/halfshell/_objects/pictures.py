@@ -6,21 +6,26 @@ Points of one dimension are drawn on a line, at height 0. Points of more than th
 
 from __future__ import annotations
 
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._plot import new_axes
+from halfshell._convert.arrays import as_point_numbers, starts_of
+from halfshell._convert.foreign import kind_of
+from halfshell._errors import needs
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
 
-__all__ = [
-    "axes_for", "box_lines", "draw_box", "draw_cells", "draw_dots", "draw_lines", "draw_neighbors",
-    "draw_text", "draw_whole_box", "finish",
-]  # fmt: skip
+    from halfshell._objects.node_links import Links
+
+    #: Positions and supports of a list.
+    Seen = tuple[npt.NDArray[Any], npt.NDArray[Any]]
 
 _Floats = npt.NDArray[np.float64]
 
@@ -32,13 +37,35 @@ RASTER = 400  # places along each axis of a picture at which cells are looked up
 MOST_CELLS = 2000  # whose bounds are drawn in three dimensions
 COLOURS = 8
 
+#: Supports and pairs of nodes: more of them only blacken the picture.
+_MOST_SUPPORTS, _MOST_PAIRS = 2000, 200_000
+
+
+def axes_of(ax: Axes | None, ndim: int = 2, **size: Any) -> Axes:
+    """The axes given, or those of a new figure, in three dimensions for points of three."""
+    if ax is not None:
+        if not hasattr(ax, "add_collection"):
+            raise TypeError(
+                f"ax must be axes of Matplotlib, got {kind_of(ax)}; to write a file: "
+                "plot().figure.savefig(file)"
+            )
+        return ax
+    try:
+        from matplotlib import pyplot
+    except ImportError as error:
+        raise ImportError(needs("plot", "matplotlib")) from error
+    flat = ndim != 3  # in three dimensions the layout would cut off labels
+    how = {} if flat else {"projection": "3d"}
+    layout = "constrained" if flat else None
+    axes: Axes = pyplot.subplots(layout=layout, subplot_kw=how, **size)[1]
+    return axes
+
 
 def axes_for(ndim: int, ax: Axes | None) -> Axes:
     """Axes to draw points on; ValueError where these have another number of dimensions."""
     if ndim > 3:
         raise ValueError(f"pictures have up to 3 dimensions, and the points {ndim}")
-    if ax is None:
-        return new_axes(ndim, **({"figsize": (6.0, 6.0)} if ndim > 1 else {}))
+    ax = axes_of(ax, ndim, **({"figsize": (6.0, 6.0)} if ndim > 1 else {}))
     if (ndim == 3) != hasattr(ax, "get_zlim"):
         kind = 'projection="3d"' if ndim == 3 else "two dimensions"
         raise ValueError(f"ax must be axes of {kind} for points in {ndim} dimensions")
@@ -137,7 +164,8 @@ def finish(ax: Axes, ndim: int, unit: str | None = None) -> Axes:
     """One scale along all axes, and what they are."""
     ax.autoscale_view()
     if ndim > 1:
-        low, high = zip(*_limits(ax, ndim), strict=True)
+        limits = [getattr(ax, f"get_{name}lim")() for name in "xyz"[:ndim]]
+        low, high = zip(*limits, strict=True)
         if all(b > a for a, b in zip(low, high, strict=True)):
             ax.set_aspect("equal", adjustable="box")
     else:
@@ -145,10 +173,6 @@ def finish(ax: Axes, ndim: int, unit: str | None = None) -> Axes:
     for name in "xyz"[:ndim]:
         getattr(ax, f"set_{name}label")(name if unit is None else f"{name} / {unit}")
     return ax
-
-
-def _limits(ax: Any, ndim: int) -> list[tuple[float, float]]:
-    return [getattr(ax, f"get_{name}lim")() for name in "xyz"[:ndim]]
 
 
 # ---- cells ----------------------------------------------------------------------------------
@@ -160,7 +184,9 @@ def draw_cells(cells: Any, ax: Axes | None, unit: str | None) -> Axes:
     if len(points) > MOST_DOTS:
         raise ValueError(f"at most {MOST_DOTS} points can be drawn, got {len(points)}")
     ax = axes_for(ndim, ax)
-    x = _wrapped(np.asarray(points, np.float64), vectors, bits)
+    x = np.asarray(points, np.float64)
+    if vectors is not None and len(x):  # where their cells are
+        x = _core.box_wrap(x, vectors, bits)[0]
     numbers = np.repeat(np.arange(len(cells.cell_start) - 1), np.diff(cells.cell_start))
     colours = _colours(numbers, cells)
     if ndim < 3:
@@ -191,14 +217,6 @@ def _colours(numbers: npt.NDArray[Any], cells: Any) -> npt.NDArray[Any]:
     return found
 
 
-def _wrapped(x: _Floats, vectors: _Floats | None, bits: int) -> _Floats:
-    """Points where their cells are: in the box along the axes that repeat."""
-    if vectors is None or not len(x):
-        return x
-    wrapped: _Floats = _core.box_wrap(x, vectors, bits)[0]
-    return wrapped
-
-
 def _extent(x: _Floats, vectors: _Floats | None, bits: int) -> tuple[_Floats, _Floats]:
     """Lowest and highest coordinates of what is drawn."""
     parts = [x] if len(x) else []
@@ -223,3 +241,86 @@ def _raster(ax: Any, cells: Any, low: _Floats, high: _Floats) -> None:
         colours.reshape(grid[0].shape), extent=area, origin="lower", cmap="tab10", vmin=0, vmax=9,
         alpha=0.22, interpolation="nearest", aspect="auto", zorder=0,
     )  # fmt: skip
+
+
+# ---- nodes ----------------------------------------------------------------------------------
+
+def html_of(links: Links) -> str:
+    """What a notebook shows: a row for each list, and what the parts take."""
+    nodes = links.nodes
+    rows = links.how.with_rows(nodes)
+    entries = np.diff(links.rows.offsets[starts_of(rows) * nodes.n_lists])
+    means = entries / np.maximum(rows, 1)
+    cells = "".join(
+        f"<tr><td>{escape(name)}</td><td>{n}</td><td>{ghosts}</td><td>{mean:.1f}</td></tr>"
+        for name, n, ghosts, mean in zip(
+            nodes.names, nodes.internal, nodes.ghosts, means, strict=True
+        )
+    )
+    built = [name for name in ("overlap", "intersection") if getattr(links, name) is not None]
+    more = f", with {' and '.join(built)}" if built else ""
+    return (
+        f"<p>Connectivity: {len(links.pairs)} pairs{more}</p><table><thead><tr><th>list</th>"
+        "<th>nodes</th><th>ghosts</th><th>neighbours of a node</th></tr></thead>"
+        f"<tbody>{cells}</tbody></table>"
+    )
+
+
+def draw_nodes(links: Links, seen: Sequence[Seen], axes: tuple[int, int], ax: Axes | None) -> Axes:
+    """Nodes by list, ghosts hollow, their supports, and the pairs."""
+    d = next((x.shape[1] for x, _ in seen if len(x)), 2)
+    if d > 1:
+        numbers = as_point_numbers(axes, "axes", d, "coordinates")
+        if len(numbers) != 2:
+            raise ValueError(f"axes must be two of the {d} coordinates, got {numbers.tolist()}")
+        axes = int(numbers[0]), int(numbers[1])
+    ax = axes_of(ax)
+    from matplotlib import collections
+
+    nodes, how, pairs = links.nodes, links.how, links.pairs
+    places = [
+        x[:, list(axes)] if d > 1 else np.column_stack((x[:, :1], np.full(len(x), float(k))))
+        for k, (x, _) in enumerate(seen)
+    ]  # in one dimension each list has a line of its own
+    if 0 < len(pairs) <= _MOST_PAIRS:
+        every = np.concatenate(places)
+        start, end = (every[nodes.numbers(rank)] for rank in nodes.ranks_of(pairs._all()))
+        if how.bits and how.box is not None and d > 1:
+            end = end + (pairs.shifts @ how.box)[:, list(axes)]
+        lines = np.stack((start, end), axis=1)
+        ax.add_collection(collections.LineCollection(list(lines), colors="0.7", linewidths=0.5))
+    few = nodes.n <= _MOST_SUPPORTS
+    extents = np.broadcast_to(how.extent, len(seen)).tolist()
+    for k, (place, (_, supports), extent) in enumerate(zip(places, seen, extents, strict=True)):
+        color, internal = f"C{k % 10}", int(nodes.internal[k])
+        x, y = place.T
+        ax.scatter(x[:internal], y[:internal], s=12, color=color, zorder=3, label=nodes.names[k])
+        ax.scatter(
+            x[internal:], y[internal:], s=12, edgecolors=color, facecolors="white", zorder=3
+        )
+        if few and len(place):
+            ax.add_collection(collections.EllipseCollection(
+                *_shadows(supports, extent, axes, d), units="xy", offsets=place, facecolors="none",
+                edgecolors=color, linewidths=0.4, alpha=0.5, offset_transform=ax.transData,
+            ))  # fmt: skip
+    ax.set_aspect("equal" if d > 1 else "auto")
+    ax.autoscale_view()
+    if seen:
+        ax.legend()
+    return ax
+
+
+def _shadows(supports: Any, extent: float, axes: tuple[int, int], d: int) -> tuple[Any, Any, Any]:
+    """Those of supports on the plane of the picture, as widths, heights and angles."""
+    angles = np.zeros(len(supports))
+    if d == 1:
+        h = supports if supports.ndim == 1 else 1.0 / supports[:, 0, 0]
+        return 2.0 * extent * h, np.full(len(h), 0.2), angles
+    if supports.ndim == 1:
+        return 2.0 * extent * supports, 2.0 * extent * supports, angles
+    inverse = np.linalg.inv(supports)
+    shadow = (inverse @ inverse.transpose(0, 2, 1))[:, axes][:, :, axes]
+    squares, turns = np.linalg.eigh(shadow)
+    angles = np.degrees(np.arctan2(turns[:, 1, 0], turns[:, 0, 0]))
+    widths, heights = 2.0 * extent * np.sqrt(squares.T)
+    return widths, heights, angles

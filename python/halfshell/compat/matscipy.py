@@ -426,16 +426,16 @@ def triplet_list(
     >>> ij.tolist(), ik.tolist()
     ([0, 1], [1, 0])
     """
-    from halfshell._convert.starts import starts_of
-    from halfshell._objects.rows import triplets
+    from halfshell._convert.arrays import starts_of
+    from halfshell._objects.neighbor_table import triplets_of
 
     starts = np.maximum(np.asarray(first_neighbours).astype(np.int64), 0)
     if abs_dr_p is None or cutoff is None:
-        ij, ik = triplets(starts, True)
+        ij, ik = triplets_of(starts, True)
     else:
         near = np.asarray(abs_dr_p) < cutoff
         kept = np.flatnonzero(near)
-        ij, ik = triplets(starts_of(near)[starts], True)
+        ij, ik = triplets_of(starts_of(near)[starts], True)
         ij, ik = kept[ij], kept[ik]
     if i_p is None or j_p is None:
         return ij.astype(np.int32), ik.astype(np.int32)

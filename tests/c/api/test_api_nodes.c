@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_api_nodes.c: connectivity of lists of nodes, and its changes. */
 #include "../../../csrc/halfshell_nodes.h"
+#include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/poll_checks.h"
 #include "../support/reach_sets.h"
@@ -21,7 +22,7 @@ static const hs_node_lists lists = {
 static hs_reach
 supports(void)
 {
-    return (hs_reach){.rule = HS_RULE_MAX, .radii = set.radii, .extent = 1.1};
+    return (hs_reach){.rule = HS_RULE_MAX, .extent = 1.1};
 }
 
 static bool
@@ -35,9 +36,10 @@ same_array(const hs_pairs *one, const hs_pairs *other, unsigned which, size_t wi
 static hs_status
 build(void *context)
 {
-    const hs_points  points = reach_points(&set);
-    const hs_reach   reach = supports();
-    const hs_among   among = {.points = &points, .box = context, .reach = &reach};
+    const hs_points points = reach_points(&set);
+    const hs_reach  reach = supports();
+    const hs_among  among = {
+         .points = SET(&points, .radii = set.radii), .box = context, .reach = &reach};
     hs_options       options = hs_options_default();
     hs_connectivity *made = NULL, *linked = NULL;
     hs_pairs        *half = NULL;
@@ -104,7 +106,7 @@ build_in_cells(void *context)
     hs_node_lists turned = lists;
     turned.number = number;
     options.memory_limit = limit;
-    const hs_among  among = {.cells = cells}, same = {.points = &points, .box = context};
+    const hs_among  among = {.cells = cells}, same = {.points = SET(&points), .box = context};
     const hs_status status = hs_connectivity_build(&among, &turned, &options, &made, NULL);
     if (status == HS_OK && limit == HUGE_VAL) {
         CHECK(hs_connectivity_build(&same, &turned, &options, &other, NULL) == HS_OK);
@@ -137,7 +139,7 @@ arguments_that_do_not_fit_are_refused(void)
 {
     const hs_points      points = reach_points(&set);
     const hs_reach       reach = supports();
-    hs_among             among = {.points = &points, .reach = &reach};
+    hs_among             among = {.points = SET(&points, .radii = set.radii), .reach = &reach};
     hs_options           options = hs_options_default();
     static const int64_t few[3] = {40, 0, 59}, many[3] = {INT32_MAX, 1, 0}, below[3] = {-1, 0, 1};
     hs_node_lists        wrong = lists;
@@ -149,6 +151,9 @@ arguments_that_do_not_fit_are_refused(void)
     CHECK(hs_connectivity_build(&among, NULL, &options, &made, NULL) == HS_ERR_ARGUMENT);
     CHECK(hs_connectivity_build(&among, &lists, NULL, &made, NULL) == HS_ERR_ARGUMENT);
     CHECK(hs_connectivity_build(&among, &lists, &options, NULL, NULL) == HS_ERR_ARGUMENT);
+    const int64_t first[] = {0, 50, 100};
+    CHECK(hs_connectivity_build(SYSTEMS(&points, 2, first, NULL, NULL), &lists, &options, &made,
+                                NULL) == HS_ERR_ARGUMENT);
     wrong.n_nodes = few;
     CHECK(hs_connectivity_build(&among, &wrong, &options, &made, NULL) == HS_ERR_ARGUMENT);
     wrong.n_nodes = many;
@@ -231,7 +236,7 @@ arguments_that_do_not_fit_are_refused(void)
     CHECK(hs_connectivity_link(&none, &wrong, &options, &made, NULL) == HS_ERR_ARGUMENT);
     CHECK(hs_connectivity_link(&none, &lists, &options, &made, NULL) == HS_ERR_ARGUMENT);
     options.memory_limit = HUGE_VAL;
-    among.queries = &points;
+    among.queries = among.points;
     CHECK(hs_connectivity_build(&among, &lists, &options, &made, NULL) == HS_ERR_ARGUMENT);
 }
 
@@ -249,12 +254,12 @@ extents_that_none_can_have_are_refused(void)
                                 .inclusive = true};
     hs_pairs        *pairs;
     hs_reach         reach = supports();
-    hs_among         among = {.points = &points, .reach = &reach};
+    hs_among         among = {.points = SET(&points, .radii = set.radii), .reach = &reach};
     for (int k = 0; k < 5; k++) {
         reach.extent = bad[k];
         CHECK(hs_pairs_find(&among, &options, &pairs, NULL) == HS_ERR_ARGUMENT);
     }
-    reach = (hs_reach){.rule = HS_RULE_SUM, .radii = set.radii, .extent = 2.0};
+    reach = (hs_reach){.rule = HS_RULE_SUM, .extent = 2.0};
     CHECK(hs_pairs_find(&among, &options, &pairs, NULL) == HS_ERR_ARGUMENT);
     reach = supports();
     const double held = set.radii[3];

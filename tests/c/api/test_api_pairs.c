@@ -295,12 +295,12 @@ plans_know_a_reach(void)
     hs_plan         plan;
     int64_t         count = 0;
     const hs_points points = {x, 1000, 1, HS_FLOAT64, 8, 8}, empty = {x_none, 0, 1, 1, 8, 8};
-    hs_reach        reach = {.rule = HS_RULE_MAX, .radii = radii};
+    hs_reach        reach = {.rule = HS_RULE_MAX};
     for (int i = 0; i < 1000; i++) {
         x[i] = 1000.0 * random_unit(&random);
         radii[i] = i % 20 == 0 ? 1.5 : ldexp(1.5, -4 * (1 + i % 2));
     }
-    hs_among among = {.points = &points, .reach = &reach};
+    hs_among among = {.points = SET(&points, .radii = radii, .types = type), .reach = &reach};
     options.cutoff = INFINITY;
     CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK);
     CHECK(hs_pairs_count(&among, &options, &count, NULL) == HS_OK);
@@ -311,11 +311,11 @@ plans_know_a_reach(void)
     CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK);
     CHECK(plan.algorithm == HS_GRID && plan.n_searches == 1);
     CHECK(plan.expected_pairs == (double)count);
-    reach = (hs_reach){.n_types = 1, .types = type, .cutoffs = none};
+    reach = (hs_reach){.n_types = 1, .cutoffs = none};
     options.cutoff = 1.0;
     CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK);
     CHECK(plan.n_searches == 0 && plan.expected_pairs == 0.0 && plan.ndim == 1);
-    among.points = &empty;
+    among.points = SET(&empty);
     CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches == 0);
 }
 
@@ -330,19 +330,19 @@ plans_of_nothing_have_the_cells_of_no_cutoff(void)
     hs_options      options = hs_options_default();
     hs_plan         plan, of_none, of_bound;
     const hs_points points = {x, 1000, 1, HS_FLOAT64, 8, 8}, empty = {x, 0, 1, HS_FLOAT64, 8, 8};
-    const hs_reach  by_type = {.n_types = 1, .types = type, .cutoffs = none};
+    const hs_reach  by_type = {.n_types = 1, .cutoffs = none};
     const hs_reach  by_radii = {.rule = HS_RULE_SUM};
     for (int i = 0; i < 1000; i++)
         x[i] = 0.125 * i;
     CHECK(hs_plan_make(AMONG(&points, NULL), &options, &of_none, NULL) == HS_OK);
     options.cutoff = 30.0;
     CHECK(hs_plan_make(AMONG(&points, NULL), &options, &of_bound, NULL) == HS_OK);
-    hs_among among = {.points = &points, .reach = &by_type};
+    hs_among among = {.points = SET(&points, .types = type), .reach = &by_type};
     CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches == 0);
     CHECK(plan.n_cells == of_none.n_cells && plan.cell_size[0] == of_none.cell_size[0]);
     CHECK(plan.n_cells != of_bound.n_cells);
     options.cutoff = INFINITY;
-    among = (hs_among){.points = &empty, .reach = &by_radii};
+    among = (hs_among){.points = SET(&empty), .reach = &by_radii};
     CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK);
     CHECK(plan.n_searches == 0 && plan.expected_pairs == 0.0);
 }
@@ -356,8 +356,8 @@ plans_join_levels_unless_told_otherwise(void)
     harness_random random = {24};
     hs_options     options = hs_options_default();
     hs_plan        plan;
-    hs_points      points = {x, FEW, 3, HS_FLOAT64, 24, 8};
-    const hs_reach reach = {.rule = HS_RULE_SUM, .radii = radii};
+    hs_set         points = {.at = {x, FEW, 3, HS_FLOAT64, 24, 8}, .radii = radii};
+    const hs_reach reach = {.rule = HS_RULE_SUM};
     const hs_among among = {.points = &points, .reach = &reach};
     for (int e = 0; e < 3 * N; e++)
         x[e] = 4.0 * random_unit(&random);
@@ -372,7 +372,7 @@ plans_join_levels_unless_told_otherwise(void)
     CHECK(plan.expected_pairs == expected);
     for (int i = 0; i < N; i++) /* one that is far larger than many */
         radii[i] = i == 0 ? 2.0 : 0x1p-8;
-    points.n = N;
+    points.at.n = N;
     options.algorithm = HS_AUTO;
     CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches > 1);
     (void)hs_test_join_levels(joins);

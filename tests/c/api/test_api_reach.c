@@ -24,7 +24,7 @@ typedef struct reach_scene {
     double       table[REACH_TYPES * REACH_TYPES];
     double       bound;
     hs_reach     reach; /* points to the rest, as these do */
-    hs_points    points, queries;
+    hs_set       points, queries;
     hs_among     among;
 } reach_scene;
 
@@ -54,17 +54,14 @@ static void
 reach_connect(hs_rule rule, bool has_types, reach_scene *s)
 {
     const ptrdiff_t row = s->of.scene.ndim * (ptrdiff_t)sizeof(double);
-    s->reach = has_types
-                   ? (hs_reach){.rule = rule,
-                                .n_types = REACH_TYPES,
-                                .types = s->types,
-                                .query_types = s->types + s->n,
-                                .cutoffs = s->table}
-                   : (hs_reach){.rule = rule, .radii = s->radii, .query_radii = s->radii + s->n};
-    s->points = (hs_points){s->of.x, s->n, s->of.scene.ndim, HS_FLOAT64, row, sizeof(double)};
-    s->queries = s->points;
-    s->queries.data = s->of.x + s->n * s->of.scene.ndim;
-    s->queries.n = s->n_queries;
+    s->reach = has_types ? (hs_reach){.rule = rule, .n_types = REACH_TYPES, .cutoffs = s->table}
+                         : (hs_reach){.rule = rule};
+    s->points = (hs_set){.at = {s->of.x, s->n, s->of.scene.ndim, HS_FLOAT64, row, sizeof(double)},
+                         .radii = s->radii,
+                         .types = s->types};
+    s->queries = (hs_set){.at = s->points.at, .radii = s->radii + s->n, .types = s->types + s->n};
+    s->queries.at.data = s->of.x + s->n * s->of.scene.ndim;
+    s->queries.at.n = s->n_queries;
     s->among = (hs_among){.points = &s->points,
                           .box = s->of.scene.box,
                           .queries = s->has_queries ? &s->queries : NULL,
@@ -206,7 +203,7 @@ static int32_t many_types[MANY];
 
 /* rule: HS_RULE_END for types. */
 static hs_among
-make_many(hs_rule rule, hs_points *points, hs_reach *reach)
+make_many(hs_rule rule, hs_set *points, hs_reach *reach)
 {
     static const double table[] = {0.02, 0.04, 0.04, -1.0};
     harness_random      random = {30303};
@@ -216,10 +213,11 @@ make_many(hs_rule rule, hs_points *points, hs_reach *reach)
         many_radii[i] = ldexp(0.03 * (0.5 + random_unit(&random)), -(i % 8 == 0));
         many_types[i] = i % 2;
     }
-    *points = (hs_points){many_x, MANY, 3, HS_FLOAT64, 24, 8};
-    *reach = (hs_reach){.rule = rule, .radii = many_radii};
+    *points = (hs_set){
+        .at = {many_x, MANY, 3, HS_FLOAT64, 24, 8}, .radii = many_radii, .types = many_types};
+    *reach = (hs_reach){.rule = rule};
     if (rule == HS_RULE_END) {
-        *reach = (hs_reach){.n_types = 2, .types = many_types, .cutoffs = table};
+        *reach = (hs_reach){.n_types = 2, .cutoffs = table};
     }
     return (hs_among){.points = points, .reach = reach};
 }
@@ -229,7 +227,7 @@ static void
 threads_make_no_difference(void)
 {
     for (int rule = 0; rule <= HS_RULE_END; rule += IS_SLOW ? 2 : 1) {
-        hs_points      points;
+        hs_set         points;
         hs_reach       reach;
         const hs_among among = make_many((hs_rule)rule, &points, &reach);
         hs_options     options = hs_options_default();
@@ -252,8 +250,8 @@ threads_make_no_difference(void)
 static void
 one_refusal_ends_any_entry(void)
 {
-    hs_points points;
-    hs_reach  reach;
+    hs_set   points;
+    hs_reach reach;
     memset(&scene_entries, 0, sizeof scene_entries);
     scene_entries.of.scene.ndim = 3;
     for (int which = 0; which < ENTRIES; which++) {
@@ -343,11 +341,9 @@ make(harness_random *random, hs_rule rule, int ndim, int n_queries)
     fill_matrices(random, ndim, of_queries);
     scene_entries.bound = HUGE_VAL;
     scene_entries.of.scene.inclusive = true;
-    scene_entries.reach = (hs_reach){.rule = rule,
-                                     .has_supports = true,
-                                     .extent = 2.0,
-                                     .supports = own,
-                                     .query_supports = of_queries};
+    scene_entries.points.supports = own;
+    scene_entries.queries.supports = of_queries;
+    scene_entries.reach = (hs_reach){.rule = rule, .has_supports = true, .extent = 2.0};
 }
 
 static void
@@ -388,7 +384,7 @@ bad_supports_are_refused(void)
     all_refuse(HS_ERR_SUPPORTS, 5);
     own[3 * 9 + 1] += 0.25;
     all_refuse(HS_ERR_SUPPORTS, 3);
-    scene_entries.reach.supports = NULL;
+    scene_entries.points.supports = NULL;
     all_refuse(HS_ERR_ARGUMENT, -1);
     make(&random, HS_RULE_SUM, 3, -1);
     all_refuse(HS_ERR_ARGUMENT, -1);
@@ -396,12 +392,11 @@ bad_supports_are_refused(void)
     all_refuse(HS_ERR_ARGUMENT, -1);
     make(&random, HS_RULE_MAX, 3, -1);
     scene_entries.reach.n_types = 1;
-    scene_entries.reach.types = scene_entries.types;
     scene_entries.reach.cutoffs = scene_entries.table;
     all_refuse(HS_ERR_ARGUMENT, -1);
     reach_make(&random, SCENE_ALIGNED, 4, 20, -1, HS_RULE_MAX, 0, &scene_entries);
-    scene_entries.reach =
-        (hs_reach){.rule = HS_RULE_MAX, .has_supports = true, .extent = 1.0, .supports = own};
+    scene_entries.points.supports = own;
+    scene_entries.reach = (hs_reach){.rule = HS_RULE_MAX, .has_supports = true, .extent = 1.0};
     all_refuse(HS_ERR_ARGUMENT, -1);
 }
 
@@ -451,7 +446,7 @@ what_is_no_table_is_refused(void)
     scene_entries.reach.n_types = INT32_MIN;
     all_refuse_refusals(HS_ERR_ARGUMENT, -1);
     make_plain(HS_RULE_END, -1);
-    scene_entries.reach.types = NULL;
+    scene_entries.points.types = NULL;
     all_refuse_refusals(HS_ERR_ARGUMENT, -1);
     make_plain(HS_RULE_END, -1);
     scene_entries.reach.cutoffs = NULL;
@@ -507,10 +502,10 @@ shifts_that_do_not_fit_name_the_callers_row(void)
 {
     const hs_box   box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
     double         x[] = {0.0, 0.25, 0x1p31, 0.5}, radii[] = {0.3, 0.001, 0.3, 0.002};
-    const hs_reach reach = {.rule = HS_RULE_SUM, .radii = radii, .query_radii = radii};
-    hs_points      points = {x, 4, 1, HS_FLOAT64, 8, 8}, queries = points;
+    const hs_reach reach = {.rule = HS_RULE_SUM};
+    hs_points      points = {x, 4, 1, HS_FLOAT64, 8, 8};
     hs_options     options = hs_options_default();
-    hs_among       among = {.points = &points, .box = &box, .reach = &reach};
+    hs_among       among = {.points = SET(&points, .radii = radii), .box = &box, .reach = &reach};
     options.cutoff = 1.0;
     options.algorithm = HS_HIERARCHY;
     for (int further = 0; further < 2; further++) {
@@ -537,7 +532,7 @@ shifts_that_do_not_fit_name_the_callers_row(void)
     CHECK(hs_pairs_find(&among, &options, &found, &failure) == HS_ERR_SHIFT_RANGE);
     CHECK(found == NULL && !failure.in_queries && (failure.row == 0 || failure.row == 2));
     radii[0] = 0.3;
-    among.queries = &queries;
+    among.queries = among.points;
     CHECK(hs_neighbors_find(&among, &options, &found, &failure) == HS_ERR_SHIFT_RANGE);
     CHECK(found == NULL && failure.row == 0 && failure.in_queries);
 }
@@ -554,12 +549,13 @@ bad_rows_are_named_among_many(void)
     }
     for (int asks = 0; asks < 2; asks++) {
         const hs_points few = {x, 9, 1, HS_FLOAT64, 8, 8}, many = {x, ROWS_READ, 1, 1, 8, 8};
-        const hs_reach  reach = {.rule = HS_RULE_SUM, .radii = radii, .query_radii = radii};
-        const hs_among  among = {
-             .points = asks ? &few : &many, .queries = asks ? &many : &few, .reach = &reach};
-        hs_options options = hs_options_default();
-        hs_failure failure;
-        int64_t    n;
+        const hs_reach  reach = {.rule = HS_RULE_SUM};
+        const hs_among  among = {.points = SET(asks ? &few : &many, .radii = radii),
+                                 .queries = SET(asks ? &many : &few, .radii = radii),
+                                 .reach = &reach};
+        hs_options      options = hs_options_default();
+        hs_failure      failure;
+        int64_t         n;
         options.cutoff = 1.0;
         CHECK(hs_pairs_count(&among, &options, &n, &failure) == HS_ERR_NOT_FINITE);
         CHECK(failure.row == BAD && failure.column == 0 && failure.in_queries == (asks == 1));
@@ -579,15 +575,15 @@ both_sets_need_what_the_rule_looks_at(void)
             const bool is_short = (lacks & 1 && needs_points) || (lacks & 2 && needs_queries);
             for (int empty = 0; empty < 2; empty++) {
                 make_plain((hs_rule)rule, 9);
-                scene_entries.points.n = empty ? 0 : scene_entries.points.n;
-                scene_entries.queries.n = empty ? 0 : scene_entries.queries.n;
+                scene_entries.points.at.n = empty ? 0 : scene_entries.points.at.n;
+                scene_entries.queries.at.n = empty ? 0 : scene_entries.queries.at.n;
                 if (lacks & 1) {
-                    scene_entries.reach.radii = NULL;
-                    scene_entries.reach.types = NULL;
+                    scene_entries.points.radii = NULL;
+                    scene_entries.points.types = NULL;
                 }
                 if (lacks & 2) {
-                    scene_entries.reach.query_radii = NULL;
-                    scene_entries.reach.query_types = NULL;
+                    scene_entries.queries.radii = NULL;
+                    scene_entries.queries.types = NULL;
                 }
                 const hs_status status = is_short && !empty ? HS_ERR_ARGUMENT : HS_OK;
                 refuses(COUNT, status, -1);

@@ -190,7 +190,7 @@ static int
 allocations_of(hs_points points, int64_t n, int threads)
 {
     points.n = n;
-    lone_visit of = {.among = {.points = &points}, .threads = threads};
+    lone_visit of = {.among = *AMONG(&points, NULL), .threads = threads};
     return fail_each_allocation(visit_alone, &of, 1000);
 }
 

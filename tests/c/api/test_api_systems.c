@@ -57,24 +57,18 @@ points_of(const batch *made, int64_t first, int64_t end)
 static int64_t
 compare(const batch *made, hs_options options, bool has_box, int threads)
 {
-    const hs_points  points = points_of(made, 0, made->first[N_SYSTEMS]);
-    const hs_systems systems = {N_SYSTEMS,
-                                made->first,
-                                has_box ? &made->box : NULL,
-                                has_box ? made->rows : NULL,
-                                made->cutoffs,
-                                NULL,
-                                NULL,
-                                NULL,
-                                NULL};
-    hs_pairs        *pairs = NULL;
-    hs_failure       failure;
-    int64_t          counts[N_SYSTEMS], at = 0;
-    bool             same = true;
+    const hs_points      points = points_of(made, 0, made->first[N_SYSTEMS]);
+    const hs_each_system each = {.rows = has_box ? made->rows : NULL, .cutoffs = made->cutoffs};
+    const hs_among      *systems =
+        SYSTEMS(&points, N_SYSTEMS, made->first, has_box ? &made->box : NULL, &each);
+    hs_pairs  *pairs = NULL;
+    hs_failure failure;
+    int64_t    counts[N_SYSTEMS], at = 0;
+    bool       same = true;
     options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE;
     options.threads = threads;
-    if (hs_systems_find(&points, &systems, &options, &pairs, &failure) != HS_OK ||
-        hs_systems_count(&points, &systems, &options, counts, &failure) != HS_OK) {
+    if (hs_pairs_find(systems, &options, &pairs, &failure) != HS_OK ||
+        hs_pairs_count(systems, &options, counts, &failure) != HS_OK) {
         hs_pairs_free(pairs);
         return -1;
     }
@@ -132,9 +126,9 @@ nothing_is_lost_when_memory_is_short(void)
     static batch  made;
     const int64_t before = hs_test_live_blocks();
     make_batch(9, &made);
-    const hs_points  points = points_of(&made, 0, made.first[N_SYSTEMS]);
-    const hs_systems systems = {N_SYSTEMS, made.first, &made.box, made.rows, made.cutoffs,
-                                NULL,      NULL,       NULL,      NULL};
+    const hs_points      points = points_of(&made, 0, made.first[N_SYSTEMS]);
+    const hs_each_system each = {.rows = made.rows, .cutoffs = made.cutoffs};
+    const hs_among      *systems = SYSTEMS(&points, N_SYSTEMS, made.first, &made.box, &each);
     for (int kind = 0; kind < 4; kind++) {
         int64_t expected = -1;
         bool    ended = false;
@@ -146,7 +140,7 @@ nothing_is_lost_when_memory_is_short(void)
             options.threads = kind & 2 ? 2 : 1;
             options.want = HS_WANT_BOTH | HS_WANT_VECTOR | HS_WANT_SHIFT;
             hs_test_fail_allocation(nth);
-            const hs_status status = hs_systems_find(&points, &systems, &options, &pairs, &failure);
+            const hs_status status = hs_pairs_find(systems, &options, &pairs, &failure);
             ended = nth > 0 && hs_test_failure_is_due();
             hs_test_fail_allocation(0);
             CHECK(status == HS_OK || (status == HS_ERR_MEMORY && pairs == NULL && !ended));
@@ -189,23 +183,22 @@ results_go_to_the_callers_arrays(void)
     options.find_context = &n_asked;
     for (int threads = 1; threads <= 4; threads += 3) {
         for (int n = 3; n <= N_SYSTEMS; n += N_SYSTEMS - 3) {
-            const hs_systems systems = {n,    made.first, &made.box, NULL, NULL,
-                                        NULL, NULL,       NULL,      NULL};
-            const hs_points  some = points_of(&made, 0, made.first[n]);
-            hs_pairs        *own = NULL, *into = NULL;
+            const hs_points some = points_of(&made, 0, made.first[n]);
+            const hs_among *systems = SYSTEMS(&some, n, made.first, &made.box, NULL);
+            hs_pairs       *own = NULL, *into = NULL;
             options.threads = threads;
             options.out = NULL;
-            CHECK(hs_systems_find(&some, &systems, &options, &own, &failure) == HS_OK);
+            CHECK(hs_pairs_find(systems, &options, &own, &failure) == HS_OK);
             const int64_t found = hs_pairs_length(own);
             CHECK(found > 50 && found <= ROOM);
             options.out = &out;
-            CHECK(hs_systems_find(&some, &systems, &options, &into, &failure) == HS_OK);
+            CHECK(hs_pairs_find(systems, &options, &into, &failure) == HS_OK);
             CHECK(hs_pairs_length(into) == found && hs_pairs_array(into, HS_WANT_I) == NULL);
             CHECK(memcmp(i, hs_pairs_array(own, HS_WANT_I), (size_t)found * 8) == 0);
             CHECK(memcmp(j, hs_pairs_array(own, HS_WANT_J), (size_t)found * 8) == 0);
             out.capacity = found - 1;
             hs_pairs_free(into);
-            CHECK(hs_systems_find(&some, &systems, &options, &into, &failure) == HS_ERR_CAPACITY);
+            CHECK(hs_pairs_find(systems, &options, &into, &failure) == HS_ERR_CAPACITY);
             CHECK(into == NULL && failure.expected_pairs == (double)found);
             out.capacity = ROOM;
             hs_pairs_free(own);
@@ -221,28 +214,28 @@ far_points_are_named_among_all(void)
     double        x[8] = {0.0, 0.0, 0.5, 0.5, 0.0, 3.9, 0.0, -3.9};
     const int64_t first[] = {0, 2, 4};
     hs_box        box = {.ndim = 2, .periodic = {true, true}, .rows = {{8.0, 0.0}, {0x1p40, 8.0}}};
-    const hs_points  points = {x, 4, 2, HS_FLOAT64, 16, 8};
-    const hs_systems systems = {2, first, &box, NULL, NULL, NULL, NULL, NULL, NULL};
-    hs_options       options = hs_options_default();
-    hs_pairs        *pairs = NULL;
-    hs_failure       failure;
-    int64_t          counts[2];
+    const hs_points points = {x, 4, 2, HS_FLOAT64, 16, 8};
+    const hs_among *systems = SYSTEMS(&points, 2, first, &box, NULL);
+    hs_options      options = hs_options_default();
+    hs_pairs       *pairs = NULL;
+    hs_failure      failure;
+    int64_t         counts[2];
     options.cutoff = 1.0;
-    CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_OK);
+    CHECK(hs_pairs_count(systems, &options, counts, &failure) == HS_OK);
     CHECK(counts[0] == 1 && counts[1] == 1);
     options.want = HS_WANT_SHIFT;
     for (int sorted = 0; sorted < 2; sorted++) {
         options.sorted = sorted;
-        CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_SHIFT_RANGE);
+        CHECK(hs_pairs_find(systems, &options, &pairs, &failure) == HS_ERR_SHIFT_RANGE);
         CHECK(pairs == NULL && (failure.row == 2 || failure.row == 3));
     }
     options.sorted = false;
     x[6] = 0x1p60; /* more turns than are counted */
-    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_SHIFT_RANGE);
+    CHECK(hs_pairs_find(systems, &options, &pairs, &failure) == HS_ERR_SHIFT_RANGE);
     CHECK(failure.row == 3);
     options.precision = HS_DOUBLE;
     options.want = HS_WANT_I;
-    const hs_status status = hs_systems_find(&points, &systems, &options, &pairs, &failure);
+    const hs_status status = hs_pairs_find(systems, &options, &pairs, &failure);
     CHECK(status == HS_ERR_ROUNDING || status == HS_ERR_SHIFT_RANGE);
     CHECK(failure.row == 3);
 }
@@ -271,15 +264,15 @@ progress_goes_on_over_all_systems(void)
     for (int s = 0; s <= N; s++)
         first[s] = s * POINTS;
     for (int threads = 1; threads <= 2; threads++) {
-        const hs_systems systems = {N, first, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
-        hs_options       options = hs_options_default();
-        hs_pairs        *pairs;
-        double           told = 0.0;
+        const hs_among *systems = SYSTEMS(&points, N, first, NULL, NULL);
+        hs_options      options = hs_options_default();
+        hs_pairs       *pairs;
+        double          told = 0.0;
         options.cutoff = 0.01;
         options.threads = threads;
         options.poll = note_fraction;
         options.poll_context = &told;
-        CHECK(hs_systems_find(&points, &systems, &options, &pairs, NULL) == HS_OK);
+        CHECK(hs_pairs_find(systems, &options, &pairs, NULL) == HS_OK);
         CHECK(told > 0.3 || threads > 1); /* how often the caller's thread polls is up to chance */
         hs_pairs_free(pairs);
     }
@@ -343,19 +336,31 @@ points_of_reach(const batch_reach *made_reach, int64_t first, int64_t end)
 typedef enum marks { RADII, TYPES, SUPPORTS } marks;
 
 static hs_reach
-reach_of(const batch_reach *made_reach, hs_rule rule, marks by, int64_t first)
+reach_of(const batch_reach *made_reach, hs_rule rule, marks by)
 {
-    if (by == TYPES) {
-        return (hs_reach){
-            .n_types = N_TYPES, .types = made_reach->types + first, .cutoffs = made_reach->table};
-    }
-    if (by == SUPPORTS) {
-        return (hs_reach){.rule = rule,
-                          .has_supports = true,
-                          .extent = 0.9,
-                          .supports = made_reach->supports + 9 * first};
-    }
-    return (hs_reach){.rule = rule, .radii = made_reach->radii + first};
+    return by == TYPES      ? (hs_reach){.n_types = N_TYPES, .cutoffs = made_reach->table}
+           : by == SUPPORTS ? (hs_reach){.rule = rule, .has_supports = true, .extent = 0.9}
+                            : (hs_reach){.rule = rule};
+}
+
+/* Points from the first on, with all that is known of them. */
+static hs_set
+set_of_reach(const batch_reach *made_reach, int64_t first, int64_t end)
+{
+    return (hs_set){.at = points_of_reach(made_reach, first, end),
+                    .radii = made_reach->radii + first,
+                    .supports = made_reach->supports + 9 * first,
+                    .types = made_reach->types + first};
+}
+
+/* Those of the first n systems. */
+static hs_set
+systems_of_reach(const batch_reach *made_reach, int64_t n)
+{
+    hs_set set = set_of_reach(made_reach, 0, made_reach->first[n]);
+    set.n_systems = n;
+    set.first = made_reach->first;
+    return set;
 }
 
 /* Compares with single calls; returns the number of pairs, -1 when something differs. */
@@ -363,20 +368,18 @@ static int64_t
 compare_reach(const batch_reach *made_reach, const hs_reach *reach, bool has_box, bool has_cutoffs,
               hs_options options, int threads)
 {
-    const hs_points  points = points_of_reach(made_reach, 0, made_reach->first[N_SYSTEMS_REACH]);
-    const hs_systems systems = {.n = N_SYSTEMS_REACH,
-                                .first = made_reach->first,
-                                .box = has_box ? &made_reach->box : NULL,
-                                .rows = has_box ? made_reach->rows : NULL,
-                                .cutoffs = has_cutoffs ? made_reach->cutoffs : NULL,
-                                .reach = reach};
-    hs_pairs        *pairs = NULL;
-    int64_t          counts[N_SYSTEMS_REACH], at = 0;
-    bool             same = true;
+    const hs_set         set = systems_of_reach(made_reach, N_SYSTEMS_REACH);
+    const hs_each_system each = {.rows = has_box ? made_reach->rows : NULL,
+                                 .cutoffs = has_cutoffs ? made_reach->cutoffs : NULL};
+    const hs_among       systems = {
+              .points = &set, .box = has_box ? &made_reach->box : NULL, .reach = reach, .each = &each};
+    hs_pairs *pairs = NULL;
+    int64_t   counts[N_SYSTEMS_REACH], at = 0;
+    bool      same = true;
     options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_SHIFT;
     options.threads = threads;
-    if (hs_systems_find(&points, &systems, &options, &pairs, NULL) != HS_OK ||
-        hs_systems_count(&points, &systems, &options, counts, NULL) != HS_OK) {
+    if (hs_pairs_find(&systems, &options, &pairs, NULL) != HS_OK ||
+        hs_pairs_count(&systems, &options, counts, NULL) != HS_OK) {
         hs_pairs_free(pairs);
         return -1;
     }
@@ -385,16 +388,14 @@ compare_reach(const batch_reach *made_reach, const hs_reach *reach, bool has_box
     const int32_t *shift = hs_pairs_array(pairs, HS_WANT_SHIFT);
     options.threads = 1;
     for (int s = 0; s < N_SYSTEMS_REACH; s++) {
-        const int64_t   first = made_reach->first[s];
-        const hs_points own = points_of_reach(made_reach, first, made_reach->first[s + 1]);
-        const marks     by = reach->has_supports ? SUPPORTS : reach->n_types > 0 ? TYPES : RADII;
-        const hs_reach  of_own = reach_of(made_reach, reach->rule, by, first);
-        hs_box          box = made_reach->box;
-        hs_pairs       *expected = NULL;
+        const int64_t first = made_reach->first[s];
+        const hs_set  own = set_of_reach(made_reach, first, made_reach->first[s + 1]);
+        hs_box        box = made_reach->box;
+        hs_pairs     *expected = NULL;
         for (int k = 0; k < 9; k++)
             box.rows[k / 3][k % 3] = made_reach->rows[9 * s + k];
         options.cutoff = has_cutoffs ? made_reach->cutoffs[s] : options.cutoff;
-        const hs_among among = {.points = &own, .box = has_box ? &box : NULL, .reach = &of_own};
+        const hs_among among = {.points = &own, .box = has_box ? &box : NULL, .reach = reach};
         same = same && hs_pairs_find(&among, &options, &expected, NULL) == HS_OK;
         const int64_t  n = hs_pairs_length(expected);
         const int64_t *a = hs_pairs_array(expected, HS_WANT_I);
@@ -426,16 +427,16 @@ the_same_as_single_calls_reach(void)
             options.cutoff = INFINITY;
             options.sorted = kind % 2 == 1;
             for (hs_rule rule = HS_RULE_SUM; rule <= HS_RULE_MIN; rule++) {
-                const hs_reach reach = reach_of(&made_reach, rule, RADII, 0);
+                const hs_reach reach = reach_of(&made_reach, rule, RADII);
                 CHECK(compare_reach(&made_reach, &reach, kind & 2, kind & 8, options,
                                     kind & 4 ? 3 : 1) >= 0);
             }
             for (hs_rule rule = HS_RULE_MAX; rule <= HS_RULE_MIN; rule++) {
-                const hs_reach reach = reach_of(&made_reach, rule, SUPPORTS, 0);
+                const hs_reach reach = reach_of(&made_reach, rule, SUPPORTS);
                 CHECK(compare_reach(&made_reach, &reach, kind & 2, kind & 8, options,
                                     kind & 4 ? 3 : 1) >= 0);
             }
-            const hs_reach by_types = reach_of(&made_reach, HS_RULE_SUM, TYPES, 0);
+            const hs_reach by_types = reach_of(&made_reach, HS_RULE_SUM, TYPES);
             options.cutoff = 0.7;
             CHECK(compare_reach(&made_reach, &by_types, kind & 2, kind & 8, options,
                                 kind & 4 ? 3 : 1) > 30);
@@ -447,8 +448,8 @@ static void
 every_algorithm_is_the_same_as_single_calls(void)
 {
     make_batch_reach(31, 2.0, &made_reach);
-    const hs_reach reach = reach_of(&made_reach, HS_RULE_SUM, RADII, 0);
-    const hs_reach of_supports = reach_of(&made_reach, HS_RULE_MAX, SUPPORTS, 0);
+    const hs_reach reach = reach_of(&made_reach, HS_RULE_SUM, RADII);
+    const hs_reach of_supports = reach_of(&made_reach, HS_RULE_MAX, SUPPORTS);
     for (hs_algorithm a = HS_AUTO; a < HS_ALGORITHM_END; a++) {
         hs_options options = hs_options_default();
         options.cutoff = INFINITY;
@@ -466,56 +467,57 @@ failures_name_system_and_point(void)
     hs_pairs  *pairs = NULL;
     hs_options options = hs_options_default();
     make_batch_reach(32, 1.0, &made_reach);
-    const int64_t   n = made_reach.first[N_SYSTEMS_REACH], row = made_reach.first[20] + 1;
-    const hs_points points = points_of_reach(&made_reach, 0, n);
-    const hs_reach  reach = reach_of(&made_reach, HS_RULE_SUM, RADII, 0);
-    const hs_reach  by_types = reach_of(&made_reach, HS_RULE_SUM, TYPES, 0);
-    const hs_reach  of_supports = reach_of(&made_reach, HS_RULE_MIN, SUPPORTS, 0);
-    const hs_reach  sums = reach_of(&made_reach, HS_RULE_SUM, SUPPORTS, 0);
-    const hs_reach  directed = {.rule = HS_RULE_GATHER, .radii = made_reach.radii};
-    const hs_reach  without = {.rule = HS_RULE_SUM};
-    hs_systems      systems = {.n = N_SYSTEMS_REACH, .first = made_reach.first, .reach = &reach};
-    const double    radius = made_reach.radii[row], x = made_reach.x[3 * row];
-    const int32_t   type = made_reach.types[row];
+    const int64_t  row = made_reach.first[20] + 1;
+    const hs_reach reach = reach_of(&made_reach, HS_RULE_SUM, RADII);
+    const hs_reach by_types = reach_of(&made_reach, HS_RULE_SUM, TYPES);
+    const hs_reach of_supports = reach_of(&made_reach, HS_RULE_MIN, SUPPORTS);
+    const hs_reach sums = reach_of(&made_reach, HS_RULE_SUM, SUPPORTS);
+    const hs_reach directed = {.rule = HS_RULE_GATHER};
+    hs_set         set = systems_of_reach(&made_reach, N_SYSTEMS_REACH);
+    hs_each_system each = {.rows = NULL};
+    hs_among       systems = {.points = &set, .reach = &reach, .each = &each};
+    const double   radius = made_reach.radii[row], x = made_reach.x[3 * row];
+    const int32_t  type = made_reach.types[row];
     options.cutoff = INFINITY;
     made_reach.radii[row] = -1.0;
-    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_RADII);
+    CHECK(hs_pairs_find(&systems, &options, &pairs, &failure) == HS_ERR_RADII);
     CHECK(failure.row == row && failure.value == -1.0 && failure.system == 20 && pairs == NULL);
     made_reach.radii[row] = radius;
     made_reach.x[3 * row] = NAN;
-    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_NOT_FINITE);
+    CHECK(hs_pairs_find(&systems, &options, &pairs, &failure) == HS_ERR_NOT_FINITE);
     CHECK(failure.row == row && failure.column == 0 && failure.system == 20);
     made_reach.x[3 * row] = x;
-    systems.cutoffs = made_reach.cutoffs;
+    each.cutoffs = made_reach.cutoffs;
     made_reach.cutoffs[20] = -2.0;
-    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_CUTOFF);
+    CHECK(hs_pairs_find(&systems, &options, &pairs, &failure) == HS_ERR_CUTOFF);
     CHECK(failure.value == -2.0 && failure.system == 20);
-    systems.cutoffs = NULL;
+    each.cutoffs = NULL;
     systems.reach = &by_types;
-    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_CUTOFF);
+    CHECK(hs_pairs_find(&systems, &options, &pairs, &failure) == HS_ERR_CUTOFF);
     options.cutoff = 1.0;
     made_reach.types[row] = N_TYPES;
-    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_TYPES);
+    CHECK(hs_pairs_find(&systems, &options, &pairs, &failure) == HS_ERR_TYPES);
     CHECK(failure.row == row && failure.value == N_TYPES);
     made_reach.types[row] = type;
     made_reach.types[row] = type;
     systems.reach = &of_supports;
     options.cutoff = INFINITY;
     made_reach.supports[9 * row + 1] = INFINITY;
-    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_SUPPORTS);
+    CHECK(hs_pairs_find(&systems, &options, &pairs, &failure) == HS_ERR_SUPPORTS);
     CHECK(failure.row == row && failure.system == 20);
     made_reach.supports[9 * row + 1] = 0.25;
     systems.reach = &sums;
-    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
+    CHECK(hs_pairs_find(&systems, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
     systems.reach = &directed;
-    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
-    systems.reach = &without;
-    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
+    CHECK(hs_pairs_find(&systems, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
     systems.reach = &reach;
+    set.radii = NULL;
+    CHECK(hs_pairs_find(&systems, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
+    set.radii = made_reach.radii;
     systems.box = &made_reach.box;
-    systems.rows = made_reach.rows;
+    each.rows = made_reach.rows;
     memset(made_reach.rows + 9 * 3, 0, 9 * sizeof(double)); /* of a system without points */
-    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_BOX_DEPENDENT);
+    CHECK(hs_pairs_find(&systems, &options, &pairs, &failure) == HS_ERR_BOX_DEPENDENT);
     CHECK(failure.system == 3);
 }
 
@@ -528,40 +530,41 @@ reaches_that_systems_cannot_have_are_refused(void)
     hs_options       options = hs_options_default();
     hs_failure       failure;
     make_batch_reach(35, 1.0, &made_reach);
-    const hs_points points = points_of_reach(&made_reach, 0, made_reach.first[N_SYSTEMS_REACH]);
-    const hs_reach  by_types = reach_of(&made_reach, HS_RULE_SUM, true, 0);
-    const hs_reach  by_supports = {.rule = HS_RULE_MAX, .has_supports = true, .extent = 1.0};
-    hs_systems systems = {.n = N_SYSTEMS_REACH, .first = made_reach.first, .reach = &by_supports};
+    const hs_reach by_types = reach_of(&made_reach, HS_RULE_SUM, TYPES);
+    const hs_reach by_supports = {.rule = HS_RULE_MAX, .has_supports = true, .extent = 1.0};
+    hs_set         set = systems_of_reach(&made_reach, N_SYSTEMS_REACH);
+    hs_each_system each = {.rows = NULL};
+    hs_among       systems = {.points = &set, .reach = &by_supports, .each = &each};
+    set.supports = NULL;
     options.cutoff = INFINITY;
     memset(&failure, 0x5a, sizeof failure);
-    CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_ERR_ARGUMENT);
+    CHECK(hs_pairs_count(&systems, &options, counts, &failure) == HS_ERR_ARGUMENT);
     CHECK(failure.row == -1 && failure.system == -1);
     systems.reach = &by_types;
-    systems.cutoffs = made_reach.cutoffs;
+    each.cutoffs = made_reach.cutoffs;
     for (int b = 0; b < 3; b++) { /* the first of them is named */
-        hs_pairs *pairs = (hs_pairs *)&points;
+        hs_pairs *pairs = (hs_pairs *)&set;
         made_reach.cutoffs[bad[b]] = INFINITY;
         const int first = b == 0 ? bad[0] : 0;
-        CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_CUTOFF);
+        CHECK(hs_pairs_find(&systems, &options, &pairs, &failure) == HS_ERR_CUTOFF);
         CHECK(pairs == NULL && failure.value == INFINITY && failure.system == first);
-        CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_ERR_CUTOFF);
+        CHECK(hs_pairs_count(&systems, &options, counts, &failure) == HS_ERR_CUTOFF);
         CHECK(failure.value == INFINITY && failure.system == first);
     }
     for (int b = 0; b < 3; b++)
         made_reach.cutoffs[bad[b]] = 1.0;
-    CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_OK);
+    CHECK(hs_pairs_count(&systems, &options, counts, &failure) == HS_OK);
 }
 
 static hs_status
 find_all(void *context)
 {
-    const hs_systems *systems = context;
-    const hs_points   points = points_of_reach(&made_reach, 0, made_reach.first[systems->n]);
-    hs_options        options = hs_options_default();
-    hs_pairs         *pairs = NULL;
+    const hs_among *systems = context;
+    hs_options      options = hs_options_default();
+    hs_pairs       *pairs = NULL;
     options.cutoff = INFINITY;
     options.sorted = systems->box == NULL;
-    const hs_status status = hs_systems_find(&points, systems, &options, &pairs, NULL);
+    const hs_status status = hs_pairs_find(systems, &options, &pairs, NULL);
     hs_pairs_free(pairs);
     return status;
 }
@@ -570,15 +573,17 @@ static void
 nothing_leaks_when_memory_is_short(void)
 {
     make_batch_reach(33, 2.0, &made_reach);
-    const hs_reach reach = reach_of(&made_reach, HS_RULE_SUM, RADII, 0);
-    hs_systems     systems = {.n = 5, .first = made_reach.first, .reach = &reach};
+    const hs_reach reach = reach_of(&made_reach, HS_RULE_SUM, RADII);
+    const hs_set   set = systems_of_reach(&made_reach, 5);
+    hs_each_system each = {.rows = NULL};
+    hs_among       systems = {.points = &set, .reach = &reach, .each = &each};
     CHECK(fail_each_allocation(find_all, &systems, 20000) > 5);
     check_arena(find_all, &systems);
     systems.box = &made_reach.box;
-    systems.rows = made_reach.rows;
+    each.rows = made_reach.rows;
     CHECK(fail_each_allocation(find_all, &systems, 20000) > 5);
     check_arena(find_all, &systems);
-    const hs_reach of_supports = reach_of(&made_reach, HS_RULE_MAX, SUPPORTS, 0);
+    const hs_reach of_supports = reach_of(&made_reach, HS_RULE_MAX, SUPPORTS);
     systems.reach = &of_supports;
     CHECK(fail_each_allocation(find_all, &systems, 20000) > 5);
     check_arena(find_all, &systems);
@@ -590,31 +595,35 @@ nothing_leaks_when_memory_is_short(void)
 static void
 each_system_has_its_box(void)
 {
-    const int64_t first[] = {0, 1, 2};
-    const double  rows[] = {1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0};
-    const hs_box  box = {.ndim = 2, .periodic = {true, false}, .rows = {{9.0}, {0.0, 9.0}}};
-    hs_systems    systems = {.n = 2, .first = first, .box = &box};
-    hs_box        own_box;
-    CHECK(hs_box_of_system(&systems, 2, 1, &own_box) == &box);
-    systems.rows = rows;
+    const int64_t  first[] = {0, 1, 2};
+    const double   rows[] = {1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0};
+    const hs_box   box = {.ndim = 2, .periodic = {true, false}, .rows = {{9.0}, {0.0, 9.0}}};
+    const hs_set   set = {.at = {.ndim = 2}, .n_systems = 2, .first = first};
+    hs_each_system each = {.rows = NULL};
+    hs_among       systems = {.points = &set, .box = &box};
+    hs_box         own_box;
+    CHECK(hs_box_of_system(&systems, 1, &own_box) == &box);
+    systems.each = &each;
+    CHECK(hs_box_of_system(&systems, 1, &own_box) == &box);
+    each.rows = rows;
     for (int s = 0; s < 2; s++) {
-        CHECK(hs_box_of_system(&systems, 2, s, &own_box) == &own_box && own_box.ndim == 2);
+        CHECK(hs_box_of_system(&systems, s, &own_box) == &own_box && own_box.ndim == 2);
         CHECK(own_box.periodic[0] && !own_box.periodic[1]);
         CHECK(own_box.rows[0][0] == 1.0 + 4 * s && own_box.rows[0][1] == 2.0 + 4 * s);
         CHECK(own_box.rows[1][0] == 3.0 + 4 * s && own_box.rows[1][1] == 4.0 + 4 * s);
     }
     const uint8_t bits[] = {2, 1}; /* which axes repeat may be of each as well, or that alone */
-    systems.periodic = bits;
-    CHECK(hs_box_of_system(&systems, 2, 0, &own_box) == &own_box);
+    each.periodic = bits;
+    CHECK(hs_box_of_system(&systems, 0, &own_box) == &own_box);
     CHECK(!own_box.periodic[0] && own_box.periodic[1] && own_box.rows[1][1] == 4.0);
-    systems.rows = NULL;
-    CHECK(hs_box_of_system(&systems, 2, 1, &own_box) == &own_box && own_box.ndim == 2);
+    each.rows = NULL;
+    CHECK(hs_box_of_system(&systems, 1, &own_box) == &own_box && own_box.ndim == 2);
     CHECK(own_box.periodic[0] && !own_box.periodic[1]);
     CHECK(own_box.rows[0][0] == 9.0 && own_box.rows[1][1] == 9.0);
     systems.box = NULL;
-    CHECK(hs_box_of_system(&systems, 2, 1, &own_box) == NULL);
+    CHECK(hs_box_of_system(&systems, 1, &own_box) == NULL);
     CHECK(hs_cutoff_of_system(&systems, 1, 0.5) == 0.5);
-    systems.cutoffs = rows;
+    each.cutoffs = rows;
     CHECK(hs_cutoff_of_system(&systems, 1, 0.5) == 2.0);
 }
 
@@ -624,31 +633,31 @@ enum { N_SYSTEM_PART = 6, Q = 4, D = 2 };
 static void
 excluded_pairs_are_sorted_by_system(void)
 {
-    const int64_t        first[] = {0, 0, 3, 3, 5, 6}, excluded[] = {4, 3, 0, 2, 5, 0, 1, 1, 3, 5};
-    const double         numbers[N_SYSTEM_PART] = {0.0};
-    const hs_points      points = {numbers, N_SYSTEM_PART, 1, HS_FLOAT64, 8, 8};
-    const hs_selection   selection = {.n_excluded = 5, .excluded = excluded};
-    const hs_systems     systems = {.n = 5, .first = first, .selection = &selection};
-    const hs_system_sets sets = {&points, NULL, &systems};
-    const int64_t        expected[] = {0, 2, 1, 1, 1, 0}, ends[] = {0, 0, 2, 2, 3, 3};
-    const hs_options     options = hs_options_default();
-    hs_excluded_parts    parts;
-    hs_system_part       part;
-    hs_account           account;
+    const int64_t      first[] = {0, 0, 3, 3, 5, 6}, excluded[] = {4, 3, 0, 2, 5, 0, 1, 1, 3, 5};
+    const double       numbers[N_SYSTEM_PART] = {0.0};
+    const hs_points    points = {numbers, N_SYSTEM_PART, 1, HS_FLOAT64, 8, 8};
+    const hs_selection selection = {.n_excluded = 5, .excluded = excluded};
+    const hs_among     sets = {.points = SET(&points, .n_systems = 5, .first = first),
+                               .selection = &selection};
+    const int64_t      expected[] = {0, 2, 1, 1, 1, 0}, ends[] = {0, 0, 2, 2, 3, 3};
+    const hs_options   options = hs_options_default();
+    hs_selected_parts  parts;
+    hs_system_part     part;
+    hs_account         account;
     hs_account_init(&account, &options);
-    CHECK(hs_excluded_parts_open(&sets, &account, &parts) == HS_OK);
+    CHECK(hs_selected_parts_open(&sets, &account, &parts) == HS_OK);
     CHECK(memcmp(parts.first, ends, sizeof ends) == 0);
     CHECK(memcmp(parts.pairs, expected, sizeof expected) == 0);
     hs_system_part_cut(&sets, &parts, 3, &part);
     CHECK(part.selection.n_excluded == 1 && part.selection.excluded == parts.pairs + 4);
     hs_system_part_cut(&sets, &parts, 2, &part);
     CHECK(part.selection.n_excluded == 0);
-    hs_excluded_parts_free(&account, &parts);
-    hs_excluded_parts_free(&account, &parts);
+    hs_selected_parts_free(&account, &parts);
+    hs_selected_parts_free(&account, &parts);
     for (int nth = 1; nth <= 2; nth++) {
         hs_test_fail_allocation(nth);
-        CHECK(hs_excluded_parts_open(&sets, &account, &parts) == HS_ERR_MEMORY);
-        hs_excluded_parts_free(&account, &parts);
+        CHECK(hs_selected_parts_open(&sets, &account, &parts) == HS_ERR_MEMORY);
+        hs_selected_parts_free(&account, &parts);
     }
     hs_test_fail_allocation(0);
     CHECK(account.held == 0);
@@ -661,21 +670,35 @@ excluded_pairs_of_queries_have_numbers_of_both(void)
 {
     const int64_t   first[] = {0, 2, 5}, first_query[] = {0, 1, 3};
     const int64_t   excluded[] = {2, 4, 0, 4, 1, 2}, expected[] = {1, 2, 0, 0};
+    const int64_t   numbered[] = {1, 2, 4}, of_points[] = {1, 0, 2}, pairs[] = {0, 2};
     const double    numbers[N_SYSTEM_PART] = {0.0};
     const hs_points points = {numbers, 5, 1, HS_FLOAT64, 8, 8},
                     queries = {numbers, 3, 1, HS_FLOAT64, 8, 8};
-    const hs_selection selection = {.n_excluded = 3, .excluded = excluded};
-    const hs_systems   systems = {
-          .n = 2, .first = first, .first_query = first_query, .selection = &selection};
-    const hs_system_sets sets = {&points, &queries, &systems};
-    const hs_options     options = hs_options_default();
-    hs_excluded_parts    parts;
-    hs_account           account;
+    hs_selection      selection = {.n_excluded = 3, .excluded = excluded};
+    const hs_among    sets = {.points = SET(&points, .n_systems = 2, .first = first),
+                              .queries = SET(&queries, .n_systems = 2, .first = first_query),
+                              .selection = &selection};
+    const hs_options  options = hs_options_default();
+    hs_selected_parts parts;
+    hs_account        account;
     hs_account_init(&account, &options);
-    CHECK(hs_excluded_parts_open(&sets, &account, &parts) == HS_OK);
+    CHECK(hs_selected_parts_open(&sets, &account, &parts) == HS_OK);
     CHECK(parts.first[1] == 0 && parts.first[2] == 2);
-    CHECK(memcmp(parts.pairs, expected, sizeof expected) == 0);
-    hs_excluded_parts_free(&account, &parts);
+    CHECK(memcmp(parts.pairs, expected, sizeof expected) == 0 && parts.query_numbers == NULL);
+    hs_selected_parts_free(&account, &parts);
+    selection.query_numbers = numbered; /* then it is that of a point, and so is that of a query */
+    CHECK(hs_selected_parts_open(&sets, &account, &parts) == HS_OK);
+    CHECK(parts.first[1] == 0 && parts.first[2] == 1);
+    CHECK(memcmp(parts.pairs, pairs, sizeof pairs) == 0);
+    CHECK(memcmp(parts.query_numbers, of_points, sizeof of_points) == 0);
+    hs_selected_parts_free(&account, &parts);
+    for (int nth = 1; nth <= 3; nth++) {
+        hs_test_fail_allocation(nth);
+        CHECK(hs_selected_parts_open(&sets, &account, &parts) == HS_ERR_MEMORY);
+        hs_selected_parts_free(&account, &parts);
+    }
+    hs_test_fail_allocation(0);
+    CHECK(account.held == 0);
     hs_account_close(&account);
 }
 
@@ -691,8 +714,8 @@ enum {
 static struct {
     double     x[N_EACH * 3], q[N_QUERIES * 3];
     int64_t    first[N_SYSTEMS_EACH + 1], first_query[N_SYSTEMS_EACH + 1], counts[N_EACH];
-    hs_points  points, queries;
-    hs_systems systems;
+    hs_set     points, queries;
+    hs_among   systems;
     hs_options options;
 } s_each;
 
@@ -708,10 +731,13 @@ make_scene(void)
         s_each.first[n] = n * POINTS_EACH;
         s_each.first_query[n] = 2 * n;
     }
-    s_each.points = (hs_points){s_each.x, N_EACH, 3, HS_FLOAT64, 24, 8};
-    s_each.queries = (hs_points){s_each.q, N_QUERIES, 3, HS_FLOAT64, 24, 8};
-    s_each.systems =
-        (hs_systems){.n = N_SYSTEMS_EACH, .first = s_each.first, .first_query = s_each.first_query};
+    s_each.points = (hs_set){.at = {s_each.x, N_EACH, 3, HS_FLOAT64, 24, 8},
+                             .n_systems = N_SYSTEMS_EACH,
+                             .first = s_each.first};
+    s_each.queries = (hs_set){.at = {s_each.q, N_QUERIES, 3, HS_FLOAT64, 24, 8},
+                              .n_systems = N_SYSTEMS_EACH,
+                              .first = s_each.first_query};
+    s_each.systems = (hs_among){.points = &s_each.points};
     s_each.options = hs_options_default();
     s_each.options.cutoff = 0.4;
     s_each.options.want = HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT;
@@ -720,10 +746,10 @@ make_scene(void)
 static hs_status
 find_rows(void *context)
 {
-    hs_pairs       *rows;
-    hs_failure      failure;
-    const hs_status status = hs_systems_neighbors(&s_each.points, context, &s_each.systems,
-                                                  &s_each.options, &rows, &failure);
+    hs_pairs  *rows;
+    hs_failure failure;
+    s_each.systems.queries = context;
+    const hs_status status = hs_neighbors_find(&s_each.systems, &s_each.options, &rows, &failure);
     hs_pairs_free(rows);
     return status;
 }
@@ -734,9 +760,9 @@ memory_may_be_short(void)
     static const int64_t pair[] = {0, 1};
     const hs_selection   one_excluded = {.n_excluded = 1, .excluded = pair};
     make_scene();
-    s_each.systems.n = 6;
-    s_each.points.n = s_each.first[6];
-    s_each.queries.n = s_each.first_query[6];
+    s_each.points.n_systems = s_each.queries.n_systems = 6;
+    s_each.points.at.n = s_each.first[6];
+    s_each.queries.at.n = s_each.first_query[6];
     for (s_each.options.threads = 1; s_each.options.threads <= 2; s_each.options.threads++) {
         CHECK(fail_each_allocation(find_rows, NULL, 2000) > 10);
         check_arena(find_rows, NULL);
@@ -763,14 +789,14 @@ rows_of_boxes_stay(void)
             boxes[9 * n + 4 * k] = 3.0;
     }
     s_each.systems.box = &box;
-    s_each.systems.rows = boxes;
+    s_each.systems.each = &(hs_each_system){.rows = boxes};
     boxes[9 * 7 + 8] = 0.0;
-    CHECK(hs_systems_coordination(&s_each.points, NULL, &s_each.systems, &s_each.options,
-                                  s_each.counts, &failure) == HS_ERR_BOX_DEPENDENT);
+    CHECK(hs_neighbors_count(&s_each.systems, &s_each.options, s_each.counts, &failure) ==
+          HS_ERR_BOX_DEPENDENT);
     CHECK(failure.row == 2 && failure.system == 7);
     boxes[9 * 7 + 8] = INFINITY;
-    CHECK(hs_systems_coordination(&s_each.points, NULL, &s_each.systems, &s_each.options,
-                                  s_each.counts, &failure) == HS_ERR_BOX_FINITE);
+    CHECK(hs_neighbors_count(&s_each.systems, &s_each.options, s_each.counts, &failure) ==
+          HS_ERR_BOX_FINITE);
     CHECK(failure.row == 2 && failure.column == 2 && failure.system == 7);
 }
 
@@ -782,7 +808,7 @@ without_systems_all_else_is_checked(void)
     const hs_reach     reach = {.rule = HS_RULE_END};
     hs_counters        counters = {.pairs = 7};
     make_scene();
-    s_each.systems.n = s_each.points.n = 0;
+    s_each.points.n_systems = s_each.points.at.n = 0;
     s_each.options.counters = &counters;
     CHECK(find_rows(NULL) == HS_OK && counters.pairs == 0);
     s_each.options.cutoff = -1.0;
@@ -838,7 +864,7 @@ work_of_all_systems_is_added_up(void)
     for (int n = 0; n < N_SYSTEMS_EACH; n++) {
         hs_pairs       *rows;
         const hs_points own = {s_each.x + s_each.first[n] * 3, POINTS_EACH, 3, HS_FLOAT64, 24, 8};
-        const hs_among  among = {.points = &own};
+        const hs_among  among = {.points = SET(&own)};
         CHECK(hs_neighbors_find(&among, &s_each.options, &rows, NULL) == HS_OK);
         hs_pairs_free(rows);
         add_work(&single, &sum);
@@ -861,13 +887,13 @@ few_large_systems(void)
     hs_pairs     *one, *many;
     make_scene();
     s_each.options.cutoff = 0.1;
-    s_each.queries.n = 2;
-    s_each.systems = (hs_systems){.n = 2, .first = ends, .first_query = of_queries};
-    CHECK(hs_systems_neighbors(&s_each.points, NULL, &s_each.systems, &s_each.options, &one,
-                               NULL) == HS_OK);
+    s_each.queries.at.n = 2;
+    s_each.points.n_systems = s_each.queries.n_systems = 2;
+    s_each.points.first = ends;
+    s_each.queries.first = of_queries;
+    CHECK(hs_neighbors_find(&s_each.systems, &s_each.options, &one, NULL) == HS_OK);
     s_each.options.threads = 4;
-    CHECK(hs_systems_neighbors(&s_each.points, NULL, &s_each.systems, &s_each.options, &many,
-                               NULL) == HS_OK);
+    CHECK(hs_neighbors_find(&s_each.systems, &s_each.options, &many, NULL) == HS_OK);
     CHECK(hs_pairs_length(one) > N_EACH && hs_pairs_length(one) == hs_pairs_length(many));
     CHECK(memcmp(hs_pairs_array(one, HS_WANT_J), hs_pairs_array(many, HS_WANT_J),
                  (size_t)hs_pairs_length(one) * 8) == 0);
@@ -887,19 +913,20 @@ enum {
 };
 
 static struct {
-    double       x[N_SYSTEMS_ROWS * MOST * 3], q[N_SYSTEMS_ROWS * MOST * 3];
-    double       rows[N_SYSTEMS_ROWS * 9], cutoffs[N_SYSTEMS_ROWS], edges[N_EDGES];
-    int64_t      first[N_SYSTEMS_ROWS + 1], first_query[N_SYSTEMS_ROWS + 1];
-    int64_t      groups[N_SYSTEMS_ROWS * MOST], query_groups[N_SYSTEMS_ROWS * MOST];
-    double       radii[N_SYSTEMS_ROWS * MOST];
-    int32_t      types[N_SYSTEMS_ROWS * MOST];
-    double       weights[N_SYSTEMS_ROWS * MOST];
-    hs_box       box;
-    hs_points    points, queries;
-    hs_selection selection;
-    hs_reach     reach;
-    hs_systems   systems;
-    hs_options   options;
+    double         x[N_SYSTEMS_ROWS * MOST * 3], q[N_SYSTEMS_ROWS * MOST * 3];
+    double         rows[N_SYSTEMS_ROWS * 9], cutoffs[N_SYSTEMS_ROWS], edges[N_EDGES];
+    int64_t        first[N_SYSTEMS_ROWS + 1], first_query[N_SYSTEMS_ROWS + 1];
+    int64_t        groups[N_SYSTEMS_ROWS * MOST], query_groups[N_SYSTEMS_ROWS * MOST];
+    double         radii[N_SYSTEMS_ROWS * MOST];
+    int32_t        types[N_SYSTEMS_ROWS * MOST];
+    double         weights[N_SYSTEMS_ROWS * MOST];
+    hs_box         box;
+    hs_set         points, queries;
+    hs_selection   selection;
+    hs_reach       reach;
+    hs_each_system each;
+    hs_among       systems;
+    hs_options     options;
 } s_rows;
 
 static hs_points
@@ -935,16 +962,22 @@ make_scene_rows(uint64_t seed)
     for (int k = 0; k < N_EDGES; k++)
         s_rows.edges[k] = 0.4 * (k + 1);
     s_rows.box = (hs_box){.ndim = 3, .periodic = {true, true, false}};
-    s_rows.points = (hs_points){s_rows.x, s_rows.first[N_SYSTEMS_ROWS], 3, HS_FLOAT64, 24, 8};
-    s_rows.queries =
-        (hs_points){s_rows.q, s_rows.first_query[N_SYSTEMS_ROWS], 3, HS_FLOAT64, 24, 8};
-    s_rows.selection = (hs_selection){.groups = s_rows.groups, .query_groups = s_rows.query_groups};
-    s_rows.reach = (hs_reach){.radii = s_rows.radii, .query_radii = s_rows.radii};
-    s_rows.systems = (hs_systems){.n = N_SYSTEMS_ROWS,
-                                  .first = s_rows.first,
-                                  .box = &s_rows.box,
-                                  .rows = s_rows.rows,
-                                  .first_query = s_rows.first_query};
+    s_rows.points = (hs_set){.at = {s_rows.x, s_rows.first[N_SYSTEMS_ROWS], 3, HS_FLOAT64, 24, 8},
+                             .radii = s_rows.radii,
+                             .weights = s_rows.weights,
+                             .types = s_rows.types,
+                             .groups = s_rows.groups,
+                             .n_systems = N_SYSTEMS_ROWS,
+                             .first = s_rows.first};
+    s_rows.queries = s_rows.points;
+    s_rows.queries.at.data = s_rows.q;
+    s_rows.queries.at.n = s_rows.first_query[N_SYSTEMS_ROWS];
+    s_rows.queries.groups = s_rows.query_groups;
+    s_rows.queries.first = s_rows.first_query;
+    s_rows.selection = (hs_selection){.has_groups = true};
+    s_rows.reach = (hs_reach){.rule = HS_RULE_SUM};
+    s_rows.each = (hs_each_system){.rows = s_rows.rows};
+    s_rows.systems = (hs_among){.points = &s_rows.points, .box = &s_rows.box, .each = &s_rows.each};
     s_rows.options = hs_options_default();
     s_rows.options.cutoff = 1.0;
     s_rows.options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_SHIFT | HS_WANT_BOTH;
@@ -952,35 +985,40 @@ make_scene_rows(uint64_t seed)
 
 /* One system by itself. */
 typedef struct single_rows {
-    hs_points    points, queries;
-    hs_box       box;
-    hs_selection selection;
-    hs_reach     reach;
-    hs_options   options;
-    hs_among     among;
+    hs_set     points, queries;
+    hs_box     box;
+    hs_options options;
+    hs_among   among;
 } single_rows;
+
+/* The points of one system, with what is known of them. */
+static hs_set
+set_at(const hs_set *all, const double *x, int n)
+{
+    const int64_t first = all->first[n];
+    return (hs_set){.at = points_at(x, all->first, n),
+                    .radii = all->radii + first,
+                    .weights = all->weights + first,
+                    .types = all->types + first,
+                    .groups = all->groups + first};
+}
 
 static void
 take_single(int n, bool has_queries, single_rows *one)
 {
-    *one = (single_rows){.points = points_at(s_rows.x, s_rows.first, n),
-                         .queries = points_at(s_rows.q, s_rows.first_query, n),
+    *one = (single_rows){.points = set_at(&s_rows.points, s_rows.x, n),
+                         .queries = set_at(&s_rows.queries, s_rows.q, n),
                          .box = s_rows.box,
-                         .selection = {.groups = s_rows.groups + s_rows.first[n],
-                                       .query_groups = s_rows.query_groups + s_rows.first_query[n]},
-                         .reach = {.radii = s_rows.radii + s_rows.first[n],
-                                   .query_radii = s_rows.radii + s_rows.first_query[n]},
                          .options = s_rows.options};
     for (int k = 0; k < 9; k++)
         one->box.rows[k / 3][k % 3] = s_rows.rows[9 * n + k];
     one->options.threads = 1;
-    one->options.cutoff = s_rows.systems.cutoffs != NULL ? s_rows.cutoffs[n]
-                                                         : s_rows.options.cutoff;
-    one->among =
-        (hs_among){.points = &one->points, .box = s_rows.systems.box != NULL ? &one->box : NULL};
-    one->among.queries = has_queries ? &one->queries : NULL;
-    one->among.reach = s_rows.systems.reach != NULL ? &one->reach : NULL;
-    one->among.selection = s_rows.systems.selection != NULL ? &one->selection : NULL;
+    one->options.cutoff = s_rows.each.cutoffs != NULL ? s_rows.cutoffs[n] : s_rows.options.cutoff;
+    one->among = (hs_among){.points = &one->points,
+                            .box = s_rows.systems.box != NULL ? &one->box : NULL,
+                            .queries = has_queries ? &one->queries : NULL,
+                            .reach = s_rows.systems.reach,
+                            .selection = s_rows.systems.selection};
 }
 
 /* Compares pairs [at, at + n) of all with those of one system; k: of the nearest, or 0. */
@@ -1006,14 +1044,20 @@ compare_pairs(const hs_pairs *all, int64_t at, const hs_pairs *own, int n, bool 
 static void
 check_rows(bool has_queries)
 {
-    const hs_points *queries = has_queries ? &s_rows.queries : NULL;
-    static int64_t   counts[N_SYSTEMS_ROWS * MOST];
-    hs_pairs        *all, *near;
-    int64_t          at = 0, row = 0;
-    CHECK(hs_systems_neighbors(&s_rows.points, queries, &s_rows.systems, &s_rows.options, &all,
-                               NULL) == HS_OK);
-    CHECK(hs_systems_coordination(&s_rows.points, queries, &s_rows.systems, &s_rows.options, counts,
-                                  NULL) == HS_OK);
+    static int64_t counts[N_SYSTEMS_ROWS * MOST];
+    hs_pairs      *all, *near;
+    int64_t        at = 0, row = 0, of_systems[N_SYSTEMS_ROWS];
+    s_rows.systems.queries = has_queries ? &s_rows.queries : NULL;
+    CHECK(hs_neighbors_find(&s_rows.systems, &s_rows.options, &all, NULL) == HS_OK);
+    CHECK(hs_neighbors_count(&s_rows.systems, &s_rows.options, counts, NULL) == HS_OK);
+    if (has_queries) { /* of each system, those of its queries */
+        CHECK(hs_pairs_count(&s_rows.systems, &s_rows.options, of_systems, NULL) == HS_OK);
+        for (int n = 0; n < N_SYSTEMS_ROWS; n++) {
+            for (int64_t q = s_rows.first_query[n]; q < s_rows.first_query[n + 1]; q++)
+                of_systems[n] -= counts[q];
+            CHECK(of_systems[n] == 0);
+        }
+    }
     const int64_t *offsets = hs_pairs_offsets(all);
     for (int n = 0; n < N_SYSTEMS_ROWS; n++) {
         single_rows one;
@@ -1031,13 +1075,11 @@ check_rows(bool has_queries)
     }
     CHECK(at > 10 && at == hs_pairs_length(all) && row == hs_pairs_rows(all) && offsets[0] == 0);
     hs_pairs_free(all);
-    if (s_rows.systems.reach != NULL || s_rows.systems.selection != NULL) {
-        CHECK(hs_systems_nearest(&s_rows.points, queries, &s_rows.systems, 3, &s_rows.options,
-                                 &near, NULL) == HS_ERR_ARGUMENT);
+    if (s_rows.systems.reach != NULL) {
+        CHECK(hs_nearest_find(&s_rows.systems, 3, &s_rows.options, &near, NULL) == HS_ERR_ARGUMENT);
         return;
     }
-    CHECK(hs_systems_nearest(&s_rows.points, queries, &s_rows.systems, 3, &s_rows.options, &near,
-                             NULL) == HS_OK);
+    CHECK(hs_nearest_find(&s_rows.systems, 3, &s_rows.options, &near, NULL) == HS_OK);
     at = 0;
     for (int n = 0; n < N_SYSTEMS_ROWS; n++) {
         single_rows one;
@@ -1059,8 +1101,8 @@ rows_are_those_of_single_calls(void)
         for (int kind = 0; kind < 64; kind++) {
             make_scene_rows(seed);
             s_rows.systems.box = kind & 1 ? &s_rows.box : NULL;
-            s_rows.systems.rows = kind & 1 ? s_rows.rows : NULL;
-            s_rows.systems.cutoffs = kind & 2 ? s_rows.cutoffs : NULL;
+            s_rows.each.rows = kind & 1 ? s_rows.rows : NULL;
+            s_rows.each.cutoffs = kind & 2 ? s_rows.cutoffs : NULL;
             s_rows.systems.selection = kind & 4 ? &s_rows.selection : NULL;
             s_rows.systems.reach = kind & 8 ? &s_rows.reach : NULL;
             s_rows.options.threads = kind & 16 ? 3 : 1;
@@ -1076,11 +1118,9 @@ numbers_may_be_short(void)
     hs_pairs *wide, *narrow;
     make_scene_rows(3);
     s_rows.options.want = HS_WANT_J | HS_WANT_DISTANCE;
-    CHECK(hs_systems_nearest(&s_rows.points, NULL, &s_rows.systems, 50, &s_rows.options, &wide,
-                             NULL) == HS_OK);
+    CHECK(hs_nearest_find(&s_rows.systems, 50, &s_rows.options, &wide, NULL) == HS_OK);
     s_rows.options.index_bytes = 4;
-    CHECK(hs_systems_nearest(&s_rows.points, NULL, &s_rows.systems, 50, &s_rows.options, &narrow,
-                             NULL) == HS_OK);
+    CHECK(hs_nearest_find(&s_rows.systems, 50, &s_rows.options, &narrow, NULL) == HS_OK);
     const int64_t *j = hs_pairs_array(wide, HS_WANT_J);
     const int32_t *k = hs_pairs_array(narrow, HS_WANT_J);
     for (int64_t e = 0; e < hs_pairs_length(wide); e++)
@@ -1098,27 +1138,20 @@ histograms_are_those_of_single_calls(void)
         make_scene_rows(11 + (uint64_t)kind);
         s_rows.options.threads = kind & 1 ? 3 : 1;
         s_rows.systems.selection = kind & 4 ? &s_rows.selection : NULL;
-        const hs_points *queries = kind & 2 ? &s_rows.queries : NULL;
-        hs_histogram     wanted = {.n_edges = N_EDGES,
-                                   .edges = s_rows.edges,
-                                   .n_types = N_TYPES_ROWS,
-                                   .of_points = {s_rows.types, s_rows.weights},
-                                   .of_queries = {s_rows.types, s_rows.weights},
-                                   .counts = counts,
-                                   .sums = sums};
-        hs_counters      counters;
-        int64_t          n_pairs = 0;
+        s_rows.systems.queries = kind & 2 ? &s_rows.queries : NULL;
+        hs_histogram wanted = {.n_edges = N_EDGES,
+                               .edges = s_rows.edges,
+                               .n_types = N_TYPES_ROWS,
+                               .counts = counts,
+                               .sums = sums};
+        hs_counters  counters;
+        int64_t      n_pairs = 0;
         s_rows.options.counters = &counters;
-        CHECK(hs_systems_histogram(&s_rows.points, queries, &s_rows.systems, &s_rows.options,
-                                   &wanted, NULL) == HS_OK);
+        CHECK(hs_pairs_histogram(&s_rows.systems, &s_rows.options, &wanted, NULL) == HS_OK);
         const int64_t of_all = counters.pairs;
         for (int n = 0; n < N_SYSTEMS_ROWS; n++) {
             single_rows one;
-            take_single(n, queries != NULL, &one);
-            wanted.of_points =
-                (hs_marks){s_rows.types + s_rows.first[n], s_rows.weights + s_rows.first[n]};
-            wanted.of_queries = (hs_marks){s_rows.types + s_rows.first_query[n],
-                                           s_rows.weights + s_rows.first_query[n]};
+            take_single(n, kind & 2, &one);
             wanted.counts = own_counts;
             wanted.sums = own_sums;
             CHECK(hs_pairs_histogram(&one.among, &one.options, &wanted, NULL) == HS_OK);
@@ -1141,10 +1174,10 @@ a_histogram_may_have_no_marks(void)
                              .n_types = 1,
                              .counts = counts};
     make_scene_rows(5);
-    CHECK(hs_systems_histogram(&s_rows.points, NULL, &s_rows.systems, &s_rows.options, &wanted,
-                               NULL) == HS_OK);
+    s_rows.points.weights = NULL;
+    CHECK(hs_pairs_histogram(&s_rows.systems, &s_rows.options, &wanted, NULL) == HS_OK);
     s_rows.options.cutoff = s_rows.edges[N_EDGES - 1];
-    CHECK(hs_systems_count(&s_rows.points, &s_rows.systems, &s_rows.options, each, NULL) == HS_OK);
+    CHECK(hs_pairs_count(&s_rows.systems, &s_rows.options, each, NULL) == HS_OK);
     for (int n = 0; n < N_SYSTEMS_ROWS; n++)
         n_pairs += each[n];
     for (int e = 0; e < N_SYSTEMS_ROWS * N_EDGES; e++)
@@ -1153,8 +1186,7 @@ a_histogram_may_have_no_marks(void)
     static double sums[N_SYSTEMS_ROWS * N_EDGES]; /* without weights they are the counts */
     wanted.counts = NULL;
     wanted.sums = sums;
-    CHECK(hs_systems_histogram(&s_rows.points, NULL, &s_rows.systems, &s_rows.options, &wanted,
-                               NULL) == HS_OK);
+    CHECK(hs_pairs_histogram(&s_rows.systems, &s_rows.options, &wanted, NULL) == HS_OK);
     for (int e = 0; e < N_SYSTEMS_ROWS * N_EDGES; e++)
         CHECK(sums[e] == (double)counts[e]);
 }
@@ -1168,38 +1200,46 @@ what_has_no_meaning_is_refused(void)
     hs_failure failure;
     hs_pairs  *rows;
     make_scene_rows(6);
-    CHECK(hs_systems_nearest(&s_rows.points, NULL, &s_rows.systems, 0, &s_rows.options, &rows,
-                             NULL) == HS_ERR_ARGUMENT);
-    CHECK(hs_systems_nearest(&s_rows.points, NULL, &s_rows.systems, 1, &s_rows.options, &rows,
-                             NULL) == HS_OK);
-    CHECK(hs_pairs_length(rows) == s_rows.points.n);
+    CHECK(hs_nearest_find(&s_rows.systems, 0, &s_rows.options, &rows, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_nearest_find(&s_rows.systems, 1, &s_rows.options, &rows, NULL) == HS_OK);
+    CHECK(hs_pairs_length(rows) == s_rows.points.at.n);
     hs_pairs_free(rows);
     s_rows.options.cutoff = -1.0;
-    CHECK(hs_systems_nearest(&s_rows.points, NULL, &s_rows.systems, 2, &s_rows.options, &rows,
-                             &failure) == HS_ERR_CUTOFF);
+    CHECK(hs_nearest_find(&s_rows.systems, 2, &s_rows.options, &rows, &failure) == HS_ERR_CUTOFF);
     CHECK(failure.value == -1.0);
     s_rows.options.cutoff = INFINITY;
-    CHECK(hs_systems_nearest(&s_rows.points, NULL, &s_rows.systems, 2, &s_rows.options, &rows,
-                             NULL) == HS_OK);
+    CHECK(hs_nearest_find(&s_rows.systems, 2, &s_rows.options, &rows, NULL) == HS_OK);
     hs_pairs_free(rows);
-    s_rows.systems.cutoffs = s_rows.cutoffs;
+    s_rows.each.cutoffs = s_rows.cutoffs;
     s_rows.options.cutoff = -1.0; /* is not looked at, and neither by histograms */
-    CHECK(hs_systems_nearest(&s_rows.points, NULL, &s_rows.systems, 2, &s_rows.options, &rows,
-                             NULL) == HS_OK);
+    CHECK(hs_nearest_find(&s_rows.systems, 2, &s_rows.options, &rows, NULL) == HS_OK);
     hs_pairs_free(rows);
-    CHECK(hs_systems_histogram(&s_rows.points, NULL, &s_rows.systems, &s_rows.options, &wanted,
-                               NULL) == HS_OK);
-    s_rows.systems.cutoffs = NULL;
+    CHECK(hs_pairs_histogram(&s_rows.systems, &s_rows.options, &wanted, NULL) == HS_OK);
+    s_rows.each.cutoffs = NULL;
     s_rows.systems.reach = &s_rows.reach;
-    CHECK(hs_systems_histogram(&s_rows.points, NULL, &s_rows.systems, &s_rows.options, &wanted,
-                               NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_pairs_histogram(&s_rows.systems, &s_rows.options, &wanted, NULL) == HS_ERR_ARGUMENT);
     s_rows.systems.reach = NULL;
+    s_rows.systems.queries = &s_rows.queries; /* which half lists do not have */
+    CHECK(hs_pairs_find(&s_rows.systems, &s_rows.options, &rows, NULL) == HS_ERR_ARGUMENT);
+    s_rows.queries.n_systems--;
+    CHECK(hs_neighbors_find(&s_rows.systems, &s_rows.options, &rows, &failure) == HS_ERR_ARGUMENT);
+    CHECK(failure.in_queries);
+    s_rows.systems.queries = NULL;
+    s_rows.options.cutoff = 1.0;
+    hs_selection numbered = {.query_numbers = s_rows.groups}; /* and no queries */
+    s_rows.systems.selection = &numbered;
+    CHECK(hs_neighbors_find(&s_rows.systems, &s_rows.options, &rows, NULL) == HS_OK);
+    hs_pairs_free(rows);
+    s_rows.systems.selection = NULL;
+    hs_cells *cells = NULL;
+    CHECK(hs_cells_build(&s_rows.points.at, NULL, &s_rows.options, &cells, NULL) == HS_OK);
+    hs_among in_cells = {.cells = cells, .points = &s_rows.points};
+    CHECK(hs_neighbors_find(&in_cells, &s_rows.options, &rows, NULL) == HS_ERR_ARGUMENT);
+    hs_cells_free(cells);
     wanted.n_types = INT32_MAX;
-    CHECK(hs_systems_histogram(&s_rows.points, NULL, &s_rows.systems, &s_rows.options, &wanted,
-                               NULL) == HS_ERR_MEMORY);
+    CHECK(hs_pairs_histogram(&s_rows.systems, &s_rows.options, &wanted, NULL) == HS_ERR_MEMORY);
     wanted.n_types = 0;
-    CHECK(hs_systems_histogram(&s_rows.points, NULL, &s_rows.systems, &s_rows.options, &wanted,
-                               NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_pairs_histogram(&s_rows.systems, &s_rows.options, &wanted, NULL) == HS_ERR_ARGUMENT);
 }
 
 void

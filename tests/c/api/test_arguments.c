@@ -180,8 +180,9 @@ other_arguments_are_refused(void)
           HS_ERR_ARGUMENT);
     CHECK(visited == 0);
     CHECK(hs_pairs_histogram(AMONG(&points, NULL), &options, &histogram, NULL) == HS_ERR_ARGUMENT);
-    const hs_systems systems = {.n = -1};
-    CHECK(hs_systems_count(&points, &systems, &options, counts, NULL) == HS_ERR_ARGUMENT);
+    const int64_t first[] = {0, 0};
+    CHECK(hs_pairs_count(SYSTEMS(&points, -1, first, NULL, NULL), &options, counts, NULL) ==
+          HS_ERR_ARGUMENT);
 }
 
 /* Cells have a dimension, and so have lists. */
@@ -260,7 +261,7 @@ nothing_at_all_is_refused(void)
     const hs_points  points = good_points();
     const hs_options options = good_options();
     CHECK(hs_neighbors_count(AMONG(NULL, NULL), &options, NULL, NULL) == HS_ERR_ARGUMENT);
-    CHECK(hs_systems_count(&points, NULL, &options, NULL, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_pairs_count(AMONG(&points, NULL), &options, NULL, NULL) == HS_ERR_ARGUMENT);
 }
 
 /*
@@ -288,7 +289,7 @@ typedef struct call_scene {
     hs_counters    counters;
     hs_options     options;
     hs_histogram   histogram;
-    hs_systems     systems;
+    call_systems   systems;
     hs_visit       visit;
     hs_reach       reach;
     call           c;
@@ -344,16 +345,18 @@ call_fill_scene(call_scene *s)
     s->histogram = (hs_histogram){.n_edges = N_EDGES_OF_CALL,
                                   .edges = s->edges,
                                   .n_types = 2,
-                                  .of_points = {s->types, s->weights},
-                                  .of_queries = {s->query_types, s->query_weights},
                                   .counts = s->counts,
                                   .sums = s->sums};
-    s->systems = (hs_systems){
-        .n = N_SYSTEMS_OF_CALL, .first = s->first, .box = &s->box, .first_query = s->first_query};
+    s->systems =
+        (call_systems){.n = N_SYSTEMS_OF_CALL, .first = s->first, .first_query = s->first_query};
     s->visit = (hs_visit){.pair = call_note_pair};
-    s->reach = (hs_reach){.rule = HS_RULE_MAX, .radii = s->radii, .query_radii = s->query_radii};
+    s->reach = (hs_reach){.rule = HS_RULE_MAX};
     s->c = (call){.points = &s->points,
                   .queries = &s->queries,
+                  .known = {.types = s->types, .weights = s->weights, .radii = s->radii},
+                  .of_queries = {.types = s->query_types,
+                                 .weights = s->query_weights,
+                                 .radii = s->query_radii},
                   .box = &s->box,
                   .options = &s->options,
                   .histogram = &s->histogram,
@@ -415,7 +418,7 @@ typedef struct fault {
     F(queries_real, USES_QUERIES, HS_ERR_ARGUMENT, s->queries.real = (hs_real)INT_MAX)            \
     F(queries_rows_away, USES_QUERIES, HS_ERR_ARGUMENT, s->queries.row_stride = PTRDIFF_MIN)      \
     F(queries_nan, USES_QUERIES, HS_ERR_NOT_FINITE, s->q[3] = NAN)                                \
-    F(box_null, NEEDS_BOX, HS_ERR_ARGUMENT, s->c.box = s->systems.box = NULL)                     \
+    F(box_null, NEEDS_BOX, HS_ERR_ARGUMENT, s->c.box = NULL)                                      \
     F(box_ndim_0, USES_BOX, HS_ERR_ARGUMENT, s->box.ndim = 0)                                     \
     F(box_ndim_below, USES_BOX, HS_ERR_ARGUMENT, s->box.ndim = INT_MIN)                           \
     F(box_ndim_above, USES_BOX, HS_ERR_ARGUMENT, s->box.ndim = HS_MAX_DIM + 1)                    \
@@ -466,21 +469,20 @@ typedef struct fault {
     F(n_types_0, USES_HISTOGRAM, HS_ERR_ARGUMENT, s->histogram.n_types = 0)                       \
     F(n_types_below, USES_HISTOGRAM, HS_ERR_ARGUMENT, s->histogram.n_types = INT32_MIN)           \
     F(n_types_highest, USES_HISTOGRAM, HS_ERR_MEMORY, s->histogram.n_types = INT32_MAX)           \
-    F(types_null, USES_HISTOGRAM, HS_ERR_TYPES, s->histogram.of_points.types = NULL)              \
+    F(types_null, USES_HISTOGRAM, HS_ERR_TYPES, s->c.known.types = NULL)                          \
     F(types_below, USES_HISTOGRAM, HS_ERR_TYPES, s->types[3] = -1)                                \
     F(types_above, USES_HISTOGRAM, HS_ERR_TYPES, s->types[3] = INT32_MAX)                         \
-    F(query_types_null, USES_HISTOGRAM, HS_ERR_TYPES, s->histogram.of_queries.types = NULL)       \
+    F(query_types_null, USES_HISTOGRAM, HS_ERR_TYPES, s->c.of_queries.types = NULL)               \
     F(query_types, USES_HISTOGRAM, HS_ERR_TYPES, s->query_types[2] = INT32_MIN)                   \
     F(weights_nan, USES_HISTOGRAM, HS_ERR_WEIGHTS, s->weights[3] = NAN)                           \
     F(query_weights_nan, USES_HISTOGRAM, HS_ERR_WEIGHTS, s->query_weights[1] = INFINITY)          \
     F(visit_null, USES_VISIT, HS_ERR_ARGUMENT, s->c.visit = NULL)                                 \
     F(visit_none, USES_VISIT, HS_ERR_ARGUMENT, s->visit.pair = NULL)                              \
     F(reach_no_rule, USES_REACH, HS_ERR_ARGUMENT, s->reach.rule = HS_RULE_END)                    \
-    F(reach_no_radii, USES_REACH, HS_ERR_ARGUMENT, s->reach.radii = NULL)                         \
+    F(reach_no_radii, USES_REACH, HS_ERR_ARGUMENT, s->c.known.radii = NULL)                       \
     F(reach_extent, USES_REACH, HS_ERR_ARGUMENT, s->reach.extent = INFINITY)                      \
     F(radii_nan, USES_REACH, HS_ERR_RADII, s->radii[3] = NAN)                                     \
     F(query_radii, USES_REACH | USES_QUERIES, HS_ERR_RADII, s->query_radii[4] = -1.0)             \
-    F(systems_null, USES_SYSTEMS, HS_ERR_ARGUMENT, s->c.systems = NULL)                           \
     F(systems_below, USES_SYSTEMS, HS_ERR_ARGUMENT, s->systems.n = INT64_MIN)                     \
     F(systems_above, USES_SYSTEMS, HS_ERR_TOO_MANY, s->systems.n = INT64_C(1) << 31)              \
     F(systems_highest, USES_SYSTEMS, HS_ERR_TOO_MANY, s->systems.n = INT64_MAX)                   \
@@ -497,8 +499,10 @@ typedef struct fault {
     F(first_query_descends, USES_SYSTEMS | USES_QUERIES, HS_ERR_ARGUMENT,                         \
       s->first_query[1] = s->first_query[2] + 1)                                                  \
     F(first_query_long, USES_SYSTEMS | USES_QUERIES, HS_ERR_ARGUMENT, s->first_query[3]++)        \
-    F(rows_nan, USES_SYSTEMS, HS_ERR_BOX_FINITE, s->systems.rows = s->rows; s->rows[13] = NAN)    \
-    F(cutoffs_nan, USES_SYSTEMS | USES_CUTOFF, HS_ERR_CUTOFF, s->systems.cutoffs = s->cutoffs;    \
+    F(rows_nan, USES_SYSTEMS, HS_ERR_BOX_FINITE, s->systems.each.rows = s->rows;                  \
+      s->rows[13] = NAN)                                                                          \
+    F(cutoffs_nan, USES_SYSTEMS | USES_CUTOFF, HS_ERR_CUTOFF,                                     \
+      s->systems.each.cutoffs = s->cutoffs;                                                       \
       s->cutoffs[2] = NAN)                                                                        \
     F(cells_null, USES_CELLS, HS_ERR_ARGUMENT, hs_cells_free(s->c.cells); s->c.cells = NULL)      \
     F(list_null, USES_LIST, HS_ERR_ARGUMENT, hs_verlet_free(s->c.list); s->c.list = NULL)         \
@@ -648,8 +652,9 @@ arrays_without_entries_may_be_missing(void)
     hs_pairs         *pairs;
     call_fill_scene(&s);
     call_make_objects(&s.c, USES_CELLS);
-    const hs_points  none = {.ndim = 3};
-    const hs_systems empty = {.n = 0};
+    const hs_points none = {.ndim = 3};
+    const int64_t   zero = 0;
+    int64_t         counts;
     CHECK(hs_neighbors_count(AMONG(&none, &s.box), &s.options, NULL, NULL) == HS_OK);
     CHECK(hs_neighbors_count(QUERIED(&s.points, &none, &s.box), &s.options, NULL, NULL) == HS_OK);
     CHECK(hs_neighbors_count(QUERIED(&none, &s.points, &s.box), &s.options, NULL, NULL) ==
@@ -657,8 +662,10 @@ arrays_without_entries_may_be_missing(void)
     CHECK(hs_neighbors_count(QUERIED_CELLS(s.c.cells, &none), &s.options, NULL, NULL) == HS_OK);
     CHECK(hs_cells_find(s.c.cells, &none, NULL, NULL) == HS_OK);
     CHECK(hs_box_wrap(&s.box, &none, NULL, NULL, NULL) == HS_OK);
-    CHECK(hs_systems_count(&none, &empty, &s.options, NULL, NULL) == HS_OK);
-    CHECK(hs_systems_find(&none, &empty, &s.options, &pairs, NULL) == HS_OK);
+    const hs_among *empty = SYSTEMS(&none, 0, &zero, NULL, NULL);
+    CHECK(hs_pairs_count(empty, &s.options, &counts, NULL) == HS_OK);
+    CHECK(hs_neighbors_count(empty, &s.options, NULL, NULL) == HS_OK);
+    CHECK(hs_pairs_find(empty, &s.options, &pairs, NULL) == HS_OK);
     CHECK(hs_pairs_length(pairs) == 0);
     hs_pairs_free(pairs);
     s.histogram.counts = NULL;
@@ -680,8 +687,10 @@ what_is_searched_cannot_contradict_itself(void)
     call_make_objects(&s.c, USES_CELLS);
     const hs_options *options = &s.options;
     const hs_among    bad[] = {{.points = NULL},
-                               {.cells = s.c.cells, .points = &s.points},
-                               {.cells = s.c.cells, .box = &s.box}};
+                               {.cells = s.c.cells, .points = SET(&s.points)},
+                               {.cells = s.c.cells, .box = &s.box},
+                               {.cells = s.c.cells, .each = &s.systems.each},
+                               {.points = SET(&s.points), .each = &s.systems.each}};
     for (size_t b = 0; b <= sizeof bad / sizeof *bad; b++) {
         const hs_among *among = b < sizeof bad / sizeof *bad ? &bad[b] : NULL;
         CHECK(hs_pairs_find(among, options, &pairs, NULL) == HS_ERR_ARGUMENT && pairs == NULL);

@@ -300,12 +300,12 @@ bad_shells_are_refused(void)
     hs_pairs      *pairs;
     hs_stream     *stream;
     hs_failure     failure;
-    const hs_reach reach = {.radii = x};
+    const hs_reach reach = {.rule = HS_RULE_SUM};
     make_lattice();
     options.want = HS_WANT_SHELL;
-    hs_among of_reach = {.points = &points, .box = box_shells, .reach = &reach};
+    hs_among of_reach = {.points = SET(&points, .radii = x), .box = box_shells, .reach = &reach};
     CHECK(hs_pairs_find(&of_reach, &options, &pairs, NULL) == HS_ERR_ARGUMENT);
-    CHECK(hs_neighbors_find(AMONG(&points, box_shells), &options, &pairs, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_neighbors_find(&of_reach, &options, &pairs, NULL) == HS_ERR_ARGUMENT);
     for (int t = 0; t < 3; t++) {
         options.shells = bad[t];
         options.n_shells = 2;

@@ -2,6 +2,7 @@
 /* test_connectivity.c: lists of nodes and the pairs between them: half lists, rows, and what is
  * kept of them. */
 #include "../../../csrc/core/connectivity/connectivity.h"
+#include "../support/among.h"
 #include "../support/node_scenes.h"
 #include "../support/poll_checks.h"
 
@@ -593,7 +594,7 @@ searches_give_what_links_give(void)
     harness_random       random = {44};
     hs_options           options = hs_options_default();
     const hs_points      points = {x, 60, 2, HS_FLOAT64, 2 * sizeof *x, sizeof *x};
-    const hs_among       among = {.points = &points};
+    const hs_among       among = {.points = SET(&points)};
     const hs_node_lists  kinds[] = {
          {.n_lists = 1, .n_nodes = all, .n_ghosts = none},
          {.n_lists = 1, .n_nodes = all, .n_ghosts = ghosts},
@@ -651,7 +652,7 @@ fill_found(void *context)
     harness_random       random = {45};
     hs_options           options = hs_options_default();
     const hs_points      points = {x, 30, 2, HS_FLOAT64, 2 * sizeof *x, sizeof *x};
-    const hs_among       among = {.points = &points};
+    const hs_among       among = {.points = SET(&points)};
     const hs_node_lists  lists = {.n_lists = 2, .n_nodes = counts, .n_ghosts = context};
     hs_pairs            *found = NULL;
     hs_connectivity     *made = hs_connectivity_new();
@@ -677,7 +678,7 @@ rows_that_are_found_may_be_too_many(void)
     CHECK(raise_memory_limit(fill_found, NULL, &limit) > 5);
     CHECK(raise_memory_limit(fill_found, ghosts, &limit) > 5);
     const hs_points     points = {NULL, 0, 2, HS_FLOAT64, 16, 8};
-    const hs_among      among = {.points = &points};
+    const hs_among      among = {.points = SET(&points)};
     const hs_node_lists none = {.n_lists = 0};
     hs_options          options = hs_options_default();
     hs_connectivity    *made;

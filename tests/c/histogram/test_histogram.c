@@ -29,6 +29,7 @@ typedef struct line {
     int          pair_of[PAIRS]; /* POINTS * i + j */
     int64_t      counts[TYPES * TYPES * PAIRS];
     double       sums[TYPES * TYPES * PAIRS];
+    hs_set       known; /* types and weights of all points */
     hs_histogram wanted;
 } line;
 
@@ -66,19 +67,13 @@ find_line(line *made, int split, hs_failure *failure)
     const hs_options options = hs_options_default();
     const hs_points  queries = {made->x, split, 1, HS_FLOAT64, 8, 8};
     const hs_points  points = {made->x + split, POINTS - split, 1, HS_FLOAT64, 8, 8};
-    const int32_t   *types = made->wanted.of_points.types;
-    const double    *weights = made->wanted.of_points.weights;
-    made->wanted.of_queries = made->wanted.of_points;
-    if (types != NULL) {
-        made->wanted.of_points.types += split;
-    }
-    if (weights != NULL) {
-        made->wanted.of_points.weights += split;
-    }
-    const hs_status status = hs_pairs_histogram(QUERIED(&points, split > 0 ? &queries : NULL, NULL),
-                                                &options, &made->wanted, failure);
-    made->wanted.of_points = (hs_marks){types, weights};
-    return status;
+    const int32_t   *types = made->known.types;
+    const double    *weights = made->known.weights;
+    const hs_among   among = {
+          .points = SET(&points, .types = types != NULL ? types + split : NULL,
+                        .weights = weights != NULL ? weights + split : NULL),
+          .queries = SET(split > 0 ? &queries : NULL, .types = types, .weights = weights)};
+    return hs_pairs_histogram(&among, &options, &made->wanted, failure);
 }
 
 /* Each pair is in the bin of its distance, between its types, with the product of its weights. */
@@ -96,7 +91,7 @@ line_is_right(const line *made, int split)
                 const int    t = n_types > 1 ? made->types[j] : 0;
                 const bool   meant = (s == a && t == b) || (split == 0 && s == b && t == a);
                 const bool   asked = split == 0 || (i < split && j >= split);
-                const bool   weighted = made->wanted.of_points.weights != NULL;
+                const bool   weighted = made->known.weights != NULL;
                 const double product = weighted ? made->weights[i] * made->weights[j] : 1.0;
                 right = right &&
                         (made->wanted.counts == NULL || made->counts[at] == (meant && asked));
@@ -121,13 +116,30 @@ each_pair_is_in_its_bin(void)
         const int     split = trial & 16 ? 1 + trial % (POINTS - 1) : 0;
         make_line(&random, spreads[trial / 64], &made);
         wanted->n_types = trial & 1 ? TYPES : 1;
-        wanted->of_points.types = trial & 1 ? made.types : NULL;
-        wanted->of_points.weights = trial & 2 ? made.weights : NULL;
+        made.known.types = trial & 1 ? made.types : NULL;
+        made.known.weights = trial & 2 ? made.weights : NULL;
         wanted->counts = trial & 4 ? NULL : made.counts;
         wanted->sums = trial & 8 ? NULL : made.sums;
         CHECK(find_line(&made, split, NULL) == HS_OK);
         CHECK(line_is_right(&made, split));
     }
+}
+
+/* Weights where nothing is summed, and types where there is one. */
+static void
+what_is_not_needed_is_not_looked_at(void)
+{
+    static line    made;
+    harness_random random = {1598};
+    make_line(&random, 4, &made);
+    made.known = (hs_set){.types = made.types, .weights = made.weights};
+    made.types[1] = -1;
+    made.weights[2] = NAN;
+    CHECK(find_line(&made, 0, NULL) == HS_ERR_WEIGHTS);
+    made.wanted.sums = NULL;
+    CHECK(find_line(&made, 0, NULL) == HS_OK && line_is_right(&made, 0));
+    made.wanted.n_types = TYPES;
+    CHECK(find_line(&made, 0, NULL) == HS_ERR_TYPES);
 }
 
 /* Where only those that ask, or only those that are asked, have weights far apart. */
@@ -139,14 +151,10 @@ either_side_may_have_the_odd_weights(void)
     hs_options options = hs_options_default();
     hs_points  points = {x, 2, 1, HS_FLOAT64, 8, 8};
     for (int side = 0; side < 2; side++) {
-        hs_histogram wanted = {.n_edges = 1,
-                               .edges = &edge,
-                               .n_types = 1,
-                               .of_points.weights = side ? far : plain,
-                               .of_queries.weights = side ? plain : far,
-                               .sums = &sum};
-        CHECK(hs_pairs_histogram(QUERIED(&points, &points, NULL), &options, &wanted, NULL) ==
-              HS_OK);
+        hs_histogram   wanted = {.n_edges = 1, .edges = &edge, .n_types = 1, .sums = &sum};
+        const hs_among among = {.points = SET(&points, .weights = side ? far : plain),
+                                .queries = SET(&points, .weights = side ? plain : far)};
+        CHECK(hs_pairs_histogram(&among, &options, &wanted, NULL) == HS_OK);
         CHECK(sum == 0x1.8p401); /* and five times 2^-400, which rounding takes */
     }
 }
@@ -515,6 +523,7 @@ void
 test_histogram(void)
 {
     RUN(each_pair_is_in_its_bin);
+    RUN(what_is_not_needed_is_not_looked_at);
     RUN(either_side_may_have_the_odd_weights);
     RUN(lattice_pairs_are_all_at_an_edge);
     RUN(pairs_of_two_spots_are_all_at_the_edge);

@@ -81,18 +81,17 @@ static void
 a_division_can_be_stopped(void)
 {
     enum { MANY = 2 * HS_POLL_POINTS + 9 };
-    static double   x[MANY], numbers[MANY];
-    static int32_t  types[MANY];
-    const double    cutoff = 1.0;
-    const hs_points p = {x, MANY, 1, HS_FLOAT64, sizeof *x, sizeof *x};
-    const hs_reach  reaches[] = {
-         {.rule = HS_RULE_SUM, .radii = numbers, .query_radii = numbers},
-         {.n_types = 1, .types = types, .query_types = types, .cutoffs = &cutoff},
-         {.rule = HS_RULE_MAX,
-          .has_supports = true,
-          .extent = 1.0,
-          .supports = numbers,
-          .query_supports = numbers},
+    static double  x[MANY], numbers[MANY];
+    static int32_t types[MANY];
+    const double   cutoff = 1.0;
+    const hs_set   p = {.at = {x, MANY, 1, HS_FLOAT64, sizeof *x, sizeof *x},
+                        .radii = numbers,
+                        .supports = numbers,
+                        .types = types};
+    const hs_reach reaches[] = {
+        {.rule = HS_RULE_SUM},
+        {.n_types = 1, .cutoffs = &cutoff},
+        {.rule = HS_RULE_MAX, .has_supports = true, .extent = 1.0},
     };
     for (int64_t i = 0; i < MANY; i++) {
         x[i] = (double)i;
@@ -141,7 +140,7 @@ make_plan_as(const hs_reach *reach, bool has_queries, double bound, hs_algorithm
              planned *made)
 {
     const hs_options options = hs_options_default();
-    const hs_points  p = reach_points(&points), q = reach_points(&queries);
+    const hs_set     p = reach_set_of(&points), q = reach_set_of(&queries);
     hs_failure       failure = HS_NO_FAILURE;
     hs_account_init(&made->account, &options);
     CHECK(hs_levels_divide(&made->account, &options, &p, has_queries ? &q : NULL, reach,
@@ -298,8 +297,7 @@ covers_each_once(const planned *made)
 static void
 sums_above_an_exact_one_are_not_it(void)
 {
-    const hs_reach reach = {
-        .rule = HS_RULE_SUM, .radii = points.radii, .query_radii = queries.radii};
+    const hs_reach reach = {.rule = HS_RULE_SUM};
     planned        made;
     int            joined = 0;
     harness_random random = {77};
@@ -332,7 +330,7 @@ many_types_are_searched_in_pairs(void)
     planned        made;
     reach_fill(&random, 90, 1, 1.0, 0, 1.0, &points);
     for (int n_types = 1; n_types <= N_TYPES; n_types++) {
-        const hs_reach reach = {.n_types = n_types, .types = points.types, .cutoffs = all};
+        const hs_reach reach = {.n_types = n_types, .cutoffs = all};
         for (int e = 0; e < N_TYPES * N_TYPES; e++)
             all[e] = 1.0;
         for (int i = 0; i < 90; i++)
@@ -347,7 +345,7 @@ many_types_are_searched_in_pairs(void)
                                        {-1.0, 0.1, 0.1, -1.0},
                                        {-1.0, -1.0, -1.0, 0.1}};
     for (int lone = 0; lone < 3; lone++) {
-        const hs_reach reach = {.n_types = 2, .types = points.types, .cutoffs = alone[lone]};
+        const hs_reach reach = {.n_types = 2, .cutoffs = alone[lone]};
         for (int i = 0; i < 90; i++)
             points.types[i] = lone == 0 ? i % 9 != 0 : lone == 1 ? i % 2 : i % 9 == 0;
         make_plan(&reach, false, HUGE_VAL, &made);
@@ -362,8 +360,7 @@ many_types_are_searched_in_pairs(void)
 static void
 a_level_of_two_is_not_all(void)
 {
-    const hs_reach reach = {
-        .rule = HS_RULE_GATHER, .radii = points.radii, .query_radii = queries.radii};
+    const hs_reach reach = {.rule = HS_RULE_GATHER};
     harness_random random = {79};
     planned        made;
     reach_fill(&random, 10, 1, 1.0, 0, 0.1, &points);
@@ -422,7 +419,7 @@ two_sizes(int64_t n, double side, double large, int64_t every)
 static void
 some_plans_are_never_joined(void)
 {
-    hs_reach       reach = {.rule = HS_RULE_SUM, .radii = points.radii};
+    hs_reach       reach = {.rule = HS_RULE_SUM};
     harness_random random = {73};
     planned        made;
     two_sizes(REACH_POINTS, 20.0, 1.2, 2);
@@ -454,7 +451,7 @@ some_plans_are_never_joined(void)
     reach_fill(&random, 90, 1, 1.0, 0, 1.0, &points);
     for (int e = 0; e < REACH_TYPES * REACH_TYPES; e++)
         table[e] = e % (REACH_TYPES + 1) == 0 ? 0.001 : -1.0;
-    reach = (hs_reach){.n_types = REACH_TYPES, .types = points.types, .cutoffs = table};
+    reach = (hs_reach){.n_types = REACH_TYPES, .cutoffs = table};
     make_plan(&reach, false, HUGE_VAL, &made);
     CHECK(made.plan.n == REACH_TYPES);
     stays(&made);
@@ -474,10 +471,10 @@ static void
 it_can_be_stopped(void)
 {
     enum { MANY = 2 * HS_POLL_POINTS + 9 };
-    static double   x[2 * MANY], radii[2 * MANY];
-    const hs_points p = {x, 2 * MANY, 1, HS_FLOAT64, sizeof *x, sizeof *x},
-                    q = {x, MANY, 1, HS_FLOAT64, sizeof *x, sizeof *x};
-    const hs_reach   reach = {.rule = HS_RULE_SUM, .radii = radii, .query_radii = radii};
+    static double x[2 * MANY], radii[2 * MANY];
+    const hs_set  p = {.at = {x, 2 * MANY, 1, HS_FLOAT64, sizeof *x, sizeof *x}, .radii = radii},
+                 q = {.at = {x, MANY, 1, HS_FLOAT64, sizeof *x, sizeof *x}, .radii = radii};
+    const hs_reach   reach = {.rule = HS_RULE_SUM};
     const hs_options quiet = hs_options_default();
     for (int64_t i = 0; i < 2 * MANY; i++) {
         x[i] = (double)i;
@@ -526,9 +523,9 @@ static void
 open_plan(const hs_reach *reach, bool has_queries, double bound, const hs_box *box,
           opened_plan *made)
 {
-    hs_options      options = hs_options_default();
-    const hs_points p = reach_points(&points), q = reach_points(&queries);
-    hs_failure      failure = HS_NO_FAILURE;
+    hs_options   options = hs_options_default();
+    const hs_set p = reach_set_of(&points), q = reach_set_of(&queries);
+    hs_failure   failure = HS_NO_FAILURE;
     options.cutoff = bound;
     options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE;
     made->box = box;
@@ -565,10 +562,9 @@ failures_name_the_callers_row(void)
     harness_random random = {93};
     for (int in_queries = 0; in_queries < 2; in_queries++) {
         for (int has_queries = in_queries; has_queries < 2; has_queries++) {
-            const hs_reach reach = {
-                .rule = HS_RULE_GATHER, .radii = points.radii, .query_radii = queries.radii};
-            opened_plan made;
-            int         n_failed = 0;
+            const hs_reach reach = {.rule = HS_RULE_GATHER};
+            opened_plan    made;
+            int            n_failed = 0;
             reach_fill(&random, 60, 1, 1.0, 2, 0.25, &points);
             reach_fill(&random, 50, 1, 1.0, 2, 0.25, &queries);
             *(in_queries ? &queries.x[31] : &points.x[31]) = 1e300;
@@ -598,7 +594,7 @@ opening_a_step_of_many_supports_can_be_stopped(void)
 {
     enum { MANY = 2 * HS_POLL_SUPPORTS + 9 };
     static double   x[MANY], numbers[MANY];
-    const hs_points p = {x, MANY, 1, HS_FLOAT64, sizeof *x, sizeof *x};
+    const hs_points at = {x, MANY, 1, HS_FLOAT64, sizeof *x, sizeof *x};
     for (int64_t i = 0; i < MANY; i++) {
         x[i] = (double)i;
         numbers[i] = i == MANY - 1 ? 1.0 : 1.5; /* the last is as wide as the ball */
@@ -606,11 +602,9 @@ opening_a_step_of_many_supports_can_be_stopped(void)
     for (int rule = HS_RULE_MAX; rule < HS_RULE_END; rule++) {
         for (int has_queries = 0; has_queries < 2; has_queries++) {
             const bool      asks = rule != HS_RULE_SCATTER, meets = rule != HS_RULE_GATHER;
-            const hs_reach  reach = {.rule = (hs_rule)rule,
-                                     .has_supports = true,
-                                     .extent = 1.0,
-                                     .supports = meets || !has_queries ? numbers : NULL,
-                                     .query_supports = asks && has_queries ? numbers : NULL};
+            const hs_reach  reach = {.rule = (hs_rule)rule, .has_supports = true, .extent = 1.0};
+            const hs_set    p = {.at = at, .supports = meets || !has_queries ? numbers : NULL};
+            const hs_set    q = {.at = at, .supports = asks ? numbers : NULL};
             refusal         once = {.nth = 0};
             hs_options      options = hs_options_default();
             hs_failure      failure = HS_NO_FAILURE;
@@ -622,7 +616,7 @@ opening_a_step_of_many_supports_can_be_stopped(void)
             options.poll = refuse_once;
             options.poll_context = &once;
             hs_call_begin(&options, &call);
-            CHECK(hs_levels_divide(&call.account, &options, &p, has_queries ? &p : NULL, &reach,
+            CHECK(hs_levels_divide(&call.account, &options, &p, has_queries ? &q : NULL, &reach,
                                    &levels, &failure) == HS_OK);
             CHECK(hs_level_plan_make(&call.account, &levels, HUGE_VAL, HS_AUTO, &plan) == HS_OK);
             const int64_t held = call.account.held;

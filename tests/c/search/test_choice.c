@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_choice.c: selections: types, labels, groups, and pairs that are left out. */
+#include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/poll_checks.h"
 
@@ -41,7 +42,10 @@ make_crowd(double away)
 static int64_t
 count(const hs_box *box)
 {
-    const hs_among among = {.points = &crowd_points, .box = box, .selection = &crowd_selection};
+    const hs_among among = {.points =
+                                SET(&crowd_points, .groups = crowd_labels, .labels = crowd_labels),
+                            .box = box,
+                            .selection = &crowd_selection};
     const unsigned wants[] = {HS_WANT_I, HS_WANT_DISTANCE | HS_WANT_J};
     int64_t        counted = -1;
     CHECK(hs_pairs_count(&among, &crowd_options, &counted, NULL) == HS_OK);
@@ -58,7 +62,10 @@ count(const hs_box *box)
 static int64_t
 count_rows(const hs_box *box)
 {
-    const hs_among among = {.points = &crowd_points, .box = box, .selection = &crowd_selection};
+    const hs_among among = {.points =
+                                SET(&crowd_points, .groups = crowd_labels, .labels = crowd_labels),
+                            .box = box,
+                            .selection = &crowd_selection};
     int64_t        counted[CROWD], all = 0;
     CHECK(hs_neighbors_count(&among, &crowd_options, counted, NULL) == HS_OK);
     for (int i = 0; i < CROWD; i++)
@@ -106,7 +113,7 @@ numbers_go_with_queries(void)
 {
     make_crowd(0.0);
     crowd_selection.query_numbers = crowd_labels;
-    crowd_selection.groups = crowd_labels;
+    crowd_selection.has_groups = true;
     CHECK(count(&line) == 3 * PAIRS + CROWD);
 }
 
@@ -115,7 +122,7 @@ static void
 single_precision_chooses_as_well(void)
 {
     make_crowd(0.0);
-    crowd_selection.labels = crowd_labels;
+    crowd_selection.has_labels = true;
     crowd_options.precision = HS_SINGLE;
     CHECK(count(&line) == 2 * PAIRS + CROWD && count_rows(&line) == 2 * (2 * PAIRS + CROWD));
 }
@@ -127,46 +134,57 @@ systems_choose_as_well(void)
     static int64_t counted[CROWD];
     int64_t        first[] = {0, 100, CROWD}, counts[2];
     make_crowd(0.0);
-    hs_systems systems = {.n = 2, .first = first, .selection = &crowd_selection};
-    crowd_selection.labels = crowd_labels;
-    CHECK(hs_systems_count(&crowd_points, &systems, &crowd_options, counts, NULL) == HS_OK);
+    hs_among among = *SYSTEMS(&crowd_points, 2, first, NULL, NULL);
+    hs_set   set = *among.points;
+    set.labels = crowd_labels;
+    among.points = &set;
+    among.selection = &crowd_selection;
+    crowd_selection.has_labels = true;
+    CHECK(hs_pairs_count(&among, &crowd_options, counts, NULL) == HS_OK);
     CHECK(counts[0] == 0 && counts[1] == 0);
-    crowd_selection.labels = NULL;
+    crowd_selection.has_labels = false;
     crowd_selection.min_distance = 1.0;
-    CHECK(hs_systems_count(&crowd_points, &systems, &crowd_options, counts, NULL) == HS_OK);
+    CHECK(hs_pairs_count(&among, &crowd_options, counts, NULL) == HS_OK);
     CHECK(counts[0] == 0 && counts[1] == 0);
-    systems.box = &line;
-    CHECK(hs_systems_count(&crowd_points, &systems, &crowd_options, counts, NULL) == HS_OK);
+    among.box = &line;
+    CHECK(hs_pairs_count(&among, &crowd_options, counts, NULL) == HS_OK);
     CHECK(counts[0] == 99 * 100 + 100 && counts[1] == 199 * 200 + 200);
     crowd_selection.min_distance = -1.0;
-    CHECK(hs_systems_coordination(&crowd_points, NULL, &systems, &crowd_options, counted, NULL) ==
-          HS_ERR_ARGUMENT);
+    CHECK(hs_neighbors_count(&among, &crowd_options, counted, NULL) == HS_ERR_ARGUMENT);
 }
 
 /* Queries of systems that have numbers of points pair as these do. */
 static void
 numbers_of_queries_hold_in_systems(void)
 {
-    static int64_t numbers[CROWD], counted[CROWD];
-    const int64_t  first[] = {0, 100, CROWD}, first_query[] = {0, 1, 2};
+    int64_t       groups[CROWD], numbers[] = {5, 200}, counted[2];
+    const int64_t first[] = {0, 100, CROWD}, first_query[] = {0, 1, 2}, excluded[] = {200, 270};
     make_crowd(0.0);
     hs_points queries = crowd_points;
     queries.n = 2;
-    numbers[0] = 5;
-    numbers[1] = 100;
+    for (int i = 0; i < CROWD; i++)
+        groups[i] = i >= 150;
     crowd_selection.query_numbers = numbers;
-    crowd_selection.labels = crowd_labels;
-    const hs_systems systems = {.n = 2,
-                                .first = first,
-                                .box = &line,
-                                .selection = &crowd_selection,
-                                .first_query = first_query};
-    CHECK(hs_systems_coordination(&crowd_points, &queries, &systems, &crowd_options, counted,
-                                  NULL) == HS_OK);
+    crowd_selection.has_labels = true;
+    const hs_among among = {.points = SET(&crowd_points, .groups = groups, .labels = crowd_labels,
+                                          .n_systems = 2, .first = first),
+                            .queries = SET(&queries, .n_systems = 2, .first = first_query),
+                            .box = &line,
+                            .selection = &crowd_selection};
+    CHECK(hs_neighbors_count(&among, &crowd_options, counted, NULL) == HS_OK);
     CHECK(counted[0] == 2 * 99 + 3 && counted[1] == 2 * 199 + 3); /* itself at S = 0 too */
+    crowd_selection.has_labels = false;
+    crowd_selection.has_groups = true;
+    CHECK(hs_neighbors_count(&among, &crowd_options, counted, NULL) == HS_OK);
+    CHECK(counted[0] == 3 * 100 && counted[1] == 3 * 150);
+    crowd_selection.n_excluded = 1;
+    crowd_selection.excluded = excluded;
+    CHECK(hs_neighbors_count(&among, &crowd_options, counted, NULL) == HS_OK);
+    CHECK(counted[0] == 3 * 100 && counted[1] == 3 * 150 - 1);
     numbers[1] = CROWD;
-    CHECK(hs_systems_coordination(&crowd_points, &queries, &systems, &crowd_options, counted,
-                                  NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_neighbors_count(&among, &crowd_options, counted, NULL) == HS_ERR_ARGUMENT);
+    numbers[1] = 99; /* of the other system */
+    CHECK(hs_neighbors_count(&among, &crowd_options, counted, NULL) == HS_ERR_ARGUMENT);
 }
 
 /* Images of excluded pairs are those of each system's box, which is looked at first. */
@@ -178,11 +196,14 @@ a_bad_box_of_a_system_is_told(void)
     int64_t             counts[2];
     hs_failure          failure;
     make_crowd(0.0);
-    crowd_selection.labels = crowd_labels;
-    const hs_systems systems = {
-        .n = 2, .first = first, .box = &line, .rows = rows, .selection = &crowd_selection};
-    CHECK(hs_systems_count(&crowd_points, &systems, &crowd_options, counts, &failure) ==
-          HS_ERR_BOX_DEPENDENT);
+    crowd_selection.has_labels = true;
+    const hs_each_system each = {.rows = rows};
+    const hs_among       among = {
+              .points = SET(&crowd_points, .labels = crowd_labels, .n_systems = 2, .first = first),
+              .box = &line,
+              .selection = &crowd_selection,
+              .each = &each};
+    CHECK(hs_pairs_count(&among, &crowd_options, counts, &failure) == HS_ERR_BOX_DEPENDENT);
     CHECK(failure.system == 1 && failure.row == 0);
 }
 
@@ -209,6 +230,9 @@ typedef struct selected {
 } selected;
 
 static selected made;
+
+/* What a selection may go by. */
+#define OF_MADE(points) SET(points, .groups = made.groups, .labels = made.labels)
 
 static int
 below(harness_random *random, int n)
@@ -253,14 +277,10 @@ make_selection(harness_random *random)
         made.query_labels[t] = below(random, 9) == 0 ? INT64_MAX : below(random, 5);
         made.numbers[t] = made.n > 0 ? below(random, made.n) : 0;
     }
-    if (below(random, 2)) {
-        of->groups = made.groups;
-        of->query_groups = made.query_groups;
-    }
+    of->has_groups = below(random, 2);
     const int how = below(random, 3);
     if (how == 1) {
-        of->labels = made.labels;
-        of->query_labels = made.query_labels;
+        of->has_labels = true;
         of->within = below(random, 3);
     } else if (how == 2 && made.n > 0 && asking > 0) {
         of->n_excluded = below(random, MOST_EXCLUDED);
@@ -329,7 +349,7 @@ is_excluded(int64_t i, int64_t j, bool queried)
         if ((a == i && b == j) || (!queried && a == j && b == i))
             return true;
     }
-    if (of->labels == NULL)
+    if (!of->has_labels)
         return false;
     const double one = (double)(queried ? made.query_labels[i] : made.labels[i]);
     return fabs(one - (double)made.labels[j]) <= (double)of->within;
@@ -361,7 +381,7 @@ counts(int64_t i, int64_t j, const int *S, bool queried)
     if (square > most || (square == most && !made.options.inclusive) ||
         square < of->min_distance * of->min_distance)
         return false;
-    if (of->groups != NULL && made.groups[j] != (queried ? made.query_groups : made.groups)[i])
+    if (of->has_groups && made.groups[j] != (queried ? made.query_groups : made.groups)[i])
         return false;
     return !is_excluded(i, j, queried) || !is_nearest(i, j, p, q, S, queried);
 }
@@ -478,7 +498,7 @@ check_stream(const hs_among *among, int64_t n_expected)
 
 /* Of two systems, each point has its pairs in the first or in the second. */
 static void
-check_systems(const hs_points *points, const hs_selection *selection, int64_t n_in_one)
+check_systems(const hs_among *one, int64_t n_in_one)
 {
     const int64_t first[] = {0, made.n, made.n};
     double        rows[2 * 9] = {0.0};
@@ -487,18 +507,20 @@ check_systems(const hs_points *points, const hs_selection *selection, int64_t n_
             for (int k = 0; k < made.d; k++)
                 rows[(s * made.d + l) * made.d + k] = made.box.rows[l][k];
     for (int own = 0; own < 2; own++) {
-        const hs_systems systems = {.n = 2,
-                                    .first = first,
-                                    .box = &made.box,
-                                    .rows = own ? rows : NULL,
-                                    .selection = selection};
-        hs_pairs        *pairs = NULL;
-        int64_t          counted[2] = {-1, -1};
+        const hs_each_system each = {.rows = own ? rows : NULL};
+        hs_set               set = *one->points;
+        hs_among             among = *one;
+        hs_pairs            *pairs = NULL;
+        int64_t              counted[2] = {-1, -1};
+        set.n_systems = 2;
+        set.first = first;
+        among.points = &set;
+        among.each = &each;
         made.options.want = HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT;
-        CHECK(hs_systems_find(points, &systems, &made.options, &pairs, NULL) == HS_OK);
+        CHECK(hs_pairs_find(&among, &made.options, &pairs, NULL) == HS_OK);
         CHECK(hs_pairs_length(pairs) == n_in_one && all_count(pairs, false));
         hs_pairs_free(pairs);
-        CHECK(hs_systems_count(points, &systems, &made.options, counted, NULL) == HS_OK);
+        CHECK(hs_pairs_count(&among, &made.options, counted, NULL) == HS_OK);
         CHECK(counted[0] == n_in_one && counted[1] == 0);
     }
 }
@@ -512,11 +534,12 @@ check_own_queries(const hs_points *points)
     hs_selection    selection = made.selection;
     const hs_points queries = {own, made.n > 0 ? made.n_queries : 0, made.d, HS_FLOAT64, 8 * made.d,
                                8};
-    const hs_among  among = {
-         .points = points, .box = &made.box, .queries = &queries, .selection = &selection};
-    hs_pairs *rows = NULL;
-    int64_t   n = 0;
-    selection.query_groups = selection.query_labels = NULL;
+    const hs_among  among = {.points = OF_MADE(points),
+                             .box = &made.box,
+                             .queries = SET(&queries),
+                             .selection = &selection};
+    hs_pairs       *rows = NULL;
+    int64_t         n = 0;
     selection.query_numbers = made.numbers;
     (void)count_all(false, of_rows);
     for (int64_t t = 0; t < queries.n; t++) {
@@ -544,9 +567,13 @@ check_scene(harness_random *random)
     made.options.kernel = below(random, 2) ? "scalar" : no_kernel;
     made.options.algorithm = (hs_algorithm)below(random, HS_ALGORITHM_END);
     made.options.threads = 1 + below(random, 2);
-    const hs_among among = {.points = &points, .box = &made.box, .selection = &made.selection};
+    const hs_among among = {
+        .points = OF_MADE(&points), .box = &made.box, .selection = &made.selection};
     const hs_among queried = {
-        .points = &points, .box = &made.box, .queries = &queries, .selection = &made.selection};
+        .points = OF_MADE(&points),
+        .box = &made.box,
+        .queries = SET(&queries, .groups = made.query_groups, .labels = made.query_labels),
+        .selection = &made.selection};
     const int64_t all = count_all(false, of_rows);
     CHECK(all % 2 == 0);
     check_half_list(&among, all / 2);
@@ -554,7 +581,7 @@ check_scene(harness_random *random)
     check_rows(&queried, true);
     check_histogram(&among, all / 2);
     check_stream(&among, all / 2);
-    check_systems(&points, &made.selection, all / 2);
+    check_systems(&among, all / 2);
     check_own_queries(&points);
 }
 
@@ -584,10 +611,13 @@ levels_choose_as_well(void)
         for (int i = 0; i < made.n; i++)
             radii[i] = i % 2 ? 2.0 : 0.0625; /* of two levels; the larger one counts */
         int64_t         n = 0, rows[MOST];
-        const hs_reach  reach = {.rule = HS_RULE_MAX, .radii = radii};
+        const hs_reach  reach = {.rule = HS_RULE_MAX};
         const hs_points points = {made.x, made.n, made.d, HS_FLOAT64, 8 * made.d, 8};
         const hs_among  among = {
-             .points = &points, .box = &made.box, .reach = &reach, .selection = &made.selection};
+             .points = SET(&points, .radii = radii, .groups = made.groups, .labels = made.labels),
+             .box = &made.box,
+             .reach = &reach,
+             .selection = &made.selection};
         hs_pairs  *pairs = NULL;
         hs_stream *stream = NULL;
         made.options.want = HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT;
@@ -617,12 +647,15 @@ levels_choose_as_well(void)
 static hs_status
 run_all(void *context)
 {
-    const hs_among  *among = context;
-    hs_pairs        *pairs = NULL;
-    hs_stream       *stream = NULL;
-    const int64_t    first[] = {0, made.n};
-    const hs_systems systems = {
-        .n = 1, .first = first, .box = &made.box, .selection = &made.selection};
+    const hs_among *among = context;
+    hs_pairs       *pairs = NULL;
+    hs_stream      *stream = NULL;
+    const int64_t   first[] = {0, made.n};
+    hs_set          set = *among->points;
+    hs_among        systems = *among;
+    set.n_systems = 1;
+    set.first = first;
+    systems.points = &set;
     made.options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE;
     hs_status status = hs_pairs_find(among, &made.options, &pairs, NULL);
     hs_pairs_free(pairs);
@@ -631,7 +664,7 @@ run_all(void *context)
         hs_stream_free(stream);
     }
     if (status == HS_OK) {
-        status = hs_systems_find(among->points, &systems, &made.options, &pairs, NULL);
+        status = hs_pairs_find(&systems, &made.options, &pairs, NULL);
         hs_pairs_free(pairs);
     }
     return status;
@@ -645,10 +678,11 @@ refused_memory_leaves_nothing(void)
         do {
             make_points(&random, false);
             make_selection(&random);
-        } while (made.n < 5 || (how ? made.selection.n_excluded < 5 : !made.selection.labels) ||
-                 made.selection.groups == NULL);
+        } while (made.n < 5 || (how ? made.selection.n_excluded < 5 : !made.selection.has_labels) ||
+                 !made.selection.has_groups);
         const hs_points points = {made.x, made.n, made.d, HS_FLOAT64, 8 * made.d, 8};
-        const hs_among  among = {.points = &points, .box = &made.box, .selection = &made.selection};
+        const hs_among  among = {
+             .points = OF_MADE(&points), .box = &made.box, .selection = &made.selection};
         made.options = hs_options_default();
         made.options.cutoff = 3.0;
         CHECK(fail_each_allocation(run_all, (void *)&among, 400) > 10);
@@ -670,50 +704,56 @@ bad_selections_are_refused(void)
                           {.min_distance = -1.0},
                           {.min_distance = NAN},
                           {.min_distance = INFINITY},
-                          {.query_groups = two},
-                          {.query_labels = two}};
+                          {.has_groups = true},
+                          {.has_labels = true}};
     hs_options   options = hs_options_default();
     hs_pairs    *pairs = NULL;
     hs_failure   failure;
     options.cutoff = 1.0;
     for (size_t b = 0; b < sizeof bad / sizeof *bad; b++) {
-        const hs_among among = {.points = &points, .selection = &bad[b]};
+        const hs_among among = {.points = SET(&points), .selection = &bad[b]};
         CHECK(hs_pairs_find(&among, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
     }
-    hs_selection of_points[] = {{.groups = two}, {.labels = two}};
+    hs_selection of_points[] = {{.has_groups = true}, {.has_labels = true}};
     for (int s = 0; s < 2; s++) { /* and none for the queries */
-        const hs_among queried = {
-            .points = &points, .queries = &points, .selection = &of_points[s]};
+        const hs_among queried = {.points = SET(&points, .groups = two, .labels = two),
+                                  .queries = SET(&points),
+                                  .selection = &of_points[s]};
         CHECK(hs_neighbors_find(&queried, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
-        const hs_among without = {.points = &points, .queries = &none, .selection = &of_points[s]};
+        const hs_among without = {.points = SET(&points, .groups = two, .labels = two),
+                                  .queries = SET(&none),
+                                  .selection = &of_points[s]};
         CHECK(hs_neighbors_find(&without, &options, &pairs, &failure) == HS_OK);
         hs_pairs_free(pairs);
         const hs_among nowhere = {
-            .points = &none, .queries = &none, .selection = &(hs_selection){.query_groups = two}};
+            .points = SET(&none), .queries = SET(&none), .selection = &of_points[s]};
         CHECK(hs_neighbors_find(&nowhere, &options, &pairs, &failure) == HS_OK);
         hs_pairs_free(pairs);
     }
     for (int e = 0; e < 4; e++) {
         hs_selection   one = {.n_excluded = 1, .excluded = outside[e]};
-        const hs_among among = {.points = &points, .selection = &one};
+        const hs_among among = {.points = SET(&points), .selection = &one};
         CHECK(hs_pairs_find(&among, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
         CHECK(failure.row == 0);
         one = (hs_selection){.query_numbers = outside[e] + (e > 1)};
         const hs_points one_query = {x, 1, 1, HS_FLOAT64, 8, 8};
-        const hs_among  queried = {.points = &points, .queries = &one_query, .selection = &one};
+        const hs_among  queried = {
+             .points = SET(&points), .queries = SET(&one_query), .selection = &one};
         CHECK(hs_neighbors_find(&queried, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
     }
     hs_selection   least = {.min_distance = 0.5};
-    const hs_among among = {.points = &points, .selection = &least};
+    const hs_among among = {.points = SET(&points), .selection = &least};
     hs_plan        plan;
     options.precision = HS_SINGLE;
     CHECK(hs_pairs_find(&among, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
     options.precision = HS_EXACT;
     CHECK(hs_plan_make(&among, &options, &plan, &failure) == HS_ERR_ARGUMENT);
+    least.min_distance = -0.5;
     CHECK(hs_nearest_find(&among, 1, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
     const hs_points in_plane = {x, 1, 2, HS_FLOAT64, 16, 8};
-    hs_selection    labelled = {.labels = two};
-    hs_among        in_box = {.points = &in_plane, .box = &skewed, .selection = &labelled};
+    hs_selection    labelled = {.has_labels = true};
+    hs_among        in_box = {
+               .points = SET(&in_plane, .labels = two), .box = &skewed, .selection = &labelled};
     CHECK(hs_pairs_find(&in_box, &options, &pairs, &failure) == HS_ERR_BOX_SKEWED);
     hs_box dependent = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0, 1.0}, {2.0, 2.0}}};
     in_box.box = &dependent;
@@ -761,9 +801,10 @@ static hs_status
 find(double min_distance, hs_pairs **pairs, hs_failure *failure)
 {
     const hs_points    points = {far_x, N, 2, HS_FLOAT64, 16, 8};
-    const hs_selection selection = {.labels = far_labels, .min_distance = min_distance};
-    const hs_among     among = {.points = &points, .box = &far_box, .selection = &selection};
-    hs_options         options = hs_options_default();
+    const hs_selection selection = {.has_labels = true, .min_distance = min_distance};
+    const hs_among     among = {
+            .points = SET(&points, .labels = far_labels), .box = &far_box, .selection = &selection};
+    hs_options options = hs_options_default();
     options.cutoff = 0.75 * SIDE + 0x1p-13; /* which no pair is so near that S decides */
     int64_t         n = 0;
     const hs_status status = hs_pairs_find(&among, &options, pairs, failure);

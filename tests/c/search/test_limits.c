@@ -150,12 +150,11 @@ points_of(int side, int ndim)
 static int64_t
 count_with(const question *ask, hs_stages *stages)
 {
-    const hs_points points = points_of(0, ask->ndim), queries = points_of(1, ask->ndim);
-    const hs_reach  reach = {.rule = ask->rule,
-                             .has_supports = true,
-                             .extent = ask->extent,
-                             .supports = ask->rule == HS_RULE_GATHER ? NULL : matrices[0],
-                             .query_supports = ask->rule == HS_RULE_SCATTER ? NULL : matrices[1]};
+    const hs_reach  reach = {.rule = ask->rule, .has_supports = true, .extent = ask->extent};
+    const hs_set    points = {.at = points_of(0, ask->ndim),
+                              .supports = ask->rule == HS_RULE_GATHER ? NULL : matrices[0]};
+    const hs_set    queries = {.at = points_of(1, ask->ndim),
+                               .supports = ask->rule == HS_RULE_SCATTER ? NULL : matrices[1]};
     hs_options      options = hs_options_default();
     hs_failure      failure;
     hs_call         call;

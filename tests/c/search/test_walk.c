@@ -3,6 +3,7 @@
 #include "../../../csrc/core/memory/memory.h"
 #include "../../../csrc/core/search/walk.h"
 #include "../../../csrc/halfshell.h"
+#include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/search_unit.h"
 
@@ -98,7 +99,7 @@ enum { SPOTS = 1024, N = 180 * SPOTS }; /* more than 2^18 candidates within 1.5 
 enum { WITHIN = SPOTS + SPOTS / 2 + 1 }; /* 1.5 box lengths: every spot, half of them twice, ends */
 
 static const int64_t      labels[N];
-static const hs_selection but_nearest = {.labels = labels, .query_labels = labels};
+static const hs_selection but_nearest = {.has_labels = true};
 static const hs_selection but_near = {.min_distance = 0.5};
 
 /* Rows with the points' numbers, or in a plane with distances alone, which are written at once; all
@@ -145,10 +146,12 @@ search(int kind, bool sorted, int threads, refusal *once, int64_t *found)
     const hs_box       *box = &kinds[kind].box;
     const hs_points     points = {x, N, box->ndim, HS_FLOAT64, 16, 8};
     const hs_points     query = {at, 1, box->ndim, HS_FLOAT64, 16, 8};
-    const hs_among      among = {
-             .points = &points, .box = box, .queries = &query, .selection = kinds[kind].selection};
-    hs_options options = hs_options_default();
-    hs_pairs  *rows = NULL;
+    const hs_among      among = {.points = SET(&points, .labels = labels),
+                                 .box = box,
+                                 .queries = SET(&query, .labels = labels),
+                                 .selection = kinds[kind].selection};
+    hs_options          options = hs_options_default();
+    hs_pairs           *rows = NULL;
     for (int p = 0; p < N; p++)
         x[2 * p] = (p * 77 % SPOTS) / (double)SPOTS;
     options.cutoff = 0.75;

@@ -237,11 +237,11 @@ is_selected(const asked *a, const brute_pair *pair)
 {
     const hs_selection *of = &a->selection;
     const double        least = of->min_distance;
-    if (of->groups != NULL && a->groups[pair->i] != a->groups[pair->j])
+    if (of->has_groups && a->groups[pair->i] != a->groups[pair->j])
         return false;
     if (least > 0.0 && is_within_sum(a, pair, 1, least, 0.0, false))
         return false;
-    const bool excluded = of->labels != NULL && pair->i != pair->j &&
+    const bool excluded = of->has_labels && pair->i != pair->j &&
                           llabs(a->labels[pair->i] - a->labels[pair->j]) <= of->within;
     return !excluded || !is_nearest_image(a, pair);
 }
@@ -305,13 +305,13 @@ rows_difference(const asked *a, const hs_among *among, brute_list expected, int6
 static inline const char *
 check_rows(asked *a)
 {
-    hs_among    among = {.points = &a->points, .box = a->scene->box};
+    hs_among    among = {.points = SET(&a->points), .box = a->scene->box};
     const char *difference =
         rows_difference(a, &among, pairs_kept(a, &a->both, NULL, false, false), 0);
-    among.queries = &a->first;
+    among.queries = SET(&a->first);
     if (difference == NULL)
         difference = rows_difference(a, &among, pairs_kept(a, &a->both, asks, false, true), 0);
-    among.points = &a->rest;
+    among.points = SET(&a->rest);
     const brute_list across = pairs_kept(a, a->half, is_asked_across, false, false);
     int64_t          n = 0;
     if (difference == NULL &&
@@ -373,25 +373,24 @@ check_nearest(asked *a)
 {
     const int64_t first[] = {0, a->split, a->split, a->n},
                   k = 1 + (int64_t)chosen(a, chosen(a, 6) ? 6 : 150);
-    hs_systems  systems = {.n = 3, .first = first, .box = a->scene->box};
     hs_options  options = a->options;
     const char *difference = NULL;
     options.index_bytes = 8;
     for (int kind = 0; a->scene->inclusive && difference == NULL && kind < 5; kind++) {
-        hs_pairs       *rows = NULL;
-        const bool      is_across = kind == 1 || kind == 4, has_systems = kind == 2;
-        const hs_among  among = {.points = is_across ? &a->rest : &a->points,
-                                 .queries = is_across ? &a->first : NULL,
-                                 .box = a->scene->box};
+        hs_pairs        *rows = NULL;
+        const bool       is_across = kind == 1 || kind == 4, has_systems = kind == 2;
+        const hs_points *points = is_across ? &a->rest : &a->points;
+        const hs_among   among = {
+              .points = SET(points, .n_systems = 3, .first = has_systems ? first : NULL),
+              .queries = SET(is_across ? &a->first : NULL),
+              .box = a->scene->box};
         hs_cells       *cells = NULL;
         const hs_status built =
-            kind < 3 ? HS_OK : hs_cells_build(among.points, among.box, &options, &cells, NULL);
+            kind < 3 ? HS_OK : hs_cells_build(points, among.box, &options, &cells, NULL);
         const hs_among  in_cells = {.cells = cells, .queries = among.queries};
-        const hs_status status =
-            built != HS_OK ? built
-            : has_systems
-                ? hs_systems_nearest(&a->points, NULL, &systems, k, &options, &rows, NULL)
-                : hs_nearest_find(kind > 2 ? &in_cells : &among, k, &options, &rows, NULL);
+        const hs_status status = built != HS_OK ? built
+                                                : hs_nearest_find(kind > 2 ? &in_cells : &among, k,
+                                                                  &options, &rows, NULL);
         if (status != HS_OK)
             difference = hs_status_text(status);
         else
@@ -430,19 +429,24 @@ check_histogram(asked *a)
         static double    sums[3 * SIZE], wanted_sums[3 * SIZE];
         const bool       inclusive = a->scene->inclusive && chosen(a, 2), is_across = kind % 2;
         const int64_t    from = is_across ? a->split : 0;
-        const hs_systems systems = {.n = 3, .first = first, .box = a->scene->box};
-        hs_among         among = {.points = is_across ? &a->rest : &a->points,
-                                  .queries = is_across ? &a->first : NULL,
-                                  .box = a->scene->box};
-        hs_histogram     histogram = {.n_edges = a->n_edges,
-                                      .edges = a->edges,
-                                      .inclusive = inclusive,
-                                      .last_inclusive = a->scene->inclusive,
-                                      .n_types = types,
-                                      .of_points = {a->types + from, a->weights + from},
-                                      .of_queries = {a->types, a->weights},
-                                      .counts = counts,
-                                      .sums = sums};
+        const hs_points *points = is_across ? &a->rest : &a->points;
+        hs_set           known = {.types = a->types + from, .weights = a->weights + from};
+        hs_set           set = {.at = *points,
+                                .types = known.types,
+                                .weights = known.weights,
+                                .n_systems = 3,
+                                .first = kind == 2 ? first : NULL};
+        hs_among         among = {
+                    .points = &set,
+                    .queries = SET(is_across ? &a->first : NULL, .types = a->types, .weights = a->weights),
+                    .box = a->scene->box};
+        hs_histogram histogram = {.n_edges = a->n_edges,
+                                  .edges = a->edges,
+                                  .inclusive = inclusive,
+                                  .last_inclusive = a->scene->inclusive,
+                                  .n_types = types,
+                                  .counts = counts,
+                                  .sums = sums};
         for (int64_t i = 0; i < a->n; i++)
             a->types[i] %= types;
         memset(wanted, 0, sizeof wanted);
@@ -466,13 +470,11 @@ check_histogram(asked *a)
         hs_status  status = HS_OK;
         building.cutoff *= factors[chosen(a, 3)];
         if (kind > 2) {
-            status = hs_cells_build(among.points, among.box, &building, &cells, NULL);
-            among = (hs_among){.cells = cells, .queries = among.queries};
+            status = hs_cells_build(points, among.box, &building, &cells, NULL);
+            among = (hs_among){.cells = cells, .points = &known, .queries = among.queries};
         }
         if (status == HS_OK)
-            status = kind == 2 ? hs_systems_histogram(&a->points, NULL, &systems, &a->options,
-                                                      &histogram, NULL)
-                               : hs_pairs_histogram(&among, &a->options, &histogram, NULL);
+            status = hs_pairs_histogram(&among, &a->options, &histogram, NULL);
         hs_cells_free(cells);
         const size_t n = (size_t)(kind == 2 ? 3 * size : size);
         if (status != HS_OK)
@@ -547,7 +549,7 @@ check_clusters(asked *a)
     static int64_t  found[ANSWER_POINTS], again[ANSWER_POINTS];
     hs_counters     counters;
     hs_options      options = a->options;
-    const hs_among  among = {.points = &a->points, .box = a->scene->box};
+    const hs_among  among = {.points = SET(&a->points), .box = a->scene->box};
     const uint8_t  *given = all ? NULL : core;
     const hs_status without =
         hs_clusters_find(&among, &options, given, again, NULL, &n_found, NULL);
@@ -595,7 +597,7 @@ see(int64_t i, int64_t j, const int32_t *S, const double *D, double d2, void *us
 static inline const char *
 check_streams(asked *a)
 {
-    const hs_among among = {.points = &a->points, .box = a->scene->box};
+    const hs_among among = {.points = SET(&a->points), .box = a->scene->box};
     hs_options     options = a->options;
     hs_stream     *stream = NULL;
     hs_pairs      *pairs = NULL, *block = NULL;
@@ -635,21 +637,22 @@ check_streams(asked *a)
 static inline const char *
 check_systems(asked *a)
 {
-    const int64_t first[] = {0, a->split, a->split, a->n};
-    const double  cutoffs[] = {a->scene->cutoff, 0.0, a->scene->cutoff};
-    double        rows[3 * HS_MAX_DIM * HS_MAX_DIM];
-    hs_systems    systems = {.n = 3, .first = first, .box = a->scene->box};
-    hs_pairs     *pairs = NULL, *of_rows = NULL;
-    int64_t       counts[3] = {0}, lengths[ANSWER_POINTS];
+    const int64_t  first[] = {0, a->split, a->split, a->n};
+    const double   cutoffs[] = {a->scene->cutoff, 0.0, a->scene->cutoff};
+    double         rows[3 * HS_MAX_DIM * HS_MAX_DIM];
+    hs_each_system each = {.rows = NULL};
+    hs_pairs      *pairs = NULL, *of_rows = NULL;
+    int64_t        counts[3] = {0}, lengths[ANSWER_POINTS];
     for (int e = 0; a->scene->box != NULL && e < 3 * a->d * a->d; e++)
         rows[e] = a->scene->box->rows[e / a->d % a->d][e % a->d];
-    systems.rows = a->scene->box != NULL && chosen(a, 2) ? rows : NULL;
-    systems.cutoffs = chosen(a, 2) ? cutoffs : NULL;
-    hs_status status = hs_systems_count(&a->points, &systems, &a->options, counts, NULL);
+    each.rows = a->scene->box != NULL && chosen(a, 2) ? rows : NULL;
+    each.cutoffs = chosen(a, 2) ? cutoffs : NULL;
+    const hs_among *among = SYSTEMS(&a->points, 3, first, a->scene->box, &each);
+    hs_status       status = hs_pairs_count(among, &a->options, counts, NULL);
     if (status == HS_OK)
-        status = hs_systems_coordination(&a->points, NULL, &systems, &a->options, lengths, NULL);
+        status = hs_neighbors_count(among, &a->options, lengths, NULL);
     if (status == HS_OK)
-        status = hs_systems_neighbors(&a->points, NULL, &systems, &a->options, &of_rows, NULL);
+        status = hs_neighbors_find(among, &a->options, &of_rows, NULL);
     for (int64_t i = 0; status == HS_OK && i < a->n; i++) {
         if (lengths[i] != hs_pairs_offsets(of_rows)[i + 1] - hs_pairs_offsets(of_rows)[i])
             return "another length of a row of a system";
@@ -658,29 +661,28 @@ check_systems(asked *a)
         a, status, of_rows, pairs_kept(a, &a->both, is_of_one_system, false, false), 0);
     if (difference != NULL)
         return difference;
-    status = hs_systems_find(&a->points, &systems, &a->options, &pairs, NULL);
+    status = hs_pairs_find(among, &a->options, &pairs, NULL);
     if (status == HS_OK && counts[0] + counts[2] != hs_pairs_length(pairs))
         return "another count of systems";
     return difference_of(a, status, pairs, pairs_kept(a, a->half, is_of_one_system, false, false),
                          0);
 }
 
+/* Points from this one on, with what their reach goes by. */
+#define set_within_reach(a, points, from)     \
+    SET(points, .radii = (a)->radii + (from), \
+        .supports = (a)->ellipsoids + (from) * (a)->d * (a)->d, .types = (a)->types + (from))
+
 /* Of the points before `split` among the others. */
 static inline const char *
 reach_across(asked *a, kept_fn kept)
 {
-    hs_reach       reach = a->reach;
-    const hs_among among = {
-        .points = &a->rest, .queries = &a->first, .box = a->scene->box, .reach = &reach};
-    brute_list    across = pairs_kept(a, a->half, is_asked_across, false, false);
-    const int64_t matrix = a->d * a->d;
-    int64_t       n = -1;
-    reach.query_radii = reach.radii;
-    reach.radii = reach.radii != NULL ? reach.radii + a->split : NULL;
-    reach.query_types = reach.types;
-    reach.types = reach.types != NULL ? reach.types + a->split : NULL;
-    reach.query_supports = reach.supports;
-    reach.supports = reach.has_supports ? a->ellipsoids + a->split * matrix : NULL;
+    const hs_among   among = {.points = set_within_reach(a, &a->rest, a->split),
+                              .queries = set_within_reach(a, &a->first, 0),
+                              .box = a->scene->box,
+                              .reach = &a->reach};
+    brute_list       across = pairs_kept(a, a->half, is_asked_across, false, false);
+    int64_t          n = -1;
     const brute_list expected = pairs_kept(a, &across, kept, false, false);
     brute_free(&across);
     const hs_status counted = hs_pairs_count(&among, &a->options, &n, NULL);
@@ -693,12 +695,13 @@ reach_across(asked *a, kept_fn kept)
 static inline const char *
 reach_difference(asked *a, kept_fn kept)
 {
-    const hs_among among = {.points = &a->points, .box = a->scene->box, .reach = &a->reach};
-    const bool     by_rows = a->reach.rule >= HS_RULE_GATHER && a->reach.n_types == 0;
-    const bool     joins = hs_test_join_levels(chosen(a, 2) == 0);
-    const char    *difference = NULL;
-    hs_pairs      *pairs = NULL;
-    int64_t        n = -1;
+    const hs_among among = {
+        .points = set_within_reach(a, &a->points, 0), .box = a->scene->box, .reach = &a->reach};
+    const bool  by_rows = a->reach.rule >= HS_RULE_GATHER && a->reach.n_types == 0;
+    const bool  joins = hs_test_join_levels(chosen(a, 2) == 0);
+    const char *difference = NULL;
+    hs_pairs   *pairs = NULL;
+    int64_t     n = -1;
     if (chosen(a, 3) == 0) {
         difference = reach_across(a, kept);
     } else if (by_rows || chosen(a, 3) == 0) {
@@ -733,7 +736,7 @@ some_length(asked *a)
 static inline const char *
 check_radii(asked *a)
 {
-    a->reach = (hs_reach){.rule = (hs_rule)chosen(a, HS_RULE_END), .radii = a->radii};
+    a->reach = (hs_reach){.rule = (hs_rule)chosen(a, HS_RULE_END)};
     a->quarters = 4;
     const bool is_ordinary = a->scene->cutoff > 0x1p-400 && a->scene->cutoff < 0x1p400;
     if (a->reach.rule >= HS_RULE_MAX && is_ordinary && chosen(a, 2) == 0) {
@@ -751,7 +754,7 @@ check_radii(asked *a)
 static inline const char *
 check_table(asked *a)
 {
-    a->reach = (hs_reach){.n_types = ANSWER_TYPES, .types = a->types, .cutoffs = a->table};
+    a->reach = (hs_reach){.n_types = ANSWER_TYPES, .cutoffs = a->table};
     for (int s = 0; s < ANSWER_TYPES; s++) {
         for (int t = 0; t <= s; t++)
             a->table[s * ANSWER_TYPES + t] = a->table[t * ANSWER_TYPES + s] =
@@ -779,7 +782,6 @@ check_supports(asked *a)
     a->ellipsoids[0] = 4.0 * unit;
     a->reach = (hs_reach){.rule = (hs_rule)(HS_RULE_MAX + chosen(a, 4)),
                           .has_supports = true,
-                          .supports = a->ellipsoids,
                           .extent = unit * (1.0 + (double)chosen(a, 5)) * some_length(a)};
     return reach_difference(a, is_within_supports);
 }
@@ -790,13 +792,15 @@ check_selection(asked *a)
 {
     static int64_t groups[ANSWER_POINTS], labels[ANSWER_POINTS];
     const uint64_t which = 1 + chosen(a, 7);
-    a->selection = (hs_selection){.groups = which & 1 ? groups : NULL,
-                                  .labels = which & 2 ? labels : NULL,
+    a->selection = (hs_selection){.has_groups = which & 1,
+                                  .has_labels = which & 2,
                                   .within = which & 2 ? (int64_t)chosen(a, 3) : 0,
                                   .min_distance = which & 4 ? some_length(a) : 0.0};
     memcpy(groups, a->groups, sizeof groups);
     memcpy(labels, a->labels, sizeof labels);
-    const hs_among among = {.points = &a->points, .box = a->scene->box, .selection = &a->selection};
+    const hs_among among = {.points = SET(&a->points, .groups = groups, .labels = labels),
+                            .box = a->scene->box,
+                            .selection = &a->selection};
     hs_stream     *stream = NULL;
     hs_pairs      *pairs = NULL, *block = NULL;
     const char    *difference =
@@ -968,7 +972,7 @@ check_layout(asked *a)
 static inline const char *
 check_plan(asked *a)
 {
-    const hs_among  among = {.points = &a->points, .box = a->scene->box};
+    const hs_among  among = {.points = SET(&a->points), .box = a->scene->box};
     hs_plan         plan;
     const hs_status status = hs_plan_make(&among, &a->options, &plan, NULL);
     int64_t         n_cells = 1;

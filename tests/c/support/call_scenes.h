@@ -52,7 +52,7 @@ static struct {
     double         sums[CALL_ROOM];
     hs_histogram   histogram;
     int64_t        first[N_SYSTEMS + 1], first_query[N_SYSTEMS + 1];
-    hs_systems     systems;
+    call_systems   systems;
     hs_visit       visit;
     call           c;
 } s;
@@ -85,13 +85,8 @@ make_histogram(void)
     }
     for (int k = 0; k < N_EDGES; k++)
         s.edges[k] = s.options.cutoff * (k + 1) / N_EDGES;
-    s.histogram = (hs_histogram){.n_edges = N_EDGES,
-                                 .edges = s.edges,
-                                 .n_types = 2,
-                                 .of_points = {s.types, s.weights},
-                                 .of_queries = {s.types, s.weights},
-                                 .counts = s.counts,
-                                 .sums = s.sums};
+    s.histogram = (hs_histogram){
+        .n_edges = N_EDGES, .edges = s.edges, .n_types = 2, .counts = s.counts, .sums = s.sums};
 }
 
 /* Radii: the cutoff for each fifth point and an eighth of it for the others, or for all points. */
@@ -109,18 +104,11 @@ make_reach(const scene_of_calls *kind)
     }
     for (int t = 0; t < 4; t++)
         s.cutoffs[t] = s.options.cutoff * (t == 0 ? 1.0 : t == 3 ? 0.125 : 0.5);
-    s.reach = (hs_reach){.rule = kind->reaches == 1 ? HS_RULE_SUM : HS_RULE_MAX,
-                         .radii = s.radii,
-                         .query_radii = s.radii};
+    s.reach = (hs_reach){.rule = kind->reaches == 1 ? HS_RULE_SUM : HS_RULE_MAX};
     if (kind->reaches == 2)
-        s.reach = (hs_reach){
-            .n_types = 2, .types = s.types, .query_types = s.types, .cutoffs = s.cutoffs};
+        s.reach = (hs_reach){.n_types = 2, .cutoffs = s.cutoffs};
     if (kind->reaches == 3)
-        s.reach = (hs_reach){.rule = HS_RULE_MAX,
-                             .has_supports = true,
-                             .supports = s.supports,
-                             .query_supports = s.supports,
-                             .extent = s.options.cutoff};
+        s.reach = (hs_reach){.rule = HS_RULE_MAX, .has_supports = true, .extent = s.options.cutoff};
 }
 
 static inline void
@@ -150,11 +138,14 @@ make_call(const scene_of_calls *kind)
         s.first[n] = n * kind->n / N_SYSTEMS;
     for (int n = 0; n <= N_SYSTEMS; n++)
         s.first_query[n] = n * N_QUERIES / N_SYSTEMS;
-    s.systems = (hs_systems){
-        .n = N_SYSTEMS, .first = s.first, .box = s.of.scene.box, .first_query = s.first_query};
+    s.systems = (call_systems){.n = N_SYSTEMS, .first = s.first, .first_query = s.first_query};
     s.visit = (hs_visit){.pair = call_note_pair, .thread_safe = true};
+    const hs_set known = {
+        .radii = s.radii, .supports = s.supports, .weights = s.weights, .types = s.types};
     s.c = (call){.points = &s.points,
                  .queries = &s.queries,
+                 .known = known,
+                 .of_queries = known,
                  .box = s.of.scene.box,
                  .options = &s.options,
                  .histogram = &s.histogram,

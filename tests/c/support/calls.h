@@ -53,14 +53,24 @@ enum {
     OF_SCENE = USES_POINTS | USES_BOX
 };
 
+/* Where several systems begin, and what each has of its own. */
+typedef struct call_systems {
+    int64_t        n;
+    const int64_t *first, *first_query;
+    hs_each_system each;
+} call_systems;
+
 /* All arguments that there are. All but `answer` borrowed. */
 typedef struct call {
     const hs_points    *points, *queries;
+    hs_set              known, of_queries; /* what is known of them */
+    hs_set              sets[2];           /* both, for a call */
     const hs_box       *box;
     const hs_options   *options;
     const hs_histogram *histogram;
-    const hs_systems   *systems;
-    const hs_visit     *visit; /* of call_note_pair */
+    const call_systems *systems;
+    bool                in_systems; /* these are searched */
+    const hs_visit     *visit;      /* of call_note_pair */
     const hs_reach     *reach;
     bool                by_reach; /* each pair has a reach of its own, that of `reach` */
     hs_cells           *cells;
@@ -173,14 +183,24 @@ call_take_counts(call *c, hs_status status, const int64_t *counts, int64_t n)
 
 /* Among what the call searches, with these queries. */
 static inline hs_among
-call_among(const call *c, const hs_points *queries)
+call_among(call *c, const hs_points *queries)
 {
-    hs_among among = {.queries = queries, .reach = c->by_reach ? c->reach : NULL};
+    hs_among among = {.reach = c->by_reach ? c->reach : NULL};
+    c->sets[0] = c->known;
+    c->sets[1] = c->of_queries;
+    among.queries = set_with(queries, &c->sets[1]);
     if (c->in_cells) {
         among.cells = c->cells;
+        among.points = &c->sets[0];
     } else {
-        among.points = c->points;
+        among.points = set_with(c->points, &c->sets[0]);
         among.box = c->box;
+    }
+    if (c->in_systems) {
+        c->sets[0].n_systems = c->sets[1].n_systems = c->systems->n;
+        c->sets[0].first = c->systems->first;
+        c->sets[1].first = c->systems->first_query;
+        among.each = &c->systems->each;
     }
     return among;
 }
@@ -330,57 +350,56 @@ call_visit(call *c, hs_failure *failure)
     return call_take_visits(c, status, n_visited);
 }
 
+/* Of several systems. */
+static inline hs_status
+call_in_systems(call *c, hs_status (*run)(call *c, hs_failure *failure), hs_failure *failure)
+{
+    c->in_systems = true;
+    const hs_status status = run(c, failure);
+    c->in_systems = false;
+    return status;
+}
+
 static inline hs_status
 call_systems_find(call *c, hs_failure *failure)
 {
-    hs_pairs       *pairs = CALL_NOTHING;
-    const hs_status status =
-        hs_systems_find(c->points, c->systems, c->options, RESULT(pairs), failure);
-    return call_take_pairs(c, status, pairs);
+    return call_in_systems(c, call_find, failure);
 }
 
 static inline hs_status
 call_systems_count(call *c, hs_failure *failure)
 {
-    int64_t         counts[CALL_ROOM];
-    const hs_status status =
-        hs_systems_count(c->points, c->systems, c->options, RESULT(counts[0]), failure);
+    int64_t counts[CALL_ROOM];
+    c->in_systems = true;
+    const hs_among  among = call_among(c, NULL);
+    const hs_status status = hs_pairs_count(&among, c->options, RESULT(counts[0]), failure);
+    c->in_systems = false;
     return call_take_counts(c, status, counts, status == HS_OK ? c->systems->n : 0);
 }
 
 static inline hs_status
 call_systems_neighbors(call *c, hs_failure *failure)
 {
-    hs_pairs       *rows = CALL_NOTHING;
-    const hs_status status =
-        hs_systems_neighbors(c->points, c->queries, c->systems, c->options, RESULT(rows), failure);
-    return call_take_pairs(c, status, rows);
+    return call_in_systems(c, call_neighbors, failure);
 }
 
 static inline hs_status
 call_systems_coordination(call *c, hs_failure *failure)
 {
-    int64_t         counts[CALL_ROOM];
-    const hs_status status = hs_systems_coordination(c->points, c->queries, c->systems, c->options,
-                                                     RESULT(counts[0]), failure);
-    return call_take_counts(c, status, counts, c->queries != NULL ? c->queries->n : c->n_points);
+    return call_in_systems(c, call_neighbors_count, failure);
 }
 
 static inline hs_status
 call_systems_nearest(call *c, hs_failure *failure)
 {
-    hs_pairs       *rows = CALL_NOTHING;
-    const hs_status status = hs_systems_nearest(c->points, c->queries, c->systems, c->k, c->options,
-                                                RESULT(rows), failure);
-    return call_take_pairs(c, status, rows);
+    return call_in_systems(c, call_nearest, failure);
 }
 
 /* Condenses the histogram of the first system. */
 static inline hs_status
 call_systems_histogram(call *c, hs_failure *failure)
 {
-    return call_take_histogram(c, hs_systems_histogram(c->points, c->queries, c->systems,
-                                                       c->options, c->histogram, failure));
+    return call_in_systems(c, call_histogram, failure);
 }
 
 #endif

@@ -66,4 +66,11 @@ reach_points(const reach_set *set)
                        .column_stride = sizeof(double)};
 }
 
+/* With all that is known of them. */
+static inline hs_set
+reach_set_of(const reach_set *set)
+{
+    return (hs_set){.at = reach_points(set), .radii = set->radii, .types = set->types};
+}
+
 #endif

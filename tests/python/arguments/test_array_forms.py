@@ -110,16 +110,6 @@ def test_a_file_in_memory(tmp_path):
         assert answers(POINTS, mapped[:60]) == answers(POINTS, POINTS[:60])
 
 
-def test_sets_may_share_memory():
-    rows = RNG.random((300, 3))
-    for points, queries in (
-        (rows[:200], rows[150:250]),
-        (rows[:200], rows[:200]),
-        (rows[:200], rows[199::-1]),
-    ):
-        assert answers(points, queries) == answers(points.copy(), queries.copy())
-
-
 # ---- memoryviews, wherever an array is taken -----------------------------------------------
 
 NUMBERS = np.arange(200)

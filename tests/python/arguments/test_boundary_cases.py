@@ -9,7 +9,7 @@ import pytest
 
 import boundary
 import halfshell as hs
-from boundary import CUBE, POINTS, answering, as_if_atoms, cyclic, laid_out, outcome, raising
+from boundary import CUBE, POINTS, answering, as_if_atoms, outcome, raising
 from calls import call
 
 MINE = RuntimeError("mine")
@@ -23,23 +23,6 @@ def refusal(kind, call, *arguments, **options):
 
 
 # ---- wrong answers and refusals of what is right -------------------------------------------
-
-
-def test_boxes_cutoffs_and_batches_anywhere_in_memory():
-    for layout in boundary.LAYOUTS:
-        for order in "<>":
-            numbers = np.array([1, 1, 1, 1], order + "i8")
-            box = np.array([2.0, 2.0, 2.0], order + "f8")
-            boxes = np.array([CUBE, CUBE], order + "f8")
-            cutoffs = np.array([0.5, 0.5], order + "f8")
-            expected = hs.count_pairs(POINTS, 0.5, box=CUBE)
-            assert hs.count_pairs(POINTS, 0.5, box=laid_out(box, layout)) == expected
-            assert hs.count_pairs(POINTS, 0.5, box=laid_out(boxes[0], "fortran")) == expected
-            several = {"batch": laid_out(numbers, layout), "box": laid_out(boxes, layout)}
-            assert call(hs.count_pairs, POINTS, laid_out(cutoffs, layout), **several).tolist() == [
-                0,
-                expected,
-            ]
 
 
 def test_masked_rows_in_a_list_keep_their_masks():
@@ -121,12 +104,6 @@ def test_numbers_that_raise(name):
     assert caught.value.__cause__ is MINE
 
 
-def test_too_many_threads_is_a_value():
-    for threads in (0, -1, 1025, 2**63, 10**400, -(10**5000)):
-        message = refusal(ValueError, hs.pairs, POINTS, 1.0, threads=threads)
-        assert "threads must be a whole number from 1 to 1024" in message
-
-
 def test_the_smallest_angles_make_no_cell():
     for angle in (5e-324, 1e-320, 1e-308, 1e-155):
         message = refusal(ValueError, hs.Box.from_lengths_angles, [1.0] * 3, [angle] * 3)
@@ -141,13 +118,6 @@ def test_a_batch_with_too_many_systems_to_count():
 
 
 # ---- calls that took their time ------------------------------------------------------------
-
-
-def test_lists_without_end():
-    for width in (1, 2, 3):
-        for value in (cyclic(width), (cyclic(width), 0.0), [cyclic(width)] * 2):
-            assert "nested" in refusal(ValueError, hs.pairs, value, 1.0)
-            assert "box" in refusal(ValueError, hs.pairs, POINTS, 1.0, box=value)
 
 
 def test_views_too_large_to_convert_are_refused_before_they_are():

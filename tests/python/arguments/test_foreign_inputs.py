@@ -69,6 +69,13 @@ def test_protocols(real):
     check_points(Converted(array, requires_grad=False, is_sparse=False), array)
 
 
+def test_a_table_with_two_columns_of_one_name_is_refused():
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame(np.zeros((2, 3)), columns=list("xyz"))
+    with pytest.raises(ValueError, match=r"points must have one column [xyz], got 2"):
+        hs.pairs(pandas.concat([table, table], axis=1), 1.0)
+
+
 def test_tables_of_pandas():
     pandas = pytest.importorskip("pandas")
     for array in (POINTS, POINTS.astype(np.float32), np.asfortranarray(POINTS)):

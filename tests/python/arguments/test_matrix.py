@@ -178,6 +178,12 @@ RIGHT = {
     ("Connectivity", "exclude"): ("function",), ("Connectivity.remove", "which"): ("function",),
     ("Connectivity.patch", "keep"): ("iteration raises",),
     ("Connectivity.patch", "old2new"): ("iteration raises",),
+} | {  # all pairs, in open space
+    (name, "cutoff"): ("inf",)
+    for name in (
+        "coordination", "count_pairs", "explain", "for_each_pair", "iter_pairs",
+        "neighbors", "pairs", "pairs_between", "verify",
+    )
 }  # fmt: skip
 BAD = {name: bad for words, bad in KINDS.items() for name in words.split()}
 

@@ -186,6 +186,33 @@ HINTS = {
         POINTS, 1.0, kernel="scalar"
     ),
     r"argument 'zzz'$": lambda: hs.pairs(POINTS, 1.0, zzz=1),
+    r"takes 2 positional .* 3 were given: points, cutoff; others by name, such as quantities=$":
+        lambda: hs.pairs("ijd", POINTS, 1.0),
+    r"'rule': the nearest go by distance alone: find more, and drop some$":
+        lambda: hs.nearest(POINTS, 2, rule="max"),
+    r"'range': the last edge is the cutoff$": lambda: hs.pair_histogram(
+        POINTS, [0.0, 1.0], range=(0.0, 1.0)
+    ),
+    r"got \(\): as from np\.linspace\(0\.0, cutoff, bins \+ 1\)$": lambda: hs.pair_histogram(
+        POINTS, 50
+    ),
+    r"'full': pairs has each pair once, neighbors from both sides$": lambda: hs.pairs(
+        POINTS, 1.0, full=True
+    ),
+    r"'block_size': did you mean max_pairs=\?$": lambda: hs.iter_pairs(POINTS, 1.0, block_size=9),
+    r"settings\(\) takes 0 .* 1 were given: none; others by name, such as kernel=$":
+        lambda: hs.settings("scalar"),
+    r"'thread': did you mean threads=\?$": lambda: hs.settings(thread=1),
+    r"quantities must be a string of letters, got list$": lambda: hs.pairs(
+        POINTS, 1.0, quantities=["i", "j"]
+    ),
+    r"points are those of update\(points\)$": lambda: hs.VerletList(POINTS, 1.0),
+    r"must be a number: points are those": lambda: hs.VerletList(hs.Points(POINTS), 1.0),
+    r"of pairs P: i, j = P\.T$": lambda: hs.verify(POINTS, 1.0, np.zeros((1, 2), int)),
+    r"got str; to write a file: plot\(\)\.figure\.savefig\(file\)$": lambda: hs.rdf(
+        POINTS, 1.0, box=5.0
+    ).plot("g.png"),
+    r"each library has a module, ase, ": lambda: hs.compat.cKDTree,
     r"are a list of arrays, as in Points\.stack\(list\(points\)\)$": lambda: hs.pairs(
         np.zeros((2, 3, 3)), 1.0
     ),
@@ -196,6 +223,43 @@ HINTS = {
 def test_common_mistakes_are_answered_with_what_is_meant(hint):
     with pytest.raises((TypeError, ValueError, AttributeError), match=hint):
         HINTS[hint]()
+
+
+def test_points_are_told_what_others_call_what_they_know():
+    for theirs, ours in [
+        ("cell", "box"), ("pbc", "periodic"), ("radius", "radii"), ("species", "types"),
+        ("symbols", "types"), ("resids", "labels"), ("masses", "weights"), ("type", "types"),
+    ]:  # fmt: skip
+        with pytest.raises(TypeError, match=rf"Points\(\) got .*: did you mean {ours}=\?$"):
+            hs.Points(POINTS, **{theirs: None})
+
+
+def test_names_of_other_libraries_are_answered_with_ours():
+    for theirs, ours in [
+        ("neighbor_list", "neighbors"), ("find_pairs", "pairs"), ("cKDTree", "CellList"),
+        ("knn", "nearest"), ("RDF", "rdf"), ("gr", "rdf"), ("DBSCAN", "clusters"),
+        ("distances", "measure"), ("Lattice", "Box"), ("quartz", "structures.alpha_quartz"),
+    ]:  # fmt: skip
+        with pytest.raises(AttributeError, match=f"'{theirs}': did you mean {ours}\\?"):
+            getattr(hs, theirs)
+        assert eval(f"hs.{ours}")
+    with pytest.raises(AttributeError, match=r"halfshell\.compat\.scipy has a cKDTree like the"):
+        hs.cKDTree  # noqa: B018
+
+
+def test_tables_by_frame_are_no_frames():
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame(POINTS, columns=["x", "y", "z"]).assign(frame=np.arange(10) // 5)
+    groups = table.groupby("frame")
+    for frames in (table, groups):
+        with pytest.raises(TypeError, match=r"\(part for _, part in table\.groupby\(column\)\)"):
+            next(hs.trajectory_pairs(frames, 1.0, box=5.0))
+    found = hs.trajectory_pairs((part for _, part in groups), 1.0)
+    assert [len(i) for i, j in found] == hs.count_pairs(
+        hs.Points(table, batch=table["frame"]), 1.0
+    ).tolist()
+    with pytest.raises(ValueError, match="points must have a column x beside y, got x_0, y, z"):
+        hs.pairs(table.rename(columns={"x": "x_0"}), 1.0)
 
 
 @pytest.mark.parametrize("search, given, message", [

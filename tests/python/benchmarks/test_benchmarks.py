@@ -66,6 +66,7 @@ def test_adapters_refuse_what_they_cannot_do(bench: SimpleNamespace) -> None:
     assert peers["cKDTree"].refuses(load("triclinic-1e4-k52")) == "triclinic box"
     assert peers["freud"].refuses(load("silicon-8")) == "several images of one pair"
     assert peers["pymatgen"].refuses(load("open-1e4")) == "open space"
+    assert peers["linkcell"].refuses(load("vectors-1e5-k52")) == "quantities Dd"
     assert peers["MDAnalysis"].refuses(load("plane-1e5-k20")) == "2 dimensions"
     assert peers["neighborlist-rs"].refuses(load("vectors-1e5-k52")) == "quantities Dd"
     assert peers["ase"].refuses(load("pairs-1e5-k52")) == "too many pairs for its speed"
@@ -208,15 +209,6 @@ def test_a_library_without_memory_is_left_out(
     assert "without cKDTree: it asked for more memory" in capsys.readouterr().out
 
 
-def test_memory_of_dropped_results_is_not_used_again(bench: SimpleNamespace) -> None:
-    called: list[bool] = []
-    turns = {"a": bench.turns.Turn(lambda: np.zeros(1000), repeats=5)}
-    bench.turns.take_turns(turns, True, 20_000, dropped=lambda: called.append(True))
-    assert len(called) == 3
-    bench.turns.take_turns(turns, True, 1 << 20, dropped=lambda: called.append(True))
-    assert len(called) == 3
-
-
 class Strict:
     """A library without batches: pairs of an open system, from brute force, full lists."""
 
@@ -306,20 +298,3 @@ def test_nearest_points_are_compared_by_their_distances(bench: SimpleNamespace) 
     assert bench.agreement.compare_nearest(scene, ours, (d, ours[1]), 24).missed == 0
     far = np.array([[3.0], [1.0], [2.0], [4.0]]), np.array([[2], [0], [1], [2]])
     assert bench.agreement.compare_nearest(scene, far, ours, 53).ours_wrong == 1
-
-
-def test_nearest_points_are_measured_like_pairs(
-    bench: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(bench.turns, "touch_memory", lambda n_bytes: None)
-    whole = bench.scenes.load("nearest-1e5-periodic")
-    scene = replace(whole, points=whole.points[:500], n_pairs=6000)
-    patience = bench.runner.Patience(repeats=2, seconds=0.05, quick=True)
-    tree = bench.peers.PEERS["cKDTree"]
-    rows, correct = bench.runner.measure_scene(
-        scene, bench.contestant.Halfshell(), [tree, bench.peers.PEERS["pykdtree"]], patience
-    )
-    assert correct
-    assert [(row.contestant, row.pairs, row.agreement) for row in rows] == [
-        ("halfshell", 6000, "not compared"), ("cKDTree", 6000, "same"),
-    ]  # fmt: skip

@@ -121,6 +121,14 @@ def test_columns_without_names(judged, tmp_path):
         assert judged(None, name="list.txt")["ok"] and judged(None, name="list.npy")["ok"]
 
 
+def test_shifts_of_the_other_sign_are_told(run, scene, tmp_path):
+    i, j, S = listed()
+    np.savez(tmp_path / "list.npz", i=i, j=j, S=-S)
+    status, out, _ = run("verify", scene, tmp_path / "list.npz", "--cutoff", CUTOFF)
+    assert status == 1 and out.rstrip().endswith("  S has the other sign: a pair is points[j] - "
+                                                 "points[i] + S @ box")  # fmt: skip
+
+
 def test_arrays_of_graphs(judged, tmp_path):
     i, j, S = listed(full=True)
     np.savez(tmp_path / "list.npz", edge_index=np.array([i, j]), cell_shifts=S, energy=np.eye(3))

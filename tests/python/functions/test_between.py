@@ -1,21 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Two sets: every query with every point, and how many pairs that makes."""
 
-import itertools
-import math
 
 import numpy as np
 import pytest
 from ase import Atoms
 from ase.build import bulk
-from hypothesis import given
 
 import halfshell as hs
 from calls import call
-from full_lists import assert_last_place, both_ways, joined, list_between
-from oracles import BOX_KINDS, lattice, random_scene, same_arrays, triples
-from refused_calls import INF, NAN, assert_refused, with_value
-from scene_strategies import scenes
+from full_lists import assert_last_place, joined, list_between
+from oracles import random_scene, same_arrays, triples
+from refused_calls import assert_refused
 
 RNG = np.random.default_rng(43)
 POINTS = RNG.random((40, 3)) * 4.0
@@ -37,45 +33,12 @@ def check(queries, points, cutoff, box=None, periodic=None, inclusive=True):
 # ---- against rational arithmetic -----------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", [None, *BOX_KINDS])
-def test_equals_the_definition(kind, rng):
-    for ndim in (1, 2, 3, 4, 5):
-        for q, n, neighbours in ((1, 1, 3), (3, 1, 3), (6, 20, 8), (20, 6, 8)):
-            size = q + n, ndim
-            points, cutoff, box, flags = random_scene(rng, *size, kind or "rotated", neighbours, 2)
-            box, flags = (box, flags) if kind else (None, None)
-            check(points[:q], points[q:], cutoff, box, flags, inclusive=n > 1)
-            check(points[:q], points[q:], cutoff, box, flags, inclusive=n < 20)
-
-
-@pytest.mark.parametrize("periodic", [(True, True, False), (False, False, True), (False,) * 3])
-def test_slabs_and_wires(periodic, rng):
-    points, cutoff, box, _ = random_scene(rng, 30, neighbours=8, spread=3)
-    check(points[:12], points[12:], cutoff, box, periodic)
-
-
-@pytest.mark.parametrize("kind", BOX_KINDS)
-def test_tiny_boxes_with_images(kind, rng):
-    points, _, box, _ = random_scene(rng, 4, kind=kind, spread=2)
-    for q in (1, 2, 3):
-        assert check(points[:q], points[q:], 1.7, box)
-
-
 @pytest.mark.parametrize("types", [("f4", "f8"), ("f8", "f4"), ("f4", "f4")])
 def test_types_may_be_mixed(types, rng):
     points, cutoff, box, flags = random_scene(rng, 30, neighbours=8, kind="triclinic")
     queries, points = points[:12].astype(types[0]), points[12:].astype(types[1])
     for frame in (box, None):
         check(queries, points, cutoff, frame, flags if frame is box else None)
-
-
-@pytest.mark.parametrize("types", [("f4", "f8"), ("f8", "f4"), ("f8", "f8")])
-def test_ties_between_lattices(types):
-    points, box = lattice("fcc", (2, 2, 2))
-    queries = (points[:7] + [1.0, 0.0, 0.0]).astype(types[0])
-    for cutoff in (1.0, math.sqrt(3), math.sqrt(5), 3.0):
-        for inclusive in (True, False):
-            check(queries, points.astype(types[1]), cutoff, box, None, inclusive)
 
 
 def test_distances_and_vectors_to_the_last_place(rng):
@@ -110,23 +73,6 @@ def test_queries_far_outside_the_points(rng):
         i, j = hs.pairs_between(mixed, points, cutoff)
         same = hs.pairs_between(near, points, cutoff)
         assert same_arrays((i - 10, j), same)
-
-
-# ---- laws ----------------------------------------------------------------------------------
-
-
-@given(scenes())
-def test_a_set_with_itself_is_its_full_list_and_each_point(scene):
-    how = {"box": scene.box, "periodic": scene.periodic, "inclusive": scene.inclusive}
-    found = call(
-        hs.pairs_between, scene.points, scene.points, scene.cutoff, quantities="ijS", **how
-    )
-    n, ndim = scene.points.shape
-    own = [(i, i, (0,) * ndim) for i in range(n)] if scene.inclusive or scene.cutoff > 0 else []
-    assert triples(*found) == sorted(both_ways(scene.found()) + own)
-    assert call(hs.count_pairs, scene.points, scene.cutoff, queries=scene.points, **how) == len(
-        found[0]
-    )
 
 
 # ---- other libraries -----------------------------------------------------------------------
@@ -166,21 +112,6 @@ def test_atoms_bring_their_box():
 # ---- special scenes ------------------------------------------------------------------------
 
 
-def test_nobody(rng):
-    for ndim, (q, n), box in itertools.product((1, 2, 3, 8), ((0, 0), (0, 5), (5, 0)), (None, 1.0)):
-        how = {"box": box and np.ones(ndim)}
-        queries, points = rng.random((q, ndim)), rng.random((n, ndim))
-        arrays = call(hs.pairs_between, queries, points, 1.0, quantities="ijdDSP", **how)
-        assert [array.shape for array in arrays] == [(0,)] * 3 + [(0, ndim)] * 2 + [(0, 2)]
-        types = ["i8", "i8", "f8", "f8", "i4", "i8"]
-        assert [array.dtype for array in arrays] == types
-        assert call(hs.count_pairs, points, 1.0, queries=queries, **how) == 0
-        assert call(hs.coordination, points, 1.0, queries=queries, **how).tolist() == [0] * q
-        assert call(hs.neighbors, points, 1.0, queries=queries, **how).offsets.tolist() == [0] * (
-            q + 1
-        )
-
-
 def test_lists_without_elements_have_the_dimensions_of_the_others():
     for ndim in (1, 2, 3):
         some = np.zeros((4, ndim))
@@ -188,24 +119,6 @@ def test_lists_without_elements_have_the_dimensions_of_the_others():
         assert hs.pairs_between(some, [], 1.0, quantities="D").shape == (0, ndim)
         assert hs.pairs_between([], some, 1.0, quantities="D").shape == (0, ndim)
     assert hs.pairs_between([], [], 1.0, quantities="D").shape == (0, 3)
-
-
-def test_no_cutoff_and_coincident_points():
-    queries = np.array([[0.5, 0.5], [0.25, 0.5]])
-    points = np.array([[0.5, 0.5], [0.5, 0.5], [0.0, 0.0]], np.float32)
-    assert check(queries, points, 0.0) == [(0, 0, (0, 0)), (0, 1, (0, 0))]
-    assert check(queries, points, 0.0, inclusive=False) == []
-    assert check(queries, points, 0.25, inclusive=False) == [
-        (0, 0, (0, 0)), (0, 1, (0, 0)),
-    ]  # fmt: skip
-
-
-def test_all_at_one_spot():
-    for kernel in hs.kernels():
-        queries, points = np.full((300, 3), 0.3), np.full((500, 3), 0.3)
-        i, j = call(hs.pairs_between, queries, points, 0.1, kernel=kernel)
-        assert np.array_equal(i, np.repeat(np.arange(300), 500))
-        assert np.array_equal(j, np.tile(np.arange(500), 300))
 
 
 # ---- forms of input and output -------------------------------------------------------------
@@ -226,36 +139,6 @@ def test_quantities_and_types():
             assert same_arrays(found, tuple(whole[letter] for letter in letters))
             arrays = found if isinstance(found, tuple) else (found,)
             assert all(array.flags.writeable and array.flags.c_contiguous for array in arrays)
-
-
-def test_threads_change_no_byte(rng):
-    points, cutoff, box, _ = random_scene(rng, 40_000, neighbours=20)
-    for frame in (box, None):
-        results = [
-            hs.pairs_between(points[::3], points, cutoff, box=frame, quantities="ijdDS", threads=k)
-            for k in (1, 2, 3)
-        ]
-        assert all(same_arrays(results[0], result) for result in results)
-        for k in (1, 2):
-            count = hs.count_pairs(points, cutoff, queries=points[::3], box=frame, threads=k)
-            assert count == len(results[0][0])
-
-
-def test_kernels_agree_to_the_bit(rng):
-    points, cutoff, box, _ = random_scene(rng, 3000, neighbours=30, kind="sheared", spread=2)
-    results = [
-        call(
-            hs.pairs_between,
-            points[:900],
-            points[900:],
-            cutoff,
-            box=box,
-            quantities="ijdDS",
-            kernel=kernel,
-        )
-        for kernel in hs.kernels()
-    ]
-    assert all(same_arrays(results[0], result) for result in results)
 
 
 def test_own_arrays_are_filled():
@@ -292,24 +175,6 @@ CALLS = {
         hs.coordination, points, cutoff, queries=queries, **how
     ),
 }
-
-
-@pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
-def test_bad_input_is_refused(call):
-    bad = with_value(4, 0, NAN)
-    assert_refused(lambda: call(bad, POINTS, 1.0), ValueError, r"^queries.*queries\[4, 0\] = nan")
-    assert_refused(lambda: call(POINTS, bad, 1.0), ValueError, r"^points.*points\[4, 0\] = nan")
-    bad = with_value(2, 1, -INF, dtype=np.float32)
-    assert_refused(lambda: call(bad, POINTS, 1.0), ValueError, r"queries\[2, 1\] = -inf")
-    assert_refused(lambda: call("queries", POINTS, 1.0), TypeError, "queries")
-    assert_refused(lambda: call(QUERIES, "points", 1.0), TypeError, "points")
-    assert_refused(lambda: call(QUERIES[0], POINTS, 1.0), ValueError, r"queries.*\(3,\)")
-    assert_refused(lambda: call(np.zeros((2, 9)), POINTS, 1.0), ValueError, r"queries.*\(2, 9\)")
-    masked = np.ma.array(QUERIES, mask=QUERIES > 4.0)
-    assert_refused(lambda: call(masked, POINTS, 1.0), ValueError, r"queries\[.*masked")
-    assert_refused(lambda: call(QUERIES, POINTS, -1.0), ValueError, "cutoff")
-    assert_refused(lambda: call(QUERIES, POINTS, 1.0, periodic=True), ValueError, "needs a box")
-    assert_refused(lambda: call(QUERIES, POINTS, 1.0, kernel="none"), ValueError, "kernel")
 
 
 @pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)

@@ -137,24 +137,6 @@ def test_they_show_themselves():
     assert hs.bricks(np.empty((0, 2)), 1.0, 3).overhead == 1.0
 
 
-@pytest.mark.parametrize(
-    ("arguments", "kind", "words"),
-    [
-        (([[np.nan]], 1.0, 2), ValueError, r"points\[0, 0\]"),
-        (([[0.0]], -1.0, 2), ValueError, "cutoff"),
-        (([[0.0]], np.inf, 2), ValueError, "cutoff"),
-        (([[0.0]], "1", 2), TypeError, "cutoff"),
-        (([[0.0]], 1.0, 0), ValueError, "n must be 1"),
-        (([[0.0]], 1.0, 10**30), ValueError, "n must be at most 1,048,576 bricks, got 10"),
-        (([[0.0]], 1.0, 1.5), TypeError, "n must be"),
-        (([["a"]], 1.0, 2), TypeError, "points"),
-    ],
-)
-def test_bad_arguments(arguments, kind, words):
-    with pytest.raises(kind, match=words):
-        hs.bricks(*arguments)
-
-
 def test_bad_boxes_and_other_points():
     with pytest.raises(ValueError, match="vector 0 of box is zero"):
         hs.bricks([[0.0]], 1.0, 2, box=[0.0])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from oracles import as_set, same_arrays
+from oracles import same_arrays
 
 RNG = np.random.default_rng(5)
 X = RNG.uniform(-1.0, 3.0, (400, 3))
@@ -116,21 +116,3 @@ def test_other_processes_get_them():
     context = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(1, mp_context=context) as pool:
         assert pool.submit(hs.CellList.count_pairs, cells).result() == count_of(cells)
-
-
-@pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("size", [None, 0.15, 0.5])
-def test_candidate_pairs_hold_every_pair(name, size):
-    cells = hs.CellList(X, 0.25, cell_size=size, **SCENES[name])
-    pairs = as_set(*cells.pairs())
-    pairs = {pair for pair in pairs if pair[0] != pair[1]}
-    assert len(pairs) > 60
-    every = []
-    for most in (37, 1 << 20):
-        blocks = list(cells.candidate_pairs(max_pairs=most))
-        assert all(len(i) == len(j) <= most and (i < j).all() for i, j in blocks)
-        i, j = (np.concatenate(columns) for columns in zip(*blocks))
-        assert i.dtype == j.dtype == np.int64
-        assert {pair[:2] for pair in pairs} <= set(zip(i.tolist(), j.tolist()))
-        every.append(sorted(zip(i.tolist(), j.tolist())))
-    assert every[0] == every[1]

@@ -158,15 +158,6 @@ def test_radii_types_and_supports(rng):
         assert np.array_equal(found.core, counts >= 3)
 
 
-def test_nothing_and_one_point():
-    for dim in (1, 3):
-        found = hs.clusters(np.empty((0, dim)), 1.0, box=[2.0] * dim, min_points=2)
-        assert found.labels.shape == found.core.shape == found.sizes.shape == (0,)
-        assert found.spans.shape == (0, dim)
-    alone = hs.clusters([[1.0, 2.0]], 1.0, min_points=2)
-    assert alone.labels.tolist() == [-1] and alone.sizes.shape == (0,)
-
-
 def test_labels_are_those_of_scikit_learn(rng):
     cluster = pytest.importorskip("sklearn.cluster", reason="scikit-learn is not installed")
     centres = rng.random((20, 3))
@@ -176,18 +167,6 @@ def test_labels_are_those_of_scikit_learn(rng):
         found = hs.clusters(points, 0.04, min_points=least)
         assert np.array_equal(found.labels, other.labels_)
         assert np.array_equal(np.flatnonzero(found.core), other.core_sample_indices_)
-
-
-def test_extreme_scales(rng):
-    points = rng.random((50, 2))
-    plain = hs.clusters(points, 0.125, box=[1.0, 1.0])
-    for exponent in (-1000, -300, 300, 1000):
-        scale = 2.0**exponent
-        found = hs.clusters(points * scale, 0.125 * scale, box=[scale] * 2)
-        assert np.array_equal(found.labels, plain.labels)
-        assert np.array_equal(found.spans, plain.spans)
-    far = hs.clusters([[0.0], [1.0], [1e300]], 1.0)
-    assert far.labels.tolist() == [0, 0, 1]
 
 
 @pytest.mark.parametrize(

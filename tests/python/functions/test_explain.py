@@ -25,7 +25,7 @@ def test_it_names_the_kernel_and_the_algorithm(scene):
         assert plan.algorithm in ("all-pairs", "grid", "hash", "hierarchy")
         assert plan.reason
         assert plan.n == 5000 and plan.ndim == 3
-        for word in (kernel, plan.algorithm, "5000"):
+        for word in (kernel, plan.algorithm, "5,000"):
             assert word in str(plan)
 
 
@@ -111,19 +111,6 @@ def test_ties_reach_the_later_stages(rng):
     assert measured["ambiguous"] >= shell
 
 
-def test_counters_do_not_depend_on_the_kernel(scene):
-    points, cutoff, box = scene
-    names = ("pairs", "candidates", "groups")
-    results = [
-        [
-            call(hs.explain, points, cutoff, box=box, kernel=k, measure=True).measured[n]
-            for n in names
-        ]
-        for k in hs.kernels()
-    ]
-    assert all(result == results[0] for result in results)
-
-
 def test_the_choice_to_store_occupied_cells_only_is_named(rng):
     cloud = rng.random((4000, 3))
     crowded = np.concatenate([cloud, cloud + 1e9])
@@ -167,17 +154,3 @@ def test_memory_of_the_search_grows_with_the_points_not_with_the_volume(rng):
             hs.explain(points * size, 1.0, box=[size] * 3, measure=True).measured["bytes_peak"]
         )
     assert max(peaks) < 2_000_000
-
-
-def test_bad_input_is_refused_as_by_pairs():
-    points = np.zeros((3, 3))
-    for arguments, exception, word in (
-        ({"points": points, "cutoff": -1.0}, ValueError, "cutoff"),
-        ({"points": points * np.nan, "cutoff": 1.0}, ValueError, "points"),
-        ({"points": points, "cutoff": 1.0, "box": np.ones((3, 3))}, ValueError, "box"),
-        ({"points": points, "cutoff": 1.0, "kernel": "none"}, ValueError, "kernel"),
-        ({"points": points, "cutoff": 1.0, "quantities": "x"}, ValueError, "quantities"),
-        ({"points": points, "cutoff": 1.0, "periodic": True}, ValueError, "periodic"),
-    ):
-        with pytest.raises(exception, match=word):
-            call(hs.explain, **arguments)

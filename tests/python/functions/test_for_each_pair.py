@@ -334,25 +334,6 @@ def test_other_things_are_refused():
             hs.for_each_pair(POINTS, 0.5, write_pair, user_data=user_data)
 
 
-@pytest.mark.parametrize(
-    ("change", "error"),
-    [
-        ({"cutoff": -1.0}, ValueError),
-        ({"points": [[np.inf]]}, ValueError),
-        ({"box": [0.0] * 3}, ValueError),
-        ({"kernel": "none"}, ValueError),
-        ({"threads": 0}, ValueError),
-        ({"thread_safe": "yes"}, TypeError),
-        ({"memory_limit": 10}, MemoryError),
-        ({"points": [[0.0], [1e10], [0.5]], "box": [1.0]}, OverflowError),
-    ],
-)
-def test_wrong_arguments_are_refused(change, error):
-    arguments = {"points": POINTS, "cutoff": 0.5, "callback": lambda *pair: None} | change
-    with pytest.raises(error):
-        call(hs.for_each_pair, **arguments)
-
-
 def test_results_of_any_size_are_visited():
     total = call(
         hs.for_each_pair, np.zeros((300, 1)), 0.0, lambda *pair: None, memory_limit=3e6, threads=1

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 
 import halfshell as hs
 from calls import call
-from halfshell._check.reference import reference_pairs
-from oracles import BOX_KINDS, as_set, random_scene
+from oracles import as_set, random_scene
 from scene_strategies import scenes
 
 
@@ -42,6 +41,25 @@ def test_rows_are_those_of_the_whole_table(scene, data):
     assert counts.dtype == np.int64 and counts.tolist() == whole.counts[numbers].tolist()
 
 
+@pytest.mark.parametrize("what", ["groups", "labels", "pairs", "min_distance"])
+def test_of_a_batch_what_counts_is_that_of_the_whole_table(rng, what):
+    n = 60
+    known = {"groups": rng.integers(0, 2, n), "labels": rng.integers(0, 9, n)}
+    how = {
+        "labels": {"exclude": 1}, "pairs": {"exclude": rng.integers(0, n, (80, 2))},
+        "min_distance": {"min_distance": 0.3},
+    }.get(what, {})  # fmt: skip
+    points = hs.Points(
+        rng.random((n, 3)), box=[1.0, 1.1, 0.9], batch=np.repeat([0, 1, 3], [25, 5, 30]),
+        **{name: known[name] for name in known if name == what},
+    )  # fmt: skip
+    numbers = rng.permutation(n)[:20]
+    whole = hs.neighbors(points, 0.7, quantities="jdS", **how)
+    assert 0 < len(whole.indices) < len(hs.neighbors(hs.Points(
+        points.positions, box=points.box, batch=points.batch), 0.7).indices)  # fmt: skip
+    same(hs.neighbors(points, 0.7, quantities="jdS", indices=numbers, **how), whole, numbers)
+
+
 def test_many_images_and_equal_points(rng):
     points = np.repeat(rng.random((40, 3)), 3, axis=0).astype(np.float32)
     numbers, box = rng.integers(0, 120, 50), [0.9, 1.1, 0.7]
@@ -59,70 +77,12 @@ def test_many_images_and_equal_points(rng):
         )
 
 
-def test_radii_of_their_own(rng):
-    for rule in ("sum", "mean", "max", "min", "gather", "scatter"):
-        for inclusive in (True, False):
-            points, radii = rng.random((60, 2)), np.where(rng.random(60) < 0.3, 0.0, 0.4)
-            how = {"radii": radii, "rule": rule, "box": [1.0, 1.0], "inclusive": inclusive}
-            whole = call(hs.neighbors, points, None, quantities="jd", **how)
-            numbers = rng.permutation(60)[:30]
-            same(
-                call(hs.neighbors, points, None, quantities="jd", indices=numbers, **how),
-                whole,
-                numbers,
-            )
-            counts = call(hs.coordination, points, None, indices=numbers, **how)
-            assert np.array_equal(counts, whole.counts[numbers])
-
-
-def test_types_that_do_not_see_themselves(rng):
-    points, types = rng.random((50, 3)), rng.integers(0, 2, 50)
-    cutoffs = {(0, 1): 0.4, (1, 1): 0.9}  # none between two of type 0
-    how = {"types": types, "box": 1.0}
-    whole = call(hs.neighbors, points, cutoffs, quantities="jS", **how)
-    numbers = np.arange(50)
-    same(
-        call(hs.neighbors, points, cutoffs, quantities="jS", indices=numbers, **how), whole, numbers
-    )
-
-
-def test_supports_of_their_own(rng):
-    points = rng.random((40, 2))
-    H = np.tile(np.diag([4.0, 2.0]), (40, 1, 1))
-    how = {"supports": H, "extent": 1.0, "rule": "gather"}
-    whole = call(hs.neighbors, points, None, quantities="jd", **how)
-    same(call(hs.neighbors, points, None, quantities="jd", indices=[5, 3], **how), whole, [5, 3])
-
-
 def test_nothing_is_within_an_open_cutoff_of_zero():
     points = np.zeros((3, 2))
     assert hs.coordination(points, 0.0, inclusive=False, indices=[1]).tolist() == [0]
     assert hs.coordination(points, 0.0, indices=[1, 1]).tolist() == [2, 2]
     empty = hs.neighbors(np.empty((0, 3)), 1.0, indices=[])
     assert empty.shape == (0, 0) and hs.neighbors(points, 1.0, indices=[]).shape == (0, 3)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "error", "said"),
-    [
-        ([3], ValueError, "indices must be numbers of points, from 0 to 2"),
-        ([-1], ValueError, "indices must be numbers of points"),
-        ([0.5], TypeError, "indices must hold integers"),
-        ([True], TypeError, "indices must hold integers"),
-        ([[0]], ValueError, "indices must have shape"),
-    ],
-)
-def test_wrong_indices(wrong, error, said):
-    points = np.zeros((3, 2))
-    cells = hs.CellList(points, 1.0)
-    for search in (hs.neighbors, hs.coordination):
-        with pytest.raises(error, match=said):
-            search(points, 1.0, indices=wrong)
-    for search in (cells.neighbors, cells.coordination):
-        with pytest.raises(error, match=said):
-            search(indices=wrong)
-        with pytest.raises(ValueError, match="do not give queries as well"):
-            search(indices=[0], queries=points)
 
 
 def test_what_does_not_go_with_indices():
@@ -176,73 +136,6 @@ def assert_part(points, cutoff, numbers, find=hs.pairs, **how):
     order = np.lexsort((*S.T[::-1], j, i))
     for got, wanted in zip((d, D), found[2:4], strict=True):
         assert got[order].tobytes() == wanted.tobytes()
-
-
-@pytest.mark.parametrize("inclusive", [True, False])
-@pytest.mark.parametrize("kind", BOX_KINDS)
-def test_boxes_of_every_kind_with_many_images(kind, inclusive, rng):
-    points, cutoff, box, _ = random_scene(rng, 24, kind=kind, neighbours=8, spread=3)
-    for periodic in (True, [True, False, True], False):
-        for times in (1.0, 2.5):
-            for numbers in choices(len(points)):
-                assert_part(
-                    points, times * cutoff, numbers, box=box, periodic=periodic,
-                    inclusive=inclusive,
-                )  # fmt: skip
-
-
-@pytest.mark.parametrize("ndim", range(1, 9))
-def test_pairs_are_those_of_the_fractions(ndim, rng):
-    for dtype in (np.float32, np.float64):
-        points = (rng.integers(-4, 5, (12, ndim)) / 4).astype(dtype)
-        cutoff, length = (0.75, 1.25) if ndim < 5 else (1.0, 2.5)
-        for box in (None, np.full(ndim, length)):
-            expected = reference_pairs(points, cutoff, box, None, True)
-            for numbers in choices(len(points)):
-                found = hs.pairs(points, cutoff, box=box, quantities="ijS", indices=numbers)
-                some = set(numbers)
-                wanted = {(i, j, S) for i, j, S in expected if i in some or j in some}
-                assert as_set(*found) == wanted
-                assert_part(points, cutoff, numbers, box=box)
-
-
-def test_few_points_and_coincident_ones():
-    for box in (None, [2.0]):
-        for n in (0, 1, 2):
-            for numbers in choices(n):
-                for cutoff in (0.0, 2.0, 5.0):
-                    for inclusive in (True, False):
-                        assert_part(np.zeros((n, 1)), cutoff, numbers, box=box, inclusive=inclusive)
-
-
-def test_points_far_from_each_other_and_from_the_box(rng):
-    points = np.concatenate([rng.random((20, 3)), 1e9 + rng.random((20, 3))])
-    assert_part(points, 0.5, [1, 30, 7])
-    assert_part(points, 0.5, [1, 30, 7], box=[1.0, 1.5, 2.0], periodic=[True, False, True])
-
-
-@pytest.mark.parametrize("rule", ["sum", "mean", "max", "min"])
-def test_radii(rule, rng):
-    for inclusive in (True, False):
-        points, radii = rng.random((60, 3)) * 2, rng.integers(0, 5, 60) / 8
-        for box in (None, np.full(3, 2.0), np.full(3, 0.5)):
-            for numbers in choices(60):
-                assert_part(
-                    points, None, numbers, radii=radii, rule=rule, box=box, inclusive=inclusive
-                )
-
-
-def test_types_and_supports(rng):
-    points, types = rng.random((60, 2)) * 3, rng.integers(0, 3, 60)
-    table = {(0, 1): 0.5, (1, 1): 1.0, (0, 2): 0.0}
-    supports = np.eye(2) * rng.uniform(1.0, 3.0, (60, 1, 1)) + 0.25
-    for box in (None, np.full(2, 3.0), np.full(2, 0.75)):
-        for numbers in choices(60):
-            assert_part(points, table, numbers, types=types, box=box)
-            for rule in ("max", "min"):
-                assert_part(
-                    points, None, numbers, supports=supports, extent=1.0, rule=rule, box=box
-                )
 
 
 def test_same_bytes_for_each_kernel_number_of_threads_and_algorithm(rng):
@@ -309,11 +202,6 @@ def test_few_among_many(rng):
         assert_part(points, 0.03, numbers, box=[1.0] * 3)
 
 
-def test_double_precision_is_that_of_the_plain_list(rng):
-    points, cutoff, box, _ = random_scene(rng, 80)
-    assert_part(points, cutoff, [4, 9], box=box, precision="double")
-
-
 def test_a_shift_that_fits_one_way_only():
     points, box = np.array([[0.0], [2.0**31]]), [1.0]
     with pytest.raises(OverflowError):
@@ -334,11 +222,7 @@ POINTS = np.zeros((3, 2))
         (np.array([2**64 - 1], np.uint64), ValueError, "indices must be numbers of points"),
         ([1, 0, 1], ValueError, "indices must name each point once, got 1 twice"),
         ([1.0], TypeError, "indices must hold integers, got dtype float64"),
-        ([True], TypeError, "indices must hold integers, got dtype bool"),
-        (["1"], TypeError, "indices must hold integers"),
-        ("1", TypeError, "indices"),
         (1, ValueError, r"indices must have shape \(m,\), got \(\)"),
-        ([[1]], ValueError, r"indices must have shape \(m,\), got \(1, 1\)"),
     ],
 )
 def test_bad_numbers(indices, error, message):
@@ -351,13 +235,140 @@ def test_bad_numbers(indices, error, message):
 def test_what_does_not_go_together():
     cells = hs.CellList(POINTS, 2.0)
     for find in (lambda *a, **how: call(hs.pairs, POINTS, *a, **how), cells.pairs):
-        with pytest.raises(ValueError, match="indices cannot be combined with several cutoffs"):
-            find([1.0, 2.0], indices=[0], quantities="k")
         with pytest.raises(ValueError, match="needs several cutoffs, got one"):
             find(1.0, indices=[0], quantities="k")
-        with pytest.raises(ValueError, match="some of the letters i j d D S P, each at most once"):
+        with pytest.raises(ValueError, match="some of the letters i j d D S P k, each at most"):
             find(1.0, indices=[0], quantities="x")
     with pytest.raises(ValueError, match="indices cannot be combined with precision 'single'"):
         call(hs.pairs, POINTS, 1.0, indices=[0], precision="single")
     with pytest.raises(ValueError, match="there are no points"):
         hs.pairs(np.zeros((0, 2)), 1.0, indices=[0])
+
+
+def test_some_points_of_systems_with_groups_and_exclusions(rng):
+    points = hs.Points(
+        rng.integers(0, 3, (20, 2)).astype(float), box=3.0, periodic=[True, False],
+        batch=np.repeat([0, 2, 3], [6, 9, 5]), groups=rng.integers(0, 2, 20), labels=np.arange(20),
+    )  # fmt: skip
+    for exclude in (None, 1, rng.integers(0, 20, (12, 2))):
+        how = {"exclude": exclude, "min_distance": 0.5}
+        whole = hs.neighbors(points, 1.5, quantities="jdDS", **how)
+        counts = hs.count_pairs(points, 1.5, **how)
+        for numbers in ([19], [7, 3, 15, 8], list(range(19, -1, -1)), []):
+            some = hs.neighbors(points, 1.5, quantities="jdDS", indices=numbers, **how)
+            same(some, whole, numbers)
+            bare = hs.neighbors(points, 1.5, quantities="jd", indices=numbers, **how)
+            same(bare.sort(), hs.neighbors(points, 1.5, quantities="jd", **how).sort(), numbers)
+            P = hs.pairs(points, 1.5, quantities="P", **how)
+            found = hs.pairs(points, 1.5, quantities="P", sort=True, indices=numbers, **how)
+            expected = P[np.isin(P, numbers).any(axis=1)]
+            assert sorted(found.tolist()) == sorted(expected.tolist())
+            assert hs.count_pairs(points, 1.5, indices=numbers, **how).sum() == len(expected)
+        assert counts.sum() == len(P)
+
+
+# ---- in blocks -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("fields", [{}, {"radii": True}, {"batch": True}, {"groups": True}])
+def test_blocks_are_those_of_the_pairs_of_some_points(fields, rng, monkeypatch):
+    monkeypatch.setattr("halfshell._convert.rows._POINTS_OF_PART", 17)
+    n, known = 150, dict.fromkeys(fields)
+    known |= {"radii": rng.random(n) * 0.2} if "radii" in fields else {}
+    known |= {"batch": np.arange(n) // 50} if "batch" in fields else {}
+    known |= {"groups": rng.integers(0, 2, n)} if "groups" in fields else {}
+    points = hs.Points(rng.random((n, 3)), box=[1.0] * 3, **known)
+    bonds = rng.integers(0, n, (40, 2))
+    cutoff = None if "radii" in fields else 0.25
+    for some in (rng.permutation(n)[:60], np.arange(n), [], [3]):
+        for quantities in ("ijdDSP", "ij", "P", "d"):
+            how = {"indices": some, "exclude": bonds, "min_distance": 0.05}
+            told = []
+            blocks = list(hs.iter_pairs(
+                points, cutoff, quantities=quantities, max_pairs=23, progress=told.append, **how
+            ))  # fmt: skip
+            whole = hs.pairs(points, cutoff, quantities=quantities, **how)
+            whole = whole if isinstance(whole, tuple) else (whole,)
+            blocks = [block if isinstance(block, tuple) else (block,) for block in blocks]
+            assert {len(block[0]) for block in blocks[:-1]} <= {23} and told == sorted(told)
+            for k, column in enumerate(whole):
+                parts = [block[k] for block in blocks]
+                joined = np.concatenate(parts) if parts else column[:0]
+                assert joined.tobytes() == column.tobytes() and joined.dtype == column.dtype
+                assert all(part.base is None or part.base.nbytes == part.nbytes for part in parts)
+
+
+def test_blocks_of_some_points_are_of_what_was_given(rng):
+    x, radii, some = rng.random((80, 3)), rng.random(80) * 0.3, np.arange(0, 80, 3)
+    for points, cutoff in ((x, 0.3), (hs.Points(x, radii=radii), None)):
+        whole = hs.pairs(points, cutoff, indices=some, quantities="P")
+        blocks = hs.iter_pairs(points, cutoff, indices=some, quantities="P", max_pairs=9)
+        x += 7.0 * rng.random((80, 3))
+        assert np.array_equal(np.concatenate(list(blocks)), whole)
+        x[:] = rng.random((80, 3))
+    cells = hs.CellList(x, 0.3)
+    whole = cells.pairs(indices=some, quantities="jk", cutoff=[0.2, 0.3])
+    blocks = cells.iter_pairs(cutoff=[0.2, 0.3], indices=some, quantities="jk", max_pairs=9)
+    for column, right in zip(zip(*blocks), whole, strict=True):
+        assert np.array_equal(np.concatenate(column), right)
+    with pytest.raises(ValueError, match="indices must name each point once"):
+        hs.iter_pairs(x, 0.3, indices=[1, 1])
+    blocks = hs.iter_pairs(x, 0.3, indices=some, max_pairs=9)
+    next(blocks)
+    blocks.close()
+    assert list(blocks) == []
+
+
+# ---- counted by distance ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("batched", [False, True, "boxes"])
+def test_histograms_count_the_pairs_of_some_points(batched, rng):
+    n, edges = 90, np.array([0.0, 0.5, 1.0, 1.0, 1.5, 2.0])
+    x = rng.integers(0, 12, (n, 3)) * 0.25  # many distances are edges
+    known = {"types": rng.integers(0, 3, n), "groups": rng.integers(0, 2, n), "box": [3.0] * 3}
+    if batched:
+        known["batch"] = np.sort(rng.integers(0, 4, n))
+    if batched == "boxes":
+        known["box"] = [np.diag([3.0, 3.5, 3.0 + s]) for s in range(5)]
+    bonds = rng.integers(0, n, (200, 2))
+    for fields, how in (
+        ({}, {}),
+        ({"groups": known["groups"]}, {"min_distance": 0.25}),
+        ({}, {"exclude": bonds}),
+        ({"labels": np.arange(n) // 4}, {"exclude": 1, "min_distance": 0.5}),
+    ):
+        points = hs.Points(x, **{**known, "groups": None, **fields})
+        for some in (rng.permutation(n)[:25], np.arange(n), [], [7]):
+            # Which bin: by the distances of a lattice, whose squares are exact.
+            i, j, D = hs.pairs(points, 2.0, indices=some, quantities="ijD", **how)
+            place = np.searchsorted(edges**2, (D**2).sum(axis=1), "right") - 1
+            place[(D**2).sum(axis=1) == 4.0] = 4
+            counts = np.zeros((points.n_systems, 3, 3, 5), np.int64)
+            s = np.zeros(len(i), int) if points.batch is None else points.batch[i]
+            a, b = points.types[i], points.types[j]
+            np.add.at(counts, (s, a, b, place), 1)
+            np.add.at(counts, (s[a != b], b[a != b], a[a != b], place[a != b]), 1)
+            counts = counts if batched else counts[0]
+            told = []
+            found = hs.pair_histogram(
+                points, edges, indices=some, by_type=True, progress=told.append, **how
+            )
+            assert found.dtype == np.int64 and np.array_equal(found, counts)
+            assert told == sorted(told)
+            upper = np.triu(np.ones((3, 3), np.int64))[:, :, None]
+            plain = hs.pair_histogram(points, edges, indices=some, **how)
+            assert np.array_equal(plain, (counts * upper).sum(axis=(-3, -2)))
+        if not batched:
+            cells = hs.CellList(points, 2.0)
+            assert np.array_equal(cells.pair_histogram(edges, indices=some, **how), plain)
+
+
+def test_histograms_of_some_points_that_are_refused():
+    points = hs.Points(POINTS, weights=np.ones(len(POINTS)))
+    with pytest.raises(ValueError, match="indices cannot be combined with weights"):
+        hs.pair_histogram(points, [0.0, 1.0], indices=[0])
+    with pytest.raises(ValueError, match="indices must name each point once"):
+        hs.pair_histogram(POINTS, [0.0, 1.0], indices=[0, 0])
+    with pytest.raises(ValueError, match="do not give queries as well"):
+        hs.pair_histogram(POINTS, [0.0, 1.0], indices=[0], queries=POINTS)

@@ -60,26 +60,6 @@ def test_any_kernel_and_any_number_of_threads(index_dtype, rng):
             assert_same(blocks, expected, "jSd", max_pairs)
 
 
-@pytest.mark.parametrize("precision", ["exact", "double", "single"])
-def test_quantities_one_by_one(precision, rng):
-    for letter in "ijdDSP":
-        points = rng.random((200, 2))
-        options = {"box": [1.0, 1.0], "quantities": letter, "precision": precision}
-        blocks = list(call(hs.iter_pairs, points, 0.3, max_pairs=501, **options))
-        assert all(isinstance(block, np.ndarray) for block in blocks)
-        assert_same(blocks, call(hs.pairs, points, 0.3, **options), letter, 501)
-
-
-def test_one_group_with_more_pairs_than_a_block(rng):
-    points = rng.random((5000, 2))
-    expected = hs.pairs(points, 2.0, index_dtype=np.int32)
-    for threads in (1, 2):
-        blocks = list(
-            hs.iter_pairs(points, 2.0, threads=threads, max_pairs=400_000, index_dtype=np.int32)
-        )
-        assert_same(blocks, expected, "ij", 400_000)
-
-
 def test_blocks_belong_to_the_caller(rng):
     points = rng.random((300, 3))
     blocks = []
@@ -102,32 +82,15 @@ def test_changed_points_change_nothing(rng):
     assert_same(blocks, expected, "dD", 100)
 
 
-@pytest.mark.parametrize(
-    ("change", "error"),
-    [
-        ({"cutoff": -1.0}, ValueError),
-        ({"cutoff": "1"}, TypeError),
-        ({"points": [[np.nan, 0.0]]}, ValueError),
-        ({"box": [0.0, 1.0]}, ValueError),
-        ({"periodic": True}, ValueError),
-        ({"quantities": "ix"}, ValueError),
-        ({"kernel": "none"}, ValueError),
-        ({"precision": "half"}, ValueError),
-        ({"index_dtype": np.int16}, ValueError),
-        ({"threads": 0}, ValueError),
-        ({"inclusive": "yes"}, TypeError),
-        ({"max_pairs": 0}, ValueError),
-        ({"max_pairs": -5}, ValueError),
-        ({"max_pairs": 1.5}, TypeError),
-        ({"max_pairs": True}, TypeError),
-        ({"progress": 1}, TypeError),
+def test_wrong_arguments_are_refused_by_the_call():
+    for change, error in (
+        ({"cutoff": -1.0}, ValueError), ({"quantities": "ix"}, ValueError),
+        ({"max_pairs": 0}, ValueError), ({"progress": 1}, TypeError),
         ({"memory_limit": 10}, MemoryError),
-    ],
-)
-def test_wrong_arguments_are_refused_by_the_call(change, error):
-    arguments = {"points": [[0.0, 0.0], [1.0, 0.0]], "cutoff": 1.0} | change
-    with pytest.raises(error):
-        call(hs.iter_pairs, **arguments)
+    ):  # fmt: skip
+        arguments = {"points": [[0.0, 0.0], [1.0, 0.0]], "cutoff": 1.0} | change
+        with pytest.raises(error):
+            call(hs.iter_pairs, **arguments)
 
 
 def test_it_is_an_iterator_that_ends_for_good():
@@ -189,6 +152,29 @@ def test_progress_of_all_pairs_at_once_never_falls(rng, threads, sort):
     assert told == sorted(told) and all(0.0 <= fraction <= 1.0 for fraction in told)
     # Of several threads the others, which tell nothing, may do the work.
     assert len(told) > 3 or threads != 1
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_progress_of_searches_in_several_passes_is_one_run(rng, threads):
+    points, radii = rng.random((120_000, 3)), rng.random(120_000) * 0.015
+    cutoff, balls = 0.02, hs.Points(points, radii=radii)
+    how = {"threads": threads}
+    for search in (
+        lambda p: hs.neighbors(points, cutoff, progress=p, **how),
+        lambda p: hs.neighbors(points, cutoff, quantities="jd", progress=p, **how),
+        lambda p: hs.pairs_between(points, points, cutoff, progress=p, **how),
+        lambda p: hs.pairs_between(points[::3], points, cutoff, progress=p, **how),
+        lambda p: hs.neighbors(points, cutoff, indices=np.arange(50_000), progress=p, **how),
+        lambda p: hs.coordination(points, [0.01, 0.015, 0.02], progress=p, **how),
+        lambda p: hs.pairs(balls, None, progress=p, **how),
+        lambda p: hs.neighbors(balls, None, progress=p, **how),
+        lambda p: hs.count_pairs(balls, None, progress=p, **how),
+    ):
+        told = []
+        search(told.append)
+        assert (
+            told == sorted(told) and 0.0 <= min(told, default=0.0) <= max(told, default=0.0) <= 1.0
+        )
 
 
 def test_progress_of_batches_and_of_cells_never_falls(rng):
@@ -355,7 +341,9 @@ points = np.random.default_rng(1).random((20_000, 2))
 list(hs.iter_pairs(points[:100], 2.0))
 before = peak = resident()
 n = 0
-for i, j in hs.iter_pairs(points, 2.0, max_pairs=1 << 18, memory_limit=1e12):
+with hs.settings(memory_limit=1e12):
+    blocks = hs.iter_pairs(points, 2.0, max_pairs=1 << 18)
+for i, j in blocks:
     n += len(i)
     peak = max(peak, resident())
 print(json.dumps([peak - before, n]))
@@ -379,7 +367,8 @@ def interrupt():
     sent.append(time.perf_counter())
     signal.raise_signal(signal.SIGINT)
 
-blocks = hs.iter_pairs(points, 2.0, max_pairs=10**9, memory_limit=1e13)
+with hs.settings(memory_limit=1e13):
+    blocks = hs.iter_pairs(points, 2.0, max_pairs=10**9)
 threading.Timer(0.3, interrupt).start()
 try:
     next(blocks)

@@ -170,37 +170,6 @@ def test_pairs_that_are_found_have_the_same_bits(kind, dtype):
             assert one.tobytes() == other.tobytes()
 
 
-def test_long_and_thin_boxes():
-    rng = np.random.default_rng(3)
-    for box in ([[300.0, 1.0], [0.5, 1.0]], [[0.5, 1.0], [3e4, 1.0]], [[1.0, 1.0], [1e-4, -3e-4]]):
-        i, j = some_pairs(rng, 10, 20)
-        check(rng.uniform(-1.0, 1.0, (10, 2)) @ np.array(box), i, j, box)
-
-
-def test_points_may_be_wrapped_or_not():
-    rng = np.random.default_rng(1)
-    points = np.round(rng.uniform(0, 1, (300, 3)) * 1024) / 1024
-    moved = points + rng.integers(-4, 5, points.shape)
-    i, j = some_pairs(rng, 300, 5000)
-    d, D, S = hs.measure(points, i, j, box=[1.0] * 3)
-    at_ties = (np.abs(D) == 0.5).any(axis=1)
-    e, E, T = hs.measure(moved, i, j, box=[1.0] * 3)
-    np.testing.assert_array_equal(d, e)
-    np.testing.assert_array_equal(D[~at_ties], E[~at_ties])
-    np.testing.assert_array_equal(moved[j] - moved[i] + T, E)
-    np.testing.assert_array_equal(points[j] - points[i] + S, D)
-
-
-def test_threads_do_not_matter():
-    rng = np.random.default_rng(2)
-    points = rng.uniform(0, 1, (30000, 3))
-    i, j = some_pairs(rng, 30000, 300_000)
-    box = np.eye(3) + [[0, 0, 0], [0.4, 0, 0], [0.2, 0.3, 0]]
-    one, two = (hs.measure(points, i, j, box=box, threads=n) for n in (1, 2))
-    for a, b in zip(one, two, strict=True):
-        assert a.tobytes() == b.tobytes()
-
-
 def test_quantities_come_in_the_order_of_their_letters():
     points = [[0.0, 0.0], [3.0, 4.0]]
     d, D, S = hs.measure(points, [0], [1])

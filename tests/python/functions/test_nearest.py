@@ -3,6 +3,7 @@
 
 import itertools
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -12,115 +13,70 @@ from scipy.spatial import cKDTree
 
 import halfshell as hs
 from calls import call
-from oracles import BOX_KINDS, EXACT_ROTATION, full_box, lattice, random_box, same_arrays, whole
-
-
-def whole_rows(rows):
-    return [[whole(x) for x in row] for row in np.asarray(rows, np.float64).tolist()]
-
-
-def within(point, owner, points, rows, axes, radius):
-    """All (square, j, S) of one query up to a radius, the images found through dual vectors.
-
-    Squares are of lengths in units of the smallest float above 0.
-    """
-    exact, box = whole_rows(points), whole_rows(rows)
-    point = np.asarray(point, np.float64)
-    (query,), limit = whole_rows(point[None]), whole(radius) ** 2
-    ndim = len(query)
-    used = rows[axes]
-    size = np.abs(used).max(initial=0.0) or 1.0
-    dual = np.linalg.pinv(used / size).T / size if len(axes) else np.zeros((0, ndim))
-    lengths = np.array([math.hypot(*row) for row in dual])
-    found = []
-    for j, target in enumerate(exact):
-        apart = [a - b for a, b in zip(target, query)]
-        along = dual @ np.array([a / (1 << 1074) for a in apart])
-        reach = radius * lengths * (1 + 1e-6) + 1e-6
-        ranges = [range(math.ceil(-a - r), math.floor(-a + r) + 1) for a, r in zip(along, reach)]
-        for s in itertools.product(*ranges):
-            S = [0] * ndim
-            for axis, value in zip(axes, s):
-                S[axis] = value
-            if j == owner and not any(S):
-                continue
-            D = [a + sum(S[axis] * box[axis][c] for axis in axes) for c, a in enumerate(apart)]
-            square = sum(x * x for x in D)
-            if not len(axes) or square <= limit:
-                found.append((square, j, tuple(S)))
-    return found
+from halfshell._check.reference import exact_vector, ulp_error
+from oracles import BOX_KINDS, lattice, random_box, same_arrays
+from rational_images import Images, between, dot, exact
 
 
 def expected_rows(points, k, queries=None, box=None, periodic=None, max_distance=math.inf):
-    """Rows of (square, j, S) in order."""
-    points = np.asarray(points, np.float64)
-    n, ndim = points.shape
-    asking = points if queries is None else np.asarray(queries, np.float64)
-    rows, flags = full_box(box, periodic, ndim)
-    axes = np.flatnonzero(flags)
+    """Rows of (square, j, S) in order, by fractions: of images up to a radius that grows."""
+    images = Images(points.shape[1], box, periodic)
+    rows = [exact(row) for row in points.tolist()]
+    asking = rows if queries is None else [exact(row) for row in queries.tolist()]
+    limit = None if math.isinf(max_distance) else Fraction(max_distance) ** 2
     result = []
     for i, point in enumerate(asking):
-        radius = min((math.hypot(*rows[axis]) for axis in axes), default=1.0)
-        owner = i if queries is None else -1
-        while n > 0:
-            found = within(point, owner, points, rows, axes, radius)
-            if len(found) >= k or not len(axes) or radius >= max_distance:
+        apart = [between(point, other) for other in rows]
+        square = limit
+        if limit is None and images.rows:
+            square = min(dot(row, row) for row in images.rows)
+        elif limit is None:
+            square = max((dot(D, D) for D in apart), default=Fraction(0))
+        found = []
+        while rows:
+            found = [
+                (length, j, S)
+                for j, D in enumerate(apart)
+                for S, _, length in images.within(D, square)
+                if queries is not None or i != j or any(S)
+            ]
+            if limit is not None or len(found) >= k or not images.rows:
                 break
-            radius = min(1.5 * radius, max(max_distance, radius))
-        found = found if n > 0 else []
-        limit = None if math.isinf(max_distance) else whole(max_distance) ** 2
-        result.append(sorted(x for x in found if limit is None or x[0] <= limit)[:k])
+            square *= 2
+        result.append(sorted(found)[:k])
     return result
 
 
 def check(points, k, **how):
     """Assert that all four quantities are those of the definition; and the same by each kernel."""
-    limit = how.get("max_distance", math.inf)
-    scene = {key: value for key, value in how.items() if key != "max_distance"}
-    expected = expected_rows(points, k, max_distance=limit, **scene)
+    points = np.asarray(points)
+    if "queries" in how:
+        how["queries"] = np.asarray(how["queries"])
+    limit, expected = how.get("max_distance", math.inf), expected_rows(points, k, **how)
     arrays, *others = (
         call(hs.nearest, points, k, quantities="jdDS", kernel=kernel, **how)
         for kernel in hs.kernels()
     )
     assert all(same_arrays(arrays, other) for other in others)
     j, d, D, S = arrays
-    ndim = np.asarray(points).shape[1]
     assert j.shape == d.shape == (len(expected), k)
-    assert D.shape == S.shape == (len(expected), k, ndim)
+    assert D.shape == S.shape == (len(expected), k, points.shape[1])
     assert d.dtype == D.dtype == np.float64 and S.dtype == np.int32
     for i, row in enumerate(expected):
         m = len(row)
         assert list(zip(j[i, :m].tolist(), map(tuple, S[i, :m].tolist()))) == [r[1:] for r in row]
-        for e, (square, *_) in enumerate(row):
-            ulp, length = whole(np.spacing(d[i, e])), whole(d[i, e])
-            assert max(length - ulp, 0) ** 2 <= square <= (length + ulp) ** 2
         assert (np.diff(d[i, :m]) >= 0).all() and (d[i, :m] <= limit).all()
         assert (j[i, m:] == -1).all() and (d[i, m:] == np.inf).all()
         assert np.isnan(D[i, m:]).all() and (S[i, m:] == 0).all()
-        check_vectors(points, i, j[i, :m], D[i, :m], S[i, :m], d[i, :m], how)
-
-
-def check_vectors(points, i, j, D, S, d, how):
-    asking = how.get("queries")
-    points = whole_rows(points)
-    origin = points[i] if asking is None else whole_rows(asking)[i]
-    rows = whole_rows(full_box(how.get("box"), how.get("periodic"), len(origin))[0])
-    for e, other in enumerate(j.tolist()):
-        for c in range(len(origin)):
-            true = points[other][c] - origin[c]
-            true += sum(int(S[e, r]) * rows[r][c] for r in range(len(rows)))
-            assert abs(whole(D[e, c]) - true) <= whole(np.spacing(d[e]))
+        point = how.get("queries", points)[i]
+        for e, (square, other, shift) in enumerate(row):
+            assert ulp_error(d[i, e], square) <= 1
+            true = exact_vector((point, points[other]), 0, 1, shift, how.get("box"))
+            unit = Fraction(float(np.spacing(d[i, e])))
+            assert all(abs(Fraction(x) - y) <= unit for x, y in zip(D[i, e].tolist(), true))
 
 
 # ---- against rational arithmetic -----------------------------------------------------------
-
-
-def test_random_points_in_open_space(rng):
-    for ndim in (1, 2, 3, 4, 5):
-        for n, k in ((1, 1), (2, 3), (50, 12)):
-            points = rng.normal(size=(n, ndim))
-            check(points, k)
-            check(points, k, queries=rng.normal(size=(7, ndim)))
 
 
 @pytest.mark.parametrize("kind", BOX_KINDS)
@@ -144,34 +100,11 @@ def test_ties_on_crystals_are_in_order_of_number_and_shift(name):
         check(points[:4] * factor, 20, box=box * factor)
 
 
-def test_ties_on_rotated_and_sheared_lattices():
-    points, box = lattice("fcc", (2, 1, 1))
-    points, box = points @ EXACT_ROTATION, box @ EXACT_ROTATION
-    check(points, 13, box=box)
-    box[1] += 3 * box[0]
-    box[2] -= 2 * box[1]
-    check(points + 40 * box[0], 13, box=box)
-
-
-def test_more_are_wanted_than_there_are_points(rng):
-    for n in (1, 2, 3):
-        points = rng.random((n, 2))
-        check(points, 40, box=[0.5, 0.75])
-        check(points, 9)
-        check(points, 30, box=[0.5, 0.75], periodic=[False, True])
-
-
 def test_many_images_of_a_tiny_anisotropic_box():
     j, d, S = hs.nearest([[0.0, 0.0, 0.0]], 2000, box=[1.0, 1e6, 1e6], quantities="jdS")
     assert np.array_equal(d[0], np.repeat(np.arange(1.0, 1001.0), 2))
     assert np.array_equal(S[0, :, 0], np.stack([-d[0, ::2], d[0, ::2]], 1).ravel())
     assert not j.any() and not S[..., 1:].any()
-
-
-def test_duplicates_come_by_number():
-    points = np.repeat([[0.1, 0.2], [0.3, 0.1], [0.1, 0.2]], 30, axis=0)
-    check(points, 35)
-    check(points, 65, queries=points[:1], box=[1.0, 1.0])
 
 
 def test_max_distance_on_a_shell():
@@ -211,18 +144,6 @@ def test_a_cluster_and_an_outlier_on_different_scales(rng):
     points[7] = 1e300
     points[30:50] += 1e9
     check(points, 4)
-
-
-def test_float32_and_strided_points(rng):
-    points = rng.random((50, 6)).astype(np.float32)[::2, ::2]
-    check(points, 5)
-    check(points, 5, queries=rng.random((4, 3)), box=[1.0, 1.5, 1.0])
-
-
-def test_the_largest_dimension(rng):
-    points = rng.random((30, 8))
-    check(points, 7)
-    check(points[:3], 1, box=np.ones(8), periodic=[True, True] + [False] * 6)
 
 
 @given(
@@ -337,42 +258,19 @@ def test_quantities_and_types(rng):
     assert np.array_equal(hs.nearest(points, np.int32(4), quantities="d"), d)
 
 
-def test_a_point_and_an_identical_query():
-    assert hs.nearest([[1.0], [2.0]], 1)[0].tolist() == [[1], [0]]
-    assert hs.nearest([[1.0], [2.0]], 1, queries=[[2.0]])[0].tolist() == [[1]]
-
-
 @pytest.mark.parametrize(
     ("error", "match", "how"),
     [
         (ValueError, "k must be 1 or more, got 0", {"k": 0}),
-        (ValueError, "k must be 1 or more", {"k": -3}),
-        (TypeError, "k must be a whole number", {"k": 2.0}),
-        (TypeError, "k must be a whole number", {"k": True}),
-        (TypeError, "k must be a whole number", {"k": "3"}),
         (TypeError, "k must be a whole number", {"k": None}),
         (MemoryError, "would not fit", {"k": 2**56}),
         (MemoryError, "more than fits in any memory", {"k": 2**60}),
-        (MemoryError, "more than fits in any memory", {"k": 2**70}),
         (ValueError, "max_distance must not be negative", {"max_distance": -1.0}),
-        (ValueError, "max_distance must not be negative or NaN", {"max_distance": math.nan}),
         (ValueError, "max_distance must be a number", {"max_distance": [1.0, 2.0]}),
-        (TypeError, "max_distance must be a number", {"max_distance": "1"}),
         (ValueError, "same number of columns", {"queries": [[1.0, 2.0, 3.0]]}),
-        (ValueError, r"queries must have shape \(n, d\)", {"queries": [1.0, 2.0]}),
         (ValueError, r"queries\[1, 0\] = nan", {"queries": [[1.0, 2.0], [math.nan, 0.0]]}),
-        (TypeError, "queries must hold real numbers", {"queries": [[1j, 2.0]]}),
         (ValueError, "j d D S", {"quantities": "ij"}),
-        (ValueError, "j d D S", {"quantities": "P"}),
         (ValueError, "quantities must be", {"quantities": "jj"}),
-        (ValueError, "quantities must be", {"quantities": ""}),
-        (TypeError, "quantities must be a string", {"quantities": 3}),
-        (ValueError, "kernel must be one of", {"kernel": "none"}),
-        (ValueError, "threads", {"threads": 0}),
-        (ValueError, "periodic needs a box", {"periodic": True}),
-        (ValueError, "box must have shape", {"box": [1.0, 2.0, 3.0]}),
-        (ValueError, "linearly independent", {"box": [[1.0, 0.0], [2.0, 0.0]]}),
-        (ValueError, "index_dtype", {"index_dtype": np.uint64}),
         (MemoryError, "would not fit", {"memory_limit": 10.0}),
     ],
 )

@@ -107,8 +107,8 @@ def test_parts():
         rows = rows.astype(int)
         expected = {name: np.asarray(KNOWN[name])[rows] for name in FIELDS if name in KNOWN}
         assert alike(part, hs.Points(X[rows], box=SKEWED, periodic=[True, False], **expected))
-    for wrong in (3, np.int64(3), (0, 1), (slice(None), 0), None):
-        with pytest.raises(TypeError, match=r"Points\[...\] takes a slice, a mask or numbers"):
+    for wrong in (3, np.int64(3), (slice(None), 0), ((0, 1), (2, 3)), None):
+        with pytest.raises(TypeError, match=r"Points\[...\] must take a slice, a mask or numbers"):
             points[wrong]
     systems = hs.Points(X, batch=np.repeat([0, 2], 6), box=np.stack([SKEWED] * 3))
     assert systems[4:8].batch.tolist() == [0, 0, 2, 2] and systems[4:8].n_systems == 3
@@ -232,36 +232,23 @@ WRONG[5] = np.nan
     ({"positions": [[0.0, np.inf]]}, ValueError, r"must be finite, got positions\[0, 1\] = inf"),
     ({"positions": np.zeros((2, 9))}, ValueError, r"shape \(n, d\) with 1 <= d <= 8.*positions.T"),
     ({"positions": np.zeros(4)}, ValueError, r"one point is positions\[None, :\]"),
-    ({"positions": "points"}, TypeError, "positions must hold real numbers, got str"),
-    ({"positions": None}, TypeError, "positions must hold real numbers, got NoneType"),
-    ({"positions": X + 1j}, TypeError, "positions must hold real numbers, got dtype complex128"),
     ({"positions": [[2**53 + 1, 0]]}, ValueError, r"positions\[0, 0\]"),
     ({"box": [1.0, 2.0, 3.0]}, ValueError, r"box must have shape \(2,\) or \(2, 2\)"),
     ({"box": [1.0, 1.0, 1.0, 90.0, 90.0, 90.0]}, ValueError, "use Box.from_dimensions"),
     ({"box": np.stack([SKEWED] * 2)}, ValueError, "a box for each system needs Points"),
     ({"box": [[1.0, 2.0], [2.0, 4.0]]}, ValueError, "linearly independent"),
-    ({"box": [1.0, np.nan]}, ValueError, r"box\[1, 1\] = nan"),
     ({"periodic": True}, ValueError, "periodic needs a box"),
     ({"box": 1.0, "periodic": "xy"}, TypeError, "periodic must be a bool or 2 bools, got 'xy'"),
     ({"box": 1.0, "periodic": [True] * 3}, ValueError, r"2 bools, got shape \(3,\)"),
     ({"radii": [0.1] * 11}, ValueError, r"radii must have shape \(12,\)"),
-    ({"radii": WRONG}, ValueError, r"radii\[5\] = nan"),
     ({"radii": -np.arange(12.0)}, ValueError, r"radii\[1\] = -1"),
     ({"radii": [2.0**1023] * 12}, ValueError, r"radii must be at most 2\*\*1022, got radii\[0\]"),
-    ({"radii": ["1"] * 12}, TypeError, "radii must hold real numbers"),
     ({"radii": [2**53 + 1] * 12}, ValueError, r"radii\[0\].*float64"),
     ({"types": [0.0] * 12}, TypeError, "types must hold integers or names, got dtype float64"),
-    ({"types": -np.arange(12)}, ValueError, r"types\[1\] = -1"),
     ({"types": [2**31 - 1] * 12}, ValueError, r"types must be .* below 2\*\*31 - 1"),
-    ({"types": ["A"] * 3}, ValueError, r"types must have shape \(12,\)"),
-    ({"groups": [None] * 12}, TypeError, "groups must hold integers or names"),
-    ({"labels": np.zeros((12, 1), int)}, ValueError, r"labels must have shape \(12,\)"),
-    ({"weights": WRONG}, ValueError, r"weights\[5\] = nan"),
-    ({"weights": [1j] * 12}, TypeError, "weights"),
     ({"supports": np.ones((12, 2))}, ValueError, r"supports must have shape \(12, 2, 2\)"),
     ({"supports": np.tile(np.eye(2), (12, 1, 1)), "radii": [1.0] * 12}, ValueError, "together"),
     ({"batch": [0, 1] * 6}, ValueError, r"batch must ascend, got batch\[1\] = 1 before 0"),
-    ({"batch": [-1] * 12}, ValueError, r"from 0 on, got batch\[0\] = -1"),
     ({"positions": hs.Points(X, box=1.0), "box": 1.0}, ValueError, "Points bring their own box"),
     ({"positions": [X, X], "batch": [0] * 24}, ValueError, "a list of systems brings its batch"),
 ])  # fmt: skip
@@ -331,6 +318,33 @@ def test_queries_go_with_their_points():
     assert table.counts.tolist() == [0, 6, 0, 6]
 
 
+def test_points_are_taken_where_coordinates_alone_are():
+    known = hs.Points(X, radii=np.ones(len(X)))
+    wrapped = hs.Box([0.5] * 2).wrap(known)[0]
+    assert np.array_equal(wrapped, hs.Box([0.5] * 2).wrap(X)[0])
+    with pytest.raises(ValueError, match="a Points brings a box, for which there is no place here"):
+        hs.Box([0.5] * 2).wrap(hs.Points(X, box=1.0))
+    with pytest.raises(ValueError, match="points must be one system, and have a batch of 2"):
+        hs.CellList([X, X], 1.0, domain=(0.0, 1.0))
+
+
+def test_a_molecule_without_a_cell_may_be_given_a_box():
+    """Atoms without a cell say that axes do not repeat; that is no box of theirs."""
+    molecule = pytest.importorskip("ase").Atoms("OH", [[0.1, 0.0, 0.0], [3.9, 0.0, 0.0]])
+    both = [[0.1, 0.0, 0.0], [3.9, 0.0, 0.0]]
+    for how in ({"box": 4.0}, {"box": 4.0, "periodic": [False, True, True]}):
+        expected = hs.count_pairs(both, 1.0, **how)
+        assert hs.count_pairs(molecule, 1.0, **how) == expected
+        assert hs.count_pairs([molecule], 1.0, **how).tolist() == [expected]
+        assert [len(i) for i, j in hs.trajectory_pairs([molecule], 1.0, **how)] == [expected]
+        assert hs.Points(molecule, **how).types.tolist() == ["O", "H"]
+    molecule.cell[:] = np.eye(3)
+    with pytest.raises(ValueError, match="Atoms bring their own box: leave box out"):
+        hs.Points(molecule, box=4.0)
+    molecule.set_array("residuenames", np.array(["OH", "OH"]))  # from a PDB file: a placeholder
+    assert hs.count_pairs(molecule, 1.0, box=4.0) == 1
+
+
 def test_a_few_of_these_objects_bring_all():
     ase = pytest.importorskip("ase")
     atoms = ase.Atoms("H2O", positions=[[0.0, 0.0, 0.0], [1.5, 0.0, 0.0], [0.7, 0.5, 0.0]],
@@ -356,28 +370,17 @@ def test_a_few_of_these_objects_bring_all():
         2,
         2,
     )
-
-
-@pytest.mark.parametrize("shape", [(), (11,), (13,), (12, 1), (1, 12), (0,)])
-def test_a_column_has_a_number_for_each_point(shape):
-    for name in ("radii", "types", "groups", "labels", "weights", "batch"):
-        with pytest.raises(
-            ValueError, match=rf"{name} must have shape \(12,\).*{str(shape)[1:-1]}"
-        ):
-            hs.Points(X, **{name: np.ones(shape, int)})
+    numbered = frame[["x", "Y"]].assign(type=[2, 1])
+    assert hs.Points(numbered).types.tolist() == [2, 1]
+    assert [hs.count_pairs(numbered, {(1, k): 1.5}) for k in (1, 2)] == [0, 1]
+    for other in ([-1, 1], [0.5, 1.0]):  # no types, but no fault
+        assert hs.Points(numbered.assign(type=other)).types is None
 
 
 WIDE = [
     "wide", b"wide", ["a"] * 12, np.ones(12, complex), np.zeros(12, "M8[s]"), [None] * 12, object(),
 ]  # fmt: skip
 WIDE += [np.ones(12, np.longdouble)] if np.longdouble != np.float64 else []
-
-
-@pytest.mark.parametrize("values", WIDE)
-def test_radii_and_weights_are_real_numbers(values):
-    for name in ("radii", "weights"):
-        with pytest.raises(TypeError, match=name):
-            hs.Points(X, **{name: values})
 
 
 def test_the_bounds_of_radii():
@@ -390,3 +393,125 @@ def test_the_bounds_of_radii():
         with pytest.raises(ValueError, match=rf"{fragment}.*radii\[99999\]"):
             hs.Points(np.zeros((100_000, 1)), radii=radii)
     assert hs.Points(X, radii=[2.0**1022] * 12).radii[0] == 2.0**1022
+
+
+def test_systems_without_points_have_the_dimension_of_their_box():
+    empty = np.empty((0, 2))
+    for systems in ([hs.Points(empty, box=[2.0, 3.0])] * 2, [empty, empty], [[], empty]):
+        assert hs.Points.stack(systems).positions.shape == (0, 2)
+    assert hs.Points.stack([[], [[1.0, 2.0]]]).positions.shape == (1, 2)
+    with pytest.raises(ValueError, match=r"same number of columns, got \[2, 3\]"):
+        hs.Points.stack([hs.Points(empty, box=[2.0, 3.0]), [[1.0, 2.0, 3.0]]])
+
+
+def test_boxes_of_queries_may_be_given_another_way():
+    x, batch = [[0.0, 0.0], [1.0, 0.0]], [0, 1]
+    of_all = hs.Points(x, box=3.0, batch=batch)
+    of_each = hs.Points(x, box=[np.eye(2) * 3.0] * 2, batch=batch)
+    flags = hs.Points(x, box=3.0, periodic=[[True, True]] * 2, batch=batch)
+    other = hs.Points(x, box=[np.eye(2) * 3.0, np.eye(2) * 4.0], batch=batch)
+    slab = hs.Points(x, box=3.0, periodic=[True, False], batch=batch)
+    more = hs.Points(x, box=[np.eye(2) * 3.0] * 3, batch=batch)
+    for points in (of_all, of_each, flags):
+        for queries in (of_all, of_each, flags):
+            assert len(hs.pairs_between(queries, points, 1.0)[0]) == 2
+        for queries in (other, slab):
+            with pytest.raises(ValueError, match="queries bring a box that is not that of points"):
+                hs.pairs_between(queries, points, 1.0)
+    with pytest.raises(ValueError, match="queries bring a box that is not that of points"):
+        hs.pairs_between(more, of_each, 1.0)
+
+
+def test_boxes_of_a_list_are_those_of_its_systems():
+    systems, box = [[[0.0, 0.0]], [[1.0, 0.0]]], [np.eye(2)] * 2
+    assert hs.count_pairs(systems, 1.0, box=box).tolist() == [2, 2]
+    with pytest.raises(ValueError, match="must be given for the 2 systems of points, got 3"):
+        hs.count_pairs(systems, 1.0, box=[*box, np.eye(2)])
+
+
+def test_a_table_has_a_row_for_each_name():
+    points = hs.Points([[0.0], [1.0], [2.0]], types=["C", "H", "O"])
+    table = np.full((3, 3), 1.0)
+    assert hs.count_pairs(points, table) == 2
+    message = r"a row for each type, 'C', 'H', in this order, got shape \(3, 3\)"
+    with pytest.raises(ValueError, match=message):
+        hs.count_pairs(points[:2], table)
+    assert hs.count_pairs(points[:0], table) == 0
+    numbered = points.replace(types=[0, 1, 0])
+    assert hs.count_pairs(numbered, table) == 2
+
+
+@pytest.mark.parametrize(
+    "places", [0, 2.5, "a", None, ..., [0.5], [[0, 1]], [None], np.True_, {1}, iter([1])],
+    ids=lambda places: type(places).__name__,
+)
+def test_points_are_chosen_along_one_axis(places):
+    points = hs.Points([[0.0, 1.0], [2.0, 3.0]], radii=[1.0, 2.0])
+    with pytest.raises(TypeError, match=r"Points\[...\] must take a slice, a mask or numbers"):
+        points[places]
+    assert points[(1, 0)].radii.tolist() == [2.0, 1.0]  # a tuple is no pair of axes
+    assert len(points[[]]) == len(points[np.array([])]) == 0
+    with pytest.raises(TypeError):
+        iter(points)
+
+
+def test_points_without_a_box_are_positions_everywhere():
+    points = hs.Points([[2.5, 0.0]], radii=[1.0])
+    assert hs.Box([2.0, 2.0]).wrap(points)[0].tolist() == [[0.5, 0.0]]
+    cells = hs.DynamicCellList(2, 1.0)
+    cells.insert_many([7], points)
+    assert cells.position(7).tolist() == [2.5, 0.0]
+    with pytest.raises(ValueError, match="brings a box, for which"):
+        hs.Box([2.0, 2.0]).wrap(points.replace(box=3.0))
+
+
+def test_a_verlet_list_refuses_what_it_does_not_look_at():
+    pair_list = hs.VerletList(1.0)
+    for known in ({"radii": [1.0]}, {"groups": [0]}, {"supports": [np.eye(2)]}, {"batch": [0]}):
+        with pytest.raises(ValueError, match=next(iter(known))):
+            pair_list.update(hs.Points([[0.0, 0.0]], **known))
+    with pytest.raises(ValueError, match="points must be one system, and have a batch of 2"):
+        pair_list.update([[[0.0, 0.0]], [[1.0, 0.0]]])
+    assert pair_list.update(hs.Points([[0.0, 0.0]], types=[0], labels=[1], weights=[1.0]))
+
+
+def test_the_last_systems_of_a_list_may_be_empty():
+    two = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]])
+    none = np.empty((0, 3))
+    for box in (None, 5.0, [5.0, 6.0, 7.0]):
+        for systems, counts in (
+            ([two, none], [1, 0]), ([none, two, none], [0, 1, 0]), ([none, none], [0, 0]),
+            ([two, []], [1, 0]), ([none], [0]),
+        ):  # fmt: skip
+            assert hs.count_pairs(systems, 1.0, box=box).tolist() == counts
+            assert hs.pair_histogram(systems, [0.0, 1.0], box=box).sum(axis=-1).tolist() == counts
+            queries = [two] * len(systems)
+            found = hs.count_pairs(systems, 1.0, box=box, queries=queries).tolist()
+            assert found == [4 * count for count in counts]
+    points = hs.Points.stack([two, none])
+    for one in (
+        points, points[:1], points[[]], pickle.loads(pickle.dumps(points)),
+        points.replace(radii=[1.0, 1.0]), points.replace(box=3.0), points.replace(positions=two),
+    ):  # fmt: skip
+        assert one.n_systems == 2
+    assert points.replace(batch=None).n_systems == 1
+    assert points.replace(batch=[0, 2]).n_systems == 3
+    with pytest.raises(ValueError, match="same number of systems, got 2 and 3"):
+        hs.count_pairs([two, two], [1.0, 2.0, 3.0])
+    assert hs.count_pairs([two, none], [1.0, 2.0]).tolist() == [1, 0]
+
+
+def test_systems_without_points_cost_nothing():
+    points = hs.Points([[0.0], [0.5], [0.0], [0.25]], batch=[0, 0, 2**60, 2**60])
+    assert hs.clusters(points, 1.0).labels.tolist() == [0, 0, 1, 1]
+    assert [b.tolist() for b in hs.iter_pairs(points, 1.0, quantities="P")] == [[[0, 1], [2, 3]]]
+    assert hs.verify(points, 1.0, [0, 2], [1, 3])
+
+
+def test_names_of_numpys_own_strings():
+    names = np.array(["b", "a"], np.dtypes.StringDType())
+    assert hs.Points([[0.0], [1.0]], types=names).types.tolist() == ["b", "a"]
+    assert len(hs.Points(np.empty((0, 2)), types=names[:0]).types) == 0
+    missing = np.array(["b", None], np.dtypes.StringDType(na_object=None))
+    with pytest.raises(TypeError, match="types must hold integers or names"):
+        hs.Points([[0.0], [1.0]], types=missing)

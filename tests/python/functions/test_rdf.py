@@ -34,19 +34,6 @@ def test_all_images_beyond_the_box(rng):
     assert abs(result.g[15:].mean() - 1.0) < 0.01
 
 
-def test_types_are_weighted_by_their_numbers(rng):
-    points = rng.random((2000, 2))
-    types = np.repeat([0, 1], [500, 1500])
-    result = call(hs.rdf, points, 0.3, bins=3, types=types, box=[1.0, 1.0])
-    assert result.g.shape == result.counts.shape == (2, 2, 3)
-    assert np.all(np.abs(result.g - 1.0) < 0.1)
-    alone = hs.rdf(points[:500], 0.3, bins=3, box=[1.0, 1.0])
-    assert np.allclose(result.g[0, 0], alone.g, rtol=1e-12)
-    cross = hs.rdf(points[500:], 0.3, bins=3, queries=points[:500], box=[1.0, 1.0])
-    assert np.array_equal(result.counts[0, 1], cross.counts)
-    assert np.allclose(result.g[0, 1], cross.g, rtol=1e-12)
-
-
 def test_types_around_queries(rng):
     points, queries = rng.random((900, 2)), rng.random((400, 2))
     types, query_types = np.arange(900) % 3, np.repeat([0, 1], [100, 300])
@@ -69,14 +56,6 @@ def test_types_around_queries(rng):
             assert np.array_equal(result.counts[a, b], some.counts)
             assert np.allclose(result.g[a, b], some.g, rtol=1e-12)
     assert np.all(np.abs(result.g[:2] - 1.0) < 0.2)
-
-
-def test_an_atoms_object_brings_its_box():
-    build = pytest.importorskip("ase.build")
-    atoms = build.bulk("Cu", cubic=True)
-    result = hs.rdf(atoms, 3.0, bins=30)
-    assert result.counts.sum() == 24  # 4 atoms with 12 neighbours each
-    assert np.flatnonzero(result.counts).tolist() == [25]  # at 2.55
 
 
 @pytest.mark.filterwarnings("error")
@@ -103,12 +82,7 @@ def test_shells_that_float64_does_not_hold_are_0_or_infinite():
 REFUSED = {
     "no box": ({}, ValueError, "periodic along every axis"),
     "a slab": ({"box": [1.0] * 2, "periodic": [True, False]}, ValueError, "along every axis"),
-    "no bins": ({"box": [1.0] * 2, "bins": 0}, ValueError, "bins"),
-    "bins that are no number": ({"box": [1.0] * 2, "bins": 1.5}, TypeError, "bins"),
-    "bins that are a bool": ({"box": [1.0] * 2, "bins": True}, TypeError, "bins"),
     "a cutoff of zero": ({"box": [1.0] * 2, "cutoff": 0.0}, ValueError, "cutoff"),
-    "cutoff that is NaN": ({"box": [1.0] * 2, "cutoff": math.nan}, ValueError, "cutoff"),
-    "several r_max": ({"box": [1.0] * 2, "cutoff": [1.0, 2.0]}, TypeError, "cutoff"),
     "types with queries": (
         {"box": [1.0] * 2, "types": [0, 0], "queries": [[0.0, 0.0]]}, ValueError, "have none",
     ),
@@ -284,20 +258,6 @@ def test_n_is_what_points_have_around_them(rng, box):
     assert math.isclose(plain.n[-1], hs.coordination(points, 1.3, box=box).mean())
 
 
-def test_n_around_queries(rng, box):
-    points, kinds = scene(rng, box)
-    queries, asking = scene(rng, box, 40)
-    how = {"queries": queries, "types": NAMES[kinds], "query_types": NAMES[asking], "box": box}
-    result = call(hs.rdf, points, 1.3, 7, **how)
-    order = [2, 1, 0]  # of NAMES, ascending
-    for k, r in enumerate(result.edges[1:-1]):
-        found = around(points, kinds, queries, asking, r, box, same=False)
-        assert np.allclose(result.n[:, :, k], found[np.ix_(order, order)], rtol=1e-15)
-    plain = hs.rdf(points, 1.3, 7, queries=queries, box=box)
-    assert np.allclose(plain.n * 40, np.cumsum(plain.counts), rtol=1e-15)
-    assert not plain.is_half and plain.n_centers == 40
-
-
 def test_two_types_are_asked_for_by_name(rng, box):
     points, kinds = scene(rng, box)
     result = call(hs.rdf, points, 1.3, 7, types=NAMES[kinds], box=box)
@@ -408,15 +368,6 @@ def test_frames_add_up(rng, box):
     assert np.allclose(total.n, n, rtol=1e-14)
 
 
-def test_frames_of_one_box_have_the_mean_of_their_g(rng, box):
-    each = [hs.rdf(scene(rng, box)[0], 1.3, 7, box=box) for _ in range(5)]
-    total = sum(each[1:], start=each[0])
-    assert np.allclose(total.g, np.mean([one.g for one in each], axis=0), rtol=1e-14)
-    assert np.allclose(total.n, np.mean([one.n for one in each], axis=0), rtol=1e-14)
-    assert np.array_equal(total.counts, sum(one.counts for one in each))
-    assert sum(each[:1]) is each[0]
-
-
 def test_frames_may_lack_types():
     points, how = [[0.0], [0.3]], {"box": [1.0]}
     one = call(hs.rdf, points, 0.4, 2, types=["B", "C"], **how)
@@ -507,19 +458,6 @@ def test_names_and_coordination(pyplot, points):
     assert axes.get_lines()[2].get_xdata().tolist() == result.edges.tolist()
     part = result["Si", "O"].plot()
     assert part.get_legend() is None and len(part.get_lines()) == 2
-
-
-def test_infinite_values_and_no_points(pyplot):
-    near = hs.rdf([[0.0] * 3, [1e-120] * 3], 4e-120, bins=2, box=[1.0] * 3)
-    assert np.isnan(near.plot().get_lines()[0].get_ydata()).tolist() == [True, False]
-    none = call(hs.rdf, np.empty((0, 1)), 0.4, bins=2, types=[], box=[1.0])
-    assert none.plot().get_legend() is None
-
-
-def test_other_quantities_are_refused(pyplot):
-    result = hs.rdf([[0.0], [0.5]], 0.4, bins=2, box=[1.0])
-    with pytest.raises(ValueError, match="quantity"):
-        result.plot(quantity="G")
 
 
 def test_without_matplotlib_an_error_names_it(monkeypatch):

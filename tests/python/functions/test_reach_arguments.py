@@ -1,11 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Radii, rules, types and cutoffs by type as they may be given, and all that is refused."""
 
-import math
 
 import numpy as np
 import pytest
-from ase import Atoms
 from ase.build import bulk, molecule
 from ase.data import chemical_symbols
 from ase.neighborlist import natural_cutoffs, neighbor_list
@@ -15,8 +13,8 @@ from boundary import as_if_atoms
 from calls import call
 from halfshell._convert.objects import SYMBOLS
 from oracles import same_arrays
-from reach_scenes import BOXES, SYMMETRIC, Reaching, boxed, check
-from refused_calls import INF, NAN, assert_refused
+from reach_scenes import SYMMETRIC, Reaching, check
+from refused_calls import NAN, assert_refused
 
 RNG = np.random.default_rng(11)
 POINTS = RNG.random((30, 3))
@@ -70,15 +68,6 @@ def test_the_sum_is_the_rule_unless_another_is_named():
     )
     counts = [call(hs.count_pairs, POINTS, None, radii=RADII, rule=rule) for rule in SYMMETRIC]
     assert counts[0] > counts[2] > counts[1] > counts[3] > 0
-
-
-def test_several_upper_bounds_are_counted_at_once():
-    bounds = [0.0, 0.1, 0.2, 0.4, 2.0]
-    for how in ({"radii": RADII}, {"radii": RADII, "rule": "max", "box": 1.0}):
-        several = call(hs.count_pairs, POINTS, bounds, **how)
-        assert several.dtype == np.int64
-        assert several.tolist() == [call(hs.count_pairs, POINTS, bound, **how) for bound in bounds]
-        assert several[-1] == call(hs.count_pairs, POINTS, None, **how)
 
 
 def test_inputs_are_not_changed_and_may_change_later():
@@ -136,37 +125,6 @@ def test_the_largest_radii_meet():
 
 
 # ---- rules and what goes together ----------------------------------------------------------
-
-
-def test_cutoff_is_needed_without_radii():
-    for refused in calls():
-        assert_refused(refused, TypeError, "cutoff")
-    for value in (-1.0, NAN, -5e-324):
-        for search in (hs.pairs, hs.count_pairs, hs.neighbors, hs.coordination):
-            assert_refused(
-                lambda search=search, value=value: call(search, POINTS, value, radii=RADII),
-                ValueError, "cutoff", "negative",
-            )  # fmt: skip
-    for value in ("far", 1j, [1.0] * 3, object()):
-        assert_refused(
-            lambda value=value: call(hs.pairs, POINTS, value, radii=RADII), TypeError, "cutoff"
-        )
-
-
-@pytest.mark.parametrize("rule", ["Sum", "", "diameter", "gather ", 1, b"sum", ("sum",)])
-def test_rules_that_are_none(rule):
-    exception = ValueError if isinstance(rule, str) else TypeError
-    for refused in calls(radii=RADII, rule=rule):
-        assert_refused(refused, exception, "rule")
-
-
-def test_rules_need_radii():
-    for rule in ("sum", "gather"):
-        assert_refused(lambda rule=rule: hs.pairs(POINTS, 0.5, rule=rule), ValueError, "rule needs")
-        assert_refused(
-            lambda rule=rule: hs.pairs_between(POINTS, POINTS, 0.5, rule=rule), ValueError,
-            "rule needs",
-        )  # fmt: skip
 
 
 @pytest.mark.parametrize("rule", ["gather", "scatter"])
@@ -230,34 +188,13 @@ def test_results_that_do_not_fit_are_refused(rule):
         )  # fmt: skip
 
 
-def test_a_further_cutoff_is_a_length():
-    for cutoff in (INF, NAN, -1.0):
-        with pytest.raises(ValueError, match="cutoff must be finite and not negative"):
-            call(hs.count_pairs, [[0.0], [1.0]], cutoff, radii=[1.0, 1.0])
-
-
 # ---- a cutoff for each two types ---------------------------------------------------------------
 
 
 TABLE = np.array([[0.3, 0.5, 0.0, 0.1], [0.5, 0.0, 0.2, 0.6], [0.0, 0.2, 0.7, 0.4],
                   [0.1, 0.6, 0.4, 0.25]])  # fmt: skip
-PAIRS = {(0, 1): 0.5, (2, 2): 0.7, (3, 0): 0.25, (7, 1): 0.3}
 FEW = np.random.default_rng(5).random((20, 3))
 TYPES = np.arange(20) % 3
-
-
-@pytest.mark.parametrize("kind", BOXES)
-def test_equals_the_definition(kind, rng):
-    for ndim in (1, 2, 3, 4):
-        for cutoff in (TABLE, PAIRS):
-            points, scene = boxed(rng, kind, ndim, 18)
-            types = rng.integers(0, 4, 18)
-            for inclusive in (True, False):
-                scene |= {"inclusive": inclusive}
-                one = Reaching(points, cutoff, types=types, **scene)
-                check(one)
-                check(one.but(n_queries=7))
-                check(one.but(points=points.astype(np.float32)))
 
 
 def test_types_that_nobody_has_and_types_that_pair_with_nobody(rng):
@@ -271,31 +208,6 @@ def test_types_that_nobody_has_and_types_that_pair_with_nobody(rng):
     assert call(hs.count_pairs, points, np.zeros((1, 1)), types=[0] * 20) == 0
 
 
-def test_ties_at_each_cutoff(rng):
-    points = rng.integers(-6, 7, (30, 2)) / 4.0
-    table = rng.integers(0, 7, (3, 3)) / 4.0
-    table = np.maximum(table, table.T)
-    for inclusive in (True, False):
-        one = Reaching(points, table, types=rng.integers(0, 3, 30), inclusive=inclusive)
-        check(one)
-        check(one.but(box=[3.0, 3.0]))
-        check(one.but(n_queries=11))
-
-
-def test_cutoffs_of_every_size(rng):
-    points = np.concatenate([rng.random((12, 2)), 1e-5 * rng.random((12, 2))])
-    table = [[0.5, 1e-3, 1e-9], [1e-3, 3e-6, 0.0], [1e-9, 0.0, 4e-6]]
-    assert check(Reaching(points, np.array(table), types=rng.integers(0, 3, 24)))
-
-
-def test_cutoffs_larger_than_the_box(rng):
-    for kind in ("periodic", "triclinic"):
-        points, scene = boxed(rng, kind, 2, 5)
-        cutoffs = {(0, 0): 2.5, (0, 1): 0.3, (1, 1): 1.1}
-        found = check(Reaching(points, cutoffs, types=[0, 1, 1, 0, 2], **scene))
-        assert any(i == j for i, j, _ in found)
-
-
 def test_one_cutoff_for_all_types_is_one_cutoff(rng):
     for kernel in hs.kernels():
         points = rng.random((500, 3))
@@ -303,26 +215,6 @@ def test_one_cutoff_for_all_types_is_one_cutoff(rng):
         table = np.full((5, 5), 0.2)
         found = call(hs.pairs, points, table, types=rng.integers(0, 5, 500), **how)
         assert same_arrays(found, call(hs.pairs, points, 0.2, **how))
-
-
-@pytest.mark.parametrize("t", [1, 8, 9, 40])
-def test_tables_of_many_types_with_pairs_left_out(t):
-    rng = np.random.default_rng(t)
-    points, types = rng.integers(0, 8, (300, 3)) / 8.0, rng.integers(0, t, 300)
-    table = rng.choice([0.0, 0.125, 0.25, 0.375, math.nextafter(0.25, 0)], (t, t))
-    table = np.maximum(table, table.T)
-    left_out = rng.random((t, t)) < 0.3
-    left_out[0, 0] = False
-    left_out |= left_out.T
-    cutoffs = {(a, b): table[a, b] for a in range(t) for b in range(a, t) if not left_out[a, b]}
-    # whole eighths: squares are exact, and roots of those that are no squares are far from them
-    distance = np.sqrt(((points[None] - points[:, None]) ** 2).sum(-1))
-    reach = table[np.ix_(types, types)]
-    kept = ~left_out[np.ix_(types, types)] & np.triu(np.ones((300, 300), bool), 1)
-    for inclusive in (True, False):
-        near = distance <= reach if inclusive else distance < reach
-        i, j = call(hs.pairs, points, cutoffs, types=types, inclusive=inclusive, sort=True)
-        assert np.array_equal(np.argwhere(near & kept), np.column_stack([i, j]))
 
 
 # ---- forms ---------------------------------------------------------------------------------
@@ -369,11 +261,6 @@ def test_a_dict_counts_both_ways_and_may_have_names():
     assert same_arrays(call(hs.pairs, FEW, absent, types=labels, sort=True), expected)
 
 
-def test_of_no_points_types_may_be_anything():
-    for cutoff in (TABLE, PAIRS, {("H", "CA"): 1.0}):
-        assert call(hs.count_pairs, np.empty((0, 2)), cutoff, types=[]) == 0
-
-
 # ---- what is refused -----------------------------------------------------------------------
 
 
@@ -382,10 +269,7 @@ def test_of_no_points_types_may_be_anything():
     [
         ([[1.0, 2.0], [2.5, 1.0]], [r"symmetric.*cutoff\[0, 1\] = 2.0.*cutoff\[1, 0\] = 2.5"]),
         ([[1.0, 2.0]], [r"\(t, t\)", r"\(1, 2\)"]),
-        (np.ones((2, 2, 2)), [r"\(t, t\)", r"\(2, 2, 2\)"]),
         ([[1.0, -2.0], [-2.0, 1.0]], [r"not negative.*cutoff\[0, 1\] = -2"]),
-        ([[1.0, NAN], [NAN, 1.0]], [r"finite.*cutoff\[0, 1\] = nan"]),
-        ([[INF]], [r"finite.*cutoff\[0, 0\] = inf"]),
     ],
 )
 def test_tables_that_are_none(table, fragments):
@@ -404,23 +288,17 @@ def test_tables_that_are_none(table, fragments):
     [
         ({(0, 1): 1.0, (1, 0): 2.0}, TYPES, ValueError, ["contradicts", r"\(1, 0\)"]),
         ({(0, 1): -1.0}, TYPES, ValueError, ["not negative", r"\(0, 1\)"]),
-        ({(0, 1): NAN}, TYPES, ValueError, ["finite", "nan"]),
         ({(0, 1): "far"}, TYPES, TypeError, [r"cutoff\[\(0, 1\)\]"]),
         ({(0, 1, 2): 1.0}, TYPES, TypeError, ["pairs of types"]),
-        ({0: 1.0}, TYPES, TypeError, ["pairs of types"]),
         ({(0, 1.5): 1.0}, TYPES, TypeError, ["1.5"]),
-        ({(0, True): 1.0}, TYPES, TypeError, ["True"]),
         ({(0, -1): 1.0}, TYPES, ValueError, ["-1"]),
         ({("H", "O"): 1.0}, TYPES, ValueError, ["names.*types are numbers"]),
         ({(0, 1): 1.0}, ["H"] * 20, ValueError, ["numbers.*types are names"]),
         ({("H", "Hx"): 1.0}, ["H"] * 20, ValueError, ["'Hx' is neither an element"]),
         ({(0, 1): 1.0}, None, ValueError, ["a dict of cutoffs needs types"]),
         ({(0, 1): 1.0}, [0, 1], ValueError, [r"types.*\(20,\).*\(2,\)"]),
-        ({(0, 1): 1.0}, np.full(20, -1), ValueError, [r"types.*types\[0\] = -1"]),
-        ({(0, 1): 1.0}, np.zeros(20), TypeError, ["types.*float64"]),
         (TABLE, TYPES + 2, ValueError, [r"types must be less than 4.*type 4 of points\[2\]"]),
         (TABLE, None, ValueError, ["a table of cutoffs needs types"]),
-        (None, TYPES, TypeError, ["cutoff"]),
     ],
 )
 def test_types_and_dicts_that_do_not_fit(cutoff, types, exception, fragments):
@@ -448,21 +326,6 @@ def test_types_of_two_sets_go_together():
         ),
         TypeError, "both be numbers",
     )  # fmt: skip
-
-
-def test_types_with_other_arguments():
-    for given in ({"radii": np.ones(20)}, {"rule": "sum"}):
-        assert_refused(
-            lambda given=given: call(hs.pairs, FEW, TABLE, types=TYPES, **given), ValueError,
-            *given, "combined with radii|needs radii",
-        )  # fmt: skip
-
-
-def test_a_table_of_no_types_holds_for_no_points():
-    nothing, table = np.zeros((0, 3)), np.zeros((0, 0))
-    i, j = call(hs.pairs, nothing, table, types=[])
-    assert len(i) == len(j) == call(hs.count_pairs, nothing, table, types=[]) == 0
-    assert call(hs.neighbors, nothing, table, types=[]).n_rows == 0
 
 
 # ---- stars ---------------------------------------------------------------------------------
@@ -586,37 +449,8 @@ def test_water_has_two_bonds_a_molecule():
     assert [{atoms.symbols[a], atoms.symbols[b]} for a, b in zip(i, j)] == [{"O", "H"}] * 2
 
 
-def test_matscipy_agrees():
-    neighbours = pytest.importorskip("matscipy.neighbours", reason="matscipy is not installed")
-    atoms = oxide()
-    for cutoffs in ({("Mg", "O"): 2.3, ("O", "O"): 3.1}, {("Mg", "Mg"): 4.5}):
-        assert ours(atoms, cutoffs) == rows(*neighbours.neighbour_list("ijS", atoms, cutoffs))
-
-
 def test_the_symbols_are_those_of_ase():
     assert chemical_symbols == SYMBOLS
-
-
-def test_elements_of_two_sets():
-    atoms = water()
-    probe = Atoms("OH", positions=[[0.5, 0.5, 0.5], [2.0, 2.0, 0.0]])
-    given = hs.Points(atoms.positions, types=atoms.get_chemical_symbols(), box=atoms.cell[:],
-                      periodic=atoms.pbc)  # fmt: skip
-    expected = hs.pairs_between(hs.Points(probe.positions, types=["O", "H"]), given, CUTOFFS)
-    assert len(expected[0]) > 0
-    within = Atoms("OH", positions=probe.positions, cell=atoms.cell, pbc=atoms.pbc)
-    assert same_arrays(hs.pairs_between(within, atoms, CUTOFFS), expected)
-    for symbols in (["O", "H"], np.array(["O", "H"])):
-        found = call(hs.pairs_between, probe.positions, atoms, CUTOFFS, query_types=symbols)
-        assert same_arrays(found, expected)
-    assert_refused(
-        lambda: hs.pairs_between(probe.positions, atoms, CUTOFFS), ValueError,
-        "queries have none",
-    )  # fmt: skip
-    assert_refused(
-        lambda: hs.pairs_between(hs.Points(probe.positions, types=[8, 1]), atoms, CUTOFFS),
-        TypeError, "both be numbers",
-    )  # fmt: skip
 
 
 def test_types_are_elements_or_given():
@@ -652,3 +486,20 @@ def test_keys_that_are_no_elements():
     strange = water()
     strange.numbers[3] = 300
     assert_refused(lambda: hs.pairs(strange, CUTOFFS), ValueError, r"numbers\[3\] = 300")
+
+
+def test_the_cutoff_may_be_left_out_with_radii(rng):
+    balls = hs.Points(rng.random((40, 3)), radii=rng.random(40) * 0.2, box=1.0)
+    count = hs.count_pairs(balls, None)
+    assert count == hs.count_pairs(balls) == len(hs.pairs(balls)[0]) > 5
+    assert 2 * count == hs.coordination(balls).sum() == hs.neighbors(balls).n_entries
+    assert count == sum(map(len, hs.iter_pairs(balls, quantities="P")))
+    assert hs.clusters(balls).n_clusters == hs.clusters(balls, None).n_clusters
+    assert len(hs.pairs_between(balls, balls)[0]) == 2 * count + 40
+    assert [len(i) for i, _ in hs.trajectory_pairs([balls] * 2)] == [count] * 2
+    assert hs.explain(balls).expected_pairs == hs.explain(balls, None).expected_pairs
+    cells = hs.CellList(balls.positions, 0.3, box=1.0)
+    assert hs.count_pairs(cells) == cells.count_pairs() == hs.count_pairs(cells, 0.3)
+    for search in (hs.pairs, hs.neighbors, hs.count_pairs, hs.coordination, hs.clusters):
+        with pytest.raises(TypeError, match="got NoneType: points without it need radii"):
+            search(balls.positions)

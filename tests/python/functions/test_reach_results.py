@@ -31,66 +31,6 @@ every_scene = pytest.mark.parametrize("name", SCENES)
 
 
 @every_scene
-def test_quantities_are_those_of_pairs(name):
-    for kernel in hs.kernels():
-        cutoff, how = SCENES[name]
-        how = how | {"kernel": kernel}
-        i, j, S, d, D, P = call(hs.pairs, POINTS, cutoff, quantities="ijSdDP", sort=True, **how)
-        assert len(i) > 100
-        assert (i.dtype, S.dtype, d.dtype, D.shape) == (np.int64, np.int32, np.float64, (len(i), 3))
-        assert np.array_equal(P, np.column_stack((i, j)))
-        for letter, column in (("i", i), ("d", d), ("D", D), ("S", S), ("P", P)):
-            assert same_arrays(
-                call(hs.pairs, POINTS, cutoff, quantities=letter, sort=True, **how), column
-            )
-        # Each is one of the pairs within the longest distance, with the same numbers.
-        scene = {key: how[key] for key in ("box", "periodic", "kernel") if key in how}
-        plain = call(hs.pairs, POINTS, 1.01 * d.max(), quantities="ijSdD", sort=True, **scene)
-        rows = {row: k for k, row in enumerate(zip(*(c.tolist() for c in plain[:2]),
-                                                    map(tuple, plain[2].tolist())))}  # fmt: skip
-        places = [rows[row] for row in zip(i.tolist(), j.tolist(), map(tuple, S.tolist()))]
-        assert np.array_equal(plain[3][places], d) and np.array_equal(plain[4][places], D)
-
-
-@every_scene
-def test_kernels_and_threads_give_the_same_arrays(name):
-    cutoff, how = SCENES[name]
-    calls = {
-        "pairs": lambda **by: call(hs.pairs, POINTS, cutoff, quantities="ijSdD", **how, **by),
-        "sorted": lambda **by: call(hs.pairs, POINTS, cutoff, sort=True, **how, **by),
-        "rows": lambda **by: (
-            call(hs.neighbors, POINTS, cutoff, quantities="jd", **how, **by)._arrays
-        ),
-        "counts": lambda **by: call(hs.coordination, POINTS, cutoff, **how, **by),
-    }
-    for search in calls.values():
-        expected = search(kernel="scalar", threads=1)
-        for kernel in hs.kernels():
-            for threads in (1, 2, 3):
-                assert same_arrays(search(kernel=kernel, threads=threads), expected)
-
-
-@every_scene
-def test_int32_and_out(name):
-    cutoff, how = SCENES[name]
-    expected = call(hs.pairs, POINTS, cutoff, quantities="ijSd", **how)
-    short = call(hs.pairs, POINTS, cutoff, quantities="ijSd", index_dtype=np.int32, **how)
-    assert short[0].dtype == short[1].dtype == np.int32
-    assert all(np.array_equal(a, b) for a, b in zip(short, expected))
-    m = len(expected[0])
-    out = (np.empty(m + 9, np.int64), np.empty(m, np.int64), np.empty((m + 1, 3), np.int32),
-           np.empty(m))  # fmt: skip
-    found = call(hs.pairs, POINTS, cutoff, quantities="ijSd", out=out, **how)
-    assert same_arrays(found, expected)
-    assert all(np.shares_memory(a, b) for a, b in zip(found, out))
-    with pytest.raises(hs.CapacityError) as caught:
-        call(hs.pairs, POINTS, cutoff, quantities="i", out=np.empty(m - 1, np.int64), **how)
-    assert caught.value.needed == m
-    table = call(hs.neighbors, POINTS, cutoff, index_dtype=np.int32, **how)
-    assert table.indices.dtype == np.int32 and table.n_entries == 2 * m
-
-
-@every_scene
 def test_blocks_and_calls_are_pairs_in_their_order(name):
     cutoff, how = SCENES[name]
     expected = call(hs.pairs, POINTS, cutoff, quantities="ijSdD", **how)
@@ -116,32 +56,6 @@ def test_blocks_and_calls_are_pairs_in_their_order(name):
     assert call(
         hs.for_each_pair, POINTS, cutoff, lambda i, *_: stopped.append(i) or i == 3, **how
     ) == (len(stopped))
-
-
-def test_rows_are_pairs_with_their_direction():
-    for rule in RULES:
-        how = {"radii": RADII, "rule": rule, "box": 1.0}
-        table = call(hs.neighbors, POINTS, None, quantities="jdDS", **how)
-        assert same_arrays(call(hs.coordination, POINTS, None, **how), table.counts)
-        i, j, d, D, S = table.to_pairs(quantities="ijdDS")
-        if rule in SYMMETRIC:
-            assert same_arrays(table.distances[table.reverse()], table.distances)
-            half = table.to_pairs(quantities="ijS", half=True)
-            assert same_arrays(
-                half, call(hs.pairs, POINTS, None, quantities="ijS", sort=True, **how)
-            )
-        else:
-            with pytest.raises(ValueError, match="needs a table of one set"):
-                table.reverse()
-            with pytest.raises(ValueError, match="needs a table of one set"):
-                table.to_pairs(half=True)
-        reach = {"gather": RADII[i], "scatter": RADII[j], "sum": RADII[i] + RADII[j],
-                 "mean": (RADII[i] + RADII[j]) / 2, "max": np.maximum(RADII[i], RADII[j]),
-                 "min": np.minimum(RADII[i], RADII[j])}[rule]  # fmt: skip
-        assert (d <= reach).all()
-        assert np.allclose(POINTS[j] - POINTS[i] + S, D, atol=1e-15)
-        near = table.sort()
-        assert all((np.diff(row[1]) >= 0.0).all() for row in near)
 
 
 # ---- large scenes --------------------------------------------------------------------------

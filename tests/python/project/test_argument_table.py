@@ -14,7 +14,7 @@ PAGE = Path(__file__).parents[3] / "docs" / "arguments.md"
 
 POINTS = np.random.default_rng(3).random((12, 3)) * 2.0
 CUBE = [2.0, 2.0, 2.0]
-LIST = hs.pairs(POINTS, 0.9, box=CUBE)
+LIST = hs.pairs(hs.Points(POINTS, box=CUBE, batch=np.arange(12) // 6), 0.9)
 
 
 def explained(found):
@@ -53,8 +53,8 @@ FIELDS = {
     "groups": ({"groups": HALF}, {}),
     "labels": ({"labels": HALF}, {"exclude": 0}),
     "weights": ({"weights": 1.0 + HALF}, {}),
-    "batch": ({"batch": np.arange(12) // 6}, {}),
-    "several cutoffs": ({}, {"c": [0.5, 0.9], "quantities": "ijk"}),
+    "batch": ({"batch": np.arange(12) // 6, "box": [np.diag(CUBE), np.eye(3)]}, {}),
+    "several cutoffs": ({}, {"c": [0.5, 0.9], "quantities": "jk"}),
 }  # fmt: skip
 
 
@@ -88,13 +88,13 @@ REASONS = {
     },
     "Rows are those of the queries: give these alone": {"pairs_between": "indices"},
     "`pairs` and `neighbors` find those of some points, which are few": {
-        "iter_pairs for_each_pair": "indices",
+        "for_each_pair": "indices",
     },
-    "Some points are given as queries": {"pair_histogram rdf": "indices"},
+    "Some points are given as queries": {"rdf": "indices"},
     "It plans the search of all points": {"explain": "indices"},
     "Clusters are of one set, and whole": {"clusters": "queries indices"},
-    "The nearest go by distance alone, up to `max_distance`: find more, and drop some": {
-        "nearest": "rule exclude min_distance inclusive radii types supports groups labels",
+    "The nearest go by distance, up to `max_distance`, not by a reach of each pair": {
+        "nearest": "rule radii types supports",
     },
     "Bins have edges: the last one is the cutoff, and closed": {
         "pair_histogram rdf": "rule inclusive radii types supports several",
@@ -112,14 +112,11 @@ REASONS = {
         "pairs pairs_between neighbors nearest count_pairs coordination rdf clusters iter_pairs "
         "for_each_pair trajectory_pairs verify explain measure bricks": "weights",
     },
-    "`pairs` and `iter_pairs` tell shells apart by the letter k, `count_pairs` counts each": {
-        "pairs_between neighbors coordination for_each_pair trajectory_pairs verify explain":
-        "several",
-    },
+    "The form of the callback is fixed, and has no shell": {"for_each_pair": "several"},
+    "Each cutoff has a list of its own, which is verified by itself": {"verify": "several"},
     "Clusters and bricks have one reach": {"clusters bricks": "several"},
     "It has a number of neighbours in place of a cutoff": {"nearest": "several"},
     "The callback itself can tell how far it is": {"for_each_pair": "progress"},
-    "Numbers of points are those of one system": {"for_each_pair measure": "batch"},
     "Each system has a plan and bricks of its own": {"explain bricks": "batch"},
     "Methods of each brick take it": {
         "bricks": "exclude min_distance inclusive quantities threads labels",

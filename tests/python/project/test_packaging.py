@@ -11,7 +11,7 @@ import pytest
 
 import halfshell as hs
 from checkout import CSRC, ROOT
-from halfshell import _include
+from halfshell import _machine
 
 pytestmark = pytest.mark.slow
 
@@ -87,9 +87,9 @@ def test_a_source_distribution_has_the_whole_checkout(copy, tmp_path):
 
 
 def test_an_editable_installation_uses_the_checkout(tmp_path, monkeypatch):
-    module = tmp_path / "python" / "halfshell" / "_include.py"
+    module = tmp_path / "python" / "halfshell" / "_machine.py"
     (tmp_path / "csrc").mkdir()
-    monkeypatch.setattr(_include, "__file__", str(module))
+    monkeypatch.setattr(_machine, "__file__", str(module))
     with pytest.raises(FileNotFoundError, match=r"halfshell.h is missing from .*include"):
         hs.get_include()
     (tmp_path / "csrc" / "halfshell.h").touch()

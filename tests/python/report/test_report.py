@@ -97,7 +97,7 @@ def test_the_truth_of_ellipsoids_of_any_size(rule, scale, rng):
                 points * scale, None, scaled, None, Ellipsoids(H, extent * scale, rule)
             )
             answer = hs.pairs(
-                points * scale, None, box=scaled, supports=H, extent=extent * scale, rule=rule,
+                hs.Points(points * scale, box=scaled, supports=H), extent * scale, rule=rule,
                 quantities="ijS", sort=True,
             )  # fmt: skip
             if box is None:  # all pairs, by fractions

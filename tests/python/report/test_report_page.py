@@ -124,7 +124,7 @@ def test_methods_are_ranked_by_what_a_reader_cares_about():
 def test_the_headline_names_the_best_other_library():
     ours = [row("exact", seconds=1.0)]
     assert findings.headline([]) == ""
-    assert findings.headline(ours) == "Precision 'exact' was right on the one scene."
+    assert findings.headline(ours) == "halfshell was right on the one scene."
     one = [*ours, row("tree", "peer", missed=1, seconds=2.0)]
     assert findings.headline(one).endswith(
         "tree, the other library, was right on 0 of 1, and took 2 times as long in the median."

@@ -490,6 +490,7 @@ def called_with(name, function, **given):
                 usual = {k: v for k, v in usual.items() if k != "box" or other == "box"}
     for one in parameters.values():
         is_needed = one.default is one.empty and one.name not in LEFT_OUT
+        is_needed |= one.name == "cutoff" and "." not in name  # but with radii
         if (one.name in USUAL.get(name, {}) and one.name in usual) or is_needed:
             given.setdefault(one.name, usual[one.name])
     free = [  # those that are not keywords

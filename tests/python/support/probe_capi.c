@@ -13,8 +13,8 @@ count(PyObject *module, PyObject *arguments)
     Py_buffer  buffer;
     int        ndim;
     int64_t    n_pairs;
-    hs_points  points;
-    hs_among   among = {&points, NULL, NULL, NULL, NULL, NULL};
+    hs_set     points;
+    hs_among   among = {&points, NULL, NULL, NULL, NULL, NULL, NULL};
     hs_failure failure;
     hs_status  status;
     hs_options options = halfshell->options_default();
@@ -22,12 +22,13 @@ count(PyObject *module, PyObject *arguments)
     if (!PyArg_ParseTuple(arguments, "y*id", &buffer, &ndim, &options.cutoff)) {
         return NULL;
     }
-    points.data = buffer.buf;
-    points.ndim = ndim;
-    points.n = (int64_t)buffer.len / (int64_t)sizeof(double) / ndim;
-    points.real = HS_FLOAT64;
-    points.row_stride = (ptrdiff_t)sizeof(double) * ndim;
-    points.column_stride = (ptrdiff_t)sizeof(double);
+    memset(&points, 0, sizeof points);
+    points.at.data = buffer.buf;
+    points.at.ndim = ndim;
+    points.at.n = (int64_t)buffer.len / (int64_t)sizeof(double) / ndim;
+    points.at.real = HS_FLOAT64;
+    points.at.row_stride = (ptrdiff_t)sizeof(double) * ndim;
+    points.at.column_stride = (ptrdiff_t)sizeof(double);
     Py_BEGIN_ALLOW_THREADS
     status = halfshell->pairs_count(&among, &options, &n_pairs, &failure);
     Py_END_ALLOW_THREADS

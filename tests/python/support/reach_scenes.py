@@ -5,20 +5,10 @@ from fractions import Fraction
 
 import numpy as np
 
+import definition
 import halfshell as hs
-from calls import call
-from full_lists import both_ways, entries
-from halfshell._check.reference import (
-    exact_square,
-    reach_by_radii,
-    reach_by_types,
-    reference_pairs,
-    ulp_error,
-)
-from oracles import by_kernels, random_box, triples
-
-SYMMETRIC = ("sum", "mean", "max", "min")
-RULES = (*SYMMETRIC, "gather", "scatter")
+from definition import RULES, SYMMETRIC  # noqa: F401, for the tests of reach
+from oracles import random_box
 
 # box kind (None: open space) and flags
 BOXES = {
@@ -77,84 +67,37 @@ class Reaching:
             found["radii"] = radii[q:]
         return found | {k: v for k, v in self.marks.items() if k != "radii"}
 
-    # ---- what must come out ----------------------------------------------------------------
+    def fields(self, rows=slice(None)):
+        """What is known of these points."""
+        known = {k: np.asarray(v)[rows] for k, v in self.marks.items() if k != "rule"}
+        return hs.Points(self.points[rows], **known)
 
-    def reach(self):
-        """How far i reaches j, exactly."""
-        if "types" in self.marks:
-            return reach_by_types(list(self.marks["types"]), self.cutoff)
-        return reach_by_radii(self.marks["radii"], self.rule, self.cutoff)
-
-    def half(self):
-        """Each pair once; of rules without a direction."""
-        return self._among("there")
+    def of_one_set(self):
+        """Points in their box, and how they are searched."""
+        inclusive = {"inclusive": self.scene["inclusive"], "rule": self.marks.get("rule")}
+        scene = {key: self.scene[key] for key in ("box", "periodic")}
+        return self.fields().replace(**scene), {k: v for k, v in inclusive.items() if v is not None}
 
     def full(self):
         """(i, j, S) of rows: what i reaches, or is reached by."""
-        if self.rule in SYMMETRIC:
-            return both_ways(self.half())
-        back = [(j, i, tuple(-s for s in S)) for i, j, S in self._among("back")]
-        return sorted(self._among("there") + back)
+        points, how = self.of_one_set()
+        return definition.rows_that_count(points, self.cutoff, **how)
 
     def between(self):
         """(i, j, S) of queries and points."""
+        points, how = self.of_one_set()
         q = self.n_queries
-        return sorted((i, j - q, S) for i, j, S in self._among("there") if i < q <= j)
-
-    def _among(self, way):
-        """(i, j, S) with i <= j within the reach of i to j, or "back" of j to i."""
-        reach = self.reach()
-        if way == "back":
-            reach = [list(column) for column in zip(*reach)]
-        return reference_pairs(self.points, reach, **self.scene)
+        return definition.rows_that_count(points[q:], self.cutoff, self.fields(slice(q)), **how)
 
 
-def check(scene, **how):
-    """Assert that all functions find what the definition says; return it, of one set or two.
-
-    By every kernel, unless one is named.
-    """
-    if scene.n_queries is not None:
-        return _check_between(scene, how)
-    full = scene.full()
-    half = None if scene.rule not in SYMMETRIC else [p for p in full if _is_of_half(*p)]
-    for by in by_kernels(how):
-        table = call(hs.neighbors, **scene.arguments, quantities="jS", **by)
-        assert entries(table) == full
-        counts = call(hs.coordination, **scene.arguments, **by)
-        assert counts.tolist() == table.counts.tolist()
-        if half is not None:
-            found = call(hs.pairs, **scene.arguments, quantities="ijS", sort=True, **by)
-            assert triples(*found) == half
-            unsorted = call(hs.pairs, **scene.arguments, quantities="ijS", **by)
-            assert sorted(triples(*unsorted)) == half
-            assert call(hs.count_pairs, **scene.arguments, **by) == len(half)
-    return full if half is None else half
-
-
-def _is_of_half(i, j, S):
-    return i < j or (i == j and S > (0,) * len(S))
-
-
-def _check_between(scene, how):
-    expected = scene.between()
-    arguments = scene.of_two_sets
-    numbers = np.bincount([i for i, _, _ in expected], minlength=scene.n_queries).tolist()
-    for by in by_kernels(how):
-        assert triples(*call(hs.pairs_between, **arguments, quantities="ijS", **by)) == expected
-        assert entries(call(hs.neighbors, **arguments, quantities="jS", **by)) == expected
-        assert call(hs.count_pairs, **arguments, **by) == len(expected)
-        assert call(hs.coordination, **arguments, **by).tolist() == numbers
-    return expected
-
-
-def assert_last_place(scene, i, j, S, d):
-    """d of pairs of one set is within 1 ulp, and on the right side of the rounded reach."""
-    reach = scene.reach()
-    for a, b, shift, length in zip(i.tolist(), j.tolist(), S.tolist(), d.tolist()):
-        square = exact_square(scene.points, a, b, shift, scene.scene["box"])
-        assert ulp_error(length, square) <= 1
-        assert length <= float(reach[a][b])
+def check(scene):
+    """Assert that all functions find what the definition says; return it, of one set or two."""
+    points, how = scene.of_one_set()
+    q = scene.n_queries
+    if q is not None:
+        return definition.check(points[q:], scene.cutoff, scene.fields(slice(q)), **how)
+    full = definition.check(points, scene.cutoff, **how)
+    return full if scene.rule not in SYMMETRIC else [p for p in full if definition.is_of_half(*p)]
 
 
 # ---- scenes --------------------------------------------------------------------------------

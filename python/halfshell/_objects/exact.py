@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rows by distance, exactly: what rounded distances cannot tell is compared in integers.
+"""What Python decides exactly: rows by distance, in integers; small matrices, in fractions.
 
 A distance is within 1 ulp of the true one. Entries of a row whose distances differ by a few ulps at
 most are a group; in it the squares of the true distances are worked out as whole numbers, for the
@@ -10,18 +10,15 @@ their digits, so that NumPy works on all entries of a group, and of many groups,
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from halfshell import _core
-from halfshell._convert.lengths import as_cutoff
+from halfshell._convert.arrays import rows_of
 from halfshell._convert.memory import refuse_unavailable
-from halfshell._convert.options import AUTO, as_flag
-from halfshell._convert.points import Points
-from halfshell._convert.types import PointArray, Reach
-from halfshell._objects.rows import order_in_rows, part_of, rows_of
+from halfshell._convert.types import PointArray
 
 Array = npt.NDArray[Any]
 Integers = npt.NDArray[np.int64]
@@ -37,25 +34,15 @@ SORTED_AT_A_TIME = 1 << 17  # entries: some milliseconds
 class Origin:
     """What exact sorting needs of the search that a table comes from.
 
-    Parameters
-    ----------
-    points, queries : ndarray of float, shape (n, d) and (q, d)
-        `queries` is None where the points themselves ask. They and the box are copied, for the
-        caller's may change, unless they are its own.
-    box : ndarray of float64, shape (d,) or (d, d), or None; with `systems` (s, d, d)
-    periodic
-        As users pass it, or as bits.
-    find : callable, optional
-        Returns S of all entries of all rows, for tables that have no shifts: called with this
-        object when they are first needed.
-    systems : ndarray of int64, shape (rows,), optional
-        Which box each row has.
-    shifts, numbers : ndarray, optional
-        All shifts, and the numbers of `points`, ascending, if they are not all.
+    queries: None where the points themselves ask. Points, queries and box are copied, for the
+    caller's may change, unless they are its own. box: vectors, with `systems`, which say which one
+    each row has, of each system. find: returns S of all entries of all rows, for tables that have
+    no shifts, when they are first needed. shifts, numbers: all shifts, and the numbers of `points`,
+    ascending, if they are not all.
     """
 
     __slots__ = (
-        "_box", "_find", "_numbers", "_periodic", "_shifts", "_systems", "points", "queries",
+        "_bits", "_box", "_find", "_numbers", "_shifts", "_systems", "points", "queries",
     )  # fmt: skip
 
     def __init__(
@@ -66,7 +53,7 @@ class Origin:
         self.points = points if is_own else points.copy()
         self.queries = queries if is_own or queries is None else queries.copy()
         self._box = box if is_own or box is None else box.copy()
-        self._periodic = tuple(periodic) if isinstance(periodic, list) else periodic
+        self._bits = int(periodic)
         self._find = find
         self._systems = systems
         self._shifts = shifts
@@ -85,23 +72,20 @@ class Origin:
             taken = points[self._places_of(named)]
             if taken.nbytes + named.nbytes < points.nbytes:
                 points, numbers = taken, named
-        _, box, bits = self.scene()
         systems = None if self._systems is None else self._systems[rows]
         return {
-            "points": points, "queries": queries, "box": box, "periodic": bits,
+            "points": points, "queries": queries, "box": self._box, "periodic": self._bits,
             "systems": systems, "shifts": shifts, "numbers": numbers,
         }  # fmt: skip
 
     def scene(self) -> tuple[PointArray, Floats | None, int]:
         """Points, box vectors and periodic bits as the core takes them."""
-        if isinstance(self._periodic, int) and not isinstance(self._periodic, bool):
-            return self.points, self._box, self._periodic
-        return Points._of(self.points, "points", self._box, self._periodic)._scene
+        return self.points, self._box, self._bits
 
     @property
     def has_images(self) -> bool:
         """Whether shifts may be other than zero."""
-        return self.scene()[2] != 0
+        return self._bits != 0
 
     def shifts(self) -> Array:
         """S of all entries of all rows. Threads may ask at once: each then searches."""
@@ -132,9 +116,8 @@ class Origin:
         """
         order = np.empty(len(distances), np.int64)
         places = self._places_of(indices)
-        _, box, bits = self.scene()
-        ndim = self.points.shape[1]
-        repeats = np.array([bits >> k & 1 for k in range(ndim)], np.float64)
+        box, ndim = self._box, self.points.shape[1]
+        repeats = np.array([self._bits >> k & 1 for k in range(ndim)], np.float64)
         # Those that repeat; others are multiplied by no shift.
         vectors = np.zeros((ndim, ndim)) if box is None else box * repeats[:, None]
         for first, end in _parts_of(offsets):
@@ -163,23 +146,6 @@ def _parts_of(offsets: Array) -> Iterator[tuple[int, int]]:
         first = end
 
 
-def shifts_of_search(
-    cutoff: Any, inclusive: Any, precision: Any, threads: int | None, reach: Reach | None = None
-) -> FindShifts:
-    """A search for the shifts of all rows that `neighbors` returns for these arguments."""
-    largest, includes_cutoff = as_cutoff(cutoff), as_flag(inclusive, "inclusive")
-    own: Any = copied(reach)  # the caller's arrays may change
-
-    def find(origin: Origin) -> Array:
-        points, vectors, bits = origin.scene()
-        return _core.neighbors(
-            points, largest, vectors, bits, includes_cutoff, precision, None, None, None, threads,
-            "S", 8, origin.queries, own, AUTO,
-        )[1]
-
-    return find
-
-
 def copied(part: Any) -> Any:
     """A tuple with copies of the arrays in it."""
     if isinstance(part, tuple):
@@ -193,18 +159,9 @@ def settle(
 ) -> None:  # fmt: skip
     """Put entries that are sorted by row and rounded distance into exact order, in place.
 
-    Parameters
-    ----------
-    order : ndarray of int64, shape (m,)
-        Entries in that order; changed.
-    rows : ndarray of int, shape (m,)
-        The point or query of ``order[k]``, by its number in `asking`.
-    indices, distances, shifts : ndarray
-        Of the entries. Entries at the same distance are left by their numbers. `shifts` is None
-        where all are zero.
-    points, asking : ndarray of float, shape (n, d) and (q, d)
-    vectors : ndarray of float64, shape (d, d) or (d, q, d)
-        What shifts multiply: the same for all, or vector k of each in `asking` as ``vectors[k]``.
+    rows: the place in `asking` of the point or query of ``order[k]``. indices, distances, shifts:
+    of the entries; no shifts where all are zero. Entries at the same distance are left by their
+    numbers. vectors: what shifts multiply, (d, d), or (d, q, d) with vector k of each in `asking`.
     """
     d = distances[order]
     with np.errstate(invalid="ignore"):
@@ -331,3 +288,96 @@ def _carried(digits: list[Integers], half: int) -> list[Integers]:
         result.append(digit - (carry << BITS))
         k += 1
     return result
+
+
+# ---- order of entries, and parts of them ---------------------------------------------------
+
+def order_by_index(indices: Array) -> Integers:
+    """A stable argsort of numbers below 2**31; NumPy's is quick for 16 bits at a time."""
+    order: Integers = np.argsort((indices & 0xFFFF).astype(np.uint16), kind="stable")
+    if indices.max(initial=0) > 0xFFFF:
+        upper = (indices >> 16).astype(np.uint16)
+        order = order[np.argsort(upper[order], kind="stable")]
+    return order
+
+
+def order_in_rows(rows: Array, values: Array) -> Integers:
+    """Entries by row, then by an index or a distance, then as they were."""
+    by_index = values.dtype.kind in "iu"
+    order = order_by_index(values) if by_index else np.argsort(values, kind="stable")
+    return order[order_by_index(rows[order])]
+
+
+def part_of(part: slice | Array, chosen: slice | Array) -> slice | Array:
+    """A part of a part: slices have both ends and a step of 1, arrays are positions."""
+    if isinstance(part, slice):
+        if isinstance(chosen, slice):
+            return slice(part.start + chosen.start, part.start + chosen.stop)
+        moved: Array = chosen + part.start
+        return moved
+    some: Array = part[chosen]
+    return some
+
+
+# ---- small matrices of floats, solved in fractions -------------------------------------------
+
+Rows = list[list[Fraction]]
+
+
+def as_fractions(matrix: Any) -> Rows:
+    """The entries of an array (m, n)."""
+    return [[Fraction(x) for x in row] for row in matrix.tolist()]
+
+
+def transposed(matrix: Rows) -> Rows:
+    return [list(column) for column in zip(*matrix, strict=True)]
+
+
+def product(a: Rows, b: Rows) -> Rows:
+    columns = transposed(b)
+    return [
+        [sum((x * y for x, y in zip(row, column, strict=True)), Fraction(0)) for column in columns]
+        for row in a
+    ]
+
+
+def solved(matrix: Rows, right: Rows) -> Rows:
+    """X with ``matrix @ X = right``, of which there is one."""
+    return _eliminated(matrix, right)[0]
+
+
+def determinant(matrix: Rows) -> Fraction:
+    return _eliminated(matrix, [[] for _ in matrix])[1]
+
+
+def _eliminated(matrix: Rows, right: Rows) -> tuple[Rows, Fraction]:
+    """What is left of `right`, and the determinant: as far as it is not 0."""
+    rows = [[*a, *b] for a, b in zip(matrix, right, strict=True)]
+    d, found = len(rows), Fraction(1)
+    for k in range(d):
+        pivot = next((m for m in range(k, d) if rows[m][k] != 0), None)
+        if pivot is None:
+            return [], Fraction(0)
+        if pivot != k:
+            rows[k], rows[pivot] = rows[pivot], rows[k]
+            found = -found
+        found *= rows[k][k]
+        rows[k] = [value / rows[k][k] for value in rows[k]]
+        for m in range(d):
+            if m != k and rows[m][k] != 0:
+                rows[m] = [a - rows[m][k] * b for a, b in zip(rows[m], rows[k], strict=True)]
+    return [row[d:] for row in rows], found
+
+
+def is_definite(matrix: Rows) -> bool:
+    """Whether a symmetric matrix is positive definite."""
+    left = matrix
+    while left:
+        pivot = left[0][0]
+        if pivot <= 0:
+            return False
+        left = [
+            [a - row[0] * b / pivot for a, b in zip(row[1:], left[0][1:], strict=True)]
+            for row in left[1:]
+        ]
+    return True

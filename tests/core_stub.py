@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The part of python/halfshell/_core.pyi that says what searches take, from the table of the
+interface (csrc/binding/interface.c).
+
+    python tests/core_stub.py            compare
+    python tests/core_stub.py --write    after the table was changed
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from halfshell import _core
+
+STUB = Path(__file__).resolve().parents[1] / "python/halfshell/_core.pyi"
+BEGIN, END = "# ---- written by tests/core_stub.py\n", "# ---- end of what is written\n"
+
+#: What each argument is; one name means one thing in all functions. Others are `Any`.
+TYPES = {
+    "cutoff": "float", "max_distance": "float", "box": "_Floats | None", "periodic": "int",
+    "inclusive": "bool", "precision": "str", "kernel": "str | None",
+    "memory_limit": "float | None", "progress": "Callable[[float], object] | None",
+    "threads": "int | None", "quantities": "str", "sort": "bool", "index_dtype": "int",
+    "queries": "_Array | None", "reach": "_Reach", "algorithm": "str",
+    "shells": "_Floats | None", "capacity": "int | None", "batch": "_Batch | None",
+    "k": "int", "edges": "_Floats", "last_inclusive": "bool", "n_types": "int",
+    "types": "_Types", "query_types": "_Types", "weights": "_Floats | None",
+    "query_weights": "_Floats | None", "core": "npt.NDArray[np.bool_] | None", "winding": "bool",
+    "max_pairs": "int", "callback": "Callable[..., object] | int", "user_data": "int",
+    "thread_safe": "bool", "first": "int", "measure": "bool", "cell_size": "float",
+    "domain": "_Floats | None", "skin": "float", "rebuild": "bool",
+}  # fmt: skip
+
+#: What they return; others: an array or several.
+RETURNS = {
+    "count_pairs": "int | _Ints", "neighbors": "tuple[_Array, ...]", "coordination": "_Ints",
+    "iter_pairs": "Any", "for_each_pair": "tuple[int, int]", "histogram": "_Array",
+    "clusters": "tuple[int, _Ints, npt.NDArray[np.uint8] | None]", "explain": "dict[str, Any]",
+    "cells_build": "Any", "cells_candidates": "tuple[_Ints, ...]", "verlet_update": "bool",
+} | dict.fromkeys(
+    ("connect", "connect_search", "overlap", "intersect", "pair_rows", "keep_rows",
+     "rows_without"), "Any",
+)  # fmt: skip
+
+
+def signature(name: str, arguments: list[tuple[str, bool]]) -> str:
+    """One function, each argument on a line."""
+    lines = [f"def {name}(\n"]
+    if name.startswith("verlet_"):
+        lines.append("    list: Any,\n")
+    for k, (argument, _) in enumerate(arguments):
+        may_lack = all(lacks for _, lacks in arguments[k:])  # with all that follow
+        kind = TYPES.get(argument, "Any")
+        lines.append(f"    {argument}: {kind}{' = ...' if may_lack else ''},\n")
+    return "".join([*lines, f"    /,\n) -> {RETURNS.get(name, '_Arrays')}: ...\n"])
+
+
+def written() -> str:
+    """The functions of the table, in its order."""
+    return "".join(signature(name, core) for name, (core, _) in _core.table().items())
+
+
+def expected() -> str:
+    """The whole stub, as it should be."""
+    head, _, rest = STUB.read_text().partition(BEGIN)
+    return head + BEGIN + written() + "\n" + END + rest.partition(END)[2]
+
+
+if __name__ == "__main__":
+    if "--write" in sys.argv[1:]:
+        STUB.write_text(expected())
+    elif STUB.read_text() != expected():
+        sys.exit("_core.pyi is not what the table says: python tests/core_stub.py --write")
