@@ -126,8 +126,6 @@ def count_pairs(
 
 def counted(call: Call) -> int | npt.NDArray[np.int64]:
     """How many pairs are within the cutoff of a call, or within each of several."""
-    if call.points.batch is not None:
-        return _count_systems(call)
     cutoffs = call.shells
     if cutoffs is None:
         return _count(call)
@@ -142,44 +140,23 @@ def counted(call: Call) -> int | npt.NDArray[np.int64]:
     return np.array(counts, dtype=np.int64)
 
 
-def _count(call: Call) -> int:
-    if call.indices is not None:
-        from halfshell._convert.rows import pairs_of  # few calls need it
-
-        return len(pairs_of(call, "j", False, 4, None))
-    found = call.run(_core.count_pairs, call.pairing, call.settings.algorithm, call.asking)
-    return cast("int", found)
-
-
-def _count_systems(call: Call) -> npt.NDArray[np.int64]:
-    """Of each system of a batch."""
-    points, queries = call.points, call.queries
-    batch = points.batch
-    assert batch is not None and call.systems is not None
-    if call.system_cutoffs is None and points.box is None and len(batch):
+def _count(call: Call) -> int | npt.NDArray[np.int64]:
+    """Within one cutoff, or that of each system; of each system of a batch."""
+    points, batch = call.points, call.points.batch
+    if batch is not None and call.system_cutoffs is None and points.box is None and len(batch):
         last = int(batch[-1])
         if last > _MANY_SYSTEMS:
             refuse_unavailable(8 * (last + 1), f"counts of the systems up to {last} in batch")
-    n_systems = points.n_systems if call.system_cutoffs is None else len(call.system_cutoffs)
     if call.indices is not None:
         from halfshell._convert.rows import pairs_of  # few calls need it
 
         i = cast("npt.NDArray[Any]", pairs_of(call, "i", False, 4, None))
-        return np.bincount(batch[i], minlength=n_systems)
-    if queries is not None:
-        found = call.run(
-            _core.coordination, call.asking, call.pairing, call.settings.algorithm, call.systems
-        )
-        ends = np.concatenate([[0], np.cumsum(found)])
-        asked = queries.batch
-        assert asked is not None
-        if len(asked):
-            n_systems = max(n_systems, 1 + int(asked[-1]))
-        return np.diff(ends[np.searchsorted(asked, np.arange(n_systems + 1))])
-    counts = call.run(
-        _core.count_pairs, call.pairing, call.settings.algorithm, None, call.systems
-    )
-    return cast("npt.NDArray[np.int64]", counts)
+        if batch is None:
+            return len(i)
+        own = call.system_cutoffs
+        return np.bincount(batch[i], minlength=points.n_systems if own is None else len(own))
+    how = (call.pairing, call.settings.algorithm, call.asking, call.systems)
+    return cast("int | npt.NDArray[np.int64]", call.run(_core.count_pairs, *how))
 
 
 # ---- by distance ---------------------------------------------------------------------------
