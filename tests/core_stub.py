@@ -14,22 +14,17 @@ from pathlib import Path
 from halfshell import _core
 
 STUB = Path(__file__).resolve().parents[1] / "python/halfshell/_core.pyi"
+N_SHARED, LINE = 10, 100  # arguments of every search; characters
 BEGIN, END = "# ---- written by tests/core_stub.py\n", "# ---- end of what is written\n"
 
-#: What each argument is; one name means one thing in all functions. Others are `Any`.
+#: What each argument is, beyond those of every search; one name means one thing in all functions.
+#: Others are `Any`.
 TYPES = {
-    "cutoff": "float", "max_distance": "float", "box": "_Floats | None", "periodic": "int",
-    "inclusive": "bool", "precision": "str", "kernel": "str | None",
-    "memory_limit": "float | None", "progress": "Callable[[float], object] | None",
-    "threads": "int | None", "quantities": "str", "sort": "bool", "index_dtype": "int",
-    "queries": "_Array | None", "reach": "_Reach", "algorithm": "str",
-    "shells": "_Floats | None", "capacity": "int | None", "batch": "_Batch | None",
-    "k": "int", "edges": "_Floats", "last_inclusive": "bool", "n_types": "int",
-    "types": "_Types", "query_types": "_Types", "weights": "_Floats | None",
-    "query_weights": "_Floats | None", "core": "npt.NDArray[np.bool_] | None", "winding": "bool",
-    "max_pairs": "int", "callback": "Callable[..., object] | int", "user_data": "int",
-    "thread_safe": "bool", "first": "int", "measure": "bool", "cell_size": "float",
-    "domain": "_Floats | None", "skin": "float", "rebuild": "bool",
+    "quantities": "str", "sort": "bool", "index_dtype": "int", "k": "int", "edges": "_Floats",
+    "last_inclusive": "bool", "n_types": "int", "core": "npt.NDArray[np.bool_] | None",
+    "winding": "bool", "max_pairs": "int", "user_data": "int", "thread_safe": "bool",
+    "first": "int", "measure": "bool", "cell_size": "float", "domain": "_Floats | None",
+    "skin": "float", "rebuild": "bool",
 }  # fmt: skip
 
 #: What they return; others: an array or several.
@@ -45,15 +40,16 @@ RETURNS = {
 
 
 def signature(name: str, arguments: list[tuple[str, bool]]) -> str:
-    """One function, each argument on a line."""
-    lines = [f"def {name}(\n"]
-    if name.startswith("verlet_"):
-        lines.append("    list: Any,\n")
-    for k, (argument, _) in enumerate(arguments):
-        may_lack = all(lacks for _, lacks in arguments[k:])  # with all that follow
-        kind = TYPES.get(argument, "Any")
-        lines.append(f"    {argument}: {kind}{' = ...' if may_lack else ''},\n")
-    return "".join([*lines, f"    /,\n) -> {RETURNS.get(name, '_Arrays')}: ...\n"])
+    """One function: the arguments of every search, its own, and those that may be left out."""
+    own = arguments[N_SHARED:]
+    while own and own[-1][1]:
+        own = own[:-1]
+    rest = ["*_Rest"] if arguments[-1][1] else []
+    takes = ", ".join(["*_Search", *(TYPES.get(one, "Any") for one, _ in own), *rest])
+    text = f"def {name}(*arguments: *tuple[{takes}]) -> {RETURNS.get(name, '_Arrays')}: ..."
+    if len(text) > LINE:
+        text = text.replace("(*arg", "(\n    *arg").replace(") ->", ",\n) ->")
+    return text + "\n"
 
 
 def written() -> str:

@@ -1,11 +1,18 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* arguments.c: numbers first, views last. What is taken when is the order of hs_py_call_take. */
+/*
+ * arguments.c: numbers first, views last. What is taken when is the order of hs_py_call_take.
+ *
+ * Of users only that is taken which is harmless: exact types of Python and NumPy, whose conversion
+ * runs no code of others, with exactly the values that _convert/ makes of it.
+ */
 #include "arguments.h"
 
 #include "errors.h"
 #include "outputs.h"
+#include "py_functions.h"
 #include "system.h"
 
+#include <numpy/arrayscalars.h>
 #include <math.h>
 #include <string.h>
 
@@ -17,7 +24,14 @@
  * is kept until the first poll. */
 #define FEW_POINTS 256
 
-/* ---- one argument ------------------------------------------------------------------------- */
+/* Bytes of a conversion from which _convert/ first looks what the machine has left. */
+#define SMALL ((npy_intp)1 << 26)
+
+#define BIGGEST_INTEGER (INT64_C(1) << 53) /* up to here float64 holds every integer */
+
+#define MOST_COUNT (INT64_C(1) << 56) /* more than fits in any memory */
+
+/* ---- arrays as the core takes them -------------------------------------------------------- */
 
 bool
 hs_is_array(PyObject *object, int type, int n_axes)
@@ -65,19 +79,12 @@ hs_points_of(PyObject *object, const char *name, hs_points *points)
     }
     PyArrayObject *array = (PyArrayObject *)object;
     const int      type = PyArray_TYPE(array);
-    if ((type != NPY_FLOAT && type != NPY_DOUBLE) || PyArray_ISBYTESWAPPED(array)) {
-        PyErr_Format(PyExc_TypeError, "%s must be native float32 or float64", name);
-        return false;
-    }
-    if (PyArray_NDIM(array) != 2) {
-        PyErr_Format(PyExc_ValueError, "%s must have shape (n, d), got %d dimension%s", name,
-                     PyArray_NDIM(array), PyArray_NDIM(array) == 1 ? "" : "s");
-        return false;
-    }
-    const npy_intp d = PyArray_DIM(array, 1);
-    if (d < 1 || d > HS_MAX_DIM) {
-        PyErr_Format(PyExc_ValueError, "%s must have shape (n, d) with 1 <= d <= %d, got d = %zd",
-                     name, HS_MAX_DIM, (Py_ssize_t)d);
+    const npy_intp d = PyArray_NDIM(array) == 2 ? PyArray_DIM(array, 1) : 0;
+    if ((type != NPY_FLOAT && type != NPY_DOUBLE) || PyArray_ISBYTESWAPPED(array) || d < 1 ||
+        d > HS_MAX_DIM) {
+        PyErr_Format(PyExc_TypeError,
+                     "%s must be native float32 or float64 of shape (n, d) with 1 <= d <= %d", name,
+                     HS_MAX_DIM);
         return false;
     }
     *points = (hs_points){.data = PyArray_DATA(array),
@@ -128,30 +135,364 @@ hs_box_of(PyObject *object, unsigned long repeats, int ndim, hs_box *box, bool *
     return true;
 }
 
-/* None or a string; the string borrows from the object. */
+/* ---- numbers and sequences ---------------------------------------------------------------- */
+
+/* A float or a small integer, of Python itself or NumPy's float64. */
 static bool
-take_name(PyObject *object, const char *argument, const char **name)
+number_of(PyObject *object, double *value)
 {
-    *name = NULL;
+    if (PyFloat_CheckExact(object)) {
+        *value = PyFloat_AS_DOUBLE(object);
+        return true;
+    }
+    if (PyLong_CheckExact(object)) {
+        int             overflow;
+        const long long whole = PyLong_AsLongLongAndOverflow(object, &overflow);
+        *value = (double)whole;
+        return overflow == 0 && whole >= -BIGGEST_INTEGER && whole <= BIGGEST_INTEGER;
+    }
+    if (Py_TYPE(object) == &PyDoubleArrType_Type) {
+        *value = PyArrayScalar_VAL(object, Double);
+        return true;
+    }
+    return false;
+}
+
+/* The same, or another number of NumPy. */
+static bool
+scalar_of(PyObject *object, double *value)
+{
+    const PyTypeObject *type = Py_TYPE(object);
+    int64_t             whole;
+    if (number_of(object, value)) {
+        return true;
+    }
+    if (type == &PyFloatArrType_Type) {
+        *value = (double)PyArrayScalar_VAL(object, Float);
+        return true;
+    }
+    if (type == &PyIntArrType_Type) {
+        whole = PyArrayScalar_VAL(object, Int);
+    } else if (type == &PyLongArrType_Type) {
+        whole = PyArrayScalar_VAL(object, Long);
+    } else if (type == &PyLongLongArrType_Type) {
+        whole = PyArrayScalar_VAL(object, LongLong);
+    } else {
+        return false;
+    }
+    *value = (double)whole;
+    return whole >= -BIGGEST_INTEGER && whole <= BIGGEST_INTEGER;
+}
+
+static bool
+truth_of(PyObject *object, bool *value)
+{
+    *value = object == Py_True || object == PyArrayScalar_True;
+    return *value || object == Py_False || object == PyArrayScalar_False;
+}
+
+static bool
+is_sequence(PyObject *object)
+{
+    return PyList_CheckExact(object) || PyTuple_CheckExact(object);
+}
+
+/* A new reference, or NULL, without an exception, behind the end: others may shorten a list. */
+static PyObject *
+item_of(PyObject *sequence, Py_ssize_t k)
+{
+#if PY_VERSION_HEX >= 0x030d0000
+    if (PyList_CheckExact(sequence)) {
+        PyObject *item = PyList_GetItemRef(sequence, k);
+        if (item == NULL) {
+            PyErr_Clear();
+        }
+        return item;
+    }
+#endif
+    return k < PySequence_Fast_GET_SIZE(sequence) ? Py_NewRef(PySequence_Fast_GET_ITEM(sequence, k))
+                                                  : NULL;
+}
+
+/* The entries of a list or tuple, or of a short array with one axis, as one of the former: a new
+ * reference; NULL for all else. */
+static PyObject *
+entries_of(PyObject *object)
+{
+    const bool is_row = PyArray_CheckExact(object) && PyArray_NDIM((PyArrayObject *)object) == 1 &&
+                        PyArray_DIM((PyArrayObject *)object, 0) <= HS_MAX_DIM;
+    return is_row ? PySequence_List(object) : is_sequence(object) ? Py_NewRef(object) : NULL;
+}
+
+bool
+hs_numbers_of(PyObject *object, npy_intp n, double *values)
+{
+    if (PyArray_CheckExact(object) && hs_is_array(object, NPY_DOUBLE, 1) &&
+        hs_length_of(object) == n) {
+        memcpy(values, PyArray_DATA((PyArrayObject *)object), (size_t)n * sizeof *values);
+        return true;
+    }
+    PyObject *row = entries_of(object);
+    bool      are_numbers = row != NULL && PySequence_Fast_GET_SIZE(row) == n;
+    for (npy_intp k = 0; are_numbers && k < n; k++) {
+        PyObject *item = item_of(row, k);
+        are_numbers = item != NULL && number_of(item, &values[k]);
+        Py_XDECREF(item);
+    }
+    Py_XDECREF(row);
+    return are_numbers;
+}
+
+/* n rows of as many numbers each, with those of the next row so many further on. */
+static bool
+rows_of(PyObject *rows, Py_ssize_t n, npy_intp width, npy_intp stride, double *values)
+{
+    bool are_rows = true;
+    for (Py_ssize_t k = 0; are_rows && k < n; k++) {
+        PyObject *row = item_of(rows, k);
+        are_rows = row != NULL && hs_numbers_of(row, width, values + k * stride);
+        Py_XDECREF(row);
+    }
+    return are_rows;
+}
+
+/* How many entries the first row has; -1 where it is none. */
+static npy_intp
+width_of(PyObject *rows)
+{
+    PyObject      *row = item_of(rows, 0), *first = row != NULL ? entries_of(row) : NULL;
+    const npy_intp n = first != NULL ? PySequence_Fast_GET_SIZE(first) : -1;
+    Py_XDECREF(first);
+    Py_XDECREF(row);
+    return n;
+}
+
+/* An object that views borrow from, kept until the call ends; takes the reference. */
+static bool
+keep(hs_py_call *call, PyObject *made)
+{
+    if (made != NULL) {
+        call->made[call->n_made++] = made;
+    }
+    return made != NULL;
+}
+
+/* ---- points ------------------------------------------------------------------------------- */
+
+/* Whether float64 holds exactly what these were, which are the nearest to integers of 64 bits. */
+static bool
+are_exact(PyArrayObject *array)
+{
+    const double  *values = PyArray_DATA(array);
+    const npy_intp n = PyArray_SIZE(array);
+    for (npy_intp k = 0; k < n; k++) {
+        if (!(values[k] < (double)BIGGEST_INTEGER && values[k] > -(double)BIGGEST_INTEGER)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* An array of real numbers as one of native float64, and C-contiguous if it is a box; or else of
+ * float32 where it has these. Itself if it is one. */
+static bool
+native_of(hs_py_call *call, PyObject **object, bool is_box)
+{
+    PyArrayObject *array = (PyArrayObject *)*object;
+    const int      type = PyArray_TYPE(array);
+    const bool     is_float32 = type == NPY_FLOAT && !is_box;
+    if (is_box ? type == NPY_DOUBLE && PyArray_ISCARRAY_RO(array)
+               : (is_float32 || type == NPY_DOUBLE) && !PyArray_ISBYTESWAPPED(array)) {
+        return true;
+    }
+    if ((type != NPY_DOUBLE && type != NPY_FLOAT && type != NPY_HALF && type != NPY_BOOL &&
+         !PyTypeNum_ISINTEGER(type)) ||
+        PyArray_SIZE(array) > SMALL / (npy_intp)sizeof(double)) {
+        return false;
+    }
+    const bool is_wide = PyTypeNum_ISINTEGER(type) && PyArray_ITEMSIZE(array) > 4;
+    *object = PyArray_FROMANY(*object, is_float32 ? NPY_FLOAT : NPY_DOUBLE, 1, 2,
+                              NPY_ARRAY_CARRAY_RO | NPY_ARRAY_FORCECAST);
+    return keep(call, *object) && (!is_wide || are_exact((PyArrayObject *)*object));
+}
+
+/* Points as users give them, as an array that hs_points_of takes. */
+static bool
+plain_points(hs_py_call *call, PyObject **object)
+{
+    if (PyArray_CheckExact(*object)) {
+        PyArrayObject *array = (PyArrayObject *)*object;
+        return PyArray_NDIM(array) == 2 && PyArray_DIM(array, 0) <= INT32_MAX &&
+               PyArray_DIM(array, 1) >= 1 && PyArray_DIM(array, 1) <= HS_MAX_DIM &&
+               native_of(call, object, false);
+    }
+    npy_intp  shape[2] = {0, -1};
+    PyObject *rows = *object;
+    if (is_sequence(rows)) {
+        shape[0] = PySequence_Fast_GET_SIZE(rows);
+        shape[1] = width_of(rows);
+    }
+    if (shape[1] < 1 || shape[1] > HS_MAX_DIM ||
+        shape[0] > SMALL / (npy_intp)sizeof(double) / shape[1]) {
+        return false;
+    }
+    *object = PyArray_SimpleNew(2, shape, NPY_DOUBLE);
+    return keep(call, *object) &&
+           rows_of(rows, shape[0], shape[1], shape[1], PyArray_DATA((PyArrayObject *)*object));
+}
+
+static bool
+take_points(hs_py_call *call, PyObject *object, const char *name, hs_points *points,
+            PyObject **array)
+{
+    if (call->is_of_users && !plain_points(call, &object)) {
+        return false;
+    }
+    *array = object;
+    return hs_points_of(object, name, points);
+}
+
+/* ---- the box, and axes that repeat -------------------------------------------------------- */
+
+/* An array or Box, rows, lengths, or one for all edges. */
+static bool
+take_plain_box(hs_py_call *call, PyObject *object, double (*rows)[HS_MAX_DIM])
+{
+    double     length, lengths[HS_MAX_DIM];
+    const int  d = call->points.at.ndim;
+    PyObject **known = PyModule_GetState(call->module);
+    if (known[HS_BOX_TYPE] == (PyObject *)Py_TYPE(object)) {
+        object = PyObject_GetAttrString(object, "_vectors");
+        if (!keep(call, object)) {
+            return false;
+        }
+    }
+    if (PyArray_CheckExact(object)) {
+        PyArrayObject *array = (PyArrayObject *)object;
+        const int      n_axes = PyArray_NDIM(array);
+        bool           given;
+        return (n_axes == 1 || n_axes == 2) && PyArray_DIM(array, 0) == d &&
+               PyArray_DIM(array, n_axes - 1) == d && native_of(call, &object, true) &&
+               hs_box_of(object, 0, d, &call->box, &given);
+    }
+    const bool is_one = scalar_of(object, &length);
+    memset(rows, 0, (size_t)d * sizeof *rows);
+    if (!is_one && is_sequence(object) && PySequence_Fast_GET_SIZE(object) == d &&
+        width_of(object) >= 0) {
+        return rows_of(object, d, d, HS_MAX_DIM, rows[0]);
+    }
+    if (!is_one && (!is_sequence(object) || !hs_numbers_of(object, d, lengths))) {
+        return false;
+    }
+    for (int l = 0; l < d; l++) {
+        rows[l][l] = is_one ? length : lengths[l];
+    }
+    return true;
+}
+
+/* The box of all, or boxes of systems, in place of which it then has any rows. */
+static bool
+take_box(hs_py_call *call, PyObject *object)
+{
+    PyArrayObject *array = (PyArrayObject *)object;
+    const int      d = call->points.at.ndim;
+    bool           given;
     if (object == Py_None) {
         return true;
     }
-    if (!PyUnicode_Check(object)) {
-        PyErr_Format(PyExc_TypeError, "%s must be a string or None, got %s", argument,
-                     Py_TYPE(object)->tp_name);
+    call->among.box = &call->box;
+    if (call->is_of_users) {
+        if (!take_plain_box(call, object, call->box.rows)) {
+            return false;
+        }
+    } else if (PyArray_Check(object) && PyArray_NDIM(array) == 3) {
+        if (!hs_is_array(object, NPY_DOUBLE, 3) || PyArray_DIM(array, 1) != d ||
+            PyArray_DIM(array, 2) != d) {
+            PyErr_Format(PyExc_ValueError, "box must be a float64 array of shape (s, %d, %d)", d,
+                         d);
+            return false;
+        }
+        call->each.rows = PyArray_DATA(array);
+        for (int l = 0; l < d * HS_MAX_DIM; l++) {
+            call->box.rows[l / HS_MAX_DIM][l % HS_MAX_DIM] = l % (HS_MAX_DIM + 1) == 0 ? 1.0 : 0.0;
+        }
+    } else if (!hs_box_of(object, 0, d, &call->box, &given)) {
         return false;
     }
-    Py_ssize_t length;
-    *name = PyUnicode_AsUTF8AndSize(object, &length);
-    if (*name == NULL && PyErr_ExceptionMatches(PyExc_UnicodeError)) {
+    call->box.ndim = d;
+    for (int l = 0; l < d; l++) {
+        call->box.periodic[l] = (call->repeats >> l & 1) != 0;
+    }
+    return true;
+}
+
+/* None, a bool, or d of them, which may be 0 and 1. Without a box they are an error unless none
+ * repeats. */
+static bool
+take_plain_periodic(hs_py_call *call, PyObject *object, bool has_box)
+{
+    const int           d = call->points.at.ndim;
+    const unsigned long all = (1ul << d) - 1;
+    bool                one, is_plain = true;
+    call->repeats = 0;
+    if (object == Py_None) {
+        call->repeats = has_box ? all : 0;
+    } else if (truth_of(object, &one)) {
+        call->repeats = one ? all : 0;
+    } else {
+        PyObject *row = entries_of(object);
+        is_plain = row != NULL && PySequence_Fast_GET_SIZE(row) == d;
+        for (int l = 0; is_plain && l < d; l++) {
+            PyObject *item = item_of(row, l);
+            double    number = -1.0;
+            is_plain = item != NULL && (truth_of(item, &one) ||
+                                        (PyLong_CheckExact(item) && number_of(item, &number) &&
+                                         (number == 0.0 || number == 1.0)));
+            call->repeats |= (unsigned long)(number == 1.0 || (number < 0.0 && one)) << l;
+            Py_XDECREF(item);
+        }
+        Py_XDECREF(row);
+    }
+    return is_plain && (has_box || call->repeats == 0);
+}
+
+/* Bits; or bits of each system, and then all axes of the box that they share. */
+static bool
+take_periodic(hs_py_call *call, PyObject *object, bool has_box)
+{
+    if (call->is_of_users) {
+        return take_plain_periodic(call, object, has_box);
+    }
+    if (!PyArray_Check(object)) {
+        return hs_repeats_of(object, &call->repeats);
+    }
+    if (!hs_is_array(object, NPY_UINT8, 1)) {
+        PyErr_SetString(PyExc_TypeError, "periodic must be bits, or a uint8 array of them");
+        return false;
+    }
+    /* In open space the axes only tell how many systems there are. */
+    call->each.periodic = has_box ? PyArray_DATA((PyArrayObject *)object) : NULL;
+    call->repeats = has_box ? (1ul << call->points.at.ndim) - 1 : 0;
+    return true;
+}
+
+/* ---- numbers, flags and names ------------------------------------------------------------- */
+
+/* A string that borrows from the object; NULL with an exception set, or without one. */
+static const char *
+text_of(PyObject *object, const char *argument)
+{
+    Py_ssize_t  length;
+    const char *text = PyUnicode_Check(object) ? PyUnicode_AsUTF8AndSize(object, &length) : NULL;
+    if (text == NULL && PyErr_Occurred() && PyErr_ExceptionMatches(PyExc_UnicodeError)) {
         PyErr_Clear();
         PyErr_Format(PyExc_ValueError, "%s must not contain lone surrogates", argument);
     }
-    if (*name != NULL && strlen(*name) != (size_t)length) {
+    if (text != NULL && strlen(text) != (size_t)length) {
         PyErr_Format(PyExc_ValueError, "%s must not contain null characters", argument);
-        return false;
+        return NULL;
     }
-    return *name != NULL;
+    return text;
 }
 
 /* The bit of a letter of HS_LETTERS is its HS_WANT_ bit. */
@@ -186,7 +527,8 @@ take_quantities(PyObject *object, const char *known, const char **letters, unsig
                      Py_TYPE(object)->tp_name);
         return false;
     }
-    if (!take_name(object, "quantities", letters)) {
+    *letters = text_of(object, "quantities");
+    if (*letters == NULL) {
         return false;
     }
     for (const char *letter = *letters; *letter != '\0'; letter++) {
@@ -205,25 +547,24 @@ take_quantities(PyObject *object, const char *known, const char **letters, unsig
     return seen != 0;
 }
 
-/* The number of the name that it is; -1 with an exception that says what it must be. */
+/* The number of the name that it is, or -1. */
 static int
-number_of_name(PyObject *object, const char *const *names, int n, const char *must_be)
+number_of_name(PyObject *object, const char *const *names, int n)
 {
     for (int k = 0; PyUnicode_Check(object) && k < n; k++) {
         if (PyUnicode_CompareWithASCIIString(object, names[k]) == 0) {
             return k;
         }
     }
-    hs_refuse(PyUnicode_Check(object) ? PyExc_ValueError : PyExc_TypeError, must_be, object);
     return -1;
 }
 
+/* The next four are what halfshell.settings has checked. */
 static bool
 take_precision(PyObject *object, hs_precision *precision)
 {
     static const char *const names[] = {"exact", "double", "single"};
-    const int                k =
-        number_of_name(object, names, 3, "precision must be 'exact', 'double' or 'single'");
+    const int                k = number_of_name(object, names, 3);
     *precision = k >= 0 ? (hs_precision)k : HS_EXACT;
     return k >= 0;
 }
@@ -236,9 +577,7 @@ const char *const hs_algorithm_names[HS_ALGORITHM_END] = {
 static bool
 take_algorithm(PyObject *object, hs_algorithm *algorithm)
 {
-    const int k =
-        number_of_name(object, hs_algorithm_names, HS_ALGORITHM_END,
-                       "algorithm must be 'auto', 'all-pairs', 'grid', 'hash' or 'hierarchy'");
+    const int k = number_of_name(object, hs_algorithm_names, HS_ALGORITHM_END);
     *algorithm = k >= 0 ? (hs_algorithm)k : HS_AUTO;
     return k >= 0;
 }
@@ -250,15 +589,15 @@ take_memory_limit(PyObject *object, hs_options *options)
         options->find_limit = hs_available_memory;
         return true;
     }
-    if (!hs_real_of(object, "memory_limit must be a number of bytes", &options->memory_limit)) {
-        return false;
-    }
-    if (!(options->memory_limit >= 0.0)) {
-        hs_refuse(PyExc_ValueError, "memory_limit must be a number of bytes", object);
-        return false;
-    }
-    options->memory_limit = fabs(options->memory_limit); /* -0.0 is 0 in messages, too */
-    return true;
+    return number_of(object, &options->memory_limit) && options->memory_limit >= 0.0;
+}
+
+/* None is what the environment says. */
+static bool
+take_kernel(PyObject *object, const char **kernel)
+{
+    *kernel = object == Py_None ? hs_environment_kernel() : text_of(object, "kernel");
+    return object == Py_None || *kernel != NULL;
 }
 
 /* A number, or 0 for None: what that means depends on the points. */
@@ -285,126 +624,318 @@ take_threads(PyObject *object, hs_options *options)
     return true;
 }
 
+/* A length; where users give an infinite one as cutoff, a finite one is found that holds all pairs.
+ * Of the core also an array of one for each system. */
 static bool
-take_truth(PyObject *object, bool *value)
+take_cutoff(hs_py_call *call, PyObject *object, bool is_largest)
 {
-    const int truth = PyObject_IsTrue(object);
-    *value = truth > 0;
-    return truth >= 0;
-}
-
-/* None is what the environment says. */
-static bool
-take_kernel(PyObject *object, const char **kernel)
-{
-    if (object == Py_None) {
-        *kernel = hs_environment_kernel();
+    const double endless = (double)INFINITY;
+    double      *cutoff = &call->options.cutoff;
+    if (!call->is_of_users && PyArray_Check(object)) {
+        *cutoff = 0.0;
         return true;
     }
-    return take_name(object, "kernel", kernel);
+    if (PyFloat_Check(object)) {
+        *cutoff = PyFloat_AS_DOUBLE(object);
+    } else if (!scalar_of(object, cutoff)) {
+        return false;
+    }
+    /* Bits are compared, as a subnormal number may be a trap. */
+    return !call->is_of_users ||
+           (is_largest ? *cutoff >= 0.0 : memcmp(cutoff, &endless, sizeof endless) != 0);
 }
 
-static bool
-take_integer(PyObject *object, int64_t *value)
+/* numpy.int32 or numpy.int64, a dtype of these, or a name of them. */
+static int
+type_of_index(PyObject *object)
 {
-    *value = PyLong_AsLongLong(object);
-    return *value != -1 || !PyErr_Occurred();
+    if (object == (PyObject *)&PyInt64ArrType_Type) {
+        return NPY_INT64;
+    }
+    if (object == (PyObject *)&PyInt32ArrType_Type) {
+        return NPY_INT32;
+    }
+    if (PyArray_DescrCheck(object) && PyArray_ISNBO(((PyArray_Descr *)object)->byteorder)) {
+        return ((PyArray_Descr *)object)->type_num;
+    }
+    const bool is_name = PyUnicode_CheckExact(object);
+    return is_name && PyUnicode_CompareWithASCIIString(object, "int64") == 0   ? NPY_INT64
+           : is_name && PyUnicode_CompareWithASCIIString(object, "int32") == 0 ? NPY_INT32
+                                                                               : NPY_NOTYPE;
 }
 
+/* The same, or of the core bytes. */
 static bool
-take_index_bytes(PyObject *object, int *bytes)
+take_index(hs_py_call *call, PyObject *object)
 {
-    *bytes = (int)PyLong_AsLong(object);
-    return *bytes != -1 || !PyErr_Occurred();
+    int *bytes = &call->options.index_bytes;
+    if (!call->is_of_users) {
+        *bytes = PyLong_CheckExact(object) ? (int)PyLong_AsLong(object) : 0;
+        return *bytes > 0;
+    }
+    const int type = type_of_index(object);
+    *bytes = type == NPY_INT64 ? 8 : 4;
+    return type == NPY_INT64 || type == NPY_INT32;
 }
 
-/* The number is not compared, which might trap. */
+/* An integer; those that users give are counts. */
 static bool
-take_real(PyObject *object, double *value)
+take_integer(hs_py_call *call, PyObject *object, int64_t *value)
 {
-    *value = PyFloat_AsDouble(object);
-    return !PyErr_Occurred();
+    int overflow = 0;
+    *value = PyLong_CheckExact(object) ? PyLong_AsLongLongAndOverflow(object, &overflow) : 0;
+    return PyLong_CheckExact(object) && overflow == 0 &&
+           (!call->is_of_users || (*value >= 1 && *value <= MOST_COUNT));
 }
 
-/* A number, flag or name; true for what is none. */
+/* A number, flag or name; true also for what is none. */
 static bool
-take_number(hs_kind kind, PyObject *object, hs_py_call *call)
+take_number(hs_py_call *call, hs_kind kind, PyObject *object)
 {
-    hs_options *options = &call->options;
+    hs_options  *options = &call->options;
+    const char **letters = &call->letters;
     switch (kind) {
-    case HS_ARG_CUTOFF: return take_real(object, &options->cutoff);
-    case HS_ARG_INCLUSIVE: return take_truth(object, &options->inclusive);
+    case HS_ARG_CUTOFF: return take_cutoff(call, object, false);
+    case HS_ARG_MAX_DISTANCE: return take_cutoff(call, object, true);
+    case HS_ARG_INCLUSIVE: return truth_of(object, &options->inclusive);
     case HS_ARG_PRECISION: return take_precision(object, &options->precision);
     case HS_ARG_KERNEL: return take_kernel(object, &options->kernel);
     case HS_ARG_MEMORY_LIMIT: return take_memory_limit(object, options);
-    case HS_ARG_PROGRESS: call->progress = object == Py_None ? NULL : object; return true;
+    case HS_ARG_PROGRESS:
+        call->progress = object == Py_None ? NULL : object;
+        return object == Py_None || PyCallable_Check(object);
     case HS_ARG_THREADS: return take_threads(object, options);
-    case HS_ARG_QUANTITIES:
-        return take_quantities(object, HS_ALL_LETTERS, &call->letters, &options->want);
+    case HS_ARG_QUANTITIES: return take_quantities(object, HS_ALL_LETTERS, letters, &options->want);
     case HS_ARG_SHELL_QUANTITIES:
-        return take_quantities(object, HS_LETTERS, &call->letters, &options->want);
+        return take_quantities(object, HS_LETTERS, letters, &options->want);
     case HS_ARG_ROW_QUANTITIES:
-        return take_quantities(object, HS_ROW_LETTERS, &call->letters, &options->want);
+        return take_quantities(object, HS_ROW_LETTERS, letters, &options->want);
     case HS_ARG_SHELL_ROW_QUANTITIES:
-        return take_quantities(object, HS_SHELL_ROW_LETTERS, &call->letters, &options->want);
-    case HS_ARG_SORT: return take_truth(object, &options->sorted);
-    case HS_ARG_INDEX: return take_index_bytes(object, &options->index_bytes);
-    case HS_ARG_FLAG: return take_truth(object, &call->flag);
-    case HS_ARG_INTEGER: return take_integer(object, &call->integer);
-    case HS_ARG_REAL: return take_real(object, &call->real);
+        return take_quantities(object, HS_SHELL_ROW_LETTERS, letters, &options->want);
+    case HS_ARG_SORT: return truth_of(object, &options->sorted);
+    case HS_ARG_INDEX: return take_index(call, object);
+    case HS_ARG_FLAG: return truth_of(object, &call->flag);
+    case HS_ARG_INTEGER: return take_integer(call, object, &call->integer);
+    case HS_ARG_REAL: return number_of(object, &call->real);
     case HS_ARG_ALGORITHM: return take_algorithm(object, &options->algorithm);
-    case HS_ARG_CAPACITY: return object == Py_None || take_integer(object, &call->capacity);
+    case HS_ARG_CAPACITY: return object == Py_None || take_integer(call, object, &call->capacity);
     default: return true;
     }
 }
 
-/* Points and box: arrays, or what cells hold. */
+/* ---- sets of points, and what pairs them -------------------------------------------------- */
+
+/* What the core's tuple of a set has behind the positions, for each point. */
+static const struct {
+    int    type, n_axes;
+    size_t member; /* of hs_set */
+} KNOWN[] = {
+    {NPY_DOUBLE, 1, offsetof(hs_set, radii)}, {NPY_DOUBLE, 3, offsetof(hs_set, supports)},
+    {NPY_INT32, 1, offsetof(hs_set, types)},  {NPY_DOUBLE, 1, offsetof(hs_set, weights)},
+    {NPY_INT64, 1, offsetof(hs_set, groups)}, {NPY_INT64, 1, offsetof(hs_set, labels)},
+};
+
+enum { N_KNOWN = sizeof KNOWN / sizeof KNOWN[0], N_PARTS = N_KNOWN + 2 };
+
+/* The parts of a set: an array, or a tuple of positions, what is known, and numbers of systems. */
 static bool
-take_scene(PyObject *points, PyObject *box, unsigned long repeats, hs_py_call *call)
+parts_of(PyObject **object, PyObject *const **known)
 {
-    hs_among *among = &call->among;
-    bool      has_box;
-    among->points = &call->points;
-    among->cells = hs_cells_of(points);
-    if (among->cells != NULL) {
-        hs_cells_points(among->cells, &call->points.at);
+    *known = NULL;
+    if (!PyTuple_CheckExact(*object)) {
+        return true;
+    }
+    if (PyTuple_GET_SIZE(*object) != N_PARTS) {
+        PyErr_Format(PyExc_TypeError, "a set of points is a tuple of %d", N_PARTS);
+        return false;
+    }
+    *known = &PyTuple_GET_ITEM(*object, 1);
+    *object = PyTuple_GET_ITEM(*object, 0);
+    return true;
+}
+
+static bool
+take_known(PyObject *const *known, hs_set *set)
+{
+    for (int k = 0; known != NULL && k < N_KNOWN; k++) {
+        const void *entries;
+        if (!hs_entries_of(known[k], KNOWN[k].type, KNOWN[k].n_axes, set->at.n, set->at.ndim,
+                           "what is known of points must be arrays of an entry for each",
+                           &entries)) {
+            return false;
+        }
+        memcpy((char *)set + KNOWN[k].member, &entries, sizeof entries);
+    }
+    return true;
+}
+
+/* A rule, or None where the cutoff is that of all pairs; extent, or None; and table. */
+static bool
+take_reach(PyObject *const *of, hs_py_call *call)
+{
+    const hs_set *points = &call->points, *queries = &call->queries;
+    const void   *table;
+    const int64_t n_types = of[2] != Py_None && PyArray_Check(of[2]) ? hs_length_of(of[2]) : 0;
+    if (of[0] == Py_None) {
+        return true;
+    }
+    const long rule = PyLong_CheckExact(of[0]) ? PyLong_AsLong(of[0]) : -1;
+    if (rule < 0 || rule >= HS_RULE_END) {
+        PyErr_Clear(); /* of a number that is no long */
+        PyErr_SetString(PyExc_ValueError, "there is no such rule");
+        return false;
+    }
+    if (of[1] != Py_None && !PyFloat_CheckExact(of[1])) {
+        PyErr_SetString(PyExc_TypeError, "extent must be a float");
+        return false;
+    }
+    if (!hs_entries_of(of[2], NPY_DOUBLE, 2, n_types, n_types,
+                       "the table of cutoffs must be a square float64 array", &table)) {
+        return false;
+    }
+    call->among.reach = &call->reach;
+    call->reach = (hs_reach){.rule = (hs_rule)rule,
+                             .n_types = (int32_t)n_types,
+                             .cutoffs = table,
+                             .has_supports = points->supports != NULL || queries->supports != NULL,
+                             .extent = of[1] != Py_None ? PyFloat_AS_DOUBLE(of[1]) : 0.0};
+    return true;
+}
+
+/* By how much labels differ at most, or None; excluded pairs; numbers of queries that are points;
+ * and the least distance. */
+static bool
+take_selection(PyObject *const *of, hs_py_call *call)
+{
+    const hs_set   *points = &call->points, *queries = &call->queries;
+    const void     *numbers, *excluded;
+    const long long within = PyLong_CheckExact(of[0]) ? PyLong_AsLongLong(of[0]) : 0;
+    if ((of[0] != Py_None && !PyLong_CheckExact(of[0])) || !PyFloat_CheckExact(of[3])) {
+        PyErr_SetString(PyExc_TypeError, "a pairing has an int or None, and a float");
+        return false;
+    }
+    if (within < 0) {
+        PyErr_Clear(); /* of a number that is no long long */
+        PyErr_SetString(PyExc_ValueError, "labels cannot differ by so much");
+        return false;
+    }
+    if (!hs_entries_of(of[1], NPY_INT64, 2, -1, 2, "excluded must be an int64 array of two columns",
+                       &excluded) ||
+        !hs_entries_of(of[2], NPY_INT64, 1, queries->at.n, 0,
+                       "numbers must be an int64 array of one for each query", &numbers)) {
+        return false;
+    }
+    call->selection =
+        (hs_selection){.has_groups = points->groups != NULL || queries->groups != NULL,
+                       .has_labels = of[0] != Py_None,
+                       .query_numbers = numbers,
+                       .within = within,
+                       .n_excluded = hs_length_of(of[1]),
+                       .excluded = excluded,
+                       .min_distance = PyFloat_AS_DOUBLE(of[3])};
+    const bool selects = call->selection.has_groups || call->selection.has_labels ||
+                         excluded != NULL || call->selection.min_distance > 0.0;
+    call->among.selection = selects ? &call->selection : NULL;
+    return true;
+}
+
+/* None, or a tuple of these seven. */
+static bool
+take_pairing(PyObject *object, hs_py_call *call)
+{
+    if (!PyTuple_Check(object) || PyTuple_GET_SIZE(object) != 7) {
+        PyErr_SetString(PyExc_TypeError, "a pairing is None or a tuple of seven");
+        return false;
+    }
+    PyObject *const *of = &PyTuple_GET_ITEM(object, 0);
+    return take_reach(of, call) && take_selection(of + 3, call);
+}
+
+/* ---- scenes ------------------------------------------------------------------------------- */
+
+/* The value of an attribute, kept until the call ends; borrowed, or NULL. */
+static PyObject *
+attribute_of(hs_py_call *call, PyObject *object, const char *name)
+{
+    PyObject *value = PyObject_GetAttrString(object, name);
+    return keep(call, value) ? value : NULL;
+}
+
+/* Of users: Points that know nothing more than where they are, and their box, which then is that of
+ * the call. */
+static bool
+open_points(hs_py_call *call, PyObject **points, PyObject **box, PyObject **periodic)
+{
+    static const char *const others[] = {"radii", "supports", "batch", "_groups"};
+    PyObject               **known = PyModule_GetState(call->module), *opened = *points;
+    if (known[HS_POINTS_TYPE] != (PyObject *)Py_TYPE(opened)) {
+        return true;
+    }
+    for (size_t k = 0; k < sizeof others / sizeof others[0]; k++) {
+        if (attribute_of(call, opened, others[k]) != Py_None) {
+            return false;
+        }
+    }
+    if (*box != Py_None || *periodic != Py_None) {
+        return false;
+    }
+    *points = attribute_of(call, opened, "positions");
+    *box = *points != NULL ? attribute_of(call, opened, "_box") : NULL;
+    PyObject *axes = *box != NULL ? attribute_of(call, opened, "_axes") : NULL;
+    *periodic = NULL;
+    return axes != NULL && hs_repeats_of(axes, &call->repeats);
+}
+
+bool
+hs_py_call_scene(hs_py_call *call, PyObject *points, PyObject *box, PyObject *periodic)
+{
+    call->among.points = &call->points;
+    call->among.cells = call->is_of_users ? NULL : hs_cells_of(points);
+    if (call->among.cells != NULL) {
+        call->positions = points;
+        hs_cells_points(call->among.cells, &call->points.at);
         call->points.at.data = NULL;
         return true;
     }
-    if (!hs_points_of(points, "points", &call->points.at) ||
-        !hs_box_of(box, repeats, call->points.at.ndim, &call->box, &has_box)) {
-        return false;
-    }
-    among->box = has_box ? &call->box : NULL;
-    return true;
+    return (!call->is_of_users || open_points(call, &points, &box, &periodic)) &&
+           take_points(call, points, "points", &call->points.at, &call->positions) &&
+           (periodic == NULL || take_periodic(call, periodic, box != Py_None)) &&
+           take_box(call, box);
 }
 
 static bool
-take_queries(PyObject *object, hs_py_call *call)
+take_queries(hs_py_call *call, PyObject *object)
 {
     const hs_points *points = &call->points.at, *queries = &call->queries.at;
-    if (!hs_points_of(object, "queries", &call->queries.at)) {
-        return false;
-    }
-    if (queries->ndim != points->ndim) {
-        PyErr_Format(PyExc_ValueError,
-                     "queries and points must have the same number of columns, got shapes "
-                     "(%lld, %d) and (%lld, %d)",
-                     (long long)queries->n, queries->ndim, (long long)points->n, points->ndim);
-        return false;
-    }
     call->among.queries = &call->queries;
-    return true;
+    return take_points(call, object, "queries", &call->queries.at, &call->asked) &&
+           queries->ndim == points->ndim;
 }
 
+/* An array of the caller's for `out`, which shares no memory with what it is made from. */
 static bool
-take_out(PyObject *object, hs_py_call *call)
+take_out(PyObject *const *of, hs_py_call *call)
 {
     hs_options *options = &call->options;
-    call->out = object;
+    PyObject   *out = of[HS_ARG_OUT];
+    call->out = out;
     options->out = &call->arrays;
-    return hs_out_of(object, call->letters, call->points.at.ndim, options->index_bytes,
-                     &call->arrays);
+    const struct {
+        PyObject   *input;
+        const char *name;
+    } inputs[] = {{of[HS_ARG_QUERIES], "queries"}, {call->asked, "queries"},
+                  {of[HS_ARG_POINTS], "points"},   {call->positions, "points"},
+                  {of[HS_ARG_BOX], "box"},         {of[HS_ARG_CUTOFF], "cutoff"}};
+    if (!hs_out_of(out, call->letters, call->points.at.ndim, options->index_bytes, &call->arrays)) {
+        return false;
+    }
+    for (size_t k = 0; k < sizeof inputs / sizeof inputs[0]; k++) {
+        if (inputs[k].input != NULL &&
+            !hs_out_is_apart(out, call->letters, inputs[k].input, inputs[k].name)) {
+            return false;
+        }
+    }
+    return true;
 }
 
 /* The cutoffs of shells, which go with their letter; NULL: one cutoff. */
@@ -428,145 +959,6 @@ take_shells(PyObject *object, hs_options *options)
     return true;
 }
 
-/* ---- what is known of points; a reach, a selection --------------------------------------- */
-
-bool
-hs_known_take(PyObject *of_points, PyObject *of_queries, int type, int n_axes, const char *must,
-              size_t member, hs_py_call *call)
-{
-    PyObject *const given[] = {of_points, of_queries};
-    hs_set *const   sets[] = {&call->points, &call->queries}; /* without queries, of none */
-    for (int k = 0; k < 2; k++) {
-        const void *entries;
-        if (!hs_entries_of(given[k], type, n_axes, sets[k]->at.n, call->points.at.ndim, must,
-                           &entries)) {
-            return false;
-        }
-        memcpy((char *)sets[k] + member, &entries, sizeof entries);
-    }
-    return true;
-}
-
-/*
- * A tuple (rule, radii, query_radii, types, query_types, table, supports, query_supports, extent):
- * an int of hs_rule; arrays of float64 or, for types, int32, each with one entry for each point or
- * query; a square float64 table of cutoffs; float64 arrays of one matrix of ndim rows for each
- * point or query; and a float, how many times supports or radii count, or None. Any but the rule
- * may be None.
- */
-static bool
-take_limits(PyObject *object, hs_py_call *call, hs_reach *reach)
-{
-    static const char *const must = "radii and types must be arrays of one entry for each point or "
-                                    "query",
-                             *const must_be_matrices = "supports must be float64 arrays of one "
-                                                       "matrix for each point or query",
-                             *const must_be_table = "the table of cutoffs must be a square float64 "
-                                                    "array";
-    *reach = (hs_reach){.n_types = 0};
-    if (!PyTuple_CheckExact(object) || PyTuple_GET_SIZE(object) != 9 ||
-        !PyLong_CheckExact(PyTuple_GET_ITEM(object, 0))) {
-        PyErr_SetString(PyExc_TypeError, "reach must be None or a tuple of nine");
-        return false;
-    }
-    PyObject *const *of = &PyTuple_GET_ITEM(object, 0);
-    const void      *table;
-    const long       rule = PyLong_AsLong(of[0]);
-    if (rule < 0 || rule >= HS_RULE_END) {
-        PyErr_Clear(); /* of a number that is no long */
-        PyErr_SetString(PyExc_ValueError, "there is no such rule");
-        return false;
-    }
-    const int64_t n_types = PyArray_Check(of[5]) && PyArray_NDIM((PyArrayObject *)of[5]) > 0
-                                ? PyArray_DIM((PyArrayObject *)of[5], 0)
-                                : 0;
-    if (!hs_known_take(of[1], of[2], NPY_DOUBLE, 1, must, offsetof(hs_set, radii), call) ||
-        !hs_known_take(of[3], of[4], NPY_INT32, 1, must, offsetof(hs_set, types), call) ||
-        !hs_entries_of(of[5], NPY_DOUBLE, 2, n_types, n_types, must_be_table, &table)) {
-        return false;
-    }
-    if (table != NULL && (n_types < 1 || n_types > INT32_MAX)) {
-        PyErr_SetString(PyExc_TypeError, must_be_table);
-        return false;
-    }
-    *reach = (hs_reach){.rule = (hs_rule)rule, .n_types = (int32_t)n_types, .cutoffs = table};
-    if (of[8] == Py_None) {
-        return true;
-    }
-    if (!PyFloat_CheckExact(of[8])) {
-        PyErr_SetString(PyExc_TypeError, "extent must be a float");
-        return false;
-    }
-    if (!hs_known_take(of[6], of[7], NPY_DOUBLE, 3, must_be_matrices, offsetof(hs_set, supports),
-                       call)) {
-        return false;
-    }
-    reach->has_supports = of[6] != Py_None || of[7] != Py_None;
-    reach->extent = PyFloat_AS_DOUBLE(of[8]);
-    return true;
-}
-
-/*
- * A tuple (groups, query_groups, labels, query_labels, query_numbers, within, excluded,
- * min_distance): int64 arrays of one entry for each point or query; an int; an int64 array of two
- * columns; and a float. Arrays may be None.
- */
-static bool
-take_selection(PyObject *object, hs_py_call *call, hs_selection *selection)
-{
-    static const char *const must = "labels must be int64 arrays of one entry for each point or "
-                                    "query";
-    if (!PyTuple_CheckExact(object) || PyTuple_GET_SIZE(object) != 8 ||
-        !PyLong_CheckExact(PyTuple_GET_ITEM(object, 5)) ||
-        !PyFloat_CheckExact(PyTuple_GET_ITEM(object, 7))) {
-        PyErr_SetString(PyExc_TypeError, "selection must be a tuple of eight");
-        return false;
-    }
-    PyObject *const *of = &PyTuple_GET_ITEM(object, 0);
-    const void      *numbers, *excluded;
-    const long long  within = PyLong_AsLongLong(of[5]);
-    if (within < 0) {
-        PyErr_Clear(); /* of a number that is no long long */
-        PyErr_SetString(PyExc_ValueError, "labels cannot differ by so much");
-        return false;
-    }
-    if (!hs_known_take(of[0], of[1], NPY_INT64, 1, must, offsetof(hs_set, groups), call) ||
-        !hs_known_take(of[2], of[3], NPY_INT64, 1, must, offsetof(hs_set, labels), call) ||
-        !hs_entries_of(of[4], NPY_INT64, 1, call->queries.at.n, 0, must, &numbers)) {
-        return false;
-    }
-    if (!hs_entries_of(of[6], NPY_INT64, 2, -1, 2, "excluded must be an int64 array of two columns",
-                       &excluded)) {
-        return false;
-    }
-    *selection = (hs_selection){.has_groups = of[0] != Py_None || of[1] != Py_None,
-                                .has_labels = of[2] != Py_None || of[3] != Py_None,
-                                .query_numbers = numbers,
-                                .within = within,
-                                .n_excluded = hs_length_of(of[6]),
-                                .excluded = excluded,
-                                .min_distance = PyFloat_AS_DOUBLE(of[7])};
-    return true;
-}
-
-/* A reach, or a tuple of two: that or None, and a selection. */
-static bool
-take_reach(PyObject *object, hs_py_call *call)
-{
-    if (PyTuple_CheckExact(object) && PyTuple_GET_SIZE(object) == 2) {
-        call->among.selection = &call->selection;
-        if (!take_selection(PyTuple_GET_ITEM(object, 1), call, &call->selection)) {
-            return false;
-        }
-        object = PyTuple_GET_ITEM(object, 0);
-        if (object == Py_None) {
-            return true;
-        }
-    }
-    call->among.reach = &call->reach;
-    return take_limits(object, call, &call->reach);
-}
-
 /* An hs_poll_fn: lets signals be handled and reports progress; false when either raised. From the
  * first poll on the GIL is free: the search is not so small after all. */
 static bool
@@ -584,30 +976,48 @@ poll_python(void *context, double fraction)
     return go_on;
 }
 
-/* Points and box, then what depends on them: queries, reach, `out`, which shares no memory with
- * what it is made from, and the batch. of: by kind, what was given, NULL for None where that may
- * be. */
+/* Cutoffs of systems, and numbers of systems. */
 static bool
-take_views(PyObject *const *of, unsigned long repeats, hs_py_call *call)
+take_systems(PyObject *const *known, PyObject *const *known_of_queries, PyObject *cutoff,
+             hs_py_call *call)
 {
-    PyObject *points = of[HS_ARG_POINTS], *box = of[HS_ARG_BOX], *reach = of[HS_ARG_REACH],
-             *out = of[HS_ARG_OUT], *batch = of[HS_ARG_BATCH],
-             *queries = of[HS_ARG_OTHER_POINTS] != NULL ? of[HS_ARG_OTHER_POINTS]
-                                                        : of[HS_ARG_QUERIES];
-    if (!take_shells(of[HS_ARG_SHELLS], &call->options) ||
-        !take_scene(points, box, repeats, call) ||
-        (queries != NULL && !take_queries(queries, call)) ||
-        (reach != NULL && !take_reach(reach, call))) {
+    PyObject *numbers = known != NULL && known[N_KNOWN] != Py_None ? known[N_KNOWN] : NULL,
+             *of_queries = known_of_queries != NULL && known_of_queries[N_KNOWN] != Py_None
+                               ? known_of_queries[N_KNOWN]
+                               : NULL;
+    if (PyArray_Check(cutoff)) {
+        if (!hs_is_array(cutoff, NPY_DOUBLE, 1)) {
+            PyErr_SetString(PyExc_TypeError, "cutoffs of systems must be a float64 array");
+            return false;
+        }
+        call->each.cutoffs = PyArray_DATA((PyArrayObject *)cutoff);
+    }
+    const hs_each_system *each = &call->each;
+    if (numbers == NULL && of_queries == NULL && each->cutoffs == NULL && each->rows == NULL &&
+        each->periodic == NULL) {
+        return true;
+    }
+    return hs_batch_take(numbers, of_queries, call);
+}
+
+/* Points and box, then what depends on them: queries, what is known, `out` and systems. of: by
+ * kind, what was given, NULL for None where that may be. */
+static bool
+take_views(PyObject **of, hs_py_call *call)
+{
+    PyObject        *points = of[HS_ARG_POINTS], *queries = of[HS_ARG_QUERIES];
+    PyObject *const *known = NULL, *const *known_of_queries = NULL;
+    if (!call->is_of_users && (!parts_of(&points, &known) ||
+                               (queries != NULL && !parts_of(&queries, &known_of_queries)))) {
         return false;
     }
-    if (out != NULL &&
-        (!take_out(out, call) ||
-         (queries != NULL && !hs_out_is_apart(out, call->letters, queries, "queries")) ||
-         !hs_out_is_apart(out, call->letters, points, "points") ||
-         !hs_out_is_apart(out, call->letters, box, "box"))) {
-        return false;
-    }
-    return batch == NULL || hs_batch_take(batch, call);
+    return take_shells(of[HS_ARG_SHELLS], &call->options) &&
+           hs_py_call_scene(call, points, of[HS_ARG_BOX], of[HS_ARG_PERIODIC]) &&
+           (queries == NULL || take_queries(call, queries)) && take_known(known, &call->points) &&
+           take_known(known_of_queries, &call->queries) &&
+           (of[HS_ARG_PAIRING] == NULL || take_pairing(of[HS_ARG_PAIRING], call)) &&
+           (of[HS_ARG_OUT] == NULL || take_out(of, call)) &&
+           (call->is_of_users || take_systems(known, known_of_queries, of[HS_ARG_CUTOFF], call));
 }
 
 static int64_t
@@ -628,61 +1038,64 @@ hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected)
 /* How many arguments of its own a call has: those at the end may be left out. A wrong number is
  * brought to the next right one. */
 static int
-count_own(const hs_argument *takes, int n_given)
+count_own(const hs_argument *const *takes, int n_given)
 {
     int n = 0, n_needed = 0;
-    for (; takes[n].kind != HS_ARG_END; n++) {
-        n_needed = takes[n].kind < HS_ARG_FIRST_OPTIONAL ? n + 1 : n_needed;
+    for (; takes[n] != NULL; n++) {
+        n_needed = takes[n]->kind < HS_ARG_FIRST_OPTIONAL ? n + 1 : n_needed;
     }
     return n_given < n_needed ? n_needed : n_given < n ? n_given : n;
 }
 
-/* Takes what is a number, and notes all by kind; false with an exception set. */
+/* Takes what is a number, and notes all by kind. */
 static bool
-take_numbers(const hs_argument *takes, int n, PyObject *const *given, PyObject **of,
-             hs_py_call *call)
+take_numbers(hs_py_call *call, int n, PyObject **of)
 {
     for (int k = 0; k < n; k++) {
-        const hs_kind kind = takes[k].kind;
-        if (given[k] != Py_None || kind < HS_ARG_OUT || kind == HS_ARG_OTHER_POINTS) {
-            of[kind] = given[k];
-        }
-        if (!take_number(kind, given[k], call)) {
+        hs_kind   kind = hs_argument_at(call->function, k)->kind;
+        PyObject *given = call->of[k];
+        if (!take_number(call, kind, given) ||
+            (kind == HS_ARG_OTHER_POINTS && given == Py_None && call->is_of_users)) {
             return false;
+        }
+        if (given != Py_None || kind < HS_ARG_OUT || kind == HS_ARG_OTHER_POINTS) {
+            of[kind == HS_ARG_MAX_DISTANCE   ? HS_ARG_CUTOFF
+               : kind == HS_ARG_OTHER_POINTS ? HS_ARG_QUERIES
+                                             : kind] = given;
         }
     }
     return true;
 }
 
-bool
-hs_py_call_take(hs_py_call *call, hs_function_number number, PyObject *const *arguments,
-                Py_ssize_t n_arguments)
+void
+hs_py_call_begin(hs_py_call *call, PyObject *module, bool is_of_users)
 {
-    const hs_function *function = &hs_functions[number];
-    const int          n_own = count_own(function->own, (int)(n_arguments - HS_CALL_ARGUMENTS));
-    PyObject          *of[HS_KINDS] = {NULL};
-    hs_options        *options = &call->options;
-    unsigned long      repeats;
-    if (!hs_expect_arguments(function->name, n_arguments, HS_CALL_ARGUMENTS + n_own) ||
-        !hs_repeats_of(arguments[3], &repeats)) {
-        return false;
-    }
-    *options = hs_options_default();
+    call->module = module;
+    call->is_of_users = is_of_users;
+    call->options = hs_options_default();
     call->among = (hs_among){.points = NULL};
     call->points = call->queries = (hs_set){.first = NULL};
+    call->each = (hs_each_system){.rows = NULL};
     call->batch = (hs_batch){.is_given = false};
-    call->own = arguments + HS_CALL_ARGUMENTS;
     call->letters = "ij";
-    call->out = call->room = NULL;
+    call->positions = call->asked = call->out = call->room = NULL;
     call->capacity = 0;
+    call->repeats = 0;
     call->thread = NULL;
-    if (!take_numbers(HS_EVERY_SEARCH, HS_CALL_ARGUMENTS, arguments, of, call) ||
-        !take_numbers(function->own, n_own, call->own, of, call) ||
-        !take_views(of, repeats, call)) {
-        return false;
-    }
-    if (!hs_out_make_room(call)) {
-        hs_py_call_end(call);
+    call->n_made = 0;
+}
+
+bool
+hs_py_call_take(hs_py_call *call, Py_ssize_t n_arguments)
+{
+    const hs_function *function = call->function;
+    const int          n_own = count_own(function->own, (int)(n_arguments - HS_CALL_ARGUMENTS)),
+              n = HS_CALL_ARGUMENTS + n_own;
+    PyObject   *of[HS_KINDS] = {NULL};
+    hs_options *options = &call->options;
+    call->own = call->of + HS_CALL_ARGUMENTS;
+    if (!hs_expect_arguments(function->name, n_arguments, n) || !take_numbers(call, n, of) ||
+        !take_views(of, call) || !hs_out_make_room(call)) {
         return false;
     }
     if (options->threads == 0) {
@@ -695,13 +1108,23 @@ hs_py_call_take(hs_py_call *call, hs_function_number number, PyObject *const *ar
     return true;
 }
 
-void
-hs_py_call_end(hs_py_call *call)
+PyObject *
+hs_py_call_raise(hs_py_call *call, hs_status status)
 {
     if (call->batch.is_given && !call->batch.are_all) {
         call->failure.system = -1; /* systems are named where each has something of its own */
     }
+    return hs_raise(status, &call->failure, &call->options);
+}
+
+void
+hs_py_call_end(hs_py_call *call)
+{
     hs_batch_free(&call->batch);
+    Py_XDECREF(call->room);
+    while (call->n_made > 0) {
+        Py_DECREF(call->made[--call->n_made]);
+    }
 }
 
 void

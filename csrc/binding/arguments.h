@@ -27,46 +27,64 @@ typedef struct hs_batch {
     int64_t *first_query; /* owned; NULL where there are no queries */
     int64_t *number;      /* owned: of each system */
     bool     are_all;     /* each number is its place */
-    int64_t  capacity;    /* of these arrays */
     int64_t  n_numbers;   /* systems, those without points counted */
 } hs_batch;
+
+enum { HS_MOST_MADE = 12 };
 
 /* The arguments of a search, as views; the Python arguments that they borrow from must stay
  * alive. It borrows from itself: it cannot be moved. */
 typedef struct hs_py_call {
-    hs_among         among;
-    hs_set           points, queries; /* those of cells have no data */
-    hs_box           box;
-    hs_reach         reach;
-    hs_selection     selection;
-    hs_each_system   each;
-    hs_options       options;
-    hs_failure       failure;
-    hs_batch         batch;
-    const char      *letters;  /* borrowed: the quantities */
-    PyObject        *out;      /* borrowed: of the caller, or NULL: new arrays */
-    hs_pair_arrays   arrays;   /* those of out */
-    PyObject        *room;     /* owned: new arrays of a fixed length that `out` is then, or NULL */
-    int64_t          capacity; /* that length, or 0; negative: the number needed is returned too */
-    bool             flag;
-    int64_t          integer;
-    double           real;
-    PyObject *const *own;      /* borrowed: the arguments beyond those of every search */
-    PyObject        *progress; /* borrowed; called with the fraction done, or NULL */
-    PyThreadState   *thread;   /* saved while the GIL is released, else NULL */
+    const hs_function *function;
+    PyObject          *module; /* borrowed */
+    PyObject *const   *of;     /* borrowed: what was given, in the order of the core ... */
+    PyObject *const   *own;    /* ... beyond the arguments of every search */
+    bool               is_of_users;
+    hs_among           among;
+    hs_set             points, queries;   /* those of cells have no data */
+    PyObject          *positions, *asked; /* borrowed: their arrays, or cells */
+    hs_box             box;
+    unsigned long      repeats; /* bits */
+    hs_reach           reach;
+    hs_selection       selection;
+    hs_each_system     each;
+    hs_options         options;
+    hs_failure         failure;
+    hs_batch           batch;
+    const char        *letters; /* borrowed: the quantities */
+    PyObject          *out;     /* borrowed: of the caller, or NULL: new arrays */
+    hs_pair_arrays     arrays;  /* those of out */
+    PyObject          *room;    /* owned: new arrays of a fixed length that `out` is, or NULL */
+    int64_t        capacity;    /* that length, or 0; negative: the number needed is returned too */
+    bool           flag;
+    int64_t        integer;
+    double         real;
+    PyObject      *progress;           /* borrowed; called with the fraction done, or NULL */
+    PyThreadState *thread;             /* saved while the GIL is released, else NULL */
+    PyObject      *made[HS_MOST_MADE]; /* owned: what views are of that was not given */
+    int            n_made;
 } hs_py_call;
 
-/* Takes the positional arguments of this function, see interface.h, and room for a capacity. False
- * with an exception set, and nothing to release; else hs_py_call_end() must follow. */
-bool hs_py_call_take(hs_py_call *call, hs_function_number number, PyObject *const *arguments,
-                     Py_ssize_t n_arguments);
+/* Takes the arguments of its function, see interface.h, and room for a capacity. hs_py_call_end()
+ * must follow, whatever comes of it. False with an exception set, or without one: only Python can
+ * tell what to do with an argument, or what is wrong with it. */
+bool hs_py_call_take(hs_py_call *call, Py_ssize_t n_arguments);
+
+/* Calls with no arguments taken, for those that take some of them themselves. */
+void hs_py_call_begin(hs_py_call *call, PyObject *module, bool is_of_users);
+
+/* The same of points, box and axes that repeat. */
+bool hs_py_call_scene(hs_py_call *call, PyObject *points, PyObject *box, PyObject *periodic);
+
+/* The exception for a status other than HS_OK; NULL. */
+PyObject *hs_py_call_raise(hs_py_call *call, hs_status status);
 
 /* Release and take the GIL around a call of the core; poll() takes it in between. With few points
  * it stays taken until the first poll: handing it over costs a tenth of a small search. */
 void hs_py_call_release(hs_py_call *call);
 void hs_py_call_acquire(hs_py_call *call);
 
-/* Gives back what the arguments took, after the call of the core. Idempotent. */
+/* Gives back what the arguments took. */
 void hs_py_call_end(hs_py_call *call);
 
 /* Whether a function got as many arguments as it takes; false with an exception set. */
@@ -80,13 +98,12 @@ bool hs_is_array(PyObject *object, int type, int n_axes);
 bool hs_entries_of(PyObject *object, int type, int n_axes, int64_t length, int64_t width,
                    const char *must, const void **entries);
 
-/* What is known of each point and of each query, arrays or None: to the member of their sets that
- * is so far from the beginning. False with a TypeError, `must`. */
-bool hs_known_take(PyObject *of_points, PyObject *of_queries, int type, int n_axes,
-                   const char *must, size_t member, hs_py_call *call);
-
 /* The length of axis 0 of an array, 0 for None. */
 int64_t hs_length_of(PyObject *object);
+
+/* n numbers of a list, tuple or array of so many, whose conversion runs no code of others and loses
+ * nothing; false, without an exception unless memory was refused, for all else. */
+bool hs_numbers_of(PyObject *object, npy_intp n, double *values);
 
 /* A native float32 or float64 array of shape (n, d), 1 <= d <= 8. The view borrows from it. `name`
  * is that of the argument, for messages. */
@@ -114,13 +131,11 @@ bool hs_box_of(PyObject *object, unsigned long repeats, int ndim, hs_box *box, b
 extern const char *const hs_algorithm_names[HS_ALGORITHM_END];
 
 /*
- * many_systems.c: the batch of a call, a tuple of five: numbers, int64 (n,); cutoffs, None or
- * float64 (s,); boxes, None or float64 (s, d, d), for which the call's box has the axes that
- * repeat; the numbers of queries, int64 (q,), or None where there are none; bits of the axes that
- * repeat in each system, uint8 (s,), or None where they are those of the call. False with an
- * exception set.
+ * many_systems.c: the systems of points that have numbers of them, int64 (n,), as have queries;
+ * each may have a cutoff, float64 (s,), a box, float64 (s, d, d), and bits of axes that repeat,
+ * uint8 (s,), of its own in place of those that all share. NULL: there are none.
  */
-bool hs_batch_take(PyObject *given, hs_py_call *call);
+bool hs_batch_take(PyObject *numbers, PyObject *query_numbers, hs_py_call *call);
 void hs_batch_free(hs_batch *batch);
 
 /* Zeros of shape (numbers, ...), for as many more axes; NULL with an exception set. */

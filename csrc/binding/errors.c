@@ -15,47 +15,63 @@ set_of(const hs_failure *failure)
     return failure->in_queries ? "queries" : "points";
 }
 
-/* What is said of a number that is wrong: "<name> <must>, got <name>[...] = <number>". */
+/* Of a number that is wrong: "<name> <must>, got <name>[...] = <number>"; of what
+ * is no number: "<name> <must>; <name>[...] <rest>". */
 typedef struct number_words {
     const char *name; /* NULL: that of the set */
     const char *must;
     enum { ALONE, AT_ROW, AT_ELEMENT, OF_SYSTEM } where;
-    bool has_queries; /* which then have query_ before the name */
+    enum { OF_ONE, OF_QUERIES } of; /* queries have query_ before the name */
+    const char *rest;
 } number_words;
 
 /* By status. */
 static const number_words WORDS[] = {
-    [HS_ERR_CUTOFF] = {"cutoff", "must be finite and not negative", OF_SYSTEM, false},
-    [HS_ERR_NOT_FINITE] = {NULL, "must be finite", AT_ELEMENT, false},
-    [HS_ERR_BOX_FINITE] = {"box", "must be finite", AT_ELEMENT, false},
-    [HS_ERR_EDGES] = {"edges", "must be finite, not negative and ascending", AT_ROW, false},
-    [HS_ERR_WEIGHTS] = {"weights", "must be finite", AT_ROW, true},
-    [HS_ERR_RADII] = {"radii", "must be finite, not negative, and of ordinary size", AT_ROW, true},
-    [HS_ERR_EXTENT] = {"extent", "must be finite and not negative", ALONE, false},
+    [HS_ERR_CUTOFF] = {"cutoff", "must be finite and not negative", OF_SYSTEM, OF_ONE, NULL},
+    [HS_ERR_NOT_FINITE] = {NULL, "must be finite", AT_ELEMENT, OF_ONE, NULL},
+    [HS_ERR_BOX_FINITE] = {"box", "must be finite", AT_ELEMENT, OF_ONE, NULL},
+    [HS_ERR_EDGES] = {"edges", "must be finite, not negative and ascending", AT_ROW, OF_ONE, NULL},
+    [HS_ERR_WEIGHTS] = {"weights", "must be finite", AT_ROW, OF_QUERIES, NULL},
+    [HS_ERR_RADII] = {"radii", "must be finite, not negative, and of ordinary size", AT_ROW,
+                      OF_QUERIES, NULL},
+    [HS_ERR_EXTENT] = {"extent", "must be finite and not negative", ALONE, OF_ONE, NULL},
+    [HS_ERR_TYPES] = {"types", "must be from 0 on and below the number of types", AT_ROW,
+                      OF_QUERIES, NULL},
+    [HS_ERR_SUPPORTS] = {"supports", "must be finite, symmetric and positive definite", AT_ROW,
+                         OF_QUERIES, "is not, for exactly the numbers given"},
+    [HS_ERR_SUPPORT_REACH] = {"supports",
+                              "must reach at most 2**1022, and at most 2**1074 times as far in one "
+                              "direction as in another",
+                              AT_ROW, OF_QUERIES, "reaches further"},
 };
 
 static PyObject *
-raise_words(const hs_failure *failure, const number_words *said)
+raise_words(hs_status status, const hs_failure *failure, const number_words *said)
 {
     const long long system = failure->system, row = failure->row, column = failure->column;
     const char     *name = said->name != NULL ? said->name : set_of(failure);
-    const char     *query = said->has_queries && failure->in_queries ? "query_" : "";
-    char            place[80] = "";
-    PyObject       *number = PyFloat_FromDouble(failure->value);
+    const char     *query = said->of == OF_QUERIES && failure->in_queries ? "query_" : "";
+    char            place[80] = "", number[32];
     if (said->where == AT_ROW) {
-        snprintf(place, sizeof place, "%s%s[%lld] = ", query, name, row);
+        snprintf(place, sizeof place, "%s%s[%lld]", query, name, row);
     } else if (said->where == AT_ELEMENT && (system < 0 || said->name == NULL)) {
-        snprintf(place, sizeof place, "%s[%lld, %lld] = ", name, row, column);
+        snprintf(place, sizeof place, "%s[%lld, %lld]", name, row, column);
     } else if (said->where == AT_ELEMENT) {
-        snprintf(place, sizeof place, "%s[%lld, %lld, %lld] = ", name, system, row, column);
+        snprintf(place, sizeof place, "%s[%lld, %lld, %lld]", name, system, row, column);
     } else if (said->where == OF_SYSTEM && system >= 0) {
-        snprintf(place, sizeof place, "%s[%lld] = ", name, system);
+        snprintf(place, sizeof place, "%s[%lld]", name, system);
     }
-    if (number != NULL) { /* repr is shortest; PyErr_Format knows no floating-point numbers */
-        PyErr_Format(PyExc_ValueError, "%s%s %s, got %s%R", query, name, said->must, place, number);
-        Py_DECREF(number);
+    if (said->rest != NULL) {
+        return PyErr_Format(PyExc_ValueError, "%s%s %s; %s %s", query, name, said->must, place,
+                            said->rest);
     }
-    return NULL;
+    if (status == HS_ERR_TYPES) {
+        snprintf(number, sizeof number, "%lld", (long long)failure->value);
+    } else {
+        hs_format_real(failure->value, number);
+    }
+    return PyErr_Format(PyExc_ValueError, "%s%s %s, got %s%s%s", query, name, said->must, place,
+                        *place != '\0' ? " = " : "", number);
 }
 
 /* "box", or which one of many. */
@@ -94,6 +110,15 @@ raise_skewed(const hs_failure *failure)
                  "along the coordinate axes",
                  name_box(failure, name, sizeof name));
     return NULL;
+}
+
+const char *
+hs_format_real(double value, char text[32])
+{
+    char *shortest = PyOS_double_to_string(value, 'r', 0, Py_DTSF_ADD_DOT_0, NULL);
+    snprintf(text, 32, "%s", shortest != NULL ? shortest : "that"); /* no memory: an exception */
+    PyMem_Free(shortest);
+    return text;
 }
 
 const char *
@@ -214,86 +239,48 @@ raise_capacity(const hs_failure *failure)
 static PyObject *
 raise_too_many(const hs_failure *failure)
 {
-    PyObject *number = PyFloat_FromDouble(failure->value);
-    if (number != NULL) {
-        PyErr_Format(PyExc_OverflowError,
-                     "fewer than 2**31 points and systems and 2**62 pairs can be searched, got %R",
-                     number);
-        Py_DECREF(number);
-    }
-    return NULL;
-}
-
-static PyObject *
-raise_types(const hs_failure *failure)
-{
-    const char *name = failure->in_queries ? "query_types" : "types";
-    PyErr_Format(PyExc_ValueError,
-                 "%s must be from 0 on and below the number of types, got %s[%lld] = %lld", name,
-                 name, (long long)failure->row, (long long)failure->value);
-    return NULL;
-}
-
-static PyObject *
-raise_supports(const hs_failure *failure)
-{
-    const char *name = failure->in_queries ? "query_supports" : "supports";
-    PyErr_Format(PyExc_ValueError,
-                 "%s must be finite, symmetric and positive definite; %s[%lld] is not, for "
-                 "exactly the numbers given",
-                 name, name, (long long)failure->row);
-    return NULL;
-}
-
-static PyObject *
-raise_support_reach(const hs_failure *failure)
-{
-    const char *name = failure->in_queries ? "query_supports" : "supports";
-    PyErr_Format(PyExc_ValueError,
-                 "%s must reach at most 2**1022, and at most 2**1074 times as far in one direction "
-                 "as in another; %s[%lld] reaches further",
-                 name, name, (long long)failure->row);
-    return NULL;
+    char number[32];
+    return PyErr_Format(PyExc_OverflowError,
+                        "fewer than 2**31 points and systems and 2**62 pairs can be searched, got "
+                        "%s",
+                        hs_format_real(failure->value, number));
 }
 
 static PyObject *
 raise_shift(const hs_failure *failure)
 {
-    PyErr_Format(PyExc_OverflowError,
-                 "%s[%lld] lies too many box vectors away, or a point that it pairs with does: "
-                 "shifts are counted up to 2**51, and S holds 2**31; wrap the points first",
-                 set_of(failure), (long long)failure->row);
-    return NULL;
+    return PyErr_Format(
+        PyExc_OverflowError,
+        "%s[%lld] lies too many box vectors away, or a point that it pairs with does: "
+        "shifts are counted up to 2**51, and S holds 2**31; wrap the points first",
+        set_of(failure), (long long)failure->row);
 }
 
 static PyObject *
 raise_rounding(const hs_failure *failure)
 {
-    PyErr_Format(PyExc_OverflowError,
-                 "%s[%lld] lies so far from the box, or the box is so skewed, that rounding "
-                 "errors of precision='double' pass the cutoff; wrap the points first, or "
-                 "use precision='exact'",
-                 set_of(failure), (long long)failure->row);
-    return NULL;
+    return PyErr_Format(PyExc_OverflowError,
+                        "%s[%lld] lies so far from the box, or the box is so skewed, that rounding "
+                        "errors of precision='double' pass the cutoff; wrap the points first, or "
+                        "use precision='exact'",
+                        set_of(failure), (long long)failure->row);
 }
 
 static PyObject *
 raise_far(const hs_failure *failure)
 {
-    PyObject *number = PyFloat_FromDouble(failure->value);
-    if (number != NULL && failure->row >= 0) {
-        PyErr_Format(PyExc_ValueError,
-                     "queries[%lld, %lld] = %R lies too far from the points and the box for cells "
-                     "that were made without it; query() and pairs_between() have no such limit",
-                     (long long)failure->row, (long long)failure->column, number);
-    } else if (number != NULL) {
-        PyErr_SetString(PyExc_ValueError,
-                        "points lie so far apart, or the box is so small in comparison, "
-                        "that one cell holds everything, and all points are candidates: the "
-                        "other methods and functions have no such limit");
-    }
-    Py_XDECREF(number);
-    return NULL;
+    char number[32];
+    return failure->row < 0
+               ? PyErr_Format(PyExc_ValueError,
+                              "points lie so far apart, or the box is so small in comparison, "
+                              "that one cell holds everything, and all points are candidates: the "
+                              "other methods and functions have no such limit")
+               : PyErr_Format(PyExc_ValueError,
+                              "queries[%lld, %lld] = %s lies too far from the points and the box "
+                              "for cells that were made without it; query() and pairs_between() "
+                              "have no such limit",
+                              (long long)failure->row, (long long)failure->column,
+                              hs_format_real(failure->value, number));
 }
 
 static PyObject *
@@ -312,8 +299,7 @@ static PyObject *(*const RAISE[])(const hs_failure *) = {
     [HS_ERR_BOX_SKEWED] = raise_skewed,       [HS_ERR_TOO_MANY] = raise_too_many,
     [HS_ERR_SHIFT_RANGE] = raise_shift,       [HS_ERR_ROUNDING] = raise_rounding,
     [HS_ERR_INTERRUPTED] = raise_interrupted, [HS_ERR_FAR] = raise_far,
-    [HS_ERR_CAPACITY] = raise_capacity,       [HS_ERR_TYPES] = raise_types,
-    [HS_ERR_SUPPORTS] = raise_supports,       [HS_ERR_SUPPORT_REACH] = raise_support_reach,
+    [HS_ERR_CAPACITY] = raise_capacity,
 };
 
 PyObject *
@@ -321,7 +307,7 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
 {
     const size_t number = (size_t)status;
     if (number < sizeof WORDS / sizeof WORDS[0] && WORDS[number].must != NULL) {
-        return raise_words(failure, &WORDS[number]);
+        return raise_words(status, failure, &WORDS[number]);
     }
     if (number < sizeof RAISE / sizeof RAISE[0] && RAISE[number] != NULL) {
         return RAISE[number](failure);

@@ -25,6 +25,9 @@ void hs_raise_capacity(int64_t capacity, int64_t needed);
 /* Of HS_ERR_MEMORY: whether what was expected is within the limit, and more was taken. */
 bool hs_took_more(const hs_failure *failure);
 
+/* The shortest text that float() reads as this number; returns text. */
+const char *hs_format_real(double value, char text[32]);
+
 /* Bytes in the largest unit of which there is one, such as "1.5 GB". Returns text, of so many
  * bytes; 32 suffice, and 48 for the next. */
 const char *hs_format_bytes(double bytes, char *text, size_t size);

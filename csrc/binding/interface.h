@@ -1,8 +1,13 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * The table of the interface: what each function that searches takes, said once. By it arguments.h
- * reads the arguments of a call and quick.h those that users give, the module makes its functions,
- * and tests/core_stub.py writes the stub.
+ * reads the arguments of a call, quick.h makes the functions, and tests/core_stub.py writes the
+ * stub.
+ *
+ * The Python layer gives a set of points, and queries, as an array or as a tuple (positions, radii,
+ * supports, types, weights, groups, labels, numbers of systems), of which all but the first may be
+ * None; cells may stand in place of positions, with None as box and 0 as periodic. Users give what
+ * the public functions take, as far as C converts it.
  */
 #ifndef HS_INTERFACE_H
 #define HS_INTERFACE_H
@@ -15,10 +20,10 @@
 typedef enum hs_kind {
     HS_ARG_END, /* of a list */
     /* Of every search, in this order. */
-    HS_ARG_POINTS,   /* an array; or cells of cells_build, with None as box and 0 as periodic */
-    HS_ARG_CUTOFF,   /* a float */
-    HS_ARG_BOX,      /* float64 (d,) or (d, d), or None */
-    HS_ARG_PERIODIC, /* bits */
+    HS_ARG_POINTS,   /* a set */
+    HS_ARG_CUTOFF,   /* a float; or float64 (s,), one for each system */
+    HS_ARG_BOX,      /* float64 (d,) or (d, d), or (s, d, d); or None */
+    HS_ARG_PERIODIC, /* bits; or uint8 (s,) */
     HS_ARG_INCLUSIVE,
     HS_ARG_PRECISION,
     HS_ARG_KERNEL,
@@ -40,16 +45,19 @@ typedef enum hs_kind {
     HS_ARG_MAX_DISTANCE, /* what a cutoff is to users of `nearest` */
     HS_ARG_OWN,          /* left to the function, which runs no Python code for it */
     /* Of some: None, or what may be left out with all that follow. */
-    HS_ARG_QUERIES,
-    HS_ARG_REACH,     /* of arguments.h; or a tuple of that, or None, and a selection */
+    HS_ARG_QUERIES,   /* a set */
+    HS_ARG_PAIRING,   /* a tuple: number of a rule, or None for the cutoff alone; how many times
+                       supports or radii count, a float, or None; a square float64 table of cutoffs
+                       by types, or None; by how much labels of an excluded pair differ at most, an
+                       int, or None; excluded pairs, int64 (k, 2), or None; numbers of queries that
+                       are points, int64 (q,), or None; and the least distance, a float */
     HS_ARG_ALGORITHM, /* a name */
     HS_ARG_SHELLS,    /* several cutoffs, with the letter k */
-    HS_ARG_CAPACITY,  /* an int, negative where the number of pairs is returned too, and pairs
-                                that do not fit are no error */
-    HS_ARG_BATCH      /* of arguments.h */
+    HS_ARG_CAPACITY   /* an int, negative where the number of pairs is returned too, and pairs
+                         that do not fit are no error */
 } hs_kind;
 
-#define HS_KINDS (HS_ARG_BATCH + 1)
+#define HS_KINDS (HS_ARG_CAPACITY + 1)
 
 #define HS_ARG_FIRST_OPTIONAL HS_ARG_QUERIES
 
@@ -62,13 +70,14 @@ typedef struct hs_argument {
 /* Of every search; beyond them, with the end; as users give them, with a star and the end. */
 enum { HS_CALL_ARGUMENTS = 10, HS_MOST_OWN = 12, HS_MOST_PUBLIC = 20 };
 
-typedef PyObject *hs_py_search(PyObject *module, PyObject *const *arguments,
-                               Py_ssize_t n_arguments);
+/* What a function does with its arguments; a new reference, or NULL with an exception set. */
+struct hs_py_call;
+typedef PyObject *hs_py_search(struct hs_py_call *call);
 
 typedef struct hs_function {
-    const char   *name;
-    hs_py_search *body;
-    hs_argument   own[HS_MOST_OWN]; /* what it takes beyond HS_EVERY_SEARCH */
+    const char        *name;
+    hs_py_search      *body;
+    const hs_argument *own[HS_MOST_OWN]; /* beyond HS_EVERY_SEARCH, until NULL */
     /* Names of the arguments as users give them, positional ones before the star; none where it is
      * no function for users. */
     const char *users[HS_MOST_PUBLIC];
@@ -81,42 +90,15 @@ extern const hs_argument HS_EVERY_SEARCH[HS_CALL_ARGUMENTS], HS_MAX_DISTANCE;
 /* What users give and the core does not take as it is: radii, types and choices become one. */
 extern const hs_argument HS_ONLY_PYTHON[];
 
-/* The argument at this place in the order of the core; its name is NULL behind the last. */
+/* The argument at this place in the order of the core; NULL behind the last. */
 static inline const hs_argument *
 hs_argument_at(const hs_function *function, int place)
 {
-    return place >= HS_CALL_ARGUMENTS           ? &function->own[place - HS_CALL_ARGUMENTS]
+    return place >= HS_CALL_ARGUMENTS           ? function->own[place - HS_CALL_ARGUMENTS]
            : place == 1 && function->is_by_rank ? &HS_MAX_DISTANCE
                                                 : &HS_EVERY_SEARCH[place];
 }
 
-typedef enum hs_function_number {
-    HS_FN_PAIRS,
-    HS_FN_COUNT_PAIRS,
-    HS_FN_PAIRS_BETWEEN,
-    HS_FN_NEIGHBORS,
-    HS_FN_COORDINATION,
-    HS_FN_NEAREST,
-    HS_FN_HISTOGRAM,
-    HS_FN_CLUSTERS,
-    HS_FN_ITER_PAIRS,
-    HS_FN_FOR_EACH_PAIR,
-    HS_FN_MEASURE,
-    HS_FN_EXPLAIN,
-    HS_FN_CELLS_BUILD,
-    HS_FN_CELLS_CANDIDATES,
-    HS_FN_VERLET_UPDATE,
-    HS_FN_VERLET_PAIRS,
-    HS_FN_CONNECT,
-    HS_FN_CONNECT_SEARCH,
-    HS_FN_OVERLAP,
-    HS_FN_INTERSECT,
-    HS_FN_PAIR_ROWS,
-    HS_FN_KEEP_ROWS,
-    HS_FN_ROWS_WITHOUT,
-    HS_FUNCTIONS
-} hs_function_number;
-
-extern const hs_function hs_functions[HS_FUNCTIONS];
+extern const hs_function hs_functions[]; /* until one without a name */
 
 #endif

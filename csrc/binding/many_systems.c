@@ -5,9 +5,8 @@
 
 #include "outputs.h"
 
-#define FIRST_CAPACITY 1024               /* systems; doubled as needed */
-#define MOST_NUMBER    (INT64_C(1) << 62) /* so that counting on from it is safe */
-#define MOST_COUNTS    (INT64_C(1) << 48) /* no memory holds them; NumPy cannot even say so */
+#define MOST_NUMBER (INT64_C(1) << 62) /* so that counting on from it is safe */
+#define MOST_COUNTS (INT64_C(1) << 48) /* no memory holds them; NumPy cannot even say so */
 
 /* Numbers of one set. */
 typedef struct numbered {
@@ -28,47 +27,36 @@ hs_batch_free(hs_batch *batch)
     batch->first = batch->first_query = batch->number = NULL;
 }
 
-/* Room for so many entries in place of those before. */
+/* Arrays for so many systems, of which only what is filled takes memory. */
 static bool
-grow_one(int64_t **array, int64_t n)
+make_room(hs_batch *batch, int64_t most, bool has_queries)
 {
-    int64_t *grown = PyMem_Realloc(*array, (size_t)n * sizeof *grown);
-    if (grown == NULL) {
+    const size_t bytes = (size_t)(most + 1) * sizeof *batch->first;
+    batch->first = PyMem_Malloc(bytes);
+    batch->number = PyMem_Malloc(bytes);
+    batch->first_query = has_queries ? PyMem_Malloc(bytes) : NULL;
+    if (batch->first == NULL || batch->number == NULL ||
+        (has_queries && batch->first_query == NULL)) {
         PyErr_NoMemory();
         return false;
     }
-    *array = grown;
     return true;
 }
 
-/* Arrays for so many systems. */
-static bool
-grow(hs_batch *batch, int64_t capacity, bool has_queries)
-{
-    batch->capacity = capacity;
-    return grow_one(&batch->first, capacity + 1) && grow_one(&batch->number, capacity + 1) &&
-           (!has_queries || grow_one(&batch->first_query, capacity + 1));
-}
-
+/* Python has looked at all but what the number of systems allows. */
 static bool
 refuse_number(const numbered *set, int64_t number, int64_t n_systems)
 {
     const char     *name = set->name;
-    const long long i = set->at, got = number, before = set->before;
-    if (number < 0) {
-        PyErr_Format(PyExc_ValueError, "%s must not be negative, got %s[%lld] = %lld", name, name,
-                     i, got);
-    } else if (number < before) {
-        PyErr_Format(PyExc_ValueError,
-                     "%s must be ascending, got %s[%lld] = %lld before %s[%lld] = %lld", name, name,
-                     i - 1, before, name, i, got);
-    } else if (number >= n_systems && n_systems < MOST_NUMBER) {
+    const long long i = set->at, got = number;
+    if (number >= n_systems && n_systems < MOST_NUMBER) {
         PyErr_Format(PyExc_ValueError,
                      "%s must be less than the number of systems that box, periodic or cutoff is "
                      "given for, %lld, got %s[%lld] = %lld",
                      name, (long long)n_systems, name, i, got);
     } else {
-        PyErr_Format(PyExc_ValueError, "%s must be less than 2**62, got %s[%lld] = %lld", name,
+        PyErr_Format(PyExc_ValueError,
+                     "%s must ascend from 0 on, to less than 2**62, got %s[%lld] = %lld", name,
                      name, i, got);
     }
     return false;
@@ -119,14 +107,11 @@ find_systems(numbered *points, numbered *queries, int64_t n_systems, hs_batch *b
 {
     const bool are_all = n_systems < MOST_NUMBER, has_queries = queries->number != NULL;
     int64_t    n = 0, number = -1;
-    if (!grow(batch, are_all ? n_systems : FIRST_CAPACITY, has_queries) ||
+    if (!make_room(batch, are_all ? n_systems : points->n + queries->n, has_queries) ||
         !begin(points, n_systems) || !begin(queries, n_systems)) {
         return false;
     }
     while (are_all ? n < n_systems : points->at < points->n || queries->at < queries->n) {
-        if (n == batch->capacity && !grow(batch, 2 * n, has_queries)) {
-            return false;
-        }
         number = are_all ? n : points->next < queries->next ? points->next : queries->next;
         batch->first[n] = points->at;
         if (has_queries) {
@@ -151,78 +136,52 @@ find_systems(numbered *points, numbered *queries, int64_t n_systems, hs_batch *b
 static bool
 take_numbers(PyObject *object, int64_t n, const char *name, numbered *set)
 {
-    PyArrayObject *array = (PyArrayObject *)object;
     *set = (numbered){.n = n, .name = name};
-    if (!hs_is_array(object, NPY_INT64, 1) || PyArray_DIM(array, 0) != n) {
+    if (object == NULL || !hs_is_array(object, NPY_INT64, 1) || hs_length_of(object) != n) {
         PyErr_Format(PyExc_TypeError, "%s must be an int64 array with a number for each", name);
         return false;
     }
-    set->number = PyArray_DATA(array);
+    set->number = PyArray_DATA((PyArrayObject *)object);
     return true;
 }
 
-/* What systems have of their own; returns how many there are, MOST_NUMBER where all share it, or -1
- * with an exception set. */
+/* How many systems have something of their own, MOST_NUMBER where all share it, or -1 with an
+ * exception set. */
 static int64_t
-take_own(PyObject *const *given, const hs_py_call *call, hs_each_system *each)
+count_systems(const hs_py_call *call)
 {
-    static const struct {
-        int         at, type, n_axes;
-        const char *name;
-    } own[] = {
-        {1, NPY_DOUBLE, 1, "float64"}, {2, NPY_DOUBLE, 3, "float64"}, {4, NPY_UINT8, 1, "uint8"}};
-    const void *data[3] = {NULL, NULL, NULL};
-    int64_t     n = MOST_NUMBER;
-    for (int k = 0; k < 3; k++) {
-        PyArrayObject *array = (PyArrayObject *)given[own[k].at];
-        if (given[own[k].at] == Py_None) {
+    int64_t n = MOST_NUMBER;
+    for (int k = 1; k < 4; k++) { /* cutoffs, boxes, axes */
+        PyArrayObject *array = (PyArrayObject *)call->of[k];
+        if (!PyArray_Check(call->of[k]) || (k == 2 && PyArray_NDIM(array) != 3)) {
             continue;
         }
-        if (!hs_is_array(given[own[k].at], own[k].type, own[k].n_axes)) {
-            PyErr_Format(PyExc_TypeError, "a %s array with %d axes is expected", own[k].name,
-                         own[k].n_axes);
+        if (n != MOST_NUMBER && PyArray_DIM(array, 0) != n) {
+            PyErr_SetString(PyExc_ValueError, "cutoffs, boxes and axes are of as many systems");
             return -1;
         }
-        const npy_intp *shape = PyArray_DIMS(array), d = call->points.at.ndim;
-        if ((n != MOST_NUMBER && shape[0] != n) || (k == 1 && call->among.box == NULL) ||
-            (k == 1 && (shape[1] != d || shape[2] != d))) {
-            PyErr_SetString(PyExc_ValueError, "boxes do not fit points, box and cutoffs");
-            return -1;
-        }
-        n = shape[0];
-        data[k] = PyArray_DATA(array);
+        n = PyArray_DIM(array, 0);
     }
-    /* In open space the axes only tell how many systems there are. */
-    *each = (hs_each_system){
-        .cutoffs = data[0], .rows = data[1], .periodic = call->among.box != NULL ? data[2] : NULL};
     return n;
 }
 
 bool
-hs_batch_take(PyObject *given, hs_py_call *call)
+hs_batch_take(PyObject *of_points, PyObject *of_queries, hs_py_call *call)
 {
-    static const char *const names[] = {"batch", "cutoff", "box", "query_batch", "periodic"};
-    hs_batch                *batch = &call->batch;
-    numbered                 points, queries = {.name = "query_batch"};
+    hs_batch *batch = &call->batch;
+    numbered  points, queries = {.name = "query_batch"};
     *batch = (hs_batch){.is_given = true};
-    if (!PyTuple_CheckExact(given) || PyTuple_GET_SIZE(given) != 5 || call->among.cells != NULL) {
-        PyErr_SetString(PyExc_TypeError, "a batch of points must be a tuple of five");
+    if (call->among.cells != NULL) {
+        PyErr_SetString(PyExc_TypeError, "cells are of one system");
         return false;
     }
-    PyObject *const *parts = &PyTuple_GET_ITEM(given, 0);
-    for (int k = 0; k < 5 && call->out != NULL; k++) {
-        if (parts[k] != Py_None && !hs_out_is_apart(call->out, call->letters, parts[k], names[k])) {
-            return false;
-        }
-    }
-    if (!take_numbers(parts[0], call->points.at.n, "batch", &points) ||
-        ((call->among.queries != NULL || parts[3] != Py_None) &&
-         !take_numbers(parts[3], call->queries.at.n, "query_batch", &queries))) {
+    if (!take_numbers(of_points, call->points.at.n, "batch", &points) ||
+        ((call->among.queries != NULL || of_queries != NULL) &&
+         !take_numbers(of_queries, call->queries.at.n, "query_batch", &queries))) {
         return false;
     }
-    const int64_t n_systems = take_own(parts, call, &call->each);
+    const int64_t n_systems = count_systems(call);
     if (n_systems < 0 || !find_systems(&points, &queries, n_systems, batch)) {
-        hs_batch_free(batch);
         return false;
     }
     call->among.each = &call->each;

@@ -148,30 +148,19 @@ static PyMethodDef others[] = {
     {NULL, NULL, 0, NULL},
 };
 
-/* Those of the table, filled when the module is first made. */
-static PyMethodDef searches[HS_FUNCTIONS + 1];
-
-static int
-add_functions(PyObject *module)
-{
-    for (int k = 0; k < HS_FUNCTIONS; k++) {
-        const hs_function *function = &hs_functions[k];
-        searches[k] = (PyMethodDef){function->name, FASTCALL(function->body), METH_FASTCALL, NULL};
-    }
-    return PyModule_AddFunctions(module, searches);
-}
-
 static int
 module_exec(PyObject *module)
 {
     PyObject **types = PyModule_GetState(module);
     hs_environment_read();
-    types[HS_STREAM_TYPE] = hs_py_stream_type(module);
-    types[HS_DYNAMIC_TYPE] = types[HS_STREAM_TYPE] != NULL ? hs_py_dynamic_type(module) : NULL;
-    if (types[HS_DYNAMIC_TYPE] == NULL || hs_py_add_capi(module) < 0 || add_functions(module) < 0) {
+    if (PyArray_ImportNumPyAPI() < 0) {
         return -1;
     }
-    return PyArray_ImportNumPyAPI();
+    types[HS_STREAM_TYPE] = hs_py_stream_type(module);
+    types[HS_DYNAMIC_TYPE] = types[HS_STREAM_TYPE] != NULL ? hs_py_dynamic_type(module) : NULL;
+    return types[HS_DYNAMIC_TYPE] == NULL || hs_py_add_capi(module) < 0
+               ? -1
+               : hs_py_add_functions(module);
 }
 
 static int

@@ -59,13 +59,13 @@ array_over(void *data, int n_dimensions, npy_intp *shape, int type)
     return array;
 }
 
-/* An array with a copy of so many bytes. */
-static PyObject *
-array_like(const void *data, size_t bytes, int n_dimensions, npy_intp *shape, int type)
+PyObject *
+hs_array_like(const void *data, int n_dimensions, npy_intp *shape, int type)
 {
     PyObject *array = PyArray_SimpleNew(n_dimensions, shape, type);
-    if (array != NULL && bytes > 0) {
-        memcpy(PyArray_DATA((PyArrayObject *)array), data, bytes);
+    if (array != NULL && PyArray_NBYTES((PyArrayObject *)array) > 0) {
+        memcpy(PyArray_DATA((PyArrayObject *)array), data,
+               (size_t)PyArray_NBYTES((PyArrayObject *)array));
     }
     return array;
 }
@@ -79,7 +79,7 @@ new_array(hs_pairs *pairs, array_form form)
     if (bytes >= OWN_BYTES) {
         return array_over(hs_pairs_take(pairs, form.which), n_dimensions, shape, form.type);
     }
-    return array_like(hs_pairs_array(pairs, form.which), bytes, n_dimensions, shape, form.type);
+    return hs_array_like(hs_pairs_array(pairs, form.which), n_dimensions, shape, form.type);
 }
 
 static PyObject *
@@ -90,38 +90,46 @@ new_offsets(hs_pairs *rows)
     if (bytes >= OWN_BYTES) {
         return array_over(hs_pairs_take_offsets(rows), 1, &length, NPY_INT64);
     }
-    return array_like(hs_pairs_offsets(rows), bytes, 1, &length, NPY_INT64);
+    return hs_array_like(hs_pairs_offsets(rows), 1, &length, NPY_INT64);
+}
+
+/* A tuple of n arrays, from the one at `first` on one for each letter. */
+static PyObject *
+arrays_in(PyObject *tuple, Py_ssize_t first, hs_pairs *pairs, const char *letters, int ndim,
+          int index_bytes)
+{
+    for (const char *letter = letters; tuple != NULL && *letter != '\0'; letter++) {
+        hs_tuple_put(&tuple, first + (letter - letters),
+                     new_array(pairs, form_of(*letter, ndim, index_bytes)));
+    }
+    return tuple;
 }
 
 PyObject *
 hs_arrays_of(hs_pairs *pairs, const char *letters, int ndim, int index_bytes)
 {
     const Py_ssize_t n = (Py_ssize_t)strlen(letters);
-    if (n == 1) {
-        return new_array(pairs, form_of(letters[0], ndim, index_bytes));
-    }
-    PyObject *result = PyTuple_New(n);
-    for (Py_ssize_t k = 0; result != NULL && k < n; k++) {
-        hs_tuple_put(&result, k, new_array(pairs, form_of(letters[k], ndim, index_bytes)));
-    }
-    return result;
+    return n == 1 ? new_array(pairs, form_of(letters[0], ndim, index_bytes))
+                  : arrays_in(PyTuple_New(n), 0, pairs, letters, ndim, index_bytes);
 }
 
 PyObject *
 hs_table_of(hs_pairs *rows, const char *letters, int ndim, int index_bytes)
 {
-    const Py_ssize_t n = (Py_ssize_t)strlen(letters);
-    PyObject        *table = PyTuple_New(n + 1);
+    PyObject *table = PyTuple_New((Py_ssize_t)strlen(letters) + 1);
     if (table != NULL) {
         hs_tuple_put(&table, 0, new_offsets(rows));
     }
-    for (Py_ssize_t k = 0; table != NULL && k < n; k++) {
-        hs_tuple_put(&table, k + 1, new_array(rows, form_of(letters[k], ndim, index_bytes)));
+    return hs_read_only(arrays_in(table, 1, rows, letters, ndim, index_bytes));
+}
+
+PyObject *
+hs_read_only(PyObject *arrays)
+{
+    for (Py_ssize_t k = 0; arrays != NULL && k < PyTuple_GET_SIZE(arrays); k++) {
+        PyArray_CLEARFLAGS((PyArrayObject *)PyTuple_GET_ITEM(arrays, k), NPY_ARRAY_WRITEABLE);
     }
-    for (Py_ssize_t k = 0; table != NULL && k <= n; k++) {
-        PyArray_CLEARFLAGS((PyArrayObject *)PyTuple_GET_ITEM(table, k), NPY_ARRAY_WRITEABLE);
-    }
-    return table;
+    return arrays;
 }
 
 /* Checks one array of `out`; returns how many pairs it holds, or -1 with an exception set. */
@@ -427,7 +435,7 @@ padded(hs_py_call *call, hs_status status, int64_t n_pairs)
     } else if (status == HS_ERR_CAPACITY) {
         hs_raise_capacity(capacity, needed);
     } else {
-        hs_raise(status, &call->failure, &call->options);
+        hs_py_call_raise(call, status);
     }
     Py_CLEAR(call->room);
     return result;
@@ -436,14 +444,14 @@ padded(hs_py_call *call, hs_status status, int64_t n_pairs)
 PyObject *
 hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs)
 {
-    hs_py_call_end(call);
+    hs_py_call_acquire(call);
     if (call->room != NULL) {
         const int64_t n_pairs = hs_pairs_length(pairs);
         hs_pairs_free(pairs);
         return padded(call, status, n_pairs);
     }
     if (status != HS_OK) {
-        return hs_raise(status, &call->failure, &call->options);
+        return hs_py_call_raise(call, status);
     }
     PyObject *arrays =
         call->out != NULL
@@ -456,9 +464,9 @@ hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs)
 PyObject *
 hs_py_call_table(hs_py_call *call, hs_status status, hs_pairs *rows)
 {
-    hs_py_call_end(call);
+    hs_py_call_acquire(call);
     if (status != HS_OK) {
-        return hs_raise(status, &call->failure, &call->options);
+        return hs_py_call_raise(call, status);
     }
     PyObject *table =
         hs_table_of(rows, call->letters, call->points.at.ndim, call->options.index_bytes);

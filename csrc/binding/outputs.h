@@ -24,6 +24,9 @@ PyObject *hs_arrays_of(hs_pairs *pairs, const char *letters, int ndim, int index
  * it can from the rows; a new reference or NULL. */
 PyObject *hs_table_of(hs_pairs *rows, const char *letters, int ndim, int index_bytes);
 
+/* Arrays that cannot be written to, as a tuple, or NULL; takes the reference. */
+PyObject *hs_read_only(PyObject *arrays);
+
 /* Where there is a capacity: arrays of that length as `out` of the call. False with an exception
  * set. */
 bool hs_out_make_room(hs_py_call *call);
@@ -35,6 +38,9 @@ PyObject *hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs);
 
 /* The same, as a table of rows. */
 PyObject *hs_py_call_table(hs_py_call *call, hs_status status, hs_pairs *rows);
+
+/* An array with a copy of what is there; a new reference or NULL. */
+PyObject *hs_array_like(const void *data, int n_dimensions, npy_intp *shape, int type);
 
 /* n numbers; a new reference, or NULL with an exception set. */
 PyObject *hs_tuple_of_integers(const int64_t *values, int n);

@@ -18,30 +18,22 @@ free_cells(PyObject *capsule)
 }
 
 PyObject *
-hs_py_cells_build(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_cells_build(hs_py_call *call)
 {
-    hs_py_call call;
-    hs_cells  *cells = NULL;
-    (void)module;
-    if (!hs_py_call_take(&call, HS_FN_CELLS_BUILD, arguments, n_arguments)) {
+    hs_cells *cells = NULL;
+    call->options.cell_size = call->real;
+    const void *domain;
+    if (!hs_entries_of(call->own[1], NPY_DOUBLE, 2, 2, call->points.at.ndim,
+                       "domain must be None or an array of two rows", &domain)) {
         return NULL;
     }
-    call.options.cell_size = call.real;
-    PyObject *domain = arguments[HS_CALL_ARGUMENTS + 1];
-    if (domain != Py_None) {
-        if (!hs_is_array(domain, NPY_DOUBLE, 2) || PyArray_DIM((PyArrayObject *)domain, 0) != 2 ||
-            PyArray_DIM((PyArrayObject *)domain, 1) != call.points.at.ndim) {
-            PyErr_SetString(PyExc_TypeError, "domain must be None or an array of two rows");
-            return NULL;
-        }
-        call.options.domain = PyArray_DATA((PyArrayObject *)domain);
-    }
-    hs_py_call_release(&call);
+    call->options.domain = domain;
+    hs_py_call_release(call);
     const hs_status status =
-        hs_cells_build(&call.points.at, call.among.box, &call.options, &cells, &call.failure);
-    hs_py_call_acquire(&call);
+        hs_cells_build(&call->points.at, call->among.box, &call->options, &cells, &call->failure);
+    hs_py_call_acquire(call);
     if (status != HS_OK) {
-        return hs_raise(status, &call.failure, &call.options);
+        return hs_py_call_raise(call, status);
     }
     PyObject *capsule = PyCapsule_New(cells, HS_CELLS_NAME, free_cells);
     if (capsule == NULL) {
@@ -150,21 +142,17 @@ hs_py_cells_find(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argu
 }
 
 PyObject *
-hs_py_cells_candidates(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_cells_candidates(hs_py_call *call)
 {
-    hs_py_call call;
-    hs_pairs  *ranges = NULL;
-    (void)module;
-    if (!hs_py_call_take(&call, HS_FN_CELLS_CANDIDATES, arguments, n_arguments) ||
-        !expect_cells(call.among.cells)) {
+    hs_pairs *ranges = NULL;
+    if (!expect_cells(call->among.cells)) {
         return NULL;
     }
-    hs_py_call_release(&call);
-    const hs_points *queries = call.among.queries != NULL ? &call.queries.at : NULL;
+    hs_py_call_release(call);
+    const hs_points *queries = call->among.queries != NULL ? &call->queries.at : NULL;
     const hs_status  status =
-        hs_cells_candidates(call.among.cells, queries, &call.options, &ranges, &call.failure);
-    hs_py_call_acquire(&call);
-    return hs_py_call_table(&call, status, ranges); /* "ij": where each begins and ends */
+        hs_cells_candidates(call->among.cells, queries, &call->options, &ranges, &call->failure);
+    return hs_py_call_table(call, status, ranges); /* "ij": where each begins and ends */
 }
 
 /* ---- lists for many steps ----------------------------------------------------------------- */
@@ -193,59 +181,42 @@ hs_py_verlet_new(PyObject *module, PyObject *ignored)
     return capsule;
 }
 
-/* A list, and the arguments of a search; false with an exception set. */
-static bool
-take_call(hs_py_call *call, hs_verlet **list, hs_function_number number, PyObject *const *arguments,
-          Py_ssize_t n_arguments)
-{
-    *list = n_arguments > 0 ? PyCapsule_GetPointer(arguments[0], CAPSULE) : NULL;
-    if (n_arguments == 0) {
-        PyErr_Format(PyExc_TypeError, "%s takes a list", hs_functions[number].name);
-    }
-    return *list != NULL && hs_py_call_take(call, number, arguments + 1, n_arguments - 1);
-}
-
 PyObject *
-hs_py_verlet_update(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_verlet_update(hs_py_call *call)
 {
-    hs_py_call call;
-    hs_verlet *list;
+    hs_verlet *list = PyCapsule_GetPointer(call->own[0], CAPSULE);
     bool       rebuilt = false;
-    (void)module;
-    if (!take_call(&call, &list, HS_FN_VERLET_UPDATE, arguments, n_arguments)) {
+    if (list == NULL) {
         return NULL;
     }
-    hs_py_call_release(&call);
-    const hs_status status = hs_verlet_update(list, &call.points.at, call.among.box, &call.options,
-                                              call.real, call.flag, &rebuilt, &call.failure);
-    hs_py_call_acquire(&call);
-    return status == HS_OK ? PyBool_FromLong(rebuilt)
-                           : hs_raise(status, &call.failure, &call.options);
+    hs_py_call_release(call);
+    const hs_status status = hs_verlet_update(list, &call->points.at, call->among.box,
+                                              &call->options, call->real, call->flag, &rebuilt,
+                                              &call->failure);
+    hs_py_call_acquire(call);
+    return status == HS_OK ? PyBool_FromLong(rebuilt) : hs_py_call_raise(call, status);
 }
 
 PyObject *
-hs_py_verlet_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_verlet_pairs(hs_py_call *call)
 {
-    hs_py_call call;
-    hs_verlet *list;
+    hs_verlet *list = PyCapsule_GetPointer(call->own[0], CAPSULE);
     hs_pairs  *pairs = NULL;
-    (void)module;
-    if (!take_call(&call, &list, HS_FN_VERLET_PAIRS, arguments, n_arguments)) {
+    if (list == NULL) {
         return NULL;
     }
     const hs_verlet_state state = hs_verlet_look(list);
-    if (call.points.at.ndim != state.ndim) {
+    if (call->points.at.ndim != state.ndim) {
         PyErr_Format(PyExc_ValueError, "points must have %d dimensions here", state.ndim);
         return NULL;
     }
-    call.points.at.n = state.n_points; /* those given are none: the list has its own */
-    if (arguments[HS_CALL_ARGUMENTS] == Py_None) {
-        call.options.threads = -hs_default_threads();
+    call->points.at.n = state.n_points; /* those given are none: the list has its own */
+    if (call->of[9] == Py_None) {
+        call->options.threads = -hs_default_threads();
     }
-    hs_py_call_release(&call);
-    const hs_status status = hs_verlet_find(list, &call.options, &pairs, &call.failure);
-    hs_py_call_acquire(&call);
-    return hs_py_call_pairs(&call, status, pairs);
+    hs_py_call_release(call);
+    const hs_status status = hs_verlet_find(list, &call->options, &pairs, &call->failure);
+    return hs_py_call_pairs(call, status, pairs);
 }
 
 PyObject *
@@ -269,18 +240,6 @@ hs_py_verlet_look(PyObject *module, PyObject *capsule)
 /* Points between two looks for Ctrl-C: some hundredths of a second in the most skewed box. */
 #define POINTS_PER_CALL 32768
 
-static PyObject *
-heights_and_volume(const double *heights, int ndim, double volume)
-{
-    npy_intp  shape[1] = {ndim};
-    PyObject *array = PyArray_SimpleNew(1, shape, NPY_DOUBLE);
-    if (array == NULL) {
-        return NULL;
-    }
-    memcpy(PyArray_DATA((PyArrayObject *)array), heights, (size_t)ndim * sizeof(double));
-    return Py_BuildValue("(Nd)", array, volume);
-}
-
 PyObject *
 hs_py_box_measure(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
@@ -295,7 +254,7 @@ hs_py_box_measure(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
         PyErr_SetString(PyExc_TypeError, "box_measure takes a box (d, d) and periodic bits");
         return NULL;
     }
-    const npy_intp ndim = PyArray_DIM((PyArrayObject *)arguments[0], 0);
+    npy_intp ndim = PyArray_DIM((PyArrayObject *)arguments[0], 0);
     if (ndim < 1 || ndim > HS_MAX_DIM) {
         PyErr_Format(PyExc_ValueError, "box must have shape (d, d) with 1 <= d <= %d", HS_MAX_DIM);
         return NULL;
@@ -305,10 +264,9 @@ hs_py_box_measure(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
         return NULL;
     }
     const hs_status status = hs_box_measure(&box, heights, &volume, &failure);
-    if (status != HS_OK) {
-        return hs_raise(status, &failure, NULL);
-    }
-    return heights_and_volume(heights, (int)ndim, volume);
+    return status == HS_OK
+               ? Py_BuildValue("(Nd)", hs_array_like(heights, 1, &ndim, NPY_DOUBLE), volume)
+               : hs_raise(status, &failure, NULL);
 }
 
 /* What is done with some rows of points, which begin at row `first`. */

@@ -75,45 +75,18 @@ key_of(const py_dynamic *self, PyObject *object, hs_key *key)
     return true;
 }
 
-/* Numbers of a float64 array, or the floats of a list or tuple; false for all else. */
-static bool
-plain_position(PyObject *object, int ndim, double *position)
-{
-    if (PyArray_Check(object)) {
-        PyArrayObject *array = (PyArrayObject *)object;
-        if (PyArray_TYPE(array) != NPY_DOUBLE || PyArray_NDIM(array) != 1 ||
-            PyArray_DIM(array, 0) != ndim || !PyArray_ISCARRAY_RO(array) ||
-            !PyArray_CheckExact(object)) {
-            return false;
-        }
-        memcpy(position, PyArray_DATA(array), (size_t)ndim * sizeof *position);
-        return true;
-    }
-    if ((!PyTuple_CheckExact(object) && !PyList_CheckExact(object)) ||
-        PySequence_Fast_GET_SIZE(object) != ndim) {
-        return false;
-    }
-    for (int k = 0; k < ndim; k++) {
-        PyObject *item = PySequence_Fast_GET_ITEM(object, k);
-        if (!PyFloat_CheckExact(item)) {
-            return false;
-        }
-        position[k] = PyFloat_AS_DOUBLE(item);
-    }
-    return true;
-}
-
 static bool
 position_of(const py_dynamic *self, PyObject *object, double *position)
 {
-    if (plain_position(object, self->ndim, position)) {
+    if (hs_numbers_of(object, self->ndim, position)) {
         return true;
     }
-    PyObject *array = PyObject_CallFunction(self->convert, "Oi", object, self->ndim);
+    PyObject *array =
+        PyErr_Occurred() ? NULL : PyObject_CallFunction(self->convert, "Oi", object, self->ndim);
     if (array == NULL) {
         return false;
     }
-    const bool is_plain = plain_position(array, self->ndim, position);
+    const bool is_plain = hs_numbers_of(array, self->ndim, position);
     Py_DECREF(array);
     if (!is_plain) {
         PyErr_SetString(PyExc_TypeError, "position must be real numbers");
@@ -145,34 +118,25 @@ keys_array(const py_dynamic *self, const hs_key *keys, int64_t n)
 static PyObject *
 raise_radius(const py_dynamic *self, const hs_failure *failure)
 {
-    PyObject *radius = PyFloat_FromDouble(failure->value);
-    PyObject *most = PyFloat_FromDouble(self->max_radius);
-    if (radius != NULL && most != NULL) {
-        PyErr_Format(PyExc_ValueError,
-                     "radius must be from 0 to max_radius, got radius = %R with max_radius = %R",
-                     radius, most);
-    }
-    Py_XDECREF(radius);
-    Py_XDECREF(most);
-    return NULL;
+    char radius[32], most[32];
+    return PyErr_Format(PyExc_ValueError,
+                        "radius must be from 0 to max_radius, got radius = %s with max_radius = %s",
+                        hs_format_real(failure->value, radius),
+                        hs_format_real(self->max_radius, most));
 }
 
 static PyObject *
 raise_coordinate(const hs_failure *failure)
 {
-    char name[64];
+    char      name[64], value[32];
+    const int column = (int)failure->column;
     if (failure->row >= 0) {
-        PyOS_snprintf(name, sizeof name, "positions[%lld, %lld]", (long long)failure->row,
-                      (long long)failure->column);
+        PyOS_snprintf(name, sizeof name, "positions[%lld, %d]", (long long)failure->row, column);
     } else {
-        PyOS_snprintf(name, sizeof name, "position[%lld]", (long long)failure->column);
+        PyOS_snprintf(name, sizeof name, "position[%d]", column);
     }
-    PyObject *value = PyFloat_FromDouble(failure->value);
-    if (value != NULL) {
-        PyErr_Format(PyExc_ValueError, "%s must be finite, got %R", name, value);
-        Py_DECREF(value);
-    }
-    return NULL;
+    return PyErr_Format(PyExc_ValueError, "%s must be finite, got %s", name,
+                        hs_format_real(failure->value, value));
 }
 
 static PyObject *
@@ -182,24 +146,22 @@ raise_far(const hs_failure *failure)
     if (failure->row >= 0) {
         PyOS_snprintf(name, sizeof name, "positions[%lld]", (long long)failure->row);
     }
-    PyErr_Format(PyExc_OverflowError,
-                 "%s lies 2**51 boxes away, or more, if only in a direction in which a box that "
-                 "is oblique to it does not repeat: wrap it into the box first",
-                 name);
-    return NULL;
+    return PyErr_Format(PyExc_OverflowError,
+                        "%s lies 2**51 boxes away, or more, if only in a direction in which a box "
+                        "that is oblique to it does not repeat: wrap it into the box first",
+                        name);
 }
 
 static PyObject *
 raise_grid(const hs_failure *failure)
 {
     char needed[32], limit[32];
-    PyErr_Format(
+    return PyErr_Format(
         PyExc_ValueError,
         "storage=\"dense\" would need %s for its cells, to reach this far; %s are allowed: "
         "use storage=\"hash\"",
         hs_format_bytes(failure->expected_bytes, needed, sizeof needed),
         hs_format_bytes(failure->limit_bytes, limit, sizeof limit));
-    return NULL;
 }
 
 /* The exception for a status; `key`, or NULL, is named where one is at fault. Returns NULL. */
@@ -492,32 +454,15 @@ free_found(gathered *found)
     free(found->shifts);
 }
 
-static PyObject *
-shifts_array(const gathered *found)
-{
-    npy_intp  shape[2] = {(npy_intp)found->n, found->self->ndim};
-    PyObject *array = PyArray_SimpleNew(2, shape, NPY_INT32);
-    if (array != NULL && found->n > 0) {
-        memcpy(PyArray_DATA((PyArrayObject *)array), found->shifts,
-               (size_t)(found->n * found->self->ndim) * sizeof *found->shifts);
-    }
-    return array;
-}
-
 /* Keys, or keys and shifts. */
 static PyObject *
 arrays_of(const gathered *found)
 {
+    npy_intp  shape[2] = {(npy_intp)found->n, found->self->ndim};
     PyObject *keys = keys_array(found->self, found->keys, found->n);
-    if (!found->with_shift || keys == NULL) {
-        return keys;
-    }
-    PyObject *both = PyTuple_New(2);
-    hs_tuple_put(&both, 0, keys);
-    if (both != NULL) {
-        hs_tuple_put(&both, 1, shifts_array(found));
-    }
-    return both;
+    return found->with_shift && keys != NULL
+               ? Py_BuildValue("(NN)", keys, hs_array_like(found->shifts, 2, shape, NPY_INT32))
+               : keys;
 }
 
 /* The arrays, or what ended the visits: a status, or that of `take`. */
@@ -635,14 +580,7 @@ within_many(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
         Py_DECREF(offsets);
         return NULL;
     }
-    PyObject *result = PyTuple_New(2);
-    hs_tuple_put(&result, 0, offsets);
-    if (result != NULL) {
-        hs_tuple_put(&result, 1, arrays);
-    } else {
-        Py_DECREF(arrays);
-    }
-    return result;
+    return Py_BuildValue("(NN)", offsets, arrays);
 }
 
 typedef hs_status put_fn(hs_dynamic *, hs_key, const double *, hs_failure *);
@@ -721,12 +659,7 @@ position_of_key(PyObject *object, PyObject *argument)
     if (status != HS_OK) {
         return raise_dynamic(self, status, NULL, argument);
     }
-    PyObject *array = PyArray_SimpleNew(1, &shape, NPY_DOUBLE);
-    if (array != NULL) {
-        memcpy(PyArray_DATA((PyArrayObject *)array), position,
-               (size_t)self->ndim * sizeof *position);
-    }
-    return array;
+    return hs_array_like(position, 1, &shape, NPY_DOUBLE);
 }
 
 static PyObject *
@@ -805,29 +738,33 @@ shrink(PyObject *object, PyObject *ignored)
     Py_RETURN_NONE;
 }
 
+/* An object that owns the list, also on failure; NULL with an exception set. */
 static PyObject *
-copy(PyObject *object, PyObject *ignored)
+own(PyTypeObject *type, hs_dynamic *list, PyObject *convert, int ndim, bool tagged)
 {
-    py_dynamic   *self = (py_dynamic *)object;
-    PyTypeObject *type = Py_TYPE(object);
-    hs_dynamic   *list;
-    (void)ignored;
-    const hs_status status = hs_dynamic_copy(self->list, &list);
-    if (status != HS_OK) {
-        return raise_dynamic(self, status, NULL, NULL);
-    }
     py_dynamic *made = (py_dynamic *)type->tp_alloc(type, 0);
     if (made == NULL) {
         hs_dynamic_free(list);
         return NULL;
     }
-    made->list = list;
     hs_dynamic_hook(list, &hooks);
-    made->convert = Py_NewRef(self->convert);
-    made->ndim = self->ndim;
-    made->tagged = self->tagged;
-    made->max_radius = self->max_radius;
+    made->list = list;
+    made->convert = Py_NewRef(convert);
+    made->ndim = ndim;
+    made->tagged = tagged;
+    made->max_radius = hs_dynamic_look(list).max_radius;
     return (PyObject *)made;
+}
+
+static PyObject *
+copy(PyObject *object, PyObject *ignored)
+{
+    const py_dynamic *self = (py_dynamic *)object;
+    hs_dynamic       *list;
+    (void)ignored;
+    const hs_status status = hs_dynamic_copy(self->list, &list);
+    return status == HS_OK ? own(Py_TYPE(object), list, self->convert, self->ndim, self->tagged)
+                           : raise_dynamic(self, status, NULL, NULL);
 }
 
 static PyObject *
@@ -945,12 +882,9 @@ raise_new(hs_status status, const hs_failure *failure)
         [HS_LENGTH_BOX] =
             "entries of periodic box vectors must be 0 or from 2**-300 to 2**300 in size"};
     if (status == HS_ERR_CUTOFF && failure->column >= 0 && failure->column <= HS_LENGTH_BOX) {
-        PyObject *value = PyFloat_FromDouble(failure->value);
-        if (value != NULL) {
-            PyErr_Format(PyExc_ValueError, "%s, got %R", must[failure->column], value);
-            Py_DECREF(value);
-        }
-        return NULL;
+        char value[32];
+        return PyErr_Format(PyExc_ValueError, "%s, got %s", must[failure->column],
+                            hs_format_real(failure->value, value));
     }
     return hs_raise(status, failure, NULL);
 }
@@ -985,16 +919,5 @@ hs_py_dynamic_new(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     if (status != HS_OK) {
         return raise_new(status, &failure);
     }
-    py_dynamic *self = (py_dynamic *)type->tp_alloc(type, 0);
-    if (self == NULL) {
-        hs_dynamic_free(list);
-        return NULL;
-    }
-    self->list = list;
-    hs_dynamic_hook(list, &hooks);
-    self->convert = Py_NewRef(arguments[8]);
-    self->ndim = options.ndim;
-    self->tagged = PyObject_IsTrue(arguments[7]) == 1;
-    self->max_radius = hs_dynamic_look(list).max_radius;
-    return (PyObject *)self;
+    return own(type, list, arguments[8], options.ndim, PyObject_IsTrue(arguments[7]) == 1);
 }

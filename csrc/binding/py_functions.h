@@ -37,25 +37,26 @@ hs_py_search hs_py_cells_build, hs_py_cells_candidates, hs_py_verlet_update, hs_
 /* cells -> dict of what is visible of them; the arrays are read-only and borrow from the cells. */
 PyObject *hs_py_cells_layout(PyObject *module, PyObject *cells);
 /* cells, points -> the cell of each point. */
-hs_py_search hs_py_cells_find;
+PyObject *hs_py_cells_find(PyObject *module, PyObject *const *arguments, Py_ssize_t n);
 /* A new list; a list -> dict of its state. */
 PyObject *hs_py_verlet_new(PyObject *module, PyObject *ignored);
 PyObject *hs_py_verlet_look(PyObject *module, PyObject *list);
 /* box, periodic -> (heights, volume). */
-hs_py_search hs_py_box_measure;
+PyObject *hs_py_box_measure(PyObject *module, PyObject *const *arguments, Py_ssize_t n);
 /* points, box, periodic -> (wrapped, shifts). */
-hs_py_search hs_py_box_wrap;
+PyObject *hs_py_box_wrap(PyObject *module, PyObject *const *arguments, Py_ssize_t n);
 /* points, box or None, periodic, cutoff, largest -> (places, repeats, reach, width). */
-hs_py_search hs_py_box_places;
+PyObject *hs_py_box_places(PyObject *module, PyObject *const *arguments, Py_ssize_t n);
 
 /* py_nodes.c */
 hs_py_search hs_py_connect, hs_py_connect_search, hs_py_overlap, hs_py_intersect, hs_py_pair_rows,
     hs_py_keep_rows, hs_py_rows_without;
 /* points, p, q -> bools; points, low, high -> keys. */
-hs_py_search hs_py_feet_between, hs_py_morton_keys;
+PyObject *hs_py_feet_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n);
+PyObject *hs_py_morton_keys(PyObject *module, PyObject *const *arguments, Py_ssize_t n);
 
 /* py_dynamic.c: dim, cell_size, box or None, periodic (bits), storage (a number), max_radius or 0,
  * inclusive, tagged, what makes arrays of positions -> a list. */
-hs_py_search hs_py_dynamic_new;
+PyObject *hs_py_dynamic_new(PyObject *module, PyObject *const *arguments, Py_ssize_t n);
 
 #endif

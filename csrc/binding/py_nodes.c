@@ -11,13 +11,6 @@
 
 /* ---- arguments and results ---------------------------------------------------------------- */
 
-/* The arguments of one call; it cannot be moved, as hs_py_call. */
-typedef struct node_call {
-    hs_py_call       call;
-    hs_node_lists    lists;
-    PyObject *const *own; /* borrowed: the arguments behind those of every search */
-} node_call;
-
 /* The bits of `flags`. */
 enum { GHOST_ROWS = 1, GHOST_PAIRS = 2, ROWS_ONLY = 4, DIRECTED = 8 };
 
@@ -124,28 +117,6 @@ take_lists(PyObject *const *arguments, const hs_py_call *call, hs_node_lists *li
     return true;
 }
 
-/* Takes the arguments of a function. n_nodes, n_ghosts and number are own[lists_at] and those
- * behind it, and the call's integer has the flags, unless lists_at is -1. */
-static bool
-take_call(node_call *call, hs_function_number number, int lists_at, PyObject *const *arguments,
-          Py_ssize_t n_arguments)
-{
-    call->own = arguments + HS_CALL_ARGUMENTS;
-    call->lists = (hs_node_lists){.n_lists = 0};
-    return hs_py_call_take(&call->call, number, arguments, n_arguments) &&
-           (lists_at < 0 || take_lists(call->own + lists_at, &call->call, &call->lists));
-}
-
-/* Arrays that cannot be written to, as a tuple; takes the reference. */
-static PyObject *
-read_only(PyObject *arrays)
-{
-    for (Py_ssize_t k = 0; arrays != NULL && k < PyTuple_GET_SIZE(arrays); k++) {
-        PyArray_CLEARFLAGS((PyArrayObject *)PyTuple_GET_ITEM(arrays, k), NPY_ARRAY_WRITEABLE);
-    }
-    return arrays;
-}
-
 static bool
 has_shifts(const hs_pairs *pairs)
 {
@@ -163,8 +134,9 @@ static PyObject *
 pairs_of(hs_connectivity *made, int ndim)
 {
     hs_pairs *const nodes = hs_connectivity_pairs(made);
-    PyObject *of_nodes = read_only(hs_arrays_of(nodes, has_shifts(nodes) ? "ijS" : "ij", ndim, 4));
-    PyObject *of_lists = read_only(hs_arrays_of(hs_connectivity_lists(made), "ij", ndim, 4));
+    PyObject       *of_nodes =
+        hs_read_only(hs_arrays_of(nodes, has_shifts(nodes) ? "ijS" : "ij", ndim, 4));
+    PyObject *of_lists = hs_read_only(hs_arrays_of(hs_connectivity_lists(made), "ij", ndim, 4));
     if (of_nodes == NULL || of_lists == NULL) {
         Py_XDECREF(of_nodes);
         Py_XDECREF(of_lists);
@@ -173,14 +145,15 @@ pairs_of(hs_connectivity *made, int ndim)
     return Py_BuildValue("(NN)", of_nodes, of_lists);
 }
 
-/* What a function returns, the GIL taken, from a result that is freed; NULL with an exception set
+/* What a function returns from a result that is freed; NULL with an exception set
  * for a status other than HS_OK. Of rows offsets and indices, and shifts of ndim components where
  * there are any; of a connectivity (rows, (nodes, lists)), None for what is not wanted. */
 static PyObject *
-give_rows(node_call *call, hs_status status, hs_pairs *rows, int ndim)
+give_rows(hs_py_call *call, hs_status status, hs_pairs *rows, int ndim)
 {
+    hs_py_call_acquire(call);
     if (status != HS_OK) {
-        return hs_raise(status, &call->call.failure, &call->call.options);
+        return hs_py_call_raise(call, status);
     }
     PyObject *arrays = rows_of(rows, ndim);
     hs_pairs_free(rows);
@@ -190,10 +163,11 @@ give_rows(node_call *call, hs_status status, hs_pairs *rows, int ndim)
 enum { ROWS_WANTED = 1, PAIRS_WANTED = 2 };
 
 static PyObject *
-give_parts(node_call *call, hs_status status, hs_connectivity *made, int wanted, int ndim)
+give_parts(hs_py_call *call, hs_status status, hs_connectivity *made, int wanted, int ndim)
 {
+    hs_py_call_acquire(call);
     if (status != HS_OK) {
-        return hs_raise(status, &call->call.failure, &call->call.options);
+        return hs_py_call_raise(call, status);
     }
     PyObject *rows = wanted & ROWS_WANTED ? rows_of(hs_connectivity_rows(made), ndim)
                                           : Py_NewRef(Py_None);
@@ -211,87 +185,76 @@ give_parts(node_call *call, hs_status status, hs_connectivity *made, int wanted,
 
 /* What the caller wants of a connectivity. */
 static int
-wanted_of(const node_call *call)
+wanted_of(const hs_node_lists *lists)
 {
-    return call->lists.rows_only ? ROWS_WANTED : ROWS_WANTED | PAIRS_WANTED;
+    return lists->rows_only ? ROWS_WANTED : ROWS_WANTED | PAIRS_WANTED;
 }
 
 PyObject *
-hs_py_connect(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_connect(hs_py_call *call)
 {
-    node_call        c;
+    hs_node_lists    lists;
     hs_half_list     half;
     hs_connectivity *made = NULL;
-    (void)module;
-    if (!take_call(&c, HS_FN_CONNECT, 3, arguments, n_arguments) ||
-        !take_half(c.own, c.own[2], &half)) {
+    if (!take_lists(call->own + 3, call, &lists) || !take_half(call->own, call->own[2], &half)) {
         return NULL;
     }
-    hs_py_call_release(&c.call);
+    hs_py_call_release(call);
     const hs_status status =
-        hs_connectivity_link(&half, &c.lists, &c.call.options, &made, &c.call.failure);
-    hs_py_call_acquire(&c.call);
-    return give_parts(&c, status, made, wanted_of(&c), half.ndim);
+        hs_connectivity_link(&half, &lists, &call->options, &made, &call->failure);
+    return give_parts(call, status, made, wanted_of(&lists), half.ndim);
 }
 
 PyObject *
-hs_py_connect_search(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_connect_search(hs_py_call *call)
 {
-    node_call        c;
+    hs_node_lists    lists;
     hs_connectivity *made = NULL;
-    (void)module;
-    if (!take_call(&c, HS_FN_CONNECT_SEARCH, 0, arguments, n_arguments)) {
+    if (!take_lists(call->own, call, &lists)) {
         return NULL;
     }
-    hs_py_call_release(&c.call);
+    hs_py_call_release(call);
     const hs_status status =
-        hs_connectivity_build(&c.call.among, &c.lists, &c.call.options, &made, &c.call.failure);
-    hs_py_call_acquire(&c.call);
-    return give_parts(&c, status, made, wanted_of(&c), c.call.points.at.ndim);
+        hs_connectivity_build(&call->among, &lists, &call->options, &made, &call->failure);
+    return give_parts(call, status, made, wanted_of(&lists), call->points.at.ndim);
 }
 
 PyObject *
-hs_py_overlap(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_overlap(hs_py_call *call)
 {
-    node_call     c;
+    hs_node_lists lists;
     hs_index_rows gather;
     hs_pairs     *rows = NULL;
-    (void)module;
-    if (!take_call(&c, HS_FN_OVERLAP, 3, arguments, n_arguments)) {
+    if (!take_lists(call->own + 3, call, &lists)) {
         return NULL;
     }
-    gather.n = c.call.points.at.n;
-    gather.offsets = entries_of(c.own[0], NPY_INT64, gather.n + 1, NULL);
-    gather.indices = gather.offsets != NULL ? entries_of(c.own[1], NPY_INT32, -1, &gather.n_indices)
-                                            : NULL;
+    gather.n = call->points.at.n;
+    gather.offsets = entries_of(call->own[0], NPY_INT64, gather.n + 1, NULL);
+    gather.indices =
+        gather.offsets != NULL ? entries_of(call->own[1], NPY_INT32, -1, &gather.n_indices) : NULL;
     if (gather.indices == NULL ||
-        !take_shifts(c.own[2], gather.n_indices, &gather.shift, &gather.ndim)) {
+        !take_shifts(call->own[2], gather.n_indices, &gather.shift, &gather.ndim)) {
         return NULL;
     }
-    hs_py_call_release(&c.call);
-    const hs_status status = hs_connectivity_overlap(&c.call.points.at, &gather, &c.lists,
-                                                     &c.call.options, &rows, &c.call.failure);
-    hs_py_call_acquire(&c.call);
-    return give_rows(&c, status, rows, gather.ndim);
+    hs_py_call_release(call);
+    const hs_status status = hs_connectivity_overlap(&call->points.at, &gather, &lists,
+                                                     &call->options, &rows, &call->failure);
+    return give_rows(call, status, rows, gather.ndim);
 }
 
 PyObject *
-hs_py_intersect(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_intersect(hs_py_call *call)
 {
-    node_call    c;
-    hs_half_list half;
-    hs_pairs    *result = NULL;
-    (void)module;
-    if (!take_call(&c, HS_FN_INTERSECT, 3, arguments, n_arguments) ||
-        !take_half(c.own, c.own[2], &half)) {
+    hs_node_lists lists;
+    hs_half_list  half;
+    hs_pairs     *result = NULL;
+    if (!take_lists(call->own + 3, call, &lists) || !take_half(call->own, call->own[2], &half)) {
         return NULL;
     }
-    hs_py_call_release(&c.call);
-    const hs_status status = hs_connectivity_intersect(&c.call.points.at, c.call.among.box, &half,
-                                                       &c.lists, &c.call.options, &result,
-                                                       &c.call.failure);
-    hs_py_call_acquire(&c.call);
-    return give_rows(&c, status, result, half.ndim);
+    hs_py_call_release(call);
+    const hs_status status = hs_connectivity_intersect(
+        &call->points.at, call->among.box, &half, &lists, &call->options, &result, &call->failure);
+    return give_rows(call, status, result, half.ndim);
 }
 
 /* A new array, or an exception for a status other than HS_OK; takes the reference. */
@@ -305,26 +268,39 @@ checked(PyObject *array, hs_status status, const hs_failure *failure)
     return hs_raise(status, failure, NULL);
 }
 
+/* points and two of their kind, and a new array of so many entries; NULL with an exception set. */
+static PyObject *
+take_three(PyObject *const *arguments, Py_ssize_t n_arguments, const char *name, int type,
+           hs_points *points, const double *two[2])
+{
+    if (!hs_expect_arguments(name, n_arguments, 3) ||
+        !hs_points_of(arguments[0], "points", points)) {
+        return NULL;
+    }
+    for (int k = 0; k < 2; k++) {
+        two[k] = entries_of(arguments[k + 1], NPY_DOUBLE, points->ndim, NULL);
+        if (two[k] == NULL) {
+            return NULL;
+        }
+    }
+    npy_intp n = (npy_intp)points->n;
+    return PyArray_SimpleNew(1, &n, type);
+}
+
 /* points, p, q -> whether the foot of each is between them. */
 PyObject *
 hs_py_feet_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_points  points;
-    hs_failure failure;
+    hs_points     points;
+    hs_failure    failure;
+    const double *ends[2];
     (void)module;
-    if (!hs_expect_arguments("feet_between", n_arguments, 3) ||
-        !hs_points_of(arguments[0], "points", &points)) {
-        return NULL;
-    }
-    const double *p = entries_of(arguments[1], NPY_DOUBLE, points.ndim, NULL);
-    const double *q = p != NULL ? entries_of(arguments[2], NPY_DOUBLE, points.ndim, NULL) : NULL;
-    npy_intp      n = (npy_intp)points.n;
-    PyObject     *array = q != NULL ? PyArray_SimpleNew(1, &n, NPY_BOOL) : NULL;
+    PyObject *array = take_three(arguments, n_arguments, "feet_between", NPY_BOOL, &points, ends);
     if (array == NULL) {
         return NULL;
     }
     const hs_status status =
-        hs_feet_between(&points, p, q, PyArray_DATA((PyArrayObject *)array), &failure);
+        hs_feet_between(&points, ends[0], ends[1], PyArray_DATA((PyArrayObject *)array), &failure);
     return checked(array, status, &failure);
 }
 
@@ -332,45 +308,35 @@ hs_py_feet_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_ar
 PyObject *
 hs_py_morton_keys(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_points  points;
-    hs_failure failure;
-    hs_status  status;
+    hs_points     points;
+    hs_failure    failure;
+    hs_status     status;
+    const double *range[2];
     (void)module;
-    if (!hs_expect_arguments("morton_keys", n_arguments, 3) ||
-        !hs_points_of(arguments[0], "points", &points)) {
-        return NULL;
-    }
-    const double *low = entries_of(arguments[1], NPY_DOUBLE, points.ndim, NULL);
-    const double *high = low != NULL ? entries_of(arguments[2], NPY_DOUBLE, points.ndim, NULL)
-                                     : NULL;
-    npy_intp      n = (npy_intp)points.n;
-    PyObject     *array = high != NULL ? PyArray_SimpleNew(1, &n, NPY_UINT64) : NULL;
+    PyObject *array = take_three(arguments, n_arguments, "morton_keys", NPY_UINT64, &points, range);
     if (array == NULL) {
         return NULL;
     }
     uint64_t *keys = PyArray_DATA((PyArrayObject *)array);
     Py_BEGIN_ALLOW_THREADS
-    status = hs_morton_keys(&points, low, high, keys, &failure);
+    status = hs_morton_keys(&points, range[0], range[1], keys, &failure);
     Py_END_ALLOW_THREADS
     return checked(array, status, &failure);
 }
 
 PyObject *
-hs_py_pair_rows(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_pair_rows(hs_py_call *call)
 {
-    node_call        c;
+    hs_node_lists    lists;
     hs_list_rows     rows;
     hs_connectivity *made = NULL;
-    (void)module;
-    if (!take_call(&c, HS_FN_PAIR_ROWS, 3, arguments, n_arguments) ||
-        !take_rows(c.own, c.lists.n_lists, &rows)) {
+    if (!take_lists(call->own + 3, call, &lists) || !take_rows(call->own, lists.n_lists, &rows)) {
         return NULL;
     }
-    hs_py_call_release(&c.call);
+    hs_py_call_release(call);
     const hs_status status =
-        hs_connectivity_pair(&rows, &c.lists, &c.call.options, &made, &c.call.failure);
-    hs_py_call_acquire(&c.call);
-    return give_parts(&c, status, made, PAIRS_WANTED, rows.ndim);
+        hs_connectivity_pair(&rows, &lists, &call->options, &made, &call->failure);
+    return give_parts(call, status, made, PAIRS_WANTED, rows.ndim);
 }
 
 /* n_nodes, target, place or None. */
@@ -402,49 +368,41 @@ take_change(PyObject *n_nodes, PyObject *target, PyObject *places, hs_node_chang
 }
 
 PyObject *
-hs_py_keep_rows(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_keep_rows(hs_py_call *call)
 {
-    node_call      c;
     hs_node_change change;
     hs_list_rows   rows;
     const int64_t *source = NULL;
     int64_t        n = 0;
     hs_pairs      *result = NULL;
-    (void)module;
-    if (!take_call(&c, HS_FN_KEEP_ROWS, -1, arguments, n_arguments) ||
-        !take_change(c.own[3], c.own[4], c.own[5], &change) ||
-        !take_rows(c.own, change.n_lists, &rows)) {
+    if (!take_change(call->own[3], call->own[4], call->own[5], &change) ||
+        !take_rows(call->own, change.n_lists, &rows)) {
         return NULL;
     }
     n = rows.n;
-    if (c.own[6] != Py_None) {
-        source = entries_of(c.own[6], NPY_INT64, -1, &n);
+    if (call->own[6] != Py_None) {
+        source = entries_of(call->own[6], NPY_INT64, -1, &n);
         if (source == NULL) {
             return NULL;
         }
     }
-    hs_py_call_release(&c.call);
+    hs_py_call_release(call);
     const hs_status status =
-        hs_rows_keep(&rows, &change, source, n, &c.call.options, &result, &c.call.failure);
-    hs_py_call_acquire(&c.call);
-    return give_rows(&c, status, result, rows.ndim);
+        hs_rows_keep(&rows, &change, source, n, &call->options, &result, &call->failure);
+    return give_rows(call, status, result, rows.ndim);
 }
 
 PyObject *
-hs_py_rows_without(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_rows_without(hs_py_call *call)
 {
-    node_call    c;
     hs_list_rows rows, without;
     hs_pairs    *result = NULL;
-    (void)module;
-    if (!take_call(&c, HS_FN_ROWS_WITHOUT, -1, arguments, n_arguments) ||
-        !take_rows(c.own, c.call.integer, &rows) ||
-        !take_rows(c.own + 3, c.call.integer, &without)) {
+    if (!take_rows(call->own, call->integer, &rows) ||
+        !take_rows(call->own + 3, call->integer, &without)) {
         return NULL;
     }
-    hs_py_call_release(&c.call);
+    hs_py_call_release(call);
     const hs_status status =
-        hs_rows_without(&rows, &without, c.call.flag, &c.call.options, &result, &c.call.failure);
-    hs_py_call_acquire(&c.call);
-    return give_rows(&c, status, result, rows.ndim);
+        hs_rows_without(&rows, &without, call->flag, &call->options, &result, &call->failure);
+    return give_rows(call, status, result, rows.ndim);
 }

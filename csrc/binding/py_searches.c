@@ -11,87 +11,34 @@
 #include <stdio.h>
 #include <string.h>
 
-/* What the core fills for a call, without the GIL. */
-typedef hs_status find_fn(hs_py_call *call, void *found);
-
-static hs_status
-without_gil(hs_py_call *call, find_fn *find, void *found)
-{
-    hs_py_call_release(call);
-    const hs_status status = find(call, found);
-    hs_py_call_acquire(call);
-    hs_py_call_end(call);
-    return status;
-}
-
-/* An array that the core has filled, or has failed to; takes the reference. */
-static PyObject *
-filled(const hs_py_call *call, hs_status status, PyObject *array)
-{
-    if (status != HS_OK) {
-        Py_DECREF(array);
-        return hs_raise(status, &call->failure, &call->options);
-    }
-    return array;
-}
-
 /* ---- pairs and rows ----------------------------------------------------------------------- */
 
-static hs_status
-find_half(hs_py_call *call, void *found)
+PyObject *
+hs_py_pairs(hs_py_call *call)
 {
-    return hs_pairs_find(&call->among, &call->options, found, &call->failure);
-}
-
-static hs_status
-find_full(hs_py_call *call, void *found)
-{
-    return hs_neighbors_find(&call->among, &call->options, found, &call->failure);
-}
-
-static hs_status
-find_nearest(hs_py_call *call, void *found)
-{
-    return hs_nearest_find(&call->among, call->integer, &call->options, found, &call->failure);
+    hs_pairs *pairs = NULL;
+    hs_py_call_release(call);
+    const hs_status status = hs_pairs_find(&call->among, &call->options, &pairs, &call->failure);
+    return hs_py_call_pairs(call, status, pairs);
 }
 
 PyObject *
-hs_py_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_pairs_between(hs_py_call *call)
 {
-    hs_py_call call;
-    hs_pairs  *pairs = NULL;
-    (void)module;
-    if (!hs_py_call_take(&call, HS_FN_PAIRS, arguments, n_arguments)) {
-        return NULL;
-    }
-    const hs_status status = without_gil(&call, find_half, &pairs);
-    return hs_py_call_pairs(&call, status, pairs);
+    hs_pairs *pairs = NULL;
+    hs_py_call_release(call);
+    const hs_status status =
+        hs_neighbors_find(&call->among, &call->options, &pairs, &call->failure);
+    return hs_py_call_pairs(call, status, pairs);
 }
 
 PyObject *
-hs_py_pairs_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_neighbors(hs_py_call *call)
 {
-    hs_py_call call;
-    hs_pairs  *pairs = NULL;
-    (void)module;
-    if (!hs_py_call_take(&call, HS_FN_PAIRS_BETWEEN, arguments, n_arguments)) {
-        return NULL;
-    }
-    const hs_status status = without_gil(&call, find_full, &pairs);
-    return hs_py_call_pairs(&call, status, pairs);
-}
-
-PyObject *
-hs_py_neighbors(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
-{
-    hs_py_call call;
-    hs_pairs  *rows = NULL;
-    (void)module;
-    if (!hs_py_call_take(&call, HS_FN_NEIGHBORS, arguments, n_arguments)) {
-        return NULL;
-    }
-    const hs_status status = without_gil(&call, find_full, &rows);
-    return hs_py_call_table(&call, status, rows);
+    hs_pairs *rows = NULL;
+    hs_py_call_release(call);
+    const hs_status status = hs_neighbors_find(&call->among, &call->options, &rows, &call->failure);
+    return hs_py_call_table(call, status, rows);
 }
 
 /* Rows have k entries: what they need is known, and fewer would do. */
@@ -118,37 +65,18 @@ raise_memory_of_rows(const hs_failure *failure)
 }
 
 PyObject *
-hs_py_nearest(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_nearest(hs_py_call *call)
 {
-    hs_py_call call;
-    hs_pairs  *rows = NULL;
-    (void)module;
-    if (!hs_py_call_take(&call, HS_FN_NEAREST, arguments, n_arguments)) {
-        return NULL;
-    }
-    if (call.integer < 1) {
-        hs_py_call_end(&call);
-        PyErr_SetString(PyExc_ValueError, "k must be 1 or more");
-        return NULL;
-    }
-    const hs_status status = without_gil(&call, find_nearest, &rows);
-    return status == HS_ERR_MEMORY ? raise_memory_of_rows(&call.failure)
-                                   : hs_py_call_pairs(&call, status, rows);
+    hs_pairs *rows = NULL;
+    hs_py_call_release(call);
+    const hs_status status =
+        hs_nearest_find(&call->among, call->integer, &call->options, &rows, &call->failure);
+    hs_py_call_acquire(call);
+    return status == HS_ERR_MEMORY ? raise_memory_of_rows(&call->failure)
+                                   : hs_py_call_pairs(call, status, rows);
 }
 
 /* ---- counts ------------------------------------------------------------------------------- */
-
-static hs_status
-count_all(hs_py_call *call, void *found)
-{
-    return hs_pairs_count(&call->among, &call->options, found, &call->failure);
-}
-
-static hs_status
-count_each(hs_py_call *call, void *found)
-{
-    return hs_neighbors_count(&call->among, &call->options, found, &call->failure);
-}
 
 /* The results of systems that have points stand one behind the other, of so many bytes each: moves
  * each to the place of its number, the last one first. The rest are zeros. */
@@ -164,154 +92,126 @@ spread(const hs_batch *batch, char *results, size_t bytes)
     }
 }
 
-/* As without_gil, of results of so many bytes for each number of a batch. */
-static hs_status
-of_systems(hs_py_call *call, find_fn *find, void *found, void *results, size_t bytes)
+/* What the core has filled, of so many bytes for each system, or has failed to; takes the
+ * reference. */
+static PyObject *
+filled(hs_py_call *call, hs_status status, PyObject *array, size_t bytes)
 {
-    hs_py_call_release(call);
-    const hs_status status = find(call, found);
     hs_py_call_acquire(call);
-    if (status == HS_OK && call->batch.is_given) {
-        spread(&call->batch, results, bytes);
+    if (status != HS_OK) {
+        Py_DECREF(array);
+        return hs_py_call_raise(call, status);
     }
-    hs_py_call_end(call);
-    return status;
+    spread(&call->batch, PyArray_DATA((PyArrayObject *)array), bytes);
+    return array;
+}
+
+/* A number, or that of each system. */
+PyObject *
+hs_py_count_pairs(hs_py_call *call)
+{
+    int64_t   n = 0;
+    PyObject *counts = NULL;
+    if (call->batch.is_given) {
+        counts = hs_batch_zeros(&call->batch, 0, NULL, NPY_INT64);
+        if (counts == NULL) {
+            return NULL;
+        }
+    }
+    hs_py_call_release(call);
+    const hs_status status =
+        hs_pairs_count(&call->among, &call->options,
+                       counts != NULL ? PyArray_DATA((PyArrayObject *)counts) : &n, &call->failure);
+    hs_py_call_acquire(call);
+    if (counts != NULL) {
+        return filled(call, status, counts, sizeof n);
+    }
+    return status == HS_OK ? PyLong_FromLongLong(n) : hs_py_call_raise(call, status);
 }
 
 PyObject *
-hs_py_count_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_coordination(hs_py_call *call)
 {
-    hs_py_call call;
-    int64_t    n = 0;
-    (void)module;
-    if (!hs_py_call_take(&call, HS_FN_COUNT_PAIRS, arguments, n_arguments)) {
-        return NULL;
-    }
-    if (!call.batch.is_given) {
-        const hs_status status = without_gil(&call, count_all, &n);
-        return status == HS_OK ? PyLong_FromLongLong(n)
-                               : hs_raise(status, &call.failure, &call.options);
-    }
-    PyObject *counts = hs_batch_zeros(&call.batch, 0, NULL, NPY_INT64);
+    const hs_set *asking = call->among.queries != NULL ? &call->queries : &call->points;
+    npy_intp      n_rows = (npy_intp)asking->at.n;
+    PyObject     *counts = PyArray_SimpleNew(1, &n_rows, NPY_INT64);
     if (counts == NULL) {
-        hs_py_call_end(&call);
         return NULL;
     }
-    void *data = PyArray_DATA((PyArrayObject *)counts);
-    return filled(&call, of_systems(&call, count_all, data, data, sizeof(int64_t)), counts);
-}
-
-PyObject *
-hs_py_coordination(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
-{
-    hs_py_call call;
-    (void)module;
-    if (!hs_py_call_take(&call, HS_FN_COORDINATION, arguments, n_arguments)) {
-        return NULL;
+    hs_py_call_release(call);
+    const hs_status status = hs_neighbors_count(
+        &call->among, &call->options, PyArray_DATA((PyArrayObject *)counts), &call->failure);
+    hs_py_call_acquire(call);
+    if (status != HS_OK) {
+        Py_DECREF(counts);
+        return hs_py_call_raise(call, status);
     }
-    npy_intp n_rows = (npy_intp)(call.among.queries != NULL ? call.queries.at.n : call.points.at.n);
-    PyObject *counts = PyArray_SimpleNew(1, &n_rows, NPY_INT64);
-    if (counts == NULL) {
-        hs_py_call_end(&call);
-        return NULL;
-    }
-    void *data = PyArray_DATA((PyArrayObject *)counts);
-    return filled(&call, without_gil(&call, count_each, data), counts);
+    return counts;
 }
 
 /* ---- pairs by distance -------------------------------------------------------------------- */
 
-/* edges, last_inclusive, queries, n_types; types and weights of the points and of the queries. */
-static bool
-take_histogram(hs_py_call *call, hs_histogram *wanted)
-{
-    static const char *const must = "edges, types and weights must be arrays of the expected types "
-                                    "and lengths";
-    const void              *edges;
-    if (!hs_entries_of(call->own[0], NPY_DOUBLE, 1, -1, 0, must, &edges)) {
-        return false;
-    }
-    if (edges == NULL || call->integer < 1 || call->integer > INT32_MAX) {
-        PyErr_SetString(PyExc_ValueError, "edges and a number of types are expected");
-        return false;
-    }
-    *wanted = (hs_histogram){.n_edges = hs_length_of(call->own[0]),
-                             .edges = edges,
-                             .inclusive = call->options.inclusive,
-                             .last_inclusive = call->flag,
-                             .n_types = (int32_t)call->integer};
-    PyObject *const *own = call->own;
-    return hs_known_take(own[4], own[6], NPY_INT32, 1, must, offsetof(hs_set, types), call) &&
-           hs_known_take(own[5], own[7], NPY_DOUBLE, 1, must, offsetof(hs_set, weights), call);
-}
-
-static hs_status
-find_histogram(hs_py_call *call, void *found)
-{
-    return hs_pairs_histogram(&call->among, &call->options, found, &call->failure);
-}
-
 /* Counts, or sums where there are weights, of shape (n_types, n_types, n_edges), before these the
  * systems if there is a batch. */
 PyObject *
-hs_py_histogram(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_histogram(hs_py_call *call)
 {
-    hs_py_call   call;
-    hs_histogram wanted;
-    PyObject    *array = NULL;
-    (void)module;
-    if (!hs_py_call_take(&call, HS_FN_HISTOGRAM, arguments, n_arguments)) {
+    const void *edges;
+    const bool  sums = call->points.weights != NULL || call->queries.weights != NULL;
+    const int   type = sums ? NPY_DOUBLE : NPY_INT64;
+    if (!hs_entries_of(call->own[0], NPY_DOUBLE, 1, -1, 0, "edges must be a float64 array",
+                       &edges)) {
         return NULL;
     }
-    if (take_histogram(&call, &wanted)) {
-        npy_intp   shape[3] = {wanted.n_types, wanted.n_types, (npy_intp)wanted.n_edges};
-        const bool sums = call.own[5] != Py_None || call.own[7] != Py_None;
-        const int  type = sums ? NPY_DOUBLE : NPY_INT64;
-        array = call.batch.is_given ? hs_batch_zeros(&call.batch, 3, shape, type)
-                                    : PyArray_ZEROS(3, shape, type, 0);
+    if (edges == NULL || call->integer < 1 || call->integer > INT32_MAX) {
+        PyErr_SetString(PyExc_ValueError, "edges and a number of types are expected");
+        return NULL;
     }
+    const npy_intp n = (npy_intp)call->integer;
+    npy_intp       shape[3] = {n, n, (npy_intp)hs_length_of(call->own[0])};
+    PyObject      *array = call->batch.is_given ? hs_batch_zeros(&call->batch, 3, shape, type)
+                                                : PyArray_ZEROS(3, shape, type, 0);
     if (array == NULL) {
-        hs_py_call_end(&call);
         return NULL;
     }
-    void *data = PyArray_DATA((PyArrayObject *)array);
-    if (PyArray_TYPE((PyArrayObject *)array) == NPY_DOUBLE) {
-        wanted.sums = data;
-    } else {
-        wanted.counts = data;
-    }
-    const size_t bytes =
-        (size_t)wanted.n_types * (size_t)wanted.n_types * (size_t)wanted.n_edges * sizeof(int64_t);
-    return filled(&call, of_systems(&call, find_histogram, &wanted, data, bytes), array);
+    void              *data = PyArray_DATA((PyArrayObject *)array);
+    const hs_histogram wanted = {.n_edges = shape[2],
+                                 .edges = edges,
+                                 .inclusive = call->options.inclusive,
+                                 .last_inclusive = call->flag,
+                                 .n_types = (int32_t)n,
+                                 .counts = sums ? NULL : data,
+                                 .sums = sums ? data : NULL};
+    hs_py_call_release(call);
+    const hs_status status =
+        hs_pairs_histogram(&call->among, &call->options, &wanted, &call->failure);
+    return filled(call, status, array, (size_t)(n * n * shape[2]) * sizeof(int64_t));
 }
 
 /* ---- clusters ----------------------------------------------------------------------------- */
 
 PyObject *
-hs_py_clusters(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_clusters(hs_py_call *call)
 {
-    hs_py_call  call;
     const void *core;
     int64_t     n_clusters = 0;
     PyObject   *result = NULL;
-    (void)module;
-    if (!hs_py_call_take(&call, HS_FN_CLUSTERS, arguments, n_arguments) ||
-        !hs_entries_of(call.own[0], NPY_BOOL, 1, call.points.at.n, 0,
+    if (!hs_entries_of(call->own[0], NPY_BOOL, 1, call->points.at.n, 0,
                        "core is no array of a bool for each point", &core)) {
         return NULL;
     }
-    npy_intp  n = (npy_intp)call.points.at.n;
+    npy_intp  n = (npy_intp)call->points.at.n;
     PyObject *labels = PyArray_SimpleNew(1, &n, NPY_INT64);
-    PyObject *winding = call.flag ? PyArray_SimpleNew(1, &n, NPY_UINT8) : Py_NewRef(Py_None);
+    PyObject *winding = call->flag ? PyArray_SimpleNew(1, &n, NPY_UINT8) : Py_NewRef(Py_None);
     if (labels != NULL && winding != NULL) {
         int64_t *to = PyArray_DATA((PyArrayObject *)labels);
-        uint8_t *bits = call.flag ? PyArray_DATA((PyArrayObject *)winding) : NULL;
-        hs_py_call_release(&call);
-        const hs_status status = hs_clusters_find(&call.among, &call.options, core, to, bits,
-                                                  &n_clusters, &call.failure);
-        hs_py_call_acquire(&call);
+        uint8_t *bits = call->flag ? PyArray_DATA((PyArrayObject *)winding) : NULL;
+        hs_py_call_release(call);
+        const hs_status status = hs_clusters_find(&call->among, &call->options, core, to, bits,
+                                                  &n_clusters, &call->failure);
+        hs_py_call_acquire(call);
         result = status == HS_OK ? Py_BuildValue("LOO", (long long)n_clusters, labels, winding)
-                                 : hs_raise(status, &call.failure, &call.options);
+                                 : hs_py_call_raise(call, status);
     }
     Py_XDECREF(labels);
     Py_XDECREF(winding);
@@ -338,7 +238,7 @@ raise_of_pair(hs_status status, hs_py_call *call)
                      "2**62, 0 along axes that do not repeat",
                      row);
     } else {
-        return hs_raise(status, &call->failure, &call->options);
+        return hs_py_call_raise(call, status);
     }
     return NULL;
 }
@@ -372,29 +272,25 @@ take_numbers(const hs_py_call *call, hs_pair_numbers *pairs)
 }
 
 PyObject *
-hs_py_measure(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_measure(hs_py_call *call)
 {
-    hs_py_call      call;
     hs_pair_numbers pairs;
     hs_pairs       *measured = NULL;
-    (void)module;
-    if (!hs_py_call_take(&call, HS_FN_MEASURE, arguments, n_arguments) ||
-        !take_numbers(&call, &pairs)) {
+    if (!take_numbers(call, &pairs)) {
         return NULL;
     }
-    if (call.among.cells != NULL || call.options.want & HS_WANT_J) {
+    if (call->among.cells != NULL || call->options.want & HS_WANT_J) {
         PyErr_SetString(PyExc_TypeError, "measure takes points, and quantities of d D S");
         return NULL;
     }
-    if (arguments[9] == Py_None && pairs.n >= HS_POINTS_FOR_THREADS) { /* however few points */
-        call.options.threads = -hs_default_threads();
+    if (call->of[9] == Py_None && pairs.n >= HS_POINTS_FOR_THREADS) { /* however few points */
+        call->options.threads = -hs_default_threads();
     }
-    hs_py_call_release(&call);
-    const hs_status status = hs_measure(&call.points.at, call.among.box, &pairs, &call.options,
-                                        &measured, &call.failure);
-    hs_py_call_acquire(&call);
-    return status != HS_OK ? raise_of_pair(status, &call)
-                           : hs_py_call_pairs(&call, status, measured);
+    hs_py_call_release(call);
+    const hs_status status = hs_measure(&call->points.at, call->among.box, &pairs, &call->options,
+                                        &measured, &call->failure);
+    hs_py_call_acquire(call);
+    return status != HS_OK ? raise_of_pair(status, call) : hs_py_call_pairs(call, status, measured);
 }
 
 /* ---- what would be done, and what was done ------------------------------------------------ */
@@ -462,26 +358,21 @@ dictionary_of(const hs_plan *plan, const hs_counters *counted)
 }
 
 PyObject *
-hs_py_explain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_explain(hs_py_call *call)
 {
-    hs_py_call  call;
     hs_plan     plan;
     hs_counters counters = {0};
     hs_pairs   *pairs = NULL;
-    (void)module;
-    if (!hs_py_call_take(&call, HS_FN_EXPLAIN, arguments, n_arguments)) {
-        return NULL;
-    }
-    hs_py_call_release(&call);
-    hs_among all = call.among; /* what is left out changes no plan */
+    hs_py_call_release(call);
+    hs_among all = call->among; /* what is left out changes no plan */
     all.selection = NULL;
-    hs_status status = hs_plan_make(&all, &call.options, &plan, &call.failure);
-    if (status == HS_OK && call.flag) {
-        call.options.counters = &counters;
-        status = hs_pairs_find(&call.among, &call.options, &pairs, &call.failure);
+    hs_status status = hs_plan_make(&all, &call->options, &plan, &call->failure);
+    if (status == HS_OK && call->flag) {
+        call->options.counters = &counters;
+        status = hs_pairs_find(&call->among, &call->options, &pairs, &call->failure);
     }
-    hs_py_call_acquire(&call);
+    hs_py_call_acquire(call);
     hs_pairs_free(pairs);
-    return status == HS_OK ? dictionary_of(&plan, call.flag ? &counters : NULL)
-                           : hs_raise(status, &call.failure, &call.options);
+    return status == HS_OK ? dictionary_of(&plan, call->flag ? &counters : NULL)
+                           : hs_py_call_raise(call, status);
 }

@@ -175,44 +175,31 @@ hs_py_stream_type(PyObject *module)
     return PyType_FromModuleAndSpec(module, &stream_spec, NULL);
 }
 
-/* The arguments but for the stream itself, and references to what it goes on to use. */
-static bool
-take_arguments(pair_stream *self, PyObject *const *arguments, Py_ssize_t n_arguments)
-{
-    hs_py_call *call = &self->call;
-    if (!hs_py_call_take(call, HS_FN_ITER_PAIRS, arguments, n_arguments)) {
-        return false;
-    }
-    strcpy(self->letters, call->letters); /* six different ones at most */
-    call->letters = self->letters;
-    self->progress = Py_XNewRef(call->progress);
-    self->cells = call->among.cells != NULL ? Py_NewRef(arguments[0]) : NULL;
-    return true;
-}
-
 PyObject *
-hs_py_iter_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_iter_pairs(hs_py_call *call)
 {
-    PyTypeObject *type = ((PyTypeObject **)PyModule_GetState(module))[HS_STREAM_TYPE];
+    PyTypeObject *type = ((PyTypeObject **)PyModule_GetState(call->module))[HS_STREAM_TYPE];
     pair_stream  *self = (pair_stream *)type->tp_alloc(type, 0); /* zeros */
-    if (self == NULL || !take_arguments(self, arguments, n_arguments)) {
-        Py_XDECREF(self);
+    if (self == NULL) {
         return NULL;
     }
-    hs_py_call *call = &self->call;
-    self->is_running = true; /* the hook can get hold of it */
     hs_py_call_release(call);
     const hs_status status =
         hs_stream_open(&call->among, &call->options, call->integer, &self->stream, &call->failure);
     hs_py_call_acquire(call);
-    leave(self);
     if (status != HS_OK) {
-        PyObject *nothing = hs_raise(status, &call->failure, &call->options);
         Py_DECREF(self);
-        return nothing;
+        return hs_py_call_raise(call, status);
     }
-    call->points.at.data = NULL; /* these are the caller's again */
-    call->options.kernel = NULL;
+    self->call = *call;
+    self->call.n_made = 0; /* what is made, and points, are the caller's again */
+    self->call.points.at.data = NULL;
+    self->call.options.kernel = NULL;
+    self->call.options.poll_context = &self->call;
+    strcpy(self->letters, call->letters); /* six different ones at most */
+    self->call.letters = self->letters;
+    self->progress = Py_XNewRef(call->progress);
+    self->cells = call->among.cells != NULL ? Py_NewRef(call->positions) : NULL;
     return (PyObject *)self;
 }
 
@@ -358,25 +345,23 @@ take_function(PyObject *const *arguments, callable *to_call, compiled *to_run, h
 }
 
 PyObject *
-hs_py_for_each_pair(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_for_each_pair(hs_py_call *call)
 {
-    hs_py_call call;
-    callable   to_call = {0};
-    compiled   to_run = {0};
-    hs_visit   visit = {0};
-    int64_t    n = 0;
-    (void)module;
-    if (!hs_py_call_take(&call, HS_FN_FOR_EACH_PAIR, arguments, n_arguments) ||
-        !take_function(arguments + HS_CALL_ARGUMENTS, &to_call, &to_run, &visit)) {
+    callable to_call = {0};
+    compiled to_run = {0};
+    hs_visit visit = {0};
+    int64_t  n = 0;
+    if (!take_function(call->own, &to_call, &to_run, &visit)) {
         return NULL;
     }
-    visit.thread_safe = call.flag;
-    to_call.function = arguments[HS_CALL_ARGUMENTS];
-    to_call.ndim = to_run.ndim = call.points.at.ndim;
-    to_call.first = to_run.first = call.integer;
-    call.thread = PyEval_SaveThread(); /* also with few points: other threads may need it */
-    const hs_status status = hs_pairs_visit(&call.among, &call.options, &visit, &n, &call.failure);
-    hs_py_call_acquire(&call);
+    visit.thread_safe = call->flag;
+    to_call.function = call->own[0];
+    to_call.ndim = to_run.ndim = call->points.at.ndim;
+    to_call.first = to_run.first = call->integer;
+    call->thread = PyEval_SaveThread(); /* also with few points: other threads may need it */
+    const hs_status status =
+        hs_pairs_visit(&call->among, &call->options, &visit, &n, &call->failure);
+    hs_py_call_acquire(call);
     if (to_call.type != NULL && !PyErr_Occurred()) {
         PyErr_Restore(to_call.type, to_call.value, to_call.traceback);
         return NULL;
@@ -385,5 +370,5 @@ hs_py_for_each_pair(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
     Py_XDECREF(to_call.value);
     Py_XDECREF(to_call.traceback);
     return status == HS_OK ? Py_BuildValue("Li", (long long)n, to_call.stops || to_run.stops != 0)
-                           : hs_raise(status, &call.failure, &call.options);
+                           : hs_py_call_raise(call, status);
 }

@@ -12,9 +12,12 @@
  */
 PyObject *hs_py_quick(PyObject *module, PyObject *name);
 
-/* scene(points, queries, box, periodic) -> the same as (queries, points, rows of the box, bits), of
- * which queries and box may be None; or NotImplemented. */
+/* scene(points, box, periodic) -> the same as (points, rows of the box or None, bits); or
+ * NotImplemented. */
 PyObject *hs_py_scene(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
+
+/* Adds the functions of the table; -1 with an exception set. */
+int hs_py_add_functions(PyObject *module);
 
 /* know(name, object): what is told apart from other objects here: "Box" and "Points", which are
  * types, and "settings", a context variable with its usual value. */

@@ -113,43 +113,29 @@ __all__ = [
 
 #: Where names are that are imported when they are first used, for a quick start.
 _LATER = {
-    "Box": "_objects.box",
-    "Brick": "_objects.brick",
-    "Bricks": "_objects.brick",
-    "CacheInfo": "_convert.memory",
-    "CellList": "_objects.cell_list",
-    "Clusters": "_functions.clusters",
-    "Connectivity": "_objects.connectivity",
-    "DynamicCellList": "_objects.dynamic_cell_list",
-    "Explanation": "_functions.explain",
-    "Graph": "_objects.neighbor_table",
-    "NeighborTable": "_objects.neighbor_table",
-    "NodeList": "_objects.node_list",
-    "PairChanges": "_objects.verlet_list",
-    "PairField": "_objects.pair_table",
-    "PairTable": "_objects.pair_table",
-    "Points": "_convert.points",
-    "RadialDistribution": "_functions.rdf",
-    "Verdict": "_check.verify",
-    "VerletList": "_objects.verlet_list",
-    "bonded": "_functions.bonded",
-    "bricks": "_functions.bricks",
-    "cache_info": "_convert.memory",
-    "clear_cache": "_convert.memory",
-    "clusters": "_functions.clusters",
-    "coordination": "_functions.neighbors",
-    "count_pairs": "_functions.counts",
-    "explain": "_functions.explain",
-    "get_include": "_machine",
-    "measure": "_functions.measure",
-    "nearest": "_functions.neighbors",
-    "neighbors": "_functions.neighbors",
-    "pair_histogram": "_functions.counts",
-    "plot_pairs": "_functions.plot_pairs",
-    "rdf": "_functions.rdf",
-    "set_cache_limit": "_convert.memory",
-    "trajectory_pairs": "_functions.trajectory",
-    "verify": "_check.verify",
+    "_check.verify": "Verdict verify",
+    "_convert.memory": "CacheInfo cache_info clear_cache set_cache_limit",
+    "_convert.points": "Points",
+    "_functions.bonded": "bonded",
+    "_functions.bricks": "bricks",
+    "_functions.clusters": "Clusters clusters",
+    "_functions.counts": "count_pairs pair_histogram",
+    "_functions.explain": "Explanation explain",
+    "_functions.measure": "measure",
+    "_functions.neighbors": "coordination nearest neighbors",
+    "_functions.plot_pairs": "plot_pairs",
+    "_functions.rdf": "RadialDistribution rdf",
+    "_functions.trajectory": "trajectory_pairs",
+    "_machine": "get_include",
+    "_objects.box": "Box",
+    "_objects.brick": "Brick Bricks",
+    "_objects.cell_list": "CellList",
+    "_objects.connectivity": "Connectivity",
+    "_objects.dynamic_cell_list": "DynamicCellList",
+    "_objects.neighbor_table": "Graph NeighborTable",
+    "_objects.node_list": "NodeList",
+    "_objects.pair_table": "PairField PairTable",
+    "_objects.verlet_list": "PairChanges VerletList",
 }
 
 #: Modules that are imported when they are first used, and the package that each needs.
@@ -167,12 +153,13 @@ if not TYPE_CHECKING:  # for type checkers they are there
     def __getattr__(name: str) -> object:
         if name in _MODULES:
             return importlib.import_module(f"{__name__}.{name}")
-        if name not in _LATER:
+        module = next((one for one, names in _LATER.items() if name in names.split()), None)
+        if module is None:
             from halfshell._unknown import hint_of_name
 
             hint = hint_of_name(name, __all__)
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}")
-        value = getattr(importlib.import_module(f"{__name__}.{_LATER[name]}"), name)
+        value = getattr(importlib.import_module(f"{__name__}.{module}"), name)
         globals()[name] = value
         return value
 

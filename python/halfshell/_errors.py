@@ -22,10 +22,6 @@ class CapacityError(ValueError):
         The true number of pairs or, for `NeighborTable.to_padded`, of entries in the
         longest row.
 
-    See Also
-    --------
-    pairs : its `out`.
-
     Examples
     --------
     >>> import halfshell as hs

@@ -11,7 +11,7 @@ from halfshell import _core
 from halfshell._errors import REFUSALS, shorten
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
 Function = TypeVar("Function", bound="Callable[..., Any]")
 
@@ -118,20 +118,35 @@ SHARED = {
 }
 
 
+#: Keywords that searches share, as `pairs` has them.
+_KEYWORDS = (
+    "box", "periodic", "rule", "exclude", "min_distance", "indices", "inclusive", "threads",
+    "progress",
+)  # fmt: skip
+
+
 def search(
-    name: str = "", *, finish: Callable[..., Any] | None = None
+    name: str = "",
+    *,
+    finish: Callable[..., Any] | None = None,
+    like: Callable[..., Any] | None = None,
+    lacks: str = "",
 ) -> Callable[[Function], Function]:
     """Decorate a search: a function of points, cutoff and keywords.
 
     name: what the table in C calls it (csrc/binding/interface.c). C then answers calls of which it
-    can convert all arguments (csrc/binding/quick.c), by one attempt; other calls the function
-    answers. finish: makes the result of what C returns and of the arguments.
+    can convert all arguments (csrc/binding/arguments.c), by one attempt; other calls the function
+    answers. finish: makes the result of what C returns and of the arguments. like: one that
+    spells out the keywords that searches share, which this one takes as ``**search``, but for
+    those of `lacks`.
     """
 
     def decorate(function: Function) -> Function:
         document(function)
         code = function.__code__
-        known = frozenset(code.co_varnames[: code.co_argcount + code.co_kwonlyargcount])
+        own = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
+        shared = [] if like is None else [name for name in _KEYWORDS if name not in lacks.split()]
+        known = frozenset((*own, *shared))
         attempt = _core.quick(name) if name else None
 
         @wraps(function)
@@ -143,7 +158,7 @@ def search(
             if not options.keys() <= known:
                 from halfshell._unknown import refuse_unknown
 
-                refuse_unknown(function, [name for name in options if name not in known])
+                refuse_unknown(call, [name for name in options if name not in known])
             if len(arguments) > code.co_argcount:
                 from halfshell._unknown import refuse_count
 
@@ -154,9 +169,26 @@ def search(
                 shorten(error)
                 raise
 
+        if like is not None:
+            spell_out(call, shared, like)
         return cast("Function", call)
 
     return decorate
+
+
+def spell_out(function: Callable[..., Any], names: Iterable[str], like: Callable[..., Any]) -> None:
+    """Let a signature have the keywords that a function takes as ``**search``, as `like` has them.
+
+    They come behind `queries`, before what is the function's own; threads and progress at the end.
+    """
+    import inspect  # here, as it takes some milliseconds
+
+    known, signature = inspect.signature(like).parameters, inspect.signature(function)
+    places = dict.fromkeys(names, 1) | dict.fromkeys(("max_distance", "queries"), 0)
+    places |= dict.fromkeys(("threads", "progress"), 3)
+    both = list(signature.parameters.values())[:-1] + [known[name] for name in names]
+    both.sort(key=lambda one: (one.kind, one.kind == one.KEYWORD_ONLY and places.get(one.name, 2)))
+    cast("Any", function).__signature__ = signature.replace(parameters=both)
 
 
 def document(function: Function, **changed: str) -> Function:

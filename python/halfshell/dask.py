@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +25,7 @@ from halfshell._errors import needs
 from halfshell._functions import brick_tasks
 from halfshell._functions.bricks import Terms, divide, part_of
 from halfshell._functions.counts import count_pairs as _count_pairs
-from halfshell._search import document
+from halfshell._search import document, spell_out
 from halfshell._settings import current
 
 if TYPE_CHECKING:
@@ -49,6 +49,19 @@ Collection = Any  # a dask Array, DataFrame or Delayed, also for type checkers w
 
 _TYPES = {"i": np.int64, "j": np.int64, "P": np.int64, "S": np.int32, "d": np.float64,
           "D": np.float64}  # fmt: skip
+
+
+class Search(TypedDict, total=False):
+    """The keywords that all functions here share, as `pairs` has them."""
+
+    n: int | None
+    box: BoxLike | None
+    periodic: PeriodicLike | None
+    rule: Rule | None
+    exclude: ArrayLike | int | None
+    min_distance: float | None
+    inclusive: bool
+    threads: int
 
 
 class Points:
@@ -154,34 +167,11 @@ class Neighbors(NamedTuple):
     table: Collection
 
 
-def bricks(
-    points: Collection | Points,
-    cutoff: CutoffLike,
-    *,
-    n: int | None = None,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    rule: Rule | None = None,
-) -> Collection:
+def bricks(points: Collection | Points, cutoff: CutoffLike, **search: Unpack[Search]) -> Collection:
     """Divide points as the other functions of this module do, to find out what that costs.
 
     Bricks are as those of `halfshell.bricks`, but own about as many points each, not exactly: they
-    are cut by a sample of the points.
-
-    Parameters
-    ----------
-    points, cutoff, n, box, periodic, rule
-        As in `pairs`.
-
-    Returns
-    -------
-    Delayed
-        `halfshell.Bricks` of all points.
-
-    Raises
-    ------
-    TypeError, ValueError, OverflowError
-        As `pairs`.
+    are cut by a sample of the points. Returns a Delayed, `halfshell.Bricks` of all points.
 
     Examples
     --------
@@ -190,7 +180,7 @@ def bricks(
     >>> hd.bricks(da.arange(8.0, chunks=4)[:, None], 1.0).compute()
     Bricks(2 of 8 points, overhead 1.25)
     """
-    parts = _Parts(points, cutoff, n, box, periodic, rule, directed=True)
+    parts = _Parts(points, cutoff, directed=True, **search)
     return _task(brick_tasks.bricks_of)(
         parts.division, *[_task(brick_tasks.brick_of)(part) for part in parts.parts]
     )
@@ -200,16 +190,9 @@ def pairs(
     points: Collection | Points,
     cutoff: CutoffLike,
     *,
-    n: int | None = None,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    rule: Rule | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
-    inclusive: bool = True,
     quantities: str = "ij",
     sort: bool = False,
-    threads: int = 1,
+    **search: Unpack[Search],
 ) -> Collection:
     """Find all pairs of points within a cutoff, always exactly, brick by brick.
 
@@ -219,15 +202,15 @@ def pairs(
         Coordinates, in chunks of any length, which need not be known; 1 <= d <= 8. Points are
         numbered across all chunks. `Points` of this module say what else is known of each.
     {cutoff}
-    n : int, optional
-        Number of bricks, 1 to 2**20. Default: the number of chunks of `points`.
-    {box, periodic, rule, exclude, min_distance, inclusive}
     quantities : str, default "ij"
         Any of the letters ``i j d D S P``, as in `halfshell.pairs`.
     sort : bool, default False
         Sort all pairs by (i, j, S), ascending, byte for byte as `halfshell.pairs` with
         ``sort=True``. The pairs of every brick are then sent to as many tasks as there are bricks.
         Otherwise they have this order within each chunk, which is a brick.
+    n : int, optional
+        Number of bricks, 1 to 2**20. Default: the number of chunks of `points`.
+    {box, periodic, rule, exclude, min_distance, inclusive}
     threads : int, default 1
         Threads of each task; dask runs several tasks at once.
 
@@ -252,9 +235,8 @@ def pairs(
     [[0, 1], [0, 2]]
     """
     check_letters(quantities)
-    parts = _Parts(points, cutoff, n, box, periodic, rule)
-    options = parts.options(exclude, min_distance, threads, inclusive=inclusive)
-    found = parts.each(brick_tasks.pairs_of, {**options, "quantities": quantities})
+    parts = _Parts(points, cutoff, **search)
+    found = parts.each(brick_tasks.pairs_of, {**parts.options, "quantities": quantities})
     if as_flag(sort, "sort"):
         found = parts.in_ranges(found)
     return _columns(found, 0, quantities, parts.terms.ndim)
@@ -264,38 +246,15 @@ def neighbors(
     points: Collection | Points,
     cutoff: CutoffLike,
     *,
-    n: int | None = None,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    rule: Rule | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
-    inclusive: bool = True,
     quantities: str = "j",
     sort: bool = False,
-    threads: int = 1,
+    **search: Unpack[Search],
 ) -> Neighbors:
     """Find all neighbours of each point, always exactly, brick by brick.
 
-    Parameters
-    ----------
-    points, cutoff, n, box, periodic, rule, exclude, min_distance, inclusive, threads
-        As in `pairs`.
-    quantities : str, default "j"
-        Any of the letters ``j d D S``, as in `halfshell.neighbors`.
-    sort : bool, default False
-        Rows in the order of the points, byte for byte as in `halfshell.neighbors`; otherwise brick
-        by brick.
-
-    Returns
-    -------
-    Neighbors
-        Rows as dask arrays, with indices among all points; `table` does not depend on `sort`.
-
-    Raises
-    ------
-    TypeError, ValueError, OverflowError
-        As `pairs`.
+    Arguments are those of `pairs`, but for two: `quantities` are any of the letters ``j d D S``, as
+    in `halfshell.neighbors`; with `sort`, rows are in the order of the points, byte for byte as
+    there, otherwise brick by brick. `Neighbors.table` does not depend on `sort`.
 
     Examples
     --------
@@ -309,10 +268,9 @@ def neighbors(
     check_letters(quantities)
     if not set(quantities) <= set("jdDS"):
         raise ValueError(f"quantities of neighbors are some of j d D S, got {quantities!r}")
-    parts = _Parts(points, cutoff, n, box, periodic, rule, directed=True)
-    options = parts.options(exclude, min_distance, threads, inclusive=inclusive)
-    found = parts.each(brick_tasks.neighbors_of, {**options, "quantities": quantities})
-    is_full = rule not in ("gather", "scatter")
+    parts = _Parts(points, cutoff, directed=True, **search)
+    found = parts.each(brick_tasks.neighbors_of, {**parts.options, "quantities": quantities})
+    is_full = search.get("rule") not in ("gather", "scatter")
     table = _task(brick_tasks.table_of)(quantities, is_full, parts.division, *found)
     if as_flag(sort, "sort"):
         found = parts.in_ranges(found)
@@ -321,34 +279,12 @@ def neighbors(
 
 
 def coordination(
-    points: Collection | Points,
-    cutoff: CutoffLike,
-    *,
-    n: int | None = None,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    rule: Rule | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
-    inclusive: bool = True,
-    threads: int = 1,
+    points: Collection | Points, cutoff: CutoffLike, **search: Unpack[Search]
 ) -> Collection:
-    """Count the neighbours of each point, always exactly.
+    """Count the neighbours of each point, always exactly, as `halfshell.coordination`.
 
-    Parameters
-    ----------
-    points, cutoff, n, box, periodic, rule, exclude, min_distance, inclusive, threads
-        As in `pairs`.
-
-    Returns
-    -------
-    dask Array of int64, shape (n_points,)
-        As `halfshell.coordination` returns it, in the order of the points.
-
-    Raises
-    ------
-    TypeError, ValueError, OverflowError
-        As `pairs`.
+    Arguments are those of `pairs`. The result is a dask Array of int64, shape (n_points,), in the
+    order of the points.
 
     Examples
     --------
@@ -358,9 +294,8 @@ def coordination(
     >>> hd.coordination(points, 1.5, box=[4.0]).compute().tolist()
     [2, 1, 1]
     """
-    parts = _Parts(points, cutoff, n, box, periodic, rule, directed=True)
-    options = parts.options(exclude, min_distance, threads, inclusive=inclusive)
-    found = parts.in_ranges(parts.each(brick_tasks.coordination_of, options))
+    parts = _Parts(points, cutoff, directed=True, **search)
+    found = parts.in_ranges(parts.each(brick_tasks.coordination_of, parts.options))
     n_ranges, lengths = len(found), [math.nan] * len(found)
     if not math.isnan(parts.n_points):
         limits = [int(parts.n_points) * k // n_ranges for k in range(n_ranges + 1)]
@@ -375,36 +310,12 @@ def coordination(
 
 
 def count_pairs(
-    points: Collection | Points,
-    cutoff: CutoffLike,
-    *,
-    n: int | None = None,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    rule: Rule | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
-    inclusive: bool = True,
-    threads: int = 1,
+    points: Collection | Points, cutoff: CutoffLike, **search: Unpack[Search]
 ) -> Collection:
     """Count all pairs within a cutoff, or several, always exactly.
 
-    Parameters
-    ----------
-    points, n, box, periodic, rule, exclude, min_distance, inclusive, threads
-        As in `pairs`.
-    cutoff : float, array_like of float, shape (k,) or (t, t), dict or None
-        As in `pairs`, or several in ascending order.
-
-    Returns
-    -------
-    dask Array of int64, shape () or (k,)
-        The number of pairs, or one for each of several cutoffs.
-
-    Raises
-    ------
-    TypeError, ValueError, OverflowError
-        As `pairs`.
+    Arguments are those of `pairs`; `cutoff` may also be several in ascending order, shape (k,). The
+    result is a dask Array of int64, shape () or (k,).
 
     Examples
     --------
@@ -416,43 +327,21 @@ def count_pairs(
     """
     several: Any = None if is_a(cutoff, Mapping) or np.ndim(cutoff) != 1 else np.array(cutoff)  # type: ignore[arg-type]
     largest: Any = cutoff if several is None else several[-1] if len(several) else 0.0
-    parts = _Parts(points, largest, n, box, periodic, rule)
-    _count_pairs(parts.terms.of_none(), cutoff, rule=rule)
-    options = parts.options(exclude, min_distance, threads, inclusive=inclusive)
-    counts = parts.each(brick_tasks.counts_of, cutoff if several is None else several, options)
+    parts = _Parts(points, largest, **search)
+    _count_pairs(parts.terms.of_none(), cutoff, rule=parts.terms.rule)
+    cutoffs = cutoff if several is None else several
+    counts = parts.each(brick_tasks.counts_of, cutoffs, parts.options)
     return da.from_delayed(_task(brick_tasks.total)(*counts), np.shape(several)
                            if several is not None else (), np.int64)  # fmt: skip
 
 
 def pair_histogram(
-    points: Collection | Points,
-    edges: npt.ArrayLike,
-    *,
-    n: int | None = None,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
-    threads: int = 1,
+    points: Collection | Points, edges: npt.ArrayLike, **search: Unpack[Search]
 ) -> Collection:
-    """Count all pairs by distance, always exactly.
+    """Count all pairs by distance, always exactly, as `halfshell.pair_histogram`.
 
-    Parameters
-    ----------
-    points, n, box, periodic, exclude, min_distance, threads
-        As in `pairs`.
-    edges : array_like of float, shape (bins + 1,)
-        Limits of the bins, as in `halfshell.pair_histogram`.
-
-    Returns
-    -------
-    dask Array of int64, shape (bins,)
-        As `halfshell.pair_histogram` returns it.
-
-    Raises
-    ------
-    TypeError, ValueError, OverflowError
-        As `pairs`.
+    Arguments are those of `pairs`, without `rule` and `inclusive`. `edges` are the limits of the
+    bins; the result is a dask Array of int64, shape (bins,).
 
     Examples
     --------
@@ -463,14 +352,12 @@ def pair_histogram(
     [2, 2]
     """
     limits = as_edges(edges)
-    parts = _Parts(points, float(limits[-1]), n, box, periodic, None, by_reach=False)
-    counts = parts.each(
-        brick_tasks.histogram_of, limits, parts.options(exclude, min_distance, threads)
-    )
+    for name in ("rule", "inclusive"):
+        if name in search:
+            raise TypeError(f"pair_histogram() got an unexpected keyword argument {name!r}")
+    parts = _Parts(points, float(limits[-1]), by_reach=False, **search)
+    counts = parts.each(brick_tasks.histogram_of, limits, parts.options)
     return da.from_delayed(_task(brick_tasks.total)(*counts), (len(limits) - 1,), np.int64)
-
-
-document(pairs)
 
 
 # ---- parts of a division, and what is found in them ----------------------------------------
@@ -484,9 +371,21 @@ class _Parts:
     """Parts of a division that is to come, after all that can be refused before it."""
 
     def __init__(
-        self, points: Any, cutoff: Any, n: Any, box: Any, periodic: Any, rule: Any,
-        by_reach: bool = True, directed: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        points: Any,
+        cutoff: Any,
+        *,
+        n: int | None = None,
+        box: BoxLike | None = None,
+        periodic: PeriodicLike | None = None,
+        rule: Rule | None = None,
+        exclude: ArrayLike | int | None = None,
+        min_distance: float | None = None,
+        inclusive: bool = True,
+        threads: int = 1,
+        by_reach: bool = True,
+        directed: bool = False,
+    ) -> None:
         given = points if isinstance(points, Points) else Points(points, box=box, periodic=periodic)
         for name, value in (("box", box), ("periodic", periodic)):
             if given is points and value is not None:
@@ -495,11 +394,20 @@ class _Parts:
             raise ValueError(f"bricks need precision 'exact', got {current().precision!r}")
         n_bricks = max(1, len(given.chunks)) if n is None else as_brick_count(n)
         scene = _Points(np.empty((0, given.ndim)), box=given.box, periodic=given.periodic)
-        # Radii and supports do not matter for a histogram.
+        # Radii and supports do not matter for a histogram, nor whether the cutoff counts.
         fields = [name for name in given.fields if by_reach or name not in ("radii", "supports")]
         flags = None if scene.periodic is None else tuple(scene.periodic.tolist())
         self.terms = Terms(cutoff, rule, scene.box, flags, given.ndim, tuple(fields))
         self.terms.call(directed)
+        self.options: dict[str, Any] = {"min_distance": min_distance, "threads": threads}
+        if by_reach:
+            self.options["inclusive"] = inclusive
+        is_number = exclude is None or whole_number(exclude, "exclude") is not None
+        _count_pairs(  # of no points, which refuses what a search would refuse
+            self.terms.of_none().replace(radii=None, supports=None), 0.0,
+            exclude=exclude if is_number else np.empty((0, 2), np.int64), **self.options,
+        )  # fmt: skip
+        self.options["exclude"] = exclude if is_number else np.array(exclude)
         self.n_points = given.n_points
         each = [
             (chunk, given.ndim, given.dtype, place, {name: known[name] for name in fields})
@@ -511,18 +419,6 @@ class _Parts:
         self.parts = [
             _task(part_of)(self.division, *[piece[k] for piece in pieces]) for k in range(n_bricks)
         ]
-
-    def options(
-        self, exclude: Any, min_distance: Any, threads: Any, **inclusive: Any
-    ) -> dict[str, Any]:
-        """Options of a search, after a search of no points with them."""
-        options = {"min_distance": min_distance, "threads": threads, **inclusive}
-        is_number = exclude is None or whole_number(exclude, "exclude") is not None
-        _count_pairs(
-            self.terms.of_none().replace(radii=None, supports=None), 0.0,
-            exclude=exclude if is_number else np.empty((0, 2), np.int64), **options,
-        )  # fmt: skip
-        return {**options, "exclude": exclude if is_number else np.array(exclude)}
 
     def each(self, task: Callable[..., Any], *arguments: Any) -> list[Any]:
         """What a task finds in each part."""
@@ -550,6 +446,11 @@ def _columns(found: Sequence[Any], group: int, quantities: str, ndim: int) -> An
         width = {"P": (2,), "S": (ndim,), "D": (ndim,)}.get(letter, ())
         arrays.append(_joined(found, group, place, (math.nan, *width), _TYPES[letter]))
     return tuple(arrays) if len(arrays) > 1 else arrays[0]
+
+
+for _function in (bricks, pairs, neighbors, coordination, count_pairs, pair_histogram):
+    document(_function)
+    spell_out(_function, Search.__annotations__, _Parts)
 
 
 # ---- chunks --------------------------------------------------------------------------------

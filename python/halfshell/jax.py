@@ -84,21 +84,19 @@ def neighbor_list(
         Coordinates, any length unit, 1 <= d <= 8. The search is exact for the numbers that reach
         it; but JAX converts its inputs to float32 unless ``jax_enable_x64`` is set.
     cutoff : float or Array, shape ()
-        Largest distance of a pair, in the unit of `positions`; finite, not negative. A Python or
-        NumPy number stays float64, a JAX array keeps its own type.
+        Largest distance of a pair. A Python or NumPy number stays float64, a JAX array keeps its
+        own type.
     capacity : int
         The length of the result. If there are more entries, the first ones are returned and
         `overflow` is set.
     box : float, array_like or Array, shape (d,) or (d, d), or Box, optional
         As in `halfshell.pairs`. A JAX array keeps its own type in the search, and derivatives with
         respect to it exist; other values are searched as float64.
-    periodic : bool or sequence of bool, shape (d,), optional
-        Which box vectors repeat. Default: all with a box, none without.
+    periodic, inclusive
+        As in `halfshell.pairs`.
     half : bool, default False
         Whether to list each pair once, as `halfshell.pairs` does, and not as (i, j, S) and
         (j, i, -S).
-    inclusive : bool, default True
-        Whether a pair at exactly `cutoff` counts.
 
     Returns
     -------

@@ -49,19 +49,15 @@ def neighbor_list(
     positions : Tensor of float64, float32, float16 or bfloat16, shape (n, d)
         Coordinates on the CPU, any length unit, 1 <= d <= 8. They are searched as they are, without
         a copy if they are contiguous and not halves, which float32 holds exactly.
-    cutoff : float
-        Largest distance of a pair, in the unit of `positions`; finite, not negative.
+    cutoff, periodic, inclusive
+        As in `halfshell.pairs`.
     box : float, array_like or Tensor, shape (d,), (d, d) or (s, d, d), or Box, optional
         As in `halfshell.pairs`. d and D can be differentiated with respect to a tensor.
-    periodic : bool or sequence of bool, shape (d,), optional
-        Which box vectors repeat. Default: all with a box, none without.
     quantities : str, default "ij"
         Any of the letters ``i j d D S P``: indices, distance, vector, shift, both indices.
     half : bool, default False
         Whether to list each pair once, as `halfshell.pairs` does, and not as (i, j, S) and
         (j, i, -S).
-    inclusive : bool, default True
-        Whether a pair at exactly `cutoff` counts.
     batch : Tensor of int, shape (n,), optional
         The system of each point, ascending; only points of the same system pair. `box` may
         have a matrix for each system, (s, d, d).
@@ -79,8 +75,6 @@ def neighbor_list(
     ------
     TypeError
         If `positions` is not a tensor, not on the CPU, not dense, or of another dtype.
-    ValueError, OverflowError, MemoryError
-        As `halfshell.pairs`.
     NotImplementedError
         Under ``torch.vmap``, as systems differ in their number of pairs: use `batch`. PyTorch
         before 2.5 raises its own error.
@@ -97,7 +91,7 @@ def neighbor_list(
     >>> x.grad.flatten().tolist()
     [0.0, 4.0, -4.0]
     """
-    _check_points(positions, "positions")
+    _as_points(positions, "positions", least=2)
     _check_letters(quantities)
     box = _as_box(box)
     flags = None if periodic is None else np.atleast_1d(np.asarray(periodic))
@@ -105,8 +99,7 @@ def neighbor_list(
         raise TypeError(f"periodic must be a bool or one for each axis, got {periodic!r}")
     if flags is not None and len(flags) == 1:
         flags = flags.repeat(positions.shape[1])
-    if batch is not None:
-        _check_batch(batch, "batch")
+    _check_batch(batch, "batch")
     i, j, S = _neighbor_list(
         positions.detach(), float(cutoff), None if box is None else box.detach(),
         None if flags is None else flags.tolist(), batch, half, inclusive,
@@ -133,38 +126,24 @@ def radius_graph(
 ) -> Tensor:
     """Connect all points that are less than `r` apart, like PyTorch Geometric's function.
 
-    PyTorch Geometric keeps 32 neighbours of a point by default and silently drops the others; which
-    ones depends on the order of the points. Here all of them are kept.
+    PyTorch Geometric keeps 32 neighbours of a point by default and silently drops the others. Here
+    all are kept: CapacityError, whose ``needed`` tells how many, if a point has more than
+    `max_num_neighbors`, not counting loops.
 
     Parameters
     ----------
     x : Tensor of floats, shape (n, d) or (n,)
         Coordinates on the CPU, as `positions` of `neighbor_list`.
-    r : float
-        A distance, in the unit of `x`; edges are shorter than this.
+    r, loop, max_num_neighbors, flow
+        As there.
     batch : Tensor of int, shape (n,), optional
         The graph of each point, ascending; points of different graphs are not connected.
-    loop : bool, default False
-        Whether each point has an edge to itself.
-    max_num_neighbors : int, optional
-        Maximum number of edges of a point, not counting loops. If a point has more, this raises
-        `CapacityError`; edges are never dropped, while PyTorch Geometric keeps some. Default: any
-        number.
-    flow : {"source_to_target", "target_to_source"}, default "source_to_target"
-        The row of the result that holds the points, while the other holds their neighbours: the
-        second row for "source_to_target", the first for "target_to_source".
 
     Returns
     -------
     Tensor of int64, shape (2, m)
-        ``edge_index``, ascending by the point and then by its neighbour.
-
-    Raises
-    ------
-    CapacityError
-        If a point has more than `max_num_neighbors`; its ``needed`` tells how many.
-    TypeError, ValueError, OverflowError, MemoryError
-        As `neighbor_list`.
+        ``edge_index``, ascending by the point, in the second row for "source_to_target", and then
+        by its neighbour.
 
     Examples
     --------
@@ -175,9 +154,8 @@ def radius_graph(
     """
     if flow not in ("source_to_target", "target_to_source"):
         raise ValueError(f"flow must be 'source_to_target' or 'target_to_source', got {flow!r}")
-    x = _as_columns(x, "x")
-    if batch is not None:
-        _check_batch(batch, "batch")
+    x = _as_points(x, "x")
+    _check_batch(batch, "batch")
     edges = _radius_graph(x.detach(), float(r), batch, loop, _as_most(max_num_neighbors))
     return edges.flip(0) if flow == "source_to_target" else edges
 
@@ -196,22 +174,15 @@ def radius(
     ----------
     x, y : Tensor of floats, shape (n, d) and (q, d), or (n,) and (q,)
         Coordinates on the CPU, as `positions` of `neighbor_list`.
-    r : float
-        A distance, in the unit of `x`.
+    r, max_num_neighbors
+        As in `radius_graph`.
     batch_x, batch_y : Tensor of int, shape (n,) and (q,), optional
         The system of each point, ascending. A set without one is all of system 0.
-    max_num_neighbors : int, optional
-        Maximum number of points found for one of `y`, as in `radius_graph`. Default: any number.
 
     Returns
     -------
     Tensor of int64, shape (2, m)
         Indices into `y` in row 0, into `x` in row 1; ascending by both.
-
-    Raises
-    ------
-    CapacityError, TypeError, ValueError, OverflowError, MemoryError
-        As `radius_graph`.
 
     Examples
     --------
@@ -220,10 +191,9 @@ def radius(
     >>> radius(torch.tensor([0.0, 1.0, 3.0]), torch.tensor([0.5, 9.0]), 1.0).tolist()
     [[0, 0], [0, 1]]
     """
-    x, y = _as_columns(x, "x"), _as_columns(y, "y")
-    for name, batch in (("batch_x", batch_x), ("batch_y", batch_y)):
-        if batch is not None:
-            _check_batch(batch, name)
+    x, y = _as_points(x, "x"), _as_points(y, "y")
+    _check_batch(batch_x, "batch_x")
+    _check_batch(batch_y, "batch_y")
     most = _as_most(max_num_neighbors)
     found: Tensor = _radius(x.detach(), y.detach(), float(r), batch_x, batch_y, most)
     return found
@@ -238,21 +208,17 @@ def _check_tensor(value: Any, name: str) -> None:
         raise TypeError(f"{name} must be dense, got layout {value.layout}")
 
 
-def _check_floats(value: Tensor, name: str) -> None:
+def _check_floats(value: Any, name: str) -> None:
+    _check_tensor(value, name)
     if value.dtype not in _FLOATS:
         raise TypeError(
             f"{name} must be of float64, float32, float16 or bfloat16, got {value.dtype}"
         )
 
 
-def _check_points(value: Any, name: str) -> None:
-    _check_tensor(value, name)
-    _check_floats(value, name)
-    if value.ndim != 2:
-        raise ValueError(f"{name} must have shape (n, d), got {tuple(value.shape)}")
-
-
 def _check_batch(value: Any, name: str) -> None:
+    if value is None:
+        return
     _check_tensor(value, name)
     if value.dtype.is_floating_point or value.dtype.is_complex or value.dtype == torch.bool:
         raise TypeError(f"{name} must hold integers, got {value.dtype}")
@@ -266,11 +232,12 @@ def _check_letters(quantities: str) -> None:
         )
 
 
-def _as_columns(value: Any, name: str) -> Tensor:
-    if isinstance(value, torch.Tensor) and value.ndim == 1:
-        value = value[:, None]
-    _check_points(value, name)
-    return value
+def _as_points(value: Any, name: str, least: int = 1) -> Tensor:
+    """Points in rows, of `least` axes or more."""
+    _check_floats(value, name)
+    if not least <= value.ndim <= 2:
+        raise ValueError(f"{name} must have shape (n, d), got {tuple(value.shape)}")
+    return value[:, None] if value.ndim == 1 else value
 
 
 def _as_most(value: int | None) -> int | None:
@@ -283,7 +250,6 @@ def _as_box(box: Any) -> Tensor | None:
     if box is None:
         return None
     if isinstance(box, torch.Tensor):
-        _check_tensor(box, "box")
         _check_floats(box, "box")
         return box
     return torch.tensor(np.asarray(box.vectors if isinstance(box, Box) else box, np.float64))

@@ -3,6 +3,7 @@
 warnings are errors."""
 
 import gc
+import json
 import os
 
 import numpy as np
@@ -62,3 +63,27 @@ def kernel(request):
 def rng():
     """Random numbers, the same in each run."""
     return np.random.default_rng(20260817)
+
+
+@pytest.fixture
+def run(capsys):
+    """Run ``halfshell ARGS``; return (exit status, standard output, standard error)."""
+    from halfshell import cli
+
+    def call(*args):
+        status = cli.main([str(arg) for arg in args])
+        return (status, *capsys.readouterr())
+
+    return call
+
+
+@pytest.fixture
+def told(run):
+    """Run ``halfshell ARGS --json``; return what it says."""
+
+    def call(*args):
+        status, out, err = run(*args, "--json")
+        assert (status, err) == (0, ""), err
+        return json.loads(out)
+
+    return call

@@ -205,8 +205,13 @@ def exact_vector(
     >>> exact_vector([[0.0], [0.75]], 0, 1, S=(-1,), box=[1.0])
     [Fraction(-1, 4)]
     """
-    vector, unit = _whole_vector(points, i, j, S, box)
-    return [Fraction(x, unit) for x in vector]
+    q, p = _fractions([points[j], points[i]])
+    vector = list(map(operator.sub, q, p))
+    if S is not None and any(S):
+        rows, _ = _box_rows(box, None, len(vector))
+        for s, edge in zip(S, rows):
+            vector = [x + int(s) * y for x, y in zip(vector, edge)]
+    return vector
 
 
 def exact_square(
@@ -219,8 +224,7 @@ def exact_square(
     >>> exact_square([[0.0, 0.0], [0.5, 1.0]], 0, 1)
     Fraction(5, 4)
     """
-    vector, unit = _whole_vector(points, i, j, S, box)
-    return Fraction(_dot(vector, vector), unit**2)
+    return sum((x * x for x in exact_vector(points, i, j, S, box)), Fraction(0))
 
 
 def ulp_error(distance: float, square: Fraction) -> Fraction:
@@ -245,21 +249,6 @@ def ulp_error(distance: float, square: Fraction) -> Fraction:
     return max(abs(Fraction(float(distance)) - end) for end in ends) / unit
 
 
-def _whole_vector(
-    points: Any, i: int, j: int, S: Sequence[int] | None, box: Any
-) -> tuple[_Vector, int]:
-    """Return `exact_vector` in units of 1 / unit, in which it is integers, and unit."""
-    ends = _fractions([points[i], points[j]])
-    rows: list[list[Fraction]] = []
-    if S is not None and any(S):
-        rows, _ = _box_rows(box, None, len(ends[0]))
-    (p, q), edges, ((unit,),) = _common_unit(ends, rows, [[Fraction(1)]])
-    vector = list(map(operator.sub, q, p))
-    for s, edge in zip(() if S is None else S, edges):
-        vector = [x + int(s) * y for x, y in zip(vector, edge)]
-    return vector, unit
-
-
 def _box_rows(box: Any, periodic: Any, ndim: int) -> tuple[list[list[Fraction]], list[bool]]:
     """Return the box as rows of Fractions, and which axes repeat."""
     if box is None:
@@ -273,7 +262,6 @@ def _box_rows(box: Any, periodic: Any, ndim: int) -> tuple[list[list[Fraction]],
 
 
 def _fractions(table: Any) -> list[list[Fraction]]:
-    """Return a table of numbers as Fractions; floats keep their exact value."""
     return [[Fraction(x) for x in np.asarray(row).tolist()] for row in table]
 
 

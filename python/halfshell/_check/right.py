@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._check.reference import exact_vector, reach_by_radii, reference_pairs
-from halfshell._convert.call import DIRECTED, RULES, Call, part_of, reach_by_supports
+from halfshell._convert.call import DIRECTED, RULES, Call, Known, Pairing, part_of
 from halfshell._functions.pairs import pairs as find_pairs
 from halfshell._functions.pairs import pairs_between as find_between
 from halfshell._objects.exact import is_definite
@@ -42,6 +42,9 @@ _DOUBT = 2.0**-46  # of all terms: more than the rounding of |H @ D|
 class Right:
     """The pairs of a call without a batch; `holds` decides on one of them."""
 
+    marks: tuple[Any, ...]
+    table: FloatArray | None
+
     def __init__(self, call: Call) -> None:
         self.points = call.array
         self.is_one_set = call.asking is None
@@ -50,30 +53,24 @@ class Right:
         self.inclusive = call.inclusive
         self.box, self.threads = call.points.box, call.threads
         self.periodic = call.points.periodic
-        self.table: FloatArray | None
-        self.extent: float | None
-        own: Any
-        other: Any
-        self.is_plain = call.reach is None
-        if call.reach is None:  # one type, as it were
-            rule, self.extent, self.table = 0, None, np.array([[call.cutoff]])
-            own, other = (np.zeros(len(one), np.int8) for one in (self.points, self.asking))
-        else:
-            rule, radii, query_radii, types, query_types, self.table = call.reach[:6]
-            *supports, self.extent = call.reach[6:]
-            own, other = (radii, query_radii) if self.table is None else (types, query_types)
-            if self.extent is not None:
-                _refuse_indefinite(call, *supports)
-                self.supports = self._sides_of(*supports)
-                extent = self.extent
-                own, other = (None if H is None else spheres_of(H, extent) for H in supports)
-        self.rule = RULES[rule]
-        self.marks = self._sides_of(own, other)  # radii or types; None where no rule goes by them
-        chosen: Any = call.selection or (None,) * 5 + (0, None, 0.0)
-        self.groups = self._sides_of(*chosen[:2])
-        self.labels = self._sides_of(*chosen[2:4])
-        self.within, self.least = chosen[5], chosen[7]
-        self.excluded = None if chosen[6] is None else self._keys(*chosen[6].T)
+        pairing = call.pairing or Pairing()
+        self.is_plain = pairing.rule is None
+        self.rule, self.extent, self.table = RULES[pairing.rule or 0], pairing.extent, pairing.table
+        known = {
+            name: self._sides_of(getattr(call.known, name), getattr(call.known_of_queries, name))
+            for name in Known._fields
+        }
+        self.marks = known["radii" if self.table is None else "types"]  # None: no rule needs them
+        if self.is_plain:  # one type, as it were
+            self.table = np.array([[call.cutoff]])
+            self.marks = tuple(np.zeros(len(one), np.int8) for one in (self.asking, self.points))
+        elif self.extent is not None:
+            _refuse_indefinite(call)
+            self.supports, extent = known["supports"], self.extent
+            self.marks = tuple(None if H is None else spheres_of(H, extent) for H in self.supports)
+        self.groups, self.labels = known["groups"], known["labels"]
+        self.within, self.least = pairing.within or 0, pairing.least
+        self.excluded = None if pairing.excluded is None else self._keys(*pairing.excluded.T)
 
     def _sides_of(self, own: Any, other: Any) -> tuple[Any, Any]:
         """What is known of each i, and of each j."""
@@ -374,19 +371,20 @@ def exact_norm(matrix: Any, vector: list[Fraction]) -> Fraction:
 
 # ---- spheres around supports ---------------------------------------------------------------
 
-def _refuse_indefinite(call: Call, supports: Any, query_supports: Any) -> None:
+def _refuse_indefinite(call: Call) -> None:
     """What the core says of supports that are not positive definite or reach too far.
 
     It looks at them before it looks for pairs, of which no queries have none.
     """
     ndim = call.array.shape[1]
-    none, extent = np.empty((0, ndim, ndim)), call.reach and call.reach[8]
-    assert extent is not None
-    for own, other in ((supports, none), (none, query_supports)):
+    none = np.empty((0, ndim, ndim))
+    by = Pairing(RULES.index("max"), call.pairing and call.pairing.extent)  # looks at all
+    for own, other in ((call.known.supports, none), (none, call.known_of_queries.supports)):
         if own is not None and other is not None:
-            points, queries = (np.zeros((len(H), ndim)) for H in (own, other))
-            reach = reach_by_supports("max", own, other, extent)  # looks at all
-            arguments: Any = (points, np.inf, None, 0, *call.rest, reach, "auto", queries)
+            points, queries = (
+                (np.zeros((len(H), ndim)), *Known(supports=H), None) for H in (own, other)
+            )
+            arguments: Any = (points, np.inf, None, 0, *call.rest, by, "auto", queries)
             _core.count_pairs(*arguments)
 
 

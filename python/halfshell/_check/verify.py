@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -201,7 +201,8 @@ def verify(
         table = cast("NeighborTable", i)
         _check_table(table, call, is_directed)
         full = not is_directed
-        i, j, S = _columns(table, call.indices)
+        i, j, *shifts = table.to_pairs(quantities="ijS" if "S" in table.quantities else "ij")
+        i, S = i if call.indices is None else call.indices[i], shifts[0] if shifts else None
     elif j is None:
         raise TypeError("j must be given, unless i is a NeighborTable; of pairs P: i, j = P.T")
     elif full and is_directed:
@@ -285,14 +286,7 @@ def _check_table(table: NeighborTable, call: Call, is_directed: bool) -> None:
         raise ValueError(f"i is a table of {table.n_rows} rows, got {wanted} {what}")
 
 
-def _columns(table: NeighborTable, indices: IntArray | None) -> tuple[Any, Any, Any]:
-    """i, j and S of the entries; None for shifts that the table does not have."""
-    i, j, *S = table.to_pairs(quantities="ijS" if "S" in table.quantities else "ij")
-    return i if indices is None else indices[i], j, S[0] if S else None
-
-
 def _reversed(rows: IntArray) -> IntArray:
-    """(j, i, -S) for each (i, j, S)."""
     turned = rows.copy()
     turned[:, 0], turned[:, 1] = rows[:, 1], rows[:, 0]
     turned[:, 2:] *= -1

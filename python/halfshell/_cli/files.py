@@ -68,31 +68,28 @@ _Reader = Callable[[str], Iterable[Scene]]  # the frames of a file, one by one
 def read_scene(
     file: str | None,
     *,
-    file_format: str | None = None,
     index: int | None = None,
-    columns: Sequence[str] | None = None,
-    trajectory: str | None = None,
     box: NDArray[np.float64] | None = None,
     periodic: tuple[bool, ...] | None = None,
+    **how: Any,
 ) -> Scene:
     """Read points and box from a file, by the rule above; without one, those of alpha-quartz.
 
-    file_format, index, columns, trajectory: what the options of these names say. box, periodic:
-    take the place of the file's; with a box all axes repeat unless `periodic` says otherwise.
+    index, and how: what the options --index, --format, --columns and --trajectory say. box,
+    periodic: take the place of the file's; with a box all axes repeat unless `periodic` says
+    otherwise.
     """
     if file is None:
-        options = (("--index", index), ("--format", file_format), ("--columns", columns),
-                   ("--trajectory", trajectory))  # fmt: skip
-        for option, value in options:
+        for name, value in {"index": index, **how}.items():
             if value is not None:
-                raise InputError(f"{option} needs a file: give one")
+                raise InputError(f"--{name.removeprefix('file_')} needs a file: give one")
         from halfshell.structures import alpha_quartz
 
         positions, rows, species = alpha_quartz()
         source = "alpha-quartz (ships with halfshell)"
         scene = Scene(positions, rows, (True,) * 3, source, species, "angstrom")
-        return _with_overrides(scene, box, periodic)
-    (scene,) = _read(file, file_format, index, columns, trajectory)
+    else:
+        (scene,) = _read(file, index, **how)
     return _with_overrides(scene, box, periodic)
 
 
@@ -100,27 +97,25 @@ def read_frames(
     file: str,
     frames: slice,
     *,
-    file_format: str | None = None,
-    columns: Sequence[str] | None = None,
-    trajectory: str | None = None,
     box: NDArray[np.float64] | None = None,
     periodic: tuple[bool, ...] | None = None,
+    **how: Any,
 ) -> Iterator[Scene]:
     """Read some frames of a file one by one, at least one, as `read_scene` reads one.
 
     None is kept. The reader is chosen by the first; one that fails later is an error that names
     the frame.
     """
-    for scene in _read(file, file_format, frames, columns, trajectory):
+    for scene in _read(file, frames, **how):
         yield _with_overrides(scene, box, periodic)
 
 
 def _read(
     file: str,
-    file_format: str | None,
     frames: Frames,
-    columns: Sequence[str] | None,
-    trajectory: str | None,
+    file_format: str | None = None,
+    columns: Sequence[str] | None = None,
+    trajectory: str | None = None,
 ) -> Iterator[Scene]:
     """The frames of the first reader that yields a sensible one."""
     with _as_path(file, file_format) as (path, name_of_path):

@@ -11,6 +11,7 @@ import time
 from argparse import Namespace
 from collections.abc import Callable
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,10 +26,10 @@ from halfshell._cli.scene import (
     describe_box,
     describe_points,
     describe_source,
+    draw_distances,
     load_frames,
     load_scene,
     named_cutoff,
-    plot_distribution,
     read_points,
     require_matplotlib,
     searching,
@@ -48,6 +49,8 @@ class Found(NamedTuple):
     columns: Columns
     facts: dict[str, Any]
     lines: list[tuple[str, str]]
+    extra: dict[str, Any] = {}  # noqa: RUF012 - for an archive, besides the columns
+    draw: Callable[[Any], object] | None = None  # on axes of matplotlib
 
 
 def run_pairs(args: Namespace) -> int:
@@ -60,64 +63,55 @@ def run_pairs(args: Namespace) -> int:
     if args.plot and largest == 0:
         raise InputError("--plot needs a cutoff above 0")
     _refuse_without_output(args, "quantities", "sort", "max_output")
-    with ExitStack() as stack:
-        output = open_output(args.output, args.file, stack, json=args.json)
-        plot = open_output(args.plot, args.file, stack, (".png", ".pdf", ".svg"))
-        if plot:
-            require_matplotlib()
-        with searching(scene, args):
-            if output:  # what it takes to count refuses what is too large
-                n_pairs = hs.count_pairs(scene.known, cutoff, inclusive=not args.strict)
-                n, ndim = scene.points.shape
-                check_size(args.output, wanted, n_pairs, n, ndim, args.max_output)
-            hs.pairs(scene.known[:0], cutoff)  # loads what a first search loads, outside its time
-            start = time.perf_counter()
-            with progress_bar(args.progress and not args.json, "searching") as advance:
-                found = hs.pairs(
-                    scene.known, cutoff, inclusive=not args.strict, quantities=letters,
-                    sort=args.sort, progress=advance,
-                )  # fmt: skip
-            seconds = time.perf_counter() - start
-        columns = dict(zip(letters, (found,) if len(letters) == 1 else found, strict=True))
-        d = columns["d"]
-        if output:
-            chosen = {letter: columns[letter] for letter in wanted}
-            extra: dict[str, Any] = {"n": len(scene.points), "inclusive": not args.strict}
-            if largest is cutoff:  # one for all pairs
-                extra["cutoff"] = cutoff
-            write_columns(output, args.output, chosen, **extra)
-        if plot:
-            plot_distribution(plot, Path(args.plot).suffix[1:], d, scene, largest)
+    n, ndim = scene.points.shape
 
-    box, unit = scene.box_rows, unit_suffix(scene)
-    names, counts = np.unique([] if scene.species is None else scene.species, return_counts=True)
-    mean, nearest = 2 * len(d) / len(scene.points), float(d.min()) if len(d) else None
-    kernel = args.kernel or _core.default_kernel()
-    facts = {
-        "species": dict(zip(names.tolist(), counts.tolist(), strict=True)),
-        "unit": scene.unit, "box": None if box is None else box.tolist(), "no_box": scene.no_box,
-        "periodic": list(scene.periodic), "cutoff": named_cutoff(cutoff),
-        "cutoff_chosen": args.cutoff is None, "inclusive": not args.strict, "pairs": len(d),
-        "mean_coordination": mean, "nearest_distance": nearest, "seconds": seconds,
-        "kernel": kernel, "precision": args.precision, "output": args.output, "plot": args.plot,
-    }  # fmt: skip
-    rule = "d < cutoff" if args.strict else "d <= cutoff"
-    speed = len(d) / seconds / 1e6 if seconds else 0.0
-    lines = [
-        ("cutoff", shown_cutoff(cutoff, scene, reason)),
-        ("pairs", f"{len(d):,}   ({rule}, each pair once)"),
-        ("mean coordination", f"{mean:.6g}"),
-        ("nearest distance", "no pair" if nearest is None else f"{nearest:.6g}{unit}"),
-        ("time", f"{_duration(seconds)}   ({speed:.3g} million pairs a second)"),
-        ("kernel", f"{kernel}, precision {args.precision}"),
-    ]
-    _print(args, scene, facts, lines, "pairs ")
-    return 0
+    def find() -> Found:
+        if args.output:  # what it takes to count refuses what is too large
+            n_pairs = hs.count_pairs(scene.known, cutoff, inclusive=not args.strict)
+            check_size(args.output, wanted, n_pairs, n, ndim, args.max_output)
+        hs.pairs(scene.known[:0], cutoff)  # loads what a first search loads, outside its time
+        start = time.perf_counter()
+        with progress_bar(args.progress and not args.json, "searching") as advance:
+            found = hs.pairs(
+                scene.known, cutoff, inclusive=not args.strict, quantities=letters,
+                sort=args.sort, progress=advance,
+            )  # fmt: skip
+        seconds = time.perf_counter() - start
+        columns = dict(zip(letters, (found,) if len(letters) == 1 else found, strict=True))
+        d, unit = columns["d"], unit_suffix(scene)
+        extra: dict[str, Any] = {"n": n, "inclusive": not args.strict}
+        if largest is cutoff:  # one for all pairs
+            extra["cutoff"] = cutoff
+        box, kernel = scene.box_rows, args.kernel or _core.default_kernel()
+        names, counts = np.unique([] if scene.species is None else scene.species,
+                                  return_counts=True)  # fmt: skip
+        mean, nearest = 2 * len(d) / n, float(d.min()) if len(d) else None
+        facts = {
+            "species": dict(zip(names.tolist(), counts.tolist(), strict=True)),
+            "unit": scene.unit, "box": None if box is None else box.tolist(),
+            "no_box": scene.no_box, "periodic": list(scene.periodic),
+            "inclusive": not args.strict, "pairs": len(d), "mean_coordination": mean,
+            "nearest_distance": nearest, "seconds": seconds, "kernel": kernel,
+            "precision": args.precision, "plot": args.plot,
+        }  # fmt: skip
+        rule = "d < cutoff" if args.strict else "d <= cutoff"
+        speed = len(d) / seconds / 1e6 if seconds else 0.0
+        lines = [
+            ("pairs", f"{len(d):,}   ({rule}, each pair once)"),
+            ("mean coordination", f"{mean:.6g}"),
+            ("nearest distance", "no pair" if nearest is None else f"{nearest:.6g}{unit}"),
+            ("time", f"{_duration(seconds)}   ({speed:.3g} million pairs a second)"),
+            ("kernel", f"{kernel}, precision {args.precision}"),
+        ]
+        chosen = {letter: columns[letter] for letter in wanted if letter in columns}
+        draw = partial(draw_distances, d=d, scene=scene, cutoff=largest)
+        return Found(chosen, facts, lines, extra, draw)
+
+    return _run_loaded(args, scene, cutoff, reason, find, "pairs ")
 
 
 def run_neighbors(args: Namespace) -> int:
     """Carry out ``halfshell neighbors``."""
-
     _refuse_without_output(args, "quantities", "max_output")
 
     def find(scene: Scene, cutoff: Any, asking: Scene, how: dict[str, Any]) -> Found:
@@ -170,31 +164,26 @@ def run_nearest(args: Namespace) -> int:
     scene = read_points(args)
     asking = _asking(args, scene)
     letters = "jdS" if any(scene.periodic) else "jd"
-    with ExitStack() as stack:
-        output = open_output(args.output, args.file, stack, json=args.json)
-        start = time.perf_counter()
-        with searching(scene, args):
-            queries = None if asking is scene else asking.points
-            found = hs.nearest(scene.known, args.k, queries=queries, quantities=letters)
-        seconds = time.perf_counter() - start
+
+    def find() -> Found:
+        queries = None if asking is scene else asking.points
+        found = hs.nearest(scene.known, args.k, queries=queries, quantities=letters)
         n, k = found[0].shape
         columns = {"i": np.repeat(np.arange(n), k), "rank": np.tile(np.arange(1, k + 1), n)}
         for letter, array in zip(letters, found, strict=True):
             columns[letter] = array.reshape(n * k, *array.shape[2:])
         real = columns["j"] >= 0
         columns = {name: array[real] for name, array in columns.items()}
-        if output:
-            write_columns(output, args.output, columns)
-    d, unit = columns["d"], unit_suffix(scene)
-    largest = float(d.max()) if len(d) else None
-    facts = {"k": k, "entries": len(d), "largest_distance": largest, "seconds": seconds}
-    lines = [
-        ("nearest points", f"{k:,} of each of {n:,}: {len(d):,} entries"),
-        ("largest distance", "none" if largest is None else f"{largest:.6g}{unit}"),
-        ("time", _duration(seconds)),
-    ]
-    _print(args, scene, facts, lines)
-    return 0
+        d, unit = columns["d"], unit_suffix(scene)
+        largest = float(d.max()) if len(d) else None
+        facts = {"k": k, "entries": len(d), "largest_distance": largest}
+        lines = [
+            ("nearest points", f"{k:,} of each of {n:,}: {len(d):,} entries"),
+            ("largest distance", "none" if largest is None else f"{largest:.6g}{unit}"),
+        ]
+        return Found(columns, facts, lines)
+
+    return _run_loaded(args, scene, None, "", find)
 
 
 def run_rdf(args: Namespace) -> int:
@@ -217,8 +206,6 @@ def run_rdf(args: Namespace) -> int:
             result = found if result is None else result + found
             sizes.add(len(frame.points))
             n_frames += 1
-        if plot:
-            _draw(plot, result, first, args.plot)
         columns: Columns = {"r": result.r}
         peaks = {}
         pairs = 0
@@ -245,14 +232,11 @@ def run_rdf(args: Namespace) -> int:
         ]
         if args.by_type:
             lines.insert(2, ("highest g(r)", "of each two types"))
-        return Found(columns, facts, lines)
+        draw = partial(result.plot, unit="Å" if first.unit else None)
+        return Found(columns, facts, lines, draw=draw)
 
     first, frames, cutoff, reason = load_frames(args)
-    if args.plot:
-        require_matplotlib()
-    with ExitStack() as stack:
-        plot = open_output(args.plot, args.file, stack, (".png", ".pdf", ".svg"))
-        return _run_loaded(args, first, cutoff, reason, find)
+    return _run_loaded(args, first, cutoff, reason, find)
 
 
 def _parts(result: Any) -> dict[str, Any]:
@@ -264,16 +248,6 @@ def _parts(result: Any) -> dict[str, Any]:
         for k, one in enumerate(result.types)
         for other in result.types[k:]
     }
-
-
-def _draw(stream: Any, result: Any, scene: Scene, name: str) -> None:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.0, 4.0), layout="constrained")
-    axes = figure.subplots()
-    result.plot(ax=axes, unit="Å" if scene.unit else None)
-    axes.set_title(printable(Path(scene.source).name), fontsize=10, parse_math=False)
-    figure.savefig(stream, format=Path(name).suffix[1:], dpi=150)
 
 
 # ---- what they share -------------------------------------------------------------------------
@@ -295,22 +269,39 @@ def _run(args: Namespace, find: Callable[[Scene, Any, Scene, dict[str, Any]], Fo
 
 
 def _run_loaded(
-    args: Namespace, scene: Scene, cutoff: Any, reason: str, find: Callable[[], Found]
-) -> int:
+    args: Namespace, scene: Scene, cutoff: Any, reason: str, find: Callable[[], Found],
+    what: str = "",
+) -> int:  # fmt: skip
+    """Open the outputs, find, write, and sum up; `what` the columns are called."""
     with ExitStack() as stack:
         output = open_output(args.output, args.file, stack, json=args.json)
+        plot = None
+        if getattr(args, "plot", None):
+            plot = open_output(args.plot, args.file, stack, (".png", ".pdf", ".svg"))
+            require_matplotlib()
         start = time.perf_counter()
         with searching(scene, args):
             found = find()
         seconds = time.perf_counter() - start
         if output:
-            write_columns(output, args.output, found.columns)
-    facts = {
-        "cutoff": named_cutoff(cutoff), "cutoff_chosen": args.cutoff is None, **found.facts,
-        "seconds": seconds,
-    }  # fmt: skip
-    line = ("cutoff", shown_cutoff(cutoff, scene, reason))
-    _print(args, scene, facts, [line, *found.lines, ("time", _duration(seconds))])
+            write_columns(output, args.output, found.columns, **found.extra)
+        if plot and found.draw:
+            from matplotlib.figure import Figure
+
+            figure = Figure(figsize=(7.0, 4.0), layout="constrained")
+            axes = figure.subplots()
+            found.draw(axes)
+            name = printable(Path(scene.source).name)
+            axes.set_title(name, fontsize=10, parse_math=False)
+            figure.savefig(plot, format=Path(args.plot).suffix[1:], dpi=150)
+    facts, lines = {"seconds": seconds, **found.facts}, list(found.lines)
+    if "seconds" not in found.facts:
+        lines.append(("time", _duration(seconds)))
+    if cutoff is not None:
+        chosen = {"cutoff": named_cutoff(cutoff), "cutoff_chosen": args.cutoff is None}
+        facts = {**chosen, **facts}
+        lines.insert(0, ("cutoff", shown_cutoff(cutoff, scene, reason)))
+    _print(args, scene, facts, lines, what)
     return 0
 
 

@@ -96,6 +96,86 @@ class _Parser(argparse.ArgumentParser):
         raise InputError(f"{message} (see {self.prog} --help)")
 
 
+#: What options of several commands are called, and what argparse is told of each.
+_OPTIONS: dict[str, dict[str, Any]] = {
+    "file": {
+        "nargs": "?", "metavar": "FILE",
+        "help": ".npy, .npz, text with one point per line, point clouds, or anything that ASE or "
+        "MDAnalysis reads; - for standard input; default: alpha-quartz",
+    },
+    "--cutoff": {
+        "type": values.cutoffs, "metavar": "R",
+        "help": "largest distance of a pair, or of each two elements: Si-O=1.8,*-*=3; default: one "
+        "with about 50 neighbours",
+    },
+    "--box": {
+        "type": values.box, "metavar": "LX,LY,LZ",
+        "help": "edge lengths, or one length for all edges; lengths and angles (six numbers); or "
+        "all components of the edge vectors",
+    },
+    "--periodic": {
+        "type": values.periodic, "metavar": "TTF",
+        "help": "which axes are periodic, T or F for each, or one letter for all",
+    },
+    "--columns": {
+        "type": values.columns, "metavar": "X,Y,Z",
+        "help": "of text, the coordinates: names of columns, or numbers from 1 on",
+    },
+    "--trajectory": {
+        "metavar": "FILE",
+        "help": "frames of which the first FILE is the topology, as MDAnalysis reads both",
+    },
+    "--format": {
+        "metavar": "NAME", "help": "format of ASE or MDAnalysis, if it is not recognised"
+    },
+    "--index": {"type": values.frame, "metavar": "N", "help": "frame; default: the last"},
+    "--json": {"action": "store_true", "help": "print JSON for machines"},
+    "--strict": {"action": "store_true", "help": "d < cutoff; default: d <= cutoff"},
+    "--kernel": {"type": values.kernel, "metavar": "NAME", "help": "see `halfshell info`"},
+    "--threads": {
+        "type": values.count, "metavar": "N", "help": "maximum number; default: as many as pay"
+    },
+    "--output": {
+        "metavar": "OUT", "help": "write the columns: .npz, .csv, .parquet, or - for CSV here"
+    },
+    "--quantities": {
+        "type": values.quantities, "metavar": "LETTERS",
+        "help": "columns of OUT, any of i j d D S; default: ijdS, or ijd without a box",
+    },
+    "--max-output": {
+        "type": values.size, "metavar": "SIZE",
+        "help": "largest output, such as 500MB or 4GB; default: 1GB",
+    },
+    "--plot": {"metavar": "PNG", "help": "draw g(r): .png, .pdf or .svg"},
+    "--queries": {
+        "metavar": "FILE",
+        "help": "whose neighbours are wanted, in the box of the points; default: the points",
+    },
+    "--by-type": {"action": "store_true", "help": "of each two elements of the file"},
+    "--no-progress": {
+        "dest": "progress", "action": "store_false", "help": "no progress bar"
+    },
+}  # fmt: skip
+
+#: What says which points are meant, in which box.
+_SCENE = (
+    "file", "--cutoff", "--box", "--periodic", "--columns", "--trajectory", "--format", "--index",
+    "--json",
+)  # fmt: skip
+_SEARCH = (*_SCENE, "--kernel", "--threads")
+_COLUMNS = (*_SEARCH, "--output")
+_ONE_CUTOFF = {"type": values.cutoff, "help": "largest distance of a pair; default: one with about "
+               "50 neighbours"}  # fmt: skip
+
+
+def _add(command: argparse.ArgumentParser, *names: str, **changed: dict[str, Any]) -> None:
+    """Add options; `changed` is what some of them are told besides."""
+    for name in names:
+        short = ("-o",) if name == "--output" else ()
+        told = changed.get(name.lstrip("-"), {})
+        command.add_argument(*short, name, **{**_OPTIONS[name], **told})
+
+
 def _parser() -> _Parser:
     parser = _Parser(
         prog="halfshell",
@@ -104,235 +184,101 @@ def _parser() -> _Parser:
     parser.add_argument("--version", action="version", version=f"halfshell {hs.__version__}")
     parser.set_defaults(run=None)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND")
-    _add_pairs(commands)
-    _add_lists(commands)
-    _add_verify(commands)
-    _add_measuring(commands)
-    info = commands.add_parser("info", help="what this installation consists of")
-    info.add_argument("--json", action="store_true", help="the same for machines")
-    info.set_defaults(run=_run_info)
-    selftest = commands.add_parser(
-        "selftest", help="check every kernel of this CPU against integers (under 5 s)"
-    )
-    selftest.set_defaults(run=lambda args: import_module("halfshell.selftest").main())
-    return parser
 
+    def command(name: str, words: str, run: Callable[[argparse.Namespace], int], **how: Any) -> Any:
+        made = commands.add_parser(name, help=words, **how)
+        made.set_defaults(run=run)
+        return made
 
-def _add_scene_options(
-    command: argparse.ArgumentParser,
-    has_cutoff: bool = True,
-    has_rule: bool = True,
-    has_kernel: bool = True,
-    has_frames: bool = False,
-    by_elements: bool = False,
-) -> None:
-    """Add what says which points are meant, in which box."""
-    command.add_argument(
-        "file",
-        nargs="?",
-        metavar="FILE",
-        help=".npy, .npz, text with one point per line, point clouds, or anything that ASE or "
-        "MDAnalysis reads; - for standard input; default: alpha-quartz",
-    )
-    if has_cutoff:
-        command.add_argument(
-            "--cutoff",
-            type=values.cutoffs if by_elements else values.cutoff,
-            metavar="R",
-            help="largest distance of a pair"
-            + (", or of each two elements: Si-O=1.8,*-*=3" if by_elements else "")
-            + "; default: one with about 50 neighbours",
-        )
-    command.add_argument(
-        "--box",
-        type=values.box,
-        metavar="LX,LY,LZ",
-        help="edge lengths, or one length for all edges; lengths and angles (six numbers); or all "
-        "components of the edge vectors",
-    )
-    command.add_argument(
-        "--periodic",
-        type=values.periodic,
-        metavar="TTF",
-        help="which axes are periodic, T or F for each, or one letter for all",
-    )
-    command.add_argument(
-        "--columns", type=values.columns, metavar="X,Y,Z",
-        help="of text, the coordinates: names of columns, or numbers from 1 on"
+    lists = "halfshell._cli.lists"
+    pairs = command(
+        "pairs", "find the pairs of a file, summarise them, save them, plot g(r)",
+        _later(lists, "run_pairs"),
     )  # fmt: skip
-    command.add_argument(
-        "--trajectory", metavar="FILE",
-        help="frames of which the first FILE is the topology, as MDAnalysis reads both"
+    _add(
+        pairs, *_COLUMNS, "--strict", "--quantities", "--max-output", "--plot", "--no-progress",
+        output={"help": "write the pairs: .npz, .csv, .parquet, or - for CSV on standard output"},
+        quantities={"help": "columns of OUT, any of i j d D S P; default: ijdS, or ijd without a "
+                    "box"},
     )  # fmt: skip
-    command.add_argument(
-        "--format", metavar="NAME", help="format of ASE or MDAnalysis, if it is not recognised"
-    )
-    if has_frames:
-        command.add_argument(
-            "--index", type=values.frames, metavar="N",
-            help="frame, or frames to average: : for all, 100:, ::10; default: the last"
-        )  # fmt: skip
-    else:
-        command.add_argument(
-            "--index", type=values.frame, metavar="N", help="frame; default: the last"
-        )
-    if has_rule:
-        command.add_argument(
-            "--strict", action="store_true", help="d < cutoff; default: d <= cutoff"
-        )
-    if has_kernel:
-        command.add_argument(
-            "--kernel", type=values.kernel, metavar="NAME", help="see `halfshell info`"
-        )
-    command.add_argument("--json", action="store_true", help="print JSON for machines")
-
-
-def _add_threads(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--threads", type=values.count, metavar="N", help="maximum number; default: as many as pay"
-    )
-
-
-def _add_max_output(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--max-output", type=values.size, metavar="SIZE",
-        help="largest output, such as 500MB or 4GB; default: 1GB"
-    )  # fmt: skip
-
-
-def _add_no_progress(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--no-progress", dest="progress", action="store_false", help="no progress bar"
-    )
-
-
-def _add_pairs(commands: Any) -> None:
-    command = commands.add_parser(
-        "pairs", help="find the pairs of a file, summarise them, save them, plot g(r)"
-    )
-    _add_scene_options(command, by_elements=True)
-    _add_threads(command)
-    command.add_argument(
-        "-o", "--output", metavar="OUT",
-        help="write the pairs: .npz, .csv, .parquet, or - for CSV on standard output"
-    )
-    command.add_argument(
-        "--quantities",
-        type=values.quantities,
-        metavar="LETTERS",
-        help="columns of OUT, any of i j d D S P; default: ijdS, or ijd without a box",
-    )
-    command.add_argument("--sort", action="store_true", help="sort OUT by (i, j, S)")
-    _add_max_output(command)
-    command.add_argument("--plot", metavar="PNG", help="draw g(r): .png, .pdf or .svg")
-    command.add_argument(
-        "--precision",
-        choices=("exact", "double", "single"),
-        default="exact",
+    pairs.add_argument("--sort", action="store_true", help="sort OUT by (i, j, S)")
+    pairs.add_argument(
+        "--precision", choices=("exact", "double", "single"), default="exact",
         help="how a pair near the cutoff is decided; default: exact",
+    )  # fmt: skip
+
+    neighbors = command(
+        "neighbors", "find all neighbours of each point", _later(lists, "run_neighbors")
     )
-    _add_no_progress(command)
-    command.set_defaults(run=_later("halfshell._cli.lists", "run_pairs"))
+    _add(neighbors, *_COLUMNS, "--strict", "--queries", "--quantities", "--max-output")
 
-
-def _add_lists(commands: Any) -> None:
-    """Commands that write columns, and sum them up."""
-    told = {
-        "neighbors": "find all neighbours of each point",
-        "coordination": "count the neighbours of each point",
-        "nearest": "find the nearest neighbours of each point",
-        "rdf": "the radial distribution function g(r), up to the cutoff",
-    }
-    for name, words in told.items():
-        command = commands.add_parser(name, help=words)
-        _add_scene_options(
-            command, name != "nearest", name in ("neighbors", "coordination"),
-            has_frames=name == "rdf", by_elements=name != "rdf",
-        )  # fmt: skip
-        _add_threads(command)
-        command.add_argument(
-            "-o", "--output", metavar="OUT", help="write the columns: .npz, .csv, .parquet, or - "
-            "for CSV here"
-        )  # fmt: skip
-        if name != "rdf":
-            command.add_argument(
-                "--queries", metavar="FILE",
-                help="whose neighbours are wanted, in the box of the points; default: the points"
-            )  # fmt: skip
-        command.set_defaults(run=_later("halfshell._cli.lists", f"run_{name}"))
-        if name == "neighbors":
-            command.add_argument(
-                "--quantities", type=values.quantities, metavar="LETTERS",
-                help="columns of OUT, any of i j d D S; default: ijdS, or ijd without a box",
-            )  # fmt: skip
-            _add_max_output(command)
-        if name == "nearest":
-            command.add_argument("-k", type=values.count, default=1, help="how many; default: 1")
-        if name == "rdf":
-            command.add_argument(
-                "--bins", type=values.count, default=100, metavar="N", help="default: 100"
-            )
-            command.add_argument(
-                "--density", type=values.number, metavar="RHO",
-                help="points per unit of volume, where the box has none or is not the whole",
-            )  # fmt: skip
-            command.add_argument("--plot", metavar="PNG", help="draw it: .png, .pdf or .svg")
-        if name in ("rdf", "coordination"):
-            command.add_argument(
-                "--by-type", action="store_true", help="of each two elements of the file"
-            )
-
-
-def _add_verify(commands: Any) -> None:
-    command = commands.add_parser(
-        "verify", help="check a list of pairs, of halfshell or another library, exactly"
+    counts = command(
+        "coordination", "count the neighbours of each point", _later(lists, "run_coordination")
     )
-    _add_scene_options(command, by_elements=True)
-    _add_threads(command)
-    command.add_argument(
+    _add(counts, *_COLUMNS, "--strict", "--queries", "--by-type")
+
+    nearest = command(
+        "nearest", "find the nearest neighbours of each point", _later(lists, "run_nearest")
+    )
+    _add(nearest, *[name for name in _COLUMNS if name != "--cutoff"], "--queries")
+    nearest.add_argument("-k", type=values.count, default=1, help="how many; default: 1")
+
+    rdf = command(
+        "rdf", "the radial distribution function g(r), up to the cutoff", _later(lists, "run_rdf")
+    )
+    _add(
+        rdf, *_COLUMNS, "--plot", "--by-type", cutoff=_ONE_CUTOFF,
+        index={"type": values.frames,
+               "help": "frame, or frames to average: : for all, 100:, ::10; default: the last"},
+    )  # fmt: skip
+    rdf.add_argument("--bins", type=values.count, default=100, metavar="N", help="default: 100")
+    rdf.add_argument(
+        "--density", type=values.number, metavar="RHO",
+        help="points per unit of volume, where the box has none or is not the whole",
+    )  # fmt: skip
+
+    verify = command(
+        "verify", "check a list of pairs, of halfshell or another library, exactly",
+        _later("halfshell._cli.verify"),
+    )  # fmt: skip
+    _add(verify, *_SEARCH, "--strict", "--no-progress")
+    verify.add_argument(
         "list", nargs="?", metavar="LIST",
-        help="a saved list: .csv, .npz, .parquet with columns i and j, or the like, and shifts"
+        help="a saved list: .csv, .npz, .parquet with columns i and j, or the like, and shifts",
     )  # fmt: skip
-    command.add_argument(
-        "--against",
-        metavar="LIBRARY",
-        help="whose list to check: ase, matscipy, matscipy-neighbours, scipy or vesin; "
-        "default: our own",
-    )
-    command.add_argument(
-        "--sample",
-        type=values.sample,
-        metavar="N",
+    verify.add_argument(
+        "--against", metavar="LIBRARY",
+        help="whose list to check: ase, matscipy, matscipy-neighbours, scipy or vesin; default: "
+        "our own",
+    )  # fmt: skip
+    verify.add_argument(
+        "--sample", type=values.sample, metavar="N",
         help="most points to check by integers, 0 for all; default: 400, or what takes seconds",
-    )
-    _add_no_progress(command)
-    command.set_defaults(run=_later("halfshell._cli.verify"))
-
-
-def _add_measuring(commands: Any) -> None:
-    """Commands of `halfshell_report`, which is imported when they are called."""
-
-    def fill_bench(command: argparse.ArgumentParser) -> None:
-        from halfshell_report.cli import add_peers
-
-        _add_scene_options(command, has_kernel=False)
-        add_peers(command)
-
-    def fill_report(command: argparse.ArgumentParser) -> None:
-        from halfshell_report.cli import add_options
-
-        add_options(command)
-
-    bench = commands.add_parser(
-        "bench", help="run times on a file, ours and other libraries', whose answers come first",
-        fill=fill_bench,
     )  # fmt: skip
-    bench.set_defaults(run=_later("halfshell_report.cli", "run_bench"))
-    report = commands.add_parser(
-        "report", help="error against run time, of halfshell and other libraries, on hard scenes",
-        fill=fill_report,
+
+    # Options of `halfshell_report`, which is imported when these commands are called.
+    def fill_bench(parser: argparse.ArgumentParser) -> None:
+        _add(parser, *_SCENE, "--strict", cutoff=_ONE_CUTOFF)
+        import_module("halfshell_report.cli").add_peers(parser)
+
+    def fill_report(parser: argparse.ArgumentParser) -> None:
+        import_module("halfshell_report.cli").add_options(parser)
+
+    command(
+        "bench", "run times on a file, ours and other libraries', whose answers come first",
+        _later("halfshell_report.cli", "run_bench"), fill=fill_bench,
     )  # fmt: skip
-    report.set_defaults(run=_later("halfshell_report.cli"))
+    command(
+        "report", "error against run time, of halfshell and other libraries, on hard scenes",
+        _later("halfshell_report.cli"), fill=fill_report,
+    )  # fmt: skip
+    info = command("info", "what this installation consists of", _run_info)
+    info.add_argument("--json", action="store_true", help="the same for machines")
+    command(
+        "selftest", "check every kernel of this CPU against integers (under 5 s)",
+        lambda args: import_module("halfshell.selftest").main(),
+    )  # fmt: skip
+    return parser
 
 
 # Commands ----------------------------------------------------------------------------------

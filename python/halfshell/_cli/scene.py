@@ -9,8 +9,7 @@ from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import chain
-from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,7 @@ from halfshell._cli.errors import InputError, missing_extra, one_line, printable
 from halfshell._cli.files import read_frames, read_scene
 from halfshell._cli.structure_files import Scene
 from halfshell._convert.memory import refuse_unavailable
-from halfshell._functions.rdf import over_ideal_gas, shell_shares, unit_ball
+from halfshell._functions.rdf import rdf, unit_ball
 from halfshell._settings import settings
 
 NEIGHBORS_WANTED = 50  # what a chosen cutoff aims at: two or three shells of a dense system
@@ -211,43 +210,14 @@ def require_matplotlib() -> None:
         raise missing_extra("--plot", "matplotlib") from None
 
 
-def radial_distribution(
-    d: NDArray[np.float64], scene: Scene, cutoff: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], bool]:
-    """Return the middle of each bin, g(r) or the raw distribution, and which of the two.
-
-    g(r) is the number of neighbours over that of an ideal gas of the same density. It needs a
-    volume: where an axis does not repeat there is none, and the number of neighbours of a
-    point per unit of distance is returned.
-    """
-    n, ndim = scene.points.shape
+def draw_distances(axes: Any, d: NDArray[np.float64], scene: Scene, cutoff: float) -> None:
+    """Draw g(r), or the mean number of neighbours where an axis has no period, and so no volume."""
+    unit = "Å" if scene.unit else None
+    if scene.box_rows is not None and all(scene.periodic):
+        rdf(scene.known, cutoff, BINS).plot(axes, unit=unit)
+        return
     counts, edges = np.histogram(d, bins=BINS, range=(0.0, cutoff))
-    middle = (edges[1:] + edges[:-1]) / 2
-    if scene.box_rows is None or not all(scene.periodic):
-        return middle, 2.0 * counts / n / np.diff(edges), False
-    shares = shell_shares(scene.box_rows, (1 << ndim) - 1, edges)
-    return middle, over_ideal_gas(counts, 0.5 * n * n, shares), True
-
-
-def plot_distribution(
-    stream: IO[bytes], file_format: str, d: NDArray[np.float64], scene: Scene, cutoff: float
-) -> None:
-    """Draw the distribution of distances."""
-    from matplotlib.figure import Figure
-
-    r, values, normalised = radial_distribution(d, scene, cutoff)
-    unit = " (Å)" if scene.unit else ""
-    figure = Figure(figsize=(7.0, 4.0), layout="constrained")
-    axes = figure.subplots()
-    axes.step(r, values, where="mid", linewidth=1.2)
-    axes.set_xlim(0, cutoff)
-    axes.set_ylim(bottom=0)
-    axes.set_xlabel(f"distance r{unit}")
-    if normalised:
-        axes.axhline(1.0, color="0.6", linewidth=0.8, linestyle="--")
-        axes.set_ylabel("g(r)")
-    else:
-        axes.set_ylabel(f"neighbours of a point per unit of r{unit}\n(raw: no volume to divide by)")
-    title = f"{printable(Path(scene.source).name)}: {len(scene.points):,} points, {len(d):,} pairs"
-    axes.set_title(title, fontsize=10, parse_math=False)
-    figure.savefig(stream, format=file_format, dpi=150)
+    axes.stairs(2.0 * counts / len(scene.points) / np.diff(edges), edges)
+    per = f" / {unit}" if unit else ""
+    axes.set_xlabel(f"distance r{per}")
+    axes.set_ylabel("neighbours of a point per unit of r\n(raw: no volume to divide by)")

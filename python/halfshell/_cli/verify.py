@@ -131,9 +131,8 @@ def check_by_integers(
 
 def _types_of(scene: Scene, cutoff: Any) -> tuple[list[int], list[list[float]]]:
     """The type of each point, and the cutoff of each two, negative if they form no pairs."""
-    reach = take(scene.known, cutoff).reach
-    assert reach is not None
-    types, _, table = reach[3:6]
+    call = take(scene.known, cutoff)
+    types, table = call.known.types, call.pairing and call.pairing.table
     assert types is not None and table is not None
     return types.tolist(), table.tolist()
 

@@ -7,7 +7,7 @@ Types and shapes are settled here: an array is converted only when no value chan
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -111,15 +111,28 @@ def as_array(values: Any, name: str, single: str = "hold real numbers") -> npt.N
         ) from error
 
 
-def one_each(name: str, n: int) -> Callable[[tuple[int, ...]], None]:
-    """A check that refuses shapes but (n,): a number for each point, or query if it is of these."""
+def of_shape(must: str, *shapes: tuple[int, ...]) -> Callable[[tuple[int, ...]], None]:
+    """A check that refuses other shapes. must: what a message says."""
 
     def check(shape: tuple[int, ...]) -> None:
-        if shape != (n,):
-            whom = "query" if name.startswith("query_") else "point"
-            raise ValueError(f"{name} must have shape ({n},), one for each {whom}, got {shape}")
+        if shape not in shapes:
+            raise ValueError(f"{must}, got {shape}")
 
     return check
+
+
+def one_each(
+    name: str, n: int, each: str = "one for each point"
+) -> Callable[[tuple[int, ...]], None]:
+    """A check that refuses shapes but (n,)."""
+    return of_shape(f"{name} must have shape ({n},), {each}", (n,))
+
+
+def refuse_where(wrong: Any, array: npt.NDArray[Any], name: str, must: str) -> None:
+    """ValueError, with the place, for the first value that is wrong."""
+    for where in np.argwhere(wrong)[:1]:
+        place = f"{_element(name, where)} = " if len(where) else ""
+        raise ValueError(f"{name} must {must}, got {place}{array[tuple(where)]}")
 
 
 def in_order(array: npt.NDArray[Any], dtype: type[Any]) -> npt.NDArray[Any]:
@@ -152,7 +165,6 @@ def _refuse_masked_items(values: list[Any] | tuple[Any, ...], name: str) -> None
 
 
 def _element(name: str, where: Iterable[Any]) -> str:
-    """``points[2, 1]``, or the name alone for a single number."""
     place = ", ".join(str(int(k)) for k in where)
     return f"{name}[{place}]" if place else name
 
@@ -212,7 +224,6 @@ def starts_of(lengths: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
 def rows_of(
     offsets: npt.NDArray[Any], dtype: npt.DTypeLike = np.int64
 ) -> npt.NDArray[Any]:
-    """The number of the row of each entry."""
     return np.repeat(np.arange(len(offsets) - 1, dtype=dtype), np.diff(offsets))
 
 
@@ -223,6 +234,16 @@ def entries_of(
     counts = offsets[rows + 1] - offsets[rows]
     ends = starts_of(counts)
     return ends, np.repeat(offsets[rows] - ends[:-1], counts) + np.arange(ends[-1])
+
+
+def whole_rows(offsets: npt.NDArray[Any], most: int) -> Iterator[tuple[int, int]]:
+    """First rows and ends of parts: of at most so many entries, or of one row that has more."""
+    first = 0
+    while first < len(offsets) - 1:
+        limit = int(offsets[first]) + most
+        end = max(first + 1, int(np.searchsorted(offsets, limit, side="right")) - 1)
+        yield first, end
+        first = end
 
 
 # ---- numbers of points -----------------------------------------------------------------------
@@ -238,11 +259,8 @@ def as_point_numbers(values: Any, name: str, n: int, numbered: str) -> IntArray:
     if column.size and n == 0:
         raise ValueError(f"{name} must be empty: there are no {numbered}")
     numbers = np.array(column, np.int64)  # one's own, as another thread may change the caller's
-    for k in np.flatnonzero((numbers < 0) | (numbers >= n)):
-        raise ValueError(
-            f"{name} must be numbers of {numbered}, from 0 to {n - 1}, got {name}[{k}] = "
-            f"{column[k]}"
-        )
+    wrong = (numbers < 0) | (numbers >= n)
+    refuse_where(wrong, column, name, f"be numbers of {numbered}, from 0 to {n - 1}")
     return numbers
 
 
@@ -263,8 +281,7 @@ def as_listed(
     if S is None:
         return first, second, None
     shifts = as_array(S, "S")
-    if shifts.shape != (len(first), ndim):
-        raise ValueError(f"S must have shape ({len(first)}, {ndim}), got {shifts.shape}")
+    of_shape(f"S must have shape ({len(first)}, {ndim})", (len(first), ndim))(shifts.shape)
     if shifts.size and (shifts.dtype.kind not in "iuf" or (shifts != np.rint(shifts)).any()):
         raise TypeError("S must hold whole numbers")
     if shifts.size and not (np.abs(shifts.astype(np.float64)) < 2.0**62).all():

@@ -22,7 +22,7 @@ from halfshell._settings import Settings, current
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from halfshell._convert.types import FloatArray, Reach, Selection, Systems
+    from halfshell._convert.types import FloatArray
 
 #: Rules by which two radii or supports make the reach of a pair, in the order of the core.
 RULES = ("sum", "mean", "max", "min", "gather", "scatter")
@@ -35,42 +35,53 @@ _LEAST_HALVED = 2.0**-1021  # halves lose no bit
 _NO_PAIRS = -1.0  # the cutoff of two types that form none
 
 
+class Known(NamedTuple):
+    """What a search goes by of each point, in the order of the core; None: by something else."""
+
+    radii: FloatArray | None = None
+    supports: FloatArray | None = None
+    types: npt.NDArray[np.int32] | None = None
+    weights: FloatArray | None = None
+    groups: npt.NDArray[np.int64] | None = None
+    labels: npt.NDArray[np.int64] | None = None
+
+    def some(self, which: Any) -> Known:
+        """Of these points."""
+        return Known(
+            *(None if one is None else np.ascontiguousarray(one[which]) for one in self)
+        )
+
+
+class Pairing(NamedTuple):
+    """How far pairs reach, and which of them count, in the order of the core."""
+
+    rule: int | None = None  # of RULES; None: as far as the cutoff
+    extent: float | None = None  # how many times supports count, or radii
+    table: FloatArray | None = None  # of cutoffs by types; negative: no pairs
+    within: int | None = None  # the most that labels of excluded pairs differ by
+    excluded: npt.NDArray[np.int64] | None = None  # pairs
+    numbers: npt.NDArray[np.int64] | None = None  # of queries that are points
+    least: float = 0.0  # distance
+
+
 class Call:
     """One search: its points, queries and cutoff, which pairs count, and how it is made."""
 
-    __slots__ = (
-        "bar",
-        "cells",
-        "cutoff",
-        "inclusive",
-        "indices",
-        "points",
-        "progress",
-        "queries",
-        "reach",
-        "rule",
-        "selection",
-        "settings",
-        "shells",
-        "system_cutoffs",
-        "threads",
-    )
-
-    bar: Any  # to be closed at the end, or None
-    cells: Any  # of the core, in place of points and box; or None
-    inclusive: bool
-    progress: Any
-    threads: int | None
     points: Points
     queries: Points | None
     cutoff: float  # the largest distance of any pair, or infinity
-    shells: FloatArray | None  # several cutoffs, ascending
-    system_cutoffs: FloatArray | None  # one for each system
-    rule: str | None
-    reach: Reach | None  # of each pair, by radii, supports or types
-    selection: Selection | None  # which pairs count
-    indices: npt.NDArray[np.int64] | None
+    inclusive: bool
     settings: Settings
+    threads: int | None
+    rule: str | None
+    bar: Any = None  # to be closed at the end
+    cells: Any = None  # of the core, in place of points and box
+    progress: Any = None
+    shells: FloatArray | None = None  # several cutoffs, ascending
+    system_cutoffs: FloatArray | None = None  # one for each system
+    known = known_of_queries = Known()
+    pairing: Pairing | None = None  # None: all pairs within the cutoff
+    indices: npt.NDArray[np.int64] | None = None
 
     # ---- as the core takes it --------------------------------------------------------------
 
@@ -83,24 +94,27 @@ class Call:
         return None if self.queries is None else self.queries.positions
 
     @property
-    def vectors(self) -> FloatArray | None:
-        """The box of all systems, or any of its shape where each has its own."""
-        box = self.points.box
-        return np.eye(box.shape[1]) if box is not None and box.ndim == 3 else box
+    def bits(self) -> int:
+        """The axes that repeat, of one system."""
+        return int(self.points._axes)
 
     @property
-    def bits(self) -> int:
-        axes = self.points._axes
-        if isinstance(axes, np.ndarray):
-            return 0 if self.points.box is None else (1 << int(self.array.shape[1])) - 1
-        return int(axes)
+    def has_reach(self) -> bool:
+        """Whether radii, supports or types say how far pairs reach."""
+        return self.pairing is not None and self.pairing.rule is not None
 
     @property
     def core(self) -> tuple[Any, ...]:
         """The first ten arguments of every search of the core."""
-        if self.cells is not None and self.reach is None:
-            return (self.cells, self.cutoff, None, 0, *self.rest)
-        return (self.array, self.cutoff, self.vectors, self.bits, *self.rest)
+        if self.cells is not None and not self.has_reach:
+            return ((self.cells, *self.known, None), self.cutoff, None, 0, *self.rest)
+        return ((self.array, *self.known, self.points.batch), *self.scene, *self.rest)
+
+    @property
+    def scene(self) -> tuple[Any, ...]:
+        """Those of the cutoff and the box: of all systems, or of each."""
+        cutoff = self.cutoff if self.system_cutoffs is None else self.system_cutoffs
+        return cutoff, self.points.box, self.points._axes
 
     @property
     def rest(self) -> tuple[Any, ...]:
@@ -112,20 +126,18 @@ class Call:
         )  # fmt: skip
 
     @property
-    def pairing(self) -> Any:
-        """The reach of each pair, with which pairs count; None for one cutoff of all."""
-        return self.reach if self.selection is None else (self.reach, self.selection)
+    def query_set(self) -> tuple[Any, ...] | None:
+        """The queries as the core takes them."""
+        one = self.queries
+        return None if one is None else (one.positions, *self.known_of_queries, one.batch)
 
-    @property
-    def systems(self) -> Systems | None:
-        points, queries = self.points, self.queries
-        if points.batch is None:
-            return None
-        boxes = points.box if points.box is not None and points.box.ndim == 3 else None
-        axes = points._axes if isinstance(points._axes, np.ndarray) else None
+    def as_queries(self, numbers: npt.NDArray[np.int64]) -> tuple[tuple[Any, ...], Pairing | None]:
+        """Some of the points as queries too, and how they pair."""
+        batch = self.points.batch
         return (
-            points.batch, self.system_cutoffs, boxes, None if queries is None else queries.batch,
-            axes,
+            (self.array[numbers], *self.known.some(numbers),
+             None if batch is None else np.ascontiguousarray(batch[numbers])),
+            self.pairing and self.pairing._replace(numbers=numbers),
         )  # fmt: skip
 
     def run(self, search: Callable[..., Any], *own: Any) -> Any:
@@ -136,27 +148,10 @@ class Call:
             if self.bar is not None:
                 self.bar.close()
 
-    def refuse(self, function: str, **reasons: str) -> None:
-        """ValueError for what is given and means nothing there, with why.
-
-        reasons: of "queries", "batch", "reach", "selection", "indices", "shells", "types".
-        """
-        given = {
-            "queries": self.queries is not None,
-            "batch": self.points.batch is not None,
-            "radii": self.reach is not None and self.reach[3] is None and self.reach[8] is None,
-            "supports": self.reach is not None and self.reach[8] is not None,
-            "types": self.reach is not None and self.reach[3] is not None,
-            "selection": self.selection is not None,
-            "indices": self.indices is not None,
-            "shells": self.shells is not None,
-        }
-        for name, reason in reasons.items():
-            words = ("radii", "supports", "types") if name == "reach" else (name,)
-            for word in words:
-                if given[word]:
-                    what = _WORDS.get(word, word)
-                    raise ValueError(f"{function} cannot be combined with {what}: {reason}")
+    def refuse_batch(self, function: str, reason: str) -> None:
+        """ValueError for several systems where they mean nothing, with why."""
+        if self.points.batch is not None:
+            raise ValueError(f"{function} cannot be combined with batch: {reason}")
 
 
 def shells_of(quantities: Any) -> str:
@@ -170,7 +165,7 @@ def check_shells(call: Call, quantities: Any) -> None:
         return
     if call.points.batch is not None:
         raise ValueError("the letter k in quantities cannot be combined with a batch")
-    if call.reach is not None:
+    if call.has_reach:
         raise ValueError(
             "the letter k in quantities cannot be combined with radii, supports or cutoffs by type"
         )
@@ -202,13 +197,6 @@ def each_cutoff(call: Call) -> Iterator[Call]:
             bar.close()
 
 
-_WORDS = {
-    "selection": "groups, exclude or min_distance",
-    "shells": "several cutoffs",
-    "types": "a cutoff for each pair of types",
-}
-
-
 def take(
     points: Any,
     cutoff: Any,
@@ -236,10 +224,10 @@ def take(
     try:
         call = Call()
         call.settings = current()
-        call.cells = None
         if getattr(type(points), "_is_cell_list", False):
             call.cells, threads = points._cells, points._threads if threads is None else threads
-            cutoff = cutoff if points.points.radii is not None else points._or_own(cutoff)
+            if cutoff is None and points.points.radii is None:
+                cutoff = points.cutoff
             points = points.points
         ndim = 3
         if queries is not None and type(points) in (list, tuple) and not points:
@@ -248,17 +236,14 @@ def take(
         call.queries = _queries_of(queries, call.points)
         call.inclusive = inclusive if type(inclusive) is bool else as_flag(inclusive, "inclusive")
         call.threads = call.settings.threads if threads is None else threads
-        call.bar = call.progress = None
         if progress is not None and progress is not False:
             _take_progress(call, progress)
         call.rule = rule
-        call.reach = call.shells = call.system_cutoffs = None
         if by_reach:
             _take_cutoff(call, cutoff, directed or call.queries is not None, several)
         else:
             call.cutoff = cutoff
-        call.selection = _selection(call, exclude, min_distance)
-        call.indices = None
+        _take_selection(call, exclude, min_distance)
         if indices is not None:
             _take_indices(call, indices)
         return call
@@ -354,7 +339,7 @@ def _take_cutoff(call: Call, cutoff: Any, directed: bool, several: str) -> None:
         call.cutoff = math.inf
     else:
         _take_cutoffs(call, cutoff, several)
-    if call.reach is not None and (has_radii or has_supports):
+    if call.has_reach and (has_radii or has_supports):
         what = "radii" if has_radii else "supports"
         raise ValueError(f"a cutoff for each pair of types cannot be combined with {what}")
     if call.shells is not None and (has_radii or has_supports) and several != "counts":
@@ -364,7 +349,7 @@ def _take_cutoff(call: Call, cutoff: Any, directed: bool, several: str) -> None:
         _take_radii(call, cutoff)
     elif has_supports:
         _take_supports(call)
-    elif call.reach is None and call.cells is None and call.cutoff == math.inf:
+    elif not call.has_reach and call.cells is None and call.cutoff == math.inf:
         call.cutoff = _beyond_all(both)
 
 
@@ -449,7 +434,8 @@ def _take_radii(call: Call, cutoff: Any) -> None:
                 )
     if call.system_cutoffs is None and cutoff is None:
         call.cutoff = math.inf
-    call.reach = reach_by_radii(rule, own, asking)
+    call.known, call.known_of_queries = Known(own), Known(asking)
+    call.pairing = Pairing(RULES.index(rule))
 
 
 def _take_supports(call: Call) -> None:
@@ -460,7 +446,8 @@ def _take_supports(call: Call) -> None:
     if not (math.isfinite(call.cutoff) and call.cutoff >= 0.0):
         raise ValueError(f"cutoff must be finite and not negative, got {call.cutoff}")
     own, asking = _sides(call, rule, "supports")
-    call.reach = reach_by_supports(rule, own, asking, call.cutoff + 0.0)
+    call.known, call.known_of_queries = Known(supports=own), Known(supports=asking)
+    call.pairing = Pairing(RULES.index(rule), call.cutoff + 0.0)
     call.cutoff = math.inf
 
 
@@ -485,23 +472,6 @@ def _sides(call: Call, rule: str, what: str) -> tuple[Any, Any]:
     )
 
 
-def reach_by_radii(
-    rule: str, radii: Any, query_radii: Any, extent: float | None = None
-) -> Reach:
-    """Of radii that are known to be right. extent: how many times they count, once if None."""
-    return RULES.index(rule), radii, query_radii, None, None, None, None, None, extent
-
-
-def reach_by_supports(rule: str, supports: Any, query_supports: Any, extent: float) -> Reach:
-    """Of supports whose shapes and entries are known to be right."""
-    return RULES.index(rule), None, None, None, None, None, supports, query_supports, extent
-
-
-def reach_by_types(types: Any, query_types: Any, cutoffs: FloatArray) -> Reach:
-    """Of types that are known to be rows of this table; the core needs no rule."""
-    return 0, None, None, types, query_types, cutoffs, None, None, None
-
-
 # ---- cutoffs by type -----------------------------------------------------------------------
 
 class _Kinds(NamedTuple):
@@ -518,7 +488,8 @@ def _take_table(
     if len(table) == 0:
         table = np.full((1, 1), _NO_PAIRS)  # of no points: the core wants one type at least
     call.cutoff = max(float(table.max(initial=0.0)), 0.0)
-    call.reach = reach_by_types(own, asking, table)
+    call.known, call.known_of_queries = Known(types=own), Known(types=asking)
+    call.pairing = Pairing(0, table=table)  # the core needs no rule
 
 
 def kinds_of(call: Call, reason: str) -> _Kinds:
@@ -697,7 +668,7 @@ def _type_of(part: Any, where: str, names: tuple[str, ...] | None) -> Any:
 
 # ---- which pairs count ---------------------------------------------------------------------
 
-def _selection(call: Call, exclude: Any, min_distance: Any) -> Selection | None:
+def _take_selection(call: Call, exclude: Any, min_distance: Any) -> None:
     groups, asking_groups, _ = _together(call, "_groups", "groups")
     least = 0.0
     if min_distance is not None:
@@ -706,18 +677,22 @@ def _selection(call: Call, exclude: Any, min_distance: Any) -> Selection | None:
             raise ValueError(f"min_distance must be finite and not negative, got {least}")
         if least > 0.0 and call.settings.precision == "single":
             raise ValueError("min_distance cannot be combined with precision 'single'")
-    labels = asking_labels = excluded = None
-    within = 0
+    labels = asking_labels = excluded = within = None
     if exclude is not None:
-        number = None if is_a(exclude, (bool, np.bool_)) else whole_number(exclude, "exclude")
-        if number is not None:
-            within = number
-            labels, asking_labels = _labels(call, number)
+        within = None if is_a(exclude, (bool, np.bool_)) else whole_number(exclude, "exclude")
+        if within is not None:
+            labels, asking_labels = _labels(call, within)
         else:
             excluded = _excluded(exclude, call)
-    if groups is labels is excluded is None and least == 0.0 and exclude is None:
-        return None
-    return groups, asking_groups, labels, asking_labels, None, within, excluded, least
+    if groups is None and exclude is None and least == 0.0:
+        return
+    call.known = call.known._replace(groups=groups, labels=labels)
+    call.known_of_queries = call.known_of_queries._replace(
+        groups=asking_groups, labels=asking_labels
+    )
+    call.pairing = (call.pairing or Pairing())._replace(
+        within=within, excluded=excluded, least=least
+    )
 
 
 def _labels(call: Call, within: int) -> tuple[Any, Any]:

@@ -12,7 +12,7 @@ import importlib
 import re
 import sys
 from _ctypes import CFuncPtr
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -57,7 +57,7 @@ def target_of(callback: Any, user_data: Any) -> Target:
         return _of_low_level(callback, user_data)
     user, keeps = _address_of_data(user_data)
     if _is_from(callback, "numba") and hasattr(callback, "_sig") and hasattr(callback, "address"):
-        _check([str(callback._sig.return_type), *map(str, callback._sig.args)])
+        _check(f"{callback._sig.return_type} ({', '.join(map(str, callback._sig.args))})")
         return Target(_checked_address(callback.address), user, keeps)
     if is_a(callback, CFuncPtr):
         return Target(_address_of_ctypes(callback), user, keeps)
@@ -90,14 +90,17 @@ def _refuse(given: str) -> TypeError:
     return TypeError(f"callback must have the C signature {EXPECTED}, got {given}")
 
 
-def _check(types: Sequence[str], given: str | None = None) -> None:
-    """Compare the type of the result and those of the arguments, as C or numba write them."""
-    result, *arguments = [_kind_of(one) for one in types]
+def _check(signature: str) -> None:
+    """Compare ``int (int64_t, ...)``, as a capsule, cffi or numba write it."""
+    match = re.fullmatch(r"\s*([^(]*?)\s*(?:\(\s*\*\s*\)\s*)?\((.*)\)\s*", signature)
+    if match is None or "(" in match[2]:
+        raise _refuse(repr(signature))
+    result, *arguments = [_kind_of(one) for one in (match[1], *match[2].split(","))]
     fits = len(arguments) == len(_ARGUMENTS) and result == _RESULT
     for kind, allowed in zip(arguments, _ARGUMENTS):
         fits = fits and (kind in allowed or ("pointer" in allowed and kind.endswith("*")))
     if not fits:
-        raise _refuse(given or f"{types[0]} ({', '.join(types[1:])})")
+        raise _refuse(signature)
 
 
 def _kind_of(declared: str) -> str:
@@ -106,14 +109,6 @@ def _kind_of(declared: str) -> str:
     words = re.sub(r"\b(const|volatile|restrict)\b|\*", " ", declared).split()
     name = re.sub(r"^(__pyx_t_\w*?_|npy_)(?=u?int(32|64)|float64)", "", " ".join(words))
     return _C_TYPES.get(name, name) + "*" * stars
-
-
-def _check_text(signature: str) -> None:
-    """The signature of a capsule, ``int (int64_t, ...)``, or that of a cffi type."""
-    match = re.fullmatch(r"\s*([^(]*?)\s*(?:\(\s*\*\s*\)\s*)?\((.*)\)\s*", signature)
-    if match is None or "(" in match[2]:
-        raise _refuse(repr(signature))
-    _check([match[1], *match[2].split(",")], signature)
 
 
 def _of_low_level(callback: Any, user_data: Any) -> Target:
@@ -127,7 +122,7 @@ def _of_low_level(callback: Any, user_data: Any) -> Target:
     name = api.PyCapsule_GetName(capsule)
     if name is None:
         raise _refuse("none: give the LowLevelCallable a signature")
-    _check_text(name.decode())
+    _check(name.decode())
     function = api.PyCapsule_GetPointer(capsule, ctypes.c_char_p(name))
     return Target(_checked_address(function), api.PyCapsule_GetContext(capsule) or 0)
 
@@ -155,8 +150,8 @@ def _address_of_ctypes(callback: Any) -> int:
         raise TypeError("callback must not need the GIL: use CFUNCTYPE, not PYFUNCTYPE")
     if callback.argtypes is None:
         raise _refuse("none: set argtypes and restype of the ctypes function")
-    types = [callback.restype, *callback.argtypes]
-    _check([_ctypes_name(one) for one in types])
+    result, *arguments = map(_ctypes_name, (callback.restype, *callback.argtypes))
+    _check(f"{result} ({', '.join(arguments)})")
     return _checked_address(ctypes.cast(callback, ctypes.c_void_p).value)
 
 
@@ -171,7 +166,7 @@ def _address_of_cffi(callback: Any) -> int | None:
         declared = ffi.typeof(callback)
     except TypeError:
         return None
-    _check_text(declared.cname if declared.kind == "function" else f"a {declared.cname}")
+    _check(declared.cname if declared.kind == "function" else f"a {declared.cname}")
     return _checked_address(int(ffi.cast("uintptr_t", callback)))
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -25,7 +25,6 @@ def is_a(value: Any, kinds: type | tuple[type, ...]) -> bool:
 
 
 def kind_of(value: Any) -> str:
-    """The name of its type."""
     return type(value).__name__
 
 
@@ -41,7 +40,6 @@ def shown(value: Any) -> str:
 
 
 def told(error: BaseException) -> str:
-    """What an exception says."""
     try:
         return str(error)
     except Exception:
@@ -50,14 +48,19 @@ def told(error: BaseException) -> str:
 
 def attribute(value: Any, name: str, argument: str, default: Any = None) -> Any:
     """An attribute, or `default` where there is none; TypeError if asking for it raises."""
+    return read(argument, value, lambda: getattr(value, name, default), f".{name}")
+
+
+def read(argument: str, value: Any, get: Callable[[], Any], part: str = "") -> Any:
+    """What `get` returns; what it raises, of code that is not ours, becomes a TypeError."""
     try:
-        return getattr(value, name, default)
+        return get()
     except MemoryError:
         raise
     except Exception as error:
         raise TypeError(
-            f"{argument} cannot be read: {kind_of(value)}.{name} raised "
-            f"{kind_of(error)}: {told(error)}"
+            f"{argument} cannot be read: {kind_of(value)}{part} raised {kind_of(error)}: "
+            f"{told(error)}"
         ) from error
 
 
@@ -84,16 +87,15 @@ def whole_number(value: Any, argument: str) -> int | None:
     number = exact_number(value)
     if number is not None:
         return number if isinstance(number, int) else None
-    try:
-        return operator.index(value)
-    except MemoryError:
-        raise
-    except TypeError:
-        return None
-    except Exception as error:
-        raise TypeError(
-            f"{argument} cannot be read: {kind_of(value)} raised {kind_of(error)}: {told(error)}"
-        ) from error
+
+    def index() -> int | None:
+        try:
+            return operator.index(value)
+        except TypeError:
+            return None
+
+    found: int | None = read(argument, value, index)
+    return found
 
 
 def refuse_deep_lists(values: Any, name: str) -> None:

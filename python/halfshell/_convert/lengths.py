@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from halfshell._convert.arrays import as_real_array
+from halfshell._convert.arrays import as_real_array, of_shape, refuse_where
 from halfshell._convert.foreign import is_a, shown
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import as_count
@@ -46,36 +46,20 @@ def as_number(value: Any, name: str, single: str = "be a number") -> float:
 
 
 def as_positive(value: Any, name: str) -> float:
-    """A number that is finite and greater than 0."""
     number = as_number(value, name)
     if not (math.isfinite(number) and number > 0.0):
         raise ValueError(f"{name} must be finite and greater than 0, got {number}")
     return number
 
 
-def as_cutoff(value: Any) -> float:
-    """One cutoff; the core checks its value."""
-    return as_number(value, "cutoff")
-
-
 def as_radii(value: Any, n: int) -> float | FloatArray | None:
     """None, one number, or an array of one for each of n queries; finite and not negative."""
     if value is None:
         return None
-
-    def check(shape: tuple[int, ...]) -> None:
-        if shape not in ((), (n,)):
-            raise ValueError(
-                f"radius must be a number or have shape ({n},), one for each query, got {shape}"
-            )
-
+    check = of_shape(f"radius must be a number or have shape ({n},), one for each query", (), (n,))
     array = as_real_array(value, "radius", "be a number", check).astype(np.float64)
-    if array.ndim == 0:
-        if not (np.isfinite(array) and array >= 0.0):
-            raise ValueError(f"radius must be finite and not negative, got {float(array)}")
-        return float(array)
     check_lengths(array, "radius")
-    return array
+    return array if array.ndim else float(array)
 
 
 def as_edges(values: npt.ArrayLike, name: str = "edges") -> FloatArray:
@@ -98,12 +82,11 @@ def as_edges(values: npt.ArrayLike, name: str = "edges") -> FloatArray:
 
 def check_lengths(array: FloatArray, name: str) -> None:
     """ValueError, with the place, unless all are finite and not negative."""
-    for k in np.flatnonzero(~(np.isfinite(array) & (array >= 0.0))):
-        raise ValueError(f"{name} must be finite and not negative, got {name}[{k}] = {array[k]}")
+    wrong = ~(np.isfinite(array) & (array >= 0.0))
+    refuse_where(wrong, array, name, "be finite and not negative")
 
 
 def check_ascending(array: FloatArray, name: str, all_of_them: str) -> None:
-    """ValueError, with the place, where one is less than the one before."""
     for k in np.flatnonzero(array[1:] < array[:-1]):
         raise ValueError(
             f"{all_of_them} must be ascending, got {name}[{k}] = {array[k]} before "
@@ -112,17 +95,9 @@ def check_ascending(array: FloatArray, name: str, all_of_them: str) -> None:
 
 
 def as_length(value: float, name: str) -> float:
-    """A number that is finite and not negative."""
     if not (math.isfinite(value) and value >= 0.0):
         raise ValueError(f"{name} must be finite and not negative, got {value!r}")
     return value
-
-
-def as_skin(value: Any) -> float:
-    """A plain number, or "auto", which is no number and is settled before."""
-    if is_a(value, str):
-        raise ValueError(f'skin must be a number or "auto", got {shown(value)}')
-    return as_length(as_number(value, "skin", 'be a number or "auto"'), "skin")
 
 
 # ---- the nearest -----------------------------------------------------------------------------
@@ -138,35 +113,22 @@ def as_k(k: Any) -> int:
     return number
 
 
-def as_max_distance(value: Any) -> float:
-    """A number that is not negative; infinity is one."""
-    number = as_number(value, "max_distance")
-    if not number >= 0.0:
-        raise ValueError(f"max_distance must not be negative or NaN, got {number}")
-    return number
-
-
 def check_max_distances(values: Any) -> Any:
     """One for all systems or one a system, which are returned: as cutoffs they are converted."""
-    if is_a(values, float):
-        return as_max_distance(values)
-    array = as_real_array(values, "max_distance", "be a number")
-    if array.ndim == 0:
-        return as_max_distance(values)
-    if array.ndim > 1:
-        raise ValueError(
-            "max_distance must be a number or have shape (s,), one for each system, got "
-                f"{array.shape}"
-        )
-    for s in np.flatnonzero(~(array >= 0.0)):
-        raise ValueError(
-            f"max_distance must not be negative or NaN, got max_distance[{s}] = {array[s]}"
-        )
-    return array
+
+    def check(shape: tuple[int, ...]) -> None:
+        if len(shape) > 1:
+            raise ValueError(
+                "max_distance must be a number or have shape (s,), one for each system, got "
+                f"{shape}"
+            )
+
+    array = as_real_array(values, "max_distance", "be a number", check)
+    refuse_where(~(array >= 0.0), array, "max_distance", "not be negative or NaN")
+    return array if array.ndim else float(array)
 
 
 def in_rows(arrays: Arrays, n_rows: int, k: int) -> Arrays:
-    """The arrays of the core, each with its entries as (rows, k)."""
     if isinstance(arrays, tuple):
         return tuple(column.reshape(n_rows, k, *column.shape[1:]) for column in arrays)
     return arrays.reshape(n_rows, k, *arrays.shape[1:])

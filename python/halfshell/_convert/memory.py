@@ -24,7 +24,6 @@ def refuse_unavailable(needed: int, what: str) -> None:
 
 
 def gigabytes(n_bytes: int) -> str:
-    """For a message; also for numbers that are no float64."""
     return f"{n_bytes / 1e9:.3g}" if n_bytes < 2**1000 else "more than 1e+290"
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from halfshell._convert.arrays import as_array, one_each
-from halfshell._convert.foreign import attribute, kind_of, told
+from halfshell._convert.foreign import attribute, kind_of, read
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -74,7 +74,6 @@ def parts_of(values: Any, name: str) -> Parts | None:
 
 
 def _of_atoms(atoms: Any, name: str) -> Parts:
-    """ASE's Atoms, and what is like them."""
     cell, periodic = attribute(atoms, "cell", "box"), attribute(atoms, "pbc", "periodic")
     rows = attribute(cell, "array", "box")  # of a Cell of ASE
     cell = rows if type(rows) is np.ndarray else cell
@@ -153,15 +152,7 @@ def _elements(owner: Any, name: str) -> tuple[Any, Any]:
     symbols = attribute(owner, "get_chemical_symbols", name)
     if symbols is None:
         return None, None
-    try:
-        return symbols(), None
-    except MemoryError:
-        raise
-    except Exception as error:
-        raise TypeError(
-            f"{name} cannot be read: {kind_of(owner)}.get_chemical_symbols raised "
-            f"{kind_of(error)}: {told(error)}"
-        ) from error
+    return read(name, owner, symbols, ".get_chemical_symbols"), None
 
 
 def as_elements(values: Any, name: str, n: int) -> npt.NDArray[np.int32]:
@@ -190,15 +181,7 @@ def vectors_of(values: Any, name: str = "box", ndim: int | None = None) -> Any:
     if vectors is not MISSING:
         return vectors
     if callable(attribute(values, "to_matrix", name)):  # freud has columns as vectors
-        try:
-            matrix = as_array(values.to_matrix(), name)
-        except (MemoryError, TypeError, ValueError):
-            raise
-        except Exception as error:
-            raise TypeError(
-                f"{name} cannot be read: {kind_of(values)}.to_matrix raised "
-                f"{kind_of(error)}: {told(error)}"
-            ) from error
+        matrix = as_array(read(name, values, values.to_matrix, ".to_matrix"), name)
         rows = matrix.T if matrix.ndim == 2 else matrix
         return rows[:2, :2] if ndim == 2 and rows.shape == (3, 3) and _is_flat(values) else rows
     for source in ("unitcell_vectors", "triclinic_dimensions"):
@@ -226,7 +209,6 @@ def periodic_of(box: Any, periodic: Any, ndim: int) -> Any:
 
 
 def _is_flat(box: Any) -> bool:
-    """Whether a box of freud has two dimensions."""
     dimensions = attribute(box, "dimensions", "box")
     return isinstance(dimensions, int) and dimensions == 2
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from halfshell import _core
-from halfshell._convert.foreign import exact_number, is_a, kind_of, shown, told
+from halfshell._convert.foreign import exact_number, is_a, kind_of, read, shown
 
 # The default of `algorithm`: what is this string itself needs no conversion.
 AUTO = "auto"
@@ -47,7 +47,6 @@ def as_flag(value: Any, name: str) -> bool:
 
 
 def as_whole(value: Any, name: str) -> int:
-    """A whole number; no bool."""
     number = exact_number(value)
     if isinstance(number, bool) or not isinstance(number, int):
         raise TypeError(f"{name} must be a whole number, got {shown(value)}")
@@ -55,7 +54,6 @@ def as_whole(value: Any, name: str) -> int:
 
 
 def as_count(value: Any, name: str) -> int:
-    """A whole number from 1 on."""
     number = as_whole(value, name)
     if number < 1:
         raise ValueError(f"{name} must be 1 or more, got {shown(number)}")
@@ -92,17 +90,13 @@ def as_list(value: Any, name: str, of_what: str) -> list[Any]:
     if is_array:
         refuse_large(_BYTES_OF_A_VIEW * len(value), value, name)
     try:
-        return list(value)
+        found: list[Any] = read(name, value, lambda: list(value))
+        return found
     except MemoryError as error:
         raise MemoryError(f"{name} cannot be made a list: too many items") from error
-    except Exception as error:
-        raise TypeError(
-            f"{name} cannot be read: {kind_of(value)} raised {kind_of(error)}: {told(error)}"
-        ) from error
 
 
 def as_choice(value: Any, name: str, choices: tuple[str, ...]) -> str:
-    """One of some words."""
     if not is_a(value, str):
         raise TypeError(f"{name} must be a string, got {kind_of(value)}")
     value = str.__str__(value)  # what it is, whatever it says
@@ -134,16 +128,19 @@ def check_letters(quantities: Any, letters: str = LETTERS) -> None:
         )
 
 
-def as_index_bytes(index_dtype: Any) -> int:
-    """4 or 8, for int32 or int64."""
+def as_dtype(value: Any, name: str, one_of: str) -> np.dtype[Any]:
     try:
-        dtype = np.dtype(index_dtype)
+        dtype: np.dtype[Any] = np.dtype(value)
+        return dtype
     except MemoryError:
         raise
     except Exception as error:
-        raise TypeError(
-            f"index_dtype must be int32 or int64, got {shown(index_dtype)}"
-        ) from error
+        raise TypeError(f"{name} must be {one_of}, got {shown(value)}") from error
+
+
+def as_index_bytes(index_dtype: Any) -> int:
+    """4 or 8, for int32 or int64."""
+    dtype = as_dtype(index_dtype, "index_dtype", "int32 or int64")
     if dtype not in (np.dtype(np.int32), np.dtype(np.int64)):
         raise ValueError(f"index_dtype must be int32 or int64, got {dtype}")
     return int(dtype.itemsize)

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from halfshell import _core
-from halfshell._convert.arrays import as_array, as_real_array, in_order, one_each
+from halfshell._convert.arrays import (
+    as_array,
+    as_real_array,
+    in_order,
+    of_shape,
+    one_each,
+    refuse_where,
+)
 from halfshell._convert.foreign import attribute, is_a, kind_of, shown
 from halfshell._convert.lengths import as_number, check_lengths
 from halfshell._convert.memory import refuse_large
@@ -134,39 +141,26 @@ class Points:
     [0]
     """
 
-    __slots__ = (
-        "_axes",  # bits of the axes that repeat, or uint8 (s,), which tells s; 0 without a box
-        "_box",  # float64 (d, d) or (s, d, d), or None
-        "_elements",  # atomic numbers of an object, and what they are, until they are types
-        "_groups",  # Labels or None, as the next two
-        "_labels",
-        "_types",
-        "batch",
-        "positions",
-        "radii",
-        "supports",
-        "tells_periodic",  # False: what it came from does not say which axes repeat
-        "weights",
-    )
+    positions: npt.NDArray[Any]
+    radii: FloatArray | None
+    supports: FloatArray | None
+    weights: FloatArray | None
+    batch: npt.NDArray[np.int64] | None
+    tells_periodic: bool  # False: what it came from does not say which axes repeat
+    _axes: Any  # bits of the axes that repeat, or uint8 (s,), which tells s; 0 without a box
+    _box: FloatArray | None  # (d, d) or (s, d, d)
+    _elements: tuple[Any, str] | None  # atomic numbers, and what they are, until they are types
+    _types: Labels | None
+    _groups: Labels | None
+    _labels: Labels | None
+
+    __slots__ = tuple(__annotations__)
 
     #: They are no sequence of their rows.
     __iter__ = None
 
     #: In a notebook.
     _shown = ("positions", "box", "periodic", *_FIELDS)
-
-    positions: npt.NDArray[Any]
-    radii: FloatArray | None
-    supports: FloatArray | None
-    weights: FloatArray | None
-    batch: npt.NDArray[np.int64] | None
-    tells_periodic: bool
-    _axes: Any
-    _box: FloatArray | None
-    _elements: tuple[Any, str] | None
-    _types: Labels | None
-    _groups: Labels | None
-    _labels: Labels | None
 
     @search()
     def __init__(
@@ -188,13 +182,11 @@ class Points:
             for name in Points.__slots__:
                 setattr_(self, name, getattr(found, name))
             n, d = self.positions.shape
-            own = {"types": types, "groups": groups, "labels": labels}
-            for name, values in own.items():
-                if values is None:
-                    continue
-                if name == "types" and (self._types is not None or self._elements is not None):
-                    raise ValueError(_twice("types", positions))
-                setattr_(self, f"_{name}", _as_labels(values, name, n, name == "types"))
+            if types is not None and (self._types or self._elements):
+                raise ValueError(_twice("types", positions))
+            for name, values in (("types", types), ("groups", groups), ("labels", labels)):
+                if values is not None:
+                    setattr_(self, f"_{name}", _as_labels(values, name, n, name == "types"))
             if supports is not None:
                 if radii is not None:
                     raise ValueError("radii and supports cannot be given together")
@@ -231,7 +223,9 @@ class Points:
                 raise ValueError("a list of systems brings its batch: leave batch out")
             stacked = Points._stack(values, name)
             if box is not None or periodic is not None:
-                stacked = stacked._with_box(box, periodic, values[0])
+                if stacked._box is not None:
+                    raise ValueError(_twice("box" if box is not None else "periodic", values[0]))
+                stacked = stacked.replace(box=box, periodic=periodic)
                 if stacked.n_systems > len(values):
                     raise ValueError(
                         f"box and periodic must be given for the {len(values)} systems of {name}, "
@@ -240,25 +234,25 @@ class Points:
                 if stacked.n_systems < len(values):  # the last are empty
                     stacked._counting(len(values))
             return stacked
-        points = Points.__new__(Points)
-        for slot in Points.__slots__:
-            setattr_(points, slot, None)
-        setattr_(points, "_axes", 0)
-        plain = NotImplemented if batch is not None else _core.scene(values, None, box, periodic)
+        plain = NotImplemented if batch is not None else _core.scene(values, box, periodic)
         if plain is not NotImplemented:
-            for slot, part in zip(("positions", "_box", "_axes"), plain[1:], strict=True):
-                setattr_(points, slot, part)
-            return points
+            return Points._made(positions=plain[0], _box=plain[1], _axes=plain[2])
         parts = parts_of(values, name)
-        setattr_(points, "tells_periodic", True)
         array = as_points(values if parts is None else parts.positions, name, ndim)
-        setattr_(points, "positions", array)
-        if batch is not None:
-            setattr_(points, "batch", _as_batch(batch, len(array)))
+        numbers = None if batch is None else _as_batch(batch, len(array))
+        points = Points._made(positions=array, batch=numbers, _axes=0, tells_periodic=True)
         if parts is None:
             points._take_box(box, periodic)
         else:
             points._take_parts(parts, name, values, box, periodic)
+        return points
+
+    @staticmethod
+    def _made(like: Points | None = None, **parts: Any) -> Points:
+        """Points of parts that are known to be right; the rest is as of others, or None."""
+        points = Points.__new__(Points)
+        for slot in Points.__slots__:
+            setattr_(points, slot, parts[slot] if slot in parts else getattr(like, slot, None))
         return points
 
     @classmethod
@@ -326,11 +320,9 @@ class Points:
         return cls(positions, batch=batch, **fields)._counting(len(every))
 
     def _take_box(self, box: Any, periodic: Any) -> None:
-        """Box and periodicity of points that bring none."""
-        ndim = self.positions.shape[1]
-        boxes, axes = as_boxes(box, periodic, ndim, self.batch is not None)
-        setattr_(self, "_box", boxes)
-        setattr_(self, "_axes", axes)
+        ndim, has_batch = self.positions.shape[1], self.batch is not None
+        for slot, part in zip(("_box", "_axes"), as_boxes(box, periodic, ndim, has_batch)):
+            setattr_(self, slot, part)
 
     def _take_parts(self, parts: Parts, name: str, owner: Any, box: Any, periodic: Any) -> None:
         """What an object knows; `box` and `periodic` are those of the call."""
@@ -373,11 +365,6 @@ class Points:
             kinds = (TypeError, OverflowError, ValueError)
             kind = next(one for one in kinds if isinstance(error, one))
             raise kind(f"the box of {name}: {error}") from error
-
-    def _with_box(self, box: Any, periodic: Any, owner: Any) -> Points:
-        if self._box is not None:
-            raise ValueError(_twice("box" if box is not None else "periodic", owner))
-        return self.replace(box=box, periodic=periodic)
 
     def _counting(self, n_systems: int) -> Points:
         """The same, told how many systems there are: the last ones may have no points."""
@@ -435,12 +422,10 @@ class Points:
 
     @property
     def box(self) -> FloatArray | None:
-        """Box vectors as rows, shape (d, d) or (s, d, d); None in open space."""
         return self._box
 
     @property
     def periodic(self) -> npt.NDArray[np.bool_] | None:
-        """Which box vectors repeat, shape (d,) or (s, d); None in open space."""
         if self._box is None:
             return None
         flags = flags_of(np.atleast_1d(np.asarray(self._axes, np.uint8)), self.positions.shape[1])
@@ -448,18 +433,15 @@ class Points:
 
     @property
     def types(self) -> npt.NDArray[Any] | None:
-        """Numbers or names, shape (n,)."""
         kinds = self._kinds
         return None if kinds is None else kinds.as_given()
 
     @property
     def groups(self) -> npt.NDArray[Any] | None:
-        """Numbers or names, shape (n,)."""
         return None if self._groups is None else self._groups.as_given()
 
     @property
     def labels(self) -> npt.NDArray[Any] | None:
-        """Numbers or names, shape (n,)."""
         return None if self._labels is None else self._labels.as_given()
 
     @property
@@ -498,12 +480,14 @@ class Points:
                     f"{places.shape} and dtype {places.dtype}"
                 )
             places = places if places.size else np.empty(0, np.int64)
-        chosen = self.positions[places]
-        fields = {
-            name: None if getattr(self, name) is None else getattr(self, name)[places]
-            for name in _FIELDS
-        }
-        return Points(chosen, box=self._box, periodic=self.periodic, **fields)._counting_as(self)
+        fields = self._fields()
+        for name in ("positions", *_FIELDS):
+            fields[name] = None if fields[name] is None else fields[name][places]
+        return Points(**fields)._counting_as(self)
+
+    def _fields(self) -> dict[str, Any]:
+        """What the constructor takes."""
+        return {name: getattr(self, name) for name in ("positions", "box", "periodic", *_FIELDS)}
 
     def replace(self, **changes: Any) -> Points:
         """Points with something else instead, or with None for nothing.
@@ -517,10 +501,7 @@ class Points:
         -------
         Points
         """
-        fields = {
-            "positions": self.positions, "box": self._box, "periodic": self.periodic,
-            **{name: getattr(self, name) for name in _FIELDS},
-        }  # fmt: skip
+        fields = self._fields()
         for name in changes:
             if name not in fields:
                 raise TypeError(f"Points have no {name!r}: they have {', '.join(fields)}")
@@ -531,25 +512,17 @@ class Points:
 
     def _over(self, positions: npt.NDArray[Any]) -> Points:
         """These points, with the same positions in other memory that does not change."""
-        other = Points.__new__(Points)
-        for name in Points.__slots__:
-            setattr_(other, name, getattr(self, name))
-        setattr_(other, "positions", positions)
+        other = Points._made(self, positions=positions)
         other._own_arrays(with_positions=False)
         return other
 
     def __reduce__(self) -> tuple[Any, tuple[dict[str, Any], int]]:
-        state = {
-            "positions": self.positions, "box": self._box, "periodic": self.periodic,
-            **{name: getattr(self, name) for name in _FIELDS},
-        }  # fmt: skip
-        return _restored, (state, self.n_systems)
+        return _restored, (self._fields(), self.n_systems)
 
-    def __setattr__(self, name: str, value: object) -> None:
+    def __setattr__(self, name: str, value: object = None) -> None:
         raise AttributeError("Points are immutable: replace() gives others")
 
-    def __delattr__(self, name: str) -> None:
-        raise AttributeError("Points are immutable: replace() gives others")
+    __delattr__ = __setattr__
 
     def __repr__(self) -> str:
         n, d = self.positions.shape
@@ -618,8 +591,7 @@ class Points:
         radii = in_order(array, np.float64)
         if n and not (radii.min() >= 0.0 and radii.max() <= _LARGEST_RADIUS):
             check_lengths(radii, "radii")
-            for k in np.flatnonzero(radii > _LARGEST_RADIUS):
-                raise ValueError(f"radii must be at most 2**1022, got radii[{k}] = {radii[k]}")
+            refuse_where(radii > _LARGEST_RADIUS, radii, "radii", "be at most 2**1022")
         return radii
 
     def _radii_by_type(self, values: Mapping[Any, Any]) -> FloatArray:
@@ -664,7 +636,6 @@ def _is_system(value: Any, name: str) -> bool:
 
 
 def _is_pdb(owner: Any, name: str) -> bool:
-    """Whether ASE's Atoms seem to come from a PDB or mmCIF file."""
     arrays = attribute(owner, "arrays", name)
     return is_a(arrays, dict) and "residuenames" in arrays
 
@@ -715,9 +686,7 @@ def as_points(values: Any, name: str = "points", ndim: int = 3) -> npt.NDArray[A
 
 
 def refuse_infinite(array: npt.NDArray[Any], name: str) -> None:
-    """ValueError, with the place, for coordinates that are not finite."""
-    for k, axis in np.argwhere(~np.isfinite(array))[:1]:
-        raise ValueError(f"{name} must be finite, got {name}[{k}, {axis}] = {array[k, axis]}")
+    refuse_where(~np.isfinite(array), array, name, "be finite")
 
 
 def _hint_of_shape(shape: tuple[int, ...], name: str) -> str:
@@ -807,7 +776,6 @@ def as_boxes(
 
 
 def as_own_box(box: Any, periodic: Any, ndim: int) -> tuple[FloatArray | None, int]:
-    """Vectors and bits of the axes that repeat, of one system."""
     rows, axes = as_boxes(box, periodic, ndim, has_batch=False)
     return rows, int(axes)
 
@@ -910,46 +878,33 @@ def _as_labels(values: Any, name: str, n: int, are_types: bool = False) -> Label
         raise TypeError(f"{name} must hold integers or names, got dtype {array.dtype}")
     array = array.copy() if n else np.empty(0, np.int64)  # it may change meanwhile
     if are_types:
-        for k in np.flatnonzero((array < 0) | (array >= 2**31 - 1)):
-            raise ValueError(
-                f"types must be from 0 on and below 2**31 - 1, got types[{k}] = {array[k]}"
-            )
+        wrong = (array < 0) | (array >= 2**31 - 1)
+        refuse_where(wrong, array, "types", "be from 0 on and below 2**31 - 1")
         return Labels(np.ascontiguousarray(array, np.int32))
     if array.dtype == np.uint64:
-        for k in np.flatnonzero(array >= np.uint64(2**63)):
-            raise ValueError(f"{name} must be less than 2**63, got {name}[{k}] = {array[k]}")
+        refuse_where(array >= np.uint64(2**63), array, name, "be less than 2**63")
     return Labels(np.ascontiguousarray(array, np.int64))
 
 
 def as_types(values: Any, n: int) -> npt.NDArray[Any]:
-    """Integers or names, one for each of n points."""
     return _as_labels(values, "types", n, are_types=True).as_given()
 
 
-def as_supports(values: Any, n: int, d: int) -> FloatArray:
+def as_supports(values: Any, n: int, d: int, name: str = "supports") -> FloatArray:
     """Symmetric matrices of finite numbers; the core decides whether they are definite."""
     if d > MOST_AXES_OF_SUPPORTS:
-        raise ValueError(f"supports are for points of 1 to 3 dimensions, got {d}")
-
-    def check(shape: tuple[int, ...]) -> None:
-        if shape != (n, d, d):
-            raise ValueError(
-                f"supports must have shape ({n}, {d}, {d}), a matrix for each point, got {shape}"
-            )
-
-    array = as_real_array(values, "supports", check_shape=check)
+        raise ValueError(f"{name} are for points of 1 to 3 dimensions, got {d}")
+    must = f"{name} must have shape ({n}, {d}, {d}), a matrix for each point"
+    array = as_real_array(values, name, check_shape=of_shape(must, (n, d, d)))
     if array.dtype != np.float64:
-        refuse_large(8 * array.size, array, "supports")
+        refuse_large(8 * array.size, array, name)
     matrices = in_order(array, np.float64)
-    for k, a, b in np.argwhere(~np.isfinite(matrices))[:1]:
-        raise ValueError(
-            f"supports must be finite, got supports[{k}, {a}, {b}] = {matrices[k, a, b]}"
-        )
+    refuse_infinite(matrices, name)
     for k, a, b in np.argwhere(matrices != matrices.transpose(0, 2, 1))[:1]:
         a, b = max(a, b), min(a, b)
         raise ValueError(
-            f"supports must be symmetric, got supports[{k}, {a}, {b}] = {matrices[k, a, b]} and "
-            f"supports[{k}, {b}, {a}] = {matrices[k, b, a]}"
+            f"{name} must be symmetric, got {name}[{k}, {a}, {b}] = {matrices[k, a, b]} and "
+            f"{name}[{k}, {b}, {a}] = {matrices[k, b, a]}"
         )
     return matrices
 
@@ -957,24 +912,19 @@ def as_supports(values: Any, n: int, d: int) -> FloatArray:
 def _as_weights(values: Any, n: int) -> FloatArray:
     array = as_real_array(values, "weights", check_shape=one_each("weights", n))
     weights = np.ascontiguousarray(array, dtype=np.float64)
-    for k in np.flatnonzero(~np.isfinite(weights))[:1]:
-        raise ValueError(f"weights must be finite, got weights[{k}] = {weights[k]}")
+    refuse_infinite(weights, "weights")
     return weights
 
 
 def _as_batch(values: Any, n: int) -> npt.NDArray[np.int64]:
     """System numbers, ascending."""
     array = as_array(values, "batch", "hold integers")
-    if array.shape != (n,):
-        raise ValueError(
-            f"batch must have shape ({n},), one number for each point, got {array.shape}"
-        )
+    one_each("batch", n, "one number for each point")(array.shape)
     if array.dtype.kind not in "iu" and n > 0:
         raise TypeError(f"batch must hold integers, got dtype {array.dtype}")
     array = array.copy()  # it may change meanwhile
     if array.dtype.itemsize == 8 and array.dtype.kind in "iu":
-        for k in np.flatnonzero(array >= 2**62):
-            raise ValueError(f"batch must be less than 2**62, got batch[{k}] = {array[k]}")
+        refuse_where(array >= 2**62, array, "batch", "be less than 2**62")
     numbers = in_order(array, np.int64)
     for k in np.flatnonzero(numbers[1:] < numbers[:-1])[:1]:
         raise ValueError(

@@ -31,7 +31,7 @@ class ProgressBar:
         self._notebook = _in_notebook()
         self._is_shown = self._notebook or sys.stderr.isatty()
         self._draw: Callable[[float], None] | None = None
-        self._finish: Callable[[], object] = _nothing
+        self._finish: Callable[[], object] = lambda: None
 
     def __call__(self, fraction: float) -> None:
         if fraction >= 1.0:
@@ -65,10 +65,6 @@ def as_progress(progress: Any, text: str = "searching") -> Callable[[float], obj
     if not callable(progress):
         raise TypeError(f"progress must be callable or a bool, got {kind_of(progress)}")
     return progress  # type: ignore[no-any-return]
-
-
-def _nothing() -> None:
-    """Take nothing away: there is no bar yet."""
 
 
 def _in_notebook() -> bool:

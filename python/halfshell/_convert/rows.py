@@ -4,27 +4,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from copy import copy
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.arrays import entries_of
-from halfshell._convert.call import Call, part_of
+from halfshell._convert.call import Call, Known, part_of
 from halfshell._convert.foreign import is_a
 from halfshell._convert.options import check_letters
 from halfshell._errors import CapacityError
 
 if TYPE_CHECKING:
-    from halfshell._convert.types import Arrays, Reach, Selection, Systems
+    from halfshell._convert.types import Arrays
 
 Array = npt.NDArray[Any]
 
 # A mark for each of so many points takes less time than one look-up among numbers that ascend.
 _POINTS_PER_LOOKUP = 32
-
-_NUMBERS_OF_QUERIES = 4  # which field of a selection these are
 
 _POINTS_OF_PART = 4096  # whose pairs are held at a time, where not all are
 
@@ -49,8 +48,8 @@ def rows_of(call: Call, quantities: str, index_bytes: int) -> Rows:
         order = np.argsort(call.points.batch[numbers], kind="stable")
         numbers = numbers[order]
     offsets, *columns = call.run(
-        _core.neighbors, letters, index_bytes, call.array[numbers],
-        pairing_of(call, numbers), call.settings.algorithm, call.shells, systems_of(call, numbers),
+        _core.neighbors, letters, index_bytes, *call.as_queries(numbers), call.settings.algorithm,
+        call.shells,
     )  # fmt: skip
     j = columns[letters.index("j")]
     row = np.repeat(np.arange(len(numbers)), np.diff(offsets))
@@ -73,27 +72,6 @@ def rows_of(call: Call, quantities: str, index_bytes: int) -> Rows:
     for array in (offsets, *kept):
         array.flags.writeable = False
     return Rows(offsets, kept, numbers, entries)
-
-
-def pairing_of(call: Call, numbers: npt.NDArray[np.int64]) -> Any:
-    """The reach and the selection of points, for some of them as queries too."""
-    reach = None
-    if call.reach is not None:
-        fields: list[Any] = list(call.reach)
-        for own in (1, 3, 6):  # radii, types and supports, before those of queries
-            fields[own + 1] = None if fields[own] is None else fields[own][numbers]
-        reach = cast("Reach", tuple(fields))
-    if call.selection is None:
-        return reach
-    fields = list(call.selection)
-    fields[_NUMBERS_OF_QUERIES] = numbers
-    return reach, cast("Selection", tuple(fields))
-
-
-def systems_of(call: Call, numbers: npt.NDArray[np.int64]) -> Systems | None:
-    """The systems of a batch, for some of its points as queries too."""
-    own = call.systems
-    return None if own is None else (*own[:3], np.ascontiguousarray(own[0][numbers]), own[4])
 
 
 def pairs_of(
@@ -120,7 +98,7 @@ def parts_of(call: Call, quantities: str, index_bytes: int) -> Iterator[tuple[Ar
     check_letters(quantities, "ijdDSPk")
     asked = named_once(call)
     told, bar, call.progress, call.bar = call.progress, call.bar, None, None
-    if call.cells is None and call.reach is None and call.points.batch is None:
+    if call.cells is None and not call.has_reach and call.points.batch is None:
         call.cells = call.run(_core.cells_build, 0.0, None)
     n = max(-(-len(asked) // _POINTS_OF_PART), 1)
 
@@ -156,28 +134,20 @@ def within_and_beyond(
     place[numbers], place[rest] = np.arange(len(numbers)), np.arange(len(rest))
     found: list[Any] = []
     for own, asking in ((numbers, None), (rest, numbers)):
-        one = Call()
-        for name in Call.__slots__:
-            setattr(one, name, getattr(call, name))
+        one = copy(call)
         one.cells = one.indices = None
         one.points = call.points[own]
         one.queries = None if asking is None else call.points[asking]
-        if call.selection is not None:
-            fields: list[Any] = list(call.selection)
-            for at in (0, 2):
-                labels = fields[at]
-                if labels is not None:
-                    fields[at] = labels[own]
-                    fields[at + 1] = None if asking is None else labels[asking]
-            if fields[6] is not None:
-                pairs = fields[6]
-                if asking is None:
-                    pairs = pairs[is_named[pairs].all(axis=1)]
-                else:
-                    pairs = np.concatenate([pairs, pairs[:, ::-1]])
-                    pairs = pairs[is_named[pairs[:, 0]] & ~is_named[pairs[:, 1]]]
-                fields[6] = np.ascontiguousarray(place[pairs])
-            one.selection = cast("Selection", tuple(fields))
+        one.known = call.known.some(own)
+        one.known_of_queries = Known() if asking is None else call.known.some(asking)
+        pairs = call.pairing and call.pairing.excluded
+        if call.pairing is not None and pairs is not None:
+            if asking is None:
+                pairs = pairs[is_named[pairs].all(axis=1)]
+            else:
+                pairs = np.concatenate([pairs, pairs[:, ::-1]])
+                pairs = pairs[is_named[pairs[:, 0]] & ~is_named[pairs[:, 1]]]
+            one.pairing = call.pairing._replace(excluded=np.ascontiguousarray(place[pairs]))
         found.append((one, own, asking))
     return found
 
@@ -190,8 +160,8 @@ def _pairs_of_part(
     letters = "j" + "".join(letter for letter in quantities if letter in "dDSk")
     part = asked[some]
     offsets, *columns = call.run(
-        _core.neighbors, letters, index_bytes, call.array[part], pairing_of(call, part),
-        call.settings.algorithm, call.shells, systems_of(call, part),
+        _core.neighbors, letters, index_bytes, *call.as_queries(part), call.settings.algorithm,
+        call.shells,
     )  # fmt: skip
     found = dict(zip(letters, columns, strict=True))
     row = np.repeat(np.arange(len(part)), np.diff(offsets))

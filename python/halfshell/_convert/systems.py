@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from copy import copy
 from itertools import pairwise
 from typing import Any
 
@@ -29,9 +30,7 @@ def each_system(call: Call) -> Iterator[tuple[Call, int]]:
         asked = [np.searchsorted(queries.batch, numbers, side) for side in ("left", "right")]
     firsts = [*bounds.tolist(), len(points)]
     for k, (s, (first, end)) in enumerate(zip(numbers.tolist(), pairwise(firsts), strict=True)):
-        one = Call()
-        for name in Call.__slots__:
-            setattr(one, name, getattr(call, name))
+        one = copy(call)
         one.points = _part(points, s, slice(first, end))
         own_queries = slice(0, 0)
         if queries is not None and asked is not None:
@@ -39,10 +38,16 @@ def each_system(call: Call) -> Iterator[tuple[Call, int]]:
             one.queries = _part(queries, s, own_queries)
         if call.system_cutoffs is not None:
             one.cutoff, one.system_cutoffs = float(call.system_cutoffs[s]), None
-        one.reach = _cut(call.reach, slice(first, end), own_queries, (1, 3, 6))
-        if call.selection is not None:
-            one.selection = _cut(call.selection, slice(first, end), own_queries, (0, 2))
-            one.selection = _own_pairs(one.selection, first, end, own_queries, queries is not None)
+        own = slice(first, end)
+        one.known = call.known.some(own)
+        one.known_of_queries = call.known_of_queries.some(own_queries)
+        pairing = call.pairing
+        if pairing is not None and pairing.excluded is not None:
+            asking = own if queries is None else own_queries
+            i, j = pairing.excluded.T
+            mine = (asking.start <= i) & (i < asking.stop) & (first <= j) & (j < end)
+            own_pairs = pairing.excluded[mine] - [asking.start, first]
+            one.pairing = pairing._replace(excluded=np.ascontiguousarray(own_pairs))
         yield one, first
 
 
@@ -61,28 +66,6 @@ def _part(points: Points, s: int, places: slice) -> Points:
             value = value[places]
         setattr_(part, name, value)
     return part
-
-
-def _cut(fields: Any, own: slice, asking: slice, places: tuple[int, ...]) -> Any:
-    """Columns of points at these places, each with those of queries behind it, of one system."""
-    if fields is None:
-        return None
-    cut = list(fields)
-    for place in places:
-        for k, where in ((place, own), (place + 1, asking)):
-            cut[k] = None if cut[k] is None else np.ascontiguousarray(cut[k][where])
-    return tuple(cut)
-
-
-def _own_pairs(selection: Any, first: int, end: int, asking: slice, has_queries: bool) -> Any:
-    """The excluded pairs of one system, with its own numbers."""
-    excluded = selection[6]
-    if excluded is None:
-        return selection
-    low, high = (asking.start, asking.stop) if has_queries else (first, end)
-    i, j = excluded.T
-    mine = excluded[(i >= low) & (i < high) & (j >= first) & (j < end)]
-    return (*selection[:6], np.ascontiguousarray(mine - [low, first]), selection[7])
 
 
 # ---- frames ----------------------------------------------------------------------------------

@@ -27,27 +27,6 @@ Progress = Callable[[float], object] | None
 # By what a pair of radii is compared; the last two go from i to j.
 Rule = Literal["sum", "mean", "max", "min", "gather", "scatter"]
 
-# What the core takes last for a reach of each pair: number of the rule, radii of the points and of
-# the queries, types of both, table of cutoffs by types, supports of both, extent. Of radii, types
-# and supports two are None.
-_Ints = npt.NDArray[np.int32]
-Reach = tuple[
-    int, FloatArray | None, FloatArray | None, _Ints | None, _Ints | None, FloatArray | None,
-    FloatArray | None, FloatArray | None, float | None,
-]  # fmt: skip
-
-# Groups of points and queries, labels of both, numbers of queries that are points, the most that
-# labels differ by, excluded pairs, least distance.
-_Labels = npt.NDArray[np.int64] | None
-Selection = tuple[_Labels, _Labels, _Labels, _Labels, _Labels, int, _Labels, float]
-
-# What each system of a batch has of its own: numbers, one a point; cutoffs and boxes, one a
-# system; numbers of the queries, where there are any; bits of the axes that repeat, one a system.
-Systems = tuple[
-    npt.NDArray[np.int64], FloatArray | None, FloatArray | None, npt.NDArray[np.int64] | None,
-    npt.NDArray[np.uint8] | None,
-]  # fmt: skip
-
 # What the core takes from `inclusive` to `threads`.
 Rest = tuple[bool, Precision, str | None, float | None, Progress, int | None]
 
@@ -135,22 +114,31 @@ ProgressLike = Callable[[float], object] | bool | None
 Out = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
 
 
-class OptionsOfCells(TypedDict, total=False):
-    """For overloads and methods of a `CellList`: the keywords that all searches share."""
-
-    rule: Rule | None
+class _AnyCutoff(TypedDict, total=False):
     exclude: ArrayLike | int | None
     min_distance: float | None
-    inclusive: bool
     threads: int | None
     progress: ProgressLike
 
 
-class Options(OptionsOfCells, total=False):
-    """The same, with the box that cells have."""
-
+class _Box(TypedDict, total=False):
     box: BoxLike | None
     periodic: PeriodicLike | None
+
+
+class OptionsOfBins(_AnyCutoff, _Box, total=False):
+    """The keywords that searches share which have bins of distance."""
+
+
+class OptionsOfCells(_AnyCutoff, total=False):
+    """For overloads and methods of a `CellList`: the keywords that all searches share."""
+
+    rule: Rule | None
+    inclusive: bool
+
+
+class Options(OptionsOfCells, _Box, total=False):
+    """The same, with the box that cells have."""
 
 
 class OptionsOfPoints(Options, total=False):
@@ -165,28 +153,13 @@ class CountOptions(OptionsOfPoints, total=False):
     queries: PointsLike | None
 
 
-class QueryOptions(OptionsOfCells, total=False):
+class MethodOptions(OptionsOfCells, total=False):
     """Of methods of a `CellList`, with what only some of them take, and refuse otherwise."""
 
-    indices: npt.ArrayLike | None
     quantities: str
     index_dtype: npt.DTypeLike
-    sort: bool
-    out: Out | None
-    max_pairs: int
     user_data: Any
     thread_safe: bool
-    max_distance: ArrayLike
-    min_points: int
-    by_type: bool
-    density: float | None
-    finite_size: bool
-
-
-class MethodOptions(QueryOptions, total=False):
-    """The same, of methods that queries are a keyword of."""
-
-    queries: PointsLike | None
 
 
 class NearestOptions(TypedDict, total=False):

@@ -35,10 +35,6 @@ def bonded(bonds: npt.ArrayLike, n: int, within: int = 3) -> npt.NDArray[np.int6
     TypeError, ValueError
         If `bonds` does not hold pairs of numbers of the points, or `within` is less than 1.
 
-    See Also
-    --------
-    pairs : takes them as `exclude`.
-
     Examples
     --------
     A chain of four points:

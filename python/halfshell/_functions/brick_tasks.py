@@ -71,7 +71,6 @@ def summary_of(
 def pieces_of(
     chunk: Any, ndim: int, dtype: np.dtype[Any], place: int, known: Known, division: Division
 ) -> list[Piece]:
-    """What a chunk gives to each brick."""
     return split(of_chunk(chunk, ndim, dtype, place, known), division, place)
 
 
@@ -80,8 +79,7 @@ def brick_of(part: Part) -> Brick:
 
 
 def bricks_of(division: Division, *made: Brick) -> Bricks:
-    """All bricks."""
-    return Bricks(made, division.scope.n_points)
+    return Bricks(made)
 
 
 def pairs_of(part: Part, how: dict[str, Any], options: dict[str, Any]) -> tuple[Group, ...]:
@@ -101,9 +99,8 @@ def neighbors_of(part: Part, how: dict[str, Any], options: dict[str, Any]) -> tu
     brick, points = part.in_order()
     with settings(**how), _numbered(brick.members):
         table = brick.neighbors(points, **options)
-    names = {"j": "indices", "d": "distances", "D": "vectors", "S": "shifts"}
     owned, counts = brick.owned, np.asarray(table.counts, np.int64)
-    columns = [getattr(table, names[letter]) for letter in options["quantities"]]
+    columns = [table._column(letter) for letter in options["quantities"]]
     return (owned, counts), (np.repeat(owned, counts), *columns)
 
 
@@ -130,14 +127,12 @@ def counts_of(part: Part, how: dict[str, Any], cutoff: Any, options: dict[str, A
 
 
 def histogram_of(part: Part, how: dict[str, Any], edges: Any, options: dict[str, Any]) -> Any:
-    """As `counts_of`, in each bin."""
     import halfshell as hs
 
     return _own(part, how, options, lambda points, **more: hs.pair_histogram(points, edges, **more))
 
 
 def total(*counts: Any) -> Any:
-    """Pairs of all bricks from what `counts_of` or `histogram_of` return."""
     return sum(counts, start=np.int64(0))
 
 

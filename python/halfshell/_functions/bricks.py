@@ -106,13 +106,13 @@ def bricks(
     """
     _refuse_endless(cutoff)
     call = take(points, cutoff, None, box, periodic, rule, directed=True)
-    call.refuse("bricks", batch="its systems are apart already")
+    call.refuse_batch("bricks", "its systems are apart already")
     n_bricks, array = as_brick_count(n), call.array
     largest = float(max(array.max(initial=0.0), -array.min(initial=0.0)))
     scope = _scope(call, cutoff, {k: v.names for k, v in labels_of(call.points).items()},
                    len(array), _widest(call.points))  # fmt: skip
-    rest = (call.vectors, call.bits, False, "exact", None, None, None, 1, None, "auto")
-    if call.reach is None:
+    rest = (call.points.box, call.bits, False, "exact", None, None, None, 1, None, "auto")
+    if not call.has_reach:
         _core.count_pairs(array[:0], call.cutoff, *rest)
     try:  # refuses what a search would refuse, at the price of a search with the cutoff 0
         _core.count_pairs(array, 0.0, *rest)
@@ -126,7 +126,7 @@ def bricks(
         is_owned[owned] = True
         made.append(Brick(members, is_owned[members], scope))
         is_owned[owned] = False
-    return Bricks(made, len(array))
+    return Bricks(made)
 
 
 def _halved(
@@ -173,11 +173,11 @@ def _scope(
 ) -> Scope:
     """What bricks are searched with. widest: the most that `_widest` is."""
     reach = call.cutoff
-    if call.reach is not None:
-        rule, radii, extent = call.reach[0], call.reach[1], call.reach[8]
+    if call.pairing is not None:
+        rule, extent = call.pairing.rule, call.pairing.extent
         if extent is not None:
             reach = extent * widest * (1.0 + 1e-12) if extent > 0.0 else 0.0
-        elif radii is not None:
+        elif call.known.radii is not None:
             reach = min(reach, 2.0 * widest if rule == 0 else widest)
         else:
             lengths = cutoff.values() if is_a(cutoff, Mapping) else np.ravel(cutoff)
@@ -185,9 +185,9 @@ def _scope(
     kept: Any = call.cutoff
     if is_a(cutoff, Mapping):
         kept = dict(cutoff)
-    elif call.reach is not None:
+    elif call.has_reach:
         kept = None if cutoff is None else np.array(cutoff, np.float64)
-    box = None if call.vectors is None else call.vectors.copy()
+    box = None if call.points.box is None else call.points.box.copy()
     return Scope(n, kept, cast("Rule", call.rule), reach, box, call.bits, names)
 
 
@@ -306,7 +306,7 @@ class Terms(NamedTuple):
         """A search of no points; raises what is wrong with it."""
         _refuse_endless(self.cutoff)
         call = take(self.of_none(), self.cutoff, rule=self.rule, directed=directed)
-        call.run(_core.coordination, None, call.pairing, "auto", None)
+        call.run(_core.coordination, None, call.pairing, "auto")
         return call
 
 
@@ -451,17 +451,14 @@ class Part(NamedTuple):
     scope: Scope
 
     def numbers(self) -> Numbers:
-        """Numbers of the points among all of them."""
         return np.concatenate(
             [first + places[k].astype(np.int64) for k in range(3) for first, places in self.places]
         )
 
     def points(self, rows: Any) -> Points:
-        """Some of the points: numbers or a slice."""
         return self.scope.points_of({name: one[rows] for name, one in self.columns.items()})
 
     def in_order(self) -> tuple[Brick, Points]:
-        """The brick, and its members."""
         members = self.numbers()
         order = np.argsort(members)
         brick = Brick(members.take(order), order < self.sizes[0], self.scope)

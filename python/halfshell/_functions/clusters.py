@@ -12,35 +12,18 @@ from halfshell import _core, _show
 from halfshell._convert.call import Call, take
 from halfshell._convert.options import as_count
 from halfshell._convert.points import flags_of
+from halfshell._functions.pairs import pairs, pairs_wanted
 from halfshell._search import search
 
 if TYPE_CHECKING:
-    from halfshell._convert.types import (
-        ArrayLike,
-        BoxLike,
-        CutoffLike,
-        FloatArray,
-        PeriodicLike,
-        PointsLike,
-        ProgressLike,
-        Rule,
-    )
+    from typing import Unpack
+
+    from halfshell._convert.types import CutoffLike, FloatArray, Options, PointsLike
 
 
-@search()
+@search(like=pairs, lacks="indices")
 def clusters(
-    points: PointsLike,
-    cutoff: CutoffLike = None,
-    *,
-    min_points: int = 1,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    rule: Rule | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
-    inclusive: bool = True,
-    threads: int | None = None,
-    progress: ProgressLike = None,
+    points: PointsLike, cutoff: CutoffLike = None, *, min_points: int = 1, **search: Unpack[Options]
 ) -> Clusters:
     """Group points into connected components, or into the clusters of DBSCAN.
 
@@ -65,13 +48,7 @@ def clusters(
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As for `pairs`; MemoryError only if the search itself would not fit. ValueError if
-        `min_points` is less than 1.
-
-    See Also
-    --------
-    coordination : the number of neighbours of each point.
-    for_each_pair : pass each pair to a function.
+        As for `count_pairs`.
 
     Notes
     -----
@@ -115,10 +92,7 @@ def clusters(
     [0, 0, 0, 0, -1]
     """
     least = as_count(min_points, "min_points")
-    call = take(
-        points, cutoff, None, box, periodic, rule, exclude, min_distance, None, inclusive, threads,
-        progress,
-    )  # fmt: skip
+    call = take(points, cutoff, **search)
     if call.points.batch is None:
         return _clusters_of(call, least)
     from halfshell._convert.systems import each_system  # few calls need it
@@ -257,8 +231,6 @@ class Clusters:
 
     def _shifts(self) -> npt.NDArray[np.int64] | None:
         """By how many box vectors each point moves."""
-        from halfshell._functions.pairs import pairs_wanted  # which few calls need
-
         call = self._call
         if call.points.box is None:
             return None

@@ -14,6 +14,7 @@ from halfshell._convert.foreign import of_argument
 from halfshell._convert.lengths import as_edges
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import as_flag
+from halfshell._functions.pairs import pairs
 from halfshell._search import search
 
 if TYPE_CHECKING:
@@ -23,16 +24,12 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from halfshell._convert.types import (
-        ArrayLike,
-        BoxLike,
         CountOptions,
         CutoffLike,
         FloatArray,
         Number,
-        PeriodicLike,
+        OptionsOfBins,
         PointsLike,
-        ProgressLike,
-        Rule,
     )
 
 # The counts of one thread, of two numbers for each bin; their sum; and the result.
@@ -56,21 +53,13 @@ def count_pairs(
 def count_pairs(
     points: PointsLike, cutoff: CutoffLike = None, **options: Unpack[CountOptions]
 ) -> int | npt.NDArray[np.int64]: ...
-@search("count_pairs")
+@search("count_pairs", like=pairs)
 def count_pairs(
     points: PointsLike,
     cutoff: CutoffLike = None,
     *,
     queries: PointsLike | None = None,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    rule: Rule | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
-    indices: npt.ArrayLike | None = None,
-    inclusive: bool = True,
-    threads: int | None = None,
-    progress: ProgressLike = None,
+    **search: Any,
 ) -> int | npt.NDArray[np.int64]:
     """Count the pairs of points within one or several cutoffs.
 
@@ -99,11 +88,6 @@ def count_pairs(
         As for `pairs` and `pairs_between`. MemoryError only if the search itself would not fit: no
         pair is stored.
 
-    See Also
-    --------
-    pairs : the pairs themselves.
-    pair_histogram : the number of pairs between one distance and the next, by type or weighted.
-
     Examples
     --------
     >>> import halfshell as hs
@@ -117,11 +101,7 @@ def count_pairs(
     >>> hs.count_pairs(hs.Points(points, batch=[0, 0, 2]), 1.5).tolist()
     [1, 0, 0]
     """
-    call = take(
-        points, cutoff, queries, box, periodic, rule, exclude, min_distance, indices, inclusive,
-        threads, progress, several="counts",
-    )  # fmt: skip
-    return counted(call)
+    return counted(take(points, cutoff, queries, several="counts", **search))
 
 
 def counted(call: Call) -> int | npt.NDArray[np.int64]:
@@ -129,7 +109,7 @@ def counted(call: Call) -> int | npt.NDArray[np.int64]:
     cutoffs = call.shells
     if cutoffs is None:
         return _count(call)
-    is_exact = call.settings.precision == "exact" and call.reach is None and call.indices is None
+    is_exact = call.settings.precision == "exact" and not call.has_reach and call.indices is None
     if is_exact and len(cutoffs) > 1:
         edges = np.ascontiguousarray(cutoffs)
         between = binned(call, edges, _NO_MARKS, last=call.inclusive, name="cutoff")
@@ -155,26 +135,21 @@ def _count(call: Call) -> int | npt.NDArray[np.int64]:
             return len(i)
         own = call.system_cutoffs
         return np.bincount(batch[i], minlength=points.n_systems if own is None else len(own))
-    how = (call.pairing, call.settings.algorithm, call.asking, call.systems)
+    how = (call.pairing, call.settings.algorithm, call.query_set)
     return cast("int | npt.NDArray[np.int64]", call.run(_core.count_pairs, *how))
 
 
 # ---- by distance ---------------------------------------------------------------------------
 
-@search()
+@search(like=pairs, lacks="rule indices inclusive")
 def pair_histogram(
     points: PointsLike,
     edges: npt.ArrayLike,
     *,
     queries: PointsLike | None = None,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
     indices: npt.ArrayLike | None = None,
     by_type: bool = False,
-    threads: int | None = None,
-    progress: ProgressLike = None,
+    **search: Unpack[OptionsOfBins],
 ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
     """Count pairs in bins of distance, always exact, without storing them.
 
@@ -217,13 +192,8 @@ def pair_histogram(
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As for `pairs` and `pairs_between`; ValueError also if there are fewer than two edges, or
-        edges are negative, not finite or not ascending, or for `by_type` without types.
-
-    See Also
-    --------
-    count_pairs : cumulative counts.
-    rdf : the histogram divided by that of an ideal gas.
+        As for `count_pairs`; ValueError also for edges that are not as above, or for `by_type`
+        without types.
 
     Notes
     -----
@@ -244,9 +214,8 @@ def pair_histogram(
     [-1.0, 0.0]
     """
     call = take(
-        points, 0.0, queries, box, periodic, None, exclude, min_distance, indices, False, threads,
-        progress, by_reach=False,
-    )  # fmt: skip
+        points, 0.0, queries, indices=indices, inclusive=False, by_reach=False, **search
+    )
     return histogram_of(call, as_edges(edges), as_flag(by_type, "by_type"))
 
 
@@ -336,9 +305,11 @@ def binned(
         f"counts for {len(edges) - 1} bins between edges and {marks.n_types}**2 pairs of types"
         + ("" if call.points.batch is None else f" of {n_systems} systems"),
     )
-    end: tuple[Any, ...] = (call.settings.algorithm, call.pairing)
-    if call.systems is not None:
-        end = (*end, call.systems)
+    call.known = call.known._replace(types=marks.types, weights=marks.weights)
+    call.known_of_queries = call.known_of_queries._replace(
+        types=marks.query_types, weights=marks.query_weights
+    )
+    end = call.settings.algorithm, call.pairing
     with of_argument(name):
-        found = call.run(_core.histogram, edges, last, call.asking, *marks[:-1], *end)
+        found = call.run(_core.histogram, edges, last, call.query_set, marks.n_types, *end)
     return cast("npt.NDArray[Any]", found)

@@ -9,24 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from halfshell import _core, _show
-from halfshell._convert.call import check_shells, shells_of, take
+from halfshell._convert.call import Call, check_shells, shells_of, take
 from halfshell._convert.options import as_flag, as_index_bytes
+from halfshell._functions.pairs import pairs
 from halfshell._search import search
 
 if TYPE_CHECKING:
+    from typing import Unpack
+
     import numpy.typing as npt
 
-    from halfshell._convert.types import (
-        ArrayLike,
-        BoxLike,
-        CutoffLike,
-        FloatArray,
-        PeriodicLike,
-        PointsLike,
-        ProgressLike,
-        Reach,
-        Rule,
-    )
+    from halfshell._convert.types import CutoffLike, Options, PointsLike
 
 
 @dataclass(frozen=True)
@@ -122,23 +115,16 @@ class Explanation:
         return "\n".join(lines)
 
 
-@search()
+@search(like=pairs, lacks="indices")
 def explain(
     points: PointsLike,
     cutoff: CutoffLike = None,
     *,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    rule: Rule | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
-    inclusive: bool = True,
     quantities: str = "ij",
     index_dtype: npt.DTypeLike = np.int64,
     sort: bool = False,
     measure: bool = False,
-    threads: int | None = None,
-    progress: ProgressLike = None,
+    **search: Unpack[Options],
 ) -> Explanation:
     """Explain how `pairs` would search a scene, and which steps it leaves out.
 
@@ -169,51 +155,37 @@ def explain(
     >>> plan.algorithm, plan.shape, plan.measured["pairs"]
     ('all-pairs', (1, 1), 1)
     """
-    call = take(
-        points, cutoff, None, box, periodic, rule, exclude, min_distance, None, inclusive, threads,
-        progress, several=shells_of(quantities),
-    )  # fmt: skip
+    call = take(points, cutoff, several=shells_of(quantities), **search)
     check_shells(call, quantities)
-    call.refuse("explain", batch="each system has a plan of its own")
+    call.refuse_batch("explain", "each system has a plan of its own")
     sort, index_bytes = as_flag(sort, "sort"), as_index_bytes(index_dtype)
-    algorithm, reach = call.settings.algorithm, call.reach
+    algorithm = call.settings.algorithm
     plan = call.run(
         _core.explain, quantities, sort, index_bytes, as_flag(measure, "measure"), call.pairing,
         algorithm, call.shells,
     )  # fmt: skip
     ndim = plan["ndim"]
     reason = _reason(plan, algorithm == "auto")
-    if reach is not None:
-        reason = _reason_of_reach(plan, reach, reason)
+    if call.has_reach:
+        reason = _reason_of_reach(plan, call, reason)
     return Explanation(
-        algorithm=plan["algorithm"],
+        **{name: plan[name] for name in _PLANNED},
         reason=reason,
         n=len(call.points),
-        ndim=ndim,
-        shape=plan["shape"],
-        n_cells=plan["n_cells"],
-        cell_sizes=plan["cell_sizes"],
-        images=plan["images"],
-        expected_pairs=plan["expected_pairs"],
         expected_bytes=plan["expected_pairs"] * _bytes_per_pair(quantities, ndim, index_bytes),
-        kernel=plan["kernel"],
-        threads=plan["threads"],
         leaves_out=_left_out(plan, quantities, sort),
         measured={key: plan[key] for key in _MEASURED if key in plan},
     )
 
 
+_PLANNED = (
+    "algorithm", "ndim", "shape", "n_cells", "cell_sizes", "images", "expected_pairs", "kernel",
+    "threads",
+)  # fmt: skip
 _MEASURED = (
-    "bytes",
-    "bytes_peak",
-    "groups",
-    "candidates",
-    "pairs",
-    "ambiguous",
-    "by_float64",
-    "by_double_word",
-    "by_integers",
-)
+    "bytes", "bytes_peak", "groups", "candidates", "pairs", "ambiguous", "by_float64",
+    "by_double_word", "by_integers",
+)  # fmt: skip
 
 
 def _reason(plan: dict[str, Any], is_choice: bool) -> str:
@@ -233,26 +205,21 @@ def _reason(plan: dict[str, Any], is_choice: bool) -> str:
     return compared
 
 
-def _reason_of_reach(plan: dict[str, Any], reach: Reach, reason: str) -> str:
+def _reason_of_reach(plan: dict[str, Any], call: Call, reason: str) -> str:
     """Of one search in which pairs have a reach each, or of several."""
     if plan["n_searches"] == 0:
         return "no two points can be a pair"
     if plan["n_searches"] == 1 and plan["algorithm"] != "hierarchy":
         return f"one search with the largest reach; {reason}"
-    n = plan["n_searches"]
-    return f"{_parts_of(reach)}, in {n} {'search' if n == 1 else 'searches'}"
+    what = "octaves of supports" if call.known.supports is not None else "octaves of radii"
+    what = "types" if call.known.types is not None else what
+    searches = "search" if plan["n_searches"] == 1 else "searches"
+    return f"by {what}, with cells of their own size, in {plan['n_searches']} {searches}"
 
 
 def _bytes_per_pair(quantities: str, ndim: int, index_bytes: int) -> int:
-    sizes = {
-        "i": index_bytes,
-        "j": index_bytes,
-        "P": 2 * index_bytes,
-        "d": 8,
-        "D": 8 * ndim,
-        "S": 4 * ndim,
-        "k": 4,
-    }
+    one = index_bytes
+    sizes = {"i": one, "j": one, "P": 2 * one, "d": 8, "D": 8 * ndim, "S": 4 * ndim, "k": 4}
     return sum(sizes[letter] for letter in quantities)
 
 
@@ -280,43 +247,3 @@ def _left_out(plan: dict[str, Any], quantities: str, sort: bool) -> tuple[str, .
     if not sort:
         left.append("sorting of pairs: sort=True does it")
     return tuple(left)
-
-
-# ---- a hierarchy -----------------------------------------------------------------------
-
-def _parts_of(reach: Reach) -> str:
-    """Those of one set of points."""
-    radii, types, supports, extent = reach[1], reach[3], reach[6], reach[8]
-    if types is not None:
-        n = len(np.unique(types))
-        return f"{_several(n, 'type')}, each two of them searched with their own cutoff"
-    what = "radii"
-    if supports is not None and extent is not None:
-        radii, what = _spheres(supports, extent), "supports"
-    assert radii is not None
-    top = float(radii.max(initial=0.0))
-    return (
-        f"{_several(_octaves(radii, top), 'octave')} of {what} up to {top:.4g}, each searched "
-        "with cells of its own size"
-    )
-
-
-def _octaves(radii: FloatArray, top: float) -> int:
-    """How many have a point: counted from the largest, which with its half is of the first."""
-    if top == 0.0:
-        return min(len(radii), 1)
-    part = radii / top
-    exponents = np.where(part > 0.0, np.minimum(np.frexp(part)[1].astype(np.int64), 0), -(1 << 20))
-    return len(np.unique(exponents))
-
-
-def _spheres(supports: FloatArray, extent: float) -> FloatArray:
-    """About how far each support reaches."""
-    sizes = np.abs(supports).max(axis=(1, 2), initial=0.0)
-    least = np.linalg.eigvalsh(supports / sizes[:, None, None])[:, 0] * sizes
-    reach: FloatArray = extent / np.maximum(least, np.finfo(np.float64).tiny)
-    return reach
-
-
-def _several(n: int, what: str) -> str:
-    return f"{n} {what}{'' if n == 1 else 's'}"

@@ -14,6 +14,7 @@ from halfshell._convert.arrays import as_listed
 from halfshell._convert.call import Call, part_of, take
 from halfshell._convert.options import check_letters
 from halfshell._convert.points import refuse_infinite
+from halfshell._functions.pairs import pairs
 from halfshell._search import search
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def measure(
     quantities: str,
     **options: Unpack[_MeasureOptions],
 ) -> Arrays: ...
-@search()
+@search(like=pairs, lacks="rule exclude min_distance indices inclusive")
 def measure(
     points: PointsLike,
     i: ArrayLike,
@@ -81,11 +82,8 @@ def measure(
     S: ArrayLike | None = None,
     *,
     queries: PointsLike | None = None,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
     quantities: str = "dDS",
-    threads: int | None = None,
-    progress: ProgressLike = None,
+    **search: Any,
 ) -> Arrays:
     """Measure given pairs, in the nearest image or in given images; always exact.
 
@@ -118,23 +116,11 @@ def measure(
 
     Raises
     ------
-    TypeError
-        If `i`, `j` or `S` does not hold whole numbers, or another argument is of the wrong kind.
-    ValueError
-        If `i`, `j` and `S` do not fit each other or the points, `S` is not 0 along an axis that
-        is not periodic, a letter is not one of ``d D S``, or `pairs` would refuse the points or
-        box; or if the box is so skewed, or so long and thin without being aligned with the
-        coordinate axes, that float64 cannot tell which images are near.
-    OverflowError
-        If a point is more than 2**51 box vectors away and `S` is not given, an S to return
-        does not fit int32, or a vector does not fit float64.
-    MemoryError
-        If the result would not fit.
-
-    See Also
-    --------
-    pairs : find pairs, and measure them.
-    nearest : the nearest points, or images.
+    TypeError, ValueError, OverflowError, MemoryError
+        As for `pairs`. ValueError also if `i`, `j` and `S` do not fit each other or the points, or
+        the box is so skewed, or so long and thin without being aligned with the coordinate axes,
+        that float64 cannot tell which images are near. OverflowError also if a point is more than
+        2**51 box vectors away and `S` is not given.
 
     Notes
     -----
@@ -156,16 +142,14 @@ def measure(
     [0.8]
     """
     check_letters(quantities, _LETTERS)
-    call = take(
-        points, 0.0, queries, box, periodic, threads=threads, progress=progress, by_reach=False
-    )
+    call = take(points, 0.0, queries, by_reach=False, **search)
     call.settings, call.cells = call.settings._replace(precision="exact"), None
     n, ndim = call.array.shape
     n_queries = None if call.queries is None else len(call.queries)
-    pairs = as_listed(i, j, S, ndim, n, n_queries)
+    listed = as_listed(i, j, S, ndim, n, n_queries)
     if call.points.batch is None:
-        return _measured(call, quantities, *pairs)
-    return _measured_in_systems(call, quantities, *pairs)
+        return _measured(call, quantities, *listed)
+    return _measured_in_systems(call, quantities, *listed)
 
 
 def _measured(call: Call, quantities: str, first: Any, second: Any, shifts: Any) -> Arrays:

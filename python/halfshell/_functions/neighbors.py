@@ -12,6 +12,7 @@ from halfshell._convert.call import DIRECTED, Call, check_shells, each_cutoff, s
 from halfshell._convert.lengths import as_k, check_max_distances, in_rows
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import AUTO, as_flag, as_index_bytes, check_letters
+from halfshell._functions.pairs import pairs
 from halfshell._objects.exact import Origin, copied
 from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._search import search
@@ -24,13 +25,10 @@ if TYPE_CHECKING:
     from halfshell._convert.types import (
         ArrayLike,
         Arrays,
-        BoxLike,
         CutoffLike,
         NearestOptions,
-        PeriodicLike,
+        OptionsOfPoints,
         PointsLike,
-        ProgressLike,
-        Rule,
     )
 
 
@@ -50,23 +48,15 @@ def _as_table(arrays: Any, points: Any, cutoff: Any, **options: Any) -> Neighbor
     return _table_of(call, arrays, quantities)
 
 
-@search("neighbors", finish=_as_table)
+@search("neighbors", finish=_as_table, like=pairs)
 def neighbors(
     points: PointsLike,
     cutoff: CutoffLike = None,
     *,
     queries: PointsLike | None = None,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    rule: Rule | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
-    indices: npt.ArrayLike | None = None,
-    inclusive: bool = True,
     quantities: str = "j",
     index_dtype: npt.DTypeLike = np.int64,
-    threads: int | None = None,
-    progress: ProgressLike = None,
+    **search: Unpack[OptionsOfPoints],
 ) -> NeighborTable:
     """Find the neighbours of each point, or of each query, within a cutoff, as a table.
 
@@ -92,14 +82,7 @@ def neighbors(
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As for `pairs`. ValueError also if `queries` and `points` differ in their number of columns
-        or in their box, or one of them lacks what `rule` or `cutoff` go by.
-
-    See Also
-    --------
-    pairs : each pair once, found in less time.
-    coordination : the lengths of the rows alone.
-    pairs_between : two sets, as arrays of pairs.
+        As for `pairs_between`.
 
     Notes
     -----
@@ -140,9 +123,8 @@ def neighbors(
     [[(1, 0), (2, 1)], [(0, 0), (2, 1)], [(0, 1), (1, 1)]]
     """
     call = take(
-        points, cutoff, queries, box, periodic, rule, exclude, min_distance, indices, inclusive,
-        threads, progress, directed=True, several=shells_of(quantities),
-    )  # fmt: skip
+        points, cutoff, queries, directed=True, several=shells_of(quantities), **search
+    )
     check_shells(call, quantities)
     index_bytes = as_index_bytes(index_dtype)
     if call.indices is not None:
@@ -153,20 +135,20 @@ def neighbors(
 def listed(call: Call, quantities: str, index_bytes: int) -> Any:
     """Offsets and columns of the rows of a call."""
     return call.run(
-        _core.neighbors, quantities, index_bytes, call.asking, call.pairing,
-        call.settings.algorithm, call.shells, call.systems,
+        _core.neighbors, quantities, index_bytes, call.query_set, call.pairing,
+        call.settings.algorithm, call.shells,
     )  # fmt: skip
 
 
 def _table_of(call: Call, arrays: Any, quantities: str) -> NeighborTable:
     is_full = call.queries is None and call.rule not in DIRECTED
-    origin = _origin_of(call, call.asking, call.pairing, call.systems, quantities)
+    origin = _origin_of(call, call.asking, call.query_set, call.pairing, quantities)
     return NeighborTable(arrays, quantities, len(call.points), is_full, origin=origin)
 
 
 def _table_of_some(call: Call, quantities: str, index_bytes: int) -> NeighborTable:
     """The rows of some points; sorting them exactly needs what the search found."""
-    from halfshell._convert.rows import pairing_of, rows_of, systems_of  # few calls need them
+    from halfshell._convert.rows import rows_of  # few calls need it
 
     rows = rows_of(call, quantities, index_bytes)
     numbers, order = rows.numbers, None
@@ -174,9 +156,8 @@ def _table_of_some(call: Call, quantities: str, index_bytes: int) -> NeighborTab
         order = np.argsort(call.points.batch[numbers], kind="stable")
         numbers = numbers[order]
     origin = _origin_of(
-        call, call.array[rows.numbers], pairing_of(call, numbers), systems_of(call, numbers),
-        quantities, order,
-    )  # fmt: skip
+        call, call.array[rows.numbers], *call.as_queries(numbers), quantities, order
+    )
     return NeighborTable(
         (rows.offsets, *rows.columns), quantities, len(call.points), False, origin=origin,
         entries=rows.entries,
@@ -184,58 +165,56 @@ def _table_of_some(call: Call, quantities: str, index_bytes: int) -> NeighborTab
 
 
 def _origin_of(
-    call: Call, asking: Any, pairing: Any, systems: Any, quantities: str, order: Any = None
+    call: Call, asking: Any, queries: Any, pairing: Any, quantities: str, order: Any = None
 ) -> Origin | None:
     """What sorting a table by exact distance needs, where it can be sorted.
 
-    order: of queries, as pairing and systems have them.
+    queries, pairing: as the core takes them, with the queries in this order.
     """
     if "d" not in quantities or "j" not in quantities:
         return None
-    kept = copied((pairing, systems, call.vectors))  # the caller's arrays may change
-    cutoff, bits = call.cutoff, call.bits
+    points, is_own = call.points, call.cells is not None  # cells own their points
+    # The caller's arrays may change; the table keeps positions itself.
+    known, known_of_queries, scene, pairing = copied(
+        ((*call.known, points.batch), queries and queries[1:], call.scene,
+         pairing and tuple(pairing))
+    )  # fmt: skip
     rest: Any = list(call.rest)
     rest[2:5] = None, None, None  # kernel, memory_limit, progress
 
     def find_shifts(origin: Origin) -> npt.NDArray[Any]:
-        search: Any = (origin.points, cutoff, kept[2], bits, *rest)
-        queries: Any = origin.queries
-        queries = queries if order is None else queries[order]
-        arguments: Any = (*search, "S", 8, queries, kept[0], AUTO, None, kept[1])
+        places: Any = origin.queries
+        places = places if order is None else places[order]
+        asked = None if places is None else (places, *known_of_queries)
+        search: Any = ((origin.points, *known), *scene, *rest)
+        arguments: Any = (*search, "S", 8, asked, pairing, AUTO)
         return _core.neighbors(*arguments)[1]
 
-    points, is_own = call.points, call.cells is not None  # cells own their points
     if points.box is None or (points.box.ndim == 2 and not np.ndim(points._axes)):
         asking = asking.copy() if is_own and asking is not None else asking
+        bits = 0 if points.box is None else call.bits
         return Origin(points.positions, asking, points.box, bits, find_shifts, is_own=is_own)
     flags = points.periodic  # what does not repeat is multiplied by no shift
     assert flags is not None
     boxes = np.broadcast_to(points.box, (points.n_systems, *points.box.shape[-2:]))
     boxes = boxes * np.broadcast_to(flags, boxes.shape[:2])[:, :, None]
-    asked_in = kept[1][0] if kept[1][3] is None else kept[1][3]
+    asked_in = known[-1] if known_of_queries is None else known_of_queries[-1]
     if order is not None:
         asked_in = asked_in[np.argsort(order)]
+    bits = (1 << boxes.shape[1]) - 1
     return Origin(points.positions, asking, boxes, bits, find_shifts, asked_in)
 
 
 # ---- the lengths of its rows ---------------------------------------------------------------
 
-@search("coordination")
+@search("coordination", like=pairs)
 def coordination(
     points: PointsLike,
     cutoff: CutoffLike = None,
     *,
     queries: PointsLike | None = None,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    rule: Rule | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
-    indices: npt.ArrayLike | None = None,
-    inclusive: bool = True,
     by_type: bool = False,
-    threads: int | None = None,
-    progress: ProgressLike = None,
+    **search: Unpack[OptionsOfPoints],
 ) -> npt.NDArray[np.int64]:
     """Count the neighbours of each point, or of each query.
 
@@ -258,18 +237,10 @@ def coordination(
 
         By type the shape is (n, t), (q, t) or (r, t): column k counts the neighbours of type k, or
         those with name k of ``np.unique(types)``. The sum of a row is the count without types.
+        ValueError if the points have no types.
 
         With several cutoffs, ascending, each has such an array: they come first, as one more axis.
         Each of them is searched for.
-
-    Raises
-    ------
-    TypeError, ValueError, OverflowError, MemoryError
-        As for `neighbors`; ValueError also for `by_type` without types.
-
-    See Also
-    --------
-    neighbors : the neighbours themselves.
 
     Examples
     --------
@@ -288,10 +259,7 @@ def coordination(
     >>> hs.coordination(atoms, 2.0, by_type=True).tolist()  # columns: O, Si
     [[1, 0], [1, 1], [1, 0]]
     """
-    call = take(
-        points, cutoff, queries, box, periodic, rule, exclude, min_distance, indices, inclusive,
-        threads, progress, directed=True, several="counts",
-    )  # fmt: skip
+    call = take(points, cutoff, queries, directed=True, several="counts", **search)
     is_by_type = as_flag(by_type, "by_type")
     if call.shells is None:
         return _lengths(call, is_by_type)
@@ -308,7 +276,7 @@ def _lengths(call: Call, by_type: bool) -> npt.NDArray[np.int64]:
 
         return np.diff(rows_of(call, "j", 4).offsets)
     found = call.run(
-        _core.coordination, call.asking, call.pairing, call.settings.algorithm, call.systems
+        _core.coordination, call.query_set, call.pairing, call.settings.algorithm
     )
     return cast("npt.NDArray[np.int64]", found)
 
@@ -359,23 +327,16 @@ def nearest(
 def nearest(
     points: PointsLike, k: int, *, quantities: str, **options: Unpack[NearestOptions]
 ) -> Arrays: ...
-@search("nearest", finish=_as_ranks)
+@search("nearest", finish=_as_ranks, like=pairs, lacks="rule")
 def nearest(
     points: PointsLike,
     k: int,
     *,
     max_distance: ArrayLike = np.inf,
     queries: PointsLike | None = None,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
-    indices: npt.ArrayLike | None = None,
-    inclusive: bool = True,
     quantities: str = "jd",
     index_dtype: npt.DTypeLike = np.int64,
-    threads: int | None = None,
-    progress: ProgressLike = None,
+    **search: Any,
 ) -> Arrays:
     """Find the k nearest points of each point or query, in an order that is always exact.
 
@@ -414,20 +375,9 @@ def nearest(
 
     Raises
     ------
-    TypeError
-        If `k` is not an integer, or another argument is of the wrong kind, as for `pairs`.
-    ValueError
-        If `k` is less than 1, `max_distance` is negative or NaN, `queries` do not have the
-        dimension of the points, or a letter is not one of ``j d D S``; otherwise as for `pairs`.
-    OverflowError
-        As for `pairs`.
-    MemoryError
-        If the result would not fit; or if a query is so far from periodic points, well beyond
-        10**8 periods, that the images at nearly equal distances do not fit in memory.
-
-    See Also
-    --------
-    pairs : all pairs within a cutoff.
+    TypeError, ValueError, OverflowError, MemoryError
+        As for `pairs_between`. MemoryError also if a query is so far from periodic points, well
+        beyond 10**8 periods, that the images at nearly equal distances do not fit in memory.
 
     Notes
     -----
@@ -470,10 +420,7 @@ def nearest(
     ([[0, 2]], [[0.5, 0.5]], [[[1, 0], [0, 0]]])
     """
     k = as_k(k)
-    call = take(
-        points, 0.0, queries, box, periodic, None, exclude, min_distance, indices, inclusive,
-        threads, progress, by_reach=False,
-    )  # fmt: skip
+    call = take(points, 0.0, queries, by_reach=False, **search)
     distances = check_max_distances(max_distance)
     if isinstance(distances, float):
         call.cutoff = distances
@@ -486,15 +433,13 @@ def nearest(
     if call.indices is not None:
         return _nearest_of_some(call, k, quantities, index_bytes)
     result = call.run(
-        _core.nearest, quantities, index_bytes, call.asking, k, call.pairing, call.systems
+        _core.nearest, quantities, index_bytes, call.query_set, k, call.pairing
     )
     return in_rows(result, len(call.points if call.queries is None else call.queries), k)
 
 
 def _nearest_of_some(call: Call, k: int, quantities: str, index_bytes: int) -> Arrays:
     """Rows of some points, found as those of queries, of which each finds itself too."""
-    from halfshell._convert.rows import pairing_of, systems_of  # few calls need them
-
     check_letters(quantities, "jdDS")  # others are added, and left out again
     numbers = call.indices
     assert numbers is not None
@@ -503,10 +448,8 @@ def _nearest_of_some(call: Call, k: int, quantities: str, index_bytes: int) -> A
         order = np.argsort(call.points.batch[numbers], kind="stable")
     asked = numbers[order]
     letters = quantities + "".join(letter for letter in "jS" if letter not in quantities)
-    result = call.run(
-        _core.nearest, letters, index_bytes, call.array[asked], k + 1, pairing_of(call, asked),
-        systems_of(call, asked),
-    )  # fmt: skip
+    queries, pairing = call.as_queries(asked)
+    result = call.run(_core.nearest, letters, index_bytes, queries, k + 1, pairing)
     columns = dict(zip(letters, in_rows(result, len(asked), k + 1), strict=True))
     itself = (columns["j"] == asked[:, None]) & ~columns["S"].any(axis=2)
     place = np.where(itself.any(axis=1), itself.argmax(axis=1), k)  # or the last one is too many

@@ -245,7 +245,7 @@ def pairs_wanted(
 ) -> Arrays:
     """The pairs of a call. room: the length of all arrays, as the core takes it."""
     wanted = quantities, sort, index_bytes, out
-    end = call.pairing, call.settings.algorithm, call.shells, room, call.systems
+    end = call.pairing, call.settings.algorithm, call.shells, room
     return cast("Arrays", call.run(_core.pairs, *wanted, *end))
 
 
@@ -342,11 +342,6 @@ def pairs_between(
         As for `pairs`. ValueError also if `queries` and `points` differ in their number of columns
         or in their box, or one of them lacks what `rule` or `cutoff` go by.
 
-    See Also
-    --------
-    neighbors : the same pairs as a table, with a row for each query.
-    count_pairs : the number of these pairs.
-
     Examples
     --------
     >>> import halfshell as hs
@@ -386,8 +381,8 @@ def between_wanted(
 ) -> Arrays:
     """The pairs of a call with queries."""
     found = call.run(
-        _core.pairs_between, quantities, True, index_bytes, out, call.asking, call.pairing,
-        call.settings.algorithm, call.shells, room, call.systems,
+        _core.pairs_between, quantities, True, index_bytes, out, call.query_set, call.pairing,
+        call.settings.algorithm, call.shells, room,
     )  # fmt: skip
     return cast("Arrays", found)
 
@@ -471,13 +466,6 @@ def iter_pairs(
         As for `pairs`, by the call itself. OverflowError for a shift that does not fit int32 is
         raised at its block. ValueError if two threads, or `progress`, advance the iterator while it
         is running.
-    MemoryError
-        If the search, or a block, would not fit.
-
-    See Also
-    --------
-    pairs : all pairs at once, and those of some points.
-    for_each_pair : pass each pair to a compiled function.
 
     Notes
     -----
@@ -510,12 +498,14 @@ def iter_pairs(
     check_shells(call, quantities)
     index_bytes = as_index_bytes(index_dtype)
     if call.indices is not None:
-        from halfshell._convert.rows import parts_of  # few calls need them
+        from halfshell._convert.call import Known, Pairing  # few calls need them
+        from halfshell._convert.rows import parts_of
         from halfshell._objects.exact import copied
 
         call.points = call.points.replace()  # a copy, as the caller's arrays may change
-        for name in ("reach", "selection", "shells", "system_cutoffs"):
-            setattr(call, name, copied(getattr(call, name)))
+        call.known = Known(*copied(tuple(call.known)))
+        call.pairing = call.pairing and Pairing(*copied(tuple(call.pairing)))
+        call.shells, call.system_cutoffs = copied((call.shells, call.system_cutoffs))
         parts = parts_of(call, quantities, index_bytes)
         return cast("PairBlocks[Any]", _in_blocks(parts, quantities, most))
     if call.points.batch is not None:
@@ -629,11 +619,6 @@ def for_each_pair(
     Exception
         Whatever a Python callable raises. An exception within a ctypes callback is printed by
         ctypes and not seen here.
-
-    See Also
-    --------
-    iter_pairs : blocks of arrays.
-    pairs : all pairs at once.
 
     Notes
     -----

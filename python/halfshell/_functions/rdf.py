@@ -22,21 +22,16 @@ from halfshell._convert.lengths import as_edges, as_positive
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import as_choice, as_count, as_flag
 from halfshell._functions.counts import Marks, binned, marks_of
+from halfshell._functions.pairs import pairs
 from halfshell._objects.pictures import axes_of
 from halfshell._search import document, search
 
 if TYPE_CHECKING:
+    from typing import Unpack
+
     from matplotlib.axes import Axes
 
-    from halfshell._convert.types import (
-        ArrayLike,
-        BoxLike,
-        FloatArray,
-        Number,
-        PeriodicLike,
-        PointsLike,
-        ProgressLike,
-    )
+    from halfshell._convert.types import ArrayLike, FloatArray, Number, OptionsOfBins, PointsLike
 
 _Floats = npt.NDArray[np.float64]
 _Ints = npt.NDArray[np.int64]
@@ -46,22 +41,17 @@ _COLUMNS = 12  # of a result without types, and what makes them
 _OF_TYPES = 6  # of g(r) of each two types, and what makes it
 
 
-@search()
+@search(like=pairs, lacks="rule indices inclusive")
 def rdf(
     points: PointsLike,
-    cutoff: Number | None,
+    cutoff: Number | None = None,
     bins: int | ArrayLike = 100,
     *,
     queries: PointsLike | None = None,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
     by_type: bool = False,
     density: float | None = None,
     finite_size: bool = False,
-    threads: int | None = None,
-    progress: ProgressLike = None,
+    **search: Unpack[OptionsOfBins],
 ) -> RadialDistribution:
     """Compute the radial distribution function g(r); counts are always exact.
 
@@ -70,7 +60,8 @@ def rdf(
     {points}
     cutoff : float or None
         The largest distance, in the unit of `points`; finite, greater than 0. It may exceed half
-        the box, and the whole box: all images are counted. None where `bins` are edges.
+        the box, and the whole box: all images are counted. None where `bins` are edges, and for
+        that of a `CellList`.
     bins : int or array_like of float, shape (bins + 1,), default 100
         How many bins of equal width there are from 0 to `cutoff`, or their edges, as in
         `pair_histogram`.
@@ -111,10 +102,6 @@ def rdf(
         As for `pair_histogram`; ValueError also without a density, if there is no box or an axis is
         not periodic, or if `cutoff`, `bins` or `density` is not positive.
 
-    See Also
-    --------
-    pair_histogram : counts only, in any box or in open space.
-
     Notes
     -----
     With labels and ``exclude=0``, g(r) is between molecules; with groups, within them. Both are
@@ -149,14 +136,11 @@ def rdf(
     >>> partial.n.round().tolist()  # oxygens within 0.1, 0.2, 0.3 and 0.4 of a silicon
     [6.0, 50.0, 170.0, 402.0]
     """
-    edges = _edges(cutoff, bins)
-    call = take(
-        points, 0.0, queries, box, periodic, None, exclude, min_distance, None, False, threads,
-        progress, by_reach=False,
-    )  # fmt: skip
+    edges = _edges(points, cutoff, bins)
+    call = take(points, 0.0, queries, inclusive=False, by_reach=False, **search)
     by_type, finite = as_flag(by_type, "by_type"), as_flag(finite_size, "finite_size")
     dense = None if density is None else as_positive(density, "density")
-    shares_of = _shares_of(call, edges, dense)
+    shares = _shares_of(call, edges, dense, 0)
     marks = marks_of(call, by_type, with_weights=False)
     if by_type:
         refuse_unavailable(
@@ -166,7 +150,7 @@ def rdf(
     counts = counts[..., 1:] if by_type else counts[..., 0, 0, 1:]
     n_frames = 1
     if call.points.batch is None:
-        expected = _expected(call, marks, finite, shares_of(0), None)
+        expected = _expected(call, marks, finite, shares, None)
     else:
         counts = counts.sum(axis=0, dtype=np.int64)
         batches = [call.points.batch]
@@ -175,7 +159,8 @@ def rdf(
         occupied = np.unique(np.concatenate(batches))
         expected = np.zeros(counts.shape)
         for s in occupied.tolist():
-            expected += _expected(call, marks, finite, shares_of(s), s)
+            shares = _shares_of(call, edges, dense, s)
+            expected += _expected(call, marks, finite, shares, s)
         n_frames = max(len(occupied), 1)
     names: _Names | None = None
     centers = _centers(call, marks)
@@ -189,7 +174,7 @@ def rdf(
     )  # fmt: skip
 
 
-def _edges(cutoff: Any, bins: Any) -> FloatArray:
+def _edges(points: Any, cutoff: Any, bins: Any) -> FloatArray:
     is_number = exact_number(bins) is not None
     array = None if is_number else as_array(bins, "bins", "be a number or edges")
     if array is not None and array.ndim > 0:
@@ -199,6 +184,8 @@ def _edges(cutoff: Any, bins: Any) -> FloatArray:
                 f"cutoff must be None, or the last edge of bins, {edges[-1]}, got {cutoff}"
             )
         return edges
+    if cutoff is None and getattr(type(points), "_is_cell_list", False):
+        cutoff = points.cutoff
     if cutoff is None:
         raise TypeError("cutoff must be a number where bins is one: None goes with edges")
     n_bins, largest = as_count(bins, "bins"), as_positive(cutoff, "cutoff")
@@ -210,51 +197,29 @@ def _edges(cutoff: Any, bins: Any) -> FloatArray:
 
 # ---- the ideal gas -------------------------------------------------------------------------
 
-def _shares_of(call: Call, edges: FloatArray, density: float | None) -> Any:
-    """A function that gives the part of all partners in each shell, for each system."""
-    points = call.points
-    d = call.array.shape[1]
-    if density is not None:
-        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-            shells = np.diff(unit_ball(d) * edges**d) * density
-
-        def of_density(s: int) -> FloatArray:
-            n = len(points) if points.batch is None else int((points.batch == s).sum())
-            with np.errstate(under="ignore"):
-                shares: FloatArray = shells / max(n, 1)
-            return shares
-
-        return of_density
-    every = (1 << d) - 1
-    bits = next((int(b) for b in np.atleast_1d(points._axes) if b != every), every)
-    if points.box is None or bits != every:
-        shell_shares(None, 0, edges)
-
-    def of_box(s: int) -> FloatArray:
-        box = points.box
-        assert box is not None
-        return shell_shares(box[s] if box.ndim == 3 else box, every, edges)
-
-    return of_box
-
-
-def shell_shares(vectors: FloatArray | None, bits: int, edges: FloatArray) -> FloatArray:
-    """The part of the box that lies between two spheres, for each bin.
+def _shares_of(call: Call, edges: FloatArray, density: float | None, s: int) -> FloatArray:
+    """The part of all partners in a system that lies between two spheres, for each bin.
 
     In a unit of about the size of the box, a power of two: volumes of boxes in other units may be
     too large or too small for a float64.
     """
-    if vectors is None or bits != (1 << len(vectors)) - 1:
-        raise ValueError(
-            "rdf needs a box that is periodic along every axis, for the density of the points, or "
-            "density; pair_histogram counts without one"
-        )
-    power = -int(np.frexp(np.abs(vectors).max())[1])
-    volume: float = _core.box_measure(np.ldexp(vectors, power), bits)[1]
-    ndim = len(vectors)
+    points, d = call.points, call.array.shape[1]
     with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
-        shells: FloatArray = np.diff(np.ldexp(edges, power) ** ndim)
-        return unit_ball(ndim) * shells / volume
+        if density is not None:
+            n = len(points) if points.batch is None else int((points.batch == s).sum())
+            of_density: FloatArray = np.diff(unit_ball(d) * edges**d) * density / max(n, 1)
+            return of_density
+        every = (1 << d) - 1
+        if points.box is None or (np.atleast_1d(points._axes) != every).any():
+            raise ValueError(
+                "rdf needs a box that is periodic along every axis, for the density of the points, "
+                "or density; pair_histogram counts without one"
+            )
+        vectors = points.box[s] if points.box.ndim == 3 else points.box
+        power = -int(np.frexp(np.abs(vectors).max())[1])
+        volume: float = _core.box_measure(np.ldexp(vectors, power), every)[1]
+        shells: FloatArray = np.diff(np.ldexp(edges, power) ** d)
+        return unit_ball(d) * shells / volume
 
 
 def unit_ball(ndim: int) -> float:
@@ -263,11 +228,6 @@ def unit_ball(ndim: int) -> float:
     for k in range(2 + ndim % 2, ndim + 1, 2):
         volume *= 2.0 * math.pi / k
     return volume
-
-
-def over_ideal_gas(counts: npt.NDArray[Any], partners: float, shares: FloatArray) -> FloatArray:
-    """g(r): counts over what each shell would have of so many pairs; 0 where there are none."""
-    return ratio(counts, _in_shells(np.array([partners]), shares))
 
 
 def _in_shells(partners: FloatArray, shares: FloatArray) -> FloatArray:

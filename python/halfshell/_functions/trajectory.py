@@ -28,17 +28,13 @@ if TYPE_CHECKING:
     from typing import Unpack
 
     from halfshell._convert.types import (
-        ArrayLike,
         Arrays,
         BoxLike,
         CutoffLike,
         Letter,
         Number,
         OptionsOfPoints,
-        PeriodicLike,
         PointsLike,
-        ProgressLike,
-        Rule,
     )
 
     _Frames = Iterable[PointsLike | tuple[PointsLike, BoxLike | None]]
@@ -78,24 +74,16 @@ def trajectory_pairs(
 def trajectory_pairs(
     frames: _Frames, cutoff: CutoffLike = None, *, quantities: str, **options: Unpack[_FrameOptions]
 ) -> Generator[Arrays, None, None]: ...
-@search()
+@search(like=pairs)
 def trajectory_pairs(
     frames: _Frames,
     cutoff: CutoffLike = None,
     *,
     skin: Number | Literal["auto"] | None = "auto",
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    rule: Rule | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
-    indices: npt.ArrayLike | None = None,
-    inclusive: bool = True,
     quantities: str = "ij",
     index_dtype: npt.DTypeLike = np.int64,
     sort: bool = False,
-    threads: int | None = None,
-    progress: ProgressLike = None,
+    **which: Any,
 ) -> Generator[Any, None, None]:
     """Find the pairs of each frame of a trajectory, one frame after the other; always exact.
 
@@ -144,11 +132,6 @@ def trajectory_pairs(
         As for `pairs`, of a frame when the iteration reaches it; a note names the frame, and the
         iteration ends. ValueError also if a frame brings its box and `box` is given.
 
-    See Also
-    --------
-    VerletList : the same, with control over each step.
-    pairs : one frame.
-
     Notes
     -----
     Except with `threads`, nothing is read ahead, and only the last frame is kept: any number of
@@ -177,10 +160,9 @@ def trajectory_pairs(
         "quantities": quantities, "sort": as_flag(sort, "sort"),
         "index_dtype": np.dtype(f"i{as_index_bytes(index_dtype)}"),
     }  # fmt: skip
-    which: Any = {
-        "rule": rule, "exclude": exclude, "min_distance": min_distance, "indices": indices,
-        "inclusive": as_flag(inclusive, "inclusive"),
-    }  # fmt: skip
+    own = ("box", "periodic", "threads", "progress")
+    box, periodic, threads, progress = (which.pop(name, None) for name in own)
+    inclusive = as_flag(which.setdefault("inclusive", True), "inclusive")
     is_plain = is_a(cutoff, (float, int, np.floating, np.integer)) and not any(
         value is not None for name, value in which.items() if name != "inclusive"
     )
@@ -251,37 +233,33 @@ def _told(
 
 # ---- several threads -----------------------------------------------------------------------
 
-
 def _ahead(
     frames: Iterator[Any], find: _Find, box: Any, periodic: Any, n_threads: int
 ) -> Generator[Arrays, None, None]:
     """The pairs of frames that several threads search, one each at a time, in their order.
 
     As many frames as there are threads are read ahead and copied, as a reader may hand out the same
-    object each time. Where the frames are small all is done by the caller's thread.
+    object each time. Those that are small are searched by the caller's thread.
     """
     number = 0
-    waiting: deque[tuple[Points, Future[Arrays]]] = deque()
+    waiting: deque[tuple[Points, Future[Arrays] | None]] = deque()
     process, pool = os.getpid(), ThreadPoolExecutor(n_threads)
 
-    def search_again() -> None:
-        """In a child: threads are gone, and frames that they searched are searched anew."""
+    def look_at_process() -> None:
+        """In a child threads are gone, and what they searched is for the caller's thread."""
         nonlocal process, pool, waiting
         if process != os.getpid():
             process, pool = os.getpid(), ThreadPoolExecutor(n_threads)
-            waiting = deque((points, _submit(points)) for points, _ in waiting)
-
-    def _submit(points: Points) -> Future[Arrays]:
-        return pool.submit(find, points)
+            waiting = deque((points, None) for points, _ in waiting)
 
     def hand_out(most: int) -> Generator[Arrays, None, None]:
         """The results of the frames that came first, until at most so many wait."""
         nonlocal number
         while len(waiting) > most:
-            search_again()
-            future = waiting.popleft()[1]
+            look_at_process()
+            points, future = waiting.popleft()
             try:
-                found = future.result()
+                found = find(points) if future is None else future.result()
             except Exception as error:
                 of_frame(error, number)
                 raise
@@ -297,25 +275,11 @@ def _ahead(
                 yield from hand_out(0)  # the frames before it come first
                 of_frame(error, number)
                 raise
-            search_again()
-            if len(points) >= _FEW_POINTS:
-                waiting.append((points, _submit(points)))
-                yield from hand_out(n_threads)
-            else:
-                yield from hand_out(0)
-                waiting.append((points, _done(find, points)))
-                yield from hand_out(0)
+            look_at_process()
+            is_small = len(points) < _FEW_POINTS
+            waiting.append((points, None if is_small else pool.submit(find, points)))
+            yield from hand_out(0 if is_small else n_threads)
         yield from hand_out(0)
     finally:
         if process == os.getpid():
             pool.shutdown(cancel_futures=True)
-
-
-def _done(find: _Find, points: Points) -> Future[Arrays]:
-    """The search of a frame by this thread."""
-    future: Future[Arrays] = Future()
-    try:
-        future.set_result(find(points))
-    except Exception as error:
-        future.set_exception(error)
-    return future

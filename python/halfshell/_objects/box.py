@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from halfshell import _core
-from halfshell._convert.arrays import as_real_array
+from halfshell._convert.arrays import as_real_array, of_shape
 from halfshell._convert.memory import refuse_large
 from halfshell._convert.objects import vectors_of
 from halfshell._convert.points import (
@@ -225,26 +225,20 @@ class Box:
         Box([[2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 4.0]])
         """
         array = as_real_array(dimensions, "dimensions")
-        if array.shape != (6,):
-            raise ValueError(
-                "dimensions must be six numbers, a, b, c, alpha, beta and gamma, got shape "
-                f"{array.shape}"
-            )
+        must = "dimensions must be six numbers, a, b, c, alpha, beta and gamma, of shape (6,)"
+        of_shape(must, (6,))(array.shape)
         return cls.from_lengths_angles(array[:3], array[3:])
 
     @property
     def vectors(self) -> npt.NDArray[np.float64]:
-        """The box vectors as rows, shape (d, d); read-only."""
         return self._vectors
 
     @property
     def volume(self) -> float:
-        """Volume (length in one dimension, area in two), in the unit of the vectors to the d."""
         return self._volume
 
     @property
     def perpendicular_heights(self) -> npt.NDArray[np.float64]:
-        """Distances between opposite faces, shape (d,), to compare with a cutoff."""
         return self._heights
 
     def wrap(

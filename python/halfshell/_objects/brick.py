@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +13,7 @@ from halfshell._convert.arrays import as_array, as_point_numbers
 from halfshell._convert.call import DIRECTED
 from halfshell._convert.foreign import whole_number
 from halfshell._convert.options import check_letters
-from halfshell._convert.points import Labels, Points, setattr_
+from halfshell._convert.points import Labels, Points
 from halfshell._functions.neighbors import neighbors as find_neighbors
 from halfshell._functions.pairs import pairs as find_pairs
 from halfshell._objects.neighbor_table import NeighborTable
@@ -63,29 +62,23 @@ class Scope(NamedTuple):
 
     def points_of(self, columns: Columns) -> Points:
         """Points with these columns, which share memory with them where it is aligned."""
-        points = Points.__new__(Points)
-        for slot in Points.__slots__:
-            setattr_(points, slot, None)
+        box = None if self.box is None else aligned(self.box)
+        parts: dict[str, Any] = {"_box": box, "_axes": self.axes, "tells_periodic": True}
         for name, column in columns.items():
             array = aligned(column).view()
             array.flags.writeable = False
             if name in _NAMED:
-                setattr_(points, f"_{name}", Labels(array, self.names.get(name)))
+                parts[f"_{name}"] = Labels(array, self.names.get(name))
             else:
-                setattr_(points, name, array)
-        setattr_(points, "_box", None if self.box is None else aligned(self.box))
-        setattr_(points, "_axes", self.axes)
-        setattr_(points, "tells_periodic", True)
-        return points
+                parts[name] = array
+        return Points._made(**parts)
 
 
 def aligned(array: Array) -> Array:
-    """As the core takes it; between processes arrays may arrive at any address."""
     return np.require(array, requirements=["C", "A"])
 
 
 def labels_of(points: Points) -> dict[str, Labels]:
-    """Types, groups and labels that are known."""
     every = {"types": points._kinds, "groups": points._groups, "labels": points._labels}
     return {name: labels for name, labels in every.items() if labels is not None}
 
@@ -130,22 +123,18 @@ class Brick:
 
     @property
     def owned(self) -> Numbers:
-        """Points of this brick, ascending."""
         return self.members[self.is_owned]
 
     @property
     def needed(self) -> Numbers:
-        """Other points that may be within the cutoff of one of these, ascending."""
         return self.members[~self.is_owned]
 
     @property
     def cutoff(self) -> Any:
-        """As it was given."""
         return self._scope.cutoff
 
     @property
     def n_points(self) -> int:
-        """The number of all points."""
         return self._scope.n_points
 
     def pairs(
@@ -253,8 +242,7 @@ class Brick:
             indices=np.flatnonzero(self.is_owned), inclusive=inclusive, quantities=quantities,
             threads=threads,
         )  # fmt: skip
-        columns = {"j": "indices", "d": "distances", "D": "vectors", "S": "shifts"}
-        arrays = [getattr(table, columns[letter]) for letter in quantities]
+        arrays = [table._column(letter) for letter in quantities]
         if "j" in quantities:
             arrays[quantities.index("j")] = self.members[table.indices]
         return NeighborTable((table.offsets, *arrays), quantities, self.n_points, False)
@@ -293,11 +281,13 @@ class Brick:
         return scope.points_of(columns)
 
 
-class Bricks(Sequence[Brick]):
+class Bricks(tuple[Brick, ...]):
     """All bricks of a set of points, as `bricks` returns them.
 
     Attributes
     ----------
+    sizes : list of int
+        How many points each brick owns.
     overhead : float
         How many points all bricks hold together, for each point: what dividing them costs.
 
@@ -311,29 +301,14 @@ class Bricks(Sequence[Brick]):
     _shown = ("sizes", "overhead")
     _repr_html_ = _show.html
 
-    def __init__(self, made: Sequence[Brick], n_points: int) -> None:
-        self._made, self._n = tuple(made), n_points
-
     @property
     def sizes(self) -> list[int]:
-        """How many points each brick owns."""
-        return [int(np.count_nonzero(brick.is_owned)) for brick in self._made]
+        return [int(np.count_nonzero(brick.is_owned)) for brick in self]
 
     @property
     def overhead(self) -> float:
-        """How many points all bricks hold together, for each point."""
-        held = sum(len(brick.members) for brick in self._made)
-        return held / self._n if self._n else 1.0
-
-    def __len__(self) -> int:
-        return len(self._made)
-
-    @overload
-    def __getitem__(self, which: int) -> Brick: ...
-    @overload
-    def __getitem__(self, which: slice) -> Sequence[Brick]: ...
-    def __getitem__(self, which: Any) -> Any:
-        return self._made[which]
+        n = sum(self.sizes)
+        return sum(len(brick.members) for brick in self) / n if n else 1.0
 
     def __repr__(self) -> str:
-        return f"Bricks({len(self)} of {self._n} points, overhead {self.overhead:.3g})"
+        return f"Bricks({len(self)} of {sum(self.sizes)} points, overhead {self.overhead:.3g})"

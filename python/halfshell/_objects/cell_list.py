@@ -7,17 +7,18 @@ Every search takes one in place of points: the methods of the same names are the
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar, cast, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _show
-from halfshell._convert.arrays import as_real_array, starts_of
+from halfshell._convert.arrays import as_real_array, entries_of, starts_of
 from halfshell._convert.call import same_boxes, take
-from halfshell._convert.foreign import exact_number, is_a, shown
-from halfshell._convert.lengths import as_cutoff, as_positive, as_radii
+from halfshell._convert.foreign import is_a, shown
+from halfshell._convert.lengths import as_number, as_positive, as_radii
 from halfshell._convert.memory import gigabytes
 from halfshell._convert.options import as_index_bytes, most_pairs
 from halfshell._convert.points import Points, refuse_infinite
@@ -33,26 +34,19 @@ from halfshell._search import document, search
 from halfshell._settings import current, settings
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
     from typing import Unpack
 
     from matplotlib.axes import Axes
 
     from halfshell._convert.types import (
         ArrayLike,
-        Arrays,
         BoxLike,
         CutoffLike,
         MethodOptions,
         Number,
-        PairBlocks,
         PeriodicLike,
         PointsLike,
-        QueryOptions,
     )
-    from halfshell._functions.clusters import Clusters
-    from halfshell._functions.rdf import RadialDistribution
-    from halfshell._objects.neighbor_table import NeighborTable
 
 # Whose candidates are listed at a time.
 _ASKED_AT_A_TIME = 4096  # points whose candidates are looked up together
@@ -72,37 +66,37 @@ class Candidates(NamedTuple):
     """Where it ends, not included; shape (m,)."""
 
 
-def _like(function: Callable[..., Any], *own: str) -> Callable[[Method], Method]:
-    """Decorate a method that calls a search with the cells as its points: its options are known.
+def _like(function: Callable[..., Any], *without: str) -> Callable[[Method], Method]:
+    """Give a method the options of a search of these cells, and its description if it has none.
 
-    own: arguments of the method, in place of those of the search that say the same.
+    without: other arguments of the search that the method does not have.
     """
 
     def decorate(method: Method) -> Method:
-        signature = inspect.signature(function)
-        mine = inspect.signature(method).parameters
-        known = [one for name, one in mine.items() if name != "options"]
-        known += [
-            parameter for name, parameter in signature.parameters.items()
-            if name not in ("points", "box", "periodic", *mine, *own)
-        ]  # fmt: skip
-        known.sort(key=lambda parameter: (parameter.kind, parameter.default is not parameter.empty))
-        cast("Any", method).__signature__ = signature.replace(
-            parameters=known, return_annotation=inspect.signature(method).return_annotation
-        )
-        named = ", ".join(one.name for one in known if one.name not in mine)
-        like = f"As in `halfshell.{function.__name__}`."
-        options = f"    {named}\n        {like}"
-        cutoff = "    cutoff : float or array_like, optional\n"
-        cutoff += f"        {like} Default: that of the list."
-        returned = (function.__doc__ or "").partition("Returns\n    -------\n")[2]
-        both = (
-            f"    Parameters\n    ----------\n{cutoff}\n{options}\n\n"
-            f"    Returns\n    -------\n{returned.partition(chr(10))[0]}"
-        )
-        return document(method, cutoff=cutoff, options=options, like=both)
+        signature, mine = inspect.signature(function), inspect.signature(method).parameters
+        known = {**mine, **signature.parameters, **mine}
+        for name in ("points", "box", "periodic", "arguments", "options", *without):
+            known.pop(name, None)
+        parameters = sorted(known.values(), key=lambda one: one.kind)
+        made = cast("Any", method)
+        made.__signature__ = signature.replace(parameters=parameters)
+        if made.__doc__ is None:
+            made.__doc__ = re.sub(
+                r"(?m)^    (points|box|periodic) :.*\n(?:     .*\n)*", "", function.__doc__ or ""
+            )
+        return method
 
     return decorate
+
+
+def _of_cells(function: Method) -> Method:
+    """A search as a method: its points are the cells, which have their box."""
+
+    def method(self: Any, *arguments: Any, **options: Any) -> Any:
+        return function(self, *arguments, **options)
+
+    method.__name__, method.__qualname__ = function.__name__, f"CellList.{function.__name__}"
+    return cast("Method", _like(function)(method))
 
 
 class CellList:
@@ -207,20 +201,19 @@ class CellList:
         threads: int | None = None,
     ) -> None:
         width = 0.0 if cell_size is None else as_positive(cell_size, "cell_size")
-        self._cutoff, self._cell_size, self._threads = as_cutoff(cutoff), width, threads
+        self._cutoff, self._cell_size, self._threads = as_number(cutoff, "cutoff"), width, threads
         found = Points._of(points, "points", box, periodic)
         self._domain = None if domain is None else _as_domain(domain, found)
         self._build(found)
 
     def _build(self, points: Points) -> None:
         call = take(points, self._cutoff, threads=self._threads, by_reach=False)
-        call.refuse("CellList", batch="cells are those of one system")
+        call.refuse_batch("CellList", "cells are those of one system")
         self._cells = call.run(_core.cells_build, self._cell_size, self._domain)
         self._layout = _core.cells_layout(self._cells)
         self.points = points._over(self._layout["points"])
 
     def __len__(self) -> int:
-        """Number of points."""
         return len(self.points)
 
     _repr_html_ = _show.html
@@ -269,101 +262,25 @@ class CellList:
 
     # ---- searches --------------------------------------------------------------------------
 
-    def _or_own(self, cutoff: Any) -> Any:
-        return self._cutoff if cutoff is None else cutoff
-
-    @_like(_pairs.pairs)
-    def pairs(self, cutoff: CutoffLike = None, **options: Unpack[MethodOptions]) -> Arrays:
-        """Find every pair of points within a cutoff: `halfshell.pairs` of the cells.
-
-        {like}
-
-        Examples
-        --------
-        >>> import halfshell as hs
-        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
-        >>> cells.pairs(1.0, quantities="P").tolist()
-        [[0, 1]]
-        """
-        found: Arrays = _pairs.pairs(self, self._or_own(cutoff), **cast("Any", options))
-        return found
-
-    @_like(_pairs.iter_pairs)
-    def iter_pairs(
-        self, cutoff: CutoffLike = None, **options: Unpack[MethodOptions]
-    ) -> PairBlocks[Any]:
-        """Iterate over the pairs in blocks: `halfshell.iter_pairs` of the cells.
-
-        Parameters
-        ----------
-        {cutoff, options}
-
-        Returns
-        -------
-        iterator of ndarray or tuple of ndarray
-            It keeps the cells of the list alive.
-
-        Examples
-        --------
-        >>> import halfshell as hs
-        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
-        >>> sum(len(i) for i, j in cells.iter_pairs(max_pairs=1))
-        2
-        """
-        return _pairs.iter_pairs(self, self._or_own(cutoff), **cast("Any", options))
+    pairs = _of_cells(_pairs.pairs)
+    iter_pairs = _of_cells(_pairs.iter_pairs)
+    neighbors = _of_cells(_rows.neighbors)
+    nearest = _of_cells(_rows.nearest)
+    count_pairs = _of_cells(_counts.count_pairs)
+    coordination = _of_cells(_rows.coordination)
+    pair_histogram = _of_cells(_counts.pair_histogram)
+    rdf = _of_cells(_rdf.rdf)
+    clusters = _of_cells(_clusters.clusters)
 
     @_like(_pairs.for_each_pair)
     def for_each_pair(
         self, callback: Any, cutoff: CutoffLike = None, **options: Unpack[MethodOptions]
     ) -> int:
-        """Call a function for each pair: `halfshell.for_each_pair` of the cells.
+        return _pairs.for_each_pair(self, cutoff, callback, **cast("Any", options))
 
-        Parameters
-        ----------
-        callback
-            As in `halfshell.for_each_pair`.
-        {cutoff, options}
-
-        Returns
-        -------
-        int
-            The number of pairs for which it was called.
-
-        Examples
-        --------
-        >>> import halfshell as hs
-        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
-        >>> cells.for_each_pair(lambda i, j, S, D, d2: print(i, j, d2))
-        0 1 1.0
-        1 2 4.0
-        2
-        """
-        return _pairs.for_each_pair(self, self._or_own(cutoff), callback, **cast("Any", options))
-
-    @_like(_rows.neighbors)
-    def neighbors(
-        self, cutoff: CutoffLike = None, **options: Unpack[MethodOptions]
-    ) -> NeighborTable:
-        """All neighbours of each point, or of each query: `halfshell.neighbors` of the cells.
-
-        {like}
-
-        See Also
-        --------
-        query : a radius for each query.
-
-        Examples
-        --------
-        >>> import halfshell as hs
-        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
-        >>> [row.tolist() for row in cells.neighbors()]
-        [[1], [0, 2], [1]]
-        """
-        return _rows.neighbors(self, self._or_own(cutoff), **cast("Any", options))
-
-    @_like(_rows.neighbors, "cutoff", "queries", "indices")
+    @_like(_rows.neighbors, "cutoff", "indices", "rule")
     def query(
-        self, queries: PointsLike, radius: ArrayLike | None = None, **options: Unpack[QueryOptions]
+        self, queries: PointsLike, radius: ArrayLike | None = None, **options: Unpack[MethodOptions]
     ) -> NeighborTable:
         """All points within a radius of each query.
 
@@ -374,7 +291,8 @@ class CellList:
         radius : float or array_like of float, shape (q,), optional
             One for all queries, or one for each. Default: the cutoff of the list, up to which the
             kept cells are used; larger radii take a separate search.
-        {options}
+        exclude, min_distance, inclusive, quantities, index_dtype, threads, progress
+            As in `halfshell.neighbors`.
 
         Returns
         -------
@@ -413,150 +331,6 @@ class CellList:
             setattr(other, name, getattr(self, name))
         other.points = self.points.replace(radii=None, supports=None)
         return other
-
-    @_like(_rows.nearest)
-    def nearest(self, k: int, **options: Unpack[MethodOptions]) -> Arrays:
-        """Find the k nearest points: `halfshell.nearest` of the cells.
-
-        The first call builds a tree of the points; later calls, with any `k` and any queries,
-        reuse it. The cutoff of the list has no effect.
-
-        Parameters
-        ----------
-        k : int
-            Number of neighbours, 1 or more.
-        {options}
-            The tree must fit the memory limit by itself, but does not count towards it otherwise.
-
-        Returns
-        -------
-        ndarray or tuple of ndarray
-
-        Examples
-        --------
-        >>> import halfshell as hs
-        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0, box=8.0)
-        >>> j, d = cells.nearest(2)
-        >>> j.tolist(), d.tolist()
-        ([[1, 2], [0, 2], [1, 0]], [[1.0, 3.0], [1.0, 2.0], [2.0, 3.0]])
-        """
-        found: Arrays = _rows.nearest(self, k, **cast("Any", options))
-        return found
-
-    @overload
-    def count_pairs(
-        self,
-        cutoff: Number | Mapping[Any, float] | None = None,
-        **options: Unpack[MethodOptions],
-    ) -> int: ...
-    @overload
-    def count_pairs(
-        self, cutoff: Sequence[float] | npt.NDArray[Any], **options: Unpack[MethodOptions]
-    ) -> npt.NDArray[np.int64]: ...
-    @_like(_counts.count_pairs)
-    def count_pairs(
-        self, cutoff: CutoffLike = None, **options: Unpack[MethodOptions]
-    ) -> int | npt.NDArray[np.int64]:
-        """Count the pairs within one or several cutoffs: `halfshell.count_pairs` of the cells.
-
-        {like}
-
-        Examples
-        --------
-        >>> import halfshell as hs
-        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
-        >>> cells.count_pairs(), cells.count_pairs(1.0), cells.count_pairs(queries=[[2.0]])
-        (2, 1, 3)
-        """
-        found: int | npt.NDArray[np.int64]
-        found = _counts.count_pairs(self, self._or_own(cutoff), **cast("Any", options))
-        return found
-
-    @_like(_rows.coordination)
-    def coordination(
-        self, cutoff: CutoffLike = None, **options: Unpack[MethodOptions]
-    ) -> npt.NDArray[np.int64]:
-        """Count the neighbours of each point, or query: `halfshell.coordination` of the cells.
-
-        {like}
-
-        Examples
-        --------
-        >>> import halfshell as hs
-        >>> hs.CellList([[0.0], [1.0], [3.0]], 2.0).coordination().tolist()
-        [1, 2, 1]
-        """
-        return _rows.coordination(self, self._or_own(cutoff), **cast("Any", options))
-
-    @_like(_counts.pair_histogram)
-    def pair_histogram(
-        self, edges: npt.ArrayLike, **options: Unpack[MethodOptions]
-    ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
-        """Count the pairs by distance: `halfshell.pair_histogram` of the cells.
-
-        Parameters
-        ----------
-        edges : array_like of float, shape (bins + 1,)
-            Limits of the bins. The last one may be larger than the cutoff of the list: that costs
-            a search of its own.
-        {options}
-
-        Returns
-        -------
-        ndarray of int64, or with weights float64
-
-        Examples
-        --------
-        >>> import halfshell as hs
-        >>> hs.CellList([[0.0], [1.0], [3.0]], 3.0).pair_histogram([0.0, 1.0, 2.0, 3.0]).tolist()
-        [0, 1, 2]
-        """
-        return _counts.pair_histogram(self, edges, **cast("Any", options))
-
-    @_like(_rdf.rdf)
-    def rdf(
-        self,
-        cutoff: Number | None = None,
-        bins: int | ArrayLike = 100,
-        **options: Unpack[MethodOptions],
-    ) -> RadialDistribution:
-        """Compute g(r): `halfshell.rdf` of the cells.
-
-        Parameters
-        ----------
-        cutoff : float, optional
-            The largest distance. Default: the cutoff of the list.
-        bins : int or array_like of float
-            As in `halfshell.rdf`.
-        {options}
-
-        Returns
-        -------
-        RadialDistribution
-
-        Examples
-        --------
-        >>> import halfshell as hs
-        >>> hs.CellList([[0.0], [1.0], [3.0]], 2.0, box=4.0).rdf(bins=2).counts.tolist()
-        [0, 4]
-        """
-        if cutoff is None and exact_number(bins) is not None:
-            cutoff = self._cutoff
-        return _rdf.rdf(self, cutoff, bins, **cast("Any", options))
-
-    @_like(_clusters.clusters)
-    def clusters(self, cutoff: CutoffLike = None, **options: Unpack[MethodOptions]) -> Clusters:
-        """Group the points: `halfshell.clusters` of the cells.
-
-        {like}
-
-        Examples
-        --------
-        >>> import halfshell as hs
-        >>> hs.CellList([[0.0], [1.0], [3.0]], 2.0).clusters(1.5).labels.tolist()
-        [0, 0, 1]
-        """
-        return _clusters.clusters(self, self._or_own(cutoff), **cast("Any", options))
 
     # ---- cells -----------------------------------------------------------------------------
 
@@ -859,18 +633,11 @@ def _search_each(
 
 def _joined(parts: list[Columns], order: npt.NDArray[np.intp]) -> Columns:
     """One table of parts whose rows are in this order."""
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
     counts = np.concatenate([np.diff(part[0]) for part in parts])
-    lengths = np.empty(len(order), np.int64)
-    lengths[order] = counts
-    offsets = starts_of(lengths)
-    starts = offsets[:-1][order] - starts_of(counts)[:-1]
-    to = np.arange(int(offsets[-1])) + np.repeat(starts, counts)
-    joined = [offsets]
-    for columns in list(zip(*parts))[1:]:
-        together = np.concatenate(columns)
-        column = np.empty_like(together)
-        column[to] = together
-        joined.append(column)
+    offsets, entries = entries_of(starts_of(counts), place)
+    joined = (offsets, *(np.concatenate(some)[entries] for some in list(zip(*parts))[1:]))
     for array in joined:
         array.flags.writeable = False
-    return tuple(joined)
+    return joined

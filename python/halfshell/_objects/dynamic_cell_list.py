@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _show
-from halfshell._convert.arrays import as_array, as_real_array, in_order
+from halfshell._convert.arrays import as_array, as_real_array, in_order, of_shape
 from halfshell._convert.foreign import shown
 from halfshell._convert.lengths import as_positive
 from halfshell._convert.options import as_choice, as_flag, as_whole
@@ -179,7 +179,6 @@ class DynamicCellList:
         return found
 
     def _all(self) -> tuple[npt.NDArray[np.int64], Any]:
-        """The keys, and a copy of the list: other threads may change this one meanwhile."""
         cells = self._cells.copy()
         return cells.keys(0, max(len(cells), 1))[1], cells
 
@@ -437,16 +436,11 @@ def _unpickled(version: int, given: _Given, keys: Any, positions: Any) -> Dynami
 
 def _as_position(position: Any, dim: int) -> FloatArray:
     """One position; the core calls this for what is not plain."""
-
-    def check(shape: tuple[int, ...]) -> None:
-        if shape != (dim,):
-            raise ValueError(f"position must have shape ({dim},), got {shape}")
-
+    check = of_shape(f"position must have shape ({dim},)", (dim,))
     return in_order(as_real_array(position, "position", check_shape=check), np.float64)
 
 
 def _as_positions(positions: Any, dim: int, n: int | None = None) -> PointArray:
-    """Positions of shape (n, dim)."""
     array = as_points(positions, "positions", dim)
     if array.shape[1] != dim or n not in (None, len(array)):
         rows = "q" if n is None else n

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert.arrays import rows_of
+from halfshell._convert.arrays import rows_of, whole_rows
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.types import PointArray
 
@@ -79,12 +79,10 @@ class Origin:
         }  # fmt: skip
 
     def scene(self) -> tuple[PointArray, Floats | None, int]:
-        """Points, box vectors and periodic bits as the core takes them."""
         return self.points, self._box, self._bits
 
     @property
     def has_images(self) -> bool:
-        """Whether shifts may be other than zero."""
         return self._bits != 0
 
     def shifts(self) -> Array:
@@ -102,7 +100,6 @@ class Origin:
         return self.points if self.queries is None else self.queries
 
     def _places_of(self, indices: Array) -> Array:
-        """Where in `points` these are, by their numbers."""
         return indices if self._numbers is None else np.searchsorted(self._numbers, indices)
 
     def order(
@@ -120,7 +117,7 @@ class Origin:
         repeats = np.array([self._bits >> k & 1 for k in range(ndim)], np.float64)
         # Those that repeat; others are multiplied by no shift.
         vectors = np.zeros((ndim, ndim)) if box is None else box * repeats[:, None]
-        for first, end in _parts_of(offsets):
+        for first, end in whole_rows(offsets, SORTED_AT_A_TIME):
             own = offsets[first : end + 1]
             a, b = int(own[0]), int(own[-1])
             row = rows_of(own)  # from 0 on: two rows of one point are two
@@ -136,18 +133,7 @@ class Origin:
         return order
 
 
-def _parts_of(offsets: Array) -> Iterator[tuple[int, int]]:
-    """Whole rows, first and end, of so many entries at most, or one row that has more."""
-    first, n_rows = 0, len(offsets) - 1
-    while first < n_rows:
-        most = offsets[first] + SORTED_AT_A_TIME
-        end = max(first + 1, int(np.searchsorted(offsets, most, side="right")) - 1)
-        yield first, end
-        first = end
-
-
 def copied(part: Any) -> Any:
-    """A tuple with copies of the arrays in it."""
     if isinstance(part, tuple):
         return tuple(copied(one) for one in part)
     return part.copy() if isinstance(part, np.ndarray) else part
@@ -204,15 +190,9 @@ def _exact(
 
 def _parts(groups: Integers, n: int) -> Iterator[slice]:
     """Whole groups, `n` entries at most, or one group that has more."""
-    begin = 0
-    while begin < len(groups):
-        end = min(begin + n, len(groups))
-        if end < len(groups) and groups[end] == groups[end - 1]:
-            cut = groups[end]
-            first = int(np.searchsorted(groups, cut))
-            end = first if first > begin else int(np.searchsorted(groups, cut, side="right"))
-        yield slice(begin, end)
-        begin = end
+    offsets = np.concatenate(([0], np.flatnonzero(np.diff(groups)) + 1, [len(groups)]))
+    for first, end in whole_rows(offsets, n):
+        yield slice(int(offsets[first]), int(offsets[end]))
 
 
 def _squares(
@@ -325,7 +305,6 @@ Rows = list[list[Fraction]]
 
 
 def as_fractions(matrix: Any) -> Rows:
-    """The entries of an array (m, n)."""
     return [[Fraction(x) for x in row] for row in matrix.tolist()]
 
 

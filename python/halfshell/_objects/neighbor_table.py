@@ -22,10 +22,12 @@ from halfshell._convert.arrays import (
     as_listed,
     as_real_array,
     entries_of,
+    one_each,
     rows_of,
     starts_of,
+    whole_rows,
 )
-from halfshell._convert.foreign import is_a, kind_of, shown, told, whole_number
+from halfshell._convert.foreign import is_a, shown, told
 from halfshell._convert.lengths import as_number
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import as_choice, as_count, as_flag, as_whole, check_letters
@@ -569,11 +571,7 @@ class NeighborTable:
         [[], [2], [1]]
         """
         keep = as_array(mask, "mask", "hold bools")
-        if keep.shape != (self.n_entries,):
-            raise ValueError(
-                f"mask must have shape ({self.n_entries},), one bool for each entry, got "
-                f"{keep.shape}"
-            )
+        one_each("mask", self.n_entries, "one bool for each entry")(keep.shape)
         if keep.dtype != np.bool_ and self.n_entries > 0:
             raise TypeError(f"mask must hold bools, got dtype {keep.dtype}")
         keep = keep.astype(np.bool_)  # a copy, as another thread may change the caller's
@@ -1036,7 +1034,6 @@ def _check_state(state: dict[str, Any]) -> None:
 # ---- rows, and both directions of entries ----------------------------------------------------
 
 def _opposite(shifts: Array) -> Array:
-    """-S, where all of them have one."""
     if shifts.min(initial=0) == _LEAST_SHIFT:
         raise OverflowError("a shift S of -2**31 has no opposite that fits int32")
     return -shifts
@@ -1052,11 +1049,7 @@ def _as_rows(chosen: Any, n_rows: int) -> Positions:
     if array.ndim != 1:
         raise ValueError(f"rows must be chosen by an array of one axis, got shape {array.shape}")
     if array.dtype.kind == "b":
-        if len(array) != n_rows:
-            raise ValueError(
-                f"a mask of rows must have shape ({n_rows},), one bool for each row, got "
-                f"{array.shape}"
-            )
+        one_each("a mask of rows", n_rows, "one bool for each row")(array.shape)
         return np.flatnonzero(array.copy())  # another thread may change the caller's
     if len(array) == 0 and is_a(chosen, list):
         return np.empty(0, np.int64)
@@ -1078,9 +1071,7 @@ def _refused(kind: str) -> TypeError:
 
 
 def _as_capacity(value: Any) -> int:
-    capacity = whole_number(value, "capacity")
-    if capacity is None or is_a(capacity, bool):
-        raise TypeError(f"capacity must be a whole number, got {kind_of(value)}")
+    capacity = as_whole(value, "capacity")
     if capacity < 0:
         raise ValueError(f"capacity must not be negative, got {shown(capacity)}")
     return capacity
@@ -1156,7 +1147,6 @@ def _reverse_by_shift(offsets: Array, indices: Array, shifts: Array) -> Position
 # ---- two entries of a row ------------------------------------------------------------------
 
 def triplets_of(offsets: Positions, ordered: bool) -> tuple[Positions, Positions]:
-    """All of them, as positions among the entries."""
     counts = np.diff(offsets)
     # As Python numbers: a product of the counts of a huge row may pass int64 when it is summed.
     total = int(np.dot(counts.astype(object), counts - 1)) if len(counts) else 0
@@ -1171,15 +1161,12 @@ def _blocks_of_triplets(
     """Whole rows at a time, together of at most so many triplets, or one row that has more."""
     counts = np.diff(offsets)
     several = counts * (counts - 1)
-    sums = np.cumsum(several if ordered else several // 2)
-    first = 0
-    while first < len(counts):
-        before = int(sums[first - 1]) if first else 0
-        end = max(first + 1, int(np.searchsorted(sums, before + most, side="right")))
-        refuse_unavailable(8 * _COPIES * (int(sums[end - 1]) - before), "the triplets of one row")
-        if int(sums[end - 1]) > before:
+    sums = starts_of(several if ordered else several // 2)
+    for first, end in whole_rows(sums, most):
+        n = int(sums[end] - sums[first])
+        refuse_unavailable(8 * _COPIES * n, "the triplets of one row")
+        if n > 0:
             yield _triplets_of(offsets[first:end], counts[first:end], ordered)
-        first = end
 
 
 def _triplets_of(starts: Positions, counts: Array, ordered: bool) -> tuple[Positions, Positions]:

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from halfshell import _core
-from halfshell._convert.arrays import as_array, starts_of
-from halfshell._convert.call import DIRECTED
+from halfshell._convert.arrays import as_array, of_shape, one_each, starts_of
+from halfshell._convert.call import DIRECTED, RULES, Pairing
 from halfshell._convert.foreign import kind_of
 from halfshell._convert.options import as_list
-from halfshell._objects.node_list import Nodes, corners_of, morton_number, nodes_of, reach_of
+from halfshell._objects.node_list import Nodes, corners_of, known_by, morton_number, nodes_of
 from halfshell._objects.pair_table import Columns, PairTable, as_pair_rows
 from halfshell._settings import current
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     Offsets = npt.NDArray[np.int64]
     #: Points, cutoff, box, periodic bits, and what follows in every call of the core.
     Search = tuple[
-        FloatArray, float, FloatArray | None, int, bool, str, str | None, float | None, None,
+        Any, float, FloatArray | None, int, bool, str, str | None, float | None, None,
         int | None,
     ]  # fmt: skip
     #: Which pairs of a half list are to go.
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 # Flags of the core.
 _GHOST_ROWS, _GHOST_PAIRS, _ROWS_ONLY, _DIRECTED = 1, 2, 4, 8
+_GATHER = RULES.index("gather")
 _NOWHERE = np.empty((0, 1))
 
 
@@ -67,17 +68,15 @@ class How:
         return self.ghosts or self.keeps_points
 
     def with_rows(self, nodes: Nodes) -> Offsets:
-        """How many nodes of each list have rows."""
         return nodes.counts if self.ghost_rows else nodes.internal
 
     @property
     def flags(self) -> int:
-        """As the core takes them."""
         rows = _GHOST_ROWS if self.ghost_rows else 0
         pairs = _GHOST_PAIRS if self.ghosts else 0
         return rows | pairs | (_DIRECTED if self.rule in DIRECTED else 0)
 
-    def search(self, points: FloatArray) -> Search:
+    def search(self, points: Any) -> Search:
         """The first arguments of the core. Its decisions are exact, whatever the settings are."""
         own = current()
         threads = own.threads if self.threads is None else self.threads
@@ -113,7 +112,6 @@ class Half(NamedTuple):
     shifts: Ints | None
 
     def keep(self, which: Any) -> Half:
-        """Some of them, by a mask or by their places."""
         return Half(
             self.i[which], self.j[which], None if self.shifts is None else self.shifts[which]
         )
@@ -129,7 +127,6 @@ class Half(NamedTuple):
         return Half(np.where(back, self.j, self.i), np.where(back, self.i, self.j), shifts)
 
     def order(self) -> Offsets:
-        """What sorts them."""
         shifts = () if self.shifts is None else self.shifts.T[::-1]
         return np.lexsort((*shifts, self.j, self.i))
 
@@ -193,14 +190,12 @@ def _completed(
 
 
 def _paired(nodes: Nodes, how: How, rows: Rows, flags: int) -> Columns:
-    """The pairs of rows."""
     made = _core.pair_rows(*how.call(nodes.n), *rows, *nodes.lists(flags))
     (i_node, j_node, *shifts), (i_list, j_list) = made[1]
     return Columns(i_node, i_list, j_node, j_list, shifts[0] if shifts else None)
 
 
 def _half_of(nodes: Nodes, how: How, rows: Rows) -> Half:
-    """All pairs of rows, those of two ghosts as well."""
     return _half_of_pairs(nodes, _paired(nodes, how, rows, how.flags | _GHOST_PAIRS))
 
 
@@ -212,7 +207,6 @@ def _half_of_pairs(nodes: Nodes, pairs: Any) -> Half:
 
 
 def _connected(nodes: Nodes, how: How, half: Half) -> Rows:
-    """The rows of a half list."""
     i, j = (one.astype(np.int32, copy=False) for one in half[:2])
     shifts = None if half.shifts is None else np.ascontiguousarray(half.shifts, np.int32)
     lists = nodes.lists(how.flags | _ROWS_ONLY)
@@ -225,21 +219,22 @@ def _search(
     points: FloatArray, supports: FloatArray, nodes: Nodes, how: How
 ) -> tuple[Rows, Rows | None]:
     """The rows of all nodes, and, for overlap, what each one's own support reaches, by ranks."""
-    search, letters = how.search(points), "jS" if how.bits else "j"
+    letters = "jS" if how.bits else "j"
     gathered = None
     if isinstance(how.extent, float):
+        search = how.search(known_by(points, supports))
         if how.overlap:
-            by = reach_of("gather", how.extent, supports)
+            by = Pairing(_GATHER, how.extent)
             gathered = Rows.of(_core.neighbors(*search, letters, 4, None, by, "auto"))
-        by = reach_of(how.rule, how.extent, supports)
+        by = Pairing(RULES.index(how.rule), how.extent)
         lists = nodes.lists(how.flags | _ROWS_ONLY)
         return Rows.of(_core.connect_search(*search, *lists, by)[0]), gathered
     extents = np.repeat(how.extent, nodes.counts)[nodes.numbers(np.arange(nodes.n))]
     parts = []
     for extent in np.unique(how.extent).tolist():  # each support among all nodes
         who = np.flatnonzero(extents == extent).astype(np.int32)
-        by = reach_of("gather", extent, None, supports[who])
-        rows = Rows.of(_core.neighbors(*search, letters, 4, points[who], by, "auto"))
+        asking, by = known_by(points[who], supports[who]), Pairing(_GATHER, extent)
+        rows = Rows.of(_core.neighbors(*how.search(points), letters, 4, asking, by, "auto"))
         half = Half(np.repeat(who, np.diff(rows.offsets)), *rows[1:])
         apart = half.i != half.j
         parts.append(half.keep(apart if half.shifts is None else apart | half.shifts.any(axis=1)))
@@ -289,9 +284,7 @@ def removed(links: Links, which: Any) -> Links:
         mask = as_array(which, "which")
         if mask.dtype.kind != "b":
             raise TypeError(f"which must hold bools, got dtype {mask.dtype}")
-        if mask.shape != (len(pairs),):
-            shape = f"({len(pairs)},), one for each pair"
-            raise ValueError(f"which must have shape {shape}, got {mask.shape}")
+        one_each("which", len(pairs), "one for each pair")(mask.shape)
         mask = np.array(mask)  # another thread may change the caller's
         places = np.flatnonzero(mask)
         gone = _half_of_pairs(nodes, [one if one is None else one[places] for one in pairs._all()])
@@ -421,8 +414,7 @@ def _as_change(keep: Any, old2new: Any, nodes: Nodes) -> tuple[list[Bools], list
     """Of each list which nodes stay, and the new number of each, -1 for those that go."""
     masks, numbers = [], []
     for name, count, mask in _of_lists(keep, "keep", nodes):
-        if mask.shape != (count,):
-            raise ValueError(f"keep must have shape ({count},) for {name!r}, got {mask.shape}")
+        of_shape(f"keep must have shape ({count},) for {name!r}", (count,))(mask.shape)
         if mask.dtype.kind in "iu" and ((mask == 0) | (mask == 1)).all():
             mask = mask.astype(np.bool_)
         if mask.dtype.kind != "b" and mask.size:
@@ -432,10 +424,7 @@ def _as_change(keep: Any, old2new: Any, nodes: Nodes) -> tuple[list[Bools], list
         return masks, [np.where(mask, np.cumsum(mask) - 1, -1) for mask in masks]
     given = _of_lists(old2new, "old2new", nodes)
     for (name, _, array), mask, internal in zip(given, masks, nodes.internal, strict=True):
-        if array.shape != mask.shape:
-            raise ValueError(
-                f"old2new must have shape {mask.shape} for {name!r}, got {array.shape}"
-            )
+        of_shape(f"old2new must have shape {mask.shape} for {name!r}", mask.shape)(array.shape)
         if array.size and array.dtype.kind not in "iu":
             raise TypeError(f"old2new must hold whole numbers, got dtype {array.dtype}")
         new = np.where(mask, array, -1).astype(np.int64)
@@ -491,7 +480,6 @@ def _shrunk(links: Links, kept: list[Bools], new: list[Offsets]) -> tuple[Nodes,
 
 
 def morton_keys(links: Links) -> npt.NDArray[np.uint64]:
-    """The key of each node by its number."""
     keys = np.empty(links.nodes.n, np.uint64)
     if len(keys):
         low, high = corners_of(links.points, links.how.morton_box)

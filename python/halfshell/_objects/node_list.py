@@ -14,13 +14,21 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from halfshell import _core, _show
-from halfshell._convert.arrays import as_array, as_real_array, in_order, starts_of
-from halfshell._convert.call import reach_by_radii, reach_by_supports
-from halfshell._convert.foreign import exact_number, is_a, kind_of, shown
-from halfshell._convert.lengths import as_positive, check_lengths
+from halfshell._convert.arrays import (
+    as_array,
+    as_real_array,
+    in_order,
+    of_shape,
+    one_each,
+    refuse_where,
+    starts_of,
+)
+from halfshell._convert.call import RULES, Known, Pairing
+from halfshell._convert.foreign import is_a, kind_of, shown
+from halfshell._convert.lengths import check_lengths
 from halfshell._convert.options import as_whole
-from halfshell._convert.points import as_points, refuse_infinite
-from halfshell._objects.exact import as_fractions, is_definite, solved
+from halfshell._convert.points import as_points, as_supports, refuse_infinite
+from halfshell._objects.exact import as_fractions, solved
 from halfshell._settings import current
 
 if TYPE_CHECKING:
@@ -28,7 +36,7 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-    from halfshell._convert.types import ArrayLike, FloatArray, Reach
+    from halfshell._convert.types import ArrayLike, FloatArray
 
     Array = npt.NDArray[Any]
     Bools = npt.NDArray[np.bool_]
@@ -175,7 +183,7 @@ class NodeList:
         ([0], [3])
         """
         d = self.positions.shape[1]
-        factor = as_extent(extent)
+        factor = cast("float", as_extents(extent))
         point, normal = _as_plane(enter, "enter", d)
         other, other_normal = _as_plane(exit, "exit", d)
         a, b = ([Fraction(x) for x in one.tolist()] for one in (normal, other_normal))
@@ -186,84 +194,56 @@ class NodeList:
         refuse_infinite(images, "positions")
         own = current()
         found = _core.pairs_between(
-            self.positions, np.inf, None, 0, True, "exact", own.kernel, own.memory_limit, None,
-            own.threads, "j", False, 8, None, images,
-            reach_of("max", factor, self.H, self.H[near]), "auto",
+            known_by(self.positions, self.H), np.inf, None, 0, True, "exact", own.kernel,
+            own.memory_limit, None, own.threads, "j", False, 8, None,
+            known_by(images, self.H[near]), Pairing(RULES.index("max"), factor), "auto",
         )  # fmt: skip
         return near, np.unique(found)
 
 
-def as_extent(value: Any) -> float:
-    """How many times supports count."""
-    return _checked_extent(as_positive(value, "extent"), "")
+def as_extents(values: Any, n: int | None = None) -> float | FloatArray:
+    """How many times supports count: one for all n lists, also where all are equal, or one each."""
+    must = "extent must be a number"
+    must += "" if n is None else f" or have shape ({n},), one for each list"
+    shapes = [(), *([] if n is None else [(n,)])]
+    array = as_real_array(values, "extent", "be a number", of_shape(must, *shapes))
+    wrong = ~((array >= _EXTENTS[0]) & (array <= _EXTENTS[1]))
+    refuse_where(wrong, array, "extent", "be from 2**-64 to 2**64")
+    every = np.unique(array).astype(np.float64)
+    if len(every) > 1:
+        return in_order(array, np.float64)
+    return float(every[0]) if len(every) else 1.0
 
 
-def as_extents(values: Any, n: int) -> float | FloatArray:
-    """One for all lists, also where all are equal, or one for each."""
-    if exact_number(values) is not None or as_array(values, "extent", "be a number").ndim == 0:
-        return as_extent(values)
-
-    def check(shape: tuple[int, ...]) -> None:
-        if shape != (n,):
-            raise ValueError(
-                f"extent must be a number or have shape ({n},), one for each list, got {shape}"
-            )
-
-    extents = in_order(as_real_array(values, "extent", check_shape=check), np.float64)
-    for k, extent in enumerate(extents.tolist()):
-        _checked_extent(extent, f"extent[{k}] = ")
-    return extents if len(np.unique(extents)) > 1 else float(extents[0]) if n else 1.0
-
-
-def _checked_extent(extent: float, where: str) -> float:
-    if not _EXTENTS[0] <= extent <= _EXTENTS[1]:
-        raise ValueError(f"extent must be from 2**-64 to 2**64, got {where}{extent}")
-    return extent
-
-
-def reach_of(rule: str, extent: float, supports: Any, of_queries: Any = None) -> Reach:
-    """What the core takes for a reach by such supports."""
-    given = of_queries if supports is None else supports
-    if given.ndim == 1:
-        return reach_by_radii(rule, supports, of_queries, extent)
-    return reach_by_supports(rule, supports, of_queries, extent)
+def known_by(points: Any, supports: FloatArray | None) -> tuple[Any, ...]:
+    """Points and their supports, or radii, as the core takes them."""
+    is_radii = supports is None or supports.ndim == 1
+    return points, *(Known(supports) if is_radii else Known(supports=supports)), None
 
 
 def _as_supports(values: Any, n: int, d: int) -> FloatArray:
-    def check(shape: tuple[int, ...]) -> None:
-        if shape not in ((n,), (n, d, d)):
-            raise ValueError(
-                f"H must have shape ({n},) or ({n}, {d}, {d}), one h or matrix for each node, got "
-                f"{shape}"
-            )
-
-    supports = in_order(as_real_array(values, "H", check_shape=check), np.float64)
-    if supports.ndim == 1:
-        check_lengths(supports, "H")
-        least, largest = _SUPPORTS
-        for k in np.flatnonzero((supports > largest) | ((supports > 0.0) & (supports < least))):
-            raise ValueError(f"H must be 0 or from 2**-500 to 2**500, got H[{k}] = {supports[k]}")
+    must = f"H must have shape ({n},) or ({n}, {d}, {d}), one h or matrix for each node"
+    given = as_real_array(values, "H", check_shape=of_shape(must, (n,), (n, d, d)))
+    if given.ndim == 3:
+        supports, own = as_supports(given, n, d, "H"), current()
+        try:  # whether they are definite, by a search of no points
+            _core.pairs_between(
+                np.empty((0, d)), np.inf, None, 0, True, "exact", own.kernel, own.memory_limit,
+                None, 1, "j", False, 8, None, known_by(np.zeros((n, d)), supports),
+                Pairing(RULES.index("gather"), 1.0), "auto",
+            )  # fmt: skip
+        except ValueError as error:
+            raise ValueError(str(error).replace("query_supports", "H")) from None
         return supports
-    if d > 3:
-        raise ValueError(f"H can be matrices in 1 to 3 dimensions, got {d}")
-    for k, a, b in np.argwhere(~np.isfinite(supports)):
-        raise ValueError(f"H must be finite, got H[{k}, {a}, {b}] = {supports[k, a, b]}")
-    for k, a, b in np.argwhere(supports != supports.transpose(0, 2, 1)):
-        raise ValueError(
-            f"H must be symmetric, got H[{k}, {a}, {b}] = {supports[k, a, b]} and "
-            f"H[{k}, {b}, {a}] = {supports[k, b, a]}"
-        )
-    sizes = np.abs(supports).max(axis=(1, 2), initial=0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        least_values = np.linalg.eigvalsh(np.nan_to_num(supports / sizes[:, None, None]))[:, 0]
-    for k in np.flatnonzero(least_values < 2.0**-40):  # which is not certain
-        if not is_definite(as_fractions(supports[k])):
-            raise ValueError(f"H must be positive definite, got H[{k}] = {supports[k].tolist()}")
+    supports = in_order(given, np.float64)
+    check_lengths(supports, "H")
+    least, largest = _SUPPORTS
+    wrong = (supports > largest) | ((supports > 0.0) & (supports < least))
+    refuse_where(wrong, supports, "H", "be 0 or from 2**-500 to 2**500")
     return supports
 
 
 def _locked(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """A view that cannot be written to."""
     view = array.view()
     view.flags.writeable = False
     return view
@@ -275,8 +255,7 @@ def _as_ids(values: Any, n: int) -> npt.NDArray[np.int64]:
         return np.empty(0, np.int64)
     if array.dtype.kind not in "iu":
         raise TypeError(f"ids must be whole numbers, got dtype {array.dtype}")
-    if array.shape != (n,):
-        raise ValueError(f"ids must have shape ({n},), one for each node, got {array.shape}")
+    one_each("ids", n, "one for each node")(array.shape)
     if array.dtype == np.uint64 and (array > np.iinfo(np.int64).max).any():
         raise OverflowError("ids must be less than 2**63")
     return np.ascontiguousarray(array, np.int64)
@@ -288,11 +267,7 @@ def _as_plane(values: Any, name: str, d: int) -> tuple[FloatArray, FloatArray]:
     """A point and a normal."""
     if not is_a(values, (tuple, list)) or len(values) != 2:
         raise ValueError(f"{name} must be a point and a normal")
-
-    def check(shape: tuple[int, ...]) -> None:
-        if shape != (d,):
-            raise ValueError(f"{name} must have a point and a normal of shape ({d},), got {shape}")
-
+    check = of_shape(f"{name} must have a point and a normal of shape ({d},)", (d,))
     point, normal = (
         in_order(as_real_array(one, name, check_shape=check), np.float64) for one in values
     )
@@ -392,7 +367,6 @@ class Nodes:
         return found
 
     def numbers(self, rank: Array) -> Array:
-        """The opposite."""
         return rank if self.number is None else self.number[rank]
 
     def is_ghost(self, rank: Array) -> Bools:
@@ -403,11 +377,9 @@ class Nodes:
         return found
 
     def global_ids(self) -> Offsets:
-        """Of each node by its number."""
         return np.arange(self.n) if self.ids is None else self.ids
 
     def lists(self, flags: int) -> tuple[Offsets, Offsets, Ints | None, int]:
-        """As the core takes them, with what it is to make of them."""
         return self.counts, self.ghosts, self.number, flags
 
     def keys_of(self, first: Array, second: Array) -> Offsets:
@@ -419,7 +391,6 @@ class Nodes:
         return keys
 
     def ranks_of(self, pairs: Any) -> tuple[Array, Array]:
-        """Ranks of both nodes of pairs, by columns i_node, i_list, j_node, j_list."""
         first = self.first.astype(np.int32)  # as all numbers are, it fits
         i_node, i_list, j_node, j_list = pairs[:4]
         return self.rank(first[i_list] + i_node), self.rank(first[j_list] + j_node)

@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _show
-from halfshell._convert.arrays import as_array, as_real_array
+from halfshell._convert.arrays import as_array, as_real_array, of_shape
 from halfshell._convert.foreign import is_a, kind_of, shown
 from halfshell._convert.memory import refuse_unavailable
-from halfshell._convert.options import as_count, as_whole
+from halfshell._convert.options import as_count, as_dtype, as_whole
 from halfshell._errors import StaleError
 
 if TYPE_CHECKING:
@@ -144,10 +144,8 @@ class PairTable:
     @coupling.setter
     def coupling(self, values: npt.ArrayLike) -> None:
         array = as_real_array(values, "coupling", "be a number")
-        if array.shape not in ((), (len(self),)):
-            raise ValueError(
-                f"coupling must be a number or have shape ({len(self)},), got {array.shape}"
-            )
+        must = f"coupling must be a number or have shape ({len(self)},)"
+        of_shape(must, (), (len(self),))(array.shape)
         self._coupling = np.array(np.broadcast_to(array, (len(self),)), np.float64)
 
     def __len__(self) -> int:
@@ -261,16 +259,6 @@ def as_pair_rows(values: Any, name: str, single: bool = False) -> npt.NDArray[np
 
 # ---- numbers for each pair -------------------------------------------------------------------
 
-def _as_dtype(value: Any) -> np.dtype[Any]:
-    try:
-        dtype: np.dtype[Any] = np.dtype(value)
-        return dtype
-    except MemoryError:
-        raise
-    except Exception as error:
-        raise TypeError(f"dtype must be one of NumPy's, got {shown(value)}") from error
-
-
 class PairField:
     """One value, or several, for each pair of a `PairTable`.
 
@@ -325,7 +313,9 @@ class PairField:
             len(pairs) * self.n_elements, f"values with n_elements = {shown(n_elements)}"
         )
         shape = (len(pairs),) if self.n_elements == 1 else (len(pairs), self.n_elements)
-        self._values: npt.NDArray[Any] = np.zeros(shape, _as_dtype(dtype))
+        self._values: npt.NDArray[Any] = np.zeros(
+            shape, as_dtype(dtype, "dtype", "one of NumPy's")
+        )
 
     @property
     def values(self) -> npt.NDArray[Any]:

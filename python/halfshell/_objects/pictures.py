@@ -73,7 +73,6 @@ def axes_for(ndim: int, ax: Axes | None) -> Axes:
 
 
 def _columns(points: npt.NDArray[Any]) -> _Floats:
-    """Points as they are drawn, of two or three columns."""
     drawn = np.asarray(points, dtype=np.float64)
     return np.column_stack((drawn, np.zeros(len(drawn)))) if drawn.shape[1] == 1 else drawn
 
@@ -85,27 +84,22 @@ def draw_lines(ax: Axes, starts: Any, ends: Any, **style: Any) -> Any:
     starts, ends = _columns(starts), _columns(ends)
     lines = np.stack((starts, ends), axis=1)
     style = {"linewidths": 1.0, "colors": "0.55", **style}
-    if lines.shape[2] == 3:
-        from mpl_toolkits.mplot3d.art3d import Line3DCollection
+    auto: Any = ax
+    if lines.shape[2] == 2:
+        return auto.add_collection(collections.LineCollection(list(lines), **style))
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
-        many: Any = ax.add_collection(Line3DCollection(list(lines), **style))
-    else:
-        many = ax.add_collection(collections.LineCollection(list(lines), **style))
+    many = auto.add_collection(Line3DCollection(list(lines), **style))
     if len(lines):
-        ax.update_datalim(lines[:, :, :2].reshape(-1, 2))
-        if lines.shape[2] == 3:
-            auto: Any = ax
-            auto.auto_scale_xyz(*lines.reshape(-1, 3).T, had_data=True)
+        auto.auto_scale_xyz(*lines.reshape(-1, 3).T, had_data=True)
     return many
 
 
 def draw_dots(ax: Axes, points: Any, **style: Any) -> Any:
-    """A dot for each point; returns the collection."""
     return ax.scatter(*_columns(points).T, **{"s": 18.0, "zorder": 3, **style})
 
 
 def draw_text(ax: Any, place: list[float], text: str, **style: Any) -> Any:
-    """Letters that begin at a place."""
     return ax.text(*_columns(np.array([place]))[0].tolist(), text, **style)
 
 
@@ -146,7 +140,6 @@ def box_lines(vectors: Any) -> tuple[_Floats, _Floats]:
 
 
 def draw_box(ax: Axes, vectors: Any, **style: Any) -> Any:
-    """The edges of a box with a corner at the origin."""
     return draw_lines(ax, *box_lines(vectors), **{"colors": "tab:blue", **style})
 
 
@@ -219,11 +212,9 @@ def _colours(numbers: npt.NDArray[Any], cells: Any) -> npt.NDArray[Any]:
 
 def _extent(x: _Floats, vectors: _Floats | None, bits: int) -> tuple[_Floats, _Floats]:
     """Lowest and highest coordinates of what is drawn."""
-    parts = [x] if len(x) else []
+    every = x if len(x) else np.zeros((1, x.shape[1]))
     if vectors is not None and bits:
-        starts, ends = box_lines(vectors)
-        parts += [starts, ends]
-    every = np.concatenate(parts) if parts else np.zeros((1, x.shape[1]))
+        every = np.concatenate((x, *box_lines(vectors)))
     low, high = every.min(axis=0), every.max(axis=0)
     room = np.where(high > low, 0.03 * (high - low), 0.5)
     return low - room, high + room
@@ -287,17 +278,13 @@ def draw_nodes(links: Links, seen: Sequence[Seen], axes: tuple[int, int], ax: Ax
         start, end = (every[nodes.numbers(rank)] for rank in nodes.ranks_of(pairs._all()))
         if how.bits and how.box is not None and d > 1:
             end = end + (pairs.shifts @ how.box)[:, list(axes)]
-        lines = np.stack((start, end), axis=1)
-        ax.add_collection(collections.LineCollection(list(lines), colors="0.7", linewidths=0.5))
+        draw_lines(ax, start, end, colors="0.7", linewidths=0.5)
     few = nodes.n <= _MOST_SUPPORTS
     extents = np.broadcast_to(how.extent, len(seen)).tolist()
     for k, (place, (_, supports), extent) in enumerate(zip(places, seen, extents, strict=True)):
         color, internal = f"C{k % 10}", int(nodes.internal[k])
-        x, y = place.T
-        ax.scatter(x[:internal], y[:internal], s=12, color=color, zorder=3, label=nodes.names[k])
-        ax.scatter(
-            x[internal:], y[internal:], s=12, edgecolors=color, facecolors="white", zorder=3
-        )
+        draw_dots(ax, place[:internal], s=12, color=color, label=nodes.names[k])
+        draw_dots(ax, place[internal:], s=12, edgecolors=color, facecolors="white")
         if few and len(place):
             ax.add_collection(collections.EllipseCollection(
                 *_shadows(supports, extent, axes, d), units="xy", offsets=place, facecolors="none",

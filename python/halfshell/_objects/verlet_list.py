@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _show
-from halfshell._convert.foreign import attribute, is_a, of_argument
-from halfshell._convert.lengths import as_cutoff, as_length, as_skin
+from halfshell._convert.foreign import attribute, is_a, of_argument, shown
+from halfshell._convert.lengths import as_length, as_number
 from halfshell._convert.options import as_flag, as_index_bytes, check_letters
 from halfshell._convert.points import Points, as_box_alone
 from halfshell._convert.types import (
@@ -113,9 +113,12 @@ class VerletList:
     ) -> None:
         if is_a(cutoff, Points) or attribute(cutoff, "ndim", "cutoff") == 2:
             raise TypeError("cutoff must be a number: points are those of update(points)")
-        self._cutoff = as_length(as_cutoff(cutoff), "cutoff")
-        is_auto = is_a(skin, str) and str.__str__(skin) == "auto"
-        self._given_skin = None if is_auto else as_skin(skin)
+        self._cutoff = as_length(as_number(cutoff, "cutoff"), "cutoff")
+        self._given_skin = None
+        if not is_a(skin, str):
+            self._given_skin = as_length(as_number(skin, "skin", 'be a number or "auto"'), "skin")
+        elif str.__str__(skin) != "auto":
+            raise ValueError(f'skin must be a number or "auto", got {shown(skin)}')
         self._given = box, periodic  # until `update` brings others
         self._inclusive = as_flag(inclusive, "inclusive")
         self._tracks = as_flag(track_changes, "track_changes")
@@ -144,7 +147,6 @@ class VerletList:
         self._updates = False  # in the middle of one
 
     def _how(self) -> Rest:
-        """What the core takes behind the box."""
         how = current()
         threads = how.threads if self._threads is None else self._threads
         return self._inclusive, "exact", how.kernel, how.memory_limit, None, threads
@@ -255,10 +257,10 @@ class VerletList:
             auto.searched()
             return True
         change = auto is not None and auto.wants_change(array.shape[1])
-        skin = auto.next_skin() if auto is not None else self._skin
+        skin = auto.chosen if auto is not None else self._skin
         with of_argument("cutoff + skin" if skin > 0.0 and auto is None else "cutoff"):
             rebuilt = _core.verlet_update(
-                self._list, array, self._cutoff, vectors, bits, *self._how(), skin, change
+                array, self._cutoff, vectors, bits, *self._how(), self._list, skin, change
             )
         self._searched = None
         self._taken(array, vectors, bits)
@@ -273,7 +275,6 @@ class VerletList:
         return rebuilt
 
     def _taken(self, points: Any, vectors: Any, bits: int) -> None:
-        """A step has been taken; its points are a copy where changes are tracked."""
         self._n_updates += 1
         if self._tracks:
             step = Step(points, None if vectors is None else vectors.copy(), bits)
@@ -345,12 +346,11 @@ class VerletList:
             return self._find(quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out)
 
     def _find(self, quantities: str, sort: bool, index_bytes: int, out: Any) -> Arrays:
-        """The pairs of the last step."""
         if self._searched is not None:
             return self._search(self._searched, quantities, sort, index_bytes, out)
         return _core.verlet_pairs(
-            self._list, np.empty((0, self._state()["ndim"])), self._cutoff, None, 0,
-            *self._how(), quantities, sort, index_bytes, out,
+            np.empty((0, self._state()["ndim"])), self._cutoff, None, 0, *self._how(), self._list,
+            quantities, sort, index_bytes, out,
         )  # fmt: skip
 
     def neighbors(
@@ -568,7 +568,7 @@ class AutoSkin:
         self.skin = FIRST_SHARE * self.cutoff  # of the list in use
         self.is_settled = self.cutoff == 0.0  # there is no length to go by
         self.searches = False
-        self._chosen = self.skin  # for the next one
+        self.chosen = self.skin  # for the next one
         self._n_changes = 0
         self._n_points = 0  # of the list in use
         self._n_listed = 0
@@ -576,18 +576,12 @@ class AutoSkin:
         self._spent = 0.0  # of the skin, since then
         self._searched = 0
 
-    def next_skin(self) -> float:
-        """The skin for the list that is built next."""
-        return self._chosen
-
     def wants_change(self, ndim: int) -> bool:
-        """Whether to build now, though it may not be needed."""
         if self._steps >= STEPS_TO_WAIT and not self.is_settled:
             self._look(self._spent / self._steps, ndim)
-        return self._chosen != self.skin
+        return self.chosen != self.skin
 
     def searched(self) -> None:
-        """A step was searched."""
         self._searched += 1
         if self._searched == SEARCHES:
             self._start()
@@ -600,8 +594,8 @@ class AutoSkin:
             self._steps += 1
             self._spent = max(self._spent, self.skin - margin)
             return
-        if self._chosen != self.skin:
-            self.skin = self._chosen
+        if self.chosen != self.skin:
+            self.skin = self.chosen
         elif not math.isinf(margin):
             self._look((self.skin - margin) / (self._steps + 1), ndim)
         self._n_points = n_points
@@ -628,23 +622,17 @@ class AutoSkin:
             self.is_settled = True
             return
         self._n_changes += 1
-        self._chosen = best
+        self.chosen = best
 
     def list_time(self, skin: float, a_step: float, ndim: int) -> float:
-        """Nanoseconds a step with a list of this skin."""
         lasts = max(1.0, skin / a_step) if a_step > 0.0 else math.inf
-        listed = self._pairs_within(skin, ndim)
-        return self._time(_BUILD, listed) / lasts + self._time(_USE, listed)
+        return self._time(_BUILD, skin, ndim) / lasts + self._time(_USE, skin, ndim)
 
     def search_time(self, ndim: int) -> float:
-        """Nanoseconds a step that is searched."""
-        return self._time(_SEARCH, self._pairs_within(0.0, ndim))
+        return self._time(_SEARCH, 0.0, ndim)
 
-    def _pairs_within(self, skin: float, ndim: int) -> float:
-        """About how many pairs there are within the cutoff and that skin."""
-        return self._n_listed * ((self.cutoff + skin) / (self.cutoff + self.skin)) ** ndim
-
-    def _time(self, parts: tuple[float, float, float], pairs: float) -> float:
+    def _time(self, parts: tuple[float, float, float], skin: float, ndim: int) -> float:
+        pairs = self._n_listed * ((self.cutoff + skin) / (self.cutoff + self.skin)) ** ndim
         return parts[0] + parts[1] * self._n_points + parts[2] * pairs
 
 
@@ -730,7 +718,7 @@ def _keys_of_both(before: Step, was: _Pairs, now: Step, then: _Pairs) -> tuple[I
     """Numbers of pairs, the same for one that goes on."""
     axes = sorted(before.axes & now.axes)
     if not axes:
-        return _keys(was, was.S, then, then.S) or _rows_as_keys(was, was.S, then, then.S)
+        return _keys(was, was.S, then, then.S)
     change, moves = _moves_between(before, now, axes)
     turns = moves.turns()
     if turns is not None and np.array_equal(change, np.eye(len(axes))):
@@ -738,17 +726,14 @@ def _keys_of_both(before: Step, was: _Pairs, now: Step, then: _Pairs) -> tuple[I
         if turns.any():
             new = then.S.astype(np.int64)
             new[:, axes] += turns[then.j] - turns[then.i]
-        keys = _keys(was, was.S, then, new)
-        if keys is not None:
-            return keys
+        return _keys(was, was.S, then, new)
     change_of = np.eye(then.S.shape[1], dtype=np.int64)
     change_of[np.ix_(np.array(axes), np.array(axes))] = change
     new = then.S @ change_of
     goes_on = (then.i < moves.n) & (then.j < moves.n)
     turns = moves.apart(then.i[goes_on], then.j[goes_on])
     new[np.ix_(np.flatnonzero(goes_on), np.array(axes))] += turns
-    old, new = _upright(was.S, was), _upright(new, then)
-    return _keys(was, old, then, new) or _rows_as_keys(was, old, then, new)
+    return _keys(was, _upright(was.S, was), then, _upright(new, then))
 
 
 class _Moves:
@@ -827,13 +812,8 @@ def _moves_between(before: Step, now: Step, axes: list[int]) -> tuple[Integers, 
         change = np.eye(len(axes), dtype=int).tolist()
     else:
         to_new = product(to_new, in_fractions)
-    points = (_padded(before.points), _padded(now.points))
-    return np.array(change, np.int64), _Moves(*points, to_old, to_new)
-
-
-def _padded(points: npt.NDArray[Any]) -> Floats:
-    """In float64, and at least one: it stands for points that the other step does not have."""
-    return np.zeros((1, points.shape[1])) if len(points) == 0 else points.astype(np.float64)
+    points = [step.points.astype(np.float64) for step in (before, now)]
+    return np.array(change, np.int64), _Moves(points[0], points[1], to_old, to_new)
 
 
 def _right_inverse(vectors: list[list[Fraction]]) -> list[list[Fraction]]:
@@ -873,14 +853,16 @@ def _upright(images: Integers, pairs: _Pairs) -> Integers:
 
 def _keys(
     was: _Pairs, old: npt.NDArray[Any], then: _Pairs, new: npt.NDArray[Any]
-) -> tuple[Integers, Integers] | None:
-    """A number for each pair from i, j and its image, in their order; None: they are too many."""
+) -> tuple[Integers, Integers]:
+    """A number for each pair from i, j and its image, in their order unless they are many."""
     low = np.minimum(old.min(axis=0, initial=0), new.min(axis=0, initial=0)).astype(np.int64)
     high = np.maximum(old.max(axis=0, initial=0), new.max(axis=0, initial=0)).astype(np.int64)
     widths = [int(width) for width in high - low + 1]
     n = int(max(was.j.max(initial=0), then.j.max(initial=0))) + 1
     if n * n * math.prod(widths) > MOST_KEYS:
-        return None
+        rows = [np.column_stack([was.i, was.j, old]), np.column_stack([then.i, then.j, new])]
+        found = np.unique(np.concatenate(rows), axis=0, return_inverse=True)[1].reshape(-1)
+        return found[: len(old)], found[len(old) :]
 
     def number(pairs: _Pairs, images: npt.NDArray[Any]) -> Integers:
         keys = pairs.i.astype(np.int64) * n
@@ -893,12 +875,3 @@ def _keys(
         return keys
 
     return number(was, old), number(then, new)
-
-
-def _rows_as_keys(
-    was: _Pairs, old: npt.NDArray[Any], then: _Pairs, new: npt.NDArray[Any]
-) -> tuple[Integers, Integers]:
-    """The same by sorting."""
-    rows = [np.column_stack([was.i, was.j, old]), np.column_stack([then.i, then.j, new])]
-    keys = np.unique(np.concatenate(rows), axis=0, return_inverse=True)[1].reshape(-1)
-    return keys[: len(old)], keys[len(old) :]

@@ -56,39 +56,11 @@ def neighbor_list(
     self_interaction: bool = False,
     max_nbins: float = 1e6,
 ) -> Any:
-    """Find all neighbours of each atom, as ``ase.neighborlist.neighbor_list`` does.
+    """Find all neighbours of each atom; see ``ase.neighborlist.neighbor_list``.
 
-    Parameters
-    ----------
-    quantities : str
-        Letters of what is returned, in their order: i and j, the indices of a pair; d, its
-        distance; D, its vector; S, its shift, with
-        ``D = a.positions[j] - a.positions[i] + S @ a.cell``. A letter may repeat.
-    a : ase.Atoms
-        The atoms, with their cell and periodicity. They may lie outside the cell. Cell vectors that
-        are zero are completed by ``a.get_cell(complete=True)``, as in ASE.
-    cutoff : float, dict or array_like of float, shape (n,)
-        In the unit of the positions: one length for all; one for each pair of elements, by symbol
-        or atomic number, such as ``{("H", "C"): 1.2, (6, 6): 1.85}``, where other pairs do not
-        count and the later of two entries for the same pair holds; or a radius for each atom, whose
-        sums are the cutoffs. A length of zero or less has no neighbours; radii are not negative.
-    self_interaction : bool, default False
-        Whether each atom is its own neighbour, at S = 0 and distance 0, where its cutoff is above
-        zero.
-    max_nbins : float, optional
-        Accepted for ASE's sake, without effect.
-
-    Returns
-    -------
-    ndarray or tuple of ndarray
-        One array for each letter, a bare array for one letter: i, j int64 (m,); d float64 (m,);
-        D float64 (m, 3); S int64 (m, 3). The full list, with (i, j, S) and (j, i, -S), ascending
-        by (i, j, S).
-
-    Raises
-    ------
-    TypeError, ValueError, OverflowError, MemoryError
-        As `halfshell.neighbors`; ValueError also for letters that are none of these.
+    `cutoff` may be a length, a dict of pairs of elements, by symbol or number, where the later of
+    two entries for the same pair holds, or a radius for each atom. A length of zero or less has no
+    neighbours.
 
     Examples
     --------
@@ -117,33 +89,10 @@ def primitive_neighbor_list(
     use_scaled_positions: bool = False,
     max_nbins: float = 1e6,
 ) -> Any:
-    """Find all neighbours of each point, as ``ase.neighborlist.primitive_neighbor_list`` does.
+    """Find all neighbours of each point; see ``ase.neighborlist.primitive_neighbor_list``.
 
-    Parameters
-    ----------
-    quantities, cutoff, self_interaction, max_nbins
-        As in `neighbor_list`.
-    pbc : bool or sequence of bool, shape (3,)
-        Which cell vectors repeat.
-    cell : array_like of float, shape (3, 3)
-        Cell vectors as rows. Those that do not repeat may be zero.
-    positions : array_like of float, shape (n, 3)
-        Coordinates, in the unit of the cell.
-    numbers : array_like of int, shape (n,), optional
-        Atomic numbers, which a dict of cutoffs needs.
-    use_scaled_positions : bool, default False
-        Whether `positions` are multiples of the cell vectors. Their product with the cell, rounded
-        to float64 as in ASE, is what is searched.
-
-    Returns
-    -------
-    ndarray or tuple of ndarray
-        As `neighbor_list`.
-
-    Raises
-    ------
-    TypeError, ValueError, OverflowError, MemoryError
-        As `neighbor_list`; TypeError also for a dict without `numbers`.
+    Cell vectors that do not repeat may be zero. Scaled positions times the cell, rounded to float64
+    as in ASE, are what is searched.
 
     Examples
     --------
@@ -205,26 +154,11 @@ def _not_negative(length: Any) -> Any:
 
 
 class NewPrimitiveNeighborList(_owner.NewPrimitiveNeighborList):
-    """In place of ``ase.neighborlist.NewPrimitiveNeighborList``, of which it is a subclass.
+    """A subclass of ``ase.neighborlist.NewPrimitiveNeighborList``, which documents it.
 
-    Parameters, attributes and methods are ASE's. With ``bothways=False`` each pair is listed once:
-    as the one of (i, j, S) and (j, i, -S) in which the first nonzero component of S is positive, or
-    i <= j where S is zero. Neighbours ascend by (j, S), also with ``sorted=False``.
-
-    Parameters
-    ----------
-    cutoffs : array_like of float, shape (n,)
-        A radius for each atom; atoms whose spheres overlap are neighbours.
-    skin : float, default 0.3
-        Added to each radius; the list is used again until an atom has moved farther than this.
-    sorted : bool, default False
-        Without effect, for lists are always sorted.
-    self_interaction : bool, default True
-        Whether an atom is its own neighbour.
-    bothways : bool, default False
-        Whether both atoms of a pair have it.
-    use_scaled_positions : bool, default False
-        Whether positions are multiples of the cell vectors.
+    With ``bothways=False`` each pair is listed once: as the one of (i, j, S) and (j, i, -S) in
+    which the first nonzero component of S is positive, or i <= j where S is zero. Neighbours
+    ascend by (j, S), also with ``sorted=False``.
 
     Examples
     --------
@@ -250,16 +184,9 @@ class NewPrimitiveNeighborList(_owner.NewPrimitiveNeighborList):
 
 
 class PrimitiveNeighborList(_owner.PrimitiveNeighborList):
-    """In place of ``ase.neighborlist.PrimitiveNeighborList``, of which it is a subclass.
+    """A subclass of ``ase.neighborlist.PrimitiveNeighborList``, which documents it.
 
-    Parameters, attributes and methods are ASE's. With ``bothways=False`` each pair is listed once,
-    at the same atom as in `NewPrimitiveNeighborList`; ASE does not specify which atom that is, and
-    its own two classes differ. Neighbours ascend by (j, S), even with ``sorted=False``.
-
-    Parameters
-    ----------
-    cutoffs, skin, sorted, self_interaction, bothways, use_scaled_positions
-        As for `NewPrimitiveNeighborList`.
+    Pairs and their order are those of `NewPrimitiveNeighborList`; ASE's own two classes differ.
 
     Examples
     --------
@@ -307,17 +234,9 @@ def _half_or_full(nl: Any, positions: Any) -> Any:
 
 
 class NeighborList(_owner.NeighborList):
-    """In place of ``ase.neighborlist.NeighborList``, of which it is a subclass.
+    """A subclass of ``ase.neighborlist.NeighborList``, which documents it.
 
-    Parameters, attributes and methods are ASE's, and so is the skin: until an atom has moved
-    farther than it the list of before is returned, with pairs that may be beyond the cutoff.
-
-    Parameters
-    ----------
-    cutoffs, skin, sorted, self_interaction, bothways
-        As for `NewPrimitiveNeighborList`.
-    primitive : type, default PrimitiveNeighborList
-        The class that does the work. ASE's own classes work too, as they do in ASE.
+    ASE's own classes work as `primitive`, too.
 
     Examples
     --------
@@ -345,21 +264,7 @@ class NeighborList(_owner.NeighborList):
 
 
 def build_neighbor_list(atoms: Any, cutoffs: Any = None, **kwargs: Any) -> NeighborList:
-    """Build a `NeighborList` for these atoms, as ``ase.neighborlist.build_neighbor_list`` does.
-
-    Parameters
-    ----------
-    atoms : ase.Atoms
-        The atoms.
-    cutoffs : array_like of float, shape (n,), optional
-        A radius for each atom. Default: `natural_cutoffs`.
-    **kwargs
-        Passed to `NeighborList`.
-
-    Returns
-    -------
-    NeighborList
-        The list, updated for `atoms`.
+    """Build a `NeighborList` for these atoms; see ``ase.neighborlist.build_neighbor_list``.
 
     Examples
     --------

@@ -48,42 +48,10 @@ def neighbour_list(
     numbers: Any = None,
     cell_origin: Any = None,
 ) -> Any:
-    """Find all neighbours of each atom, as ``matscipy.neighbours.neighbour_list`` does.
+    """Find all neighbours of each atom; see ``matscipy.neighbours.neighbour_list``.
 
-    Parameters
-    ----------
-    quantities : str
-        Letters of what is returned, in their order: i, j, d, D, S, as in `halfshell.compat.ase`.
-    atoms : ase.Atoms, optional
-        The atoms; or else what they consist of, one by one:
-    cutoff : float, dict or array_like of float, shape (n,) or (z, z)
-        One length for all; one for each pair of elements, by symbol or number, in a dict or a
-        symmetric matrix with a row for each atomic number; or a radius for each atom, whose sums
-        are the cutoffs.
-    positions : array_like of float, shape (n, 3), optional
-        In place of `atoms`, like the following.
-    cell : array_like of float, shape (3, 3), optional
-        Cell vectors as rows. Default: none, which needs no periodicity.
-    pbc : bool or sequence of bool, shape (3,), optional
-        Which of them repeat. Default: none.
-    numbers : array_like of int, shape (n,), optional
-        Atomic numbers. Default: 1.
-    cell_origin : array_like of float, shape (3,), optional
-        Accepted, without effect: points may lie anywhere.
-
-    Returns
-    -------
-    ndarray or tuple of ndarray
-        One array for each letter, a bare array for one letter: i, j int32 (m,); d float64 (m,);
-        D float64 (m, 3); S int32 (m, 3). The full list, ascending by (i, j, S).
-
-    Raises
-    ------
-    TypeError
-        If there is not one radius, or number, for each atom, or `quantities` is not a string.
-    TypeError, ValueError, OverflowError, MemoryError
-        As `halfshell.neighbors`; ValueError also for letters that are none of these, without a
-        cutoff, and for `atoms` beside what they consist of.
+    `cutoff` may also be a symmetric matrix with a row for each atomic number. `cell_origin` has no
+    effect: points may lie anywhere.
 
     Examples
     --------
@@ -95,8 +63,7 @@ def neighbour_list(
     """
     if not isinstance(quantities, str):
         raise TypeError(f"quantities must be a string, got {type(quantities).__name__}")
-    parts = {"positions": positions, "cell": cell, "pbc": pbc, "numbers": numbers}
-    scene, cutoff = _scene(atoms, cutoff, **parts, cell_origin=cell_origin)
+    scene, cutoff = _scene(atoms, cutoff, positions, cell, pbc, numbers, cell_origin)
     if not set(quantities) <= set("ijdDS"):
         raise ValueError("Unsupported quantity specified.")
     found = primitive_neighbor_list(quantities, cutoff=cutoff, **scene)
@@ -108,18 +75,19 @@ def neighbour_list(
     return typed[0] if len(typed) == 1 else typed
 
 
-def _scene(atoms: Any, cutoff: Any, **parts: Any) -> tuple[dict[str, Any], Any]:
+def _scene(
+    atoms: Any, cutoff: Any, positions: Any = None, cell: Any = None, pbc: Any = None,
+    numbers: Any = None, cell_origin: Any = None,
+) -> tuple[dict[str, Any], Any]:  # fmt: skip
     """What ASE's function takes: atoms or what they consist of, and a cutoff."""
     if cutoff is None:
         raise ValueError("Please provide a value for the cutoff radius.")
     if atoms is not None:
-        for name, value in parts.items():
+        parts = {"positions": positions, "cell": cell, "pbc": pbc, "numbers": numbers}
+        for name, value in {**parts, "cell_origin": cell_origin}.items():
             if value is not None:
                 raise ValueError(f"You cannot provide an ASE Atoms object and {name} as well.")
-        parts = {name: getattr(atoms, name) for name in ("positions", "cell", "pbc", "numbers")}
-    positions, cell, pbc, numbers = (
-        parts[name] for name in ("positions", "cell", "pbc", "numbers")
-    )
+        positions, cell, pbc, numbers = (getattr(atoms, name) for name in parts)
     if positions is None:
         raise ValueError("Please provide atoms or positions.")
     n = len(positions)
@@ -168,33 +136,12 @@ def _points(atoms: Any, cutoff: Any, **parts: Any) -> tuple[hs.Points, Any]:
 
 
 def coordination(
-    structure: Any = None,
-    cutoff: Any = None,
-    *,
-    positions: Any = None,
-    cell: Any = None,
-    pbc: Any = None,
-    numbers: Any = None,
-    cell_origin: Any = None,
+    structure: Any = None, cutoff: Any = None, **parts: Any
 ) -> npt.NDArray[np.int64]:
-    """Count the neighbours of each atom, as ``matscipy.neighbours.coordination`` does.
+    """Count the neighbours of each atom; see ``matscipy.neighbours.coordination``.
 
-    Parameters
-    ----------
-    structure : ase.Atoms, optional
-        The atoms, or else what they consist of, as in `neighbour_list`.
-    cutoff, positions, cell, pbc, numbers, cell_origin
-        As in `neighbour_list`.
-
-    Returns
-    -------
-    ndarray of int64, shape (n,)
-        A number for each atom. matscipy's array ends with the last atom that has neighbours.
-
-    Raises
-    ------
-    TypeError, ValueError, OverflowError, MemoryError
-        As `neighbour_list`.
+    There is a number for each atom; matscipy's array ends with the last one that has neighbours.
+    parts: what atoms consist of, as in `neighbour_list`.
 
     Examples
     --------
@@ -203,8 +150,7 @@ def coordination(
     >>> coordination(molecule("H2O"), 1.2).tolist()
     [2, 1, 1]
     """
-    parts = {"positions": positions, "cell": cell, "pbc": pbc, "numbers": numbers}
-    points, cutoff = _points(structure, cutoff, **parts, cell_origin=cell_origin)
+    points, cutoff = _points(structure, cutoff, **parts)
     return hs.coordination(points, cutoff, inclusive=False)
 
 
@@ -213,42 +159,14 @@ def neighbour_matrix(
     cutoff: Any = None,
     max_neighbours: int | None = None,
     *,
-    positions: Any = None,
-    cell: Any = None,
-    pbc: Any = None,
-    numbers: Any = None,
-    cell_origin: Any = None,
     device: Any = None,
     array_namespace: Any = None,
+    **parts: Any,
 ) -> tuple[Any, Any, Any]:
-    """List neighbours in rows of one length, as ``matscipy_neighbours.neighbour_matrix`` does.
+    """List neighbours in rows of one length; see ``matscipy_neighbours.neighbour_matrix``.
 
-    Parameters
-    ----------
-    atoms, cutoff, positions, cell, pbc, numbers, cell_origin
-        As in `neighbour_list`.
-    max_neighbours : int
-        The length of the rows.
-    device : {"cpu"}, optional
-        Where to search.
-    array_namespace : module or "dlpack", optional
-        The result is made by its ``from_dlpack``. Default, and with "dlpack": arrays of NumPy.
-
-    Returns
-    -------
-    idx : ndarray of int64, shape (n, max_neighbours)
-        Numbers of the neighbours, ascending, then zeros.
-    dist : ndarray of float64, shape (n, max_neighbours, 3)
-        Their vectors, then zeros.
-    count : ndarray of int64, shape (n,)
-        How many they are.
-
-    Raises
-    ------
-    CapacityError
-        A ValueError: if an atom has more than `max_neighbours`; ``needed`` tells how many.
-    TypeError, ValueError, OverflowError, MemoryError
-        As `neighbour_list`; ValueError also for another device.
+    Only the device "cpu" is there. CapacityError, a ValueError, if an atom has more than
+    `max_neighbours`; ``needed`` tells how many.
 
     Examples
     --------
@@ -262,8 +180,7 @@ def neighbour_matrix(
         raise ValueError("Please provide max_neighbours (the row capacity).")
     if device not in (None, "cpu"):
         raise ValueError(f"device must be None or 'cpu', got {device!r}")
-    parts = {"positions": positions, "cell": cell, "pbc": pbc, "numbers": numbers}
-    points, cutoff = _points(atoms, cutoff, **parts, cell_origin=cell_origin)
+    points, cutoff = _points(atoms, cutoff, **parts)
     table = hs.neighbors(points, cutoff, quantities="jD", inclusive=False)
     idx, dist = (table.to_padded(max_neighbours, 0, quantity=letter) for letter in "jD")
     made = idx, dist, table.counts
@@ -274,30 +191,11 @@ def neighbour_matrix(
 
 
 def mic(dr: npt.ArrayLike, cell: Any, pbc: Any = None) -> npt.NDArray[np.float64]:
-    """Replace vectors by their shortest images.
+    """Replace vectors by their shortest images; see ``matscipy.neighbours.mic``.
 
-    ``matscipy.neighbours.mic`` rounds multiples of the cell vectors, which may give a longer image
-    in a skewed cell; as in matscipy-neighbours, the shortest one is found in any cell. Which one it
-    is, is decided exactly.
-
-    Parameters
-    ----------
-    dr : array_like of float, shape (..., 3)
-        The vectors.
-    cell : array_like of float, shape (3, 3)
-        Cell vectors as rows. Those that do not repeat may be zero.
-    pbc : bool or sequence of bool, shape (3,), optional
-        Which of them repeat. Default: all.
-
-    Returns
-    -------
-    ndarray of float64, shape (..., 3)
-        ``dr + S @ cell`` with the integers S that make it shortest, the least S of several.
-
-    Raises
-    ------
-    TypeError, ValueError, OverflowError, MemoryError
-        As `halfshell.nearest`.
+    That rounds multiples of the cell vectors, which may give a longer image in a skewed cell; as in
+    matscipy-neighbours, the shortest one is found in any cell, and with the least shift of several.
+    Which one it is, is decided exactly.
 
     Examples
     --------
@@ -320,27 +218,10 @@ def mic(dr: npt.ArrayLike, cell: Any, pbc: Any = None) -> npt.NDArray[np.float64
 
 
 def first_neighbours(nat: int, i: npt.ArrayLike) -> npt.NDArray[np.int32]:
-    """Where the neighbours of each atom begin in a list that ascends by i.
+    """Where the neighbours of each atom begin; see ``matscipy.neighbours.first_neighbours``.
 
-    Parameters
-    ----------
-    nat : int
-        Number of atoms.
-    i : array_like of int, shape (m,)
-        First atoms of the pairs, ascending.
-
-    Returns
-    -------
-    ndarray of int32, shape (nat + 1,)
-        Those of atom k are from ``first[k]`` to ``first[k + 1]``. As in matscipy, it is -1, not 0,
-        for atoms before the first one that has neighbours.
-
-    Raises
-    ------
-    TypeError
-        If `nat` is not an integer.
-    ValueError
-        If `i` does not ascend from 0 or more, where matscipy returns something.
+    As there, it is -1, not 0, for atoms before the first one that has neighbours. ValueError if `i`
+    does not ascend from 0 or more, where matscipy returns something.
 
     Examples
     --------
@@ -360,24 +241,10 @@ def first_neighbours(nat: int, i: npt.ArrayLike) -> npt.NDArray[np.int32]:
 
 
 def get_jump_indicies(sorted: npt.ArrayLike) -> npt.NDArray[np.int32]:
-    """Where each number begins in a list that ascends from 0 in steps of at most 1.
+    """Where each number begins in a list; see ``matscipy.neighbours.get_jump_indicies``.
 
-    The name is spelt as in ``matscipy.neighbours``.
-
-    Parameters
-    ----------
-    sorted : array_like of int, shape (m,)
-        The list.
-
-    Returns
-    -------
-    ndarray of int32
-        Number k is from place k to place k + 1 of it; 0, 0 for an empty list.
-
-    Raises
-    ------
-    ValueError
-        If the list is not like that; matscipy then returns what was in memory.
+    ValueError if the list does not ascend from 0 in steps of at most 1; matscipy then returns what
+    was in memory.
 
     Examples
     --------
@@ -399,25 +266,7 @@ def triplet_list(
     i_p: npt.ArrayLike | None = None,
     j_p: npt.ArrayLike | None = None,
 ) -> tuple[npt.NDArray[np.int32], ...]:
-    """Find pairs of pairs with the same first atom, as ``matscipy.neighbours.triplet_list`` does.
-
-    Parameters
-    ----------
-    first_neighbours : array_like of int, shape (n + 1,)
-        Where the pairs of each atom begin, as `first_neighbours` tells.
-    abs_dr_p : array_like of float, shape (m,), optional
-        Distance of each pair; with `cutoff` only pairs that are closer than that count.
-    cutoff : float, optional
-        In the unit of the distances.
-    i_p, j_p : array_like of int, shape (m,), optional
-        Both atoms of each pair: then the pair of both second atoms is looked for as well.
-
-    Returns
-    -------
-    ij_t, ik_t : ndarray of int32, shape (t,)
-        Positions among the pairs, in both orders.
-    jk_t : ndarray of int32, shape (t,)
-        With `i_p` and `j_p`: the first pair (j, k), or -1.
+    """Find pairs of pairs with the same first atom; see ``matscipy.neighbours.triplet_list``.
 
     Examples
     --------

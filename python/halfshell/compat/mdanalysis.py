@@ -12,12 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
-
-try:
-    from MDAnalysis.lib.util import check_box, check_coords
-except ImportError as error:  # pragma: no cover
-    message = "halfshell.compat.mdanalysis needs MDAnalysis: pip install MDAnalysis"
-    raise ImportError(message) from error
+from MDAnalysis.lib.util import check_box, check_coords
 
 import halfshell as hs
 
@@ -126,35 +121,11 @@ def capped_distance(
     return_distances: bool = True,
     backend: str = "serial",
 ) -> Any:
-    """Pairs of two sets within a cutoff, as `MDAnalysis.lib.distances.capped_distance`.
+    """Pairs of two sets within a cutoff; see ``MDAnalysis.lib.distances.capped_distance``.
 
-    Parameters
-    ----------
-    reference, configuration : (n, 3) or (3,) array_like, or AtomGroup
-        Read as float32.
-    max_cutoff : float
-        Pairs at this distance count; infinity, for all.
-    min_cutoff : float, optional
-        Pairs at this distance, or nearer, do not.
-    box : (6,) array_like, optional
-        Lengths and angles in degrees. None: open space. With right angles an axis is open if its
-        length is zero or negative; if there is no such triclinic box, all are.
-    method, backend : str, optional
-        Checked, and not used.
-    return_distances : bool, default True
-
-    Returns
-    -------
-    pairs : ndarray of intp, shape (m, 2)
-        Indices in `reference` and in `configuration`.
-    distances : ndarray of float64, shape (m,)
-        In the nearest image, within 1 ulp; if wanted.
-
-    Raises
-    ------
-    ValueError, TypeError, KeyError
-        As the original, for a box, coordinates, a backend or a method that are none; ValueError
-        for NaN.
+    `method` and `backend` are checked, and not used. Distances are float64, within 1 ulp.
+    `max_cutoff` may be infinite, for all pairs. With right angles an axis is open if its length is
+    zero or negative; if there is no such triclinic box, all are. ValueError also for NaN.
 
     Examples
     --------
@@ -181,26 +152,9 @@ def self_capped_distance(
     return_distances: bool = True,
     backend: str = "serial",
 ) -> Any:
-    """Pairs of one set within a cutoff, as `MDAnalysis.lib.distances.self_capped_distance`.
+    """Pairs of one set within a cutoff; see ``MDAnalysis.lib.distances.self_capped_distance``.
 
-    Parameters
-    ----------
-    reference : (n, 3) array_like or AtomGroup
-        Read as float32.
-    max_cutoff, min_cutoff, box, method, return_distances, backend
-        As in `capped_distance`.
-
-    Returns
-    -------
-    pairs : ndarray of intp, shape (m, 2)
-        Indices, the lower one first.
-    distances : ndarray of float64, shape (m,)
-        In the nearest image, within 1 ulp; if wanted.
-
-    Raises
-    ------
-    ValueError, TypeError, KeyError
-        As `capped_distance`.
+    What differs is as in `capped_distance`; the lower number of a pair comes first.
 
     Examples
     --------

@@ -29,37 +29,7 @@ def find_points_in_spheres(
     tol: float = 1e-8,
     min_r: float = 1.0,
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]]:
-    """Find all points within a distance of centres, as the function of pymatgen does.
-
-    Parameters
-    ----------
-    all_coords : array_like of float, shape (n, 3)
-        Cartesian coordinates of the points.
-    center_coords : array_like of float, shape (q, 3)
-        Cartesian coordinates of the centres. A point that lies on one is found at distance 0.
-    r : float
-        The cutoff radius.
-    pbc : array_like of int, shape (3,)
-        Which lattice vectors repeat: not 0.
-    lattice : array_like of float, shape (3, 3)
-        Lattice vectors as rows.
-    tol : float, default 1e-8
-        Added to the square of the radius, unless the radius is below `min_r`.
-    min_r : float, default 1.0
-        Spheres with a smaller radius are closed, and have no tolerance.
-
-    Returns
-    -------
-    index1, index2 : ndarray of int64, shape (m,)
-        Numbers of the centres and of the points.
-    offset_vectors : ndarray of float64, shape (m, 3)
-        The image of the point, in lattice vectors.
-    distances : ndarray of float64, shape (m,)
-
-    Raises
-    ------
-    TypeError, ValueError, OverflowError, MemoryError
-        As `halfshell.pairs_between`.
+    """Find all points within a distance of centres; see pymatgen's ``find_points_in_spheres``.
 
     Examples
     --------

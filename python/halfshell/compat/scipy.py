@@ -25,13 +25,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-
-try:
-    import scipy.spatial as _owner
-    from scipy.sparse import coo_matrix
-except ImportError as error:  # pragma: no cover
-    message = "halfshell.compat.scipy needs scipy: pip install scipy"
-    raise ImportError(message) from error
+import scipy.spatial as _owner
+from scipy.sparse import coo_matrix
 
 import halfshell as hs
 from halfshell._convert.call import take
@@ -70,35 +65,7 @@ class _Searches:
         distance_upper_bound: Any = np.inf,
         workers: Any = 1,
     ) -> Any:
-        """Find the nearest neighbours of each point of `x`.
-
-        Parameters
-        ----------
-        x : array_like of float, shape (..., m)
-            The points that ask.
-        k : int or sequence of int, default 1
-            How many neighbours, or which of them: 1 is the nearest.
-        eps, p
-            Others than 0 and 2 are for SciPy.
-        distance_upper_bound : float, default infinity
-            Only neighbours that are closer than this.
-        workers : int, default 1
-            Threads; -1 is all.
-
-        Returns
-        -------
-        d : float or ndarray of float64, shape (..., k)
-            Distances, ascending, infinity where there is no neighbour; without the last axis if k
-            is 1, as an int.
-        i : int or ndarray of intp, shape (..., k)
-            Numbers of the neighbours; n where there is none.
-
-        Raises
-        ------
-        ValueError
-            If any of `k` is less than 1; there SciPy crashes, or returns what was in memory. Other
-            errors are SciPy's.
-        """
+        """As SciPy's; but ValueError if any of `k` is less than 1, where SciPy crashes."""
         asked, threads, ranks = self._asked(x, p, eps), _as_threads(workers), _as_ranks(k)
         bound = _as_bound(distance_upper_bound)
         if asked is None or threads is None or ranks is None or bound is None or not self.n:
@@ -123,26 +90,7 @@ class _Searches:
         return_sorted: Any = None,
         return_length: Any = False,
     ) -> Any:
-        """Find all points within a distance of each point of `x`.
-
-        Parameters
-        ----------
-        x : array_like of float, shape (..., m)
-            The points that ask.
-        r : float or array_like of float
-            The largest distance, for all or, broadcast to ``x.shape[:-1]``, for each.
-        p, eps, workers
-            As for `query`.
-        return_sorted : bool, optional
-            Without effect: lists always ascend.
-        return_length : bool, default False
-            Whether to return how many they are.
-
-        Returns
-        -------
-        list of int, ndarray of lists, or numbers as intp
-            As SciPy's.
-        """
+        """As SciPy's; lists ascend, whatever `return_sorted` is."""
         asked, threads = self._asked(x, p, eps), _as_threads(workers)
         radii = None if asked is None else self._radii(r, np.shape(x)[:-1])
         if asked is None or threads is None or radii is None:
@@ -162,44 +110,14 @@ class _Searches:
         return result.reshape(shape)
 
     def query_ball_tree(self, other: Any, r: Any, p: Any = 2.0, eps: Any = 0.0) -> Any:
-        """For each point of this tree list those of another one within a distance.
-
-        Parameters
-        ----------
-        other : KDTree
-            The other tree, which may be this one.
-        r : float
-            The largest distance.
-        p, eps
-            As for `query`.
-
-        Returns
-        -------
-        list of list of int
-            A list for each point of this tree, ascending.
-        """
+        """As SciPy's; lists ascend."""
         if not self._is_for(p, eps) or not self._fits(other) or not self._is_near(r):
             return super().query_ball_tree(other, r, p, eps)  # type: ignore[misc]
         rows = hs.neighbors(other.data, float(r), queries=self.data, **self._box())
         return _as_lists(rows.offsets, rows.indices)
 
     def query_pairs(self, r: Any, p: Any = 2.0, eps: Any = 0.0, output_type: Any = "set") -> Any:
-        """Find all pairs of points within a distance.
-
-        Parameters
-        ----------
-        r : float
-            The largest distance.
-        p, eps
-            As for `query`.
-        output_type : {"set", "ndarray"}
-            What to return.
-
-        Returns
-        -------
-        set of tuple of int, or ndarray of intp, shape (number of pairs, 2)
-            Each pair once, the lower number first.
-        """
+        """As SciPy's."""
         known = output_type in ("set", "ndarray")
         if not known or not self._is_for(p, eps) or not self._is_near(r):
             return super().query_pairs(r, p, eps, output_type)  # type: ignore[misc]
@@ -212,27 +130,7 @@ class _Searches:
     def count_neighbors(
         self, other: Any, r: Any, p: Any = 2.0, weights: Any = None, cumulative: Any = True
     ) -> Any:
-        """Count the pairs of a point of this tree and one of another, or add up their weights.
-
-        Parameters
-        ----------
-        other : KDTree
-            The other tree, which may be this one.
-        r : float or array_like of float, shape (k,)
-            Largest distances.
-        p
-            As for `query`.
-        weights : array_like, or tuple of two, optional
-            Weights of the points of this tree and of the other, None for 1; one array is for both,
-            if they are the same tree. The weight of a pair is the product of the two.
-        cumulative : bool, default True
-            Whether to count up to each of `r`, or between it and the one before, that not included.
-
-        Returns
-        -------
-        int, float, or ndarray of intp or float64, shape (k,)
-            Integers without weights.
-        """
+        """As SciPy's."""
         limits, marks = self._limits(r, cumulative), _as_weights(weights, self, other)
         if limits is None or marks is None or not self._is_for(p, 0.0) or not self._fits(other):
             return super().count_neighbors(other, r, p, weights, cumulative)  # type: ignore[misc]
@@ -253,25 +151,7 @@ class _Searches:
     def sparse_distance_matrix(
         self, other: Any, max_distance: Any, p: Any = 2.0, output_type: Any = "dok_matrix"
     ) -> Any:
-        """The distances of all points of this tree and of another, up to a largest one.
-
-        Parameters
-        ----------
-        other : KDTree
-            The other tree, which may be this one.
-        max_distance : float
-            The largest distance.
-        p
-            As for `query`.
-        output_type : {"dok_matrix", "coo_matrix", "dict", "ndarray"}
-            What to return.
-
-        Returns
-        -------
-        dok_matrix, coo_matrix, dict or ndarray
-            As SciPy's, with distances within 1 ulp; the array has fields i, j and v and ascends by
-            i and j.
-        """
+        """As SciPy's, with distances within 1 ulp; the array ascends by i and j."""
         known = output_type in ("dok_matrix", "coo_matrix", "dict", "ndarray")
         is_ours = known and self._is_for(p, 0.0) and self._fits(other)
         if not is_ours or not self._is_near(max_distance):
@@ -417,9 +297,7 @@ class _Searches:
 
 
 class cKDTree(_Searches, _owner.cKDTree):
-    """In place of ``scipy.spatial.cKDTree``, of which it is a subclass.
-
-    Parameters and attributes are SciPy's; see `KDTree`.
+    """A subclass of ``scipy.spatial.cKDTree``, which documents it.
 
     Examples
     --------
@@ -430,18 +308,7 @@ class cKDTree(_Searches, _owner.cKDTree):
 
 
 class KDTree(_Searches, _owner.KDTree):
-    """In place of ``scipy.spatial.KDTree``, of which it is a subclass.
-
-    Parameters and attributes are SciPy's, and so is the tree that `tree` shows.
-
-    Parameters
-    ----------
-    data : array_like of float, shape (n, m)
-        The points.
-    leafsize, compact_nodes, copy_data, balanced_tree
-        How SciPy's tree is built, with no effect on answers.
-    boxsize : float or array_like of float, shape (m,), optional
-        Periods; 0 for axes without one. The points are from 0 up to these, not included.
+    """A subclass of ``scipy.spatial.KDTree``, which documents it.
 
     Examples
     --------

@@ -73,19 +73,10 @@ class _Graphs:
 
 
 class RadiusNeighborsTransformer(_Graphs, _owner.RadiusNeighborsTransformer):
-    """In place of ``sklearn.neighbors.RadiusNeighborsTransformer``, of which it is a subclass.
+    """A subclass of ``sklearn.neighbors.RadiusNeighborsTransformer``, which documents it.
 
-    Parameters, attributes and methods are scikit-learn's. Rows ascend by distance, and neighbours
-    at one distance by their number; with mode "connectivity" by their number alone.
-
-    Parameters
-    ----------
-    mode : {"distance", "connectivity"}, default "distance"
-        What the graph holds: distances, or 1 for each neighbour.
-    radius : float, default 1.0
-        Samples that are no further apart are neighbours.
-    algorithm, leaf_size, metric, p, metric_params, n_jobs
-        As there; the first two say how other metrics are searched.
+    Rows ascend by distance, and neighbours at one distance by their number; with mode
+    "connectivity" by their number alone.
 
     Examples
     --------
@@ -121,19 +112,9 @@ class RadiusNeighborsTransformer(_Graphs, _owner.RadiusNeighborsTransformer):
 
 
 class KNeighborsTransformer(_Graphs, _owner.KNeighborsTransformer):
-    """In place of ``sklearn.neighbors.KNeighborsTransformer``, of which it is a subclass.
+    """A subclass of ``sklearn.neighbors.KNeighborsTransformer``, which documents it.
 
-    Parameters, attributes and methods are scikit-learn's. Rows ascend by distance, and neighbours
-    at one distance by their number.
-
-    Parameters
-    ----------
-    mode : {"distance", "connectivity"}, default "distance"
-        What the graph holds: distances, with each sample itself besides, or 1 for each neighbour.
-    n_neighbors : int, default 5
-        How many neighbours each sample has.
-    algorithm, leaf_size, metric, p, metric_params, n_jobs
-        As there; the first two say how other metrics are searched.
+    Rows ascend by distance, and neighbours at one distance by their number.
 
     Examples
     --------

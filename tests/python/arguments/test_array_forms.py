@@ -6,6 +6,7 @@ import pytest
 
 import halfshell as hs
 from calls import call
+from oracles import as_set, check, same_arrays
 
 RNG = np.random.default_rng(5)
 POINTS, QUERIES = RNG.random((200, 3)), RNG.random((60, 3))
@@ -114,7 +115,6 @@ def test_a_file_in_memory(tmp_path):
 
 NUMBERS = np.arange(200)
 RADII = np.full(200, 0.05)
-MATRICES = np.repeat(np.eye(3)[None] * 10.0, 200, axis=0)
 
 
 def connectivity(*arrays, **how):
@@ -141,43 +141,16 @@ TAKEN = {
         lambda x, p: hs.pairs(x, 0.1, box=BOX, periodic=p),
         (POINTS, np.array([True, False, True])),
     ),
-    "cutoffs": (lambda c: hs.pairs(POINTS, c, quantities="ijk"), (np.array([0.05, 0.1]),)),
     "radii": (lambda r: call(hs.neighbors, POINTS, None, radii=r).indices, (RADII,)),
-    "supports": (
-        lambda H: hs.neighbors(hs.Points(POINTS, supports=H), 1.0).indices,
-        (MATRICES,),
-    ),
-    "types": (lambda t: call(hs.rdf, POINTS, 0.1, types=t, box=BOX).counts, (TYPES,)),
     "batch": (lambda k: call(hs.pairs, POINTS, 0.1, batch=k), (NUMBERS // 50,)),
-    "pairs": (lambda k: hs.pairs(POINTS, 0.2, exclude=k), (np.array([[0, 1], [2, 3]]),)),
-    "labels": (lambda k: hs.pairs(hs.Points(POINTS, labels=k), 0.2, exclude=0), (NUMBERS // 3,)),
-    "groups": (lambda k: call(hs.pairs, POINTS, 0.2, groups=k), (NUMBERS // 3,)),
-    "touching": (lambda k: hs.pairs(POINTS, 0.2, indices=k), (NUMBERS[5:9],)),
-    "indices": (lambda k: hs.neighbors(POINTS, 0.2, indices=k).indices, (NUMBERS[5:9],)),
     "edges, weights": (
         lambda e, w: hs.pair_histogram(hs.Points(POINTS, weights=w), e),
         (EDGES, WEIGHTS),
     ),
-    "lists": (lambda i, j: hs.measure(POINTS, i, j), (NUMBERS[:9], NUMBERS[1:10])),
-    "checked": (lambda i, j: str(hs.verify(POINTS, 0.2, i, j)), hs.pairs(POINTS, 0.2)),
     "rows": (lambda k: hs.neighbors(POINTS, 0.2)[k].indices, (NUMBERS[5:9],)),
-    "mask of rows": (lambda k: hs.neighbors(POINTS, 0.2)[k].indices, (NUMBERS % 2 == 0,)),
-    "frames": (lambda x: list(hs.trajectory_pairs(x, 0.2))[1], (POINTS.reshape(2, 100, 3),)),
-    "step": (lambda x, b: hs.VerletList(0.2, box=BOX).update(x, b), (POINTS, np.eye(3) * 1.1)),
     "keys": (dynamic, (NUMBERS, POINTS)),
     "nodes": (lambda *a: connectivity(*a).pairs.view(), (POINTS, RADII, NUMBERS)),
-    "nodes of ellipsoids": (lambda *a: connectivity(*a).pairs.view(), (POINTS, MATRICES, NUMBERS)),
-    "pairs of nodes": (
-        lambda k: connectivity(POINTS, RADII, NUMBERS, exclude=k).pairs.view(),
-        (np.array([[0, 0, 1, 0]]),),
-    ),
-    "corners": (
-        lambda k: connectivity(POINTS, RADII, NUMBERS, order="morton", morton_box=k).pairs.view(),
-        (np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]),),
-    ),
     "kept nodes": (patched, ((NUMBERS % 2 == 0)[None], (NUMBERS // 2)[None])),
-    "bricks": (lambda x: hs.bricks(x, 0.2, 2)[0].pairs(x), (POINTS,)),
-    "vectors": (lambda b, x: hs.Box(b).wrap(x), (np.eye(3) * 0.3, POINTS)),
 }
 
 
@@ -193,3 +166,40 @@ def test_memoryviews(name):
 def test_a_memoryview_of_numbers_is_no_list_of_nodes():
     with pytest.raises(TypeError, match="lists must be of NodeList, got ndarray"):
         hs.Connectivity(memoryview(POINTS))
+
+
+@pytest.fixture
+def points(rng):
+    """Coordinates that float16 and float32 hold exactly."""
+    return rng.integers(-32, 32, (30, 3)) / 16
+
+
+def test_integers_and_booleans_are_taken_as_they_are(rng):
+    for dtype in "bhilqBHILQ?":
+        for kernel in hs.kernels():
+            whole = rng.integers(0, 2 if dtype == "?" else 12, (25, 3)).astype(dtype)
+            plain = whole.astype(float)
+            assert same_arrays(
+                call(hs.pairs, whole, 3, quantities="ijd", kernel=kernel),
+                call(hs.pairs, plain, 3.0, quantities="ijd", kernel=kernel),
+            )
+            assert same_arrays(
+                call(hs.pairs, whole, 3, box=[5, 6, 7], quantities="ijdS", kernel=kernel),
+                call(hs.pairs, plain, 3.0, box=[5.0, 6.0, 7.0], quantities="ijdS", kernel=kernel),
+            )
+
+
+def test_large_integers_that_float64_holds_are_exact():
+    points = np.array([[2**53, 0], [2**53 - 1, 0], [2**62, 2**40], [2**62, 2**40 + 1]])
+    assert as_set(*hs.pairs(points, 1)) == {(0, 1, ()), (2, 3, ())}
+    assert as_set(*hs.pairs(points.astype(np.uint64), 1)) == {(0, 1, ()), (2, 3, ())}
+
+
+def test_float32_values_are_not_rounded_again(rng):
+    # 0.1f is 0.100000001490116...: a pair at that distance is beyond a cutoff of 0.1.
+    points = np.array([[0.0], [0.1]], np.float32)
+    assert check(points, 0.1) == set()
+    assert len(check(points, np.float32(0.1))) == 1
+    crowd = rng.random((60, 3)).astype(np.float32)
+    box = rng.random((3, 3)).astype(np.float32) + np.eye(3, dtype=np.float32)
+    check(crowd, 0.3, box)

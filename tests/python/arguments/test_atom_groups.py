@@ -88,45 +88,6 @@ def test_without_elements_types_are_needed(boxless):
         hs.pairs(boxless, {("Si", "O"): 2.0})
 
 
-def test_periodicity_is_the_callers(universe, box):
-    flags = [True, True, False]
-    expected = hs.pairs(POINTS, 2.0, box=box, periodic=flags)
-    same(hs.pairs(universe.atoms, 2.0, periodic=flags), expected)
-    two = hs.pairs_between(universe.atoms[:20], universe.atoms, 2.0, periodic=flags)
-    same(two, hs.pairs_between(POINTS[:20], POINTS, 2.0, box=box, periodic=flags))
-
-
-def test_queries(universe, boxless, box):
-    asking = universe.atoms[:20]
-    expected = hs.pairs_between(POINTS[:20], POINTS, 2.0, box=box)
-    for queries, points, how in (
-        (asking, universe, {}), (asking, POINTS, {"box": box}), (POINTS[:20], universe.atoms, {}),
-        (boxless.atoms[:20], universe, {}),
-    ):  # fmt: skip
-        same(call(hs.pairs_between, queries, points, 2.0, **how), expected)
-    same(hs.CellList(universe, 2.0).neighbors(queries=asking).to_pairs(), expected)
-    for other in ({}, {"box": 2.0 * box}):
-        with pytest.raises(ValueError, match="queries bring a box that is not that of points"):
-            call(hs.pairs_between, asking, POINTS, 2.0, **other)
-
-
-def test_without_a_box(boxless, box):
-    same(hs.pairs(boxless.atoms, 2.0), hs.pairs(POINTS, 2.0))
-    same(hs.pairs(boxless.atoms, 2.0, box=box), hs.pairs(POINTS, 2.0, box=box))
-    batch, boxes = np.repeat([0, 1], 30), np.stack([box, 1.1 * box])
-    same(
-        call(hs.pairs, boxless, 2.0, batch=batch, box=boxes),
-        call(hs.pairs, POINTS, 2.0, batch=batch, box=boxes),
-    )
-
-
-def test_a_box_given_twice_is_refused(universe, box):
-    with pytest.raises(ValueError, match="of type AtomGroup bring their own box: leave box"):
-        hs.pairs(universe.atoms, 2.0, box=box)
-    with pytest.raises(ValueError, match="of type Universe bring their own box: leave box"):
-        call(hs.pairs, universe, 2.0, batch=np.zeros(60, int), box=box[None])
-
-
 def test_objects_with_no_positions_are_none(mda):
     bare = mda.Universe.empty(3)
     for points in (bare, bare.atoms, SimpleNamespace(universe=1, atoms=2)):

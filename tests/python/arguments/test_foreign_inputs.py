@@ -99,13 +99,6 @@ def test_tables_of_polars():
         hs.pairs(polars.DataFrame({"x": ["a", "b"]}), 1.0)
 
 
-def test_tables_of_pyarrow():
-    pyarrow = pytest.importorskip("pyarrow")
-    check_points(pyarrow.Tensor.from_numpy(POINTS), POINTS)
-    table = pyarrow.table({name: POINTS[:, k].copy() for k, name in enumerate("xyz")})
-    check_points(table, POINTS, is_a_view=False)
-
-
 def test_arrays_of_xarray():
     xarray = pytest.importorskip("xarray")
     check_points(xarray.DataArray(POINTS, dims=("atom", "axis")), POINTS)
@@ -151,35 +144,10 @@ def test_other_devices(device, name):
         hs.pairs(Handed(POINTS, Device.METAL), 1.0)
 
 
-def test_devices_that_do_not_tell():
-    class Strange(Converted):
-        def __dlpack_device__(self):
-            raise RuntimeError("no idea")
-
-    check_points(Strange(POINTS), POINTS)
-    Strange.__dlpack_device__ = lambda self: ("CPU", 0)
-    check_points(Strange(POINTS), POINTS)
-    Strange.__dlpack_device__ = lambda self: (1000, 0)
-    check_points(Strange(POINTS), POINTS)
-
-
 @pytest.mark.parametrize("form", [np.asarray, Converted, Handed])
 def test_complex_numbers(form):
     with pytest.raises(TypeError, match="points must hold real numbers, got dtype complex128"):
         hs.pairs(form(POINTS + 0j), 1.0)
-
-
-def test_attributes_that_raise():
-    class Hostile:
-        def __getattr__(self, name):
-            if name.startswith("__"):
-                raise AttributeError(name)
-            raise RuntimeError("no")
-
-    with pytest.raises(TypeError, match="points cannot be read"):
-        hs.pairs(Hostile(), 1.0)
-    with pytest.raises(TypeError, match="box cannot be read"):
-        hs.pairs(POINTS, 1.0, box=Hostile())
 
 
 def freud_box(rows, periodic=(True, True, True), dimensions=3):
@@ -210,31 +178,6 @@ def test_boxes_of_freud():
     same(hs.pairs(POINTS, 1.3, box=freud_box(ROWS, mixed), periodic=True),
          hs.pairs(POINTS, 1.3, box=ROWS))  # fmt: skip
     assert np.array_equal(hs.Box(freud_box(ROWS)).vectors, ROWS)
-
-
-def test_flat_boxes_of_freud():
-    flat = np.diag([4.0, 5.0, 0.0])
-    flat[1, 0] = 1.5
-    flat_points = POINTS.copy()
-    flat_points[:, 2] = 0.0
-    box = freud_box(flat, dimensions=2)
-    check_box(box, flat, flat_points, periodic=[True, True, False])
-    points = POINTS[:, :2].copy()
-    expected = hs.pairs(points, 1.3, box=flat[:2, :2], quantities=LETTERS)
-    same(hs.pairs(points, 1.3, box=box, quantities=LETTERS), expected)
-    with pytest.raises(ValueError, match="box must have shape"):
-        hs.pairs(points, 1.3, box=freud_box(ROWS))
-
-
-def test_real_boxes_of_freud():
-    freud = pytest.importorskip("freud")
-    box = freud.box.Box(4.0, 5.0, 6.0, 0.25, -0.5, 0.125)
-    check_box(box, box.to_matrix().T)
-    box.periodic = [True, False, True]
-    check_box(box, box.to_matrix().T, periodic=[True, False, True])
-    square = freud.box.Box.square(4.0)
-    points = POINTS[:, :2].copy()
-    same(hs.pairs(points, 1.3, box=square), hs.pairs(points, 1.3, box=[4.0, 4.0]))
 
 
 def test_boxes_that_are_none():

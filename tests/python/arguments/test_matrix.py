@@ -360,33 +360,3 @@ def test_a_scene_in_any_clothes_has_the_same_pairs():
         assert verdict.answer is not None and verdict.answer.ok, verdict.message
 
     fuzz(scenes(), check, 150)
-
-
-@st.composite
-def outputs(draw):
-    """Arrays for `out` of the scene that has six pairs or so, most of them not quite right."""
-    dtypes = st.sampled_from(["i8", "i8", "i8", "i4", ">i8", "f8", "u8", "O", "?"])
-    length = draw(st.sampled_from([0, 1, 3, 20, 20, 20]))
-    rows = st.sampled_from([(length,), (length,), (length, 3), (length, 2), ()])
-    made = [np.zeros(draw(rows), draw(dtypes)) for _ in range(draw(st.sampled_from([2, 2, 2, 1])))]
-    if draw(st.booleans()):
-        made = [laid_out(array, draw(st.sampled_from(boundary.LAYOUTS))) for array in made]
-    if draw(st.integers(0, 4)) == 0:
-        made = [made[0], made[0][1:] if made[0].ndim else made[0]]
-    return tuple(made) if draw(st.integers(0, 4)) else made
-
-
-def test_any_arrays_to_write_to():
-    expected = hs.pairs(POINTS, 1.0, sort=True)
-
-    def check(out):
-        options = {"sort": True, "out": out}
-        result = outcome(hs.pairs, POINTS, 1.0, may_change=True, slowdown=SLOWDOWN, **options)
-        if result.error is None:
-            for array, column, whole in zip(result.answer, expected, out, strict=True):
-                assert array.tolist() == column.tolist()
-                assert len(array) == 0 or np.shares_memory(array, whole)
-        else:
-            assert "out" in result.message
-
-    fuzz(outputs(), check, 100)

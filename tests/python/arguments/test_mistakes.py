@@ -2,7 +2,6 @@
 """What a user's mistake is answered: the keyword that is meant, and a short traceback."""
 
 import inspect
-import traceback
 
 import numpy as np
 import pytest
@@ -34,43 +33,6 @@ CALLS = {
 }
 
 
-def test_frames_of_the_users_own_code_stay():
-    class Broken:
-        def __array__(self, *arguments, **more):
-            return self.inner()
-
-        def inner(self):
-            raise ZeroDivisionError("mine")
-
-    with pytest.raises(TypeError, match="Broken raised ZeroDivisionError: mine") as refused:
-        hs.neighbors(Broken(), 1.0)
-    cause = refused.value.__cause__
-    assert "inner" in [frame.name for frame in traceback.extract_tb(cause.__traceback__)]
-
-    class Reader:
-        def __iter__(self):
-            yield POINTS
-            raise ZeroDivisionError("read")
-
-    frames = hs.trajectory_pairs(Reader(), 1.0)
-    next(frames)
-    with pytest.raises(ZeroDivisionError, match="read") as refused:
-        next(frames)
-    names = [frame.name for frame in traceback.extract_tb(refused.value.__traceback__)]
-    assert "__iter__" in names
-
-
-def test_frames_of_a_number_of_the_users_own_stay():
-    class Broken:
-        def __index__(self):
-            raise ZeroDivisionError("mine")
-
-    with pytest.raises(TypeError, match=r"threads must be .*Broken") as refused:
-        hs.pairs(POINTS, 1.0, threads=Broken())
-    cause = refused.value.__cause__
-    assert "__index__" in [frame.name for frame in traceback.extract_tb(cause.__traceback__)]
-
-
 MEANT = {"pbc": "periodic", "cell": "box", "boxsize": "box", "workers": "threads"}
 
 
@@ -85,17 +47,6 @@ def test_keywords_of_other_libraries_are_answered_with_ours(name):
         assert str(refused.value) == (
             f"{name}() got an unexpected keyword argument {theirs!r}: did you mean {ours}=?"
         )
-
-
-def test_keywords_of_other_libraries_are_answered_by_classes_too():
-    for make, given, meant in [
-        (lambda **how: hs.CellList(POINTS, 1.0, **how), "pbc", "periodic"),
-        (lambda **how: hs.VerletList(1.0, **how), "cell", "box"),
-        (lambda **how: hs.DynamicCellList(3, 1.0, **how), "boxsize", "box"),
-        (lambda **how: call(hs.verify, POINTS, 1.0, [0], [1], **how), "pbc", "periodic"),
-    ]:
-        with pytest.raises(TypeError, match=rf"\w\(\) got .* '{given}': did you mean {meant}=\?$"):
-            make(**{given: None})
 
 
 #: Keywords that there were -> what stands in their place.
@@ -130,16 +81,6 @@ def test_old_keywords_are_answered_with_what_stands_in_their_place(old):
 
 class Universe:
     trajectory = ()
-
-
-class Atoms:
-    positions, cell, pbc = POINTS, np.eye(3), [True] * 3
-
-    def __len__(self):
-        return 10
-
-    def __getitem__(self, k):
-        return self.positions[k]
 
 
 #: What newcomers try -> what the message says besides what is wrong.
@@ -260,23 +201,3 @@ def test_tables_by_frame_are_no_frames():
     ).tolist()
     with pytest.raises(ValueError, match="points must have a column x beside y, got x_0, y, z"):
         hs.pairs(table.rename(columns={"x": "x_0"}), 1.0)
-
-
-@pytest.mark.parametrize("search, given, message", [
-    (hs.pairs, {"threds": 2}, "did you mean threads=?"),
-    (hs.pairs, {"quantity": "ij"}, "did you mean quantities=?"),
-    (hs.nearest, {"distance_upper_bound": 1.0}, "did you mean max_distance=?"),
-    (hs.clusters, {"min_samples": 3}, "did you mean min_points=?"),
-    (hs.pairs, {"zzz": 1}, "unexpected keyword argument 'zzz'"),
-])  # fmt: skip
-def test_what_is_spelled_alike_is_named(search, given, message):
-    with pytest.raises(TypeError) as refused:
-        search(POINTS, 1, **given)
-    assert str(refused.value).endswith(message)
-
-
-def test_words_that_are_spelled_alike_are_named():
-    with pytest.raises(ValueError, match=r"got 'maxx': did you mean 'max'\?"):
-        call(hs.pairs, POINTS, None, radii=np.ones(10), rule="maxx")
-    with pytest.raises(ValueError, match=r"rule must be one of .* got 'zzz'$"):
-        call(hs.pairs, POINTS, None, radii=np.ones(10), rule="zzz")

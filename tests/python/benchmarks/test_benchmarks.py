@@ -8,15 +8,17 @@ Nothing here is timed against a clock, and no other library is needed.
 from __future__ import annotations
 
 import csv
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from benchmark_modules import bench, measurement, only_in_a_checkout  # noqa: F401
+from checkout import BENCHMARKS
 
 pytestmark = [pytest.mark.slow, only_in_a_checkout]
 
@@ -51,27 +53,6 @@ def test_differences_are_counted_and_judged(bench: SimpleNamespace) -> None:
     swapped = bench.agreement.compare(scene, theirs, ours, True, 1e-12, False)
     assert swapped.ours_wrong == 3
     assert str(bench.agreement.compare(scene, ours, ours, True, 0.0, False)) == "same"
-
-
-def test_a_tie_is_judged_by_its_rule(bench: SimpleNamespace) -> None:
-    scene = bench.scenes.load("fcc-tie")
-    nearest = int(np.flatnonzero((scene.points == [0.0, 0.0, 48.0]).all(axis=1))[0])
-    assert bench.agreement.is_pair(scene, 0, nearest, None, True) == (True, 0.0)
-    assert bench.agreement.is_pair(scene, 0, nearest, (0, 0, -1), False) == (False, 0.0)
-
-
-def test_adapters_refuse_what_they_cannot_do(bench: SimpleNamespace) -> None:
-    peers = bench.peers.PEERS
-    load = bench.scenes.load
-    assert peers["cKDTree"].refuses(load("triclinic-1e4-k52")) == "triclinic box"
-    assert peers["freud"].refuses(load("silicon-8")) == "several images of one pair"
-    assert peers["pymatgen"].refuses(load("open-1e4")) == "open space"
-    assert peers["linkcell"].refuses(load("vectors-1e5-k52")) == "quantities Dd"
-    assert peers["MDAnalysis"].refuses(load("plane-1e5-k20")) == "2 dimensions"
-    assert peers["neighborlist-rs"].refuses(load("vectors-1e5-k52")) == "quantities Dd"
-    assert peers["ase"].refuses(load("pairs-1e5-k52")) == "too many pairs for its speed"
-    assert peers["Corrfunc"].refuses(load("pairs-1e4-k52")) == "quantities ij"
-    assert peers["vesin"].refuses(load("plane-1e5-k20")) is None
 
 
 def test_ratios_are_peer_over_ours_for_the_fastest_complete_peer(bench: SimpleNamespace) -> None:
@@ -143,25 +124,6 @@ def test_result_files_name_machine_kernel_commit_and_versions(
     )  # fmt: skip
 
 
-def test_runner_starts_with_nothing_installed(
-    bench: SimpleNamespace, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(bench.run, "pin_threads", lambda: None)
-    monkeypatch.setattr(bench.machine, "touch_memory", lambda n_bytes: None)
-    assert bench.run.main(["--quick", "--without-halfshell", "--peers", "--no-pin"]) == 0
-    assert "silicon-8: a unit cell" in capsys.readouterr().out
-
-
-def test_result_files_of_other_columns_are_left_alone(
-    bench: SimpleNamespace, tmp_path: Path
-) -> None:
-    path = tmp_path / "old.csv"
-    path.write_text("scene,time\n")
-    with pytest.raises(ValueError, match="other columns"):
-        bench.report.write_csv(path, {}, [measurement(bench, "halfshell", 0.1)], {})
-    assert path.read_text() == "scene,time\n"
-
-
 def test_a_scene_is_measured_with_its_limits_and_single_calls(
     bench: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -191,110 +153,9 @@ def test_a_scene_is_measured_with_its_limits_and_single_calls(
     assert (rows, correct) == ([], True)
 
 
-def test_a_library_without_memory_is_left_out(
-    bench: SimpleNamespace, capsys: pytest.CaptureFixture[str]
-) -> None:
-    class Greedy(bench.contestant.Halfshell):
-        name = "cKDTree"
-
-        def prepare(self, scene: Any) -> Any:
-            raise MemoryError
-
-    scene = bench.scenes.load("molecule-30")
-    patience = bench.runner.Patience(repeats=1, seconds=0.01, quick=True)
-    rows, correct = bench.runner.measure_scene(
-        scene, bench.contestant.Halfshell(), [Greedy()], patience
-    )
-    assert correct and "cKDTree" not in {row.contestant for row in rows}
-    assert "without cKDTree: it asked for more memory" in capsys.readouterr().out
-
-
-class Strict:
-    """A library without batches: pairs of an open system, from brute force, full lists."""
-
-    def __new__(cls, bench: SimpleNamespace) -> Any:
-        class Library(bench.contestant.Contestant):
-            name = distribution = module = "numpy"
-            full = True
-            quantities = "ijS"
-
-            def prepare(self, scene: Any) -> Any:
-                def search() -> Any:
-                    steps = scene.points[None] - scene.points[:, None]
-                    near = np.sum(steps**2, axis=-1) < scene.cutoff**2
-                    np.fill_diagonal(near, False)
-                    return np.nonzero(near)
-
-                return search
-
-        return Library()
-
-
-def test_a_library_without_batches_is_called_for_each_system(bench: SimpleNamespace) -> None:
-    whole = bench.scenes.load("batch-30")
-    scene = replace(whole, points=whole.points[:90], batch=whole.batch[:90], n_pairs=None)
-    looped = Strict(bench).for_batch()
-    assert looped.refuses(scene) is None
-    result = looped.prepare(scene)()
-    keys = looped.keys(scene, result)
-    i, j = np.divmod(keys, scene.n)
-    assert len(result) == 3
-    assert len(keys) == looped.count(scene, result)
-    assert np.array_equal(i // 30, j // 30)
-    assert set(i // 30) == {0, 1, 2}
-    square = np.sum((scene.points[i] - scene.points[j]) ** 2, axis=-1)
-    assert square.max() < scene.cutoff**2
-    assert bench.agreement.compare(scene, keys, keys[1:], False, 1e-12, False).missed == 1
-    periodic = bench.scenes.load("batch-1e4-periodic")
-    assert (
-        bench.peers.PEERS["cKDTree"].for_batch().refuses(periodic) == "several images of one pair"
-    )
-    assert bench.peers.PEERS["neighborlist-rs"].for_batch().name == "neighborlist-rs"
-
-
-def test_pairs_of_a_batch_are_judged_in_the_box_of_their_system(bench: SimpleNamespace) -> None:
-    scene = bench.scenes.Scene(
-        "two", "", np.array([[0.0, 0, 0], [4, 0, 0], [0, 0, 0], [4, 0, 0]]), 1.0,
-        np.array([np.eye(3) * 5.0, np.eye(3) * 9.0]), (True,) * 3,
-        batch=np.array([0, 0, 1, 1]),
-    )  # fmt: skip
-    assert bench.agreement.is_pair(scene, 0, 1, (-1, 0, 0), True) == (True, 0.0)
-    assert not bench.agreement.is_pair(scene, 2, 3, (-1, 0, 0), True)[0]
-    assert not bench.agreement.is_pair(scene, 2, 3, None, True)[0]
-
-
-def test_options_are_keywords_or_set_around_the_call(bench: SimpleNamespace) -> None:
-    scene = bench.scenes.load("threads-pairs-1e5-k52")
-    assert bench.contestant.Halfshell().prepare(scene).keywords["threads"] == 2
-    assert bench.contestant.Halfshell({"threads": 1}).prepare(scene).keywords["threads"] == 1
-    single = bench.contestant.Halfshell({"precision": "single"}).prepare(scene)
-    assert single.func.__name__ == "run" and "precision" not in single.keywords
-
-
-def test_groups_choose_scenes(bench: SimpleNamespace, capsys: pytest.CaptureFixture[str]) -> None:
-    parse = bench.run._parse
-    assert parse([]).scenes == bench.scenes.GROUPS["main"]
-    assert parse(["--quick"]).scenes == list(bench.scenes.QUICK)
-    assert parse(["--group", "S7", "--scenes", "plane-1e5-k8", "call-2"]).scenes == [
-        "plane-1e5-k8", "plane-1e5-k30", "call-2",
-    ]  # fmt: skip
-    assert set(parse(["--group", "all"]).scenes) == set(bench.scenes.SCENES)
-    assert bench.run.main(["--list"]) == 0
-    assert "S13: input order" in capsys.readouterr().out
-    with pytest.raises(SystemExit):
-        parse(["--group", "S99"])
-
-
-def test_nearest_points_are_compared_by_their_distances(bench: SimpleNamespace) -> None:
-    scene = bench.scenes.Scene(
-        "row", "", np.array([[0.0], [1.0], [3.0], [7.0]]), 0.0, task="nearest", nearest=1,
-    )  # fmt: skip
-    ours = np.array([[1.0], [1.0], [2.0], [4.0]]), np.array([[1], [0], [1], [2]])
-    assert bench.agreement.compare_nearest(scene, ours, ours, 53).complete
-    d = ours[0] + [[1e-16], [1e-9], [0.0], [-1.0]]
-    verdict = bench.agreement.compare_nearest(scene, ours, (d, ours[1]), 53)
-    assert (verdict.missed, verdict.spurious, verdict.ours_wrong) == (1, 1, 0)
-    assert not verdict.complete
-    assert bench.agreement.compare_nearest(scene, ours, (d, ours[1]), 24).missed == 0
-    far = np.array([[3.0], [1.0], [2.0], [4.0]]), np.array([[2], [0], [1], [2]])
-    assert bench.agreement.compare_nearest(scene, far, ours, 53).ours_wrong == 1
+def test_the_benchmark_of_drop_ins_compares_equal_lists() -> None:
+    pytest.importorskip("ase")
+    command = [sys.executable, str(BENCHMARKS / "drop_ins.py"), "--points", "300", "--turns", "1"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "ase.NeighborList" in done.stdout

@@ -1,50 +1,37 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""_core refuses a reach or a selection that the Python layer never makes: there is no other check
-between their arrays and memory."""
+"""_core refuses a set of points or a pairing that the Python layer never makes: there is no other
+check between their arrays and memory."""
 
 import numpy as np
 import pytest
 
 from halfshell import _core
+from halfshell._convert.call import Known, Pairing
 from refused_calls import arrays_among
 
 POINTS = np.random.default_rng(3).uniform(0.0, 3.0, (12, 3))
 QUERIES = POINTS[:4].copy()
-REACH = ["rule", "radii", "query_radii", "types", "query_types", "table", "supports",
-         "query_supports", "extent"]  # fmt: skip
-REACHES = {
-    "radii": {"radii": np.full(12, 0.5), "query_radii": np.full(4, 0.5)},
-    "types": {
-        "types": np.arange(12, dtype=np.int32) % 2, "query_types": np.zeros(4, np.int32),
-        "table": np.ones((2, 2)),
-    },
-    "supports": {
-        "rule": 2, "extent": 1.0,
-        "supports": np.stack([np.eye(3)] * 12), "query_supports": np.stack([np.eye(3)] * 4),
-    },
+SETS = {
+    n: {
+        "radii": np.full(n, 0.5), "supports": np.stack([np.eye(3)] * n), "weights": np.ones(n),
+        "types": np.arange(n, dtype=np.int32) % 2, "groups": np.arange(n), "labels": np.arange(n),
+    } for n in (12, 4)
 }  # fmt: skip
-SELECTION = {
-    "groups": np.arange(12), "query_groups": np.arange(4), "labels": np.arange(12),
-    "query_labels": np.arange(4), "query_numbers": np.arange(4), "within": 1,
-    "excluded": np.array([[0, 1], [2, 3]]), "min_distance": 0.0,
+PAIRING = Pairing(
+    0, None, None, 1, np.array([[0, 1], [2, 3]]), np.arange(4), 0.0,
+)  # fmt: skip
+KINDS = {
+    "radii": Pairing(0), "supports": Pairing(2, 1.0), "types": Pairing(0, table=np.ones((2, 2))),
 }  # fmt: skip
-ARRAYS = arrays_among(REACHES)
-REFUSED = r"^(radii and types|the table of cutoffs|supports) must be"
-ENTRIES = "labels must be int64 arrays of one entry for each"
-LABELS = ["groups", "query_groups", "labels", "query_labels", "query_numbers"]
 
 
-def search(reach):
+def search(pairing, known=None, known_of_queries=None):
+    points, queries = (
+        (one, *Known(**known or {}), None)
+        for one, known in ((POINTS, known), (QUERIES, known_of_queries))
+    )
     shared = (1.0, None, 0, True, "exact", None, None, None, None)
-    return _core.coordination(POINTS, *shared, QUERIES, reach)
-
-
-def with_reach(given):
-    return search(tuple({**dict.fromkeys(REACH), "rule": 0, **given}.values()))
-
-
-def with_selection(**changed):
-    return search((None, tuple((SELECTION | changed).values())))
+    return _core.coordination(points, *shared, queries, pairing)
 
 
 def other_arrays(array):
@@ -57,63 +44,58 @@ def other_arrays(array):
     ]  # fmt: skip
 
 
-def test_a_reach_that_fits_is_taken():
-    for kind in REACHES:
-        assert len(with_reach(REACHES[kind])) == 4
+def test_a_pairing_that_fits_is_taken():
+    for kind, pairing in KINDS.items():
+        assert len(search(pairing, *({kind: SETS[n][kind]} for n in (12, 4)))) == 4
+    labels, of_queries = ({"labels": SETS[n]["labels"]} for n in (12, 4))
+    assert len(search(PAIRING._replace(rule=None), labels, of_queries)) == 4
 
 
-def test_arrays_of_a_reach_have_an_entry_for_each():
-    for kind, name in ARRAYS:
-        for wrong in other_arrays(REACHES[kind][name]):
-            with pytest.raises(TypeError, match=REFUSED):
-                with_reach(REACHES[kind] | {name: wrong})
+def test_arrays_of_a_set_have_an_entry_for_each():
+    for n, name in arrays_among(SETS):
+        for wrong in other_arrays(SETS[n][name]):
+            with pytest.raises(TypeError, match="what is known of points must be arrays"):
+                search(None, *({name: wrong} if n == m else None for m in (12, 4)))
 
 
-@pytest.mark.parametrize("name", ["supports", "query_supports"])
-def test_a_support_has_as_many_rows_and_columns_as_there_are_dimensions(name):
-    n = len(REACHES["supports"][name])
-    for shape in ((n, 3, 2), (n, 2, 3), (n, 2, 2), (n, 4, 4), (n, 9)):
-        with pytest.raises(TypeError, match="supports must be float64 arrays of one matrix"):
-            with_reach(REACHES["supports"] | {name: np.ones(shape)})
+def test_a_support_has_as_many_rows_and_columns_as_there_are_dimensions():
+    for shape in ((12, 3, 2), (12, 2, 3), (12, 2, 2), (12, 4, 4), (12, 9)):
+        with pytest.raises(TypeError, match="what is known of points must be arrays"):
+            search(None, {"supports": np.ones(shape)})
 
 
-def test_a_reach_is_nine_values():
-    fields = list({**dict.fromkeys(REACH), "rule": 0, **REACHES["radii"]}.values())
-    for wrong in ((), tuple(fields[:-1]), (*fields, None), fields, 3, (None, *fields[1:])):
-        with pytest.raises(TypeError, match=r"^(reach|selection) must be"):
+def test_a_pairing_is_seven_values():
+    for wrong in ((), PAIRING[:-1], (*PAIRING, None), list(PAIRING), 3):
+        with pytest.raises(TypeError, match="a pairing is None or a tuple of seven"):
             search(wrong)
-    for rule in (-1, 6, 2**31, 2**64, -(2**64)):
+    for rule in (-1, 6, 2**31, 2**64, -(2**64), "sum"):
         with pytest.raises(ValueError, match="there is no such rule"):
-            with_reach(REACHES["radii"] | {"rule": rule})
+            search(Pairing(rule), {"radii": np.ones(12)})
     for extent in (1, "1", np.float32(1.0)):
         with pytest.raises(TypeError, match="extent must be a float"):
-            with_reach(REACHES["supports"] | {"extent": extent})
+            search(Pairing(2, extent))
+    for wrong in ({"within": 1.0}, {"least": 0}, {"least": None}):
+        with pytest.raises(TypeError, match="a pairing has an int or None, and a float"):
+            search(PAIRING._replace(**wrong))
+    for within in (-1, 2**63, -(2**63) - 1):
+        with pytest.raises(ValueError, match="labels cannot differ by so much"):
+            search(PAIRING._replace(within=within))
 
 
-def test_arrays_of_a_selection_have_an_entry_for_each():
-    for name in LABELS:
-        for wrong in other_arrays(SELECTION[name]):
-            with pytest.raises(TypeError, match=ENTRIES):
-                with_selection(**{name: wrong})
-
-
-def test_excluded_pairs_are_two_columns():
+def test_arrays_of_a_pairing_have_their_types_and_lengths():
+    square = np.ones((2, 2))
+    for wrong in (
+        square.tolist(), square.astype(np.float32), np.ones((2, 3)), np.ones((1, 2, 2)), square[:1],
+        np.ones(4), square.astype(">f8"), np.ones((4, 4))[::2, ::2], 3.0,
+    ):  # fmt: skip
+        with pytest.raises(TypeError, match="the table of cutoffs must be a square float64 array"):
+            search(Pairing(0, table=wrong))
     for wrong in (
         [[0, 1]], np.ones((2, 2)), np.ones(2, int), np.ones((2, 3), int), np.ones((2, 1), int),
         np.ones((2, 2), np.int32), np.ones((2, 2), int).T[:, ::-1],
     ):  # fmt: skip
         with pytest.raises(TypeError, match="excluded must be an int64 array of two columns"):
-            with_selection(excluded=wrong)
-
-
-def test_a_selection_is_eight_values():
-    fields = list(SELECTION.values())
-    for wrong in ((), tuple(fields[:-1]), (*fields, None), fields, None):
-        with pytest.raises(TypeError, match="selection must be a tuple of eight"):
-            search((None, wrong))
-    for name, value in (("within", 1.0), ("within", None), ("min_distance", 0)):
-        with pytest.raises(TypeError, match="selection must be a tuple of eight"):
-            with_selection(**{name: value})
-    for within in (-1, 2**63, -(2**63) - 1):
-        with pytest.raises(ValueError, match="labels cannot differ by so much"):
-            with_selection(within=within)
+            search(PAIRING._replace(excluded=wrong))
+    for wrong in other_arrays(PAIRING.numbers):
+        with pytest.raises(TypeError, match="numbers must be an int64 array of one for each query"):
+            search(PAIRING._replace(numbers=wrong))

@@ -8,7 +8,6 @@ import random
 import subprocess
 import sys
 import warnings
-import zipfile
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from halfshell import cli
-from halfshell._cli import numpy_files
 
 pytestmark = pytest.mark.slow
 POINTS = np.arange(30.0).reshape(10, 3) % 7.0
@@ -145,44 +143,6 @@ def test_arrays_that_are_no_points(tmp_path, content):
     assert "periodic" in refused("pairs", tmp_path / "periodic.npz", "--cutoff", "1.0")
 
 
-def test_archives_that_zipfile_cannot_open(tmp_path):
-    path = tmp_path / "a.npz"
-    data = bytearray(valid_bytes("npz"))
-    for name, value in (("encrypted", (6, 1)), ("method", (8, 77)), ("needs 9.9", (4, 99))):
-        changed = data.copy()
-        at = changed.find(b"PK\x01\x02")  # the central directory: its offsets are 2 further
-        changed[at + value[0] + 2] = changed[value[0]] = value[1]
-        path.write_bytes(changed)
-        assert "a.npz" in refused("pairs", path, "--cutoff", "1.0"), name
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("points.npy", b"\x93NUMPY\x01\x00\x08\x00" + b"((((((((")
-    refused("pairs", path, "--cutoff", "1.0")
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("points.npy", b"not an array")
-    refused("pairs", path, "--cutoff", "1.0")
-
-
-@pytest.mark.parametrize("version", [b"\x01\x00", b"\x02\x00", b"\x03\x00", b"\x09\x09"])
-def test_headers_of_arrays(tmp_path, version):
-    path = tmp_path / "a.npy"
-    headers = [
-        "{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999, 3)}",
-        "{'descr': '<f8', 'fortran_order': False, 'shape': (-1, 3)}",
-        "{'descr': '<f8', 'fortran_order': False, 'shape': (10L, 3L)}",
-        "{'descr': '|O', 'fortran_order': False, 'shape': (1, 3)}",
-        "{'descr': 'a,b', 'fortran_order': 0, 'shape': 3}",
-        "(" * 500,
-        "[" * 5000 + "]" * 5000,
-        "{}",
-        "\0" * 20,
-        "9" * 5000,
-    ]
-    for header in headers:
-        size = len(header).to_bytes(2 if version == b"\x01\x00" else 4, "little")
-        path.write_bytes(b"\x93NUMPY" + version + size + header.encode() + bytes(240))
-        check("pairs", path, "--cutoff", "1.0")
-
-
 def test_places_that_are_no_files(tmp_path):
     (tmp_path / "folder.npz").mkdir()
     for name in (tmp_path, tmp_path / "folder.npz", tmp_path / "none", "/", "", "\0", "a\nb", "~"):
@@ -199,43 +159,6 @@ def test_a_pipe_is_not_waited_for(tmp_path):
         for command in ("pairs", "verify"):
             error = refused(command, tmp_path / f"pipe{suffix}", "--cutoff", "1.0")
             assert error.endswith(f"pipe{suffix}: cannot be read: not a regular file\n")
-
-
-def test_line_breaks_of_names_are_escaped(tmp_path):
-    assert r"/a\nb\x1bc.npy: no such file" in refused("pairs", tmp_path / "a\nb\x1bc.npy")
-    (tmp_path / "a\nb.npy").write_bytes(b"")
-    assert r"/a\nb.npy: is empty" in refused("pairs", tmp_path / "a\nb.npy")
-
-
-def test_negative_lengths_are_named(tmp_path):
-    path = tmp_path / "a.npy"
-    header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (-1, 3)}"
-    path.write_bytes(b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + bytes(240))
-    assert "a.npy: 'points' has shape (-1, 3); no length is negative" in refused("pairs", path)
-
-
-def test_a_file_that_must_not_be_read(tmp_path, monkeypatch):
-    path = tmp_path / "a.npy"
-    path.write_bytes(valid_bytes("npy"))
-
-    def refuse(*arguments, **options):
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(numpy_files, "open", refuse, raising=False)  # also where root may read all
-    assert "Permission denied" in refused("pairs", path, "--cutoff", "1.0")
-
-
-def test_places_that_cannot_be_written(tmp_path):
-    for name in ("folder.npz", "folder.png"):
-        (tmp_path / name).mkdir()
-    path = tmp_path.parent / "source.npy"
-    path.write_bytes(valid_bytes("npy"))
-    outputs = [tmp_path / "none" / "a.npz", tmp_path / "folder.npz", "a.txt", "", "\0.npz"]
-    for name in [*outputs, "x" * 5000 + ".npz", tmp_path / ("x" * 300 + ".csv"), "/proc/a.npz"]:
-        refused("pairs", path, "-o", name)
-        refused("pairs", path, "--plot", str(name).replace(".npz", ".png"))
-        refused("pairs", "-o", name)
-    assert sorted(os.listdir(tmp_path)) == ["folder.npz", "folder.png"]
 
 
 # ---- arguments -----------------------------------------------------------------------------

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Frames of the command line: one at a time in memory, named where one fails; with a topology."""
 
-import json
 import sys
 import warnings
 
@@ -9,32 +8,11 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell import cli
 from halfshell._cli.files import read_frames
 from subprocesses import run as run_script
 
 POINTS = np.random.default_rng(5).random((60, 3)) * 8
 LENGTHS = np.array([8.0, 7.5, 9.0])
-
-
-@pytest.fixture
-def run(capsys):
-    def call(*args):
-        status = cli.main([str(arg) for arg in args])
-        out, err = capsys.readouterr()
-        return status, out, err
-
-    return call
-
-
-@pytest.fixture
-def told(run):
-    def call(*args):
-        status, out, err = run(*args, "--json")
-        assert status == 0, err
-        return json.loads(out)
-
-    return call
 
 
 def extxyz(path, n_frames, points=POINTS, spoil=None):
@@ -200,19 +178,6 @@ def test_a_topology_with_a_trajectory(told, topology, suffix):
     facts = told("rdf", *both, "--index=1::2")
     assert facts["frames"] == 2
     assert facts["pairs"] == sum(hs.count_pairs(cutoff=2.0, **scene(k)) for k in (1, 3))
-
-
-def test_a_topology_of_charmm(told, run, topology, tmp_path):
-    psf = tmp_path / "top.psf"
-    atoms = [f"{k + 1:8d} S    {k + 1:<4d} WAT  {'OH'[k % 2]:<4s} {'OH'[k % 2]:<4s} 0.0 "
-             f"{(15.9994, 1.008)[k % 2]:13.4f}           0\n" for k in range(60)]  # fmt: skip
-    empty = "".join(f"{0:8d} !{name}\n\n" for name in ("NBOND: bonds", "NTHETA: angles"))
-    psf.write_text(f"PSF\n\n{1:8d} !NTITLE\n REMARKS water\n\n{60:8d} !NATOM\n"
-                   f"{''.join(atoms)}\n{empty}")  # fmt: skip
-    facts = told("pairs", psf, "--trajectory", topology[1] / "run.dcd", "--cutoff", 2)
-    assert facts["points"] == 60 and facts["pairs"] > 0
-    status, _, err = run("pairs", psf, "--cutoff", 2)
-    assert status == 2 and "--trajectory" in err
 
 
 def test_trajectories_that_cannot_be_read(run, topology, tmp_path, monkeypatch):

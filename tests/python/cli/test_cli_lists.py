@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """``halfshell neighbors``, ``coordination``, ``nearest``, ``rdf``; points in text; boxes of six."""
 
-import json
 import subprocess
 import sys
 
@@ -30,16 +29,6 @@ def run(capfdbinary):
         status = cli.main([str(arg) for arg in args])
         out, err = capfdbinary.readouterr()
         return status, out.decode(), err.decode()
-
-    return call
-
-
-@pytest.fixture
-def told(run):
-    def call(*args):
-        status, out, err = run(*args, "--json")
-        assert (status, err) == (0, ""), err
-        return json.loads(out)
 
     return call
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell import cli
 
 POINTS = np.random.default_rng(6).random((50, 3)) * 6.0
 BOX = [6.0, 7.0, 8.0]
@@ -21,16 +20,6 @@ def scene(tmp_path):
     np.savez(tmp_path / "scene.npz", points=POINTS, box=BOX)
     np.save(tmp_path / "open.npy", POINTS)
     return tmp_path / "scene.npz"
-
-
-@pytest.fixture
-def run(capsys):
-    def call(*args):
-        status = cli.main([str(arg) for arg in args])
-        out, err = capsys.readouterr()
-        return status, out, err
-
-    return call
 
 
 @pytest.fixture
@@ -103,14 +92,6 @@ def test_columns_are_found_by_their_names(judged, names, between):
         wrong = judged(text(names, i[1:], j[1:], *S[1:].T, between=between))
         assert not wrong["ok"] and wrong["full"] == full
         assert wrong["checks"][0]["examples"]["missed"] == [[i[0], j[0], *S[0]]]
-
-
-def test_columns_in_any_order_beside_others(judged):
-    i, j, S = listed()
-    d = np.linspace(0.0, 1.0, len(i))
-    rank = np.arange(len(i))
-    names = ",S2,d,dst,S1,src,S0"  # as a data frame writes them, with its index
-    assert judged(text(names, rank, S[:, 2], d, j, S[:, 1], i, S[:, 0]))["ok"]
 
 
 def test_columns_without_names(judged, tmp_path):
@@ -241,12 +222,6 @@ def test_options_that_make_a_list_are_refused_with_one(run, scene, tmp_path):
 def test_an_empty_list_is_a_list(judged):
     assert judged("i,j,S0,S1,S2\n")["checks"][0]["missed"] == len(listed()[0])
     assert judged("i,j,S0,S1,S2\n", "--box", "1e3,1e3,1e3", "--sample", "5")["rows"] == 0
-
-
-def test_points_with_indices_beside_them_are_points(run, tmp_path):
-    for names, content in (("i,j,k", "0,1,2\n"), ("i,j,x,y,z", "0,1,2,3,4\n")):
-        (tmp_path / "points.csv").write_text(f"{names}\n{content}")
-        assert "is a list of pairs" not in run("pairs", tmp_path / "points.csv", "--cutoff", 1)[2]
 
 
 @pytest.mark.parametrize("missing", [("pyarrow",), ("pyarrow", "polars")])

@@ -112,21 +112,6 @@ def test_placeholders_of_objects_are_left_out_with_a_warning(tmp_path):
         assert len(hs.pairs(ase.Atoms("H", [[0, 0, 0]], cell=[1, 1, 1], pbc=True), 1.0)[0]) == 3
 
 
-def test_placeholders_of_frames_are_left_out():
-    need("MDAnalysis")
-    import MDAnalysis
-
-    universe = MDAnalysis.Universe.empty(2, trajectory=True)
-    universe.atoms.positions = POINTS[:2]
-    universe.dimensions = [10.0, 10.0, 10.0, 0.0, 0.0, 0.0]
-    for given in (universe, universe.atoms):
-        with pytest.warns(UserWarning, match="left out"):
-            assert hs.count_pairs(given, 2.0) == 1
-    with pytest.warns(UserWarning, match="left out"):
-        (found,) = hs.trajectory_pairs([universe.trajectory.ts], 2.0)
-    assert len(found[0]) == 1
-
-
 # ---- formats ---------------------------------------------------------------------------------
 
 

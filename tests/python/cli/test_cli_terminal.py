@@ -75,27 +75,6 @@ def test_messages_escape_names(command, evil):
             assert r"(it holds what\x1b]0;title\x07)" in err
 
 
-def test_warnings_and_titles_escape_names(command, tmp_path, monkeypatch):
-    pytest.importorskip("ase")
-    pytest.importorskip("matplotlib")
-    monkeypatch.chdir(tmp_path)
-    name = "$a\x1b[1m$.xyz"
-    with open(name, "w") as stream:
-        stream.write("2\n\nH 0 0 0\nH 0 0 0.7\n")
-    import ase.io
-    read = ase.io.read
-
-    def remarking(*args, **options):
-        import warnings
-
-        warnings.warn("odd \x1b[2J file", UserWarning, stacklevel=1)
-        return read(*args, **options)
-
-    monkeypatch.setattr(ase.io, "read", remarking)
-    status, _, err = command("pairs", name, "--cutoff", "1", "--plot", "g.svg")
-    assert status == 0 and err.startswith("halfshell: warning: ") and r"\x1b[2J" in err
-
-
 def test_plain_text_stays_as_it_is():
     assert printable("Å größer 10 x 10 中 \\x1b") == "Å größer 10 x 10 中 \\x1b"
     assert printable("a\tb\x85\ud800\U000e0001") == r"a\tb\x85\ud800\U000e0001"

@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from ase import Atoms, neighborlist
-from ase.build import bulk, molecule
+from ase.build import molecule
 
 from halfshell.compat import ase as ours
 
@@ -86,54 +86,6 @@ def test_no_length_has_no_neighbours_and_not_the_atom_itself():
         for selves in (False, True):
             arguments = [True] * 3, np.eye(3), np.zeros((2, 3)), cutoff
             assert same(*arguments, self_interaction=selves) == 0
-
-
-def test_a_cutoff_without_axes_is_one_length():
-    atoms = molecule("H2O")
-    for cutoff, entries in ((1.2, 4), (-1.2, 0)):
-        assert len(ours.neighbor_list("i", atoms, np.array(cutoff))) == entries
-
-
-def test_coincident_atoms_and_selves_at_distance_0():
-    assert same([False] * 3, np.eye(3), np.zeros((3, 3)), 1.0) == 6
-    assert same([False] * 3, np.eye(3), np.zeros((3, 3)), 1.0, self_interaction=True) == 9
-
-
-def test_the_later_entry_of_a_dict_holds():
-    atoms = molecule("H2O")
-    for table in ({("H", "O"): 0.1, ("O", "H"): 1.2}, {("O", "H"): 1.2, (8, 1): 0.1}):
-        expected = neighborlist.neighbor_list("ij", atoms, table)
-        found = ours.neighbor_list("ij", atoms, table)
-        assert len(found[0]) == len(expected[0])
-
-
-@pytest.mark.parametrize("n", [0, 1, 5])
-@pytest.mark.parametrize("selves", [False, True])
-def test_types_shapes_and_letters(rng, n, selves):
-    for quantities in ("i", "j", "d", "D", "S", "Sdij", "jDidS", "iijj", ""):
-        atoms = Atoms(f"C{n}" if n else "", rng.random((n, 3)), cell=[3, 3, 3], pbc=True)
-        expected = neighborlist.neighbor_list(quantities, atoms, 1.5, self_interaction=selves)
-        found = ours.neighbor_list(quantities, atoms, 1.5, selves, max_nbins=10)
-        assert type(found) is type(expected)
-        if len(quantities) == 1:
-            expected, found = (expected,), (found,)
-        for a, b in zip(found, expected, strict=True):
-            assert (a.dtype, a.shape) == (b.dtype, b.shape)
-            assert a.flags.writeable and a.flags.c_contiguous
-
-
-def test_the_order_is_by_i_then_j_then_shift():
-    for selves in (False, True):
-        i, j, S = ours.neighbor_list("ijS", bulk("Cu") * (2, 1, 1), 5.0, self_interaction=selves)
-        rows = np.column_stack([i, j, S])
-        assert np.array_equal(np.lexsort(rows.T[::-1]), np.arange(len(rows)))
-
-
-def test_cells_that_are_completed_as_by_ase():
-    atoms = Atoms("H3", [(0, 0, 0), (0.4, 0, 0), (5.2, 0.3, 0)], cell=[3, 0, 0], pbc=[1, 0, 1])
-    expected, found = (m.neighbor_list("ijS", atoms, 1.3) for m in (neighborlist, ours))
-    rows = [{tuple(row) for row in np.column_stack(one).tolist()} for one in (expected, found)]
-    assert rows[0] == rows[1] and rows[0]
 
 
 def test_where_rounding_decides_ours_is_right():
@@ -230,18 +182,6 @@ def test_skin_and_updates_are_those_of_ase(name):
     atoms.pbc = True
     assert nl.update(atoms)
     assert nl.get_connectivity_matrix(sparse=False).shape == (2, 2)
-
-
-def test_rows_of_atoms_without_neighbours_are_empty():
-    for alone in ([0], [5], [0, 1, 4], [2, 3, 4, 5], range(6)):
-        points = np.zeros((6, 3))
-        points[list(alone)] = 10.0 * np.arange(1, len(alone) + 1)[:, None]
-        nls = [module.NewPrimitiveNeighborList([0.5] * 6, 0.0, False, False, True)
-               for module in (neighborlist, ours)]  # fmt: skip
-        for nl in nls:
-            nl.update(np.zeros(3, bool), np.eye(3), points)
-        expected, found = (nl.first_neigh for nl in nls)
-        assert found.dtype == expected.dtype and np.array_equal(found, expected)
 
 
 @pytest.mark.parametrize("name", PRIMITIVES)

@@ -66,17 +66,6 @@ def test_cutoffs(cutoff):
     assert as_set(*found).keys() == as_set(*wanted).keys()
 
 
-def test_parts_of_atoms():
-    atoms = STRUCTURES["skewed"]
-    parts = {"positions": atoms.positions, "cell": atoms.cell.array, "pbc": atoms.pbc}
-    whole = ours.neighbour_list("ijS", atoms, 4.0)
-    for one, other in zip(ours.neighbour_list("ijS", cutoff=4.0, **parts), whole, strict=True):
-        assert np.array_equal(one, other)
-    flat = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    assert ours.neighbour_list("j", positions=flat, cutoff=1.5).tolist() == [1, 0]
-    assert ours.neighbour_list("j", positions=flat, cutoff=1.0).tolist() == []
-
-
 @pytest.mark.parametrize(
     "arguments",
     [("x", "molecule", 2.0), ("i", "molecule", None), ("i", "molecule", "a"), ("i", None, 1.0)],
@@ -180,14 +169,6 @@ def test_jumps():
             ours.get_jump_indicies(wrong)
 
 
-def test_triplets_of_atoms_behind_some_without_neighbours():
-    first = ours.first_neighbours(5, [1, 1, 1, 3, 3])
-    assert first.tolist() == [-1, 0, 3, 3, 5, 5]
-    for more in ((), (np.arange(5.0), 3.5)):
-        found, wanted = (module.triplet_list(first, *more) for module in (ours, theirs))
-        assert [one.tolist() for one in found] == [one.tolist() for one in wanted]
-
-
 @pytest.mark.parametrize("name", STRUCTURES)
 def test_counts_and_matrices_are_those_of_lists(name):
     for cutoff in (2.0, 3.3):
@@ -240,9 +221,6 @@ def test_matrices_are_those_of_their_owner():
         atoms, 3.3, 8, array_namespace="dlpack"))  # fmt: skip
 
 
-SKEWED = np.array([[5.0, 0.0, 0.0], [4.9, 1.0, 0.0], [3.0, 3.0, 2.0]])
-
-
 def test_shortest_images(rng):
     vectors = rng.normal(size=(200, 3)) * 8.0
     box = np.diag([3.0, 4.0, 5.0])
@@ -254,20 +232,6 @@ def test_shortest_images(rng):
     for shape in ((3,), (0, 3), (2, 4, 3)):
         assert ours.mic(np.ones(shape), box).shape == shape
     assert ours.mic(vectors[:, :2], np.eye(2)).shape == (200, 2)
-
-
-def test_shortest_images_in_a_skewed_cell(rng):
-    """Rounded multiples of the vectors of the cell, as in matscipy, leave longer ones."""
-    vectors = rng.normal(size=(40, 3)) * 8.0
-    shifts = np.stack(np.meshgrid(*[np.arange(-30, 31)] * 3, indexing="ij"), -1).reshape(-1, 3)
-    found = ours.mic(vectors, SKEWED)
-    squares = (found**2).sum(axis=1)
-    for vector, square in zip(theirs.mic(vectors, SKEWED), squares, strict=True):
-        images = vector + shifts[abs(shifts).max(axis=1) < 8] @ SKEWED
-        assert abs((images**2).sum(axis=1).min() - square) < 1e-9
-    multiples = (found - vectors) @ np.linalg.inv(SKEWED)
-    assert np.allclose(multiples, np.rint(multiples), atol=1e-9)
-    assert (squares < (theirs.mic(vectors, SKEWED) ** 2).sum(axis=1) - 0.1).any()
 
 
 def test_the_shortest_of_images_that_seem_equal():
@@ -309,12 +273,6 @@ def test_triplets(name):
     assert not any((a, b) in pairs for a, b in zip(j[ij[~near]], j[ik[~near]], strict=True))
 
 
-def test_triplets_of_nothing():
-    for first in ([0], [0, 0], [0, 1, 1]):
-        assert [array.tolist() for array in ours.triplet_list(first)] == [[], []]
-    assert len(ours.triplet_list([0, 0], i_p=[], j_p=[])) == 3
-
-
 @pytest.mark.parametrize("periodic", [(1, 1, 1), (1, 0, 1), (0, 0, 0)])
 def test_points_in_spheres(periodic, rng):
     for r in (0.4, 0.9, 1.0, 2.5, 4.0):
@@ -330,16 +288,3 @@ def test_points_in_spheres(periodic, rng):
         sets = [as_set(i, j, d, S) for i, j, S, d in (found, wanted)]
         assert sets[0].keys() == sets[1].keys()
         assert all(abs(sets[0][key] - sets[1][key]) < 1e-9 for key in sets[0])
-
-
-def test_spheres_have_a_tolerance():
-    owner = pytest.importorskip("pymatgen.optimization.neighbors", reason="pymatgen is missing")
-    pbc, lattice = np.ones(3, np.int64), np.eye(3) * 9.0
-    for far in (0.5, 2.0):
-        points = np.array([[0.0, 0.0, 0.0], [far, 0.0, 0.0]])
-        for less in (0.0, 1e-12, 1e-9, 2.4e-9, 2.6e-9, 1e-8):
-            found, wanted = (
-                function(points, points[:1].copy(), far - less, pbc, lattice)[1]
-                for function in (find_points_in_spheres, owner.find_points_in_spheres)
-            )
-            assert sorted(found) == sorted(wanted)

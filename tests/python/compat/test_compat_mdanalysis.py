@@ -6,9 +6,6 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-import halfshell as hs
-from halfshell_report import scenes
-
 distances = pytest.importorskip("MDAnalysis.lib.distances", reason="MDAnalysis is not installed")
 from halfshell.compat import mdanalysis as ours  # noqa: E402
 
@@ -71,19 +68,6 @@ def test_pairs_of_two_sets(name, dtype, rng):
         assert_same(found, wanted, [largest, least or largest])
     one = ours.capped_distance(points[0], points, 4.0, box=box)
     assert_same(one, distances.capped_distance(points[0], points, 4.0, box=theirs), [4.0])
-
-
-@pytest.mark.parametrize("name", ["ortho", "triclinic"])
-def test_cutoffs_beyond_half_the_box_give_the_nearest_image_alone(name, rng):
-    points = scatter(rng, 30)
-    box = BOXES[name]
-    for cutoff in (5.0, 6.5, 12.0):
-        found = ours.self_capped_distance(points, cutoff, box=box)
-        wanted = distances.self_capped_distance(points, cutoff, box=box, method="bruteforce")
-        assert_same(found, wanted, [cutoff])
-        found = ours.capped_distance(points[:9], points, cutoff, box=box)
-        wanted = distances.capped_distance(points[:9], points, cutoff, box=box, method="bruteforce")
-        assert_same(found, wanted, [cutoff])
 
 
 OPEN_AXES = [
@@ -158,53 +142,6 @@ def test_pairs_at_the_lesser_cutoff_are_those_of_the_real_numbers(name):
     two = np.zeros((2, 3), np.float32)
     for least, kept in ((0.0, 0), (-1.0, 1), (-5e-324, 1), (np.nan, 0), (np.inf, 0)):
         assert len(ours.self_capped_distance(two, 1.0, least, BOXES[name])[0]) == kept
-
-
-def test_a_cutoff_of_half_a_height_counts_each_pair_once():
-    """The height is rounded, and both images are at the same distance."""
-    for length in np.linspace(3.0, 11.0, 50, dtype=np.float32):
-        x = np.array([[0.0, 0.0, 0.0], [length / 2, 0.0, 0.0]], np.float32)
-        box = [length, 20.0, 20.0, 90.0, 90.0, 90.0]
-        assert len(ours.self_capped_distance(x, float(length) / 2, box=box)[0]) == 1
-
-
-def test_nothing_to_find():
-    none = np.empty((0, 3), np.float32)
-    for cutoff in (1.0, -1.0):
-        for found in (
-            ours.self_capped_distance(none, cutoff),
-            ours.capped_distance(none, none, cutoff),
-        ):
-            assert found[0].shape == (0, 2) and found[1].shape == (0,)
-    two = np.zeros((2, 3), np.float32)
-    assert len(ours.self_capped_distance(two, -1.0)[0]) == 0
-    assert len(ours.self_capped_distance(two, 0.0)[0]) == 1
-
-
-def test_pairs_at_the_cutoff_are_those_of_the_real_numbers():
-    """The difference of these float32 is more than the cutoff, and rounds to it in float32."""
-    x = np.array([[-(2.0**-30), 0.0, 0.0], [1.0, 0.0, 0.0]], np.float32)
-    assert Fraction(float(x[1, 0])) - Fraction(float(x[0, 0])) > 1
-    assert np.float32(x[1, 0] - x[0, 0]) == 1
-    assert len(ours.self_capped_distance(x, 1.0)[0]) == 0
-    assert len(ours.self_capped_distance(x * np.float32(-1.0), 1.0)[0]) == 0
-    assert len(ours.self_capped_distance(np.abs(x), 1.0)[0]) == 1
-
-
-def test_scenes_of_the_package():
-    """The open ones in three dimensions, as far as float32 holds them."""
-    tried = 0
-    for name in scenes.names():
-        scene = scenes.load(name, "small")
-        with np.errstate(over="ignore", under="ignore"):
-            points = scene.points.astype(np.float32)
-        if points.shape[1] == 3 and scene.box is None and np.isfinite(points).all():
-            found = ours.self_capped_distance(points, scene.cutoff)
-            i, j, d = hs.pairs(points, scene.cutoff, quantities="ijd")
-            assert np.array_equal(found[0], np.column_stack([i, j]))
-            assert np.array_equal(found[1], d)
-            tried += 1
-    assert tried >= 3
 
 
 def test_what_the_original_refuses():

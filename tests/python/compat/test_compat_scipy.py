@@ -3,7 +3,6 @@
 rounding does not decide."""
 
 import itertools
-import pickle
 import subprocess
 import sys
 from fractions import Fraction
@@ -166,50 +165,6 @@ def test_sparse_matrices_are_those_of_scipy(rng, name, box):
     assert type(tree.sparse_distance_matrix(tree, 0.3)).__name__ == "dok_matrix"
 
 
-@pytest.mark.parametrize("m", [1, 2, 5, 8, 9])
-def test_other_dimensions_norms_and_approximations(rng, m):
-    theirs, tree = both("KDTree", rng.random((100, m)))
-    for options in ({}, {"p": 1}, {"p": np.inf}, {"p": 3.5}, {"eps": 0.1}, {"eps": 0.1, "p": 1}):
-        r = 0.3 * m**0.5
-        alike(tree.query(theirs.data, 2, **options), theirs.query(theirs.data, 2, **options))
-        alike(tree.query_pairs(r, **options), theirs.query_pairs(r, **options))
-        found, expected = (
-            one.query_ball_point(theirs.data, r, return_sorted=True, **options)
-            for one in (tree, theirs)
-        )
-        alike(found, expected)
-        if "eps" not in options:
-            alike(tree.count_neighbors(tree, r, **options),
-                  theirs.count_neighbors(theirs, r, **options))  # fmt: skip
-
-
-def test_attributes_pickles_and_trees_of_both_kinds(rng):
-    points = rng.random((50, 2))
-    for name in TREES:
-        theirs, tree = both(name, points, leafsize=3, boxsize=[1.0, 2.0])
-        assert isinstance(tree, getattr(spatial, name)) and np.shares_memory(tree.data, points)
-        assert (tree.data is points) == (theirs.data is points)  # a view since SciPy 1.18
-        for attribute in ("n", "m", "leafsize", "size"):
-            assert getattr(tree, attribute) == getattr(theirs, attribute)
-        for attribute in ("maxes", "mins", "boxsize"):
-            assert np.array_equal(getattr(tree, attribute), getattr(theirs, attribute))
-        again = pickle.loads(pickle.dumps(tree))
-        assert type(again) is type(tree)
-        assert again.query_pairs(0.1) == tree.query_pairs(0.1) == theirs.query_pairs(0.1)
-        alike(tree.query_ball_tree(theirs, 0.1), theirs.query_ball_tree(tree, 0.1))
-        open_one = getattr(ours, name)(points)
-        their_open = getattr(spatial, name)(points)
-        alike(tree.query_ball_tree(open_one, 0.1), theirs.query_ball_tree(their_open, 0.1))
-
-
-def test_points_are_copied_if_wanted(rng):
-    points = rng.random((50, 2))
-    tree = ours.KDTree(points, copy_data=True)
-    expected = tree.query_pairs(0.2)
-    points[:] = 0.0
-    assert tree.query_pairs(0.2) == expected
-
-
 CALLS = [
     lambda tree: tree.query([[0.0]]),
     lambda tree: tree.query([[np.nan, 0.0]]),
@@ -272,9 +227,6 @@ def test_ranks_below_1_are_refused(name, n):
 
 # ---- exact decisions -----------------------------------------------------------------------
 
-#: Apart by 0.2, 0.2 and 0.1 or so: as floats just closer than 0.3, which rounding makes a tie.
-CLOSE = np.array([[0.5, 0.3, 0.6], [0.7, 0.5, 0.5]])
-
 
 def square(a, b):
     return sum((Fraction(y) - Fraction(x)) ** 2 for x, y in zip(a.tolist(), b.tolist()))
@@ -309,16 +261,6 @@ def test_where_rounding_decides_ours_is_right(inside):
     assert tree.sparse_distance_matrix(tree, r).nnz == 2 + 2 * inside
 
 
-def test_neighbours_below_a_bound_are_decided_exactly():
-    """The bound itself is not below it, and what is less by a hair is."""
-    assert square(*CLOSE) < Fraction(0.3) ** 2
-    d, i = ours.KDTree(CLOSE).query(CLOSE[0], 2, distance_upper_bound=0.3)
-    assert i.tolist() == [0, 1] and d[1] <= 0.3
-    tree = ours.KDTree([[0.0], [1.0], [0.5]])
-    for bound, expected in ((1.0, [0, 2, 3]), (np.nextafter(1.0, 2.0), [0, 2, 1])):
-        assert tree.query([0.0], 3, distance_upper_bound=bound)[1].tolist() == expected
-
-
 def test_few_queries_of_a_lattice_are_decided_exactly():
     """Those for which the tree finds candidates; against fractions, at every radius of a shell."""
     points = np.stack(np.meshgrid(*[0.1 * np.arange(12)] * 3), -1).reshape(-1, 3)
@@ -342,17 +284,3 @@ def test_few_queries_of_a_lattice_are_decided_exactly():
         i = tree.query(query, 40)[1]
         close = sorted(range(len(points)), key=lambda k: (square(query, points[k]), k))
         assert i.tolist() == close[:40]
-
-
-def test_periodic_distances_of_lattices_are_decided_exactly():
-    points = np.stack(np.meshgrid(*[0.1 * np.arange(10)] * 2), -1).reshape(-1, 2)
-    tree = ours.KDTree(points, boxsize=1.0)
-    for r in (0.1, 0.2, 0.1 * 2**0.5):
-        found = tree.query_pairs(r)
-        exact = set()
-        for i in range(len(points)):
-            for j in range(i):
-                axes = (abs(Fraction(a) - Fraction(b)) for a, b in zip(*points[[i, j]].tolist()))
-                if sum(min(x, 1 - x) ** 2 for x in axes) <= Fraction(r) ** 2:
-                    exact.add((j, i))
-        assert found == exact

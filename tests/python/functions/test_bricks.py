@@ -10,38 +10,7 @@ import pytest
 import brick_scenes
 import halfshell as hs
 
-
-def shear(ndim, length, step):
-    return length * np.eye(ndim) + step * length * np.eye(ndim, k=-1)
-
-
-def scenes():
-    rng = np.random.default_rng(0)
-    for ndim in (1, 2, 3, 5):
-        points = rng.random((120, ndim)) * 6.0 - 1.0
-        yield f"open-{ndim}", points, 0.4 * ndim, {}
-        yield f"box-{ndim}", points, 0.4 * ndim, {"box": [4.0] * ndim}
-        mixed = {"box": shear(ndim, 4.0, 0.4), "periodic": [k % 2 == 0 for k in range(ndim)]}
-        yield f"mixed-{ndim}", points, 0.4 * ndim, mixed
-    points = rng.random((90, 3))
-    yield "skewed", points * 9.0 - 4.0, 0.7, {"box": shear(3, 2.5, 1.7)}
-    yield "images", points[:9] * 2.0, 2.3, {"box": shear(3, 1.0, 0.3)}
-    yield "single", (points * 5.0).astype(np.float32), 0.8, {"box": [5.0] * 3}
-    far = np.repeat([0.0, 1e9, -3e12], 30)[:, None]
-    yield "clusters", points + far, 0.3, {}
-    yield "clusters in a box", points + far, 0.3, {"box": [7.0] * 3}
-    lattice = np.stack(np.meshgrid(*[np.arange(6.0)] * 2), -1).reshape(-1, 2)
-    yield "on the cuts", lattice, 1.0, {"box": [6.0, 6.0]}
-    yield "negative zeros", np.where(lattice == 0.0, -0.0, lattice), 1.0, {"box": [6.0, 6.0]}
-    yield "one place", np.zeros((20, 2)), 0.0, {"box": [1.0, 1.0]}
-    yield "one point", np.ones((1, 3)), 1.5, {"box": [1.0] * 3}
-    yield "none", np.empty((0, 3)), 1.0, {"box": [1.0] * 3}
-    yield "huge", points * 1e300, 1e299, {}
-    yield "tiny", points * 1e-300, 1e-301, {"box": [1e-300] * 3}
-    yield "far from the box", points[:, :2] + [1e14, 0.0], 0.2, {"box": [1.0, 1.0]}
-
-
-SCENES = {**{name: rest for name, *rest in scenes()}, **brick_scenes.scenes()}
+SCENES = brick_scenes.scenes()
 
 
 @pytest.mark.parametrize("name, n", [*zip(SCENES, itertools.cycle([7, 2, 40, 3]))])
@@ -92,21 +61,6 @@ def test_a_box_that_no_cutoff_of_0_can_be_searched_in():
     assert hs.count_pairs(points, 4.0, **scene) == 102
 
 
-@pytest.mark.parametrize("inclusive", [False, True])
-def test_rules_and_quantities(inclusive):
-    points, cutoff, options = SCENES["on the cuts"]
-    how = {"inclusive": inclusive, "threads": 2}
-    whole = hs.pairs(points, cutoff, sort=True, quantities="P", **options, **how)
-    parts = hs.bricks(points, cutoff, 5, **options)
-    with hs.settings(kernel="scalar"):
-        found = np.concatenate([part.pairs(points, quantities="P", **how) for part in parts])
-    assert sorted(map(tuple, found.tolist())) == sorted(map(tuple, whole.tolist()))
-    assert sum(part.count_pairs(points, **how) for part in parts) == len(whole)
-    assert [len(part.pairs(points, quantities="d", **how)) for part in parts] == [
-        part.count_pairs(points, **how) for part in parts
-    ]
-
-
 def test_bricks_follow_the_points():
     rng = np.random.default_rng(1)
     points = np.concatenate((rng.random((900, 3)), 1e6 + rng.random((100, 3))))
@@ -117,15 +71,6 @@ def test_bricks_follow_the_points():
     uniform = rng.random((20000, 3))
     assert hs.bricks(uniform, 0.02, 8, box=[1.0] * 3).overhead < 1.3
     assert hs.bricks(uniform, 0.6, 8, box=[1.0] * 3).overhead == 8.0
-
-
-def test_they_are_sent_elsewhere():
-    points, cutoff, options = SCENES["skewed"]
-    for part in hs.bricks(points, cutoff, 4, **options):
-        copy = pickle.loads(pickle.dumps(part))
-        held = points[copy.members].copy()
-        for one, other in zip(copy.pairs(held), part.pairs(points), strict=True):
-            assert np.array_equal(one, other)
 
 
 def test_they_show_themselves():

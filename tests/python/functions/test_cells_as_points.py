@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A `CellList` in place of points, for all searches, and its pickles and candidates."""
 
-import concurrent.futures
-import multiprocessing
 import pickle
 
 import numpy as np
@@ -62,31 +60,6 @@ def test_searches_of_cells_are_those_of_their_points(name):
             assert same_arrays(as_arrays(search(cells)), as_arrays(search(points)))
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_what_is_known_of_their_points_counts(name):
-    points = hs.Points(X, **KNOWN, **SCENES[name])
-    cells = hs.CellList(points, 0.3)
-    for search in (
-        lambda p: hs.pairs(p, None, sort=True, exclude=1),
-        lambda p: hs.coordination(p, None, rule="gather"),
-        lambda p: hs.pair_histogram(p, [0.0, 0.3], by_type=True),
-        lambda p: hs.coordination(p, 0.3, by_type=True),
-        lambda p: hs.clusters(p, None).centers(),
-    ):
-        assert same_arrays(as_arrays(search(cells)), as_arrays(search(points)))
-    bare = points.replace(radii=None)
-    cutoffs = {(0, 1): 0.3, ("*", "*"): 0.1}
-    found = hs.CellList(bare, 0.3).pairs(cutoffs, sort=True)
-    assert same_arrays(found, hs.pairs(bare, cutoffs, sort=True))
-    # A radius of each query, whatever the points have.
-    plain = hs.CellList(X, 0.3, **SCENES[name])
-    chosen = plain.query(QUERIES, 0.2).counts
-    near = hs.CellList(bare.replace(groups=None, radii=KNOWN["radii"]), 0.3)
-    assert np.array_equal(near.query(QUERIES, 0.2).counts, chosen)
-    each = np.linspace(0.0, 0.5, 30)
-    assert np.array_equal(near.query(QUERIES, each).counts, plain.query(QUERIES, each).counts)
-
-
 def test_what_cells_are_not():
     cells = hs.CellList(X, 0.3, box=SKEWED)
     with pytest.raises(ValueError, match="Points bring their own box: leave box out"):
@@ -107,12 +80,10 @@ def test_pickles_are_the_same_cells(name):
     assert same_arrays(again.pairs(exclude=0), cells.pairs(exclude=0))
 
 
-def count_of(cells):
-    return cells.count_pairs()
-
-
-def test_other_processes_get_them():
-    cells = hs.CellList(X, 0.3, box=SKEWED)
-    context = multiprocessing.get_context("spawn")
-    with concurrent.futures.ProcessPoolExecutor(1, mp_context=context) as pool:
-        assert pool.submit(hs.CellList.count_pairs, cells).result() == count_of(cells)
+def test_queries_with_a_radius_each_do_not_look_at_those_of_the_points():
+    for box in SCENES.values():
+        plain = hs.CellList(X, 0.3, **box)
+        near = hs.CellList(hs.Points(X, radii=KNOWN["radii"], **box), 0.3)
+        for radius in (0.2, np.linspace(0.0, 0.5, 30)):
+            assert np.array_equal(near.query(QUERIES, radius).counts,
+                                  plain.query(QUERIES, radius).counts)  # fmt: skip

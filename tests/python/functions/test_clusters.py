@@ -92,19 +92,6 @@ def test_core_points_are_those_of_the_definition(name, rng):
         assert np.array_equal(found.sizes, np.bincount(labels[labels >= 0]))
 
 
-@pytest.mark.parametrize("dim", range(1, 9))
-def test_any_dimension(dim, rng):
-    for dtype in (np.float32, np.float64):
-        points = rng.random((60, dim)).astype(dtype)
-        cutoff = 0.5 * 60 ** (-1.0 / dim) if dim > 1 else 0.01
-        for options in [{}, {"box": [1.0] * dim}]:
-            i, j = call(hs.pairs, points, cutoff, **options)
-            found = call(hs.clusters, points, cutoff, **options)
-            assert np.array_equal(found.labels, components(60, i, j))
-            assert found.spans.shape == (len(found.sizes), dim) and found.spans.dtype == bool
-            assert options or not found.spans.any()
-
-
 @pytest.mark.parametrize("periodic", list(itertools.product([True, False], repeat=3)))
 def test_clusters_span_a_box_as_copies_of_them_hang_together(periodic, rng):
     for trial in range(6):
@@ -116,76 +103,6 @@ def test_clusters_span_a_box_as_copies_of_them_hang_together(periodic, rng):
         for k, spans in enumerate(found.spans):
             members = found.labels == k
             assert spans.tolist() == spanned(points, members, cutoff, rows, periodic)
-
-
-def test_a_point_that_meets_its_own_image_spans_the_box():
-    found = hs.clusters([[0.5, 0.5]], 1.0, box=[1.0, 3.0])
-    assert found.spans.tolist() == [[True, False]]
-    diagonal = hs.clusters([[0.0, 0.0]], 1.0, box=[[0.5, 0.5], [0.0, 9.0]])
-    assert diagonal.spans.tolist() == [[True, False]]
-
-
-def test_a_ring_within_the_box_does_not_span_it():
-    angles = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
-    ring = np.column_stack([np.cos(angles), np.sin(angles)])
-    for offset in (0.0, 1.7, 40.0):  # across the faces of the box, too
-        found = hs.clusters(ring + offset, 0.2, box=[4.0, 4.0])
-        assert found.sizes.tolist() == [40] and not found.spans.any()
-
-
-def test_the_cutoff_is_decided_exactly():
-    points = np.array([[0.0], [0.1], [0.1 + 0.2]])  # 0.30000000000000004 - 0.1 rounds to 0.2
-    assert hs.clusters(points, 0.2).labels.tolist() == [0, 0, 1]
-    assert hs.clusters([[0.0], [1.0]], 1.0, inclusive=False).labels.tolist() == [0, 1]
-
-
-def test_radii_types_and_supports(rng):
-    points = rng.random((200, 3))
-    radii = rng.uniform(0.01, 0.1, 200)
-    types = rng.integers(0, 2, 200)
-    ways = [
-        {"cutoff": None, "radii": radii},
-        {"cutoff": None, "radii": radii * 4.0 ** rng.integers(-4, 1, 200), "rule": "max"},
-        {"cutoff": {(0, 0): 0.12, (1, 1): 0.05}, "types": types},
-        {"cutoff": None, "supports": np.eye(3) / radii[:, None, None], "extent": 1.2},
-    ]
-    for way, options in itertools.product(ways, BOXES.values()):
-        i, j = call(hs.pairs, points, **way, **options)
-        found = call(hs.clusters, points, **way, **options)
-        assert np.array_equal(found.labels, components(200, i, j))
-        found = call(hs.clusters, points, min_points=3, **way, **options)
-        counts = np.bincount(np.concatenate([i, j]), minlength=200) + 1
-        assert np.array_equal(found.core, counts >= 3)
-
-
-def test_labels_are_those_of_scikit_learn(rng):
-    cluster = pytest.importorskip("sklearn.cluster", reason="scikit-learn is not installed")
-    centres = rng.random((20, 3))
-    points = np.concatenate([c + 0.03 * rng.standard_normal((60, 3)) for c in centres])
-    for least in (1, 4, 12):
-        other = cluster.DBSCAN(eps=0.04, min_samples=least).fit(points)
-        found = hs.clusters(points, 0.04, min_points=least)
-        assert np.array_equal(found.labels, other.labels_)
-        assert np.array_equal(np.flatnonzero(found.core), other.core_sample_indices_)
-
-
-@pytest.mark.parametrize(
-    ("options", "error", "message"),
-    [
-        ({"min_points": 0}, ValueError, "min_points"),
-        ({"min_points": 2.5}, TypeError, "min_points"),
-        ({"min_points": True}, TypeError, "min_points"),
-        ({"rule": "gather", "radii": [1.0] * 3, "cutoff": None}, ValueError, "gather"),
-        ({"cutoff": -1.0}, ValueError, "cutoff"),
-        ({"cutoff": [1.0, 2.0]}, TypeError, "cutoff"),
-        ({"points": [[np.nan]]}, ValueError, r"points\[0, 0\] = nan"),
-        ({"box": [1.0], "periodic": True, "kernel": "none"}, ValueError, "kernel"),
-    ],
-)
-def test_bad_arguments(options, error, message):
-    arguments = {"points": [[0.0], [1.0], [2.0]], "cutoff": 1.0, **options}
-    with pytest.raises(error, match=message):
-        call(hs.clusters, **arguments)
 
 
 def test_the_memory_limit_holds_for_what_is_noted_for_each_point(rng):
@@ -222,14 +139,6 @@ def test_unwrapped_clusters_are_whole(periodic, rng):
             found = hs.clusters(points, cutoff, box=rows, periodic=periodic)
             assert found.sizes.max() > 2
             whole_by_fractions(points, found, cutoff, rows, periodic)
-
-
-@pytest.mark.parametrize("dim", range(1, 9))
-def test_unwrapping_in_any_dimension(dim, rng):
-    points = rng.random((50, dim)).astype(np.float32)
-    cutoff = 0.45 * 50 ** (-1.0 / dim) if dim > 1 else 0.02
-    whole_by_fractions(points, hs.clusters(points, cutoff, box=[1.0] * dim), cutoff, np.eye(dim),
-                       [True] * dim)  # fmt: skip
 
 
 def test_a_chain_across_faces_is_one_line():
@@ -292,14 +201,3 @@ def test_clusters_of_a_batch_are_those_of_each_system(least, rng):
         assert np.allclose(found.centers()[some], alone.centers())
         first, number = own.stop, some.stop
     assert found.n_clusters == number > 5
-
-
-def test_exclusions_and_groups_join_nothing(rng):
-    points = rng.random((60, 2))
-    groups = rng.integers(0, 3, 60)
-    found = hs.clusters(
-        hs.Points(points, groups=groups, labels=np.arange(60) // 2), 0.15, exclude=0
-    )
-    i, j = hs.pairs(points, 0.15)
-    kept = (groups[i] == groups[j]) & (i // 2 != j // 2)
-    assert np.array_equal(found.labels, components(60, i[kept], j[kept]))

@@ -28,3 +28,11 @@ def test_pairs_that_count(form, seeds):
 @pytest.mark.parametrize("seeds", SEEDS, ids=str)
 def test_pairs_of_each_system(form, seeds):
     assert sum(Scene(2000 + seed, form, 30).choose().divide().check() for seed in seeds) > 5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", FORMS)
+def test_many_more_scenes(form):
+    for seed in range(60, 400):
+        Scene(seed, form).choose().check()
+        Scene(2000 + seed, form, 20).choose().divide().check()

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What `explain` says is what the search does."""
 
-import os
 
 import numpy as np
 import pytest
@@ -29,20 +28,6 @@ def test_it_names_the_kernel_and_the_algorithm(scene):
             assert word in str(plan)
 
 
-def test_the_default_kernel_is_the_first_or_what_the_environment_says(scene):
-    points, cutoff, box = scene
-    expected = os.environ.get("HALFSHELL_KERNEL") or hs.kernels()[0]
-    assert hs.explain(points, cutoff, box=box).kernel == expected
-
-
-def test_shapes_have_one_entry_per_axis(rng):
-    for ndim in range(1, 9):
-        plan = hs.explain(rng.random((50, ndim)), 0.3, box=np.ones(ndim))
-        assert len(plan.shape) == len(plan.cell_sizes) == len(plan.images) == ndim
-        assert all(k >= 1 for k in plan.shape)
-        assert all(size > 0 for size in plan.cell_sizes)
-
-
 def test_expected_pairs_are_near_the_truth_for_even_points(rng):
     for n, neighbours in ((500, 30), (5000, 20), (20_000, 5)):
         for ndim in (2, 3):
@@ -61,13 +46,6 @@ def test_bytes_follow_the_quantities(scene):
         assert plan.expected_bytes == pytest.approx(size * plan.expected_pairs)
     plan = hs.explain(points, cutoff, box=box, index_dtype=np.int32)
     assert plan.expected_bytes == pytest.approx(8 * plan.expected_pairs)
-
-
-def test_without_measuring_nothing_is_measured(scene):
-    points, cutoff, box = scene
-    assert not hs.explain(points, cutoff, box=box).measured
-    # 2e10 pairs would take minutes to find
-    assert hs.explain(np.zeros((200_000, 3)), 1.0).n == 200_000
 
 
 def test_measured_counters_add_up(scene):
@@ -133,24 +111,3 @@ def test_what_is_not_asked_for_costs_no_byte(scene):
     ).measured["bytes"]
     for purpose in ("distances", "vectors", "shifts", "sorting"):
         assert more[purpose] > 0, purpose
-
-
-def test_it_says_what_is_left_out(rng):
-    flat = hs.explain(rng.random((50, 2)), 0.1)
-    text = " ".join(flat.leaves_out)
-    assert "z" in text and "images" in text and "distances" in text
-    everything = hs.explain(rng.random((50, 3)), 0.4, box=[1.0] * 3, quantities="ijdDS", sort=True)
-    text = " ".join(everything.leaves_out)
-    for word in ("distances", "vectors", "shifts", "sorting of pairs"):
-        assert word not in text
-
-
-def test_memory_of_the_search_grows_with_the_points_not_with_the_volume(rng):
-    points = rng.random((2000, 3))
-    peaks = []
-    for size in (1e2, 1e4, 1e8):
-        peaks.append(hs.explain(points * size, 1.0, measure=True).measured["bytes_peak"])
-        peaks.append(
-            hs.explain(points * size, 1.0, box=[size] * 3, measure=True).measured["bytes_peak"]
-        )
-    assert max(peaks) < 2_000_000

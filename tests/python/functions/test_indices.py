@@ -3,13 +3,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import halfshell as hs
 from calls import call
-from oracles import as_set, random_scene
-from scene_strategies import scenes
+from oracles import random_scene
 
 
 def same(table, whole, numbers):
@@ -17,72 +14,6 @@ def same(table, whole, numbers):
     for k, number in enumerate(numbers):
         for ours, theirs in zip(table[k], whole[number], strict=True):
             assert ours.dtype == theirs.dtype and ours.tobytes() == theirs.tobytes()
-
-
-@given(scenes(), st.data())
-def test_rows_are_those_of_the_whole_table(scene, data):
-    n = len(scene.points)
-    some = st.lists(st.integers(0, n - 1), max_size=8) if n else st.just([])
-    numbers = data.draw(some)
-    how = {"box": scene.box, "periodic": scene.periodic, "inclusive": scene.inclusive}
-    whole = call(hs.neighbors, scene.points, scene.cutoff, quantities="jdDS", **how)
-    table = call(
-        hs.neighbors, scene.points, scene.cutoff, quantities="jdDS", indices=numbers, **how
-    )
-    same(table, whole, numbers)
-    same(table.sort(), whole.sort(), numbers)
-    cells = hs.CellList(scene.points, scene.cutoff, box=scene.box, periodic=scene.periodic)
-    how_cells = {"inclusive": scene.inclusive, "indices": numbers}
-    table = cells.neighbors(quantities="jdDS", **how_cells)
-    same(table, whole, numbers)
-    same(table.sort(), whole.sort(), numbers)
-    assert cells.coordination(**how_cells).tolist() == whole.counts[numbers].tolist()
-    counts = call(hs.coordination, scene.points, scene.cutoff, indices=numbers, **how)
-    assert counts.dtype == np.int64 and counts.tolist() == whole.counts[numbers].tolist()
-
-
-@pytest.mark.parametrize("what", ["groups", "labels", "pairs", "min_distance"])
-def test_of_a_batch_what_counts_is_that_of_the_whole_table(rng, what):
-    n = 60
-    known = {"groups": rng.integers(0, 2, n), "labels": rng.integers(0, 9, n)}
-    how = {
-        "labels": {"exclude": 1}, "pairs": {"exclude": rng.integers(0, n, (80, 2))},
-        "min_distance": {"min_distance": 0.3},
-    }.get(what, {})  # fmt: skip
-    points = hs.Points(
-        rng.random((n, 3)), box=[1.0, 1.1, 0.9], batch=np.repeat([0, 1, 3], [25, 5, 30]),
-        **{name: known[name] for name in known if name == what},
-    )  # fmt: skip
-    numbers = rng.permutation(n)[:20]
-    whole = hs.neighbors(points, 0.7, quantities="jdS", **how)
-    assert 0 < len(whole.indices) < len(hs.neighbors(hs.Points(
-        points.positions, box=points.box, batch=points.batch), 0.7).indices)  # fmt: skip
-    same(hs.neighbors(points, 0.7, quantities="jdS", indices=numbers, **how), whole, numbers)
-
-
-def test_many_images_and_equal_points(rng):
-    points = np.repeat(rng.random((40, 3)), 3, axis=0).astype(np.float32)
-    numbers, box = rng.integers(0, 120, 50), [0.9, 1.1, 0.7]
-    for kernel, threads in zip(hs.kernels(), (1, 3, 1, 3)):
-        how = {"box": box, "kernel": kernel, "threads": threads}
-        whole = call(hs.neighbors, points, 1.3, quantities="jDSd", **how)
-        how["indices"] = numbers
-        same(call(hs.neighbors, points, 1.3, quantities="jDSd", **how), whole, numbers)
-        bare = call(hs.neighbors, points, 1.3, quantities="S", index_dtype=np.int32, **how)
-        assert np.array_equal(bare.shifts, np.concatenate([whole[k][2] for k in numbers]))
-        lacking = call(hs.neighbors, points, 1.3, quantities="jd", **how)
-        del how["indices"]
-        same(
-            lacking.sort(), call(hs.neighbors, points, 1.3, quantities="jd", **how).sort(), numbers
-        )
-
-
-def test_nothing_is_within_an_open_cutoff_of_zero():
-    points = np.zeros((3, 2))
-    assert hs.coordination(points, 0.0, inclusive=False, indices=[1]).tolist() == [0]
-    assert hs.coordination(points, 0.0, indices=[1, 1]).tolist() == [2, 2]
-    empty = hs.neighbors(np.empty((0, 3)), 1.0, indices=[])
-    assert empty.shape == (0, 0) and hs.neighbors(points, 1.0, indices=[]).shape == (0, 3)
 
 
 def test_what_does_not_go_with_indices():
@@ -108,36 +39,6 @@ def test_what_does_not_go_with_indices():
 LETTERS = "ijdDSP"
 
 
-def choices(n):
-    """Some points, none and all, in any order."""
-    some = [[], [0], [n - 1], list(range(n))[::-1], list(range(0, n, 3)), [2, 0, 5, 1]]
-    return [numbers for numbers in some if all(0 <= k < n for k in numbers)]
-
-
-def touches(i, j, numbers):
-    return np.isin(i, numbers) | np.isin(j, numbers)
-
-
-def assert_part(points, cutoff, numbers, find=hs.pairs, **how):
-    """The sorted result has the bytes of the plain list; the other is the same set, in order."""
-    whole = call(hs.pairs, points, cutoff, quantities=LETTERS, sort=True, **how)
-    part = touches(whole[0], whole[1], numbers)
-    options = {"quantities": LETTERS, "indices": numbers}
-    found = call(find, points, cutoff, sort=True, **options, **how)
-    for got, wanted in zip(found, whole, strict=True):
-        assert got.dtype == wanted.dtype
-        assert got.shape == wanted[part].shape
-        assert got.tobytes() == wanted[part].tobytes()
-        assert got.flags.c_contiguous
-        assert got.flags.writeable
-    i, j, d, D, S, P = call(find, points, cutoff, **options, **how)
-    assert as_set(i, j, S) == as_set(found[0], found[1], found[4])
-    assert (P == np.stack([i, j], axis=1)).all()
-    order = np.lexsort((*S.T[::-1], j, i))
-    for got, wanted in zip((d, D), found[2:4], strict=True):
-        assert got[order].tobytes() == wanted.tobytes()
-
-
 def test_same_bytes_for_each_kernel_number_of_threads_and_algorithm(rng):
     for kernel in hs.kernels():
         points, box, numbers = rng.random((3000, 3)), np.ones(3), rng.permutation(3000)[:500]
@@ -150,22 +51,6 @@ def test_same_bytes_for_each_kernel_number_of_threads_and_algorithm(rng):
                 )  # fmt: skip
                 for one, other in zip(found, wanted, strict=True):
                     assert one.tobytes() == other.tobytes()
-
-
-def test_cells(rng):
-    points, cutoff, box, _ = random_scene(rng, 200, neighbours=20)
-
-    def find(points, cutoff, box=None, **how):
-        return hs.CellList(points, 1.5 * cutoff, box=box).pairs(cutoff, **how)
-
-    for numbers in choices(200):
-        assert_part(points, cutoff, numbers, find, box=box)
-        assert_part(points.astype(np.float32), cutoff, numbers, find)
-    cells = hs.CellList(points, cutoff, box=box)
-    alone = hs.pairs(points, cutoff, box=box, indices=[7], sort=True)
-    points[:] = 0.0  # the list has its own
-    for one, other in zip(cells.pairs(indices=[7], sort=True), alone, strict=True):
-        assert np.array_equal(one, other)
 
 
 @pytest.mark.parametrize("index_dtype", [np.int32, np.int64])
@@ -196,12 +81,6 @@ def test_any_letters_and_arrays_of_the_caller(index_dtype, rng):
             call(hs.pairs, points, cutoff, quantities=quantities, out=wrong, **options)
 
 
-def test_few_among_many(rng):
-    points = rng.random((20_000, 3))
-    for numbers in ([7], [11, 3], list(range(0, 20_000, 7))):
-        assert_part(points, 0.03, numbers, box=[1.0] * 3)
-
-
 def test_a_shift_that_fits_one_way_only():
     points, box = np.array([[0.0], [2.0**31]]), [1.0]
     with pytest.raises(OverflowError):
@@ -230,19 +109,8 @@ def test_bad_numbers(indices, error, message):
         hs.pairs(POINTS, 1.0, indices=indices)
     with pytest.raises(error, match=message):
         hs.CellList(POINTS, 1.0).pairs(indices=indices)
-
-
-def test_what_does_not_go_together():
-    cells = hs.CellList(POINTS, 2.0)
-    for find in (lambda *a, **how: call(hs.pairs, POINTS, *a, **how), cells.pairs):
-        with pytest.raises(ValueError, match="needs several cutoffs, got one"):
-            find(1.0, indices=[0], quantities="k")
-        with pytest.raises(ValueError, match="some of the letters i j d D S P k, each at most"):
-            find(1.0, indices=[0], quantities="x")
-    with pytest.raises(ValueError, match="indices cannot be combined with precision 'single'"):
-        call(hs.pairs, POINTS, 1.0, indices=[0], precision="single")
-    with pytest.raises(ValueError, match="there are no points"):
-        hs.pairs(np.zeros((0, 2)), 1.0, indices=[0])
+    with pytest.raises(ValueError, match="some of the letters i j d D S P k, each at most"):
+        hs.pairs(POINTS, 1.0, indices=[0], quantities="x")
 
 
 def test_some_points_of_systems_with_groups_and_exclusions(rng):
@@ -320,48 +188,6 @@ def test_blocks_of_some_points_are_of_what_was_given(rng):
 
 
 # ---- counted by distance ---------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("batched", [False, True, "boxes"])
-def test_histograms_count_the_pairs_of_some_points(batched, rng):
-    n, edges = 90, np.array([0.0, 0.5, 1.0, 1.0, 1.5, 2.0])
-    x = rng.integers(0, 12, (n, 3)) * 0.25  # many distances are edges
-    known = {"types": rng.integers(0, 3, n), "groups": rng.integers(0, 2, n), "box": [3.0] * 3}
-    if batched:
-        known["batch"] = np.sort(rng.integers(0, 4, n))
-    if batched == "boxes":
-        known["box"] = [np.diag([3.0, 3.5, 3.0 + s]) for s in range(5)]
-    bonds = rng.integers(0, n, (200, 2))
-    for fields, how in (
-        ({}, {}),
-        ({"groups": known["groups"]}, {"min_distance": 0.25}),
-        ({}, {"exclude": bonds}),
-        ({"labels": np.arange(n) // 4}, {"exclude": 1, "min_distance": 0.5}),
-    ):
-        points = hs.Points(x, **{**known, "groups": None, **fields})
-        for some in (rng.permutation(n)[:25], np.arange(n), [], [7]):
-            # Which bin: by the distances of a lattice, whose squares are exact.
-            i, j, D = hs.pairs(points, 2.0, indices=some, quantities="ijD", **how)
-            place = np.searchsorted(edges**2, (D**2).sum(axis=1), "right") - 1
-            place[(D**2).sum(axis=1) == 4.0] = 4
-            counts = np.zeros((points.n_systems, 3, 3, 5), np.int64)
-            s = np.zeros(len(i), int) if points.batch is None else points.batch[i]
-            a, b = points.types[i], points.types[j]
-            np.add.at(counts, (s, a, b, place), 1)
-            np.add.at(counts, (s[a != b], b[a != b], a[a != b], place[a != b]), 1)
-            counts = counts if batched else counts[0]
-            told = []
-            found = hs.pair_histogram(
-                points, edges, indices=some, by_type=True, progress=told.append, **how
-            )
-            assert found.dtype == np.int64 and np.array_equal(found, counts)
-            assert told == sorted(told)
-            upper = np.triu(np.ones((3, 3), np.int64))[:, :, None]
-            plain = hs.pair_histogram(points, edges, indices=some, **how)
-            assert np.array_equal(plain, (counts * upper).sum(axis=(-3, -2)))
-        if not batched:
-            cells = hs.CellList(points, 2.0)
-            assert np.array_equal(cells.pair_histogram(edges, indices=some, **how), plain)
 
 
 def test_histograms_of_some_points_that_are_refused():

@@ -111,20 +111,6 @@ def test_ties_go_to_the_least_shift(box):
     assert not S.any()
 
 
-@pytest.mark.parametrize("dim", [4, 8])
-def test_many_images_are_equally_near(dim):
-    half = np.full((2, dim), 0.5)
-    half[0] = 0.0
-    _, _, S = hs.measure(half, [0, 1], [1, 0], box=np.eye(dim))
-    assert S.tolist() == [[-1] * dim, [0] * dim]
-    rows = np.eye(dim)  # D_n: even sums, whose deep holes have 2**dim / 2 or 2 dim of them
-    rows[:-1] -= np.eye(dim)[1:]
-    rows[-1, -2:] = 1.0
-    points = np.zeros((3, dim))
-    points[1], points[2, 0] = 0.5, 1.0
-    check(points, [0, 0, 1], [1, 2, 2], rows)
-
-
 def test_a_last_bit_decides():
     below, above = np.nextafter(0.5, 0.0), np.nextafter(0.5, 1.0)
     points = np.array([[0.0], [below], [0.5], [above], [1e9 + 0.5]])
@@ -151,44 +137,6 @@ def test_far_points_and_huge_coordinates():
         scaled = np.ldexp(np.round(slab[1::2] * 8), exponent)
         check(scaled, [0, 1, 2, 3], [1, 2, 0, 4], np.ldexp(np.eye(3) * 3.0, exponent))
         check(scaled, [0, 1, 2, 3], [1, 2, 0, 4], np.ldexp(BCC * 3.0, exponent))
-
-
-@pytest.mark.parametrize("kind", ["open", "upright", "mixed", "skewed"])
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_pairs_that_are_found_have_the_same_bits(kind, dtype):
-    rng = np.random.default_rng(7)
-    points = rng.uniform(-2.0, 5.0, (400, 3)).astype(dtype)
-    box = np.diag([2.0, 3.1, 2.7]) + (np.tri(3, k=-1) * 1.3 if kind == "skewed" else 0.0)
-    options = {} if kind == "open" else {"box": box, "periodic": [True, kind != "mixed", True]}
-    i, j, d, D, S = call(hs.pairs, points, 1.9, quantities="ijdDS", **options)
-    assert len(i) > 1000
-    for kernel in hs.kernels():
-        options["kernel"] = kernel
-        found = call(hs.measure, points, i, j, S, **options)
-        turned = call(hs.measure, points, j, i, -S, quantities="SDd", **options)
-        for one, other in zip((*found, *turned), (d, D, S, -S, -D + 0.0, d), strict=True):
-            assert one.tobytes() == other.tobytes()
-
-
-def test_quantities_come_in_the_order_of_their_letters():
-    points = [[0.0, 0.0], [3.0, 4.0]]
-    d, D, S = hs.measure(points, [0], [1])
-    assert d.tolist() == [5.0] and D.tolist() == [[3.0, 4.0]] and S.tolist() == [[0, 0]]
-    for n in (1, 2, 3):
-        for letters in itertools.permutations("dDS", n):
-            arrays = hs.measure(points, [0], [1], quantities="".join(letters))
-            for letter, array in zip(letters, (arrays,) if n == 1 else arrays, strict=True):
-                np.testing.assert_array_equal(array, {"d": d, "D": D, "S": S}[letter])
-
-
-def test_nothing_to_measure():
-    for points in ([], np.empty((0, 3)), np.zeros((4, 3))):
-        d, D, S = hs.measure(points, [], [], box=[1.0, 1.0, 1.0])
-        assert d.shape == (0,) and D.shape == S.shape == (0, 3)
-        assert (d.dtype, D.dtype, S.dtype) == (np.float64, np.float64, np.int32)
-    assert hs.measure(np.empty((0, 2)), [], [], np.empty((0, 2)), quantities="D").shape == (0, 2)
-    d, D, S = hs.measure([[7.5, 1e300]], [0, 0], [0, 0], [[0, 0], [2, 0]], box=[1.5, 2.0])
-    assert d.tolist() == [0.0, 3.0] and D.tolist() == [[0.0, 0.0], [3.0, 0.0]]
 
 
 POINTS, BOX = np.zeros((3, 2)), [1.0, 1.0]
@@ -237,21 +185,3 @@ def test_what_no_float_holds_is_refused():
     assert hs.measure([[0.0, 0.0], [1e12, 0.0]], [0], [1], box=BOX, quantities="d")[0] == 0.0
     with pytest.raises(ValueError, match="finite"):
         hs.measure([[0.0, np.nan]], [], [])
-
-
-def test_boxes_that_float64_cannot_tell_are_refused():
-    thin = np.array([[1.0, 1.0], [1e-200, -1e-200 * 3]])
-    with pytest.raises(ValueError, match="box"):
-        hs.measure(POINTS, [0], [1], box=thin)
-    assert hs.measure(POINTS, [0], [1], [[0, 0]], box=thin, quantities="d").tolist() == [0.0]
-
-
-def test_points_may_bring_their_box():
-    class Atoms:
-        positions = np.array([[0.1, 0.0, 0.0], [0.9, 0.0, 0.0]])
-        cell = np.eye(3)
-        pbc = (True, False, False)
-
-    assert hs.measure(Atoms(), [0], [1], quantities="S").tolist() == [[-1, 0, 0]]
-    with pytest.raises(ValueError, match="bring their own box"):
-        hs.measure(Atoms(), [0], [1], box=np.eye(3))

@@ -1,14 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The k nearest points: order and ties by rational arithmetic, images, clusters, bad arguments."""
 
-import itertools
 import math
 from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 import halfshell as hs
@@ -107,30 +104,6 @@ def test_many_images_of_a_tiny_anisotropic_box():
     assert not j.any() and not S[..., 1:].any()
 
 
-def test_max_distance_on_a_shell():
-    points = np.array(list(itertools.product(range(3), repeat=3)), float)
-    for limit in (0.0, 1.0, math.sqrt(2.0), np.nextafter(math.sqrt(2.0), 0.0), math.sqrt(3.0), 2.0):
-        check(points, 19, max_distance=limit)
-        check(points, 30, max_distance=limit, box=[3.0, 3.0, 3.0])
-    tenths = points * 0.1
-    check(tenths, 10, max_distance=0.1)
-    check(tenths, 10, max_distance=5e-324, queries=tenths)
-
-
-def test_queries_far_outside(rng):
-    points = rng.random((60, 3))
-    far = np.array([[1e3, 0.0, 0.0], [1e8, 1e8, -1e8], [1e200, 0.0, 1.0], [-1e300, 1e300, 0.0]])
-    check(points, 5, queries=far)
-    check(points, 5, queries=far[:2], box=[1.0, 1.0, 1.0])
-    slab = {"box": [1.0, 1.0, 1.0], "periodic": [True, True, False]}
-    check(points[:3], 5, queries=[[0.3, 0.2, 6.0], [5.1, 0.2, -9.0]], **slab)
-    # The nearest is the one with the least distance in the plane among those of the top layer.
-    points[:, 2] = 0.0
-    j = call(hs.nearest, points, 1, queries=[[0.5, 0.5, 1e4]], quantities="j", **slab)
-    lateral = np.hypot(*(points[:, :2] - 0.5).T)
-    assert j[0, 0] == np.argmin(lateral)
-
-
 @pytest.mark.parametrize("scale", [5e-324, 1e-320, 1e-300, 1e-160, 1e160, 1e300])
 def test_any_scale(scale, rng):
     points = rng.integers(-8, 9, (40, 2)).astype(float) * scale
@@ -144,19 +117,6 @@ def test_a_cluster_and_an_outlier_on_different_scales(rng):
     points[7] = 1e300
     points[30:50] += 1e9
     check(points, 4)
-
-
-@given(
-    st.lists(st.tuples(*[st.integers(-6, 6)] * 2), max_size=30),
-    st.integers(1, 12),
-    st.sampled_from([None, [3.0, 4.0], [[2.0, 0.0], [5.0, 3.0]], [[3.0, 1.0], [-1.0, 3.0]]]),
-    st.sampled_from([math.inf, 0.0, 1.0, 2.5, math.sqrt(8.0)]),
-    st.booleans(),
-)
-def test_small_integers(places, k, box, max_distance, asks):
-    points = np.array(places, float).reshape(-1, 2) * 0.5
-    queries = {"queries": points[::3] + 0.25} if asks else {}
-    check(points, k, box=box, max_distance=max_distance, **queries)
 
 
 # ---- larger scenes -------------------------------------------------------------------------
@@ -193,16 +153,6 @@ def test_distances_are_those_of_a_tree(rng):
             assert (j >= 0).all() and (j != np.arange(len(points))[:, None]).all()
 
 
-def test_many_neighbours(rng):
-    for kernel in hs.kernels():
-        points = rng.random((3000, 3))
-        for k in (100, 700, 2999, 3100):
-            j, d = call(hs.nearest, points[:], k, queries=points[:20], kernel=kernel)
-            expected, numbers = cKDTree(points).query(points[:20], min(k, 3000))
-            np.testing.assert_allclose(d[:, :3000], expected, rtol=1e-14)
-            assert np.array_equal(j[:, :3000], numbers) and (j[:, 3000:] == -1).all()
-
-
 def test_the_same_bits_for_any_kernel_and_number_of_threads(rng):
     points, box = rng.random((6000, 3)), random_box(rng, "rotated")
     points[:500] = np.round(points[:500], 1)
@@ -227,57 +177,6 @@ def test_cost_follows_the_points_not_their_distances(rng):
 
 
 # ---- forms and errors ----------------------------------------------------------------------
-
-
-def test_empty_inputs():
-    for ndim in (1, 3, 8):
-        none, some = np.empty((0, ndim)), np.ones((4, ndim))
-        for box in (None, np.ones(ndim)):
-            j, d, D, S = hs.nearest(none, 3, box=box, quantities="jdDS")
-            assert j.shape == d.shape == (0, 3) and D.shape == S.shape == (0, 3, ndim)
-            j, d, D, S = hs.nearest(none, 3, queries=some, box=box, quantities="jdDS")
-            assert (j == -1).all() and (d == np.inf).all() and np.isnan(D).all() and not S.any()
-            assert hs.nearest(some, 3, queries=none, box=box, quantities="S").shape == (0, 3, ndim)
-        assert hs.nearest(none, 2**56, quantities="D").shape == (0, 2**56, ndim)
-        assert hs.nearest([], 2)[0].shape == (0, 2)
-        assert hs.nearest(some, 2, queries=[])[0].shape == (0, 2)
-
-
-def test_quantities_and_types(rng):
-    points = rng.random((30, 3))
-    j, d = hs.nearest(points, 4)
-    assert j.dtype == np.int64 and d.dtype == np.float64
-    narrow = hs.nearest(points, 4, quantities="j", index_dtype=np.int32)
-    assert narrow.dtype == np.int32 and np.array_equal(narrow, j)
-    for letters in itertools.permutations("jdDS"):
-        arrays = hs.nearest(points, 4, quantities="".join(letters), box=np.ones(3))
-        assert [a.dtype.kind + str(a.ndim) for a in arrays] == [
-            {"j": "i2", "d": "f2", "D": "f3", "S": "i3"}[x] for x in letters
-        ]
-        assert all(a.flags.c_contiguous and a.flags.writeable for a in arrays)
-    assert np.array_equal(hs.nearest(points, np.int32(4), quantities="d"), d)
-
-
-@pytest.mark.parametrize(
-    ("error", "match", "how"),
-    [
-        (ValueError, "k must be 1 or more, got 0", {"k": 0}),
-        (TypeError, "k must be a whole number", {"k": None}),
-        (MemoryError, "would not fit", {"k": 2**56}),
-        (MemoryError, "more than fits in any memory", {"k": 2**60}),
-        (ValueError, "max_distance must not be negative", {"max_distance": -1.0}),
-        (ValueError, "max_distance must be a number", {"max_distance": [1.0, 2.0]}),
-        (ValueError, "same number of columns", {"queries": [[1.0, 2.0, 3.0]]}),
-        (ValueError, r"queries\[1, 0\] = nan", {"queries": [[1.0, 2.0], [math.nan, 0.0]]}),
-        (ValueError, "j d D S", {"quantities": "ij"}),
-        (ValueError, "quantities must be", {"quantities": "jj"}),
-        (MemoryError, "would not fit", {"memory_limit": 10.0}),
-    ],
-)
-def test_bad_arguments(error, match, how):
-    arguments = {"k": 2, **how}
-    with pytest.raises(error, match=match):
-        call(hs.nearest, [[0.0, 0.0], [1.0, 0.0]], **arguments)
 
 
 def test_shifts_that_do_not_fit_are_refused():

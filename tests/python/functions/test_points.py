@@ -49,17 +49,11 @@ def test_attributes_are_what_was_given():
     assert hs.Points(X, box=2.0).box.tolist() == [[2.0, 0.0], [0.0, 2.0]]
     assert hs.Points([]).positions.shape == (0, 3)
     assert hs.Points(bare).positions.dtype == np.float32  # Points of Points
-
-
-@pytest.mark.parametrize("d", range(1, 9))
-def test_every_dimension_and_kind_of_number(d):
-    whole = RNG.integers(-9, 9, (5, d))
-    for dtype in (np.int8, np.int64, np.float16, np.float32, ">f8", bool):
-        given = whole.astype(dtype)
-        points = hs.Points(np.repeat(given, 2, axis=0)[::2], box=[30.0] * d)
-        assert np.array_equal(points.positions, given) and points.box.shape == (d, d)
-        assert points.positions.flags.c_contiguous and points.positions.dtype.isnative
-        assert hs.count_pairs(points, 3.0) == hs.count_pairs(given, 3.0, box=[30.0] * d)
+    narrow = hs.Points(X, supports=np.tile(np.eye(2, dtype=np.float32), (12, 1, 1)))
+    balls = hs.Points(X, radii=np.arange(12, dtype=np.float32))
+    assert narrow.supports.dtype == balls.radii.dtype == np.float64
+    names = np.array(["b", "a"], np.dtypes.StringDType())
+    assert hs.Points([[0.0], [1.0]], types=names).types.tolist() == ["b", "a"]
 
 
 def test_they_do_not_change():
@@ -107,7 +101,7 @@ def test_parts():
         rows = rows.astype(int)
         expected = {name: np.asarray(KNOWN[name])[rows] for name in FIELDS if name in KNOWN}
         assert alike(part, hs.Points(X[rows], box=SKEWED, periodic=[True, False], **expected))
-    for wrong in (3, np.int64(3), (slice(None), 0), ((0, 1), (2, 3)), None):
+    for wrong in (3, np.int64(3), (slice(None), 0), ((0, 1), (2, 3)), None, "a", [None]):
         with pytest.raises(TypeError, match=r"Points\[...\] must take a slice, a mask or numbers"):
             points[wrong]
     systems = hs.Points(X, batch=np.repeat([0, 2], 6), box=np.stack([SKEWED] * 3))
@@ -192,23 +186,6 @@ def test_stacks_are_systems_one_behind_the_other():
     assert hs.Points.stack(x for x in (X, X)).n_systems == 2
 
 
-def test_lists_of_systems_are_stacks():
-    for systems in ([X, X[:4]], [X.tolist(), X[:4].tolist()], (X, X[:4]), [hs.Points(X), X[:4]]):
-        assert hs.count_pairs(systems, 0.3).tolist() == [
-            hs.count_pairs(X, 0.3),
-            hs.count_pairs(X[:4], 0.3),
-        ]
-        assert alike(hs.Points(systems), hs.Points.stack(systems))
-    boxed = hs.count_pairs([X, X[:4]], 0.3, box=1.0)
-    assert boxed.tolist() == [hs.count_pairs(x, 0.3, box=1.0) for x in (X, X[:4])]
-    each = hs.pairs([X, X[:4]], [0.3, 0.6])  # a cutoff for each system
-    assert len(each[0]) == hs.count_pairs(X, 0.3) + hs.count_pairs(X[:4], 0.6)
-    both = hs.pairs_between([X[:3], X[:2]], [X, X[:4]], 0.3)
-    assert len(both[0]) == sum(
-        hs.count_pairs(x, 0.3, queries=q) for q, x in ((X[:3], X), (X[:2], X[:4]))
-    )
-
-
 @pytest.mark.parametrize(("systems", "error", "message"), [
     ([X, np.zeros((2, 3))], ValueError, r"the same number of columns, got \[2, 3\]"),
     ([hs.Points(X, radii=[1.0] * 12), X], ValueError, r"systems\[0\] has radii, and systems"),
@@ -245,8 +222,10 @@ WRONG[5] = np.nan
     ({"radii": [2.0**1023] * 12}, ValueError, r"radii must be at most 2\*\*1022, got radii\[0\]"),
     ({"radii": [2**53 + 1] * 12}, ValueError, r"radii\[0\].*float64"),
     ({"types": [0.0] * 12}, TypeError, "types must hold integers or names, got dtype float64"),
+    ({"types": "A"}, TypeError, "types must hold integers or names"),
     ({"types": [2**31 - 1] * 12}, ValueError, r"types must be .* below 2\*\*31 - 1"),
     ({"supports": np.ones((12, 2))}, ValueError, r"supports must have shape \(12, 2, 2\)"),
+    ({"positions": np.zeros((2, 4)), "supports": [np.eye(4)] * 2}, ValueError, "to 3 dimensions"),
     ({"supports": np.tile(np.eye(2), (12, 1, 1)), "radii": [1.0] * 12}, ValueError, "together"),
     ({"batch": [0, 1] * 6}, ValueError, r"batch must ascend, got batch\[1\] = 1 before 0"),
     ({"positions": hs.Points(X, box=1.0), "box": 1.0}, ValueError, "Points bring their own box"),
@@ -270,36 +249,6 @@ def test_masked_and_huge_input():
 # ---- in searches ---------------------------------------------------------------------------
 
 
-def test_every_search_takes_them():
-    points, queries = hs.Points(X, box=SKEWED), hs.Points(X[:4] + 0.1)
-    how = {"box": SKEWED}
-    for search in (
-        lambda x, **h: hs.pairs(x, 0.3, **h),
-        lambda x, **h: hs.neighbors(x, 0.3, **h).to_pairs(),
-        lambda x, **h: hs.coordination(x, 0.3, **h),
-        lambda x, **h: hs.count_pairs(x, [0.2, 0.3], **h),
-        lambda x, **h: hs.nearest(x, 3, **h),
-        lambda x, **h: hs.pair_histogram(x, [0.0, 0.2, 0.4], **h),
-        lambda x, **h: hs.rdf(x, 0.4, 5, **h).g,
-        lambda x, **h: hs.clusters(x, 0.1, **h).labels,
-        lambda x, **h: next(hs.iter_pairs(x, 0.3, **h)),
-        lambda x, **h: next(hs.trajectory_pairs([x], 0.3, **h)),
-        lambda x, **h: hs.measure(x, [0], [1], quantities="dD", **h),
-        lambda x, **h: hs.CellList(x, 0.3, **h).pairs(),
-        lambda x, **h: hs.pairs_between(queries, x, 0.3, **h),
-        lambda x, **h: hs.count_pairs(x, 0.3, queries=queries, **h),
-    ):
-        assert same_arrays(as_arrays(search(points)), as_arrays(search(X, **how)))
-        with pytest.raises(ValueError, match="Points bring their own box: leave box out"):
-            search(points, **how)
-    assert hs.for_each_pair(points, 0.3, lambda *pair: None) == hs.count_pairs(X, 0.3, **how)
-    assert hs.explain(points, 0.3).algorithm == hs.explain(X, 0.3, **how).algorithm
-
-
-def as_arrays(found):
-    return found if isinstance(found, tuple) else (np.asarray(found),)
-
-
 def test_queries_go_with_their_points():
     points = hs.Points(X, box=SKEWED)
     assert hs.count_pairs(points, 0.3, queries=points) == hs.count_pairs(
@@ -316,16 +265,6 @@ def test_queries_go_with_their_points():
     other = hs.Points(X[:4], types=["B", "C", "B", "C"])
     table = hs.neighbors(named, {("A", "C"): 2.0}, queries=other)
     assert table.counts.tolist() == [0, 6, 0, 6]
-
-
-def test_points_are_taken_where_coordinates_alone_are():
-    known = hs.Points(X, radii=np.ones(len(X)))
-    wrapped = hs.Box([0.5] * 2).wrap(known)[0]
-    assert np.array_equal(wrapped, hs.Box([0.5] * 2).wrap(X)[0])
-    with pytest.raises(ValueError, match="a Points brings a box, for which there is no place here"):
-        hs.Box([0.5] * 2).wrap(hs.Points(X, box=1.0))
-    with pytest.raises(ValueError, match="points must be one system, and have a batch of 2"):
-        hs.CellList([X, X], 1.0, domain=(0.0, 1.0))
 
 
 def test_a_molecule_without_a_cell_may_be_given_a_box():
@@ -377,33 +316,6 @@ def test_a_few_of_these_objects_bring_all():
         assert hs.Points(numbered.assign(type=other)).types is None
 
 
-WIDE = [
-    "wide", b"wide", ["a"] * 12, np.ones(12, complex), np.zeros(12, "M8[s]"), [None] * 12, object(),
-]  # fmt: skip
-WIDE += [np.ones(12, np.longdouble)] if np.longdouble != np.float64 else []
-
-
-def test_the_bounds_of_radii():
-    for value, fragment in (
-        (-5e-324, "not negative"), (np.inf, "finite"), (-np.inf, "finite"),
-        (np.nextafter(2.0**1022, np.inf), r"2\*\*1022"),
-    ):  # fmt: skip
-        radii = np.full(100_000, 0.01)
-        radii[99_999] = value
-        with pytest.raises(ValueError, match=rf"{fragment}.*radii\[99999\]"):
-            hs.Points(np.zeros((100_000, 1)), radii=radii)
-    assert hs.Points(X, radii=[2.0**1022] * 12).radii[0] == 2.0**1022
-
-
-def test_systems_without_points_have_the_dimension_of_their_box():
-    empty = np.empty((0, 2))
-    for systems in ([hs.Points(empty, box=[2.0, 3.0])] * 2, [empty, empty], [[], empty]):
-        assert hs.Points.stack(systems).positions.shape == (0, 2)
-    assert hs.Points.stack([[], [[1.0, 2.0]]]).positions.shape == (1, 2)
-    with pytest.raises(ValueError, match=r"same number of columns, got \[2, 3\]"):
-        hs.Points.stack([hs.Points(empty, box=[2.0, 3.0]), [[1.0, 2.0, 3.0]]])
-
-
 def test_boxes_of_queries_may_be_given_another_way():
     x, batch = [[0.0, 0.0], [1.0, 0.0]], [0, 1]
     of_all = hs.Points(x, box=3.0, batch=batch)
@@ -422,13 +334,6 @@ def test_boxes_of_queries_may_be_given_another_way():
         hs.pairs_between(more, of_each, 1.0)
 
 
-def test_boxes_of_a_list_are_those_of_its_systems():
-    systems, box = [[[0.0, 0.0]], [[1.0, 0.0]]], [np.eye(2)] * 2
-    assert hs.count_pairs(systems, 1.0, box=box).tolist() == [2, 2]
-    with pytest.raises(ValueError, match="must be given for the 2 systems of points, got 3"):
-        hs.count_pairs(systems, 1.0, box=[*box, np.eye(2)])
-
-
 def test_a_table_has_a_row_for_each_name():
     points = hs.Points([[0.0], [1.0], [2.0]], types=["C", "H", "O"])
     table = np.full((3, 3), 1.0)
@@ -439,30 +344,6 @@ def test_a_table_has_a_row_for_each_name():
     assert hs.count_pairs(points[:0], table) == 0
     numbered = points.replace(types=[0, 1, 0])
     assert hs.count_pairs(numbered, table) == 2
-
-
-@pytest.mark.parametrize(
-    "places", [0, 2.5, "a", None, ..., [0.5], [[0, 1]], [None], np.True_, {1}, iter([1])],
-    ids=lambda places: type(places).__name__,
-)
-def test_points_are_chosen_along_one_axis(places):
-    points = hs.Points([[0.0, 1.0], [2.0, 3.0]], radii=[1.0, 2.0])
-    with pytest.raises(TypeError, match=r"Points\[...\] must take a slice, a mask or numbers"):
-        points[places]
-    assert points[(1, 0)].radii.tolist() == [2.0, 1.0]  # a tuple is no pair of axes
-    assert len(points[[]]) == len(points[np.array([])]) == 0
-    with pytest.raises(TypeError):
-        iter(points)
-
-
-def test_points_without_a_box_are_positions_everywhere():
-    points = hs.Points([[2.5, 0.0]], radii=[1.0])
-    assert hs.Box([2.0, 2.0]).wrap(points)[0].tolist() == [[0.5, 0.0]]
-    cells = hs.DynamicCellList(2, 1.0)
-    cells.insert_many([7], points)
-    assert cells.position(7).tolist() == [2.5, 0.0]
-    with pytest.raises(ValueError, match="brings a box, for which"):
-        hs.Box([2.0, 2.0]).wrap(points.replace(box=3.0))
 
 
 def test_a_verlet_list_refuses_what_it_does_not_look_at():
@@ -501,17 +382,13 @@ def test_the_last_systems_of_a_list_may_be_empty():
     assert hs.count_pairs([two, none], [1.0, 2.0]).tolist() == [1, 0]
 
 
-def test_systems_without_points_cost_nothing():
-    points = hs.Points([[0.0], [0.5], [0.0], [0.25]], batch=[0, 0, 2**60, 2**60])
-    assert hs.clusters(points, 1.0).labels.tolist() == [0, 0, 1, 1]
-    assert [b.tolist() for b in hs.iter_pairs(points, 1.0, quantities="P")] == [[[0, 1], [2, 3]]]
-    assert hs.verify(points, 1.0, [0, 2], [1, 3])
-
-
-def test_names_of_numpys_own_strings():
-    names = np.array(["b", "a"], np.dtypes.StringDType())
-    assert hs.Points([[0.0], [1.0]], types=names).types.tolist() == ["b", "a"]
-    assert len(hs.Points(np.empty((0, 2)), types=names[:0]).types) == 0
-    missing = np.array(["b", None], np.dtypes.StringDType(na_object=None))
-    with pytest.raises(TypeError, match="types must hold integers or names"):
-        hs.Points([[0.0], [1.0]], types=missing)
+def test_points_are_taken_where_coordinates_alone_are():
+    known = hs.Points(X, radii=np.ones(len(X)))
+    wrapped = hs.Box([0.5] * 2).wrap(known)[0]
+    assert np.array_equal(wrapped, hs.Box([0.5] * 2).wrap(X)[0])
+    with pytest.raises(ValueError, match="a Points brings a box, for which there is no place here"):
+        hs.Box([0.5] * 2).wrap(hs.Points(X, box=1.0))
+    with pytest.raises(ValueError, match="points must be one system, and have a batch of 2"):
+        hs.CellList([X, X], 1.0, domain=(0.0, 1.0))
+    with pytest.raises(ValueError, match="must be given for the 2 systems of points, got 3"):
+        hs.count_pairs([X, X], 1.0, box=[np.eye(2)] * 3)

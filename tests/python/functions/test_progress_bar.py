@@ -84,36 +84,12 @@ def test_a_bar_is_shown_and_goes_away(points, slow, terminal, name):
     assert "searching" in shown and shown.count(HIDE) == shown.count(SHOW) == 1
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_false_is_none(points, slow, terminal, name):
-    screen = terminal()
-    search = searches(points)[name]
-    assert same(search(False), search(None))
-    assert screen.getvalue() == ""
-
-
-def test_short_work_shows_none(points, terminal, monkeypatch):
-    screen = terminal()
-    monkeypatch.setattr(bar, "time", types.SimpleNamespace(monotonic=lambda: 0.0))
-    hs.pairs(points, 0.08, progress=True)
-    assert screen.getvalue() == ""
-
-
 def test_nothing_is_shown_in_a_file(points, slow, monkeypatch):
     pytest.importorskip("rich")
     file = io.StringIO()
     monkeypatch.setattr(sys, "stderr", file)
     hs.pairs(points, 0.08, progress=True)
     assert file.getvalue() == ""
-
-
-def test_blocks_that_are_given_up_leave_no_bar(points, slow, terminal):
-    screen = terminal()
-    blocks = hs.iter_pairs(points, 0.08, max_pairs=65_536, progress=True)
-    next(blocks)
-    assert screen.getvalue().count(HIDE) == 1
-    del blocks
-    assert screen.getvalue().count(SHOW) == 1
 
 
 def test_errors_leave_no_bar(points, slow, terminal):
@@ -151,14 +127,3 @@ def test_in_a_notebook_the_cell_has_a_bar(points, slow, monkeypatch):
     hs.pairs(points, 0.08, threads=1, progress=True)
     assert len(pages) > 2 and pages[-1] == ""
     assert all('<progress max="1" value="0.' in page and "%" in page for page in pages[:-1])
-
-
-def test_a_bar_that_is_closed_shows_nothing_more(slow, terminal):
-    screen = terminal()
-    told = bar.ProgressBar("working")
-    told(0.25)
-    told(1.0)
-    shown = screen.getvalue()
-    told(0.5)
-    told.close()
-    assert screen.getvalue() == shown and "working" in shown

@@ -28,36 +28,6 @@ def test_an_ideal_gas_has_one_everywhere(ndim, rng):
     assert np.all(np.abs(result.g - 1.0) < 0.2)
 
 
-def test_all_images_beyond_the_box(rng):
-    points = rng.random((40, 3))
-    result = hs.rdf(points, 6.0, bins=30, box=[1.0, 1.0, 1.0])
-    assert abs(result.g[15:].mean() - 1.0) < 0.01
-
-
-def test_types_around_queries(rng):
-    points, queries = rng.random((900, 2)), rng.random((400, 2))
-    types, query_types = np.arange(900) % 3, np.repeat([0, 1], [100, 300])
-    result = call(
-        hs.rdf,
-        points,
-        0.3,
-        bins=3,
-        queries=queries,
-        types=types,
-        query_types=query_types,
-        box=[1.0, 1.0],
-    )
-    assert result.g.shape == (3, 3, 3) and (result.g[2] == 0.0).all()
-    for a in (0, 1):
-        for b in range(3):
-            some = hs.rdf(
-                points[types == b], 0.3, bins=3, queries=queries[query_types == a], box=[1.0, 1.0]
-            )
-            assert np.array_equal(result.counts[a, b], some.counts)
-            assert np.allclose(result.g[a, b], some.g, rtol=1e-12)
-    assert np.all(np.abs(result.g[:2] - 1.0) < 0.2)
-
-
 @pytest.mark.filterwarnings("error")
 def test_no_points_and_absent_types_have_a_g_of_zero():
     assert hs.rdf([], 1.0, bins=2, box=[1.0] * 3).g.tolist() == [0.0, 0.0]
@@ -68,6 +38,9 @@ def test_no_points_and_absent_types_have_a_g_of_zero():
     assert result.g[0, 2].tolist() == result.g[2, 0].tolist() == [0.0, 2.5]
     none = hs.rdf(np.empty((0, 1)), 0.4, bins=2, queries=[[0.5]], box=[1.0])
     assert none.g.tolist() == [0.0, 0.0]
+    named = hs.Points(np.empty((0, 1)), types=[], box=1.0)
+    none = hs.rdf(named, 0.4, 2, queries=hs.Points([[0.25]], types=["c"]), by_type=True)
+    assert none.types == ("c",) and none.n.tolist() == [[[0.0, 0.0]]]
     none = hs.rdf([[0.5]], 0.4, bins=2, queries=np.empty((0, 1)), box=[1.0])
     assert none.g.tolist() == [0.0, 0.0]
 
@@ -158,18 +131,6 @@ def test_a_density_in_place_of_that_of_a_box(rng):
         hs.rdf(points, 0.5, 5, density="thin")
 
 
-def test_a_density_in_a_batch_and_with_queries(rng):
-    each = [rng.random((n, 2)) for n in (50, 0, 80)]
-    total = sum(hs.rdf(x, 0.3, 4, density=2.0) for x in each if len(x))
-    found = hs.rdf(each, 0.3, 4, density=2.0)
-    assert np.allclose(found.g, total.g, rtol=1e-13) and found.n_frames == 2
-    assert np.allclose(found.n, total.n)
-    queries = rng.random((30, 2))
-    asked = hs.rdf(each[0], 0.3, 4, queries=queries, density=2.0)
-    shells = math.pi * np.diff(asked.edges**2)
-    assert np.allclose(asked.g, asked.counts / (30 * 2.0 * shells), rtol=1e-13)
-
-
 def test_a_finite_gas_has_fewer_pairs(rng):
     box = [1.0, 1.0]
     points, types = rng.random((7, 2)), [0, 0, 1, 1, 1, 1, 0]
@@ -225,25 +186,6 @@ def around(points, types, queries, query_types, r, box, same):
     return table
 
 
-def test_names_count_as_numbers_do_in_ascending_order(rng, box):
-    points, kinds = scene(rng, box)
-    names = NAMES[kinds]
-    places = np.unique(names, return_inverse=True)[1]
-    expected = call(hs.rdf, points, 1.3, 9, types=places, box=box)
-    assert expected.types == (0, 1, 2)
-    forms = names, names.tolist(), names.astype(object), tuple(names), names.reshape(-1)[::-1][::-1]
-    for given in forms:
-        result = call(hs.rdf, points, 1.3, 9, types=given, box=box)
-        assert result.types == ("Na", "O", "Si")
-        assert np.array_equal(result.counts, expected.counts)
-        assert result.g.tobytes() == expected.g.tobytes()
-        assert result.n.tobytes() == expected.n.tobytes()
-        histogram = call(hs.pair_histogram, points, result.edges, types=given, box=box)
-        assert np.array_equal(histogram, result.counts)
-    cells = hs.CellList(hs.Points(points, types=names, box=box), 0.4)
-    assert np.array_equal(cells.pair_histogram(result.edges, by_type=True), result.counts)
-
-
 def test_n_is_what_points_have_around_them(rng, box):
     points, kinds = scene(rng, box)
     result = call(hs.rdf, points, 1.3, 7, types=kinds, box=box)
@@ -289,58 +231,6 @@ def test_what_is_no_type_is_refused():
         hs.rdf([[0.0], [0.5]], 0.4, 2, box=[1.0])["A", "B"]
 
 
-def test_points_and_queries_of_other_types_have_all_of_them():
-    result = call(
-        hs.rdf,
-        [[0.0], [0.5]],
-        0.4,
-        2,
-        queries=[[0.25]],
-        types=["b", "d"],
-        query_types=["c"],
-        box=[1.0],
-    )
-    assert result.types == ("b", "c", "d")
-    assert result.counts.sum() == 2 and result["c", "b"].n.tolist() == [0.0, 1.0]
-    none = call(
-        hs.rdf, np.empty((0, 1)), 0.4, 2, queries=[[0.25]], types=[], query_types=["c"], box=[1.0]
-    )
-    assert none.types == ("c",) and none.counts.sum() == 0 and none.n.tolist() == [[[0.0, 0.0]]]
-
-
-NO_TYPES = {
-    "names and numbers": (["A", 1], TypeError, "integers"),
-    "one name": ("A", TypeError, "integers or names"),
-    "a name for too few": (["A"], ValueError, r"shape \(2,\)"),
-    "tables of names": ([["A", "B"]], ValueError, r"shape \(2,\)"),
-    "bytes": ([b"A", b"B"], TypeError, "integers"),
-}
-
-
-@pytest.mark.parametrize("types, error, text", NO_TYPES.values(), ids=NO_TYPES)
-def test_types_that_are_none_are_refused(types, error, text):
-    types = np.array(types, dtype=object) if types == ["A", 1] else types
-    with pytest.raises(error, match=text):
-        call(hs.rdf, [[0.0], [0.5]], 0.4, 2, types=types, box=[1.0])
-    with pytest.raises(error, match=text):
-        call(hs.pair_histogram, [[0.0], [0.5]], [0.0, 1.0], types=types)
-
-
-def test_names_and_numbers_of_two_sets_are_refused():
-    points, queries = [[0.0], [0.5]], [[0.25]]
-    for own, asking in ((["A", "B"], [0]), ([0, 1], ["A"])):
-        with pytest.raises(TypeError, match="both be numbers or both be names"):
-            call(hs.rdf, points, 0.4, 2, queries=queries, types=own, query_types=asking, box=[1.0])
-
-
-def test_elements_of_an_atoms_object():
-    build = pytest.importorskip("ase.build")
-    atoms = build.bulk("NaCl", "rocksalt", a=5.64, cubic=True)
-    result = hs.rdf(atoms, 4.0, 40, by_type=True)
-    assert result.types == ("Cl", "Na")
-    assert result["Na", "Cl"].n[-1] == 6.0 and result["Na", "Na"].n[-1] == 12.0
-
-
 # ---- frames --------------------------------------------------------------------------------
 
 
@@ -366,17 +256,6 @@ def test_frames_add_up(rng, box):
     twice = 1 + np.eye(3, dtype=int)[:, :, None]
     n = np.cumsum(twice * counts, axis=2) / centers[:, None, None]
     assert np.allclose(total.n, n, rtol=1e-14)
-
-
-def test_frames_may_lack_types():
-    points, how = [[0.0], [0.3]], {"box": [1.0]}
-    one = call(hs.rdf, points, 0.4, 2, types=["B", "C"], **how)
-    other = call(hs.rdf, points, 0.4, 2, types=["A", "C"], **how)
-    total = one + other
-    assert total.types == ("A", "B", "C") and total.n_centers.tolist() == [1, 1, 2]
-    assert total["A", "B"].counts.sum() == 0 and total["C", "B"].counts.tolist() == [0, 1]
-    assert total["C", "A"].n.tolist() == [0.0, 0.5]  # one of two C has an A
-    assert np.array_equal((other + one).counts, total.counts)
 
 
 def test_what_cannot_be_added_is_refused():
@@ -462,6 +341,5 @@ def test_names_and_coordination(pyplot, points):
 
 def test_without_matplotlib_an_error_names_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    result = hs.rdf([[0.0], [0.5]], 0.4, bins=2, box=[1.0])
     with pytest.raises(ImportError, match=r"plot needs matplotlib: pip install matplotlib$"):
-        result.plot()
+        hs.rdf([[0.0], [0.5]], 0.4, bins=2, box=[1.0]).plot()

@@ -6,20 +6,18 @@ import numpy as np
 import pytest
 from ase.build import bulk, molecule
 from ase.data import chemical_symbols
-from ase.neighborlist import natural_cutoffs, neighbor_list
+from ase.neighborlist import neighbor_list
 
 import halfshell as hs
-from boundary import as_if_atoms
 from calls import call
+from definition import SYMMETRIC
 from halfshell._convert.objects import SYMBOLS
 from oracles import same_arrays
-from reach_scenes import SYMMETRIC, Reaching, check
 from refused_calls import NAN, assert_refused
 
 RNG = np.random.default_rng(11)
 POINTS = RNG.random((30, 3))
 RADII = RNG.integers(1, 9, 30) / 32.0
-LARGE = RNG.random((100_000, 3))
 
 
 def with_radius(k, value, n=30):
@@ -45,22 +43,6 @@ def calls(points=POINTS, **how):
 # ---- forms ---------------------------------------------------------------------------------
 
 
-def test_radii_may_have_any_form():
-    expected = call(hs.pairs, POINTS, None, radii=RADII, sort=True)
-    assert len(expected[0]) > 10
-    read_only = RADII.copy()
-    read_only.flags.writeable = False
-    unaligned = np.frombuffer(b"x" + RADII.tobytes(), dtype=np.float64, offset=1)
-    for radii in (RADII.tolist(), tuple(RADII), RADII.astype(np.float32), RADII.astype(">f8"),
-                  RADII.astype(np.float16), np.repeat(RADII, 3)[::3], RADII[::-1].copy()[::-1],
-                  memoryview(RADII), read_only, unaligned, RADII.astype(object)):  # fmt: skip
-        assert same_arrays(call(hs.pairs, POINTS, None, radii=radii, sort=True), expected)
-    whole = np.ones(30, np.int64)
-    for kind in (np.int64, np.uint8, np.bool_):
-        found = call(hs.count_pairs, POINTS, 0.5, radii=whole.astype(kind))
-        assert found == hs.count_pairs(POINTS, 0.5)
-
-
 def test_the_sum_is_the_rule_unless_another_is_named():
     assert same_arrays(
         call(hs.pairs, POINTS, None, radii=RADII),
@@ -68,22 +50,6 @@ def test_the_sum_is_the_rule_unless_another_is_named():
     )
     counts = [call(hs.count_pairs, POINTS, None, radii=RADII, rule=rule) for rule in SYMMETRIC]
     assert counts[0] > counts[2] > counts[1] > counts[3] > 0
-
-
-def test_inputs_are_not_changed_and_may_change_later():
-    radii, points = RADII.copy(), POINTS.copy()
-    table = call(hs.neighbors, points, None, radii=radii, quantities="jd", box=1.0)
-    expected = table.sort().indices.tolist()
-    again = call(hs.neighbors, points, None, radii=radii, quantities="jd", box=1.0)
-    blocks = call(hs.iter_pairs, points, None, radii=radii, max_pairs=10)
-    first = next(blocks)
-    assert np.array_equal(radii, RADII)
-    radii[:] = 0.0
-    points[:] = 7.0
-    assert again.sort().indices.tolist() == expected
-    rest = [first, *blocks]
-    found = tuple(np.concatenate(columns) for columns in zip(*rest))
-    assert same_arrays(found, call(hs.pairs, POINTS, None, radii=RADII))
 
 
 # ---- radii ---------------------------------------------------------------------------------
@@ -118,30 +84,7 @@ def test_radii_that_cannot_be_halved():
         assert call(hs.count_pairs, POINTS, None, radii=with_radius(7, small), rule=rule) == 0
 
 
-def test_the_largest_radii_meet():
-    points = np.array([[-(2.0**1022)], [2.0**1022]])
-    for rule, count in (("sum", 1), ("mean", 0), ("max", 0)):
-        assert call(hs.count_pairs, points, None, radii=[2.0**1022] * 2, rule=rule) == count
-
-
 # ---- rules and what goes together ----------------------------------------------------------
-
-
-@pytest.mark.parametrize("rule", ["gather", "scatter"])
-def test_rules_with_a_direction_are_for_rows_and_two_sets(rule):
-    how = {"radii": RADII, "rule": rule}
-    for refused in (
-        lambda: call(hs.pairs, POINTS, None, **how),
-        lambda: call(hs.iter_pairs, POINTS, None, **how),
-        lambda: call(hs.for_each_pair, POINTS, None, print, **how),
-        lambda: call(hs.count_pairs, POINTS, None, **how),
-        lambda: call(hs.explain, POINTS, None, **how),
-    ):
-        assert_refused(refused, ValueError, rule, "neighbors")
-    assert (
-        call(hs.neighbors, POINTS, None, **how).n_entries
-        == call(hs.coordination, POINTS, None, **how).sum()
-    )
 
 
 def test_radii_of_two_sets():
@@ -165,29 +108,6 @@ def test_radii_of_two_sets():
         )
 
 
-@pytest.mark.parametrize("batch", [{}, {"batch": [0] * 30}], ids=["", "batch"])
-def test_radii_go_with_no_cutoffs_by_type(batch):
-    for search in (hs.pairs, hs.count_pairs):
-        assert_refused(
-            lambda search=search: call(
-                search, POINTS, {(0, 0): 1.0}, radii=RADII, types=[0] * 30, **batch
-            ),
-            ValueError, "a cutoff for each pair of types cannot be combined with radii",
-        )  # fmt: skip
-
-
-@pytest.mark.parametrize("rule", SYMMETRIC)
-def test_results_that_do_not_fit_are_refused(rule):
-    radii = np.full(100_000, 1.0)
-    for search in (hs.pairs, hs.neighbors):
-        assert_refused(
-            lambda search=search: call(
-                search, LARGE, None, radii=radii, rule=rule, memory_limit=1e8
-            ),
-            MemoryError, "fit",
-        )  # fmt: skip
-
-
 # ---- a cutoff for each two types ---------------------------------------------------------------
 
 
@@ -197,42 +117,7 @@ FEW = np.random.default_rng(5).random((20, 3))
 TYPES = np.arange(20) % 3
 
 
-def test_types_that_nobody_has_and_types_that_pair_with_nobody(rng):
-    points = rng.random((20, 2))
-    for types in (np.full(20, 2), rng.choice([1, 3], 20), rng.integers(0, 9, 20)):
-        for cutoff in ({(1, 3): 0.4}, {(2, 2): 0.3}, {(5, 6): 0.5, (6, 8): 0.3}, {}):
-            check(Reaching(points, cutoff, types=types))
-            check(Reaching(points, cutoff, 8, types=types))
-    for types in (np.full(20, 2), rng.choice([1, 3], 20)):
-        check(Reaching(points, TABLE, types=types))
-    assert call(hs.count_pairs, points, np.zeros((1, 1)), types=[0] * 20) == 0
-
-
-def test_one_cutoff_for_all_types_is_one_cutoff(rng):
-    for kernel in hs.kernels():
-        points = rng.random((500, 3))
-        how = {"quantities": "ijSdD", "sort": True, "box": 1.0, "kernel": kernel}
-        table = np.full((5, 5), 0.2)
-        found = call(hs.pairs, points, table, types=rng.integers(0, 5, 500), **how)
-        assert same_arrays(found, call(hs.pairs, points, 0.2, **how))
-
-
 # ---- forms ---------------------------------------------------------------------------------
-
-
-def test_a_table_may_have_any_form():
-    expected = call(hs.pairs, FEW, TABLE, types=TYPES, sort=True)
-    assert len(expected[0]) > 0
-    for cutoff in (TABLE.tolist(), np.asfortranarray(TABLE), TABLE.astype(">f8"),
-                   np.repeat(TABLE, 2, axis=1)[:, ::2]):  # fmt: skip
-        for types in (TYPES.tolist(), TYPES.astype(np.uint8), TYPES.astype(">i8"),
-                      np.repeat(TYPES, 2)[::2]):  # fmt: skip
-            found = call(hs.pairs, FEW, cutoff, types=types, sort=True)
-            assert same_arrays(found, expected)
-    whole = np.array([[1, 0], [0, 0]])
-    assert call(hs.count_pairs, FEW, whole, types=TYPES % 2) == call(
-        hs.count_pairs, FEW, whole.astype(np.float32), types=TYPES % 2
-    )
 
 
 def test_a_dict_counts_both_ways_and_may_have_names():
@@ -265,25 +150,6 @@ def test_a_dict_counts_both_ways_and_may_have_names():
 
 
 @pytest.mark.parametrize(
-    "table, fragments",
-    [
-        ([[1.0, 2.0], [2.5, 1.0]], [r"symmetric.*cutoff\[0, 1\] = 2.0.*cutoff\[1, 0\] = 2.5"]),
-        ([[1.0, 2.0]], [r"\(t, t\)", r"\(1, 2\)"]),
-        ([[1.0, -2.0], [-2.0, 1.0]], [r"not negative.*cutoff\[0, 1\] = -2"]),
-    ],
-)
-def test_tables_that_are_none(table, fragments):
-    types = np.zeros(20, int)
-    for search in (hs.pairs, hs.count_pairs, hs.neighbors, hs.iter_pairs):
-        assert_refused(
-            lambda search=search: call(search, FEW, table, types=types),
-            ValueError,
-            "cutoff",
-            *fragments,
-        )
-
-
-@pytest.mark.parametrize(
     "cutoff, types, exception, fragments",
     [
         ({(0, 1): 1.0, (1, 0): 2.0}, TYPES, ValueError, ["contradicts", r"\(1, 0\)"]),
@@ -299,6 +165,10 @@ def test_tables_that_are_none(table, fragments):
         ({(0, 1): 1.0}, [0, 1], ValueError, [r"types.*\(20,\).*\(2,\)"]),
         (TABLE, TYPES + 2, ValueError, [r"types must be less than 4.*type 4 of points\[2\]"]),
         (TABLE, None, ValueError, ["a table of cutoffs needs types"]),
+        ([[1.0, 2.0], [2.5, 1.0]], TYPES, ValueError,
+         [r"symmetric.*cutoff\[0, 1\] = 2.0.*cutoff\[1, 0\] = 2.5"]),
+        ([[1.0, 2.0]], TYPES, ValueError, [r"\(t, t\)", r"\(1, 2\)"]),
+        ([[1.0, -2.0], [-2.0, 1.0]], TYPES, ValueError, [r"not negative.*cutoff\[0, 1\] = -2"]),
     ],
 )
 def test_types_and_dicts_that_do_not_fit(cutoff, types, exception, fragments):
@@ -329,54 +199,6 @@ def test_types_of_two_sets_go_together():
 
 
 # ---- stars ---------------------------------------------------------------------------------
-
-
-def written_out(cutoffs, names):
-    """The same, with a key for each two of these types: one with fewer stars wins."""
-    found = {}
-    for a in names:
-        for b in names:
-            for key in ((a, b), (b, a), (a, "*"), ("*", a), ("*", b), (b, "*"), ("*", "*")):
-                if key in cutoffs:
-                    found[a, b] = cutoffs[key]
-                    break
-    return found
-
-
-@pytest.mark.parametrize("cutoffs", [
-    {("*", "*"): 0.4},
-    {("*", "*"): 0.2, ("O", "H"): 0.5},
-    {("*", "*"): 0.2, ("O", "*"): 0.4, ("O", "H"): 0.1},
-    {("*", "Si"): 0.3},
-    {("Si", "*"): 0.3, ("O", "*"): 0.3, ("H", "H"): 0.6},
-    {("Si", "*"): 0.3, ("O", "*"): 0.5, ("Si", "O"): 0.0},
-    {("Xe", "*"): 0.3, ("*", "*"): 0.25},
-])  # fmt: skip
-def test_a_key_with_fewer_stars_wins(cutoffs, rng):
-    names = np.array(["Si", "O", "H", "N"])
-    kinds = rng.integers(0, 4, 150)
-    points, queries = rng.random((150, 3)), rng.random((40, 3))
-    asked = names[rng.integers(1, 4, 40)]
-    expected = written_out(cutoffs, names.tolist())
-    numbers = {
-        tuple(p if p == "*" else {"Si": 0, "O": 1, "H": 2, "N": 3, "Xe": 9}[p] for p in key): length
-        for key, length in cutoffs.items()
-    }
-    for box in (None, 1.0):
-        named = hs.Points(points, types=names[kinds], box=box)
-        found = hs.pairs(named, cutoffs, quantities="ijS" if box else "ij", sort=True)
-        same = hs.pairs(named, expected, quantities="ijS" if box else "ij", sort=True)
-        assert same_arrays(found, same) and len(found[0]) > 10
-        numbered = named.replace(types=kinds)
-        assert hs.count_pairs(numbered, numbers) == len(found[0])
-        both = {"queries": hs.Points(queries, types=asked)}
-        assert np.array_equal(
-            hs.coordination(named, cutoffs, **both), hs.coordination(named, expected, **both)
-        )
-        assert (
-            hs.clusters(named, cutoffs).labels.tolist()
-            == hs.clusters(named, expected).labels.tolist()
-        )
 
 
 def test_stars_that_contradict():
@@ -432,48 +254,8 @@ def test_the_dict_of_ase(make):
         assert ours(atoms, cutoffs) == rows(*neighbor_list("ijS", atoms, cutoffs))
 
 
-@pytest.mark.parametrize("make", [water, oxide])
-@pytest.mark.parametrize("factor", [0.5, 1.0, 1.2])
-def test_covalent_radii_of_ase(make, factor):
-    atoms = make()
-    radii = np.array(natural_cutoffs(atoms, mult=factor))
-    found = ours(atoms, None, radii=radii)
-    assert found == rows(*neighbor_list("ijS", atoms, radii))
-    assert found or factor < 1.0
-
-
-def test_water_has_two_bonds_a_molecule():
-    atoms = molecule("H2O")
-    radii = natural_cutoffs(atoms, mult=1.1)
-    i, j = call(hs.pairs, atoms, None, radii=radii, sort=True)
-    assert [{atoms.symbols[a], atoms.symbols[b]} for a, b in zip(i, j)] == [{"O", "H"}] * 2
-
-
 def test_the_symbols_are_those_of_ase():
     assert chemical_symbols == SYMBOLS
-
-
-def test_types_are_elements_or_given():
-    with pytest.raises(ValueError, match="of type Atoms bring their own types: leave types out"):
-        hs.Points(oxide(), types=np.arange(64) % 2)
-    points = hs.Points(oxide())
-    assert np.array_equal(points.types, oxide().get_chemical_symbols())
-    other = points.replace(types=np.arange(64) % 2)
-    assert other.types.dtype == np.int32 and np.array_equal(other.box, points.box)
-
-
-def test_objects_that_have_symbols_only():
-    atoms = water()
-
-    class Symbols:
-        positions, cell, pbc = atoms.positions, atoms.cell[:], atoms.pbc
-
-        def get_chemical_symbols(self):
-            return atoms.get_chemical_symbols()
-
-    assert same_arrays(hs.pairs(Symbols(), CUTOFFS), hs.pairs(atoms, CUTOFFS))
-    bare = as_if_atoms(atoms.positions, atoms.cell[:], atoms.pbc)
-    assert_refused(lambda: hs.pairs(bare, CUTOFFS), ValueError, "needs types")
 
 
 def test_keys_that_are_no_elements():
@@ -503,3 +285,15 @@ def test_the_cutoff_may_be_left_out_with_radii(rng):
     for search in (hs.pairs, hs.neighbors, hs.count_pairs, hs.coordination, hs.clusters):
         with pytest.raises(TypeError, match="got NoneType: points without it need radii"):
             search(balls.positions)
+
+
+def test_objects_that_have_symbols_only():
+    atoms = water()
+
+    class Symbols:
+        positions, cell, pbc = atoms.positions, atoms.cell[:], atoms.pbc
+
+        def get_chemical_symbols(self):
+            return atoms.get_chemical_symbols()
+
+    assert same_arrays(hs.pairs(Symbols(), CUTOFFS), hs.pairs(atoms, CUTOFFS))

@@ -2,9 +2,6 @@
 """`settings`: what they set, for whom, and how long."""
 
 import asyncio
-import contextvars
-import threading
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -52,69 +49,7 @@ def test_each_one_reaches_the_searches():
         assert hs.pair_histogram(LATTICE, [0.0, SHELL]).tolist() == [EXACT]  # always exact
 
 
-def test_threads_of_a_call_come_first():
-    with hs.settings(threads=2):
-        assert hs.explain(X, 0.3).threads == 2
-        assert hs.explain(X, 0.3, threads=1).threads == 1
-
-
-# ---- how long ------------------------------------------------------------------------------
-
-
-def test_nested_ones_change_what_they_name():
-    with hs.settings(algorithm="hash", threads=1) as outer:
-        assert outer == (None, "hash", "exact", None, 1) and current() is outer
-        with hs.settings(precision="double", algorithm="grid"):
-            assert current() == (None, "grid", "double", None, 1)
-            with hs.settings(threads=None, algorithm="auto"):
-                assert current() == (None, "auto", "double", None, None)
-        assert current() is outer
-    assert current() is USUAL
-    with hs.settings():
-        assert current() == USUAL
-
-
-def test_errors_end_them_too():
-    with pytest.raises(KeyError), hs.settings(algorithm="hash"):
-        raise KeyError
-    assert current() is USUAL
-    with hs.settings(memory_limit=0.0):
-        with pytest.raises(MemoryError):
-            hs.pairs(X, 0.1)
-    assert len(hs.pairs(X, 0.1)[0]) > 0
-
-
-def test_one_object_may_be_used_again_and_within_itself():
-    how = hs.settings(algorithm="hash")
-    for _ in range(2):
-        with how, hs.settings(algorithm="grid"):
-            with how:
-                assert algorithm() == "hash"
-            assert algorithm() == "grid"
-        assert current() is USUAL
-    assert repr(how) == "settings(algorithm='hash')" and repr(hs.settings()) == "settings()"
-    assert repr(hs.settings(kernel=None, threads=3)) == "settings(kernel=None, threads=3)"
-
-
 # ---- for whom ------------------------------------------------------------------------------
-
-
-def test_threads_do_not_see_each_others():
-    met = threading.Barrier(3, timeout=60)
-
-    def work(name):
-        with hs.settings(algorithm=name):
-            met.wait()
-            found = algorithm()
-            met.wait()
-        return found, current() is USUAL
-
-    with ThreadPoolExecutor(3) as pool, hs.settings(algorithm="all-pairs"):
-        names = ["grid", "hash", "all-pairs"]
-        assert list(pool.map(work, names)) == [(name, True) for name in names]
-        assert pool.submit(current).result() is USUAL
-        copied = contextvars.copy_context()
-        assert pool.submit(copied.run, algorithm).result() == "all-pairs"
 
 
 def test_tasks_keep_those_they_began_with():
@@ -179,6 +114,7 @@ def test_wrong_ones_are_refused_when_they_are_made(how, error, message):
     with pytest.raises(error, match=message):
         hs.settings(**how)
     assert current() is USUAL
+    assert repr(hs.settings(kernel=None, threads=3)) == "settings(kernel=None, threads=3)"
 
 
 def test_what_is_set_around_calls_is_no_keyword_of_them():

@@ -56,29 +56,6 @@ def test_frame_by_frame(skin):
 
 
 @pytest.mark.parametrize("skin", SKINS)
-def test_dimensions_and_mixed_periodicity(skin):
-    for d in (1, 2, 5, 8):
-        frames = walk(6, 40, d)
-        options = {"box": np.full(d, 5.0), "periodic": [k % 2 == 0 for k in range(d)]}
-        expected = [fresh(points, 1.0 + 0.3 * d, **options) for points in frames]
-        check(follow(frames, 1.0 + 0.3 * d, skin=skin, **options), expected)
-
-
-def test_without_a_skin_the_order_is_that_of_pairs():
-    frames = walk(5, 300)
-    for letters in ("ij", "P", "dSD"):
-        found = hs.trajectory_pairs(
-            frames, 1.3, skin=None, quantities=letters, box=SKEWED, index_dtype=np.int32
-        )
-        for points, ours in zip(frames, found, strict=True):
-            theirs = hs.pairs(points, 1.3, quantities=letters, box=SKEWED, index_dtype=np.int32)
-            if letters == "P":
-                ours, theirs = (ours,), (theirs,)
-            for a, b in zip(ours, theirs, strict=True):
-                assert a.dtype == b.dtype and np.array_equal(a, b)
-
-
-@pytest.mark.parametrize("skin", SKINS)
 def test_frames_of_other_length_box_and_dimension(skin):
     long, short, flat = walk(2, 90), walk(2, 35, seed=1), walk(2, 60, 2, seed=2)
     frames = [
@@ -89,27 +66,6 @@ def test_frames_of_other_length_box_and_dimension(skin):
     expected = [fresh(points, box=box) for points, box in frames]
     check(follow(frames, skin=skin), expected)
     check(follow((one for one in frames), skin=skin), expected)
-
-
-@pytest.mark.parametrize("skin", SKINS)
-def test_frames_with_and_without_a_box(skin):
-    points = walk(3)
-    frames = [points[0], (points[1], None), points[2].tolist()]
-    check(follow(frames, skin=skin, box=5.0), [fresh(one, box=5.0) for one in points])
-    frames = [points[0], (points[1], SKEWED), points[2]]  # open, in a box, open
-    check(follow(frames, skin=skin), [fresh(points[0]), fresh(points[1], box=SKEWED),
-                                      fresh(points[2])])  # fmt: skip
-
-
-@pytest.mark.parametrize("skin", SKINS)
-def test_atoms(skin):
-    frames = [
-        ase.Atoms("C80", positions=points, cell=(1.0 + 0.01 * k) * SKEWED, pbc=[True, k > 1, True])
-        for k, points in enumerate(walk(4))
-    ]
-    check(follow(frames, skin=skin), [fresh(atoms) for atoms in frames])
-    with pytest.raises(ValueError, match="of type Atoms bring their own box: leave box"):
-        next(follow(frames, skin=skin, box=3.0))
 
 
 class Timestep:
@@ -203,23 +159,6 @@ def test_nothing_is_read_ahead():
     assert list(found) == []
 
 
-def test_progress():
-    frames = walk(4)
-    for options in ({}, {"skin": None}):
-        done = []
-        for k, _ in enumerate(follow(frames, progress=done.append, **options)):
-            assert len(done) == k + 1  # before the pairs are handed out
-        assert done == [0.25, 0.5, 0.75, 1.0]
-
-    def stop(fraction):
-        raise KeyError("stop")
-
-    found = follow(frames, progress=stop)
-    with pytest.raises(KeyError, match="stop"):
-        next(found)
-    assert list(found) == []
-
-
 @pytest.mark.parametrize("options, kind, message", [
     ({"cutoff": -1.0}, ValueError, "cutoff"),
     ({"skin": "thick"}, ValueError, "skin"),
@@ -264,12 +203,6 @@ def test_periodic_needs_a_box_and_none_of_its_own(skin):
     periodic = [True, False, True]
     check(follow(frames, skin=skin, periodic=periodic),
           [fresh(points, box=box, periodic=periodic) for points, box in frames])  # fmt: skip
-
-
-def test_a_result_that_does_not_fit():
-    with pytest.raises(MemoryError) as caught:
-        next(call(hs.trajectory_pairs, walk(1, 3000), 5.0, memory_limit=1e5))
-    assert caught.value.__notes__ == ["in frame 0 of trajectory_pairs"]
 
 
 def large(n_frames=9, n=1500, seed=3):
@@ -340,3 +273,20 @@ def test_threads_end_with_the_iteration():
     found.close()
     assert set(threading.enumerate()) == before
     assert list(follow([], skin=None, threads=2)) == []
+
+
+def test_progress():
+    frames = walk(4)
+    for options in ({}, {"skin": None}):
+        done = []
+        for k, _ in enumerate(follow(frames, progress=done.append, **options)):
+            assert len(done) == k + 1  # before the pairs are handed out
+        assert done == [0.25, 0.5, 0.75, 1.0]
+
+    def stop(fraction):
+        raise KeyError("stop")
+
+    found = follow(frames, progress=stop)
+    with pytest.raises(KeyError, match="stop"):
+        next(found)
+    assert list(found) == []

@@ -5,15 +5,12 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from ase import Atoms
-from ase.neighborlist import neighbor_list
 from hypothesis import given
-from scipy.spatial import cKDTree
 
 import halfshell as hs
 from halfshell._check.reference import reference_pairs
 from halfshell._check.verify import _COMPARING
-from oracles import lattice, random_scene, rotation
+from oracles import lattice, random_scene
 from scene_strategies import scenes
 
 
@@ -52,16 +49,6 @@ def test_the_list_of_the_definition_is_right(scene):
         assert not len(verdict.spurious) and not len(verdict.duplicate)
 
 
-def test_a_pair_listed_twice_is_a_duplicate_in_either_direction(scene):
-    points, cutoff, box = scene
-    i, j, S = listed(scene)
-    for a, b, sign in ((i[4], j[4], 1), (j[4], i[4], -1)):
-        more = np.append(i, a), np.append(j, b), np.append(S, sign * S[4:5], axis=0)
-        verdict = hs.verify(points, cutoff, *more, box=box)
-        assert rows(verdict.duplicate) == [(i[4], j[4], *S[4].tolist())]
-        assert len(verdict.missed) == len(verdict.spurious) == 0
-
-
 def test_all_three_at_once(scene):
     points, cutoff, box = scene
     i, j, S = (x[2:] for x in listed(scene))
@@ -84,29 +71,6 @@ def test_shifts_that_mean_something_else_are_told(scene, full):
         verdict = hs.verify(points, cutoff, i, j, other, box=box, full=full)
         assert not verdict and told in str(verdict)
         assert "S" not in str(hs.verify(points, cutoff, i[1:], j[1:], other[1:], box=box))
-
-
-def test_order_and_orientation_do_not_matter(scene, rng):
-    points, cutoff, box = scene
-    i, j, S = listed(scene)
-    order = rng.permutation(len(i))
-    turn = rng.random(len(i)) < 0.5
-    a, b = np.where(turn, j, i)[order], np.where(turn, i, j)[order]
-    T = np.where(turn[:, None], -S, S)[order]
-    verdict = hs.verify(points, cutoff, a, b, T, box=box)
-    assert verdict.ok and verdict
-    for part in (verdict.missed, verdict.spurious, verdict.duplicate):
-        assert part.dtype == np.int64 and part.shape == (0, 5)
-
-
-def test_full_lists(scene):
-    points, cutoff, box = scene
-    i, j, S = listed(scene)
-    assert hs.verify(points, cutoff, *doubled(i, j, S), box=box, full=True).ok
-    assert len(hs.verify(points, cutoff, i, j, S, box=box, full=True).missed) == len(i)
-    found = hs.verify(points, cutoff, *doubled(i, j, S), box=box)
-    assert found.ok and found.is_full and found.n_expected == 2 * len(i)
-    assert str(found) == f"correct: {2 * len(i)} pairs of a full list"
 
 
 def test_a_point_as_its_own_neighbour_is_spurious():
@@ -132,22 +96,6 @@ def test_shifts_in_open_space_and_on_open_axes_are_spurious():
     assert not len(verdict.missed)
 
 
-def test_lists_without_shifts(rng):
-    points = rng.random((200, 3))
-    theirs = cKDTree(points).query_pairs(0.2, output_type="ndarray")
-    assert hs.verify(points, 0.2, theirs[:, 0], theirs[:, 1]).ok
-    assert len(hs.verify(points, 0.2, theirs[1:, 0], theirs[1:, 1]).missed) == 1
-    boxed = cKDTree(points, boxsize=1.0).query_pairs(0.2, output_type="ndarray")
-    assert hs.verify(points, 0.2, boxed[:, 0], boxed[:, 1], box=[1.0] * 3).ok
-
-
-def test_without_shifts_images_are_told_apart_by_their_number():
-    points, box = [[0.0, 0.0], [0.5, 0.0]], [1.0, 10.0]
-    assert hs.verify(points, 0.5, [0, 0], [1, 1], box=box).ok
-    assert not hs.verify(points, 0.5, [0], [1], box=box).ok
-    assert len(hs.verify(points, 0.5, [0, 0, 0], [1, 1, 1], box=box).duplicate) == 1
-
-
 def test_the_rule_at_the_cutoff_is_that_of_the_list():
     points, box = lattice("sc", (3, 3, 3))
     closed = hs.pairs(points, 1.0, box=box, quantities="ijS")
@@ -156,32 +104,6 @@ def test_the_rule_at_the_cutoff_is_that_of_the_list():
     assert len(verdict.spurious) == len(closed[0]) == 81
     nothing = np.empty((0, 3), int)
     assert hs.verify(points, 1.0, [], [], nothing, box=box, inclusive=False).ok
-
-
-def test_the_list_of_ase(rng):
-    points, cutoff, box, _ = random_scene(rng, 40, neighbours=20)
-    atoms = Atoms("H40", positions=points, cell=box, pbc=True)
-    found = neighbor_list("ijS", atoms, cutoff)
-    assert hs.verify(points, cutoff, *found, box=box, inclusive=False, full=True).ok
-    assert hs.verify(atoms, cutoff, *found, inclusive=False, full=True).ok
-
-
-def test_a_rounded_list_of_a_rotated_crystal_is_found_out(rng):
-    points, _ = lattice("sc", (6, 6, 6))
-    points = points @ rotation(rng)
-    theirs = cKDTree(points).query_pairs(1.0, output_type="ndarray")
-    ours = hs.pairs(points, 1.0, quantities="P")
-    verdict = hs.verify(points, 1.0, *theirs.T)
-    one, other = set(map(tuple, ours.tolist())), set(map(tuple, theirs.tolist()))
-    assert set(rows(verdict.missed)) == one - other
-    assert set(rows(verdict.spurious)) == other - one
-    assert not verdict.ok
-
-
-def test_nothing_to_verify():
-    assert hs.verify(np.empty((0, 3)), 1.0, [], []).ok
-    assert hs.verify(np.zeros((1, 3)), 1.0, [], []).ok
-    assert not hs.verify(np.zeros((2, 3)), 1.0, [], []).ok
 
 
 POINTS = np.arange(12.0).reshape(4, 3)
@@ -300,18 +222,3 @@ def test_supports_of_any_unit(unit):
     for rule in ("min", "scatter"):
         table = hs.neighbors(points, unit, rule=rule, quantities="jS")
         assert table.n_entries == 8 and hs.verify(points, unit, table, rule=rule)
-
-
-def test_a_batch_without_systems():
-    points = hs.Points(np.empty((0, 2)), box=1.0, batch=[])
-    assert hs.verify(points, 1.0, [], [])
-    queries = hs.Points([[0.0, 0.0]], batch=[0])
-    assert hs.verify(points, 1.0, hs.neighbors(points, 1.0, queries=queries), queries=queries)
-
-
-def test_systems_that_have_points_or_queries_or_both():
-    points = hs.Points([[0.0], [1.0], [0.0]], batch=[1, 1, 4])
-    queries = hs.Points([[0.0], [0.0], [1.0], [0.0]], batch=[0, 1, 3, 4])
-    assert hs.verify(points, 1.0, [1, 1, 3], [0, 1, 2], queries=queries)
-    wrong = hs.verify(points, 1.0, [1, 0, 3], [0, 1, 2], queries=queries)
-    assert wrong.missed.tolist() == [[1, 1]] and wrong.spurious.tolist() == [[0, 1]]

@@ -8,9 +8,7 @@ import pytest
 
 import halfshell as hs
 from calls import call
-from full_lists import entries, full_list, large_full_rows, list_between
-from halfshell._check.reference import reference_pairs
-from oracles import check, check_large, exact_pairs, same_arrays
+from oracles import check, same_arrays
 
 LARGEST = 1.7e308
 SMALLEST = 5e-324
@@ -58,17 +56,6 @@ def test_periodic_scenes_of_all_scales(rng, cutoff, length):
         check(points, cutoff, [[0, -length], [length, 0]], [True, False])
 
 
-def test_boxes_of_very_different_lengths(rng):
-    box = [1e-300, 1.0, 1e300]
-    points = rng.random((20, 3)) * box
-    points[:, 0] = points[rng.integers(20, size=20), 0]
-    near_points(rng, points, 1e-300)
-    check(points, 1e-300, box)
-    check(points, 0.0, box)
-    for open_axis in range(3):
-        check(points, 1e-300, box, [k != open_axis for k in range(3)])
-
-
 def test_tilted_boxes_with_tiny_cutoffs(rng):
     box = np.array([[1.0, 0, 0], [0.3, 1, 0], [0, 0, 1]])
     points = rng.random((30, 3)) @ box
@@ -79,28 +66,6 @@ def test_tilted_boxes_with_tiny_cutoffs(rng):
         assert len(found) >= 10
         points[:, 2] %= 1.0
         assert len(check(points, cutoff, box)) >= 10
-
-
-def test_distances_and_vectors_beside_outliers(rng):
-    for box in (None, [1.0, 1.0, 1.0]):
-        points = rng.random((40, 3))
-        points[7, 0], points[8, 1], points[9, 2] = 1e300, -LARGEST, SMALLEST
-        shifts = "" if box else "S"
-        i, j, d, D, *_ = hs.pairs(points, 0.5, box=box, quantities="ijdD" + shifts, periodic=None)
-        vectors = np.where(box is None, points[j] - points[i], D)
-        assert np.all(np.abs(np.linalg.norm(vectors, axis=1) - d) <= 2 * np.spacing(d))
-        assert len(i) == len(reference_pairs(points, 0.5, box))
-
-
-def test_distances_of_subnormal_coordinates(rng):
-    points = rng.integers(0, 30, (60, 2)) * SMALLEST
-    points[0] = 1e300
-    i, j, d, D = hs.pairs(points, 9 * SMALLEST, quantities="ijdD")
-    assert np.array_equal(D, points[j] - points[i])
-    for a, b, distance in zip(i, j, d):
-        steps = [round((points[b, k] - points[a, k]) / SMALLEST) for k in range(2)]
-        assert abs(distance / SMALLEST - math.hypot(*steps)) <= 1
-    assert len(check(points, 9 * SMALLEST)) == len(i)
 
 
 def test_points_wrapped_from_far_away_count_their_turns():
@@ -116,34 +81,6 @@ def test_points_wrapped_from_far_away_count_their_turns():
         assert call(hs.count_pairs, points, 1e-300, box=box, kernel=kernel) == 6
     with pytest.raises(OverflowError, match=r"points\[4\] lies too many box vectors away"):
         hs.pairs(points * 4, 1e-300, box=box, quantities="S")
-
-
-def test_faces_of_a_condensed_box_meet():
-    half = 0.5
-    points = np.array([[half], [-half], [np.nextafter(half, 0)], [0.0]])
-    expected = {(0, 1, (1,))}
-    assert check(points, 1e-200, [1.0]) == expected
-    assert check(points, 2.0**-54, [1.0]) == expected | {(0, 2, (0,)), (1, 2, (-1,))}
-
-
-def test_a_cutoff_far_beyond_the_cloud(rng):
-    for kernel in hs.kernels():
-        points = rng.random((50, 3)) * 1e-300
-        for cutoff in (1e-299, 1e-290, 1.0, 1e19, 1e300, LARGEST):
-            assert call(hs.count_pairs, points, cutoff, kernel=kernel) == 50 * 49 // 2
-            d = call(hs.pairs, points, cutoff, quantities="d", kernel=kernel)
-            expected = hs.pairs(points, 1e-299, quantities="d")
-            assert np.allclose(np.sort(d), np.sort(expected), rtol=1e-15)
-        assert call(hs.count_pairs, points * 0, 1.0, kernel=kernel) == 50 * 49 // 2
-
-
-def test_crowds_far_smaller_than_the_cutoff(rng):
-    # Differences underflow in float32 where the crowds are 1e-30 wide.
-    centres = rng.integers(0, 9, (300, 3)).astype(float)
-    centres[:100] = 0.0
-    points = centres + rng.uniform(-1, 1, (300, 3)) * 10.0 ** rng.uniform(-40, -12, (300, 1))
-    for cutoff in (1e-35, 1e-25, 1e-13, 1.0):
-        check_large(points, cutoff)
 
 
 def long_boxes(aspect):
@@ -162,17 +99,6 @@ def test_long_skewed_boxes(rng, aspect):
             check(points, cutoff, box)
     report = hs.explain(rng.random((2000, 3)) @ box, 0.3, box=box, measure=True)
     assert report.measured["candidates"] < 300 * 2000
-
-
-def test_boxes_that_float64_does_not_place_points_in(rng):
-    turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    sheared = np.array([[1.0, 0, 0], [1e12, 1, 0], [-3e11, 7e11, 1]])
-    for box in (np.diag([1e17, 1, 1]) @ turned, np.diag([1e30, 1, 1]) @ turned, sheared):
-        with pytest.raises(ValueError, match="box is too skewed, or its vectors differ"):
-            hs.count_pairs(rng.random((100, 3)), 0.1, box=box)
-    # What the cutoff blurs anyway is no matter.
-    box = np.diag([1e12, 1, 1]) @ turned
-    check(rng.random((12, 3)) @ box, 0.4, box)
 
 
 # ---- work, counted -------------------------------------------------------------------------
@@ -208,11 +134,6 @@ def test_work_follows_points_and_pairs(rng, scene):
         assert candidates < 100
         assert ambiguous < 0.1
         assert by_integers < 0.01
-
-
-def test_coincident_points_with_cutoff_zero_are_no_work_for_integers():
-    _, _, by_integers = work(np.full((500, 3), 0.3), 0.0)
-    assert by_integers == 0
 
 
 def test_many_coincident_points_are_refused_at_once():
@@ -261,56 +182,19 @@ def test_a_refusal_says_what_was_expected(rng, limit, options):
         assert (" 0 bytes are allowed" in text) == (limit == 0)
 
 
-def test_a_refused_count_says_so_too(rng):
-    with pytest.raises(MemoryError, match=r"pairs are expected and the search itself takes .*MB"):
-        call(hs.count_pairs, rng.random((50_000, 3)), 0.05, memory_limit=1e4)
-
-
 def test_arrays_of_out_must_lie_apart_from_each_other(rng):
     points = rng.random((50, 2))
     room = np.empty(3000, np.int64)
     for i, j in ((room, room), (room[:2000], room[1999:]), (room[1000:], room[:1001])):
         with pytest.raises(ValueError, match="the arrays of out must not overlap"):
             hs.pairs(points, 0.2, out=(i, j))
+    with pytest.raises(ValueError, match="out for 'd' must not share memory with points"):
+        hs.pairs(points, 0.2, quantities="d", out=points.reshape(-1))
+    whole = np.arange(100).reshape(50, 2)
+    with pytest.raises(ValueError, match="must not share memory with points"):
+        hs.pairs(whole, 3.0, quantities="i", out=whole.reshape(-1))  # also if converted first
     found = hs.pairs(points, 0.2, out=(room[:1500], room[1500:]))
     assert same_arrays(found, hs.pairs(points, 0.2))
-
-
-def test_out_must_lie_apart_from_the_inputs(rng):
-    n = 50
-    points = rng.random((n, 2))
-    before = points.copy()
-    flat = points.reshape(-1)
-    for part in (flat, flat[-1:], flat[:1], points[::-1].reshape(-1)[:0]):
-        if part.base is points and part.size:
-            with pytest.raises(ValueError, match="out for 'd' must not share memory with points"):
-                hs.pairs(points, 0.2, quantities="d", out=part)
-    with pytest.raises(ValueError, match="out for 'd' must not share memory with points"):
-        hs.pairs(points[::-1, ::-1], 0.2, quantities="d", out=flat)
-    assert np.array_equal(points, before)
-    box = np.ones(2)
-    with pytest.raises(ValueError, match="must not share memory with box"):
-        hs.pairs(points, 0.2, box=box, quantities="d", out=box)
-    systems = hs.Points(points, batch=np.arange(n) // 10)  # which are a copy
-    assert len(hs.pairs(systems, 0.2, quantities="d", out=flat)) > 0
-    points[:] = before
-    cutoffs = np.full(5, 0.2)
-    with pytest.raises(ValueError, match="must not share memory with cutoff"):
-        hs.pairs(systems, cutoffs, quantities="d", out=cutoffs)
-    # Also where it was converted first.
-    whole = np.arange(2 * n).reshape(n, 2)
-    with pytest.raises(ValueError, match="out must not share memory with points"):
-        hs.pairs(whole, 3.0, quantities="i", out=whole.reshape(-1))
-
-
-def test_out_may_lie_beside_the_inputs(rng):
-    memory = np.empty(1200)
-    points = memory[:150].reshape(50, 3)
-    points[:] = rng.random((50, 3))
-    found = hs.pairs(points, 0.3, quantities="d", out=memory[150:])
-    assert np.array_equal(found, hs.pairs(points, 0.3, quantities="d"))
-    none = np.empty((0, 3))
-    assert len(hs.pairs(none, 0.3, quantities="d", out=memory)) == 0
 
 
 # ---- full lists, queries, and cells that are kept ---------------------------------------------
@@ -321,52 +205,6 @@ SKEWED = "box is too skewed, or its vectors differ"
 def turned_box(rng, aspect):
     """A box with one vector so many times as long as the others, along no coordinate axis."""
     return np.diag([aspect, 1.0, 1.0]) @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
-
-
-def scene_in(rng, box, n=20):
-    """Points about the box, half of them beside others."""
-    points = rng.uniform(-1, 2, (n, 3)) @ box
-    points[n // 2 :] = points[: n - n // 2] + rng.uniform(-0.6, 0.6, (n - n // 2, 3))
-    return points
-
-
-# ---- long skewed boxes ---------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("aspect", [1e6, 1e12, 1e19])
-def test_full_lists_in_long_skewed_boxes(rng, aspect):
-    for kernel in hs.kernels():
-        for box in long_boxes(aspect):
-            points = scene_in(rng, box)
-            queries = np.concatenate([scene_in(rng, box, 4), points[:4] + 0.1])
-            for cutoff in (0.3, 0.9):
-                found = call(hs.neighbors, points, cutoff, box=box, quantities="jS", kernel=kernel)
-                assert entries(found) == full_list(points, cutoff, box)
-                expected = list_between(queries, points, cutoff, box)
-                found = call(
-                    hs.neighbors,
-                    points,
-                    cutoff,
-                    queries=queries,
-                    box=box,
-                    quantities="jS",
-                    kernel=kernel,
-                )
-                assert entries(found) == expected
-                assert hs.count_pairs(points, cutoff, queries=queries, box=box) == len(expected)
-
-
-@pytest.mark.parametrize("aspect", [1e6, 1e12, 1e19])
-def test_kept_cells_in_long_skewed_boxes(rng, aspect):
-    for box in long_boxes(aspect):
-        points = scene_in(rng, box)
-        queries = np.concatenate([scene_in(rng, box, 4), points[:4] + 0.1])
-        cells = hs.CellList(points, 0.9, box=box)
-        for radius in (0.9, 0.3, 1e-3):
-            found = cells.query(queries, radius, quantities="jS")
-            assert entries(found) == list_between(queries, points, radius, box)
-            found = cells.neighbors(radius, quantities="jS")
-            assert entries(found) == full_list(points, radius, box)
 
 
 # ---- boxes that are refused ----------------------------------------------------------------
@@ -395,13 +233,6 @@ def test_every_search_refuses_boxes_that_float64_does_not_place_points_in(rng):
                 raise AssertionError(name)
 
 
-def test_a_refused_box_of_many_is_named(rng):
-    boxes = np.stack([np.eye(3), np.eye(3), turned_box(rng, 1e17)])
-    points = rng.random((60, 3))
-    with pytest.raises(ValueError, match=r"box\[2\] is too skewed"):
-        call(hs.pairs, points, 0.1, box=boxes, batch=np.arange(60) // 20)
-
-
 def test_cells_for_a_large_cutoff_refuse_what_is_smaller_than_rounding(rng):
     # Along the short vectors points are known to some units: the cutoff has to be larger.
     box = turned_box(rng, 2.0**50)
@@ -414,66 +245,3 @@ def test_cells_for_a_large_cutoff_refuse_what_is_smaller_than_rounding(rng):
     with pytest.raises(ValueError, match=SKEWED):
         cells.query(points[:3], 1e-3)
     assert cells.count_pairs() == hs.count_pairs(points, 10.0, box=box)
-
-
-# ---- few points far from the box, among many in it -----------------------------------------
-
-
-@pytest.mark.parametrize("far", [1e5, 1e8])
-def test_some_points_and_queries_many_boxes_away(rng, far):
-    for kernel in hs.kernels():
-        box = np.array([[3.0, 0, 0], [1.0, 2.5, 0], [-1.0, 0.7, 3.0]])
-        points, queries = rng.random((300, 3)) @ box, rng.random((300, 3)) @ box
-        for some in (points[7:290:71], queries[130:140]):
-            some += np.round(rng.uniform(-far, far, some.shape)) @ box
-        everyone = np.concatenate([queries, points])
-        half = exact_pairs(everyone, 0.4, box)
-        between = half[(half[:, 0] < 300) & (half[:, 1] >= 300)]
-        found = call(
-            hs.neighbors, points, 0.4, queries=queries, box=box, quantities="jS", kernel=kernel
-        )
-        assert entries(found) == [(i, j - 300, tuple(S)) for i, j, *S in between.tolist()]
-        kept = hs.CellList(points, 0.4, box=box).query(queries, quantities="jS")
-        assert entries(kept) == entries(found)
-        full = call(hs.neighbors, points, 0.4, box=box, quantities="jS", kernel=kernel)
-        assert entries(full) == [
-            (i, j, tuple(S)) for i, j, *S in large_full_rows(points, 0.4, box).tolist()
-        ]
-
-
-# ---- groups that meet nobody ---------------------------------------------------------------
-
-
-def test_queries_that_meet_nobody(rng):
-    points = rng.random((4000, 3)) * 200.0  # hardly a neighbour each
-    queries = rng.random((3000, 3)) * 200.0
-    for box in (None, [200.0] * 3):
-        full = large_full_rows(points, 1.5, box)
-        table = hs.neighbors(points, 1.5, box=box, quantities="jS")
-        assert entries(table) == [(i, j, tuple(S)) for i, j, *S in full.tolist()]
-        assert np.array_equal(hs.coordination(points, 1.5, box=box), table.counts)
-        half = exact_pairs(np.concatenate([queries, points]), 1.5, box)
-        between = half[(half[:, 0] < 3000) & (half[:, 1] >= 3000)]
-        i, j, S = hs.pairs_between(queries, points, 1.5, box=box, quantities="ijS")
-        assert np.array_equal(np.column_stack([i, j - 0, S]), between - [0, 3000, 0, 0, 0])
-    nobody = hs.neighbors(points, 1.5, queries=queries + 1e4)
-    assert nobody.n_entries == 0 and len(nobody.offsets) == 3001
-
-
-# ---- plates --------------------------------------------------------------------------------
-
-
-def test_full_lists_in_plates(rng):
-    box = [2000.0, 2000.0, 0.05]
-    points, queries = rng.random((1500, 3)) * box, rng.random((200, 3)) * box
-    queries[:100] = points[:100] + 0.01
-    for cutoff in (1.0, 0.3):
-        full = large_full_rows(points, cutoff, box).tolist()
-        half = exact_pairs(np.concatenate([queries, points]), cutoff, box)
-        between = half[(half[:, 0] < 200) & (half[:, 1] >= 200)].tolist()
-        for kernel in hs.kernels():
-            how = {"box": box, "quantities": "jS", "kernel": kernel}
-            table = call(hs.neighbors, points, cutoff, **how)
-            assert entries(table) == [(i, j, tuple(S)) for i, j, *S in full]
-            found = call(hs.neighbors, points, cutoff, queries=queries, **how)
-            assert entries(found) == [(i, j - 200, tuple(S)) for i, j, *S in between]

@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 
 import halfshell as hs
 from calls import call
-from full_lists import full_list
+from definition import rows_that_count
 
 #: Cells in which the original's cell list loses pairs, with cutoffs for which it does.
 LOSSY = {
@@ -27,7 +27,8 @@ MODES = {
 def by_rule(points, cutoff, box, periodic=(True, True, True)):
     """Both directions of each pair that the rule keeps: strict, images counted one by one,
     (i, i, 0) never."""
-    return set(full_list(points, cutoff, box, periodic, inclusive=False))
+    points = hs.Points(points, box=box, periodic=periodic)
+    return set(rows_that_count(points, cutoff, inclusive=False))
 
 
 def edges(points, cutoff, **options):
@@ -37,11 +38,6 @@ def edges(points, cutoff, **options):
     found = list(zip(i.tolist(), j.tolist(), map(tuple, S.tolist())))
     assert len(set(found)) == len(found)
     return set(found)
-
-
-def both_ways(i, j, S):
-    half = list(zip(i.tolist(), j.tolist(), map(tuple, S.tolist())))
-    return set(half) | {(b, a, tuple(-s for s in S)) for a, b, S in half}
 
 
 @pytest.mark.parametrize("name", LOSSY)
@@ -99,16 +95,6 @@ def test_image_windows(ratio, name):
     assert edges(points + turns @ box, cutoff, box=box) == moved
 
 
-@pytest.mark.parametrize("n, length, cutoff", [(5, 1.5, 1.2), (12, 1.0, 0.8), (1, 1.0, 2.5)])
-def test_cells_smaller_than_the_cutoff_and_self_images(n, length, cutoff):
-    box = np.eye(3) * length
-    points = np.random.default_rng(4).random((n, 3)) * length
-    expected = by_rule(points, cutoff, box)
-    assert edges(points, cutoff, box=box) == expected
-    images = {S for i, j, S in expected if i == j}
-    assert (len(images) > 0) == (cutoff > length)
-
-
 def test_the_cutoff_is_strict_where_that_is_asked_for():
     points = np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 0.0], [0.0, 0.0, 9.0]])
     box = np.eye(3) * 20.0
@@ -126,59 +112,6 @@ def test_points_outside_of_open_axes(far, periodic):
     points = np.random.default_rng(5).random((12, 3)) * 6.0
     points[:4] += np.where(periodic, 0.0, far)
     assert edges(points, 2.0, box=box, periodic=periodic) == by_rule(points, 2.0, box, periodic)
-
-
-def test_systems_do_not_mix():
-    boxes = np.stack([np.eye(3) * 3.0, LOSSY["skewed"][0] / 6.0, np.eye(3) * 2.0])
-    cutoffs = [1.2, 1.0, 1.5]
-    rng = np.random.default_rng(6)
-    parts = [rng.random((n, 3)) @ box for n, box in zip((7, 12, 9), boxes)]
-    batch = np.repeat(np.arange(3), [7, 12, 9])
-    found = both_ways(
-        *call(hs.pairs,
-            np.concatenate(parts), cutoffs, box=boxes, batch=batch, inclusive=False,
-            quantities="ijS",
-        )
-    )  # fmt: skip
-    expected = set()
-    for part, cutoff, box, first in zip(parts, cutoffs, boxes, (0, 7, 19)):
-        expected |= {(i + first, j + first, S) for i, j, S in by_rule(part, cutoff, box)}
-    assert found == expected
-
-
-def test_two_sets_have_one_edge_for_each_image():
-    rng = np.random.default_rng(7)
-    keys, queries = rng.random((2, 8, 3)) * 2.0
-    box = np.eye(3) * 2.0
-    i, j, S = hs.pairs_between(queries, keys, 1.6, box=box, inclusive=False, quantities="ijS")
-    found = set(zip(i.tolist(), j.tolist(), map(tuple, S.tolist())))
-    every = by_rule(np.concatenate((queries, keys)), 1.6, box)
-    assert len(found) == len(i)
-    assert found == {(a, b - 8, S) for a, b, S in every if a < 8 <= b}
-
-
-def test_vectors_are_those_of_edges():
-    """x[j] - x[i] + S @ vectors, rows being lattice vectors, for the unwrapped positions given."""
-    box = LOSSY["skewed"][0] / 5.0
-    points = np.random.default_rng(8).uniform(-9.0, 9.0, (40, 3))
-    i, j, S, D, d = hs.pairs(points, 1.4, box=box, quantities="ijSDd")
-    assert len(i) > 20
-    assert np.allclose(D, points[j] - points[i] + S @ box, atol=1e-13)
-    assert np.allclose(d, np.linalg.norm(D, axis=1))
-
-
-def test_sizes_are_exact_or_fixed_and_never_cut():
-    """Without arrays of the caller's there is no size to choose; what does not fit them is told."""
-    points = np.random.default_rng(9).random((100, 3))
-    how = {"box": [1.0] * 3, "quantities": "ij", "inclusive": False}
-    i, j = hs.pairs(points, 0.3, **how)
-    m = len(i)
-    for size in (m, 2 * m):
-        found = hs.pairs(points, 0.3, out=(np.empty(size, int), np.empty(size, int)), **how)
-        assert_array_equal(found, (i, j))
-    with pytest.raises(hs.CapacityError) as caught:
-        hs.pairs(points, 0.3, out=(np.empty(m - 1, int), np.empty(m, int)), **how)
-    assert caught.value.needed == m
 
 
 def nearest_image(points, i, j, box, near):
@@ -214,17 +147,3 @@ def test_labels_are_those_of_the_original(ratio, name):
     assert found == expected
     # Labels of their own take out (i, i, 0) alone, which is no edge here.
     assert edges(points, cutoff, box=box, exclude=range(6)) == edges(points, cutoff, box=box)
-
-
-def test_edges_of_some_points():
-    """Edges that touch these ids: of rows in one direction, as pairs each once."""
-    points, box = np.random.default_rng(5).random((40, 3)) * 3.0, [3.0] * 3
-    ids = [3, 17, 8]
-    every = edges(points, 1.0, box=box, exclude=np.arange(40) // 2)
-    options = {"box": box, "inclusive": False, "exclude": np.arange(40) // 2}
-    half = both_ways(*call(hs.pairs, points, 1.0, indices=ids, quantities="ijS", **options))
-    assert half == {edge for edge in every if edge[0] in ids or edge[1] in ids}
-    table = call(hs.neighbors, points, 1.0, indices=ids, quantities="jS", **options)
-    row, j, S = table.to_pairs(quantities="ijS")
-    found = zip(np.array(ids)[row].tolist(), j.tolist(), map(tuple, S.tolist()))
-    assert set(found) == {edge for edge in every if edge[0] in ids}

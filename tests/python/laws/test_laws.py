@@ -166,12 +166,3 @@ def test_the_two_rules_differ_by_the_exact_ties(scene):
 def test_float32_points_are_the_real_numbers_that_they_are(scene):
     single = scene.points.astype(np.float32)
     assert scene.but(points=single).found() == scene.but(points=single.astype(float)).found()
-
-
-@given(scenes(), st.integers(1, 3), st.integers(1, 3))
-def test_strided_points_return_the_same_bytes(scene, row_step, column_step):
-    n, ndim = scene.points.shape
-    store = np.full((n * row_step, ndim * column_step), np.nan)
-    store[::row_step, ::column_step] = scene.points
-    strided = scene.but(points=store[::row_step, ::column_step])
-    assert same_arrays(strided.arrays("ijSdD"), scene.arrays("ijSdD"))

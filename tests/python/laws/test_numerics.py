@@ -4,7 +4,6 @@
 docs/systems/numerics.md has the table that these belong to.
 """
 
-import itertools
 
 import numpy as np
 import pytest
@@ -15,110 +14,6 @@ import halfshell as hs
 
 def plane(n, seed=1):
     return np.random.default_rng(seed).random((n, 2)) * 10.0
-
-
-def neighbours_by_hand(points, cutoff):
-    """Each unordered pair within the cutoff, by float64 distances away from ties."""
-    return {
-        (i, j)
-        for i, j in itertools.combinations(range(len(points)), 2)
-        if np.hypot(*(points[i] - points[j])) <= cutoff
-    }
-
-
-def held_by(cells, block, query):
-    ranges = range(block.offsets[query], block.offsets[query + 1])
-    return [j for r in ranges for j in cells.order[block.start[r] : block.stop[r]].tolist()]
-
-
-def test_order_is_a_permutation():
-    cells = hs.CellList(plane(300), 1.0)
-    assert_array_equal(np.sort(cells.order), np.arange(300))
-
-
-def test_start_ascends_to_n():
-    cells = hs.CellList(plane(300), 1.0)
-    assert cells.cell_start[0] == 0 and cells.cell_start[-1] == 300
-    assert (np.diff(cells.cell_start) >= 0).all()
-
-
-def test_every_point_is_in_the_cell_of_its_position():
-    points = plane(300)
-    cells = hs.CellList(points, 1.0)
-    inside = np.repeat(np.arange(len(cells.cell_start) - 1), np.diff(cells.cell_start))
-    assert_array_equal(cells.cell_of(points)[cells.order], inside)
-
-
-def test_candidates_are_a_superset_of_the_neighbours_and_hold_the_point_itself():
-    points = plane(200)
-    cells = hs.CellList(points, 1.0)
-    block = cells.candidates()
-    for i, row in enumerate(cells.neighbors()):
-        held = held_by(cells, block, i)
-        assert set(row.tolist()) | {i} <= set(held)
-        assert len(held) == len(set(held)), "in open space no range comes twice"
-
-
-@pytest.mark.parametrize("cutoff", [0.5, 1.0])
-def test_candidates_are_the_block_of_three_by_three_cells(cutoff):
-    points = plane(600)
-    cells = hs.CellList(points, cutoff, cell_size=1.0)
-    assert cells.shape == tuple((np.ptp(points, axis=0) / (1.0 + 1e-5)).astype(int))
-    home = cells.cell_of(points)
-    x, y = home % cells.shape[0], home // cells.shape[0]
-    block = cells.candidates()
-    for i in range(0, 600, 7):
-        expected = np.flatnonzero((abs(x - x[i]) <= 1) & (abs(y - y[i]) <= 1))
-        held = set(held_by(cells, block, i))
-        assert held <= set(expected.tolist())
-        if cutoff == 1.0:
-            assert held == set(expected.tolist())
-
-
-def test_each_unordered_pair_comes_once_and_both_ends_agree():
-    points = plane(200)
-    cells = hs.CellList(points, 1.0)
-    i, j = cells.pairs()
-    found = list(zip(i.tolist(), j.tolist(), strict=True))
-    assert len(found) == len(set(found)) and all(a < b for a, b in found)
-    assert set(found) == neighbours_by_hand(points, 1.0)
-    later = {(a, b) for a, row in enumerate(cells.neighbors()) for b in row.tolist() if b > a}
-    assert later == set(found)
-
-
-def test_the_sort_is_stable():
-    cells = hs.CellList(plane(500), 2.0)
-    for a, b in itertools.pairwise(cells.cell_start.tolist()):
-        assert (np.diff(cells.order[a:b]) > 0).all()
-
-
-def test_another_number_of_points():
-    for n in (300, 10, 500):
-        assert len(hs.CellList(plane(n), 1.0).order) == n
-
-
-def test_no_points():
-    cells = hs.CellList(np.empty((0, 2)), 1.0)
-    assert cells.cell_start.tolist()[-1] == 0 and len(cells.pairs()[0]) == 0
-    assert len(cells.candidates([[1.0, 1.0]]).start) == 0
-
-
-def test_all_points_in_one_cell():
-    points = plane(50) * 1e-3
-    cells = hs.CellList(points, 1.0)
-    assert cells.shape == (1, 1) and cells.count_pairs() == 50 * 49 // 2
-
-
-def test_points_outside_the_domain():
-    # The domain is the box: points far outside it are wrapped, in open space they have cells.
-    points = plane(100)
-    away = points + np.random.default_rng(2).integers(-50, 50, points.shape) * 16.0
-    box = [16.0, 16.0]
-    near, far = hs.CellList(points, 1.0, box=box), hs.CellList(away, 1.0, box=box)
-    assert_array_equal(near.pairs(sort=True), far.pairs(sort=True))
-    assert_array_equal(near.cell_of(away), near.cell_of(points))
-    open_space = hs.CellList(away, 1.0)
-    assert open_space.count_pairs() == hs.count_pairs(away, 1.0)
 
 
 @pytest.mark.parametrize("periodic", [False, True])

@@ -85,36 +85,3 @@ def test_the_sign_of_zero_changes_nothing(case):
     (points, options), (turned, turned_options) = both(case)
     for one, other in zip(of_all(points, **options), of_all(turned, **turned_options), strict=True):
         assert np.asarray(one).tobytes() == np.asarray(other).tobytes()
-
-
-def test_neighbours_of_a_lattice_are_counted():
-    for length in (4, 8, 16):
-        for ndim in (1, 2, 3):
-            for is_periodic in (False, True):
-                points = negative(lattice(ndim, length, length // 2))
-                options = {"box": [float(length)] * ndim} if is_periodic else {}
-                each = length if is_periodic else length - 1
-                for algorithm in ("auto", "grid", "hash", "all-pairs"):
-                    found = call(hs.count_pairs, points, 1.0, algorithm=algorithm, **options)
-                    assert found == ndim * each * length ** (ndim - 1)
-
-
-@pytest.mark.parametrize("storage", ["hash", "dense", "all-pairs"])
-def test_dynamic_lists(storage):
-    points = lattice(2, 8, 4)
-    answers = []
-    for own in (points, negative(points)):
-        listed = hs.DynamicCellList(2, 1.0, box=[8.0, 8.0], storage=storage)
-        listed.insert_many(range(len(own)), own)
-        answers.append([sorted(listed.within(point, 1.0)) for point in own])
-    assert answers[0] == answers[1]
-    assert all(len(row) == 5 for row in answers[0])
-
-
-def test_node_lists():
-    points = lattice(2, 8, 4)
-    rows = []
-    for own in (points, negative(points)):
-        made = hs.Connectivity([hs.NodeList("all", own, np.ones(len(own)))], 1.0)
-        rows.append([made.offsets.tolist(), made.indices.tolist()])
-    assert rows[0] == rows[1]

@@ -51,15 +51,6 @@ def test_the_layout_is_a_sort_of_the_points(name):
             assert len(np.unique(cells.cell_ids, axis=0)) == n_cells
 
 
-def test_clusters_far_apart_have_occupied_cells_only():
-    points, cutoff, _ = scene_of("clusters far apart")
-    for size in (None, 0.05):
-        cells = hs.CellList(points, cutoff, cell_size=size)
-        assert cells.cell_ids is not None and cells.cell_of([[5e8, 0.0, 0.0]]).tolist() == [-1]
-    one = hs.CellList(points, cutoff, cell_size=1e12)  # as wanted: all of them in one cell
-    assert one.shape == (1, 1, 1) and one.count_pairs() == hs.count_pairs(points, cutoff)
-
-
 def test_arrays_are_read_only_and_outlive_the_list(rng):
     cells = hs.CellList(rng.random((100, 3)) * 9.0, 1.0)
     order, start = cells.order, cells.cell_start
@@ -72,18 +63,6 @@ def test_arrays_are_read_only_and_outlive_the_list(rng):
     rng.random(100_000)
     assert_array_equal(order, copies[0])
     assert_array_equal(start, copies[1])
-
-
-def test_axes_are_cut_into_as_many_cells_as_are_wide_enough():
-    points = np.random.default_rng(1).random((800, 2)) * [12.0, 5.0]
-    points[:2] = [[0.0, 0.0], [12.0, 5.0]]
-    for width in (0.25, 0.5, 0.75, 1.0, 1.5, 3.0, 20.0):
-        for box in (None, [12.0, 5.0]):
-            cells = hs.CellList(points, 0.7, box=box, cell_size=width)
-            expected = [max(int(length / width), 1) for length in (12.0, 5.0)]
-            assert list(cells.shape) == expected
-            sizes = [length / count for length, count in zip((12.0, 5.0), expected, strict=True)]
-            assert np.allclose(cells.cell_sizes, sizes)
 
 
 @pytest.mark.parametrize("ndim", [1, 2, 3])

@@ -7,7 +7,6 @@ import itertools
 import pickle
 import threading
 import tracemalloc
-import weakref
 from functools import partial
 
 import numpy as np
@@ -23,7 +22,6 @@ from full_lists import same_tables
 from halfshell._objects import cell_list
 from oracles import same_arrays
 from refused_calls import check_refusals
-from subprocesses import RESIDENT, run
 
 
 class Alone:
@@ -128,21 +126,6 @@ def test_nearest_are_those_of_a_search_of_its_own(name):
             assert same_arrays(cells.nearest(k, **how), alone.nearest(k, **how))
 
 
-def test_nearest_do_not_depend_on_what_the_cells_are_for():
-    points = np.stack(np.meshgrid(*[np.arange(4.0)] * 3), -1).reshape(-1, 3) * 0.1
-    for cutoff, precision in ((0.0, "exact"), (0.1, "single"), (1e200, "double")):
-        far = points[:5] * 100.0
-        with hs.settings(precision=precision):
-            cells = hs.CellList(points, cutoff)
-            found = cells.nearest(14), cells.nearest(3, queries=far)
-        assert same_arrays(found[0], hs.nearest(points, 14))
-        assert same_arrays(found[1], hs.nearest(points, 3, queries=far))
-    scene = np.array([[1e300, 0.0], [1e-300, 0.0], [0.0, 3e-300], [0.0, 0.0]])
-    cells = hs.CellList(scene, 1.0)
-    for how in ({}, {"queries": scene}, {"max_distance": 2e-300}):
-        assert same_arrays(cells.nearest(2, **how), call(hs.nearest, scene, 2, **how))
-
-
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_histograms_are_exact_for_any_precision(precision):
     points = np.stack(np.meshgrid(*[np.arange(6.0) * 0.1] * 3), -1).reshape(-1, 3)
@@ -156,22 +139,6 @@ def test_histograms_are_exact_for_any_precision(precision):
         assert counts.tolist() == [cells.count_pairs(one) for one in edges]
         if precision == "double":  # single depends on the cells
             assert_array_equal(counts, hs.count_pairs(points, edges, box=box))
-
-
-def test_neither_kernel_nor_threads_matter(rng):
-    points, queries = rng.random((25_000, 3)), rng.random((900, 3))
-    weights, edges = rng.normal(size=len(points)), np.linspace(0.0, 0.05, 12)
-    asks = [
-        lambda cells, how: call(cells.pair_histogram, edges, **how),
-        lambda cells, how: call(cells.query, queries, quantities="jd", **how),
-        lambda cells, how: call(cells.pairs, quantities="P", **how),
-    ]
-    known = hs.Points(points, weights=weights, box=1.0)
-    lists = [hs.CellList(known, 0.05, threads=threads) for threads in (1, 2)]
-    for ask in asks:
-        expected = ask(lists[0], {"kernel": "scalar", "threads": 1})
-        for cells, kernel, more in itertools.product(lists, hs.kernels(), ({}, {"threads": 2})):
-            assert same(ask(cells, {"kernel": kernel, **more}), expected)
 
 
 @pytest.mark.parametrize("what", ["query", "nearest"])
@@ -257,24 +224,6 @@ def test_special_radii():
         assert_array_equal(cells.query(points, radius).indices, cells.query(points, 0.5).indices)
 
 
-def test_radii_are_decided_by_the_precision_that_is_set():
-    # Far outside the box rounded and exact distances differ by many last places.
-    points, box = np.random.default_rng(4).random((300, 2)) * 1e6, [3.9, 3.7]
-    cells = hs.CellList(points, 0.5, box=box)
-    queries = points[:100]
-    near = hs.neighbors(points, 0.5, queries=queries, quantities="d", box=box)
-    radii = np.array([d[-1] for d in near]) * (1.0 + 1e-12)
-    rounded = partial(call, cells.query, quantities="jS", precision="double")
-    table = rounded(queries, radii)
-    differ = 0
-    for i, radius in enumerate(radii.tolist()):
-        alone = rounded(queries[i : i + 1], radius)[0]
-        assert same_arrays(table[i], alone)
-        exact = hs.neighbors(points, radius, queries=queries[i : i + 1], box=box)
-        differ += len(exact[0]) != len(alone[0])
-    assert differ > 0
-
-
 def shell(rng, n=3000):
     """Points between two spheres about the origin: none within 1.09, all within 1.99."""
     v = rng.normal(size=(n, 3))
@@ -344,16 +293,6 @@ def test_blocks_and_visits_have_the_order_of_the_pairs(name):
     assert seen == list(rows)
 
 
-def test_more_pairs_than_memory_holds_are_counted_and_streamed(rng):
-    points = rng.random((2000, 3))
-    with hs.settings(memory_limit=5e6):
-        cells = hs.CellList(points, 1.5, box=[1.0] * 3)
-        assert next(cells.iter_pairs(max_pairs=10))[0].shape == (10,)
-        assert cells.count_pairs(0.1) == hs.count_pairs(points, 0.1, box=[1.0] * 3)
-        with pytest.raises(MemoryError, match="pairs"):
-            cells.pairs()
-
-
 def test_an_iterator_keeps_its_cells(rng):
     points = rng.random((2000, 3)) * 9.0
     cells = hs.CellList(points, 1.0)
@@ -366,28 +305,6 @@ def test_an_iterator_keeps_its_cells(rng):
     others = [hs.CellList(rng.random((2000, 3)) * 9.0, 1.0) for _ in range(4)]
     assert_array_equal(np.concatenate([first, *blocks]), expected)
     assert len(others[0].pairs(quantities="P")) != len(expected)
-
-
-def test_lists_and_iterators_give_their_memory_back():
-    grown = run(RESIDENT + """
-import json
-import numpy as np, halfshell as hs
-points = np.random.default_rng(1).random((200_000, 3))
-held = []
-for turn in range(30):
-    cells = hs.CellList(points, 0.02, box=[1.0] * 3)
-    blocks = cells.iter_pairs(max_pairs=100_000)
-    next(blocks)
-    if turn % 3 == 0:
-        blocks.close()
-        assert list(blocks) == []
-    elif turn % 3 == 1:
-        del cells
-    del blocks
-    held.append(resident())
-print(json.dumps(held[-1] - held[9]))
-""")
-    assert grown < 30e6  # a list has 10 MB
 
 
 def test_progress_is_told_and_may_stop_a_block():
@@ -489,15 +406,6 @@ def test_pickles_and_lists_of_other_points_have_the_same_cells(name):
             assert same(table, cells.neighbors(quantities="jd").sort())
 
 
-def test_processes_share_a_list(tmp_path):
-    path = tmp_path / "cells.pickle"
-    cells = hs.CellList(np.random.default_rng(3).random((500, 3)), 0.1, box=[1.0] * 3)
-    path.write_bytes(pickle.dumps(cells))
-    script = f"import json, pickle; cells = pickle.load(open({str(path)!r}, 'rb'))\n"
-    found = run(script + "print(json.dumps([each.tolist() for each in cells.pairs()]))")
-    assert found == [each.tolist() for each in cells.pairs()]
-
-
 def test_other_points_are_those_of_the_list_in_kind(rng):
     cells = hs.CellList(rng.random((10, 3)), 0.2, box=[1.0] * 3)
     check_refusals([
@@ -507,18 +415,6 @@ def test_other_points_are_those_of_the_list_in_kind(rng):
         (lambda: cells.rebuild(Atoms("H", cell=[2.0] * 3, pbc=True)), ValueError, "box"),
     ])  # fmt: skip
     assert len(cells.rebuild(np.empty((0, 3)))) == 0
-
-
-def test_a_list_can_be_collected(rng):
-    class Owner:
-        pass
-
-    owner = Owner()
-    owner.cells = hs.CellList(rng.random((10, 3)), 1.0)
-    gone = weakref.ref(owner)
-    del owner
-    gc.collect()
-    assert gone() is None
 
 
 CELLS = hs.CellList([[0.0, 0.0], [1.0, 1.0]], 2.0)

@@ -78,31 +78,6 @@ def random_culling(lists, rng, shuffled):
     return keep, old2new
 
 
-@pytest.mark.parametrize("seed", range(30))
-def test_a_patch_equals_a_build_of_what_is_left(seed):
-    rng = np.random.default_rng([seed, 1])
-    lists = random_lists(rng, rng.integers(0, 20, rng.integers(1, 4)), 2, lattice=seed % 3 == 0)
-    lists = with_ids(lists, rng)
-    options = random_options(rng)
-    c = hs.Connectivity(lists, **options)
-    coupling = {}
-    if seed % 2:
-        c.pairs.coupling = rng.random(len(c.pairs))
-        ids = [one.ids for one in lists]
-        coupling = {
-            frozenset((ids[a][i], ids[b][j])): value
-            for (i, a, j, b), value in zip(c.pairs, c.pairs.coupling, strict=True)
-        }
-    for _ in range(2):
-        keep, old2new = random_culling(lists, rng, shuffled=seed % 4 < 2)
-        lists = culled(lists, keep, old2new)
-        c.patch(keep, None if seed % 4 >= 2 else old2new)
-        assert_equal(c, hs.Connectivity(lists, **options))
-        ids = [one.ids for one in lists]
-        for (i, a, j, b), value in zip(c.pairs, c.pairs.coupling, strict=True):
-            assert value == coupling.get(frozenset((ids[a][i], ids[b][j])), 1.0)
-
-
 def test_a_patch_by_used_drops_ghosts_that_no_node_sees():
     rng = np.random.default_rng(4)
     lists = with_ids(random_lists(rng, (40, 30), 2, size=9.0), rng)
@@ -113,24 +88,6 @@ def test_a_patch_by_used_drops_ghosts_that_no_node_sees():
     c.patch(keep)
     assert len(c.pairs) == len(pairs)
     assert_equal(c, hs.Connectivity(culled(lists, keep, [np.cumsum(m) - 1 for m in keep])))
-
-
-def test_remove_equals_exclude():
-    for seed in range(16):
-        rng = np.random.default_rng([seed, 2])
-        lists = random_lists(rng, rng.integers(1, 16, 3), 2)
-        options = random_options(rng)
-
-        def gone(i_node, i_list, j_node, j_list, seed=seed):
-            """Symmetric, and of pairs that merely overlap as well."""
-            return (i_node * 7 + j_node * 7 + i_list + j_list) % 5 == seed % 5
-
-        c = hs.Connectivity(lists, **options)
-        c.pairs.coupling = np.arange(len(c.pairs))
-        stays = ~gone(*(getattr(c.pairs, name) for name in COLUMNS))
-        c.remove(gone)
-        assert_equal(c, hs.Connectivity(lists, exclude=gone, **options))
-        assert c.pairs.coupling.tolist() == np.flatnonzero(stays).tolist()
 
 
 def test_pairs_that_are_excluded_by_number_count_nowhere():
@@ -196,27 +153,6 @@ def test_every_access_to_an_old_field_is_stale():
         change(c)
         with pytest.raises(hs.StaleError):
             _ = field[0]
-
-
-def test_a_rebuild_takes_other_nodes_and_keeps_what_is_excluded():
-    lists = [hs.NodeList("a", [[0.0], [1.0]], [1.0] * 2), hs.NodeList("b", [], [])]
-    c = hs.Connectivity(lists, exclude=[(0, 0, 1, 0)])
-    assert len(c.pairs) == 0
-    more = [hs.NodeList("a", [[0.0], [1.0], [2.0]], [1.0] * 3), hs.NodeList("b", [[0.5]], [0.1])]
-    c.rebuild(more)
-    check(c, more, gone=[(0, 1)])
-
-
-def test_memory_of_results_is_used_again():
-    rng = np.random.default_rng(0)
-    lists = [hs.NodeList("a", rng.random((30000, 3)), np.full(30000, 0.03))]
-    c = hs.Connectivity(lists)
-    for _ in range(4):
-        c.rebuild(lists)
-    held = hs.cache_info().held
-    for _ in range(3):
-        c.rebuild(lists)
-        assert abs(hs.cache_info().held - held) <= 0.2 * held + 2**20
 
 
 class Machine(RuleBasedStateMachine):

@@ -142,21 +142,6 @@ def test_pairs_that_are_not_there():
         c.pairs.index([(0, 0, 1, 0), (0, 0, 2, 0)])
 
 
-def test_what_is_not_wanted_is_not_built():
-    c = hs.Connectivity(three())
-    assert {name for name, n_bytes in c.nbytes.items() if n_bytes} == {"rows"}
-    assert c.nbytes["rows"] == 4 * len(c.indices) + 8 * len(c.offsets)
-    assert len(c.pairs) * 16 == c.nbytes["pairs"] > 0
-    c.pairs.index(c.pairs[0])
-    assert c.nbytes["lookup"] == 8 * len(c.pairs)
-    assert (c.pairs.coupling == 1.0).all()
-    assert c.nbytes["coupling"] == 0
-    c.pairs.coupling = 0.5
-    c.pairs.coupling[0] = 0.25
-    assert c.nbytes["coupling"] == 8 * len(c.pairs)
-    assert c.pairs.coupling[:2].tolist() == [0.25, 0.5]
-
-
 def test_what_is_not_wanted_takes_no_memory():
     rng = np.random.default_rng(0)
     lists = [hs.NodeList(name, rng.random((3000, 3)), np.full(3000, 0.05)) for name in "ab"]

@@ -53,14 +53,6 @@ def test_keys_of_lists_can_be_read():
     assert c.morton_keys(1).tolist() == [key_of(place, low, high) for place in x[12:]]
 
 
-def test_a_grid_has_as_many_keys_as_nodes():
-    """Of 512 nodes of such a grid, Spheral's keys tell 148 apart."""
-    grid = np.stack(np.meshgrid(*[np.arange(8.0)] * 3), -1).reshape(-1, 3)
-    assert len(np.unique(_core.morton_keys(grid, np.zeros(3), np.full(3, 7.0)))) == 512
-    half = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5], [1.0, 1.0]])
-    assert len(np.unique(_core.morton_keys(half, np.zeros(2), np.ones(2)))) == 4
-
-
 def test_boxes_without_width_and_near_the_largest_number():
     x = np.array([[1.0, 0.0], [1.0, 2.0]])
     assert _core.morton_keys(x, np.array([1.0, 0.0]), np.array([1.0, 2.0]))[0] == 0
@@ -127,21 +119,6 @@ def test_storage_and_division_do_not_change_the_sequence(d, tied):
                     for m in range(2):
                         row = parts[m].ids[c.neighbors(k, i)[m]]
                         assert (row == lists[m].ids[serial.neighbors(k, at)[m]]).all()
-
-
-def test_a_part_of_a_divided_scene_has_the_pairs_of_the_whole_in_their_order():
-    rng = np.random.default_rng(8)
-    x, h, which, ids = scene(rng, 150, 2, False)
-    options = {"order": "morton", "morton_box": [[0.0, 0.0], [4.0, 4.0]]}
-    lists = lists_of(x, h, which, ids, np.zeros(150, bool))
-    whole = id_pairs(hs.Connectivity(lists, **options), lists)
-    is_left = x[:, 0] < 2.0
-    for own in (is_left, ~is_left):
-        seen = own | (np.abs(x[:, 0] - 2.0) < 1.3)  # beyond the largest support
-        parts = lists_of(x[seen], h[seen], which[seen], ids[seen], ~own[seen])
-        mine = set(ids[own].tolist())
-        want = [(a, b) for a, b in whole if a in mine or b in mine]
-        assert id_pairs(hs.Connectivity(parts, **options), parts) == want
 
 
 def test_nodes_outside_the_box_are_refused():

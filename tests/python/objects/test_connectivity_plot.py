@@ -49,20 +49,6 @@ def test_all_nodes_and_pairs_are_drawn(axes, d, matrices):
         assert np.allclose(supports[0].get_widths(), 1.0 if matrices else 0.6)
 
 
-def test_a_patched_connectivity_is_drawn_as_it_is(axes):
-    lists = lists_of(2)
-    c = hs.Connectivity(lists)
-    keep = [np.arange(20) % 3 != 0, np.arange(10) > 2, np.zeros(0, bool)]
-    for _ in range(2):
-        c.patch(keep)
-        keep = [np.ones(n, bool) for n in c.n_nodes]
-        keep[0][0] = False
-    c.plot(ax=axes)
-    want = lists[0].positions[np.flatnonzero(np.arange(20) % 3 != 0)[1:]]
-    dots = [one.get_offsets() for one in axes.collections[1:3]]
-    assert np.allclose(np.concatenate((dots[0], axes.collections[2].get_offsets())), want)
-
-
 def test_pairs_in_a_box_are_drawn_to_the_image(axes):
     c = hs.Connectivity([hs.NodeList("a", [[0.1, 0.5], [0.9, 0.5]], [0.2] * 2)], box=1.0)
     c.plot(ax=axes)
@@ -78,9 +64,3 @@ def test_a_notebook_shows_a_row_for_each_list():
     assert "&lt;wall&gt;" in html
     assert "with overlap" in html
     assert "0 pairs" in hs.Connectivity([])._repr_html_()
-
-
-def test_axes_that_are_none_are_refused():
-    c = hs.Connectivity(lists_of(2))
-    with pytest.raises(ValueError, match="axes"):
-        c.plot(axes=(0, 2))

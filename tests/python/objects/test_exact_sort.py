@@ -1,11 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`NeighborTable.sort` orders by the true distances, as `nearest` does, ties by (j, S)."""
 
-import copy
 import pickle
 import sys
 import threading
-import tracemalloc
 
 import numpy as np
 import pytest
@@ -104,52 +102,6 @@ def test_tables_without_shifts_are_ordered_alike(maker):
     assert np.array_equal(pickle.loads(pickle.dumps(bare)).sort().indices, wanted.indices)
 
 
-def test_what_happens_to_the_arguments_changes_nothing():
-    points, box, queries = SCENE.copy(), BOX.copy(), SCENE[:5] + 0.05
-    cells = hs.CellList(points, 0.25, box=box)
-    tables = [
-        hs.neighbors(points, 0.25, queries=queries, box=box, quantities="jd"),
-        cells.query(queries, quantities="jd"),
-        cells.query(queries, [0.25] * 5, quantities="jd"),
-    ]
-    expected = [pickle.loads(pickle.dumps(table)).sort() for table in tables]
-    points *= 0.3
-    box *= 2.0
-    queries += 0.01
-    for table, right in zip(tables, expected, strict=True):
-        assert same_arrays(table.sort().indices, right.indices)
-
-
-@pytest.mark.parametrize("maker", makers())
-def test_pickles_hold_what_their_rows_need(maker):
-    for letters in ("jd", "jdS"):
-        table = makers()[maker](letters)
-        inner = table[1:8][2:5]
-        filtered = inner.filter(np.arange(inner.n_entries) % 3 == 1)
-        for part in (table, table[3:5], table[4:4], filtered, table[2:6].sort()[1:]):
-            again = part
-            for _ in range(2):
-                again = pickle.loads(pickle.dumps(again))
-            first = copy.deepcopy(again[:1])
-            for one, other in ((part, again), (part[1:], again[1:]), (part[:1], first)):
-                assert same_arrays(one.sort().indices, other.sort().indices)
-        assert copy.copy(table) is table
-
-
-def test_pickles_of_few_rows_are_small(rng):
-    points = rng.random((20_000, 3))
-    cells = hs.CellList(points, 0.03, box=[1.0] * 3)
-    for table in (
-        hs.neighbors(points, 0.03, box=[1.0] * 3, quantities="jd"),
-        hs.neighbors(points, 0.03, queries=points, quantities="jd"),
-        cells.neighbors(quantities="jdS"),
-    ):
-        assert len(pickle.dumps(table[7:8].filter([False] * table.counts[7]))) < 2000
-        assert len(pickle.dumps(table[7:9])) < 4000
-        again = pickle.loads(pickle.dumps(table[100:9000])).sort()
-        assert same_arrays(again.indices, table[100:9000].sort().indices)
-
-
 def sort_beside(table, stop):
     """Another thread sorts before line `stop` of `shifts`: what comes, and how many lines ran."""
     code, n_lines = type(table._origin).shifts.__code__, 0
@@ -184,31 +136,6 @@ def test_threads_may_need_shifts_at_once():
     assert 3 < stop < 99
 
 
-def test_cell_lists_and_their_tables_share_the_points(rng):
-    points = rng.random((200_000, 3)).astype(np.float32)
-    tracemalloc.start()
-    try:
-        cells = hs.CellList(points, 0.01)
-        table = cells.query(points[:5], quantities="jd")
-        assert tracemalloc.get_traced_memory()[0] < points.nbytes / 20
-    finally:
-        tracemalloc.stop()
-    assert not table._origin.points.flags.writeable
-    assert same_arrays(table._origin.points, points.astype(np.float64))
-    del cells
-    assert_in_exact_order(
-        hs.CellList(points[:50], 0.4).query(points[:5], quantities="jdS").sort(), points, None,
-        points[:5],
-    )
-
-
-def test_many_entries_are_taken_in_parts(monkeypatch):
-    whole = hs.neighbors(SCENE, 0.25, box=BOX, quantities="jdS").sort()
-    monkeypatch.setattr(exact, "AT_A_TIME", 24 * 50)
-    parts = hs.neighbors(SCENE, 0.25, box=BOX, quantities="jdS").sort()
-    assert same_arrays(parts.indices, whole.indices) and same_arrays(parts.shifts, whole.shifts)
-
-
 def wide_ties(n_rows, n_points):
     """Rows of entries at one distance, of numbers with bits from 2**-1000 to 1."""
     x = np.arange(n_rows * n_points) % 2 * 2.0 - 1.0
@@ -218,31 +145,6 @@ def wide_ties(n_rows, n_points):
         (np.arange(n_rows + 1) * n_points, np.arange(len(x)), np.ones(len(x))), "jd", len(x),
         False, origin=Origin(points, rows, None, False),
     )  # fmt: skip
-
-
-def peak_of(call):
-    tracemalloc.start()
-    try:
-        call()
-        return tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("n_rows", [15_000, 1], ids=["many groups", "one group"])
-def test_ties_of_every_scale_take_the_memory_that_is_foreseen(n_rows, monkeypatch):
-    foreseen = []
-
-    def refuse(needed, what):
-        foreseen.append(needed)
-
-    monkeypatch.setattr(exact, "refuse_unavailable", refuse)
-    table = wide_ties(n_rows, 30_000 // n_rows)
-    taken = peak_of(table.sort)
-    assert sum(foreseen) > 80e6 and len(foreseen) == (1 if n_rows == 1 else 6)
-    assert max(foreseen) / 2 < taken < max(foreseen) + 8e6
-    assert n_rows == 1 or max(foreseen) <= 8 * exact.AT_A_TIME
 
 
 def test_a_long_tie_that_does_not_fit_is_refused(monkeypatch):
@@ -274,3 +176,19 @@ def test_rows_are_sorted_a_few_at_a_time(monkeypatch):
             assert same_arrays(*pairs)
         assert_in_exact_order(parts[5:9], points, None, first=5)
         assert hs.neighbors(points[:0], 0.2, quantities="jd").sort().n_entries == 0
+
+
+def test_what_happens_to_the_arguments_changes_nothing():
+    points, box, queries = SCENE.copy(), BOX.copy(), SCENE[:5] + 0.05
+    cells = hs.CellList(points, 0.25, box=box)
+    tables = [
+        hs.neighbors(points, 0.25, queries=queries, box=box, quantities="jd"),
+        cells.query(queries, quantities="jd"),
+        cells.query(queries, [0.25] * 5, quantities="jd"),
+    ]
+    expected = [pickle.loads(pickle.dumps(table)).sort() for table in tables]
+    points *= 0.3
+    box *= 2.0
+    queries += 0.01
+    for table, right in zip(tables, expected, strict=True):
+        assert same_arrays(table.sort().indices, right.indices)

@@ -77,14 +77,6 @@ def test_pairs_are_lines_to_their_images(pyplot, scene):
     axes.figure.canvas.draw()
 
 
-def test_without_shifts_they_are_the_nearest_images(pyplot, scene):
-    points, box = scene
-    i, j, S = hs.pairs(points, 0.7, box=box, quantities="ijS")
-    ours, given = (hs.plot_pairs(points, i, j, shifts, box=box) for shifts in (None, S))
-    for a, b in zip(ours.collections[:2], given.collections[:2], strict=True):
-        assert np.array_equal(segments(a), segments(b))
-
-
 def test_types_have_colours_and_names(pyplot, scene):
     points, box = scene
     kinds = np.array(["O", "Si"])[np.arange(40) % 2]
@@ -186,15 +178,6 @@ def test_points_have_the_colour_of_their_cell(pyplot, rng, scene, periodic):
         if periodic:
             assert len(np.unique(colours)) >= min(2, max(cells.shape))
     assert names(axes, len(box))[0] == "x / Å"
-    axes.figure.canvas.draw()
-
-
-def test_cells_that_are_occupied_alone(pyplot, rng):
-    points = np.concatenate((rng.random((100, 2)), rng.random((100, 2)) + 1e4))
-    cells = hs.CellList(points, 0.1)
-    axes = cells.plot()
-    if cells.cell_ids is not None:
-        assert np.ma.getmaskarray(axes.images[0].get_array()).any()
     axes.figure.canvas.draw()
 
 

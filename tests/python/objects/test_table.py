@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 import halfshell as hs
 from full_lists import same_tables
-from oracles import as_rows, random_scene, same_arrays
+from oracles import BOX_KINDS, random_scene, same_arrays
 from refused_calls import assert_refused
 from scene_strategies import scenes
 
@@ -93,21 +93,6 @@ def test_rows_that_are_not_there(table):
         assert_refused(partial(table.__getitem__, key), TypeError, "whole number")
 
 
-def test_slices_are_tables(table):
-    for ends in itertools.product((None, 0, 7, -3, 30, 99), repeat=2):
-        part = table[slice(*ends)]
-        numbers = range(30)[slice(*ends)]
-        assert len(part) == len(numbers) and part.n_points == 30
-        assert part.offsets[0] == 0 and part.n_entries == part.offsets[-1] == len(part.indices)
-        for k, number in enumerate(numbers):
-            assert same_arrays(part[k], table[number])
-        if part.n_entries:
-            assert np.shares_memory(part.distances, table.distances)
-        assert not part.offsets.flags.writeable and not part.indices.flags.writeable
-        again = part[1:]
-        assert len(again) == max(len(part) - 1, 0)
-
-
 def test_what_was_not_asked_for_is_named():
     for letters in ("j", "d", "D", "S", "dS"):
         table = hs.neighbors(POINTS, 1.0, quantities=letters)
@@ -120,16 +105,6 @@ def test_what_was_not_asked_for_is_named():
                     partial(getattr, table, name),
                     AttributeError, name, f"'{letter}' in quantities, got '{letters}'",
                 )  # fmt: skip
-
-
-def test_tables_do_not_change(table):
-    for name in ("offsets", "counts", "indices", "distances", "vectors", "shifts", "quantities"):
-        with pytest.raises(AttributeError):
-            setattr(table, name, None)
-        array = getattr(table, name)
-        assert isinstance(array, str) or not array.flags.writeable
-    with pytest.raises(AttributeError):
-        table.other = 1
 
 
 def test_copies_and_pickles(table):
@@ -178,15 +153,6 @@ def test_files_of_many_systems_and_few_rows(rng):
         for part in (table, table[25:31], table[[59, 3]]):
             assert same_tables(through_a_file(part).sort(), part.sort())
             assert same_tables(pickle.loads(pickle.dumps(part)).sort(), part.sort())
-
-
-def test_files_have_the_name_they_are_given(table, tmp_path):
-    for name in (tmp_path / "rows", str(tmp_path / "rows.table")):
-        table.save(name)
-        assert same_tables(hs.NeighborTable.load(name), table)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["rows", "rows.table"]
-    with pytest.raises(FileNotFoundError):
-        hs.NeighborTable.load(tmp_path / "other")
 
 
 def test_broken_files_are_refused(table, tmp_path):
@@ -251,25 +217,6 @@ def test_filter_refuses_other_masks(table):
     assert_refused(lambda: table.filter("mask"), TypeError, "mask")
 
 
-@pytest.mark.parametrize("fixture", ["table", "tiny"])
-def test_sort_by_distance(fixture, request):
-    table = request.getfixturevalue(fixture)
-    done = table.sort(by="distance")
-    assert np.array_equal(done.offsets, table.offsets)
-    at = {letter: table.quantities.index(letter) for letter in "jdS"}
-    for k in range(len(table)):
-        keys = [
-            (d, j, tuple(S))
-            for d, j, S in zip(*(table[k][at[letter]].tolist() for letter in "djS"), strict=True)
-        ]
-        found = [
-            (d, j, tuple(S))
-            for d, j, S in zip(*(done[k][at[letter]].tolist() for letter in "djS"), strict=True)
-        ]
-        assert found == sorted(keys)
-    assert same_tables(done.sort(), done)
-
-
 def test_sort_needs_distances(table):
     assert_refused(lambda: table.sort(by="index"), ValueError, "'distance', got 'index'")
     assert_refused(lambda: hs.neighbors(POINTS, 1.0).sort(), AttributeError, "'d' in quantities")
@@ -290,16 +237,6 @@ def test_to_pairs(table):
     narrow = hs.neighbors(POINTS, 1.0, index_dtype=np.int32).to_pairs(quantities="ijP")
     assert [array.dtype for array in narrow] == [np.int32] * 3
     assert hs.neighbors(POINTS, 1.0, quantities="d").to_pairs(quantities="i").dtype == np.int64
-
-
-def test_half_of_the_pairs(table, tiny):
-    for some, cutoff, points, box in ((table, 1.0, POINTS, [4.0, 4.0]),
-                                      (tiny, 1.7, POINTS[:3], [1.0, 1.1])):  # fmt: skip
-        letters = "ijdS"
-        expected = hs.pairs(points, cutoff, box=box, quantities=letters, sort=True)
-        assert same_arrays(some.to_pairs(quantities=letters, half=True), expected)
-        unordered = some.sort().to_pairs(quantities="ijS", half=True)
-        assert np.array_equal(as_rows(*unordered), as_rows(*expected[:2], expected[3]))
 
 
 def test_half_needs_shifts_only_for_own_images():
@@ -349,21 +286,6 @@ def test_from_pairs_makes_the_table_of_a_search(scene, random, is_half):
         assert_refused(bare.reverse, AttributeError, "'S' in quantities")
 
 
-def test_from_pairs_of_queries_and_directions():
-    expected = with_queries(box=[4.0, 4.0])
-    i, j, d, S = expected.to_pairs(quantities="ijdS")
-    made = hs.NeighborTable.from_pairs(
-        i[::-1], j[::-1], S[::-1], n_points=30, n_queries=5, distances=d[::-1]
-    )
-    assert same_tables(made, expected) and made.shape == (5, 30)
-    assert_refused(made.reverse, ValueError, "one set of points")
-    one_way = hs.NeighborTable.from_pairs([0, 1], [1, 2], n_points=3)
-    assert one_way.counts.tolist() == [1, 1, 0]
-    assert_refused(lambda: one_way.to_pairs(half=True), ValueError, "both directions")
-    assert hs.NeighborTable.from_pairs([], [], n_points=0, half=True).shape == (0, 0)
-    assert hs.NeighborTable.from_pairs([], [], n_points=3).counts.tolist() == [0, 0, 0]
-
-
 def test_from_pairs_refuses_what_are_no_pairs():
     make = partial(hs.NeighborTable.from_pairs, n_points=3)
     for call, kind, words in (
@@ -393,21 +315,6 @@ def test_from_pairs_refuses_what_are_no_pairs():
 
 
 # ---- graphs and matrices -------------------------------------------------------------------
-
-
-def test_edge_index(table):
-    edges = table.edge_index()
-    assert edges.shape == (2, table.n_entries) and edges.dtype == np.int64
-    assert edges.flags.writeable and edges.flags.c_contiguous
-    i, j = table.to_pairs()
-    assert np.array_equal(edges[0], j) and np.array_equal(edges[1], i)
-    # The vector points from the target to the source.
-    D = POINTS[edges[0]] - POINTS[edges[1]] + table.shifts * 4.0
-    np.testing.assert_allclose(table.vectors, D, atol=1e-14)
-    assert hs.neighbors(POINTS, 1.0, index_dtype=np.int32).edge_index().dtype == np.int32
-    assert_refused(
-        lambda: hs.neighbors(POINTS, 1.0, quantities="d").edge_index(), AttributeError, "'j'"
-    )
 
 
 @pytest.mark.parametrize("dtype", [np.int32, np.int64])
@@ -555,3 +462,111 @@ def test_rows_longer_than_memory_are_refused(n):
     for capacity in (2**40, 2**62, 2**63, 10**400):
         assert_refused(partial(table.to_padded, capacity), MemoryError, "capacity")
     assert_refused(partial(table.to_padded, True), TypeError, "capacity")
+
+
+def mace_vectors(positions, edge_index, shifts):
+    """As mace.modules.utils.get_edge_vectors_and_lengths has it."""
+    sender, receiver = edge_index
+    return positions[receiver] - positions[sender] + shifts
+
+
+def nequip_vectors(pos, edge_index, cell, edge_cell_shift):
+    """As nequip.data.AtomicDataDict.with_edge_vectors has it."""
+    edge_vec = pos[edge_index[1]] - pos[edge_index[0]]
+    return edge_vec + np.einsum("ni,ij->nj", edge_cell_shift, cell)
+
+
+@pytest.mark.parametrize("kind", BOX_KINDS)
+def test_the_formulas_of_graph_networks_hold(kind, rng):
+    for ndim in (1, 2, 3, 4):
+        points, cutoff, box, periodic = random_scene(rng, 40, ndim, kind, neighbours=8, spread=1)
+        cell = np.eye(ndim) if box is None else box
+        table = hs.neighbors(points, cutoff, box=box, periodic=periodic, quantities="SjDd")
+        graph = table.graph()
+        edge_index, shifts, vectors, distances = graph
+        assert edge_index.shape == (2, table.n_entries) and edge_index.dtype == table.indices.dtype
+        assert np.array_equal(edge_index, table.edge_index())
+        assert shifts.dtype == np.int32 and vectors.dtype == np.float64
+        close = {"rtol": 0.0, "atol": 1e-12 * (1.0 + np.abs(points).max() + np.abs(cell).max())}
+        found = mace_vectors(points, edge_index, shifts @ cell)
+        np.testing.assert_allclose(found, vectors, **close)
+        found = nequip_vectors(points, edge_index, cell, shifts)
+        np.testing.assert_allclose(found, vectors, **close)
+        np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), distances, rtol=1e-12)
+        # The formula for S and D of the table itself, in the docstring of edge_index.
+        j, i = table.edge_index()
+        found = points[j] - points[i] + table.shifts @ cell
+        np.testing.assert_allclose(found, table.vectors, **close)
+        assert not np.signbit(vectors[vectors == 0.0]).any()
+
+
+def test_what_is_lacking_is_named():
+    for letters in ("j", "jd", "jD", "jS", "DS"):
+        table = hs.neighbors([[0.0], [1.0]], 1.0, quantities=letters)
+        with pytest.raises(AttributeError, match="quantities='jDS'"):
+            table.graph()
+
+
+def expected(table, ordered):
+    choose = itertools.permutations if ordered else itertools.combinations
+    rows = itertools.pairwise(table.offsets.tolist())
+    return sorted(pair for first, end in rows for pair in choose(range(first, end), 2))
+
+
+def tables():
+    rng = np.random.default_rng(0)
+    yield hs.neighbors(rng.random((40, 3)), 0.4)
+    yield hs.neighbors(rng.random((40, 2)), 0.05)  # nearly all rows are empty
+    yield hs.neighbors(rng.random((5, 3)), 1.5, box=[1.0] * 3, quantities="jS")
+    yield hs.neighbors(rng.random((9, 3)), 0.5, queries=rng.random((4, 3)))
+    yield hs.neighbors(np.empty((0, 3)), 1.0)
+    yield hs.neighbors([[0.0]], 1.0)
+
+
+TABLES = list(tables())
+
+
+@pytest.mark.parametrize("table", TABLES, ids=range(len(TABLES)))
+def test_all_and_in_blocks(table):
+    for ordered in (False, True):
+        wanted = expected(table, ordered)
+        first, second = table.triplets(ordered=ordered)
+        assert first.dtype == second.dtype == np.int64
+        assert list(zip(first.tolist(), second.tolist(), strict=True)) == wanted
+        for block in (1, 7, 100, 10**9):
+            parts = list(table.triplets(ordered=ordered, block=block))
+            found = [pair for a, b in parts for pair in zip(a.tolist(), b.tolist(), strict=True)]
+            assert found == wanted
+            row = np.repeat(np.arange(len(table)), table.counts)
+            assert all(len(a) <= block or len(set(row[a])) == 1 for a, _ in parts)
+            assert all(len(a) > 0 for a, _ in parts)
+
+
+def test_of_some_rows():
+    table = TABLES[0]
+    for rows in (table[5:12], table[[3, 1, 3]]):
+        first, second = rows.triplets()
+        assert list(zip(first.tolist(), second.tolist(), strict=True)) == expected(rows, False)
+
+
+def test_too_many_are_refused_before():
+    points = np.zeros((3000, 1))
+    table = hs.neighbors(points, 1.0, queries=[[0.0]])
+    assert len(table.triplets()[0]) == 3000 * 2999 // 2
+    huge = hs.neighbors(np.zeros((10**6, 1)), 1.0, queries=[[0.0]])
+    with pytest.raises(MemoryError, match="triplets"):
+        huge.triplets()
+    with pytest.raises(MemoryError, match="triplets"):
+        next(huge.triplets(block=1000))
+
+
+@pytest.mark.parametrize(
+    ("options", "kind", "words"),
+    [
+        ({"ordered": "yes"}, TypeError, "ordered"), ({"block": 0}, ValueError, "block must be 1"),
+        ({"block": 1.5}, TypeError, "block"), ({"block": "1"}, TypeError, "block"),
+    ],
+)  # fmt: skip
+def test_bad_arguments(options, kind, words):
+    with pytest.raises(kind, match=words):
+        TABLES[0].triplets(**options)

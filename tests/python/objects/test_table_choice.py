@@ -4,7 +4,6 @@
 import copy
 import pickle
 import re
-from fractions import Fraction
 from functools import partial
 
 import numpy as np
@@ -78,23 +77,6 @@ def test_what_chooses_no_rows():
         ((0, 1), TypeError, "an array of whole numbers or a mask, got tuple"),
     ):  # fmt: skip
         assert_refused(partial(table.__getitem__, choice), kind, re.escape(words))
-
-
-def test_sums_are_those_of_the_rows():
-    table = hs.neighbors(POINTS, 0.8, quantities="jdD")
-    assert (table.counts == 0).any() and table.counts[0] != table.counts[1]
-    exact = [float(sum(map(Fraction, d.tolist()))) for _, d, _ in table]
-    assert np.allclose(table.sum(table.distances), exact, rtol=1e-15, atol=0.0)
-    sums = table.sum(table.vectors)
-    assert sums.shape == (30, 2) and sums.dtype == np.float64
-    assert np.allclose(sums, [D.sum(axis=0) for _, _, D in table], rtol=0.0, atol=1e-14)
-    ones = np.ones(table.n_entries, np.int8)
-    assert np.array_equal(table.sum(ones), table.counts)
-    assert np.array_equal(table[:0].sum([]), []) and len(hs.neighbors(POINTS[:0], 1.0).sum([])) == 0
-    lonely = hs.neighbors(POINTS[:1], 1.0)
-    assert lonely.sum([]).tolist() == [0.0] and lonely.sum(np.empty((0, 3))).shape == (1, 3)
-    ends = table[[29, 4, 4]]
-    assert np.array_equal(ends.sum(ends.distances), table.sum(table.distances)[[29, 4, 4]])
 
 
 def test_types_of_sums():

@@ -40,18 +40,20 @@ class Tree:
         if mounts is not None:
             self.write("/proc/self/mountinfo", mounts)
 
-    def v2(self, folder, limit, usage, inactive=0, active=0):
-        self.write(f"{folder}/memory.max", f"{limit}\n")
-        self.write(f"{folder}/memory.current", f"{usage}\n")
-        files = f"inactive_file {inactive}\nactive_file {active}\n"
-        self.write(f"{folder}/memory.stat", f"anon 1\ninactive_anon 5\n{files}")
-
-    def v1(self, folder, limit, usage, inactive=0, active=0):
-        self.write(f"{folder}/memory.limit_in_bytes", f"{limit}\n")
-        self.write(f"{folder}/memory.usage_in_bytes", f"{usage}\n")
-        self.write(f"{folder}/memory.stat",
-                   "inactive_file 99999999999\nactive_file 99999999999\n"
-                   f"total_inactive_file {inactive}\ntotal_active_file {active}\n")  # fmt: skip
+    def limit(self, folder, limit, usage, inactive=0, active=0):
+        """A group of version 2, or of version 1 where the folder ends with "!"."""
+        if folder.endswith("!"):
+            names = "limit_in_bytes", "usage_in_bytes", "total_"
+            rest = "inactive_file 99999999999\nactive_file 99999999999\n"
+        else:
+            names = "max", "current", ""
+            rest = "anon 1\ninactive_anon 5\n"
+        folder = folder.removesuffix("!")
+        self.write(f"{folder}/memory.{names[0]}", f"{limit}\n")
+        self.write(f"{folder}/memory.{names[1]}", f"{usage}\n")
+        files = "".join(f"{names[2]}{kind}_file {size}\n"
+                        for kind, size in (("inactive", inactive), ("active", active)))  # fmt: skip
+        self.write(f"{folder}/memory.stat", rest + files)
 
     def left(self):
         return _core.group_memory(str(self.root))
@@ -62,129 +64,78 @@ def tree(tmp_path):
     return Tree(tmp_path)
 
 
-def test_no_control_groups_are_no_limit(tree):
-    assert tree.left() == math.inf
-    tree.process("", "")
-    assert tree.left() == math.inf
+TOP, ONE = "/sys/fs/cgroup", "/sys/fs/cgroup/memory"
+JOBS = "9:name=systemd:/\n4:cpu,memory:/jobs/one\n1:cpuset:/other\n0::/\n"
+ABOVE = [(f"{ONE}!", NO_LIMIT_V1, 5000), (f"{ONE}/jobs/one!", 400, 100, 20, 30),
+         (f"{ONE}/other!", 1, 0)]  # fmt: skip
+ODD = "35 31 0:32 / /odd\\040place/with\\134memory rw - cgroup cgroup rw,hugetlb,memory\n"
+FIELDS = "35 31 0:32 / /a\\4b rw,label=odd- master:1 - cgroup cgroup rw,memory\n"
+DOCKER = V1_MEMORY.replace("0:32 /", "0:32 /docker/abc")
+IN_DOCKER = [(f"{ONE}!", 400, 100), (f"{ONE}/inner!", 350, 90)]
+LONG = V2.replace("rw,nosuid", "rw," + "x" * 20000) + V2
+
+#: What is said of groups and mounts, limits in megabytes, and the megabytes that are left.
+GROUPS = {
+    "no groups": ("", "", [], math.inf),
+    "nowhere but at the top": ("0::/\n", None, [(TOP, 400, 100)], 300),
+    "1: above it": (JOBS, V1_CPU + V1_MEMORY, [*ABOVE, (f"{ONE}/jobs!", 1000, 900, 50)], 150),
+    "1: in the usual place": (JOBS, None, [*ABOVE, (f"{ONE}/jobs!", 1000, 900, 50)], 150),
+    "1: itself": (JOBS, V1_MEMORY, [*ABOVE, (f"{ONE}/jobs!", 1000, 150)], 350),
+    "1: the top": (JOBS, V1_MEMORY, [*ABOVE, (f"{ONE}!", 300, 100)], 200),
+    "1: where the mount says": (
+        "4:hugetlb,memory:/jobs\n", V1_CPU + ODD,
+        [("/odd place/with\\memory/jobs!", 400, 100), (f"{ONE}!", 0.1, 0)], 300,
+    ),
+    "1: fields of a mount": ("4:memory:/jobs\n", FIELDS, [("/a\\4b/jobs!", 400, 100)], 300),
+    "1: the largest limit": ("4:memory:/\n", V1_MEMORY, [(f"{ONE}!", NO_LIMIT_V1, 5000)], math.inf),
+    "2: none": ("0::/user/job\n", V2, [(f"{TOP}/user/job", "max", 100)], math.inf),
+    "2: above it": (
+        "0::/user/job\n", V2,
+        [(f"{TOP}/user/job", "max", 100), (f"{TOP}/user", 600, 250, 20, 5)], 375,
+    ),
+    "2: itself, in the usual place": (
+        "0::/user/job\n", None,
+        [(f"{TOP}/user/job", 400, 100), (f"{TOP}/user", 600, 250, 20, 5)], 300,
+    ),
+    "1 is not 2": (
+        "2:memory:/one\n1:name=systemd:/one\n3::/one\n", V2, [(f"{TOP}/one", 400, 100)], math.inf,
+    ),
+    "2 among 1": ("1:name=systemd:/\n0::/one\n3:cpu:/\n", V2, [(f"{TOP}/one", 400, 100)], 300),
+    "hybrid, memory in 1": (
+        "4:memory:/a/b\n0::/a/b\n", V1_CPU + V1_MEMORY + UNIFIED, [(f"{ONE}/a!", 400, 100)], 300,
+    ),
+    "hybrid, memory in 2": (
+        "2:cpu:/x\n0::/a/b\n", V1_CPU + UNIFIED, [(f"{TOP}/unified/a", 400, 100)], 300,
+    ),
+    "both": (
+        "4:memory:/a\n0::/b\n", V1_MEMORY + UNIFIED,
+        [(f"{ONE}/a!", 400, 100), (f"{TOP}/unified/b", 500, 300)], 200,
+    ),
+    "container": ("4:memory:/docker/abc\n", DOCKER, IN_DOCKER, 300),
+    "within a container": ("4:memory:/docker/abc/inner\n", DOCKER, IN_DOCKER, 260),
+    "another container": ("4:memory:/docker/abcdef/inner\n", DOCKER, IN_DOCKER, 300),
+    "outside of it": ("4:memory:/../other/inner\n", DOCKER, IN_DOCKER, 300),
+    "gone": ("0::/jobs/one (deleted)\n", V2, [(f"{TOP}/jobs", 400, 100)], 300),
+    "beyond the limit": ("0::/a\n", V2, [(f"{TOP}/a", 100, 130)], 0),
+    "pages beyond the limit": ("0::/a\n", V2, [(f"{TOP}/a", 100, 10, 500)], 100),
+    "long lines": ("0::/" + "a/" * 10000 + "\n", LONG, [(TOP, 400, 100)], 300),
+    "no lines": ("no colons\n:::\n", "short\n1 2 3\n" + V2, [(TOP, 400, 100)], math.inf),
+}  # fmt: skip
 
 
-def test_where_no_file_tells_the_group_there_is_no_limit(tree):
-    tree.process("0::/\n")
-    tree.v2("/sys/fs/cgroup", 400 * MB, 100 * MB)
-    assert tree.left() == 300 * MB
-    (tree.root / "proc/self/cgroup").unlink()
-    assert tree.left() == math.inf
-
-
-@pytest.mark.parametrize("mounts", [V1_CPU + V1_MEMORY, None], ids=["mountinfo", "usual place"])
-def test_version_1_counts_the_group_and_those_above_it(tree, mounts):
-    tree.process("9:name=systemd:/\n4:cpu,memory:/jobs/one\n1:cpuset:/other\n0::/\n", mounts)
-    top = "/sys/fs/cgroup/memory"
-    tree.v1(top, NO_LIMIT_V1, 5000 * MB)
-    tree.v1(f"{top}/jobs", 1000 * MB, 900 * MB, 50 * MB)
-    tree.v1(f"{top}/jobs/one", 400 * MB, 100 * MB, 20 * MB, 30 * MB)
-    tree.v1(f"{top}/other", 1, 0)
-    assert tree.left() == 150 * MB
-    tree.v1(f"{top}/jobs", 1000 * MB, 150 * MB)
-    assert tree.left() == 350 * MB
-    tree.v1(top, 300 * MB, 100 * MB)
-    assert tree.left() == 200 * MB
-
-
-def test_version_1_is_where_the_mount_says(tree):
-    place = "/odd\\040place/with\\134memory"
-    mounts = V1_CPU + f"35 31 0:32 / {place} rw - cgroup cgroup rw,hugetlb,memory\n"
-    tree.process("4:hugetlb,memory:/jobs\n", mounts)
-    tree.v1("/odd place/with\\memory/jobs", 400 * MB, 100 * MB)
-    tree.v1("/sys/fs/cgroup/memory", 10, 0)
-    assert tree.left() == 300 * MB
-
-
-def test_lines_of_mountinfo_are_read_field_by_field(tree):
-    mounts = "35 31 0:32 / /a\\4b rw,label=odd- master:1 - cgroup cgroup rw,memory\n"
-    tree.process("4:memory:/jobs\n", mounts)
-    tree.v1("/a\\4b/jobs", 400 * MB, 100 * MB)
-    assert tree.left() == 300 * MB
-
-
-def test_the_largest_limit_of_version_1_is_none(tree):
-    tree.process("4:memory:/\n", V1_MEMORY)
-    tree.v1("/sys/fs/cgroup/memory", NO_LIMIT_V1, 5000 * MB)
-    assert tree.left() == math.inf
-
-
-@pytest.mark.parametrize("mounts", [V2, None], ids=["mountinfo", "usual place"])
-def test_version_2_counts_the_group_and_those_above_it(tree, mounts):
-    tree.process("0::/user.slice/job\n", mounts)
-    tree.v2("/sys/fs/cgroup/user.slice/job", "max", 100 * MB)
-    assert tree.left() == math.inf
-    tree.v2("/sys/fs/cgroup/user.slice", 600 * MB, 250 * MB, 20 * MB, 5 * MB)
-    assert tree.left() == 375 * MB
-    tree.v2("/sys/fs/cgroup/user.slice/job", 400 * MB, 100 * MB)
-    assert tree.left() == 300 * MB
-
-
-def test_groups_of_version_1_are_no_groups_of_version_2(tree):
-    tree.v2("/sys/fs/cgroup/one", 400 * MB, 100 * MB)
-    tree.process("2:memory:/one\n1:name=systemd:/one\n3::/one\n", V2)
-    assert tree.left() == math.inf
-    tree.process("1:name=systemd:/\n0::/one\n3:cpu:/\n", V2)
-    assert tree.left() == 300 * MB
-
-
-@pytest.mark.parametrize("memory_in", ["v1", "v2"])
-def test_hybrid_setups_are_limited_by_the_hierarchy_that_has_the_memory(tree, memory_in):
-    if memory_in == "v1":
-        tree.process("4:memory:/a/b\n0::/a/b\n", V1_CPU + V1_MEMORY + UNIFIED)
-        tree.v1("/sys/fs/cgroup/memory/a", 400 * MB, 100 * MB)
-        (tree.root / "sys/fs/cgroup/unified/a/b").mkdir(parents=True)
-    else:
-        tree.process("2:cpu:/x\n0::/a/b\n", V1_CPU + UNIFIED)
-        tree.v2("/sys/fs/cgroup/unified/a", 400 * MB, 100 * MB)
-    assert tree.left() == 300 * MB
-
-
-def test_both_versions_count_where_both_limit(tree):
-    tree.process("4:memory:/a\n0::/b\n", V1_MEMORY + UNIFIED)
-    tree.v1("/sys/fs/cgroup/memory/a", 400 * MB, 100 * MB)
-    tree.v2("/sys/fs/cgroup/unified/b", 500 * MB, 300 * MB)
-    assert tree.left() == 200 * MB
-
-
-def test_containers_see_the_part_of_a_hierarchy_that_is_theirs(tree):
-    # Without a namespace of its own, a container's group is named as the host names it.
-    mounts = V1_MEMORY.replace("0:32 /", "0:32 /docker/abc")
-    top = "/sys/fs/cgroup/memory"
-    tree.v1(top, 400 * MB, 100 * MB)
-    tree.v1(f"{top}/inner", 350 * MB, 90 * MB)
-    tree.process("4:memory:/docker/abc\n", mounts)
-    assert tree.left() == 300 * MB
-    tree.process("4:memory:/docker/abc/inner\n", mounts)
-    assert tree.left() == 260 * MB
-    for elsewhere in ("/docker/abcdef/inner", "/", "/../other/inner"):
-        tree.process(f"4:memory:{elsewhere}\n", mounts)
-        assert tree.left() == 300 * MB
-    tree.process("4:memory:/../inner\n", V1_MEMORY)
-    assert tree.left() == 300 * MB
-
-
-def test_groups_that_are_gone_leave_those_above_them(tree):
-    tree.process("0::/jobs/one (deleted)\n", V2)
-    tree.v2("/sys/fs/cgroup/jobs", 400 * MB, 100 * MB)
-    assert tree.left() == 300 * MB
-
-
-def test_usage_beyond_the_limit_leaves_nothing_and_pages_no_more_than_the_limit(tree):
-    tree.process("0::/a\n", V2)
-    tree.v2("/sys/fs/cgroup/a", 100 * MB, 130 * MB)
-    assert tree.left() == 0
-    tree.v2("/sys/fs/cgroup/a", 100 * MB, 10 * MB, 500 * MB)
-    assert tree.left() == 100 * MB
+@pytest.mark.parametrize("name", GROUPS)
+def test_what_groups_leave(tree, name):
+    groups, mounts, limits, left = GROUPS[name]
+    tree.process(groups, mounts)
+    for folder, limit, *sizes in limits:
+        limit = limit if limit in ("max", NO_LIMIT_V1) else int(limit * MB)
+        tree.limit(folder, limit, *(size * MB for size in sizes))
+    assert tree.left() == left * MB
 
 
 def test_what_cannot_be_read_limits_nothing_but_a_known_limit_counts(tree):
     tree.process("0::/a\n", V2)
-    tree.v2("/sys/fs/cgroup/a", 400 * MB, 100 * MB)
+    tree.limit("/sys/fs/cgroup/a", 400 * MB, 100 * MB)
     for name in ("memory.stat", "memory.current"):
         file = tree.root / "sys/fs/cgroup/a" / name
         file.unlink()
@@ -192,14 +143,6 @@ def test_what_cannot_be_read_limits_nothing_but_a_known_limit_counts(tree):
     assert tree.left() == 400 * MB
     tree.write("/sys/fs/cgroup/a/memory.max", "nonsense\n")
     assert tree.left() == math.inf
-    tree.process("no colons\n:::\n", "short\n1 2 3\n" + V2)
-    assert tree.left() == math.inf
-
-
-def test_long_lines_do_no_harm(tree):
-    tree.process("0::/" + "a/" * 10000 + "\n", V2.replace("rw,nosuid", "rw," + "x" * 20000) + V2)
-    tree.v2("/sys/fs/cgroup", 400 * MB, 100 * MB)
-    assert tree.left() == 300 * MB
 
 
 def test_this_process_has_no_more_than_its_groups_leave():
@@ -245,13 +188,6 @@ def available(library, tmp_path):
 
 def machine(megabytes):
     return {"/proc/meminfo": f"MemTotal: 99999999 kB\nMemAvailable: {megabytes * 1024} kB\n"}
-
-
-@needs_c
-@preloaded
-def test_where_the_machine_says_nothing_all_its_memory_counts(available):
-    pages = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGESIZE") / MEGA
-    assert available({}) == pages
 
 
 @needs_c

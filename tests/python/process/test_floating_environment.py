@@ -159,44 +159,6 @@ def test_same_bytes_in_every_environment(name):
         assert len(searches[0]()[0])
 
 
-def test_the_environment_survives_a_refused_call():
-    for mode, flush in SETTINGS:
-        points = np.full((3, 3), np.nan)
-        with environment(mode, flush):
-            try:
-                hs.pairs(points, 1.0)
-            except ValueError:
-                refused = True
-            try:
-                call(hs.pairs, np.zeros((100_000, 3)), 1.0, memory_limit=10**6)
-            except MemoryError:
-                refused_later = True
-        assert refused and refused_later
-
-
-def test_dependence_is_decided_alike_in_every_environment():
-    for mode, flush in SETTINGS:
-        sheared = np.array([[0.1, 0.2, 0.3], [0.7, 0.1, 0.9], [0.2, 0.4, 0.6]])
-        tiny = np.diag([5e-324, 1e-323, 5e-324])
-        points = np.zeros((1, 3))
-        with environment(mode, flush):
-            try:
-                hs.pairs(points, 1.0, box=sheared)
-                refused = False
-            except ValueError:
-                refused = True
-            count = hs.count_pairs(points, 1e-323, box=tiny)
-        assert refused
-        assert count == hs.count_pairs(points, 1e-323, box=tiny) == 7
-
-
-def test_searching_raises_no_floating_point_warnings(rng):
-    for points, cutoff, box in SCENES.values():
-        with np.errstate(all="raise"):
-            hs.pairs(points, cutoff, box=box, quantities="ijSdD")
-            np.array([1.0]) / np.array([2.0])
-
-
 @pytest.mark.parametrize("threads", [1, 2])
 def test_traps_of_the_caller_end_no_search(threads):
     # Python and NumPy compare numbers themselves: only what goes straight to the core.

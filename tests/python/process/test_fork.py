@@ -112,21 +112,6 @@ def test_update_of_a_verlet_list(skin, tracks):
     in_children(inside, check)
 
 
-@pytest.mark.parametrize("method", ["pairs", "neighbors", "changes"])
-def test_an_answer_of_a_verlet_list(method):
-    """The list is as it was before: looking at it changes nothing."""
-    (points,) = steps(4000, 1)
-    answer = rows(hs.pairs(points, 0.6, box=BOX))
-    pair_list = hs.VerletList(0.6, 0.3, box=BOX, track_changes=True)
-    pair_list.update(points)
-
-    def check():
-        assert rows(pair_list.pairs()) == answer
-        assert rows(pair_list.changes().formed) == answer
-
-    in_children(getattr(pair_list, method), check)
-
-
 def test_a_step_that_was_being_taken_is_refused_until_the_next():
     """The thread is surely inside: its points are read by code of ours, which waits."""
     inside, goes_on = threading.Event(), threading.Event()
@@ -295,71 +280,6 @@ def test_connectivities(order):
             one.validate()
 
     in_children(inside, check)
-
-
-def test_rows_that_are_sorted_and_shifts_that_are_searched_when_needed():
-    (points,) = steps(3000, 1)
-    many = [hs.neighbors(points, 0.6, box=BOX, quantities="jd") for _ in range(20)]
-    answer = many[0].sort()
-    used = iter(many[1:])
-
-    def inside():
-        next(used, many[-1]).sort()
-
-    def check():
-        for one in (many[1], many[-1], next(used, many[2])):
-            found = one.sort()
-            assert (found.indices == answer.indices).all()
-
-    in_children(inside, check)
-
-
-def test_streams():
-    """One that a thread is in is refused, others go on where they are."""
-    (points,) = steps(4000, 1)
-    answer = rows(hs.pairs(points, 0.6, box=BOX))
-    streams = []
-
-    def blocks():
-        return hs.iter_pairs(points, 0.6, box=BOX, max_pairs=2000)
-
-    def inside():
-        streams.append(blocks())
-        for _ in streams[-1]:
-            pass
-
-    waiting = blocks()
-    first = rows(next(waiting))
-
-    def check():
-        assert sorted([*first, *(row for block in waiting for row in rows(block))]) == answer
-        for stream in streams[-1:]:
-            try:
-                next(stream, None)
-            except ValueError as error:
-                assert "already looking for the next block" in str(error)
-        assert sorted(row for block in blocks() for row in rows(block)) == answer
-
-    in_children(inside, check)
-
-
-def test_frames_that_threads_search_ahead():
-    frames = steps(1500, 8)
-    answer = [rows(hs.pairs(points, 0.9, box=BOX)) for points in frames]
-    waiting = hs.trajectory_pairs(frames, 0.9, box=BOX, threads=3)
-    assert rows(next(waiting)) == answer[0]
-
-    def inside():
-        for _ in hs.trajectory_pairs(frames, 0.9, box=BOX, threads=3):
-            pass
-
-    def check():
-        assert [rows(found) for found in waiting] == answer[1:]
-        again = hs.trajectory_pairs(frames, 0.9, box=BOX, threads=3)
-        assert [rows(found) for found in again] == answer
-
-    in_children(inside, check)
-    assert [rows(found) for found in waiting] == answer[1:]
 
 
 FUNCTIONS = {

@@ -76,19 +76,6 @@ print(json.dumps([listed, first is second, name in vars(hs), first.__module__]))
     assert module.startswith("halfshell.")
 
 
-def test_every_listed_name_can_be_read():
-    """`dir` leaves out modules whose library is not installed, for what reads all that it lists."""
-    script = """
-import importlib.util, inspect, json
-find = importlib.util.find_spec
-importlib.util.find_spec = lambda name, *rest: None if name == "jax" else find(name, *rest)
-import halfshell as hs
-print(json.dumps([name for name, _ in inspect.getmembers(hs)]))
-"""
-    listed = fresh(script)
-    assert {"pairs", "CellList", "compat"} < set(listed) and "jax" not in listed
-
-
 def test_type_checkers_see_the_names_that_come_later():
     """`_LATER` and the imports that only type checkers read agree, modules included."""
     tree = ast.parse(Path(hs.__file__).read_text())
@@ -103,7 +90,7 @@ def test_type_checkers_see_the_names_that_come_later():
             continue
         assert isinstance(node, ast.ImportFrom) and not any(alias.asname for alias in node.names)
         seen |= {alias.name: node.module.removeprefix("halfshell.") for alias in node.names}
-    assert seen == hs._LATER
+    assert seen == {name: one for one, names in hs._LATER.items() for name in names.split()}
     at_once = {
         alias.name for node in tree.body if isinstance(node, ast.ImportFrom)
         and node.module.startswith("halfshell.") for alias in node.names
@@ -112,25 +99,7 @@ def test_type_checkers_see_the_names_that_come_later():
     assert sorted(at_once | set(seen)) == sorted(hs.__all__)
 
 
-def test_all_names_come_with_a_star():
-    script = "import json; from halfshell import *; print(json.dumps(sorted(globals())))"
-    assert set(hs.__all__) <= set(fresh(script))
-
-
 def test_what_is_not_there_is_an_attribute_error():
     with pytest.raises(AttributeError, match="module 'halfshell' has no attribute 'neighbours'"):
         hs.neighbours  # noqa: B018
     assert not hasattr(hs, "_nothing")
-
-
-def test_help_shows_the_package_whatever_is_installed():
-    script = """
-import json, pydoc
-from importlib.machinery import PathFinder
-find, absent = PathFinder.find_spec, ("dask", "jax", "torch")
-PathFinder.find_spec = lambda name, *rest: None if name in absent else find(name, *rest)
-import halfshell as hs
-text = pydoc.render_doc(hs)
-print(json.dumps([name in dir(hs) for name in ("compat", *absent)] + [len(text) > 10000]))
-"""
-    assert fresh(script) == [True, False, False, False, True]

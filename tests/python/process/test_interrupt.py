@@ -11,20 +11,19 @@ SEARCHES = {
     "pairs": "hs.pairs(points, 0.16)",
     "sorted pairs": "hs.pairs(points, 0.16, sort=True, quantities='ijdDS')",
     "neighbors": "hs.neighbors(points, 0.16, quantities='jdDS')",
-    "coordination": "hs.coordination(points, 0.5)",
     "pairs of two sets": "hs.pairs_between(points[1::2], points, 0.16)",
-    "count of two sets": "hs.count_pairs(points[::2], 0.7, queries=points[1::2])",
     "count": "hs.count_pairs(points, 0.5)",
-    "count of coincident points": "hs.count_pairs(points * 0, 0.0)",
     "count of many cutoffs": "hs.count_pairs(points, np.linspace(0.4, 0.5, 50))",
     "clusters": "hs.clusters(points, 0.3)",
-    "clusters of core points": "hs.clusters(points, 0.3, min_points=10**6)",
     "pairs of balls": "hs.pairs(balls, None, sort=True)",
-    "count of balls": "hs.count_pairs(balls.replace(radii=4 * balls.radii), None)",
-    "rows of balls": "hs.neighbors(balls, None, rule='max')",
     "count of ellipsoids": "hs.count_pairs(ellipsoids, 4.0)",
     "batch of ellipsoids": "hs.pairs(ellipsoids.replace(batch=np.sort(kinds)), 4.0)",
-    "pairs by type": "hs.pairs(hs.Points(points, types=kinds), np.eye(9) * 0.3)",
+    "blocks": "next(hs.iter_pairs(points, 2.0, max_pairs=10**9))",
+    "calls": "hs.for_each_pair(points, 2.0, lambda *pair: None)",
+    "batch": """while True:
+        hs.pairs(hs.Points(points, batch=np.arange(400_000) // 30), 2.0, threads=2)""",
+    "counts of a batch": """while True:
+        hs.count_pairs(hs.Points(points, batch=np.arange(400_000) // 30), 2.0, threads=1)""",
     "histogram": "hs.pair_histogram(points, np.linspace(0.0, 0.5, 100))",
     "measure": """i = np.arange(10**6) % 500
     while True:
@@ -33,7 +32,6 @@ SEARCHES = {
     "nearest, all equally far": """hs.nearest(
         np.concatenate([points > 0.5] * 5), 1_000_000, queries=points[:9] * 0 + 0.5
     )""",
-    "candidates": "[hs.CellList(points, 0.1).candidates() for _ in range(10)]",
     "candidates of many images": "hs.CellList(points[:3000, :1], 1e6, box=[1.0]).candidates()",
     "count of a million boxes, many": "hs.count_pairs(points[:3000, :1], 1e6, box=[1.0])",
     "rows of cells of many images": "hs.CellList(points[:9], 1e3, box=[1.0] * 3).candidates()",
@@ -44,13 +42,9 @@ SEARCHES = {
     "count of many images": "hs.count_pairs(points[:1000], 60.0, box=[1.0] * 3)",
     "wrap": "hs.Box([[1, 0, 0], [0.4, 1, 0], [0.3, 0.2, 1]]).wrap(np.concatenate([points] * 16))",
     "connectivity": "hs.Connectivity(lists(0.08))",
-    "overlap": "hs.Connectivity(lists(0.02), overlap=True)",
     "overlap of images": "hs.Connectivity(lists(0.02), box=1.0, overlap=True)",
-    "intersection": "hs.Connectivity(lists(0.02), intersection=True)",
     "intersection of images": "hs.Connectivity(lists(0.02), box=1.0, intersection=True)",
     "intersection by threads": "hs.Connectivity(lists(0.02), intersection=True, threads=2)",
-    "rebuild": """c = hs.Connectivity(lists(0.001))
-    c.rebuild(lists(0.08))""",
     "patches": """c = hs.Connectivity(lists(0.015))
     keep = [np.ones(n, bool) for n in c.n_nodes]
     while True:
@@ -154,88 +148,3 @@ print(json.dumps(found))
 """
     )
     assert found == [True] * 8
-
-
-def test_a_handler_that_does_not_raise_lets_the_search_finish():
-    calls, count = run(
-        """
-import json, signal, threading
-import numpy as np
-import halfshell as hs
-seen = []
-signal.signal(signal.SIGINT, lambda *_: seen.append(1))
-points = np.random.default_rng(1).random((30_000, 3))
-threading.Timer(0.1, signal.raise_signal, [signal.SIGINT]).start()
-count = 0
-while not seen:
-    count = hs.count_pairs(points, 2.0)
-print(json.dumps([len(seen), hs.count_pairs(points, 2.0)]))
-"""
-    )
-    assert calls == 1 and count == 30_000 * 29_999 // 2
-
-
-@pytest.mark.parametrize("size", [1.5e8, 5e8])
-def test_an_interrupt_is_heard_while_a_large_neighbourhood_is_gathered(size):
-    outcome, late = run(
-        RESIDENT
-        + f"""
-import json, signal, threading, time
-import numpy as np
-import halfshell as hs
-
-points = np.random.default_rng(0).random((9, 8))
-sent = []
-
-def interrupt():
-    while resident() < {size}:
-        time.sleep(0.005)
-    sent.append(time.process_time())
-    signal.raise_signal(signal.SIGINT)
-
-threading.Thread(target=interrupt, daemon=True).start()
-try:
-    with hs.settings(memory_limit=1e13):
-        hs.neighbors(points, 3.0, box=[1.0] * 8)
-    outcome = "finished"
-except KeyboardInterrupt:
-    outcome = "interrupted"
-print(json.dumps([outcome, time.process_time() - sent[0]]))
-"""
-    )
-    assert outcome == "interrupted"
-    assert late < 0.4  # of this process, however busy the machine is
-
-
-def test_an_interrupt_stops_the_sorting_of_rows():
-    # Late by processor time, which other processes do not take part in.
-    outcome, late = run(
-        """
-import json, signal, threading, time
-import numpy as np
-import halfshell as hs
-grid = np.stack(np.meshgrid(*[np.arange(32) * 0.1] * 3), axis=-1).reshape(-1, 3)
-table = hs.neighbors(grid, 0.33, quantities="jdS")
-sent = []
-
-def interrupt():
-    sent.append(time.process_time())
-    signal.raise_signal(signal.SIGINT)
-
-outcome, late = "finished", 0.0
-for wait in (0.03, 0.1, 0.2, 0.4, 0.7):
-    sent.clear()
-    timer = threading.Timer(wait, interrupt)
-    timer.start()
-    try:
-        while True:
-            table.sort()
-    except KeyboardInterrupt:
-        outcome = "interrupted"
-    late = max(late, time.process_time() - sent[0])
-    timer.join()
-print(json.dumps([outcome, late, table.n_entries]))
-"""
-    )[:2]
-    assert outcome == "interrupted"
-    assert late < 0.25

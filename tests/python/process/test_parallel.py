@@ -2,12 +2,9 @@
 """Several threads give the arrays of one, leave nothing running, and survive fork and pools."""
 
 import os
-import signal
 import subprocess
 import sys
 import textwrap
-import threading
-import time
 from functools import partial
 
 import numpy as np
@@ -56,22 +53,6 @@ def test_arrays_do_not_depend_on_the_number_of_threads(name):
             assert call(hs.count_pairs, points, cutoff, box=box, kernel=kernel, threads=4) == n
 
 
-@pytest.mark.parametrize("threads", [2, 5])
-def test_the_callers_arrays_are_filled_in_the_same_order(threads):
-    alone = hs.pairs(CLOUD, 2.0, threads=1)
-    n = len(alone[0])
-    out = np.full(n + 5, -7), np.full(n + 5, -7)
-    filled = hs.pairs(CLOUD, 2.0, threads=threads, out=out)
-    for a, b, whole in zip(alone, filled, out, strict=True):
-        assert np.array_equal(a, b)
-        assert b.base is whole
-        assert (whole[n:] == -7).all()
-    with pytest.raises(hs.CapacityError) as caught:
-        hs.pairs(CLOUD, 2.0, threads=threads, out=(out[0][: n - 1], out[1]))
-    assert caught.value.needed == n
-    assert (out[0][n:] == -7).all()
-
-
 def test_small_scenes_use_one_thread_and_large_ones_what_is_allowed(monkeypatch):
     assert hs.explain(CLOUD[:3000], 2.0).threads == 1
     assert hs.explain(CLOUD[:3000], 2.0, threads=3).threads == 1
@@ -101,25 +82,6 @@ def test_no_thread_is_left_running():
     assert len(os.listdir("/proc/self/task")) == before
 
 
-def test_from_several_python_threads_at_once():
-    expected = hs.pairs(CLOUD, 2.0, threads=1)
-    wrong = []
-
-    def search():
-        for _ in range(10):
-            found = hs.pairs(CLOUD, 2.0, threads=2)
-            wrong.extend(
-                1 for a, b in zip(expected, found, strict=True) if not np.array_equal(a, b)
-            )
-
-    workers = [threading.Thread(target=search) for _ in range(4)]
-    for worker in workers:
-        worker.start()
-    for worker in workers:
-        worker.join()
-    assert not wrong
-
-
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_after_fork_and_in_process_pools():
     run(
@@ -141,44 +103,3 @@ def test_after_fork_and_in_process_pools():
             assert counts == [expected] * 4
         """
     )
-
-
-@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs POSIX timers")
-@pytest.mark.parametrize("threads", [1, 4])
-def test_interrupting_stops_all_threads_soon(threads):
-    points = RNG.rand(250000, 3)
-    started = []
-
-    def stop(*_):
-        started.append(time.perf_counter())
-        raise KeyboardInterrupt
-
-    old = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, 0.3)
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            hs.count_pairs(points, 0.9, threads=threads)
-        assert time.perf_counter() - started[0] < 5.0  # 0.2 s on a quiet machine
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, old)
-
-
-def test_failures_in_threads_are_the_same_as_alone():
-    far = CLOUD.copy()
-    far[2000] = 1e300
-    box = np.array([20.0, 20.0, 20.0])
-    for threads in (1, 3):
-        with pytest.raises(OverflowError, match=r"points\[2000\]"):
-            hs.pairs(far, 2.0, box=box, quantities="S", threads=threads)
-        with pytest.raises(MemoryError):
-            call(hs.pairs, RNG.rand(20000, 3), 0.9, threads=threads, memory_limit=3e7)
-
-
-def test_long_rows_are_walked_once():
-    # Stepping to the start of each range from the start of the row took seconds.
-    points = np.random.RandomState(0).rand(300_000, 1) * 3e5
-    started = time.perf_counter()
-    n = hs.count_pairs(points, 1.0, threads=1)
-    assert n == len(hs.pairs(points, 1.0, threads=2)[0])
-    assert time.perf_counter() - started < 10.0

@@ -10,76 +10,7 @@ import pytest
 
 import halfshell as hs
 from calls import call
-from oracles import random_scene, same_arrays
 from subprocesses import run
-
-
-def in_threads(count, work):
-    """Call work(k) in `count` threads that start together; return results, or raise."""
-    results, errors = [None] * count, []
-    barrier = threading.Barrier(count)
-
-    def body(k):
-        barrier.wait()
-        try:
-            results[k] = work(k)
-        except BaseException as error:
-            errors.append(error)
-
-    threads = [threading.Thread(target=body, args=(k,)) for k in range(count)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    if errors:
-        raise errors[0]
-    return results
-
-
-def test_different_searches_in_many_threads(rng):
-    scenes = [random_scene(rng, 20 + 60 * k, 1 + k % 4, neighbours=12) for k in range(12)]
-    names = hs.kernels()
-
-    def work(k):
-        points, cutoff, box, flags = scenes[k]
-        return [
-            call(hs.pairs,
-                points,
-                cutoff,
-                box=box,
-                periodic=flags,
-                quantities="ijSdDP",
-                kernel=names[k % len(names)],
-                sort=bool(k % 2),
-            )
-            for _ in range(5)
-        ]
-
-    alone = [work(k)[0] for k in range(len(scenes))]
-    for expected, results in zip(alone, in_threads(len(scenes), work)):
-        assert all(same_arrays(found, expected) for found in results)
-
-
-def test_failures_in_one_thread_do_not_disturb_the_others(rng):
-    points, cutoff, box, _ = random_scene(rng, 1000, neighbours=10)
-    expected = hs.count_pairs(points, cutoff, box=box)
-    broken = points.copy()
-    broken[500] = np.nan
-
-    def work(k):
-        if k % 2:
-            return [hs.count_pairs(points, cutoff, box=box) for _ in range(20)]
-        for _ in range(20):
-            try:
-                hs.count_pairs(broken, cutoff, box=box)
-            except ValueError as error:
-                assert "500" in str(error)
-            else:
-                raise AssertionError("NaN was accepted")
-        return [expected]
-
-    for counts in in_threads(8, work):
-        assert set(counts) == {expected}
 
 
 def test_searches_in_threads_overlap(rng):
@@ -180,30 +111,6 @@ print(json.dumps([True, writes]))
     assert survived and changed > 1000
 
 
-def test_points_that_are_freed_during_the_search_are_kept_alive():
-    assert run(
-        """
-import gc, json, threading
-import numpy as np
-import pytest
-import halfshell as hs
-
-def work():
-    for k in range(8):
-        count = hs.count_pairs(np.random.default_rng(k).random((3000, 3)).astype(">f8")[::2], 0.1)
-        assert count > 0
-        gc.collect()
-
-threads = [threading.Thread(target=work) for _ in range(4)]
-for thread in threads:
-    thread.start()
-for thread in threads:
-    thread.join()
-print(json.dumps(True))
-"""
-    )
-
-
 def changing(array, bad, call, seconds=0.1):
     """What `call` raises while another thread writes to the array, but what it may raise."""
     done, good, raised = threading.Event(), array.copy(), set()
@@ -253,37 +160,15 @@ class _Elements:
 
 CHANGING = {
     "touching": (_NUMBERS, 10**6, lambda x: hs.pairs(_PLACES, 0.5, indices=x)),
-    "indices": (_NUMBERS, -7, lambda x: hs.neighbors(_PLACES, 0.5, indices=x)),
-    "nodes": (_PLACES, np.nan, lambda x: hs.NodeList("a", x, _RADII)),
-    "h": (_RADII, np.nan, lambda x: hs.NodeList("a", _PLACES, x)),
     "bricks": (_PLACES, np.inf, lambda x: hs.bricks(x, 0.5, 2)),
-    "lists": (_NUMBERS, 10**6, lambda x: hs.measure(_PLACES, x, _NUMBERS)),
-    "checked": (_NUMBERS, 10**6, lambda x: hs.verify(_PLACES, 0.1, x, _NUMBERS)),
+    "nodes": (_PLACES, np.nan, lambda x: hs.NodeList("a", x, _RADII)),
     "rows": (_NUMBERS, 10**6, lambda x: _TABLE[x]),
-    "mask of rows": (np.zeros(1500, bool), True, lambda x: _TABLE[x]),
     "mask of entries": (np.zeros(len(_TABLE.indices), bool), True, _TABLE.filter),
-    "kept nodes": (np.ones(200, bool), False, lambda x: hs.Connectivity([_FEW]).patch([x])),
     "which pairs": (np.zeros(len(_PAIRS), bool), True, lambda x: hs.Connectivity([_FEW]).remove(x)),
-    "pairs of nodes": (_ROWS, -1, _PAIRS.index),
     "excluded nodes": (_ROWS, 10**6, lambda x: hs.Connectivity([_FEW], exclude=x)),
     "types": (
         (_NUMBERS % 3).astype(np.int32), 50,
         lambda x: call(hs.rdf, _PLACES, 0.5, 9, box=[8.0] * 3, types=x),
-    ),
-    "types as they are": (
-        _NUMBERS // 500, -1, lambda x: call(hs.pairs, _PLACES, [[0.3, 0.2, 0.1]] * 3, types=x),
-    ),
-    "systems": (
-        (_NUMBERS // 500).astype(np.uint64), 2**63, lambda x: call(hs.pairs, _PLACES, 0.5, batch=x),
-    ),
-    "systems of a histogram": (
-        _NUMBERS // 500, 10**4,
-        lambda x: call(hs.rdf, _PLACES, 0.5, 9, box=np.tile(np.eye(3) * 8.0, (3, 1, 1)), batch=x),
-    ),
-    "names": (
-        _NAMES,
-        "Zz",
-        lambda x: call(hs.rdf, _PLACES, 0.5, 9, box=[8.0] * 3, types=x)["H", "O"],
     ),
     "elements": (_NUMBERS % 90, 10**6, lambda x: hs.pairs(_Elements(x), {("H", "He"): 0.5})),
     "species": (_NAMES, "Zz", lambda x: call(hs.pairs, _PLACES, {("H", "O"): 0.5}, types=x)),

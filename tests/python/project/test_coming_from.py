@@ -27,10 +27,6 @@ def triples(i, j, S):
     return set(zip(i.tolist(), j.tolist(), map(tuple, np.asarray(S).tolist())))
 
 
-def both_ways(i, j, S):
-    return triples(i, j, S) | triples(j, i, -S)
-
-
 def test_every_row_has_a_section():
     rows = re.findall(r"^\| (\w+(?: Geometric)?)", TEXT.split("## ")[0], re.MULTILINE)
     for name in rows:
@@ -39,15 +35,7 @@ def test_every_row_has_a_section():
 
 def test_ase():
     names = run("ASE", "ase")
-    assert triples(*names["theirs"]) == triples(*names["ours"])
-    i = names["theirs"][0]
-    assert (np.diff(i) >= 0).all() and len(i) > 4000
-    from ase.neighborlist import first_neighbors
-
-    offsets = first_neighbors(len(names["atoms"]), i)
-    assert np.array_equal(offsets, names["table"].offsets)
-    counts = hs.coordination(names["atoms"], 4.0, inclusive=False)
-    assert np.array_equal(counts, np.bincount(i, minlength=len(names["atoms"])))
+    assert triples(*names["theirs"]) == triples(*names["ours"]) and len(names["theirs"][0]) > 4000
     atoms = names["Atoms"]("H4", positions=LINE)
     assert len(names["neighbor_list"]("i", atoms, 1.0)) == 0
 
@@ -60,11 +48,6 @@ def test_scipy():
     assert tree.query_pairs(1.0) == {(0, 1), (1, 2), (2, 3)}
     assert np.isinf(tree.query(LINE[:1], k=2, distance_upper_bound=1.0)[0][0, 1])
     assert hs.nearest(LINE, 2, queries=LINE[:1], max_distance=1.0, quantities="d")[0, 1] == 1.0
-    with pytest.raises(ValueError):
-        names["KDTree"](names["points"] + 1.0, boxsize=20.0)
-    points = names["points"][:50]
-    once = names["KDTree"](points, boxsize=20.0).query_pairs(15.0)
-    assert len(once) < hs.count_pairs(points, 15.0, box=names["box"])
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
@@ -73,70 +56,31 @@ def test_mdanalysis():
     pairs = set(zip(names["i"].tolist(), names["j"].tolist()))
     assert {tuple(sorted(row)) for row in names["theirs"].tolist()} == pairs
     assert len(names["n_pairs"]) == 3 and names["atoms"][0].min() >= 100
-    from MDAnalysis.analysis.rdf import InterRDF
-    from MDAnalysis.lib.distances import calc_bonds
-
-    group, dimensions = names["group"], names["u"].dimensions
-    box = hs.Box.from_dimensions(dimensions)
-    x, i, j = group.positions, np.arange(100), np.arange(100, 200)
-    d = calc_bonds(x[i], x[j], box=dimensions)
-    assert np.allclose(d, hs.measure(x, i, j, box=box, quantities="d"), atol=1e-5)
-    everything = group.universe.atoms.positions
-    group.universe.load_new(everything, dimensions=dimensions)
-    theirs = InterRDF(group, group, nbins=20, range=(0, 5)).run().results.rdf
-    ours = hs.rdf(everything[group.indices], 5.0, 20, box=box).g
-    assert np.allclose(theirs[1:], ours[1:], rtol=1e-6) and theirs[0] > ours[0]
-    found, _ = names["self_capped_distance"](LINE.astype(np.float32), 1.0)
-    assert len(found) == 3
+    assert len(names["self_capped_distance"](LINE.astype(np.float32), 1.0)[0]) == 3
 
 
 def test_freud():
     names = run("freud", "freud")
-    freud, found = names["freud"], names["found"]
-    i, j = np.asarray(found.query_point_indices), np.asarray(found.point_indices)
+    i, j = (np.asarray(getattr(names["found"], name)) for name in
+            ("query_point_indices", "point_indices"))  # fmt: skip
     order = np.lexsort((j, i))
     assert np.array_equal(i[order], names["i"]) and np.array_equal(j[order], names["j"])
-    assert (np.diff(i.astype(np.int64)) >= 0).all()
-    vectors = np.asarray(found.vectors)
-    assert vectors.dtype == np.float32
-    assert np.allclose(vectors[order], names["D"], atol=1e-5)
-    query = freud.locality.AABBQuery(freud.box.Box.cube(10.0), LINE)
-    options = {"r_max": 1.0, "exclude_ii": True}
-    assert len(query.query(LINE, options).toNeighborList()) == 0
+    assert np.allclose(np.asarray(names["found"].vectors)[order], names["D"], atol=1e-5)
     sizes = np.bincount(names["cluster"].cluster_idx)
     ours = hs.clusters(names["points"], 1.2, box=names["length"]).sizes
-    assert (np.diff(sizes) <= 0).all() and np.array_equal(np.sort(ours)[::-1], sizes)
-    with pytest.raises(RuntimeError):
-        query.query(LINE, {"r_max": 5.5, "exclude_ii": True}).toNeighborList()
-    options = {"num_neighbors": 3, "exclude_ii": True}
-    nearest = names["query"].query(names["points"], options).toNeighborList()
-    j = np.sort(np.asarray(nearest.point_indices).reshape(-1, 3), axis=1)
-    ours, _ = hs.nearest(names["points"], 3, box=names["length"])
-    assert np.mean(j == np.sort(ours, axis=1)) > 0.999  # float32 may see another one
+    assert np.array_equal(np.sort(ours)[::-1], sizes)
 
 
 def test_vesin_and_matscipy():
     names = run("vesin and matscipy", "vesin", "matscipy")
-    points, box = names["points"], names["box"]
-    half = hs.pairs(points, 2.0, box=box, quantities="ijS", inclusive=False)
-    assert triples(names["i"], names["j"], names["S"]) == triples(*half)
-    again = points[names["j"]] - points[names["i"]] + names["S"] @ box
-    assert np.allclose(again, names["D"])
-    assert triples(*names["full"]) == triples(*names["ours"]) == both_ways(*half)
-    assert (np.diff(names["full"][0]) >= 0).all()
-    (shifts,) = names["calculator"].compute(
-        points=np.zeros((1, 3)), box=np.eye(3), periodic=True, quantities="S"
+    half = hs.pairs(
+        names["points"], 2.0, box=names["box"], quantities="ijS", inclusive=False
     )
-    ours = hs.pairs(np.zeros((1, 3)), 2.0, box=1.0, quantities="S", inclusive=False)
-    assert {tuple(S) for S in np.concatenate((shifts, -shifts)).tolist()} == {
-        tuple(S) for S in np.concatenate((ours, -ours)).tolist()
-    }
-    assert len(shifts) == len(ours)
+    assert triples(names["i"], names["j"], names["S"]) == triples(*half)
+    assert triples(*names["full"]) == triples(*names["ours"])
     open_space = {"points": LINE, "box": np.zeros((3, 3)), "periodic": False, "quantities": "i"}
     calculator = names["vesin"].NeighborList(cutoff=1.0, full_list=False)
     assert len(calculator.compute(**open_space)[0]) == 0
-    cell = {"cell": np.eye(3) * 10.0, "pbc": [False] * 3}
-    assert len(names["neighbour_list"]("i", cutoff=1.0, positions=LINE, **cell)) == 0
 
 
 def test_pytorch_geometric():

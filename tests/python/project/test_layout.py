@@ -54,11 +54,6 @@ def test_every_folder_of_the_core_has_a_place():
     assert {path.name for path in (CSRC / "core").iterdir()} == PLACE.keys() - {"kernels"}
 
 
-def test_file_names_are_unique():
-    names = [path.name for path in FILES]
-    assert sorted(set(names)) == sorted(names)
-
-
 def test_no_two_headers_include_each_other():
     uses = {path: set(quoted_includes(path)) for path in FILES if path.suffix == ".h"}
     assert len(list(TopologicalSorter(uses).static_order())) >= len(uses)

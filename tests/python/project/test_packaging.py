@@ -11,7 +11,6 @@ import pytest
 
 import halfshell as hs
 from checkout import CSRC, ROOT
-from halfshell import _machine
 
 pytestmark = pytest.mark.slow
 
@@ -84,16 +83,3 @@ def test_a_source_distribution_has_the_whole_checkout(copy, tmp_path):
     made = {name for name in names if name in ("PKG-INFO", "setup.cfg") or ".egg-info/" in name}
     assert names - made == checkout_files() - {".gitignore"}
     assert archive.stat().st_size < 3_000_000
-
-
-def test_an_editable_installation_uses_the_checkout(tmp_path, monkeypatch):
-    module = tmp_path / "python" / "halfshell" / "_machine.py"
-    (tmp_path / "csrc").mkdir()
-    monkeypatch.setattr(_machine, "__file__", str(module))
-    with pytest.raises(FileNotFoundError, match=r"halfshell.h is missing from .*include"):
-        hs.get_include()
-    (tmp_path / "csrc" / "halfshell.h").touch()
-    assert hs.get_include() == str(tmp_path / "csrc")
-    (module.parent / "include").mkdir(parents=True)
-    (module.parent / "include" / "halfshell.h").touch()
-    assert hs.get_include() == str(module.parent / "include")

@@ -95,19 +95,6 @@ def test_methods_have_the_keywords_of_the_functions(name):
         assert set(keywords(function)) - set(keywords(method)) == {"box", "periodic"}
 
 
-def test_quantities_and_queries_are_keywords():
-    positional = {
-        (one, name) for name, function in (FUNCTIONS | METHODS).items()
-        for one in ("quantities", "queries")
-        if one in parameters(function) and one not in keywords(function)
-    }  # fmt: skip
-    assert positional == {
-        ("queries", "pairs_between"), ("queries", "CellList.query"),
-        ("queries", "CellList.candidates"), ("quantities", "NeighborTable.__init__"),
-        ("quantities", "Case.find"),
-    }  # fmt: skip
-
-
 def test_public_arguments_have_types():
     for name, function in (FUNCTIONS | METHODS).items():
         for one in parameters(function).values():

@@ -14,7 +14,6 @@ from halfshell import structures
 from halfshell_report import scenes
 
 DOCS = ROOT / "docs"
-FOLDERS = ["start", "recipes", "explanation", "reference", "systems"]
 NEEDED = ["sphinx", "numpydoc", "myst_nb", "furo", "ipykernel", "matplotlib", "numba", "ase"]
 NOTEBOOKS = [path for path in sorted(DOCS.rglob("*.md")) if "{code-cell}" in path.read_text()]
 #: What makes a cell of a notebook end with a figure.
@@ -76,13 +75,6 @@ def check_outputs(page, source):
     assert len(re.findall(r"<img [^>]*_images/", text)) == drawn, page
 
 
-def test_there_are_notebooks_and_they_are_kept_without_outputs():
-    assert {path.parent.name for path in NOTEBOOKS} == {"start", "recipes"}
-    assert len(NOTEBOOKS) > 8
-    for path in NOTEBOOKS:
-        assert path.read_text().startswith("---\nfile_format: mystnb\nkernelspec:\n"), path
-
-
 def test_the_start_page_answers_in_one_click():
     start = (DOCS / "index.md").read_text()
     for question, target in QUESTIONS.items():
@@ -115,13 +107,6 @@ def test_the_reference_has_each_name_once():
     assert named - {"report"} == {name for name in scenes.__all__ if name not in ("SIZES", "Size")}
 
 
-def test_which_function_names_every_search():
-    text = (DOCS / "start/which-function.md").read_text()
-    assert len(names_of_the_reference("Searches")) > 10
-    for name in names_of_the_reference("Searches"):
-        assert f"(#halfshell.{name})" in text, name
-
-
 def test_drawings_are_those_of_the_script(tmp_path):
     pytest.importorskip("matplotlib", reason="matplotlib is not installed")
     sys.path.insert(0, str(DOCS / "figures"))
@@ -133,11 +118,3 @@ def test_drawings_are_those_of_the_script(tmp_path):
     for name in draw.DRAWINGS:
         assert (tmp_path / f"{name}.svg").stat().st_size > 5000
         assert (DOCS / "figures" / f"{name}.svg").exists()
-
-
-@pytest.mark.parametrize("page", ["index.md", "explanation/how-pairs-are-found.md"])
-def test_examples_of_plain_pages_run(page):
-    blocks = re.findall(r"```python\n(.*?)```", (DOCS / page).read_text(), re.DOTALL)
-    assert blocks
-    for code in blocks:
-        exec(compile(code, page, "exec"), {})

@@ -4,7 +4,7 @@ are unique."""
 
 import re
 
-from checkout import BENCHMARKS, PYTHON_TESTS, ROOT, SUPPORT, TESTS
+from checkout import PYTHON_TESTS, ROOT, SUPPORT, TESTS
 
 #: A folder of tests/python -> what its tests are about.
 FOLDERS = {
@@ -68,16 +68,3 @@ def test_files_of_tests_that_a_page_names_exist():
     for page in PAGES:
         for name in re.findall(r"\b(?:tests|benchmarks)/[\w/]*\w\.\w+\b", page.read_text()):
             assert (ROOT / name).exists(), f"{page} names {name}"
-
-
-def test_benchmarks_are_commands_and_folders_that_their_guide_names():
-    guide = (BENCHMARKS / "README.md").read_text()
-    folders = {path.name for path in BENCHMARKS.iterdir() if path.is_dir()} - {"__pycache__"}
-    assert folders == {"scenes", "libraries", "measure", "pages", "results"}
-    for folder in folders:
-        assert f"| `{folder}/` |" in guide
-    for command in BENCHMARKS.glob("*.py"):
-        assert f"`{command.name}`" in guide
-    for folder in ("libraries", "measure", "pages"):
-        for path in (BENCHMARKS / folder).glob("[!_]*.py"):
-            assert f"`{path.stem}`" in guide

@@ -4,7 +4,6 @@
 import csv
 import io
 import math
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -16,10 +15,10 @@ from halfshell_report import report, scenes
 from halfshell_report.measure import Patience, machine_facts, take_turns
 from halfshell_report.page import page
 from halfshell_report.reach import Balls, Ellipsoids, reach_of
-from halfshell_report.rows import STATUSES, ReportRow, read_csv, write_csv
+from halfshell_report.rows import STATUSES, read_csv, write_csv
 from halfshell_report.run import SCENES
 from halfshell_report.truth import true_pairs
-from needle_scenes import is_reached, needle_pairs
+from needle_scenes import needle_pairs
 from oracles import remembered
 
 pytestmark = pytest.mark.slow
@@ -81,41 +80,6 @@ def test_the_truth_of_needles_is_that_of_rational_brute_force(name, rule):
         found = [(i, j, *S) for i, j, S in zip(*(getattr(pairs, k).tolist() for k in "ijS"))]
         assert sorted(found) == expected
     assert 0 < truth.n_by_integers < 20 * scene.n_points
-
-
-@pytest.mark.parametrize("scale", [1.0, 2.0**-700, 2.0**500])
-@pytest.mark.parametrize("rule", ["max", "min"])
-def test_the_truth_of_ellipsoids_of_any_size(rule, scale, rng):
-    points = rng.random((40, 2))
-    H = rng.uniform(-1.0, 1.0, (40, 2, 2)) * 3.0
-    H = H @ H.transpose(0, 2, 1) + np.eye(2)
-    H = (H + H.transpose(0, 2, 1)) / 2.0
-    for extent in (0.0, 0.25, 0.8):
-        for box in (None, np.array([[1.0, 0.0], [0.375, 1.0]])):
-            scaled = None if box is None else box * scale
-            truth = true_pairs(
-                points * scale, None, scaled, None, Ellipsoids(H, extent * scale, rule)
-            )
-            answer = hs.pairs(
-                hs.Points(points * scale, box=scaled, supports=H), extent * scale, rule=rule,
-                quantities="ijS", sort=True,
-            )  # fmt: skip
-            if box is None:  # all pairs, by fractions
-                assert len(truth.pairs) == sum(
-                    is_reached(H, extent, rule, i, j, points[j] - points[i])
-                    for i in range(40) for j in range(i)
-                )  # fmt: skip
-            found = zip(*(getattr(truth.pairs, k).tolist() for k in "ijS"))
-            assert sorted((i, j, tuple(S)) for i, j, S in found) == [
-                (i, j, tuple(S)) for i, j, S in zip(*(x.tolist() for x in answer))
-            ]
-
-
-def test_far_points_with_supports_are_no_pairs():
-    points = np.array([[1e300, 0.0], [-1e300, 0.0], [1e300, 1e-3], [0.0, 0.0], [0.1, 0.0]])
-    H = np.broadcast_to(np.eye(2), (5, 2, 2))
-    truth = true_pairs(points, None, None, None, Ellipsoids(H, 0.5, "max"))
-    assert sorted(zip(truth.pairs.i.tolist(), truth.pairs.j.tolist())) == [(0, 2), (3, 4)]
 
 
 def test_reaches_of_no_points_are_no_pairs():
@@ -191,12 +155,6 @@ def test_rows_say_what_was_asked_and_found(rows):
     assert [row.method for row in rows if row.kind == "peer"] == ["cKDTree"] * 2
 
 
-def test_float32_input_errs_by_float32(rows):
-    row = next(row for row in rows if row.method == "float32" and row.scene == "near-ties")
-    assert row.d_max_ulp > 1e6
-    assert 1e-10 < row.d_max_relative < 1e-5
-
-
 def test_kept_lists_have_rows_of_their_own(rows):
     kept = [row for row in rows if row.kind == "reuse"]
     assert {row.scene for row in kept} == {"head-on"}
@@ -205,12 +163,6 @@ def test_kept_lists_have_rows_of_their_own(rows):
     assert late and max(row.drift_kinetic for row in late) > 10.0
     verlet = [row for row in kept if row.method == "verlet"]
     assert len(verlet) == 3 and all(1 < row.builds < row.steps for row in verlet)
-
-
-def test_scenes_in_float32_are_not_rounded_again():
-    (row,) = report(["float32-ulp"], methods=["float32"], size="small")
-    assert (row.status, row.wrong) == ("not offered", None)
-    assert "float32 as they are" in row.note
 
 
 def test_names_are_checked():
@@ -240,12 +192,6 @@ def test_csv_is_read_back_as_it_was(rows):
     assert {"scene", "missed", "d_max_ulp", "cpu", "date", "halfshell", "numpy"} <= set(head)
 
 
-def test_every_field_is_documented():
-    told = ReportRow.__doc__
-    for name in ReportRow.__dataclass_fields__:
-        assert re.search(rf"\b{name}\b", told), name
-
-
 # ---- timing --------------------------------------------------------------------------------
 
 
@@ -258,3 +204,9 @@ def test_every_call_is_timed_and_patience_is_kept():
     assert timings["a"].repeats == made.count("a") > 3
     once = take_turns({"slow": lambda: sum(range(300_000))}, Patience(1000, 0.01))
     assert 1 <= once["slow"].repeats < 500
+
+
+def test_scenes_in_float32_are_not_rounded_again():
+    (row,) = report(["float32-ulp"], methods=["float32"], size="small")
+    assert (row.status, row.wrong) == ("not offered", None)
+    assert "float32 as they are" in row.note

@@ -9,11 +9,10 @@ import pytest
 import halfshell as hs
 from halfshell import cli
 from halfshell_report import run
-from halfshell_report.measure import PeerProcess
 from halfshell_report.peers import LIBRARIES
 from halfshell_report.rows import read_csv
 from halfshell_report.run import SCENES
-from report_helpers import fake, parse, row
+from report_helpers import parse, row
 
 pytestmark = pytest.mark.slow
 
@@ -46,16 +45,6 @@ def test_the_command_writes_the_report(command, tmp_path):
     assert facts["halfshell"] == hs.__version__
     assert {row.scene for row in rows} == {"near-ties", "head-on"}
     assert {"exact", "cKDTree", "verlet"} <= {row.method for row in rows}
-
-
-def test_libraries_that_are_missing_are_told_of_when_they_were_asked_for(command, monkeypatch):
-    missing = fake("pass", module="no_such_module")
-    start = PeerProcess.__init__
-    monkeypatch.setattr(PeerProcess, "__init__", lambda self, name, *rest: start(
-        self, name, *rest, command=missing))  # fmt: skip
-    options = ("--scenes", "uniform", "--methods", "exact", "--size", "small")
-    assert "not installed" in command(*options, "--peers", "vesin")[1]
-    assert "vesin" not in command(*options)[1]
 
 
 def test_a_wrong_exact_list_is_an_exit_status(command, monkeypatch):
@@ -122,14 +111,6 @@ def test_a_missing_extra_is_named(command, monkeypatch, package):
     status, _, err = command("--scenes", "uniform")
     assert status == 2
     assert f"report needs {package}: pip install {package}\n" in err
-
-
-def test_all_missing_extras_are_named_at_once(command, monkeypatch):
-    for name in ("scipy.spatial", "rich.console"):
-        monkeypatch.setitem(sys.modules, name, None)
-    status, _, err = command("--scenes", "uniform")
-    assert status == 2
-    assert "report needs scipy and rich: pip install scipy rich\n" in err
 
 
 def test_quick_is_a_choice_of_scenes_and_one_thing(command, monkeypatch):

@@ -59,32 +59,6 @@ def test_a_quick_scene_is_right(name):
     assert len(i) == KEPT[name]["quick"]["pairs"] == hs.count_pairs(**scene.arguments)
 
 
-def test_fields_have_the_promised_types():
-    for name in BALLS + NEEDLES:
-        scene = scenes.load(name, "small")
-        n, ndim = scene.points.shape
-        assert scene.cutoff is None and len(scene.periodic) == ndim
-        assert 10 <= len(scene.title) <= 80 and len(scene.stresses) > 40
-        reach = scene.radii if name in BALLS else scene.supports
-        assert reach.dtype == np.float64 and reach.flags.c_contiguous
-        if name in BALLS:
-            assert reach.shape == (n,) and (reach >= 0.0).all()
-            assert scene.rule in ("sum", "mean", "max", "min")
-        else:
-            assert scene.radii is None and scene.rule in ("max", "min")
-            assert np.array_equal(reach, reach.transpose(0, 2, 1)) and reach.shape[0] == n
-            assert set(scene.reach) == {"supports", "extent", "rule"}
-        sizes = [KEPT[name][size]["n"] for size in scenes.SIZES]
-        assert sizes[0] <= 300 < sizes[1] <= 10_000 < sizes[2] <= 1_000_000
-
-
-def test_the_kinds_are_apart():
-    assert len(BALLS) >= 6 and NEEDLES and not set(BALLS) & {*NEEDLES, *scenes.names()}
-    assert not set(NEEDLES) & set(scenes.names())
-    assert all(not scenes.load(name, "small").reach for name in scenes.names())
-    assert scenes.names(radii=True, supports=True) == BALLS + NEEDLES
-
-
 def test_rounded_sums_are_wrong_on_half_of_the_pairs():
     scene = scenes.load("balls-rounded", "quick")
     n = scene.n_points // 2

@@ -107,21 +107,3 @@ def test_rounded_decisions_are_wrong_where_disks_touch():
     D = hs.pairs(strict.points, 5.1, box=strict.box, quantities="D").astype(np.float32)
     rounded = int(((D * D).sum(axis=1) < np.float32(25.0)).sum())
     assert abs(rounded - hs.count_pairs(**strict.arguments)) > 50
-
-
-def test_a_crowd_is_in_one_cell():
-    cells = start(scenes.load("disks-crowd", "quick"), "hash")
-    corner = len(cells.near([0.0] * 3, 0.125))
-    assert corner > 300
-
-
-@every_scene
-def test_fields_have_the_promised_types(name):
-    scene = scenes.load(name, "small")
-    updates, m = scene.updates, len(scene.updates.keys)
-    assert updates.keys.dtype == np.int64 and updates.keys.min() >= 0
-    assert updates.positions.shape == (m, scene.ndim)
-    assert updates.positions.dtype == np.float64 and np.isfinite(updates.positions).all()
-    assert updates.removed.dtype == bool and 0 < updates.removed.sum() < m / 4
-    assert (updates.keys >= scene.n_points).any() and (updates.keys < scene.n_points).any()
-    assert 10 <= len(scene.title) <= 80 and len(scene.stresses) > 40

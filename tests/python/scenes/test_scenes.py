@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`halfshell_report.scenes`: exact answers, the same bits everywhere, said what for."""
 
-import dataclasses
 import importlib.util
 import inspect
 import re
 
-import numpy as np
 import pytest
 
 import halfshell as hs
@@ -93,43 +91,6 @@ def test_scenes_say_what_they_are_and_what_they_stress():
         assert scene.stresses == inspect.cleandoc(scene.stresses)
 
 
-def test_titles_and_names_tell_scenes_apart():
-    titles = [scenes.load(name, "small").title for name in NAMES]
-    assert len(set(titles)) == len(titles)
-    assert all(name == name.lower() and " " not in name for name in NAMES)
-
-
-def test_fields_have_the_promised_types():
-    for name in NAMES:
-        scene = scenes.load(name, "small")
-        n, ndim = scene.points.shape
-        assert (scene.n_points, scene.ndim) == (n, ndim)
-        assert scene.points.dtype in (np.float64, np.float32)
-        assert scene.points.flags.c_contiguous
-        assert np.isfinite(scene.points).all()
-        assert type(scene.cutoff) is float
-        assert type(scene.inclusive) is bool
-        assert len(scene.periodic) == ndim
-        assert all(type(flag) is bool for flag in scene.periodic)
-        if scene.box is None:
-            assert not any(scene.periodic)
-        else:
-            assert scene.box.dtype == np.float64
-            assert scene.box.shape in ((ndim,), (ndim, ndim))
-        with pytest.raises(dataclasses.FrozenInstanceError):
-            scene.cutoff = 1.0
-
-
-def test_scenes_are_made_anew():
-    one, other = (scenes.load("uniform", "small") for _ in range(2))
-    one.points[:] = 0.0
-    assert other.points.any()
-
-
-def test_full_is_the_size_unless_one_is_named():
-    assert scenes.load("uniform").n_points == KEPT["uniform"]["full"]["n"]
-
-
 @pytest.mark.parametrize(
     ("name", "nearest"),
     [("fcc-shel", "fcc-shell"), ("Plummer", "plummer"), ("offset-1e5", "offset-1e15"), ("", "")],
@@ -143,18 +104,6 @@ def test_an_unknown_name_is_told_the_nearest_ones(name, nearest):
 def test_an_unknown_size_is_told_the_three(size):
     with pytest.raises(ValueError, match="one of small, quick, full"):
         scenes.load("uniform", size)
-
-
-@pytest.mark.parametrize(("name", "size"), [(None, "full"), (b"uniform", "full"), ("uniform", 3)])
-def test_names_and_sizes_are_strings(name, size):
-    with pytest.raises(TypeError, match="must be a string"):
-        scenes.load(name, size)
-
-
-def test_two_scenes_of_one_name_are_refused():
-    add = importlib.import_module("halfshell_report.scenes._catalogue").add
-    with pytest.raises(ValueError, match="two scenes 'uniform'"):
-        add({"uniform": ("again",)})(lambda size: None)
 
 
 def test_examples_of_the_scenes_run():

@@ -46,17 +46,6 @@ def test_unit_cell_is_that_of_the_space_group():
         assert distance_to_nearest(published, ours, symbol).max() < 1e-12
 
 
-def test_file_holds_the_same_crystal():
-    from ase.io import read
-
-    from_file = read(structures.ALPHA_QUARTZ_CIF)
-    ours = as_atoms(structures.alpha_quartz((1, 1, 1)))
-    assert len(from_file) == len(ours) == 9
-    np.testing.assert_allclose(ours.cell.array, from_file.cell.array, rtol=0, atol=1e-12)
-    for symbol in ("Si", "O"):
-        assert distance_to_nearest(ours, from_file, symbol).max() < 1e-12
-
-
 def test_bonds_are_those_of_quartz():
     from ase.neighborlist import neighbor_list
 
@@ -68,25 +57,6 @@ def test_bonds_are_those_of_quartz():
     assert set(coordination[symbols == "Si"]) == {4}
     assert set(coordination[symbols == "O"]) == {2}
     assert sorted(set(d.round(3))) == [1.605, 1.614]
-
-
-def test_block_is_the_repeated_cell():
-    cell = structures.alpha_quartz((1, 1, 1))
-    block = structures.alpha_quartz((2, 1, 3))
-    assert len(block.positions) == len(block.species) == 6 * 9
-    np.testing.assert_array_equal(block.box, cell.box * [[2], [1], [3]])
-    repeated = as_atoms(cell).repeat((2, 1, 3))
-    assert repeated.get_chemical_symbols() == block.species.tolist()
-    np.testing.assert_allclose(repeated.positions, block.positions, rtol=0, atol=1e-12)
-
-
-def test_default_is_some_thousand_points_inside_the_box():
-    positions, box, species = structures.alpha_quartz()
-    assert positions.shape == (4608, 3)
-    fractions = positions @ np.linalg.inv(box)
-    assert fractions.min() > -1e-12
-    assert fractions.max() < 1
-    assert (species == "Si").sum() * 2 == (species == "O").sum()
 
 
 @pytest.mark.parametrize("repeat", [(0, 1, 1), (1, 1), (1.0, 1, 1), 3, "111", (1, 1, -2)])

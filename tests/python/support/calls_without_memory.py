@@ -78,10 +78,10 @@ def visited_balls(**options):
 MOVED = [POINTS + shift * (1.0 + 0.001 * TYPES[:, None]) for shift in (0.0, 0.01, BOX[1], 1.0)]
 
 
-def verlet(threads=None):
+def verlet():
     """A list, built, kept, and built again where the box is another."""
     found = []
-    steps = hs.VerletList(1.5, 0.3, **PERIODIC, threads=threads)
+    steps = hs.VerletList(1.5, 0.3, **PERIODIC)
     for points in MOVED:
         found.append((steps.update(points), *steps.pairs(quantities="ijdDS", sort=True)))
     return found, steps.n_points, steps.cutoff
@@ -178,14 +178,10 @@ CALLS = {
         POINTS, [0.5, 1.0, 1.5], quantities=LETTERS + "k", sort=True, **PERIODIC),
     "pairs, touching": lambda: call(hs.pairs,
         POINTS, 1.5, quantities=LETTERS, indices=[3, 0], sort=True, **PERIODIC),
-    "pairs, int32, threads": lambda: hs.pairs(
-        CROWD, 0.5, index_dtype=np.int32, sort=True, threads=2),
     "pairs, lists": lambda: hs.pairs(POINTS.tolist(), 1, sort=True, box=BOX.tolist(),
                                      periodic=[1, 0, 1]),
-    "pairs, float32": lambda: call(hs.pairs, POINTS.astype(np.float32), 1.5, sort=True, **PERIODIC),
     "pairs, far": lambda: hs.pairs(FAR, 1.5, quantities="dDS", sort=True),
     "pairs, double": lambda: call(hs.pairs, POINTS, 1.5, precision="double", sort=True, **PERIODIC),
-    "pairs, one": lambda: hs.pairs(POINTS, 1.5, quantities="P", sort=True),
     "pairs into": lambda: into("ijdDS"),
     "capacity": capacity_error,
     "pairs, batch": lambda: call(hs.pairs, POINTS, 1.5, batch=BATCH, sort=True, **PERIODIC),
@@ -207,17 +203,12 @@ CALLS = {
     "coordination": lambda: call(hs.coordination, POINTS, 1.5, **PERIODIC),
     "pairs of balls": lambda: call(hs.pairs,
         POINTS, None, radii=RADII, quantities=LETTERS, sort=True, **PERIODIC),
-    "pairs of balls, threads": lambda: call(hs.pairs,
-        POINTS, 1.5, radii=RADII.tolist(), rule="max", sort=True, threads=2, **PERIODIC),
     "pairs by type": lambda: call(hs.pairs, POINTS, CUTOFFS, types=TYPES, sort=True, **PERIODIC),
     "pairs_between, balls": lambda: call(hs.pairs_between,
         OTHER, POINTS, None, query_radii=RADII[:12], radii=RADII, quantities="ijdDS", **PERIODIC),
     "neighbors, gather": lambda: call(hs.neighbors,
         POINTS, None, radii=RADII, rule="gather", quantities="jdS", **PERIODIC)._arrays,
     "coordination, types": lambda: call(hs.coordination, POINTS, np.ones((3, 3)), types=TYPES),
-    "count_pairs, balls": lambda: call(
-        hs.count_pairs, POINTS, [1.0, 2.0], radii=RADII, rule="mean"
-    ),
     "visited and blocks, balls": lambda: visited_balls(**PERIODIC),
     "bad radii": lambda: message(hs.Points, POINTS, radii=-RADII),
     "histogram": lambda: call(hs.pair_histogram, POINTS, EDGES, **PERIODIC),
@@ -242,22 +233,16 @@ CALLS = {
     "CellList, few cells": lambda: fields(
         hs.CellList(FAR, 1.5), "shape cell_sizes cell_start order cell_ids cutoff"),
     "cells.pairs": lambda: CELLS.pairs(1.0, quantities="ijdDS", sort=True),
-    "cells.pairs, few cells": lambda: SPARSE.pairs(1.0, quantities="ijdDS", sort=True),
     "cells.query": lambda: CELLS.query(OTHER, quantities="jd")._arrays,
     "cells.neighbors": lambda: CELLS.neighbors(1.2)._arrays,
-    "cells.nearest": lambda: CELLS.nearest(3, queries=OTHER),
     "cells.count_pairs": lambda: CELLS.count_pairs(queries=OTHER),
-    "cells.coordination": lambda: CELLS.coordination(),
     "cells.pair_histogram": lambda: CELLS.pair_histogram(EDGES[:5]),
     "cells.iter_pairs": lambda: list(CELLS.iter_pairs(max_pairs=64)),
-    "cells.for_each_pair": lambda: CELLS.for_each_pair(lambda *pair: False),
     "cells.candidates": lambda: fields(CELLS.candidates(OTHER), "offsets start stop"),
     "cells.cell_of": lambda: SPARSE.cell_of(FAR[:9]),
     "VerletList": verlet,
-    "VerletList, threads": lambda: verlet(threads=2),
     "Connectivity": lambda: connected(),
     "Connectivity, all": lambda: connected(**WITH_ALL),
-    "Connectivity, threads": lambda: connected(**WITH_ALL, threads=2),
     "Connectivity, box": lambda: connected(box=BOX, **WITH_ALL),
     "Connectivity, extents": lambda: connected(extent=[1.0, 1.5], rule="scatter", box=BOX),
     "Connectivity, Z curve": lambda: connected(order="morton", exclude=[(0, 0, 1, 0)]),
@@ -270,13 +255,11 @@ CALLS = {
     "between_planes": lambda: LISTS[0].between_planes(
         ([0.0] * 3, [1.0, 0.0, 0.0]), ([5.0, 0.0, 0.0], [1.0, 0.0, 0.0])),
     "Box": lambda: fields(hs.Box(BOX), "perpendicular_heights volume vectors"),
-    "Box, angles": lambda: hs.Box.from_lengths_angles((3, 4, 5), (80, 90, 100)).vectors,
     "Box.wrap": lambda: hs.Box(BOX).wrap(POINTS),
     "explain": lambda: fields(call(hs.explain, POINTS, 1.5, **PERIODIC, measure=True),
                               "algorithm reason shape images expected_pairs kernel"),
     "verify": lambda: fields(call(hs.verify, POINTS, 1.5, *LIST, **PERIODIC),
                              "n_expected n_given missed spurious duplicate"),
-    "kernels": hs.kernels,
     "set_cache_limit": lambda: hs.set_cache_limit(hs.set_cache_limit(1 << 20)),
     "not finite": lambda: message(hs.pairs, BAD, 1.5),
     "not independent": lambda: message(hs.pairs, POINTS, 1.5, box=FLAT_BOX, periodic=True),
@@ -284,10 +267,7 @@ CALLS = {
     "no cutoff": lambda: message(hs.pairs, POINTS, -1.0),
     "no number": lambda: message(hs.pairs, POINTS, "far"),
     "no quantity": lambda: message(hs.pairs, POINTS, 1.5, quantities="xyz"),
-    "no threads": lambda: message(hs.pairs, POINTS, 1.5, threads=10**30),
-    "no limit": lambda: message(hs.settings, memory_limit=POINTS.tolist()),
     "no array to write to": lambda: message(hs.pairs, POINTS, 1.5, out=(LIST[0], LIST[1][:, None])),
-    "no edges": lambda: message(hs.pair_histogram, POINTS, -EDGES),
     "no batch": lambda: message(hs.Points, POINTS, batch=BATCH[::-1]),
 }  # fmt: skip
 
@@ -297,7 +277,7 @@ CALLS = {
 # functions are refused memory all the same.
 NOT_NUMPY = {
     "rdf", "verify", "Connectivity", "rebuild", "neighbors, indices",
-    "Connectivity, all", "Connectivity, threads", "Connectivity, box", "Connectivity, extents",
+    "Connectivity, all", "Connectivity, box", "Connectivity, extents",
     "Connectivity, Z curve", "patch", "patch, all", "patch, turned", "remove", "remove, function",
     "between_planes", "pairs, double", "pairs, touching", "no kernel",
 }  # fmt: skip

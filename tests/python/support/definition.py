@@ -4,7 +4,7 @@
 `rows_that_count` is the definition; `check` holds each function that has pairs to it.
 """
 
-import inspect
+import bisect
 import itertools
 import math
 from fractions import Fraction
@@ -13,7 +13,8 @@ import numpy as np
 
 import halfshell as hs
 from full_lists import entries
-from oracles import triples
+from halfshell._check.reference import ulp_error
+from oracles import same_arrays, triples
 from rational_images import Images, between, dot, exact
 
 SYMMETRIC = ("sum", "mean", "max", "min")
@@ -62,8 +63,10 @@ class _Reach:
             a, b = self.asking.types[i], self.points.types[j]
             if not isinstance(self.cutoff, dict):
                 return Fraction(float(self.cutoff[a][b]))
-            found = self.cutoff.get((a, b), self.cutoff.get((b, a)))
-            return None if found is None else Fraction(float(found))
+            for key in ((a, b), (b, a), (a, "*"), (b, "*"), ("*", "*")):  # few stars win
+                if key in self.cutoff:
+                    return Fraction(float(self.cutoff[key]))
+            return None
         if self.kind == "radii":
             sides = [one.radii for one in (self.asking, self.points)]
         else:
@@ -91,11 +94,15 @@ def rows_that_count(
 ):
     """(i, j, S) of every point or query i and what it has as a neighbour, ascending."""
     rule_and_rest = rule, exclude, min_distance, inclusive
-    return [entry[:3] for entry in _with_squares(points, cutoff, queries, *rule_and_rest)]
+    return _keys(measured_pairs(points, cutoff, queries, *rule_and_rest))
 
 
-def _with_squares(points, cutoff, queries, rule, exclude, min_distance, inclusive):
-    """(i, j, S, |D|**2) of each."""
+def _keys(measured):
+    return [entry[:3] for entry in measured]
+
+
+def measured_pairs(points, cutoff, queries, rule, exclude, min_distance, inclusive):
+    """(i, j, S, |D|**2, D) of each."""
     own = queries is None
     asking = points if own else queries
     reach = _Reach(points, asking, cutoff, rule, inclusive)
@@ -143,7 +150,7 @@ def _with_squares(points, cutoff, queries, rule, exclude, min_distance, inclusiv
             turn = -1 if own and j < i else 1
             first = min(near, key=lambda one: (one[0], [turn * s for s in one[1]]))[1]
         found += [
-            (i, j, S, square)
+            (i, j, S, square, D)
             for square, S, D in near
             if S != first and square >= least and (closed or square < farthest**2)
             and reach.counts(i, j, D)
@@ -167,8 +174,8 @@ def check(points, cutoff=None, queries=None, **options):
     """
     points = points if isinstance(points, hs.Points) else hs.Points(points)
     usual = {"rule": None, "exclude": None, "min_distance": None, "inclusive": True}
-    measured = _with_squares(points, cutoff, queries, **{**usual, **options})
-    full = [entry[:3] for entry in measured]
+    measured = measured_pairs(points, cutoff, queries, **{**usual, **options})
+    full = _keys(measured)
     n = len(points if queries is None else queries)
     counts = np.bincount([i for i, _, _ in full], minlength=n).tolist()
     by = zip(hs.kernels(), itertools.cycle(ALGORITHMS), itertools.cycle((1, 2)))
@@ -177,27 +184,46 @@ def check(points, cutoff=None, queries=None, **options):
             how = {**options, "threads": threads}
             if queries is not None:
                 how["queries"] = queries
-            table = hs.neighbors(points, cutoff, quantities="jSd", **how)
+            table = hs.neighbors(points, cutoff, quantities="jSdD", **how)
             assert entries(table) == full
             assert hs.coordination(points, cutoff, **how).tolist() == counts
             if points.types is not None:
                 by_type = hs.coordination(points, cutoff, by_type=True, **how)
                 assert by_type.tolist() == _by_type(points.types, table)
             if queries is not None:
-                _check_between(points, cutoff, full, how)
+                _check_between(points, cutoff, full, table, how)
             elif options.get("rule") not in DIRECTED:
-                _check_half(points, cutoff, [p for p in full if is_of_half(*p)], how, number)
+                _check_half(points, cutoff, full, table, how, number)
             if number == 0 and n:
                 _check_rest(points, cutoff, table, how)
-                assert entries(table.sort()) == [e[:3] for e in sorted(measured, key=_by_distance)]
+                _check_table(table, measured)
             if type(cutoff) is float and options.keys() <= {"inclusive", "exclude", "min_distance"}:
                 _check_distances(points, cutoff, measured, how)
     return full
 
 
 def _by_distance(entry):
-    i, j, S, square = entry
+    i, j, S, square, _ = entry
     return i, square, j, S
+
+
+def _check_table(table, measured):
+    """The numbers of each entry to the last place, and what is made of the table."""
+    for (*_, square, true), d, D in zip(
+        measured, table.distances.tolist(), table.vectors.tolist(), strict=True
+    ):
+        assert ulp_error(d, square) <= 1
+        assert all(abs(Fraction(a) - b) <= Fraction(math.ulp(d)) for a, b in zip(D, true))
+    ordered = table.sort()
+    assert entries(ordered) == _keys(sorted(measured, key=_by_distance))
+    mask = np.arange(len(measured)) % 3 > 0
+    some = [entry for entry, is_kept in zip(measured, mask) if is_kept]
+    assert entries(table.filter(mask)) == _keys(some)
+    assert entries(table.filter(mask).sort()) == _keys(sorted(some, key=_by_distance))
+    graph = ordered.graph()
+    assert np.array_equal(graph.edge_index[0], ordered.indices)
+    assert np.array_equal(graph.shifts, -ordered.shifts)
+    assert np.array_equal(graph.vectors, -ordered.vectors)
 
 
 def _by_type(types, table):
@@ -212,15 +238,20 @@ def _total(count):
     return int(np.sum(count))  # of a batch one for each system
 
 
-def _check_between(points, cutoff, full, how):
+def _check_between(points, cutoff, full, table, how):
     assert _total(hs.count_pairs(points, cutoff, **how)) == len(full)
-    how = {**how, "quantities": "ijS"}
-    assert triples(*hs.pairs_between(how.pop("queries"), points, cutoff, **how)) == full
+    how = {**how, "quantities": LETTERS}
+    found = hs.pairs_between(how.pop("queries"), points, cutoff, **how)
+    assert triples(*found[:3]) == full
+    assert same_arrays(found[3:], (table.distances, table.vectors))
 
 
-def _check_half(points, cutoff, half, how, number):
+def _check_half(points, cutoff, full, table, how, number):
+    is_half = np.array([is_of_half(*entry) for entry in full], bool)
+    half = [entry for entry, is_one in zip(full, is_half) if is_one]
     found = hs.pairs(points, cutoff, quantities=LETTERS, sort=True, **how)
     assert triples(*found[:3]) == half
+    assert same_arrays(found[3:], (table.distances[is_half], table.vectors[is_half]))
     plain = hs.pairs(points, cutoff, quantities=LETTERS, **how)
     order = np.lexsort([*plain[2].T[::-1], plain[1], plain[0]])
     assert all(a.tobytes() == b[order].tobytes() for a, b in zip(found, plain, strict=True))
@@ -233,6 +264,16 @@ def _check_half(points, cutoff, half, how, number):
             seen = []
             hs.for_each_pair(points, cutoff, lambda i, j, S, D, d2: seen.append((i, j, S)), **how)
             assert sorted((i, j, tuple(S)) for i, j, S in seen) == half
+        _check_clusters(points, cutoff, half, how)
+
+
+def _check_clusters(points, cutoff, half, how):
+    joined = list(range(len(points)))
+    for i, j, _ in half:
+        one, other = sorted((joined[i], joined[j]))
+        joined = [one if x == other else x for x in joined]
+    labels = np.unique(joined, return_inverse=True)[1]
+    assert hs.clusters(points, cutoff, **how).labels.tolist() == labels.tolist()
 
 
 def _check_rest(points, cutoff, table, how):
@@ -243,13 +284,17 @@ def _check_rest(points, cutoff, table, how):
     is_chosen = points.groups is not None or both.keys() & {"exclude", "min_distance"}
     if "queries" not in how and (points.batch is None or not is_chosen):
         some = np.arange(0, len(points), 3)[::-1]
-        rows = hs.neighbors(points, cutoff, indices=some, quantities="jSd", **how)
+        rows = hs.neighbors(points, cutoff, indices=some, quantities="jSdD", **how)
         for k, number in enumerate(some):
             for ours, theirs in zip(rows[k], table[number], strict=True):
                 assert ours.tobytes() == theirs.tobytes()
+        counts = hs.coordination(points, cutoff, indices=some, **how)
+        assert counts.tolist() == table.counts[some].tolist()
         if how.get("rule") not in DIRECTED:
             part = np.isin(i, some) | np.isin(j, some)
             found = hs.pairs(points, cutoff, indices=some, quantities="ijS", sort=True, **how)
+            count = hs.count_pairs(points, cutoff, indices=some, **how)
+            assert _total(count) == len(found[0])
             assert triples(*found) == [
                 one for one, is_in in zip(triples(i, j, S), part, strict=True)
                 if is_in and is_of_half(*one)
@@ -258,36 +303,123 @@ def _check_rest(points, cutoff, table, how):
 
 def _check_distances(points, cutoff, measured, how):
     """Histograms, and the nearest points: of one cutoff that counts."""
-    how = {key: value for key, value in how.items() if value is not None}
-    _check_nearest(points, cutoff, measured, how)
-    if not how.pop("inclusive"):
+    how = {"inclusive": True} | {key: value for key, value in how.items() if value is not None}
+    edges = _beside(cutoff, measured)
+    if points.batch is None:
+        _check_cells(points, cutoff, measured, how)
+        _check_shells(points, edges, measured, how)
+    if how["inclusive"] and cutoff > 0.0:
+        of_all = {key: value for key, value in how.items() if key != "inclusive"}
+        _check_histogram(points, edges, measured, of_all)
+    check_nearest(points, cutoff, measured, how)
+
+
+def _beside(cutoff, measured):
+    """The cutoff and lengths before it: some of the distances, or next to them."""
+    some = [math.hypot(*map(float, D)) for *_, D in measured[:: 1 + len(measured) // 3]]
+    lengths = [x for d in some for x in (math.nextafter(d, 0.0), d, math.nextafter(d, math.inf))]
+    return sorted({0.0, 0.5 * cutoff, cutoff, *(x for x in lengths if x < cutoff)})
+
+
+def _check_shells(points, edges, measured, how):
+    """Each entry is in the first shell that holds it; counts are of all shells up to one."""
+    how, squares = dict(how), [Fraction(edge) ** 2 for edge in edges]
+    place = bisect.bisect_left if how["inclusive"] else bisect.bisect_right
+    shells = [place(squares, square) for *_, square, _ in measured]
+    table = hs.neighbors(points, edges, quantities="jSdk", **how)
+    assert entries(table) == _keys(measured) and table.shells.tolist() == shells
+    side = "left" if how["inclusive"] else "right"  # no distance contradicts its shell
+    assert np.array_equal(np.searchsorted(edges, table.distances, side), table.shells)
+    counts = np.zeros((len(edges), table.n_rows), np.int64)
+    for (i, *_), shell in zip(measured, shells):
+        counts[shell:, i] += 1
+    assert np.array_equal(hs.coordination(points, edges, **how), counts)
+    is_half = [is_of_half(*key) for key in _keys(measured)]
+    if "queries" in how:
+        is_half = [True] * len(measured)
+        asking = how.pop("queries")
+        *found, k = hs.pairs_between(asking, points, edges, quantities="ijSk", **how)
+        how["queries"] = asking
+    else:
+        *found, k = hs.pairs(points, edges, quantities="ijSk", sort=True, **how)
+    assert triples(*found) == [key for key, is_one in zip(_keys(measured), is_half) if is_one]
+    some = [shell for shell, is_one in zip(shells, is_half) if is_one]
+    assert k.tolist() == some
+    total = [sum(shell <= most for shell in some) for most in range(len(edges))]
+    assert hs.count_pairs(points, edges, **how).tolist() == total
+
+
+def _check_cells(points, cutoff, measured, how):
+    """Points in cells say what they say themselves."""
+    cells, how = hs.CellList(points, cutoff), dict(how)
+    queries = how.pop("queries", None)
+    if queries is not None:
+        found = hs.pairs_between(queries, cells, cutoff, quantities="ijS", **how)
+        assert triples(*found) == _keys(measured)
+        if points.groups is None and not how.keys() & {"exclude", "min_distance"}:
+            assert entries(cells.query(queries, quantities="jS", **how)) == _keys(measured)
         return
-    queries = how.get("queries")
-    edges = [0.0, 0.5 * cutoff, cutoff]
+    half = [key for key in _keys(measured) if is_of_half(*key)]
+    assert triples(*cells.pairs(quantities="ijS", sort=True, **how)) == half
+    assert triples(*hs.pairs(cells, cutoff, quantities="ijS", sort=True, **how)) == half
+    assert entries(cells.neighbors(quantities="jS", **how)) == _keys(measured)
+    assert cells.count_pairs(**how) == len(half)
+    if points.groups is None and not how.keys() & {"exclude", "min_distance"}:
+        scene = {"box": points.box, "periodic": points.periodic}
+        kept = hs.VerletList(cutoff, 0.25 * cutoff, inclusive=how["inclusive"], **scene)
+        kept.update(points.positions)
+        assert triples(*kept.pairs(quantities="ijS", sort=True)) == half
+
+
+def _check_histogram(points, edges, measured, how):
+    """Counts, and sums of products of weights, of each bin, by type and over all of them."""
+    queries, squares = how.get("queries"), [Fraction(edge) ** 2 for edge in edges]
+    sides = [points if queries is None else queries, points]
+    kinds = [np.zeros(len(one), int) if one.types is None else one.types for one in sides]
+    names = np.unique(np.concatenate(kinds))
+    is_named = kinds[0].dtype.kind == "U"
+    kinds = [np.searchsorted(names, one) if is_named else one for one in kinds]
+    n_types = max(1, len(names) if is_named else 1 + int(names.max(initial=0)))
     found = hs.pair_histogram(points, edges, **how)
-    limits = [Fraction(edge) ** 2 for edge in edges]
-    shape = found.shape[:-1] if points.batch is not None else ()
-    counts = np.zeros((*shape, 2), np.int64)
-    for i, j, S, square in measured:
-        if queries is not None or is_of_half(i, j, S):
-            place = (points.batch[j],) if shape else ()
-            counts[(*place, int(square >= limits[1]))] += 1
-    if limits[1] > 0:
-        assert found.tolist() == counts.tolist()
+    is_divided, is_weighted = points.batch is not None, points.weights is not None
+    shape = len(found) if is_divided else 1, n_types, n_types, len(edges) - 1
+    sums = np.full(shape, Fraction(0), dtype=object)
+    upper = np.full((shape[0], shape[-1]), Fraction(0), dtype=object)
+    some, of_some = np.arange(0, len(points), 3), np.zeros(upper.shape, np.int64)
+    for i, j, S, square, _ in measured:
+        if queries is None and not is_of_half(i, j, S):
+            continue
+        term = Fraction(1)
+        if is_weighted:
+            term = Fraction(sides[0].weights[i].item()) * Fraction(points.weights[j].item())
+        k = min(bisect.bisect_right(squares, square), len(edges) - 1) - 1
+        system, a, b = points.batch[j] if is_divided else 0, kinds[0][i], kinds[1][j]
+        upper[system, k] += term
+        of_some[system, k] += i % 3 == 0 or j % 3 == 0
+        sums[system, a, b, k] += term
+        if queries is None and a != b:
+            sums[system, b, a, k] += term
+    dtype = np.float64 if is_weighted else np.int64  # a fraction is rounded once, to even
+    sums, upper = (np.array([dtype(float(x)) for x in one.ravel()], dtype).reshape(one.shape)
+                   for one in (sums, upper))  # fmt: skip
+    assert same_arrays(found, upper if is_divided else upper[0])
+    if queries is None and not is_weighted and len(points):
+        found = hs.pair_histogram(points, edges, indices=some, **how)
+        assert same_arrays(found, of_some if is_divided else of_some[0])
+    if points.types is not None:
+        by_type = hs.pair_histogram(points, edges, by_type=True, **how)
+        assert same_arrays(by_type, sums if is_divided else sums[0])
 
 
-def _check_nearest(points, cutoff, measured, how):
+def check_nearest(points, cutoff, measured, how, letters="jS"):
     """Rows of `nearest` are the first ones of those within the cutoff, as far as it takes them."""
-    takes = inspect.signature(hs.nearest).parameters
-    if how.get("inclusive") and "inclusive" not in takes:
-        how = {key: value for key, value in how.items() if key != "inclusive"}
-    if how.keys() - takes.keys() or (points.groups is not None and "exclude" not in takes):
-        return
-    j, S = hs.nearest(points, 3, max_distance=cutoff, quantities="jS", **how)
+    columns = hs.nearest(points, 3, max_distance=cutoff, quantities=letters, **how)
+    columns = columns if len(letters) > 1 else (columns, np.zeros((*columns.shape, 0), int))
     ordered = sorted(measured, key=_by_distance)
-    for i, (numbers, shifts) in enumerate(zip(j.tolist(), S.tolist(), strict=True)):
+    for i, (numbers, shifts) in enumerate(zip(*map(np.ndarray.tolist, columns), strict=True)):
         mine = [entry[1:3] for entry in ordered if entry[0] == i][:3]
-        assert [(a, tuple(s)) for a, s in zip(numbers, shifts) if a >= 0] == mine
+        found = [(a, tuple(s)) for a, s in zip(numbers, shifts) if a >= 0]
+        assert found == [(j, S if len(letters) > 1 else ()) for j, S in mine]
 
 
 # ---- scenes --------------------------------------------------------------------------------
@@ -313,6 +445,8 @@ class Scene:
         x = np.where(rng.random(x.shape) < 0.2, np.nextafter(x, 9.0), x)
         x[: n // 4] = x[n // 4 : n // 4 + n // 4]  # some coincide
         x *= self.unit
+        if self.box is not None and rng.integers(2):  # far from home, where their images are not
+            x += rng.choice([0, 1, -3, 1000], x.shape) * self.periodic @ self.box
         with np.errstate(over="ignore", under="ignore"):
             single = x.astype(np.float32)
         x = single if rng.random() < 0.2 and np.isfinite(single).all() else x
@@ -334,7 +468,11 @@ class Scene:
         cutoff = self.rng.choice([0.0, 0.25, 0.5, math.sqrt(0.5), 0.75, 1.0])
         self.cutoff = float(cutoff * self.unit)
         if self.rng.integers(2):
-            self.fields["types"] = self.rng.integers(0, 3, len(self.x))  # which is no matter
+            kinds = self.rng.integers(0, 3, len(self.x))  # which are no matter
+            self.fields["types"] = np.array(["O", "H", "Si"])[kinds] if kinds[0] else kinds
+        if self.rng.integers(2):
+            exact = self.rng.normal(size=len(self.x)) * 10.0 ** self.rng.integers(-20, 4)
+            self.fields["weights"] = exact  # sums of their products are rounded once
 
     def _radii(self):
         rng, n = self.rng, len(self.x)
@@ -356,6 +494,9 @@ class Scene:
                 (names[a].item(), names[b].item()): float(table[a, b])
                 for a in range(kinds) for b in range(a, kinds) if a == 0 or rng.integers(4)
             }  # fmt: skip
+            if rng.integers(2):  # the only type that some of the others have a cutoff with
+                self.cutoff[names[0].item(), "*"] = float(table[0, 0])
+                self.cutoff["*", "*"] = float(table.max())
         self.fields["types"] = types
 
     def _supports(self):
@@ -409,4 +550,6 @@ class Scene:
         points = self.part(slice(self.n), **box)
         found = check(points, self.cutoff, **self.options)
         queries = self.part(slice(self.n, None))
+        if self.unit < 1e30 and self.n % 2:
+            queries = queries.replace(positions=queries.positions.astype(np.float32))
         return len(found) + len(check(points, self.cutoff, queries, **self.options))
