@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Drop-ins against the functions that they stand in for, by the same calls.
 
-    python benchmarks/drop_ins.py [--points 10000] [--turns 7] [--neighbours 50]
+    python benchmarks/drop_ins.py [--points 10000] [--turns 7] [--neighbours 50] [--queries 1 100]
 
 Points are uniform in a periodic cube. The calls take turns, and results are dropped at once. Owners
-that are not installed are left out.
+that are not installed are left out. With --queries trees that are there already answer so many of
+them, in many turns, of which the shortest counts.
 """
 
 from __future__ import annotations
@@ -112,6 +113,35 @@ CALLS: dict[str, tuple[str, str, Callable[[Any, Scene], int]]] = {
 }  # fmt: skip
 
 
+#: Searches of a tree that has been made, for the points of a scene and its cutoff.
+KEPT: dict[str, Callable[[Any, Scene], int]] = {
+    "KDTree.query, k=1": lambda tree, scene: len(tree.query(scene.points)[0]),
+    "KDTree.query, k=8": lambda tree, scene: len(tree.query(scene.points, 8)[0]),
+    "KDTree.query_ball_point": lambda tree, scene: sum(
+        map(len, tree.query_ball_point(scene.points, scene.cutoff))
+    ),
+}  # fmt: skip
+
+
+def _few_queries(scene: Scene, numbers: Sequence[int], turns: int) -> bool:
+    """Print a row for each search of kept trees and each number of queries; whether any differ."""
+    from scipy import spatial
+
+    from halfshell.compat import scipy as ours
+
+    trees = [module.KDTree(scene.points, boxsize=scene.edge) for module in (ours, spatial)]
+    rng, different = np.random.default_rng(1), False
+    for n in numbers:
+        asking = scene._replace(points=rng.random((n, 3)) * scene.edge)
+        for name, search in KEPT.items():
+            seconds, counts = _times(search, trees, asking, turns * max(1, 1000 // n))
+            mine, others = (1e6 * min(one) for one in seconds)
+            ratio = f"{mine:9.1f} us, owner {others:9.1f} us: {others / mine:.1f} times"
+            print(f"{n} queries of {name:24} {ratio}")
+            different |= counts[0] != counts[1]
+    return different
+
+
 def _times(call: Any, modules: Sequence[Any], scene: Scene, turns: int) -> tuple[Any, Any]:
     """Seconds of each turn, and the number of entries, of each module."""
     seconds: list[list[float]] = [[] for _ in modules]
@@ -130,10 +160,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--points", type=int, default=10_000)
     parser.add_argument("--neighbours", type=float, default=50.0, help="of a point, on average")
     parser.add_argument("--turns", type=int, default=7)
+    parser.add_argument("--queries", type=int, nargs="+", help="of trees that are there already")
     options = parser.parse_args(arguments)
     n, cutoff = options.points, 5.0
     edge = cutoff * (n * 4.0 / 3.0 * np.pi / options.neighbours) ** (1.0 / 3.0)
     scene = Scene(np.random.default_rng(0).random((n, 3)) * edge, edge, cutoff)
+    if options.queries:
+        return int(_few_queries(scene, options.queries, options.turns))
     different = False
     print(f"{n} points, about {options.neighbours:g} neighbours each, {options.turns} turns")
     for name, (drop_in, owner, call) in CALLS.items():

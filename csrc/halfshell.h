@@ -179,7 +179,7 @@ typedef enum hs_purpose {
     HS_FOR_DISTANCES,  /* d */
     HS_FOR_VECTORS,    /* D */
     HS_FOR_SHIFTS,     /* S */
-    HS_FOR_SORTING,    /* scratch of sort=true */
+    HS_FOR_SORTING,    /* scratch of rows and of sort=true */
     HS_FOR_SUPPORTS,   /* supports of points, as they are read and as kernels read them */
     HS_PURPOSE_END
 } hs_purpose;
@@ -241,7 +241,8 @@ typedef struct hs_options {
     const hs_pair_arrays *out; /* borrowed: where to write all that is wanted; NULL: new arrays */
     const char           *kernel;  /* borrowed; NULL: the best of this CPU */
     int                   threads; /* at most so many, 0 as 1, where the work is worth them, and
-                                  HS_MOST_THREADS; -n: n from HS_POINTS_FOR_THREADS on, else 1 */
+                                  HS_MOST_THREADS; -n: n from HS_POINTS_FOR_THREADS on, else 1,
+                                  where kept points are not counted, but the work of queries */
     double        memory_limit;    /* bytes that result and search may take; infinity: no limit */
     hs_limit_fn   find_limit;      /* NULL, or called for a further limit beyond 64 MB */
     void         *find_context;
@@ -338,12 +339,12 @@ typedef struct hs_each_system {
  * the first hs_nearest_find builds a tree of the points, which stays with the cells and is not
  * counted as memory of the call.
  *
- * Several systems are for hs_pairs_find, hs_pairs_count, hs_neighbors_*, hs_nearest_find and
- * hs_pairs_histogram, and not for cells: they are searched one after the other, and the result is
- * that of so many calls, one behind the other, with numbers among all points and queries. Threads
- * share the systems out. A failure names the point among all, and the system where that says more;
- * failure.system is also where `first` descends. options->counters: bytes_peak is the sum of what
- * each thread held at most.
+ * Several systems are for all searches but hs_stream_open and hs_plan_make, and not for cells: they
+ * are searched one after the other, and the result is that of so many calls, one behind the other,
+ * with numbers among all points and queries; so are clusters. Threads share the systems out. A
+ * failure names the point among all, and the system where that says more; failure.system is also
+ * where `first` descends. options->counters: bytes_peak is the sum of what each thread held at
+ * most.
  */
 typedef struct hs_among {
     const hs_set         *points;

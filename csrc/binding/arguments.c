@@ -137,6 +137,56 @@ hs_box_of(PyObject *object, unsigned long repeats, int ndim, hs_box *box, bool *
 
 /* ---- numbers and sequences ---------------------------------------------------------------- */
 
+bool
+hs_whole_of(PyObject *object, const char *must, double *value)
+{
+    if (PyBool_Check(object)) {
+        hs_refuse(PyExc_TypeError, must, object);
+        return false;
+    }
+    PyObject *index = PyNumber_Index(object);
+    if (index == NULL) {
+        return hs_refuse_kind(must, object);
+    }
+    int             overflow;
+    const long long whole = PyLong_AsLongLongAndOverflow(index, &overflow);
+    *value = (double)whole;
+    if (overflow != 0) {
+        *value = PyLong_AsDouble(index);
+        if (PyErr_Occurred()) { /* an OverflowError: there is no other reason */
+            PyErr_Clear();
+            *value = overflow * (double)INFINITY;
+        }
+    }
+    Py_DECREF(index);
+    return true;
+}
+
+bool
+hs_real_of(PyObject *object, const char *must, double *value)
+{
+    if (PyFloat_Check(object)) {
+        *value = PyFloat_AS_DOUBLE(object);
+        return true;
+    }
+    if (sizeof(npy_longdouble) > sizeof(double) && PyArray_IsScalar(object, LongDouble)) {
+        hs_refuse(PyExc_TypeError, must, object); /* it would be rounded */
+        return false;
+    }
+    if (PyArray_IsScalar(object, Floating)) {
+        *value = PyFloat_AsDouble(object);
+        return PyErr_Occurred() ? hs_refuse_kind(must, object) : true;
+    }
+    if (!hs_whole_of(object, must, value)) {
+        return false;
+    }
+    if (isinf(*value)) {
+        PyErr_Format(PyExc_OverflowError, "%s, got one that is too large for float64", must);
+        return false;
+    }
+    return true;
+}
+
 /* A float or a small integer, of Python itself or NumPy's float64. */
 static bool
 number_of(PyObject *object, double *value)
@@ -158,7 +208,7 @@ number_of(PyObject *object, double *value)
     return false;
 }
 
-/* The same, or another number of NumPy. */
+/* A number as above, or another one of NumPy. */
 static bool
 scalar_of(PyObject *object, double *value)
 {
@@ -624,8 +674,8 @@ take_threads(PyObject *object, hs_options *options)
     return true;
 }
 
-/* A length; where users give an infinite one as cutoff, a finite one is found that holds all pairs.
- * Of the core also an array of one for each system. */
+/* A length. An infinite cutoff of users is left to Python, which finds a finite one that holds all
+ * pairs. The Python layer may also give an array of one for each system, see take_systems. */
 static bool
 take_cutoff(hs_py_call *call, PyObject *object, bool is_largest)
 {
@@ -664,7 +714,7 @@ type_of_index(PyObject *object)
                                                                                : NPY_NOTYPE;
 }
 
-/* The same, or of the core bytes. */
+/* One of these; or, from the Python layer, the bytes of an index. */
 static bool
 take_index(hs_py_call *call, PyObject *object)
 {
@@ -839,7 +889,7 @@ take_selection(PyObject *const *of, hs_py_call *call)
     return true;
 }
 
-/* None, or a tuple of these seven. */
+/* A tuple of these seven. */
 static bool
 take_pairing(PyObject *object, hs_py_call *call)
 {
@@ -890,7 +940,7 @@ bool
 hs_py_call_scene(hs_py_call *call, PyObject *points, PyObject *box, PyObject *periodic)
 {
     call->among.points = &call->points;
-    call->among.cells = call->is_of_users ? NULL : hs_cells_of(points);
+    call->among.cells = hs_cells_of(points);
     if (call->among.cells != NULL) {
         call->positions = points;
         hs_cells_points(call->among.cells, &call->points.at);

@@ -65,15 +65,15 @@ typedef struct hs_py_call {
     int            n_made;
 } hs_py_call;
 
-/* Takes the arguments of its function, see interface.h, and room for a capacity. hs_py_call_end()
- * must follow, whatever comes of it. False with an exception set, or without one: only Python can
- * tell what to do with an argument, or what is wrong with it. */
-bool hs_py_call_take(hs_py_call *call, Py_ssize_t n_arguments);
-
-/* Calls with no arguments taken, for those that take some of them themselves. */
+/* A call of which no argument is taken yet. */
 void hs_py_call_begin(hs_py_call *call, PyObject *module, bool is_of_users);
 
-/* The same of points, box and axes that repeat. */
+/* Takes the arguments of its function, see interface.h, and makes room for a capacity. False with
+ * an exception set, or without one where only Python can tell what to do with an argument, or what
+ * is wrong with it. In either case hs_py_call_end() must follow. */
+bool hs_py_call_take(hs_py_call *call, Py_ssize_t n_arguments);
+
+/* Takes points, box and axes that repeat, and nothing else, in the same way. */
 bool hs_py_call_scene(hs_py_call *call, PyObject *points, PyObject *box, PyObject *periodic);
 
 /* The exception for a status other than HS_OK; NULL. */
@@ -104,6 +104,13 @@ int64_t hs_length_of(PyObject *object);
 /* n numbers of a list, tuple or array of so many, whose conversion runs no code of others and loses
  * nothing; false, without an exception unless memory was refused, for all else. */
 bool hs_numbers_of(PyObject *object, npy_intp n, double *values);
+
+/* An integer, or what has __index__; no bool. Infinite where float64 does not hold it. */
+bool hs_whole_of(PyObject *object, const char *must, double *value);
+
+/* A float, also one of NumPy's, or an integer as above; OverflowError where float64 does not hold
+ * it. */
+bool hs_real_of(PyObject *object, const char *must, double *value);
 
 /* A native float32 or float64 array of shape (n, d), 1 <= d <= 8. The view borrows from it. `name`
  * is that of the argument, for messages. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* errors.c: a function for each status. Messages say what was wrong, the value, and what is
- * allowed. */
+/* errors.c: an exception for each status, by a table of words or by a function where more is to be
+ * said. Messages say what was wrong, the value, and what is allowed. */
 #include "errors.h"
 
 #include "system.h"
@@ -293,7 +293,7 @@ raise_interrupted(const hs_failure *failure)
     return NULL;
 }
 
-/* Those that say more, by status. */
+/* By status: those of which a message says more than WORDS has. */
 static PyObject *(*const RAISE[])(const hs_failure *) = {
     [HS_ERR_MEMORY] = raise_memory,           [HS_ERR_BOX_DEPENDENT] = raise_dependent,
     [HS_ERR_BOX_SKEWED] = raise_skewed,       [HS_ERR_TOO_MANY] = raise_too_many,
@@ -402,56 +402,6 @@ hs_refuse_kind(const char *must, PyObject *object)
         set_cause(fault);
     }
     return false;
-}
-
-bool
-hs_whole_of(PyObject *object, const char *must, double *value)
-{
-    if (PyBool_Check(object)) {
-        hs_refuse(PyExc_TypeError, must, object);
-        return false;
-    }
-    PyObject *index = PyNumber_Index(object);
-    if (index == NULL) {
-        return hs_refuse_kind(must, object);
-    }
-    int             overflow;
-    const long long whole = PyLong_AsLongLongAndOverflow(index, &overflow);
-    *value = (double)whole;
-    if (overflow != 0) {
-        *value = PyLong_AsDouble(index);
-        if (PyErr_Occurred()) { /* an OverflowError: there is no other reason */
-            PyErr_Clear();
-            *value = overflow * (double)INFINITY;
-        }
-    }
-    Py_DECREF(index);
-    return true;
-}
-
-bool
-hs_real_of(PyObject *object, const char *must, double *value)
-{
-    if (PyFloat_Check(object)) {
-        *value = PyFloat_AS_DOUBLE(object);
-        return true;
-    }
-    if (sizeof(npy_longdouble) > sizeof(double) && PyArray_IsScalar(object, LongDouble)) {
-        hs_refuse(PyExc_TypeError, must, object); /* it would be rounded */
-        return false;
-    }
-    if (PyArray_IsScalar(object, Floating)) {
-        *value = PyFloat_AsDouble(object);
-        return PyErr_Occurred() ? hs_refuse_kind(must, object) : true;
-    }
-    if (!hs_whole_of(object, must, value)) {
-        return false;
-    }
-    if (isinf(*value)) {
-        PyErr_Format(PyExc_OverflowError, "%s, got one that is too large for float64", must);
-        return false;
-    }
-    return true;
 }
 
 void

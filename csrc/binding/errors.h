@@ -35,6 +35,7 @@ const char *hs_format_bytes(double bytes, char *text, size_t size);
 /* What may be taken: "1.5 GB are allowed", or where nothing but the system sets a limit, "the
  * system has no more". */
 const char *hs_format_limit(double bytes, char *text, size_t size);
+
 /* Raises `type`: "<must>, got <repr>", the repr on one line and cut short, or the type
  * where there is none. */
 void hs_refuse(PyObject *type, const char *must, PyObject *object);
@@ -42,12 +43,6 @@ void hs_refuse(PyObject *type, const char *must, PyObject *object);
 /* Replaces what a conversion raised by a TypeError that says what the object must be; false. */
 bool hs_refuse_kind(const char *must, PyObject *object);
 
-/* An integer, or what has __index__; no bool. Infinite where float64 does not hold it. */
-bool hs_whole_of(PyObject *object, const char *must, double *value);
-
-/* A float, also one of NumPy's, or an integer as above; OverflowError where float64 does not hold
- * it. */
-bool hs_real_of(PyObject *object, const char *must, double *value);
 /* Puts entry k into the tuple and gives it up; where it is NULL, the tuple is given up instead, and
  * *tuple is NULL. */
 void hs_tuple_put(PyObject **tuple, Py_ssize_t k, PyObject *entry);

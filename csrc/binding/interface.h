@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * The table of the interface: what each function that searches takes, said once. By it arguments.h
- * reads the arguments of a call, quick.h makes the functions, and tests/core_stub.py writes the
- * stub.
+ * The table of the interface: what each function that searches takes. By it arguments.h reads the
+ * arguments of a call, quick.h makes the functions, and tests/core_stub.py writes the stub.
  *
  * The Python layer gives a set of points, and queries, as an array or as a tuple (positions, radii,
  * supports, types, weights, groups, labels, numbers of systems), of which all but the first may be
@@ -87,7 +86,8 @@ typedef struct hs_function {
 
 extern const hs_argument HS_EVERY_SEARCH[HS_CALL_ARGUMENTS], HS_MAX_DISTANCE;
 
-/* What users give and the core does not take as it is: radii, types and choices become one. */
+/* What users give and only the Python layer converts: where one of these is not its usual value, C
+ * leaves the call to Python. */
 extern const hs_argument HS_ONLY_PYTHON[];
 
 /* The argument at this place in the order of the core; NULL behind the last. */

@@ -33,10 +33,10 @@ bool hs_out_make_room(hs_py_call *call);
 
 /* What a function returns, the GIL taken: arrays of the pairs, which are freed, or those of `out`,
  * or with a capacity all of its room, padded; NULL with an exception set for a status other than
- * HS_OK. The call has ended. */
+ * HS_OK. */
 PyObject *hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs);
 
-/* The same, as a table of rows. */
+/* What a function returns as a table: the rows, which are freed; as above. */
 PyObject *hs_py_call_table(hs_py_call *call, hs_status status, hs_pairs *rows);
 
 /* An array with a copy of what is there; a new reference or NULL. */

@@ -228,11 +228,10 @@ hs_py_verlet_look(PyObject *module, PyObject *capsule)
         return NULL;
     }
     const hs_verlet_state state = hs_verlet_look(list);
-    return Py_BuildValue("{s:O,s:i,s:L,s:L,s:d,s:d,s:d,s:d}", "has_list",
+    return Py_BuildValue("{s:O,s:i,s:L,s:L,s:d,s:d}", "has_list",
                          state.has_list ? Py_True : Py_False, "ndim", state.ndim, "n_points",
-                         (long long)state.n_points, "n_listed", (long long)state.n_listed, "cutoff",
-                         state.cutoff, "radius", state.radius, "margin", state.margin, "tried",
-                         state.tried);
+                         (long long)state.n_points, "n_listed", (long long)state.n_listed, "margin",
+                         state.margin, "tried", state.tried);
 }
 
 /* ---- boxes -------------------------------------------------------------------------------- */

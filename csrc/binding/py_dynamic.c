@@ -23,52 +23,65 @@ typedef struct py_dynamic {
     double      max_radius;
 } py_dynamic;
 
-static const hs_dynamic_hooks hooks;
-static bool                   is_to_be_made_again(hs_status status);
+/* Whether a query ended for a signal, whose handler has returned. Else the status stays, with an
+ * exception where that is HS_ERR_INTERRUPTED. */
+static bool
+is_to_be_made_again(hs_status status)
+{
+    return status == HS_ERR_INTERRUPTED && PyErr_CheckSignals() == 0;
+}
+
+/* An exception that says which argument it is about, "key" or "skip"; without `error`, one that
+ * the present one caused. Returns false. */
+static bool
+refuse_key(PyObject *error, const char *name, const char *must, PyObject *object)
+{
+    char text[64];
+    PyOS_snprintf(text, sizeof text, must, name);
+    if (error == NULL) {
+        return hs_refuse_kind(text, object);
+    }
+    hs_refuse(error, text, object);
+    return false;
+}
 
 static bool
-integer_of(PyObject *object, const char *must, long long *value)
+integer_of(PyObject *object, const char *name, const char *must, long long *value)
 {
     int overflow = 0;
     if (!PyLong_CheckExact(object) &&
         (PyBool_Check(object) || !PyIndex_Check(object) || PyArray_Check(object))) {
-        hs_refuse(PyExc_TypeError, must, object);
-        return false;
+        return refuse_key(PyExc_TypeError, name, must, object);
     }
     PyObject *index = PyNumber_Index(object);
     if (index == NULL) {
-        return hs_refuse_kind(must, object);
+        return refuse_key(NULL, name, must, object);
     }
     *value = PyLong_AsLongLongAndOverflow(index, &overflow);
     Py_DECREF(index);
-    if (overflow != 0) {
-        hs_refuse(PyExc_OverflowError, "key must fit int64", object);
-    }
-    return overflow == 0;
+    return overflow == 0 || refuse_key(PyExc_OverflowError, name, "%s must fit int64", object);
 }
 
 /* False with an exception set. */
 static bool
-key_of(const py_dynamic *self, PyObject *object, hs_key *key)
+key_of(const py_dynamic *self, PyObject *object, const char *name, hs_key *key)
 {
     long long id = 0, tag = 0;
     if (!self->tagged) {
-        if (!integer_of(object, "key must be an integer", &id)) {
+        if (!integer_of(object, name, "%s must be an integer", &id)) {
             return false;
         }
     } else {
-        const char *must = "key must be a tuple (tag, integer) of integers";
+        const char *must = "%s must be a tuple (tag, integer) of integers";
         if (!PyTuple_Check(object) || PyTuple_GET_SIZE(object) != 2) {
-            hs_refuse(PyExc_TypeError, must, object);
-            return false;
+            return refuse_key(PyExc_TypeError, name, must, object);
         }
-        if (!integer_of(PyTuple_GET_ITEM(object, 0), must, &tag) ||
-            !integer_of(PyTuple_GET_ITEM(object, 1), must, &id)) {
+        if (!integer_of(PyTuple_GET_ITEM(object, 0), name, must, &tag) ||
+            !integer_of(PyTuple_GET_ITEM(object, 1), name, must, &id)) {
             return false;
         }
         if (tag < INT32_MIN || tag > INT32_MAX) {
-            hs_refuse(PyExc_OverflowError, "the tag of a key must fit int32", object);
-            return false;
+            return refuse_key(PyExc_OverflowError, name, "the tag of %s must fit int32", object);
         }
     }
     *key = (hs_key){.id = id, .tag = (int32_t)tag};
@@ -401,14 +414,6 @@ take_gil(void *thread)
 /* For queries that take long, and changes that wait for them: Ctrl-C, and the GIL. */
 static const hs_dynamic_hooks hooks = {poll_signals, give_up_gil, take_gil};
 
-/* Whether a query ended for a signal, whose handler has returned. Else the status stays, with an
- * exception where that is HS_ERR_INTERRUPTED. */
-static bool
-is_to_be_made_again(hs_status status)
-{
-    return status == HS_ERR_INTERRUPTED && PyErr_CheckSignals() == 0;
-}
-
 static bool
 grow(gathered *found)
 {
@@ -592,7 +597,7 @@ put(PyObject *object, PyObject *const *arguments, Py_ssize_t n, put_fn *put_in)
     double            position[HS_MAX_DIM];
     hs_key            key;
     hs_failure        failure;
-    if (!hs_expect_arguments("insert or move", n, 2) || !key_of(self, arguments[0], &key)) {
+    if (!hs_expect_arguments("insert or move", n, 2) || !key_of(self, arguments[0], "key", &key)) {
         return NULL;
     }
     const bool has_position = arguments[1] != Py_None;
@@ -628,21 +633,10 @@ remove_key(PyObject *object, PyObject *argument)
 {
     const py_dynamic *self = (const py_dynamic *)object;
     hs_key            key;
-    if (!key_of(self, argument, &key)) {
+    if (!key_of(self, argument, "key", &key)) {
         return NULL;
     }
     return PyBool_FromLong(hs_dynamic_remove(self->list, key));
-}
-
-static PyObject *
-has(PyObject *object, PyObject *argument)
-{
-    const py_dynamic *self = (const py_dynamic *)object;
-    hs_key            key;
-    if (!key_of(self, argument, &key)) {
-        return NULL;
-    }
-    return PyBool_FromLong(hs_dynamic_has(self->list, key));
 }
 
 static PyObject *
@@ -652,7 +646,7 @@ position_of_key(PyObject *object, PyObject *argument)
     double            position[HS_MAX_DIM];
     npy_intp          shape = self->ndim;
     hs_key            key;
-    if (!key_of(self, argument, &key)) {
+    if (!key_of(self, argument, "key", &key)) {
         return NULL;
     }
     const hs_status status = hs_dynamic_position(self->list, key, position);
@@ -668,7 +662,7 @@ cell_of_key(PyObject *object, PyObject *argument)
     const py_dynamic *self = (const py_dynamic *)object;
     int64_t           cell[HS_MAX_DIM];
     hs_key            key;
-    if (!key_of(self, argument, &key)) {
+    if (!key_of(self, argument, "key", &key)) {
         return NULL;
     }
     const hs_status status = hs_dynamic_cell(self->list, key, cell);
@@ -702,7 +696,7 @@ any_within(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
     bool              any = false;
     if (!hs_expect_arguments("any_within", n, 3) ||
         !hs_real_of(arguments[1], "radius must be a number", &radius) ||
-        (arguments[2] != Py_None && !key_of(self, arguments[2], &skip)) ||
+        (arguments[2] != Py_None && !key_of(self, arguments[2], "skip", &skip)) ||
         !position_of(self, arguments[0], position)) {
         return NULL;
     }
@@ -772,10 +766,7 @@ look(PyObject *object, PyObject *ignored)
 {
     const hs_dynamic_state state = hs_dynamic_look(((py_dynamic *)object)->list);
     (void)ignored;
-    return Py_BuildValue("{s:L,s:L,s:L,s:L,s:L,s:L,s:d,s:N}", "n_points", (long long)state.n_points,
-                         "n_without", (long long)state.n_without, "n_cells",
-                         (long long)state.n_cells, "n_empty", (long long)state.n_empty, "bytes",
-                         (long long)state.bytes, "changes", (long long)state.changes, "max_radius",
+    return Py_BuildValue("{s:L,s:d,s:N}", "bytes", (long long)state.bytes, "max_radius",
                          state.max_radius, "cell_size",
                          hs_tuple_of_reals(state.cell_size, state.ndim));
 }
@@ -798,7 +789,7 @@ contains(PyObject *object, PyObject *argument)
 {
     const py_dynamic *self = (const py_dynamic *)object;
     hs_key            key;
-    return key_of(self, argument, &key) ? hs_dynamic_has(self->list, key) : -1;
+    return key_of(self, argument, "key", &key) ? hs_dynamic_has(self->list, key) : -1;
 }
 
 static int
@@ -827,7 +818,6 @@ static PyMethodDef methods[] = {
     {"insert", FASTCALL(insert), METH_FASTCALL, NULL},
     {"move", FASTCALL(move), METH_FASTCALL, NULL},
     {"remove", remove_key, METH_O, NULL},
-    {"has", has, METH_O, NULL},
     {"position", position_of_key, METH_O, NULL},
     {"cell", cell_of_key, METH_O, NULL},
     {"cell_of", cell_of_position, METH_O, NULL},
@@ -900,8 +890,7 @@ hs_py_dynamic_new(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     hs_box             box;
     unsigned long      repeats;
     bool               given;
-    if (n_arguments != 9) {
-        PyErr_SetString(PyExc_TypeError, "dynamic_new takes 9 arguments");
+    if (!hs_expect_arguments("dynamic_new", n_arguments, 9)) {
         return NULL;
     }
     options.ndim = (int)PyLong_AsLong(arguments[0]);

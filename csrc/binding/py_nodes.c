@@ -14,28 +14,20 @@
 /* The bits of `flags`. */
 enum { GHOST_ROWS = 1, GHOST_PAIRS = 2, ROWS_ONLY = 4, DIRECTED = 8 };
 
+#define MUST "expected arrays of the types and lengths of node lists"
+
 /* The entries of a C-contiguous array of this type with n entries, or with any number where n is
  * -1; *length, unless NULL, is that number. NULL with an exception set. */
 static const void *
 entries_of(PyObject *object, int type, int64_t n, int64_t *length)
 {
-    PyArrayObject *array = (PyArrayObject *)object;
-    if (!hs_is_array(object, type, 1) || (n >= 0 && PyArray_DIM(array, 0) != n)) {
-        PyErr_SetString(PyExc_TypeError, "expected arrays of the types and lengths of node lists");
-        return NULL;
+    const void *entries = NULL;
+    if (object == Py_None) {
+        PyErr_SetString(PyExc_TypeError, MUST);
+    } else if (hs_entries_of(object, type, 1, n, 0, MUST, &entries) && length != NULL) {
+        *length = hs_length_of(object);
     }
-    if (length != NULL) {
-        *length = PyArray_DIM(array, 0);
-    }
-    return PyArray_DATA(array);
-}
-
-/* The same of an array or None: false with an exception set. */
-static bool
-entries_or_none(PyObject *object, int type, int64_t n, const void **entries)
-{
-    *entries = object != Py_None ? entries_of(object, type, n, NULL) : NULL;
-    return object == Py_None || *entries != NULL;
+    return entries;
 }
 
 /* Shifts of n entries, or NULL and 1 dimension for None. */
@@ -110,7 +102,7 @@ take_lists(PyObject *const *arguments, const hs_py_call *call, hs_node_lists *li
     lists->n_lists = (int32_t)n_lists;
     lists->n_ghosts = entries_of(arguments[1], NPY_INT64, n_lists, NULL);
     if (lists->n_ghosts == NULL ||
-        !entries_or_none(arguments[2], NPY_INT32, call->points.at.n, &number)) {
+        !hs_entries_of(arguments[2], NPY_INT32, 1, call->points.at.n, 0, MUST, &number)) {
         return false;
     }
     lists->number = number;
@@ -348,7 +340,7 @@ take_change(PyObject *n_nodes, PyObject *target, PyObject *places, hs_node_chang
     *change = (hs_node_change){.n_lists = 0};
     change->n_nodes = entries_of(n_nodes, NPY_INT64, -1, &n_lists);
     change->target = change->n_nodes != NULL ? entries_of(target, NPY_INT32, -1, &n) : NULL;
-    if (change->target == NULL || !entries_or_none(places, NPY_INT32, n, &place)) {
+    if (change->target == NULL || !hs_entries_of(places, NPY_INT32, 1, n, 0, MUST, &place)) {
         return false;
     }
     for (int64_t l = 0; l < n_lists; l++) {

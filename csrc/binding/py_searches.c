@@ -301,16 +301,14 @@ plan_as_dict(const hs_plan *plan)
 {
     const int d = plan->ndim;
     return Py_BuildValue(
-        "{sisisNsNsNsssLsLsNsNsNsNsNsNsLsdsiss}", "ndim", d, "n_periodic", plan->n_periodic,
-        "aligned", PyBool_FromLong(plan->aligned), "reduced", PyBool_FromLong(plan->reduced),
-        "keeps_originals", PyBool_FromLong(plan->keeps_originals), "algorithm",
-        hs_algorithm_names[plan->algorithm], "n_searches", (long long)plan->n_searches, "n_cells",
-        (long long)plan->n_cells, "all_pairs", PyBool_FromLong(plan->all_pairs), "sparse",
-        PyBool_FromLong(plan->sparse), "shape", hs_tuple_of_integers(plan->shape, d), "cell_sizes",
-        hs_tuple_of_reals(plan->cell_size, d), "reach", hs_tuple_of_integers(plan->reach, d),
-        "images", hs_tuple_of_integers(plan->images, d), "stencil_rows",
-        (long long)plan->stencil_rows, "expected_pairs", plan->expected_pairs, "threads",
-        plan->threads, "kernel", plan->kernel);
+        "{sisisNsNsssLsLsNsNsNsNsNsLsdsiss}", "ndim", d, "n_periodic", plan->n_periodic, "aligned",
+        PyBool_FromLong(plan->aligned), "keeps_originals", PyBool_FromLong(plan->keeps_originals),
+        "algorithm", hs_algorithm_names[plan->algorithm], "n_searches", (long long)plan->n_searches,
+        "n_cells", (long long)plan->n_cells, "all_pairs", PyBool_FromLong(plan->all_pairs),
+        "sparse", PyBool_FromLong(plan->sparse), "shape", hs_tuple_of_integers(plan->shape, d),
+        "cell_sizes", hs_tuple_of_reals(plan->cell_size, d), "images",
+        hs_tuple_of_integers(plan->images, d), "stencil_rows", (long long)plan->stencil_rows,
+        "expected_pairs", plan->expected_pairs, "threads", plan->threads, "kernel", plan->kernel);
 }
 
 /* The bytes that a search took, by purpose; a new dictionary, or NULL. */

@@ -196,7 +196,7 @@ hs_py_iter_pairs(hs_py_call *call)
     self->call.points.at.data = NULL;
     self->call.options.kernel = NULL;
     self->call.options.poll_context = &self->call;
-    strcpy(self->letters, call->letters); /* six different ones at most */
+    strcpy(self->letters, call->letters); /* seven different ones at most */
     self->call.letters = self->letters;
     self->progress = Py_XNewRef(call->progress);
     self->cells = call->among.cells != NULL ? Py_NewRef(call->positions) : NULL;

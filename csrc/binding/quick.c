@@ -103,8 +103,29 @@ place(const quick_row *row, PyObject *arguments, PyObject *options, PyObject **g
     for (int k = 0; are_placed && k < row->n_core; k++) {
         are_placed = given[k] != NULL;
     }
-    /* A cutoff that is left out is by radii, or refused. */
-    return are_placed && given[1] != Py_None;
+    return are_placed;
+}
+
+/* In place of a CellList of points that know nothing more than where they are, what the core has of
+ * it, and its own cutoff and threads where others are left out. All are borrowed from it. */
+static bool
+open_cells(const quick_row *row, PyObject *module, PyObject **given)
+{
+    PyObject **known = PyModule_GetState(module), **threads = &given[row->settings[N_SETTINGS - 1]];
+    if (known[HS_CELLS_TYPE] != (PyObject *)Py_TYPE(given[0])) {
+        return true;
+    }
+    PyObject  *plain = PyObject_GetAttrString(given[0], "_plain");
+    const bool is_plain = plain != NULL && PyTuple_Check(plain) && PyTuple_GET_SIZE(plain) == 3 &&
+                          given[2] == Py_None && given[3] == Py_None;
+    if (is_plain) {
+        given[0] = PyTuple_GET_ITEM(plain, 0);
+        given[1] = given[1] == Py_None ? PyTuple_GET_ITEM(plain, 1) : given[1];
+        *threads = *threads == Py_None ? PyTuple_GET_ITEM(plain, 2) : *threads;
+    }
+    Py_XDECREF(plain);
+    PyErr_Clear();
+    return is_plain;
 }
 
 /* What is set around this call, a tuple that halfshell.settings has checked: kernel, algorithm,
@@ -141,7 +162,9 @@ attempt(PyObject *self, PyObject *const *arguments, Py_ssize_t n_arguments)
         PyErr_SetString(PyExc_TypeError, "expected a tuple and a dict of arguments");
         return NULL;
     }
-    if (!place(row, arguments[0], arguments[1], given)) {
+    /* A cutoff that is still left out is by radii, or refused. */
+    if (!place(row, arguments[0], arguments[1], given) ||
+        !open_cells(row, PyTuple_GET_ITEM(self, 0), given) || given[1] == Py_None) {
         return Py_NewRef(Py_NotImplemented);
     }
     PyObject *set = take_settings(row, PyTuple_GET_ITEM(self, 0), given);
@@ -404,7 +427,10 @@ hs_py_know(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
     static const struct {
         const char *name;
         int         place;
-    } things[] = {{"Box", HS_BOX_TYPE}, {"Points", HS_POINTS_TYPE}, {"settings", HS_SETTINGS}};
+    } things[] = {{"Box", HS_BOX_TYPE},
+                  {"Points", HS_POINTS_TYPE},
+                  {"CellList", HS_CELLS_TYPE},
+                  {"settings", HS_SETTINGS}};
     PyObject **known = PyModule_GetState(module);
     if (!hs_expect_arguments("know", n_arguments, 2)) {
         return NULL;
@@ -423,6 +449,7 @@ hs_py_know(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
         Py_XSETREF(known[things[k].place], Py_NewRef(arguments[1]));
         Py_RETURN_NONE;
     }
-    PyErr_SetString(PyExc_ValueError, "know takes \"Box\", \"Points\" or \"settings\"");
+    PyErr_SetString(PyExc_ValueError,
+                    "know takes \"Box\", \"Points\", \"CellList\" or \"settings\"");
     return NULL;
 }

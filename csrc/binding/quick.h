@@ -19,8 +19,8 @@ PyObject *hs_py_scene(PyObject *module, PyObject *const *arguments, Py_ssize_t n
 /* Adds the functions of the table; -1 with an exception set. */
 int hs_py_add_functions(PyObject *module);
 
-/* know(name, object): what is told apart from other objects here: "Box" and "Points", which are
- * types, and "settings", a context variable with its usual value. */
+/* know(name, object): makes an object of the Python layer known here: the types "Box" and "Points",
+ * and "settings", a context variable with its usual value. */
 PyObject *hs_py_know(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 
 /* table() -> the arguments of each function that users call, by its name: of each argument its

@@ -38,12 +38,17 @@ count_cores(void)
 #endif
 }
 
+static int
+most_threads(long cores)
+{
+    const long most = HS_THREADS_PER_CORE * (cores < 1 ? 1 : cores);
+    return most > MOST_USEFUL ? MOST_USEFUL : (int)most;
+}
+
 int
 hs_most_threads(void)
 {
-    const long cores = count_cores();
-    const long most = HS_THREADS_PER_CORE * (cores < 1 ? 1 : cores);
-    return most > MOST_USEFUL ? MOST_USEFUL : (int)most;
+    return most_threads(count_cores());
 }
 
 int
@@ -52,10 +57,11 @@ hs_default_threads(void)
     const char *text = getenv("OMP_NUM_THREADS");
     char       *end = NULL;
     long        n = text != NULL ? strtol(text, &end, 10) : 0;
+    const long  cores = count_cores();
     if (n < 1 || end == text) {
-        n = count_cores();
+        n = cores;
     }
-    const int most = hs_most_threads();
+    const int most = most_threads(cores);
     return n < 1 ? 1 : n > most ? most : (int)n;
 }
 

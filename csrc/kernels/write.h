@@ -31,7 +31,8 @@ struct hs_hits;
  */
 typedef struct hs_write {
     int  ndim;
-    bool is_half;    /* each pair once, the lower number first: others change sign */
+    bool is_half;    /* each pair once, the lower number first: others change sign; else the point
+                      * is i, whatever the candidate's number is */
     bool is_shifted; /* some shift may not be zero; with q needs metric->floats_usable */
     bool by_S;       /* the metric's shift is S */
     const hs_metric *metric;

@@ -223,8 +223,10 @@ HS_ALWAYS_INLINE void
 put_known(const hs_write *write, int64_t e, places point, bool in_order, const lanes *of,
           const int ndim)
 {
-    put_index(write->i, write->index_bytes, e, lower_place(of->number, point));
-    put_index(write->j, write->index_bytes, e, higher_place(of->number, point));
+    const bool is_half = write->is_half;
+    put_index(write->i, write->index_bytes, e, is_half ? lower_place(of->number, point) : point);
+    put_index(write->j, write->index_bytes, e,
+              is_half ? higher_place(of->number, point) : of->number);
     if (write->shift != NULL) {
         put_shifts(write, e, in_order, of, ndim);
     }

@@ -5,9 +5,10 @@
     neighbors(points, cutoff, ...)      both directions, as a table with a row for each point
     pairs_between(queries, points, cutoff, ...)         pairs of two sets
     nearest(points, k, ...)             the k nearest of each point
-    count_pairs, coordination, pair_histogram, rdf      numbers, of which no pair is stored
+    count_pairs, coordination, pair_histogram, rdf      numbers; no pair is stored
     clusters(points, cutoff, ...)       connected components, DBSCAN, percolation
-    iter_pairs, for_each_pair, trajectory_pairs, bricks more than memory holds, and many frames
+    iter_pairs, for_each_pair           more pairs than memory holds
+    trajectory_pairs, bricks            many frames; parts for other threads or machines
     verify(points, cutoff, i, j, ...)   check a list of pairs of any library
     explain, measure, bonded, plot_pairs
 
@@ -40,14 +41,12 @@ if TYPE_CHECKING:
     from halfshell._check.verify import Verdict, verify
     from halfshell._convert.memory import CacheInfo, cache_info, clear_cache, set_cache_limit
     from halfshell._convert.points import Points
-    from halfshell._functions.bonded import bonded
     from halfshell._functions.bricks import bricks
     from halfshell._functions.clusters import Clusters, clusters
     from halfshell._functions.counts import count_pairs, pair_histogram
     from halfshell._functions.explain import Explanation, explain
-    from halfshell._functions.measure import measure
+    from halfshell._functions.given_pairs import bonded, measure, plot_pairs
     from halfshell._functions.neighbors import coordination, nearest, neighbors
-    from halfshell._functions.plot_pairs import plot_pairs
     from halfshell._functions.rdf import RadialDistribution, rdf
     from halfshell._functions.trajectory import trajectory_pairs
     from halfshell._machine import get_include
@@ -116,14 +115,12 @@ _LATER = {
     "_check.verify": "Verdict verify",
     "_convert.memory": "CacheInfo cache_info clear_cache set_cache_limit",
     "_convert.points": "Points",
-    "_functions.bonded": "bonded",
     "_functions.bricks": "bricks",
     "_functions.clusters": "Clusters clusters",
     "_functions.counts": "count_pairs pair_histogram",
     "_functions.explain": "Explanation explain",
-    "_functions.measure": "measure",
+    "_functions.given_pairs": "bonded measure plot_pairs",
     "_functions.neighbors": "coordination nearest neighbors",
-    "_functions.plot_pairs": "plot_pairs",
     "_functions.rdf": "RadialDistribution rdf",
     "_functions.trajectory": "trajectory_pairs",
     "_machine": "get_include",

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any, TypeVar, cast
 
-#: What input is refused by; other errors keep their frames.
+#: Errors by which arguments are refused.
 REFUSALS = (TypeError, ValueError, OverflowError, MemoryError)
 
 Function = TypeVar("Function", bound="Callable[..., Any]")
@@ -65,9 +65,9 @@ class StaleError(RuntimeError):
 
 
 def shorten(error: BaseException) -> None:
-    """Drop the frames of an error in which input was looked at, before it is raised again.
+    """Drop the traceback of an error, before it is raised again, if all frames are of this package.
 
-    Where all are of this package: what a user's own code raises keeps them.
+    So a refused argument is shown where the user gave it. Errors of a user's own code keep theirs.
     """
     frame = error.__traceback__
     while frame is not None:
@@ -78,7 +78,7 @@ def shorten(error: BaseException) -> None:
 
 
 def brief(function: Function) -> Function:
-    """Decorate what looks at input, so that its errors have one frame of it."""
+    """Decorate a function that checks arguments: its refusals do not show the frames below it."""
 
     @wraps(function)
     def looked(*arguments: Any, **options: Any) -> Any:

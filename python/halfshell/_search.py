@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What all searches are decorated with: one description of each shared argument, calls with the
-usual arguments that go to C at once, and an answer to keywords that there are none of."""
+"""The decorators of searches.
+
+`search` lets C answer plain calls at once, and says of an unknown keyword which one may be meant.
+`document` puts the descriptions of shared arguments into docstrings.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ if TYPE_CHECKING:
 
 Function = TypeVar("Function", bound="Callable[..., Any]")
 
-#: Arguments that mean the same everywhere, as their docstrings have them, and what pictures are.
+#: Descriptions of arguments that mean the same everywhere, and of what functions that draw return.
 SHARED = {
     "points": """
     points : array_like of float, shape (n, d), or Points
@@ -134,11 +137,11 @@ def search(
 ) -> Callable[[Function], Function]:
     """Decorate a search: a function of points, cutoff and keywords.
 
-    name: what the table in C calls it (csrc/binding/interface.c). C then answers calls of which it
-    can convert all arguments (csrc/binding/arguments.c), by one attempt; other calls the function
-    answers. finish: makes the result of what C returns and of the arguments. like: one that
-    spells out the keywords that searches share, which this one takes as ``**search``, but for
-    those of `lacks`.
+    name: what the table in C calls it (csrc/binding/interface.c). C is tried first, and answers a
+    call if it can convert all arguments (csrc/binding/arguments.c); otherwise the function itself
+    does. finish: makes the result from what C returned and the arguments. like: the search whose
+    signature has the shared keywords that this one takes as ``**search``. lacks: those of them
+    that this one does not take.
     """
 
     def decorate(function: Function) -> Function:
@@ -177,9 +180,9 @@ def search(
 
 
 def spell_out(function: Callable[..., Any], names: Iterable[str], like: Callable[..., Any]) -> None:
-    """Let a signature have the keywords that a function takes as ``**search``, as `like` has them.
+    """Put the keywords that a function takes as ``**search`` into its signature, as in `like`.
 
-    They come behind `queries`, before what is the function's own; threads and progress at the end.
+    They come behind `queries` and before the function's own; threads and progress come last.
     """
     import inspect  # here, as it takes some milliseconds
 
@@ -192,9 +195,9 @@ def spell_out(function: Callable[..., Any], names: Iterable[str], like: Callable
 
 
 def document(function: Function, **changed: str) -> Function:
-    """Decorate what has shared arguments: their descriptions come where it has names in braces.
+    """Put the descriptions of shared arguments in place of their names in braces in a docstring.
 
-    changed: what some of them say there instead.
+    changed: other descriptions for some of them.
     """
     if not function.__doc__:
         return function

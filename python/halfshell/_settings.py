@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What few calls set, set around them: `settings`, which all searches read once at their start."""
+"""`settings`: what few calls change, set around them. All searches read it once, at their start."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from halfshell import _core
-from halfshell._convert.foreign import exact_number, is_a, kind_of, shown
+from halfshell._convert.foreign import exact_number, is_a, kind_of, shown, whole_number
 from halfshell._convert.options import as_choice
 from halfshell._search import search
 
@@ -154,8 +154,6 @@ def _as_threads(value: Any) -> int | None:
     must = "threads must be a whole number from 1 to 1024 or None"
     if value is None:
         return None
-    from halfshell._convert.foreign import whole_number
-
     number = None if is_a(value, bool) else whole_number(value, "threads")
     if number is None:
         raise TypeError(f"{must}, got {kind_of(value)}")

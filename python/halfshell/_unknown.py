@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a name or a keyword that there is none of is answered: the one that is meant, if any."""
+"""Answers to names and keywords that do not exist: which one may be meant."""
 
 from __future__ import annotations
 

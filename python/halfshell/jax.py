@@ -15,7 +15,7 @@ import numpy as np
 from halfshell import _show
 from halfshell._convert.foreign import shown
 from halfshell._errors import needs
-from halfshell._functions.directed import entries_of
+from halfshell._functions.neighbors import entries_of
 from halfshell._objects.box import Box
 
 try:

@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from halfshell._errors import needs
-from halfshell._functions.directed import check_rows, entries_between, entries_of
+from halfshell._convert.points import Points
+from halfshell._errors import CapacityError, needs
+from halfshell._functions.neighbors import entries_of
+from halfshell._functions.pairs import pairs_between
 from halfshell._objects.box import Box
 
 try:
@@ -298,7 +300,7 @@ def _find_neighbors(
 
 def _find_graph(x: Tensor, r: float, batch: Tensor | None, loop: bool, most: int | None) -> Tensor:
     i, j, _ = entries_of(_array(x), r, None, None, _array(batch), False, False)
-    check_rows(i, most)
+    _check_rows(i, most)
     if loop:
         own = np.arange(len(x))
         i, j = np.concatenate((i, own)), np.concatenate((j, own))
@@ -310,9 +312,30 @@ def _find_graph(x: Tensor, r: float, batch: Tensor | None, loop: bool, most: int
 def _find_between(
     x: Tensor, y: Tensor, r: float, batch_x: Tensor, batch_y: Tensor, most: int | None
 ) -> Tensor:
-    i, j = entries_between(_array(y), _array(x), r, _array(batch_y), _array(batch_x), False)
-    check_rows(i, most)
+    """Queries i and points j of the same system, ascending by (i, j), in open space."""
+    queries, points = _array(y), _array(x)
+    query_batch, batch = _array(batch_y), _array(batch_x)
+    if batch is not None or query_batch is not None:  # a set without numbers is all of system 0
+        batch = np.zeros(len(points), np.int64) if batch is None else batch
+        query_batch = np.zeros(len(queries), np.int64) if query_batch is None else query_batch
+    i, j = pairs_between(
+        Points._of(queries, "queries", batch=query_batch),
+        Points._of(points, "points", batch=batch), r, inclusive=False,
+    )  # fmt: skip
+    _check_rows(i, most)
     return torch.from_numpy(np.stack((i, j)))
+
+
+def _check_rows(i: Any, most: int | None) -> None:
+    """CapacityError if a row has more entries than `most`; none is ever cut."""
+    if most is not None and len(i):
+        needed = int(np.bincount(i).max())
+        if needed > most:
+            raise CapacityError(
+                f"max_num_neighbors is {most}, but a point has {needed} neighbours, and none is "
+                "left out silently: give None for all of them",
+                needed,
+            )
 
 
 def _shape_of_neighbors(positions: Tensor, *_: Any) -> tuple[Tensor, ...]:

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "cells.h"
-#include "request.h"
+#include "query.h"
 #include "../scene/points.h"
 #include "../cells/bins.h"
 #include "../base/status.h"

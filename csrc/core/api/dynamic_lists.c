@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "../../halfshell_dynamic.h"
-#include "request.h"
+#include "query.h"
 #include "../base/os.h"
 #include "../base/status.h"
 #include "../dynamic/storage.h"

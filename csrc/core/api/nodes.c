@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "../connectivity/connectivity.h"
-#include "request.h"
+#include "query.h"
 #include "../../halfshell_nodes.h"
 #include "../connectivity/overlap.h"
 #include "../scene/points.h"
@@ -147,14 +147,13 @@ hs_connectivity_build(const hs_among *among, const hs_node_lists *lists, const h
     int64_t   n = 0;
     hs_pairs *found = NULL;
     hs_status status = count_nodes(lists, &n);
-    if (!can_connect(result, options) || among == NULL || hs_has_systems(among) ||
-        status != HS_OK) {
+    if (!can_connect(result, options) || status != HS_OK || among == NULL) {
         return hs_end_early(status != HS_OK ? status : HS_ERR_ARGUMENT, options, failure);
     }
     const hs_options search = options_of_all_neighbours(among, options);
     /* Only to look at the points; a half list, so that queries are refused. */
-    const hs_request request = hs_request_among(among, HS_HALF_LIST, &search);
-    if (request.sets.points != NULL && request.sets.points->n != n) {
+    const hs_query query = hs_query_among(among, HS_HALF_LIST, &search);
+    if (query.among != NULL || (query.sets.points != NULL && query.sets.points->n != n)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     status = hs_neighbors_find(among, &search, &found, failure);

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-#include "request.h"
+#include "query.h"
 #include "../base/status.h"
-#include "by_reach.h"
 #include "../collect/parallel.h"
 #include "../collect/sort_pairs.h"
 #include "../search/walk.h"
@@ -9,14 +8,11 @@
 #include "../nearest/nearest.h"
 #include "../search/choice.h"
 #include "../histogram/histogram.h"
-#include "stream.h"
-#include "systems.h"
-#include "../collect/components.h"
 
 #include <math.h>
+#include <string.h>
 
-/* pairs.c: the public searches of one call: pairs, rows, nearest points, histograms, clusters and
- * plans. */
+/* pairs.c: the public searches of one call: pairs, rows, nearest points, histograms and plans. */
 
 /* The public searches: find and count. */
 
@@ -30,66 +26,126 @@ hs_options_default(void)
                         .memory_limit = INFINITY};
 }
 
-/* Writes all pairs sorted. They are found in an output of their own, with the columns that sorting
- * needs besides. */
+/* A hs_use_fn: pairs of the step that is open, behind those of an output; NULL: that of the run. */
 static hs_status
-sort_pairs(hs_search *search, hs_output *output, hs_failure *failure)
+record_step(void *context, hs_query_run *run)
 {
-    hs_output found;
-    hs_output_init(&search->call->account, search->scene.ndim, hs_sort_columns(search), 4, &found);
-    hs_status status = hs_parallel_record_all(search, &found, failure);
-    if (status == HS_OK) {
-        status = hs_sort_pairs(search->call, search->first_point, search->scene.n, &found, output);
-    }
-    if (status == HS_ERR_MEMORY) {
-        failure->expected_pairs = (double)found.n_pairs;
-    }
-    hs_output_free(&found);
-    return status;
-}
-
-/* A hs_fill_fn. */
-static hs_status
-fill_pairs(hs_search *search, hs_pairs *pairs, hs_failure *failure)
-{
-    hs_output *output = &pairs->output;
-    hs_status  status = hs_estimate_by_sample(search, failure);
+    hs_output *output = context != NULL ? context : run->output;
+    hs_kept   *kept = run->kept;
+    hs_status  status = hs_estimate_by_sample(run->search, run->failure);
     if (status != HS_OK) {
         return status;
     }
-    if (search->call->options.sorted) {
-        status = sort_pairs(search, output, failure);
-    } else {
-        status = hs_parallel_record_all(search, output, failure);
+    if (kept == NULL) {
+        return hs_parallel_record_all(run->search, output, run->failure);
+    }
+    return output == &kept->backlog.pairs
+               ? hs_backlog_record(run->search, &kept->backlog, &kept->walker, run->failure)
+               : hs_parallel_record_next(run->search, output, &kept->walker, &kept->recorder,
+                                         run->failure);
+}
+
+/* Whether two points may be a pair in several images, or one with itself. Twice the cutoff is
+ * shorter than any period where not, by far more than rounding errors. */
+static bool
+images_repeat(const hs_query_run *run)
+{
+    hs_lattice lattice;
+    double     cutoff = 0.0;
+    for (int64_t s = 0; s < run->plan.n; s++) {
+        cutoff = hs_larger(run->plan.steps[s].cutoff, cutoff);
+    }
+    hs_lattice_init(run->query->box, run->levels.points.ndim, hs_scale_of(0), &lattice);
+    for (int k = 0; k < lattice.ndim; k++) {
+        if (lattice.row_of_axis[k] >= 0 && !(2.1 * cutoff < lattice.period[k])) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Columns that put pairs of several steps in order and have all that is wanted. */
+static unsigned
+columns_of(const hs_query_run *run)
+{
+    const unsigned wanted = run->call->options.want & ~(unsigned)HS_WANT_BOTH;
+    return wanted | HS_WANT_I | HS_WANT_J | (images_repeat(run) ? HS_WANT_SHIFT : 0);
+}
+
+/* Empties an output of pairs that are to be sorted; `found` may have been used before. */
+static void
+open_found(const hs_query_run *run, unsigned columns, hs_output *found)
+{
+    if (found->columns != columns) { /* systems with images need more of them */
+        hs_output_free(found);
+        hs_output_init(&run->call->account, run->query->sets.points->ndim, columns, 4, found);
+    }
+    found->n_pairs = 0;
+}
+
+/* A hs_use_fn, for the one step of a search without a reach, which tells the columns. */
+static hs_status
+record_to_sort(void *found, hs_query_run *run)
+{
+    open_found(run, hs_sort_columns(run->search), found);
+    return record_step(found, run);
+}
+
+/* Writes all pairs sorted. They are found in an output of their own, with the columns that sorting
+ * needs besides. */
+static hs_status
+find_sorted(hs_query_run *run)
+{
+    hs_output own = {.columns = 0}, *found = run->kept != NULL ? &run->kept->found : &own;
+    if (run->has_levels) {
+        open_found(run, columns_of(run), found);
+    }
+    hs_status status =
+        hs_query_each_step(run, run->has_levels ? record_step : record_to_sort, found);
+    if (status == HS_OK && found->n_pairs > 0) {
+        status = hs_sort_pairs(run->call, (int32_t)run->first_point, hs_query_asking(run->query),
+                               found, run->output);
     }
     if (status == HS_ERR_MEMORY) {
-        failure->expected_pairs = fmax(failure->expected_pairs, (double)output->n_pairs);
+        run->failure->expected_pairs = (double)found->n_pairs;
     }
-    return hs_pairs_conclude(output, status, failure);
+    hs_output_free(&own);
+    return status;
 }
 
-hs_status
-hs_pairs_find(const hs_among *among, const hs_options *options, hs_pairs **result,
-              hs_failure *failure)
-{
-    const hs_request request = hs_request_among(among, HS_HALF_LIST, options);
-    if (!hs_can_return(result, options)) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    if (hs_has_systems(among)) {
-        return hs_systems_pairs(among, options, result, failure);
-    }
-    return request.reach != NULL ? hs_by_reach_pairs(&request, result, failure)
-                                 : hs_request_fill(&request, fill_pairs, result, failure);
-}
-
-/* A hs_use_fn: adds the number of pairs, each once; with queries, of all neighbours of each. */
+/* A hs_use_fn: the number of pairs, each once; with queries, of all neighbours of each. */
 static hs_status
-count_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
+count_step(void *context, hs_query_run *run)
 {
-    const hs_status status = hs_parallel_count(search, n_pairs, failure);
+    hs_search *search = run->search;
+    hs_kept   *kept = run->kept;
+    int64_t    n_pairs = 0;
+    hs_status  status;
+    (void)context;
+    if (kept == NULL) {
+        status = hs_parallel_count(search, &n_pairs, run->failure);
+    } else {
+        status = hs_walker_renew(search, HS_BLOCK_COUNTS, NULL, NULL, &kept->walker);
+        if (status == HS_OK) {
+            const int64_t n = hs_search_asking(search)->n;
+            status = hs_walk_or_tell(&kept->walker, 0, (int32_t)n, run->failure);
+            n_pairs = kept->walker.scanner.n_found;
+        }
+        hs_walker_flush_counters(search, &kept->walker);
+    }
+    run->n_pairs += n_pairs;
+    return status;
+}
+
+/* A hs_use_fn; context: a count of each system. */
+static hs_status
+count_pairs(void *context, hs_query_run *run)
+{
+    int64_t        *counts = context;
+    const int64_t   before = run->n_pairs;
+    const hs_status status = hs_query_each_step(run, count_step, NULL);
     if (status == HS_OK) {
-        *(int64_t *)context += *n_pairs;
+        counts[run->system] = run->n_pairs - before;
     }
     return status;
 }
@@ -98,36 +154,21 @@ hs_status
 hs_pairs_count(const hs_among *among, const hs_options *options, int64_t *count,
                hs_failure *failure)
 {
+    const hs_finder finder = {.find = count_pairs, .context = count};
     if (count == NULL || options == NULL) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     const hs_options counting = hs_options_of_count(options);
-    if (hs_has_systems(among)) {
-        return hs_systems_count(among, &counting, count, failure);
-    }
-    const hs_request request = hs_request_among(among, HS_HALF_OR_QUERIES, &counting);
-    int64_t          n_pairs = 0;
-    const hs_status  status = hs_by_reach_each_step(&request, count_pairs, &n_pairs, failure);
-    *count = status == HS_OK ? n_pairs : *count;
-    return status;
+    const hs_query   query = hs_query_among(among, HS_HALF_OR_QUERIES, &counting);
+    return hs_query_answer(&query, &finder, NULL, failure);
 }
 
 /* The public searches for all neighbours of each point, or of each query. */
 
-/* The caller's options, unsorted: table rows have an order of their own. */
-static hs_options
-options_of_rows(const hs_options *options)
-{
-    hs_options of_rows = *options;
-    of_rows.sorted = false;
-    return of_rows;
-}
-
 /* Room for all entries, or what is needed for them. */
 static hs_status
-make_rows_room(hs_pairs *rows, int64_t n_entries, hs_failure *failure)
+make_rows_room(hs_output *output, int64_t n_entries, hs_failure *failure)
 {
-    hs_output *output = &rows->output;
     if (output->fixed && n_entries > output->capacity) {
         failure->expected_pairs = (double)n_entries;
         return HS_ERR_CAPACITY;
@@ -144,47 +185,210 @@ make_rows_room(hs_pairs *rows, int64_t n_entries, hs_failure *failure)
 
 /* Offsets and entries of a table that is prepared. */
 static hs_status
-find_entries(hs_pairs *rows, hs_table *table, hs_failure *failure)
+find_entries(hs_query_run *run, hs_table *table)
 {
-    hs_search *search = table->search;
-    hs_status  status = hs_table_takes_one_walk(table) ? hs_table_find_in_one_walk(table, failure)
-                                                       : HS_TRY_OTHER;
-    if (status != HS_TRY_OTHER) {
-        return status;
-    }
-    status = hs_table_measure(table, failure);
+    hs_failure *failure = run->failure;
+    hs_status   status = hs_table_measure(table, failure);
     if (status == HS_OK) {
-        status = make_rows_room(rows, table->offsets[hs_search_asking(search)->n], failure);
+        status = make_rows_room(run->output, table->offsets[hs_search_asking(table->search)->n],
+                                failure);
     }
     if (status == HS_OK) {
-        status = hs_touch_output(search->call->team, &search->call->options, &rows->output);
+        status = hs_touch_output(run->call->team, &run->call->options, run->output);
     }
     return status == HS_OK ? hs_table_fill(table, failure) : status;
 }
 
-/* A hs_fill_fn. */
+/* A hs_use_fn: the rows of a single step. */
 static hs_status
-find_rows(hs_search *search, hs_pairs *rows, hs_failure *failure)
+fill_rows(void *context, hs_query_run *run)
 {
-    const int64_t n = hs_search_asking(search)->n;
-    hs_table      table = {.search = search, .entries = &rows->output};
-    hs_output_init(&search->call->account, search->scene.ndim, HS_WANT_I, 8, &rows->offsets);
-    hs_status status = hs_estimate_by_sample(search, failure);
+    hs_search *search = run->search;
+    hs_table   table = {.search = search, .entries = run->output};
+    hs_status  status = hs_estimate_by_sample(search, run->failure);
+    (void)context;
     if (status == HS_OK) {
-        status = hs_output_reserve(&rows->offsets, n + 1, 0.0);
+        status = hs_output_open_offsets(&run->call->account, hs_search_asking(search)->n + 1,
+                                        run->offsets, &table.offsets);
     }
     if (status == HS_OK) {
-        rows->offsets.n_pairs = n + 1;
-        table.offsets = hs_output_column(&rows->offsets, HS_WANT_I);
-        status = hs_table_prepare(&table, failure);
+        status = hs_table_prepare(&table, run->failure);
     }
-    if (status == HS_OK && !hs_walker_fits(search, &table.most, &failure->search_bytes)) {
+    if (status == HS_OK && !hs_walker_fits(search, &table.most, &run->failure->search_bytes)) {
         status = HS_ERR_MEMORY; /* refused before anything is counted */
     }
     if (status == HS_OK) {
-        status = find_entries(rows, &table, failure);
+        status = find_entries(run, &table);
     }
     hs_table_free(&table);
+    return status;
+}
+
+/* The rows of a table that lists each pair once, without their beginnings. */
+static hs_status
+fill_sorted(hs_query_run *run)
+{
+    const hs_status status = hs_query_each_step(run, fill_rows, NULL);
+    hs_output_free(run->offsets);
+    return status;
+}
+
+/* A hs_use_fn. */
+static hs_status
+find_pairs(void *context, hs_query_run *run)
+{
+    (void)context;
+    if (run->query->sets.is_once) {
+        return fill_sorted(run);
+    }
+    return run->call->options.sorted ? find_sorted(run)
+                                     : hs_query_each_step(run, record_step, NULL);
+}
+
+hs_status
+hs_pairs_find(const hs_among *among, const hs_options *options, hs_pairs **result,
+              hs_failure *failure)
+{
+    const hs_finder finder = {.find = find_pairs, .is_numbered = true};
+    if (!hs_can_return(result, options)) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
+    hs_options of_pairs = *options;
+    hs_query   query = hs_query_among(among, HS_HALF_LIST, &of_pairs);
+    if (options->sorted && query.reach == NULL && query.among == NULL) {
+        query.sets.is_full = query.sets.is_once = true;
+        of_pairs.sorted = false; /* table rows have an order of their own */
+    }
+    return hs_query_answer(&query, &finder, result, failure);
+}
+
+/* A hs_use_fn; counts those of a single step, to an array of all rows. */
+static hs_status
+count_rows_of_step(void *context, hs_query_run *run)
+{
+    int64_t        *counts = (int64_t *)context + run->first_asking;
+    const int64_t   n = hs_search_asking(run->search)->n;
+    const hs_status status = hs_table_count(run->search, counts, run->failure);
+    for (int64_t i = 0; status == HS_OK && i < n; i++) {
+        run->n_pairs += counts[i];
+    }
+    return status;
+}
+
+/* Rows of several steps are made of their pairs in ascending order: where the rule is the same both
+ * ways, each pair is in two of them. */
+
+/* Whether a point meets itself: in rows of one set that are not made of a half list. */
+static bool
+meets_itself(const hs_query_run *run)
+{
+    return !run->levels.has_queries && !run->plan.is_half;
+}
+
+/* Whether each point is within its limit of itself, which the rows of one search count on. */
+static bool
+has_selves(const hs_query_run *run)
+{
+    const hs_levels *levels = &run->levels;
+    if (levels->has_queries) {
+        return true;
+    }
+    for (int32_t l = 0; l < levels->n; l++) {
+        if (levels->cutoffs[l * levels->n + l] < 0.0) {
+            return false;
+        }
+    }
+    return run->call->options.inclusive && run->call->options.precision == HS_EXACT;
+}
+
+/* Whether rows are those of a single step. It goes over all points twice: where pairs have limits
+ * by radii, whose scans take long, sorting them is quicker. */
+static bool
+is_single(const hs_query_run *run)
+{
+    return !run->has_levels ||
+           (hs_level_plan_is_single(&run->levels, &run->plan) && !meets_itself(run) &&
+            (!run->plan.steps[0].has_limits || (run->levels.cutoffs != NULL && has_selves(run))));
+}
+
+/* Makes use of it, with all neighbours of each point. */
+static hs_status
+use_single(hs_query_run *run, hs_use_fn use, void *context)
+{
+    run->plan.is_half = false;
+    return hs_query_each_step(run, use, context);
+}
+
+/* Moves pair `from` to place `to`. */
+static void
+move_pair(hs_output *found, int64_t from, int64_t to)
+{
+    for (unsigned bit = HS_WANT_I; bit <= HS_WANT_SHIFT; bit <<= 1) {
+        char        *column = hs_output_column(found, bit);
+        const size_t width = column != NULL ? hs_output_width(found, bit) : 0;
+        if (column != NULL) {
+            memmove(column + (size_t)to * width, column + (size_t)from * width, width);
+        }
+    }
+}
+
+/* Takes (i, i, S = 0) out. */
+static void
+drop_selves(hs_output *found)
+{
+    const int32_t *i = hs_output_column(found, HS_WANT_I), *j = hs_output_column(found, HS_WANT_J);
+    const int32_t *shift = hs_output_column(found, HS_WANT_SHIFT);
+    int64_t        kept = 0;
+    for (int64_t e = 0; e < found->n_pairs; e++) {
+        bool is_self = i[e] == j[e];
+        for (int k = 0; is_self && shift != NULL && k < found->ndim; k++) {
+            is_self = shift[e * found->ndim + k] == 0;
+        }
+        if (!is_self) {
+            move_pair(found, e, kept++);
+        }
+    }
+    found->n_pairs = kept;
+}
+
+/* Pairs of all steps, in an output that is opened. */
+static hs_status
+find_of_rows(hs_query_run *run, unsigned columns, hs_output *found)
+{
+    hs_output_init(&run->call->account, run->levels.points.ndim, columns, 4, found);
+    const hs_status status = hs_query_each_step(run, record_step, found);
+    if (status == HS_OK && meets_itself(run)) {
+        drop_selves(found);
+    }
+    return status;
+}
+
+/* A hs_use_fn. */
+static hs_status
+find_rows(void *context, hs_query_run *run)
+{
+    const int64_t n = hs_query_asking(run->query);
+    const bool    is_half = run->plan.is_half;
+    int64_t      *offsets = NULL;
+    hs_output     found;
+    if (is_single(run)) {
+        return use_single(run, fill_rows, context);
+    }
+    hs_status status = find_of_rows(run, columns_of(run), &found);
+    if (status == HS_OK && is_half && (run->call->options.want & HS_WANT_SHIFT)) {
+        status = hs_output_check_opposites(&found, run->failure);
+    }
+    if (status == HS_OK) {
+        status = hs_output_open_offsets(&run->call->account, n + 1, run->offsets, &offsets);
+    }
+    if (status == HS_OK) {
+        status = hs_sort_rows(run->call, n, &found, is_half, offsets, run->output);
+    }
+    if (status == HS_ERR_MEMORY) {
+        run->failure->expected_pairs =
+            fmax(run->failure->expected_pairs, (is_half ? 2.0 : 1.0) * (double)found.n_pairs);
+    }
+    hs_output_free(&found);
     return status;
 }
 
@@ -192,28 +396,40 @@ hs_status
 hs_neighbors_find(const hs_among *among, const hs_options *options, hs_pairs **result,
                   hs_failure *failure)
 {
+    const hs_finder finder = {.find = find_rows, .has_rows = true};
     if (!hs_can_return(result, options)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    const hs_options of_rows = options_of_rows(options);
-    if (hs_has_systems(among)) {
-        return hs_systems_neighbors(among, &of_rows, result, failure);
-    }
-    const hs_request request = hs_request_among(among, HS_FULL_LIST, &of_rows);
-    return request.reach != NULL ? hs_by_reach_rows(&request, find_rows, result, failure)
-                                 : hs_request_fill(&request, find_rows, result, failure);
+    hs_options of_rows = *options;
+    of_rows.sorted = false; /* table rows have an order of their own */
+    const hs_query query = hs_query_among(among, HS_FULL_LIST, &of_rows);
+    return hs_query_answer(&query, &finder, result, failure);
 }
 
-/* A hs_use_fn. */
+/* A hs_use_fn; context: a count of each row, of all systems. */
 static hs_status
-count_rows(void *context, hs_search *search, int64_t *n_entries, hs_failure *failure)
+count_rows(void *context, hs_query_run *run)
 {
-    const int64_t   n = hs_search_asking(search)->n;
-    const int64_t  *counts = context;
-    const hs_status status = hs_table_count(search, context, failure);
-    for (int64_t i = 0; status == HS_OK && i < n; i++) {
-        *n_entries += counts[i];
+    int64_t  *counts = (int64_t *)context + run->first_asking;
+    hs_output found;
+    if (is_single(run)) {
+        return use_single(run, count_rows_of_step, context);
     }
+    const unsigned  columns = meets_itself(run) ? columns_of(run) : HS_WANT_I | HS_WANT_J;
+    const hs_status status = find_of_rows(run, columns, &found);
+    if (status == HS_OK) {
+        const int32_t *i = hs_output_column(&found, HS_WANT_I);
+        const int32_t *j = hs_output_column(&found, HS_WANT_J);
+        memset(counts, 0, (size_t)hs_query_asking(run->query) * sizeof *counts);
+        for (int64_t e = 0; e < found.n_pairs; e++) {
+            counts[i[e]]++;
+        }
+        for (int64_t e = 0; run->plan.is_half && e < found.n_pairs; e++) {
+            counts[j[e]]++;
+        }
+        run->n_pairs += (run->plan.is_half ? 2 : 1) * found.n_pairs;
+    }
+    hs_output_free(&found);
     return status;
 }
 
@@ -221,20 +437,18 @@ hs_status
 hs_neighbors_count(const hs_among *among, const hs_options *options, int64_t *counts,
                    hs_failure *failure)
 {
+    int64_t         none; /* where there are no points, there may be no counts */
+    const hs_finder finder = {.find = count_rows, .context = counts != NULL ? counts : &none};
     if (options == NULL) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     const hs_options counting = hs_options_of_count(options);
-    if (hs_has_systems(among)) {
-        return hs_systems_neighbors_count(among, &counting, counts, failure);
-    }
-    const hs_request request = hs_request_among(among, HS_FULL_LIST, &counting);
-    const hs_sets   *sets = &request.sets;
+    const hs_query   query = hs_query_among(among, HS_FULL_LIST, &counting);
+    const hs_sets   *sets = &query.sets;
     if (!hs_has_entries(counts, sets->queries != NULL ? sets->queries : sets->points)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    return request.reach != NULL ? hs_by_reach_count_rows(&request, count_rows, counts, failure)
-                                 : hs_request_use(&request, count_rows, counts, failure);
+    return hs_query_answer(&query, &finder, NULL, failure);
 }
 
 /* The public search for the k nearest points: prepares trees, then searches group by
@@ -255,92 +469,63 @@ make_nearest_room(hs_nearest *near, int64_t n_asking, hs_failure *failure)
     return HS_ERR_MEMORY;
 }
 
+/* A hs_use_fn; context: k. */
 static hs_status
-find_nearest(hs_nearest *near, const hs_request *request, hs_failure *failure)
+find_nearest(void *context, hs_query_run *run)
 {
-    const hs_sets *sets = &request->sets;
-    hs_search     *search = near->search;
-    const int64_t  n_asking = sets->queries != NULL ? sets->queries->n : sets->points->n;
-    const double   limit = search->call->options.cutoff;
-    hs_status      status = make_nearest_room(near, n_asking, failure);
+    const int64_t *k = context;
+    hs_search     *search = &run->step.search;
+    hs_failure    *failure = run->failure;
+    hs_sets        sets = run->query->sets;
+    const double   limit = run->call->options.cutoff;
+    sets.is_plain = sets.is_wide = true;
+    hs_search_begin(run->call, search);
+    hs_nearest near = {.search = search,
+                       .k = *k,
+                       .of_spot = *k < INT32_MAX - 1 && run->query->selection == NULL
+                                      ? (int32_t)*k + 1
+                                      : INT32_MAX,
+                       .omits_self = sets.queries == NULL,
+                       .rows = run->output};
+    hs_status  status = make_nearest_room(&near, hs_query_asking(run->query), failure);
     if (status == HS_OK) {
-        status = hs_choice_of_request(request, limit, search->call, failure);
-    }
-    if (status == HS_OK) {
-        status = hs_nearest_prepare(near, sets, request->box, limit, failure);
+        status = hs_nearest_prepare(&near, &sets, run->query->box, limit, failure);
     }
     if (status == HS_OK) { /* rows are written in the order of the tree */
-        status = hs_touch_output(search->call->team, &search->call->options, near->rows);
+        status = hs_touch_output(run->call->team, &run->call->options, near.rows);
     }
     if (status == HS_OK) {
-        status = hs_nearest_search(near, failure);
+        status = hs_nearest_search(&near, failure);
     }
-    hs_call_tell_limit(search->call, status, failure);
-    hs_nearest_release(near);
+    hs_nearest_release(&near);
     hs_search_close(search);
-    hs_choice_close(search->call);
     return status;
-}
-
-static hs_status
-check_nearest(const hs_sets *sets, const hs_box *box, int64_t k, const hs_options *options,
-              hs_failure *failure)
-{
-    const hs_status status = hs_check_arguments(sets->points, sets->queries, box, options, failure);
-    if (status != HS_OK || k < 1) {
-        return status != HS_OK ? status : HS_ERR_ARGUMENT;
-    }
-    if (!(options->cutoff >= 0.0)) {
-        failure->value = options->cutoff;
-        return HS_ERR_CUTOFF;
-    }
-    return HS_OK;
 }
 
 hs_status
 hs_nearest_find(const hs_among *among, int64_t k, const hs_options *options, hs_pairs **result,
                 hs_failure *failure)
 {
-    hs_search  search;
-    hs_request request = hs_request_among(among, HS_FULL_LIST, options);
-    hs_sets   *sets = &request.sets;
-    if (!hs_can_return(result, options)) {
+    const hs_finder finder = {.find = find_nearest, .context = &k, .is_nearest = true};
+    if (!hs_can_return(result, options) || k < 1) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    const hs_options of_rows = hs_options_of_nearest(options);
-    if (hs_has_systems(among)) {
-        return hs_systems_nearest(among, k, &of_rows, result, failure);
-    }
-    sets->is_plain = sets->is_wide = true;
-    hs_pairs *rows = hs_pairs_begin(&of_rows, &failure);
-    if (rows == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    hs_search_begin(&rows->call, &search);
-    hs_nearest near = {.search = &search,
-                       .k = k,
-                       .of_spot = k < INT32_MAX - 1 && request.selection == NULL ? (int32_t)k + 1
-                                                                                 : INT32_MAX,
-                       .omits_self = sets->queries == NULL,
-                       .rows = &rows->output};
-    hs_status  status = request.reach == NULL
-                            ? check_nearest(sets, request.box, k, &of_rows, failure)
-                            : HS_ERR_ARGUMENT; /* which this search does not know */
-    if (status == HS_OK) {
-        hs_pairs_open(rows, sets->points->ndim);
-        status = find_nearest(&near, &request, failure);
-    }
-    return hs_pairs_finish(rows, status, rows->output.n_pairs, result);
+    hs_options of_rows = *options;
+    of_rows.sorted = false;
+    of_rows.out = NULL;
+    of_rows.precision = HS_EXACT;
+    of_rows.want &= HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
+    const hs_query query = hs_query_among(among, HS_FULL_LIST, &of_rows);
+    return hs_query_answer(&query, &finder, result, failure);
 }
 
 /* The public histogram of all pairs, which stores none of them. */
 
 /* What the threads share. */
 typedef struct counting {
-    hs_search          *search;
-    const hs_histogram *histogram;
-    const hs_sets      *sets;
-    hs_tally_plan       plan;
+    hs_search    *search;
+    hs_histogram  histogram;
+    hs_tally_plan plan;
 } counting;
 
 /* What all threads have counted of one group, to entry `to` and on. Returns their number. */
@@ -371,7 +556,7 @@ static int64_t
 write_histogram(const counting *shared, hs_tally *tallies, int n)
 {
     const hs_tally_plan *plan = &shared->plan;
-    const hs_histogram  *histogram = shared->histogram;
+    const hs_histogram  *histogram = &shared->histogram;
     const bool           is_symmetric = !shared->search->has_queries;
     const int64_t        n_types = plan->n_types;
     int64_t              n_pairs = 0;
@@ -426,55 +611,69 @@ tally_pairs(counting *shared, int64_t *n_pairs, hs_failure *failure)
         status = hs_parallel_visit(search, &visitors, NULL, failure);
     }
     if (status == HS_OK) {
-        *n_pairs = write_histogram(shared, crew.workers, crew.n_open);
+        *n_pairs += write_histogram(shared, crew.workers, crew.n_open);
     }
     hs_crew_close(&crew);
     return status;
 }
 
-/* The search up to the largest edge. */
-static hs_options
-options_of_histogram(const hs_histogram *histogram, const hs_options *options)
-{
-    hs_options of_search = hs_options_of_count(options);
-    of_search.cutoff = histogram->edges[histogram->n_edges - 1];
-    of_search.inclusive = histogram->last_inclusive;
-    of_search.precision = HS_EXACT;
-    return of_search;
-}
-
 /* A hs_use_fn. */
 static hs_status
-fill_histogram(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
+fill_histogram(void *context, hs_query_run *run)
 {
     counting *shared = context;
-    shared->search = search;
-    hs_status status =
-        hs_tally_plan_open(search, shared->histogram, shared->sets, &shared->plan, failure);
+    shared->search = run->search;
+    hs_status status = hs_tally_plan_open(run->search, &shared->histogram, &run->query->sets,
+                                          &shared->plan, run->failure);
     if (status == HS_OK) {
-        status = tally_pairs(shared, n_pairs, failure);
+        status = tally_pairs(shared, &run->n_pairs, run->failure);
     }
     hs_tally_plan_close(&shared->plan);
     return status;
 }
 
+/* A hs_use_fn; context: the histograms of all systems, one behind the other. */
 static hs_status
-find_histogram(const hs_among *among, const hs_options *options, const hs_histogram *histogram,
-               hs_failure *failure)
+find_histogram(void *context, hs_query_run *run)
 {
+    counting      shared = {.histogram = *(const hs_histogram *)context};
+    hs_histogram *own = &shared.histogram;
+    const int64_t at = run->system * own->n_edges * own->n_types * own->n_types;
+    own->counts = own->counts != NULL ? own->counts + at : NULL;
+    own->sums = own->sums != NULL ? own->sums + at : NULL;
+    return hs_query_each_step(run, fill_histogram, &shared);
+}
+
+/* The search goes up to the largest edge. */
+static hs_status
+find_histograms(const hs_among *among, const hs_options *options, const hs_histogram *histogram,
+                hs_failure *failure)
+{
+    hs_histogram    all;
+    const hs_finder finder = {.find = find_histogram, .context = &all};
     const hs_status status = options != NULL ? hs_check_histogram(histogram, failure)
                                              : HS_ERR_ARGUMENT;
     if (status != HS_OK) {
         hs_clear_counters(options);
         return status;
     }
-    const hs_options of_search = options_of_histogram(histogram, options);
-    hs_request       request = hs_request_among(among, HS_HALF_OR_QUERIES, &of_search);
-    request.sets.is_plain = true;
-    request.sets.keeps_none = true;
-    request.sets.least_cutoff = hs_least_length(histogram->edges, histogram->n_edges);
-    counting shared = {.histogram = histogram, .sets = &request.sets};
-    return hs_request_use(&request, fill_histogram, &shared, failure);
+    all = *histogram;
+    hs_options of_search = hs_options_of_count(options);
+    of_search.cutoff = histogram->edges[histogram->n_edges - 1];
+    of_search.inclusive = histogram->last_inclusive;
+    of_search.precision = HS_EXACT;
+    hs_query query = hs_query_among(among, HS_HALF_OR_QUERIES, &of_search);
+    if (query.reach != NULL) { /* which this search does not know */
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
+    const double n = (double)histogram->n_types;
+    if (query.among != NULL && !(n * n * (double)histogram->n_edges < 0x1p31)) {
+        return hs_end_early(HS_ERR_MEMORY, options, failure); /* counts might pass int64 */
+    }
+    query.sets.is_plain = true;
+    query.sets.keeps_none = true;
+    query.sets.least_cutoff = hs_least_length(histogram->edges, histogram->n_edges);
+    return hs_query_answer(&query, &finder, NULL, failure);
 }
 
 /* Enters the floating-point environment itself, because edges are compared before the
@@ -483,148 +682,18 @@ hs_status
 hs_pairs_histogram(const hs_among *among, const hs_options *options, const hs_histogram *histogram,
                    hs_failure *failure)
 {
-    hs_entry entry;
-    if (options != NULL && hs_has_systems(among)) {
-        return hs_systems_histogram(among, options, histogram, failure);
+    hs_entry       entry;
+    hs_among       without;
+    hs_each_system each;
+    if (among != NULL && among->each != NULL) { /* cutoffs of their own do not count */
+        each = *among->each;
+        each.cutoffs = NULL;
+        without = *among;
+        without.each = &each;
+        among = &without;
     }
     failure = hs_enter(failure, &entry);
-    const hs_status status = find_histogram(among, options, histogram, failure);
-    hs_leave(&entry);
-    return status;
-}
-
-/* Clusters of points, joined pair by pair while these are found. */
-
-/* What the pairs are for. */
-typedef struct clustering {
-    hs_components  components; /* owned */
-    const uint8_t *core;       /* borrowed, or NULL */
-    int64_t       *labels;     /* borrowed */
-} clustering;
-
-/* A hs_pairs_fn: core points that are a pair belong together. */
-static int
-join_pairs(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user)
-{
-    clustering    *doing = user;
-    const int32_t *i = pairs->i, *j = pairs->j;
-    const int      n_axes = doing->components.n_axes;
-    (void)n_taken;
-    for (int64_t e = 0; e < n; e++) {
-        if (doing->core == NULL || (doing->core[i[e]] != 0 && doing->core[j[e]] != 0)) {
-            hs_components_join(&doing->components, i[e], j[e],
-                               n_axes > 0 ? pairs->shift + e * n_axes : NULL);
-        }
-    }
-    return 0;
-}
-
-/* A hs_pairs_fn: any other point belongs to the first cluster that has a core point near it. */
-static int
-adopt_points(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user)
-{
-    const clustering *doing = user;
-    const uint8_t    *core = doing->core;
-    const int32_t    *i = pairs->i, *j = pairs->j;
-    (void)n_taken;
-    for (int64_t e = 0; e < n; e++) {
-        if ((core[i[e]] != 0) != (core[j[e]] != 0)) {
-            int64_t      *label = &doing->labels[core[i[e]] != 0 ? j[e] : i[e]];
-            const int64_t near = doing->labels[core[i[e]] != 0 ? i[e] : j[e]];
-            *label = *label < 0 || near < *label ? near : *label;
-        }
-    }
-    return 0;
-}
-
-/* Whether some point is near enough to a cluster only. */
-static bool
-has_others(const uint8_t *core, int64_t n)
-{
-    return core != NULL && n > 0 && memchr(core, 0, (size_t)n) != NULL;
-}
-
-static bool
-is_periodic(const hs_box *box)
-{
-    bool any = false;
-    for (int l = 0; box != NULL && l < box->ndim; l++) {
-        any = any || box->periodic[l];
-    }
-    return any;
-}
-
-/* The pairs, once or twice; the options' memory limit is what the search may take. */
-static hs_status
-join_all_pairs(const hs_among *among, const hs_options *options, clustering *doing,
-               uint8_t *winding, int64_t *n_clusters, hs_failure *failure)
-{
-    hs_visit      visit = {.pairs = join_pairs, .user = doing};
-    hs_options    of_visit = *options;
-    int64_t       n_pairs;
-    const int64_t n = doing->components.n;
-    of_visit.want = HS_WANT_I | HS_WANT_J | (doing->components.n_axes > 0 ? HS_WANT_SHIFT : 0);
-    hs_status status = hs_visit_columns(among, &of_visit, &visit, &n_pairs, failure);
-    if (status != HS_OK) {
-        return status;
-    }
-    const int64_t found =
-        hs_components_label(&doing->components, doing->core, doing->labels, winding);
-    if (has_others(doing->core, n)) {
-        visit.pairs = adopt_points;
-        of_visit.want = HS_WANT_I | HS_WANT_J;
-        of_visit.counters = NULL;
-        status = hs_visit_columns(among, &of_visit, &visit, &n_pairs, failure);
-    }
-    if (status == HS_OK) {
-        *n_clusters = found;
-    }
-    return status;
-}
-
-static hs_status
-find_clusters(const hs_among *among, const hs_options *options, const uint8_t *core,
-              int64_t *labels, uint8_t *winding, int64_t *n_clusters, hs_failure *failure)
-{
-    const hs_request request = hs_request_among(among, HS_HALF_LIST, options);
-    const hs_points *points = request.sets.points;
-    clustering       doing = {.core = core, .labels = labels};
-    hs_account       account;
-    hs_clear_counters(options);
-    hs_status status = hs_check_arguments(points, NULL, request.box, options, failure);
-    if (status != HS_OK) {
-        return status;
-    }
-    const int n_axes = winding != NULL && is_periodic(request.box) ? points->ndim : 0;
-    hs_account_init(&account, options);
-    status = hs_components_open(&account, points->n, n_axes, &doing.components);
-    if (status == HS_OK) {
-        hs_options of_search = *options;
-        of_search.memory_limit -= (double)account.held;
-        status = join_all_pairs(among, &of_search, &doing, winding, n_clusters, failure);
-        failure->limit_bytes += status == HS_ERR_MEMORY ? (double)account.held : 0.0;
-    } else {
-        failure->limit_bytes = account.limit;
-    }
-    hs_components_close(&account, &doing.components);
-    hs_account_close(&account);
-    return status;
-}
-
-hs_status
-hs_clusters_find(const hs_among *among, const hs_options *options, const uint8_t *core,
-                 int64_t *labels, uint8_t *winding, int64_t *n_clusters, hs_failure *failure)
-{
-    const hs_points *points = hs_request_among(among, HS_HALF_LIST, options).sets.points;
-    if (options == NULL || n_clusters == NULL || !hs_has_entries(labels, points)) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    hs_entry   entry;
-    hs_options of_search = hs_options_of_count(options);
-    of_search.index_bytes = 4;
-    failure = hs_enter(failure, &entry);
-    const hs_status status =
-        find_clusters(among, &of_search, core, labels, winding, n_clusters, failure);
+    const hs_status status = find_histograms(among, options, histogram, failure);
     hs_leave(&entry);
     return status;
 }
@@ -675,19 +744,18 @@ typedef struct planning {
 
 /* A hs_use_fn: adds a search to the plan, which is about the one with the largest reach. */
 static hs_status
-use_search(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
+plan_step(void *context, hs_query_run *run)
 {
     planning       *now = context;
     hs_plan        *plan = now->plan;
+    const double    cutoff = run->call->options.cutoff;
     const int64_t   n_before = plan->n_searches;
     const double    expected_before = plan->expected_pairs;
     double          expected;
-    const hs_status status = hs_estimate_pairs(search, &expected);
-    (void)n_pairs;
-    (void)failure;
-    if (n_before == 0 || search->call->options.cutoff > now->largest) {
-        now->largest = search->call->options.cutoff;
-        fill_plan(search, plan);
+    const hs_status status = hs_estimate_pairs(run->search, &expected);
+    if (n_before == 0 || cutoff > now->largest) {
+        now->largest = cutoff;
+        fill_plan(run->search, plan);
     }
     plan->n_searches = n_before + 1;
     plan->expected_pairs = expected_before + expected;
@@ -699,33 +767,34 @@ use_search(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failu
     return status;
 }
 
-/* Where no two points can be a pair: what the cells would be for a cutoff of 0. */
+/* A hs_use_fn. */
 static hs_status
-plan_nothing(const hs_request *request, planning *now, hs_failure *failure)
+plan_search(void *context, hs_query_run *run)
 {
-    hs_options options = *request->options;
-    hs_request without = *request;
-    options.cutoff = 0.0;
-    without.options = &options;
-    without.reach = NULL;
-    const hs_status status = hs_request_use(&without, use_search, now, failure);
-    now->plan->n_searches = 0;
-    now->plan->expected_pairs = 0.0;
-    return status;
+    return hs_query_each_step(run, plan_step, context);
 }
 
 hs_status
 hs_plan_make(const hs_among *among, const hs_options *options, hs_plan *plan, hs_failure *failure)
 {
-    const hs_request request = hs_request_among(among, HS_HALF_LIST, options);
-    if (options == NULL || plan == NULL || request.selection != NULL) {
+    hs_plan         made = {.ndim = 0};
+    planning        now = {.plan = &made};
+    const hs_finder finder = {.find = plan_search, .context = &now};
+    hs_query        query = hs_query_among(among, HS_HALF_LIST, options);
+    if (options == NULL || plan == NULL || query.selection != NULL || query.among != NULL) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    hs_plan   made = {.ndim = 0};
-    planning  now = {.plan = &made, .wanted = options->algorithm};
-    hs_status status = hs_by_reach_each_step(&request, use_search, &now, failure);
+    now.wanted = options->algorithm;
+    hs_status status = hs_query_answer(&query, &finder, NULL, failure);
     if (status == HS_OK && made.n_searches == 0) {
-        status = plan_nothing(&request, &now, failure);
+        /* Where no two points can be a pair: what the cells would be for a cutoff of 0. */
+        hs_options without = *options;
+        without.cutoff = 0.0;
+        query.options = &without;
+        query.reach = NULL;
+        status = hs_query_answer(&query, &finder, NULL, failure);
+        made.n_searches = 0;
+        made.expected_pairs = 0.0;
     }
     *plan = status == HS_OK ? made : *plan;
     return status;

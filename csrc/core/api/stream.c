@@ -1,17 +1,15 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-#include "stream.h"
-#include "by_reach.h"
+#include "query.h"
 #include "../search/choice.h"
-#include "../collect/columns.h"
-#include "../collect/parallel.h"
 #include "../base/os.h"
 #include "../base/status.h"
-#include "../collect/record.h"
+#include "../collect/components.h"
 
 #include <math.h>
 #include <string.h>
 
-/* stream.c: pairs in blocks. A stream holds a search that is ready to be walked, a bookmark of how
+/* stream.c: pairs that are never stored all at once: in blocks, shown to a function, or joined to
+ * clusters. A stream holds a search that is ready to be walked, a bookmark of how
  * far that has come, and the pairs that were found and not yet handed out. */
 
 /* Pairs that are looked for at a time, at least: less would not pay for walkers and threads. */
@@ -21,21 +19,19 @@
 #define MOST_EXPECTED 0x1p24
 
 struct hs_stream {
-    hs_call         call;   /* that opened it; it has threads only while it looks for pairs */
-    hs_search      *search; /* one of the next two, open; or NULL between two steps */
-    hs_search       alone;
-    hs_by_reach     by;   /* where pairs have a reach of their own: several searches, in steps, */
-    hs_level_search step; /* one after the other, */
-    int64_t         n_steps; /* of which so many have been opened, */
-    hs_box          box;     /* in this box */
-    int             ndim;
-    hs_output       held; /* pairs from `begin` on wait to be handed out */
-    int64_t         begin;
-    int64_t         max_pairs;
-    hs_bookmark     next; /* where to go on looking */
-    double          told; /* the largest fraction that poll has been called with */
-    hs_poll_fn      poll; /* of the caller, during hs_stream_next */
-    void           *context;
+    hs_call      call;  /* that opened it; it has threads only while it looks for pairs */
+    hs_query     query; /* with nothing of the caller's but */
+    hs_box       box;   /* where it has any */
+    hs_query_run run;
+    int64_t      n_steps; /* that have been opened */
+    int          ndim;
+    hs_output    held; /* pairs from `begin` on wait to be handed out */
+    int64_t      begin;
+    int64_t      max_pairs;
+    hs_bookmark  next; /* where to go on looking */
+    double       told; /* the largest fraction that poll has been called with */
+    hs_poll_fn   poll; /* of the caller, during hs_stream_next */
+    void        *context;
 };
 
 static int64_t
@@ -48,13 +44,14 @@ waiting(const hs_stream *stream)
 static bool
 is_over(const hs_stream *stream)
 {
-    return stream->search == NULL || stream->next.point == hs_search_asking(stream->search)->n;
+    const hs_search *search = stream->run.search;
+    return search == NULL || stream->next.point == hs_search_asking(search)->n;
 }
 
 static bool
 is_all_found(const hs_stream *stream)
 {
-    return is_over(stream) && stream->n_steps == stream->by.plan.n;
+    return is_over(stream) && stream->n_steps == stream->run.plan.n;
 }
 
 /* An empty output, columns as the options say. */
@@ -87,7 +84,7 @@ fill_of(const hs_stream *stream)
 static hs_status
 move_waiting(hs_stream *stream, int64_t first, hs_output *moved)
 {
-    const double expected = fmin((double)fill_of(stream), stream->search->grid.expected_pairs);
+    const double expected = fmin((double)fill_of(stream), stream->run.search->grid.expected_pairs);
     open_output(stream, &stream->call.account, moved);
     hs_output_reserve_hint(moved, fmin(expected, MOST_EXPECTED));
     const hs_status status = copy_waiting(stream, first, stream->held.n_pairs - first, moved);
@@ -101,7 +98,7 @@ move_waiting(hs_stream *stream, int64_t first, hs_output *moved)
 static hs_status
 fill(hs_stream *stream, hs_failure *failure)
 {
-    hs_search *search = stream->search;
+    hs_search *search = stream->run.search;
     hs_output  moved;
     if (stream->begin > 0 || stream->held.capacity == 0) {
         const hs_status status = move_waiting(stream, stream->begin, &moved);
@@ -124,27 +121,14 @@ fill(hs_stream *stream, hs_failure *failure)
     return hs_poll(&search->call->options, hs_search_fraction(search, stream->next.point));
 }
 
-static void
-close_search(hs_stream *stream)
-{
-    if (stream->search == &stream->alone) {
-        hs_search_close(stream->search);
-    } else if (stream->search != NULL) {
-        hs_level_close(&stream->step);
-    }
-    stream->search = NULL;
-}
-
 /* The next search, once the one before is over. */
 static hs_status
 open_step(hs_stream *stream, hs_failure *failure)
 {
-    close_search(stream);
-    const hs_status status = hs_level_open(&stream->by.levels, &stream->by.plan, stream->n_steps,
-                                           stream->by.box, true, &stream->call, &stream->step,
-                                           failure);
+    stream->run.failure = failure;
+    hs_query_close_step(&stream->run);
+    const hs_status status = hs_query_open_step(&stream->run, stream->n_steps);
     if (status == HS_OK) {
-        stream->search = &stream->step.search;
         stream->next = (hs_bookmark){.point = 0};
         stream->n_steps++;
     }
@@ -250,37 +234,27 @@ options_of_stream(const hs_options *options)
     return of_stream;
 }
 
-/* Labels last until hs_stream_open returns. */
+/* Opens what the caller's arrays are needed for: the one search, or what all steps of a reach are
+ * made of. Labels last until hs_stream_open returns. */
 static hs_status
-keep_labels(const hs_request *request, hs_stream *stream)
+open_search(hs_stream *stream, hs_failure *failure)
 {
-    const hs_status status = hs_choice_keep_labels(&request->sets, &stream->call);
-    if (status != HS_OK) {
-        close_search(stream);
-        hs_by_reach_close(&stream->call, &stream->by);
+    static const hs_finder of_stream = {.find = NULL};
+    hs_query              *query = &stream->query;
+    hs_query_run          *run = &stream->run;
+    hs_status              status = hs_query_open(query, &of_stream, &stream->call, run, failure);
+    if (status == HS_OK) {
+        status = !run->has_levels ? open_step(stream, failure) : HS_OK;
+        status = status == HS_OK ? hs_choice_keep_labels(&query->sets, &stream->call) : status;
+        if (status != HS_OK) {
+            hs_query_close(run);
+        }
     }
-    return status;
-}
-
-/* The search of a request, or the steps of one with a reach. */
-static hs_status
-open_search(const hs_request *request, hs_stream *stream, hs_failure *failure)
-{
-    hs_call *call = &stream->call;
-    stream->search = NULL;
-    stream->n_steps = 0;
-    stream->by = (hs_by_reach){.box = NULL};
-    if (request->reach == NULL) {
-        const hs_status status = hs_request_open(request, call, &stream->alone, failure);
-        stream->search = status == HS_OK ? &stream->alone : NULL;
-        return status;
+    if (query->box != NULL) {
+        stream->box = *query->box;
+        query->box = &stream->box;
     }
-    const hs_status status = hs_by_reach_open(request, call, &stream->by, failure);
-    hs_call_tell_limit(call, status, failure);
-    if (status == HS_OK && request->box != NULL) {
-        stream->box = *request->box;
-        stream->by.box = &stream->box;
-    }
+    hs_call_tell_limit(&stream->call, status, failure);
     return status;
 }
 
@@ -295,18 +269,16 @@ hs_stream_open(const hs_among *among, const hs_options *options, int64_t max_pai
         return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
     }
     const hs_options of_stream = options_of_stream(options);
-    hs_request       request = hs_request_among(among, HS_HALF_LIST, &of_stream);
-    request.sets.keeps_none = true;
-    hs_stream *stream = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *stream);
+    hs_stream       *stream = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *stream);
     if (stream == NULL) {
         return hs_end_early(HS_ERR_MEMORY, NULL, failure);
     }
     hs_call *call = &stream->call;
     failure = hs_call_enter(&of_stream, failure, call);
-    hs_status status = open_search(&request, stream, failure);
-    if (status == HS_OK) {
-        status = keep_labels(&request, stream);
-    }
+    stream->query = hs_query_among(among, HS_HALF_LIST, &of_stream);
+    stream->query.sets.keeps_none = true;
+    stream->n_steps = 0;
+    const hs_status status = open_search(stream, failure);
     hs_call_leave(call, 0);
     hs_call_detach(call);
     if (status != HS_OK) {
@@ -314,7 +286,7 @@ hs_stream_open(const hs_among *among, const hs_options *options, int64_t max_pai
         hs_free(NULL, stream);
         return status;
     }
-    stream->ndim = request.sets.points->ndim;
+    stream->ndim = stream->query.sets.points->ndim;
     open_output(stream, &call->account, &stream->held);
     stream->begin = 0;
     stream->max_pairs = max_pairs;
@@ -331,8 +303,7 @@ hs_stream_free(hs_stream *stream)
         return;
     }
     hs_output_free(&stream->held);
-    close_search(stream);
-    hs_by_reach_close(&stream->call, &stream->by);
+    hs_query_close(&stream->run);
     hs_account_close(&stream->call.account);
     hs_free(NULL, stream);
 }
@@ -402,7 +373,7 @@ typedef struct visiting {
     unsigned        want; /* columns, with indices of so many bytes */
     int             index_bytes;
     hs_search      *search;
-    int64_t        *n_visited; /* by those that have ended */
+    int64_t         n_visited; /* by those that have ended */
 } visiting;
 
 static hs_status
@@ -420,61 +391,71 @@ open_visitor(void *job, void *place)
 static void
 close_visitor(void *job, void *place)
 {
-    const visiting *shared = job;
-    visitor        *doing = place;
-    *shared->n_visited += doing->n_visited;
+    visiting *shared = job;
+    visitor  *doing = place;
+    shared->n_visited += doing->n_visited;
     hs_recorder_free(&shared->search->call->account, &doing->recorder);
     hs_output_free(&doing->part);
 }
 
 /* A hs_use_fn: each thread visits the pairs that it finds. HS_ENOUGH: a function wants no more. */
 static hs_status
-visit_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
+visit_step(void *context, hs_query_run *run)
 {
-    visiting     *shared = context;
-    hs_crew       crew = {.call = search->call,
-                          .job = shared,
-                          .worker_size = sizeof(visitor),
-                          .open = open_visitor,
-                          .close = close_visitor};
-    const int64_t before = *shared->n_visited;
-    shared->search = search;
-    if (!shared->visit->thread_safe) { /* other threads only make the search ready */
-        hs_call_dismiss(search->call);
+    visiting shared = *(const visiting *)context;
+    hs_crew  crew = {.call = run->call,
+                     .job = &shared,
+                     .worker_size = sizeof(visitor),
+                     .open = open_visitor,
+                     .close = close_visitor};
+    shared.search = run->search;
+    if (!shared.visit->thread_safe) { /* other threads only make the search ready */
+        hs_call_dismiss(run->call);
     }
     hs_status status = hs_crew_open(&crew);
     if (status == HS_OK) {
-        const hs_visitors all = {.use = hs_record_use(shared->want),
+        const hs_visitors all = {.use = hs_record_use(shared.want),
                                  .visit = visit_hits,
                                  .contexts = crew.workers,
                                  .context_size = crew.worker_size};
-        status = hs_parallel_visit(search, &all, NULL, failure);
+        status = hs_parallel_visit(run->search, &all, NULL, run->failure);
     }
     hs_crew_close(&crew);
-    *n_pairs = *shared->n_visited - before;
+    run->n_pairs += shared.n_visited;
     return status;
 }
 
-hs_status
-hs_visit_columns(const hs_among *among, const hs_options *options, const hs_visit *visit,
-                 int64_t *n_visited, hs_failure *failure)
+/* A hs_use_fn. */
+static hs_status
+visit_pairs(void *context, hs_query_run *run)
 {
-    visiting   shared = {.visit = visit,
-                         .want = options->want,
-                         .index_bytes = options->index_bytes,
-                         .n_visited = n_visited};
-    hs_options of_visit = *options;
-    hs_request request = hs_request_among(among, HS_HALF_LIST, &of_visit);
+    return hs_query_each_step(run, visit_step, context);
+}
+
+/* hs_pairs_visit with options->want and ->index_bytes heeded, by visit->pairs where that leaves a
+ * column out; all but `among` is there. */
+static hs_status
+visit_columns(const hs_among *among, const hs_options *options, const hs_visit *visit,
+              int64_t *n_visited, hs_failure *failure)
+{
+    visiting shared = {.visit = visit, .want = options->want, .index_bytes = options->index_bytes};
+    const hs_finder finder = {.find = visit_pairs,
+                              .context = &shared,
+                              .is_numbered = true,
+                              .one_thread = !visit->thread_safe};
+    hs_counters     done;
+    hs_options      of_visit = *options;
+    hs_query        query = hs_query_among(among, HS_HALF_LIST, &of_visit);
     of_visit.sorted = false;
     of_visit.out = NULL;
+    of_visit.counters = options->counters != NULL ? options->counters : &done;
     if (!visit->thread_safe && options->threads > 1) { /* others only make the search ready */
-        const int64_t n = request.sets.points == NULL ? 0 : request.sets.points->n;
-        const int     n_threads = hs_call_threads((double)(n / HS_POINTS_MADE_READY), options);
-        of_visit.threads = n_threads > 1 ? options->threads : 1;
+        const double n = (double)(hs_query_asking(&query) / HS_POINTS_MADE_READY);
+        of_visit.threads = hs_call_threads(n, options) > 1 ? options->threads : 1;
     }
-    request.sets.keeps_none = true;
-    *n_visited = 0;
-    const hs_status status = hs_by_reach_each_step(&request, visit_pairs, &shared, failure);
+    query.sets.keeps_none = true;
+    const hs_status status = hs_query_answer(&query, &finder, NULL, failure);
+    *n_visited = of_visit.counters->pairs;
     return status == HS_ENOUGH ? HS_OK : status;
 }
 
@@ -492,5 +473,150 @@ hs_pairs_visit(const hs_among *among, const hs_options *options, const hs_visit 
     hs_options of_visit = *options;
     of_visit.want = WANTED;
     of_visit.index_bytes = 8;
-    return hs_visit_columns(among, &of_visit, visit, n_visited, failure);
+    return visit_columns(among, &of_visit, visit, n_visited, failure);
+}
+
+/* Clusters of points, joined pair by pair while these are found. */
+
+/* What the pairs are for. */
+typedef struct clustering {
+    hs_components  components; /* owned */
+    const uint8_t *core;       /* borrowed, or NULL */
+    int64_t       *labels;     /* borrowed */
+} clustering;
+
+/* A hs_pairs_fn: core points that are a pair belong together. */
+static int
+join_pairs(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user)
+{
+    clustering    *doing = user;
+    const int32_t *i = pairs->i, *j = pairs->j;
+    const int      n_axes = doing->components.n_axes;
+    (void)n_taken;
+    for (int64_t e = 0; e < n; e++) {
+        if (doing->core == NULL || (doing->core[i[e]] != 0 && doing->core[j[e]] != 0)) {
+            hs_components_join(&doing->components, i[e], j[e],
+                               n_axes > 0 ? pairs->shift + e * n_axes : NULL);
+        }
+    }
+    return 0;
+}
+
+/* A hs_pairs_fn: any other point belongs to the first cluster that has a core point near it. */
+static int
+adopt_points(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user)
+{
+    const clustering *doing = user;
+    const uint8_t    *core = doing->core;
+    const int32_t    *i = pairs->i, *j = pairs->j;
+    (void)n_taken;
+    for (int64_t e = 0; e < n; e++) {
+        if ((core[i[e]] != 0) != (core[j[e]] != 0)) {
+            int64_t      *label = &doing->labels[core[i[e]] != 0 ? j[e] : i[e]];
+            const int64_t near = doing->labels[core[i[e]] != 0 ? i[e] : j[e]];
+            *label = *label < 0 || near < *label ? near : *label;
+        }
+    }
+    return 0;
+}
+
+/* Whether some point is near enough to a cluster only. */
+static bool
+has_others(const uint8_t *core, int64_t n)
+{
+    return core != NULL && n > 0 && memchr(core, 0, (size_t)n) != NULL;
+}
+
+/* Whether anything repeats, in any system. */
+static bool
+is_periodic(const hs_query *query)
+{
+    const hs_box         *box = query->box;
+    const hs_each_system *each = query->among != NULL ? query->among->each : NULL;
+    bool                  any = false;
+    if (box == NULL || each == NULL || each->periodic == NULL) {
+        for (int l = 0; box != NULL && l < box->ndim; l++) {
+            any = any || box->periodic[l];
+        }
+        return any;
+    }
+    for (int64_t s = 0; s < query->among->points->n_systems; s++) {
+        any = any || each->periodic[s] != 0;
+    }
+    return any;
+}
+
+/* The pairs, once or twice; the options' memory limit is what the search may take. */
+static hs_status
+join_all_pairs(const hs_among *among, const hs_options *options, clustering *doing,
+               uint8_t *winding, int64_t *n_clusters, hs_failure *failure)
+{
+    hs_visit      visit = {.pairs = join_pairs, .user = doing};
+    hs_options    of_visit = *options;
+    int64_t       n_pairs;
+    const int64_t n = doing->components.n;
+    of_visit.want = HS_WANT_I | HS_WANT_J | (doing->components.n_axes > 0 ? HS_WANT_SHIFT : 0);
+    hs_status status = visit_columns(among, &of_visit, &visit, &n_pairs, failure);
+    if (status != HS_OK) {
+        return status;
+    }
+    const int64_t found =
+        hs_components_label(&doing->components, doing->core, doing->labels, winding);
+    if (has_others(doing->core, n)) {
+        visit.pairs = adopt_points;
+        of_visit.want = HS_WANT_I | HS_WANT_J;
+        of_visit.counters = NULL;
+        status = visit_columns(among, &of_visit, &visit, &n_pairs, failure);
+    }
+    if (status == HS_OK) {
+        *n_clusters = found;
+    }
+    return status;
+}
+
+static hs_status
+find_clusters(const hs_among *among, const hs_options *options, const uint8_t *core,
+              int64_t *labels, uint8_t *winding, int64_t *n_clusters, hs_failure *failure)
+{
+    const hs_query   query = hs_query_among(among, HS_HALF_LIST, options);
+    const hs_points *points = query.sets.points;
+    clustering       doing = {.core = core, .labels = labels};
+    hs_account       account;
+    hs_clear_counters(options);
+    hs_status status = hs_check_arguments(points, NULL, query.box, options, failure);
+    if (status != HS_OK) {
+        return status;
+    }
+    const int n_axes = winding != NULL && is_periodic(&query) ? points->ndim : 0;
+    hs_account_init(&account, options);
+    status = hs_components_open(&account, points->n, n_axes, &doing.components);
+    if (status == HS_OK) {
+        hs_options of_search = *options;
+        of_search.memory_limit -= (double)account.held;
+        status = join_all_pairs(among, &of_search, &doing, winding, n_clusters, failure);
+        failure->limit_bytes += status == HS_ERR_MEMORY ? (double)account.held : 0.0;
+    } else {
+        failure->limit_bytes = account.limit;
+    }
+    hs_components_close(&account, &doing.components);
+    hs_account_close(&account);
+    return status;
+}
+
+hs_status
+hs_clusters_find(const hs_among *among, const hs_options *options, const uint8_t *core,
+                 int64_t *labels, uint8_t *winding, int64_t *n_clusters, hs_failure *failure)
+{
+    const hs_query query = hs_query_among(among, HS_HALF_LIST, options);
+    if (options == NULL || n_clusters == NULL || !hs_has_entries(labels, query.sets.points)) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
+    hs_entry   entry;
+    hs_options of_search = hs_options_of_count(options);
+    of_search.index_bytes = 4;
+    failure = hs_enter(failure, &entry);
+    const hs_status status =
+        find_clusters(among, &of_search, core, labels, winding, n_clusters, failure);
+    hs_leave(&entry);
+    return status;
 }

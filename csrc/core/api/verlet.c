@@ -5,7 +5,7 @@
  */
 #include "../verlet/pair_list.h"
 #include "../verlet/recheck.h"
-#include "request.h"
+#include "query.h"
 #include "../box/lattice.h"
 #include "../memory/memory.h"
 #include "../exact/arithmetic.h"

@@ -21,6 +21,10 @@
 #define TILE 512
 /* Points for which a strip of its own pays. */
 #define STRIP_POINTS 16384
+/* Queries whose numbers are sorted one by one, as pairs of cell and number: counting would take
+ * longer for all the cells, of which there are at least so many times more. */
+#define FEW_QUERIES   HS_POLL_POINTS
+#define CELLS_PER_FEW 8
 
 typedef struct sorting {
     const hs_grid    *grid;
@@ -63,50 +67,62 @@ add_index(const hs_grid *grid, int k, const double *HS_RESTRICT t, int64_t n,
     }
 }
 
+/* Cells of n points, at most TILE, from `begin` on. */
+static void
+find_cells(const sorting *sort, int64_t begin, int64_t n)
+{
+    uint32_t     *id = sort->cells + begin;
+    const double *from[HS_MAX_DIM];
+    double        t[TILE];
+    for (int k = 0; k < sort->grid->ndim; k++) {
+        from[k] = sort->x[k] + begin;
+    }
+    memset(id, 0, (size_t)n * sizeof *id);
+    for (int k = 0; k < sort->grid->ndim; k++) {
+        if (sort->grid->shape[k] == 1) {
+            continue;
+        }
+        if (sort->lattice->aligned) {
+            add_index(sort->grid, k, from[k], n, id);
+        } else {
+            hs_fold_coordinates(sort->lattice, k, from, n, t);
+            add_index(sort->grid, k, t, n, id);
+        }
+    }
+}
+
 static hs_status
 count_strip(void *context, int strip, int64_t first, int64_t last)
 {
     const sorting *sort = context;
     int32_t       *counts = sort->counts[strip];
-    double         t[TILE];
     for (int64_t begin = first; begin < last; begin += TILE) {
         const int64_t n = last - begin < TILE ? last - begin : TILE;
-        uint32_t     *id = sort->cells + begin;
-        const double *from[HS_MAX_DIM];
-        for (int k = 0; k < sort->grid->ndim; k++) {
-            from[k] = sort->x[k] + begin;
-        }
-        memset(id, 0, (size_t)n * sizeof *id);
-        for (int k = 0; k < sort->grid->ndim; k++) {
-            if (sort->grid->shape[k] == 1) {
-                continue;
-            }
-            if (sort->lattice->aligned) {
-                add_index(sort->grid, k, from[k], n, id);
-            } else {
-                hs_fold_coordinates(sort->lattice, k, from, n, t);
-                add_index(sort->grid, k, t, n, id);
-            }
-        }
-        for (int64_t i = 0; i < n; i++) {
-            counts[id[i]]++;
+        find_cells(sort, begin, n);
+        for (int64_t i = begin; i < begin + n; i++) {
+            counts[sort->cells[i]]++;
         }
     }
     return HS_OK;
 }
 
-/* Turns numbers of points into places: cell by cell, and in each cell strip by strip. */
-static void
+/* Turns numbers of points into places: cell by cell, and in each cell strip by strip. Returns the
+ * sum of the squared numbers of each cell. */
+static double
 accumulate(const sorting *sort)
 {
+    int64_t squares = 0;
     int32_t place = 0;
     for (int64_t c = 0; c < sort->grid->n_cells; c++) {
+        const int64_t before = place;
         for (int strip = 0; strip < sort->n_strips; strip++) {
             const int32_t count = sort->counts[strip][c];
             sort->counts[strip][c] = place;
             place += count;
         }
+        squares += (place - before) * (place - before);
     }
+    return (double)squares;
 }
 
 static hs_status
@@ -133,12 +149,12 @@ choose_strips(const hs_team *team, int64_t n, int64_t n_cells)
     return n_strips;
 }
 
-/* Sorts the point numbers into bins->order, and fills bins->start. */
+/* Sorts the point numbers into bins->order, and fills `start`. */
 static hs_status
-sort_numbers(hs_account *account, hs_team *team, const hs_options *options, sorting *sort)
+sort_numbers(hs_account *account, hs_team *team, const hs_options *options, sorting *sort,
+             hs_bins *bins, int32_t *start)
 {
-    const int64_t n_cells = sort->grid->n_cells, n = sort->bins->n;
-    int32_t      *start = sort->bins->start;
+    const int64_t n_cells = sort->grid->n_cells, n = bins->n;
     int32_t      *others = NULL;
     sort->n_strips = choose_strips(team, n, n_cells);
     if (sort->n_strips > 1) {
@@ -153,7 +169,7 @@ sort_numbers(hs_account *account, hs_team *team, const hs_options *options, sort
     }
     hs_status status = hs_walk_strips(team, options, n, sort->n_strips, count_strip, sort);
     if (status == HS_OK) {
-        accumulate(sort);
+        bins->squares = accumulate(sort);
         status = hs_walk_strips(team, options, n, sort->n_strips, order_strip, sort);
     }
     /* The last strip's place in a cell has moved up to where the next cell starts. */
@@ -259,16 +275,63 @@ hs_bins_arrange(hs_account *account, hs_team *team, const hs_options *options,
     return status;
 }
 
+/* Sorts few numbers into bins->order, and fills bins->cells. numbers: the spare column. */
+static hs_status
+sort_few(hs_account *account, const sorting *sort, uint64_t *numbers, hs_bins *bins)
+{
+    const int64_t n = bins->n;
+    uint64_t     *spare = hs_alloc(account, HS_FOR_ORDER, n, sizeof *spare);
+    if (spare == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    for (int64_t begin = 0; begin < n; begin += TILE) {
+        find_cells(sort, begin, n - begin < TILE ? n - begin : TILE);
+    }
+    for (int64_t i = 0; i < n; i++) {
+        numbers[i] = (uint64_t)sort->cells[i] << 32 | (uint64_t)i;
+    }
+    hs_sort_numbers(numbers, n, spare);
+    hs_free(account, spare);
+    for (int64_t si = 0, run = 0; si < n; si++) {
+        bins->order[si] = (int32_t)(uint32_t)numbers[si];
+        bins->cells[si] = (uint32_t)(numbers[si] >> 32);
+        run = si > 0 && bins->cells[si] == bins->cells[si - 1] ? run + 1 : 0;
+        bins->squares += (double)(2 * run + 1);
+    }
+    return HS_OK;
+}
+
+/* Sorts many numbers into bins->order, and fills bins->cells. */
+static hs_status
+sort_many(hs_account *account, hs_team *team, const hs_options *options, sorting *sort,
+          hs_bins *bins)
+{
+    int32_t *start = hs_alloc(account, HS_FOR_CELLS, sort->grid->n_cells + 1, sizeof *start);
+    if (start == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    hs_status status = sort_numbers(account, team, options, sort, bins, start);
+    hs_free(account, start);
+    if (status == HS_OK) {
+        moving move = {bins->order, sort->cells, bins->cells, sizeof *bins->cells};
+        status = hs_walk_slabs(team, options, bins->n, gather_slab, &move);
+    }
+    return status;
+}
+
+/* Sorts the points into bins->order, and fills `start` or `cells`. */
 static hs_status
 sort_points(hs_account *account, hs_team *team, const hs_options *options, const hs_scene *scene,
             const hs_grid *grid, hs_bins *bins)
 {
-    sorting         sort = {.grid = grid,
-                            .lattice = &scene->lattice,
-                            .bins = bins,
-                            .x = bins->x,
-                            .cells = (uint32_t *)(void *)scene->cloud.spare};
-    const hs_status status = sort_numbers(account, team, options, &sort);
+    const bool is_few = bins->n <= FEW_QUERIES && bins->n <= grid->n_cells / CELLS_PER_FEW;
+    void      *spare = scene->cloud.spare;
+    sorting    sort = {.grid = grid, .lattice = &scene->lattice, .bins = bins, .x = bins->x};
+    hs_status  status;
+    sort.cells = bins->cells != NULL && is_few ? bins->cells : spare;
+    status = bins->cells == NULL ? sort_numbers(account, team, options, &sort, bins, bins->start)
+             : is_few            ? sort_few(account, &sort, spare, bins)
+                                 : sort_many(account, team, options, &sort, bins);
     return status == HS_OK ? hs_bins_arrange(account, team, options, scene, bins) : status;
 }
 
@@ -289,18 +352,28 @@ hs_bins_take(hs_scene *scene, hs_bins *bins)
 
 hs_status
 hs_bins_build(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
-              const hs_grid *grid, hs_bins *bins)
+              const hs_grid *grid, bool of_queries, hs_bins *bins)
 {
-    hs_status status = HS_OK;
+    const int64_t n = scene->n;
+    hs_status     status = HS_OK;
     hs_bins_take(scene, bins);
-    bins->start = hs_alloc(account, HS_FOR_CELLS, grid->n_cells + 1, sizeof(int32_t));
-    if (bins->start == NULL) {
+    if (of_queries) {
+        bins->cells = hs_alloc(account, HS_FOR_CELLS, n, sizeof *bins->cells);
+    } else {
+        bins->start = hs_alloc(account, HS_FOR_CELLS, grid->n_cells + 1, sizeof *bins->start);
+    }
+    if (bins->start == NULL && bins->cells == NULL) {
         status = HS_ERR_MEMORY;
     } else if (grid->n_cells == 1) {
-        bins->start[0] = 0;
-        bins->start[1] = (int32_t)scene->n;
-        for (int64_t i = 0; i < scene->n; i++) {
+        bins->squares = (double)n * (double)n;
+        for (int64_t i = 0; i < n; i++) {
             bins->order[i] = (int32_t)i;
+        }
+        if (of_queries) {
+            memset(bins->cells, 0, (size_t)n * sizeof *bins->cells);
+        } else {
+            bins->start[0] = 0;
+            bins->start[1] = (int32_t)n;
         }
     } else {
         status = sort_points(account, team, options, scene, grid, bins);
@@ -317,9 +390,11 @@ hs_bins_free(hs_account *account, hs_bins *bins)
     hs_free(account, bins->points);
     hs_free(account, bins->beside);
     hs_free(account, bins->start);
+    hs_free(account, bins->cells);
     bins->points = NULL;
     bins->beside = NULL;
     bins->start = NULL;
+    bins->cells = NULL;
 }
 
 /*
@@ -790,6 +865,10 @@ make_rows(build *b, hs_sparse *sparse, hs_bins *bins)
     }
     sparse->cell_start = bins->start;
     list_cells(b, bins->n, bins->start, sparse);
+    for (int64_t c = 0; c < sparse->n_cells; c++) {
+        const double n = bins->start[c + 1] - bins->start[c];
+        bins->squares += n * n;
+    }
     return HS_OK;
 }
 

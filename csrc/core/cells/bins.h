@@ -13,25 +13,29 @@
  */
 
 typedef struct hs_bins {
-    int64_t  n;
-    int      ndim;
-    int      n_periodic;
-    double  *x[HS_MAX_DIM]; /* X of each axis, n each; HS_PADDING more can be read */
-    int32_t *order;         /* a permutation of 0 ... n - 1; HS_PADDING more can be read */
-    int32_t *start;         /* owned; n_cells + 1, nondecreasing, last is n */
-    bool     keeps_originals;
-    double  *originals[HS_MAX_DIM]; /* the points as given, n each, if they are kept */
-    hs_turns turns;
-    void    *points; /* owned; the columns above lie in these two: the scene's blocks */
-    void    *beside; /* owned or NULL */
+    int64_t   n;
+    int       ndim;
+    int       n_periodic;
+    double   *x[HS_MAX_DIM]; /* X of each axis, n each; HS_PADDING more can be read */
+    int32_t  *order;         /* a permutation of 0 ... n - 1; HS_PADDING more can be read */
+    int32_t  *start;         /* owned; n_cells + 1, nondecreasing, last is n; NULL of queries */
+    uint32_t *cells;         /* owned; of queries in a dense grid: the cell of each */
+    double    squares;       /* sum of the squared numbers of points in each cell */
+    bool      keeps_originals;
+    double   *originals[HS_MAX_DIM]; /* the points as given, n each, if they are kept */
+    hs_turns  turns;
+    void     *points; /* owned; the columns above lie in these two: the scene's blocks */
+    void     *beside; /* owned or NULL */
 } hs_bins;
 
 /*
  * Sorts, polling now and then; takes the scene's arrays over or frees them. On failure holds
- * nothing. The result does not depend on the team.
+ * nothing. The result does not depend on the team. of_queries: what is stored is the cell of each
+ * point, not where the points of each cell begin; and few points take time for themselves alone,
+ * however many cells there are.
  */
 hs_status hs_bins_build(hs_account *account, hs_team *team, const hs_options *options,
-                        hs_scene *scene, const hs_grid *grid, hs_bins *bins);
+                        hs_scene *scene, const hs_grid *grid, bool of_queries, hs_bins *bins);
 
 /* Steps of hs_bins_build, for other orders: the scene's arrays become those of the bins, in the
  * caller's order as yet, and without `start`; the scene's spare column stays usable. */

@@ -253,6 +253,60 @@ hs_output_copy(hs_output *output, int64_t at, const hs_output *part, int64_t fir
             }
         }
     }
+    hs_bypass_end();
+}
+
+#define ROWS_AHEAD 16 /* rows from prefetching a place to writing there */
+
+/* Prefetches the lines of a row that it shares with others, or all; the others are written whole
+ * past the caches. */
+HS_ALWAYS_INLINE void
+expect_row(const char *from, const char *end, bool bypass)
+{
+    for (; from < end && !bypass; from += HS_ALIGNMENT) {
+        HS_PREFETCH_WRITE(from);
+    }
+    HS_PREFETCH_WRITE(from);
+    HS_PREFETCH_WRITE(end);
+}
+
+static void
+place_column(char *column, const char *from, size_t width, bool bypass, const int64_t *offsets,
+             const int32_t *row, int64_t n, int64_t known)
+{
+    for (int64_t t = 0; t < n; t++) {
+        const int64_t *place = offsets + row[t];
+        const size_t   n_bytes = (size_t)(place[1] - place[0]) * width;
+        char          *to = column + (size_t)place[0] * width;
+        if (t + 2 * ROWS_AHEAD < known) {
+            HS_PREFETCH(offsets + row[t + 2 * ROWS_AHEAD]);
+        }
+        if (t + ROWS_AHEAD < known) {
+            const int64_t *next = offsets + row[t + ROWS_AHEAD];
+            expect_row(column + (size_t)next[0] * width, column + (size_t)next[1] * width, bypass);
+        }
+        if (bypass) {
+            hs_bypass_copy(to, from, n_bytes);
+        } else {
+            memcpy(to, from, n_bytes);
+        }
+        from += n_bytes;
+    }
+}
+
+void
+hs_output_place(const hs_output *output, const int64_t *offsets, const hs_output *part,
+                const int32_t *row, int64_t n, int64_t known)
+{
+    for (int k = 0; k < HS_QUANTITIES && part->n_pairs > 0; k++) {
+        if (output->columns >> k & 1u) {
+            const size_t width = hs_output_width(output, 1u << k);
+            place_column(output->column[k].data, part->column[k].data, width,
+                         (double)output->capacity * (double)width >= LEAST_BYPASSED, offsets, row,
+                         n, known);
+        }
+    }
+    hs_bypass_end();
 }
 
 /* Ownership of one column, cut to n_pairs, goes to the caller: hs_buffer_free. NULL where it is not
@@ -391,13 +445,13 @@ hs_pairs_open(hs_pairs *pairs, int ndim)
 }
 
 hs_status
-hs_pairs_open_offsets(hs_account *account, int64_t n, hs_pairs *pairs, int64_t **offsets)
+hs_output_open_offsets(hs_account *account, int64_t n, hs_output *output, int64_t **offsets)
 {
-    hs_output_init(account, 1, HS_WANT_I, 8, &pairs->offsets);
-    const hs_status status = hs_output_reserve(&pairs->offsets, n, 0.0);
+    hs_output_init(account, 1, HS_WANT_I, 8, output);
+    const hs_status status = hs_output_reserve(output, n, 0.0);
     if (status == HS_OK) {
-        pairs->offsets.n_pairs = n;
-        *offsets = hs_output_column(&pairs->offsets, HS_WANT_I);
+        output->n_pairs = n;
+        *offsets = hs_output_column(output, HS_WANT_I);
     }
     return status;
 }

@@ -62,6 +62,28 @@ void hs_output_touch(hs_output *output, int64_t at, int64_t n);
 void hs_output_copy(hs_output *output, int64_t at, const hs_output *part, int64_t first,
                     int64_t end);
 
+/* Copies rows of a table, which are one behind another in `part` from its beginning: row[t] begins
+ * at entry offsets[row[t]], and ends where the next one begins. Of the `known` >= n entries of
+ * `row`, those behind the first n are the rows that will come next. */
+void hs_output_place(const hs_output *output, const int64_t *offsets, const hs_output *part,
+                     const int32_t *row, int64_t n, int64_t known);
+
+/* n indices to every `stride`-th place of a column of 4 or 8 bytes each, from every `step`-th
+ * number; step 0: all are the first one. column NULL: nothing. */
+HS_ALWAYS_INLINE void
+hs_put_indices(void *column, int index_bytes, const int64_t stride, const int32_t *numbers,
+               const int64_t step, int64_t n)
+{
+    int32_t *HS_RESTRICT narrow = column;
+    int64_t *HS_RESTRICT wide = column;
+    for (int64_t e = 0; column != NULL && index_bytes == 4 && e < n; e++) {
+        narrow[e * stride] = numbers[e * step];
+    }
+    for (int64_t e = 0; column != NULL && index_bytes == 8 && e < n; e++) {
+        wide[e * stride] = (int64_t)(uint32_t)numbers[e * step]; /* cheaper than a sign */
+    }
+}
+
 /* Virtual room for about n pairs, before the first: saves growing. Never fails. */
 void hs_output_reserve_hint(hs_output *output, double n);
 
@@ -98,9 +120,10 @@ hs_pairs *hs_pairs_new(void);
 /* An empty output of the columns that the call wants, or the caller's arrays. */
 void hs_pairs_open(hs_pairs *pairs, int ndim);
 
-/* n offsets, of which none is set, charged to `account`; *offsets is their array. HS_OK or
- * HS_ERR_MEMORY; the output of offsets can be freed either way. */
-hs_status hs_pairs_open_offsets(hs_account *account, int64_t n, hs_pairs *pairs, int64_t **offsets);
+/* An output of n offsets, of which none is set, charged to `account`; *offsets is their array.
+ * HS_OK or HS_ERR_MEMORY; it can be freed either way. */
+hs_status hs_output_open_offsets(hs_account *account, int64_t n, hs_output *output,
+                                 int64_t **offsets);
 
 /* Leaves the call, which found n_pairs pairs. *result becomes the object, or that is freed. Returns
  * the status. */

@@ -341,10 +341,8 @@ can_write(const hs_recorder *recorder, const hs_scanner *scanner)
 {
     const hs_search *search = scanner->search;
     const int        d = search->scene.ndim;
-    return search->call->kernel->write != NULL &&
-           (search->is_half || !(recorder->columns & (HS_WANT_I | HS_WANT_J))) && d >= 2 &&
-           d <= HS_WRITE_MOST_DIM && !(recorder->columns & HS_WANT_BOTH) &&
-           scanner->pair_batch.of.is_narrow &&
+    return search->call->kernel->write != NULL && d >= 2 && d <= HS_WRITE_MOST_DIM &&
+           !(recorder->columns & HS_WANT_BOTH) && scanner->pair_batch.of.is_narrow &&
            (!(recorder->columns & HS_MEASURED) ||
             (search->limits == NULL && !search->scene.extreme &&
              search->scene.metric.floats_usable));
@@ -662,33 +660,22 @@ put_measures(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs
 
 #define INDICES (HS_WANT_I | HS_WANT_J | HS_WANT_BOTH)
 
-/* i and j side by side. */
+/* The lower of the two numbers to i, the other to j. */
 static void
-put_both(const hs_recorder *recorder, const hs_kernel *kernel, const hs_hits *hits)
+put_ordered(const hs_recorder *recorder, const hs_kernel *kernel, const hs_hits *hits)
 {
     const hs_output *output = recorder->output;
-    int32_t         *i = recorder->ends[0], *j = recorder->ends[1];
+    const int        bytes = output->index_bytes;
     const int32_t    n = hits->end[hits->n - 1];
-    void            *both = hs_output_next(output, HS_WANT_BOTH);
-    kernel->emit_int32(hits, i, j);
-    for (int32_t h = 0; h < n; h++) {
-        if (output->index_bytes == 8) {
-            ((int64_t *)both)[2 * h] = i[h];
-            ((int64_t *)both)[2 * h + 1] = j[h];
-        } else {
-            ((int32_t *)both)[2 * h] = i[h];
-            ((int32_t *)both)[2 * h + 1] = j[h];
-        }
+    char            *both = hs_output_next(output, HS_WANT_BOTH);
+    if (recorder->columns & (HS_WANT_I | HS_WANT_J)) {
+        (bytes == 8 ? kernel->emit_int64 : kernel->emit_int32)(
+            hits, hs_output_next(output, HS_WANT_I), hs_output_next(output, HS_WANT_J));
     }
-}
-
-static void
-put_index(void *column, int bytes, int64_t at, int32_t number)
-{
-    if (column != NULL && bytes == 8) {
-        ((int64_t *)column)[at] = number;
-    } else if (column != NULL) {
-        ((int32_t *)column)[at] = number;
+    if (both != NULL) {
+        kernel->emit_int32(hits, recorder->ends[0], recorder->ends[1]);
+        hs_put_indices(both, bytes, 2, recorder->ends[0], 1, n);
+        hs_put_indices(both + bytes, bytes, 2, recorder->ends[1], 1, n);
     }
 }
 
@@ -698,33 +685,25 @@ put_directed(const hs_recorder *recorder, const hs_hits *hits)
 {
     const hs_output *output = recorder->output;
     const int        bytes = output->index_bytes;
-    void            *i = hs_output_next(output, HS_WANT_I), *j = hs_output_next(output, HS_WANT_J);
-    void            *both = hs_output_next(output, HS_WANT_BOTH);
-    for (int32_t t = 0, h = 0; t < hits->n; t++) {
-        for (; h < hits->end[t]; h++) {
-            put_index(i, bytes, h, hits->point[t]);
-            put_index(j, bytes, h, hits->label[h]);
-            put_index(both, bytes, 2 * (int64_t)h, hits->point[t]);
-            put_index(both, bytes, 2 * (int64_t)h + 1, hits->label[h]);
-        }
+    const int32_t    n = hits->end[hits->n - 1];
+    char            *i = hs_output_next(output, HS_WANT_I), *j = hs_output_next(output, HS_WANT_J);
+    char            *both = hs_output_next(output, HS_WANT_BOTH);
+    hs_put_indices(j, bytes, 1, hits->label, 1, n);
+    hs_put_indices(both != NULL ? both + bytes : NULL, bytes, 2, hits->label, 1, n);
+    for (int32_t t = 0, h = 0; t < hits->n && (i != NULL || both != NULL); h = hits->end[t++]) {
+        const int64_t at = (int64_t)h * bytes, of_point = hits->end[t] - h;
+        hs_put_indices(i != NULL ? i + at : NULL, bytes, 1, &hits->point[t], 0, of_point);
+        hs_put_indices(both != NULL ? both + 2 * at : NULL, bytes, 2, &hits->point[t], 0, of_point);
     }
 }
 
 static void
 put_indices(const hs_recorder *recorder, const hs_search *search, const hs_hits *hits)
 {
-    const hs_kernel *kernel = search->call->kernel;
-    const hs_output *output = recorder->output;
-    if (!search->is_half) {
+    if (search->is_half) {
+        put_ordered(recorder, search->call->kernel, hits);
+    } else {
         put_directed(recorder, hits);
-        return;
-    }
-    const hs_emit_fn emit = output->index_bytes == 8 ? kernel->emit_int64 : kernel->emit_int32;
-    if (recorder->columns & (HS_WANT_I | HS_WANT_J)) {
-        emit(hits, hs_output_next(output, HS_WANT_I), hs_output_next(output, HS_WANT_J));
-    }
-    if (recorder->columns & HS_WANT_BOTH) {
-        put_both(recorder, kernel, hits);
     }
 }
 

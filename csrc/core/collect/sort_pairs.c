@@ -342,37 +342,11 @@ deal_out(hs_sorting *all)
 #define RANGE_ENTRIES 8192 /* of a range, about: with what is written of them they fit a cache */
 #define PUT           256  /* entries that are written at a time */
 
-/* A pair of points can occur in several images, so that sorting needs to tell these apart. */
-static bool
-images_repeat(const hs_search *search)
-{
-    const hs_lattice *lattice = &search->scene.lattice;
-    for (int k = 0; k < lattice->ndim; k++) {
-        if (lattice->row_of_axis[k] >= 0 && 2.0 * search->grid.range[k] >= lattice->period[k]) {
-            return true;
-        }
-    }
-    return false;
-}
-
 unsigned
 hs_sort_columns(const hs_search *search)
 {
     const unsigned wanted = search->call->options.want & ~(unsigned)HS_WANT_BOTH;
-    return wanted | HS_WANT_I | HS_WANT_J | (images_repeat(search) ? HS_WANT_SHIFT : 0);
-}
-
-/* n indices to every `stride`-th element. */
-static void
-put_indices(void *to, int index_bytes, int64_t stride, const int32_t *from, int64_t n)
-{
-    for (int64_t e = 0; e < n && to != NULL; e++) {
-        if (index_bytes == 8) {
-            ((int64_t *)to)[e * stride] = from[e];
-        } else {
-            ((int32_t *)to)[e * stride] = from[e];
-        }
-    }
+    return wanted | HS_WANT_I | HS_WANT_J | (hs_search_repeats_images(search) ? HS_WANT_SHIFT : 0);
 }
 
 /* The other quantities of n entries, at most PUT. */
@@ -422,10 +396,10 @@ put_some(const hs_sorting *all, int64_t first, int64_t n, int64_t *row, hs_outpu
         i[e] = all->first_point + (int32_t)*row;
         j[e] = second_of(all, entries[e]);
     }
-    put_indices(hs_output_next(sorted, HS_WANT_I), bytes, 1, i, n);
-    put_indices(hs_output_next(sorted, HS_WANT_J), bytes, 1, j, n);
-    put_indices(both, bytes, 2, i, n);
-    put_indices(both == NULL ? NULL : both + bytes, bytes, 2, j, n);
+    hs_put_indices(hs_output_next(sorted, HS_WANT_I), bytes, 1, i, 1, n);
+    hs_put_indices(hs_output_next(sorted, HS_WANT_J), bytes, 1, j, 1, n);
+    hs_put_indices(both, bytes, 2, i, 1, n);
+    hs_put_indices(both == NULL ? NULL : both + bytes, bytes, 2, j, 1, n);
     put_measures(all, entries, n, sorted);
     sorted->n_pairs += n;
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "connectivity.h"
+#include "../collect/sort_pairs.h"
 #include "../base/sort.h"
 #include "../base/os.h"
 
@@ -236,6 +237,16 @@ hs_half_list_copy(hs_account *account, const hs_half_list *pairs, int64_t n, boo
     return check(&half, n, directed, failure);
 }
 
+hs_status
+hs_half_list_rows(hs_call *call, const hs_output *half, int64_t n, bool directed,
+                  hs_output *offsets, hs_output *rows)
+{
+    int64_t        *first;
+    const hs_status status = hs_output_open_offsets(&call->account, n + 1, offsets, &first);
+    hs_output_init(&call->account, half->ndim, half->columns & ~(unsigned)HS_WANT_I, 4, rows);
+    return status == HS_OK ? hs_sort_rows(call, n, half, !directed, first, rows) : status;
+}
+
 /* Where the lists follow each other in a row, it is cut at their ends; else each entry
  * goes to where its list goes on. */
 
@@ -304,22 +315,16 @@ find_points(const hs_node_map *map, const hs_rows_view *from, int32_t *point_of_
     return n_entries;
 }
 
+/* Offsets, which are not set, and room for the entries, in an empty result. */
 static hs_status
-reserve(hs_call *call, const hs_node_map *map, int64_t n_entries, const hs_rows_view *from,
-        hs_pairs *rows)
+open_rows(hs_call *call, int64_t n_offsets, int64_t n_entries, bool has_shift, int ndim,
+          hs_pairs *rows, int64_t **offsets)
 {
-    const int64_t  n = map->n_rows * map->n_lists + 1;
-    const unsigned columns = HS_WANT_J | (from->shift != NULL ? (unsigned)HS_WANT_SHIFT : 0u);
-    int64_t       *offsets;
-    hs_output_init(&call->account, from->ndim, columns, 4, &rows->output);
-    hs_status status = hs_pairs_open_offsets(&call->account, n, rows, &offsets);
-    if (status == HS_OK) {
-        status = hs_output_reserve(&rows->output, n_entries, 0.0);
-    }
-    if (status == HS_OK) {
-        rows->output.n_pairs = n_entries;
-    }
-    return status;
+    const unsigned shift = has_shift ? (unsigned)HS_WANT_SHIFT : 0u;
+    hs_output_init(&call->account, has_shift ? ndim : 1, HS_WANT_J | shift, 4, &rows->output);
+    const hs_status status =
+        hs_output_open_offsets(&call->account, n_offsets, &rows->offsets, offsets);
+    return status == HS_OK ? hs_output_reserve(&rows->output, n_entries, 0.0) : status;
 }
 
 hs_status
@@ -329,10 +334,13 @@ hs_row_split_fill(hs_call *call, const hs_node_map *map, const hs_rows_view *fro
     if (point_of_row == NULL) {
         return HS_ERR_MEMORY;
     }
+    int64_t        *offsets;
     const int64_t   n_entries = find_points(map, from, point_of_row);
-    const hs_status status = reserve(call, map, n_entries, from, rows);
+    const hs_status status = open_rows(call, map->n_rows * map->n_lists + 1, n_entries,
+                                       from->shift != NULL, from->ndim, rows, &offsets);
     if (status == HS_OK) {
-        split_target to = {.offsets = hs_output_column(&rows->offsets, HS_WANT_I),
+        rows->output.n_pairs = n_entries;
+        split_target to = {.offsets = offsets,
                            .index = hs_output_column(&rows->output, HS_WANT_J),
                            .shift = hs_output_column(&rows->output, HS_WANT_SHIFT)};
         to.offsets[0] = 0;
@@ -345,143 +353,6 @@ hs_row_split_fill(hs_call *call, const hs_node_map *map, const hs_rows_view *fro
         }
     }
     hs_free(&call->account, point_of_row);
-    return status;
-}
-
-/* One pass counts, one puts each point where the row goes on. Pairs of one i and j in
- * several images are a group, put from its end for the row in which shifts are negative. */
-
-/* Pairs between two calls of poll(). */
-#define POLL_PAIRS (INT64_C(1) << 20)
-
-typedef struct rows_filling {
-    const hs_node_map *map;
-    hs_half_columns    half;
-    int64_t           *next; /* where each entry goes on, or how long it is */
-    int32_t           *index;
-    int32_t           *shift; /* NULL: none */
-} rows_filling;
-
-/* The entry of a point's row for the list of another one, or -1. */
-HS_ALWAYS_INLINE int64_t
-entry_of(const hs_node_map *map, int32_t point, int32_t other)
-{
-    const int32_t row = map->row[point];
-    return row < 0 ? -1 : (int64_t)row * map->n_lists + map->list[other];
-}
-
-/* How long each entry is, one place further on. */
-static hs_status
-count(const hs_options *options, const rows_filling *doing)
-{
-    const hs_half_columns *half = &doing->half;
-    int64_t               *counts = doing->next + 1;
-    for (int64_t e = 0; e < half->n; e++) {
-        const int64_t of_i = entry_of(doing->map, half->i[e], half->j[e]);
-        const int64_t of_j = doing->map->directed ? -1
-                                                  : entry_of(doing->map, half->j[e], half->i[e]);
-        if (of_i >= 0) {
-            counts[of_i]++;
-        }
-        if (of_j >= 0) {
-            counts[of_j]++;
-        }
-        if (e % POLL_PAIRS == POLL_PAIRS - 1 && hs_poll(options, 1.0) != HS_OK) {
-            return HS_ERR_INTERRUPTED;
-        }
-    }
-    return HS_OK;
-}
-
-/* Puts `other` into the row of a point, with the shift of pair e, or its opposite. */
-HS_ALWAYS_INLINE void
-put_node_entry(const rows_filling *doing, int32_t point, int32_t other, int64_t e, bool is_opposite)
-{
-    const int64_t entry = entry_of(doing->map, point, other);
-    if (entry < 0) {
-        return;
-    }
-    const int64_t at = doing->next[entry]++;
-    doing->index[at] = doing->map->node[other];
-    if (doing->shift != NULL) {
-        const int      d = doing->half.ndim;
-        const int32_t *from = doing->half.shift + e * d;
-        for (int k = 0; k < d; k++) {
-            doing->shift[at * d + k] = is_opposite ? (int32_t)(0u - (uint32_t)from[k]) : from[k];
-        }
-    }
-}
-
-/* The pairs [first, end) of one i and j. A point's own images follow each other by S. */
-HS_ALWAYS_INLINE void
-put_group(const rows_filling *doing, int64_t first, int64_t end)
-{
-    const int32_t i = doing->half.i[first], j = doing->half.j[first];
-    const bool    mirrors = !doing->map->directed;
-    for (int64_t e = end; i == j && mirrors && e-- > first;) {
-        put_node_entry(doing, i, i, e, true);
-    }
-    for (int64_t e = first; e < end; e++) {
-        put_node_entry(doing, i, j, e, false);
-    }
-    for (int64_t e = end; i != j && mirrors && e-- > first;) {
-        put_node_entry(doing, j, i, e, true);
-    }
-}
-
-static hs_status
-fill_node_rows(const hs_options *options, const rows_filling *doing)
-{
-    const hs_half_columns *half = &doing->half;
-    int64_t                polled = 0;
-    for (int64_t first = 0, end; first < half->n; first = end) {
-        end = first + 1;
-        while (half->shift != NULL && end < half->n && half->i[end] == half->i[first] &&
-               half->j[end] == half->j[first]) {
-            end++;
-        }
-        put_group(doing, first, end);
-        if (end - polled >= POLL_PAIRS) {
-            polled = end;
-            if (hs_poll(options, 1.0) != HS_OK) {
-                return HS_ERR_INTERRUPTED;
-            }
-        }
-    }
-    return HS_OK;
-}
-
-hs_status
-hs_node_rows_fill(hs_call *call, const hs_node_map *map, const hs_output *half, hs_pairs *rows,
-                  hs_failure *failure)
-{
-    rows_filling   doing = {.map = map, .half = hs_half_list_columns(half)};
-    const int64_t  n = map->n_rows * map->n_lists + 1;
-    const unsigned columns = HS_WANT_J | (half->columns & HS_WANT_SHIFT);
-    hs_output     *output = &rows->output;
-    hs_status      status = hs_output_check_opposites(half, failure);
-    hs_output_init(&call->account, half->ndim, columns, 4, output);
-    if (status == HS_OK) {
-        status = hs_pairs_open_offsets(&call->account, n, rows, &doing.next);
-    }
-    if (status == HS_OK) {
-        memset(doing.next, 0, (size_t)n * sizeof *doing.next);
-        status = count(&call->options, &doing);
-    }
-    if (status != HS_OK) {
-        return status;
-    }
-    hs_starts_of_lengths(doing.next, n);
-    const int64_t n_entries = doing.next[n - 1];
-    status = hs_output_reserve(output, n_entries, 0.0);
-    if (status != HS_OK) {
-        return status;
-    }
-    output->n_pairs = n_entries;
-    doing.index = hs_output_column(output, HS_WANT_J);
-    doing.shift = hs_output_column(output, HS_WANT_SHIFT);
-    status = fill_node_rows(&call->options, &doing);
-    hs_starts_of_ends(doing.next, n);
     return status;
 }
 
@@ -690,15 +561,13 @@ row_pairs_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs, const hs
 }
 
 /* Pairs of rows in any order, or of which ghosts have none: entries that begin a pair are put in
- * order by both of its points, the second one first. */
+ * order. */
 
 typedef struct pair_sorting {
     const hs_node_map  *map;
     const hs_list_rows *rows;
     int32_t            *point_of_node; /* owned */
-    int64_t            *start;         /* owned; of each point */
-    int64_t            *order, *spare; /* owned; pairs */
-    hs_output           found, half;   /* as entries come, and in order */
+    hs_output           found;         /* pairs as entries come */
 } pair_sorting;
 
 /* Whether entry e of the row of p, which is q, begins a pair; *turned: with q. */
@@ -734,27 +603,21 @@ put_found(pair_sorting *doing, int32_t p, int32_t q, int64_t e, bool turned)
     }
 }
 
-/* The pairs of entries [first, last) of the row of p, of list l; of one q that comes first, by
- * their opposite shifts. False where a node is none. */
+/* The pairs of entries [first, last) of the row of p, of list l. False where a node is none. */
 static bool
 put_entries(pair_sorting *doing, int32_t p, int32_t l, int64_t first, int64_t last)
 {
     const int32_t *indices = doing->rows->indices;
     const int64_t  before = l > 0 ? doing->map->end[l - 1] : 0;
-    for (int64_t e = first, end; e < last; e = end) {
+    for (int64_t e = first; e < last; e++) {
         const int32_t node = indices[e];
         bool          turned;
         if (node < 0 || node >= doing->map->end[l] - before) {
             return false;
         }
         const int32_t q = doing->point_of_node[before + node];
-        for (end = e + 1; end < last && indices[end] == node;) {
-            end++;
-        }
-        for (int64_t k = e; k < end; k++) {
-            if (begins(doing, p, q, k, &turned)) {
-                put_found(doing, p, q, turned ? e + end - 1 - k : k, turned);
-            }
+        if (begins(doing, p, q, e, &turned)) {
+            put_found(doing, p, q, e, turned);
         }
     }
     return true;
@@ -786,68 +649,20 @@ find_pairs(hs_call *call, pair_sorting *doing)
     return status;
 }
 
-/* The numbers of pairs in `from` (NULL: in their order), by the points of a column, in `to`. */
-static void
-sort_by(const pair_sorting *doing, const int32_t *points, const int64_t *from, int64_t *to)
-{
-    int64_t *start = doing->start;
-    memset(start, 0, (size_t)(doing->map->n + 1) * sizeof *start);
-    for (int64_t e = 0; e < doing->found.n_pairs; e++) {
-        start[points[e] + 1]++;
-    }
-    hs_starts_of_lengths(start, doing->map->n + 1);
-    for (int64_t e = 0; e < doing->found.n_pairs; e++) {
-        const int64_t k = from != NULL ? from[e] : e;
-        to[start[points[k]]++] = k;
-    }
-}
-
-static hs_status
-sort_pairs(hs_call *call, pair_sorting *doing)
-{
-    const hs_half_columns found = hs_half_list_columns(&doing->found);
-    hs_account           *account = &call->account;
-    hs_status             status = HS_ERR_MEMORY;
-    doing->start = hs_alloc(account, HS_FOR_SORTING, doing->map->n + 1, sizeof *doing->start);
-    doing->order = hs_alloc(account, HS_FOR_SORTING, found.n, sizeof *doing->order);
-    doing->spare = hs_alloc(account, HS_FOR_SORTING, found.n, sizeof *doing->spare);
-    if (doing->start != NULL && doing->order != NULL && doing->spare != NULL) {
-        status = hs_output_reserve(&doing->half, found.n, 0.0);
-    }
-    if (status != HS_OK) {
-        return status;
-    }
-    sort_by(doing, found.j, NULL, doing->spare);
-    sort_by(doing, found.i, doing->spare, doing->order);
-    int32_t *i = hs_output_column(&doing->half, HS_WANT_I);
-    int32_t *j = hs_output_column(&doing->half, HS_WANT_J);
-    int32_t *shift = hs_output_column(&doing->half, HS_WANT_SHIFT);
-    for (int64_t e = 0; e < found.n; e++) {
-        const int64_t k = doing->order[e];
-        i[e] = found.i[k];
-        j[e] = found.j[k];
-        if (shift != NULL) {
-            memcpy(shift + e * found.ndim, found.shift + k * found.ndim,
-                   (size_t)found.ndim * sizeof *shift);
-        }
-    }
-    doing->half.n_pairs = found.n;
-    return HS_OK;
-}
-
 /* As row_pairs_fill, of any map. */
 static hs_status
 sorted_pairs_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs, const hs_list_rows *rows,
                   hs_pairs *nodes, hs_pairs *lists)
 {
     hs_account    *account = &call->account;
+    hs_output      half;
     pair_sorting   doing = {.map = map, .rows = rows};
     const int      d = rows->shift != NULL ? rows->ndim : 1;
     const unsigned columns = HS_WANT_I | HS_WANT_J |
                              (rows->shift != NULL ? (unsigned)HS_WANT_SHIFT : 0u);
     hs_status status = HS_ERR_MEMORY;
     hs_output_init(account, d, columns, 4, &doing.found);
-    hs_output_init(account, d, columns, 4, &doing.half);
+    hs_output_init(account, d, columns, 4, &half);
     doing.point_of_node = hs_alloc(account, HS_FOR_ORDER, map->n, sizeof *doing.point_of_node);
     if (doing.point_of_node != NULL) {
         for (int64_t p = 0; p < map->n; p++) {
@@ -857,17 +672,14 @@ sorted_pairs_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs, const
         status = find_pairs(call, &doing);
     }
     if (status == HS_OK) {
-        status = sort_pairs(call, &doing);
+        status = hs_sort_pairs(call, 0, map->n, &doing.found, &half);
     }
     if (status == HS_OK) {
-        status = hs_node_pairs_fill(call, map, ghost_pairs, &doing.half, nodes, lists);
+        status = hs_node_pairs_fill(call, map, ghost_pairs, &half, nodes, lists);
     }
     hs_output_free(&doing.found);
-    hs_output_free(&doing.half);
+    hs_output_free(&half);
     hs_free(account, doing.point_of_node);
-    hs_free(account, doing.start);
-    hs_free(account, doing.order);
-    hs_free(account, doing.spare);
     return status;
 }
 
@@ -894,30 +706,53 @@ hs_connectivity_new(void)
     return made;
 }
 
-hs_status
-hs_connectivity_fill(hs_connectivity *made, const hs_node_lists *lists, int64_t n,
-                     const hs_output *half, hs_failure *failure)
-{
-    hs_node_map map;
-    hs_account *account = &made->call.account;
-    hs_status   status = hs_node_map_make(account, lists, n, &map);
-    if (status != HS_OK) {
-        return status;
-    }
-    status = hs_node_rows_fill(&made->call, &map, half, made->rows, failure);
-    if (status == HS_OK && !lists->rows_only) {
-        status = hs_node_pairs_fill(&made->call, &map, lists->ghost_pairs, half, made->nodes,
-                                    made->lists);
-    }
-    hs_node_map_free(account, &map);
-    return status;
-}
-
 /* Whether rows of points are those of nodes: of one list, all of which have rows. */
 static bool
 needs_no_split(const hs_node_map *map)
 {
     return map->is_plain && map->n_lists == 1 && map->n_rows == map->n;
+}
+
+/* Rows of points become those of nodes. */
+static hs_status
+split_rows(hs_connectivity *made, const hs_node_map *map, const hs_output *offsets,
+           const hs_output *rows)
+{
+    const int64_t     *first = hs_output_column(offsets, HS_WANT_I);
+    const hs_rows_view view = {.first = first,
+                               .end = first + 1,
+                               .index = hs_output_column(rows, HS_WANT_J),
+                               .shift = hs_output_column(rows, HS_WANT_SHIFT),
+                               .ndim = rows->ndim};
+    return hs_row_split_fill(&made->call, map, &view, made->rows);
+}
+
+hs_status
+hs_connectivity_fill(hs_connectivity *made, const hs_node_lists *lists, int64_t n,
+                     const hs_output *half, hs_failure *failure)
+{
+    hs_node_map map;
+    hs_call    *call = &made->call;
+    hs_output   offsets = {.n_pairs = 0}, rows = {.n_pairs = 0};
+    hs_status   status = hs_node_map_make(&call->account, lists, n, &map);
+    if (status != HS_OK) {
+        return status;
+    }
+    status = hs_output_check_opposites(half, failure);
+    if (status == HS_OK && needs_no_split(&map)) {
+        status = hs_half_list_rows(call, half, n, map.directed, &made->rows->offsets,
+                                   &made->rows->output);
+    } else if (status == HS_OK) {
+        status = hs_half_list_rows(call, half, n, map.directed, &offsets, &rows);
+        status = status == HS_OK ? split_rows(made, &map, &offsets, &rows) : status;
+    }
+    hs_output_free(&offsets);
+    hs_output_free(&rows);
+    if (status == HS_OK && !lists->rows_only) {
+        status = hs_node_pairs_fill(call, &map, lists->ghost_pairs, half, made->nodes, made->lists);
+    }
+    hs_node_map_free(&call->account, &map);
+    return status;
 }
 
 /* The rows that have been filled, as a caller would give them. */
@@ -942,42 +777,27 @@ fill_pairs(hs_connectivity *made, const hs_node_map *map, bool ghost_pairs,
                                                              made->nodes, made->lists);
 }
 
-static hs_status
-fill_rows(hs_connectivity *made, const hs_node_map *map, const hs_node_lists *lists,
-          hs_pairs **found)
-{
-    const hs_output   *output = &(*found)->output;
-    const int64_t     *offsets = hs_pairs_offsets(*found);
-    const hs_rows_view view = {.first = offsets,
-                               .end = offsets + 1,
-                               .index = hs_output_column(output, HS_WANT_J),
-                               .shift = hs_output_column(output, HS_WANT_SHIFT),
-                               .ndim = output->ndim};
-    hs_status          status = HS_OK;
-    if (needs_no_split(map)) {
-        hs_pairs_free(made->rows);
-        made->rows = *found;
-        *found = NULL;
-    } else {
-        status = hs_row_split_fill(&made->call, map, &view, made->rows);
-    }
-    if (status == HS_OK && !lists->rows_only) {
-        const hs_list_rows rows = rows_of(made->rows, map->n_lists);
-        status = fill_pairs(made, map, lists->ghost_pairs, &rows);
-    }
-    return status;
-}
-
 hs_status
 hs_connectivity_fill_rows(hs_connectivity *made, const hs_node_lists *lists, hs_pairs **found)
 {
     hs_node_map map;
     hs_account *account = &made->call.account;
     hs_status   status = hs_node_map_make(account, lists, hs_pairs_rows(*found), &map);
-    if (status == HS_OK) {
-        status = fill_rows(made, &map, lists, found);
-        hs_node_map_free(account, &map);
+    if (status != HS_OK) {
+        return status;
     }
+    if (needs_no_split(&map)) {
+        hs_pairs_free(made->rows);
+        made->rows = *found;
+        *found = NULL;
+    } else {
+        status = split_rows(made, &map, &(*found)->offsets, &(*found)->output);
+    }
+    if (status == HS_OK && !lists->rows_only) {
+        const hs_list_rows rows = rows_of(made->rows, map.n_lists);
+        status = fill_pairs(made, &map, lists->ghost_pairs, &rows);
+    }
+    hs_node_map_free(account, &map);
     return status;
 }
 
@@ -1060,15 +880,9 @@ are_rows(const hs_list_rows *rows)
 static hs_status
 begin(hs_call *call, const hs_list_rows *rows, int64_t n, hs_pairs *result, new_rows *to)
 {
-    const int      ndim = rows->shift != NULL ? rows->ndim : 1;
-    const unsigned columns = HS_WANT_J | (rows->shift != NULL ? (unsigned)HS_WANT_SHIFT : 0u);
-    const int64_t  n_offsets = n * rows->n_lists + 1;
-    int64_t       *offsets = NULL;
-    hs_output_init(&call->account, ndim, columns, 4, &result->output);
-    hs_status status = hs_pairs_open_offsets(&call->account, n_offsets, result, &offsets);
-    if (status == HS_OK) {
-        status = hs_output_reserve(&result->output, rows->n_indices, 0.0);
-    }
+    int64_t        *offsets;
+    const hs_status status = open_rows(call, n * rows->n_lists + 1, rows->n_indices,
+                                       rows->shift != NULL, rows->ndim, result, &offsets);
     if (status != HS_OK) {
         return status;
     }

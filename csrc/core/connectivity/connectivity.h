@@ -59,6 +59,12 @@ typedef struct hs_half_columns {
 
 hs_half_columns hs_half_list_columns(const hs_output *half);
 
+/* Rows of n points, ascending by number and S, in two empty outputs: where each begins, and columns
+ * J and, where the half list has shifts, S. Pair (i, j) puts j into the row of i and, but for
+ * directed lists, i with -S into that of j. To be freed on failure as well. */
+hs_status hs_half_list_rows(hs_call *call, const hs_output *half, int64_t n, bool directed,
+                            hs_output *offsets, hs_output *rows);
+
 /* Whether the first component of S that is not 0 is positive; S is not 0. */
 HS_ALWAYS_INLINE bool
 hs_shift_is_forward(const int32_t *shift, int ndim)
@@ -84,26 +90,14 @@ typedef struct hs_rows_view {
     int            ndim;
 } hs_rows_view;
 
-/* Fills offsets and columns J and S of `rows`, empty, as hs_node_rows_fill does, from rows of all
- * points of the map. */
+/*
+ * Fills offsets and columns J and, where rows have shifts, S of `rows`, an empty result, from rows
+ * of all points of the map: entry l of row r, [offsets[r * n_lists + l], next), has the numbers in
+ * list l of neighbours of the node with that row, in the order of the points; of one neighbour
+ * ascending by S.
+ */
 hs_status hs_row_split_fill(hs_call *call, const hs_node_map *map, const hs_rows_view *from,
                             hs_pairs *rows);
-
-/*
- * The neighbours of each node in each list, from a half list. Pair (i, j) puts j into
- * the row of i and i into that of j. As pairs come in ascending order, each row is filled in
- * ascending order too: first with the smaller ones, while these are i, then with the larger ones.
- * Nothing is sorted.
- */
-
-/*
- * Fills offsets and columns J and, where the half list has shifts, S of `rows`, an empty result:
- * entry l of row r, [offsets[r * n_lists + l], next), has the numbers in list l of neighbours of
- * the node with that row, in the order of the points; of one neighbour ascending by S. A shift
- * whose opposite is no int32 is HS_ERR_SHIFT_RANGE.
- */
-hs_status hs_node_rows_fill(hs_call *call, const hs_node_map *map, const hs_output *half,
-                            hs_pairs *rows, hs_failure *failure);
 
 /* The table of pairs of nodes, each once, from a half list. */
 

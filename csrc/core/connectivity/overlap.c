@@ -187,67 +187,6 @@ point_rows_turn(hs_account *account, const hs_point_rows *from, const int32_t *o
     return HS_OK;
 }
 
-/* Puts `other` into the row of a point, with the shift of pair e, or its opposite. */
-HS_ALWAYS_INLINE void
-put_neighbor(const hs_half_columns *pairs, int64_t e, int32_t point, int32_t other,
-             bool is_opposite, hs_point_rows *rows)
-{
-    const int     d = pairs->ndim;
-    const int64_t at = rows->first[point]++;
-    rows->index[at] = other;
-    for (int k = 0; rows->shift != NULL && k < d; k++) {
-        const uint32_t component = (uint32_t)pairs->shift[e * d + k];
-        rows->shift[at * d + k] = (int32_t)(is_opposite ? 0u - component : component);
-    }
-}
-
-/* The first pair behind those of the i and j of pair e. */
-static int64_t
-end_of_images(const hs_half_columns *pairs, int64_t e)
-{
-    int64_t end = e + 1;
-    while (pairs->shift != NULL && end < pairs->n && pairs->i[end] == pairs->i[e] &&
-           pairs->j[end] == pairs->j[e]) {
-        end++;
-    }
-    return end;
-}
-
-/* All neighbours of each of n points. */
-static hs_status
-point_rows_of(hs_account *account, const hs_output *half, int64_t n, hs_point_rows *rows)
-{
-    const hs_half_columns pairs = hs_half_list_columns(half);
-    hs_status             status = allocate(account, n, rows);
-    if (status == HS_OK) {
-        status = allocate_index(account, 2 * pairs.n, rows);
-    }
-    if (status == HS_OK && pairs.shift != NULL) {
-        status = allocate_shifts(account, 2 * pairs.n, pairs.ndim, rows);
-    }
-    if (status != HS_OK) {
-        hs_point_rows_free(account, rows);
-        return status;
-    }
-    for (int64_t e = 0; e < pairs.n; e++) {
-        rows->first[pairs.i[e] + 1]++;
-        rows->first[pairs.j[e] + 1]++;
-    }
-    hs_starts_of_lengths(rows->first, rows->n + 1);
-    for (int64_t first = 0, end; first < pairs.n; first = end) { /* images of one i and j */
-        const int32_t i = pairs.i[first], j = pairs.j[first];
-        end = end_of_images(&pairs, first);
-        for (int64_t e = end; e-- > first;) {
-            put_neighbor(&pairs, e, j, i, true, rows);
-        }
-        for (int64_t e = first; e < end; e++) {
-            put_neighbor(&pairs, e, i, j, false, rows);
-        }
-    }
-    hs_starts_of_ends(rows->first, rows->n + 1);
-    return HS_OK;
-}
-
 void
 hs_point_rows_free(hs_account *account, hs_point_rows *rows)
 {
@@ -640,16 +579,23 @@ merge_all(merging *doing, const hs_output *half, hs_output *output, hs_failure *
                           .n_ranges = n_ranges,
                           .search = merge_range,
                           .output = output};
-    hs_status     status = point_rows_of(&doing->call->account, half, doing->map->n, &doing->rows);
+    hs_output     offsets = {.n_pairs = 0}, rows = {.n_pairs = 0};
+    hs_status status = hs_half_list_rows(doing->call, half, doing->map->n, false, &offsets, &rows);
     if (status == HS_OK && !count_before(doing, n_ranges)) {
         status = HS_ERR_MEMORY;
     }
     if (status == HS_OK) {
+        doing->rows = (hs_point_rows){.n = doing->map->n,
+                                      .first = hs_output_column(&offsets, HS_WANT_I),
+                                      .index = hs_output_column(&rows, HS_WANT_J),
+                                      .shift = hs_output_column(&rows, HS_WANT_SHIFT),
+                                      .ndim = rows.ndim};
         doing->longest = longest_row(&doing->rows);
         hs_call_gather(doing->call, doing->half.n); /* a pair is as much work as a point */
         status = hs_crew_run(&crew, failure);
     }
-    hs_point_rows_free(&doing->call->account, &doing->rows);
+    hs_output_free(&offsets);
+    hs_output_free(&rows);
     hs_free(&doing->call->account, doing->before);
     return status;
 }
@@ -668,7 +614,7 @@ hs_intersection_fill(hs_call *call, const hs_node_map *map, bool ghost_pairs, co
     const int64_t n = hs_node_pairs_count(map, ghost_pairs, half) * map->n_lists + 1;
     hs_output_init(&call->account, doing.half.ndim, wanted_of(&doing.half), 4, &result->output);
     int64_t  *offsets = NULL;
-    hs_status status = hs_pairs_open_offsets(&call->account, n, result, &offsets);
+    hs_status status = hs_output_open_offsets(&call->account, n, &result->offsets, &offsets);
     if (status == HS_OK) {
         status = hs_output_reserve(&result->output, 0, 0.0);
     }

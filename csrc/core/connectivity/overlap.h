@@ -148,7 +148,7 @@ typedef struct hs_space_order {
  * further apart. With shifts, entry (k, T) of row i and (k, U) of row j give (j, T - U).
  */
 
-/* Fills offsets and columns J and S of `rows`, empty, as hs_node_rows_fill does; all points of the
+/* Fills offsets and columns J and S of `rows`, empty, as hs_row_split_fill does; all points of the
  * map have rows. points: row after row; they only say what is near. */
 hs_status hs_overlap_fill(hs_call *call, const hs_node_map *map, const hs_index_rows *gather,
                           const double *points, int ndim, hs_pairs *rows, hs_failure *failure);

@@ -78,7 +78,8 @@ void        hs_expanded_bounds(int ndim, double cutoff, double extent, double er
                                double tiny, double *in, double *out);
 
 /* Errors of the expanded form grow with extent^2, those of the direct form with extent * cutoff:
- * worth it where this holds, which is wherever cells are about as wide as the cutoff. */
+ * worth it where this holds, which is wherever cells are about as wide as the cutoff. Without it
+ * counts take 1.16 to 1.34 times as long (AVX-512, AVX2; 52 and 419 neighbours), lists the same. */
 HS_ALWAYS_INLINE bool
 hs_expanded_pays(double cutoff, double extent)
 {

@@ -92,21 +92,30 @@ hs_support_set_read(hs_account *account, const hs_options *options, const double
     return status;
 }
 
-/* The largest width of all points, which a few tell where they are round or turned
- * in all ways. */
+/* How far pairs of a step can be apart along an axis of the grid, by their supports: cells go by
+ * that, so that needles along an axis have few candidates across it. The largest width of all
+ * points is told by a few where they are round or turned in all ways. */
+
+/* A step whose pairs are decided by supports; borrowed. */
+typedef struct support_step {
+    const hs_levels     *levels;
+    const hs_level_step *step;
+    const hs_options    *options; /* to poll by */
+} support_step;
 
 /* Of the points of some levels, which have supports. Ends where it is enough. */
 static hs_status
-width_of(const hs_support_step *of, const hs_level_set *set, hs_slice levels, const double *normal,
+width_of(const support_step *of, const hs_level_set *set, hs_slice levels, const double *normal,
          double enough, double *width)
 {
     const int     size_at = hs_support_entries(set->ndim);
     const int64_t first = set->first[levels.first], end = set->first[levels.end];
     *width = 0.0;
     for (int64_t at = first; at < end && *width < enough; at++) {
-        const double *numbers = hs_support_set_at(&set->supports, set->ndim, set->number[at]);
-        const double  own = hs_support_width(set->ndim, numbers, numbers[size_at],
-                                             of->levels->extent, set->radii[at], normal);
+        const double *numbers = set->supports.numbers + (set->number[at] - set->supports.first) *
+                                                            hs_support_numbers(set->ndim);
+        const double own = hs_support_width(set->ndim, numbers, numbers[size_at],
+                                            of->levels->extent, set->radii[at], normal);
         *width = hs_larger(*width, own);
         if ((at + 1 - first) % HS_POLL_SUPPORTS == 0 && hs_poll(of->options, 0.0) != HS_OK) {
             return HS_ERR_INTERRUPTED;
@@ -115,16 +124,16 @@ width_of(const hs_support_step *of, const hs_level_set *set, hs_slice levels, co
     return HS_OK;
 }
 
-/* The `find` of a hs_narrowing, whose context is a hs_support_step. */
+/* The `find` of a hs_narrowing, whose context is a support_step. */
 static hs_status
 support_step_width(const void *context, const double *normal, double enough, double *width)
 {
-    const hs_support_step *of = context;
-    const hs_level_step   *step = of->step;
-    const hs_level_set    *set = hs_levels_asking(of->levels);
-    const hs_rule          rule = of->levels->rule;
-    hs_status              status = HS_OK;
-    double                 asking = 0.0, points = 0.0;
+    const support_step  *of = context;
+    const hs_level_step *step = of->step;
+    const hs_level_set  *set = hs_levels_asking(of->levels);
+    const hs_rule        rule = of->levels->rule;
+    hs_status            status = HS_OK;
+    double               asking = 0.0, points = 0.0;
     if (hs_rule_needs_asking(rule)) {
         status = width_of(of, set, step->asking, normal, enough, &asking);
     }
@@ -183,13 +192,43 @@ level_points(const hs_level_set *set, hs_slice levels)
 #define LARGEST_RADIUS  0x1p1022
 #define SMALLEST_HALVED 0x1p-1021
 
+/* What is divided, and by what. */
+typedef struct division {
+    hs_account       *account;
+    const hs_options *options; /* to poll by */
+    const hs_reach   *reach;
+    int64_t          *count; /* owned; points of each size or type, in both sets */
+    int32_t           n_sizes;
+    double            factor;
+    double            largest; /* of all radii */
+} division;
+
+/* A set of points while it is divided; no points: there is no such set. */
+typedef struct level_input {
+    const hs_points *points;
+    const double    *radii;
+    const int32_t   *types;
+    const double    *supports;
+    bool             are_queries;
+    double          *rows; /* owned, in the caller's order, as are all of these */
+    double          *copy; /* of the radii, or how far supports reach */
+    int32_t         *size; /* of each point; read where there are types, else to be found */
+    hs_support_set   read; /* of the supports */
+} level_input;
+
+static bool
+has_radii(const level_input *set)
+{
+    return set->radii != NULL || set->supports != NULL;
+}
+
 /* Radii that have an extent, where they are not 0: the two words of the product are float64s, and
  * no two radii are so different that they could not be told apart by their size. */
 #define SMALLEST_EXTENDED 0x1p-500
 #define LARGEST_EXTENDED  0x1p500
 
 static hs_status
-refuse_input(hs_status status, const hs_level_input *set, int64_t row, double value,
+refuse_input(hs_status status, const level_input *set, int64_t row, double value,
              hs_failure *failure)
 {
     failure->row = row;
@@ -201,7 +240,7 @@ refuse_input(hs_status status, const hs_level_input *set, int64_t row, double va
 /* Passes go over HS_POLL_POINTS at a time and poll in between. The next ones of n; false where
  * there are none, after a failure, or where the caller wants to stop, which *status says. */
 static bool
-division_go_on(const hs_division *by, int64_t n, hs_slice *next, hs_status *status)
+division_go_on(const division *by, int64_t n, hs_slice *next, hs_status *status)
 {
     if (*status == HS_OK && next->end > 0 && next->end < n) {
         *status = hs_poll(by->options, 0.0);
@@ -212,7 +251,7 @@ division_go_on(const hs_division *by, int64_t n, hs_slice *next, hs_status *stat
 }
 
 static hs_status
-read_radii(hs_division *by, hs_level_input *set, hs_failure *failure)
+read_radii(division *by, level_input *set, hs_failure *failure)
 {
     const bool    halves = by->reach->rule == HS_RULE_MEAN, extends = by->factor != 1.0;
     const double  largest = extends ? LARGEST_EXTENDED : LARGEST_RADIUS;
@@ -234,7 +273,7 @@ read_radii(hs_division *by, hs_level_input *set, hs_failure *failure)
 }
 
 static hs_status
-read_supports(hs_division *by, hs_level_input *set, hs_failure *failure)
+read_supports(division *by, level_input *set, hs_failure *failure)
 {
     const int64_t n = set->points->n;
     hs_status     status = HS_OK;
@@ -250,7 +289,7 @@ read_supports(hs_division *by, hs_level_input *set, hs_failure *failure)
 }
 
 static hs_status
-read_types(const hs_division *by, hs_level_input *set, hs_failure *failure)
+read_types(const division *by, level_input *set, hs_failure *failure)
 {
     hs_slice  next = {0, 0};
     hs_status status = HS_OK;
@@ -268,7 +307,7 @@ read_types(const hs_division *by, hs_level_input *set, hs_failure *failure)
 }
 
 static hs_status
-read_rows(const hs_division *by, hs_level_input *set, hs_failure *failure)
+read_rows(const division *by, level_input *set, hs_failure *failure)
 {
     hs_slice  next = {0, 0};
     hs_status status = HS_OK;
@@ -286,7 +325,7 @@ read_rows(const hs_division *by, hs_level_input *set, hs_failure *failure)
 }
 
 static hs_status
-level_input_read(hs_division *by, hs_level_input *set, hs_failure *failure)
+read_input(division *by, level_input *set, hs_failure *failure)
 {
     const int64_t n = set->points->n;
     set->rows = hs_alloc(by->account, HS_FOR_POINTS, n * set->points->ndim, sizeof *set->rows);
@@ -304,7 +343,7 @@ level_input_read(hs_division *by, hs_level_input *set, hs_failure *failure)
 /* Reads a set, and counts its types or finds the largest of its radii. On failure as well, it is to
  * be freed. */
 static void
-level_input_free(hs_account *account, hs_level_input *set)
+free_input(hs_account *account, level_input *set)
 {
     hs_free(account, set->rows);
     hs_free(account, set->copy);
@@ -330,13 +369,13 @@ size_of(double radius, double largest)
 
 /* Once the largest radius is known. Sets without any are of one size. */
 static hs_status
-find_sizes(const hs_division *by, hs_level_input *set)
+find_sizes(const division *by, level_input *set)
 {
     hs_slice  next = {0, 0};
     hs_status status = HS_OK;
     while (division_go_on(by, set->points->n, &next, &status)) {
         for (int64_t i = next.first; i < next.end; i++) {
-            set->size[i] = hs_level_input_has_radii(set) ? size_of(set->copy[i], by->largest) : 0;
+            set->size[i] = has_radii(set) ? size_of(set->copy[i], by->largest) : 0;
             by->count[set->size[i]]++;
         }
     }
@@ -345,7 +384,7 @@ find_sizes(const hs_division *by, hs_level_input *set)
 
 /* Gives each size that occurs a level, in count; returns how many there are. */
 static int32_t
-number_levels(const hs_division *by)
+number_levels(const division *by)
 {
     int32_t n = 0;
     for (int32_t s = 0; s < by->n_sizes; s++) {
@@ -355,7 +394,7 @@ number_levels(const hs_division *by)
 }
 
 static bool
-allocate_set(const hs_division *by, const hs_level_input *from, int32_t n_levels, hs_level_set *to)
+allocate_set(const division *by, const level_input *from, int32_t n_levels, hs_level_set *to)
 {
     const int64_t n = from->points->n;
     to->n = n;
@@ -364,16 +403,16 @@ allocate_set(const hs_division *by, const hs_level_input *from, int32_t n_levels
     to->number = hs_alloc(by->account, HS_FOR_ORDER, n, sizeof *to->number);
     to->first = hs_alloc(by->account, HS_FOR_CELLS, (int64_t)n_levels + 1, sizeof *to->first);
     to->radii = NULL;
-    if (hs_level_input_has_radii(from)) {
+    if (has_radii(from)) {
         to->radii = hs_alloc(by->account, HS_FOR_POINTS, n, sizeof *to->radii);
     }
     return to->rows != NULL && to->number != NULL && to->first != NULL &&
-           (to->radii != NULL || !hs_level_input_has_radii(from));
+           (to->radii != NULL || !has_radii(from));
 }
 
 /* Puts the points in the order of their levels. */
 static hs_status
-arrange(const hs_division *by, hs_level_input *from, int32_t n_levels, hs_level_set *to)
+arrange(const division *by, level_input *from, int32_t n_levels, hs_level_set *to)
 {
     if (!allocate_set(by, from, n_levels, to)) {
         return HS_ERR_MEMORY;
@@ -405,7 +444,7 @@ arrange(const hs_division *by, hs_level_input *from, int32_t n_levels, hs_level_
 
 /* The cutoffs of those types that occur, in the order of their levels. */
 static hs_status
-read_cutoffs(const hs_division *by, hs_levels *levels, hs_failure *failure)
+read_cutoffs(const division *by, hs_levels *levels, hs_failure *failure)
 {
     const int32_t n_types = by->reach->n_types, n = levels->n;
     levels->cutoffs = hs_alloc(by->account, HS_FOR_CELLS, (int64_t)n * n, sizeof *levels->cutoffs);
@@ -427,48 +466,44 @@ read_cutoffs(const hs_division *by, hs_levels *levels, hs_failure *failure)
     return HS_OK;
 }
 
+/* inputs: points, and queries, which may be none. */
 static hs_status
-divide(hs_division *by, hs_level_input *points, hs_level_input *queries, hs_levels *levels,
-       hs_failure *failure)
+divide(division *by, level_input *inputs, hs_levels *levels, hs_failure *failure)
 {
-    const bool has_types = by->reach->n_types > 0;
+    hs_level_set *to[] = {&levels->points, &levels->queries};
+    const int     n = inputs[1].points != NULL ? 2 : 1;
+    const bool    has_types = by->reach->n_types > 0;
+    hs_status     status = HS_OK;
     by->n_sizes = has_types ? by->reach->n_types : N_SIZES;
     by->count = hs_alloc(by->account, HS_FOR_CELLS, by->n_sizes, sizeof *by->count);
     if (by->count == NULL) {
         return HS_ERR_MEMORY;
     }
     memset(by->count, 0, (size_t)by->n_sizes * sizeof *by->count);
-    hs_status status = level_input_read(by, points, failure);
-    if (status == HS_OK && queries->points != NULL) {
-        status = level_input_read(by, queries, failure);
+    for (int s = 0; s < n && status == HS_OK; s++) {
+        status = read_input(by, &inputs[s], failure);
     }
     if (status != HS_OK) {
         return status;
     }
-    if (!has_types) {
-        status = find_sizes(by, points);
-    }
-    if (status == HS_OK && !has_types && queries->points != NULL) {
-        status = find_sizes(by, queries);
+    for (int s = 0; s < n && status == HS_OK && !has_types; s++) {
+        status = find_sizes(by, &inputs[s]);
     }
     levels->n = number_levels(by);
     if (status == HS_OK && has_types) {
         status = read_cutoffs(by, levels, failure);
     }
-    if (status == HS_OK) {
-        status = arrange(by, points, levels->n, &levels->points);
-    }
-    if (status == HS_OK && queries->points != NULL) {
-        status = arrange(by, queries, levels->n, &levels->queries);
+    for (int s = 0; s < n && status == HS_OK; s++) {
+        status = arrange(by, &inputs[s], levels->n, to[s]);
     }
     return status;
 }
 
 /* A set, which may be NULL, as far as the reach goes by it. */
-static hs_level_input
-level_input(const hs_set *set, const hs_reach *reach, bool are_queries)
+static level_input
+input_of(const hs_set *set, const hs_reach *reach, bool are_queries)
 {
-    hs_level_input input = {.are_queries = are_queries};
+    level_input input = {.are_queries = are_queries};
     if (set != NULL) {
         input.points = &set->at;
         input.radii = reach->n_types == 0 && !reach->has_supports ? set->radii : NULL;
@@ -483,19 +518,18 @@ hs_levels_divide(hs_account *account, const hs_options *options, const hs_set *p
                  const hs_set *queries, const hs_reach *reach, hs_levels *levels,
                  hs_failure *failure)
 {
-    const bool     has_own = reach->n_types == 0 && !reach->has_supports; /* radii */
-    const double   factor = has_own && reach->extent != 0.0 ? reach->extent : 1.0;
-    hs_division    by = {.account = account, .options = options, .reach = reach, .factor = factor};
-    hs_level_input of_points = level_input(points, reach, false);
-    hs_level_input of_queries = level_input(queries, reach, true);
+    const bool   has_own = reach->n_types == 0 && !reach->has_supports; /* radii */
+    const double factor = has_own && reach->extent != 0.0 ? reach->extent : 1.0;
+    division     by = {.account = account, .options = options, .reach = reach, .factor = factor};
+    level_input  inputs[] = {input_of(points, reach, false), input_of(queries, reach, true)};
     *levels = (hs_levels){.rule = reach->rule,
                           .factor = factor,
                           .has_queries = queries != NULL,
                           .has_supports = reach->has_supports,
                           .extent = reach->extent};
-    const hs_status status = divide(&by, &of_points, &of_queries, levels, failure);
-    level_input_free(account, &of_points);
-    level_input_free(account, &of_queries);
+    const hs_status status = divide(&by, inputs, levels, failure);
+    free_input(account, &inputs[0]);
+    free_input(account, &inputs[1]);
     hs_free(account, by.count);
     if (status != HS_OK) {
         hs_levels_free(account, levels);
@@ -1177,7 +1211,7 @@ static void
 set_progress(const hs_level_plan *plan, int64_t step, hs_search *search)
 {
     const int64_t n = hs_search_asking(search)->n;
-    search->first_point = step * n;
+    search->n_before = step * n;
     search->n_in_all = plan->n * n;
 }
 
@@ -1217,20 +1251,22 @@ hs_status
 hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int64_t number, const hs_box *box,
               bool keeps_none, hs_call *call, hs_level_search *open, hs_failure *failure)
 {
-    const hs_level_step  *step = &plan->steps[number];
-    const hs_level_set   *asking = hs_levels_asking(levels);
-    const hs_points       points = level_points(&levels->points, step->points);
-    const hs_points       queries = level_points(asking, step->asking);
-    hs_search            *search = &open->search;
-    const hs_support_step of_supports = {levels, step, &call->options};
-    const hs_narrowing    narrowing = {support_step_width, &of_supports};
-    const hs_sets         sets = {.points = &points,
-                                  .queries = step->is_own ? NULL : &queries,
-                                  .is_full = !step->is_own || !plan->is_half,
-                                  .keeps_none = keeps_none,
-                                  .least_cutoff = hs_choice_least_length(call->choice, step->least),
-                                  .narrowing = levels->has_supports ? &narrowing : NULL};
-    hs_level_limits_init(levels, step, &open->own);
+    const hs_level_step *step = &plan->steps[number];
+    const hs_level_set  *asking = hs_levels_asking(levels);
+    const hs_points      points = level_points(&levels->points, step->points);
+    const hs_points      queries = level_points(asking, step->asking);
+    hs_search           *search = &open->search;
+    const support_step   of_supports = {levels, step, &call->options};
+    const hs_narrowing   narrowing = {support_step_width, &of_supports};
+    const hs_sets        sets = {.points = &points,
+                                 .queries = step->is_own ? NULL : &queries,
+                                 .is_full = !step->is_own || !plan->is_half,
+                                 .keeps_none = keeps_none,
+                                 .least_cutoff = hs_choice_least_length(call->choice, step->least),
+                                 .narrowing = levels->has_supports ? &narrowing : NULL};
+    open->own.of_asking = open->own.of_points = open->own.table = NULL;
+    open->own.limits.table.n_types = step->by_table ? levels->n : 0;
+    open->own.limits.supports = levels->has_supports ? &open->own.supports : NULL;
     call->options.cutoff = step->cutoff;
     call->options.algorithm = algorithm_of(plan, step, queries.n);
     hs_search_begin(call, search);

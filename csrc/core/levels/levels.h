@@ -36,13 +36,6 @@ hs_status hs_support_set_read(hs_account *account, const hs_options *options,
                               const double *supports, int64_t n, int ndim, double extent,
                               hs_support_set *set, double *reaches, hs_failure *failure);
 
-/* The numbers of the support of this number. */
-HS_ALWAYS_INLINE const double *
-hs_support_set_at(const hs_support_set *set, int ndim, int64_t number)
-{
-    return set->numbers + (number - set->first) * (hs_support_entries(ndim) + 1);
-}
-
 /* Consecutive levels, or a part of what lies in them. */
 typedef struct hs_slice {
     int64_t first, end;
@@ -141,53 +134,6 @@ bool hs_level_plan_is_single(const hs_levels *levels, const hs_level_plan *plan)
 void hs_level_plan_free(hs_account *account, hs_level_plan *plan);
 
 /*
- * How far pairs of a step can be apart along an axis of the grid, by their
- * supports: cells go by that, so that needles along an axis have few candidates across it.
- */
-
-/* A step whose pairs are decided by supports; borrowed. */
-typedef struct hs_support_step {
-    const hs_levels     *levels;
-    const hs_level_step *step;
-    const hs_options    *options; /* to poll by */
-} hs_support_step;
-
-/*
- * What is to be divided into levels, read once and checked: the coordinates of a set
- * of points, and its radii, types or supports.
- */
-
-/* What is divided, and by what. */
-typedef struct hs_division {
-    hs_account       *account;
-    const hs_options *options; /* to poll by */
-    const hs_reach   *reach;
-    int64_t          *count; /* owned; points of each size or type, in both sets */
-    int32_t           n_sizes;
-    double            factor;
-    double            largest; /* of all radii */
-} hs_division;
-
-/* A set of points while it is divided. */
-typedef struct hs_level_input {
-    const hs_points *points;
-    const double    *radii;
-    const int32_t   *types;
-    const double    *supports;
-    bool             are_queries;
-    double          *rows; /* owned, in the caller's order, as are all of these */
-    double          *copy; /* of the radii, or how far supports reach */
-    int32_t         *size; /* of each point; read where there are types, else to be found */
-    hs_support_set   read; /* of the supports */
-} hs_level_input;
-
-HS_ALWAYS_INLINE bool
-hs_level_input_has_radii(const hs_level_input *set)
-{
-    return set->radii != NULL || set->supports != NULL;
-}
-
-/*
  * One search of all levels in place of several, where that is quicker. Searches of
  * a few levels each sort their points and walk over them again; one search tests more candidates,
  * each with a limit of its own. Points of few sizes, all of them common, are better searched at
@@ -219,15 +165,6 @@ typedef struct hs_level_limits {
     void       *of_asking, *of_points; /* owned: the radii of limits, the types, or the supports */
     void       *table;                 /* owned: that of limits */
 } hs_level_limits;
-
-/* What an open search needs to know beforehand; the rest is set once it has cells. */
-HS_ALWAYS_INLINE void
-hs_level_limits_init(const hs_levels *levels, const hs_level_step *step, hs_level_limits *own)
-{
-    own->of_asking = own->of_points = own->table = NULL;
-    own->limits.table.n_types = step->by_table ? levels->n : 0;
-    own->limits.supports = levels->has_supports ? &own->supports : NULL;
-}
 
 /*
  * One step of a plan as a search like any other: of two sets of points, or of one,

@@ -100,7 +100,8 @@ hs_bypass_end(void)
 #endif
 }
 
-/* Any bytes: whole lines go past the caches, what is before and behind them does not. */
+/* Any bytes: whole lines go past the caches, what is before and behind them does not.
+ * hs_bypass_end must follow. */
 HS_ALWAYS_INLINE void
 hs_bypass_copy(void *to, const void *from, size_t n_bytes)
 {
@@ -110,7 +111,6 @@ hs_bypass_copy(void *to, const void *from, size_t n_bytes)
     memcpy(to, from, head);
     hs_bypass_lines((char *)to + head, (const char *)from + head, lines);
     memcpy((char *)to + head + lines, (const char *)from + head + lines, n_bytes - head - lines);
-    hs_bypass_end();
 }
 
 #endif

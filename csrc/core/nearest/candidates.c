@@ -219,6 +219,8 @@ hs_nearest_image_set(const hs_nearest *near, const hs_nearest_images *images,
 #define MOST_SHARED_IMAGES 64
 /* Groups that look so many times as far as others do walk by themselves. */
 #define FARTHEST 2.0
+/* So do all, where the box around them is so many times as large as they are themselves. */
+#define MOSTLY_EMPTY 4.0
 /* In units, where the radius is between 1 and 2: floats tell leaves apart. */
 #define WIDEST_LEAF 256.0
 /* Relative room, far more than roundings of floats take. */
@@ -295,6 +297,16 @@ unite(const hs_nearest_group *groups, int32_t n, int ndim)
         all.radius = hs_larger(one->radius, all.radius);
     }
     return all;
+}
+
+double
+hs_nearest_balls(const hs_nearest_group *group, int ndim)
+{
+    double balls = 1.0;
+    for (int k = 0; k < ndim; k++) {
+        balls *= 1.0 + (group->upper[k] - group->lower[k]) / (2.0 * group->radius);
+    }
+    return balls;
 }
 
 /* A coordinate in units, relative to the centre of all groups. */
@@ -386,11 +398,18 @@ hs_nearest_leaves_find(const hs_nearest *near, const hs_nearest_group *groups, i
     hs_nearest_images images;
     const int         d = near->tree.ndim;
     double            widest = 0.0;
+    double            balls = 0.0;
     leaves->radius = 0.0;
     if (n < 2 || near->tree.n_nodes < 2) {
         return;
     }
     const hs_nearest_group all = unite(groups, n, d);
+    for (int32_t g = 0; g < n; g++) {
+        balls += hs_nearest_balls(&groups[g], d);
+    }
+    if (hs_nearest_balls(&all, d) > MOSTLY_EMPTY * balls) {
+        return;
+    }
     leaves->unit = hs_power_of_two(-hs_nearest_exponent(all.radius));
     for (int k = 0; k < d; k++) {
         const double width = all.upper[k] - all.lower[k];
@@ -502,6 +521,7 @@ find_runs(const hs_nearest *near, const double *low, const double *high, double 
         const hs_tree_node *node = &tree->nodes[number];
         const int32_t       left = node->left;
         double              gap[2] = {INFINITY, INFINITY};
+        HS_PREFETCH(&tree->nodes[left]);
         if (left != 0) {
             hs_tree_gaps(hs_tree_bounds(tree, left, ndim), low, high, block->unit, ndim, gap);
         } else if (!add_leaf_runs(near, node, block) || block->n >= INT32_MAX / 8) {

@@ -191,6 +191,7 @@ prepare_anew(hs_nearest *near, const hs_sets *sets, const hs_box *box, double li
     hs_sets       bounded = *sets;
     bounded.within = limit < INFINITY ? limit : 0.0;
     options.cutoff = scene_cutoff(box, smallest_length(near, limit));
+    hs_call_gather(search->call, sets->points->n + (asking != NULL ? sets->queries->n : 0));
     near->asking = &near->tree;
     hs_status status = hs_scene_init_sets(&search->call->account, search->call->team, &bounded, box,
                                           &options, &search->scene, asking, failure);
@@ -275,6 +276,7 @@ prepare_from_kept(hs_nearest *near, const hs_sets *sets, const hs_box *box, doub
     }
     const hs_nearest *kept = hs_nearest_kept_get(sets->trees, &room);
     if (room != NULL) {
+        hs_call_gather(search->call, sets->points->n);
         status = build_kept(near, sets, box, room, failure);
         hs_nearest_kept_end(sets->trees, status == HS_OK);
         kept = room;
@@ -307,13 +309,12 @@ hs_nearest_prepare(hs_nearest *near, const hs_sets *sets, const hs_box *box, dou
                    hs_failure *failure)
 {
     hs_search    *search = near->search;
-    const int64_t n_queries = sets->queries != NULL ? sets->queries->n : 0;
-    const int64_t n_asking = sets->queries != NULL ? n_queries : sets->points->n;
+    const int64_t n_asking = sets->queries != NULL ? sets->queries->n : sets->points->n;
     if (search->call->kernel == NULL) {
         return HS_ERR_KERNEL;
     }
-    hs_call_gather(search->call, sets->points->n + n_queries);
-    hs_call_gather_for(search->call, n_asking, PAIRS_PER_POINT * (double)n_asking);
+    hs_call_gather_for(search->call, n_asking, PAIRS_PER_POINT * (double)n_asking,
+                       sets->trees != NULL);
     search->is_full = true;
     hs_status status = HS_REBUILD;
     if (sets->trees != NULL) {
@@ -486,6 +487,7 @@ find_node(const hs_tree *tree, const hs_nearest_group *group, double least, doub
         const int32_t left = tree->nodes[number].left;
         double        gap[2] = {0.0, 0.0};
         const double *bounds = left != 0 ? hs_tree_bounds(tree, left, d) : NULL;
+        HS_PREFETCH(&tree->nodes[left]); /* comes with the bounds, not after them */
         for (int k = 0; left != 0 && k < d; k++) {
             const double middle = group->lower[k] + 0.5 * (group->upper[k] - group->lower[k]);
             for (int side = 0; side < 2; side++) {
@@ -901,6 +903,8 @@ hs_nearest_bound(const hs_nearest *near, const hs_options *options, hs_nearest_b
 #define MOST_CANDIDATES 24.0
 /* ... and so many times more for each axis beyond the third. */
 #define MOST_PER_AXIS 3.0
+/* What is in reach of a group, by what it would be if reach were a cube. */
+#define CUBE_OF_BALL 4.0
 
 /* Groups, as nodes of the tree of asking points; spots are cut into several. */
 typedef struct near_part {
@@ -914,6 +918,7 @@ typedef struct nearest_job {
     int64_t     n_parts;
     int64_t    *ranges; /* the first part of each, and behind the last one n_parts */
     int64_t     n_ranges;
+    int64_t     most_groups; /* of a range */
 } nearest_job;
 
 /* What one thread works with; rows are written where they belong, not committed. */
@@ -921,7 +926,7 @@ typedef struct nearest_worker {
     hs_committer       committer;
     const nearest_job *job;
     hs_options         options;
-    hs_nearest_group   groups[RANGE_GROUPS];
+    hs_nearest_group  *groups; /* owned; of one range */
     hs_nearest_leaves  leaves;
     hs_nearest_block   block;
     hs_nearest_bounder bounder;
@@ -1041,17 +1046,25 @@ search_point(nearest_worker *worker, int32_t si, double guess)
     return status;
 }
 
+/* Candidates beyond which the guess of a group was bad. */
+static double
+most_candidates(const hs_nearest *near, const hs_nearest_group *group)
+{
+    const double more = pow(MOST_PER_AXIS, fmax(near->tree.ndim - 3.0, 0.0));
+    const double wanted = (double)near->k + group->more + (group->last - group->first);
+    return more * MOST_CANDIDATES * wanted + 64.0;
+}
+
 static hs_status
 search_group(nearest_worker *worker, hs_nearest_group *group)
 {
     const hs_nearest *near = worker->job->near;
     const int32_t     n_points = group->last - group->first;
-    const double      more = pow(MOST_PER_AXIS, fmax(near->tree.ndim - 3.0, 0.0));
-    const double most = more * MOST_CANDIDATES * ((double)near->k + group->more + n_points) + 64.0;
-    uint64_t     left = UINT64_MAX;
-    hs_status    status = hs_nearest_block_fill(near, &worker->options, group,
+    const double      most = most_candidates(near, group);
+    uint64_t          left = UINT64_MAX;
+    hs_status         status = hs_nearest_block_fill(near, &worker->options, group,
                                              n_points == 1 && group->is_complete ? INFINITY : most,
-                                                &worker->leaves, &worker->block);
+                                                     &worker->leaves, &worker->block);
     if (status == HS_OK) {
         status = finish_block(worker, group, &left);
     } else if (status == HS_TRY_OTHER) {
@@ -1102,7 +1115,11 @@ open_worker(void *context, void *place)
         .near = near, .block = &worker->block, .pace = {.options = &worker->options}};
     hs_nearest_writer_init(near, &worker->writer);
     hs_status status = hs_nearest_bounder_init(near, &worker->bounder);
-    if (status == HS_OK) {
+    if (status == HS_OK && !hs_shared_resize(near->shared, (void **)&worker->groups, 0,
+                                             job->most_groups, sizeof *worker->groups)) {
+        status = HS_ERR_MEMORY;
+    }
+    if (status == HS_OK && job->most_groups > 1) { /* one alone walks down the tree by itself */
         status = hs_nearest_leaves_init(near, &worker->leaves);
     }
     return status == HS_OK ? hs_nearest_block_init(near, &worker->block) : status;
@@ -1124,16 +1141,17 @@ close_worker(void *context, void *place)
     hs_call_add_counters(job->near->search->call, &walked);
     hs_nearest_ranker_free(&worker->ranker);
     hs_nearest_bounder_free(job->near, &worker->bounder);
+    hs_shared_release(job->near->shared, (void **)&worker->groups);
     hs_nearest_leaves_free(job->near, &worker->leaves);
     hs_nearest_block_free(job->near, &worker->block);
 }
 
-/* Adds the points of a node, as one group or several, to the present range and new ones. */
+/* Adds the points of a node, in groups of at most `most`, to the present range and new ones. */
 static void
-add_parts(nearest_job *job, const hs_tree_node *node)
+add_parts(nearest_job *job, const hs_tree_node *node, int32_t most)
 {
-    for (int32_t first = node->first; first < node->end; first += GROUP_POINTS) {
-        const int32_t last = node->end - first < GROUP_POINTS ? node->end : first + GROUP_POINTS;
+    for (int32_t first = node->first; first < node->end; first += most) {
+        const int32_t last = node->end - first < most ? node->end : first + most;
         if (job->n_parts - job->ranges[job->n_ranges - 1] == RANGE_GROUPS) {
             job->ranges[job->n_ranges++] = job->n_parts;
         }
@@ -1141,8 +1159,23 @@ add_parts(nearest_job *job, const hs_tree_node *node)
     }
 }
 
-/* Cuts the tree into groups, the largest subtrees of at most GROUP_POINTS, and these into ranges,
- * which are larger subtrees. A larger leaf becomes several groups. */
+/* Whether queries lie so far apart, by how many points each one wants, that they are no group. */
+static bool
+is_scattered(const hs_nearest *near, const hs_tree_node *node)
+{
+    hs_nearest_group group;
+    if (near->asking == &near->tree || hs_tree_points(node) == 1) {
+        return false;
+    }
+    hs_nearest_group_set(near, node->first, node->end, &group);
+    hs_nearest_guess(near, &group);
+    const double k = (double)near->k, in_ball = k + SPREAD * sqrt(k) + group.more;
+    return CUBE_OF_BALL * in_ball * hs_nearest_balls(&group, near->tree.ndim) >
+           most_candidates(near, &group);
+}
+
+/* Cuts the tree into groups, the largest subtrees of at most GROUP_POINTS that are not scattered,
+ * and these into ranges, which are larger subtrees. A larger leaf becomes several groups. */
 static void
 list_parts(nearest_job *job, const hs_tree *tree, int32_t *stack)
 {
@@ -1160,8 +1193,10 @@ list_parts(nearest_job *job, const hs_tree *tree, int32_t *stack)
             job->ranges[job->n_ranges++] = job->n_parts;
             range_end = node->end;
         }
-        if (points <= GROUP_POINTS || is_leaf) {
-            add_parts(job, node);
+        const bool is_small = points <= GROUP_POINTS || is_leaf;
+        const bool apart = is_small && is_scattered(job->near, node);
+        if (is_small && (is_leaf || !apart)) {
+            add_parts(job, node, apart ? 1 : GROUP_POINTS);
             number = stack[--n_waiting];
         } else {
             stack[n_waiting++] = node->left + 1;
@@ -1169,6 +1204,10 @@ list_parts(nearest_job *job, const hs_tree *tree, int32_t *stack)
         }
     }
     job->ranges[job->n_ranges] = job->n_parts;
+    for (int64_t r = 0; r < job->n_ranges; r++) {
+        const int64_t n_groups = job->ranges[r + 1] - job->ranges[r];
+        job->most_groups = n_groups > job->most_groups ? n_groups : job->most_groups;
+    }
 }
 
 static hs_status
@@ -1197,7 +1236,9 @@ hs_nearest_search(hs_nearest *near, hs_failure *failure)
     if (near->tree.n_nodes == 0 || near->asking->n_nodes == 0) {
         return HS_OK;
     }
-    const int64_t most_parts = near->asking->n_nodes + n / GROUP_POINTS + 1;
+    const int64_t most_parts = near->asking == &near->tree
+                                   ? near->asking->n_nodes + n / GROUP_POINTS + 1
+                                   : n; /* queries may be scattered */
     int32_t      *stack = hs_alloc(account, HS_FOR_STENCIL, near->asking->depth + 3, sizeof *stack);
     job.parts = hs_alloc(account, HS_FOR_STENCIL, most_parts, sizeof *job.parts);
     job.ranges = hs_alloc(account, HS_FOR_STENCIL, most_parts + 1, sizeof *job.ranges);

@@ -100,6 +100,9 @@ void hs_nearest_group_set(const hs_nearest *near, int32_t first, int32_t last,
  * more; in any case not more than can be of use. */
 void hs_nearest_guess(const hs_nearest *near, hs_nearest_group *group);
 
+/* How many times as large as for one of its points what the group looks at is, about. */
+double hs_nearest_balls(const hs_nearest_group *group, int ndim);
+
 /* The present image, as a group keeps it. */
 void hs_nearest_image_set(const hs_nearest *near, const hs_nearest_images *images,
                           hs_nearest_image *image);

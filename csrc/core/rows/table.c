@@ -9,93 +9,19 @@
 #include <string.h>
 
 /* table.c: lengths of table rows by a counting walk, or by the one walk that keeps them; their sums
- * are the offsets. Hits come in the order of the table; the point itself is left out, and each
- * column is copied. */
-
-/* Columns of a table that are measured, not numbers. */
-#define MEASURES (HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT | HS_WANT_SHELL)
+ * are the offsets. Hits come in the order of the table; the point itself is left out, the others
+ * are recorded as those of any list, and each column of a row is copied to its place. */
 
 /* Bytes of rows that wait for their places. */
 #define MOST_KEPT (6 << 20)
 
-/* What one thread fills rows with; the context of the visits below. */
+/* What one thread fills rows with; the context of put_rows. */
 typedef struct row_filler {
     hs_table   *table;
-    hs_output  *to;       /* borrowed; where the rows go */
-    hs_output   part;     /* owned; measures of the hits of one visit */
-    hs_recorder recorder; /* owned; of the part */
-    int32_t    *numbers;  /* owned; of the hits of one point, where hits are places */
+    hs_output  *to;       /* borrowed; the rows of one visit, or all that are kept */
+    hs_output   visit;    /* owned */
+    hs_recorder recorder; /* owned; of `to` */
 } row_filler;
-
-#define ROWS_AHEAD         32        /* points from prefetch to writing; twice that for offsets */
-#define MOST_EXPECTED_ROWS 2048      /* bytes of a table row to prefetch */
-#define NO_POINT           INT32_MAX /* more than any point's number */
-
-/* The row of one point. */
-typedef struct table_row {
-    int64_t        at; /* entries [at, at + n) of the table */
-    int32_t        n;
-    int32_t        point;
-    int32_t        itself;  /* what is left out once: the point's number, or NO_POINT */
-    const int32_t *numbers; /* of the hits, ascending; n + 1 may be read */
-} table_row;
-
-/* Every `step`-th entry of a column from `at` on: the row's numbers, or n times the point. What
- * follows the point itself moves up by one. */
-HS_ALWAYS_INLINE void
-put_numbers(void *column, int index_bytes, int64_t at, const table_row *of, const bool is_j,
-            const int step)
-{
-    const int32_t *HS_RESTRICT numbers = of->numbers;
-    const int32_t              n = of->n, point = of->point, itself = of->itself;
-    if (index_bytes == 8) {
-        int64_t *HS_RESTRICT wide = (int64_t *)column + at;
-        for (int32_t h = 0; h < n; h++) {
-            const int32_t here = is_j ? numbers[h] : 0, next = is_j ? numbers[h + 1] : 0;
-            wide[h * (int64_t)step] = !is_j ? point : here < itself ? here : next;
-        }
-    } else {
-        int32_t *HS_RESTRICT narrow = (int32_t *)column + at;
-        for (int32_t h = 0; h < n; h++) {
-            const int32_t here = is_j ? numbers[h] : 0, next = is_j ? numbers[h + 1] : 0;
-            narrow[h * (int64_t)step] = !is_j ? point : here < itself ? here : next;
-        }
-    }
-}
-
-/* i, j, or both side by side. */
-static void
-put_ends(const hs_output *entries, const table_row *of)
-{
-    void     *i = hs_output_column(entries, HS_WANT_I), *j = hs_output_column(entries, HS_WANT_J);
-    void     *both = hs_output_column(entries, HS_WANT_BOTH);
-    const int bytes = entries->index_bytes;
-    if (i != NULL) {
-        put_numbers(i, bytes, of->at, of, false, 1);
-    }
-    if (j != NULL) {
-        put_numbers(j, bytes, of->at, of, true, 1);
-    }
-    if (both != NULL) {
-        put_numbers(both, bytes, 2 * of->at, of, false, 2);
-        put_numbers(both, bytes, 2 * of->at + 1, of, true, 2);
-    }
-}
-
-/* Measures of hits [hit, hit + n) of the visit, as entries from `at` on. */
-static void
-put_measures(const row_filler *fill, int64_t at, int64_t hit, int32_t n)
-{
-    const hs_output *entries = fill->to;
-    for (unsigned bit = HS_WANT_DISTANCE; bit <= HS_WANT_SHELL && n > 0; bit <<= 1) {
-        char *to = bit & MEASURES ? hs_output_column(entries, bit) : NULL;
-        if (to != NULL) {
-            const size_t width = hs_output_width(entries, bit);
-            const char  *from = hs_output_column(&fill->part, bit);
-            memcpy(to + (size_t)at * width, from + (size_t)hit * width, (size_t)n * width);
-        }
-    }
-}
 
 /* The place of the group's first point itself among the candidates as gathered; the others follow
  * it. */
@@ -118,232 +44,131 @@ own_place(const hs_scanner *scanner)
     return -1;
 }
 
-/* Measures of all hits of a visit, as the part. */
-static hs_status
-fill_part(row_filler *fill, hs_scanner *scanner, int32_t first, const hs_hits *hits)
-{
-    fill->part.n_pairs = 0;
-    const hs_status status = hs_output_reserve(&fill->part, hits->end[hits->n - 1], 0.0);
-    return status == HS_OK ? hs_record_places(&fill->recorder, scanner, first, hits) : status;
-}
-
-/* How many of n numbers are below this one. Not by halving, though they ascend: its branches cost
- * more than looking at all the numbers of a row, which are to be copied anyway. */
+/* Which of a point's n hits, which are places, is the point itself. */
 static int32_t
-count_below(const int32_t *numbers, int32_t n, int32_t number)
+find_place(const int32_t *places, int32_t n, int32_t own)
 {
-    int32_t below = 0;
-    for (int32_t h = 0; h < n; h++) {
-        below += numbers[h] < number;
+    int32_t at = 0;
+    for (int32_t h = 0; h < n; h++) { /* all of them: a branch costs more */
+        at |= places[h] == own ? h : 0;
     }
-    return below;
+    HS_ASSERT(at < n && places[at] == own);
+    return at;
 }
 
-/* Which of a point's hits is the point itself, or n. place: its own. */
+/* The same where hits are numbers, ascending: as many images of the point are before it as behind
+ * it. */
 static int32_t
-find_self(const row_filler *fill, const hs_scanner *scanner, const int32_t *hits, int32_t n,
-          int32_t point, int32_t place)
+find_number(const int32_t *numbers, int32_t n, int32_t point)
 {
-    int32_t self = scanner->search->has_queries ? n : count_below(fill->numbers, n, point);
-    while (self < n && hits[self] != place) { /* images of the point come before it */
-        self++;
-    }
-    return self;
-}
-
-/* The row of a point whose n hits, from number `hit` of the visit on, are places. */
-static void
-put_places(const row_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int32_t hit,
-           int32_t n, int32_t place, table_row *of)
-{
-    const int32_t *places = hits->label + hit;
+    int32_t below = 0, equal = 0;
     for (int32_t h = 0; h < n; h++) {
-        fill->numbers[h] = scanner->block.id[places[h]];
+        below += numbers[h] < point;
+        equal += numbers[h] == point;
     }
-    const int32_t self = find_self(fill, scanner, places, n, of->point, place);
-    of->numbers = fill->numbers;
-    put_ends(fill->to, of);
-    put_measures(fill, of->at, hit, self);
-    if (self < n) {
-        put_measures(fill, of->at + self, hit + self + 1, n - self - 1);
-    }
+    HS_ASSERT(equal % 2 == 1);
+    return below + equal / 2;
 }
 
-/* Table rows lie anywhere in the result: prefetches the memory of one that is soon to be written,
- * and the offset of a later one. */
-HS_ALWAYS_INLINE void
-expect_rows(const row_filler *fill, const hs_bins *asking, int64_t si)
+/* The hits that the rows of a visit have: no point itself, and where each pair is listed once,
+ * none that is before it. end: receives where those of each point end. */
+static hs_hits
+hits_of_rows(hs_scanner *scanner, int32_t first, const hs_hits *hits, int32_t *end)
 {
-    const int64_t *offsets = fill->table->offsets;
-    char          *j = hs_output_column(fill->table->entries, HS_WANT_J);
-    if (si + 2 * ROWS_AHEAD < asking->n) {
-        HS_PREFETCH(offsets + asking->order[si + 2 * ROWS_AHEAD]);
+    const hs_search *search = scanner->search;
+    const bool       by_place = scanner->use == HS_BLOCK_LISTS_PLACES;
+    int32_t         *label = scanner->block.hits, to = 0;
+    hs_hits          rows = *hits;
+    if (search->has_queries) {
+        return rows;
     }
-    if (j != NULL && si + ROWS_AHEAD < asking->n) {
-        const size_t   width = (size_t)fill->table->entries->index_bytes;
-        const int64_t *place = offsets + asking->order[si + ROWS_AHEAD];
-        const char    *end = j + (size_t)place[1] * width;
-        const char    *most = j + (size_t)place[0] * width + MOST_EXPECTED_ROWS;
-        for (j += (size_t)place[0] * width; j < end && j < most; j += HS_ALIGNMENT) {
-            HS_PREFETCH_WRITE(j);
+    const int32_t own = by_place ? own_place(scanner) + first - scanner->group.first : 0;
+    for (int32_t t = 0, from = 0; t < hits->n; t++) {
+        const int32_t *of = label + from, n = hits->end[t] - from;
+        const int32_t  at = by_place ? find_place(of, n, own + t)
+                                     : find_number(of, n, hits->point[t]);
+        if (!search->is_half) {
+            memmove(label + to, of, (size_t)at * sizeof *of);
+            to += at;
         }
+        memmove(label + to, of + at + 1, (size_t)(n - at - 1) * sizeof *of);
+        to += n - at - 1;
+        end[t] = to;
+        from = hits->end[t];
     }
+    rows.end = end;
+    return rows;
 }
 
-/* What is needed before the rows of a visit: measures, and the place of the group's first point. */
+/* A hs_visit_fn of ordered walkers: whole rows, to their places by table->offsets; or kept, one
+ * behind another, and their lengths as offsets. HS_TRY_OTHER when more than MOST_KEPT are kept. */
 static hs_status
-begin_visit(row_filler *fill, hs_scanner *scanner, int32_t first, const hs_hits *hits, int32_t *own)
-{
-    *own = 0;
-    if (scanner->use != HS_BLOCK_LISTS_PLACES) {
-        return HS_OK;
-    }
-    *own = scanner->search->has_queries ? 0 : own_place(scanner);
-    *own += first - scanner->group.first;
-    return fill_part(fill, scanner, first, hits);
-}
-
-/* The row of point t of a visit, whose n hits begin at number `hit`. */
-HS_ALWAYS_INLINE void
-put_row(const row_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int32_t hit,
-        int32_t n, int32_t place, table_row *of)
-{
-    const bool has_self = !scanner->search->has_queries;
-    HS_ASSERT(!has_self || n > 0);
-    of->n = n - has_self;
-    of->itself = has_self ? of->point : NO_POINT;
-    of->numbers = hits->label + hit;
-    if (scanner->use == HS_BLOCK_LISTS_PLACES) {
-        put_places(fill, scanner, hits, hit, n, place, of);
-    } else {
-        put_ends(fill->to, of);
-    }
-}
-
-/* A hs_visit_fn of ordered walkers: whole rows, to their places by table->offsets. */
-static hs_status
-fill_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+put_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     row_filler     *fill = context;
-    const hs_bins  *asking = hs_search_asking(scanner->search);
-    int32_t         own;
-    const hs_status status = begin_visit(fill, scanner, first, hits, &own);
-    for (int32_t t = 0, hit = 0; t < hits->n && status == HS_OK; t++) {
-        const int32_t point = hits->point[t];
-        table_row     of = {.at = fill->table->offsets[point], .point = point};
-        expect_rows(fill, asking, (int64_t)first + t);
-        put_row(fill, scanner, hits, hit, hits->end[t] - hit, own + t, &of);
-        hit = hits->end[t];
-    }
-    return status;
-}
-
-/* The rows of a visit, behind those that `fill->to` has already. */
-HS_ALWAYS_INLINE void
-keep_visit(row_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int32_t own,
-           int64_t *where)
-{
-    hs_output *kept = fill->to;
-    for (int32_t t = 0, hit = 0; t < hits->n; t++) {
-        table_row of = {.at = kept->n_pairs, .point = hits->point[t]};
-        put_row(fill, scanner, hits, hit, hits->end[t] - hit, own + t, &of);
-        fill->table->offsets[of.point] = of.n;
-        if (where != NULL) {
-            where[of.point] = of.at;
-        }
-        kept->n_pairs += of.n;
-        hit = hits->end[t];
-    }
-}
-
-/* The rows of a visit with HS_BLOCK_LISTS_IDS, one behind another, in fill->to, which has room for
- * them: to table->offsets the lengths, and to `where` the entry that each begins with. Of `fill`
- * only table and to are looked at. */
-static void
-keep_numbers(row_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int64_t *where)
-{
-    HS_ASSERT(scanner->use == HS_BLOCK_LISTS_IDS);
-    keep_visit(fill, scanner, hits, 0, where);
-}
-
-/* A hs_visit_fn of ordered walkers: whole rows, one behind another, and their lengths as offsets.
- * HS_TRY_OTHER when they are more than MOST_KEPT. */
-static hs_status
-keep_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
-{
-    row_filler   *fill = context;
-    hs_output    *kept = fill->to;
-    const int32_t n = hits->end[hits->n - 1];
-    int32_t       own;
-    hs_status     status = hs_output_reserve(kept, n, 0.0);
-    if (status == HS_OK) {
-        status = begin_visit(fill, scanner, first, hits, &own);
-    }
+    hs_output      *to = fill->to;
+    int64_t        *offsets = fill->table->offsets;
+    int32_t         end[HS_GROUP_POINTS];
+    const hs_hits   rows = hits_of_rows(scanner, first, hits, end);
+    const int32_t   n = rows.end[rows.n - 1];
+    const hs_status status = n > 0 ? hs_record_hits(&fill->recorder, scanner, first, &rows) : HS_OK;
     if (status != HS_OK) {
         return status;
     }
-    keep_visit(fill, scanner, hits, own, NULL);
-    const bool is_much = kept->n_pairs * hs_output_bytes_per_pair(kept) > MOST_KEPT;
-    return is_much ? HS_TRY_OTHER : HS_OK;
+    if (to != &fill->visit) {
+        for (int32_t t = 0, from = 0; t < rows.n; from = rows.end[t++]) {
+            offsets[rows.point[t]] = rows.end[t] - from;
+        }
+        return to->n_pairs * hs_output_bytes_per_pair(to) > MOST_KEPT ? HS_TRY_OTHER : HS_OK;
+    }
+    hs_output_place(fill->table->entries, offsets, to, rows.point, rows.n,
+                    hs_search_asking(scanner->search)->n - first);
+    to->n_pairs = 0;
+    return HS_OK;
 }
 
 /* After hs_table_prepare. On failure filler_close. */
 static hs_status
 filler_open(hs_table *table, hs_output *to, row_filler *fill)
 {
-    hs_account *account = &table->search->call->account;
-    unsigned    columns = to->columns & MEASURES;
-    columns |= columns & HS_WANT_SHELL ? HS_WANT_DISTANCE : 0; /* by which shells are told */
-    *fill = (row_filler){.table = table, .to = to};
-    hs_output_init(NULL, to->ndim, columns, to->index_bytes, &fill->part);
-    fill->numbers =
-        hs_alloc(account, HS_FOR_CANDIDATES, table->most.candidates + 1, sizeof *fill->numbers);
-    /* It keeps no numbers of hits: no pair must be turned round. */
-    const hs_status status = hs_recorder_init(account, &fill->part, 0, &fill->recorder);
-    return fill->numbers == NULL ? HS_ERR_MEMORY : status;
+    const hs_output *entries = table->entries;
+    const int32_t    most_hits = hs_block_most_hits((int32_t)table->most.candidates + 1);
+    *fill = (row_filler){.table = table, .to = to != NULL ? to : &fill->visit};
+    hs_output_init(NULL, entries->ndim, entries->columns, entries->index_bytes, &fill->visit);
+    return hs_recorder_init(&table->search->call->account, fill->to, most_hits, &fill->recorder);
 }
 
 static void
 filler_close(row_filler *fill)
 {
     hs_recorder_free(&fill->table->search->call->account, &fill->recorder);
-    hs_free(&fill->table->search->call->account, fill->numbers);
-    hs_output_free(&fill->part);
-}
-
-/* The rows that were kept, to their places. */
-static void
-move_rows(hs_table *table)
-{
-    const hs_bins   *asking = hs_search_asking(table->search);
-    const int32_t   *numbers = hs_output_column(&table->kept, HS_WANT_J);
-    const row_filler fill = {.table = table, .to = table->entries, .part = table->kept};
-    int64_t          from = 0;
-    for (int64_t si = 0; si < asking->n; si++) {
-        const int64_t *place = table->offsets + asking->order[si];
-        table_row      of = {.at = place[0], .n = (int32_t)(place[1] - place[0])};
-        of.point = asking->order[si];
-        of.itself = NO_POINT;
-        of.numbers = numbers != NULL ? numbers + from : NULL; /* none: an empty table */
-        expect_rows(&fill, asking, si);
-        put_ends(fill.to, &of);
-        put_measures(&fill, of.at, from, of.n);
-        from += of.n;
-    }
+    hs_output_free(&fill->visit);
 }
 
 #define MOST_EXPECTED_KEPT (4 << 20) /* bytes; rows are kept when no more than these are expected */
+
+/* Of n hits, those with a higher number than the point, twice, and those with its own, which are
+ * the point itself and images of it on either side. */
+static int32_t
+count_twice(const int32_t *numbers, int32_t n, int32_t point)
+{
+    int32_t twice = 0;
+    for (int32_t h = 0; h < n; h++) {
+        twice += (numbers[h] >= point) + (numbers[h] > point);
+    }
+    return twice;
+}
 
 /* A hs_visit_fn; each point belongs to one thread. */
 static hs_status
 count_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     int64_t *counts = context;
-    (void)scanner;
     (void)first;
-    for (int32_t t = 0, begin = 0; t < hits->n; t++) {
-        counts[hits->point[t]] += hits->end[t] - begin;
-        begin = hits->end[t];
+    for (int32_t t = 0, begin = 0; t < hits->n; begin = hits->end[t++]) {
+        const int32_t point = hits->point[t], n = hits->end[t] - begin;
+        counts[point] +=
+            scanner->use == HS_BLOCK_COUNTS ? n : count_twice(hits->label + begin, n, point);
     }
     return HS_OK;
 }
@@ -352,13 +177,17 @@ hs_status
 hs_table_count(hs_search *search, int64_t *counts, hs_failure *failure)
 {
     const int64_t     n = hs_search_asking(search)->n;
-    const hs_visitors visitors = {.use = HS_BLOCK_COUNTS, .visit = count_hits, .contexts = counts};
+    const bool        halves = search->is_half;
+    const hs_visitors visitors = {.use = halves ? HS_BLOCK_LISTS_IDS : HS_BLOCK_COUNTS,
+                                  .visit = count_hits,
+                                  .contexts = counts};
     if (n > 0) { /* otherwise counts may be NULL */
         memset(counts, 0, (size_t)n * sizeof *counts);
     }
     const hs_status status = hs_parallel_visit(search, &visitors, NULL, failure);
     for (int64_t i = 0; !search->has_queries && i < n; i++) {
         counts[i] -= counts[i] > 0; /* the point itself, unless nothing is within */
+        counts[i] /= halves ? 2 : 1;
     }
     return status;
 }
@@ -402,8 +231,8 @@ will_keep(hs_table *table)
     hs_search       *search = table->search;
     const hs_output *entries = table->entries;
     const double     n = search->grid.expected_pairs * search->pairs_per_half;
-    hs_output_init(&search->call->account, entries->ndim, (entries->columns & MEASURES) | HS_WANT_J,
-                   4, &table->kept);
+    hs_output_init(&search->call->account, entries->ndim, entries->columns, entries->index_bytes,
+                   &table->kept);
     const double bytes = n * (double)hs_output_bytes_per_pair(&table->kept);
     return search->call->team == NULL && bytes < MOST_EXPECTED_KEPT &&
            hs_account_allows(&search->call->account, 2.0 * MOST_KEPT);
@@ -418,10 +247,11 @@ keep_all(hs_table *table, hs_failure *failure)
     hs_walker     walker;
     row_filler    fill;
     memset(table->offsets, 0, (size_t)n * sizeof *table->offsets);
+    hs_output_reserve_hint(&table->kept, search->grid.expected_pairs * search->pairs_per_half);
     hs_status status = filler_open(table, &table->kept, &fill);
     if (status == HS_OK) {
         status = hs_walker_init_ordered(search, hs_record_use(table->kept.columns), &table->most,
-                                        keep_rows, &fill, &walker);
+                                        put_rows, &fill, &walker);
     }
     if (status == HS_OK) {
         status = hs_walk_or_tell(&walker, 0, (int32_t)n, failure);
@@ -451,7 +281,7 @@ hs_table_measure(hs_table *table, hs_failure *failure)
 static hs_status
 open_filler(void *table, void *filler)
 {
-    return filler_open(table, ((hs_table *)table)->entries, filler);
+    return filler_open(table, NULL, filler);
 }
 
 static void
@@ -473,7 +303,7 @@ fill_all(hs_table *table, hs_failure *failure)
     if (status == HS_OK) {
         const hs_visitors visitors = {.use = hs_record_use(table->entries->columns),
                                       .most = &table->most,
-                                      .visit = fill_rows,
+                                      .visit = put_rows,
                                       .contexts = crew.workers,
                                       .context_size = crew.worker_size};
         status = hs_parallel_visit(table->search, &visitors, NULL, failure);
@@ -485,8 +315,10 @@ fill_all(hs_table *table, hs_failure *failure)
 hs_status
 hs_table_fill(hs_table *table, hs_failure *failure)
 {
+    const hs_bins *asking = hs_search_asking(table->search);
     if (table->kept.columns != 0) {
-        move_rows(table);
+        hs_output_place(table->entries, table->offsets, &table->kept, asking->order, asking->n,
+                        asking->n);
         return HS_OK;
     }
     const hs_stretch whole = hs_call_begin_part(table->search->call, COUNTED, 1.0);
@@ -500,253 +332,4 @@ hs_table_free(hs_table *table)
 {
     hs_output_free(&table->kept);
     table->kept.columns = 0;
-}
-
-/*
- * A large column of point numbers that is written from its first entry to its last,
- * past the caches: it does not fit them, and what a store misses there would first be read.
- *
- * Collected in a small buffer, whole cache lines are written by streaming stores.
- *
- * Usage: put_column_open(column, index_bytes, &out); put_column_numbers or put_column_repeat any
- * number of times; put_column_close(&out), before which part of it is not there.
- */
-
-#define PUT_BYTES 4096 /* collected before they are written: well inside the first-level cache */
-
-/* Numbers of 4 or 8 bytes on their way to memory. */
-typedef struct put_column {
-    char  *to; /* where the collected bytes will go */
-    size_t n;  /* of them */
-    int    index_bytes;
-    union {
-        char    bytes[PUT_BYTES + HS_ALIGNMENT];
-        int32_t narrow[(PUT_BYTES + HS_ALIGNMENT) / sizeof(int32_t)];
-        int64_t wide[(PUT_BYTES + HS_ALIGNMENT) / sizeof(int64_t)];
-    } part;
-} put_column;
-
-/* column: aligned to HS_ALIGNMENT; borrowed. */
-static void
-put_column_open(void *column, int index_bytes, put_column *out)
-{
-    out->to = column;
-    out->n = 0;
-    out->index_bytes = index_bytes;
-}
-
-/* The first collected bytes, as far as they fill whole lines. */
-static void
-write_lines(put_column *out)
-{
-    const size_t n_bytes = out->n / HS_ALIGNMENT * HS_ALIGNMENT;
-    hs_bypass_lines(out->to, out->part.bytes, n_bytes);
-    memcpy(out->part.bytes, out->part.bytes + n_bytes, HS_ALIGNMENT);
-    out->to += n_bytes;
-    out->n -= n_bytes;
-}
-
-/* How many of n numbers there is room for. */
-static int64_t
-make_room(put_column *out, int64_t n)
-{
-    if (out->n >= PUT_BYTES) {
-        write_lines(out);
-    }
-    const int64_t room = (int64_t)(PUT_BYTES - out->n) / out->index_bytes;
-    return n < room ? n : room;
-}
-
-/* These n numbers, none of which is negative. */
-static void
-put_column_numbers(put_column *out, const int32_t *numbers, int64_t n)
-{
-    while (n > 0) {
-        const int64_t part = make_room(out, n);
-        if (out->index_bytes == 8) {
-            int64_t *wide = out->part.wide + out->n / sizeof *out->part.wide;
-            for (int64_t k = 0; k < part; k++) {
-                wide[k] = (int64_t)(uint32_t)numbers[k]; /* cheaper than a sign */
-            }
-        } else {
-            memcpy(out->part.bytes + out->n, numbers, (size_t)part * sizeof *numbers);
-        }
-        out->n += (size_t)part * (size_t)out->index_bytes;
-        numbers += part;
-        n -= part;
-    }
-}
-
-/* n times this number. */
-static void
-put_column_repeat(put_column *out, int32_t number, int64_t n)
-{
-    while (n > 0) {
-        const int64_t part = make_room(out, n);
-        if (out->index_bytes == 8) {
-            int64_t *wide = out->part.wide + out->n / sizeof *out->part.wide;
-            for (int64_t k = 0; k < part; k++) {
-                wide[k] = number;
-            }
-        } else {
-            int32_t *narrow = out->part.narrow + out->n / sizeof *out->part.narrow;
-            for (int64_t k = 0; k < part; k++) {
-                narrow[k] = number;
-            }
-        }
-        out->n += (size_t)part * (size_t)out->index_bytes;
-        n -= part;
-    }
-}
-
-static void
-put_column_close(put_column *out)
-{
-    write_lines(out);
-    memcpy(out->to, out->part.bytes, out->n);
-    hs_bypass_end();
-}
-
-/* The walk keeps table rows as it finds them; then two passes in the order of the table
- * write j, then i. */
-
-#define ONCE_AHEAD            24   /* rows between prefetching one and reading it */
-#define MOST_EXPECTED_ENTRIES 1024 /* bytes of a row to prefetch; the hardware takes the rest */
-#define LEAST_ENTRIES         (1 << 20) /* with fewer, all rows stay in a cache */
-#define POLL_ENTRIES          (1 << 20) /* written between two polls: some milliseconds */
-
-/* The walk and what it leaves. */
-typedef struct once {
-    hs_table  *table;
-    row_filler fill;  /* not opened: keep_numbers needs no more than table and to */
-    hs_output  kept;  /* its numbers j lie in the entries' column i */
-    int64_t   *where; /* owned; for each asking point: where in `kept` its row begins */
-} once;
-
-bool
-hs_table_takes_one_walk(const hs_table *table)
-{
-    const hs_search *search = table->search;
-    const hs_output *entries = table->entries;
-    return entries->columns == (HS_WANT_I | HS_WANT_J) && !entries->fixed &&
-           search->call->team == NULL &&
-           search->grid.expected_pairs * search->pairs_per_half > LEAST_ENTRIES;
-}
-
-/* A hs_visit_fn. */
-static hs_status
-keep_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
-{
-    once         *doing = context;
-    hs_output    *entries = doing->table->entries;
-    const int32_t n = hits->end[hits->n - 1];
-    (void)first;
-    const hs_status status = hs_output_reserve(entries, n, hs_scanner_fraction(scanner));
-    if (status != HS_OK) {
-        return status;
-    }
-    doing->kept.column[1].data = hs_output_column(entries, HS_WANT_I); /* it may have moved */
-    keep_numbers(&doing->fill, scanner, hits, doing->where);
-    entries->n_pairs = doing->kept.n_pairs;
-    return HS_OK;
-}
-
-static hs_status
-walk_once(once *doing, hs_failure *failure)
-{
-    hs_table     *table = doing->table;
-    hs_search    *search = table->search;
-    const int64_t n = hs_search_asking(search)->n;
-    hs_walker     walker;
-    memset(table->offsets, 0, (size_t)n * sizeof *table->offsets);
-    hs_output_reserve_hint(table->entries, search->grid.expected_pairs * search->pairs_per_half);
-    hs_status status =
-        hs_walker_init_ordered(search, HS_BLOCK_LISTS_IDS, &table->most, keep_hits, doing, &walker);
-    if (status == HS_OK) {
-        status = hs_walk_or_tell(&walker, 0, (int32_t)n, failure);
-        hs_walker_close(search, &walker);
-    }
-    return status;
-}
-
-/* Prefetches the row that is AHEAD rows ahead. */
-static void
-ask_ahead(const once *doing, const int32_t *kept, int64_t row)
-{
-    const int64_t *offsets = doing->table->offsets;
-    const char    *from = (const char *)(kept + doing->where[row]);
-    int64_t        bytes = 4 * (offsets[row + 1] - offsets[row]);
-    bytes = bytes < MOST_EXPECTED_ENTRIES ? bytes : MOST_EXPECTED_ENTRIES;
-    for (int64_t at = 0; at < bytes; at += HS_ALIGNMENT) {
-        HS_PREFETCH(from + at);
-    }
-}
-
-/* Column i or j, row after row; j first, because its rows wait in the memory of i. */
-static hs_status
-write_column(const once *doing, unsigned bit, const hs_options *options)
-{
-    const hs_output *entries = doing->table->entries;
-    const int64_t   *offsets = doing->table->offsets;
-    const int64_t    n = hs_search_asking(doing->table->search)->n;
-    const int32_t   *kept = hs_output_column(&doing->kept, HS_WANT_J);
-    put_column       out;
-    hs_status        status = HS_OK;
-    put_column_open(hs_output_column(entries, bit), entries->index_bytes, &out);
-    for (int64_t row = 0, next = POLL_ENTRIES; row < n && status == HS_OK; row++) {
-        const int64_t length = offsets[row + 1] - offsets[row];
-        if (bit == HS_WANT_I) {
-            put_column_repeat(&out, (int32_t)row, length);
-        } else {
-            if (row + ONCE_AHEAD < n) {
-                ask_ahead(doing, kept, row + ONCE_AHEAD);
-            }
-            put_column_numbers(&out, kept + doing->where[row], length);
-        }
-        if (offsets[row] >= next) {
-            status = hs_poll(options, 1.0);
-            next = offsets[row] + POLL_ENTRIES;
-        }
-    }
-    put_column_close(&out);
-    return status;
-}
-
-/* The entries are empty again. */
-static void
-give_up(hs_output *entries)
-{
-    hs_account    *account = entries->account;
-    const unsigned columns = entries->columns;
-    const int      ndim = entries->ndim, index_bytes = entries->index_bytes;
-    hs_output_free(entries);
-    hs_output_init(account, ndim, columns, index_bytes, entries);
-}
-
-hs_status
-hs_table_find_in_one_walk(hs_table *table, hs_failure *failure)
-{
-    hs_search    *search = table->search;
-    const int64_t n = hs_search_asking(search)->n;
-    once          doing = {.table = table, .fill.table = table, .fill.to = &doing.kept};
-    hs_output_init(NULL, search->scene.ndim, HS_WANT_J, 4, &doing.kept);
-    doing.where = hs_alloc(&search->call->account, HS_FOR_CANDIDATES, n + 1, sizeof *doing.where);
-    hs_status status = doing.where != NULL ? HS_OK : HS_ERR_MEMORY;
-    if (status == HS_OK) {
-        memset(doing.where, 0, (size_t)n * sizeof *doing.where);
-        status = walk_once(&doing, failure);
-    }
-    if (status == HS_OK) {
-        table_sum(table);
-        status = write_column(&doing, HS_WANT_J, &search->call->options);
-    }
-    if (status == HS_OK) {
-        status = write_column(&doing, HS_WANT_I, &search->call->options);
-    }
-    hs_free(&search->call->account, doing.where);
-    if (status == HS_ERR_MEMORY) {
-        give_up(table->entries);
-        return HS_TRY_OTHER;
-    }
-    return status;
 }

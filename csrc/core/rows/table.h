@@ -7,12 +7,10 @@
 
 /*
  * table.h: all neighbours of each asking point, one row a point, in the order of the caller's
- * numbers. One walk counts them, a second one writes each row to its place: no row moves, and
- * nothing is held but the result. A small table is found by one walk, and its rows are moved.
+ * numbers; of a search that lists each pair once, only those that follow the point, which is a
+ * sorted half list. One walk counts them, a second one writes each row to its place: no row moves,
+ * and nothing is held but the result. A small table is found by one walk, and its rows are moved.
  */
-
-/* Table rows (the neighbours of one point each), written as walkers find them: to
- * their places when offsets are known, or one behind another in cell order, to be moved later. */
 
 /* A table that is being made, of a full search. */
 typedef struct hs_table {
@@ -20,7 +18,7 @@ typedef struct hs_table {
     int64_t         *offsets; /* borrowed; where each row begins, rows + 1 */
     hs_output       *entries; /* borrowed; columns for what is wanted */
     hs_neighbourhood most;    /* set by hs_table_prepare */
-    hs_output        kept;    /* owned; rows in cell order, int32, until they have places */
+    hs_output        kept;    /* owned; rows in cell order, until they have places */
 } hs_table;
 
 /* Neighbours of each asking point, not counting itself, to counts[0 ... n - 1]. HS_ERR_SHIFT_RANGE
@@ -38,19 +36,5 @@ hs_status hs_table_fill(hs_table *table, hs_failure *failure);
 
 /* Idempotent. */
 void hs_table_free(hs_table *table);
-
-/*
- * A large table of i and j by one walk, not two. The rows are found in cell order, as
- * int32, and wait in memory that the result needs anyway: that of i, whose turn comes last. Then j
- * is written from them in the order of the table, and i over them.
- */
-
-/* Whether to try: i and j, nothing else, in columns of the search's own, by one thread. */
-bool hs_table_takes_one_walk(const hs_table *table);
-
-/* After hs_table_prepare: finds offsets and entries. HS_TRY_OTHER when memory is short: nothing is
- * kept then, and two walks, the first of which only counts, can do with less or tell how much it
- * takes. */
-hs_status hs_table_find_in_one_walk(hs_table *table, hs_failure *failure);
 
 #endif

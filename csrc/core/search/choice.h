@@ -41,17 +41,14 @@ typedef struct hs_choice {
     double       shortest; /* no vector of the lattice is shorter; infinity in open space */
     hs_cloud     asking_cloud, cloud; /* as given; empty where the shortest is far enough */
     hs_image_box images;
+    int64_t      origin; /* of a part: partners and `number` count points from here */
 } hs_choice;
-
-/* HS_OK, or HS_ERR_ARGUMENT for arrays that are missing, numbers that are no point's
- * (failure->row), or a min_distance that is negative or not finite, or not 0 with HS_SINGLE. */
-hs_status hs_selection_check(const hs_selection *selection, const hs_sets *sets,
-                             const hs_options *options, hs_failure *failure);
 
 /*
  * Sets call->choice for searches among these sets, to be freed with hs_choice_close; selection NULL
- * leaves it as it is. Any status of hs_selection_check, or HS_ERR_MEMORY. On failure there is
- * none.
+ * leaves it as it is. HS_ERR_MEMORY, or HS_ERR_ARGUMENT for arrays that are missing, numbers that
+ * are no point's (failure->row), or a min_distance that is negative or not finite, or not 0 with
+ * HS_SINGLE. On failure there is none.
  */
 hs_status hs_choice_open(const hs_selection *selection, const hs_sets *sets, hs_call *call,
                          hs_failure *failure);
@@ -68,6 +65,10 @@ hs_choice_excludes(const hs_choice *choice)
 
 /* The box of a choice that excludes pairs, in place of one before: HS_OK or HS_ERR_BOX_SKEWED. */
 hs_status hs_choice_set_box(const hs_box *box, int ndim, hs_choice *choice);
+
+/* The part of a choice for points from first_point on and queries from first_query on, which are
+ * numbered from 0; it borrows all that it has. */
+void hs_choice_cut(const hs_choice *all, int64_t first_point, int64_t first_query, hs_choice *part);
 
 /* Keeps the points, for a choice that compares images; any status of hs_cloud_load. */
 hs_status hs_choice_keep_points(const hs_sets *sets, hs_call *call, hs_failure *failure);
@@ -144,6 +145,7 @@ typedef struct hs_asking {
     int64_t        own;
     uint64_t       within;
     const int32_t *partner; /* ascending */
+    int32_t        origin;  /* that partners count from */
     int64_t        n_partners;
     uint64_t       bits; /* one for the last six bits of each partner */
 } hs_asking;

@@ -233,12 +233,12 @@ static hs_status
 order_init(hs_account *account, hs_block *block, hs_order *order)
 {
     const int64_t n = (int64_t)block->capacity + HS_PADDING;
-    order->entries = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(uint64_t));
-    order->spare = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(uint64_t));
-    order->column = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(float));
-    order->shifts = hs_alloc(account, HS_FOR_CANDIDATES,
-                             ((int64_t)block->most_runs + 1) * HS_MAX_DIM, sizeof(int64_t));
-    block->origin = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(int32_t));
+    order->entries = hs_alloc(account, HS_FOR_SORTING, n, sizeof(uint64_t));
+    order->spare = hs_alloc(account, HS_FOR_SORTING, n, sizeof(uint64_t));
+    order->column = hs_alloc(account, HS_FOR_SORTING, n, sizeof(float));
+    order->shifts = hs_alloc(account, HS_FOR_SORTING, ((int64_t)block->most_runs + 1) * HS_MAX_DIM,
+                             sizeof(int64_t));
+    block->origin = hs_alloc(account, HS_FOR_SORTING, n, sizeof(int32_t));
     const bool complete = order->entries != NULL && order->spare != NULL && order->column != NULL &&
                           order->shifts != NULL && block->origin != NULL;
     if (complete) { /* padding of labels may be read */
@@ -368,46 +368,6 @@ sort_entries(hs_order *order, int32_t n, uint32_t any)
     }
 }
 
-/* Whether two neighbouring entries have equal keys. */
-static bool
-has_twice(const hs_order *order, int32_t n)
-{
-    uint32_t twice = 0;
-    for (int32_t c = 1; c < n; c++) {
-        twice |= (order->entries[c] >> 32) == (order->entries[c - 1] >> 32);
-    }
-    return twice != 0;
-}
-
-/* Sorts by the candidates' numbers, stable. Returns whether a number occurs twice. */
-static bool
-sort_by_number(const hs_block *block, hs_order *order)
-{
-    const int32_t n = block->n;
-    uint32_t      any = 0;
-    for (int32_t c = 0; c < n; c++) {
-        const uint32_t key = (uint32_t)block->id[c];
-        order->entries[c] = (uint64_t)key << 32 | (uint32_t)c;
-        any |= key;
-    }
-    sort_entries(order, n, any);
-    return has_twice(order, n);
-}
-
-/* Sorts entries that are in some order by the candidates' numbers, stable. */
-static void
-sort_again_by_number(const hs_block *block, hs_order *order)
-{
-    uint32_t any = 0;
-    for (int32_t c = 0; c < block->n; c++) {
-        const uint32_t place = (uint32_t)(order->entries[c] & UINT32_MAX);
-        const uint32_t key = (uint32_t)block->id[place];
-        order->entries[c] = (uint64_t)key << 32 | place;
-        any |= key;
-    }
-    sort_entries(order, block->n, any);
-}
-
 /* Finds S of each run's image, over the box vectors as given. */
 static bool
 find_shifts(const hs_lattice *lattice, const hs_block *block, int64_t *shifts)
@@ -424,31 +384,48 @@ find_shifts(const hs_lattice *lattice, const hs_block *block, int64_t *shifts)
     return true;
 }
 
-/* Sorts by one component of S, stable: by its lower 32 bits, or by the bits above. */
+/* Sorts the runs' entries by one component of S, stable: by its lower 32 bits, or by the bits
+ * above. */
 static void
-sort_by_shift(const hs_block *block, const int64_t *shifts, bool upper, hs_order *order)
+sort_by_shift(int32_t n_runs, const int64_t *shifts, bool upper, hs_order *order)
 {
     int64_t  least = INT64_MAX;
     uint32_t any = 0;
-    for (int32_t r = 0; r < block->n_runs; r++) {
+    for (int32_t r = 0; r < n_runs; r++) {
         const int64_t shift = shifts[(int64_t)r * HS_MAX_DIM];
         least = shift < least ? shift : least;
     }
-    for (int32_t r = 0; r < block->n_runs; r++) {
-        const uint64_t above = (uint64_t)shifts[(int64_t)r * HS_MAX_DIM] - (uint64_t)least;
+    for (int32_t e = 0; e < n_runs; e++) {
+        const uint32_t run = (uint32_t)(order->entries[e] & UINT32_MAX);
+        const uint64_t above = (uint64_t)shifts[(int64_t)run * HS_MAX_DIM] - (uint64_t)least;
         const uint32_t key = upper ? (uint32_t)(above >> 32) : (uint32_t)above;
+        order->entries[e] = (uint64_t)key << 32 | run;
         any |= key;
-        for (int32_t c = block->runs[r].at; c < block->runs[r + 1].at; c++) {
-            order->spare[c] = (uint64_t)key << 32;
-        }
-    }
-    for (int32_t c = 0; c < block->n; c++) {
-        const uint32_t place = (uint32_t)(order->entries[c] & UINT32_MAX);
-        order->entries[c] = order->spare[place] | place;
     }
     if (any != 0) {
-        sort_entries(order, block->n, any);
+        sort_entries(order, n_runs, any);
     }
+}
+
+/* From entries of the runs to one for each candidate, with its number for a key. Returns every bit
+ * that a number has. */
+static uint32_t
+list_candidates(const hs_block *block, hs_order *order)
+{
+    uint64_t *to = order->spare;
+    uint32_t  any = 0;
+    for (int32_t e = 0; e < block->n_runs; e++) {
+        const hs_run *run = &block->runs[order->entries[e] & UINT32_MAX];
+        for (int32_t c = run->at; c < run[1].at; c++) {
+            const uint32_t key = (uint32_t)block->id[c];
+            *to++ = (uint64_t)key << 32 | (uint32_t)c;
+            any |= key;
+        }
+    }
+    to = order->spare;
+    order->spare = order->entries;
+    order->entries = to;
+    return any;
 }
 
 /* Polls between passes over a large block. */
@@ -499,14 +476,17 @@ is_ascending(const int32_t *numbers, int32_t n)
 
 /*
  * Sorts a block that has been gathered: ascending by the caller's number, then, where hits are
- * listed as places, by S over the box vectors as given. block->origin says where each candidate
- * was; ids follow the new order only where these are listed. HS_ERR_SHIFT_RANGE when an image
- * passes 2^62; HS_ERR_INTERRUPTED, as options say, while a large block is sorted.
+ * listed as places and some pair has several images, by S over the box vectors as given.
+ * block->origin says where each candidate was; ids follow the new order only where these are
+ * listed. HS_ERR_SHIFT_RANGE when an image passes 2^62; HS_ERR_INTERRUPTED, as options say, while a
+ * large block is sorted.
  */
 static hs_status
-order_block(const hs_lattice *lattice, const hs_options *options, hs_block_use use, hs_block *block,
+order_block(const hs_search *search, const hs_options *options, hs_block_use use, hs_block *block,
             hs_order *order)
 {
+    const hs_lattice *lattice = &search->scene.lattice;
+    const bool        by_shift = use == HS_BLOCK_LISTS_PLACES && hs_search_repeats_images(search);
     if (poll_large(options, block) != HS_OK) { /* it was gathered */
         return HS_ERR_INTERRUPTED;
     }
@@ -516,20 +496,21 @@ order_block(const hs_lattice *lattice, const hs_options *options, hs_block_use u
         }
         return HS_OK;
     }
-    const bool twice = sort_by_number(block, order);
-    if (twice && use == HS_BLOCK_LISTS_PLACES) {
-        if (!find_shifts(lattice, block, order->shifts)) {
-            return HS_ERR_SHIFT_RANGE;
-        }
-        for (int l = lattice->n_periodic - 1; l >= 0; l--) {
-            sort_by_shift(block, order->shifts + l, false, order);
-            sort_by_shift(block, order->shifts + l, true, order);
-            if (poll_large(options, block) != HS_OK) {
-                return HS_ERR_INTERRUPTED;
-            }
-        }
-        sort_again_by_number(block, order);
+    if (by_shift && !find_shifts(lattice, block, order->shifts)) {
+        return HS_ERR_SHIFT_RANGE;
     }
+    for (int32_t r = 0; r < block->n_runs; r++) {
+        order->entries[r] = (uint64_t)r;
+    }
+    for (int l = lattice->n_periodic - 1; by_shift && l >= 0; l--) {
+        sort_by_shift(block->n_runs, order->shifts + l, false, order);
+        sort_by_shift(block->n_runs, order->shifts + l, true, order);
+        if (poll_large(options, block) != HS_OK) {
+            return HS_ERR_INTERRUPTED;
+        }
+    }
+    const uint32_t any = list_candidates(block, order);
+    sort_entries(order, block->n, any);
     return arrange(lattice->ndim, options, use, block, order);
 }
 
@@ -1774,8 +1755,8 @@ fill_block(hs_scanner *scanner)
     if (!scanner->is_ordered) {
         return HS_OK;
     }
-    status = order_block(&scanner->search->scene.lattice, &scanner->options, scanner->scans, block,
-                         &scanner->order);
+    status =
+        order_block(scanner->search, &scanner->options, scanner->scans, block, &scanner->order);
     if (status == HS_ERR_SHIFT_RANGE) {
         scanner->failed_point = hs_search_asking(scanner->search)->order[scanner->group.first];
     }

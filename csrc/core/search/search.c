@@ -25,17 +25,6 @@
 #define ROUNDING             1e-9   /* relative; far more than coordinates along axes are rounded */
 #define SURE_ERRORS          3.0    /* standard errors below the mean: sure enough to refuse */
 
-static double
-sum_of_squares(const hs_bins *bins, int64_t n_cells)
-{
-    double squares = 0.0;
-    for (int64_t c = 0; c < n_cells; c++) {
-        const double n = bins->start[c + 1] - bins->start[c];
-        squares += n * n;
-    }
-    return squares;
-}
-
 /*
  * A bound on the number of pairs. Each stencil offset pairs every cell with at most one other, so
  * by the Cauchy-Schwarz inequality it contributes at most the sum of squared occupancies; for two
@@ -44,11 +33,9 @@ sum_of_squares(const hs_bins *bins, int64_t n_cells)
 static double
 bound_pairs(const hs_search *search)
 {
-    double squares = sum_of_squares(&search->bins, search->grid.n_cells), offsets = 0.0;
+    double squares = search->bins.squares, offsets = 0.0;
     if (search->has_queries) {
-        const int64_t n_cells = search->is_sparse ? search->query_sparse.n_cells
-                                                  : search->grid.n_cells;
-        squares = sqrt(squares * sum_of_squares(&search->query_bins, n_cells));
+        squares = sqrt(squares * search->query_bins.squares);
     }
     for (int64_t s = 0; s < search->stencil.n_rows; s++) {
         offsets += (double)search->stencil.rows[s].last - search->stencil.rows[s].first + 1.0;
@@ -96,17 +83,22 @@ occupied_volume(const hs_points *points, const hs_box *box, double cutoff)
 }
 
 void
-hs_shortage_add(const hs_points *points, const hs_box *box, double cutoff, hs_shortage *shortage)
+hs_shortage_add(const hs_sets *sets, const hs_box *box, double cutoff, hs_shortage *shortage)
 {
-    const double n = (double)points->n, all = 0.5 * n * (n - 1.0);
-    hs_failure   ignored;
+    const hs_points *points = sets->points;
+    const double     n = (double)points->n, all = 0.5 * n * (n - 1.0);
+    const double     n_asking = sets->queries != NULL ? (double)sets->queries->n : n;
+    hs_failure       ignored;
     if (points->n == 0 || !(cutoff >= 0.0) || hs_box_check(box, &ignored) != HS_OK) {
         return;
     }
     const double volume = occupied_volume(points, box, cutoff);
     const double pairs = 0.5 * n * n * hs_ball_volume(points->ndim, cutoff) / volume;
     /* Numbers near the ends of the range leave no volume: all pairs then. */
-    shortage->pairs += box == NULL && !(pairs < all) ? all : isfinite(pairs) ? pairs : all;
+    shortage->pairs += (box == NULL && !(pairs < all) ? all
+                        : isfinite(pairs)             ? pairs
+                                                      : all) *
+                       (sets->is_full && !sets->is_once ? 2.0 * n_asking / n : 1.0);
     shortage->bytes += n * (BYTES_PER_POINT + BYTES_PER_COORDINATE * points->ndim);
 }
 
@@ -120,19 +112,6 @@ hs_shortage_tell(const hs_shortage *shortage, const hs_options *options, int ndi
         failure->expected_bytes = failure->expected_pairs * bytes_per_pair_of(options, ndim);
         failure->search_bytes = hs_larger(shortage->bytes + BYTES_OF_WALK, failure->search_bytes);
     }
-}
-
-void
-hs_shortage_of_search(const hs_points *points, const hs_box *box, const hs_search *search,
-                      hs_failure *failure)
-{
-    hs_shortage shortage = {0.0, 0.0};
-    hs_shortage_add(points, box, search->call->options.cutoff, &shortage);
-    if (search->is_full) {
-        shortage.pairs *= search->pairs_per_half;
-    }
-    hs_shortage_tell(&shortage, &search->call->options, points->ndim, search->call->account.limit,
-                     failure);
 }
 
 static hs_status
@@ -511,11 +490,11 @@ search_set_asking(const hs_sets *sets, hs_search *search)
     search->keeps_none = sets->keeps_none;
     HS_ASSERT(sets->is_full || !search->has_queries);
     search->is_full = sets->is_full;
-    search->is_half = !sets->is_full;
+    search->is_half = !sets->is_full || sets->is_once;
     search->n_in_all = search->has_queries ? sets->queries->n : n;
-    search->pairs_per_half = !search->is_full ? 1.0
-                             : n == 0         ? 0.0
-                                              : 2.0 * (double)search->n_in_all / (double)n;
+    search->pairs_per_half = search->is_half ? 1.0
+                             : n == 0        ? 0.0
+                                             : 2.0 * (double)search->n_in_all / (double)n;
 }
 
 /* Sets what follows from scene and grid. */
@@ -526,11 +505,21 @@ search_finish_setup(hs_search *search)
         search->scene.x_error + search->grid.shift_error + search->scene.formula_error;
 }
 
-void
-hs_search_renumber(int64_t first_point, int64_t n_points_in_all, hs_search *search)
+bool
+hs_search_repeats_images(const hs_search *search)
 {
-    search->first_point = first_point;
-    search->n_in_all = n_points_in_all;
+    const hs_lattice *lattice = &search->scene.lattice;
+    for (int k = 0; k < lattice->ndim; k++) {
+        if (lattice->row_of_axis[k] >= 0 && 2.0 * search->grid.range[k] >= lattice->period[k]) {
+            return true;
+        }
+    }
+    return false;
+}
+
+void
+hs_search_renumber(int64_t first_point, hs_search *search)
+{
     for (int64_t si = 0; si < search->bins.n; si++) {
         search->bins.order[si] += (int32_t)first_point;
     }
@@ -622,10 +611,11 @@ static hs_status
 build_bins(hs_search *search, hs_scene *scene, hs_grid *grid, hs_sparse *sparse, hs_bins *bins)
 {
     hs_account *account = &search->call->account;
+    const bool  of_queries = bins == &search->query_bins;
     return search->is_sparse ? hs_sparse_build(account, search->call->team, &search->call->options,
                                                scene, grid, sparse, bins)
                              : hs_bins_build(account, search->call->team, &search->call->options,
-                                             scene, grid, bins);
+                                             scene, grid, of_queries, bins);
 }
 
 /* The queries into the cells that are there; their scene gives up its arrays. */
@@ -783,13 +773,13 @@ hs_status
 hs_search_reuse(const hs_sets *sets, hs_call *call, hs_search *search, hs_failure *failure)
 {
     const hs_search *built = sets->built;
-    const int64_t    n_queries = sets->queries != NULL ? sets->queries->n : 0;
+    const int64_t    n_asking = sets->queries != NULL ? sets->queries->n : sets->points->n;
     if (!serves(built, &call->options, sets->least_cutoff)) {
         return HS_REBUILD;
     }
     hs_search_begin(call, search);
     borrow(built, sets->is_untested, search);
-    hs_call_gather(call, sets->points->n + n_queries);
+    hs_call_gather(call, n_asking);
     hs_status status = call->kernel == NULL ? HS_ERR_KERNEL : adapt(sets, search, failure);
     if (status == HS_OK && sets->queries != NULL) {
         status = take_queries(sets->queries, search, failure);
@@ -816,7 +806,7 @@ finish(hs_search *search)
         return HS_ERR_MEMORY;
     }
     hs_call_gather_for(call, hs_search_asking(search)->n,
-                       search->grid.expected_pairs * search->pairs_per_half);
+                       search->grid.expected_pairs * search->pairs_per_half, search->is_borrowed);
     return HS_OK;
 }
 

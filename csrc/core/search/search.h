@@ -75,26 +75,26 @@ typedef struct hs_search {
     hs_bins    query_bins;
     hs_sparse  query_sparse;
     bool       is_sparse;
-    const struct hs_limits *limits;      /* borrowed; NULL: the cutoff is that of all pairs */
-    hs_shells               shells;      /* as the options have them */
-    int64_t                 first_point; /* number of the first point */
-    int64_t n_in_all;       /* asking points, of which these may be a part: for fractions done */
-    double  pairs_per_half; /* pairs to be found for each pair of the half list */
-    double  filter_error;   /* bound on each component before rounding to float32 */
+    const struct hs_limits *limits;         /* borrowed; NULL: the cutoff is that of all pairs */
+    hs_shells               shells;         /* as the options have them */
+    int64_t                 n_before;       /* asking points that were searched with before, ... */
+    int64_t                 n_in_all;       /* ... of so many: for fractions done */
+    double                  pairs_per_half; /* pairs to be found for each pair of the half list */
+    double                  filter_error;   /* bound on each component before rounding to float32 */
 } hs_search;
 
 /* An empty search; the call must outlive it. */
 void hs_search_begin(hs_call *call, hs_search *search);
 
-/* Points that are part of more: their numbers begin at first_point, of n_points_in_all. */
-void hs_search_renumber(int64_t first_point, int64_t n_points_in_all, hs_search *search);
+/* Points that are part of more: their numbers begin here. */
+void hs_search_renumber(int64_t first_point, hs_search *search);
 
 /* How much of all points lies behind when so many of the asking points do, those before the
  * search's own included: for progress and guesses. */
 HS_ALWAYS_INLINE double
 hs_search_fraction(const hs_search *search, int64_t n)
 {
-    return (double)(search->first_point + n) / (double)search->n_in_all;
+    return (double)(search->n_before + n) / (double)search->n_in_all;
 }
 
 /* Whether a walker of this search may serve another one: it has no arrays for limits or hints for
@@ -111,6 +111,9 @@ hs_search_asking(const hs_search *search)
 {
     return search->has_queries ? &search->query_bins : &search->bins;
 }
+
+/* Whether a pair of points can occur in several images, so that these are to be told apart. */
+bool hs_search_repeats_images(const hs_search *search);
 
 /* Frees what it has; idempotent. The call goes on. */
 void hs_search_close(hs_search *search);
@@ -151,15 +154,10 @@ typedef struct hs_shortage {
     double bytes; /* of the search itself */
 } hs_shortage;
 
-/* Adds one system, from the caller's numbers: nothing else need have been read yet. */
-void hs_shortage_add(const hs_points *points, const hs_box *box, double cutoff,
-                     hs_shortage *shortage);
+/* Adds one search, from the caller's numbers: nothing else need have been read yet. */
+void hs_shortage_add(const hs_sets *sets, const hs_box *box, double cutoff, hs_shortage *shortage);
 void hs_shortage_tell(const hs_shortage *shortage, const hs_options *options, int ndim,
                       double limit, hs_failure *failure);
-
-/* Pairs and bytes of one search. */
-void hs_shortage_of_search(const hs_points *points, const hs_box *box, const hs_search *search,
-                           hs_failure *failure);
 
 /*
  * After sorting into cells: HS_OK when a result is expected to fit the account's limit, and always

@@ -41,20 +41,41 @@ row_count(const hs_search *search)
                              : search->grid.n_cells / search->grid.shape[0];
 }
 
+/* The first query in this cell of a dense grid or a later one. */
+static int32_t
+first_query(const hs_bins *queries, int64_t cell)
+{
+    int64_t low = 0, high = queries->n;
+    while (low < high) {
+        const int64_t middle = low + (high - low) / 2;
+        if (queries->cells[middle] < cell) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    return (int32_t)low;
+}
+
 /* The first point of a row; of the row after the last, the number of points. */
 static int32_t
 first_point(const hs_search *search, int64_t number)
 {
-    const int64_t cell = search->is_sparse ? asking_sparse(search)->row_cell[number]
-                                           : number * search->grid.shape[0];
-    return hs_search_asking(search)->start[cell];
+    const hs_bins *asking = hs_search_asking(search);
+    const int64_t  cell = search->is_sparse ? asking_sparse(search)->row_cell[number]
+                                            : number * search->grid.shape[0];
+    return asking->cells != NULL ? first_query(asking, cell) : asking->start[cell];
 }
 
 /* The last row that begins at or before point si. */
 static int64_t
 hs_row_of(const hs_search *search, int32_t si)
 {
-    int64_t low = 0, high = row_count(search);
+    const hs_bins *asking = hs_search_asking(search);
+    int64_t        low = 0, high = row_count(search);
+    if (asking->cells != NULL) {
+        return asking->cells[si] / search->grid.shape[0];
+    }
     while (high - low > 1) {
         const int64_t middle = low + (high - low) / 2;
         if (first_point(search, middle) <= si) {
@@ -116,9 +137,32 @@ row_target(const hs_search *search, bool is_ordered)
     return target < HS_GROUP_POINTS ? (int32_t)target : HS_GROUP_POINTS;
 }
 
+/* hs_row_next for queries in a dense grid: while they are few, and their windows meet. */
+static bool
+next_queries(const hs_search *search, int32_t target, hs_row *row, hs_row_group *group)
+{
+    const uint32_t *cells = hs_search_asking(search)->cells;
+    const int64_t   apart = 2 * search->grid.reach[0] + 1;
+    const int32_t   first = row->next;
+    int32_t         last = first;
+    if (first >= row->end) {
+        return false;
+    }
+    while (last + 1 < row->end && last + 1 - first < target &&
+           cells[last + 1] - cells[last] <= apart) {
+        last++;
+    }
+    *group = (hs_row_group){first, last + 1, cells[first] - row->base, cells[last] - row->base};
+    row->next = last + 1;
+    return true;
+}
+
 bool
 hs_row_next(const hs_search *search, int32_t target, hs_row *row, hs_row_group *group)
 {
+    if (hs_search_asking(search)->cells != NULL) {
+        return next_queries(search, target, row, group);
+    }
     if (search->is_sparse) {
         const bool found =
             hs_sparse_next_group(asking_sparse(search), row->base, HS_GROUP_POINTS, &row->taken);
@@ -345,11 +389,15 @@ hs_walk(hs_walker *walker, int32_t first, int32_t end)
         return HS_OK; /* no distance is below zero */
     }
     const int64_t last_row = hs_row_of(search, end - 1);
-    for (int64_t row = hs_row_of(search, first); row < n_rows && row <= last_row; row++) {
+    for (int64_t row = hs_row_of(search, first); row < n_rows && row <= last_row;) {
         const hs_status status = walk_row(walker, row, first, end);
+        const int32_t   next = walker->cursor.row.end;
         if (status != HS_OK) {
             return status;
         }
+        /* Between few queries there are many rows without one. */
+        row = hs_search_asking(search)->cells != NULL && next < end ? hs_row_of(search, next)
+                                                                    : row + 1;
     }
     return HS_OK;
 }

@@ -279,10 +279,10 @@ hs_call_gather(hs_call *call, int64_t n_points)
 }
 
 void
-hs_call_gather_for(hs_call *call, int64_t n_points, double n_pairs)
+hs_call_gather_for(hs_call *call, int64_t n_points, double n_pairs, bool are_kept)
 {
     const hs_options *options = &call->options;
-    if (call->team == NULL && options->threads > 1) {
+    if (call->team == NULL && (options->threads > 1 || are_kept)) {
         const int64_t bytes = hs_want_bytes(options->want, HS_MAX_DIM / 2, options->index_bytes);
         const double  of_pair = POINTS_PER_PAIR + POINTS_PER_BYTE * (double)bytes;
         call->team = hs_team_create(hs_call_threads((double)n_points + of_pair * n_pairs, options));

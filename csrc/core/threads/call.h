@@ -100,9 +100,9 @@ int hs_call_threads(double n_points, const hs_options *options);
 /* Starts the threads that so many points are worth, unless they run already. */
 void hs_call_gather(hs_call *call, int64_t n_points);
 
-/* The same once it is known about how many pairs these points have, for options that name a number
- * of threads: the others go by points alone. */
-void hs_call_gather_for(hs_call *call, int64_t n_points, double n_pairs);
+/* The same once it is known about how many pairs these points have; unless what is searched is
+ * kept, for options that name a number of threads: the others go by points alone. */
+void hs_call_gather_for(hs_call *call, int64_t n_points, double n_pairs, bool are_kept);
 
 #ifdef HS_TESTING
 /* From how many points on threads are worth starting that the options name; in tests 0 at first.

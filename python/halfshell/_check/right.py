@@ -56,9 +56,9 @@ class Right:
         pairing = call.pairing or Pairing()
         self.is_plain = pairing.rule is None
         self.rule, self.extent, self.table = RULES[pairing.rule or 0], pairing.extent, pairing.table
-        known = {
-            name: self._sides_of(getattr(call.known, name), getattr(call.known_of_queries, name))
-            for name in Known._fields
+        known: dict[str, tuple[Any, Any]] = {
+            name: (own if self.is_one_set else other, own)  # of each i, and of each j
+            for name, own, other in zip(Known._fields, call.known, call.known_of_queries)
         }
         self.marks = known["radii" if self.table is None else "types"]  # None: no rule needs them
         if self.is_plain:  # one type, as it were
@@ -71,10 +71,6 @@ class Right:
         self.groups, self.labels = known["groups"], known["labels"]
         self.within, self.least = pairing.within or 0, pairing.least
         self.excluded = None if pairing.excluded is None else self._keys(*pairing.excluded.T)
-
-    def _sides_of(self, own: Any, other: Any) -> tuple[Any, Any]:
-        """What is known of each i, and of each j."""
-        return own if self.is_one_set else other, own
 
     @property
     def is_directed(self) -> bool:

@@ -259,6 +259,7 @@ def _refuse_without_output(args: Namespace, *names: str) -> None:
             option = name.replace("_", "-")
             raise InputError(f"--{option} is for what -o writes: give -o as well")
 
+
 def _run(args: Namespace, find: Callable[[Scene, Any, Scene, dict[str, Any]], Found]) -> int:
     """A command with a cutoff."""
     scene, cutoff, reason = load_scene(args)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the command line works out from a scene itself: a cutoff, a description, g(r)."""
+"""A scene of the command line: read as the options say, its cutoff chosen, described, and drawn."""
 
 from __future__ import annotations
 

@@ -224,6 +224,7 @@ def starts_of(lengths: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
 def rows_of(
     offsets: npt.NDArray[Any], dtype: npt.DTypeLike = np.int64
 ) -> npt.NDArray[Any]:
+    """The row that each entry is in."""
     return np.repeat(np.arange(len(offsets) - 1, dtype=dtype), np.diff(offsets))
 
 

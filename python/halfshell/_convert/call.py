@@ -5,13 +5,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
+from copy import copy
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from halfshell._convert.arrays import as_array, as_real_array, in_order
 from halfshell._convert.foreign import is_a, kind_of, shown, told, whole_number
-from halfshell._convert.lengths import as_number, check_ascending, check_lengths
+from halfshell._convert.lengths import as_length, as_number, check_ascending, check_lengths
 from halfshell._convert.memory import refuse_large
 from halfshell._convert.objects import SYMBOLS
 from halfshell._convert.options import SHELL, as_choice, as_flag
@@ -36,7 +39,7 @@ _NO_PAIRS = -1.0  # the cutoff of two types that form none
 
 
 class Known(NamedTuple):
-    """What a search goes by of each point, in the order of the core; None: by something else."""
+    """What a search uses of each point, in the order of the core; None for what it does not use."""
 
     radii: FloatArray | None = None
     supports: FloatArray | None = None
@@ -112,7 +115,7 @@ class Call:
 
     @property
     def scene(self) -> tuple[Any, ...]:
-        """Those of the cutoff and the box: of all systems, or of each."""
+        """The cutoff, the box and its axes: those of all systems, or of each one."""
         cutoff = self.cutoff if self.system_cutoffs is None else self.system_cutoffs
         return cutoff, self.points.box, self.points._axes
 
@@ -142,11 +145,13 @@ class Call:
 
     def run(self, search: Callable[..., Any], *own: Any) -> Any:
         """Call a search of the core, with a bar that goes away at its end."""
-        try:
+        with closing(self):
             return search(*self.core, *own)
-        finally:
-            if self.bar is not None:
-                self.bar.close()
+
+    def close(self) -> None:
+        """Take the bar away, if there is one."""
+        if self.bar is not None:
+            self.bar.close()
 
     def refuse_batch(self, function: str, reason: str) -> None:
         """ValueError for several systems where they mean nothing, with why."""
@@ -155,7 +160,7 @@ class Call:
 
 
 def shells_of(quantities: Any) -> str:
-    """What several cutoffs are for, if the letter k is wanted."""
+    """The argument `several` of `take`: "shells" if the letter k is wanted."""
     return "shells" if is_a(quantities, str) and SHELL in quantities else ""
 
 
@@ -179,22 +184,69 @@ def check_shells(call: Call, quantities: Any) -> None:
 
 
 def part_of(progress: Any, k: int, n: int) -> Any:
-    """What is told of the k-th of n searches."""
+    """The progress of the k-th of n searches, which together are one."""
     return progress and (lambda fraction: progress((k + fraction) / n))
 
 
 def each_cutoff(call: Call) -> Iterator[Call]:
     """The call with each of its several cutoffs in turn, as parts of one search."""
     assert call.shells is not None
-    cutoffs, told, bar = call.shells.tolist(), call.progress, call.bar
-    call.shells = call.bar = None
-    try:
+    cutoffs, call.shells = call.shells.tolist(), None
+    with closing(call):
         for k, cutoff in enumerate(cutoffs):
-            call.cutoff, call.progress = cutoff, part_of(told, k, len(cutoffs))
-            yield call
-    finally:
-        if bar is not None:
-            bar.close()
+            one = copy(call)
+            one.progress, one.bar = part_of(call.progress, k, len(cutoffs)), None
+            if call.pairing is not None and call.pairing.extent is not None:
+                one.pairing = call.pairing._replace(extent=cutoff + 0.0)
+            else:
+                one.cutoff = cutoff
+            yield one
+
+
+def each_system(call: Call) -> Iterator[tuple[Call, int]]:
+    """A call for each system that has points, and the number of its first point among all."""
+    points, queries = call.points, call.queries
+    assert points.batch is not None
+    if call.system_cutoffs is not None:
+        check_lengths(call.system_cutoffs, "cutoff")
+    numbers, bounds = np.unique(points.batch, return_index=True)
+    asked = None
+    if queries is not None and queries.batch is not None:
+        asked = [np.searchsorted(queries.batch, numbers, side) for side in ("left", "right")]
+    firsts = [*bounds.tolist(), len(points)]
+    for k, (s, (first, end)) in enumerate(zip(numbers.tolist(), pairwise(firsts), strict=True)):
+        one = copy(call)
+        one.points = _part(points, s, slice(first, end))
+        own_queries = slice(0, 0)
+        if queries is not None and asked is not None:
+            own_queries = slice(int(asked[0][k]), int(asked[1][k]))
+            one.queries = _part(queries, s, own_queries)
+        if call.system_cutoffs is not None:
+            one.cutoff, one.system_cutoffs = float(call.system_cutoffs[s]), None
+        own = slice(first, end)
+        one.known = call.known.some(own)
+        one.known_of_queries = call.known_of_queries.some(own_queries)
+        pairing = call.pairing
+        if pairing is not None and pairing.excluded is not None:
+            asking = own if queries is None else own_queries
+            i, j = pairing.excluded.T
+            mine = (asking.start <= i) & (i < asking.stop) & (first <= j) & (j < end)
+            own_pairs = pairing.excluded[mine] - [asking.start, first]
+            one.pairing = pairing._replace(excluded=np.ascontiguousarray(own_pairs))
+        yield one, first
+
+
+def _part(points: Points, s: int, places: slice) -> Points:
+    """The points of system s, which share memory with all."""
+    parts: dict[str, Any] = {"batch": None}
+    for name in ("positions", "radii", "supports", "weights", "_types", "_groups", "_labels"):
+        column = getattr(points, name)
+        parts[name] = None if column is None else column[places]
+    if points._box is not None and points._box.ndim == 3:
+        parts["_box"] = points._box[s]
+    if isinstance(points._axes, np.ndarray):
+        parts["_axes"] = int(points._axes[s])
+    return Points._made(points, **parts)
 
 
 def take(
@@ -215,10 +267,10 @@ def take(
     several: str = "",
     by_reach: bool = True,
 ) -> Call:
-    """What a call has for the shared arguments, converted and checked once.
+    """A call with its shared arguments, converted and checked once.
 
-    directed: the result has a direction, so that the rule may have one. several: what a function
-    makes of several cutoffs: "shells" or "counts"; nothing: they are refused. by_reach: whether
+    directed: the result has a direction, so that the rule may have one. several: what several
+    cutoffs are for, "shells" or "counts"; if it is empty, they are refused. by_reach: whether
     radii, supports and types say how far pairs reach.
     """
     try:
@@ -237,7 +289,10 @@ def take(
         call.inclusive = inclusive if type(inclusive) is bool else as_flag(inclusive, "inclusive")
         call.threads = call.settings.threads if threads is None else threads
         if progress is not None and progress is not False:
-            _take_progress(call, progress)
+            from halfshell._convert.progress import ProgressBar, as_progress  # few calls need it
+
+            call.progress = as_progress(progress)
+            call.bar = call.progress if isinstance(call.progress, ProgressBar) else None
         call.rule = rule
         if by_reach:
             _take_cutoff(call, cutoff, directed or call.queries is not None, several)
@@ -250,14 +305,6 @@ def take(
     except Exception as error:
         shorten(error)
         raise
-
-
-def _take_progress(call: Call, progress: Any) -> None:
-    from halfshell._convert.progress import ProgressBar, as_progress  # few calls need it
-
-    call.progress = as_progress(progress)
-    if isinstance(call.progress, ProgressBar):
-        call.bar = call.progress
 
 
 # ---- queries, and rows of some points ------------------------------------------------------
@@ -443,8 +490,7 @@ def _take_supports(call: Call) -> None:
     rule = "max" if call.rule is None else call.rule
     if call.system_cutoffs is not None:
         raise ValueError("supports have one extent: cutoff must be a number")
-    if not (math.isfinite(call.cutoff) and call.cutoff >= 0.0):
-        raise ValueError(f"cutoff must be finite and not negative, got {call.cutoff}")
+    as_length(call.cutoff, "cutoff")
     own, asking = _sides(call, rule, "supports")
     call.known, call.known_of_queries = Known(supports=own), Known(supports=asking)
     call.pairing = Pairing(RULES.index(rule), call.cutoff + 0.0)
@@ -497,15 +543,15 @@ def kinds_of(call: Call, reason: str) -> _Kinds:
     for name, one in (("points", call.points), ("queries", call.queries)):
         if one is not None and one._kinds is None:
             raise ValueError(f"{reason} needs types, and {name} have none: Points(types=...)")
-    own, asking, names = _together(call, "_kinds", "types")
+    own, asking, names = numbers_of_both(call, "_kinds", "types")
     assert own is not None
     return _Kinds(own, asking, names)
 
 
-def _together(
+def numbers_of_both(
     call: Call, attribute: str, name: str
 ) -> tuple[Any, Any, tuple[str, ...] | None]:
-    """Numbers of both sets, of which the same name has the same one; names, if they are some."""
+    """Types, groups or labels of both sets as numbers, equal for equal names; and any names."""
     own: Labels | None = getattr(call.points, attribute)
     asking: Labels | None = None if call.queries is None else getattr(call.queries, attribute)
     if call.queries is not None and (own is None) != (asking is None):
@@ -627,9 +673,7 @@ def _lengths(
             raise TypeError(
                 f"cutoff must have pairs of types as keys, such as ('Si', 'O'), got {shown(key)}"
             )
-        length = as_number(value, where)
-        if not (math.isfinite(length) and length >= 0.0):
-            raise ValueError(f"{where} must be finite and not negative, got {length}")
+        length = as_length(as_number(value, where), where)
         one, other = (_type_of(part, where, names) for part in key)
         if "*" in (one, other):
             pair = ("*", other if one == "*" else one)
@@ -650,6 +694,8 @@ def _type_of(part: Any, where: str, names: tuple[str, ...] | None) -> Any:
     if is_a(part, str):
         name = str.__str__(part)
         if name == "*":
+            if names is not None and name in names:
+                raise ValueError(f"{where} has '*', which means any type and is the name of one")
             return name
         if names is None:
             raise ValueError(f"{where} has names, and types are numbers")
@@ -669,12 +715,10 @@ def _type_of(part: Any, where: str, names: tuple[str, ...] | None) -> Any:
 # ---- which pairs count ---------------------------------------------------------------------
 
 def _take_selection(call: Call, exclude: Any, min_distance: Any) -> None:
-    groups, asking_groups, _ = _together(call, "_groups", "groups")
+    groups, asking_groups, _ = numbers_of_both(call, "_groups", "groups")
     least = 0.0
     if min_distance is not None:
-        least = as_number(min_distance, "min_distance")
-        if not (math.isfinite(least) and least >= 0.0):
-            raise ValueError(f"min_distance must be finite and not negative, got {least}")
+        least = as_length(as_number(min_distance, "min_distance"), "min_distance")
         if least > 0.0 and call.settings.precision == "single":
             raise ValueError("min_distance cannot be combined with precision 'single'")
     labels = asking_labels = excluded = within = None
@@ -703,7 +747,7 @@ def _labels(call: Call, within: int) -> tuple[Any, Any]:
             )
     if not 0 <= within < 2**63:
         raise ValueError(f"exclude must be from 0 on and below 2**63, got {within}")
-    own, asking, names = _together(call, "_labels", "labels")
+    own, asking, names = numbers_of_both(call, "_labels", "labels")
     if names is not None and within:
         raise ValueError(f"exclude must be 0 where labels are names, got {within}")
     return own, asking

@@ -12,13 +12,12 @@ from halfshell._convert.arrays import as_real_array, of_shape, refuse_where
 from halfshell._convert.foreign import is_a, shown
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import as_count
-from halfshell._convert.types import Arrays
 from halfshell._errors import brief
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from halfshell._convert.types import FloatArray
+    from halfshell._convert.types import Arrays, FloatArray
 
 # The array, the one that it is checked with, and the counts.
 _EDGE_COPIES = 4
@@ -95,6 +94,7 @@ def check_ascending(array: FloatArray, name: str, all_of_them: str) -> None:
 
 
 def as_length(value: float, name: str) -> float:
+    """The same number, if it is finite and not negative."""
     if not (math.isfinite(value) and value >= 0.0):
         raise ValueError(f"{name} must be finite and not negative, got {value!r}")
     return value

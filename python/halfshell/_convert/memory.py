@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Memory: what is there for arrays that Python makes, and what is kept of results that are gone.
+"""Memory: whether arrays that Python makes would fit, and what is kept of deleted results.
 
-The core looks after its own.
+The core checks its own allocations.
 """
 
 from __future__ import annotations

@@ -367,14 +367,14 @@ class Points:
             raise kind(f"the box of {name}: {error}") from error
 
     def _counting(self, n_systems: int) -> Points:
-        """The same, told how many systems there are: the last ones may have no points."""
+        """These points, told how many systems there are: the last ones may have no points."""
         if self.batch is not None and not is_a(self._axes, np.ndarray):
             setattr_(self, "_axes", np.full(n_systems, self._axes, np.uint8))
             self._axes.flags.writeable = False
         return self
 
     def _counting_as(self, other: Points) -> Points:
-        """The same, of as many systems as others, where these are told how many."""
+        """These points, with as many systems as others, if those are told how many."""
         return self._counting(len(other._axes)) if is_a(other._axes, np.ndarray) else self
 
     def _own_arrays(self, with_positions: bool = True) -> None:
@@ -392,7 +392,7 @@ class Points:
                 kept.numbers.flags.writeable = False
 
     def _own_all(self) -> None:
-        """The same, of finite coordinates in a box that is one."""
+        """Copies that do not change; ValueError for infinite coordinates, or a box that is none."""
         self._own_arrays()
         refuse_infinite(self.positions, "positions")
         if self._box is not None:
@@ -452,8 +452,7 @@ class Points:
             numbers, places = np.unique(elements, return_inverse=True)
             symbols = np.array(SYMBOLS)[numbers]
             order = np.argsort(symbols)
-            ranks = np.empty(len(order), np.int32)
-            ranks[order] = np.arange(len(order))
+            ranks = np.argsort(order).astype(np.int32)
             named = Labels(ranks[places.reshape(-1)], tuple(symbols[order].tolist()))
             setattr_(self, "_types", named)
             setattr_(self, "_elements", None)
@@ -599,17 +598,17 @@ class Points:
         if kinds is None:
             raise ValueError("radii by type need types")
         lengths = {key: as_number(value, f"radii[{shown(key)}]") for key, value in values.items()}
-        every = range(1 + int(kinds.numbers.max(initial=-1)))
-        present = set(np.unique(kinds.numbers).tolist())
-        table = np.zeros(len(every))
-        for number in every:
-            name = number if kinds.names is None else kinds.names[number]
-            if number in present and name not in lengths and "*" not in lengths:
+        present, places = np.unique(kinds.numbers, return_inverse=True)
+        names = present.tolist() if kinds.names is None else [kinds.names[k] for k in present]
+        if "*" in names and "*" in lengths:
+            raise ValueError("radii have a key '*', which means any type and is the name of one")
+        for name in names:
+            if name not in lengths and "*" not in lengths:
                 raise ValueError(
                     f"radii must have a radius for each type, and have none for {name!r}"
                 )
-            table[number] = lengths.get(name, lengths.get("*", 0.0))
-        radii: FloatArray = table[kinds.numbers]
+        table = np.array([lengths.get(name, lengths.get("*", 0.0)) for name in names])
+        radii: FloatArray = table[places]
         return radii
 
 
@@ -864,8 +863,8 @@ def _as_labels(values: Any, name: str, n: int, are_types: bool = False) -> Label
     array = as_array(values, name, "hold integers or names")
     names = as_names(array)
     one_each(name, n)(array.shape)
-    if names is not None and is_a(values, (list, tuple)):  # NumPy makes names of numbers
-        for place, one in enumerate(values):
+    if names is not None and is_a(values, (list, tuple)) and set(map(type, values)) != {str}:
+        for place, one in enumerate(values):  # NumPy makes names of numbers
             if not is_a(one, str):
                 raise TypeError(
                     f"{name} must be all integers or all names, got {name}[{place}] = {shown(one)}"

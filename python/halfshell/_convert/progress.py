@@ -22,7 +22,7 @@ class ProgressBar:
     """Show what fraction of some work is done: by rich on a terminal, as HTML in a notebook.
 
     The bar appears once the work has taken `BAR_AFTER` seconds, and goes away with `close`, at the
-    fraction 1, or with the object. Where standard error is neither, nothing is shown.
+    fraction 1, or with the object. If there is neither terminal nor notebook, nothing is shown.
     """
 
     def __init__(self, text: str) -> None:
@@ -85,7 +85,7 @@ def _on_terminal(text: str) -> tuple[Callable[[float], None], Callable[[], None]
 
 
 def _on_page(text: str) -> tuple[Callable[[float], None], Callable[[], None]]:
-    """The same as an output of the present cell of a notebook."""
+    """Begin a bar in the output of the present cell of a notebook; what it returns is as above."""
     import IPython.display
 
     page: Any = IPython.display

@@ -138,17 +138,25 @@ class OptionsOfCells(_AnyCutoff, total=False):
 
 
 class Options(OptionsOfCells, _Box, total=False):
-    """The same, with the box that cells have."""
+    """The keywords that all searches share, with the box, which a `CellList` has itself."""
 
 
 class OptionsOfPoints(Options, total=False):
-    """The same, of searches that take some of the points."""
+    """For searches that also take `indices`."""
 
     indices: npt.ArrayLike | None
 
 
+class ListOptions(TypedDict, total=False):
+    """For overloads: the keywords of a list of pairs that is kept, without `quantities`."""
+
+    sort: bool
+    index_dtype: npt.DTypeLike
+    out: Out | None
+
+
 class CountOptions(OptionsOfPoints, total=False):
-    """The same of `count_pairs`."""
+    """For overloads: the keywords of `count_pairs`."""
 
     queries: PointsLike | None
 

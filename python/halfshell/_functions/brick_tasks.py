@@ -175,11 +175,11 @@ def table_of(
 def _own(
     part: Part, how: dict[str, Any], options: dict[str, Any], count: Callable[..., Any]
 ) -> Any:
-    """What is counted of owned points, and of these with points of later bricks.
+    """Counts of pairs of two owned points, and of an owned point and one of a later brick.
 
-    That is what is counted of both less that of the latter alone. Where these are many, it is
-    counted as it is said, which takes two walks; but not where pairs are excluded, which depends on
-    the order of the points.
+    This is the count among all of these points less that among the later ones. If the later ones
+    are many, both kinds of pairs are counted by a search each; but not with excluded pairs, whose
+    image depends on the order of the points.
     """
     n_owned, n_later, _ = part.sizes
     both, later = slice(n_owned + n_later), slice(n_owned, n_owned + n_later)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`bricks`: which points each part owns, and which it needs besides; of points in pieces, too.
+"""`bricks`: which points each part owns, and which others it needs.
 
-Points in pieces, none of which sees the others, are divided by what each piece says of itself in a
-`Summary`. Any cuts are right: a sample of the points only makes bricks of about equal size.
+Points may also be in pieces: chunks of Dask, or ranks of MPI. These are divided without being
+brought together, by a `Summary` of each piece. Any cuts are right; that they go by a sample of the
+points makes the bricks about equally large.
 """
 
 from __future__ import annotations
@@ -387,7 +388,7 @@ def _cut(
 
 
 def renumbered(error: Exception, points: Any, queries: Any = None) -> Exception:
-    """The same error with numbers among all points, of which both are some."""
+    """An error that names points by their numbers among all, which `points` and `queries` hold."""
     own = "points|positions|radii|types|supports|groups|labels"
 
     def other(found: re.Match[str]) -> str:

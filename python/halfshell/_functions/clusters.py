@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _show
-from halfshell._convert.call import Call, take
+from halfshell._convert.arrays import entries_of
+from halfshell._convert.call import Call, each_system, take
 from halfshell._convert.options import as_count
 from halfshell._convert.points import flags_of
 from halfshell._functions.pairs import pairs, pairs_wanted
@@ -95,8 +96,6 @@ def clusters(
     call = take(points, cutoff, **search)
     if call.points.batch is None:
         return _clusters_of(call, least)
-    from halfshell._convert.systems import each_system  # few calls need it
-
     n, d = call.array.shape
     labels, core, spans, sizes = np.full(n, -1), np.zeros(n, bool), [], []
     count = 0
@@ -237,17 +236,14 @@ class Clusters:
         i, j, S = pairs_wanted(call, "ijS", False, 8, None)
         both = self.core[i] & self.core[j]
         join = both & (i != j)
-        shifts = _follow(len(call.array), i[join], j[join], S[join], self._lowest())
+        core = np.flatnonzero(self.core & (self.labels >= 0))
+        lowest = core[np.unique(self.labels[core], return_index=True)[1]]  # of each cluster
+        shifts = _follow(len(call.array), i[join], j[join], S[join], lowest)
         # Points that are not core follow one core point of their cluster.
         for a, b, sign in ((i, j, 1), (j, i, -1)):
             lead = self.core[a] & ~self.core[b] & (self.labels[a] == self.labels[b])
             shifts[b[lead]] = shifts[a[lead]] + sign * S[lead]
         return shifts
-
-    def _lowest(self) -> npt.NDArray[np.int64]:
-        """The lowest core point of each cluster."""
-        core = np.flatnonzero(self.core & (self.labels >= 0))
-        return core[np.unique(self.labels[core], return_index=True)[1]]
 
 
 def _follow(
@@ -268,10 +264,7 @@ def _follow(
     seen[starts] = True
     front = starts
     while len(front):
-        lengths = begins[front + 1] - begins[front]
-        edges = np.repeat(begins[front], lengths) + (
-            np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-        )
+        edges = entries_of(begins, front)[1]
         edges = edges[~seen[target[edges]]]
         front, first = np.unique(target[edges], return_index=True)
         edges = edges[first]

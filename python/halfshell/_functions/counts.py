@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast, overload
 import numpy as np
 
 from halfshell import _core
-from halfshell._convert.call import Call, _together, each_cutoff, part_of, take
+from halfshell._convert.call import Call, each_cutoff, numbers_of_both, part_of, take
 from halfshell._convert.foreign import of_argument
 from halfshell._convert.lengths import as_edges
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import as_flag
+from halfshell._functions.indices import named_once, pairs_of_some, within_and_beyond
 from halfshell._functions.pairs import pairs
 from halfshell._search import search
 
@@ -128,9 +129,7 @@ def _count(call: Call) -> int | npt.NDArray[np.int64]:
         if last > _MANY_SYSTEMS:
             refuse_unavailable(8 * (last + 1), f"counts of the systems up to {last} in batch")
     if call.indices is not None:
-        from halfshell._convert.rows import pairs_of  # few calls need it
-
-        i = cast("npt.NDArray[Any]", pairs_of(call, "i", False, 4, None))
+        i = cast("npt.NDArray[Any]", pairs_of_some(call, "i", False, 4, None))
         if batch is None:
             return len(i)
         own = call.system_cutoffs
@@ -231,8 +230,6 @@ def histogram_of(
 
 def _of_some(call: Call, edges: FloatArray, marks: Marks) -> npt.NDArray[Any]:
     """Counts of the pairs that have one of some points: those of two, and those with another."""
-    from halfshell._convert.rows import named_once, within_and_beyond  # few calls need them
-
     if marks.weights is not None:
         raise ValueError(
             "indices cannot be combined with weights: their sums are rounded once, and these are "
@@ -255,8 +252,7 @@ def _of_some(call: Call, edges: FloatArray, marks: Marks) -> npt.NDArray[Any]:
             same = np.arange(marks.n_types)
             found[:, same, same] //= 2
         sums[: len(found)] += found
-    if call.bar is not None:
-        call.bar.close()
+    call.close()
     return sums if call.points.batch is not None else sums[0]
 
 
@@ -275,13 +271,13 @@ _NO_MARKS = Marks(1, None, None, None, None)
 
 
 def marks_of(call: Call, by_type: bool, with_weights: bool = True) -> Marks:
-    """What a histogram tells pairs apart by, and adds up."""
+    """The types and the weights that a histogram uses."""
     types = query_types = names = None
     n_types = 1
     if by_type:
         if call.points._kinds is None:
             raise ValueError("by_type needs types, and points have none: Points(types=...)")
-        types, query_types, names = _together(call, "_kinds", "types")
+        types, query_types, names = numbers_of_both(call, "_kinds", "types")
         largest = max(int(t.max(initial=0)) for t in (types, query_types) if t is not None)
         n_types = 1 + largest if names is None else max(len(names), 1)
     weights = query_weights = None

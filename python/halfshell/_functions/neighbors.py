@@ -12,8 +12,10 @@ from halfshell._convert.call import DIRECTED, Call, check_shells, each_cutoff, s
 from halfshell._convert.lengths import as_k, check_max_distances, in_rows
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import AUTO, as_flag, as_index_bytes, check_letters
+from halfshell._convert.points import Points
+from halfshell._functions.indices import rows_of_some
 from halfshell._functions.pairs import pairs
-from halfshell._objects.exact import Origin, copied
+from halfshell._objects.exact import LateOrigin, Origin, copied
 from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._search import search
 
@@ -34,18 +36,25 @@ if TYPE_CHECKING:
 
 # ---- a table -------------------------------------------------------------------------------
 
-def _as_table(arrays: Any, points: Any, cutoff: Any, **options: Any) -> NeighborTable:
+def _as_table(arrays: Any, points: Any, cutoff: Any = None, **options: Any) -> NeighborTable:
     """The table of a call with plain arguments, which C has answered."""
     quantities = options.get("quantities", "j")
     queries = options.get("queries")
     if "d" not in quantities or "j" not in quantities:  # it cannot be sorted
         return NeighborTable(arrays, quantities, len(points), queries is None)
+    own = copied((points, cutoff, queries))  # the caller's arrays may change until it is sorted
     given = {
-        name: options[name] for name in ("box", "periodic", "inclusive", "threads")
+        name: copied(options[name]) for name in ("box", "periodic", "inclusive", "threads")
         if name in options
     }  # fmt: skip
-    call = take(points, cutoff, queries, directed=True, **given)
-    return _table_of(call, arrays, quantities)
+
+    def find_origin() -> Origin | None:
+        call = take(*own, directed=True, **given)
+        return _origin_of(call, call.asking, call.query_set, call.pairing, quantities)
+
+    can_wait = type(points) is np.ndarray and (queries is None or type(queries) is np.ndarray)
+    origin: Any = LateOrigin(find_origin) if can_wait else find_origin()
+    return NeighborTable(arrays, quantities, len(points), queries is None, origin=origin)
 
 
 @search("neighbors", finish=_as_table, like=pairs)
@@ -140,6 +149,28 @@ def listed(call: Call, quantities: str, index_bytes: int) -> Any:
     )  # fmt: skip
 
 
+@search("neighbors")
+def arrays_of_rows(
+    points: Any,
+    cutoff: Any,
+    *,
+    queries: Any = None,
+    box: Any = None,
+    periodic: Any = None,
+    rule: Any = None,
+    inclusive: bool = True,
+    quantities: str = "j",
+    index_dtype: npt.DTypeLike = np.int64,
+    threads: int | None = None,
+) -> Any:
+    """Offsets and columns of `neighbors`, without a table of them."""
+    call = take(
+        points, cutoff, queries, box, periodic, rule, inclusive=inclusive, threads=threads,
+        directed=True,
+    )  # fmt: skip
+    return listed(call, quantities, as_index_bytes(index_dtype))
+
+
 def _table_of(call: Call, arrays: Any, quantities: str) -> NeighborTable:
     is_full = call.queries is None and call.rule not in DIRECTED
     origin = _origin_of(call, call.asking, call.query_set, call.pairing, quantities)
@@ -148,9 +179,7 @@ def _table_of(call: Call, arrays: Any, quantities: str) -> NeighborTable:
 
 def _table_of_some(call: Call, quantities: str, index_bytes: int) -> NeighborTable:
     """The rows of some points; sorting them exactly needs what the search found."""
-    from halfshell._convert.rows import rows_of  # few calls need it
-
-    rows = rows_of(call, quantities, index_bytes)
+    rows = rows_of_some(call, quantities, index_bytes)
     numbers, order = rows.numbers, None
     if call.points.batch is not None:  # a search has systems one after the other
         order = np.argsort(call.points.batch[numbers], kind="stable")
@@ -203,6 +232,20 @@ def _origin_of(
         asked_in = asked_in[np.argsort(order)]
     bits = (1 << boxes.shape[1]) - 1
     return Origin(points.positions, asking, boxes, bits, find_shifts, asked_in)
+
+
+def entries_of(
+    points: npt.NDArray[Any], cutoff: Any, box: Any, periodic: Any,
+    batch: npt.NDArray[Any] | None, half: bool, inclusive: bool,
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]]:  # fmt: skip
+    """i, j and S of a full or half list, ascending by (i, j, S), for lists of tensors."""
+    given = Points._of(points, "points", box, periodic, batch)
+    if as_flag(half, "half"):
+        i, j, S = pairs(given, cutoff, quantities="ijS", sort=True, inclusive=inclusive)
+    else:
+        table = neighbors(given, cutoff, quantities="jS", inclusive=inclusive)
+        i, j, S = table.to_pairs(quantities="ijS")
+    return i, j, S
 
 
 # ---- the lengths of its rows ---------------------------------------------------------------
@@ -272,9 +315,7 @@ def _lengths(call: Call, by_type: bool) -> npt.NDArray[np.int64]:
     if by_type:
         return _count_by_type(call)
     if call.indices is not None:
-        from halfshell._convert.rows import rows_of  # few calls need it
-
-        return np.diff(rows_of(call, "j", 4).offsets)
+        return np.diff(rows_of_some(call, "j", 4).offsets)
     found = call.run(
         _core.coordination, call.query_set, call.pairing, call.settings.algorithm
     )
@@ -291,9 +332,7 @@ def _count_by_type(call: Call) -> npt.NDArray[np.int64]:
         n_rows = len(call.indices)
     refuse_unavailable(8 * n_types * n_rows, f"counts for {n_types} types")
     if call.indices is not None:
-        from halfshell._convert.rows import rows_of  # few calls need it
-
-        offsets, (j,), *_ = rows_of(call, "j", 4)
+        offsets, (j,), *_ = rows_of_some(call, "j", 4)
     else:
         offsets, j = listed(call, "j", 4)
     places = np.repeat(np.arange(n_rows) * n_types, np.diff(offsets)) + numbers[j]
@@ -454,8 +493,6 @@ def _nearest_of_some(call: Call, k: int, quantities: str, index_bytes: int) -> A
     itself = (columns["j"] == asked[:, None]) & ~columns["S"].any(axis=2)
     place = np.where(itself.any(axis=1), itself.argmax(axis=1), k)  # or the last one is too many
     kept = np.arange(k) + (np.arange(k) >= place[:, None])
-    back = np.empty_like(order)
-    back[order] = np.arange(len(order))
-    rows = np.arange(len(asked))[:, None]
-    found = tuple(columns[letter][rows, kept][back] for letter in quantities)
+    back = np.argsort(order)
+    found = tuple(columns[letter][back[:, None], kept[back]] for letter in quantities)
     return found[0] if len(found) == 1 else found

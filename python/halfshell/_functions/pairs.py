@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         BoxLike,
         CutoffLike,
         Letter,
+        ListOptions,
         Options,
         OptionsOfPoints,
         Out,
@@ -35,21 +36,17 @@ if TYPE_CHECKING:
         Rule,
     )
 
-    class _PairOptions(OptionsOfPoints, total=False):
+    class _PairOptions(OptionsOfPoints, ListOptions, total=False):
         """For overloads: the keywords of `pairs`, without `quantities`."""
 
-        sort: bool
-        index_dtype: npt.DTypeLike
-        out: Out | None
-
     class _BetweenOptions(Options, total=False):
-        """The same of `pairs_between`."""
+        """For overloads: the keywords of `pairs_between`, without `quantities`."""
 
         index_dtype: npt.DTypeLike
         out: Out | None
 
     class _BlockOptions(OptionsOfPoints, total=False):
-        """The same of `iter_pairs`."""
+        """For overloads: the keywords of `iter_pairs`, without `quantities`."""
 
         index_dtype: npt.DTypeLike
         max_pairs: int
@@ -234,9 +231,9 @@ def pairs(
     check_shells(call, quantities)
     wanted = quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out
     if call.indices is not None:
-        from halfshell._convert.rows import pairs_of  # few calls need it
+        from halfshell._functions.indices import pairs_of_some  # few calls need it
 
-        return pairs_of(call, *wanted)
+        return pairs_of_some(call, *wanted)
     return pairs_wanted(call, *wanted)
 
 
@@ -499,14 +496,14 @@ def iter_pairs(
     index_bytes = as_index_bytes(index_dtype)
     if call.indices is not None:
         from halfshell._convert.call import Known, Pairing  # few calls need them
-        from halfshell._convert.rows import parts_of
+        from halfshell._functions.indices import blocks_of_some
         from halfshell._objects.exact import copied
 
         call.points = call.points.replace()  # a copy, as the caller's arrays may change
         call.known = Known(*copied(tuple(call.known)))
         call.pairing = call.pairing and Pairing(*copied(tuple(call.pairing)))
         call.shells, call.system_cutoffs = copied((call.shells, call.system_cutoffs))
-        parts = parts_of(call, quantities, index_bytes)
+        parts = blocks_of_some(call, quantities, index_bytes)
         return cast("PairBlocks[Any]", _in_blocks(parts, quantities, most))
     if call.points.batch is not None:
         return cast("PairBlocks[Any]", _blocks_of_systems(call, quantities, index_bytes, most))
@@ -665,6 +662,6 @@ def _systems(call: Call) -> Iterable[tuple[Call, int]]:
     """A call for each system, and the number of its first point among all."""
     if call.points.batch is None:
         return ((call, 0),)
-    from halfshell._convert.systems import each_system  # few calls need it
+    from halfshell._convert.call import each_system  # as above
 
     return each_system(call)

@@ -366,19 +366,16 @@ class RadialDistribution:
 
     def __getitem__(self, pair: tuple[str, str] | tuple[int, int]) -> RadialDistribution:
         """g(r) of points of the second type around those of the first."""
-        a, b = (self._place(one) for one in self._two(pair))
+        if self.types is None:
+            raise TypeError("this result has no types: rdf(..., by_type=True)")
+        if not is_a(pair, tuple) or len(pair) != 2:
+            raise TypeError(f"two types are needed, as in result[a, b], got {shown(pair)}")
+        a, b = (self._place(one) for one in pair)
         return RadialDistribution(
             counts=self.counts[a, b], edges=self.edges, types=None, expected=self.expected[a, b],
             n_centers=self.n_centers[a], n_frames=self.n_frames,
             is_half=self.is_half and a == b,
         )  # fmt: skip
-
-    def _two(self, pair: Any) -> tuple[Any, Any]:
-        if self.types is None:
-            raise TypeError("this result has no types: rdf(..., by_type=True)")
-        if not is_a(pair, tuple) or len(pair) != 2:
-            raise TypeError(f"two types are needed, as in result[a, b], got {shown(pair)}")
-        return pair[0], pair[1]
 
     def _place(self, one: Any) -> int:
         assert self.types is not None
@@ -393,7 +390,9 @@ class RadialDistribution:
         if not isinstance(other, RadialDistribution):
             return NotImplemented
         self._check_alike(other)
-        types = _all_types(self.types, other.types)
+        types = self.types
+        if types is not None and other.types is not None and types != other.types:
+            types = tuple(sorted({*types, *other.types}))
         counts, expected, centers = (
             _spread(one, self.types, types) + _spread(more, other.types, types)
             for one, more in (
@@ -493,13 +492,6 @@ def ratio(counts: npt.NDArray[Any], by: npt.NDArray[Any]) -> _Floats:
 
 def _of_names(types: _Names) -> bool:
     return any(isinstance(one, str) for one in types)
-
-
-def _all_types(one: _Names | None, other: _Names | None) -> _Names | None:
-    """Those of both, ascending."""
-    if one is None or other is None:
-        return None
-    return one if one == other else tuple(sorted({*one, *other}))
 
 
 def _spread(values: npt.NDArray[Any], own: _Names | None, types: _Names | None) -> Any:

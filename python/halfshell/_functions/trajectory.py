@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any, Literal, cast, overload
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert.arrays import as_real_array
-from halfshell._convert.foreign import is_a, kind_of
+from halfshell._convert.arrays import as_array, as_real_array
+from halfshell._convert.foreign import attribute, is_a, kind_of
+from halfshell._convert.objects import MISSING, parts_of
 from halfshell._convert.options import LETTERS, SHELL, as_flag, as_index_bytes, check_letters
 from halfshell._convert.points import Points
 from halfshell._convert.progress import as_progress
-from halfshell._convert.systems import as_frame, frames_of, of_frame
 from halfshell._errors import shorten
 from halfshell._functions.pairs import pairs
 from halfshell._objects.verlet_list import VerletList
@@ -173,7 +173,7 @@ def trajectory_pairs(
         cast("Any", cutoff if is_plain else 1.0), given_skin, box=box,
         periodic=None if box is None else periodic, inclusive=inclusive, threads=threads,
     )  # fmt: skip
-    iterator, n_frames = frames_of(frames)
+    iterator, n_frames = _frames_of(frames)
     told = as_progress(progress)
     if told is not None and n_frames is None:
         raise TypeError(f"progress needs frames that have a length, got {kind_of(frames)}")
@@ -212,9 +212,9 @@ def _each(
 ) -> Generator[Any, None, None]:
     for number, frame in enumerate(frames):
         try:
-            found = find(as_frame(frame, box, periodic))
+            found = find(_as_frame(frame, box, periodic))
         except Exception as error:
-            of_frame(error, number)
+            error.add_note(f"in frame {number} of trajectory_pairs")
             shorten(error)
             raise
         yield found
@@ -224,11 +224,66 @@ def _each(
 def _told(
     results: Iterator[Any], n_frames: int, progress: Callable[[float], object]
 ) -> Generator[Any, None, None]:
-    """The same, each after `progress` has been told."""
+    """The results, each after `progress` has been called."""
     for number, found in enumerate(results):
         progress(min((number + 1) / n_frames, 1.0))
         yield found
         del found
+
+
+# ---- frames ---------------------------------------------------------------------------------
+
+_BY_COLUMN = "frames by a column are (part for _, part in table.groupby(column))"
+
+
+def _frames_of(frames: Any) -> tuple[Iterator[Any], int | None]:
+    """The frames one by one, and how many there are, if that is known."""
+    kind = kind_of(frames)
+    if is_a(frames, (str, bytes)) or type(frames) is Points:
+        raise TypeError(f"frames must be a sequence of frames, got {kind}")
+    if attribute(frames, "columns", "frames", MISSING) is not MISSING:  # rows, or groups of them
+        raise TypeError(f"frames must be a sequence of frames, got {kind}: {_BY_COLUMN}")
+    places = attribute(frames, "xyz", "frames", MISSING)
+    vectors = attribute(frames, "unitcell_vectors", "frames", MISSING)
+    if places is not MISSING and vectors is not MISSING:  # a Trajectory of mdtraj
+        boxes = [None] * len(places) if vectors is None else vectors
+        return iter(zip(places, boxes, strict=True)), len(places)
+    try:
+        iterator = iter(as_array(frames, "frames") if is_a(frames, memoryview) else frames)
+    except MemoryError:
+        raise
+    except Exception as error:
+        own = attribute(frames, "trajectory", "frames", MISSING) is not MISSING
+        hint = ": pass its trajectory" if own else ""
+        raise TypeError(
+            f"frames must be a sequence or iterator of frames, got {kind}{hint}"
+        ) from error
+    try:
+        return iterator, len(frames)
+    except Exception:  # iterators have none, and objects may raise anything
+        return iterator, None
+
+
+def _as_frame(frame: Any, box: Any, periodic: Any) -> Points:
+    """The points of a frame. `box` and `periodic` are for a frame that brings none.
+
+    ValueError if a frame brings its own and another is given.
+    """
+    if is_a(frame, tuple) and tuple.__len__(frame) == 2:
+        points, own = tuple.__iter__(frame)
+        if attribute(own, "columns", "frames", MISSING) is not MISSING:
+            raise TypeError(f"frames must be points, got a tuple of a {kind_of(own)}: {_BY_COLUMN}")
+        if own is not None and box is not None:
+            raise ValueError("box is given twice: frames bring their own")
+        return Points._of(points, "frames", box if own is None else own, periodic)
+    if type(frame) is Points:
+        if frame.box is not None:
+            return Points._of(frame, "frames", box, periodic)
+        return frame if box is None else frame.replace(box=box, periodic=periodic)
+    parts = parts_of(frame, "frames")
+    if box is None and parts is not None and parts.box is None and parts.periodic is None:
+        periodic = None  # an object in open space
+    return Points._of(frame, "frames", box, periodic)
 
 
 # ---- several threads -----------------------------------------------------------------------
@@ -261,7 +316,7 @@ def _ahead(
             try:
                 found = find(points) if future is None else future.result()
             except Exception as error:
-                of_frame(error, number)
+                error.add_note(f"in frame {number} of trajectory_pairs")
                 raise
             del future  # its memory is the caller's
             number += 1
@@ -270,10 +325,10 @@ def _ahead(
     try:
         for frame in frames:
             try:
-                points = as_frame(frame, box, periodic).replace()  # a copy
+                points = _as_frame(frame, box, periodic).replace()  # a copy
             except Exception as error:
                 yield from hand_out(0)  # the frames before it come first
-                of_frame(error, number)
+                error.add_note(f"in frame {number} of trajectory_pairs")
                 raise
             look_at_process()
             is_small = len(points) < _FEW_POINTS

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _show
-from halfshell._convert.arrays import as_real_array, entries_of, starts_of
+from halfshell._convert.arrays import as_real_array, entries_of, rows_of, starts_of
 from halfshell._convert.call import same_boxes, take
 from halfshell._convert.foreign import is_a, shown
 from halfshell._convert.lengths import as_number, as_positive, as_radii
@@ -48,7 +48,6 @@ if TYPE_CHECKING:
         PointsLike,
     )
 
-# Whose candidates are listed at a time.
 _ASKED_AT_A_TIME = 4096  # points whose candidates are looked up together
 
 Method = TypeVar("Method", bound="Callable[..., Any]")
@@ -181,7 +180,9 @@ class CellList:
     0
     """
 
-    __slots__ = ("_cell_size", "_cells", "_cutoff", "_domain", "_layout", "_threads", "points")
+    __slots__ = (
+        "_cell_size", "_cells", "_cutoff", "_domain", "_layout", "_plain", "_threads", "points"
+    )  # fmt: skip
 
     #: Told by `take` from other points.
     _is_cell_list = True
@@ -211,7 +212,14 @@ class CellList:
         call.refuse_batch("CellList", "cells are those of one system")
         self._cells = call.run(_core.cells_build, self._cell_size, self._domain)
         self._layout = _core.cells_layout(self._cells)
-        self.points = points._over(self._layout["points"])
+        self._take_points(points._over(self._layout["points"]))
+
+    def _take_points(self, points: Points) -> None:
+        self.points = points
+        known = points.radii, points.supports, points._groups
+        is_plain = all(one is None for one in known)
+        #: What C takes in place of the list (csrc/binding/quick.c).
+        self._plain = (self._cells, self._cutoff, self._threads) if is_plain else None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -309,13 +317,15 @@ class CellList:
         >>> [row.tolist() for row in cells.query([[0.0], [0.0]], [0.5, 3.0])]
         [[0], [0, 1, 2]]
         """
-        asking = self._asking(queries)
-        radii = as_radii(radius, len(asking))
+        radii: Any = self._cutoff if radius is None else radius
+        asking: Any = queries
+        if type(radii) is not float or not 0.0 <= radii < np.inf:
+            asking = self._asking(queries)
+            radii = as_radii(radius, len(asking))
         cells = self._without_reach()
         try:
-            if radii is None or isinstance(radii, float):
-                within = self._cutoff if radii is None else radii
-                return cells.neighbors(within, queries=asking, **cast("Any", options))
+            if isinstance(radii, float):
+                return cells.neighbors(radii, queries=asking, **cast("Any", options))
             return query_each(cells, asking, radii, cast("Any", options))
         except MemoryError as error:
             if radius is None:
@@ -329,7 +339,7 @@ class CellList:
         other = CellList.__new__(CellList)
         for name in CellList.__slots__:
             setattr(other, name, getattr(self, name))
-        other.points = self.points.replace(radii=None, supports=None)
+        other._take_points(self.points.replace(radii=None, supports=None))
         return other
 
     # ---- cells -----------------------------------------------------------------------------
@@ -443,7 +453,7 @@ class CellList:
         for first in range(0, len(self), _ASKED_AT_A_TIME):
             asking = order[first : first + _ASKED_AT_A_TIME]
             block = self.candidates(points[asking])
-            row = np.repeat(np.arange(len(asking)), np.diff(block.offsets))
+            row = rows_of(block.offsets)
             ends = starts_of(block.stop - block.start)
             for begin in range(0, int(ends[-1]), most):
                 entries = np.arange(begin, min(begin + most, int(ends[-1])))
@@ -507,6 +517,7 @@ class CellList:
 
 
 document(CellList)
+_core.know("CellList", CellList)
 
 
 def _restored(
@@ -633,10 +644,8 @@ def _search_each(
 
 def _joined(parts: list[Columns], order: npt.NDArray[np.intp]) -> Columns:
     """One table of parts whose rows are in this order."""
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
     counts = np.concatenate([np.diff(part[0]) for part in parts])
-    offsets, entries = entries_of(starts_of(counts), place)
+    offsets, entries = entries_of(starts_of(counts), np.argsort(order))
     joined = (offsets, *(np.concatenate(some)[entries] for some in list(zip(*parts))[1:]))
     for array in joined:
         array.flags.writeable = False

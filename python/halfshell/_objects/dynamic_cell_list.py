@@ -385,7 +385,7 @@ class DynamicCellList:
         return self.copy()
 
     def __contains__(self, key: Key) -> bool:
-        return self._cells.has(key)
+        return key in self._cells
 
     def __len__(self) -> int:
         return len(self._cells)

@@ -34,11 +34,11 @@ SORTED_AT_A_TIME = 1 << 17  # entries: some milliseconds
 class Origin:
     """What exact sorting needs of the search that a table comes from.
 
-    queries: None where the points themselves ask. Points, queries and box are copied, for the
-    caller's may change, unless they are its own. box: vectors, with `systems`, which say which one
-    each row has, of each system. find: returns S of all entries of all rows, for tables that have
-    no shifts, when they are first needed. shifts, numbers: all shifts, and the numbers of `points`,
-    ascending, if they are not all.
+    queries: None if the rows are those of the points themselves. Points, queries and box are
+    copied, as the caller may change them, unless `is_own`. box: its vectors, or those of each
+    system; `systems` then tells which system each row is of. find: returns S of all entries of all
+    rows, when a table without shifts first needs them. shifts: these, if they are known. numbers:
+    those of `points`, ascending, if they are only some of the points of the search.
     """
 
     __slots__ = (
@@ -77,9 +77,6 @@ class Origin:
             "points": points, "queries": queries, "box": self._box, "periodic": self._bits,
             "systems": systems, "shifts": shifts, "numbers": numbers,
         }  # fmt: skip
-
-    def scene(self) -> tuple[PointArray, Floats | None, int]:
-        return self.points, self._box, self._bits
 
     @property
     def has_images(self) -> bool:
@@ -133,9 +130,26 @@ class Origin:
         return order
 
 
+class LateOrigin:
+    """An origin that is made when it is first needed: few tables are sorted or pickled."""
+
+    __slots__ = ("_find", "_found")
+
+    def __init__(self, find: Callable[[], Origin | None]) -> None:
+        self._find = find
+        self._found: Origin | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        if self._found is None:
+            self._found = self._find()
+        return getattr(self._found, name)
+
+
 def copied(part: Any) -> Any:
-    if isinstance(part, tuple):
-        return tuple(copied(one) for one in part)
+    """The same with copies of its arrays, which may stand in tuples and lists."""
+    if isinstance(part, (tuple, list)):
+        copies = [copied(one) for one in part]
+        return copies if isinstance(part, list) else tuple(copies)
     return part.copy() if isinstance(part, np.ndarray) else part
 
 

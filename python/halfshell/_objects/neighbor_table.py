@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib
+import io
 import itertools
 import math
 import operator
@@ -27,7 +28,7 @@ from halfshell._convert.arrays import (
     starts_of,
     whole_rows,
 )
-from halfshell._convert.foreign import is_a, shown, told
+from halfshell._convert.foreign import is_a, kind_of, shown, told
 from halfshell._convert.lengths import as_number
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import as_choice, as_count, as_flag, as_whole, check_letters
@@ -323,7 +324,8 @@ class NeighborTable:
         1: 0 (1)
         """
         state = {name: value for name, value in self._state().items() if value is not None}
-        if hasattr(file, "write"):
+        file = _as_file(file, "write")
+        if not isinstance(file, str | bytes):
             np.savez(file, **state)
             return
         with open(file, "wb") as stream:
@@ -345,7 +347,8 @@ class NeighborTable:
             If it was not written by `save`, or by another version that writes another format, or is
             broken.
         """
-        if not hasattr(file, "read"):
+        file = _as_file(file, "read")
+        if isinstance(file, str | bytes):
             with open(file, "rb") as stream:
                 return cls.load(stream)
         try:
@@ -358,6 +361,8 @@ class NeighborTable:
         except MemoryError:
             raise
         except (Exception, zipfile.BadZipFile) as error:
+            if isinstance(error, OSError) and error.errno is not None:
+                raise
             why = told(error) if type(error) is ValueError else type(error).__name__
             raise ValueError(f"this is no file of a NeighborTable, or is broken: {why}") from error
         if version != _FORMAT:
@@ -1001,6 +1006,18 @@ def _as_size(value: Any, name: str) -> int:
     return number
 
 
+def _as_file(file: Any, method: str) -> Any:
+    """A path, or a binary file that has the method."""
+    if hasattr(file, method) and not isinstance(file, io.TextIOBase):
+        return file
+    try:
+        return os.fspath(file)
+    except TypeError:
+        raise TypeError(
+            f"file must be a path or a binary file, got {kind_of(file)}"
+        ) from None
+
+
 def _check_state(state: dict[str, Any]) -> None:
     """Raise where a file does not hold what `save` writes: its arrays fit each other."""
     offsets, letters, n = state["offsets"], state["quantities"], _as_size(state["n_points"], "n")
@@ -1128,7 +1145,7 @@ def _reverse_in_order(offsets: Array, indices: Array) -> Positions:
 
 
 def _reverse_by_shift(offsets: Array, indices: Array, shifts: Array) -> Positions | None:
-    """The same for entries in any order; None where that of one of them is missing."""
+    """Where (j, i, -S) of each (i, j, S) is, for entries in any order; None if one has none."""
     rows = rows_of(offsets, indices.dtype)
     columns = tuple(shifts.T[::-1])
     order = np.lexsort((*columns, indices, rows))

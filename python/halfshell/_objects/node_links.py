@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from halfshell import _core
-from halfshell._convert.arrays import as_array, of_shape, one_each, starts_of
+from halfshell._convert.arrays import as_array, of_shape, one_each, rows_of, starts_of
 from halfshell._convert.call import DIRECTED, RULES, Pairing
 from halfshell._convert.foreign import kind_of
 from halfshell._convert.options import as_list
@@ -87,7 +87,7 @@ class How:
         )  # fmt: skip
 
     def call(self, n: int) -> Search:
-        """The same of a call about n nodes that looks at no points."""
+        """The first arguments of a call about n nodes that looks at no points."""
         return np.empty((n, 1)), 0.0, None, 0, *self.search(_NOWHERE)[4:]
 
 
@@ -306,7 +306,7 @@ def _without(
     ))  # fmt: skip
     if gathered is not None:
         offsets, j, shifts = gathered
-        half = Half(np.repeat(np.arange(nodes.n, dtype=np.int32), np.diff(offsets)), j, shifts)
+        half = Half(rows_of(offsets, np.int32), j, shifts)
         stays = ~cut(half.forward())
         gathered = Rows(starts_of(stays)[offsets], *half.keep(stays)[1:])
     return left, gathered

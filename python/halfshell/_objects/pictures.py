@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.arrays import as_point_numbers, starts_of
+from halfshell._convert.arrays import as_point_numbers, rows_of, starts_of
 from halfshell._convert.foreign import kind_of
 from halfshell._errors import needs
 
@@ -180,8 +180,7 @@ def draw_cells(cells: Any, ax: Axes | None, unit: str | None) -> Axes:
     x = np.asarray(points, np.float64)
     if vectors is not None and len(x):  # where their cells are
         x = _core.box_wrap(x, vectors, bits)[0]
-    numbers = np.repeat(np.arange(len(cells.cell_start) - 1), np.diff(cells.cell_start))
-    colours = _colours(numbers, cells)
+    colours = _colours(rows_of(cells.cell_start), cells)
     if ndim < 3:
         _raster(ax, cells, *_extent(x, vectors, bits))
     elif len(x):

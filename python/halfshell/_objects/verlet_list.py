@@ -10,7 +10,7 @@ import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from fractions import Fraction
-from typing import Any, Literal, NamedTuple, NoReturn, TypedDict, Unpack, overload
+from typing import Any, Literal, NamedTuple, NoReturn, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +24,7 @@ from halfshell._convert.types import (
     Arrays,
     BoxLike,
     Letter,
+    ListOptions,
     Number,
     Out,
     PeriodicLike,
@@ -36,14 +37,6 @@ from halfshell._search import search
 from halfshell._settings import current
 
 _LISTS: weakref.WeakSet[VerletList] = weakref.WeakSet()
-
-
-class _PairOptions(TypedDict, total=False):
-    """For overloads: the keywords of `pairs`, without `quantities`."""
-
-    sort: bool
-    index_dtype: npt.DTypeLike
-    out: Out | None
 
 
 class VerletList:
@@ -294,14 +287,14 @@ class VerletList:
 
     @overload
     def pairs(
-        self, *, quantities: Literal["ij"] = "ij", **options: Unpack[_PairOptions]
+        self, *, quantities: Literal["ij"] = "ij", **options: Unpack[ListOptions]
     ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
     @overload
     def pairs(
-        self, *, quantities: Letter, **options: Unpack[_PairOptions]
+        self, *, quantities: Letter, **options: Unpack[ListOptions]
     ) -> npt.NDArray[Any]: ...
     @overload
-    def pairs(self, *, quantities: str, **options: Unpack[_PairOptions]) -> Arrays: ...
+    def pairs(self, *, quantities: str, **options: Unpack[ListOptions]) -> Arrays: ...
     def pairs(
         self,
         *,

@@ -28,6 +28,7 @@ from ase.data import atomic_numbers
 from ase.neighborlist import first_neighbors, natural_cutoffs
 
 import halfshell as hs
+from halfshell._functions.neighbors import arrays_of_rows
 
 __all__ = [
     "NeighborList",
@@ -111,25 +112,31 @@ def primitive_neighbor_list(
     else:
         if use_scaled_positions:
             positions = np.dot(positions, cell)
-        length, each = _reach(cutoff, numbers)
-        points = hs.Points(positions, box=np.asarray(cell), periodic=pbc, **each)
-        wanted = "".join(dict.fromkeys(letters)) or "i"
+        length, each = reach_of(cutoff, numbers)
+        box: dict[str, Any] = {"box": np.asarray(cell), "periodic": pbc}
+        points = positions
+        if each:
+            points, box = hs.Points(positions, **box, **each), {}
+        wanted = "".join(one for one in dict.fromkeys(letters) if one != "i") or "j"
         # As a query each point finds itself, if its reach is above zero.
-        table = hs.neighbors(
-            points, length, queries=points if self_interaction else None, inclusive=False,
-            quantities=wanted.replace("i", "") or "j",
-        )  # fmt: skip
-        arrays = table.to_pairs(quantities=wanted)
-        columns = arrays if isinstance(arrays, tuple) else (arrays,)
+        try:
+            offsets, *columns = arrays_of_rows(
+                points, length, queries=points if self_interaction else None, inclusive=False,
+                quantities=wanted, **box,
+            )  # fmt: skip
+        except (TypeError, ValueError):
+            hs.Points(points, **box)  # which says by their names what is wrong with these
+            raise
         found = {  # in ASE's type, and the caller's to write to
-            one: np.require(array, _EMPTY[one][0], "W")
-            for one, array in zip(wanted, columns, strict=True)
+            one: np.array(array, _EMPTY[one][0]) for one, array in zip(wanted, columns, strict=True)
         }
+        if "i" in letters:
+            found["i"] = np.repeat(np.arange(len(positions)), offsets[1:] - offsets[:-1])
     arrays = tuple(found[letter] for letter in letters)
     return arrays[0] if len(arrays) == 1 else arrays
 
 
-def _reach(cutoff: Any, numbers: Any) -> tuple[Any, dict[str, Any]]:
+def reach_of(cutoff: Any, numbers: Any) -> tuple[Any, dict[str, Any]]:
     """The cutoff of halfshell, and what `halfshell.Points` are to know of each atom."""
     if isinstance(cutoff, Mapping):
         if numbers is None:

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from ase.data import atomic_numbers
 
 import halfshell as hs
-from halfshell.compat.ase import _reach, primitive_neighbor_list
+from halfshell.compat.ase import primitive_neighbor_list, reach_of
 
 __all__ = [
     "coordination",
@@ -91,7 +91,8 @@ def _scene(
     if positions is None:
         raise ValueError("Please provide atoms or positions.")
     n = len(positions)
-    pbc = np.broadcast_to(np.asarray(False if pbc is None else pbc, bool), 3)
+    pbc = np.asarray(False if pbc is None else pbc, bool)
+    pbc = pbc if pbc.shape == (3,) else np.broadcast_to(pbc, 3)
     if cell is None and pbc.any():
         raise ValueError("Please provide a cell: pbc says that it repeats.")
     cell = np.zeros((3, 3)) if cell is None else np.asarray(cell, dtype=float)
@@ -131,7 +132,7 @@ def _cutoff(cutoff: Any, numbers: npt.NDArray[Any]) -> Any:
 def _points(atoms: Any, cutoff: Any, **parts: Any) -> tuple[hs.Points, Any]:
     """Points and cutoff of halfshell."""
     scene, cutoff = _scene(atoms, cutoff, **parts)
-    cutoff, each = _reach(cutoff, scene["numbers"])
+    cutoff, each = reach_of(cutoff, scene["numbers"])
     return hs.Points(scene["positions"], box=scene["cell"], periodic=scene["pbc"], **each), cutoff
 
 

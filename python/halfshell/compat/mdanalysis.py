@@ -35,12 +35,19 @@ def _box(box: Any) -> dict[str, Any]:
     kind, form = check_box(box)
     if np.isnan(np.asarray(box, np.float32)).any():
         raise ValueError(f"box must be lengths and angles, which NaN is not, got {box!r}")
+    form = form.astype(np.float64)
     lengths = form if kind == "ortho" else form.diagonal()  # zeros, if no triclinic box is like it
     periodic = lengths > _SHORTEST
     if not periodic.any():
         return {"box": None}
-    vectors = np.diag(np.where(periodic, form, 0.0)) if kind == "ortho" else form
-    return {"box": vectors.astype(np.float64), "periodic": periodic}
+    if kind == "ortho":
+        form[~periodic] = 0.0
+    return {"box": form, "periodic": periodic}
+
+
+def _diagonal(box: dict[str, Any]) -> Any:
+    """The lengths of a box with right angles, or along the axes of a lower triangle."""
+    return box["box"] if box["box"].ndim == 1 else box["box"].diagonal()
 
 
 def _check(method: str | None, backend: str) -> None:
@@ -56,34 +63,40 @@ def _within(max_cutoff: Any, box: dict[str, Any], *sets: Any) -> Any:
     The vectors of the box are rows of a lower triangle, so some image of each point is as near as
     half of the diagonal is long; on open axes points are as far apart as their coordinates.
     """
-    halves = np.zeros(3) if box["box"] is None else box["box"].diagonal() / 2.0
+    halves = np.zeros(3) if box["box"] is None else _diagonal(box) / 2.0
     if np.isfinite(max_cutoff) and (box["box"] is None or max_cutoff <= halves.max()):
         return max_cutoff
-    low = np.min([points.min(axis=0) for points in sets], axis=0).astype(np.float64)
-    spans = np.max([points.max(axis=0) for points in sets], axis=0) - low
-    spans = np.where(box.get("periodic", False), halves, spans)
+    spans = halves
+    if box["box"] is None or not box["periodic"].all():
+        low = np.min([points.min(axis=0) for points in sets], axis=0).astype(np.float64)
+        spans = np.max([points.max(axis=0) for points in sets], axis=0) - low
+        spans = np.where(box.get("periodic", False), halves, spans)
     most = float(np.sqrt((spans * spans).sum())) * (1.0 + 1e-9)
     if not np.isfinite(most):
         return 0.0  # enough to find out which of the points is not finite
     return most if max_cutoff > most else max_cutoff
 
 
-def _nearest_images(entries: Entries, box: dict[str, Any], cutoff: float, selves: bool) -> Entries:
-    """Each pair once, with its least distance, where some have several images."""
-    both, d = entries
-    if box["box"] is None or not len(d):
-        return both, d
-    heights = hs.Box.from_matrix(np.where(box["periodic"], box["box"], np.eye(3)))
-    nearest = heights.perpendicular_heights[box["periodic"]].min()
-    if 2.0 * cutoff < nearest * (1.0 - 1e-9):  # which is rounded
-        return both, d
-    order = np.lexsort((d, both[:, 1], both[:, 0]))
-    both, d = both[order], d[order]
-    first = np.ones(len(d), np.bool_)
-    first[1:] = (both[1:] != both[:-1]).any(axis=1)
-    if selves:
-        first &= both[:, 0] != both[:, 1]
-    return both[first], d[first]
+def _has_images(box: dict[str, Any], cutoff: float) -> bool:
+    """Whether pairs may have several images within the cutoff."""
+    if box["box"] is None:
+        return False
+    heights, periodic = box["box"], box["periodic"]
+    if heights.ndim == 2:
+        whole = np.where(periodic, heights, np.eye(3))
+        heights = hs.Box.from_matrix(whole).perpendicular_heights
+    nearest = heights.min(where=periodic, initial=np.inf)
+    return bool(2.0 * cutoff >= nearest * (1.0 - 1e-9))  # which is rounded
+
+
+def _nearest_images(both: Any, d: Any, selves: bool) -> Entries:
+    """Each pair once, with its least distance, of pairs that are sorted."""
+    number = both[:, 0] * (int(both.max(initial=0)) + 1) + both[:, 1]
+    first = np.flatnonzero(np.diff(number, prepend=-1))
+    if len(first):
+        both, d = both[first], np.minimum.reduceat(d, first)
+    kept = both[:, 0] != both[:, 1]
+    return (both[kept], d[kept]) if selves else (both, d)
 
 
 def _answer(
@@ -94,8 +107,11 @@ def _answer(
         entries = np.empty((0, 2), np.intp), np.empty(0)
     else:
         cutoff = _within(max_cutoff, box, *sets)
-        found = search(*sets, cutoff, quantities="Pd", **box)
-        entries = _nearest_images(cast("Entries", found), box, cutoff, len(sets) == 1)
+        has_images, is_one = _has_images(box, cutoff), len(sets) == 1
+        how = {"sort": True} if has_images and is_one else {}
+        entries = cast("Entries", search(*sets, cutoff, quantities="Pd", **how, **box))
+        if has_images:
+            entries = _nearest_images(*entries, is_one)
     both, d = entries
     if min_cutoff is not None:
         kept = d > min_cutoff
@@ -166,4 +182,6 @@ def self_capped_distance(
     ([[0, 1]], [5.0])
     """
     _check(method, backend)
+    if len(reference) < 2 and (box is None or np.shape(box) == (6,)):
+        box = None  # there is no pair
     return _answer(hs.pairs, max_cutoff, min_cutoff, _box(box), (reference,), return_distances)

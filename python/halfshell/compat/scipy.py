@@ -17,8 +17,10 @@ as `halfshell.pairs`.
 
 from __future__ import annotations
 
+import math
 import operator
 import os
+from functools import cached_property
 from itertools import pairwise
 from numbers import Real
 from typing import Any
@@ -31,15 +33,22 @@ from scipy.sparse import coo_matrix
 import halfshell as hs
 from halfshell._convert.call import take
 from halfshell._functions.counts import Marks, binned
+from halfshell._functions.neighbors import arrays_of_rows
 
 __all__ = ["KDTree", "cKDTree"]
 
 _ENTRY = np.dtype([("i", np.intp), ("j", np.intp), ("v", np.float64)], align=True)
 _Points = npt.NDArray[np.float64]
+_FLOAT = np.dtype(np.float64)
+_FIRST = np.zeros(1, np.intp)
 
-#: With fewer queries than this share of the points a tree leads to candidates, in less time than
-#: all points are sorted into cells; these decide among them.
-_FEW = 1.0 / 256.0
+#: From so many points on they are sorted into cells once, and these are kept; it takes less time to
+#: search fewer anew.
+_MANY = 500
+#: A set that has more than so many times the points of another one does not ask, but is asked.
+_FEWER = 8
+#: Lists of cells that a tree keeps beside the first, for radii that differ by factors.
+_MOST_LISTS = 4
 
 #: What is beyond this wraps in SciPy, which then reads what lies before its results.
 _LAST = np.iinfo(np.intp).max
@@ -66,16 +75,17 @@ class _Searches:
         workers: Any = 1,
     ) -> Any:
         """As SciPy's; but ValueError if any of `k` is less than 1, where SciPy crashes."""
-        asked, threads, ranks = self._asked(x, p, eps), _as_threads(workers), _as_ranks(k)
-        bound = _as_bound(distance_upper_bound)
+        asked, shape = self._asked(x, p, eps)
+        threads, ranks = _as_threads(workers), _as_ranks(k)
+        bound = distance_upper_bound
+        bound = float(bound) if _is_number(bound) and float(bound) >= 0.0 else None
         if asked is None or threads is None or ranks is None or bound is None or not self.n:
             return super().query(x, k, eps, p, distance_upper_bound, workers)  # type: ignore[misc]
-        columns, squeezed = ranks
-        shape = np.shape(x)[:-1]
-        i, d = self._nearest(asked, int(columns.max()), bound, threads)
-        i, d = _columns_of(i, columns, self.n), _columns_of(d, columns, np.inf)
-        if not squeezed:
-            return d.reshape(*shape, len(columns)), i.reshape(*shape, len(columns))
+        most = ranks if isinstance(ranks, int) else int(ranks.max())
+        i, d = self._nearest(asked, most, bound, threads)
+        i, d = _columns_of(i, ranks, self.n), _columns_of(d, ranks, np.inf)
+        if not isinstance(ranks, int) or ranks != 1:
+            return d.reshape(*shape, d.shape[1]), i.reshape(*shape, i.shape[1])
         if not shape:
             return float(d[0, 0]), self._index(i[0, 0])
         return d.reshape(shape), i.reshape(shape)
@@ -91,14 +101,14 @@ class _Searches:
         return_length: Any = False,
     ) -> Any:
         """As SciPy's; lists ascend, whatever `return_sorted` is."""
-        asked, threads = self._asked(x, p, eps), _as_threads(workers)
-        radii = None if asked is None else self._radii(r, np.shape(x)[:-1])
+        asked, shape = self._asked(x, p, eps)
+        threads = _as_threads(workers)
+        radii = None if asked is None else self._radii(r, shape)
         if asked is None or threads is None or radii is None:
             return super().query_ball_point(  # type: ignore[misc]
                 x, r, p, eps, workers, return_sorted, return_length
             )
-        shape = np.shape(x)[:-1]
-        offsets, j = self._balls(asked, radii, threads)
+        offsets, j = self._balls(asked, radii, threads or None)
         if return_length:
             lengths = np.diff(offsets).astype(np.intp).reshape(shape)
             return lengths if shape else lengths[()]
@@ -113,18 +123,19 @@ class _Searches:
         """As SciPy's; lists ascend."""
         if not self._is_for(p, eps) or not self._fits(other) or not self._is_near(r):
             return super().query_ball_tree(other, r, p, eps)  # type: ignore[misc]
-        rows = hs.neighbors(other.data, float(r), queries=self.data, **self._box())
-        return _as_lists(rows.offsets, rows.indices)
+        points, box = self._searched(float(r), other)
+        return _as_lists(*arrays_of_rows(points, float(r), queries=self.data, **box))
 
     def query_pairs(self, r: Any, p: Any = 2.0, eps: Any = 0.0, output_type: Any = "set") -> Any:
         """As SciPy's."""
         known = output_type in ("set", "ndarray")
         if not known or not self._is_for(p, eps) or not self._is_near(r):
             return super().query_pairs(r, p, eps, output_type)  # type: ignore[misc]
+        points, box = self._searched(float(r))
         if output_type == "ndarray":
-            both = hs.pairs(self.data, float(r), quantities="P", **self._box())
+            both = hs.pairs(points, float(r), quantities="P", **box)
             return both.astype(np.intp, copy=False)
-        i, j = hs.pairs(self.data, float(r), **self._box())
+        i, j = hs.pairs(points, float(r), **box)
         return set(zip(i.tolist(), j.tolist()))
 
     def count_neighbors(
@@ -135,18 +146,19 @@ class _Searches:
         if limits is None or marks is None or not self._is_for(p, 0.0) or not self._fits(other):
             return super().count_neighbors(other, r, p, weights, cumulative)  # type: ignore[misc]
         within, places = limits
-        call = take(other.data, 0.0, self.data, **self._box(), by_reach=False)
+        if marks[0] is None and marks[1] is None:
+            found = self._count(other, within)[places]
+            if not cumulative:
+                found = np.diff(found, prepend=0)
+            return found.reshape(np.shape(r)) if np.ndim(r) else int(found[0])
+        call = take(other.data, 0.0, self.data, **self._box, by_reach=False)
         bins = binned(call, within, Marks(1, None, marks[1], None, marks[0]))[0, 0]
         if cumulative:
             found = np.cumsum(bins)[places]
         else:  # an edge that is repeated has nothing between it and itself
             found = bins[places]
             found[1:][places[1:] == places[:-1]] = 0
-        counts = marks[0] is None and marks[1] is None
-        found = found.astype(np.intp if counts else np.float64, copy=False).reshape(np.shape(r))
-        if np.ndim(r):
-            return found
-        return int(found) if counts else found[()]
+        return found.astype(np.float64, copy=False).reshape(np.shape(r))[()]
 
     def sparse_distance_matrix(
         self, other: Any, max_distance: Any, p: Any = 2.0, output_type: Any = "dok_matrix"
@@ -158,9 +170,7 @@ class _Searches:
             return super().sparse_distance_matrix(  # type: ignore[misc]
                 other, max_distance, p, output_type
             )
-        i, j, d = hs.pairs_between(
-            self.data, other.data, float(max_distance), quantities="ijd", **self._box()
-        )
+        i, j, d = self._between(other, float(max_distance))
         if output_type == "dict":
             return dict(zip(zip(i.tolist(), j.tolist()), d.tolist()))
         if output_type == "ndarray":
@@ -173,31 +183,39 @@ class _Searches:
     # ---- what is ours ----------------------------------------------------------------------
 
     def _is_for(self, p: Any, eps: Any) -> bool:
-        numbers = isinstance(p, Real) and isinstance(eps, Real)
-        return numbers and p == 2 and eps == 0 and 1 <= self.m <= 8
+        return _is_number(p) and _is_number(eps) and p == 2 and eps == 0 and 1 <= self.m <= 8
 
-    def _asked(self, x: Any, p: Any, eps: Any) -> _Points | None:
-        """Queries in rows, or None if they are not plain numbers."""
+    def _asked(self, x: Any, p: Any, eps: Any) -> tuple[_Points | None, tuple[int, ...]]:
+        """Queries in rows, or None if they are not plain numbers, and the shape that they had."""
         array = np.asarray(x)
-        if not self._is_for(p, eps) or array.dtype.kind not in "fiu" or array.itemsize > 8:
-            return None
-        if array.ndim == 0 or array.shape[-1] != self.m or not np.isfinite(array).all():
-            return None
-        return np.ascontiguousarray(array.reshape(-1, self.m), np.float64)
+        shape = array.shape[:-1]
+        is_plain = array.dtype is _FLOAT or (array.dtype.kind in "fiu" and array.itemsize <= 8)
+        if not is_plain or not array.ndim or array.shape[-1] != self.m or not self._is_for(p, eps):
+            return None, shape
+        rows = array
+        if len(shape) != 1 or array.dtype is not _FLOAT:
+            rows = np.ascontiguousarray(array.reshape(-1, self.m), np.float64)
+        # One sum tells it of nearly all arrays.
+        is_finite = math.isfinite(np.vdot(rows, rows)) or np.isfinite(rows).all()
+        return (rows if is_finite else None), shape
 
     def _fits(self, other: Any) -> bool:
+        if other is self:
+            return True
         if not isinstance(other, _owner.cKDTree) or other.m != self.m:
             return False
         if self.boxsize is None or other.boxsize is None:
             return self.boxsize is None and other.boxsize is None
         return np.array_equal(self.boxsize, other.boxsize)
 
+    @cached_property
     def _box(self) -> dict[str, Any]:
         if self.boxsize is None or not (self.boxsize > 0.0).any():
             return {"box": None, "periodic": None}
         periodic = self.boxsize > 0.0
         return {"box": np.where(periodic, self.boxsize, 0.0), "periodic": periodic}
 
+    @cached_property
     def _half(self) -> float:
         """Half the shortest period: what is closer has no other image that is."""
         if self.boxsize is None:
@@ -205,16 +223,16 @@ class _Searches:
         return float(np.min(self.boxsize, where=self.boxsize > 0.0, initial=np.inf)) / 2.0
 
     def _is_near(self, r: Any) -> bool:
-        return isinstance(r, Real) and 0.0 <= float(r) < self._half()
+        return _is_number(r) and 0.0 <= float(r) < self._half
 
     def _radii(self, r: Any, shape: tuple[int, ...]) -> float | _Points | None:
-        if isinstance(r, Real):
+        if _is_number(r):
             return float(r) if self._is_near(r) else None
         try:
             radii = np.broadcast_to(np.asarray(r, np.float64), shape).reshape(-1)
         except (TypeError, ValueError):
             return None
-        if not ((radii >= 0.0) & (radii < self._half())).all():
+        if not ((radii >= 0.0) & (radii < self._half)).all():
             return None
         if len(radii) and (radii == radii[0]).all():
             return float(radii[0])
@@ -222,13 +240,15 @@ class _Searches:
 
     def _limits(self, r: Any, cumulative: Any) -> tuple[_Points, npt.NDArray[np.intp]] | None:
         """Ascending radii, and where each of `r` is among them."""
+        if _is_number(r):
+            return (np.array([r], np.float64), _FIRST) if self._is_near(r) else None
         try:
             radii = np.asarray(r, np.float64)
         except (TypeError, ValueError):
             return None
         if radii.ndim > 1 or not radii.size or not (radii >= 0.0).all():
             return None
-        if not (radii < self._half()).all():
+        if not (radii < self._half).all():
             return None
         within, places = np.unique(radii, return_inverse=True)
         if not cumulative and (np.diff(places.reshape(-1)) < 0).any():
@@ -237,59 +257,85 @@ class _Searches:
 
     # ---- searches --------------------------------------------------------------------------
 
-    def _is_few(self, asked: _Points) -> bool:
-        return len(asked) < _FEW * self.n
+    def _searched(self, radius: float | None, tree: Any = None) -> tuple[Any, dict[str, Any]]:
+        """The points of this tree or another one, as searches up to this radius, or for the nearest
+        ones, take them, with their box."""
+        tree = self if tree is None else tree
+        if tree.n < _MANY or not isinstance(tree, _Searches):
+            return tree.data, self._box
+        return tree._kept(radius), {}
 
-    def _candidates(self, asked: _Points, radii: Any) -> npt.NDArray[np.intp] | None:
-        """Ascending numbers of all points within these radii of any, and some more; or None."""
-        ends = (asked.min(), asked.max(), self.mins.min(), self.maxes.max())
-        largest = max(map(abs, ends))
-        wide = np.add(radii, 1e-14 * self.m * (largest + np.max(radii))) + 1e-150
-        if not (wide < self._half()).all():
-            return None
-        found = super().query_ball_point(asked, wide)  # type: ignore[misc]
-        return np.unique(np.concatenate([np.asarray(one, np.intp) for one in found]))
+    @cached_property
+    def _lists(self) -> dict[int, hs.CellList]:
+        return {}  # by powers of two of the radii
 
-    def _balls(self, asked: _Points, radii: Any, threads: int) -> tuple[Any, Any]:
+    def _kept(self, radius: float | None) -> hs.CellList:
+        """A list of cells, which is kept: for the first radius between two powers of two, or for
+        any in between once there is a larger one."""
+        lists = self._lists
+        if radius is None:
+            for cells in list(lists.values()):
+                return cells
+            radius = 0.0
+        octave = math.frexp(radius)[1]
+        found = lists.get(octave)
+        if found is not None and found.cutoff >= radius:
+            return found
+        cutoff = radius if found is None else max(radius, math.ldexp(1.0, min(octave, 1023)))
+        made = lists[octave] = hs.CellList(self.data, cutoff, **self._box)
+        for old in list(lists)[1:-_MOST_LISTS]:  # the first one has the tree of the nearest
+            lists.pop(old, None)
+        return made
+
+    def _balls(self, asked: _Points, radii: Any, threads: int | None) -> Any:
         """Offsets and numbers of all points within these radii."""
-        points, numbers = self.data, None
-        if len(asked) and self._is_few(asked):
-            numbers = self._candidates(asked, radii)
-            points = self.data if numbers is None else self.data[numbers]
-        each: dict[str, Any] = {"threads": threads or None, "queries": asked, **self._box()}
+        how: dict[str, Any] = {"queries": asked, "threads": threads}
         if isinstance(radii, float):
-            rows = hs.neighbors(points, radii, **each)
-        else:
-            each["queries"] = hs.Points(asked, radii=radii)
-            rows = hs.neighbors(points, None, rule="gather", **each)
-        return rows.offsets, rows.indices if numbers is None else numbers[rows.indices]
+            points, box = self._searched(radii)
+            return arrays_of_rows(points, radii, **how, **box)
+        points, box = self._searched(float(radii.max(initial=0.0)))
+        if isinstance(points, hs.CellList):
+            rows = points.query(asked, radii, threads=threads)
+            return rows.offsets, rows.indices
+        how["queries"] = hs.Points(asked, radii=radii)
+        return arrays_of_rows(points, None, rule="gather", **how, **box)
+
+    def _count(self, other: Any, radii: _Points) -> npt.NDArray[np.int64]:
+        """How many pairs of the points of both trees are within each of ascending radii."""
+        large, small = (self, other) if self.n >= other.n else (other, self)
+        points, box = self._searched(float(radii[-1]), large)
+        within = float(radii[0]) if len(radii) == 1 else radii
+        return np.atleast_1d(hs.count_pairs(points, within, queries=small.data, **box))
+
+    def _between(self, other: Any, radius: float) -> Any:
+        """Numbers in both trees, ascending, and distances of pairs."""
+        if self.n <= _FEWER * other.n:
+            points, box = self._searched(radius, other)
+            return hs.pairs_between(self.data, points, radius, quantities="ijd", **box)
+        points, box = self._searched(radius)
+        j, i, d = hs.pairs_between(other.data, points, radius, quantities="ijd", **box)
+        order = np.argsort(i, kind="stable")
+        return i[order], j[order], d[order]
 
     def _nearest(self, asked: _Points, k: int, bound: float, threads: int) -> tuple[Any, Any]:
         """Numbers and distances, with n and infinity where there are none."""
-        k, points, numbers = min(k, self.n), self.data, None
-        if len(asked) and self._is_few(asked):
-            far: Any = super().query(asked, [k])[0]  # type: ignore[misc]
-            if np.isfinite(far).all():
-                numbers = self._candidates(asked, np.minimum(far[:, 0], bound))
-                points = self.data if numbers is None else self.data[numbers]
-        within = min(max(bound, 0.0), float(np.nextafter(self._half(), 0.0)))
-        within = bound if self._half() == np.inf else within
-        scene: dict[str, Any] = {"threads": threads or None, **self._box()}
-        i, d = hs.nearest(points, k, queries=asked, max_distance=within, **scene)
-        near = np.nextafter(np.nextafter(bound, 0.0), 0.0)
-        ties = np.flatnonzero(((d >= near) & (bound < np.inf)).any(axis=1))
+        points, box = self._searched(None)
+        is_open = self._half == np.inf
+        within = bound if is_open else min(bound, math.nextafter(self._half, 0.0))
+        scene: dict[str, Any] = {"queries": asked, "threads": threads or None, **box}
+        i, d = hs.nearest(points, min(k, self.n), max_distance=within, **scene)
+        near = math.nextafter(math.nextafter(bound, 0.0), 0.0)
+        ties = np.flatnonzero((d >= near).any(axis=1)) if bound < np.inf else ()
         if len(ties):  # closer, in real numbers?
-            closer = hs.coordination(points, bound, queries=asked[ties], inclusive=False, **scene)
-            kept = np.arange(k) < closer[:, None]
+            scene["queries"] = asked[ties]
+            closer = hs.coordination(points, bound, inclusive=False, **scene)
+            kept = np.arange(d.shape[1]) < closer[:, None]
             i[ties], d[ties] = np.where(kept, i[ties], -1), np.where(kept, d[ties], np.inf)
-        none = i < 0
-        if numbers is not None:
-            i = np.append(numbers, self.n)[i]
-        i[none] = self.n
-        if within < bound:
-            rest = np.flatnonzero(none.any(axis=1))
+        if within < np.inf and len(i) and i[:, -1].min() < 0:
+            rest = np.flatnonzero(i[:, -1] < 0) if within < bound else ()
+            i[i < 0] = self.n
             if len(rest):  # images half a period away, or more
-                each = np.arange(1, k + 1)
+                each = np.arange(1, d.shape[1] + 1)
                 d[rest], i[rest] = super().query(  # type: ignore[misc]
                     asked[rest], each, distance_upper_bound=bound
                 )
@@ -327,25 +373,23 @@ class KDTree(_Searches, _owner.KDTree):
 
 # ---- arguments that are ours, or SciPy's to judge --------------------------------------------
 
-def _as_bound(bound: Any) -> float | None:
-    """A bound that is a plain number and not negative."""
-    return float(bound) if isinstance(bound, Real) and float(bound) >= 0.0 else None
+def _is_number(value: Any) -> bool:
+    return type(value) is float or isinstance(value, Real)
 
 
 def _as_threads(workers: Any) -> int | None:
     """Threads, 0 for all; None for what SciPy is to judge."""
-    if not isinstance(workers, int | np.integer) or isinstance(workers, bool):
+    if type(workers) is not int and not isinstance(workers, np.integer):
         return None
     if workers == -1:
         return 0 if os.cpu_count() else None
     return int(workers) if 0 < workers < 1 << 16 else None
 
 
-def _as_ranks(k: Any) -> tuple[npt.NDArray[np.intp], bool] | None:
-    """Which neighbours, and whether there is no axis for them; None for what SciPy is to judge."""
+def _as_ranks(k: Any) -> int | npt.NDArray[np.intp] | None:
+    """How many neighbours, or which of them; None for what SciPy is to judge."""
     try:
-        most = operator.index(k)
-        return (np.arange(1, most + 1), most == 1) if most > 0 else None
+        return max(operator.index(k), 0) or None
     except TypeError:
         pass
     ranks = np.asarray(k)
@@ -355,15 +399,20 @@ def _as_ranks(k: Any) -> tuple[npt.NDArray[np.intp], bool] | None:
         raise ValueError(f"k must be 1 or more, as 1 is the nearest neighbour, got {k!r}")
     if ranks.dtype.kind not in "iu":
         return None
-    return ranks.astype(np.intp), False
+    return ranks.astype(np.intp)
 
 
-def _columns_of(found: npt.NDArray[Any], ranks: npt.NDArray[np.intp], missing: float) -> Any:
-    """These columns, from 1, of which there may be fewer."""
-    if len(ranks) == found.shape[1] and ranks[0] == 1 and (np.diff(ranks) == 1).all():
-        return found
+def _columns_of(found: npt.NDArray[Any], ranks: Any, missing: float) -> Any:
+    """So many columns, or these, from 1; there may be fewer."""
+    width = found.shape[1]
+    if isinstance(ranks, int):
+        if ranks == width:
+            return found
+        result = np.full((len(found), ranks), missing, found.dtype)
+        result[:, :width] = found
+        return result
     result = np.full((len(found), len(ranks)), missing, found.dtype)
-    there = ranks <= found.shape[1]
+    there = ranks <= width
     result[:, there] = found[:, ranks[there] - 1]
     return result
 

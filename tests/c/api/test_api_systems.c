@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_api_systems.c: many systems in one call have the pairs that each has alone. */
-#include "../../../csrc/core/api/systems.h"
 #include "../../../csrc/core/memory/memory.h"
 #include "../../../csrc/halfshell.h"
 #include "../support/among.h"
@@ -589,117 +588,293 @@ nothing_leaks_when_memory_is_short(void)
     check_arena(find_all, &systems);
 }
 
+/* Small reaches have one image of a pair and large ones several: pairs of both are sorted. */
+static void
+steps_with_and_without_images_are_sorted_together(void)
+{
+    enum { N = 200 };
+    static double x[3 * N], radii[N];
+    const int64_t first[] = {0, N};
+    const hs_box  box = {
+         .ndim = 3, .periodic = {true, true, true}, .rows = {{4.0}, {0.0, 4.0}, {0.0, 0.0, 4.0}}};
+    const hs_reach reach = {.rule = HS_RULE_MAX};
+    hs_set         set = {
+                .at = {x, N, 3, HS_FLOAT64, 24, 8}, .radii = radii, .n_systems = 1, .first = first};
+    hs_among       systems = {.points = &set, .box = &box, .reach = &reach};
+    hs_options     options = hs_options_default();
+    harness_random random = {62};
+    hs_pairs      *many, *one;
+    for (int e = 0; e < 3 * N; e++)
+        x[e] = 4.0 * random_unit(&random);
+    for (int i = 0; i < N; i++)
+        radii[i] = i < N - 5 ? 0.4 : 2.2;
+    options.cutoff = INFINITY;
+    options.sorted = true;
+    options.algorithm = HS_HIERARCHY;
+    CHECK(hs_pairs_find(&systems, &options, &many, NULL) == HS_OK);
+    set.first = NULL;
+    CHECK(hs_pairs_find(&systems, &options, &one, NULL) == HS_OK);
+    const size_t n = (size_t)hs_pairs_length(one);
+    CHECK(n > N && hs_pairs_length(many) == (int64_t)n);
+    CHECK(memcmp(hs_pairs_array(many, HS_WANT_I), hs_pairs_array(one, HS_WANT_I), 8 * n) == 0);
+    CHECK(memcmp(hs_pairs_array(many, HS_WANT_J), hs_pairs_array(one, HS_WANT_J), 8 * n) == 0);
+    hs_pairs_free(many);
+    hs_pairs_free(one);
+}
+
 /* ---- what one of many systems has of the arrays of all ---- */
 
-/* One box for all, or rows for each, of which it says what repeats. */
+enum { OF_ALL = 24, Q_OF_ALL = 12, PARTS = 5 };
+
+/* What is asked of many systems, or of one of them: queries are every second point. */
+typedef struct chosen {
+    double       x[OF_ALL * 2], q[Q_OF_ALL * 2];
+    int64_t      groups[OF_ALL], labels[OF_ALL], q_groups[Q_OF_ALL], q_labels[Q_OF_ALL];
+    int64_t      numbers[Q_OF_ALL], excluded[2 * OF_ALL];
+    hs_points    at, q_at;
+    hs_set       points, queries;
+    hs_selection selection;
+    hs_among     among;
+} chosen;
+
+static const int64_t part_first[] = {0, 0, 10, 14, 24, 24}, part_query[] = {0, 0, 5, 7, 12, 12};
+static const double  part_rows[PARTS * 4] = {9.0, 0.0, 0.0,  9.0, 1.5, 0.0, 0.5, 1.25, 4.0, 0.0,
+                                             0.0, 4.0, 1.25, 0.0, 0.0, 1.0, 9.0, 0.0,  0.0, 9.0};
+static const uint8_t part_periodic[PARTS] = {3, 3, 2, 1, 3};
+
+/* Points, and the same numbered from `first` on. */
 static void
-each_system_has_its_box(void)
+make_chosen(chosen *c, int s, bool has_queries, bool has_numbers, const hs_selection *selection)
 {
-    const int64_t  first[] = {0, 1, 2};
-    const double   rows[] = {1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0};
-    const hs_box   box = {.ndim = 2, .periodic = {true, false}, .rows = {{9.0}, {0.0, 9.0}}};
-    const hs_set   set = {.at = {.ndim = 2}, .n_systems = 2, .first = first};
-    hs_each_system each = {.rows = NULL};
-    hs_among       systems = {.points = &set, .box = &box};
-    hs_box         own_box;
-    CHECK(hs_box_of_system(&systems, 1, &own_box) == &box);
-    systems.each = &each;
-    CHECK(hs_box_of_system(&systems, 1, &own_box) == &box);
-    each.rows = rows;
-    for (int s = 0; s < 2; s++) {
-        CHECK(hs_box_of_system(&systems, s, &own_box) == &own_box && own_box.ndim == 2);
-        CHECK(own_box.periodic[0] && !own_box.periodic[1]);
-        CHECK(own_box.rows[0][0] == 1.0 + 4 * s && own_box.rows[0][1] == 2.0 + 4 * s);
-        CHECK(own_box.rows[1][0] == 3.0 + 4 * s && own_box.rows[1][1] == 4.0 + 4 * s);
+    const int64_t  first = s < 0 ? 0 : part_first[s], end = s < 0 ? OF_ALL : part_first[s + 1];
+    const int64_t  first_query = first / 2, of_asking = has_queries && !has_numbers ? 2 : 1;
+    harness_random random = {5};
+    memset(c, 0, sizeof *c);
+    for (int64_t i = 0; i < OF_ALL; i++) {
+        const double  x = 1.5 * random_unit(&random), y = 1.5 * random_unit(&random);
+        const int64_t j = (i * 7 + 3) % OF_ALL, at = c->selection.n_excluded;
+        if (i < first || i >= end)
+            continue;
+        const int64_t own = i - first;
+        c->x[2 * own] = c->q[own - own % 2] = x;
+        c->x[2 * own + 1] = c->q[own - own % 2 + 1] = y;
+        c->groups[own] = c->q_groups[own / 2] = i % 3;
+        c->labels[own] = c->q_labels[own / 2] = i / 3;
+        c->numbers[own / 2] = own - own % 2;
+        if (i % of_asking == 0 && j >= first && j < end) { /* pairs of two systems are none */
+            c->excluded[2 * at] = i / of_asking - (of_asking == 2 ? first_query : first);
+            c->excluded[2 * at + 1] = j - first;
+            c->selection.n_excluded++;
+        }
     }
-    const uint8_t bits[] = {2, 1}; /* which axes repeat may be of each as well, or that alone */
-    each.periodic = bits;
-    CHECK(hs_box_of_system(&systems, 0, &own_box) == &own_box);
-    CHECK(!own_box.periodic[0] && own_box.periodic[1] && own_box.rows[1][1] == 4.0);
-    each.rows = NULL;
-    CHECK(hs_box_of_system(&systems, 1, &own_box) == &own_box && own_box.ndim == 2);
-    CHECK(own_box.periodic[0] && !own_box.periodic[1]);
-    CHECK(own_box.rows[0][0] == 9.0 && own_box.rows[1][1] == 9.0);
-    systems.box = NULL;
-    CHECK(hs_box_of_system(&systems, 1, &own_box) == NULL);
-    CHECK(hs_cutoff_of_system(&systems, 1, 0.5) == 0.5);
-    each.cutoffs = rows;
-    CHECK(hs_cutoff_of_system(&systems, 1, 0.5) == 2.0);
+    const int64_t n_excluded = c->selection.n_excluded, n = end - first;
+    c->selection = *selection;
+    c->selection.n_excluded = selection->n_excluded != 0 ? n_excluded : 0;
+    c->selection.excluded = c->excluded;
+    c->selection.query_numbers = has_numbers ? c->numbers : NULL;
+    c->at = (hs_points){c->x, n, 2, HS_FLOAT64, 16, 8};
+    c->q_at = (hs_points){c->q, n / 2, 2, HS_FLOAT64, 16, 8};
+    c->points = (hs_set){.at = c->at, .groups = c->groups, .labels = c->labels};
+    c->queries = (hs_set){.at = c->q_at, .groups = c->q_groups, .labels = c->q_labels};
+    c->among = (hs_among){.points = &c->points,
+                          .queries = has_queries ? &c->queries : NULL,
+                          .selection = &c->selection};
 }
 
-enum { N_SYSTEM_PART = 6, Q = 4, D = 2 };
-
-/* The excluded pairs of a system, with numbers of its own; pairs of two systems are none. */
-static void
-excluded_pairs_are_sorted_by_system(void)
+/* Pairs, rows or nearest points. */
+static hs_pairs *
+find_chosen(const chosen *c, int what, const hs_options *options)
 {
-    const int64_t      first[] = {0, 0, 3, 3, 5, 6}, excluded[] = {4, 3, 0, 2, 5, 0, 1, 1, 3, 5};
-    const double       numbers[N_SYSTEM_PART] = {0.0};
-    const hs_points    points = {numbers, N_SYSTEM_PART, 1, HS_FLOAT64, 8, 8};
-    const hs_selection selection = {.n_excluded = 5, .excluded = excluded};
-    const hs_among     sets = {.points = SET(&points, .n_systems = 5, .first = first),
-                               .selection = &selection};
-    const int64_t      expected[] = {0, 2, 1, 1, 1, 0}, ends[] = {0, 0, 2, 2, 3, 3};
+    hs_pairs       *pairs = NULL;
+    const hs_status status = what == 0   ? hs_pairs_find(&c->among, options, &pairs, NULL)
+                             : what == 1 ? hs_neighbors_find(&c->among, options, &pairs, NULL)
+                                         : hs_nearest_find(&c->among, 3, options, &pairs, NULL);
+    CHECK(status == HS_OK);
+    return pairs;
+}
+
+/* Each system has its pairs, with its box, its labels, and the pairs that it excludes. */
+static int64_t
+compare_chosen(int what, bool has_queries, bool has_numbers, const hs_selection *selection,
+               int threads)
+{
+    static chosen        all, one;
+    hs_box               box = {.ndim = 2};
+    const hs_each_system each = {.rows = part_rows, .periodic = part_periodic};
+    hs_options           options = hs_options_default();
+    int64_t              at = 0;
+    options.cutoff = 0.9;
+    options.sorted = true;
+    options.threads = threads;
+    options.want = HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_SHIFT;
+    make_chosen(&all, -1, has_queries, has_numbers, selection);
+    all.points.n_systems = all.queries.n_systems = PARTS;
+    all.points.first = part_first;
+    all.queries.first = part_query;
+    all.among.box = &box;
+    all.among.each = &each;
+    hs_pairs      *of_all = find_chosen(&all, what, &options);
+    const int64_t *j = hs_pairs_array(of_all, HS_WANT_J);
+    const double  *d = hs_pairs_array(of_all, HS_WANT_DISTANCE);
+    const int32_t *shift = hs_pairs_array(of_all, HS_WANT_SHIFT);
+    for (int s = 0; s < PARTS; s++) {
+        make_chosen(&one, s, has_queries, has_numbers, selection);
+        memcpy(box.rows[0], part_rows + 4 * s, 2 * sizeof(double));
+        memcpy(box.rows[1], part_rows + 4 * s + 2, 2 * sizeof(double));
+        box.periodic[0] = part_periodic[s] & 1;
+        box.periodic[1] = part_periodic[s] & 2;
+        one.among.box = &box;
+        hs_pairs      *own = find_chosen(&one, what, &options);
+        const int64_t  n = hs_pairs_length(own);
+        const int64_t *own_j = hs_pairs_array(own, HS_WANT_J);
+        CHECK(at + n <= hs_pairs_length(of_all));
+        for (int64_t e = 0; e < n; e++)
+            CHECK(j[at + e] == (own_j[e] < 0 ? -1 : own_j[e] + part_first[s]));
+        const size_t m = (size_t)n;
+        CHECK(m == 0 || memcmp(d + at, hs_pairs_array(own, HS_WANT_DISTANCE), 8 * m) == 0);
+        CHECK(m == 0 || memcmp(shift + 2 * at, hs_pairs_array(own, HS_WANT_SHIFT), 8 * m) == 0);
+        at += n;
+        hs_pairs_free(own);
+    }
+    CHECK(at == hs_pairs_length(of_all));
+    hs_pairs_free(of_all);
+    return at;
+}
+
+static void
+each_system_has_its_box_and_selection(void)
+{
+    const hs_selection selections[] = {
+        {.has_groups = true},
+        {.has_labels = true},
+        {.has_labels = true, .within = 1, .has_groups = true},
+        {.n_excluded = 1},
+        {.n_excluded = 1, .min_distance = 0.2},
+    };
+    int64_t before = 0;
+    for (size_t k = 0; k < sizeof selections / sizeof *selections; k++) {
+        for (int kind = 0; kind < 14; kind++) { /* half lists have no queries */
+            const int what = kind < 2 ? 0 : 1 + (kind - 2) / 6,
+                      queried = kind < 2 ? 0 : kind / 2 % 3;
+            CHECK(compare_chosen(what, queried > 0, queried > 1, &selections[k], 1 + kind % 2) > 5);
+        }
+        before = compare_chosen(1, false, false, &selections[k], 1);
+    }
+    CHECK(before < compare_chosen(1, false, false, &(hs_selection){.within = 0}, 1));
+}
+
+typedef struct noted_pairs {
+    const int64_t *i, *j;
+    int64_t        n, most;
+} noted_pairs;
+
+/* A hs_pairs_fn: compares them with those that were found. */
+static int
+compare_visited(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user)
+{
+    noted_pairs   *noted = user;
+    const int64_t *i = pairs->i, *j = pairs->j;
+    for (int64_t e = 0; e < n && noted->n < noted->most; e++, noted->n++) {
+        CHECK(i[e] == noted->i[noted->n] && j[e] == noted->j[noted->n]);
+        *n_taken = e + 1;
+    }
+    return noted->n == noted->most;
+}
+
+/* Visits come in the order of pairs, and may end in any system; clusters are those of all pairs. */
+static void
+visits_and_clusters_go_over_all_systems(void)
+{
+    static chosen        all;
+    const hs_box         box = {.ndim = 2};
+    const hs_each_system each = {.rows = part_rows, .periodic = part_periodic};
+    const hs_selection   selection = {.has_labels = true};
+    hs_options           options = hs_options_default();
+    int64_t              labels[OF_ALL], own_labels[OF_ALL], n_clusters, n, n_found;
+    uint8_t              winding[OF_ALL], own_winding[OF_ALL];
+    hs_pairs            *pairs;
+    options.cutoff = 0.6;
+    for (options.threads = 1; options.threads <= 2; options.threads++) {
+        make_chosen(&all, -1, false, false, &selection);
+        all.points.n_systems = PARTS;
+        all.points.first = part_first;
+        all.among.box = &box;
+        all.among.each = &each;
+        CHECK(hs_pairs_find(&all.among, &options, &pairs, NULL) == HS_OK);
+        n_found = hs_pairs_length(pairs);
+        for (int part = 1; part <= 3; part++) {
+            noted_pairs noted = {hs_pairs_array(pairs, HS_WANT_I), hs_pairs_array(pairs, HS_WANT_J),
+                                 0, n_found * part / 3};
+            const hs_visit visit = {.pairs = compare_visited, .user = &noted};
+            CHECK(hs_pairs_visit(&all.among, &options, &visit, &n, NULL) == HS_OK);
+            CHECK(n == noted.most && noted.n == n);
+        }
+        hs_pairs_free(pairs);
+        CHECK(hs_clusters_find(&all.among, &options, NULL, labels, winding, &n_clusters, NULL) ==
+              HS_OK);
+        int64_t before = 0;
+        for (int s = 0; s < PARTS; s++) {
+            hs_box own_box = box;
+            make_chosen(&all, s, false, false, &selection);
+            memcpy(own_box.rows[0], part_rows + 4 * s, 2 * sizeof(double));
+            memcpy(own_box.rows[1], part_rows + 4 * s + 2, 2 * sizeof(double));
+            own_box.periodic[0] = part_periodic[s] & 1;
+            own_box.periodic[1] = part_periodic[s] & 2;
+            all.among.box = &own_box;
+            CHECK(hs_clusters_find(&all.among, &options, NULL, own_labels, own_winding, &n, NULL) ==
+                  HS_OK);
+            for (int64_t i = 0; i < all.at.n; i++)
+                CHECK(labels[part_first[s] + i] == own_labels[i] + before);
+            CHECK(memcmp(winding + before, own_winding, (size_t)n) == 0);
+            before += n;
+        }
+        CHECK(before == n_clusters);
+    }
+}
+
+/* Systems that share the vectors of a box and not which of them repeat, if any does. */
+static void
+what_repeats_may_be_of_each_system(void)
+{
+    const double         x[] = {0.1, 0.9, 0.1, 0.9};
+    const int64_t        first[] = {0, 2, 4};
+    const uint8_t        bits[] = {0, 1}, none[] = {0, 0};
+    const hs_set         set = {.at = {x, 4, 1, HS_FLOAT64, 8, 8}, .n_systems = 2, .first = first};
+    const hs_box         box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
+    const hs_each_system each = {.periodic = bits}, open = {.periodic = none};
+    hs_among             systems = {.points = &set, .box = &box, .each = &each};
+    hs_options           options = hs_options_default();
+    int64_t              labels[4], n, counts[2];
+    uint8_t              winding[4];
+    options.cutoff = 0.3;
+    CHECK(hs_pairs_count(&systems, &options, counts, NULL) == HS_OK);
+    CHECK(counts[0] == 0 && counts[1] == 1);
+    CHECK(hs_clusters_find(&systems, &options, NULL, labels, winding, &n, NULL) == HS_OK);
+    CHECK(n == 3 && labels[1] == 1 && labels[3] == 2);
+    systems.each = &open;
+    CHECK(hs_clusters_find(&systems, &options, NULL, labels, winding, &n, NULL) == HS_OK);
+    CHECK(n == 4 && winding[3] == 0);
+}
+
+/* Queries that are points are those of their own system. */
+static void
+numbers_of_another_system_are_refused(void)
+{
+    static chosen      all;
+    const hs_selection selection = {.has_labels = true};
     const hs_options   options = hs_options_default();
-    hs_selected_parts  parts;
-    hs_system_part     part;
-    hs_account         account;
-    hs_account_init(&account, &options);
-    CHECK(hs_selected_parts_open(&sets, &account, &parts) == HS_OK);
-    CHECK(memcmp(parts.first, ends, sizeof ends) == 0);
-    CHECK(memcmp(parts.pairs, expected, sizeof expected) == 0);
-    hs_system_part_cut(&sets, &parts, 3, &part);
-    CHECK(part.selection.n_excluded == 1 && part.selection.excluded == parts.pairs + 4);
-    hs_system_part_cut(&sets, &parts, 2, &part);
-    CHECK(part.selection.n_excluded == 0);
-    hs_selected_parts_free(&account, &parts);
-    hs_selected_parts_free(&account, &parts);
-    for (int nth = 1; nth <= 2; nth++) {
-        hs_test_fail_allocation(nth);
-        CHECK(hs_selected_parts_open(&sets, &account, &parts) == HS_ERR_MEMORY);
-        hs_selected_parts_free(&account, &parts);
-    }
-    hs_test_fail_allocation(0);
-    CHECK(account.held == 0);
-    hs_account_close(&account);
-}
-
-/* With queries the first number is that of a query. */
-static void
-excluded_pairs_of_queries_have_numbers_of_both(void)
-{
-    const int64_t   first[] = {0, 2, 5}, first_query[] = {0, 1, 3};
-    const int64_t   excluded[] = {2, 4, 0, 4, 1, 2}, expected[] = {1, 2, 0, 0};
-    const int64_t   numbered[] = {1, 2, 4}, of_points[] = {1, 0, 2}, pairs[] = {0, 2};
-    const double    numbers[N_SYSTEM_PART] = {0.0};
-    const hs_points points = {numbers, 5, 1, HS_FLOAT64, 8, 8},
-                    queries = {numbers, 3, 1, HS_FLOAT64, 8, 8};
-    hs_selection      selection = {.n_excluded = 3, .excluded = excluded};
-    const hs_among    sets = {.points = SET(&points, .n_systems = 2, .first = first),
-                              .queries = SET(&queries, .n_systems = 2, .first = first_query),
-                              .selection = &selection};
-    const hs_options  options = hs_options_default();
-    hs_selected_parts parts;
-    hs_account        account;
-    hs_account_init(&account, &options);
-    CHECK(hs_selected_parts_open(&sets, &account, &parts) == HS_OK);
-    CHECK(parts.first[1] == 0 && parts.first[2] == 2);
-    CHECK(memcmp(parts.pairs, expected, sizeof expected) == 0 && parts.query_numbers == NULL);
-    hs_selected_parts_free(&account, &parts);
-    selection.query_numbers = numbered; /* then it is that of a point, and so is that of a query */
-    CHECK(hs_selected_parts_open(&sets, &account, &parts) == HS_OK);
-    CHECK(parts.first[1] == 0 && parts.first[2] == 1);
-    CHECK(memcmp(parts.pairs, pairs, sizeof pairs) == 0);
-    CHECK(memcmp(parts.query_numbers, of_points, sizeof of_points) == 0);
-    hs_selected_parts_free(&account, &parts);
-    for (int nth = 1; nth <= 3; nth++) {
-        hs_test_fail_allocation(nth);
-        CHECK(hs_selected_parts_open(&sets, &account, &parts) == HS_ERR_MEMORY);
-        hs_selected_parts_free(&account, &parts);
-    }
-    hs_test_fail_allocation(0);
-    CHECK(account.held == 0);
-    hs_account_close(&account);
+    hs_pairs          *pairs = NULL;
+    hs_failure         failure;
+    make_chosen(&all, -1, true, true, &selection);
+    all.points.n_systems = all.queries.n_systems = PARTS;
+    all.points.first = part_first;
+    all.queries.first = part_query;
+    all.numbers[6] = 14;
+    CHECK(hs_neighbors_find(&all.among, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
+    CHECK(failure.system == 2 && pairs == NULL);
+    all.numbers[6] = 9;
+    CHECK(hs_nearest_find(&all.among, 1, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
+    CHECK(failure.system == 2 && pairs == NULL);
 }
 
 /* ---- one call for each of many systems: polls, threads, and what failures say ---- */
@@ -1255,9 +1430,11 @@ test_api_systems(void)
     RUN(failures_name_system_and_point);
     RUN(reaches_that_systems_cannot_have_are_refused);
     RUN(nothing_leaks_when_memory_is_short);
-    RUN(each_system_has_its_box);
-    RUN(excluded_pairs_are_sorted_by_system);
-    RUN(excluded_pairs_of_queries_have_numbers_of_both);
+    RUN(steps_with_and_without_images_are_sorted_together);
+    RUN(each_system_has_its_box_and_selection);
+    RUN(visits_and_clusters_go_over_all_systems);
+    RUN(what_repeats_may_be_of_each_system);
+    RUN(numbers_of_another_system_are_refused);
     RUN(memory_may_be_short);
     RUN(rows_of_boxes_stay);
     RUN(without_systems_all_else_is_checked);

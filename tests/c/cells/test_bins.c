@@ -28,7 +28,7 @@ sort_scene(hs_account *account, const hs_options *options, hs_scene *scene, hs_g
         hs_scene_free(account, scene);
         return false;
     }
-    return hs_bins_build(account, NULL, options, scene, grid, bins) == HS_OK;
+    return hs_bins_build(account, NULL, options, scene, grid, false, bins) == HS_OK;
 }
 
 /* X = r - w B is the point, moved by whole box vectors: exactly so in aligned boxes. */
@@ -125,8 +125,9 @@ compare_order(double cutoff, int threads, int nth, const int32_t *expected, int 
     hs_team *team = hs_team_create(threads);
     open_scene(2, FEW, cutoff, NULL, &s);
     hs_test_fail_allocation(nth);
-    const hs_status status = hs_bins_build(&s.account, team, &s.options, &s.scene, &s.grid, &bins);
-    const bool      disturbed = nth > 0 && !hs_test_failure_is_due();
+    const hs_status status =
+        hs_bins_build(&s.account, team, &s.options, &s.scene, &s.grid, false, &bins);
+    const bool disturbed = nth > 0 && !hs_test_failure_is_due();
     hs_test_fail_allocation(0);
     CHECK(status == HS_OK || (disturbed && status == HS_ERR_MEMORY));
     *n_refused += status != HS_OK;
@@ -137,6 +138,62 @@ compare_order(double cutoff, int threads, int nth, const int32_t *expected, int 
     close_scene(&s);
     hs_team_free(team);
     return disturbed;
+}
+
+/* Sorts the scene as queries of other points, whose grid this is; false where memory was refused
+ * for the nth time. */
+static bool
+check_queries(const sorted *of_points, int64_t n, int nth)
+{
+    const hs_grid *grid = &of_points->grid;
+    int64_t       *cells = malloc((size_t)(n + 1) * sizeof *cells);
+    double         squares = 0.0;
+    sorted         s;
+    hs_bins        bins;
+    open_scene(2, n, of_points->options.cutoff, NULL, &s);
+    for (int64_t i = 0; i < n; i++) {
+        cells[i] = 0;
+        for (int k = 0; k < 2; k++)
+            cells[i] +=
+                hs_grid_index(grid, k, hs_scene_coordinate(&s.scene, i, k)) * grid->stride[k];
+    }
+    hs_test_fail_allocation(nth);
+    const hs_status status =
+        hs_bins_build(&s.account, NULL, &s.options, &s.scene, grid, true, &bins);
+    const bool disturbed = nth > 0 && !hs_test_failure_is_due();
+    hs_test_fail_allocation(0);
+    CHECK(status == (disturbed ? HS_ERR_MEMORY : HS_OK));
+    for (int64_t si = 0, run = 0; status == HS_OK && si < n; si++) {
+        const int64_t own = cells[bins.order[si]];
+        const int64_t before = si > 0 ? cells[bins.order[si - 1]] : -1;
+        CHECK(bins.cells[si] == own && before <= own);
+        CHECK(before < own || bins.order[si - 1] < bins.order[si]);
+        run = before == own ? run + 1 : 0;
+        squares += (double)(2 * run + 1);
+    }
+    if (status == HS_OK) {
+        CHECK(bins.start == NULL && bins.squares == squares);
+        hs_bins_free(&s.account, &bins);
+    }
+    free(cells);
+    close_scene(&s);
+    return !disturbed;
+}
+
+/* Few of them are sorted by themselves, many into all the cells. */
+static void
+queries_carry_their_cells(void)
+{
+    static const int64_t counts[] = {0, 1, 2, 25, 1000, 30000};
+    sorted               s;
+    open_scene(2, FEW, 0.0001, NULL, &s);
+    CHECK(s.grid.n_cells / 8 > 1000 && s.grid.n_cells / 8 < 30000);
+    for (int c = 0; c < 6; c++) {
+        CHECK(check_queries(&s, counts[c], 0));
+        for (int nth = 1; !check_queries(&s, counts[c], nth); nth++) {
+        }
+    }
+    close_scene(&s);
 }
 
 /* Few cells, and about as many as points: then threads do not count for themselves. */
@@ -150,7 +207,8 @@ any_team_finds_the_same_order(void)
         int     nth = 0, n_refused = 0;
         open_scene(2, FEW, cutoffs[c], NULL, &s);
         CHECK((s.grid.n_cells > FEW / 3) == (c == 1));
-        CHECK(hs_bins_build(&s.account, NULL, &s.options, &s.scene, &s.grid, &bins) == HS_OK);
+        CHECK(hs_bins_build(&s.account, NULL, &s.options, &s.scene, &s.grid, false, &bins) ==
+              HS_OK);
         for (int threads = 2; threads <= HS_SLABS + 1; threads += threads == 2 ? 2 : 29)
             (void)compare_order(cutoffs[c], threads, 0, bins.order, &n_refused);
         CHECK(n_refused == 0);
@@ -239,5 +297,6 @@ test_bins(void)
 {
     RUN(coordinates_and_turns_travel_with_their_point);
     RUN(any_team_finds_the_same_order);
+    RUN(queries_carry_their_cells);
     RUN(sparse_pays_where_points_crowd);
 }

@@ -139,7 +139,8 @@ is_right(const hs_write *write, int32_t t, int32_t h)
     const double  distance = length * 4.0 < 20.0 ? length * 4.0 : write->largest;
     const int64_t i = write->index_bytes == 8 ? it.wide[0][h] : it.narrow[0][h];
     const int64_t j = write->index_bytes == 8 ? it.wide[1][h] : it.narrow[1][h];
-    bool right = i == (number < point ? number : point) && j == (number < point ? point : number) &&
+    const bool    swaps = write->is_half && number < point;
+    bool          right = i == (swaps ? number : point) && j == (swaps ? point : number) &&
                  it.distance[h] == distance;
     for (int k = 0; k < ndim; k++) {
         const double D = (flips ? -vector[k] : vector[k]) * 4.0 + 0.0;

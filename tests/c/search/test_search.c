@@ -107,15 +107,16 @@ shortages_leave_out_what_cannot_be_searched(void)
     hs_box          flat = box;
     hs_shortage     shortage = {0.0, 0.0};
     flat.rows[1][1] = 0.0;
-    hs_shortage_add(&none, &box, 1.0, &shortage);
-    hs_shortage_add(&points, &box, NAN, &shortage);
-    hs_shortage_add(&points, &box, -1.0, &shortage);
-    hs_shortage_add(&points, &flat, 1.0, &shortage);
+    hs_shortage_add(&(hs_sets){.points = &none}, &box, 1.0, &shortage);
+    hs_shortage_add(&(hs_sets){.points = &points}, &box, NAN, &shortage);
+    hs_shortage_add(&(hs_sets){.points = &points}, &box, -1.0, &shortage);
+    hs_shortage_add(&(hs_sets){.points = &points}, &flat, 1.0, &shortage);
     CHECK(shortage.pairs == 0.0 && shortage.bytes == 0.0);
-    hs_shortage_add(&points, &box, 1.0, &shortage); /* half of 9 points in a disk, of 8 */
+    hs_shortage_add(&(hs_sets){.points = &points}, &box, 1.0,
+                    &shortage); /* half of 9 points in a disk, of 8 */
     CHECK(fabs(shortage.pairs - 4.5 * 3.14159265358979 / 8.0) < 1e-9 && shortage.bytes > 0.0);
     const double before = shortage.pairs;
-    hs_shortage_add(&points, NULL, 100.0, &shortage); /* all three */
+    hs_shortage_add(&(hs_sets){.points = &points}, NULL, 100.0, &shortage); /* all three */
     CHECK(shortage.pairs == before + 3.0);
 }
 

@@ -402,4 +402,10 @@ call_systems_histogram(call *c, hs_failure *failure)
     return call_in_systems(c, call_histogram, failure);
 }
 
+static inline hs_status
+call_systems_visit(call *c, hs_failure *failure)
+{
+    return call_in_systems(c, call_visit, failure);
+}
+
 #endif

@@ -94,4 +94,10 @@ call_measure(call *c, hs_failure *failure)
     return call_take_pairs(c, status, pairs);
 }
 
+static inline hs_status
+call_systems_clusters(call *c, hs_failure *failure)
+{
+    return call_in_systems(c, call_clusters, failure);
+}
+
 #endif

@@ -87,17 +87,20 @@ threads_are_started_where_they_are_worth_it(void)
     CHECK(hs_call_threads(999.0, &options) == 1 && hs_call_threads(1000.0, &options) == 2);
     hs_call_begin(&options, &call);
     hs_call_gather(&call, 900);
-    hs_call_gather_for(&call, 900, 900.0);
+    hs_call_gather_for(&call, 900, 900.0, false);
     CHECK(call.team == NULL);
-    hs_call_gather_for(&call, 900, 9000.0);
+    hs_call_gather_for(&call, 900, 9000.0, false);
     CHECK(call.team != NULL);
     hs_call_dismiss(&call);
     call.options.want = 0; /* less is written */
-    hs_call_gather_for(&call, 900, 4000.0);
+    hs_call_gather_for(&call, 900, 4000.0, false);
     CHECK(call.team == NULL);
     call.options.threads = -2; /* by points alone */
-    hs_call_gather_for(&call, 900, 1e9);
+    hs_call_gather_for(&call, 900, 1e9, false);
     CHECK(call.team == NULL);
+    hs_call_gather_for(&call, 900, 1e9, true); /* unless there are no others to be sorted */
+    CHECK(call.team != NULL);
+    hs_call_dismiss(&call);
     CHECK(hs_test_worth_threads(0.0) == 1000.0);
 }
 

@@ -159,3 +159,5 @@ def test_the_benchmark_of_drop_ins_compares_equal_lists() -> None:
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "ase.NeighborList" in done.stdout
+    done = subprocess.run([*command, "--queries", "1", "3"], capture_output=True, text=True)
+    assert done.returncode == 0 and "3 queries of KDTree.query, k=8" in done.stdout, done.stderr

@@ -142,6 +142,25 @@ def test_pairs_and_counts_are_those_of_scipy(rng, n, name, box):
 
 
 @pytest.mark.parametrize("name, box", [one[1:] for one in SCENES[:4]])
+def test_points_that_are_kept_serve_all_radii(rng, name, box):
+    theirs, tree = both(name, rng.random((1500, 3)), boxsize=BOXES[box])
+    few, our_few = both(name, rng.random((3, 3)), boxsize=BOXES[box])
+    for r in (0.1, 0.11, 0.2, 0.05, 0.0, 0.012, 0.4, 0.025, 0.49, 0.1, 1e-5, 3e-9):
+        alike(tree.query_ball_point(few.data, r), theirs.query_ball_point(few.data, r))
+        alike(our_few.query_ball_tree(tree, r), few.query_ball_tree(theirs, r))
+        alike(tree.count_neighbors(our_few, r), theirs.count_neighbors(few, r))
+        alike(our_few.count_neighbors(tree, [0.0, r]), few.count_neighbors(theirs, [0.0, r]))
+        for a, b, c, d in ((tree, our_few, theirs, few), (our_few, tree, few, theirs)):
+            found = a.sparse_distance_matrix(b, r, output_type="ndarray")
+            expected = np.sort(c.sparse_distance_matrix(d, r, output_type="ndarray"))
+            assert found["i"].tolist() == expected["i"].tolist()
+            assert found["j"].tolist() == expected["j"].tolist()
+            np.testing.assert_allclose(found["v"], expected["v"], rtol=1e-12)
+        alike(tree.query(few.data, 5), theirs.query(few.data, 5))
+    assert len(tree._lists) < 7
+
+
+@pytest.mark.parametrize("name, box", [one[1:] for one in SCENES[:4]])
 def test_sparse_matrices_are_those_of_scipy(rng, name, box):
     points = np.vstack([rng.random((40, 3)), np.zeros((2, 3))])
     theirs, tree = both(name, points, boxsize=BOXES[box])

@@ -325,3 +325,30 @@ def test_a_result_that_does_not_fit_is_refused(rng):
             with pytest.raises(MemoryError), hs.settings(memory_limit=8e6):
                 hs.pairs(systems, 10.0, **how)
             assert len(hs.pairs(systems, 10.0, **how)[0]) == m
+
+
+@pytest.mark.parametrize("algorithm", ["auto", "hierarchy"])
+@pytest.mark.parametrize("reach", ["radii", "supports", "types"])
+def test_sorted_pairs_of_a_reach_are_those_of_each_system(reach, algorithm, rng):
+    frames, cutoff, rules = [], None, ["sum", "max", "min"]
+    if reach == "supports":
+        cutoff, rules = 1.0, ["max", "min"]
+    elif reach == "types":
+        cutoff, rules = {(0, 0): 0.3, (1, 1): 3.0, ("*", "*"): 1.0}, [None]
+    for _ in range(3):
+        sizes = np.exp(rng.uniform(-3.0, 1.2, 40))  # from far less than the box to more than half
+        known = {"radii": sizes, "types": np.arange(40) % 3}
+        known["supports"] = np.eye(2) / sizes[:, None, None]
+        frames.append(hs.Points(rng.random((40, 2)) * 5.0, box=5.0, **{reach: known[reach]}))
+    for rule in rules:
+        for letters in ("ij", "d", "ijS"):
+            with hs.settings(algorithm=algorithm):
+                how = {"rule": rule, "quantities": letters, "sort": True}
+                got = hs.pairs(hs.Points.stack(frames), cutoff, **how)
+                each = [hs.pairs(frame, cutoff, **how) for frame in frames]
+            if letters == "d":
+                assert np.array_equal(got, np.concatenate(each))
+                continue
+            for k, column in enumerate(got):
+                own = [one[k] + 40 * s * (letters[k] != "S") for s, one in enumerate(each)]
+                assert np.array_equal(column, np.concatenate(own))

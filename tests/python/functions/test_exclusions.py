@@ -101,3 +101,24 @@ def test_inputs_stay_and_empty_ones_are_nothing():
     assert hs.count_pairs([[0.0], [1.0]], 1.0, exclude=exclude) == 0
     assert exclude.tolist() == [[1, 0], [0, 1]]
     assert hs.count_pairs([[0.0], [1.0]], 1.0, exclude=[]) == 1
+
+
+def test_bonds_of_many_points_take_what_the_bonds_take():
+    n = 2**31 - 1
+    bonds = [[0, 1], [1, n - 1]]
+    assert hs.bonded(bonds, n).tolist() == [[0, 1], [0, n - 1], [1, n - 1]]
+    for many in (2**31, 2**63, 10**400):
+        with pytest.raises(OverflowError, match=r"^n must be less than 2\*\*31, the most points"):
+            hs.bonded(bonds[:1], many)
+
+
+def test_bonded_pairs_are_those_of_powers_of_the_bonds():
+    rng = np.random.default_rng(8)
+    for within in (1, 2, 3, 4, 9):
+        for n in (0, 1, 7, 25):
+            bonds = rng.integers(0, max(n, 1), (n, 2))
+            bonded = np.eye(n, dtype=bool)
+            bonded[bonds[:, 0], bonds[:, 1]] = bonded[bonds[:, 1], bonds[:, 0]] = True
+            reached = np.linalg.matrix_power(bonded.astype(float), within) > 0.0
+            expected = np.argwhere(np.triu(reached, 1))
+            assert np.array_equal(hs.bonded(bonds, n, within=within), expected)

@@ -140,7 +140,7 @@ def test_some_points_of_systems_with_groups_and_exclusions(rng):
 
 @pytest.mark.parametrize("fields", [{}, {"radii": True}, {"batch": True}, {"groups": True}])
 def test_blocks_are_those_of_the_pairs_of_some_points(fields, rng, monkeypatch):
-    monkeypatch.setattr("halfshell._convert.rows._POINTS_OF_PART", 17)
+    monkeypatch.setattr("halfshell._functions.indices._POINTS_OF_PART", 17)
     n, known = 150, dict.fromkeys(fields)
     known |= {"radii": rng.random(n) * 0.2} if "radii" in fields else {}
     known |= {"batch": np.arange(n) // 50} if "batch" in fields else {}

@@ -392,3 +392,19 @@ def test_points_are_taken_where_coordinates_alone_are():
         hs.CellList([X, X], 1.0, domain=(0.0, 1.0))
     with pytest.raises(ValueError, match="must be given for the 2 systems of points, got 3"):
         hs.count_pairs([X, X], 1.0, box=[np.eye(2)] * 3)
+
+
+def test_radii_of_types_of_large_numbers_need_no_table_of_all():
+    types, radii = [2**31 - 2, 5, 5], {2**31 - 2: 0.5, "*": 1}
+    points = hs.Points([[0.0], [1.0], [3.0]], types=types, radii=radii)
+    assert points.radii.tolist() == [0.5, 1.0, 1.0]
+
+
+def test_a_star_is_not_the_name_of_a_type_where_it_means_any():
+    points = hs.Points([[0.0], [1.0]], types=["*", "H"])
+    assert hs.count_pairs(points, 1.0) == 1
+    assert hs.coordination(points, 1.0, by_type=True).tolist() == [[0, 1], [1, 0]]
+    with pytest.raises(ValueError, match=r"cutoff\[\('\*', 'H'\)\] has '\*', which means any type"):
+        hs.count_pairs(points, {("*", "H"): 1.0})
+    with pytest.raises(ValueError, match=r"radii have a key '\*', which means any type"):
+        points.replace(radii={"*": 1.0})

@@ -305,3 +305,18 @@ def test_an_extent_of_zero_holds_coincident_points():
     points = hs.Points(x, supports=[np.diag([1.0, 2.0])] * 5)
     assert hs.pairs(points, 0.0, quantities="P", sort=True).tolist() == [[0, 1], [3, 4]]
     assert hs.count_pairs(points, 0.0, inclusive=False) == 0
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_several_extents_are_counted_one_by_one(rule):
+    rng = np.random.default_rng(5)
+    points = hs.Points(rng.random((30, 2)), supports=tensors(rng, 30, 2, 0.2, 3.0), box=1.0)
+    extents = [0.0, 0.5, 1.0, 1.5]
+    for how in ({"queries": points}, {"indices": [3, 1, 8]}, {}):
+        if rule not in DIRECTED or "queries" in how:
+            counts = hs.count_pairs(points, extents, rule=rule, **how)
+            each = [hs.count_pairs(points, e, rule=rule, **how) for e in extents]
+            assert counts.tolist() == each and len(set(each)) > 2
+        counts = hs.coordination(points, extents, rule=rule, **how)
+        each = [hs.coordination(points, e, rule=rule, **how) for e in extents]
+        assert np.array_equal(counts, each)

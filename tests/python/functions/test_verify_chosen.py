@@ -64,3 +64,17 @@ def test_progress_ascends_over_all_searches(rng):
     points = [rng.random((100_000, 3)), rng.random((100_000, 3))]
     assert not hs.verify(points, 0.01, [], [], progress=told.append)
     assert told == sorted(told) and 0.5 < told[-1] <= 1.0
+
+
+@pytest.mark.parametrize("full", [False, True])
+@pytest.mark.parametrize("indices", [[], [3], [0, 4]])
+def test_pairs_of_other_points_are_spurious(indices, full):
+    points = np.random.default_rng(3).random((8, 2))
+    i, j, S = hs.pairs(points, 0.6, quantities="ijS")
+    if full:
+        i, j, S = np.r_[i, j], np.r_[j, i], np.r_[S, -S]
+    right = np.isin(i, indices) | (False if full else np.isin(j, indices))
+    verdict = hs.verify(points, 0.6, i, j, S, indices=indices, full=full)
+    assert len(verdict.spurious) == np.count_nonzero(~right) > 0
+    assert len(verdict.missed) == len(verdict.duplicate) == 0
+    assert hs.verify(points, 0.6, i[right], j[right], S[right], indices=indices, full=full)

@@ -126,6 +126,26 @@ def test_nearest_are_those_of_a_search_of_its_own(name):
             assert same_arrays(cells.nearest(k, **how), alone.nearest(k, **how))
 
 
+@pytest.mark.parametrize("box", [None, 1.0, [[1.0, 0.0, 0.0], [0.6, 0.7, 0.0], [0.0, 0.3, 0.8]]])
+def test_few_and_many_queries_far_apart_or_close(box, rng):
+    points = rng.random((4000, 3))
+    cells = hs.CellList(points, 0.07, box=box)
+    for n in (1, 2, 9, 30, 200, 800, 5000):
+        apart, close = rng.random((n, 3)) * 1.2 - 0.1, 0.5 + 0.02 * rng.random((n, 3))
+        mixed = np.where(np.arange(n)[:, None] % 3 > 0, apart, close)
+        for queries in (apart, close, mixed):
+            for threads in (1, 2):
+                how = {"queries": queries, "threads": threads}
+                for radius in (0.07, 0.02):
+                    expected = hs.neighbors(points, radius, box=box, **how)
+                    assert same_tables(cells.query(queries, radius, threads=threads), expected)
+                    assert cells.count_pairs(radius, **how) == expected.n_entries
+                for k in (1, 8):
+                    assert same_arrays(
+                        cells.nearest(k, **how), hs.nearest(points, k, box=box, **how)
+                    )
+
+
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_histograms_are_exact_for_any_precision(precision):
     points = np.stack(np.meshgrid(*[np.arange(6.0) * 0.1] * 3), -1).reshape(-1, 3)

@@ -326,7 +326,7 @@ def test_keys_of_the_other_kind_and_size():
     for key in (1, (1,), (1, 2, 3), (1.0, 2), (1, True), [1, 2]):
         with pytest.raises(TypeError, match=r"key must be a tuple \(tag, integer\)"):
             tagged.insert(key, [0.0])
-    with pytest.raises(OverflowError, match="tag of a key must fit int32"):
+    with pytest.raises(OverflowError, match="tag of key must fit int32"):
         tagged.insert((2**31, 0), [0.0])
     with pytest.raises(OverflowError, match="must fit int64"):
         tagged.insert((0, 2**63), [0.0])
@@ -421,3 +421,17 @@ def test_every_dimension(rng, storage):
         check_points(cells, model)
         for radius in (0.0, 0.3, 0.5, 1.0):
             check(cells, model, rng.integers(-8, 9, dim) / 8.0, radius)
+
+
+@pytest.mark.parametrize("tagged, good", [(False, 1), (True, (1, 2))])
+def test_a_key_to_skip_of_a_wrong_kind_is_called_skip(tagged, good):
+    cells = hs.DynamicCellList(2, 1.0, tagged=tagged)
+    cells.insert(good, [0.0, 0.0])
+    for bad in ("a", 1.5, [1], (1, 2, 3), (1.5, 2), True, np.array(1)):
+        with pytest.raises(TypeError, match=r"^skip must be "):
+            cells.any_within([0.0, 0.0], 1.0, skip=bad)
+        with pytest.raises(TypeError, match=r"^key must be "):
+            cells.remove(bad)
+    with pytest.raises(OverflowError, match=r"^skip must fit int64|the tag of skip must fit int32"):
+        cells.any_within([0.0, 0.0], 1.0, skip=(2**40, 2) if tagged else 2**70)
+    assert not cells.any_within([0.0, 0.0], 1.0, skip=good)

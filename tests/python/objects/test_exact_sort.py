@@ -104,7 +104,7 @@ def test_tables_without_shifts_are_ordered_alike(maker):
 
 def sort_beside(table, stop):
     """Another thread sorts before line `stop` of `shifts`: what comes, and how many lines ran."""
-    code, n_lines = type(table._origin).shifts.__code__, 0
+    code, n_lines = Origin.shifts.__code__, 0
 
     def trace(frame, event, argument):
         nonlocal n_lines
@@ -176,6 +176,15 @@ def test_rows_are_sorted_a_few_at_a_time(monkeypatch):
             assert same_arrays(*pairs)
         assert_in_exact_order(parts[5:9], points, None, first=5)
         assert hs.neighbors(points[:0], 0.2, quantities="jd").sort().n_entries == 0
+
+
+def test_arguments_may_change_before_a_table_is_sorted():
+    points, box = SCENE.copy(), list(BOX)
+    table = hs.neighbors(points, 0.25, box=box, quantities="jd")
+    wanted = hs.neighbors(SCENE, 0.25, box=BOX, quantities="jd").sort().indices
+    points[:] = 0.0
+    box[:] = [5.0] * len(box)
+    assert np.array_equal(table.sort().indices, wanted)
 
 
 def test_what_happens_to_the_arguments_changes_nothing():

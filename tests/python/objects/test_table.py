@@ -2,6 +2,7 @@
 """Tables of neighbours: rows, and what they turn into."""
 
 import copy
+import errno
 import io
 import itertools
 import pickle
@@ -570,3 +571,20 @@ def test_too_many_are_refused_before():
 def test_bad_arguments(options, kind, words):
     with pytest.raises(kind, match=words):
         TABLES[0].triplets(**options)
+
+
+@pytest.mark.parametrize("bad", [1, True, -1, 2.5, None, [b"x"], io.StringIO()])
+def test_a_file_of_a_wrong_kind_is_refused(bad):
+    table = hs.neighbors([[0.0], [1.0]], 1.5)
+    for call in (table.save, hs.NeighborTable.load):
+        with pytest.raises(TypeError, match="file must be a path or a binary file, got "):
+            call(bad)
+
+
+def test_a_file_that_cannot_be_read_is_an_error_of_the_system():
+    class Broken(io.BytesIO):
+        def read(self, size=-1):
+            raise OSError(errno.EIO, "input/output error")
+
+    with pytest.raises(OSError, match="input/output error"):
+        hs.NeighborTable.load(Broken())

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Only some of the points: their rows, found as those of queries, and the pairs they are in."""
+"""Searches with the argument `indices`: the rows of some points, found as those of queries, and the
+pairs that these points are in."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.arrays import entries_of
+from halfshell._convert.arrays import entries_of, rows_of, starts_of
 from halfshell._convert.call import Call, Known, part_of
 from halfshell._convert.foreign import is_a
 from halfshell._convert.options import check_letters
@@ -37,7 +38,7 @@ class Rows(NamedTuple):
     entries: npt.NDArray[np.int64]  # which of those that a search for these as queries finds
 
 
-def rows_of(call: Call, quantities: str, index_bytes: int) -> Rows:
+def rows_of_some(call: Call, quantities: str, index_bytes: int) -> Rows:
     """The rows of `call.indices`, each ascending by (j, S)."""
     check_letters(quantities, "jdDSk")
     numbers = call.indices
@@ -52,7 +53,7 @@ def rows_of(call: Call, quantities: str, index_bytes: int) -> Rows:
         call.shells,
     )  # fmt: skip
     j = columns[letters.index("j")]
-    row = np.repeat(np.arange(len(numbers)), np.diff(offsets))
+    row = rows_of(offsets)
     # A point meets its images in the order of S: the middle one is itself, at S = 0.
     own = np.flatnonzero(j == numbers[row])
     first = np.searchsorted(own, offsets)
@@ -60,12 +61,9 @@ def rows_of(call: Call, quantities: str, index_bytes: int) -> Rows:
     found = np.flatnonzero(n_own % 2)
     itself = own[first[found] + n_own[found] // 2]
     entries = np.delete(np.arange(len(j)), itself)
-    fewer = np.zeros(len(offsets), np.int64)
-    fewer[1:] = np.cumsum(n_own % 2)
-    offsets = offsets - fewer
+    offsets = offsets - starts_of(n_own % 2)
     if order is not None:
-        place = np.empty_like(order)
-        place[order] = np.arange(len(order))
+        place = np.argsort(order)
         offsets, chosen = entries_of(offsets, place)
         entries, numbers = entries[chosen], numbers[place]
     kept = tuple(columns[letters.index(letter)][entries] for letter in quantities)
@@ -74,7 +72,7 @@ def rows_of(call: Call, quantities: str, index_bytes: int) -> Rows:
     return Rows(offsets, kept, numbers, entries)
 
 
-def pairs_of(
+def pairs_of_some(
     call: Call, quantities: str, sort: bool, index_bytes: int, out: Any
 ) -> Arrays:
     """Pairs with one of `call.indices`, as a half list."""
@@ -93,11 +91,12 @@ def pairs_of(
     return arrays[0] if len(arrays) == 1 else arrays
 
 
-def parts_of(call: Call, quantities: str, index_bytes: int) -> Iterator[tuple[Array, ...]]:
-    """The same, not sorted, of some of these points at a time."""
+def blocks_of_some(call: Call, quantities: str, index_bytes: int) -> Iterator[tuple[Array, ...]]:
+    """Pairs with one of `call.indices`, not sorted: those of some of these points at a time."""
     check_letters(quantities, "ijdDSPk")
     asked = named_once(call)
-    told, bar, call.progress, call.bar = call.progress, call.bar, None, None
+    whole = copy(call)
+    call.progress = call.bar = None
     if call.cells is None and not call.has_reach and call.points.batch is None:
         call.cells = call.run(_core.cells_build, 0.0, None)
     n = max(-(-len(asked) // _POINTS_OF_PART), 1)
@@ -105,10 +104,9 @@ def parts_of(call: Call, quantities: str, index_bytes: int) -> Iterator[tuple[Ar
     def each() -> Iterator[tuple[Array, ...]]:
         for k in range(n):
             some = slice(k * _POINTS_OF_PART, (k + 1) * _POINTS_OF_PART)
-            call.progress = part_of(told, k, n)
+            call.progress = part_of(whole.progress, k, n)
             yield _pairs_of_part(call, asked, some, quantities, False, index_bytes)
-        if bar is not None:
-            bar.close()
+        whole.close()
 
     return each()
 
@@ -164,8 +162,7 @@ def _pairs_of_part(
         call.shells,
     )  # fmt: skip
     found = dict(zip(letters, columns, strict=True))
-    row = np.repeat(np.arange(len(part)), np.diff(offsets))
-    found = _half_list(found, row, part, asked, len(call.points), sort)
+    found = _half_list(found, rows_of(offsets), part, asked, len(call.points), sort)
     if "P" in quantities:
         found["P"] = np.stack([found["i"], found["j"]], axis=1)
     return tuple(found[letter] for letter in quantities)

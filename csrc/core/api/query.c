@@ -1,0 +1,658 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+#include "query.h"
+#include "../base/status.h"
+#include "../exact/ellipsoid.h"
+#include "../search/choice.h"
+#include "cells.h"
+
+#include <limits.h>
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+/* query.c: counts and pointers first, then what they lead to: nothing is read before it is known
+ * to be there. Then checks, plans, finds and closes, in this order for every search. */
+
+/* Most bytes from one end of an array to the other: a little less than addresses allow, because the
+ * sum that is compared with it is rounded. */
+#define MOST_EXTENT (0.99 * (double)PTRDIFF_MAX)
+
+static hs_status
+status_of(bool sound)
+{
+    return sound ? HS_OK : HS_ERR_ARGUMENT;
+}
+
+void
+hs_clear_counters(const hs_options *options)
+{
+    if (options != NULL && options->counters != NULL) {
+        *options->counters = (hs_counters){.pairs = 0};
+    }
+}
+
+hs_status
+hs_end_early(hs_status status, const hs_options *options, hs_failure *failure)
+{
+    if (failure != NULL) {
+        *failure = HS_NO_FAILURE;
+    }
+    hs_clear_counters(options);
+    return status;
+}
+
+bool
+hs_can_return(hs_pairs **result, const hs_options *options)
+{
+    if (result != NULL) {
+        *result = NULL;
+    }
+    return hs_can_begin(result, options);
+}
+
+bool
+hs_can_begin(const void *result, const hs_options *options)
+{
+    return result != NULL && options != NULL;
+}
+
+bool
+hs_has_entries(const void *array, const hs_points *points)
+{
+    return array != NULL || (points != NULL && points->n == 0);
+}
+
+static bool
+is_dimension(int ndim)
+{
+    return ndim >= 1 && ndim <= HS_MAX_DIM;
+}
+
+static bool
+is_index_size(int bytes)
+{
+    return bytes == 4 || bytes == 8;
+}
+
+/* Whether entries are there, if any, no further apart than addresses can be. */
+static bool
+has_coordinates(const hs_points *points)
+{
+    const double rows = (double)(points->n - 1) * (double)points->row_stride;
+    const double columns = (double)(points->ndim - 1) * (double)points->column_stride;
+    return points->n == 0 || (points->data != NULL && fabs(rows) + fabs(columns) <= MOST_EXTENT);
+}
+
+hs_status
+hs_check_points(const hs_points *points, hs_failure *failure)
+{
+    if (points == NULL || !is_dimension(points->ndim) || points->n < 0 ||
+        (points->real != HS_FLOAT32 && points->real != HS_FLOAT64)) {
+        return HS_ERR_ARGUMENT;
+    }
+    if (points->n > INT32_MAX) {
+        failure->value = (double)points->n;
+        return HS_ERR_TOO_MANY;
+    }
+    return status_of(has_coordinates(points));
+}
+
+hs_status
+hs_check_box(const hs_box *box, int ndim)
+{
+    return status_of(box == NULL || (is_dimension(ndim) && box->ndim == ndim));
+}
+
+static bool
+has_all(const hs_pair_arrays *out, unsigned want)
+{
+    return (!(want & HS_WANT_I) || out->i != NULL) && (!(want & HS_WANT_J) || out->j != NULL) &&
+           (!(want & HS_WANT_BOTH) || out->both != NULL) &&
+           (!(want & HS_WANT_DISTANCE) || out->distance != NULL) &&
+           (!(want & HS_WANT_VECTOR) || out->vector != NULL) &&
+           (!(want & HS_WANT_SHIFT) || out->shift != NULL) &&
+           (!(want & HS_WANT_SHELL) || out->shell != NULL);
+}
+
+/* Each array that is wanted is there, if anything is to be written to it. */
+static bool
+can_hold(const hs_pair_arrays *out, unsigned want)
+{
+    return is_index_size(out->index_bytes) && out->capacity >= 0 &&
+           (out->capacity == 0 || has_all(out, want));
+}
+
+hs_status
+hs_check_resources(const hs_options *options)
+{
+    return status_of(options->threads > INT_MIN && options->memory_limit >= 0.0);
+}
+
+/* These options, of which `known` are bits that may be wanted. */
+static hs_status
+check_options(const hs_options *options, unsigned known)
+{
+    const unsigned        want = options->want;
+    const hs_pair_arrays *out = options->out;
+    if (hs_check_resources(options) != HS_OK) {
+        return HS_ERR_ARGUMENT;
+    }
+    return status_of((want & ~known) == 0 && (want == 0 || is_index_size(options->index_bytes)) &&
+                     (out == NULL || can_hold(out, want)) && options->cell_size >= 0.0 &&
+                     (unsigned)options->algorithm < HS_ALGORITHM_END &&
+                     (options->precision == HS_EXACT || options->precision == HS_DOUBLE ||
+                      options->precision == HS_SINGLE));
+}
+
+hs_status
+hs_check_options(const hs_options *options)
+{
+    return check_options(options, HS_WANT_ALL);
+}
+
+/* HS_OK, or HS_ERR_EDGES unless there are some, finite, not negative and not descending. */
+static hs_status
+check_lengths(const double *lengths, int64_t n, hs_failure *failure)
+{
+    if (n < 1 || n >= HS_MOST_LENGTHS) {
+        return HS_ERR_EDGES;
+    }
+    for (int64_t k = 0; k < n; k++) {
+        if (!isfinite(lengths[k]) || lengths[k] < 0.0 || (k > 0 && lengths[k] < lengths[k - 1])) {
+            failure->row = k;
+            failure->value = lengths[k];
+            return HS_ERR_EDGES;
+        }
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_check_histogram(const hs_histogram *histogram, hs_failure *failure)
+{
+    if (histogram == NULL || histogram->edges == NULL || histogram->n_types < 1) {
+        return HS_ERR_ARGUMENT;
+    }
+    return check_lengths(histogram->edges, histogram->n_edges, failure);
+}
+
+double
+hs_least_length(const double *lengths, int64_t n)
+{
+    for (int64_t k = 0; k < n; k++) {
+        if (lengths[k] > 0.0) {
+            return lengths[k];
+        }
+    }
+    return 0.0;
+}
+
+/* Shells are those of an exact search, up to its cutoff. */
+static hs_status
+check_shells(const hs_options *options, hs_failure *failure)
+{
+    if (options->shells == NULL || options->precision != HS_EXACT) {
+        return HS_ERR_ARGUMENT;
+    }
+    const hs_status status = check_lengths(options->shells, options->n_shells, failure);
+    return status == HS_OK ? status_of(options->shells[options->n_shells - 1] == options->cutoff)
+                           : status;
+}
+
+/* Points, queries and box. */
+static hs_status
+check_sets(const hs_points *points, const hs_points *queries, const hs_box *box,
+           hs_failure *failure)
+{
+    hs_status status = hs_check_points(points, failure);
+    if (status == HS_OK) {
+        status = hs_check_box(box, points->ndim);
+    }
+    if (status == HS_OK && queries != NULL) {
+        status = hs_check_points(queries, failure);
+        failure->in_queries = status != HS_OK;
+        status = status == HS_OK ? status_of(queries->ndim == points->ndim) : status;
+    }
+    return status;
+}
+
+hs_status
+hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_box *box,
+                   const hs_options *options, hs_failure *failure)
+{
+    const hs_status status = check_sets(points, queries, box, failure);
+    return status == HS_OK ? hs_check_options(options) : status;
+}
+
+/* Several searches take as long for each point as one that has so many pairs of it, at least. */
+#define PAIRS_PER_POINT 60.0
+
+/* Whether a set has what the reach goes by. */
+static bool
+has_marks(const hs_reach *reach, const hs_points *points, const hs_set *known, bool is_needed)
+{
+    const hs_set set = hs_set_with(points, known);
+    return set.at.n == 0 || (reach->n_types > 0    ? set.types != NULL
+                             : !is_needed          ? true
+                             : reach->has_supports ? set.supports != NULL
+                                                   : set.radii != NULL);
+}
+
+/* Whether the limit is that of one of the two points: supports do not add up, and neither do radii
+ * that count several times. */
+static bool
+takes_one(hs_rule rule)
+{
+    return rule != HS_RULE_SUM && rule != HS_RULE_MEAN;
+}
+
+/* Whether radii may count so many times. */
+static bool
+may_extend(const hs_reach *reach)
+{
+    return reach->has_supports || reach->extent == 0.0 ||
+           (takes_one(reach->rule) && reach->n_types == 0 && reach->extent >= 0x1p-64 &&
+            reach->extent <= 0x1p64);
+}
+
+/* Whether the query has all that its reach needs. */
+static hs_status
+check_reach(const hs_query *query, hs_failure *failure)
+{
+    const hs_sets  *sets = &query->sets;
+    const hs_reach *reach = query->reach;
+    const bool      asks = hs_rule_needs_asking(reach->rule);
+    const bool      meets = hs_rule_needs_other(reach->rule);
+    if ((unsigned)reach->rule >= HS_RULE_END || reach->n_types < 0 || !may_extend(reach) ||
+        (reach->n_types > 0 && reach->cutoffs == NULL) ||
+        (reach->has_supports &&
+         (reach->n_types > 0 || sets->points->ndim > HS_SUPPORT_DIM || !takes_one(reach->rule))) ||
+        (!sets->is_full && hs_rule_is_directed(reach->rule) && reach->n_types == 0)) {
+        return HS_ERR_ARGUMENT;
+    }
+    if (reach->has_supports && !(reach->extent >= 0.0 && isfinite(reach->extent))) {
+        failure->value = reach->extent;
+        return HS_ERR_EXTENT;
+    }
+    return has_marks(reach, sets->points, sets->of_points, meets || sets->queries == NULL) &&
+                   (sets->queries == NULL ||
+                    has_marks(reach, sets->queries, sets->of_queries, asks))
+               ? HS_OK
+               : HS_ERR_ARGUMENT;
+}
+
+hs_query
+hs_query_among(const hs_among *among, hs_list_kind kind, const hs_options *options)
+{
+    hs_query query = {.options = options};
+    if (among == NULL || (kind == HS_HALF_LIST && among->queries != NULL)) {
+        return query;
+    }
+    const hs_set *points = among->points, *queries = among->queries;
+    if ((points != NULL && points->first != NULL) || (queries != NULL && queries->first != NULL) ||
+        among->each != NULL) {
+        query.among = among;
+    }
+    query.reach = among->reach;
+    query.selection = among->selection;
+    query.sets.of_points = points;
+    query.sets.of_queries = queries;
+    query.sets.queries = queries != NULL ? &queries->at : NULL;
+    query.sets.is_full = kind == HS_FULL_LIST || queries != NULL;
+    if (among->cells == NULL) {
+        query.sets.points = points != NULL ? &points->at : NULL;
+        query.box = among->box;
+    } else if ((points == NULL || points->at.data == NULL) && among->box == NULL) {
+        const hs_cells *cells = among->cells;
+        query.sets.points = &cells->points;
+        query.sets.built = &cells->search;
+        query.sets.trees = cells->trees;
+        query.box = hs_cells_box(cells);
+    }
+    return query;
+}
+
+/* How far pairs may be apart: the cutoff, or the further limit of a reach. */
+static hs_status
+check_cutoff(const hs_query *query, const hs_finder *finder, hs_failure *failure)
+{
+    const double cutoff = query->options->cutoff;
+    const bool   may_be_infinite = finder->is_nearest ||
+                                 (query->reach != NULL && query->reach->n_types == 0);
+    if (!(cutoff >= 0.0) || !(isfinite(cutoff) || may_be_infinite)) {
+        failure->value = cutoff;
+        return HS_ERR_CUTOFF;
+    }
+    return HS_OK;
+}
+
+/* Whether each of several systems has this of its own. */
+static bool
+have_cutoffs(const hs_query *query)
+{
+    return query->among != NULL && query->among->each != NULL &&
+           query->among->each->cutoffs != NULL;
+}
+
+/* Arguments, and what all systems share of the limit of pairs. */
+static hs_status
+check_query(const hs_query *query, const hs_finder *finder, const hs_call *call,
+            hs_failure *failure)
+{
+    const hs_sets    *sets = &query->sets;
+    const hs_options *options = query->options;
+    const bool        has_shells = query->reach == NULL && query->among == NULL;
+    hs_status         status = check_sets(sets->points, sets->queries, query->box, failure);
+    if (status == HS_OK) {
+        status = check_options(options, HS_WANT_ALL | (has_shells ? HS_WANT_SHELL : 0));
+    }
+    if (status == HS_OK && (options->want & HS_WANT_SHELL)) {
+        status = check_shells(options, failure);
+    }
+    if (status == HS_OK && query->among != NULL) {
+        status = hs_systems_check(query, failure);
+    }
+    if (status == HS_OK && query->reach != NULL) {
+        status = finder->is_nearest ? HS_ERR_ARGUMENT : check_reach(query, failure);
+    }
+    if (status != HS_OK) {
+        return status;
+    }
+    return call->kernel == NULL  ? HS_ERR_KERNEL
+           : have_cutoffs(query) ? HS_OK
+                                 : check_cutoff(query, finder, failure);
+}
+
+/* Without what the rule does not look at. */
+static hs_status
+divide(hs_query_run *run)
+{
+    const hs_sets  *sets = &run->query->sets;
+    const hs_reach *reach = run->query->reach;
+    const bool      has_queries = sets->queries != NULL;
+    hs_set          points = hs_set_with(sets->points, sets->of_points);
+    hs_set          queries = hs_set_with(sets->queries, sets->of_queries);
+    if (has_queries && !hs_rule_needs_other(reach->rule)) {
+        points.radii = points.supports = NULL;
+    } else if (!hs_rule_needs_asking(reach->rule)) {
+        queries.radii = queries.supports = NULL;
+    }
+    return hs_levels_divide(&run->call->account, &run->call->options, &points,
+                            has_queries ? &queries : NULL, reach, &run->levels, run->failure);
+}
+
+/* Whether the search itself takes numbers among all systems. */
+static bool
+is_numbered(const hs_query_run *run)
+{
+    return run->kept != NULL && run->finder->is_numbered;
+}
+
+hs_status
+hs_query_plan(hs_query_run *run)
+{
+    const hs_query *query = run->query;
+    hs_call        *call = run->call;
+    hs_status       status = HS_OK;
+    if (have_cutoffs(query)) {
+        status = check_cutoff(query, run->finder, run->failure);
+    }
+    if (query->reach == NULL || status != HS_OK) {
+        run->plan.n = 1;
+        return status;
+    }
+    const int64_t n = query->sets.points->n + (query->sets.queries ? query->sets.queries->n : 0);
+    status = hs_box_check(query->box, run->failure);
+    if (status != HS_OK) {
+        return status;
+    }
+    hs_call_gather(call, n);
+    hs_call_gather_for(call, n, PAIRS_PER_POINT * (double)n, false);
+    status = divide(run);
+    if (status == HS_OK) {
+        run->has_levels = true;
+        if (is_numbered(run)) {
+            hs_levels_renumber((int32_t)run->first_point, &run->levels);
+        }
+        status = hs_level_plan_choose(&call->account, &call->options, &run->levels, query->box,
+                                      query->options->cutoff, query->options->algorithm,
+                                      &run->plan);
+    } else if (is_numbered(run)) {
+        hs_query_name_point(run, status);
+    }
+    return status;
+}
+
+void
+hs_query_name_point(const hs_query_run *run, hs_status status)
+{
+    hs_failure *failure = run->failure;
+    if (failure->row >= 0 && status != HS_ERR_BOX_FINITE && status != HS_ERR_BOX_DEPENDENT) {
+        failure->row += failure->in_queries ? run->first_asking : run->first_point;
+    }
+}
+
+/* Which pairs count, of none that are further apart than the cutoff. On failure there is none. */
+static hs_status
+choose(const hs_query *query, double cutoff, hs_call *call, hs_failure *failure)
+{
+    hs_status status = hs_choice_open(query->selection, &query->sets, call, failure);
+    if (status == HS_OK) {
+        status = hs_choice_set_scene(&query->sets, query->box, cutoff, call, failure);
+    }
+    if (status != HS_OK) {
+        hs_choice_close(call);
+    }
+    return status;
+}
+
+/* All zeros but for the step that is to be opened. */
+static void
+begin(const hs_query *query, const hs_finder *finder, hs_call *call, hs_failure *failure,
+      hs_query_run *run)
+{
+    memset(run, 0, offsetof(hs_query_run, step));
+    run->query = query;
+    run->finder = finder;
+    run->call = call;
+    run->failure = failure;
+}
+
+hs_status
+hs_query_open(const hs_query *query, const hs_finder *finder, hs_call *call, hs_query_run *run,
+              hs_failure *failure)
+{
+    begin(query, finder, call, failure, run);
+    hs_status status = query->among == NULL ? check_query(query, finder, call, failure)
+                                            : HS_ERR_ARGUMENT;
+    if (status == HS_OK) {
+        status = hs_query_plan(run);
+    }
+    if (status == HS_OK) {
+        status =
+            choose(query, query->reach != NULL ? INFINITY : query->options->cutoff, call, failure);
+    }
+    if (status != HS_OK) {
+        hs_query_close(run);
+    }
+    return status;
+}
+
+void
+hs_query_close(hs_query_run *run)
+{
+    hs_account *account = &run->call->account;
+    hs_query_close_step(run);
+    if (run->kept == NULL) {
+        hs_choice_close(run->call);
+    }
+    if (run->has_levels) {
+        hs_level_plan_free(account, &run->plan);
+        hs_levels_free(account, &run->levels);
+        run->has_levels = false;
+    }
+}
+
+/* The one step of a query without a reach; a thread that searches several systems has begun it. */
+static hs_status
+open_plain(hs_query_run *run)
+{
+    const hs_query   *query = run->query;
+    const hs_options *options = &run->call->options;
+    hs_search        *search = &run->step.search;
+    hs_sets           sets = query->sets;
+    if (options->want & HS_WANT_SHELL) {
+        sets.is_plain = true;
+        sets.least_cutoff = hs_least_length(options->shells, options->n_shells);
+    }
+    sets.least_cutoff = hs_choice_least_length(run->call->choice, sets.least_cutoff);
+    sets.follows = run->has_scene;
+    if (run->kept == NULL) {
+        return hs_search_open(&sets, query->box, run->call, search, run->failure);
+    }
+    const hs_status status = hs_search_build(&sets, query->box, search, run->failure);
+    if (status != HS_OK) {
+        hs_search_close(search);
+    }
+    run->has_scene = status == HS_OK;
+    if (status == HS_OK && is_numbered(run)) {
+        hs_search_renumber(run->first_point, search);
+    } else if (is_numbered(run)) {
+        hs_query_name_point(run, status);
+    }
+    return status;
+}
+
+hs_status
+hs_query_open_step(hs_query_run *run, int64_t number)
+{
+    hs_search      *search = &run->step.search;
+    const hs_status status = !run->has_levels
+                                 ? open_plain(run)
+                                 : hs_level_open(&run->levels, &run->plan, number, run->query->box,
+                                                 run->query->sets.keeps_none, run->call, &run->step,
+                                                 run->failure);
+    if (status != HS_OK) {
+        return status;
+    }
+    run->search = search;
+    if (is_numbered(run)) { /* all that is found is a part of the same */
+        search->n_before = run->first_asking;
+        search->n_in_all = run->n_in_all;
+    }
+    return HS_OK;
+}
+
+void
+hs_query_close_step(hs_query_run *run)
+{
+    if (run->search != NULL && run->has_levels) {
+        hs_level_close(&run->step);
+    } else if (run->search != NULL) {
+        hs_search_close(run->search);
+    }
+    run->search = NULL;
+}
+
+hs_status
+hs_query_each_step(hs_query_run *run, hs_use_fn use, void *context)
+{
+    hs_status status = HS_OK;
+    for (int64_t s = 0; status == HS_OK && s < run->plan.n; s++) {
+        status = hs_query_open_step(run, s);
+        if (status == HS_OK) {
+            status = use(context, run);
+            hs_query_close_step(run);
+            run->failure->in_queries = run->failure->in_queries && run->query->sets.queries != NULL;
+        }
+    }
+    return status;
+}
+
+/* Fills the failure when memory is short. Where no pairs are kept, their number is not the
+ * reason. */
+static void
+tell_shortage(const hs_query_run *run, hs_failure *failure)
+{
+    const hs_query *query = run->query;
+    hs_shortage     shortage = {0.0, 0.0};
+    failure->limit_bytes = run->call->account.limit;
+    if (query->sets.keeps_none || query->reach != NULL || run->finder->is_nearest) {
+        return;
+    }
+    if (run->output != NULL) {
+        failure->expected_pairs = fmax(failure->expected_pairs, (double)run->output->n_pairs);
+    }
+    if (query->among != NULL) {
+        hs_systems_add_shortage(query, &shortage);
+    } else {
+        hs_shortage_add(&query->sets, query->box, query->options->cutoff, &shortage);
+    }
+    hs_shortage_tell(&shortage, &run->call->options, query->sets.points->ndim,
+                     run->call->account.limit, failure);
+}
+
+hs_pairs *
+hs_pairs_begin(const hs_options *options, hs_failure **failure)
+{
+    hs_pairs *pairs = hs_pairs_new();
+    if (pairs == NULL) {
+        (void)hs_end_early(HS_ERR_MEMORY, options, *failure);
+        return NULL;
+    }
+    *failure = hs_call_enter(options, *failure, &pairs->call);
+    return pairs;
+}
+
+hs_options
+hs_options_of_count(const hs_options *options)
+{
+    hs_options counting = *options;
+    counting.want = 0;
+    counting.sorted = false;
+    counting.out = NULL;
+    return counting;
+}
+
+hs_status
+hs_query_answer(const hs_query *query, const hs_finder *finder, hs_pairs **result,
+                hs_failure *failure)
+{
+    hs_query_run run;
+    hs_call      own, *call = &own;
+    hs_pairs    *pairs = result != NULL ? hs_pairs_begin(query->options, &failure) : NULL;
+    const bool   has_systems = query->among != NULL;
+    if (result == NULL) {
+        failure = hs_call_enter(query->options, failure, call);
+    } else if (pairs != NULL) {
+        call = &pairs->call;
+    } else {
+        return HS_ERR_MEMORY;
+    }
+    hs_status status;
+    if (has_systems) {
+        begin(query, finder, call, failure, &run);
+        status = check_query(query, finder, call, failure);
+    } else {
+        status = hs_query_open(query, finder, call, &run, failure);
+    }
+    if (status == HS_OK && pairs != NULL) {
+        hs_pairs_open(pairs, query->sets.points->ndim);
+        run.output = &pairs->output;
+        run.offsets = &pairs->offsets;
+    }
+    if (status == HS_OK) {
+        status = has_systems ? hs_systems_find(&run) : finder->find(finder->context, &run);
+    }
+    hs_query_close(&run);
+    if (status == HS_ERR_MEMORY) {
+        tell_shortage(&run, failure);
+    }
+    if (pairs != NULL) {
+        status = hs_pairs_conclude(&pairs->output, status, failure);
+        return hs_pairs_finish(pairs, status, pairs->output.n_pairs, result);
+    }
+    hs_call_leave(call, run.n_pairs);
+    hs_account_close(&call->account);
+    return status;
+}

@@ -1,0 +1,177 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+#ifndef HS_API_QUERY_H
+#define HS_API_QUERY_H
+
+#include "../../halfshell.h"
+#include "../base/base.h"
+#include "../collect/parallel.h"
+#include "../levels/levels.h"
+#include "../search/search.h"
+
+/*
+ * query.h: what is asked, checked once, and its way from there to what the caller gets. A query is
+ * a plan of steps, each of them one open search: one step where one cutoff holds for all pairs,
+ * several where pairs have a reach of their own, and all of these for each of several systems.
+ */
+
+/*
+ * Checks of what a program of C may get wrong about the arguments of halfshell.h, so
+ * that no memory is read or written out of bounds. The binding checks Python's arguments before.
+ * Coordinates, boxes and cutoffs are checked when the scene is made (scene.h). Any pointer may be
+ * NULL, except the options and the failure that are given to a function hs_check_*.
+ */
+
+/* Ends such a call: returns the status. *failure, unless NULL, has no details. */
+hs_status hs_end_early(hs_status status, const hs_options *options, hs_failure *failure);
+
+/* The counters, if any, of a call that ends before its search begins. */
+void hs_clear_counters(const hs_options *options);
+
+/* Whether a call that returns an object has these two, without which it cannot begin. *result,
+ * unless NULL, is NULL afterwards. */
+bool hs_can_return(hs_pairs **result, const hs_options *options);
+
+/* hs_can_return for objects of other types, once their pointer, unless NULL, has been cleared. */
+bool hs_can_begin(const void *result, const hs_options *options);
+
+/* Whether an array is there that has one entry for each of these points, if there are any. */
+bool hs_has_entries(const void *array, const hs_points *points);
+
+/* HS_OK, HS_ERR_ARGUMENT, or HS_ERR_TOO_MANY for points and systems from 2^31 on. */
+hs_status hs_check_points(const hs_points *points, hs_failure *failure);
+
+/* HS_OK or HS_ERR_ARGUMENT. The box may be NULL; ndim is that of the points. */
+hs_status hs_check_box(const hs_box *box, int ndim);
+
+/* Checks the options that every function uses: threads and the memory limit. */
+hs_status hs_check_resources(const hs_options *options);
+
+hs_status hs_check_options(const hs_options *options);
+
+/* Most lengths that distances are sorted by: twice as many are int32. */
+#define HS_MOST_LENGTHS (INT64_C(1) << 30)
+
+/* The first of ascending lengths that is above 0, or 0. */
+double hs_least_length(const double *lengths, int64_t n);
+
+/* HS_OK, HS_ERR_ARGUMENT, or HS_ERR_EDGES. */
+hs_status hs_check_histogram(const hs_histogram *histogram, hs_failure *failure);
+
+/* Points, queries, box and options; failure->in_queries tells queries from points. */
+hs_status hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_box *box,
+                             const hs_options *options, hs_failure *failure);
+
+/* What to search for, all borrowed. */
+typedef struct hs_query {
+    hs_sets             sets;
+    const hs_box       *box;
+    const hs_options   *options;
+    const hs_reach     *reach;     /* NULL: the cutoff holds for all pairs */
+    const hs_selection *selection; /* NULL: all pairs within reach count */
+    const hs_among     *among;     /* several systems, of which the above are all; NULL: one */
+} hs_query;
+
+/* Which pairs a search is for: each once, among the points alone; every neighbour of each point or
+ * query; or the first without queries and the second with them. */
+typedef enum hs_list_kind { HS_HALF_LIST, HS_FULL_LIST, HS_HALF_OR_QUERIES } hs_list_kind;
+
+/* `among` may be NULL or contradict itself: then no points are set, which is refused later. */
+hs_query hs_query_among(const hs_among *among, hs_list_kind kind, const hs_options *options);
+
+/* How many points or queries ask. */
+HS_ALWAYS_INLINE int64_t
+hs_query_asking(const hs_query *query)
+{
+    const hs_sets *sets = &query->sets;
+    return sets->queries != NULL ? sets->queries->n : sets->points != NULL ? sets->points->n : 0;
+}
+
+typedef struct hs_query_run hs_query_run;
+
+/* Makes use of a run: of all its steps, or of one that is open. */
+typedef hs_status (*hs_use_fn)(void *context, hs_query_run *run);
+
+/* What a search is for: how the pairs of one system are found, and what is done with them. */
+typedef struct hs_finder {
+    hs_use_fn find;
+    void     *context;     /* borrowed; threads share it */
+    bool      has_rows;    /* offsets come with the output */
+    bool      is_numbered; /* finds numbers among all systems: else they are added afterwards */
+    bool      is_nearest;  /* the cutoff may be infinite, and there is no reach */
+    bool      one_thread;  /* several systems are searched by the caller's thread */
+} hs_finder;
+
+/* What a thread that searches several systems keeps from one to the next; zeros at first. */
+typedef struct hs_kept {
+    hs_walker   walker;
+    hs_recorder recorder;
+    hs_backlog  backlog;
+    hs_output   found; /* pairs of one system before they are sorted */
+} hs_kept;
+
+/*
+ * A query at work, of one system; a thread that searches several has one run for all of them. It
+ * must not move while a step is open.
+ */
+struct hs_query_run {
+    hs_call         *call; /* borrowed, as are all up to what is kept */
+    const hs_query  *query;
+    const hs_finder *finder;
+    hs_failure      *failure;
+    hs_output       *output;  /* pairs go behind those that it has; NULL: only counting */
+    hs_output       *offsets; /* of rows */
+    hs_kept         *kept;    /* of a thread that searches several systems; else NULL */
+    int64_t          system, first_point, first_asking; /* its number, and what lies before it */
+    int64_t          n_in_all;   /* points or queries that ask, of all systems */
+    int64_t          n_pairs;    /* that were counted, of all of them */
+    bool             has_scene;  /* the step was open for another system before */
+    bool             has_levels; /* pairs have a reach; else the plan is of one step */
+    hs_levels        levels;
+    hs_level_plan    plan;
+    hs_search       *search; /* of the step that is open, or NULL */
+    hs_level_search  step;   /* large, and filled before it is read */
+};
+
+/*
+ * A call of a public function: checks the query, plans and finds. failure: NULL, or what was wrong.
+ * The caller has seen that the options are there, and where the result goes. *result, unless result
+ * is NULL, becomes the pairs, to be freed by hs_pairs_free; NULL on failure.
+ */
+hs_status hs_query_answer(const hs_query *query, const hs_finder *finder, hs_pairs **result,
+                          hs_failure *failure);
+
+/* Its parts. The first checks a query of one system and plans its steps, for a call that has begun;
+ * on failure the run is closed. */
+hs_status hs_query_open(const hs_query *query, const hs_finder *finder, hs_call *call,
+                        hs_query_run *run, hs_failure *failure);
+
+/* Plans the steps of a query that has been checked; to be closed in any case. */
+hs_status hs_query_plan(hs_query_run *run);
+
+/* Idempotent. */
+void hs_query_close(hs_query_run *run);
+
+/* Opens a step of the plan; closes it. */
+hs_status hs_query_open_step(hs_query_run *run, int64_t number);
+void      hs_query_close_step(hs_query_run *run);
+
+/* Uses each step in turn, as long as that gives HS_OK. */
+hs_status hs_query_each_step(hs_query_run *run, hs_use_fn use, void *context);
+
+/* Counts the row of a failure, if it is that of a point, among those of all systems. */
+void hs_query_name_point(const hs_query_run *run, hs_status status);
+
+/* Several systems (systems.c): checks what they share; finds in each of them, by the threads of the
+ * call; adds up what they would have taken. */
+hs_status hs_systems_check(const hs_query *query, hs_failure *failure);
+hs_status hs_systems_find(hs_query_run *run);
+void      hs_systems_add_shortage(const hs_query *query, hs_shortage *shortage);
+
+/* A result whose call, with these options, has been entered; *failure becomes where the failure
+ * goes. hs_pairs_finish must follow. NULL when memory is short: then the call has ended. */
+hs_pairs *hs_pairs_begin(const hs_options *options, hs_failure **failure);
+
+/* These options for a search that only counts. */
+hs_options hs_options_of_count(const hs_options *options);
+
+#endif
