@@ -9,9 +9,9 @@
 #include "../search/search.h"
 
 /*
- * query.h: what is asked, checked once, and its way from there to what the caller gets. A query is
- * a plan of steps, each of them one open search: one step where one cutoff holds for all pairs,
- * several where pairs have a reach of their own, and all of these for each of several systems.
+ * query.h: a query, checked once, and its way from there to what the caller gets. It is a plan of
+ * steps, each of them one open search: one step where one cutoff holds for all pairs, several where
+ * pairs have a reach of their own, and all of these for each of several systems.
  */
 
 /*

@@ -149,25 +149,18 @@ def listed(call: Call, quantities: str, index_bytes: int) -> Any:
     )  # fmt: skip
 
 
-@search("neighbors")
+@search("neighbors", like=pairs)
 def arrays_of_rows(
     points: Any,
     cutoff: Any,
     *,
     queries: Any = None,
-    box: Any = None,
-    periodic: Any = None,
-    rule: Any = None,
-    inclusive: bool = True,
     quantities: str = "j",
     index_dtype: npt.DTypeLike = np.int64,
-    threads: int | None = None,
+    **search: Any,
 ) -> Any:
     """Offsets and columns of `neighbors`, without a table of them."""
-    call = take(
-        points, cutoff, queries, box, periodic, rule, inclusive=inclusive, threads=threads,
-        directed=True,
-    )  # fmt: skip
+    call = take(points, cutoff, queries, directed=True, **search)
     return listed(call, quantities, as_index_bytes(index_dtype))
 
 

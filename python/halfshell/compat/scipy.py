@@ -45,7 +45,7 @@ _FIRST = np.zeros(1, np.intp)
 #: From so many points on they are sorted into cells once, and these are kept; it takes less time to
 #: search fewer anew.
 _MANY = 500
-#: A set that has more than so many times the points of another one does not ask, but is asked.
+#: A tree of more than so many times the points of another one is searched with those as queries.
 _FEWER = 8
 #: Lists of cells that a tree keeps beside the first, for radii that differ by factors.
 _MOST_LISTS = 4
