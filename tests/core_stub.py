@@ -30,7 +30,7 @@ TYPES = {
 #: What they return; others: an array or several.
 RETURNS = {
     "count_pairs": "int | _Ints", "neighbors": "tuple[_Array, ...]", "coordination": "_Ints",
-    "iter_pairs": "Any", "for_each_pair": "tuple[int, int]", "histogram": "_Array",
+    "iter_pairs": "Any", "for_each_pair": "int", "histogram": "_Array",
     "clusters": "tuple[int, _Ints, npt.NDArray[np.uint8] | None]", "explain": "dict[str, Any]",
     "cells_build": "Any", "cells_candidates": "tuple[_Ints, ...]", "verlet_update": "bool",
 } | dict.fromkeys(

@@ -137,8 +137,9 @@ hs_box_of(PyObject *object, unsigned long repeats, int ndim, hs_box *box, bool *
 
 /* ---- numbers and sequences ---------------------------------------------------------------- */
 
-bool
-hs_whole_of(PyObject *object, const char *must, double *value)
+/* An integer, or what has __index__; no bool. Infinite where float64 does not hold it. */
+static bool
+whole_of(PyObject *object, const char *must, double *value)
 {
     if (PyBool_Check(object)) {
         hs_refuse(PyExc_TypeError, must, object);
@@ -177,7 +178,7 @@ hs_real_of(PyObject *object, const char *must, double *value)
         *value = PyFloat_AsDouble(object);
         return PyErr_Occurred() ? hs_refuse_kind(must, object) : true;
     }
-    if (!hs_whole_of(object, must, value)) {
+    if (!whole_of(object, must, value)) {
         return false;
     }
     if (isinf(*value)) {
@@ -659,7 +660,7 @@ take_threads(PyObject *object, hs_options *options)
         return true;
     }
     double n;
-    if (!hs_whole_of(object, THREADS_MUST_BE, &n)) {
+    if (!whole_of(object, THREADS_MUST_BE, &n)) {
         return false;
     }
     if (!(n >= 1.0 && n <= HS_MOST_THREADS)) {
@@ -768,7 +769,6 @@ take_number(hs_py_call *call, hs_kind kind, PyObject *object)
     case HS_ARG_INTEGER: return take_integer(call, object, &call->integer);
     case HS_ARG_REAL: return number_of(object, &call->real);
     case HS_ARG_ALGORITHM: return take_algorithm(object, &options->algorithm);
-    case HS_ARG_CAPACITY: return object == Py_None || take_integer(call, object, &call->capacity);
     default: return true;
     }
 }
@@ -1128,8 +1128,7 @@ hs_py_call_begin(hs_py_call *call, PyObject *module, bool is_of_users)
     call->each = (hs_each_system){.rows = NULL};
     call->batch = (hs_batch){.is_given = false};
     call->letters = "ij";
-    call->positions = call->asked = call->out = call->room = NULL;
-    call->capacity = 0;
+    call->positions = call->asked = call->out = NULL;
     call->repeats = 0;
     call->thread = NULL;
     call->n_made = 0;
@@ -1145,7 +1144,7 @@ hs_py_call_take(hs_py_call *call, Py_ssize_t n_arguments)
     hs_options *options = &call->options;
     call->own = call->of + HS_CALL_ARGUMENTS;
     if (!hs_expect_arguments(function->name, n_arguments, n) || !take_numbers(call, n, of) ||
-        !take_views(of, call) || !hs_out_make_room(call)) {
+        !take_views(of, call)) {
         return false;
     }
     if (options->threads == 0) {
@@ -1171,7 +1170,6 @@ void
 hs_py_call_end(hs_py_call *call)
 {
     hs_batch_free(&call->batch);
-    Py_XDECREF(call->room);
     while (call->n_made > 0) {
         Py_DECREF(call->made[--call->n_made]);
     }

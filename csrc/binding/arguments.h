@@ -54,23 +54,21 @@ typedef struct hs_py_call {
     const char        *letters; /* borrowed: the quantities */
     PyObject          *out;     /* borrowed: of the caller, or NULL: new arrays */
     hs_pair_arrays     arrays;  /* those of out */
-    PyObject          *room;    /* owned: new arrays of a fixed length that `out` is, or NULL */
-    int64_t        capacity;    /* that length, or 0; negative: the number needed is returned too */
-    bool           flag;
-    int64_t        integer;
-    double         real;
-    PyObject      *progress;           /* borrowed; called with the fraction done, or NULL */
-    PyThreadState *thread;             /* saved while the GIL is released, else NULL */
-    PyObject      *made[HS_MOST_MADE]; /* owned: what views are of that was not given */
-    int            n_made;
+    bool               flag;
+    int64_t            integer;
+    double             real;
+    PyObject          *progress;           /* borrowed; called with the fraction done, or NULL */
+    PyThreadState     *thread;             /* saved while the GIL is released, else NULL */
+    PyObject          *made[HS_MOST_MADE]; /* owned: what views are of that was not given */
+    int                n_made;
 } hs_py_call;
 
 /* A call of which no argument is taken yet. */
 void hs_py_call_begin(hs_py_call *call, PyObject *module, bool is_of_users);
 
-/* Takes the arguments of its function, see interface.h, and makes room for a capacity. False with
- * an exception set, or without one where only Python can tell what to do with an argument, or what
- * is wrong with it. In either case hs_py_call_end() must follow. */
+/* Takes the arguments of its function, see interface.h. False with an exception set, or without one
+ * where only Python can tell what to do with an argument, or what is wrong with it. In either case
+ * hs_py_call_end() must follow. */
 bool hs_py_call_take(hs_py_call *call, Py_ssize_t n_arguments);
 
 /* Takes points, box and axes that repeat, and nothing else, in the same way. */
@@ -105,11 +103,8 @@ int64_t hs_length_of(PyObject *object);
  * nothing; false, without an exception unless memory was refused, for all else. */
 bool hs_numbers_of(PyObject *object, npy_intp n, double *values);
 
-/* An integer, or what has __index__; no bool. Infinite where float64 does not hold it. */
-bool hs_whole_of(PyObject *object, const char *must, double *value);
-
-/* A float, also one of NumPy's, or an integer as above; OverflowError where float64 does not hold
- * it. */
+/* A float, also one of NumPy's, or an integer, or what has __index__, but no bool. OverflowError
+ * where float64 does not hold it. */
 bool hs_real_of(PyObject *object, const char *must, double *value);
 
 /* A native float32 or float64 array of shape (n, d), 1 <= d <= 8. The view borrows from it. `name`

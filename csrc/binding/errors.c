@@ -1,114 +1,108 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* errors.c: an exception for each status, by a table of words or by a function where more is to be
- * said. Messages say what was wrong, the value, and what is allowed. */
+/* errors.c: an exception for each status, by a table of messages or by a function where more is to
+ * be said. Messages say what was wrong, the value, and what is allowed. */
 #include "errors.h"
 
 #include "system.h"
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
-/* The argument that a failure's row is of. */
-static const char *
-set_of(const hs_failure *failure)
-{
-    return failure->in_queries ? "queries" : "points";
-}
-
-/* Of a number that is wrong: "<name> <must>, got <name>[...] = <number>"; of what
- * is no number: "<name> <must>; <name>[...] <rest>". */
-typedef struct number_words {
-    const char *name; /* NULL: that of the set */
-    const char *must;
-    enum { ALONE, AT_ROW, AT_ELEMENT, OF_SYSTEM } where;
-    enum { OF_ONE, OF_QUERIES } of; /* queries have query_ before the name */
-    const char *rest;
-} number_words;
-
-/* By status. */
-static const number_words WORDS[] = {
-    [HS_ERR_CUTOFF] = {"cutoff", "must be finite and not negative", OF_SYSTEM, OF_ONE, NULL},
-    [HS_ERR_NOT_FINITE] = {NULL, "must be finite", AT_ELEMENT, OF_ONE, NULL},
-    [HS_ERR_BOX_FINITE] = {"box", "must be finite", AT_ELEMENT, OF_ONE, NULL},
-    [HS_ERR_EDGES] = {"edges", "must be finite, not negative and ascending", AT_ROW, OF_ONE, NULL},
-    [HS_ERR_WEIGHTS] = {"weights", "must be finite", AT_ROW, OF_QUERIES, NULL},
-    [HS_ERR_RADII] = {"radii", "must be finite, not negative, and of ordinary size", AT_ROW,
-                      OF_QUERIES, NULL},
-    [HS_ERR_EXTENT] = {"extent", "must be finite and not negative", ALONE, OF_ONE, NULL},
-    [HS_ERR_TYPES] = {"types", "must be from 0 on and below the number of types", AT_ROW,
-                      OF_QUERIES, NULL},
-    [HS_ERR_SUPPORTS] = {"supports", "must be finite, symmetric and positive definite", AT_ROW,
-                         OF_QUERIES, "is not, for exactly the numbers given"},
-    [HS_ERR_SUPPORT_REACH] = {"supports",
-                              "must reach at most 2**1022, and at most 2**1074 times as far in one "
-                              "direction as in another",
-                              AT_ROW, OF_QUERIES, "reaches further"},
+/* Messages by status. A name in braces becomes what the failure says, see field_of. Without a row:
+ * where failure->row is -1, if that is another one. All but these are errors of values. */
+static const struct {
+    const char *message, *without_row;
+    bool        is_overflow;
+} MESSAGES[] = {
+    [HS_ERR_CUTOFF] = {"cutoff must be finite and not negative, got {cutoff}{value}"},
+    [HS_ERR_NOT_FINITE] = {"{points} must be finite, got {points}[{row}, {column}] = {value}"},
+    [HS_ERR_BOX_FINITE] = {"box must be finite, got box[{system}{row}, {column}] = {value}"},
+    [HS_ERR_BOX_DEPENDENT] =
+        {"vector {row} of {box} is zero; make that axis not periodic",
+         "the periodic vectors of {box} must be linearly independent; these are exactly dependent"},
+    [HS_ERR_BOX_SKEWED] = {"{box} is too skewed, or its vectors differ too much in length: float64 "
+                           "does not place points along the short ones; give an equivalent, less "
+                           "skewed box, or one along the coordinate axes"},
+    [HS_ERR_TOO_MANY] = {"fewer than 2**31 points and systems and 2**62 pairs can be searched, got "
+                         "{value}",
+                         NULL, true},
+    [HS_ERR_SHIFT_RANGE] = {"{points}[{row}] lies too many box vectors away, or a point that it "
+                            "pairs with does: shifts are counted up to 2**51, and S holds 2**31; "
+                            "wrap the points first",
+                            NULL, true},
+    [HS_ERR_ROUNDING] = {"{points}[{row}] lies so far from the box, or the box is so skewed, that "
+                         "rounding errors of precision='double' pass the cutoff; wrap the points "
+                         "first, or use precision='exact'",
+                         NULL, true},
+    [HS_ERR_FAR] = {"queries[{row}, {column}] = {value} lies too far from the points and the box "
+                    "for cells that were made without it; query() and pairs_between() have no such "
+                    "limit",
+                    "points lie so far apart, or the box is so small in comparison, that one cell "
+                    "holds everything, and all points are candidates: the other methods and "
+                    "functions have no such limit"},
+    [HS_ERR_EDGES] = {"edges must be finite, not negative and ascending, got edges[{row}] = "
+                      "{value}"},
+    [HS_ERR_TYPES] = {"{query}types must be from 0 on and below the number of types, got "
+                      "{query}types[{row}] = {integer}"},
+    [HS_ERR_WEIGHTS] = {"{query}weights must be finite, got {query}weights[{row}] = {value}"},
+    [HS_ERR_RADII] = {"{query}radii must be finite, not negative, and of ordinary size, got "
+                      "{query}radii[{row}] = {value}"},
+    [HS_ERR_SUPPORTS] = {"{query}supports must be finite, symmetric and positive definite; "
+                         "{query}supports[{row}] is not, for exactly the numbers given"},
+    [HS_ERR_SUPPORT_REACH] = {"{query}supports must reach at most 2**1022, and at most 2**1074 "
+                              "times as far in one direction as in another; "
+                              "{query}supports[{row}] reaches further"},
+    [HS_ERR_EXTENT] = {"extent must be finite and not negative, got {value}"},
 };
 
-static PyObject *
-raise_words(hs_status status, const hs_failure *failure, const number_words *said)
-{
-    const long long system = failure->system, row = failure->row, column = failure->column;
-    const char     *name = said->name != NULL ? said->name : set_of(failure);
-    const char     *query = said->of == OF_QUERIES && failure->in_queries ? "query_" : "";
-    char            place[80] = "", number[32];
-    if (said->where == AT_ROW) {
-        snprintf(place, sizeof place, "%s%s[%lld]", query, name, row);
-    } else if (said->where == AT_ELEMENT && (system < 0 || said->name == NULL)) {
-        snprintf(place, sizeof place, "%s[%lld, %lld]", name, row, column);
-    } else if (said->where == AT_ELEMENT) {
-        snprintf(place, sizeof place, "%s[%lld, %lld, %lld]", name, system, row, column);
-    } else if (said->where == OF_SYSTEM && system >= 0) {
-        snprintf(place, sizeof place, "%s[%lld]", name, system);
-    }
-    if (said->rest != NULL) {
-        return PyErr_Format(PyExc_ValueError, "%s%s %s; %s %s", query, name, said->must, place,
-                            said->rest);
-    }
-    if (status == HS_ERR_TYPES) {
-        snprintf(number, sizeof number, "%lld", (long long)failure->value);
-    } else {
-        hs_format_real(failure->value, number);
-    }
-    return PyErr_Format(PyExc_ValueError, "%s%s %s, got %s%s%s", query, name, said->must, place,
-                        *place != '\0' ? " = " : "", number);
-}
-
-/* "box", or which one of many. */
+/* What stands in place of the name that is followed by a brace. */
 static const char *
-name_box(const hs_failure *failure, char *name, size_t size)
+field_of(const char *name, const hs_failure *failure, char text[64])
 {
-    if (failure->system < 0) {
-        return "box";
+    const struct {
+        const char *name, *text; /* NULL: a number */
+        long long   number;
+    } known[] = {
+        {"points}", failure->in_queries ? "queries" : "points", 0},
+        {"query}", failure->in_queries ? "query_" : "", 0},
+        {"row}", NULL, failure->row},
+        {"column}", NULL, failure->column},
+        {"cutoff}", failure->system < 0 ? "" : "cutoff[%lld] = ", failure->system},
+        {"system}", failure->system < 0 ? "" : "%lld, ", failure->system},
+        {"box}", failure->system < 0 ? "box" : "box[%lld]", failure->system},
+    };
+    for (size_t k = 0; k < sizeof known / sizeof known[0]; k++) {
+        if (strncmp(name, known[k].name, strlen(known[k].name)) == 0) {
+            snprintf(text, 64, known[k].text != NULL ? known[k].text : "%lld", known[k].number);
+            return text;
+        }
     }
-    snprintf(name, size, "box[%lld]", (long long)failure->system);
-    return name;
+    if (strncmp(name, "integer}", 8) == 0) {
+        snprintf(text, 64, "%.0f", failure->value);
+        return text;
+    }
+    return hs_format_real(failure->value, text);
 }
 
 static PyObject *
-raise_dependent(const hs_failure *failure)
+raise_message(hs_status status, const hs_failure *failure)
 {
-    char        name[32];
-    const char *box = name_box(failure, name, sizeof name);
-    return failure->row >= 0
-               ? PyErr_Format(PyExc_ValueError,
-                              "vector %lld of %s is zero; make that axis not periodic",
-                              (long long)failure->row, box)
-               : PyErr_Format(PyExc_ValueError,
-                              "the periodic vectors of %s must be linearly independent; these are "
-                              "exactly dependent",
-                              box);
-}
-
-static PyObject *
-raise_skewed(const hs_failure *failure)
-{
-    char name[32];
-    PyErr_Format(PyExc_ValueError,
-                 "%s is too skewed, or its vectors differ too much in length: float64 does not "
-                 "place points along the short ones; give an equivalent, less skewed box, or one "
-                 "along the coordinate axes",
-                 name_box(failure, name, sizeof name));
+    const char *from = failure->row < 0 && MESSAGES[status].without_row != NULL
+                           ? MESSAGES[status].without_row
+                           : MESSAGES[status].message;
+    char        text[512], field[64];
+    size_t      n = 0;
+    for (; *from != '\0' && n < sizeof text - sizeof field; from++) {
+        if (*from == '{') {
+            n += (size_t)snprintf(text + n, sizeof field, "%s", field_of(from + 1, failure, field));
+            from = strchr(from, '}');
+        } else {
+            text[n++] = *from;
+        }
+    }
+    text[n] = '\0';
+    PyErr_SetString(MESSAGES[status].is_overflow ? PyExc_OverflowError : PyExc_ValueError, text);
     return NULL;
 }
 
@@ -204,19 +198,16 @@ raise_kernel(const hs_options *options)
     return NULL;
 }
 
-/* halfshell.CapacityError, which carries the number that was needed. */
-void
-hs_raise_capacity(int64_t capacity, int64_t needed)
+/* halfshell.CapacityError, which carries the number that was needed; INT64_MAX where it is more. */
+static PyObject *
+raise_capacity(const hs_failure *failure)
 {
-    static const char *const        of_room = "capacity is %lld, but there are %lld pairs",
-                             *const of_out =
-                                 "out is too small: there are %lld pairs, each array needs room "
-                                 "for all";
-    const long long n = (long long)needed, most = (long long)capacity;
+    const long long n = failure->expected_pairs < 0x1p63 ? (long long)failure->expected_pairs
+                                                         : INT64_MAX;
     PyObject       *module = PyImport_ImportModule("halfshell._errors");
     PyObject       *type = module != NULL ? PyObject_GetAttrString(module, "CapacityError") : NULL;
-    PyObject       *message = capacity != 0 ? PyUnicode_FromFormat(of_room, most, n)
-                                            : PyUnicode_FromFormat(of_out, n);
+    PyObject       *message = PyUnicode_FromFormat(
+              "out is too small: there are %lld pairs, each array needs room for all", n);
     if (type != NULL && message != NULL) {
         PyObject *error = PyObject_CallFunction(type, "OL", message, n);
         if (error != NULL) {
@@ -227,93 +218,25 @@ hs_raise_capacity(int64_t capacity, int64_t needed)
     Py_XDECREF(module);
     Py_XDECREF(type);
     Py_XDECREF(message);
-}
-
-static PyObject *
-raise_capacity(const hs_failure *failure)
-{
-    hs_raise_capacity(0, hs_pairs_needed(failure));
     return NULL;
 }
-
-static PyObject *
-raise_too_many(const hs_failure *failure)
-{
-    char number[32];
-    return PyErr_Format(PyExc_OverflowError,
-                        "fewer than 2**31 points and systems and 2**62 pairs can be searched, got "
-                        "%s",
-                        hs_format_real(failure->value, number));
-}
-
-static PyObject *
-raise_shift(const hs_failure *failure)
-{
-    return PyErr_Format(
-        PyExc_OverflowError,
-        "%s[%lld] lies too many box vectors away, or a point that it pairs with does: "
-        "shifts are counted up to 2**51, and S holds 2**31; wrap the points first",
-        set_of(failure), (long long)failure->row);
-}
-
-static PyObject *
-raise_rounding(const hs_failure *failure)
-{
-    return PyErr_Format(PyExc_OverflowError,
-                        "%s[%lld] lies so far from the box, or the box is so skewed, that rounding "
-                        "errors of precision='double' pass the cutoff; wrap the points first, or "
-                        "use precision='exact'",
-                        set_of(failure), (long long)failure->row);
-}
-
-static PyObject *
-raise_far(const hs_failure *failure)
-{
-    char number[32];
-    return failure->row < 0
-               ? PyErr_Format(PyExc_ValueError,
-                              "points lie so far apart, or the box is so small in comparison, "
-                              "that one cell holds everything, and all points are candidates: the "
-                              "other methods and functions have no such limit")
-               : PyErr_Format(PyExc_ValueError,
-                              "queries[%lld, %lld] = %s lies too far from the points and the box "
-                              "for cells that were made without it; query() and pairs_between() "
-                              "have no such limit",
-                              (long long)failure->row, (long long)failure->column,
-                              hs_format_real(failure->value, number));
-}
-
-static PyObject *
-raise_interrupted(const hs_failure *failure)
-{
-    (void)failure;
-    if (!PyErr_Occurred()) {
-        PyErr_SetString(PyExc_SystemError, "interrupted without an exception");
-    }
-    return NULL;
-}
-
-/* By status: those of which a message says more than WORDS has. */
-static PyObject *(*const RAISE[])(const hs_failure *) = {
-    [HS_ERR_MEMORY] = raise_memory,           [HS_ERR_BOX_DEPENDENT] = raise_dependent,
-    [HS_ERR_BOX_SKEWED] = raise_skewed,       [HS_ERR_TOO_MANY] = raise_too_many,
-    [HS_ERR_SHIFT_RANGE] = raise_shift,       [HS_ERR_ROUNDING] = raise_rounding,
-    [HS_ERR_INTERRUPTED] = raise_interrupted, [HS_ERR_FAR] = raise_far,
-    [HS_ERR_CAPACITY] = raise_capacity,
-};
 
 PyObject *
 hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
 {
     const size_t number = (size_t)status;
-    if (number < sizeof WORDS / sizeof WORDS[0] && WORDS[number].must != NULL) {
-        return raise_words(status, failure, &WORDS[number]);
-    }
-    if (number < sizeof RAISE / sizeof RAISE[0] && RAISE[number] != NULL) {
-        return RAISE[number](failure);
+    if (number < sizeof MESSAGES / sizeof MESSAGES[0] && MESSAGES[number].message != NULL) {
+        return raise_message(status, failure);
     }
     switch (status) {
+    case HS_ERR_MEMORY: return raise_memory(failure);
     case HS_ERR_KERNEL: return raise_kernel(options);
+    case HS_ERR_CAPACITY: return raise_capacity(failure);
+    case HS_ERR_INTERRUPTED:
+        if (!PyErr_Occurred()) {
+            PyErr_SetString(PyExc_SystemError, "interrupted without an exception");
+        }
+        return NULL;
     /* Python's arguments are checked before the call; the core refuses what that let through. */
     case HS_ERR_ARGUMENT: PyErr_SetString(PyExc_ValueError, hs_status_text(status)); return NULL;
     /* The binding of dynamic lists names keys itself. */

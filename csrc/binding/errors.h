@@ -12,16 +12,6 @@
  * HS_ERR_INTERRUPTED expects that poll() has set one. options may be NULL. */
 PyObject *hs_raise(hs_status status, const hs_failure *failure, const hs_options *options);
 
-/* The pairs that a failure speaks of; INT64_MAX where they are more. */
-static inline int64_t
-hs_pairs_needed(const hs_failure *failure)
-{
-    return failure->expected_pairs < 0x1p63 ? (int64_t)failure->expected_pairs : INT64_MAX;
-}
-
-/* CapacityError, of `out`, or of a capacity where that is not 0. */
-void hs_raise_capacity(int64_t capacity, int64_t needed);
-
 /* Of HS_ERR_MEMORY: whether what was expected is within the limit, and more was taken. */
 bool hs_took_more(const hs_failure *failure);
 
@@ -36,8 +26,8 @@ const char *hs_format_bytes(double bytes, char *text, size_t size);
  * system has no more". */
 const char *hs_format_limit(double bytes, char *text, size_t size);
 
-/* Raises `type`: "<must>, got <repr>", the repr on one line and cut short, or the type
- * where there is none. */
+/* Raises `type`: "<must>, got <repr>", the repr on one line and cut short, or the type where there
+ * is none. */
 void hs_refuse(PyObject *type, const char *must, PyObject *object);
 
 /* Replaces what a conversion raised by a TypeError that says what the object must be; false. */

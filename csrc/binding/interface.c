@@ -40,8 +40,7 @@ static const hs_argument OF_SHELL_ROWS = {"quantities", HS_ARG_SHELL_ROW_QUANTIT
                          QUERIES = {"queries", HS_ARG_QUERIES, "None"},
                          PAIRING = {"pairing", HS_ARG_PAIRING, "None"},
                          ALGORITHM = {"algorithm", HS_ARG_ALGORITHM, "'auto'"},
-                         SHELLS = {"shells", HS_ARG_SHELLS, "None"},
-                         CAPACITY = {"capacity", HS_ARG_CAPACITY, "None"};
+                         SHELLS = {"shells", HS_ARG_SHELLS, "None"};
 
 /* What one takes, or a few by this name. */
 #define A(name, kind) (&(const hs_argument){name, kind, NULL})
@@ -59,7 +58,7 @@ static const hs_argument OF_SHELL_ROWS = {"quantities", HS_ARG_SHELL_ROW_QUANTIT
 const hs_function hs_functions[] = {
     {.name = "pairs",
      hs_py_pairs,
-     {&OF_SHELLS, &SORT, &INDEX, &OUT, &PAIRING, &ALGORITHM, &SHELLS, &CAPACITY},
+     {&OF_SHELLS, &SORT, &INDEX, &OUT, &PAIRING, &ALGORITHM, &SHELLS},
      {"points", "cutoff", "*", SCENE, "indices", "inclusive", "quantities", "index_dtype", "sort",
       "out", HOW}},
     {.name = "count_pairs",
@@ -68,7 +67,7 @@ const hs_function hs_functions[] = {
      {"points", "cutoff", "*", "queries", SCENE, "indices", "inclusive", HOW}},
     {.name = "pairs_between",
      hs_py_pairs_between,
-     {&OF_SHELLS, &SORTED, &INDEX, &OUT, &OTHER_POINTS, &PAIRING, &ALGORITHM, &SHELLS, &CAPACITY},
+     {&OF_SHELLS, &SORTED, &INDEX, &OUT, &OTHER_POINTS, &PAIRING, &ALGORITHM, &SHELLS},
      {"queries", "points", "cutoff", "*", SCENE, "inclusive", "quantities", "index_dtype", "out",
       HOW}},
     {.name = "neighbors",
@@ -97,8 +96,7 @@ const hs_function hs_functions[] = {
       "max_pairs", HOW}},
     {.name = "for_each_pair",
      hs_py_for_each_pair,
-     {OWN("callback"), OWN("user_data"), FLAG("thread_safe"), INTEGER("first"), &PAIRING,
-      &ALGORITHM}},
+     {OWN("callback"), OWN("user_data"), FLAG("thread_safe"), &PAIRING, &ALGORITHM}},
     {.name = "measure", hs_py_measure, {&OF_ROWS, OWN("i"), OWN("j"), OWN("S")}},
     {.name = "explain",
      hs_py_explain,

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * The table of the interface: what each function that searches takes. By it arguments.h reads the
- * arguments of a call, quick.h makes the functions, and tests/core_stub.py writes the stub.
+ * arguments of a call, functions.c makes the functions, and tests/core_stub.py writes the stub.
  *
  * The Python layer gives a set of points, and queries, as an array or as a tuple (positions, radii,
  * supports, types, weights, groups, labels, numbers of systems), of which all but the first may be
@@ -51,12 +51,10 @@ typedef enum hs_kind {
                        int, or None; excluded pairs, int64 (k, 2), or None; numbers of queries that
                        are points, int64 (q,), or None; and the least distance, a float */
     HS_ARG_ALGORITHM, /* a name */
-    HS_ARG_SHELLS,    /* several cutoffs, with the letter k */
-    HS_ARG_CAPACITY   /* an int, negative where the number of pairs is returned too, and pairs
-                         that do not fit are no error */
+    HS_ARG_SHELLS     /* several cutoffs, with the letter k */
 } hs_kind;
 
-#define HS_KINDS (HS_ARG_CAPACITY + 1)
+#define HS_KINDS (HS_ARG_SHELLS + 1)
 
 #define HS_ARG_FIRST_OPTIONAL HS_ARG_QUERIES
 

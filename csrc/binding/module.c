@@ -6,7 +6,6 @@
 
 #include "outputs.h"
 #include "errors.h"
-#include "quick.h"
 #include "system.h"
 
 static PyObject *

@@ -27,13 +27,8 @@ PyObject *hs_table_of(hs_pairs *rows, const char *letters, int ndim, int index_b
 /* Arrays that cannot be written to, as a tuple, or NULL; takes the reference. */
 PyObject *hs_read_only(PyObject *arrays);
 
-/* Where there is a capacity: arrays of that length as `out` of the call. False with an exception
- * set. */
-bool hs_out_make_room(hs_py_call *call);
-
-/* What a function returns, the GIL taken: arrays of the pairs, which are freed, or those of `out`,
- * or with a capacity all of its room, padded; NULL with an exception set for a status other than
- * HS_OK. */
+/* What a function returns, the GIL taken: arrays of the pairs, which are freed, or those of `out`;
+ * NULL with an exception set for a status other than HS_OK. */
 PyObject *hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs);
 
 /* What a function returns as a table: the rows, which are freed; as above. */

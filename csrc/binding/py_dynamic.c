@@ -128,59 +128,16 @@ keys_array(const py_dynamic *self, const hs_key *keys, int64_t n)
     return array;
 }
 
-static PyObject *
-raise_radius(const py_dynamic *self, const hs_failure *failure)
-{
-    char radius[32], most[32];
-    return PyErr_Format(PyExc_ValueError,
-                        "radius must be from 0 to max_radius, got radius = %s with max_radius = %s",
-                        hs_format_real(failure->value, radius),
-                        hs_format_real(self->max_radius, most));
-}
-
-static PyObject *
-raise_coordinate(const hs_failure *failure)
-{
-    char      name[64], value[32];
-    const int column = (int)failure->column;
-    if (failure->row >= 0) {
-        PyOS_snprintf(name, sizeof name, "positions[%lld, %d]", (long long)failure->row, column);
-    } else {
-        PyOS_snprintf(name, sizeof name, "position[%d]", column);
-    }
-    return PyErr_Format(PyExc_ValueError, "%s must be finite, got %s", name,
-                        hs_format_real(failure->value, value));
-}
-
-static PyObject *
-raise_far(const hs_failure *failure)
-{
-    char name[64] = "position";
-    if (failure->row >= 0) {
-        PyOS_snprintf(name, sizeof name, "positions[%lld]", (long long)failure->row);
-    }
-    return PyErr_Format(PyExc_OverflowError,
-                        "%s lies 2**51 boxes away, or more, if only in a direction in which a box "
-                        "that is oblique to it does not repeat: wrap it into the box first",
-                        name);
-}
-
-static PyObject *
-raise_grid(const hs_failure *failure)
-{
-    char needed[32], limit[32];
-    return PyErr_Format(
-        PyExc_ValueError,
-        "storage=\"dense\" would need %s for its cells, to reach this far; %s are allowed: "
-        "use storage=\"hash\"",
-        hs_format_bytes(failure->expected_bytes, needed, sizeof needed),
-        hs_format_bytes(failure->limit_bytes, limit, sizeof limit));
-}
-
 /* The exception for a status; `key`, or NULL, is named where one is at fault. Returns NULL. */
 static PyObject *
 raise_dynamic(const py_dynamic *self, hs_status status, const hs_failure *failure, PyObject *key)
 {
+    const bool      is_of_rows = failure != NULL && failure->row >= 0;
+    const long long row = is_of_rows ? (long long)failure->row : -1;
+    char            name[64] = "position", one[32], other[32];
+    if (is_of_rows) {
+        PyOS_snprintf(name, sizeof name, "positions[%lld]", row);
+    }
     switch (status) {
     case HS_ERR_KEY:
         if (key != NULL) {
@@ -191,12 +148,30 @@ raise_dynamic(const py_dynamic *self, hs_status status, const hs_failure *failur
         }
         return NULL;
     case HS_ERR_ARGUMENT:
-        PyErr_Format(PyExc_ValueError, "key %R has no position", key != NULL ? key : Py_None);
-        return NULL;
-    case HS_ERR_CUTOFF: return raise_radius(self, failure);
-    case HS_ERR_NOT_FINITE: return raise_coordinate(failure);
-    case HS_ERR_SHIFT_RANGE: return raise_far(failure);
-    case HS_ERR_CAPACITY: return raise_grid(failure);
+        return PyErr_Format(PyExc_ValueError, "key %R has no position",
+                            key != NULL ? key : Py_None);
+    case HS_ERR_CUTOFF:
+        return PyErr_Format(
+            PyExc_ValueError,
+            "radius must be from 0 to max_radius, got radius = %s with max_radius = %s",
+            hs_format_real(failure->value, one), hs_format_real(self->max_radius, other));
+    case HS_ERR_NOT_FINITE:
+        PyOS_snprintf(name, sizeof name, is_of_rows ? "positions[%lld, " : "position[", row);
+        return PyErr_Format(PyExc_ValueError, "%s%d] must be finite, got %s", name,
+                            (int)failure->column, hs_format_real(failure->value, one));
+    case HS_ERR_SHIFT_RANGE:
+        return PyErr_Format(
+            PyExc_OverflowError,
+            "%s lies 2**51 boxes away, or more, if only in a direction in which a box that is "
+            "oblique to it does not repeat: wrap it into the box first",
+            name);
+    case HS_ERR_CAPACITY:
+        return PyErr_Format(
+            PyExc_ValueError,
+            "storage=\"dense\" would need %s for its cells, to reach this far; %s are allowed: "
+            "use storage=\"hash\"",
+            hs_format_bytes(failure->expected_bytes, one, sizeof one),
+            hs_format_bytes(failure->limit_bytes, other, sizeof other));
     case HS_ERR_MEMORY:
         PyErr_SetString(PyExc_MemoryError, "out of memory; the list is as it was");
         return NULL;
@@ -452,36 +427,30 @@ take(hs_key key, const double *position, const int64_t *shift, void *user)
     return 0;
 }
 
-static void
-free_found(gathered *found)
-{
-    free(found->keys);
-    free(found->shifts);
-}
-
-/* Keys, or keys and shifts. */
+/* Keys, or keys and shifts; or the exception for what ended the visits, a status or that of `take`.
+ * Frees what was gathered. */
 static PyObject *
-arrays_of(const gathered *found)
+result_of(gathered *found, hs_status status, const hs_failure *failure)
 {
-    npy_intp  shape[2] = {(npy_intp)found->n, found->self->ndim};
-    PyObject *keys = keys_array(found->self, found->keys, found->n);
-    return found->with_shift && keys != NULL
-               ? Py_BuildValue("(NN)", keys, hs_array_like(found->shifts, 2, shape, NPY_INT32))
-               : keys;
-}
-
-/* The arrays, or what ended the visits: a status, or that of `take`. */
-static PyObject *
-result_of(const gathered *found, hs_status status, const hs_failure *failure)
-{
+    const py_dynamic *self = found->self;
+    npy_intp          shape[2] = {(npy_intp)found->n, self->ndim};
+    PyObject         *result = NULL;
     if (status == HS_OK && found->status == HS_ERR_SHIFT_RANGE) {
         PyErr_SetString(PyExc_OverflowError,
                         "S holds 2**31 boxes, and a point in the ball lies further from the centre "
                         "as it was given: wrap both into the box first");
-        return NULL;
+    } else if (status != HS_OK || found->status != HS_OK) {
+        (void)raise_dynamic(self, status != HS_OK ? status : found->status, failure, NULL);
+    } else {
+        result = keys_array(self, found->keys, found->n);
+        if (found->with_shift && result != NULL) {
+            result =
+                Py_BuildValue("(NN)", result, hs_array_like(found->shifts, 2, shape, NPY_INT32));
+        }
     }
-    status = status == HS_OK ? found->status : status;
-    return status == HS_OK ? arrays_of(found) : raise_dynamic(found->self, status, failure, NULL);
+    free(found->keys);
+    free(found->shifts);
+    return result;
 }
 
 /* position, radius, and whether shifts are wanted. */
@@ -502,9 +471,7 @@ ask(const py_dynamic *self, PyObject *const *arguments, bool is_near, bool with_
                          : hs_dynamic_within(self->list, position, radius, with_shift, take, &found,
                                              &failure);
     } while (is_to_be_made_again(status));
-    PyObject *result = result_of(&found, status, &failure);
-    free_found(&found);
-    return result;
+    return result_of(&found, status, &failure);
 }
 
 static PyObject *
@@ -580,7 +547,6 @@ within_many(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
     const hs_status status = ask_rows(self, PyArray_DATA(positions), rows, radius,
                                       PyArray_DATA((PyArrayObject *)offsets), &found, &failure);
     PyObject       *arrays = result_of(&found, status, &failure);
-    free_found(&found);
     if (arrays == NULL) {
         Py_DECREF(offsets);
         return NULL;
@@ -633,10 +599,8 @@ remove_key(PyObject *object, PyObject *argument)
 {
     const py_dynamic *self = (const py_dynamic *)object;
     hs_key            key;
-    if (!key_of(self, argument, "key", &key)) {
-        return NULL;
-    }
-    return PyBool_FromLong(hs_dynamic_remove(self->list, key));
+    return key_of(self, argument, "key", &key) ? PyBool_FromLong(hs_dynamic_remove(self->list, key))
+                                               : NULL;
 }
 
 static PyObject *
@@ -650,10 +614,8 @@ position_of_key(PyObject *object, PyObject *argument)
         return NULL;
     }
     const hs_status status = hs_dynamic_position(self->list, key, position);
-    if (status != HS_OK) {
-        return raise_dynamic(self, status, NULL, argument);
-    }
-    return hs_array_like(position, 1, &shape, NPY_DOUBLE);
+    return status == HS_OK ? hs_array_like(position, 1, &shape, NPY_DOUBLE)
+                           : raise_dynamic(self, status, NULL, argument);
 }
 
 static PyObject *

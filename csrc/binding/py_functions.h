@@ -25,6 +25,32 @@ PyObject *hs_py_dynamic_type(PyObject *module);
 /* Adds _C_API to the module; -1 with an exception set. */
 int hs_py_add_capi(PyObject *module);
 
+/* functions.c */
+
+/*
+ * quick(name) -> attempt, for a function of the table that users call. attempt(arguments, options)
+ * returns what that function returns for a tuple and a dict of arguments as users give them. They
+ * are converted here, without a line of Python; NotImplemented, and no exception, where an argument
+ * needs more than that, or is wrong in a way that _convert/ has words for.
+ */
+PyObject *hs_py_quick(PyObject *module, PyObject *name);
+
+/* scene(points, box, periodic) -> the same as (points, rows of the box or None, bits); or
+ * NotImplemented. */
+PyObject *hs_py_scene(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
+
+/* Adds the functions of the table; -1 with an exception set. */
+int hs_py_add_functions(PyObject *module);
+
+/* know(name, object): makes an object of the Python layer known here: the types "Box" and "Points",
+ * and "settings", a context variable with its usual value. */
+PyObject *hs_py_know(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
+
+/* table() -> the arguments of each function that users call, by its name: of each argument its
+ * name, what it is where it is left out, as Python writes it, or None, and whether it is
+ * positional. */
+PyObject *hs_py_table(PyObject *module, PyObject *ignored);
+
 /* py_searches.c */
 hs_py_search hs_py_pairs, hs_py_count_pairs, hs_py_pairs_between, hs_py_neighbors,
     hs_py_coordination, hs_py_nearest, hs_py_histogram, hs_py_clusters, hs_py_measure,

@@ -137,9 +137,9 @@ pairs_of(hs_connectivity *made, int ndim)
     return Py_BuildValue("(NN)", of_nodes, of_lists);
 }
 
-/* What a function returns from a result that is freed; NULL with an exception set
- * for a status other than HS_OK. Of rows offsets and indices, and shifts of ndim components where
- * there are any; of a connectivity (rows, (nodes, lists)), None for what is not wanted. */
+/* What a function returns from a result that is freed; NULL with an exception set for a status
+ * other than HS_OK. Of rows offsets and indices, and shifts of ndim components where there are any;
+ * of a connectivity (rows, (nodes, lists)), None for what is not wanted. */
 static PyObject *
 give_rows(hs_py_call *call, hs_status status, hs_pairs *rows, int ndim)
 {

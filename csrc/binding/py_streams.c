@@ -192,7 +192,8 @@ hs_py_iter_pairs(hs_py_call *call)
         return hs_py_call_raise(call, status);
     }
     self->call = *call;
-    self->call.n_made = 0; /* what is made, and points, are the caller's again */
+    self->call.n_made = 0; /* what is made, points and systems, are the caller's again */
+    self->call.batch = (hs_batch){.is_given = call->batch.is_given, .are_all = call->batch.are_all};
     self->call.points.at.data = NULL;
     self->call.options.kernel = NULL;
     self->call.options.poll_context = &self->call;
@@ -209,7 +210,6 @@ hs_py_iter_pairs(hs_py_call *call)
 typedef struct callable {
     PyObject *function; /* borrowed */
     int       ndim;
-    int64_t   first; /* what is added to numbers of points */
     bool      stops; /* it wants to, or has failed; guarded by the lock of the function */
     PyObject *type, *value, *traceback; /* owned; of the first failure */
 } callable;
@@ -259,15 +259,14 @@ tuple_of_shift(const int32_t *S, int ndim)
 static bool
 call_with(const callable *to_call, const hs_pair_arrays *pairs, int64_t e)
 {
-    const int     ndim = to_call->ndim;
-    const double  d = pairs->distance[e];
-    const int64_t first = to_call->first;
-    PyObject     *arguments[5] = {PyLong_FromLongLong(((const int64_t *)pairs->i)[e] + first),
-                                  PyLong_FromLongLong(((const int64_t *)pairs->j)[e] + first),
-                                  tuple_of_shift(pairs->shift + e * ndim, ndim),
-                                  hs_tuple_of_reals(pairs->vector + e * ndim, ndim),
-                                  PyFloat_FromDouble(d * d)};
-    bool          complete = true;
+    const int    ndim = to_call->ndim;
+    const double d = pairs->distance[e];
+    PyObject    *arguments[5] = {PyLong_FromLongLong(((const int64_t *)pairs->i)[e]),
+                                 PyLong_FromLongLong(((const int64_t *)pairs->j)[e]),
+                                 tuple_of_shift(pairs->shift + e * ndim, ndim),
+                                 hs_tuple_of_reals(pairs->vector + e * ndim, ndim),
+                                 PyFloat_FromDouble(d * d)};
+    bool         complete = true;
     for (int k = 0; k < 5; k++) {
         complete = complete && arguments[k] != NULL;
     }
@@ -301,11 +300,9 @@ call_python(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user
 
 /* A compiled function, which several threads may call. */
 typedef struct compiled {
-    hs_pair_fn       pair;
-    void            *user;
-    int              ndim;
-    int64_t          first; /* what is added to numbers of points */
-    volatile int64_t stops; /* it wants to; only ever set to 1 */
+    hs_pair_fn pair;
+    void      *user;
+    int        ndim;
 } compiled;
 
 /* An hs_pairs_fn. */
@@ -313,13 +310,12 @@ static int
 call_compiled(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user)
 {
     compiled      *to_call = user;
-    const int64_t *i = pairs->i, *j = pairs->j, first = to_call->first;
+    const int64_t *i = pairs->i, *j = pairs->j;
     const int      ndim = to_call->ndim;
     for (int64_t e = 0; e < n; e++) {
         const double d = pairs->distance[e];
-        if (to_call->pair(i[e] + first, j[e] + first, pairs->shift + e * ndim,
-                          pairs->vector + e * ndim, d * d, to_call->user) != 0) {
-            to_call->stops = 1;
+        if (to_call->pair(i[e], j[e], pairs->shift + e * ndim, pairs->vector + e * ndim, d * d,
+                          to_call->user) != 0) {
             *n_taken = e + 1;
             return 1;
         }
@@ -357,7 +353,6 @@ hs_py_for_each_pair(hs_py_call *call)
     visit.thread_safe = call->flag;
     to_call.function = call->own[0];
     to_call.ndim = to_run.ndim = call->points.at.ndim;
-    to_call.first = to_run.first = call->integer;
     call->thread = PyEval_SaveThread(); /* also with few points: other threads may need it */
     const hs_status status =
         hs_pairs_visit(&call->among, &call->options, &visit, &n, &call->failure);
@@ -369,6 +364,5 @@ hs_py_for_each_pair(hs_py_call *call)
     Py_XDECREF(to_call.type);
     Py_XDECREF(to_call.value);
     Py_XDECREF(to_call.traceback);
-    return status == HS_OK ? Py_BuildValue("Li", (long long)n, to_call.stops || to_run.stops != 0)
-                           : hs_py_call_raise(call, status);
+    return status == HS_OK ? PyLong_FromLongLong(n) : hs_py_call_raise(call, status);
 }

@@ -324,10 +324,8 @@ typedef struct hs_kernel {
     hs_recheck_fn         recheck;      /* slab.h */
     hs_decide_batch_fn    decide_batch; /* batch.h */
     hs_measure_fn         measure;
-    /* write.h; or all NULL: */
-    hs_write_fn         write;
-    hs_point_records_fn point_records;
-    hs_shift_records_fn shift_records;
+    hs_write_fn           write; /* write.h; or both NULL */
+    hs_candidates_fn      candidates;
 } hs_kernel;
 
 /* The fields that each kernel's file fills with its own functions of these names. */

@@ -36,8 +36,7 @@ const hs_kernel hs_kernel_avx512 = {
     .decide_batch = hs_decide_batch_avx512,
     .measure = hs_measure_avx512,
     .write = hs_write_avx512,
-    .point_records = hs_point_records_avx2,
-    .shift_records = hs_shift_records_avx2,
+    .candidates = hs_candidates_avx2,
 };
 #else
 typedef int hs_kernel_avx512_is_for_x86_64; /* a translation unit must not be empty */

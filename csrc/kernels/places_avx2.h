@@ -16,49 +16,35 @@ broadcast_place(int32_t a)
     return _mm_set1_epi32(a);
 }
 
-/* Of LANES candidates, what a record holds. */
-typedef struct record {
-    reals  q[HS_RECORD - 1];
-    places number;
-} record;
-
-HS_ALWAYS_INLINE record
-load_records(const double *from, const int32_t *at)
-{
-    const reals   a = _mm256_loadu_pd(from + (int64_t)at[0] * HS_RECORD);
-    const reals   b = _mm256_loadu_pd(from + (int64_t)at[1] * HS_RECORD);
-    const reals   c = _mm256_loadu_pd(from + (int64_t)at[2] * HS_RECORD);
-    const reals   d = _mm256_loadu_pd(from + (int64_t)at[3] * HS_RECORD);
-    const reals   ab_even = _mm256_unpacklo_pd(a, b), ab_odd = _mm256_unpackhi_pd(a, b);
-    const reals   cd_even = _mm256_unpacklo_pd(c, d), cd_odd = _mm256_unpackhi_pd(c, d);
-    const reals   number = _mm256_permute2f128_pd(ab_odd, cd_odd, 0x31);
-    const __m256i low_halves = _mm256_setr_epi32(0, 2, 4, 6, 0, 2, 4, 6);
-    const __m256i numbers = _mm256_permutevar8x32_epi32(_mm256_castpd_si256(number), low_halves);
-    return (record){{_mm256_permute2f128_pd(ab_even, cd_even, 0x20),
-                     _mm256_permute2f128_pd(ab_odd, cd_odd, 0x20),
-                     _mm256_permute2f128_pd(ab_even, cd_even, 0x31)},
-                    _mm256_castsi256_si128(numbers)};
-}
-
-/* LANES entries of an array. */
-HS_ALWAYS_INLINE places
-load_places(const int32_t *from, const int32_t *at)
-{
-    return _mm_setr_epi32(from[at[0]], from[at[1]], from[at[2]], from[at[3]]);
-}
-
-/* The first three entries of LANES records of int32. */
+/* Four entries of each of LANES hs_candidate, from the first or the fifth on. */
 HS_ALWAYS_INLINE void
-load_triples(const int32_t *from, const int32_t *at, places *entries)
+load_records(const double *from, const int32_t *at, reals *entries)
 {
-    const places a = _mm_loadu_si128((const __m128i *)(from + (int64_t)at[0] * HS_RECORD));
-    const places b = _mm_loadu_si128((const __m128i *)(from + (int64_t)at[1] * HS_RECORD));
-    const places c = _mm_loadu_si128((const __m128i *)(from + (int64_t)at[2] * HS_RECORD));
-    const places d = _mm_loadu_si128((const __m128i *)(from + (int64_t)at[3] * HS_RECORD));
-    const places ab = _mm_unpacklo_epi32(a, b), cd = _mm_unpacklo_epi32(c, d);
-    entries[0] = _mm_unpacklo_epi64(ab, cd);
-    entries[1] = _mm_unpackhi_epi64(ab, cd);
-    entries[2] = _mm_unpacklo_epi64(_mm_unpackhi_epi32(a, b), _mm_unpackhi_epi32(c, d));
+    const reals a = _mm256_loadu_pd(from + (int64_t)at[0] * 2 * HS_RECORD);
+    const reals b = _mm256_loadu_pd(from + (int64_t)at[1] * 2 * HS_RECORD);
+    const reals c = _mm256_loadu_pd(from + (int64_t)at[2] * 2 * HS_RECORD);
+    const reals d = _mm256_loadu_pd(from + (int64_t)at[3] * 2 * HS_RECORD);
+    const reals ab_even = _mm256_unpacklo_pd(a, b), ab_odd = _mm256_unpackhi_pd(a, b);
+    const reals cd_even = _mm256_unpacklo_pd(c, d), cd_odd = _mm256_unpackhi_pd(c, d);
+    entries[0] = _mm256_permute2f128_pd(ab_even, cd_even, 0x20);
+    entries[1] = _mm256_permute2f128_pd(ab_odd, cd_odd, 0x20);
+    entries[2] = _mm256_permute2f128_pd(ab_even, cd_even, 0x31);
+    entries[3] = _mm256_permute2f128_pd(ab_odd, cd_odd, 0x31);
+}
+
+/* The first, and the second, of the two places that each lane has the bits of. */
+HS_ALWAYS_INLINE places
+even_places(reals a)
+{
+    const __m256i order = _mm256_setr_epi32(0, 2, 4, 6, 0, 2, 4, 6);
+    return _mm256_castsi256_si128(_mm256_permutevar8x32_epi32(_mm256_castpd_si256(a), order));
+}
+
+HS_ALWAYS_INLINE places
+odd_places(reals a)
+{
+    const __m256i order = _mm256_setr_epi32(1, 3, 5, 7, 1, 3, 5, 7);
+    return _mm256_castsi256_si128(_mm256_permutevar8x32_epi32(_mm256_castpd_si256(a), order));
 }
 
 HS_ALWAYS_INLINE places
@@ -121,12 +107,6 @@ HS_ALWAYS_INLINE places
 negate_places(marks m, places a)
 {
     return _mm_sub_epi32(_mm_xor_si128(a, m), m);
-}
-
-HS_ALWAYS_INLINE reals
-to_reals(places a)
-{
-    return _mm256_cvtepi32_pd(a);
 }
 
 /* a b + c, and c - a b, rounded once. */

@@ -16,23 +16,18 @@ broadcast_place(int32_t a)
     return _mm256_set1_epi32(a);
 }
 
-/* Of LANES candidates, what a record holds. */
-typedef struct record {
-    reals  q[HS_RECORD - 1];
-    places number;
-} record;
-
-/* Two records of the array. */
+/* Of two of them. */
 HS_ALWAYS_INLINE reals
 load_two_records(const double *from, int32_t first, int32_t second)
 {
-    const __m256d low = _mm256_loadu_pd(from + (int64_t)first * HS_RECORD);
-    const __m256d high = _mm256_loadu_pd(from + (int64_t)second * HS_RECORD);
+    const __m256d low = _mm256_loadu_pd(from + (int64_t)first * 2 * HS_RECORD);
+    const __m256d high = _mm256_loadu_pd(from + (int64_t)second * 2 * HS_RECORD);
     return _mm512_insertf64x4(_mm512_castpd256_pd512(low), high, 1);
 }
 
-HS_ALWAYS_INLINE record
-load_records(const double *from, const int32_t *at)
+/* Four entries of each of LANES hs_candidate, from the first or the fifth on. */
+HS_ALWAYS_INLINE void
+load_records(const double *from, const int32_t *at, reals *entries)
 {
     const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
     const __m512i high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
@@ -42,42 +37,23 @@ load_records(const double *from, const int32_t *at)
     const reals   d = load_two_records(from, at[3], at[7]);
     const reals   ab_even = _mm512_unpacklo_pd(a, b), ab_odd = _mm512_unpackhi_pd(a, b);
     const reals   cd_even = _mm512_unpacklo_pd(c, d), cd_odd = _mm512_unpackhi_pd(c, d);
-    const reals   number = _mm512_permutex2var_pd(ab_odd, high, cd_odd);
-    return (record){{_mm512_permutex2var_pd(ab_even, low, cd_even),
-                     _mm512_permutex2var_pd(ab_odd, low, cd_odd),
-                     _mm512_permutex2var_pd(ab_even, high, cd_even)},
-                    _mm512_cvtepi64_epi32(_mm512_castpd_si512(number))};
+    entries[0] = _mm512_permutex2var_pd(ab_even, low, cd_even);
+    entries[1] = _mm512_permutex2var_pd(ab_odd, low, cd_odd);
+    entries[2] = _mm512_permutex2var_pd(ab_even, high, cd_even);
+    entries[3] = _mm512_permutex2var_pd(ab_odd, high, cd_odd);
 }
 
-/* LANES entries of an array. */
+/* The first, and the second, of the two places that each lane has the bits of. */
 HS_ALWAYS_INLINE places
-load_places(const int32_t *from, const int32_t *at)
+even_places(reals a)
 {
-    return _mm256_setr_epi32(from[at[0]], from[at[1]], from[at[2]], from[at[3]], from[at[4]],
-                             from[at[5]], from[at[6]], from[at[7]]);
+    return _mm512_cvtepi64_epi32(_mm512_castpd_si512(a));
 }
 
-/* Two records of int32. */
 HS_ALWAYS_INLINE places
-load_two_triples(const int32_t *from, int32_t first, int32_t second)
+odd_places(reals a)
 {
-    const __m128i low = _mm_loadu_si128((const __m128i *)(from + (int64_t)first * HS_RECORD));
-    const __m128i high = _mm_loadu_si128((const __m128i *)(from + (int64_t)second * HS_RECORD));
-    return _mm256_inserti128_si256(_mm256_castsi128_si256(low), high, 1);
-}
-
-/* The first three entries of LANES records of int32. */
-HS_ALWAYS_INLINE void
-load_triples(const int32_t *from, const int32_t *at, places *entries)
-{
-    const places a = load_two_triples(from, at[0], at[4]);
-    const places b = load_two_triples(from, at[1], at[5]);
-    const places c = load_two_triples(from, at[2], at[6]);
-    const places d = load_two_triples(from, at[3], at[7]);
-    const places ab = _mm256_unpacklo_epi32(a, b), cd = _mm256_unpacklo_epi32(c, d);
-    entries[0] = _mm256_unpacklo_epi64(ab, cd);
-    entries[1] = _mm256_unpackhi_epi64(ab, cd);
-    entries[2] = _mm256_unpacklo_epi64(_mm256_unpackhi_epi32(a, b), _mm256_unpackhi_epi32(c, d));
+    return _mm512_cvtepi64_epi32(_mm512_srli_epi64(_mm512_castpd_si512(a), 32));
 }
 
 HS_ALWAYS_INLINE places
@@ -140,12 +116,6 @@ HS_ALWAYS_INLINE places
 negate_places(marks m, places a)
 {
     return _mm256_mask_sub_epi32(a, m, _mm256_setzero_si256(), a);
-}
-
-HS_ALWAYS_INLINE reals
-to_reals(places a)
-{
-    return _mm512_cvtepi32_pd(a);
 }
 
 /* a b + c, and c - a b, rounded once. */

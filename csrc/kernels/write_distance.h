@@ -17,26 +17,15 @@
 
 /* What the writer goes by. */
 typedef struct scales {
-    double grid;        /* sums with it are multiples of 2^(E - 26) */
-    double farthest;    /* coordinates and terms up to here are split so; 2^(E + 23) */
     double least, most; /* squares that are computed well: 2^(2E - 32) to 1.5 * 2^(2E) */
     double error;       /* of a distance: 2^(E - 69) */
-    double cancelled;   /* D is sure if its largest component is at least this part of the
-                        * magnitudes that it is a sum of */
     double unit;        /* to the caller's unit: a power of two */
 } scales;
 
-/* A number as two, large a multiple of the grid and small at most half a step of it. */
+/* hs_halving: large is a multiple of 2^(E - 26). */
 typedef struct halves {
     reals large, small;
 } halves;
-
-HS_ALWAYS_INLINE halves
-halve(reals x, reals grid)
-{
-    const reals large = subtract(add(x, grid), grid);
-    return (halves){large, subtract(x, large)};
-}
 
 /* Squares of the distances of some hits, from the first on. */
 enum { TILE = 128 };
@@ -60,33 +49,16 @@ set_scales(const hs_write *write, scales *by)
     int E;
     (void)frexp(write->metric->cutoff, &E);
     const double size = ldexp(1.0, E);
-    by->grid = 1.5 * 0x1p26 * size;
-    by->farthest = 0x1p23 * size;
     by->least = hs_larger(0x1p-32 * size * size, LEAST_SQUARE);
     by->most = hs_smaller(1.5 * size * size, MOST_SQUARE);
     by->error = 0x1p-69 * size;
-    /* An error e of D is of no matter up to a quarter of the last place of |D|. */
-    by->cancelled =
-        0x1p58 * HS_DW_ADD_ERROR * (HS_FLOAT64_UNIT * HS_FLOAT64_UNIT) * HS_WRITE_MOST_DIM;
     by->unit = write->first * write->second;
     return by->unit >= DBL_MIN && by->unit <= DBL_MAX;
 }
 
-/* As bits, the lanes where D is zero. */
-HS_ALWAYS_INLINE unsigned
-zeros_of(const halves *of_D, const int ndim)
-{
-    unsigned zeros = (1u << LANES) - 1;
-    for (int k = 0; k < ndim; k++) {
-        zeros &= bits(is_equal(of_D[k].large, broadcast(0.0)));
-        zeros &= bits(is_equal(of_D[k].small, broadcast(0.0)));
-    }
-    return zeros;
-}
-
-/* |D|^2 as square + rest; NaN where the pair is not sure, zero only where D is. */
+/* |D|^2 as square + rest; NaN where the halves are. */
 HS_ALWAYS_INLINE void
-put_squares(const halves *of_D, unsigned sure, tile *to, int32_t at, const int ndim)
+put_squares(const halves *of_D, tile *to, int32_t at, const int ndim)
 {
     const reals two = broadcast(2.0);
     reals       large = broadcast(0.0), small = broadcast(0.0);
@@ -99,14 +71,6 @@ put_squares(const halves *of_D, unsigned sure, tile *to, int32_t at, const int n
     const reals square = add(large, small);
     store(to->square + at, square);
     store(to->rest + at, add(subtract(large, square), small));
-    const unsigned vanishing = bits(is_equal(square, broadcast(0.0)));
-    if (HS_UNLIKELY(vanishing != 0)) {
-        sure &= ~vanishing | zeros_of(of_D, ndim);
-    }
-    unsigned lost = ~sure & ((1u << LANES) - 1);
-    for (; HS_UNLIKELY(lost != 0); lost &= lost - 1) {
-        to->square[at + (int32_t)count((lost & (0u - lost)) - 1)] = NAN;
-    }
 }
 
 /* |D|, and as bits for which lanes it is sure. */

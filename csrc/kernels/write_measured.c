@@ -1,18 +1,39 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* write_measured.c: d and D of one pair that a writer is not sure of. */
+/* write_measured.c: coordinates in halves; d and D of one pair that a writer is not sure of. */
 #include "kernel.h"
 
-#include <string.h>
+#include <math.h>
 
-/* S and image of a candidate, over the rows. */
-static void
-find_shift(const hs_write *write, int32_t t, int64_t place, int64_t *S, int64_t *image)
+hs_halving
+hs_write_halving(double cutoff)
 {
-    for (int r = 0; r < write->metric->n_rows; r++) {
-        image[r] = write->image != NULL ? write->image[place * HS_RECORD + r] : 0;
-        S[r] = write->few != NULL ? write->few[place * HS_RECORD + r] : image[r];
-        S[r] += write->turns[r] != NULL ? write->turns[r][t] : 0;
+    int E;
+    (void)frexp(cutoff, &E);
+    return (hs_halving){
+        .grid = ldexp(1.5, E + 26), .fine = ldexp(1.5, E - 20), .farthest = ldexp(1.0, E + 23)};
+}
+
+bool
+hs_write_move(const hs_metric *metric, hs_halving by, const int32_t *shift, hs_moved *moved)
+{
+    double turns = 0.0, total = 0.0;
+    *moved = (hs_moved){.is_fine = true};
+    for (int l = 0; l < metric->n_rows; l++) {
+        turns += fabs((double)shift[l]);
+        for (int k = 0; k < metric->ndim && shift[l] != 0; k++) {
+            const double entry = metric->rows[l][k], large = (entry + by.grid) - by.grid;
+            const double small = entry - large;
+            moved->large[k] += shift[l] * large;
+            moved->small[k] += shift[l] * small;
+            moved->is_fine = moved->is_fine && (small + by.fine) - by.fine == small;
+            total += fabs(shift[l] * entry);
+        }
     }
+    if (turns <= HS_WRITE_MOST_TURNS && total <= 0.5 * by.farthest) {
+        return true;
+    }
+    moved->large[0] = NAN;
+    return false;
 }
 
 /* Whether it is listed the other way round. */
@@ -32,20 +53,22 @@ is_flipped(const hs_write *write, int64_t number, int32_t point, const int64_t *
 void
 hs_write_measured(const hs_write *write, const struct hs_hits *hits, int32_t h)
 {
-    const int64_t place = hits->label[h];
+    const int32_t place = hits->label[h], number = write->candidates[place].number;
     int32_t       t = 0;
-    const double *q = write->q + place * HS_RECORD;
-    double        p[HS_WRITE_MOST_DIM], D[HS_WRITE_MOST_DIM];
-    int64_t       S[HS_WRITE_MOST_DIM], image[HS_WRITE_MOST_DIM], number;
+    double        p[HS_WRITE_MOST_DIM], q[HS_WRITE_MOST_DIM], D[HS_WRITE_MOST_DIM];
+    int64_t       S[HS_WRITE_MOST_DIM], shift[HS_WRITE_MOST_DIM];
     while (hits->end[t] <= h) {
         t++;
     }
     for (int k = 0; k < write->ndim; k++) {
         p[k] = write->p[k][t];
+        q[k] = hs_write_coordinate(write, place, k);
     }
-    memcpy(&number, &q[HS_RECORD - 1], sizeof number);
-    find_shift(write, t, place, S, image);
-    const double found = hs_metric_measure(write->metric, p, q, write->by_S ? S : image, D);
+    for (int r = 0; r < write->metric->n_rows; r++) {
+        S[r] = hs_write_S(write, t, place, r);
+        shift[r] = hs_write_shift(write, t, place, r);
+    }
+    const double found = hs_metric_measure(write->metric, p, q, shift, D);
     const double d = found * write->first * write->second;
     const double sign = is_flipped(write, number, hits->point[t], S) ? -1.0 : 1.0;
     if (write->distance != NULL) {

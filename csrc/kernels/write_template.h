@@ -18,182 +18,144 @@
 #include "write_distance.h"
 
 #define EVERY_LANE ((1u << LANES) - 1)
-#define MOST_TURNS 62.0 /* along all rows together, of what is added in halves */
 
 /* Of one point. */
 typedef struct asking {
     places number;
+    places turns[HS_WRITE_MOST_DIM];
     reals  p[HS_WRITE_MOST_DIM];
     halves of_p[HS_WRITE_MOST_DIM];
+    bool   is_fine; /* its halves and those of all candidates */
 } asking;
 
 /* Of LANES hits of one point. */
 typedef struct lanes {
     places number; /* of the candidate */
-    places image[HS_WRITE_MOST_DIM];
     places S[HS_WRITE_MOST_DIM];
-    reals  D[HS_WRITE_MOST_DIM];    /* rounded */
-    halves of_D[HS_WRITE_MOST_DIM]; /* the high part alone is exact */
-    marks  flips;                   /* pairs that are listed the other way round */
+    halves of_q[HS_WRITE_MOST_DIM];
+    halves of_D[HS_WRITE_MOST_DIM];
+    marks  flips; /* pairs that are listed the other way round */
 } lanes;
 
-/* Image and S. */
 HS_ALWAYS_INLINE void
-find_shifts(const hs_write *write, int32_t t, const int32_t *at, lanes *of)
+set_asking(const hs_write *write, const hs_hits *hits, int32_t t, asking *point)
 {
-    places few[HS_WRITE_MOST_DIM];
-    for (int r = 0; r < HS_WRITE_MOST_DIM; r++) {
-        of->image[r] = broadcast_place(0);
+    point->number = broadcast_place(hits->point[t]);
+    for (int k = 0; k < HS_WRITE_MOST_DIM; k++) {
+        point->turns[k] = broadcast_place(0);
     }
-    if (write->image != NULL) {
-        load_triples(write->image, at, of->image);
+    for (int r = 0; r < write->metric->n_rows; r++) {
+        const int32_t *turns = write->turns[r];
+        point->turns[write->column[r]] = broadcast_place(turns != NULL ? turns[t] : 0);
     }
-    memcpy(few, of->image, sizeof few);
-    if (write->few != NULL) {
-        load_triples(write->few, at, few);
-    }
-    for (int r = 0; r < HS_WRITE_MOST_DIM; r++) {
-        const int32_t turns = write->turns[r] != NULL ? write->turns[r][t] : 0;
-        of->S[r] = add_places(few[r], broadcast_place(turns));
+}
+
+/* What there is to know of the candidates, and S. */
+HS_ALWAYS_INLINE void
+load_candidates(const hs_write *write, const asking *point, const int32_t *at, lanes *of)
+{
+    const double *from = write->candidates->large;
+    reals         large[HS_RECORD], small[HS_RECORD];
+    load_records(from, at, large);
+    load_records(from + HS_RECORD, at, small);
+    of->number = even_places(large[HS_RECORD - 1]);
+    of->S[0] = add_places(odd_places(large[HS_RECORD - 1]), point->turns[0]);
+    of->S[1] = add_places(even_places(small[HS_RECORD - 1]), point->turns[1]);
+    of->S[2] = add_places(odd_places(small[HS_RECORD - 1]), point->turns[2]);
+    for (int k = 0; k < HS_WRITE_MOST_DIM; k++) {
+        of->of_q[k] = (halves){large[k], small[k]};
     }
 }
 
 /* Pairs that are listed the other way round: the candidate has the lower number, or it is an image
  * of the point itself and the first nonzero entry of S is negative. */
 HS_ALWAYS_INLINE void
-find_flips(const hs_write *write, places point, lanes *of)
+find_flips(places point, lanes *of, const int ndim)
 {
     const places zero = broadcast_place(0);
     const marks  same = place_equal(of->number, point);
     of->flips = place_below(of->number, point);
     if (HS_UNLIKELY(mark_bits(same) != 0)) {
         marks tied = same;
-        for (int r = 0; r < write->metric->n_rows; r++) {
-            of->flips = either_mark(of->flips, both_marks(tied, place_below(of->S[r], zero)));
-            tied = both_marks(tied, place_equal(of->S[r], zero));
-        }
-    }
-}
-
-/* q - p. */
-HS_ALWAYS_INLINE void
-find_plain(const asking *point, const record *candidates, reals grid, lanes *of, const int ndim)
-{
-    for (int k = 0; k < ndim; k++) {
-        const halves q = halve(candidates->q[k], grid);
-        of->D[k] = subtract(candidates->q[k], point->p[k]);
-        of->of_D[k].large = subtract(q.large, point->of_p[k].large);
-        of->of_D[k].small = subtract(q.small, point->of_p[k].small);
-    }
-}
-
-/* As bits, the pairs that no row moves. */
-HS_ALWAYS_INLINE unsigned
-resting(const hs_write *write, const lanes *of)
-{
-    const places *shift = write->by_S ? of->S : of->image;
-    unsigned      lanes_left = EVERY_LANE;
-    for (int l = 0; l < write->metric->n_rows; l++) {
-        lanes_left &= mark_bits(place_equal(shift[l], broadcast_place(0)));
-    }
-    return lanes_left;
-}
-
-/* Adds shift * rows; returns as bits the pairs for which that is sure. A row that does not move a
- * pair adds zero, which changes nothing but the sign of a zero, and that is not written. */
-HS_ALWAYS_INLINE unsigned
-add_rows(const hs_write *write, const scales *by, const asking *point, const record *candidates,
-         lanes *of, const int ndim)
-{
-    const hs_metric *metric = write->metric;
-    const places    *shift = write->by_S ? of->S : of->image;
-    const reals      grid = broadcast(by->grid);
-    reals            total = broadcast(0.0), turns = broadcast(0.0), largest = broadcast(0.0);
-    dwords           D[HS_WRITE_MOST_DIM];
-    for (int k = 0; k < ndim; k++) {
-        const reals q = candidates->q[k], p = point->p[k];
-        D[k] = two_sum(q, negative(p));
-        total = add(total, add(magnitude(q), magnitude(p)));
-    }
-    for (int l = 0; l < metric->n_rows; l++) {
-        if (mark_bits(place_equal(shift[l], broadcast_place(0))) == EVERY_LANE) {
-            continue;
-        }
-        const reals times = to_reals(shift[l]);
-        turns = add(turns, magnitude(times));
         for (int k = 0; k < ndim; k++) {
-            if (metric->rows[l][k] != 0.0) {
-                const reals  entry = broadcast(metric->rows[l][k]);
-                const halves parts = halve(entry, grid);
-                const dwords product = two_product(times, entry);
-                D[k] = dw_add(D[k], product);
-                of->of_D[k].large = add_product(times, parts.large, of->of_D[k].large);
-                of->of_D[k].small = add_product(times, parts.small, of->of_D[k].small);
-                total = add(total, magnitude(product.hi));
+            of->flips = either_mark(of->flips, both_marks(tied, place_below(of->S[k], zero)));
+            tied = both_marks(tied, place_equal(of->S[k], zero));
+        }
+    }
+}
+
+/* D of hits of point t, by the steps of core/exact/metric.h. A row that does not move a pair adds
+ * zero, which changes nothing but the sign of a zero, and that is not written. */
+static HS_NO_INLINE void
+find_exact_vectors(const hs_write *write, int32_t t, const int32_t *at, reals *D)
+{
+    for (int k = 0; k < write->ndim; k++) {
+        double q[LANES];
+        for (int lane = 0; lane < LANES; lane++) {
+            q[lane] = hs_write_coordinate(write, at[lane], k);
+        }
+        dwords sum = two_sum(load(q), broadcast(-write->p[k][t]));
+        for (int l = 0; l < write->metric->n_rows; l++) {
+            const double entry = write->metric->rows[l][k];
+            double       times[LANES];
+            for (int lane = 0; lane < LANES && entry != 0.0; lane++) {
+                times[lane] = (double)hs_write_shift(write, t, at[lane], l);
+            }
+            if (entry != 0.0) {
+                sum = dw_add(sum, two_product(load(times), broadcast(entry)));
             }
         }
+        D[k] = sum.hi;
     }
-    for (int k = 0; k < ndim; k++) {
-        of->D[k] = D[k].hi;
-        largest = larger(largest, magnitude(D[k].hi));
+}
+
+/* D, rounded. Where halves are fine their sums have no rounding, and it is what any way gives. */
+HS_ALWAYS_INLINE void
+find_vectors(const hs_write *write, const asking *point, int32_t t, const int32_t *at,
+             const lanes *of, reals *D, const int ndim)
+{
+    if (HS_UNLIKELY(!point->is_fine && write->is_shifted)) {
+        find_exact_vectors(write, t, at, D);
+        return;
     }
-    return bits(both(both(is_at_least(broadcast(by->farthest), total),
-                          is_at_least(broadcast(MOST_TURNS), turns)),
-                     is_at_least(largest, multiply(total, broadcast(by->cancelled)))));
+    for (int k = 0; k < ndim; k++) { /* without shifts, the sum of halves is the candidate */
+        D[k] = point->is_fine ? add(of->of_D[k].large, of->of_D[k].small)
+                              : subtract(add(of->of_q[k].large, of->of_q[k].small), point->p[k]);
+    }
 }
 
 HS_ALWAYS_INLINE void
-put_distances(const hs_write *write, int64_t e, reals unit, reals distance)
+put_distances(double *to, reals unit, reals cutoff, reals largest, reals distance)
 {
     const reals d = multiply(distance, unit);
-    const truth below = is_below(d, broadcast(write->cutoff));
-    store(write->distance + e, choose(below, d, broadcast(write->largest)));
-    hs_prefetch_later(write->distance + e, LANES * sizeof(double));
+    store(to, choose(is_below(d, cutoff), d, largest));
+    hs_prefetch_later(to, LANES * sizeof(double));
 }
 
 /* Plus zero: a zero has no sign, which would tell where the search met the pair. */
 HS_ALWAYS_INLINE void
-put_vectors(const hs_write *write, int64_t e, reals unit, const lanes *of, const int ndim)
+put_vectors(const hs_write *write, int64_t e, reals unit, const lanes *of, const reals *D,
+            const int ndim, const bool is_half)
 {
     const reals zero = broadcast(0.0);
-    const reals times = write->is_half ? choose(widen_marks(of->flips), negative(unit), unit)
-                                       : unit;
+    const reals times = is_half ? choose(widen_marks(of->flips), negative(unit), unit) : unit;
     double     *to = write->vector + e * ndim;
-    const reals x = add_product(of->D[0], times, zero), y = add_product(of->D[1], times, zero);
+    const reals x = add_product(D[0], times, zero), y = add_product(D[1], times, zero);
     if (ndim == 2) {
         put_two_reals(to, x, y);
     } else {
-        put_three_reals(to, x, y, add_product(of->D[2], times, zero));
+        put_three_reals(to, x, y, add_product(D[2], times, zero));
     }
     hs_prefetch_later(to, LANES * sizeof *to * (size_t)ndim);
 }
 
-/* Whether each row is the box vector of the same number: then S need not go through memory. */
-HS_ALWAYS_INLINE bool
-are_in_order(const hs_write *write, const int ndim)
-{
-    bool in_order = write->metric->n_rows == ndim;
-    for (int r = 0; r < ndim && in_order; r++) {
-        in_order = write->column[r] == r;
-    }
-    return in_order;
-}
-
 HS_ALWAYS_INLINE void
-put_shifts(const hs_write *write, int64_t e, bool in_order, const lanes *of, const int ndim)
+put_shifts(const hs_write *write, int64_t e, const lanes *of, const int ndim, const bool is_half)
 {
     int32_t *to = write->shift + e * ndim;
-    places   rows[HS_WRITE_MOST_DIM], S[HS_WRITE_MOST_DIM];
-    for (int r = 0; r < HS_WRITE_MOST_DIM; r++) {
-        S[r] = rows[r] = write->is_half ? negate_places(of->flips, of->S[r]) : of->S[r];
-    }
-    if (!in_order) {
-        for (int l = 0; l < HS_WRITE_MOST_DIM; l++) {
-            S[l] = broadcast_place(0);
-        }
-        for (int r = 0; r < write->metric->n_rows; r++) {
-            S[write->column[r]] = rows[r];
-        }
+    places   S[HS_WRITE_MOST_DIM];
+    for (int k = 0; k < HS_WRITE_MOST_DIM; k++) {
+        S[k] = is_half ? negate_places(of->flips, of->S[k]) : of->S[k];
     }
     if (ndim == 2) {
         put_two_places(to, S[0], S[1]);
@@ -220,48 +182,57 @@ put_index(void *column, int index_bytes, int64_t e, places number)
 
 /* i and j; S. */
 HS_ALWAYS_INLINE void
-put_known(const hs_write *write, int64_t e, places point, bool in_order, const lanes *of,
-          const int ndim)
+put_known(const hs_write *write, int64_t e, places point, const lanes *of, const int ndim,
+          const bool is_half)
 {
-    const bool is_half = write->is_half;
     put_index(write->i, write->index_bytes, e, is_half ? lower_place(of->number, point) : point);
     put_index(write->j, write->index_bytes, e,
               is_half ? higher_place(of->number, point) : of->number);
     if (write->shift != NULL) {
-        put_shifts(write, e, in_order, of, ndim);
+        put_shifts(write, e, of, ndim, is_half);
     }
 }
 
 /* Nothing is measured. */
 HS_ALWAYS_INLINE bool
-write_known(const hs_write *write, const hs_hits *hits, const int ndim)
+write_known(const hs_write *write, const hs_hits *hits, const int ndim, const bool is_half)
 {
-    const bool in_order = are_in_order(write, ndim);
     for (int32_t t = 0, h = 0; t < hits->n; h = hits->end[t++]) {
-        const places point = broadcast_place(hits->point[t]);
+        asking point;
+        set_asking(write, hits, t, &point);
         for (int32_t e = h; e < hits->end[t]; e += LANES) {
             lanes of;
-            of.number = load_places(write->number, hits->label + e);
-            find_shifts(write, t, hits->label + e, &of);
-            find_flips(write, point, &of);
-            put_known(write, e, point, in_order, &of, ndim);
+            load_candidates(write, &point, hits->label + e, &of);
+            if (is_half) {
+                find_flips(point.number, &of, ndim);
+            }
+            put_known(write, e, point.number, &of, ndim, is_half);
         }
     }
     return true;
 }
 
-/* Whether it is not too far away to be halved. */
+/* Its coordinates; whether it is not too far away to be halved. */
 HS_ALWAYS_INLINE bool
-set_asking(const hs_write *write, const hs_hits *hits, int32_t t, const scales *by, asking *point,
-           const int ndim)
+halve_asking(const hs_write *write, int32_t t, hs_halving by, asking *point, const int ndim)
 {
-    bool is_near = true;
-    point->number = broadcast_place(hits->point[t]);
+    hs_moved moved = {.is_fine = true};
+    int32_t  shift[HS_WRITE_MOST_DIM];
+    bool     is_near = true;
+    for (int r = 0; write->by_S && r < write->metric->n_rows; r++) {
+        shift[r] = write->base[r] - (write->turns[r] != NULL ? write->turns[r][t] : 0);
+    }
+    if (write->by_S) {
+        is_near = hs_write_move(write->metric, by, shift, &moved);
+    }
+    point->is_fine = write->is_fine && moved.is_fine;
     for (int k = 0; k < ndim; k++) {
-        const double p = write->p[k][t];
-        is_near = is_near && fabs(p) <= by->farthest;
+        const double p = write->p[k][t], large = (p + by.grid) - by.grid, small = p - large;
+        is_near = is_near && fabs(p) <= by.farthest;
+        point->is_fine = point->is_fine && (small + by.fine) - by.fine == small;
         point->p[k] = broadcast(p);
-        point->of_p[k] = halve(point->p[k], broadcast(by->grid));
+        point->of_p[k] =
+            (halves){broadcast(large + moved.large[k]), broadcast(small + moved.small[k])};
     }
     return is_near;
 }
@@ -276,25 +247,21 @@ set_asking(const hs_write *write, const hs_hits *hits, int32_t t, const scales *
 /* Distances of the hits from the first of the tile to `end`; d and D where they are not sure. False
  * if those are many. */
 static HS_NO_INLINE bool
-finish_tile(const hs_write *write, const hs_hits *hits, const scales *by, tile *of, int32_t end)
+finish_tile(const hs_write *write, const hs_hits *hits, const scales *scale, tile *of, int32_t end)
 {
-    const reals unit = broadcast(by->unit);
-    unsigned    measured = 0;
+    const scales by = *scale; /* columns do not overlap it */
+    const reals  unit = broadcast(by.unit);
+    const reals  cutoff = broadcast(write->cutoff), largest = broadcast(write->largest);
+    double      *distance = write->distance;
+    unsigned     measured = 0;
     pad_tile(of, end);
-    for (int32_t e = of->first; e < end; e += LANES) {
-        reals       distance;
-        const reals square = load(of->square + (e - of->first));
-        const reals rest = load(of->rest + (e - of->first));
-        unsigned    left = end - e < LANES ? (1u << (end - e)) - 1 : EVERY_LANE;
-        left &= ~find_distances(by, square, rest, &distance);
-        if (HS_UNLIKELY(left != 0)) {
-            const truth zero = is_equal(square, broadcast(0.0));
-            left &= ~bits(zero);
-            distance = choose(zero, broadcast(0.0), distance);
+    for (int32_t e = of->first, at = 0; e < end; e += LANES, at += LANES) {
+        reals    d;
+        unsigned left = ~find_distances(&by, load(of->square + at), load(of->rest + at), &d);
+        if (distance != NULL) {
+            put_distances(distance + e, unit, cutoff, largest, d);
         }
-        if (write->distance != NULL) {
-            put_distances(write, e, unit, distance);
-        }
+        left &= end - e < LANES ? (1u << (end - e)) - 1 : EVERY_LANE;
         measured += count(left);
         if (HS_UNLIKELY(measured > MOST_MEASURED)) {
             return false;
@@ -308,45 +275,47 @@ finish_tile(const hs_write *write, const hs_hits *hits, const scales *by, tile *
 }
 
 HS_ALWAYS_INLINE bool
-write_pairs(const hs_write *write, const hs_hits *hits, const int ndim, const bool shifted)
+write_pairs(const hs_write *write, const hs_hits *hits, const int ndim, const bool is_half)
 {
-    const hs_write own = *write; /* columns do not overlap it */
-    const bool     in_order = are_in_order(&own, ndim);
-    int32_t        h = 0;
-    scales         by;
-    tile           squares;
+    const hs_write   own = *write; /* columns do not overlap it */
+    const hs_halving halving = hs_write_halving(own.metric->cutoff);
+    int32_t          h = 0;
+    scales           by;
+    tile             squares;
     if (!set_scales(&own, &by)) {
         return false;
     }
-    const reals grid = broadcast(by.grid), unit = broadcast(by.unit);
+    const reals unit = broadcast(by.unit);
     squares.first = 0;
     for (int32_t t = 0; t < hits->n; t++) {
         const int32_t end = hits->end[t];
         asking        point;
-        if (HS_UNLIKELY(!set_asking(&own, hits, t, &by, &point, ndim))) {
+        set_asking(&own, hits, t, &point);
+        if (HS_UNLIKELY(!halve_asking(&own, t, halving, &point, ndim))) {
             return false;
         }
         for (int32_t e = h; e < end; e += LANES) {
-            lanes        of;
-            const record candidates = load_records(own.q, hits->label + e);
-            unsigned     sure = EVERY_LANE;
+            lanes of;
             if (e + LANES - squares.first > TILE) {
                 if (HS_UNLIKELY(!finish_tile(&own, hits, &by, &squares, e))) {
                     return false;
                 }
                 squares.first = e;
             }
-            of.number = candidates.number;
-            find_shifts(&own, t, hits->label + e, &of);
-            find_flips(&own, point.number, &of);
-            find_plain(&point, &candidates, grid, &of, ndim);
-            if (shifted && resting(&own, &of) != EVERY_LANE) {
-                sure = add_rows(&own, &by, &point, &candidates, &of, ndim);
+            load_candidates(&own, &point, hits->label + e, &of);
+            if (is_half) {
+                find_flips(point.number, &of, ndim);
             }
-            put_squares(of.of_D, sure, &squares, e - squares.first, ndim);
-            put_known(&own, e, point.number, in_order, &of, ndim);
+            for (int k = 0; k < ndim; k++) {
+                of.of_D[k].large = subtract(of.of_q[k].large, point.of_p[k].large);
+                of.of_D[k].small = subtract(of.of_q[k].small, point.of_p[k].small);
+            }
+            put_squares(of.of_D, &squares, e - squares.first, ndim);
+            put_known(&own, e, point.number, &of, ndim, is_half);
             if (own.vector != NULL) {
-                put_vectors(&own, e, unit, &of, ndim);
+                reals D[HS_WRITE_MOST_DIM];
+                find_vectors(&own, &point, t, hits->label + e, &of, D, ndim);
+                put_vectors(&own, e, unit, &of, D, ndim, is_half);
             }
         }
         h = end;
@@ -354,21 +323,24 @@ write_pairs(const hs_write *write, const hs_hits *hits, const int ndim, const bo
     return finish_tile(&own, hits, &by, &squares, h);
 }
 
+HS_ALWAYS_INLINE bool
+write_dimensions(const hs_write *write, const hs_hits *hits, const bool is_half)
+{
+    if (!write->is_measured) {
+        return write->ndim == 2 ? write_known(write, hits, 2, is_half)
+                                : write_known(write, hits, 3, is_half);
+    }
+    return write->ndim == 2 ? write_pairs(write, hits, 2, is_half)
+                            : write_pairs(write, hits, 3, is_half);
+}
+
 bool
 WRITE(const hs_write *write, const hs_hits *hits)
 {
-    if (write->q == NULL) {
-        return write->ndim == 2 ? write_known(write, hits, 2) : write_known(write, hits, 3);
-    }
-    if (write->ndim == 2) {
-        return write->is_shifted ? write_pairs(write, hits, 2, true)
-                                 : write_pairs(write, hits, 2, false);
-    }
-    return write->is_shifted ? write_pairs(write, hits, 3, true)
-                             : write_pairs(write, hits, 3, false);
+    return write->is_half ? write_dimensions(write, hits, true)
+                          : write_dimensions(write, hits, false);
 }
 
 #undef EVERY_LANE
 #undef MOST_MEASURED
-#undef MOST_TURNS
 #undef WRITE

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from halfshell._cli.errors import InputError, missing_extra, one_line, printable
-from halfshell._cli.files import replacing
+from halfshell._cli.outputs import replacing
 from halfshell._cli.scene import describe_source, load_scene, unit_suffix
 from halfshell._machine import cpu_name, unknown_kernel, usable_cpus
 

@@ -32,17 +32,6 @@ keep_points(const hs_points *points, hs_cells *cells)
     return HS_OK;
 }
 
-/* The options that cells are built with: they keep all that a later search may want. */
-static hs_options
-options_of_cells(const hs_options *options)
-{
-    hs_options of_cells = *options;
-    of_cells.want = HS_WANT_SHIFT;
-    of_cells.out = NULL;
-    of_cells.domain = NULL; /* borrowed for this call */
-    return of_cells;
-}
-
 /* Whether all ends are finite, where something is fixed, and those of axes that do not matter. */
 static bool
 is_domain(const double *domain, int ndim)
@@ -60,8 +49,11 @@ static hs_status
 build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
             hs_failure *failure)
 {
-    const hs_options of_cells = options_of_cells(options);
-    hs_call         *call = &cells->call;
+    hs_options of_cells = *options;
+    hs_call   *call = &cells->call;
+    of_cells.want = HS_WANT_SHIFT; /* they keep all that a later search may want */
+    of_cells.out = NULL;
+    of_cells.domain = NULL; /* borrowed for this call */
     failure = hs_call_enter(&of_cells, failure, call);
     call->account.is_kept = true;
     hs_search_begin(call, &cells->search);
@@ -99,7 +91,7 @@ hs_cells_build(const hs_points *points, const hs_box *box, const hs_options *opt
     if (result != NULL) {
         *result = NULL;
     }
-    if (!hs_can_begin(result, options)) {
+    if (result == NULL || options == NULL) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     hs_cells *cells = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *cells);
@@ -148,8 +140,7 @@ hs_cells_box(const hs_cells *cells)
     return cells != NULL && cells->has_box ? &cells->box : NULL;
 }
 
-/* The public functions that tell which cells there are, and which of them a point is
- * in. */
+/* The public functions that tell which cells there are, and which of them a point is in. */
 
 void
 hs_cells_layout(const hs_cells *cells, hs_layout *layout)
@@ -179,14 +170,6 @@ hs_cells_layout(const hs_cells *cells, hs_layout *layout)
     hs_fpenv_leave(saved);
 }
 
-/* Index along axis k of a point with coordinate t. */
-static int64_t
-index_along(const hs_search *search, int k, double t)
-{
-    return search->is_sparse ? hs_sparse_index(&search->grid, k, t)
-                             : hs_grid_index(&search->grid, k, t);
-}
-
 /* The occupied cell with these indices, or -1. */
 static int64_t
 find_occupied(const hs_sparse *sparse, const int64_t *index, int64_t *hint)
@@ -207,7 +190,9 @@ cell_of_point(const hs_search *search, const hs_scene *scene, int64_t i, int64_t
 {
     int64_t index[HS_MAX_DIM], cell = 0;
     for (int k = 0; k < scene->ndim; k++) {
-        index[k] = index_along(search, k, hs_scene_coordinate(scene, i, k));
+        const double t = hs_scene_coordinate(scene, i, k);
+        index[k] = search->is_sparse ? hs_sparse_index(&search->grid, k, t)
+                                     : hs_grid_index(&search->grid, k, t);
         cell += index[k] * search->grid.stride[k];
     }
     return search->is_sparse ? find_occupied(&search->sparse, index, hint) : cell;
@@ -225,8 +210,8 @@ hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t *cell, hs_
     failure = hs_call_enter(&options, failure, &call);
     hs_status status = hs_check_arguments(&cells->points, points, NULL, &options, failure);
     if (status == HS_OK) {
-        status = hs_scene_wrapped_like(&call.account, &cells->search.scene, points, &options,
-                                       &scene, failure);
+        status = hs_scene_from_kept(&call.account, NULL, &cells->search.scene, points, &options,
+                                    true, &scene, failure);
     }
     if (status == HS_OK) {
         int64_t hint = 0;
@@ -374,81 +359,47 @@ add_queries(range_list *list)
     return status;
 }
 
-/* Offsets from counts, which are zero again. */
-static int64_t
-sum_counts(int64_t n, int64_t *counts, int64_t *offsets)
-{
-    int64_t sum = 0;
-    for (int64_t q = 0; q < n; q++) {
-        offsets[q] = sum;
-        sum += counts[q];
-        counts[q] = 0;
-    }
-    offsets[n] = sum;
-    return sum;
-}
-
-static hs_status
-find_ranges(hs_pairs *rows, range_list *list, hs_failure *failure)
-{
-    const int64_t n = hs_search_asking(list->search)->n;
-    int64_t      *offsets = NULL;
-    hs_status     status = hs_output_reserve(&rows->offsets, n + 1, 0.0);
-    if (status == HS_OK) {
-        rows->offsets.n_pairs = n + 1;
-        offsets = hs_output_column(&rows->offsets, HS_WANT_I);
-        memset(list->counts, 0, (size_t)n * sizeof *list->counts);
-        status = add_queries(list);
-    }
-    if (status == HS_OK) {
-        const int64_t n_ranges = sum_counts(n, list->counts, offsets);
-        failure->search_bytes = (double)n_ranges * 2.0 * sizeof(int64_t);
-        status = hs_output_reserve(&rows->output, n_ranges, 0.0);
-        rows->output.n_pairs = status == HS_OK ? n_ranges : 0;
-    }
-    if (status == HS_OK) {
-        list->offsets = offsets;
-        list->first = hs_output_column(&rows->output, HS_WANT_I);
-        list->end = hs_output_column(&rows->output, HS_WANT_J);
-        status = add_queries(list);
-    }
-    return status;
-}
-
-/* With an open search: allocates links and ranges, and fills the ranges. */
+/* With an open search: counts the ranges of each query, and then fills them. */
 static hs_status
 list_ranges(hs_search *search, hs_pairs *rows, hs_failure *failure)
 {
     hs_account   *account = &search->call->account;
     const int64_t n = hs_search_asking(search)->n, n_links = search->stencil.n_rows;
     range_list    list = {.search = search};
+    int64_t      *offsets, n_ranges = 0;
+    hs_status     status = HS_ERR_MEMORY;
     list.links = hs_alloc(account, HS_FOR_STENCIL, n_links, sizeof *list.links);
     list.hints = hs_alloc(account, HS_FOR_STENCIL, n_links, sizeof *list.hints);
     list.counts = hs_alloc(account, HS_FOR_INDICES, n, sizeof *list.counts);
-    hs_status status = HS_ERR_MEMORY;
     if (list.links != NULL && list.hints != NULL && list.counts != NULL) {
         memset(list.hints, 0, (size_t)n_links * sizeof *list.hints);
-        status = find_ranges(rows, &list, failure);
+        memset(list.counts, 0, (size_t)n * sizeof *list.counts);
+        status = hs_output_open_offsets(account, n + 1, &rows->offsets, &offsets);
+    }
+    if (status == HS_OK) {
+        status = add_queries(&list);
+    }
+    if (status == HS_OK) {
+        for (int64_t q = 0; q < n; q++) {
+            offsets[q] = n_ranges;
+            n_ranges += list.counts[q];
+            list.counts[q] = 0;
+        }
+        offsets[n] = n_ranges;
+        failure->search_bytes = (double)n_ranges * 2.0 * sizeof(int64_t);
+        status = hs_output_reserve(&rows->output, n_ranges, 0.0);
+    }
+    if (status == HS_OK) {
+        rows->output.n_pairs = n_ranges;
+        list.offsets = offsets;
+        list.first = hs_output_column(&rows->output, HS_WANT_I);
+        list.end = hs_output_column(&rows->output, HS_WANT_J);
+        status = add_queries(&list);
     }
     hs_free(account, list.counts);
     hs_free(account, list.hints);
     hs_free(account, list.links);
     return status;
-}
-
-/* Why the cells do not serve these queries at this cutoff. */
-static hs_status
-tell_unserved(const hs_cells *cells, const hs_points *queries, double cutoff, hs_failure *failure)
-{
-    *failure = HS_NO_FAILURE;
-    if (cutoff != cells->call.options.cutoff) {
-        failure->value = cutoff;
-        return HS_ERR_CUTOFF;
-    }
-    if (queries != NULL) {
-        hs_scene_name_refused(&cells->search.scene, queries, failure);
-    }
-    return HS_ERR_FAR;
 }
 
 static hs_status
@@ -473,7 +424,14 @@ find_candidates(const hs_cells *cells, const hs_points *queries, hs_pairs *rows,
         status = list_ranges(&search, rows, failure);
         hs_search_close(&search);
     } else if (status == HS_REBUILD) {
-        status = tell_unserved(cells, queries, call->options.cutoff, failure);
+        /* The cutoff is not that of the cells, or a query is too far from their points. */
+        *failure = HS_NO_FAILURE;
+        status = call->options.cutoff != cells->call.options.cutoff ? HS_ERR_CUTOFF : HS_ERR_FAR;
+        if (status == HS_ERR_CUTOFF) {
+            failure->value = call->options.cutoff;
+        } else if (queries != NULL) {
+            hs_scene_name_refused(&cells->search.scene, queries, failure);
+        }
     }
     if (status != HS_OK) {
         failure->limit_bytes = status == HS_ERR_MEMORY ? call->account.limit : 0.0;

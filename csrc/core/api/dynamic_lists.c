@@ -64,6 +64,13 @@ hs_read_position(const hs_dynamic *list, const double *position, double *own)
     }
 }
 
+/* The place of a key's entry, or HS_NO_PLACE. */
+static uint32_t
+find(const hs_dynamic *list, hs_key key)
+{
+    return hs_key_map_find(&list->map, &list->entries, key);
+}
+
 /* hs_dynamic_insert and hs_dynamic_move. */
 static hs_status
 put(hs_dynamic *list, hs_key key, const double *position, bool must_be_there, hs_failure *failure)
@@ -77,7 +84,7 @@ put(hs_dynamic *list, hs_key key, const double *position, bool must_be_there, hs
         return HS_ERR_ARGUMENT;
     }
     const hs_dynamic_call call = hs_dynamic_enter(list, true);
-    if (must_be_there && hs_key_map_find(&list->map, &list->entries, key) == HS_NO_PLACE) {
+    if (must_be_there && find(list, key) == HS_NO_PLACE) {
         status = HS_ERR_KEY;
     }
     if (status == HS_OK && position != NULL) {
@@ -128,7 +135,7 @@ check_keys(const hs_dynamic *list, const int64_t *ids, const int32_t *tags, int6
     }
     for (int64_t i = 0; must_be_there && i < n; i++) {
         const hs_key key = {ids[i], tags != NULL ? tags[i] : 0};
-        if (hs_key_map_find(&list->map, &list->entries, key) == HS_NO_PLACE) {
+        if (find(list, key) == HS_NO_PLACE) {
             failure->row = i;
             failure->column = HS_KEY_ABSENT;
             return HS_ERR_KEY;
@@ -202,13 +209,6 @@ hs_dynamic_remove_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags
     return status;
 }
 
-/* The entry of a key, for a visit. */
-static uint32_t
-find(const hs_dynamic *list, hs_key key)
-{
-    return hs_key_map_find(&list->map, &list->entries, key);
-}
-
 bool
 hs_dynamic_has(const hs_dynamic *list, hs_key key)
 {
@@ -249,25 +249,39 @@ hs_dynamic_position(const hs_dynamic *list, hs_key key, double *position)
     return status;
 }
 
-hs_status
-hs_dynamic_cell(const hs_dynamic *list, hs_key key, int64_t *cell)
+/* The cell of a position of the caller's, or where that is NULL of a key. */
+static hs_status
+cell_at(const hs_dynamic *list, const hs_key *key, const double *position, int64_t *cell,
+        hs_failure *failure)
 {
-    const double *given;
+    double        own[HS_MAX_DIM];
+    const double *given = own;
     hs_placed     placed;
-    hs_failure    ignored;
-    if (list == NULL || cell == NULL) {
+    hs_status     status = HS_OK;
+    if (list == NULL || (key == NULL && position == NULL) || cell == NULL) {
         return HS_ERR_ARGUMENT;
     }
     const hs_dynamic_call call = hs_dynamic_enter(list, false);
-    hs_status             status = look_up(list, key, &given);
+    if (key != NULL) {
+        status = look_up(list, *key, &given);
+    } else {
+        hs_read_position(list, position, own);
+    }
     if (status == HS_OK) {
-        status = hs_dynamic_place(list, given, &placed, &ignored);
+        status = hs_dynamic_place(list, given, &placed, failure);
     }
     if (status == HS_OK) {
         memcpy(cell, placed.index, (size_t)list->lattice.ndim * sizeof *cell);
     }
     hs_dynamic_leave(list, call);
     return status;
+}
+
+hs_status
+hs_dynamic_cell(const hs_dynamic *list, hs_key key, int64_t *cell)
+{
+    hs_failure ignored;
+    return cell_at(list, &key, NULL, cell, &ignored);
 }
 
 hs_status
@@ -275,62 +289,37 @@ hs_dynamic_cell_of(const hs_dynamic *list, const double *position, int64_t *cell
                    hs_failure *failure)
 {
     hs_failure ignored;
-    hs_placed  placed;
-    double     own[HS_MAX_DIM];
-    failure = hs_failure_or(failure, &ignored);
-    if (list == NULL || position == NULL || cell == NULL) {
-        return HS_ERR_ARGUMENT;
-    }
-    const hs_dynamic_call call = hs_dynamic_enter(list, false);
-    hs_read_position(list, position, own);
-    const hs_status status = hs_dynamic_place(list, own, &placed, failure);
-    if (status == HS_OK) {
-        memcpy(cell, placed.index, (size_t)list->lattice.ndim * sizeof *cell);
-    }
-    hs_dynamic_leave(list, call);
-    return status;
+    return cell_at(list, NULL, position, cell, hs_failure_or(failure, &ignored));
 }
 
-/* The public functions that ask what lies in a ball. */
-
-/* A ball for a list that has been entered; `own` holds its centre. */
+/* Visits the points that a query finds: those near the ball, or exactly within it, for which every
+ * key needs a position. any: receives whether there is one; NULL: each is visited. skip: or
+ * NULL. */
 static hs_status
-open_ball(const hs_dynamic *list, const double *position, double radius, double *own, hs_ball *ball,
-          hs_failure *failure)
-{
-    hs_read_position(list, position, own);
-    return hs_ball_init(ball, list, own, radius, failure);
-}
-
-/* For queries that are decided exactly, which every key needs a position for. */
-static hs_status
-open_exact(const hs_dynamic *list, const double *position, double radius, double *own,
-           hs_ball *ball, hs_failure *failure)
-{
-    const hs_status status = open_ball(list, position, radius, own, ball, failure);
-    return status == HS_OK && list->n_without > 0 ? HS_ERR_KEY : status;
-}
-
-/* Calls `each` for the points that a query finds: those near the ball, or exactly within it. */
-static hs_status
-visit_ball(const hs_dynamic *list, const double *position, double radius, bool exact,
-           const hs_ball_visit *each, hs_failure *failure)
+ask(const hs_dynamic *list, const double *position, double radius, const hs_ball_visit *visit,
+    const hs_key *skip, bool *any, hs_failure *failure)
 {
     hs_failure ignored;
     hs_ball    ball;
     double     own[HS_MAX_DIM];
     failure = hs_failure_or(failure, &ignored);
-    if (list == NULL || position == NULL || each->fn == NULL) {
+    if (list == NULL || position == NULL || (visit->fn == NULL && any == NULL)) {
         return HS_ERR_ARGUMENT;
     }
     const hs_dynamic_call call = hs_dynamic_enter(list, false);
-    hs_status             status = exact ? open_exact(list, position, radius, own, &ball, failure)
-                                         : open_ball(list, position, radius, own, &ball, failure);
+    hs_read_position(list, position, own);
+    hs_status status = hs_ball_init(&ball, list, own, radius, failure);
+    if (status == HS_OK && list->n_without > 0 && !visit->is_near) {
+        status = HS_ERR_KEY;
+    }
+    if (status == HS_OK && skip != NULL) {
+        ball.skip = find(list, *skip);
+        status = ball.skip != HS_NO_PLACE ? HS_OK : HS_ERR_KEY;
+    }
     if (status == HS_OK) {
-        if (exact) {
-            (void)hs_ball_within(&ball, each);
-        } else {
-            hs_ball_near(&ball, each);
+        const bool found = hs_ball_walk(&ball, visit);
+        if (any != NULL) {
+            *any = found;
         }
         status = ball.status;
     }
@@ -342,8 +331,8 @@ hs_status
 hs_dynamic_near(const hs_dynamic *list, const double *position, double radius, hs_dynamic_fn visit,
                 void *user, hs_failure *failure)
 {
-    const hs_ball_visit each = {.fn = visit, .user = user};
-    return visit_ball(list, position, radius, false, &each, failure);
+    const hs_ball_visit each = {.fn = visit, .user = user, .is_near = true};
+    return ask(list, position, radius, &each, NULL, NULL, failure);
 }
 
 hs_status
@@ -351,7 +340,7 @@ hs_dynamic_within(const hs_dynamic *list, const double *position, double radius,
                   hs_dynamic_fn visit, void *user, hs_failure *failure)
 {
     const hs_ball_visit each = {.fn = visit, .user = user, .with_shift = with_shift};
-    return visit_ball(list, position, radius, true, &each, failure);
+    return ask(list, position, radius, &each, NULL, NULL, failure);
 }
 
 hs_status
@@ -359,33 +348,11 @@ hs_dynamic_any_within(const hs_dynamic *list, const double *position, double rad
                       const hs_key *skip, bool *any, hs_failure *failure)
 {
     static const hs_ball_visit first = {.fn = NULL};
-    hs_failure                 ignored;
-    hs_ball                    ball;
-    double                     own[HS_MAX_DIM];
-    failure = hs_failure_or(failure, &ignored);
-    if (list == NULL || position == NULL || any == NULL) {
-        return HS_ERR_ARGUMENT;
-    }
-    const hs_dynamic_call call = hs_dynamic_enter(list, false);
-    hs_status             status = open_exact(list, position, radius, own, &ball, failure);
-    if (status == HS_OK && skip != NULL) {
-        const uint32_t place = hs_key_map_find(&list->map, &list->entries, *skip);
-        if (place != HS_NO_PLACE) {
-            ball.skip = place;
-        } else {
-            status = HS_ERR_KEY;
-        }
-    }
-    if (status == HS_OK) {
-        *any = hs_ball_within(&ball, &first);
-        status = ball.status;
-    }
-    hs_dynamic_leave(list, call);
-    return status;
+    return ask(list, position, radius, &first, skip, any, failure); /* refused where any is NULL */
 }
 
-/* The public functions of a list of points that come and go as a whole: it is
- * made, copied and emptied, held for calls in a row, gone through, and looked at. */
+/* The public functions of a list of points that come and go as a whole: it is made, copied and
+ * emptied, held for calls in a row, gone through, and looked at. */
 
 hs_dynamic_options
 hs_dynamic_options_default(void)
@@ -406,11 +373,8 @@ hs_dynamic_new(const hs_dynamic_options *options, hs_dynamic **list, hs_failure 
         return HS_ERR_ARGUMENT;
     }
     *list = NULL;
-    const hs_fpenv env = hs_fpenv_enter();
-    hs_status      status = hs_list_check(options, failure);
-    if (status == HS_OK) {
-        status = hs_list_new(options, list, failure);
-    }
+    const hs_fpenv  env = hs_fpenv_enter();
+    const hs_status status = hs_list_new(options, list, failure);
     hs_fpenv_leave(env);
     return status;
 }
@@ -531,8 +495,8 @@ hs_dynamic_look(const hs_dynamic *list)
     state.n_without = list->n_without;
     state.n_cells = list->cells.n;
     state.n_empty = list->cells.dense ? 0 : list->cells.n_empty;
-    state.bytes = (int64_t)sizeof *list + list->offsets.bytes + hs_entries_bytes(&list->entries) +
-                  list->map.capacity * (int64_t)sizeof(hs_key_row) +
+    state.bytes = (int64_t)sizeof *list + list->offsets.at[list->offsets.reach + 1] +
+                  hs_entries_bytes(&list->entries) + hs_hash_bytes(&list->map.hash) +
                   hs_cell_table_bytes(&list->cells);
     state.changes = list->changes;
     state.max_radius = list->max_radius;

@@ -33,21 +33,43 @@ count_nodes(const hs_node_lists *lists, int64_t *n)
     return HS_OK;
 }
 
-/* Whether a call that returns a connectivity can begin; *result, unless NULL, is NULL then. */
-static bool
-can_connect(hs_connectivity **result, const hs_options *options)
+/* Begins a call that makes a connectivity of the nodes of these lists, if `has_input`: *failure
+ * becomes where the failure goes, *n how many nodes there are. connectivity_end must follow. NULL,
+ * with *status, where the call has ended. */
+static hs_connectivity *
+connectivity_begin(bool has_input, const hs_node_lists *lists, const hs_options *options,
+                   hs_connectivity **result, int64_t *n, hs_failure **failure, hs_status *status)
 {
+    hs_connectivity *made = NULL;
     if (result != NULL) {
         *result = NULL;
     }
-    return hs_can_begin(result, options);
+    *status = count_nodes(lists, n);
+    if (*status == HS_OK && (result == NULL || options == NULL || !has_input)) {
+        *status = HS_ERR_ARGUMENT;
+    }
+    if (*status == HS_OK) {
+        made = hs_connectivity_new();
+        *status = made == NULL ? HS_ERR_MEMORY : HS_OK;
+    }
+    if (*status != HS_OK) {
+        (void)hs_end_early(*status, options, *failure);
+        return NULL;
+    }
+    *failure = hs_call_enter(options, *failure, &made->call);
+    *status = hs_check_resources(options);
+    return made;
 }
 
-/* Leaves the call. *result becomes the object, or that is freed. Returns the status. */
+/* Leaves the call, unless it has not begun. *result becomes the object, or that is freed. Returns
+ * the status. */
 static hs_status
-connectivity_finish(hs_connectivity *made, hs_status status, hs_connectivity **result,
-                    hs_failure *failure)
+connectivity_end(hs_connectivity *made, hs_status status, hs_connectivity **result,
+                 hs_failure *failure)
 {
+    if (made == NULL) {
+        return status;
+    }
     hs_call_tell_limit(&made->call, status, failure);
     hs_call_leave(&made->call, hs_pairs_length(made->nodes));
     hs_call_detach(&made->call);
@@ -59,44 +81,29 @@ connectivity_finish(hs_connectivity *made, hs_status status, hs_connectivity **r
     return status;
 }
 
-/* An empty connectivity whose call, with these options, has been entered; *failure becomes where
- * the failure goes, *status that of the resources. connectivity_finish must follow. NULL when
- * memory is short: then the call has ended. */
-static hs_connectivity *
-connectivity_begin(const hs_options *options, hs_failure **failure, hs_status *status)
-{
-    hs_connectivity *made = hs_connectivity_new();
-    if (made == NULL) {
-        *status = hs_end_early(HS_ERR_MEMORY, options, *failure);
-        return NULL;
-    }
-    *failure = hs_call_enter(options, *failure, &made->call);
-    *status = hs_check_resources(options);
-    return made;
-}
-
-/* connectivity_begin for rows, by hs_pairs_begin; rows_finish must follow. points: NULL, or checked
- * as well. */
+/* The same for rows. points: NULL, or checked as well. */
 static hs_pairs *
-rows_begin(const hs_options *options, const hs_points *points, hs_failure **failure,
-           hs_status *status)
+rows_begin(bool has_input, const hs_points *points, const hs_options *options, hs_pairs **result,
+           hs_failure **failure, hs_status *status)
 {
-    hs_pairs *made = hs_pairs_begin(options, failure);
-    if (made == NULL) {
-        *status = HS_ERR_MEMORY;
+    if (!hs_can_return(result, options) || !has_input) {
+        *status = hs_end_early(HS_ERR_ARGUMENT, options, *failure);
         return NULL;
     }
-    *status = hs_check_resources(options);
+    hs_pairs *made = hs_pairs_begin(options, failure);
+    *status = made != NULL ? hs_check_resources(options) : HS_ERR_MEMORY;
     if (*status == HS_OK && points != NULL) {
         *status = hs_check_points(points, *failure);
     }
     return made;
 }
 
-/* Leaves the call. *result becomes the rows, or these are freed. Returns the status. */
 static hs_status
-rows_finish(hs_pairs *made, hs_status status, hs_pairs **result, hs_failure *failure)
+rows_end(hs_pairs *made, hs_status status, hs_pairs **result, hs_failure *failure)
 {
+    if (made == NULL) {
+        return status;
+    }
     hs_call_tell_limit(&made->call, status, failure);
     return hs_pairs_finish(made, status, made->output.n_pairs, result);
 }
@@ -105,39 +112,30 @@ hs_status
 hs_connectivity_link(const hs_half_list *pairs, const hs_node_lists *lists,
                      const hs_options *options, hs_connectivity **result, hs_failure *failure)
 {
-    int64_t   n = 0;
-    hs_output half;
-    hs_status status = count_nodes(lists, &n);
-    if (!can_connect(result, options) || pairs == NULL || status != HS_OK) {
-        return hs_end_early(status != HS_OK ? status : HS_ERR_ARGUMENT, options, failure);
-    }
-    hs_connectivity *made = connectivity_begin(options, &failure, &status);
-    if (made == NULL) {
-        return status;
-    }
+    int64_t          n;
+    hs_status        status;
+    hs_output        half = {.n_pairs = 0};
+    hs_pairs        *rows = NULL;
+    hs_connectivity *made =
+        connectivity_begin(pairs != NULL, lists, options, result, &n, &failure, &status);
     if (status == HS_OK) {
         status = hs_half_list_copy(&made->call.account, pairs, n, lists->directed, &half, failure);
-        if (status == HS_OK) {
-            status = hs_connectivity_fill(made, lists, n, &half, failure);
-        }
-        hs_output_free(&half);
     }
-    return connectivity_finish(made, status, result, failure);
-}
-
-/* Options of the search for all neighbours. */
-static hs_options
-options_of_all_neighbours(const hs_among *among, const hs_options *options)
-{
-    hs_options    search = *options;
-    const hs_box *box = among->cells != NULL ? hs_cells_box(among->cells) : among->box;
-    search.want = HS_WANT_J;
-    search.index_bytes = 4;
-    search.out = NULL;
-    for (int l = 0; box != NULL && l < box->ndim && l < HS_MAX_DIM; l++) {
-        search.want |= box->periodic[l] ? (unsigned)HS_WANT_SHIFT : 0u;
+    if (status == HS_OK) {
+        status = hs_output_check_opposites(&half, failure);
     }
-    return search;
+    if (status == HS_OK) {
+        rows = hs_part_new();
+        status = rows != NULL ? hs_half_list_rows(&made->call, &half, n, lists->directed,
+                                                  &rows->offsets, &rows->output)
+                              : HS_ERR_MEMORY;
+    }
+    if (status == HS_OK) {
+        status = hs_connectivity_fill(made, lists, &half, &rows);
+    }
+    hs_output_free(&half);
+    hs_pairs_free(rows);
+    return connectivity_end(made, status, result, failure);
 }
 
 hs_status
@@ -147,13 +145,23 @@ hs_connectivity_build(const hs_among *among, const hs_node_lists *lists, const h
     int64_t   n = 0;
     hs_pairs *found = NULL;
     hs_status status = count_nodes(lists, &n);
-    if (!can_connect(result, options) || status != HS_OK || among == NULL) {
+    if (result != NULL) {
+        *result = NULL;
+    }
+    if (status != HS_OK || result == NULL || options == NULL || among == NULL) {
         return hs_end_early(status != HS_OK ? status : HS_ERR_ARGUMENT, options, failure);
     }
-    const hs_options search = options_of_all_neighbours(among, options);
+    hs_options    search = *options; /* for all neighbours */
+    const hs_box *box = among->cells != NULL ? hs_cells_box(among->cells) : among->box;
+    search.want = HS_WANT_J;
+    search.index_bytes = 4;
+    search.out = NULL;
+    for (int l = 0; box != NULL && l < box->ndim && l < HS_MAX_DIM; l++) {
+        search.want |= box->periodic[l] ? (unsigned)HS_WANT_SHIFT : 0u;
+    }
     /* Only to look at the points; a half list, so that queries are refused. */
     const hs_query query = hs_query_among(among, HS_HALF_LIST, &search);
-    if (query.among != NULL || (query.sets.points != NULL && query.sets.points->n != n)) {
+    if (query.among != NULL || query.sets.points == NULL || query.sets.points->n != n) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     status = hs_neighbors_find(among, &search, &found, failure);
@@ -162,38 +170,13 @@ hs_connectivity_build(const hs_among *among, const hs_node_lists *lists, const h
     }
     hs_options linking = *options; /* its counters are those of the search */
     linking.counters = NULL;
-    hs_connectivity *made = connectivity_begin(&linking, &failure, &status);
-    if (made == NULL) {
-        hs_pairs_free(found);
-        return status;
-    }
-    status = hs_connectivity_fill_rows(made, lists, &found);
-    hs_pairs_free(found);
-    return connectivity_finish(made, status, result, failure);
-}
-
-/* Points of an overlap, which need not be finite. */
-static hs_status
-find_overlap(hs_pairs *made, const hs_points *points, const hs_index_rows *gather,
-             const hs_node_lists *lists, hs_failure *failure)
-{
-    hs_account   *account = &made->call.account;
-    hs_node_lists of_all = *lists;
-    hs_node_map   map;
-    of_all.ghost_rows = true;
-    hs_status status = hs_node_map_make(account, &of_all, points->n, &map);
-    if (status != HS_OK) {
-        return status;
-    }
-    double *rows = hs_alloc(account, HS_FOR_POINTS, points->n * points->ndim, sizeof *rows);
-    status = rows != NULL ? HS_OK : HS_ERR_MEMORY;
+    hs_connectivity *made =
+        connectivity_begin(true, lists, &linking, result, &n, &failure, &status);
     if (status == HS_OK) {
-        hs_points_copy(points, rows);
-        status = hs_overlap_fill(&made->call, &map, gather, rows, points->ndim, made, failure);
+        status = hs_connectivity_fill(made, lists, NULL, &found);
     }
-    hs_free(account, rows);
-    hs_node_map_free(account, &map);
-    return status;
+    hs_pairs_free(found);
+    return connectivity_end(made, status, result, failure);
 }
 
 hs_status
@@ -201,54 +184,26 @@ hs_connectivity_overlap(const hs_points *points, const hs_index_rows *gather,
                         const hs_node_lists *lists, const hs_options *options, hs_pairs **rows,
                         hs_failure *failure)
 {
-    if (!hs_can_return(rows, options) || points == NULL || gather == NULL || lists == NULL) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    hs_status status;
-    hs_pairs *made = rows_begin(options, points, &failure, &status);
-    if (made == NULL) {
-        return status;
-    }
+    hs_status  status;
+    const bool has_input = points != NULL && gather != NULL && lists != NULL;
+    hs_pairs  *made = rows_begin(has_input, points, options, rows, &failure, &status);
     if (status == HS_OK) {
-        status = find_overlap(made, points, gather, lists, failure);
+        status = hs_overlap_fill(&made->call, points, gather, lists, made, failure);
     }
-    return rows_finish(made, status, rows, failure);
+    return rows_end(made, status, rows, failure);
 }
 
-/* What the shifts of a half list multiply; axes that do not repeat have rows of zeros. False for a
- * box of too many dimensions. */
-static bool
-read_images(const hs_box *box, int ndim, hs_metric *images)
+/* What the shifts of a half list multiply; axes that do not repeat have rows of zeros. */
+static hs_metric
+images_of(const hs_box *box, int ndim)
 {
-    *images = (hs_metric){.ndim = ndim, .n_rows = box != NULL ? ndim : 0};
-    for (int l = 0; l < images->n_rows; l++) {
+    hs_metric images = {.ndim = ndim, .n_rows = box != NULL ? ndim : 0};
+    for (int l = 0; l < images.n_rows; l++) {
         for (int k = 0; k < ndim; k++) {
-            images->rows[l][k] = box->periodic[l] ? box->rows[l][k] : 0.0;
+            images.rows[l][k] = box->periodic[l] ? box->rows[l][k] : 0.0;
         }
     }
-    return images->n_rows <= HS_MAX_DIM - 2;
-}
-
-/* Of a half list that is copied, and a map. */
-static hs_status
-intersect(hs_pairs *made, const hs_points *points, const hs_metric *images,
-          const hs_node_lists *lists, const hs_output *half, hs_failure *failure)
-{
-    hs_account *account = &made->call.account;
-    hs_node_map map;
-    hs_status   status = hs_node_map_make(account, lists, points->n, &map);
-    if (status != HS_OK) {
-        return status;
-    }
-    double *rows = hs_alloc(account, HS_FOR_POINTS, points->n * points->ndim, sizeof *rows);
-    status = rows != NULL ? hs_points_copy_finite(points, rows, failure) : HS_ERR_MEMORY;
-    if (status == HS_OK) {
-        status = hs_intersection_fill(&made->call, &map, lists->ghost_pairs, half, rows, images,
-                                      made, failure);
-    }
-    hs_free(account, rows);
-    hs_node_map_free(account, &map);
-    return status;
+    return images;
 }
 
 hs_status
@@ -256,97 +211,71 @@ hs_connectivity_intersect(const hs_points *points, const hs_box *box, const hs_h
                           const hs_node_lists *lists, const hs_options *options, hs_pairs **result,
                           hs_failure *failure)
 {
-    hs_output half;
-    hs_metric images;
-    if (!hs_can_return(result, options) || points == NULL || pairs == NULL || lists == NULL ||
-        lists->directed || (box == NULL) != (pairs->shift == NULL)) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    hs_status status;
-    hs_pairs *made = rows_begin(options, points, &failure, &status);
-    if (made == NULL) {
-        return status;
-    }
-    if (status == HS_OK && box != NULL &&
-        (hs_check_box(box, points->ndim) != HS_OK || pairs->ndim != points->ndim)) {
-        status = HS_ERR_ARGUMENT;
-    }
-    if (status == HS_OK) {
-        status = box != NULL ? hs_box_check(box, failure) : HS_OK;
-    }
-    if (status == HS_OK && !read_images(box, points->ndim, &images)) {
-        status = HS_ERR_ARGUMENT;
+    hs_status  status;
+    hs_output  half = {.n_pairs = 0};
+    const bool has_input = points != NULL && pairs != NULL && lists != NULL && !lists->directed &&
+                           (box == NULL) == (pairs->shift == NULL);
+    hs_pairs *made = rows_begin(has_input, points, options, result, &failure, &status);
+    if (status == HS_OK && box != NULL) {
+        status = hs_check_box(box, points->ndim) == HS_OK && pairs->ndim == points->ndim &&
+                         points->ndim <= HS_MAX_DIM - 2
+                     ? hs_box_check(box, failure)
+                     : HS_ERR_ARGUMENT;
     }
     if (status == HS_OK) {
         status = hs_half_list_copy(&made->call.account, pairs, points->n, false, &half, failure);
-        if (status == HS_OK) {
-            status = intersect(made, points, &images, lists, &half, failure);
-        }
-        hs_output_free(&half);
     }
-    return rows_finish(made, status, result, failure);
+    if (status == HS_OK) {
+        const hs_metric images = images_of(box, points->ndim);
+        status = hs_intersection_fill(&made->call, points, &images, lists, &half, made, failure);
+    }
+    hs_output_free(&half);
+    return rows_end(made, status, result, failure);
 }
 
-/* The public functions that make rows and pairs out of others: pairs of rows,
- * and what is left of rows when nodes or pairs go. */
+/* ---- rows and pairs out of others ------------------------------------------------------------ */
 
 hs_status
 hs_connectivity_pair(const hs_list_rows *rows, const hs_node_lists *lists,
                      const hs_options *options, hs_connectivity **result, hs_failure *failure)
 {
-    int64_t   n = 0;
-    hs_status status = count_nodes(lists, &n);
-    if (!can_connect(result, options) || rows == NULL || status != HS_OK) {
-        return hs_end_early(status != HS_OK ? status : HS_ERR_ARGUMENT, options, failure);
-    }
-    hs_connectivity *made = connectivity_begin(options, &failure, &status);
-    if (made == NULL) {
-        return status;
-    }
+    int64_t          n;
+    hs_status        status;
+    hs_connectivity *made =
+        connectivity_begin(rows != NULL, lists, options, result, &n, &failure, &status);
     if (status == HS_OK) {
         status = hs_connectivity_fill_pairs(made, lists, n, rows);
     }
-    return connectivity_finish(made, status, result, failure);
+    return connectivity_end(made, status, result, failure);
 }
 
 hs_status
 hs_rows_keep(const hs_list_rows *rows, const hs_node_change *change, const int64_t *source,
              int64_t n, const hs_options *options, hs_pairs **result, hs_failure *failure)
 {
-    hs_status status = HS_ERR_ARGUMENT;
-    if (!hs_can_return(result, options) || rows == NULL || change == NULL) {
-        return hs_end_early(status, options, failure);
-    }
-    hs_pairs *made = rows_begin(options, NULL, &failure, &status);
-    if (made == NULL) {
-        return status;
-    }
+    hs_status status;
+    hs_pairs *made =
+        rows_begin(rows != NULL && change != NULL, NULL, options, result, &failure, &status);
     if (status == HS_OK) {
         status = hs_kept_rows_fill(&made->call, rows, change, source, n, made);
     }
-    return rows_finish(made, status, result, failure);
+    return rows_end(made, status, result, failure);
 }
 
 hs_status
 hs_rows_without(const hs_list_rows *rows, const hs_list_rows *without, bool ascend,
                 const hs_options *options, hs_pairs **result, hs_failure *failure)
 {
-    hs_status status = HS_ERR_ARGUMENT;
-    if (!hs_can_return(result, options) || rows == NULL || without == NULL) {
-        return hs_end_early(status, options, failure);
-    }
-    hs_pairs *made = rows_begin(options, NULL, &failure, &status);
-    if (made == NULL) {
-        return status;
-    }
+    hs_status status;
+    hs_pairs *made =
+        rows_begin(rows != NULL && without != NULL, NULL, options, result, &failure, &status);
     if (status == HS_OK) {
         status = hs_rows_without_fill(&made->call, rows, without, ascend, made);
     }
-    return rows_finish(made, status, result, failure);
+    return rows_end(made, status, result, failure);
 }
 
-/* The public functions about single nodes: feet on a segment, and places on
- * the Z curve. Points are looked at one by one; nothing is allocated. */
+/* ---- single nodes: points are looked at one by one; nothing is allocated --------------------- */
 
 /* Reads point i; HS_ERR_NOT_FINITE where it is no point. */
 static hs_status
@@ -360,15 +289,25 @@ read_point(const hs_points *points, int64_t i, double *x, hs_failure *failure)
     return status;
 }
 
-static bool
-are_finite(const double *x, int ndim)
+/* Checks points, two of their kind, and an array of an entry for each; copies the two, which
+ * nothing can change then. HS_ERR_BOX_FINITE where one of these is not finite: failure->column. */
+static hs_status
+read_two(const hs_points *points, const double *p, const double *q, const void *entries,
+         double two[2][HS_MAX_DIM], hs_failure *failure)
 {
-    for (int k = 0; k < ndim; k++) {
-        if (!isfinite(x[k])) {
-            return false;
+    const hs_status status = points != NULL ? hs_check_points(points, failure) : HS_ERR_ARGUMENT;
+    if (status != HS_OK || p == NULL || q == NULL || !hs_has_entries(entries, points)) {
+        return status != HS_OK ? status : HS_ERR_ARGUMENT;
+    }
+    for (int k = 0; k < points->ndim; k++) {
+        two[0][k] = p[k];
+        two[1][k] = q[k];
+        if (!isfinite(two[0][k]) || !isfinite(two[1][k])) {
+            failure->column = k;
+            return HS_ERR_BOX_FINITE;
         }
     }
-    return true;
+    return HS_OK;
 }
 
 hs_status
@@ -378,17 +317,8 @@ hs_feet_between(const hs_points *points, const double *p, const double *q, bool 
     hs_entry entry;
     double   ends[2][HS_MAX_DIM] = {{0.0}}, x[HS_MAX_DIM];
     failure = hs_enter(failure, &entry);
-    hs_status status = points != NULL ? hs_check_points(points, failure) : HS_ERR_ARGUMENT;
-    if (status == HS_OK && (p == NULL || q == NULL || !hs_has_entries(between, points))) {
-        status = HS_ERR_ARGUMENT;
-    }
-    if (status == HS_OK) {
-        memcpy(ends[0], p, (size_t)points->ndim * sizeof *p);
-        memcpy(ends[1], q, (size_t)points->ndim * sizeof *q);
-        if (!are_finite(ends[0], points->ndim) || !are_finite(ends[1], points->ndim)) {
-            status = HS_ERR_ARGUMENT;
-        }
-    }
+    hs_status status = read_two(points, p, q, between, ends, failure);
+    status = status == HS_ERR_BOX_FINITE ? HS_ERR_ARGUMENT : status;
     for (int64_t i = 0; status == HS_OK && i < points->n; i++) {
         status = read_point(points, i, x, failure);
         if (status == HS_OK) {
@@ -399,60 +329,30 @@ hs_feet_between(const hs_points *points, const double *p, const double *q, bool 
     return status;
 }
 
-/* The box of the keys. */
-typedef struct key_box {
-    double low[HS_MAX_DIM], high[HS_MAX_DIM];
-} key_box;
-
-static hs_status
-read_box(const double *low, const double *high, int ndim, key_box *box, hs_failure *failure)
-{
-    for (int k = 0; k < ndim; k++) {
-        box->low[k] = low[k];
-        box->high[k] = high[k];
-        if (!isfinite(box->low[k]) || !isfinite(box->high[k]) || box->low[k] > box->high[k]) {
-            failure->column = k;
-            return HS_ERR_BOX_FINITE;
-        }
-    }
-    return HS_OK;
-}
-
-/* The key of a point, or HS_ERR_FAR where it is outside. */
-static hs_status
-find_key(const key_box *box, const double *x, int ndim, uint64_t *key)
-{
-    uint64_t slices[HS_MAX_DIM];
-    for (int k = 0; k < ndim; k++) {
-        if (x[k] < box->low[k] || x[k] > box->high[k]) {
-            return HS_ERR_FAR;
-        }
-        slices[k] = hs_morton_slice(x[k], box->low[k], box->high[k], hs_morton_bits(ndim));
-    }
-    *key = hs_morton_interleave(slices, ndim);
-    return HS_OK;
-}
-
 hs_status
 hs_morton_keys(const hs_points *points, const double *low, const double *high, uint64_t *keys,
                hs_failure *failure)
 {
     hs_entry entry;
-    key_box  box;
-    double   x[HS_MAX_DIM];
+    double   box[2][HS_MAX_DIM] = {{0.0}}, x[HS_MAX_DIM];
     failure = hs_enter(failure, &entry);
-    hs_status status = points != NULL ? hs_check_points(points, failure) : HS_ERR_ARGUMENT;
-    if (status == HS_OK && (low == NULL || high == NULL || !hs_has_entries(keys, points))) {
-        status = HS_ERR_ARGUMENT;
-    }
-    if (status == HS_OK) {
-        status = read_box(low, high, points->ndim, &box, failure);
+    hs_status status = read_two(points, low, high, keys, box, failure);
+    for (int k = 0; status == HS_OK && k < points->ndim; k++) {
+        if (box[0][k] > box[1][k]) {
+            failure->column = k;
+            status = HS_ERR_BOX_FINITE;
+        }
     }
     for (int64_t i = 0; status == HS_OK && i < points->n; i++) {
         status = read_point(points, i, x, failure);
+        for (int k = 0; status == HS_OK && k < points->ndim; k++) {
+            if (x[k] < box[0][k] || x[k] > box[1][k]) {
+                failure->row = i;
+                status = HS_ERR_FAR;
+            }
+        }
         if (status == HS_OK) {
-            status = find_key(&box, x, points->ndim, &keys[i]);
-            failure->row = status != HS_OK ? i : failure->row;
+            keys[i] = hs_morton_key(x, box[0], box[1], points->ndim);
         }
     }
     hs_leave(&entry);

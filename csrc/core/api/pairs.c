@@ -9,40 +9,27 @@
 #include "../search/choice.h"
 #include "../histogram/histogram.h"
 
-#include <math.h>
 #include <string.h>
 
 /* pairs.c: the public searches of one call: pairs, rows, nearest points, histograms and plans. */
 
 /* The public searches: find and count. */
 
-hs_options
-hs_options_default(void)
+/* What a thread that searches several systems keeps from one to the next, or NULL. */
+static hs_keeper *
+keeper_of(const hs_query_run *run)
 {
-    return (hs_options){.inclusive = true,
-                        .want = HS_WANT_I | HS_WANT_J,
-                        .index_bytes = 8,
-                        .threads = 1,
-                        .memory_limit = INFINITY};
+    return run->kept != NULL ? &run->kept->keeper : NULL;
 }
 
 /* A hs_use_fn: pairs of the step that is open, behind those of an output; NULL: that of the run. */
 static hs_status
 record_step(void *context, hs_query_run *run)
 {
-    hs_output *output = context != NULL ? context : run->output;
-    hs_kept   *kept = run->kept;
-    hs_status  status = hs_estimate_by_sample(run->search, run->failure);
-    if (status != HS_OK) {
-        return status;
-    }
-    if (kept == NULL) {
-        return hs_parallel_record_all(run->search, output, run->failure);
-    }
-    return output == &kept->backlog.pairs
-               ? hs_backlog_record(run->search, &kept->backlog, &kept->walker, run->failure)
-               : hs_parallel_record_next(run->search, output, &kept->walker, &kept->recorder,
-                                         run->failure);
+    hs_output      *output = context != NULL ? context : run->output;
+    const hs_status status = hs_estimate_by_sample(run->search, run->failure);
+    return status == HS_OK ? hs_parallel_record(run->search, keeper_of(run), output, run->failure)
+                           : status;
 }
 
 /* Whether two points may be a pair in several images, or one with itself. Twice the cutoff is
@@ -117,24 +104,8 @@ find_sorted(hs_query_run *run)
 static hs_status
 count_step(void *context, hs_query_run *run)
 {
-    hs_search *search = run->search;
-    hs_kept   *kept = run->kept;
-    int64_t    n_pairs = 0;
-    hs_status  status;
     (void)context;
-    if (kept == NULL) {
-        status = hs_parallel_count(search, &n_pairs, run->failure);
-    } else {
-        status = hs_walker_renew(search, HS_BLOCK_COUNTS, NULL, NULL, &kept->walker);
-        if (status == HS_OK) {
-            const int64_t n = hs_search_asking(search)->n;
-            status = hs_walk_or_tell(&kept->walker, 0, (int32_t)n, run->failure);
-            n_pairs = kept->walker.scanner.n_found;
-        }
-        hs_walker_flush_counters(search, &kept->walker);
-    }
-    run->n_pairs += n_pairs;
-    return status;
+    return hs_parallel_count(run->search, keeper_of(run), &run->n_pairs, run->failure);
 }
 
 /* A hs_use_fn; context: a count of each system. */
@@ -169,47 +140,31 @@ hs_pairs_count(const hs_among *among, const hs_options *options, int64_t *count,
 static hs_status
 make_rows_room(hs_output *output, int64_t n_entries, hs_failure *failure)
 {
-    if (output->fixed && n_entries > output->capacity) {
-        failure->expected_pairs = (double)n_entries;
-        return HS_ERR_CAPACITY;
+    const bool fits = output->fixed ? n_entries <= output->capacity
+                                    : hs_output_reserve(output, n_entries, 0.0) == HS_OK;
+    if (fits) {
+        output->n_pairs = n_entries;
+        return HS_OK;
     }
-    if (!output->fixed && hs_output_reserve(output, n_entries, 0.0) != HS_OK) {
-        failure->expected_pairs = (double)n_entries;
+    failure->expected_pairs = (double)n_entries;
+    if (!output->fixed) {
         failure->expected_bytes =
             failure->expected_pairs * (double)hs_output_bytes_per_pair(output);
-        return HS_ERR_MEMORY;
     }
-    output->n_pairs = n_entries;
-    return HS_OK;
-}
-
-/* Offsets and entries of a table that is prepared. */
-static hs_status
-find_entries(hs_query_run *run, hs_table *table)
-{
-    hs_failure *failure = run->failure;
-    hs_status   status = hs_table_measure(table, failure);
-    if (status == HS_OK) {
-        status = make_rows_room(run->output, table->offsets[hs_search_asking(table->search)->n],
-                                failure);
-    }
-    if (status == HS_OK) {
-        status = hs_touch_output(run->call->team, &run->call->options, run->output);
-    }
-    return status == HS_OK ? hs_table_fill(table, failure) : status;
+    return output->fixed ? HS_ERR_CAPACITY : HS_ERR_MEMORY;
 }
 
 /* A hs_use_fn: the rows of a single step. */
 static hs_status
 fill_rows(void *context, hs_query_run *run)
 {
-    hs_search *search = run->search;
-    hs_table   table = {.search = search, .entries = run->output};
-    hs_status  status = hs_estimate_by_sample(search, run->failure);
+    hs_search    *search = run->search;
+    hs_table      table = {.search = search, .entries = run->output};
+    const int64_t n = hs_search_asking(search)->n;
+    hs_status     status = hs_estimate_by_sample(search, run->failure);
     (void)context;
     if (status == HS_OK) {
-        status = hs_output_open_offsets(&run->call->account, hs_search_asking(search)->n + 1,
-                                        run->offsets, &table.offsets);
+        status = hs_output_open_offsets(&run->call->account, n + 1, run->offsets, &table.offsets);
     }
     if (status == HS_OK) {
         status = hs_table_prepare(&table, run->failure);
@@ -218,18 +173,18 @@ fill_rows(void *context, hs_query_run *run)
         status = HS_ERR_MEMORY; /* refused before anything is counted */
     }
     if (status == HS_OK) {
-        status = find_entries(run, &table);
+        status = hs_table_measure(&table, run->failure);
+    }
+    if (status == HS_OK) {
+        status = make_rows_room(run->output, table.offsets[n], run->failure);
+    }
+    if (status == HS_OK) {
+        status = hs_touch_output(run->call->team, &run->call->options, run->output);
+    }
+    if (status == HS_OK) {
+        status = hs_table_fill(&table, run->failure);
     }
     hs_table_free(&table);
-    return status;
-}
-
-/* The rows of a table that lists each pair once, without their beginnings. */
-static hs_status
-fill_sorted(hs_query_run *run)
-{
-    const hs_status status = hs_query_each_step(run, fill_rows, NULL);
-    hs_output_free(run->offsets);
     return status;
 }
 
@@ -238,8 +193,10 @@ static hs_status
 find_pairs(void *context, hs_query_run *run)
 {
     (void)context;
-    if (run->query->sets.is_once) {
-        return fill_sorted(run);
+    if (run->query->sets.is_once) { /* rows that list each pair once, without their beginnings */
+        const hs_status status = hs_query_each_step(run, fill_rows, NULL);
+        hs_output_free(run->offsets);
+        return status;
     }
     return run->call->options.sorted ? find_sorted(run)
                                      : hs_query_each_step(run, record_step, NULL);
@@ -307,29 +264,8 @@ static bool
 is_single(const hs_query_run *run)
 {
     return !run->has_levels ||
-           (hs_level_plan_is_single(&run->levels, &run->plan) && !meets_itself(run) &&
+           (hs_level_plan_is_single(&run->plan) && !meets_itself(run) &&
             (!run->plan.steps[0].has_limits || (run->levels.cutoffs != NULL && has_selves(run))));
-}
-
-/* Makes use of it, with all neighbours of each point. */
-static hs_status
-use_single(hs_query_run *run, hs_use_fn use, void *context)
-{
-    run->plan.is_half = false;
-    return hs_query_each_step(run, use, context);
-}
-
-/* Moves pair `from` to place `to`. */
-static void
-move_pair(hs_output *found, int64_t from, int64_t to)
-{
-    for (unsigned bit = HS_WANT_I; bit <= HS_WANT_SHIFT; bit <<= 1) {
-        char        *column = hs_output_column(found, bit);
-        const size_t width = column != NULL ? hs_output_width(found, bit) : 0;
-        if (column != NULL) {
-            memmove(column + (size_t)to * width, column + (size_t)from * width, width);
-        }
-    }
 }
 
 /* Takes (i, i, S = 0) out. */
@@ -344,9 +280,14 @@ drop_selves(hs_output *found)
         for (int k = 0; is_self && shift != NULL && k < found->ndim; k++) {
             is_self = shift[e * found->ndim + k] == 0;
         }
-        if (!is_self) {
-            move_pair(found, e, kept++);
+        for (unsigned bit = HS_WANT_I; !is_self && bit <= HS_WANT_SHIFT; bit <<= 1) {
+            char        *column = hs_output_column(found, bit);
+            const size_t width = column != NULL ? hs_output_width(found, bit) : 0;
+            if (column != NULL) {
+                memmove(column + (size_t)kept * width, column + (size_t)e * width, width);
+            }
         }
+        kept += !is_self;
     }
     found->n_pairs = kept;
 }
@@ -372,7 +313,8 @@ find_rows(void *context, hs_query_run *run)
     int64_t      *offsets = NULL;
     hs_output     found;
     if (is_single(run)) {
-        return use_single(run, fill_rows, context);
+        run->plan.is_half = false; /* all neighbours of each point */
+        return hs_query_each_step(run, fill_rows, context);
     }
     hs_status status = find_of_rows(run, columns_of(run), &found);
     if (status == HS_OK && is_half && (run->call->options.want & HS_WANT_SHIFT)) {
@@ -413,7 +355,8 @@ count_rows(void *context, hs_query_run *run)
     int64_t  *counts = (int64_t *)context + run->first_asking;
     hs_output found;
     if (is_single(run)) {
-        return use_single(run, count_rows_of_step, context);
+        run->plan.is_half = false;
+        return hs_query_each_step(run, count_rows_of_step, context);
     }
     const unsigned  columns = meets_itself(run) ? columns_of(run) : HS_WANT_I | HS_WANT_J;
     const hs_status status = find_of_rows(run, columns, &found);
@@ -451,8 +394,7 @@ hs_neighbors_count(const hs_among *among, const hs_options *options, int64_t *co
     return hs_query_answer(&query, &finder, NULL, failure);
 }
 
-/* The public search for the k nearest points: prepares trees, then searches group by
- * group. */
+/* The public search for the k nearest points: prepares trees, then searches group by group. */
 
 /* Room for k entries for each asking point. */
 static hs_status
@@ -521,127 +463,22 @@ hs_nearest_find(const hs_among *among, int64_t k, const hs_options *options, hs_
 
 /* The public histogram of all pairs, which stores none of them. */
 
-/* What the threads share. */
-typedef struct counting {
-    hs_search    *search;
-    hs_histogram  histogram;
-    hs_tally_plan plan;
-} counting;
-
-/* What all threads have counted of one group, to entry `to` and on. Returns their number. */
-static int64_t
-write_group(const hs_tally *tallies, int n, int64_t group, int64_t to,
-            const hs_histogram *histogram)
-{
-    int64_t all = 0;
-    for (int64_t k = 0; k < histogram->n_edges; k++) {
-        int64_t count = 0;
-        for (int w = 0; w < n; w++) {
-            count += hs_tally_count(&tallies[w], group, k);
-        }
-        if (histogram->counts != NULL) {
-            histogram->counts[to + k] = count;
-        }
-        if (histogram->sums != NULL) {
-            histogram->sums[to + k] =
-                hs_sums_round(&tallies[0].sums, group * (histogram->n_edges + 1) + k);
-        }
-        all += count;
-    }
-    return all;
-}
-
-/* Returns the number of pairs. */
-static int64_t
-write_histogram(const counting *shared, hs_tally *tallies, int n)
-{
-    const hs_tally_plan *plan = &shared->plan;
-    const hs_histogram  *histogram = &shared->histogram;
-    const bool           is_symmetric = !shared->search->has_queries;
-    const int64_t        n_types = plan->n_types;
-    int64_t              n_pairs = 0;
-    for (int w = 1; w < n && plan->sums; w++) {
-        hs_sums_join(&tallies[0].sums, &tallies[w].sums);
-    }
-    if (plan->sums) {
-        hs_sums_carry(&tallies[0].sums);
-    }
-    for (int64_t a = 0; a < n_types; a++) {
-        for (int64_t b = 0; b < n_types; b++) {
-            const int64_t at = a * n_types + b, group = plan->has_types ? plan->group[at] : 0;
-            const int64_t found =
-                write_group(tallies, n, group, at * histogram->n_edges, histogram);
-            n_pairs += is_symmetric && b < a ? 0 : found;
-        }
-    }
-    return n_pairs;
-}
-
-static hs_status
-open_tally(void *job, void *tally)
-{
-    const counting *shared = job;
-    const int32_t   capacity = hs_walker_capacity(shared->search);
-    return hs_tally_init(&shared->plan, capacity, hs_block_most_hits(capacity), tally);
-}
-
-static void
-close_tally(void *job, void *tally)
-{
-    (void)job;
-    hs_tally_free(tally);
-}
-
-/* Each thread counts by itself; then the counts are added up. */
-static hs_status
-tally_pairs(counting *shared, int64_t *n_pairs, hs_failure *failure)
-{
-    hs_search *search = shared->search;
-    hs_crew    crew = {.call = search->call,
-                       .job = shared,
-                       .worker_size = sizeof(hs_tally),
-                       .open = open_tally,
-                       .close = close_tally};
-    hs_status  status = hs_crew_open(&crew);
-    if (status == HS_OK) {
-        const hs_visitors visitors = {.use = HS_BLOCK_LISTS_SQUARES,
-                                      .visit = hs_tally_hits,
-                                      .contexts = crew.workers,
-                                      .context_size = crew.worker_size};
-        status = hs_parallel_visit(search, &visitors, NULL, failure);
-    }
-    if (status == HS_OK) {
-        *n_pairs += write_histogram(shared, crew.workers, crew.n_open);
-    }
-    hs_crew_close(&crew);
-    return status;
-}
-
-/* A hs_use_fn. */
+/* A hs_use_fn; context: the histogram. */
 static hs_status
 fill_histogram(void *context, hs_query_run *run)
 {
-    counting *shared = context;
-    shared->search = run->search;
-    hs_status status = hs_tally_plan_open(run->search, &shared->histogram, &run->query->sets,
-                                          &shared->plan, run->failure);
-    if (status == HS_OK) {
-        status = tally_pairs(shared, &run->n_pairs, run->failure);
-    }
-    hs_tally_plan_close(&shared->plan);
-    return status;
+    return hs_histogram_fill(run->search, context, &run->query->sets, &run->n_pairs, run->failure);
 }
 
 /* A hs_use_fn; context: the histograms of all systems, one behind the other. */
 static hs_status
 find_histogram(void *context, hs_query_run *run)
 {
-    counting      shared = {.histogram = *(const hs_histogram *)context};
-    hs_histogram *own = &shared.histogram;
-    const int64_t at = run->system * own->n_edges * own->n_types * own->n_types;
-    own->counts = own->counts != NULL ? own->counts + at : NULL;
-    own->sums = own->sums != NULL ? own->sums + at : NULL;
-    return hs_query_each_step(run, fill_histogram, &shared);
+    hs_histogram  own = *(const hs_histogram *)context;
+    const int64_t at = run->system * own.n_edges * own.n_types * own.n_types;
+    own.counts = own.counts != NULL ? own.counts + at : NULL;
+    own.sums = own.sums != NULL ? own.sums + at : NULL;
+    return hs_query_each_step(run, fill_histogram, &own);
 }
 
 /* The search goes up to the largest edge. */
@@ -651,8 +488,11 @@ find_histograms(const hs_among *among, const hs_options *options, const hs_histo
 {
     hs_histogram    all;
     const hs_finder finder = {.find = find_histogram, .context = &all};
-    const hs_status status = options != NULL ? hs_check_histogram(histogram, failure)
-                                             : HS_ERR_ARGUMENT;
+    const bool      is_there = options != NULL && histogram != NULL && histogram->edges != NULL &&
+                          histogram->n_types >= 1;
+    const hs_status status = is_there
+                                 ? hs_check_lengths(histogram->edges, histogram->n_edges, failure)
+                                 : HS_ERR_ARGUMENT;
     if (status != HS_OK) {
         hs_clear_counters(options);
         return status;
@@ -676,8 +516,8 @@ find_histograms(const hs_among *among, const hs_options *options, const hs_histo
     return hs_query_answer(&query, &finder, NULL, failure);
 }
 
-/* Enters the floating-point environment itself, because edges are compared before the
- * search does. */
+/* Enters the floating-point environment itself, because edges are compared before the search
+ * does. */
 hs_status
 hs_pairs_histogram(const hs_among *among, const hs_options *options, const hs_histogram *histogram,
                    hs_failure *failure)
@@ -700,13 +540,6 @@ hs_pairs_histogram(const hs_among *among, const hs_options *options, const hs_hi
 
 /* What a search of a scene would do, read from the structures that would do it. */
 
-/* What was chosen. */
-static hs_algorithm
-algorithm_of(const hs_search *search)
-{
-    return search->is_sparse ? HS_HASH : search->grid.n_cells == 1 ? HS_ALL_PAIRS : HS_GRID;
-}
-
 static void
 fill_plan(const hs_search *search, hs_plan *plan)
 {
@@ -718,7 +551,9 @@ fill_plan(const hs_search *search, hs_plan *plan)
                       .aligned = scene->lattice.aligned,
                       .reduced = scene->lattice.reduced,
                       .keeps_originals = search->bins.keeps_originals,
-                      .algorithm = algorithm_of(search),
+                      .algorithm = search->is_sparse    ? HS_HASH
+                                   : grid->n_cells == 1 ? HS_ALL_PAIRS
+                                                        : HS_GRID,
                       .all_pairs = grid->n_cells == 1,
                       .sparse = search->is_sparse,
                       .n_cells = grid->n_cells,

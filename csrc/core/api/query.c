@@ -2,7 +2,6 @@
 #include "query.h"
 #include "../base/status.h"
 #include "../exact/ellipsoid.h"
-#include "../search/choice.h"
 #include "cells.h"
 
 #include <limits.h>
@@ -16,12 +15,6 @@
 /* Most bytes from one end of an array to the other: a little less than addresses allow, because the
  * sum that is compared with it is rounded. */
 #define MOST_EXTENT (0.99 * (double)PTRDIFF_MAX)
-
-static hs_status
-status_of(bool sound)
-{
-    return sound ? HS_OK : HS_ERR_ARGUMENT;
-}
 
 void
 hs_clear_counters(const hs_options *options)
@@ -47,12 +40,6 @@ hs_can_return(hs_pairs **result, const hs_options *options)
     if (result != NULL) {
         *result = NULL;
     }
-    return hs_can_begin(result, options);
-}
-
-bool
-hs_can_begin(const void *result, const hs_options *options)
-{
     return result != NULL && options != NULL;
 }
 
@@ -62,31 +49,10 @@ hs_has_entries(const void *array, const hs_points *points)
     return array != NULL || (points != NULL && points->n == 0);
 }
 
-static bool
-is_dimension(int ndim)
-{
-    return ndim >= 1 && ndim <= HS_MAX_DIM;
-}
-
-static bool
-is_index_size(int bytes)
-{
-    return bytes == 4 || bytes == 8;
-}
-
-/* Whether entries are there, if any, no further apart than addresses can be. */
-static bool
-has_coordinates(const hs_points *points)
-{
-    const double rows = (double)(points->n - 1) * (double)points->row_stride;
-    const double columns = (double)(points->ndim - 1) * (double)points->column_stride;
-    return points->n == 0 || (points->data != NULL && fabs(rows) + fabs(columns) <= MOST_EXTENT);
-}
-
 hs_status
 hs_check_points(const hs_points *points, hs_failure *failure)
 {
-    if (points == NULL || !is_dimension(points->ndim) || points->n < 0 ||
+    if (points == NULL || points->ndim < 1 || points->ndim > HS_MAX_DIM || points->n < 0 ||
         (points->real != HS_FLOAT32 && points->real != HS_FLOAT64)) {
         return HS_ERR_ARGUMENT;
     }
@@ -94,67 +60,64 @@ hs_check_points(const hs_points *points, hs_failure *failure)
         failure->value = (double)points->n;
         return HS_ERR_TOO_MANY;
     }
-    return status_of(has_coordinates(points));
+    /* Entries are there, if any, no further apart than addresses can be. */
+    const double rows = (double)(points->n - 1) * (double)points->row_stride;
+    const double columns = (double)(points->ndim - 1) * (double)points->column_stride;
+    return points->n == 0 || (points->data != NULL && fabs(rows) + fabs(columns) <= MOST_EXTENT)
+               ? HS_OK
+               : HS_ERR_ARGUMENT;
 }
 
 hs_status
 hs_check_box(const hs_box *box, int ndim)
 {
-    return status_of(box == NULL || (is_dimension(ndim) && box->ndim == ndim));
-}
-
-static bool
-has_all(const hs_pair_arrays *out, unsigned want)
-{
-    return (!(want & HS_WANT_I) || out->i != NULL) && (!(want & HS_WANT_J) || out->j != NULL) &&
-           (!(want & HS_WANT_BOTH) || out->both != NULL) &&
-           (!(want & HS_WANT_DISTANCE) || out->distance != NULL) &&
-           (!(want & HS_WANT_VECTOR) || out->vector != NULL) &&
-           (!(want & HS_WANT_SHIFT) || out->shift != NULL) &&
-           (!(want & HS_WANT_SHELL) || out->shell != NULL);
+    return box == NULL || (ndim >= 1 && ndim <= HS_MAX_DIM && box->ndim == ndim) ? HS_OK
+                                                                                 : HS_ERR_ARGUMENT;
 }
 
 /* Each array that is wanted is there, if anything is to be written to it. */
 static bool
 can_hold(const hs_pair_arrays *out, unsigned want)
 {
-    return is_index_size(out->index_bytes) && out->capacity >= 0 &&
-           (out->capacity == 0 || has_all(out, want));
+    const bool has_all = (!(want & HS_WANT_I) || out->i != NULL) &&
+                         (!(want & HS_WANT_J) || out->j != NULL) &&
+                         (!(want & HS_WANT_BOTH) || out->both != NULL) &&
+                         (!(want & HS_WANT_DISTANCE) || out->distance != NULL) &&
+                         (!(want & HS_WANT_VECTOR) || out->vector != NULL) &&
+                         (!(want & HS_WANT_SHIFT) || out->shift != NULL) &&
+                         (!(want & HS_WANT_SHELL) || out->shell != NULL);
+    return (out->index_bytes == 4 || out->index_bytes == 8) && out->capacity >= 0 &&
+           (out->capacity == 0 || has_all);
 }
 
 hs_status
 hs_check_resources(const hs_options *options)
 {
-    return status_of(options->threads > INT_MIN && options->memory_limit >= 0.0);
-}
-
-/* These options, of which `known` are bits that may be wanted. */
-static hs_status
-check_options(const hs_options *options, unsigned known)
-{
-    const unsigned        want = options->want;
-    const hs_pair_arrays *out = options->out;
-    if (hs_check_resources(options) != HS_OK) {
-        return HS_ERR_ARGUMENT;
-    }
-    return status_of((want & ~known) == 0 && (want == 0 || is_index_size(options->index_bytes)) &&
-                     (out == NULL || can_hold(out, want)) && options->cell_size >= 0.0 &&
-                     (unsigned)options->algorithm < HS_ALGORITHM_END &&
-                     (options->precision == HS_EXACT || options->precision == HS_DOUBLE ||
-                      options->precision == HS_SINGLE));
+    return options->threads > INT_MIN && options->memory_limit >= 0.0 ? HS_OK : HS_ERR_ARGUMENT;
 }
 
 hs_status
-hs_check_options(const hs_options *options)
+hs_check_options(const hs_options *options, unsigned known)
 {
-    return check_options(options, HS_WANT_ALL);
+    const unsigned want = options->want;
+    const bool     is_known = (want & ~known) == 0;
+    const bool     has_index = want == 0 || options->index_bytes == 4 || options->index_bytes == 8;
+    return is_known && has_index && hs_check_resources(options) == HS_OK &&
+                   (options->out == NULL || can_hold(options->out, want)) &&
+                   options->cell_size >= 0.0 && (unsigned)options->algorithm < HS_ALGORITHM_END &&
+                   (options->precision == HS_EXACT || options->precision == HS_DOUBLE ||
+                    options->precision == HS_SINGLE)
+               ? HS_OK
+               : HS_ERR_ARGUMENT;
 }
 
-/* HS_OK, or HS_ERR_EDGES unless there are some, finite, not negative and not descending. */
-static hs_status
-check_lengths(const double *lengths, int64_t n, hs_failure *failure)
+/* Most lengths that distances are sorted by: twice as many are int32. */
+#define MOST_LENGTHS (INT64_C(1) << 30)
+
+hs_status
+hs_check_lengths(const double *lengths, int64_t n, hs_failure *failure)
 {
-    if (n < 1 || n >= HS_MOST_LENGTHS) {
+    if (n < 1 || n >= MOST_LENGTHS) {
         return HS_ERR_EDGES;
     }
     for (int64_t k = 0; k < n; k++) {
@@ -167,15 +130,6 @@ check_lengths(const double *lengths, int64_t n, hs_failure *failure)
     return HS_OK;
 }
 
-hs_status
-hs_check_histogram(const hs_histogram *histogram, hs_failure *failure)
-{
-    if (histogram == NULL || histogram->edges == NULL || histogram->n_types < 1) {
-        return HS_ERR_ARGUMENT;
-    }
-    return check_lengths(histogram->edges, histogram->n_edges, failure);
-}
-
 double
 hs_least_length(const double *lengths, int64_t n)
 {
@@ -185,18 +139,6 @@ hs_least_length(const double *lengths, int64_t n)
         }
     }
     return 0.0;
-}
-
-/* Shells are those of an exact search, up to its cutoff. */
-static hs_status
-check_shells(const hs_options *options, hs_failure *failure)
-{
-    if (options->shells == NULL || options->precision != HS_EXACT) {
-        return HS_ERR_ARGUMENT;
-    }
-    const hs_status status = check_lengths(options->shells, options->n_shells, failure);
-    return status == HS_OK ? status_of(options->shells[options->n_shells - 1] == options->cutoff)
-                           : status;
 }
 
 /* Points, queries and box. */
@@ -211,7 +153,7 @@ check_sets(const hs_points *points, const hs_points *queries, const hs_box *box,
     if (status == HS_OK && queries != NULL) {
         status = hs_check_points(queries, failure);
         failure->in_queries = status != HS_OK;
-        status = status == HS_OK ? status_of(queries->ndim == points->ndim) : status;
+        status = status == HS_OK && queries->ndim != points->ndim ? HS_ERR_ARGUMENT : status;
     }
     return status;
 }
@@ -221,7 +163,7 @@ hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_b
                    const hs_options *options, hs_failure *failure)
 {
     const hs_status status = check_sets(points, queries, box, failure);
-    return status == HS_OK ? hs_check_options(options) : status;
+    return status == HS_OK ? hs_check_options(options, HS_WANT_ALL) : status;
 }
 
 /* Several searches take as long for each point as one that has so many pairs of it, at least. */
@@ -238,23 +180,6 @@ has_marks(const hs_reach *reach, const hs_points *points, const hs_set *known, b
                                                    : set.radii != NULL);
 }
 
-/* Whether the limit is that of one of the two points: supports do not add up, and neither do radii
- * that count several times. */
-static bool
-takes_one(hs_rule rule)
-{
-    return rule != HS_RULE_SUM && rule != HS_RULE_MEAN;
-}
-
-/* Whether radii may count so many times. */
-static bool
-may_extend(const hs_reach *reach)
-{
-    return reach->has_supports || reach->extent == 0.0 ||
-           (takes_one(reach->rule) && reach->n_types == 0 && reach->extent >= 0x1p-64 &&
-            reach->extent <= 0x1p64);
-}
-
 /* Whether the query has all that its reach needs. */
 static hs_status
 check_reach(const hs_query *query, hs_failure *failure)
@@ -263,10 +188,15 @@ check_reach(const hs_query *query, hs_failure *failure)
     const hs_reach *reach = query->reach;
     const bool      asks = hs_rule_needs_asking(reach->rule);
     const bool      meets = hs_rule_needs_other(reach->rule);
-    if ((unsigned)reach->rule >= HS_RULE_END || reach->n_types < 0 || !may_extend(reach) ||
+    /* Supports do not add up, and neither do radii that count several times. */
+    const bool takes_one = reach->rule != HS_RULE_SUM && reach->rule != HS_RULE_MEAN;
+    const bool may_extend = takes_one && reach->n_types == 0 && reach->extent >= 0x1p-64 &&
+                            reach->extent <= 0x1p64;
+    if ((unsigned)reach->rule >= HS_RULE_END || reach->n_types < 0 ||
+        (!reach->has_supports && reach->extent != 0.0 && !may_extend) ||
         (reach->n_types > 0 && reach->cutoffs == NULL) ||
         (reach->has_supports &&
-         (reach->n_types > 0 || sets->points->ndim > HS_SUPPORT_DIM || !takes_one(reach->rule))) ||
+         (reach->n_types > 0 || sets->points->ndim > HS_SUPPORT_DIM || !takes_one)) ||
         (!sets->is_full && hs_rule_is_directed(reach->rule) && reach->n_types == 0)) {
         return HS_ERR_ARGUMENT;
     }
@@ -344,10 +274,16 @@ check_query(const hs_query *query, const hs_finder *finder, const hs_call *call,
     const bool        has_shells = query->reach == NULL && query->among == NULL;
     hs_status         status = check_sets(sets->points, sets->queries, query->box, failure);
     if (status == HS_OK) {
-        status = check_options(options, HS_WANT_ALL | (has_shells ? HS_WANT_SHELL : 0));
+        status = hs_check_options(options, HS_WANT_ALL | (has_shells ? HS_WANT_SHELL : 0));
     }
     if (status == HS_OK && (options->want & HS_WANT_SHELL)) {
-        status = check_shells(options, failure);
+        /* Shells are those of an exact search, up to its cutoff. */
+        status = options->shells != NULL && options->precision == HS_EXACT
+                     ? hs_check_lengths(options->shells, options->n_shells, failure)
+                     : HS_ERR_ARGUMENT;
+        if (status == HS_OK && options->shells[options->n_shells - 1] != options->cutoff) {
+            status = HS_ERR_ARGUMENT;
+        }
     }
     if (status == HS_OK && query->among != NULL) {
         status = hs_systems_check(query, failure);
@@ -363,35 +299,18 @@ check_query(const hs_query *query, const hs_finder *finder, const hs_call *call,
                                  : check_cutoff(query, finder, failure);
 }
 
-/* Without what the rule does not look at. */
-static hs_status
-divide(hs_query_run *run)
-{
-    const hs_sets  *sets = &run->query->sets;
-    const hs_reach *reach = run->query->reach;
-    const bool      has_queries = sets->queries != NULL;
-    hs_set          points = hs_set_with(sets->points, sets->of_points);
-    hs_set          queries = hs_set_with(sets->queries, sets->of_queries);
-    if (has_queries && !hs_rule_needs_other(reach->rule)) {
-        points.radii = points.supports = NULL;
-    } else if (!hs_rule_needs_asking(reach->rule)) {
-        queries.radii = queries.supports = NULL;
-    }
-    return hs_levels_divide(&run->call->account, &run->call->options, &points,
-                            has_queries ? &queries : NULL, reach, &run->levels, run->failure);
-}
-
 /* Whether the search itself takes numbers among all systems. */
 static bool
 is_numbered(const hs_query_run *run)
 {
-    return run->kept != NULL && run->finder->is_numbered;
+    return run->is_part && run->finder->is_numbered;
 }
 
 hs_status
 hs_query_plan(hs_query_run *run)
 {
     const hs_query *query = run->query;
+    const hs_sets  *sets = &query->sets;
     hs_call        *call = run->call;
     hs_status       status = HS_OK;
     if (have_cutoffs(query)) {
@@ -401,22 +320,32 @@ hs_query_plan(hs_query_run *run)
         run->plan.n = 1;
         return status;
     }
-    const int64_t n = query->sets.points->n + (query->sets.queries ? query->sets.queries->n : 0);
+    const bool    has_queries = sets->queries != NULL;
+    const int64_t n = sets->points->n + (has_queries ? sets->queries->n : 0);
     status = hs_box_check(query->box, run->failure);
     if (status != HS_OK) {
         return status;
     }
     hs_call_gather(call, n);
     hs_call_gather_for(call, n, PAIRS_PER_POINT * (double)n, false);
-    status = divide(run);
+    hs_set points = hs_set_with(sets->points, sets->of_points);
+    hs_set queries = hs_set_with(sets->queries, sets->of_queries);
+    /* Without what the rule does not look at. */
+    if (has_queries && !hs_rule_needs_other(query->reach->rule)) {
+        points.radii = points.supports = NULL;
+    } else if (!hs_rule_needs_asking(query->reach->rule)) {
+        queries.radii = queries.supports = NULL;
+    }
+    status = hs_levels_divide(&call->account, &call->options, &points,
+                              has_queries ? &queries : NULL, query->reach, &run->levels,
+                              run->failure);
     if (status == HS_OK) {
         run->has_levels = true;
         if (is_numbered(run)) {
             hs_levels_renumber((int32_t)run->first_point, &run->levels);
         }
-        status = hs_level_plan_choose(&call->account, &call->options, &run->levels, query->box,
-                                      query->options->cutoff, query->options->algorithm,
-                                      &run->plan);
+        status = hs_level_plan_make(&call->account, &call->options, &run->levels, query->box,
+                                    query->options->cutoff, query->options->algorithm, &run->plan);
     } else if (is_numbered(run)) {
         hs_query_name_point(run, status);
     }
@@ -432,24 +361,9 @@ hs_query_name_point(const hs_query_run *run, hs_status status)
     }
 }
 
-/* Which pairs count, of none that are further apart than the cutoff. On failure there is none. */
-static hs_status
-choose(const hs_query *query, double cutoff, hs_call *call, hs_failure *failure)
-{
-    hs_status status = hs_choice_open(query->selection, &query->sets, call, failure);
-    if (status == HS_OK) {
-        status = hs_choice_set_scene(&query->sets, query->box, cutoff, call, failure);
-    }
-    if (status != HS_OK) {
-        hs_choice_close(call);
-    }
-    return status;
-}
-
-/* All zeros but for the step that is to be opened. */
-static void
-begin(const hs_query *query, const hs_finder *finder, hs_call *call, hs_failure *failure,
-      hs_query_run *run)
+void
+hs_query_begin(const hs_query *query, const hs_finder *finder, hs_call *call, hs_failure *failure,
+               hs_query_run *run)
 {
     memset(run, 0, offsetof(hs_query_run, step));
     run->query = query;
@@ -462,15 +376,21 @@ hs_status
 hs_query_open(const hs_query *query, const hs_finder *finder, hs_call *call, hs_query_run *run,
               hs_failure *failure)
 {
-    begin(query, finder, call, failure, run);
-    hs_status status = query->among == NULL ? check_query(query, finder, call, failure)
-                                            : HS_ERR_ARGUMENT;
-    if (status == HS_OK) {
+    hs_query_begin(query, finder, call, failure, run);
+    hs_status status = check_query(query, finder, call, failure);
+    if (status == HS_OK && query->among != NULL) {
+        status = hs_systems_choose(query, call, failure);
+    } else if (status == HS_OK) {
         status = hs_query_plan(run);
-    }
-    if (status == HS_OK) {
-        status =
-            choose(query, query->reach != NULL ? INFINITY : query->options->cutoff, call, failure);
+        if (status == HS_OK && query->selection != NULL) {
+            status = hs_choice_open(query->selection, &query->sets, call, failure);
+        }
+        if (status == HS_OK && call->choice != NULL) {
+            /* None that are further apart than the cutoff. */
+            status = hs_choice_set_scene(&query->sets, query->box,
+                                         query->reach != NULL ? INFINITY : query->options->cutoff,
+                                         call, failure);
+        }
     }
     if (status != HS_OK) {
         hs_query_close(run);
@@ -483,7 +403,7 @@ hs_query_close(hs_query_run *run)
 {
     hs_account *account = &run->call->account;
     hs_query_close_step(run);
-    if (run->kept == NULL) {
+    if (!run->is_part) {
         hs_choice_close(run->call);
     }
     if (run->has_levels) {
@@ -497,25 +417,27 @@ hs_query_close(hs_query_run *run)
 static hs_status
 open_plain(hs_query_run *run)
 {
-    const hs_query   *query = run->query;
-    const hs_options *options = &run->call->options;
-    hs_search        *search = &run->step.search;
-    hs_sets           sets = query->sets;
-    if (options->want & HS_WANT_SHELL) {
+    const hs_query *query = run->query;
+    hs_call        *call = run->call;
+    hs_search      *search = &run->step.search;
+    hs_sets         sets = query->sets;
+    hs_status       status;
+    if (call->options.want & HS_WANT_SHELL) {
         sets.is_plain = true;
-        sets.least_cutoff = hs_least_length(options->shells, options->n_shells);
+        sets.least_cutoff = hs_least_length(call->options.shells, call->options.n_shells);
     }
-    sets.least_cutoff = hs_choice_least_length(run->call->choice, sets.least_cutoff);
+    sets.least_cutoff = hs_choice_least_length(call->choice, sets.least_cutoff);
     sets.follows = run->has_scene;
     if (run->kept == NULL) {
-        return hs_search_open(&sets, query->box, run->call, search, run->failure);
+        status = hs_search_open(&sets, query->box, call, search, run->failure);
+    } else {
+        status = hs_search_build(&sets, query->box, search, run->failure);
+        run->has_scene = status == HS_OK;
+        if (status != HS_OK) {
+            hs_search_close(search);
+        }
     }
-    const hs_status status = hs_search_build(&sets, query->box, search, run->failure);
-    if (status != HS_OK) {
-        hs_search_close(search);
-    }
-    run->has_scene = status == HS_OK;
-    if (status == HS_OK && is_numbered(run)) {
+    if (is_numbered(run) && status == HS_OK) {
         hs_search_renumber(run->first_point, search);
     } else if (is_numbered(run)) {
         hs_query_name_point(run, status);
@@ -527,11 +449,10 @@ hs_status
 hs_query_open_step(hs_query_run *run, int64_t number)
 {
     hs_search      *search = &run->step.search;
-    const hs_status status = !run->has_levels
-                                 ? open_plain(run)
-                                 : hs_level_open(&run->levels, &run->plan, number, run->query->box,
-                                                 run->query->sets.keeps_none, run->call, &run->step,
-                                                 run->failure);
+    const hs_status status = run->has_levels ? hs_level_open(&run->plan, number, run->query->box,
+                                                             run->query->sets.keeps_none, run->call,
+                                                             &run->step, run->failure)
+                                             : open_plain(run);
     if (status != HS_OK) {
         return status;
     }
@@ -621,7 +542,6 @@ hs_query_answer(const hs_query *query, const hs_finder *finder, hs_pairs **resul
     hs_query_run run;
     hs_call      own, *call = &own;
     hs_pairs    *pairs = result != NULL ? hs_pairs_begin(query->options, &failure) : NULL;
-    const bool   has_systems = query->among != NULL;
     if (result == NULL) {
         failure = hs_call_enter(query->options, failure, call);
     } else if (pairs != NULL) {
@@ -629,20 +549,14 @@ hs_query_answer(const hs_query *query, const hs_finder *finder, hs_pairs **resul
     } else {
         return HS_ERR_MEMORY;
     }
-    hs_status status;
-    if (has_systems) {
-        begin(query, finder, call, failure, &run);
-        status = check_query(query, finder, call, failure);
-    } else {
-        status = hs_query_open(query, finder, call, &run, failure);
-    }
+    hs_status status = hs_query_open(query, finder, call, &run, failure);
     if (status == HS_OK && pairs != NULL) {
         hs_pairs_open(pairs, query->sets.points->ndim);
         run.output = &pairs->output;
         run.offsets = &pairs->offsets;
     }
     if (status == HS_OK) {
-        status = has_systems ? hs_systems_find(&run) : finder->find(finder->context, &run);
+        status = query->among != NULL ? hs_systems_find(&run) : finder->find(finder->context, &run);
     }
     hs_query_close(&run);
     if (status == HS_ERR_MEMORY) {

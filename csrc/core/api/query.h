@@ -6,6 +6,7 @@
 #include "../base/base.h"
 #include "../collect/parallel.h"
 #include "../levels/levels.h"
+#include "../search/choice.h"
 #include "../search/search.h"
 
 /*
@@ -15,10 +16,10 @@
  */
 
 /*
- * Checks of what a program of C may get wrong about the arguments of halfshell.h, so
- * that no memory is read or written out of bounds. The binding checks Python's arguments before.
- * Coordinates, boxes and cutoffs are checked when the scene is made (scene.h). Any pointer may be
- * NULL, except the options and the failure that are given to a function hs_check_*.
+ * Checks of what a program of C may get wrong about the arguments of halfshell.h, so that no memory
+ * is read or written out of bounds. The binding checks Python's arguments before. Coordinates,
+ * boxes and cutoffs are checked when the scene is made (scene.h). Any pointer may be NULL, except
+ * the options and the failure that are given to a function hs_check_*.
  */
 
 /* Ends such a call: returns the status. *failure, unless NULL, has no details. */
@@ -30,9 +31,6 @@ void hs_clear_counters(const hs_options *options);
 /* Whether a call that returns an object has these two, without which it cannot begin. *result,
  * unless NULL, is NULL afterwards. */
 bool hs_can_return(hs_pairs **result, const hs_options *options);
-
-/* hs_can_return for objects of other types, once their pointer, unless NULL, has been cleared. */
-bool hs_can_begin(const void *result, const hs_options *options);
 
 /* Whether an array is there that has one entry for each of these points, if there are any. */
 bool hs_has_entries(const void *array, const hs_points *points);
@@ -46,16 +44,14 @@ hs_status hs_check_box(const hs_box *box, int ndim);
 /* Checks the options that every function uses: threads and the memory limit. */
 hs_status hs_check_resources(const hs_options *options);
 
-hs_status hs_check_options(const hs_options *options);
-
-/* Most lengths that distances are sorted by: twice as many are int32. */
-#define HS_MOST_LENGTHS (INT64_C(1) << 30)
+/* `known`: the HS_WANT_ bits that there may be. */
+hs_status hs_check_options(const hs_options *options, unsigned known);
 
 /* The first of ascending lengths that is above 0, or 0. */
 double hs_least_length(const double *lengths, int64_t n);
 
-/* HS_OK, HS_ERR_ARGUMENT, or HS_ERR_EDGES. */
-hs_status hs_check_histogram(const hs_histogram *histogram, hs_failure *failure);
+/* HS_OK, or HS_ERR_EDGES unless there are some, finite, not negative and not descending. */
+hs_status hs_check_lengths(const double *lengths, int64_t n, hs_failure *failure);
 
 /* Points, queries, box and options; failure->in_queries tells queries from points. */
 hs_status hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_box *box,
@@ -103,10 +99,8 @@ typedef struct hs_finder {
 
 /* What a thread that searches several systems keeps from one to the next; zeros at first. */
 typedef struct hs_kept {
-    hs_walker   walker;
-    hs_recorder recorder;
-    hs_backlog  backlog;
-    hs_output   found; /* pairs of one system before they are sorted */
+    hs_keeper keeper;
+    hs_output found; /* pairs of one system before they are sorted */
 } hs_kept;
 
 /*
@@ -121,6 +115,7 @@ struct hs_query_run {
     hs_output       *output;  /* pairs go behind those that it has; NULL: only counting */
     hs_output       *offsets; /* of rows */
     hs_kept         *kept;    /* of a thread that searches several systems; else NULL */
+    bool             is_part; /* one of several systems, which share a choice: */
     int64_t          system, first_point, first_asking; /* its number, and what lies before it */
     int64_t          n_in_all;   /* points or queries that ask, of all systems */
     int64_t          n_pairs;    /* that were counted, of all of them */
@@ -140,12 +135,16 @@ struct hs_query_run {
 hs_status hs_query_answer(const hs_query *query, const hs_finder *finder, hs_pairs **result,
                           hs_failure *failure);
 
-/* Its parts. The first checks a query of one system and plans its steps, for a call that has begun;
- * on failure the run is closed. */
+/* Its parts. A run without a step, for a call that has begun. */
+void hs_query_begin(const hs_query *query, const hs_finder *finder, hs_call *call,
+                    hs_failure *failure, hs_query_run *run);
+
+/* Begins it, checks the query, chooses pairs, and of one system plans the steps; on failure the run
+ * is closed. */
 hs_status hs_query_open(const hs_query *query, const hs_finder *finder, hs_call *call,
                         hs_query_run *run, hs_failure *failure);
 
-/* Plans the steps of a query that has been checked; to be closed in any case. */
+/* Plans the steps of one system, whose query has been checked. */
 hs_status hs_query_plan(hs_query_run *run);
 
 /* Idempotent. */
@@ -161,11 +160,30 @@ hs_status hs_query_each_step(hs_query_run *run, hs_use_fn use, void *context);
 /* Counts the row of a failure, if it is that of a point, among those of all systems. */
 void hs_query_name_point(const hs_query_run *run, hs_status status);
 
-/* Several systems (systems.c): checks what they share; finds in each of them, by the threads of the
- * call; adds up what they would have taken. */
+/* One of several systems, cut from all; it must not move. */
+typedef struct hs_system {
+    hs_query   query;
+    hs_set     points, queries;
+    hs_box     own_box;
+    hs_options options; /* with its own cutoff */
+    hs_choice  choice;  /* as all have it, in its box */
+} hs_system;
+
+/* Several systems (systems.c): checks what they share; chooses their pairs, but for what boxes
+ * decide; finds in each of them, by the threads of the call; adds up what they would have taken. */
 hs_status hs_systems_check(const hs_query *query, hs_failure *failure);
+hs_status hs_systems_choose(const hs_query *query, hs_call *call, hs_failure *failure);
 hs_status hs_systems_find(hs_query_run *run);
 void      hs_systems_add_shortage(const hs_query *query, hs_shortage *shortage);
+
+/* What all cuts of a query have; that of `run`, which has begun, becomes that of the system. */
+void hs_system_begin(const hs_query *all, const hs_options *options, hs_system *system,
+                     hs_query_run *run);
+
+/* System s of all: cuts it, in place of another, and plans its steps; to be closed in any case.
+ * `choice` is that of all, or NULL. On failure that names it. */
+hs_status hs_system_open(const hs_query *all, int64_t s, const hs_choice *choice, hs_system *system,
+                         hs_query_run *run);
 
 /* A result whose call, with these options, has been entered; *failure becomes where the failure
  * goes. hs_pairs_finish must follow. NULL when memory is short: then the call has ended. */

@@ -9,7 +9,7 @@
 #include <string.h>
 
 /* stream.c: pairs that are never stored all at once: in blocks, shown to a function, or joined to
- * clusters. A stream holds a search that is ready to be walked, a bookmark of how
+ * clusters. A stream holds a search of each system that is ready to be walked, a bookmark of how
  * far that has come, and the pairs that were found and not yet handed out. */
 
 /* Pairs that are looked for at a time, at least: less would not pay for walkers and threads. */
@@ -18,20 +18,25 @@
 /* Pairs that room is reserved for before any is found, at most; larger blocks grow. */
 #define MOST_EXPECTED 0x1p24
 
-struct hs_stream {
-    hs_call      call;  /* that opened it; it has threads only while it looks for pairs */
-    hs_query     query; /* with nothing of the caller's but */
-    hs_box       box;   /* where it has any */
+/* One system. What it has points to nothing of the caller's. */
+typedef struct source {
+    hs_system    system;
     hs_query_run run;
     int64_t      n_steps; /* that have been opened */
-    int          ndim;
-    hs_output    held; /* pairs from `begin` on wait to be handed out */
-    int64_t      begin;
-    int64_t      max_pairs;
-    hs_bookmark  next; /* where to go on looking */
-    double       told; /* the largest fraction that poll has been called with */
-    hs_poll_fn   poll; /* of the caller, during hs_stream_next */
-    void        *context;
+} source;
+
+struct hs_stream {
+    hs_call     call;      /* that opened it; it has threads only while it looks for pairs */
+    source      own;       /* of a stream of one system */
+    source     *sources;   /* that one, or owned */
+    int64_t     n_sources; /* the first ones, which have been opened */
+    int64_t     at;        /* the present one */
+    hs_choice  *choice;    /* owned: of all, where there are several; or NULL */
+    int         ndim;
+    hs_output   held; /* pairs from `begin` on wait to be handed out */
+    int64_t     begin;
+    int64_t     max_pairs;
+    hs_bookmark next; /* where to go on looking */
 };
 
 static int64_t
@@ -40,18 +45,25 @@ waiting(const hs_stream *stream)
     return stream->held.n_pairs - stream->begin;
 }
 
+static source *
+present(const hs_stream *stream)
+{
+    return &stream->sources[stream->at];
+}
+
 /* Whether the present search has found all that it can. */
 static bool
 is_over(const hs_stream *stream)
 {
-    const hs_search *search = stream->run.search;
+    const hs_search *search = present(stream)->run.search;
     return search == NULL || stream->next.point == hs_search_asking(search)->n;
 }
 
 static bool
 is_all_found(const hs_stream *stream)
 {
-    return is_over(stream) && stream->n_steps == stream->run.plan.n;
+    return stream->n_sources == 0 || (stream->at == stream->n_sources - 1 && is_over(stream) &&
+                                      present(stream)->n_steps == present(stream)->run.plan.n);
 }
 
 /* An empty output, columns as the options say. */
@@ -84,9 +96,10 @@ fill_of(const hs_stream *stream)
 static hs_status
 move_waiting(hs_stream *stream, int64_t first, hs_output *moved)
 {
-    const double expected = fmin((double)fill_of(stream), stream->run.search->grid.expected_pairs);
+    const hs_search *search = present(stream)->run.search; /* or none is left */
+    const double     all = search != NULL ? search->grid.expected_pairs : 0.0;
     open_output(stream, &stream->call.account, moved);
-    hs_output_reserve_hint(moved, fmin(expected, MOST_EXPECTED));
+    hs_output_reserve_hint(moved, fmin(fmin((double)fill_of(stream), all), MOST_EXPECTED));
     const hs_status status = copy_waiting(stream, first, stream->held.n_pairs - first, moved);
     if (status != HS_OK) {
         hs_output_free(moved);
@@ -98,7 +111,7 @@ move_waiting(hs_stream *stream, int64_t first, hs_output *moved)
 static hs_status
 fill(hs_stream *stream, hs_failure *failure)
 {
-    hs_search *search = stream->run.search;
+    hs_search *search = present(stream)->run.search;
     hs_output  moved;
     if (stream->begin > 0 || stream->held.capacity == 0) {
         const hs_status status = move_waiting(stream, stream->begin, &moved);
@@ -121,17 +134,41 @@ fill(hs_stream *stream, hs_failure *failure)
     return hs_poll(&search->call->options, hs_search_fraction(search, stream->next.point));
 }
 
-/* The next search, once the one before is over. */
 static hs_status
-open_step(hs_stream *stream, hs_failure *failure)
+open_step(source *one)
 {
-    stream->run.failure = failure;
-    hs_query_close_step(&stream->run);
-    const hs_status status = hs_query_open_step(&stream->run, stream->n_steps);
-    if (status == HS_OK) {
-        stream->next = (hs_bookmark){.point = 0};
-        stream->n_steps++;
+    hs_query_close_step(&one->run);
+    const hs_status status = hs_query_open_step(&one->run, one->n_steps);
+    one->n_steps += status == HS_OK;
+    return status;
+}
+
+/* From here on pairs are those of this system, in the way that is its own. */
+static void
+take_up(hs_stream *stream, int64_t at)
+{
+    source *one = &stream->sources[at];
+    stream->at = at;
+    stream->call.options.cutoff = one->system.options.cutoff;
+    if (stream->choice != NULL) {
+        stream->call.choice = &one->system.choice;
     }
+}
+
+/* The next search, once the one before is over; that of another system may be open already. */
+static hs_status
+go_on(hs_stream *stream, hs_failure *failure)
+{
+    source   *one = present(stream);
+    hs_status status = HS_OK;
+    one->run.failure = failure;
+    if (one->n_steps < one->run.plan.n) {
+        status = open_step(one);
+    } else {
+        hs_query_close(&one->run);
+        take_up(stream, stream->at + 1);
+    }
+    stream->next = status == HS_OK ? (hs_bookmark){.point = 0} : stream->next;
     return status;
 }
 
@@ -185,16 +222,6 @@ take_block(hs_stream *stream, hs_pairs **result)
     return HS_OK;
 }
 
-/* A hs_poll_fn: the fraction does not fall where pairs are sought a second time, because they did
- * not fit a block or the caller stopped. */
-static bool
-tell(void *context, double fraction)
-{
-    hs_stream *stream = context;
-    stream->told = hs_larger(stream->told, fraction);
-    return stream->poll(stream->context, stream->told);
-}
-
 hs_status
 hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **block,
                hs_failure *failure)
@@ -208,11 +235,9 @@ hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **blo
     hs_entry *entry = &stream->call.entry;
     hs_status status = HS_OK;
     failure = hs_enter(failure, entry);
-    stream->poll = poll;
-    stream->context = context;
-    hs_call_set_poll(poll != NULL ? tell : NULL, stream, &stream->call);
+    hs_call_set_poll(poll, context, &stream->call);
     while (status == HS_OK && waiting(stream) < stream->max_pairs && !is_all_found(stream)) {
-        status = is_over(stream) ? open_step(stream, failure) : fill(stream, failure);
+        status = is_over(stream) ? go_on(stream, failure) : fill(stream, failure);
     }
     if (status == HS_OK && waiting(stream) > 0) {
         status = take_block(stream, block);
@@ -223,38 +248,80 @@ hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **blo
     return status;
 }
 
-/* The options of the stream's search: what the caller lends for one call is left out. */
-static hs_options
-options_of_stream(const hs_options *options)
+static void
+free_sources(hs_stream *stream)
 {
-    hs_options of_stream = *options;
-    of_stream.sorted = false;
-    of_stream.out = NULL;
-    of_stream.counters = NULL;
-    return of_stream;
+    hs_call *call = &stream->call;
+    for (int64_t s = 0; s < stream->n_sources; s++) {
+        hs_query_close(&stream->sources[s].run);
+    }
+    if (stream->choice != NULL) {
+        call->choice = stream->choice;
+        hs_choice_close(call);
+    }
+    if (stream->sources != &stream->own) {
+        hs_free(&call->account, stream->sources);
+    }
 }
 
-/* Opens what the caller's arrays are needed for: the one search, or what all steps of a reach are
- * made of. Labels last until hs_stream_open returns. */
+/* Opens what the caller's arrays are needed for, of a run whose query is its system's: the one
+ * search, or what all steps of a reach are made of. */
 static hs_status
-open_search(hs_stream *stream, hs_failure *failure)
+open_source(source *one)
 {
-    static const hs_finder of_stream = {.find = NULL};
-    hs_query              *query = &stream->query;
-    hs_query_run          *run = &stream->run;
-    hs_status              status = hs_query_open(query, &of_stream, &stream->call, run, failure);
+    hs_system      *system = &one->system;
+    const hs_status status = one->run.has_levels ? HS_OK : open_step(one);
+    if (system->query.box != NULL) {
+        system->own_box = *system->query.box;
+        system->query.box = &system->own_box;
+    }
+    return status;
+}
+
+/* Labels last until hs_stream_open returns. */
+static hs_status
+open_alone(hs_stream *stream, const hs_query *query, const hs_finder *finder, hs_failure *failure)
+{
+    source *one = stream->sources = &stream->own;
+    one->n_steps = 0;
+    one->system.query = *query;
+    one->system.options = *query->options;
+    one->system.query.options = &one->system.options;
+    hs_status status = hs_query_open(&one->system.query, finder, &stream->call, &one->run, failure);
+    stream->n_sources = 1;
     if (status == HS_OK) {
-        status = !run->has_levels ? open_step(stream, failure) : HS_OK;
-        status = status == HS_OK ? hs_choice_keep_labels(&query->sets, &stream->call) : status;
-        if (status != HS_OK) {
-            hs_query_close(run);
-        }
+        status = hs_choice_keep_labels(&query->sets, &stream->call);
     }
-    if (query->box != NULL) {
-        stream->box = *query->box;
-        query->box = &stream->box;
+    return status == HS_OK ? open_source(one) : status;
+}
+
+static hs_status
+open_systems(hs_stream *stream, const hs_query *all, const hs_finder *finder, hs_failure *failure)
+{
+    const int64_t n = all->among->points != NULL ? all->among->points->n_systems : 0;
+    hs_call      *call = &stream->call;
+    hs_query_run  of_all;
+    hs_status     status = hs_query_open(all, finder, call, &of_all, failure);
+    if (status == HS_OK) {
+        status = hs_choice_keep_labels(&all->sets, call);
     }
-    hs_call_tell_limit(&stream->call, status, failure);
+    stream->choice = call->choice;
+    if (status == HS_OK) {
+        stream->sources = hs_alloc(&call->account, HS_FOR_INDICES, n, sizeof(source));
+        status = stream->sources != NULL ? HS_OK : HS_ERR_MEMORY;
+    }
+    for (int64_t s = 0; status == HS_OK && s < n; s++) {
+        source *one = &stream->sources[stream->n_sources++];
+        one->n_steps = 0;
+        hs_query_begin(all, finder, call, failure, &one->run);
+        hs_system_begin(all, all->options, &one->system, &one->run);
+        status = hs_system_open(all, s, stream->choice, &one->system, &one->run);
+        status = status == HS_OK ? open_source(one) : status;
+        failure->system = status == HS_OK ? -1 : s;
+    }
+    if (status == HS_OK && stream->n_sources > 0) {
+        take_up(stream, 0);
+    }
     return status;
 }
 
@@ -262,36 +329,43 @@ hs_status
 hs_stream_open(const hs_among *among, const hs_options *options, int64_t max_pairs,
                hs_stream **result, hs_failure *failure)
 {
+    static const hs_finder of_pairs = {.is_numbered = true};
     if (result != NULL) {
         *result = NULL;
     }
-    if (!hs_can_begin(result, options) || max_pairs < 1) {
+    if (result == NULL || options == NULL || max_pairs < 1) {
         return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
     }
-    const hs_options of_stream = options_of_stream(options);
-    hs_stream       *stream = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *stream);
+    hs_options of_stream = *options; /* without what the caller lends for one call */
+    of_stream.sorted = false;
+    of_stream.out = NULL;
+    of_stream.counters = NULL;
+    hs_stream *stream = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *stream);
     if (stream == NULL) {
         return hs_end_early(HS_ERR_MEMORY, NULL, failure);
     }
     hs_call *call = &stream->call;
+    hs_query query = hs_query_among(among, HS_HALF_LIST, &of_stream);
+    query.sets.keeps_none = true;
     failure = hs_call_enter(&of_stream, failure, call);
-    stream->query = hs_query_among(among, HS_HALF_LIST, &of_stream);
-    stream->query.sets.keeps_none = true;
-    stream->n_steps = 0;
-    const hs_status status = open_search(stream, failure);
+    stream->n_sources = stream->at = stream->begin = 0;
+    stream->choice = NULL;
+    stream->max_pairs = max_pairs;
+    stream->next = (hs_bookmark){.point = 0};
+    stream->sources = NULL;
+    const hs_status status = query.among != NULL ? open_systems(stream, &query, &of_pairs, failure)
+                                                 : open_alone(stream, &query, &of_pairs, failure);
+    hs_call_tell_limit(call, status, failure);
     hs_call_leave(call, 0);
     hs_call_detach(call);
     if (status != HS_OK) {
+        free_sources(stream);
         hs_account_close(&call->account);
         hs_free(NULL, stream);
         return status;
     }
-    stream->ndim = stream->query.sets.points->ndim;
+    stream->ndim = query.sets.points->ndim;
     open_output(stream, &call->account, &stream->held);
-    stream->begin = 0;
-    stream->max_pairs = max_pairs;
-    stream->next = (hs_bookmark){.point = 0};
-    stream->told = 0.0;
     *result = stream;
     return HS_OK;
 }
@@ -303,17 +377,23 @@ hs_stream_free(hs_stream *stream)
         return;
     }
     hs_output_free(&stream->held);
-    hs_query_close(&stream->run);
+    free_sources(stream);
     hs_account_close(&stream->call.account);
     hs_free(NULL, stream);
 }
 
 /* Pairs handed to a function as they are found, stored nowhere. */
 
-#define WANTED (HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)
-
 /* Work of a call in candidates, for polling: functions take tens of nanoseconds and more. */
 #define CALL_WORK 32
+
+/* What the threads share. */
+typedef struct visiting {
+    const hs_visit *visit;
+    unsigned        want; /* columns, with indices of so many bytes */
+    int             index_bytes;
+    hs_query_run   *run; /* of the step; counts the pairs of threads that have ended */
+} visiting;
 
 /* What one thread works with. */
 typedef struct visitor {
@@ -367,34 +447,25 @@ visit_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hit
     return stops != 0 ? HS_ENOUGH : HS_OK;
 }
 
-/* What the threads share. */
-typedef struct visiting {
-    const hs_visit *visit;
-    unsigned        want; /* columns, with indices of so many bytes */
-    int             index_bytes;
-    hs_search      *search;
-    int64_t         n_visited; /* by those that have ended */
-} visiting;
-
 static hs_status
-open_visitor(void *job, void *place)
+open_visitor(void *context, void *state, const hs_walker *walker)
 {
-    const visiting *shared = job;
-    visitor        *doing = place;
+    const visiting *shared = context;
+    visitor        *doing = state;
     doing->visit = shared->visit;
-    hs_output_init(NULL, shared->search->scene.ndim, shared->want, shared->index_bytes,
+    hs_output_init(NULL, walker->search->scene.ndim, shared->want, shared->index_bytes,
                    &doing->part);
-    return hs_recorder_init(&shared->search->call->account, &doing->part, HS_MOST_HITS,
-                            &doing->recorder);
+    return hs_recorder_init(&shared->run->call->account, &doing->part,
+                            walker->scanner.block.most_hits, &doing->recorder);
 }
 
 static void
-close_visitor(void *job, void *place)
+close_visitor(void *context, void *state)
 {
-    visiting *shared = job;
-    visitor  *doing = place;
-    shared->n_visited += doing->n_visited;
-    hs_recorder_free(&shared->search->call->account, &doing->recorder);
+    visiting *shared = context;
+    visitor  *doing = state;
+    shared->run->n_pairs += doing->n_visited;
+    hs_recorder_free(&shared->run->call->account, &doing->recorder);
     hs_output_free(&doing->part);
 }
 
@@ -402,27 +473,18 @@ close_visitor(void *job, void *place)
 static hs_status
 visit_step(void *context, hs_query_run *run)
 {
-    visiting shared = *(const visiting *)context;
-    hs_crew  crew = {.call = run->call,
-                     .job = &shared,
-                     .worker_size = sizeof(visitor),
-                     .open = open_visitor,
-                     .close = close_visitor};
-    shared.search = run->search;
+    visiting         shared = *(const visiting *)context;
+    const hs_visitor all = {.use = hs_record_use(shared.want),
+                            .visit = visit_hits,
+                            .shared = &shared,
+                            .state_size = sizeof(visitor),
+                            .open = open_visitor,
+                            .close = close_visitor};
+    shared.run = run;
     if (!shared.visit->thread_safe) { /* other threads only make the search ready */
         hs_call_dismiss(run->call);
     }
-    hs_status status = hs_crew_open(&crew);
-    if (status == HS_OK) {
-        const hs_visitors all = {.use = hs_record_use(shared.want),
-                                 .visit = visit_hits,
-                                 .contexts = crew.workers,
-                                 .context_size = crew.worker_size};
-        status = hs_parallel_visit(run->search, &all, NULL, run->failure);
-    }
-    hs_crew_close(&crew);
-    run->n_pairs += shared.n_visited;
-    return status;
+    return hs_parallel_visit(run->search, &all, NULL, run->failure);
 }
 
 /* A hs_use_fn. */
@@ -471,7 +533,7 @@ hs_pairs_visit(const hs_among *among, const hs_options *options, const hs_visit 
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     hs_options of_visit = *options;
-    of_visit.want = WANTED;
+    of_visit.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
     of_visit.index_bytes = 8;
     return visit_columns(among, &of_visit, visit, n_visited, failure);
 }
@@ -520,13 +582,6 @@ adopt_points(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *use
     return 0;
 }
 
-/* Whether some point is near enough to a cluster only. */
-static bool
-has_others(const uint8_t *core, int64_t n)
-{
-    return core != NULL && n > 0 && memchr(core, 0, (size_t)n) != NULL;
-}
-
 /* Whether anything repeats, in any system. */
 static bool
 is_periodic(const hs_query *query)
@@ -562,7 +617,8 @@ join_all_pairs(const hs_among *among, const hs_options *options, clustering *doi
     }
     const int64_t found =
         hs_components_label(&doing->components, doing->core, doing->labels, winding);
-    if (has_others(doing->core, n)) {
+    if (doing->core != NULL && n > 0 && memchr(doing->core, 0, (size_t)n) != NULL) {
+        /* some point is near enough to a cluster only */
         visit.pairs = adopt_points;
         of_visit.want = HS_WANT_I | HS_WANT_J;
         of_visit.counters = NULL;

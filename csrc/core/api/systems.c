@@ -21,30 +21,23 @@
 #define POLL_WORK   (INT64_C(1) << 21)
 #define SYSTEM_WORK 1024
 
-/* The points of system s. */
-static hs_points
-points_of_system(const hs_set *all, int64_t s)
-{
-    hs_points points = all->at;
-    points.n = all->first[s + 1] - all->first[s];
-    if (points.n > 0) { /* without points there is no first row */
-        points.data = (const char *)points.data + all->first[s] * points.row_stride;
-    }
-    return points;
-}
-
-/* With what is known of them. */
+/* The points of system s, with what is known of them. */
 static hs_set
 set_of_system(const hs_set *all, int64_t s)
 {
     const int64_t first = all->first[s], entries = (int64_t)all->at.ndim * all->at.ndim;
-    return (hs_set){.at = points_of_system(all, s),
-                    .radii = all->radii != NULL ? all->radii + first : NULL,
-                    .supports = all->supports != NULL ? all->supports + first * entries : NULL,
-                    .weights = all->weights != NULL ? all->weights + first : NULL,
-                    .types = all->types != NULL ? all->types + first : NULL,
-                    .groups = all->groups != NULL ? all->groups + first : NULL,
-                    .labels = all->labels != NULL ? all->labels + first : NULL};
+    hs_set        set = {.at = all->at,
+                         .radii = all->radii != NULL ? all->radii + first : NULL,
+                         .supports = all->supports != NULL ? all->supports + first * entries : NULL,
+                         .weights = all->weights != NULL ? all->weights + first : NULL,
+                         .types = all->types != NULL ? all->types + first : NULL,
+                         .groups = all->groups != NULL ? all->groups + first : NULL,
+                         .labels = all->labels != NULL ? all->labels + first : NULL};
+    set.at.n = all->first[s + 1] - first;
+    if (set.at.n > 0) { /* without points there is no first row */
+        set.at.data = (const char *)set.at.data + first * set.at.row_stride;
+    }
+    return set;
 }
 
 /* n_systems and first of a set; what it reads is first alone. */
@@ -135,45 +128,73 @@ box_of_system(const hs_among *among, int64_t s, hs_box *own_box)
     return own_box;
 }
 
-/* A query of one of several systems; it must not move. */
-typedef struct system_query {
-    hs_query   query;
-    hs_set     points, queries;
-    hs_box     own_box;
-    hs_options options; /* with its own cutoff */
-} system_query;
-
 static void
-cut_system(const hs_query *all, int64_t s, system_query *cut)
+cut_system(const hs_query *all, int64_t s, hs_system *system)
 {
     const hs_among *among = all->among;
-    cut->points = set_of_system(among->points, s);
-    cut->query.sets.points = &cut->points.at;
-    cut->query.sets.of_points = &cut->points;
+    system->points = set_of_system(among->points, s);
+    system->query.sets.points = &system->points.at;
+    system->query.sets.of_points = &system->points;
     if (among->queries != NULL) {
-        cut->queries = set_of_system(among->queries, s);
-        cut->query.sets.queries = &cut->queries.at;
-        cut->query.sets.of_queries = &cut->queries;
+        system->queries = set_of_system(among->queries, s);
+        system->query.sets.queries = &system->queries.at;
+        system->query.sets.of_queries = &system->queries;
     }
-    cut->query.box = box_of_system(among, s, &cut->own_box);
+    system->query.box = box_of_system(among, s, &system->own_box);
     if (among->each != NULL && among->each->cutoffs != NULL) {
-        cut->options.cutoff = among->each->cutoffs[s];
+        system->options.cutoff = among->each->cutoffs[s];
     }
 }
 
-/* What all cuts of a query have. */
 static void
-begin_cuts(const hs_query *all, const hs_options *options, system_query *cut)
+begin_cuts(const hs_query *all, const hs_options *options, hs_system *system)
 {
-    cut->query = *all;
-    cut->options = *options;
-    cut->query.options = &cut->options;
+    system->query = *all;
+    system->options = *options;
+    system->query.options = &system->options;
+}
+
+void
+hs_system_begin(const hs_query *all, const hs_options *options, hs_system *system,
+                hs_query_run *run)
+{
+    const hs_among *among = all->among;
+    begin_cuts(all, options, system);
+    run->query = &system->query;
+    run->is_part = true;
+    run->n_in_all = (among->queries != NULL ? among->queries : among->points)->at.n;
+}
+
+hs_status
+hs_system_open(const hs_query *all, int64_t s, const hs_choice *choice, hs_system *system,
+               hs_query_run *run)
+{
+    const hs_among *among = all->among;
+    const bool      is_numbered = run->finder->is_numbered;
+    hs_status       status = HS_OK;
+    cut_system(all, s, system);
+    run->system = s;
+    run->first_point = among->points->first[s];
+    run->first_asking = (among->queries != NULL ? among->queries : among->points)->first[s];
+    run->call->options.cutoff = system->options.cutoff;
+    if (choice != NULL) {
+        run->call->choice = &system->choice;
+        hs_choice_cut(choice, is_numbered ? 0 : run->first_point,
+                      is_numbered ? 0 : run->first_asking, &system->choice);
+        if (hs_choice_excludes(choice)) {
+            status = hs_box_check(system->query.box, run->failure);
+            status = status == HS_OK ? hs_choice_set_box(system->query.box, among->points->at.ndim,
+                                                         &system->choice)
+                                     : status;
+        }
+    }
+    return status == HS_OK ? hs_query_plan(run) : status;
 }
 
 void
 hs_systems_add_shortage(const hs_query *query, hs_shortage *shortage)
 {
-    system_query cut;
+    hs_system cut;
     begin_cuts(query, query->options, &cut);
     for (int64_t s = 0; s < query->among->points->n_systems; s++) {
         cut_system(query, s, &cut);
@@ -197,10 +218,8 @@ typedef struct systems_job {
 typedef struct worker {
     hs_committer committer;
     systems_job *job;
-    hs_options   options; /* of the committer: their poll is that of all threads */
     hs_call      call;
-    hs_choice    choice; /* as all have it, in the box of the present system */
-    system_query cut;    /* the present system */
+    hs_system    system; /* the present one */
     hs_kept      kept;
     hs_output   *target;           /* that of all, or the backlog */
     hs_output    entries, offsets; /* owned; of one system, which are numbered afterwards */
@@ -213,7 +232,7 @@ static bool
 poll_for_all(void *context, double fraction)
 {
     const worker *me = context;
-    return hs_poll(&me->options, fraction) == HS_OK;
+    return hs_poll(me->committer.options, fraction) == HS_OK;
 }
 
 /* How much of all is done when this system begins. */
@@ -266,37 +285,6 @@ append(worker *me)
     return HS_OK;
 }
 
-/* Which pairs of the present system count, in its box. */
-static hs_status
-choose_in_system(worker *me)
-{
-    const hs_choice *all = me->job->all->call->choice;
-    const hs_query  *query = &me->cut.query;
-    if (all == NULL) {
-        return HS_OK;
-    }
-    hs_choice_cut(all, me->run.finder->is_numbered ? 0 : me->run.first_point,
-                  me->run.finder->is_numbered ? 0 : me->run.first_asking, &me->choice);
-    if (!hs_choice_excludes(all)) {
-        return HS_OK;
-    }
-    const hs_status status = hs_box_check(query->box, &me->committer.failure);
-    return status == HS_OK ? hs_choice_set_box(query->box, query->sets.points->ndim, &me->choice)
-                           : status;
-}
-
-/* After a system: what it took, and sometimes a poll. */
-static hs_status
-count_work(worker *me, int64_t n_candidates)
-{
-    me->work += SYSTEM_WORK + n_candidates;
-    if (me->work <= POLL_WORK) {
-        return HS_OK;
-    }
-    me->work = 0;
-    return hs_poll(&me->options, done_before(me->job, me->run.system + 1));
-}
-
 static hs_status
 search_system(worker *me, int64_t s)
 {
@@ -306,11 +294,6 @@ search_system(worker *me, int64_t s)
     hs_call           *call = &me->call;
     const int64_t      before = call->done.candidates;
     hs_stretch         whole = {0.0, 1.0};
-    cut_system(job->all->query, s, &me->cut);
-    run->system = s;
-    run->first_point = job->all->query->among->points->first[s];
-    run->first_asking = job->asking->first[s];
-    call->options.cutoff = me->cut.options.cutoff;
     if (!finder->is_numbered) { /* it tells how much of this system is done */
         whole = hs_call_begin_part(call, done_before(job, s), done_before(job, s + 1));
     }
@@ -319,10 +302,7 @@ search_system(worker *me, int64_t s)
         hs_output_init(&call->account, output->ndim, output->columns, output->index_bytes,
                        &me->entries);
     }
-    hs_status status = choose_in_system(me);
-    if (status == HS_OK) {
-        status = hs_query_plan(run);
-    }
+    hs_status status = hs_system_open(job->all->query, s, job->all->call->choice, &me->system, run);
     if (status == HS_OK) {
         status = finder->find(finder->context, run);
     }
@@ -342,7 +322,12 @@ search_system(worker *me, int64_t s)
         me->committer.failure.system = s;
         return status;
     }
-    return count_work(me, call->done.candidates - before);
+    me->work += SYSTEM_WORK + call->done.candidates - before;
+    if (me->work <= POLL_WORK) {
+        return HS_OK;
+    }
+    me->work = 0;
+    return hs_poll(me->committer.options, done_before(job, s + 1));
 }
 
 /* A hs_range_fn. */
@@ -380,28 +365,20 @@ open_worker(void *context, void *place)
     worker             *me = place;
     hs_query_run       *run = &me->run;
     me->job = job;
-    me->options = *options; /* their poll counts already, for the whole call */
-    me->committer.options = &me->options;
     hs_call_begin(options, &me->call);
     me->call.options.threads = 1;
     me->call.options.out = NULL;
-    if (options->poll != NULL) {
+    if (options->poll != NULL) { /* which counts already, for the whole call */
         hs_call_set_poll(poll_for_all, me, &me->call);
     }
-    if (all->call->choice != NULL) {
-        me->call.choice = &me->choice;
-    }
-    begin_cuts(all->query, &me->call.options, &me->cut);
-    run->call = &me->call;
-    run->query = &me->cut.query;
+    run->call = &me->call; /* all else is zero */
     run->finder = all->finder;
     run->failure = &me->committer.failure;
     run->kept = &me->kept;
-    run->n_in_all = job->asking->at.n;
+    hs_system_begin(all->query, &me->call.options, &me->system, run);
     hs_search_begin(&me->call, &run->step.search);
     if (all->output != NULL) {
-        hs_backlog_init(all->output, &me->committer, &me->kept.backlog);
-        me->committer.pairs = &me->kept.backlog.pairs;
+        me->kept.keeper.committer = &me->committer;
         me->target = job->is_direct ? all->output : me->committer.pairs;
         run->output = all->finder->is_numbered ? me->target : &me->entries;
         run->offsets = &me->offsets;
@@ -417,9 +394,7 @@ close_worker(void *context, void *place)
     worker      *me = place;
     hs_account  *account = &me->call.account;
     hs_call     *total = job->all->call;
-    hs_backlog_free(account, &me->kept.backlog);
-    hs_walker_close(&me->run.step.search, &me->kept.walker);
-    hs_recorder_free(account, &me->kept.recorder);
+    hs_keeper_close(&me->run.step.search, &me->kept.keeper);
     hs_output_free(&me->kept.found);
     me->call.done.polls = 0; /* counted by the call */
     hs_call_add_counters(total, &me->call.done);
@@ -431,33 +406,29 @@ close_worker(void *context, void *place)
     hs_account_close(account);
 }
 
-/* Each thread has an account of its own: together they must not pass the limit of the call. */
-static void
-share_limit(hs_options *options, int n_threads)
-{
-    if (n_threads > 1 && options->find_limit != NULL) {
-        options->memory_limit =
-            fmin(options->memory_limit, options->find_limit(options->find_context));
-        options->find_limit = NULL;
-    }
-    options->memory_limit /= n_threads;
-}
-
 /* Searches all systems, of which there is one at least, by a team. */
 static hs_status
 search_by_team(systems_job *job, hs_failure *failure)
 {
     const hs_finder *finder = job->all->finder;
     hs_call         *total = job->all->call;
+    hs_options      *options = &total->options;
     hs_output       *output = job->all->output;
     const double     n_points = (double)job->all->query->sets.points->n;
     const double     work = finder->is_numbered ? n_points : n_points + job->n_asking;
-    const int        n_threads = finder->one_thread ? 1 : hs_call_threads(work, &total->options);
+    const int        n_threads = finder->one_thread ? 1 : hs_call_threads(work, options);
     const int64_t    in_range = (int64_t)(RANGE_POINTS * job->n_systems / (job->n_asking + 1.0));
     total->team = hs_team_create(job->n_systems < n_threads ? (int)job->n_systems : n_threads);
-    share_limit(&total->options, hs_team_size(total->team));
+    const int team_size = hs_team_size(total->team);
+    /* Each thread has an account of its own: together they must not pass the limit of the call. */
+    if (team_size > 1 && options->find_limit != NULL) {
+        options->memory_limit =
+            fmin(options->memory_limit, options->find_limit(options->find_context));
+        options->find_limit = NULL;
+    }
+    options->memory_limit /= team_size;
     job->in_range = in_range > 1 ? in_range : 1;
-    job->is_direct = hs_team_size(total->team) == 1 && output != NULL && !output->fixed;
+    job->is_direct = team_size == 1 && output != NULL && !output->fixed;
     hs_crew crew = {.call = total,
                     .job = job,
                     .worker_size = sizeof(worker),
@@ -469,9 +440,9 @@ search_by_team(systems_job *job, hs_failure *failure)
     return hs_crew_run(&crew, failure);
 }
 
-/* Which pairs count. Boxes are looked at with their systems. */
-static hs_status
-choose(const hs_query *query, hs_call *call, hs_failure *failure)
+/* Boxes are looked at with their systems. */
+hs_status
+hs_systems_choose(const hs_query *query, hs_call *call, hs_failure *failure)
 {
     hs_status status = hs_choice_open(query->selection, &query->sets, call, failure);
     if (status == HS_OK && call->choice != NULL && query->box != NULL &&
@@ -492,8 +463,8 @@ hs_systems_find(hs_query_run *all)
                            .asking = asking,
                            .n_asking = asking->at.n > 0 ? (double)asking->at.n : 1.0,
                            .n_systems = asking->n_systems};
-    hs_status       status = choose(query, call, all->failure);
-    if (status == HS_OK && all->finder->has_rows) {
+    hs_status       status = HS_OK;
+    if (all->finder->has_rows) {
         status =
             hs_output_open_offsets(&call->account, asking->at.n + 1, all->offsets, &job.lengths);
     }

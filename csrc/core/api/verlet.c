@@ -70,23 +70,21 @@ is_length(double x)
     return x >= 0.0 && isfinite(x);
 }
 
-/* cutoff + skin, rounded up. */
-static double
-radius_of(double cutoff, double skin)
+/* Points, box and options. */
+static hs_status
+check(const hs_points *points, const hs_box *box, const hs_options *options, hs_failure *failure)
 {
-    const hs_dw sum = hs_two_sum(cutoff, skin);
-    return sum.lo > 0.0 ? hs_next_up(sum.hi) : sum.hi;
+    const hs_status status = hs_check_arguments(points, NULL, box, options, failure);
+    return status == HS_OK ? hs_box_check(box, failure) : status;
 }
 
-/* The frame that is not in use. */
-static int
-spare_frame(const hs_verlet *list)
+/* The same, and then the coordinates, which are the caller's to free. */
+static hs_status
+load(const hs_points *points, const hs_box *box, const hs_options *options, hs_cloud *cloud,
+     hs_failure *failure)
 {
-    int f = 0;
-    while (f == list->built || f == list->now) {
-        f++;
-    }
-    return f;
+    const hs_status status = check(points, box, options, failure);
+    return status == HS_OK ? hs_cloud_load(NULL, NULL, points, options, cloud, failure) : status;
 }
 
 /* The list serves the points of frame `next` as well, or *margin is negative. */
@@ -116,7 +114,8 @@ try_to_keep(hs_verlet *list, int next, const hs_options *options, double *margin
 static hs_status
 build(hs_verlet *list, int next, const hs_options *options, double skin, hs_failure *failure)
 {
-    const double radius = radius_of(options->cutoff, skin);
+    const hs_dw  sum = hs_two_sum(options->cutoff, skin);
+    const double radius = sum.lo > 0.0 ? hs_next_up(sum.hi) : sum.hi; /* rounded up */
     if (!is_length(skin) || !is_length(radius)) {
         failure->value = radius;
         return HS_ERR_CUTOFF;
@@ -138,21 +137,19 @@ static hs_status
 update(hs_verlet *list, const hs_points *points, const hs_box *box, const hs_options *options,
        double skin, bool rebuild, bool *rebuilt, hs_failure *failure)
 {
-    const int next = spare_frame(list);
-    double    margin = -INFINITY;
+    const hs_options plain = hs_options_default(); /* what is wanted is not looked at here */
+    double           margin = -INFINITY;
+    int              next = 0; /* the frame that is not in use */
+    while (next == list->built || next == list->now) {
+        next++;
+    }
     if (!is_length(options->cutoff)) {
         failure->value = options->cutoff;
         return HS_ERR_CUTOFF;
     }
     hs_status status = hs_check_resources(options);
     if (status == HS_OK) {
-        status = hs_check_points(points, failure);
-    }
-    if (status == HS_OK) {
-        status = hs_check_box(box, points->ndim);
-    }
-    if (status == HS_OK) {
-        status = hs_box_check(box, failure);
+        status = check(points, box, &plain, failure);
     }
     if (status == HS_OK) {
         status = hs_frame_take(points, box, options, &list->frames[next], failure);
@@ -196,7 +193,7 @@ hs_verlet_find(const hs_verlet *list, const hs_options *options, hs_pairs **resu
     hs_options of_list = *options;
     of_list.cutoff = list->cutoff;
     of_list.precision = HS_EXACT;
-    if (hs_check_options(&of_list) != HS_OK) {
+    if (hs_check_options(&of_list, HS_WANT_ALL) != HS_OK) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     hs_pairs *pairs = hs_pairs_begin(&of_list, &failure);
@@ -355,14 +352,7 @@ hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped, int64_t
     hs_lattice       lattice;
     hs_cloud         cloud;
     failure = hs_enter(failure, &entry);
-    hs_status status = box != NULL ? hs_check_arguments(points, NULL, box, &options, failure)
-                                   : HS_ERR_ARGUMENT;
-    if (status == HS_OK) {
-        status = hs_box_check(box, failure);
-    }
-    if (status == HS_OK) {
-        status = hs_cloud_load(NULL, NULL, points, &options, &cloud, failure);
-    }
+    hs_status status = box != NULL ? load(points, box, &options, &cloud, failure) : HS_ERR_ARGUMENT;
     if (status == HS_OK) {
         const hs_scale scale = scale_of_box(box);
         hs_lattice_init_given(box, scale, &lattice);
@@ -524,18 +514,15 @@ hs_box_places(const hs_box *box, const hs_points *points, double cutoff, double 
     place_axes axes;
     options.cutoff = cutoff;
     failure = hs_enter(failure, &entry);
-    hs_status status = found != NULL && largest >= 0.0 && isfinite(largest)
+    hs_status status = found != NULL && is_length(largest)
                            ? hs_check_arguments(points, NULL, box, &options, failure)
                            : HS_ERR_ARGUMENT;
-    if (status == HS_OK && !(cutoff >= 0.0 && isfinite(cutoff))) {
+    if (status == HS_OK && !is_length(cutoff)) {
         failure->value = cutoff;
         status = HS_ERR_CUTOFF;
     }
     if (status == HS_OK) {
-        status = hs_box_check(box, failure);
-    }
-    if (status == HS_OK) {
-        status = hs_cloud_load(NULL, NULL, points, &options, &cloud, failure);
+        status = load(points, box, &options, &cloud, failure);
     }
     if (status == HS_OK && cloud.largest > largest) {
         hs_cloud_free(NULL, &cloud);
@@ -568,21 +555,6 @@ hs_box_places(const hs_box *box, const hs_points *points, double cutoff, double 
 
 /* Pairs that take about as long as a point of a search with few neighbours. */
 #define PAIRS_A_POINT 8
-
-static hs_status
-check(const hs_points *points, const hs_box *box, const hs_pair_numbers *pairs,
-      const hs_options *options, hs_failure *failure)
-{
-    const hs_status status = hs_check_arguments(points, NULL, box, options, failure);
-    if (status != HS_OK) {
-        return status;
-    }
-    if (pairs == NULL || pairs->n < 0 || pairs->n > INT64_MAX / 1024 ||
-        (pairs->n > 0 && (pairs->i == NULL || pairs->j == NULL))) {
-        return HS_ERR_ARGUMENT;
-    }
-    return hs_box_check(box, failure);
-}
 
 /* Once the arguments are sound. */
 static hs_status
@@ -641,7 +613,14 @@ hs_measure(const hs_points *points, const hs_box *box, const hs_pair_numbers *pa
     if (measured == NULL) {
         return HS_ERR_MEMORY;
     }
-    hs_status status = check(points, box, pairs, &of_pairs, failure);
+    hs_status status = hs_check_arguments(points, NULL, box, &of_pairs, failure);
+    if (status == HS_OK && (pairs == NULL || pairs->n < 0 || pairs->n > INT64_MAX / 1024 ||
+                            (pairs->n > 0 && (pairs->i == NULL || pairs->j == NULL)))) {
+        status = HS_ERR_ARGUMENT;
+    }
+    if (status == HS_OK) {
+        status = hs_box_check(box, failure);
+    }
     if (status == HS_OK) {
         hs_pairs_open(measured, points->ndim);
         status = measure(points, box, pairs, measured, failure);

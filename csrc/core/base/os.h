@@ -13,9 +13,9 @@
  */
 
 /*
- * The floating-point environment that the exact stages need: round to nearest, no
- * flushing of subnormal numbers, no trap. Every entry into the core enters it before it touches a
- * float, and leaves it; threads of a team live in it.
+ * The floating-point environment that the exact stages need: round to nearest, no flushing of
+ * subnormal numbers, no trap. Every entry into the core enters it before it touches a float, and
+ * leaves it; threads of a team live in it.
  */
 
 #if !defined(__SSE2__) && !defined(_M_X64) && !defined(__aarch64__) && !defined(_M_ARM64)

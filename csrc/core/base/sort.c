@@ -26,20 +26,6 @@ insert_keys(int64_t *keys, int32_t *ids, int64_t n)
     }
 }
 
-/* Where the highest bit of a nonzero number is, from 0. */
-static int
-top_bit(uint64_t bits)
-{
-    int top = 0;
-    for (int step = 32; step > 0; step /= 2) {
-        if (bits >> step != 0) {
-            bits >>= step;
-            top += step;
-        }
-    }
-    return top;
-}
-
 /* The bits in which the keys differ; 0 when they need no sorting. */
 static uint64_t
 varying_bits(const int64_t *keys, int64_t n)
@@ -98,8 +84,7 @@ hs_keys_sort(hs_keys *sort, int64_t first, int64_t end)
     if (varying == 0) {
         return HS_OK;
     }
-    const int top = top_bit(varying);
-    const int shift = top < DIGIT_BITS ? 0 : top - DIGIT_BITS + 1;
+    const int bits = hs_count_bits(varying), shift = bits < DIGIT_BITS ? 0 : bits - DIGIT_BITS;
     distribute(sort, first, n, shift, bucket_end);
     if ((varying & ((UINT64_C(1) << shift) - 1)) == 0) {
         return HS_OK; /* no lower digit differs */
@@ -118,9 +103,9 @@ hs_keys_sort(hs_keys *sort, int64_t first, int64_t end)
 }
 
 /*
- * One digit, of about as many values as there are numbers, tells nearly all of them
- * apart when they are spread evenly; insertion does the rest. Where many agree in it, these are
- * sorted by the digits below.
+ * One digit, of about as many values as there are numbers, tells nearly all of them apart when they
+ * are spread evenly; insertion does the rest. Where many agree in it, these are sorted by the
+ * digits below.
  */
 
 #define FEW_NUMBERS 24 /* numbers that are quicker sorted by insertion */
@@ -154,42 +139,6 @@ hs_count_bits(uint64_t number)
     return bits + (number != 0);
 }
 
-/* Bits of the digit for so many numbers. */
-static int
-digit_bits(int64_t n)
-{
-    int bits = LEAST_BITS;
-    while (bits < MOST_BITS && n > INT64_C(1) << bits) {
-        bits++;
-    }
-    return bits;
-}
-
-/* Turns counts into where each digit ends; returns the largest count. */
-static int64_t
-sum_counts(int64_t *end, int bits)
-{
-    int64_t most = 0, sum = 0;
-    for (int digit = 0; digit < 1 << bits; digit++) {
-        most = end[digit] > most ? end[digit] : most;
-        sum += end[digit];
-        end[digit] = sum;
-    }
-    return most;
-}
-
-/* Sorts what agrees in the digit; end[]: where each one begins now. */
-static void
-sort_digits(uint64_t *numbers, int64_t n, const int64_t *begin, int bits, uint64_t *spare)
-{
-    for (int digit = 0; digit < 1 << bits; digit++) {
-        const int64_t end = digit + 1 < 1 << bits ? begin[digit + 1] : n;
-        if (end - begin[digit] > 1) {
-            hs_sort_numbers(numbers + begin[digit], end - begin[digit], spare);
-        }
-    }
-}
-
 void
 hs_sort_numbers(uint64_t *numbers, int64_t n, uint64_t *spare)
 {
@@ -198,25 +147,46 @@ hs_sort_numbers(uint64_t *numbers, int64_t n, uint64_t *spare)
         insert_numbers(numbers, n);
         return;
     }
+    int64_t ascending = 1;
+    while (ascending < n && numbers[ascending - 1] <= numbers[ascending]) {
+        ascending++;
+    }
+    if (ascending == n) { /* as rows of pairs that are given in order */
+        return;
+    }
     uint64_t low = numbers[0], high = numbers[0];
     for (int64_t e = 1; e < n; e++) {
         low = numbers[e] < low ? numbers[e] : low;
         high = numbers[e] > high ? numbers[e] : high;
     }
-    const int bits = digit_bits(n), range = hs_count_bits(high - low);
+    int       bits = LEAST_BITS; /* of the digit */
+    const int range = hs_count_bits(high - low);
+    while (bits < MOST_BITS && n > INT64_C(1) << bits) {
+        bits++;
+    }
     const int shift = range > bits ? range - bits : 0;
     memset(place, 0, sizeof *place << bits);
     for (int64_t e = 0; e < n; e++) {
         place[(numbers[e] - low) >> shift]++;
     }
-    const int64_t most = sum_counts(place, bits);
+    int64_t most = 0, sum = 0; /* from counts to where each digit ends */
+    for (int digit = 0; digit < 1 << bits; digit++) {
+        most = place[digit] > most ? place[digit] : most;
+        sum += place[digit];
+        place[digit] = sum;
+    }
     for (int64_t e = n; e-- > 0;) {
         spare[--place[(numbers[e] - low) >> shift]] = numbers[e];
     }
     memcpy(numbers, spare, (size_t)n * sizeof *numbers);
     if (most <= CROWD) {
         insert_numbers(numbers, n);
-    } else if (shift > 0) {
-        sort_digits(numbers, n, place, bits, spare);
+        return;
+    }
+    for (int digit = 0; shift > 0 && digit < 1 << bits; digit++) { /* where each begins now */
+        const int64_t end = digit + 1 < 1 << bits ? place[digit + 1] : n;
+        if (end - place[digit] > 1) {
+            hs_sort_numbers(numbers + place[digit], end - place[digit], spare);
+        }
     }
 }

@@ -13,8 +13,8 @@
  */
 
 /*
- * A stable sort of point numbers by integer keys, quick whatever the keys are: its
- * cost follows the digits in which they differ, not their range.
+ * A stable sort of point numbers by integer keys, quick whatever the keys are: its cost follows the
+ * digits in which they differ, not their range.
  */
 
 /* All four arrays are borrowed and equally long; the spare ones hold nothing between calls. */
@@ -31,9 +31,9 @@ typedef struct hs_keys {
 hs_status hs_keys_sort(hs_keys *sort, int64_t first, int64_t end);
 
 /*
- * Sorts short arrays of 64-bit numbers, many one after the other: the rows of a
- * table, whose numbers are spread evenly as a rule. Whatever they are, time is in proportion to how
- * many there are.
+ * Sorts short arrays of 64-bit numbers, many one after the other: the rows of a table, whose
+ * numbers are spread evenly as a rule. Whatever they are, time is in proportion to how many there
+ * are.
  */
 
 /* Sorts n numbers ascending; `spare` has room for as many. */
@@ -43,9 +43,9 @@ void hs_sort_numbers(uint64_t *numbers, int64_t n, uint64_t *spare);
 int hs_count_bits(uint64_t number);
 
 /*
- * Where the parts of an array begin, of which first the lengths are counted: that of part
- * k in starts[k + 1], with 0 in front. Filling part k moves starts[k] to its end, which is where
- * part k + 1 began.
+ * Where the parts of an array begin, of which first the lengths are counted: that of part k in
+ * starts[k + 1], with 0 in front. Filling part k moves starts[k] to its end, which is where part
+ * k + 1 began.
  */
 
 /* From lengths to beginnings; the last of the n numbers becomes the length of the array. n > 0. */

@@ -1,12 +1,24 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "status.h"
 
-/* status.c: one sentence for each status; the version of the core. */
+#include <math.h>
+
+/* status.c: one sentence for each status; the version of the core; the options by default. */
 
 int
 hs_version(void)
 {
     return HS_VERSION;
+}
+
+hs_options
+hs_options_default(void)
+{
+    return (hs_options){.inclusive = true,
+                        .want = HS_WANT_I | HS_WANT_J,
+                        .index_bytes = 8,
+                        .threads = 1,
+                        .memory_limit = INFINITY};
 }
 
 const char *

@@ -11,9 +11,9 @@
  */
 
 /*
- * A failure that is still to be told, and how a step inside the core can end besides
- * with a status of halfshell.h. Each function that returns one of these says so; none reaches the
- * caller of the library.
+ * A failure that is still to be told, and how a step inside the core can end besides with a status
+ * of halfshell.h. Each function that returns one of these says so; none reaches the caller of the
+ * library.
  */
 
 /* A failure without details. */
@@ -54,8 +54,8 @@ int hs_want_number(unsigned bit);
 hs_purpose hs_want_purpose(int k);
 
 /*
- * Whose radius or support a rule looks at, that of the asking point, of the other one, or
- * of both. A side that a rule does not look at needs no values.
+ * Whose radius or support a rule looks at, that of the asking point, of the other one, or of both.
+ * A side that a rule does not look at needs no values.
  */
 
 HS_ALWAYS_INLINE bool

@@ -59,7 +59,7 @@ typedef struct short_basis {
 } short_basis;
 
 static double
-dot_of_rows(int ndim, const double a[], const double b[])
+dot(int ndim, const double a[], const double b[])
 {
     double sum = 0.0;
     for (int c = 0; c < ndim; c++) {
@@ -89,7 +89,7 @@ set_row(int ndim, const double x[], int exponent, scaled_row *row)
     for (int c = 0; c < ndim; c++) {
         row->x[c] = x[c] * first * second; /* 2^1073 is not a double */
     }
-    row->norm2 = dot_of_rows(ndim, row->x, row->x);
+    row->norm2 = dot(ndim, row->x, row->x);
     row->exponent += shift;
     return true;
 }
@@ -219,7 +219,7 @@ project(short_basis *b, int k)
     memcpy(x, row->x, sizeof x);
     for (int j = 0; j < k; j++) {
         const scaled_row *star = &b->star[j];
-        double along = star->norm2 > 0.0 ? dot_of_rows(b->ndim, x, star->x) / star->norm2 : 0.0;
+        double            along = star->norm2 > 0.0 ? dot(b->ndim, x, star->x) / star->norm2 : 0.0;
         for (int c = 0; c < b->ndim; c++) {
             x[c] -= along * star->x[c];
         }
@@ -232,7 +232,7 @@ static double
 coefficient(const short_basis *b, int k, int j)
 {
     const scaled_row *row = &b->row[b->order[k]], *star = &b->star[j];
-    double mu = star->norm2 > 0.0 ? dot_of_rows(b->ndim, row->x, star->x) / star->norm2 : 0.0;
+    double            mu = star->norm2 > 0.0 ? dot(b->ndim, row->x, star->x) / star->norm2 : 0.0;
     return ldexp(mu, row->exponent - star->exponent);
 }
 
@@ -343,52 +343,31 @@ is_shorter(const short_basis *a, const short_basis *b)
     return ldexp(ratio, 2 * exponent) < NOTABLY_LESS;
 }
 
-/* False when there is nothing to reduce. */
-static bool
-begin(short_basis *b, int ndim, int n_rows, const double rows[][HS_MAX_DIM])
+/*
+ * B from the scaled box vectors, which are linearly independent, finite, of any scale, 1e-300 to
+ * 1e300, and of very different length. U has determinant +1 or -1, so that both span the same
+ * lattice. Where a row would need a coefficient beyond 2^61, this stops early: the result is always
+ * a valid basis, at worst the given one.
+ */
+static void
+reduce(hs_lattice *lattice)
 {
-    b->ndim = ndim;
-    b->n_rows = n_rows;
-    b->given = rows;
-    bool orthogonal = true, usable = true;
+    const int   ndim = lattice->ndim, n_rows = lattice->n_periodic;
+    short_basis best, trial;
+    bool        orthogonal = true, usable = true;
+    best.ndim = ndim;
+    best.n_rows = n_rows;
+    best.given = (const double(*)[HS_MAX_DIM])lattice->scaled;
     for (int k = 0; k < n_rows; k++) {
         for (int l = 0; l < n_rows; l++) {
-            b->U[k][l] = k == l;
+            best.U[k][l] = k == l;
         }
-        usable = set_row(ndim, rows[k], 0, &b->row[k]) && usable;
+        usable = set_row(ndim, best.given[k], 0, &best.row[k]) && usable;
         for (int j = 0; j < k; j++) {
-            orthogonal = dot_of_rows(ndim, b->row[k].x, b->row[j].x) == 0.0 && orthogonal;
+            orthogonal = dot(ndim, best.row[k].x, best.row[j].x) == 0.0 && orthogonal;
         }
     }
-    return usable && !orthogonal;
-}
-
-static void
-report(const short_basis *b, hs_reduction *reduction)
-{
-    reduction->n_rows = b->n_rows;
-    reduction->changed = false;
-    for (int k = 0; k < b->n_rows; k++) {
-        bool same = true;
-        for (int l = 0; l < b->n_rows; l++) {
-            reduction->U[k][l] = b->U[k][l];
-            same = same && b->U[k][l] == (k == l);
-        }
-        reduction->changed = reduction->changed || !same;
-        reduction->error[k] = 0.0;
-        for (int c = 0; c < b->ndim; c++) {
-            double error = 0.0;
-            reduction->rows[k][c] = same ? b->given[k][c] : combine(b, b->U[k], c, &error);
-            reduction->error[k] = hs_larger(error, reduction->error[k]);
-        }
-    }
-}
-
-void
-hs_reduce(int ndim, int n_rows, const double rows[][HS_MAX_DIM], hs_reduction *reduction)
-{
-    short_basis best, trial;
-    bool        promising = begin(&best, ndim, n_rows, rows);
+    bool promising = usable && !orthogonal;
     /* A pass that gains nothing is undone, which leaves reduced boxes alone. Beyond three
      * dimensions what it reaches depends on the order of the rows, and a second may gain more. */
     for (int pass = 0; promising && pass < (n_rows <= 3 ? 1 : MAX_PASSES); pass++) {
@@ -405,7 +384,19 @@ hs_reduce(int ndim, int n_rows, const double rows[][HS_MAX_DIM], hs_reduction *r
             best = trial;
         }
     }
-    report(&best, reduction);
+    for (int k = 0; k < n_rows; k++) {
+        bool same = true;
+        for (int l = 0; l < n_rows; l++) {
+            lattice->U[k][l] = best.U[k][l];
+            same = same && best.U[k][l] == (k == l);
+        }
+        lattice->reduced = lattice->reduced || !same;
+        for (int c = 0; c < ndim && !same; c++) {
+            double error = 0.0;
+            lattice->rows[k][c] = combine(&best, best.U[k], c, &error);
+            lattice->row_error[k] = hs_larger(error, lattice->row_error[k]);
+        }
+    }
 }
 
 /*
@@ -421,16 +412,32 @@ hs_reduce(int ndim, int n_rows, const double rows[][HS_MAX_DIM], hs_reduction *r
  * for the purpose go further. Numbers are kept as in Montgomery (1985), scaled by R = 2^64.
  */
 
-/* The largest prime below 2^62, so that the usual call need not look for one. */
-#define FIRST_PRIME ((UINT64_C(1) << 62) - 57)
+/* The largest primes below 2^62, each so much below the one before: enough for all rows. */
+enum { PRIMES = 280 };
+static const uint16_t prime_gaps[PRIMES] = {
+    57,  30,  30, 26,  10,  14, 4,   24,  8,  70,  14, 30,  126, 40,  12, 80, 6,   22,  30,  30,
+    102, 8,   4,  14,  22,  18, 92,  58,  12, 8,   6,  10,  180, 44,  52, 60, 80,  82,  38,  22,
+    6,   14,  22, 56,  24,  4,  2,   120, 58, 30,  12, 120, 30,  30,  38, 46, 30,  30,  38,  66,
+    16,  8,   22, 24,  90,  30, 42,  78,  14, 78,  24, 16,  68,  30,  36, 96, 18,  180, 30,  4,
+    2,   6,   54, 60,  144, 16, 8,   6,   12, 108, 34, 62,  30,  6,   70, 60, 230, 84,  28,  26,
+    76,  26,  82, 72,  38,  46, 20,  46,  74, 34,  6,  36,  24,  36,  24, 30, 20,  6,   6,   52,
+    48,  30,  20, 112, 90,  38, 52,  20,  10, 8,   64, 24,  66,  8,   48, 78, 34,  12,  66,  2,
+    30,  12,  16, 48,  36,  8,  22,  6,   14, 46,  12, 12,  78,  12,  36, 8,  42,  4,   6,   78,
+    14,  100, 48, 24,  20,  10, 38,  162, 78, 102, 36, 28,  42,  170, 52, 36, 24,  20,  106, 14,
+    6,   6,   54, 36,  70,  50, 58,  6,   20, 4,   66, 104, 100, 6,   14, 16, 32,  48,  22,  8,
+    60,  4,   26, 22,  20,  64, 110, 18,  16, 12,  18, 14,  42,  16,  60, 60, 24,  24,  24,  12,
+    68,  22,  8,  28,  30,  32, 192, 60,  88, 78,  80, 138, 22,  24,  14, 30, 34,  50,  72,  46,
+    140, 34,  30, 6,   18,  72, 38,  12,  52, 6,   2,  24,  46,  20,  42, 48, 22,  8,   40,  8,
+    94,  12,  14, 52,  2,   22, 98,  46,  90, 2,   64, 20,  10,  38,  16, 2,  34,  36,  20,  60,
+};
 
-/* Every prime that can be reached exceeds 2^61: there are about 2^61 / 43 between. */
+/* Bits of a number that each of them passes. */
 #define PRIME_BITS 61
 
 typedef struct modulus {
     uint64_t p;
     uint64_t negated_inverse; /* -1/p modulo R */
-    uint64_t one;             /* R modulo p */
+    uint64_t large;           /* 2^61 R modulo p */
 } modulus;
 
 /* A row as integers, mantissa * 2^exponent. */
@@ -467,6 +474,12 @@ multiply_exactly(const modulus *m, uint64_t a, uint64_t b)
     return result >= m->p ? result - m->p : result;
 }
 
+HS_ALWAYS_INLINE uint64_t
+add(const modulus *m, uint64_t a, uint64_t b)
+{
+    return a + b >= m->p ? a + b - m->p : a + b;
+}
+
 static modulus
 make_modulus(uint64_t p)
 {
@@ -477,87 +490,11 @@ make_modulus(uint64_t p)
     }
     m.p = p;
     m.negated_inverse = 0 - inverse;
-    m.one = (0 - p) % p;
+    m.large = (0 - p) % p; /* R modulo p */
+    for (int bit = 0; bit < 61; bit++) {
+        m.large = add(&m, m.large, m.large);
+    }
     return m;
-}
-
-/* base: x R modulo p. Returns x^exponent R modulo p. */
-static uint64_t
-power(const modulus *m, uint64_t base, uint64_t exponent)
-{
-    uint64_t result = m->one;
-    for (; exponent != 0; exponent >>= 1) {
-        if (exponent & 1) {
-            result = multiply_exactly(m, result, base);
-        }
-        base = multiply_exactly(m, base, base);
-    }
-    return result;
-}
-
-HS_ALWAYS_INLINE uint64_t
-add(const modulus *m, uint64_t a, uint64_t b)
-{
-    return a + b >= m->p ? a + b - m->p : a + b;
-}
-
-/* Whether odd p passes the strong test of Miller and Rabin to a base: no prime fails. */
-static bool
-passes(const modulus *m, uint64_t base)
-{
-    uint64_t minus_one = m->p - m->one;
-    uint64_t odd = m->p - 1, x = 0;
-    int      halvings = 0;
-    while (odd % 2 == 0) {
-        odd /= 2;
-        halvings++;
-    }
-    for (int bit = 31; bit >= 0; bit--) { /* x = base R modulo p */
-        x = add(m, x, x);
-        x = (base >> bit) & 1 ? add(m, x, m->one) : x;
-    }
-    x = power(m, x, odd);
-    if (x == m->one || x == minus_one) {
-        return true;
-    }
-    for (int k = 1; k < halvings; k++) {
-        x = multiply_exactly(m, x, x);
-        if (x == minus_one) {
-            return true;
-        }
-    }
-    return false;
-}
-
-/* 2^61 < p < 2^62, odd. */
-static bool
-is_prime(uint64_t p)
-{
-    /* The first twelve primes as bases decide every number below 3.3e24 (Sorenson and Webster
-     * 2015); dividing by them first costs less than a test and drops most numbers. */
-    static const uint64_t small[12] = {2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37};
-    for (int k = 1; k < 12; k++) {
-        if (p % small[k] == 0) {
-            return false;
-        }
-    }
-    modulus m = make_modulus(p);
-    for (int k = 0; k < 12; k++) {
-        if (!passes(&m, small[k])) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/* The largest prime below p; p: odd, at most 2^62 and far above 2^61. A step of the above. */
-static uint64_t
-prime_below(uint64_t p)
-{
-    do {
-        p -= 2;
-    } while (!is_prime(p));
-    return p;
 }
 
 /* Returns bits enough for every integer of the row, or -1 if all are zero. */
@@ -586,22 +523,19 @@ load_row(int ndim, const double row[], integer_row *integers)
     return bits;
 }
 
-/* out: the row modulo p, times 1/R. */
+/* out: the row modulo p. */
 static void
 take_residues(const modulus *m, int ndim, const integer_row *row, uint64_t out[])
 {
     for (int k = 0; k < ndim; k++) {
-        int64_t  mantissa = row->mantissa[k];
-        int      exponent = row->exponent[k];
-        uint64_t residue = 0;
-        if (mantissa != 0) {
-            residue = mantissa > 0 ? (uint64_t)mantissa : m->p - (uint64_t)-mantissa;
-            residue = multiply_exactly(m, residue, UINT64_C(1) << (exponent % 61));
+        const int64_t mantissa = row->mantissa[k];
+        uint64_t      residue = mantissa < 0 ? m->p - (uint64_t)-mantissa : (uint64_t)mantissa;
+        int           exponent = row->exponent[k];
+        for (; exponent >= 61; exponent -= 61) {
+            residue = multiply_exactly(m, residue, m->large);
         }
-        if (residue != 0 && exponent >= 61) {
-            uint64_t two = add(m, m->one, m->one);
-            residue =
-                multiply_exactly(m, residue, power(m, two, (uint64_t)(exponent - exponent % 61)));
+        for (; exponent > 0; exponent--) {
+            residue = add(m, residue, residue);
         }
         out[k] = residue;
     }
@@ -643,8 +577,10 @@ full_rank(uint64_t p, int ndim, int n_rows, const integer_row rows[])
     return true;
 }
 
-bool
-hs_rows_independent(int ndim, int n_rows, const double rows[][HS_MAX_DIM])
+/* n_rows (0 ... ndim) rows of ndim finite doubles, of any magnitude. A rounded determinant could
+ * not tell. */
+static bool
+rows_are_independent(int ndim, int n_rows, const double rows[][HS_MAX_DIM])
 {
     integer_row integers[HS_MAX_DIM];
     int         bound_bits = 0;
@@ -656,29 +592,14 @@ hs_rows_independent(int ndim, int n_rows, const double rows[][HS_MAX_DIM])
         }
         bound_bits += bits + 2; /* a minor's row is no longer than sqrt(8) 2^bits */
     }
-    /* At most 8 * 2100 bits: some 280 primes. */
-    uint64_t p = FIRST_PRIME;
-    for (int proven_bits = 0; proven_bits <= bound_bits; proven_bits += PRIME_BITS) {
-        if (proven_bits != 0) {
-            p = prime_below(p);
-        }
+    uint64_t p = UINT64_C(1) << 62;
+    for (int k = 0; k < PRIMES && k * PRIME_BITS <= bound_bits; k++) { /* 8 * 2102 bits at most */
+        p -= prime_gaps[k];
         if (full_rank(p, ndim, n_rows, integers)) {
             return true;
         }
     }
     return false;
-}
-
-/* The first of these rows that is zero, or n_rows. */
-static int
-zero_row(int ndim, int n_rows, const double rows[][HS_MAX_DIM])
-{
-    integer_row ignored;
-    int         k = 0;
-    while (k < n_rows && load_row(ndim, rows[k], &ignored) >= 0) {
-        k++;
-    }
-    return k;
 }
 
 hs_scale
@@ -747,22 +668,15 @@ hs_box_check(const hs_box *box, hs_failure *failure)
     }
     const int n_periodic = collect_periodic_rows(box, rows, vector_of_row);
     if (rows_are_aligned(box->ndim, n_periodic, rows, column) ||
-        hs_rows_independent(box->ndim, n_periodic, rows)) {
+        rows_are_independent(box->ndim, n_periodic, rows)) {
         return HS_OK;
     }
-    const int zero = zero_row(box->ndim, n_periodic, rows);
-    failure->row = zero < n_periodic ? vector_of_row[zero] : -1;
-    return HS_ERR_BOX_DEPENDENT;
-}
-
-static double
-dot(int ndim, const double *a, const double *b)
-{
-    double sum = 0.0;
-    for (int k = 0; k < ndim; k++) {
-        sum += a[k] * b[k];
+    failure->row = -1; /* unless one of them is zero */
+    for (int r = n_periodic - 1; r >= 0; r--) {
+        integer_row ignored;
+        failure->row = load_row(box->ndim, rows[r], &ignored) < 0 ? vector_of_row[r] : failure->row;
     }
-    return sum;
+    return HS_ERR_BOX_DEPENDENT;
 }
 
 /* Largest entry brought near 1 by a power of two, so that squares neither overflow nor vanish.
@@ -801,13 +715,6 @@ orthonormalise(int ndim, int n_basis, double basis[][HS_MAX_DIM], double *v)
         v[k] = length > 0.0 ? v[k] / length : 0.0;
     }
     return length;
-}
-
-static void
-start_volume(hs_lattice *lattice)
-{
-    lattice->volume_mantissa = 1.0;
-    lattice->volume_exponent = 0;
 }
 
 /* Multiplies the volume by length * 2^exponent. */
@@ -852,7 +759,6 @@ set_open_normals(hs_lattice *lattice)
     double    basis[HS_MAX_DIM][HS_MAX_DIM];
     const int ndim = lattice->ndim;
     int       n_basis = 0;
-    start_volume(lattice);
     for (int r = 0; r < lattice->n_periodic; r++) {
         const int    exponent = copy_of_unit_size(ndim, lattice->rows[r], basis[n_basis]);
         const double length = orthonormalise(ndim, n_basis, basis, basis[n_basis]);
@@ -908,7 +814,6 @@ set_general_axes(hs_lattice *lattice)
 static void
 set_aligned_axes(hs_lattice *lattice, const int *column)
 {
-    start_volume(lattice);
     for (int r = 0; r < lattice->n_periodic; r++) {
         const int c = column[r];
         if (lattice->rows[r][c] < 0.0) {
@@ -928,7 +833,7 @@ set_aligned_axes(hs_lattice *lattice, const int *column)
     }
 }
 
-/* The given box vectors, scaled; B starts as these. All axes are open as yet. */
+/* The given box vectors, scaled; B starts as these. All axes are open as yet, the volume is 1. */
 static void
 take_rows(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice)
 {
@@ -936,6 +841,8 @@ take_rows(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice)
     lattice->n_periodic =
         box == NULL ? 0 : collect_periodic_rows(box, lattice->given, lattice->vector_of_row);
     lattice->aligned = lattice->reduced = false;
+    lattice->volume_mantissa = 1.0;
+    lattice->volume_exponent = 0;
     for (int k = 0; k < ndim; k++) {
         lattice->row_of_axis[k] = -1;
         lattice->period[k] = 0.0;
@@ -952,31 +859,21 @@ take_rows(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice)
     }
 }
 
-/* Replaces B by a short basis. Returns whether it is then axis-aligned, as it is for a box sheared
- * by whole widths. */
-static bool
-reduce_rows(hs_lattice *lattice, int *column)
-{
-    hs_reduction reduction;
-    bool         exact = true;
-    hs_reduce(lattice->ndim, lattice->n_periodic, lattice->scaled, &reduction);
-    lattice->reduced = reduction.changed;
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        memcpy(lattice->U[r], reduction.U[r], (size_t)lattice->n_periodic * sizeof(int64_t));
-        memcpy(lattice->rows[r], reduction.rows[r], (size_t)lattice->ndim * sizeof(double));
-        lattice->row_error[r] = reduction.error[r];
-        exact = exact && reduction.error[r] == 0.0;
-    }
-    return exact && rows_are_aligned(lattice->ndim, lattice->n_periodic, lattice->rows, column);
-}
-
 void
 hs_lattice_init(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice)
 {
     int column[HS_MAX_DIM];
     take_rows(box, ndim, scale, lattice);
-    lattice->aligned = rows_are_aligned(ndim, lattice->n_periodic, lattice->given, column) ||
-                       reduce_rows(lattice, column);
+    lattice->aligned = rows_are_aligned(ndim, lattice->n_periodic, lattice->given, column);
+    if (!lattice->aligned) { /* a short basis: of a box sheared by whole widths it is aligned */
+        bool exact = true;
+        reduce(lattice);
+        for (int r = 0; r < lattice->n_periodic; r++) {
+            exact = exact && lattice->row_error[r] == 0.0;
+        }
+        lattice->aligned = exact &&
+                           rows_are_aligned(ndim, lattice->n_periodic, lattice->rows, column);
+    }
     if (lattice->aligned) {
         set_aligned_axes(lattice, column);
     } else {

@@ -8,7 +8,9 @@
 /*
  * lattice.h: the box as the search uses it. The periodic box vectors are replaced by a short
  * basis B of the same lattice, and each grid axis gets a unit normal along which points are
- * binned. Axis-aligned boxes keep their own coordinate axes and cost no arithmetic.
+ * binned. Axis-aligned boxes keep their own coordinate axes and cost no arithmetic. The search
+ * enumerates images over B, where their number is small however skewed the box is; shifts are
+ * mapped back to the box as given, exactly, through integers.
  */
 
 /* Multiplying by 2^-exponent, in two steps because 2^1074 is not a double. */
@@ -39,7 +41,7 @@ typedef struct hs_lattice {
     int     row_of_axis[HS_MAX_DIM];        /* row of B along grid axis k, or -1: open */
     double  given[HS_MAX_DIM][HS_MAX_DIM];  /* periodic box vectors as given, not scaled */
     double  scaled[HS_MAX_DIM][HS_MAX_DIM]; /* `given`, scaled */
-    int64_t U[HS_MAX_DIM][HS_MAX_DIM];      /* B = U * scaled */
+    int64_t U[HS_MAX_DIM][HS_MAX_DIM];      /* B = U * scaled; |U[r][l]| <= 2^61 */
     double  rows[HS_MAX_DIM][HS_MAX_DIM];   /* B, scaled, rounded to float64 ... */
     double  row_error[HS_MAX_DIM];          /* ... each entry within this; 0 when aligned */
     double  normal[HS_MAX_DIM][HS_MAX_DIM]; /* unit vectors */
@@ -89,38 +91,6 @@ bool hs_skew_is_left(const hs_lattice *lattice);
 /* Why a search would meet more images or rows of cells than any memory holds: HS_ERR_BOX_SKEWED or
  * HS_ERR_MEMORY, because the cutoff spans them. */
 hs_status hs_skew_or_memory(const hs_lattice *lattice);
-
-/*
- * A short, nearly orthogonal basis of the lattice that the periodic box vectors
- * span. The search enumerates images in the reduced basis, where their number is small however
- * skewed the box is; shifts are mapped back to the box as given, exactly, through integers.
- */
-
-/* B = U A: row k of the reduced basis is sum_l U[k][l] * (row l of A), in real arithmetic. U has
- * determinant +1 or -1, so both bases span the same lattice. */
-typedef struct hs_reduction {
-    int     n_rows;
-    bool    changed;                      /* U is not the identity */
-    int64_t U[HS_MAX_DIM][HS_MAX_DIM];    /* |U[k][l]| <= 2^61 */
-    double  rows[HS_MAX_DIM][HS_MAX_DIM]; /* B rounded to float64 ... */
-    double  error[HS_MAX_DIM];            /* ... each entry of row k within this */
-} hs_reduction;
-
-/*
- * rows: n_rows linearly independent rows of ndim finite doubles. Any scale,
- * 1e-300 to 1e300, rows of very different length too. Where a row would need a coefficient beyond
- * 2^61, the reduction stops early: the result is always a valid basis, at worst the given one.
- */
-void hs_reduce(int ndim, int n_rows, const double rows[][HS_MAX_DIM], hs_reduction *reduction);
-
-/*
- * Are the periodic box vectors linearly independent? Decided exactly for the given
- * floats, by elimination modulo 62-bit primes: one prime of full rank proves independence, enough
- * primes to pass the Hadamard bound prove dependence. A rounded determinant can do neither.
- */
-
-/* rows: n_rows (0 ... ndim) rows of ndim finite doubles, of any magnitude. Allocates nothing. */
-bool hs_rows_independent(int ndim, int n_rows, const double rows[][HS_MAX_DIM]);
 
 /*
  * What a change of the box does to distances, with certified bounds. docs/verlet.md

@@ -155,8 +155,8 @@ hs_wrap_point(const hs_lattice *lattice, const double *r, double *inside, int64_
  * of 0.5 too large), and to +-1 beyond; x - n L is the expression there.
  */
 
-#define TILE  256 /* points at a time: they stay in the nearest cache */
-#define LANES 8   /* maxima kept side by side, so that the loops over them can be vectors */
+#define TILE  256 /* points at a time: they, and all work arrays, stay in the nearest cache */
+#define LANES 8   /* extremes kept side by side, so that the loops over them can be vectors */
 /* Up to here, in periods, x is wrapped by one turn at most; below 1.5 with room for rounding. */
 #define ONE_TURN 1.25
 
@@ -308,8 +308,8 @@ hs_fold_coordinates(const hs_lattice *lattice, int k, const double *const *x, in
 }
 
 /*
- * Columns of points into a box of any shape, hs_fold_points. A tile of points at a
- * time, without branches.
+ * Columns of points into a box of any shape, hs_fold_points. A tile of points at a time, without
+ * branches.
  *
  * Why the bits are those of hs_wrap_point: the steps are those of its first pass. With so few turns
  * the products by the leading part of the turns vanish, and the splitting of the turns is trivial;
@@ -317,19 +317,17 @@ hs_fold_coordinates(const hs_lattice *lattice, int k, const double *const *x, in
  * away again. A tile with a point that may need a second pass goes through hs_wrap_point.
  */
 
-#define SKEWED_TILE  256 /* points at a time: all work arrays together fit the nearest cache */
-#define SKEWED_LANES 8 /* extremes kept side by side, so that the loops over them can be vectors */
 /* Adding and subtracting this rounds any |x| < 2^51 to an integer, ties to even, as rint() does. */
 #define ROUNDER 0x1.8p52
 
 /* Work arrays of one tile. */
 typedef struct tile {
     int    n;
-    double inside[HS_MAX_DIM][SKEWED_TILE];
-    double given[HS_MAX_DIM][SKEWED_TILE];  /* turns over the given box vectors, as doubles */
-    double turned[HS_MAX_DIM][SKEWED_TILE]; /* turns over B */
-    double moved[SKEWED_TILE];              /* 0 where no turn is needed */
-    double t[SKEWED_TILE], sum[SKEWED_TILE], low[SKEWED_TILE], absolute[SKEWED_TILE];
+    double inside[HS_MAX_DIM][TILE];
+    double given[HS_MAX_DIM][TILE];  /* turns over the given box vectors, as doubles */
+    double turned[HS_MAX_DIM][TILE]; /* turns over B */
+    double moved[TILE];              /* 0 where no turn is needed */
+    double t[TILE], sum[TILE], low[TILE], absolute[TILE];
 } tile;
 
 static void
@@ -377,21 +375,6 @@ typedef struct term {
 /* At most this many terms at a time; more need a second loop. */
 #define TERMS 3
 
-static int
-list_terms(const hs_lattice *lattice, int k, const tile *work, term *terms)
-{
-    int n_terms = 0;
-    for (int l = 0; l < lattice->n_periodic; l++) {
-        const double entry = lattice->scaled[l][k];
-        if (entry != 0.0) {
-            const double scaled = 0x1.0000002p27 * entry;
-            const double high_part = scaled - (scaled - entry);
-            terms[n_terms++] = (term){work->given[l], entry, high_part, entry - high_part};
-        }
-    }
-    return n_terms;
-}
-
 /* sum + low -= turns * entry for each of n_terms terms, by the steps of subtract_product.
  * Inlined with constant n_terms. */
 HS_ALWAYS_INLINE void
@@ -422,7 +405,15 @@ move_inside(const hs_lattice *lattice, int k, const double *HS_RESTRICT x, tile 
 {
     double *HS_RESTRICT inside = work->inside[k];
     term                terms[HS_MAX_DIM];
-    const int           n_terms = list_terms(lattice, k, work, terms);
+    int                 n_terms = 0;
+    for (int l = 0; l < lattice->n_periodic; l++) {
+        const double entry = lattice->scaled[l][k];
+        if (entry != 0.0) {
+            const double scaled = 0x1.0000002p27 * entry;
+            const double high_part = scaled - (scaled - entry);
+            terms[n_terms++] = (term){work->given[l], entry, high_part, entry - high_part};
+        }
+    }
     for (int i = 0; i < work->n; i++) {
         work->sum[i] = x[i];
         work->low[i] = 0.0;
@@ -458,15 +449,15 @@ find_ranges(const hs_lattice *lattice, tile *work, hs_wrap_range *folded)
         inside[k] = work->inside[k];
     }
     for (int k = 0; k < lattice->ndim; k++) {
-        double lower[SKEWED_LANES], upper[SKEWED_LANES], low = INFINITY, high = -INFINITY;
+        double lower[LANES], upper[LANES], low = INFINITY, high = -INFINITY;
         int    i = 0;
         hs_fold_coordinates(lattice, k, inside, work->n, work->t);
-        for (int l = 0; l < SKEWED_LANES; l++) {
+        for (int l = 0; l < LANES; l++) {
             lower[l] = INFINITY;
             upper[l] = -INFINITY;
         }
-        for (; i + SKEWED_LANES <= work->n; i += SKEWED_LANES) {
-            for (int l = 0; l < SKEWED_LANES; l++) {
+        for (; i + LANES <= work->n; i += LANES) {
+            for (int l = 0; l < LANES; l++) {
                 const double t = work->t[i + l];
                 lower[l] = t < lower[l] ? t : lower[l];
                 upper[l] = t > upper[l] ? t : upper[l];
@@ -476,7 +467,7 @@ find_ranges(const hs_lattice *lattice, tile *work, hs_wrap_range *folded)
             lower[0] = fmin(lower[0], work->t[i]);
             upper[0] = fmax(upper[0], work->t[i]);
         }
-        for (int l = 0; l < SKEWED_LANES; l++) {
+        for (int l = 0; l < LANES; l++) {
             low = fmin(low, lower[l]);
             high = fmax(high, upper[l]);
         }
@@ -530,30 +521,6 @@ put_turns(const hs_turns *turns, int row, int64_t begin, const tile *work)
     }
 }
 
-/* Whether no point of the tile has more than so many turns, over all rows of B together. */
-static bool
-turns_are_few(const tile *work, double most)
-{
-    int many = 0;
-    for (int i = 0; i < work->n; i++) {
-        many |= !(work->moved[i] <= most); /* also where overflow has left no number */
-    }
-    return many == 0;
-}
-
-/* Turns over B that make at most HS_FOLD_TURNS over any given box vector. */
-static double
-most_turns(const hs_lattice *lattice)
-{
-    double largest = 1.0;
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        for (int l = 0; l < lattice->n_periodic; l++) {
-            largest = fmax(largest, fabs((double)lattice->U[r][l]));
-        }
-    }
-    return HS_FOLD_TURNS / largest;
-}
-
 /* The quick way. Returns false where some points have too many turns or may need a second pass. */
 static bool
 fold_tile(const hs_lattice *lattice, double most, const double *const *x, const hs_turns *turns,
@@ -561,7 +528,11 @@ fold_tile(const hs_lattice *lattice, double most, const double *const *x, const 
 {
     hs_wrap_range found = *folded;
     count_turns(lattice, x, work);
-    if (!turns_are_few(work, most)) {
+    int many = 0; /* turns of a point, over all rows of B together */
+    for (int i = 0; i < work->n; i++) {
+        many |= !(work->moved[i] <= most); /* also where overflow has left no number */
+    }
+    if (many) {
         return false;
     }
     for (int k = 0; k < lattice->ndim; k++) {
@@ -581,11 +552,17 @@ void
 hs_fold_points(const hs_lattice *lattice, bool few_turns, double *const *r, int64_t first,
                int64_t last, double *const *x, const hs_turns *turns, hs_wrap_range *folded)
 {
-    tile         work;
-    const double most = few_turns ? INFINITY : most_turns(lattice);
-    for (int64_t begin = first; begin < last; begin += SKEWED_TILE) {
+    tile   work;
+    double largest = 1.0; /* of U: one turn over B makes at most so many over a given vector */
+    for (int row = 0; row < lattice->n_periodic; row++) {
+        for (int l = 0; l < lattice->n_periodic; l++) {
+            largest = fmax(largest, fabs((double)lattice->U[row][l]));
+        }
+    }
+    const double most = few_turns ? INFINITY : HS_FOLD_TURNS / largest;
+    for (int64_t begin = first; begin < last; begin += TILE) {
         const double *from[HS_MAX_DIM];
-        work.n = (int)(last - begin < SKEWED_TILE ? last - begin : SKEWED_TILE);
+        work.n = (int)(last - begin < TILE ? last - begin : TILE);
         for (int k = 0; k < lattice->ndim; k++) {
             from[k] = r[k] + begin;
         }
@@ -603,8 +580,8 @@ hs_fold_points(const hs_lattice *lattice, bool few_turns, double *const *r, int6
     }
 }
 
-/* Along coordinate axes each axis by itself; else all images within the distance of
- * one that is near, coordinate by coordinate (Fincke and Pohst, Math. Comp. 44 (1985) 463). */
+/* Along coordinate axes each axis by itself; else all images within the distance of one that is
+ * near, coordinate by coordinate (Fincke and Pohst, Math. Comp. 44 (1985) 463). */
 
 #define UNIT 0x1p-53
 /* Fractions of a period this close to a half are compared exactly; they are known to 2^-50. */

@@ -104,10 +104,10 @@ double hs_fold_turns(const hs_lattice *lattice, double largest);
 #define HS_FOLD_TURNS 0x1p20
 
 /*
- * The nearest image of one point to another, decided exactly, in any box. Floats with
- * a bound on their error leave few images over, nearly always one; these are compared for the real
- * numbers that the inputs are. Of images that are equally near the one with the lexicographically
- * least shift over the given box vectors counts.
+ * The nearest image of one point to another, decided exactly, in any box. Floats with a bound on
+ * their error leave few images over, nearly always one; these are compared for the real numbers
+ * that the inputs are. Of images that are equally near the one with the lexicographically least
+ * shift over the given box vectors counts.
  */
 
 /* A box made ready; plain values, nothing owned. */

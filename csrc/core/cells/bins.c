@@ -45,25 +45,12 @@ add_index(const hs_grid *grid, int k, const double *HS_RESTRICT t, int64_t n,
 {
     const double   lower = grid->lower[k], cells_per_length = grid->cells_per_length[k];
     const double   last = (double)(grid->shape[k] - 1);
-    const double   size = grid->cell_size[k];
     const uint32_t stride = (uint32_t)grid->stride[k];
-    if (!grid->by_faces[k]) {
-        for (int64_t i = 0; i < n; i++) {
-            const double place = (t[i] - lower) * cells_per_length;
-            const double below = place < last ? place : last;
-            const double inside = below > 0.0 ? below : 0.0;
-            id[i] += (uint32_t)(int32_t)inside * stride;
-        }
-        return;
-    }
-    const double bias = HS_GRID_BIAS * (double)grid->shape[k];
     for (int64_t i = 0; i < n; i++) {
-        const double place = (t[i] - lower) * cells_per_length + bias;
+        const double place = (t[i] - lower) * cells_per_length;
         const double below = place < last ? place : last;
-        const double cell = (double)(int32_t)(below > 0.0 ? below : 0.0);
-        /* Plus zero: t = -0 on a face at 0 is not before it, and the difference of these is -0. */
-        const uint64_t beyond = hs_bits_of_double(t[i] - (lower + cell * size) + 0.0);
-        id[i] += (uint32_t)((int32_t)cell - (int32_t)(beyond >> 63)) * stride; /* its sign */
+        const double inside = below > 0.0 ? below : 0.0;
+        id[i] += (uint32_t)(int32_t)inside * stride;
     }
 }
 
@@ -138,17 +125,6 @@ order_strip(void *context, int strip, int64_t first, int64_t last)
     return HS_OK;
 }
 
-/* Strips for this team: each with points enough, and no more further counts than points. */
-static int
-choose_strips(const hs_team *team, int64_t n, int64_t n_cells)
-{
-    int n_strips = hs_team_size(team) < HS_SLABS ? hs_team_size(team) : HS_SLABS;
-    while (n_strips > 1 && (n < n_strips * STRIP_POINTS || (n_strips - 1) * n_cells > n)) {
-        n_strips--;
-    }
-    return n_strips;
-}
-
 /* Sorts the point numbers into bins->order, and fills `start`. */
 static hs_status
 sort_numbers(hs_account *account, hs_team *team, const hs_options *options, sorting *sort,
@@ -156,7 +132,12 @@ sort_numbers(hs_account *account, hs_team *team, const hs_options *options, sort
 {
     const int64_t n_cells = sort->grid->n_cells, n = bins->n;
     int32_t      *others = NULL;
-    sort->n_strips = choose_strips(team, n, n_cells);
+    /* Strips for this team: each with points enough, and no more further counts than points. */
+    sort->n_strips = hs_team_size(team) < HS_SLABS ? hs_team_size(team) : HS_SLABS;
+    while (sort->n_strips > 1 &&
+           (n < sort->n_strips * STRIP_POINTS || (sort->n_strips - 1) * n_cells > n)) {
+        sort->n_strips--;
+    }
     if (sort->n_strips > 1) {
         others = hs_alloc(account, HS_FOR_CELLS, (sort->n_strips - 1) * n_cells, sizeof *others);
         sort->n_strips = others == NULL ? 1 : sort->n_strips;
@@ -233,18 +214,15 @@ gather_doubles(hs_team *team, const hs_options *options, const hs_bins *bins,
     return status;
 }
 
-/*
- * Columns of x, originals and turns, as bins->order says, in the order in which they lie behind the
- * free column: the wide ones go before the narrow ones. x_is_beside: the originals lie behind the
- * free column, X lies apart. *end: where the last column ends that is still needed. HS_OK or
- * HS_ERR_INTERRUPTED.
- */
-static hs_status
-gather_columns(hs_team *team, const hs_options *options, bool x_is_beside, hs_bins *bins,
-               void *free_column, char **end)
+hs_status
+hs_bins_arrange(hs_account *account, hs_team *team, const hs_options *options,
+                const hs_scene *scene, hs_bins *bins)
 {
-    double  **first = x_is_beside ? bins->originals : bins->x;
-    double  **second = x_is_beside ? bins->x : bins->originals;
+    /* In the order in which they lie behind the free column, the wide ones before the narrow ones.
+     * Where X is beside, the originals lie behind the free column, and X apart. */
+    double  **first = scene->x_is_beside ? bins->originals : bins->x;
+    double  **second = scene->x_is_beside ? bins->x : bins->originals;
+    void     *free_column = scene->cloud.spare;
     hs_status status = gather_doubles(team, options, bins, first, &free_column);
     if (status == HS_OK && bins->keeps_originals) {
         status = gather_doubles(team, options, bins, second, &free_column);
@@ -257,20 +235,9 @@ gather_columns(hs_team *team, const hs_options *options, bool x_is_beside, hs_bi
         bins->turns.narrow[r] = narrow ? column : NULL;
         bins->turns.wide[r] = narrow ? NULL : column;
     }
-    *end = free_column;
-    return status;
-}
-
-hs_status
-hs_bins_arrange(hs_account *account, hs_team *team, const hs_options *options,
-                const hs_scene *scene, hs_bins *bins)
-{
-    char           *end = NULL;
-    const hs_status status =
-        gather_columns(team, options, scene->x_is_beside, bins, scene->cloud.spare, &end);
-    if (status == HS_OK) {
-        void *last = bins->beside != NULL ? bins->beside : bins->points;
-        hs_trim(account, last, (size_t)(end - (char *)last) + HS_COLUMN_PADDING);
+    if (status == HS_OK) { /* the free column lies behind all that is still needed */
+        char *last = bins->beside != NULL ? bins->beside : bins->points;
+        hs_trim(account, last, (size_t)((char *)free_column - last) + HS_COLUMN_PADDING);
     }
     return status;
 }
@@ -319,22 +286,6 @@ sort_many(hs_account *account, hs_team *team, const hs_options *options, sorting
     return status;
 }
 
-/* Sorts the points into bins->order, and fills `start` or `cells`. */
-static hs_status
-sort_points(hs_account *account, hs_team *team, const hs_options *options, const hs_scene *scene,
-            const hs_grid *grid, hs_bins *bins)
-{
-    const bool is_few = bins->n <= FEW_QUERIES && bins->n <= grid->n_cells / CELLS_PER_FEW;
-    void      *spare = scene->cloud.spare;
-    sorting    sort = {.grid = grid, .lattice = &scene->lattice, .bins = bins, .x = bins->x};
-    hs_status  status;
-    sort.cells = bins->cells != NULL && is_few ? bins->cells : spare;
-    status = bins->cells == NULL ? sort_numbers(account, team, options, &sort, bins, bins->start)
-             : is_few            ? sort_few(account, &sort, spare, bins)
-                                 : sort_many(account, team, options, &sort, bins);
-    return status == HS_OK ? hs_bins_arrange(account, team, options, scene, bins) : status;
-}
-
 void
 hs_bins_take(hs_scene *scene, hs_bins *bins)
 {
@@ -376,7 +327,16 @@ hs_bins_build(hs_account *account, hs_team *team, const hs_options *options, hs_
             bins->start[1] = (int32_t)n;
         }
     } else {
-        status = sort_points(account, team, options, scene, grid, bins);
+        const bool is_few = n <= FEW_QUERIES && n <= grid->n_cells / CELLS_PER_FEW;
+        void      *spare = scene->cloud.spare;
+        sorting    sort = {.grid = grid, .lattice = &scene->lattice, .bins = bins, .x = bins->x};
+        sort.cells = of_queries && is_few ? bins->cells : spare;
+        status = !of_queries ? sort_numbers(account, team, options, &sort, bins, bins->start)
+                 : is_few    ? sort_few(account, &sort, spare, bins)
+                             : sort_many(account, team, options, &sort, bins);
+        if (status == HS_OK) {
+            status = hs_bins_arrange(account, team, options, scene, bins);
+        }
     }
     if (status != HS_OK) {
         hs_bins_free(account, bins);
@@ -463,7 +423,6 @@ hs_sparse_grid(const hs_scene *scene, const hs_grid *dense, double width, hs_gri
         const double pitch = choose_pitch(grid, k, extent, width);
         grid->stride[k] = 0;
         grid->skipped[k] = 0;
-        grid->by_faces[k] = false;
         if (scene->lattice.row_of_axis[k] >= 0) {
             const double count = floor(fmin(extent / pitch, MOST_PER_PERIOD));
             /* Cells are range / 4 wide or more, or there is one: then its reach is at most that of
@@ -479,10 +438,10 @@ hs_sparse_grid(const hs_scene *scene, const hs_grid *dense, double width, hs_gri
 }
 
 /*
- * Dense or sparse, and how wide the cells. Both grids are judged by how many
- * other points the cell of an average point holds, which a sample tells: samples are compared with
- * each other, so their number grows with the square root of n, and a cell that holds enough of the
- * points to matter holds a few dozen of the samples, for any n.
+ * Dense or sparse, and how wide the cells. Both grids are judged by how many other points the cell
+ * of an average point holds, which a sample tells: samples are compared with each other, so their
+ * number grows with the square root of n, and a cell that holds enough of the points to matter
+ * holds a few dozen of the samples, for any n.
  */
 
 /* How much larger than wanted a dense cell must be before anything is counted. */
@@ -555,12 +514,14 @@ cost_of(double company, int ndim)
     return ldexp(company, ndim) + (TESTS_PER_GROUP + TESTS_PER_ROW * rows) / (1.0 + company);
 }
 
-/* The cheapest width of cells; *cost: what it costs. */
-static double
-choose_width(const hs_scene *scene, const hs_grid *dense, double *cost)
+double
+hs_sparse_width(const hs_scene *scene, const hs_grid *dense, double *cost)
 {
     double best = 1.0;
     *cost = INFINITY;
+    if (scene->n < 2) {
+        return best;
+    }
     for (double width = 1.0; width <= WIDEST; width *= 2.0) {
         hs_grid grid;
         hs_sparse_grid(scene, dense, width, &grid);
@@ -574,13 +535,6 @@ choose_width(const hs_scene *scene, const hs_grid *dense, double *cost)
         }
     }
     return best;
-}
-
-double
-hs_sparse_width(const hs_scene *scene, const hs_grid *dense)
-{
-    double cost;
-    return scene->n < 2 ? 1.0 : choose_width(scene, dense, &cost);
 }
 
 double
@@ -608,12 +562,12 @@ hs_sparse_choose(const hs_scene *scene, const hs_grid *dense)
     if (!(crowd > CROWDED)) {
         return 0.0;
     }
-    const double width = choose_width(scene, dense, &cost);
+    const double width = hs_sparse_width(scene, dense, &cost);
     return 0.5 * crowd > cost ? width : 0.0;
 }
 
-/* Sorts the points into rows of cells; finds rows, windows and groups by steps that
- * double, then by halves. */
+/* Sorts the points into rows of cells; finds rows, windows and groups by steps that double, then by
+ * halves. */
 
 void
 hs_sparse_free(hs_account *account, hs_sparse *sparse)
@@ -637,19 +591,29 @@ row_is_before(const hs_sparse *sparse, int64_t row, const int64_t *index)
     return false;
 }
 
-/* The first row that does not come before these indices, by steps that double, then by halves. */
-static int64_t
-seek_row(const hs_sparse *sparse, const int64_t *index, int64_t hint)
+/* Does the cell come before this index along the first axis? */
+HS_ALWAYS_INLINE bool
+cell_is_before(const hs_sparse *sparse, int64_t cell, const int64_t *x)
 {
-    int64_t low = 0, high = sparse->n_rows, step = 1; /* the answer is in [low, high] */
-    if (hint < high && row_is_before(sparse, hint, index)) {
-        for (low = hint + 1; low + step <= high && row_is_before(sparse, low + step - 1, index);
+    return sparse->cell_x[cell] < *x;
+}
+
+/* The first row or cell of [low, high) that does not come before what is sought, or high: from
+ * `hint` on, which is at most high, by steps that double, then by halves. */
+HS_ALWAYS_INLINE int64_t
+seek(const hs_sparse *sparse, bool (*is_before)(const hs_sparse *, int64_t, const int64_t *),
+     const int64_t *sought, int64_t low, int64_t high, int64_t hint)
+{
+    int64_t step = 1; /* the answer is in [low, high] */
+    hint = hint < low ? low : hint;
+    if (hint < high && is_before(sparse, hint, sought)) {
+        for (low = hint + 1; low + step <= high && is_before(sparse, low + step - 1, sought);
              step *= 2) {
             low += step;
         }
         high = low + step - 1 < high ? low + step - 1 : high;
     } else {
-        for (high = hint; high - step >= low && !row_is_before(sparse, high - step, index);
+        for (high = hint; high - step >= low && !is_before(sparse, high - step, sought);
              step *= 2) {
             high -= step;
         }
@@ -657,7 +621,7 @@ seek_row(const hs_sparse *sparse, const int64_t *index, int64_t hint)
     }
     while (low < high) {
         const int64_t middle = low + (high - low) / 2;
-        if (row_is_before(sparse, middle, index)) {
+        if (is_before(sparse, middle, sought)) {
             low = middle + 1;
         } else {
             high = middle;
@@ -669,7 +633,8 @@ seek_row(const hs_sparse *sparse, const int64_t *index, int64_t hint)
 int64_t
 hs_sparse_find_row(const hs_sparse *sparse, const int64_t *index, int64_t *hint)
 {
-    const int64_t row = *hint = seek_row(sparse, index, *hint);
+    const int64_t row = seek(sparse, row_is_before, index, 0, sparse->n_rows, *hint);
+    *hint = row;
     if (row == sparse->n_rows) {
         return -1;
     }
@@ -682,42 +647,14 @@ hs_sparse_find_row(const hs_sparse *sparse, const int64_t *index, int64_t *hint)
     return row;
 }
 
-/* The first of cells [low, high) at x or beyond, or high: from `hint` on, which is at most high, by
- * steps that double, then by halves. */
-static int32_t
-seek_cell(const int64_t *cell_x, int32_t low, int32_t high, int32_t hint, int64_t x)
-{
-    int64_t step = 1;
-    hint = hint < low ? low : hint;
-    if (hint < high && cell_x[hint] < x) {
-        for (low = hint + 1; low + step <= high && cell_x[low + step - 1] < x; step *= 2) {
-            low += (int32_t)step;
-        }
-        high = low + step - 1 < high ? low + (int32_t)step - 1 : high;
-    } else {
-        for (high = hint; high - step >= low && cell_x[high - step] >= x; step *= 2) {
-            high -= (int32_t)step;
-        }
-        low = high - step >= low ? high - (int32_t)step + 1 : low;
-    }
-    while (low < high) {
-        const int32_t middle = low + (high - low) / 2;
-        if (cell_x[middle] < x) {
-            low = middle + 1;
-        } else {
-            high = middle;
-        }
-    }
-    return low;
-}
-
 void
 hs_sparse_window(const hs_sparse *sparse, int64_t row, int64_t x_first, int64_t x_last,
                  hs_sparse_cursor *cursor, int32_t *first, int32_t *end)
 {
     const int32_t low = sparse->row_cell[row], high = sparse->row_cell[row + 1];
-    cursor->low = seek_cell(sparse->cell_x, low, high, cursor->low, x_first);
-    cursor->high = seek_cell(sparse->cell_x, cursor->low, high, cursor->high, x_last + 1);
+    const int64_t beyond = x_last + 1;
+    cursor->low = (int32_t)seek(sparse, cell_is_before, &x_first, low, high, cursor->low);
+    cursor->high = (int32_t)seek(sparse, cell_is_before, &beyond, cursor->low, high, cursor->high);
     *first = sparse->cell_start[cursor->low];
     *end = sparse->cell_start[cursor->high];
 }
@@ -758,11 +695,9 @@ hs_sparse_next_group(const hs_sparse *sparse, int64_t row, int32_t most, hs_spar
  */
 
 typedef struct build {
-    hs_account       *account;
-    const hs_options *options;
-    const hs_scene   *scene;
-    const hs_grid    *grid;
-    hs_keys           sort; /* ids: bins->order; keys end as indices along the first axis */
+    const hs_scene *scene;
+    const hs_grid  *grid;
+    hs_keys         sort; /* ids: bins->order; keys end as indices along the first axis */
 } build;
 
 static int64_t
@@ -794,37 +729,6 @@ sort_by_axis(build *b, int64_t first, int64_t end, int k)
     return status;
 }
 
-/* bins->order, sorted; keys as sort_by_axis leaves them. */
-static hs_status
-sort_points_sparsely(build *b, hs_bins *bins)
-{
-    const int64_t n = bins->n;
-    b->sort.spare_keys = (int64_t *)(void *)b->scene->cloud.spare;
-    b->sort.spare_ids = hs_alloc(b->account, HS_FOR_ORDER, n, sizeof(int32_t));
-    if (b->sort.spare_ids == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    b->sort.ids = bins->order;
-    b->sort.options = b->options;
-    for (int64_t i = 0; i < n; i++) {
-        bins->order[i] = (int32_t)i;
-    }
-    const hs_status status = n > 0 ? sort_by_axis(b, 0, n, b->scene->ndim - 1) : HS_OK;
-    hs_free(b->account, b->sort.spare_ids);
-    return status;
-}
-
-/* keys: indices along the first axis, complemented where a row begins. */
-static void
-count_cells(const int64_t *keys, int64_t n, hs_sparse *sparse)
-{
-    for (int64_t si = 0; si < n; si++) {
-        const bool begins_row = keys[si] < 0;
-        sparse->n_rows += begins_row;
-        sparse->n_cells += begins_row || (keys[si] != keys[si - 1] && keys[si] != ~keys[si - 1]);
-    }
-}
-
 /* Lists rows and cells, and shortens the keys to one for each cell. */
 static void
 list_cells(const build *b, int64_t n, int32_t *start, hs_sparse *sparse)
@@ -851,47 +755,49 @@ list_cells(const build *b, int64_t n, int32_t *start, hs_sparse *sparse)
     start[cell] = (int32_t)n;
 }
 
-static hs_status
-make_rows(build *b, hs_sparse *sparse, hs_bins *bins)
-{
-    hs_account *account = b->account;
-    count_cells(sparse->cell_x, bins->n, sparse);
-    sparse->row_index =
-        hs_alloc(account, HS_FOR_CELLS, sparse->n_rows * (sparse->ndim - 1), sizeof(int64_t));
-    sparse->row_cell = hs_alloc(account, HS_FOR_CELLS, sparse->n_rows + 1, sizeof(int32_t));
-    bins->start = hs_alloc(account, HS_FOR_CELLS, sparse->n_cells + 1, sizeof(int32_t));
-    if (sparse->row_index == NULL || sparse->row_cell == NULL || bins->start == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    sparse->cell_start = bins->start;
-    list_cells(b, bins->n, bins->start, sparse);
-    for (int64_t c = 0; c < sparse->n_cells; c++) {
-        const double n = bins->start[c + 1] - bins->start[c];
-        bins->squares += n * n;
-    }
-    return HS_OK;
-}
-
 hs_status
 hs_sparse_build(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
                 hs_grid *grid, hs_sparse *sparse, hs_bins *bins)
 {
-    build b = {.account = account, .options = options, .scene = scene, .grid = grid};
+    const int64_t n = scene->n;
+    build         b = {.scene = scene, .grid = grid};
+    hs_status     status = HS_ERR_MEMORY;
     *sparse = (hs_sparse){.ndim = scene->ndim};
-    hs_status status = HS_OK;
     hs_bins_take(scene, bins);
-    sparse->cell_x = hs_alloc(account, HS_FOR_CELLS, scene->n, sizeof(int64_t));
-    if (sparse->cell_x == NULL) {
-        status = HS_ERR_MEMORY;
+    sparse->cell_x = hs_alloc(account, HS_FOR_CELLS, n, sizeof(int64_t));
+    int32_t *spare_ids = hs_alloc(account, HS_FOR_ORDER, n, sizeof *spare_ids);
+    b.sort = (hs_keys){sparse->cell_x, bins->order, (int64_t *)(void *)scene->cloud.spare,
+                       spare_ids,      options,     0};
+    if (sparse->cell_x != NULL && spare_ids != NULL) {
+        for (int64_t i = 0; i < n; i++) {
+            bins->order[i] = (int32_t)i;
+        }
+        status = n > 0 ? sort_by_axis(&b, 0, n, scene->ndim - 1) : HS_OK;
+    }
+    hs_free(account, spare_ids);
+    if (status == HS_OK) {
+        const int64_t *keys = sparse->cell_x; /* complemented where a row begins */
+        for (int64_t si = 0; si < n; si++) {
+            const bool begins_row = keys[si] < 0;
+            sparse->n_rows += begins_row;
+            sparse->n_cells += begins_row ||
+                               (keys[si] != keys[si - 1] && keys[si] != ~keys[si - 1]);
+        }
+        sparse->row_index =
+            hs_alloc(account, HS_FOR_CELLS, sparse->n_rows * (sparse->ndim - 1), sizeof(int64_t));
+        sparse->row_cell = hs_alloc(account, HS_FOR_CELLS, sparse->n_rows + 1, sizeof(int32_t));
+        bins->start = hs_alloc(account, HS_FOR_CELLS, sparse->n_cells + 1, sizeof(int32_t));
+        if (sparse->row_index == NULL || sparse->row_cell == NULL || bins->start == NULL) {
+            status = HS_ERR_MEMORY;
+        }
     }
     if (status == HS_OK) {
-        b.sort.keys = sparse->cell_x;
-        status = sort_points_sparsely(&b, bins);
-    }
-    if (status == HS_OK) {
-        status = make_rows(&b, sparse, bins);
-    }
-    if (status == HS_OK) {
+        sparse->cell_start = bins->start;
+        list_cells(&b, n, bins->start, sparse);
+        for (int64_t c = 0; c < sparse->n_cells; c++) {
+            const double here = bins->start[c + 1] - bins->start[c];
+            bins->squares += here * here;
+        }
         status = hs_bins_arrange(account, team, options, scene, bins);
     }
     grid->n_cells = sparse->n_cells;

@@ -41,25 +41,22 @@ hs_status hs_bins_build(hs_account *account, hs_team *team, const hs_options *op
  * caller's order as yet, and without `start`; the scene's spare column stays usable. */
 void hs_bins_take(hs_scene *scene, hs_bins *bins);
 
-/* Then, with bins->order filled: moves all columns into that order. Overwrites the spare column.
- * HS_OK or HS_ERR_INTERRUPTED. */
+/*
+ * Then, with bins->order filled: moves all columns into that order. Each is gathered into the
+ * column that is free, and leaves its own place free for the next:
+ *
+ *     order | spare | x[0] | x[1] | ...   ->   order | x[0] | x[1] | ... | free
+ *
+ * so that this takes room for one column and no more. HS_OK or HS_ERR_INTERRUPTED.
+ */
 hs_status hs_bins_arrange(hs_account *account, hs_team *team, const hs_options *options,
                           const hs_scene *scene, hs_bins *bins);
 
 void hs_bins_free(hs_account *account, hs_bins *bins);
 
 /*
- * The columns of the points, from the caller's order to cell order. Each is gathered
- * into the column that is free, and leaves its own place free for the next:
- *
- *     order | spare | x[0] | x[1] | ...   ->   order | x[0] | x[1] | ... | free
- *
- * so that this takes room for one column and no more.
- */
-
-/*
- * Cells as wide as the search wants them, however far the points reach. Such a grid
- * has no array over its cells: only the occupied ones are stored.
+ * Cells as wide as the search wants them, however far the points reach. Such a grid has no array
+ * over its cells: only the occupied ones are stored.
  */
 
 /* Cells per row's width along the first axis: short cells make tight windows and cost no rows. */
@@ -108,8 +105,8 @@ hs_sparse_index(const hs_grid *grid, int k, double t)
 double hs_sparse_choose(const hs_scene *scene, const hs_grid *dense);
 
 /* The `width` for hs_sparse_grid that is expected to be quickest, for a scene of any number of
- * points. dense: any grid of it. */
-double hs_sparse_width(const hs_scene *scene, const hs_grid *dense);
+ * points; *cost: tests per point, all costs counted as tests. dense: any grid of it. */
+double hs_sparse_width(const hs_scene *scene, const hs_grid *dense, double *cost);
 
 /*
  * The occupied cells of a sparse grid, in rows. A row is a line of cells along the

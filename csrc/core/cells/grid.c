@@ -15,80 +15,16 @@
  * bounds how far apart the computed coordinates of a pair can be, every rounding and the whole
  * effect of inexact normals included; and `reach` is that range in cells, rounded up.
  *
- * Boxes are often whole multiples of the cutoff. There is no room for rounding then, so points are
- * told apart by the faces between cells, which are numbers: two points with `part` whole cells
- * between their cells are more than the radius apart, also across a periodic face unless one lies
- * on it.
+ * Where a box is a whole multiple of the cutoff, rounding leaves no room for that many cells, and
+ * there is one less. Cells with exact faces would save that one: in crystals and uniform scenes
+ * searches with them took 1.00 to 1.04 times the instructions (AVX2).
  */
 
-/* Is every cell along axis k at least `least` wide, in the real numbers that its faces are? */
-static bool
-faces_hold(const hs_scene *scene, const hs_grid *grid, int k, double least)
-{
-    double from = scene->lower[k]; /* where cell 0 begins */
-    for (int64_t cell = 0; cell < grid->shape[k]; cell++) {
-        const double to = cell + 1 < grid->shape[k] ? hs_grid_face(grid, k, (double)(cell + 1))
-                                                    : scene->upper[k];
-        const hs_dw  width = hs_two_difference(to, from);
-        if (!(width.hi > least || (width.hi == least && width.lo >= 0.0))) {
-            return false;
-        }
-        from = to;
-    }
-    return true;
-}
+/* How many cells there are along each axis, unless the caller sets their width. Any cells find all
+ * pairs: what is chosen here is speed alone. */
 
-/* Does a point lie on the far face? There the last cell is closed, not half open. */
-static bool
-touches_end(const hs_scene *scene, int k)
-{
-    const double *x = scene->cloud.x[k], end = scene->upper[k];
-    int           any = 0;
-    for (int64_t i = 0; i < scene->n; i++) {
-        any |= x[i] >= end;
-    }
-    return any != 0;
-}
-
-void
-hs_grid_cut_by_faces(const hs_scene *scene, const double *parts, double cap, hs_grid *grid)
-{
-    double cells = (double)grid->n_cells;
-    for (int k = 0; k < scene->ndim; k++) {
-        const double extent = scene->upper[k] - scene->lower[k];
-        const double along = hs_scene_radius_along(scene, k);
-        const double part = along / parts[k]; /* exact but for thirds */
-        const double least = parts[k] == 3.0 ? hs_next_up(part) : part;
-        const double count = (double)grid->shape[k] + 1.0;
-        const double reach = hs_larger(fabs(scene->lower[k]), fabs(scene->upper[k]));
-        if (scene->t_error[k] != 0.0 || reach > 16.0 * extent || count < 4.0 || !(least > 0.0) ||
-            !(least * count <= extent * (1.0 + HS_GRID_SLACK)) || count > HS_GRID_CELLS_PER_AXIS) {
-            continue;
-        }
-        const double  more = cells / (count - 1.0) * count;
-        const hs_grid before = *grid;
-        grid->shape[k] = (int64_t)count;
-        grid->cell_size[k] = extent / count;
-        grid->cells_per_length[k] = count / extent;
-        grid->reach[k] = (int64_t)parts[k];
-        grid->by_faces[k] = more <= cap && faces_hold(scene, grid, k, least) &&
-                            (scene->lattice.row_of_axis[k] < 0 || !touches_end(scene, k));
-        if (grid->by_faces[k]) {
-            cells = more;
-        } else {
-            *grid = before;
-        }
-    }
-    grid->n_cells = 1;
-    for (int k = 0; k < scene->ndim; k++) {
-        grid->stride[k] = grid->n_cells;
-        grid->n_cells *= grid->shape[k];
-    }
-}
-
-/* How many cells there are along each axis, unless the caller sets their width
- *. Any cells find all pairs: what is chosen here is speed alone. */
-
+/* Cells per axis that int32 windows and doubles tell apart. */
+#define CELLS_PER_AXIS 0x1p31
 /* Cells of a grid: their ids are uint32. */
 #define MOST_CELLS 4294967295.0
 /* Points that a cell along the first axis should hold, if that makes it a quarter of the range or
@@ -113,26 +49,25 @@ pitch_of(const hs_grid *grid, int k, double parts)
 
 /*
  * How many cells along each axis: those that make a search quickest, `finer` of them to a range;
- * along the first axis so many that a cell holds some twelve points of this density. Fills
- * parts[k], the cells to a range along axis k.
+ * along the first axis so many that a cell holds some twelve points of this density.
  */
 static void
 grid_choose_counts(const hs_scene *scene, const hs_grid *grid, int finer, double density,
-                   double *counts, double *parts)
+                   double *counts)
 {
     double area = 1.0; /* of one row's cross-section */
     for (int k = scene->ndim - 1; k >= 0; k--) {
         const double extent = scene->upper[k] - scene->lower[k];
-        parts[k] = finer;
+        double       parts = finer;
         if (k == 0 && scene->ndim > 1) {
             /* A whole fraction of the range: otherwise windows are longer than need be. */
             const double points = density * area * grid->range[0];
-            parts[k] = fmin(fmax(nearbyint(points / POINTS_PER_CELL), 1.0), 4.0);
+            parts = fmin(fmax(nearbyint(points / POINTS_PER_CELL), 1.0), 4.0);
         }
-        const double pitch = pitch_of(grid, k, parts[k]);
+        const double pitch = pitch_of(grid, k, parts);
         counts[k] = 1.0;
         if (extent > pitch) { /* never for a zero extent, also with cutoff 0 */
-            counts[k] = floor(fmin(extent / pitch, HS_GRID_CELLS_PER_AXIS));
+            counts[k] = floor(fmin(extent / pitch, CELLS_PER_AXIS));
         }
         area *= fmax(extent, grid->range[k]) / counts[k]; /* flat scenes count as this thick */
     }
@@ -169,14 +104,6 @@ cap_counts(int ndim, double cap, double *counts)
     }
 }
 
-/* Fewer cells, evenly over the axes, until there are no more than grid_most_cells. Returns
- * whether it had to. */
-static bool
-grid_cap_counts(const hs_scene *scene, double *counts)
-{
-    return cap_counts(scene->ndim, grid_most_cells(scene), counts);
-}
-
 /*
  * For counts that were capped, so that cells are wider than the range: cells become shorter along
  * the first axis, where a walk passes over them one after the other, and wider along the others, in
@@ -210,23 +137,9 @@ shorten_cells(const hs_scene *scene, const hs_grid *grid, double *counts)
     counts[0] = fmin(floor(product), most);
 }
 
-/* The same, then fewer rows of shorter cells, or of more points. */
-static bool
-grid_fit_counts(const hs_scene *scene, const hs_grid *grid, double *counts)
-{
-    const bool capped = grid_cap_counts(scene, counts);
-    if (capped && counts[0] < FEW_CELLS) {
-        const double rows = fmax((double)scene->n / POINTS_PER_ROW, 1.0);
-        (void)cap_counts(scene->ndim, counts[0] * rows, counts);
-    } else if (capped) {
-        shorten_cells(scene, grid, counts);
-    }
-    return capped;
-}
-
 #define UNIT                0x1p-53
 #define SLACK               HS_GRID_SLACK
-#define MOST_CELLS_PER_AXIS HS_GRID_CELLS_PER_AXIS
+#define MOST_CELLS_PER_AXIS CELLS_PER_AXIS
 /* Cost of sorting a point into its cell, in candidates. */
 #define SORTING_COST 40.0
 
@@ -335,7 +248,6 @@ hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *grid)
     const double extent = scene->upper[k] - scene->lower[k];
     const bool   open = scene->lattice.row_of_axis[k] < 0;
     grid->shape[k] = (int64_t)count;
-    grid->by_faces[k] = false;
     grid->lower[k] = scene->lower[k];
     grid->cell_size[k] = extent / count;
     /* One cell needs no scale; that of a subnormal extent would be infinite. */
@@ -352,8 +264,9 @@ hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *grid)
     return HS_OK;
 }
 
-hs_status
-hs_grid_set_shape(const hs_scene *scene, const double *counts, hs_grid *grid)
+/* So many cells along each axis. HS_ERR_MEMORY when a reach passes its integers. */
+static hs_status
+set_shape(const hs_scene *scene, const double *counts, hs_grid *grid)
 {
     grid->n_cells = 1;
     for (int k = 0; k < scene->ndim; k++) {
@@ -387,61 +300,6 @@ cost_per_point(const hs_scene *scene, const hs_grid *grid)
     return candidates + 8.0 * (rows + 1.0) / group + (grid->n_cells > 1 ? SORTING_COST : 0.0);
 }
 
-/* Chooses one cell, or a grid of cells where that is cheaper, unless the kind says which. */
-static hs_status
-choose_shape(const hs_scene *scene, hs_grid_kind kind, double density, double neighbours,
-             hs_grid *grid)
-{
-    double counts[HS_MAX_DIM], parts[HS_MAX_DIM];
-    double single_cost = INFINITY;
-    for (int k = 0; k < scene->ndim; k++) {
-        counts[k] = 1.0;
-    }
-    if (hs_grid_set_shape(scene, counts, grid) == HS_OK) {
-        single_cost = cost_per_point(scene, grid);
-    }
-    if (kind == HS_GRID_SINGLE) {
-        return single_cost < INFINITY ? HS_OK : hs_skew_or_memory(&scene->lattice);
-    }
-    if (kind == HS_GRID_ANY && single_cost <= SORTING_COST) { /* no grid costs less */
-        return HS_OK;
-    }
-    const hs_grid single = *grid;
-    /* Narrower rows cost more rows to visit, and leave out candidates that else are gathered first
-     * (scan.h). */
-    const int finer = neighbours < 600.0 ? 1 : neighbours < 3000.0 ? 2 : 3;
-    grid_choose_counts(scene, grid, finer, density, counts, parts);
-    const bool capped = grid_fit_counts(scene, grid, counts);
-    hs_status  status = hs_grid_set_shape(scene, counts, grid);
-    if (status == HS_OK && scene->lattice.aligned && !capped && !scene->is_asked) {
-        hs_grid_cut_by_faces(scene, parts, grid_most_cells(scene), grid);
-    }
-    /* Axes with several cells reach a few of them, the others as far as in the single one. */
-    HS_ASSERT(status == HS_OK || single_cost == INFINITY);
-    if (status == HS_OK && kind == HS_GRID_ANY && single_cost <= cost_per_point(scene, grid)) {
-        *grid = single;
-    }
-    return status == HS_OK ? HS_OK : hs_skew_or_memory(&scene->lattice);
-}
-
-/*
- * Whether rounding moves points across half a period and more than the cutoff: a box vector is so
- * long that along the short ones every point would meet many images of every other. drift: how far
- * images can move t_k beyond whole periods.
- */
-static bool
-is_blurred(const hs_scene *scene, const double *drift)
-{
-    for (int k = 0; k < scene->ndim; k++) {
-        const double blur = drift[k] + 2.0 * scene->t_error[k];
-        if (scene->lattice.row_of_axis[k] >= 0 && blur > scene->radius &&
-            !(blur <= 0.5 * scene->lattice.period[k])) {
-            return true;
-        }
-    }
-    return false;
-}
-
 /* Sets how far apart the computed coordinates of a pair can be. HS_ERR_MEMORY when they pass more
  * images than can be counted, HS_ERR_BOX_SKEWED when it is rounding that does. */
 static hs_status
@@ -451,8 +309,14 @@ set_ranges(const hs_scene *scene, hs_grid *grid)
     if (scene->lattice.n_periodic > 0) {
         bound_drift(scene, images, drift);
     }
-    if (is_blurred(scene, drift)) {
-        return HS_ERR_BOX_SKEWED;
+    for (int k = 0; k < scene->ndim; k++) {
+        /* Rounding moves points across half a period and more than the cutoff: a box vector is so
+         * long that along the short ones every point would meet many images of every other. */
+        const double blur = drift[k] + 2.0 * scene->t_error[k];
+        if (scene->lattice.row_of_axis[k] >= 0 && blur > scene->radius &&
+            !(blur <= 0.5 * scene->lattice.period[k])) {
+            return HS_ERR_BOX_SKEWED;
+        }
     }
     for (int k = 0; k < scene->ndim; k++) {
         const int    r = scene->lattice.row_of_axis[k];
@@ -473,8 +337,10 @@ tell_endless(hs_failure *failure)
     failure->expected_pairs = failure->expected_bytes = INFINITY;
 }
 
-hs_status
-hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure *failure)
+/* Ranges, errors and expected pairs, no cells yet; *density: points in a unit of the volume that
+ * they are in. */
+static hs_status
+grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure *failure)
 {
     /* Volume of the periodic axes, times the open extents. */
     double volume = hs_lattice_volume(&scene->lattice, 0);
@@ -498,20 +364,47 @@ hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure 
 }
 
 hs_status
-hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure)
+hs_grid_init(const hs_scene *scene, hs_grid_kind kind, hs_grid *grid, hs_failure *failure)
 {
-    return hs_grid_init_kind(scene, HS_GRID_ANY, grid, failure);
-}
-
-hs_status
-hs_grid_init_kind(const hs_scene *scene, hs_grid_kind kind, hs_grid *grid, hs_failure *failure)
-{
-    double    density;
-    hs_status status = hs_grid_begin(scene, &density, grid, failure);
+    double    counts[HS_MAX_DIM], density, single_cost = INFINITY;
+    hs_status status = grid_begin(scene, &density, grid, failure);
+    if (status != HS_OK) {
+        return status;
+    }
+    for (int k = 0; k < scene->ndim; k++) {
+        counts[k] = 1.0;
+    }
+    status = set_shape(scene, counts, grid);
     if (status == HS_OK) {
+        single_cost = cost_per_point(scene, grid);
+    }
+    const hs_grid single = *grid;
+    /* Several cells cost no less, however good they are. */
+    const bool is_single = kind == HS_GRID_SINGLE ||
+                           (kind == HS_GRID_ANY && single_cost <= SORTING_COST);
+    if (!is_single) {
         const double neighbours =
             density * hs_scene_volume(scene, hs_ball_volume(scene->ndim, scene->cutoff));
-        status = choose_shape(scene, kind, density, neighbours, grid);
+        /* Narrower rows cost more rows to visit, and leave out candidates that else are gathered
+         * first (scan.h). */
+        const int finer = neighbours < 600.0 ? 1 : neighbours < 3000.0 ? 2 : 3;
+        grid_choose_counts(scene, grid, finer, density, counts);
+        const bool capped = cap_counts(scene->ndim, grid_most_cells(scene), counts);
+        if (capped && counts[0] < FEW_CELLS) {
+            const double rows = fmax((double)scene->n / POINTS_PER_ROW, 1.0);
+            (void)cap_counts(scene->ndim, counts[0] * rows, counts);
+        } else if (capped) {
+            shorten_cells(scene, grid, counts);
+        }
+        status = set_shape(scene, counts, grid);
+        /* Axes with several cells reach a few of them, the others as far as in the single one. */
+        HS_ASSERT(status == HS_OK || single_cost == INFINITY);
+        if (status == HS_OK && kind == HS_GRID_ANY && single_cost <= cost_per_point(scene, grid)) {
+            *grid = single;
+        }
+    }
+    if (status != HS_OK) {
+        status = hs_skew_or_memory(&scene->lattice);
         if (status == HS_ERR_MEMORY) {
             tell_endless(failure);
         }
@@ -526,7 +419,6 @@ hs_grid_narrow(const hs_scene *scene, bool is_sparse, double cutoff_before, hs_g
     const double    ratio = scene->cutoff / cutoff_before;
     const hs_status status = set_ranges(scene, grid);
     for (int k = 0; status == HS_OK && k < scene->ndim; k++) {
-        HS_ASSERT(!grid->by_faces[k]);
         const double cells = grid->range[k] * grid->cells_per_length[k] * (1.0 + SLACK) +
                              0x1p-50 * (double)grid->shape[k];
         if (!is_sparse && cells < (double)grid->reach[k]) {
@@ -557,13 +449,6 @@ typedef struct frame {
     bool   diagonal;                      /* no entry but lower[k][k] differs from zero */
     double lower[HS_MAX_DIM][HS_MAX_DIM]; /* direction k = sum_{c <= k} lower[k][c] q_c */
 } frame;
-
-/* What add_rows needs beside the stencil. */
-typedef struct scope {
-    const hs_scene *scene;
-    const hs_grid  *grid;
-    frame           axes;
-} scope;
 
 /* Is v = sum_k (normal_k . v) direction_k, for every v? */
 static bool
@@ -642,31 +527,15 @@ slack_along(const hs_scene *scene, const hs_grid *grid, int k)
            0x1p-50 * extent;
 }
 
-/* Differences of t_k along the later axes, as far as the radius lets them go. */
-typedef struct spans {
-    double low[HS_MAX_DIM], high[HS_MAX_DIM];
-} spans;
-
-/* Sets the differences that points of the cells at `offset` can have, rounding included. */
-static void
-set_spans(const hs_scene *scene, const hs_grid *grid, const int32_t *offset, spans *t)
-{
-    for (int k = 1; k < grid->ndim; k++) {
-        const double slack = slack_along(scene, grid, k);
-        const double radius = hs_scene_radius_along(scene, k) * (1.0 + FRAME_SLACK);
-        t->low[k] = hs_larger((offset[k] - 1) * grid->cell_size[k] - slack, -radius - slack);
-        t->high[k] = hs_smaller((offset[k] + 1) * grid->cell_size[k] + slack, radius + slack);
-    }
-}
-
 /* Finds the range of component c of D; of the first one, what the later axes add to it. */
 static void
-range_of_component(const frame *axes, const spans *t, int ndim, int c, double *least, double *most)
+range_of_component(const frame *axes, const double *low, const double *high, int ndim, int c,
+                   double *least, double *most)
 {
     const int last = axes->diagonal ? c : ndim - 1;
     *least = *most = 0.0;
     for (int k = c > 0 ? c : 1; k <= last; k++) {
-        const double a = axes->lower[k][c] * t->low[k], b = axes->lower[k][c] * t->high[k];
+        const double a = axes->lower[k][c] * low[k], b = axes->lower[k][c] * high[k];
         *least += hs_smaller(a, b);
         *most += hs_larger(a, b);
     }
@@ -681,18 +550,23 @@ narrow_by_frame(const hs_scene *scene, const hs_grid *grid, const frame *axes,
     const double radius = scene->radius * (1.0 + FRAME_SLACK);
     const double unit = radius > 0.0 ? radius : 1.0; /* squares of tiny lengths would vanish */
     double       left = radius > 0.0 ? 1.0 : 0.0; /* of the square, for the components still open */
-    double       least, most;
-    spans        t;
-    set_spans(scene, grid, offset, &t);
+    double       least, most, t_low[HS_MAX_DIM], t_high[HS_MAX_DIM];
+    /* Differences of points of these cells, with roundings. */
+    for (int k = 1; k < grid->ndim; k++) {
+        const double slack = slack_along(scene, grid, k);
+        const double along = hs_scene_radius_along(scene, k) * (1.0 + FRAME_SLACK);
+        t_low[k] = hs_larger((offset[k] - 1) * grid->cell_size[k] - slack, -along - slack);
+        t_high[k] = hs_smaller((offset[k] + 1) * grid->cell_size[k] + slack, along + slack);
+    }
     for (int c = grid->ndim - 1; c >= 1; c--) {
-        range_of_component(axes, &t, grid->ndim, c, &least, &most);
+        range_of_component(axes, t_low, t_high, grid->ndim, c, &least, &most);
         const double gap = hs_larger(hs_larger(least, -most), 0.0) / unit;
         left -= gap * gap;
         if (left < 0.0) {
             return false;
         }
     }
-    range_of_component(axes, &t, grid->ndim, 0, &least, &most);
+    range_of_component(axes, t_low, t_high, grid->ndim, 0, &least, &most);
     const double rest = sqrt(left) * unit;
     const double slack = slack_along(scene, grid, 0);
     *low = hs_larger((-rest - most) / axes->lower[0][0] - slack, *low);
@@ -765,83 +639,65 @@ hs_stencil_bytes(const hs_grid *grid, bool is_full)
     return 0.9 * share[m] * rows * (double)sizeof(hs_stencil_row); /* balls of cells are uneven */
 }
 
-/* Twice the room; on failure the stencil is freed. */
-static bool
-grow(hs_account *account, int64_t *capacity, hs_stencil *stencil)
-{
-    hs_stencil_row *more = hs_grow(account, HS_FOR_STENCIL, stencil->rows, stencil->n_rows,
-                                   2 * *capacity, sizeof(hs_stencil_row));
-    if (more == NULL) {
-        hs_stencil_free(account, stencil);
-        return false;
-    }
-    stencil->rows = more;
-    *capacity *= 2;
-    return true;
-}
-
-/* Adds the rows from this one to the last in the order of the axes, as far as they are in reach. */
-static hs_status
-add_rows(hs_account *account, const hs_options *options, const scope *of, hs_stencil_row *row,
-         hs_stencil *stencil, int64_t capacity)
-{
-    int64_t tried = 0;
-    do {
-        if (++tried % POLL_ROWS == 0 && hs_poll(options, 0.0) != HS_OK) {
-            hs_stencil_free(account, stencil);
-            return HS_ERR_INTERRUPTED;
-        }
-        if (stencil->n_rows == capacity && !grow(account, &capacity, stencil)) {
-            return HS_ERR_MEMORY;
-        }
-        if (reach_along_row(of->scene, of->grid, &of->axes, row)) {
-            stencil->rows[stencil->n_rows++] = *row;
-        }
-    } while (advance(of->grid, row->offset));
-    return HS_OK;
-}
-
 hs_status
 hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene *scene,
                  const hs_grid *grid, bool is_full, hs_stencil *stencil)
 {
     const double bound = stencil_bound(grid) * (is_full ? 2.0 : 1.0);
-    scope        of;
-    of.scene = scene;
-    of.grid = grid;
-    of.axes.usable = false; /* the own row alone needs none */
+    frame        axes;
+    axes.usable = false; /* the own row alone needs none */
     *stencil = (hs_stencil){0};
     if (bound > 1.0 && scene->lattice.aligned) {
-        set_unit_frame(grid->ndim, &of.axes);
+        set_unit_frame(grid->ndim, &axes);
     } else if (bound > 1.0) {
-        set_triangular_frame(&scene->lattice, &of.axes);
+        set_triangular_frame(&scene->lattice, &axes);
     }
-    if (bound > (of.axes.usable ? (double)INT32_MAX : MOST_UNPRUNED)) {
+    if (bound > (axes.usable ? (double)INT32_MAX : MOST_UNPRUNED)) {
         return hs_skew_or_memory(&scene->lattice);
     }
     if (scene->lattice.aligned && bound > FIRST_CAPACITY &&
         !hs_account_allows(account, hs_stencil_bytes(grid, is_full))) {
         return HS_ERR_MEMORY; /* refused now, not after as much has been written */
     }
-    const int64_t capacity = (int64_t)hs_smaller(bound, FIRST_CAPACITY);
+    int64_t capacity = (int64_t)hs_smaller(bound, FIRST_CAPACITY);
     stencil->rows = hs_alloc(account, HS_FOR_STENCIL, capacity, sizeof(hs_stencil_row));
     if (stencil->rows == NULL) {
         return HS_ERR_MEMORY;
     }
     hs_stencil_row row = {{0}, 0, 0};
+    bool           more = true; /* rows from this one on, in the order of the axes */
     if (is_full) {
         for (int k = 1; k < grid->ndim; k++) {
             row.offset[k] = (int32_t)-grid->reach[k];
         }
-        return add_rows(account, options, &of, &row, stencil, capacity);
+    } else {
+        (void)reach_along_row(scene, grid, &axes, &row);
+        row.first = 0; /* in the own row only what lies ahead */
+        row.last = row.last > 0 ? row.last : 0;
+        stencil->rows[stencil->n_rows++] = row;
+        more = advance(grid, row.offset); /* counting up visits exactly the forward half */
     }
-    (void)reach_along_row(scene, grid, &of.axes, &row);
-    row.first = 0; /* in the own row only what lies ahead */
-    row.last = row.last > 0 ? row.last : 0;
-    stencil->rows[stencil->n_rows++] = row;
-    /* From the zero offset on, counting up visits exactly the forward half. */
-    return advance(grid, row.offset) ? add_rows(account, options, &of, &row, stencil, capacity)
-                                     : HS_OK;
+    for (int64_t tried = 1; more; tried++) {
+        if (tried % POLL_ROWS == 0 && hs_poll(options, 0.0) != HS_OK) {
+            hs_stencil_free(account, stencil);
+            return HS_ERR_INTERRUPTED;
+        }
+        if (stencil->n_rows == capacity) {
+            hs_stencil_row *grown = hs_grow(account, HS_FOR_STENCIL, stencil->rows, capacity,
+                                            2 * capacity, sizeof(hs_stencil_row));
+            if (grown == NULL) {
+                hs_stencil_free(account, stencil);
+                return HS_ERR_MEMORY;
+            }
+            stencil->rows = grown;
+            capacity *= 2;
+        }
+        if (reach_along_row(scene, grid, &axes, &row)) {
+            stencil->rows[stencil->n_rows++] = row;
+        }
+        more = advance(grid, row.offset);
+    }
+    return HS_OK;
 }
 
 void
@@ -851,8 +707,8 @@ hs_stencil_free(hs_account *account, hs_stencil *stencil)
     stencil->rows = NULL;
 }
 
-/* Cells of a width that the caller chooses. Any cells find all pairs, for their reach
- * follows from their width: only layout and speed are the caller's. */
+/* Cells of a width that the caller chooses. Any cells find all pairs, for their reach follows from
+ * their width: only layout and speed are the caller's. */
 
 /* Rows around a cell, the forward half of them, at most: each takes room, and a look for each group
  * of points. In eight dimensions the nearest ones alone are half of 3^7 = 2187. */
@@ -885,7 +741,7 @@ hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_w
                   hs_failure *failure)
 {
     double          counts[HS_MAX_DIM], density;
-    const hs_status status = hs_grid_begin(scene, &density, grid, failure);
+    const hs_status status = grid_begin(scene, &density, grid, failure);
     if (status != HS_OK) {
         return status;
     }
@@ -893,10 +749,10 @@ hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_w
         const double extent = scene->upper[k] - scene->lower[k];
         const double pitch = wide_enough(grid->range[k], width);
         /* Not for a zero extent, also with a width that scaling brought to zero. */
-        counts[k] = extent > pitch ? floor(fmin(extent / pitch, HS_GRID_CELLS_PER_AXIS)) : 1.0;
+        counts[k] = extent > pitch ? floor(fmin(extent / pitch, CELLS_PER_AXIS)) : 1.0;
     }
-    *is_wider = grid_cap_counts(scene, counts);
-    while (hs_grid_set_shape(scene, counts, grid) != HS_OK || stencil_bound(grid) > MOST_ROWS) {
+    *is_wider = cap_counts(scene->ndim, grid_most_cells(scene), counts);
+    while (set_shape(scene, counts, grid) != HS_OK || stencil_bound(grid) > MOST_ROWS) {
         *is_wider = true;
         if (!halve_counts(scene->ndim, counts)) {
             return HS_TRY_OTHER;

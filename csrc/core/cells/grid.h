@@ -18,11 +18,10 @@ typedef struct hs_grid {
     int64_t skipped[HS_MAX_DIM]; /* sparse grids: cells before the first that holds points */
     double  cell_size[HS_MAX_DIM];
     double  cells_per_length[HS_MAX_DIM];
-    bool    by_faces[HS_MAX_DIM]; /* cells begin at the numbers hs_grid_face() gives, exactly */
-    double  range[HS_MAX_DIM];    /* largest |difference of computed t_k| of a pair */
-    int64_t reach[HS_MAX_DIM];    /* `range` in cells, counted on through images */
-    double  shift_error;          /* bound on the error of a shifted coordinate minus a centre */
-    double  expected_pairs;       /* if the points were spread evenly over the space they occupy */
+    double  range[HS_MAX_DIM]; /* largest |difference of computed t_k| of a pair */
+    int64_t reach[HS_MAX_DIM]; /* `range` in cells, counted on through images */
+    double  shift_error;       /* bound on the error of a shifted coordinate minus a centre */
+    double  expected_pairs;    /* if the points were spread evenly over the space they occupy */
 } hs_grid;
 
 #define HS_GRID_SPARE_CELLS 64
@@ -30,14 +29,13 @@ typedef struct hs_grid {
 /* Volume of a ball in ndim dimensions. */
 double hs_ball_volume(int ndim, double radius);
 
-/* One cell or as many as are quickest. HS_ERR_MEMORY when a cutoff spans more than 2^31 images,
- * HS_ERR_BOX_SKEWED when rounding does. */
-hs_status hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure);
-
-/* The same, with the choice between one cell and several made by the caller. */
+/* One cell, several, or whichever is quicker. */
 typedef enum hs_grid_kind { HS_GRID_ANY, HS_GRID_SINGLE, HS_GRID_CELLS } hs_grid_kind;
-hs_status hs_grid_init_kind(const hs_scene *scene, hs_grid_kind kind, hs_grid *grid,
-                            hs_failure *failure);
+
+/* The grid of that kind which is quickest. HS_ERR_MEMORY when a cutoff spans more than 2^31 images,
+ * HS_ERR_BOX_SKEWED when rounding does. */
+hs_status hs_grid_init(const hs_scene *scene, hs_grid_kind kind, hs_grid *grid,
+                       hs_failure *failure);
 
 /*
  * Cells that are at least `width` wide, whatever that costs; wider ones, with *is_wider set, where
@@ -46,55 +44,26 @@ hs_status hs_grid_init_kind(const hs_scene *scene, hs_grid_kind kind, hs_grid *g
 hs_status hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_wider,
                             hs_failure *failure);
 
-/* Steps of hs_grid_init and hs_grid_init_wide. Ranges, errors and expected pairs, no cells yet;
- * *density: points in a unit of the volume that they are in. */
-hs_status hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure *failure);
-
-/* So many cells along each axis. HS_ERR_MEMORY when a reach passes its integers. */
-hs_status hs_grid_set_shape(const hs_scene *scene, const double *counts, hs_grid *grid);
-
 /* `count` cells of equal width along axis k: sets all but the stride, from the scene's range there
  * and grid->range. HS_ERR_MEMORY when the reach passes its integers. */
 hs_status hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *grid);
 
-/* Tries one cell more along each axis, each a whole part of the radius wide (one of parts[k]) and
- * no wider. Not for scenes with queries: only the points are looked at. */
-void hs_grid_cut_by_faces(const hs_scene *scene, const double *parts, double cap, hs_grid *grid);
-
-/* The cells of `grid`, not cut by faces, for a scene whose cutoff was `cutoff_before` and is
- * smaller now. HS_ERR_MEMORY, HS_ERR_BOX_SKEWED for the reasons of hs_grid_init. */
+/* The cells of `grid` for a scene whose cutoff was `cutoff_before` and is smaller now.
+ * HS_ERR_MEMORY, HS_ERR_BOX_SKEWED for the reasons of hs_grid_init. */
 hs_status hs_grid_narrow(const hs_scene *scene, bool is_sparse, double cutoff_before,
                          hs_grid *grid);
 
 /* Relative room for the few roundings between a bound and its use. */
 #define HS_GRID_SLACK 0x1p-40
 
-/* Cells per axis that int32 windows and doubles tell apart. */
-#define HS_GRID_CELLS_PER_AXIS 0x1p31
-
-/* Added to places, times the number of cells, where axes are cut by faces: more than their
- * rounding, so that the cell found is the right one or the next. */
-#define HS_GRID_BIAS 0x1p-44
-
-/* Where cell number `cell` begins, where axes are cut by faces. */
-HS_ALWAYS_INLINE double
-hs_grid_face(const hs_grid *grid, int k, double cell)
-{
-    return grid->lower[k] + cell * grid->cell_size[k];
-}
-
 /* Cell index along axis k of a point with coordinate t; points beyond a face count as on it. */
 HS_ALWAYS_INLINE int64_t
 hs_grid_index(const hs_grid *grid, int k, double t)
 {
-    const bool    by_faces = grid->by_faces[k];
-    const double  bias = by_faces ? HS_GRID_BIAS * (double)grid->shape[k] : 0.0;
-    const double  place = (t - grid->lower[k]) * grid->cells_per_length[k] + bias;
+    const double  place = (t - grid->lower[k]) * grid->cells_per_length[k];
     const int64_t last = grid->shape[k] - 1;
     /* Compared first: it may be beyond any integer. */
-    int64_t cell = !(place < (double)last) ? last : place > 0.0 ? (int64_t)place : 0;
-    cell -= by_faces && cell > 0 && t < hs_grid_face(grid, k, (double)cell);
-    return cell;
+    return !(place < (double)last) ? last : place > 0.0 ? (int64_t)place : 0;
 }
 
 /*

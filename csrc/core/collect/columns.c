@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "columns.h"
 #include "../base/os.h"
-#include "../memory/pool.h"
 
 #include <math.h>
 #include <string.h>

@@ -117,8 +117,8 @@ hs_components_label(hs_components *components, const uint8_t *counts, int64_t *l
     return n_found;
 }
 
-/* A batch at a time, between the points as given, by the kernels that measure pairs
- * of searches. Far from the box, where their error could reach the last place, by integers. */
+/* A batch at a time, between the points as given, by the kernels that measure pairs of searches.
+ * Far from the box, where their error could reach the last place, by integers. */
 
 #define MOST_SHIFT (INT64_C(1) << 62)
 /* Distances below this part of the terms that they are made of: double-words leave an error of
@@ -163,29 +163,16 @@ find_shift(const hs_given_pairs *given, int64_t at, const double *p, const doubl
     return HS_OK;
 }
 
-/* S over all box vectors; false when it does not fit. */
-static bool
-put_shift(const hs_lattice *lattice, const int64_t *shift, int32_t *to)
-{
-    memset(to, 0, (size_t)lattice->ndim * sizeof *to);
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        if (shift[r] < INT32_MIN || shift[r] > INT32_MAX) {
-            return false;
-        }
-        to[lattice->vector_of_row[r]] = (int32_t)shift[r];
-    }
-    return true;
-}
-
 /* Takes pair `at` into the batch as number e. */
 static hs_status
 take_pair(const hs_given_pairs *given, int64_t at, int32_t e, int32_t *S, hs_measured *batch)
 {
-    const hs_cloud *cloud = given->cloud;
-    const int       d = cloud->ndim;
-    const int64_t   i = given->pairs->i[at], j = given->pairs->j[at];
-    double          p[HS_MAX_DIM], q[HS_MAX_DIM];
-    int64_t         shift[HS_MAX_DIM];
+    const hs_cloud   *cloud = given->cloud;
+    const hs_lattice *lattice = &given->box->lattice;
+    const int         d = cloud->ndim;
+    const int64_t     i = given->pairs->i[at], j = given->pairs->j[at];
+    double            p[HS_MAX_DIM], q[HS_MAX_DIM];
+    int64_t           shift[HS_MAX_DIM];
     if (i < 0 || i >= cloud->n || j < 0 || j >= cloud->n) {
         return HS_ERR_ARGUMENT;
     }
@@ -197,11 +184,19 @@ take_pair(const hs_given_pairs *given, int64_t at, int32_t e, int32_t *S, hs_mea
     if (status != HS_OK) {
         return status;
     }
-    for (int r = 0; r < given->box->lattice.n_periodic; r++) {
-        hs_measured_shift(batch, e, r, shift[r]);
+    if (S != NULL) { /* over all box vectors */
+        memset(S + at * d, 0, (size_t)d * sizeof *S);
     }
-    return S == NULL || put_shift(&given->box->lattice, shift, S + at * d) ? HS_OK
-                                                                           : HS_ERR_SHIFT_RANGE;
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        hs_measured_shift(batch, e, r, shift[r]);
+        if (S != NULL && (shift[r] < INT32_MIN || shift[r] > INT32_MAX)) {
+            return HS_ERR_SHIFT_RANGE;
+        }
+        if (S != NULL) {
+            S[at * d + lattice->vector_of_row[r]] = (int32_t)shift[r];
+        }
+    }
+    return HS_OK;
 }
 
 /* Measures anew what nearly cancels. */

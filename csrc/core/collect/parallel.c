@@ -9,14 +9,12 @@
 
 #include <string.h>
 
-/* parallel.c: each worker has a walker and a backlog; ranges are committed in turn. A mutex guards
- * the number of the range that is due; pairs are copied without it. A thread alone writes straight
- * to the output, by a walker that it may keep for the next search. */
+/* parallel.c: a mutex guards the number of the range that is due; pairs are copied without it. A
+ * thread alone writes straight to the output, by a walker that it may keep for the next search. */
 
-struct hs_commits {
-    hs_output       *output;
-    hs_thread_id     caller;
-    int64_t          n_ranges;
+typedef struct hs_commits {
+    const hs_crew   *crew;
+    hs_thread_id     caller;     /* the only thread that may poll */
     volatile int64_t next_range; /* atomic */
     hs_mutex         mutex;      /* guards all below, and the output but for what columns hold */
     hs_condition     changed;    /* due, n_copying or status */
@@ -25,61 +23,11 @@ struct hs_commits {
     int              n_copying;  /* threads that write to columns: these must not move then */
     int              n_working;  /* threads that may still have a range */
     hs_status        status;
-    hs_failure       failure;
+    hs_failure       failure; /* of the earliest range that had one */
     int64_t          failed_range;
-    int64_t          enough, most; /* in pairs: limits set by commits_limit */
     bool             has_enough;
     int64_t          full_range; /* the last one that is written, n_ranges at first */
-};
-
-/* output: borrowed; NULL when nothing is written. The thread that calls this is the only one that
- * may poll. NULL when memory is short. */
-static hs_commits *
-commits_new(hs_account *account, hs_output *output, int64_t n_ranges)
-{
-    hs_commits *commits = hs_alloc(account, HS_FOR_CANDIDATES, 1, sizeof *commits);
-    if (commits != NULL) {
-        *commits = (hs_commits){.output = output,
-                                .n_ranges = n_ranges,
-                                .enough = INT64_MAX,
-                                .most = INT64_MAX,
-                                .full_range = n_ranges};
-        commits->caller = hs_thread_self();
-        hs_mutex_init(&commits->mutex);
-        hs_condition_init(&commits->changed);
-    }
-    return commits;
-}
-
-/* Before any thread joins: from `enough` pairs in the output on no range is begun, and from `most`
- * on none is ended but the one that is due, which is to be left (hs_committer.is_full). */
-static void
-commits_limit(hs_commits *commits, int64_t enough, int64_t most)
-{
-    commits->enough = enough;
-    commits->most = most;
-}
-
-/* After all threads are done: how many ranges have been written to their end, the first ones. */
-static int64_t
-commits_written(const hs_commits *commits)
-{
-    return commits->due;
-}
-
-/* After all threads are done: HS_OK, or the failure of the earliest range that had one. Frees. */
-static hs_status
-commits_end(hs_account *account, hs_commits *commits, hs_failure *failure)
-{
-    const hs_status status = commits->status;
-    if (status != HS_OK) {
-        *failure = commits->failure;
-    }
-    hs_condition_destroy(&commits->changed);
-    hs_mutex_destroy(&commits->mutex);
-    hs_free(account, commits);
-    return status;
-}
+} hs_commits;
 
 /* A hs_poll_fn of the threads that may not call the caller's: true until a thread has failed. */
 static bool
@@ -101,7 +49,7 @@ ask_caller(void *context, double fraction)
     hs_committer *committer = context;
     hs_commits   *commits = committer->commits;
     hs_mutex_lock(&commits->mutex);
-    if (commits->output == NULL || committer->range == commits->due) {
+    if (commits->crew->output == NULL || committer->range == commits->due) {
         commits->done = hs_larger(commits->done, fraction);
     }
     const double done = commits->done;
@@ -109,11 +57,10 @@ ask_caller(void *context, double fraction)
     return committer->poll(committer->poll_context, done);
 }
 
-/* Called by the thread itself, whose committer has options and pairs, and nothing else. The options
- * are changed: threads that may not poll look whether another has failed, and the caller's thread
- * tells a fraction that never falls. committer must outlive them. */
+/* Called by the thread itself. The options are changed: threads that may not poll look whether
+ * another has failed, and the caller's thread tells a fraction that never falls. */
 static void
-commits_join(hs_commits *commits, hs_committer *committer)
+join(hs_commits *commits, hs_committer *committer)
 {
     hs_options *options = committer->options;
     committer->failure = HS_NO_FAILURE;
@@ -121,8 +68,7 @@ commits_join(hs_commits *commits, hs_committer *committer)
     committer->poll = options->poll;
     committer->poll_context = options->poll_context;
     committer->range = -1;
-    committer->most_bytes = commits->enough < INT64_MAX ? HS_COMMIT_BYTES_OF_BLOCKS
-                                                        : HS_COMMIT_BYTES;
+    committer->most_bytes = commits->crew->enough > 0 ? HS_COMMIT_BYTES_OF_BLOCKS : HS_COMMIT_BYTES;
     hs_mutex_lock(&commits->mutex);
     commits->n_working++;
     hs_mutex_unlock(&commits->mutex);
@@ -148,7 +94,7 @@ take_range(hs_committer *committer)
         return false;
     }
     committer->range = hs_fetch_increment(&commits->next_range);
-    return committer->range < commits->n_ranges;
+    return committer->range < commits->crew->n_ranges;
 }
 
 /* This range has failed: all threads stop. A status that only follows from another failure is not
@@ -184,53 +130,33 @@ wait_for_change(hs_commits *commits, const hs_committer *committer, double fract
     return status;
 }
 
-/* With the mutex held: settles where in the output the n pairs that are due go. */
+/* Writes the part that is due. The mutex is held, but not while it copies. */
 static hs_status
-claim(hs_commits *commits, int64_t n, double fraction, int64_t *at)
+write_part(hs_committer *committer, const hs_commit_part *part)
 {
-    hs_output *output = commits->output;
+    hs_commits    *commits = committer->commits;
+    const hs_crew *crew = commits->crew;
+    hs_output     *output = crew->output;
+    const int64_t  n = part->end - committer->written, at = output->n_pairs;
+    const bool     is_limited = crew->enough > 0;
     if (!hs_output_has_room(output, n)) {
         while (commits->n_copying > 0) { /* soon over */
             hs_condition_wait(&commits->changed, &commits->mutex);
         }
         /* An output with a limit does not grow with the work that is left. */
-        const bool      is_limited = commits->enough < INT64_MAX;
-        const hs_status status = hs_output_reserve(output, n, is_limited ? 0.0 : fraction);
+        const hs_status status = hs_output_reserve(output, n, is_limited ? 0.0 : part->fraction);
         if (status != HS_OK) {
             return status;
         }
     }
-    *at = output->n_pairs;
     output->n_pairs += n;
-    hs_output_touch(output, *at, n);
-    return HS_OK;
-}
-
-/* With the mutex held: notes whether the output has `enough` or `most` pairs. */
-static void
-heed_limits(hs_committer *committer, const hs_commit_part *part)
-{
-    hs_commits   *commits = committer->commits;
-    const int64_t n = commits->output->n_pairs;
-    commits->has_enough = commits->has_enough || n >= commits->enough;
-    if (n >= commits->most && commits->full_range == commits->n_ranges) {
+    hs_output_touch(output, at, n);
+    commits->has_enough = commits->has_enough || (is_limited && output->n_pairs >= crew->enough);
+    if (is_limited && output->n_pairs >= crew->most && commits->full_range == crew->n_ranges) {
         commits->full_range = part->range;
         committer->is_full = !part->is_last;
         hs_condition_wake(&commits->changed);
     }
-}
-
-/* Writes the part that is due. The mutex is held, but not while it copies. */
-static hs_status
-write_part(hs_committer *committer, const hs_commit_part *part)
-{
-    hs_commits     *commits = committer->commits;
-    int64_t         at = 0;
-    const hs_status status = claim(commits, part->end - committer->written, part->fraction, &at);
-    if (status != HS_OK) {
-        return status;
-    }
-    heed_limits(committer, part);
     commits->done = hs_larger(commits->done, part->fraction);
     commits->n_copying++;
     if (part->is_last) {
@@ -238,7 +164,7 @@ write_part(hs_committer *committer, const hs_commit_part *part)
         hs_condition_wake(&commits->changed);
     }
     hs_mutex_unlock(&commits->mutex);
-    hs_output_copy(commits->output, at, committer->pairs, committer->written, part->end);
+    hs_output_copy(output, at, committer->pairs, committer->written, part->end);
     committer->written = part->end;
     hs_mutex_lock(&commits->mutex);
     if (--commits->n_copying == 0) {
@@ -300,24 +226,40 @@ leave(hs_committer *committer)
     commits->n_working--;
     hs_condition_wake(&commits->changed);
     while (waits && status == HS_OK && commits->status == HS_OK && commits->n_working > 0) {
-        const double left = (double)commits->n_working / (double)commits->n_ranges;
+        const double left = (double)commits->n_working / (double)commits->crew->n_ranges;
         status = wait_for_change(commits, committer, hs_larger(1.0 - left, 0.0));
     }
     hs_mutex_unlock(&commits->mutex);
     return status;
 }
 
+static void *
+worker_of(const hs_crew *crew, void *workers, int64_t number)
+{
+    return (char *)workers + (size_t)number * crew->worker_size;
+}
+
+/* A crew at work. */
+typedef struct sharing {
+    hs_commits commits;
+    void      *workers; /* owned; one of each thread, one behind another */
+} sharing;
+
 /*
- * Takes ranges as long as there are any and no thread has failed, and waits until all that was
- * committed has been written. All threads stop when a range fails; the committer's failure tells
- * why it did. The caller's thread then waits for the others, and polls meanwhile.
+ * A hs_task_fn: takes ranges as long as there are any and no thread has failed, and waits until all
+ * that was committed has been written. All threads stop when a range fails; the committer's failure
+ * tells why it did. The caller's thread then waits for the others, and polls meanwhile.
  */
 static void
-commits_work(hs_committer *committer, hs_range_fn search_range, void *worker)
+work(void *context, int64_t task)
 {
-    hs_status status = HS_OK;
+    sharing       *shared = context;
+    const hs_crew *crew = shared->commits.crew;
+    hs_committer  *committer = worker_of(crew, shared->workers, task);
+    hs_status      status = HS_OK;
+    join(&shared->commits, committer);
     while (status == HS_OK && take_range(committer)) {
-        status = search_range(worker, committer->range);
+        status = crew->search(committer, committer->range);
     }
     if (status == HS_OK && committer->n_parts > 0) {
         status = write_parts(committer, true);
@@ -331,82 +273,54 @@ commits_work(hs_committer *committer, hs_range_fn search_range, void *worker)
     }
 }
 
-/* Workers are opened one after the other; then each thread of the team has one. */
-
-static void *
-worker_of(const hs_crew *crew, int64_t number)
-{
-    return (char *)crew->workers + (size_t)number * crew->worker_size;
-}
-
-hs_status
-hs_crew_open(hs_crew *crew)
-{
-    const int n = hs_team_size(crew->call->team);
-    hs_status status = HS_OK;
-    crew->n_open = 0;
-    crew->workers = hs_alloc(&crew->call->account, HS_FOR_CANDIDATES, n, crew->worker_size);
-    if (crew->workers == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    memset(crew->workers, 0, (size_t)n * crew->worker_size);
-    while (crew->n_open < n && status == HS_OK) {
-        status = crew->open(crew->job, worker_of(crew, crew->n_open++));
-    }
-    return status;
-}
-
-void
-hs_crew_close(hs_crew *crew)
-{
-    for (int w = 0; w < crew->n_open; w++) {
-        crew->close(crew->job, worker_of(crew, w));
-    }
-    hs_free(&crew->call->account, crew->workers);
-}
-
-/* A crew at work. */
-typedef struct sharing {
-    const hs_crew *crew;
-    hs_commits    *commits;
-} sharing;
-
-/* A hs_task_fn: ranges, as long as there are any. */
-static void
-work(void *context, int64_t task)
-{
-    const sharing *shared = context;
-    hs_committer  *worker = worker_of(shared->crew, task);
-    commits_join(shared->commits, worker);
-    commits_work(worker, shared->crew->search, worker);
-}
-
-static hs_status
-search_ranges(hs_crew *crew, hs_failure *failure)
-{
-    hs_account *account = &crew->call->account;
-    sharing     shared = {crew, commits_new(account, crew->output, crew->n_ranges)};
-    if (shared.commits == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    if (crew->enough > 0) {
-        commits_limit(shared.commits, crew->enough, crew->most);
-    }
-    hs_team_run(crew->call->team, crew->n_open, work, &shared);
-    crew->n_written = commits_written(shared.commits);
-    return commits_end(account, shared.commits, failure);
-}
-
 hs_status
 hs_crew_run(hs_crew *crew, hs_failure *failure)
 {
-    hs_status status = hs_crew_open(crew);
-    if (status == HS_OK) {
-        status = search_ranges(crew, failure);
+    hs_account *account = &crew->call->account;
+    const int   n = hs_team_size(crew->call->team);
+    sharing     shared = {.commits = {.crew = crew, .full_range = crew->n_ranges}};
+    hs_commits *commits = &shared.commits;
+    int         n_open = 0;
+    hs_status   status = HS_OK;
+    shared.workers = hs_alloc(account, HS_FOR_CANDIDATES, n, crew->worker_size);
+    if (shared.workers == NULL) {
+        return HS_ERR_MEMORY;
     }
-    hs_crew_close(crew);
+    memset(shared.workers, 0, (size_t)n * crew->worker_size);
+    while (n_open < n && status == HS_OK) {
+        hs_committer    *worker = worker_of(crew, shared.workers, n_open++);
+        const hs_output *output = crew->output;
+        worker->own_options = crew->call->options;
+        worker->options = &worker->own_options;
+        worker->pairs = &worker->own_pairs;
+        if (output != NULL) {
+            hs_output_init(NULL, output->ndim, output->columns, output->index_bytes, worker->pairs);
+        }
+        status = crew->open(crew->job, worker);
+    }
+    if (status == HS_OK) {
+        commits->caller = hs_thread_self();
+        hs_mutex_init(&commits->mutex);
+        hs_condition_init(&commits->changed);
+        hs_team_run(crew->call->team, n, work, &shared);
+        hs_condition_destroy(&commits->changed);
+        hs_mutex_destroy(&commits->mutex);
+        crew->n_written = commits->due;
+        status = commits->status;
+        if (status != HS_OK) {
+            *failure = commits->failure;
+        }
+    }
+    for (int w = 0; w < n_open; w++) {
+        hs_committer *worker = worker_of(crew, shared.workers, w);
+        crew->close(crew->job, worker);
+        hs_output_free(&worker->own_pairs);
+    }
+    hs_free(account, shared.workers);
     return status;
 }
+
+/* The walk over all points, by a crew of walkers. */
 
 /* Points of a range: a group at least, and so few that their pairs are a part of what a thread can
  * hold back: it seldom waits for others. */
@@ -415,186 +329,159 @@ hs_crew_run(hs_crew *crew, hs_failure *failure)
 
 /* What the threads share. */
 typedef struct walk_job {
-    hs_search         *search;
-    hs_output         *output;   /* NULL: nothing is recorded */
-    int64_t            in_range; /* points of a range */
-    int64_t            enough;   /* pairs in it; 0: all */
-    hs_bookmark        start;    /* where the first range begins */
-    hs_bookmark        left;     /* set by the worker that has left its range */
-    bool               is_left;
-    const hs_visitors *visitors; /* NULL: hits are recorded, or only counted */
-    int                n_opened; /* workers */
-    hs_neighbourhood   most;     /* set at the end, as is `n_found` */
-    int64_t            n_found;
+    hs_search        *search;
+    hs_output        *output;   /* NULL: nothing is recorded */
+    int64_t           in_range; /* points of a range */
+    int64_t           enough;   /* pairs in it; 0: all */
+    hs_bookmark       start;    /* where the first range begins */
+    hs_bookmark       left;     /* set by the worker that has left its range */
+    bool              is_left;
+    const hs_visitor *visitor; /* where nothing is recorded */
+    hs_neighbourhood  most;    /* set at the end, as is `n_found` */
+    int64_t           n_found;
 } walk_job;
 
-/* What one thread works with. */
-typedef struct worker {
+/* What one thread works with; the state of a visitor lies behind it. */
+typedef struct walk_worker {
     hs_committer committer;
     walk_job    *job;
-    hs_walker    walker;
-    hs_backlog   backlog;
-} worker;
-
-/* The output is full: what the worker has is written, and its place is kept. */
-static hs_status
-leave_range(worker *me)
-{
-    walk_job         *job = me->job;
-    const hs_scanner *scanner = &me->walker.scanner;
-    const hs_status   status = hs_commit(&me->committer, hs_scanner_fraction(scanner), false);
-    if (status != HS_OK) {
-        return status;
-    }
-    job->left = (hs_bookmark){.point = scanner->group.first, .blocks = scanner->blocks};
-    job->is_left = true;
-    return HS_STOPPED;
-}
+    hs_keeper    keeper;
+} walk_worker;
 
 /* A hs_range_fn. */
 static hs_status
 search_range(void *context, int64_t range)
 {
-    worker         *me = context;
-    const walk_job *job = me->job;
-    const int64_t   n = hs_search_asking(job->search)->n;
-    const int64_t   first = job->start.point + range * job->in_range;
-    const int64_t   end = first + (n - first < job->in_range ? n - first : job->in_range);
-    me->walker.scanner.blocks_to_skip = range == 0 ? job->start.blocks : 0;
+    walk_worker      *me = context;
+    walk_job         *job = me->job;
+    hs_walker        *walker = &me->keeper.walker;
+    const hs_scanner *scanner = &walker->scanner;
+    const int64_t     n = hs_search_asking(job->search)->n;
+    const int64_t     first = job->start.point + range * job->in_range;
+    const int64_t     end = first + (n - first < job->in_range ? n - first : job->in_range);
+    walker->scanner.blocks_to_skip = range == 0 ? job->start.blocks : 0;
     hs_status status =
-        hs_walk_or_tell(&me->walker, (int32_t)first, (int32_t)end, &me->committer.failure);
-    if (status == HS_STOPPED && me->walker.scanner.leaves) {
-        return leave_range(me);
-    }
-    if (status == HS_OK && job->output != NULL) {
+        hs_walk_or_tell(walker, (int32_t)first, (int32_t)end, &me->committer.failure);
+    if (status == HS_STOPPED && scanner->leaves) {
+        /* The output is full: what the worker has is written, and its place is kept. */
+        status = hs_commit(&me->committer, hs_scanner_fraction(scanner), false);
+        if (status == HS_OK) {
+            job->left = (hs_bookmark){.point = scanner->group.first, .blocks = scanner->blocks};
+            job->is_left = true;
+            status = HS_STOPPED;
+        }
+    } else if (status == HS_OK && job->output != NULL) {
         status = hs_commit(&me->committer, hs_search_fraction(job->search, end), true);
     }
     return status;
 }
 
-/* A hs_visit_fn. */
+/* A hs_visit_fn: to the pairs of a committer, which takes them when they are many. */
 static hs_status
-backlog_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+collect_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    hs_backlog      *backlog = context;
-    const hs_output *pairs = &backlog->pairs;
-    const hs_status  status = hs_record_hits(&backlog->recorder, scanner, first, hits);
+    hs_keeper       *keeper = context;
+    hs_committer    *committer = keeper->committer;
+    const hs_output *pairs = committer->pairs;
+    const hs_status  status = hs_record_hits(&keeper->recorder, scanner, first, hits);
     const int64_t    n_bytes = pairs->n_pairs * hs_output_bytes_per_pair(pairs);
-    if (status == HS_OK && n_bytes >= backlog->committer->most_bytes) {
-        const hs_status committed =
-            hs_commit(backlog->committer, hs_scanner_fraction(scanner), false);
-        scanner->leaves = backlog->committer->is_full;
+    if (status == HS_OK && n_bytes >= committer->most_bytes) {
+        const hs_status committed = hs_commit(committer, hs_scanner_fraction(scanner), false);
+        scanner->leaves = committer->is_full;
         return committed;
     }
     return status;
 }
 
-/* A walker that visits; the workers take the contexts in turn. */
+/* Without a visitor, pairs are recorded as they are by a keeper. */
 static hs_status
-open_visitor(walk_job *job, hs_walker *walker)
+open_walk_worker(void *context, void *place)
 {
-    const hs_visitors *visitors = job->visitors;
-    const size_t       at = (size_t)job->n_opened++ * visitors->context_size;
-    void              *context = (char *)visitors->contexts + at;
-    return visitors->most == NULL
-               ? hs_walker_init(job->search, visitors->use, visitors->visit, context, walker)
-               : hs_walker_init_ordered(job->search, visitors->use, visitors->most, visitors->visit,
-                                        context, walker);
-}
-
-static hs_status
-open_worker(void *context, void *place)
-{
-    walk_job  *job = context;
-    hs_search *search = job->search;
-    worker    *me = place;
+    walk_job         *job = context;
+    hs_search        *search = job->search;
+    walk_worker      *me = place;
+    hs_walker        *walker = &me->keeper.walker;
+    const hs_visitor *visitor = job->visitor;
+    hs_status         status;
     me->job = job;
-    me->committer.options = &me->walker.scanner.options;
-    if (job->visitors != NULL) {
-        return open_visitor(job, &me->walker);
+    me->committer.options = &walker->scanner.options;
+    me->keeper.committer = &me->committer;
+    if (visitor == NULL) {
+        status = hs_walker_init(search, hs_record_use(job->output->columns), collect_hits,
+                                &me->keeper, walker);
+        return status == HS_OK
+                   ? hs_recorder_init(&search->call->account, me->committer.pairs,
+                                      walker->scanner.block.most_hits, &me->keeper.recorder)
+                   : status;
     }
-    if (job->output == NULL) {
-        return hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &me->walker);
-    }
-    hs_backlog_init(job->output, &me->committer, &me->backlog);
-    me->committer.pairs = &me->backlog.pairs;
-    hs_status status = hs_walker_init(search, hs_record_use(job->output->columns), backlog_hits,
-                                      &me->backlog, &me->walker);
-    if (status == HS_OK) {
-        status = hs_recorder_init(&search->call->account, &me->backlog.pairs,
-                                  me->walker.scanner.block.most_hits, &me->backlog.recorder);
-    }
-    return status;
+    void *state = visitor->state_size > 0 ? (void *)(me + 1) : visitor->shared;
+    status = visitor->most == NULL
+                 ? hs_walker_init(search, visitor->use, visitor->visit, state, walker)
+                 : hs_walker_init_ordered(search, visitor->use, visitor->most, visitor->visit,
+                                          state, walker);
+    return status == HS_OK && visitor->open != NULL ? visitor->open(visitor->shared, state, walker)
+                                                    : status;
 }
 
 /* What a worker has found, and its end. */
 static void
-close_worker(void *context, void *place)
+close_walk_worker(void *context, void *place)
 {
     walk_job               *job = context;
-    worker                 *me = place;
-    const hs_neighbourhood *most = &me->walker.scanner.most;
-    job->n_found += me->walker.scanner.n_found;
+    walk_worker            *me = place;
+    const hs_visitor       *visitor = job->visitor;
+    const hs_neighbourhood *most = &me->keeper.walker.scanner.most;
+    job->n_found += me->keeper.walker.scanner.n_found;
     job->most.runs = most->runs > job->most.runs ? most->runs : job->most.runs;
     if (most->candidates > job->most.candidates) {
         job->most.candidates = most->candidates;
     }
-    hs_walker_close(job->search, &me->walker);
-    if (job->output != NULL) {
-        hs_backlog_free(&job->search->call->account, &me->backlog);
+    if (visitor != NULL && visitor->close != NULL) {
+        visitor->close(visitor->shared, me + 1);
     }
-}
-
-/* Threads may end the ranges that they work on, as long as these are no longer than usual. */
-static int64_t
-most_pairs(const walk_job *job)
-{
-    const int64_t bytes = hs_output_bytes_per_pair(job->output);
-    const int64_t slack = hs_team_size(job->search->call->team) *
-                          (int64_t)HS_COMMIT_BYTES_OF_BLOCKS / (bytes > 0 ? bytes : 1);
-    return job->enough <= INT64_MAX - slack ? job->enough + slack : INT64_MAX;
-}
-
-/* Points of which HS_RANGE_BYTES are expected, in an even scene. */
-static int64_t
-points_in_range(const walk_job *job)
-{
-    const hs_search *search = job->search;
-    const double     pairs = search->grid.expected_pairs * search->pairs_per_half;
-    const double     each = (double)hs_output_bytes_per_pair(job->output) * pairs;
-    const double     n = HS_RANGE_BYTES * (double)hs_search_asking(search)->n / each;
-    return n > MOST_POINTS ? MOST_POINTS : n > LEAST_POINTS ? (int64_t)n : LEAST_POINTS;
+    hs_keeper_close(job->search, &me->keeper);
 }
 
 /* Runs all workers. */
 static hs_status
 walk_together(walk_job *job, hs_failure *failure)
 {
-    const int64_t n_left = hs_search_asking(job->search)->n - job->start.point;
-    job->in_range = job->output != NULL ? points_in_range(job) : MOST_POINTS;
-    hs_crew         crew = {.call = job->search->call,
-                            .job = job,
-                            .worker_size = sizeof(worker),
-                            .open = open_worker,
-                            .close = close_worker,
-                            .n_ranges = (n_left + job->in_range - 1) / job->in_range,
-                            .search = search_range,
-                            .output = job->output,
-                            .enough = job->enough,
-                            .most = job->enough > 0 ? most_pairs(job) : 0};
+    const hs_search *search = job->search;
+    const double     n = (double)hs_search_asking(search)->n;
+    const int64_t    n_left = hs_search_asking(search)->n - job->start.point;
+    hs_crew          crew = {.call = search->call,
+                             .job = job,
+                             .worker_size = sizeof(walk_worker),
+                             .open = open_walk_worker,
+                             .close = close_walk_worker,
+                             .search = search_range,
+                             .output = job->output,
+                             .enough = job->enough};
+    job->in_range = MOST_POINTS;
+    if (job->output != NULL) { /* points of which HS_RANGE_BYTES are expected, in an even scene */
+        const double pairs = search->grid.expected_pairs * search->pairs_per_half;
+        const double most =
+            HS_RANGE_BYTES * n / ((double)hs_output_bytes_per_pair(job->output) * pairs);
+        job->in_range = most > MOST_POINTS    ? MOST_POINTS
+                        : most > LEAST_POINTS ? (int64_t)most
+                                              : LEAST_POINTS;
+    } else {
+        crew.worker_size += job->visitor->state_size;
+    }
+    if (job->enough > 0) {
+        /* Threads may end the ranges that they work on, if these are no longer than usual. */
+        const int64_t bytes = hs_output_bytes_per_pair(job->output);
+        const int64_t slack = hs_team_size(search->call->team) *
+                              (int64_t)HS_COMMIT_BYTES_OF_BLOCKS / (bytes > 0 ? bytes : 1);
+        crew.most = job->enough <= INT64_MAX - slack ? job->enough + slack : INT64_MAX;
+    }
+    crew.n_ranges = (n_left + job->in_range - 1) / job->in_range;
     const hs_status status = hs_crew_run(&crew, failure);
     if (!job->is_left) {
         const int64_t done = crew.n_written * job->in_range;
         job->left = (hs_bookmark){.point = job->start.point + (done < n_left ? done : n_left)};
     }
     return status;
-}
-
-hs_status
-hs_parallel_record(hs_search *search, hs_output *output, hs_failure *failure)
-{
-    walk_job job = {.search = search, .output = output};
-    return walk_together(&job, failure);
 }
 
 hs_status
@@ -610,10 +497,10 @@ hs_parallel_record_on(hs_search *search, hs_output *output, int64_t enough, hs_b
 }
 
 hs_status
-hs_parallel_visit(hs_search *search, const hs_visitors *visitors, hs_neighbourhood *most,
+hs_parallel_visit(hs_search *search, const hs_visitor *visitor, hs_neighbourhood *most,
                   hs_failure *failure)
 {
-    walk_job        job = {.search = search, .visitors = visitors};
+    walk_job        job = {.search = search, .visitor = visitor};
     const hs_status status = walk_together(&job, failure);
     if (most != NULL) {
         *most = job.most;
@@ -621,108 +508,81 @@ hs_parallel_visit(hs_search *search, const hs_visitors *visitors, hs_neighbourho
     return status;
 }
 
-hs_status
-hs_parallel_count(hs_search *search, int64_t *count, hs_failure *failure)
-{
-    walk_job        job = {.search = search};
-    const hs_status status = walk_together(&job, failure);
-    *count = job.n_found;
-    return status;
-}
-
 void
-hs_backlog_init(const hs_output *target, hs_committer *committer, hs_backlog *backlog)
+hs_keeper_close(hs_search *search, hs_keeper *keeper)
 {
-    *backlog = (hs_backlog){.committer = committer};
-    hs_output_init(NULL, target->ndim, target->columns, target->index_bytes, &backlog->pairs);
+    hs_recorder_free(&search->call->account, &keeper->recorder);
+    hs_walker_close(search, &keeper->walker);
 }
 
-void
-hs_backlog_free(hs_account *account, hs_backlog *backlog)
-{
-    hs_recorder_free(account, &backlog->recorder);
-    hs_output_free(&backlog->pairs);
-}
-
-/* A recorder for this output and so many hits at a time, that before if it is one. */
+/* By a keeper, which is new, or has served before: then it may have a walker and a recorder that
+ * will do. */
 static hs_status
-renew_recorder(hs_search *search, hs_output *output, int32_t most_hits, hs_recorder *recorder)
+record_alone(hs_search *search, bool is_new, hs_keeper *keeper, hs_output *output,
+             hs_failure *failure)
 {
-    hs_account *account = &search->call->account;
-    if (recorder->output == output && recorder->columns == output->columns &&
-        recorder->most_hits >= most_hits) {
-        return HS_OK;
-    }
-    hs_recorder_free(account, recorder);
-    const hs_status status = hs_recorder_init(account, output, most_hits, recorder);
-    hs_account_keep(account);
-    return status;
-}
-
-static hs_status
-walk_all(const hs_search *search, hs_walker *walker, hs_failure *failure)
-{
-    return hs_walk_or_tell(walker, 0, (int32_t)hs_search_asking(search)->n, failure);
-}
-
-/* By a walker that is kept; `visit` writes to the output by the recorder. */
-static hs_status
-record_by(hs_search *search, hs_output *output, hs_walker *walker, hs_recorder *recorder,
-          hs_visit_fn visit, void *context, hs_failure *failure)
-{
-    hs_status status =
-        hs_walker_renew(search, hs_record_use(output->columns), visit, context, walker);
-    if (status == HS_OK) {
-        status = renew_recorder(search, output, walker->scanner.block.most_hits, recorder);
+    hs_account        *account = &search->call->account;
+    hs_recorder       *recorder = &keeper->recorder;
+    hs_walker         *walker = &keeper->walker;
+    const bool         collects = keeper->committer != NULL && output == keeper->committer->pairs;
+    const hs_block_use use = hs_record_use(output->columns);
+    const hs_visit_fn  visit = collects ? collect_hits : hs_record_hits;
+    void              *context = collects ? (void *)keeper : recorder;
+    hs_status          status = is_new ? hs_walker_init(search, use, visit, context, walker)
+                                       : hs_walker_renew(search, use, visit, context, walker);
+    if (status == HS_OK && (recorder->output != output || recorder->columns != output->columns ||
+                            recorder->most_hits < walker->scanner.block.most_hits)) {
+        hs_recorder_free(account, recorder);
+        status = hs_recorder_init(account, output, walker->scanner.block.most_hits, recorder);
+        hs_account_keep(account);
     }
     if (status == HS_OK) {
-        status = walk_all(search, walker, failure);
+        status = hs_walk_or_tell(walker, 0, (int32_t)hs_search_asking(search)->n, failure);
     }
-    hs_walker_flush_counters(search, walker);
+    if (!is_new) {
+        hs_walker_flush_counters(search, walker);
+    }
     return status;
 }
 
 hs_status
-hs_parallel_record_next(hs_search *search, hs_output *output, hs_walker *walker,
-                        hs_recorder *recorder, hs_failure *failure)
+hs_parallel_record(hs_search *search, hs_keeper *keeper, hs_output *output, hs_failure *failure)
 {
-    return record_by(search, output, walker, recorder, hs_record_hits, recorder, failure);
-}
-
-/* Records all pairs by this thread, straight into an output that grows. */
-static hs_status
-record_alone(hs_search *search, hs_output *output, hs_failure *failure)
-{
-    hs_account *account = &search->call->account;
-    hs_walker   walker;
-    hs_recorder recorder = {0};
-    hs_status   status =
-        hs_walker_init(search, hs_record_use(output->columns), hs_record_hits, &recorder, &walker);
-    if (status == HS_OK) {
-        status = hs_recorder_init(account, output, walker.scanner.block.most_hits, &recorder);
+    if (keeper != NULL) {
+        return record_alone(search, false, keeper, output, failure);
     }
-    if (status == HS_OK) {
-        status = walk_all(search, &walker, failure);
+    if (!output->fixed) {
+        hs_output_reserve_hint(output, (double)output->n_pairs + search->grid.expected_pairs);
     }
-    hs_recorder_free(account, &recorder);
-    hs_walker_close(search, &walker);
+    if (output->fixed || search->call->team != NULL) {
+        /* what is written ahead is kept out of the caller's arrays */
+        walk_job job = {.search = search, .output = output};
+        return walk_together(&job, failure);
+    }
+    hs_keeper own; /* its walker is large, and filled before it is read */
+    own.committer = NULL;
+    own.recorder = (hs_recorder){.output = NULL};
+    const hs_status status = record_alone(search, true, &own, output, failure);
+    hs_keeper_close(search, &own);
     return status;
 }
 
 hs_status
-hs_backlog_record(hs_search *search, hs_backlog *backlog, hs_walker *walker, hs_failure *failure)
+hs_parallel_count(hs_search *search, hs_keeper *keeper, int64_t *count, hs_failure *failure)
 {
-    return record_by(search, &backlog->pairs, walker, &backlog->recorder, backlog_hits, backlog,
-                     failure);
-}
-
-hs_status
-hs_parallel_record_all(hs_search *search, hs_output *output, hs_failure *failure)
-{
-    if (output->fixed) { /* a backlog keeps what is written ahead out of the caller's arrays */
-        return hs_parallel_record(search, output, failure);
+    if (keeper == NULL) {
+        const hs_visitor visitor = {.use = HS_BLOCK_COUNTS};
+        walk_job         job = {.search = search, .visitor = &visitor};
+        const hs_status  status = walk_together(&job, failure);
+        *count += job.n_found;
+        return status;
     }
-    hs_output_reserve_hint(output, (double)output->n_pairs + search->grid.expected_pairs);
-    return search->call->team != NULL ? hs_parallel_record(search, output, failure)
-                                      : record_alone(search, output, failure);
+    hs_status status = hs_walker_renew(search, HS_BLOCK_COUNTS, NULL, NULL, &keeper->walker);
+    if (status == HS_OK) {
+        const int64_t n = hs_search_asking(search)->n;
+        status = hs_walk_or_tell(&keeper->walker, 0, (int32_t)n, failure);
+        *count += keeper->walker.scanner.n_found;
+    }
+    hs_walker_flush_counters(search, &keeper->walker);
+    return status;
 }

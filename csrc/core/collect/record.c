@@ -340,9 +340,7 @@ static bool
 can_write(const hs_recorder *recorder, const hs_scanner *scanner)
 {
     const hs_search *search = scanner->search;
-    const int        d = search->scene.ndim;
-    return search->call->kernel->write != NULL && d >= 2 && d <= HS_WRITE_MOST_DIM &&
-           !(recorder->columns & HS_WANT_BOTH) && scanner->pair_batch.of.is_narrow &&
+    return scanner->pair_batch.of.candidates != NULL && !(recorder->columns & HS_WANT_BOTH) &&
            (!(recorder->columns & HS_MEASURED) ||
             (search->limits == NULL && !search->scene.extreme &&
              search->scene.metric.floats_usable));
@@ -350,25 +348,24 @@ can_write(const hs_recorder *recorder, const hs_scanner *scanner)
 
 /* What candidates and points are, of the hits of points from `first` on. */
 static void
-describe(const hs_scanner *scanner, bool is_measured, int32_t first, hs_write *write)
+describe(const hs_scanner *scanner, int32_t first, hs_write *write)
 {
     const hs_search     *search = scanner->search;
     const hs_pair_batch *pair_batch = &scanner->pair_batch;
-    const hs_bins       *asking = hs_search_asking(search);
+    const hs_bins       *asking = hs_search_asking(search), *bins = &search->bins;
     const hs_lattice    *lattice = &search->scene.lattice;
-    const bool           turned = asking->turns.known;
-    write->by_S = search->bins.keeps_originals;
-    write->is_shifted = pair_batch->of.has_images || write->by_S;
-    write->q = is_measured ? pair_batch->of.q : NULL;
-    write->number = scanner->block.id;
-    write->image = pair_batch->of.has_images ? pair_batch->of.image : NULL;
-    write->few = search->bins.turns.known ? pair_batch->of.few : NULL;
+    write->candidates = pair_batch->of.candidates;
+    write->place = scanner->block.number;
+    write->x_width = 1;
     for (int k = 0; k < search->scene.ndim; k++) {
         write->p[k] = (write->by_S ? asking->originals[k] : asking->x[k]) + first;
+        write->x[k] = write->by_S ? bins->originals[k] : bins->x[k];
     }
     for (int r = 0; r < lattice->n_periodic; r++) {
         write->column[r] = lattice->vector_of_row[r];
-        write->turns[r] = turned ? asking->turns.narrow[r] + first : NULL;
+        write->turns[r] = asking->turns.known ? asking->turns.narrow[r] + first : NULL;
+        write->turned[r] = bins->turns.known ? bins->turns.narrow[r] : NULL;
+        write->base[r] = asking->turns.known ? asking->turns.narrow[r][scanner->group.first] : 0;
     }
 }
 
@@ -397,14 +394,19 @@ write_hits(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_h
     if (!can_write(recorder, scanner)) {
         return HS_OK;
     }
-    const bool is_measured = recorder->columns & HS_MEASURED;
-    if (hs_records_load(&scanner->pair_batch.of, is_measured) != HS_OK) {
+    hs_records *records = &scanner->pair_batch.of;
+    hs_write    write = {.ndim = search->scene.ndim,
+                         .is_half = search->is_half,
+                         .is_measured = recorder->columns & HS_MEASURED,
+                         .by_S = search->bins.keeps_originals,
+                         .metric = &search->scene.metric};
+    write.is_shifted = write.by_S || hs_records_has_images(records);
+    hs_measures_tell(&search->scene, &search->call->options, &write);
+    describe(scanner, first, &write);
+    if (hs_records_load_candidates(records, write.base) != HS_OK) {
         return HS_ERR_INTERRUPTED;
     }
-    hs_write write = {
-        .ndim = search->scene.ndim, .is_half = search->is_half, .metric = &search->scene.metric};
-    hs_measures_tell(&search->scene, &search->call->options, &write);
-    describe(scanner, is_measured, first, &write);
+    write.is_fine = records->are_fine;
     memset(scanner->block.hits + hits->end[hits->n - 1], 0, HS_PADDING * sizeof(int32_t));
     direct(recorder, &write);
     *written = search->call->kernel->write(&write, hits);

@@ -44,29 +44,29 @@ set_thresholds(const hs_ball *ball, double a, hs_ball_image *image)
  * directions that the box does not move, X and P are what was given.
  */
 static double
-wrapping_error(const hs_ball *ball)
-{
-    return 0x1p-90 * (ball->list->magnitude + ball->centre.magnitude);
-}
-
-static double
-coordinate_error(const hs_ball *ball)
+coordinate_error(const hs_ball *ball, double wrapping)
 {
     const hs_dynamic *list = ball->list;
     double            size = list->spread + ball->radius;
     for (int c = 0; c < list->lattice.ndim; c++) {
         size += list->moves[c] ? fabs(ball->centre.x[c]) : 0.0;
     }
-    return 0x1p-48 * size + wrapping_error(ball);
+    return 0x1p-48 * size + wrapping;
 }
 
 static double
-axis_error(const hs_ball *ball, int k)
+axis_error(const hs_ball *ball, int k, double wrapping)
 {
     const double size = 2.0 * ball->centre.terms[k] + HS_MAX_DIM * ball->radius;
-    return hs_axis_rounding(ball->list->lattice.ndim) * size + wrapping_error(ball) +
+    return hs_axis_rounding(ball->list->lattice.ndim) * size + wrapping +
            ball->list->axes.axis[k].leak;
 }
+
+/* Radius for cells in place of a smaller one: its square is not 0. */
+#define LEAST_BALL 0x1p-400
+/* Images that one ball looks at, at most: MOST_IMAGES of dynamic.c, and those that a far centre
+ * adds. */
+#define MOST_BALL_IMAGES 0x1p24
 
 HS_ALWAYS_INLINE hs_status
 init_in(hs_ball *ball, const hs_dynamic *list, const double *position, hs_failure *failure,
@@ -76,11 +76,12 @@ init_in(hs_ball *ball, const hs_dynamic *list, const double *position, hs_failur
     if (status != HS_OK) {
         return status;
     }
-    const double least = hs_larger(ball->radius, HS_LEAST_BALL);
+    const double least = hs_larger(ball->radius, LEAST_BALL);
     double       images = 1.0;
-    ball->error = list->lattice.aligned ? 0.0 : coordinate_error(ball);
+    const double wrapping = 0x1p-90 * (list->magnitude + ball->centre.magnitude);
+    ball->error = list->lattice.aligned ? 0.0 : coordinate_error(ball, wrapping);
     for (int k = 0; k < ndim; k++) {
-        const double error = list->lattice.aligned ? 0.0 : axis_error(ball, k);
+        const double error = list->lattice.aligned ? 0.0 : axis_error(ball, k, wrapping);
         hs_axis_span(&list->axes.axis[k], ball->centre.t[k], ball->centre.index[k], least + error,
                      error, &ball->span[k]);
         images *= (double)(ball->span[k].most - ball->span[k].least) + 1.0;
@@ -88,7 +89,7 @@ init_in(hs_ball *ball, const hs_dynamic *list, const double *position, hs_failur
         ball->home.image[k] = 0;
     }
     set_thresholds(ball, list->lattice.aligned ? 0.0 : ndim * ball->error, &ball->home);
-    return images <= HS_MOST_BALL_IMAGES ? HS_OK : HS_ERR_SHIFT_RANGE;
+    return images <= MOST_BALL_IMAGES ? HS_OK : HS_ERR_SHIFT_RANGE;
 }
 
 hs_status
@@ -233,7 +234,6 @@ typedef struct ball_walk {
     hs_ball             *ball;
     const hs_ball_visit *visit;
     double               limit;   /* cells with larger gaps are beyond the radius */
-    bool                 is_near; /* no distances: each entry once */
     bool                 filters; /* cells may hold entries that are none of the ball's cells */
     unsigned             cut;     /* bit k: each cell in one image, where it is nearest */
     int64_t              work;    /* entries and cells since the last poll */
@@ -356,8 +356,9 @@ HS_ALWAYS_INLINE bool
 scan_cell(ball_walk *walk, const hs_ball_image *image, hs_cell cell, const int ndim)
 {
     for (uint32_t place = cell.start; place < cell.start + cell.count; place++) {
-        if (walk->is_near ? !(walk->filters && !is_met(walk, place)) && tell(walk, image, place)
-                          : scan_entry(walk, image, place, ndim)) {
+        if (walk->visit->is_near
+                ? !(walk->filters && !is_met(walk, place)) && tell(walk, image, place)
+                : scan_entry(walk, image, place, ndim)) {
             return true;
         }
     }
@@ -402,12 +403,12 @@ scan_number(ball_walk *walk, uint64_t number, const int64_t *index, const int64_
     if (HS_UNLIKELY(list->counters != NULL)) {
         list->counters->cells++;
         list->counters->lookups += !list->cells.dense;
-        list->counters->candidates += walk->is_near ? 0 : cell.count;
+        list->counters->candidates += walk->visit->is_near ? 0 : cell.count;
     }
     if (cell.count == 0) {
         return false;
     }
-    if (walk->meets_images && !walk->is_near) {
+    if (walk->meets_images && !walk->visit->is_near) {
         uint64_t turns = 0;
         int      k = 0;
         do
@@ -419,43 +420,24 @@ scan_number(ball_walk *walk, uint64_t number, const int64_t *index, const int64_
 }
 
 /*
- * Three ways through the cells of a ball. A ball of a few cells takes them nearest
- * first, from the lists of storage.h; what is needed of each cell is made up of a part for each
- * axis. A larger one takes them by index, and one that meets more cells than there are takes all
- * entries there are, in each image.
+ * Three ways through the cells of a ball. A ball of a few cells takes them nearest first, from the
+ * lists of storage.h; what is needed of each cell is made up of a part for each axis. A larger one
+ * takes them by index, and one that meets more cells than there are takes all entries there are, in
+ * each image.
  */
 
 #define CROWD         4   /* entries of a cell that are gathered without a branch */
 #define MOST_GATHERED 125 /* cells */
 
-/* The parts of all cells up to `reach` to a side; those that the ball does not meet are out of
- * reach, and add nothing to a number. */
-HS_ALWAYS_INLINE void
-set_parts(const ball_walk *walk, int reach, part parts[][HS_SLOTS], const int ndim)
-{
-    int k = 0;
-    do {
-        const hs_span_of_cells *span = &walk->ball->span[k];
-        for (int o = -reach; o <= reach; o++) {
-            const int64_t u = span->centre + o;
-            if (u < span->first || u > span->last) {
-                parts[k][o + HS_MOST_REACH] = (part){.gap = INFINITY};
-            } else {
-                parts[k][o + HS_MOST_REACH] = part_of(walk, k, u);
-            }
-        }
-    } while (++k < ndim);
-}
-
 /* Cells nearest first. */
 HS_ALWAYS_INLINE bool
 walk_listed(ball_walk *walk, int reach, part parts[][HS_SLOTS], const int ndim)
 {
-    int64_t               index[HS_MAX_DIM] = {0}, along[HS_MAX_DIM] = {0};
-    const bool            needs_index = !walk->ball->list->cells.dense || walk->meets_images;
-    const hs_offset_list *offsets = &walk->ball->list->offsets.list[reach];
-    const uint8_t        *end = offsets->slot + offsets->n * ndim;
-    for (const uint8_t *slot = offsets->slot; slot < end; slot += ndim) {
+    int64_t           index[HS_MAX_DIM] = {0}, along[HS_MAX_DIM] = {0};
+    const bool        needs_index = !walk->ball->list->cells.dense || walk->meets_images;
+    const hs_offsets *offsets = &walk->ball->list->offsets;
+    const uint8_t    *end = offsets->slot + offsets->at[reach + 1];
+    for (const uint8_t *slot = offsets->slot + offsets->at[reach]; slot < end; slot += ndim) {
         double   gap = 0.0;
         uint64_t number = 0;
         int      k = 0;
@@ -489,17 +471,17 @@ walk_listed(ball_walk *walk, int reach, part parts[][HS_SLOTS], const int ndim)
 HS_ALWAYS_INLINE bool
 walk_gathered(ball_walk *walk, int reach, part parts[][HS_SLOTS], bool *stopped, const int ndim)
 {
-    uint32_t              places[MOST_GATHERED * CROWD];
-    const hs_dynamic     *list = walk->ball->list;
-    const hs_offset_list *offsets = &list->offsets.list[reach];
-    const uint8_t        *slot = offsets->slot;
-    uint32_t              fullest = 0;
-    int                   n = 0;
-    if (!list->cells.dense || walk->meets_images || walk->is_near || offsets->n > MOST_GATHERED ||
-        list->counters != NULL) {
+    uint32_t          places[MOST_GATHERED * CROWD];
+    const hs_dynamic *list = walk->ball->list;
+    const int64_t     n_offsets = list->offsets.n[reach];
+    const uint8_t    *slot = list->offsets.slot + list->offsets.at[reach];
+    uint32_t          fullest = 0;
+    int               n = 0;
+    if (!list->cells.dense || walk->meets_images || walk->visit->is_near ||
+        n_offsets > MOST_GATHERED || list->counters != NULL) {
         return false;
     }
-    for (int64_t o = 0; o < offsets->n; o++, slot += ndim) {
+    for (int64_t o = 0; o < n_offsets; o++, slot += ndim) {
         double   gap = parts[0][slot[0]].gap;
         uint64_t number = parts[0][slot[0]].number;
         for (int k = 1; k < ndim; k++) {
@@ -524,12 +506,25 @@ walk_gathered(ball_walk *walk, int reach, part parts[][HS_SLOTS], bool *stopped,
     return true;
 }
 
+/* Takes the parts of all cells up to `reach` to a side; those that the ball does not meet are out
+ * of reach, and add nothing to a number. */
 HS_ALWAYS_INLINE bool
 walk_few(ball_walk *walk, int reach, const int ndim)
 {
     part parts[HS_MAX_DIM][HS_SLOTS];
     bool stopped;
-    set_parts(walk, reach, parts, ndim);
+    int  k = 0;
+    do {
+        const hs_span_of_cells *span = &walk->ball->span[k];
+        for (int o = -reach; o <= reach; o++) {
+            const int64_t u = span->centre + o;
+            if (u < span->first || u > span->last) {
+                parts[k][o + HS_MOST_REACH] = (part){.gap = INFINITY};
+            } else {
+                parts[k][o + HS_MOST_REACH] = part_of(walk, k, u);
+            }
+        }
+    } while (++k < ndim);
     return walk_gathered(walk, reach, parts, &stopped, ndim)
                ? stopped
                : walk_listed(walk, reach, parts, ndim);
@@ -595,7 +590,7 @@ walk_all(ball_walk *walk)
     const hs_dynamic       *list = walk->ball->list;
     const int               d = list->lattice.ndim;
     int64_t                 along[HS_MAX_DIM];
-    if (walk->is_near) {
+    if (walk->visit->is_near) {
         walk->filters = list->storage != HS_STORE_ALL_PAIRS;
         return scan_all(walk, &walk->ball->home);
     }
@@ -650,7 +645,7 @@ take_cells(ball_walk *walk)
     for (int k = 0; k < list->lattice.ndim; k++) {
         const int64_t below = span[k].centre - span[k].first, above = span[k].last - span[k].centre;
         wanted *= (double)(span[k].last - span[k].first) + 1.0;
-        stored *= walk->is_near ? 1.0 : (double)(span[k].most - span[k].least) + 1.0;
+        stored *= walk->visit->is_near ? 1.0 : (double)(span[k].most - span[k].least) + 1.0;
         walk->meets_images = walk->meets_images || span[k].least != 0 || span[k].most != 0;
         reach = below > reach ? below : reach;
         reach = above > reach ? above : reach;
@@ -668,57 +663,29 @@ take_cells(ball_walk *walk)
     }
 }
 
-/* Above the square of the radius, by more than all rounding: no cell with a larger gap matters. */
-static double
-limit_of(const hs_ball *ball)
-{
-    const double least = hs_larger(ball->radius, HS_LEAST_BALL);
-    return least * least * (1.0 + 0x1p-30);
-}
-
 bool
-hs_ball_within(hs_ball *ball, const hs_ball_visit *visit)
-{
-    ball_walk walk = {.ball = ball, .visit = visit, .limit = limit_of(ball), .has_turned = false};
-    return cut_spans(ball->list, ball->span) && take_cells(&walk);
-}
-
-/* Each cell once: those of one period around the centre's cell. */
-static void
-cut_to_a_period(ball_walk *walk)
-{
-    for (int k = 0; k < walk->ball->list->lattice.ndim; k++) {
-        const int64_t     n = walk->ball->list->axes.axis[k].n;
-        hs_span_of_cells *span = &walk->ball->span[k];
-        if (n > 0 && span->last - span->first >= n) {
-            span->first = span->centre - n / 2;
-            span->last = span->first + n - 1;
-            walk->cut |= 1u << k;
-        }
-    }
-}
-
-static bool
-passes_int32(const hs_span_of_cells *span, int ndim)
-{
-    bool passes = false;
-    for (int k = 0; k < ndim; k++) {
-        passes = passes || span[k].first < INT32_MIN || span[k].last > INT32_MAX;
-    }
-    return passes;
-}
-
-void
-hs_ball_near(hs_ball *ball, const hs_ball_visit *visit)
+hs_ball_walk(hs_ball *ball, const hs_ball_visit *visit)
 {
     const hs_dynamic *list = ball->list;
-    ball_walk walk = {.ball = ball, .visit = visit, .limit = limit_of(ball), .is_near = true};
-    cut_to_a_period(&walk);
-    walk.filters = !list->cells.dense &&
-                   (list->cells.is_wide || passes_int32(ball->span, list->lattice.ndim));
-    if (list->storage == HS_STORE_ALL_PAIRS) {
-        (void)walk_all(&walk);
-    } else if (cut_spans(list, ball->span)) {
-        (void)take_cells(&walk);
+    const double      least = hs_larger(ball->radius, LEAST_BALL);
+    /* The limit is above the square of the radius by more than all rounding. */
+    ball_walk walk = {.ball = ball, .visit = visit, .limit = least * least * (1.0 + 0x1p-30)};
+    if (visit->is_near) {
+        bool is_wide = list->cells.is_wide;
+        for (int k = 0; k < list->lattice.ndim; k++) {
+            const int64_t     n = list->axes.axis[k].n;
+            hs_span_of_cells *span = &ball->span[k];
+            if (n > 0 && span->last - span->first >= n) { /* each cell once, around the centre's */
+                span->first = span->centre - n / 2;
+                span->last = span->first + n - 1;
+                walk.cut |= 1u << k;
+            }
+            is_wide = is_wide || span->first < INT32_MIN || span->last > INT32_MAX;
+        }
+        walk.filters = !list->cells.dense && is_wide;
+        if (list->storage == HS_STORE_ALL_PAIRS) {
+            return walk_all(&walk);
+        }
     }
+    return cut_spans(list, ball->span) && take_cells(&walk);
 }

@@ -11,13 +11,6 @@
  * with a proven bound first, then the stages of metric.h on the positions that were given.
  */
 
-/* Radius for cells in place of a smaller one: its square is not 0. */
-#define HS_LEAST_BALL 0x1p-400
-
-/* Images that one ball looks at, at most: MOST_IMAGES of dynamic.c, and those that a far centre
- * adds. */
-#define HS_MOST_BALL_IMAGES 0x1p24
-
 /* The centre as entries see it that have been moved by `image`: centre - image * B. */
 typedef struct hs_ball_image {
     double  centre[HS_MAX_DIM];
@@ -41,6 +34,7 @@ typedef struct hs_ball_visit {
     hs_dynamic_fn fn; /* NULL: the first one is enough */
     void         *user;
     bool          with_shift;
+    bool          is_near; /* no distances: entries of all cells of the ball, each once */
 } hs_ball_visit;
 
 /* position: borrowed while the ball is in use. HS_ERR_CUTOFF, HS_ERR_NOT_FINITE,
@@ -48,10 +42,8 @@ typedef struct hs_ball_visit {
 hs_status hs_ball_init(hs_ball *ball, const hs_dynamic *list, const double *position, double radius,
                        hs_failure *failure);
 
-/* Entries within the ball, in each image; whether it was left early. */
-bool hs_ball_within(hs_ball *ball, const hs_ball_visit *visit);
-
-/* Entries of all these cells, each once. The spans of the ball may be cut. */
-void hs_ball_near(hs_ball *ball, const hs_ball_visit *visit);
+/* Entries within the ball, in each image, or near it; whether it was left early. The spans of the
+ * ball may be cut. */
+bool hs_ball_walk(hs_ball *ball, const hs_ball_visit *visit);
 
 #endif

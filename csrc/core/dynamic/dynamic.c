@@ -11,8 +11,8 @@
 /* dynamic.c: points come into cells, move and go; the gate that readers and writers pass; lists as
  * a whole. */
 
-/* A block that is too small is replaced by a larger one; the map learns where its
- * entries are now. */
+/* A block that is too small is replaced by a larger one; the map learns where its entries are
+ * now. */
 
 /* The size of the smallest block for so many entries: it has 2^size. */
 static int
@@ -265,94 +265,46 @@ dynamic_write(hs_dynamic *list, uint32_t place, const hs_placed *placed)
     }
 }
 
-/* Rows are placed one at a time: to store what comes of it would cost more than to do it
- * again. */
+/* All memory first, then cell after cell, in order. */
 
-hs_status
-hs_rows_place(const hs_dynamic *list, double *const *x, int64_t i, double *given, hs_placed *placed,
-              hs_failure *failure)
+/* Makes a range of cells hold one more, which may be the first. */
+static void
+widen(const hs_dynamic *list, const int64_t *index, bool is_first, int64_t *first, int64_t *last)
 {
     for (int k = 0; k < list->lattice.ndim; k++) {
-        given[k] = x[k][i];
+        first[k] = is_first || index[k] < first[k] ? index[k] : first[k];
+        last[k] = is_first || index[k] > last[k] ? index[k] : last[k];
     }
-    const hs_status status = hs_dynamic_place(list, given, placed, failure);
-    failure->row = status == HS_OK ? failure->row : i;
-    return status;
 }
-
-/* Whether to go on before row i, as long as the list is as it was. */
-HS_ALWAYS_INLINE bool
-rows_go_on(const hs_dynamic *list, int64_t i)
-{
-    return (i + 1) % HS_POLL_POINTS != 0 || list->hooks.poll == NULL || list->hooks.poll(NULL, 0.0);
-}
-
-/* Whether all positions can be had; dense cells are made to reach them. HS_ERR_SHIFT_RANGE;
- * HS_ERR_CAPACITY with the bytes, HS_ERR_MEMORY, HS_ERR_INTERRUPTED. n > 0. */
-static hs_status
-rows_reach(hs_dynamic *list, int64_t n, double *const *x, hs_failure *failure)
-{
-    int64_t   first[HS_MAX_DIM], last[HS_MAX_DIM];
-    double    given[HS_MAX_DIM], bytes = 0.0;
-    hs_placed placed;
-    for (int64_t i = 0; i < n; i++) {
-        if (!rows_go_on(list, i)) {
-            return HS_ERR_INTERRUPTED;
-        }
-        const hs_status status = hs_rows_place(list, x, i, given, &placed, failure);
-        if (status != HS_OK) {
-            return status;
-        }
-        for (int k = 0; k < list->lattice.ndim; k++) {
-            const int64_t u = placed.index[k];
-            first[k] = i == 0 || u < first[k] ? u : first[k];
-            last[k] = i == 0 || u > last[k] ? u : last[k];
-        }
-    }
-    if (!list->cells.dense) {
-        return HS_OK;
-    }
-    const hs_status status =
-        hs_cell_table_extend(&list->cells, &list->entries, first, last, list->grid_bytes, &bytes);
-    failure->expected_bytes = bytes;
-    failure->limit_bytes = list->grid_bytes;
-    return status;
-}
-
-/* All memory first, then cell after cell, in order. */
 
 /* Memory for all that a copy will hold, and no more. */
 static bool
 reserve_copy(const hs_dynamic *list, hs_dynamic *copy)
 {
-    int64_t first[HS_MAX_DIM], last[HS_MAX_DIM], index[HS_MAX_DIM];
-    int64_t n_entries = 0, n_cells = 0;
-    double  bytes;
+    int64_t    first[HS_MAX_DIM], last[HS_MAX_DIM], index[HS_MAX_DIM];
+    int64_t    n_entries = 0, n_cells = 0;
+    hs_failure ignored;
     for (int64_t c = 0; c < list->cells.n; c++) {
-        if (list->cells.cell[c].count == 0) {
-            continue;
+        if (list->cells.cell[c].count > 0) {
+            hs_cell_table_index(&list->cells, (uint32_t)c, index);
+            widen(list, index, n_cells == 0, first, last);
+            n_entries += INT64_C(1) << block_size(list->cells.cell[c].count);
+            n_cells++;
         }
-        hs_cell_table_index(&list->cells, (uint32_t)c, index);
-        for (int k = 0; k < list->lattice.ndim; k++) {
-            first[k] = n_cells == 0 || index[k] < first[k] ? index[k] : first[k];
-            last[k] = n_cells == 0 || index[k] > last[k] ? index[k] : last[k];
-        }
-        n_entries += INT64_C(1) << block_size(list->cells.cell[c].count);
-        n_cells++;
     }
-    return n_cells == 0 ||
-           (hs_key_map_reserve(&copy->map, list->map.n) &&
-            hs_entries_reserve(&copy->entries, n_entries) &&
-            (list->cells.dense ? hs_cell_table_extend(&copy->cells, &copy->entries, first, last,
-                                                      list->grid_bytes, &bytes) == HS_OK
-                               : hs_cell_table_reserve(&copy->cells, &copy->entries, n_cells)));
+    return n_cells == 0 || (hs_hash_reserve(&copy->map.hash, list->map.n) &&
+                            hs_entries_reserve(&copy->entries, n_entries) &&
+                            hs_cell_table_reserve(&copy->cells, &copy->entries, first, last,
+                                                  n_cells, &ignored) == HS_OK);
 }
 
-/* copy: a new list of the same kind. HS_ERR_MEMORY: it holds no points. */
+/* copy: of the same kind, without points. HS_ERR_MEMORY: that it stays. */
 static hs_status
 copy_points(const hs_dynamic *list, hs_dynamic *copy)
 {
-    int64_t index[HS_MAX_DIM];
+    int64_t    index[HS_MAX_DIM];
+    uint32_t   number;
+    hs_failure ignored;
     if (!reserve_copy(list, copy)) {
         return HS_ERR_MEMORY;
     }
@@ -362,8 +314,9 @@ copy_points(const hs_dynamic *list, hs_dynamic *copy)
             continue;
         }
         hs_cell_table_index(&list->cells, (uint32_t)c, index);
-        const uint32_t number = hs_cell_table_add(&copy->cells, &copy->entries, index);
-        (void)hs_cell_reserve(copy, number, cell.count); /* reserve_copy has the memory */
+        /* reserve_copy has the memory */
+        (void)hs_cell_table_add(&copy->cells, &copy->entries, index, &number, &ignored);
+        (void)hs_cell_reserve(copy, number, cell.count);
         const uint32_t start = copy->cells.cell[number].start;
         hs_entries_copy(&list->entries, cell.start, &copy->entries, start, cell.count);
         copy->cells.cell[number].count = cell.count;
@@ -374,15 +327,12 @@ copy_points(const hs_dynamic *list, hs_dynamic *copy)
             hs_key_map_add(&copy->map, (hs_key){tail->id, tail->tag}, start + e);
         }
     }
-    copy->n_without = list->n_without;
     copy->cells.is_wide = list->cells.is_wide;
-    copy->magnitude = list->magnitude;
     return HS_OK;
 }
 
-/* The checks of options, and lists that are made, copied and emptied. A copy is a new
- * list into which the points of the old one are put, cell after cell; shrinking makes one and keeps
- * it. */
+/* The checks of options, and lists that are made, copied and emptied. A copy is a new list into
+ * which the points of the old one are put, cell after cell; shrinking makes one and keeps it. */
 
 #define LEAST_LENGTH 0x1p-300 /* squares of these and of their quotients are ordinary numbers */
 #define MOST_LENGTH  0x1p300
@@ -403,31 +353,14 @@ refuse_length(hs_failure *failure, hs_length_column column, double value)
 }
 
 static hs_status
-check_box(const hs_box *box, int ndim, hs_failure *failure)
+check_options(const hs_dynamic_options *options, hs_failure *failure)
 {
-    if (box == NULL) {
-        return HS_OK;
-    }
-    if (box->ndim != ndim) {
-        return HS_ERR_ARGUMENT;
-    }
-    const hs_status status = hs_box_check(box, failure);
-    for (int l = 0; status == HS_OK && l < ndim; l++) {
-        for (int k = 0; box->periodic[l] && k < ndim; k++) {
-            if (box->rows[l][k] != 0.0 && !is_length(fabs(box->rows[l][k]))) {
-                return refuse_length(failure, HS_LENGTH_BOX, box->rows[l][k]);
-            }
-        }
-    }
-    return status;
-}
-
-hs_status
-hs_list_check(const hs_dynamic_options *options, hs_failure *failure)
-{
-    const double radius = options->max_radius;
-    if (options->ndim < 1 || options->ndim > HS_MAX_DIM || (int)options->storage < 0 ||
-        options->storage > HS_STORE_ALL_PAIRS || !(options->grid_bytes >= 0.0)) {
+    const double  radius = options->max_radius;
+    const hs_box *box = options->box;
+    const int     d = options->ndim;
+    if (d < 1 || d > HS_MAX_DIM || (int)options->storage < 0 ||
+        options->storage > HS_STORE_ALL_PAIRS || !(options->grid_bytes >= 0.0) ||
+        (box != NULL && box->ndim != d)) {
         return HS_ERR_ARGUMENT;
     }
     if (!is_length(options->cell_size)) {
@@ -436,28 +369,23 @@ hs_list_check(const hs_dynamic_options *options, hs_failure *failure)
     if (radius != 0.0 && !is_length(radius)) {
         return refuse_length(failure, HS_LENGTH_MAX_RADIUS, radius);
     }
-    return check_box(options->box, options->ndim, failure);
-}
-
-/* Images of a ball that a query may have to look at, as far as its centre does not add to them. */
-static double
-count_images(const hs_axes *axes, double max_radius)
-{
-    double n = 1.0;
-    for (int k = 0; k < axes->ndim; k++) {
-        const hs_axis *axis = &axes->axis[k];
-        if (axis->row >= 0) {
-            n *= 2.0 * ceil((max_radius + axis->leak) / axis->period) + 1.0;
+    const hs_status status = box != NULL ? hs_box_check(box, failure) : HS_OK;
+    for (int l = 0; box != NULL && status == HS_OK && l < d; l++) {
+        for (int k = 0; box->periodic[l] && k < d; k++) {
+            if (box->rows[l][k] != 0.0 && !is_length(fabs(box->rows[l][k]))) {
+                return refuse_length(failure, HS_LENGTH_BOX, box->rows[l][k]);
+            }
         }
     }
-    return n;
+    return status;
 }
 
-/* Sums over the box that bounds of rounding are made of. */
-static void
+/* Sums over the box that bounds of rounding are made of. Returns how many images of a ball a query
+ * may have to look at, as far as its centre does not add to them. */
+static double
 measure_box(hs_dynamic *list)
 {
-    double least = INFINITY;
+    double least = INFINITY, n_images = 1.0;
     for (int r = 0; r < list->lattice.n_periodic; r++) {
         list->row_error += list->lattice.row_error[r];
         for (int k = 0; k < list->lattice.ndim; k++) {
@@ -465,37 +393,42 @@ measure_box(hs_dynamic *list)
         }
     }
     for (int k = 0; k < list->lattice.ndim; k++) {
-        list->moves[k] = hs_moves_column(&list->lattice, k);
-        least = list->axes.axis[k].row >= 0 ? hs_smaller(list->axes.axis[k].period, least) : least;
+        const hs_axis *axis = &list->axes.axis[k];
+        for (int l = 0; l < list->lattice.n_periodic; l++) {
+            list->moves[k] = list->moves[k] || list->lattice.given[l][k] != 0.0;
+        }
+        if (axis->row >= 0) {
+            least = hs_smaller(axis->period, least);
+            n_images *= 2.0 * ceil((list->max_radius + axis->leak) / axis->period) + 1.0;
+        }
     }
     list->most_terms = 0x1p90 * least;
+    return n_images;
 }
 
 hs_status
 hs_list_new(const hs_dynamic_options *options, hs_dynamic **list, hs_failure *failure)
 {
-    const bool  one_cell = options->storage == HS_STORE_ALL_PAIRS;
-    hs_dynamic *made = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *made);
+    hs_status   status = check_options(options, failure);
+    hs_dynamic *made = status == HS_OK ? hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *made) : NULL;
     if (made == NULL) {
-        return HS_ERR_MEMORY;
+        return status == HS_OK ? HS_ERR_MEMORY : status;
     }
     memset(made, 0, sizeof *made);
     made->storage = options->storage;
     made->inclusive = options->inclusive;
-    made->cell_size = options->cell_size;
     made->max_radius = options->max_radius != 0.0 ? options->max_radius : options->cell_size;
-    made->grid_bytes = options->grid_bytes;
-    made->has_box = options->box != NULL;
-    if (made->has_box) {
-        made->box = *options->box;
-    }
+    hs_gate_init(&made->gate);
     hs_lattice_init(options->box, options->ndim, hs_scale_of(0), &made->lattice);
-    hs_status status = hs_skew_is_left(&made->lattice) ? HS_ERR_BOX_SKEWED : HS_OK;
-    if (status == HS_OK) {
-        hs_axes_init(&made->axes, &made->lattice, made->cell_size, one_cell, made->max_radius);
-        measure_box(made);
-        hs_gate_init(&made->gate);
-        if (!(count_images(&made->axes, made->max_radius) <= MOST_IMAGES)) {
+    if (hs_skew_is_left(&made->lattice)) {
+        status = HS_ERR_BOX_SKEWED;
+    } else {
+        hs_axes_init(&made->axes, &made->lattice, options->cell_size,
+                     options->storage == HS_STORE_ALL_PAIRS, made->max_radius);
+        hs_entries_init(&made->entries, options->ndim, made->lattice.n_periodic > 0);
+        hs_cell_table_init(&made->cells, &made->axes, options->storage != HS_STORE_HASH,
+                           options->grid_bytes);
+        if (!(measure_box(made) <= MOST_IMAGES)) {
             status = refuse_length(failure, HS_LENGTH_MAX_RADIUS, made->max_radius);
         } else if (!hs_offsets_init(&made->offsets, &made->axes, &made->lattice,
                                     made->max_radius)) {
@@ -506,8 +439,6 @@ hs_list_new(const hs_dynamic_options *options, hs_dynamic **list, hs_failure *fa
         hs_free(NULL, made);
         return status;
     }
-    hs_entries_init(&made->entries, options->ndim, made->lattice.n_periodic > 0);
-    hs_cell_table_init(&made->cells, &made->axes, options->storage != HS_STORE_HASH);
     *list = made;
     return HS_OK;
 }
@@ -528,36 +459,40 @@ hs_list_free(hs_dynamic *list)
     hs_free(NULL, list);
 }
 
+/* No points, and no memory of them. */
+static void
+start_points(hs_dynamic *list)
+{
+    hs_entries_init(&list->entries, list->lattice.ndim, list->entries.keeps_given);
+    hs_cell_table_init(&list->cells, &list->axes, list->cells.dense, list->cells.most_bytes);
+    list->map = (hs_key_map){.n = 0};
+}
+
 hs_status
 hs_list_copy(const hs_dynamic *list, hs_dynamic **copy)
 {
-    const hs_dynamic_options options = {.ndim = list->lattice.ndim,
-                                        .box = list->has_box ? &list->box : NULL,
-                                        .storage = list->storage,
-                                        .cell_size = list->cell_size,
-                                        .max_radius = list->max_radius,
-                                        .inclusive = list->inclusive,
-                                        .grid_bytes = list->grid_bytes};
-    hs_failure               ignored;
-    hs_dynamic              *made;
-    hs_status                status = hs_list_new(&options, &made, &ignored);
     *copy = NULL;
-    if (status == HS_OK) {
-        status = copy_points(list, made);
-        if (status == HS_OK) {
-            *copy = made;
-        } else {
-            hs_list_free(made);
-        }
+    hs_dynamic *made = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *made);
+    if (made == NULL) {
+        return HS_ERR_MEMORY;
     }
-    return status;
+    memset(made, 0, sizeof *made);
+    memcpy(made, list, offsetof(hs_dynamic, changes)); /* others may be at its gate */
+    hs_gate_init(&made->gate);
+    start_points(made);
+    if (!hs_offsets_copy(&list->offsets, &made->offsets) || copy_points(list, made) != HS_OK) {
+        hs_list_free(made);
+        return HS_ERR_MEMORY;
+    }
+    *copy = made;
+    return HS_OK;
 }
 
 void
 hs_list_clear(hs_dynamic *list)
 {
     free_points(list);
-    hs_cell_table_init(&list->cells, &list->axes, list->cells.dense);
+    start_points(list);
     list->n_without = 0;
     list->magnitude = 0.0;
 }
@@ -570,204 +505,20 @@ hs_list_shrink(hs_dynamic *list)
     if (status != HS_OK) {
         return status;
     }
-    const hs_entries    entries = list->entries;
-    const hs_key_map    map = list->map;
-    const hs_cell_table cells = list->cells;
+    free_points(list);
     list->entries = copy->entries;
     list->map = copy->map;
     list->cells = copy->cells;
-    list->magnitude = copy->magnitude;
     list->changes++;
-    copy->entries = entries;
-    copy->map = map;
-    copy->cells = cells;
+    start_points(copy);
     hs_list_free(copy);
     return HS_OK;
 }
 
 /*
- * A counting sort. A first pass numbers the cells and counts what goes into each, a second
- * one gives them blocks, one behind another, and a third one writes the points there.
- */
-
-#define POINTS_A_CELL 4  /* or more: else a hash table grows meanwhile */
-#define AT_ONCE       32 /* rows whose memory is fetched before they are written */
-
-static hs_key
-key_of(const int64_t *ids, const int32_t *tags, int64_t i)
-{
-    return (hs_key){ids[i], tags != NULL ? tags[i] : 0};
-}
-
-/* hs_rows_place, for a number of dimensions that the compiler may know. */
-HS_ALWAYS_INLINE hs_status
-place_row(const hs_dynamic *list, double *const *x, int64_t i, double *given, hs_placed *placed,
-          hs_failure *failure, const int ndim)
-{
-    for (int k = 0; k < ndim; k++) {
-        given[k] = x[k][i];
-    }
-    return hs_dynamic_place_in(list, given, placed, failure, ndim);
-}
-
-/* The cell of each row, and how many go to each. */
-HS_ALWAYS_INLINE hs_status
-count_in(hs_dynamic *list, int64_t n, double *const *x, uint32_t *numbers, hs_failure *failure,
-         const int ndim)
-{
-    double    given[HS_MAX_DIM];
-    hs_placed placed;
-    for (int64_t i = 0; i < n; i++) {
-        if (!rows_go_on(list, i)) {
-            return HS_ERR_INTERRUPTED;
-        }
-        const hs_status status = place_row(list, x, i, given, &placed, failure, ndim);
-        if (status != HS_OK) {
-            failure->row = i;
-            return status;
-        }
-        numbers[i] = hs_cell_table_add(&list->cells, &list->entries, placed.index);
-        if (numbers[i] == HS_NO_CELL) {
-            return HS_ERR_MEMORY;
-        }
-        list->cells.n_empty -= list->cells.cell[numbers[i]].count++ == 0;
-    }
-    return HS_OK;
-}
-
-static hs_status
-count_rows(hs_dynamic *list, int64_t n, double *const *x, uint32_t *numbers, hs_failure *failure)
-{
-    switch (list->lattice.ndim) {
-    case 2: return count_in(list, n, x, numbers, failure, 2);
-    case 3: return count_in(list, n, x, numbers, failure, 3);
-    default: return count_in(list, n, x, numbers, failure, list->lattice.ndim);
-    }
-}
-
-/* Dense cells as far as there are points. Along the axes of aligned boxes the cell is a monotone
- * function of the coordinate, so that the outermost coordinates are enough; count_rows will see
- * whether each position can be had. */
-static hs_status
-reach(hs_dynamic *list, int64_t n, double *const *x, hs_failure *failure)
-{
-    int64_t first[HS_MAX_DIM], last[HS_MAX_DIM];
-    double  bytes = 0.0;
-    if (!list->lattice.aligned) {
-        return rows_reach(list, n, x, failure);
-    }
-    for (int k = 0; k < list->lattice.ndim; k++) {
-        const hs_axis *axis = &list->axes.axis[k];
-        double         low = x[k][0], high = low;
-        for (int64_t i = 1; axis->n == 0 && i < n; i++) {
-            low = hs_smaller(x[k][i], low);
-            high = hs_larger(x[k][i], high);
-        }
-        first[k] = axis->n == 0 ? hs_axis_cell(axis, low) : 0;
-        last[k] = axis->n == 0 ? hs_axis_cell(axis, high) : axis->n - 1;
-    }
-    const hs_status status =
-        hs_cell_table_extend(&list->cells, &list->entries, first, last, list->grid_bytes, &bytes);
-    failure->expected_bytes = bytes;
-    failure->limit_bytes = list->grid_bytes;
-    return status;
-}
-
-/* A block for each cell that is not empty, in the order of the cells, so that those of neighbours
- * lie side by side. Counts begin again. */
-static bool
-cut_blocks(hs_dynamic *list)
-{
-    hs_cell_table *cells = &list->cells;
-    int64_t        total = 0;
-    for (int64_t c = 0; c < cells->n; c++) {
-        total += cells->cell[c].count > 0 ? INT64_C(1) << block_size(cells->cell[c].count) : 0;
-    }
-    if (!hs_entries_reserve(&list->entries, total)) {
-        return false;
-    }
-    for (int64_t c = 0; c < cells->n; c++) {
-        if (cells->cell[c].count > 0) {
-            const int size = block_size(cells->cell[c].count);
-            cells->size[c] = (uint8_t)size;
-            cells->cell[c] = (hs_cell){hs_entries_take(&list->entries, size), 0};
-        }
-    }
-    return true;
-}
-
-/* Rows i to i + n - 1. First where each of them goes, so that the memory is there when it is
- * written to: the points of a cell come from anywhere among the rows. */
-HS_ALWAYS_INLINE void
-write_in(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t i, int n,
-         double *const *x, const uint32_t *numbers, hs_failure *failure, const int ndim)
-{
-    uint32_t  places[AT_ONCE];
-    double    given[HS_MAX_DIM];
-    hs_placed placed;
-    for (int r = 0; r < n; r++) {
-        hs_cell *const cell = &list->cells.cell[numbers[i + r]];
-        places[r] = cell->start + cell->count++;
-        HS_PREFETCH_WRITE(hs_entry_at(&list->entries, places[r]));
-        HS_PREFETCH_WRITE(hs_entry_given(&list->entries, places[r]));
-        hs_key_map_expect(&list->map, key_of(ids, tags, i + r));
-    }
-    for (int r = 0; r < n; r++) {
-        const hs_key   key = key_of(ids, tags, i + r);
-        hs_entry_tail *tail = hs_entry_tail_at(&list->entries, places[r]);
-        (void)place_row(list, x, i + r, given, &placed, failure, ndim); /* as in count_rows */
-        *tail = (hs_entry_tail){key.id, key.tag, numbers[i + r]};
-        dynamic_write(list, places[r], &placed);
-        hs_key_map_add(&list->map, key, places[r]);
-    }
-}
-
-static void
-write_some(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t i, int n,
-           double *const *x, const uint32_t *numbers, hs_failure *failure)
-{
-    switch (list->lattice.ndim) {
-    case 2: write_in(list, ids, tags, i, n, x, numbers, failure, 2); break;
-    case 3: write_in(list, ids, tags, i, n, x, numbers, failure, 3); break;
-    default: write_in(list, ids, tags, i, n, x, numbers, failure, list->lattice.ndim);
-    }
-}
-
-hs_status
-hs_fill(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n, double *const *x,
-        hs_failure *failure)
-{
-    hs_list_clear(list);
-    uint32_t *numbers = hs_alloc(NULL, HS_FOR_CELLS, n, sizeof *numbers);
-    hs_status status = numbers != NULL ? HS_OK : HS_ERR_MEMORY;
-    if (status == HS_OK && list->cells.dense) {
-        status = reach(list, n, x, failure);
-    } else if (status == HS_OK &&
-               !hs_cell_table_reserve(&list->cells, &list->entries, n / POINTS_A_CELL)) {
-        status = HS_ERR_MEMORY;
-    }
-    if (status == HS_OK) {
-        status = count_rows(list, n, x, numbers, failure);
-    }
-    if (status == HS_OK && !(cut_blocks(list) && hs_key_map_reserve(&list->map, n))) {
-        status = HS_ERR_MEMORY;
-    }
-    if (status == HS_OK) {
-        for (int64_t i = 0; i < n; i += AT_ONCE) {
-            const int some = (int)(n - i < AT_ONCE ? n - i : AT_ONCE);
-            write_some(list, ids, tags, i, some, x, numbers, failure);
-        }
-    } else {
-        hs_list_clear(list);
-    }
-    hs_free(NULL, numbers);
-    return status;
-}
-
-/*
- * A point comes into a cell, goes out of it or moves on, once there is room: nothing
- * here can fail. A point that stays in its cell is written over; else it is appended to its new
- * cell and taken out of the old one.
+ * A point comes into a cell, goes out of it or moves on, once there is room: nothing here can fail.
+ * A point that stays in its cell is written over; else it is appended to its new cell and taken out
+ * of the old one.
  */
 
 /* A new entry behind those of a cell that has room for it; returns its place. */
@@ -801,7 +552,7 @@ take_out(hs_dynamic *list, uint32_t place)
     }
     cell->count--;
     list->cells.n_empty += cell->count == 0;
-    if (cell->count == 0 && !list->keeps_blocks) {
+    if (cell->count == 0 && !list->cells.keeps_empty) {
         hs_entries_give(&list->entries, list->cells.size[number], cell->start);
         list->cells.size[number] = HS_NO_BLOCK;
     }
@@ -836,36 +587,19 @@ put_new(hs_dynamic *list, hs_key key, uint32_t number, const hs_placed *placed)
 
 /* One point. Memory first, then changes that cannot fail. */
 
-/* The cell of a position, which is added where there is none. */
-static hs_status
-cell_for(hs_dynamic *list, const hs_placed *placed, uint32_t *number, hs_failure *failure)
-{
-    static const int64_t nowhere[HS_MAX_DIM] = {0};
-    const int64_t       *index = placed != NULL ? placed->index : nowhere;
-    if (list->cells.dense) {
-        double          bytes = 0.0;
-        const hs_status status = hs_cell_table_extend(&list->cells, &list->entries, index, index,
-                                                      list->grid_bytes, &bytes);
-        if (status != HS_OK) {
-            failure->expected_bytes = bytes;
-            failure->limit_bytes = list->grid_bytes;
-            return status;
-        }
-    }
-    *number = hs_cell_table_add(&list->cells, &list->entries, index);
-    return *number != HS_NO_CELL ? HS_OK : HS_ERR_MEMORY;
-}
-
 hs_status
 hs_update_insert(hs_dynamic *list, hs_key key, const hs_placed *placed, hs_failure *failure)
 {
-    uint32_t  number;
-    hs_status status = cell_for(list, placed, &number, failure);
+    static const int64_t nowhere[HS_MAX_DIM] = {0};
+    uint32_t             number;
+    const int64_t       *index = placed != NULL ? placed->index : nowhere;
+    const hs_status      status =
+        hs_cell_table_add(&list->cells, &list->entries, index, &number, failure);
     if (status != HS_OK) {
         return status;
     }
     uint32_t place = hs_key_map_find(&list->map, &list->entries, key);
-    if (place == HS_NO_PLACE && !hs_key_map_reserve(&list->map, list->map.n + 1)) {
+    if (place == HS_NO_PLACE && !hs_hash_reserve(&list->map.hash, list->map.n + 1)) {
         return HS_ERR_MEMORY;
     }
     if (place == HS_NO_PLACE || hs_entry_tail_at(&list->entries, place)->cell != number) {
@@ -896,24 +630,62 @@ hs_update_remove(hs_dynamic *list, hs_key key)
     return true;
 }
 
-/* Many points at once. First each cell gets room for all that comes into it, as if
- * all were new; then each point is put where it belongs. */
+/*
+ * Many points at once. First each has the number of its cell, then each cell gets room for all that
+ * comes into it, as if all were new, and at last each point is put where it belongs. Rows are
+ * placed anew each time: to store what comes of it would cost more than to do it again.
+ */
 
-/* Rows are few where there are more than so many cells for each: these are not all looked at. */
-#define FEW_ROWS 16
+#define POINTS_A_CELL 4  /* or more: else a hash table grows meanwhile */
+#define FEW_ROWS      16 /* where there are more cells for each row, not all are looked at */
+#define ROWS_AHEAD    32 /* whose memory is fetched before they are written */
 
-/* Room for `coming` more entries in each cell, in the order of the cells, so that the blocks of
- * neighbours lie side by side. */
-static bool
-reserve_in_cells(hs_dynamic *list, const uint32_t *coming)
+/* Row i made ready. given: receives its numbers, which `placed` borrows. Statuses of
+ * hs_dynamic_place, with failure->row. */
+static hs_status
+place_row(const hs_dynamic *list, double *const *x, int64_t i, double *given, hs_placed *placed,
+          hs_failure *failure)
 {
-    for (int64_t c = 0; c < list->cells.n; c++) {
-        const int64_t count = (int64_t)list->cells.cell[c].count + coming[c];
-        if (coming[c] > 0 && !hs_cell_reserve(list, (uint32_t)c, count)) {
-            return false;
+    for (int k = 0; k < list->lattice.ndim; k++) {
+        given[k] = x[k][i];
+    }
+    const hs_status status = hs_dynamic_place(list, given, placed, failure);
+    failure->row = status == HS_OK ? failure->row : i;
+    return status;
+}
+
+/* The cell of each row, as long as the list is as it was. Dense cells are made to reach all rows
+ * first, for which they are looked at where an axis is open. HS_ERR_INTERRUPTED, and statuses of
+ * hs_dynamic_place and hs_cell_table_reserve. */
+static hs_status
+number_rows(hs_dynamic *list, int64_t n, double *const *x, uint32_t *numbers, hs_failure *failure)
+{
+    int64_t   first[HS_MAX_DIM] = {0}, last[HS_MAX_DIM] = {0};
+    double    given[HS_MAX_DIM];
+    hs_placed placed;
+    hs_status status = HS_OK;
+    int       pass = list->cells.dense && list->lattice.n_periodic < list->lattice.ndim ? 0 : 1;
+    for (; pass < 2 && status == HS_OK; pass++) {
+        if (pass == 1) {
+            status = hs_cell_table_reserve(&list->cells, &list->entries, first, last,
+                                           list->map.n == 0 ? n / POINTS_A_CELL : n, failure);
+        }
+        list->cells.keeps_empty = true;
+        for (int64_t i = 0; i < n && status == HS_OK; i++) {
+            if ((i + 1) % HS_POLL_POINTS == 0 && list->hooks.poll != NULL &&
+                !list->hooks.poll(NULL, 0.0)) {
+                return HS_ERR_INTERRUPTED;
+            }
+            status = place_row(list, x, i, given, &placed, failure);
+            if (status == HS_OK && pass == 0) {
+                widen(list, placed.index, i == 0, first, last);
+            } else if (status == HS_OK) {
+                status = hs_cell_table_add(&list->cells, &list->entries, placed.index, &numbers[i],
+                                           failure);
+            }
         }
     }
-    return true;
+    return status;
 }
 
 static int
@@ -923,87 +695,72 @@ compare_cells(const void *one, const void *other)
     return (a > b) - (a < b);
 }
 
-/* The same for few rows among many cells: the numbers of their cells, which are sorted. */
 static bool
-reserve_in_some(hs_dynamic *list, uint32_t *numbers, int64_t n)
+reserve_more(hs_dynamic *list, uint32_t number, int64_t more)
 {
-    qsort(numbers, (size_t)n, sizeof *numbers, compare_cells);
-    for (int64_t i = 0; i < n;) {
-        const int64_t begin = i;
-        while (i < n && numbers[i] == numbers[begin]) {
-            i++;
-        }
-        const int64_t count = (int64_t)list->cells.cell[numbers[begin]].count + (i - begin);
-        if (!hs_cell_reserve(list, numbers[begin], count)) {
-            return false;
-        }
-    }
-    return true;
+    return hs_cell_reserve(list, number, (int64_t)list->cells.cell[number].count + more);
 }
 
-/* Room in each cell for all rows that go there, as if they were all new. numbers: n, scratch. */
-static hs_status
-reserve_rows(hs_dynamic *list, int64_t n, double *const *x, uint32_t *numbers, hs_failure *failure)
+/* Room in each cell for all rows that go there, as if they were all new; in the order of the cells,
+ * so that the blocks of neighbours lie side by side. */
+static bool
+reserve_cells(hs_dynamic *list, const uint32_t *numbers, int64_t n)
 {
-    double    given[HS_MAX_DIM];
-    hs_placed placed;
-    uint32_t *coming = NULL;
-    bool      fits;
-    for (int64_t i = 0; i < n; i++) {
-        (void)hs_rows_place(list, x, i, given, &placed, failure); /* it can be had: rows_reach */
-        numbers[i] = hs_cell_table_add(&list->cells, &list->entries, placed.index);
-    }
-    if (n < list->cells.n / FEW_ROWS) {
-        return reserve_in_some(list, numbers, n) ? HS_OK : HS_ERR_MEMORY;
-    }
-    coming = hs_alloc(NULL, HS_FOR_CELLS, list->cells.n, sizeof *coming);
-    fits = coming != NULL;
-    if (fits) {
-        memset(coming, 0, (size_t)list->cells.n * sizeof *coming);
+    const bool    few = n < list->cells.n / FEW_ROWS; /* sorted, else counted */
+    const int64_t n_scratch = few ? n : list->cells.n;
+    uint32_t     *scratch = hs_alloc(NULL, HS_FOR_CELLS, n_scratch, sizeof *scratch);
+    bool          fits = scratch != NULL;
+    if (fits && few) {
+        memcpy(scratch, numbers, (size_t)n * sizeof *scratch);
+        qsort(scratch, (size_t)n, sizeof *scratch, compare_cells);
+        for (int64_t i = 0, begin = 0; fits && i < n; begin = i) {
+            while (i < n && scratch[i] == scratch[begin]) {
+                i++;
+            }
+            fits = reserve_more(list, scratch[begin], i - begin);
+        }
+    } else if (fits) {
+        memset(scratch, 0, (size_t)n_scratch * sizeof *scratch);
         for (int64_t i = 0; i < n; i++) {
-            coming[numbers[i]]++;
+            scratch[numbers[i]]++;
         }
-        fits = reserve_in_cells(list, coming);
-    }
-    hs_free(NULL, coming);
-    return fits ? HS_OK : HS_ERR_MEMORY;
-}
-
-/* Gives back the blocks of those of these cells that are empty. */
-static void
-release_empty(hs_dynamic *list, const uint32_t *numbers, int64_t n)
-{
-    for (int64_t i = 0; i < n; i++) {
-        const uint32_t c = numbers[i];
-        if (list->cells.cell[c].count == 0 && list->cells.size[c] != HS_NO_BLOCK) {
-            hs_entries_give(&list->entries, list->cells.size[c], list->cells.cell[c].start);
-            list->cells.size[c] = HS_NO_BLOCK;
+        for (int64_t c = 0; fits && c < n_scratch; c++) {
+            fits = scratch[c] == 0 || reserve_more(list, (uint32_t)c, scratch[c]);
         }
     }
+    hs_free(NULL, scratch);
+    return fits;
 }
 
-/* numbers: receives the cells that the points were in, or are in if they are new. */
+/* Puts the rows into their cells, which have room; numbers: receives the cells that they were in,
+ * or are in if they are new. */
 static void
 put_rows(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n, double *const *x,
          uint32_t *numbers, hs_failure *failure)
 {
-    double    given[HS_MAX_DIM];
-    hs_placed placed;
-    list->keeps_blocks = true;
+    const bool are_new = list->map.n == 0;
+    double     given[HS_MAX_DIM];
+    hs_placed  placed;
     for (int64_t i = 0; i < n; i++) {
         const hs_key   key = {ids[i], tags != NULL ? tags[i] : 0};
-        const uint32_t place = hs_key_map_find(&list->map, &list->entries, key);
-        (void)hs_rows_place(list, x, i, given, &placed, failure);
-        numbers[i] = hs_cell_table_find(&list->cells, placed.index);
+        const uint32_t number = numbers[i];
+        if (i + ROWS_AHEAD < n) { /* the points of a cell come from anywhere among the rows */
+            const int64_t ahead = i + ROWS_AHEAD;
+            const hs_cell cell = list->cells.cell[numbers[ahead]];
+            HS_PREFETCH_WRITE(hs_entry_at(&list->entries, cell.start + cell.count));
+            HS_PREFETCH_WRITE(hs_entry_given(&list->entries, cell.start + cell.count));
+            hs_key_map_expect(&list->map, (hs_key){ids[ahead], tags != NULL ? tags[ahead] : 0});
+        }
+        const uint32_t place = are_new ? HS_NO_PLACE
+                                       : hs_key_map_find(&list->map, &list->entries, key);
+        (void)place_row(list, x, i, given, &placed, failure); /* it can be had: number_rows */
         if (place == HS_NO_PLACE) {
-            put_new(list, key, numbers[i], &placed);
+            put_new(list, key, number, &placed);
         } else {
-            const uint32_t number = numbers[i];
             numbers[i] = hs_entry_tail_at(&list->entries, place)->cell;
             put_again(list, key, place, number, &placed);
         }
     }
-    list->keeps_blocks = false;
 }
 
 hs_status
@@ -1013,27 +770,31 @@ hs_update_insert_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags,
     if (n == 0) {
         return HS_OK;
     }
-    if (list->map.n == 0) {
-        const hs_status status = hs_fill(list, ids, tags, n, x, failure);
-        list->changes += status == HS_OK;
-        return status;
+    if (list->map.n == 0) { /* what memory it has may not be where these points are */
+        hs_list_clear(list);
     }
-    hs_status status = rows_reach(list, n, x, failure);
-    if (status != HS_OK) {
-        return status;
+    uint32_t  *numbers = hs_alloc(NULL, HS_FOR_CELLS, n, sizeof *numbers);
+    hs_status  status = numbers != NULL ? number_rows(list, n, x, numbers, failure) : HS_ERR_MEMORY;
+    const bool numbered = status == HS_OK;
+    if (numbered &&
+        !(hs_hash_reserve(&list->map.hash, list->map.n + n) && reserve_cells(list, numbers, n))) {
+        status = HS_ERR_MEMORY;
     }
-    uint32_t *numbers = hs_alloc(NULL, HS_FOR_CELLS, n, sizeof *numbers);
-    if (numbers == NULL || !hs_key_map_reserve(&list->map, list->map.n + n) ||
-        !(list->cells.dense || hs_cell_table_reserve(&list->cells, &list->entries, n))) {
-        hs_free(NULL, numbers);
-        return HS_ERR_MEMORY;
-    }
-    status = reserve_rows(list, n, x, numbers, failure);
     if (status == HS_OK) {
         put_rows(list, ids, tags, n, x, numbers, failure);
         list->changes++;
     }
-    release_empty(list, numbers, n);
+    list->cells.keeps_empty = false;
+    for (int64_t i = 0; numbered && i < n; i++) { /* the blocks of cells that are empty */
+        const uint32_t c = numbers[i];
+        if (list->cells.cell[c].count == 0 && list->cells.size[c] != HS_NO_BLOCK) {
+            hs_entries_give(&list->entries, list->cells.size[c], list->cells.cell[c].start);
+            list->cells.size[c] = HS_NO_BLOCK;
+        }
+    }
+    if (list->map.n == 0) {
+        hs_list_clear(list);
+    }
     hs_free(NULL, numbers);
     return status;
 }

@@ -49,11 +49,8 @@ void hs_gate_release(hs_gate *gate); /* which this thread holds */
 struct hs_dynamic {
     hs_storage storage;
     bool       inclusive;
-    hs_fpenv   held_env;     /* hs_dynamic_hold */
-    bool       keeps_blocks; /* empty cells keep their blocks: others are about to come */
-    double     cell_size, max_radius, grid_bytes;
-    bool       has_box;
-    hs_box     box; /* as given */
+    hs_fpenv   held_env; /* hs_dynamic_hold */
+    double     max_radius;
     hs_lattice lattice;
     double     spread;            /* sum of all |entries| of B */
     double     row_error;         /* sum of the errors of B */
@@ -66,7 +63,7 @@ struct hs_dynamic {
     hs_key_map map;
     hs_cell_table        cells;
     int64_t              n_without; /* entries without a position, whose coordinates are NaN */
-    int64_t              changes;
+    int64_t              changes;   /* from here on nothing is copied to another list */
     hs_gate              gate;
     hs_dynamic_hooks     hooks;
     hs_dynamic_counters *counters; /* borrowed, or NULL */
@@ -161,20 +158,9 @@ hs_dynamic_place_in(const hs_dynamic *list, const double *given, hs_placed *plac
 hs_status hs_dynamic_place(const hs_dynamic *list, const double *given, hs_placed *placed,
                            hs_failure *failure);
 
-/* Many positions, as columns x[k][i] of finite numbers. */
-
-/* Row i made ready. given: receives its numbers, which `placed` borrows. Statuses of
- * hs_dynamic_place, with failure->row. */
-hs_status hs_rows_place(const hs_dynamic *list, double *const *x, int64_t i, double *given,
-                        hs_placed *placed, hs_failure *failure);
-
 /* Lists as a whole: made from options, copied, emptied. */
 
-/* HS_OK, or what is wrong with the options; failure->column as halfshell_dynamic.h says. */
-hs_status hs_list_check(const hs_dynamic_options *options, hs_failure *failure);
-
-/* options: checked. HS_ERR_MEMORY, HS_ERR_BOX_SKEWED, or HS_ERR_CUTOFF when a ball would meet too
- * many images. */
+/* Statuses of hs_dynamic_new. */
 hs_status hs_list_new(const hs_dynamic_options *options, hs_dynamic **list, hs_failure *failure);
 
 void      hs_list_free(hs_dynamic *list);
@@ -184,17 +170,9 @@ void      hs_list_clear(hs_dynamic *list);
 /* On failure the list is as it was. */
 hs_status hs_list_shrink(hs_dynamic *list);
 
-/* Many points into a list that holds none: no key has to be looked up, and each cell has
- * its block from the beginning. */
-
-/* list: empty. ids: n that differ from each other, n > 0; positions are columns x[k][i], finite.
- * Statuses of hs_update_insert_many; on failure the list holds no points. */
-hs_status hs_fill(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n,
-                  double *const *x, hs_failure *failure);
-
 /*
- * Points come, go and move. Each function either does all that it is for, or returns a
- * status and leaves the list as it was, but for memory that waits for the next point.
+ * Points come, go and move. Each function either does all that it is for, or returns a status and
+ * leaves the list as it was, but for memory that waits for the next point.
  */
 
 /* Adds the point or moves it. placed: NULL for a key without a position. */

@@ -8,8 +8,8 @@
 /* storage.c: what a list is stored in: blocks of entries, the map from keys to these, the cells
  * along each axis, and the offsets around a cell. */
 
-/* Blocks by size. Those that are free form a list: the first bytes of each say where the
- * next one is. */
+/* Blocks by size. Those that are free form a list: the first bytes of each say where the next one
+ * is. */
 
 #define FIRST_CAPACITY 16
 #define MOST_ENTRIES   INT64_C(0xFFFFFFF0) /* places are below HS_NO_PLACE */
@@ -112,7 +112,62 @@ hs_entries_bytes(const hs_entries *entries)
 
 /* Rows stand as near behind the one that their mark names as others allow. */
 
-#define LEAST_KEY_ROWS 16
+#define LEAST_HASH_ROWS 16
+
+static void
+hash_free(hs_hash *hash)
+{
+    hs_free(NULL, hash->rows);
+    *hash = (hs_hash){0};
+}
+
+int64_t
+hs_hash_bytes(const hs_hash *hash)
+{
+    return hash->n_rows * (int64_t)sizeof *hash->rows;
+}
+
+/* Adds a row, for which there is room. */
+static void
+hash_put(const hs_hash *hash, hs_hash_row row)
+{
+    int64_t r = row.mark & (uint64_t)(hash->n_rows - 1);
+    while (hash->rows[r].number != HS_NO_NUMBER) {
+        r = (r + 1) & (hash->n_rows - 1);
+    }
+    hash->rows[r] = row;
+}
+
+static void
+hash_clear(const hs_hash *hash)
+{
+    memset(hash->rows, 0xFF, (size_t)hash->n_rows * sizeof *hash->rows);
+}
+
+bool
+hs_hash_reserve(hs_hash *hash, int64_t n)
+{
+    hs_hash larger = {.n_rows = hash->n_rows > 0 ? hash->n_rows : LEAST_HASH_ROWS};
+    while (n > larger.n_rows / 4 * 3) {
+        larger.n_rows *= 2;
+    }
+    if (larger.n_rows == hash->n_rows) {
+        return true;
+    }
+    larger.rows = hs_alloc(NULL, HS_FOR_ORDER, larger.n_rows, sizeof *larger.rows);
+    if (larger.rows == NULL) {
+        return false;
+    }
+    hash_clear(&larger);
+    for (int64_t r = 0; r < hash->n_rows; r++) {
+        if (hash->rows[r].number != HS_NO_NUMBER) {
+            hash_put(&larger, hash->rows[r]);
+        }
+    }
+    hash_free(hash);
+    *hash = larger;
+    return true;
+}
 
 HS_ALWAYS_INLINE bool
 holds(const hs_entries *entries, uint32_t place, hs_key key)
@@ -124,57 +179,22 @@ holds(const hs_entries *entries, uint32_t place, hs_key key)
 void
 hs_key_map_free(hs_key_map *map)
 {
-    hs_free(NULL, map->rows);
-    *map = (hs_key_map){0};
-}
-
-static void
-put_key(hs_key_row *rows, int64_t capacity, hs_key_row row)
-{
-    int64_t r = row.mark & (uint64_t)(capacity - 1);
-    while (rows[r].place != HS_NO_PLACE) {
-        r = (r + 1) & (capacity - 1);
-    }
-    rows[r] = row;
-}
-
-bool
-hs_key_map_reserve(hs_key_map *map, int64_t n)
-{
-    int64_t capacity = map->capacity > 0 ? map->capacity : LEAST_KEY_ROWS;
-    while (n > capacity / 4 * 3) {
-        capacity *= 2;
-    }
-    if (capacity == map->capacity) {
-        return true;
-    }
-    hs_key_row *rows = hs_alloc(NULL, HS_FOR_ORDER, capacity, sizeof *rows);
-    if (rows == NULL) {
-        return false;
-    }
-    memset(rows, 0xFF, (size_t)capacity * sizeof *rows);
-    for (int64_t r = 0; r < map->capacity; r++) {
-        if (map->rows[r].place != HS_NO_PLACE) {
-            put_key(rows, capacity, map->rows[r]);
-        }
-    }
-    hs_free(NULL, map->rows);
-    map->rows = rows;
-    map->capacity = capacity;
-    return true;
+    hash_free(&map->hash);
+    map->n = 0;
 }
 
 uint32_t
 hs_key_map_find(const hs_key_map *map, const hs_entries *entries, hs_key key)
 {
     const uint32_t mark = hs_key_mark(key);
+    const int64_t  last = map->hash.n_rows - 1;
     if (map->n == 0) {
         return HS_NO_PLACE;
     }
-    for (int64_t r = mark & (uint64_t)(map->capacity - 1);; r = (r + 1) & (map->capacity - 1)) {
-        const hs_key_row row = map->rows[r];
-        if (row.place == HS_NO_PLACE || (row.mark == mark && holds(entries, row.place, key))) {
-            return row.place;
+    for (int64_t r = mark & (uint64_t)last;; r = (r + 1) & last) {
+        const hs_hash_row row = map->hash.rows[r];
+        if (row.number == HS_NO_NUMBER || (row.mark == mark && holds(entries, row.number, key))) {
+            return row.number;
         }
     }
 }
@@ -182,13 +202,13 @@ hs_key_map_find(const hs_key_map *map, const hs_entries *entries, hs_key key)
 void
 hs_key_map_expect(const hs_key_map *map, hs_key key)
 {
-    HS_PREFETCH_WRITE(&map->rows[hs_key_mark(key) & (uint64_t)(map->capacity - 1)]);
+    HS_PREFETCH_WRITE(&map->hash.rows[hs_key_mark(key) & (uint64_t)(map->hash.n_rows - 1)]);
 }
 
 void
 hs_key_map_add(hs_key_map *map, hs_key key, uint32_t place)
 {
-    put_key(map->rows, map->capacity, (hs_key_row){place, hs_key_mark(key)});
+    hash_put(&map->hash, (hs_hash_row){place, hs_key_mark(key)});
     map->n++;
 }
 
@@ -196,9 +216,9 @@ hs_key_map_add(hs_key_map *map, hs_key key, uint32_t place)
 static int64_t
 row_of(const hs_key_map *map, hs_key key, uint32_t place)
 {
-    int64_t r = hs_key_mark(key) & (uint64_t)(map->capacity - 1);
-    while (map->rows[r].place != place) {
-        r = (r + 1) & (map->capacity - 1);
+    int64_t r = hs_key_mark(key) & (uint64_t)(map->hash.n_rows - 1);
+    while (map->hash.rows[r].number != place) {
+        r = (r + 1) & (map->hash.n_rows - 1);
     }
     return r;
 }
@@ -206,72 +226,56 @@ row_of(const hs_key_map *map, hs_key key, uint32_t place)
 void
 hs_key_map_moved(hs_key_map *map, hs_key key, uint32_t from, uint32_t to)
 {
-    map->rows[row_of(map, key, from)].place = to;
+    map->hash.rows[row_of(map, key, from)].number = to;
 }
 
 void
 hs_key_map_remove(hs_key_map *map, hs_key key, uint32_t place)
 {
-    const int64_t last = map->capacity - 1;
-    int64_t       gap = row_of(map, key, place);
-    for (int64_t r = (gap + 1) & last; map->rows[r].place != HS_NO_PLACE; r = (r + 1) & last) {
-        const int64_t home = map->rows[r].mark & (uint64_t)last;
+    hs_hash_row *const rows = map->hash.rows;
+    const int64_t      last = map->hash.n_rows - 1;
+    int64_t            gap = row_of(map, key, place);
+    for (int64_t r = (gap + 1) & last; rows[r].number != HS_NO_NUMBER; r = (r + 1) & last) {
+        const int64_t home = rows[r].mark & (uint64_t)last;
         if (((r - home) & last) >= ((r - gap) & last)) { /* it may stand in the gap */
-            map->rows[gap] = map->rows[r];
+            rows[gap] = rows[r];
             gap = r;
         }
     }
-    map->rows[gap].place = HS_NO_PLACE;
+    rows[gap].number = HS_NO_NUMBER;
     map->n--;
-}
-
-/* Ascending keys are compared in turn; others are put into a table one by one. */
-
-#define LEAST_SEEN_ROWS 16
-
-/* Whether each key is above the one before: then none is repeated, which no table is needed to see.
- */
-static bool
-ascend(const int64_t *ids, const int32_t *tags, int64_t n)
-{
-    bool all = true;
-    for (int64_t i = 1; i < n && all; i++) {
-        all = ids[i] > ids[i - 1] ||
-              (ids[i] == ids[i - 1] && tags != NULL && tags[i] > tags[i - 1]);
-    }
-    return all;
 }
 
 int64_t
 hs_repeated_key(const int64_t *ids, const int32_t *tags, int64_t n)
 {
-    int64_t capacity = LEAST_SEEN_ROWS, repeated = -1;
-    if (ascend(ids, tags, n)) {
+    hs_hash seen = {0};
+    int64_t repeated = -1, i = 1;
+    while (i < n && (ids[i] > ids[i - 1] ||
+                     (ids[i] == ids[i - 1] && tags != NULL && tags[i] > tags[i - 1]))) {
+        i++;
+    }
+    if (i >= n) { /* each key is above the one before: no table is needed */
         return -1;
     }
-    while (n > capacity / 2) {
-        capacity *= 2;
-    }
-    hs_key_row *rows = hs_alloc(NULL, HS_FOR_ORDER, capacity, sizeof *rows);
-    if (rows == NULL) {
+    if (!hs_hash_reserve(&seen, n)) {
         return -2;
     }
-    memset(rows, 0xFF, (size_t)capacity * sizeof *rows);
-    for (int64_t i = 0; i < n && repeated < 0; i++) {
+    for (i = 0; i < n && repeated < 0; i++) {
         const hs_key   key = {ids[i], tags != NULL ? tags[i] : 0};
         const uint32_t mark = hs_key_mark(key);
-        int64_t        r = mark & (uint64_t)(capacity - 1);
-        for (; rows[r].place != HS_NO_PLACE; r = (r + 1) & (capacity - 1)) {
-            const uint32_t other = rows[r].place;
-            if (rows[r].mark == mark && ids[other] == key.id &&
+        int64_t        r = mark & (uint64_t)(seen.n_rows - 1);
+        for (; seen.rows[r].number != HS_NO_NUMBER; r = (r + 1) & (seen.n_rows - 1)) {
+            const uint32_t other = seen.rows[r].number;
+            if (seen.rows[r].mark == mark && ids[other] == key.id &&
                 (tags == NULL || tags[other] == key.tag)) {
                 repeated = i;
                 break;
             }
         }
-        rows[r] = (hs_key_row){(uint32_t)i, mark};
+        seen.rows[r] = (hs_hash_row){(uint32_t)i, mark};
     }
-    hs_free(NULL, rows);
+    hash_free(&seen);
     return repeated;
 }
 
@@ -281,16 +285,6 @@ hs_repeated_key(const int64_t *ids, const int32_t *tags, int64_t n)
 
 /* Wrapped points are so many rows away at most, where they are far along open axes. */
 #define ROWS_AWAY 16
-
-bool
-hs_moves_column(const hs_lattice *lattice, int c)
-{
-    bool moves = false;
-    for (int l = 0; l < lattice->n_periodic; l++) {
-        moves = moves || lattice->given[l][c] != 0.0;
-    }
-    return moves;
-}
 
 /*
  * By how much the images of a ball may miss whole periods along axis k: a row of B that should not
@@ -345,7 +339,6 @@ hs_axes_init(hs_axes *axes, const hs_lattice *lattice, double cell_size, bool on
              double max_radius)
 {
     axes->ndim = lattice->ndim;
-    axes->aligned = lattice->aligned;
     for (int k = 0; k < lattice->ndim; k++) {
         hs_axis *axis = &axes->axis[k];
         *axis = (hs_axis){.row = lattice->row_of_axis[k]};
@@ -395,38 +388,21 @@ hs_axis_images(const hs_axis *axis, double low, double high, double error, hs_sp
     span->last = span->most * axis->n + hs_axis_cell(axis, last + slack);
 }
 
-/* Sparse tables keep the numbers of their cells when they grow, and close the
- * gaps when they drop empty ones. */
+/* Sparse tables keep the numbers of their cells when they grow, and close the gaps when they drop
+ * empty ones. */
 
-#define LEAST_CELL_ROWS 16
+#define MORE_CELLS       16 /* than half as many again, when a table grows */
+#define DENSE_CELL_BYTES (sizeof(hs_cell) + sizeof(uint8_t)) /* of a cell of a dense table */
 
-static uint32_t
-mark_of(const hs_cell_table *table, uint32_t cell)
+/* Adds the row of a cell, for which there is room. */
+static void
+put_cell(const hs_cell_table *table, int64_t cell)
 {
     uint64_t sum = 0;
     for (int k = 0; k < table->ndim; k++) {
-        sum += hs_cell_part(k, table->index[(int64_t)cell * table->ndim + k]);
+        sum += hs_cell_part(k, table->index[cell * table->ndim + k]);
     }
-    return hs_cell_mark(sum);
-}
-
-static void
-put_cell(hs_cell_row *rows, int64_t n_rows, uint32_t cell, uint32_t mark)
-{
-    int64_t r = mark & (uint64_t)(n_rows - 1);
-    while (rows[r].cell != HS_NO_CELL) {
-        r = (r + 1) & (n_rows - 1);
-    }
-    rows[r] = (hs_cell_row){cell, mark};
-}
-
-static void
-put_all(const hs_cell_table *table, hs_cell_row *rows, int64_t n_rows)
-{
-    memset(rows, 0xFF, (size_t)n_rows * sizeof *rows);
-    for (int64_t c = 0; c < table->n; c++) {
-        put_cell(rows, n_rows, (uint32_t)c, mark_of(table, (uint32_t)c));
-    }
+    hash_put(&table->hash, (hs_hash_row){(uint32_t)cell, hs_cell_mark(sum)});
 }
 
 /* Empty cells are dropped; those behind them get lower numbers. */
@@ -435,6 +411,7 @@ drop_empty(hs_cell_table *table, hs_entries *entries)
 {
     const size_t width = (size_t)table->ndim * sizeof *table->index;
     int64_t      n = 0;
+    hash_clear(&table->hash);
     for (int64_t c = 0; c < table->n; c++) {
         if (table->cell[c].count == 0) {
             if (table->size[c] != HS_NO_BLOCK) {
@@ -448,101 +425,69 @@ drop_empty(hs_cell_table *table, hs_entries *entries)
         table->cell[n] = table->cell[c];
         table->size[n] = table->size[c];
         memmove(table->index + n * table->ndim, table->index + c * table->ndim, width);
-        n++;
+        put_cell(table, n++);
     }
     table->n = n;
     table->n_empty = 0;
-    put_all(table, table->rows, table->n_rows);
 }
 
-static void
-free_arrays(const hs_cell_table *table)
-{
-    hs_free(NULL, table->cell);
-    hs_free(NULL, table->size);
-    hs_free(NULL, table->index);
-    hs_free(NULL, table->rows);
-}
-
-/* Room for `capacity` cells and rows for them; on failure all is as it was. */
+/* Room for `capacity` cells and rows for them; on failure some arrays are larger than they must
+ * be. */
 static bool
 grow(hs_cell_table *table, int64_t capacity)
 {
-    int64_t n_rows = table->n_rows > 0 ? table->n_rows : LEAST_CELL_ROWS;
-    while (capacity > n_rows / 4 * 3) {
-        n_rows *= 2;
+    hs_cell *cell = NULL;
+    uint8_t *size = NULL;
+    int32_t *index = NULL;
+    if (hs_hash_reserve(&table->hash, capacity)) {
+        cell = hs_grow(NULL, HS_FOR_CELLS, table->cell, table->n, capacity, sizeof *cell);
     }
-    hs_cell     *cell = hs_alloc(NULL, HS_FOR_CELLS, capacity, sizeof *cell);
-    uint8_t     *size = hs_alloc(NULL, HS_FOR_CELLS, capacity, sizeof *size);
-    int32_t     *index = hs_alloc(NULL, HS_FOR_CELLS, capacity, table->ndim * sizeof *index);
-    hs_cell_row *rows = hs_alloc(NULL, HS_FOR_CELLS, n_rows, sizeof *rows);
-    if (cell == NULL || size == NULL || index == NULL || rows == NULL) {
-        hs_free(NULL, cell);
-        hs_free(NULL, size);
-        hs_free(NULL, index);
-        hs_free(NULL, rows);
-        return false;
+    if (cell != NULL) {
+        table->cell = cell;
+        size = hs_grow(NULL, HS_FOR_CELLS, table->size, table->n, capacity, sizeof *size);
     }
-    if (table->n > 0) {
-        memcpy(cell, table->cell, (size_t)table->n * sizeof *cell);
-        memcpy(size, table->size, (size_t)table->n * sizeof *size);
-        memcpy(index, table->index, (size_t)(table->n * table->ndim) * sizeof *index);
+    if (size != NULL) {
+        table->size = size;
+        index = hs_grow(NULL, HS_FOR_CELLS, table->index, table->n, capacity,
+                        table->ndim * sizeof *index);
     }
-    free_arrays(table);
-    table->cell = cell;
-    table->size = size;
-    table->index = index;
-    table->rows = rows;
-    table->n_rows = n_rows;
-    table->capacity = capacity;
-    put_all(table, rows, n_rows);
-    return true;
+    if (index != NULL) {
+        table->index = index;
+        table->capacity = capacity;
+    }
+    return index != NULL;
 }
 
-bool
-hs_cell_table_reserve(hs_cell_table *table, hs_entries *entries, int64_t more)
+static hs_status
+reserve_sparse(hs_cell_table *table, hs_entries *entries, int64_t more)
 {
     if (table->n + more <= table->capacity) {
-        return true;
+        return HS_OK;
     }
-    if (table->n_empty >= table->n / 2 && table->n_empty > 0) {
+    if (table->n_empty >= table->n / 2 && table->n_empty > 0 && !table->keeps_empty) {
         drop_empty(table, entries);
     }
-    int64_t capacity = table->n + table->n / 2 + LEAST_CELL_ROWS;
+    int64_t capacity = table->n + table->n / 2 + MORE_CELLS;
     capacity = capacity < table->n + more ? table->n + more : capacity;
     if (table->n + more <= table->capacity ||
         (capacity < (int64_t)HS_NO_CELL && grow(table, capacity))) {
-        return true;
+        return HS_OK;
     }
-    if (table->n_empty > 0) {
+    if (table->n_empty > 0 && !table->keeps_empty) {
         drop_empty(table, entries);
     }
-    return table->n + more <= table->capacity;
-}
-
-/* Sparse: adds a cell that is not there, for which there is room. */
-static uint32_t
-cell_table_append(hs_cell_table *table, const int64_t *index)
-{
-    const uint32_t cell = (uint32_t)table->n++;
-    table->n_empty++;
-    table->cell[cell] = (hs_cell){0, 0};
-    table->size[cell] = HS_NO_BLOCK;
-    for (int k = 0; k < table->ndim; k++) {
-        table->index[(int64_t)cell * table->ndim + k] = (int32_t)(uint32_t)index[k];
-    }
-    put_cell(table->rows, table->n_rows, cell, mark_of(table, cell));
-    return cell;
+    return table->n + more <= table->capacity ? HS_OK : HS_ERR_MEMORY;
 }
 
 /* Cells are found, in either kind of table. */
 
 void
-hs_cell_table_init(hs_cell_table *table, const hs_axes *axes, bool dense)
+hs_cell_table_init(hs_cell_table *table, const hs_axes *axes, bool dense, double most_bytes)
 {
     memset(table, 0, sizeof *table);
     table->dense = dense;
     table->ndim = axes->ndim;
+    table->most_bytes = most_bytes;
     for (int k = 0; k < axes->ndim; k++) {
         table->shape[k] = axes->axis[k].n; /* 0: none yet, along open axes */
     }
@@ -551,52 +496,59 @@ hs_cell_table_init(hs_cell_table *table, const hs_axes *axes, bool dense)
 void
 hs_cell_table_free(hs_cell_table *table)
 {
-    free_arrays(table);
+    hs_free(NULL, table->cell);
+    hs_free(NULL, table->size);
+    hs_free(NULL, table->index);
+    hash_free(&table->hash);
     table->cell = NULL;
     table->size = NULL;
     table->index = NULL;
-    table->rows = NULL;
-    table->n = table->capacity = table->n_rows = table->n_empty = 0;
-}
-
-static uint32_t
-find_dense(const hs_cell_table *table, const int64_t *index)
-{
-    int64_t number = 0;
-    for (int k = 0; k < table->ndim; k++) {
-        const int64_t along = index[k] - table->lowest[k];
-        if (along < 0 || along >= table->shape[k]) {
-            return HS_NO_CELL;
-        }
-        number += along * table->stride[k];
-    }
-    return table->n > 0 ? (uint32_t)number : HS_NO_CELL;
+    table->n = table->capacity = table->n_empty = 0;
 }
 
 uint32_t
 hs_cell_table_find(const hs_cell_table *table, const int64_t *index)
 {
     uint64_t sum = 0;
-    if (table->dense) {
-        return find_dense(table, index);
-    }
     for (int k = 0; k < table->ndim; k++) {
-        sum += hs_cell_part(k, index[k]);
+        if (table->dense) {
+            const int64_t along = index[k] - table->lowest[k];
+            if (table->n == 0 || along < 0 || along >= table->shape[k]) {
+                return HS_NO_CELL;
+            }
+            sum += (uint64_t)(along * table->stride[k]);
+        } else {
+            sum += hs_cell_part(k, index[k]);
+        }
     }
-    return hs_cell_table_probe(table, index, hs_cell_mark(sum));
+    return table->dense ? (uint32_t)sum : hs_cell_table_probe(table, index, hs_cell_mark(sum));
 }
 
-uint32_t
-hs_cell_table_add(hs_cell_table *table, hs_entries *entries, const int64_t *index)
+hs_status
+hs_cell_table_add(hs_cell_table *table, hs_entries *entries, const int64_t *index, uint32_t *number,
+                  hs_failure *failure)
 {
-    const uint32_t found = hs_cell_table_find(table, index);
-    for (int k = 0; k < table->ndim; k++) {
+    *number = hs_cell_table_find(table, index);
+    for (int k = 0; k < table->ndim && !table->dense; k++) {
         table->is_wide = table->is_wide || index[k] < INT32_MIN || index[k] > INT32_MAX;
     }
-    if (found != HS_NO_CELL || table->dense) {
-        return found;
+    if (*number != HS_NO_CELL) {
+        return HS_OK;
     }
-    return hs_cell_table_reserve(table, entries, 1) ? cell_table_append(table, index) : HS_NO_CELL;
+    const hs_status status = hs_cell_table_reserve(table, entries, index, index, 1, failure);
+    if (status == HS_OK && table->dense) {
+        *number = hs_cell_table_find(table, index);
+    } else if (status == HS_OK) {
+        *number = (uint32_t)table->n++;
+        table->n_empty++;
+        table->cell[*number] = (hs_cell){0, 0};
+        table->size[*number] = HS_NO_BLOCK;
+        for (int k = 0; k < table->ndim; k++) {
+            table->index[(int64_t)*number * table->ndim + k] = (int32_t)(uint32_t)index[k];
+        }
+        put_cell(table, *number);
+    }
+    return status;
 }
 
 void
@@ -616,121 +568,98 @@ hs_cell_table_index(const hs_cell_table *table, uint32_t cell, int64_t *index)
 int64_t
 hs_cell_table_bytes(const hs_cell_table *table)
 {
-    int64_t bytes = table->capacity * (int64_t)HS_DENSE_CELL_BYTES;
-    if (!table->dense) {
-        bytes += table->capacity * table->ndim * (int64_t)sizeof *table->index +
-                 table->n_rows * (int64_t)sizeof *table->rows;
-    }
-    return bytes;
+    const size_t of_index = table->dense ? 0 : (size_t)table->ndim * sizeof *table->index;
+    return table->capacity * (int64_t)(DENSE_CELL_BYTES + of_index) + hs_hash_bytes(&table->hash);
 }
 
 /* Dense tables reach farther by being copied into larger ones. */
 
 #define MOST_DENSE_CELLS 0x1p31
 
-/* The number of cells, and how far one along each axis is from the next. */
+/* The shape that holds the present range along each axis and that from `first` to `last`, grown by
+ * half of the present one where it grows at all, or `tight`; returns the number of cells. Periodic
+ * axes have their range from the beginning. */
 static double
-set_strides(const int64_t *shape, int ndim, int64_t *stride)
+join(const hs_cell_table *table, const int64_t *first, const int64_t *last, bool tight,
+     hs_cell_table *larger)
 {
     double n = 1.0;
-    for (int k = ndim - 1; k >= 0; k--) { /* the last axis fastest */
-        stride[k] = n < MOST_DENSE_CELLS ? (int64_t)n : 0;
-        n *= (double)shape[k];
+    for (int k = table->ndim - 1; k >= 0; k--) { /* the last axis fastest */
+        const int64_t more = tight ? 0 : table->shape[k] / 2;
+        int64_t       low = first[k], high = last[k];
+        if (table->shape[k] > 0) {
+            low = table->lowest[k];
+            high = low + table->shape[k] - 1;
+            low = first[k] < low ? first[k] - more : low;
+            high = last[k] > high ? last[k] + more : high;
+        }
+        larger->lowest[k] = low;
+        larger->shape[k] = high - low + 1;
+        larger->stride[k] = n < MOST_DENSE_CELLS ? (int64_t)n : 0;
+        n *= (double)larger->shape[k];
     }
     return n;
 }
 
-/* The range along an axis that holds both, grown by half of the present one where it grows at all.
- * Periodic axes have theirs from the beginning. */
+/* Moves the cells of a dense table to their places in a larger one. */
 static void
-join(const hs_cell_table *table, int k, int64_t first, int64_t last, bool generous, int64_t *lowest,
-     int64_t *shape)
-{
-    const int64_t more = generous ? table->shape[k] / 2 : 0;
-    int64_t       low = first, high = last;
-    if (table->shape[k] > 0) {
-        low = table->lowest[k];
-        high = low + table->shape[k] - 1;
-        low = first < low ? first - more : low;
-        high = last > high ? last + more : high;
-    }
-    *lowest = low;
-    *shape = high - low + 1;
-}
-
-/* Moves the old cells to their places in the new ones. */
-static void
-transfer(hs_cell_table *table, hs_entries *entries, const int64_t *lowest, const int64_t *stride,
-         hs_cell *cell, uint8_t *size)
+transfer(const hs_cell_table *table, hs_entries *entries, const hs_cell_table *larger)
 {
     for (int64_t c = 0; c < table->n; c++) {
-        int64_t index[HS_MAX_DIM], number = 0;
+        int64_t index[HS_MAX_DIM];
         if (table->size[c] == HS_NO_BLOCK) {
             continue;
         }
         hs_cell_table_index(table, (uint32_t)c, index);
-        for (int k = 0; k < table->ndim; k++) {
-            number += (index[k] - lowest[k]) * stride[k];
-        }
-        cell[number] = table->cell[c];
-        size[number] = table->size[c];
-        for (uint32_t e = 0; e < cell[number].count; e++) {
-            hs_entry_tail_at(entries, cell[number].start + e)->cell = (uint32_t)number;
+        const uint32_t number = hs_cell_table_find(larger, index);
+        larger->cell[number] = table->cell[c];
+        larger->size[number] = table->size[c];
+        for (uint32_t e = 0; e < table->cell[c].count; e++) {
+            hs_entry_tail_at(entries, table->cell[c].start + e)->cell = number;
         }
     }
 }
 
-/* Whether the table reaches from `first` to `last` as it is. */
-static bool
-reaches(const hs_cell_table *table, const int64_t *first, const int64_t *last)
+static hs_status
+reserve_dense(hs_cell_table *table, hs_entries *entries, const int64_t *first, const int64_t *last,
+              hs_failure *failure)
 {
-    bool all = table->n > 0;
-    for (int k = 0; k < table->ndim; k++) {
-        all = all && first[k] >= table->lowest[k] && last[k] < table->lowest[k] + table->shape[k];
+    hs_cell_table larger = *table;
+    if (hs_cell_table_find(table, first) != HS_NO_CELL &&
+        hs_cell_table_find(table, last) != HS_NO_CELL) {
+        return HS_OK;
     }
-    return all;
+    double n = join(table, first, last, false, &larger);
+    if (!(n < MOST_DENSE_CELLS && n * DENSE_CELL_BYTES <= table->most_bytes)) {
+        n = join(table, first, last, true, &larger);
+    }
+    if (!(n < MOST_DENSE_CELLS && n * DENSE_CELL_BYTES <= table->most_bytes)) {
+        failure->expected_bytes = n * DENSE_CELL_BYTES;
+        failure->limit_bytes = table->most_bytes;
+        return HS_ERR_CAPACITY;
+    }
+    larger.n = larger.capacity = (int64_t)n;
+    larger.cell = hs_alloc(NULL, HS_FOR_CELLS, larger.n, sizeof *larger.cell);
+    larger.size = hs_alloc(NULL, HS_FOR_CELLS, larger.n, sizeof *larger.size);
+    if (larger.cell == NULL || larger.size == NULL) {
+        hs_free(NULL, larger.cell);
+        hs_free(NULL, larger.size);
+        return HS_ERR_MEMORY;
+    }
+    memset(larger.cell, 0, (size_t)n * sizeof *larger.cell);
+    memset(larger.size, HS_NO_BLOCK, (size_t)n * sizeof *larger.size);
+    transfer(table, entries, &larger);
+    hs_cell_table_free(table);
+    *table = larger;
+    return HS_OK;
 }
 
 hs_status
-hs_cell_table_extend(hs_cell_table *table, hs_entries *entries, const int64_t *first,
-                     const int64_t *last, double most, double *bytes)
+hs_cell_table_reserve(hs_cell_table *table, hs_entries *entries, const int64_t *first,
+                      const int64_t *last, int64_t more, hs_failure *failure)
 {
-    int64_t lowest[HS_MAX_DIM], shape[HS_MAX_DIM], stride[HS_MAX_DIM];
-    double  n = 0.0;
-    if (reaches(table, first, last)) {
-        return HS_OK;
-    }
-    for (int generous = 1; generous >= 0; generous--) {
-        for (int k = 0; k < table->ndim; k++) {
-            join(table, k, first[k], last[k], generous == 1, &lowest[k], &shape[k]);
-        }
-        n = set_strides(shape, table->ndim, stride);
-        if (n < MOST_DENSE_CELLS && n * HS_DENSE_CELL_BYTES <= most) {
-            break;
-        }
-    }
-    *bytes = n * HS_DENSE_CELL_BYTES;
-    if (!(n < MOST_DENSE_CELLS && *bytes <= most)) {
-        return HS_ERR_CAPACITY;
-    }
-    hs_cell *cell = hs_alloc(NULL, HS_FOR_CELLS, (int64_t)n, sizeof *cell);
-    uint8_t *size = cell == NULL ? NULL : hs_alloc(NULL, HS_FOR_CELLS, (int64_t)n, sizeof *size);
-    if (size == NULL) {
-        hs_free(NULL, cell);
-        return HS_ERR_MEMORY;
-    }
-    memset(cell, 0, (size_t)n * sizeof *cell);
-    memset(size, HS_NO_BLOCK, (size_t)n * sizeof *size);
-    transfer(table, entries, lowest, stride, cell, size);
-    hs_free(NULL, table->cell);
-    hs_free(NULL, table->size);
-    table->cell = cell;
-    table->size = size;
-    table->n = table->capacity = (int64_t)n;
-    memcpy(table->lowest, lowest, sizeof lowest);
-    memcpy(table->shape, shape, sizeof shape);
-    memcpy(table->stride, stride, sizeof stride);
-    return HS_OK;
+    return table->dense ? reserve_dense(table, entries, first, last, failure)
+                        : reserve_sparse(table, entries, more);
 }
 
 /* The cube of offsets, sorted once when the list is made. */
@@ -754,30 +683,6 @@ compare(const void *one, const void *other)
     return memcmp(a->slot, b->slot, HS_MAX_DIM);
 }
 
-/* Cells to a side that a ball of this radius may reach, and one more for rounding. */
-static double
-reach_of(const hs_axes *axes, double max_radius)
-{
-    double reach = 0.0;
-    for (int k = 0; k < axes->ndim; k++) {
-        const hs_axis *axis = &axes->axis[k];
-        if (isfinite(axis->width)) {
-            reach = hs_larger(ceil(max_radius / axis->width) + 1.0, reach);
-        }
-    }
-    return reach;
-}
-
-static double
-count_of(int reach, int ndim)
-{
-    double n = 1.0;
-    for (int k = 0; k < ndim; k++) {
-        n *= 2 * reach + 1;
-    }
-    return n;
-}
-
 /* Distances in units of the widest cell, so that their squares are ordinary numbers. In skewed
  * boxes the least distance is the sum of squares of those between faces: an order, not a bound. */
 static void
@@ -799,26 +704,25 @@ measure(const hs_axes *axes, const hs_lattice *lattice, double unit, item *of)
     }
 }
 
+/* The offsets of the list of this reach, in order; `unit` is the widest cell's width. */
 static void
-fill(const hs_axes *axes, const hs_lattice *lattice, int reach, item *items, hs_offset_list *list)
+fill(const hs_axes *axes, const hs_lattice *lattice, double unit, int reach, item *items,
+     const hs_offsets *offsets)
 {
-    const int d = axes->ndim, side = 2 * reach + 1;
-    double    unit = 0.0;
-    for (int k = 0; k < d; k++) {
-        unit = hs_larger(isfinite(axes->axis[k].width) ? axes->axis[k].width : 0.0, unit);
-    }
-    for (int64_t n = 0; n < list->n; n++) {
-        int64_t rest = n;
-        memset(items[n].slot, 0, sizeof items[n].slot);
+    const int     d = axes->ndim, side = 2 * reach + 1;
+    const int64_t n = offsets->n[reach];
+    for (int64_t i = 0; i < n; i++) {
+        int64_t rest = i;
+        memset(items[i].slot, 0, sizeof items[i].slot);
         for (int k = d - 1; k >= 0; k--) {
-            items[n].slot[k] = (uint8_t)(rest % side + HS_MOST_REACH - reach);
+            items[i].slot[k] = (uint8_t)(rest % side + HS_MOST_REACH - reach);
             rest /= side;
         }
-        measure(axes, lattice, unit > 0.0 ? unit : 1.0, &items[n]);
+        measure(axes, lattice, unit, &items[i]);
     }
-    qsort(items, (size_t)list->n, sizeof *items, compare);
-    for (int64_t n = 0; n < list->n; n++) {
-        memcpy(list->slot + n * d, items[n].slot, (size_t)d);
+    qsort(items, (size_t)n, sizeof *items, compare);
+    for (int64_t i = 0; i < n; i++) {
+        memcpy(offsets->slot + offsets->at[reach] + i * d, items[i].slot, (size_t)d);
     }
 }
 
@@ -826,39 +730,54 @@ bool
 hs_offsets_init(hs_offsets *offsets, const hs_axes *axes, const hs_lattice *lattice,
                 double max_radius)
 {
-    const double needed = reach_of(axes, max_radius);
-    int64_t      total = 0;
+    double needed = 0.0, unit = 0.0; /* cells to a side, and one more for rounding; widest cell */
     memset(offsets, 0, sizeof *offsets);
+    for (int k = 0; k < axes->ndim; k++) {
+        if (isfinite(axes->axis[k].width)) {
+            needed = hs_larger(ceil(max_radius / axes->axis[k].width) + 1.0, needed);
+            unit = hs_larger(axes->axis[k].width, unit);
+        }
+    }
     for (int r = 0; r <= HS_MOST_REACH && r <= needed; r++) {
-        const double n = count_of(r, axes->ndim);
+        double n = 1.0;
+        for (int k = 0; k < axes->ndim; k++) {
+            n *= 2 * r + 1;
+        }
         if (n > HS_MOST_OFFSETS) {
             break;
         }
         offsets->reach = r;
-        offsets->list[r].n = (int64_t)n;
-        total += (int64_t)n * axes->ndim;
+        offsets->n[r] = (int64_t)n;
+        offsets->at[r + 1] = offsets->at[r] + (int64_t)n * axes->ndim;
     }
-    offsets->data = hs_alloc(NULL, HS_FOR_STENCIL, total, 1);
-    item *items = hs_alloc(NULL, HS_FOR_STENCIL, offsets->list[offsets->reach].n, sizeof *items);
-    if (offsets->data == NULL || items == NULL) {
-        hs_free(NULL, items);
-        hs_offsets_free(offsets);
-        return false;
-    }
-    offsets->bytes = total;
-    total = 0;
-    for (int r = 0; r <= offsets->reach; r++) {
-        offsets->list[r].slot = offsets->data + total;
-        fill(axes, lattice, r, items, &offsets->list[r]);
-        total += offsets->list[r].n * axes->ndim;
+    const int last = offsets->reach;
+    offsets->slot = hs_alloc(NULL, HS_FOR_STENCIL, offsets->at[last + 1], 1);
+    item *items = hs_alloc(NULL, HS_FOR_STENCIL, offsets->n[last], sizeof *items);
+    for (int r = 0; r <= last && offsets->slot != NULL && items != NULL; r++) {
+        fill(axes, lattice, unit > 0.0 ? unit : 1.0, r, items, offsets);
     }
     hs_free(NULL, items);
-    return true;
+    if (items == NULL) {
+        hs_offsets_free(offsets);
+    }
+    return offsets->slot != NULL;
+}
+
+bool
+hs_offsets_copy(const hs_offsets *offsets, hs_offsets *copy)
+{
+    const int64_t bytes = offsets->at[offsets->reach + 1];
+    *copy = *offsets;
+    copy->slot = hs_alloc(NULL, HS_FOR_STENCIL, bytes, 1);
+    if (copy->slot != NULL) {
+        memcpy(copy->slot, offsets->slot, (size_t)bytes);
+    }
+    return copy->slot != NULL;
 }
 
 void
 hs_offsets_free(hs_offsets *offsets)
 {
-    hs_free(NULL, offsets->data);
-    offsets->data = NULL;
+    hs_free(NULL, offsets->slot);
+    offsets->slot = NULL;
 }

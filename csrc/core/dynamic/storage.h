@@ -78,20 +78,32 @@ void hs_entries_copy(const hs_entries *source, uint32_t from, hs_entries *entrie
 int64_t hs_entries_bytes(const hs_entries *entries);
 
 /*
- * From a key to the place of its entry. Open addressing with linear probing: a row holds
- * a place and 32 bits of the key's hash, which say where the row belongs; the key itself is in the
- * entry. Removal closes the gap, so that no row is ever wasted on keys that are gone.
+ * From what has a hash to a number. Open addressing with linear probing: a row holds the number and
+ * 32 bits of the hash, its mark, which say where the row belongs; what was hashed is looked up by
+ * the number.
  */
 
-typedef struct hs_key_row {
-    uint32_t place; /* HS_NO_PLACE: no key */
-    uint32_t mark;
-} hs_key_row;
+#define HS_NO_NUMBER UINT32_MAX
 
+typedef struct hs_hash_row {
+    uint32_t number; /* HS_NO_NUMBER: the row is free */
+    uint32_t mark;
+} hs_hash_row;
+
+typedef struct hs_hash {
+    hs_hash_row *rows;   /* owned */
+    int64_t      n_rows; /* 0, or a power of two; at most three quarters are in use */
+} hs_hash;
+
+/* Room for n numbers in all; false when memory is refused: then nothing has changed. */
+bool    hs_hash_reserve(hs_hash *hash, int64_t n);
+int64_t hs_hash_bytes(const hs_hash *hash);
+
+/* From a key to the place of its entry, which holds the key itself. Removal closes the gap, so that
+ * no row is ever wasted on keys that are gone. */
 typedef struct hs_key_map {
-    hs_key_row *rows;     /* owned; capacity of them */
-    int64_t     n;        /* keys */
-    int64_t     capacity; /* 0, or a power of two; at most three quarters are in use */
+    hs_hash hash; /* numbers are places */
+    int64_t n;    /* keys */
 } hs_key_map;
 
 /* Bits of a key in which each depends on all of it: the finaliser of SplitMix64 (Steele, Lea and
@@ -107,16 +119,13 @@ hs_key_mark(hs_key key)
 
 void hs_key_map_free(hs_key_map *map);
 
-/* Room for so many keys in all; false when memory is refused: then nothing has changed. */
-bool hs_key_map_reserve(hs_key_map *map, int64_t n);
-
 /* The place of a key's entry, or HS_NO_PLACE. */
 uint32_t hs_key_map_find(const hs_key_map *map, const hs_entries *entries, hs_key key);
 
 /* A key is about to be added. */
 void hs_key_map_expect(const hs_key_map *map, hs_key key);
 
-/* Adds a key that is not there; hs_key_map_reserve has made room. */
+/* Adds a key that is not there; hs_hash_reserve has made room. */
 void hs_key_map_add(hs_key_map *map, hs_key key, uint32_t place);
 
 /* The entry of a key was at `from`, and is at `to` now. */
@@ -159,7 +168,6 @@ typedef struct hs_axis {
 
 typedef struct hs_axes {
     int     ndim;
-    bool    aligned; /* coordinates along the axes are those of points, and exact */
     hs_axis axis[HS_MAX_DIM];
 } hs_axes;
 
@@ -190,9 +198,6 @@ hs_axis_terms(const hs_lattice *lattice, const double *x, int k)
     }
     return terms;
 }
-
-/* Whether the box moves points along coordinate axis c. */
-bool hs_moves_column(const hs_lattice *lattice, int c);
 
 /* cell_size: least width, where `one_cell` is false. max_radius: of queries. */
 void hs_axes_init(hs_axes *axes, const hs_lattice *lattice, double cell_size, bool one_cell,
@@ -275,26 +280,22 @@ hs_axis_gap(const hs_axis *axis, double t, int64_t u, int64_t centre)
 }
 
 /*
- * From the indices of a cell to its entries. Either every cell between the outermost
- * has a number by its place in the grid (dense), or those that have been occupied are numbered as
- * they come, and a hash table knows them (sparse). A sparse table that is full drops its empty
- * cells before it grows, if half of them are empty, or if memory is refused.
+ * From the indices of a cell to its entries. Either every cell between the outermost has a number
+ * by its place in the grid (dense), or those that have been occupied are numbered as they come, and
+ * a hash table knows them (sparse). A sparse table that is full drops its empty cells before it
+ * grows, if half of them are empty, or if memory is refused.
  */
 
-#define HS_NO_CELL  UINT32_MAX
+#define HS_NO_CELL  HS_NO_NUMBER
 #define HS_NO_BLOCK UINT8_MAX
 
 typedef struct hs_cell {
     uint32_t start, count; /* places start to start + count - 1 */
 } hs_cell;
 
-typedef struct hs_cell_row {
-    uint32_t cell; /* HS_NO_CELL: none */
-    uint32_t mark;
-} hs_cell_row;
-
 typedef struct hs_cell_table {
     bool     dense;
+    bool     keeps_empty; /* empty cells keep their numbers and blocks: others are about to come */
     int      ndim;
     int64_t  n;        /* cells */
     int64_t  capacity; /* of the next three */
@@ -302,39 +303,35 @@ typedef struct hs_cell_table {
     uint8_t *size;     /* owned: a block has 2^size entries; HS_NO_BLOCK: there is none */
     int32_t *index;    /* owned, sparse: ndim a cell, the indices modulo 2^32 */
     /* sparse */
-    hs_cell_row *rows;    /* owned */
-    int64_t      n_rows;  /* 0, or a power of two */
-    int64_t      n_empty; /* cells without entries */
-    bool         is_wide; /* some index was beyond int32, so that cells may be shared */
+    hs_hash hash;    /* numbers are those of cells */
+    int64_t n_empty; /* cells without entries */
+    bool    is_wide; /* some index was beyond int32, so that cells may be shared */
     /* dense */
+    double  most_bytes;
     int64_t lowest[HS_MAX_DIM], shape[HS_MAX_DIM], stride[HS_MAX_DIM];
 } hs_cell_table;
 
-void hs_cell_table_init(hs_cell_table *table, const hs_axes *axes, bool dense);
+/* most_bytes: that a dense table may take. */
+void hs_cell_table_init(hs_cell_table *table, const hs_axes *axes, bool dense, double most_bytes);
 
 /* Gives all cells back; blocks are left to the caller. */
 void hs_cell_table_free(hs_cell_table *table);
 
-/* Bytes of a dense table of so many cells. */
-#define HS_DENSE_CELL_BYTES (sizeof(hs_cell) + sizeof(uint8_t))
-
 /*
- * Dense: makes the table reach from `first` to `last` along open axes, and gives the entries their
- * new cells. Farther than that by half of what it was, if `most` bytes allow it. HS_ERR_MEMORY, or
- * HS_ERR_CAPACITY with the bytes: then nothing has changed.
+ * Makes room for cells to come; the numbers of others may change, and entries get those of theirs.
+ * Sparse: for so many more. Dense: makes the table reach from `first` to `last` along open axes;
+ * farther than that by half of what it was, if its most bytes allow it. HS_ERR_MEMORY, or
+ * HS_ERR_CAPACITY, which sets expected_bytes and limit_bytes: then nothing has changed.
  */
-hs_status hs_cell_table_extend(hs_cell_table *table, hs_entries *entries, const int64_t *first,
-                               const int64_t *last, double most, double *bytes);
+hs_status hs_cell_table_reserve(hs_cell_table *table, hs_entries *entries, const int64_t *first,
+                                const int64_t *last, int64_t more, hs_failure *failure);
 
 /* The cell with these indices, or HS_NO_CELL. */
 uint32_t hs_cell_table_find(const hs_cell_table *table, const int64_t *index);
 
-/* The same; a sparse table adds it. HS_NO_CELL when memory is refused. The numbers of other cells
- * may change. */
-uint32_t hs_cell_table_add(hs_cell_table *table, hs_entries *entries, const int64_t *index);
-
-/* Sparse: makes room for so many cells more, whose numbers will then stay. */
-bool hs_cell_table_reserve(hs_cell_table *table, hs_entries *entries, int64_t more);
+/* The same; where there is none, it is added. Statuses and effects of hs_cell_table_reserve. */
+hs_status hs_cell_table_add(hs_cell_table *table, hs_entries *entries, const int64_t *index,
+                            uint32_t *number, hs_failure *failure);
 
 /* The indices of a cell, in sparse tables modulo 2^32. */
 void hs_cell_table_index(const hs_cell_table *table, uint32_t cell, int64_t *index);
@@ -362,22 +359,23 @@ hs_cell_mark(uint64_t sum)
 HS_ALWAYS_INLINE uint32_t
 hs_cell_table_probe(const hs_cell_table *table, const int64_t *index, uint32_t mark)
 {
-    if (table->n_rows == 0) {
+    const int64_t last = table->hash.n_rows - 1;
+    if (last < 0) {
         return HS_NO_CELL;
     }
-    for (int64_t r = mark & (uint64_t)(table->n_rows - 1);; r = (r + 1) & (table->n_rows - 1)) {
-        const hs_cell_row row = table->rows[r];
-        if (row.cell == HS_NO_CELL) {
+    for (int64_t r = mark & (uint64_t)last;; r = (r + 1) & last) {
+        const hs_hash_row row = table->hash.rows[r];
+        if (row.number == HS_NO_NUMBER) {
             return HS_NO_CELL;
         }
         if (row.mark == mark) {
-            const int32_t *found = table->index + (int64_t)row.cell * table->ndim;
+            const int32_t *found = table->index + (int64_t)row.number * table->ndim;
             int            k = 0;
             while (k < table->ndim && found[k] == (int32_t)(uint32_t)index[k]) {
                 k++;
             }
             if (k == table->ndim) {
-                return row.cell;
+                return row.number;
             }
         }
     }
@@ -394,22 +392,18 @@ hs_cell_table_probe(const hs_cell_table *table, const int64_t *index, uint32_t m
 #define HS_MOST_OFFSETS 8192 /* of one list */
 #define HS_SLOTS        (2 * HS_MOST_REACH + 1)
 
-typedef struct hs_offset_list {
-    int64_t  n;
-    uint8_t *slot; /* borrowed from `data`: ndim each, the offset plus HS_MOST_REACH */
-} hs_offset_list;
-
 typedef struct hs_offsets {
-    int            reach; /* lists 0 to `reach` are there */
-    hs_offset_list list[HS_MOST_REACH + 1];
-    uint8_t       *data; /* owned */
-    int64_t        bytes;
+    int      reach;                 /* lists 0 to `reach` are there */
+    int64_t  n[HS_MOST_REACH + 1];  /* offsets of each */
+    int64_t  at[HS_MOST_REACH + 2]; /* bytes before each, and of all */
+    uint8_t *slot;                  /* owned: ndim each, the offset plus HS_MOST_REACH */
 } hs_offsets;
 
 /* Lists for balls up to this radius, as far as they are not too long. False when memory is
  * refused. */
 bool hs_offsets_init(hs_offsets *offsets, const hs_axes *axes, const hs_lattice *lattice,
                      double max_radius);
+bool hs_offsets_copy(const hs_offsets *offsets, hs_offsets *copy);
 void hs_offsets_free(hs_offsets *offsets);
 
 #endif

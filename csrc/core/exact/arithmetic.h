@@ -14,8 +14,8 @@
  */
 
 /*
- * Error-free transformations and double-word arithmetic. A double-word is an
- * unevaluated sum hi + lo with |lo| at most half a unit in the last place of hi: about 106 bits.
+ * Error-free transformations and double-word arithmetic. A double-word is an unevaluated sum
+ * hi + lo with |lo| at most half a unit in the last place of hi: about 106 bits.
  *
  * v = 2^-53. Every statement assumes round to nearest and neither overflow nor underflow; callers
  * keep to a safe range (HS_RANGE_GUARD). Sources: [D] Dekker, Numer. Math. 18 (1971) 224; [K]
@@ -245,9 +245,9 @@ hs_add_carry(uint64_t a, uint64_t b, uint64_t *carry)
 }
 
 /*
- * Numbers m 2^e with integers m and e, added and multiplied exactly: every float64 is
- * one, and so is every determinant of them. For the few decisions that float stages leave over;
- * there is no allocation and no rounding.
+ * Numbers m 2^e with integers m and e, added and multiplied exactly: every float64 is one, and so
+ * is every determinant of them. For the few decisions that float stages leave over; there is no
+ * allocation and no rounding.
  */
 
 /*

@@ -412,8 +412,8 @@ hs_support_width(int ndim, const double *entries, double size, double extent, do
     return hs_smaller((extent * length + reach * rest) * (1.0 + 0x1p-48), ball);
 }
 
-/* Supports are brought to the unit of D by a power of two, so that the extent is
- * the number that was given. */
+/* Supports are brought to the unit of D by a power of two, so that the extent is the number that
+ * was given. */
 
 /* Powers of two that supports are multiplied by in floats. */
 #define MOST_SCALED 900
@@ -430,14 +430,7 @@ hs_support_metric_init(int ndim, double extent, bool inclusive, int exponent,
 void
 hs_support_span_of(const hs_metric *metric, const hs_span *span, hs_support_span *of)
 {
-    of->usable = true;
-    if (!hs_is_shifted(metric, span->shift)) {
-        hs_difference_plain(&of->difference, span->p, span->q, metric->ndim);
-    } else {
-        of->usable = metric->floats_usable &&
-                     hs_difference_shifted(&of->difference, metric, span->p, span->q, span->shift,
-                                           metric->ndim, true);
-    }
+    of->usable = hs_difference_watched(&of->difference, metric, span->p, span->q, span->shift);
     of->size = 0.0;
     for (int k = 0; of->usable && k < metric->ndim; k++) {
         of->size += fabs(of->difference.component[k].hi);
@@ -553,36 +546,6 @@ hs_support_compare(const hs_support_metric *metric, const double *entries, const
     return hs_dyadic_compare_sizes(&square, &term);
 }
 
-bool
-hs_support_within(const hs_support_metric *metric, const double *entries, double size,
-                  const hs_metric *measure, const hs_span *span, hs_stages *stages)
-{
-    hs_support_span of;
-    hs_support_span_of(measure, span, &of);
-    const hs_verdict verdict = hs_support_decide_double(metric, entries, size, &of, stages);
-    if (verdict != HS_UNDECIDED) {
-        return verdict == HS_WITHIN;
-    }
-    stages->by_integers++;
-    const int sign = hs_support_compare(metric, entries, measure, span);
-    return sign < 0 || (sign == 0 && metric->limit.inclusive);
-}
-
-/* Unfused float64, terms added in the order of the axes, as in hs_metric_within_double. */
-static double
-rounded_component(const hs_metric *measure, const hs_span *span, int k)
-{
-    double component = span->q[k] - span->p[k];
-    if (span->shift != NULL && measure->n_rows > 0) {
-        double offset = (double)span->shift[0] * measure->rows[0][k];
-        for (int l = 1; l < measure->n_rows; l++) {
-            offset += (double)span->shift[l] * measure->rows[l][k];
-        }
-        component += offset;
-    }
-    return component;
-}
-
 /* x, or what float32 makes of it. */
 HS_ALWAYS_INLINE double
 as_real(double x, const bool is_single)
@@ -618,7 +581,7 @@ hs_support_within_rounded(const hs_support_metric *metric, const double *entries
 {
     double d[HS_SUPPORT_DIM];
     for (int k = 0; k < measure->ndim; k++) {
-        d[k] = rounded_component(measure, span, k);
+        d[k] = hs_rounded_component(measure, span, k);
     }
     return is_single ? compare_rounded(metric, entries, d, true)
                      : compare_rounded(metric, entries, d, false);

@@ -64,8 +64,8 @@ hs_support_state hs_support_reach(int ndim, const double *entries, double extent
  * infinite. */
 double hs_support_size(int ndim, const double *entries);
 
-/* How far a support reaches along a direction: less than a ball around it, where
- * it is narrow there. */
+/* How far a support reaches along a direction: less than a ball around it, where it is narrow
+ * there. */
 
 /* Not below |normal . D| of any D within the support, and near to the most that it can be.
  * size: of hs_support_size; reach: of hs_support_reach. */
@@ -73,10 +73,10 @@ double hs_support_width(int ndim, const double *entries, double size, double ext
                         const double *normal);
 
 /*
- * Is D within a support, |H D| <= extent (or <), for the real numbers that these
- * floats are? The stages are those of metric.h, for z = H D in place of D: each computes z with a
- * proven bound on its error, in float64 or in double-words, and the verdict on |z| is that of
- * metric.h. What they leave is decided by exact numbers, for every finite input.
+ * Is D within a support, |H D| <= extent (or <), for the real numbers that these floats are? The
+ * stages are those of metric.h, for z = H D in place of D: each computes z with a proven bound on
+ * its error, in float64 or in double-words, and the verdict on |z| is that of metric.h. What they
+ * leave is decided by exact numbers, for every finite input.
  *
  * Callers must have set round to nearest without flushing.
  */
@@ -108,10 +108,6 @@ hs_verdict hs_support_decide_double(const hs_support_metric *metric, const doubl
 /* For spans that hs_support_decide_double has left undecided: sign of |H D| - extent. */
 int hs_support_compare(const hs_support_metric *metric, const double *entries,
                        const hs_metric *measure, const hs_span *span);
-
-/* The three stages one after the other. */
-bool hs_support_within(const hs_support_metric *metric, const double *entries, double size,
-                       const hs_metric *measure, const hs_span *span, hs_stages *stages);
 
 /*
  * precision="double" and, is_single, "single": D_k as in hs_metric_within_double, then H, D and the

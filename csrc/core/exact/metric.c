@@ -17,9 +17,6 @@
 /* One axis has two points and up to eight rows. */
 #define MAX_TERMS (2 + HS_MAX_DIM)
 
-/* The cutoff, or a sum that it is in place of. */
-#define CUTOFF_TERMS 2
-
 /* A float64 times an integer: +-(high * 2^64 + low) * 2^exponent. */
 typedef struct exact_term {
     uint64_t low, high;
@@ -30,11 +27,11 @@ typedef struct exact_term {
 /* What is added up along each axis, zeros left out, and what unit and width hold all of it. */
 typedef struct exact_sums {
     exact_term terms[HS_MAX_DIM][MAX_TERMS];
+    int        n_axes;
     int        n_terms[HS_MAX_DIM];
-    int        most_terms;           /* of any axis */
-    exact_term cutoff[CUTOFF_TERMS]; /* zeros where there is less */
-    int        lowest;               /* everything is a multiple of 2^lowest */
-    int        highest;              /* and every term is below 2^highest */
+    int        most_terms; /* of any axis */
+    int        lowest;     /* everything is a multiple of 2^lowest */
+    int        highest;    /* and every term is below 2^highest */
 } exact_sums;
 
 /* A nonzero finite double as an odd significand with sign and exponent. */
@@ -53,52 +50,44 @@ decompose(double x)
                         .negative = bits >> 63};
 }
 
-/* Widen the range to hold this term. */
+/* Sets a term to x * times, which is not zero, and widens the range to hold it. */
 HS_ALWAYS_INLINE void
-include_term(exact_sums *sums, const exact_term *term)
+set_term(exact_term *term, double x, int64_t times, exact_sums *sums)
 {
+    *term = decompose(x);
+    term->negative = term->negative != (times < 0);
+    if (times != 1 && times != -1) {
+        const uint64_t size = times < 0 ? ~(uint64_t)times + 1 : (uint64_t)times;
+        term->low = hs_multiply_add(term->low, size, 0, &term->high);
+    }
     const int bits = term->high != 0 ? 64 + hs_bit_length(term->high) : hs_bit_length(term->low);
     const int top = term->exponent + bits;
     sums->lowest = term->exponent < sums->lowest ? term->exponent : sums->lowest;
     sums->highest = top > sums->highest ? top : sums->highest;
 }
 
+/* q - p + shift * rows along each axis; shift NULL: q - p. */
 HS_ALWAYS_INLINE void
-set_sums(exact_sums *sums, const hs_metric *metric, hs_dw cutoff, const hs_span *span)
+set_sums(exact_sums *sums, const hs_metric *metric, const hs_span *span)
 {
-    const double  *p = span->p, *q = span->q, parts[CUTOFF_TERMS] = {cutoff.hi, cutoff.lo};
+    const double  *p = span->p, *q = span->q;
     const int64_t *shift = span->shift;
     sums->lowest = INT32_MAX;
     sums->highest = INT32_MIN;
-    sums->most_terms = cutoff.lo != 0.0 ? CUTOFF_TERMS : 1;
-    for (int t = 0; t < CUTOFF_TERMS; t++) {
-        sums->cutoff[t].low = sums->cutoff[t].high = 0;
-        if (parts[t] != 0.0) {
-            sums->cutoff[t] = decompose(parts[t]);
-            include_term(sums, &sums->cutoff[t]);
-        }
-    }
+    sums->most_terms = 1;
+    sums->n_axes = metric->ndim;
     for (int k = 0; k < metric->ndim; k++) {
         exact_term *next = sums->terms[k];
         if (q[k] != 0.0) {
-            *next = decompose(q[k]);
-            include_term(sums, next++);
+            set_term(next++, q[k], 1, sums);
         }
         if (p[k] != 0.0) {
-            *next = decompose(p[k]);
-            next->negative = !next->negative;
-            include_term(sums, next++);
+            set_term(next++, p[k], -1, sums);
         }
         for (int l = 0; shift != NULL && l < metric->n_rows; l++) {
-            const double entry = metric->rows[l][k];
-            if (shift[l] == 0 || entry == 0.0) {
-                continue;
+            if (shift[l] != 0 && metric->rows[l][k] != 0.0) {
+                set_term(next++, metric->rows[l][k], shift[l], sums);
             }
-            const uint64_t times = shift[l] < 0 ? ~(uint64_t)shift[l] + 1 : (uint64_t)shift[l];
-            *next = decompose(entry);
-            next->low = hs_multiply_add(next->low, times, 0, &next->high);
-            next->negative = next->negative != (shift[l] < 0);
-            include_term(sums, next++);
         }
         const int n_terms = (int)(next - sums->terms[k]);
         sums->n_terms[k] = n_terms;
@@ -106,7 +95,17 @@ set_sums(exact_sums *sums, const hs_metric *metric, hs_dw cutoff, const hs_span 
     }
 }
 
-/* Limbs for a component of D, and twice as many for |D|^2; 0 when every input is zero. */
+/* A limit, the sum of both words, as a vector of one component. */
+HS_ALWAYS_INLINE void
+set_limit(exact_sums *sums, hs_dw limit)
+{
+    const double low = -limit.lo;
+    hs_metric    axis;
+    axis.ndim = 1;
+    set_sums(sums, &axis, &(hs_span){&low, &limit.hi, NULL});
+}
+
+/* Limbs for a component, and twice as many for the square; 0 when every input is zero. */
 static int
 count_limbs(const exact_sums *sums)
 {
@@ -190,34 +189,12 @@ compare_limbs(const uint64_t *a, const uint64_t *b, int n)
     return 0;
 }
 
-/* The comparison; total and limit have 2 n limbs, value n. */
-HS_ALWAYS_INLINE int
-compare_squares(const exact_sums *sums, int ndim, int n, uint64_t *total, uint64_t *limit,
-                uint64_t *value)
+/* The square where everything fits 62 bits: single words instead of limbs. */
+static void
+square_small(const exact_sums *sums, uint64_t total[2])
 {
-    for (int i = 0; i < 2 * n; i++) {
-        total[i] = limit[i] = 0;
-    }
-    for (int k = 0; k < ndim; k++) {
-        sum_terms(value, sums, k, n);
-        add_square(total, value, n);
-    }
-    for (int i = 0; i < n; i++) {
-        value[i] = 0;
-    }
-    for (int t = 0; t < CUTOFF_TERMS && sums->cutoff[t].low != 0; t++) {
-        add_term(value, &sums->cutoff[t], sums->lowest, n);
-    }
-    add_square(limit, value, n);
-    return compare_limbs(total, limit, 2 * n);
-}
-
-/* The comparison where everything fits 62 bits: single words instead of limbs. */
-static int
-compare_small(const exact_sums *sums, int ndim)
-{
-    uint64_t total[2] = {0, 0}, limit[2] = {0, 0};
-    for (int k = 0; k < ndim; k++) {
+    total[0] = total[1] = 0;
+    for (int k = 0; k < sums->n_axes; k++) {
         int64_t value = 0;
         for (int t = 0; t < sums->n_terms[k]; t++) {
             const exact_term *term = &sums->terms[k][t];
@@ -230,87 +207,28 @@ compare_small(const exact_sums *sums, int ndim)
         total[0] = hs_add_carry(total[0], low, &carry);
         total[1] += high + carry;
     }
-    uint64_t cutoff = 0;
-    for (int t = 0; t < CUTOFF_TERMS && sums->cutoff[t].low != 0; t++) {
-        const exact_term *term = &sums->cutoff[t];
-        const uint64_t    size = term->low << (term->exponent - sums->lowest);
-        cutoff += term->negative ? ~size + 1 : size;
-    }
-    limit[0] = hs_multiply_add(cutoff, cutoff, 0, &limit[1]);
-    return compare_limbs(total, limit, 2);
 }
 
-/* Up to 126 bits, where the compiler can unroll every loop over limbs. */
-static int
-compare_medium(const exact_sums *sums, int ndim)
-{
-    uint64_t total[4], limit[4], value[2];
-    return compare_squares(sums, ndim, 2, total, limit, value);
-}
-
-static HS_NO_INLINE int
-compare_large(const exact_sums *sums, int ndim, int n)
-{
-    uint64_t total[2 * MAX_LIMBS], limit[2 * MAX_LIMBS], value[MAX_LIMBS];
-    return compare_squares(sums, ndim, n, total, limit, value);
-}
-
-HS_ALWAYS_INLINE int
-compare(const hs_metric *metric, hs_dw cutoff, const hs_span *span)
-{
-    exact_sums sums;
-    set_sums(&sums, metric, cutoff, span);
-    const int n = count_limbs(&sums);
-    switch (n) {
-    case 0: return 0;
-    case 1: return compare_small(&sums, metric->ndim);
-    case 2: return compare_medium(&sums, metric->ndim);
-    default: return compare_large(&sums, metric->ndim, n);
-    }
-}
-
-int
-hs_integer_compare(const hs_metric *metric, const double *p, const double *q, const int64_t *shift)
-{
-    return compare(metric, (hs_dw){metric->cutoff, 0.0}, &(hs_span){p, q, shift});
-}
-
-int
-hs_integer_compare_sum(const hs_metric *metric, hs_dw limit, const double *p, const double *q,
-                       const int64_t *shift)
-{
-    return compare(metric, limit, &(hs_span){p, q, shift});
-}
-
-/* Compares both squares, in 2 n limbs and one unit. */
-HS_ALWAYS_INLINE int
-compare_two_sums(const exact_sums *one, const exact_sums *other, int ndim, int n, uint64_t *first,
-                 uint64_t *second, uint64_t *value)
+/* The square in 2 n limbs; value has n. */
+HS_ALWAYS_INLINE void
+square_sums(const exact_sums *sums, int n, uint64_t *total, uint64_t *value)
 {
     for (int i = 0; i < 2 * n; i++) {
-        first[i] = second[i] = 0;
+        total[i] = 0;
     }
-    for (int k = 0; k < ndim; k++) {
-        sum_terms(value, one, k, n);
-        add_square(first, value, n);
-        sum_terms(value, other, k, n);
-        add_square(second, value, n);
+    for (int k = 0; k < sums->n_axes; k++) {
+        sum_terms(value, sums, k, n);
+        add_square(total, value, n);
     }
-    return compare_limbs(first, second, 2 * n);
-}
-
-static int
-compare_two_medium(const exact_sums *one, const exact_sums *other, int ndim)
-{
-    uint64_t first[4], second[4], value[2];
-    return compare_two_sums(one, other, ndim, 2, first, second, value);
 }
 
 static HS_NO_INLINE int
-compare_two_large(const exact_sums *one, const exact_sums *other, int ndim, int n)
+compare_large(const exact_sums *one, const exact_sums *other, int n)
 {
     uint64_t first[2 * MAX_LIMBS], second[2 * MAX_LIMBS], value[MAX_LIMBS];
-    return compare_two_sums(one, other, ndim, n, first, second, value);
+    square_sums(one, n, first, value);
+    square_sums(other, n, second, value);
+    return compare_limbs(first, second, 2 * n);
 }
 
 /* Gives both sums one unit and one width. */
@@ -325,17 +243,47 @@ join_units(exact_sums *one, exact_sums *other)
     one->most_terms = other->most_terms = terms;
 }
 
+/* Sign of the difference of both squares. Up to 126 bits the compiler can unroll every loop over
+ * limbs. */
+static int
+compare_sums(exact_sums *one, exact_sums *other)
+{
+    uint64_t first[4], second[4], value[2];
+    join_units(one, other);
+    const int n = count_limbs(one);
+    if (n == 0) {
+        return 0;
+    }
+    if (n > 2) {
+        return compare_large(one, other, n);
+    }
+    if (n == 1) {
+        square_small(one, first);
+        square_small(other, second);
+    } else {
+        square_sums(one, 2, first, value);
+        square_sums(other, 2, second, value);
+    }
+    return compare_limbs(first, second, 2 * n);
+}
+
+int
+hs_integer_compare(const hs_metric *metric, hs_dw limit, const double *p, const double *q,
+                   const int64_t *shift)
+{
+    exact_sums sums, of_limit;
+    set_sums(&sums, metric, &(hs_span){p, q, shift});
+    set_limit(&of_limit, limit);
+    return compare_sums(&sums, &of_limit);
+}
+
 int
 hs_integer_compare_two(const hs_metric *metric, const hs_span *one, const hs_span *other)
 {
     exact_sums a, b;
-    set_sums(&a, metric, (hs_dw){0.0, 0.0}, one);
-    set_sums(&b, metric, (hs_dw){0.0, 0.0}, other);
-    join_units(&a, &b);
-    const int n = count_limbs(&a);
-    return n == 0   ? 0
-           : n <= 2 ? compare_two_medium(&a, &b, metric->ndim)
-                    : compare_two_large(&a, &b, metric->ndim, n);
+    set_sums(&a, metric, one);
+    set_sums(&b, metric, other);
+    return compare_sums(&a, &b);
 }
 
 /* The limbs top, top - 1 and top - 2 as a double-word, in units of the lowest of them. */
@@ -357,11 +305,13 @@ void
 hs_integer_difference(const hs_metric *metric, const double *p, const double *q,
                       const int64_t *shift, hs_dw *value, int *exponent)
 {
-    exact_sums sums;
+    exact_sums sums, limit;
     uint64_t   component[HS_MAX_DIM][MAX_LIMBS];
     bool       negative[HS_MAX_DIM];
     int        top = -1; /* highest limb in use */
-    set_sums(&sums, metric, (hs_dw){metric->cutoff, 0.0}, &(hs_span){p, q, shift});
+    set_sums(&sums, metric, &(hs_span){p, q, shift});
+    set_limit(&limit, (hs_dw){metric->cutoff, 0.0});
+    join_units(&sums, &limit);
     const int n = count_limbs(&sums);
     for (int k = 0; k < metric->ndim; k++) {
         value[k] = (hs_dw){0.0, 0.0};
@@ -488,29 +438,20 @@ hs_metric_within(const hs_metric *metric, const double *p, const double *q, cons
     return hs_metric_decide_by_integers(metric, p, q, shift, stages);
 }
 
-/* Long integers take ten times as long. */
-static hs_verdict
-decide_by_a_hair(const hs_metric *metric, const double *p, const double *q, const int64_t *shift)
-{
-    hs_difference difference;
-    return hs_difference_watched(&difference, metric, p, q, shift)
-               ? hs_hair_verdict(metric, &difference, metric->ndim)
-               : HS_UNDECIDED;
-}
-
 bool
 hs_metric_decide_by_integers(const hs_metric *metric, const double *p, const double *q,
                              const int64_t *shift, hs_stages *stages)
 {
-    if (metric->floats_usable) {
-        const hs_verdict verdict = decide_by_a_hair(metric, p, q, shift);
+    hs_difference difference; /* long integers take ten times as long */
+    if (metric->floats_usable && hs_difference_watched(&difference, metric, p, q, shift)) {
+        const hs_verdict verdict = hs_hair_verdict(metric, &difference, metric->ndim);
         if (verdict != HS_UNDECIDED) {
             stages->by_double_word++;
             return verdict == HS_WITHIN;
         }
     }
     stages->by_integers++;
-    const int sign = hs_integer_compare(metric, p, q, shift);
+    const int sign = hs_integer_compare(metric, (hs_dw){metric->cutoff, 0.0}, p, q, shift);
     return sign < 0 || (sign == 0 && metric->inclusive);
 }
 
@@ -521,14 +462,7 @@ hs_metric_within_double(const hs_metric *metric, const double *p, const double *
     const double limit = metric->cutoff * metric->cutoff;
     double       square = 0.0;
     for (int k = 0; k < metric->ndim; k++) {
-        double difference = q[k] - p[k];
-        if (shift != NULL && metric->n_rows > 0) {
-            double offset = (double)shift[0] * metric->rows[0][k];
-            for (int l = 1; l < metric->n_rows; l++) {
-                offset += (double)shift[l] * metric->rows[l][k];
-            }
-            difference += offset;
-        }
+        const double difference = hs_rounded_component(metric, &(hs_span){p, q, shift}, k);
         square += difference * difference;
     }
     return metric->inclusive ? square <= limit : square < limit;
@@ -540,14 +474,6 @@ hs_metric_within_double(const hs_metric *metric, const double *p, const double *
  * each, is nothing beside 2^-106 of them. */
 #define LEAST_SQUARE 0x1p-800
 #define MOST_SQUARE  0x1p800
-
-/* D in double-words, with what was lost. False where floats cannot hold it. */
-static bool
-subtract(const hs_metric *metric, const hs_span *span, hs_difference *difference)
-{
-    return (metric->floats_usable || !hs_is_shifted(metric, span->shift)) &&
-           hs_difference_watched(difference, metric, span->p, span->q, span->shift);
-}
 
 /* How far hs_float64_square may be from |D|^2. */
 static double
@@ -585,7 +511,8 @@ hs_metric_compare(const hs_metric *metric, const hs_span *one, const hs_span *ot
     const int     ndim = metric->ndim;
     hs_difference a, b;
     int           sign;
-    if (subtract(metric, one, &a) && subtract(metric, other, &b)) {
+    if (hs_difference_watched(&a, metric, one->p, one->q, one->shift) &&
+        hs_difference_watched(&b, metric, other->p, other->q, other->shift)) {
         const double first = hs_float64_square(&a, ndim), second = hs_float64_square(&b, ndim);
         if (hs_smaller(first, second) >= LEAST_SQUARE && hs_larger(first, second) <= MOST_SQUARE) {
             if (fabs(first - second) >
@@ -695,8 +622,7 @@ hs_keep_within(double distance, double cutoff, bool inclusive)
     return inclusive ? cutoff : nextafter(cutoff, 0.0);
 }
 
-/* A sum that is no float64 lies between two neighbouring ones, and so does nearly
- * no distance. */
+/* A sum that is no float64 lies between two neighbouring ones, and so does nearly no distance. */
 
 void
 hs_metric_set_cutoff(double cutoff, hs_metric *metric)
@@ -729,13 +655,13 @@ hs_metric_within_sum(const hs_metric *metric, hs_dw limit, const double *p, cons
         return false;
     }
     stages->by_integers++;
-    const int sign = hs_integer_compare_sum(metric, limit, p, q, shift);
+    const int sign = hs_integer_compare(metric, limit, p, q, shift);
     return sign < 0 || (sign == 0 && metric->inclusive);
 }
 
 /*
- * The signs of (x - p).(q - p) and (x - q).(p - q), neither of which is negative if
- * the foot lies between p and q: by float64 with an error bound, and else by integers.
+ * The signs of (x - p).(q - p) and (x - q).(p - q), neither of which is negative if the foot lies
+ * between p and q: by float64 with an error bound, and else by integers.
  */
 
 /*

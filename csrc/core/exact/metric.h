@@ -77,6 +77,21 @@ double hs_keep_within(double distance, double cutoff, bool inclusive);
 bool hs_metric_within_double(const hs_metric *metric, const double *p, const double *q,
                              const int64_t *shift);
 
+/* D_k of that formula. */
+HS_ALWAYS_INLINE double
+hs_rounded_component(const hs_metric *metric, const hs_span *span, int k)
+{
+    double component = span->q[k] - span->p[k];
+    if (span->shift != NULL && metric->n_rows > 0) {
+        double offset = (double)span->shift[0] * metric->rows[0][k];
+        for (int l = 1; l < metric->n_rows; l++) {
+            offset += (double)span->shift[l] * metric->rows[l][k];
+        }
+        component += offset;
+    }
+    return component;
+}
+
 /* Which of two points is nearer: the sign of |D1|^2 - |D2|^2 for two vectors of one metric, -1, 0
  * or 1; its cutoff plays no part, but for floats_usable. Callers must have set round to nearest
  * without flushing. */
@@ -84,8 +99,8 @@ int hs_metric_compare(const hs_metric *metric, const hs_span *one, const hs_span
                       hs_stages *stages);
 
 /*
- * The float stages of the decision, each a value with a proven bound on its error.
- * For metric.c, the batch kernels and tests only.
+ * The float stages of the decision, each a value with a proven bound on its error. For metric.c,
+ * the batch kernels and tests only.
  *
  * ndim is passed beside the metric because callers that know it let the compiler unroll loops.
  */
@@ -164,7 +179,7 @@ hs_is_shifted(const hs_metric *metric, const int64_t *shift)
     return any != 0;
 }
 
-/* D, watched, whatever the shift. False as for hs_difference_shifted. */
+/* D, watched, whatever the shift. False where floats cannot hold it. */
 HS_ALWAYS_INLINE bool
 hs_difference_watched(hs_difference *difference, const hs_metric *metric, const double *p,
                       const double *q, const int64_t *shift)
@@ -173,7 +188,8 @@ hs_difference_watched(hs_difference *difference, const hs_metric *metric, const 
         hs_difference_plain(difference, p, q, metric->ndim);
         return true;
     }
-    return hs_difference_shifted(difference, metric, p, q, shift, metric->ndim, true);
+    return metric->floats_usable &&
+           hs_difference_shifted(difference, metric, p, q, shift, metric->ndim, true);
 }
 
 /* |D|^2 of the computed D in float64. */
@@ -298,18 +314,15 @@ hs_hair_verdict(const hs_metric *metric, const hs_difference *difference, int nd
 }
 
 /*
- * The last stage. Every float is an integer times a power of two, so that, for a
- * common power, D and the cutoff are integers and compare exactly. No overflow, no rounding mode
- * and no flushing can touch this; it always decides.
+ * The last stage. Every float is an integer times a power of two, so that, for a common power, D
+ * and the cutoff are integers and compare exactly. No overflow, no rounding mode and no flushing
+ * can touch this; it always decides.
  */
 
-/* Sign of |D|^2 - cutoff^2: -1, 0 or 1. shift may be NULL. */
-int hs_integer_compare(const hs_metric *metric, const double *p, const double *q,
+/* Sign of |D|^2 - limit^2, for the sum of both words, which must not be negative: -1, 0 or 1. shift
+ * may be NULL. */
+int hs_integer_compare(const hs_metric *metric, hs_dw limit, const double *p, const double *q,
                        const int64_t *shift);
-
-/* Sign of |D|^2 - limit^2, for the sum of both words, which must not be negative. */
-int hs_integer_compare_sum(const hs_metric *metric, hs_dw limit, const double *p, const double *q,
-                           const int64_t *shift);
 
 /* Sign of |D1|^2 - |D2|^2. */
 int hs_integer_compare_two(const hs_metric *metric, const hs_span *one, const hs_span *other);
@@ -320,8 +333,8 @@ void hs_integer_difference(const hs_metric *metric, const double *p, const doubl
                            const int64_t *shift, hs_dw *value, int *exponent);
 
 /*
- * The decision for a limit that is the sum of two numbers, such as two
- * radii, and often no float64. What is compared is the real sum.
+ * The decision for a limit that is the sum of two numbers, such as two radii, and often no float64.
+ * What is compared is the real sum.
  */
 
 /* Sets the cutoff of a metric, whose rows stay. */
@@ -332,8 +345,8 @@ void hs_metric_set_cutoff(double cutoff, hs_metric *metric);
 bool hs_metric_within_sum(const hs_metric *metric, hs_dw limit, const double *p, const double *q,
                           const int64_t *shift, hs_stages *stages);
 
-/* Does the perpendicular from a point meet a segment, for the real numbers that
- * these floats are? */
+/* Does the perpendicular from a point meet a segment, for the real numbers that these floats
+ * are? */
 
 /* Whether 0 <= (x - p).(q - p) <= |q - p|^2: the foot of the perpendicular from x on the line
  * through p and q lies on the closed segment between them. True where p and q are one point. */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "histogram.h"
+#include "../collect/parallel.h"
 #include "../exact/filter.h"
 
 #include <float.h>
@@ -20,6 +21,7 @@
 #define ALL_CELLS  8
 #define MOST_CELLS (1 << 16) /* a megabyte; squares below these share cell 0 */
 
+/* Edges of the histogram in the unit of the scene. */
 static hs_status
 edges_init(hs_account *account, const hs_scene *scene, double filter_error,
            const hs_histogram *histogram, hs_edges *edges)
@@ -48,14 +50,6 @@ edges_init(hs_account *account, const hs_scene *scene, double filter_error,
         }
     }
     return HS_OK;
-}
-
-/* Edges of the histogram in the unit of the scene. */
-static void
-edges_free(hs_account *account, hs_edges *edges)
-{
-    hs_free(account, edges->at);
-    edges->at = NULL;
 }
 
 /* Sets the band of every edge. */
@@ -114,16 +108,6 @@ set_cells(const hs_edges *edges, int shift, hs_edge_table *table)
     return shared;
 }
 
-/* Chooses as few cells as keep most bands apart. */
-static void
-choose_cells(const hs_edges *edges, hs_edge_table *table)
-{
-    const int64_t few = edges->n / 64; /* the last bins share first, and have the most pairs */
-    if (set_cells(edges, FEW_CELLS, table) > few && set_cells(edges, MANY_CELLS, table) > few) {
-        (void)set_cells(edges, ALL_CELLS, table);
-    }
-}
-
 static void
 fill_cells(const hs_edges *edges, hs_edge_table *table)
 {
@@ -164,7 +148,10 @@ hs_edge_table_build(const hs_edges *edges, double extent, hs_edge_table *table)
     if (!(4.0 * edges->ndim * extent * extent <= FLT_MAX)) { /* four times the largest square */
         return HS_OK;
     }
-    choose_cells(edges, table);
+    const int64_t few = edges->n / 64; /* the last bins share first, and have the most pairs */
+    if (set_cells(edges, FEW_CELLS, table) > few && set_cells(edges, MANY_CELLS, table) > few) {
+        (void)set_cells(edges, ALL_CELLS, table); /* as few cells as keep most bands apart */
+    }
     table->cells =
         hs_alloc(NULL, HS_FOR_CANDIDATES, (int64_t)table->last + 1, sizeof(hs_edge_cell));
     if (table->cells == NULL) {
@@ -382,21 +369,16 @@ hs_sums_free(hs_account *account, hs_sums *sums)
 }
 
 /* Limbs of 32 bits but for the highest one, which has the sign. */
-static void
-carry_one(int64_t *limbs, int32_t n)
-{
-    for (int32_t e = 0; e + 1 < n; e++) {
-        const int64_t low = limbs[e] & INT64_C(0xffffffff);
-        limbs[e + 1] += (limbs[e] - low) / (INT64_C(1) << 32);
-        limbs[e] = low;
-    }
-}
-
 void
 hs_sums_carry(hs_sums *sums)
 {
     for (int64_t k = 0; k < sums->n; k++) {
-        carry_one(sums->limbs + k * sums->n_limbs, sums->n_limbs);
+        int64_t *limbs = sums->limbs + k * sums->n_limbs;
+        for (int32_t e = 0; e + 1 < sums->n_limbs; e++) {
+            const int64_t low = limbs[e] & INT64_C(0xffffffff);
+            limbs[e + 1] += (limbs[e] - low) / (INT64_C(1) << 32);
+            limbs[e] = low;
+        }
     }
     sums->n_added = 0;
 }
@@ -428,15 +410,6 @@ round_top(uint64_t top, bool more, int exponent)
     return ldexp((double)kept, lowest);
 }
 
-/* Bits [32 e, 32 e + 32) of |sum|: of two's complement, negated by `flip` and what is carried. */
-static uint32_t
-next_digit(int64_t limb, bool flip, uint64_t *carry)
-{
-    const uint64_t digit = (flip ? ~(uint32_t)limb : (uint32_t)limb) + *carry;
-    *carry = digit >> 32;
-    return (uint32_t)digit;
-}
-
 double
 hs_sums_round(const hs_sums *sums, int64_t k)
 {
@@ -448,7 +421,11 @@ hs_sums_round(const hs_sums *sums, int64_t k)
     bool           any = false, any_below_top = false;  /* digits below these */
     int32_t        top = 0;
     for (int32_t e = 0; e < sums->n_limbs; e++) {
-        const uint32_t digit = next_digit(limbs[e], negative, &carry);
+        /* Bits [32 e, 32 e + 32) of |sum|: of two's complement, negated, and what is carried. */
+        const uint32_t limb = (uint32_t)limbs[e];
+        const uint64_t next = (negative ? ~limb : limb) + carry;
+        const uint32_t digit = (uint32_t)next;
+        carry = next >> 32;
         any = any || (low & UINT32_MAX) != 0;
         low = low >> 32 | high << 32;
         high = digit;
@@ -469,12 +446,69 @@ hs_sums_round(const hs_sums *sums, int64_t k)
     return negative ? -size : size;
 }
 
+/*
+ * What one thread counts for a histogram. Hits come with their float32 squares; a table says which
+ * slot each belongs to, and those that it cannot tell are decided exactly, edge by edge.
+ */
+
+/* Types and weights of one set of points, in cell order. */
+typedef struct marked_set {
+    int32_t   *type; /* owned; NULL: all 0 */
+    hs_weights weights;
+} marked_set;
+
+#define TALLY_TABLES 4    /* extents that a walk may meet again; each a power of two */
+#define TALLY_COPIES 4    /* of small histograms: counting does not wait for the last count */
+#define TALLY_OPEN   1024 /* pairs that are decided together, at most */
+
+/* A pair that is decided edge by edge: it reaches at least `low` edges and at most `high`. */
+typedef struct open_pair {
+    int32_t si, place;
+    int32_t low, high;
+    int32_t next; /* of those that wait for the same edge, or -1 */
+} open_pair;
+
+typedef struct thread_tally {
+    const struct tally_plan *plan;                 /* borrowed */
+    hs_edge_table            tables[TALLY_TABLES]; /* owned; place: exponent of the extent */
+    int64_t                  n_slots;              /* of one group */
+    int                      n_copies;
+    int64_t                 *counts; /* owned; n_copies * n_groups * n_slots */
+    hs_sums                  sums;   /* owned; n_groups * (edges + 1) */
+    int32_t                 *slots;  /* owned; of the hits of a visit */
+    int32_t                 *type;   /* owned; of each candidate of the block; or NULL */
+    int64_t                 *value;  /* owned; of each candidate: its weight; or NULL */
+    int32_t                 *place; /* owned; of each candidate: the place of its weight; or NULL */
+    int64_t                  block; /* number of the block that these are of */
+    open_pair               *open;  /* owned; TALLY_OPEN */
+    int32_t                  n_open;
+    int32_t                 *waiting; /* owned; for each edge the first open pair, or -1 */
+    int32_t                 *asked;   /* owned; edges that pairs wait for, TALLY_OPEN */
+    int32_t                  n_asked;
+} thread_tally;
+
+/* What all threads count by, only read while they do. */
+typedef struct tally_plan {
+    hs_search        *search;          /* borrowed */
+    hs_edges          edges;           /* owned */
+    marked_set        points, queries; /* owned */
+    const marked_set *asking;          /* one of these two */
+    bool              has_types, sums; /* whether types matter; whether weights are summed */
+    int32_t           n_types;
+    int64_t           n_groups; /* pairs of types that are told apart */
+    int32_t          *group;    /* owned; n_types * n_types; when has_types */
+    bool              has_all;
+    thread_tally      all; /* owned: of the threads that have ended */
+} tally_plan;
+
+/* Point i of the set has the caller's number order[i]. HS_ERR_TYPES or HS_ERR_WEIGHTS set
+ * failure->row. */
 static hs_status
 marked_init(hs_account *account, const hs_set *known, const int32_t *order, int64_t n,
-            const hs_tally_plan *plan, hs_marked *marked, hs_failure *failure)
+            const tally_plan *plan, marked_set *marked, hs_failure *failure)
 {
     const hs_set set = hs_set_with(NULL, known);
-    *marked = (hs_marked){.type = NULL};
+    *marked = (marked_set){.type = NULL};
     hs_status status = hs_weights_init(account, plan->sums ? set.weights : NULL, order, n,
                                        &marked->weights, failure);
     if (status != HS_OK || set.types == NULL || !plan->has_types) {
@@ -495,13 +529,10 @@ marked_init(hs_account *account, const hs_set *known, const int32_t *order, int6
     return HS_OK;
 }
 
-/* Point i of the set has the caller's number order[i]. HS_ERR_TYPES or HS_ERR_WEIGHTS set
- * failure->row. */
 static void
-marked_free(hs_account *account, hs_marked *marked)
+marked_free(hs_account *account, marked_set *marked)
 {
     hs_free(account, marked->type);
-    marked->type = NULL;
     hs_weights_free(account, &marked->weights);
 }
 
@@ -512,25 +543,25 @@ marked_free(hs_account *account, hs_marked *marked)
 #define FEW_SLOTS 1024
 
 static bool
-allocate(hs_tally *tally, int32_t block_capacity, int32_t most_hits)
+allocate(thread_tally *tally, const hs_block *block)
 {
-    const hs_tally_plan *plan = tally->plan;
-    hs_account          *account = plan->account;
-    const int64_t        n_counts = tally->n_copies * plan->n_groups * tally->n_slots;
-    tally->counts = hs_alloc(account, HS_FOR_CANDIDATES, n_counts, sizeof(int64_t));
-    tally->slots = hs_alloc(account, HS_FOR_CANDIDATES, most_hits, sizeof(int32_t));
-    tally->open = hs_alloc(account, HS_FOR_CANDIDATES, HS_TALLY_OPEN, sizeof(hs_tally_open));
-    tally->asked = hs_alloc(account, HS_FOR_CANDIDATES, HS_TALLY_OPEN, sizeof(int32_t));
+    const tally_plan *plan = tally->plan;
+    hs_account       *account = &plan->search->call->account;
+    const int64_t     n_slots = tally->n_copies * plan->n_groups * tally->n_slots;
+    tally->counts = hs_alloc(account, HS_FOR_CANDIDATES, n_slots, sizeof(int64_t));
+    tally->slots = hs_alloc(account, HS_FOR_CANDIDATES, block->most_hits, sizeof(int32_t));
+    tally->open = hs_alloc(account, HS_FOR_CANDIDATES, TALLY_OPEN, sizeof(open_pair));
+    tally->asked = hs_alloc(account, HS_FOR_CANDIDATES, TALLY_OPEN, sizeof(int32_t));
     tally->waiting = hs_alloc(account, HS_FOR_CANDIDATES, plan->edges.n, sizeof(int32_t));
     bool complete = tally->counts != NULL && tally->slots != NULL && tally->open != NULL &&
                     tally->asked != NULL && tally->waiting != NULL;
     if (complete && plan->has_types) {
-        tally->type = hs_alloc(account, HS_FOR_CANDIDATES, block_capacity, sizeof(int32_t));
+        tally->type = hs_alloc(account, HS_FOR_CANDIDATES, block->capacity, sizeof(int32_t));
         complete = tally->type != NULL;
     }
     if (complete && plan->sums) {
-        tally->value = hs_alloc(account, HS_FOR_CANDIDATES, block_capacity, sizeof(int64_t));
-        tally->place = hs_alloc(account, HS_FOR_CANDIDATES, block_capacity, sizeof(int32_t));
+        tally->value = hs_alloc(account, HS_FOR_CANDIDATES, block->capacity, sizeof(int64_t));
+        tally->place = hs_alloc(account, HS_FOR_CANDIDATES, block->capacity, sizeof(int32_t));
         complete = tally->value != NULL && tally->place != NULL &&
                    hs_sums_init(account, plan->n_groups * (plan->edges.n + 1),
                                 &plan->asking->weights, &plan->points.weights,
@@ -539,13 +570,14 @@ allocate(hs_tally *tally, int32_t block_capacity, int32_t most_hits)
     return complete;
 }
 
-hs_status
-hs_tally_init(const hs_tally_plan *plan, int32_t block_capacity, int32_t most_hits, hs_tally *tally)
+static hs_status
+open_tally(void *context, void *state, const hs_walker *walker)
 {
-    *tally = (hs_tally){.plan = plan, .n_slots = 2 * plan->edges.n + 1, .block = -1};
-    tally->n_copies = !plan->has_types && tally->n_slots <= FEW_SLOTS ? HS_TALLY_COPIES : 1;
-    if (!allocate(tally, block_capacity, most_hits)) {
-        hs_tally_free(tally);
+    const tally_plan *plan = context;
+    thread_tally     *tally = state;
+    *tally = (thread_tally){.plan = plan, .n_slots = 2 * plan->edges.n + 1, .block = -1};
+    tally->n_copies = !plan->has_types && tally->n_slots <= FEW_SLOTS ? TALLY_COPIES : 1;
+    if (!allocate(tally, &walker->scanner.block)) {
         return HS_ERR_MEMORY;
     }
     memset(tally->counts, 0,
@@ -556,14 +588,10 @@ hs_tally_init(const hs_tally_plan *plan, int32_t block_capacity, int32_t most_hi
     return HS_OK;
 }
 
-void
-hs_tally_free(hs_tally *tally)
+static void
+free_tally(hs_account *account, thread_tally *tally)
 {
-    if (tally->plan == NULL) {
-        return;
-    }
-    hs_account *account = tally->plan->account;
-    for (int e = 0; e < HS_TALLY_TABLES; e++) {
+    for (int e = 0; e < TALLY_TABLES; e++) {
         hs_edge_table_free(&tally->tables[e]);
     }
     hs_free(account, tally->counts);
@@ -575,24 +603,32 @@ hs_tally_free(hs_tally *tally)
     hs_free(account, tally->value);
     hs_free(account, tally->place);
     hs_sums_free(account, &tally->sums);
-    *tally = (hs_tally){.plan = NULL};
 }
 
-int64_t
-hs_tally_count(const hs_tally *tally, int64_t group, int64_t n_reached)
+/* Adds what the thread has counted to what those before have. */
+static void
+close_tally(void *context, void *state)
 {
-    int64_t sum = 0;
-    for (int copy = 0; copy < tally->n_copies; copy++) {
-        const int64_t *counts =
-            tally->counts + (copy * tally->plan->n_groups + group) * tally->n_slots;
-        sum += counts[2 * n_reached];
+    tally_plan   *plan = context;
+    thread_tally *tally = state, *all = &plan->all;
+    if (!plan->has_all) {
+        plan->has_all = true;
+        *all = *tally;
+        return;
     }
-    return sum;
+    const int64_t n_counts = all->n_copies * plan->n_groups * all->n_slots;
+    for (int64_t e = 0; all->counts != NULL && tally->counts != NULL && e < n_counts; e++) {
+        all->counts[e] += tally->counts[e];
+    }
+    if (all->sums.limbs != NULL && tally->sums.limbs != NULL) {
+        hs_sums_join(&all->sums, &tally->sums);
+    }
+    free_tally(&plan->search->call->account, tally);
 }
 
 /* The table for groups up to this extent, rounded up to a power of two so that there are few. */
 static const hs_edge_table *
-table_for(hs_tally *tally, double extent)
+table_for(thread_tally *tally, double extent)
 {
     int exponent = 0;
     if (!(extent > 0.0) || !isfinite(extent)) { /* NaN, with which nothing is sure, or one point */
@@ -600,7 +636,7 @@ table_for(hs_tally *tally, double extent)
     } else if (frexp(extent, &exponent) > 0.5) {
         extent = ldexp(1.0, exponent);
     }
-    hs_edge_table *table = &tally->tables[(unsigned)exponent % HS_TALLY_TABLES];
+    hs_edge_table *table = &tally->tables[(unsigned)exponent % TALLY_TABLES];
     if (table->extent != extent &&
         hs_edge_table_build(&tally->plan->edges, extent, table) != HS_OK) {
         return NULL;
@@ -610,7 +646,7 @@ table_for(hs_tally *tally, double extent)
 
 /* Types and weights of the candidates, once for each block. */
 static void
-load_block(hs_tally *tally, const hs_scanner *scanner)
+load_block(thread_tally *tally, const hs_scanner *scanner)
 {
     const hs_block   *block = &scanner->block;
     const hs_weights *weights = &tally->plan->points.weights;
@@ -630,21 +666,21 @@ load_block(hs_tally *tally, const hs_scanner *scanner)
 
 /* The groups of pairs of point si, by the type of the other point. */
 static const int32_t *
-groups_of(const hs_tally *tally, int32_t si)
+groups_of(const thread_tally *tally, int32_t si)
 {
-    const hs_tally_plan *plan = tally->plan;
+    const tally_plan *plan = tally->plan;
     return plan->group + (int64_t)plan->asking->type[si] * plan->n_types;
 }
 
 static int64_t
-group_of(const hs_tally *tally, int32_t si, int32_t place)
+group_of(const thread_tally *tally, int32_t si, int32_t place)
 {
     return tally->plan->has_types ? groups_of(tally, si)[tally->type[place]] : 0;
 }
 
 /* The weight of point si. */
 static int64_t
-weight_of(const hs_tally *tally, int32_t si, int32_t *place)
+weight_of(const thread_tally *tally, int32_t si, int32_t *place)
 {
     const hs_weights *weights = &tally->plan->asking->weights;
     *place = weights->place != NULL ? weights->place[si] : 0;
@@ -653,30 +689,20 @@ weight_of(const hs_tally *tally, int32_t si, int32_t *place)
 
 /* The sum of a group for pairs that reach so many edges. */
 static int64_t *
-limbs_of(const hs_tally *tally, int64_t group, int32_t n_reached)
+limbs_of(const thread_tally *tally, int64_t group, int32_t n_reached)
 {
     const int64_t n_bins = tally->plan->edges.n + 1;
     return tally->sums.limbs + (group * n_bins + n_reached) * tally->sums.n_limbs;
 }
 
 static void
-sum_pair(hs_tally *tally, int64_t group, int32_t si, int32_t candidate, int32_t n_reached)
-{
-    int32_t       place;
-    const int64_t value = weight_of(tally, si, &place);
-    hs_sums_expect(&tally->sums, 1);
-    hs_sums_add(limbs_of(tally, group, n_reached), value, tally->value[candidate],
-                place + tally->place[candidate]);
-}
-
-static void
-count_plain(hs_tally *tally, int32_t n)
+count_plain(thread_tally *tally, int32_t n)
 {
     const int32_t *slots = tally->slots;
     const int64_t  n_slots = tally->n_slots;
     int64_t       *counts = tally->counts;
     int32_t        h = 0;
-    for (; tally->n_copies == HS_TALLY_COPIES && h + HS_TALLY_COPIES <= n; h += HS_TALLY_COPIES) {
+    for (; tally->n_copies == TALLY_COPIES && h + TALLY_COPIES <= n; h += TALLY_COPIES) {
         counts[slots[h]]++;
         counts[n_slots + slots[h + 1]]++;
         counts[2 * n_slots + slots[h + 2]]++;
@@ -689,7 +715,7 @@ count_plain(hs_tally *tally, int32_t n)
 
 /* Counts hits [begin, end) of point si. */
 static void
-count_typed(hs_tally *tally, int32_t si, const int32_t *places, int32_t begin, int32_t end)
+count_typed(thread_tally *tally, int32_t si, const int32_t *places, int32_t begin, int32_t end)
 {
     const int32_t *groups = groups_of(tally, si), *type = tally->type;
     for (int32_t h = begin; h < end; h++) {
@@ -700,7 +726,7 @@ count_typed(hs_tally *tally, int32_t si, const int32_t *places, int32_t begin, i
 /* Sums weights of the hits of point si whose slots are even; those beyond the last edge add to a
  * sum that is never read. has_places: otherwise all places of weights are 0. */
 HS_ALWAYS_INLINE void
-sum_hits(hs_tally *tally, int32_t si, const int32_t *places, int32_t begin, int32_t end,
+sum_hits(thread_tally *tally, int32_t si, const int32_t *places, int32_t begin, int32_t end,
          const bool has_places)
 {
     int32_t        own_place;
@@ -722,9 +748,9 @@ sum_hits(hs_tally *tally, int32_t si, const int32_t *places, int32_t begin, int3
 
 /* An open pair whose range is empty is decided; others wait for the edge in the middle. */
 static void
-count_or_wait(hs_tally *tally, int32_t u)
+count_or_wait(thread_tally *tally, int32_t u)
 {
-    hs_tally_open *pair = &tally->open[u];
+    open_pair *pair = &tally->open[u];
     if (pair->low < pair->high) {
         const int32_t edge = pair->low + (pair->high - pair->low) / 2;
         if (tally->waiting[edge] < 0) {
@@ -736,31 +762,22 @@ count_or_wait(hs_tally *tally, int32_t u)
     }
     const int64_t group = group_of(tally, pair->si, pair->place);
     if (tally->plan->sums) {
-        sum_pair(tally, group, pair->si, pair->place, pair->low);
+        int32_t       place;
+        const int64_t value = weight_of(tally, pair->si, &place);
+        hs_sums_expect(&tally->sums, 1);
+        hs_sums_add(limbs_of(tally, group, pair->low), value, tally->value[pair->place],
+                    place + tally->place[pair->place]);
     }
     tally->counts[group * tally->n_slots + 2 * pair->low]++;
 }
 
-/* Traces pairs that wait for an edge, from u on; *next: the first that did not fit the batch. */
-static hs_status
-batch_waiting(hs_tally *tally, hs_scanner *scanner, int32_t u, int32_t *next)
-{
-    hs_pair_batch *pair_batch = &scanner->pair_batch;
-    hs_pair_batch_clear(pair_batch);
-    while (u >= 0 && pair_batch->n < HS_BATCH) {
-        hs_pair_batch_put(pair_batch, tally->open[u].si, tally->open[u].place);
-        u = tally->open[u].next;
-    }
-    *next = u;
-    return hs_pair_batch_look_up(pair_batch, true, &scanner->failed_point);
-}
-
 /* Decides all pairs that wait for one edge. */
 static hs_status
-decide_edge(hs_tally *tally, hs_scanner *scanner, int32_t edge)
+decide_edge(thread_tally *tally, hs_scanner *scanner, int32_t edge)
 {
     const hs_metric *given = &scanner->search->scene.metric;
     const hs_edges  *edges = &tally->plan->edges;
+    hs_pair_batch   *pair_batch = &scanner->pair_batch;
     hs_metric        metric;
     uint8_t          within[HS_BATCH];
     int32_t          u = tally->waiting[edge], end;
@@ -768,14 +785,18 @@ decide_edge(hs_tally *tally, hs_scanner *scanner, int32_t edge)
     hs_metric_init(&metric, given->ndim, given->n_rows, (const double(*)[HS_MAX_DIM])given->rows,
                    edges->at[edge], hs_edge_is_inclusive(edges, edge));
     while (u >= 0) {
-        const hs_status status = batch_waiting(tally, scanner, u, &end);
+        hs_pair_batch_clear(pair_batch);
+        for (end = u; end >= 0 && pair_batch->n < HS_BATCH; end = tally->open[end].next) {
+            hs_pair_batch_put(pair_batch, tally->open[end].si, tally->open[end].place);
+        }
+        const hs_status status = hs_pair_batch_look_up(pair_batch, true, &scanner->failed_point);
         if (status != HS_OK) {
             return status;
         }
         hs_decide_pair_batch(scanner, &metric, within);
         for (int32_t e = 0; u != end; e++) {
-            hs_tally_open *pair = &tally->open[u];
-            const int32_t  next = pair->next;
+            open_pair    *pair = &tally->open[u];
+            const int32_t next = pair->next;
             if (within[e]) {
                 pair->high = edge;
             } else {
@@ -790,7 +811,7 @@ decide_edge(hs_tally *tally, hs_scanner *scanner, int32_t edge)
 
 /* Decides all open pairs. */
 static hs_status
-decide_open(hs_tally *tally, hs_scanner *scanner)
+decide_open(thread_tally *tally, hs_scanner *scanner)
 {
     hs_status status = HS_OK;
     scanner->n_ambiguous += tally->n_open;
@@ -806,7 +827,7 @@ decide_open(hs_tally *tally, hs_scanner *scanner)
 
 /* Looks again at hits with odd slots. */
 static hs_status
-look_again(hs_tally *tally, hs_scanner *scanner, const hs_edge_table *table, int32_t first,
+look_again(thread_tally *tally, hs_scanner *scanner, const hs_edge_table *table, int32_t first,
            const hs_hits *hits)
 {
     hs_status status = HS_OK;
@@ -815,13 +836,13 @@ look_again(hs_tally *tally, hs_scanner *scanner, const hs_edge_table *table, int
             if (!(tally->slots[h] & 1)) {
                 continue;
             }
-            hs_tally_open *pair = &tally->open[tally->n_open];
-            *pair = (hs_tally_open){.si = first + t, .place = hits->label[h]};
+            open_pair *pair = &tally->open[tally->n_open];
+            *pair = (open_pair){.si = first + t, .place = hits->label[h]};
             hs_edge_range(table, &tally->plan->edges, scanner->block.squares[h], &pair->low,
                           &pair->high);
             if (pair->low == pair->high) { /* of a cell with several bands, but in none of these */
                 count_or_wait(tally, tally->n_open);
-            } else if (++tally->n_open == HS_TALLY_OPEN) {
+            } else if (++tally->n_open == TALLY_OPEN) {
                 status = decide_open(tally, scanner);
             }
             if (status != HS_OK) {
@@ -832,10 +853,11 @@ look_again(hs_tally *tally, hs_scanner *scanner, const hs_edge_table *table, int
     return decide_open(tally, scanner);
 }
 
-hs_status
-hs_tally_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+/* A hs_visit_fn for HS_BLOCK_LISTS_SQUARES. */
+static hs_status
+tally_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    hs_tally            *tally = context;
+    thread_tally        *tally = context;
     const hs_edge_table *table = table_for(tally, scanner->form->extent);
     const int32_t        n = hits->end[hits->n - 1];
     if (table == NULL) {
@@ -863,11 +885,9 @@ hs_tally_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *
     return is_open ? look_again(tally, scanner, table, first, hits) : HS_OK;
 }
 
-/* Edges, types and weights in the order of the cells, before any thread counts. */
-
 /* Which pairs of types are told apart: all, but in the half list (a, b) and (b, a) are one. */
 static hs_status
-plan_groups(bool has_queries, hs_tally_plan *plan)
+plan_groups(hs_account *account, bool has_queries, tally_plan *plan)
 {
     const int64_t n = plan->n_types;
     plan->n_groups = has_queries ? n * n : n * (n + 1) / 2;
@@ -876,7 +896,7 @@ plan_groups(bool has_queries, hs_tally_plan *plan)
         return HS_OK;
     }
     plan->group = plan->n_groups <= INT32_MAX
-                      ? hs_alloc(plan->account, HS_FOR_CANDIDATES, n * n, sizeof(int32_t))
+                      ? hs_alloc(account, HS_FOR_CANDIDATES, n * n, sizeof(int32_t))
                       : NULL;
     if (plan->group == NULL) {
         return HS_ERR_MEMORY;
@@ -892,12 +912,12 @@ plan_groups(bool has_queries, hs_tally_plan *plan)
     return HS_OK;
 }
 
-hs_status
-hs_tally_plan_open(hs_search *search, const hs_histogram *histogram, const hs_sets *sets,
-                   hs_tally_plan *plan, hs_failure *failure)
+/* Edges, types and weights in the order of the cells, before any thread counts. */
+static hs_status
+open_plan(const hs_histogram *histogram, const hs_sets *sets, tally_plan *plan, hs_failure *failure)
 {
+    hs_search  *search = plan->search;
     hs_account *account = &search->call->account;
-    plan->account = account;
     plan->has_types = histogram->n_types > 1;
     plan->n_types = histogram->n_types;
     plan->sums = histogram->sums != NULL;
@@ -917,14 +937,61 @@ hs_tally_plan_open(hs_search *search, const hs_histogram *histogram, const hs_se
         (plan->points.type == NULL || plan->asking->type == NULL)) {
         status = HS_ERR_TYPES;
     }
-    return status == HS_OK ? plan_groups(search->has_queries, plan) : status;
+    return status == HS_OK ? plan_groups(account, search->has_queries, plan) : status;
 }
 
-void
-hs_tally_plan_close(hs_tally_plan *plan)
+/* What was counted of one group, to entry `to` and on. Returns their number. */
+static int64_t
+write_group(const thread_tally *all, int64_t group, int64_t to, const hs_histogram *histogram)
 {
-    edges_free(plan->account, &plan->edges);
-    marked_free(plan->account, &plan->points);
-    marked_free(plan->account, &plan->queries);
-    hs_free(plan->account, plan->group);
+    int64_t n_pairs = 0;
+    for (int64_t k = 0; k < histogram->n_edges; k++) {
+        int64_t count = 0;
+        for (int copy = 0; copy < all->n_copies; copy++) {
+            count += all->counts[(copy * all->plan->n_groups + group) * all->n_slots + 2 * k];
+        }
+        if (histogram->counts != NULL) {
+            histogram->counts[to + k] = count;
+        }
+        if (histogram->sums != NULL) {
+            histogram->sums[to + k] =
+                hs_sums_round(&all->sums, group * (histogram->n_edges + 1) + k);
+        }
+        n_pairs += count;
+    }
+    return n_pairs;
+}
+
+hs_status
+hs_histogram_fill(hs_search *search, const hs_histogram *histogram, const hs_sets *sets,
+                  int64_t *n_pairs, hs_failure *failure)
+{
+    hs_account      *account = &search->call->account;
+    tally_plan       plan = {.search = search};
+    const hs_visitor visitor = {.use = HS_BLOCK_LISTS_SQUARES,
+                                .visit = tally_hits,
+                                .shared = &plan,
+                                .state_size = sizeof(thread_tally),
+                                .open = open_tally,
+                                .close = close_tally};
+    const int64_t    n_types = histogram->n_types;
+    hs_status        status = open_plan(histogram, sets, &plan, failure);
+    if (status == HS_OK) {
+        status = hs_parallel_visit(search, &visitor, NULL, failure);
+    }
+    if (status == HS_OK && plan.sums) {
+        hs_sums_carry(&plan.all.sums);
+    }
+    for (int64_t at = 0; status == HS_OK && at < n_types * n_types; at++) {
+        const bool    again = !search->has_queries && at % n_types < at / n_types;
+        const int64_t found = write_group(&plan.all, plan.has_types ? plan.group[at] : 0,
+                                          at * histogram->n_edges, histogram);
+        *n_pairs += again ? 0 : found;
+    }
+    free_tally(account, &plan.all);
+    hs_free(account, plan.edges.at);
+    marked_free(account, &plan.points);
+    marked_free(account, &plan.queries);
+    hs_free(account, plan.group);
+    return status;
 }

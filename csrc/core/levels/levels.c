@@ -13,8 +13,6 @@
 /* levels.c: supports are read and checked, points divided into levels, and steps planned between
  * these; a level as others see it is a set of points by itself. */
 
-/* The lower triangle of each matrix, once the upper one is seen to be the same. */
-
 /* The lower triangle, each number of the matrix read once. False if one is not finite or differs
  * from its mirror image, which is *wrong then; NaN differs. */
 static bool
@@ -33,63 +31,6 @@ read_entries(const double *matrix, int ndim, double *entries, double *wrong)
         }
     }
     return right;
-}
-
-static hs_status
-refuse_support(hs_status status, int64_t row, double value, hs_failure *failure)
-{
-    failure->row = row;
-    failure->value = value;
-    return status;
-}
-
-static hs_status
-read_one(const double *matrix, int64_t row, int ndim, double extent, double *numbers, double *reach,
-         hs_failure *failure)
-{
-    double wrong = 0.0;
-    if (!read_entries(matrix, ndim, numbers, &wrong)) {
-        return refuse_support(HS_ERR_SUPPORTS, row, wrong, failure);
-    }
-    numbers[hs_support_entries(ndim)] = hs_support_size(ndim, numbers);
-    switch (hs_support_reach(ndim, numbers, extent, reach)) {
-    case HS_SUPPORT_FITS: return HS_OK;
-    case HS_SUPPORT_NOT_DEFINITE: return refuse_support(HS_ERR_SUPPORTS, row, numbers[0], failure);
-    default: return refuse_support(HS_ERR_SUPPORT_REACH, row, extent, failure);
-    }
-}
-
-/* Idempotent. */
-static void
-support_set_free(hs_account *account, hs_support_set *set)
-{
-    hs_free(account, set->numbers);
-    set->numbers = NULL;
-}
-
-hs_status
-hs_support_set_read(hs_account *account, const hs_options *options, const double *supports,
-                    int64_t n, int ndim, double extent, hs_support_set *set, double *reaches,
-                    hs_failure *failure)
-{
-    const int64_t each = hs_support_numbers(ndim);
-    hs_status     status = HS_OK;
-    set->first = 0;
-    set->numbers = hs_alloc(account, HS_FOR_SUPPORTS, n * each, sizeof *set->numbers);
-    if (set->numbers == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    for (int64_t i = 0; status == HS_OK && i < n; i++) {
-        status = read_one(supports + i * ndim * ndim, i, ndim, extent, set->numbers + i * each,
-                          &reaches[i], failure);
-        if (status == HS_OK && (i + 1) % HS_POLL_SUPPORTS == 0) {
-            status = hs_poll(options, 0.0);
-        }
-    }
-    if (status != HS_OK) {
-        support_set_free(account, set);
-    }
-    return status;
 }
 
 /* How far pairs of a step can be apart along an axis of the grid, by their supports: cells go by
@@ -151,8 +92,9 @@ free_level_set(hs_account *account, hs_level_set *set)
     hs_free(account, set->rows);
     hs_free(account, set->number);
     hs_free(account, set->radii);
+    hs_free(account, set->range);
     hs_free(account, set->first);
-    support_set_free(account, &set->supports);
+    hs_free(account, set->supports.numbers);
 }
 
 void
@@ -250,80 +192,92 @@ division_go_on(const division *by, int64_t n, hs_slice *next, hs_status *status)
     return *status == HS_OK && next->first < n;
 }
 
+/* Of the points of a part. */
 static hs_status
-read_radii(division *by, level_input *set, hs_failure *failure)
+read_radii(division *by, level_input *set, hs_slice part, hs_failure *failure)
 {
-    const bool    halves = by->reach->rule == HS_RULE_MEAN, extends = by->factor != 1.0;
-    const double  largest = extends ? LARGEST_EXTENDED : LARGEST_RADIUS;
-    const double  smallest = extends ? SMALLEST_EXTENDED : halves ? SMALLEST_HALVED : 0.0;
-    const int64_t n = set->radii != NULL ? set->points->n : 0;
-    hs_slice      next = {0, 0};
-    hs_status     status = HS_OK;
-    while (division_go_on(by, n, &next, &status)) {
-        for (int64_t i = next.first; i < next.end; i++) {
-            const double radius = set->radii[i] + 0.0; /* and no -0 */
-            if (!(radius >= 0.0 && radius <= largest) || (radius > 0.0 && radius < smallest)) {
-                return refuse_input(HS_ERR_RADII, set, i, radius, failure);
-            }
-            set->copy[i] = halves ? 0.5 * radius : radius;
-            by->largest = hs_larger(by->largest, set->copy[i]);
+    const bool   halves = by->reach->rule == HS_RULE_MEAN, extends = by->factor != 1.0;
+    const double largest = extends ? LARGEST_EXTENDED : LARGEST_RADIUS;
+    const double smallest = extends ? SMALLEST_EXTENDED : halves ? SMALLEST_HALVED : 0.0;
+    for (int64_t i = part.first; set->radii != NULL && i < part.end; i++) {
+        const double radius = set->radii[i] + 0.0; /* and no -0 */
+        if (!(radius >= 0.0 && radius <= largest) || (radius > 0.0 && radius < smallest)) {
+            return refuse_input(HS_ERR_RADII, set, i, radius, failure);
         }
+        set->copy[i] = halves ? 0.5 * radius : radius;
+        by->largest = hs_larger(by->largest, set->copy[i]);
     }
-    return status;
+    return HS_OK;
 }
 
 static hs_status
-read_supports(division *by, level_input *set, hs_failure *failure)
+read_types(const division *by, level_input *set, hs_slice part, hs_failure *failure)
+{
+    for (int64_t i = part.first; i < part.end; i++) {
+        const int32_t type = set->types[i];
+        if (type < 0 || type >= by->reach->n_types) {
+            return refuse_input(HS_ERR_TYPES, set, i, type, failure);
+        }
+        set->size[i] = type;
+        by->count[type]++;
+    }
+    return HS_OK;
+}
+
+/* Support `row`: checked, and how far it reaches. */
+static hs_status
+read_support(division *by, level_input *set, int64_t row, hs_failure *failure)
+{
+    const int ndim = set->points->ndim;
+    double   *numbers = set->read.numbers + row * hs_support_numbers(ndim), wrong = 0.0;
+    if (!read_entries(set->supports + row * ndim * ndim, ndim, numbers, &wrong)) {
+        return refuse_input(HS_ERR_SUPPORTS, set, row, wrong, failure);
+    }
+    numbers[hs_support_entries(ndim)] = hs_support_size(ndim, numbers);
+    switch (hs_support_reach(ndim, numbers, by->reach->extent, &set->copy[row])) {
+    case HS_SUPPORT_FITS: by->largest = hs_larger(by->largest, set->copy[row]); return HS_OK;
+    case HS_SUPPORT_NOT_DEFINITE:
+        return refuse_input(HS_ERR_SUPPORTS, set, row, numbers[0], failure);
+    default: return refuse_input(HS_ERR_SUPPORT_REACH, set, row, by->reach->extent, failure);
+    }
+}
+
+/* Supports, if there are any; then what the reach goes by, and the points. */
+static hs_status
+read_all(division *by, level_input *set, hs_failure *failure)
 {
     const int64_t n = set->points->n;
+    hs_slice      next = {0, 0};
     hs_status     status = HS_OK;
     if (set->supports != NULL) {
-        status = hs_support_set_read(by->account, by->options, set->supports, n, set->points->ndim,
-                                     by->reach->extent, &set->read, set->copy, failure);
+        set->read.numbers = hs_alloc(by->account, HS_FOR_SUPPORTS,
+                                     n * hs_support_numbers(set->points->ndim), sizeof(double));
+        status = set->read.numbers != NULL ? HS_OK : HS_ERR_MEMORY;
         failure->in_queries = set->are_queries;
     }
     for (int64_t i = 0; status == HS_OK && set->supports != NULL && i < n; i++) {
-        by->largest = hs_larger(by->largest, set->copy[i]);
-    }
-    return status;
-}
-
-static hs_status
-read_types(const division *by, level_input *set, hs_failure *failure)
-{
-    hs_slice  next = {0, 0};
-    hs_status status = HS_OK;
-    while (division_go_on(by, set->points->n, &next, &status)) {
-        for (int64_t i = next.first; i < next.end; i++) {
-            const int32_t type = set->types[i];
-            if (type < 0 || type >= by->reach->n_types) {
-                return refuse_input(HS_ERR_TYPES, set, i, type, failure);
-            }
-            set->size[i] = type;
-            by->count[type]++;
+        status = read_support(by, set, i, failure);
+        if (status == HS_OK && (i + 1) % HS_POLL_SUPPORTS == 0) {
+            status = hs_poll(by->options, 0.0);
         }
     }
-    return status;
-}
-
-static hs_status
-read_rows(const division *by, level_input *set, hs_failure *failure)
-{
-    hs_slice  next = {0, 0};
-    hs_status status = HS_OK;
-    while (division_go_on(by, set->points->n, &next, &status)) {
+    while (division_go_on(by, n, &next, &status)) {
         hs_points part = *set->points;
         part.data = (const char *)part.data + next.first * part.row_stride;
         part.n = next.end - next.first;
-        status = hs_points_copy_finite(&part, set->rows + next.first * part.ndim, failure);
-        if (status != HS_OK) {
-            failure->row += next.first;
-            failure->in_queries = set->are_queries;
+        status = by->reach->n_types > 0 ? read_types(by, set, next, failure)
+                                        : read_radii(by, set, next, failure);
+        if (status == HS_OK) {
+            status = hs_points_copy_finite(&part, set->rows + next.first * part.ndim, failure);
+            failure->row += status == HS_OK ? 0 : next.first;
+            failure->in_queries = set->are_queries && status != HS_OK;
         }
     }
     return status;
 }
 
+/* Reads a set, and counts its types or finds the largest of its radii. On failure as well, it is to
+ * be freed. */
 static hs_status
 read_input(division *by, level_input *set, hs_failure *failure)
 {
@@ -331,28 +285,20 @@ read_input(division *by, level_input *set, hs_failure *failure)
     set->rows = hs_alloc(by->account, HS_FOR_POINTS, n * set->points->ndim, sizeof *set->rows);
     set->copy = hs_alloc(by->account, HS_FOR_POINTS, n, sizeof *set->copy);
     set->size = hs_alloc(by->account, HS_FOR_ORDER, n, sizeof *set->size);
-    if (set->rows == NULL || set->copy == NULL || set->size == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    const hs_status status = by->reach->has_supports  ? read_supports(by, set, failure)
-                             : by->reach->n_types > 0 ? read_types(by, set, failure)
-                                                      : read_radii(by, set, failure);
-    return status == HS_OK ? read_rows(by, set, failure) : status;
+    return set->rows != NULL && set->copy != NULL && set->size != NULL ? read_all(by, set, failure)
+                                                                       : HS_ERR_MEMORY;
 }
 
-/* Reads a set, and counts its types or finds the largest of its radii. On failure as well, it is to
- * be freed. */
 static void
 free_input(hs_account *account, level_input *set)
 {
     hs_free(account, set->rows);
     hs_free(account, set->copy);
     hs_free(account, set->size);
-    support_set_free(account, &set->read);
+    hs_free(account, set->read.numbers);
 }
 
-/* One pass finds the level of each point, a counting sort puts the levels in
- * order. */
+/* One pass finds the level of each point, a counting sort puts the levels in order. */
 
 /* Sizes count the binary orders of a radius below the largest one, and zero as the smallest. */
 #define LEAST_EXPONENT (-1074)
@@ -382,19 +328,9 @@ find_sizes(const division *by, level_input *set)
     return status;
 }
 
-/* Gives each size that occurs a level, in count; returns how many there are. */
-static int32_t
-number_levels(const division *by)
-{
-    int32_t n = 0;
-    for (int32_t s = 0; s < by->n_sizes; s++) {
-        by->count[s] = by->count[s] > 0 ? n++ : -1;
-    }
-    return n;
-}
-
-static bool
-allocate_set(const division *by, const level_input *from, int32_t n_levels, hs_level_set *to)
+/* Puts the points in the order of their levels. */
+static hs_status
+arrange(const division *by, level_input *from, int32_t n_levels, hs_level_set *to)
 {
     const int64_t n = from->points->n;
     to->n = n;
@@ -403,19 +339,17 @@ allocate_set(const division *by, const level_input *from, int32_t n_levels, hs_l
     to->number = hs_alloc(by->account, HS_FOR_ORDER, n, sizeof *to->number);
     to->first = hs_alloc(by->account, HS_FOR_CELLS, (int64_t)n_levels + 1, sizeof *to->first);
     to->radii = NULL;
+    to->range = NULL;
     if (has_radii(from)) {
         to->radii = hs_alloc(by->account, HS_FOR_POINTS, n, sizeof *to->radii);
+        to->range = hs_alloc(by->account, HS_FOR_CELLS, n_levels, sizeof *to->range);
     }
-    return to->rows != NULL && to->number != NULL && to->first != NULL &&
-           (to->radii != NULL || !has_radii(from));
-}
-
-/* Puts the points in the order of their levels. */
-static hs_status
-arrange(const division *by, level_input *from, int32_t n_levels, hs_level_set *to)
-{
-    if (!allocate_set(by, from, n_levels, to)) {
+    if (to->rows == NULL || to->number == NULL || to->first == NULL ||
+        (has_radii(from) && (to->radii == NULL || to->range == NULL))) {
         return HS_ERR_MEMORY;
+    }
+    for (int32_t l = 0; to->range != NULL && l < n_levels; l++) {
+        to->range[l] = (hs_radii_range){HUGE_VAL, 0.0, HUGE_VAL};
     }
     const size_t bytes = (size_t)to->ndim * sizeof(double);
     hs_slice     part = {0, 0};
@@ -428,11 +362,15 @@ arrange(const division *by, level_input *from, int32_t n_levels, hs_level_set *t
     hs_starts_of_lengths(next, (int64_t)n_levels + 1);
     while (division_go_on(by, to->n, &part, &status)) {
         for (int64_t i = part.first; i < part.end; i++) {
-            const int64_t at = next[by->count[from->size[i]]]++;
+            const int64_t level = by->count[from->size[i]], at = next[level]++;
             memcpy(to->rows + at * to->ndim, from->rows + i * to->ndim, bytes);
             to->number[at] = (int32_t)i;
             if (to->radii != NULL) {
-                to->radii[at] = from->copy[i];
+                hs_radii_range *range = &to->range[level];
+                const double    radius = to->radii[at] = from->copy[i];
+                range->smallest = hs_smaller(range->smallest, radius);
+                range->largest = hs_larger(range->largest, radius);
+                range->least = radius > 0.0 ? hs_smaller(range->least, radius) : range->least;
             }
         }
     }
@@ -489,7 +427,9 @@ divide(division *by, level_input *inputs, hs_levels *levels, hs_failure *failure
     for (int s = 0; s < n && status == HS_OK && !has_types; s++) {
         status = find_sizes(by, &inputs[s]);
     }
-    levels->n = number_levels(by);
+    for (int32_t s = 0; s < by->n_sizes; s++) { /* each size that occurs becomes a level */
+        by->count[s] = by->count[s] > 0 ? levels->n++ : -1;
+    }
     if (status == HS_OK && has_types) {
         status = read_cutoffs(by, levels, failure);
     }
@@ -538,8 +478,8 @@ hs_levels_divide(hs_account *account, const hs_options *options, const hs_set *p
 }
 
 /*
- * The steps by rule. With a sum, the larger of two points decides nearly alone once
- * the other one is an eighth of it: only the two levels below a level are searched by themselves.
+ * The steps by rule. With a sum, the larger of two points decides nearly alone once the other one
+ * is an eighth of it: only the two levels below a level are searched by themselves.
  */
 
 /* Levels below another that are searched one by one for a sum of radii. */
@@ -551,75 +491,20 @@ hs_levels_divide(hs_account *account, const hs_options *options, const hs_set *p
 /* Times a product of two float64s, less than what its low word is a multiple of. */
 #define LOW_WORD 0x1p-110
 
-/* Radii of points in some levels; nothing where there are none. */
-typedef struct radii_range {
-    double smallest, largest, least; /* least: that is not 0 */
-} radii_range;
-
-/* Extremes are found in so many parts, which do not wait for each other. */
-#define PARTS 4
-
-/* The smallest of radii, and of those that are not 0; infinity where there are none. */
-static void
-find_smallest(const double *radii, int64_t n, radii_range *range)
-{
-    double smallest[PARTS], least[PARTS];
-    for (int p = 0; p < PARTS; p++) {
-        smallest[p] = least[p] = HUGE_VAL;
-    }
-    for (int64_t first = 0; first < n; first += PARTS) {
-        for (int p = 0; p < PARTS; p++) {
-            const double radius = radii[first + p < n ? first + p : n - 1];
-            const double positive = radius > 0.0 ? radius : HUGE_VAL;
-            smallest[p] = hs_smaller(smallest[p], radius);
-            least[p] = hs_smaller(least[p], positive);
-        }
-    }
-    for (int p = 0; p < PARTS; p++) {
-        range->smallest = hs_smaller(range->smallest, smallest[p]);
-        range->least = hs_smaller(range->least, least[p]);
-    }
-}
-
-static double
-largest_of(const double *radii, int64_t n)
-{
-    double largest[PARTS] = {0.0};
-    for (int64_t first = 0; first < n; first += PARTS) {
-        for (int p = 0; p < PARTS; p++) {
-            largest[p] = hs_larger(largest[p], radii[first + p < n ? first + p : n - 1]);
-        }
-    }
-    return hs_larger(hs_larger(largest[0], largest[1]), hs_larger(largest[2], largest[3]));
-}
-
-/* Of a slice that has a point. Levels ascend, so that the first ones and the last tell all. */
-static radii_range
+/* Of a slice that has a point; least 0 where all are. */
+static hs_radii_range
 range_of(const hs_level_set *set, hs_slice levels)
 {
-    const int64_t end = set->first[levels.end];
-    int64_t       last = levels.end - 1;
-    if (set->radii == NULL) {
-        return (radii_range){0.0, 0.0, 0.0};
+    hs_radii_range all = {HUGE_VAL, 0.0, HUGE_VAL};
+    for (int64_t l = levels.first; set->range != NULL && l < levels.end; l++) {
+        all.smallest = hs_smaller(all.smallest, set->range[l].smallest);
+        all.largest = hs_larger(all.largest, set->range[l].largest);
+        all.least = hs_smaller(all.least, set->range[l].least);
     }
-    radii_range range = {.smallest = HUGE_VAL, .least = HUGE_VAL};
-    for (int64_t l = levels.first; l < levels.end && range.least == HUGE_VAL; l++) {
-        const int64_t first = set->first[l];
-        find_smallest(set->radii + first, set->first[l + 1] - first, &range);
-    }
-    while (set->first[last] == end) {
-        last--;
-    }
-    range.largest = largest_of(set->radii + set->first[last], end - set->first[last]);
-    range.least = range.least == HUGE_VAL ? 0.0 : range.least;
-    return range;
+    all.smallest = set->range != NULL ? all.smallest : 0.0;
+    all.least = all.least < HUGE_VAL ? all.least : 0.0;
+    return all;
 }
-
-/* What steps are added to, and from. */
-typedef struct planning {
-    const hs_levels *levels;
-    hs_level_plan   *plan;
-} planning;
 
 static bool
 is_empty(const hs_level_set *set, hs_slice levels)
@@ -627,17 +512,10 @@ is_empty(const hs_level_set *set, hs_slice levels)
     return levels.first >= levels.end || set->first[levels.first] == set->first[levels.end];
 }
 
-static hs_dw
-limit_by(const planning *now, double asking, double other)
-{
-    return hs_limit_by(now->levels->rule, now->levels->factor, asking, other, now->plan->bound);
-}
-
 static void
-add_step(planning *now, hs_slice asking, hs_slice points, bool is_own)
+add_step(hs_level_plan *plan, hs_slice asking, hs_slice points, bool is_own)
 {
-    const hs_levels    *levels = now->levels;
-    hs_level_plan      *plan = now->plan;
+    const hs_levels    *levels = plan->levels;
     const hs_level_set *askers = hs_levels_asking(levels);
     if (is_empty(askers, asking) || is_empty(&levels->points, points)) {
         return;
@@ -652,9 +530,10 @@ add_step(planning *now, hs_slice asking, hs_slice points, bool is_own)
         plan->steps[plan->n++] = step;
         return;
     }
-    const radii_range a = range_of(askers, asking), b = range_of(&levels->points, points);
-    const hs_dw       low = limit_by(now, a.smallest, b.smallest);
-    const hs_dw       high = limit_by(now, a.largest, b.largest);
+    const hs_radii_range a = range_of(askers, asking), b = range_of(&levels->points, points);
+    const hs_rule        rule = levels->rule;
+    const hs_dw low = hs_limit_by(rule, levels->factor, a.smallest, b.smallest, plan->bound);
+    const hs_dw high = hs_limit_by(rule, levels->factor, a.largest, b.largest, plan->bound);
     step.cutoff = high.lo > 0.0 ? hs_next_up(high.hi) : high.hi;
     step.least = a.least > 0.0 && !(b.least > 0.0 && b.least < a.least) ? a.least : b.least;
     if (levels->factor != 1.0) { /* where lengths are scaled, the low words of products count */
@@ -666,34 +545,34 @@ add_step(planning *now, hs_slice asking, hs_slice points, bool is_own)
 
 /* Level l with itself and with all below it, those far below together; with queries, both ways. */
 static void
-add_below(planning *now, int32_t l, int32_t apart)
+add_below(hs_level_plan *plan, int32_t l, int32_t apart)
 {
     const hs_slice own = {l, l + 1};
-    const bool     is_half = now->plan->is_half;
-    add_step(now, own, own, is_half);
+    const bool     is_half = plan->is_half;
+    add_step(plan, own, own, is_half);
     for (int32_t below = l - 1; below >= 0 && below >= l - apart; below--) {
         const hs_slice other = {below, below + 1};
-        add_step(now, own, other, false);
+        add_step(plan, own, other, false);
         if (!is_half) {
-            add_step(now, other, own, false);
+            add_step(plan, other, own, false);
         }
     }
     const hs_slice rest = {0, l - apart};
-    add_step(now, own, rest, false);
+    add_step(plan, own, rest, false);
     if (!is_half) {
-        add_step(now, rest, own, false);
+        add_step(plan, rest, own, false);
     }
 }
 
 /* Level l with itself and with all above it, which look among its points. */
 static void
-add_above(planning *now, int32_t l)
+add_above(hs_level_plan *plan, int32_t l)
 {
-    const hs_slice own = {l, l + 1}, rest = {l + 1, now->levels->n};
-    add_step(now, own, own, now->plan->is_half);
-    add_step(now, rest, own, false);
-    if (!now->plan->is_half) {
-        add_step(now, own, rest, false);
+    const hs_slice own = {l, l + 1}, rest = {l + 1, plan->levels->n};
+    add_step(plan, own, own, plan->is_half);
+    add_step(plan, rest, own, false);
+    if (!plan->is_half) {
+        add_step(plan, own, rest, false);
     }
 }
 
@@ -703,6 +582,13 @@ add_above(planning *now, int32_t l)
  * for every other: with three types that costs two or three times as much.
  */
 #define SHARE_OF_PAIRED 0.3
+
+/* How many points these levels have. */
+static double
+count_of(const hs_level_set *set, hs_slice levels)
+{
+    return (double)(set->first[levels.end] - set->first[levels.first]);
+}
 
 /* By how much the candidates of all pairs of types are fewer than those of all at once. */
 static double
@@ -718,16 +604,18 @@ share_of_paired(const hs_levels *levels)
     for (int32_t e = 0; e < n * n && largest > 0.0 && all > 0.0; e++) {
         const double   volume = pow(hs_larger(levels->cutoffs[e], 0.0) / largest, points->ndim);
         const hs_slice a = {e / n, e / n + 1}, b = {e % n, e % n + 1};
-        share += hs_level_count(asking, a) * hs_level_count(points, b) / all * volume;
+        share += count_of(asking, a) * count_of(points, b) / all * volume;
     }
     return share;
 }
 
 /* Whether there is one search, as far as that does not depend on where the points are. */
 static bool
-takes_all(const hs_levels *levels, hs_algorithm algorithm)
+takes_all(const hs_level_plan *plan)
 {
-    const bool has_types = levels->cutoffs != NULL;
+    const hs_levels   *levels = plan->levels;
+    const hs_algorithm algorithm = plan->algorithm;
+    const bool         has_types = levels->cutoffs != NULL;
     if (levels->n < 2 || algorithm == HS_HIERARCHY || (has_types && levels->n > HS_TABLE_TYPES)) {
         return false;
     }
@@ -735,17 +623,17 @@ takes_all(const hs_levels *levels, hs_algorithm algorithm)
 }
 
 static void
-add_all(planning *now)
+add_all(hs_level_plan *plan)
 {
-    const hs_levels *levels = now->levels;
+    const hs_levels *levels = plan->levels;
     const hs_slice   all = {0, levels->n};
     if (levels->cutoffs == NULL) {
-        add_step(now, all, all, now->plan->is_half);
+        add_step(plan, all, all, plan->is_half);
         return;
     }
     hs_level_step step = {.asking = all,
                           .points = all,
-                          .is_own = now->plan->is_half,
+                          .is_own = plan->is_half,
                           .by_table = true,
                           .has_limits = true};
     for (int32_t e = 0; e < levels->n * levels->n; e++) {
@@ -755,70 +643,34 @@ add_all(planning *now)
             step.least = cutoff;
         }
     }
-    step.cutoff = hs_smaller(step.cutoff, now->plan->bound);
-    now->plan->steps[now->plan->n++] = step;
+    step.cutoff = hs_smaller(step.cutoff, plan->bound);
+    plan->steps[plan->n++] = step;
 }
 
 static void
-add_level(planning *now, int32_t l)
+add_level(hs_level_plan *plan, int32_t l)
 {
-    const hs_slice own = {l, l + 1}, all = {0, now->levels->n};
-    if (now->levels->cutoffs != NULL) {
-        add_below(now, l, l);
+    const hs_slice own = {l, l + 1}, all = {0, plan->levels->n};
+    if (plan->levels->cutoffs != NULL) {
+        add_below(plan, l, l);
         return;
     }
-    switch (now->levels->rule) {
-    case HS_RULE_MAX: add_below(now, l, 0); break;
-    case HS_RULE_MIN: add_above(now, l); break;
-    case HS_RULE_GATHER: add_step(now, own, all, false); break;
-    case HS_RULE_SCATTER: add_step(now, all, own, false); break;
-    default: add_below(now, l, APART);
+    switch (plan->levels->rule) {
+    case HS_RULE_MAX: add_below(plan, l, 0); break;
+    case HS_RULE_MIN: add_above(plan, l); break;
+    case HS_RULE_GATHER: add_step(plan, own, all, false); break;
+    case HS_RULE_SCATTER: add_step(plan, all, own, false); break;
+    default: add_below(plan, l, APART);
     }
-}
-
-hs_status
-hs_level_plan_make(hs_account *account, const hs_levels *levels, double bound,
-                   hs_algorithm algorithm, hs_level_plan *plan)
-{
-    const int64_t n = levels->n, most = levels->cutoffs != NULL ? 2 * n : MOST_STEPS;
-    const bool    is_directed = levels->cutoffs == NULL && hs_rule_is_directed(levels->rule);
-    *plan = (hs_level_plan){
-        .is_half = !levels->has_queries && !is_directed, .bound = bound, .algorithm = algorithm};
-    plan->steps = hs_alloc(account, HS_FOR_CELLS, n * most, sizeof *plan->steps);
-    if (plan->steps == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    planning now = {.levels = levels, .plan = plan};
-    if (takes_all(levels, algorithm)) {
-        add_all(&now);
-        return HS_OK;
-    }
-    for (int32_t l = 0; l < n; l++) {
-        add_level(&now, l);
-    }
-    HS_ASSERT(plan->n <= n * most);
-    return HS_OK;
-}
-
-/* One step that is all of a search by radii, in place of those of the plan, which has some. */
-static hs_level_step
-level_plan_all(const hs_levels *levels, const hs_level_plan *plan)
-{
-    hs_level_step  all = {.is_own = plan->is_half};
-    hs_level_plan  one = {.steps = &all, .is_half = plan->is_half, .bound = plan->bound};
-    planning       now = {.levels = levels, .plan = &one};
-    const hs_slice each = {0, levels->n};
-    add_step(&now, each, each, plan->is_half);
-    HS_ASSERT(one.n == 1);
-    return all;
 }
 
 bool
-hs_level_plan_is_single(const hs_levels *levels, const hs_level_plan *plan)
+hs_level_plan_is_single(const hs_level_plan *plan)
 {
     const hs_level_step *step = plan->steps;
-    return plan->n == 1 && step->points.first == 0 && step->points.end == levels->n &&
-           step->asking.first == 0 && step->asking.end == levels->n;
+    const int32_t        n = plan->levels->n;
+    return plan->n == 1 && step->points.first == 0 && step->points.end == n &&
+           step->asking.first == 0 && step->asking.end == n;
 }
 
 void
@@ -828,8 +680,8 @@ hs_level_plan_free(hs_account *account, hs_level_plan *plan)
     *plan = (hs_level_plan){.n = 0};
 }
 
-/* Points are taken to be spread evenly over the box of their level. Where they are
- * not, both plans test more than that, and the one with fewer tests is favoured too little. */
+/* Points are taken to be spread evenly over the box of their level. Where they are not, both plans
+ * test more than that, and the one with fewer tests is favoured too little. */
 
 #ifdef HS_TESTING
 static bool joins = false;
@@ -936,29 +788,53 @@ cost_of_step(const hs_levels *levels, const spread *of, const hs_level_step *ste
     for (int64_t a = asked.first; a < asked.end; a++) {
         for (int64_t b = step->points.first; b < step->points.end; b++) {
             const double *extent = step->is_own ? of->points[a] : of->asking[a];
-            pairs += hs_level_count(asking, (hs_slice){a, a + 1}) *
-                     hs_level_count(points, (hs_slice){b, b + 1}) *
+            pairs += count_of(asking, (hs_slice){a, a + 1}) *
+                     count_of(points, (hs_slice){b, b + 1}) *
                      part_within(extent, of->points[b], d, side);
         }
     }
-    return TESTS_PER_POINT * (hs_level_count(asking, asked) +
-                              (step->is_own ? 0.0 : hs_level_count(points, step->points))) +
+    return TESTS_PER_POINT *
+               (count_of(asking, asked) + (step->is_own ? 0.0 : count_of(points, step->points))) +
            TESTS_PER_PAIR * (step->has_limits ? TEST_OF_LIMITS : 1.0) * (step->is_own ? 0.5 : 1.0) *
                pairs;
 }
 
-static hs_status
-join(const hs_options *options, const hs_levels *levels, const hs_box *box, hs_level_plan *plan)
+hs_status
+hs_level_plan_make(hs_account *account, const hs_options *options, const hs_levels *levels,
+                   const hs_box *box, double bound, hs_algorithm algorithm, hs_level_plan *plan)
 {
-    spread of;
-    double cost = 0.0;
-    if (!joins || plan->algorithm != HS_AUTO || levels->cutoffs != NULL || plan->n < 2 ||
-        levels->n > MOST_JOINED) {
+    const int64_t  n = levels->n, most = levels->cutoffs != NULL ? 2 * n : MOST_STEPS;
+    const bool     is_directed = levels->cutoffs == NULL && hs_rule_is_directed(levels->rule);
+    const hs_slice each = {0, n};
+    spread         of;
+    double         cost = 0.0;
+    hs_level_step  all = {.cutoff = 0.0};
+    *plan = (hs_level_plan){.levels = levels,
+                            .is_half = !levels->has_queries && !is_directed,
+                            .bound = bound,
+                            .algorithm = algorithm};
+    plan->steps = hs_alloc(account, HS_FOR_CELLS, n * most, sizeof *plan->steps);
+    if (plan->steps == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    if (takes_all(plan)) {
+        add_all(plan);
         return HS_OK;
     }
-    const hs_level_step all = level_plan_all(levels, plan);
-    const hs_status     status = find_spread(options, levels, box, &of);
+    for (int32_t l = 0; l < n; l++) {
+        add_level(plan, l);
+    }
+    HS_ASSERT(plan->n <= n * most);
+    if (!joins || algorithm != HS_AUTO || levels->cutoffs != NULL || plan->n < 2 ||
+        n > MOST_JOINED) {
+        return HS_OK;
+    }
+    hs_level_plan one = {.levels = levels, .steps = &all, .is_half = plan->is_half, .bound = bound};
+    add_step(&one, each, each, plan->is_half);
+    HS_ASSERT(one.n == 1);
+    const hs_status status = find_spread(options, levels, box, &of);
     if (status != HS_OK) {
+        hs_level_plan_free(account, plan);
         return status;
     }
     for (int64_t s = 0; s < plan->n; s++) {
@@ -971,22 +847,8 @@ join(const hs_options *options, const hs_levels *levels, const hs_box *box, hs_l
     return HS_OK;
 }
 
-hs_status
-hs_level_plan_choose(hs_account *account, const hs_options *options, const hs_levels *levels,
-                     const hs_box *box, double bound, hs_algorithm algorithm, hs_level_plan *plan)
-{
-    hs_status status = hs_level_plan_make(account, levels, bound, algorithm, plan);
-    if (status == HS_OK) {
-        status = join(options, levels, box, plan);
-    }
-    if (status != HS_OK) {
-        hs_level_plan_free(account, plan);
-    }
-    return status;
-}
-
-/* Radii, types and supports come in the order of levels, and are laid out in the
- * order of the cells. */
+/* Radii, types and supports come in the order of levels, and are laid out in the order of the
+ * cells. */
 
 /* Scaled radii that are larger are beyond all distances: the scale goes by a cutoff that is no
  * larger than these. */
@@ -1037,18 +899,6 @@ arrange_types(hs_account *account, const hs_bins *bins, const hs_level_set *set,
     return to;
 }
 
-/* The cutoffs of all types, exactly and as they are scanned with. */
-static void
-scale_table(const hs_levels *levels, const hs_scene *scene, double *exact, float *near)
-{
-    for (int32_t e = 0; e < levels->n * levels->n; e++) {
-        const double cutoff = levels->cutoffs[e];
-        const double scaled = hs_smaller(hs_scale_apply(scene->scale, cutoff), BEYOND_ALL);
-        exact[e] = cutoff < 0.0 ? -1.0 : scene->extreme ? cutoff : scaled;
-        near[e] = cutoff < 0.0 ? -1.0f : (float)scaled;
-    }
-}
-
 /* Limits by the types of both points, for a search of all of them. */
 static hs_status
 set_table(const hs_levels *levels, hs_search *search, hs_level_limits *own)
@@ -1066,7 +916,12 @@ set_table(const hs_levels *levels, hs_search *search, hs_level_limits *own)
         return HS_ERR_MEMORY;
     }
     float *near = (float *)(exact + size);
-    scale_table(levels, &search->scene, exact, near);
+    for (int32_t e = 0; e < size; e++) { /* exactly, and as they are scanned with */
+        const double cutoff = levels->cutoffs[e];
+        const double scaled = hs_smaller(hs_scale_apply(search->scene.scale, cutoff), BEYOND_ALL);
+        exact[e] = cutoff < 0.0 ? -1.0 : search->scene.extreme ? cutoff : scaled;
+        near[e] = cutoff < 0.0 ? -1.0f : (float)scaled;
+    }
     own->limits.rule = HS_RULE_SCATTER;
     own->limits.table = (hs_limit_table){
         .n_types = n,
@@ -1178,18 +1033,7 @@ level_limits_set(const hs_levels *levels, const hs_level_step *step, double boun
     return lacks ? HS_ERR_MEMORY : HS_OK;
 }
 
-/* Idempotent. */
-static void
-level_limits_free(hs_account *account, hs_level_limits *own)
-{
-    hs_free(account, own->of_asking);
-    hs_free(account, own->of_points);
-    hs_free(account, own->table);
-    own->of_asking = own->of_points = own->table = NULL;
-}
-
-/* Opens the search of two slices, has its limits set, and gives its points the
- * caller's numbers. */
+/* Opens the search of two slices, has its limits set, and gives its points the caller's numbers. */
 
 static void
 renumber(const int32_t *number, hs_bins *bins)
@@ -1204,15 +1048,6 @@ static const int32_t *
 numbers_of(const hs_level_set *set, hs_slice levels)
 {
     return set->number + set->first[levels.first];
-}
-
-/* Fractions done are those of all asking points of all steps, as far as these are equal. */
-static void
-set_progress(const hs_level_plan *plan, int64_t step, hs_search *search)
-{
-    const int64_t n = hs_search_asking(search)->n;
-    search->n_before = step * n;
-    search->n_in_all = plan->n * n;
 }
 
 static void
@@ -1238,19 +1073,11 @@ name_row(const hs_levels *levels, const hs_level_step *step, hs_failure *failure
 #define FEW_ASKING 32
 #endif
 
-/* What a step is searched by: without cells for few asking points, where the caller leaves that
- * open. */
-static hs_algorithm
-algorithm_of(const hs_level_plan *plan, const hs_level_step *step, int64_t n_asking)
-{
-    const bool is_open = plan->algorithm == HS_AUTO || plan->algorithm == HS_HIERARCHY;
-    return is_open && !step->is_own && n_asking <= FEW_ASKING ? HS_ALL_PAIRS : plan->algorithm;
-}
-
 hs_status
-hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int64_t number, const hs_box *box,
-              bool keeps_none, hs_call *call, hs_level_search *open, hs_failure *failure)
+hs_level_open(const hs_level_plan *plan, int64_t number, const hs_box *box, bool keeps_none,
+              hs_call *call, hs_level_search *open, hs_failure *failure)
 {
+    const hs_levels     *levels = plan->levels;
     const hs_level_step *step = &plan->steps[number];
     const hs_level_set  *asking = hs_levels_asking(levels);
     const hs_points      points = level_points(&levels->points, step->points);
@@ -1268,7 +1095,12 @@ hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int64_t number
     open->own.limits.table.n_types = step->by_table ? levels->n : 0;
     open->own.limits.supports = levels->has_supports ? &open->own.supports : NULL;
     call->options.cutoff = step->cutoff;
-    call->options.algorithm = algorithm_of(plan, step, queries.n);
+    call->options.algorithm =
+        plan->algorithm; /* without cells, where the caller leaves that open: */
+    if ((plan->algorithm == HS_AUTO || plan->algorithm == HS_HIERARCHY) && !step->is_own &&
+        queries.n <= FEW_ASKING) {
+        call->options.algorithm = HS_ALL_PAIRS;
+    }
     hs_search_begin(call, search);
     search->limits = step->has_limits ? &open->own.limits : NULL;
     hs_status status = hs_search_build(&sets, box, search, failure);
@@ -1292,13 +1124,20 @@ hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int64_t number
         hs_level_close(open);
         return status;
     }
-    set_progress(plan, number, search);
+    /* Fractions done are those of all asking points of all steps, as far as these are equal. */
+    search->n_before = number * hs_search_asking(search)->n;
+    search->n_in_all = plan->n * hs_search_asking(search)->n;
     return HS_OK;
 }
 
 void
 hs_level_close(hs_level_search *open)
 {
-    level_limits_free(&open->search.call->account, &open->own);
+    hs_account      *account = &open->search.call->account;
+    hs_level_limits *own = &open->own;
+    hs_free(account, own->of_asking);
+    hs_free(account, own->of_points);
+    hs_free(account, own->table);
+    own->of_asking = own->of_points = own->table = NULL;
     hs_search_close(&open->search);
 }

@@ -15,31 +15,24 @@
  * set of points by itself.
  */
 
-/*
- * The supports of a set of points, read once and checked: what is decided with, and
- * how far each reaches.
- */
-
 /* Supports that are read, or looked at, between two polls: some milliseconds. */
 #define HS_POLL_SUPPORTS (HS_POLL_POINTS / 16)
 
-/* hs_support_numbers for each point. */
+/* The supports of a set of points, read once and checked: hs_support_numbers for each point. */
 typedef struct hs_support_set {
     double *numbers; /* owned; one support after the other, in the caller's order; NULL: none */
     int64_t first;   /* the number of the first */
 } hs_support_set;
 
-/* supports: n * ndim * ndim, numbered from 0. reaches: receives n. HS_OK; HS_ERR_MEMORY;
- * HS_ERR_INTERRUPTED; HS_ERR_SUPPORTS or HS_ERR_SUPPORT_REACH with the row of the failure. On
- * failure holds nothing. */
-hs_status hs_support_set_read(hs_account *account, const hs_options *options,
-                              const double *supports, int64_t n, int ndim, double extent,
-                              hs_support_set *set, double *reaches, hs_failure *failure);
-
 /* Consecutive levels, or a part of what lies in them. */
 typedef struct hs_slice {
     int64_t first, end;
 } hs_slice;
+
+/* Radii of points in some levels. */
+typedef struct hs_radii_range {
+    double smallest, largest, least; /* least: that is not 0; infinity where there is none */
+} hs_radii_range;
 
 /* The points of one set by level, in the caller's order in each. Arrays are owned. */
 typedef struct hs_level_set {
@@ -49,8 +42,9 @@ typedef struct hs_level_set {
     int32_t *number; /* n: the caller's number of each */
     double  *radii; /* n, halved for HS_RULE_MEAN; of supports, how far they reach; NULL where there
                       * are none */
-    int64_t *first; /* of each level, and n */
-    hs_support_set supports; /* in the caller's order */
+    hs_radii_range *range;    /* of each level; NULL where there are no radii */
+    int64_t        *first;    /* of each level, and n */
+    hs_support_set  supports; /* in the caller's order */
 } hs_level_set;
 
 typedef struct hs_levels {
@@ -80,13 +74,6 @@ void hs_levels_renumber(int32_t first, hs_levels *levels);
 /* Idempotent. */
 void hs_levels_free(hs_account *account, hs_levels *levels);
 
-/* How many these are. */
-HS_ALWAYS_INLINE double
-hs_level_count(const hs_level_set *set, hs_slice levels)
-{
-    return (double)(set->first[levels.end] - set->first[levels.first]);
-}
-
 /* Those that search: queries, or the points. */
 HS_ALWAYS_INLINE const hs_level_set *
 hs_levels_asking(const hs_levels *levels)
@@ -95,10 +82,10 @@ hs_levels_asking(const hs_levels *levels)
 }
 
 /*
- * Which levels are searched together. A search between two levels costs what its
- * largest reach costs. Where one level is much larger than others, its own size decides the reach,
- * and these others may be searched against it all at once: so there are a few searches for each
- * level, and not one for every two levels.
+ * Which levels are searched together. A search between two levels costs what its largest reach
+ * costs. Where one level is much larger than others, its own size decides the reach, and these
+ * others may be searched against it all at once: so there are a few searches for each level, and
+ * not one for every two levels.
  */
 
 /* One search: these levels of the asking set among these of the points. */
@@ -112,40 +99,37 @@ typedef struct hs_level_step {
 } hs_level_step;
 
 typedef struct hs_level_plan {
-    hs_level_step *steps; /* owned */
-    int64_t        n;
-    bool           is_half;   /* each pair of points once, the lower number first. If not, a level
+    const hs_levels *levels; /* borrowed */
+    hs_level_step   *steps;  /* owned */
+    int64_t          n;
+    bool             is_half;   /* each pair of points once, the lower number first. If not, a level
                              * with itself gives each point all its neighbours */
-    double         bound;     /* no pair is further apart than this; may be infinite */
-    hs_algorithm   algorithm; /* the caller's choice, which is narrowed for each step */
+    double           bound;     /* no pair is further apart than this; may be infinite */
+    hs_algorithm     algorithm; /* the caller's choice, which is narrowed for each step */
 } hs_level_plan;
 
-/* Without queries, rules that are the same both ways give the half list; else every asking point
- * meets all that it can. HS_OK or HS_ERR_MEMORY. algorithm: HS_HIERARCHY is levels in any case,
- * HS_AUTO what is expected to be quickest, and any other one search of all, with the largest reach;
- * but types are searched in pairs where there are more of them than a table of limits holds. */
-hs_status hs_level_plan_make(hs_account *account, const hs_levels *levels, double bound,
-                             hs_algorithm algorithm, hs_level_plan *plan);
-
 /* Whether one step is all of the search. */
-bool hs_level_plan_is_single(const hs_levels *levels, const hs_level_plan *plan);
+bool hs_level_plan_is_single(const hs_level_plan *plan);
 
 /* Idempotent. */
 void hs_level_plan_free(hs_account *account, hs_level_plan *plan);
 
 /*
- * One search of all levels in place of several, where that is quicker. Searches of
- * a few levels each sort their points and walk over them again; one search tests more candidates,
- * each with a limit of its own. Points of few sizes, all of them common, are better searched at
- * once.
+ * One search of all levels in place of several, where that is quicker. Searches of a few levels
+ * each sort their points and walk over them again; one search tests more candidates, each with a
+ * limit of its own. Points of few sizes, all of them common, are better searched at once.
  */
 
-/* As hs_level_plan_make, but of radii and supports it is a single step, if that is expected to cost
- * less and the caller has not chosen an algorithm. box: of the points, borrowed, or NULL. options:
- * to poll by. HS_ERR_INTERRUPTED too, without a plan. */
-hs_status hs_level_plan_choose(hs_account *account, const hs_options *options,
-                               const hs_levels *levels, const hs_box *box, double bound,
-                               hs_algorithm algorithm, hs_level_plan *plan);
+/*
+ * Without queries, rules that are the same both ways give the half list; else every asking point
+ * meets all that it can. algorithm: HS_HIERARCHY is levels in any case, HS_AUTO what is expected to
+ * be quickest, and any other one search of all, with the largest reach; but types are searched in
+ * pairs where there are more of them than a table of limits holds. box: of the points, borrowed, or
+ * NULL. options: to poll by. HS_OK, or HS_ERR_MEMORY or HS_ERR_INTERRUPTED, without a plan.
+ */
+hs_status hs_level_plan_make(hs_account *account, const hs_options *options,
+                             const hs_levels *levels, const hs_box *box, double bound,
+                             hs_algorithm algorithm, hs_level_plan *plan);
 
 #ifdef HS_TESTING
 /* Whether plans are replaced; off at first, so that few points have several searches. Returns what
@@ -154,8 +138,8 @@ bool hs_test_join_levels(bool on);
 #endif
 
 /*
- * The lengths that the pairs of one step are compared with: by radii, by the types
- * of both points, or by supports, in the order of the cells of an open search.
+ * The lengths that the pairs of one step are compared with: by radii, by the types of both points,
+ * or by supports, in the order of the cells of an open search.
  */
 
 /* It must not move: the search has a pointer to its limits. */
@@ -167,8 +151,8 @@ typedef struct hs_level_limits {
 } hs_level_limits;
 
 /*
- * One step of a plan as a search like any other: of two sets of points, or of one,
- * with the caller's numbers, and with limits where pairs have lengths of their own.
+ * One step of a plan as a search like any other: of two sets of points, or of one, with the
+ * caller's numbers, and with limits where pairs have lengths of their own.
  */
 
 /* An open step; it must not move. */
@@ -182,9 +166,8 @@ typedef struct hs_level_search {
  * the step. keeps_none: pairs are not kept. On failure it is closed, and the failure names rows as
  * the caller does.
  */
-hs_status hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int64_t step,
-                        const hs_box *box, bool keeps_none, hs_call *call, hs_level_search *open,
-                        hs_failure *failure);
+hs_status hs_level_open(const hs_level_plan *plan, int64_t step, const hs_box *box, bool keeps_none,
+                        hs_call *call, hs_level_search *open, hs_failure *failure);
 
 /* Idempotent. */
 void hs_level_close(hs_level_search *open);

@@ -3,28 +3,19 @@
 #define _POSIX_C_SOURCE 200809L /* for os_thread.h */
 #endif
 #include "memory.h"
-#include "pool.h"
+#include "results.h"
 #include "../base/os_thread.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* memory.c: accounts, blocks and arenas. Each block has a header in front of it, which remembers
- * its size. */
+/* memory.c: accounts, blocks and arenas. Each block is a chunk (results.h), or lies in the arena
+ * behind a header like one, of which `bytes`, `raw` (NULL) and `length` (0) are set. */
 
 #ifdef HS_TESTING
 #include <stdatomic.h>
 #endif
-
-typedef struct block_header {
-    void   *raw;    /* what malloc returned, or the mapping */
-    size_t  length; /* of the mapping; 0 for malloc and for the arena */
-    int64_t bytes;  /* usable, as requested */
-} block_header;     /* raw == NULL: in the arena */
-
-_Static_assert(sizeof(block_header) <= HS_PAGES_HEADROOM, "the header lies in the headroom");
-_Static_assert(sizeof(block_header) <= HS_ALIGNMENT, "and in front of an aligned block");
 
 #ifdef HS_TESTING
 static _Atomic int64_t fail_countdown;
@@ -64,6 +55,7 @@ hs_test_count_block(int change)
 {
     live_blocks += change;
 }
+
 void
 hs_test_use_arena(bool on)
 {
@@ -80,13 +72,7 @@ enum { arena_is_used = 1 };
 HS_ALWAYS_INLINE size_t
 arena_step(size_t bytes)
 {
-    return (bytes + sizeof(block_header) + HS_ALIGNMENT - 1) & ~(size_t)(HS_ALIGNMENT - 1);
-}
-
-HS_ALWAYS_INLINE char *
-align(char *at)
-{
-    return at + (-(uintptr_t)at % HS_ALIGNMENT);
+    return (bytes + sizeof(hs_chunk) + HS_ALIGNMENT - 1) & ~(size_t)(HS_ALIGNMENT - 1);
 }
 
 void
@@ -127,46 +113,37 @@ hs_account_give(hs_account *account, int64_t bytes)
     account->held -= bytes;
 }
 
+/* Small arenas are not kept, nor others where the pool is switched off or in use. */
 static void
 give_arena(void *data)
 {
-    if (!hs_pool_give(data)) { /* it is switched off, or in use */
+    hs_chunk_of(data)->is_arena = true;
+    if (hs_chunk_of(data)->capacity < HS_POOL_SCRATCH || !hs_pool_give(data)) {
         hs_chunk_free(data);
-    }
-}
-
-/* Leaves an arena in the pool that the next call may have room enough in. */
-static void
-leave_larger_arena(void)
-{
-    void *data = hs_chunk_new(HS_POOL_SCRATCH), *other = hs_chunk_new(HS_POOL_SCRATCH);
-    if (other != NULL) {
-        /* From then on glibc keeps twice as much free memory at the top of the heap, where results
-         * are copied to arrays, instead of giving that back to the system each time. */
-        hs_chunk_free(other);
-    }
-    if (data != NULL) {
-        hs_chunk_of(data)->is_arena = true;
-        give_arena(data);
     }
 }
 
 void
 hs_account_close(hs_account *account)
 {
-#ifdef HS_TESTING
-    live_blocks -= account->arena != NULL;
-#endif
-    if (account->arena_is_pooled) {
+    if (account->arena != NULL) {
+        hs_test_count_block(-1);
         give_arena(account->arena);
-    } else {
-        free(account->arena);
     }
     if (account->arena_was_small) {
-        leave_larger_arena();
+        /* One in the pool that the next call may have room enough in. */
+        void *larger = hs_chunk_new(HS_POOL_SCRATCH), *other = hs_chunk_new(HS_POOL_SCRATCH);
+        if (other != NULL) {
+            /* From then on glibc keeps twice as much free memory at the top of the heap, where
+             * results are copied to arrays, instead of giving that back to the system each time. */
+            hs_chunk_free(other);
+        }
+        if (larger != NULL) {
+            give_arena(larger);
+        }
     }
     account->arena = account->arena_first = account->arena_next = account->arena_end = NULL;
-    account->arena_is_pooled = account->arena_was_small = false;
+    account->arena_was_small = false;
 }
 
 void
@@ -181,41 +158,31 @@ hs_account_keep(hs_account *account)
     account->arena_first = account->arena_next;
 }
 
-/* An arena, of the pool if it has one. */
-static bool
-take_arena(hs_account *account)
-{
-    account->arena = account->is_kept ? NULL : hs_pool_take_arena();
-    account->arena_is_pooled = account->arena != NULL;
-    if (account->arena == NULL) {
-        account->arena = malloc(HS_ARENA_BYTES);
-    }
-    if (account->arena == NULL) {
-        return false;
-    }
-    account->arena_end =
-        account->arena + (account->arena_is_pooled ? HS_POOL_SCRATCH : (size_t)HS_ARENA_BYTES);
-    account->arena_first = account->arena_next = align(account->arena + sizeof(block_header));
-#ifdef HS_TESTING
-    live_blocks++;
-#endif
-    return true;
-}
-
 /* The next block of the arena, or NULL when it has no room for that. */
 static void *
 take_from_arena(hs_account *account, size_t bytes)
 {
-    if (account->arena == NULL && !take_arena(account)) {
-        return NULL;
+    if (account->arena == NULL) {
+        account->arena = account->is_kept ? NULL : hs_pool_take_arena();
+        if (account->arena == NULL) {
+            account->arena = hs_chunk_new(HS_ARENA_BYTES);
+        }
+        if (account->arena == NULL) {
+            return NULL;
+        }
+        hs_test_count_block(1);
+        account->arena_end = account->arena + hs_chunk_of(account->arena)->capacity;
+        account->arena_first = account->arena_next = account->arena + arena_step(0);
     }
     char *block = account->arena_next;
     if (arena_step(bytes) > (size_t)(account->arena_end - block)) {
-        account->arena_was_small = !account->arena_is_pooled && !account->is_kept;
+        const bool is_pooled = hs_chunk_of(account->arena)->capacity >= HS_POOL_SCRATCH;
+        account->arena_was_small = !is_pooled && !account->is_kept;
         return NULL;
     }
     account->arena_next = block + arena_step(bytes);
-    ((block_header *)block)[-1] = (block_header){.raw = NULL};
+    hs_chunk_of(block)->raw = NULL;
+    hs_chunk_of(block)->length = 0;
     return block;
 }
 
@@ -223,28 +190,25 @@ take_from_arena(hs_account *account, size_t bytes)
 static void *
 take_block(hs_account *account, size_t bytes)
 {
-    void  *raw;
-    size_t length;
     if (HS_HAVE_ARENA && arena_is_used && account != NULL && bytes < LARGEST_IN_ARENA) {
         void *block = take_from_arena(account, bytes);
         if (block != NULL) {
             return block;
         }
     }
-    if (bytes >= HS_PAGES_FROM) {
-        void *block = hs_pages_alloc(bytes, &raw, &length);
-        if (block != NULL) {
-            ((block_header *)block)[-1] = (block_header){.raw = raw, .length = length};
-            return block;
-        }
-    }
-    raw = malloc(bytes + sizeof(block_header) + HS_ALIGNMENT + HS_GUARD_BYTES);
-    if (raw == NULL) {
+    /* A tail of a quarter and more becomes a whole huge page: quicker to fill than small ones. */
+    const size_t tail = bytes % HS_PAGES_FROM;
+    const bool   fills_tail = bytes >= HS_PAGES_FROM && tail >= HS_PAGES_FROM / 4;
+    const size_t room = bytes + (fills_tail ? HS_PAGES_FROM - tail : 0) + HS_GUARD_BYTES;
+    void        *block = hs_chunk_new(room);
+    if (block == NULL) {
         return NULL;
     }
-    void *block = align((char *)raw + sizeof(block_header));
-    ((block_header *)block)[-1] = (block_header){.raw = raw};
-    hs_guard_new(block, bytes);
+    if (hs_chunk_of(block)->length > 0) {
+        hs_chunk_expect(block, room);
+    } else {
+        hs_guard_new(block, bytes);
+    }
     return block;
 }
 
@@ -262,19 +226,15 @@ hs_alloc(hs_account *account, hs_purpose purpose, int64_t count, size_t size)
     if (account != NULL && !hs_account_allows(account, (double)bytes)) {
         return NULL;
     }
-#ifdef HS_TESTING
     if (hs_test_allocation_fails()) {
         return NULL;
     }
-#endif
     void *block = take_block(account, bytes);
     if (block == NULL) {
         return NULL;
     }
-#ifdef HS_TESTING
     hs_test_count_block(1);
-#endif
-    ((block_header *)block)[-1].bytes = (int64_t)bytes;
+    hs_chunk_of(block)->bytes = (int64_t)bytes;
     if (account != NULL) {
         hs_account_take(account, purpose, (int64_t)bytes);
     }
@@ -297,11 +257,11 @@ hs_grow(hs_account *account, hs_purpose purpose, void *block, int64_t held, int6
 void
 hs_trim(hs_account *account, void *block, size_t bytes)
 {
-    block_header *header = (block_header *)block - 1;
+    hs_chunk *header = hs_chunk_of(block);
     if (header->length == 0 || (int64_t)bytes >= header->bytes) {
         return;
     }
-    header->length = hs_pages_trim(header->raw, header->length, block, bytes);
+    (void)hs_chunk_cut(block, bytes, NULL);
     if (account != NULL) {
         account->held -= header->bytes - (int64_t)bytes;
     }
@@ -323,24 +283,22 @@ hs_free(hs_account *account, void *block)
     if (block == NULL) {
         return;
     }
-    const block_header header = ((block_header *)block)[-1];
+    const hs_chunk *header = hs_chunk_of(block);
     if (account != NULL) {
-        account->held -= header.bytes;
+        account->held -= header->bytes;
     }
-#ifdef HS_TESTING
     hs_test_count_block(-1);
-#endif
-    if (header.raw == NULL) {
+    if (header->raw == NULL) {
         /* The last block makes room for another; the others wait for hs_account_close. */
-        if (account->arena_next == (char *)block + arena_step((size_t)header.bytes)) {
+        if (account->arena_next == (char *)block + arena_step((size_t)header->bytes)) {
             account->arena_next = block;
         }
-    } else if (header.length > 0) {
-        hs_pages_free(header.raw, header.length);
-    } else {
-        hs_guard_check(block, (size_t)header.bytes);
-        free(header.raw);
+        return;
     }
+    if (header->length == 0) {
+        hs_guard_check(block, (size_t)header->bytes);
+    }
+    hs_chunk_free(block);
 }
 
 /* A mutex around each change of the account. */

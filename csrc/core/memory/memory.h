@@ -6,14 +6,9 @@
 #include "../base/base.h"
 
 /*
- * memory.h: scratch memory of a call: checked, counted by purpose, bounded by the caller's limit,
- * and shared by its threads.
- */
-
-/*
- * The memory that the core works with: overflow-checked, 64-byte aligned, counted by
- * purpose, and bounded by the caller's limit. Results have theirs from results.h; they are counted
- * and bounded here too.
+ * memory.h: scratch memory of a call: overflow-checked, 64-byte aligned, counted by purpose,
+ * bounded by the caller's limit, and shared by its threads. Results have theirs from results.h;
+ * they are counted and bounded here too.
  */
 
 /*
@@ -24,16 +19,7 @@
  * search of 1000 points. Not where tools watch over each block: sanitizers, and the tests, which
  * switch it on where they mean it.
  */
-#if defined(__SANITIZE_ADDRESS__)
-#define HS_HAVE_ARENA 0
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(memory_sanitizer)
-#define HS_HAVE_ARENA 0
-#endif
-#endif
-#ifndef HS_HAVE_ARENA
-#define HS_HAVE_ARENA 1
-#endif
+#define HS_HAVE_ARENA (!HS_WATCHED_MALLOC)
 
 #define HS_ARENA_BYTES \
     (32 << 10) /* what 64 points with a few hundred pairs take; without the pool */
@@ -46,12 +32,11 @@ typedef struct hs_account {
     double      limit;      /* bytes allowed */
     hs_limit_fn find_limit; /* called once, when held first passes HS_LIMIT_FREE; or NULL */
     void       *find_context;
-    char       *arena;       /* owned, taken with the first small block; or NULL */
+    char       *arena; /* owned, a chunk (results.h) taken with the first small block; or NULL */
     char       *arena_first; /* where its next block begins after hs_account_reset */
     char       *arena_next;  /* where its next block begins */
     char       *arena_end;
     bool        is_kept;         /* for long: its arena is a small one */
-    bool        arena_is_pooled; /* a chunk of the pool, or else from malloc */
     bool        arena_was_small; /* for a block that one of the pool would have had room for */
 } hs_account;
 
@@ -105,12 +90,15 @@ void hs_test_fail_allocation(int64_t nth);
 bool hs_test_failure_is_due(void);
 /* Blocks and arenas that are allocated and not yet freed, in the whole process. */
 int64_t hs_test_live_blocks(void);
-/* For other modules that hand out memory: asks whether this allocation is the one to fail, and
- * counts a block more (1) or less (-1). */
-bool hs_test_allocation_fails(void);
-void hs_test_count_block(int change);
 /* Whether accounts have an arena, where the build has one; off at first. */
 void hs_test_use_arena(bool on);
+/* For what hands out memory: asks whether this allocation is the one to fail, and counts a block
+ * more (1) or less (-1). */
+bool hs_test_allocation_fails(void);
+void hs_test_count_block(int change);
+#else
+#define hs_test_allocation_fails()  false
+#define hs_test_count_block(change) ((void)0)
 #endif
 
 /* One account for several threads that take memory while they work. */
@@ -203,8 +191,8 @@ hs_store_free(hs_store *store)
     *store = (hs_store){0};
 }
 
-/* In tests, bytes behind each small block that must stay as they are, and new blocks that
- * are not zero by chance. Sanitizers that watch malloc see more than that: then there is none. */
+/* In tests, bytes behind each small block that must stay as they are, and new blocks that are not
+ * zero by chance. Sanitizers that watch malloc see more than that: then there is none. */
 
 #if defined(HS_TESTING) && !HS_WATCHED_MALLOC
 
@@ -239,21 +227,9 @@ hs_guard_check(const void *block, size_t bytes)
 
 #else
 
-#define HS_GUARD_BYTES 0
-
-static inline void
-hs_guard_new(void *block, size_t bytes)
-{
-    (void)block;
-    (void)bytes;
-}
-
-static inline void
-hs_guard_check(const void *block, size_t bytes)
-{
-    (void)block;
-    (void)bytes;
-}
+#define HS_GUARD_BYTES               0
+#define hs_guard_new(block, bytes)   ((void)0)
+#define hs_guard_check(block, bytes) ((void)0)
 
 #endif
 

@@ -3,15 +3,304 @@
 #include "../base/status.h"
 #include "../base/os.h"
 #include "../exact/bounds.h"
+#include "../search/choice.h"
 
 #include <math.h>
 #include <string.h>
 
-/* candidates.c: images that can be near a group, leaves of the tree in these, and the block of
- * floats that they fill. */
+/* candidates.c: how far a group looks, images of the points within that, leaves of the tree in
+ * these, and the block of floats that they fill. */
 
-/* Which images of the points can be near a group, by the range of its t_k along
- * each periodic axis. */
+/* How far to look, by the density of points. */
+
+/* Relative room, far more than roundings take. */
+#define RADIUS_ROOM 0x1p-40
+/* The density is that of at least so many times the points that are wanted. */
+#define POINTS_PER_WANTED 4.0
+/* Standard deviations of their number that a first radius makes room for. Measured: with 3 the time
+ * differs by less than the noise. */
+#define SPREAD 3.5
+/* Points whose labels say how many more are to be looked at. */
+#define MOST_LABELS 512
+/* Candidates of a group, in points of the group and wanted ones, beyond which the guess was bad:
+ * some three times as many as there are where points are evenly spread, ... */
+#define MOST_CANDIDATES 24.0
+/* ... and so many times more for each axis beyond the third. */
+#define MOST_PER_AXIS 3.0
+/* What is in reach of a group, by what it would be if reach were a cube. */
+#define CUBE_OF_BALL 4.0
+
+/* Range of t_k of points [first, last), which are in order; none: from infinity to -infinity. */
+static void
+range_of(const hs_lattice *lattice, const hs_bins *bins, int k, int64_t first, int64_t last,
+         double *lower, double *upper)
+{
+    double low = INFINITY, high = -INFINITY;
+    for (int64_t si = first; si < last; si++) {
+        double x[HS_MAX_DIM];
+        for (int c = 0; c < bins->ndim; c++) {
+            x[c] = bins->x[c][si];
+        }
+        const double t = hs_lattice_coordinate(lattice, x, k);
+        low = hs_smaller(t, low);
+        high = hs_larger(t, high);
+    }
+    *lower = low;
+    *upper = high;
+}
+
+void
+hs_nearest_group_set(const hs_nearest *near, int32_t first, int32_t last, hs_nearest_group *group)
+{
+    const hs_bins    *bins = hs_search_asking(near->search);
+    const hs_lattice *lattice = &near->search->scene.lattice;
+    *group = (hs_nearest_group){.first = first, .last = last};
+    for (int k = 0; k < bins->ndim; k++) {
+        const double *x = bins->x[k];
+        double        low = x[first], high = low;
+        for (int32_t si = first + 1; si < last; si++) {
+            low = hs_smaller(x[si], low);
+            high = hs_larger(x[si], high);
+        }
+        group->lower[k] = group->t_lower[k] = low;
+        group->upper[k] = group->t_upper[k] = high;
+    }
+    for (int k = 0; !lattice->aligned && k < bins->ndim; k++) {
+        range_of(lattice, bins, k, first, last, &group->t_lower[k], &group->t_upper[k]);
+    }
+    for (int k = 0; near->has_layer && k < bins->ndim; k++) {
+        if (lattice->row_of_axis[k] < 0) {
+            const double apart = hs_larger(near->layer_lower[k] - group->t_upper[k],
+                                           group->t_lower[k] - near->layer_upper[k]);
+            group->away = hs_larger(
+                apart * (1.0 - RADIUS_ROOM) - 4.0 * near->search->scene.t_error[k], group->away);
+        }
+    }
+}
+
+double
+hs_nearest_farthest(const hs_nearest *near, const hs_nearest_group *group)
+{
+    const hs_scene *scene = &near->search->scene;
+    const double    limit = near->limit * (1.0 + RADIUS_ROOM);
+    const hs_tree  *tree = &near->tree;
+    double          all = 32.0 * scene->x_error; /* two in each of up to eight components */
+    if (scene->lattice.n_periodic > 0) {
+        return limit;
+    }
+    for (int k = 0; k < scene->ndim; k++) { /* no component is longer than this */
+        all += hs_larger(fabs(tree->upper[k] - group->lower[k]),
+                         fabs(group->upper[k] - tree->lower[k]));
+    }
+    return hs_smaller(limit, all * (1.0 + RADIUS_ROOM));
+}
+
+/* Sides of a region, base 2 logarithms, and what it holds. */
+typedef struct near_region {
+    int    ndim;
+    double side[HS_MAX_DIM];
+    bool   repeats[HS_MAX_DIM]; /* the region goes on along this side */
+    double n_points;
+} near_region;
+
+/* log2 of the volume of a ball of radius 1. */
+static double
+ball_volume(int ndim)
+{
+    static const double volume[HS_MAX_DIM + 1] = {1.0,    2.0,    3.1416, 4.1888, 4.9348,
+                                                  5.2638, 5.1677, 4.7248, 4.0587};
+    return log2(volume[ndim]);
+}
+
+/*
+ * log2 of the radius of a ball with `wanted` points in it, if the region is filled evenly. Sides
+ * that are shorter than the ball is wide do not count: points on a line or in a plane have the
+ * density of their line or plane.
+ */
+static double
+radius_of(const near_region *region, double wanted)
+{
+    const double width = ball_volume(region->ndim) / region->ndim; /* of the ball, as a cube */
+    bool         counts[HS_MAX_DIM];
+    double       longest = -INFINITY;
+    for (int k = 0; k < region->ndim; k++) {
+        counts[k] = region->side[k] > -INFINITY;
+        longest = hs_larger(region->side[k], longest);
+    }
+    for (;;) {
+        double sum = log2(wanted / region->n_points);
+        int    n = 0;
+        for (int k = 0; k < region->ndim; k++) {
+            sum += counts[k] ? region->side[k] : 0.0;
+            n += counts[k];
+        }
+        const double radius = n > 0 ? sum / n - width : longest - width;
+        bool         changed = false;
+        for (int k = 0; n > 0 && k < region->ndim; k++) {
+            if (counts[k] && !region->repeats[k] && region->side[k] < radius + width) {
+                counts[k] = false;
+                changed = true;
+            }
+        }
+        if (!changed) {
+            return radius;
+        }
+    }
+}
+
+/* The node around the group with at least so many points, and its sides; *away: how far from it
+ * the group is. */
+static int32_t
+find_node(const hs_tree *tree, const hs_nearest_group *group, double least, double *sides,
+          double *away)
+{
+    const int d = tree->ndim;
+    int32_t   number = 0;
+    *away = 0.0;
+    for (int k = 0; k < d; k++) {
+        sides[k] = tree->upper[k] - tree->lower[k];
+    }
+    for (;;) {
+        const int32_t left = tree->nodes[number].left;
+        double        gap[2] = {0.0, 0.0};
+        const double *bounds = left != 0 ? hs_tree_bounds(tree, left, d) : NULL;
+        HS_PREFETCH(&tree->nodes[left]); /* comes with the bounds, not after them */
+        for (int k = 0; left != 0 && k < d; k++) {
+            const double middle = group->lower[k] + 0.5 * (group->upper[k] - group->lower[k]);
+            for (int side = 0; side < 2; side++) {
+                const double below = bounds[4 * k + side] - middle;
+                gap[side] += hs_larger(hs_larger(below, middle - bounds[4 * k + 2 + side]), 0.0);
+            }
+        }
+        const int     side = gap[1] < gap[0];
+        const int32_t next = left + side;
+        if (left == 0 || tree->nodes[next].end - tree->nodes[next].first < least) {
+            return number;
+        }
+        *away = gap[side];
+        number = next;
+        for (int k = 0; k < d; k++) {
+            sides[k] = bounds[4 * k + 2 + side] - bounds[4 * k + side];
+        }
+    }
+}
+
+/* The whole box counts as the region when points are too few for a part of it. */
+static void
+take_box(const hs_lattice *lattice, near_region *region)
+{
+    const double side =
+        (log2(lattice->volume_mantissa) + lattice->volume_exponent) / lattice->n_periodic;
+    for (int k = 0; k < region->ndim; k++) {
+        if (lattice->row_of_axis[k] >= 0) {
+            region->side[k] = side;
+            region->repeats[k] = true;
+        }
+    }
+}
+
+/* A ball that sticks out of all points along open axes holds fewer. */
+static double
+widen_at_edges(const hs_nearest *near, const hs_nearest_group *group, double radius)
+{
+    const hs_tree *tree = &near->tree;
+    double         part = 1.0;
+    for (int k = 0; k < tree->ndim; k++) {
+        const double middle = group->lower[k] + 0.5 * (group->upper[k] - group->lower[k]);
+        const double below = hs_smaller(middle - tree->lower[k], radius);
+        const double above = hs_smaller(tree->upper[k] - middle, radius);
+        const bool   repeats = near->search->scene.lattice.aligned &&
+                             near->search->scene.lattice.row_of_axis[k] >= 0;
+        part *= repeats ? 1.0 : fmin(fmax((below + above) / (2.0 * radius), 0.5), 1.0);
+    }
+    return part < 1.0 ? radius * pow(part, -1.0 / tree->ndim) : radius;
+}
+
+/* How many points of the node, or of as many as are looked at, do not count by their labels: for a
+ * point of the group. */
+static int32_t
+count_left_out(const hs_nearest *near, const hs_nearest_group *group, const hs_tree_node *node)
+{
+    const int32_t *order = near->search->bins.order;
+    const int32_t  end = node->end - node->first < MOST_LABELS ? node->end
+                                                               : node->first + MOST_LABELS;
+    hs_chooser     chooser;
+    int32_t        n = 0;
+    hs_chooser_set(near->search->call->choice,
+                   hs_search_asking(near->search)->order[(group->first + group->last) / 2],
+                   &chooser);
+    for (int32_t sj = node->first; sj < end; sj++) {
+        n += !hs_chooser_is_of_group(&chooser, order[sj]) ||
+             hs_chooser_excludes(&chooser, order[sj]);
+    }
+    return n;
+}
+
+void
+hs_nearest_guess(const hs_nearest *near, hs_nearest_group *group)
+{
+    const hs_tree    *tree = &near->tree;
+    const hs_lattice *lattice = &near->search->scene.lattice;
+    const double      k = (double)near->k + near->omits_self;
+    double            wanted = k + SPREAD * sqrt(k) + 1.0;
+    double            away, sides[HS_MAX_DIM];
+    const int32_t     number =
+        find_node(tree, group, POINTS_PER_WANTED * hs_larger(wanted, 16.0), sides, &away);
+    const hs_tree_node *node = &tree->nodes[number];
+    group->more = near->search->call->choice != NULL ? count_left_out(near, group, node) : 0.0;
+    wanted += group->more;
+    near_region region = {.ndim = tree->ndim, .n_points = (double)(node->end - node->first)};
+    for (int axis = 0; axis < tree->ndim; axis++) {
+        region.side[axis] = log2(sides[axis]);
+    }
+    if (lattice->n_periodic > 0 && number == 0) {
+        take_box(lattice, &region);
+    }
+    const double farthest = hs_nearest_farthest(near, group);
+    double       inside = exp2(radius_of(&region, wanted));
+    if (near->least > 0.0) { /* a shell around a ball holds as many as are wanted */
+        const double ratio = pow(near->least / inside, tree->ndim);
+        const double wider = inside * pow(1.0 + ratio, 1.0 / tree->ndim);
+        group->more += wanted * ratio;
+        inside = wider < INFINITY ? wider : near->least;
+    }
+    group->radius = hs_larger(widen_at_edges(near, group, inside) + away, HS_NEAREST_LEAST_RADIUS);
+    group->is_complete = group->radius >= farthest ||
+                         (lattice->n_periodic == 0 && (double)tree->nodes[0].end <= k);
+    if (group->is_complete) {
+        group->radius = hs_larger(farthest, HS_NEAREST_LEAST_RADIUS);
+    }
+}
+
+/* How many times as large as for one of its points what the group looks at is, about. */
+static double
+balls_of(const hs_nearest_group *group, int ndim)
+{
+    double balls = 1.0;
+    for (int k = 0; k < ndim; k++) {
+        balls *= 1.0 + (group->upper[k] - group->lower[k]) / (2.0 * group->radius);
+    }
+    return balls;
+}
+
+double
+hs_nearest_most_candidates(const hs_nearest *near, const hs_nearest_group *group)
+{
+    const double more = pow(MOST_PER_AXIS, fmax(near->tree.ndim - 3.0, 0.0));
+    const double wanted = (double)near->k + group->more + (group->last - group->first);
+    return more * MOST_CANDIDATES * wanted + 64.0;
+}
+
+bool
+hs_nearest_is_scattered(const hs_nearest *near, const hs_nearest_group *group)
+{
+    const double k = (double)near->k, in_ball = k + SPREAD * sqrt(k) + group->more;
+    return CUBE_OF_BALL * in_ball * balls_of(group, near->tree.ndim) >
+           hs_nearest_most_candidates(near, group);
+}
+
+/* Which images of the points can be near a group, by the range of its t_k along each periodic
+ * axis. */
 
 #define UNIT 0x1p-53
 /* In periods: far more than the rounding of a quotient of ordinary size, ... */
@@ -81,7 +370,7 @@ hs_nearest_measure_layer(hs_nearest *near)
     near->has_layer = bins->n > 0 && is_upright(lattice);
     for (int k = 0; near->has_layer && k < lattice->ndim; k++) {
         const int64_t n = lattice->row_of_axis[k] < 0 ? bins->n : 0;
-        hs_nearest_range(lattice, bins, k, 0, n, &near->layer_lower[k], &near->layer_upper[k]);
+        range_of(lattice, bins, k, 0, n, &near->layer_lower[k], &near->layer_upper[k]);
     }
 }
 
@@ -140,13 +429,22 @@ bound_error(const hs_scene *scene, const double *most)
     return error + 2.0 * scene->x_error;
 }
 
+void
+hs_nearest_images_home(const hs_nearest *near, hs_nearest_images *images)
+{
+    *images = (hs_nearest_images){.lattice = &near->search->scene.lattice,
+                                  .count = 1.0,
+                                  .error = 2.0 * near->search->scene.x_error,
+                                  .is_first = true};
+}
+
 hs_status
 hs_nearest_images_start(const hs_nearest *near, const hs_nearest_group *group,
                         hs_nearest_images *images)
 {
     const hs_lattice *lattice = &near->search->scene.lattice;
     double            most[HS_MAX_DIM] = {0.0};
-    *images = (hs_nearest_images){.near = near, .count = 1.0, .is_first = true};
+    hs_nearest_images_home(near, images);
     /* The drift depends on the largest shifts, and these a little on the drift. */
     for (int pass = 0; pass < 3; pass++) {
         for (int k = 0; k < lattice->ndim; k++) {
@@ -160,7 +458,7 @@ hs_nearest_images_start(const hs_nearest *near, const hs_nearest_group *group,
         pass += lattice->aligned ? 2 : 0;
     }
     for (int r = 0; r < lattice->n_periodic; r++) {
-        images->shift[r] = (int32_t)images->low[r];
+        images->next.shift[r] = (int32_t)images->low[r];
         images->count *= hs_larger((double)(images->high[r] - images->low[r] + 1), 0.0);
     }
     images->error = bound_error(&near->search->scene, most);
@@ -171,101 +469,109 @@ hs_nearest_images_start(const hs_nearest *near, const hs_nearest_group *group,
 bool
 hs_nearest_images_next(hs_nearest_images *images)
 {
-    const hs_lattice *lattice = &images->near->search->scene.lattice;
+    const hs_lattice *lattice = images->lattice;
+    hs_nearest_image *next = &images->next;
     const int         m = lattice->n_periodic;
-    if (images->is_first) {
-        images->is_first = false;
-        if (images->count == 0.0) {
-            return false;
-        }
-    } else {
-        int r = 0;
-        while (r < m && images->shift[r] == images->high[r]) {
-            images->shift[r] = (int32_t)images->low[r];
-            r++;
-        }
-        if (r == m) {
-            return false;
-        }
-        images->shift[r]++;
+    int               r = 0;
+    while (!images->is_first && r < m && next->shift[r] == images->high[r]) {
+        next->shift[r] = (int32_t)images->low[r];
+        r++;
     }
+    if (images->is_first ? images->count == 0.0 : r == m) {
+        return false;
+    }
+    next->shift[r] += !images->is_first;
+    images->is_first = false;
+    next->is_home = true;
     for (int c = 0; c < lattice->ndim; c++) {
-        double moved = 0.0;
-        for (int r = 0; r < m; r++) {
-            moved += images->shift[r] * lattice->rows[r][c];
+        next->moved[c] = 0.0;
+        for (r = 0; r < m; r++) {
+            next->moved[c] += next->shift[r] * lattice->rows[r][c];
         }
-        images->moved[c] = moved;
+    }
+    for (r = 0; r < m; r++) {
+        next->is_home = next->is_home && next->shift[r] == 0;
     }
     return true;
 }
 
-void
-hs_nearest_image_set(const hs_nearest *near, const hs_nearest_images *images,
-                     hs_nearest_image *image)
+int
+hs_nearest_exponent(double length)
 {
-    memcpy(image->shift, images->shift, sizeof image->shift);
-    memcpy(image->moved, images->moved, sizeof image->moved);
-    image->is_home = true;
-    for (int r = 0; r < near->search->bins.n_periodic; r++) {
-        image->is_home = image->is_home && images->shift[r] == 0;
-    }
+    return ilogb(hs_larger(length, HS_NEAREST_LEAST_RADIUS));
 }
 
-/* One walk for the box of all groups, in float32 units around its centre; then
- * the kernel lists each group's leaves. */
+void
+hs_nearest_frame_set(int ndim, double unit, double error, double reach, hs_nearest_frame *frame)
+{
+    const double along = sqrt(ndim) * error;
+    *frame = (hs_nearest_frame){unit, error, reach,
+                                .flat_error = 2.1 * along * (reach + along) + 0x1p-1000};
+    /* 2 e |D| + e^2, and what underflow may lose. */
+}
 
-/* Beyond these each group walks down the tree by itself: it is far smaller than all together. */
-#define MOST_LEAVES        2048
-#define MOST_SHARED_IMAGES 64
-/* Groups that look so many times as far as others do walk by themselves. */
+/* One walk for the box of all groups, in float32 units around its centre; then the kernel lists
+ * each group's leaves. */
+
+#define MOST_LEAVES      4096 /* with more, each point walks down the tree by itself */
+#define MOST_LEAF_IMAGES 512
+/* Groups that look so many times as far as others do get leaves by themselves. */
 #define FARTHEST 2.0
 /* So do all, where the box around them is so many times as large as they are themselves. */
 #define MOSTLY_EMPTY 4.0
-/* In units, where the radius is between 1 and 2: floats tell leaves apart. */
-#define WIDEST_LEAF 256.0
+/* In units, where the radius is between 1 and 2: floats tell leaves apart, and relative to the
+ * centre of a group, distances. */
+#define WIDEST_LEAF 128.0
+/* Least radius, in errors of shifted coordinates: floats tell nothing of smaller ones. */
+#define LEAST_IN_ERRORS 1024.0
 /* Relative room, far more than roundings of floats take. */
 #define LEAF_ROOM 0x1p-18
 /* Error on each axis as a fraction of the extent: two roundings to floats and one of their
  * difference, twice. */
 #define AXIS_ERROR 0x1p-21
 
-hs_status
-hs_nearest_leaves_init(const hs_nearest *near, hs_nearest_leaves *leaves)
+/* Sets the addresses of parts that become one array of the threads' memory. */
+static bool
+allocate(const hs_nearest *near, const hs_parts *parts, void **memory)
 {
-    const int64_t room = MOST_LEAVES + HS_PADDING;
-    hs_shared    *shared = near->shared;
-    bool          done = true;
-    *leaves = (hs_nearest_leaves){.n = 0};
-    for (int k = 0; done && k < near->tree.ndim; k++) {
-        done = hs_shared_resize(shared, (void **)&leaves->low[k], 0, room, sizeof(float)) &&
-               hs_shared_resize(shared, (void **)&leaves->high[k], 0, room, sizeof(float));
+    if (!hs_shared_resize(near->shared, memory, 0, (int64_t)parts->bytes, 1)) {
+        return false;
     }
-    done =
-        done && hs_shared_resize(shared, (void **)&leaves->runs, 0, room, sizeof *leaves->runs) &&
-        hs_shared_resize(shared, (void **)&leaves->label, 0, room, sizeof(int32_t)) &&
-        hs_shared_resize(shared, (void **)&leaves->hits, 0, room, sizeof(int32_t)) &&
-        hs_shared_resize(shared, (void **)&leaves->images, 0, MOST_SHARED_IMAGES,
-                         sizeof *leaves->images) &&
-        hs_shared_resize(shared, (void **)&leaves->stack, 0, near->tree.depth + 2, sizeof(int32_t));
-    for (int32_t c = 0; done && c < room; c++) {
-        leaves->label[c] = c;
+    for (int p = 0; p < parts->n; p++) {
+        *parts->part[p].to = (char *)*memory + parts->part[p].at;
     }
-    return done ? HS_OK : HS_ERR_MEMORY;
+    return true;
 }
 
-void
-hs_nearest_leaves_free(const hs_nearest *near, hs_nearest_leaves *leaves)
+/* Room for the leaves of the tree in all images, if they are few. */
+static hs_status
+open_leaves(const hs_nearest *near, hs_nearest_leaves *leaves)
 {
-    hs_shared *shared = near->shared;
-    for (int k = 0; k < HS_MAX_DIM; k++) {
-        hs_shared_release(shared, (void **)&leaves->low[k]);
-        hs_shared_release(shared, (void **)&leaves->high[k]);
+    const int     images = near->search->bins.n_periodic > 0 ? MOST_LEAF_IMAGES : 1;
+    const int64_t all = (near->tree.n_nodes + INT64_C(1)) / 2 * images;
+    const int64_t room = (all < MOST_LEAVES ? all : MOST_LEAVES) + HS_PADDING;
+    hs_parts      parts;
+    if (leaves->memory != NULL) {
+        return HS_OK;
     }
-    hs_shared_release(shared, (void **)&leaves->runs);
-    hs_shared_release(shared, (void **)&leaves->label);
-    hs_shared_release(shared, (void **)&leaves->hits);
-    hs_shared_release(shared, (void **)&leaves->images);
-    hs_shared_release(shared, (void **)&leaves->stack);
+    hs_parts_begin(&parts);
+    for (int k = 0; k < near->tree.ndim; k++) {
+        hs_parts_add(&parts, (void **)&leaves->low[k], room, sizeof(float));
+        hs_parts_add(&parts, (void **)&leaves->high[k], room, sizeof(float));
+    }
+    hs_parts_add(&parts, (void **)&leaves->runs, room, sizeof *leaves->runs);
+    hs_parts_add(&parts, (void **)&leaves->joined, room, sizeof *leaves->joined);
+    hs_parts_add(&parts, (void **)&leaves->label, room, sizeof(int32_t));
+    hs_parts_add(&parts, (void **)&leaves->hits, room, sizeof(int32_t));
+    hs_parts_add(&parts, (void **)&leaves->images, MOST_LEAF_IMAGES, sizeof *leaves->images);
+    hs_parts_add(&parts, (void **)&leaves->stack, near->tree.depth + 2, sizeof(int32_t));
+    if (!allocate(near, &parts, &leaves->memory)) {
+        return HS_ERR_MEMORY;
+    }
+    for (int32_t c = 0; c < room; c++) {
+        leaves->label[c] = c;
+    }
+    return HS_OK;
 }
 
 /* One group around all that do not look much further than others. */
@@ -276,13 +582,13 @@ unite(const hs_nearest_group *groups, int32_t n, int ndim)
     for (int32_t g = 0; g < n; g++) {
         least = hs_smaller(groups[g].radius, least);
     }
-    hs_nearest_group all = {.first = INT32_MAX, .away = INFINITY};
+    hs_nearest_group all = {.last = 0, .away = INFINITY};
     for (int32_t g = 0; g < n; g++) {
         const hs_nearest_group *one = &groups[g];
+        const bool              is_first = all.last == 0;
         if (one->radius > FARTHEST * least) {
             continue;
         }
-        const bool is_first = all.first == INT32_MAX;
         for (int k = 0; k < ndim; k++) {
             all.lower[k] = is_first ? one->lower[k] : hs_smaller(one->lower[k], all.lower[k]);
             all.upper[k] = is_first ? one->upper[k] : hs_larger(one->upper[k], all.upper[k]);
@@ -291,7 +597,6 @@ unite(const hs_nearest_group *groups, int32_t n, int ndim)
             all.t_upper[k] = is_first ? one->t_upper[k]
                                       : hs_larger(one->t_upper[k], all.t_upper[k]);
         }
-        all.first = is_first ? one->first : all.first;
         all.last = one->last;
         all.away = hs_smaller(one->away, all.away);
         all.radius = hs_larger(one->radius, all.radius);
@@ -299,43 +604,41 @@ unite(const hs_nearest_group *groups, int32_t n, int ndim)
     return all;
 }
 
-double
-hs_nearest_balls(const hs_nearest_group *group, int ndim)
+/* Number x in units, from the centre, and no further than the extent, which nothing in reach is. */
+HS_ALWAYS_INLINE float
+clamped(double x, double centre, double unit, double extent)
 {
-    double balls = 1.0;
-    for (int k = 0; k < ndim; k++) {
-        balls *= 1.0 + (group->upper[k] - group->lower[k]) / (2.0 * group->radius);
-    }
-    return balls;
+    const double y = (x - centre) * unit;
+    return (float)hs_larger(hs_smaller(y, extent), -extent);
 }
 
-/* A coordinate in units, relative to the centre of all groups. */
+/* The same relative to the centre of all groups. */
 HS_ALWAYS_INLINE float
 relative(const hs_nearest_leaves *leaves, int k, double x)
 {
-    return hs_nearest_relative(x, leaves->centre[k], leaves->unit, leaves->extent);
+    return clamped(x, leaves->centre[k], leaves->unit, leaves->extent);
 }
 
 static void
 add_leaf(const hs_nearest *near, int32_t number, hs_nearest_leaves *leaves)
 {
     const hs_tree_node *node = &near->tree.nodes[number];
-    const int           d = near->tree.ndim, side = (number - 1) % 2;
-    const double       *bounds = hs_tree_bounds(&near->tree, number - side, d);
-    const int32_t       image = leaves->n_images - 1;
-    const double       *moved = leaves->images[image].moved;
-    for (int k = 0; k < d; k++) {
-        leaves->low[k][leaves->n] = relative(leaves, k, bounds[4 * k + side] + moved[k]);
-        leaves->high[k][leaves->n] = relative(leaves, k, bounds[4 * k + 2 + side] + moved[k]);
+    const int           d = near->tree.ndim, side = (number + 1) % 2;
+    const double       *moved = leaves->images[leaves->n_images - 1].moved;
+    for (int k = 0; leaves->are_shared && k < d; k++) { /* the tree is more than one leaf then */
+        const double *bounds = hs_tree_bounds(&near->tree, number - side, d) + 4 * k + side;
+        leaves->low[k][leaves->n] = relative(leaves, k, bounds[0] + moved[k]);
+        leaves->high[k][leaves->n] = relative(leaves, k, bounds[2] + moved[k]);
     }
-    leaves->runs[leaves->n++] =
-        (hs_nearest_run){0, hs_nearest_of_leaf(near, node), node->first, image};
+    leaves->runs[leaves->n] =
+        (hs_nearest_run){0, hs_nearest_of_leaf(near, node), node->first, leaves->n_images - 1};
+    leaves->n_points += leaves->runs[leaves->n++].n;
 }
 
 /* Adds the leaves of the last image whose squared distance is within `limit`; false when there are
  * too many. */
 HS_ALWAYS_INLINE bool
-find_leaves_in_image(const hs_nearest *near, const hs_nearest_group *all, double limit,
+find_leaves_in_image(const hs_nearest *near, const hs_nearest_group *all, double limit, double most,
                      hs_nearest_leaves *leaves, const int ndim)
 {
     const hs_tree *tree = &near->tree;
@@ -353,9 +656,10 @@ find_leaves_in_image(const hs_nearest *near, const hs_nearest_group *all, double
     for (;;) {
         const int32_t left = tree->nodes[number].left;
         double        gap[2] = {INFINITY, INFINITY};
+        HS_PREFETCH(&tree->nodes[left]);
         if (left != 0) {
             hs_tree_gaps(hs_tree_bounds(tree, left, ndim), low, high, leaves->unit, ndim, gap);
-        } else if (leaves->n == MOST_LEAVES) {
+        } else if (leaves->n == MOST_LEAVES || (double)leaves->n_points > most) {
             return false;
         } else {
             add_leaf(near, number, leaves);
@@ -368,8 +672,8 @@ find_leaves_in_image(const hs_nearest *near, const hs_nearest_group *all, double
 
 /* Finds the leaves of all images within reach; false when there are too many. */
 static bool
-find_leaves(const hs_nearest *near, const hs_nearest_group *all, hs_nearest_images *images,
-            hs_nearest_leaves *leaves)
+find_leaves(const hs_nearest *near, const hs_nearest_group *all, double most,
+            hs_nearest_images *images, hs_nearest_leaves *leaves)
 {
     const int    d = near->tree.ndim;
     const double reach = all->radius * leaves->unit * (1.0 + LEAF_ROOM) +
@@ -377,38 +681,41 @@ find_leaves(const hs_nearest *near, const hs_nearest_group *all, hs_nearest_imag
     const double limit = reach * reach;
     bool         fit = true;
     leaves->n = leaves->n_images = 0;
+    leaves->n_points = 0;
     while (fit && hs_nearest_images_next(images)) {
-        const int32_t     n = leaves->n;
-        hs_nearest_image *image = &leaves->images[leaves->n_images++];
-        hs_nearest_image_set(near, images, image);
+        const int32_t n = leaves->n;
+        leaves->images[leaves->n_images++] = images->next;
         switch (d) {
-        case 2: fit = find_leaves_in_image(near, all, limit, leaves, 2); break;
-        case 3: fit = find_leaves_in_image(near, all, limit, leaves, 3); break;
-        default: fit = find_leaves_in_image(near, all, limit, leaves, d);
+        case 2: fit = find_leaves_in_image(near, all, limit, most, leaves, 2); break;
+        case 3: fit = find_leaves_in_image(near, all, limit, most, leaves, 3); break;
+        default: fit = find_leaves_in_image(near, all, limit, most, leaves, d);
         }
         leaves->n_images -= leaves->n == n; /* nothing there */
     }
     return fit;
 }
 
-void
+hs_status
 hs_nearest_leaves_find(const hs_nearest *near, const hs_nearest_group *groups, int32_t n,
-                       hs_nearest_leaves *leaves)
+                       double most, hs_nearest_leaves *leaves)
 {
     hs_nearest_images images;
     const int         d = near->tree.ndim;
-    double            widest = 0.0;
-    double            balls = 0.0;
+    double            widest = 0.0, balls = 0.0;
     leaves->radius = 0.0;
-    if (n < 2 || near->tree.n_nodes < 2) {
-        return;
+    leaves->are_shared = n > 1 && near->tree.n_nodes > 1;
+    if (n == 0) {
+        return HS_OK;
+    }
+    if (open_leaves(near, leaves) != HS_OK) {
+        return HS_ERR_MEMORY;
     }
     const hs_nearest_group all = unite(groups, n, d);
     for (int32_t g = 0; g < n; g++) {
-        balls += hs_nearest_balls(&groups[g], d);
+        balls += balls_of(&groups[g], d);
     }
-    if (hs_nearest_balls(&all, d) > MOSTLY_EMPTY * balls) {
-        return;
+    if (balls_of(&all, d) > MOSTLY_EMPTY * balls) {
+        return HS_OK;
     }
     leaves->unit = hs_power_of_two(-hs_nearest_exponent(all.radius));
     for (int k = 0; k < d; k++) {
@@ -418,24 +725,24 @@ hs_nearest_leaves_find(const hs_nearest *near, const hs_nearest_group *groups, i
     }
     leaves->extent = 0.5 * widest + 4.0;
     if (!(widest < WIDEST_LEAF) || hs_nearest_images_start(near, &all, &images) != HS_OK ||
-        images.count > MOST_SHARED_IMAGES || images.error * leaves->unit > LEAF_ROOM) {
-        return;
+        images.count > MOST_LEAF_IMAGES || images.error * leaves->unit > LEAF_ROOM) {
+        return HS_OK;
     }
     leaves->error = images.error;
-    if (find_leaves(near, &all, &images, leaves)) {
+    if (find_leaves(near, &all, most, &images, leaves)) {
         leaves->radius = all.radius;
     }
+    return HS_OK;
 }
 
-/* Lists the leaves within `radius` of one of these groups in leaves->hits, ascending; returns how
- * many. radius: at most leaves->radius. */
+/* Lists the leaves within the radius of one of these groups in leaves->hits, ascending; returns how
+ * many. */
 static int32_t
-nearest_leaves_list(const hs_nearest *near, const hs_nearest_group *group, double radius,
-                    hs_nearest_leaves *leaves)
+list_leaves(const hs_nearest *near, const hs_nearest_group *group, const hs_nearest_leaves *leaves)
 {
     const int    d = near->tree.ndim;
     const double reach =
-        radius * leaves->unit * (1.0 + LEAF_ROOM) +
+        group->radius * leaves->unit * (1.0 + LEAF_ROOM) +
         sqrt(d) * (4.0 * leaves->error * leaves->unit + AXIS_ERROR * leaves->extent);
     hs_boxes boxes = {.ndim = d,
                       .n = leaves->n,
@@ -451,175 +758,11 @@ nearest_leaves_list(const hs_nearest *near, const hs_nearest_group *group, doubl
     return near->search->call->kernel->near_boxes(&boxes);
 }
 
-/* Which leaves a group may be near to, as runs of points. */
-
-/* Relative room, far more than roundings take. */
-#define RUN_ROOM 0x1p-30
-/* Images between two polls. */
-#define POLL_IMAGES 4096
-
-static bool
-add_image(const hs_nearest *near, const hs_nearest_image *image, hs_nearest_block *block)
-{
-    if (block->n_images == block->image_capacity) {
-        const int32_t capacity = 2 * block->image_capacity + 32;
-        if (!hs_shared_resize(near->shared, (void **)&block->images, block->image_capacity,
-                              capacity, sizeof *block->images)) {
-            return false;
-        }
-        block->image_capacity = capacity;
-    }
-    block->images[block->n_images++] = *image;
-    return true;
-}
-
-/* Adds points si, ..., si + n - 1 in that image. */
-static bool
-add_points(const hs_nearest *near, int32_t si, int32_t n, int32_t image, hs_nearest_block *block)
-{
-    hs_nearest_run *last = block->n_runs > 0 ? &block->runs[block->n_runs - 1] : NULL;
-    if (last != NULL && last->image == image && last->si + last->n == si) {
-        last->n += n;
-        block->n += n;
-        return true;
-    }
-    if (block->n_runs == block->run_capacity) {
-        const int32_t capacity = 2 * block->run_capacity + 64;
-        if (!hs_shared_resize(near->shared, (void **)&block->runs, block->run_capacity, capacity,
-                              sizeof *block->runs)) {
-            return false;
-        }
-        block->run_capacity = capacity;
-    }
-    block->runs[block->n_runs++] = (hs_nearest_run){block->n, n, si, image};
-    block->n += n;
-    return true;
-}
-
-/* Adds the points of a leaf, in the last image. */
-static bool
-add_leaf_runs(const hs_nearest *near, const hs_tree_node *node, hs_nearest_block *block)
-{
-    return add_points(near, node->first, hs_nearest_of_leaf(near, node), block->n_images - 1,
-                      block);
-}
-
-/* Adds the leaves of the last image that are in reach, as runs in ascending order. low, high: the
- * group, less the image's displacement. */
-HS_ALWAYS_INLINE hs_status
-find_runs(const hs_nearest *near, const double *low, const double *high, double most, double reach,
-          hs_nearest_block *block, const int ndim)
-{
-    const hs_tree *tree = &near->tree;
-    const double   limit = reach * reach * (1.0 + RUN_ROOM);
-    int64_t        n_waiting = 0;
-    int32_t        number = 0;
-    if (hs_tree_gap(tree, low, high, block->unit) > limit) {
-        return HS_OK;
-    }
-    for (;;) {
-        const hs_tree_node *node = &tree->nodes[number];
-        const int32_t       left = node->left;
-        double              gap[2] = {INFINITY, INFINITY};
-        HS_PREFETCH(&tree->nodes[left]);
-        if (left != 0) {
-            hs_tree_gaps(hs_tree_bounds(tree, left, ndim), low, high, block->unit, ndim, gap);
-        } else if (!add_leaf_runs(near, node, block) || block->n >= INT32_MAX / 8) {
-            return HS_ERR_MEMORY;
-        } else if (block->n > most) {
-            return HS_TRY_OTHER;
-        }
-        if (!hs_tree_step(left, gap, limit, block->stack, &n_waiting, &number)) {
-            return HS_OK;
-        }
-    }
-}
-
-static hs_status
-find_runs_in_image(const hs_nearest *near, const hs_nearest_group *group, const double *moved,
-                   double most, double reach, hs_nearest_block *block)
-{
-    double low[HS_MAX_DIM], high[HS_MAX_DIM];
-    for (int k = 0; k < near->tree.ndim; k++) {
-        low[k] = group->lower[k] - moved[k];
-        high[k] = group->upper[k] - moved[k];
-    }
-    switch (near->tree.ndim) {
-    case 2: return find_runs(near, low, high, most, reach, block, 2);
-    case 3: return find_runs(near, low, high, most, reach, block, 3);
-    default: return find_runs(near, low, high, most, reach, block, near->tree.ndim);
-    }
-}
-
-/* Sets runs and images, by walking down the tree: what is within the radius of the group and a
- * little more. HS_TRY_OTHER: more than `most` candidates. */
-static hs_status
-nearest_runs_find(const hs_nearest *near, const hs_options *options, const hs_nearest_group *group,
-                  double most, hs_nearest_images *images, hs_nearest_block *block)
-{
-    const double reach =
-        block->reach * (1.0 + RUN_ROOM) + 4.0 * sqrt(near->tree.ndim) * block->error;
-    int       since_poll = 0; /* images, as many as hs_nearest_images_start lets be */
-    hs_status status = HS_OK;
-    block->n = block->n_runs = block->n_images = 0;
-    while (status == HS_OK && hs_nearest_images_next(images)) {
-        const int32_t    n = block->n;
-        hs_nearest_image image;
-        hs_nearest_image_set(near, images, &image);
-        if (!add_image(near, &image, block)) {
-            return HS_ERR_MEMORY;
-        }
-        status = find_runs_in_image(near, group, images->moved, most, reach, block);
-        block->n_images -= block->n == n; /* nothing there */
-        if (status == HS_OK && ++since_poll == POLL_IMAGES) {
-            since_poll = 0;
-            status = hs_poll(options, 0.0);
-        }
-    }
-    return status;
-}
-
-/* nearest_runs_find from leaves that were found for this group and others. */
-static hs_status
-nearest_runs_take(const hs_nearest *near, const hs_nearest_group *group, double most,
-                  hs_nearest_leaves *leaves, hs_nearest_block *block)
-{
-    const int32_t n = nearest_leaves_list(near, group, group->radius, leaves);
-    int32_t       first = 0;
-    bool          is_one = true;
-    block->n = block->n_runs = block->n_images = 0;
-    for (int32_t l = 0; l < n; l++) {
-        const hs_nearest_run *leaf = &leaves->runs[leaves->hits[l]];
-        first = l == 0 ? leaf->image : first;
-        is_one = is_one && leaf->image == first;
-        if (!add_points(near, leaf->si, leaf->n, leaf->image, block)) {
-            return HS_ERR_MEMORY;
-        }
-    }
-    /* Where all leaves lie in one image, it becomes the only one. */
-    const int32_t from = is_one ? first : 0;
-    const int32_t to = is_one && first < leaves->n_images ? first + 1 : leaves->n_images;
-    for (int32_t i = from; i < to; i++) {
-        if (!add_image(near, &leaves->images[i], block)) {
-            return HS_ERR_MEMORY;
-        }
-    }
-    for (int32_t r = 0; is_one && r < block->n_runs; r++) {
-        block->runs[r].image = 0;
-    }
-    return block->n > most ? HS_TRY_OTHER : HS_OK;
-}
-
-/* Runs and images first; then a unit for which the radius is between 1 and 2; then
- * the kernel copies. */
+/* The block: runs first, then a unit for which the radius is between 1 and 2, then the kernel
+ * copies. */
 
 /* Relative room, far more than roundings take. */
 #define BLOCK_ROOM 0x1p-30
-/* A group that is so many times as wide as its radius is searched point by point: floats relative
- * to its centre would not tell distances apart. */
-#define WIDEST_BLOCK 512.0
-/* Least radius, in errors of shifted coordinates. */
-#define LEAST_IN_ERRORS 1024.0
 /* Candidates for which there is room at first. */
 #define FIRST_CAPACITY 1024
 /* With more to be found there are more hits than a kernel puts in order. */
@@ -638,129 +781,53 @@ static bool
 reserve(const hs_nearest *near, hs_nearest_block *block, int64_t n)
 {
     const int64_t capacity = n + n / 2 + FIRST_CAPACITY, room = capacity + HS_PADDING;
-    hs_shared    *shared = near->shared;
-    bool          done = n < INT32_MAX / 4;
+    hs_parts      parts;
     if (n <= block->capacity && block->capacity > 0) {
         return true;
     }
     block->capacity = 0;
-    for (int k = 0; done && k < near->tree.ndim; k++) {
-        done = hs_shared_resize(shared, (void **)&block->y[k], 0, room, sizeof(float));
+    hs_parts_begin(&parts);
+    for (int k = 0; k < near->tree.ndim; k++) {
+        hs_parts_add(&parts, (void **)&block->y[k], room, sizeof(float));
     }
-    done = done && hs_shared_resize(shared, (void **)&block->norm, 0, room, sizeof(float)) &&
-           hs_shared_resize(shared, (void **)&block->number, 0, room, sizeof(int32_t)) &&
-           hs_shared_resize(shared, (void **)&block->image_of, 0, room, sizeof(int32_t)) &&
-           hs_shared_resize(shared, (void **)&block->place, 0, room, sizeof(int32_t)) &&
-           hs_shared_resize(shared, (void **)&block->unsure, 0, room, sizeof(hs_unsure)) &&
-           hs_shared_resize(shared, (void **)&block->hits, 0, 2 * capacity + HS_PADDING,
-                            sizeof(int32_t)) &&
-           hs_shared_resize(shared, (void **)&block->squares, 0, 2 * capacity + HS_PADDING,
-                            sizeof(float));
-    for (int64_t c = 0; done && c < room; c++) {
+    hs_parts_add(&parts, (void **)&block->norm, room, sizeof(float));
+    hs_parts_add(&parts, (void **)&block->number, room, sizeof(int32_t));
+    hs_parts_add(&parts, (void **)&block->image_of, room, sizeof(int32_t));
+    hs_parts_add(&parts, (void **)&block->place, room, sizeof(int32_t));
+    hs_parts_add(&parts, (void **)&block->unsure, room, sizeof(hs_unsure));
+    hs_parts_add(&parts, (void **)&block->hits, 2 * capacity + HS_PADDING, sizeof(int32_t));
+    hs_parts_add(&parts, (void **)&block->squares, 2 * capacity + HS_PADDING, sizeof(float));
+    if (!allocate(near, &parts, &block->memory)) {
+        return false;
+    }
+    for (int64_t c = 0; c < room; c++) {
         block->place[c] = (int32_t)c;
     }
-    block->capacity = done ? (int32_t)capacity : 0;
-    return done;
+    block->capacity = (int32_t)capacity;
+    return true;
 }
 
-hs_status
-hs_nearest_block_init(const hs_nearest *near, hs_nearest_block *block)
-{
-    *block = (hs_nearest_block){.depth = near->tree.depth + 2};
-    return hs_shared_resize(near->shared, (void **)&block->stack, 0, block->depth,
-                            sizeof *block->stack) &&
-                   reserve(near, block, 0)
-               ? HS_OK
-               : HS_ERR_MEMORY;
-}
-
-void
-hs_nearest_block_free(const hs_nearest *near, hs_nearest_block *block)
-{
-    for (int k = 0; k < HS_MAX_DIM; k++) {
-        hs_shared_release(near->shared, (void **)&block->y[k]);
-    }
-    hs_shared_release(near->shared, (void **)&block->norm);
-    hs_shared_release(near->shared, (void **)&block->number);
-    hs_shared_release(near->shared, (void **)&block->image_of);
-    hs_shared_release(near->shared, (void **)&block->place);
-    hs_shared_release(near->shared, (void **)&block->hits);
-    hs_shared_release(near->shared, (void **)&block->squares);
-    hs_shared_release(near->shared, (void **)&block->unsure);
-    hs_shared_release(near->shared, (void **)&block->runs);
-    hs_shared_release(near->shared, (void **)&block->images);
-    hs_shared_release(near->shared, (void **)&block->stack);
-}
-
-/* Images in reach. A radius that is small beside the errors of shifted coordinates is raised to
- * some multiple of these: a smaller unit would be of no use. */
+/* Sets runs: points of the leaves in reach, those that follow one another together. HS_TRY_OTHER:
+ * they are more than `most`. */
 static hs_status
-start_images(const hs_nearest *near, hs_nearest_group *group, hs_nearest_images *images)
+find_runs(const hs_nearest *near, const hs_nearest_group *group, double most,
+          const hs_nearest_leaves *leaves, hs_nearest_block *block)
 {
-    hs_status    status = hs_nearest_images_start(near, group, images);
-    const double least = LEAST_IN_ERRORS * images->error;
-    if (status == HS_OK && group->radius < least) {
-        group->radius = least;
-        status = hs_nearest_images_start(near, group, images);
-    }
-    return status;
-}
-
-/* Unit and errors, for the group's radius. */
-static void
-set_unit(const hs_nearest *near, const hs_nearest_group *group, double error,
-         hs_nearest_block *block)
-{
-    block->unit = hs_power_of_two(-hs_nearest_exponent(group->radius));
-    block->reach = group->radius * block->unit;
-    block->error = error * block->unit;
-    /* 2 e |D| + e^2, and what underflow may lose. */
-    const double along = sqrt(near->tree.ndim) * block->error;
-    block->flat_error = 2.1 * along * (block->reach + along) + 0x1p-1000;
-}
-
-static void
-gather_relative(const hs_nearest *near, const double *centre, hs_nearest_block *block)
-{
-    hs_relative_keys keys = {.ndim = near->tree.ndim,
-                             .images = block->images,
-                             .unit = block->unit,
-                             .extent = block->extent,
-                             .norm = block->norm,
-                             .number = block->number};
-    for (int k = 0; k < near->tree.ndim; k++) {
-        keys.x[k] = near->search->bins.x[k];
-        keys.y[k] = block->y[k];
-        keys.centre[k] = centre[k];
-    }
-    near->search->call->kernel->gather_relative(&keys, block->runs, block->n_runs);
-    for (int k = 0; k < near->tree.ndim; k++) {
-        hs_pad_lanes(block->y[k], block->n);
-    }
-    hs_pad_lanes(block->norm, block->n);
-    for (int32_t r = 0; block->n_images > 1 && r < block->n_runs; r++) {
-        int32_t *image_of = block->image_of + block->runs[r].at;
-        for (int32_t c = 0; c < block->runs[r].n; c++) {
-            image_of[c] = block->runs[r].image;
+    const int32_t  n = leaves->are_shared ? list_leaves(near, group, leaves) : leaves->n;
+    const int32_t *which = leaves->are_shared ? leaves->hits : leaves->label;
+    block->n = block->n_runs = 0;
+    for (int32_t l = 0; l < n; l++) {
+        const hs_nearest_run *leaf = &leaves->runs[which[l]];
+        hs_nearest_run       *last = block->n_runs > 0 ? &block->runs[block->n_runs - 1] : NULL;
+        if (last != NULL && last->image == leaf->image && last->si + last->n == leaf->si) {
+            last->n += leaf->n;
+        } else {
+            block->runs[block->n_runs] = *leaf;
+            block->runs[block->n_runs++].at = block->n;
         }
+        block->n += leaf->n;
     }
-}
-
-static hs_status
-gather(const hs_nearest *near, const hs_options *options, const hs_nearest_group *group,
-       hs_nearest_block *block)
-{
-    const hs_bins *asking = hs_search_asking(near->search);
-    double         centre[HS_MAX_DIM];
-    for (int k = 0; k < near->tree.ndim; k++) {
-        centre[k] = group->lower[k] + 0.5 * (group->upper[k] - group->lower[k]);
-        for (int32_t t = 0; t < group->last - group->first; t++) {
-            block->q[k][t] = hs_nearest_relative(asking->x[k][group->first + t], centre[k],
-                                                 block->unit, block->extent);
-        }
-    }
-    gather_relative(near, centre, block);
-    return poll_if_large(options, block);
+    return block->n > most ? HS_TRY_OTHER : HS_OK;
 }
 
 /* Largest |y| and |q| together, as floats, which round up. */
@@ -775,59 +842,74 @@ scan_extent(const hs_nearest_block *block)
 static void
 choose_squares(const hs_nearest *near, const hs_nearest_group *group, hs_nearest_block *block)
 {
-    const double extent = scan_extent(block), limit = near->limit * block->unit;
-    double       in, out;
+    const hs_nearest_frame *frame = &block->frame;
+    double                  in, out;
     block->has_squares = false;
-    if (group->is_complete || near->k > MOST_BY_SQUARES || limit < block->reach) {
+    if (group->is_complete || near->k > MOST_BY_SQUARES ||
+        near->limit * frame->unit < frame->reach || near->search->call->choice != NULL) {
         return;
     }
-    hs_threshold_bounds(near->tree.ndim, block->reach, extent, block->error, HS_FILTER_UNIT,
-                        HS_FILTER_TINY, &in, &out);
-    const double square = block->reach * block->reach;
+    hs_threshold_bounds(near->tree.ndim, frame->reach, scan_extent(block), frame->error,
+                        HS_FILTER_UNIT, HS_FILTER_TINY, &in, &out);
+    const double square = frame->reach * frame->reach;
     /* The radius is 1024 errors at least, and the extent some hundred radii at most. */
     HS_ASSERT(in > 0.0 && out < LARGEST_SQUARE);
     block->has_squares = true;
     block->square_error = hs_larger(square - in, out - square) * (1.0 + BLOCK_ROOM);
 }
 
-/* Unit, errors and extent; HS_TRY_OTHER: the group is too wide. */
-static hs_status
-set_frame(const hs_nearest *near, const hs_nearest_group *group, double error,
-          hs_nearest_block *block)
+/* Copies coordinates of the group and of all candidates, relative to its centre. */
+static void
+gather(const hs_nearest *near, const hs_nearest_group *group, hs_nearest_block *block)
 {
-    double widest = 0.0;
-    set_unit(near, group, error, block);
+    const hs_bins   *asking = hs_search_asking(near->search);
+    hs_relative_keys keys = {.ndim = near->tree.ndim,
+                             .images = block->images,
+                             .unit = block->frame.unit,
+                             .extent = block->extent,
+                             .norm = block->norm,
+                             .number = block->number};
     for (int k = 0; k < near->tree.ndim; k++) {
-        widest = hs_larger((group->upper[k] - group->lower[k]) * block->unit, widest);
+        keys.x[k] = near->search->bins.x[k];
+        keys.y[k] = block->y[k];
+        keys.centre[k] = group->lower[k] + 0.5 * (group->upper[k] - group->lower[k]);
+        for (int32_t t = 0; t < group->last - group->first; t++) {
+            block->q[k][t] =
+                clamped(asking->x[k][group->first + t], keys.centre[k], keys.unit, keys.extent);
+        }
     }
-    /* Beyond the group and the radius, by more than roundings take. */
-    block->extent = 0.5 * widest + 4.0;
-    return widest > WIDEST_BLOCK ? HS_TRY_OTHER : HS_OK;
-}
-
-/* Runs and images. */
-static hs_status
-find(const hs_nearest *near, const hs_options *options, hs_nearest_group *group, double most,
-     hs_nearest_leaves *leaves, hs_nearest_block *block)
-{
-    hs_nearest_images images;
-    if (leaves != NULL && group->radius <= leaves->radius &&
-        group->radius >= LEAST_IN_ERRORS * leaves->error) {
-        const hs_status status = set_frame(near, group, leaves->error, block);
-        return status == HS_OK ? nearest_runs_take(near, group, most, leaves, block) : status;
+    near->search->call->kernel->gather_relative(&keys, block->runs, block->n_runs);
+    for (int k = 0; k < near->tree.ndim; k++) {
+        hs_pad_lanes(block->y[k], block->n);
     }
-    if (start_images(near, group, &images) != HS_OK || images.count > most) {
-        return most < INFINITY ? HS_TRY_OTHER : HS_ERR_MEMORY;
+    hs_pad_lanes(block->norm, block->n);
+    for (int32_t r = 0; r < block->n_runs; r++) {
+        int32_t *image_of = block->image_of + block->runs[r].at;
+        for (int32_t c = 0; c < block->runs[r].n; c++) {
+            image_of[c] = block->runs[r].image;
+        }
     }
-    const hs_status status = set_frame(near, group, images.error, block);
-    return status == HS_OK ? nearest_runs_find(near, options, group, most, &images, block) : status;
 }
 
 hs_status
-hs_nearest_block_fill(const hs_nearest *near, const hs_options *options, hs_nearest_group *group,
-                      double most, hs_nearest_leaves *leaves, hs_nearest_block *block)
+hs_nearest_block_fill(const hs_nearest *near, const hs_options *options,
+                      const hs_nearest_group *group, double most, const hs_nearest_leaves *leaves,
+                      hs_nearest_block *block)
 {
-    hs_status status = find(near, options, group, most, leaves, block);
+    const double unit = hs_power_of_two(-hs_nearest_exponent(group->radius));
+    double       widest = 0.0;
+    if (group->radius > leaves->radius || group->radius < LEAST_IN_ERRORS * leaves->error) {
+        return HS_TRY_OTHER;
+    }
+    hs_nearest_frame_set(near->tree.ndim, unit, leaves->error * unit, group->radius * unit,
+                         &block->frame);
+    for (int k = 0; k < near->tree.ndim; k++) {
+        widest = hs_larger((group->upper[k] - group->lower[k]) * unit, widest);
+    }
+    block->extent = 0.5 * widest + 4.0; /* beyond the radius, by more than roundings take */
+    block->images = leaves->images;
+    block->runs = leaves->joined;
+    hs_status status = find_runs(near, group, most, leaves, block);
     if (status == HS_OK) {
         choose_squares(near, group, block);
         status = poll_if_large(options, block);
@@ -835,7 +917,11 @@ hs_nearest_block_fill(const hs_nearest *near, const hs_options *options, hs_near
     if (status == HS_OK && !reserve(near, block, block->n)) {
         status = HS_ERR_MEMORY;
     }
-    return status == HS_OK ? gather(near, options, group, block) : status;
+    if (status == HS_OK) {
+        gather(near, group, block);
+        status = poll_if_large(options, block);
+    }
+    return status;
 }
 
 int32_t
@@ -844,7 +930,7 @@ hs_nearest_block_scan(const hs_nearest *near, const hs_nearest_group *group,
 {
     const hs_kernel *kernel = near->search->call->kernel;
     const int        d = near->tree.ndim;
-    const double     extent = scan_extent(block);
+    const double     extent = scan_extent(block), reach = block->frame.reach;
     hs_scan          scan = {.ndim = d,
                              .norm = block->norm,
                              .label = block->place,
@@ -860,14 +946,14 @@ hs_nearest_block_scan(const hs_nearest *near, const hs_nearest_group *group,
         scan.q[k] = block->q[k];
     }
     /* rank.c decides: no hit is unsure here. */
-    scan.direct = hs_thresholds_of(d, block->reach, extent, block->error);
+    scan.direct = hs_thresholds_of(d, reach, extent, block->frame.error);
     if (block->has_squares) {
         scan.squares = block->squares;
         return kernel->squares(&scan, first);
     }
-    scan.expanded = hs_expanded_of(d, block->reach, extent, block->error);
+    scan.expanded = hs_expanded_of(d, reach, extent, block->frame.error);
     scan.direct.in = INFINITY;
     scan.expanded.in = INFINITY;
-    return hs_expanded_pays(block->reach, extent) ? kernel->list(&scan, first)
-                                                  : kernel->list_direct(&scan, first);
+    return hs_expanded_pays(reach, extent) ? kernel->list(&scan, first)
+                                           : kernel->list_direct(&scan, first);
 }

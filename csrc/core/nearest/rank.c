@@ -4,120 +4,67 @@
 #include <math.h>
 #include <string.h>
 
-/* rank.c: few keys are placed by counting the smaller ones, many are merged; the nearest of many
- * come by partitioning. Squares too close to tell are compared exactly, then rows are written. */
+/* rank.c: keys of hits or of a walk, their exact order, and the rows that they become. */
 
-HS_ALWAYS_INLINE bool
-is_smaller(void *context, const hs_nearest_key *b, const hs_nearest_key *a)
-{
-    (void)context;
-    return b->square < a->square;
-}
-
-/*
- * Each key goes to the place that is the number of smaller ones: as integers of 16 bits, the square
- * in some hundreds of steps followed by the key's own number, so that no two are equal. Insertion
- * puts in order what these cannot tell: on average less than one among thirty.
- */
-static void
-sort_by_counting(hs_nearest_key **keys, hs_nearest_key **spare, int64_t n, double largest)
-{
-    const int32_t padded = ((int32_t)n + 7) / 8 * 8;
-    const int32_t numbers = n <= HS_NEAREST_COUNTED / 2 ? HS_NEAREST_COUNTED / 2
-                                                        : HS_NEAREST_COUNTED;
-    const double  steps = largest > 0x1p-1000 ? (double)(INT16_MAX / numbers) / largest : 0.0;
-    int16_t       rough[HS_NEAREST_COUNTED];
-    for (int32_t e = 0; e < n; e++) {
-        rough[e] = (int16_t)((int32_t)((*keys)[e].square * steps) * numbers + e);
-    }
-    for (int32_t e = (int32_t)n; e < padded; e++) {
-        rough[e] = INT16_MAX;
-    }
-    for (int32_t e = 0; e < n; e++) {
-        const int16_t own = rough[e];
-        int16_t       smaller = 0;
-        for (int32_t f = 0; f < padded; f++) {
-            smaller = (int16_t)(smaller + (rough[f] < own));
-        }
-        (*spare)[smaller] = (*keys)[e];
-    }
-    hs_nearest_key *sorted = *spare;
-    *spare = *keys;
-    *keys = sorted;
-    hs_nearest_insert(NULL, *keys, n, is_smaller);
-}
-
-void
-hs_nearest_sort(hs_nearest_pace *pace, hs_nearest_key **keys, hs_nearest_key **spare, int64_t n,
-                double largest)
-{
-    if (n <= HS_NEAREST_COUNTED) {
-        sort_by_counting(keys, spare, n, largest);
-    } else {
-        hs_nearest_merge(pace, NULL, *keys, *spare, n, is_smaller);
-    }
-}
-
-/* Brings the `wanted` keys of least squares to the front, in no order. */
-static void
-nearest_select(hs_nearest_key *keys, int64_t n, int64_t wanted)
-{
-    for (int64_t low = 0, high = n - 1; low < high;) {
-        const double pivot = keys[low + (high - low) / 2].square;
-        int64_t      i = low, j = high;
-        while (i <= j) {
-            while (keys[i].square < pivot) {
-                i++;
-            }
-            while (keys[j].square > pivot) {
-                j--;
-            }
-            if (i <= j) {
-                const hs_nearest_key key = keys[i];
-                keys[i++] = keys[j];
-                keys[j--] = key;
-            }
-        }
-        if (wanted - 1 <= j) {
-            high = j;
-        } else if (wanted - 1 >= i) {
-            low = i;
-        } else {
-            return;
-        }
-    }
-}
-
-/* Squares in float64 are sorted; neighbours in that order that are too close are
- * compared exactly. */
-
-/* A part of the largest square. The last bits of a key hold the number of its hit: this is twice
- * what two keys lose by that. */
+/* A part of the largest square. The last bits of a key of the kernel hold the number of its hit:
+ * this is twice what two keys lose by that. */
 #define KEY_ERROR 0x1p-15
-/* Where there are more than so many times the keys that are wanted, the farthest are set aside
- * before the others are sorted. */
-#define MANY 3
+/* Where there are more than so many times the keys that are wanted, and more than so many, the
+ * farthest are set aside before the others are sorted. */
+#define MANY      3
+#define MANY_KEYS 64
 /* Among very many keys that float64 cannot tell apart, the nearest are found by insertion where no
  * more than so many are wanted. */
 #define MOST_INSERTED 64
+#define FEW           24 /* up to here keys are sorted by insertion */
+
+hs_status
+hs_nearest_ranker_init(hs_nearest_ranker *ranker)
+{
+    const hs_nearest *near = ranker->near;
+    const int64_t     room = near->tree.depth + 2;
+    return hs_shared_resize(near->shared, (void **)&ranker->stack, 0, room, sizeof(int32_t)) &&
+                   hs_shared_resize(near->shared, (void **)&ranker->gaps, 0, room, sizeof(double))
+               ? HS_OK
+               : HS_ERR_MEMORY;
+}
 
 void
 hs_nearest_ranker_free(hs_nearest_ranker *ranker)
 {
-    hs_shared_release(ranker->near->shared, (void **)&ranker->keys);
-    hs_shared_release(ranker->near->shared, (void **)&ranker->spare);
+    hs_shared *shared = ranker->near->shared;
+    hs_shared_release(shared, (void **)&ranker->keys);
+    hs_shared_release(shared, (void **)&ranker->spare);
+    hs_shared_release(shared, (void **)&ranker->least);
+    hs_shared_release(shared, (void **)&ranker->walked);
+    hs_shared_release(shared, (void **)&ranker->stack);
+    hs_shared_release(shared, (void **)&ranker->gaps);
 }
 
+void
+hs_nearest_ranker_set(hs_nearest_ranker *ranker, int32_t si)
+{
+    const hs_search *search = ranker->near->search;
+    ranker->si = si;
+    ranker->n = 0;
+    ranker->status = HS_OK;
+    if (search->call->choice != NULL) {
+        hs_chooser_set(search->call->choice, hs_search_asking(search)->order[si], &ranker->chooser);
+    }
+}
+
+/* Room for n keys beside those that there are. */
 static bool
 reserve(hs_nearest_ranker *ranker, int64_t n)
 {
     hs_shared    *shared = ranker->near->shared;
-    const int64_t capacity = n + n / 2 + 256;
-    if (n <= ranker->capacity) {
+    const int64_t capacity = ranker->n + n + (ranker->n + n) / 2 + 256;
+    if (ranker->n + n <= ranker->capacity) {
         return true;
     }
     ranker->capacity = 0;
-    if (!hs_shared_resize(shared, (void **)&ranker->keys, 0, capacity, sizeof(hs_nearest_key)) ||
+    if (!hs_shared_resize(shared, (void **)&ranker->keys, ranker->n, capacity,
+                          sizeof(hs_nearest_key)) ||
         !hs_shared_resize(shared, (void **)&ranker->spare, 0, capacity, sizeof(hs_nearest_key))) {
         return false;
     }
@@ -125,24 +72,45 @@ reserve(hs_nearest_ranker *ranker, int64_t n)
     return true;
 }
 
+/* Counts so many more steps, and polls now and then; false: stop. Once what may take long does not
+ * go on, keys are in any order, some of them twice, and of no use. */
+HS_ALWAYS_INLINE bool
+goes_on(hs_nearest_ranker *ranker, int64_t steps)
+{
+    ranker->steps += steps;
+    if (ranker->steps >= HS_NEAREST_POLL_STEPS && ranker->status == HS_OK) {
+        ranker->steps = 0;
+        ranker->status = hs_poll(ranker->options, 0.0);
+    }
+    return ranker->status == HS_OK;
+}
+
 /* Neighbouring keys are told apart if they differ by more. */
 HS_ALWAYS_INLINE double
 closeness(const hs_nearest_ranker *ranker, double square)
 {
-    return 2.0 * hs_nearest_error(ranker->block, ranker->near->tree.ndim, square);
+    return 2.0 * hs_nearest_error(&ranker->frame, ranker->near->tree.ndim, square);
 }
 
-/* What the metric measures to, and its shift, of point sj in this image; also S over the periodic
- * box vectors as given when `given` is not NULL. False when a shift passes its range. */
-static bool
-pair_in_image(const hs_nearest *near, int32_t si, int32_t sj, const int32_t *image, double *q,
-              int64_t *shift, int64_t *given)
+HS_ALWAYS_INLINE const hs_nearest_image *
+image_of(const hs_nearest_ranker *ranker, const hs_nearest_key *key)
 {
-    const hs_bins *bins = &near->search->bins, *asking = hs_search_asking(near->search);
-    const int      m = bins->n_periodic;
-    int64_t        turned[HS_MAX_DIM] = {0}, as_given[HS_MAX_DIM];
+    return &ranker->images[key->image];
+}
+
+/* What the metric measures to, and its shift, of a key's point; also S over the periodic box
+ * vectors as given when `given` is not NULL. False when a shift passes its range. */
+static bool
+pair_of(const hs_nearest_ranker *ranker, const hs_nearest_key *key, double *q, int64_t *shift,
+        int64_t *given)
+{
+    const hs_search *search = ranker->near->search;
+    const hs_bins   *bins = &search->bins, *asking = hs_search_asking(search);
+    const int32_t   *image = image_of(ranker, key)->shift;
+    const int        m = bins->n_periodic;
+    int64_t          turned[HS_MAX_DIM] = {0}, as_given[HS_MAX_DIM];
     for (int k = 0; k < bins->ndim; k++) {
-        q[k] = bins->keeps_originals ? bins->originals[k][sj] : bins->x[k][sj];
+        q[k] = bins->keeps_originals ? bins->originals[k][key->number] : bins->x[k][key->number];
     }
     for (int r = 0; r < m; r++) {
         shift[r] = image[r];
@@ -152,10 +120,10 @@ pair_in_image(const hs_nearest *near, int32_t si, int32_t sj, const int32_t *ima
     }
     HS_ASSERT(bins->turns.known && asking->turns.known);
     for (int r = 0; r < m; r++) {
-        turned[r] =
-            shift[r] + hs_turns_get(&asking->turns, r, si) - hs_turns_get(&bins->turns, r, sj);
+        turned[r] = shift[r] + hs_turns_get(&asking->turns, r, ranker->si) -
+                    hs_turns_get(&bins->turns, r, key->number);
     }
-    if (!hs_lattice_shift(&near->search->scene.lattice, turned, as_given)) {
+    if (!hs_lattice_shift(&search->scene.lattice, turned, as_given)) {
         return false;
     }
     for (int r = 0; r < m; r++) {
@@ -167,73 +135,70 @@ pair_in_image(const hs_nearest *near, int32_t si, int32_t sj, const int32_t *ima
     return true;
 }
 
-/* The same of the candidate at a place of the block. */
-static bool
-nearest_pair(const hs_nearest *near, const hs_nearest_block *block, int32_t si, int32_t place,
-             double *q, int64_t *shift, int64_t *given)
+/* Coordinate k of the asking point that the metric measures from, and all of them. */
+HS_ALWAYS_INLINE double
+origin_along(const hs_nearest_ranker *ranker, int k)
 {
-    return pair_in_image(near, si, block->number[place], hs_nearest_image_of(block, place)->shift,
-                         q, shift, given);
+    const hs_bins *asking = hs_search_asking(ranker->near->search);
+    return (asking->keeps_originals ? asking->originals : asking->x)[k][ranker->si];
 }
 
-/* Copies the coordinates of the asking point that the metric measures from. */
 static void
-take_origin(const hs_nearest *near, int32_t si, double *p)
+take_origin(const hs_nearest_ranker *ranker, double *p)
 {
-    const hs_bins *asking = hs_search_asking(near->search);
-    for (int k = 0; k < asking->ndim; k++) {
-        p[k] = asking->keeps_originals ? asking->originals[k][si] : asking->x[k][si];
+    for (int k = 0; k < ranker->near->tree.ndim; k++) {
+        p[k] = origin_along(ranker, k);
     }
 }
 
-/* ---- which of them count: what the call's choice leaves out ---- */
-
-/* How far a squared length may be from the true one, in either direction. */
+/* How far a square may be from the true one, in either direction, however far the point is. */
 static double
-square_error(const hs_nearest *near, const hs_nearest_candidate *candidate, double square)
+square_error(const hs_nearest_ranker *ranker, double square)
 {
-    const double along = sqrt(near->tree.ndim) * candidate->error;
-    return 2.0 * ((near->tree.ndim + 4) * 0x1p-51 * square + 2.1 * along * (sqrt(square) + along) +
-                  0x1p-1000);
+    hs_nearest_frame frame;
+    hs_nearest_frame_set(ranker->near->tree.ndim, 1.0, ranker->frame.error, sqrt(square), &frame);
+    return 2.0 * hs_nearest_error(&frame, ranker->near->tree.ndim, square);
 }
+
+/* ---- which keys count: what the call's choice leaves out ---- */
 
 /* Whether a pair that is excluded in its nearest image is in this one. */
 static hs_status
-is_excluded_here(const hs_nearest *near, const hs_chooser *chooser,
-                 const hs_nearest_candidate *candidate, bool *excluded)
+is_excluded_here(const hs_nearest_ranker *ranker, const hs_nearest_key *key, bool *excluded)
 {
-    const hs_search *search = near->search;
-    const hs_choice *choice = chooser->choice;
+    const hs_search *search = ranker->near->search;
+    const hs_choice *choice = ranker->chooser.choice;
     double           q[HS_MAX_DIM];
     int64_t          shift[HS_MAX_DIM], given[HS_MAX_DIM];
     *excluded = true;
     if (choice->shortest == INFINITY) { /* there are no others */
         return HS_OK;
     }
-    const double square = candidate->square + square_error(near, candidate, candidate->square);
-    const double far = hs_scale_apply(search->scene.unscale, sqrt(square) / candidate->unit);
+    const double square = key->square + square_error(ranker, key->square);
+    const double far = hs_scale_apply(search->scene.unscale, sqrt(square) / ranker->frame.unit);
     if (!hs_choice_compares(choice, hs_smaller(far, search->call->options.cutoff))) {
         return HS_OK;
     }
     *excluded = false;
     /* Shifts that pass their range are found when the pair is written. */
-    return pair_in_image(near, candidate->si, candidate->sj, candidate->image, q, shift, given)
-               ? hs_choice_is_nearest(choice, chooser->point, search->bins.order[candidate->sj],
-                                      given, excluded)
+    return pair_of(ranker, key, q, shift, given)
+               ? hs_choice_is_nearest(choice, ranker->chooser.point,
+                                      search->bins.order[key->number], given, excluded)
                : HS_OK;
 }
 
 /* Whether a pair is that of a point with itself. */
 static bool
-is_itself(const hs_nearest *near, const hs_chooser *chooser, const hs_nearest_candidate *candidate)
+is_itself(const hs_nearest_ranker *ranker, const hs_nearest_key *key)
 {
-    double  q[HS_MAX_DIM];
-    int64_t shift[HS_MAX_DIM], given[HS_MAX_DIM] = {0}, any = 0;
-    if (near->search->bins.order[candidate->sj] != chooser->excluding.itself ||
-        !pair_in_image(near, candidate->si, candidate->sj, candidate->image, q, shift, given)) {
+    const hs_bins *bins = &ranker->near->search->bins;
+    double         q[HS_MAX_DIM];
+    int64_t        shift[HS_MAX_DIM], given[HS_MAX_DIM] = {0}, any = 0;
+    if (bins->order[key->number] != ranker->chooser.excluding.itself ||
+        !pair_of(ranker, key, q, shift, given)) {
         return false;
     }
-    for (int r = 0; r < near->search->bins.n_periodic; r++) {
+    for (int r = 0; r < bins->n_periodic; r++) {
         any |= given[r];
     }
     return any == 0;
@@ -241,121 +206,101 @@ is_itself(const hs_nearest *near, const hs_chooser *chooser, const hs_nearest_ca
 
 /* Whether a pair is nearer than the least distance. */
 static bool
-is_too_near(const hs_nearest *near, const hs_chooser *chooser,
-            const hs_nearest_candidate *candidate, hs_stages *stages)
+is_too_near(hs_nearest_ranker *ranker, const hs_nearest_key *key)
 {
-    const double least = near->least * candidate->unit, square = least * least;
-    const double error = square_error(near, candidate, hs_larger(square, candidate->square));
-    double       p[HS_MAX_DIM], q[HS_MAX_DIM];
-    int64_t      shift[HS_MAX_DIM];
-    if (near->least == 0.0 || candidate->square - error > square) {
+    const hs_nearest *near = ranker->near;
+    const double      least = near->least * ranker->frame.unit, square = least * least;
+    const double      error = square_error(ranker, hs_larger(square, key->square));
+    double            p[HS_MAX_DIM], q[HS_MAX_DIM];
+    int64_t           shift[HS_MAX_DIM];
+    if (near->least == 0.0 || key->square - error > square) {
         return false;
     }
-    if (!(candidate->square + error < square)) {
-        take_origin(near, candidate->si, p);
-        if (!pair_in_image(near, candidate->si, candidate->sj, candidate->image, q, shift, NULL) ||
-            !hs_metric_within(&near->nearer, p, q, shift, stages)) {
+    if (!(key->square + error < square)) {
+        take_origin(ranker, p);
+        if (!pair_of(ranker, key, q, shift, NULL) ||
+            !hs_metric_within(&near->nearer, p, q, shift, &ranker->stages)) {
             return false;
         }
     }
-    return !is_itself(near, chooser, candidate);
+    return !is_itself(ranker, key);
 }
 
-hs_status
-hs_nearest_counts(const hs_nearest *near, const hs_chooser *chooser,
-                  const hs_nearest_candidate *candidate, hs_stages *stages, bool *counts)
+/* Whether the call's choice lets a key count, decided exactly. The point itself does, unless it is
+ * of another group. Any status of hs_choice_is_nearest. */
+static hs_status
+key_counts(hs_nearest_ranker *ranker, const hs_nearest_key *key, bool *counts)
 {
-    const int32_t number = near->search->bins.order[candidate->sj];
+    const int32_t number = ranker->near->search->bins.order[key->number];
     bool          excluded = false;
     hs_status     status = HS_OK;
-    *counts = hs_chooser_is_of_group(chooser, number);
-    if (*counts && hs_chooser_excludes(chooser, number)) {
-        status = is_excluded_here(near, chooser, candidate, &excluded);
+    *counts = hs_chooser_is_of_group(&ranker->chooser, number);
+    if (*counts && hs_chooser_excludes(&ranker->chooser, number)) {
+        status = is_excluded_here(ranker, key, &excluded);
     }
-    *counts = *counts && !excluded && !is_too_near(near, chooser, candidate, stages);
-    return status;
-}
-
-hs_status
-hs_nearest_choose(hs_nearest_ranker *ranker, int32_t si, int32_t *hits, float *squares, int32_t *n)
-{
-    const hs_nearest       *near = ranker->near;
-    const hs_nearest_block *block = ranker->block;
-    const hs_bins          *bins = &near->search->bins, *asking = hs_search_asking(near->search);
-    hs_chooser              chooser;
-    hs_nearest_candidate    candidate = {.si = si, .unit = block->unit, .error = block->error};
-    int32_t                 kept = 0;
-    hs_status               status = HS_OK;
-    hs_chooser_set(near->search->call->choice, asking->order[si], &chooser);
-    for (int32_t h = 0; h < *n && status == HS_OK; h++) {
-        const int32_t           place = hits[h];
-        const hs_nearest_image *image = hs_nearest_image_of(block, place);
-        bool                    counts;
-        candidate.sj = block->number[place];
-        candidate.image = image->shift;
-        candidate.square = 0.0;
-        for (int k = 0; k < bins->ndim; k++) {
-            const double along =
-                (bins->x[k][candidate.sj] + image->moved[k] - asking->x[k][si]) * block->unit;
-            candidate.square += along * along;
-        }
-        status = hs_nearest_counts(near, &chooser, &candidate, &ranker->stages, &counts);
-        hits[kept] = place;
-        if (squares != NULL) {
-            squares[kept] = squares[h];
-        }
-        kept += counts;
-        if (status == HS_OK && !hs_nearest_goes_on(&ranker->pace, 1)) {
-            status = ranker->pace.status;
-        }
-    }
-    *n = kept;
+    *counts = *counts && !excluded && !is_too_near(ranker, key);
     return status;
 }
 
 /* ---- which is nearer ---- */
 
-/* Sign of the difference of two distances. */
-static int
-compare(hs_nearest_ranker *ranker, const hs_nearest_key *one, const hs_nearest_key *other)
+/* Whether b must come before a. */
+typedef bool (*before_fn)(hs_nearest_ranker *ranker, const hs_nearest_key *b,
+                          const hs_nearest_key *a);
+
+/* Stable, by merging runs that are sorted by insertion; few calls of `before` where all is in order
+ * already. */
+HS_ALWAYS_INLINE void
+sort_keys(hs_nearest_ranker *ranker, hs_nearest_key *keys, int64_t n, before_fn before)
 {
-    const hs_nearest *near = ranker->near;
-    double            p[HS_MAX_DIM], q[2][HS_MAX_DIM];
-    int64_t           shift[2][HS_MAX_DIM];
-    take_origin(near, ranker->si, p);
-    ranker->n_compared++;
-    /* Shifts that pass their range are found when the pair is written; here any order will do. */
-    if (!nearest_pair(near, ranker->block, ranker->si, one->place, q[0], shift[0], NULL) ||
-        !nearest_pair(near, ranker->block, ranker->si, other->place, q[1], shift[1], NULL)) {
-        return 0;
+    hs_nearest_key *left = ranker->spare;
+    for (int64_t begin = 0; begin < n && goes_on(ranker, FEW); begin += FEW) {
+        const int64_t end = n - begin < FEW ? n : begin + FEW;
+        for (int64_t e = begin + 1; e < end; e++) {
+            const hs_nearest_key key = keys[e];
+            int64_t              at = e;
+            for (; at > begin && before(ranker, &key, &keys[at - 1]); at--) {
+                keys[at] = keys[at - 1];
+            }
+            keys[at] = key;
+        }
     }
-    return hs_metric_compare(&near->order, &(hs_span){p, q[0], shift[0]},
-                             &(hs_span){p, q[1], shift[1]}, &ranker->stages);
+    for (int64_t width = FEW; width < n; width *= 2) {
+        for (int64_t begin = 0; begin + width < n && goes_on(ranker, 1); begin += 2 * width) {
+            hs_nearest_key *to = keys + begin, *right = to + width;
+            const int64_t   n_right = n - begin - width < width ? n - begin - width : width;
+            if (!before(ranker, right, right - 1)) {
+                continue;
+            }
+            memcpy(left, to, (size_t)width * sizeof *left);
+            for (int64_t l = 0, r = 0; l < width && goes_on(ranker, 1);) {
+                const bool takes_right = r < n_right && before(ranker, &right[r], &left[l]);
+                *to++ = takes_right ? right[r++] : left[l++];
+            }
+        }
+    }
 }
 
-static bool
-is_nearer(void *ranker, const hs_nearest_key *b, const hs_nearest_key *a)
+HS_ALWAYS_INLINE bool
+is_smaller(hs_nearest_ranker *ranker, const hs_nearest_key *b, const hs_nearest_key *a)
 {
-    return compare(ranker, b, a) < 0;
+    (void)ranker;
+    return b->square < a->square;
 }
 
 /* Whether b comes before a by (j, S). The turns of i and j are common to all images of one j, so
  * shifts over B tell these apart. */
 static bool
-is_listed_before(void *context, const hs_nearest_key *b, const hs_nearest_key *a)
+is_listed_before(const hs_nearest_ranker *ranker, const hs_nearest_key *b, const hs_nearest_key *a)
 {
-    const hs_nearest_ranker *ranker = context;
-    const hs_search         *search = ranker->near->search;
-    const hs_nearest_block  *block = ranker->block;
-    const int32_t            j = search->bins.order[block->number[b->place]];
-    const int32_t            other = search->bins.order[block->number[a->place]];
-    int64_t                  difference[HS_MAX_DIM] = {0}, given[HS_MAX_DIM];
-    if (j != other) {
-        return j < other;
+    const hs_search *search = ranker->near->search;
+    const int32_t   *order = search->bins.order;
+    int64_t          difference[HS_MAX_DIM] = {0}, given[HS_MAX_DIM];
+    if (b->number != a->number) {
+        return order[b->number] < order[a->number];
     }
     for (int r = 0; r < search->bins.n_periodic; r++) {
-        difference[r] = (int64_t)hs_nearest_image_of(block, b->place)->shift[r] -
-                        hs_nearest_image_of(block, a->place)->shift[r];
+        difference[r] = (int64_t)image_of(ranker, b)->shift[r] - image_of(ranker, a)->shift[r];
     }
     if (!hs_lattice_shift(&search->scene.lattice, difference, given)) {
         return false;
@@ -368,23 +313,34 @@ is_listed_before(void *context, const hs_nearest_key *b, const hs_nearest_key *a
     return false;
 }
 
+/* Whether b comes before a, in exact arithmetic. */
+static bool
+is_before(hs_nearest_ranker *ranker, const hs_nearest_key *b, const hs_nearest_key *a)
+{
+    double  p[HS_MAX_DIM], q[2][HS_MAX_DIM];
+    int64_t shift[2][HS_MAX_DIM];
+    int     sign = 0;
+    take_origin(ranker, p);
+    ranker->n_compared++;
+    /* Shifts that pass their range are found when the pair is written; here any order will do. */
+    if (pair_of(ranker, b, q[0], shift[0], NULL) && pair_of(ranker, a, q[1], shift[1], NULL)) {
+        sign = hs_metric_compare(&ranker->near->order, &(hs_span){p, q[0], shift[0]},
+                                 &(hs_span){p, q[1], shift[1]}, &ranker->stages);
+    }
+    return sign < 0 || (sign == 0 && is_listed_before(ranker, b, a));
+}
+
 /* Puts in exact order the first `wanted` of n keys that float64 cannot tell; the others come behind
  * them. */
 static void
-sort_keys_exactly(hs_nearest_ranker *ranker, hs_nearest_key *keys, int64_t n, int64_t wanted)
+sort_exactly(hs_nearest_ranker *ranker, hs_nearest_key *keys, int64_t n, int64_t wanted)
 {
-    hs_nearest_pace *pace = &ranker->pace;
-    const int64_t    sorted = wanted <= MOST_INSERTED && n > 4 * wanted ? wanted : n;
-    hs_nearest_merge(pace, ranker, keys, ranker->spare, sorted, is_listed_before);
-    hs_nearest_merge(pace, ranker, keys, ranker->spare, sorted, is_nearer);
-    for (int64_t e = sorted; e < n && hs_nearest_goes_on(pace, 1); e++) {
+    const int64_t sorted = wanted <= MOST_INSERTED && n > 4 * wanted ? wanted : n;
+    sort_keys(ranker, keys, sorted, is_before);
+    for (int64_t e = sorted; e < n && goes_on(ranker, 1); e++) {
         const hs_nearest_key key = keys[e];
         int64_t              at = sorted;
-        while (at > 0) {
-            const int sign = compare(ranker, &key, &keys[at - 1]);
-            if (sign > 0 || (sign == 0 && !is_listed_before(ranker, &key, &keys[at - 1]))) {
-                break;
-            }
+        while (at > 0 && is_before(ranker, &key, &keys[at - 1])) {
             at--;
         }
         if (at < sorted) {
@@ -395,89 +351,405 @@ sort_keys_exactly(hs_nearest_ranker *ranker, hs_nearest_key *keys, int64_t n, in
     }
 }
 
-/* Finds sorted keys whose squares are too close to tell, among the first `wanted`, and puts
- * them in exact order. */
-static void
-sort_close_keys_exactly(hs_nearest_ranker *ranker, int64_t n, int64_t wanted)
+/* Takes a square into the heap of the k least ones. */
+static bool
+note_square(hs_nearest_ranker *ranker, double square)
 {
-    hs_nearest_key *const all = ranker->keys;
+    const int64_t k = ranker->near->k;
+    int64_t       at = ranker->n_least;
+    if (at < k) {
+        if (at == ranker->least_capacity) {
+            const int64_t capacity = 2 * at + 64 < k ? 2 * at + 64 : k;
+            if (!hs_shared_resize(ranker->near->shared, (void **)&ranker->least, at, capacity,
+                                  sizeof(double))) {
+                return false;
+            }
+            ranker->least_capacity = capacity;
+        }
+        for (ranker->n_least++; at > 0 && ranker->least[(at - 1) / 2] < square; at = (at - 1) / 2) {
+            ranker->least[at] = ranker->least[(at - 1) / 2];
+        }
+        ranker->least[at] = square;
+    } else if (square < ranker->least[0]) {
+        double *heap = ranker->least;
+        at = 0;
+        for (int64_t child = 1; child < k; child = 2 * at + 1) {
+            child += child + 1 < k && heap[child + 1] > heap[child];
+            if (heap[child] <= square) {
+                break;
+            }
+            heap[at] = heap[child];
+            at = child;
+        }
+        heap[at] = square;
+    }
+    return true;
+}
+
+/* Drops the keys with larger squares. */
+static void
+drop_far_keys(hs_nearest_ranker *ranker, double bound)
+{
+    int64_t kept = 0;
+    for (int64_t e = 0; e < ranker->n; e++) {
+        ranker->keys[kept] = ranker->keys[e];
+        kept += ranker->keys[e].square <= bound;
+    }
+    ranker->n = kept;
+}
+
+/* Puts the keys in order of distance, then (j, S), as far as they are wanted: *count of them.
+ * is_complete: no others are wanted; else *count is -1 when some beyond the reach may be. */
+static hs_status
+order_keys(hs_nearest_ranker *ranker, bool is_complete, int64_t *count)
+{
+    const int64_t   k = ranker->near->k, wanted = ranker->n < k ? ranker->n : k;
+    const double    reach = ranker->frame.reach * ranker->frame.reach;
+    hs_nearest_key *keys = ranker->keys;
+    *count = -1;
+    if (wanted < k && !is_complete) {
+        return HS_OK;
+    }
+    if (ranker->n > MANY * wanted && ranker->n > MANY_KEYS) {
+        ranker->n_least = 0;
+        for (int64_t e = 0; e < ranker->n; e++) {
+            if (!note_square(ranker, keys[e].square)) {
+                return HS_ERR_MEMORY;
+            }
+        }
+        const double last = ranker->least[0];
+        drop_far_keys(ranker, last + 2.0 * closeness(ranker, last));
+    }
+    sort_keys(ranker, keys, ranker->n, is_smaller);
+    if (!is_complete) {
+        const double last = keys[wanted - 1].square;
+        if (last + closeness(ranker, last) > reach * (1.0 - 0x1p-40)) {
+            return ranker->status;
+        }
+    }
     for (int64_t begin = 0, end; begin < wanted; begin = end) {
         end = begin + 1;
-        while (end < n &&
-               all[end].square - all[end - 1].square <= closeness(ranker, all[end].square)) {
+        while (end < ranker->n &&
+               keys[end].square - keys[end - 1].square <= closeness(ranker, keys[end].square)) {
             end++;
         }
         if (end - begin > 1) {
-            sort_keys_exactly(ranker, all + begin, end - begin, wanted - begin);
+            sort_exactly(ranker, keys + begin, end - begin, wanted - begin);
+        }
+    }
+    *count = wanted;
+    return ranker->status;
+}
+
+/* ---- the keys of a point alone: the tree is walked down, nearest nodes first ---- */
+
+/* Relative room, far more than roundings take. */
+#define WALK_ROOM 0x1p-36
+/* What deciding whether a point counts may take, in points: images of it are compared. */
+#define STEPS_OF_CHOICE 16
+/* Squares below this are near underflow: another unit is needed. */
+#define LEAST_SQUARE 0x1p-600
+#define UNIT_STEP    400
+#define LEAF_CHUNK   8 /* points of a leaf at a time */
+
+/* The walk down the tree in one image. */
+typedef struct near_walk {
+    hs_nearest_ranker *ranker;
+    double             at[HS_MAX_DIM]; /* the point's X less the image's displacement */
+    int32_t            self;           /* the point itself is left out; -1 in other images */
+    double             within; /* what has a larger square is beyond the largest distance ... */
+    double             bound;  /* ... or surely not among the nearest */
+    double             slack;  /* for errors that do not fall with the square */
+    bool               takes;  /* some key is in this image */
+} near_walk;
+
+/* With room for what is too close to tell from the last one: two closenesses for a reach of twice
+ * its distance, in which distances times errors are no more than part of the square of either. */
+HS_ALWAYS_INLINE void
+set_bound(near_walk *walk)
+{
+    const hs_nearest_ranker *ranker = walk->ranker;
+    if (ranker->n_least == ranker->near->k) {
+        walk->bound = hs_smaller(ranker->least[0] * (1.0 + 0x1p-16) + walk->slack, walk->within);
+    }
+}
+
+/* Takes a point, which is nearer than all beyond the bound, if it counts. */
+static hs_status
+take_key(near_walk *walk, hs_nearest_key key)
+{
+    hs_nearest_ranker *ranker = walk->ranker;
+    bool               counts = key.number != walk->self;
+    if (counts && ranker->near->search->call->choice != NULL) {
+        const hs_status status = key_counts(ranker, &key, &counts);
+        if (status != HS_OK || !goes_on(ranker, STEPS_OF_CHOICE)) {
+            return status != HS_OK ? status : ranker->status;
+        }
+    }
+    if (!counts) {
+        return HS_OK;
+    }
+    if (ranker->n == ranker->capacity) {
+        drop_far_keys(ranker, walk->bound);
+    }
+    if (!reserve(ranker, 1) || !note_square(ranker, key.square)) {
+        return HS_ERR_MEMORY;
+    }
+    ranker->keys[ranker->n++] = key;
+    walk->takes = true;
+    set_bound(walk);
+    return HS_OK;
+}
+
+HS_ALWAYS_INLINE hs_status
+walk_leaf(near_walk *walk, const hs_tree_node *node, const int ndim)
+{
+    hs_nearest_ranker *ranker = walk->ranker;
+    const hs_nearest  *near = ranker->near;
+    const double       unit = ranker->frame.unit;
+    const int32_t      end = node->first + hs_nearest_of_leaf(near, node);
+    ranker->n_met += end - node->first;
+    for (int32_t first = node->first, next; first < end; first = next) {
+        double squares[LEAF_CHUNK] = {0.0};
+        next = end - first < LEAF_CHUNK ? end : first + LEAF_CHUNK;
+        for (int k = 0; k < ndim; k++) {
+            const double *x = near->search->bins.x[k] + first, at = walk->at[k];
+            for (int32_t e = 0; e < next - first; e++) {
+                const double along = (x[e] - at) * unit;
+                squares[e] += along * along;
+            }
+        }
+        for (int32_t e = 0; e < next - first; e++) {
+            if (squares[e] <= walk->bound) {
+                const hs_status status =
+                    take_key(walk, (hs_nearest_key){squares[e], first + e, ranker->n_walked - 1});
+                if (status != HS_OK) {
+                    return status;
+                }
+            }
+        }
+    }
+    return HS_OK;
+}
+
+HS_ALWAYS_INLINE hs_status
+walk_tree(near_walk *walk, const int ndim)
+{
+    hs_nearest_ranker *ranker = walk->ranker;
+    const hs_tree     *tree = &ranker->near->tree;
+    const double       unit = ranker->frame.unit;
+    int32_t           *stack = ranker->stack;
+    double            *gaps = ranker->gaps;
+    int64_t            n_waiting = 1;
+    stack[0] = 0;
+    gaps[0] = hs_tree_gap(tree, walk->at, walk->at, unit);
+    while (n_waiting > 0) {
+        const hs_tree_node *node = &tree->nodes[stack[--n_waiting]];
+        if (gaps[n_waiting] > walk->bound) {
+            continue;
+        }
+        while (node->left != 0) { /* down to the leaf that is nearest */
+            double gap[2];
+            HS_PREFETCH(&tree->nodes[node->left]);
+            hs_tree_gaps(hs_tree_bounds(tree, node->left, ndim), walk->at, walk->at, unit, ndim,
+                         gap);
+            const int nearer = gap[1] < gap[0];
+            stack[n_waiting] = node->left + 1 - nearer;
+            gaps[n_waiting] = gap[1 - nearer];
+            n_waiting += gap[1 - nearer] <= walk->bound;
+            node = &tree->nodes[node->left + nearer];
+        }
+        const hs_status status = walk_leaf(walk, node, ndim);
+        if (status != HS_OK || !goes_on(ranker, FEW)) {
+            return status != HS_OK ? status : ranker->status;
+        }
+    }
+    return HS_OK;
+}
+
+/* Walks down the tree in one image more. */
+static hs_status
+walk_image(near_walk *walk, const hs_nearest_image *image)
+{
+    hs_nearest_ranker *ranker = walk->ranker;
+    const hs_nearest  *near = ranker->near;
+    const hs_bins     *asking = hs_search_asking(near->search);
+    hs_status          status;
+    if (ranker->n_walked == ranker->walked_capacity) {
+        const int32_t capacity = 2 * ranker->n_walked + 8;
+        if (!hs_shared_resize(near->shared, (void **)&ranker->walked, ranker->n_walked, capacity,
+                              sizeof *image)) {
+            return HS_ERR_MEMORY;
+        }
+        ranker->walked_capacity = capacity;
+    }
+    ranker->walked[ranker->n_walked++] = *image;
+    ranker->images = ranker->walked;
+    walk->takes = false;
+    walk->self = near->omits_self && image->is_home ? ranker->si : -1;
+    for (int k = 0; k < asking->ndim; k++) {
+        walk->at[k] = asking->x[k][ranker->si] - image->moved[k];
+    }
+    switch (asking->ndim) {
+    case 2: status = walk_tree(walk, 2); break;
+    case 3: status = walk_tree(walk, 3); break;
+    default: status = walk_tree(walk, asking->ndim);
+    }
+    ranker->n_walked -= !walk->takes; /* nothing there */
+    return status;
+}
+
+/* Sets the keys in a given unit: those of the home image first, then of as many as what is found
+ * there leaves in reach. */
+static hs_status
+walk_images(hs_nearest_ranker *ranker, const hs_nearest_group *point, double unit)
+{
+    const hs_nearest *near = ranker->near;
+    const double      farthest = hs_nearest_farthest(near, point);
+    const double      root = sqrt(near->tree.ndim);
+    near_walk         walk = {.ranker = ranker};
+    hs_nearest_group  group = *point;
+    hs_nearest_images images;
+    int64_t           low[HS_MAX_DIM], high[HS_MAX_DIM]; /* images walked through before */
+    double            along = 0.5 * near->smallest_period;
+    hs_nearest_images_home(near, &images);
+    group.radius = near->search->scene.lattice.n_periodic == 0 ? INFINITY : -1.0;
+    ranker->n = ranker->n_least = ranker->n_walked = 0;
+    for (int round = 0;; round++) {
+        const double error = images.error * unit, room = 8.0 * root * error;
+        const double within = (near->limit * unit + room) * (1.0 + WALK_ROOM);
+        hs_status    status = HS_OK;
+        walk.within = walk.bound = within * within;
+        walk.slack = near->tree.ndim * error * error * 0x1p24 + 0x1p-990;
+        ranker->frame.unit = unit;
+        ranker->frame.error = error;
+        set_bound(&walk);
+        while (status == HS_OK && hs_nearest_images_next(&images)) {
+            bool is_new = round < 2 && images.next.is_home == (round == 0);
+            for (int r = 0; round > 1 && !images.next.is_home && r < images.lattice->n_periodic;
+                 r++) {
+                const int32_t shift = images.next.shift[r];
+                is_new = is_new || shift < low[r] || shift > high[r];
+            }
+            status = is_new ? walk_image(&walk, &images.next) : HS_OK;
+            if (status == HS_OK && !goes_on(ranker, 1)) {
+                status = ranker->status;
+            }
+        }
+        const double far = ranker->n_least > 0 ? sqrt(ranker->least[0]) : 0.0;
+        const bool   is_full = ranker->n_least == near->k && far < INFINITY;
+        const double enough =
+            hs_smaller(is_full ? (far + room) * (1.0 + WALK_ROOM) / unit : INFINITY, farthest);
+        if (status != HS_OK || group.radius >= enough) {
+            hs_nearest_frame_set(near->tree.ndim, unit, error, 2.0 * far + 2.0 * room,
+                                 &ranker->frame);
+            drop_far_keys(ranker, walk.bound);
+            return status;
+        }
+        memcpy(low, images.low, sizeof low);
+        memcpy(high, images.high, sizeof high);
+        along *= 2.0;
+        group.radius = is_full ? enough : hs_smaller(hypot(group.away, along), farthest);
+        group.radius = hs_larger(group.radius, HS_NEAREST_LEAST_RADIUS);
+        status = hs_nearest_images_start(near, &group, &images);
+        if (status != HS_OK) {
+            return status;
         }
     }
 }
 
-/* Squares of the hits that are not beyond the limit; returns how many. */
-HS_ALWAYS_INLINE int64_t
-fill_keys(hs_nearest_ranker *ranker, const int32_t *hits, int64_t n, double limit, const int ndim)
+hs_status
+hs_nearest_walk(hs_nearest_ranker *ranker, int64_t *count)
 {
-    const hs_nearest_block     *block = ranker->block;
+    const hs_nearest *near = ranker->near;
+    const double      period = near->smallest_period;
+    double            widest = period < INFINITY ? period : 0.0;
+    hs_nearest_group  group;
+    hs_nearest_group_set(near, ranker->si, ranker->si + 1, &group);
+    for (int k = 0; k < near->tree.ndim; k++) {
+        widest = hs_larger(fabs(near->tree.upper[k] - group.lower[k]), widest);
+        widest = hs_larger(fabs(near->tree.lower[k] - group.lower[k]), widest);
+    }
+    /* In this unit no square overflows but those of no use. Where the nearest are so near beside
+     * all others that theirs may vanish, it is raised: what was small is ordinary then. */
+    widest = hs_smaller(widest, near->limit);
+    for (int exponent = -hs_nearest_exponent(widest);;
+         exponent = exponent + UNIT_STEP < 1000 ? exponent + UNIT_STEP : 1000) {
+        const hs_status status = walk_images(ranker, &group, hs_power_of_two(exponent));
+        if (status != HS_OK) {
+            return status;
+        }
+        const double error = ranker->frame.error; /* beside which nothing vanishes */
+        if (exponent >= 1000 || ranker->n_least < near->k || ranker->least[0] >= LEAST_SQUARE ||
+            error * error >= LEAST_SQUARE) {
+            break;
+        }
+    }
+    return order_keys(ranker, true, count);
+}
+
+/* ---- the keys of hits of a block ---- */
+
+/* Squares of the hits that are not beyond the reach. */
+HS_ALWAYS_INLINE void
+fill_keys(hs_nearest_ranker *ranker, const hs_nearest_block *block, const int32_t *hits, int64_t n,
+          const int ndim)
+{
     const hs_bins              *asking = hs_search_asking(ranker->near->search);
     hs_nearest_key *HS_RESTRICT keys = ranker->keys;
-    const double               *x[HS_MAX_DIM], unit = block->unit;
-    double                      at[HS_MAX_DIM];
-    int64_t                     n_keys = 0;
+    const double               *x[HS_MAX_DIM], unit = block->frame.unit;
+    const double                reach = block->frame.reach * block->frame.reach;
+    const double limit = reach * (1.0 + 0x1p-40) + hs_nearest_error(&block->frame, ndim, reach);
+    double       at[HS_MAX_DIM];
+    int64_t      n_keys = 0;
     for (int k = 0; k < ndim; k++) {
         at[k] = asking->x[k][ranker->si];
         x[k] = ranker->near->search->bins.x[k];
     }
     for (int64_t h = 0; h < n; h++) {
-        const int32_t place = hits[h], sj = block->number[place];
-        const double *moved = hs_nearest_image_of(block, place)->moved;
+        const int32_t sj = block->number[hits[h]], image = block->image_of[hits[h]];
+        const double *moved = block->images[image].moved;
         double        square = 0.0;
         for (int k = 0; k < ndim; k++) {
             const double along = (x[k][sj] + moved[k] - at[k]) * unit;
             square += along * along;
         }
-        keys[n_keys].square = square;
-        keys[n_keys].place = place;
+        keys[n_keys] = (hs_nearest_key){square, sj, image};
         n_keys += square <= limit;
     }
-    return n_keys;
+    ranker->n = n_keys;
 }
 
-/* Key of the point itself (S = 0): one of the keys whose distance is about 0. */
-static int64_t
-drop_self(hs_nearest_ranker *ranker, int64_t n)
+/* Drops the key of the point itself: one of those whose distance is about 0. */
+static void
+drop_self(hs_nearest_ranker *ranker)
 {
-    const hs_nearest_block *block = ranker->block;
-    for (int64_t e = 0; e < n; e++) {
-        const int32_t place = ranker->keys[e].place;
-        if (ranker->keys[e].square <= block->flat_error && block->number[place] == ranker->si &&
-            hs_nearest_image_of(block, place)->is_home) {
-            ranker->keys[e] = ranker->keys[n - 1];
-            return n - 1;
+    for (int64_t e = 0; e < ranker->n; e++) {
+        const hs_nearest_key *key = &ranker->keys[e];
+        if (key->square <= ranker->frame.flat_error && key->number == ranker->si &&
+            image_of(ranker, key)->is_home) {
+            ranker->keys[e] = ranker->keys[--ranker->n];
+            return;
         }
     }
-    return n;
 }
 
-/* Leaves out what surely comes after the first `wanted`. */
-static int64_t
-keep_nearest(hs_nearest_ranker *ranker, int64_t n, int64_t wanted)
+/* Drops the keys that do not count. */
+static hs_status
+choose_keys(hs_nearest_ranker *ranker)
 {
-    hs_nearest_key *keys = ranker->keys;
-    double          last = 0.0;
-    int64_t         kept = wanted;
-    nearest_select(keys, n, wanted);
-    for (int64_t e = 0; e < wanted; e++) {
-        last = hs_larger(keys[e].square, last);
-    }
-    last += 2.0 * closeness(ranker, last);
-    for (int64_t e = wanted; e < n; e++) {
-        if (keys[e].square <= last) {
-            const hs_nearest_key key = keys[e];
-            keys[e] = keys[kept];
-            keys[kept++] = key;
+    int64_t kept = 0;
+    for (int64_t e = 0; e < ranker->n; e++) {
+        bool            counts;
+        const hs_status status = key_counts(ranker, &ranker->keys[e], &counts);
+        if (status != HS_OK || !goes_on(ranker, 1)) {
+            return status != HS_OK ? status : ranker->status;
         }
+        ranker->keys[kept] = ranker->keys[e];
+        kept += counts;
     }
-    return kept;
+    ranker->n = kept;
+    return HS_OK;
 }
 
 HS_ALWAYS_INLINE float
@@ -486,14 +758,14 @@ square_of(int32_t key)
     return hs_float_of_bits((uint32_t)key);
 }
 
-bool
-hs_nearest_rank_fast(hs_nearest_ranker *ranker, int32_t si, const int32_t *hits,
-                     const float *squares, int64_t n, int64_t *count)
+/* Ranks from squares in float32: false when these cannot tell. There is room for n keys. */
+static bool
+rank_fast(hs_nearest_ranker *ranker, const hs_nearest_block *block, const int32_t *hits,
+          const float *squares, int64_t n, int64_t *count)
 {
-    const hs_nearest_block *block = ranker->block;
-    const bool              omits_self = ranker->near->omits_self;
-    const int64_t           wanted = ranker->near->k + omits_self;
-    const double            reach = block->reach * block->reach;
+    const bool    omits_self = ranker->near->omits_self;
+    const int64_t wanted = ranker->near->k + omits_self;
+    const double  reach = block->frame.reach * block->frame.reach;
     /* The error of two squares, and of two keys. */
     const double least = 2.0 * block->square_error + KEY_ERROR * reach;
     int32_t      keys[HS_ORDER_MOST + 1];
@@ -501,7 +773,6 @@ hs_nearest_rank_fast(hs_nearest_ranker *ranker, int32_t si, const int32_t *hits,
     if (n < wanted || n > HS_ORDER_MOST) {
         return n < wanted;
     }
-    ranker->si = si;
     ranker->near->search->call->kernel->order(squares, (int32_t)n, keys);
     keys[n] = HS_ORDER_LAST;
     bool is_sure = square_of(keys[wanted - 1]) + least < reach;
@@ -510,73 +781,57 @@ hs_nearest_rank_fast(hs_nearest_ranker *ranker, int32_t si, const int32_t *hits,
     }
     if (is_sure && omits_self) {
         const int32_t first = hits[keys[0] & (HS_ORDER_MOST - 1)];
-        is_sure = block->number[first] == si && hs_nearest_image_of(block, first)->is_home;
+        is_sure = block->number[first] == ranker->si &&
+                  block->images[block->image_of[first]].is_home;
     }
-    if (!is_sure || !reserve(ranker, n)) {
-        return false;
-    }
-    for (int64_t e = omits_self; e < wanted; e++) {
-        const int32_t key = keys[e];
+    for (int64_t e = omits_self; is_sure && e < wanted; e++) {
+        const int32_t hit = hits[keys[e] & (HS_ORDER_MOST - 1)];
         ranker->keys[e - omits_self] =
-            (hs_nearest_key){square_of(key), hits[key & (HS_ORDER_MOST - 1)]};
+            (hs_nearest_key){square_of(keys[e]), block->number[hit], block->image_of[hit]};
     }
-    *count = ranker->near->k;
-    return true;
+    *count = is_sure ? ranker->near->k : -1;
+    return is_sure;
 }
 
 hs_status
-hs_nearest_rank(hs_nearest_ranker *ranker, const hs_nearest_group *group, int32_t si,
-                const int32_t *hits, int64_t n, int64_t *count)
+hs_nearest_rank(hs_nearest_ranker *ranker, const hs_nearest_block *block, const int32_t *hits,
+                const float *squares, int64_t n, bool is_complete, int64_t *count)
 {
-    const hs_nearest_block *block = ranker->block;
-    const int               d = ranker->near->tree.ndim;
-    const int64_t           k = ranker->near->k;
-    const double            reach = block->reach * block->reach;
-    const double            limit = reach * (1.0 + 0x1p-40) + hs_nearest_error(block, d, reach);
     *count = -1;
-    ranker->si = si;
+    ranker->frame = block->frame;
+    ranker->images = block->images;
     if (!reserve(ranker, n)) {
         return HS_ERR_MEMORY;
     }
-    switch (d) {
-    case 2: n = fill_keys(ranker, hits, n, limit, 2); break;
-    case 3: n = fill_keys(ranker, hits, n, limit, 3); break;
-    default: n = fill_keys(ranker, hits, n, limit, d);
-    }
-    n = ranker->near->omits_self ? drop_self(ranker, n) : n;
-    if (!hs_nearest_goes_on(&ranker->pace, n)) {
-        return ranker->pace.status;
-    }
-    if (n < k && !group->is_complete) {
+    if (squares != NULL && rank_fast(ranker, block, hits, squares, n, count)) {
         return HS_OK;
     }
-    const int64_t wanted = n < k ? n : k;
-    if (n > MANY * wanted && n > HS_NEAREST_COUNTED) {
-        n = keep_nearest(ranker, n, wanted);
+    switch (ranker->near->tree.ndim) {
+    case 2: fill_keys(ranker, block, hits, n, 2); break;
+    case 3: fill_keys(ranker, block, hits, n, 3); break;
+    default: fill_keys(ranker, block, hits, n, ranker->near->tree.ndim);
     }
-    hs_nearest_sort(&ranker->pace, &ranker->keys, &ranker->spare, n, limit);
-    if (!group->is_complete) { /* then there are as many as are wanted */
-        const double last = ranker->keys[wanted - 1].square;
-        if (last + closeness(ranker, last) > reach * (1.0 - 0x1p-40)) {
-            return HS_OK;
+    if (ranker->near->omits_self) {
+        drop_self(ranker);
+    }
+    if (ranker->near->search->call->choice != NULL) {
+        const hs_status status = choose_keys(ranker);
+        if (status != HS_OK) {
+            return status;
         }
     }
-    sort_close_keys_exactly(ranker, n, wanted);
-    *count = wanted;
-    return ranker->pace.status;
+    return goes_on(ranker, n) ? order_keys(ranker, is_complete, count) : ranker->status;
 }
 
-/* A batch of entries at a time, measured by the batch kernel; each goes to its
- * place in the output. */
+/* ---- rows, a batch of entries at a time, measured by the batch kernel ---- */
 
-#define LINE          64  /* bytes that are fetched at once, */
-#define MOST_EXPECTED 512 /* and of a row */
-#define MOST_SQUARE   0x1p1000
+#define LINE          64       /* bytes that are fetched at once, */
+#define MOST_EXPECTED 512      /* and of a row */
+#define ANY_SQUARE    0x1p1000 /* more than any key's */
 
 void
 hs_nearest_writer_init(const hs_nearest *near, hs_nearest_writer *writer)
 {
-    memset(writer, 0, sizeof *writer); /* kernels read a little beyond the last entry */
     writer->near = near;
     writer->j = hs_output_column(near->rows, HS_WANT_J);
     writer->d = hs_output_column(near->rows, HS_WANT_DISTANCE);
@@ -599,37 +854,24 @@ hs_nearest_prefetch(const hs_nearest_writer *writer, int32_t si)
     }
 }
 
-HS_ALWAYS_INLINE void
-put_number(void *j, int index_bytes, int64_t at, int32_t number)
-{
-    if (j != NULL && index_bytes == 8) {
-        ((int64_t *)j)[at] = number;
-    } else if (j != NULL) {
-        ((int32_t *)j)[at] = number;
-    }
-}
-
 void
-hs_nearest_write_nothing(const hs_nearest *near, int64_t row, int64_t from)
+hs_nearest_write_nothing(const hs_nearest_writer *writer, int64_t row, int64_t from)
 {
-    const hs_output *rows = near->rows;
-    const int        d = rows->ndim;
-    void            *j = hs_output_column(rows, HS_WANT_J);
-    double          *distance = hs_output_column(rows, HS_WANT_DISTANCE);
-    double          *vector = hs_output_column(rows, HS_WANT_VECTOR);
-    int32_t         *shift = hs_output_column(rows, HS_WANT_SHIFT);
-    HS_ASSERT((row + 1) * near->k <= rows->n_pairs);
-    for (int64_t at = row * near->k + from; at < (row + 1) * near->k; at++) {
-        put_number(j, rows->index_bytes, at, -1);
-        if (distance != NULL) {
-            distance[at] = INFINITY;
-        }
-        for (int k = 0; vector != NULL && k < d; k++) {
-            vector[at * d + k] = NAN;
-        }
-        for (int k = 0; shift != NULL && k < d; k++) {
-            shift[at * d + k] = 0;
-        }
+    const hs_output *rows = writer->near->rows;
+    const int64_t    k = writer->near->k, begin = row * k + from, n = k - from;
+    HS_ASSERT((row + 1) * k <= rows->n_pairs);
+    if (writer->j != NULL) { /* all bits of -1 are set */
+        memset((char *)writer->j + begin * rows->index_bytes, 0xff,
+               (size_t)(n * rows->index_bytes));
+    }
+    for (int64_t at = begin; writer->d != NULL && at < begin + n; at++) {
+        writer->d[at] = INFINITY;
+    }
+    for (int64_t e = begin * rows->ndim; writer->D != NULL && e < (begin + n) * rows->ndim; e++) {
+        writer->D[e] = NAN;
+    }
+    if (writer->S != NULL) {
+        memset(writer->S + begin * rows->ndim, 0, (size_t)(n * rows->ndim) * sizeof *writer->S);
     }
 }
 
@@ -708,81 +950,52 @@ put_shift(const hs_nearest *near, const int64_t *given, int32_t *to)
     return fits;
 }
 
-/* The metric's shifts, and S where that is wanted, of n entries from place `at` of the output and
- * from the batch's next entry on: where they follow from the points' turns. */
-static hs_status
-put_given(hs_nearest_writer *writer, const hs_nearest_ranker *ranker, const hs_nearest_key *keys,
-          int32_t n, int64_t at)
-{
-    const hs_nearest *near = writer->near;
-    const hs_bins    *asking = hs_search_asking(near->search);
-    for (int32_t e = 0; e < n; e++) {
-        double  q[HS_MAX_DIM];
-        int64_t shift[HS_MAX_DIM], given[HS_MAX_DIM];
-        if (!nearest_pair(near, ranker->block, ranker->si, keys[e].place, q, shift, given) ||
-            (writer->S != NULL && !put_shift(near, given, writer->S + (at + e) * asking->ndim))) {
-            return HS_ERR_SHIFT_RANGE;
-        }
-        for (int r = 0; r < asking->n_periodic; r++) {
-            hs_measured_shift(&writer->pairs, writer->pairs.n + e, r, shift[r]);
-        }
-    }
-    return HS_OK;
-}
-
-/* The metric's shifts where they are those of the images: all are zero before, and few are not
- * after. */
-static void
-put_images(hs_nearest_writer *writer, const hs_nearest_ranker *ranker, const hs_nearest_key *keys,
-           int32_t n)
-{
-    const hs_nearest_block *block = ranker->block;
-    if (block->n_images == 1 && block->images[0].is_home) {
-        return;
-    }
-    for (int32_t e = 0; e < n; e++) {
-        const hs_nearest_image *image = hs_nearest_image_of(block, keys[e].place);
-        for (int r = 0; !image->is_home && r < writer->near->order.n_rows; r++) {
-            hs_measured_shift(&writer->pairs, writer->pairs.n + e, r, image->shift[r]);
-        }
-    }
-}
-
 /* n entries of the ranker's row, from `at` on; the batch has room for them. */
 static hs_status
 put_entries(hs_nearest_writer *writer, const hs_nearest_ranker *ranker, const hs_nearest_key *keys,
             int32_t n, int64_t at, bool is_first)
 {
-    const hs_nearest *near = writer->near;
-    const hs_bins    *bins = &near->search->bins, *asking = hs_search_asking(near->search);
-    const int32_t     begin = writer->pairs.n;
-    const int         index_bytes = near->rows->index_bytes;
-    int32_t           number[HS_BATCH];
+    const hs_bins *bins = &writer->near->search->bins;
+    hs_measured   *pairs = &writer->pairs;
+    const bool needs_given = bins->n_periodic > 0 && (bins->keeps_originals || writer->S != NULL);
+    int32_t    j[HS_BATCH];
     for (int32_t e = 0; e < n; e++) {
-        number[e] = ranker->block->number[keys[e].place];
-        put_number(writer->j, index_bytes, at + e, bins->order[number[e]]);
+        j[e] = bins->order[keys[e].number];
+        writer->at[pairs->n + e] = at + e;
+        writer->is_first[pairs->n + e] = is_first && e == 0;
+    }
+    if (writer->j != NULL) {
+        const int index_bytes = writer->near->rows->index_bytes;
+        hs_put_indices((char *)writer->j + at * index_bytes, index_bytes, 1, j, 1, n);
     }
     for (int k = 0; k < bins->ndim; k++) {
         const double *from = bins->keeps_originals ? bins->originals[k] : bins->x[k];
-        const double  own = asking->keeps_originals ? asking->originals[k][ranker->si]
-                                                    : asking->x[k][ranker->si];
+        const double  own = origin_along(ranker, k);
         for (int32_t e = 0; e < n; e++) {
-            writer->pairs.p[k][begin + e] = own;
-            writer->pairs.q[k][begin + e] = from[number[e]];
+            pairs->p[k][pairs->n + e] = own;
+            pairs->q[k][pairs->n + e] = from[keys[e].number];
         }
     }
-    for (int32_t e = 0; e < n; e++) {
-        writer->at[begin + e] = at + e;
-        writer->is_first[begin + e] = is_first && e == 0;
+    for (int32_t e = 0; e < n && bins->n_periodic > 0; e++) {
+        double  q[HS_MAX_DIM];
+        int64_t shift[HS_MAX_DIM], given[HS_MAX_DIM];
+        if (!needs_given && image_of(ranker, &keys[e])->is_home) { /* as it was before */
+            continue;
+        }
+        if (!pair_of(ranker, &keys[e], q, shift, needs_given ? given : NULL) ||
+            (writer->S != NULL &&
+             !put_shift(writer->near, given, writer->S + (at + e) * bins->ndim))) {
+            return HS_ERR_SHIFT_RANGE;
+        }
+        for (int r = 0; r < bins->n_periodic; r++) {
+            hs_measured_shift(pairs, pairs->n + e, r, shift[r]);
+        }
     }
-    hs_status status = HS_OK;
-    if (bins->keeps_originals || writer->S != NULL) {
-        status = put_given(writer, ranker, keys, n, at);
-    } else if (bins->n_periodic > 0) {
-        put_images(writer, ranker, keys, n);
+    if (bins->n_periodic == 0 && writer->S != NULL) {
+        memset(writer->S + at * bins->ndim, 0, (size_t)n * (size_t)bins->ndim * sizeof *writer->S);
     }
-    writer->pairs.n += n;
-    return status;
+    pairs->n += n;
+    return HS_OK;
 }
 
 /* How many of the ranked are within the largest distance: all before the first that is not. */
@@ -790,27 +1003,21 @@ static int64_t
 count_within(hs_nearest_ranker *ranker, int64_t count)
 {
     const hs_nearest *near = ranker->near;
-    const hs_bins    *asking = hs_search_asking(near->search);
-    const double      limit = near->limit * ranker->block->unit;
-    const double      square = limit * limit;
-    if (!(square < MOST_SQUARE)) { /* beyond all that a block holds */
+    const double      limit = near->limit * ranker->frame.unit, square = limit * limit;
+    double            p[HS_MAX_DIM], q[HS_MAX_DIM];
+    int64_t           shift[HS_MAX_DIM];
+    if (!(square < ANY_SQUARE)) {
         return count;
     }
+    take_origin(ranker, p);
     while (count > 0) {
         const hs_nearest_key *key = &ranker->keys[count - 1];
-        const double          error =
-            2.0 * hs_nearest_error(ranker->block, near->tree.ndim, hs_larger(square, key->square));
-        double  p[HS_MAX_DIM], q[HS_MAX_DIM];
-        int64_t shift[HS_MAX_DIM];
+        const double          error = closeness(ranker, hs_larger(square, key->square));
         if (key->square + error < square) {
             break;
         }
-        for (int k = 0; k < asking->ndim; k++) {
-            p[k] = asking->keeps_originals ? asking->originals[k][ranker->si]
-                                           : asking->x[k][ranker->si];
-        }
         if (key->square <= square + error &&
-            (!nearest_pair(near, ranker->block, ranker->si, key->place, q, shift, NULL) ||
+            (!pair_of(ranker, key, q, shift, NULL) ||
              hs_metric_within(&near->within, p, q, shift, &ranker->stages))) {
             break; /* shifts that pass their range are found when they are written */
         }
@@ -839,7 +1046,7 @@ hs_nearest_write(hs_nearest_writer *writer, hs_nearest_ranker *ranker, int64_t c
         }
     }
     if (count < near->k) {
-        hs_nearest_write_nothing(near, row, count);
+        hs_nearest_write_nothing(writer, row, count);
     }
     return HS_OK;
 }

@@ -16,6 +16,14 @@
 #define LARGE_NODE 4096
 #define SMALL_NODE 32
 
+/* What nodes of one tree are split with; all borrowed. */
+typedef struct tree_splitter {
+    const hs_bins *bins;
+    int32_t       *order; /* numbers of points, of each node those from `first` to `end` */
+    int32_t       *aside; /* room for as many */
+    int32_t        leaf_points;
+} tree_splitter;
+
 /* Where a node is split: what is below the pivot goes left. */
 typedef struct tree_cut {
     int    axis;
@@ -35,10 +43,10 @@ sort_numbers(double *numbers, int n)
     }
 }
 
-/* Finds where to split, by a sample picked evenly from the node; false when it is all in
- * one place. */
+/* Finds where to split, by a sample picked evenly from the node; false when it is all in one
+ * place. */
 static bool
-cut_by_sample(const hs_splitter *splitter, const hs_tree_node *node, tree_cut *cut)
+cut_by_sample(const tree_splitter *splitter, const hs_tree_node *node, tree_cut *cut)
 {
     const int32_t  n = hs_tree_points(node);
     const int      m = n > LARGE_NODE ? LARGE_SAMPLE : n > SMALL_NODE ? SAMPLE : FEW_SAMPLE;
@@ -78,7 +86,7 @@ cut_by_sample(const hs_splitter *splitter, const hs_tree_node *node, tree_cut *c
 
 /* Finds where to split, by all points; false when they are all in one place. */
 static bool
-cut_by_range(const hs_splitter *splitter, const hs_tree_node *node, tree_cut *cut)
+cut_by_range(const tree_splitter *splitter, const hs_tree_node *node, tree_cut *cut)
 {
     double widest = 0.0;
     for (int k = 0; k < splitter->bins->ndim; k++) {
@@ -99,7 +107,7 @@ cut_by_range(const hs_splitter *splitter, const hs_tree_node *node, tree_cut *cu
 
 /* Points whose X are equal: are they equal as given? */
 static bool
-is_spot(const hs_splitter *splitter, const hs_tree_node *node)
+is_spot(const tree_splitter *splitter, const hs_tree_node *node)
 {
     const hs_bins *bins = splitter->bins;
     for (int k = 0; bins->keeps_originals && k < bins->ndim; k++) {
@@ -117,7 +125,7 @@ is_spot(const hs_splitter *splitter, const hs_tree_node *node)
 /* Partitions the points of a node, keeping the order on both sides; returns where the right one
  * begins. */
 static int32_t
-partition(const hs_splitter *splitter, const hs_tree_node *node, const tree_cut *cut)
+partition(const tree_splitter *splitter, const hs_tree_node *node, const tree_cut *cut)
 {
     const double        *x = splitter->bins->x[cut->axis];
     int32_t             *order = splitter->order;
@@ -141,7 +149,7 @@ partition(const hs_splitter *splitter, const hs_tree_node *node, const tree_cut 
  * are equal. Nodes that share no points can be split at the same time.
  */
 static int32_t
-tree_split(const hs_splitter *splitter, hs_tree_node *node)
+tree_split(const tree_splitter *splitter, hs_tree_node *node)
 {
     tree_cut cut;
     if (hs_tree_points(node) <= splitter->leaf_points) {
@@ -213,47 +221,12 @@ bound_nodes(const hs_bins *bins, hs_tree *tree, int32_t first, int32_t last)
     }
 }
 
-typedef struct tree_bounder {
-    const hs_bins *bins;
-    const int32_t *begins;
-    hs_tree       *tree;
-} tree_bounder;
-
-static void
-bound_subtree(void *context, int64_t task)
-{
-    const tree_bounder *bounder = context;
-    bound_nodes(bounder->bins, bounder->tree, bounder->begins[task], bounder->begins[task + 1]);
-}
-
 /*
- * Fills depth, lower, upper and bounds, for which there is room, of a tree with nodes, whose points
- * are in tree order by now. begins, n_subtrees + 1 numbers: nodes begins[s] to begins[s + 1] - 1
- * are those below the root of subtree s, which is one thread's task; roots and what is above them
- * come before.
- */
-static void
-tree_bound(hs_team *team, const hs_bins *bins, const int32_t *begins, int32_t n_subtrees,
-           hs_tree *tree)
-{
-    tree_bounder bounder = {bins, begins, tree};
-    double       range[2];
-    tree->depth = measure_depth(tree);
-    hs_team_run(team, n_subtrees, bound_subtree, &bounder);
-    bound_nodes(bins, tree, 1, begins[0]);
-    for (int k = 0; k < tree->ndim; k++) {
-        bound_axis(bins, tree, 0, k, range);
-        tree->lower[k] = range[0];
-        tree->upper[k] = range[1];
-    }
-}
-
-/*
- * Builds the tree by all threads. At the top there are too few subtrees for them, so
- * the first nodes are split level by level, those of a level at once. Each subtree of few points is
- * then split to its leaves by one thread, the smaller half first, in memory of its own: its points
- * fit a cache, and its nodes need no lock. The subtrees are appended at the end. The tree is the
- * same for any number of threads.
+ * Builds the tree by all threads. At the top there are too few subtrees for them, so the first
+ * nodes are split level by level, those of a level at once. Each subtree of few points is then
+ * split to its leaves by one thread, the smaller half first, in memory of its own: its points fit a
+ * cache, and its nodes need no lock. The subtrees are appended at the end. The tree is the same for
+ * any number of threads.
  */
 
 /* Points of a subtree at most: few enough for even work, and enough to be worth a task. */
@@ -276,7 +249,7 @@ typedef struct tree_builder {
     hs_shared        *shared; /* while subtrees are split and appended */
     hs_team          *team;
     const hs_options *options;
-    hs_splitter       splitter;
+    tree_splitter     splitter;
     hs_tree          *tree;
     subtree          *subtrees; /* owned */
     int32_t           n_subtrees;
@@ -384,27 +357,6 @@ is_root(const tree_builder *builder, const hs_tree_node *node)
            hs_tree_points(node) > builder->splitter.leaf_points;
 }
 
-static hs_status
-open_subtrees(tree_builder *builder)
-{
-    const hs_tree *tree = builder->tree;
-    int32_t        n = 0;
-    for (int32_t number = 0; number < tree->n_nodes; number++) {
-        n += is_root(builder, &tree->nodes[number]);
-    }
-    builder->subtrees = hs_alloc(builder->account, HS_FOR_CELLS, n, sizeof *builder->subtrees);
-    builder->begins = hs_alloc(builder->account, HS_FOR_CELLS, n + 1, sizeof *builder->begins);
-    if (builder->subtrees == NULL || builder->begins == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    for (int32_t number = 0; number < tree->n_nodes; number++) {
-        if (is_root(builder, &tree->nodes[number])) {
-            builder->subtrees[builder->n_subtrees++] = (subtree){.root = number};
-        }
-    }
-    return HS_OK;
-}
-
 /* Room for half full leaves and as many other nodes at first, then for twice as many as before. */
 static bool
 grow(const tree_builder *builder, subtree *sub)
@@ -420,13 +372,16 @@ grow(const tree_builder *builder, subtree *sub)
     return true;
 }
 
-static hs_status
-split_nodes(const tree_builder *builder, subtree *sub)
+static void
+split_subtree(void *context, int64_t task)
 {
-    int32_t waiting[MOST_WAITING];
-    int     n_waiting = 1;
+    const tree_builder *builder = context;
+    subtree            *sub = &builder->subtrees[builder->first_subtree + task];
+    int32_t             waiting[MOST_WAITING];
+    int                 n_waiting = 1;
+    sub->status = HS_ERR_MEMORY;
     if (!grow(builder, sub)) {
-        return HS_ERR_MEMORY;
+        return;
     }
     sub->nodes[sub->n_nodes++] = builder->tree->nodes[sub->root];
     waiting[0] = 0;
@@ -434,7 +389,7 @@ split_nodes(const tree_builder *builder, subtree *sub)
         const int32_t number = waiting[--n_waiting], left = sub->n_nodes;
         if (hs_tree_points(&sub->nodes[number]) > builder->splitter.leaf_points &&
             left + 2 > sub->capacity && !grow(builder, sub)) {
-            return HS_ERR_MEMORY;
+            return;
         }
         const int32_t middle = tree_split(&builder->splitter, &sub->nodes[number]);
         if (middle != 0) {
@@ -445,15 +400,7 @@ split_nodes(const tree_builder *builder, subtree *sub)
             waiting[n_waiting++] = left_is_larger ? left + 1 : left;
         }
     }
-    return HS_OK;
-}
-
-static void
-split_subtree(void *context, int64_t task)
-{
-    const tree_builder *builder = context;
-    subtree            *sub = &builder->subtrees[builder->first_subtree + task];
-    sub->status = split_nodes(builder, sub);
+    sub->status = HS_OK;
 }
 
 static hs_status
@@ -475,15 +422,6 @@ split_subtrees(tree_builder *builder)
     return status;
 }
 
-/* Node `number` of a subtree as a node of the tree, where node 1 of the subtree is `begin`. */
-static hs_tree_node
-renumbered(const subtree *sub, int32_t begin, int32_t number)
-{
-    hs_tree_node node = sub->nodes[number];
-    node.left += node.left != 0 ? begin - 1 : 0;
-    return node;
-}
-
 /* Appends the nodes of all subtrees to those of the tree. */
 static hs_status
 append_subtrees(tree_builder *builder)
@@ -499,9 +437,10 @@ append_subtrees(tree_builder *builder)
     for (int32_t s = 0; s < builder->n_subtrees; s++) {
         const subtree *sub = &builder->subtrees[s];
         const int32_t  begin = builder->begins[s] = tree->n_nodes;
-        tree->nodes[sub->root] = renumbered(sub, begin, 0);
-        for (int32_t number = 1; number < sub->n_nodes; number++) {
-            tree->nodes[tree->n_nodes++] = renumbered(sub, begin, number);
+        for (int32_t number = 0; number < sub->n_nodes; number++) {
+            hs_tree_node *to = &tree->nodes[number == 0 ? sub->root : tree->n_nodes++];
+            *to = sub->nodes[number];
+            to->left += to->left != 0 ? begin - 1 : 0; /* node 1 of the subtree is `begin` */
         }
     }
     builder->begins[builder->n_subtrees] = tree->n_nodes;
@@ -512,23 +451,42 @@ append_subtrees(tree_builder *builder)
 static hs_status
 build_subtrees(tree_builder *builder)
 {
-    hs_status status = open_subtrees(builder);
-    if (status != HS_OK) {
-        return status;
+    const hs_tree *tree = builder->tree;
+    int32_t        n = 0;
+    for (int32_t number = 0; number < tree->n_nodes; number++) {
+        n += is_root(builder, &tree->nodes[number]);
     }
+    builder->subtrees = hs_alloc(builder->account, HS_FOR_CELLS, n, sizeof *builder->subtrees);
+    builder->begins = hs_alloc(builder->account, HS_FOR_CELLS, n + 1, sizeof *builder->begins);
     builder->shared = hs_shared_new(builder->account, HS_FOR_CELLS);
-    if (builder->shared == NULL) {
+    if (builder->subtrees == NULL || builder->begins == NULL || builder->shared == NULL) {
+        hs_shared_free(builder->shared);
         return HS_ERR_MEMORY;
     }
-    status = split_subtrees(builder);
+    for (int32_t number = 0; number < tree->n_nodes; number++) {
+        if (is_root(builder, &tree->nodes[number])) {
+            builder->subtrees[builder->n_subtrees++] = (subtree){.root = number};
+        }
+    }
+    hs_status status = split_subtrees(builder);
     if (status == HS_OK) {
         status = append_subtrees(builder);
     }
-    for (int32_t s = 0; s < builder->n_subtrees; s++) {
+    for (int32_t s = 0; s < n; s++) {
         hs_shared_release(builder->shared, (void **)&builder->subtrees[s].nodes);
     }
     hs_shared_free(builder->shared);
     return status;
+}
+
+/* A task for hs_team_run: bounds of the nodes below the root of one subtree; roots and what is
+ * above them come before. */
+static void
+bound_subtree(void *context, int64_t task)
+{
+    const tree_builder *builder = context;
+    bound_nodes(builder->splitter.bins, builder->tree, builder->begins[task],
+                builder->begins[task + 1]);
 }
 
 static hs_status
@@ -550,25 +508,6 @@ build_nodes(tree_builder *builder)
     return status == HS_OK ? build_subtrees(builder) : status;
 }
 
-static hs_status
-build_tree(tree_builder *builder, hs_scene *scene, hs_bins *bins)
-{
-    hs_tree  *tree = builder->tree;
-    hs_status status = build_nodes(builder);
-    if (status == HS_OK) {
-        status = hs_bins_arrange(builder->account, builder->team, builder->options, scene, bins);
-    }
-    if (status == HS_OK) {
-        tree->bounds = hs_alloc(builder->account, HS_FOR_CELLS,
-                                (int64_t)tree->n_nodes * 2 * tree->ndim, sizeof(double));
-        status = tree->bounds == NULL ? HS_ERR_MEMORY : HS_OK;
-    }
-    if (status == HS_OK && tree->n_nodes > 0) {
-        tree_bound(builder->team, bins, builder->begins, builder->n_subtrees, tree);
-    }
-    return status;
-}
-
 hs_status
 hs_tree_build(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
               int32_t leaf_points, hs_bins *bins, hs_tree *tree)
@@ -583,7 +522,26 @@ hs_tree_build(hs_account *account, hs_team *team, const hs_options *options, hs_
                             .tree = tree};
     *tree = (hs_tree){.ndim = scene->ndim};
     hs_bins_take(scene, bins);
-    const hs_status status = build_tree(&builder, scene, bins);
+    hs_status status = build_nodes(&builder);
+    if (status == HS_OK) {
+        status = hs_bins_arrange(account, team, options, scene, bins);
+    }
+    if (status == HS_OK) {
+        tree->bounds = hs_alloc(account, HS_FOR_CELLS, (int64_t)tree->n_nodes * 2 * tree->ndim,
+                                sizeof(double));
+        status = tree->bounds == NULL ? HS_ERR_MEMORY : HS_OK;
+    }
+    if (status == HS_OK && tree->n_nodes > 0) {
+        tree->depth = measure_depth(tree);
+        hs_team_run(team, builder.n_subtrees, bound_subtree, &builder);
+        bound_nodes(bins, tree, 1, builder.begins[0]);
+        for (int k = 0; k < tree->ndim; k++) {
+            double range[2];
+            bound_axis(bins, tree, 0, k, range);
+            tree->lower[k] = range[0];
+            tree->upper[k] = range[1];
+        }
+    }
     hs_free(account, builder.subtrees);
     hs_free(account, builder.begins);
     return status;

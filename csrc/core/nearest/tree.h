@@ -106,8 +106,6 @@ hs_tree_step(int32_t left, const double gap[2], double limit, int32_t *waiting, 
     return true;
 }
 
-/* Makes a tree of the points of a scene. */
-
 /*
  * Sorts the points of the scene, whose arrays the bins take over, into leaves of at most
  * leaf_points; spots may be larger. In each node points are in the caller's order. The tree is the
@@ -119,16 +117,5 @@ hs_status hs_tree_build(hs_account *account, hs_team *team, const hs_options *op
 
 /* Idempotent; does nothing to a tree of zeros. */
 void hs_tree_free(hs_account *account, hs_tree *tree);
-
-/* One step in building a tree: the points of a node are divided between two
- * children. */
-
-/* What nodes of one tree are split with; all borrowed. */
-typedef struct hs_splitter {
-    const hs_bins *bins;
-    int32_t       *order; /* numbers of points, of each node those from `first` to `end` */
-    int32_t       *aside; /* room for as many */
-    int32_t        leaf_points;
-} hs_splitter;
 
 #endif

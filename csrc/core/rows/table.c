@@ -138,10 +138,12 @@ filler_open(hs_table *table, hs_output *to, row_filler *fill)
     return hs_recorder_init(&table->search->call->account, fill->to, most_hits, &fill->recorder);
 }
 
+/* Idempotent, also of one that is all zeros. A hs_visitor's close. */
 static void
-filler_close(row_filler *fill)
+filler_close(void *table, void *filler)
 {
-    hs_recorder_free(&fill->table->search->call->account, &fill->recorder);
+    row_filler *fill = filler;
+    hs_recorder_free(&((hs_table *)table)->search->call->account, &fill->recorder);
     hs_output_free(&fill->visit);
 }
 
@@ -176,15 +178,15 @@ count_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hit
 hs_status
 hs_table_count(hs_search *search, int64_t *counts, hs_failure *failure)
 {
-    const int64_t     n = hs_search_asking(search)->n;
-    const bool        halves = search->is_half;
-    const hs_visitors visitors = {.use = halves ? HS_BLOCK_LISTS_IDS : HS_BLOCK_COUNTS,
-                                  .visit = count_hits,
-                                  .contexts = counts};
+    const int64_t    n = hs_search_asking(search)->n;
+    const bool       halves = search->is_half;
+    const hs_visitor visitor = {.use = halves ? HS_BLOCK_LISTS_IDS : HS_BLOCK_COUNTS,
+                                .visit = count_hits,
+                                .shared = counts};
     if (n > 0) { /* otherwise counts may be NULL */
         memset(counts, 0, (size_t)n * sizeof *counts);
     }
-    const hs_status status = hs_parallel_visit(search, &visitors, NULL, failure);
+    const hs_status status = hs_parallel_visit(search, &visitor, NULL, failure);
     for (int64_t i = 0; !search->has_queries && i < n; i++) {
         counts[i] -= counts[i] > 0; /* the point itself, unless nothing is within */
         counts[i] /= halves ? 2 : 1;
@@ -200,8 +202,8 @@ hs_table_count(hs_search *search, int64_t *counts, hs_failure *failure)
 hs_status
 hs_table_prepare(hs_table *table, hs_failure *failure)
 {
-    const hs_visitors sizes = {.use = HS_BLOCK_SIZES, .contexts = table};
-    hs_status         status = HS_OK;
+    const hs_visitor sizes = {.use = HS_BLOCK_SIZES};
+    hs_status        status = HS_OK;
     if (!hs_walker_bound(table->search, &table->most)) {
         const hs_stretch whole = hs_call_begin_part(table->search->call, 0.0, PREPARED);
         status = hs_parallel_visit(table->search, &sizes, &table->most, failure);
@@ -257,7 +259,7 @@ keep_all(hs_table *table, hs_failure *failure)
         status = hs_walk_or_tell(&walker, 0, (int32_t)n, failure);
         hs_walker_close(search, &walker);
     }
-    filler_close(&fill);
+    filler_close(table, &fill);
     return status;
 }
 
@@ -279,37 +281,10 @@ hs_table_measure(hs_table *table, hs_failure *failure)
 }
 
 static hs_status
-open_filler(void *table, void *filler)
+open_filler(void *table, void *filler, const hs_walker *walker)
 {
+    (void)walker;
     return filler_open(table, NULL, filler);
-}
-
-static void
-close_filler(void *table, void *filler)
-{
-    (void)table;
-    filler_close(filler);
-}
-
-static hs_status
-fill_all(hs_table *table, hs_failure *failure)
-{
-    hs_crew   crew = {.call = table->search->call,
-                      .job = table,
-                      .worker_size = sizeof(row_filler),
-                      .open = open_filler,
-                      .close = close_filler};
-    hs_status status = hs_crew_open(&crew);
-    if (status == HS_OK) {
-        const hs_visitors visitors = {.use = hs_record_use(table->entries->columns),
-                                      .most = &table->most,
-                                      .visit = put_rows,
-                                      .contexts = crew.workers,
-                                      .context_size = crew.worker_size};
-        status = hs_parallel_visit(table->search, &visitors, NULL, failure);
-    }
-    hs_crew_close(&crew);
-    return status;
 }
 
 hs_status
@@ -322,7 +297,14 @@ hs_table_fill(hs_table *table, hs_failure *failure)
         return HS_OK;
     }
     const hs_stretch whole = hs_call_begin_part(table->search->call, COUNTED, 1.0);
-    const hs_status  status = fill_all(table, failure);
+    const hs_visitor filler = {.use = hs_record_use(table->entries->columns),
+                               .most = &table->most,
+                               .visit = put_rows,
+                               .shared = table,
+                               .state_size = sizeof(row_filler),
+                               .open = open_filler,
+                               .close = filler_close};
+    const hs_status  status = hs_parallel_visit(table->search, &filler, NULL, failure);
     hs_call_end_part(table->search->call, whole);
     return status;
 }

@@ -138,42 +138,37 @@ load_slab(void *context, int slab, int64_t first, int64_t last)
     return HS_OK;
 }
 
-/* Joins the ranges of all slabs. Returns whether every entry is finite. */
-static bool
-join_ranges(const loading *load, int n_slabs)
+/* Coordinate k of point i. */
+static double
+entry_at(const hs_points *points, int64_t i, int k)
 {
-    hs_cloud *cloud = load->cloud;
-    double    poison = 0.0;
-    for (int k = 0; k < cloud->ndim; k++) {
-        cloud->lower[k] = INFINITY;
-        cloud->upper[k] = -INFINITY;
-        for (int slab = 0; slab < n_slabs; slab++) {
-            const range *found = &load->found[slab][k];
-            cloud->lower[k] = hs_smaller(found->lower, cloud->lower[k]);
-            cloud->upper[k] = hs_larger(found->upper, cloud->upper[k]);
-            poison += found->poison;
-        }
-        if (cloud->n > 0) {
-            const double largest = hs_larger(-cloud->lower[k], cloud->upper[k]);
-            cloud->largest = hs_larger(largest, cloud->largest);
-        }
+    const char *entry =
+        (const char *)points->data + i * points->row_stride + k * points->column_stride;
+    float  narrow;
+    double x;
+    if (points->real == HS_FLOAT32) {
+        memcpy(&narrow, entry, sizeof narrow);
+        return (double)narrow;
     }
-    return poison == 0.0;
+    memcpy(&x, entry, sizeof x);
+    return x;
 }
 
-static void
-name_first_bad(const hs_cloud *cloud, hs_failure *failure)
+hs_status
+hs_points_check_finite(const hs_points *points, hs_failure *failure)
 {
-    for (int64_t i = 0; i < cloud->n; i++) {
-        for (int k = 0; k < cloud->ndim; k++) {
-            if (!isfinite(cloud->x[k][i])) {
+    for (int64_t i = 0; i < points->n; i++) {
+        for (int k = 0; k < points->ndim; k++) {
+            const double x = entry_at(points, i, k);
+            if (!isfinite(x)) {
                 failure->row = i;
                 failure->column = k;
-                failure->value = cloud->x[k][i];
-                return;
+                failure->value = x;
+                return HS_ERR_NOT_FINITE;
             }
         }
     }
+    return HS_OK;
 }
 
 static bool
@@ -217,30 +212,29 @@ hs_cloud_load(hs_account *account, hs_team *team, const hs_points *points,
         }
     }
     hs_status status = hs_walk_slabs(team, options, points->n, load_slab, &load);
-    if (status == HS_OK && !join_ranges(&load, n_slabs)) {
-        name_first_bad(cloud, failure);
-        status = HS_ERR_NOT_FINITE;
+    double    poison = 0.0; /* of all slabs */
+    for (int k = 0; status == HS_OK && k < cloud->ndim; k++) {
+        range all = no_range;
+        for (int slab = 0; slab < n_slabs; slab++) {
+            const range *found = &load.found[slab][k];
+            join_range(found->lower, found->upper, found->poison, &all);
+        }
+        cloud->lower[k] = all.lower;
+        cloud->upper[k] = all.upper;
+        cloud->largest = hs_larger(hs_larger(-all.lower, all.upper), cloud->largest);
+        poison += all.poison;
+    }
+    if (status == HS_OK && poison != 0.0) {
+        const hs_points columns = {
+            cloud->x[0],    cloud->n,
+            cloud->ndim,    HS_FLOAT64,
+            sizeof(double), hs_column_pitch(cloud->n, sizeof(double)) * (ptrdiff_t)sizeof(double)};
+        status = hs_points_check_finite(&columns, failure);
     }
     if (status != HS_OK) {
         hs_cloud_free(account, cloud);
     }
     return status;
-}
-
-/* Coordinate k of point i. */
-static double
-entry_at(const hs_points *points, int64_t i, int k)
-{
-    const char *entry =
-        (const char *)points->data + i * points->row_stride + k * points->column_stride;
-    float  narrow;
-    double x;
-    if (points->real == HS_FLOAT32) {
-        memcpy(&narrow, entry, sizeof narrow);
-        return (double)narrow;
-    }
-    memcpy(&x, entry, sizeof x);
-    return x;
 }
 
 void
@@ -256,16 +250,10 @@ hs_points_copy(const hs_points *points, double *rows)
 hs_status
 hs_points_copy_finite(const hs_points *points, double *rows, hs_failure *failure)
 {
+    const ptrdiff_t size = (ptrdiff_t)sizeof *rows;
+    const hs_points copied = {rows, points->n, points->ndim, HS_FLOAT64, points->ndim * size, size};
     hs_points_copy(points, rows);
-    for (int64_t e = 0; e < points->n * points->ndim; e++) {
-        if (!isfinite(rows[e])) {
-            failure->row = e / points->ndim;
-            failure->column = e % points->ndim;
-            failure->value = rows[e];
-            return HS_ERR_NOT_FINITE;
-        }
-    }
-    return HS_OK;
+    return hs_points_check_finite(&copied, failure);
 }
 
 void

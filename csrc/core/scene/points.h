@@ -46,6 +46,9 @@ hs_column_pitch(int64_t n, size_t size)
 hs_status hs_cloud_load(hs_account *account, hs_team *team, const hs_points *points,
                         const hs_options *options, hs_cloud *cloud, hs_failure *failure);
 
+/* HS_OK, or HS_ERR_NOT_FINITE, which names the first number that is not finite. */
+hs_status hs_points_check_finite(const hs_points *points, hs_failure *failure);
+
 /* All coordinates in float64, one point behind another; they need not be finite. */
 void hs_points_copy(const hs_points *points, double *rows);
 

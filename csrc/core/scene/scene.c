@@ -191,22 +191,7 @@ scene_name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure *f
     }
 }
 
-/* Whether the error of the formula of precision="double" passes both the cutoff and a small part of
- * the box: then it might call too many images near, and its answer is noise. */
-static bool
-scene_is_drowned(const hs_scene *scene)
-{
-    double shortest = INFINITY;
-    for (int k = 0; k < scene->ndim; k++) {
-        if (scene->lattice.row_of_axis[k] >= 0) {
-            shortest = hs_smaller(scene->lattice.period[k], shortest);
-        }
-    }
-    return scene->formula_error > scene->cutoff && !(scene->formula_error <= NOISE * shortest);
-}
-
-/* Points and queries in one scene, at once or one after the other: bounds must
- * hold for both. */
+/* Points and queries in one scene, at once or one after the other: bounds must hold for both. */
 
 /* How much further from the box than the points queries may be that come later, and how many box
  * vectors at least, before they need bounds of their own. Bounds that are so much wider cost next
@@ -251,7 +236,6 @@ static void
 scene_join_wrapped(hs_scene *scene, const hs_scene *asking)
 {
     const bool points = scene->n > 0, queries = asking->n > 0;
-    scene->is_asked = true;
     for (int k = 0; k < scene->ndim; k++) {
         scene->x_largest[k] = hs_larger(scene->x_largest[k], asking->x_largest[k]);
         if (queries) { /* otherwise its range is that of nothing */
@@ -315,16 +299,6 @@ scene_make_room(hs_scene *scene, double *magnitude)
         if (across == 0.0) { /* queries stay wherever they are along this axis */
             scene->x_largest[k] = hs_larger(2.0 * scene->x_largest[k], away);
         }
-    }
-}
-
-/* Widen the bounds on what was wrapped, for queries that come later: before and after they are
- * settled. */
-static void
-scene_widen_errors(hs_scene *scene)
-{
-    for (int k = 0; k < scene->ndim; k++) {
-        scene->t_error[k] *= 2.0; /* queries may be rounded to beyond another face */
     }
 }
 
@@ -430,15 +404,19 @@ entries_of_row(const double *row, int ndim)
     return entries;
 }
 
-/* HS_OPEN, HS_COUPLED, or the number of the row (a box vector) that alone has an entry in this
+/* What moves a column of coordinates besides the points' own values. */
+#define OPEN    (-1) /* nothing */
+#define COUPLED (-2) /* box vectors that have entries in other columns as well */
+
+/* OPEN, COUPLED, or the number of the row (a box vector) that alone has an entry in this
  * column, and no other entry. periodic: the rows that count; NULL: all. */
 static int
 mover_among(const double rows[][HS_MAX_DIM], const bool *periodic, int n_rows, int ndim, int column)
 {
-    int mover = HS_OPEN;
+    int mover = OPEN;
     for (int l = 0; l < n_rows; l++) {
         if ((periodic == NULL || periodic[l]) && rows[l][column] != 0.0) {
-            mover = mover == HS_OPEN && entries_of_row(rows[l], ndim) == 1 ? l : HS_COUPLED;
+            mover = mover == OPEN && entries_of_row(rows[l], ndim) == 1 ? l : COUPLED;
         }
     }
     return mover;
@@ -448,7 +426,7 @@ mover_among(const double rows[][HS_MAX_DIM], const bool *periodic, int n_rows, i
 static int
 mover_of(const hs_box *box, int column)
 {
-    return box == NULL ? HS_OPEN
+    return box == NULL ? OPEN
                        : mover_among((const double(*)[HS_MAX_DIM])box->rows, box->periodic,
                                      box->ndim, box->ndim, column);
 }
@@ -471,30 +449,10 @@ hs_box_size_of(const hs_box *box)
     }
     for (int k = 0; box != NULL && k < box->ndim; k++) {
         const int mover = mover_of(box, k);
-        found.moved |= (unsigned)(mover != HS_OPEN) << k;
-        found.is_coupled = found.is_coupled || mover == HS_COUPLED;
+        found.moved |= (unsigned)(mover != OPEN) << k;
+        found.is_coupled = found.is_coupled || mover == COUPLED;
     }
     return found;
-}
-
-double
-hs_enough_cutoff(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
-{
-    if (!(cutoff > ENOUGH_CUTOFF * cloud->largest) || cloud->largest == 0.0 || box->largest > 0.0) {
-        return cutoff;
-    }
-    const int exponent = hs_exponent_of(cloud->largest) + WHOLE_EXPONENT;
-    return exponent > 1023 ? cutoff : hs_smaller(ldexp(1.0, exponent), cutoff);
-}
-
-/* Whether points of open space with this cutoff are searched as they are: no gap is closed, nothing
- * is scaled, and the cutoff is not shortened. */
-static bool
-hs_is_ordinary(const hs_cloud *cloud, double cutoff)
-{
-    const double far = ldexp(1.0, HS_FAR_EXPONENT - 1 - ORDINARY_EXPONENT);
-    return cutoff >= ldexp(1.0, -ORDINARY_EXPONENT) && cutoff <= ldexp(1.0, ORDINARY_EXPONENT) &&
-           cutoff <= ENOUGH_CUTOFF * cloud->largest && cloud->largest <= far;
 }
 
 /* The exponent of the length that a scene goes by: its cutoff, or with cutoff 0 its box, or where
@@ -562,8 +520,8 @@ choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff, in
     return exponent;
 }
 
-/* Which power of two a scene is scaled by, and whether gaps between its
- * points are closed before that. */
+/* Which power of two a scene is scaled by, and whether gaps between its points are closed before
+ * that. */
 
 /* Whether gaps between far points and queries are closed. Queries that come later may lie in such a
  * gap, and the k nearest may be at any distance. Where one scale holds everything, cells of queries
@@ -578,19 +536,6 @@ scene_may_condense(const hs_scene *scene, const hs_scene *asking, const hs_box_s
     return scene->is_wide || (asking == NULL && !scene->is_plain) ||
            open_drowns_box(&scene->cloud, size, scene->sought) ||
            !fits_one_scale(&scene->cloud, size, unit, HS_LARGEST_WIDE_EXPONENT);
-}
-
-/* Steps of hs_scene_init_sets. The cutoff that scale and gaps go by. */
-static double
-scene_scale_cutoff(const hs_scene *scene, const hs_box_size *size, double cutoff)
-{
-    const hs_cloud *cloud = &scene->cloud;
-    if (scene->within > 0.0 &&
-        !fits_one_scale(cloud, size, unit_exponent(cloud, size, scene->within),
-                        HS_FAR_BOUNDED_EXPONENT)) {
-        return scene->within;
-    }
-    return scene->is_kept || scene->is_plain ? cutoff : hs_enough_cutoff(cloud, size, cutoff);
 }
 
 /* The scale of points, lengths and the cutoff. asking: NULL, or the queries' scene. is_scaled:
@@ -625,8 +570,33 @@ scene_set_scale(const hs_box *box, bool is_scaled, int unit, hs_scene *scene,
     }
 }
 
-bool
-hs_scene_box_vanishes(const hs_scene *scene)
+/*
+ * Closes the gaps between coordinates that are far from zero. Where two different float64 numbers
+ * are more than a cutoff apart, all that matters is which are equal, so smaller numbers can take
+ * their place. No scale holds both a cutoff of 1e-300 and an outlier at 1e300; once gaps are
+ * closed, one does. No pair changes, nor a bit of d and D, and S by the turns alone.
+ */
+
+/* Points, queries. */
+#define CONDENSED_SETS 2
+
+typedef struct condensed_set {
+    const hs_box *box;       /* in place of the caller's: borrowed, or `rows` */
+    const hs_box *given_box; /* the caller's */
+    hs_box        rows;
+    bool          is_scaled; /* points and box vectors are in units of 2^unit now */
+    bool          has_turns; /* something was wrapped into the box, and S is wanted: */
+    /* Both set where has_turns says so. Owned, of points and of queries; n each for a column where
+     * some were, else NULL. */
+    int64_t *turns[CONDENSED_SETS][HS_MAX_DIM];
+    /* Owned; where scaling may lose digits: the columns that have turns, of both sets, as they were
+     * given. S with all its turns belongs to these numbers and to the box as given. */
+    double *given[CONDENSED_SETS][HS_MAX_DIM];
+} condensed_set;
+
+/* Once the box is scaled: whether one of its periods has become zero. */
+static bool
+box_vanishes(const hs_scene *scene)
 {
     const hs_lattice *lattice = &scene->lattice;
     for (int k = 0; k < lattice->ndim; k++) {
@@ -635,33 +605,6 @@ hs_scene_box_vanishes(const hs_scene *scene)
         }
     }
     return false;
-}
-
-/* Whether a cutoff has more images than any memory holds. */
-static bool
-has_endless_images(const hs_scene *scene, const hs_condensed *condensed)
-{
-    const hs_box_size size = hs_box_size_of(condensed->box);
-    const double      cutoff = condensed->is_scaled ? scene->cutoff : scene->sought;
-    return hs_is_far(cutoff, hs_exponent_of(size.short_row), HS_FAR_IMAGES_EXPONENT);
-}
-
-bool
-hs_scene_has_no_scale(const hs_scene *scene, const hs_condensed *condensed)
-{
-    const hs_box_size size = hs_box_size_of(condensed->box);
-    return (hs_scene_box_vanishes(scene) || open_drowns_box(&scene->cloud, &size, scene->sought)) &&
-           !has_endless_images(scene, condensed);
-}
-
-hs_status
-hs_scene_refuse_vanishing(const hs_scene *scene, const hs_condensed *condensed, hs_failure *failure)
-{
-    if (!scene->lattice.aligned && !has_endless_images(scene, condensed)) {
-        return HS_ERR_BOX_SKEWED;
-    }
-    failure->expected_pairs = failure->expected_bytes = INFINITY; /* of images */
-    return HS_ERR_MEMORY;
 }
 
 /* The pass over all points that wraps them into the box, axis by axis where
@@ -754,26 +697,6 @@ wrap_slab(void *context, int slab, int64_t first, int64_t last)
     return folded->failed < 0 ? HS_OK : HS_ERR_SHIFT_RANGE;
 }
 
-/* What wrapping found in all slabs together, and on the axes that were left alone. */
-static hs_wrap_range
-join_slabs(const wrapping *wrap)
-{
-    const hs_scene *scene = wrap->scene;
-    hs_wrap_range   folded = hs_wrap_range_none();
-    for (int slab = 0; slab < wrap->n_slabs; slab++) {
-        hs_wrap_range_join(&folded, &wrap->folded[slab]);
-    }
-    for (int k = 0; scene->lattice.aligned && k < scene->ndim; k++) {
-        const bool open = scene->lattice.row_of_axis[k] < 0;
-        if (scene->n > 0 && (open || is_inside(scene, k))) {
-            folded.x_largest[k] = fmax(-scene->cloud.lower[k], scene->cloud.upper[k]);
-        }
-        folded.lower[k] = open ? scene->cloud.lower[k] : 0.0;
-        folded.upper[k] = open ? scene->cloud.upper[k] : 0.0;
-    }
-    return folded;
-}
-
 /* No point moves, and coordinates are those along the axes. */
 static void
 stay(hs_scene *scene)
@@ -786,59 +709,27 @@ stay(hs_scene *scene)
     }
 }
 
-/* Wraps the points into the box. Sets x_largest, the range of t_k of the points in
- * lower and upper, and *magnitude, the largest sum of absolute terms. */
-static hs_status
-scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options, double *magnitude,
-           hs_failure *failure)
-{
-    wrapping wrap;
-    *magnitude = 0.0;
-    if (scene->lattice.n_periodic == 0) {
-        stay(scene);
-        return HS_OK;
-    }
-    wrap.scene = scene;
-    wrap.few_turns = hs_fold_turns(&scene->lattice, scene->cloud.largest) <= HS_FOLD_TURNS;
-    wrap.n_slabs = scene->n < HS_SLABS * HS_SLAB_POINTS
-                       ? (int)((scene->n + HS_SLAB_POINTS - 1) / HS_SLAB_POINTS)
-                       : HS_SLABS;
-    for (int slab = 0; slab < wrap.n_slabs; slab++) {
-        wrap.folded[slab] = hs_wrap_range_none();
-    }
-    hs_status           status = hs_walk_slabs(team, options, scene->n, wrap_slab, &wrap);
-    const hs_wrap_range folded = join_slabs(&wrap);
-    if (status == HS_ERR_SHIFT_RANGE) {
-        failure->row = folded.failed;
-        status = hs_skew_is_left(&scene->lattice) ? HS_ERR_BOX_SKEWED : status;
-    }
-    *magnitude = folded.magnitude;
-    for (int k = 0; k < scene->ndim; k++) {
-        scene->x_largest[k] = folded.x_largest[k];
-        scene->lower[k] = scene->n > 0 ? folded.lower[k] : 0.0;
-        scene->upper[k] = scene->n > 0 ? folded.upper[k] : 0.0;
-    }
-    return status;
-}
-
 /* Scenes without a box whose numbers need no scale are filled in one go: else a call of 30 points
  * takes 1.27 times the instructions, and 2000 systems of 30 points 1.18 times as long. */
 
-/* Whether a scene, once its points have been read, stays as it was given: there is no box, and
- * nothing is scaled. Then scene_fill_ordinary fills it. */
+/* Whether a scene, once its points have been read, stays as it was given: there is no box, no
+ * gap is closed, nothing is scaled, and the cutoff is not shortened. Then scene_fill_ordinary
+ * fills it. */
 static bool
 scene_needs_no_scaling(const hs_sets *sets, const hs_box *box, const hs_options *options,
                        const hs_scene *scene)
 {
+    const double cutoff = options->cutoff, largest = scene->cloud.largest;
     return box == NULL && sets->queries == NULL && !sets->is_kept && !sets->is_wide &&
-           options->precision != HS_DOUBLE && hs_is_ordinary(&scene->cloud, options->cutoff);
+           options->precision != HS_DOUBLE && cutoff >= hs_power_of_two(-ORDINARY_EXPONENT) &&
+           cutoff <= hs_power_of_two(ORDINARY_EXPONENT) && cutoff <= ENOUGH_CUTOFF * largest &&
+           largest <= hs_power_of_two(HS_FAR_EXPONENT - 1 - ORDINARY_EXPONENT);
 }
 
 /* follows: it has filled the scene before, with this cutoff and as many axes. */
-static hs_status
-scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene, hs_failure *failure)
+static void
+scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene)
 {
-    double magnitude;
     if (!follows) {
         scene->scale = scene->unscale = scene->pending = hs_scale_of(0);
         scene->sought = scene->cutoff = scene->cutoff_low = options->cutoff;
@@ -848,7 +739,7 @@ scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene, hs
         hs_scene_init_metric(scene, options);
     }
     scene_set_radius(scene, options, scene->cloud.largest);
-    return scene_wrap(scene, NULL, options, &magnitude, failure);
+    stay(scene);
 }
 
 /*
@@ -888,10 +779,10 @@ scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene, hs
 typedef struct condensing {
     hs_account       *account;
     const hs_options *options;
-    hs_cloud         *of[HS_CONDENSED_SETS]; /* points, and queries if there are any */
+    hs_cloud         *of[CONDENSED_SETS]; /* points, and queries if there are any */
     int               n_sets;
     int64_t           n; /* of both together */
-    hs_condensed     *condensed;
+    condensed_set    *condensed;
     bool              changes_rows; /* gaps of box vectors may be closed, too */
     bool              keeps_given;  /* columns that are wrapped, as they were before */
     hs_scale          to_units, from_units;
@@ -899,45 +790,6 @@ typedef struct condensing {
     double            coarse; /* 2^54 u, in the caller's unit */
     hs_keys           keys;   /* room for n + 1 */
 } condensing;
-
-/* The number that stands for entry i of a set among the keys. */
-static int32_t
-id_of(int set, int64_t i)
-{
-    return set == 0 ? (int32_t)i : (int32_t)(HALF - 1 - i);
-}
-
-/* The coordinate that a number stands for. */
-static double *
-coordinate_of(const condensing *doing, int k, int32_t id)
-{
-    return id >= 0 ? &doing->of[0]->x[k][id] : &doing->of[1]->x[k][HALF - 1 - (int64_t)id];
-}
-
-/* Box vectors are left alone where closing would change a decision on the points as given: in
- * coupled boxes, and for precision="double". */
-static bool
-rows_may_change(const condensing *doing, const hs_box *box)
-{
-    for (int k = 0; box != NULL && k < box->ndim; k++) {
-        if (mover_of(box, k) == HS_COUPLED) {
-            return false;
-        }
-    }
-    return box == NULL || doing->options->precision != HS_DOUBLE;
-}
-
-static bool
-anything_is_far(const hs_cloud *cloud, const hs_box *box, int unit, int powers)
-{
-    bool found = hs_is_far(cloud->largest, unit, powers);
-    for (int l = 0; box != NULL && l < box->ndim; l++) {
-        for (int k = 0; box->periodic[l] && k < box->ndim; k++) {
-            found = found || hs_is_far(0.5 * fabs(box->rows[l][k]), unit, powers);
-        }
-    }
-    return found;
-}
 
 /* Copies the column of both sets before any number in it is wrapped. */
 static hs_status
@@ -959,9 +811,9 @@ keep_given(const condensing *doing, int k)
 static hs_status
 begin_turns(const condensing *doing, int set, int k)
 {
-    hs_condensed *condensed = doing->condensed;
-    const int64_t n = doing->of[set]->n;
-    int64_t      *turns = hs_alloc(doing->account, HS_FOR_WRAPS, n, sizeof *turns);
+    condensed_set *condensed = doing->condensed;
+    const int64_t  n = doing->of[set]->n;
+    int64_t       *turns = hs_alloc(doing->account, HS_FOR_WRAPS, n, sizeof *turns);
     condensed->turns[set][k] = turns;
     if (turns == NULL) {
         return HS_ERR_MEMORY;
@@ -1050,7 +902,7 @@ collect(condensing *doing, int k, double from, double half, places *at)
         for (int64_t i = 0; i < doing->of[set]->n; i++) {
             if (fabs(x[i]) > from) {
                 keys->keys[found] = bits_of(x[i]);
-                keys->ids[found++] = id_of(set, i);
+                keys->ids[found++] = (int32_t)(set == 0 ? i : HALF - 1 - i);
                 continue;
             }
             largest = hs_larger(fabs(x[i]), largest);
@@ -1088,7 +940,8 @@ condense_numbers(condensing *doing, int k, double from, double *half)
         if (keys->ids[e] == HALF) {
             *half = place;
         } else {
-            double *x = coordinate_of(doing, k, keys->ids[e]);
+            const int64_t id = keys->ids[e];
+            double *x = id >= 0 ? &doing->of[0]->x[k][id] : &doing->of[1]->x[k][HALF - 1 - id];
             *x = copysign(place, *x);
         }
     }
@@ -1117,7 +970,7 @@ static hs_status
 condense_column(condensing *doing, int k, hs_failure *failure)
 {
     const hs_cloud *cloud = doing->of[0]; /* its range is that of both */
-    hs_condensed   *condensed = doing->condensed;
+    condensed_set  *condensed = doing->condensed;
     const double    far = doing->far;
     const int       row = mover_of(condensed->box, k);
     double         *entry = row >= 0 ? &condensed->rows.rows[row][k] : NULL;
@@ -1146,20 +999,6 @@ condense_column(condensing *doing, int k, hs_failure *failure)
     return status;
 }
 
-/* All four arrays are one memory block, which begins with the keys. */
-static bool
-allocate_keys(hs_account *account, const hs_options *options, int64_t n, hs_keys *keys)
-{
-    keys->options = options;
-    keys->keys = hs_alloc(account, HS_FOR_ORDER, n, 2 * (sizeof(int64_t) + sizeof(int32_t)));
-    if (keys->keys != NULL) {
-        keys->spare_keys = keys->keys + n;
-        keys->ids = (int32_t *)(void *)(keys->spare_keys + n);
-        keys->spare_ids = keys->ids + n;
-    }
-    return keys->keys != NULL;
-}
-
 /* Closes the gaps of all columns that have any, one after the other. */
 static hs_status
 condense_columns(condensing *doing, hs_failure *failure)
@@ -1168,7 +1007,7 @@ condense_columns(condensing *doing, hs_failure *failure)
     double          largest = 0.0;
     for (int k = 0; k < cloud->ndim; k++) {
         const int mover = mover_of(doing->condensed->box, k);
-        if (mover == HS_OPEN || (mover >= 0 && doing->changes_rows)) {
+        if (mover == OPEN || (mover >= 0 && doing->changes_rows)) {
             const hs_status status = condense_column(doing, k, failure);
             if (status != HS_OK) {
                 return status;
@@ -1185,18 +1024,18 @@ condense_columns(condensing *doing, hs_failure *failure)
 /*
  * unit: the exponent of the cutoff, 2^unit <= cutoff < 2^(unit + 1); with cutoff 0 any other.
  * powers: what is far is so beyond 2^powers units, HS_FAR_EXPONENT at most. Does nothing
- * but look at ranges where nothing is far. box: checked. asking: NULL, or queries, whose
+ * but look at ranges where nothing is far. size: of the box. asking: NULL, or queries, whose
  * range and that of the points have been joined. HS_ERR_SHIFT_RANGE only where S is wanted.
  * condensed_free in any case.
  */
 static hs_status
-condense(hs_account *account, const hs_options *options, const hs_box *box, int unit, int powers,
-         hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed, hs_failure *failure)
+condense(hs_account *account, const hs_options *options, const hs_box_size *size, int unit,
+         int powers, hs_cloud *cloud, hs_cloud *asking, condensed_set *condensed,
+         hs_failure *failure)
 {
-    condensed->box = condensed->given_box = box;
-    condensed->is_scaled = condensed->has_turns = false;
+    const hs_box *box = condensed->given_box;
     if (cloud->n == 0 || (asking != NULL && asking->n == 0) ||
-        !anything_is_far(cloud, box, unit, powers)) {
+        !hs_is_far(hs_larger(0.5 * size->largest, cloud->largest), unit, powers)) {
         return HS_OK;
     }
     memset(condensed->turns, 0, sizeof condensed->turns);
@@ -1212,7 +1051,9 @@ condense(hs_account *account, const hs_options *options, const hs_box *box, int 
                         .from_units = hs_scale_of(-unit),
                         .far = ldexp(1.0, unit + powers),
                         .coarse = ldexp(1.0, unit + HS_FAR_EXPONENT)};
-    doing.changes_rows = rows_may_change(&doing, box);
+    /* Box vectors are left alone where closing would change a decision on the points as given: in
+     * coupled boxes, and for precision="double". */
+    doing.changes_rows = box == NULL || (!size->is_coupled && options->precision != HS_DOUBLE);
     if (doing.changes_rows) {
         condensed->is_scaled = unit < 0;
         if (box != NULL) {
@@ -1220,17 +1061,23 @@ condense(hs_account *account, const hs_options *options, const hs_box *box, int 
             condensed->box = &condensed->rows;
         }
     }
-    const hs_status status = allocate_keys(account, options, doing.n + 1, &doing.keys)
-                                 ? condense_columns(&doing, failure)
-                                 : HS_ERR_MEMORY;
-    hs_free(account, doing.keys.keys);
+    const int64_t n = doing.n + 1; /* of all four arrays, which are one memory block */
+    int64_t *keys = hs_alloc(account, HS_FOR_ORDER, n, 2 * (sizeof(int64_t) + sizeof(int32_t)));
+    if (keys == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    int32_t *ids = (int32_t *)(void *)(keys + 2 * n);
+    doing.keys = (hs_keys){
+        .options = options, .keys = keys, .spare_keys = keys + n, .ids = ids, .spare_ids = ids + n};
+    const hs_status status = condense_columns(&doing, failure);
+    hs_free(account, keys);
     return status;
 }
 
 static void
-condensed_free(hs_account *account, hs_condensed *condensed)
+condensed_free(hs_account *account, condensed_set *condensed)
 {
-    for (int set = 0; condensed->has_turns && set < HS_CONDENSED_SETS; set++) {
+    for (int set = 0; condensed->has_turns && set < CONDENSED_SETS; set++) {
         for (int k = 0; k < HS_MAX_DIM; k++) {
             hs_free(account, condensed->turns[set][k]);
             hs_free(account, condensed->given[set][k]);
@@ -1271,29 +1118,23 @@ allocate_beside(hs_account *account, hs_scene *scene)
     return true;
 }
 
-typedef struct scaling {
-    hs_scene *scene;
-    bool      copies;        /* to the originals ... */
-    bool      copies_scaled; /* ... what has been scaled already */
-} scaling;
-
-/* Scales points [first, last), and copies them before or after that. */
+/* Scales points [first, last), and copies them to the originals before or after that. */
 static hs_status
 scale_slab(void *context, int slab, int64_t first, int64_t last)
 {
-    const scaling *doing = context;
-    hs_scene      *scene = doing->scene;
-    const size_t   n_bytes = (size_t)(last - first) * sizeof(double);
+    hs_scene    *scene = context;
+    const size_t n_bytes = (size_t)(last - first) * sizeof(double);
+    const bool   copies = scene->keeps_originals && !scene->x_is_beside;
     (void)slab;
     for (int k = 0; k < scene->ndim; k++) {
         double *x = scene->cloud.x[k];
-        if (doing->copies && !doing->copies_scaled) {
+        if (copies && scene->extreme) {
             memcpy(scene->originals[k] + first, x + first, n_bytes);
         }
         for (int64_t i = first; scene->pending.exponent != 0 && i < last; i++) {
             x[i] = hs_scale_apply(scene->pending, x[i]);
         }
-        if (doing->copies && doing->copies_scaled) {
+        if (copies && !scene->extreme) {
             memcpy(scene->originals[k] + first, x + first, n_bytes);
         }
     }
@@ -1321,11 +1162,9 @@ prepare_points(hs_account *account, hs_team *team, const hs_options *options, hs
         return HS_ERR_MEMORY;
     }
     scene->x_is_beside = scene->keeps_originals && !scene->extreme && !scene->lattice.aligned;
-    const bool copies = scene->keeps_originals && !scene->x_is_beside;
-    if (copies || scene->pending.exponent != 0) {
-        scaling          doing = {scene, copies, !scene->extreme};
+    if ((scene->keeps_originals && !scene->x_is_beside) || scene->pending.exponent != 0) {
         const hs_options silent = {.poll = NULL}; /* the caller was polled when this was copied */
-        (void)hs_walk_slabs(team, &silent, scene->n, scale_slab, &doing);
+        (void)hs_walk_slabs(team, &silent, scene->n, scale_slab, scene);
     }
     for (int k = 0; scene->x_is_beside && k < scene->ndim; k++) {
         double *beside = scene->originals[k]; /* wrapping moves the points there */
@@ -1335,42 +1174,53 @@ prepare_points(hs_account *account, hs_team *team, const hs_options *options, hs
     return HS_OK;
 }
 
+/* Wraps the points into the box. Sets x_largest, the range of t_k of the points in lower and upper,
+ * and *magnitude, the largest sum of absolute terms. */
 static hs_status
 wrap_points(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
             double *magnitude, hs_failure *failure)
 {
-    const hs_status status = prepare_points(account, team, options, scene);
-    return status == HS_OK ? scene_wrap(scene, team, options, magnitude, failure) : status;
-}
-
-/* asking: NULL, or the queries' scene, which is wrapped too and gets the bounds of `scene`. */
-static hs_status
-fill_scene(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
-           hs_scene *asking, hs_failure *failure)
-{
-    double    magnitude = 0.0, of_asking = 0.0;
-    hs_status status = wrap_points(account, team, options, scene, &magnitude, failure);
-    if (status == HS_OK && asking != NULL) {
-        status = wrap_points(account, team, options, asking, &of_asking, failure);
-        failure->in_queries = status == HS_ERR_SHIFT_RANGE;
+    wrapping wrap;
+    *magnitude = 0.0;
+    if (prepare_points(account, team, options, scene) != HS_OK) {
+        return HS_ERR_MEMORY;
     }
-    if (status != HS_OK) {
-        return status;
+    if (scene->lattice.n_periodic == 0) {
+        stay(scene);
+        return HS_OK;
     }
-    magnitude = hs_larger(magnitude, of_asking);
-    if (asking != NULL) {
-        scene_join_wrapped(scene, asking);
+    wrap.scene = scene;
+    wrap.few_turns = hs_fold_turns(&scene->lattice, scene->cloud.largest) <= HS_FOLD_TURNS;
+    wrap.n_slabs = scene->n < HS_SLABS * HS_SLAB_POINTS
+                       ? (int)((scene->n + HS_SLAB_POINTS - 1) / HS_SLAB_POINTS)
+                       : HS_SLABS;
+    for (int slab = 0; slab < wrap.n_slabs; slab++) {
+        wrap.folded[slab] = hs_wrap_range_none();
     }
-    if (scene->is_kept) {
-        scene_make_room(scene, &magnitude);
+    hs_status     status = hs_walk_slabs(team, options, scene->n, wrap_slab, &wrap);
+    hs_wrap_range folded = hs_wrap_range_none();
+    for (int slab = 0; slab < wrap.n_slabs; slab++) {
+        hs_wrap_range_join(&folded, &wrap.folded[slab]);
     }
-    scene_bound_errors(scene, magnitude);
-    hs_scene_scale_ranges(scene);
-    if (scene->is_kept) {
-        scene_widen_errors(scene);
+    if (status == HS_ERR_SHIFT_RANGE) {
+        failure->row = folded.failed;
+        status = hs_skew_is_left(&scene->lattice) ? HS_ERR_BOX_SKEWED : status;
     }
-    hs_scene_init_metric(scene, options);
-    return HS_OK;
+    *magnitude = folded.magnitude;
+    for (int k = 0; k < scene->ndim; k++) {
+        const bool open = scene->lattice.row_of_axis[k] < 0;
+        scene->x_largest[k] = folded.x_largest[k];
+        scene->lower[k] = scene->upper[k] = 0.0;
+        if (scene->n > 0 && scene->lattice.aligned && (open || is_inside(scene, k))) {
+            scene->x_largest[k] = fmax(-scene->cloud.lower[k], scene->cloud.upper[k]);
+        }
+        if (scene->n > 0 && (open || !scene->lattice.aligned)) {
+            const bool of_cloud = scene->lattice.aligned; /* the axis was left alone */
+            scene->lower[k] = of_cloud ? scene->cloud.lower[k] : folded.lower[k];
+            scene->upper[k] = of_cloud ? scene->cloud.upper[k] : folded.upper[k];
+        }
+    }
+    return status;
 }
 
 /* Clears what is added to or freed. The rest is large, and set before it is read. */
@@ -1379,7 +1229,7 @@ start_scene(const hs_points *points, hs_scene *scene)
 {
     scene->ndim = points->ndim;
     scene->n = points->n;
-    scene->keeps_originals = scene->x_is_beside = scene->is_asked = scene->is_kept = false;
+    scene->keeps_originals = scene->x_is_beside = scene->is_kept = false;
     scene->in_one_cell = scene->is_untested = false;
     scene->cloud.block = scene->beside = NULL;
     scene->turns = (hs_turns){.known = false};
@@ -1388,30 +1238,30 @@ start_scene(const hs_points *points, hs_scene *scene)
 
 hs_status
 hs_scene_from_kept(hs_account *account, hs_team *team, const hs_scene *kept,
-                   const hs_points *queries, const hs_options *options, hs_scene *asking,
-                   hs_failure *failure)
+                   const hs_points *queries, const hs_options *options, bool for_cells,
+                   hs_scene *asking, hs_failure *failure)
 {
     double     magnitude = 0.0;
     hs_options as_kept = *options;
     start_scene(queries, asking);
-    if (kept->is_untested) { /* however many turns that are */
+    if (for_cells || kept->is_untested) { /* however many turns that are */
         as_kept.want &= ~(unsigned)HS_WANT_SHIFT;
     } else if (kept->turns.known) {
         as_kept.want |= HS_WANT_SHIFT;
     }
     hs_status status = hs_cloud_load(account, team, queries, options, &asking->cloud, failure);
-    if (status == HS_OK && !hs_scene_takes(kept, &asking->cloud)) {
+    if (status == HS_OK && !for_cells && !hs_scene_takes(kept, &asking->cloud)) {
         status = HS_REBUILD;
     }
     if (status == HS_OK) {
         scene_share(kept, asking);
         status = wrap_points(account, team, &as_kept, asking, &magnitude, failure);
     }
-    if (status == HS_ERR_SHIFT_RANGE && !(options->want & HS_WANT_SHIFT)) {
+    if (status == HS_ERR_SHIFT_RANGE && !for_cells && !(options->want & HS_WANT_SHIFT)) {
         status = HS_REBUILD; /* a scene without turns will do */
     }
-    failure->in_queries = status != HS_OK && status != HS_REBUILD;
-    if (status == HS_OK) {
+    failure->in_queries = !for_cells && status != HS_OK && status != HS_REBUILD;
+    if (status == HS_OK && !for_cells) {
         scene_bound_errors(asking, magnitude);
         hs_scene_scale_ranges(asking);
         status = scene_covers(kept, asking) ? HS_OK : HS_REBUILD;
@@ -1422,24 +1272,6 @@ hs_scene_from_kept(hs_account *account, hs_team *team, const hs_scene *kept,
     return status;
 }
 
-hs_status
-hs_scene_wrapped_like(hs_account *account, const hs_scene *kept, const hs_points *points,
-                      const hs_options *options, hs_scene *scene, hs_failure *failure)
-{
-    double magnitude = 0.0;
-    start_scene(points, scene);
-    hs_status status = hs_cloud_load(account, NULL, points, options, &scene->cloud, failure);
-    if (status == HS_OK) {
-        scene_share(kept, scene);
-        status = wrap_points(account, NULL, options, scene, &magnitude, failure);
-    }
-    if (status != HS_OK) {
-        hs_scene_free(account, scene);
-    }
-    return status;
-}
-
-/* Reads the points, and the queries if there are any. */
 /* The range of the points becomes that of a domain, or reaches further: as if queries lay at its
  * ends. */
 static void
@@ -1455,28 +1287,10 @@ widen_cloud(const double *domain, hs_cloud *cloud)
     }
 }
 
-static hs_status
-load_clouds(hs_account *account, hs_team *team, const hs_sets *sets, const hs_options *options,
-            hs_scene *scene, hs_scene *asking, hs_failure *failure)
-{
-    hs_status status = hs_cloud_load(account, team, sets->points, options, &scene->cloud, failure);
-    if (status == HS_OK && asking != NULL) {
-        status = hs_cloud_load(account, team, sets->queries, options, &asking->cloud, failure);
-        failure->in_queries = status != HS_OK;
-    }
-    if (status == HS_OK && sets->domain != NULL) {
-        widen_cloud(sets->domain, &scene->cloud);
-    }
-    if (status == HS_OK && asking != NULL) {
-        scene_join_clouds(scene, asking);
-    }
-    return status;
-}
-
 /* The turns that closing gaps made, added to those that wrapping made after it. With all of them
  * the originals are the columns as given. */
 static void
-add_turns(const hs_condensed *condensed, int set, hs_scene *scene)
+add_turns(const condensed_set *condensed, int set, hs_scene *scene)
 {
     for (int k = 0; condensed->has_turns && k < scene->ndim; k++) {
         const int64_t *more = condensed->turns[set][k];
@@ -1493,7 +1307,7 @@ add_turns(const hs_condensed *condensed, int set, hs_scene *scene)
 
 /* Sets the box vectors as given in columns that are decided on as they were given. */
 static void
-restore_rows(const hs_condensed *condensed, hs_lattice *lattice)
+restore_rows(const condensed_set *condensed, hs_lattice *lattice)
 {
     for (int r = 0; condensed->has_turns && r < lattice->n_periodic; r++) {
         for (int k = 0; k < lattice->ndim; k++) {
@@ -1504,10 +1318,11 @@ restore_rows(const hs_condensed *condensed, hs_lattice *lattice)
     }
 }
 
-/* Sets lattice and radius, then wraps the points. */
+/* Sets lattice and radius, wraps the points, and sets the bounds. asking: NULL, or the queries'
+ * scene, which is wrapped too; the bounds of `scene` hold for both. */
 static hs_status
 fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
-            const hs_condensed *condensed, hs_scene *scene, hs_scene *asking, hs_failure *failure)
+            const condensed_set *condensed, hs_scene *scene, hs_scene *asking, hs_failure *failure)
 {
     /* Without points nothing has an image, however small the box is. */
     const bool empty = scene->n == 0 || (asking != NULL && asking->n == 0);
@@ -1522,20 +1337,58 @@ fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
     if (scene->extreme) {
         restore_rows(condensed, &scene->lattice);
     }
-    if (scene->is_kept && !empty && hs_scene_has_no_scale(scene, condensed)) {
-        scene_put_in_one_cell(scene);
+    /* Whether the cutoff has more images than any memory holds: in boxes that no closing has
+     * scaled. */
+    const hs_box_size size = hs_box_size_of(condensed->box);
+    const bool        is_endless =
+        hs_is_far(scene->sought, hs_exponent_of(size.short_row), HS_FAR_IMAGES_EXPONENT);
+    if (scene->is_kept && !empty && !is_endless &&
+        (box_vanishes(scene) || open_drowns_box(&scene->cloud, &size, scene->sought))) {
+        scene_put_in_one_cell(scene); /* open axes leave nothing of the box */
     }
     scene_set_radius(scene, options, hs_scale_apply(scene->pending, scene->cloud.largest));
-    if (scene_is_drowned(scene)) {
+    double shortest = INFINITY;
+    for (int k = 0; k < scene->ndim; k++) {
+        const bool is_open = scene->lattice.row_of_axis[k] < 0;
+        shortest = is_open ? shortest : hs_smaller(scene->lattice.period[k], shortest);
+    }
+    if (scene->formula_error > scene->cutoff && !(scene->formula_error <= NOISE * shortest)) {
+        /* It passes both the cutoff and a small part of the box: too many images might be called
+         * near, and the answer is noise. */
         scene_name_farthest(scene, asking, failure);
         return HS_ERR_ROUNDING;
     }
-    if (asking != NULL) {
-        scene_share(scene, asking);
+    if (box_vanishes(scene)) {
+        if (!scene->lattice.aligned && !is_endless) {
+            return HS_ERR_BOX_SKEWED;
+        }
+        failure->expected_pairs = failure->expected_bytes = INFINITY; /* of images */
+        return HS_ERR_MEMORY;
     }
-    return hs_scene_box_vanishes(scene)
-               ? hs_scene_refuse_vanishing(scene, condensed, failure)
-               : fill_scene(account, team, options, scene, asking, failure);
+    double    magnitude = 0.0, of_asking = 0.0;
+    hs_status status = wrap_points(account, team, options, scene, &magnitude, failure);
+    if (status == HS_OK && asking != NULL) {
+        scene_share(scene, asking);
+        status = wrap_points(account, team, options, asking, &of_asking, failure);
+        failure->in_queries = status == HS_ERR_SHIFT_RANGE;
+    }
+    if (status != HS_OK) {
+        return status;
+    }
+    magnitude = hs_larger(magnitude, of_asking);
+    if (asking != NULL) {
+        scene_join_wrapped(scene, asking);
+    }
+    if (scene->is_kept) {
+        scene_make_room(scene, &magnitude);
+    }
+    scene_bound_errors(scene, magnitude);
+    hs_scene_scale_ranges(scene);
+    for (int k = 0; scene->is_kept && k < scene->ndim; k++) {
+        scene->t_error[k] *= 2.0; /* queries may be rounded to beyond another face */
+    }
+    hs_scene_init_metric(scene, options);
+    return HS_OK;
 }
 
 /* Chooses the scale of a scene whose points are as given, and fills it. */
@@ -1543,17 +1396,28 @@ static hs_status
 scale_scene(hs_account *account, hs_team *team, const hs_options *options, const hs_box *box,
             hs_scene *scene, hs_scene *asking, hs_failure *failure)
 {
-    hs_condensed      condensed; /* large, and seldom used: not cleared */
+    condensed_set     condensed; /* large, and seldom used: not cleared */
     hs_cloud         *cloud = &scene->cloud;
     const hs_box_size size = hs_box_size_of(box);
     hs_status         status = HS_OK;
     condensed.box = condensed.given_box = box;
     condensed.is_scaled = condensed.has_turns = false;
-    scene->sought = scene_scale_cutoff(scene, &size, options->cutoff);
+    scene->sought = options->cutoff;
+    if (scene->within > 0.0 &&
+        !fits_one_scale(cloud, &size, unit_exponent(cloud, &size, scene->within),
+                        HS_FAR_BOUNDED_EXPONENT)) {
+        scene->sought = scene->within;
+    } else if (!scene->is_kept && !scene->is_plain && cloud->largest > 0.0 && size.largest == 0.0 &&
+               options->cutoff > ENOUGH_CUTOFF * cloud->largest) {
+        /* A smaller one that is beyond all distances as well. */
+        const int exponent = hs_exponent_of(cloud->largest) + WHOLE_EXPONENT;
+        scene->sought = exponent > 1023 ? options->cutoff
+                                        : hs_smaller(ldexp(1.0, exponent), options->cutoff);
+    }
     const int unit = unit_exponent(cloud, &size, scene->sought);
     if (scene_may_condense(scene, asking, &size, unit)) {
         const int powers = scene->is_wide ? HS_FAR_BOUNDED_EXPONENT : HS_FAR_EXPONENT;
-        status = condense(account, options, box, unit, powers, cloud,
+        status = condense(account, options, &size, unit, powers, cloud,
                           asking != NULL ? &asking->cloud : NULL, &condensed, failure);
     }
     if (status == HS_OK) {
@@ -1571,14 +1435,13 @@ scale_scene(hs_account *account, hs_team *team, const hs_options *options, const
 }
 
 hs_status
-hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, const hs_box *box,
-                   const hs_options *options, hs_scene *scene, hs_scene *asking,
-                   hs_failure *failure)
+hs_scene_make(hs_account *account, hs_team *team, const hs_sets *sets, const hs_box *box,
+              const hs_options *options, hs_scene *scene, hs_scene *asking, hs_failure *failure)
 {
     const bool follows = sets->follows && scene->is_ordinary && scene->sought == options->cutoff;
     start_scene(sets->points, scene);
     scene->is_ordinary = false;
-    scene->is_kept = scene->is_asked = sets->is_kept;
+    scene->is_kept = sets->is_kept;
     scene->is_plain = sets->is_plain;
     scene->is_wide = sets->is_wide;
     scene->least_cutoff = sets->least_cutoff;
@@ -1592,11 +1455,21 @@ hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, cons
     }
     hs_status status = hs_box_check(box, failure);
     if (status == HS_OK) {
-        status = load_clouds(account, team, sets, options, scene, asking, failure);
+        status = hs_cloud_load(account, team, sets->points, options, &scene->cloud, failure);
+    }
+    if (status == HS_OK && asking != NULL) {
+        status = hs_cloud_load(account, team, sets->queries, options, &asking->cloud, failure);
+        failure->in_queries = status != HS_OK;
+    }
+    if (status == HS_OK && sets->domain != NULL) {
+        widen_cloud(sets->domain, &scene->cloud);
+    }
+    if (status == HS_OK && asking != NULL) {
+        scene_join_clouds(scene, asking);
     }
     scene->is_ordinary = status == HS_OK && scene_needs_no_scaling(sets, box, options, scene);
     if (scene->is_ordinary) {
-        status = scene_fill_ordinary(options, follows, scene, failure);
+        scene_fill_ordinary(options, follows, scene);
     } else if (status == HS_OK) {
         status = scale_scene(account, team, options, box, scene, asking, failure);
     }
@@ -1607,14 +1480,6 @@ hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, cons
         }
     }
     return status;
-}
-
-hs_status
-hs_scene_init(hs_account *account, hs_team *team, const hs_points *points, const hs_box *box,
-              const hs_options *options, hs_scene *scene, hs_failure *failure)
-{
-    const hs_sets alone = {.points = points};
-    return hs_scene_init_sets(account, team, &alone, box, options, scene, NULL, failure);
 }
 
 void
@@ -1673,45 +1538,6 @@ find_largest(const void *rows, const hs_real real, int64_t first, int64_t last)
            (poison[0] + poison[1] + poison[2] + poison[3]);
 }
 
-static hs_status
-name_first_bad(const hs_frame *frame, int64_t first, int64_t last, hs_failure *failure)
-{
-    for (int64_t e = first; e < last; e++) {
-        const double x = hs_frame_entry(frame->rows, frame->points.real, e);
-        if (!isfinite(x)) {
-            failure->row = e / frame->points.ndim;
-            failure->column = e % frame->points.ndim;
-            failure->value = x;
-            break;
-        }
-    }
-    return HS_ERR_NOT_FINITE;
-}
-
-static hs_status
-take_points(const hs_points *points, const hs_options *options, hs_frame *frame,
-            hs_failure *failure)
-{
-    const int64_t d = points->ndim;
-    frame->largest = 0.0;
-    for (int64_t first = 0; first < points->n; first += HS_POLL_POINTS) {
-        const int64_t left = points->n - first;
-        const int64_t last = first + (left < HS_POLL_POINTS ? left : HS_POLL_POINTS);
-        copy_rows(points, first, last, frame->rows);
-        const double largest = points->real == HS_FLOAT32
-                                   ? find_largest(frame->rows, HS_FLOAT32, first * d, last * d)
-                                   : find_largest(frame->rows, HS_FLOAT64, first * d, last * d);
-        if (!isfinite(largest)) {
-            return name_first_bad(frame, first * d, last * d, failure);
-        }
-        frame->largest = hs_larger(largest, frame->largest);
-        if (left > HS_POLL_POINTS && hs_poll(options, 0.0) != HS_OK) {
-            return HS_ERR_INTERRUPTED;
-        }
-    }
-    return HS_OK;
-}
-
 hs_status
 hs_frame_take(const hs_points *points, const hs_box *box, const hs_options *options,
               hs_frame *frame, hs_failure *failure)
@@ -1733,7 +1559,24 @@ hs_frame_take(const hs_points *points, const hs_box *box, const hs_options *opti
     if (box != NULL) {
         frame->box = *box;
     }
-    return take_points(points, options, frame, failure);
+    const int64_t d = points->ndim;
+    frame->largest = 0.0;
+    for (int64_t first = 0; first < points->n; first += HS_POLL_POINTS) {
+        const int64_t left = points->n - first;
+        const int64_t last = first + (left < HS_POLL_POINTS ? left : HS_POLL_POINTS);
+        copy_rows(points, first, last, frame->rows);
+        const double largest = points->real == HS_FLOAT32
+                                   ? find_largest(frame->rows, HS_FLOAT32, first * d, last * d)
+                                   : find_largest(frame->rows, HS_FLOAT64, first * d, last * d);
+        if (!isfinite(largest)) {
+            return hs_points_check_finite(&frame->points, failure);
+        }
+        frame->largest = hs_larger(largest, frame->largest);
+        if (left > HS_POLL_POINTS && hs_poll(options, 0.0) != HS_OK) {
+            return HS_ERR_INTERRUPTED;
+        }
+    }
+    return HS_OK;
 }
 
 bool

@@ -12,8 +12,6 @@
  * that the cutoff has an ordinary size, wrapped into the box, with a bound on every rounding.
  */
 
-struct hs_box_size;
-
 /* More than any digit that scaling can lose times any number of turns: 2^-1074 * 2^51 < 2^-1000. */
 #define HS_SCALING_LOSS 0x1p-1000
 
@@ -45,8 +43,7 @@ typedef struct hs_scene {
     double    x_error;               /* each component of X is within this of r - w B */
     double    t_error[HS_MAX_DIM];   /* and each computed t_k of the true one, clamping included */
     double    formula_error;         /* precision="double": its |D| against the true one */
-    bool      is_asked;              /* there are queries: the bounds above hold for these too */
-    bool      is_kept;               /* and for queries that come later */
+    bool      is_kept;               /* the bounds above hold for queries that come later, too */
     bool      in_one_cell;           /* kept, but no scale holds it (scene_put_in_one_cell) */
     bool      is_untested;           /* only cells are wanted: bounds for these alone will do */
     bool      is_plain;              /* the cutoff is taken as it is; gaps are closed only if
@@ -117,21 +114,14 @@ double hs_scene_volume(const hs_scene *scene, double ball);
 hs_status hs_scene_narrow(hs_scene *scene, const hs_narrowing *narrowing);
 
 /*
- * Reads the points, checks everything that has a value, wraps. On failure the scene holds nothing
- * and any status but HS_ERR_KERNEL and HS_ERR_INTERRUPTED is possible.
+ * Reads the points and the queries, if there are any, checks everything that has a value, wraps:
+ * each set becomes a scene of its own, with one scale, one lattice and bounds that hold for both.
+ * asking: the queries' scene, NULL without queries; only its arrays and what describes them are its
+ * own. On failure the scenes hold nothing and any status but HS_ERR_KERNEL is possible.
  */
-hs_status hs_scene_init(hs_account *account, hs_team *team, const hs_points *points,
-                        const hs_box *box, const hs_options *options, hs_scene *scene,
+hs_status hs_scene_make(hs_account *account, hs_team *team, const hs_sets *sets, const hs_box *box,
+                        const hs_options *options, hs_scene *scene, hs_scene *asking,
                         hs_failure *failure);
-
-/*
- * Two sets of points in one box: each becomes a scene of its own, with one scale, one lattice and
- * bounds that hold for both. asking: the queries' scene, NULL without queries; only its arrays and
- * what describes them are its own.
- */
-hs_status hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets,
-                             const hs_box *box, const hs_options *options, hs_scene *scene,
-                             hs_scene *asking, hs_failure *failure);
 
 /* Whether a scene that was kept can take this cloud as it was loaded: no larger numbers, none that
  * its scale would round unless only cells are wanted. */
@@ -144,17 +134,12 @@ void hs_scene_name_refused(const hs_scene *kept, const hs_points *queries, hs_fa
 
 /*
  * Queries that meet the points of a scene that was made to be kept, as a scene of their own.
- * HS_REBUILD when its bounds do not hold for them: they need another one. On failure it holds
- * nothing.
+ * HS_REBUILD when its bounds do not hold for them: they need another one. for_cells: points wrapped
+ * into its box for their cells alone, however far away they are. On failure it holds nothing.
  */
 hs_status hs_scene_from_kept(hs_account *account, hs_team *team, const hs_scene *kept,
-                             const hs_points *queries, const hs_options *options, hs_scene *asking,
-                             hs_failure *failure);
-
-/* Points wrapped into the box of a scene that was kept, however far away they are: for their cells
- * alone. On failure it holds nothing. */
-hs_status hs_scene_wrapped_like(hs_account *account, const hs_scene *kept, const hs_points *points,
-                                const hs_options *options, hs_scene *scene, hs_failure *failure);
+                             const hs_points *queries, const hs_options *options, bool for_cells,
+                             hs_scene *asking, hs_failure *failure);
 
 /* Sets cutoff, radius and metric for another cutoff of a scene that is not extreme. */
 void hs_scene_set_cutoff(hs_scene *scene, const hs_options *options);
@@ -184,18 +169,6 @@ hs_scene_coordinate(const hs_scene *scene, int64_t i, int k)
     return t;
 }
 
-struct hs_condensed;
-
-/* Once the box is scaled: whether one of its periods has become zero. */
-bool hs_scene_box_vanishes(const hs_scene *scene);
-
-/* Whether open axes leave nothing of the box, so that the points cannot be in cells. */
-bool hs_scene_has_no_scale(const hs_scene *scene, const struct hs_condensed *condensed);
-
-/* Why there is no search in a box that vanishes: HS_ERR_BOX_SKEWED or HS_ERR_MEMORY. */
-hs_status hs_scene_refuse_vanishing(const hs_scene *scene, const struct hs_condensed *condensed,
-                                    hs_failure *failure);
-
 void hs_scene_free(hs_account *account, hs_scene *scene);
 
 /* The power of two that a scene is scaled by, so that the search has ordinary numbers. */
@@ -204,8 +177,8 @@ void hs_scene_free(hs_account *account, hs_scene *scene);
  * How far is far? So many powers of two beyond a length, each for a reason of its own. hs_is_far
  * tells.
  */
-/* Beyond so many cutoffs gaps between the points are closed: float64 numbers are
- * multiples of four cutoffs there. */
+/* Beyond so many cutoffs gaps between the points are closed: float64 numbers are multiples of four
+ * cutoffs there. */
 #define HS_FAR_EXPONENT 54
 /*
  * Beyond so many largest distances they are in a bounded search for the nearest. Wrapped into a
@@ -250,37 +223,6 @@ typedef struct hs_box_size {
 
 /* box: NULL for none. */
 hs_box_size hs_box_size_of(const hs_box *box);
-
-/* What moves a column of coordinates besides the points' own values. */
-#define HS_OPEN    (-1) /* nothing */
-#define HS_COUPLED (-2) /* box vectors that have entries in other columns as well */
-
-/* The cutoff, or a smaller one if that is beyond all distances as well. */
-double hs_enough_cutoff(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
-
-/*
- * Closes the gaps between coordinates that are far from zero. Where two different
- * float64 numbers are more than a cutoff apart, all that matters is which are equal, so smaller
- * numbers can take their place. No scale holds both a cutoff of 1e-300 and an outlier at 1e300;
- * once gaps are closed, one does. No pair changes, nor a bit of d and D, and S by the turns alone.
- */
-
-/* Points, queries. */
-#define HS_CONDENSED_SETS 2
-
-typedef struct hs_condensed {
-    const hs_box *box;       /* in place of the caller's: borrowed, or `rows` */
-    const hs_box *given_box; /* the caller's */
-    hs_box        rows;
-    bool          is_scaled; /* points and box vectors are in units of 2^unit now */
-    bool          has_turns; /* something was wrapped into the box, and S is wanted: */
-    /* Both set where has_turns says so. Owned, of points and of queries; n each for a column where
-     * some were, else NULL. */
-    int64_t *turns[HS_CONDENSED_SETS][HS_MAX_DIM];
-    /* Owned; where scaling may lose digits: the columns that have turns, of both sets, as they were
-     * given. S with all its turns belongs to these numbers and to the box as given. */
-    double *given[HS_CONDENSED_SETS][HS_MAX_DIM];
-} hs_condensed;
 
 /* A copy of the caller's points and box at one step, as given: what a list that
  * outlives the call (pair_list.h) compares and decides with. */

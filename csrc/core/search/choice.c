@@ -7,23 +7,6 @@
 /* choice.c: what the caller selects is checked; points, box and labels are kept where they are
  * needed. */
 
-/* Excluded partners of each point, in CSR form: a counting sort by j, then by i. */
-
-/* Room for rows of so many numbers, all of them empty. The length of row r is then counted at
- * first[r + 2]; once they are summed, row r is filled from first[r + 1] on, which becomes where the
- * next one begins. */
-static bool
-open_rows(hs_account *account, int64_t n_rows, int64_t n_numbers, hs_partners *rows)
-{
-    rows->first = hs_alloc(account, HS_FOR_CANDIDATES, n_rows + 2, sizeof *rows->first);
-    rows->number = hs_alloc(account, HS_FOR_CANDIDATES, n_numbers, sizeof *rows->number);
-    if (rows->first == NULL || rows->number == NULL) {
-        return false;
-    }
-    memset(rows->first, 0, (size_t)(n_rows + 2) * sizeof *rows->first);
-    return true;
-}
-
 /* Idempotent. */
 static void
 partners_free(hs_account *account, hs_partners *rows)
@@ -33,83 +16,58 @@ partners_free(hs_account *account, hs_partners *rows)
     *rows = (hs_partners){NULL, NULL};
 }
 
-/* One of both points of an excluded pair: the asking one, or the other. */
-HS_ALWAYS_INLINE int64_t
-number_in(const hs_selection *selection, int64_t pair, int which)
-{
-    return selection->excluded[2 * pair + which];
-}
-
-/* Pairs by their second point: each way round, but for those with queries. */
-static void
-fill_by_second(const hs_selection *selection, int n_ways, int64_t n_rows, hs_partners *rows)
-{
-    for (int64_t e = 0; e < selection->n_excluded; e++) {
-        for (int way = 0; way < n_ways; way++) {
-            rows->first[number_in(selection, e, 1 - way) + 2]++;
-        }
-    }
-    hs_starts_of_lengths(rows->first + 1, n_rows + 1);
-    for (int64_t e = 0; e < selection->n_excluded; e++) {
-        for (int way = 0; way < n_ways; way++) {
-            const int64_t at = rows->first[number_in(selection, e, 1 - way) + 1]++;
-            rows->number[at] = (int32_t)number_in(selection, e, way);
-        }
-    }
-}
-
-static void
-transpose(const hs_partners *from, int64_t n_from, int64_t n_to, hs_partners *to)
-{
-    for (int64_t p = 0; p < from->first[n_from]; p++) {
-        to->first[from->number[p] + 2]++;
-    }
-    hs_starts_of_lengths(to->first + 1, n_to + 1);
-    for (int64_t r = 0; r < n_from; r++) {
-        for (int64_t p = from->first[r]; p < from->first[r + 1]; p++) {
-            to->number[to->first[from->number[p] + 1]++] = (int32_t)r;
-        }
-    }
-}
-
-/* HS_OK, or HS_ERR_ARGUMENT for numbers that are no point's (failure->row). */
-static hs_status
-partners_check(const hs_selection *selection, int64_t n_asking, int64_t n_points,
-               hs_failure *failure)
-{
-    for (int64_t e = 0; e < selection->n_excluded; e++) {
-        const int64_t i = number_in(selection, e, 0), j = number_in(selection, e, 1);
-        if (i < 0 || i >= n_asking || j < 0 || j >= n_points) {
-            failure->row = e;
-            return HS_ERR_ARGUMENT;
-        }
-    }
-    return HS_OK;
-}
-
 /*
- * Each way round, or from queries to points alone. Any status of partners_check, or
- * HS_ERR_MEMORY. To be freed on failure as well.
+ * Excluded partners of each asking point, in CSR form: each way round, or from queries to points
+ * alone. HS_ERR_ARGUMENT for numbers that are no point's (failure->row), or HS_ERR_MEMORY. To be
+ * freed on failure as well.
  */
 static hs_status
 partners_open(const hs_selection *selection, int64_t n_asking, int64_t n_points, bool has_queries,
               hs_account *account, hs_partners *partners, hs_failure *failure)
 {
-    const int       n_ways = has_queries ? 1 : 2;
-    const int64_t   n_numbers = selection->n_excluded * n_ways;
-    hs_partners     by_second = {NULL, NULL};
-    const hs_status status = partners_check(selection, n_asking, n_points, failure);
-    if (status != HS_OK) {
-        return status;
+    const int64_t  n_pairs = selection->n_excluded, n = n_pairs * (has_queries ? 1 : 2);
+    const int64_t *excluded = selection->excluded;
+    uint64_t      *others = hs_alloc(account, HS_FOR_CANDIDATES, 2 * n, sizeof *others);
+    int64_t       *first = hs_alloc(account, HS_FOR_CANDIDATES, n_asking + 1, sizeof *first);
+    int32_t       *number = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof *number);
+    hs_status      status = HS_OK;
+    *partners = (hs_partners){first, number};
+    if (others == NULL || first == NULL || number == NULL) {
+        status = HS_ERR_MEMORY;
+    } else {
+        memset(first, 0, (size_t)(n_asking + 1) * sizeof *first);
     }
-    const bool is_open = open_rows(account, n_asking, n_numbers, partners) &&
-                         open_rows(account, n_points, n_numbers, &by_second);
-    if (is_open) {
-        fill_by_second(selection, n_ways, n_points, &by_second);
-        transpose(&by_second, n_points, n_asking, partners);
+    for (int64_t e = 0; status == HS_OK && e < n_pairs; e++) {
+        const int64_t i = excluded[2 * e], j = excluded[2 * e + 1];
+        if (i < 0 || i >= n_asking || j < 0 || j >= n_points) {
+            failure->row = e;
+            status = HS_ERR_ARGUMENT;
+        } else {
+            first[i + 1]++;
+            if (!has_queries) {
+                first[j + 1]++;
+            }
+        }
     }
-    partners_free(account, &by_second);
-    return is_open ? HS_OK : HS_ERR_MEMORY;
+    if (status == HS_OK) {
+        hs_starts_of_lengths(first, n_asking + 1);
+        for (int64_t e = 0; e < n_pairs; e++) {
+            const int64_t i = excluded[2 * e], j = excluded[2 * e + 1];
+            others[first[i]++] = (uint64_t)j;
+            if (!has_queries) {
+                others[first[j]++] = (uint64_t)i;
+            }
+        }
+        hs_starts_of_ends(first, n_asking + 1);
+        for (int64_t r = 0; r < n_asking; r++) {
+            hs_sort_numbers(others + first[r], first[r + 1] - first[r], others + n);
+        }
+        for (int64_t e = 0; e < n; e++) {
+            number[e] = (int32_t)others[e];
+        }
+    }
+    hs_free(account, others);
+    return status;
 }
 
 hs_status
@@ -315,8 +273,8 @@ hs_choice_cut(const hs_choice *all, int64_t first_point, int64_t first_query, hs
     cut_cloud(first_point, &part->cloud);
 }
 
-/* One loop without branches for each test; it writes each hit, and goes on behind those
- * that stay. */
+/* One loop without branches for each test; it writes each hit, and goes on behind those that
+ * stay. */
 
 static bool
 has_partner(const hs_asking *asking, int32_t number)
@@ -474,9 +432,8 @@ keep_by_group(const hs_scanner *scanner, hs_scan *scan, const hs_chooser *choose
     return to + (int32_t)n;
 }
 
-/* Labels are compared for all hits, one point after the other. Where that
- * leaves images or distances open, a batch of hits is looked up: of distances, those that float32
- * cannot tell. */
+/* Labels are compared for all hits, one point after the other. Where that leaves images or
+ * distances open, a batch of hits is looked up: of distances, those that float32 cannot tell. */
 
 /* Candidates that could be tested while the nearest image of a pair is found: a microsecond, some
  * of them in many dimensions. */
@@ -604,56 +561,6 @@ drop_near(const hs_choice *choice, hit_batch *batch)
 
 #define DROPPED (-1) /* in place of a hit */
 
-/* Decides the batch, by images or by the least distance, marks what is dropped, and empties it. */
-static hs_status
-decide_batch_of_hits(const hs_choice *choice, bool by_image, hit_batch *batch, hs_scan *scan)
-{
-    const hs_status status = batch->n == 0 ? HS_OK
-                             : by_image    ? drop_nearest(choice, batch)
-                                           : drop_near(choice, batch);
-    for (int32_t e = 0; status == HS_OK && e < batch->n; e++) {
-        if (batch->drop[e]) {
-            scan->hits[batch->hit[e]] = DROPPED;
-        }
-    }
-    batch->n = 0;
-    return status;
-}
-
-/* Takes hits that are dropped out of [from, end); returns where the others end. */
-static int32_t
-close_up(hs_scan *scan, int32_t from, int32_t end)
-{
-    int32_t to = from;
-    for (int32_t h = from; h < end; h++) {
-        const int32_t hit = scan->hits[h];
-        scan->hits[to] = hit;
-        if (scan->squares != NULL) {
-            scan->squares[to] = scan->squares[h];
-        }
-        to += hit != DROPPED;
-    }
-    return to;
-}
-
-/* Marks those of hits [from, end) of a point that are excluded and in their nearest image. */
-static hs_status
-drop_images(const hs_chooser *chooser, int32_t from, int32_t end, hit_batch *batch, hs_scan *scan)
-{
-    const hs_choice *choice = batch->scanner->search->call->choice;
-    hs_status        status = HS_OK;
-    for (int32_t h = from; status == HS_OK && h < end; h++) {
-        const int32_t id = hs_hit_number(batch->scanner, scan->hits[h]);
-        if (hs_chooser_excludes(chooser, id)) {
-            add_hit(scan, h, batch);
-        }
-        if (batch->n == HS_BATCH) {
-            status = decide_batch_of_hits(choice, true, batch, scan);
-        }
-    }
-    return status == HS_OK ? decide_batch_of_hits(choice, true, batch, scan) : status;
-}
-
 /* Whether float32 cannot tell that a hit is as far as the least distance; out: beyond this square
  * it is. */
 HS_ALWAYS_INLINE bool
@@ -667,21 +574,42 @@ may_be_near(const hs_scanner *scanner, int32_t t, int32_t hit, float out)
     return !(square > out);
 }
 
-/* Marks those of hits [from, end) of a point that are nearer than the least distance. */
+/* Drops those of hits [from, end) of a point that are excluded and in their nearest image,
+ * by_image, or nearer than the least distance; *left: where the others end. */
 static hs_status
-drop_nearer(float out, int32_t from, int32_t end, hit_batch *batch, hs_scan *scan)
+drop_hits(const hs_chooser *chooser, bool by_image, float out, int32_t from, int32_t end,
+          hit_batch *batch, hs_scan *scan, int32_t *left)
 {
-    const hs_choice *choice = batch->scanner->search->call->choice;
-    hs_status        status = HS_OK;
+    hs_status status = HS_OK;
+    batch->n = 0;
     for (int32_t h = from; status == HS_OK && h < end; h++) {
-        if (may_be_near(batch->scanner, batch->t, scan->hits[h], out)) {
+        const int32_t hit = scan->hits[h];
+        if (by_image ? hs_chooser_excludes(chooser, hs_hit_number(batch->scanner, hit))
+                     : may_be_near(batch->scanner, batch->t, hit, out)) {
             add_hit(scan, h, batch);
         }
-        if (batch->n == HS_BATCH) {
-            status = decide_batch_of_hits(choice, false, batch, scan);
+        if (batch->n == 0 || (batch->n < HS_BATCH && h + 1 < end)) {
+            continue;
         }
+        status = by_image ? drop_nearest(chooser->choice, batch)
+                          : drop_near(chooser->choice, batch);
+        for (int32_t e = 0; status == HS_OK && e < batch->n; e++) {
+            if (batch->drop[e]) {
+                scan->hits[batch->hit[e]] = DROPPED;
+            }
+        }
+        batch->n = 0;
     }
-    return status == HS_OK ? decide_batch_of_hits(choice, false, batch, scan) : status;
+    *left = from;
+    for (int32_t h = from; h < end; h++) {
+        const int32_t hit = scan->hits[h];
+        scan->hits[*left] = hit;
+        if (scan->squares != NULL) {
+            scan->squares[*left] = scan->squares[h];
+        }
+        *left += hit != DROPPED;
+    }
+    return status;
 }
 
 /* Squares beyond this are those of pairs that are at least the least distance apart. */
@@ -709,12 +637,10 @@ choose_of_point(const hs_chooser *chooser, hit_batch *batch, hs_scan *scan, floa
     if (chooser->excludes && !compares) {
         *end = keep_by_label(scanner, scan, &chooser->excluding, to, *end, to, chooser->test);
     } else if (chooser->excludes) {
-        status = drop_images(chooser, to, *end, batch, scan);
-        *end = close_up(scan, to, *end);
+        status = drop_hits(chooser, true, out, to, *end, batch, scan, end);
     }
     if (status == HS_OK && choice->min_distance > 0.0) {
-        status = drop_nearer(out, to, *end, batch, scan);
-        *end = close_up(scan, to, *end);
+        status = drop_hits(chooser, false, out, to, *end, batch, scan, end);
     }
     return status;
 }

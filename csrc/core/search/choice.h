@@ -114,8 +114,7 @@ hs_choice_least(const hs_choice *choice, const hs_scene *scene)
                           : hs_scale_apply(scene->scale, choice->min_distance);
 }
 
-/* Takes pairs that do not count from the hits of a scan, before anything is done with
- * them. */
+/* Takes pairs that do not count from the hits of a scan, before anything is done with them. */
 
 /*
  * Takes hits of points [first, next) of the group out that the call's choice leaves out; the order
@@ -127,8 +126,8 @@ hs_choice_least(const hs_choice *choice, const hs_scene *scene)
 hs_status hs_choose(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next);
 
 /*
- * Which hits of a point their labels leave out: those of another group; those whose label
- * is equal or near, or that are among the point's partners, for excluded pairs.
+ * Which hits of a point their labels leave out: those of another group; those whose label is equal
+ * or near, or that are among the point's partners, for excluded pairs.
  */
 
 /* By what hits of a point are left out. */

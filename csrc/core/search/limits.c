@@ -40,16 +40,6 @@ lay_out_table(const hs_limit_table *table, const hs_scanner *scanner)
     }
 }
 
-static void
-lay_out_radii(const float *of_points, const hs_scanner *scanner)
-{
-    const hs_block *block = &scanner->block;
-    for (int32_t c = 0; c < block->n; c++) {
-        block->radius[c] = of_points[number_of(scanner, c)];
-    }
-    hs_pad_lanes(block->radius, block->n);
-}
-
 void
 hs_limits_set(const hs_scanner *scanner, const hs_limit_form *form, hs_limit_scan *scan)
 {
@@ -70,12 +60,15 @@ hs_limits_set(const hs_scanner *scanner, const hs_limit_form *form, hs_limit_sca
     if (has_table) {
         lay_out_table(table, scanner);
     } else if (of_points != NULL) {
-        lay_out_radii(of_points, scanner);
+        for (int32_t c = 0; c < block->n; c++) {
+            block->radius[c] = of_points[number_of(scanner, c)];
+        }
+        hs_pad_lanes(block->radius, block->n);
     }
 }
 
-/* One support of a pair often tells without the other, so that integers are the last
- * resort of the pair, not of each. */
+/* One support of a pair often tells without the other, so that integers are the last resort of the
+ * pair, not of each. */
 
 /* Supports of other sizes, over their extent, leave no room for float32: nothing is sure of them.
  * Those of common scenes are about 1, or as much larger as they are smaller than the largest. */
@@ -127,8 +120,7 @@ lay_out_block(const float *near, const hs_scanner *scanner)
     const hs_block *block = &scanner->block;
     const int       n_numbers = hs_support_numbers(scanner->search->scene.ndim);
     for (int32_t c = 0; c < block->n; c++) {
-        const int32_t sj = block->number[scanner->is_ordered ? block->origin[c] : c];
-        const float  *numbers = near + (int64_t)sj * n_numbers;
+        const float *numbers = near + (int64_t)number_of(scanner, c) * n_numbers;
         for (int e = 0; e < n_numbers; e++) {
             block->radius[e * block->pitch + c] = numbers[e];
         }
@@ -196,21 +188,6 @@ combine(hs_rule rule, hs_verdict one, hs_verdict other)
                                                         : HS_WITHIN;
 }
 
-/* The verdict of a support that the rule does not look at: it changes nothing. */
-static hs_verdict
-neutral(hs_rule rule)
-{
-    return rule == HS_RULE_MIN ? HS_WITHIN : HS_BEYOND;
-}
-
-static hs_verdict
-verdict_by_support(const hs_supports *supports, const double *numbers, const hs_metric *measure,
-                   const hs_span *span)
-{
-    const int sign = hs_support_compare(&supports->metric, numbers, measure, span);
-    return sign < 0 || (sign == 0 && supports->metric.limit.inclusive) ? HS_WITHIN : HS_BEYOND;
-}
-
 /* One pair exactly; it counts once, by the stage that it took. */
 static bool
 decide_exactly(hs_scanner *scanner, const two_supports *of, const hs_span *span)
@@ -219,9 +196,11 @@ decide_exactly(hs_scanner *scanner, const two_supports *of, const hs_span *span)
     const hs_metric   *measure = &scanner->search->scene.metric;
     const hs_rule      rule = supports->rule;
     const double      *numbers[2] = {of->asking, of->point};
-    hs_verdict         verdict[2] = {neutral(rule), neutral(rule)};
-    hs_stages          stages = {0, 0, 0};
-    hs_support_span    measured;
+    /* Of a support that the rule does not look at, a verdict that changes nothing. */
+    const hs_verdict neutral = rule == HS_RULE_MIN ? HS_WITHIN : HS_BEYOND;
+    hs_verdict       verdict[2] = {neutral, neutral};
+    hs_stages        stages = {0, 0, 0};
+    hs_support_span  measured;
     hs_support_span_of(measure, span, &measured);
     for (int n = 0; n < 2; n++) {
         if (numbers[n] != NULL) {
@@ -235,7 +214,9 @@ decide_exactly(hs_scanner *scanner, const two_supports *of, const hs_span *span)
     scanner->stages.by_float64 += all != HS_UNDECIDED && stages.by_double_word == 0;
     for (int n = 0; n < 2 && all == HS_UNDECIDED; n++) {
         if (verdict[n] == HS_UNDECIDED) {
-            verdict[n] = verdict_by_support(supports, numbers[n], measure, span);
+            const int sign = hs_support_compare(&supports->metric, numbers[n], measure, span);
+            verdict[n] = sign < 0 || (sign == 0 && supports->metric.limit.inclusive) ? HS_WITHIN
+                                                                                     : HS_BEYOND;
             all = combine(rule, verdict[0], verdict[1]);
         }
     }
@@ -250,7 +231,8 @@ decide_rounded(hs_scanner *scanner, const two_supports *of, const hs_span *span)
     const hs_metric   *measure = &scanner->search->scene.metric;
     const double      *numbers[2] = {of->asking, of->point};
     const bool         is_single = scanner->options.precision == HS_SINGLE;
-    hs_verdict         verdict[2] = {neutral(supports->rule), neutral(supports->rule)};
+    const hs_verdict   neutral = supports->rule == HS_RULE_MIN ? HS_WITHIN : HS_BEYOND;
+    hs_verdict         verdict[2] = {neutral, neutral};
     for (int n = 0; n < 2; n++) {
         if (numbers[n] != NULL) {
             verdict[n] =

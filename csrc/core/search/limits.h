@@ -94,9 +94,9 @@ hs_limit_of_pair(const hs_scanner *scanner, int32_t e)
 }
 
 /*
- * Pairs that are decided by the supports of their points (ellipsoid.h), and not by a
- * length. The search is one for the longest distance that supports reach, and scans compare in
- * float32 with a bound for each pair; hits that these cannot tell are decided for the real numbers.
+ * Pairs that are decided by the supports of their points (ellipsoid.h), and not by a length. The
+ * search is one for the longest distance that supports reach, and scans compare in float32 with a
+ * bound for each pair; hits that these cannot tell are decided for the real numbers.
  */
 
 /* The supports of a set; borrowed. */

@@ -573,6 +573,10 @@ records_init(const hs_search *search, const hs_block *block, const hs_options *p
     } else if (has_rows && records->needs_given) {
         hs_parts_add(&parts, (void **)&records->turned, n, sizeof(int64_t));
     }
+    if (needs_given && records->is_narrow && search->call->kernel->write != NULL &&
+        search->scene.ndim >= 2 && search->scene.ndim <= HS_WRITE_MOST_DIM) {
+        hs_parts_add(&parts, (void **)&records->candidates, block->capacity, sizeof(hs_candidate));
+    }
     records->memory = hs_parts_alloc(account, HS_FOR_CANDIDATES, &parts);
     return records->memory != NULL ? HS_OK : HS_ERR_MEMORY;
 }
@@ -583,13 +587,6 @@ records_free(hs_account *account, hs_records *records)
 {
     hs_free(account, records->memory);
     records->memory = NULL;
-}
-
-/* Whether these are all of the points from the first to the last. */
-static bool
-are_consecutive(const int32_t *number, int32_t n)
-{
-    return number[n - 1] - number[0] == n - 1;
 }
 
 /* The image less the turns of each of n candidates. */
@@ -614,21 +611,14 @@ subtract_turns(const hs_bins *bins, const int32_t *image, const int32_t *number,
 static void
 load_few(hs_records *records, const hs_run *run, int32_t n)
 {
-    const hs_bins   *bins = &records->search->bins;
-    const hs_kernel *kernel = records->search->call->kernel;
-    const int        m = bins->n_periodic, width = records->width;
-    int32_t         *few = records->few + (int64_t)run->at * width;
-    const int32_t   *number = records->block->number + run->at;
-    if (m != 3 || width != HS_RECORD) {
-        subtract_turns(bins, run->image, number, n, m, width, few);
-    } else if (kernel->shift_records == NULL || !are_consecutive(number, n)) {
+    const hs_bins *bins = &records->search->bins;
+    const int      m = bins->n_periodic, width = records->width;
+    int32_t       *few = records->few + (int64_t)run->at * width;
+    const int32_t *number = records->block->number + run->at;
+    if (m == 3 && width == HS_RECORD) {
         subtract_turns(bins, run->image, number, n, 3, HS_RECORD, few);
     } else {
-        const int32_t *turns[HS_MAX_DIM];
-        for (int r = 0; r < m; r++) {
-            turns[r] = bins->turns.narrow[r] + number[0];
-        }
-        kernel->shift_records(run->image, turns, n, few);
+        subtract_turns(bins, run->image, number, n, m, width, few);
     }
 }
 
@@ -651,10 +641,10 @@ load_given(hs_records *records, const hs_run *run, int32_t n)
     }
 }
 
-/* Coordinates and number of each of n candidates. */
+/* Coordinates of each of n candidates. */
 HS_ALWAYS_INLINE void
-copy_points(double *const *x, const int32_t *order, const int32_t *number, int32_t n, const int d,
-            const int width, double *to)
+copy_points(double *const *x, const int32_t *number, int32_t n, const int d, const int width,
+            double *to)
 {
     const double *from[HS_MAX_DIM];
     for (int k = 0; k < d; k++) { /* `to` does not overlap this */
@@ -664,10 +654,6 @@ copy_points(double *const *x, const int32_t *order, const int32_t *number, int32
         for (int k = 0; k < d; k++) {
             to[k] = from[k][number[c]];
         }
-        if (d < HS_RECORD) {
-            const int64_t id = order[number[c]];
-            memcpy(to + HS_RECORD - 1, &id, sizeof id);
-        }
     }
 }
 
@@ -675,22 +661,15 @@ copy_points(double *const *x, const int32_t *order, const int32_t *number, int32
 static void
 load_points(hs_records *records, const hs_run *run, int32_t n)
 {
-    const hs_bins   *bins = &records->search->bins;
-    const hs_kernel *kernel = records->search->call->kernel;
-    const int        d = bins->ndim;
-    const int32_t   *number = records->block->number + run->at;
-    double          *to = records->q + (int64_t)run->at * records->width;
-    double *const   *x = bins->keeps_originals ? bins->originals : bins->x;
-    if (d != 3) {
-        copy_points(x, bins->order, number, n, d, records->width, to);
-    } else if (kernel->point_records == NULL || !are_consecutive(number, n)) {
-        copy_points(x, bins->order, number, n, 3, HS_RECORD, to);
+    const hs_bins *bins = &records->search->bins;
+    const int      d = bins->ndim;
+    const int32_t *number = records->block->number + run->at;
+    double        *to = records->q + (int64_t)run->at * records->width;
+    double *const *x = bins->keeps_originals ? bins->originals : bins->x;
+    if (d == 3) {
+        copy_points(x, number, n, 3, HS_RECORD, to);
     } else {
-        const double *from[HS_MAX_DIM];
-        for (int k = 0; k < d; k++) {
-            from[k] = x[k] + number[0];
-        }
-        kernel->point_records(from, bins->order + number[0], n, to);
+        copy_points(x, number, n, d, records->width, to);
     }
 }
 
@@ -712,9 +691,9 @@ load_images(hs_records *records, const hs_run *run, int32_t n)
     }
 }
 
-/* Whether some candidate of the block is in another image; looks at its runs once. */
-static bool
-records_has_images(hs_records *records)
+/* Looks at the runs of the block once. */
+bool
+hs_records_has_images(hs_records *records)
 {
     if (records->knows_images) {
         return records->has_images;
@@ -740,7 +719,7 @@ hs_records_load(hs_records *records, bool metric)
     if (!given && !metric) {
         return HS_OK;
     }
-    const bool images = records_has_images(records);
+    const bool images = hs_records_has_images(records);
     given = given && (records->search->bins.turns.known || !records->is_narrow);
     for (const hs_run *run = records->block->runs; run->at < records->block->n; run++) {
         const int32_t n = run[1].at - run->at;
@@ -766,6 +745,85 @@ hs_records_load(hs_records *records, bool metric)
     }
     records->has_given = records->needs_given;
     records->has_metric = metric;
+    return HS_OK;
+}
+
+/* Candidates of one run. Returns whether they are fine. */
+static bool
+load_halved(hs_records *records, const hs_run *run, int32_t n, const int32_t *base, hs_halving by)
+{
+    const hs_search *search = records->search;
+    const hs_bins   *bins = &search->bins;
+    const hs_metric *metric = &search->scene.metric;
+    const bool       by_S = bins->keeps_originals;
+    const int        d = bins->ndim, m = bins->n_periodic;
+    const int       *column = search->scene.lattice.vector_of_row;
+    hs_candidate    *to = records->candidates + run->at;
+    hs_candidate_run whole = {.n = n,
+                              .by = by,
+                              .place = records->block->number + run->at,
+                              .number = records->block->id + run->at};
+    int32_t          shift[HS_WRITE_MOST_DIM];
+    bool             are_fine = true;
+    for (int k = 0; k < d; k++) {
+        whole.x[k] = by_S ? bins->originals[k] : bins->x[k];
+    }
+    for (int r = 0; r < m; r++) {
+        whole.turns[column[r]] = bins->turns.known ? bins->turns.narrow[r] : NULL;
+        whole.image[column[r]] = shift[r] = run->image[r];
+    }
+    (void)hs_write_move(metric, by, shift, &whole.moved);
+    if (d == 3 && !by_S) {
+        return search->call->kernel->candidates(&whole, to) && whole.moved.is_fine;
+    }
+    for (int32_t c = 0; c < n; c++) {
+        const int32_t si = whole.place[c];
+        double        q[HS_WRITE_MOST_DIM] = {0.0};
+        int32_t       S[HS_WRITE_MOST_DIM] = {0}, any = 0;
+        for (int k = 0; k < d; k++) {
+            q[k] = whole.x[k][si];
+            S[k] = whole.image[k] - (whole.turns[k] != NULL ? whole.turns[k][si] : 0);
+        }
+        for (int r = 0; by_S && r < m; r++) {
+            any |= S[column[r]] + base[r] - shift[r];
+        }
+        if (any != 0) { /* from one candidate to the next they seldom differ */
+            for (int r = 0; r < m; r++) {
+                shift[r] = S[column[r]] + base[r];
+            }
+            are_fine = are_fine && whole.moved.is_fine;
+            (void)hs_write_move(metric, by, shift, &whole.moved);
+        }
+        are_fine &= hs_candidate_set(&to[c], q, by, &whole.moved, whole.number[c], S);
+    }
+    return are_fine && whole.moved.is_fine;
+}
+
+hs_status
+hs_records_load_candidates(hs_records *records, const int32_t *base)
+{
+    const hs_halving by = hs_write_halving(records->search->scene.metric.cutoff);
+    bool             are_fine = true;
+    int32_t          unpolled = 0;
+    if (records->has_candidates) {
+        return HS_OK;
+    }
+    for (const hs_run *run = records->block->runs; run->at < records->block->n; run++) {
+        const int32_t n = run[1].at - run->at;
+        if (n == 0) { /* all of it was left out */
+            continue;
+        }
+        are_fine &= load_halved(records, run, n, base, by);
+        unpolled += n;
+        if (unpolled > HS_POLL_CANDIDATES) {
+            unpolled = 0;
+            if (hs_poll(records->polls, 0.0) != HS_OK) {
+                return HS_ERR_INTERRUPTED;
+            }
+        }
+    }
+    records->has_candidates = true;
+    records->are_fine = are_fine;
     return HS_OK;
 }
 
@@ -906,7 +964,7 @@ look_up_few(hs_pair_batch *pair_batch)
         }
     }
     int32_t    any = 0;
-    const bool images = records_has_images(&pair_batch->of);
+    const bool images = hs_records_has_images(&pair_batch->of);
     for (int32_t e = 0; images && e < pair_batch->n; e++) {
         const hs_run *run = run_of(block, pair_batch->place[e]);
         for (int r = 0; r < bins->n_periodic; r++) {

@@ -120,7 +120,7 @@ typedef struct hs_order {
     int64_t  *shifts; /* of images, by runs: one for each run and given box vector */
 } hs_order;
 
-/* Room for this block, and its `origin`. On failure hs_order_free. */
+/* Frees it, and the `origin` of the block. Idempotent. */
 void hs_order_free(hs_account *account, hs_block *block, hs_order *order);
 
 /*
@@ -136,15 +136,16 @@ typedef struct hs_records {
     const hs_block   *block;  /* borrowed */
     const hs_options *polls;  /* borrowed; polled while a large block is loaded */
     int               width;  /* HS_RECORD, or twice that where a record does not hold all axes */
-    double           *q;     /* what the metric measures to; last in a record of three or fewer, the
-                               * bits of the candidate's number */
-    int32_t          *image; /* shift over B, of X; not set without images */
+    double           *q;      /* what the metric measures to */
+    int32_t          *image;  /* shift over B, of X; not set without images */
     int64_t          *turned; /* `image` less the turns by which the candidate was wrapped; ... */
     int32_t          *few;    /* ... as int32, when is_narrow; not set where turns are not known */
     bool              needs_given; /* turned or few are set */
     bool              is_narrow;   /* all S of the scene are few */
     bool has_metric, has_given;    /* arrays are the block's: q and image; turned or few */
     bool has_images, knows_images; /* some candidate is in another image; valid if knows_images */
+    hs_candidate *candidates;      /* as writers take them; NULL where there are none */
+    bool          has_candidates, are_fine; /* hs_write.is_fine; valid if has_candidates */
 } hs_records;
 
 /* Call when the block has new candidates: they will be looked up again. */
@@ -152,11 +153,18 @@ HS_ALWAYS_INLINE void
 hs_records_reset(hs_records *records)
 {
     records->has_metric = records->has_given = records->knows_images = false;
+    records->has_candidates = false;
 }
 
 /* Fills what is needed for all candidates of the block, as far as that is not done yet; `metric`:
  * also q. HS_OK or HS_ERR_INTERRUPTED. */
 hs_status hs_records_load(hs_records *records, bool metric);
+
+/* Fills candidates, moved as hs_write says, unless that is done. HS_OK or HS_ERR_INTERRUPTED. */
+hs_status hs_records_load_candidates(hs_records *records, const int32_t *base);
+
+/* Whether some candidate is in another image. */
+bool hs_records_has_images(hs_records *records);
 
 /*
  * From places in the gathered block back to the numbers that were given, a batch of

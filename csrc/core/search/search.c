@@ -186,86 +186,63 @@ estimate_by_density(hs_search *search, hs_failure *failure)
     return refuse(search, has_density ? dense : least, bytes_per_pair, failure);
 }
 
-/* What a few points have found: the sum of their counts, of the squares, and how many. */
+/* What some points have found: the sum of their counts, of the squares, and how many they are. */
 typedef struct sample {
     double  sum, squares;
     int64_t taken;
+    bool    is_cut; /* not all of them were taken, or the last one not to its end */
 } sample;
 
 /*
- * Points are sampled evenly over the cells; each counts its forward half, so the mean over points
- * times n estimates the pairs without bias. Stopping early leaves a count too small: an estimate
- * from below, which is the safe side here.
+ * At most `most` points, a power of two, are sampled evenly over the cells, every `step`th of them;
+ * each counts its forward half, so the mean over points times n estimates the pairs without bias.
+ * Stopping early leaves a count too small: an estimate from below, which is the safe side here.
  */
 static hs_status
-take_sample(hs_walker *walker, int64_t n, sample *taken)
+take_sample(hs_search *search, int64_t most, int64_t step, sample *taken)
 {
-    const int64_t samples = n < SAMPLES ? n : SAMPLES;
-    const double  row_work = WORK_OF_ROW * (double)walker->search->stencil.n_rows;
+    const int64_t n = hs_search_asking(search)->n, samples = n < most ? n : most;
     double        work = 0.0;
-    *taken = (sample){0.0, 0.0, 0};
-    for (; taken->taken < samples && work < SAMPLE_WORK; taken->taken++) {
-        const int64_t si = (2 * taken->taken + 1) * n / (2 * samples);
-        const int64_t before = walker->scanner.n_candidates;
-        walker->scanner.n_found = 0;
-        walker->scanner.candidate_limit = before + (int64_t)SAMPLE_WORK;
-        const hs_status status = hs_walk_point(walker, (int32_t)si);
-        if (status != HS_OK && status != HS_STOPPED) {
-            return status;
-        }
-        taken->sum += (double)walker->scanner.n_found;
-        taken->squares += (double)walker->scanner.n_found * (double)walker->scanner.n_found;
-        work += (double)(walker->scanner.n_candidates - before) + row_work;
+    hs_walker     walker;
+    *taken = (sample){0.0, 0.0, 0, false};
+    hs_status status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
+    if (status != HS_OK) {
+        return status;
     }
-    return HS_OK;
+    for (; status == HS_OK && taken->taken < samples && work < SAMPLE_WORK; taken->taken++) {
+        const int64_t s = samples == n ? taken->taken : taken->taken * step % samples;
+        const int64_t before = walker.scanner.n_candidates;
+        walker.scanner.n_found = 0;
+        walker.scanner.candidate_limit = before + (int64_t)SAMPLE_WORK;
+        status = hs_walk_point(&walker, (int32_t)((2 * s + 1) * n / (2 * samples)));
+        HS_ASSERT(status != HS_ERR_SHIFT_RANGE); /* counting needs no S */
+        taken->sum += (double)walker.scanner.n_found;
+        taken->squares += (double)walker.scanner.n_found * (double)walker.scanner.n_found;
+        work += (double)(walker.scanner.n_candidates - before) +
+                WORK_OF_ROW * (double)search->stencil.n_rows;
+    }
+    hs_walker_close(search, &walker);
+    taken->is_cut = status == HS_STOPPED || taken->taken < samples;
+    return status == HS_STOPPED ? HS_OK : status;
 }
 
 hs_status
 hs_estimate_pairs(hs_search *search, double *pairs)
 {
-    const int64_t n = hs_search_asking(search)->n;
-    const int64_t samples = n < MANY_SAMPLES ? n : MANY_SAMPLES;
-    const double  by_density = search->grid.expected_pairs * search->pairs_per_half;
-    double        work = 0.0, sum = 0.0;
-    int64_t       taken = 0;
-    hs_walker     walker;
+    sample          taken;
+    const hs_status status = take_sample(search, MANY_SAMPLES, SAMPLE_STEP, &taken);
     *pairs = 0.0;
-    hs_status status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
-    if (status != HS_OK) {
-        return status;
+    if (status == HS_OK && taken.taken > 0) {
+        *pairs = taken.sum / (double)taken.taken * (double)hs_search_asking(search)->n;
     }
-    for (; status == HS_OK && taken < samples && work < SAMPLE_WORK; taken++) {
-        const int64_t s = samples == n ? taken : taken * SAMPLE_STEP % samples;
-        const int64_t before = walker.scanner.n_candidates;
-        walker.scanner.n_found = 0;
-        walker.scanner.candidate_limit = before + (int64_t)SAMPLE_WORK;
-        status = hs_walk_point(&walker, (int32_t)((2 * s + 1) * n / (2 * samples)));
-        sum += (double)walker.scanner.n_found;
-        work += (double)(walker.scanner.n_candidates - before) +
-                WORK_OF_ROW * (double)search->stencil.n_rows;
+    if (status == HS_OK && taken.is_cut) {
+        *pairs = hs_larger(*pairs, search->grid.expected_pairs * search->pairs_per_half);
     }
-    hs_walker_close(search, &walker);
-    if (taken > 0) {
-        *pairs = sum / (double)taken * (double)n;
-    }
-    if (status == HS_STOPPED || taken < samples) {
-        *pairs = hs_larger(*pairs, by_density);
-    }
-    return status == HS_STOPPED ? HS_OK : status;
+    return status;
 }
 
 /* The part of what is free that a result may seem to need: its density may be off by a third. */
 #define SEEMS_SMALL 0.75
-
-/* Whether to take a sample before the limit is looked up, which takes longer: the result may be too
- * large to do without, and does not seem to be. */
-static bool
-samples_first(const hs_search *search, double bytes_per_pair, double bound)
-{
-    const double by_density = search->grid.expected_pairs * search->pairs_per_half;
-    return search->call->account.find_limit != NULL && bound > HS_LIMIT_FREE &&
-           by_density * bytes_per_pair < SEEMS_SMALL * HS_LIMIT_FREE;
-}
 
 hs_status
 hs_estimate_by_sample(hs_search *search, hs_failure *failure)
@@ -274,18 +251,16 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     const double  bytes_per_pair = find_bytes_per_pair(search);
     const int64_t n = hs_search_asking(search)->n;
     const double  bound = n > 0 ? bound_pairs(search) * bytes_per_pair : 0.0;
-    hs_walker     walker;
+    const double  by_density = search->grid.expected_pairs * search->pairs_per_half;
     sample        taken;
-    if (n == 0 ||
-        (!samples_first(search, bytes_per_pair, bound) && hs_account_allows(account, bound))) {
+    /* The limit is looked up, which takes longer than a sample, unless the result may be too large
+     * to do without and does not seem to be. */
+    const bool samples_first = account->find_limit != NULL && bound > HS_LIMIT_FREE &&
+                               by_density * bytes_per_pair < SEEMS_SMALL * HS_LIMIT_FREE;
+    if (n == 0 || (!samples_first && hs_account_allows(account, bound))) {
         return HS_OK;
     }
-    hs_status status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
-    if (status == HS_OK) {
-        status = take_sample(&walker, n, &taken);
-        HS_ASSERT(status != HS_ERR_SHIFT_RANGE); /* counting needs no S */
-        hs_walker_close(search, &walker);
-    }
+    const hs_status status = take_sample(search, SAMPLES, 1, &taken);
     if (status != HS_OK) {
         return status;
     }
@@ -301,8 +276,8 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     return refuse(search, mean * (double)n, bytes_per_pair, failure);
 }
 
-/* Distances have an error of 1 ulp, or less than 2^-1073 below the normal numbers; the
- * band around an edge is some times as wide, which costs nothing. */
+/* Distances have an error of 1 ulp, or less than 2^-1073 below the normal numbers; the band around
+ * an edge is some times as wide, which costs nothing. */
 
 /* Times a number: 4 ulp of it or more. */
 #define BAND 0x1p-50
@@ -319,19 +294,7 @@ static const int cell_bits[] = {3, 6, 9};
 HS_ALWAYS_INLINE int64_t
 bits_of(double x)
 {
-    int64_t bits;
-    memcpy(&bits, &x, sizeof bits);
-    return bits;
-}
-
-/* The least number with these leading bits. */
-static double
-least_of(int64_t leading, int shift)
-{
-    const uint64_t bits = (uint64_t)leading << shift;
-    double         x;
-    memcpy(&x, &bits, sizeof x);
-    return x;
+    return (int64_t)hs_bits_of_double(x);
 }
 
 /* Cells from the one before the first edge above zero to that of the cutoff. Returns how many
@@ -364,8 +327,9 @@ fill_cells(const hs_shells *shells)
 {
     int64_t below = 0, reached = 0; /* bands that end before the cell, or begin before its end */
     for (int64_t c = 0; c <= shells->last; c++) {
-        const double least = c == 0 ? 0.0 : least_of(shells->first + c, shells->shift);
-        const double end = least_of(shells->first + c + 1, shells->shift);
+        const double least =
+            c == 0 ? 0.0 : hs_double_of_bits((uint64_t)(shells->first + c) << shells->shift);
+        const double end = hs_double_of_bits((uint64_t)(shells->first + c + 1) << shells->shift);
         while (below < shells->n && shells->high[below] < least) {
             below++;
         }
@@ -497,9 +461,9 @@ search_set_asking(const hs_sets *sets, hs_search *search)
                                              : 2.0 * (double)search->n_in_all / (double)n;
 }
 
-/* Sets what follows from scene and grid. */
+/* From scene and grid. */
 static void
-search_finish_setup(hs_search *search)
+set_filter_error(hs_search *search)
 {
     search->filter_error =
         search->scene.x_error + search->grid.shift_error + search->scene.formula_error;
@@ -551,79 +515,64 @@ hs_search_close(hs_search *search)
     }
 }
 
-/* The scene first, then the grid, its stencil, and the points sorted into its
- * cells. */
+/* The scene first, then the grid, its stencil, and the points sorted into its cells. */
 
-/* Stores occupied cells only, in place of the grid that was chosen; nothing for a width of 0. */
-static void
-make_sparse(hs_search *search, double width)
-{
-    search->is_sparse = width > 0.0;
-    if (search->is_sparse) {
-        const hs_grid dense = search->grid;
-        hs_sparse_grid(&search->scene, &dense, width, &search->grid);
-    }
-}
-
-/* The grid of an algorithm of the caller's choice. */
-static hs_status
-choose_single_or_sparse(hs_search *search, bool is_sparse, hs_failure *failure)
-{
-    const hs_status status =
-        hs_grid_init_kind(&search->scene, HS_GRID_SINGLE, &search->grid, failure);
-    if (status == HS_OK && is_sparse) {
-        make_sparse(search, hs_sparse_width(&search->scene, &search->grid));
-    }
-    return status;
-}
-
-/* Chooses the dense grid, with cells as wide as the caller wants them or as is quickest. Where
- * points crowd in few of its cells, one that stores occupied cells only, unless the dense one has
- * the caller's width, or the caller wants all cells. */
+/*
+ * Chooses the grid. HS_ALL_PAIRS and HS_HASH say which. Else it is the dense one, with cells as
+ * wide as the caller wants them or as is quickest; or where points crowd in few of its cells, one
+ * that stores occupied cells only, unless the dense one has the caller's width, or the caller wants
+ * all cells.
+ */
 static hs_status
 choose_grid(hs_search *search, hs_failure *failure)
 {
     const hs_options  *options = &search->call->options;
     const hs_algorithm algorithm = options->algorithm;
+    const hs_scene    *scene = &search->scene;
     const bool         is_dense = algorithm == HS_GRID;
+    hs_grid           *grid = &search->grid;
     hs_status          status = HS_TRY_OTHER;
+    double             width = 0.0; /* of the cells of a sparse grid */
     bool               may_be_sparse = true;
-    search->is_sparse = false; /* another system may have been searched before */
     if (algorithm == HS_ALL_PAIRS || algorithm == HS_HASH) {
-        return choose_single_or_sparse(search, algorithm == HS_HASH, failure);
+        status = hs_grid_init(scene, HS_GRID_SINGLE, grid, failure);
+        if (status == HS_OK && algorithm == HS_HASH) {
+            double cost;
+            width = hs_sparse_width(scene, grid, &cost);
+        }
+    } else {
+        if (options->cell_size > 0.0) {
+            status = hs_grid_init_wide(scene, hs_scale_apply(scene->scale, options->cell_size),
+                                       grid, &may_be_sparse, failure);
+        }
+        if (status == HS_TRY_OTHER) {
+            status = hs_grid_init(scene, is_dense ? HS_GRID_CELLS : HS_GRID_ANY, grid, failure);
+        }
+        if (status == HS_OK && may_be_sparse && !is_dense) {
+            width = hs_sparse_choose(scene, grid);
+        }
     }
-    if (options->cell_size > 0.0) {
-        const double width = hs_scale_apply(search->scene.scale, options->cell_size);
-        status = hs_grid_init_wide(&search->scene, width, &search->grid, &may_be_sparse, failure);
-    }
-    if (status == HS_TRY_OTHER) {
-        status = hs_grid_init_kind(&search->scene, is_dense ? HS_GRID_CELLS : HS_GRID_ANY,
-                                   &search->grid, failure);
-    }
-    if (status == HS_OK && may_be_sparse && !is_dense) {
-        make_sparse(search, hs_sparse_choose(&search->scene, &search->grid));
+    search->is_sparse = width > 0.0;
+    if (search->is_sparse) {
+        const hs_grid dense = *grid;
+        hs_sparse_grid(scene, &dense, width, grid);
     }
     return status;
 }
 
-/* Sorts the points into the cells of the grid. */
+/* Sorts points, or queries, into the cells of the grid; their scene gives up its arrays. */
 static hs_status
-build_bins(hs_search *search, hs_scene *scene, hs_grid *grid, hs_sparse *sparse, hs_bins *bins)
+build_bins(hs_search *search, bool of_queries, hs_scene *scene)
 {
-    hs_account *account = &search->call->account;
-    const bool  of_queries = bins == &search->query_bins;
-    return search->is_sparse ? hs_sparse_build(account, search->call->team, &search->call->options,
-                                               scene, grid, sparse, bins)
-                             : hs_bins_build(account, search->call->team, &search->call->options,
-                                             scene, grid, of_queries, bins);
-}
-
-/* The queries into the cells that are there; their scene gives up its arrays. */
-static hs_status
-search_bin_queries(hs_search *search, hs_scene *asking)
-{
-    hs_grid grid = search->grid; /* of which occupied cells are counted anew */
-    return build_bins(search, asking, &grid, &search->query_sparse, &search->query_bins);
+    hs_call   *call = search->call;
+    hs_grid    counted = search->grid; /* occupied cells of queries are counted by themselves */
+    hs_grid   *grid = of_queries ? &counted : &search->grid;
+    hs_bins   *bins = of_queries ? &search->query_bins : &search->bins;
+    hs_sparse *sparse = of_queries ? &search->query_sparse : &search->sparse;
+    return search->is_sparse ? hs_sparse_build(&call->account, call->team, &call->options, scene,
+                                               grid, sparse, bins)
+                             : hs_bins_build(&call->account, call->team, &call->options, scene,
+                                             grid, of_queries, bins);
 }
 
 /* Grid, stencil and bins. */
@@ -633,6 +582,7 @@ build_cells(hs_search *search, hs_scene *asking, hs_failure *failure)
     hs_scene *scene = &search->scene;
     hs_status status = choose_grid(search, failure);
     if (status == HS_OK) {
+        set_filter_error(search);
         status = estimate_by_density(search, failure);
     }
     if (status == HS_OK) {
@@ -643,70 +593,44 @@ build_cells(hs_search *search, hs_scene *asking, hs_failure *failure)
         }
     }
     if (status == HS_OK) {
-        status = build_bins(search, scene, &search->grid, &search->sparse, &search->bins);
+        status = build_bins(search, false, scene);
     }
     if (status == HS_OK && asking != NULL) {
-        status = search_bin_queries(search, asking);
+        status = build_bins(search, true, asking);
     }
     return status;
-}
-
-/* The call's options for its scene; `others`: room for some. Where images are compared, S is needed
- * of all pairs. */
-static const hs_options *
-options_of_scene(const hs_call *call, hs_options *others)
-{
-    if (call->choice == NULL || !hs_choice_compares(call->choice, call->options.cutoff)) {
-        return &call->options;
-    }
-    *others = call->options;
-    others->want |= HS_WANT_SHIFT;
-    return others;
 }
 
 hs_status
 hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_failure *failure)
 {
-    hs_options others;
-    hs_scene   queries, *asking = sets->queries != NULL ? &queries : NULL;
-    if (search->call->kernel == NULL) {
+    hs_call       *call = search->call;
+    hs_scene       queries, *asking = sets->queries != NULL ? &queries : NULL;
+    const unsigned want = call->options.want;
+    if (call->kernel == NULL) {
         return HS_ERR_KERNEL;
     }
     search_set_asking(sets, search);
-    hs_status status = hs_scene_init_sets(&search->call->account, search->call->team, sets, box,
-                                          options_of_scene(search->call, &others), &search->scene,
-                                          asking, failure);
+    if (call->choice != NULL && hs_choice_compares(call->choice, call->options.cutoff)) {
+        call->options.want |= HS_WANT_SHIFT; /* to compare images of all pairs */
+    }
+    hs_status status = hs_scene_make(&call->account, call->team, sets, box, &call->options,
+                                     &search->scene, asking, failure);
+    call->options.want = want;
     if (status == HS_OK) {
         status = hs_scene_narrow(&search->scene, sets->narrowing);
         status = status == HS_OK ? build_cells(search, asking, failure) : status;
         if (asking != NULL) {
-            hs_scene_free(&search->call->account, asking);
+            hs_scene_free(&call->account, asking);
         }
-    }
-    if (status == HS_OK) {
-        search_finish_setup(search);
     }
     return status;
 }
 
-/* A copy of the other search that borrows its arrays, with a reach and queries of
- * its own. */
+/* A copy of the other search that borrows its arrays, with a reach and queries of its own. */
 
 /* Scaled cutoffs as small as this keep all their digits. */
 #define SMALLEST_CUTOFF 0x1p-500
-
-/* Takes what is shared as the new search's own, and marks as borrowed what it must not free. */
-static void
-borrow(const hs_search *built, bool is_untested, hs_search *search)
-{
-    search->scene = built->scene;
-    search->scene.is_untested = is_untested;
-    search->grid = built->grid;
-    search->bins = built->bins;
-    search->sparse = built->sparse;
-    search->is_sparse = built->is_sparse;
-    search->is_borrowed = true;
-}
 
 /* Whether the scale of the cells keeps all digits of a length up to theirs. */
 static bool
@@ -744,27 +668,13 @@ adapt(const hs_sets *sets, hs_search *search, hs_failure *failure)
     }
     hs_scene_init_metric(&search->scene, options);
     search_set_asking(sets, search);
-    search_finish_setup(search);
+    set_filter_error(search);
     if (status == HS_OK) {
         status = estimate_by_density(search, failure);
     }
     if (status == HS_OK) {
         status = hs_stencil_build(&search->call->account, options, &search->scene, &search->grid,
                                   search->is_full, &search->stencil);
-    }
-    return status;
-}
-
-static hs_status
-take_queries(const hs_points *queries, hs_search *search, hs_failure *failure)
-{
-    hs_scene  asking;
-    hs_status status = hs_scene_from_kept(&search->call->account, search->call->team,
-                                          &search->scene, queries, &search->call->options, &asking,
-                                          failure);
-    if (status == HS_OK) {
-        status = search_bin_queries(search, &asking);
-        hs_scene_free(&search->call->account, &asking);
     }
     return status;
 }
@@ -778,11 +688,23 @@ hs_search_reuse(const hs_sets *sets, hs_call *call, hs_search *search, hs_failur
         return HS_REBUILD;
     }
     hs_search_begin(call, search);
-    borrow(built, sets->is_untested, search);
+    search->scene = built->scene;
+    search->scene.is_untested = sets->is_untested;
+    search->grid = built->grid;
+    search->bins = built->bins;
+    search->sparse = built->sparse;
+    search->is_sparse = built->is_sparse;
+    search->is_borrowed = true; /* not to be freed */
     hs_call_gather(call, n_asking);
     hs_status status = call->kernel == NULL ? HS_ERR_KERNEL : adapt(sets, search, failure);
     if (status == HS_OK && sets->queries != NULL) {
-        status = take_queries(sets->queries, search, failure);
+        hs_scene asking;
+        status = hs_scene_from_kept(&call->account, call->team, &search->scene, sets->queries,
+                                    &call->options, false, &asking, failure);
+        if (status == HS_OK) {
+            status = build_bins(search, true, &asking);
+            hs_scene_free(&call->account, &asking);
+        }
     }
     if (status != HS_OK) {
         hs_search_close(search);
@@ -795,20 +717,6 @@ hs_search_reuse(const hs_sets *sets, hs_call *call, hs_search *search, hs_failur
 }
 
 /* Takes cells that were kept where they serve, and else makes new ones. */
-
-/* Shells, and threads for the walk where points alone were not worth them. */
-static hs_status
-finish(hs_search *search)
-{
-    hs_call *call = search->call;
-    if (hs_shells_open(&call->account, &search->scene, &call->options, &search->shells) != HS_OK) {
-        hs_search_close(search);
-        return HS_ERR_MEMORY;
-    }
-    hs_call_gather_for(call, hs_search_asking(search)->n,
-                       search->grid.expected_pairs * search->pairs_per_half, search->is_borrowed);
-    return HS_OK;
-}
 
 hs_status
 hs_search_open(const hs_sets *sets, const hs_box *box, hs_call *call, hs_search *search,
@@ -828,7 +736,14 @@ hs_search_open(const hs_sets *sets, const hs_box *box, hs_call *call, hs_search 
         }
     }
     if (status == HS_OK) {
-        status = finish(search);
+        status = hs_shells_open(&call->account, &search->scene, &call->options, &search->shells);
+        if (status == HS_OK) { /* threads for the walk, where points alone were not worth them */
+            hs_call_gather_for(call, hs_search_asking(search)->n,
+                               search->grid.expected_pairs * search->pairs_per_half,
+                               search->is_borrowed);
+        } else {
+            hs_search_close(search);
+        }
     }
     hs_call_tell_limit(call, status, failure);
     return status;

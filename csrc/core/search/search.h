@@ -13,9 +13,9 @@
  */
 
 /*
- * Several cutoffs of one search, and for each but the last the float64 distances that do
- * not tell on which side of it a pair is. The last one is that of the search itself. A table,
- * indexed by the leading bits of a distance, knows for each of its cells which edges are in it.
+ * Several cutoffs of one search, and for each but the last the float64 distances that do not tell
+ * on which side of it a pair is. The last one is that of the search itself. A table, indexed by the
+ * leading bits of a distance, knows for each of its cells which edges are in it.
  */
 
 /* Distances of one cell of the table: `below` edges are below them; above `high`, one more. From
@@ -119,8 +119,8 @@ bool hs_search_repeats_images(const hs_search *search);
 void hs_search_close(hs_search *search);
 
 /*
- * From points, queries, box and options to a search that can be walked: with cells
- * of its own, or with those of another one.
+ * From points, queries, box and options to a search that can be walked: with cells of its own, or
+ * with those of another one.
  */
 
 /*

@@ -97,8 +97,6 @@ typedef struct hs_walker {
     hs_scanner       scanner;
 } hs_walker;
 
-/* Hits of one visit at most, of walkers that hs_walker_init has opened. */
-#define HS_MOST_HITS (HS_HITS_PER_CANDIDATE * (HS_BLOCK_CANDIDATES + HS_GROUP_POINTS))
 /* Candidates that a block of hs_walker_init has room for. */
 int32_t hs_walker_capacity(const hs_search *search);
 
@@ -119,8 +117,7 @@ hs_status hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit,
  * walker is all zeros. It is the same object, of the same call, with as many axes, and with the
  * same kernel and options but for the cutoff. Memory that will do is kept, in the account's arena
  * too (hs_account_keep). Between two searches hs_walker_flush_counters tells the call what was
- * done; a walker
- * that is not for others (hs_search_keeps_walker) ends there.
+ * done; a walker that is not for others (hs_search_keeps_walker) ends there.
  */
 hs_status hs_walker_renew(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
                           hs_walker *walker);

@@ -273,7 +273,7 @@ hs_call_threads(double n_points, const hs_options *options)
 void
 hs_call_gather(hs_call *call, int64_t n_points)
 {
-    if (call->team == NULL) {
+    if (call->team == NULL && call->options.threads != 1) {
         call->team = hs_team_create(hs_call_threads((double)n_points, &call->options));
     }
 }
@@ -417,6 +417,9 @@ hs_walk_strips(hs_team *team, const hs_options *options, int64_t n, int n_strips
                void *context)
 {
     HS_ASSERT(n_strips >= 1 && n_strips <= HS_SLABS);
+    if (n_strips == 1 && n > 0 && n < HS_POLL_POINTS) {
+        return run(context, 0, 0, n);
+    }
     pass doing = {.run = run, .context = context, .n = n, .n_strips = n_strips};
     return walk(team, options, &doing);
 }

@@ -130,8 +130,8 @@ void hs_call_restart(hs_call *call);
  * context of find_limit stays. */
 void hs_call_detach(hs_call *call);
 
-/* A pass over all points, cut into ranges that a team works on at once. Between its
- * rounds the caller is polled: once in HS_POLL_POINTS points, however many threads there are. */
+/* A pass over all points, cut into ranges that a team works on at once. Between its rounds the
+ * caller is polled: once in HS_POLL_POINTS points, however many threads there are. */
 
 /* Slabs of a round. Results of a slab can be kept in an array of that many. */
 #define HS_SLABS       32

@@ -12,355 +12,9 @@
 /* pair_list.c: finds the pairs of a list, lists them in bundles, and follows the motion of the
  * points: how much of the skin it leaves. */
 
-/* Each thread has a walker; shifts are looked up once for each run of a
- * block. */
-
-#define PIECES_A_THREAD 4 /* so that none waits long for the others */
-#define FIRST_BUNDLES   256
-
-/* What one thread works with. */
-typedef struct worker {
-    hs_committer committer;
-    hs_search   *search; /* borrowed */
-    hs_pieces   *pieces; /* borrowed */
-    hs_walker    walker;
-    hs_piece    *piece; /* that it is working on */
-    /* Of the block that was looked at last: */
-    int64_t  block; /* candidates tested before it, which tells blocks apart; -1: none */
-    bool     has_images;
-    bool    *is_shifted; /* owned; whether a run is in another image ... */
-    int32_t *shift;      /* owned; ... and which, over the given box vectors: m numbers */
-} worker;
-
-/* The shift of a run over the box vectors as given. */
-static bool
-shift_of_run(const hs_search *search, const hs_run *run, int32_t *shift)
-{
-    const hs_lattice *lattice = &search->scene.lattice;
-    int64_t           reduced[HS_MAX_DIM], given[HS_MAX_DIM];
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        reduced[r] = run->image[r];
-    }
-    if (!hs_lattice_shift(lattice, reduced, given)) {
-        return false;
-    }
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        shift[r] = (int32_t)given[r];
-        if (given[r] > INT32_MAX || given[r] < -INT32_MAX) { /* so that it can be negated */
-            return false;
-        }
-    }
-    return true;
-}
-
-static bool
-has_shift(const hs_run *run, int m)
-{
-    uint32_t any = 0;
-    for (int r = 0; r < m; r++) {
-        any |= (uint32_t)run->image[r];
-    }
-    return any != 0;
-}
-
-/* A new bundle at the end of a part, of no pairs; NULL: out of memory. m: numbers of its shift, 0
- * in a plain part. */
-static hs_bundle *
-add_bundle(hs_part *part, int32_t point, int m)
-{
-    if (part->n_bundles == part->capacity) {
-        const int64_t capacity = part->capacity > 0 ? 2 * part->capacity : FIRST_BUNDLES;
-        hs_bundle    *bundles = hs_alloc(NULL, HS_FOR_INDICES, capacity, sizeof *bundles);
-        int32_t      *shift = hs_alloc(NULL, HS_FOR_SHIFTS, capacity * m, sizeof *shift);
-        if (bundles == NULL || shift == NULL) {
-            hs_free(NULL, bundles);
-            hs_free(NULL, shift);
-            return NULL;
-        }
-        if (part->n_bundles > 0) {
-            memcpy(bundles, part->bundles, (size_t)part->n_bundles * sizeof *bundles);
-            memcpy(shift, part->shift, (size_t)(part->n_bundles * m) * sizeof *shift);
-        }
-        hs_free(NULL, part->bundles);
-        hs_free(NULL, part->shift);
-        part->bundles = bundles;
-        part->shift = shift;
-        part->capacity = capacity;
-    }
-    hs_bundle *bundle = &part->bundles[part->n_bundles++];
-    *bundle = (hs_bundle){.end = part->pairs.n_pairs, .point = point};
-    return bundle;
-}
-
-/* Whether the first entry that is not zero is negative. */
-static bool
-is_negative(const int32_t *shift, int m)
-{
-    for (int r = 0; r < m; r++) {
-        if (shift[r] != 0) {
-            return shift[r] < 0;
-        }
-    }
-    return false;
-}
-
-/* Finds the shifts of the runs of a block, once. */
-static bool
-look_at_block(worker *me)
-{
-    const hs_scanner *scanner = &me->walker.scanner;
-    const hs_block   *block = &scanner->block;
-    const int         m = scanner->search->bins.n_periodic;
-    if (me->block == scanner->n_candidates) {
-        return true;
-    }
-    me->block = scanner->n_candidates;
-    me->has_images = false;
-    for (int32_t r = 0; m > 0 && block->runs[r].at < block->n; r++) {
-        me->is_shifted[r] = has_shift(&block->runs[r], m);
-        me->has_images = me->has_images || me->is_shifted[r];
-        if (me->is_shifted[r] &&
-            !shift_of_run(scanner->search, &block->runs[r], me->shift + (int64_t)r * m)) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/* n hits of one run to a part: as many pairs of its last bundle. */
-static void
-add_pairs(worker *me, hs_part *part, const int32_t *labels, int32_t n)
-{
-    const int32_t *id = me->walker.scanner.block.id;
-    int32_t       *to = hs_output_next(&part->pairs, HS_WANT_J);
-    for (int32_t h = 0; h < n; h++) {
-        to[h] = id[labels[h]];
-    }
-    part->pairs.n_pairs += n;
-    part->bundles[part->n_bundles - 1].end = part->pairs.n_pairs;
-}
-
-/* Hits of one run with this shift, or the opposite one; in the last bundle if that has it, too. */
-static bool
-add_shifted(worker *me, int32_t si, const int32_t *labels, int32_t n, const int32_t *shift,
-            bool turned)
-{
-    const int m = me->walker.scanner.search->bins.n_periodic;
-    hs_part  *part = &me->piece->shifted;
-    int32_t   own[HS_MAX_DIM];
-    for (int r = 0; r < m; r++) {
-        own[r] = turned ? -shift[r] : shift[r];
-    }
-    const int64_t last = part->n_bundles - 1;
-    const size_t  size = (size_t)m * sizeof *own;
-    if (last < 0 || part->bundles[last].point != si ||
-        memcmp(part->shift + last * m, own, size) != 0) {
-        if (add_bundle(part, si, m) == NULL) {
-            return false;
-        }
-        memcpy(part->shift + (part->n_bundles - 1) * m, own, size);
-    }
-    add_pairs(me, part, labels, n);
-    return true;
-}
-
-/* Hits of one run that is in another image. A point that is its own neighbour has a first shift
- * that is positive. */
-static bool
-add_run(worker *me, int32_t si, const int32_t *labels, int32_t n, const int32_t *shift)
-{
-    const int32_t *id = me->walker.scanner.block.id;
-    if (!is_negative(shift, me->walker.scanner.search->bins.n_periodic)) {
-        return add_shifted(me, si, labels, n, shift, false);
-    }
-    for (int32_t h = 0, next; h < n; h = next) {
-        const bool own = id[labels[h]] == si;
-        for (next = h + 1; next < n && (id[labels[next]] == si) == own; next++) {
-        }
-        if (!add_shifted(me, si, labels + h, next - h, shift, own)) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/* The hits of one point, whose places in the block ascend, as do its runs. */
-static bool
-add_row(worker *me, int32_t si, const int32_t *labels, int32_t n)
-{
-    const int     m = me->walker.scanner.search->bins.n_periodic;
-    const hs_run *runs = me->walker.scanner.block.runs;
-    bool          is_open = false; /* its bundle without an image */
-    for (int32_t h = 0, next, r = 0; h < n; h = next) {
-        while (runs[r + 1].at <= labels[h]) {
-            r++;
-        }
-        for (next = h + 1; next < n && labels[next] < runs[r + 1].at; next++) {
-        }
-        if (me->is_shifted[r]) {
-            if (!add_run(me, si, labels + h, next - h, me->shift + (int64_t)r * m)) {
-                return false;
-            }
-            continue;
-        }
-        if (!is_open && add_bundle(&me->piece->plain, si, 0) == NULL) {
-            return false;
-        }
-        is_open = true;
-        add_pairs(me, &me->piece->plain, labels + h, next - h);
-    }
-    return true;
-}
-
-/* The hits of one point where the whole block is in its image. */
-static bool
-add_plain_row(worker *me, int32_t si, const int32_t *labels, int32_t n)
-{
-    if (n > 0) {
-        if (add_bundle(&me->piece->plain, si, 0) == NULL) {
-            return false;
-        }
-        add_pairs(me, &me->piece->plain, labels, n);
-    }
-    return true;
-}
-
-/* A hs_visit_fn. */
-static hs_status
-take_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
-{
-    worker       *me = context;
-    const int32_t n = hits->end[hits->n - 1];
-    if (!look_at_block(me)) {
-        scanner->failed_point = first;
-        return HS_ERR_SHIFT_RANGE;
-    }
-    hs_status status = hs_output_reserve(&me->piece->plain.pairs, n, 0.0);
-    if (status == HS_OK && me->has_images) {
-        status = hs_output_reserve(&me->piece->shifted.pairs, n, 0.0);
-    }
-    for (int32_t row = 0, begin = 0; status == HS_OK && row < hits->n; row++) {
-        const int32_t *labels = hits->label + begin, of_row = hits->end[row] - begin;
-        if (!(me->has_images ? add_row(me, first + row, labels, of_row)
-                             : add_plain_row(me, first + row, labels, of_row))) {
-            status = HS_ERR_MEMORY;
-        }
-        begin = hits->end[row];
-    }
-    return status;
-}
-
-/* A hs_range_fn: a piece. */
-static hs_status
-search_piece(void *context, int64_t piece)
-{
-    worker          *me = context;
-    const hs_search *search = me->search;
-    const int64_t    n = search->bins.n, n_pieces = me->pieces->n;
-    me->piece = &me->pieces->of[piece];
-    hs_output_reserve_hint(&me->piece->plain.pairs, search->grid.expected_pairs / (double)n_pieces);
-    return hs_walk_or_tell(&me->walker, (int32_t)(n * piece / n_pieces),
-                           (int32_t)(n * (piece + 1) / n_pieces), &me->committer.failure);
-}
-
-/* What the threads share. */
-typedef struct piece_job {
-    hs_search *search;
-    hs_pieces *pieces;
-} piece_job;
-
-static hs_status
-open_worker(void *context, void *place)
-{
-    const piece_job *job = context;
-    hs_search       *search = job->search;
-    worker          *me = place;
-    me->committer.options = &me->walker.scanner.options;
-    me->search = search;
-    me->pieces = job->pieces;
-    me->block = -1;
-    const hs_status status =
-        hs_walker_init(search, HS_BLOCK_LISTS_PLACES, take_hits, me, &me->walker);
-    if (status != HS_OK) {
-        return status;
-    }
-    hs_account     *account = &search->call->account;
-    const hs_block *block = &me->walker.scanner.block;
-    const int64_t   n_runs = block->most_runs + 1, m = search->bins.n_periodic;
-    me->is_shifted = hs_alloc(account, HS_FOR_CANDIDATES, n_runs, sizeof *me->is_shifted);
-    me->shift = hs_alloc(account, HS_FOR_CANDIDATES, n_runs * m, sizeof *me->shift);
-    const bool complete = me->is_shifted != NULL && me->shift != NULL;
-    return complete ? HS_OK : HS_ERR_MEMORY;
-}
-
-static void
-close_worker(void *context, void *place)
-{
-    const piece_job *job = context;
-    hs_account      *account = &job->search->call->account;
-    worker          *me = place;
-    hs_walker_close(job->search, &me->walker);
-    hs_free(account, me->shift);
-    hs_free(account, me->is_shifted);
-}
-
-static void
-free_part(hs_part *part)
-{
-    hs_output_free(&part->pairs);
-    hs_free(NULL, part->bundles);
-    hs_free(NULL, part->shift);
-}
-
-void
-hs_pieces_free(hs_account *account, hs_pieces *pieces)
-{
-    for (int64_t p = 0; pieces->of != NULL && p < pieces->n; p++) {
-        free_part(&pieces->of[p].plain);
-        free_part(&pieces->of[p].shifted);
-    }
-    hs_free(account, pieces->of);
-    *pieces = (hs_pieces){0};
-}
-
-hs_status
-hs_pieces_find(hs_search *search, hs_pieces *pieces, hs_failure *failure)
-{
-    pieces->n = search->call->team == NULL ? 1 : PIECES_A_THREAD * hs_team_size(search->call->team);
-    pieces->of = hs_alloc(&search->call->account, HS_FOR_CANDIDATES, pieces->n, sizeof *pieces->of);
-    if (pieces->of == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    memset(pieces->of, 0, (size_t)pieces->n * sizeof *pieces->of);
-    for (int64_t p = 0; p < pieces->n; p++) {
-        hs_output_init(NULL, search->scene.ndim, HS_WANT_J, 4, &pieces->of[p].plain.pairs);
-        hs_output_init(NULL, search->scene.ndim, HS_WANT_J, 4, &pieces->of[p].shifted.pairs);
-    }
-    piece_job       job = {.search = search, .pieces = pieces};
-    hs_crew         crew = {.call = search->call,
-                            .job = &job,
-                            .worker_size = sizeof(worker),
-                            .open = open_worker,
-                            .close = close_worker,
-                            .n_ranges = pieces->n,
-                            .search = search_piece};
-    const hs_status status = hs_crew_run(&crew, failure);
-    if (status != HS_OK) {
-        hs_pieces_free(&search->call->account, pieces);
-    }
-    return status;
-}
-
 /* A hash table with open addressing. */
 
 #define FIRST_CAPACITY 64 /* the 26 images next to a box, and some room */
-
-/* An empty table. */
-static void
-images_init(int width, hs_images *images)
-{
-    *images = (hs_images){.width = width};
-}
 
 /* Idempotent. */
 static void
@@ -368,7 +22,7 @@ images_free(hs_images *images)
 {
     hs_free(NULL, images->of);
     hs_free(NULL, images->slots);
-    images_init(images->width, images);
+    *images = (hs_images){.width = images->width};
 }
 
 /* Where the shift is, or the empty slot where it belongs. */
@@ -436,18 +90,284 @@ hs_images_number(hs_images *images, const int32_t *shift)
 }
 
 /*
- * The list of one step. It is a search whose points are numbered in cell order,
- * so that neighbours lie close together in memory when the list is used, and whose shifts are those
- * of the wrapped points, so that few of them are not zero.
+ * The pairs of a search in pieces, one for each range of its points, by several threads. Which
+ * pieces there are depends on the number of threads, what follows from one to the next does not.
+ * Points are told by their places in cell order. Few pairs have a shift, those that are in
+ * different images once the points are wrapped, and each piece keeps them apart. Each thread has a
+ * walker; shifts are looked up once for each run of a block.
  */
+
+#define PIECES_A_THREAD 4 /* so that none waits long for the others */
+#define FIRST_BUNDLES   256
+
+/* Some pairs of a piece, as in a hs_listing. */
+typedef struct some_pairs {
+    hs_output  pairs;   /* b of each, in its column j; counted by no account */
+    hs_bundle *bundles; /* owned; ends are places in this part, images those of the piece */
+    int64_t    n_bundles, capacity;
+    int64_t    first_pair, first_bundle; /* of it, in the listing */
+} some_pairs;
+
+typedef struct piece {
+    some_pairs plain, shifted;
+    hs_images  images; /* over the box vectors that repeat, as given */
+} piece;
 
 /* A search, and what it has found in cell order. */
 typedef struct building {
     hs_call     call;
     hs_search   search;
-    hs_pieces   pieces;
+    int64_t     n;       /* pieces */
+    piece      *pieces;  /* owned */
     hs_listing *listing; /* borrowed: what it becomes; its stores are those of the list in use */
 } building;
+
+/* What one thread works with. */
+typedef struct worker {
+    hs_committer committer;
+    building    *built; /* borrowed */
+    hs_walker    walker;
+    piece       *piece; /* that it is working on */
+    /* Of the block that was looked at last: */
+    int64_t  block; /* candidates tested before it, which tells blocks apart; -1: none */
+    bool     has_images;
+    int32_t *image; /* owned; number in the piece of that of each run; -1: none */
+} worker;
+
+/* The shift of a run over the box vectors as given. */
+static bool
+shift_of_run(const hs_search *search, const hs_run *run, int32_t *shift)
+{
+    const hs_lattice *lattice = &search->scene.lattice;
+    int64_t           reduced[HS_MAX_DIM], given[HS_MAX_DIM];
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        reduced[r] = run->image[r];
+    }
+    if (!hs_lattice_shift(lattice, reduced, given)) {
+        return false;
+    }
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        shift[r] = (int32_t)given[r];
+        if (given[r] > INT32_MAX || given[r] < -INT32_MAX) { /* so that it can be negated */
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Finds the images of the runs of a block, once. HS_ERR_SHIFT_RANGE, HS_ERR_MEMORY. */
+static hs_status
+look_at_block(worker *me)
+{
+    const hs_scanner *scanner = &me->walker.scanner;
+    const hs_block   *block = &scanner->block;
+    const int         m = scanner->search->bins.n_periodic;
+    if (me->block == scanner->n_candidates) {
+        return HS_OK;
+    }
+    me->block = scanner->n_candidates;
+    me->has_images = false;
+    for (int32_t r = 0; m > 0 && block->runs[r].at < block->n; r++) {
+        int32_t shift[HS_MAX_DIM], any = 0;
+        for (int k = 0; k < m; k++) {
+            any |= block->runs[r].image[k];
+        }
+        me->image[r] = -1;
+        if (any != 0) {
+            if (!shift_of_run(scanner->search, &block->runs[r], shift)) {
+                return HS_ERR_SHIFT_RANGE;
+            }
+            me->has_images = true;
+            me->image[r] = hs_images_number(&me->piece->images, shift);
+            if (me->image[r] < 0) {
+                return HS_ERR_MEMORY;
+            }
+        }
+    }
+    return HS_OK;
+}
+
+/* n hits of one run to a part: in its last bundle if that is of this point and image, else in a new
+ * one. False when memory is refused. */
+static bool
+add_pairs(worker *me, some_pairs *part, int32_t si, int32_t image, const int32_t *labels, int32_t n)
+{
+    const int32_t *id = me->walker.scanner.block.id;
+    hs_bundle     *last = part->n_bundles > 0 ? &part->bundles[part->n_bundles - 1] : NULL;
+    if (last == NULL || last->point != si || last->image != image) {
+        if (part->n_bundles == part->capacity) {
+            const int64_t capacity = part->capacity > 0 ? 2 * part->capacity : FIRST_BUNDLES;
+            hs_bundle    *more = hs_grow(NULL, HS_FOR_INDICES, part->bundles, part->n_bundles,
+                                         capacity, sizeof *more);
+            if (more == NULL) {
+                return false;
+            }
+            part->bundles = more;
+            part->capacity = capacity;
+        }
+        last = &part->bundles[part->n_bundles++];
+        *last = (hs_bundle){.point = si, .image = image};
+    }
+    int32_t *to = hs_output_next(&part->pairs, HS_WANT_J);
+    for (int32_t h = 0; h < n; h++) {
+        to[h] = id[labels[h]];
+    }
+    part->pairs.n_pairs += n;
+    last->end = part->pairs.n_pairs;
+    return true;
+}
+
+/* Hits of one run that is in another image. A point that is its own neighbour has a first shift
+ * that is positive. */
+static bool
+add_run(worker *me, int32_t si, const int32_t *labels, int32_t n, int32_t image)
+{
+    hs_images     *images = &me->piece->images;
+    const int32_t *id = me->walker.scanner.block.id;
+    const int32_t *shift = images->of + (int64_t)image * images->width;
+    int32_t        opposite[HS_MAX_DIM], first = 0;
+    for (int r = images->width - 1; r >= 0; r--) {
+        opposite[r] = -shift[r];
+        first = shift[r] != 0 ? shift[r] : first;
+    }
+    for (int32_t h = 0, next; h < n; h = next) {
+        const bool    turned = first < 0 && id[labels[h]] == si;
+        const int32_t number = turned ? hs_images_number(images, opposite) : image;
+        for (next = h + 1; next < n && (first < 0 && id[labels[next]] == si) == turned; next++) {
+        }
+        if (number < 0 || !add_pairs(me, &me->piece->shifted, si, number, labels + h, next - h)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* The hits of one point, whose places in the block ascend, as do its runs. */
+static bool
+add_row(worker *me, int32_t si, const int32_t *labels, int32_t n)
+{
+    const hs_run *runs = me->walker.scanner.block.runs;
+    bool          fits = true;
+    if (!me->has_images) {
+        return n == 0 || add_pairs(me, &me->piece->plain, si, 0, labels, n);
+    }
+    for (int32_t h = 0, next, r = 0; h < n && fits; h = next) {
+        while (runs[r + 1].at <= labels[h]) {
+            r++;
+        }
+        for (next = h + 1; next < n && labels[next] < runs[r + 1].at; next++) {
+        }
+        fits = me->image[r] < 0 ? add_pairs(me, &me->piece->plain, si, 0, labels + h, next - h)
+                                : add_run(me, si, labels + h, next - h, me->image[r]);
+    }
+    return fits;
+}
+
+/* A hs_visit_fn. */
+static hs_status
+take_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+{
+    worker       *me = context;
+    const int32_t n = hits->end[hits->n - 1];
+    hs_status     status = look_at_block(me);
+    if (status == HS_ERR_SHIFT_RANGE) {
+        scanner->failed_point = first;
+    }
+    if (status == HS_OK) {
+        status = hs_output_reserve(&me->piece->plain.pairs, n, 0.0);
+    }
+    if (status == HS_OK && me->has_images) {
+        status = hs_output_reserve(&me->piece->shifted.pairs, n, 0.0);
+    }
+    for (int32_t row = 0, begin = 0; status == HS_OK && row < hits->n; begin = hits->end[row++]) {
+        if (!add_row(me, first + row, hits->label + begin, hits->end[row] - begin)) {
+            status = HS_ERR_MEMORY;
+        }
+    }
+    return status;
+}
+
+/* A hs_range_fn: a piece. */
+static hs_status
+search_piece(void *context, int64_t number)
+{
+    worker          *me = context;
+    const hs_search *search = &me->built->search;
+    const int64_t    n = search->bins.n, n_pieces = me->built->n;
+    me->piece = &me->built->pieces[number];
+    me->block = -1; /* its images have other numbers */
+    hs_output_reserve_hint(&me->piece->plain.pairs, search->grid.expected_pairs / (double)n_pieces);
+    return hs_walk_or_tell(&me->walker, (int32_t)(n * number / n_pieces),
+                           (int32_t)(n * (number + 1) / n_pieces), &me->committer.failure);
+}
+
+static hs_status
+open_worker(void *context, void *place)
+{
+    building  *built = context;
+    hs_search *search = &built->search;
+    worker    *me = place;
+    me->committer.options = &me->walker.scanner.options;
+    me->built = built;
+    const hs_status status =
+        hs_walker_init(search, HS_BLOCK_LISTS_PLACES, take_hits, me, &me->walker);
+    if (status != HS_OK) {
+        return status;
+    }
+    const int64_t n_runs = me->walker.scanner.block.most_runs + 1;
+    me->image = hs_alloc(&search->call->account, HS_FOR_CANDIDATES, n_runs, sizeof *me->image);
+    return me->image != NULL ? HS_OK : HS_ERR_MEMORY;
+}
+
+static void
+close_worker(void *context, void *place)
+{
+    hs_search *search = &((building *)context)->search;
+    worker    *me = place;
+    hs_walker_close(search, &me->walker);
+    hs_free(&search->call->account, me->image);
+}
+
+/* All pairs. search->bins.order must be 0, 1, 2, ... HS_ERR_SHIFT_RANGE sets failure->row, a
+ * place. */
+static hs_status
+find_pieces(building *built, hs_failure *failure)
+{
+    hs_call  *call = &built->call;
+    const int d = built->search.scene.ndim, m = built->search.scene.lattice.n_periodic;
+    built->n = call->team == NULL ? 1 : PIECES_A_THREAD * hs_team_size(call->team);
+    built->pieces = hs_alloc(&call->account, HS_FOR_CANDIDATES, built->n, sizeof *built->pieces);
+    if (built->pieces == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    memset(built->pieces, 0, (size_t)built->n * sizeof *built->pieces);
+    for (int64_t p = 0; p < built->n; p++) {
+        hs_output_init(NULL, d, HS_WANT_J, 4, &built->pieces[p].plain.pairs);
+        hs_output_init(NULL, d, HS_WANT_J, 4, &built->pieces[p].shifted.pairs);
+        built->pieces[p].images.width = m;
+    }
+    hs_crew crew = {.call = call,
+                    .job = built,
+                    .worker_size = sizeof(worker),
+                    .open = open_worker,
+                    .close = close_worker,
+                    .n_ranges = built->n,
+                    .search = search_piece};
+    return hs_crew_run(&crew, failure);
+}
+
+static void
+free_part(some_pairs *part)
+{
+    hs_output_free(&part->pairs);
+    hs_free(NULL, part->bundles);
+}
+
+/*
+ * The list of one step. It is a search whose points are numbered in cell order, so that neighbours
+ * lie close together in memory when the list is used, and whose shifts are those of the wrapped
+ * points, so that few of them are not zero.
+ */
 
 void
 hs_listing_free(hs_listing *listing)
@@ -462,257 +382,174 @@ hs_listing_free(hs_listing *listing)
     *listing = (hs_listing){0};
 }
 
-static hs_options
-options_of_build(const hs_options *options, double radius, int m)
-{
-    hs_options searching = *options;
-    searching.cutoff = radius;
-    searching.inclusive = true;
-    searching.precision = HS_EXACT;
-    searching.sorted = false;
-    searching.cell_size = 0.0;
-    searching.algorithm = HS_AUTO;
-    searching.out = NULL;
-    searching.counters = NULL;
-    searching.want = HS_WANT_I | HS_WANT_J | (m > 0 ? HS_WANT_SHIFT : 0);
-    searching.index_bytes = 4;
-    return searching;
-}
-
-/* Stores by how many given box vectors each point was wrapped; nothing where none was. */
+/* Renumbers the points by their places in cell order, and stores by how many given box vectors each
+ * was wrapped, or nothing where none was: shifts are images alone from here on. */
 static hs_status
-take_counts(const hs_search *search, hs_listing *listing, hs_failure *failure)
+renumber(hs_search *search, hs_listing *listing, hs_failure *failure)
 {
-    const hs_bins *bins = &search->bins;
-    const int      m = bins->n_periodic;
-    int64_t        any = 0;
-    if (m == 0) {
-        return HS_OK;
+    hs_bins  *bins = &search->bins;
+    const int m = bins->n_periodic;
+    int64_t   any = 0;
+    listing->order = hs_store_reserve(&listing->for_order[listing->turn], HS_FOR_ORDER, bins->n,
+                                      sizeof *listing->order);
+    if (m > 0) {
+        HS_ASSERT(bins->turns.known);
+        listing->counts = hs_store_reserve(&listing->for_counts[listing->turn], HS_FOR_WRAPS,
+                                           bins->n * m, sizeof *listing->counts);
     }
-    HS_ASSERT(bins->turns.known);
-    listing->counts = hs_store_reserve(&listing->for_counts[listing->turn], HS_FOR_WRAPS,
-                                       bins->n * m, sizeof *listing->counts);
-    if (listing->counts == NULL) {
+    if (listing->order == NULL || (m > 0 && listing->counts == NULL)) {
         return HS_ERR_MEMORY;
     }
     for (int64_t si = 0; si < bins->n; si++) {
-        int64_t turns[HS_MAX_DIM];
+        int64_t turns[HS_MAX_DIM], *counts = m > 0 ? listing->counts + si * m : NULL;
         for (int r = 0; r < m; r++) {
             turns[r] = hs_turns_get(&bins->turns, r, si);
         }
-        if (!hs_lattice_shift(&search->scene.lattice, turns, listing->counts + si * m)) {
+        if (m > 0 && !hs_lattice_shift(&search->scene.lattice, turns, counts)) {
             failure->row = bins->order[si];
             return HS_ERR_SHIFT_RANGE;
         }
         for (int r = 0; r < m; r++) {
-            any |= listing->counts[si * m + r];
+            any |= counts[r];
         }
-    }
-    if (any == 0) {
-        listing->counts = NULL;
-    }
-    return HS_OK;
-}
-
-/* Renumbers the points by their places in cell order; shifts are images alone from here on. */
-static hs_status
-renumber(hs_search *search, hs_listing *listing)
-{
-    hs_bins *bins = &search->bins;
-    listing->order = hs_store_reserve(&listing->for_order[listing->turn], HS_FOR_ORDER, bins->n,
-                                      sizeof *listing->order);
-    if (listing->order == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    for (int64_t si = 0; si < bins->n; si++) {
         listing->order[si] = bins->order[si];
         bins->order[si] = (int32_t)si;
     }
+    listing->counts = any != 0 ? listing->counts : NULL;
     if (!bins->keeps_originals) {
         bins->turns.known = false; /* they are not needed any more */
     }
     return HS_OK;
 }
 
-/* Finds all pairs within the radius; the search stays open. */
-static hs_status
-find(building *built, hs_failure *failure)
-{
-    hs_search  *search = &built->search;
-    hs_listing *listing = built->listing;
-    hs_status   status = hs_estimate_by_sample(search, failure);
-    if (status == HS_OK) {
-        status = take_counts(search, listing, failure);
-    }
-    if (status == HS_OK) {
-        status = renumber(search, listing);
-    }
-    if (status == HS_OK) {
-        status = hs_pieces_find(search, &built->pieces, failure);
-        if (failure->row >= 0) {
-            failure->row = listing->order[failure->row];
-        }
-    }
-    return status;
-}
-
-/* Where the parts of a piece go: its first pair and bundle of each kind. */
-typedef struct places {
-    int64_t plain_pair, shifted_pair, plain_bundle, shifted_bundle;
-} places;
-
-typedef struct placing {
-    const building *built;
-    places         *of; /* owned, one for each piece */
-} placing;
-
 static void
-place_part(const hs_part *part, int64_t first_pair, int64_t first_bundle, hs_listing *listing)
+place_part(const some_pairs *part, hs_listing *listing)
 {
     if (part->pairs.n_pairs == 0) {
         return;
     }
-    memcpy(listing->j + first_pair, hs_output_column(&part->pairs, HS_WANT_J),
+    memcpy(listing->j + part->first_pair, hs_output_column(&part->pairs, HS_WANT_J),
            (size_t)part->pairs.n_pairs * sizeof *listing->j);
     for (int64_t b = 0; b < part->n_bundles; b++) {
-        listing->bundles[first_bundle + b] = part->bundles[b];
-        listing->bundles[first_bundle + b].end += first_pair;
+        listing->bundles[part->first_bundle + b] = part->bundles[b];
+        listing->bundles[part->first_bundle + b].end += part->first_pair;
     }
 }
 
-/* A hs_task_fn: the pairs of one piece to the listing, those with an image behind all others. */
+/* A hs_task_fn: the pairs of one piece to the listing. */
 static void
 place_piece(void *context, int64_t p)
 {
-    const placing  *place = context;
-    const hs_piece *piece = &place->built->pieces.of[p];
-    const places   *to = &place->of[p];
-    hs_listing     *listing = place->built->listing;
-    place_part(&piece->plain, to->plain_pair, to->plain_bundle, listing);
-    place_part(&piece->shifted, listing->n_plain + to->shifted_pair,
-               listing->n_plain_bundles + to->shifted_bundle, listing);
+    const building *built = context;
+    place_part(&built->pieces[p].plain, built->listing);
+    place_part(&built->pieces[p].shifted, built->listing);
 }
 
-/* Gives each bundle with a shift the number of its image. */
-static bool
-number_images(hs_part *part, hs_listing *listing)
+/* Where a part goes, behind what has been counted so far. */
+static void
+count_part(some_pairs *part, hs_listing *listing)
 {
-    const int m = listing->images.width;
-    for (int64_t b = 0; b < part->n_bundles; b++) {
-        part->bundles[b].image = hs_images_number(&listing->images, part->shift + b * m);
-        if (part->bundles[b].image < 0) {
-            return false;
+    part->first_pair = listing->n_pairs;
+    part->first_bundle = listing->n_bundles;
+    listing->n_pairs += part->pairs.n_pairs;
+    listing->n_bundles += part->n_bundles;
+}
+
+/* Counts pairs and bundles, those with an image behind all others, and gives the images their
+ * numbers in the listing. */
+static bool
+count_pairs(building *built)
+{
+    hs_listing *listing = built->listing;
+    listing->n_pairs = listing->n_bundles = 0;
+    for (int64_t p = 0; p < built->n; p++) {
+        count_part(&built->pieces[p].plain, listing);
+    }
+    listing->n_plain = listing->n_pairs;
+    for (int64_t p = 0; p < built->n; p++) {
+        const hs_images *images = &built->pieces[p].images;
+        some_pairs      *shifted = &built->pieces[p].shifted;
+        count_part(shifted, listing);
+        for (int64_t b = 0; b < shifted->n_bundles; b++) {
+            const int32_t *shift = images->of + (int64_t)shifted->bundles[b].image * images->width;
+            shifted->bundles[b].image = hs_images_number(&listing->images, shift);
+            if (shifted->bundles[b].image < 0) {
+                return false;
+            }
         }
     }
-    return true;
-}
-
-/* A larger store in *renewed, if the present one is too small. */
-static bool
-renew(const hs_store *store, hs_purpose purpose, int64_t n, size_t size, hs_store *renewed)
-{
-    return (store->data != NULL && n * (int64_t)size <= store->capacity) ||
-           hs_store_reserve(renewed, purpose, n, size) != NULL;
-}
-
-/* The renewed store in place of the other, if there is one. */
-static void *
-take(hs_store *store, hs_store *renewed)
-{
-    if (renewed->data != NULL) {
-        hs_store_free(store);
-        *store = *renewed;
-    }
-    return store->data;
-}
-
-/* Counts pairs and bundles, and how many come before each piece. */
-static bool
-count_pairs(building *built, placing *place)
-{
-    hs_account *account = &built->call.account;
-    hs_listing *listing = built->listing;
-    places      sum = {0};
-    place->of = hs_alloc(account, HS_FOR_SORTING, built->pieces.n, sizeof *place->of);
-    if (place->of == NULL) {
-        return false;
-    }
-    for (int64_t p = 0; p < built->pieces.n; p++) {
-        const hs_piece *piece = &built->pieces.of[p];
-        place->of[p] = sum;
-        sum.plain_pair += piece->plain.pairs.n_pairs;
-        sum.plain_bundle += piece->plain.n_bundles;
-        sum.shifted_pair += piece->shifted.pairs.n_pairs;
-        sum.shifted_bundle += piece->shifted.n_bundles;
-    }
-    listing->n_plain = sum.plain_pair;
-    listing->n_pairs = sum.plain_pair + sum.shifted_pair;
-    listing->n_plain_bundles = sum.plain_bundle;
-    listing->n_bundles = sum.plain_bundle + sum.shifted_bundle;
     /* The pieces, which the account is not charged for, and the listing. */
-    return hs_account_allows(account, (double)(2 * sizeof *listing->j) * (double)listing->n_pairs +
-                                          (double)(3 * sizeof *listing->bundles) *
-                                              (double)listing->n_bundles);
-}
-
-/* Makes room for the pairs, which may be that of the list in use: so this is the last step that can
- * fail, ... */
-static bool
-make_room(hs_listing *listing)
-{
-    hs_store j = {0}, bundles = {0};
-    /* ... which must lose none of its arrays if another one cannot be had. */
-    if (!renew(&listing->for_j, HS_FOR_INDICES, listing->n_pairs + HS_PADDING, sizeof(int32_t),
-               &j) ||
-        !renew(&listing->for_bundles, HS_FOR_INDICES, listing->n_bundles, sizeof(hs_bundle),
-               &bundles)) {
-        hs_store_free(&j);
-        return false;
-    }
-    listing->j = take(&listing->for_j, &j);
-    listing->bundles = take(&listing->for_bundles, &bundles);
-    memset(listing->j + listing->n_pairs, 0, HS_PADDING * sizeof *listing->j);
-    return true;
+    return hs_account_allows(&built->call.account,
+                             (double)(2 * sizeof *listing->j) * (double)listing->n_pairs +
+                                 (double)(3 * sizeof *listing->bundles) *
+                                     (double)listing->n_bundles);
 }
 
 /* Writes what was found to the listing. */
 static hs_status
 write_listing(building *built)
 {
-    hs_search *search = &built->search;
-    placing    place = {.built = built};
-    images_init(search->scene.lattice.n_periodic, &built->listing->images);
-    bool complete = count_pairs(built, &place);
-    for (int64_t p = 0; p < built->pieces.n && complete; p++) {
-        complete = number_images(&built->pieces.of[p].shifted, built->listing);
+    hs_listing *listing = built->listing;
+    hs_store    larger = {0}; /* in place of listing->for_j, if that is too small */
+    listing->images.width = built->search.scene.lattice.n_periodic;
+    if (!count_pairs(built)) {
+        return HS_ERR_MEMORY;
     }
-    complete = complete && make_room(built->listing);
-    if (complete) {
-        hs_team_run(search->call->team, built->pieces.n, place_piece, &place);
+    /* The list in use keeps its arrays until the last step that can fail. */
+    const int64_t n_j = listing->n_pairs + HS_PADDING;
+    const bool    fits = listing->for_j.data != NULL &&
+                      n_j * (int64_t)sizeof *listing->j <= listing->for_j.capacity;
+    if ((!fits && hs_store_reserve(&larger, HS_FOR_INDICES, n_j, sizeof *listing->j) == NULL) ||
+        hs_store_reserve(&listing->for_bundles, HS_FOR_INDICES, listing->n_bundles,
+                         sizeof *listing->bundles) == NULL) {
+        hs_store_free(&larger);
+        return HS_ERR_MEMORY;
     }
-    hs_free(&search->call->account, place.of);
-    return complete ? HS_OK : HS_ERR_MEMORY;
+    if (!fits) {
+        hs_store_free(&listing->for_j);
+        listing->for_j = larger;
+    }
+    listing->j = listing->for_j.data;
+    listing->bundles = listing->for_bundles.data;
+    memset(listing->j + listing->n_pairs, 0, HS_PADDING * sizeof *listing->j);
+    hs_team_run(built->call.team, built->n, place_piece, built);
+    return HS_OK;
 }
 
 static hs_status
 build(const hs_frame *frame, building *built, hs_failure *failure)
 {
     hs_call      *call = &built->call;
+    hs_listing   *listing = built->listing;
     const hs_sets sets = {.points = &frame->points, .is_plain = true};
     hs_status  status = hs_search_open(&sets, hs_frame_box(frame), call, &built->search, failure);
     const bool opened = status == HS_OK;
     if (status == HS_OK) {
-        status = find(built, failure);
+        status = hs_estimate_by_sample(&built->search, failure);
+    }
+    if (status == HS_OK) {
+        status = renumber(&built->search, listing, failure);
+    }
+    if (status == HS_OK) {
+        status = find_pieces(built, failure);
+        if (failure->row >= 0) {
+            failure->row = listing->order[failure->row];
+        }
     }
     if (status == HS_OK) {
         status = write_listing(built);
     }
     if (status == HS_ERR_MEMORY) {
-        failure->expected_pairs = fmax(failure->expected_pairs, (double)built->listing->n_pairs);
+        failure->expected_pairs = fmax(failure->expected_pairs, (double)listing->n_pairs);
     }
     hs_call_tell_limit(call, status, failure);
+    for (int64_t p = 0; built->pieces != NULL && p < built->n; p++) {
+        free_part(&built->pieces[p].plain);
+        free_part(&built->pieces[p].shifted);
+        images_free(&built->pieces[p].images);
+    }
+    hs_free(&call->account, built->pieces);
     if (opened) {
-        hs_pieces_free(&call->account, &built->pieces);
         hs_search_close(&built->search);
     }
     return status;
@@ -722,20 +559,31 @@ hs_status
 hs_listing_build(const hs_frame *frame, const hs_options *options, double radius,
                  hs_listing *listing, hs_failure *failure)
 {
-    int              row[HS_MAX_DIM];
-    const hs_options searching = options_of_build(options, radius, hs_frame_periodic(frame, row));
-    hs_listing       next = *listing; /* with its stores */
-    building        *built = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *built);
+    int        row[HS_MAX_DIM];
+    hs_options searching = *options;
+    hs_listing next = *listing; /* with its stores */
+    building  *built = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *built);
     if (built == NULL) {
         return HS_ERR_MEMORY;
     }
+    searching.cutoff = radius;
+    searching.inclusive = true;
+    searching.precision = HS_EXACT;
+    searching.sorted = false;
+    searching.cell_size = 0.0;
+    searching.algorithm = HS_AUTO;
+    searching.out = NULL;
+    searching.counters = NULL;
+    searching.want = HS_WANT_I | HS_WANT_J;
+    searching.want |= hs_frame_periodic(frame, row) > 0 ? HS_WANT_SHIFT : 0;
+    searching.index_bytes = 4;
     next.n_pairs = 0; /* not known */
     next.radius = radius;
     next.counts = NULL;
-    images_init(0, &next.images);
+    next.images = (hs_images){.width = 0};
     next.turn = 1 - listing->turn;
     built->listing = &next;
-    built->pieces = (hs_pieces){0};
+    built->pieces = NULL;
     hs_call_begin(&searching, &built->call);
     const hs_status status = build(frame, built, failure);
     hs_call_dismiss(&built->call);
@@ -752,13 +600,56 @@ hs_listing_build(const hs_frame *frame, const hs_options *options, double radius
     return status;
 }
 
-/* One loop for each common type and number of dimensions; maxima in several chains,
- * for one would wait for itself. */
+/*
+ * How far points have moved, a tile at a time: u_i = r_i - r0_i F - k_i h - c, what is left when
+ * the deformation of the box, whole box vectors and what all points share are taken away.
+ */
+
+#define TILE 64 /* points whose displacements are held at a time; whole chains of a maximum */
+
+typedef struct tracking {
+    const hs_motion *motion;
+    bool             deformed;
+    hs_strain        strain;
+    hs_lattice       lattice; /* of the box now */
+    int              m;
+    double           jump; /* longer displacements are looked at; infinity: none */
+    bool             has_base;
+    double           base[HS_MAX_DIM];
+    bool             has_drift;
+    double           drift[HS_MAX_DIM];
+    hs_store        *jumps;
+    int64_t         *jump_of;   /* in it, m a point; NULL: there is none yet */
+    double           square;    /* largest |u|^2 ... */
+    double           component; /* ... and |u_k| */
+    double           magnitude; /* of the terms of wrapping */
+} tracking;
+
+/* u of the points of one tile, one array for each axis, without drift. */
+typedef struct tile {
+    int64_t first, step; /* points first, first + step, ... */
+    int     n;
+    double  u[HS_MAX_DIM][TILE];
+} tile;
+
+/* Whether a displacement is so long that it may be a jump. */
+static bool
+may_be_jump(const tracking *track, const tile *t, int p)
+{
+    double longest = 0.0;
+    for (int k = 0; k < track->lattice.ndim; k++) {
+        longest = hs_larger(fabs(t->u[k][p]), longest);
+    }
+    return !(longest < track->jump);
+}
+
+/* One loop for each common type and number of dimensions; maxima in several chains, for one would
+ * wait for itself. */
 
 #define CHAINS 8
 
 HS_ALWAYS_INLINE void
-subtract(const hs_tracking *track, hs_tile *t, const hs_real real, const int d, const bool deformed)
+subtract(const tracking *track, tile *t, const hs_real real, const int d, const bool deformed)
 {
     const void   *now = track->motion->now->rows, *built = track->motion->built->rows;
     const int64_t first = t->first * d, step = t->step * d;
@@ -777,7 +668,7 @@ subtract(const hs_tracking *track, hs_tile *t, const hs_real real, const int d, 
 
 /* subtract, with constants where that pays. */
 static void
-find_displacements(const hs_tracking *track, hs_tile *t)
+find_displacements(const tracking *track, tile *t)
 {
     const hs_real real = track->motion->now->points.real;
     const int     d = track->motion->now->points.ndim;
@@ -800,7 +691,7 @@ find_displacements(const hs_tracking *track, hs_tile *t)
 /* Takes whole box vectors from u of point p. Returns whether that is known to have worked; sets
  * `given`, over the box vectors as given. */
 static bool
-take_jump(hs_tracking *track, hs_tile *t, int p, int64_t *given)
+take_jump(tracking *track, tile *t, int p, int64_t *given)
 {
     double  u[HS_MAX_DIM], inside[HS_MAX_DIM];
     int64_t turns[HS_MAX_DIM];
@@ -817,21 +708,9 @@ take_jump(hs_tracking *track, hs_tile *t, int p, int64_t *given)
     return true;
 }
 
-/* No jumps yet. */
-static bool
-start_jumps(hs_tracking *track)
-{
-    const int64_t n = track->motion->now->points.n * track->m;
-    track->jump_of = hs_store_reserve(track->jumps, HS_FOR_WRAPS, n, sizeof *track->jump_of);
-    if (track->jump_of != NULL) {
-        memset(track->jump_of, 0, (size_t)n * sizeof *track->jump_of);
-    }
-    return track->jump_of != NULL;
-}
-
 /* The longest of the tile, less drift, to *square and *component. */
 HS_ALWAYS_INLINE void
-find_longest(hs_tile *t, const int d, const double *drift, double *square, double *component)
+find_longest(tile *t, const int d, const double *drift, double *square, double *component)
 {
     double most[CHAINS] = {0.0}, longest[CHAINS] = {0.0};
     for (int p = t->n; p % CHAINS != 0; p++) { /* the last one again */
@@ -860,7 +739,7 @@ find_longest(hs_tile *t, const int d, const double *drift, double *square, doubl
 
 /* The longest of the tile, less drift, to *square and *component, which are not lowered. */
 static void
-measure_tile(hs_tile *t, int d, const double *drift, double *square, double *component)
+measure_tile(tile *t, int d, const double *drift, double *square, double *component)
 {
     switch (d) {
     case 2: find_longest(t, 2, drift, square, component); break;
@@ -869,17 +748,17 @@ measure_tile(hs_tile *t, int d, const double *drift, double *square, double *com
     }
 }
 
-/* Displacements of up to HS_TILE points from `first` on; their longest to *square and *component.
+/* Displacements of up to TILE points from `first` on; their longest to *square and *component.
  * Returns whether some point may have jumped. */
 static bool
-look_at_tile(const hs_tracking *track, int64_t first, int64_t step, hs_tile *t, double *square,
+look_at_tile(const tracking *track, int64_t first, int64_t step, tile *t, double *square,
              double *component)
 {
     const double  none[HS_MAX_DIM] = {0.0};
     const int64_t left = (track->motion->now->points.n - first + step - 1) / step;
     t->first = first;
     t->step = step;
-    t->n = left < HS_TILE ? (int)left : HS_TILE;
+    t->n = left < TILE ? (int)left : TILE;
     *square = *component = 0.0;
     find_displacements(track, t);
     measure_tile(t, track->motion->now->points.ndim, none, square, component);
@@ -889,13 +768,13 @@ look_at_tile(const hs_tracking *track, int64_t first, int64_t step, hs_tile *t, 
 /* Takes and keeps the jumps of the points of a tile. HS_REBUILD: some point went too far to
  * tell. */
 static hs_status
-take_jumps(hs_tracking *track, hs_tile *t)
+take_jumps(tracking *track, tile *t)
 {
     const int m = track->m;
     for (int p = 0; p < t->n; p++) {
         int64_t  given[HS_MAX_DIM];
         uint64_t any = 0;
-        if (!hs_may_be_jump(track, t, p)) {
+        if (!may_be_jump(track, t, p)) {
             continue;
         }
         if (!take_jump(track, t, p, given)) {
@@ -904,8 +783,13 @@ take_jumps(hs_tracking *track, hs_tile *t)
         for (int r = 0; r < m; r++) {
             any |= (uint64_t)given[r];
         }
-        if (any != 0 && track->jump_of == NULL && !start_jumps(track)) {
-            return HS_ERR_MEMORY;
+        if (any != 0 && track->jump_of == NULL) { /* no jumps yet */
+            const int64_t n = track->motion->now->points.n * m;
+            track->jump_of = hs_store_reserve(track->jumps, HS_FOR_WRAPS, n, sizeof(int64_t));
+            if (track->jump_of == NULL) {
+                return HS_ERR_MEMORY;
+            }
+            memset(track->jump_of, 0, (size_t)n * sizeof(int64_t));
         }
         for (int r = 0; any != 0 && r < m; r++) {
             track->jump_of[(t->first + p) * m + r] = given[r];
@@ -915,9 +799,9 @@ take_jumps(hs_tracking *track, hs_tile *t)
 }
 
 /*
- * Chooses F, k and c (pair_list.h), and what the longest displacement leaves of the skin.
- * Any F, k and c are right; good ones make displacements small. c is `base`, taken away before box
- * vectors are looked for, and `drift`, taken away behind that.
+ * Chooses F, k and c, and finds what the longest displacement leaves of the skin. Any F, k and c
+ * are right; good ones make displacements small. c is `base`, taken away before box vectors are
+ * looked for, and `drift`, taken away behind that.
  */
 
 #define UNIT   0x1p-53
@@ -930,16 +814,16 @@ take_jumps(hs_tracking *track, hs_tile *t)
 
 /* Points that all went far share that, or most of it: the displacement of one of them. */
 static void
-find_base(hs_tracking *track)
+find_base(tracking *track)
 {
     const int64_t n = track->motion->now->points.n, step = (n + SAMPLE - 1) / SAMPLE;
     int64_t       count = 0, far = 0;
     double        base[HS_MAX_DIM] = {0.0}, square, component;
-    hs_tile       t;
-    for (int64_t i = 0; track->m > 0 && i < n; i += HS_TILE * step, count += t.n) {
+    tile          t;
+    for (int64_t i = 0; track->m > 0 && i < n; i += TILE * step, count += t.n) {
         const bool any = look_at_tile(track, i, step, &t, &square, &component);
         for (int p = 0; any && p < t.n; p++) {
-            if (hs_may_be_jump(track, &t, p)) {
+            if (may_be_jump(track, &t, p)) {
                 for (int k = 0; far == 0 && k < track->lattice.ndim; k++) {
                     base[k] = t.u[k][p];
                 }
@@ -961,17 +845,17 @@ typedef struct sample {
 } sample;
 
 static void
-take_sample(hs_tracking *track, const double *drift, sample *found)
+take_sample(tracking *track, const double *drift, sample *found)
 {
     const int64_t n = track->motion->now->points.n, step = (n + SAMPLE - 1) / SAMPLE;
     const int     d = track->motion->now->points.ndim;
     double        square, component;
-    hs_tile       t;
+    tile          t;
     *found = (sample){.count = 0.0};
-    for (int64_t i = 0; i < n; i += HS_TILE * step) {
+    for (int64_t i = 0; i < n; i += TILE * step) {
         const bool any = look_at_tile(track, i, step, &t, &square, &component);
         for (int p = 0; p < t.n; p++) {
-            if (any && hs_may_be_jump(track, &t, p)) {
+            if (any && may_be_jump(track, &t, p)) {
                 int64_t given[HS_MAX_DIM];
                 (void)take_jump(track, &t, p, given); /* a failure shows again in the full pass */
             }
@@ -989,7 +873,7 @@ take_sample(hs_tracking *track, const double *drift, sample *found)
 
 /* The drift of a sample: the mean, or where the sample is all there is the middle of the range. */
 static void
-guess_drift(hs_tracking *track)
+guess_drift(tracking *track)
 {
     sample    all, rest;
     double    drift[HS_MAX_DIM] = {0.0};
@@ -1008,7 +892,7 @@ guess_drift(hs_tracking *track)
 
 /* At least the longest |u| as computed: 2^-47 is more than the roundings of square and root. */
 static double
-longest_computed(const hs_tracking *track)
+longest_computed(const tracking *track)
 {
     if (track->component == 0.0) {
         return 0.0;
@@ -1021,7 +905,7 @@ longest_computed(const hs_tracking *track)
 
 /* How far a computed u may be from the true one. Zero where nothing was rounded. */
 static double
-bound_rounding(const hs_tracking *track)
+bound_rounding(const tracking *track)
 {
     const hs_motion *motion = track->motion;
     const int        d = motion->now->points.ndim;
@@ -1047,7 +931,7 @@ bound_rounding(const hs_tracking *track)
 
 /* What is left of the skin. Each step is rounded to the safe side. */
 static double
-find_margin(const hs_tracking *track)
+find_margin(const tracking *track)
 {
     const hs_motion *motion = track->motion;
     double           reach = motion->radius;
@@ -1064,70 +948,49 @@ find_margin(const hs_tracking *track)
     return margin > 0.0 && used > 0.0 ? hs_next_down(margin) : margin;
 }
 
-static hs_status
-start(const hs_motion *motion, hs_store *jumps, hs_tracking *track)
-{
-    int row[HS_MAX_DIM];
-    memset(track, 0, sizeof *track);
-    track->motion = motion;
-    track->jumps = jumps;
-    track->m = hs_frame_periodic(motion->now, row);
-    track->jump = INFINITY;
-    if (track->m == 0) {
-        return HS_OK;
-    }
-    track->deformed = !hs_frames_share_box(motion->built, motion->now);
-    if (track->deformed &&
-        !hs_strain_find(&motion->built->box, &motion->now->box, &track->strain)) {
-        return HS_REBUILD;
-    }
-    hs_lattice_init(&motion->now->box, motion->now->points.ndim, hs_scale_of(0), &track->lattice);
-    for (int k = 0; k < track->lattice.ndim; k++) {
-        if (track->lattice.row_of_axis[k] >= 0) {
-            track->jump = hs_smaller(JUMP * track->lattice.period[k], track->jump);
-        }
-    }
-    return track->jump > 0.0 ? HS_OK : HS_REBUILD;
-}
-
-static hs_status
-measure_all(hs_tracking *track, const hs_options *options)
-{
-    const int64_t n = track->motion->now->points.n;
-    hs_tile       t;
-    for (int64_t first = 0; first < n; first += HS_TILE) {
-        double     square, component;
-        const bool any = look_at_tile(track, first, 1, &t, &square, &component);
-        hs_status  status = any ? take_jumps(track, &t) : HS_OK;
-        if (status == HS_OK && (any || track->has_drift)) {
-            measure_tile(&t, track->motion->now->points.ndim, track->drift, &track->square,
-                         &track->component);
-        } else {
-            track->square = hs_larger(square, track->square);
-            track->component = hs_larger(component, track->component);
-        }
-        if (status == HS_OK && (first + HS_TILE) % HS_POLL_POINTS == 0) {
-            status = hs_poll(options, 0.0);
-        }
-        if (status != HS_OK) {
-            return status;
-        }
-    }
-    return HS_OK;
-}
-
 hs_status
 hs_motion_margin(const hs_motion *motion, const hs_options *options, double *margin, bool *jumped,
                  hs_store *jumps)
 {
-    hs_tracking track;
-    hs_status   status = start(motion, jumps, &track);
+    const hs_frame *built = motion->built, *now = motion->now;
+    const int64_t   n = now->points.n;
+    tracking        track = {.motion = motion, .jumps = jumps, .jump = INFINITY};
+    tile            t;
+    int             row[HS_MAX_DIM];
+    hs_status       status = HS_OK;
     *margin = -INFINITY;
     *jumped = false;
-    if (status == HS_OK) {
-        find_base(&track);
-        guess_drift(&track);
-        status = measure_all(&track, options);
+    track.m = hs_frame_periodic(now, row);
+    if (track.m > 0) {
+        track.deformed = !hs_frames_share_box(built, now);
+        if (track.deformed && !hs_strain_find(&built->box, &now->box, &track.strain)) {
+            return HS_OK;
+        }
+        hs_lattice_init(&now->box, now->points.ndim, hs_scale_of(0), &track.lattice);
+        for (int k = 0; k < track.lattice.ndim; k++) {
+            if (track.lattice.row_of_axis[k] >= 0) {
+                track.jump = hs_smaller(JUMP * track.lattice.period[k], track.jump);
+            }
+        }
+        if (!(track.jump > 0.0)) {
+            return HS_OK;
+        }
+    }
+    find_base(&track);
+    guess_drift(&track);
+    for (int64_t first = 0; status == HS_OK && first < n; first += TILE) {
+        double     square, component;
+        const bool any = look_at_tile(&track, first, 1, &t, &square, &component);
+        status = any ? take_jumps(&track, &t) : HS_OK;
+        if (status == HS_OK && (any || track.has_drift)) {
+            measure_tile(&t, now->points.ndim, track.drift, &track.square, &track.component);
+        } else {
+            track.square = hs_larger(square, track.square);
+            track.component = hs_larger(component, track.component);
+        }
+        if (status == HS_OK && (first + TILE) % HS_POLL_POINTS == 0) {
+            status = hs_poll(options, 0.0);
+        }
     }
     if (status == HS_OK) {
         const double found = find_margin(&track);

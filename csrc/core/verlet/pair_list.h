@@ -12,10 +12,12 @@
 
 #include <math.h>
 
-/* pair_list.h: a list of pairs that is used for many steps: what it holds. */
+/*
+ * pair_list.h: a list of pairs that is used for many steps: what it holds, and how much of its skin
+ * the motion of the points leaves.
+ */
 
 /* The distinct shifts among many, numbered in the order in which they first come. */
-
 typedef struct hs_images {
     int      width; /* numbers of a shift */
     int32_t *of;    /* owned; n shifts of `width` numbers */
@@ -43,7 +45,7 @@ typedef struct hs_listing {
     int64_t    n_pairs, n_plain;
     int32_t   *j;       /* b of each pair, and HS_PADDING places more */
     hs_bundle *bundles; /* first those without an image */
-    int64_t    n_bundles, n_plain_bundles;
+    int64_t    n_bundles;
     hs_images  images;
     int32_t   *order;  /* the caller's number of each place */
     int64_t   *counts; /* m for each place, when it was built; NULL: all zero */
@@ -73,42 +75,9 @@ hs_status hs_listing_build(const hs_frame *frame, const hs_options *options, dou
 void hs_listing_free(hs_listing *listing);
 
 /*
- * The pairs of a search in pieces, one for each range of its points, by several
- * threads. Which pieces there are depends on the number of threads, what follows from one to the
- * next does not. Points are told by their places in cell order. Few pairs have a shift, those that
- * are in different images once the points are wrapped, and each piece keeps them apart.
+ * How far points have moved since a list was built, and what that leaves of its skin.
+ * docs/verlet.md derives the inequality.
  */
-
-/* Some pairs of a piece, as in a hs_listing. */
-typedef struct hs_part {
-    hs_output  pairs;   /* b of each, in its column j; counted by no account */
-    hs_bundle *bundles; /* owned; ends are places in this part */
-    int32_t   *shift;   /* owned; m for each bundle, over the box vectors that repeat, as given */
-    int64_t    n_bundles, capacity;
-} hs_part;
-
-typedef struct hs_piece {
-    hs_part plain, shifted;
-} hs_piece;
-
-typedef struct hs_pieces {
-    int64_t   n;
-    hs_piece *of; /* owned */
-} hs_pieces;
-
-/* All pairs. search->bins.order must be 0, 1, 2, ... On failure nothing is held; HS_ERR_SHIFT_RANGE
- * sets failure->row, a place. */
-hs_status hs_pieces_find(hs_search *search, hs_pieces *pieces, hs_failure *failure);
-
-void hs_pieces_free(hs_account *account, hs_pieces *pieces);
-
-/*
- * How far points have moved, a tile at a time: u_i = r_i - r0_i F - k_i h - c, what
- * is left when the deformation of the box, whole box vectors and what all points share are taken
- * away.
- */
-
-#define HS_TILE 64 /* points whose displacements are held at a time; whole chains of a maximum */
 
 /* What is compared; all borrowed. */
 typedef struct hs_motion {
@@ -117,47 +86,6 @@ typedef struct hs_motion {
     double          radius; /* the list has every pair up to here */
     double          cutoff;
 } hs_motion;
-
-typedef struct hs_tracking {
-    const hs_motion *motion;
-    bool             deformed;
-    hs_strain        strain;
-    hs_lattice       lattice; /* of the box now */
-    int              m;
-    double           jump; /* longer displacements are looked at; infinity: none */
-    bool             has_base;
-    double           base[HS_MAX_DIM];
-    bool             has_drift;
-    double           drift[HS_MAX_DIM];
-    hs_store        *jumps;
-    int64_t         *jump_of;   /* in it, m a point; NULL: there is none yet */
-    double           square;    /* largest |u|^2 ... */
-    double           component; /* ... and |u_k| */
-    double           magnitude; /* of the terms of wrapping */
-} hs_tracking;
-
-/* u of the points of one tile, one array for each axis, without drift. */
-typedef struct hs_tile {
-    int64_t first, step; /* points first, first + step, ... */
-    int     n;
-    double  u[HS_MAX_DIM][HS_TILE];
-} hs_tile;
-
-/* Whether a displacement is so long that it may be a jump. */
-HS_ALWAYS_INLINE bool
-hs_may_be_jump(const hs_tracking *track, const hs_tile *t, int p)
-{
-    double longest = 0.0;
-    for (int k = 0; k < track->lattice.ndim; k++) {
-        longest = hs_larger(fabs(t->u[k][p]), longest);
-    }
-    return !(longest < track->jump);
-}
-
-/*
- * How far points have moved since a list was built, and what that leaves of its skin.
- * docs/verlet.md derives the inequality.
- */
 
 /*
  * *margin: by how much pairs may still come closer, in the unit of points, rounded down. At least

@@ -220,12 +220,23 @@ class Right:
         if self.is_one_set and j < i:
             back = self._nearest(j, i, tuple(-s for s in shift))
             return tuple(-s for s in back)
-        square = self._square(np.array([i, j, *shift]))
+        pair = (self.asking[i], self.points[j])
+        square = min(self._square(np.array([i, j, *S])) for S in (shift, self._wrapped(i, j)))
         root = math.isqrt(square.numerator * square.denominator) + 1  # and more
         reach = [[None, Fraction(root, square.denominator)], [None, None]]
-        pair = (self.asking[i], self.points[j])
         images = reference_pairs(pair, reach, self.box, self.periodic)
         return min((self._square(np.array([i, j, *S])), S) for _, _, S in images)[1]
+
+    def _wrapped(self, i: int, j: int) -> tuple[int, ...]:
+        """The S of a near image of a pair: about the nearest one, unless the box is skewed."""
+        S = np.zeros(self.points.shape[1], np.int64)
+        if self.box is not None:
+            axes = slice(None) if self.periodic is None else self.periodic
+            with np.errstate(over="ignore"):
+                apart = np.nan_to_num(self.points[j].astype(np.float64) - self.asking[i])
+            turns = np.linalg.lstsq(self.box[axes].T, apart, rcond=None)[0]
+            S[axes] = -np.clip(np.rint(turns), -(2.0**31), 2.0**31)
+        return tuple(S.tolist())
 
     # ---- which of them count ---------------------------------------------------------------
 

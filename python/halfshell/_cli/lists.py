@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 import halfshell as hs
 from halfshell import _core
 from halfshell._cli.errors import InputError, printable
-from halfshell._cli.files import check_size, open_output, read_scene, write_columns
+from halfshell._cli.files import read_scene
+from halfshell._cli.outputs import check_size, open_output, write_columns
 from halfshell._cli.scene import (
     describe_box,
     describe_points,

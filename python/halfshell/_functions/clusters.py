@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from halfshell import _core, _show
 from halfshell._convert.arrays import entries_of
-from halfshell._convert.call import Call, each_system, take
+from halfshell._convert.call import Call, take
 from halfshell._convert.options import as_count
 from halfshell._convert.points import flags_of
 from halfshell._functions.pairs import pairs, pairs_wanted
@@ -94,33 +94,12 @@ def clusters(
     """
     least = as_count(min_points, "min_points")
     call = take(points, cutoff, **search)
-    if call.points.batch is None:
-        return _clusters_of(call, least)
-    n, d = call.array.shape
-    labels, core, spans, sizes = np.full(n, -1), np.zeros(n, bool), [], []
-    count = 0
-    for one, first in each_system(call):
-        found = _clusters_of(one, least)
-        own = slice(first, first + len(found.labels))
-        labels[own] = np.where(found.labels < 0, -1, found.labels + count)
-        core[own] = found.core
-        spans.append(found.spans)
-        sizes.append(found.sizes)
-        count += found.n_clusters
-    return Clusters(
-        labels, np.concatenate([np.empty(0, np.int64), *sizes]), core,
-        np.concatenate([np.empty((0, d), bool), *spans]), call,
-    )  # fmt: skip
-
-
-def _clusters_of(call: Call, least: int) -> Clusters:
-    """The clusters of one system."""
     n, d = call.array.shape
     core = None
     algorithm = call.settings.algorithm
     if least > 1:
         core = call.run(_core.coordination, None, call.pairing, algorithm) >= least - 1
-    has_images = call.bits != 0
+    has_images = bool(np.any(call.points._axes))
     count, labels, bits = call.run(_core.clusters, core, has_images, call.pairing, algorithm)
     return Clusters(
         labels,

@@ -13,7 +13,7 @@ from halfshell._convert.options import as_flag, as_index_bytes, most_pairs
 from halfshell._search import search
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
     from typing import Literal, Unpack
 
     import numpy.typing as npt
@@ -238,11 +238,11 @@ def pairs(
 
 
 def pairs_wanted(
-    call: Call, quantities: str, sort: bool, index_bytes: int, out: Any, room: int | None = None
+    call: Call, quantities: str, sort: bool, index_bytes: int, out: Any
 ) -> Arrays:
-    """The pairs of a call. room: the length of all arrays, as the core takes it."""
+    """The pairs of a call."""
     wanted = quantities, sort, index_bytes, out
-    end = call.pairing, call.settings.algorithm, call.shells, room
+    end = call.pairing, call.settings.algorithm, call.shells
     return cast("Arrays", call.run(_core.pairs, *wanted, *end))
 
 
@@ -370,16 +370,9 @@ def pairs_between(
         threads, progress, directed=True, several=shells_of(quantities),
     )  # fmt: skip
     check_shells(call, quantities)
-    return between_wanted(call, quantities, as_index_bytes(index_dtype), out)
-
-
-def between_wanted(
-    call: Call, quantities: str, index_bytes: int, out: Any, room: int | None = None
-) -> Arrays:
-    """The pairs of a call with queries."""
     found = call.run(
-        _core.pairs_between, quantities, True, index_bytes, out, call.query_set, call.pairing,
-        call.settings.algorithm, call.shells, room,
+        _core.pairs_between, quantities, True, as_index_bytes(index_dtype), out, call.query_set,
+        call.pairing, call.settings.algorithm, call.shells,
     )  # fmt: skip
     return cast("Arrays", found)
 
@@ -446,8 +439,8 @@ def iter_pairs(
         As in `pairs`. Threads run while a block is being made and end before it is returned.
     progress : bool or callable, optional
         As in `pairs`, with the fraction of the points that are done, until the iterator ends or is
-        closed. An exception ends the call; the iterator can continue afterwards, but for `indices`
-        and a batch.
+        closed. An exception ends the call; the iterator can continue afterwards, but for
+        `indices`.
 
     Returns
     -------
@@ -505,34 +498,9 @@ def iter_pairs(
         call.shells, call.system_cutoffs = copied((call.shells, call.system_cutoffs))
         parts = blocks_of_some(call, quantities, index_bytes)
         return cast("PairBlocks[Any]", _in_blocks(parts, quantities, most))
-    if call.points.batch is not None:
-        return cast("PairBlocks[Any]", _blocks_of_systems(call, quantities, index_bytes, most))
-    return cast("PairBlocks[Any]", _blocks(call, quantities, index_bytes, most))
-
-
-def _blocks(call: Call, quantities: str, index_bytes: int, most: int) -> Iterator[Any]:
     own = quantities, index_bytes, most, call.pairing, call.settings.algorithm, call.shells
     arguments: Any = (*call.core, *own)
-    found = _core.iter_pairs(*arguments)
-    return cast("Iterator[Any]", found)
-
-
-def _blocks_of_systems(
-    call: Call, quantities: str, index_bytes: int, most: int
-) -> Iterator[Any]:
-    """Blocks of one system after the other, of which several make one block where they fit."""
-    parts = [(_blocks(one, quantities, index_bytes, most), first) for one, first in _systems(call)]
-
-    def each() -> Iterator[Any]:
-        for blocks, first in parts:
-            for block in blocks:
-                columns = block if isinstance(block, tuple) else (block,)
-                yield [
-                    column + first if letter in "ijP" else column
-                    for column, letter in zip(columns, quantities, strict=True)
-                ]
-
-    return _in_blocks(each(), quantities, most)
+    return cast("PairBlocks[Any]", _core.iter_pairs(*arguments))
 
 
 def _in_blocks(parts: Iterator[Any], quantities: str, most: int) -> Iterator[Any]:
@@ -647,21 +615,5 @@ def for_each_pair(
         points, cutoff, None, box, periodic, rule, exclude, min_distance, None, inclusive, threads
     )
     own = target.function, target.user, as_flag(thread_safe, "thread_safe")
-    n_pairs = 0
-    for one, first in _systems(call):
-        found, is_ended = one.run(
-            _core.for_each_pair, *own, first, one.pairing, one.settings.algorithm
-        )
-        n_pairs += found
-        if is_ended:
-            break
+    n_pairs: int = call.run(_core.for_each_pair, *own, call.pairing, call.settings.algorithm)
     return n_pairs
-
-
-def _systems(call: Call) -> Iterable[tuple[Call, int]]:
-    """A call for each system, and the number of its first point among all."""
-    if call.points.batch is None:
-        return ((call, 0),)
-    from halfshell._convert.call import each_system  # as above
-
-    return each_system(call)

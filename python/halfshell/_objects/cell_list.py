@@ -218,7 +218,7 @@ class CellList:
         self.points = points
         known = points.radii, points.supports, points._groups
         is_plain = all(one is None for one in known)
-        #: What C takes in place of the list (csrc/binding/quick.c).
+        #: What C takes in place of the list (csrc/binding/functions.c).
         self._plain = (self._cells, self._cutoff, self._threads) if is_plain else None
 
     def __len__(self) -> int:

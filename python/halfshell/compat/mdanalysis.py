@@ -8,6 +8,7 @@ the exact values of the float32 numbers decide. The order of the pairs is not sp
 
 from __future__ import annotations
 
+import math
 from typing import Any, cast
 
 import numpy as np
@@ -45,9 +46,10 @@ def _box(box: Any) -> dict[str, Any]:
     return {"box": form, "periodic": periodic}
 
 
-def _diagonal(box: dict[str, Any]) -> Any:
+def _lengths(box: dict[str, Any]) -> list[float]:
     """The lengths of a box with right angles, or along the axes of a lower triangle."""
-    return box["box"] if box["box"].ndim == 1 else box["box"].diagonal()
+    lengths: list[float] = (box["box"] if box["box"].ndim == 1 else box["box"].diagonal()).tolist()
+    return lengths
 
 
 def _check(method: str | None, backend: str) -> None:
@@ -63,16 +65,16 @@ def _within(max_cutoff: Any, box: dict[str, Any], *sets: Any) -> Any:
     The vectors of the box are rows of a lower triangle, so some image of each point is as near as
     half of the diagonal is long; on open axes points are as far apart as their coordinates.
     """
-    halves = np.zeros(3) if box["box"] is None else _diagonal(box) / 2.0
-    if np.isfinite(max_cutoff) and (box["box"] is None or max_cutoff <= halves.max()):
+    halves = [0.0] * 3 if box["box"] is None else [length / 2.0 for length in _lengths(box)]
+    if math.isfinite(max_cutoff) and (box["box"] is None or max_cutoff <= max(halves)):
         return max_cutoff
     spans = halves
     if box["box"] is None or not box["periodic"].all():
         low = np.min([points.min(axis=0) for points in sets], axis=0).astype(np.float64)
-        spans = np.max([points.max(axis=0) for points in sets], axis=0) - low
-        spans = np.where(box.get("periodic", False), halves, spans)
-    most = float(np.sqrt((spans * spans).sum())) * (1.0 + 1e-9)
-    if not np.isfinite(most):
+        far = np.max([points.max(axis=0) for points in sets], axis=0) - low
+        spans = np.where(box.get("periodic", False), halves, far).tolist()
+    most = math.hypot(*spans) * (1.0 + 1e-9)
+    if not math.isfinite(most):
         return 0.0  # enough to find out which of the points is not finite
     return most if max_cutoff > most else max_cutoff
 
@@ -85,18 +87,21 @@ def _has_images(box: dict[str, Any], cutoff: float) -> bool:
     if heights.ndim == 2:
         whole = np.where(periodic, heights, np.eye(3))
         heights = hs.Box.from_matrix(whole).perpendicular_heights
-    nearest = heights.min(where=periodic, initial=np.inf)
+    nearest = min(h for h, repeats in zip(heights.tolist(), periodic.tolist()) if repeats)
     return bool(2.0 * cutoff >= nearest * (1.0 - 1e-9))  # which is rounded
 
 
-def _nearest_images(both: Any, d: Any, selves: bool) -> Entries:
+def _nearest_images(i: Any, j: Any, d: Any, selves: bool) -> Entries:
     """Each pair once, with its least distance, of pairs that are sorted."""
-    number = both[:, 0] * (int(both.max(initial=0)) + 1) + both[:, 1]
-    first = np.flatnonzero(np.diff(number, prepend=-1))
+    is_first = np.ones(len(d), bool)
+    np.logical_or(i[1:] != i[:-1], j[1:] != j[:-1], out=is_first[1:])
+    (first,) = is_first.nonzero()
     if len(first):
-        both, d = both[first], np.minimum.reduceat(d, first)
-    kept = both[:, 0] != both[:, 1]
-    return (both[kept], d[kept]) if selves else (both, d)
+        i, j, d = i[first], j[first], np.minimum.reduceat(d, first)
+    if selves:
+        kept = i != j
+        i, j, d = i[kept], j[kept], d[kept]
+    return np.stack((i, j), axis=1), d
 
 
 def _answer(
@@ -107,11 +112,13 @@ def _answer(
         entries = np.empty((0, 2), np.intp), np.empty(0)
     else:
         cutoff = _within(max_cutoff, box, *sets)
-        has_images, is_one = _has_images(box, cutoff), len(sets) == 1
-        how = {"sort": True} if has_images and is_one else {}
-        entries = cast("Entries", search(*sets, cutoff, quantities="Pd", **how, **box))
-        if has_images:
-            entries = _nearest_images(*entries, is_one)
+        is_one = len(sets) == 1
+        if _has_images(box, cutoff):
+            how = {"sort": True} if is_one else {}  # pairs of two sets are
+            i, j, d = search(*sets, cutoff, quantities="ijd", **how, **box)
+            entries = _nearest_images(i, j, d, is_one)
+        else:
+            entries = cast("Entries", search(*sets, cutoff, quantities="Pd", **box))
     both, d = entries
     if min_cutoff is not None:
         kept = d > min_cutoff

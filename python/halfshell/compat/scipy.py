@@ -211,8 +211,10 @@ class _Searches:
     @cached_property
     def _box(self) -> dict[str, Any]:
         if self.boxsize is None or not (self.boxsize > 0.0).any():
-            return {"box": None, "periodic": None}
+            return {}
         periodic = self.boxsize > 0.0
+        if periodic.all():
+            return {"box": self.boxsize.copy()}
         return {"box": np.where(periodic, self.boxsize, 0.0), "periodic": periodic}
 
     @cached_property

@@ -17,24 +17,18 @@ void test_lattice(void);
 
 typedef double matrix[HS_MAX_DIM][HS_MAX_DIM];
 
-/* C11 does not add this qualifier by itself. */
-static const double (*as_const(matrix a))[HS_MAX_DIM]
-{
-    return (const double(*)[HS_MAX_DIM])a;
-}
-
 /* Whether entry c of row k is as close to that of U A as it is said to be. Exact. */
 static bool
-is_within_error(const hs_reduction *r, matrix a, int k, int c)
+is_within_error(const hs_lattice *r, matrix a, int k, int c)
 {
     big difference = big_negated(big_from_double(r->rows[k][c]));
-    for (int l = 0; l < r->n_rows; l++) {
+    for (int l = 0; l < r->n_periodic; l++) {
         if (r->U[k][l] != 0 && a[l][c] != 0.0) {
             difference = big_sum(difference,
                                  big_product(big_from_int(r->U[k][l]), big_from_double(a[l][c])));
         }
     }
-    big error = big_from_double(r->error[k]);
+    big error = big_from_double(r->row_error[k]);
     return big_compare_magnitude(&difference, &error) <= 0;
 }
 
@@ -64,10 +58,10 @@ prime_number(int k)
 }
 
 static uint64_t
-determinant_modulo(uint64_t p, const hs_reduction *r)
+determinant_modulo(uint64_t p, const hs_lattice *r)
 {
     uint64_t a[HS_MAX_DIM][HS_MAX_DIM], determinant = 1;
-    int      n = r->n_rows;
+    int      n = r->n_periodic;
     for (int i = 0; i < n; i++) {
         for (int j = 0; j < n; j++) {
             int64_t residue = r->U[i][j] % (int64_t)p;
@@ -103,7 +97,7 @@ determinant_modulo(uint64_t p, const hs_reduction *r)
 }
 
 static bool
-is_unimodular(const hs_reduction *r)
+is_unimodular(const hs_lattice *r)
 {
     bool is_one = true, is_minus_one = true;
     for (int k = 0; k < N_PRIMES; k++) {
@@ -151,27 +145,40 @@ defect_of(int ndim, int n, matrix rows)
 
 /* ---- reduced bases are bases of the same lattice, exactly, and they are short ---- */
 
+/* n periodic rows of ndim. */
+static hs_box
+box_of(int ndim, int n, matrix a)
+{
+    hs_box box = {.ndim = ndim};
+    for (int l = 0; l < n; l++) {
+        box.periodic[l] = true;
+        memcpy(box.rows[l], a[l], sizeof box.rows[l]);
+    }
+    return box;
+}
+
 /* What is promised of every result, however odd the rows are. */
-static hs_reduction
+static hs_lattice
 reduce_and_check(int ndim, int n, matrix a)
 {
-    hs_reduction r;
+    const hs_box box = box_of(ndim, n, a);
+    hs_lattice   r;
     bool         identity = true;
     memset(&r, 0xff, sizeof r);
-    hs_reduce(ndim, n, as_const(a), &r);
-    CHECK(r.n_rows == n);
+    hs_lattice_init(&box, ndim, hs_scale_of(0), &r);
+    CHECK(r.n_periodic == n);
     for (int k = 0; k < n; k++) {
         for (int l = 0; l < n; l++) {
             CHECK(r.U[k][l] <= INT64_C(1) << 61 && r.U[k][l] >= -(INT64_C(1) << 61));
-            identity = identity && r.U[k][l] == (k == l);
+            identity = identity && (r.U[k][l] == (k == l) || r.U[k][l] == -(k == l));
         }
-        CHECK(r.error[k] >= 0.0);
+        CHECK(r.row_error[k] >= 0.0);
         for (int c = 0; c < ndim; c++) {
             CHECK(isfinite(r.rows[k][c]));
             CHECK(is_within_error(&r, a, k, c));
         }
     }
-    CHECK(r.changed == !identity);
+    CHECK(r.reduced == !identity);
     CHECK(is_unimodular(&r));
     return r;
 }
@@ -212,7 +219,7 @@ extreme_rows_are_survived(void)
         {{1, 0, 0}, {1, 1e-300, 0}, {1, 1e-300, 5e-324}},
         {{1e-300, 0, 0}, {1, 1, 0}, {1e9, 1000000001, 1}},
         {{1.7e308, 0, 1.7e308}, {1.7e308, 1, 0}, {5e-324, 0, 1.7e308}},
-        {{0, 0, 0}, {1, 1e-300, 0}, {1, 1, 0}}, /* against the rules: dependent ... */
+        {{0, 0, 0}, {1, 1e-300, 0}, {1, 1, 0}}, /* against the rules: dependent */
         {{1, 2, 3}, {3, 2, 1}, {4, 4, 4}},
     };
     for (int k = 0; k < 9; k++) {
@@ -220,18 +227,14 @@ extreme_rows_are_survived(void)
         for (int c = 0; c < 9; c++) {
             a[c / 3][c % 3] = cells[k][c / 3][c % 3];
         }
-        hs_reduction r = reduce_and_check(3, 3, a);
+        hs_lattice r = reduce_and_check(3, 3, a);
         CHECK(k < 3 || k > 4 || defect_of(3, 3, r.rows) < 1.4143);
         CHECK(k != 4 || (r.rows[1][1] == 1e-300 && r.rows[2][2] == 5e-324));
     }
-    matrix       a = {{1.0, INFINITY}, {NAN, 1.0}}; /* ... and not finite */
-    hs_reduction r;
-    hs_reduce(2, 2, as_const(a), &r);
-    CHECK(!r.changed && r.U[0][0] == 1 && r.U[1][1] == 1 && r.U[0][1] == 0 && r.U[1][0] == 0);
 }
 
 /* Four rows of a unit box, the second with so much of the first. */
-static hs_reduction
+static hs_lattice
 reduce_leaning(double much)
 {
     matrix a = {{0.0}};
@@ -250,16 +253,16 @@ coefficients_are_taken_off_from_half_to_the_largest(void)
     static const double taken[] = {0.5 + 0x1p-20 + 0x1p-43, 0.5 + 0x1p-19, 1.0, 0x1p61};
     for (int sign = -1; sign <= 1; sign += 2) {
         for (int e = 0; e < 3; e++) {
-            const hs_reduction r = reduce_leaning(sign * left[e]);
-            CHECK(!r.changed);
+            const hs_lattice r = reduce_leaning(sign * left[e]);
+            CHECK(!r.reduced);
         }
         for (int e = 0; e < 4; e++) {
-            const hs_reduction r = reduce_leaning(sign * taken[e]);
-            const double       whole = fmax(1.0, floor(taken[e]));
-            CHECK(r.changed && r.rows[1][0] == sign * (taken[e] - whole) && r.rows[1][1] == 1.0);
+            const hs_lattice r = reduce_leaning(sign * taken[e]);
+            const double     whole = fmax(1.0, floor(taken[e]));
+            CHECK(r.reduced && r.rows[1][0] == sign * (taken[e] - whole) && r.rows[1][1] == 1.0);
             CHECK(r.U[1][0] == -sign * (int64_t)whole);
         }
-        CHECK(!reduce_leaning(sign * 0x1.0000000000001p61).changed);
+        CHECK(!reduce_leaning(sign * 0x1.0000000000001p61).reduced);
     }
 }
 
@@ -268,7 +271,9 @@ coefficients_are_taken_off_from_half_to_the_largest(void)
 static bool
 independent(int ndim, int n, matrix a)
 {
-    return hs_rows_independent(ndim, n, as_const(a));
+    const hs_box box = box_of(ndim, n, a);
+    hs_failure   failure;
+    return hs_box_check(&box, &failure) == HS_OK;
 }
 
 /* The last row is the sum of the others, and entries of a row differ by up to 2^1007. */

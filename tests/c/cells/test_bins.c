@@ -22,9 +22,10 @@ sort_scene(hs_account *account, const hs_options *options, hs_scene *scene, hs_g
     const hs_points points = points_of(&shared.scene);
     hs_failure      failure;
     hs_account_init(account, options);
-    if (hs_scene_init(account, NULL, &points, shared.scene.box, options, scene, &failure) != HS_OK)
+    if (hs_scene_make(account, NULL, &(hs_sets){.points = &points}, shared.scene.box, options,
+                      scene, NULL, &failure) != HS_OK)
         return false;
-    if (hs_grid_init(scene, grid, &failure) != HS_OK) {
+    if (hs_grid_init(scene, HS_GRID_ANY, grid, &failure) != HS_OK) {
         hs_scene_free(account, scene);
         return false;
     }
@@ -101,9 +102,9 @@ open_scene(int ndim, int64_t n, double cutoff, const hs_box *box, sorted *s)
     s->options.cutoff = cutoff;
     s->options.want = HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT;
     hs_account_init(&s->account, &s->options);
-    CHECK(hs_scene_init(&s->account, NULL, &points, box, &s->options, &s->scene, &failure) ==
-          HS_OK);
-    CHECK(hs_grid_init(&s->scene, &s->grid, &failure) == HS_OK);
+    CHECK(hs_scene_make(&s->account, NULL, &(hs_sets){.points = &points}, box, &s->options,
+                        &s->scene, NULL, &failure) == HS_OK);
+    CHECK(hs_grid_init(&s->scene, HS_GRID_ANY, &s->grid, &failure) == HS_OK);
 }
 
 static void
@@ -285,8 +286,9 @@ sparse_pays_where_points_crowd(void)
         hs_failure       failure;
         many_points(&random, kind, many_sparse_grid);
         hs_account_init(&account, &options);
-        CHECK(hs_scene_init(&account, NULL, &points, NULL, &options, &read, &failure) == HS_OK);
-        CHECK(hs_grid_init(&read, &dense, &failure) == HS_OK);
+        CHECK(hs_scene_make(&account, NULL, &(hs_sets){.points = &points}, NULL, &options, &read,
+                            NULL, &failure) == HS_OK);
+        CHECK(hs_grid_init(&read, HS_GRID_ANY, &dense, &failure) == HS_OK);
         CHECK((hs_sparse_choose(&read, &dense) > 0.0) == pays[kind]);
         hs_scene_free(&account, &read);
     }

@@ -60,8 +60,9 @@ open_scene(int64_t n, const hs_box *box, double cutoff)
     hs_failure      failure;
     options.cutoff = cutoff;
     hs_account_init(&account, &options);
-    CHECK(hs_scene_init(&account, NULL, &points, box, &options, &grid_scene, &failure) == HS_OK);
-    CHECK(hs_grid_init(&grid_scene, &grid, &failure) == HS_OK);
+    CHECK(hs_scene_make(&account, NULL, &(hs_sets){.points = &points}, box, &options, &grid_scene,
+                        NULL, &failure) == HS_OK);
+    CHECK(hs_grid_init(&grid_scene, HS_GRID_ANY, &grid, &failure) == HS_OK);
 }
 
 static void
@@ -80,41 +81,6 @@ fill_square(double side)
 }
 
 /*
- * ---- grid faces ----
- *
- * Axes are cut at the numbers that cells begin at where these are as wide as the cutoff, or a part
- * of it, and no rounding can move a point over them.
- */
-
-/* Boxes that are whole multiples of the cutoff get as many cells, unless the cutoff is 0. */
-static void
-faces_need_a_cutoff(void)
-{
-    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{8.0}, {0.0, 8.0}}};
-    const double counts[2] = {7.0, 7.0}, parts[2] = {1.0, 1.0};
-    fill_square(8.0);
-    open_scene(N, &box, 1.0);
-    for (int with = 0; with < 2; with++) {
-        grid_scene.radius = with ? 1.0 : 0.0;
-        CHECK(hs_grid_set_shape(&grid_scene, counts, &grid) == HS_OK);
-        hs_grid_cut_by_faces(&grid_scene, parts, 1000.0, &grid);
-        CHECK(grid.by_faces[0] == with && grid.by_faces[1] == with);
-        CHECK(grid.shape[0] == 7 + with && grid.n_cells == (7 + with) * (7 + with));
-    }
-    CHECK(hs_grid_set_shape(&grid_scene, counts, &grid) == HS_OK);
-    const hs_grid seven = grid;
-    grid_scene.upper[0] = -(grid_scene.lower[0] = -0x1p31); /* more cells than can be told apart */
-    grid.shape[0] = INT64_C(1) << 31;
-    hs_grid_cut_by_faces(&grid_scene, parts, 0x1p60, &grid);
-    CHECK(!grid.by_faces[0] && grid.shape[0] == INT64_C(1) << 31);
-    grid_scene.upper[0] = -(grid_scene.lower[0] = -4.0);
-    grid = seven;
-    hs_grid_cut_by_faces(&grid_scene, parts, 56.0, &grid); /* room for a row more, not for two */
-    CHECK(grid.by_faces[0] && !grid.by_faces[1] && grid.n_cells == 56);
-    close_scene();
-}
-
-/*
  * ---- grid ranges ----
  *
  * How far apart the cells of a pair can be, in lattices that are worse than any box gives.
@@ -126,7 +92,6 @@ static void
 endless_ranges_are_refused(void)
 {
     const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 1.0}}};
-    double       density;
     hs_failure   failure = HS_NO_FAILURE;
     bool         is_wider;
     fill_square(1.0);
@@ -136,28 +101,25 @@ endless_ranges_are_refused(void)
     grid_scene.lattice.normal[0][1] = grid_scene.lattice.normal[1][0] = 0.0;
     grid_scene.lattice.normal[1][1] = 1.0;
     grid_scene.radius = 100.0;
-    CHECK(hs_grid_begin(&grid_scene, &density, &grid, &failure) == HS_ERR_MEMORY);
+    CHECK(hs_grid_init(&grid_scene, HS_GRID_ANY, &grid, &failure) == HS_ERR_MEMORY);
     CHECK(failure.expected_pairs == INFINITY && failure.expected_bytes == INFINITY);
-    failure = HS_NO_FAILURE;
-    CHECK(hs_grid_init(&grid_scene, &grid, &failure) == HS_ERR_MEMORY);
-    CHECK(failure.expected_pairs == INFINITY);
     CHECK(hs_grid_init_wide(&grid_scene, 1.0, &grid, &is_wider, &failure) == HS_ERR_MEMORY);
     const hs_grid before = grid;
     CHECK(hs_grid_narrow(&grid_scene, false, 2.0, &grid) == HS_ERR_MEMORY);
     CHECK(grid.reach[0] == before.reach[0] && grid.expected_pairs == before.expected_pairs);
     grid_scene.lattice.U[1][0] = INT64_C(1) << 32; /* a row that no S counts */
-    CHECK(hs_grid_begin(&grid_scene, &density, &grid, &failure) == HS_ERR_BOX_SKEWED);
+    CHECK(hs_grid_init(&grid_scene, HS_GRID_ANY, &grid, &failure) == HS_ERR_BOX_SKEWED);
     CHECK(hs_grid_init_wide(&grid_scene, 1.0, &grid, &is_wider, &failure) == HS_ERR_BOX_SKEWED);
     grid_scene.lattice.U[1][0] = 0;
     grid_scene.radius = 0.25; /* then it is rounding alone that moves points across the box */
     grid_scene.t_error[0] = 0.3;
-    CHECK(hs_grid_begin(&grid_scene, &density, &grid, &failure) == HS_ERR_BOX_SKEWED);
+    CHECK(hs_grid_init(&grid_scene, HS_GRID_ANY, &grid, &failure) == HS_ERR_BOX_SKEWED);
     grid_scene.t_error[0] = 0.0;
     grid_scene.lattice.normal[0][0] = 1.0;
-    CHECK(hs_grid_begin(&grid_scene, &density, &grid, &failure) == HS_OK);
+    CHECK(hs_grid_init(&grid_scene, HS_GRID_ANY, &grid, &failure) == HS_OK);
     CHECK(grid.range[0] >= 0.25 && grid.range[0] < 0.2500001);
     grid_scene.lattice.row_error[0] = 0x1p-20; /* of each image that a pair may be away */
-    CHECK(hs_grid_begin(&grid_scene, &density, &grid, &failure) == HS_OK);
+    CHECK(hs_grid_init(&grid_scene, HS_GRID_ANY, &grid, &failure) == HS_OK);
     CHECK(grid.range[0] > 0.25 + 0x1p-20 && grid.range[0] < 0.2501);
     close_scene();
 }
@@ -250,7 +212,6 @@ void
 test_grid(void)
 {
     RUN(endless_images_are_refused_with_any_cells);
-    RUN(faces_need_a_cutoff);
     RUN(endless_ranges_are_refused);
     RUN(flat_frames_prune_nothing);
     RUN(long_lists_of_rows_can_be_stopped);

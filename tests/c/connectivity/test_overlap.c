@@ -9,29 +9,6 @@
 
 void test_overlap(void);
 
-/* Point rows: rows that are given are copied with their own numbers, turned under others, and made
- * of half lists. */
-
-static void
-what_are_no_rows_is_refused(void)
-{
-    static const int64_t ends[3] = {0, 1, 1}, none[3] = {0, 0, 0};
-    static const int32_t one[1] = {1};
-    hs_point_rows        rows;
-    const hs_index_rows  wrong[] = {{-1, ends, 1, one, NULL, 1},
-                                    {INT64_C(1) << 31, ends, 1, one, NULL, 1},
-                                    {2, NULL, 1, one, NULL, 1},
-                                    {2, ends, 1, NULL, NULL, 1},
-                                    {2, ends, 0, NULL, NULL, 1}};
-    for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
-        CHECK(hs_point_rows_copy(NULL, &wrong[k], &rows) == HS_ERR_ARGUMENT);
-        CHECK(rows.first == NULL && rows.index == NULL);
-    }
-    const hs_index_rows empty = {2, none, 0, NULL, NULL, 1};
-    CHECK(hs_point_rows_copy(NULL, &empty, &rows) == HS_OK && rows.first[2] == 2);
-    hs_point_rows_free(NULL, &rows);
-}
-
 /* Overlap: rows are the pattern of the product of matrices. */
 
 static node_scene scene;
@@ -662,38 +639,45 @@ intersections_have_every_image(void)
     CHECK(raise_memory_limit(intersect_images, NULL, &limit) > 10);
 }
 
-/* Morton: slices never descend, bits come in turns, and points are put in order by them. */
+/* Keys of the Z curve never descend along an axis, and bits come in turns. */
 
 static void
-slices_never_descend(void)
+keys_never_descend(void)
 {
     static const double ranges[][2] = {
         {0.0, 1.0}, {-3.0, 5.0}, {-0x1.8p1023, 0x1.8p1023}, {1.0, 1.0 + 0x1p-40}, {0.0, 5e-324}};
-    harness_random random = {6};
+    static const double zeros[HS_MAX_DIM] = {0.0};
+    harness_random      random = {6};
     for (int r = 0; r < 5; r++) {
-        const double low = ranges[r][0], high = ranges[r][1];
         for (int ndim = 1; ndim <= HS_MAX_DIM; ndim++) {
-            const int      bits = hs_morton_bits(ndim);
-            const uint64_t last = (UINT64_C(1) << bits) - 1;
-            CHECK(hs_morton_slice(low, low, high, bits) == 0);
-            CHECK(hs_morton_slice(high, low, high, bits) == last);
+            const int    axis = ndim - 1;
+            const double bottom = ranges[r][0], top = ranges[r][1];
+            double       low[HS_MAX_DIM] = {0.0}, high[HS_MAX_DIM] = {0.0}, x[HS_MAX_DIM] = {0.0};
+            uint64_t     last = 0; /* all bits of this axis */
+            for (int b = 0; b < 63 / ndim; b++)
+                last |= UINT64_C(1) << (b * ndim + axis);
+            low[axis] = bottom;
+            high[axis] = top;
+            CHECK(hs_morton_key(low, low, high, ndim) == 0);
+            CHECK(hs_morton_key(high, low, high, ndim) == last);
             for (int trial = 0; trial < 100; trial++) {
                 const double part = random_unit(&random);
-                const double x = fmin(low * (1.0 - part) + high * part, high);
-                const double y = nextafter(x, high);
-                CHECK(hs_morton_slice(x, low, high, bits) <= hs_morton_slice(y, low, high, bits));
-                CHECK(hs_morton_slice(y, low, high, bits) <= last);
+                x[axis] = fmin(bottom * (1.0 - part) + top * part, top);
+                const uint64_t key = hs_morton_key(x, low, high, ndim);
+                x[axis] = nextafter(x[axis], top);
+                const uint64_t next = hs_morton_key(x, low, high, ndim);
+                CHECK(key <= next && next <= last && (next & ~last) == 0);
             }
         }
     }
-    CHECK(hs_morton_slice(2.0, 2.0, 2.0, 21) == 0);
-    CHECK(hs_morton_slice(0.25, 0.0, 1.0, 2) == 1 && hs_morton_slice(0.75, 0.0, 1.0, 2) == 3);
+    static const double two[2] = {2.0, 2.0}, quarter[2] = {0.25, 0.75}, one[2] = {1.0, 1.0};
+    CHECK(hs_morton_key(two, two, two, 2) == 0);
+    CHECK(hs_morton_key(quarter, zeros, one, 2) >> 58 == 0xB); /* 01 and 11 */
 }
 
 void
 test_overlap(void)
 {
-    RUN(what_are_no_rows_is_refused);
     RUN(rows_are_the_pattern_of_the_product);
     RUN(rows_that_are_none_are_refused);
     RUN(no_allocation_that_fails_leaves_anything);
@@ -704,5 +688,5 @@ test_overlap(void)
     RUN(overlaps_have_every_image);
     RUN(images_that_are_no_rows_are_refused);
     RUN(intersections_have_every_image);
-    RUN(slices_never_descend);
+    RUN(keys_never_descend);
 }

@@ -113,6 +113,16 @@ both_axes_may_be_too_far(void)
 
 /* ---- copies are lists of their own ---- */
 
+static hs_status
+new_once(void *options)
+{
+    hs_dynamic     *list = NULL;
+    const hs_status status = hs_dynamic_new(options, &list, NULL);
+    CHECK((list != NULL) == (status == HS_OK));
+    hs_dynamic_free(list);
+    return status;
+}
+
 static void
 options_are_checked(void)
 {
@@ -131,8 +141,7 @@ options_are_checked(void)
     for (int b = 0; b < 7; b++)
         CHECK(hs_dynamic_new(&bad[b], &list, NULL) == HS_ERR_ARGUMENT && list == NULL);
     bad[6].ndim = 2;
-    CHECK(hs_dynamic_new(&bad[6], &list, NULL) == HS_OK);
-    hs_dynamic_free(list);
+    CHECK(fail_each_allocation(new_once, &bad[6], 10) == 4);
     bad[6].box = &steep;
     CHECK(hs_dynamic_new(&bad[6], &list, NULL) == HS_ERR_BOX_SKEWED && list == NULL);
 }
@@ -218,11 +227,13 @@ filled_lists_are_those_of_single_points(void)
                 hs_dynamic *list = list_of_fill((box_kind)kind, ndim, (hs_storage)storage);
                 hs_dynamic *single = list_of_fill((box_kind)kind, ndim, (hs_storage)storage);
                 hs_failure  failure = HS_NO_FAILURE;
-                CHECK(hs_fill(list, of.ids, of.tags, N, of.x, &failure) == HS_OK);
+                CHECK(hs_update_insert_many(list, of.ids, of.tags, N, of.x, &failure) == HS_OK);
                 for (int64_t i = 0; i < N; i++) {
                     double    given[HS_MAX_DIM];
                     hs_placed placed;
-                    CHECK(hs_rows_place(single, of.x, i, given, &placed, &failure) == HS_OK);
+                    for (int k = 0; k < ndim; k++)
+                        given[k] = of.x[k][i];
+                    CHECK(hs_dynamic_place(single, given, &placed, &failure) == HS_OK);
                     CHECK(hs_update_insert(single, (hs_key){of.ids[i], of.tags[i]}, &placed,
                                            &failure) == HS_OK);
                 }
@@ -251,11 +262,12 @@ what_cannot_be_had_leaves_an_empty_list(void)
             hs_dynamic *list = list_of_fill((box_kind)kind, 2, (hs_storage)storage);
             hs_failure  failure = HS_NO_FAILURE;
             make_rows(&of);
-            CHECK(hs_fill(list, of.ids, of.tags, N, of.x, &failure) == HS_OK);
+            CHECK(hs_update_insert_many(list, of.ids, of.tags, N, of.x, &failure) == HS_OK);
             for (int64_t i = 0; i < N; i++)
                 CHECK(hs_update_remove(list, (hs_key){of.ids[i], of.tags[i]}));
             of.columns[1][7] = 1e200;
-            const hs_status status = hs_fill(list, of.ids, of.tags, N, of.x, &failure);
+            const hs_status status =
+                hs_update_insert_many(list, of.ids, of.tags, N, of.x, &failure);
             if (kind == OPEN) {
                 CHECK(status == (storage == HS_STORE_DENSE ? HS_ERR_CAPACITY : HS_OK));
                 CHECK(status == HS_OK || failure.expected_bytes > failure.limit_bytes);
@@ -265,7 +277,8 @@ what_cannot_be_had_leaves_an_empty_list(void)
             CHECK(status == HS_OK || (list->map.n == 0 && list->entries.n_used == 0));
             hs_list_clear(list);
             make_rows(&of);
-            CHECK(hs_fill(list, of.ids, of.tags, N, of.x, &failure) == HS_OK && list->map.n == N);
+            CHECK(hs_update_insert_many(list, of.ids, of.tags, N, of.x, &failure) == HS_OK &&
+                  list->map.n == N);
             hs_list_free(list);
         }
     }
@@ -278,7 +291,7 @@ fill_once(void *context)
     static rows_fill of;
     hs_failure       failure;
     make_rows(&of);
-    const hs_status status = hs_fill(list, of.ids, of.tags, N, of.x, &failure);
+    const hs_status status = hs_update_insert_many(list, of.ids, of.tags, N, of.x, &failure);
     CHECK(list->map.n == (status == HS_OK ? N : 0));
     hs_list_clear(list);
     return status;

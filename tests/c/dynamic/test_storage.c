@@ -72,7 +72,7 @@ check_apart(hs_key one, hs_key other)
     hs_key_map    map = {0};
     hs_entries    entries;
     hs_entries_init(&entries, 1, false);
-    CHECK(hs_entries_take(&entries, 1) == 0 && hs_key_map_reserve(&map, 2));
+    CHECK(hs_entries_take(&entries, 1) == 0 && hs_hash_reserve(&map.hash, 2));
     for (uint32_t place = 0; place < 2; place++) {
         hs_entry_tail_at(&entries, place)->id = ids[place];
         hs_entry_tail_at(&entries, place)->tag = tags[place];
@@ -222,8 +222,25 @@ start(hs_cell_table *table, hs_entries *entries, bool dense)
 {
     hs_axes axes = {.ndim = 2};
     axes.axis[1].n = 5; /* the second axis repeats */
-    hs_cell_table_init(table, &axes, dense);
+    hs_cell_table_init(table, &axes, dense, 5000.0);
     hs_entries_init(entries, 2, false);
+}
+
+/* A cell with these indices. */
+static uint32_t
+added(hs_cell_table *table, hs_entries *entries, const int64_t *index)
+{
+    uint32_t   number;
+    hs_failure failure;
+    CHECK(hs_cell_table_add(table, entries, index, &number, &failure) == HS_OK);
+    return number;
+}
+
+/* Whether a sparse table has room for so many cells more. */
+static bool
+room_for(hs_cell_table *table, hs_entries *entries, int64_t more)
+{
+    return hs_cell_table_reserve(table, entries, NULL, NULL, more, NULL) == HS_OK;
 }
 
 /* Gives a cell one entry. */
@@ -246,16 +263,17 @@ dense_tables_have_a_limit(void)
     const int64_t first[2] = {0, 0}, last[2] = {99, 4}, more[2] = {104, 4}, far[2] = {200, 0};
     hs_cell_table table;
     hs_entries    entries;
-    double        bytes = 0.0;
+    hs_failure    failure;
     start(&table, &entries, true);
-    CHECK(hs_cell_table_extend(&table, &entries, first, last, 5000.0, &bytes) == HS_OK);
+    CHECK(hs_cell_table_reserve(&table, &entries, first, last, 0, &failure) == HS_OK);
     CHECK(table.n == 500);
-    CHECK(hs_cell_table_extend(&table, &entries, more, more, 5000.0, &bytes) == HS_OK);
+    CHECK(hs_cell_table_reserve(&table, &entries, more, more, 0, &failure) == HS_OK);
     CHECK(table.n == 525);
-    CHECK(hs_cell_table_extend(&table, &entries, far, far, 5000.0, &bytes) == HS_ERR_CAPACITY);
-    CHECK(table.n == 525 && bytes == 201 * 5 * 9);
+    CHECK(hs_cell_table_reserve(&table, &entries, far, far, 0, &failure) == HS_ERR_CAPACITY);
+    CHECK(table.n == 525 && failure.expected_bytes == 201 * 5 * 9 && failure.limit_bytes == 5000);
     const int64_t farthest[2] = {INT64_C(1) << 52, 0};
-    CHECK(hs_cell_table_extend(&table, &entries, farthest, farthest, INFINITY, &bytes) ==
+    table.most_bytes = INFINITY;
+    CHECK(hs_cell_table_reserve(&table, &entries, farthest, farthest, 0, &failure) ==
           HS_ERR_CAPACITY);
     hs_cell_table_free(&table);
 }
@@ -267,18 +285,17 @@ cells_outside_are_none(void)
     const int64_t outside[][2] = {{2, 1}, {10, 1}, {4, -1}, {4, 5}};
     hs_cell_table table;
     hs_entries    entries;
-    double        bytes;
+    hs_failure    failure;
     hs_axes       both = {.ndim = 2};
     start(&table, &entries, true);
-    CHECK(hs_cell_table_extend(&table, &entries, first, last, 1e6, &bytes) == HS_OK);
+    CHECK(hs_cell_table_reserve(&table, &entries, first, last, 0, &failure) == HS_OK);
     for (int o = 0; o < 4; o++) {
         CHECK(hs_cell_table_find(&table, outside[o]) == HS_NO_CELL);
-        CHECK(hs_cell_table_add(&table, &entries, outside[o]) == HS_NO_CELL);
     }
     CHECK(hs_cell_table_find(&table, first) == 0 && hs_cell_table_find(&table, last) == 34);
     hs_cell_table_free(&table);
     both.axis[0].n = both.axis[1].n = 5; /* known from the beginning, but not there yet */
-    hs_cell_table_init(&table, &both, true);
+    hs_cell_table_init(&table, &both, true, 0.0);
     CHECK(hs_cell_table_find(&table, (const int64_t[2]){1, 1}) == HS_NO_CELL);
 }
 
@@ -290,12 +307,33 @@ dropped_cells_give_their_blocks_back(void)
     hs_cell_table table;
     hs_entries    entries;
     start(&table, &entries, false);
-    const uint32_t cell = hs_cell_table_add(&table, &entries, index);
+    const uint32_t cell = added(&table, &entries, index);
     table.cell[cell].start = hs_entries_take(&entries, 3);
     table.size[cell] = 3;
-    CHECK(hs_cell_table_reserve(&table, &entries, table.capacity));
+    CHECK(room_for(&table, &entries, table.capacity));
     CHECK(table.n == 0 && hs_cell_table_find(&table, index) == HS_NO_CELL);
     CHECK(entries.spare[3] == 0);
+    hs_cell_table_free(&table);
+    hs_entries_free(&entries);
+}
+
+/* A table that is full and may not grow drops what is empty, however little that is. */
+static void
+empty_cells_make_room_where_memory_is_refused(void)
+{
+    hs_cell_table table;
+    hs_entries    entries;
+    start(&table, &entries, false);
+    for (int64_t k = 0; k == 0 || k < table.capacity; k++) {
+        const int64_t  index[2] = {k, 0};
+        const uint32_t cell = added(&table, &entries, index);
+        if (k > 0)
+            occupy(&table, &entries, cell, k);
+    }
+    hs_test_fail_allocation(1);
+    CHECK(table.n == table.capacity && room_for(&table, &entries, 1));
+    CHECK(table.n == table.capacity - 1 && table.n_empty == 0);
+    hs_test_fail_allocation(0);
     hs_cell_table_free(&table);
     hs_entries_free(&entries);
 }
@@ -309,14 +347,14 @@ too_many_cells_are_refused(void)
     start(&table, &entries, false);
     for (int64_t k = 0; k < 9; k++) {
         const int64_t  index[2] = {k, 0};
-        const uint32_t cell = hs_cell_table_add(&table, &entries, index);
+        const uint32_t cell = added(&table, &entries, index);
         if (k < 8)
             occupy(&table, &entries, cell, k);
     }
     CHECK(table.n_empty == 1 && table.n == 9);
-    CHECK(!hs_cell_table_reserve(&table, &entries, INT64_C(1) << 33));
+    CHECK(!room_for(&table, &entries, INT64_C(1) << 33));
     CHECK(table.n == 8 && table.n_empty == 0);
-    CHECK(!hs_cell_table_reserve(&table, &entries, INT64_C(1) << 33));
+    CHECK(!room_for(&table, &entries, INT64_C(1) << 33));
     for (int64_t k = 0; k < 9; k++) {
         const int64_t index[2] = {k, 0};
         CHECK((hs_cell_table_find(&table, index) != HS_NO_CELL) == (k < 8));
@@ -342,9 +380,9 @@ cells_of_equal_marks_are_told_apart(void)
             hs_cell_table table;
             hs_entries    entries;
             start(&table, &entries, false);
-            const uint32_t first = hs_cell_table_add(&table, &entries, one);
+            const uint32_t first = added(&table, &entries, one);
             CHECK(hs_cell_table_find(&table, other) == HS_NO_CELL);
-            CHECK(hs_cell_table_add(&table, &entries, other) != first);
+            CHECK(added(&table, &entries, other) != first);
             CHECK(hs_cell_table_find(&table, one) == first);
             hs_cell_table_free(&table);
             met++;
@@ -367,6 +405,7 @@ test_storage(void)
     RUN(dense_tables_have_a_limit);
     RUN(cells_outside_are_none);
     RUN(dropped_cells_give_their_blocks_back);
+    RUN(empty_cells_make_room_where_memory_is_refused);
     RUN(too_many_cells_are_refused);
     RUN(cells_of_equal_marks_are_told_apart);
 }

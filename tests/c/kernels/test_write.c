@@ -15,39 +15,33 @@ enum { POINTS = 5, PLACES = 64, MOST_HITS = 40, ROOM = MOST_HITS + HS_PADDING };
 typedef struct scene {
     hs_metric metric;
     double    q[PLACES][HS_RECORD];
+    int32_t   number[PLACES];
     int32_t   image[PLACES][HS_RECORD], few[PLACES][HS_RECORD];
-    double    p[3][POINTS];
-    int32_t   turns[3][POINTS];
-    int32_t   point[POINTS], end[POINTS], label[ROOM];
-    bool      has_images, has_turns, is_inclusive;
-    int       first_column; /* of S, for the first row */
-    int64_t   wide[2][ROOM];
-    int32_t   narrow[2][ROOM];
-    double    distance[ROOM], vector[3 * ROOM];
-    int32_t   shift[3 * ROOM];
+    /* As the writer has them; all points lie in another order. */
+    hs_candidate candidates[PLACES];
+    int32_t      place[PLACES], base[3], turned[3][PLACES];
+    double       x[PLACES][3];
+    bool         is_fine;
+    double       p[3][POINTS];
+    int32_t      turns[3][POINTS];
+    int32_t      point[POINTS], end[POINTS], label[ROOM];
+    bool         has_images, has_turns, is_inclusive;
+    int          first_column; /* of S, for the first row: those before are of open box vectors */
+    int64_t      wide[2][ROOM];
+    int32_t      narrow[2][ROOM];
+    double       distance[ROOM], vector[3 * ROOM];
+    int32_t      shift[3 * ROOM];
 } scene;
 
 static scene it;
 
-static int64_t
-number_of(int32_t place)
-{
-    int64_t number;
-    memcpy(&number, &it.q[place][HS_RECORD - 1], sizeof number);
-    return number;
-}
-
-static void
-set_number(int32_t place, int64_t number)
-{
-    memcpy(&it.q[place][HS_RECORD - 1], &number, sizeof number);
-}
-
-/* Coordinates are multiples of `grain` if that is not 0, so that points coincide. */
+/* Coordinates are multiples of `grain` if that is not 0, so that points coincide; a few are next to
+ * nothing. */
 static double
 coordinate(harness_random *random, double grain)
 {
-    const double x = 10.0 * random_unit(random) - 5.0;
+    double x = 10.0 * random_unit(random) - 5.0;
+    x = random_bits(random) % 256 == 0 ? 0x1p-60 * x : x; /* its halves are not fine */
     return grain > 0.0 ? grain * floor(x / grain) : x;
 }
 
@@ -59,13 +53,15 @@ make_scene(int ndim, bool is_coupled, bool has_images, bool has_turns, double gr
     static const double coupled[3][HS_MAX_DIM] = {{9.0}, {2.7, 10.1}, {-3.1, 0.7, 8.3}};
     static const double aligned[3][HS_MAX_DIM] = {{0.0, 9.3}, {10.7}, {0.0, 0.0, 8.0}};
     memset(&it, 0, sizeof it);
-    hs_metric_init(&it.metric, ndim, ndim, is_coupled ? coupled : aligned, 8.0, true);
     it.has_images = has_images;
     it.has_turns = has_turns;
     it.is_inclusive = true;
     it.first_column = (int)(random_bits(random) % 2);
+    hs_metric_init(&it.metric, ndim, ndim - it.first_column, is_coupled ? coupled : aligned, 8.0,
+                   true);
     for (int32_t c = 0; c < PLACES; c++) {
-        set_number(c, (int64_t)(random_bits(random) % 70));
+        it.number[c] = (int32_t)(random_bits(random) % 70);
+        it.place[c] = (c * 5 + 3) % PLACES;
         for (int k = 0; k < ndim; k++) {
             it.q[c][k] = coordinate(random, grain);
             it.image[c][k] = has_images ? (int32_t)(random_bits(random) % 3) - 1 : 0;
@@ -87,18 +83,42 @@ make_scene(int ndim, bool is_coupled, bool has_images, bool has_turns, double gr
     }
 }
 
+/* Candidates as they are now. */
+static void
+set_candidates(bool by_S)
+{
+    const hs_halving by = hs_write_halving(it.metric.cutoff);
+    it.is_fine = true;
+    for (int32_t c = 0; c < PLACES; c++) {
+        hs_moved move;
+        int32_t  S[3] = {0}, moved[3] = {0};
+        for (int r = 0; r < it.metric.n_rows; r++) {
+            const int32_t shift = it.has_turns ? it.few[c][r] : it.image[c][r];
+            S[r + it.first_column] = shift;
+            it.base[r] = by_S ? r - 1 : 0;
+            moved[r] = by_S ? shift + it.base[r] : it.image[c][r];
+            it.turned[r][it.place[c]] = it.image[c][r] - shift;
+        }
+        memcpy(it.x[it.place[c]], it.q[c], sizeof it.x[0]);
+        (void)hs_write_move(&it.metric, by, moved, &move);
+        it.is_fine &= move.is_fine;
+        it.is_fine &= hs_candidate_set(&it.candidates[c], it.q[c], by, &move, it.number[c], S);
+    }
+}
+
 static hs_write
 write_of(bool is_half, bool by_S, int index_bytes)
 {
     const int ndim = it.metric.ndim;
     hs_write  write = {.ndim = ndim,
                        .is_half = is_half,
-                       .is_shifted = it.has_images || (by_S && it.has_turns),
+                       .is_measured = true,
+                       .is_shifted = it.has_images || by_S,
                        .by_S = by_S,
                        .metric = &it.metric,
-                       .q = it.q[0],
-                       .image = it.has_images ? it.image[0] : NULL,
-                       .few = it.has_turns ? it.few[0] : NULL,
+                       .candidates = it.candidates,
+                       .place = it.place,
+                       .x_width = 3,
                        .first = 0x1p3,
                        .second = 0x1p-1,
                        .cutoff = 20.0,
@@ -109,10 +129,17 @@ write_of(bool is_half, bool by_S, int index_bytes)
                        .distance = it.distance,
                        .vector = it.vector,
                        .shift = it.shift};
+    set_candidates(by_S);
+    write.is_fine = it.is_fine;
     for (int k = 0; k < ndim; k++) {
         write.p[k] = it.p[k];
-        write.turns[k] = it.has_turns ? it.turns[k] : NULL;
-        write.column[k] = (k + it.first_column) % ndim;
+        write.x[k] = &it.x[0][k];
+    }
+    for (int r = 0; r < it.metric.n_rows; r++) {
+        write.base[r] = it.base[r];
+        write.turns[r] = it.has_turns ? it.turns[r] : NULL;
+        write.turned[r] = it.has_turns ? it.turned[r] : NULL;
+        write.column[r] = r + it.first_column;
     }
     return write;
 }
@@ -123,15 +150,18 @@ is_right(const hs_write *write, int32_t t, int32_t h)
 {
     const int     ndim = it.metric.ndim;
     const int32_t place = it.label[h];
-    const int64_t number = number_of(place), point = it.point[t];
+    const int64_t number = it.number[place], point = it.point[t];
     double        p[3], vector[3];
-    int64_t       S[3], times[3];
+    int64_t       S[3], times[3], given[3] = {0};
     bool          flips = number < point;
-    for (int r = ndim - 1; r >= 0; r--) {
-        const int64_t of_candidate = write->few != NULL ? it.few[place][r] : it.image[place][r];
-        p[r] = it.p[r][t];
+    for (int k = 0; k < ndim; k++) {
+        p[k] = it.p[k][t];
+    }
+    for (int r = it.metric.n_rows - 1; r >= 0; r--) {
+        const int64_t of_candidate = it.has_turns ? it.few[place][r] : it.image[place][r];
         S[r] = of_candidate + (it.has_turns ? it.turns[r][t] : 0);
         times[r] = write->by_S ? S[r] : it.image[place][r];
+        given[r + it.first_column] = S[r];
         flips = number == point && S[r] != 0 ? S[r] < 0 : flips;
     }
     flips = flips && write->is_half;
@@ -145,7 +175,7 @@ is_right(const hs_write *write, int32_t t, int32_t h)
     for (int k = 0; k < ndim; k++) {
         const double D = (flips ? -vector[k] : vector[k]) * 4.0 + 0.0;
         right = right && memcmp(&it.vector[h * ndim + k], &D, sizeof D) == 0 &&
-                it.shift[h * ndim + write->column[k]] == (int32_t)(flips ? -S[k] : S[k]);
+                it.shift[h * ndim + k] == (int32_t)(flips ? -given[k] : given[k]);
     }
     return right;
 }
@@ -208,20 +238,16 @@ static void
 unmeasured_pairs(const hs_kernel *kernel)
 {
     harness_random random = {12};
-    int32_t        number[PLACES];
     int            taken = 0;
     for (int trial = 0; trial < TRIALS(1000); trial++) {
         make_scene(2 + (trial & 1), false, trial & 2, trial & 4, 0.0, &random);
         hs_write write = write_of(trial & 8, false, trial & 16 ? 8 : 4);
         CHECK(are_right(kernel, &write, &taken));
-        for (int32_t c = 0; c < PLACES; c++) {
-            number[c] = (int32_t)number_of(c);
-        }
         memset(it.wide, 1, sizeof it.wide);
         memset(it.narrow, 1, sizeof it.narrow);
         memset(it.shift, 1, sizeof it.shift);
-        write.q = NULL;
-        write.number = number;
+        write.is_measured = false;
+        write.distance = write.vector = NULL;
         CHECK(are_right(kernel, &write, &taken));
     }
     CHECK(taken == 2 * TRIALS(1000));
@@ -246,6 +272,7 @@ make_pair(double p, double q, int32_t image)
     it.q[7][0] = q;
     memset(it.image, 0, sizeof it.image);
     it.image[7][1] = image; /* row 1 is along x */
+    it.first_column = 0;
     it.label[0] = 7;
     for (int32_t t = 0; t < POINTS; t++) {
         it.end[t] = 1;

@@ -16,7 +16,7 @@ void test_levels(void);
 
 enum { N = 5 };
 
-static double matrices[N * 9], support_reaches[N];
+static double matrices[N * 9];
 
 /* Diagonal 1, 2, 4 and beside it 0.25, for each point a power of two of that. */
 static void
@@ -31,13 +31,15 @@ fill(int ndim)
 static void
 is_refused(hs_status status, int64_t row, double value)
 {
-    const hs_options options = hs_options_default();
-    hs_account       account = new_account();
-    hs_failure       failure = {.row = -1};
-    hs_support_set   set;
-    CHECK(hs_support_set_read(&account, &options, matrices, N, 3, 1.0, &set, support_reaches,
-                              &failure) == status);
-    CHECK(failure.row == row && set.numbers == NULL && account.held == 0);
+    static const double rows[N * 3];
+    const hs_options    options = hs_options_default();
+    const hs_reach      reach = {.rule = HS_RULE_MAX, .has_supports = true, .extent = 1.0};
+    const hs_set        points = {.at = {rows, N, 3, HS_FLOAT64, 24, 8}, .supports = matrices};
+    hs_account          account = new_account();
+    hs_failure          failure = {.row = -1};
+    hs_levels           levels;
+    CHECK(hs_levels_divide(&account, &options, &points, NULL, &reach, &levels, &failure) == status);
+    CHECK(failure.row == row && levels.points.supports.numbers == NULL && account.held == 0);
     CHECK(failure.value == value || (isnan(failure.value) && isnan(value)));
     hs_account_close(&account);
 }
@@ -111,7 +113,7 @@ a_division_can_be_stopped(void)
                                    &levels, &failure) == HS_OK);
             hs_levels_free(&account, &levels);
             const int64_t n = once.n;
-            CHECK(n >= (kind == 1 ? 6 : 8) * (has_queries + 1));
+            CHECK(n >= (kind == 1 ? 4 : 6) * (has_queries + 1));
             for (int64_t nth = 1; nth <= n; nth += n > 40 && nth > 2 && nth < n - 12 ? 9 : 1) {
                 once = (refusal){.nth = nth};
                 CHECK(hs_levels_divide(&account, &options, &p, has_queries ? &p : NULL,
@@ -145,8 +147,8 @@ make_plan_as(const hs_reach *reach, bool has_queries, double bound, hs_algorithm
     hs_account_init(&made->account, &options);
     CHECK(hs_levels_divide(&made->account, &options, &p, has_queries ? &q : NULL, reach,
                            &made->levels, &failure) == HS_OK);
-    CHECK(hs_level_plan_make(&made->account, &made->levels, bound, algorithm, &made->plan) ==
-          HS_OK);
+    CHECK(hs_level_plan_make(&made->account, &options, &made->levels, NULL, bound, algorithm,
+                             &made->plan) == HS_OK);
 }
 
 static void
@@ -337,7 +339,7 @@ many_types_are_searched_in_pairs(void)
             points.types[i] = i % n_types;
         make_plan(&reach, false, HUGE_VAL, &made);
         CHECK(made.plan.n == (n_types <= 8 ? 1 : N_TYPES * (N_TYPES + 1) / 2));
-        CHECK(hs_level_plan_is_single(&made.levels, &made.plan) == (n_types <= 8));
+        CHECK(hs_level_plan_is_single(&made.plan) == (n_types <= 8));
         free_plan(&made);
     }
     static const double alone[3][4] = {/* type 0 with itself, with type 1, or that with itself */
@@ -351,7 +353,7 @@ many_types_are_searched_in_pairs(void)
         make_plan(&reach, false, HUGE_VAL, &made);
         const bool by_table = made.plan.steps[0].by_table;
         CHECK(made.plan.n == 1);
-        CHECK(hs_level_plan_is_single(&made.levels, &made.plan) == by_table);
+        CHECK(hs_level_plan_is_single(&made.plan) == by_table);
         free_plan(&made);
     }
 }
@@ -371,7 +373,7 @@ a_level_of_two_is_not_all(void)
             queries.radii[i] = upper ? 0.9 : 0.1;
         make_plan_as(&reach, true, HUGE_VAL, HS_HIERARCHY, &made);
         CHECK(made.levels.n == 2 && made.plan.n == 1 && made.plan.steps[0].asking.first == upper);
-        CHECK(!hs_level_plan_is_single(&made.levels, &made.plan));
+        CHECK(!hs_level_plan_is_single(&made.plan));
         free_plan(&made);
     }
 }
@@ -389,8 +391,8 @@ choose_plan(const hs_box *box, planned *made)
     const hs_options   options = hs_options_default();
     const hs_algorithm algorithm = made->plan.algorithm;
     hs_level_plan_free(&made->account, &made->plan);
-    CHECK(hs_level_plan_choose(&made->account, &options, &made->levels, box, HUGE_VAL, algorithm,
-                               &made->plan) == HS_OK);
+    CHECK(hs_level_plan_make(&made->account, &options, &made->levels, box, HUGE_VAL, algorithm,
+                             &made->plan) == HS_OK);
 }
 
 /* As it is, where levels may be joined; and frees it. */
@@ -460,8 +462,8 @@ some_plans_are_never_joined(void)
 static void
 choose_plan_by(const hs_options *options, planned *made, hs_status expected)
 {
-    const hs_status status = hs_level_plan_choose(&made->account, options, &made->levels, NULL,
-                                                  HUGE_VAL, HS_AUTO, &made->plan);
+    const hs_status status = hs_level_plan_make(&made->account, options, &made->levels, NULL,
+                                                HUGE_VAL, HS_AUTO, &made->plan);
     CHECK(status == expected && (made->plan.n > 0) == (expected == HS_OK));
     hs_level_plan_free(&made->account, &made->plan);
 }
@@ -533,7 +535,8 @@ open_plan(const hs_reach *reach, bool has_queries, double bound, const hs_box *b
     hs_account *account = &made->call.account;
     CHECK(hs_levels_divide(account, &options, &p, has_queries ? &q : NULL, reach, &made->levels,
                            &failure) == HS_OK);
-    CHECK(hs_level_plan_make(account, &made->levels, bound, HS_AUTO, &made->plan) == HS_OK);
+    CHECK(hs_level_plan_make(account, &options, &made->levels, NULL, bound, HS_AUTO, &made->plan) ==
+          HS_OK);
 }
 
 static void
@@ -550,8 +553,7 @@ static hs_status
 open_step(opened_plan *made, int64_t step, hs_level_search *open, hs_failure *failure)
 {
     *failure = HS_NO_FAILURE;
-    return hs_level_open(&made->levels, &made->plan, step, made->box, false, &made->call, open,
-                         failure);
+    return hs_level_open(&made->plan, step, made->box, false, &made->call, open, failure);
 }
 
 /* A point too far for its box: the row is the caller's, of the set that it belongs to. */
@@ -618,16 +620,17 @@ opening_a_step_of_many_supports_can_be_stopped(void)
             hs_call_begin(&options, &call);
             CHECK(hs_levels_divide(&call.account, &options, &p, has_queries ? &q : NULL, &reach,
                                    &levels, &failure) == HS_OK);
-            CHECK(hs_level_plan_make(&call.account, &levels, HUGE_VAL, HS_AUTO, &plan) == HS_OK);
+            CHECK(hs_level_plan_make(&call.account, &call.options, &levels, NULL, HUGE_VAL, HS_AUTO,
+                                     &plan) == HS_OK);
             const int64_t held = call.account.held;
             once = (refusal){.nth = 0};
-            CHECK(hs_level_open(&levels, &plan, 0, NULL, false, &call, &open, &failure) == HS_OK);
+            CHECK(hs_level_open(&plan, 0, NULL, false, &call, &open, &failure) == HS_OK);
             hs_level_close(&open);
             const int64_t n = once.n;
             CHECK(n >= 4); /* the width of one side at least, and what is laid out */
             for (int64_t nth = 1; nth <= n; nth++) {
                 once = (refusal){.nth = nth};
-                CHECK(hs_level_open(&levels, &plan, 0, NULL, false, &call, &open, &failure) ==
+                CHECK(hs_level_open(&plan, 0, NULL, false, &call, &open, &failure) ==
                       HS_ERR_INTERRUPTED);
                 CHECK(once.n == nth && call.account.held == held);
             }

@@ -7,7 +7,6 @@
 #include "../../../csrc/core/base/os_thread.h"
 #include "../../../csrc/core/collect/columns.h"
 #include "../../../csrc/core/memory/memory.h"
-#include "../../../csrc/core/memory/pool.h"
 #include "../../../csrc/core/memory/results.h"
 #include "../support/address_space.h"
 #include "../support/harness.h"
@@ -294,23 +293,20 @@ use_up_mappings(char **start)
 }
 
 static void
-blocks_are_aligned_and_zero(void)
+chunks_in_pages_are_aligned_and_zero(void)
 {
     static const size_t sizes[] = {2 * MB, 2 * MB + 5, 3 * MB, 5 * MB - 1};
     for (int s = 0; s < 4; s++) {
-        for (int reserved = 0; reserved < 2; reserved++) {
-            void  *mapping;
-            size_t length;
-            char  *block = reserved ? hs_pages_reserve(sizes[s], &mapping, &length)
-                                    : hs_pages_alloc(sizes[s], &mapping, &length);
-            bool   zero = block != NULL && (uintptr_t)block % HS_PAGES_FROM == 0;
-            for (size_t b = 0; zero && b < sizes[s]; b += 4001) {
-                zero = block[b] == 0;
-            }
-            CHECK(zero && length >= sizes[s] && (size_t)(block - (char *)mapping) < length);
-            memset(block - HS_PAGES_HEADROOM, 1, HS_PAGES_HEADROOM);
-            hs_pages_advise(block, block, true); /* nothing to advise */
-            hs_pages_free(mapping, length);
+        for (int huge = 0; huge < 2; huge++) {
+            char *chunk = hs_chunk_new(sizes[s]);
+            bool  zero = chunk != NULL && (uintptr_t)chunk % HS_PAGES_FROM == 0;
+            if (huge)
+                hs_chunk_expect(chunk, sizes[s]);
+            for (size_t b = 0; zero && b < sizes[s]; b += 4001)
+                zero = chunk[b] == 0;
+            CHECK(zero && hs_chunk_of(chunk)->length >= sizes[s]);
+            CHECK(hs_chunk_of(chunk)->capacity >= sizes[s]);
+            hs_chunk_free(chunk);
         }
     }
 }
@@ -319,54 +315,45 @@ static void
 what_cannot_be_had_is_refused(void)
 {
     static const size_t sizes[] = {TOO_MUCH, PTRDIFF_MAX / 2 + MB, PTRDIFF_MAX, SIZE_MAX - MB};
-    void               *mapping;
-    size_t              length;
-    char               *block = hs_pages_reserve(3 * MB, &mapping, &length);
-    fill(block, 3 * MB);
+    hs_region           region = {0};
+    CHECK(hs_region_reserve(&region, 3 * MB));
+    fill(region.data, 3 * MB);
+    region.used = 3 * MB;
     for (int s = 0; s < 4; s++) {
-        void  *other;
-        size_t other_length;
-        CHECK(hs_pages_alloc(sizes[s], &other, &other_length) == NULL);
-        CHECK(hs_pages_reserve(sizes[s], &other, &other_length) == NULL);
-        CHECK(hs_pages_grow(sizes[s], &mapping, &length) == NULL);
-        CHECK(holds(block, 3 * MB));
+        CHECK(hs_chunk_new(sizes[s]) == NULL);
+        CHECK(!hs_region_grow(&region, sizes[s]) && holds(region.data, 3 * MB));
     }
     const rlim_t before = limit_addresses(20 * MB);
-    CHECK(hs_pages_grow(60 * MB, &mapping, &length) == NULL && holds(block, 3 * MB));
+    CHECK(!hs_region_grow(&region, 60 * MB) && holds(region.data, 3 * MB));
     set_address_limit(before);
-    hs_pages_free(mapping, length);
+    hs_region_release(&region);
 }
 
 /* What the system does not take back is empty at least. */
 static void
 cut_without_mappings(void)
 {
-    void  *mapping, *rest;
-    size_t length;
-    char  *start, *block = hs_pages_reserve(8 * MB, &mapping, &length);
-    char  *chunk = hs_chunk_new(16 * MB);
-    fill(block, 8 * MB);
+    void *rest;
+    char *start, *block = hs_chunk_new(9 * MB), *chunk = hs_chunk_new(16 * MB);
+    fill(block, 9 * MB);
     fill(chunk, 16 * MB);
-    hs_chunk_touch(chunk, 16 * MB);
-    CHECK(hs_pages_cut(block, block));
+    hs_region region = {.data = chunk, .capacity = hs_chunk_of(chunk)->capacity, .used = 16 * MB};
+    hs_region_advise(&region, 16 * MB); /* all of it is resident */
     const size_t bytes = use_up_mappings(&start);
-    const bool   cut = hs_pages_cut(block + 2 * MB, block + 4 * MB);
-    const bool   is_empty = cut || (block[2 * MB] == 0 && block[3 * MB + 5] == 0);
+    void *const  same = hs_chunk_cut(block, 2 * MB, NULL);
     void *const  shorter = hs_chunk_cut(chunk, 3 * MB, &rest);
     if (bytes > 0) {
         munmap(start, bytes);
     }
-    CHECK(cut == (bytes == 0) && is_empty);
-    CHECK(holds(block, 2 * MB) && block[4 * MB] == 0);
+    CHECK(same == block && holds(block, 2 * MB));
     CHECK(shorter == chunk && holds(chunk, 3 * MB) && (rest == NULL || bytes == 0));
     CHECK(hs_chunk_of(chunk)->capacity >= 3 * MB && hs_chunk_of(chunk)->capacity < 4 * MB);
-    CHECK(hs_pages_trim(mapping, length, block, 9 * MB) == length);
-    CHECK(hs_pages_trim((char *)mapping + 1, length, block + 1, 2 * MB) == length); /* no page */
+    CHECK(hs_chunk_cut(block, 9 * MB, NULL) == block && holds(block, 2 * MB));
+    hs_chunk_free(block);
     hs_chunk_free(chunk);
     if (rest != NULL) {
         hs_chunk_free(rest);
     }
-    hs_pages_free(mapping, length);
 }
 
 /* In a process of its own: other threads and the checks themselves may need mappings. */
@@ -400,11 +387,11 @@ chunks_that_cannot_grow_stay(void)
         fill(chunk, sizes[s]);
         hs_chunk_expect(chunk, 100 * sizes[s]); /* more than it has */
         CHECK(hs_chunk_of(chunk)->huge <= hs_chunk_of(chunk)->capacity);
-        CHECK(hs_chunk_grow(chunk, TOO_MUCH, sizes[s]) == NULL && holds(chunk, sizes[s]));
-        CHECK(hs_chunk_grow(chunk, PTRDIFF_MAX, sizes[s]) == NULL && holds(chunk, sizes[s]));
-        chunk = hs_chunk_grow(chunk, 7 * MB, sizes[s]);
-        CHECK(chunk != NULL && holds(chunk, sizes[s]));
-        hs_chunk_free(chunk);
+        hs_region region = {.data = chunk, .capacity = sizes[s], .used = sizes[s]};
+        CHECK(!hs_region_grow(&region, TOO_MUCH) && holds(region.data, sizes[s]));
+        CHECK(!hs_region_grow(&region, PTRDIFF_MAX) && holds(region.data, sizes[s]));
+        CHECK(hs_region_grow(&region, 7 * MB) && holds(region.data, sizes[s]));
+        hs_chunk_free(region.data);
     }
 }
 
@@ -694,7 +681,7 @@ test_results(void)
 #endif
 #if !defined(HS_EMULATED)
 #if CAN_LIMIT_ADDRESSES
-    RUN(blocks_are_aligned_and_zero);
+    RUN(chunks_in_pages_are_aligned_and_zero);
     RUN(what_cannot_be_had_is_refused);
     RUN(cuts_may_be_refused);
     RUN(chunks_that_cannot_grow_stay);

@@ -68,26 +68,30 @@ whoever_comes_while_it_is_built_does_without(void)
 {
     const int64_t    blocks = hs_test_live_blocks();
     hs_nearest_kept *kept = hs_nearest_kept_new();
-    hs_nearest      *room = NULL, *other = NULL;
-    CHECK(hs_nearest_kept_get(kept, &room) == NULL && room != NULL);
-    CHECK(hs_nearest_kept_get(kept, &other) == NULL && other == NULL);
+    CHECK(kept->state == HS_NEAREST_NOTHING);
+    kept->state = HS_NEAREST_BUILDS + hs_atomic_load(&hs_n_forks);
     CHECK(!borrows(kept, INFINITY));
-    hs_nearest_kept_end(kept, false); /* it could not be built: the next one tries */
-    CHECK(hs_nearest_kept_get(kept, &room) == NULL && room != NULL);
     hs_test_fork(); /* a thread of the parent built it */
-    CHECK(hs_nearest_kept_get(kept, &room) == NULL && room != NULL);
-    CHECK(hs_nearest_kept_get(kept, &other) == NULL && other == NULL);
-    hs_nearest_kept_end(kept, false);
     CHECK(borrows(kept, INFINITY));
     CHECK(borrows(kept, 1.0));
     CHECK(!borrows(kept, 0x1p-900)); /* has a scale of its own */
-    const hs_nearest *built = hs_nearest_kept_get(kept, &room);
-    CHECK(built != NULL && room == NULL && built->tree.n_nodes == 1);
-    CHECK(built->search->call->team == NULL); /* it was the call's that built it */
-    CHECK(hs_nearest_kept_get(kept, &other) == built && other == NULL);
+    CHECK(kept->state == HS_NEAREST_BUILT && kept->near.tree.n_nodes == 1);
+    CHECK(kept->call.team == NULL); /* it was the call's that built it */
     hs_nearest_kept_free(kept);
     hs_nearest_kept_free(NULL);
     CHECK(hs_test_live_blocks() == blocks);
+}
+
+/* A ranker for point number i of the unit. */
+static void
+open_ranker(int32_t i, hs_nearest_ranker *ranker)
+{
+    int32_t si = 0;
+    while (hs_search_asking(&unit.search)->order[si] != i)
+        si++;
+    *ranker = (hs_nearest_ranker){.near = &unit.near, .options = &unit.call.options};
+    CHECK(hs_nearest_ranker_init(ranker) == HS_OK);
+    hs_nearest_ranker_set(ranker, si);
 }
 
 /* Points that a radius beyond the largest distance has let in. */
@@ -95,26 +99,29 @@ static void
 rows_end_at_the_largest_distance(void)
 {
     const hs_points          points = points_on_line(line, 4);
+    static hs_nearest_leaves leaves;
     static hs_nearest_block  block;
     static hs_nearest_writer writer;
     static const double      limits[] = {0.25, 0.5, 0.75, 1.0, 1.125, 1.25};
     static const int         within[] = {0, 1, 1, 2, 2, 3};
-    hs_options               options = hs_options_default();
-    for (int l = 0; l < 6; l++) {
+    for (int trial = 0; trial < 12; trial++) {
+        const int         l = trial / 2, walks = trial % 2;
+        hs_nearest_ranker ranker;
         nearest_unit_open(&points, NULL, NULL, 3, HS_WANT_J | HS_WANT_DISTANCE, limits[l], &unit);
-        hs_nearest_ranker ranker = {
-            .near = &unit.near, .block = &block, .pace = {.options = &options}};
         hs_nearest_group group = nearest_unit_group(&unit, 1.5);
-        int32_t          hits[4] = {0, 1, 2, 3}, si = 0;
+        int32_t          hits[4] = {0, 1, 2, 3};
         int64_t          count;
         CHECK(hs_output_reserve(&unit.rows, 12, 0.0) == HS_OK);
         unit.rows.n_pairs = 12;
-        CHECK(hs_nearest_block_init(&unit.near, &block) == HS_OK);
-        CHECK(hs_nearest_block_fill(&unit.near, &unit.call.options, &group, 1e9, NULL, &block) ==
-              HS_OK);
-        while (unit.search.bins.order[si] != 0)
-            si++;
-        CHECK(hs_nearest_rank(&ranker, &group, si, hits, 4, &count) == HS_OK && count == 3);
+        CHECK(nearest_unit_fill(&unit, &group, 1e9, &leaves, &block) == HS_OK);
+        open_ranker(0, &ranker);
+        if (walks) {
+            CHECK(hs_nearest_walk(&ranker, &count) == HS_OK && count == within[l]);
+        } else {
+            CHECK(hs_nearest_rank(&ranker, &block, hits, NULL, 4, false, &count) == HS_OK);
+            CHECK(count == 3);
+        }
+        memset(&writer, 0, sizeof writer);
         hs_nearest_writer_init(&unit.near, &writer);
         CHECK(hs_nearest_write(&writer, &ranker, count) == HS_OK);
         hs_nearest_flush(&writer);
@@ -125,42 +132,39 @@ rows_end_at_the_largest_distance(void)
             CHECK(d[e] == (e < within[l] ? line[e + 1] : INFINITY));
         }
         hs_nearest_ranker_free(&ranker);
-        hs_nearest_block_free(&unit.near, &block);
+        nearest_unit_clear(&unit, &leaves, &block);
         nearest_unit_close(&unit);
     }
 }
 
-/* Squares of what is far beyond the first guess would overflow, those of what is far below it would
- * vanish: the unit changes, up and down to the last that there is. */
+/* Squares of what is far from as large as all points would overflow or vanish: the unit changes, up
+ * and down to the last that there is. */
 static void
-check_two_points(const double *x)
+check_two_points(const double *x, int n)
 {
-    const hs_points  points = points_on_line(x, 2);
-    const hs_options options = hs_options_default();
-    static const int exponents[] = {-1000, -300, 0, 300, 600, 601, 602, 900};
-    for (int e = 0; e < 8; e++) {
-        hs_nearest_bounder bounder;
+    const hs_points points = points_on_line(x, n);
+    for (int32_t i = 0; i < 2; i++) {
+        hs_nearest_ranker ranker;
+        int64_t           count;
         nearest_unit_open(&points, NULL, NULL, 1, HS_WANT_J, INFINITY, &unit);
-        const double apart = fabs(unit.search.bins.x[0][0] - unit.search.bins.x[0][1]);
-        CHECK(apart > 0.0 && apart < INFINITY);
-        CHECK(hs_nearest_bounder_init(&unit.near, &bounder) == HS_OK);
-        hs_nearest_group group;
-        hs_nearest_group_set(&unit.near, 0, 1, &group);
-        group.radius = ldexp(1.0, exponents[e]);
-        CHECK(hs_nearest_bound(&unit.near, &options, &bounder, &group) == HS_OK);
-        CHECK(group.radius >= apart && group.radius <= 1.001 * apart);
-        hs_nearest_bounder_free(&unit.near, &bounder);
+        open_ranker(i, &ranker);
+        CHECK(hs_nearest_walk(&ranker, &count) == HS_OK && count == 1);
+        CHECK(unit.search.bins.order[ranker.keys[0].number] == 1 - i);
+        CHECK(ranker.keys[0].square >= 0x1p-620 && ranker.keys[0].square <= 0x1p620);
+        hs_nearest_ranker_free(&ranker);
         nearest_unit_close(&unit);
     }
 }
 
 static void
-radii_are_found_far_from_a_guess(void)
+distances_may_be_of_any_size(void)
 {
-    check_two_points((const double[2]){-0x1.fp900, 0x1.fp900});
-    check_two_points((const double[2]){0.0, 0x1.fp-900});
-    check_two_points((const double[2]){-0x1p-500, 0x1.fp-470});
-    check_two_points((const double[2]){0x1p500, 0x1.fp470});
+    check_two_points((const double[2]){-0x1.fp900, 0x1.fp900}, 2);
+    check_two_points((const double[2]){0.0, 0x1.fp-900}, 2);
+    check_two_points((const double[3]){0.0, 0x1p-200, 0x1p200}, 3);
+    check_two_points((const double[3]){0.0, 0x1p-500, 0x1p480}, 3);
+    check_two_points((const double[3]){-0x1p-500, 0x1.fp-470, 1.0}, 3);
+    check_two_points((const double[3]){0x1p500, 0x1.fp470, 0x1p900}, 3);
 }
 
 /*
@@ -572,7 +576,7 @@ test_nearest(void)
 {
     RUN(whoever_comes_while_it_is_built_does_without);
     RUN(rows_end_at_the_largest_distance);
-    RUN(radii_are_found_far_from_a_guess);
+    RUN(distances_may_be_of_any_size);
     RUN(points_that_wrapping_makes_equal);
     RUN(clusters_of_all_sizes);
     RUN(many_points_on_a_lattice);

@@ -20,6 +20,7 @@ void test_rank(void);
 enum { N = 300 };
 
 static nearest_unit      unit;
+static hs_nearest_leaves leaves;
 static hs_nearest_block  block;
 static hs_nearest_ranker ranker;
 static hs_nearest_group  group;
@@ -31,13 +32,10 @@ open_scene(const double *x, int64_t n, int d, const hs_box *box, int64_t k, doub
 {
     const hs_points points = {x, n, d, HS_FLOAT64, d * 8, 8};
     nearest_unit_open(&points, NULL, box, k, HS_WANT_J, INFINITY, &unit);
-    CHECK(hs_nearest_block_init(&unit.near, &block) == HS_OK);
     group = nearest_unit_group(&unit, radius);
-    CHECK(hs_nearest_block_fill(&unit.near, &unit.call.options, &group, 1e9, NULL, &block) ==
-          HS_OK);
+    CHECK(nearest_unit_fill(&unit, &group, 1e9, &leaves, &block) == HS_OK);
     rank_options = hs_options_default();
-    ranker = (hs_nearest_ranker){
-        .near = &unit.near, .block = &block, .pace = {.options = &rank_options}};
+    ranker = (hs_nearest_ranker){.near = &unit.near, .options = &rank_options};
     for (int32_t h = 0; h < block.n && h < 2 * N; h++)
         hits[h] = h;
 }
@@ -46,7 +44,7 @@ static void
 close_scene(void)
 {
     hs_nearest_ranker_free(&ranker);
-    hs_nearest_block_free(&unit.near, &block);
+    nearest_unit_clear(&unit, &leaves, &block);
     nearest_unit_close(&unit);
 }
 
@@ -63,6 +61,15 @@ place_of(int32_t i)
 /* Four points on a line: from the first one 0.5, 1.0 and 1.2. */
 static const double line[4] = {0.0, 0.5, 1.0, 1.2};
 
+/* Ranks by squares in float32 if that can tell: then no square in float64 is computed. */
+static bool
+ranks_fast(int32_t si, const float *squares, int64_t n, int64_t *count)
+{
+    hs_nearest_ranker_set(&ranker, si);
+    CHECK(hs_nearest_rank(&ranker, &block, hits, squares, n, false, count) == HS_OK);
+    return ranker.n == 0;
+}
+
 /* Squares in float32 do where they differ by more than they err, from the point itself on. */
 static void
 float32_tells_only_what_it_can(void)
@@ -70,7 +77,8 @@ float32_tells_only_what_it_can(void)
     float   squares[4 + HS_PADDING] = {0.0f};
     int64_t count;
     open_scene(line, 4, 1, NULL, 2, 1.5);
-    const int32_t si = place_of(0);
+    const int32_t           si = place_of(0);
+    hs_nearest_image *const home = &leaves.images[0];
     for (int32_t h = 0; h < 4; h++) {
         const double along = line[unit.search.bins.order[block.number[h]]];
         squares[h] = (float)(along * along);
@@ -79,25 +87,24 @@ float32_tells_only_what_it_can(void)
     const double errors[] = {1e-7, 0.1, 0.124, 0.126, 0.4};
     for (int e = 0; e < 5; e++) {
         block.square_error = errors[e];
-        CHECK(hs_nearest_rank_fast(&ranker, si, hits, squares, 4, &count) == (e < 3));
-        CHECK(count == (e < 3 ? 2 : -1));
-        CHECK(e >= 3 || (unit.search.bins.order[block.number[ranker.keys[0].place]] == 1 &&
-                         unit.search.bins.order[block.number[ranker.keys[1].place]] == 2));
+        CHECK(ranks_fast(si, squares, 4, &count) == (e < 3));
+        CHECK(count == 2);
+        CHECK(unit.search.bins.order[ranker.keys[0].number] == 1 &&
+              unit.search.bins.order[ranker.keys[1].number] == 2);
     }
     block.square_error = 1e-7;
-    CHECK(
-        !hs_nearest_rank_fast(&ranker, place_of(1), hits, squares, 4, &count)); /* not the first */
-    CHECK(hs_nearest_rank_fast(&ranker, si, hits, squares, 2, &count) && count == -1);
-    block.images[0].is_home = false; /* an image of itself is a neighbour */
-    CHECK(!hs_nearest_rank_fast(&ranker, si, hits, squares, 4, &count));
-    block.images[0].is_home = true;
+    CHECK(!ranks_fast(place_of(1), squares, 4, &count)); /* not the first */
+    CHECK(ranks_fast(si, squares, 2, &count) && count == -1);
+    home->is_home = false; /* an image of itself is a neighbour */
+    CHECK(!ranks_fast(si, squares, 4, &count));
+    home->is_home = true;
     /* The last one wanted must be that far from the radius, too. */
     for (int32_t h = 0; h < 4; h++)
         squares[h] = squares[h] == 1.0f ? 2.2f : squares[h] > 1.0f ? 2.249f : squares[h];
     block.square_error = 0.02;
-    CHECK(hs_nearest_rank_fast(&ranker, si, hits, squares, 4, &count));
+    CHECK(ranks_fast(si, squares, 4, &count));
     block.square_error = 0.0249;
-    CHECK(!hs_nearest_rank_fast(&ranker, si, hits, squares, 4, &count));
+    CHECK(!ranks_fast(si, squares, 4, &count));
     close_scene();
 }
 
@@ -109,15 +116,16 @@ only_the_point_itself_is_left_out(void)
     const double x[2] = {0.03125, 0.5};
     int64_t      count;
     open_scene(x, 1, 2, &box, 4, 0.75);
-    CHECK(block.n_images >= 5 && block.n == block.n_images);
-    block.flat_error = 0.3; /* the next images are at 0.27 */
-    CHECK(hs_nearest_rank(&ranker, &group, 0, hits, block.n, &count) == HS_OK && count == 4);
+    CHECK(leaves.n_images >= 5 && block.n == leaves.n_images);
+    block.frame.flat_error = 0.3; /* the next images are at 0.27 */
+    hs_nearest_ranker_set(&ranker, 0);
+    CHECK(hs_nearest_rank(&ranker, &block, hits, NULL, block.n, false, &count) == HS_OK);
+    CHECK(count == 4);
     for (int e = 0; e < 4; e++) { /* -1 and 1, -2 and 2 */
-        const hs_nearest_image *image = hs_nearest_image_of(&block, ranker.keys[e].place);
+        const hs_nearest_image *image = &ranker.images[ranker.keys[e].image];
         CHECK(!image->is_home && abs(image->shift[0]) == 1 + e / 2);
     }
-    CHECK(hs_nearest_image_of(&block, ranker.keys[0].place)->shift[0] *
-              unit.search.scene.lattice.U[0][0] <
+    CHECK(ranker.images[ranker.keys[0].image].shift[0] * unit.search.scene.lattice.U[0][0] <
           0); /* the smaller S first */
     close_scene();
 }
@@ -142,16 +150,18 @@ ranking_can_be_stopped_anywhere(void)
         x[2 * e + 1] = ldexp(e, -44);
     }
     open_scene(x, N, 2, NULL, 1, 1.5);
-    CHECK(hs_nearest_rank(&ranker, &group, place_of(0), hits, N, &count) == HS_OK && count == 1);
-    CHECK(unit.search.bins.order[block.number[ranker.keys[0].place]] == 1);
-    const int64_t n_steps = ranker.pace.steps;
+    const int32_t si = place_of(0);
+    hs_nearest_ranker_set(&ranker, si);
+    CHECK(hs_nearest_rank(&ranker, &block, hits, NULL, N, false, &count) == HS_OK && count == 1);
+    CHECK(unit.search.bins.order[ranker.keys[0].number] == 1);
+    const int64_t n_steps = ranker.steps;
     CHECK(n_steps > 3 * N && ranker.n_compared >= N - 2);
     rank_options.poll = stop;
     rank_options.poll_context = &asked;
     for (int64_t ahead = 1; ahead <= n_steps + 20; ahead += 20) {
-        ranker.pace =
-            (hs_nearest_pace){.options = &rank_options, .steps = HS_NEAREST_POLL_STEPS - ahead};
-        const hs_status status = hs_nearest_rank(&ranker, &group, place_of(0), hits, N, &count);
+        ranker.steps = HS_NEAREST_POLL_STEPS - ahead;
+        hs_nearest_ranker_set(&ranker, si);
+        const hs_status status = hs_nearest_rank(&ranker, &block, hits, NULL, N, false, &count);
         CHECK(status == (ahead <= n_steps ? HS_ERR_INTERRUPTED : HS_OK));
         n_stopped += status != HS_OK;
     }
@@ -274,41 +284,6 @@ eight_thousand_points_may_be_one(void)
     hs_pairs_free(rows);
 }
 
-enum { KEYS = 40 };
-
-static hs_nearest_key keys[KEYS], spare[KEYS], given[KEYS];
-
-static bool
-are_sorted(const hs_nearest_key *sorted, int64_t n)
-{
-    bool right = true;
-    for (int64_t e = 0; e < n; e++) {
-        const hs_nearest_key *key = &sorted[e];
-        right = right && key->place >= 0 && key->place < n;
-        right = right && key->square == given[key->place].square;
-        if (e > 0)
-            right = right && (key->square > key[-1].square ||
-                              (key->square == key[-1].square && key->place > key[-1].place));
-    }
-    return right;
-}
-
-/* A step of such a bound would be infinite. */
-static void
-bounds_may_be_zero_or_tiny(void)
-{
-    static const double bounds[] = {0.0, 0x1p-1074, 0x1p-1000, 0x1p-999};
-    const hs_options    options = hs_options_default();
-    for (int b = 0; b < 4; b++) {
-        hs_nearest_pace pace = {.options = &options};
-        hs_nearest_key *sorted = keys, *other = spare;
-        for (int32_t e = 0; e < 20; e++)
-            given[e] = keys[e] = (hs_nearest_key){e % 3 == 0 ? bounds[b] : 0.0, e};
-        hs_nearest_sort(&pace, &sorted, &other, 20, bounds[b]);
-        CHECK(are_sorted(sorted, 20));
-    }
-}
-
 void
 test_rank(void)
 {
@@ -317,5 +292,4 @@ test_rank(void)
     RUN(ranking_can_be_stopped_anywhere);
     RUN(all_candidates_may_lie_in_one_image);
     RUN(eight_thousand_points_may_be_one);
-    RUN(bounds_may_be_zero_or_tiny);
 }

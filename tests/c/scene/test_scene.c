@@ -56,7 +56,7 @@ lost_digits_are_kept(void)
     const hs_points  points = points_in(tiny, N_POINTS);
     const hs_sets    sets = {.points = &points, .is_plain = true};
     hs_account_init(&account, &options);
-    CHECK(hs_scene_init_sets(&account, NULL, &sets, NULL, &options, &one_scene, NULL, &failure) ==
+    CHECK(hs_scene_make(&account, NULL, &sets, NULL, &options, &one_scene, NULL, &failure) ==
           HS_OK);
     CHECK(one_scene.extreme && one_scene.keeps_originals &&
           one_scene.originals[0][0] == 0x1.8p-1070);
@@ -91,7 +91,7 @@ errors_are_bounded_and_small(void)
     const hs_points  points = points_in(x, 2);
     const hs_sets    sets = {.points = &points};
     hs_account_init(&account, &options);
-    CHECK(hs_scene_init_sets(&account, NULL, &sets, &box, &options, &one_scene, NULL, &failure) ==
+    CHECK(hs_scene_make(&account, NULL, &sets, &box, &options, &one_scene, NULL, &failure) ==
           HS_OK);
     for (int k = 0; k < 2; k++) {
         CHECK(one_scene.t_error[k] >= 4.0 * 0x1p-53 * 1.7 && one_scene.t_error[k] < 0x1p-48);
@@ -127,7 +127,7 @@ keep(const double *x, int64_t n, const hs_box *box)
     options.cutoff = 1.0;
     options.want = HS_WANT_SHIFT;
     hs_account_init(&account, &options);
-    CHECK(hs_scene_init_sets(&account, NULL, &sets, box, &options, &kept, NULL, &failure) == HS_OK);
+    CHECK(hs_scene_make(&account, NULL, &sets, box, &options, &kept, NULL, &failure) == HS_OK);
 }
 
 static hs_status
@@ -140,7 +140,7 @@ ask(const double *q, int64_t n, unsigned want, hs_failure *failure)
     options.want = want;
     *failure = HS_NO_FAILURE;
     const hs_status status =
-        hs_scene_from_kept(&account, NULL, &kept, &queries, &options, &asking, failure);
+        hs_scene_from_kept(&account, NULL, &kept, &queries, &options, false, &asking, failure);
     if (status == HS_OK)
         hs_scene_free(&account, &asking);
     return status;
@@ -278,35 +278,29 @@ queries_that_fit_are_taken(void)
  * Whether gaps are closed, which cutoff and scale a scene goes by, and why some boxes have none.
  */
 
-/* Boxes that vanish beside the cutoff have no scale, but where that has images without end. */
+/* A box that vanishes beside the cutoff has no scale: it is too skewed, unless it lies along the
+ * coordinate axes or its vectors themselves are so short that their images have no end. */
 static void
 endless_images_are_refused_for_their_number(void)
 {
-    const hs_box tiny = {.ndim = 1, .periodic = {true}, .rows = {{0x1p-1000}}};
-    hs_condensed condensed = {.box = &tiny, .given_box = &tiny};
-    hs_scene     scene;
-    hs_failure   failure = HS_NO_FAILURE;
-    memset(&scene, 0, sizeof scene);
-    scene.ndim = scene.cloud.ndim = scene.lattice.ndim = scene.lattice.n_periodic = 1;
-    scene.lattice.period[0] = 0x1p-1000;
-    scene.sought = 0x1p-960; /* scaled by 2^0 or by more */
-    scene.cutoff = 0x1p-900;
-    CHECK(hs_scene_box_vanishes(&scene));
-    CHECK(hs_scene_has_no_scale(&scene, &condensed));
-    CHECK(hs_scene_refuse_vanishing(&scene, &condensed, &failure) == HS_ERR_BOX_SKEWED);
-    CHECK(failure.expected_pairs == 0.0);
-    condensed.is_scaled = true;
-    CHECK(!hs_scene_has_no_scale(&scene, &condensed));
-    CHECK(hs_scene_refuse_vanishing(&scene, &condensed, &failure) == HS_ERR_MEMORY);
-    CHECK(failure.expected_pairs == INFINITY && failure.expected_bytes == INFINITY);
-    condensed.is_scaled = false;
-    scene.sought = 0x1p-900;
-    CHECK(!hs_scene_has_no_scale(&scene, &condensed));
-    scene.lattice.aligned = true;
-    scene.sought = 0x1p-960;
-    CHECK(hs_scene_refuse_vanishing(&scene, &condensed, &failure) == HS_ERR_MEMORY);
-    scene.lattice.period[0] = 0x1p-899;
-    CHECK(!hs_scene_box_vanishes(&scene));
+    const double    x[6] = {0.0, 0.0, 0.0, 0.25, 0.0, 0.25};
+    const hs_points points = {x, 2, 3, HS_FLOAT64, 24, 8};
+    for (int tilted = 0; tilted < 2; tilted++) {
+        for (int is_short = 0; is_short < 2; is_short++) {
+            const double     least = is_short ? 0x1p-950 : 1.0;
+            const hs_box     box = {.ndim = 3,
+                                    .periodic = {true, true, true},
+                                    .rows = {{least}, {least, 0x1p-950}, {tilted * 0.375, 0.0, 1.0}}};
+            const hs_options options = options_for(1.0, HS_WANT_J, HS_EXACT);
+            hs_failure       failure = HS_NO_FAILURE;
+            int64_t          n = -1;
+            const hs_status  status = hs_pairs_count(AMONG(&points, &box), &options, &n, &failure);
+            const bool       is_skewed = tilted && !is_short;
+            CHECK(status == (is_skewed ? HS_ERR_BOX_SKEWED : HS_ERR_MEMORY));
+            CHECK(failure.expected_pairs == (is_skewed ? 0.0 : INFINITY));
+            CHECK(failure.expected_bytes == (is_skewed ? 0.0 : INFINITY));
+        }
+    }
 }
 
 /* ---- how far what is computed with may be from the numbers that were given ---- */
@@ -472,41 +466,35 @@ originals_too_far_to_count_are_wrapped(void)
 
 /* ---- the power of two that a scene is scaled by, and how far far is ---- */
 
-/* Points from low to high along each axis; `x` is theirs. */
-static hs_cloud
-cloud_of(int ndim, double low, double high, double *x)
+/* The cutoff that a scene of points at these two places goes by. */
+static double
+cutoff_of(double low, double high, const hs_box *box, double cutoff)
 {
-    hs_cloud cloud = {.n = 2, .ndim = ndim, .largest = fmax(-low, high)};
-    x[0] = low;
-    x[1] = high;
-    for (int k = 0; k < ndim; k++) {
-        cloud.x[k] = x;
-        cloud.lower[k] = low;
-        cloud.upper[k] = high;
-    }
-    return cloud;
+    const double     x[2] = {low, high};
+    const hs_points  points = {x, 2, 1, HS_FLOAT64, 8, 8};
+    const hs_sets    sets = {.points = &points};
+    const hs_options options = options_for(cutoff, HS_WANT_J, HS_EXACT);
+    hs_failure       failure;
+    hs_account_init(&account, &options);
+    CHECK(hs_scene_make(&account, NULL, &sets, box, &options, &one_scene, NULL, &failure) == HS_OK);
+    finish();
+    return one_scene.sought;
 }
 
 /* A cutoff far beyond all distances is as good as one that is 2^8 times the largest coordinate. */
 static void
 cutoffs_beyond_everything_become_smaller(void)
 {
-    const hs_box      box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
-    const hs_box_size none = hs_box_size_of(NULL), some = hs_box_size_of(&box);
-    double            x[2];
-    hs_cloud          cloud = cloud_of(1, -3.0, 1.0, x);
-    CHECK(hs_enough_cutoff(&cloud, &none, 192.0) == 192.0); /* 64 times as much is not enough */
-    CHECK(hs_enough_cutoff(&cloud, &none, 256.0) == 256.0);
-    CHECK(hs_enough_cutoff(&cloud, &none, 512.0) == 512.0);
-    CHECK(hs_enough_cutoff(&cloud, &none, 513.0) == 512.0);
-    CHECK(hs_enough_cutoff(&cloud, &none, DBL_MAX) == 512.0);
-    CHECK(hs_enough_cutoff(&cloud, &some, 513.0) == 513.0); /* images are at any distance */
-    cloud = cloud_of(1, 0.0, 0.0, x);
-    CHECK(hs_enough_cutoff(&cloud, &none, 513.0) == 513.0);
-    cloud = cloud_of(1, 0.0, 0x1p1015, x);
-    CHECK(hs_enough_cutoff(&cloud, &none, DBL_MAX) == 0x1p1023);
-    cloud = cloud_of(1, 0.0, 0x1p1016, x);
-    CHECK(hs_enough_cutoff(&cloud, &none, DBL_MAX) == DBL_MAX);
+    const hs_box box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
+    CHECK(cutoff_of(-3.0, 1.0, NULL, 192.0) == 192.0); /* 64 times as much is not enough */
+    CHECK(cutoff_of(-3.0, 1.0, NULL, 256.0) == 256.0);
+    CHECK(cutoff_of(-3.0, 1.0, NULL, 512.0) == 512.0);
+    CHECK(cutoff_of(-3.0, 1.0, NULL, 513.0) == 512.0);
+    CHECK(cutoff_of(-3.0, 1.0, NULL, DBL_MAX) == 512.0);
+    CHECK(cutoff_of(-3.0, 1.0, &box, 513.0) == 513.0); /* images are at any distance */
+    CHECK(cutoff_of(0.0, 0.0, NULL, 513.0) == 513.0);
+    CHECK(cutoff_of(0.0, 0x1p1015, NULL, DBL_MAX) == 0x1p1023);
+    CHECK(cutoff_of(0.0, 0x1p1016, NULL, DBL_MAX) == DBL_MAX);
 }
 
 /*

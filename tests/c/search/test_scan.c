@@ -3,7 +3,6 @@
  * hits. */
 #include "../../../csrc/core/collect/parallel.h"
 #include "../../../csrc/core/search/scan.h"
-#include "../../../csrc/core/verlet/pair_list.h"
 #include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/poll_checks.h"
@@ -244,7 +243,6 @@ shifts_beyond_the_integers_are_told(void)
     const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.5, 1.0}}};
     for (int beyond = 0; beyond < 2; beyond++) {
         hs_output  pairs;
-        hs_pieces  pieces;
         hs_failure failure = HS_NO_FAILURE;
         search_unit_points(18, 40, 2, 1.0, &unit);
         search_unit_open(&box, 0.3, false, HS_WANT_I | HS_WANT_J, &unit);
@@ -252,18 +250,10 @@ shifts_beyond_the_integers_are_told(void)
         for (int r = 0; r < 2 && beyond; r++)
             search->scene.lattice.U[r][r] = INT64_MAX;
         hs_output_init(&search->call->account, 2, HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT, 4, &pairs);
-        CHECK(hs_parallel_record(search, &pairs, &failure) ==
+        CHECK(hs_parallel_record(search, NULL, &pairs, &failure) ==
               (beyond ? HS_ERR_SHIFT_RANGE : HS_OK));
         CHECK(beyond ? failure.row >= 0 && failure.row < 40 : pairs.n_pairs > 100);
         hs_output_free(&pairs);
-        for (int32_t si = 0; si < 40; si++)
-            search->bins.order[si] = si;
-        failure.row = -1;
-        CHECK(hs_pieces_find(search, &pieces, &failure) == (beyond ? HS_ERR_SHIFT_RANGE : HS_OK));
-        CHECK(beyond ? failure.row >= 0 && failure.row < 40
-                     : pieces.n == 1 && pieces.of[0].shifted.pairs.n_pairs > 10);
-        if (!beyond)
-            hs_pieces_free(&search->call->account, &pieces);
         search_unit_close(&unit);
     }
 }
@@ -286,7 +276,7 @@ keys_beyond_the_integers_are_told(void)
         for (int r = 0; r < 2 && beyond; r++)
             search->scene.lattice.U[r][r] = INT64_MAX;
         hs_output_init(&unit.call.account, 2, HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT, 4, &pairs);
-        CHECK(hs_parallel_record(search, &pairs, &failure) ==
+        CHECK(hs_parallel_record(search, NULL, &pairs, &failure) ==
               (beyond ? HS_ERR_SHIFT_RANGE : HS_OK));
         CHECK(beyond ? failure.row == 0 || failure.row == 1 : pairs.n_pairs == 1);
         hs_output_free(&pairs);

@@ -65,6 +65,9 @@ static const call_kind call_kinds[] = {
     {"systems_histogram", call_systems_histogram,
      OF_SCENE | USES_SYSTEMS | USES_QUERIES | USES_OPTIONS | USES_CELL_SIZE | USES_KERNEL |
          USES_COUNTERS | USES_HISTOGRAM},
+    {"systems_stream", call_systems_stream,
+     OF_SCENE | USES_SYSTEMS | (OF_SEARCH & ~USES_COUNTERS) | USES_WANT | USES_INDEX_BYTES |
+         USES_MAX_PAIRS},
     {"systems_visit", call_systems_visit, OF_SCENE | USES_SYSTEMS | OF_SEARCH | USES_VISIT},
     {"systems_clusters", call_systems_clusters, OF_SCENE | USES_SYSTEMS | OF_SEARCH},
     {"verlet_update", call_verlet_update, OF_VERLET | USES_SKIN},

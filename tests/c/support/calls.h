@@ -403,6 +403,12 @@ call_systems_histogram(call *c, hs_failure *failure)
 }
 
 static inline hs_status
+call_systems_stream(call *c, hs_failure *failure)
+{
+    return call_in_systems(c, call_stream, failure);
+}
+
+static inline hs_status
 call_systems_visit(call *c, hs_failure *failure)
 {
     return call_in_systems(c, call_visit, failure);

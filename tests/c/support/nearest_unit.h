@@ -71,4 +71,23 @@ nearest_unit_group(const nearest_unit *unit, double radius)
     return group;
 }
 
+/* Fills a block for one group from leaves of its own. */
+static inline hs_status
+nearest_unit_fill(nearest_unit *unit, const hs_nearest_group *group, double most,
+                  hs_nearest_leaves *leaves, hs_nearest_block *block)
+{
+    CHECK(hs_nearest_leaves_find(&unit->near, group, 1, most, leaves) == HS_OK);
+    return hs_nearest_block_fill(&unit->near, &unit->call.options, group, most, leaves, block);
+}
+
+/* Frees the memory of leaves and a block, and makes them as they were at first. */
+static inline void
+nearest_unit_clear(nearest_unit *unit, hs_nearest_leaves *leaves, hs_nearest_block *block)
+{
+    hs_shared_release(unit->near.shared, &leaves->memory);
+    hs_shared_release(unit->near.shared, &block->memory);
+    memset(leaves, 0, sizeof *leaves);
+    memset(block, 0, sizeof *block);
+}
+
 #endif

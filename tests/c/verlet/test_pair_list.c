@@ -4,6 +4,7 @@
 #include "../../../csrc/core/memory/memory.h"
 #include "../../../csrc/core/verlet/pair_list.h"
 #include "../support/harness.h"
+#include "../support/poll_checks.h"
 #include "../support/list_checks.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
@@ -360,6 +361,33 @@ no_more_shifts_are_numbered_than_can_be(void)
     CHECK(images.n == INT32_MAX / 2 + 1 && images.of == of);
 }
 
+/* A point and its own images, in a box whose vector points down: half of them are numbered where
+ * they are met, the others where each is turned to be positive. */
+static hs_status
+list_own_images(void *context)
+{
+    const double    x = 0.25;
+    const hs_box    box = {.ndim = 1, .periodic = {true}, .rows = {{-1.0}}};
+    const hs_points points = {&x, 1, 1, HS_FLOAT64, 8, 8};
+    hs_options      options = hs_options_default();
+    hs_verlet      *list = hs_verlet_new();
+    bool            rebuilt;
+    (void)context;
+    options.cutoff = 40.0;
+    const hs_status status =
+        list == NULL ? HS_ERR_MEMORY
+                     : hs_verlet_update(list, &points, &box, &options, 0.25, false, &rebuilt, NULL);
+    CHECK(status != HS_OK || hs_verlet_look(list).n_listed == 40);
+    hs_verlet_free(list);
+    return status;
+}
+
+static void
+memory_of_images_may_be_refused(void)
+{
+    CHECK(fail_each_allocation(list_own_images, NULL, 100) > 10);
+}
+
 /* ---- when a list is built again, and that it stays as it was when that fails ---- */
 
 static random_scene shared;
@@ -506,6 +534,7 @@ test_pair_list(void)
     RUN(it_stops_when_told_to_or_without_memory);
     RUN(a_jump_of_one_costs_a_difference_and_its_wrapping);
     RUN(no_more_shifts_are_numbered_than_can_be);
+    RUN(memory_of_images_may_be_refused);
     RUN(other_scenes_get_lists_of_their_own);
     RUN(limits_leave_the_list_as_it_was);
     RUN(shifts_that_do_not_fit_name_a_point);

@@ -144,6 +144,11 @@ shifts_may_be_as_large_as_jumps_are(void)
     const int   n_names = hs_kernel_names(names, 16);
     for (int k = 0; k < n_names; k++) {
         jump_by(3, 4.0, 1.0, names[k], HS_OK);
+        for (int64_t off = -1; off <= 1; off++) { /* what the writer's sums of shifts may be */
+            jump_by((INT64_C(1) << 29) + off, 0.0, 1.0, names[k], HS_OK);
+            jump_by(-(INT64_C(1) << 29) + off, 0.0, 1.0, names[k], HS_OK);
+        }
+        jump_by(INT32_MAX, 0.0, 1.0, names[k], HS_OK);
         jump_by(-3, 0x1p20, 1.0, names[k], HS_OK);
         jump_by(INT64_C(1) << 33, 0.0, 1.0, names[k], HS_ERR_SHIFT_RANGE);
         jump_by(-(INT64_C(1) << 33), 0.0, 1.0, names[k], HS_ERR_SHIFT_RANGE);
@@ -202,215 +207,47 @@ box_vectors_may_be_any_sum_of_shorter_ones(void)
     CHECK(n_pairs > 10000);
 }
 
-/*
- * ---- recheck unit ----
- *
- * A list of a few points, put together by hand, whose pairs are decided anew, so that a test can
- * take the steps of that one by one.
- */
+/* What finding with d, by a writer where there is one, takes in memory may be refused. */
+static hs_status
+find_distances(void *context)
+{
+    const hs_verlet *list = context;
+    hs_options       options = hs_options_default();
+    hs_pairs        *pairs = NULL;
+    options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE;
+    const hs_status status = hs_verlet_find(list, &options, &pairs, NULL);
+    CHECK((pairs != NULL) == (status == HS_OK));
+    hs_pairs_free(pairs);
+    return status;
+}
 
-enum { RECHECK_POINTS = 6, RECHECK_IMAGES = 4 };
-
-typedef struct recheck_unit {
-    hs_call    call;
-    hs_verlet  list;
-    hs_recheck recheck;
-    hs_output  output; /* fixed, so that batches are measured */
-    int32_t    order[RECHECK_POINTS];
-    int64_t    counts[RECHECK_POINTS * 3], jumps[RECHECK_POINTS * 3];
-    int32_t    images[RECHECK_IMAGES * 3];
-} recheck_unit;
-
-/* All points in reverse, no jumps, counts and images of 0. */
+/* All points of a list go on together by so many boxes: they are wrapped by other box vectors than
+ * those that they have been counted by, as many as the writer's sums of shifts can hold, or more. */
 static void
-recheck_unit_open(const hs_points *points, const hs_box *box, double cutoff, unsigned want,
-                  recheck_unit *unit)
+points_may_be_wrapped_anew(void)
 {
-    hs_options  options = hs_options_default();
-    hs_failure  failure;
-    double      rows[HS_MAX_DIM][HS_MAX_DIM];
-    hs_recheck *recheck = &unit->recheck;
-    memset(unit, 0, sizeof *unit);
-    options.cutoff = cutoff;
-    options.want = want;
-    options.threads = 1;
-    hs_call_begin(&options, &unit->call);
-    unit->call.kernel = hs_kernel_select(NULL);
-    CHECK(hs_frame_take(points, box, &options, &unit->list.frames[0], &failure) == HS_OK);
-    for (int a = 0; a < points->n; a++)
-        unit->order[a] = (int32_t)points->n - 1 - a;
-    unit->list.cutoff = cutoff;
-    unit->list.jumps_now = -1;
-    recheck->list = &unit->list;
-    recheck->now = &unit->list.frames[0];
-    recheck->call = &unit->call;
-    unit->output.fixed = true;
-    recheck->output = &unit->output;
-    recheck->d = points->ndim;
-    recheck->m = hs_frame_periodic(recheck->now, recheck->vector_of_row);
-    for (int r = 0; r < recheck->m; r++)
-        memcpy(rows[r], box->rows[recheck->vector_of_row[r]], sizeof rows[r]);
-    hs_metric_init(&recheck->given, recheck->d, recheck->m, (const double(*)[HS_MAX_DIM])rows,
-                   cutoff, true);
-    unit->list.listing.order = unit->order;
-    unit->list.listing.images =
-        (hs_images){.width = recheck->m, .of = unit->images, .n = RECHECK_IMAGES};
-}
-
-static void
-recheck_unit_close(recheck_unit *unit)
-{
-    hs_account *account = &unit->call.account;
-    hs_recheck *recheck = &unit->recheck;
-    hs_scene_free(account, &recheck->scene);
-    hs_free(account, recheck->counts);
-    hs_free(account, recheck->y);
-    hs_free(account, recheck->offset);
-    hs_free(account, recheck->x);
-    hs_free(account, recheck->image);
-    hs_free(account, recheck->lag);
-    hs_free(account, recheck->lagging);
-    hs_free(account, recheck->few);
-    hs_free(account, recheck->of_a);
-    hs_frame_free(&unit->list.frames[0]);
-    CHECK(account->held == 0);
-    hs_account_close(account);
-}
-
-/*
- * ---- recheck measure ----
- *
- * Listed pairs are measured between points as the scene has them: with their shift over its rows,
- * whatever they were wrapped by and have jumped since.
- */
-
-enum { N_MEASURE = RECHECK_POINTS, IMAGES = RECHECK_IMAGES };
-
-static recheck_unit unit_measure;
-
-/* Along one axis, and along two, where points that lag are laid out for the writer as well. */
-static void
-any_allocation_may_be_refused(void)
-{
-    const double x[2 * N_MEASURE] = {0.0, 5.0, 2.0, 3.0, 4.0, 1.0, 9.0, 8.0, 6.0, 1.0, 7.0, 0.0};
-    for (int d = 1; d <= 2; d++) {
-        const hs_box    box = {.ndim = d, .periodic = {true, d > 1}, .rows = {{4.0}, {0.0, 4.0}}};
-        const hs_points points = {x, N_MEASURE, d, HS_FLOAT64, 16, 8};
-        hs_status       status = HS_ERR_MEMORY;
-        hs_failure      failure;
-        int             nth;
-        for (nth = 1; status != HS_OK && nth < 20; nth++) {
-            recheck_unit_open(&points, &box, 1.0, HS_WANT_DISTANCE, &unit_measure);
-            const bool writes = d > 1 && unit_measure.call.kernel->write != NULL;
-            unit_measure.output.fixed = false;
-            hs_test_fail_allocation(nth);
-            status = hs_recheck_open_scene(&unit_measure.recheck, &failure);
-            CHECK(status == (hs_test_failure_is_due() ? HS_OK : HS_ERR_MEMORY));
-            hs_test_fail_allocation(0);
-            CHECK(status != HS_OK || (unit_measure.recheck.few != NULL) == writes);
-            recheck_unit_close(&unit_measure);
-        }
-        CHECK(nth > 6 && nth < 20);
-    }
-}
-
-/*
- * ---- recheck write ----
- *
- * When hits of a list are measured while they are written, and what is laid out for that.
- */
-
-enum { N_WRITE = 3, WANT = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR };
-
-static void *
-zeros(int64_t n, size_t size)
-{
-    void *to = hs_alloc(&unit_measure.call.account, HS_FOR_WRAPS, n, size);
-    CHECK(to != NULL);
-    memset(to, 0, (size_t)n * size);
-    return to;
-}
-
-/* Three points in a box whose vectors repeat, none of which lags. */
-static void
-open_unit(int d)
-{
-    static const double x[N_WRITE * 3] = {0.5, 0.5, 0.5, 1.0, 1.0, 1.0, 3.0, 3.0, 3.0};
-    const hs_points     points = {x, N_WRITE, d, HS_FLOAT64, 24, 8};
-    const hs_box        box = {
-               .ndim = d, .periodic = {true, true, true}, .rows = {{4.0}, {0.0, 4.0}, {0.0, 0.0, 4.0}}};
-    hs_recheck *recheck = &unit_measure.recheck;
-    recheck_unit_open(&points, &box, 1.0, WANT, &unit_measure);
-    unit_measure.output.fixed = false;
-    unit_measure.output.columns = WANT;
-    recheck->scene.ndim = d;
-    hs_metric_init(&recheck->scene.metric, d, d, box.rows, 1.0, true);
-    recheck->lag = zeros((int64_t)N_WRITE * d, sizeof *recheck->lag);
-    recheck->lagging = zeros(N_WRITE, sizeof *recheck->lagging);
-    recheck->image = zeros((int64_t)RECHECK_IMAGES * d, sizeof *recheck->image);
-}
-
-static bool
-has_writer(void)
-{
-    return unit_measure.call.kernel->write != NULL;
-}
-
-/* Whether hits can be written. Without lags there are no records of them. */
-static bool
-can_write(void)
-{
-    const hs_recheck *recheck = &unit_measure.recheck;
-    CHECK(hs_recheck_plan_write(&unit_measure.recheck) == HS_OK);
-    CHECK(recheck->few == NULL);
-    return recheck->writes;
-}
-
-enum { ORDINARY, SHARED, EXTREME, ORIGINALS, NO_FLOATS, FIXED, BOTH, OWN_IMAGES, SHORT, ODDITIES };
-
-static void
-only_what_is_ordinary_is_written(void)
-{
-    static const double short_rows[3][HS_MAX_DIM] = {{0.5}, {0.0, 0.5}, {0.0, 0.0, 0.5}};
-    for (int d = 1; d <= 3; d++) {
-        for (int oddity = 0; oddity < ODDITIES; oddity++) {
-            open_unit(d);
-            hs_scene *scene = &unit_measure.recheck.scene;
-            scene->extreme = oddity == EXTREME;
-            scene->keeps_originals = oddity == ORIGINALS;
-            scene->metric.floats_usable = oddity != NO_FLOATS;
-            unit_measure.output.fixed = oddity == FIXED || oddity == SHARED;
-            unit_measure.recheck.shared = oddity == SHARED;
-            unit_measure.output.columns |= oddity == BOTH ? HS_WANT_BOTH : 0;
-            if (oddity == OWN_IMAGES)
-                scene->metric.cutoff = 4.0;
-            if (oddity == SHORT)
-                hs_metric_init(&scene->metric, d, d, short_rows, 0.75, true);
-            CHECK(can_write() == (has_writer() && oddity <= SHARED && d > 1));
-            recheck_unit_close(&unit_measure);
-        }
-    }
-}
-
-/* Sums of these must fit into int32, whichever of them are added. */
-static void
-large_lags_and_images_are_not_written(void)
-{
-    const int64_t most = INT64_C(1) << 29;
-    const int64_t values[] = {most - 1, -most, most, -most - 1, INT64_MAX, INT64_MIN};
-    const size_t  n_values = sizeof values / sizeof *values;
-    for (size_t v = 0; v < n_values; v++) {
-        for (int of_image = 0; of_image < 2; of_image++) {
-            for (int last = 0; last < 2; last++) {
-                open_unit(2);
-                hs_recheck *recheck = &unit_measure.recheck;
-                int64_t    *to = of_image ? recheck->image : recheck->lag;
-                const int   n = 2 * (of_image ? RECHECK_IMAGES : N_WRITE);
-                to[last ? n - 1 : 0] = values[v];
-                CHECK(can_write() == (has_writer() && v < 2));
-                recheck_unit_close(&unit_measure);
+    static const int64_t boxes[] = {0, 1, -3, 1 << 28, -(1 << 29), 1 << 29, INT64_C(1) << 33};
+    for (int b = 0; b < 7; b++) {
+        double     x[12];
+        hs_box     box = {.ndim = 2, .periodic = {true, true}, .rows = {{4.0}, {0.0, 4.0}}};
+        hs_points  points = {x, 6, 2, HS_FLOAT64, 16, 8};
+        hs_options options = hs_options_default();
+        hs_verlet *list = hs_verlet_new();
+        bool       rebuilt;
+        int64_t    n_pairs = 0;
+        options.cutoff = 1.0;
+        for (int step = 0; step < 2; step++) {
+            for (int e = 0; e < 12; e++) {
+                x[e] = 0.625 * (e * 5 % 12) + (step > 0 ? 4.0 * (double)boxes[b] : 0.0);
             }
+            CHECK(hs_verlet_update(list, &points, &box, &options, 0.25, false, &rebuilt, NULL) ==
+                  HS_OK);
+            CHECK(rebuilt == (step == 0));
+            CHECK(list_difference(list, &points, &box, options, &n_pairs) == NULL);
         }
+        CHECK(n_pairs > 0);
+        CHECK(fail_each_allocation(find_distances, list, 100) > 6);
+        hs_verlet_free(list);
     }
 }
 
@@ -528,9 +365,7 @@ test_recheck(void)
     RUN(every_type_and_dimension_gives_the_pairs_of_a_search);
     RUN(shifts_may_be_as_large_as_jumps_are);
     RUN(box_vectors_may_be_any_sum_of_shorter_ones);
-    RUN(any_allocation_may_be_refused);
-    RUN(only_what_is_ordinary_is_written);
-    RUN(large_lags_and_images_are_not_written);
+    RUN(points_may_be_wrapped_anew);
     RUN(what_does_not_fit_is_told);
     RUN(threads_stop_at_shifts_that_do_not_fit);
 }

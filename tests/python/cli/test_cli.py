@@ -19,7 +19,8 @@ from halfshell import cli, selftest
 from halfshell._cli import scene as cli_scene
 from halfshell._cli import verify as cli_verify
 from halfshell._cli.errors import InputError
-from halfshell._cli.files import Scene, read_scene, replacing, write_csv
+from halfshell._cli.files import Scene, read_scene
+from halfshell._cli.outputs import replacing, write_csv
 from halfshell._convert import progress as bar
 from halfshell_report import against as cli_peers
 

@@ -390,7 +390,7 @@ def test_frames_that_are_not_there(run, trajectory, text):
 
 def test_parquet_has_the_columns_of_the_archive(told, text, tmp_path, monkeypatch):
     parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
-    monkeypatch.setattr("halfshell._cli.files._PARQUET_ROWS", 10)
+    monkeypatch.setattr("halfshell._cli.outputs._PARQUET_ROWS", 10)
     scene = [text, "--box", "8,7.5,9", "--cutoff", 2, "--quantities", "ijdS"]
     told("pairs", *scene, "--sort", "-o", tmp_path / "pairs.parquet")
     told("pairs", *scene, "--sort", "-o", tmp_path / "pairs.npz")
@@ -406,7 +406,7 @@ def test_parquet_has_the_columns_of_the_archive(told, text, tmp_path, monkeypatc
 
 
 def test_without_pyarrow_one_line_says_what_is_missing(run, text, tmp_path, monkeypatch):
-    monkeypatch.setattr("halfshell._cli.files.find_spec", lambda name: None)
+    monkeypatch.setattr("halfshell._cli.outputs.find_spec", lambda name: None)
     status, _, err = run("pairs", text, "--cutoff", 1, "-o", tmp_path / "pairs.parquet")
     assert status == 2 and "needs pyarrow" in err and err.count("\n") == 1
     assert not (tmp_path / "pairs.parquet").exists()

@@ -119,6 +119,16 @@ def test_a_cluster_and_an_outlier_on_different_scales(rng):
     check(points, 4)
 
 
+def test_points_that_their_places_in_a_box_do_not_tell_apart(rng):
+    points = rng.random((300, 2)) * 10.0 ** rng.uniform(-40, 40, (300, 1))
+    queries = points[np.abs(points).max(axis=1) < 1e25]
+    box = [[4e39, 3e38], [-7e38, 6e39]]
+    j, d = hs.nearest(points, 1, queries=queries)
+    in_box = hs.nearest(points, 1, queries=queries, box=box)
+    assert np.array_equal(in_box[0], j)
+    assert np.array_equal(in_box[1], d)
+
+
 # ---- larger scenes -------------------------------------------------------------------------
 
 

@@ -24,6 +24,19 @@ def test_a_pair_that_does_not_count_is_spurious():
     assert hs.verify(apart, 2.0, [0], [2]) and not hs.verify(points, 2.0, [0], [2])
 
 
+def test_excluded_pairs_of_many_images(rng):
+    box = [[1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.3, 0.4, 1.0]]
+    points = hs.Points(rng.random((4, 3)) * 3.0, box=box)
+    excluded = np.column_stack(np.triu_indices(4, 1))
+    right = hs.pairs(points, 4.0, quantities="ijS", exclude=excluded)
+    nothing = [column[:0] for column in right]
+    verdict = hs.verify(points, 4.0, *nothing, exclude=excluded)
+    assert len(verdict.missed) == len(right[0]) > 1000
+    every = hs.pairs(points, 4.0, quantities="ijS")
+    verdict = hs.verify(points, 4.0, *every, exclude=excluded)
+    assert verdict.spurious[:, :2].tolist() == excluded.tolist() and not len(verdict.missed)
+
+
 def test_rows_of_some_points():
     points = [[0.0], [1.0], [2.0], [3.0]]
     how = {"indices": [2, 0]}

@@ -50,6 +50,25 @@ def test_includes_follow_the_layers():
     assert wrong == []
 
 
+def test_calls_follow_the_layers():
+    """What a public header declares can be called from anywhere: not so inside the core."""
+    sources = [path for path in FILES if path.suffix == ".c" and layer(path) in PLACE]
+    text = {path: path.read_text() for path in sources}
+    at = {
+        name: path
+        for path in sources
+        for name in re.findall(r"^(hs_\w+)\(", text[path], re.MULTILINE)
+        if f"static {name}" not in text[path]
+    }
+    wrong = [
+        f"{path.name} calls {name} of {at[name].name}"
+        for path in sources
+        for name in set(re.findall(r"\b(hs_\w+)\(", text[path])) & at.keys()
+        if PLACE[layer(at[name])] > PLACE[layer(path)]
+    ]
+    assert wrong == []
+
+
 def test_every_folder_of_the_core_has_a_place():
     assert {path.name for path in (CSRC / "core").iterdir()} == PLACE.keys() - {"kernels"}
 
@@ -86,3 +105,21 @@ def test_every_source_names_its_license():
     for path in sources:
         if not any(part.startswith("build") for part in path.parts):
             assert "SPDX-License-Identifier" in path.read_text()[:200], path
+
+
+def test_the_primes_of_the_lattice_are_the_largest_below_2_to_62():
+    """By the bases of Miller and Rabin that decide every number below 3.3e24."""
+    text = (CSRC / "core" / "box" / "lattice.c").read_text()
+    table = re.search(r"prime_gaps\[PRIMES\] = \{([^}]+)\}", text)
+    assert table is not None
+    prime = 2**62
+    for gap in map(int, re.findall(r"\d+", table[1])):
+        prime -= gap
+        assert gap % 2 == 0 or prime == 2**62 - 57
+        odd = (prime - 1) // 2
+        halvings = 1
+        while odd % 2 == 0:
+            odd, halvings = odd // 2, halvings + 1
+        for base in (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37):
+            powers = [pow(base, odd << k, prime) for k in range(halvings)]
+            assert powers[0] == 1 or prime - 1 in powers

@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * quick.c: the functions of the table, as the Python layer calls them and as users do. Python needs
- * as long to fill in what users leave out as a search of thirty points.
+ * functions.c: the functions of the table, as the Python layer calls them and as users do. Python
+ * needs as long to fill in what users leave out as a search of thirty points.
  */
-#include "quick.h"
-
 #include "arguments.h"
 #include "errors.h"
 #include "outputs.h"
@@ -17,7 +15,7 @@
 enum { MOST_CORE = HS_CALL_ARGUMENTS + HS_MOST_OWN, PRECISION = 2, N_SETTINGS = 5 };
 
 /* A function of the table, with what a call of users begins with. */
-typedef struct quick_row {
+typedef struct function_row {
     const hs_function *function;
     PyMethodDef        of_core, of_users;
     int                n_public, n_positional, n_core;
@@ -26,14 +24,14 @@ typedef struct quick_row {
     PyObject *others[HS_MOST_PUBLIC]; /* what these are where they are left out */
     PyObject *usual[MOST_CORE];       /* NULL: it must be given */
     int       settings[N_SETTINGS];   /* places of those that are set around calls */
-} quick_row;
+} function_row;
 
-static const char ROW[] = "halfshell._core.quick";
+static const char ROW[] = "halfshell._core.function";
 
 /* ---- calls -------------------------------------------------------------------------------- */
 
 /* The row of a function, whose `self` is a tuple of the module and this. */
-static const quick_row *
+static const function_row *
 row_of(PyObject *self)
 {
     return PyCapsule_GetPointer(PyTuple_GET_ITEM(self, 1), ROW);
@@ -65,7 +63,7 @@ search(PyObject *self, PyObject *const *arguments, Py_ssize_t n_arguments)
 
 /* Where a public argument stands among those of this name; -1: nowhere. */
 static int
-find_name(const quick_row *row, PyObject *name)
+find_name(const function_row *row, PyObject *name)
 {
     for (int k = 0; k < row->n_public; k++) {
         if (row->names[k] == name) { /* names in programs are interned */
@@ -83,7 +81,7 @@ find_name(const quick_row *row, PyObject *name)
 /* Puts arguments into their places in the order of the core; false if only Python knows what to do
  * with one of them, or if one is missing. */
 static bool
-place(const quick_row *row, PyObject *arguments, PyObject *options, PyObject **given)
+place(const function_row *row, PyObject *arguments, PyObject *options, PyObject **given)
 {
     const Py_ssize_t n_given = PyTuple_GET_SIZE(arguments);
     PyObject        *name, *value;
@@ -109,7 +107,7 @@ place(const quick_row *row, PyObject *arguments, PyObject *options, PyObject **g
 /* In place of a CellList of points that know nothing more than where they are, what the core has of
  * it, and its own cutoff and threads where others are left out. All are borrowed from it. */
 static bool
-open_cells(const quick_row *row, PyObject *module, PyObject **given)
+open_cells(const function_row *row, PyObject *module, PyObject **given)
 {
     PyObject **known = PyModule_GetState(module), **threads = &given[row->settings[N_SETTINGS - 1]];
     if (known[HS_CELLS_TYPE] != (PyObject *)Py_TYPE(given[0])) {
@@ -132,7 +130,7 @@ open_cells(const quick_row *row, PyObject *module, PyObject **given)
  * precision, memory_limit, and threads for a call that does not say how many. A new reference that
  * these borrow from, or NULL with an exception set. */
 static PyObject *
-take_settings(const quick_row *row, PyObject *module, PyObject **given)
+take_settings(const function_row *row, PyObject *module, PyObject **given)
 {
     PyObject **known = PyModule_GetState(module), *var = known[HS_SETTINGS], *set = NULL;
     if (var == NULL) {
@@ -156,8 +154,8 @@ take_settings(const quick_row *row, PyObject *module, PyObject **given)
 static PyObject *
 attempt(PyObject *self, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    const quick_row *row = row_of(self);
-    PyObject        *given[MOST_CORE], *result = NULL;
+    const function_row *row = row_of(self);
+    PyObject           *given[MOST_CORE], *result = NULL;
     if (n_arguments != 2 || !PyTuple_CheckExact(arguments[0]) || !PyDict_CheckExact(arguments[1])) {
         PyErr_SetString(PyExc_TypeError, "expected a tuple and a dict of arguments");
         return NULL;
@@ -222,7 +220,7 @@ hs_py_scene(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments
 static void
 free_row(PyObject *capsule)
 {
-    quick_row *row = PyCapsule_GetPointer(capsule, ROW);
+    function_row *row = PyCapsule_GetPointer(capsule, ROW);
     for (int k = 0; k < HS_MOST_PUBLIC; k++) {
         Py_XDECREF(row->names[k]);
         Py_XDECREF(row->others[k]);
@@ -270,7 +268,7 @@ argument_of(const hs_function *function, const char *name, int *place)
 
 /* Fills the row, which has zeros. */
 static bool
-fill_row(quick_row *row)
+fill_row(function_row *row)
 {
     static const char *const settings[N_SETTINGS] = {"kernel", "algorithm", "precision",
                                                      "memory_limit", "threads"};
@@ -310,8 +308,8 @@ fill_row(quick_row *row)
 static PyObject *
 make_function(PyObject *module, const hs_function *function)
 {
-    quick_row *row = PyMem_Calloc(1, sizeof *row);
-    PyObject  *capsule = row != NULL ? PyCapsule_New(row, ROW, free_row) : PyErr_NoMemory();
+    function_row *row = PyMem_Calloc(1, sizeof *row);
+    PyObject     *capsule = row != NULL ? PyCapsule_New(row, ROW, free_row) : PyErr_NoMemory();
     if (capsule == NULL) {
         PyMem_Free(row);
         return NULL;
