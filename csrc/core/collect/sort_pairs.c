@@ -415,7 +415,6 @@ typedef struct row_job {
 /* What one thread works with. */
 typedef struct worker {
     hs_committer committer;
-    hs_options   options; /* with this thread's poll */
     row_job     *job;
     hs_output    sorted; /* the job's; where this thread writes next */
     uint64_t    *spare;  /* owned */
@@ -430,7 +429,7 @@ note_work(worker *me, int64_t entries)
         return HS_OK;
     }
     me->work = 0;
-    return hs_poll(&me->options, 1.0);
+    return hs_poll(me->committer.options, 1.0);
 }
 
 /* A hs_range_fn: the rows that begin in a range of entries, as a few rows may have most of them. */
@@ -468,8 +467,6 @@ open_worker(void *context, void *place)
     worker  *me = place;
     hs_call *call = job->all->call;
     me->job = job;
-    me->options = call->options;
-    me->committer.options = &me->options;
     me->sorted = *job->sorted;
     me->spare = hs_alloc(&call->account, HS_FOR_SORTING, job->all->longest, sizeof *me->spare);
     return me->spare != NULL ? HS_OK : HS_ERR_MEMORY;
@@ -499,7 +496,7 @@ do_ranges(row_job *job)
                            .search = do_range};
         return hs_crew_run(&crew, &ignored);
     }
-    worker    me = {.work = 0};
+    worker    me = {.committer = {.options = &call->options}};
     hs_status status = open_worker(job, &me);
     for (int64_t range = 0; range < job->n_ranges && status == HS_OK; range++) {
         status = do_range(&me, range);
