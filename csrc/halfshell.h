@@ -55,7 +55,8 @@ typedef enum hs_status {
     HS_ERR_BOX_FINITE,    /* a box entry is NaN or infinite: failure.row, failure.column */
     HS_ERR_BOX_DEPENDENT, /* the periodic box vectors are exactly linearly dependent; failure.row:
                            * the first that is zero, or -1 */
-    HS_ERR_BOX_SKEWED,    /* independent, but float64 does not tell points along the short ones */
+    HS_ERR_BOX_SKEWED,    /* independent, but float64 does not tell points along the short ones;
+                           * failure.row: the point that lies too far outside for it, or -1 */
     HS_ERR_TOO_MANY,      /* 2^31 points or systems or more, or more pairs than int64 counts */
     HS_ERR_SHIFT_RANGE,   /* a shift does not fit: failure.row is the point */
     HS_ERR_ROUNDING,      /* precision="double" cannot tell: failure.row is the farthest point */

@@ -54,7 +54,7 @@ def signature(name: str, arguments: list[tuple[str, bool]]) -> str:
 
 def written() -> str:
     """The functions of the table, in its order."""
-    return "".join(signature(name, core) for name, (core, _) in _core.table().items())
+    return "".join(signature(name, core) for name, core in _core.table().items())
 
 
 def expected() -> str:

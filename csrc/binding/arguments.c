@@ -16,10 +16,6 @@
 #include <math.h>
 #include <string.h>
 
-#define AS_TEXT(number)      #number
-#define MUST_BE_UP_TO(limit) "threads must be a whole number from 1 to " AS_TEXT(limit) " or None"
-#define THREADS_MUST_BE      MUST_BE_UP_TO(HS_MOST_THREADS)
-
 /* Points below which a search is expected to be over before another thread could take the GIL: it
  * is kept until the first poll. */
 #define FEW_POINTS 256
@@ -28,6 +24,8 @@
 #define SMALL ((npy_intp)1 << 26)
 
 #define BIGGEST_INTEGER (INT64_C(1) << 53) /* up to here float64 holds every integer */
+
+#define FIRST_MUST_BE "where systems begin must be an int64 array with one number more than these"
 
 #define MOST_COUNT (INT64_C(1) << 56) /* more than fits in any memory */
 
@@ -137,60 +135,9 @@ hs_box_of(PyObject *object, unsigned long repeats, int ndim, hs_box *box, bool *
 
 /* ---- numbers and sequences ---------------------------------------------------------------- */
 
-/* An integer, or what has __index__; no bool. Infinite where float64 does not hold it. */
-static bool
-whole_of(PyObject *object, const char *must, double *value)
-{
-    if (PyBool_Check(object)) {
-        hs_refuse(PyExc_TypeError, must, object);
-        return false;
-    }
-    PyObject *index = PyNumber_Index(object);
-    if (index == NULL) {
-        return hs_refuse_kind(must, object);
-    }
-    int             overflow;
-    const long long whole = PyLong_AsLongLongAndOverflow(index, &overflow);
-    *value = (double)whole;
-    if (overflow != 0) {
-        *value = PyLong_AsDouble(index);
-        if (PyErr_Occurred()) { /* an OverflowError: there is no other reason */
-            PyErr_Clear();
-            *value = overflow * (double)INFINITY;
-        }
-    }
-    Py_DECREF(index);
-    return true;
-}
-
-bool
-hs_real_of(PyObject *object, const char *must, double *value)
-{
-    if (PyFloat_Check(object)) {
-        *value = PyFloat_AS_DOUBLE(object);
-        return true;
-    }
-    if (sizeof(npy_longdouble) > sizeof(double) && PyArray_IsScalar(object, LongDouble)) {
-        hs_refuse(PyExc_TypeError, must, object); /* it would be rounded */
-        return false;
-    }
-    if (PyArray_IsScalar(object, Floating)) {
-        *value = PyFloat_AsDouble(object);
-        return PyErr_Occurred() ? hs_refuse_kind(must, object) : true;
-    }
-    if (!whole_of(object, must, value)) {
-        return false;
-    }
-    if (isinf(*value)) {
-        PyErr_Format(PyExc_OverflowError, "%s, got one that is too large for float64", must);
-        return false;
-    }
-    return true;
-}
-
 /* A float or a small integer, of Python itself or NumPy's float64. */
 static bool
-number_of(PyObject *object, double *value)
+usual_number_of(PyObject *object, double *value)
 {
     if (PyFloat_CheckExact(object)) {
         *value = PyFloat_AS_DOUBLE(object);
@@ -209,13 +156,12 @@ number_of(PyObject *object, double *value)
     return false;
 }
 
-/* A number as above, or another one of NumPy. */
-static bool
-scalar_of(PyObject *object, double *value)
+bool
+hs_number_of(PyObject *object, double *value)
 {
     const PyTypeObject *type = Py_TYPE(object);
     int64_t             whole;
-    if (number_of(object, value)) {
+    if (usual_number_of(object, value)) {
         return true;
     }
     if (type == &PyFloatArrType_Type) {
@@ -287,7 +233,7 @@ hs_numbers_of(PyObject *object, npy_intp n, double *values)
     bool      are_numbers = row != NULL && PySequence_Fast_GET_SIZE(row) == n;
     for (npy_intp k = 0; are_numbers && k < n; k++) {
         PyObject *item = item_of(row, k);
-        are_numbers = item != NULL && number_of(item, &values[k]);
+        are_numbers = item != NULL && usual_number_of(item, &values[k]);
         Py_XDECREF(item);
     }
     Py_XDECREF(row);
@@ -426,7 +372,7 @@ take_plain_box(hs_py_call *call, PyObject *object, double (*rows)[HS_MAX_DIM])
                PyArray_DIM(array, n_axes - 1) == d && native_of(call, &object, true) &&
                hs_box_of(object, 0, d, &call->box, &given);
     }
-    const bool is_one = scalar_of(object, &length);
+    const bool is_one = hs_number_of(object, &length);
     memset(rows, 0, (size_t)d * sizeof *rows);
     if (!is_one && is_sequence(object) && PySequence_Fast_GET_SIZE(object) == d &&
         width_of(object) >= 0) {
@@ -496,9 +442,9 @@ take_plain_periodic(hs_py_call *call, PyObject *object, bool has_box)
         for (int l = 0; is_plain && l < d; l++) {
             PyObject *item = item_of(row, l);
             double    number = -1.0;
-            is_plain = item != NULL && (truth_of(item, &one) ||
-                                        (PyLong_CheckExact(item) && number_of(item, &number) &&
-                                         (number == 0.0 || number == 1.0)));
+            is_plain = item != NULL && (truth_of(item, &one) || (PyLong_CheckExact(item) &&
+                                                                 usual_number_of(item, &number) &&
+                                                                 (number == 0.0 || number == 1.0)));
             call->repeats |= (unsigned long)(number == 1.0 || (number < 0.0 && one)) << l;
             Py_XDECREF(item);
         }
@@ -529,73 +475,30 @@ take_periodic(hs_py_call *call, PyObject *object, bool has_box)
 
 /* ---- numbers, flags and names ------------------------------------------------------------- */
 
-/* A string that borrows from the object; NULL with an exception set, or without one. */
-static const char *
-text_of(PyObject *object, const char *argument)
-{
-    Py_ssize_t  length;
-    const char *text = PyUnicode_Check(object) ? PyUnicode_AsUTF8AndSize(object, &length) : NULL;
-    if (text == NULL && PyErr_Occurred() && PyErr_ExceptionMatches(PyExc_UnicodeError)) {
-        PyErr_Clear();
-        PyErr_Format(PyExc_ValueError, "%s must not contain lone surrogates", argument);
-    }
-    if (text != NULL && strlen(text) != (size_t)length) {
-        PyErr_Format(PyExc_ValueError, "%s must not contain null characters", argument);
-        return NULL;
-    }
-    return text;
-}
-
 /* The bit of a letter of HS_LETTERS is its HS_WANT_ bit. */
 _Static_assert(HS_WANT_I == 1 && HS_WANT_J == 2 && HS_WANT_DISTANCE == 4 && HS_WANT_VECTOR == 8 &&
                    HS_WANT_SHIFT == 16 && HS_WANT_BOTH == 32 && HS_WANT_SHELL == 64,
                "take_quantities counts on this");
 
-/* Names the letters that are known. */
-static void
-refuse_quantities(const char *known, PyObject *object)
-{
-    char   text[160] = "quantities must be some of the letters ";
-    size_t n = strlen(text);
-    for (const char *letter = known; *letter != '\0'; letter++) {
-        text[n++] = *letter;
-        text[n++] = letter[1] != '\0' ? ' ' : ',';
-    }
-    strcpy(text + n, " each at most once");
-    if (strchr(known, 'i') == NULL) {
-        strcat(text, " (i is the row itself)");
-    }
-    hs_refuse(PyExc_ValueError, text, object);
-}
-
 /* A string of the known letters, each at most once, and its HS_WANT_ bits. */
 static bool
 take_quantities(PyObject *object, const char *known, const char **letters, unsigned *want)
 {
-    unsigned seen = 0;
-    if (!PyUnicode_Check(object)) {
-        PyErr_Format(PyExc_TypeError, "quantities must be a string of letters, got %s",
-                     Py_TYPE(object)->tp_name);
-        return false;
-    }
-    *letters = text_of(object, "quantities");
+    *want = 0;
+    *letters = PyUnicode_Check(object) ? PyUnicode_AsUTF8(object) : NULL;
     if (*letters == NULL) {
+        PyErr_Clear(); /* of what UTF-8 does not write */
         return false;
     }
     for (const char *letter = *letters; *letter != '\0'; letter++) {
         const bool     is_known = strchr(known, *letter) != NULL;
         const unsigned bit = is_known ? 1u << (strchr(HS_LETTERS, *letter) - HS_LETTERS) : 0;
-        if (bit == 0 || (seen & bit)) {
-            seen = 0;
-            break;
+        if (bit == 0 || (*want & bit)) {
+            return false;
         }
-        seen |= bit;
+        *want |= bit;
     }
-    *want = seen;
-    if (seen == 0) {
-        refuse_quantities(known, object);
-    }
-    return seen != 0;
+    return *want != 0;
 }
 
 /* The number of the name that it is, or -1. */
@@ -610,7 +513,7 @@ number_of_name(PyObject *object, const char *const *names, int n)
     return -1;
 }
 
-/* The next four are what halfshell.settings has checked. */
+/* Below are what halfshell.settings has checked. */
 static bool
 take_precision(PyObject *object, hs_precision *precision)
 {
@@ -640,14 +543,16 @@ take_memory_limit(PyObject *object, hs_options *options)
         options->find_limit = hs_available_memory;
         return true;
     }
-    return number_of(object, &options->memory_limit) && options->memory_limit >= 0.0;
+    return usual_number_of(object, &options->memory_limit) && options->memory_limit >= 0.0;
 }
 
 /* None is what the environment says. */
 static bool
 take_kernel(PyObject *object, const char **kernel)
 {
-    *kernel = object == Py_None ? hs_environment_kernel() : text_of(object, "kernel");
+    *kernel = object == Py_None         ? hs_environment_kernel()
+              : PyUnicode_Check(object) ? PyUnicode_AsUTF8(object)
+                                        : NULL;
     return object == Py_None || *kernel != NULL;
 }
 
@@ -655,24 +560,14 @@ take_kernel(PyObject *object, const char **kernel)
 static bool
 take_threads(PyObject *object, hs_options *options)
 {
-    options->threads = 0;
-    if (object == Py_None) {
-        return true;
-    }
-    double n;
-    if (!whole_of(object, THREADS_MUST_BE, &n)) {
-        return false;
-    }
-    if (!(n >= 1.0 && n <= HS_MOST_THREADS)) {
-        hs_refuse(PyExc_ValueError, THREADS_MUST_BE, object);
-        return false;
-    }
+    const long n = PyLong_CheckExact(object) ? PyLong_AsLong(object) : 0;
+    PyErr_Clear(); /* of a number that is no long */
     options->threads = (int)n;
-    if (n > HS_THREADS_PER_CORE) {
+    if (n > HS_THREADS_PER_CORE && n <= HS_MOST_THREADS) {
         const int most = hs_most_threads();
         options->threads = n > most ? most : (int)n;
     }
-    return true;
+    return object == Py_None || (n >= 1 && n <= HS_MOST_THREADS);
 }
 
 /* A length. An infinite cutoff of users is left to Python, which finds a finite one that holds all
@@ -688,7 +583,7 @@ take_cutoff(hs_py_call *call, PyObject *object, bool is_largest)
     }
     if (PyFloat_Check(object)) {
         *cutoff = PyFloat_AS_DOUBLE(object);
-    } else if (!scalar_of(object, cutoff)) {
+    } else if (!hs_number_of(object, cutoff)) {
         return false;
     }
     /* Bits are compared, as a subnormal number may be a trap. */
@@ -741,11 +636,10 @@ take_integer(hs_py_call *call, PyObject *object, int64_t *value)
 
 /* A number, flag or name; true also for what is none. */
 static bool
-take_number(hs_py_call *call, hs_kind kind, PyObject *object)
+take_number(hs_py_call *call, const hs_argument *argument, PyObject *object)
 {
-    hs_options  *options = &call->options;
-    const char **letters = &call->letters;
-    switch (kind) {
+    hs_options *options = &call->options;
+    switch (argument->kind) {
     case HS_ARG_CUTOFF: return take_cutoff(call, object, false);
     case HS_ARG_MAX_DISTANCE: return take_cutoff(call, object, true);
     case HS_ARG_INCLUSIVE: return truth_of(object, &options->inclusive);
@@ -756,18 +650,13 @@ take_number(hs_py_call *call, hs_kind kind, PyObject *object)
         call->progress = object == Py_None ? NULL : object;
         return object == Py_None || PyCallable_Check(object);
     case HS_ARG_THREADS: return take_threads(object, options);
-    case HS_ARG_QUANTITIES: return take_quantities(object, HS_ALL_LETTERS, letters, &options->want);
-    case HS_ARG_SHELL_QUANTITIES:
-        return take_quantities(object, HS_LETTERS, letters, &options->want);
-    case HS_ARG_ROW_QUANTITIES:
-        return take_quantities(object, HS_ROW_LETTERS, letters, &options->want);
-    case HS_ARG_SHELL_ROW_QUANTITIES:
-        return take_quantities(object, HS_SHELL_ROW_LETTERS, letters, &options->want);
+    case HS_ARG_QUANTITIES:
+        return take_quantities(object, argument->letters, &call->letters, &options->want);
     case HS_ARG_SORT: return truth_of(object, &options->sorted);
     case HS_ARG_INDEX: return take_index(call, object);
     case HS_ARG_FLAG: return truth_of(object, &call->flag);
     case HS_ARG_INTEGER: return take_integer(call, object, &call->integer);
-    case HS_ARG_REAL: return number_of(object, &call->real);
+    case HS_ARG_REAL: return usual_number_of(object, &call->real);
     case HS_ARG_ALGORITHM: return take_algorithm(object, &options->algorithm);
     default: return true;
     }
@@ -787,7 +676,7 @@ static const struct {
 
 enum { N_KNOWN = sizeof KNOWN / sizeof KNOWN[0], N_PARTS = N_KNOWN + 2 };
 
-/* The parts of a set: an array, or a tuple of positions, what is known, and numbers of systems. */
+/* The parts of a set: an array, or a tuple of positions, what is known, and where systems begin. */
 static bool
 parts_of(PyObject **object, PyObject *const **known)
 {
@@ -962,30 +851,23 @@ take_queries(hs_py_call *call, PyObject *object)
            queries->ndim == points->ndim;
 }
 
-/* An array of the caller's for `out`, which shares no memory with what it is made from. */
+/* Arrays of the caller's for `out`; of users, which share no memory with what they are made from:
+ * the Python layer has seen to that. */
 static bool
 take_out(PyObject *const *of, hs_py_call *call)
 {
     hs_options *options = &call->options;
     PyObject   *out = of[HS_ARG_OUT];
+    PyObject   *inputs[] = {of[HS_ARG_QUERIES], of[HS_ARG_POINTS], of[HS_ARG_BOX],
+                            of[HS_ARG_CUTOFF],  call->asked,       call->positions};
     call->out = out;
     options->out = &call->arrays;
-    const struct {
-        PyObject   *input;
-        const char *name;
-    } inputs[] = {{of[HS_ARG_QUERIES], "queries"}, {call->asked, "queries"},
-                  {of[HS_ARG_POINTS], "points"},   {call->positions, "points"},
-                  {of[HS_ARG_BOX], "box"},         {of[HS_ARG_CUTOFF], "cutoff"}};
-    if (!hs_out_of(out, call->letters, call->points.at.ndim, options->index_bytes, &call->arrays)) {
-        return false;
+    bool is_right =
+        hs_out_of(out, call->letters, call->points.at.ndim, options->index_bytes, &call->arrays);
+    for (size_t k = 0; is_right && call->is_of_users && k < sizeof inputs / sizeof inputs[0]; k++) {
+        is_right = inputs[k] == NULL || hs_out_is_apart(out, call->letters, inputs[k]);
     }
-    for (size_t k = 0; k < sizeof inputs / sizeof inputs[0]; k++) {
-        if (inputs[k].input != NULL &&
-            !hs_out_is_apart(out, call->letters, inputs[k].input, inputs[k].name)) {
-            return false;
-        }
-    }
-    return true;
+    return is_right;
 }
 
 /* The cutoffs of shells, which go with their letter; NULL: one cutoff. */
@@ -1026,28 +908,49 @@ poll_python(void *context, double fraction)
     return go_on;
 }
 
-/* Cutoffs of systems, and numbers of systems. */
+/* Where the systems of a batch begin among points and queries; each may have a cutoff, float64
+ * (s,), a box, float64 (s, d, d), and bits of axes that repeat, uint8 (s,), of its own. */
 static bool
-take_systems(PyObject *const *known, PyObject *const *known_of_queries, PyObject *cutoff,
-             hs_py_call *call)
+take_systems(PyObject *const *known, PyObject *const *known_of_queries, hs_py_call *call)
 {
-    PyObject *numbers = known != NULL && known[N_KNOWN] != Py_None ? known[N_KNOWN] : NULL,
-             *of_queries = known_of_queries != NULL && known_of_queries[N_KNOWN] != Py_None
-                               ? known_of_queries[N_KNOWN]
-                               : NULL;
-    if (PyArray_Check(cutoff)) {
-        if (!hs_is_array(cutoff, NPY_DOUBLE, 1)) {
+    PyObject     *first = known != NULL ? known[N_KNOWN] : Py_None;
+    PyObject     *first_query = known_of_queries != NULL ? known_of_queries[N_KNOWN] : Py_None;
+    const void   *begins_of_queries;
+    const int64_t n = hs_is_array(first, NPY_INT64, 1) ? hs_length_of(first) - 1 : -1;
+    for (int k = 1; k < 4; k++) { /* cutoffs, boxes, axes */
+        PyArrayObject *own = (PyArrayObject *)call->of[k];
+        if (!PyArray_Check(call->of[k]) || (k == 2 && PyArray_NDIM(own) != 3)) {
+            continue;
+        }
+        if (k == 1 && !hs_is_array(call->of[k], NPY_DOUBLE, 1)) {
             PyErr_SetString(PyExc_TypeError, "cutoffs of systems must be a float64 array");
             return false;
         }
-        call->each.cutoffs = PyArray_DATA((PyArrayObject *)cutoff);
+        if (PyArray_DIM(own, 0) != n) {
+            PyErr_SetString(PyExc_ValueError, "cutoffs, boxes and axes are of as many systems");
+            return false;
+        }
+        call->each.cutoffs = k == 1 ? PyArray_DATA(own) : call->each.cutoffs;
     }
-    const hs_each_system *each = &call->each;
-    if (numbers == NULL && of_queries == NULL && each->cutoffs == NULL && each->rows == NULL &&
-        each->periodic == NULL) {
+    if (first == Py_None) {
         return true;
     }
-    return hs_batch_take(numbers, of_queries, call);
+    if (call->among.cells != NULL) {
+        PyErr_SetString(PyExc_TypeError, "cells are of one system");
+        return false;
+    }
+    if (n < 0) {
+        PyErr_SetString(PyExc_TypeError, FIRST_MUST_BE);
+        return false;
+    }
+    if (!hs_entries_of(first_query, NPY_INT64, 1, n + 1, 0, FIRST_MUST_BE, &begins_of_queries)) {
+        return false;
+    }
+    call->among.each = &call->each;
+    call->points.n_systems = call->queries.n_systems = n;
+    call->points.first = PyArray_DATA((PyArrayObject *)first);
+    call->queries.first = begins_of_queries;
+    return true;
 }
 
 /* Points and box, then what depends on them: queries, what is known, `out` and systems. of: by
@@ -1067,7 +970,7 @@ take_views(PyObject **of, hs_py_call *call)
            take_known(known_of_queries, &call->queries) &&
            (of[HS_ARG_PAIRING] == NULL || take_pairing(of[HS_ARG_PAIRING], call)) &&
            (of[HS_ARG_OUT] == NULL || take_out(of, call)) &&
-           (call->is_of_users || take_systems(known, known_of_queries, of[HS_ARG_CUTOFF], call));
+           (call->is_of_users || take_systems(known, known_of_queries, call));
 }
 
 static int64_t
@@ -1102,9 +1005,10 @@ static bool
 take_numbers(hs_py_call *call, int n, PyObject **of)
 {
     for (int k = 0; k < n; k++) {
-        hs_kind   kind = hs_argument_at(call->function, k)->kind;
-        PyObject *given = call->of[k];
-        if (!take_number(call, kind, given) ||
+        const hs_argument *argument = hs_argument_at(call->function, k);
+        const hs_kind      kind = argument->kind;
+        PyObject          *given = call->of[k];
+        if (!take_number(call, argument, given) ||
             (kind == HS_ARG_OTHER_POINTS && given == Py_None && call->is_of_users)) {
             return false;
         }
@@ -1126,7 +1030,6 @@ hs_py_call_begin(hs_py_call *call, PyObject *module, bool is_of_users)
     call->among = (hs_among){.points = NULL};
     call->points = call->queries = (hs_set){.first = NULL};
     call->each = (hs_each_system){.rows = NULL};
-    call->batch = (hs_batch){.is_given = false};
     call->letters = "ij";
     call->positions = call->asked = call->out = NULL;
     call->repeats = 0;
@@ -1160,7 +1063,8 @@ hs_py_call_take(hs_py_call *call, Py_ssize_t n_arguments)
 PyObject *
 hs_py_call_raise(hs_py_call *call, hs_status status)
 {
-    if (call->batch.is_given && !call->batch.are_all) {
+    const hs_each_system *each = &call->each;
+    if (each->rows == NULL && each->cutoffs == NULL && each->periodic == NULL) {
         call->failure.system = -1; /* systems are named where each has something of its own */
     }
     return hs_raise(status, &call->failure, &call->options);
@@ -1169,7 +1073,6 @@ hs_py_call_raise(hs_py_call *call, hs_status status)
 void
 hs_py_call_end(hs_py_call *call)
 {
-    hs_batch_free(&call->batch);
     while (call->n_made > 0) {
         Py_DECREF(call->made[--call->n_made]);
     }

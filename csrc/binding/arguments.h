@@ -16,20 +16,6 @@
 
 #include <stdbool.h>
 
-/*
- * Several systems. Where all share box and cutoff, those without points are left out: numbers may
- * be as far apart as users like. Otherwise each has its place.
- */
-typedef struct hs_batch {
-    bool     is_given;    /* else there is one system, and nothing below is set */
-    int64_t  n;           /* systems */
-    int64_t *first;       /* owned */
-    int64_t *first_query; /* owned; NULL where there are no queries */
-    int64_t *number;      /* owned: of each system */
-    bool     are_all;     /* each number is its place */
-    int64_t  n_numbers;   /* systems, those without points counted */
-} hs_batch;
-
 enum { HS_MOST_MADE = 12 };
 
 /* The arguments of a search, as views; the Python arguments that they borrow from must stay
@@ -50,7 +36,6 @@ typedef struct hs_py_call {
     hs_each_system     each;
     hs_options         options;
     hs_failure         failure;
-    hs_batch           batch;
     const char        *letters; /* borrowed: the quantities */
     PyObject          *out;     /* borrowed: of the caller, or NULL: new arrays */
     hs_pair_arrays     arrays;  /* those of out */
@@ -103,9 +88,8 @@ int64_t hs_length_of(PyObject *object);
  * nothing; false, without an exception unless memory was refused, for all else. */
 bool hs_numbers_of(PyObject *object, npy_intp n, double *values);
 
-/* A float, also one of NumPy's, or an integer, or what has __index__, but no bool. OverflowError
- * where float64 does not hold it. */
-bool hs_real_of(PyObject *object, const char *must, double *value);
+/* A float or a small integer of Python or NumPy; false, without an exception, for all else. */
+bool hs_number_of(PyObject *object, double *value);
 
 /* A native float32 or float64 array of shape (n, d), 1 <= d <= 8. The view borrows from it. `name`
  * is that of the argument, for messages. */
@@ -122,25 +106,7 @@ bool hs_repeats_of(PyObject *periodic, unsigned long *repeats);
  * whether there is a box at all. */
 bool hs_box_of(PyObject *object, unsigned long repeats, int ndim, hs_box *box, bool *given);
 
-/* A string of the known letters, which are some of HS_LETTERS, each at most once: of lists of
- * pairs, of those that have no k, and of rows, which say themselves what i is. */
-#define HS_LETTERS           "ijdDSPk"
-#define HS_ALL_LETTERS       "ijdDSP"
-#define HS_ROW_LETTERS       "jdDS"
-#define HS_SHELL_ROW_LETTERS "jdDSk"
-
 /* By number of the algorithm. */
 extern const char *const hs_algorithm_names[HS_ALGORITHM_END];
-
-/*
- * many_systems.c: the systems of points that have numbers of them, int64 (n,), as have queries;
- * each may have a cutoff, float64 (s,), a box, float64 (s, d, d), and bits of axes that repeat,
- * uint8 (s,), of its own in place of those that all share. NULL: there are none.
- */
-bool hs_batch_take(PyObject *numbers, PyObject *query_numbers, hs_py_call *call);
-void hs_batch_free(hs_batch *batch);
-
-/* Zeros of shape (numbers, ...), for as many more axes; NULL with an exception set. */
-PyObject *hs_batch_zeros(const hs_batch *batch, int n_axes, const npy_intp *shape, int type);
 
 #endif

@@ -21,9 +21,13 @@ static const struct {
     [HS_ERR_BOX_DEPENDENT] =
         {"vector {row} of {box} is zero; make that axis not periodic",
          "the periodic vectors of {box} must be linearly independent; these are exactly dependent"},
-    [HS_ERR_BOX_SKEWED] = {"{box} is too skewed, or its vectors differ too much in length: float64 "
-                           "does not place points along the short ones; give an equivalent, less "
-                           "skewed box, or one along the coordinate axes"},
+    [HS_ERR_BOX_SKEWED] =
+        {"{points}[{row}] lies so far from {box}, along a direction that does not "
+         "repeat, that float64 does not place it in the box; move the points "
+         "closer to the origin",
+         "{box} is too skewed, or its vectors differ too much in length: float64 "
+         "does not place points along the short ones; give an equivalent, less "
+         "skewed box, or one along the coordinate axes"},
     [HS_ERR_TOO_MANY] = {"fewer than 2**31 points and systems and 2**62 pairs can be searched, got "
                          "{value}",
                          NULL, true},
@@ -245,86 +249,6 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
     }
     PyErr_Format(PyExc_SystemError, "unmapped status %d: %s", (int)status, hs_status_text(status));
     return NULL;
-}
-
-#define SHOWN 80 /* characters of a value in a message */
-
-/* The exception that is set, taken; NULL where it is not the fault of an argument. */
-static PyObject *
-take_fault(void)
-{
-    PyObject *type, *value, *trace;
-    if (!PyErr_ExceptionMatches(PyExc_Exception) || PyErr_ExceptionMatches(PyExc_MemoryError)) {
-        return NULL;
-    }
-    PyErr_Fetch(&type, &value, &trace);
-    PyErr_NormalizeException(&type, &value, &trace);
-    if (trace != NULL) {
-        PyException_SetTraceback(value, trace);
-    }
-    Py_XDECREF(type);
-    Py_XDECREF(trace);
-    return value;
-}
-
-/* Makes an exception the cause of the one that is set; takes ownership of it. */
-static void
-set_cause(PyObject *cause)
-{
-    PyObject *type, *value, *trace;
-    PyErr_Fetch(&type, &value, &trace);
-    PyErr_NormalizeException(&type, &value, &trace);
-    PyException_SetCause(value, cause);
-    PyErr_Restore(type, value, trace);
-}
-
-/* The text with one blank for each run of blanks and line breaks; takes ownership. NULL with an
- * exception set, also for NULL. */
-static PyObject *
-on_one_line(PyObject *text)
-{
-    PyObject *words = text != NULL ? PyUnicode_Split(text, NULL, -1) : NULL;
-    PyObject *blank = words != NULL ? PyUnicode_FromString(" ") : NULL;
-    PyObject *joined = blank != NULL ? PyUnicode_Join(blank, words) : NULL;
-    Py_XDECREF(blank);
-    Py_XDECREF(words);
-    Py_XDECREF(text);
-    return joined;
-}
-
-void
-hs_refuse(PyObject *type, const char *must, PyObject *object)
-{
-    PyObject *text = on_one_line(PyObject_Repr(object));
-    if (text == NULL) {
-        PyObject *fault = take_fault();
-        if (fault == NULL) {
-            return;
-        }
-        Py_DECREF(fault);
-        PyErr_Format(type, "%s, got a value of type %.80s", must, Py_TYPE(object)->tp_name);
-        return;
-    }
-    if (PyUnicode_GetLength(text) > SHOWN) {
-        Py_SETREF(text, PyUnicode_Substring(text, 0, SHOWN - 3));
-        if (text != NULL) {
-            PyErr_Format(type, "%s, got %U...", must, text);
-        }
-    } else {
-        PyErr_Format(type, "%s, got %U", must, text);
-    }
-    Py_XDECREF(text);
-}
-
-bool
-hs_refuse_kind(const char *must, PyObject *object)
-{
-    PyObject *fault = take_fault();
-    if (fault != NULL) {
-        PyErr_Format(PyExc_TypeError, "%s, got %.80s", must, Py_TYPE(object)->tp_name);
-        set_cause(fault);
-    }
-    return false;
 }
 
 void

@@ -26,13 +26,6 @@ const char *hs_format_bytes(double bytes, char *text, size_t size);
  * system has no more". */
 const char *hs_format_limit(double bytes, char *text, size_t size);
 
-/* Raises `type`: "<must>, got <repr>", the repr on one line and cut short, or the type where there
- * is none. */
-void hs_refuse(PyObject *type, const char *must, PyObject *object);
-
-/* Replaces what a conversion raised by a TypeError that says what the object must be; false. */
-bool hs_refuse_kind(const char *must, PyObject *object);
-
 /* Puts entry k into the tuple and gives it up; where it is NULL, the tuple is given up instead, and
  * *tuple is NULL. */
 void hs_tuple_put(PyObject **tuple, Py_ssize_t k, PyObject *entry);

@@ -4,26 +4,29 @@
  * needs as long to fill in what users leave out as a search of thirty points.
  */
 #include "arguments.h"
-#include "errors.h"
 #include "outputs.h"
 #include "py_functions.h"
 
 #include <numpy/arrayscalars.h>
-#include <math.h>
 #include <string.h>
 
-enum { MOST_CORE = HS_CALL_ARGUMENTS + HS_MOST_OWN, PRECISION = 2, N_SETTINGS = 5 };
+enum {
+    MOST_CORE = HS_CALL_ARGUMENTS + HS_MOST_OWN,
+    MOST_PUBLIC = 20,
+    PRECISION = 2,
+    N_SETTINGS = 5
+};
 
-/* A function of the table, with what a call of users begins with. */
+/* A function of the table, and for users what a call begins with. */
 typedef struct function_row {
     const hs_function *function;
-    PyMethodDef        of_core, of_users;
+    PyMethodDef        method;
     int                n_public, n_positional, n_core;
-    PyObject          *names[HS_MOST_PUBLIC]; /* owned, as all objects below */
-    int       places[HS_MOST_PUBLIC]; /* in the order of the core; -1: only Python takes it */
-    PyObject *others[HS_MOST_PUBLIC]; /* what these are where they are left out */
-    PyObject *usual[MOST_CORE];       /* NULL: it must be given */
-    int       settings[N_SETTINGS];   /* places of those that are set around calls */
+    PyObject          *names[MOST_PUBLIC];  /* owned, as all objects below */
+    int                places[MOST_PUBLIC]; /* in the order of the core; -1: only Python takes it */
+    PyObject          *others[MOST_PUBLIC]; /* what these are where they are left out, or NULL */
+    PyObject          *usual[MOST_CORE];    /* NULL: it must be given */
+    int                settings[N_SETTINGS]; /* places of those that are set around calls */
 } function_row;
 
 static const char ROW[] = "halfshell._core.function";
@@ -221,7 +224,7 @@ static void
 free_row(PyObject *capsule)
 {
     function_row *row = PyCapsule_GetPointer(capsule, ROW);
-    for (int k = 0; k < HS_MOST_PUBLIC; k++) {
+    for (int k = 0; k < MOST_PUBLIC; k++) {
         Py_XDECREF(row->names[k]);
         Py_XDECREF(row->others[k]);
     }
@@ -231,96 +234,75 @@ free_row(PyObject *capsule)
     PyMem_Free(row);
 }
 
-/* The object that Python writes so; a new reference or NULL. */
-static PyObject *
-object_of(const char *text)
-{
-    if (text[0] == '\'') {
-        return PyUnicode_FromStringAndSize(text + 1, (Py_ssize_t)strlen(text) - 2);
-    }
-    if (text[0] >= '0' && text[0] <= '9') {
-        return PyLong_FromString(text, NULL, 10);
-    }
-    return strcmp(text, "numpy.int64") == 0 ? Py_NewRef((PyObject *)&PyInt64ArrType_Type)
-           : strcmp(text, "inf") == 0       ? PyFloat_FromDouble((double)INFINITY)
-           : strcmp(text, "True") == 0      ? Py_NewRef(Py_True)
-           : strcmp(text, "False") == 0     ? Py_NewRef(Py_False)
-                                            : Py_NewRef(Py_None);
-}
-
-/* The argument of this name, and its place in the order of the core; -1: only Python takes it. */
-static const hs_argument *
-argument_of(const hs_function *function, const char *name, int *place)
+/* The place of an argument in the order of the core; -1: only Python takes it. */
+static int
+place_of(const hs_function *function, const char *name)
 {
     const hs_argument *argument;
-    for (*place = 0; (argument = hs_argument_at(function, *place)) != NULL; ++*place) {
+    for (int k = 0; (argument = hs_argument_at(function, k)) != NULL; k++) {
         if (strcmp(argument->name, name) == 0) {
-            return argument;
+            return k;
         }
     }
-    *place = -1;
-    argument = HS_ONLY_PYTHON;
-    while (argument->name != NULL && strcmp(argument->name, name) != 0) {
-        argument++;
-    }
-    return argument;
+    return -1;
 }
 
-/* Fills the row, which has zeros. */
+/* What an argument of the core is that users do not have; a new reference or NULL. */
+static PyObject *
+usual_of(hs_kind kind)
+{
+    return kind == HS_ARG_PRECISION   ? PyUnicode_FromString("exact")
+           : kind == HS_ARG_ALGORITHM ? PyUnicode_FromString("auto")
+                                      : Py_NewRef(kind == HS_ARG_SORT ? Py_True : Py_None);
+}
+
+/* Fills the row, which has zeros, with what users have: names, in order, and what is left out. */
 static bool
-fill_row(function_row *row)
+fill_row(function_row *row, PyObject *names, PyObject *defaults)
 {
     static const char *const settings[N_SETTINGS] = {"kernel", "algorithm", "precision",
                                                      "memory_limit", "threads"};
-    const hs_function       *function = row->function;
     const hs_argument       *argument;
-    for (; (argument = hs_argument_at(function, row->n_core)) != NULL; row->n_core++) {
-        if (argument->usual != NULL) {
-            row->usual[row->n_core] = object_of(argument->usual);
-            if (row->usual[row->n_core] == NULL) {
-                return false;
-            }
-        }
-    }
-    for (const char *const *name = function->users; *name != NULL; name++) {
-        if (**name == '*') {
-            row->n_positional = row->n_public;
-            continue;
-        }
-        const int k = row->n_public++;
-        argument = argument_of(function, *name, &row->places[k]);
-        row->names[k] = PyUnicode_InternFromString(*name);
-        row->others[k] = row->places[k] < 0 ? object_of(argument->usual) : Py_NewRef(Py_None);
-        if (row->names[k] == NULL || row->others[k] == NULL) {
+    for (; (argument = hs_argument_at(row->function, row->n_core)) != NULL; row->n_core++) {
+        row->usual[row->n_core] = usual_of(argument->kind);
+        if (row->usual[row->n_core] == NULL) {
             return false;
         }
     }
-    for (int k = 0; k < N_SETTINGS; k++) {
-        (void)argument_of(function, settings[k], &row->settings[k]);
-        if (function->is_by_rank && k == PRECISION) {
-            row->settings[k] = -1;
+    for (Py_ssize_t k = 0; k < PyTuple_GET_SIZE(names); k++) {
+        PyObject *name = PyTuple_GET_ITEM(names, k),
+                 *usual = PyDict_GetItemWithError(defaults, name);
+        const char *text = PyUnicode_AsUTF8(name);
+        if (text == NULL || k == MOST_PUBLIC) {
+            return false;
         }
+        const int at = row->places[k] = place_of(row->function, text);
+        row->names[k] = Py_NewRef(name);
+        row->n_public++;
+        Py_XSETREF(*(at < 0 ? &row->others[k] : &row->usual[at]), Py_XNewRef(usual));
     }
-    return true;
+    for (int k = 0; k < N_SETTINGS; k++) {
+        row->settings[k] =
+            row->function->is_by_rank && k == PRECISION ? -1 : place_of(row->function, settings[k]);
+    }
+    return !PyErr_Occurred();
 }
 
-/* A function of the table, of the Python layer; a new reference or NULL. */
+/* A function of the table, and its row, which is to be filled; a new reference or NULL. */
 static PyObject *
-make_function(PyObject *module, const hs_function *function)
+make_function(PyObject *module, const hs_function *function, const char *name,
+              PyObject *(*body)(PyObject *, PyObject *const *, Py_ssize_t), function_row **row)
 {
-    function_row *row = PyMem_Calloc(1, sizeof *row);
-    PyObject     *capsule = row != NULL ? PyCapsule_New(row, ROW, free_row) : PyErr_NoMemory();
+    *row = PyMem_Calloc(1, sizeof **row);
+    PyObject *capsule = *row != NULL ? PyCapsule_New(*row, ROW, free_row) : PyErr_NoMemory();
     if (capsule == NULL) {
-        PyMem_Free(row);
+        PyMem_Free(*row);
         return NULL;
     }
-    PyCFunction const of_core = (PyCFunction)(void (*)(void))search,
-                      of_users = (PyCFunction)(void (*)(void))attempt;
-    row->function = function;
-    row->of_core = (PyMethodDef){function->name, of_core, METH_FASTCALL, NULL};
-    row->of_users = (PyMethodDef){"attempt", of_users, METH_FASTCALL, NULL};
-    PyObject *self = fill_row(row) ? PyTuple_Pack(2, module, capsule) : NULL;
-    PyObject *made = self != NULL ? PyCFunction_New(&row->of_core, self) : NULL;
+    (*row)->function = function;
+    (*row)->method = (PyMethodDef){name, (PyCFunction)(void (*)(void))body, METH_FASTCALL, NULL};
+    PyObject *self = PyTuple_Pack(2, module, capsule);
+    PyObject *made = self != NULL ? PyCFunction_New(&(*row)->method, self) : NULL;
     Py_DECREF(capsule);
     Py_XDECREF(self);
     return made;
@@ -329,75 +311,59 @@ make_function(PyObject *module, const hs_function *function)
 int
 hs_py_add_functions(PyObject *module)
 {
-    int status = 0;
-    for (int k = 0; hs_functions[k].name != NULL && status == 0; k++) {
-        PyObject *made = make_function(module, &hs_functions[k]);
-        status = PyModule_AddObjectRef(module, hs_functions[k].name, made);
+    int           status = 0;
+    function_row *row;
+    for (const hs_function *one = hs_functions; one->name != NULL && status == 0; one++) {
+        PyObject *made = make_function(module, one, one->name, search, &row);
+        status = PyModule_AddObjectRef(module, one->name, made);
         Py_XDECREF(made);
     }
     return status;
 }
 
 PyObject *
-hs_py_quick(PyObject *module, PyObject *name)
+hs_py_quick(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    PyObject *function = NULL, *made = NULL;
-    for (int k = 0; hs_functions[k].name != NULL && PyUnicode_Check(name); k++) {
-        if (hs_functions[k].users[0] != NULL &&
-            PyUnicode_CompareWithASCIIString(name, hs_functions[k].name) == 0) {
-            function = PyObject_GetAttr(module, name);
+    const hs_function *function = hs_functions;
+    function_row      *row;
+    if (n_arguments != 4 || !PyUnicode_Check(arguments[0]) || !PyTuple_Check(arguments[1]) ||
+        !PyLong_Check(arguments[2]) || !PyDict_Check(arguments[3])) {
+        PyErr_SetString(PyExc_TypeError, "quick takes a name, names, a number and a dict");
+        return NULL;
+    }
+    while (function->name != NULL &&
+           PyUnicode_CompareWithASCIIString(arguments[0], function->name) != 0) {
+        function++;
+    }
+    if (function->name == NULL) {
+        return PyErr_Format(PyExc_ValueError, "no function is called %R", arguments[0]);
+    }
+    PyObject *made = make_function(module, function, "attempt", attempt, &row);
+    if (made != NULL && !fill_row(row, arguments[1], arguments[3])) {
+        Py_CLEAR(made);
+        if (!PyErr_Occurred()) {
+            PyErr_SetString(PyExc_ValueError, "a function for users has fewer arguments");
         }
+    } else if (made != NULL) {
+        row->n_positional = (int)PyLong_AsLong(arguments[2]);
     }
-    if (function != NULL && PyCFunction_Check(function)) {
-        PyObject *self = PyCFunction_GetSelf(function);
-        made = PyCFunction_New((PyMethodDef *)&row_of(self)->of_users, self);
-    } else if (!PyErr_Occurred()) {
-        PyErr_Format(PyExc_ValueError, "no function for users is called %R", name);
-    }
-    Py_XDECREF(function);
     return made;
-}
-
-/* Appends a new reference to the list, or gives up both. */
-static PyObject *
-appended(PyObject *list, PyObject *entry)
-{
-    if (list != NULL && (entry == NULL || PyList_Append(list, entry) < 0)) {
-        Py_CLEAR(list);
-    }
-    Py_XDECREF(entry);
-    return list;
-}
-
-/* Name, usual value and whether it is positional, of each argument for users. */
-static PyObject *
-arguments_of_users(const hs_function *function)
-{
-    PyObject *list = PyList_New(0);
-    bool      is_positional = true;
-    for (const char *const *name = function->users; list != NULL && *name != NULL; name++) {
-        int place;
-        if (**name == '*') {
-            is_positional = false;
-            continue;
-        }
-        list = appended(list,
-                        Py_BuildValue("(szO)", *name, argument_of(function, *name, &place)->usual,
-                                      is_positional ? Py_True : Py_False));
-    }
-    return list;
 }
 
 /* Name of each argument in the order of the core, and whether it may be left out with all that
  * follow. */
 static PyObject *
-arguments_of_core(const hs_function *function)
+arguments_of(const hs_function *function)
 {
     PyObject          *list = PyList_New(0);
     const hs_argument *argument;
     for (int k = 0; list != NULL && (argument = hs_argument_at(function, k)) != NULL; k++) {
-        const bool may_lack = argument->kind >= HS_ARG_FIRST_OPTIONAL;
-        list = appended(list, Py_BuildValue("(sO)", argument->name, may_lack ? Py_True : Py_False));
+        PyObject *entry = Py_BuildValue("(sN)", argument->name,
+                                        PyBool_FromLong(argument->kind >= HS_ARG_FIRST_OPTIONAL));
+        if (entry == NULL || PyList_Append(list, entry) < 0) {
+            Py_CLEAR(list);
+        }
+        Py_XDECREF(entry);
     }
     return list;
 }
@@ -408,11 +374,8 @@ hs_py_table(PyObject *module, PyObject *ignored)
     PyObject *dict = PyDict_New();
     (void)module;
     (void)ignored;
-    for (int k = 0; dict != NULL && hs_functions[k].name != NULL; k++) {
-        PyObject *core = arguments_of_core(&hs_functions[k]);
-        PyObject *users = core != NULL ? arguments_of_users(&hs_functions[k]) : NULL;
-        /* "N" takes both over, also where one is NULL. */
-        if (!hs_dict_put(dict, hs_functions[k].name, Py_BuildValue("(NN)", core, users))) {
+    for (const hs_function *one = hs_functions; dict != NULL && one->name != NULL; one++) {
+        if (!hs_dict_put(dict, one->name, arguments_of(one))) {
             Py_CLEAR(dict);
         }
     }
@@ -422,29 +385,26 @@ hs_py_table(PyObject *module, PyObject *ignored)
 PyObject *
 hs_py_know(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    static const struct {
-        const char *name;
-        int         place;
-    } things[] = {{"Box", HS_BOX_TYPE},
-                  {"Points", HS_POINTS_TYPE},
-                  {"CellList", HS_CELLS_TYPE},
-                  {"settings", HS_SETTINGS}};
-    PyObject **known = PyModule_GetState(module);
+    static const char *const names[] = {[HS_BOX_TYPE] = "Box",
+                                        [HS_POINTS_TYPE] = "Points",
+                                        [HS_CELLS_TYPE] = "CellList",
+                                        [HS_SETTINGS] = "settings"};
+    PyObject               **known = PyModule_GetState(module);
     if (!hs_expect_arguments("know", n_arguments, 2)) {
         return NULL;
     }
-    for (size_t k = 0; k < sizeof things / sizeof things[0] && PyUnicode_Check(arguments[0]); k++) {
-        if (PyUnicode_CompareWithASCIIString(arguments[0], things[k].name) != 0) {
+    for (int k = HS_BOX_TYPE; k <= HS_SETTINGS && PyUnicode_Check(arguments[0]); k++) {
+        if (PyUnicode_CompareWithASCIIString(arguments[0], names[k]) != 0) {
             continue;
         }
-        if (things[k].place == HS_SETTINGS) {
+        if (k == HS_SETTINGS) {
             PyObject *usual = NULL;
             if (PyContextVar_Get(arguments[1], NULL, &usual) < 0) {
                 return NULL;
             }
             Py_XSETREF(known[HS_USUAL_SETTINGS], usual);
         }
-        Py_XSETREF(known[things[k].place], Py_NewRef(arguments[1]));
+        Py_XSETREF(known[k], Py_NewRef(arguments[1]));
         Py_RETURN_NONE;
     }
     PyErr_SetString(PyExc_ValueError,

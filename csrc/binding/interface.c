@@ -6,41 +6,33 @@
 
 const hs_argument HS_EVERY_SEARCH[HS_CALL_ARGUMENTS] = {
     {"points", HS_ARG_POINTS, NULL},
-    {"cutoff", HS_ARG_CUTOFF, "None"},
-    {"box", HS_ARG_BOX, "None"},
-    {"periodic", HS_ARG_PERIODIC, "None"},
-    {"inclusive", HS_ARG_INCLUSIVE, "True"},
-    {"precision", HS_ARG_PRECISION, "'exact'"},
-    {"kernel", HS_ARG_KERNEL, "None"},
-    {"memory_limit", HS_ARG_MEMORY_LIMIT, "None"},
-    {"progress", HS_ARG_PROGRESS, "None"},
-    {"threads", HS_ARG_THREADS, "None"},
+    {"cutoff", HS_ARG_CUTOFF, NULL},
+    {"box", HS_ARG_BOX, NULL},
+    {"periodic", HS_ARG_PERIODIC, NULL},
+    {"inclusive", HS_ARG_INCLUSIVE, NULL},
+    {"precision", HS_ARG_PRECISION, NULL},
+    {"kernel", HS_ARG_KERNEL, NULL},
+    {"memory_limit", HS_ARG_MEMORY_LIMIT, NULL},
+    {"progress", HS_ARG_PROGRESS, NULL},
+    {"threads", HS_ARG_THREADS, NULL},
 };
 
-const hs_argument HS_MAX_DISTANCE = {"max_distance", HS_ARG_MAX_DISTANCE, "inf"};
+const hs_argument HS_MAX_DISTANCE = {"max_distance", HS_ARG_MAX_DISTANCE, NULL};
 
-const hs_argument HS_ONLY_PYTHON[] = {
-    {"rule", HS_ARG_OWN, "None"},         {"exclude", HS_ARG_OWN, "None"},
-    {"min_distance", HS_ARG_OWN, "None"}, {"indices", HS_ARG_OWN, "None"},
-    {"by_type", HS_ARG_OWN, "False"},     {NULL, HS_ARG_END, NULL},
-};
-
-/* What several take. */
-static const hs_argument OF_SHELL_ROWS = {"quantities", HS_ARG_SHELL_ROW_QUANTITIES, "'j'"},
-                         OF_NEAREST = {"quantities", HS_ARG_ROW_QUANTITIES, "'jd'"},
-                         MAX_PAIRS = {"max_pairs", HS_ARG_INTEGER, "1048576"},
-                         QUANTITIES = {"quantities", HS_ARG_QUANTITIES, "'ij'"},
-                         OF_SHELLS = {"quantities", HS_ARG_SHELL_QUANTITIES, "'ij'"},
-                         OF_ROWS = {"quantities", HS_ARG_ROW_QUANTITIES, "'j'"},
-                         SORT = {"sort", HS_ARG_SORT, "False"},
-                         SORTED = {"sort", HS_ARG_SORT, "True"},
-                         INDEX = {"index_dtype", HS_ARG_INDEX, "numpy.int64"},
-                         OUT = {"out", HS_ARG_OUT, "None"},
+/* What several take; letters of rows are none that say what the row is. */
+static const hs_argument OF_SHELL_ROWS = {"quantities", HS_ARG_QUANTITIES, "jdDSk"},
+                         OF_ROWS = {"quantities", HS_ARG_QUANTITIES, "jdDS"},
+                         QUANTITIES = {"quantities", HS_ARG_QUANTITIES, "ijdDSP"},
+                         OF_SHELLS = {"quantities", HS_ARG_QUANTITIES, HS_LETTERS},
+                         MAX_PAIRS = {"max_pairs", HS_ARG_INTEGER, NULL},
+                         SORT = {"sort", HS_ARG_SORT, NULL},
+                         INDEX = {"index_dtype", HS_ARG_INDEX, NULL},
+                         OUT = {"out", HS_ARG_OUT, NULL},
                          OTHER_POINTS = {"queries", HS_ARG_OTHER_POINTS, NULL},
-                         QUERIES = {"queries", HS_ARG_QUERIES, "None"},
-                         PAIRING = {"pairing", HS_ARG_PAIRING, "None"},
-                         ALGORITHM = {"algorithm", HS_ARG_ALGORITHM, "'auto'"},
-                         SHELLS = {"shells", HS_ARG_SHELLS, "None"};
+                         QUERIES = {"queries", HS_ARG_QUERIES, NULL},
+                         PAIRING = {"pairing", HS_ARG_PAIRING, NULL},
+                         ALGORITHM = {"algorithm", HS_ARG_ALGORITHM, NULL},
+                         SHELLS = {"shells", HS_ARG_SHELLS, NULL};
 
 /* What one takes, or a few by this name. */
 #define A(name, kind) (&(const hs_argument){name, kind, NULL})
@@ -51,49 +43,26 @@ static const hs_argument OF_SHELL_ROWS = {"quantities", HS_ARG_SHELL_ROW_QUANTIT
 #define NODES         OWN("n_nodes"), OWN("n_ghosts"), OWN("number"), INTEGER("flags")
 #define ROWS          OWN("offsets"), OWN("indices"), OWN("shifts")
 
-/* What users give. */
-#define SCENE "box", "periodic", "rule", "exclude", "min_distance"
-#define HOW   "threads", "progress"
-
 const hs_function hs_functions[] = {
     {.name = "pairs",
      hs_py_pairs,
-     {&OF_SHELLS, &SORT, &INDEX, &OUT, &PAIRING, &ALGORITHM, &SHELLS},
-     {"points", "cutoff", "*", SCENE, "indices", "inclusive", "quantities", "index_dtype", "sort",
-      "out", HOW}},
-    {.name = "count_pairs",
-     hs_py_count_pairs,
-     {&PAIRING, &ALGORITHM, &QUERIES},
-     {"points", "cutoff", "*", "queries", SCENE, "indices", "inclusive", HOW}},
+     {&OF_SHELLS, &SORT, &INDEX, &OUT, &PAIRING, &ALGORITHM, &SHELLS}},
+    {.name = "count_pairs", hs_py_count_pairs, {&PAIRING, &ALGORITHM, &QUERIES}},
     {.name = "pairs_between",
      hs_py_pairs_between,
-     {&OF_SHELLS, &SORTED, &INDEX, &OUT, &OTHER_POINTS, &PAIRING, &ALGORITHM, &SHELLS},
-     {"queries", "points", "cutoff", "*", SCENE, "inclusive", "quantities", "index_dtype", "out",
-      HOW}},
+     {&OF_SHELLS, &SORT, &INDEX, &OUT, &OTHER_POINTS, &PAIRING, &ALGORITHM, &SHELLS}},
     {.name = "neighbors",
      hs_py_neighbors,
-     {&OF_SHELL_ROWS, &INDEX, &QUERIES, &PAIRING, &ALGORITHM, &SHELLS},
-     {"points", "cutoff", "*", "queries", SCENE, "indices", "inclusive", "quantities",
-      "index_dtype", HOW}},
-    {.name = "coordination",
-     hs_py_coordination,
-     {&QUERIES, &PAIRING, &ALGORITHM},
-     {"points", "cutoff", "*", "queries", SCENE, "indices", "inclusive", "by_type", HOW}},
-    {.name = "nearest",
-     hs_py_nearest,
-     {&OF_NEAREST, &INDEX, &QUERIES, INTEGER("k"), &PAIRING},
-     {"points", "k", "*", "max_distance", "queries", "box", "periodic", "exclude", "min_distance",
-      "indices", "inclusive", "quantities", "index_dtype", HOW},
-     true},
+     {&OF_SHELL_ROWS, &INDEX, &QUERIES, &PAIRING, &ALGORITHM, &SHELLS}},
+    {.name = "coordination", hs_py_coordination, {&QUERIES, &PAIRING, &ALGORITHM}},
+    {.name = "nearest", hs_py_nearest, {&OF_ROWS, &INDEX, &QUERIES, INTEGER("k"), &PAIRING}, true},
     {.name = "histogram",
      hs_py_histogram,
      {OWN("edges"), FLAG("last_inclusive"), &QUERIES, INTEGER("n_types"), &ALGORITHM, &PAIRING}},
     {.name = "clusters", hs_py_clusters, {OWN("core"), FLAG("winding"), &PAIRING, &ALGORITHM}},
     {.name = "iter_pairs",
      hs_py_iter_pairs,
-     {&OF_SHELLS, &INDEX, &MAX_PAIRS, &PAIRING, &ALGORITHM, &SHELLS},
-     {"points", "cutoff", "*", SCENE, "indices", "inclusive", "quantities", "index_dtype",
-      "max_pairs", HOW}},
+     {&OF_SHELLS, &INDEX, &MAX_PAIRS, &PAIRING, &ALGORITHM, &SHELLS}},
     {.name = "for_each_pair",
      hs_py_for_each_pair,
      {OWN("callback"), OWN("user_data"), FLAG("thread_safe"), &PAIRING, &ALGORITHM}},

@@ -4,7 +4,7 @@
  * arguments of a call, functions.c makes the functions, and tests/core_stub.py writes the stub.
  *
  * The Python layer gives a set of points, and queries, as an array or as a tuple (positions, radii,
- * supports, types, weights, groups, labels, numbers of systems), of which all but the first may be
+ * supports, types, weights, groups, labels, where systems begin), of which all but the first may be
  * None; cells may stand in place of positions, with None as box and 0 as periodic. Users give what
  * the public functions take, as far as C converts it.
  */
@@ -30,10 +30,7 @@ typedef enum hs_kind {
     HS_ARG_PROGRESS,     /* None: no calls */
     HS_ARG_THREADS,      /* None: as many as pay */
     /* Of some. */
-    HS_ARG_QUANTITIES,           /* some of HS_ALL_LETTERS */
-    HS_ARG_SHELL_QUANTITIES,     /* some of HS_LETTERS, where there may be shells */
-    HS_ARG_ROW_QUANTITIES,       /* some of HS_ROW_LETTERS */
-    HS_ARG_SHELL_ROW_QUANTITIES, /* some of HS_SHELL_ROW_LETTERS */
+    HS_ARG_QUANTITIES, /* some of its letters, each at most once */
     HS_ARG_SORT,
     HS_ARG_INDEX,        /* bytes of an index */
     HS_ARG_OUT,          /* arrays, or None */
@@ -61,11 +58,14 @@ typedef enum hs_kind {
 typedef struct hs_argument {
     const char *name; /* NULL at the end of a list */
     hs_kind     kind;
-    const char *usual; /* what users leave out, as Python writes it; NULL: it must be given */
+    const char *letters; /* of quantities, some of HS_LETTERS */
 } hs_argument;
 
-/* Of every search; beyond them, with the end; as users give them, with a star and the end. */
-enum { HS_CALL_ARGUMENTS = 10, HS_MOST_OWN = 12, HS_MOST_PUBLIC = 20 };
+/* Of every search; beyond them, with the end. */
+enum { HS_CALL_ARGUMENTS = 10, HS_MOST_OWN = 12 };
+
+/* All letters; k where there are shells. */
+#define HS_LETTERS "ijdDSPk"
 
 /* What a function does with its arguments; a new reference, or NULL with an exception set. */
 struct hs_py_call;
@@ -75,18 +75,11 @@ typedef struct hs_function {
     const char        *name;
     hs_py_search      *body;
     const hs_argument *own[HS_MOST_OWN]; /* beyond HS_EVERY_SEARCH, until NULL */
-    /* Names of the arguments as users give them, positional ones before the star; none where it is
-     * no function for users. */
-    const char *users[HS_MOST_PUBLIC];
     /* Whether the cutoff is the largest distance of what is near, decided exactly in any case. */
     bool is_by_rank;
 } hs_function;
 
 extern const hs_argument HS_EVERY_SEARCH[HS_CALL_ARGUMENTS], HS_MAX_DISTANCE;
-
-/* What users give and only the Python layer converts: where one of these is not its usual value, C
- * leaves the call to Python. */
-extern const hs_argument HS_ONLY_PYTHON[];
 
 /* The argument at this place in the order of the core; NULL behind the last. */
 static inline const hs_argument *

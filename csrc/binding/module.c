@@ -102,29 +102,22 @@ set_cache_limit(PyObject *module, PyObject *limit)
 }
 
 static PyObject *
-cache_limit(PyObject *module, PyObject *ignored)
+cache_info(PyObject *module, PyObject *ignored)
 {
     (void)module;
     (void)ignored;
-    return PyLong_FromSize_t(hs_pool_limit());
-}
-
-static PyObject *
-cache_held(PyObject *module, PyObject *ignored)
-{
-    (void)module;
-    (void)ignored;
-    return PyLong_FromSize_t(hs_pool_held());
+    return Py_BuildValue("(nn)", (Py_ssize_t)hs_pool_held(), (Py_ssize_t)hs_pool_limit());
 }
 
 #define FASTCALL(function) ((PyCFunction)(void (*)(void))(function))
 
 /* Functions that are not in the table: they search for nothing. */
 static PyMethodDef others[] = {
-    {"quick", hs_py_quick, METH_O, NULL},
+    {"quick", FASTCALL(hs_py_quick), METH_FASTCALL, NULL},
     {"scene", FASTCALL(hs_py_scene), METH_FASTCALL, NULL},
     {"know", FASTCALL(hs_py_know), METH_FASTCALL, NULL},
     {"table", hs_py_table, METH_NOARGS, NULL},
+    {"next_block", FASTCALL(hs_py_next_block), METH_FASTCALL, NULL},
     {"cells_layout", hs_py_cells_layout, METH_O, NULL},
     {"cells_find", FASTCALL(hs_py_cells_find), METH_FASTCALL, NULL},
     {"feet_between", FASTCALL(hs_py_feet_between), METH_FASTCALL, NULL},
@@ -136,8 +129,7 @@ static PyMethodDef others[] = {
     {"group_memory", group_memory, METH_O, NULL},
     {"clear_cache", clear_cache, METH_NOARGS, NULL},
     {"set_cache_limit", set_cache_limit, METH_O, NULL},
-    {"cache_limit", cache_limit, METH_NOARGS, NULL},
-    {"cache_held", cache_held, METH_NOARGS, NULL},
+    {"cache_info", cache_info, METH_NOARGS, NULL},
     {"box_measure", FASTCALL(hs_py_box_measure), METH_FASTCALL, NULL},
     {"box_wrap", FASTCALL(hs_py_box_wrap), METH_FASTCALL, NULL},
     {"box_places", FASTCALL(hs_py_box_places), METH_FASTCALL, NULL},
@@ -155,8 +147,7 @@ module_exec(PyObject *module)
     if (PyArray_ImportNumPyAPI() < 0) {
         return -1;
     }
-    types[HS_STREAM_TYPE] = hs_py_stream_type(module);
-    types[HS_DYNAMIC_TYPE] = types[HS_STREAM_TYPE] != NULL ? hs_py_dynamic_type(module) : NULL;
+    types[HS_DYNAMIC_TYPE] = hs_py_dynamic_type(module);
     return types[HS_DYNAMIC_TYPE] == NULL || hs_py_add_capi(module) < 0
                ? -1
                : hs_py_add_functions(module);

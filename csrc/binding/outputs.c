@@ -4,7 +4,6 @@
 
 #include "errors.h"
 
-#include <math.h>
 #include <string.h>
 
 /* Bytes from which an array keeps the memory that the search wrote it to; smaller ones are copied,
@@ -93,34 +92,22 @@ new_offsets(hs_pairs *rows)
     return hs_array_like(hs_pairs_offsets(rows), 1, &length, NPY_INT64);
 }
 
-/* A tuple of n arrays, from the one at `first` on one for each letter. */
-static PyObject *
-arrays_in(PyObject *tuple, Py_ssize_t first, hs_pairs *pairs, const char *letters, int ndim,
-          int index_bytes)
-{
-    for (const char *letter = letters; tuple != NULL && *letter != '\0'; letter++) {
-        hs_tuple_put(&tuple, first + (letter - letters),
-                     new_array(pairs, form_of(*letter, ndim, index_bytes)));
-    }
-    return tuple;
-}
-
 PyObject *
-hs_arrays_of(hs_pairs *pairs, const char *letters, int ndim, int index_bytes)
+hs_arrays_of(hs_pairs *pairs, const char *letters, int ndim, int index_bytes, bool is_table)
 {
-    const Py_ssize_t n = (Py_ssize_t)strlen(letters);
-    return n == 1 ? new_array(pairs, form_of(letters[0], ndim, index_bytes))
-                  : arrays_in(PyTuple_New(n), 0, pairs, letters, ndim, index_bytes);
-}
-
-PyObject *
-hs_table_of(hs_pairs *rows, const char *letters, int ndim, int index_bytes)
-{
-    PyObject *table = PyTuple_New((Py_ssize_t)strlen(letters) + 1);
-    if (table != NULL) {
-        hs_tuple_put(&table, 0, new_offsets(rows));
+    const Py_ssize_t n = (Py_ssize_t)strlen(letters), n_before = is_table ? 1 : 0;
+    if (n == 1 && !is_table) {
+        return new_array(pairs, form_of(letters[0], ndim, index_bytes));
     }
-    return hs_read_only(arrays_in(table, 1, rows, letters, ndim, index_bytes));
+    PyObject *tuple = PyTuple_New(n_before + n);
+    if (tuple != NULL && is_table) {
+        hs_tuple_put(&tuple, 0, new_offsets(pairs));
+    }
+    for (Py_ssize_t k = 0; tuple != NULL && k < n; k++) {
+        hs_tuple_put(&tuple, n_before + k,
+                     new_array(pairs, form_of(letters[k], ndim, index_bytes)));
+    }
+    return is_table ? hs_read_only(tuple) : tuple;
 }
 
 PyObject *
@@ -244,17 +231,14 @@ hs_out_of(PyObject *out, const char *letters, int ndim, int index_bytes, hs_pair
 }
 
 bool
-hs_out_is_apart(PyObject *out, const char *letters, PyObject *input, const char *name)
+hs_out_is_apart(PyObject *out, const char *letters, PyObject *input)
 {
     const Py_ssize_t n = (Py_ssize_t)strlen(letters);
+    bool             is_apart = true;
     for (Py_ssize_t k = 0; PyArray_Check(input) && k < n; k++) {
-        if (overlap(item_of(out, k, n), input)) {
-            PyErr_Format(PyExc_ValueError, "out for '%c' must not share memory with %s", letters[k],
-                         name);
-            return false;
-        }
+        is_apart = is_apart && !overlap(item_of(out, k, n), input);
     }
-    return true;
+    return is_apart;
 }
 
 /* The first rows of an array, as a plain array: subclasses may have slices of their own. */
@@ -293,31 +277,18 @@ out_filled(PyObject *out, const char *letters, int64_t n_pairs)
 }
 
 PyObject *
-hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs)
+hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs, bool is_table)
 {
     hs_py_call_acquire(call);
     if (status != HS_OK) {
         return hs_py_call_raise(call, status);
     }
-    PyObject *arrays =
-        call->out != NULL
-            ? out_filled(call->out, call->letters, hs_pairs_length(pairs))
-            : hs_arrays_of(pairs, call->letters, call->points.at.ndim, call->options.index_bytes);
+    PyObject *arrays = call->out != NULL
+                           ? out_filled(call->out, call->letters, hs_pairs_length(pairs))
+                           : hs_arrays_of(pairs, call->letters, call->points.at.ndim,
+                                          call->options.index_bytes, is_table);
     hs_pairs_free(pairs);
     return arrays;
-}
-
-PyObject *
-hs_py_call_table(hs_py_call *call, hs_status status, hs_pairs *rows)
-{
-    hs_py_call_acquire(call);
-    if (status != HS_OK) {
-        return hs_py_call_raise(call, status);
-    }
-    PyObject *table =
-        hs_table_of(rows, call->letters, call->points.at.ndim, call->options.index_bytes);
-    hs_pairs_free(rows);
-    return table;
 }
 
 PyObject *

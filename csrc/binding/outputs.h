@@ -13,26 +13,21 @@ bool hs_out_of(PyObject *out, const char *letters, int ndim, int index_bytes,
                hs_pair_arrays *arrays);
 
 /* Whether the memory of these arrays lies apart from that of an input, which may be None or no
- * array: else false with an exception set that names it. Compares where they begin and end. */
-bool hs_out_is_apart(PyObject *out, const char *letters, PyObject *input, const char *name);
+ * array. Compares where they begin and end. */
+bool hs_out_is_apart(PyObject *out, const char *letters, PyObject *input);
 
-/* New arrays in the order of the letters: a tuple, or for one letter the array itself. Takes
- * what it can from the pairs; a new reference or NULL. */
-PyObject *hs_arrays_of(hs_pairs *pairs, const char *letters, int ndim, int index_bytes);
-
-/* Rows of a full search: a tuple of the offsets and these arrays, all of them read-only. Takes what
- * it can from the rows; a new reference or NULL. */
-PyObject *hs_table_of(hs_pairs *rows, const char *letters, int ndim, int index_bytes);
+/* New arrays in the order of the letters: a tuple, or for one letter the array itself. As a table
+ * it is a tuple with the offsets of rows before these, and nothing can be written to. Takes what it
+ * can from the pairs; a new reference or NULL. */
+PyObject *hs_arrays_of(hs_pairs *pairs, const char *letters, int ndim, int index_bytes,
+                       bool is_table);
 
 /* Arrays that cannot be written to, as a tuple, or NULL; takes the reference. */
 PyObject *hs_read_only(PyObject *arrays);
 
-/* What a function returns, the GIL taken: arrays of the pairs, which are freed, or those of `out`;
- * NULL with an exception set for a status other than HS_OK. */
-PyObject *hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs);
-
-/* What a function returns as a table: the rows, which are freed; as above. */
-PyObject *hs_py_call_table(hs_py_call *call, hs_status status, hs_pairs *rows);
+/* What a function returns, the GIL taken: such arrays of the pairs, which are freed, or those of
+ * `out`; NULL with an exception set for a status other than HS_OK. */
+PyObject *hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs, bool is_table);
 
 /* An array with a copy of what is there; a new reference or NULL. */
 PyObject *hs_array_like(const void *data, int n_dimensions, npy_intp *shape, int type);

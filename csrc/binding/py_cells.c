@@ -7,8 +7,6 @@
 #include "outputs.h"
 #include "system.h"
 
-#include <string.h>
-
 /* ---- cells -------------------------------------------------------------------------------- */
 
 static void
@@ -152,7 +150,7 @@ hs_py_cells_candidates(hs_py_call *call)
     const hs_points *queries = call->among.queries != NULL ? &call->queries.at : NULL;
     const hs_status  status =
         hs_cells_candidates(call->among.cells, queries, &call->options, &ranges, &call->failure);
-    return hs_py_call_table(call, status, ranges); /* "ij": where each begins and ends */
+    return hs_py_call_pairs(call, status, ranges, true); /* "ij": where each begins and ends */
 }
 
 /* ---- lists for many steps ----------------------------------------------------------------- */
@@ -216,7 +214,7 @@ hs_py_verlet_pairs(hs_py_call *call)
     }
     hs_py_call_release(call);
     const hs_status status = hs_verlet_find(list, &call->options, &pairs, &call->failure);
-    return hs_py_call_pairs(call, status, pairs);
+    return hs_py_call_pairs(call, status, pairs, false);
 }
 
 PyObject *
@@ -239,6 +237,18 @@ hs_py_verlet_look(PyObject *module, PyObject *capsule)
 /* Points between two looks for Ctrl-C: some hundredths of a second in the most skewed box. */
 #define POINTS_PER_CALL 32768
 
+/* Points, the box, or NULL where there may be none, and the axes that repeat, of a function that
+ * takes so many arguments, these first. */
+static bool
+take_scene(const char *name, PyObject *const *arguments, Py_ssize_t n_arguments, int expected,
+           hs_points *points, hs_box *box, bool *given)
+{
+    unsigned long repeats;
+    return hs_expect_arguments(name, n_arguments, expected) &&
+           hs_repeats_of(arguments[2], &repeats) && hs_points_of(arguments[0], "points", points) &&
+           hs_box_of(arguments[1], repeats, points->ndim, box, given);
+}
+
 PyObject *
 hs_py_box_measure(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
@@ -248,15 +258,13 @@ hs_py_box_measure(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     unsigned long repeats;
     double        heights[HS_MAX_DIM] = {0}, volume;
     (void)module;
-    if (n_arguments != 2 || !PyArray_Check(arguments[0]) ||
-        PyArray_NDIM((PyArrayObject *)arguments[0]) != 2) {
-        PyErr_SetString(PyExc_TypeError, "box_measure takes a box (d, d) and periodic bits");
-        return NULL;
-    }
-    npy_intp ndim = PyArray_DIM((PyArrayObject *)arguments[0], 0);
+    npy_intp ndim = n_arguments == 2 && hs_is_array(arguments[0], NPY_DOUBLE, 2)
+                        ? (npy_intp)hs_length_of(arguments[0])
+                        : 0;
     if (ndim < 1 || ndim > HS_MAX_DIM) {
-        PyErr_Format(PyExc_ValueError, "box must have shape (d, d) with 1 <= d <= %d", HS_MAX_DIM);
-        return NULL;
+        return PyErr_Format(PyExc_TypeError,
+                            "box_measure takes a box (d, d), with 1 <= d <= %d, and periodic bits",
+                            HS_MAX_DIM);
     }
     if (!hs_repeats_of(arguments[1], &repeats) ||
         !hs_box_of(arguments[0], repeats, (int)ndim, &box, &given)) {
@@ -268,48 +276,21 @@ hs_py_box_measure(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
                : hs_raise(status, &failure, NULL);
 }
 
-/* What is done with some rows of points, which begin at row `first`. */
-typedef struct box_work {
-    const hs_box *box;
-    int64_t       n; /* rows in all */
-    double       *wrapped;
-    int64_t      *shifts;
-    double        cutoff, largest, *places;
-    hs_box_axes   axes;
-} box_work;
-
-typedef hs_status work_fn(box_work *work, const hs_points *rows, int64_t first,
-                          hs_failure *failure);
-
-static hs_status
-wrap_rows(box_work *work, const hs_points *rows, int64_t first, hs_failure *failure)
-{
-    const int64_t at = first * rows->ndim;
-    return hs_box_wrap(work->box, rows, work->wrapped + at, work->shifts + at, failure);
-}
-
-static hs_status
-place_rows(box_work *work, const hs_points *rows, int64_t first, hs_failure *failure)
-{
-    return hs_box_places(work->box, rows, work->cutoff, work->largest, work->places + first,
-                         work->n, &work->axes, failure);
-}
-
 /* Some points after others, without the GIL; signals are handled in between. Without points once,
  * for what is said of the box. Returns false with an exception set. */
 static bool
-in_parts(const hs_points *points, work_fn *work_on, box_work *work)
+wrap_in_parts(const hs_box *box, const hs_points *points, double *wrapped, int64_t *shifts)
 {
     hs_points  part = *points;
     hs_failure failure;
     int64_t    first = 0;
-    work->n = points->n;
     do {
-        hs_status status;
+        const int64_t at = first * points->ndim;
+        hs_status     status;
         part.n = points->n - first < POINTS_PER_CALL ? points->n - first : POINTS_PER_CALL;
         part.data = (const char *)points->data + first * points->row_stride;
         Py_BEGIN_ALLOW_THREADS
-        status = work_on(work, &part, first, &failure);
+        status = hs_box_wrap(box, &part, wrapped + at, shifts + at, &failure);
         Py_END_ALLOW_THREADS
         if (status != HS_OK) {
             const bool is_of_point = status == HS_ERR_NOT_FINITE || status == HS_ERR_SHIFT_RANGE;
@@ -328,80 +309,62 @@ in_parts(const hs_points *points, work_fn *work_on, box_work *work)
 PyObject *
 hs_py_box_wrap(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_points     points;
-    hs_box        box;
-    bool          given;
-    unsigned long repeats;
+    hs_points points;
+    hs_box    box;
+    bool      given;
     (void)module;
-    if (n_arguments != 3) {
-        PyErr_SetString(PyExc_TypeError, "box_wrap takes points, a box and periodic bits");
-        return NULL;
-    }
-    if (!hs_repeats_of(arguments[2], &repeats) || !hs_points_of(arguments[0], "points", &points) ||
-        !hs_box_of(arguments[1], repeats, points.ndim, &box, &given)) {
+    if (!take_scene("box_wrap", arguments, n_arguments, 3, &points, &box, &given)) {
         return NULL;
     }
     if (!given) {
         PyErr_SetString(PyExc_TypeError, "box_wrap needs a box");
         return NULL;
     }
-    npy_intp  shape[2] = {(npy_intp)points.n, points.ndim};
-    PyObject *wrapped = PyArray_SimpleNew(2, shape, NPY_DOUBLE);
-    PyObject *shifts = PyArray_SimpleNew(2, shape, NPY_INT64);
-    bool      made = wrapped != NULL && shifts != NULL;
-    if (made) {
-        box_work work = {.box = &box,
-                         .wrapped = PyArray_DATA((PyArrayObject *)wrapped),
-                         .shifts = PyArray_DATA((PyArrayObject *)shifts)};
-        made = in_parts(&points, wrap_rows, &work);
-    }
-    if (!made) {
-        Py_XDECREF(wrapped);
-        Py_XDECREF(shifts);
-        return NULL;
-    }
-    return Py_BuildValue("(NN)", wrapped, shifts);
+    npy_intp   shape[2] = {(npy_intp)points.n, points.ndim};
+    PyObject  *wrapped = PyArray_SimpleNew(2, shape, NPY_DOUBLE);
+    PyObject  *shifts = PyArray_SimpleNew(2, shape, NPY_INT64);
+    const bool made = wrapped != NULL && shifts != NULL &&
+                      wrap_in_parts(&box, &points, PyArray_DATA((PyArrayObject *)wrapped),
+                                    PyArray_DATA((PyArrayObject *)shifts));
+    PyObject *both = made ? PyTuple_Pack(2, wrapped, shifts) : NULL;
+    Py_XDECREF(wrapped);
+    Py_XDECREF(shifts);
+    return both;
 }
 
 PyObject *
 hs_py_box_places(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_points     points;
-    hs_box        box;
-    bool          given;
-    unsigned long repeats;
+    hs_points points;
+    hs_box    box;
+    bool      given;
     (void)module;
-    if (n_arguments != 5) {
-        PyErr_SetString(PyExc_TypeError,
-                        "box_places takes points, a box, periodic bits, a cutoff and the largest "
-                        "coordinate");
+    if (!take_scene("box_places", arguments, n_arguments, 5, &points, &box, &given)) {
         return NULL;
     }
     const double cutoff = PyFloat_AsDouble(arguments[3]);
     const double largest = PyErr_Occurred() ? 0.0 : PyFloat_AsDouble(arguments[4]);
-    if (PyErr_Occurred() || !hs_repeats_of(arguments[2], &repeats) ||
-        !hs_points_of(arguments[0], "points", &points) ||
-        !hs_box_of(arguments[1], repeats, points.ndim, &box, &given)) {
-        return NULL;
-    }
-    npy_intp  shape[2] = {points.ndim, (npy_intp)points.n};
-    PyObject *places = PyArray_SimpleNew(2, shape, NPY_DOUBLE);
+    npy_intp     shape[2] = {points.ndim, (npy_intp)points.n};
+    PyObject    *places = PyErr_Occurred() ? NULL : PyArray_SimpleNew(2, shape, NPY_DOUBLE);
     if (places == NULL) {
         return NULL;
     }
-    box_work work = {.box = given ? &box : NULL,
-                     .cutoff = cutoff,
-                     .largest = largest,
-                     .places = PyArray_DATA((PyArrayObject *)places)};
-    if (!in_parts(&points, place_rows, &work)) {
+    hs_box_axes axes;
+    hs_failure  failure;
+    hs_status   status;
+    Py_BEGIN_ALLOW_THREADS
+    status = hs_box_places(given ? &box : NULL, &points, cutoff, largest,
+                           PyArray_DATA((PyArrayObject *)places), points.n, &axes, &failure);
+    Py_END_ALLOW_THREADS
+    PyObject *repeats = status == HS_OK ? PyTuple_New(points.ndim)
+                                        : hs_raise(status, &failure, NULL);
+    if (repeats == NULL) {
         Py_DECREF(places);
         return NULL;
     }
-    PyObject *repeats_of_axes = PyTuple_New(points.ndim);
-    for (int k = 0; repeats_of_axes != NULL && k < points.ndim; k++) {
-        PyTuple_SET_ITEM(repeats_of_axes, k, PyBool_FromLong(work.axes.repeats[k]));
+    for (int k = 0; k < points.ndim; k++) {
+        PyTuple_SET_ITEM(repeats, k, PyBool_FromLong(axes.repeats[k]));
     }
-    return Py_BuildValue("(NNNN)", places, repeats_of_axes,
-                         hs_tuple_of_reals(work.axes.reach, points.ndim),
-                         hs_tuple_of_reals(work.axes.width, points.ndim));
+    return Py_BuildValue("(NNNN)", places, repeats, hs_tuple_of_reals(axes.reach, points.ndim),
+                         hs_tuple_of_reals(axes.width, points.ndim));
 }

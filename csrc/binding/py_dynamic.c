@@ -17,7 +17,7 @@
 typedef struct py_dynamic {
     PyObject_HEAD
     hs_dynamic *list;    /* owned */
-    PyObject   *convert; /* owned: makes an array of a position that is none */
+    PyObject   *convert; /* owned: see converted() */
     int         ndim;
     bool        tagged;
     double      max_radius;
@@ -31,61 +31,74 @@ is_to_be_made_again(hs_status status)
     return status == HS_ERR_INTERRUPTED && PyErr_CheckSignals() == 0;
 }
 
-/* An exception that says which argument it is about, "key" or "skip"; without `error`, one that
- * the present one caused. Returns false. */
-static bool
-refuse_key(PyObject *error, const char *name, const char *must, PyObject *object)
+/* An argument of this name that is not plain, as one that is; a new reference or NULL. */
+static PyObject *
+converted(const py_dynamic *self, PyObject *object, const char *name)
 {
-    char text[64];
-    PyOS_snprintf(text, sizeof text, must, name);
-    if (error == NULL) {
-        return hs_refuse_kind(text, object);
-    }
-    hs_refuse(error, text, object);
-    return false;
+    return PyObject_CallFunction(self->convert, "Osii", object, name, self->ndim, self->tagged);
 }
 
+/* The same after `is_plain`, whether it has been read; takes the reference to it. */
 static bool
-integer_of(PyObject *object, const char *name, const char *must, long long *value)
+end_converted(PyObject *plain, const char *name, bool is_plain)
 {
-    int overflow = 0;
-    if (!PyLong_CheckExact(object) &&
-        (PyBool_Check(object) || !PyIndex_Check(object) || PyArray_Check(object))) {
-        return refuse_key(PyExc_TypeError, name, must, object);
+    if (plain != NULL && !is_plain) {
+        PyErr_Format(PyExc_TypeError, "%s was not converted", name);
     }
-    PyObject *index = PyNumber_Index(object);
-    if (index == NULL) {
-        return refuse_key(NULL, name, must, object);
-    }
-    *value = PyLong_AsLongLongAndOverflow(index, &overflow);
-    Py_DECREF(index);
-    return overflow == 0 || refuse_key(PyExc_OverflowError, name, "%s must fit int64", object);
+    Py_XDECREF(plain);
+    return is_plain;
 }
 
-/* False with an exception set. */
+/* An integer of Python or NumPy that fits int64; false, without an exception, for all else. */
 static bool
-key_of(const py_dynamic *self, PyObject *object, const char *name, hs_key *key)
+integer_of(PyObject *object, long long *value)
 {
-    long long id = 0, tag = 0;
-    if (!self->tagged) {
-        if (!integer_of(object, name, "%s must be an integer", &id)) {
-            return false;
-        }
-    } else {
-        const char *must = "%s must be a tuple (tag, integer) of integers";
-        if (!PyTuple_Check(object) || PyTuple_GET_SIZE(object) != 2) {
-            return refuse_key(PyExc_TypeError, name, must, object);
-        }
-        if (!integer_of(PyTuple_GET_ITEM(object, 0), name, must, &tag) ||
-            !integer_of(PyTuple_GET_ITEM(object, 1), name, must, &id)) {
-            return false;
-        }
-        if (tag < INT32_MIN || tag > INT32_MAX) {
-            return refuse_key(PyExc_OverflowError, name, "the tag of %s must fit int32", object);
-        }
+    int        overflow = 1;
+    const bool is_integer = PyLong_CheckExact(object) || PyArray_IsScalar(object, Integer);
+    PyObject  *index = is_integer ? PyNumber_Index(object) : NULL;
+    if (index != NULL) {
+        *value = PyLong_AsLongLongAndOverflow(index, &overflow);
+        Py_DECREF(index);
+    }
+    PyErr_Clear();
+    return overflow == 0;
+}
+
+/* An integer, or a tuple of a tag and one, as above. */
+static bool
+plain_key_of(const py_dynamic *self, PyObject *object, hs_key *key)
+{
+    long long  id, tag = 0;
+    const bool is_pair = PyTuple_Check(object) && PyTuple_GET_SIZE(object) == 2;
+    if (!(self->tagged ? is_pair && integer_of(PyTuple_GET_ITEM(object, 0), &tag) &&
+                             integer_of(PyTuple_GET_ITEM(object, 1), &id)
+                       : integer_of(object, &id)) ||
+        tag < INT32_MIN || tag > INT32_MAX) {
+        return false;
     }
     *key = (hs_key){.id = id, .tag = (int32_t)tag};
     return true;
+}
+
+/* name: "key" or "skip". This and the next ones return false with an exception set. */
+static bool
+key_of(const py_dynamic *self, PyObject *object, const char *name, hs_key *key)
+{
+    if (plain_key_of(self, object, key)) {
+        return true;
+    }
+    PyObject *plain = converted(self, object, name);
+    return end_converted(plain, name, plain != NULL && plain_key_of(self, plain, key));
+}
+
+static bool
+radius_of(const py_dynamic *self, PyObject *object, double *radius)
+{
+    if (hs_number_of(object, radius)) {
+        return true;
+    }
+    PyObject *plain = converted(self, object, "radius");
+    return end_converted(plain, "radius", plain != NULL && hs_number_of(plain, radius));
 }
 
 static bool
@@ -94,17 +107,9 @@ position_of(const py_dynamic *self, PyObject *object, double *position)
     if (hs_numbers_of(object, self->ndim, position)) {
         return true;
     }
-    PyObject *array =
-        PyErr_Occurred() ? NULL : PyObject_CallFunction(self->convert, "Oi", object, self->ndim);
-    if (array == NULL) {
-        return false;
-    }
-    const bool is_plain = hs_numbers_of(array, self->ndim, position);
-    Py_DECREF(array);
-    if (!is_plain) {
-        PyErr_SetString(PyExc_TypeError, "position must be real numbers");
-    }
-    return is_plain;
+    PyObject *plain = PyErr_Occurred() ? NULL : converted(self, object, "position");
+    return end_converted(plain, "position",
+                         plain != NULL && hs_numbers_of(plain, self->ndim, position));
 }
 
 /* An array of a key for each row: (n,), or (n, 2) with tags. */
@@ -215,12 +220,9 @@ raise_many(const py_dynamic *self, hs_status status, const hs_failure *failure, 
     return NULL;
 }
 
-typedef hs_status put_many_fn(hs_dynamic *, const int64_t *, const int32_t *, const hs_points *,
-                              hs_failure *);
-
-/* ids, tags or None, positions. */
+/* ids, tags or None, positions, whether all must be there. */
 static PyObject *
-put_many(PyObject *object, PyObject *const *arguments, Py_ssize_t n_arguments, put_many_fn *put)
+put_many(PyObject *object, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     const py_dynamic *self = (const py_dynamic *)object;
     const int64_t    *ids;
@@ -228,7 +230,7 @@ put_many(PyObject *object, PyObject *const *arguments, Py_ssize_t n_arguments, p
     int64_t           n;
     hs_points         positions;
     hs_failure        failure = {.row = -1};
-    if (!hs_expect_arguments("insert_many or move_many", n_arguments, 3) ||
+    if (!hs_expect_arguments("put_many", n_arguments, 4) ||
         !take_keys(arguments, &ids, &tags, &n) ||
         !hs_points_of(arguments[2], "positions", &positions)) {
         return NULL;
@@ -239,24 +241,13 @@ put_many(PyObject *object, PyObject *const *arguments, Py_ssize_t n_arguments, p
     }
     hs_status status;
     do {
-        status = put(self->list, ids, tags, &positions, &failure);
+        status = (arguments[3] == Py_True ? hs_dynamic_move_many : hs_dynamic_insert_many)(
+            self->list, ids, tags, &positions, &failure);
     } while (is_to_be_made_again(status));
     if (status != HS_OK) {
         return raise_many(self, status, &failure, ids, tags);
     }
     Py_RETURN_NONE;
-}
-
-static PyObject *
-insert_many(PyObject *self, PyObject *const *arguments, Py_ssize_t n)
-{
-    return put_many(self, arguments, n, hs_dynamic_insert_many);
-}
-
-static PyObject *
-move_many(PyObject *self, PyObject *const *arguments, Py_ssize_t n)
-{
-    return put_many(self, arguments, n, hs_dynamic_move_many);
 }
 
 /* ids, tags or None -> which of them were there. */
@@ -453,40 +444,28 @@ result_of(gathered *found, hs_status status, const hs_failure *failure)
     return result;
 }
 
-/* position, radius, and whether shifts are wanted. */
+/* position, radius, whether shifts are wanted; None: all that are near. */
 static PyObject *
-ask(const py_dynamic *self, PyObject *const *arguments, bool is_near, bool with_shift)
+within(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
 {
-    gathered   found = {.self = self, .with_shift = with_shift, .status = HS_OK};
-    double     position[HS_MAX_DIM], radius;
-    hs_failure failure;
-    if (!hs_real_of(arguments[1], "radius must be a number", &radius) ||
+    const py_dynamic *self = (const py_dynamic *)object;
+    gathered          found = {.self = self, .status = HS_OK};
+    double            position[HS_MAX_DIM], radius;
+    hs_failure        failure;
+    hs_status         status;
+    if (!hs_expect_arguments("within", n, 3) || !radius_of(self, arguments[1], &radius) ||
         !position_of(self, arguments[0], position)) {
         return NULL;
     }
-    hs_status status;
+    found.with_shift = arguments[2] == Py_True;
     do {
         found.n = 0;
-        status = is_near ? hs_dynamic_near(self->list, position, radius, take, &found, &failure)
-                         : hs_dynamic_within(self->list, position, radius, with_shift, take, &found,
-                                             &failure);
+        status = arguments[2] == Py_None
+                     ? hs_dynamic_near(self->list, position, radius, take, &found, &failure)
+                     : hs_dynamic_within(self->list, position, radius, found.with_shift, take,
+                                         &found, &failure);
     } while (is_to_be_made_again(status));
     return result_of(&found, status, &failure);
-}
-
-static PyObject *
-near(PyObject *self, PyObject *const *arguments, Py_ssize_t n)
-{
-    return hs_expect_arguments("near", n, 2) ? ask((py_dynamic *)self, arguments, true, false)
-                                             : NULL;
-}
-
-static PyObject *
-within(PyObject *self, PyObject *const *arguments, Py_ssize_t n)
-{
-    return hs_expect_arguments("within", n, 3)
-               ? ask((py_dynamic *)self, arguments, false, arguments[2] == Py_True)
-               : NULL;
 }
 
 /* The balls around rows of float64, one after another, without the GIL but for a look at signals.
@@ -535,7 +514,7 @@ within_many(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
         PyErr_SetString(PyExc_TypeError, "within_many takes positions, a radius and a bool");
         return NULL;
     }
-    if (!hs_real_of(arguments[1], "radius must be a number", &radius)) {
+    if (!radius_of(self, arguments[1], &radius)) {
         return NULL;
     }
     PyArrayObject *positions = (PyArrayObject *)arguments[0];
@@ -554,23 +533,23 @@ within_many(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
     return Py_BuildValue("(NN)", offsets, arrays);
 }
 
-typedef hs_status put_fn(hs_dynamic *, hs_key, const double *, hs_failure *);
-
+/* key, position or None, whether it must be there. */
 static PyObject *
-put(PyObject *object, PyObject *const *arguments, Py_ssize_t n, put_fn *put_in)
+put(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
 {
     const py_dynamic *self = (const py_dynamic *)object;
     double            position[HS_MAX_DIM];
     hs_key            key;
     hs_failure        failure;
-    if (!hs_expect_arguments("insert or move", n, 2) || !key_of(self, arguments[0], "key", &key)) {
+    if (!hs_expect_arguments("put", n, 3) || !key_of(self, arguments[0], "key", &key)) {
         return NULL;
     }
     const bool has_position = arguments[1] != Py_None;
     if (has_position && !position_of(self, arguments[1], position)) {
         return NULL;
     }
-    const hs_status status = put_in(self->list, key, has_position ? position : NULL, &failure);
+    const hs_status status = (arguments[2] == Py_True ? hs_dynamic_move : hs_dynamic_insert)(
+        self->list, key, has_position ? position : NULL, &failure);
     if (status == HS_ERR_ARGUMENT) {
         PyErr_SetString(PyExc_TypeError,
                         "position must not be None but with storage=\"all-pairs\"");
@@ -580,18 +559,6 @@ put(PyObject *object, PyObject *const *arguments, Py_ssize_t n, put_fn *put_in)
         return raise_dynamic(self, status, &failure, arguments[0]);
     }
     Py_RETURN_NONE;
-}
-
-static PyObject *
-insert(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
-{
-    return put(object, arguments, n, hs_dynamic_insert);
-}
-
-static PyObject *
-move(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
-{
-    return put(object, arguments, n, hs_dynamic_move);
 }
 
 static PyObject *
@@ -656,8 +623,7 @@ any_within(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
     hs_key            skip;
     hs_failure        failure;
     bool              any = false;
-    if (!hs_expect_arguments("any_within", n, 3) ||
-        !hs_real_of(arguments[1], "radius must be a number", &radius) ||
+    if (!hs_expect_arguments("any_within", n, 3) || !radius_of(self, arguments[1], &radius) ||
         (arguments[2] != Py_None && !key_of(self, arguments[2], "skip", &skip)) ||
         !position_of(self, arguments[0], position)) {
         return NULL;
@@ -686,12 +652,10 @@ clear(PyObject *object, PyObject *ignored)
 static PyObject *
 shrink(PyObject *object, PyObject *ignored)
 {
-    (void)ignored;
     const hs_status status = hs_dynamic_shrink_to_fit(((py_dynamic *)object)->list);
-    if (status != HS_OK) {
-        return raise_dynamic((py_dynamic *)object, status, NULL, NULL);
-    }
-    Py_RETURN_NONE;
+    (void)ignored;
+    return status == HS_OK ? Py_NewRef(Py_None)
+                           : raise_dynamic((py_dynamic *)object, status, NULL, NULL);
 }
 
 /* An object that owns the list, also on failure; NULL with an exception set. */
@@ -728,16 +692,9 @@ look(PyObject *object, PyObject *ignored)
 {
     const hs_dynamic_state state = hs_dynamic_look(((py_dynamic *)object)->list);
     (void)ignored;
-    return Py_BuildValue("{s:L,s:d,s:N}", "bytes", (long long)state.bytes, "max_radius",
-                         state.max_radius, "cell_size",
+    return Py_BuildValue("{s:L,s:L,s:d,s:N}", "bytes", (long long)state.bytes, "changes",
+                         (long long)state.changes, "max_radius", state.max_radius, "cell_size",
                          hs_tuple_of_reals(state.cell_size, state.ndim));
-}
-
-static PyObject *
-changes(PyObject *object, PyObject *ignored)
-{
-    (void)ignored;
-    return PyLong_FromLongLong(hs_dynamic_look(((py_dynamic *)object)->list).changes);
 }
 
 static Py_ssize_t
@@ -777,18 +734,15 @@ dealloc(PyObject *object)
 #define FASTCALL(function) ((PyCFunction)(void (*)(void))(function))
 
 static PyMethodDef methods[] = {
-    {"insert", FASTCALL(insert), METH_FASTCALL, NULL},
-    {"move", FASTCALL(move), METH_FASTCALL, NULL},
+    {"put", FASTCALL(put), METH_FASTCALL, NULL},
+    {"put_many", FASTCALL(put_many), METH_FASTCALL, NULL},
     {"remove", remove_key, METH_O, NULL},
     {"position", position_of_key, METH_O, NULL},
     {"cell", cell_of_key, METH_O, NULL},
     {"cell_of", cell_of_position, METH_O, NULL},
     {"any_within", FASTCALL(any_within), METH_FASTCALL, NULL},
-    {"near", FASTCALL(near), METH_FASTCALL, NULL},
     {"within", FASTCALL(within), METH_FASTCALL, NULL},
     {"within_many", FASTCALL(within_many), METH_FASTCALL, NULL},
-    {"insert_many", FASTCALL(insert_many), METH_FASTCALL, NULL},
-    {"move_many", FASTCALL(move_many), METH_FASTCALL, NULL},
     {"remove_many", FASTCALL(remove_many), METH_FASTCALL, NULL},
     {"keys", FASTCALL(next_keys), METH_FASTCALL, NULL},
     {"positions", positions_of_keys, METH_O, NULL},
@@ -796,7 +750,6 @@ static PyMethodDef methods[] = {
     {"shrink_to_fit", shrink, METH_NOARGS, NULL},
     {"copy", copy, METH_NOARGS, NULL},
     {"look", look, METH_NOARGS, NULL},
-    {"changes", changes, METH_NOARGS, NULL},
     {NULL, NULL, 0, NULL},
 };
 
@@ -858,10 +811,9 @@ hs_py_dynamic_new(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     options.ndim = (int)PyLong_AsLong(arguments[0]);
     options.storage = (hs_storage)PyLong_AsLong(arguments[4]);
     options.inclusive = PyObject_IsTrue(arguments[6]) == 1;
-    if (PyErr_Occurred() ||
-        !hs_real_of(arguments[1], "cell_size must be a number", &options.cell_size) ||
-        !hs_real_of(arguments[5], "max_radius must be a number", &options.max_radius) ||
-        !hs_repeats_of(arguments[3], &repeats) ||
+    options.cell_size = PyFloat_AsDouble(arguments[1]);
+    options.max_radius = PyFloat_AsDouble(arguments[5]);
+    if (PyErr_Occurred() || !hs_repeats_of(arguments[3], &repeats) ||
         !hs_box_of(arguments[2], repeats, options.ndim, &box, &given)) {
         return NULL;
     }

@@ -8,7 +8,6 @@
 
 /* What the module keeps as its state, by number: types, and what halfshell makes known. */
 enum {
-    HS_STREAM_TYPE,
     HS_DYNAMIC_TYPE,
     HS_BOX_TYPE,
     HS_POINTS_TYPE,
@@ -18,8 +17,7 @@ enum {
     HS_TYPES
 };
 
-/* The types of the first two; a new reference or NULL. */
-PyObject *hs_py_stream_type(PyObject *module);
+/* The first of them; a new reference or NULL. */
 PyObject *hs_py_dynamic_type(PyObject *module);
 
 /* Adds _C_API to the module; -1 with an exception set. */
@@ -28,12 +26,14 @@ int hs_py_add_capi(PyObject *module);
 /* functions.c */
 
 /*
- * quick(name) -> attempt, for a function of the table that users call. attempt(arguments, options)
- * returns what that function returns for a tuple and a dict of arguments as users give them. They
- * are converted here, without a line of Python; NotImplemented, and no exception, where an argument
- * needs more than that, or is wrong in a way that _convert/ has words for.
+ * quick(name, names, positional, defaults) -> attempt, for a function of the table that users call,
+ * with the names of its arguments in order, how many may be positional, and what those are that may
+ * be left out. attempt(arguments, options) returns what that function returns for a tuple and a
+ * dict of arguments as users give them. They are converted here, without a line of Python;
+ * NotImplemented, and no exception, where an argument needs more than that, is wrong, or is one
+ * that only Python knows and not its default.
  */
-PyObject *hs_py_quick(PyObject *module, PyObject *name);
+PyObject *hs_py_quick(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 
 /* scene(points, box, periodic) -> the same as (points, rows of the box or None, bits); or
  * NotImplemented. */
@@ -46,9 +46,8 @@ int hs_py_add_functions(PyObject *module);
  * and "settings", a context variable with its usual value. */
 PyObject *hs_py_know(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 
-/* table() -> the arguments of each function that users call, by its name: of each argument its
- * name, what it is where it is left out, as Python writes it, or None, and whether it is
- * positional. */
+/* table() -> the arguments of each function, by its name: of each argument its name, and whether it
+ * may be left out with all that follow. */
 PyObject *hs_py_table(PyObject *module, PyObject *ignored);
 
 /* py_searches.c */
@@ -58,6 +57,9 @@ hs_py_search hs_py_pairs, hs_py_count_pairs, hs_py_pairs_between, hs_py_neighbor
 
 /* py_streams.c */
 hs_py_search hs_py_iter_pairs, hs_py_for_each_pair;
+/* The first of what iter_pairs returns, in one call at a time, and what is told of the progress, or
+ * None -> arrays as from pairs; None after the last. */
+PyObject *hs_py_next_block(PyObject *module, PyObject *const *arguments, Py_ssize_t n);
 
 /* py_cells.c */
 hs_py_search hs_py_cells_build, hs_py_cells_candidates, hs_py_verlet_update, hs_py_verlet_pairs;

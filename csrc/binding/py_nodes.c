@@ -118,7 +118,7 @@ has_shifts(const hs_pairs *pairs)
 static PyObject *
 rows_of(hs_pairs *rows, int ndim)
 {
-    return hs_table_of(rows, has_shifts(rows) ? "jS" : "j", ndim, 4);
+    return hs_arrays_of(rows, has_shifts(rows) ? "jS" : "j", ndim, 4, true);
 }
 
 /* Nodes and lists of pairs. */
@@ -127,8 +127,9 @@ pairs_of(hs_connectivity *made, int ndim)
 {
     hs_pairs *const nodes = hs_connectivity_pairs(made);
     PyObject       *of_nodes =
-        hs_read_only(hs_arrays_of(nodes, has_shifts(nodes) ? "ijS" : "ij", ndim, 4));
-    PyObject *of_lists = hs_read_only(hs_arrays_of(hs_connectivity_lists(made), "ij", ndim, 4));
+        hs_read_only(hs_arrays_of(nodes, has_shifts(nodes) ? "ijS" : "ij", ndim, 4, false));
+    PyObject *of_lists =
+        hs_read_only(hs_arrays_of(hs_connectivity_lists(made), "ij", ndim, 4, false));
     if (of_nodes == NULL || of_lists == NULL) {
         Py_XDECREF(of_nodes);
         Py_XDECREF(of_lists);
@@ -249,71 +250,54 @@ hs_py_intersect(hs_py_call *call)
     return give_rows(call, status, result, half.ndim);
 }
 
-/* A new array, or an exception for a status other than HS_OK; takes the reference. */
+/* points and two of their kind -> a bool for each of whether its foot is between these, or a key on
+ * the Z curve through their box. */
 static PyObject *
-checked(PyObject *array, hs_status status, const hs_failure *failure)
-{
-    if (status == HS_OK) {
-        return array;
-    }
-    Py_DECREF(array);
-    return hs_raise(status, failure, NULL);
-}
-
-/* points and two of their kind, and a new array of so many entries; NULL with an exception set. */
-static PyObject *
-take_three(PyObject *const *arguments, Py_ssize_t n_arguments, const char *name, int type,
-           hs_points *points, const double *two[2])
-{
-    if (!hs_expect_arguments(name, n_arguments, 3) ||
-        !hs_points_of(arguments[0], "points", points)) {
-        return NULL;
-    }
-    for (int k = 0; k < 2; k++) {
-        two[k] = entries_of(arguments[k + 1], NPY_DOUBLE, points->ndim, NULL);
-        if (two[k] == NULL) {
-            return NULL;
-        }
-    }
-    npy_intp n = (npy_intp)points->n;
-    return PyArray_SimpleNew(1, &n, type);
-}
-
-/* points, p, q -> whether the foot of each is between them. */
-PyObject *
-hs_py_feet_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
-{
-    hs_points     points;
-    hs_failure    failure;
-    const double *ends[2];
-    (void)module;
-    PyObject *array = take_three(arguments, n_arguments, "feet_between", NPY_BOOL, &points, ends);
-    if (array == NULL) {
-        return NULL;
-    }
-    const hs_status status =
-        hs_feet_between(&points, ends[0], ends[1], PyArray_DATA((PyArrayObject *)array), &failure);
-    return checked(array, status, &failure);
-}
-
-/* points, low, high -> uint64 keys. */
-PyObject *
-hs_py_morton_keys(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+of_each_point(PyObject *const *arguments, Py_ssize_t n_arguments, const char *name, bool keys)
 {
     hs_points     points;
     hs_failure    failure;
     hs_status     status;
-    const double *range[2];
-    (void)module;
-    PyObject *array = take_three(arguments, n_arguments, "morton_keys", NPY_UINT64, &points, range);
+    const double *two[2];
+    if (!hs_expect_arguments(name, n_arguments, 3) ||
+        !hs_points_of(arguments[0], "points", &points)) {
+        return NULL;
+    }
+    for (int k = 0; k < 2; k++) {
+        two[k] = entries_of(arguments[k + 1], NPY_DOUBLE, points.ndim, NULL);
+        if (two[k] == NULL) {
+            return NULL;
+        }
+    }
+    npy_intp  n = (npy_intp)points.n;
+    PyObject *array = PyArray_SimpleNew(1, &n, keys ? NPY_UINT64 : NPY_BOOL);
     if (array == NULL) {
         return NULL;
     }
-    uint64_t *keys = PyArray_DATA((PyArrayObject *)array);
+    void *data = PyArray_DATA((PyArrayObject *)array);
     Py_BEGIN_ALLOW_THREADS
-    status = hs_morton_keys(&points, range[0], range[1], keys, &failure);
+    status = keys ? hs_morton_keys(&points, two[0], two[1], data, &failure)
+                  : hs_feet_between(&points, two[0], two[1], data, &failure);
     Py_END_ALLOW_THREADS
-    return checked(array, status, &failure);
+    if (status != HS_OK) {
+        Py_DECREF(array);
+        return hs_raise(status, &failure, NULL);
+    }
+    return array;
+}
+
+PyObject *
+hs_py_feet_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    (void)module;
+    return of_each_point(arguments, n_arguments, "feet_between", false);
+}
+
+PyObject *
+hs_py_morton_keys(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    (void)module;
+    return of_each_point(arguments, n_arguments, "morton_keys", true);
 }
 
 PyObject *

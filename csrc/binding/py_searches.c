@@ -13,32 +13,34 @@
 
 /* ---- pairs and rows ----------------------------------------------------------------------- */
 
+typedef hs_status find_fn(const hs_among *among, const hs_options *options, hs_pairs **found,
+                          hs_failure *failure);
+
+static PyObject *
+find(hs_py_call *call, find_fn *find_all, bool is_table)
+{
+    hs_pairs *found = NULL;
+    hs_py_call_release(call);
+    const hs_status status = find_all(&call->among, &call->options, &found, &call->failure);
+    return hs_py_call_pairs(call, status, found, is_table);
+}
+
 PyObject *
 hs_py_pairs(hs_py_call *call)
 {
-    hs_pairs *pairs = NULL;
-    hs_py_call_release(call);
-    const hs_status status = hs_pairs_find(&call->among, &call->options, &pairs, &call->failure);
-    return hs_py_call_pairs(call, status, pairs);
+    return find(call, hs_pairs_find, false);
 }
 
 PyObject *
 hs_py_pairs_between(hs_py_call *call)
 {
-    hs_pairs *pairs = NULL;
-    hs_py_call_release(call);
-    const hs_status status =
-        hs_neighbors_find(&call->among, &call->options, &pairs, &call->failure);
-    return hs_py_call_pairs(call, status, pairs);
+    return find(call, hs_neighbors_find, false);
 }
 
 PyObject *
 hs_py_neighbors(hs_py_call *call)
 {
-    hs_pairs *rows = NULL;
-    hs_py_call_release(call);
-    const hs_status status = hs_neighbors_find(&call->among, &call->options, &rows, &call->failure);
-    return hs_py_call_table(call, status, rows);
+    return find(call, hs_neighbors_find, true);
 }
 
 /* Rows have k entries: what they need is known, and fewer would do. */
@@ -73,36 +75,20 @@ hs_py_nearest(hs_py_call *call)
         hs_nearest_find(&call->among, call->integer, &call->options, &rows, &call->failure);
     hs_py_call_acquire(call);
     return status == HS_ERR_MEMORY ? raise_memory_of_rows(&call->failure)
-                                   : hs_py_call_pairs(call, status, rows);
+                                   : hs_py_call_pairs(call, status, rows, false);
 }
 
 /* ---- counts ------------------------------------------------------------------------------- */
 
-/* The results of systems that have points stand one behind the other, of so many bytes each: moves
- * each to the place of its number, the last one first. The rest are zeros. */
-static void
-spread(const hs_batch *batch, char *results, size_t bytes)
-{
-    for (int64_t s = batch->n - 1; s >= 0; s--) {
-        const size_t from = (size_t)s * bytes, to = (size_t)batch->number[s] * bytes;
-        if (to != from) {
-            memcpy(results + to, results + from, bytes);
-            memset(results + from, 0, bytes);
-        }
-    }
-}
-
-/* What the core has filled, of so many bytes for each system, or has failed to; takes the
- * reference. */
+/* What the core has filled, or has failed to; takes the reference. */
 static PyObject *
-filled(hs_py_call *call, hs_status status, PyObject *array, size_t bytes)
+filled(hs_py_call *call, hs_status status, PyObject *array)
 {
     hs_py_call_acquire(call);
     if (status != HS_OK) {
         Py_DECREF(array);
         return hs_py_call_raise(call, status);
     }
-    spread(&call->batch, PyArray_DATA((PyArrayObject *)array), bytes);
     return array;
 }
 
@@ -110,22 +96,21 @@ filled(hs_py_call *call, hs_status status, PyObject *array, size_t bytes)
 PyObject *
 hs_py_count_pairs(hs_py_call *call)
 {
-    int64_t   n = 0;
-    PyObject *counts = NULL;
-    if (call->batch.is_given) {
-        counts = hs_batch_zeros(&call->batch, 0, NULL, NPY_INT64);
-        if (counts == NULL) {
-            return NULL;
-        }
+    const bool is_batch = call->among.each != NULL;
+    npy_intp   n_systems = (npy_intp)call->points.n_systems;
+    int64_t    n = 0;
+    PyObject  *counts = is_batch ? PyArray_ZEROS(1, &n_systems, NPY_INT64, 0) : NULL;
+    if (is_batch && counts == NULL) {
+        return NULL;
     }
     hs_py_call_release(call);
-    const hs_status status =
-        hs_pairs_count(&call->among, &call->options,
-                       counts != NULL ? PyArray_DATA((PyArrayObject *)counts) : &n, &call->failure);
-    hs_py_call_acquire(call);
-    if (counts != NULL) {
-        return filled(call, status, counts, sizeof n);
+    const hs_status status = hs_pairs_count(&call->among, &call->options,
+                                            is_batch ? PyArray_DATA((PyArrayObject *)counts) : &n,
+                                            &call->failure);
+    if (is_batch) {
+        return filled(call, status, counts);
     }
+    hs_py_call_acquire(call);
     return status == HS_OK ? PyLong_FromLongLong(n) : hs_py_call_raise(call, status);
 }
 
@@ -141,12 +126,7 @@ hs_py_coordination(hs_py_call *call)
     hs_py_call_release(call);
     const hs_status status = hs_neighbors_count(
         &call->among, &call->options, PyArray_DATA((PyArrayObject *)counts), &call->failure);
-    hs_py_call_acquire(call);
-    if (status != HS_OK) {
-        Py_DECREF(counts);
-        return hs_py_call_raise(call, status);
-    }
-    return counts;
+    return filled(call, status, counts);
 }
 
 /* ---- pairs by distance -------------------------------------------------------------------- */
@@ -168,14 +148,15 @@ hs_py_histogram(hs_py_call *call)
         return NULL;
     }
     const npy_intp n = (npy_intp)call->integer;
-    npy_intp       shape[3] = {n, n, (npy_intp)hs_length_of(call->own[0])};
-    PyObject      *array = call->batch.is_given ? hs_batch_zeros(&call->batch, 3, shape, type)
-                                                : PyArray_ZEROS(3, shape, type, 0);
+    const npy_intp n_edges = (npy_intp)hs_length_of(call->own[0]);
+    npy_intp       shape[4] = {(npy_intp)call->points.n_systems, n, n, n_edges};
+    const int      is_one = call->among.each == NULL;
+    PyObject      *array = PyArray_ZEROS(4 - is_one, shape + is_one, type, 0);
     if (array == NULL) {
         return NULL;
     }
     void              *data = PyArray_DATA((PyArrayObject *)array);
-    const hs_histogram wanted = {.n_edges = shape[2],
+    const hs_histogram wanted = {.n_edges = n_edges,
                                  .edges = edges,
                                  .inclusive = call->options.inclusive,
                                  .last_inclusive = call->flag,
@@ -185,7 +166,7 @@ hs_py_histogram(hs_py_call *call)
     hs_py_call_release(call);
     const hs_status status =
         hs_pairs_histogram(&call->among, &call->options, &wanted, &call->failure);
-    return filled(call, status, array, (size_t)(n * n * shape[2]) * sizeof(int64_t));
+    return filled(call, status, array);
 }
 
 /* ---- clusters ----------------------------------------------------------------------------- */
@@ -290,7 +271,8 @@ hs_py_measure(hs_py_call *call)
     const hs_status status = hs_measure(&call->points.at, call->among.box, &pairs, &call->options,
                                         &measured, &call->failure);
     hs_py_call_acquire(call);
-    return status != HS_OK ? raise_of_pair(status, call) : hs_py_call_pairs(call, status, measured);
+    return status != HS_OK ? raise_of_pair(status, call)
+                           : hs_py_call_pairs(call, status, measured, false);
 }
 
 /* ---- what would be done, and what was done ------------------------------------------------ */

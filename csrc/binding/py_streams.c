@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* py_streams.c: pairs that are never stored all at once: _core.iter_pairs and the type of the
- * iterators that it returns; _core.for_each_pair, which calls a function of C or of Python. */
+/* py_streams.c: pairs that are never stored all at once: _core.iter_pairs, and the next block of
+ * what it returns; _core.for_each_pair, which calls a function of C or of Python. */
 #include "py_functions.h"
 
 #include "errors.h"
@@ -11,48 +11,23 @@
 
 /* ---- blocks ------------------------------------------------------------------------------- */
 
-/* Owns the stream, and references to the cells that it borrows from and to the progress hook. */
+/* Owns the stream, and a reference to the cells that it borrows from. */
 typedef struct pair_stream {
-    PyObject_HEAD
     hs_stream *stream;     /* NULL after the last block */
-    PyObject  *cells;      /* or NULL; as long as there is a stream */
+    PyObject  *cells;      /* or NULL */
     hs_py_call call;       /* points: their number only */
-    PyObject  *progress;   /* or NULL */
     char       letters[8]; /* of the quantities */
-    bool       is_running; /* a thread is in a call of the core */
 } pair_stream;
 
-/* Marks it as running; false with an exception set when it is already: a hook that calls for
- * the next block, or another thread. */
-static bool
-enter(pair_stream *self)
-{
-    bool is_free;
-    Py_BEGIN_CRITICAL_SECTION(self);
-    is_free = !self->is_running;
-    self->is_running = true;
-    Py_END_CRITICAL_SECTION();
-    if (!is_free) {
-        PyErr_SetString(PyExc_ValueError, "iter_pairs is already looking for the next block");
-    }
-    return is_free;
-}
+#define STREAM "halfshell._core.stream"
 
 static void
-leave(pair_stream *self)
+free_stream(PyObject *capsule)
 {
-    Py_BEGIN_CRITICAL_SECTION(self);
-    self->is_running = false;
-    Py_END_CRITICAL_SECTION();
-}
-
-/* Gives back all memory: no block follows. */
-static void
-end(pair_stream *self)
-{
+    pair_stream *self = PyCapsule_GetPointer(capsule, STREAM);
     hs_stream_free(self->stream);
-    self->stream = NULL;
-    Py_CLEAR(self->cells);
+    Py_XDECREF(self->cells);
+    PyMem_Free(self);
 }
 
 static PyObject *
@@ -68,119 +43,47 @@ raise_block_too_large(const pair_stream *self, const hs_failure *failure)
     return NULL;
 }
 
-/* While it is marked as running: the next block, or NULL, with an exception unless it is over. */
-static PyObject *
-next_block(pair_stream *self)
+PyObject *
+hs_py_next_block(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     hs_pairs *block = NULL;
-    if (self->stream == NULL || PyErr_CheckSignals() != 0) {
+    (void)module;
+    pair_stream *self = hs_expect_arguments("next_block", n_arguments, 2)
+                            ? PyCapsule_GetPointer(arguments[0], STREAM)
+                            : NULL;
+    if (self == NULL || PyErr_CheckSignals() != 0) {
         return NULL;
     }
-    hs_py_call_release(&self->call);
-    const hs_status status = hs_stream_next(self->stream, self->call.options.poll,
-                                            self->call.options.poll_context, &block,
-                                            &self->call.failure);
-    hs_py_call_acquire(&self->call);
-    if (status == HS_ERR_MEMORY) {
-        return raise_block_too_large(self, &self->call.failure);
+    if (self->stream == NULL) {
+        Py_RETURN_NONE;
     }
-    PyObject *arrays =
-        status == HS_OK && block == NULL ? NULL : hs_py_call_pairs(&self->call, status, block);
-    if (status == HS_OK && arrays == NULL) { /* the last one, or one that is lost */
-        end(self);                           /* nothing may follow it */
+    hs_py_call *call = &self->call;
+    call->progress = arguments[1] != Py_None ? arguments[1] : NULL;
+    hs_py_call_release(call);
+    const hs_status status =
+        hs_stream_next(self->stream, call->options.poll, call, &block, &call->failure);
+    hs_py_call_acquire(call);
+    if (status == HS_ERR_MEMORY) {
+        return raise_block_too_large(self, &call->failure);
+    }
+    if (status == HS_OK && block == NULL) {
+        Py_RETURN_NONE;
+    }
+    PyObject *arrays = hs_py_call_pairs(call, status, block, false);
+    if (status == HS_OK && arrays == NULL) { /* nothing may follow one that is lost */
+        hs_stream_free(self->stream);
+        self->stream = NULL;
     }
     return arrays;
-}
-
-static PyObject *
-stream_next(PyObject *object)
-{
-    pair_stream *self = (pair_stream *)object;
-    if (!enter(self)) {
-        return NULL;
-    }
-    PyObject *block = next_block(self);
-    leave(self);
-    return block;
-}
-
-static PyObject *
-stream_close(PyObject *object, PyObject *ignored)
-{
-    pair_stream *self = (pair_stream *)object;
-    (void)ignored;
-    if (!enter(self)) {
-        return NULL;
-    }
-    end(self);
-    leave(self);
-    Py_RETURN_NONE;
-}
-
-static int
-stream_traverse(PyObject *object, visitproc visit, void *arg)
-{
-    Py_VISIT(Py_TYPE(object));
-    Py_VISIT(((pair_stream *)object)->progress);
-    return 0;
-}
-
-static int
-stream_clear(PyObject *object)
-{
-    pair_stream *self = (pair_stream *)object;
-    self->call.progress = NULL;
-    Py_CLEAR(self->progress);
-    return 0;
-}
-
-static void
-stream_dealloc(PyObject *object)
-{
-    PyTypeObject *type = Py_TYPE(object);
-    PyObject_GC_UnTrack(object);
-    end((pair_stream *)object);
-    (void)stream_clear(object);
-    type->tp_free(object);
-    Py_DECREF(type);
-}
-
-static PyMethodDef stream_methods[] = {
-    {"close", stream_close, METH_NOARGS, "Give back all memory; no block follows."},
-    {NULL, NULL, 0, NULL},
-};
-
-static PyType_Slot stream_slots[] = {
-    {Py_tp_doc, "Blocks of pairs; see halfshell.iter_pairs."},
-    {Py_tp_iter, PyObject_SelfIter},
-    {Py_tp_iternext, stream_next},
-    {Py_tp_methods, stream_methods},
-    {Py_tp_traverse, stream_traverse},
-    {Py_tp_clear, stream_clear},
-    {Py_tp_dealloc, stream_dealloc},
-    {0, NULL},
-};
-
-static PyType_Spec stream_spec = {
-    .name = "halfshell._core.PairBlocks",
-    .basicsize = sizeof(pair_stream),
-    .flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_GC | Py_TPFLAGS_DISALLOW_INSTANTIATION |
-             Py_TPFLAGS_IMMUTABLETYPE,
-    .slots = stream_slots,
-};
-
-PyObject *
-hs_py_stream_type(PyObject *module)
-{
-    return PyType_FromModuleAndSpec(module, &stream_spec, NULL);
 }
 
 PyObject *
 hs_py_iter_pairs(hs_py_call *call)
 {
-    PyTypeObject *type = ((PyTypeObject **)PyModule_GetState(call->module))[HS_STREAM_TYPE];
-    pair_stream  *self = (pair_stream *)type->tp_alloc(type, 0); /* zeros */
-    if (self == NULL) {
+    pair_stream *self = PyMem_Calloc(1, sizeof *self);
+    PyObject *capsule = self != NULL ? PyCapsule_New(self, STREAM, free_stream) : PyErr_NoMemory();
+    if (capsule == NULL) {
+        PyMem_Free(self);
         return NULL;
     }
     hs_py_call_release(call);
@@ -188,20 +91,17 @@ hs_py_iter_pairs(hs_py_call *call)
         hs_stream_open(&call->among, &call->options, call->integer, &self->stream, &call->failure);
     hs_py_call_acquire(call);
     if (status != HS_OK) {
-        Py_DECREF(self);
+        Py_DECREF(capsule);
         return hs_py_call_raise(call, status);
     }
     self->call = *call;
-    self->call.n_made = 0; /* what is made, points and systems, are the caller's again */
-    self->call.batch = (hs_batch){.is_given = call->batch.is_given, .are_all = call->batch.are_all};
+    self->call.n_made = 0; /* what is made is the caller's again */
     self->call.points.at.data = NULL;
     self->call.options.kernel = NULL;
-    self->call.options.poll_context = &self->call;
     strcpy(self->letters, call->letters); /* seven different ones at most */
     self->call.letters = self->letters;
-    self->progress = Py_XNewRef(call->progress);
     self->cells = call->among.cells != NULL ? Py_NewRef(call->positions) : NULL;
-    return (PyObject *)self;
+    return Py_BuildValue("(NO)", capsule, call->progress != NULL ? call->progress : Py_None);
 }
 
 /* ---- functions that are called ------------------------------------------------------------ */

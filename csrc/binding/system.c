@@ -163,31 +163,22 @@ left_in_groups(const hierarchy *version, const char *root, const char *place, co
     }
 }
 
-/* The text up to the next separator, which is cut off. */
-static char *
-next_field(char **rest, const char *separators)
-{
-    char *field = *rest;
-    *rest += strcspn(field, separators);
-    if (**rest != '\0') {
-        *(*rest)++ = '\0';
-    }
-    return field;
-}
-
 /* Whether a list such as "rw,cpu,memory" has this name. */
 static bool
-has_name(char *list, const char *name)
+has_name(const char *list, const char *name)
 {
-    while (*list != '\0') {
-        if (strcmp(next_field(&list, ","), name) == 0) {
-            return true;
+    const size_t n = strlen(name);
+    while (strncmp(list, name, n) != 0 || (list[n] != ',' && list[n] != '\0')) {
+        list = strchr(list, ',');
+        if (list++ == NULL) {
+            return false;
         }
     }
-    return false;
+    return true;
 }
 
-/* The group of this process in the hierarchy that limits memory; false if there is none. */
+/* The group of this process in the hierarchy that limits memory, of a line "4:cpu,memory:GROUP", or
+ * "0::GROUP" in version 2; false if there is none. */
 static bool
 find_group(const hierarchy *version, const char *root, char *group)
 {
@@ -199,13 +190,12 @@ find_group(const hierarchy *version, const char *root, char *group)
         return false;
     }
     while (!is_found && fgets(line, sizeof line, file) != NULL) {
-        char       *rest = line;
-        const char *number = next_field(&rest, ":\n");
-        char       *controllers = next_field(&rest, ":\n");
-        const char *path = next_field(&rest, "\n");
-        is_found = version == &VERSIONS[0] ? strcmp(number, "0") == 0 && *controllers == '\0'
-                                           : has_name(controllers, "memory");
-        if (is_found) {
+        char *names = strchr(line, ':'), *path = names != NULL ? strchr(names + 1, ':') : NULL;
+        if (path != NULL) {
+            *path++ = '\0';
+            path[strcspn(path, "\n")] = '\0';
+            is_found = version == &VERSIONS[0] ? strcmp(line, "0:") == 0
+                                               : has_name(names + 1, "memory");
             snprintf(group, PATH, "%.*s", PATH - 1, path);
         }
     }
@@ -232,31 +222,24 @@ unescape(char *text)
 /* A line "31 23 0:28 TOP PLACE rw shared:1 - TYPE SOURCE OPTIONS" of mountinfo, of this version and
  * with memory? Version 2 does not tell: its groups have the files or not. */
 static bool
-is_mount_of(const hierarchy *version, char *line, char **top, char **place)
+is_mount_of(const hierarchy *version, const char *line, char *top, char *place)
 {
-    char *rest = line;
-    for (int k = 0; k < 3; k++) {
-        (void)next_field(&rest, " \n");
-    }
-    *top = next_field(&rest, " \n");
-    *place = next_field(&rest, " \n");
-    rest = strstr(rest, " - "); /* an option of the mount may end in a dash */
-    if (rest == NULL) {
+    char        type[64], options[LINE];
+    const char *end = strstr(line, " - ");
+    if (end == NULL || sscanf(line, "%*s %*s %*s %4095s %4095s", top, place) != 2 ||
+        sscanf(end, " - %63s %*s %8191s", type, options) != 2) {
         return false;
     }
-    rest += 3;
-    const char *type = next_field(&rest, " \n");
-    (void)next_field(&rest, " \n");
-    unescape(*top);
-    unescape(*place);
+    unescape(top);
+    unescape(place);
     return strcmp(type, version->type) == 0 &&
-           (version == &VERSIONS[0] || has_name(next_field(&rest, " \n"), "memory"));
+           (version == &VERSIONS[0] || has_name(options, "memory"));
 }
 
 static double
 left_in_version(const hierarchy *version, const char *root)
 {
-    char   line[LINE], group[PATH], *top, *place;
+    char   line[LINE], group[PATH], top[PATH], place[PATH];
     double left = INFINITY;
     if (!find_group(version, root, group)) {
         return INFINITY;
@@ -267,7 +250,7 @@ left_in_version(const hierarchy *version, const char *root)
         return left_in_groups(version, root, version->place, "/", group);
     }
     while (fgets(line, sizeof line, file) != NULL) {
-        if (is_mount_of(version, line, &top, &place)) {
+        if (is_mount_of(version, line, top, place)) {
             left = fmin(left, left_in_groups(version, root, place, top, group));
         }
     }

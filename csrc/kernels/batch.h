@@ -51,7 +51,7 @@ void hs_decide_batch_baseline(const hs_metric *metric, const hs_batch *batch, ui
 void hs_measure_baseline(const hs_metric *metric, const hs_batch *batch, double *distance,
                          double *const *vector, uint8_t *done);
 
-/* batch_avx2.c, batch_avx512.c: x86-64 only. */
+/* wide_avx2.c, wide_avx512.c: x86-64 only. */
 void hs_decide_batch_avx2(const hs_metric *metric, const hs_batch *batch, uint8_t *verdict,
                           hs_stages *stages);
 void hs_measure_avx2(const hs_metric *metric, const hs_batch *batch, double *distance,

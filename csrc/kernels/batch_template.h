@@ -190,48 +190,40 @@ decide_loop(const hs_metric *metric, const hs_batch *batch, const int ndim, cons
     }
 }
 
-/* |D| and D of the pairs from e on; returns as bits which of them are done. */
-HS_ALWAYS_INLINE unsigned
-measure_group(const hs_metric *metric, const hs_batch *batch, int32_t e, const int ndim,
-              const bool shifted, double *distance, double *const *vector)
-{
-    const reals zero = broadcast(0.0);
-    reals       largest = zero, smallest = broadcast(SAFE_LARGE); /* of those that are not zero */
-    moves       moving;
-    differences d;
-    dwords      square = {zero, zero};
-    find_moves(&moving, metric, batch, e, shifted);
-    find_differences(&d, metric, batch, e, &moving, ndim, shifted, false);
-    for (int k = 0; k < ndim; k++) {
-        const dwords component = d.component[k];
-        const reals  size = magnitude(component.hi);
-        const dwords term = dw_square(component);
-        largest = larger(size, largest);
-        smallest = smaller(choose(is_equal(size, zero), smallest, size), smallest);
-        square = k == 0 ? term : dw_add(square, term);
-        if (vector != NULL) {
-            store(vector[k] + e, component.hi);
-        }
-    }
-    const truth none = is_equal(largest, zero);
-    const reals length = choose(none, zero, dw_sqrt(square));
-    /* With nothing smaller than this every error-free product is one, fused or not. */
-    truth done = both(is_at_least(smallest, broadcast(SAFE_SMALL)),
-                      is_at_least(broadcast(SAFE_LARGE), largest));
-    if (shifted) {
-        const reals shorter = subtract(length, multiply(broadcast(2.0), d.error));
-        done = both(both(done, d.usable), is_equal(shorter, length));
-    }
-    store(distance + e, length);
-    return bits(done);
-}
-
 HS_ALWAYS_INLINE void
 measure_loop(const hs_metric *metric, const hs_batch *batch, const int ndim, const bool shifted,
              double *distance, double *const *vector, uint8_t *done)
 {
+    const reals zero = broadcast(0.0);
     for (int32_t e = 0; e < batch->n; e += LANES) {
-        put_bytes(done + e, measure_group(metric, batch, e, ndim, shifted, distance, vector), 0);
+        reals       largest = zero, smallest = broadcast(SAFE_LARGE); /* of those not zero */
+        moves       moving;
+        differences d;
+        dwords      square = {zero, zero};
+        find_moves(&moving, metric, batch, e, shifted);
+        find_differences(&d, metric, batch, e, &moving, ndim, shifted, false);
+        for (int k = 0; k < ndim; k++) {
+            const dwords component = d.component[k];
+            const reals  size = magnitude(component.hi);
+            const dwords term = dw_square(component);
+            largest = larger(size, largest);
+            smallest = smaller(choose(is_equal(size, zero), smallest, size), smallest);
+            square = k == 0 ? term : dw_add(square, term);
+            if (vector != NULL) {
+                store(vector[k] + e, component.hi);
+            }
+        }
+        const truth none = is_equal(largest, zero);
+        const reals length = choose(none, zero, dw_sqrt(square));
+        /* With nothing smaller than this every error-free product is one, fused or not. */
+        truth sure = both(is_at_least(smallest, broadcast(SAFE_SMALL)),
+                          is_at_least(broadcast(SAFE_LARGE), largest));
+        if (shifted) {
+            const reals shorter = subtract(length, multiply(broadcast(2.0), d.error));
+            sure = both(both(sure, d.usable), is_equal(shorter, length));
+        }
+        store(distance + e, length);
+        put_bytes(done + e, bits(sure), 0);
     }
 }
 

@@ -2,8 +2,15 @@
 /*
  * copy_template.h: the vector loops that bring candidates in and pairs out, once for each
  * instruction set. Include it after a vocabulary (simd_<isa>.h), inside that instruction set's
- * target region. Defines gather (hs_gather_fn), emit_int32 and emit_int64 (hs_emit_fn).
+ * target region. Defines gather (hs_gather_fn) and emit (hs_emit_fn).
  */
+
+/* |a| as integers that order like the numbers. */
+HS_ALWAYS_INLINE integers
+magnitudes(floats a)
+{
+    return bits_in_both(bits_of(a), broadcast_integer(0x7fffffff));
+}
 
 /* Largest magnitude of n floats. */
 HS_ALWAYS_INLINE integers
@@ -29,7 +36,7 @@ gather_lanes(const hs_gather *gather, const hs_run *run, int64_t si, const int n
     gathered these;
     these.norm = broadcast(0.0f);
     for (int k = 0; k < ndim; k++) {
-        these.y[k] = load_moved(gather->x[k] + si, run->moved[k]);
+        these.y[k] = load_relative(gather->x[k] + si, run->moved[k], 0.0, 1.0);
         these.norm = multiply_add(these.y[k], these.y[k], these.norm);
     }
     these.id = load_integers(gather->order + si);
@@ -155,7 +162,7 @@ put(void *column, int32_t at, integers entries, const bool wide)
 }
 
 HS_ALWAYS_INLINE void
-emit(const hs_hits *hits, void *i, void *j, const bool wide)
+emit_columns(const hs_hits *hits, void *i, void *j, const bool wide)
 {
     int32_t h = 0;
     for (int32_t t = 0; t < hits->n; t++) {
@@ -175,25 +182,11 @@ emit(const hs_hits *hits, void *i, void *j, const bool wide)
 }
 
 static void
-emit_int32(const hs_hits *hits, void *i, void *j)
+emit(const hs_hits *hits, int index_bytes, void *i, void *j)
 {
-    if (i != NULL && j != NULL) {
-        emit(hits, i, j, false);
-    } else if (i != NULL) {
-        emit(hits, i, NULL, false);
+    if (index_bytes == 8) {
+        emit_columns(hits, i, j, true);
     } else {
-        emit(hits, NULL, j, false);
-    }
-}
-
-static void
-emit_int64(const hs_hits *hits, void *i, void *j)
-{
-    if (i != NULL && j != NULL) {
-        emit(hits, i, j, true);
-    } else if (i != NULL) {
-        emit(hits, i, NULL, true);
-    } else {
-        emit(hits, NULL, j, true);
+        emit_columns(hits, i, j, false);
     }
 }

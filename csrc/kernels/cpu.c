@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* cpu.c: a feature counts when cpuid reports it and xgetbv shows that the operating system saves
  * its registers. */
-#include "cpu.h"
-
 #include "target.h"
 
 #if HS_X86_64
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #if defined(_MSC_VER)
@@ -16,7 +15,7 @@
 #include <cpuid.h>
 #endif
 
-enum { DETECTED = 1, HAS_AVX2 = 2, HAS_AVX512 = 4 };
+#define DETECTED 4 /* beside the features */
 
 #if defined(_MSC_VER)
 #define ATOMIC_INT volatile long
@@ -78,10 +77,10 @@ detect_features(void)
     int            found = DETECTED;
     if (has_bits(saved, 0x6) && /* xmm, ymm */
         has_bits(cpuid(1).c, fma_popcnt_avx) && has_bits(extended, avx2)) {
-        found |= HAS_AVX2;
+        found |= HS_CPU_AVX2;
         found |= has_bits(saved, 0xe6) && /* and opmask, zmm */
                          has_bits(extended, f_dq_bw_vl)
-                     ? HAS_AVX512
+                     ? HS_CPU_AVX512
                      : 0;
     }
     return found;
@@ -89,8 +88,8 @@ detect_features(void)
 
 /* Found once in a process: in a virtual machine every cpuid calls the host, which takes tens of
  * microseconds. Threads that come here together find and write equal values. */
-static int
-features(void)
+int
+hs_cpu_features(void)
 {
     static ATOMIC_INT known;
     if (known == 0) {
@@ -99,30 +98,6 @@ features(void)
     return (int)known;
 }
 
-bool
-hs_cpu_has_avx2(void)
-{
-    return (features() & HAS_AVX2) != 0;
-}
-
-bool
-hs_cpu_has_avx512(void)
-{
-    return (features() & HAS_AVX512) != 0;
-}
-
 #else
-
-bool
-hs_cpu_has_avx2(void)
-{
-    return false;
-}
-
-bool
-hs_cpu_has_avx512(void)
-{
-    return false;
-}
-
+typedef int hs_cpu_is_for_x86_64; /* a translation unit must not be empty */
 #endif

@@ -3,10 +3,8 @@
  * kernel.h: the contract of the kernels, the inner loops of a search, and the table of them.
  *
  *   gather   copies runs of points to float32, relative to a centre, as far as they are near a box
- *   list     compares the points of a group with gathered candidates in float32 and lists those
- *            that are not surely beyond the cutoff
- *   count    counts them, and lists none
- *   squares  lists them too, with the float32 square of each, and notes none as unsure
+ *   scan     compares the points of a group with gathered candidates in float32 and lists those
+ *            that are not surely beyond the cutoff, or counts them
  *   emit     writes listed hits as pairs, i < j, int32 or int64
  *   write    does so with all that is measured of them
  *   gather_relative   gathers candidates of a search for the nearest
@@ -17,7 +15,7 @@
  * between the two thresholds of filter.h; every such hit is decided again by the caller, so results
  * do not depend on the kernel.
  *
- * Scans come in two forms. With c_k = -2 q_k,
+ * What is compared is, with c_k = -2 q_k,
  *
  *   expanded   s = (...((norm[c] + c_0 y_0) + c_1 y_1) + ...), |y - q|^2 less |q|^2: one fused
  *              multiply-add an axis where there is one, but errors go with the size of the block
@@ -86,13 +84,20 @@ typedef struct hs_unsure {
     int32_t at;    /* its entry of hits; of no meaning when counting */
 } hs_unsure;
 
-/* What a scan compares: s of either form, or of the direct one with a limit for each pair, or of
- * the direct one and of the supports of each pair. */
+/* What a scan compares with what: all but the second are of the direct form. */
 typedef enum hs_scan_form {
     HS_SCAN_DIRECT,
     HS_SCAN_EXPANDED,
+    /* The thresholds of each pair are from scan->limits. */
     HS_SCAN_LIMITS,
-    HS_SCAN_SUPPORTS
+    /* Candidates must not be surely beyond by the rule and the supports either, of which
+     * s = z_0^2 + z_1^2 + ..., z_k = N_k0 (y_0 - q_0) + ..., fused or not, is compared with
+     * thresholds of its own. Unsure are those that are not surely within by both. Up to
+     * HS_SUPPORT_DIM axes only. */
+    HS_SCAN_SUPPORTS,
+    /* Lists, and writes s of each hit, fused or not. Does not look at `in`, and notes none as
+     * unsure. */
+    HS_SCAN_SQUARES
 } hs_scan_form;
 
 /* How the radii of a pair make its limit, for the scans that compare each pair with its own. */
@@ -154,6 +159,8 @@ hs_support_thresholds(hs_limit_form form, float size)
 
 /* Points of a group against a block of candidates; all arrays borrowed. */
 typedef struct hs_scan {
+    hs_scan_form    form;
+    bool            counts; /* and lists none; not of HS_SCAN_SQUARES */
     int             ndim;
     const float    *y[HS_MAX_DIM]; /* candidates, n + HS_PADDING each, those past n of any value */
     const float    *norm;          /* sum of y_k^2, n + HS_PADDING */
@@ -164,11 +171,11 @@ typedef struct hs_scan {
     bool            triangular;    /* point t meets only the candidates after place t */
     hs_thresholds   direct;        /* thresholds of the direct form */
     hs_expanded     expanded;      /* and of the expanded one */
-    hs_limit_scan   limits;        /* for list_limits and count_limits only */
-    hs_support_scan supports;      /* for list_supports and count_supports only */
+    hs_limit_scan   limits;        /* for HS_SCAN_LIMITS only */
+    hs_support_scan supports;      /* for HS_SCAN_SUPPORTS only */
     int32_t        *hits;          /* receives labels; most_hits + HS_PADDING */
     int32_t        *end;           /* receives, for each point, where its hits end; n_points */
-    float          *squares;       /* receives s of each hit, by `squares` alone; as hits */
+    float          *squares;       /* receives s of each hit, of HS_SCAN_SQUARES alone; as hits */
     hs_unsure      *unsure;        /* receives hits with !(s < in); most_unsure */
     int32_t         most_hits;     /* at least n */
     int32_t         most_unsure;   /* at least n */
@@ -182,17 +189,6 @@ typedef struct hs_scan {
  * label[c] for every candidate c with !(s > out), ascending. hits begin at entry 0 with those
  * of point `first`; unsure ones, with !(s < in), are ascending too. NaN counts as a hit and unsure.
  * Counting leaves hits alone; end is as in listing.
- *
- * list_limits and count_limits take the thresholds of each pair from scan->limits, and are of the
- * direct form.
- *
- * list_supports and count_supports list candidates that are not surely beyond by the direct form,
- * nor by the rule and the supports, of which s = z_0^2 + z_1^2 + ..., z_k = N_k0 (y_0 - q_0) + ...,
- * fused or not, is compared with thresholds of its own. Unsure are those that are not surely within
- * by both. Up to HS_SUPPORT_DIM axes only.
- *
- * `squares` lists as the direct form does, and writes s of each hit, fused or not. It does not look
- * at `in`, notes none as unsure and leaves unsure and n_unsure alone.
  */
 typedef int32_t (*hs_scan_fn)(hs_scan *scan, int32_t first);
 
@@ -299,25 +295,16 @@ typedef struct hs_hits {
 } hs_hits;
 
 /* For hits that are listed as point numbers: the lower of the two numbers of each to i, the higher
- * to j. Either may be NULL; each has room for all hits and HS_PADDING more, which may be
- * overwritten. */
-typedef void (*hs_emit_fn)(const hs_hits *hits, void *i, void *j);
+ * to j, of 4 or 8 bytes each. Either may be NULL; each has room for all hits and HS_PADDING more,
+ * which may be overwritten. */
+typedef void (*hs_emit_fn)(const hs_hits *hits, int index_bytes, void *i, void *j);
 
 typedef struct hs_kernel {
     const char *name;
     bool (*supported)(void); /* by this CPU, and compiled as it must be */
     hs_gather_fn          gather;
-    hs_scan_fn            list; /* expanded */
-    hs_scan_fn            count;
-    hs_scan_fn            list_direct;
-    hs_scan_fn            count_direct;
-    hs_scan_fn            list_limits;
-    hs_scan_fn            count_limits;
-    hs_scan_fn            list_supports;
-    hs_scan_fn            count_supports;
-    hs_scan_fn            squares;
-    hs_emit_fn            emit_int32;
-    hs_emit_fn            emit_int64;
+    hs_scan_fn            scan;
+    hs_emit_fn            emit;
     hs_gather_relative_fn gather_relative;
     hs_order_fn           order;
     hs_boxes_fn           near_boxes;
@@ -329,11 +316,8 @@ typedef struct hs_kernel {
 } hs_kernel;
 
 /* The fields that each kernel's file fills with its own functions of these names. */
-#define HS_KERNEL_LOOPS                                                                     \
-    .gather = gather, .list = list, .count = count, .list_direct = list_direct,             \
-    .count_direct = count_direct, .list_limits = list_limits, .count_limits = count_limits, \
-    .list_supports = list_supports, .count_supports = count_supports, .squares = squares,   \
-    .emit_int32 = emit_int32, .emit_int64 = emit_int64, .gather_relative = gather_relative, \
+#define HS_KERNEL_LOOPS                                                                   \
+    .gather = gather, .scan = scan_any, .emit = emit, .gather_relative = gather_relative, \
     .order = order, .near_boxes = near_boxes
 
 extern const hs_kernel hs_kernel_scalar; /* plain C, any CPU; the specification of the others */

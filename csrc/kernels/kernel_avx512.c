@@ -2,7 +2,6 @@
 /* kernel_avx512.c: the kernels for x86-64 CPUs with AVX-512, from the templates. */
 #include "kernel.h"
 
-#include "cpu.h"
 #include "target.h"
 
 #if HS_X86_64
@@ -25,7 +24,8 @@ HS_TARGET_END
 static bool
 supported(void)
 {
-    return hs_cpu_has_avx512() && sound(); /* in this order: sound() needs the instructions */
+    /* In this order: sound() needs the instructions. */
+    return (hs_cpu_features() & HS_CPU_AVX512) != 0 && sound();
 }
 
 const hs_kernel hs_kernel_avx512 = {

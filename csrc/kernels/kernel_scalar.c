@@ -7,12 +7,22 @@
  * the second packs the labels. Measured: half the time of one loop that does both.
  */
 #include "kernel.h"
-#include "support_scalar.h"
 
 #include <string.h>
 
 /* Candidates tested before they are packed; their flags stay in the first-level cache. */
 #define TILE 128
+
+/* Whether a hit, and whether surely within. */
+typedef struct scalar_verdict {
+    int32_t near, sure;
+} scalar_verdict;
+
+/* The support of a point, if the rule looks at it. */
+typedef struct scalar_own {
+    const float  *numbers;
+    hs_thresholds thresholds;
+} scalar_own;
 
 /* What depends on the point that is compared. */
 typedef struct scalar_scan {
@@ -39,7 +49,11 @@ set_point(const hs_scan *scan, int32_t t, const int ndim, const hs_scan_form for
         v.radius = scan->limits.of_point != NULL ? scan->limits.of_point[t] : 0.0f;
         v.others = hs_limit_row(&scan->limits, t);
     }
-    v.own = own_support(&scan->supports, form == HS_SCAN_SUPPORTS, t, ndim);
+    if (form == HS_SCAN_SUPPORTS && hs_rule_needs_asking(scan->supports.rule)) {
+        v.own.numbers = scan->supports.of_point + (int64_t)t * hs_support_numbers(ndim);
+        v.own.thresholds =
+            hs_support_thresholds(scan->supports.form, v.own.numbers[hs_support_entries(ndim)]);
+    }
     return v;
 }
 
@@ -67,10 +81,55 @@ thresholds_of(const hs_scan *scan, const scalar_scan *v, int32_t c)
     return hs_limit_thresholds(&scan->limits, v->radius, v->others != NULL ? v->others[c] : 0.0f);
 }
 
-/* Tests n candidates from `begin` on: near[c] is 1 for hits, else 0. Returns if any is unsure. */
+/* |N along|^2 against its thresholds. stride: from one entry of N to the next. */
+HS_ALWAYS_INLINE scalar_verdict
+meet_support(const float *entries, int64_t stride, hs_thresholds thresholds, const float *along,
+             const int ndim)
+{
+    float s = 0.0f;
+    for (int k = 0; k < ndim; k++) {
+        float z = entries[hs_support_at(k, 0) * stride] * along[0];
+        for (int l = 1; l < ndim; l++) {
+            z = z + entries[hs_support_at(k, l) * stride] * along[l];
+        }
+        s = k == 0 ? z * z : s + z * z;
+    }
+    return (scalar_verdict){!(s > thresholds.out), s < thresholds.in};
+}
+
+/* Candidate c and the point at `centre`, by the direct form and by both supports, as the rule
+ * says. */
+HS_ALWAYS_INLINE scalar_verdict
+meet_supports(const hs_scan *scan, const float *centre, const scalar_own *own, int32_t c,
+              const int ndim)
+{
+    const hs_support_scan *supports = &scan->supports;
+    scalar_verdict         one = {0, 0}, other = {0, 0};
+    float                  along[HS_SUPPORT_DIM], s = 0.0f;
+    for (int k = 0; k < ndim; k++) {
+        along[k] = scan->y[k][c] - centre[k];
+        s = k == 0 ? along[k] * along[k] : s + along[k] * along[k];
+    }
+    const int32_t near = !(s > scan->direct.out), sure = s < scan->direct.in;
+    if (hs_rule_needs_asking(supports->rule)) {
+        one = meet_support(own->numbers, 1, own->thresholds, along, ndim);
+    }
+    if (hs_rule_needs_other(supports->rule)) {
+        const float *numbers = supports->of_block + c;
+        const float  size = numbers[hs_support_entries(ndim) * supports->pitch];
+        other = meet_support(numbers, supports->pitch, hs_support_thresholds(supports->form, size),
+                             along, ndim);
+    }
+    return supports->rule == HS_RULE_MIN
+               ? (scalar_verdict){near & one.near & other.near, sure & one.sure & other.sure}
+               : (scalar_verdict){near & (one.near | other.near), sure & (one.sure | other.sure)};
+}
+
+/* Tests n candidates from `begin` on: near[c] is 1 for hits, else 0; squares to s, of
+ * HS_SCAN_SQUARES alone. Returns if any is unsure. */
 HS_ALWAYS_INLINE bool
 test_chunk(const hs_scan *scan, const scalar_scan *v, int32_t begin, int32_t n, const int ndim,
-           const hs_scan_form form, int32_t *HS_RESTRICT near)
+           const hs_scan_form form, int32_t *HS_RESTRICT near, float *HS_RESTRICT s)
 {
     float        in = v->thresholds.in, out = v->thresholds.out;
     const float *norm = scan->norm + begin;
@@ -83,17 +142,23 @@ test_chunk(const hs_scan *scan, const scalar_scan *v, int32_t begin, int32_t n, 
     }
     for (int32_t c = 0; c < n; c++) {
         if (form == HS_SCAN_SUPPORTS) {
-            unsure |= note_supports(scan, v->centre, &v->own, begin + c, ndim, &near[c]);
+            const scalar_verdict found = meet_supports(scan, v->centre, &v->own, begin + c, ndim);
+            near[c] = found.near;
+            unsure |= found.near & !found.sure;
             continue;
         }
-        const float s = square(y, norm, centre, c, ndim, form);
+        const float sum = square(y, norm, centre, c, ndim, form);
         if (form == HS_SCAN_LIMITS) {
             const hs_thresholds own = thresholds_of(scan, v, begin + c);
             in = own.in;
             out = own.out;
         }
-        near[c] = !(s > out);
-        unsure |= near[c] & !(s < in);
+        near[c] = !(sum > out);
+        if (form == HS_SCAN_SQUARES) {
+            s[c] = sum;
+        } else {
+            unsure |= near[c] & !(sum < in);
+        }
     }
     return unsure != 0;
 }
@@ -125,6 +190,7 @@ note_unsure(hs_scan *scan, const scalar_scan *v, int32_t t, int32_t begin, int32
 HS_ALWAYS_INLINE int32_t
 scan_points(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form form, const bool lists)
 {
+    float   s[TILE];
     int32_t near[TILE];
     int32_t t = first, n_listed = 0;
     int64_t count = 0;
@@ -137,10 +203,13 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form for
         const scalar_scan v = set_point(scan, t, ndim, form);
         for (int32_t begin = scan->triangular ? t + 1 : 0; begin < scan->n; begin += TILE) {
             const int32_t left = scan->n - begin, n = left < TILE ? left : TILE;
-            if (test_chunk(scan, &v, begin, n, ndim, form, near)) {
+            if (test_chunk(scan, &v, begin, n, ndim, form, near, s)) {
                 note_unsure(scan, &v, t, begin, n, ndim, form, near, n_listed);
             }
             for (int32_t c = 0; lists && c < n; c++) {
+                if (form == HS_SCAN_SQUARES) {
+                    scan->squares[n_listed] = s[c];
+                }
                 scan->hits[n_listed] = scan->label[begin + c];
                 n_listed += near[c];
             }
@@ -151,50 +220,6 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form for
         scan->end[t] = (int32_t)(lists ? n_listed : count);
     }
     scan->n_hits = lists ? n_listed : count;
-    return t;
-}
-
-/* n squares from candidate `begin` on, and which of them are hits. */
-HS_ALWAYS_INLINE void
-square_chunk(const hs_scan *scan, const float *point, int32_t begin, int32_t n, const int ndim,
-             float *HS_RESTRICT s, int32_t *HS_RESTRICT near)
-{
-    const float  out = scan->direct.out;
-    const float *y[HS_MAX_DIM];
-    float        centre[HS_MAX_DIM];
-    for (int k = 0; k < ndim; k++) {
-        y[k] = scan->y[k] + begin;
-        centre[k] = point[k];
-    }
-    for (int32_t c = 0; c < n; c++) {
-        s[c] = square(y, NULL, centre, c, ndim, HS_SCAN_DIRECT);
-        near[c] = !(s[c] > out);
-    }
-}
-
-HS_ALWAYS_INLINE int32_t
-square_points(hs_scan *scan, int32_t first, const int ndim)
-{
-    float   s[TILE];
-    int32_t near[TILE];
-    int32_t t = first, at = 0;
-    for (; t < scan->n_points && at + scan->n <= scan->most_hits; t++) {
-        float point[HS_MAX_DIM] = {0.0f};
-        for (int k = 0; k < ndim; k++) {
-            point[k] = scan->q[k][t];
-        }
-        for (int32_t begin = scan->triangular ? t + 1 : 0; begin < scan->n; begin += TILE) {
-            const int32_t left = scan->n - begin, n = left < TILE ? left : TILE;
-            square_chunk(scan, point, begin, n, ndim, s, near);
-            for (int32_t c = 0; c < n; c++) {
-                scan->squares[at] = s[c];
-                scan->hits[at] = scan->label[begin + c];
-                at += near[c];
-            }
-        }
-        scan->end[t] = at;
-    }
-    scan->n_hits = at;
     return t;
 }
 
@@ -297,7 +322,7 @@ put(void *array, int32_t h, int32_t value, const bool wide)
 }
 
 HS_ALWAYS_INLINE void
-emit(const hs_hits *hits, void *i, void *j, const bool wide)
+emit_columns(const hs_hits *hits, void *i, void *j, const bool wide)
 {
     const int32_t *label = hits->label;
     int32_t        begin = 0;
@@ -314,15 +339,13 @@ emit(const hs_hits *hits, void *i, void *j, const bool wide)
 }
 
 static void
-emit_int32(const hs_hits *hits, void *i, void *j)
+emit(const hs_hits *hits, int index_bytes, void *i, void *j)
 {
-    emit(hits, i, j, false);
-}
-
-static void
-emit_int64(const hs_hits *hits, void *i, void *j)
-{
-    emit(hits, i, j, true);
+    if (index_bytes == 8) {
+        emit_columns(hits, i, j, true);
+    } else {
+        emit_columns(hits, i, j, false);
+    }
 }
 
 static void

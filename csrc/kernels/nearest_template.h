@@ -9,7 +9,8 @@ HS_ALWAYS_INLINE void
 gather_relative_runs(const hs_relative_keys *keys, const hs_nearest_run *runs, int32_t n_runs,
                      const int ndim)
 {
-    const float    extent = (float)keys->extent;
+    const floats   most = broadcast((float)keys->extent);
+    const floats   least = broadcast(-(float)keys->extent);
     const integers lanes = lane_numbers();
     const double   unit = keys->unit;
     for (int32_t r = 0; r < n_runs; r++) {
@@ -21,7 +22,7 @@ gather_relative_runs(const hs_relative_keys *keys, const hs_nearest_run *runs, i
             for (int k = 0; k < ndim; k++) {
                 const double *x = keys->x[k] + si;
                 const floats  y = load_relative(x, moved[k], keys->centre[k], unit);
-                const floats  place = within(y, extent);
+                const floats  place = larger_of(smaller_of(y, most), least);
                 store(keys->y[k] + to, place);
                 sum = multiply_add(place, place, sum);
             }
@@ -46,13 +47,13 @@ gather_relative(const hs_relative_keys *keys, const hs_nearest_run *runs, int32_
 static void
 order(const float *squares, int32_t n, int32_t *keys)
 {
-    const integers number_bits = broadcast_integer(HS_ORDER_MOST - 1);
+    const integers other_bits = broadcast_integer(-HS_ORDER_MOST); /* than those of numbers */
     const integers lanes = lane_numbers();
     int32_t        own[HS_ORDER_MOST], place[HS_ORDER_MOST];
     for (int32_t e = 0; e < n; e += LANES) {
         const integers number = add_integers(lanes, broadcast_integer(e));
-        const integers key = merge_bits(bits_of(load(squares + e)), number, number_bits);
-        store_integers(own + e, key);
+        const integers square = bits_in_both(bits_of(load(squares + e)), other_bits);
+        store_integers(own + e, add_integers(square, number));
     }
     for (int32_t e = n; e % (2 * LANES) != 0; e++) {
         own[e] = HS_ORDER_LAST;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * scan_template.h: the vector scans, once for each instruction set. Include it after a vocabulary
- * (simd_<isa>.h), inside that instruction set's target region. Defines scan_points, square_points
- * and, by scan_forms.h, list, count, list_direct, count_direct and squares (hs_scan_fn).
+ * (simd_<isa>.h), inside that instruction set's target region. Defines scan_points and, by
+ * scan_forms.h, scan_any (hs_scan_fn).
  */
 
 /* Notes the lanes of m as unsure hits, listed from entry `at` on. They are rare, so one bit at a
@@ -102,7 +102,8 @@ set_limits(const hs_scan *scan, const hs_rule rule, int32_t c, vector_scan *v)
     v->out = multiply(out, out);
 }
 
-/* s of LANES candidates from c on. */
+/* s of LANES candidates from c on. Squares are fused where that is quicker: only the caller sees
+ * them, and the bounds of filter.h hold either way. */
 HS_ALWAYS_INLINE floats
 sums_of(const vector_scan *v, int32_t c, const int ndim, const hs_scan_form form)
 {
@@ -117,7 +118,8 @@ sums_of(const vector_scan *v, int32_t c, const int ndim, const hs_scan_form form
     floats       s = multiply(first, first);
     for (int k = 1; k < ndim; k++) {
         const floats along = subtract(load(v->y[k] + c), v->centre[k]);
-        s = add(s, multiply(along, along));
+        s = form == HS_SCAN_SQUARES ? multiply_add(along, along, s)
+                                    : add(s, multiply(along, along));
     }
     return s;
 }
@@ -188,16 +190,6 @@ meet_supports(const hs_support_scan *supports, const vector_scan *v, const float
     return (lanes_near){either, (mask)(either & ~sure)};
 }
 
-HS_ALWAYS_INLINE floats
-sum_squares(const floats *along, const int ndim)
-{
-    floats s = multiply(along[0], along[0]);
-    for (int k = 1; k < ndim; k++) {
-        s = add(s, multiply(along[k], along[k]));
-    }
-    return s;
-}
-
 /* LANES candidates from c on, by the direct form and their supports. */
 HS_ALWAYS_INLINE lanes_near
 test_supports(const hs_scan *scan, const vector_scan *v, int32_t c, const int ndim)
@@ -206,7 +198,7 @@ test_supports(const hs_scan *scan, const vector_scan *v, int32_t c, const int nd
     for (int k = 0; k < ndim; k++) {
         along[k] = subtract(load(v->y[k] + c), v->centre[k]);
     }
-    const floats     s = sum_squares(along, ndim);
+    const floats     s = sums_of(v, c, ndim, HS_SCAN_DIRECT);
     const mask       in_ball = not_greater(s, v->out);
     const mask       maybe = and_not_less(in_ball, s, v->in);
     const lanes_near found = meet_supports(&scan->supports, v, along, c, ndim);
@@ -220,7 +212,8 @@ scan_ruled(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form form
 {
     const int32_t *label = scan->label;
     const int32_t  n = scan->n;
-    int32_t       *hit = scan->hits;
+    int32_t *const hits = scan->hits, *hit = hits;
+    float *const   squares = scan->squares;
     int64_t        count = 0;
     int32_t        t = first;
     vector_scan    v;
@@ -230,8 +223,7 @@ scan_ruled(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form form
     }
     scan->n_unsure = 0;
     for (; t < scan->n_points; t++) {
-        if ((lists && hit - scan->hits + n > scan->most_hits) ||
-            scan->n_unsure + n > scan->most_unsure) {
+        if ((lists && hit - hits + n > scan->most_hits) || scan->n_unsure + n > scan->most_unsure) {
             break;
         }
         set_point(scan, t, ndim, form, &v);
@@ -255,10 +247,14 @@ scan_ruled(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form form
             if (HS_UNLIKELY(n - c < LANES)) {
                 near = (mask)(near & first_lanes(n - c));
             }
-            const mask maybe = form == HS_SCAN_SUPPORTS ? (mask)(near & found.maybe)
-                                                        : and_not_less(near, sum, v.in);
+            const mask maybe = form == HS_SCAN_SUPPORTS  ? (mask)(near & found.maybe)
+                               : form == HS_SCAN_SQUARES ? 0
+                                                         : and_not_less(near, sum, v.in);
             if (HS_UNLIKELY(maybe != 0)) {
-                note_unsure(scan, t, c, near, maybe, (int32_t)(hit - scan->hits));
+                note_unsure(scan, t, c, near, maybe, (int32_t)(hit - hits));
+            }
+            if (form == HS_SCAN_SQUARES) {
+                append_floats(squares + (hit - hits), sum, near);
             }
             if (lists) {
                 hit += append(hit, load_integers(label + c), near);
@@ -266,9 +262,9 @@ scan_ruled(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form form
                 count += popcount(near);
             }
         }
-        scan->end[t] = (int32_t)(lists ? hit - scan->hits : count);
+        scan->end[t] = (int32_t)(lists ? hit - hits : count);
     }
-    scan->n_hits = lists ? hit - scan->hits : count;
+    scan->n_hits = lists ? hit - hits : count;
     return t;
 }
 
@@ -283,46 +279,6 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form for
         return scan_ruled(scan, first, ndim, form, HS_RULE_MIN, lists);
     }
     return scan_ruled(scan, first, ndim, form, HS_RULE_SUM, lists);
-}
-
-/* Unlike the direct form above, fused where that is quicker: only the caller sees s, and the bounds
- * of filter.h hold either way. */
-HS_ALWAYS_INLINE int32_t
-square_points(hs_scan *scan, int32_t first, const int ndim)
-{
-    const int32_t *label = scan->label;
-    const int32_t  n = scan->n;
-    const floats   out = broadcast(scan->direct.out);
-    const float   *y[HS_MAX_DIM];
-    int32_t       *hits = scan->hits;
-    float         *found = scan->squares;
-    int32_t        at = 0, t = first;
-    for (int k = 0; k < ndim; k++) {
-        y[k] = scan->y[k];
-    }
-    for (; t < scan->n_points && at + n <= scan->most_hits; t++) {
-        floats q[HS_MAX_DIM];
-        for (int k = 0; k < ndim; k++) {
-            q[k] = broadcast(scan->q[k][t]);
-        }
-        for (int32_t c = scan->triangular ? t + 1 : 0; c < n; c += LANES) {
-            const floats along = subtract(load(y[0] + c), q[0]);
-            floats       s = multiply(along, along);
-            for (int k = 1; k < ndim; k++) {
-                const floats other = subtract(load(y[k] + c), q[k]);
-                s = multiply_add(other, other, s);
-            }
-            mask near = not_greater(s, out);
-            if (HS_UNLIKELY(n - c < LANES)) {
-                near = (mask)(near & first_lanes(n - c));
-            }
-            append_floats(found + at, s, near);
-            at += append(hits + at, load_integers(label + c), near);
-        }
-        scan->end[t] = at;
-    }
-    scan->n_hits = at;
-    return t;
 }
 
 #include "scan_forms.h"

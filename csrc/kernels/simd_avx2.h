@@ -102,21 +102,6 @@ store_wide(int64_t *p, integers a)
 }
 HS_ALWAYS_INLINE integers smaller(integers a, integers b) { return _mm256_min_epi32(a, b); }
 HS_ALWAYS_INLINE integers larger(integers a, integers b) { return _mm256_max_epi32(a, b); }
-/* (float)(p[lane] + moved). */
-HS_ALWAYS_INLINE floats
-load_moved(const double *p, double moved)
-{
-    const __m256d by = _mm256_set1_pd(moved);
-    const __m128  low = _mm256_cvtpd_ps(_mm256_add_pd(_mm256_loadu_pd(p), by));
-    const __m128  high = _mm256_cvtpd_ps(_mm256_add_pd(_mm256_loadu_pd(p + 4), by));
-    return _mm256_insertf128_ps(_mm256_castps128_ps256(low), high, 1);
-}
-/* |a| as integers that order like the numbers. */
-HS_ALWAYS_INLINE integers
-magnitudes(floats a)
-{
-    return _mm256_and_si256(_mm256_castps_si256(a), _mm256_set1_epi32(0x7fffffff));
-}
 /* The first n, 1 <= n < LANES; zero elsewhere. */
 HS_ALWAYS_INLINE integers
 keep_lanes(integers a, int32_t n)
@@ -139,12 +124,6 @@ load_relative(const double *p, double moved, double centre, double unit)
     const __m128 high = load_relative_half(p + 4, moved, centre, unit);
     return _mm256_insertf128_ps(_mm256_castps128_ps256(low), high, 1);
 }
-/* The nearest numbers of [-most, most]. */
-HS_ALWAYS_INLINE floats
-within(floats a, float most)
-{
-    return _mm256_max_ps(_mm256_min_ps(a, broadcast(most)), broadcast(-most));
-}
 /* b where one is NaN. */
 HS_ALWAYS_INLINE floats larger_of(floats a, floats b) { return _mm256_max_ps(a, b); }
 HS_ALWAYS_INLINE floats smaller_of(floats a, floats b) { return _mm256_min_ps(a, b); }
@@ -154,13 +133,8 @@ lane_numbers(void)
     return _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
 }
 HS_ALWAYS_INLINE integers add_integers(integers a, integers b) { return _mm256_add_epi32(a, b); }
+HS_ALWAYS_INLINE integers bits_in_both(integers a, integers b) { return _mm256_and_si256(a, b); }
 HS_ALWAYS_INLINE integers bits_of(floats a) { return _mm256_castps_si256(a); }
-/* b where bits are set, elsewhere a; b has no others. */
-HS_ALWAYS_INLINE integers
-merge_bits(integers a, integers b, integers bits)
-{
-    return _mm256_or_si256(_mm256_andnot_si256(bits, a), b);
-}
 /* One more in lanes with a > b. */
 HS_ALWAYS_INLINE integers
 count_greater(integers counts, integers a, integers b)

@@ -71,21 +71,6 @@ store_wide(int64_t *p, integers a)
 }
 HS_ALWAYS_INLINE integers smaller(integers a, integers b) { return _mm512_min_epi32(a, b); }
 HS_ALWAYS_INLINE integers larger(integers a, integers b) { return _mm512_max_epi32(a, b); }
-/* (float)(p[lane] + moved). */
-HS_ALWAYS_INLINE floats
-load_moved(const double *p, double moved)
-{
-    const __m512d by = _mm512_set1_pd(moved);
-    const __m256  low = _mm512_cvtpd_ps(_mm512_add_pd(_mm512_loadu_pd(p), by));
-    const __m256  high = _mm512_cvtpd_ps(_mm512_add_pd(_mm512_loadu_pd(p + 8), by));
-    return _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
-}
-/* |a| as integers that order like the numbers. */
-HS_ALWAYS_INLINE integers
-magnitudes(floats a)
-{
-    return _mm512_and_si512(_mm512_castps_si512(a), _mm512_set1_epi32(0x7fffffff));
-}
 /* The first n, 1 <= n < LANES; zero elsewhere. */
 HS_ALWAYS_INLINE integers
 keep_lanes(integers a, int32_t n)
@@ -107,12 +92,6 @@ load_relative(const double *p, double moved, double centre, double unit)
     const __m256 high = load_relative_half(p + 8, moved, centre, unit);
     return _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
 }
-/* The nearest numbers of [-most, most]. */
-HS_ALWAYS_INLINE floats
-within(floats a, float most)
-{
-    return _mm512_max_ps(_mm512_min_ps(a, broadcast(most)), broadcast(-most));
-}
 /* b where one is NaN. */
 HS_ALWAYS_INLINE floats larger_of(floats a, floats b) { return _mm512_max_ps(a, b); }
 HS_ALWAYS_INLINE floats smaller_of(floats a, floats b) { return _mm512_min_ps(a, b); }
@@ -122,13 +101,8 @@ lane_numbers(void)
     return _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
 }
 HS_ALWAYS_INLINE integers add_integers(integers a, integers b) { return _mm512_add_epi32(a, b); }
+HS_ALWAYS_INLINE integers bits_in_both(integers a, integers b) { return _mm512_and_si512(a, b); }
 HS_ALWAYS_INLINE integers bits_of(floats a) { return _mm512_castps_si512(a); }
-/* b where bits are set, elsewhere a; b has no others. */
-HS_ALWAYS_INLINE integers
-merge_bits(integers a, integers b, integers bits)
-{
-    return _mm512_or_si512(_mm512_andnot_si512(bits, a), b);
-}
 /* One more in lanes with a > b. */
 HS_ALWAYS_INLINE integers
 count_greater(integers counts, integers a, integers b)

@@ -97,20 +97,6 @@ store_wide(int64_t *p, integers a)
 }
 HS_ALWAYS_INLINE integers smaller(integers a, integers b) { return vminq_s32(a, b); }
 HS_ALWAYS_INLINE integers larger(integers a, integers b) { return vmaxq_s32(a, b); }
-/* (float)(p[lane] + moved). */
-HS_ALWAYS_INLINE floats
-load_moved(const double *p, double moved)
-{
-    const float64x2_t by = vdupq_n_f64(moved);
-    const float32x2_t low = vcvt_f32_f64(vaddq_f64(vld1q_f64(p), by));
-    return vcvt_high_f32_f64(low, vaddq_f64(vld1q_f64(p + 2), by));
-}
-/* |a| as integers that order like the numbers. */
-HS_ALWAYS_INLINE integers
-magnitudes(floats a)
-{
-    return vandq_s32(vreinterpretq_s32_f32(a), vdupq_n_s32(0x7fffffff));
-}
 /* The first n, 1 <= n < LANES; zero elsewhere. */
 HS_ALWAYS_INLINE integers
 keep_lanes(integers a, int32_t n)
@@ -132,12 +118,6 @@ load_relative(const double *p, double moved, double centre, double unit)
     const float32x2_t low = vcvt_f32_f64(load_relative_half(p, moved, centre, unit));
     return vcvt_high_f32_f64(low, load_relative_half(p + 2, moved, centre, unit));
 }
-/* The nearest numbers of [-most, most]. */
-HS_ALWAYS_INLINE floats
-within(floats a, float most)
-{
-    return vmaxq_f32(vminq_f32(a, broadcast(most)), broadcast(-most));
-}
 /* NaN where one is NaN. */
 HS_ALWAYS_INLINE floats larger_of(floats a, floats b) { return vmaxq_f32(a, b); }
 HS_ALWAYS_INLINE floats smaller_of(floats a, floats b) { return vminq_f32(a, b); }
@@ -148,13 +128,8 @@ lane_numbers(void)
     return vld1q_s32(lane);
 }
 HS_ALWAYS_INLINE integers add_integers(integers a, integers b) { return vaddq_s32(a, b); }
+HS_ALWAYS_INLINE integers bits_in_both(integers a, integers b) { return vandq_s32(a, b); }
 HS_ALWAYS_INLINE integers bits_of(floats a) { return vreinterpretq_s32_f32(a); }
-/* b where bits are set, elsewhere a; b has no others. */
-HS_ALWAYS_INLINE integers
-merge_bits(integers a, integers b, integers bits)
-{
-    return vorrq_s32(vbicq_s32(a, bits), b);
-}
 /* One more in lanes with a > b. */
 HS_ALWAYS_INLINE integers
 count_greater(integers counts, integers a, integers b)

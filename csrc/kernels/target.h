@@ -23,6 +23,12 @@
 #define HS_AARCH64 0
 #endif
 
+/* cpu.c, x86-64 only: what this CPU can run and its operating system keeps across context switches.
+ */
+#define HS_CPU_AVX2   1 /* with FMA and POPCNT */
+#define HS_CPU_AVX512 2 /* F, BW, DQ and VL */
+int hs_cpu_features(void);
+
 #define HS_PRAGMA(text) _Pragma(#text)
 #if defined(__clang__)
 #define HS_TARGET_BEGIN(features) \

@@ -170,7 +170,7 @@ void hs_write_measured(const hs_write *write, const struct hs_hits *hits, int32_
 /* candidates_avx2.c: x86-64 only. */
 bool hs_candidates_avx2(const hs_candidate_run *run, hs_candidate *to);
 
-/* write_avx2.c, write_avx512.c: x86-64 only. */
+/* wide_avx2.c, wide_avx512.c: x86-64 only. */
 bool hs_write_avx2(const hs_write *write, const struct hs_hits *hits);
 bool hs_write_avx512(const hs_write *write, const struct hs_hits *hits);
 

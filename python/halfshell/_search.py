@@ -8,13 +8,14 @@
 from __future__ import annotations
 
 from functools import wraps
+from inspect import Parameter, signature
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from halfshell import _core
 from halfshell._errors import REFUSALS, shorten
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
 
 Function = TypeVar("Function", bound="Callable[..., Any]")
 
@@ -121,36 +122,45 @@ SHARED = {
 }
 
 
-#: Keywords that searches share, as `pairs` has them.
-_KEYWORDS = (
-    "box", "periodic", "rule", "exclude", "min_distance", "indices", "inclusive", "threads",
-    "progress",
-)  # fmt: skip
+#: Keywords that searches share, in their order, with their types; None where they are left out.
+_KEYWORDS = {
+    "box": "BoxLike | None",
+    "periodic": "PeriodicLike | None",
+    "rule": "Rule | None",
+    "exclude": "ArrayLike | int | None",
+    "min_distance": "float | None",
+    "indices": "npt.ArrayLike | None",
+    "inclusive": "bool",
+    "threads": "int | None",
+    "progress": "ProgressLike",
+}
 
 
 def search(
-    name: str = "",
-    *,
-    finish: Callable[..., Any] | None = None,
-    like: Callable[..., Any] | None = None,
-    lacks: str = "",
+    name: str = "", *, finish: Callable[..., Any] | None = None, lacks: str = ""
 ) -> Callable[[Function], Function]:
     """Decorate a search: a function of points, cutoff and keywords.
 
     name: what the table in C calls it (csrc/binding/interface.c). C is tried first, and answers a
     call if it can convert all arguments (csrc/binding/arguments.c); otherwise the function itself
-    does. finish: makes the result from what C returned and the arguments. like: the search whose
-    signature has the shared keywords that this one takes as ``**search``. lacks: those of them
-    that this one does not take.
+    does. finish: makes the result from what C returned and the arguments. lacks: which of the
+    shared keywords a function does not take that has ``**search``, in place of which they are.
     """
 
     def decorate(function: Function) -> Function:
         document(function)
         code = function.__code__
         own = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
-        shared = [] if like is None else [name for name in _KEYWORDS if name not in lacks.split()]
-        known = frozenset((*own, *shared))
-        attempt = _core.quick(name) if name else None
+        takes = "search" in code.co_varnames[len(own) : len(own) + 1]
+        shared = [one for one in _KEYWORDS if takes and one not in lacks.split()]
+        defaults = {one: True if one == "inclusive" else None for one in shared}
+        known = (*own, *shared)
+        attempt = None
+        if name:
+            positional = own[: code.co_argcount]
+            usual = dict(zip(positional[::-1], (function.__defaults__ or ())[::-1], strict=False))
+            usual |= {**(function.__kwdefaults__ or {}), **defaults}
+            attempt = _core.quick(name, known, code.co_argcount, usual)
 
         @wraps(function)
         def call(*arguments: Any, **options: Any) -> Any:
@@ -158,10 +168,10 @@ def search(
                 result = attempt(arguments, options)
                 if result is not NotImplemented:
                     return result if finish is None else finish(result, *arguments, **options)
-            if not options.keys() <= known:
+            if not options.keys() <= names:
                 from halfshell._unknown import refuse_unknown
 
-                refuse_unknown(call, [name for name in options if name not in known])
+                refuse_unknown(call, [name for name in options if name not in names])
             if len(arguments) > code.co_argcount:
                 from halfshell._unknown import refuse_count
 
@@ -172,26 +182,29 @@ def search(
                 shorten(error)
                 raise
 
-        if like is not None:
-            spell_out(call, shared, like)
+        names = frozenset(known)
+        if shared:
+            kind = Parameter.KEYWORD_ONLY
+            spell_out(call, [
+                Parameter(one, kind, default=defaults[one], annotation=_KEYWORDS[one])
+                for one in shared
+            ])  # fmt: skip
         return cast("Function", call)
 
     return decorate
 
 
-def spell_out(function: Callable[..., Any], names: Iterable[str], like: Callable[..., Any]) -> None:
-    """Put the keywords that a function takes as ``**search`` into its signature, as in `like`.
+def spell_out(function: Callable[..., Any], keywords: list[Parameter]) -> None:
+    """Put the keywords that a function takes as its last argument, with ``**``, into its signature.
 
     They come behind `queries` and before the function's own; threads and progress come last.
     """
-    import inspect  # here, as it takes some milliseconds
-
-    known, signature = inspect.signature(like).parameters, inspect.signature(function)
-    places = dict.fromkeys(names, 1) | dict.fromkeys(("max_distance", "queries"), 0)
-    places |= dict.fromkeys(("threads", "progress"), 3)
-    both = list(signature.parameters.values())[:-1] + [known[name] for name in names]
+    known = signature(function)
+    places = dict.fromkeys((one.name for one in keywords), 1)
+    places |= {"max_distance": 0, "queries": 0, "threads": 3, "progress": 3}
+    both = [*known.parameters.values()][:-1] + keywords
     both.sort(key=lambda one: (one.kind, one.kind == one.KEYWORD_ONLY and places.get(one.name, 2)))
-    cast("Any", function).__signature__ = signature.replace(parameters=both)
+    cast("Any", function).__signature__ = known.replace(parameters=both)
 
 
 def document(function: Function, **changed: str) -> Function:

@@ -8,8 +8,8 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from halfshell import _core
-from halfshell._convert.foreign import exact_number, is_a, kind_of, shown, whole_number
-from halfshell._convert.options import as_choice
+from halfshell._convert.foreign import exact_number, is_a, shown
+from halfshell._convert.options import as_choice, as_threads
 from halfshell._search import search
 
 if TYPE_CHECKING:
@@ -150,18 +150,6 @@ def _as_memory_limit(value: Any) -> float | None:
     return limit + 0.0
 
 
-def _as_threads(value: Any) -> int | None:
-    must = "threads must be a whole number from 1 to 1024 or None"
-    if value is None:
-        return None
-    number = None if is_a(value, bool) else whole_number(value, "threads")
-    if number is None:
-        raise TypeError(f"{must}, got {kind_of(value)}")
-    if not 1 <= number <= 1024:
-        raise ValueError(f"{must}, got {shown(value)}")
-    return number
-
-
 _CHECKS: dict[str, Any] = {
     "kernel": lambda value: (
         None if value is None else as_choice(value, "kernel", tuple(_core.kernels()))
@@ -169,5 +157,5 @@ _CHECKS: dict[str, Any] = {
     "algorithm": lambda value: as_choice(value, "algorithm", ALGORITHMS),
     "precision": lambda value: as_choice(value, "precision", PRECISIONS),
     "memory_limit": _as_memory_limit,
-    "threads": _as_threads,
+    "threads": as_threads,
 }

@@ -9,24 +9,41 @@ chunk; each chunk gives its points to the bricks that own or need them; each bri
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from inspect import signature
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
+from halfshell._convert.arrays import as_real_array
 from halfshell._convert.foreign import is_a, kind_of, whole_number
 from halfshell._convert.lengths import as_edges
 from halfshell._convert.options import as_brick_count, as_flag, check_letters
 from halfshell._convert.points import MAX_DIM
 from halfshell._convert.points import Points as _Points
 from halfshell._errors import needs
-from halfshell._functions import brick_tasks
-from halfshell._functions.bricks import Terms, divide, part_of
+from halfshell._functions.bricks import (
+    Division,
+    Part,
+    Piece,
+    Summary,
+    Terms,
+    divide,
+    part_of,
+    renumbered,
+    split,
+    summary,
+)
 from halfshell._functions.counts import count_pairs as _count_pairs
+from halfshell._functions.counts import pair_histogram as _pair_histogram
+from halfshell._functions.neighbors import coordination as _coordination
+from halfshell._objects.brick import Brick, Bricks
+from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._search import document, spell_out
-from halfshell._settings import current
+from halfshell._settings import current, settings
 
 if TYPE_CHECKING:
     from halfshell._convert.types import ArrayLike, BoxLike, CutoffLike, PeriodicLike, Rule
@@ -181,8 +198,8 @@ def bricks(points: Collection | Points, cutoff: CutoffLike, **search: Unpack[Sea
     Bricks(2 of 8 points, overhead 1.25)
     """
     parts = _Parts(points, cutoff, directed=True, **search)
-    return _task(brick_tasks.bricks_of)(
-        parts.division, *[_task(brick_tasks.brick_of)(part) for part in parts.parts]
+    return _task(_bricks_of)(
+        parts.division, *[_task(_brick_of)(part) for part in parts.parts]
     )
 
 
@@ -236,7 +253,7 @@ def pairs(
     """
     check_letters(quantities)
     parts = _Parts(points, cutoff, **search)
-    found = parts.each(brick_tasks.pairs_of, {**parts.options, "quantities": quantities})
+    found = parts.each(_pairs_of, {**parts.options, "quantities": quantities})
     if as_flag(sort, "sort"):
         found = parts.in_ranges(found)
     return _columns(found, 0, quantities, parts.terms.ndim)
@@ -269,12 +286,12 @@ def neighbors(
     if not set(quantities) <= set("jdDS"):
         raise ValueError(f"quantities of neighbors are some of j d D S, got {quantities!r}")
     parts = _Parts(points, cutoff, directed=True, **search)
-    found = parts.each(brick_tasks.neighbors_of, {**parts.options, "quantities": quantities})
+    found = parts.each(_neighbors_of, {**parts.options, "quantities": quantities})
     is_full = search.get("rule") not in ("gather", "scatter")
-    table = _task(brick_tasks.table_of)(quantities, is_full, parts.division, *found)
+    table = _task(_table_of)(quantities, is_full, parts.division, *found)
     if as_flag(sort, "sort"):
         found = parts.in_ranges(found)
-    rows, counts = (_joined(found, 0, place, (math.nan,), np.int64) for place in (0, 1))
+    rows, counts = _columns(found, 0, "ij", 0, first=0)
     return Neighbors(rows, counts, _columns(found, 1, quantities, parts.terms.ndim), table)
 
 
@@ -295,7 +312,7 @@ def coordination(
     [2, 1, 1]
     """
     parts = _Parts(points, cutoff, directed=True, **search)
-    found = parts.in_ranges(parts.each(brick_tasks.coordination_of, parts.options))
+    found = parts.in_ranges(parts.each(_coordination_of, parts.options))
     n_ranges, lengths = len(found), [math.nan] * len(found)
     if not math.isnan(parts.n_points):
         limits = [int(parts.n_points) * k // n_ranges for k in range(n_ranges + 1)]
@@ -328,11 +345,8 @@ def count_pairs(
     several: Any = None if is_a(cutoff, Mapping) or np.ndim(cutoff) != 1 else np.array(cutoff)  # type: ignore[arg-type]
     largest: Any = cutoff if several is None else several[-1] if len(several) else 0.0
     parts = _Parts(points, largest, **search)
-    _count_pairs(parts.terms.of_none(), cutoff, rule=parts.terms.rule)
     cutoffs = cutoff if several is None else several
-    counts = parts.each(brick_tasks.counts_of, cutoffs, parts.options)
-    return da.from_delayed(_task(brick_tasks.total)(*counts), np.shape(several)
-                           if several is not None else (), np.int64)  # fmt: skip
+    return parts.total(_count_pairs, cutoffs, rule=parts.terms.rule)
 
 
 def pair_histogram(
@@ -356,8 +370,7 @@ def pair_histogram(
         if name in search:
             raise TypeError(f"pair_histogram() got an unexpected keyword argument {name!r}")
     parts = _Parts(points, float(limits[-1]), by_reach=False, **search)
-    counts = parts.each(brick_tasks.histogram_of, limits, parts.options)
-    return da.from_delayed(_task(brick_tasks.total)(*counts), (len(limits) - 1,), np.int64)
+    return parts.total(_pair_histogram, limits)
 
 
 # ---- parts of a division, and what is found in them ----------------------------------------
@@ -413,9 +426,9 @@ class _Parts:
             (chunk, given.ndim, given.dtype, place, {name: known[name] for name in fields})
             for place, (chunk, known) in enumerate(zip(given.chunks, given.known, strict=True))
         ]
-        summaries = [_task(brick_tasks.summary_of)(*one, len(each)) for one in each]
+        summaries = [_task(_summary_of)(*one, len(each)) for one in each]
         self.division = _task(divide)(self.terms, n_bricks, *summaries)
-        pieces = [_task(brick_tasks.pieces_of)(*one, self.division) for one in each]
+        pieces = [_task(_pieces_of)(*one, self.division) for one in each]
         self.parts = [
             _task(part_of)(self.division, *[piece[k] for piece in pieces]) for k in range(n_bricks)
         ]
@@ -424,33 +437,33 @@ class _Parts:
         """What a task finds in each part."""
         return [_task(task)(part, current()._asdict(), *arguments) for part in self.parts]
 
+    def total(self, count: Callable[..., Any], by: Any, **options: Any) -> Any:
+        """What is counted in all parts together."""
+        shape = np.shape(count(self.terms.of_none(), by, **options))
+        found = self.each(_counted, count, by, {**self.options, **options})
+        return da.from_delayed(_task(sum)(found, np.int64(0)), shape, np.int64)
+
     def in_ranges(self, found: list[Any]) -> list[Any]:
         """What parts found, in as many ranges of ascending points."""
         n = len(self.parts)
-        cuts = [_task(brick_tasks.cut)(groups, self.division, n) for groups in found]
-        return [_task(brick_tasks.merged)(*[one[k] for one in cuts]) for k in range(n)]
+        cuts = [_task(_cut)(groups, self.division, n) for groups in found]
+        return [_task(_merged)(*[one[k] for one in cuts]) for k in range(n)]
 
 
-def _joined(
-    found: Sequence[Any], group: int, place: int, shape: tuple[float, ...], dtype: Any
-) -> Any:
-    """One array of what parts found, with a chunk for each."""
-    blocks = [da.from_delayed(one[group][place], shape, dtype) for one in found]
-    return da.concatenate(blocks, allow_unknown_chunksizes=True)
-
-
-def _columns(found: Sequence[Any], group: int, quantities: str, ndim: int) -> Any:
-    """The array of each letter, which stand in a group before the last columns."""
+def _columns(found: Sequence[Any], group: int, quantities: str, ndim: int, first: int = 1) -> Any:
+    """The array of each letter, which stand in a group from the first column on; a chunk a part."""
     arrays = []
-    for place, letter in enumerate(quantities, 1):
+    for place, letter in enumerate(quantities, first):
         width = {"P": (2,), "S": (ndim,), "D": (ndim,)}.get(letter, ())
-        arrays.append(_joined(found, group, place, (math.nan, *width), _TYPES[letter]))
+        shape = (math.nan, *width)
+        blocks = [da.from_delayed(one[group][place], shape, _TYPES[letter]) for one in found]
+        arrays.append(da.concatenate(blocks, allow_unknown_chunksizes=True))
     return tuple(arrays) if len(arrays) > 1 else arrays[0]
 
 
 for _function in (bricks, pairs, neighbors, coordination, count_pairs, pair_histogram):
     document(_function)
-    spell_out(_function, Search.__annotations__, _Parts)
+    spell_out(_function, [signature(_Parts).parameters[name] for name in Search.__annotations__])
 
 
 # ---- chunks --------------------------------------------------------------------------------
@@ -458,47 +471,178 @@ for _function in (bricks, pairs, neighbors, coordination, count_pairs, pair_hist
 def _chunks(points: Any) -> tuple[list[Any], tuple[float, ...], int, np.dtype[Any]]:
     """Delayed arrays of rows, how many rows (NaN if unknown) and columns they have, their type."""
     if isinstance(points, da.Array):
-        return _of_array(points)
-    needed = ("to_delayed", "dtypes", "columns")
-    if not isinstance(points, Delayed) and all(hasattr(points, name) for name in needed):
-        return _of_frame(points)
-    raise TypeError(
-        f"points must be a dask array or dataframe, or Points of these, got {kind_of(points)}; "
-        "dask.array.from_array makes one of an array"
-    )
-
-
-def _of_array(points: Any) -> tuple[list[Any], tuple[float, ...], int, np.dtype[Any]]:
-    if points.ndim != 2:
-        raise ValueError(f"points must have shape (n, d), got {points.ndim} axes")
-    if math.isnan(points.shape[1]):
-        raise ValueError(
-            "points must have a known number of columns; points.compute_chunk_sizes() finds it"
+        if points.ndim != 2:
+            raise ValueError(f"points must have shape (n, d), got {points.ndim} axes")
+        if math.isnan(points.shape[1]):
+            raise ValueError(
+                "points must have a known number of columns; points.compute_chunk_sizes() finds it"
+            )
+        ndim, dtype = int(points.shape[1]), np.dtype(points.dtype)
+        types = [("points", dtype)]
+        whole = points.rechunk({1: -1}) if points.numblocks[1] > 1 else points
+        chunks, lengths = list(whole.to_delayed()[:, 0]), points.chunks[0]
+    elif not isinstance(points, Delayed) and all(
+        hasattr(points, name) for name in ("to_delayed", "dtypes", "columns")
+    ):
+        if getattr(points, "ndim", 2) != 2:
+            raise ValueError("points must be a dataframe with a column for each axis")
+        types = [(f"column {name!r} of points", one) for name, one in points.dtypes.items()]
+        ndim = len(types)
+        dtype = np.dtype(np.float32 if all(one == np.float32 for _, one in types) else np.float64)
+        chunks = [_task(_of_columns)(part, dtype) for part in points.to_delayed()]
+        lengths = (math.nan,) * len(chunks)
+    else:
+        raise TypeError(
+            "points must be a dask array or dataframe, or Points of these, got "
+            f"{kind_of(points)}; dask.array.from_array makes one of an array"
         )
-    ndim, dtype = int(points.shape[1]), np.dtype(points.dtype)
-    _check(ndim, dtype, "points")
-    if points.numblocks[1] > 1:
-        points = points.rechunk({1: -1})
-    return list(points.to_delayed()[:, 0]), points.chunks[0], ndim, dtype
-
-
-def _of_frame(points: Any) -> tuple[list[Any], tuple[float, ...], int, np.dtype[Any]]:
-    if getattr(points, "ndim", 2) != 2:
-        raise ValueError("points must be a dataframe with a column for each axis")
-    types = list(points.dtypes.items())
-    for name, dtype in types:
-        if not isinstance(dtype, np.dtype):
-            raise TypeError(f"column {name!r} of points must be of a type of NumPy, got {dtype}")
-        _check(1, dtype, f"column {name!r} of points")
-    narrow = types and all(dtype == np.float32 for _, dtype in types)
-    common = np.dtype(np.float32 if narrow else np.float64)
-    _check(len(types), common, "points")
-    chunks = [_task(brick_tasks.of_columns)(part, common) for part in points.to_delayed()]
-    return chunks, (math.nan,) * len(chunks), len(types), common
-
-
-def _check(ndim: int, dtype: np.dtype[Any], name: str) -> None:
     if not 1 <= ndim <= MAX_DIM:
         raise ValueError(f"points must have from 1 to {MAX_DIM} columns, got {ndim}")
-    if dtype.kind not in "biuf" or dtype.itemsize > 8:
-        raise TypeError(f"{name} must hold real numbers, got {dtype}")
+    for name, one in types:
+        if not isinstance(one, np.dtype) or one.kind not in "biuf" or one.itemsize > 8:
+            raise TypeError(f"{name} must hold real numbers, got {one}")
+    return chunks, lengths, ndim, dtype
+
+
+# ---- tasks ---------------------------------------------------------------------------------
+
+# What a brick finds is a tuple of groups; a group is a tuple of arrays of one length, of which the
+# first holds numbers of points, ascending.
+Array = npt.NDArray[Any]
+Group = tuple[Array, ...]
+Known = dict[str, Any]  # what else is known of the points of a chunk
+
+
+def _of_columns(frame: Any, dtype: np.dtype[Any]) -> Array:
+    """Coordinates in the columns of a table; nothing is rounded."""
+    array = np.empty((len(frame), len(frame.columns)), dtype)
+    for place, name in enumerate(frame.columns):
+        array[:, place] = as_real_array(frame[name].to_numpy(), f"column {name!r} of points")
+    return array
+
+
+def _of_chunk(chunk: Any, ndim: int, dtype: np.dtype[Any], place: int, known: Known) -> _Points:
+    """The points of a chunk, if it is what the whole was said to be."""
+    array = np.asanyarray(chunk)
+    if array.ndim != 2 or array.shape[1] != ndim:
+        raise ValueError(
+            f"points must have {ndim} columns in every chunk; chunk {place} has shape {array.shape}"
+        )
+    if array.dtype != dtype:
+        raise TypeError(
+            f"points must be of {dtype} in every chunk, as the whole says; chunk {place} is of "
+            f"{array.dtype}"
+        )
+    return _Points(array, **known) if known else _Points._of(array)
+
+
+def _summary_of(
+    chunk: Any, ndim: int, dtype: np.dtype[Any], place: int, known: Known, n_chunks: int
+) -> Summary:
+    """What a division must know of a chunk; what is wrong with its points is a part of it."""
+    try:
+        return summary(_of_chunk(chunk, ndim, dtype, place, known), n_chunks)
+    except (ValueError, OverflowError) as error:
+        n_points = len(chunk) if np.ndim(chunk) else 0
+        return Summary(n_points, 0.0, np.empty((0, ndim)), 1.0, error=error)
+
+
+def _pieces_of(
+    chunk: Any, ndim: int, dtype: np.dtype[Any], place: int, known: Known, division: Division
+) -> list[Piece]:
+    return split(_of_chunk(chunk, ndim, dtype, place, known), division, place)
+
+
+def _brick_of(part: Part) -> Brick:
+    return part.in_order()[0]
+
+
+def _bricks_of(division: Division, *made: Brick) -> Bricks:
+    return Bricks(made)
+
+
+def _pairs_of(part: Part, how: dict[str, Any], options: dict[str, Any]) -> tuple[Group, ...]:
+    """One group: i, and a column for each letter."""
+    quantities = options["quantities"]
+    letters = "i" + quantities.replace("i", "")
+    with _searching(part, how) as (brick, points):
+        found = brick.pairs(points, **{**options, "quantities": letters})
+    arrays = list(found) if isinstance(found, tuple) else [found]
+    columns = dict(zip(letters, arrays, strict=True))
+    return ((arrays[0], *(columns[letter] for letter in quantities)),)
+
+
+def _neighbors_of(part: Part, how: dict[str, Any], options: dict[str, Any]) -> tuple[Group, ...]:
+    """Two groups: points and how many neighbours they have; point and columns of each neighbour."""
+    with _searching(part, how) as (brick, points):
+        table = brick.neighbors(points, **options)
+    owned, counts = brick.owned, np.asarray(table.counts, np.int64)
+    columns = [table._column(letter) for letter in options["quantities"]]
+    return (owned, counts), (np.repeat(owned, counts), *columns)
+
+
+def _coordination_of(part: Part, how: dict[str, Any], options: dict[str, Any]) -> tuple[Group, ...]:
+    """One group: points, and how many neighbours they have."""
+    with _searching(part, how) as (brick, points):
+        options = {**options, "exclude": brick._excluded(options.get("exclude"))}
+        of_all = _coordination(points, brick.cutoff, rule=part.scope.rule, **options)
+    return ((brick.owned, of_all[brick.is_owned]),)
+
+
+def _counted(
+    part: Part, how: dict[str, Any], count: Callable[..., Any], by: Any, options: dict[str, Any]
+) -> Any:
+    """What is counted among owned points and those of later bricks, less that among the latter."""
+    found = []
+    for kinds in ((0, 2), (1, 2)):
+        with _searching(part, how, *kinds) as (brick, points):
+            exclude = brick._excluded(options.get("exclude"))
+            found.append(count(points, by, **{**options, "exclude": exclude}))
+    return found[0] - found[1]
+
+
+@contextmanager
+def _searching(part: Part, how: dict[str, Any], *kinds: int) -> Iterator[tuple[Brick, _Points]]:
+    """Points of some kinds, with settings; errors name them by their numbers among all."""
+    brick, points = part.in_order(*kinds)
+    try:
+        with settings(**how):
+            yield brick, points
+    except (ValueError, OverflowError) as error:
+        raise renumbered(error, brick.members) from None
+
+
+def _cut(groups: Sequence[Group], division: Division, n: int) -> list[list[Group]]:
+    """What belongs to each of n ranges of points, of equal length but for one."""
+    n_points = division.scope.n_points
+    limits = np.array([n_points * k // n for k in range(n + 1)], np.int64)
+    places = [np.searchsorted(group[0], limits) for group in groups]
+    return [
+        [
+            tuple(array[place[k] : place[k + 1]] for array in group)
+            for group, place in zip(groups, places, strict=True)
+        ]
+        for k in range(n)
+    ]
+
+
+def _merged(*cuts: Sequence[Group]) -> list[Group]:
+    """One range of points from all bricks, ascending by point.
+
+    All entries of a point are of one brick, and in order there.
+    """
+    whole = []
+    for groups in zip(*cuts, strict=True):
+        columns = [np.concatenate(column) for column in zip(*groups, strict=True)]
+        order = np.argsort(columns[0], kind="stable")
+        whole.append(tuple(column[order] for column in columns))
+    return whole
+
+
+def _table_of(
+    quantities: str, is_full: bool, division: Division, *found: Sequence[Group]
+) -> NeighborTable:
+    """The rows of all points, ascending, from what `_neighbors_of` returns for each brick."""
+    (_, counts), (_, *columns) = _merged(*found)
+    offsets = np.concatenate((np.zeros(1, np.int64), np.cumsum(counts, dtype=np.int64)))
+    return NeighborTable((offsets, *columns), quantities, division.scope.n_points, is_full)

@@ -7,6 +7,7 @@ computed from them by JAX, so that derivatives of any order come from there.
 
 from __future__ import annotations
 
+import math
 import operator
 from typing import Any, NamedTuple
 
@@ -140,53 +141,36 @@ def neighbor_list(
     traced = [x for x in (cutoff, box) if isinstance(x, jax.Array)]
 
     def search(points: Any, *rest: Any) -> tuple[Any, ...]:
-        """Find the entries of one system, or of all that vmap gives, as leading axes."""
+        """Find the entries of each system that vmap gives, in arrays with its leading axes."""
         left = iter(map(np.asarray, rest))
         own_cutoff = next(left) if isinstance(cutoff, jax.Array) else np.asarray(cutoff)
         own_box = next(left) if isinstance(box, jax.Array) else box
-        points = np.asarray(points)
         lead = points.shape[:-2]
-        if not lead:
-            return _fill([_search(points, own_cutoff[()], own_box)], n, dim, capacity, lead)
-        systems = points.reshape(-1, n, dim)
-        cutoffs = np.broadcast_to(own_cutoff, lead).reshape(-1)
-        boxes: Any = [own_box] * len(systems)
+        s = math.prod(lead)
+        systems = np.asarray(points).reshape(s, n, dim)
+        cutoffs = np.broadcast_to(own_cutoff, lead).reshape(s)
+        boxes: Any = [own_box] * s
         if isinstance(box, jax.Array):
-            boxes = own_box.reshape(len(systems), *box.shape)
-        found = [_search(*one) for one in zip(systems, cutoffs, boxes)]
-        return _fill(found, n, dim, capacity, lead)
+            boxes = own_box.reshape(s, *box.shape)
+        i, j = (np.full((s, capacity), n, np.int32) for _ in range(2))
+        S, needed = np.zeros((s, capacity, dim), np.int32), np.empty(s, np.int32)
+        for k, (system, reach, edges) in enumerate(zip(systems, cutoffs, boxes)):
+            found = entries_of(system, float(reach), edges, periodic, None, half, inclusive)
+            m = min(len(found[0]), capacity)
+            for column, values in zip((i, j, S), found):
+                column[k, :m] = values[:m]
+            needed[k] = min(len(found[0]), 2**31 - 1)
+        return tuple(x.reshape((*lead, *x.shape[1:])) for x in (i, j, S, needed))
 
-    def _search(points: Any, reach: Any, own_box: Any) -> tuple[Any, ...]:
-        return entries_of(points, float(reach), own_box, periodic, None, half, inclusive)
-
-    shapes = (
-        jax.ShapeDtypeStruct((capacity,), np.int32),
-        jax.ShapeDtypeStruct((capacity,), np.int32),
-        jax.ShapeDtypeStruct((capacity, dim), np.int32),
-        jax.ShapeDtypeStruct((), np.int32),
-    )
+    shapes = [
+        jax.ShapeDtypeStruct(shape, np.int32)
+        for shape in ((capacity,), (capacity,), (capacity, dim), ())
+    ]
     given = [jax.lax.stop_gradient(x) for x in (positions, *traced)]
     i, j, S, needed = jax.pure_callback(search, shapes, *given, vmap_method="broadcast_all")
     valid = jnp.arange(capacity) < needed
     D, d = _measure(positions, i, j, S, box, valid)
     return NeighborList(i, j, S, D, d, needed, needed > capacity)
-
-
-def _fill(
-    found: list[tuple[Any, ...]], n: int, dim: int, capacity: int, lead: tuple[int, ...]
-) -> tuple[Any, ...]:
-    """Arrays of the capacity with the entries of each system, and the numbers needed."""
-    s = len(found)
-    i, j = (np.full((s, capacity), n, np.int32) for _ in range(2))
-    S = np.zeros((s, capacity, dim), np.int32)
-    needed = np.empty(s, np.int32)
-    for k, entries in enumerate(found):
-        m = min(len(entries[0]), capacity)
-        for column, values in zip((i, j, S), entries):
-            column[k, :m] = values[:m]
-        needed[k] = min(len(entries[0]), 2**31 - 1)
-    shapes = (capacity,), (capacity,), (capacity, dim), ()
-    return tuple(x.reshape((*lead, *shape)) for x, shape in zip((i, j, S, needed), shapes))
 
 
 def _measure(positions: Array, i: Array, j: Array, S: Array, box: Any, valid: Array) -> Any:

@@ -14,7 +14,6 @@ from halfshell._convert.types import BoxLike, CutoffLike, PeriodicLike, PointsLi
 from halfshell._functions.bricks import (
     FIELDS,
     Division,
-    Piece,
     Summary,
     Terms,
     divide,
@@ -107,23 +106,22 @@ def exchange(
         )
     own, given = _given(points, cutoff, box, periodic, rule, comm.Get_size())
     gathered = comm.gather(given)
-    answer: Division | Exception | None = None
+    division: Any = None
     if gathered is not None:
         try:
-            answer = _divided(gathered)
-        except Exception as found:
-            answer = _plain(found, "")
-    answer = comm.bcast(answer)
-    if isinstance(answer, Exception):
-        raise answer
-    division: Any = answer
-    pieces: list[Piece] = []
-    error = None
+            division = _divided(gathered)
+        except Exception as error:
+            division = _plain(error, "")
+    division = comm.bcast(division)
+    if isinstance(division, Exception):
+        raise division
+    pieces: Any = None
     try:
         pieces = split(own, division, comm.Get_rank())
-    except Exception as found:  # the others must not wait for these pieces
-        error = _plain(found, "")
-    for rank, one in enumerate(comm.allgather(error)):
+    except Exception as error:  # the others must not wait for these pieces
+        pieces = _plain(error, "")
+    failed = pieces if isinstance(pieces, Exception) else None
+    for rank, one in enumerate(comm.allgather(failed)):
         if one is not None:
             raise _plain(one, f"rank {rank}: ")
     return Exchanged(*part_of(division, *comm.alltoall(pieces)).in_order())
@@ -165,16 +163,14 @@ def _divided(given: list[_Given]) -> Division:
             mine, other = getattr(terms, name), getattr(first, name)
             if not np.array_equal(mine, other):
                 what = "what is known of points" if name == "fields" else name
+                told = [" ".join(repr(one.tolist() if isinstance(one, np.ndarray) else one).split())
+                        for one in (other, mine)]  # fmt: skip
                 raise ValueError(
-                    f"{what} must be the same on all ranks, got {_shown(other)} on rank 0 and "
-                    f"{_shown(mine)} on rank {rank}"
+                    f"{what} must be the same on all ranks, got {told[0]} on rank 0 and "
+                    f"{told[1]} on rank {rank}"
                 )
     summaries = [one.summary for one in given if one.summary is not None]
     return divide(first, len(given), *summaries)
-
-
-def _shown(value: Any) -> str:
-    return " ".join(repr(value.tolist() if isinstance(value, np.ndarray) else value).split())
 
 
 def _plain(error: Exception, whose: str) -> Exception:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from halfshell._convert.options import check_letters
 from halfshell._convert.points import Points
 from halfshell._errors import CapacityError, needs
 from halfshell._functions.neighbors import entries_of
@@ -94,14 +95,17 @@ def neighbor_list(
     [0.0, 4.0, -4.0]
     """
     _as_points(positions, "positions", least=2)
-    _check_letters(quantities)
-    box = _as_box(box)
+    check_letters(quantities)
+    if isinstance(box, torch.Tensor):
+        _check(box, "box")
+    elif box is not None:
+        box = torch.tensor(np.asarray(box.vectors if isinstance(box, Box) else box, np.float64))
     flags = None if periodic is None else np.atleast_1d(np.asarray(periodic))
     if flags is not None and (flags.dtype != bool or flags.ndim != 1):
         raise TypeError(f"periodic must be a bool or one for each axis, got {periodic!r}")
     if flags is not None and len(flags) == 1:
         flags = flags.repeat(positions.shape[1])
-    _check_batch(batch, "batch")
+    _check(batch, "batch", is_batch=True)
     i, j, S = _neighbor_list(
         positions.detach(), float(cutoff), None if box is None else box.detach(),
         None if flags is None else flags.tolist(), batch, half, inclusive,
@@ -137,7 +141,7 @@ def radius_graph(
     x : Tensor of floats, shape (n, d) or (n,)
         Coordinates on the CPU, as `positions` of `neighbor_list`.
     r, loop, max_num_neighbors, flow
-        As there.
+        As in PyTorch Geometric's function.
     batch : Tensor of int, shape (n,), optional
         The graph of each point, ascending; points of different graphs are not connected.
 
@@ -157,8 +161,7 @@ def radius_graph(
     if flow not in ("source_to_target", "target_to_source"):
         raise ValueError(f"flow must be 'source_to_target' or 'target_to_source', got {flow!r}")
     x = _as_points(x, "x")
-    _check_batch(batch, "batch")
-    edges = _radius_graph(x.detach(), float(r), batch, loop, _as_most(max_num_neighbors))
+    edges = _edges(x, None, r, batch, None, loop, max_num_neighbors)
     return edges.flip(0) if flow == "source_to_target" else edges
 
 
@@ -193,68 +196,44 @@ def radius(
     >>> radius(torch.tensor([0.0, 1.0, 3.0]), torch.tensor([0.5, 9.0]), 1.0).tolist()
     [[0, 0], [0, 1]]
     """
-    x, y = _as_points(x, "x"), _as_points(y, "y")
-    _check_batch(batch_x, "batch_x")
-    _check_batch(batch_y, "batch_y")
-    most = _as_most(max_num_neighbors)
-    found: Tensor = _radius(x.detach(), y.detach(), float(r), batch_x, batch_y, most)
-    return found
+    return _edges(_as_points(x, "x"), _as_points(y, "y"), r, batch_x, batch_y, False,
+                  max_num_neighbors)  # fmt: skip
 
 
-def _check_tensor(value: Any, name: str) -> None:
+def _check(value: Any, name: str, is_batch: bool = False) -> None:
+    """TypeError unless this is a tensor that can be read: of floats, or a batch of integers."""
+    if is_batch and value is None:
+        return
     if not isinstance(value, torch.Tensor):
         raise TypeError(f"{name} must be a torch.Tensor, got {type(value).__name__}")
     if value.device.type != "cpu":
         raise TypeError(f"{name} must be on the CPU, but is on {value.device}: give {name}.cpu()")
     if value.layout != torch.strided:
         raise TypeError(f"{name} must be dense, got layout {value.layout}")
-
-
-def _check_floats(value: Any, name: str) -> None:
-    _check_tensor(value, name)
-    if value.dtype not in _FLOATS:
-        raise TypeError(
-            f"{name} must be of float64, float32, float16 or bfloat16, got {value.dtype}"
-        )
-
-
-def _check_batch(value: Any, name: str) -> None:
-    if value is None:
-        return
-    _check_tensor(value, name)
-    if value.dtype.is_floating_point or value.dtype.is_complex or value.dtype == torch.bool:
-        raise TypeError(f"{name} must hold integers, got {value.dtype}")
-
-
-def _check_letters(quantities: str) -> None:
-    letters = set(quantities) if isinstance(quantities, str) else set()
-    if not letters or len(letters) < len(quantities) or not letters <= set("ijdDSP"):
-        raise ValueError(
-            f"quantities must be letters of 'ijdDSP', each at most once, got {quantities!r}"
-        )
+    dtype = value.dtype
+    if is_batch:
+        if dtype.is_floating_point or dtype.is_complex or dtype == torch.bool:
+            raise TypeError(f"{name} must hold integers, got {dtype}")
+    elif dtype not in _FLOATS:
+        raise TypeError(f"{name} must be of float64, float32, float16 or bfloat16, got {dtype}")
 
 
 def _as_points(value: Any, name: str, least: int = 1) -> Tensor:
     """Points in rows, of `least` axes or more."""
-    _check_floats(value, name)
+    _check(value, name)
     if not least <= value.ndim <= 2:
         raise ValueError(f"{name} must have shape (n, d), got {tuple(value.shape)}")
     return value[:, None] if value.ndim == 1 else value
 
 
-def _as_most(value: int | None) -> int | None:
-    if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 0):
-        raise ValueError(f"max_num_neighbors must be None or an integer from 0 on, got {value!r}")
-    return value
-
-
-def _as_box(box: Any) -> Tensor | None:
-    if box is None:
-        return None
-    if isinstance(box, torch.Tensor):
-        _check_floats(box, "box")
-        return box
-    return torch.tensor(np.asarray(box.vectors if isinstance(box, Box) else box, np.float64))
+def _edges(x: Tensor, y: Any, r: float, batch_x: Any, batch_y: Any, loop: bool, most: Any) -> Any:
+    """Points of y, or of x without y, and points of x less than r from them."""
+    _check(batch_x, "batch" if y is None else "batch_x", is_batch=True)
+    _check(batch_y, "batch_y", is_batch=True)
+    if most is not None and (isinstance(most, bool) or not isinstance(most, int) or most < 0):
+        raise ValueError(f"max_num_neighbors must be None or an integer from 0 on, got {most!r}")
+    y = None if y is None else y.detach()
+    return _radius(x.detach(), y, float(r), batch_x, batch_y, loop, most)
 
 
 def _vectors(
@@ -264,11 +243,9 @@ def _vectors(
     if box is None:
         return D
     box, S = box.double(), S.double()
-    if box.ndim < 2:
-        return D + S * box
     if box.ndim == 3:  # with a batch, or the search would have refused it
-        return D + (S[:, :, None] * box[batch[i]]).sum(1)
-    return D + (S[:, :, None] * box).sum(1)
+        box = box[batch[i]]
+    return D + (S * box if box.ndim < 2 else (S[:, :, None] * box).sum(1))
 
 
 def _lengths(D: Tensor) -> Tensor:
@@ -298,44 +275,36 @@ def _find_neighbors(
     return tuple(torch.from_numpy(x if x.flags.writeable else x.copy()) for x in found)
 
 
-def _find_graph(x: Tensor, r: float, batch: Tensor | None, loop: bool, most: int | None) -> Tensor:
-    i, j, _ = entries_of(_array(x), r, None, None, _array(batch), False, False)
-    _check_rows(i, most)
+def _find_edges(
+    x: Tensor, y: Tensor | None, r: float, batch_x: Tensor | None, batch_y: Tensor | None,
+    loop: bool, most: int | None,
+) -> Tensor:  # fmt: skip
+    """Queries i and points j of the same system, ascending by (i, j), in open space."""
+    points, batch = _array(x), _array(batch_x)
+    if y is None:
+        i, j, _ = entries_of(points, r, None, None, batch, False, False)
+    else:
+        queries, query_batch = _array(y), _array(batch_y)
+        if batch is not None or query_batch is not None:  # a set without one is all of system 0
+            batch = np.zeros(len(points), np.int64) if batch is None else batch
+            query_batch = np.zeros(len(queries), np.int64) if query_batch is None else query_batch
+        i, j = pairs_between(
+            Points._of(queries, "queries", batch=query_batch),
+            Points._of(points, "points", batch=batch), r, inclusive=False,
+        )  # fmt: skip
+    needed = int(np.bincount(i).max()) if len(i) else 0
+    if most is not None and needed > most:
+        raise CapacityError(
+            f"max_num_neighbors is {most}, but a point has {needed} neighbours, and none is "
+            "left out silently: give None for all of them",
+            needed,
+        )
     if loop:
         own = np.arange(len(x))
         i, j = np.concatenate((i, own)), np.concatenate((j, own))
         order = np.lexsort((j, i))
         i, j = i[order], j[order]
     return torch.from_numpy(np.stack((i, j)))
-
-
-def _find_between(
-    x: Tensor, y: Tensor, r: float, batch_x: Tensor, batch_y: Tensor, most: int | None
-) -> Tensor:
-    """Queries i and points j of the same system, ascending by (i, j), in open space."""
-    queries, points = _array(y), _array(x)
-    query_batch, batch = _array(batch_y), _array(batch_x)
-    if batch is not None or query_batch is not None:  # a set without numbers is all of system 0
-        batch = np.zeros(len(points), np.int64) if batch is None else batch
-        query_batch = np.zeros(len(queries), np.int64) if query_batch is None else query_batch
-    i, j = pairs_between(
-        Points._of(queries, "queries", batch=query_batch),
-        Points._of(points, "points", batch=batch), r, inclusive=False,
-    )  # fmt: skip
-    _check_rows(i, most)
-    return torch.from_numpy(np.stack((i, j)))
-
-
-def _check_rows(i: Any, most: int | None) -> None:
-    """CapacityError if a row has more entries than `most`; none is ever cut."""
-    if most is not None and len(i):
-        needed = int(np.bincount(i).max())
-        if needed > most:
-            raise CapacityError(
-                f"max_num_neighbors is {most}, but a point has {needed} neighbours, and none is "
-                "left out silently: give None for all of them",
-                needed,
-            )
 
 
 def _shape_of_neighbors(positions: Tensor, *_: Any) -> tuple[Tensor, ...]:
@@ -371,16 +340,10 @@ _neighbor_list = _operator(
     _find_neighbors,
     _shape_of_neighbors,
 )
-_radius_graph = _operator(
-    "radius_graph",
-    "(Tensor x, float r, Tensor? batch, bool loop, int? max_num_neighbors) -> Tensor",
-    _find_graph,
-    _shape_of_edges,
-)
 _radius = _operator(
     "radius",
-    "(Tensor x, Tensor y, float r, Tensor? batch_x, Tensor? batch_y, int? max_num_neighbors) "
-    "-> Tensor",
-    _find_between,
+    "(Tensor x, Tensor? y, float r, Tensor? batch_x, Tensor? batch_y, bool loop, "
+    "int? max_num_neighbors) -> Tensor",
+    _find_edges,
     _shape_of_edges,
 )

@@ -20,13 +20,12 @@ NAME = "_core" + sysconfig.get_config_var("EXT_SUFFIX")
 
 # Themes of each file of the binding, as names of tests say them, besides its own name.
 THEMES = {
-    "arguments": "core_arguments interrupt threads boundary_cases quantities reach selection",
-    "quick": "quick dtypes array_forms",
+    "arguments": "core_arguments interrupt threads boundary_cases quantities reach exclusions",
+    "functions": "quick core_arguments array_forms",
     "interface": "quick core_arguments",
-    "outputs": "quantities table array_forms capacity pairs_small",
+    "outputs": "quantities table array_forms pairs",
     "errors": "boundary statuses for_each_pair explain cell_list",
-    "many_systems": "batch core_arguments",
-    "py_searches": "quantities pairs_small count neighbors between table nearest clusters",
+    "py_searches": "quantities pairs neighbors between table nearest clusters histogram",
     "py_cells": "cell_ verlet box",
     "py_streams": "iter_pairs for_each_pair",
     "py_nodes": "connectivity",

@@ -87,3 +87,16 @@ def told(run):
         return json.loads(out)
 
     return call
+
+
+@pytest.fixture
+def refusal(run):
+    """Run ``halfshell ARGS``, which must be refused in one line; return that line."""
+
+    def call(*args):
+        status, out, err = run(*args)
+        assert (status, out, err.count("\n")) == (2, "", 1), (args, out, err)
+        assert err.startswith("halfshell: error: ") and "Traceback" not in err
+        return err
+
+    return call

@@ -338,9 +338,9 @@ add_queries(range_list *list)
     hs_status        status = HS_OK;
     list->unpolled = HS_POLL_POINTS;
     for (int64_t si = 0; status == HS_OK && si < asking->n; si++) {
-        hs_row       row;
-        hs_row_group group;
-        int64_t      n_links = 0;
+        hs_row          row;
+        hs_sparse_group group;
+        int64_t         n_links = 0;
         list->si = si;
         status = poll_sometimes(list, 1);
         if (status != HS_OK || is_far_outside(search, si)) {

@@ -2,9 +2,7 @@
 #include "../connectivity/connectivity.h"
 #include "query.h"
 #include "../../halfshell_nodes.h"
-#include "../connectivity/overlap.h"
 #include "../scene/points.h"
-#include "../exact/metric.h"
 #include "../threads/call.h"
 
 #include <math.h>
@@ -193,19 +191,6 @@ hs_connectivity_overlap(const hs_points *points, const hs_index_rows *gather,
     return rows_end(made, status, rows, failure);
 }
 
-/* What the shifts of a half list multiply; axes that do not repeat have rows of zeros. */
-static hs_metric
-images_of(const hs_box *box, int ndim)
-{
-    hs_metric images = {.ndim = ndim, .n_rows = box != NULL ? ndim : 0};
-    for (int l = 0; l < images.n_rows; l++) {
-        for (int k = 0; k < ndim; k++) {
-            images.rows[l][k] = box->periodic[l] ? box->rows[l][k] : 0.0;
-        }
-    }
-    return images;
-}
-
 hs_status
 hs_connectivity_intersect(const hs_points *points, const hs_box *box, const hs_half_list *pairs,
                           const hs_node_lists *lists, const hs_options *options, hs_pairs **result,
@@ -226,7 +211,12 @@ hs_connectivity_intersect(const hs_points *points, const hs_box *box, const hs_h
         status = hs_half_list_copy(&made->call.account, pairs, points->n, false, &half, failure);
     }
     if (status == HS_OK) {
-        const hs_metric images = images_of(box, points->ndim);
+        /* What the shifts multiply; axes that do not repeat have rows of zeros. */
+        const int d = points->ndim;
+        hs_metric images = {.ndim = d, .n_rows = box != NULL ? d : 0};
+        for (int e = 0; e < images.n_rows * d; e++) {
+            images.rows[e / d][e % d] = box->periodic[e / d] ? box->rows[e / d][e % d] : 0.0;
+        }
         status = hs_intersection_fill(&made->call, points, &images, lists, &half, made, failure);
     }
     hs_output_free(&half);
@@ -277,84 +267,59 @@ hs_rows_without(const hs_list_rows *rows, const hs_list_rows *without, bool asce
 
 /* ---- single nodes: points are looked at one by one; nothing is allocated --------------------- */
 
-/* Reads point i; HS_ERR_NOT_FINITE where it is no point. */
+/* hs_morton_keys, or hs_feet_between with p and q in place of low and high: both are copied, and
+ * nothing can change them then. */
 static hs_status
-read_point(const hs_points *points, int64_t i, double *x, hs_failure *failure)
+of_each_point(const hs_points *points, const double *p, const double *q, uint64_t *keys,
+              bool *between, bool finds_keys, hs_failure *failure)
 {
-    hs_points one = *points;
-    one.data = (const char *)points->data + i * points->row_stride;
-    one.n = 1;
-    const hs_status status = hs_points_copy_finite(&one, x, failure);
-    failure->row = status != HS_OK ? i : failure->row;
-    return status;
-}
-
-/* Checks points, two of their kind, and an array of an entry for each; copies the two, which
- * nothing can change then. HS_ERR_BOX_FINITE where one of these is not finite: failure->column. */
-static hs_status
-read_two(const hs_points *points, const double *p, const double *q, const void *entries,
-         double two[2][HS_MAX_DIM], hs_failure *failure)
-{
-    const hs_status status = points != NULL ? hs_check_points(points, failure) : HS_ERR_ARGUMENT;
-    if (status != HS_OK || p == NULL || q == NULL || !hs_has_entries(entries, points)) {
-        return status != HS_OK ? status : HS_ERR_ARGUMENT;
+    const void *entries = finds_keys ? (const void *)keys : between;
+    hs_metric   plain = {.n_rows = 0};
+    hs_entry    entry;
+    double      two[2][HS_MAX_DIM] = {{0.0}}, x[HS_MAX_DIM];
+    failure = hs_enter(failure, &entry);
+    hs_status status = hs_check_points(points, failure);
+    if (status == HS_OK && (p == NULL || q == NULL || !hs_has_entries(entries, points))) {
+        status = HS_ERR_ARGUMENT;
     }
-    for (int k = 0; k < points->ndim; k++) {
+    for (int k = 0; status == HS_OK && k < points->ndim; k++) {
         two[0][k] = p[k];
         two[1][k] = q[k];
-        if (!isfinite(two[0][k]) || !isfinite(two[1][k])) {
+        if (!isfinite(two[0][k]) || !isfinite(two[1][k]) || (finds_keys && two[0][k] > two[1][k])) {
             failure->column = k;
-            return HS_ERR_BOX_FINITE;
+            status = finds_keys ? HS_ERR_BOX_FINITE : HS_ERR_ARGUMENT;
         }
     }
-    return HS_OK;
+    plain.ndim = status == HS_OK ? points->ndim : 0;
+    for (int64_t i = 0; status == HS_OK && i < points->n; i++) {
+        hs_points one = *points;
+        one.data = (const char *)points->data + i * points->row_stride;
+        one.n = 1;
+        status = hs_points_copy_finite(&one, x, failure);
+        for (int k = 0; finds_keys && status == HS_OK && k < points->ndim; k++) {
+            status = x[k] < two[0][k] || x[k] > two[1][k] ? HS_ERR_FAR : HS_OK;
+        }
+        failure->row = status != HS_OK ? i : failure->row;
+        if (status == HS_OK && finds_keys) {
+            keys[i] = hs_morton_key(x, two[0], two[1], points->ndim);
+        } else if (status == HS_OK) {
+            between[i] = hs_foot_is_between(&plain, x, NULL, two[0], two[1], NULL);
+        }
+    }
+    hs_leave(&entry);
+    return status;
 }
 
 hs_status
 hs_feet_between(const hs_points *points, const double *p, const double *q, bool *between,
                 hs_failure *failure)
 {
-    hs_entry entry;
-    double   ends[2][HS_MAX_DIM] = {{0.0}}, x[HS_MAX_DIM];
-    failure = hs_enter(failure, &entry);
-    hs_status status = read_two(points, p, q, between, ends, failure);
-    status = status == HS_ERR_BOX_FINITE ? HS_ERR_ARGUMENT : status;
-    for (int64_t i = 0; status == HS_OK && i < points->n; i++) {
-        status = read_point(points, i, x, failure);
-        if (status == HS_OK) {
-            between[i] = hs_foot_is_between(x, ends[0], ends[1], points->ndim);
-        }
-    }
-    hs_leave(&entry);
-    return status;
+    return of_each_point(points, p, q, NULL, between, false, failure);
 }
 
 hs_status
 hs_morton_keys(const hs_points *points, const double *low, const double *high, uint64_t *keys,
                hs_failure *failure)
 {
-    hs_entry entry;
-    double   box[2][HS_MAX_DIM] = {{0.0}}, x[HS_MAX_DIM];
-    failure = hs_enter(failure, &entry);
-    hs_status status = read_two(points, low, high, keys, box, failure);
-    for (int k = 0; status == HS_OK && k < points->ndim; k++) {
-        if (box[0][k] > box[1][k]) {
-            failure->column = k;
-            status = HS_ERR_BOX_FINITE;
-        }
-    }
-    for (int64_t i = 0; status == HS_OK && i < points->n; i++) {
-        status = read_point(points, i, x, failure);
-        for (int k = 0; status == HS_OK && k < points->ndim; k++) {
-            if (x[k] < box[0][k] || x[k] > box[1][k]) {
-                failure->row = i;
-                status = HS_ERR_FAR;
-            }
-        }
-        if (status == HS_OK) {
-            keys[i] = hs_morton_key(x, box[0], box[1], points->ndim);
-        }
-    }
-    hs_leave(&entry);
-    return status;
+    return of_each_point(points, low, high, keys, NULL, true, failure);
 }

@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "query.h"
-#include "../base/status.h"
 #include "../collect/parallel.h"
 #include "../collect/sort_pairs.h"
-#include "../search/walk.h"
 #include "../rows/table.h"
 #include "../nearest/nearest.h"
 #include "../search/choice.h"
@@ -32,11 +30,13 @@ record_step(void *context, hs_query_run *run)
                            : status;
 }
 
-/* Whether two points may be a pair in several images, or one with itself. Twice the cutoff is
- * shorter than any period where not, by far more than rounding errors. */
-static bool
-images_repeat(const hs_query_run *run)
+/* Columns that put pairs of several steps in order and have all that is wanted: S where two points
+ * may be a pair in several images, or one with itself. Twice the cutoff is shorter than any period
+ * where not, by far more than rounding errors. */
+static unsigned
+columns_of(const hs_query_run *run)
 {
+    unsigned   columns = run->call->options.want & ~(unsigned)HS_WANT_BOTH;
     hs_lattice lattice;
     double     cutoff = 0.0;
     for (int64_t s = 0; s < run->plan.n; s++) {
@@ -45,18 +45,10 @@ images_repeat(const hs_query_run *run)
     hs_lattice_init(run->query->box, run->levels.points.ndim, hs_scale_of(0), &lattice);
     for (int k = 0; k < lattice.ndim; k++) {
         if (lattice.row_of_axis[k] >= 0 && !(2.1 * cutoff < lattice.period[k])) {
-            return true;
+            columns |= HS_WANT_SHIFT;
         }
     }
-    return false;
-}
-
-/* Columns that put pairs of several steps in order and have all that is wanted. */
-static unsigned
-columns_of(const hs_query_run *run)
-{
-    const unsigned wanted = run->call->options.want & ~(unsigned)HS_WANT_BOTH;
-    return wanted | HS_WANT_I | HS_WANT_J | (images_repeat(run) ? HS_WANT_SHIFT : 0);
+    return columns | HS_WANT_I | HS_WANT_J;
 }
 
 /* Empties an output of pairs that are to be sorted; `found` may have been used before. */
@@ -136,56 +128,12 @@ hs_pairs_count(const hs_among *among, const hs_options *options, int64_t *count,
 
 /* The public searches for all neighbours of each point, or of each query. */
 
-/* Room for all entries, or what is needed for them. */
-static hs_status
-make_rows_room(hs_output *output, int64_t n_entries, hs_failure *failure)
-{
-    const bool fits = output->fixed ? n_entries <= output->capacity
-                                    : hs_output_reserve(output, n_entries, 0.0) == HS_OK;
-    if (fits) {
-        output->n_pairs = n_entries;
-        return HS_OK;
-    }
-    failure->expected_pairs = (double)n_entries;
-    if (!output->fixed) {
-        failure->expected_bytes =
-            failure->expected_pairs * (double)hs_output_bytes_per_pair(output);
-    }
-    return output->fixed ? HS_ERR_CAPACITY : HS_ERR_MEMORY;
-}
-
 /* A hs_use_fn: the rows of a single step. */
 static hs_status
 fill_rows(void *context, hs_query_run *run)
 {
-    hs_search    *search = run->search;
-    hs_table      table = {.search = search, .entries = run->output};
-    const int64_t n = hs_search_asking(search)->n;
-    hs_status     status = hs_estimate_by_sample(search, run->failure);
     (void)context;
-    if (status == HS_OK) {
-        status = hs_output_open_offsets(&run->call->account, n + 1, run->offsets, &table.offsets);
-    }
-    if (status == HS_OK) {
-        status = hs_table_prepare(&table, run->failure);
-    }
-    if (status == HS_OK && !hs_walker_fits(search, &table.most, &run->failure->search_bytes)) {
-        status = HS_ERR_MEMORY; /* refused before anything is counted */
-    }
-    if (status == HS_OK) {
-        status = hs_table_measure(&table, run->failure);
-    }
-    if (status == HS_OK) {
-        status = make_rows_room(run->output, table.offsets[n], run->failure);
-    }
-    if (status == HS_OK) {
-        status = hs_touch_output(run->call->team, &run->call->options, run->output);
-    }
-    if (status == HS_OK) {
-        status = hs_table_fill(&table, run->failure);
-    }
-    hs_table_free(&table);
-    return status;
+    return hs_table_find(run->search, run->output, run->offsets, run->failure);
 }
 
 /* A hs_use_fn. */
@@ -242,39 +190,42 @@ meets_itself(const hs_query_run *run)
     return !run->levels.has_queries && !run->plan.is_half;
 }
 
-/* Whether each point is within its limit of itself, which the rows of one search count on. */
-static bool
-has_selves(const hs_query_run *run)
-{
-    const hs_levels *levels = &run->levels;
-    if (levels->has_queries) {
-        return true;
-    }
-    for (int32_t l = 0; l < levels->n; l++) {
-        if (levels->cutoffs[l * levels->n + l] < 0.0) {
-            return false;
-        }
-    }
-    return run->call->options.inclusive && run->call->options.precision == HS_EXACT;
-}
-
 /* Whether rows are those of a single step. It goes over all points twice: where pairs have limits
  * by radii, whose scans take long, sorting them is quicker. */
 static bool
 is_single(const hs_query_run *run)
 {
-    return !run->has_levels ||
-           (hs_level_plan_is_single(&run->plan) && !meets_itself(run) &&
-            (!run->plan.steps[0].has_limits || (run->levels.cutoffs != NULL && has_selves(run))));
+    const hs_levels  *levels = &run->levels;
+    const hs_options *options = &run->call->options;
+    if (!run->has_levels) {
+        return true;
+    }
+    if (!hs_level_plan_is_single(&run->plan) || meets_itself(run)) {
+        return false;
+    }
+    if (!run->plan.steps[0].has_limits || (levels->cutoffs != NULL && levels->has_queries)) {
+        return true;
+    }
+    /* The rows of one search count on each point being within its limit of itself. */
+    bool has_selves = options->inclusive && options->precision == HS_EXACT;
+    for (int32_t l = 0; levels->cutoffs != NULL && l < levels->n; l++) {
+        has_selves = has_selves && levels->cutoffs[l * levels->n + l] >= 0.0;
+    }
+    return levels->cutoffs != NULL && has_selves;
 }
 
-/* Takes (i, i, S = 0) out. */
-static void
-drop_selves(hs_output *found)
+/* Pairs of all steps, in an output that is opened; without (i, i, S = 0). */
+static hs_status
+find_of_rows(hs_query_run *run, unsigned columns, hs_output *found)
 {
-    const int32_t *i = hs_output_column(found, HS_WANT_I), *j = hs_output_column(found, HS_WANT_J);
-    const int32_t *shift = hs_output_column(found, HS_WANT_SHIFT);
-    int64_t        kept = 0;
+    hs_output_init(&run->call->account, run->levels.points.ndim, columns, 4, found);
+    const hs_status status = hs_query_each_step(run, record_step, found);
+    const int32_t  *i = hs_output_column(found, HS_WANT_I), *j = hs_output_column(found, HS_WANT_J);
+    const int32_t  *shift = hs_output_column(found, HS_WANT_SHIFT);
+    int64_t         kept = 0;
+    if (status != HS_OK || !meets_itself(run)) {
+        return status;
+    }
     for (int64_t e = 0; e < found->n_pairs; e++) {
         bool is_self = i[e] == j[e];
         for (int k = 0; is_self && shift != NULL && k < found->ndim; k++) {
@@ -290,18 +241,7 @@ drop_selves(hs_output *found)
         kept += !is_self;
     }
     found->n_pairs = kept;
-}
-
-/* Pairs of all steps, in an output that is opened. */
-static hs_status
-find_of_rows(hs_query_run *run, unsigned columns, hs_output *found)
-{
-    hs_output_init(&run->call->account, run->levels.points.ndim, columns, 4, found);
-    const hs_status status = hs_query_each_step(run, record_step, found);
-    if (status == HS_OK && meets_itself(run)) {
-        drop_selves(found);
-    }
-    return status;
+    return HS_OK;
 }
 
 /* A hs_use_fn. */
@@ -396,21 +336,6 @@ hs_neighbors_count(const hs_among *among, const hs_options *options, int64_t *co
 
 /* The public search for the k nearest points: prepares trees, then searches group by group. */
 
-/* Room for k entries for each asking point. */
-static hs_status
-make_nearest_room(hs_nearest *near, int64_t n_asking, hs_failure *failure)
-{
-    const double n = (double)n_asking * (double)near->k;
-    if (n < 0x1p62 && hs_output_reserve(near->rows, n_asking * near->k, 0.0) == HS_OK) {
-        near->rows->n_pairs = n_asking * near->k;
-        return HS_OK;
-    }
-    failure->expected_pairs = n;
-    failure->expected_bytes = n * (double)hs_output_bytes_per_pair(near->rows);
-    failure->limit_bytes = near->search->call->account.limit;
-    return HS_ERR_MEMORY;
-}
-
 /* A hs_use_fn; context: k. */
 static hs_status
 find_nearest(void *context, hs_query_run *run)
@@ -420,6 +345,8 @@ find_nearest(void *context, hs_query_run *run)
     hs_failure    *failure = run->failure;
     hs_sets        sets = run->query->sets;
     const double   limit = run->call->options.cutoff;
+    const int64_t  n_asking = hs_query_asking(run->query);
+    const double   n = (double)n_asking * (double)*k;
     sets.is_plain = sets.is_wide = true;
     hs_search_begin(run->call, search);
     hs_nearest near = {.search = search,
@@ -429,7 +356,15 @@ find_nearest(void *context, hs_query_run *run)
                                       : INT32_MAX,
                        .omits_self = sets.queries == NULL,
                        .rows = run->output};
-    hs_status  status = make_nearest_room(&near, hs_query_asking(run->query), failure);
+    hs_status  status = HS_OK;
+    if (n < 0x1p62 && hs_output_reserve(near.rows, n_asking * near.k, 0.0) == HS_OK) {
+        near.rows->n_pairs = n_asking * near.k;
+    } else {
+        failure->expected_pairs = n;
+        failure->expected_bytes = n * (double)hs_output_bytes_per_pair(near.rows);
+        failure->limit_bytes = run->call->account.limit;
+        status = HS_ERR_MEMORY;
+    }
     if (status == HS_OK) {
         status = hs_nearest_prepare(&near, &sets, run->query->box, limit, failure);
     }
@@ -481,50 +416,22 @@ find_histogram(void *context, hs_query_run *run)
     return hs_query_each_step(run, fill_histogram, &own);
 }
 
-/* The search goes up to the largest edge. */
-static hs_status
-find_histograms(const hs_among *among, const hs_options *options, const hs_histogram *histogram,
-                hs_failure *failure)
-{
-    hs_histogram    all;
-    const hs_finder finder = {.find = find_histogram, .context = &all};
-    const bool      is_there = options != NULL && histogram != NULL && histogram->edges != NULL &&
-                          histogram->n_types >= 1;
-    const hs_status status = is_there
-                                 ? hs_check_lengths(histogram->edges, histogram->n_edges, failure)
-                                 : HS_ERR_ARGUMENT;
-    if (status != HS_OK) {
-        hs_clear_counters(options);
-        return status;
-    }
-    all = *histogram;
-    hs_options of_search = hs_options_of_count(options);
-    of_search.cutoff = histogram->edges[histogram->n_edges - 1];
-    of_search.inclusive = histogram->last_inclusive;
-    of_search.precision = HS_EXACT;
-    hs_query query = hs_query_among(among, HS_HALF_OR_QUERIES, &of_search);
-    if (query.reach != NULL) { /* which this search does not know */
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    const double n = (double)histogram->n_types;
-    if (query.among != NULL && !(n * n * (double)histogram->n_edges < 0x1p31)) {
-        return hs_end_early(HS_ERR_MEMORY, options, failure); /* counts might pass int64 */
-    }
-    query.sets.is_plain = true;
-    query.sets.keeps_none = true;
-    query.sets.least_cutoff = hs_least_length(histogram->edges, histogram->n_edges);
-    return hs_query_answer(&query, &finder, NULL, failure);
-}
-
-/* Enters the floating-point environment itself, because edges are compared before the search
- * does. */
+/* The search goes up to the largest edge. Enters the floating-point environment itself, because
+ * edges are compared before the search does. */
 hs_status
 hs_pairs_histogram(const hs_among *among, const hs_options *options, const hs_histogram *histogram,
                    hs_failure *failure)
 {
-    hs_entry       entry;
-    hs_among       without;
-    hs_each_system each;
+    hs_entry        entry;
+    hs_among        without;
+    hs_each_system  each;
+    hs_histogram    all;
+    const hs_finder finder = {.find = find_histogram, .context = &all};
+    hs_status       status = HS_ERR_ARGUMENT;
+    if (options == NULL || histogram == NULL || histogram->edges == NULL ||
+        histogram->n_types < 1 || (among != NULL && among->reach != NULL)) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
     if (among != NULL && among->each != NULL) { /* cutoffs of their own do not count */
         each = *among->each;
         each.cutoffs = NULL;
@@ -533,42 +440,29 @@ hs_pairs_histogram(const hs_among *among, const hs_options *options, const hs_hi
         among = &without;
     }
     failure = hs_enter(failure, &entry);
-    const hs_status status = find_histograms(among, options, histogram, failure);
+    hs_clear_counters(options);
+    status = hs_check_lengths(histogram->edges, histogram->n_edges, failure);
+    if (status == HS_OK) {
+        all = *histogram;
+        hs_options of_search = hs_options_of_count(options);
+        of_search.cutoff = histogram->edges[histogram->n_edges - 1];
+        of_search.inclusive = histogram->last_inclusive;
+        of_search.precision = HS_EXACT;
+        hs_query     query = hs_query_among(among, HS_HALF_OR_QUERIES, &of_search);
+        const double n = (double)histogram->n_types;
+        query.sets.is_plain = true;
+        query.sets.keeps_none = true;
+        query.sets.least_cutoff = hs_least_length(histogram->edges, histogram->n_edges);
+        /* Counts of many systems might pass int64. */
+        status = query.among != NULL && !(n * n * (double)histogram->n_edges < 0x1p31)
+                     ? HS_ERR_MEMORY
+                     : hs_query_answer(&query, &finder, NULL, failure);
+    }
     hs_leave(&entry);
     return status;
 }
 
 /* What a search of a scene would do, read from the structures that would do it. */
-
-static void
-fill_plan(const hs_search *search, hs_plan *plan)
-{
-    const hs_scene *scene = &search->scene;
-    const hs_grid  *grid = &search->grid;
-    const double    unscale = hs_scale_apply(scene->unscale, 1.0);
-    *plan = (hs_plan){.ndim = scene->ndim,
-                      .n_periodic = scene->lattice.n_periodic,
-                      .aligned = scene->lattice.aligned,
-                      .reduced = scene->lattice.reduced,
-                      .keeps_originals = search->bins.keeps_originals,
-                      .algorithm = search->is_sparse    ? HS_HASH
-                                   : grid->n_cells == 1 ? HS_ALL_PAIRS
-                                                        : HS_GRID,
-                      .all_pairs = grid->n_cells == 1,
-                      .sparse = search->is_sparse,
-                      .n_cells = grid->n_cells,
-                      .stencil_rows = search->stencil.n_rows,
-                      .threads = hs_team_size(search->call->team),
-                      .kernel = search->call->kernel->name};
-    for (int k = 0; k < scene->ndim; k++) {
-        plan->shape[k] = grid->shape[k];
-        plan->cell_size[k] = grid->cell_size[k] * unscale;
-        plan->reach[k] = grid->reach[k];
-        plan->images[k] = scene->lattice.row_of_axis[k] >= 0
-                              ? (grid->reach[k] + grid->shape[k] - 1) / grid->shape[k]
-                              : 0;
-    }
-}
 
 /* A plan while searches are added to it. */
 typedef struct planning {
@@ -586,11 +480,35 @@ plan_step(void *context, hs_query_run *run)
     const double    cutoff = run->call->options.cutoff;
     const int64_t   n_before = plan->n_searches;
     const double    expected_before = plan->expected_pairs;
+    const hs_scene *scene = &run->search->scene;
+    const hs_grid  *grid = &run->search->grid;
+    const double    unscale = hs_scale_apply(scene->unscale, 1.0);
     double          expected;
     const hs_status status = hs_estimate_pairs(run->search, &expected);
     if (n_before == 0 || cutoff > now->largest) {
         now->largest = cutoff;
-        fill_plan(run->search, plan);
+        *plan = (hs_plan){.ndim = scene->ndim,
+                          .n_periodic = scene->lattice.n_periodic,
+                          .aligned = scene->lattice.aligned,
+                          .reduced = scene->lattice.reduced,
+                          .keeps_originals = run->search->bins.keeps_originals,
+                          .algorithm = run->search->is_sparse ? HS_HASH
+                                       : grid->n_cells == 1   ? HS_ALL_PAIRS
+                                                              : HS_GRID,
+                          .all_pairs = grid->n_cells == 1,
+                          .sparse = run->search->is_sparse,
+                          .n_cells = grid->n_cells,
+                          .stencil_rows = run->search->stencil.n_rows,
+                          .threads = hs_team_size(run->call->team),
+                          .kernel = run->call->kernel->name};
+        for (int k = 0; k < scene->ndim; k++) {
+            plan->shape[k] = grid->shape[k];
+            plan->cell_size[k] = grid->cell_size[k] * unscale;
+            plan->reach[k] = grid->reach[k];
+            plan->images[k] = scene->lattice.row_of_axis[k] >= 0
+                                  ? (grid->reach[k] + grid->shape[k] - 1) / grid->shape[k]
+                                  : 0;
+        }
     }
     plan->n_searches = n_before + 1;
     plan->expected_pairs = expected_before + expected;

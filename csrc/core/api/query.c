@@ -12,10 +12,6 @@
 /* query.c: counts and pointers first, then what they lead to: nothing is read before it is known
  * to be there. Then checks, plans, finds and closes, in this order for every search. */
 
-/* Most bytes from one end of an array to the other: a little less than addresses allow, because the
- * sum that is compared with it is rounded. */
-#define MOST_EXTENT (0.99 * (double)PTRDIFF_MAX)
-
 void
 hs_clear_counters(const hs_options *options)
 {
@@ -47,25 +43,6 @@ bool
 hs_has_entries(const void *array, const hs_points *points)
 {
     return array != NULL || (points != NULL && points->n == 0);
-}
-
-hs_status
-hs_check_points(const hs_points *points, hs_failure *failure)
-{
-    if (points == NULL || points->ndim < 1 || points->ndim > HS_MAX_DIM || points->n < 0 ||
-        (points->real != HS_FLOAT32 && points->real != HS_FLOAT64)) {
-        return HS_ERR_ARGUMENT;
-    }
-    if (points->n > INT32_MAX) {
-        failure->value = (double)points->n;
-        return HS_ERR_TOO_MANY;
-    }
-    /* Entries are there, if any, no further apart than addresses can be. */
-    const double rows = (double)(points->n - 1) * (double)points->row_stride;
-    const double columns = (double)(points->ndim - 1) * (double)points->column_stride;
-    return points->n == 0 || (points->data != NULL && fabs(rows) + fabs(columns) <= MOST_EXTENT)
-               ? HS_OK
-               : HS_ERR_ARGUMENT;
 }
 
 hs_status
@@ -379,7 +356,11 @@ hs_query_open(const hs_query *query, const hs_finder *finder, hs_call *call, hs_
     hs_query_begin(query, finder, call, failure, run);
     hs_status status = check_query(query, finder, call, failure);
     if (status == HS_OK && query->among != NULL) {
-        status = hs_systems_choose(query, call, failure);
+        status = hs_choice_open(query->selection, &query->sets, call, failure);
+        if (status == HS_OK && call->choice != NULL && query->box != NULL &&
+            hs_choice_excludes(call->choice)) { /* boxes are looked at with their systems */
+            status = hs_choice_keep_points(&query->sets, call, failure);
+        }
     } else if (status == HS_OK) {
         status = hs_query_plan(run);
         if (status == HS_OK && query->selection != NULL) {
@@ -413,46 +394,40 @@ hs_query_close(hs_query_run *run)
     }
 }
 
-/* The one step of a query without a reach; a thread that searches several systems has begun it. */
-static hs_status
-open_plain(hs_query_run *run)
+hs_status
+hs_query_open_step(hs_query_run *run, int64_t number)
 {
     const hs_query *query = run->query;
     hs_call        *call = run->call;
     hs_search      *search = &run->step.search;
     hs_sets         sets = query->sets;
     hs_status       status;
-    if (call->options.want & HS_WANT_SHELL) {
-        sets.is_plain = true;
-        sets.least_cutoff = hs_least_length(call->options.shells, call->options.n_shells);
-    }
-    sets.least_cutoff = hs_choice_least_length(call->choice, sets.least_cutoff);
-    sets.follows = run->has_scene;
-    if (run->kept == NULL) {
-        status = hs_search_open(&sets, query->box, call, search, run->failure);
+    if (run->has_levels) {
+        status = hs_level_open(&run->plan, number, query->box, sets.keeps_none, call, &run->step,
+                               run->failure);
     } else {
-        status = hs_search_build(&sets, query->box, search, run->failure);
-        run->has_scene = status == HS_OK;
-        if (status != HS_OK) {
-            hs_search_close(search);
+        if (call->options.want & HS_WANT_SHELL) {
+            sets.is_plain = true;
+            sets.least_cutoff = hs_least_length(call->options.shells, call->options.n_shells);
+        }
+        sets.least_cutoff = hs_choice_least_length(call->choice, sets.least_cutoff);
+        sets.follows = run->has_scene;
+        if (run->kept == NULL) {
+            status = hs_search_open(&sets, query->box, call, search, run->failure);
+        } else { /* a thread that searches several systems has begun it */
+            status = hs_search_build(&sets, query->box, search, run->failure);
+            run->has_scene = status == HS_OK;
+            if (status != HS_OK) {
+                hs_search_close(search);
+            }
+        }
+        for (int64_t si = 0; is_numbered(run) && status == HS_OK && si < search->bins.n; si++) {
+            search->bins.order[si] += (int32_t)run->first_point;
+        }
+        if (is_numbered(run) && status != HS_OK) {
+            hs_query_name_point(run, status);
         }
     }
-    if (is_numbered(run) && status == HS_OK) {
-        hs_search_renumber(run->first_point, search);
-    } else if (is_numbered(run)) {
-        hs_query_name_point(run, status);
-    }
-    return status;
-}
-
-hs_status
-hs_query_open_step(hs_query_run *run, int64_t number)
-{
-    hs_search      *search = &run->step.search;
-    const hs_status status = run->has_levels ? hs_level_open(&run->plan, number, run->query->box,
-                                                             run->query->sets.keeps_none, run->call,
-                                                             &run->step, run->failure)
-                                             : open_plain(run);
     if (status != HS_OK) {
         return status;
     }
@@ -488,29 +463,6 @@ hs_query_each_step(hs_query_run *run, hs_use_fn use, void *context)
         }
     }
     return status;
-}
-
-/* Fills the failure when memory is short. Where no pairs are kept, their number is not the
- * reason. */
-static void
-tell_shortage(const hs_query_run *run, hs_failure *failure)
-{
-    const hs_query *query = run->query;
-    hs_shortage     shortage = {0.0, 0.0};
-    failure->limit_bytes = run->call->account.limit;
-    if (query->sets.keeps_none || query->reach != NULL || run->finder->is_nearest) {
-        return;
-    }
-    if (run->output != NULL) {
-        failure->expected_pairs = fmax(failure->expected_pairs, (double)run->output->n_pairs);
-    }
-    if (query->among != NULL) {
-        hs_systems_add_shortage(query, &shortage);
-    } else {
-        hs_shortage_add(&query->sets, query->box, query->options->cutoff, &shortage);
-    }
-    hs_shortage_tell(&shortage, &run->call->options, query->sets.points->ndim,
-                     run->call->account.limit, failure);
 }
 
 hs_pairs *
@@ -560,7 +512,21 @@ hs_query_answer(const hs_query *query, const hs_finder *finder, hs_pairs **resul
     }
     hs_query_close(&run);
     if (status == HS_ERR_MEMORY) {
-        tell_shortage(&run, failure);
+        failure->limit_bytes = call->account.limit;
+    }
+    if (status == HS_ERR_MEMORY && !query->sets.keeps_none && query->reach == NULL &&
+        !finder->is_nearest) { /* else the number of pairs is not the reason */
+        hs_shortage shortage = {0.0, 0.0};
+        if (run.output != NULL) {
+            failure->expected_pairs = fmax(failure->expected_pairs, (double)run.output->n_pairs);
+        }
+        if (query->among != NULL) {
+            hs_systems_add_shortage(query, &shortage);
+        } else {
+            hs_shortage_add(&query->sets, query->box, query->options->cutoff, &shortage);
+        }
+        hs_shortage_tell(&shortage, &call->options, query->sets.points->ndim, call->account.limit,
+                         failure);
     }
     if (pairs != NULL) {
         status = hs_pairs_conclude(&pairs->output, status, failure);

@@ -35,9 +35,6 @@ bool hs_can_return(hs_pairs **result, const hs_options *options);
 /* Whether an array is there that has one entry for each of these points, if there are any. */
 bool hs_has_entries(const void *array, const hs_points *points);
 
-/* HS_OK, HS_ERR_ARGUMENT, or HS_ERR_TOO_MANY for points and systems from 2^31 on. */
-hs_status hs_check_points(const hs_points *points, hs_failure *failure);
-
 /* HS_OK or HS_ERR_ARGUMENT. The box may be NULL; ndim is that of the points. */
 hs_status hs_check_box(const hs_box *box, int ndim);
 
@@ -169,10 +166,9 @@ typedef struct hs_system {
     hs_choice  choice;  /* as all have it, in its box */
 } hs_system;
 
-/* Several systems (systems.c): checks what they share; chooses their pairs, but for what boxes
- * decide; finds in each of them, by the threads of the call; adds up what they would have taken. */
+/* Several systems (systems.c): checks what they share; finds in each of them, by the threads of the
+ * call; adds up what they would have taken. */
 hs_status hs_systems_check(const hs_query *query, hs_failure *failure);
-hs_status hs_systems_choose(const hs_query *query, hs_call *call, hs_failure *failure);
 hs_status hs_systems_find(hs_query_run *run);
 void      hs_systems_add_shortage(const hs_query *query, hs_shortage *shortage);
 

@@ -59,13 +59,6 @@ is_over(const hs_stream *stream)
     return search == NULL || stream->next.point == hs_search_asking(search)->n;
 }
 
-static bool
-is_all_found(const hs_stream *stream)
-{
-    return stream->n_sources == 0 || (stream->at == stream->n_sources - 1 && is_over(stream) &&
-                                      present(stream)->n_steps == present(stream)->run.plan.n);
-}
-
 /* An empty output, columns as the options say. */
 static void
 open_output(const hs_stream *stream, hs_account *account, hs_output *output)
@@ -155,65 +148,35 @@ take_up(hs_stream *stream, int64_t at)
     }
 }
 
-/* The next search, once the one before is over; that of another system may be open already. */
-static hs_status
-go_on(hs_stream *stream, hs_failure *failure)
-{
-    source   *one = present(stream);
-    hs_status status = HS_OK;
-    one->run.failure = failure;
-    if (one->n_steps < one->run.plan.n) {
-        status = open_step(one);
-    } else {
-        hs_query_close(&one->run);
-        take_up(stream, stream->at + 1);
-    }
-    stream->next = status == HS_OK ? (hs_bookmark){.point = 0} : stream->next;
-    return status;
-}
-
-/* Hands out the first n pairs that wait: the held columns become theirs, the rest is copied. */
-static hs_status
-give_away(hs_stream *stream, int64_t n, hs_output *given)
-{
-    hs_output       rest;
-    const hs_status status = move_waiting(stream, n, &rest);
-    if (status == HS_OK) {
-        *given = stream->held;
-        hs_account_give(given->account, given->charged * hs_output_bytes_per_pair(given));
-        given->account = NULL;
-        given->charged = 0;
-        given->n_pairs = n;
-        stream->held = rest;
-    }
-    return status;
-}
-
-/* Hands out a copy of the first n pairs that wait; without the memory for it, an empty one. */
-static hs_status
-copy_out(hs_stream *stream, int64_t n, hs_output *copy)
-{
-    open_output(stream, NULL, copy);
-    const hs_status status = copy_waiting(stream, stream->begin, n, copy);
-    if (status == HS_OK) {
-        stream->begin += n;
-    }
-    return status;
-}
-
+/* Hands out the first n pairs that wait; without the memory for it, nothing. What is held becomes
+ * the block where that leaves less to be copied. */
 static hs_status
 take_block(hs_stream *stream, hs_pairs **result)
 {
     const int64_t n = waiting(stream) < stream->max_pairs ? waiting(stream) : stream->max_pairs;
     hs_pairs     *block = hs_pairs_new();
+    hs_output     rest, *given;
+    hs_status     status;
     if (block == NULL) {
         return HS_ERR_MEMORY;
     }
+    given = &block->output;
     block->call.account = (hs_account){.arena = NULL}; /* what is held is not charged to it */
-    /* What is held becomes the block where that leaves less to be copied. */
-    const bool      gives = stream->begin == 0 && waiting(stream) - n < n;
-    const hs_status status = gives ? give_away(stream, n, &block->output)
-                                   : copy_out(stream, n, &block->output);
+    if (stream->begin == 0 && waiting(stream) - n < n) {
+        status = move_waiting(stream, n, &rest);
+        if (status == HS_OK) {
+            *given = stream->held;
+            hs_account_give(given->account, given->charged * hs_output_bytes_per_pair(given));
+            given->account = NULL;
+            given->charged = 0;
+            given->n_pairs = n;
+            stream->held = rest;
+        }
+    } else {
+        open_output(stream, NULL, given);
+        status = copy_waiting(stream, stream->begin, n, given);
+        stream->begin += status == HS_OK ? n : 0;
+    }
     if (status != HS_OK) {
         hs_free(NULL, block);
         return status;
@@ -236,8 +199,25 @@ hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **blo
     hs_status status = HS_OK;
     failure = hs_enter(failure, entry);
     hs_call_set_poll(poll, context, &stream->call);
-    while (status == HS_OK && waiting(stream) < stream->max_pairs && !is_all_found(stream)) {
-        status = is_over(stream) ? go_on(stream, failure) : fill(stream, failure);
+    while (status == HS_OK && waiting(stream) < stream->max_pairs && stream->n_sources > 0) {
+        source *one = present(stream);
+        if (is_over(stream) && stream->at == stream->n_sources - 1 &&
+            one->n_steps == one->run.plan.n) {
+            break; /* all is found */
+        }
+        one->run.failure = failure;
+        if (!is_over(stream)) {
+            status = fill(stream, failure);
+            continue;
+        }
+        /* The next search; that of another system may be open already. */
+        if (one->n_steps < one->run.plan.n) {
+            status = open_step(one);
+        } else {
+            hs_query_close(&one->run);
+            take_up(stream, stream->at + 1);
+        }
+        stream->next = status == HS_OK ? (hs_bookmark){.point = 0} : stream->next;
     }
     if (status == HS_OK && waiting(stream) > 0) {
         status = take_block(stream, block);
@@ -403,21 +383,6 @@ typedef struct visitor {
     int64_t         n_visited;
 } visitor;
 
-static int
-call_each(const hs_visit *visit, const hs_pair_arrays *pairs, int ndim, int64_t *n_taken)
-{
-    const int64_t *i = pairs->i, *j = pairs->j;
-    for (int64_t e = 0; e < pairs->capacity; e++) {
-        const double d = pairs->distance[e];
-        if (visit->pair(i[e], j[e], pairs->shift + e * ndim, pairs->vector + e * ndim, d * d,
-                        visit->user) != 0) {
-            *n_taken = e + 1;
-            return 1;
-        }
-    }
-    return 0;
-}
-
 /* A hs_visit_fn. */
 static hs_status
 visit_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
@@ -437,10 +402,18 @@ visit_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hit
                                   .distance = hs_output_column(part, HS_WANT_DISTANCE),
                                   .vector = hs_output_column(part, HS_WANT_VECTOR),
                                   .shift = hs_output_column(part, HS_WANT_SHIFT)};
+    const int64_t       *i = pairs.i, *j = pairs.j;
     int64_t              n_taken = part->n_pairs;
-    const int            stops = visit->pairs != NULL
-                                     ? visit->pairs(&pairs, part->n_pairs, &n_taken, visit->user)
-                                     : call_each(visit, &pairs, part->ndim, &n_taken);
+    int                  stops = 0;
+    if (visit->pairs != NULL) {
+        stops = visit->pairs(&pairs, part->n_pairs, &n_taken, visit->user);
+    }
+    for (int64_t e = 0; visit->pairs == NULL && stops == 0 && e < part->n_pairs; e++) {
+        const double d = pairs.distance[e];
+        stops = visit->pair(i[e], j[e], pairs.shift + e * part->ndim, pairs.vector + e * part->ndim,
+                            d * d, visit->user);
+        n_taken = e + 1;
+    }
     (void)hs_fpenv_enter(); /* the caller's function may have changed it */
     doing->n_visited += n_taken;
     scanner->work_since_poll += CALL_WORK * part->n_pairs;
@@ -601,78 +574,53 @@ is_periodic(const hs_query *query)
     return any;
 }
 
-/* The pairs, once or twice; the options' memory limit is what the search may take. */
-static hs_status
-join_all_pairs(const hs_among *among, const hs_options *options, clustering *doing,
-               uint8_t *winding, int64_t *n_clusters, hs_failure *failure)
-{
-    hs_visit      visit = {.pairs = join_pairs, .user = doing};
-    hs_options    of_visit = *options;
-    int64_t       n_pairs;
-    const int64_t n = doing->components.n;
-    of_visit.want = HS_WANT_I | HS_WANT_J | (doing->components.n_axes > 0 ? HS_WANT_SHIFT : 0);
-    hs_status status = visit_columns(among, &of_visit, &visit, &n_pairs, failure);
-    if (status != HS_OK) {
-        return status;
-    }
-    const int64_t found =
-        hs_components_label(&doing->components, doing->core, doing->labels, winding);
-    if (doing->core != NULL && n > 0 && memchr(doing->core, 0, (size_t)n) != NULL) {
-        /* some point is near enough to a cluster only */
-        visit.pairs = adopt_points;
-        of_visit.want = HS_WANT_I | HS_WANT_J;
-        of_visit.counters = NULL;
-        status = visit_columns(among, &of_visit, &visit, &n_pairs, failure);
-    }
-    if (status == HS_OK) {
-        *n_clusters = found;
-    }
-    return status;
-}
-
-static hs_status
-find_clusters(const hs_among *among, const hs_options *options, const uint8_t *core,
-              int64_t *labels, uint8_t *winding, int64_t *n_clusters, hs_failure *failure)
-{
-    const hs_query   query = hs_query_among(among, HS_HALF_LIST, options);
-    const hs_points *points = query.sets.points;
-    clustering       doing = {.core = core, .labels = labels};
-    hs_account       account;
-    hs_clear_counters(options);
-    hs_status status = hs_check_arguments(points, NULL, query.box, options, failure);
-    if (status != HS_OK) {
-        return status;
-    }
-    const int n_axes = winding != NULL && is_periodic(&query) ? points->ndim : 0;
-    hs_account_init(&account, options);
-    status = hs_components_open(&account, points->n, n_axes, &doing.components);
-    if (status == HS_OK) {
-        hs_options of_search = *options;
-        of_search.memory_limit -= (double)account.held;
-        status = join_all_pairs(among, &of_search, &doing, winding, n_clusters, failure);
-        failure->limit_bytes += status == HS_ERR_MEMORY ? (double)account.held : 0.0;
-    } else {
-        failure->limit_bytes = account.limit;
-    }
-    hs_components_close(&account, &doing.components);
-    hs_account_close(&account);
-    return status;
-}
-
 hs_status
 hs_clusters_find(const hs_among *among, const hs_options *options, const uint8_t *core,
                  int64_t *labels, uint8_t *winding, int64_t *n_clusters, hs_failure *failure)
 {
-    const hs_query query = hs_query_among(among, HS_HALF_LIST, options);
-    if (options == NULL || n_clusters == NULL || !hs_has_entries(labels, query.sets.points)) {
+    const hs_query   query = hs_query_among(among, HS_HALF_LIST, options);
+    const hs_points *points = query.sets.points;
+    clustering       doing = {.core = core, .labels = labels};
+    hs_visit         visit = {.pairs = join_pairs, .user = &doing};
+    hs_entry         entry;
+    hs_account       account;
+    int64_t          n_pairs, found = 0;
+    if (options == NULL || n_clusters == NULL || !hs_has_entries(labels, points)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    hs_entry   entry;
+    failure = hs_enter(failure, &entry);
     hs_options of_search = hs_options_of_count(options);
     of_search.index_bytes = 4;
-    failure = hs_enter(failure, &entry);
-    const hs_status status =
-        find_clusters(among, &of_search, core, labels, winding, n_clusters, failure);
+    hs_clear_counters(options);
+    hs_status status = hs_check_arguments(points, NULL, query.box, &of_search, failure);
+    if (status != HS_OK) {
+        hs_leave(&entry);
+        return status;
+    }
+    const int n_axes = winding != NULL && is_periodic(&query) ? points->ndim : 0;
+    hs_account_init(&account, &of_search);
+    status = hs_components_open(&account, points->n, n_axes, &doing.components);
+    failure->limit_bytes = status != HS_OK ? account.limit : 0.0;
+    if (status == HS_OK) { /* the rest of the memory limit is what the search may take */
+        of_search.memory_limit -= (double)account.held;
+        of_search.want = HS_WANT_I | HS_WANT_J | (n_axes > 0 ? HS_WANT_SHIFT : 0);
+        status = visit_columns(among, &of_search, &visit, &n_pairs, failure);
+        if (status == HS_OK) {
+            found = hs_components_label(&doing.components, core, labels, winding);
+        }
+        if (status == HS_OK && core != NULL && points->n > 0 &&
+            memchr(core, 0, (size_t)points->n) != NULL) {
+            /* some point is near enough to a cluster only */
+            visit.pairs = adopt_points;
+            of_search.want = HS_WANT_I | HS_WANT_J;
+            of_search.counters = NULL;
+            status = visit_columns(among, &of_search, &visit, &n_pairs, failure);
+        }
+        failure->limit_bytes += status == HS_ERR_MEMORY ? (double)account.held : 0.0;
+    }
+    *n_clusters = status == HS_OK ? found : *n_clusters;
+    hs_components_close(&account, &doing.components);
+    hs_account_close(&account);
     hs_leave(&entry);
     return status;
 }

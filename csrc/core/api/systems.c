@@ -2,7 +2,6 @@
 #include "query.h"
 #include "../base/os.h"
 #include "../base/sort.h"
-#include "../base/status.h"
 #include "../collect/parallel.h"
 #include "../search/choice.h"
 
@@ -61,23 +60,6 @@ check_first(const hs_set *set, hs_failure *failure)
     return first[0] == 0 && first[set->n_systems] == set->at.n ? HS_OK : HS_ERR_ARGUMENT;
 }
 
-/* Queries that are points are those of their own system. */
-static hs_status
-check_numbers(const hs_among *among, hs_failure *failure)
-{
-    const int64_t *numbers = among->selection->query_numbers;
-    const int64_t *first = among->points->first, *first_query = among->queries->first;
-    for (int64_t s = 0; s < among->points->n_systems; s++) {
-        for (int64_t q = first_query[s]; q < first_query[s + 1]; q++) {
-            if (numbers[q] < first[s] || numbers[q] >= first[s + 1]) {
-                failure->system = s;
-                return HS_ERR_ARGUMENT;
-            }
-        }
-    }
-    return HS_OK;
-}
-
 /* Whether each system has something of a box of its own. */
 static bool
 have_boxes(const hs_among *among)
@@ -101,37 +83,27 @@ hs_systems_check(const hs_query *query, hs_failure *failure)
     }
     if (status == HS_OK && queries != NULL && query->selection != NULL &&
         query->selection->query_numbers != NULL) {
-        status = check_numbers(among, failure);
+        /* Queries that are points are those of their own system. */
+        const int64_t *numbers = query->selection->query_numbers, *first = points->first;
+        for (int64_t s = 0; status == HS_OK && s < points->n_systems; s++) {
+            for (int64_t q = queries->first[s]; q < queries->first[s + 1]; q++) {
+                if (numbers[q] < first[s] || numbers[q] >= first[s + 1]) {
+                    failure->system = s;
+                    status = HS_ERR_ARGUMENT;
+                    break;
+                }
+            }
+        }
     }
     return status == HS_OK && !have_boxes(among) ? hs_box_check(among->box, failure) : status;
-}
-
-/* The box of system s: that of all, or own_box, which is set. */
-static const hs_box *
-box_of_system(const hs_among *among, int64_t s, hs_box *own_box)
-{
-    const int ndim = among->points->at.ndim;
-    if (among->box == NULL || !have_boxes(among)) {
-        return among->box;
-    }
-    const hs_each_system *each = among->each;
-    *own_box = *among->box;
-    for (int l = 0; l < ndim; l++) {
-        if (each->rows != NULL) {
-            memcpy(own_box->rows[l], each->rows + (s * ndim + l) * ndim,
-                   (size_t)ndim * sizeof(double));
-        }
-        if (each->periodic != NULL) {
-            own_box->periodic[l] = each->periodic[s] >> l & 1;
-        }
-    }
-    return own_box;
 }
 
 static void
 cut_system(const hs_query *all, int64_t s, hs_system *system)
 {
-    const hs_among *among = all->among;
+    const hs_among       *among = all->among;
+    const hs_each_system *each = among->each;
+    const int             ndim = among->points->at.ndim;
     system->points = set_of_system(among->points, s);
     system->query.sets.points = &system->points.at;
     system->query.sets.of_points = &system->points;
@@ -140,9 +112,23 @@ cut_system(const hs_query *all, int64_t s, hs_system *system)
         system->query.sets.queries = &system->queries.at;
         system->query.sets.of_queries = &system->queries;
     }
-    system->query.box = box_of_system(among, s, &system->own_box);
-    if (among->each != NULL && among->each->cutoffs != NULL) {
-        system->options.cutoff = among->each->cutoffs[s];
+    system->query.box = among->box;
+    if (among->box != NULL && have_boxes(among)) {
+        hs_box *box = &system->own_box;
+        system->query.box = box;
+        *box = *among->box;
+        for (int l = 0; l < ndim; l++) {
+            if (each->rows != NULL) {
+                memcpy(box->rows[l], each->rows + (s * ndim + l) * ndim,
+                       (size_t)ndim * sizeof(double));
+            }
+            if (each->periodic != NULL) {
+                box->periodic[l] = each->periodic[s] >> l & 1;
+            }
+        }
+    }
+    if (each != NULL && each->cutoffs != NULL) {
+        system->options.cutoff = each->cutoffs[s];
     }
 }
 
@@ -307,7 +293,7 @@ search_system(worker *me, int64_t s)
         status = finder->find(finder->context, run);
     }
     hs_query_close(run);
-    hs_call_end_part(call, whole);
+    call->part = whole;
     if (status == HS_OK && !finder->is_numbered && run->output != NULL) {
         status = append(me);
     } else if (status != HS_OK && !finder->is_numbered) {
@@ -406,70 +392,51 @@ close_worker(void *context, void *place)
     hs_account_close(account);
 }
 
-/* Searches all systems, of which there is one at least, by a team. */
-static hs_status
-search_by_team(systems_job *job, hs_failure *failure)
-{
-    const hs_finder *finder = job->all->finder;
-    hs_call         *total = job->all->call;
-    hs_options      *options = &total->options;
-    hs_output       *output = job->all->output;
-    const double     n_points = (double)job->all->query->sets.points->n;
-    const double     work = finder->is_numbered ? n_points : n_points + job->n_asking;
-    const int        n_threads = finder->one_thread ? 1 : hs_call_threads(work, options);
-    const int64_t    in_range = (int64_t)(RANGE_POINTS * job->n_systems / (job->n_asking + 1.0));
-    total->team = hs_team_create(job->n_systems < n_threads ? (int)job->n_systems : n_threads);
-    const int team_size = hs_team_size(total->team);
-    /* Each thread has an account of its own: together they must not pass the limit of the call. */
-    if (team_size > 1 && options->find_limit != NULL) {
-        options->memory_limit =
-            fmin(options->memory_limit, options->find_limit(options->find_context));
-        options->find_limit = NULL;
-    }
-    options->memory_limit /= team_size;
-    job->in_range = in_range > 1 ? in_range : 1;
-    job->is_direct = team_size == 1 && output != NULL && !output->fixed;
-    hs_crew crew = {.call = total,
-                    .job = job,
-                    .worker_size = sizeof(worker),
-                    .open = open_worker,
-                    .close = close_worker,
-                    .search = search_range,
-                    .n_ranges = (job->n_systems + job->in_range - 1) / job->in_range,
-                    .output = output};
-    return hs_crew_run(&crew, failure);
-}
-
-/* Boxes are looked at with their systems. */
-hs_status
-hs_systems_choose(const hs_query *query, hs_call *call, hs_failure *failure)
-{
-    hs_status status = hs_choice_open(query->selection, &query->sets, call, failure);
-    if (status == HS_OK && call->choice != NULL && query->box != NULL &&
-        hs_choice_excludes(call->choice)) {
-        status = hs_choice_keep_points(&query->sets, call, failure);
-    }
-    return status;
-}
-
 hs_status
 hs_systems_find(hs_query_run *all)
 {
-    const hs_query *query = all->query;
-    hs_call        *call = all->call;
-    const hs_set   *asking = query->among->queries != NULL ? query->among->queries
-                                                           : query->among->points;
-    systems_job     job = {.all = all,
-                           .asking = asking,
-                           .n_asking = asking->at.n > 0 ? (double)asking->at.n : 1.0,
-                           .n_systems = asking->n_systems};
-    hs_status       status = HS_OK;
-    if (all->finder->has_rows) {
+    const hs_query  *query = all->query;
+    const hs_finder *finder = all->finder;
+    hs_call         *total = all->call;
+    hs_options      *options = &total->options;
+    hs_output       *output = all->output;
+    const hs_set    *points = query->among->points;
+    const hs_set    *asking = query->among->queries != NULL ? query->among->queries : points;
+    systems_job      job = {.all = all,
+                            .asking = asking,
+                            .n_asking = asking->at.n > 0 ? (double)asking->at.n : 1.0,
+                            .n_systems = asking->n_systems};
+    hs_status        status = HS_OK;
+    if (finder->has_rows) {
         status =
-            hs_output_open_offsets(&call->account, asking->at.n + 1, all->offsets, &job.lengths);
+            hs_output_open_offsets(&total->account, asking->at.n + 1, all->offsets, &job.lengths);
     }
     if (status == HS_OK && job.n_systems > 0) {
-        status = search_by_team(&job, all->failure);
+        const double  n_points = (double)points->at.n;
+        const double  work = finder->is_numbered ? n_points : n_points + job.n_asking;
+        const int     n_threads = finder->one_thread ? 1 : hs_call_threads(work, options);
+        const int64_t in_range = (int64_t)(RANGE_POINTS * job.n_systems / (job.n_asking + 1.0));
+        total->team = hs_team_create(job.n_systems < n_threads ? (int)job.n_systems : n_threads);
+        const int team_size = hs_team_size(total->team);
+        /* Each thread has an account of its own: together they must not pass the limit of the
+         * call. */
+        if (team_size > 1 && options->find_limit != NULL) {
+            options->memory_limit =
+                fmin(options->memory_limit, options->find_limit(options->find_context));
+            options->find_limit = NULL;
+        }
+        options->memory_limit /= team_size;
+        job.in_range = in_range > 1 ? in_range : 1;
+        job.is_direct = team_size == 1 && output != NULL && !output->fixed;
+        hs_crew crew = {.call = total,
+                        .job = &job,
+                        .worker_size = sizeof(worker),
+                        .open = open_worker,
+                        .close = close_worker,
+                        .search = search_range,
+                        .n_ranges = (job.n_systems + job.in_range - 1) / job.in_range,
+                        .output = output};
+        status = hs_crew_run(&crew, all->failure);
     }
     if (status == HS_OK && job.lengths != NULL) {
         job.lengths[0] = 0;

@@ -4,7 +4,6 @@
  * nothing themselves.
  */
 #include "../verlet/pair_list.h"
-#include "../verlet/recheck.h"
 #include "query.h"
 #include "../box/lattice.h"
 #include "../memory/memory.h"
@@ -70,20 +69,15 @@ is_length(double x)
     return x >= 0.0 && isfinite(x);
 }
 
-/* Points, box and options. */
-static hs_status
-check(const hs_points *points, const hs_box *box, const hs_options *options, hs_failure *failure)
-{
-    const hs_status status = hs_check_arguments(points, NULL, box, options, failure);
-    return status == HS_OK ? hs_box_check(box, failure) : status;
-}
-
-/* The same, and then the coordinates, which are the caller's to free. */
+/* Points and a box, and then the coordinates, which are the caller's to free. */
 static hs_status
 load(const hs_points *points, const hs_box *box, const hs_options *options, hs_cloud *cloud,
      hs_failure *failure)
 {
-    const hs_status status = check(points, box, options, failure);
+    hs_status status = hs_check_arguments(points, NULL, box, options, failure);
+    if (status == HS_OK) {
+        status = hs_box_check(box, failure);
+    }
     return status == HS_OK ? hs_cloud_load(NULL, NULL, points, options, cloud, failure) : status;
 }
 
@@ -133,23 +127,32 @@ build(hs_verlet *list, int next, const hs_options *options, double skin, hs_fail
     return status;
 }
 
-static hs_status
-update(hs_verlet *list, const hs_points *points, const hs_box *box, const hs_options *options,
-       double skin, bool rebuild, bool *rebuilt, hs_failure *failure)
+hs_status
+hs_verlet_update(hs_verlet *list, const hs_points *points, const hs_box *box,
+                 const hs_options *options, double skin, bool rebuild, bool *rebuilt,
+                 hs_failure *failure)
 {
     const hs_options plain = hs_options_default(); /* what is wanted is not looked at here */
+    hs_entry         entry;
     double           margin = -INFINITY;
     int              next = 0; /* the frame that is not in use */
+    if (list == NULL || options == NULL || rebuilt == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
+    }
     while (next == list->built || next == list->now) {
         next++;
     }
+    failure = hs_enter(failure, &entry);
+    hs_status status = hs_check_resources(options);
     if (!is_length(options->cutoff)) {
         failure->value = options->cutoff;
-        return HS_ERR_CUTOFF;
+        status = HS_ERR_CUTOFF;
     }
-    hs_status status = hs_check_resources(options);
     if (status == HS_OK) {
-        status = check(points, box, &plain, failure);
+        status = hs_check_arguments(points, NULL, box, &plain, failure);
+    }
+    if (status == HS_OK) {
+        status = hs_box_check(box, failure);
     }
     if (status == HS_OK) {
         status = hs_frame_take(points, box, options, &list->frames[next], failure);
@@ -165,20 +168,6 @@ update(hs_verlet *list, const hs_points *points, const hs_box *box, const hs_opt
         *rebuilt = needed;
         list->tried = margin;
     }
-    return status;
-}
-
-hs_status
-hs_verlet_update(hs_verlet *list, const hs_points *points, const hs_box *box,
-                 const hs_options *options, double skin, bool rebuild, bool *rebuilt,
-                 hs_failure *failure)
-{
-    hs_entry entry;
-    if (list == NULL || options == NULL || rebuilt == NULL) {
-        return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
-    }
-    failure = hs_enter(failure, &entry);
-    const hs_status status = update(list, points, box, options, skin, rebuild, rebuilt, failure);
     hs_leave(&entry);
     return status;
 }
@@ -212,13 +201,8 @@ hs_verlet_find(const hs_verlet *list, const hs_options *options, hs_pairs **resu
 static hs_scale
 scale_of_box(const hs_box *box)
 {
-    double largest = 0.0;
-    for (int l = 0; l < box->ndim; l++) {
-        for (int k = 0; box->periodic[l] && k < box->ndim; k++) {
-            largest = fmax(largest, fabs(box->rows[l][k]));
-        }
-    }
-    const int exponent = largest > 0.0 ? ilogb(largest) : 0;
+    const double largest = hs_box_size_of(box).largest;
+    const int    exponent = largest > 0.0 ? ilogb(largest) : 0;
     return hs_scale_of(exponent > LARGEST_EXPONENT ? exponent - LARGEST_EXPONENT : 0);
 }
 
@@ -248,36 +232,24 @@ hs_box_measure(const hs_box *box, double *heights, double *volume, hs_failure *f
     return status;
 }
 
-/* The column of the only entry of box vector r, if no other vector has one there, or -1. That
- * coordinate alone then says what is inside along r. */
-static int
-own_column(const hs_lattice *lattice, int r)
-{
-    int column = -1;
-    for (int k = 0; k < lattice->ndim; k++) {
-        if (lattice->rows[r][k] != 0.0) {
-            if (column >= 0) {
-                return -1;
-            }
-            column = k;
-        }
-    }
-    for (int other = 0; other < lattice->n_periodic; other++) {
-        if (other != r && lattice->rows[other][column] != 0.0) {
-            return -1;
-        }
-    }
-    return column;
-}
-
-/* A tiny negative coordinate plus the length rounds to the length: keep it inside. */
+/* A tiny negative coordinate plus the length rounds to the length: keep it inside. Along a box
+ * vector with one entry, in a column where no other has any, that coordinate alone says what is. */
 static void
 keep_inside(const hs_lattice *lattice, double *wrapped)
 {
     for (int r = 0; r < lattice->n_periodic; r++) {
-        const int k = own_column(lattice, r);
-        if (k >= 0 && fabs(wrapped[k]) >= fabs(lattice->rows[r][k])) {
-            wrapped[k] = nextafter(lattice->rows[r][k], 0.0);
+        for (int k = 0; k < lattice->ndim; k++) {
+            const double length = lattice->rows[r][k];
+            bool         is_alone = length != 0.0;
+            for (int c = 0; c < lattice->ndim; c++) {
+                is_alone = is_alone && (c == k || lattice->rows[r][c] == 0.0);
+            }
+            for (int other = 0; other < lattice->n_periodic; other++) {
+                is_alone = is_alone && (other == r || lattice->rows[other][k] == 0.0);
+            }
+            if (is_alone && fabs(wrapped[k]) >= fabs(length)) {
+                wrapped[k] = nextafter(length, 0.0);
+            }
         }
     }
 }
@@ -388,24 +360,10 @@ typedef struct place_axes {
     double            length[HS_MAX_DIM]; /* not scaled; aligned lattices only */
 } place_axes;
 
-/* A bound on |along[k] . B_r|, which is 0 but for rounding, or on its difference from 1. */
-static double
-rest_along(const place_axes *axes, int k, int r)
-{
-    const hs_lattice *lattice = axes->lattice;
-    double            sum = lattice->row_of_axis[k] == r ? -1.0 : 0.0;
-    double            terms = fabs(sum);
-    for (int c = 0; c < lattice->ndim; c++) {
-        const double term = axes->along[k][c] * lattice->rows[r][c];
-        sum += term;
-        terms += fabs(term);
-    }
-    return fabs(sum) + PLACE_ERROR * terms + axes->size[k] * lattice->row_error[r] + PLACE_LOSS;
-}
-
 /*
  * How far shifts may move the places of a pair, in the unit of box vectors, because along[k] is
- * rounded: the sum over rows r of |S_r| rest(k, r). For D = x_j - x_i + sum_r S_r B_r with
+ * rounded: the sum over rows r of |S_r| rest(k, r), a bound on |along[k] . B_r|, which is 0 but for
+ * rounding, or on its difference from 1. For D = x_j - x_i + sum_r S_r B_r with
  * |D| <= cutoff and |x| <= largest, |S_r| <= a_r + sum_m rest(r, m) |S_m| with
  * a_r = size_r (cutoff + 2 largest). Where the sum over m of rest(r, m) 2 a_m is at most a_r, as is
  * checked, |S_r| <= 2 a_r follows.
@@ -425,7 +383,15 @@ bound_drifts(const place_axes *axes, double cutoff, double largest, double *drif
         double of_all = 0.0;
         drift[k] = 0.0;
         for (int r = 0; r < lattice->n_periodic; r++) {
-            const double moved = rest_along(axes, k, r) * turns[r];
+            double sum = lattice->row_of_axis[k] == r ? -1.0 : 0.0, terms = fabs(sum);
+            for (int c = 0; c < lattice->ndim; c++) {
+                const double term = axes->along[k][c] * lattice->rows[r][c];
+                sum += term;
+                terms += fabs(term);
+            }
+            const double rest = fabs(sum) + PLACE_ERROR * terms +
+                                axes->size[k] * lattice->row_error[r] + PLACE_LOSS;
+            const double moved = rest * turns[r];
             of_all += moved;
             drift[k] += turns[r] < 0.5 ? 0.0 : moved;
         }
@@ -514,9 +480,7 @@ hs_box_places(const hs_box *box, const hs_points *points, double cutoff, double 
     place_axes axes;
     options.cutoff = cutoff;
     failure = hs_enter(failure, &entry);
-    hs_status status = found != NULL && is_length(largest)
-                           ? hs_check_arguments(points, NULL, box, &options, failure)
-                           : HS_ERR_ARGUMENT;
+    hs_status status = found != NULL && is_length(largest) ? HS_OK : HS_ERR_ARGUMENT;
     if (status == HS_OK && !is_length(cutoff)) {
         failure->value = cutoff;
         status = HS_ERR_CUTOFF;
@@ -524,8 +488,8 @@ hs_box_places(const hs_box *box, const hs_points *points, double cutoff, double 
     if (status == HS_OK) {
         status = load(points, box, &options, &cloud, failure);
     }
-    if (status == HS_OK && cloud.largest > largest) {
-        hs_cloud_free(NULL, &cloud);
+    const bool is_loaded = status == HS_OK;
+    if (is_loaded && cloud.largest > largest) {
         status = HS_ERR_ARGUMENT;
     }
     if (status == HS_OK) {
@@ -545,6 +509,8 @@ hs_box_places(const hs_box *box, const hs_points *points, double cutoff, double 
                 memset(places + k * stride, 0, (size_t)cloud.n * sizeof *places);
             }
         }
+    }
+    if (is_loaded) {
         hs_cloud_free(NULL, &cloud);
     }
     hs_leave(&entry);
@@ -555,43 +521,6 @@ hs_box_places(const hs_box *box, const hs_points *points, double cutoff, double 
 
 /* Pairs that take about as long as a point of a search with few neighbours. */
 #define PAIRS_A_POINT 8
-
-/* Once the arguments are sound. */
-static hs_status
-measure(const hs_points *points, const hs_box *box, const hs_pair_numbers *pairs, hs_pairs *result,
-        hs_failure *failure)
-{
-    hs_call     *call = &result->call;
-    hs_cloud     cloud;
-    hs_image_box images;
-    hs_status    status = hs_image_box_init(box, points->ndim, &images);
-    if (status == HS_ERR_BOX_SKEWED && pairs->shift != NULL) {
-        status = HS_OK; /* no image is looked for */
-    }
-    if (status == HS_OK && call->kernel == NULL) {
-        status = HS_ERR_KERNEL;
-    }
-    if (status != HS_OK) {
-        return status;
-    }
-    hs_call_gather(call, points->n + pairs->n / PAIRS_A_POINT);
-    status = hs_cloud_load(&call->account, call->team, points, &call->options, &cloud, failure);
-    if (status != HS_OK) {
-        return status;
-    }
-    status = hs_output_reserve(&result->output, pairs->n, 0.0);
-    if (status == HS_OK) {
-        const hs_given_pairs given = {pairs, &cloud, &images, &result->output};
-        result->output.n_pairs = pairs->n;
-        status = hs_given_pairs_measure(&given, call, failure);
-    } else {
-        failure->expected_pairs = (double)pairs->n;
-        failure->expected_bytes =
-            (double)pairs->n * (double)hs_output_bytes_per_pair(&result->output);
-    }
-    hs_cloud_free(&call->account, &cloud);
-    return status;
-}
 
 hs_status
 hs_measure(const hs_points *points, const hs_box *box, const hs_pair_numbers *pairs,
@@ -613,7 +542,10 @@ hs_measure(const hs_points *points, const hs_box *box, const hs_pair_numbers *pa
     if (measured == NULL) {
         return HS_ERR_MEMORY;
     }
-    hs_status status = hs_check_arguments(points, NULL, box, &of_pairs, failure);
+    hs_call     *call = &measured->call;
+    hs_cloud     cloud;
+    hs_image_box images;
+    hs_status    status = hs_check_arguments(points, NULL, box, &of_pairs, failure);
     if (status == HS_OK && (pairs == NULL || pairs->n < 0 || pairs->n > INT64_MAX / 1024 ||
                             (pairs->n > 0 && (pairs->i == NULL || pairs->j == NULL)))) {
         status = HS_ERR_ARGUMENT;
@@ -623,8 +555,31 @@ hs_measure(const hs_points *points, const hs_box *box, const hs_pair_numbers *pa
     }
     if (status == HS_OK) {
         hs_pairs_open(measured, points->ndim);
-        status = measure(points, box, pairs, measured, failure);
+        status = hs_image_box_init(box, points->ndim, &images);
+        if (status == HS_ERR_BOX_SKEWED && pairs->shift != NULL) {
+            status = HS_OK; /* no image is looked for */
+        }
     }
-    hs_call_tell_limit(&measured->call, status, failure);
+    if (status == HS_OK && call->kernel == NULL) {
+        status = HS_ERR_KERNEL;
+    }
+    if (status == HS_OK) {
+        hs_call_gather(call, points->n + pairs->n / PAIRS_A_POINT);
+        status = hs_cloud_load(&call->account, call->team, points, &call->options, &cloud, failure);
+    }
+    if (status == HS_OK) {
+        const hs_given_pairs given = {pairs, &cloud, &images, &measured->output};
+        status = hs_output_reserve(&measured->output, pairs->n, 0.0);
+        if (status == HS_OK) {
+            measured->output.n_pairs = pairs->n;
+            status = hs_given_pairs_measure(&given, call, failure);
+        } else {
+            failure->expected_pairs = (double)pairs->n;
+            failure->expected_bytes =
+                (double)pairs->n * (double)hs_output_bytes_per_pair(&measured->output);
+        }
+        hs_cloud_free(&call->account, &cloud);
+    }
+    hs_call_tell_limit(call, status, failure);
     return hs_pairs_finish(measured, status, measured->output.n_pairs, result);
 }

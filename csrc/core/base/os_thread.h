@@ -166,16 +166,9 @@ extern volatile int64_t hs_n_waiting; /* threads; hs_wake_waiting has nothing to
 void hs_test_fork(void); /* as if this process had just been forked off */
 #endif
 
-/* Numbers that several threads change, each function in one step. All threads see the steps of the
- * last four functions in one order. */
+/* Numbers that several threads change, each function in one step. All threads see these steps in
+ * one order. */
 #if defined(_MSC_VER) && !defined(__clang__)
-
-/* Returns *counter and adds 1 to it; orders nothing else. */
-HS_ALWAYS_INLINE int64_t
-hs_fetch_increment(volatile int64_t *counter)
-{
-    return InterlockedIncrement64(counter) - 1;
-}
 
 HS_ALWAYS_INLINE int64_t
 hs_atomic_load(volatile int64_t *x)
@@ -204,13 +197,6 @@ hs_atomic_swap_if(volatile int64_t *x, int64_t old, int64_t value)
 }
 
 #else
-
-/* Returns *counter and adds 1 to it; orders nothing else. */
-HS_ALWAYS_INLINE int64_t
-hs_fetch_increment(volatile int64_t *counter)
-{
-    return __atomic_fetch_add(counter, 1, __ATOMIC_RELAXED);
-}
 
 HS_ALWAYS_INLINE int64_t
 hs_atomic_load(volatile int64_t *x)

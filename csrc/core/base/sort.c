@@ -2,129 +2,18 @@
 #include "sort.h"
 #include "os.h"
 
-/* sort.c: sorts from the highest digit down. Each range looks for the highest bit in which its keys
- * differ and distributes by the eight bits from there, so that clusters far apart cost one pass and
- * not one for every digit of the distance. */
-
-#define DIGIT_BITS 8 /* 256 places to write to stay in the first-level cache */
-#define BUCKETS    (1 << DIGIT_BITS)
-#define FEW_KEYS   32 /* keys that insertion sorts in less time than clearing the counters takes */
-
-static void
-insert_keys(int64_t *keys, int32_t *ids, int64_t n)
-{
-    for (int64_t e = 1; e < n; e++) {
-        const int64_t key = keys[e];
-        const int32_t id = ids[e];
-        int64_t       at = e;
-        for (; at > 0 && keys[at - 1] > key; at--) {
-            keys[at] = keys[at - 1];
-            ids[at] = ids[at - 1];
-        }
-        keys[at] = key;
-        ids[at] = id;
-    }
-}
-
-/* The bits in which the keys differ; 0 when they need no sorting. */
-static uint64_t
-varying_bits(const int64_t *keys, int64_t n)
-{
-    uint64_t bits = 0;
-    bool     ordered = true;
-    for (int64_t e = 1; e < n; e++) {
-        bits |= (uint64_t)(keys[e] ^ keys[0]);
-        ordered = ordered & (keys[e - 1] <= keys[e]);
-    }
-    return ordered ? 0 : bits;
-}
-
-/* One stable pass by the digit at `shift`; end[b] becomes the end of bucket b. */
-static void
-distribute(hs_keys *sort, int64_t first, int64_t n, int shift, int32_t *end)
-{
-    int64_t *keys = sort->keys + first;
-    int32_t *ids = sort->ids + first;
-    int32_t  sum = 0;
-    memset(end, 0, BUCKETS * sizeof *end);
-    for (int64_t e = 0; e < n; e++) {
-        end[keys[e] >> shift & (BUCKETS - 1)]++;
-    }
-    for (int b = 0; b < BUCKETS; b++) {
-        const int32_t count = end[b];
-        end[b] = sum; /* where the bucket begins; counts up to its end */
-        sum += count;
-    }
-    for (int64_t e = 0; e < n; e++) {
-        const int32_t to = end[keys[e] >> shift & (BUCKETS - 1)]++;
-        sort->spare_keys[to] = keys[e];
-        sort->spare_ids[to] = ids[e];
-    }
-    memcpy(keys, sort->spare_keys, (size_t)n * sizeof *keys);
-    memcpy(ids, sort->spare_ids, (size_t)n * sizeof *ids);
-}
-
-hs_status
-hs_keys_sort(hs_keys *sort, int64_t first, int64_t end)
-{
-    int32_t       bucket_end[BUCKETS];
-    const int64_t n = end - first;
-    sort->work += n;
-    if (sort->work >= HS_POLL_POINTS) {
-        sort->work = 0;
-        if (hs_poll(sort->options, 0.0) != HS_OK) {
-            return HS_ERR_INTERRUPTED;
-        }
-    }
-    if (n <= FEW_KEYS) {
-        insert_keys(sort->keys + first, sort->ids + first, n);
-        return HS_OK;
-    }
-    const uint64_t varying = varying_bits(sort->keys + first, n);
-    if (varying == 0) {
-        return HS_OK;
-    }
-    const int bits = hs_count_bits(varying), shift = bits < DIGIT_BITS ? 0 : bits - DIGIT_BITS;
-    distribute(sort, first, n, shift, bucket_end);
-    if ((varying & ((UINT64_C(1) << shift) - 1)) == 0) {
-        return HS_OK; /* no lower digit differs */
-    }
-    int64_t begin = 0;
-    for (int b = 0; b < BUCKETS; b++) {
-        if (bucket_end[b] - begin > 1) {
-            const hs_status status = hs_keys_sort(sort, first + begin, first + bucket_end[b]);
-            if (status != HS_OK) {
-                return status;
-            }
-        }
-        begin = bucket_end[b];
-    }
-    return HS_OK;
-}
-
 /*
- * One digit, of about as many values as there are numbers, tells nearly all of them apart when they
- * are spread evenly; insertion does the rest. Where many agree in it, these are sorted by the
- * digits below.
+ * sort.c: one digit, of about as many values as there are keys, tells nearly all of them apart when
+ * they are spread evenly; insertion does the rest. Where many agree in it, these are sorted by the
+ * digits below, from the range of their own: clusters far apart cost one pass, and not one for
+ * every digit of the distance.
  */
 
-#define FEW_NUMBERS 24 /* numbers that are quicker sorted by insertion */
-#define CROWD       12 /* numbers with the same digit, beyond which insertion does not pay */
-#define LEAST_BITS  5  /* of a digit */
-#define MOST_BITS   10 /* its counts stay in the first-level cache */
-
-static void
-insert_numbers(uint64_t *numbers, int64_t n)
-{
-    for (int64_t e = 1; e < n; e++) {
-        const uint64_t moving = numbers[e];
-        int64_t        at = e;
-        for (; at > 0 && numbers[at - 1] > moving; at--) {
-            numbers[at] = numbers[at - 1];
-        }
-        numbers[at] = moving;
-    }
-}
+#define FEW_KEYS   24  /* keys that are quicker sorted by insertion */
+#define MANY       160 /* from here on two digits are quicker than one and insertion */
+#define CROWD      12  /* keys with the same digit, beyond which insertion does not pay */
+#define LEAST_BITS 5   /* of a digit */
+#define MOST_BITS  10  /* its counts stay in the first-level cache */
 
 int
 hs_count_bits(uint64_t number)
@@ -139,35 +28,96 @@ hs_count_bits(uint64_t number)
     return bits + (number != 0);
 }
 
-void
-hs_sort_numbers(uint64_t *numbers, int64_t n, uint64_t *spare)
+/* Sorts keys by their bits from `from` on, and ids with them unless they are NULL; those that agree
+ * in these keep their order. Inlined with constants for ids. */
+HS_ALWAYS_INLINE void
+insert(uint64_t *keys, int32_t *ids, int64_t n, int from)
 {
-    int64_t place[1 << MOST_BITS];
-    if (n <= FEW_NUMBERS) {
-        insert_numbers(numbers, n);
-        return;
+    for (int64_t e = 1; e < n; e++) {
+        const uint64_t key = keys[e];
+        const int32_t  id = ids != NULL ? ids[e] : 0;
+        int64_t        at = e;
+        for (; at > 0 && keys[at - 1] >> from > key >> from; at--) {
+            keys[at] = keys[at - 1];
+            if (ids != NULL) {
+                ids[at] = ids[at - 1];
+            }
+        }
+        keys[at] = key;
+        if (ids != NULL) {
+            ids[at] = id;
+        }
+    }
+}
+
+/* By two digits of keys that are less than 2^bits, above the lowest: without the branches of an
+ * insertion. */
+static void
+sort_two_digits(uint64_t *numbers, int64_t n, int from, uint64_t lowest, int bits, uint64_t *spare)
+{
+    uint32_t       lower[1 << MOST_BITS], upper[1 << MOST_BITS], sums[2] = {0, 0};
+    const int      width = (bits + 1) / 2;
+    const uint32_t mask = (UINT32_C(1) << width) - 1;
+    memset(lower, 0, sizeof *lower << width);
+    memset(upper, 0, sizeof *upper << width);
+    for (int64_t e = 0; e < n; e++) {
+        const uint32_t key = (uint32_t)((numbers[e] >> from) - lowest);
+        lower[key & mask]++;
+        upper[key >> width]++;
+    }
+    for (uint32_t digit = 0; digit <= mask; digit++) { /* from counts to where each digit begins */
+        const uint32_t in_lower = lower[digit], in_upper = upper[digit];
+        lower[digit] = sums[0];
+        upper[digit] = sums[1];
+        sums[0] += in_lower;
+        sums[1] += in_upper;
+    }
+    for (int64_t e = 0; e < n; e++) {
+        const uint32_t key = (uint32_t)((numbers[e] >> from) - lowest);
+        spare[lower[key & mask]++] = numbers[e];
+    }
+    for (int64_t e = 0; e < n; e++) {
+        const uint32_t key = (uint32_t)((spare[e] >> from) - lowest);
+        numbers[upper[key >> width]++] = spare[e];
+    }
+}
+
+/* As insert, for many: by their highest digit. Returns of how many of its values the keys are still
+ * to be sorted, those of value v from place[v] on; 0: all are in order. */
+HS_ALWAYS_INLINE int
+sort_by_digit(uint64_t *keys, int32_t *ids, int64_t n, int from, uint64_t *spare,
+              int32_t *spare_ids, int64_t *place)
+{
+    if (n <= FEW_KEYS) {
+        insert(keys, ids, n, from);
+        return 0;
     }
     int64_t ascending = 1;
-    while (ascending < n && numbers[ascending - 1] <= numbers[ascending]) {
+    while (ascending < n && keys[ascending - 1] >> from <= keys[ascending] >> from) {
         ascending++;
     }
     if (ascending == n) { /* as rows of pairs that are given in order */
-        return;
+        return 0;
     }
-    uint64_t low = numbers[0], high = numbers[0];
+    uint64_t lowest = keys[0] >> from, highest = lowest;
     for (int64_t e = 1; e < n; e++) {
-        low = numbers[e] < low ? numbers[e] : low;
-        high = numbers[e] > high ? numbers[e] : high;
+        const uint64_t key = keys[e] >> from;
+        lowest = key < lowest ? key : lowest;
+        highest = key > highest ? key : highest;
     }
+    const int range = hs_count_bits(highest - lowest);
     int       bits = LEAST_BITS; /* of the digit */
-    const int range = hs_count_bits(high - low);
     while (bits < MOST_BITS && n > INT64_C(1) << bits) {
         bits++;
+    }
+    if (ids == NULL && n >= MANY && n <= INT32_MAX && range > bits && range <= 2 * MOST_BITS) {
+        sort_two_digits(keys, n, from, lowest, range, spare);
+        return 0;
     }
     const int shift = range > bits ? range - bits : 0;
     memset(place, 0, sizeof *place << bits);
     for (int64_t e = 0; e < n; e++) {
-        place[(numbers[e] - low) >> shift]++;
+        place[((keys[e] >> from) - lowest) >> shift]++;
     }
     int64_t most = 0, sum = 0; /* from counts to where each digit ends */
     for (int digit = 0; digit < 1 << bits; digit++) {
@@ -176,17 +126,55 @@ hs_sort_numbers(uint64_t *numbers, int64_t n, uint64_t *spare)
         place[digit] = sum;
     }
     for (int64_t e = n; e-- > 0;) {
-        spare[--place[(numbers[e] - low) >> shift]] = numbers[e];
+        const int64_t to = --place[((keys[e] >> from) - lowest) >> shift];
+        spare[to] = keys[e];
+        if (ids != NULL) {
+            spare_ids[to] = ids[e];
+        }
     }
-    memcpy(numbers, spare, (size_t)n * sizeof *numbers);
-    if (most <= CROWD) {
-        insert_numbers(numbers, n);
-        return;
+    memcpy(keys, spare, (size_t)n * sizeof *keys);
+    if (ids != NULL) {
+        memcpy(ids, spare_ids, (size_t)n * sizeof *ids);
     }
-    for (int digit = 0; shift > 0 && digit < 1 << bits; digit++) { /* where each begins now */
-        const int64_t end = digit + 1 < 1 << bits ? place[digit + 1] : n;
-        if (end - place[digit] > 1) {
-            hs_sort_numbers(numbers + place[digit], end - place[digit], spare);
+    if (shift > 0 && most <= CROWD) {
+        insert(keys, ids, n, from);
+    }
+    return shift == 0 || most <= CROWD ? 0 : 1 << bits;
+}
+
+hs_status
+hs_keys_sort(hs_keys *sort, int64_t first, int64_t end)
+{
+    int64_t       place[(1 << MOST_BITS) + 1];
+    const int64_t n = end - first;
+    hs_status     status = HS_OK;
+    sort->work += n;
+    if (sort->work >= HS_POLL_POINTS) {
+        sort->work = 0;
+        status = hs_poll(sort->options, 0.0);
+    }
+    if (status == HS_OK) {
+        const int digits = sort_by_digit((uint64_t *)sort->keys + first, sort->ids + first, n, 0,
+                                         (uint64_t *)sort->spare_keys, sort->spare_ids, place);
+        place[digits] = n;
+        for (int digit = 0; status == HS_OK && digit < digits; digit++) {
+            if (place[digit + 1] - place[digit] > 1) {
+                status = hs_keys_sort(sort, first + place[digit], first + place[digit + 1]);
+            }
+        }
+    }
+    return status;
+}
+
+void
+hs_sort_numbers(uint64_t *numbers, int64_t n, int from, uint64_t *spare)
+{
+    int64_t   place[(1 << MOST_BITS) + 1];
+    const int digits = sort_by_digit(numbers, NULL, n, from, spare, NULL, place);
+    place[digits] = n;
+    for (int digit = 0; digit < digits; digit++) {
+        if (place[digit + 1] - place[digit] > 1) {
+            hs_sort_numbers(numbers + place[digit], place[digit + 1] - place[digit], from, spare);
         }
     }
 }

@@ -12,10 +12,8 @@
  * starts of parts from their lengths.
  */
 
-/*
- * A stable sort of point numbers by integer keys, quick whatever the keys are: its cost follows the
- * digits in which they differ, not their range.
- */
+/* Whatever the keys are, sorting takes time in proportion to how many there are; equal ones keep
+ * their order. */
 
 /* All four arrays are borrowed and equally long; the spare ones hold nothing between calls. */
 typedef struct hs_keys {
@@ -27,17 +25,12 @@ typedef struct hs_keys {
     int64_t           work;    /* keys moved since the last poll */
 } hs_keys;
 
-/* Sorts places [first, end) ascending; equal keys keep their order. HS_OK or HS_ERR_INTERRUPTED. */
+/* Sorts places [first, end) ascending. HS_OK or HS_ERR_INTERRUPTED. */
 hs_status hs_keys_sort(hs_keys *sort, int64_t first, int64_t end);
 
-/*
- * Sorts short arrays of 64-bit numbers, many one after the other: the rows of a table, whose
- * numbers are spread evenly as a rule. Whatever they are, time is in proportion to how many there
- * are.
- */
-
-/* Sorts n numbers ascending; `spare` has room for as many. */
-void hs_sort_numbers(uint64_t *numbers, int64_t n, uint64_t *spare);
+/* Sorts n numbers by their bits from `from` on, 0 to 63; those that agree in these keep their
+ * order. `spare` has room for as many. */
+void hs_sort_numbers(uint64_t *numbers, int64_t n, int from, uint64_t *spare);
 
 /* Bits up to the highest one that is set; 0 for 0. */
 int hs_count_bits(uint64_t number);

@@ -31,7 +31,8 @@ hs_status_text(hs_status status)
     case HS_ERR_NOT_FINITE: return "points must be finite";
     case HS_ERR_BOX_FINITE: return "box must be finite";
     case HS_ERR_BOX_DEPENDENT: return "periodic box vectors must be linearly independent";
-    case HS_ERR_BOX_SKEWED: return "the box is too skewed or too long for float64";
+    case HS_ERR_BOX_SKEWED:
+        return "the box is too skewed or too long for float64, or a point too far from it";
     case HS_ERR_TOO_MANY: return "too many points, systems or pairs";
     case HS_ERR_SHIFT_RANGE: return "a shift does not fit its integer type";
     case HS_ERR_ROUNDING: return "too far from the box for precision=\"double\"";
@@ -72,14 +73,6 @@ static const quantity quantities[HS_QUANTITIES] = {
     {HS_FOR_INDICES, sizeof(int32_t), 1},  /* HS_WANT_SHELL */
 };
 
-static size_t
-width_of(int k, int ndim, int index_bytes)
-{
-    const quantity *of = &quantities[k];
-    return (of->entry_bytes != 0 ? of->entry_bytes : (size_t)index_bytes) *
-           (size_t)(of->n_entries != 0 ? of->n_entries : ndim);
-}
-
 int
 hs_want_number(unsigned bit)
 {
@@ -90,18 +83,16 @@ hs_want_number(unsigned bit)
     return k;
 }
 
-size_t
-hs_want_width(unsigned bit, int ndim, int index_bytes)
-{
-    return width_of(hs_want_number(bit), ndim, index_bytes);
-}
-
 int64_t
 hs_want_bytes(unsigned want, int ndim, int index_bytes)
 {
     size_t bytes = 0;
     for (int k = 0; k < HS_QUANTITIES; k++) {
-        bytes += want >> k & 1u ? width_of(k, ndim, index_bytes) : 0;
+        const quantity *of = &quantities[k];
+        if (want >> k & 1u) {
+            bytes += (of->entry_bytes != 0 ? of->entry_bytes : (size_t)index_bytes) *
+                     (size_t)(of->n_entries != 0 ? of->n_entries : ndim);
+        }
     }
     return (int64_t)bytes;
 }

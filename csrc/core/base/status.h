@@ -41,10 +41,8 @@
 /* Every HS_WANT_ bit that needs no other options. */
 #define HS_WANT_ALL (2u * HS_WANT_BOTH - 1u)
 
-/* Bytes of one pair in the column of this HS_WANT_ bit. index_bytes: 4 or 8, of i and j. */
-size_t hs_want_width(unsigned bit, int ndim, int index_bytes);
-
-/* Bytes of one pair in the columns of all bits of `want`. */
+/* Bytes of one pair in the columns of all HS_WANT_ bits of `want`. index_bytes: 4 or 8, of i and
+ * j. */
 int64_t hs_want_bytes(unsigned want, int ndim, int index_bytes);
 
 /* The number of a bit, from 0 on; HS_QUANTITIES for what is not one bit of them. */

@@ -400,7 +400,7 @@ reduce(hs_lattice *lattice)
 }
 
 /*
- * Exact linear independence, by elimination modulo primes just below 2^62.
+ * Exact linear independence, by elimination modulo primes just below 2^31.
  *
  * Multiplying a row by a power of two keeps the rank, so the rows may be taken as integers. If
  * they are independent, some n x n minor is a nonzero integer, at most B by Hadamard's
@@ -409,36 +409,24 @@ reduce(hs_lattice *lattice)
  *   - deficient rank modulo primes whose product exceeds B proves dependence: their product
  *     divides every minor, and zero is the only multiple of it that small.
  * The first prime settles practically every independent box; only dependent rows and rows made
- * for the purpose go further. Numbers are kept as in Montgomery (1985), scaled by R = 2^64.
+ * for the purpose go further.
  */
 
-/* The largest primes below 2^62, each so much below the one before: enough for all rows. */
-enum { PRIMES = 280 };
-static const uint16_t prime_gaps[PRIMES] = {
-    57,  30,  30, 26,  10,  14, 4,   24,  8,  70,  14, 30,  126, 40,  12, 80, 6,   22,  30,  30,
-    102, 8,   4,  14,  22,  18, 92,  58,  12, 8,   6,  10,  180, 44,  52, 60, 80,  82,  38,  22,
-    6,   14,  22, 56,  24,  4,  2,   120, 58, 30,  12, 120, 30,  30,  38, 46, 30,  30,  38,  66,
-    16,  8,   22, 24,  90,  30, 42,  78,  14, 78,  24, 16,  68,  30,  36, 96, 18,  180, 30,  4,
-    2,   6,   54, 60,  144, 16, 8,   6,   12, 108, 34, 62,  30,  6,   70, 60, 230, 84,  28,  26,
-    76,  26,  82, 72,  38,  46, 20,  46,  74, 34,  6,  36,  24,  36,  24, 30, 20,  6,   6,   52,
-    48,  30,  20, 112, 90,  38, 52,  20,  10, 8,   64, 24,  66,  8,   48, 78, 34,  12,  66,  2,
-    30,  12,  16, 48,  36,  8,  22,  6,   14, 46,  12, 12,  78,  12,  36, 8,  42,  4,   6,   78,
-    14,  100, 48, 24,  20,  10, 38,  162, 78, 102, 36, 28,  42,  170, 52, 36, 24,  20,  106, 14,
-    6,   6,   54, 36,  70,  50, 58,  6,   20, 4,   66, 104, 100, 6,   14, 16, 32,  48,  22,  8,
-    60,  4,   26, 22,  20,  64, 110, 18,  16, 12,  18, 14,  42,  16,  60, 60, 24,  24,  24,  12,
-    68,  22,  8,  28,  30,  32, 192, 60,  88, 78,  80, 138, 22,  24,  14, 30, 34,  50,  72,  46,
-    140, 34,  30, 6,   18,  72, 38,  12,  52, 6,   2,  24,  46,  20,  42, 48, 22,  8,   40,  8,
-    94,  12,  14, 52,  2,   22, 98,  46,  90, 2,   64, 20,  10,  38,  16, 2,  34,  36,  20,  60,
-};
+#define LARGEST_PRIME UINT64_C(0x7fffffff) /* 2^31 - 1: products of residues fit 64 bits */
+#define PRIME_BITS    30                   /* of a number that each prime used here passes */
 
-/* Bits of a number that each of them passes. */
-#define PRIME_BITS 61
-
-typedef struct modulus {
-    uint64_t p;
-    uint64_t negated_inverse; /* -1/p modulo R */
-    uint64_t large;           /* 2^61 R modulo p */
-} modulus;
+/* Primes below 2^31 are some twenty apart. */
+static uint64_t
+prime_below(uint64_t p)
+{
+    uint64_t divisor = 2;
+    do {
+        p -= 2;
+        for (divisor = 3; divisor * divisor <= p && p % divisor != 0; divisor += 2) {
+        }
+    } while (divisor * divisor <= p);
+    return p;
+}
 
 /* A row as integers, mantissa * 2^exponent. */
 typedef struct integer_row {
@@ -446,112 +434,43 @@ typedef struct integer_row {
     int     exponent[HS_MAX_DIM]; /* not negative, least 0 */
 } integer_row;
 
-/* 0 <= a, b < p < 2^62: a b / R modulo p. */
-HS_ALWAYS_INLINE uint64_t
-multiply_exactly(const modulus *m, uint64_t a, uint64_t b)
-{
-#if HS_HAVE_INT128
-    hs_uint128 product = (hs_uint128)a * b;
-    uint64_t   factor = (uint64_t)product * m->negated_inverse;
-    uint64_t   result = (uint64_t)((product + (hs_uint128)factor * m->p) >> 64);
-#else
-    uint64_t operands[2][2] = {{a, b}, {0, m->p}};
-    uint64_t high[2], low = 0;
-    for (int k = 0; k < 2; k++) {
-        uint64_t x = operands[k][0], y = operands[k][1];
-        uint64_t x0 = x & UINT32_MAX, x1 = x >> 32, y0 = y & UINT32_MAX, y1 = y >> 32;
-        uint64_t middle = x1 * y0 + ((x0 * y0) >> 32); /* at most 2^64 - 2^32 */
-        uint64_t other = x0 * y1 + (middle & UINT32_MAX);
-        high[k] = x1 * y1 + (middle >> 32) + (other >> 32);
-        if (k == 0) {
-            low = x * y;
-            operands[1][0] = low * m->negated_inverse;
-        }
-    }
-    /* The low halves cancel: they add up to R, or to nothing where both are zero. */
-    uint64_t result = high[0] + high[1] + (low != 0);
-#endif
-    return result >= m->p ? result - m->p : result;
-}
-
-HS_ALWAYS_INLINE uint64_t
-add(const modulus *m, uint64_t a, uint64_t b)
-{
-    return a + b >= m->p ? a + b - m->p : a + b;
-}
-
-static modulus
-make_modulus(uint64_t p)
-{
-    modulus  m;
-    uint64_t inverse = p; /* of p modulo 2^3, as of any odd number; each step doubles the bits */
-    for (int bits = 3; bits < 64; bits *= 2) {
-        inverse *= 2 - p * inverse;
-    }
-    m.p = p;
-    m.negated_inverse = 0 - inverse;
-    m.large = (0 - p) % p; /* R modulo p */
-    for (int bit = 0; bit < 61; bit++) {
-        m.large = add(&m, m.large, m.large);
-    }
-    return m;
-}
-
 /* Returns bits enough for every integer of the row, or -1 if all are zero. */
 static int
 load_row(int ndim, const double row[], integer_row *integers)
 {
-    int least = INT32_MAX, bits = -1;
+    int least = INT32_MAX, most = INT32_MIN;
     for (int k = 0; k < ndim; k++) {
-        uint64_t word;
-        memcpy(&word, &row[k], sizeof word);
-        int      biased = (int)((word >> 52) & 2047);
-        uint64_t mantissa = word & ((UINT64_C(1) << 52) - 1);
-        mantissa |= biased != 0 ? UINT64_C(1) << 52 : 0;
-        integers->mantissa[k] = word >> 63 ? -(int64_t)mantissa : (int64_t)mantissa;
-        integers->exponent[k] = biased != 0 ? biased - 1 : 0; /* of the least subnormal: 0 */
-        if (mantissa != 0 && integers->exponent[k] < least) {
-            least = integers->exponent[k];
+        int exponent;
+        integers->mantissa[k] = (int64_t)ldexp(frexp(row[k], &exponent), 53);
+        integers->exponent[k] = exponent;
+        if (row[k] != 0.0) {
+            least = exponent < least ? exponent : least;
+            most = exponent > most ? exponent : most;
         }
     }
     for (int k = 0; k < ndim; k++) {
-        integers->exponent[k] -= least;
-        if (integers->mantissa[k] != 0 && integers->exponent[k] + 53 > bits) {
-            bits = integers->exponent[k] + 53;
-        }
+        integers->exponent[k] = row[k] != 0.0 ? integers->exponent[k] - least : 0;
     }
-    return bits;
-}
-
-/* out: the row modulo p. */
-static void
-take_residues(const modulus *m, int ndim, const integer_row *row, uint64_t out[])
-{
-    for (int k = 0; k < ndim; k++) {
-        const int64_t mantissa = row->mantissa[k];
-        uint64_t      residue = mantissa < 0 ? m->p - (uint64_t)-mantissa : (uint64_t)mantissa;
-        int           exponent = row->exponent[k];
-        for (; exponent >= 61; exponent -= 61) {
-            residue = multiply_exactly(m, residue, m->large);
-        }
-        for (; exponent > 0; exponent--) {
-            residue = add(m, residue, residue);
-        }
-        out[k] = residue;
-    }
+    return most < least ? -1 : most - least + 53;
 }
 
 /*
  * Elimination without division: what is left of a row is multiplied by the pivot instead. For
- * the rank a row's factor is of no account, nor is the 1/R that every product brings.
+ * the rank a row's factor is of no account.
  */
 static bool
 full_rank(uint64_t p, int ndim, int n_rows, const integer_row rows[])
 {
-    modulus  m = make_modulus(p);
-    uint64_t a[HS_MAX_DIM][HS_MAX_DIM];
-    for (int k = 0; k < n_rows; k++) {
-        take_residues(&m, ndim, &rows[k], a[k]);
+    uint64_t a[HS_MAX_DIM][HS_MAX_DIM]; /* modulo p */
+    for (int r = 0; r < n_rows; r++) {
+        for (int k = 0; k < ndim; k++) {
+            const int64_t  mantissa = rows[r].mantissa[k];
+            const uint64_t size = (uint64_t)(mantissa < 0 ? -mantissa : mantissa) % p;
+            a[r][k] = mantissa < 0 && size > 0 ? p - size : size;
+            for (int left = rows[r].exponent[k]; left > 0; left -= 32) {
+                a[r][k] = (a[r][k] << (left < 32 ? left : 32)) % p;
+            }
+        }
     }
     for (int k = 0; k < n_rows; k++) {
         int column = 0;
@@ -561,45 +480,15 @@ full_rank(uint64_t p, int ndim, int n_rows, const integer_row rows[])
         if (column == ndim) {
             return false;
         }
-        uint64_t pivot = a[k][column];
+        const uint64_t pivot = a[k][column];
         for (int i = k + 1; i < n_rows; i++) {
-            uint64_t factor = a[i][column];
-            if (factor == 0) {
-                continue;
-            }
-            factor = p - factor;
+            const uint64_t factor = p - a[i][column];
             for (int c = 0; c < ndim; c++) {
-                a[i][c] = add(&m, multiply_exactly(&m, pivot, a[i][c]),
-                              multiply_exactly(&m, factor, a[k][c]));
+                a[i][c] = (pivot * a[i][c] % p + factor * a[k][c] % p) % p;
             }
         }
     }
     return true;
-}
-
-/* n_rows (0 ... ndim) rows of ndim finite doubles, of any magnitude. A rounded determinant could
- * not tell. */
-static bool
-rows_are_independent(int ndim, int n_rows, const double rows[][HS_MAX_DIM])
-{
-    integer_row integers[HS_MAX_DIM];
-    int         bound_bits = 0;
-    HS_ASSERT(0 <= n_rows && n_rows <= ndim && ndim <= HS_MAX_DIM);
-    for (int k = 0; k < n_rows; k++) {
-        int bits = load_row(ndim, rows[k], &integers[k]);
-        if (bits < 0) {
-            return false;
-        }
-        bound_bits += bits + 2; /* a minor's row is no longer than sqrt(8) 2^bits */
-    }
-    uint64_t p = UINT64_C(1) << 62;
-    for (int k = 0; k < PRIMES && k * PRIME_BITS <= bound_bits; k++) { /* 8 * 2102 bits at most */
-        p -= prime_gaps[k];
-        if (full_rank(p, ndim, n_rows, integers)) {
-            return true;
-        }
-    }
-    return false;
 }
 
 hs_scale
@@ -651,8 +540,9 @@ rows_are_aligned(int ndim, int n_rows, const double rows[][HS_MAX_DIM], int *col
 hs_status
 hs_box_check(const hs_box *box, hs_failure *failure)
 {
-    double rows[HS_MAX_DIM][HS_MAX_DIM];
-    int    vector_of_row[HS_MAX_DIM], column[HS_MAX_DIM];
+    double      rows[HS_MAX_DIM][HS_MAX_DIM];
+    int         vector_of_row[HS_MAX_DIM], column[HS_MAX_DIM];
+    integer_row integers[HS_MAX_DIM];
     if (box == NULL) {
         return HS_OK;
     }
@@ -667,34 +557,24 @@ hs_box_check(const hs_box *box, hs_failure *failure)
         }
     }
     const int n_periodic = collect_periodic_rows(box, rows, vector_of_row);
-    if (rows_are_aligned(box->ndim, n_periodic, rows, column) ||
-        rows_are_independent(box->ndim, n_periodic, rows)) {
+    int       bound_bits = 0;
+    if (rows_are_aligned(box->ndim, n_periodic, rows, column)) {
         return HS_OK;
     }
     failure->row = -1; /* unless one of them is zero */
     for (int r = n_periodic - 1; r >= 0; r--) {
-        integer_row ignored;
-        failure->row = load_row(box->ndim, rows[r], &ignored) < 0 ? vector_of_row[r] : failure->row;
+        const int bits = load_row(box->ndim, rows[r], &integers[r]);
+        failure->row = bits < 0 ? vector_of_row[r] : failure->row;
+        bound_bits += bits + 2; /* a minor's row is no longer than sqrt(8) 2^bits */
+    }
+    uint64_t p = LARGEST_PRIME;
+    for (int bits = 0; failure->row < 0 && bits <= bound_bits; bits += PRIME_BITS) {
+        if (full_rank(p, box->ndim, n_periodic, integers)) { /* 8 * 2102 bits at most */
+            return HS_OK;
+        }
+        p = prime_below(p);
     }
     return HS_ERR_BOX_DEPENDENT;
-}
-
-/* Largest entry brought near 1 by a power of two, so that squares neither overflow nor vanish.
- * Returns that power's exponent. */
-static int
-copy_of_unit_size(int ndim, const double *row, double *copy)
-{
-    double largest = 0.0;
-    int    exponent;
-    for (int k = 0; k < ndim; k++) {
-        largest = hs_larger(fabs(row[k]), largest);
-    }
-    (void)frexp(largest, &exponent);
-    const hs_scale scale = hs_scale_of(exponent);
-    for (int k = 0; k < ndim; k++) {
-        copy[k] = hs_scale_apply(scale, row[k]);
-    }
-    return exponent;
 }
 
 /* Remove from v what lies along n_basis orthonormal vectors (twice: the first pass rounds), then
@@ -733,22 +613,32 @@ hs_lattice_volume(const hs_lattice *lattice, int exponent)
     return power == 0 ? lattice->volume_mantissa : ldexp(lattice->volume_mantissa, power);
 }
 
+/* Sets v to the part of row r of B that is orthogonal to n_basis vectors, with length 1. Returns
+ * its length before that, times 2^-*exponent. */
+static double
+orthonormal_row(const hs_lattice *lattice, int r, int n_basis, double basis[][HS_MAX_DIM],
+                double *v, int *exponent)
+{
+    scaled_row row;
+    (void)set_row(lattice->ndim, lattice->rows[r], 0, &row);
+    memcpy(v, row.x, (size_t)lattice->ndim * sizeof *v);
+    *exponent = row.exponent;
+    return orthonormalise(lattice->ndim, n_basis, basis, v);
+}
+
 /* The unit vector that is orthogonal to all rows of B but row r. */
 static void
 set_periodic_normal(hs_lattice *lattice, int r, double *normal)
 {
-    double    basis[HS_MAX_DIM][HS_MAX_DIM];
-    const int ndim = lattice->ndim;
-    int       n_basis = 0;
+    double basis[HS_MAX_DIM][HS_MAX_DIM];
+    int    n_basis = 0, exponent;
     for (int other = 0; other < lattice->n_periodic; other++) {
         if (other != r) {
-            copy_of_unit_size(ndim, lattice->rows[other], basis[n_basis]);
-            orthonormalise(ndim, n_basis, basis, basis[n_basis]);
+            (void)orthonormal_row(lattice, other, n_basis, basis, basis[n_basis], &exponent);
             n_basis++;
         }
     }
-    copy_of_unit_size(ndim, lattice->rows[r], normal);
-    orthonormalise(ndim, n_basis, basis, normal);
+    (void)orthonormal_row(lattice, r, n_basis, basis, normal, &exponent);
 }
 
 /* Orthonormal vectors that are orthogonal to all rows of B, one for each open grid axis. Each
@@ -758,12 +648,10 @@ set_open_normals(hs_lattice *lattice)
 {
     double    basis[HS_MAX_DIM][HS_MAX_DIM];
     const int ndim = lattice->ndim;
-    int       n_basis = 0;
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        const int    exponent = copy_of_unit_size(ndim, lattice->rows[r], basis[n_basis]);
-        const double length = orthonormalise(ndim, n_basis, basis, basis[n_basis]);
+    int       n_basis = lattice->n_periodic, exponent;
+    for (int r = 0; r < n_basis; r++) {
+        const double length = orthonormal_row(lattice, r, r, basis, basis[r], &exponent);
         multiply_volume(lattice, length, exponent);
-        n_basis++;
     }
     for (int k = 0; k < ndim; k++) {
         if (lattice->row_of_axis[k] >= 0) {
@@ -882,38 +770,38 @@ hs_lattice_init(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice
 }
 
 /*
- * The vector whose product with given box vector l is 1, and 0 with the others: a combination of
- * the dual vectors of the short basis, which are accurate however skewed the box is. Scaled by
- * 2^*exponent to have an ordinary size. False where a height of the short basis has vanished.
+ * The height of given box vector l over the others, and the unit vector along it. The vector whose
+ * product with that box vector is 1, and 0 with the others, is a combination of the dual vectors of
+ * the short basis, which are accurate however skewed the box is. 0 where a height of the short
+ * basis has vanished.
  */
-static bool
-dual_of_given(const hs_lattice *reduced, int l, double *dual, int *exponent)
+static double
+height_of_given(const hs_lattice *reduced, int l, double *normal)
 {
     const int d = reduced->ndim;
-    *exponent = -INT32_MAX / 4;
-    memset(dual, 0, (size_t)d * sizeof(double));
+    double    shortest = INFINITY;
+    memset(normal, 0, (size_t)d * sizeof(double));
     for (int k = 0; k < d; k++) {
         const int r = reduced->row_of_axis[k];
         if (r >= 0 && !(reduced->period[k] > 0.0)) {
-            return false;
+            return 0.0;
         }
-        if (r >= 0 && reduced->U[r][l] != 0) {
-            const int e = ilogb((double)reduced->U[r][l]) - ilogb(reduced->period[k]);
-            *exponent = e > *exponent ? e : *exponent;
-        }
+        shortest = r >= 0 && reduced->U[r][l] != 0 ? hs_smaller(reduced->period[k], shortest)
+                                                   : shortest;
     }
+    const int      exponent = ilogb(shortest);
+    const hs_scale scale = hs_scale_of(exponent);
     for (int c = 0; c < d; c++) {
         for (int k = 0; k < d; k++) {
             const int r = reduced->row_of_axis[k];
             if (r >= 0 && reduced->U[r][l] != 0) {
-                int          e;
-                const double period = frexp(reduced->period[k], &e);
-                dual[c] += ldexp((double)reduced->U[r][l] / period * reduced->normal[k][c],
-                                 -e - *exponent);
+                normal[c] += (double)reduced->U[r][l] / hs_scale_apply(scale, reduced->period[k]) *
+                             reduced->normal[k][c];
             }
         }
     }
-    return true;
+    const double length = orthonormalise(d, 0, NULL, normal);
+    return length > 0.0 ? ldexp(1.0 / length, exponent) : 0.0;
 }
 
 void
@@ -926,14 +814,8 @@ hs_lattice_init_given(const hs_box *box, hs_scale scale, hs_lattice *lattice)
     lattice->volume_exponent = reduced.volume_exponent;
     for (int l = 0; l < lattice->n_periodic; l++) {
         const int k = lattice->vector_of_row[l];
-        double   *normal = lattice->normal[k];
-        int       exponent = 0;
-        double    length = 0.0;
-        if (dual_of_given(&reduced, l, normal, &exponent)) {
-            length = orthonormalise(lattice->ndim, 0, NULL, normal);
-        }
         lattice->row_of_axis[k] = l;
-        lattice->period[k] = length > 0.0 ? ldexp(1.0 / length, -exponent) : 0.0;
+        lattice->period[k] = height_of_given(&reduced, l, lattice->normal[k]);
     }
     for (int c = 0; reduced.aligned && !reduced.reduced && c < box->ndim; c++) {
         if (reduced.row_of_axis[c] >= 0) { /* nothing to round */
@@ -1006,8 +888,6 @@ hs_skew_or_memory(const hs_lattice *lattice)
 #define GROW (1.0 + 0x1p-40)
 /* More than all underflows of a sum of products lose. */
 #define LOST 0x1p-1060
-/* Sweeps of rotations: they converge quadratically, and whatever is left is measured. */
-#define SWEEPS 12
 
 /* c = a b; returns how far, at most, an entry may be from that of the exact product. */
 static double
@@ -1029,87 +909,31 @@ multiply_matrices(int rows, int inner, int columns, const double a[][HS_MAX_DIM]
     return worst * GROW + LOST;
 }
 
-/* At most the smallest (sign = -1), or at least the largest (sign = 1), eigenvalue of M M^T, by
- * Gershgorin's circles. */
+/* At most the smallest singular value of F (d rows of d), by Gershgorin's circles of F F^T; 0 where
+ * it may vanish. */
 static double
-bound_eigenvalue(int d, const double M[][HS_MAX_DIM], double sign)
+smallest_stretch(int d, const double F[][HS_MAX_DIM])
 {
-    double bound = sign * -INFINITY;
+    double least = INFINITY;
     for (int a = 0; a < d; a++) {
         double radius = 0.0, centre = 0.0;
         for (int b = 0; b < d; b++) {
             double dot = 0.0, size = 0.0;
             for (int k = 0; k < d; k++) {
-                dot += M[a][k] * M[b][k];
-                size += fabs(M[a][k]) * fabs(M[b][k]);
+                dot += F[a][k] * F[b][k];
+                size += fabs(F[a][k]) * fabs(F[b][k]);
             }
             radius += (b == a ? 0.0 : fabs(dot)) + (d + 1) * UNIT * size + LOST;
             centre = b == a ? dot : centre;
         }
         /* The sum and its rounding, to the safe side. */
-        const double reach = radius * GROW + fabs(centre) * 0x1p-50;
-        const double end = centre + sign * reach;
-        bound = sign > 0.0 ? hs_larger(end, bound) : hs_smaller(end, bound);
-        if (!(end == end)) {
-            return NAN;
+        const double end = centre - (radius * GROW + fabs(centre) * 0x1p-50);
+        if (!(end > 0x1p-900) || !(end < 0x1p900)) {
+            return 0.0;
         }
+        least = hs_smaller(end, least);
     }
-    return bound;
-}
-
-/* Rotates rows a and b of M, and of V, so that those of M become orthogonal. */
-static void
-rotate_rows(int d, double M[][HS_MAX_DIM], double V[][HS_MAX_DIM], int a, int b)
-{
-    double aa = 0.0, bb = 0.0, ab = 0.0;
-    for (int k = 0; k < d; k++) {
-        aa += M[a][k] * M[a][k];
-        bb += M[b][k] * M[b][k];
-        ab += M[a][k] * M[b][k];
-    }
-    if (ab == 0.0) {
-        return;
-    }
-    const double zeta = (bb - aa) / (2.0 * ab);
-    const double t = (zeta >= 0.0 ? 1.0 : -1.0) / (fabs(zeta) + sqrt(1.0 + zeta * zeta));
-    const double c = 1.0 / sqrt(1.0 + t * t), s = c * t;
-    for (int k = 0; k < d; k++) {
-        const double m = M[a][k], v = V[a][k];
-        M[a][k] = c * m - s * M[b][k];
-        M[b][k] = s * m + c * M[b][k];
-        V[a][k] = c * v - s * V[b][k];
-        V[b][k] = s * v + c * V[b][k];
-    }
-}
-
-/* At most the smallest singular value of F (d rows of d); 0 or less where it may vanish. */
-static double
-smallest_stretch(int d, const double F[][HS_MAX_DIM])
-{
-    double M[HS_MAX_DIM][HS_MAX_DIM], V[HS_MAX_DIM][HS_MAX_DIM];
-    for (int a = 0; a < d; a++) {
-        for (int k = 0; k < d; k++) {
-            M[a][k] = F[a][k];
-            V[a][k] = a == k;
-        }
-    }
-    for (int sweep = 0; sweep < SWEEPS; sweep++) {
-        for (int a = 0; a < d; a++) {
-            for (int b = a + 1; b < d; b++) {
-                rotate_rows(d, M, V, a, b);
-            }
-        }
-    }
-    /* V is nearly orthogonal and V F has nearly orthogonal rows. Neither is trusted: both are
-     * measured. With x = y V: |x F|^2 = |y (V F)|^2 and |x|^2 = |y V|^2. */
-    const double off = multiply_matrices(d, d, d, (const double(*)[HS_MAX_DIM])V, F, M);
-    const double least = bound_eigenvalue(d, (const double(*)[HS_MAX_DIM])M, -1.0);
-    const double most = bound_eigenvalue(d, (const double(*)[HS_MAX_DIM])V, 1.0);
-    if (!(least > 0x1p-900) || !(least < 0x1p900) || !(most < 2.0) || !(most > 0.5)) {
-        return 0.0;
-    }
-    /* 2^-48 is more than the six roundings; `off` moves a singular value by its norm at most. */
-    return (sqrt(least) - d * off * GROW) / sqrt(most) * (1.0 - 0x1p-48);
+    return sqrt(least) * (1.0 - 0x1p-48); /* more than its rounding */
 }
 
 /* F = 1 + sum_r g_r^T (h_r - h0_r), g_r being the vectors dual to h0: a first guess. */

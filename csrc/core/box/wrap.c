@@ -156,54 +156,38 @@ hs_wrap_point(const hs_lattice *lattice, const double *r, double *inside, int64_
  */
 
 #define TILE  256 /* points at a time: they, and all work arrays, stay in the nearest cache */
-#define LANES 8   /* extremes kept side by side, so that the loops over them can be vectors */
+#define LANES 4   /* extremes kept side by side: one chain would wait for itself */
 /* Up to here, in periods, x is wrapped by one turn at most; below 1.5 with room for rounding. */
 #define ONE_TURN 1.25
 
-hs_wrap_range
-hs_wrap_range_none(void)
-{
-    hs_wrap_range none = {.failed = -1};
-    for (int k = 0; k < HS_MAX_DIM; k++) {
-        none.lower[k] = INFINITY;
-        none.upper[k] = -INFINITY;
-    }
-    return none;
-}
-
 void
-hs_wrap_range_join(hs_wrap_range *folded, const hs_wrap_range *more)
+hs_range_widen(const double *x, int64_t n, hs_range *range)
 {
-    for (int k = 0; k < HS_MAX_DIM; k++) {
-        folded->x_largest[k] = fmax(folded->x_largest[k], more->x_largest[k]);
-        folded->lower[k] = fmin(folded->lower[k], more->lower[k]);
-        folded->upper[k] = fmax(folded->upper[k], more->upper[k]);
-    }
-    folded->magnitude = fmax(folded->magnitude, more->magnitude);
-    if (folded->failed < 0 || (more->failed >= 0 && more->failed < folded->failed)) {
-        folded->failed = more->failed;
-    }
-}
-
-/* Largest |x|, or `largest` if that is larger. */
-static double
-fold_largest(const double *x, int64_t n, double largest)
-{
-    double  lane[LANES] = {0.0};
+    double  lower[LANES], upper[LANES], poison[LANES];
     int64_t i = 0;
+    for (int l = 0; l < LANES; l++) {
+        lower[l] = INFINITY;
+        upper[l] = -INFINITY;
+        poison[l] = 0.0;
+    }
     for (; i + LANES <= n; i += LANES) {
         for (int l = 0; l < LANES; l++) {
-            const double size = fabs(x[i + l]);
-            lane[l] = size > lane[l] ? size : lane[l];
+            const double entry = x[i + l];
+            lower[l] = hs_smaller(entry, lower[l]);
+            upper[l] = hs_larger(entry, upper[l]);
+            poison[l] += entry - entry;
         }
     }
     for (; i < n; i++) {
-        largest = fmax(largest, fabs(x[i]));
+        lower[0] = hs_smaller(x[i], lower[0]);
+        upper[0] = hs_larger(x[i], upper[0]);
+        poison[0] += x[i] - x[i];
     }
     for (int l = 0; l < LANES; l++) {
-        largest = fmax(largest, lane[l]);
+        range->lower = hs_smaller(lower[l], range->lower);
+        range->upper = hs_larger(upper[l], range->upper);
+        range->poison += poison[l];
     }
-    return largest;
 }
 
 /* At most one turn each way. Written so that compilers vectorise it: 1 and 0 for true and false,
@@ -256,7 +240,6 @@ hs_fold_axis(const hs_lattice *lattice, int k, double *x, int64_t first, int64_t
             }
         }
     }
-    folded->x_largest[k] = 0.5 * length;
 }
 
 double
@@ -435,7 +418,9 @@ move_inside(const hs_lattice *lattice, int k, const double *HS_RESTRICT x, tile 
         const double given = x[i], moved = inside[i];
         inside[i] = work->moved[i] != 0.0 ? moved : given;
     }
-    folded->magnitude = fold_largest(work->absolute, work->n, folded->magnitude);
+    hs_range absolute = HS_NO_RANGE;
+    hs_range_widen(work->absolute, work->n, &absolute);
+    folded->magnitude = hs_larger(absolute.upper, folded->magnitude);
 }
 
 /* Ranges of the coordinates t_k of the points inside, joined to *folded. Returns whether along any
@@ -449,33 +434,15 @@ find_ranges(const hs_lattice *lattice, tile *work, hs_wrap_range *folded)
         inside[k] = work->inside[k];
     }
     for (int k = 0; k < lattice->ndim; k++) {
-        double lower[LANES], upper[LANES], low = INFINITY, high = -INFINITY;
-        int    i = 0;
+        hs_range t = HS_NO_RANGE, x = HS_NO_RANGE;
         hs_fold_coordinates(lattice, k, inside, work->n, work->t);
-        for (int l = 0; l < LANES; l++) {
-            lower[l] = INFINITY;
-            upper[l] = -INFINITY;
-        }
-        for (; i + LANES <= work->n; i += LANES) {
-            for (int l = 0; l < LANES; l++) {
-                const double t = work->t[i + l];
-                lower[l] = t < lower[l] ? t : lower[l];
-                upper[l] = t > upper[l] ? t : upper[l];
-            }
-        }
-        for (; i < work->n; i++) {
-            lower[0] = fmin(lower[0], work->t[i]);
-            upper[0] = fmax(upper[0], work->t[i]);
-        }
-        for (int l = 0; l < LANES; l++) {
-            low = fmin(low, lower[l]);
-            high = fmax(high, upper[l]);
-        }
-        folded->lower[k] = fmin(folded->lower[k], low);
-        folded->upper[k] = fmax(folded->upper[k], high);
-        folded->x_largest[k] = fold_largest(inside[k], work->n, folded->x_largest[k]);
+        hs_range_widen(work->t, work->n, &t);
+        hs_range_widen(inside[k], work->n, &x);
+        folded->lower[k] = hs_smaller(t.lower, folded->lower[k]);
+        folded->upper[k] = hs_larger(t.upper, folded->upper[k]);
+        folded->x_largest[k] = hs_larger(hs_larger(-x.lower, x.upper), folded->x_largest[k]);
         const double half = 0.5 * lattice->period[k];
-        beyond = beyond || (lattice->row_of_axis[k] >= 0 && !(low >= -half && high <= half));
+        beyond = beyond || (lattice->row_of_axis[k] >= 0 && !(t.lower >= -half && t.upper <= half));
     }
     return beyond;
 }
@@ -504,23 +471,6 @@ fold_one_by_one(const hs_lattice *lattice, const double *const *x, const hs_turn
     return -1;
 }
 
-static void
-put_turns(const hs_turns *turns, int row, int64_t begin, const tile *work)
-{
-    const double *HS_RESTRICT turned = work->turned[row];
-    const int                 n = work->n;
-    if (turns->narrow[row] != NULL) {
-        int32_t *HS_RESTRICT to = turns->narrow[row] + begin;
-        for (int i = 0; i < n; i++) {
-            to[i] = (int32_t)turned[i];
-        }
-    } else {
-        for (int i = 0; i < n; i++) {
-            turns->wide[row][begin + i] = (int64_t)turned[i];
-        }
-    }
-}
-
 /* The quick way. Returns false where some points have too many turns or may need a second pass. */
 static bool
 fold_tile(const hs_lattice *lattice, double most, const double *const *x, const hs_turns *turns,
@@ -543,7 +493,9 @@ fold_tile(const hs_lattice *lattice, double most, const double *const *x, const 
     }
     *folded = found;
     for (int row = 0; row < lattice->n_periodic; row++) {
-        put_turns(turns, row, begin, work);
+        for (int i = 0; i < work->n; i++) {
+            hs_turns_set(turns, row, begin + i, (int64_t)work->turned[row][i]);
+        }
     }
     return true;
 }
@@ -681,20 +633,6 @@ set_unit_vectors(hs_image_box *to)
     return HS_OK;
 }
 
-/* Whether scaling has lost nothing. */
-static bool
-keeps_digits(const hs_lattice *lattice, hs_scale scale)
-{
-    const hs_scale back = hs_scale_of(-scale.exponent);
-    bool           same = true;
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        for (int k = 0; k < lattice->ndim; k++) {
-            same = same && hs_scale_apply(back, lattice->scaled[r][k]) == lattice->given[r][k];
-        }
-    }
-    return same;
-}
-
 hs_status
 hs_image_box_init(const hs_box *box, int ndim, hs_image_box *to)
 {
@@ -708,17 +646,17 @@ hs_image_box_init(const hs_box *box, int ndim, hs_image_box *to)
             largest = hs_larger(fabs(box->rows[l][k]), largest);
         }
     }
-    /* Along coordinate axes as they are given nothing overflows, and no digit may be lost. */
+    /* Along coordinate axes nothing overflows, and no digit may be lost. */
     to->scale = hs_scale_of(0);
     hs_lattice_init(box, ndim, to->scale, &to->lattice);
-    if (!to->lattice.aligned || to->lattice.reduced) {
+    if (!to->lattice.aligned) {
         to->scale = hs_scale_of(ilogb(largest));
         hs_lattice_init(box, ndim, to->scale, &to->lattice);
     }
     hs_metric_init(&to->metric, ndim, to->lattice.n_periodic,
                    (const double(*)[HS_MAX_DIM])to->lattice.given, 1.0, true);
     if (to->lattice.aligned) {
-        return keeps_digits(&to->lattice, to->scale) ? HS_OK : HS_ERR_BOX_SKEWED;
+        return HS_OK;
     }
     return hs_skew_is_left(&to->lattice) ? HS_ERR_BOX_SKEWED : set_unit_vectors(to);
 }

@@ -5,6 +5,8 @@
 #include "lattice.h"
 #include "../exact/metric.h"
 
+#include <math.h>
+
 /*
  * wrap.h: X = r - w B, with integers w that bring the point r into the box. Nothing is lost: any w
  * will do, because a pair's shift S is corrected by w_i - w_j, in integers.
@@ -62,6 +64,17 @@ hs_turns_set(const hs_turns *turns, int row, int64_t i, int64_t value)
     }
 }
 
+/* Range of some numbers. */
+typedef struct hs_range {
+    double lower, upper;
+    double poison; /* 0, or NaN once a number was infinite or NaN */
+} hs_range;
+
+#define HS_NO_RANGE ((hs_range){INFINITY, -INFINITY, 0.0})
+
+/* Widens the range to n more numbers; those that are NaN change the poison alone. */
+void hs_range_widen(const double *x, int64_t n, hs_range *range);
+
 /* What wrapping found out about the points. */
 typedef struct hs_wrap_range {
     double  x_largest[HS_MAX_DIM]; /* at least the largest |X_k| */
@@ -70,12 +83,6 @@ typedef struct hs_wrap_range {
     double  magnitude; /* the largest sum of absolute terms of any point */
     int64_t failed;    /* lowest point that could not be wrapped, or -1 */
 } hs_wrap_range;
-
-/* The result of wrapping no point. */
-hs_wrap_range hs_wrap_range_none(void);
-
-/* Joins `more` to *folded. */
-void hs_wrap_range_join(hs_wrap_range *folded, const hs_wrap_range *more);
 
 /*
  * Along coordinate axis k of an aligned lattice: x[first, last) are wrapped in place. `largest`: at
@@ -112,10 +119,10 @@ double hs_fold_turns(const hs_lattice *lattice, double largest);
 
 /* A box made ready; plain values, nothing owned. */
 typedef struct hs_image_box {
-    hs_metric  metric;  /* of the points and box vectors as given */
-    hs_scale   scale;   /* of the lattice; unless the box is aligned as given, its longest entry is
-                         * from 1 to 2 */
-    hs_lattice lattice; /* in a short basis */
+    hs_metric  metric;     /* of the points and box vectors as given */
+    hs_scale   scale;      /* of the lattice; unless that is aligned, its longest entry is from 1 to
+                         * 2 */
+    hs_lattice lattice;    /* in a short basis */
     int order[HS_MAX_DIM]; /* of the rows of B: the shortest first, unless that is aligned ... */
     /* ... when row order[r] of B is the sum of R[r][k] along[k] over k <= r. */
     double along[HS_MAX_DIM][HS_MAX_DIM]; /* unit vectors at right angles */

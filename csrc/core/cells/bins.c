@@ -201,19 +201,6 @@ gather_column(hs_team *team, const hs_options *options, const hs_bins *bins, siz
     return hs_walk_slabs(team, options, bins->n, gather_slab, &move);
 }
 
-static hs_status
-gather_doubles(hs_team *team, const hs_options *options, const hs_bins *bins,
-               double *columns[HS_MAX_DIM], void **free_column)
-{
-    hs_status status = HS_OK;
-    for (int k = 0; k < bins->ndim && status == HS_OK; k++) {
-        void *column = columns[k];
-        status = gather_column(team, options, bins, sizeof(double), &column, free_column);
-        columns[k] = column;
-    }
-    return status;
-}
-
 hs_status
 hs_bins_arrange(hs_account *account, hs_team *team, const hs_options *options,
                 const hs_scene *scene, hs_bins *bins)
@@ -223,9 +210,13 @@ hs_bins_arrange(hs_account *account, hs_team *team, const hs_options *options,
     double  **first = scene->x_is_beside ? bins->originals : bins->x;
     double  **second = scene->x_is_beside ? bins->x : bins->originals;
     void     *free_column = scene->cloud.spare;
-    hs_status status = gather_doubles(team, options, bins, first, &free_column);
-    if (status == HS_OK && bins->keeps_originals) {
-        status = gather_doubles(team, options, bins, second, &free_column);
+    const int n = bins->keeps_originals ? 2 * bins->ndim : bins->ndim;
+    hs_status status = HS_OK;
+    for (int c = 0; c < n && status == HS_OK; c++) {
+        double **at = c < bins->ndim ? &first[c] : &second[c - bins->ndim];
+        void    *column = *at;
+        status = gather_column(team, options, bins, sizeof(double), &column, &free_column);
+        *at = column;
     }
     for (int r = 0; bins->turns.known && r < bins->n_periodic && status == HS_OK; r++) {
         const bool   narrow = bins->turns.narrow[r] != NULL;
@@ -257,7 +248,7 @@ sort_few(hs_account *account, const sorting *sort, uint64_t *numbers, hs_bins *b
     for (int64_t i = 0; i < n; i++) {
         numbers[i] = (uint64_t)sort->cells[i] << 32 | (uint64_t)i;
     }
-    hs_sort_numbers(numbers, n, spare);
+    hs_sort_numbers(numbers, n, 32, spare);
     hs_free(account, spare);
     for (int64_t si = 0, run = 0; si < n; si++) {
         bins->order[si] = (int32_t)(uint32_t)numbers[si];

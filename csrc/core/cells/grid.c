@@ -137,9 +137,8 @@ shorten_cells(const hs_scene *scene, const hs_grid *grid, double *counts)
     counts[0] = fmin(floor(product), most);
 }
 
-#define UNIT                0x1p-53
-#define SLACK               HS_GRID_SLACK
-#define MOST_CELLS_PER_AXIS CELLS_PER_AXIS
+#define UNIT  0x1p-53
+#define SLACK HS_GRID_SLACK
 /* Cost of sorting a point into its cell, in candidates. */
 #define SORTING_COST 40.0
 
@@ -256,7 +255,7 @@ hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *grid)
         grid->range[k] * grid->cells_per_length[k] * (1.0 + SLACK) + 0x1p-50 * count;
     if (open && !(cells < count - 1.0)) {
         grid->reach[k] = grid->shape[k] - 1;
-    } else if (cells < MOST_CELLS_PER_AXIS - 2.0) { /* windows of cells are int32 */
+    } else if (cells < CELLS_PER_AXIS - 2.0) { /* windows of cells are int32 */
         grid->reach[k] = (int64_t)cells + 1;
     } else {
         return HS_ERR_MEMORY;
@@ -330,13 +329,6 @@ set_ranges(const hs_scene *scene, hs_grid *grid)
     return HS_OK;
 }
 
-/* Fills the failure where there would be more pairs than any memory holds. */
-static void
-tell_endless(hs_failure *failure)
-{
-    failure->expected_pairs = failure->expected_bytes = INFINITY;
-}
-
 /* Ranges, errors and expected pairs, no cells yet; *density: points in a unit of the volume that
  * they are in. */
 static hs_status
@@ -357,8 +349,8 @@ grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure *fa
     if (!(volume > 0.0)) { /* points on one spot, cutoff 0 */
         grid->expected_pairs = 0.5 * (double)scene->n * (double)(scene->n - 1);
     }
-    if (status == HS_ERR_MEMORY) {
-        tell_endless(failure);
+    if (status == HS_ERR_MEMORY) { /* more pairs than any memory holds */
+        failure->expected_pairs = failure->expected_bytes = INFINITY;
     }
     return status;
 }
@@ -406,7 +398,7 @@ hs_grid_init(const hs_scene *scene, hs_grid_kind kind, hs_grid *grid, hs_failure
     if (status != HS_OK) {
         status = hs_skew_or_memory(&scene->lattice);
         if (status == HS_ERR_MEMORY) {
-            tell_endless(failure);
+            failure->expected_pairs = failure->expected_bytes = INFINITY;
         }
     }
     return status;
@@ -468,27 +460,21 @@ axes_are_dual(const hs_lattice *lattice)
     return true;
 }
 
-/* The frame of an aligned lattice: its directions are the coordinate axes. */
+/* Gram-Schmidt on the directions, first axis first; checked, not trusted. Those of an aligned
+ * lattice are the coordinate axes. */
 static void
-set_unit_frame(int ndim, frame *axes)
-{
-    axes->usable = axes->diagonal = true;
-    for (int k = 0; k < ndim; k++) {
-        for (int c = 0; c <= k; c++) {
-            axes->lower[k][c] = k == c ? 1.0 : 0.0;
-        }
-    }
-}
-
-/* Gram-Schmidt on the directions, first axis first; checked, not trusted. */
-static void
-set_triangular_frame(const hs_lattice *lattice, frame *axes)
+set_frame(const hs_lattice *lattice, frame *axes)
 {
     double    q[HS_MAX_DIM][HS_MAX_DIM];
     const int d = lattice->ndim;
-    axes->usable = axes_are_dual(lattice);
-    axes->diagonal = false;
+    axes->usable = lattice->aligned || axes_are_dual(lattice);
+    axes->diagonal = lattice->aligned;
     for (int k = 0; k < d; k++) {
+        if (lattice->aligned) {
+            memset(axes->lower[k], 0, (size_t)d * sizeof(double));
+            axes->lower[k][k] = 1.0;
+            continue;
+        }
         memcpy(q[k], lattice->direction[k], sizeof q[k]);
         memset(axes->lower[k], 0, (size_t)d * sizeof(double));
         for (int pass = 0; pass < 2; pass++) {
@@ -647,10 +633,8 @@ hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene 
     frame        axes;
     axes.usable = false; /* the own row alone needs none */
     *stencil = (hs_stencil){0};
-    if (bound > 1.0 && scene->lattice.aligned) {
-        set_unit_frame(grid->ndim, &axes);
-    } else if (bound > 1.0) {
-        set_triangular_frame(&scene->lattice, &axes);
+    if (bound > 1.0) {
+        set_frame(&scene->lattice, &axes);
     }
     if (bound > (axes.usable ? (double)INT32_MAX : MOST_UNPRUNED)) {
         return hs_skew_or_memory(&scene->lattice);
@@ -724,18 +708,6 @@ wide_enough(double range, double width)
     return part > width && part <= width * (1.0 + 0x1p-18) ? part : width;
 }
 
-/* Returns whether any axis had more than one. */
-static bool
-halve_counts(int ndim, double *counts)
-{
-    bool any = false;
-    for (int k = 0; k < ndim; k++) {
-        any = any || counts[k] > 1.0;
-        counts[k] = fmax(floor(0.5 * counts[k]), 1.0);
-    }
-    return any;
-}
-
 hs_status
 hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_wider,
                   hs_failure *failure)
@@ -753,8 +725,13 @@ hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_w
     }
     *is_wider = cap_counts(scene->ndim, grid_most_cells(scene), counts);
     while (set_shape(scene, counts, grid) != HS_OK || stencil_bound(grid) > MOST_ROWS) {
+        bool any = false; /* axis had more than one */
+        for (int k = 0; k < scene->ndim; k++) {
+            any = any || counts[k] > 1.0;
+            counts[k] = fmax(floor(0.5 * counts[k]), 1.0);
+        }
         *is_wider = true;
-        if (!halve_counts(scene->ndim, counts)) {
+        if (!any) {
             return HS_TRY_OTHER;
         }
     }

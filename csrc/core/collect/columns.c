@@ -33,7 +33,7 @@ hs_output_init(hs_account *account, int ndim, unsigned columns, int index_bytes,
 size_t
 hs_output_width(const hs_output *output, unsigned bit)
 {
-    return hs_want_width(bit, output->ndim, output->index_bytes);
+    return (size_t)hs_want_bytes(bit, output->ndim, output->index_bytes);
 }
 
 /* Write to the caller's arrays. */

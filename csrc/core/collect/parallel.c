@@ -93,7 +93,7 @@ take_range(hs_committer *committer)
     if (!more) {
         return false;
     }
-    committer->range = hs_fetch_increment(&commits->next_range);
+    committer->range = hs_atomic_add(&commits->next_range, 1);
     return committer->range < commits->crew->n_ranges;
 }
 
@@ -360,8 +360,7 @@ search_range(void *context, int64_t range)
     const int64_t     first = job->start.point + range * job->in_range;
     const int64_t     end = first + (n - first < job->in_range ? n - first : job->in_range);
     walker->scanner.blocks_to_skip = range == 0 ? job->start.blocks : 0;
-    hs_status status =
-        hs_walk_or_tell(walker, (int32_t)first, (int32_t)end, &me->committer.failure);
+    hs_status status = hs_walk(walker, (int32_t)first, (int32_t)end, &me->committer.failure);
     if (status == HS_STOPPED && scanner->leaves) {
         /* The output is full: what the worker has is written, and its place is kept. */
         status = hs_commit(&me->committer, hs_scanner_fraction(scanner), false);
@@ -407,7 +406,7 @@ open_walk_worker(void *context, void *place)
     me->committer.options = &walker->scanner.options;
     me->keeper.committer = &me->committer;
     if (visitor == NULL) {
-        status = hs_walker_init(search, hs_record_use(job->output->columns), collect_hits,
+        status = hs_walker_init(search, hs_record_use(job->output->columns), NULL, collect_hits,
                                 &me->keeper, walker);
         return status == HS_OK
                    ? hs_recorder_init(&search->call->account, me->committer.pairs,
@@ -415,10 +414,7 @@ open_walk_worker(void *context, void *place)
                    : status;
     }
     void *state = visitor->state_size > 0 ? (void *)(me + 1) : visitor->shared;
-    status = visitor->most == NULL
-                 ? hs_walker_init(search, visitor->use, visitor->visit, state, walker)
-                 : hs_walker_init_ordered(search, visitor->use, visitor->most, visitor->visit,
-                                          state, walker);
+    status = hs_walker_init(search, visitor->use, visitor->most, visitor->visit, state, walker);
     return status == HS_OK && visitor->open != NULL ? visitor->open(visitor->shared, state, walker)
                                                     : status;
 }
@@ -528,7 +524,7 @@ record_alone(hs_search *search, bool is_new, hs_keeper *keeper, hs_output *outpu
     const hs_block_use use = hs_record_use(output->columns);
     const hs_visit_fn  visit = collects ? collect_hits : hs_record_hits;
     void              *context = collects ? (void *)keeper : recorder;
-    hs_status          status = is_new ? hs_walker_init(search, use, visit, context, walker)
+    hs_status          status = is_new ? hs_walker_init(search, use, NULL, visit, context, walker)
                                        : hs_walker_renew(search, use, visit, context, walker);
     if (status == HS_OK && (recorder->output != output || recorder->columns != output->columns ||
                             recorder->most_hits < walker->scanner.block.most_hits)) {
@@ -537,7 +533,7 @@ record_alone(hs_search *search, bool is_new, hs_keeper *keeper, hs_output *outpu
         hs_account_keep(account);
     }
     if (status == HS_OK) {
-        status = hs_walk_or_tell(walker, 0, (int32_t)hs_search_asking(search)->n, failure);
+        status = hs_walk(walker, 0, (int32_t)hs_search_asking(search)->n, failure);
     }
     if (!is_new) {
         hs_walker_flush_counters(search, walker);
@@ -580,7 +576,7 @@ hs_parallel_count(hs_search *search, hs_keeper *keeper, int64_t *count, hs_failu
     hs_status status = hs_walker_renew(search, HS_BLOCK_COUNTS, NULL, NULL, &keeper->walker);
     if (status == HS_OK) {
         const int64_t n = hs_search_asking(search)->n;
-        status = hs_walk_or_tell(&keeper->walker, 0, (int32_t)n, failure);
+        status = hs_walk(&keeper->walker, 0, (int32_t)n, failure);
         *count += keeper->walker.scanner.n_found;
     }
     hs_walker_flush_counters(search, &keeper->walker);

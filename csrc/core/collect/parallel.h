@@ -89,7 +89,7 @@ hs_status hs_crew_run(hs_crew *crew, hs_failure *failure);
  */
 typedef struct hs_visitor {
     hs_block_use            use;
-    const hs_neighbourhood *most;       /* NULL, or for hs_walker_init_ordered */
+    const hs_neighbourhood *most;       /* NULL, or of hs_walker_init */
     hs_visit_fn             visit;      /* gets the state */
     void                   *shared;     /* borrowed */
     size_t                  state_size; /* bytes; 0: the shared one is the state */

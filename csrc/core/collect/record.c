@@ -428,8 +428,7 @@ is_backward(const hs_pair_batch *pair_batch, int32_t e)
 {
     const int m = pair_batch->search->scene.lattice.n_periodic;
     for (int l = 0; l < m; l++) {
-        const int64_t shift = pair_batch->of.is_narrow ? pair_batch->shift[l][e]
-                                                       : pair_batch->given[l][e];
+        const int64_t shift = pair_batch->given[l][e];
         if (shift != 0) {
             return shift < 0;
         }
@@ -527,35 +526,6 @@ find_keys(const hs_pair_batch *pair_batch, int64_t keys[][HS_BATCH])
     return pair_batch->n;
 }
 
-/* S over all box vectors, zero on open ones, when all are few. */
-static void
-put_narrow(const hs_pair_batch *pair_batch, const double *sign, int32_t *to)
-{
-    const hs_lattice *lattice = &pair_batch->search->scene.lattice;
-    const int         d = lattice->ndim;
-    int32_t           flip[HS_BATCH]; /* 0, or -1 to negate: (x ^ -1) - -1 */
-    for (int32_t e = 0; e < pair_batch->n; e++) {
-        flip[e] = -(sign[e] < 0.0);
-    }
-    if (d == 3 && lattice->n_periodic == 3) { /* most scenes: one pair after the other */
-        const int32_t *x = pair_batch->shift[0], *y = pair_batch->shift[1],
-                      *z = pair_batch->shift[2];
-        for (int32_t e = 0; e < pair_batch->n; e++, to += 3) {
-            to[lattice->vector_of_row[0]] = (x[e] ^ flip[e]) - flip[e];
-            to[lattice->vector_of_row[1]] = (y[e] ^ flip[e]) - flip[e];
-            to[lattice->vector_of_row[2]] = (z[e] ^ flip[e]) - flip[e];
-        }
-        return;
-    }
-    for (int l = 0; l < lattice->n_periodic; l++) {
-        const int32_t *shift = pair_batch->shift[l];
-        int32_t       *column = to + lattice->vector_of_row[l];
-        for (int32_t e = 0; e < pair_batch->n; e++) {
-            column[(int64_t)e * d] = (shift[e] ^ flip[e]) - flip[e];
-        }
-    }
-}
-
 /* S over all box vectors, zero on open ones. Returns the first pair whose S does not fit int32, or
  * their number. */
 static int32_t
@@ -570,10 +540,6 @@ put_shifts(const hs_recorder *recorder, const hs_pair_batch *pair_batch, const d
     int32_t  fitting = pair_batch->n;
     if (m < d) {
         memset(to, 0, (size_t)pair_batch->n * (size_t)d * sizeof *to);
-    }
-    if (pair_batch->of.is_narrow) { /* what is left out is zero, or common to all images */
-        put_narrow(pair_batch, sign, to);
-        return fitting;
     }
     if (keys_only) {
         fitting = find_keys(pair_batch, keys);
@@ -671,11 +637,11 @@ put_ordered(const hs_recorder *recorder, const hs_kernel *kernel, const hs_hits 
     const int32_t    n = hits->end[hits->n - 1];
     char            *both = hs_output_next(output, HS_WANT_BOTH);
     if (recorder->columns & (HS_WANT_I | HS_WANT_J)) {
-        (bytes == 8 ? kernel->emit_int64 : kernel->emit_int32)(
-            hits, hs_output_next(output, HS_WANT_I), hs_output_next(output, HS_WANT_J));
+        kernel->emit(hits, bytes, hs_output_next(output, HS_WANT_I),
+                     hs_output_next(output, HS_WANT_J));
     }
     if (both != NULL) {
-        kernel->emit_int32(hits, recorder->ends[0], recorder->ends[1]);
+        kernel->emit(hits, 4, recorder->ends[0], recorder->ends[1]);
         hs_put_indices(both, bytes, 2, recorder->ends[0], 1, n);
         hs_put_indices(both + bytes, bytes, 2, recorder->ends[1], 1, n);
     }

@@ -171,7 +171,7 @@ hs_sort_row(const hs_sorting *all, uint64_t *row, int64_t n, uint64_t *spare)
         sort_any(all, row, n);
         return;
     }
-    hs_sort_numbers(row, n, spare);
+    hs_sort_numbers(row, n, all->place_bits, spare);
     for (int64_t first = 0, end; all->shift != NULL && first < n; first = end) {
         const uint64_t j = row[first] >> all->place_bits;
         for (end = first + 1; end < n && row[end] >> all->place_bits == j;) {

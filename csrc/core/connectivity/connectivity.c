@@ -12,31 +12,24 @@
 /* Entries between two calls of poll(). */
 #define POLL_ENTRIES (INT64_C(1) << 21)
 
-HS_ALWAYS_INLINE void
-copy_components(int32_t *to, const int32_t *from, int d, bool turned)
-{
-    for (int k = 0; k < d; k++) {
-        to[k] = turned ? (int32_t)(0u - (uint32_t)from[k]) : from[k];
-    }
-}
-
 /* Copies a shift, or its opposite. A loop of three is no loop. */
 HS_ALWAYS_INLINE void
 copy_shift(int32_t *to, const int32_t *from, int d, bool turned)
 {
-    if (d == 3) {
-        copy_components(to, from, 3, turned);
-    } else {
-        copy_components(to, from, d, turned);
+    for (int k = 0; k < (d == 3 ? 3 : d); k++) {
+        to[k] = turned ? (int32_t)(0u - (uint32_t)from[k]) : from[k];
     }
 }
 
 /* ---- which node a point is ------------------------------------------------------------------ */
 
-/* The point of each node. False unless each node is one point. */
+/* Fills the map, list after list. False where the counts are not those of n nodes, or some node is
+ * not one point. */
 static bool
-find_points(const int32_t *number, hs_node_map *map)
+fill_map(const hs_node_lists *lists, hs_node_map *map)
 {
+    const int32_t *number = lists->number;
+    int64_t        end = 0;
     for (int32_t k = 0; k < map->n; k++) {
         map->point[k] = number != NULL ? -1 : k;
     }
@@ -47,14 +40,6 @@ find_points(const int32_t *number, hs_node_map *map)
         }
         map->point[node] = p;
     }
-    return true;
-}
-
-/* All else of each node, list after list. False where the counts are not those of n nodes. */
-static bool
-fill_map(const hs_node_lists *lists, hs_node_map *map)
-{
-    int64_t end = 0;
     for (int32_t l = 0; l < map->n_lists; l++) {
         const int64_t first = end, count = lists->n_nodes[l];
         const int64_t ghosts = lists->n_ghosts != NULL ? lists->n_ghosts[l] : 0;
@@ -91,7 +76,7 @@ hs_node_map_make(hs_account *account, const hs_node_lists *lists, int64_t n, hs_
         map->row = map->node + n;
         map->point = map->row + n;
         map->is_ghost = (bool *)(map->point + n);
-        status = find_points(lists->number, map) && fill_map(lists, map) ? HS_OK : HS_ERR_ARGUMENT;
+        status = fill_map(lists, map) ? HS_OK : HS_ERR_ARGUMENT;
     }
     if (status != HS_OK) {
         hs_node_map_free(account, map);
@@ -636,27 +621,13 @@ keep_entries(const keeping *doing, int32_t l, int64_t first, int64_t last, new_r
         }
     }
     if (n > 0) {
-        hs_sort_numbers(doing->entries, n, doing->spare);
+        hs_sort_numbers(doing->entries, n, 32, doing->spare);
     }
     for (int64_t k = 0; k < n; k++) {
         const int64_t e = first + (int64_t)(doing->entries[k] & UINT32_MAX);
         put_entry(to, to->n++, target[rows->indices[e]], rows, e);
     }
     return true;
-}
-
-static hs_status
-keep_row(const hs_call *call, const keeping *doing, int64_t row, new_rows *to)
-{
-    hs_status status = HS_OK;
-    for (int32_t l = 0; l < doing->rows->n_lists && status == HS_OK; l++) {
-        int64_t first, last;
-        status = read_range(doing->rows, row * doing->rows->n_lists + l, &first, &last) &&
-                         last - first <= to->room - to->n && keep_entries(doing, l, first, last, to)
-                     ? end_entry(call, last - first, to)
-                     : HS_ERR_ARGUMENT;
-    }
-    return status;
 }
 
 hs_status
@@ -675,7 +646,15 @@ hs_kept_rows_fill(hs_call *call, const hs_list_rows *rows, const hs_node_change 
     }
     for (int64_t k = 0; status == HS_OK && k < n; k++) {
         const int64_t row = source != NULL ? source[k] : k;
-        status = row >= 0 && row < rows->n ? keep_row(call, &doing, row, &to) : HS_ERR_ARGUMENT;
+        status = row >= 0 && row < rows->n ? HS_OK : HS_ERR_ARGUMENT;
+        for (int32_t l = 0; l < rows->n_lists && status == HS_OK; l++) {
+            int64_t first, last;
+            status = read_range(rows, row * rows->n_lists + l, &first, &last) &&
+                             last - first <= to.room - to.n &&
+                             keep_entries(&doing, l, first, last, &to)
+                         ? end_entry(call, last - first, &to)
+                         : HS_ERR_ARGUMENT;
+        }
     }
     result->output.n_pairs = status == HS_OK ? to.n : 0;
     hs_free(&call->account, doing.first);

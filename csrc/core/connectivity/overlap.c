@@ -1,119 +1,40 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-#include "overlap.h"
+#include "connectivity.h"
 #include "../base/sort.h"
 #include "../base/os.h"
 #include "../collect/parallel.h"
-#include "../exact/metric.h"
 #include "../scene/points.h"
 
 #include <string.h>
 #include <math.h>
 
 /* overlap.c: the Z curve through a box; what is between the two of a pair, from marks on
- * neighbours; and points that gather a common point, from sets of bits, or of images from lists. */
+ * neighbours; and points that gather a common point, from sets of bits. */
 
 /* ---- the Z curve ----------------------------------------------------------------------------- */
 
-/* The number of the slice that x is in, of 2^bits equal ones from low to high. It is found by one
- * division and one multiplication by a power of two. Rounding keeps the order of numbers in both,
- * so that a larger coordinate never has a lower slice. */
-static uint64_t
-slice_of(double x, double low, double high, int bits)
-{
-    double above = x - low, width = high - low;
-    if (!(width <= 0x1.fffffffffffffp1023)) { /* the difference of two large numbers */
-        above = 0.5 * x - 0.5 * low;
-        width = 0.5 * high - 0.5 * low;
-    }
-    if (!(width > 0.0)) {
-        return 0;
-    }
-    const double   slice = ldexp(above / width, bits); /* a quotient of at most 1 */
-    const uint64_t last = (UINT64_C(1) << bits) - 1;
-    return slice >= ldexp(1.0, bits) ? last : (uint64_t)slice;
-}
-
+/* Each coordinate is in a slice of 2^bits equal ones, which is found by one division and one
+ * multiplication by a power of two. Rounding keeps the order of numbers in both, so that a larger
+ * coordinate never has a lower slice. */
 uint64_t
 hs_morton_key(const double *x, const double *low, const double *high, int ndim)
 {
-    const int bits = 63 / ndim;
-    uint64_t  key = 0;
+    const int      bits = 63 / ndim;
+    const uint64_t last = (UINT64_C(1) << bits) - 1;
+    uint64_t       key = 0;
     for (int k = 0; k < ndim; k++) {
-        const uint64_t slice = slice_of(x[k], low[k], high[k], bits);
+        double above = x[k] - low[k], width = high[k] - low[k];
+        if (!(width <= 0x1.fffffffffffffp1023)) { /* the difference of two large numbers */
+            above = 0.5 * x[k] - 0.5 * low[k];
+            width = 0.5 * high[k] - 0.5 * low[k];
+        }
+        const double   place = width > 0.0 ? ldexp(above / width, bits) : 0.0;
+        const uint64_t slice = place >= ldexp(1.0, bits) ? last : (uint64_t)place;
         for (int b = 0; b < bits; b++) {
             key |= (slice >> b & 1u) << (b * ndim + k);
         }
     }
     return key;
-}
-
-/* ---- sets of numbers ------------------------------------------------------------------------- */
-
-/*
- * A set of numbers that is filled in any order and emptied in ascending order, again and again. A
- * bit for each number, and two levels above that tell which words have any: emptying takes time by
- * the words that were touched, and a little by the size of the set.
- */
-#define BIT_LEVELS 3
-
-typedef struct bit_set {
-    uint64_t *word[BIT_LEVELS]; /* parts of one block, owned by word[0] */
-    int64_t   n_words[BIT_LEVELS];
-} bit_set;
-
-/* An empty set of numbers below n. False when memory is short. */
-static bool
-bit_set_make(hs_account *account, int64_t n, bit_set *set)
-{
-    int64_t all = 0, words = n;
-    for (int l = 0; l < BIT_LEVELS; l++) {
-        words = (words + 63) / 64;
-        set->n_words[l] = words;
-        all += words;
-    }
-    set->word[0] = hs_alloc(account, HS_FOR_SORTING, all, sizeof(uint64_t));
-    if (set->word[0] == NULL) {
-        return false;
-    }
-    memset(set->word[0], 0, (size_t)all * sizeof(uint64_t));
-    for (int l = 1; l < BIT_LEVELS; l++) {
-        set->word[l] = set->word[l - 1] + set->n_words[l - 1];
-    }
-    return true;
-}
-
-/* Adds numbers from 64 * word on, one for each bit. */
-HS_ALWAYS_INLINE void
-bit_set_add(bit_set *set, int32_t word, uint64_t bits)
-{
-    const uint64_t before = set->word[0][word];
-    set->word[0][word] = before | bits;
-    if (before == 0) {
-        set->word[1][word >> 6] |= UINT64_C(1) << (word & 63);
-        set->word[2][word >> 12] |= UINT64_C(1) << (word >> 6 & 63);
-    }
-}
-
-/* Writes all numbers, ascending, and forgets them; returns how many there were. */
-HS_ALWAYS_INLINE int64_t
-bit_set_drain(bit_set *set, int32_t *to)
-{
-    const int32_t *const first = to;
-    for (int64_t high = 0; high < set->n_words[2]; high++) {
-        for (uint64_t top = set->word[2][high]; top != 0; top &= top - 1) {
-            const int64_t middle = high * 64 + hs_trailing_zeros(top);
-            for (uint64_t mid = set->word[1][middle]; mid != 0; mid &= mid - 1) {
-                const int64_t low = middle * 64 + hs_trailing_zeros(mid);
-                for (uint64_t bits = set->word[0][low]; bits != 0; bits &= bits - 1) {
-                    *to++ = (int32_t)(low * 64 + hs_trailing_zeros(bits));
-                }
-                set->word[0][low] = 0;
-            }
-            set->word[1][middle] = 0;
-        }
-        set->word[2][high] = 0;
-    }
-    return to - first;
 }
 
 /* ---- between the two of a pair --------------------------------------------------------------- */
@@ -230,27 +151,6 @@ has_image(const hs_list_rows *rows, int32_t i, int32_t k, const int64_t *shift)
     return false;
 }
 
-/* Of images: whether neighbour e of j is at `shift` from i a neighbour of i, between i and the
- * image of j at `of_j`. Writes its shift. */
-static bool
-is_common_image(const intersection_worker *me, int32_t i, int32_t j, const int32_t *of_j, int64_t e,
-                int32_t *shift)
-{
-    const merging *all = me->all;
-    const int      d = all->half.ndim;
-    const int32_t  k = all->rows.indices[e];
-    int64_t        of_x[HS_MAX_DIM], of_q[HS_MAX_DIM];
-    for (int l = 0; l < d; l++) {
-        of_q[l] = of_j[l];
-        of_x[l] = (int64_t)all->rows.shift[e * d + l] + of_j[l];
-        shift[l] = (int32_t)of_x[l]; /* where it does not fit, row i does not have it */
-    }
-    return has_image(&all->rows, i, k, of_x) &&
-           hs_foot_is_between_images(all->images, all->points + (int64_t)k * d, of_x,
-                                     all->points + (int64_t)i * d, all->points + (int64_t)j * d,
-                                     of_q);
-}
-
 /* Writes the common neighbours of the marked row's point i and of j, the ends of pair number
  * `pair`, to me->common, and then the ends, the first one first; of images, all shifts are from the
  * first end. Returns how many there are. */
@@ -262,12 +162,21 @@ find_common(intersection_worker *me, int64_t pair, bool turned)
     const int32_t  i = all->half.i[pair], j = all->half.j[pair];
     const double  *p = all->points + (int64_t)i * d, *q = all->points + (int64_t)j * d;
     const int32_t *of_j = all->half.shift != NULL ? all->half.shift + pair * d : NULL;
-    int64_t        n = 0;
+    int64_t        of_x[HS_MAX_DIM] = {0}, of_q[HS_MAX_DIM] = {0}, n = 0;
+    for (int l = 0; of_j != NULL && l < d; l++) {
+        of_q[l] = of_j[l];
+    }
     for (int64_t e = all->rows.offsets[j]; e < all->rows.offsets[j + 1]; e++) {
         const int32_t k = all->rows.indices[e];
-        if ((me->marked[k >> 6] >> (k & 63) & 1u) != 0 &&
-            (of_j == NULL ? hs_foot_is_between(all->points + (int64_t)k * d, p, q, d)
-                          : is_common_image(me, i, j, of_j, e, me->shift + n * d))) {
+        if ((me->marked[k >> 6] >> (k & 63) & 1u) == 0) {
+            continue;
+        }
+        for (int l = 0; of_j != NULL && l < d; l++) {
+            of_x[l] = (int64_t)all->rows.shift[e * d + l] + of_j[l];
+            me->shift[n * d + l] = (int32_t)of_x[l]; /* row i does not have what does not fit */
+        }
+        if ((of_j == NULL || has_image(&all->rows, i, k, of_x)) &&
+            hs_foot_is_between(all->images, all->points + (int64_t)k * d, of_x, p, q, of_q)) {
             me->common[n++] = k;
         }
     }
@@ -441,17 +350,18 @@ hs_intersection_fill(hs_call *call, const hs_points *points, const hs_metric *im
 /* ---- points that gather a common point ------------------------------------------------------- */
 
 /*
- * Row i is the union, over all k that i gathers, of the points that gather k. Under the numbers of
- * the order of space, that of the Z curve through the points, these are few words of bits, 64
- * numbers each, which the union takes at a time; and work on points that follow each other finds in
- * the caches what the last ones needed. Its points are then put in order under their own numbers.
- * Images are no bits: there all points that gather k are written down with their shifts, sorted,
- * and looked through for those that differ. Threads take ranges of the order of space, whose rows
- * are written in this order.
+ * Row i is the union, over all k that i gathers, of the points that gather k. All these are met in
+ * turn, and each sets a bit, so that they come out in order. Without shifts bits are of places in
+ * the order of space, that of the Z curve through the points: few words, which are met as a whole,
+ * and what comes out is put in order under its own numbers. Of images what was met last of a point
+ * says whether it is met again, which leaves out nearly all that comes twice; the others are
+ * compared when the point comes out. Threads take ranges of the order of space, whose rows are
+ * written in this order: work on points that follow each other finds in the caches what the last
+ * ones needed.
  */
 
-/* Words that are looked at between two calls of poll(). */
-#define POLL_WORDS (INT64_C(1) << 22)
+/* Points that are met between two calls of poll(). */
+#define POLL_MET (INT64_C(1) << 22)
 /* Points of a range: some HS_RANGE_BYTES, and half a millisecond. */
 #define RANGE_POINTS 64
 
@@ -462,28 +372,25 @@ typedef struct product {
     int      ndim; /* of shifts; 0: there are none */
     /* What each point gathers, itself first. Owned, as all arrays. */
     int64_t *first;
-    int32_t *index;
-    int32_t *shift;
-    int32_t *order; /* the points, in the order of space */
-    int32_t *place; /* part of order; where each of them is in it */
-    /* By which points each one is gathered, all by their places: words [first_word[p],
-     * first_word[p + 1]), ascending, of which `bits` are the points from 64 * word on; or, with
-     * shifts, points themselves. */
-    int64_t  *first_word;
-    int32_t  *word;
-    uint64_t *bits;
-    int32_t  *of_word;      /* the shift that this point gathers the other with */
-    int64_t  *length;       /* of the row of each place; then where the next one begins */
-    hs_output offsets, all; /* these, and J and S: all rows, in the order of space */
+    int32_t *index, *shift;
+    int32_t *order, *place; /* the points along the Z curve through them, and where each is on it */
+    /* By which points each one is gathered: [by_first[k], by_end[k]). With shifts these are points;
+     * else bits, of the places from 64 times the index on. */
+    int64_t  *by_first, *by_end;
+    int32_t  *by, *by_shift;
+    uint64_t *by_bits;
+    int64_t  *length;       /* of each row; then where the next one begins */
+    hs_output offsets, all; /* these, and J and S of all rows, in the order of space */
 } product;
 
 typedef struct overlap_worker {
     hs_committer committer;
     product     *all;
-    bit_set      found;
-    int32_t     *scratch; /* owned; a row */
-    uint64_t    *met;     /* owned; point and number of each image that is met, and room for more */
+    uint64_t    *bits;    /* owned; of points that are met, and of their words that have any */
+    int32_t     *last;    /* owned; of images: the number of what was met last of each point, */
+    int32_t     *met;     /* owned; and of what was met of it before each of these; -1: nothing */
     int32_t     *shift;   /* owned; of each of them, and of those of one point that differ */
+    int32_t     *scratch; /* owned; all points */
     int64_t      room;
     int64_t      looked;
 } overlap_worker;
@@ -492,99 +399,121 @@ static hs_status
 open_overlap_worker(void *context, void *place)
 {
     product        *all = context;
-    hs_account     *account = &all->call->account;
     overlap_worker *me = place;
     me->all = all;
-    if (all->ndim > 0) {
-        return HS_OK;
+    const int64_t n_bits = all->n / 64 + all->n / 4096 + 2;
+    me->bits = hs_alloc(&all->call->account, HS_FOR_SORTING, n_bits, sizeof *me->bits);
+    me->last =
+        hs_alloc(&all->call->account, HS_FOR_SORTING, all->ndim > 0 ? all->n : 0, sizeof *me->last);
+    me->scratch = hs_alloc(&all->call->account, HS_FOR_SORTING, all->n, sizeof *me->scratch);
+    if (me->bits == NULL || me->last == NULL || me->scratch == NULL) {
+        return HS_ERR_MEMORY;
     }
-    me->scratch = hs_alloc(account, HS_FOR_SORTING, all->n, sizeof *me->scratch);
-    return me->scratch != NULL && bit_set_make(account, all->n, &me->found) ? HS_OK : HS_ERR_MEMORY;
+    memset(me->bits, 0, (size_t)n_bits * sizeof *me->bits);
+    return HS_OK;
 }
 
 static void
 close_overlap_worker(void *context, void *place)
 {
-    const product  *all = context;
-    hs_account     *account = &all->call->account;
+    hs_account     *account = &((product *)context)->call->account;
     overlap_worker *me = place;
-    hs_free(account, me->found.word[0]);
+    hs_free(account, me->bits);
+    hs_free(account, me->last);
     hs_free(account, me->scratch);
     hs_free(account, me->met);
     hs_free(account, me->shift);
 }
 
-/* The row of point i, as bits: all points that gather what i gathers, but for i. */
-static hs_status
-write_points(overlap_worker *me, int32_t i, int64_t *length)
+/* Sets bits of one word; returns what it was. */
+HS_ALWAYS_INLINE uint64_t
+set_bits(const overlap_worker *me, int32_t word, uint64_t bits)
 {
-    const product *all = me->all;
-    for (int64_t e = all->first[i]; e < all->first[i + 1]; e++) {
-        const int32_t k = all->place[all->index[e]];
-        const int64_t end = all->first_word[k + 1];
-        for (int64_t w = all->first_word[k]; w < end; w++) {
-            bit_set_add(&me->found, all->word[w], all->bits[w]);
-        }
-        me->looked += end - all->first_word[k];
-    }
-    const int64_t n = bit_set_drain(&me->found, me->scratch);
-    *length = n - 1; /* i itself is among them */
-    const hs_status status = hs_output_reserve(me->committer.pairs, *length, 0.0);
-    if (status != HS_OK) {
-        return status;
-    }
-    for (int64_t e = 0; e < n; e++) {
-        const int32_t j = all->order[me->scratch[e]];
-        if (j != i) {
-            bit_set_add(&me->found, j >> 6, UINT64_C(1) << (j & 63));
-        }
-    }
-    me->committer.pairs->n_pairs +=
-        bit_set_drain(&me->found, hs_output_next(me->committer.pairs, HS_WANT_J));
-    return HS_OK;
+    uint64_t *const words = me->bits + me->all->n / 64 + 1;
+    const uint64_t  before = me->bits[word];
+    me->bits[word] = before | bits;
+    words[word >> 6] |= UINT64_C(1) << (word & 63);
+    return before;
 }
 
-/* Writes down all images that gather what i gathers. */
+/* Writes the numbers of all bits, ascending, and clears them; returns how many there were. */
+HS_ALWAYS_INLINE int64_t
+clear_bits(const overlap_worker *me, int32_t *to)
+{
+    const int64_t   n_words = me->all->n / 64 + 1;
+    uint64_t *const words = me->bits + n_words;
+    int64_t         n = 0;
+    for (int64_t high = 0; high * 64 < n_words; high++) {
+        for (uint64_t some = words[high]; some != 0; some &= some - 1) {
+            const int64_t word = high * 64 + hs_trailing_zeros(some);
+            for (uint64_t bits = me->bits[word]; bits != 0; bits &= bits - 1) {
+                to[n++] = (int32_t)(word * 64 + hs_trailing_zeros(bits));
+            }
+            me->bits[word] = 0;
+        }
+        words[high] = 0;
+    }
+    return n;
+}
+
+/* Room for all that point i meets. */
 static hs_status
-meet_images(overlap_worker *me, int32_t i, int64_t *n)
+make_room(overlap_worker *me, int32_t i)
 {
     const product *all = me->all;
     hs_account    *account = &all->call->account;
     const int      d = all->ndim;
-    int64_t        at = 0;
-    *n = 0;
+    int64_t        most = 0;
     for (int64_t e = all->first[i]; e < all->first[i + 1]; e++) {
-        const int32_t k = all->place[all->index[e]];
-        *n += all->first_word[k + 1] - all->first_word[k];
+        const int32_t k = all->index[e];
+        most += all->by_end[k] - all->by_first[k];
     }
-    if (*n > UINT32_MAX) {
+    me->looked += most;
+    if (most > INT32_MAX) {
         return HS_ERR_TOO_MANY;
     }
-    if (*n > me->room) {
+    if (d > 0 && most > me->room) {
         hs_free(account, me->met);
         hs_free(account, me->shift);
         me->room = 0;
-        me->met = hs_alloc(account, HS_FOR_SORTING, *n, 2 * sizeof *me->met);
-        me->shift = hs_alloc(account, HS_FOR_SORTING, *n * d, 2 * sizeof *me->shift);
+        me->met = hs_alloc(account, HS_FOR_SORTING, most, sizeof *me->met);
+        me->shift = hs_alloc(account, HS_FOR_SORTING, most * d, 2 * sizeof *me->shift);
         if (me->met == NULL || me->shift == NULL) {
             return HS_ERR_MEMORY;
         }
-        me->room = *n;
+        me->room = most;
     }
+    return HS_OK;
+}
+
+/* Sets the bits of what gathers what i gathers; writes down *n images, each at least once. */
+HS_ALWAYS_INLINE hs_status
+meet(overlap_worker *me, int32_t i, const int d, int64_t *n)
+{
+    const product *all = me->all;
+    int64_t        at = 0;
     for (int64_t e = all->first[i]; e < all->first[i + 1]; e++) {
-        const int32_t k = all->place[all->index[e]];
-        for (int64_t w = all->first_word[k]; w < all->first_word[k + 1]; w++, at++) {
-            me->met[at] = (uint64_t)(uint32_t)all->order[all->word[w]] << 32 | (uint64_t)at;
+        const int32_t k = all->index[e];
+        for (int64_t b = all->by_first[k]; b < all->by_end[k]; b++) {
+            const int32_t  j = all->by[b], w = d > 0 ? j >> 6 : j;
+            const uint64_t bit = d > 0 ? UINT64_C(1) << (j & 63) : all->by_bits[b];
+            int32_t       *own = me->shift + at * d;
             for (int l = 0; l < d; l++) {
-                const int64_t shift = (int64_t)all->shift[e * d + l] - all->of_word[w * d + l];
-                me->shift[at * d + l] = (int32_t)shift;
-                if (shift != me->shift[at * d + l]) {
+                const int64_t shift = (int64_t)all->shift[e * d + l] - all->by_shift[b * d + l];
+                own[l] = (int32_t)shift;
+                if (shift != own[l]) {
                     return HS_ERR_SHIFT_RANGE;
                 }
             }
+            const uint64_t before = set_bits(me, w, bit);
+            if (d > 0 && ((before & bit) == 0 ||
+                          hs_compare_shifts(me->shift + (int64_t)me->last[j] * d, own, d) != 0)) {
+                me->met[at] = (before & bit) != 0 ? me->last[j] : -1;
+                me->last[j] = (int32_t)at++;
+            }
         }
     }
-    me->looked += *n;
+    *n = at;
     return HS_OK;
 }
 
@@ -610,37 +539,55 @@ add_shift(const int32_t *shift, int ndim, int32_t *to, int64_t n)
     return n + 1;
 }
 
-/* The row of point i, of images. */
-static hs_status
-write_images(overlap_worker *me, int32_t i, int64_t *length)
+/* The row of point i. */
+HS_ALWAYS_INLINE hs_status
+write_row_in(overlap_worker *me, int32_t i, const int d, int64_t *length)
 {
-    const int d = me->all->ndim;
-    int64_t   n;
-    hs_status status = meet_images(me, i, &n);
-    *length = 0;
+    hs_output *pairs = me->committer.pairs;
+    int64_t    n, at = 0;
+    hs_status  status = make_room(me, i);
     if (status == HS_OK) {
-        hs_sort_numbers(me->met, n, me->met + me->room);
+        status = meet(me, i, d, &n);
     }
-    for (int64_t first = 0, end; status == HS_OK && first < n; first = end) {
-        const int32_t  j = (int32_t)(me->met[first] >> 32);
-        int32_t *const own = me->shift + me->room * d;
-        int64_t        n_own = 0;
-        for (end = first; end < n && (int32_t)(me->met[end] >> 32) == j; end++) {
-            n_own = add_shift(me->shift + (int64_t)(me->met[end] & UINT32_MAX) * d, d, own, n_own);
+    const int64_t n_met = status == HS_OK ? clear_bits(me, me->scratch) : 0;
+    if (status == HS_OK) {
+        status = hs_output_reserve(pairs, d > 0 ? n : n_met, 0.0);
+    }
+    if (status != HS_OK) {
+        return status;
+    }
+    int32_t *to = hs_output_next(pairs, HS_WANT_J),
+            *to_shift = hs_output_next(pairs, HS_WANT_SHIFT);
+    for (int64_t e = 0; e < n_met; e++) {
+        const int32_t j = d > 0 ? me->scratch[e] : me->all->order[me->scratch[e]];
+        int32_t      *own = me->shift + me->room * d;
+        int64_t       n_own = 0;
+        if (d == 0 && j != i) {
+            (void)set_bits(me, j >> 6, UINT64_C(1) << (j & 63));
         }
-        status = hs_output_reserve(me->committer.pairs, n_own, 0.0);
-        for (int64_t e = 0; status == HS_OK && e < n_own; e++) {
-            const int32_t *shift = own + e * d;
-            if (j != i || hs_compare_shifts(shift, NULL, d) != 0) {
-                *(int32_t *)hs_output_next(me->committer.pairs, HS_WANT_J) = j;
-                memcpy(hs_output_next(me->committer.pairs, HS_WANT_SHIFT), shift,
-                       (size_t)d * sizeof *shift);
-                me->committer.pairs->n_pairs++;
-                ++*length;
+        for (int32_t m = d > 0 ? me->last[j] : -1; m >= 0; m = me->met[m]) {
+            n_own = add_shift(me->shift + (int64_t)m * d, d, own, n_own);
+        }
+        for (; n_own > 0; n_own--, own += d) {
+            if (j != i || hs_compare_shifts(own, NULL, d) != 0) {
+                to[at] = j;
+                memcpy(to_shift + at++ * d, own, (size_t)d * sizeof *own);
             }
         }
     }
-    return status;
+    *length = d > 0 ? at : clear_bits(me, to);
+    pairs->n_pairs += *length;
+    return HS_OK;
+}
+
+static hs_status
+write_row(overlap_worker *me, int32_t i, int64_t *length)
+{
+    switch (me->all->ndim) {
+    case 0: return write_row_in(me, i, 0, length);
+    case 3: return write_row_in(me, i, 3, length);
+    default: return write_row_in(me, i, me->all->ndim, length);
+    }
 }
 
 /* A hs_range_fn. */
@@ -652,9 +599,8 @@ multiply_range(void *context, int64_t range)
     const int64_t   n = all->n, first = range * RANGE_POINTS;
     const int64_t   last = first + RANGE_POINTS < n ? first + RANGE_POINTS : n;
     for (int64_t p = first; p < last; p++) {
-        hs_status status =
-            (all->ndim > 0 ? write_images : write_points)(me, all->order[p], &all->length[p]);
-        if (status == HS_OK && me->looked >= POLL_WORDS) {
+        hs_status status = write_row(me, all->order[p], &all->length[p]);
+        if (status == HS_OK && me->looked >= POLL_MET) {
             me->looked = 0;
             status = hs_poll(me->committer.options, (double)p / (double)n);
         }
@@ -665,94 +611,58 @@ multiply_range(void *context, int64_t range)
     return hs_commit(&me->committer, (double)last / (double)n, true);
 }
 
-/* Copies the entries of point i, and puts i itself first, with a shift of zero. False where these
- * are no row. */
-static bool
-copy_row(const hs_index_rows *given, int64_t i, product *doing)
-{
-    const int64_t at = doing->first[i], length = doing->first[i + 1] - at - 1;
-    const int     d = doing->ndim;
-    int32_t      *index = doing->index + at, *own = doing->shift + at * d;
-    memset(own, 0, (size_t)d * sizeof *own);
-    index[0] = (int32_t)i;
-    for (int64_t e = 0; e < length; e++) {
-        const int32_t j = given->indices[at - i + e], before = e > 0 ? index[e] : -1;
-        int32_t      *shift = own + (e + 1) * d;
-        for (int k = 0; k < d; k++) {
-            shift[k] = given->shift[(at - i + e) * d + k];
-        }
-        if (j < before || j < 0 || j >= given->n ||
-            (j == i && hs_compare_shifts(shift, NULL, d) == 0) ||
-            (j == before && hs_compare_shifts(shift, shift - d, d) <= 0)) {
-            return false;
-        }
-        index[e + 1] = j;
-    }
-    return true;
-}
-
-/* Copies what each point gathers. */
+/* Copies what each point gathers, and puts the point itself first, with a shift of zero.
+ * HS_ERR_ARGUMENT where these are no rows. */
 static hs_status
 copy_rows(hs_account *account, const hs_index_rows *given, product *doing)
 {
-    int64_t before = 0;
+    const int     d = doing->ndim;
+    const int64_t n = given->n + given->n_indices; /* entries */
+    int64_t       at = 0;
     doing->first = hs_alloc(account, HS_FOR_SORTING, doing->n + 1, sizeof *doing->first);
-    if (doing->first == NULL) {
+    doing->index = hs_alloc(account, HS_FOR_SORTING, n, sizeof *doing->index);
+    doing->shift = hs_alloc(account, HS_FOR_SORTING, n * d, sizeof *doing->shift);
+    if (doing->first == NULL || doing->index == NULL || doing->shift == NULL) {
         return HS_ERR_MEMORY;
     }
-    for (int64_t i = 0; i <= given->n; i++) {
-        const int64_t first = given->offsets[i];
-        if (first < before || (i == 0 && first != 0)) {
+    for (int64_t i = 0; i < given->n; i++) {
+        const int64_t first = given->offsets[i], last = given->offsets[i + 1];
+        if (first != at - i || last < first || last > given->n_indices) {
             return HS_ERR_ARGUMENT;
         }
-        doing->first[i] = first + i;
-        before = first;
-    }
-    if (before != given->n_indices) {
-        return HS_ERR_ARGUMENT;
-    }
-    const int64_t n = doing->first[doing->n];
-    doing->index = hs_alloc(account, HS_FOR_SORTING, n, sizeof *doing->index);
-    doing->shift = hs_alloc(account, HS_FOR_SORTING, n * doing->ndim, sizeof *doing->shift);
-    hs_status status = doing->index != NULL && doing->shift != NULL ? HS_OK : HS_ERR_MEMORY;
-    for (int64_t i = 0; status == HS_OK && i < doing->n; i++) {
-        status = copy_row(given, i, doing) ? HS_OK : HS_ERR_ARGUMENT;
-    }
-    return status;
-}
-
-/* Keys of points on the Z curve through the box of those that are finite; the others are anywhere.
- * x: row after row. */
-static void
-find_keys(const double *x, int64_t n, int ndim, hs_keys *sort)
-{
-    double low[HS_MAX_DIM], high[HS_MAX_DIM], own[HS_MAX_DIM];
-    for (int k = 0; k < ndim; k++) {
-        low[k] = INFINITY;
-        high[k] = -INFINITY;
-        for (int64_t i = 0; i < n; i++) {
-            const double at = x[i * ndim + k];
-            low[k] = isfinite(at) && at < low[k] ? at : low[k];
-            high[k] = isfinite(at) && at > high[k] ? at : high[k];
+        doing->first[i] = at;
+        doing->index[at] = (int32_t)i;
+        memset(doing->shift + at * d, 0, (size_t)d * sizeof *doing->shift);
+        at++;
+        for (int64_t e = first; e < last; e++, at++) {
+            const int32_t j = given->indices[e], before = e > first ? doing->index[at - 1] : -1;
+            int32_t      *shift = doing->shift + at * d;
+            for (int k = 0; k < d; k++) {
+                shift[k] = given->shift[e * d + k];
+            }
+            if (j < before || j < 0 || j >= given->n ||
+                (j == i && hs_compare_shifts(shift, NULL, d) == 0) ||
+                (j == before && hs_compare_shifts(shift, shift - d, d) <= 0)) {
+                return HS_ERR_ARGUMENT;
+            }
+            doing->index[at] = j;
         }
     }
-    for (int64_t i = 0; i < n; i++) {
-        for (int k = 0; k < ndim; k++) {
-            own[k] = isfinite(x[i * ndim + k]) ? x[i * ndim + k] : low[k];
-        }
-        sort->keys[i] = (int64_t)hs_morton_key(own, low, high, ndim);
-        sort->ids[i] = (int32_t)i;
-    }
+    doing->first[given->n] = at;
+    return at == n && given->offsets[given->n] == given->n_indices ? HS_OK : HS_ERR_ARGUMENT;
 }
 
-/* Puts the points in the order of space. */
+/* Puts the points in the order of space, that of the Z curve through the box of those that are
+ * finite; the others are anywhere. */
 static hs_status
 put_in_order(hs_account *account, const hs_points *points, product *doing)
 {
     const int64_t n = doing->n;
-    double       *x = hs_alloc(account, HS_FOR_POINTS, n * points->ndim, sizeof *x);
+    const int     d = points->ndim;
+    double       *x = hs_alloc(account, HS_FOR_POINTS, n * d, sizeof *x);
     int64_t      *keys = hs_alloc(account, HS_FOR_SORTING, n, 2 * sizeof *keys);
     int32_t      *spare = hs_alloc(account, HS_FOR_SORTING, n, sizeof *spare);
+    double        low[HS_MAX_DIM], high[HS_MAX_DIM];
     hs_status     status = HS_ERR_MEMORY;
     doing->order = hs_alloc(account, HS_FOR_SORTING, n, 2 * sizeof *doing->order);
     if (doing->order != NULL && x != NULL && keys != NULL && spare != NULL) {
@@ -762,7 +672,21 @@ put_in_order(hs_account *account, const hs_points *points, product *doing)
                         .spare_ids = spare,
                         .options = &doing->call->options};
         hs_points_copy(points, x);
-        find_keys(x, n, points->ndim, &sort);
+        for (int k = 0; k < d; k++) {
+            low[k] = INFINITY;
+            high[k] = -INFINITY;
+            for (int64_t e = k; e < n * d; e += d) {
+                low[k] = isfinite(x[e]) && x[e] < low[k] ? x[e] : low[k];
+                high[k] = isfinite(x[e]) && x[e] > high[k] ? x[e] : high[k];
+            }
+        }
+        for (int64_t i = 0; i < n; i++) {
+            for (int k = 0; k < d; k++) {
+                x[i * d + k] = isfinite(x[i * d + k]) ? x[i * d + k] : low[k];
+            }
+            keys[i] = (int64_t)hs_morton_key(x + i * d, low, high, d);
+            doing->order[i] = (int32_t)i;
+        }
         status = hs_keys_sort(&sort, 0, n);
         doing->place = doing->order + n;
         for (int64_t p = 0; p < n; p++) {
@@ -775,87 +699,46 @@ put_in_order(hs_account *account, const hs_points *points, product *doing)
     return status;
 }
 
-/* Finds the words of all points: counts them, or, once there is room, fills them. last: the word
- * that each point has had last. */
-HS_ALWAYS_INLINE void
-put_words(product *doing, const bool fills, int32_t *last)
-{
-    const int d = doing->ndim;
-    memset(last, -1, (size_t)doing->n * sizeof *last);
-    for (int32_t p = 0; p < doing->n; p++) {
-        const int32_t i = doing->order[p], word = d > 0 ? p : p >> 6;
-        for (int64_t e = doing->first[i]; e < doing->first[i + 1]; e++) {
-            const int32_t k = doing->place[doing->index[e]];
-            const bool    begins = d > 0 || last[k] != word;
-            last[k] = word;
-            if (!fills) {
-                doing->first_word[k + 1] += begins;
-                continue;
-            }
-            const int64_t at = (doing->first_word[k] += begins) - 1;
-            doing->word[at] = word;
-            if (d == 0) {
-                doing->bits[at] = (begins ? 0 : doing->bits[at]) | UINT64_C(1) << (p & 63);
-            }
-            for (int l = 0; l < d; l++) {
-                doing->of_word[at * d + l] = doing->shift[e * d + l];
-            }
-        }
-    }
-}
-
 /* Finds by which points each one is gathered. */
 static hs_status
 turn_rows(hs_account *account, product *doing)
 {
-    const int64_t n = doing->n;
-    int32_t      *last = hs_alloc(account, HS_FOR_SORTING, n, sizeof *last);
-    hs_status     status = HS_ERR_MEMORY;
-    doing->first_word = hs_alloc(account, HS_FOR_SORTING, n + 1, sizeof *doing->first_word);
-    if (last != NULL && doing->first_word != NULL) {
-        memset(doing->first_word, 0, (size_t)(n + 1) * sizeof *doing->first_word);
-        put_words(doing, false, last);
-        hs_starts_of_lengths(doing->first_word, n + 1);
-        const int64_t n_words = doing->first_word[n], n_bits = doing->ndim > 0 ? 0 : n_words;
-        doing->word = hs_alloc(account, HS_FOR_SORTING, n_words, sizeof *doing->word);
-        doing->bits = hs_alloc(account, HS_FOR_SORTING, n_bits, sizeof *doing->bits);
-        doing->of_word =
-            hs_alloc(account, HS_FOR_SORTING, n_words * doing->ndim, sizeof *doing->of_word);
-        if (doing->word != NULL && doing->bits != NULL && doing->of_word != NULL) {
-            put_words(doing, true, last);
-            hs_starts_of_ends(doing->first_word, n + 1);
-            status = HS_OK;
-        }
-    }
-    hs_free(account, last);
-    return status;
-}
-
-static hs_status
-multiply(product *doing, hs_failure *failure)
-{
-    const int64_t n = doing->n;
-    int64_t      *offsets;
-    hs_crew       crew = {.call = doing->call,
-                          .job = doing,
-                          .worker_size = sizeof(overlap_worker),
-                          .open = open_overlap_worker,
-                          .close = close_overlap_worker,
-                          .n_ranges = (n + RANGE_POINTS - 1) / RANGE_POINTS,
-                          .search = multiply_range,
-                          .output = &doing->all};
-    if (hs_output_open_offsets(&doing->call->account, n + 1, &doing->offsets, &offsets) != HS_OK ||
-        hs_output_reserve(&doing->all, 0, 0.0) != HS_OK) {
+    const int64_t n = doing->n, n_entries = doing->first[n];
+    const int     d = doing->ndim;
+    doing->by_first = hs_alloc(account, HS_FOR_SORTING, n + 1, 2 * sizeof *doing->by_first);
+    doing->by = hs_alloc(account, HS_FOR_SORTING, n_entries, sizeof *doing->by);
+    doing->by_shift = hs_alloc(account, HS_FOR_SORTING, n_entries * d, sizeof *doing->by_shift);
+    doing->by_bits =
+        hs_alloc(account, HS_FOR_SORTING, d > 0 ? 0 : n_entries, sizeof *doing->by_bits);
+    if (doing->by_first == NULL || doing->by == NULL || doing->by_shift == NULL ||
+        doing->by_bits == NULL) {
         return HS_ERR_MEMORY;
     }
-    offsets[0] = 0;
-    doing->length = offsets + 1;
-    hs_call_gather(doing->call, n);
-    const hs_status status = hs_crew_run(&crew, failure);
-    if (status == HS_OK) {
-        hs_starts_of_lengths(offsets, n + 1);
+    doing->by_end = doing->by_first + n + 1;
+    memset(doing->by_first, 0, (size_t)(n + 1) * sizeof *doing->by_first);
+    for (int64_t e = 0; e < n_entries; e++) {
+        doing->by_first[doing->index[e] + 1]++;
     }
-    return status;
+    hs_starts_of_lengths(doing->by_first, n + 1);
+    memcpy(doing->by_end, doing->by_first, (size_t)(n + 1) * sizeof *doing->by_end);
+    for (int32_t p = 0; p < n; p++) {
+        const int32_t i = doing->order[p];
+        for (int64_t e = doing->first[i]; e < doing->first[i + 1]; e++) {
+            const int32_t k = doing->index[e];
+            int64_t       at = doing->by_end[k];
+            if (d == 0) {
+                at -= at > doing->by_first[k] && doing->by[at - 1] == p >> 6;
+                const uint64_t before = at < doing->by_end[k] ? doing->by_bits[at] : 0;
+                doing->by_bits[at] = before | UINT64_C(1) << (p & 63);
+            }
+            for (int l = 0; l < d; l++) {
+                doing->by_shift[at * d + l] = doing->shift[e * d + l];
+            }
+            doing->by[at] = d > 0 ? i : p >> 6;
+            doing->by_end[k] = at + 1;
+        }
+    }
+    return HS_OK;
 }
 
 hs_status
@@ -866,8 +749,9 @@ hs_overlap_fill(hs_call *call, const hs_points *points, const hs_index_rows *gat
     product       doing = {.call = call, .n = gather->n};
     hs_node_lists of_all = *lists;
     hs_node_map   map;
-    if (gather->n != points->n || gather->offsets == NULL ||
-        (gather->indices == NULL && gather->n_indices != 0) ||
+    int64_t      *offsets;
+    if (gather->n != points->n || gather->offsets == NULL || gather->n_indices < 0 ||
+        (gather->indices == NULL && gather->n_indices > 0) ||
         (gather->shift != NULL && (gather->ndim < 1 || gather->ndim > HS_MAX_DIM))) {
         return HS_ERR_ARGUMENT;
     }
@@ -886,7 +770,27 @@ hs_overlap_fill(hs_call *call, const hs_points *points, const hs_index_rows *gat
         status = turn_rows(account, &doing);
     }
     if (status == HS_OK) {
-        status = multiply(&doing, failure);
+        status = hs_output_open_offsets(account, doing.n + 1, &doing.offsets, &offsets);
+    }
+    if (status == HS_OK) {
+        status = hs_output_reserve(&doing.all, 0, 0.0);
+    }
+    if (status == HS_OK) {
+        hs_crew crew = {.call = call,
+                        .job = &doing,
+                        .worker_size = sizeof(overlap_worker),
+                        .open = open_overlap_worker,
+                        .close = close_overlap_worker,
+                        .n_ranges = (doing.n + RANGE_POINTS - 1) / RANGE_POINTS,
+                        .search = multiply_range,
+                        .output = &doing.all};
+        offsets[0] = 0;
+        doing.length = offsets + 1;
+        hs_call_gather(call, doing.n);
+        status = hs_crew_run(&crew, failure);
+    }
+    if (status == HS_OK) {
+        hs_starts_of_lengths(offsets, doing.n + 1);
     }
     if (status == HS_OK) {
         const hs_list_rows found = hs_rows_of(&doing.offsets, &doing.all, 1);
@@ -895,8 +799,8 @@ hs_overlap_fill(hs_call *call, const hs_points *points, const hs_index_rows *gat
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = (double)doing.all.n_pairs;
     }
-    void *const owned[] = {doing.first,      doing.index, doing.shift, doing.order,
-                           doing.first_word, doing.word,  doing.bits,  doing.of_word};
+    void *const owned[] = {doing.first,    doing.index, doing.shift,    doing.order,
+                           doing.by_first, doing.by,    doing.by_shift, doing.by_bits};
     for (size_t k = 0; k < sizeof owned / sizeof owned[0]; k++) {
         hs_free(account, owned[k]);
     }

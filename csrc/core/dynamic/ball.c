@@ -1,10 +1,214 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "ball.h"
-#include "../box/wrap.h"
 #include "../exact/bounds.h"
+#include "../exact/metric.h"
+#include "../memory/memory.h"
+
+#include <stdlib.h>
+
+/* ball.c: the grid axes of a list, the cells around a cell, and queries: the ball of each, its
+ * cells, and the points that are in it. */
+
+/* Cells of at least the width that was given; periods hold a whole number of them. */
+
+#define MOST_CELLS 0x1p30 /* in a period: their numbers and images are int32 and int64 */
+
+/* Wrapped points are so many rows away at most, where they are far along open axes. */
+#define ROWS_AWAY 16
 
 /*
- * ball.c: thresholds on the float64 square of the distance, and what decides between them.
+ * By how much the images of a ball may miss whole periods along axis k: a row of B that should not
+ * move along it does so by normal . row, as rounded, and by the roundings of these; the row that
+ * should moves by its height as rounded. So often as a query can meet the row: R and what
+ * coordinates are wrong by, in heights. Points that are ROWS_AWAY are rounded besides.
+ */
+static double
+leak_of(const hs_lattice *lattice, int k, double max_radius, const hs_axes *so_far)
+{
+    double leak = 0.0;
+    for (int j = 0; j < lattice->ndim; j++) {
+        const int r = lattice->row_of_axis[j];
+        double    along = 0.0, size = 0.0;
+        if (r < 0) {
+            continue;
+        }
+        for (int c = 0; c < lattice->ndim; c++) {
+            along += lattice->normal[k][c] * lattice->rows[r][c];
+            size += fabs(lattice->rows[r][c]);
+        }
+        const double miss =
+            (j == k ? 0.0 : fabs(along)) + 0x1p-44 * size + lattice->ndim * lattice->row_error[r];
+        leak += ((max_radius + so_far->axis[j].leak) / lattice->period[j] + ROWS_AWAY) * miss;
+        leak += hs_axis_rounding(lattice->ndim) * ROWS_AWAY *
+                hs_axis_terms(lattice, lattice->rows[r], k);
+    }
+    return leak;
+}
+
+void
+hs_axes_init(hs_axes *axes, const hs_lattice *lattice, double cell_size, bool one_cell,
+             double max_radius)
+{
+    axes->ndim = lattice->ndim;
+    for (int k = 0; k < lattice->ndim; k++) {
+        hs_axis *axis = &axes->axis[k];
+        *axis = (hs_axis){.row = lattice->row_of_axis[k]};
+        if (axis->row >= 0) {
+            const double fitting = one_cell ? 1.0 : floor(lattice->period[k] / cell_size);
+            axis->period = lattice->period[k];
+            axis->half = 0.5 * axis->period;
+            axis->n = (int64_t)hs_larger(hs_smaller(fitting, MOST_CELLS), 1.0);
+        }
+        if (axis->n == 1 || (axis->n == 0 && one_cell)) {
+            axis->width = axis->n == 1 ? axis->period : INFINITY;
+            axis->inverse = 0.0;
+        } else {
+            axis->width = axis->n > 0 ? axis->period / (double)axis->n : cell_size;
+            axis->inverse = 1.0 / axis->width;
+        }
+        const double farthest = one_cell ? 0.0 : HS_FARTHEST_CELL;
+        axis->lowest = axis->n > 0 ? 0.0 : -farthest;
+        axis->highest = axis->n > 0 ? (double)(axis->n - 1) : farthest;
+    }
+    /* Leaks twice: those along one axis lead to more images along others. */
+    for (int pass = 0; pass < 2 && !lattice->aligned; pass++) {
+        const hs_axes so_far = *axes;
+        for (int k = 0; k < lattice->ndim; k++) {
+            axes->axis[k].leak = leak_of(lattice, k, max_radius, &so_far);
+        }
+    }
+    for (int k = 0; k < lattice->ndim; k++) {
+        hs_axis *axis = &axes->axis[k];
+        axis->farthest = axis->row >= 0 ? HS_WRAP_LIMIT * axis->period : INFINITY;
+        for (int r = 0; r < lattice->n_periodic; r++) {
+            axis->farthest += hs_axis_terms(lattice, lattice->rows[r], k);
+        }
+    }
+}
+
+/* The number of periods times their length; beyond one it may be rounded, by less than `*slack`. */
+static double
+shift_of(const hs_axis *axis, int64_t image, double *slack)
+{
+    const double shift = (double)image * axis->period;
+    *slack = image < -1 || image > 1 ? 0x1p-50 * fabs(shift) : 0.0;
+    return shift;
+}
+
+void
+hs_axis_images(const hs_axis *axis, double low, double high, double error, hs_span_of_cells *span)
+{
+    /* Image m has points from m L - L/2 to m L + L/2, wider by the error; the quotients are rounded
+     * by less than the 2^-40 that is added: one image too many is no fault. */
+    const double least = floor((low - error) / axis->period + 0.5 - 0x1p-40);
+    const double most = floor((high + error) / axis->period + 0.5 + 0x1p-40);
+    double       slack;
+    HS_ASSERT(least > -0x1p30 && most < 0x1p30); /* hs_dynamic_new, hs_dynamic_place */
+    span->least = (int64_t)least - (fabs(least) > 0x1p8);
+    span->most = (int64_t)most + (fabs(most) > 0x1p8);
+    const double first = hs_below(low, shift_of(axis, span->least, &slack));
+    span->first = span->least * axis->n + hs_axis_cell(axis, first - slack);
+    const double last = hs_above(high, -shift_of(axis, span->most, &slack));
+    span->last = span->most * axis->n + hs_axis_cell(axis, last + slack);
+}
+
+/* The cube of offsets, sorted once when the list is made. */
+
+/* An offset and what it is sorted by. */
+typedef struct item {
+    double  least, centre;
+    uint8_t slot[HS_MAX_DIM];
+} item;
+
+static int
+compare(const void *one, const void *other)
+{
+    const item *a = one, *b = other;
+    if (a->least != b->least) {
+        return a->least < b->least ? -1 : 1;
+    }
+    if (a->centre != b->centre) {
+        return a->centre < b->centre ? -1 : 1;
+    }
+    return memcmp(a->slot, b->slot, HS_MAX_DIM);
+}
+
+/* The offsets of the list of this reach, in order, from distances in units of the widest cell, so
+ * that their squares are ordinary numbers. In skewed boxes the least distance is the sum of squares
+ * of those between faces: an order, not a bound. */
+static void
+fill(const hs_axes *axes, const hs_lattice *lattice, double unit, int reach, item *items,
+     const hs_offsets *offsets)
+{
+    const int     d = axes->ndim, side = 2 * reach + 1;
+    const int64_t n = offsets->n[reach];
+    for (int64_t i = 0; i < n; i++) {
+        double  centre[HS_MAX_DIM] = {0};
+        int64_t rest = i;
+        items[i] = (item){.least = 0.0};
+        for (int k = d - 1; k >= 0; k--) {
+            items[i].slot[k] = (uint8_t)(rest % side + HS_MOST_REACH - reach);
+            rest /= side;
+        }
+        for (int k = 0; k < d; k++) {
+            const int    offset = items[i].slot[k] - HS_MOST_REACH;
+            const int    between = offset > 1 ? offset - 1 : offset < -1 ? -offset - 1 : 0;
+            const double width = isfinite(axes->axis[k].width) ? axes->axis[k].width / unit : 0.0;
+            items[i].least += between * width * (between * width);
+            for (int c = 0; c < d; c++) {
+                centre[c] += offset * width * lattice->direction[k][c];
+            }
+        }
+        for (int c = 0; c < d; c++) {
+            items[i].centre += centre[c] * centre[c];
+        }
+    }
+    qsort(items, (size_t)n, sizeof *items, compare);
+    for (int64_t i = 0; i < n; i++) {
+        memcpy(offsets->slot + offsets->at[reach] + i * d, items[i].slot, (size_t)d);
+    }
+}
+
+bool
+hs_offsets_init(hs_offsets *offsets, const hs_axes *axes, const hs_lattice *lattice,
+                double max_radius)
+{
+    double needed = 0.0, unit = 0.0; /* cells to a side, and one more for rounding; widest cell */
+    memset(offsets, 0, sizeof *offsets);
+    for (int k = 0; k < axes->ndim; k++) {
+        if (isfinite(axes->axis[k].width)) {
+            needed = hs_larger(ceil(max_radius / axes->axis[k].width) + 1.0, needed);
+            unit = hs_larger(axes->axis[k].width, unit);
+        }
+    }
+    for (int r = 0; r <= HS_MOST_REACH && r <= needed; r++) {
+        double n = 1.0;
+        for (int k = 0; k < axes->ndim; k++) {
+            n *= 2 * r + 1;
+        }
+        if (n > HS_MOST_OFFSETS) {
+            break;
+        }
+        offsets->reach = r;
+        offsets->n[r] = (int64_t)n;
+        offsets->at[r + 1] = offsets->at[r] + (int64_t)n * axes->ndim;
+    }
+    const int last = offsets->reach;
+    offsets->slot = hs_alloc(NULL, HS_FOR_STENCIL, offsets->at[last + 1], 1);
+    item *items = hs_alloc(NULL, HS_FOR_STENCIL, offsets->n[last], sizeof *items);
+    for (int r = 0; r <= last && offsets->slot != NULL && items != NULL; r++) {
+        fill(axes, lattice, unit > 0.0 ? unit : 1.0, r, items, offsets);
+    }
+    hs_free(NULL, items);
+    if (items == NULL) {
+        hs_free(NULL, offsets->slot);
+        offsets->slot = NULL;
+    }
+    return offsets->slot != NULL;
+}
+
+/*
+ * Thresholds on the float64 square of the distance, and what decides between them.
  *
  * An entry X and the centre P in image m: D = X - (P - m B). In open and aligned boxes X and P are
  * exact, so without an image each component is rounded once, and the square has the relative error
@@ -54,14 +258,6 @@ coordinate_error(const hs_ball *ball, double wrapping)
     return 0x1p-48 * size + wrapping;
 }
 
-static double
-axis_error(const hs_ball *ball, int k, double wrapping)
-{
-    const double size = 2.0 * ball->centre.terms[k] + HS_MAX_DIM * ball->radius;
-    return hs_axis_rounding(ball->list->lattice.ndim) * size + wrapping +
-           ball->list->axes.axis[k].leak;
-}
-
 /* Radius for cells in place of a smaller one: its square is not 0. */
 #define LEAST_BALL 0x1p-400
 /* Images that one ball looks at, at most: MOST_IMAGES of dynamic.c, and those that a far centre
@@ -81,7 +277,11 @@ init_in(hs_ball *ball, const hs_dynamic *list, const double *position, hs_failur
     const double wrapping = 0x1p-90 * (list->magnitude + ball->centre.magnitude);
     ball->error = list->lattice.aligned ? 0.0 : coordinate_error(ball, wrapping);
     for (int k = 0; k < ndim; k++) {
-        const double error = list->lattice.aligned ? 0.0 : axis_error(ball, k, wrapping);
+        const double error = list->lattice.aligned
+                                 ? 0.0
+                                 : hs_axis_rounding(ndim) * (2.0 * ball->centre.terms[k] +
+                                                             HS_MAX_DIM * ball->radius) +
+                                       wrapping + list->axes.axis[k].leak;
         hs_axis_span(&list->axes.axis[k], ball->centre.t[k], ball->centre.index[k], least + error,
                      error, &ball->span[k]);
         images *= (double)(ball->span[k].most - ball->span[k].least) + 1.0;
@@ -165,29 +365,23 @@ ball_turn(const hs_ball *ball, const int64_t *image, hs_ball_image *turned)
     set_thresholds(ball, d * error, turned);
 }
 
-/* S of an entry over the box vectors: ndim integers, 0 where the box does not repeat. False where
- * it passes 2^62: ball->status says so then. */
+/* S of an entry over the box vectors that repeat, as given. False where it passes 2^62:
+ * ball->status says so then. */
 static bool
-ball_shift(hs_ball *ball, const hs_ball_image *image, uint32_t place, int64_t *shift)
+find_shift(hs_ball *ball, const hs_ball_image *image, uint32_t place, int64_t *given)
 {
     const hs_lattice *lattice = &ball->list->lattice;
-    int64_t           reduced[HS_MAX_DIM], given[HS_MAX_DIM];
-    memset(shift, 0, (size_t)lattice->ndim * sizeof *shift);
-    if (lattice->n_periodic == 0) {
-        return true;
+    int64_t           reduced[HS_MAX_DIM];
+    if (lattice->n_periodic > 0) {
+        turns_of(ball->list, place, reduced);
     }
-    turns_of(ball->list, place, reduced);
     for (int r = 0; r < lattice->n_periodic; r++) {
         reduced[r] = image->image[r] + ball->centre.turns[r] - reduced[r];
     }
     if (!hs_lattice_shift(lattice, reduced, given)) {
         ball->status = HS_ERR_SHIFT_RANGE;
-        return false;
     }
-    for (int l = 0; l < lattice->n_periodic; l++) {
-        shift[lattice->vector_of_row[l]] = given[l];
-    }
-    return true;
+    return ball->status == HS_OK;
 }
 
 /* Decides for an entry that the thresholds left open. */
@@ -196,29 +390,35 @@ ball_decide_unsure(hs_ball *ball, const hs_ball_image *image, uint32_t place)
 {
     const hs_dynamic *list = ball->list;
     const hs_lattice *lattice = &list->lattice;
+    const bool        exact = lattice->aligned; /* X and P are */
+    const int64_t    *shift = image->image;
+    int64_t           given[HS_MAX_DIM];
     hs_stages         stages = {0};
     hs_metric         metric;
     if (list->counters != NULL) {
         list->counters->exact++;
     }
-    if (lattice->aligned) { /* X and P are exact */
-        hs_metric_init(&metric, lattice->ndim, lattice->n_periodic, lattice->rows, ball->radius,
-                       list->inclusive);
-        return hs_metric_within(&metric, ball->centre.x, hs_entry_at(&list->entries, place),
-                                image->image, &stages);
+    if (!exact) {
+        if (!find_shift(ball, image, place, given)) {
+            return false;
+        }
+        shift = given;
     }
-    int64_t over_box[HS_MAX_DIM], shift[HS_MAX_DIM];
-    if (!ball_shift(ball, image, place, over_box)) {
-        return false;
-    }
-    for (int l = 0; l < lattice->n_periodic; l++) {
-        shift[l] = over_box[lattice->vector_of_row[l]];
-    }
-    hs_metric_init(&metric, lattice->ndim, lattice->n_periodic, lattice->given, ball->radius,
-                   list->inclusive);
-    return hs_metric_within(&metric, ball->centre.given, hs_entry_given(&list->entries, place),
+    hs_metric_init(&metric, lattice->ndim, lattice->n_periodic,
+                   exact ? lattice->rows : lattice->given, ball->radius, list->inclusive);
+    return hs_metric_within(&metric, exact ? ball->centre.x : ball->centre.given,
+                            exact ? hs_entry_at(&list->entries, place)
+                                  : hs_entry_given(&list->entries, place),
                             shift, &stages);
 }
+
+/* What to do with each entry. */
+typedef struct hs_ball_visit {
+    hs_dynamic_fn fn; /* NULL: the first one is enough */
+    void         *user;
+    bool          with_shift;
+    bool          is_near; /* no distances: entries of all cells of the ball, each once */
+} hs_ball_visit;
 
 /* One cell of a ball: whether it is in reach, which image of it is meant, and its entries. */
 
@@ -318,9 +518,15 @@ tell(const ball_walk *walk, const hs_ball_image *image, uint32_t place)
     const hs_dynamic    *list = walk->ball->list;
     const hs_entry_tail *tail = hs_entry_tail_at(&list->entries, place);
     const double        *given = hs_entry_given(&list->entries, place);
-    int64_t              shift[HS_MAX_DIM];
-    if (walk->visit->with_shift && !ball_shift(walk->ball, image, place, shift)) {
-        return true;
+    const hs_lattice    *lattice = &list->lattice;
+    int64_t              over_rows[HS_MAX_DIM], shift[HS_MAX_DIM] = {0};
+    if (walk->visit->with_shift) {
+        if (!find_shift(walk->ball, image, place, over_rows)) {
+            return true;
+        }
+        for (int l = 0; l < lattice->n_periodic; l++) {
+            shift[lattice->vector_of_row[l]] = over_rows[l];
+        }
     }
     return walk->visit->fn((hs_key){tail->id, tail->tag}, isnan(given[0]) ? NULL : given,
                            walk->visit->with_shift ? shift : NULL, walk->visit->user) != 0;
@@ -366,14 +572,21 @@ scan_cell(ball_walk *walk, const hs_ball_image *image, hs_cell cell, const int n
 }
 
 /* The image of these parts. */
-static inline const hs_ball_image *
-image_of(ball_walk *walk, const int64_t *along)
+HS_ALWAYS_INLINE const hs_ball_image *
+image_of(ball_walk *walk, const int64_t *along, const int ndim)
 {
-    const hs_dynamic *list = walk->ball->list;
-    int64_t           image[HS_MAX_DIM];
-    bool              same = walk->has_turned;
-    for (int k = 0; k < list->lattice.ndim; k++) {
-        const int r = list->axes.axis[k].row;
+    int64_t  image[HS_MAX_DIM];
+    uint64_t turns = 0;
+    bool     same = walk->has_turned;
+    int      k = 0;
+    do
+        turns |= (uint64_t)along[k];
+    while (++k < ndim);
+    if (turns == 0) {
+        return &walk->ball->home;
+    }
+    for (k = 0; k < ndim; k++) {
+        const int r = walk->ball->list->axes.axis[k].row;
         if (r >= 0) {
             image[r] = along[k];
             same = same && walk->turned.image[r] == along[k];
@@ -409,19 +622,14 @@ scan_number(ball_walk *walk, uint64_t number, const int64_t *index, const int64_
         return false;
     }
     if (walk->meets_images && !walk->visit->is_near) {
-        uint64_t turns = 0;
-        int      k = 0;
-        do
-            turns |= (uint64_t)along[k];
-        while (++k < ndim);
-        image = turns != 0 ? image_of(walk, along) : image;
+        image = image_of(walk, along, ndim);
     }
     return scan_cell(walk, image, cell, ndim);
 }
 
 /*
  * Three ways through the cells of a ball. A ball of a few cells takes them nearest first, from the
- * lists of storage.h; what is needed of each cell is made up of a part for each axis. A larger one
+ * lists of offsets; what is needed of each cell is made up of a part for each axis. A larger one
  * takes them by index, and one that meets more cells than there are takes all entries there are, in
  * each image.
  */
@@ -530,7 +738,22 @@ walk_few(ball_walk *walk, int reach, const int ndim)
                : walk_listed(walk, reach, parts, ndim);
 }
 
-/* Cells by index, the last axis fastest. */
+/* Moves to the next of all cells, or images, of a ball, the last axis fastest. Returns the first
+ * axis that it was moved along, or -1 after the last one. */
+static int
+go_to_next(const hs_span_of_cells *span, int ndim, bool is_image, int64_t *u)
+{
+    int k = ndim - 1;
+    for (; k >= 0 && u[k] == (is_image ? span[k].most : span[k].last); k--) {
+        u[k] = is_image ? span[k].least : span[k].first;
+    }
+    if (k >= 0) {
+        u[k]++;
+    }
+    return k;
+}
+
+/* Cells by index. */
 static bool
 walk_by_index(ball_walk *walk)
 {
@@ -540,12 +763,12 @@ walk_by_index(ball_walk *walk)
     part                    parts[HS_MAX_DIM];
     for (int k = 0; k < d; k++) {
         u[k] = span[k].first;
-        parts[k] = part_of(walk, k, u[k]);
     }
-    for (;;) {
+    for (int moved = 0; moved >= 0; moved = go_to_next(span, d, false, u)) {
         double   gap = 0.0;
         uint64_t number = 0;
         for (int k = 0; k < d; k++) {
+            parts[k] = k >= moved ? part_of(walk, k, u[k]) : parts[k];
             gap += parts[k].gap;
             number += parts[k].number;
             index[k] = parts[k].index;
@@ -555,34 +778,11 @@ walk_by_index(ball_walk *walk)
             !goes_on(walk, 1)) {
             return true;
         }
-        int k = d - 1;
-        while (k >= 0 && u[k] == span[k].last) {
-            u[k] = span[k].first;
-            parts[k] = part_of(walk, k, u[k]);
-            k--;
-        }
-        if (k < 0) {
-            return false;
-        }
-        u[k]++;
-        parts[k] = part_of(walk, k, u[k]);
-    }
-}
-
-/* All cells there are, in one image. */
-static bool
-scan_all(ball_walk *walk, const hs_ball_image *image)
-{
-    const hs_dynamic *list = walk->ball->list;
-    for (int64_t c = 0; c < list->cells.n; c++) {
-        if (scan_cell(walk, image, list->cells.cell[c], list->lattice.ndim)) {
-            return true;
-        }
     }
     return false;
 }
 
-/* All cells there are, in each image; entries of a near walk once. */
+/* All cells there are, in each image; of a near walk once. */
 static bool
 walk_all(ball_walk *walk)
 {
@@ -590,63 +790,43 @@ walk_all(ball_walk *walk)
     const hs_dynamic       *list = walk->ball->list;
     const int               d = list->lattice.ndim;
     int64_t                 along[HS_MAX_DIM];
-    if (walk->visit->is_near) {
-        walk->filters = list->storage != HS_STORE_ALL_PAIRS;
-        return scan_all(walk, &walk->ball->home);
-    }
+    walk->filters = list->storage != HS_STORE_ALL_PAIRS;
     for (int k = 0; k < d; k++) {
         along[k] = span[k].least;
     }
-    for (;;) {
-        uint64_t turns = 0;
-        for (int k = 0; k < d; k++) {
-            turns |= (uint64_t)along[k];
+    do {
+        const hs_ball_image *image = walk->visit->is_near ? &walk->ball->home
+                                                          : image_of(walk, along, d);
+        for (int64_t c = 0; c < list->cells.n; c++) {
+            if (scan_cell(walk, image, list->cells.cell[c], d)) {
+                return true;
+            }
         }
-        if (scan_all(walk, turns != 0 ? image_of(walk, along) : &walk->ball->home)) {
-            return true;
-        }
-        int k = d - 1;
-        while (k >= 0 && along[k] == span[k].most) {
-            along[k] = span[k].least;
-            k--;
-        }
-        if (k < 0) {
-            return false;
-        }
-        along[k]++;
-    }
+    } while (!walk->visit->is_near && go_to_next(span, d, true, along) >= 0);
+    return false;
 }
 
-/* Along open axes a dense table ends where its cells do. False: no cell is left. */
-static bool
-cut_spans(const hs_dynamic *list, hs_span_of_cells *span)
-{
-    bool some = list->cells.n > 0;
-    for (int k = 0; k < list->lattice.ndim; k++) {
-        if (list->cells.dense && list->axes.axis[k].n == 0 && some) {
-            const int64_t last = list->cells.lowest[k] + list->cells.shape[k] - 1;
-            span[k].first = span[k].first < list->cells.lowest[k] ? list->cells.lowest[k]
-                                                                  : span[k].first;
-            span[k].last = span[k].last > last ? last : span[k].last;
-        }
-        some = some && span[k].first <= span[k].last;
-    }
-    return some;
-}
-
-/* A ball whose cells are fewer than those of the list, times images. */
+/* The cells that there are of a ball: those of an open dense table end where it does. */
 static bool
 take_cells(ball_walk *walk)
 {
-    const hs_dynamic       *list = walk->ball->list;
-    const hs_span_of_cells *span = walk->ball->span;
-    double                  wanted = 1.0, stored = (double)list->cells.n;
-    int64_t                 reach = 0;
-    for (int k = 0; k < list->lattice.ndim; k++) {
-        const int64_t below = span[k].centre - span[k].first, above = span[k].last - span[k].centre;
-        wanted *= (double)(span[k].last - span[k].first) + 1.0;
-        stored *= walk->visit->is_near ? 1.0 : (double)(span[k].most - span[k].least) + 1.0;
-        walk->meets_images = walk->meets_images || span[k].least != 0 || span[k].most != 0;
+    const hs_dynamic *list = walk->ball->list;
+    hs_span_of_cells *span = walk->ball->span;
+    double            wanted = 1.0, stored = (double)list->cells.n;
+    int64_t           reach = 0;
+    for (int k = 0; k < list->lattice.ndim; k++, span++) {
+        if (list->cells.dense && list->axes.axis[k].n == 0) {
+            const int64_t first = list->cells.lowest[k], last = first + list->cells.shape[k] - 1;
+            span->first = span->first < first ? first : span->first;
+            span->last = span->last > last ? last : span->last;
+        }
+        if (list->cells.n == 0 || span->first > span->last) {
+            return false;
+        }
+        const int64_t below = span->centre - span->first, above = span->last - span->centre;
+        wanted *= (double)(span->last - span->first) + 1.0;
+        stored *= walk->visit->is_near ? 1.0 : (double)(span->most - span->least) + 1.0;
+        walk->meets_images = walk->meets_images || span->least != 0 || span->most != 0;
         reach = below > reach ? below : reach;
         reach = above > reach ? above : reach;
     }
@@ -663,8 +843,10 @@ take_cells(ball_walk *walk)
     }
 }
 
-bool
-hs_ball_walk(hs_ball *ball, const hs_ball_visit *visit)
+/* Entries within the ball, in each image, or near it; whether it was left early. The spans of the
+ * ball may be cut. */
+static bool
+walk_ball(hs_ball *ball, const hs_ball_visit *visit)
 {
     const hs_dynamic *list = ball->list;
     const double      least = hs_larger(ball->radius, LEAST_BALL);
@@ -687,5 +869,64 @@ hs_ball_walk(hs_ball *ball, const hs_ball_visit *visit)
             return walk_all(&walk);
         }
     }
-    return cut_spans(list, ball->span) && take_cells(&walk);
+    return take_cells(&walk);
+}
+
+/* Visits the points that a query finds: those near the ball, or exactly within it, for which every
+ * key needs a position. any: receives whether there is one; NULL: each is visited. skip: or
+ * NULL. */
+static hs_status
+ask(const hs_dynamic *list, const double *position, double radius, const hs_ball_visit *visit,
+    const hs_key *skip, bool *any, hs_failure *failure)
+{
+    hs_failure ignored;
+    hs_ball    ball;
+    double     own[HS_MAX_DIM];
+    failure = hs_failure_or(failure, &ignored);
+    if (list == NULL || position == NULL || (visit->fn == NULL && any == NULL)) {
+        return HS_ERR_ARGUMENT;
+    }
+    const hs_dynamic_call call = hs_dynamic_enter(list, false);
+    hs_read_position(list, position, own);
+    hs_status status = hs_ball_init(&ball, list, own, radius, failure);
+    if (status == HS_OK && list->n_without > 0 && !visit->is_near) {
+        status = HS_ERR_KEY;
+    }
+    if (status == HS_OK && skip != NULL) {
+        ball.skip = hs_stored_find(list, *skip);
+        status = ball.skip != HS_NO_PLACE ? HS_OK : HS_ERR_KEY;
+    }
+    if (status == HS_OK) {
+        const bool found = walk_ball(&ball, visit);
+        if (any != NULL) {
+            *any = found;
+        }
+        status = ball.status;
+    }
+    hs_dynamic_leave(list, call);
+    return status;
+}
+
+hs_status
+hs_dynamic_near(const hs_dynamic *list, const double *position, double radius, hs_dynamic_fn visit,
+                void *user, hs_failure *failure)
+{
+    const hs_ball_visit each = {.fn = visit, .user = user, .is_near = true};
+    return ask(list, position, radius, &each, NULL, NULL, failure);
+}
+
+hs_status
+hs_dynamic_within(const hs_dynamic *list, const double *position, double radius, bool with_shift,
+                  hs_dynamic_fn visit, void *user, hs_failure *failure)
+{
+    const hs_ball_visit each = {.fn = visit, .user = user, .with_shift = with_shift};
+    return ask(list, position, radius, &each, NULL, NULL, failure);
+}
+
+hs_status
+hs_dynamic_any_within(const hs_dynamic *list, const double *position, double radius,
+                      const hs_key *skip, bool *any, hs_failure *failure)
+{
+    static const hs_ball_visit first = {.fn = NULL};
+    return ask(list, position, radius, &first, skip, any, failure); /* refused where any is NULL */
 }

@@ -5,52 +5,11 @@
 #include "dynamic.h"
 #include "../base/os_thread.h"
 #include "../memory/memory.h"
+#include "../scene/points.h"
+#include "ball.h"
 
-#include <stdlib.h>
-
-/* dynamic.c: points come into cells, move and go; the gate that readers and writers pass; lists as
- * a whole. */
-
-/* A block that is too small is replaced by a larger one; the map learns where its entries are
- * now. */
-
-/* The size of the smallest block for so many entries: it has 2^size. */
-static int
-block_size(int64_t count)
-{
-    int size = 0;
-    while (INT64_C(1) << size < count) {
-        size++;
-    }
-    return size;
-}
-
-bool
-hs_cell_reserve(hs_dynamic *list, uint32_t number, int64_t count)
-{
-    hs_cell *const cell = &list->cells.cell[number];
-    uint8_t *const size = &list->cells.size[number];
-    const int      larger = block_size(count);
-    if (*size != HS_NO_BLOCK && larger <= *size) {
-        return true;
-    }
-    const uint32_t place = larger < HS_ENTRY_SIZES ? hs_entries_take(&list->entries, larger)
-                                                   : HS_NO_PLACE;
-    if (place == HS_NO_PLACE) {
-        return false;
-    }
-    for (uint32_t e = 0; e < cell->count; e++) {
-        const hs_entry_tail *tail = hs_entry_tail_at(&list->entries, cell->start + e);
-        hs_entries_copy(&list->entries, cell->start + e, &list->entries, place + e, 1);
-        hs_key_map_moved(&list->map, (hs_key){tail->id, tail->tag}, cell->start + e, place + e);
-    }
-    if (*size != HS_NO_BLOCK) {
-        hs_entries_give(&list->entries, *size, cell->start);
-    }
-    cell->start = place;
-    *size = (uint8_t)larger;
-    return true;
-}
+/* dynamic.c: the functions of halfshell_dynamic.h (docs/dynamic.md) but for queries: points come,
+ * go and move, lists are made, copied and looked at; and the gate that readers and writers pass. */
 
 /* The way in is one compare-and-swap; threads that do not get in sleep until one leaves. */
 
@@ -86,18 +45,9 @@ try_write(void *gate)
 }
 
 static bool
-is_free(void *context)
+is_free(void *gate)
 {
-    hs_gate *gate = context;
-    return hs_atomic_load(&gate->state) <= empty();
-}
-
-static void
-wake(void)
-{
-    if (hs_atomic_load(&hs_n_waiting) > 0) {
-        hs_wake_waiting();
-    }
+    return hs_atomic_load(&((hs_gate *)gate)->state) <= empty();
 }
 
 void
@@ -112,26 +62,6 @@ hs_gate_is_mine(hs_gate *gate)
     const int64_t holder = hs_atomic_load(&gate->holder);
     return holder != 0 && holder == HS_THREAD_NUMBER() &&
            gate->held_at == hs_atomic_load(&hs_n_forks);
-}
-
-bool
-hs_gate_read(hs_gate *gate)
-{
-    if (hs_gate_is_mine(gate)) {
-        return false;
-    }
-    if (!try_read(gate) && !try_read(gate)) {
-        hs_wait_for(try_read, gate);
-    }
-    return true;
-}
-
-void
-hs_gate_read_end(hs_gate *gate)
-{
-    if (hs_atomic_add(&gate->state, -1) % WRITER == 1) {
-        wake();
-    }
 }
 
 /* A writer that waits gives up what readers may need to get out, and takes it back before it goes
@@ -151,28 +81,40 @@ wait_to_write(hs_gate *gate)
 }
 
 bool
-hs_gate_write(hs_gate *gate)
+hs_gate_enter(hs_gate *gate, bool writes)
 {
+    bool (*const try_to)(void *) = writes ? try_write : try_read;
     if (hs_gate_is_mine(gate)) {
         return false;
     }
-    if (!try_write(gate) && !try_write(gate)) {
-        wait_to_write(gate);
+    if (!try_to(gate) && !try_to(gate)) {
+        if (writes) {
+            wait_to_write(gate);
+        } else {
+            hs_wait_for(try_read, gate);
+        }
     }
     return true;
 }
 
 void
-hs_gate_write_end(hs_gate *gate)
+hs_gate_leave(hs_gate *gate, bool writes)
 {
-    hs_atomic_store(&gate->state, empty());
-    wake();
+    bool is_last = true;
+    if (writes) {
+        hs_atomic_store(&gate->state, empty());
+    } else {
+        is_last = hs_atomic_add(&gate->state, -1) % WRITER == 1;
+    }
+    if (is_last && hs_atomic_load(&hs_n_waiting) > 0) {
+        hs_wake_waiting();
+    }
 }
 
 bool
 hs_gate_hold(hs_gate *gate)
 {
-    const bool went_in = hs_gate_write(gate);
+    const bool went_in = hs_gate_enter(gate, true);
     if (went_in) {
         gate->held_at = hs_atomic_load(&hs_n_forks);
         hs_atomic_store(&gate->holder, HS_THREAD_NUMBER());
@@ -184,7 +126,7 @@ void
 hs_gate_release(hs_gate *gate)
 {
     hs_atomic_store(&gate->holder, 0);
-    hs_gate_write_end(gate);
+    hs_gate_leave(gate, true);
 }
 
 /* Positions made ready, for the number of dimensions that a list has. */
@@ -235,104 +177,7 @@ hs_dynamic_is_known(const hs_dynamic *list, hs_placed *placed)
     return known;
 }
 
-/* In line: a call of memcpy for two or three numbers takes longer than they do. */
-HS_ALWAYS_INLINE void
-copy_numbers(double *to, const double *from, int n)
-{
-    for (int k = 0; k < n; k++) {
-        to[k] = from[k];
-    }
-}
-
-/* The position of an entry. placed: NULL for a key without one. */
-static void
-dynamic_write(hs_dynamic *list, uint32_t place, const hs_placed *placed)
-{
-    const int     d = list->lattice.ndim;
-    double *const x = hs_entry_at(&list->entries, place);
-    if (placed == NULL) {
-        for (int k = 0; k < d; k++) {
-            x[k] = NAN;
-        }
-        return;
-    }
-    copy_numbers(x, placed->x, d);
-    if (list->entries.keeps_given) {
-        copy_numbers(hs_entry_given(&list->entries, place), placed->given, d);
-    }
-    if (!list->lattice.aligned) {
-        list->magnitude = hs_larger(placed->magnitude, list->magnitude);
-    }
-}
-
-/* All memory first, then cell after cell, in order. */
-
-/* Makes a range of cells hold one more, which may be the first. */
-static void
-widen(const hs_dynamic *list, const int64_t *index, bool is_first, int64_t *first, int64_t *last)
-{
-    for (int k = 0; k < list->lattice.ndim; k++) {
-        first[k] = is_first || index[k] < first[k] ? index[k] : first[k];
-        last[k] = is_first || index[k] > last[k] ? index[k] : last[k];
-    }
-}
-
-/* Memory for all that a copy will hold, and no more. */
-static bool
-reserve_copy(const hs_dynamic *list, hs_dynamic *copy)
-{
-    int64_t    first[HS_MAX_DIM], last[HS_MAX_DIM], index[HS_MAX_DIM];
-    int64_t    n_entries = 0, n_cells = 0;
-    hs_failure ignored;
-    for (int64_t c = 0; c < list->cells.n; c++) {
-        if (list->cells.cell[c].count > 0) {
-            hs_cell_table_index(&list->cells, (uint32_t)c, index);
-            widen(list, index, n_cells == 0, first, last);
-            n_entries += INT64_C(1) << block_size(list->cells.cell[c].count);
-            n_cells++;
-        }
-    }
-    return n_cells == 0 || (hs_hash_reserve(&copy->map.hash, list->map.n) &&
-                            hs_entries_reserve(&copy->entries, n_entries) &&
-                            hs_cell_table_reserve(&copy->cells, &copy->entries, first, last,
-                                                  n_cells, &ignored) == HS_OK);
-}
-
-/* copy: of the same kind, without points. HS_ERR_MEMORY: that it stays. */
-static hs_status
-copy_points(const hs_dynamic *list, hs_dynamic *copy)
-{
-    int64_t    index[HS_MAX_DIM];
-    uint32_t   number;
-    hs_failure ignored;
-    if (!reserve_copy(list, copy)) {
-        return HS_ERR_MEMORY;
-    }
-    for (int64_t c = 0; c < list->cells.n; c++) {
-        const hs_cell cell = list->cells.cell[c];
-        if (cell.count == 0) {
-            continue;
-        }
-        hs_cell_table_index(&list->cells, (uint32_t)c, index);
-        /* reserve_copy has the memory */
-        (void)hs_cell_table_add(&copy->cells, &copy->entries, index, &number, &ignored);
-        (void)hs_cell_reserve(copy, number, cell.count);
-        const uint32_t start = copy->cells.cell[number].start;
-        hs_entries_copy(&list->entries, cell.start, &copy->entries, start, cell.count);
-        copy->cells.cell[number].count = cell.count;
-        copy->cells.n_empty--;
-        for (uint32_t e = 0; e < cell.count; e++) {
-            hs_entry_tail *tail = hs_entry_tail_at(&copy->entries, start + e);
-            tail->cell = number;
-            hs_key_map_add(&copy->map, (hs_key){tail->id, tail->tag}, start + e);
-        }
-    }
-    copy->cells.is_wide = list->cells.is_wide;
-    return HS_OK;
-}
-
-/* The checks of options, and lists that are made, copied and emptied. A copy is a new list into
- * which the points of the old one are put, cell after cell; shrinking makes one and keeps it. */
+/* ---- lists as a whole ---- */
 
 #define LEAST_LENGTH 0x1p-300 /* squares of these and of their quotients are ordinary numbers */
 #define MOST_LENGTH  0x1p300
@@ -406,28 +251,44 @@ measure_box(hs_dynamic *list)
     return n_images;
 }
 
-hs_status
-hs_list_new(const hs_dynamic_options *options, hs_dynamic **list, hs_failure *failure)
+hs_dynamic_options
+hs_dynamic_options_default(void)
 {
-    hs_status   status = check_options(options, failure);
-    hs_dynamic *made = status == HS_OK ? hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *made) : NULL;
-    if (made == NULL) {
-        return status == HS_OK ? HS_ERR_MEMORY : status;
+    return (hs_dynamic_options){.ndim = 3,
+                                .storage = HS_STORE_HASH,
+                                .cell_size = 1.0,
+                                .inclusive = true,
+                                .grid_bytes = 1e9};
+}
+
+hs_status
+hs_dynamic_new(const hs_dynamic_options *options, hs_dynamic **list, hs_failure *failure)
+{
+    hs_failure ignored;
+    failure = hs_failure_or(failure, &ignored);
+    if (options == NULL || list == NULL) {
+        return HS_ERR_ARGUMENT;
     }
-    memset(made, 0, sizeof *made);
-    made->storage = options->storage;
-    made->inclusive = options->inclusive;
-    made->max_radius = options->max_radius != 0.0 ? options->max_radius : options->cell_size;
-    hs_gate_init(&made->gate);
-    hs_lattice_init(options->box, options->ndim, hs_scale_of(0), &made->lattice);
-    if (hs_skew_is_left(&made->lattice)) {
-        status = HS_ERR_BOX_SKEWED;
-    } else {
+    *list = NULL;
+    const hs_fpenv env = hs_fpenv_enter();
+    hs_status      status = check_options(options, failure);
+    hs_dynamic    *made = status == HS_OK ? hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *made) : NULL;
+    if (status == HS_OK && made == NULL) {
+        status = HS_ERR_MEMORY;
+    }
+    if (status == HS_OK) {
+        memset(made, 0, sizeof *made);
+        made->storage = options->storage;
+        made->inclusive = options->inclusive;
+        made->max_radius = options->max_radius != 0.0 ? options->max_radius : options->cell_size;
+        hs_gate_init(&made->gate);
+        hs_lattice_init(options->box, options->ndim, hs_scale_of(0), &made->lattice);
+        status = hs_skew_is_left(&made->lattice) ? HS_ERR_BOX_SKEWED : HS_OK;
+    }
+    if (status == HS_OK) {
         hs_axes_init(&made->axes, &made->lattice, options->cell_size,
                      options->storage == HS_STORE_ALL_PAIRS, made->max_radius);
-        hs_entries_init(&made->entries, options->ndim, made->lattice.n_periodic > 0);
-        hs_cell_table_init(&made->cells, &made->axes, options->storage != HS_STORE_HASH,
-                           options->grid_bytes);
+        hs_stored_init(made, options->storage != HS_STORE_HASH, options->grid_bytes);
         if (!(measure_box(made) <= MOST_IMAGES)) {
             status = refuse_length(failure, HS_LENGTH_MAX_RADIUS, made->max_radius);
         } else if (!hs_offsets_init(&made->offsets, &made->axes, &made->lattice,
@@ -435,42 +296,30 @@ hs_list_new(const hs_dynamic_options *options, hs_dynamic **list, hs_failure *fa
             status = HS_ERR_MEMORY;
         }
     }
-    if (status != HS_OK) {
+    if (status == HS_OK) {
+        *list = made;
+    } else {
         hs_free(NULL, made);
-        return status;
     }
-    *list = made;
-    return HS_OK;
-}
-
-static void
-free_points(hs_dynamic *list)
-{
-    hs_entries_free(&list->entries);
-    hs_key_map_free(&list->map);
-    hs_cell_table_free(&list->cells);
+    hs_fpenv_leave(env);
+    return status;
 }
 
 void
-hs_list_free(hs_dynamic *list)
+hs_dynamic_free(hs_dynamic *list)
 {
-    free_points(list);
-    hs_offsets_free(&list->offsets);
-    hs_free(NULL, list);
+    if (list != NULL) {
+        hs_stored_free(list);
+        hs_free(NULL, list->offsets.slot);
+        hs_free(NULL, list);
+    }
 }
 
-/* No points, and no memory of them. */
-static void
-start_points(hs_dynamic *list)
+/* hs_dynamic_copy, of a list that is entered. */
+static hs_status
+make_copy(const hs_dynamic *list, hs_dynamic **copy)
 {
-    hs_entries_init(&list->entries, list->lattice.ndim, list->entries.keeps_given);
-    hs_cell_table_init(&list->cells, &list->axes, list->cells.dense, list->cells.most_bytes);
-    list->map = (hs_key_map){.n = 0};
-}
-
-hs_status
-hs_list_copy(const hs_dynamic *list, hs_dynamic **copy)
-{
+    const int64_t bytes = list->offsets.at[list->offsets.reach + 1];
     *copy = NULL;
     hs_dynamic *made = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *made);
     if (made == NULL) {
@@ -479,322 +328,357 @@ hs_list_copy(const hs_dynamic *list, hs_dynamic **copy)
     memset(made, 0, sizeof *made);
     memcpy(made, list, offsetof(hs_dynamic, changes)); /* others may be at its gate */
     hs_gate_init(&made->gate);
-    start_points(made);
-    if (!hs_offsets_copy(&list->offsets, &made->offsets) || copy_points(list, made) != HS_OK) {
-        hs_list_free(made);
+    hs_stored_init(made, list->cells.dense, list->cells.most_bytes);
+    made->offsets.slot = hs_alloc(NULL, HS_FOR_STENCIL, bytes, 1);
+    if (made->offsets.slot == NULL || hs_stored_copy(list, made) != HS_OK) {
+        hs_dynamic_free(made);
         return HS_ERR_MEMORY;
     }
+    memcpy(made->offsets.slot, list->offsets.slot, (size_t)bytes);
     *copy = made;
     return HS_OK;
 }
 
+hs_status
+hs_dynamic_copy(const hs_dynamic *list, hs_dynamic **copy)
+{
+    if (list == NULL || copy == NULL) {
+        return HS_ERR_ARGUMENT;
+    }
+    const hs_dynamic_call call = hs_dynamic_enter(list, false);
+    const hs_status       status = make_copy(list, copy);
+    hs_dynamic_leave(list, call);
+    return status;
+}
+
 void
-hs_list_clear(hs_dynamic *list)
+hs_dynamic_clear(hs_dynamic *list)
 {
-    free_points(list);
-    start_points(list);
-    list->n_without = 0;
-    list->magnitude = 0.0;
+    if (list != NULL) {
+        const hs_dynamic_call call = hs_dynamic_enter(list, true);
+        hs_stored_free(list);
+        list->changes++;
+        hs_dynamic_leave(list, call);
+    }
 }
 
+/* Keeps the points of a copy. On failure the list is as it was. */
 hs_status
-hs_list_shrink(hs_dynamic *list)
+hs_dynamic_shrink_to_fit(hs_dynamic *list)
 {
-    hs_dynamic     *copy;
-    const hs_status status = hs_list_copy(list, &copy);
-    if (status != HS_OK) {
-        return status;
+    hs_dynamic *copy;
+    if (list == NULL) {
+        return HS_ERR_ARGUMENT;
     }
-    free_points(list);
-    list->entries = copy->entries;
-    list->map = copy->map;
-    list->cells = copy->cells;
-    list->changes++;
-    start_points(copy);
-    hs_list_free(copy);
-    return HS_OK;
+    const hs_dynamic_call call = hs_dynamic_enter(list, true);
+    const hs_status       status = make_copy(list, &copy);
+    if (status == HS_OK) {
+        const hs_entries    entries = list->entries; /* others may be at its gate */
+        const hs_hash       map = list->map;
+        const hs_cell_table cells = list->cells;
+        list->entries = copy->entries;
+        list->map = copy->map;
+        list->cells = copy->cells;
+        list->changes++;
+        copy->entries = entries;
+        copy->map = map;
+        copy->cells = cells;
+        hs_dynamic_free(copy);
+    }
+    hs_dynamic_leave(list, call);
+    return status;
 }
 
-/*
- * A point comes into a cell, goes out of it or moves on, once there is room: nothing here can fail.
- * A point that stays in its cell is written over; else it is appended to its new cell and taken out
- * of the old one.
- */
-
-/* A new entry behind those of a cell that has room for it; returns its place. */
-HS_ALWAYS_INLINE uint32_t
-append_entry(hs_dynamic *list, uint32_t number, hs_key key, const hs_placed *placed)
+int64_t
+hs_dynamic_length(const hs_dynamic *list)
 {
-    hs_cell *const       cell = &list->cells.cell[number];
-    const uint32_t       place = cell->start + cell->count;
-    hs_entry_tail *const tail = hs_entry_tail_at(&list->entries, place);
-    list->cells.n_empty -= cell->count == 0;
-    cell->count++;
-    tail->id = key.id;
-    tail->tag = key.tag;
-    tail->cell = number;
-    dynamic_write(list, place, placed);
-    return place;
+    return hs_dynamic_look(list).n_points;
 }
 
-/* Takes an entry out of its cell: the last one takes its place. A cell that is left empty gives its
- * block back. */
-HS_ALWAYS_INLINE void
-take_out(hs_dynamic *list, uint32_t place)
+/* The cursor is the number of a cell, and that of an entry in it: 2^31 of both at most. */
+int64_t
+hs_dynamic_keys(const hs_dynamic *list, int64_t *cursor, hs_key *keys, int64_t n)
 {
-    const uint32_t number = hs_entry_tail_at(&list->entries, place)->cell;
-    hs_cell *const cell = &list->cells.cell[number];
-    const uint32_t last = cell->start + cell->count - 1;
-    if (last != place) {
-        const hs_entry_tail *tail = hs_entry_tail_at(&list->entries, last);
-        hs_key_map_moved(&list->map, (hs_key){tail->id, tail->tag}, last, place);
-        hs_entries_copy(&list->entries, last, &list->entries, place, 1);
+    int64_t found = 0;
+    if (list == NULL || cursor == NULL || keys == NULL || *cursor < 0) {
+        return 0;
     }
-    cell->count--;
-    list->cells.n_empty += cell->count == 0;
-    if (cell->count == 0 && !list->cells.keeps_empty) {
-        hs_entries_give(&list->entries, list->cells.size[number], cell->start);
-        list->cells.size[number] = HS_NO_BLOCK;
-    }
-}
-
-HS_ALWAYS_INLINE bool
-has_position(const hs_dynamic *list, uint32_t place)
-{
-    return !isnan(hs_entry_at(&list->entries, place)[0]);
-}
-
-/* The point of a key that is there, for which its new cell has room if that is another one. */
-HS_ALWAYS_INLINE void
-put_again(hs_dynamic *list, hs_key key, uint32_t place, uint32_t number, const hs_placed *placed)
-{
-    list->n_without += (placed == NULL) - !has_position(list, place);
-    if (hs_entry_tail_at(&list->entries, place)->cell == number) {
-        dynamic_write(list, place, placed);
-        return;
-    }
-    const uint32_t to = append_entry(list, number, key, placed);
-    hs_key_map_moved(&list->map, key, place, to);
-    take_out(list, place);
-}
-
-HS_ALWAYS_INLINE void
-put_new(hs_dynamic *list, hs_key key, uint32_t number, const hs_placed *placed)
-{
-    list->n_without += placed == NULL;
-    hs_key_map_add(&list->map, key, append_entry(list, number, key, placed));
-}
-
-/* One point. Memory first, then changes that cannot fail. */
-
-hs_status
-hs_update_insert(hs_dynamic *list, hs_key key, const hs_placed *placed, hs_failure *failure)
-{
-    static const int64_t nowhere[HS_MAX_DIM] = {0};
-    uint32_t             number;
-    const int64_t       *index = placed != NULL ? placed->index : nowhere;
-    const hs_status      status =
-        hs_cell_table_add(&list->cells, &list->entries, index, &number, failure);
-    if (status != HS_OK) {
-        return status;
-    }
-    uint32_t place = hs_key_map_find(&list->map, &list->entries, key);
-    if (place == HS_NO_PLACE && !hs_hash_reserve(&list->map.hash, list->map.n + 1)) {
-        return HS_ERR_MEMORY;
-    }
-    if (place == HS_NO_PLACE || hs_entry_tail_at(&list->entries, place)->cell != number) {
-        if (!hs_cell_reserve(list, number, (int64_t)list->cells.cell[number].count + 1)) {
-            return HS_ERR_MEMORY;
+    const hs_dynamic_call call = hs_dynamic_enter(list, false);
+    int64_t               c = *cursor >> 32, e = *cursor & UINT32_MAX;
+    while (found < n && c < list->cells.n) {
+        const hs_cell cell = list->cells.cell[c];
+        for (; e < cell.count && found < n; e++) {
+            const hs_entry_tail *tail = hs_entry_tail_at(&list->entries, cell.start + (uint32_t)e);
+            keys[found++] = (hs_key){tail->id, tail->tag};
+        }
+        if (e >= cell.count) {
+            c++;
+            e = 0;
         }
     }
-    if (place == HS_NO_PLACE) {
-        put_new(list, key, number, placed);
-    } else {
-        put_again(list, key, place, number, placed);
+    *cursor = c << 32 | e;
+    hs_dynamic_leave(list, call);
+    return found;
+}
+
+void
+hs_dynamic_hold(hs_dynamic *list)
+{
+    if (list != NULL && hs_gate_hold(&list->gate)) {
+        list->held_env = hs_fpenv_enter();
     }
-    list->changes++;
-    return HS_OK;
+}
+
+void
+hs_dynamic_release(hs_dynamic *list)
+{
+    if (list != NULL && hs_gate_is_mine(&list->gate)) {
+        const hs_fpenv env = list->held_env;
+        hs_gate_release(&list->gate);
+        hs_fpenv_leave(env);
+    }
+}
+
+void
+hs_dynamic_hook(hs_dynamic *list, const hs_dynamic_hooks *hooks)
+{
+    if (list != NULL) {
+        list->hooks = hooks != NULL ? *hooks : (hs_dynamic_hooks){.poll = NULL};
+        list->gate.pause = list->hooks.pause;
+        list->gate.resume = list->hooks.resume;
+    }
+}
+
+hs_dynamic_state
+hs_dynamic_look(const hs_dynamic *list)
+{
+    hs_dynamic_state state = {.ndim = 0};
+    if (list == NULL) {
+        return state;
+    }
+    const hs_dynamic_call call = hs_dynamic_enter(list, false);
+    state.ndim = list->lattice.ndim;
+    state.n_points = list->map.n;
+    state.n_without = list->n_without;
+    state.n_cells = list->cells.n;
+    state.n_empty = list->cells.dense ? 0 : list->cells.n_empty;
+    state.bytes =
+        (int64_t)sizeof *list + list->offsets.at[list->offsets.reach + 1] + hs_stored_bytes(list);
+    state.changes = list->changes;
+    state.max_radius = list->max_radius;
+    for (int k = 0; k < state.ndim; k++) {
+        state.cell_size[k] = list->axes.axis[k].width;
+    }
+    hs_dynamic_leave(list, call);
+    return state;
+}
+
+void
+hs_dynamic_count(hs_dynamic *list, hs_dynamic_counters *counters)
+{
+    if (list != NULL) {
+        list->counters = counters;
+        if (counters != NULL) {
+            *counters = (hs_dynamic_counters){0};
+        }
+    }
+}
+
+/* ---- points come, go and move ---- */
+
+/* hs_dynamic_insert and hs_dynamic_move. */
+static hs_status
+put(hs_dynamic *list, hs_key key, const double *position, bool must_be_there, hs_failure *failure)
+{
+    hs_failure ignored;
+    hs_placed  placed;
+    double     own[HS_MAX_DIM];
+    failure = hs_failure_or(failure, &ignored);
+    if (list == NULL || (position == NULL && list->storage != HS_STORE_ALL_PAIRS)) {
+        return HS_ERR_ARGUMENT;
+    }
+    const hs_dynamic_call call = hs_dynamic_enter(list, true);
+    const uint32_t        place = hs_stored_find(list, key);
+    hs_status             status = must_be_there && place == HS_NO_PLACE ? HS_ERR_KEY : HS_OK;
+    if (status == HS_OK && position != NULL) {
+        hs_read_position(list, position, own);
+        status = hs_dynamic_place(list, own, &placed, failure);
+    }
+    if (status == HS_OK) {
+        status = hs_stored_put(list, key, place, position != NULL ? &placed : NULL, failure);
+    }
+    hs_dynamic_leave(list, call);
+    return status;
+}
+
+hs_status
+hs_dynamic_insert(hs_dynamic *list, hs_key key, const double *position, hs_failure *failure)
+{
+    return put(list, key, position, false, failure);
+}
+
+hs_status
+hs_dynamic_move(hs_dynamic *list, hs_key key, const double *position, hs_failure *failure)
+{
+    return put(list, key, position, true, failure);
 }
 
 bool
-hs_update_remove(hs_dynamic *list, hs_key key)
+hs_dynamic_remove(hs_dynamic *list, hs_key key)
 {
-    const uint32_t place = hs_key_map_find(&list->map, &list->entries, key);
-    if (place == HS_NO_PLACE) {
+    if (list == NULL) {
         return false;
     }
-    list->n_without -= !has_position(list, place);
-    hs_key_map_remove(&list->map, key, place);
-    take_out(list, place);
-    list->changes++;
-    return true;
+    const hs_dynamic_call call = hs_dynamic_enter(list, true);
+    const bool            was_there = hs_stored_remove(list, key);
+    hs_dynamic_leave(list, call);
+    return was_there;
 }
 
-/*
- * Many points at once. First each has the number of its cell, then each cell gets room for all that
- * comes into it, as if all were new, and at last each point is put where it belongs. Rows are
- * placed anew each time: to store what comes of it would cost more than to do it again.
- */
-
-#define POINTS_A_CELL 4  /* or more: else a hash table grows meanwhile */
-#define FEW_ROWS      16 /* where there are more cells for each row, not all are looked at */
-#define ROWS_AHEAD    32 /* whose memory is fetched before they are written */
-
-/* Row i made ready. given: receives its numbers, which `placed` borrows. Statuses of
- * hs_dynamic_place, with failure->row. */
 static hs_status
-place_row(const hs_dynamic *list, double *const *x, int64_t i, double *given, hs_placed *placed,
-          hs_failure *failure)
+put_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags, const hs_points *positions,
+         bool must_be_there, hs_failure *failure)
 {
-    for (int k = 0; k < list->lattice.ndim; k++) {
-        given[k] = x[k][i];
+    const hs_options options = hs_options_default();
+    hs_failure       ignored;
+    hs_cloud         cloud;
+    failure = hs_failure_or(failure, &ignored);
+    if (list == NULL || positions == NULL || positions->ndim != list->lattice.ndim ||
+        (ids == NULL && positions->n != 0)) {
+        return HS_ERR_ARGUMENT;
     }
-    const hs_status status = hs_dynamic_place(list, given, placed, failure);
-    failure->row = status == HS_OK ? failure->row : i;
+    hs_status status = hs_check_points(positions, failure);
+    if (status != HS_OK) {
+        return status;
+    }
+    const hs_dynamic_call call = hs_dynamic_enter(list, true);
+    status = hs_stored_check(list, ids, tags, positions->n, must_be_there, failure);
+    if (status == HS_OK) {
+        status = hs_cloud_load(NULL, NULL, positions, &options, &cloud, failure);
+        if (status == HS_OK) {
+            status = hs_stored_put_many(list, ids, tags, positions->n, cloud.x, failure);
+            hs_cloud_free(NULL, &cloud);
+        }
+    }
+    hs_dynamic_leave(list, call);
     return status;
-}
-
-/* The cell of each row, as long as the list is as it was. Dense cells are made to reach all rows
- * first, for which they are looked at where an axis is open. HS_ERR_INTERRUPTED, and statuses of
- * hs_dynamic_place and hs_cell_table_reserve. */
-static hs_status
-number_rows(hs_dynamic *list, int64_t n, double *const *x, uint32_t *numbers, hs_failure *failure)
-{
-    int64_t   first[HS_MAX_DIM] = {0}, last[HS_MAX_DIM] = {0};
-    double    given[HS_MAX_DIM];
-    hs_placed placed;
-    hs_status status = HS_OK;
-    int       pass = list->cells.dense && list->lattice.n_periodic < list->lattice.ndim ? 0 : 1;
-    for (; pass < 2 && status == HS_OK; pass++) {
-        if (pass == 1) {
-            status = hs_cell_table_reserve(&list->cells, &list->entries, first, last,
-                                           list->map.n == 0 ? n / POINTS_A_CELL : n, failure);
-        }
-        list->cells.keeps_empty = true;
-        for (int64_t i = 0; i < n && status == HS_OK; i++) {
-            if ((i + 1) % HS_POLL_POINTS == 0 && list->hooks.poll != NULL &&
-                !list->hooks.poll(NULL, 0.0)) {
-                return HS_ERR_INTERRUPTED;
-            }
-            status = place_row(list, x, i, given, &placed, failure);
-            if (status == HS_OK && pass == 0) {
-                widen(list, placed.index, i == 0, first, last);
-            } else if (status == HS_OK) {
-                status = hs_cell_table_add(&list->cells, &list->entries, placed.index, &numbers[i],
-                                           failure);
-            }
-        }
-    }
-    return status;
-}
-
-static int
-compare_cells(const void *one, const void *other)
-{
-    const uint32_t a = *(const uint32_t *)one, b = *(const uint32_t *)other;
-    return (a > b) - (a < b);
-}
-
-static bool
-reserve_more(hs_dynamic *list, uint32_t number, int64_t more)
-{
-    return hs_cell_reserve(list, number, (int64_t)list->cells.cell[number].count + more);
-}
-
-/* Room in each cell for all rows that go there, as if they were all new; in the order of the cells,
- * so that the blocks of neighbours lie side by side. */
-static bool
-reserve_cells(hs_dynamic *list, const uint32_t *numbers, int64_t n)
-{
-    const bool    few = n < list->cells.n / FEW_ROWS; /* sorted, else counted */
-    const int64_t n_scratch = few ? n : list->cells.n;
-    uint32_t     *scratch = hs_alloc(NULL, HS_FOR_CELLS, n_scratch, sizeof *scratch);
-    bool          fits = scratch != NULL;
-    if (fits && few) {
-        memcpy(scratch, numbers, (size_t)n * sizeof *scratch);
-        qsort(scratch, (size_t)n, sizeof *scratch, compare_cells);
-        for (int64_t i = 0, begin = 0; fits && i < n; begin = i) {
-            while (i < n && scratch[i] == scratch[begin]) {
-                i++;
-            }
-            fits = reserve_more(list, scratch[begin], i - begin);
-        }
-    } else if (fits) {
-        memset(scratch, 0, (size_t)n_scratch * sizeof *scratch);
-        for (int64_t i = 0; i < n; i++) {
-            scratch[numbers[i]]++;
-        }
-        for (int64_t c = 0; fits && c < n_scratch; c++) {
-            fits = scratch[c] == 0 || reserve_more(list, (uint32_t)c, scratch[c]);
-        }
-    }
-    hs_free(NULL, scratch);
-    return fits;
-}
-
-/* Puts the rows into their cells, which have room; numbers: receives the cells that they were in,
- * or are in if they are new. */
-static void
-put_rows(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n, double *const *x,
-         uint32_t *numbers, hs_failure *failure)
-{
-    const bool are_new = list->map.n == 0;
-    double     given[HS_MAX_DIM];
-    hs_placed  placed;
-    for (int64_t i = 0; i < n; i++) {
-        const hs_key   key = {ids[i], tags != NULL ? tags[i] : 0};
-        const uint32_t number = numbers[i];
-        if (i + ROWS_AHEAD < n) { /* the points of a cell come from anywhere among the rows */
-            const int64_t ahead = i + ROWS_AHEAD;
-            const hs_cell cell = list->cells.cell[numbers[ahead]];
-            HS_PREFETCH_WRITE(hs_entry_at(&list->entries, cell.start + cell.count));
-            HS_PREFETCH_WRITE(hs_entry_given(&list->entries, cell.start + cell.count));
-            hs_key_map_expect(&list->map, (hs_key){ids[ahead], tags != NULL ? tags[ahead] : 0});
-        }
-        const uint32_t place = are_new ? HS_NO_PLACE
-                                       : hs_key_map_find(&list->map, &list->entries, key);
-        (void)place_row(list, x, i, given, &placed, failure); /* it can be had: number_rows */
-        if (place == HS_NO_PLACE) {
-            put_new(list, key, number, &placed);
-        } else {
-            numbers[i] = hs_entry_tail_at(&list->entries, place)->cell;
-            put_again(list, key, place, number, &placed);
-        }
-    }
 }
 
 hs_status
-hs_update_insert_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n,
-                      double *const *x, hs_failure *failure)
+hs_dynamic_insert_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags,
+                       const hs_points *positions, hs_failure *failure)
 {
-    if (n == 0) {
-        return HS_OK;
+    return put_many(list, ids, tags, positions, false, failure);
+}
+
+hs_status
+hs_dynamic_move_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags,
+                     const hs_points *positions, hs_failure *failure)
+{
+    return put_many(list, ids, tags, positions, true, failure);
+}
+
+hs_status
+hs_dynamic_remove_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n,
+                       bool *removed, hs_failure *failure)
+{
+    hs_failure ignored;
+    failure = hs_failure_or(failure, &ignored);
+    if (list == NULL || n < 0 || (ids == NULL && n > 0)) {
+        return HS_ERR_ARGUMENT;
     }
-    if (list->map.n == 0) { /* what memory it has may not be where these points are */
-        hs_list_clear(list);
-    }
-    uint32_t  *numbers = hs_alloc(NULL, HS_FOR_CELLS, n, sizeof *numbers);
-    hs_status  status = numbers != NULL ? number_rows(list, n, x, numbers, failure) : HS_ERR_MEMORY;
-    const bool numbered = status == HS_OK;
-    if (numbered &&
-        !(hs_hash_reserve(&list->map.hash, list->map.n + n) && reserve_cells(list, numbers, n))) {
-        status = HS_ERR_MEMORY;
-    }
-    if (status == HS_OK) {
-        put_rows(list, ids, tags, n, x, numbers, failure);
-        list->changes++;
-    }
-    list->cells.keeps_empty = false;
-    for (int64_t i = 0; numbered && i < n; i++) { /* the blocks of cells that are empty */
-        const uint32_t c = numbers[i];
-        if (list->cells.cell[c].count == 0 && list->cells.size[c] != HS_NO_BLOCK) {
-            hs_entries_give(&list->entries, list->cells.size[c], list->cells.cell[c].start);
-            list->cells.size[c] = HS_NO_BLOCK;
+    const hs_dynamic_call call = hs_dynamic_enter(list, true);
+    const hs_status       status = hs_stored_check(list, ids, tags, n, false, failure);
+    for (int64_t i = 0; status == HS_OK && i < n; i++) {
+        const hs_key key = {ids[i], tags != NULL ? tags[i] : 0};
+        const bool   was_there = hs_stored_remove(list, key);
+        if (removed != NULL) {
+            removed[i] = was_there;
         }
     }
-    if (list->map.n == 0) {
-        hs_list_clear(list);
-    }
-    hs_free(NULL, numbers);
+    hs_dynamic_leave(list, call);
     return status;
+}
+
+bool
+hs_dynamic_has(const hs_dynamic *list, hs_key key)
+{
+    if (list == NULL) {
+        return false;
+    }
+    const hs_dynamic_call call = hs_dynamic_enter(list, false);
+    const bool            has = hs_stored_find(list, key) != HS_NO_PLACE;
+    hs_dynamic_leave(list, call);
+    return has;
+}
+
+/* The position of a key: borrowed until the list changes. */
+static hs_status
+look_up(const hs_dynamic *list, hs_key key, const double **given)
+{
+    const uint32_t place = hs_stored_find(list, key);
+    if (place == HS_NO_PLACE) {
+        return HS_ERR_KEY;
+    }
+    *given = hs_entry_given(&list->entries, place);
+    return isnan(hs_entry_at(&list->entries, place)[0]) ? HS_ERR_ARGUMENT : HS_OK;
+}
+
+hs_status
+hs_dynamic_position(const hs_dynamic *list, hs_key key, double *position)
+{
+    const double *given;
+    if (list == NULL || position == NULL) {
+        return HS_ERR_ARGUMENT;
+    }
+    const hs_dynamic_call call = hs_dynamic_enter(list, false);
+    const hs_status       status = look_up(list, key, &given);
+    if (status == HS_OK) {
+        memcpy(position, given, (size_t)list->lattice.ndim * sizeof *given);
+    }
+    hs_dynamic_leave(list, call);
+    return status;
+}
+
+/* The cell of a position of the caller's, or where that is NULL of a key. */
+static hs_status
+cell_at(const hs_dynamic *list, const hs_key *key, const double *position, int64_t *cell,
+        hs_failure *failure)
+{
+    double        own[HS_MAX_DIM];
+    const double *given = own;
+    hs_placed     placed;
+    hs_status     status = HS_OK;
+    if (list == NULL || (key == NULL && position == NULL) || cell == NULL) {
+        return HS_ERR_ARGUMENT;
+    }
+    const hs_dynamic_call call = hs_dynamic_enter(list, false);
+    if (key != NULL) {
+        status = look_up(list, *key, &given);
+    } else {
+        hs_read_position(list, position, own);
+    }
+    if (status == HS_OK) {
+        status = hs_dynamic_place(list, given, &placed, failure);
+    }
+    if (status == HS_OK) {
+        memcpy(cell, placed.index, (size_t)list->lattice.ndim * sizeof *cell);
+    }
+    hs_dynamic_leave(list, call);
+    return status;
+}
+
+hs_status
+hs_dynamic_cell(const hs_dynamic *list, hs_key key, int64_t *cell)
+{
+    hs_failure ignored;
+    return cell_at(list, &key, NULL, cell, &ignored);
+}
+
+hs_status
+hs_dynamic_cell_of(const hs_dynamic *list, const double *position, int64_t *cell,
+                   hs_failure *failure)
+{
+    hs_failure ignored;
+    return cell_at(list, NULL, position, cell, hs_failure_or(failure, &ignored));
 }

@@ -1,42 +1,53 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-#include "storage.h"
+#include "dynamic.h"
 #include "../memory/memory.h"
-#include "../box/wrap.h"
 
 #include <stdlib.h>
 
-/* storage.c: what a list is stored in: blocks of entries, the map from keys to these, the cells
- * along each axis, and the offsets around a cell. */
-
-/* Blocks by size. Those that are free form a list: the first bytes of each say where the next one
- * is. */
+/* storage.c: points in their cells: blocks of entries, the map from keys to these, and tables of
+ * cells that are dense, or hold occupied cells only. */
 
 #define FIRST_CAPACITY 16
 #define MOST_ENTRIES   INT64_C(0xFFFFFFF0) /* places are below HS_NO_PLACE */
 
 void
-hs_entries_init(hs_entries *entries, int ndim, bool keeps_given)
+hs_stored_init(hs_dynamic *list, bool dense, double most_bytes)
 {
-    memset(entries, 0, sizeof *entries);
-    entries->ndim = ndim;
-    entries->stride = (size_t)ndim * sizeof(double) + sizeof(hs_entry_tail);
-    entries->keeps_given = keeps_given;
+    const int ndim = list->lattice.ndim;
+    list->entries = (hs_entries){.ndim = ndim,
+                                 .stride = (size_t)ndim * sizeof(double) + sizeof(hs_entry_tail),
+                                 .keeps_given = list->lattice.n_periodic > 0};
     for (int size = 0; size < HS_ENTRY_SIZES; size++) {
-        entries->spare[size] = HS_NO_PLACE;
+        list->entries.spare[size] = HS_NO_PLACE;
     }
+    list->map = (hs_hash){0};
+    list->cells = (hs_cell_table){.dense = dense, .ndim = ndim, .most_bytes = most_bytes};
+    for (int k = 0; k < ndim; k++) {
+        list->cells.shape[k] = list->axes.axis[k].n; /* 0: none yet, along open axes */
+    }
+    list->n_without = 0;
+    list->magnitude = 0.0;
 }
 
 void
-hs_entries_free(hs_entries *entries)
+hs_stored_free(hs_dynamic *list)
 {
-    hs_free(NULL, entries->data);
-    hs_free(NULL, entries->given);
-    hs_entries_init(entries, entries->ndim, entries->keeps_given);
+    void *const owned[] = {list->entries.data,   list->entries.given, list->map.rows,
+                           list->cells.cell,     list->cells.size,    list->cells.index,
+                           list->cells.hash.rows};
+    for (size_t k = 0; k < sizeof owned / sizeof owned[0]; k++) {
+        hs_free(NULL, owned[k]);
+    }
+    hs_stored_init(list, list->cells.dense, list->cells.most_bytes);
 }
 
-/* Half as many again as there were, at least. */
-bool
-hs_entries_reserve(hs_entries *entries, int64_t more)
+/* ---- blocks by size: those that are free form a list, in which the first bytes of each say where
+ * the next one is ---- */
+
+/* Makes room for `more` entries in blocks to come: half as many again as there were, at least, but
+ * exactly so many where there were none. False when memory is refused: then nothing has changed. */
+static bool
+reserve_entries(hs_entries *entries, int64_t more)
 {
     const int64_t needed = entries->n_used + more;
     int64_t       capacity = entries->capacity;
@@ -69,15 +80,16 @@ hs_entries_reserve(hs_entries *entries, int64_t more)
     return true;
 }
 
-uint32_t
-hs_entries_take(hs_entries *entries, int size)
+/* The first place of a block of 2^size entries, or HS_NO_PLACE. */
+static uint32_t
+take_block(hs_entries *entries, int size)
 {
     uint32_t place = entries->spare[size];
     if (place != HS_NO_PLACE) {
         memcpy(&entries->spare[size], hs_entry_at(entries, place), sizeof place);
         return place;
     }
-    if (!hs_entries_reserve(entries, INT64_C(1) << size)) {
+    if (!reserve_entries(entries, INT64_C(1) << size)) {
         return HS_NO_PLACE;
     }
     place = entries->n_used;
@@ -85,16 +97,16 @@ hs_entries_take(hs_entries *entries, int size)
     return place;
 }
 
-void
-hs_entries_give(hs_entries *entries, int size, uint32_t place)
+static void
+give_block(hs_entries *entries, int size, uint32_t place)
 {
     memcpy(hs_entry_at(entries, place), &entries->spare[size], sizeof place);
     entries->spare[size] = place;
 }
 
-void
-hs_entries_copy(const hs_entries *source, uint32_t from, hs_entries *entries, uint32_t to,
-                uint32_t n)
+/* Copies n entries to other places, also of other entries of the same kind. */
+static void
+copy_entries(const hs_entries *source, uint32_t from, hs_entries *entries, uint32_t to, uint32_t n)
 {
     memcpy(hs_entry_at(entries, to), hs_entry_at(source, from), n * entries->stride);
     if (entries->keeps_given) {
@@ -103,49 +115,32 @@ hs_entries_copy(const hs_entries *source, uint32_t from, hs_entries *entries, ui
     }
 }
 
-int64_t
-hs_entries_bytes(const hs_entries *entries)
-{
-    const size_t given = entries->keeps_given ? (size_t)entries->ndim * sizeof(double) : 0;
-    return (int64_t)entries->capacity * (int64_t)(entries->stride + given);
-}
-
-/* Rows stand as near behind the one that their mark names as others allow. */
+/* ---- hash tables: rows stand as near behind the one that their mark names as others allow ---- */
 
 #define LEAST_HASH_ROWS 16
 
-static void
-hash_free(hs_hash *hash)
-{
-    hs_free(NULL, hash->rows);
-    *hash = (hs_hash){0};
-}
-
-int64_t
-hs_hash_bytes(const hs_hash *hash)
-{
-    return hash->n_rows * (int64_t)sizeof *hash->rows;
-}
-
 /* Adds a row, for which there is room. */
 static void
-hash_put(const hs_hash *hash, hs_hash_row row)
+hash_put(hs_hash *hash, hs_hash_row row)
 {
     int64_t r = row.mark & (uint64_t)(hash->n_rows - 1);
     while (hash->rows[r].number != HS_NO_NUMBER) {
         r = (r + 1) & (hash->n_rows - 1);
     }
     hash->rows[r] = row;
+    hash->n++;
 }
 
 static void
-hash_clear(const hs_hash *hash)
+hash_clear(hs_hash *hash)
 {
     memset(hash->rows, 0xFF, (size_t)hash->n_rows * sizeof *hash->rows);
+    hash->n = 0;
 }
 
-bool
-hs_hash_reserve(hs_hash *hash, int64_t n)
+/* Room for n numbers in all; false when memory is refused: then nothing has changed. */
+static bool
+reserve_rows(hs_hash *hash, int64_t n)
 {
     hs_hash larger = {.n_rows = hash->n_rows > 0 ? hash->n_rows : LEAST_HASH_ROWS};
     while (n > larger.n_rows / 4 * 3) {
@@ -164,77 +159,75 @@ hs_hash_reserve(hs_hash *hash, int64_t n)
             hash_put(&larger, hash->rows[r]);
         }
     }
-    hash_free(hash);
+    hs_free(NULL, hash->rows);
     *hash = larger;
     return true;
 }
 
-HS_ALWAYS_INLINE bool
-holds(const hs_entries *entries, uint32_t place, hs_key key)
-{
-    const hs_entry_tail *tail = hs_entry_tail_at(entries, place);
-    return tail->id == key.id && tail->tag == key.tag;
-}
-
-void
-hs_key_map_free(hs_key_map *map)
-{
-    hash_free(&map->hash);
-    map->n = 0;
-}
-
-uint32_t
-hs_key_map_find(const hs_key_map *map, const hs_entries *entries, hs_key key)
-{
-    const uint32_t mark = hs_key_mark(key);
-    const int64_t  last = map->hash.n_rows - 1;
-    if (map->n == 0) {
-        return HS_NO_PLACE;
-    }
-    for (int64_t r = mark & (uint64_t)last;; r = (r + 1) & last) {
-        const hs_hash_row row = map->hash.rows[r];
-        if (row.number == HS_NO_NUMBER || (row.mark == mark && holds(entries, row.number, key))) {
-            return row.number;
-        }
-    }
-}
-
-void
-hs_key_map_expect(const hs_key_map *map, hs_key key)
-{
-    HS_PREFETCH_WRITE(&map->hash.rows[hs_key_mark(key) & (uint64_t)(map->hash.n_rows - 1)]);
-}
-
-void
-hs_key_map_add(hs_key_map *map, hs_key key, uint32_t place)
-{
-    hash_put(&map->hash, (hs_hash_row){place, hs_key_mark(key)});
-    map->n++;
-}
-
-/* The row of a key that is there, known by its place. */
+/* The row of a number under this mark. */
 static int64_t
-row_of(const hs_key_map *map, hs_key key, uint32_t place)
+row_of(const hs_hash *hash, uint32_t mark, uint32_t number)
 {
-    int64_t r = hs_key_mark(key) & (uint64_t)(map->hash.n_rows - 1);
-    while (map->hash.rows[r].number != place) {
-        r = (r + 1) & (map->hash.n_rows - 1);
+    int64_t r = mark & (uint64_t)(hash->n_rows - 1);
+    while (hash->rows[r].number != number) {
+        r = (r + 1) & (hash->n_rows - 1);
     }
     return r;
 }
 
-void
-hs_key_map_moved(hs_key_map *map, hs_key key, uint32_t from, uint32_t to)
+/* ---- from a key to the place of its entry, which holds the key itself ---- */
+
+/* Bits of a key in which each depends on all of it: the finaliser of SplitMix64 (Steele, Lea and
+ * Flood, OOPSLA 2014). */
+HS_ALWAYS_INLINE uint32_t
+key_mark(hs_key key)
 {
-    map->hash.rows[row_of(map, key, from)].number = to;
+    uint64_t x = (uint64_t)key.id + (uint64_t)(uint32_t)key.tag * UINT64_C(0x9E3779B97F4A7C15);
+    x = (x ^ (x >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
+    x = (x ^ (x >> 27)) * UINT64_C(0x94D049BB133111EB);
+    return (uint32_t)(x >> 32);
 }
 
-void
-hs_key_map_remove(hs_key_map *map, hs_key key, uint32_t place)
+/* Key i of a caller's. */
+HS_ALWAYS_INLINE hs_key
+key_at(const int64_t *ids, const int32_t *tags, int64_t i)
 {
-    hs_hash_row *const rows = map->hash.rows;
-    const int64_t      last = map->hash.n_rows - 1;
-    int64_t            gap = row_of(map, key, place);
+    return (hs_key){ids[i], tags != NULL ? tags[i] : 0};
+}
+
+uint32_t
+hs_stored_find(const hs_dynamic *list, hs_key key)
+{
+    const uint32_t mark = key_mark(key);
+    int64_t        r = mark;
+    for (;;) {
+        const uint32_t place = hs_hash_next(&list->map, mark, &r);
+        if (place == HS_NO_PLACE) {
+            return place;
+        }
+        const hs_entry_tail *tail = hs_entry_tail_at(&list->entries, place);
+        if (tail->id == key.id && tail->tag == key.tag) {
+            return place;
+        }
+    }
+}
+
+/* An entry was at `from`, and is at `to` now. */
+static void
+tell_moved(hs_dynamic *list, uint32_t from, uint32_t to)
+{
+    const hs_entry_tail *tail = hs_entry_tail_at(&list->entries, to);
+    const uint32_t       mark = key_mark((hs_key){tail->id, tail->tag});
+    list->map.rows[row_of(&list->map, mark, from)].number = to;
+}
+
+/* Takes the key whose entry is at `place` from the map. */
+static void
+forget_key(hs_hash *map, hs_key key, uint32_t place)
+{
+    hs_hash_row *const rows = map->rows;
+    const int64_t      last = map->n_rows - 1;
+    int64_t            gap = row_of(map, key_mark(key), place);
     for (int64_t r = (gap + 1) & last; rows[r].number != HS_NO_NUMBER; r = (r + 1) & last) {
         const int64_t home = rows[r].mark & (uint64_t)last;
         if (((r - home) & last) >= ((r - gap) & last)) { /* it may stand in the gap */
@@ -246,8 +239,9 @@ hs_key_map_remove(hs_key_map *map, hs_key key, uint32_t place)
     map->n--;
 }
 
-int64_t
-hs_repeated_key(const int64_t *ids, const int32_t *tags, int64_t n)
+/* The first of n keys that came before among them, or -1; -2: out of memory. */
+static int64_t
+find_repeated(const int64_t *ids, const int32_t *tags, int64_t n)
 {
     hs_hash seen = {0};
     int64_t repeated = -1, i = 1;
@@ -258,145 +252,54 @@ hs_repeated_key(const int64_t *ids, const int32_t *tags, int64_t n)
     if (i >= n) { /* each key is above the one before: no table is needed */
         return -1;
     }
-    if (!hs_hash_reserve(&seen, n)) {
+    if (!reserve_rows(&seen, n)) {
         return -2;
     }
     for (i = 0; i < n && repeated < 0; i++) {
-        const hs_key   key = {ids[i], tags != NULL ? tags[i] : 0};
-        const uint32_t mark = hs_key_mark(key);
-        int64_t        r = mark & (uint64_t)(seen.n_rows - 1);
-        for (; seen.rows[r].number != HS_NO_NUMBER; r = (r + 1) & (seen.n_rows - 1)) {
-            const uint32_t other = seen.rows[r].number;
-            if (seen.rows[r].mark == mark && ids[other] == key.id &&
-                (tags == NULL || tags[other] == key.tag)) {
-                repeated = i;
-                break;
-            }
+        const uint32_t mark = key_mark(key_at(ids, tags, i));
+        int64_t        r = mark;
+        uint32_t       other = hs_hash_next(&seen, mark, &r);
+        while (other != HS_NO_NUMBER &&
+               (ids[other] != ids[i] || (tags != NULL && tags[other] != tags[i]))) {
+            other = hs_hash_next(&seen, mark, &r);
         }
-        seen.rows[r] = (hs_hash_row){(uint32_t)i, mark};
+        repeated = other != HS_NO_NUMBER ? i : -1;
+        hash_put(&seen, (hs_hash_row){(uint32_t)i, mark});
     }
-    hash_free(&seen);
+    hs_free(NULL, seen.rows);
     return repeated;
 }
 
-/* Cells of at least the width that was given; periods hold a whole number of them. */
-
-#define MOST_CELLS 0x1p30 /* in a period: their numbers and images are int32 and int64 */
-
-/* Wrapped points are so many rows away at most, where they are far along open axes. */
-#define ROWS_AWAY 16
-
-/*
- * By how much the images of a ball may miss whole periods along axis k: a row of B that should not
- * move along it does so by normal . row, as rounded, and by the roundings of these; the row that
- * should moves by its height as rounded. So often as a query can meet the row: R and what
- * coordinates are wrong by, in heights. Points that are ROWS_AWAY are rounded besides.
- */
-static double
-leak_of(const hs_lattice *lattice, int k, double max_radius, const hs_axes *so_far)
+hs_status
+hs_stored_check(const hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n,
+                bool must_be_there, hs_failure *failure)
 {
-    double leak = 0.0;
-    for (int j = 0; j < lattice->ndim; j++) {
-        const int r = lattice->row_of_axis[j];
-        double    along = 0.0, size = 0.0;
-        if (r < 0) {
-            continue;
-        }
-        for (int c = 0; c < lattice->ndim; c++) {
-            along += lattice->normal[k][c] * lattice->rows[r][c];
-            size += fabs(lattice->rows[r][c]);
-        }
-        const double miss =
-            (j == k ? 0.0 : fabs(along)) + 0x1p-44 * size + lattice->ndim * lattice->row_error[r];
-        leak += ((max_radius + so_far->axis[j].leak) / lattice->period[j] + ROWS_AWAY) * miss;
-        leak += hs_axis_rounding(lattice->ndim) * ROWS_AWAY *
-                hs_axis_terms(lattice, lattice->rows[r], k);
+    const int64_t repeated = find_repeated(ids, tags, n);
+    if (repeated != -1) {
+        failure->row = repeated >= 0 ? repeated : -1;
+        failure->column = repeated >= 0 ? HS_KEY_REPEATED : -1;
+        return repeated >= 0 ? HS_ERR_KEY : HS_ERR_MEMORY;
     }
-    return leak;
-}
-
-/* Leaks twice: those along one axis lead to more images along others. */
-static void
-set_leaks(hs_axes *axes, const hs_lattice *lattice, double max_radius)
-{
-    for (int pass = 0; pass < 2 && !lattice->aligned; pass++) {
-        const hs_axes so_far = *axes;
-        for (int k = 0; k < lattice->ndim; k++) {
-            axes->axis[k].leak = leak_of(lattice, k, max_radius, &so_far);
+    for (int64_t i = 0; must_be_there && i < n; i++) {
+        if (hs_stored_find(list, key_at(ids, tags, i)) == HS_NO_PLACE) {
+            failure->row = i;
+            failure->column = HS_KEY_ABSENT;
+            return HS_ERR_KEY;
         }
     }
-    for (int k = 0; k < lattice->ndim; k++) {
-        hs_axis *axis = &axes->axis[k];
-        axis->farthest = axis->row >= 0 ? HS_WRAP_LIMIT * axis->period : INFINITY;
-        for (int r = 0; r < lattice->n_periodic; r++) {
-            axis->farthest += hs_axis_terms(lattice, lattice->rows[r], k);
-        }
-    }
+    return HS_OK;
 }
 
-void
-hs_axes_init(hs_axes *axes, const hs_lattice *lattice, double cell_size, bool one_cell,
-             double max_radius)
-{
-    axes->ndim = lattice->ndim;
-    for (int k = 0; k < lattice->ndim; k++) {
-        hs_axis *axis = &axes->axis[k];
-        *axis = (hs_axis){.row = lattice->row_of_axis[k]};
-        if (axis->row >= 0) {
-            const double fitting = one_cell ? 1.0 : floor(lattice->period[k] / cell_size);
-            axis->period = lattice->period[k];
-            axis->half = 0.5 * axis->period;
-            axis->n = (int64_t)hs_larger(hs_smaller(fitting, MOST_CELLS), 1.0);
-        }
-        if (axis->n == 1 || (axis->n == 0 && one_cell)) {
-            axis->width = axis->n == 1 ? axis->period : INFINITY;
-            axis->inverse = 0.0;
-        } else {
-            axis->width = axis->n > 0 ? axis->period / (double)axis->n : cell_size;
-            axis->inverse = 1.0 / axis->width;
-        }
-        const double farthest = one_cell ? 0.0 : HS_FARTHEST_CELL;
-        axis->lowest = axis->n > 0 ? 0.0 : -farthest;
-        axis->highest = axis->n > 0 ? (double)(axis->n - 1) : farthest;
-    }
-    set_leaks(axes, lattice, max_radius);
-}
-
-/* The number of periods times their length; beyond one it may be rounded, by less than `*slack`. */
-static double
-shift_of(const hs_axis *axis, int64_t image, double *slack)
-{
-    const double shift = (double)image * axis->period;
-    *slack = image < -1 || image > 1 ? 0x1p-50 * fabs(shift) : 0.0;
-    return shift;
-}
-
-void
-hs_axis_images(const hs_axis *axis, double low, double high, double error, hs_span_of_cells *span)
-{
-    /* Image m has points from m L - L/2 to m L + L/2, wider by the error; the quotients are rounded
-     * by less than the 2^-40 that is added: one image too many is no fault. */
-    const double least = floor((low - error) / axis->period + 0.5 - 0x1p-40);
-    const double most = floor((high + error) / axis->period + 0.5 + 0x1p-40);
-    double       slack;
-    HS_ASSERT(least > -0x1p30 && most < 0x1p30); /* hs_list_new and hs_dynamic_place see to that */
-    span->least = (int64_t)least - (fabs(least) > 0x1p8);
-    span->most = (int64_t)most + (fabs(most) > 0x1p8);
-    const double first = hs_below(low, shift_of(axis, span->least, &slack));
-    span->first = span->least * axis->n + hs_axis_cell(axis, first - slack);
-    const double last = hs_above(high, -shift_of(axis, span->most, &slack));
-    span->last = span->most * axis->n + hs_axis_cell(axis, last + slack);
-}
-
-/* Sparse tables keep the numbers of their cells when they grow, and close the gaps when they drop
- * empty ones. */
+/* ---- cells: sparse tables keep the numbers of their cells when they grow, and close the gaps when
+ * they drop empty ones; dense ones reach farther by being copied into larger ones ---- */
 
 #define MORE_CELLS       16 /* than half as many again, when a table grows */
 #define DENSE_CELL_BYTES (sizeof(hs_cell) + sizeof(uint8_t)) /* of a cell of a dense table */
+#define MOST_DENSE_CELLS 0x1p31
 
 /* Adds the row of a cell, for which there is room. */
 static void
-put_cell(const hs_cell_table *table, int64_t cell)
+put_cell(hs_cell_table *table, int64_t cell)
 {
     uint64_t sum = 0;
     for (int k = 0; k < table->ndim; k++) {
@@ -414,10 +317,7 @@ drop_empty(hs_cell_table *table, hs_entries *entries)
     hash_clear(&table->hash);
     for (int64_t c = 0; c < table->n; c++) {
         if (table->cell[c].count == 0) {
-            if (table->size[c] != HS_NO_BLOCK) {
-                hs_entries_give(entries, table->size[c], table->cell[c].start);
-            }
-            continue;
+            continue; /* it has no block: keeps_empty */
         }
         for (uint32_t e = 0; n < c && e < table->cell[c].count; e++) {
             hs_entry_tail_at(entries, table->cell[c].start + e)->cell = (uint32_t)n;
@@ -431,31 +331,58 @@ drop_empty(hs_cell_table *table, hs_entries *entries)
     table->n_empty = 0;
 }
 
+/* The cell with these indices, or HS_NO_CELL. */
+static uint32_t
+find_cell(const hs_cell_table *table, const int64_t *index)
+{
+    uint64_t sum = 0;
+    for (int k = 0; k < table->ndim; k++) {
+        if (table->dense) {
+            const int64_t along = index[k] - table->lowest[k];
+            if (table->n == 0 || along < 0 || along >= table->shape[k]) {
+                return HS_NO_CELL;
+            }
+            sum += (uint64_t)(along * table->stride[k]);
+        } else {
+            sum += hs_cell_part(k, index[k]);
+        }
+    }
+    return table->dense ? (uint32_t)sum : hs_cell_table_probe(table, index, hs_cell_mark(sum));
+}
+
+/* The indices of a cell, in sparse tables modulo 2^32. */
+static void
+index_of(const hs_cell_table *table, uint32_t cell, int64_t *index)
+{
+    int64_t rest = cell;
+    for (int k = 0; k < table->ndim; k++) {
+        if (table->dense) {
+            index[k] = table->lowest[k] + rest / table->stride[k];
+            rest %= table->stride[k];
+        } else {
+            index[k] = table->index[(int64_t)cell * table->ndim + k];
+        }
+    }
+}
+
 /* Room for `capacity` cells and rows for them; on failure some arrays are larger than they must
  * be. */
 static bool
 grow(hs_cell_table *table, int64_t capacity)
 {
-    hs_cell *cell = NULL;
-    uint8_t *size = NULL;
-    int32_t *index = NULL;
-    if (hs_hash_reserve(&table->hash, capacity)) {
-        cell = hs_grow(NULL, HS_FOR_CELLS, table->cell, table->n, capacity, sizeof *cell);
+    const size_t width = (size_t)table->ndim * sizeof *table->index;
+    hs_cell     *cell =
+        hs_grow(NULL, HS_FOR_CELLS, table->cell, table->n, capacity, sizeof *table->cell);
+    table->cell = cell != NULL ? cell : table->cell;
+    uint8_t *size = hs_grow(NULL, HS_FOR_CELLS, table->size, table->n, capacity, sizeof *size);
+    table->size = size != NULL ? size : table->size;
+    int32_t *index = hs_grow(NULL, HS_FOR_CELLS, table->index, table->n, capacity, width);
+    table->index = index != NULL ? index : table->index;
+    if (cell == NULL || size == NULL || index == NULL || !reserve_rows(&table->hash, capacity)) {
+        return false;
     }
-    if (cell != NULL) {
-        table->cell = cell;
-        size = hs_grow(NULL, HS_FOR_CELLS, table->size, table->n, capacity, sizeof *size);
-    }
-    if (size != NULL) {
-        table->size = size;
-        index = hs_grow(NULL, HS_FOR_CELLS, table->index, table->n, capacity,
-                        table->ndim * sizeof *index);
-    }
-    if (index != NULL) {
-        table->index = index;
-        table->capacity = capacity;
-    }
-    return index != NULL;
+    table->capacity = capacity;
+    return true;
 }
 
 static hs_status
@@ -478,103 +405,6 @@ reserve_sparse(hs_cell_table *table, hs_entries *entries, int64_t more)
     }
     return table->n + more <= table->capacity ? HS_OK : HS_ERR_MEMORY;
 }
-
-/* Cells are found, in either kind of table. */
-
-void
-hs_cell_table_init(hs_cell_table *table, const hs_axes *axes, bool dense, double most_bytes)
-{
-    memset(table, 0, sizeof *table);
-    table->dense = dense;
-    table->ndim = axes->ndim;
-    table->most_bytes = most_bytes;
-    for (int k = 0; k < axes->ndim; k++) {
-        table->shape[k] = axes->axis[k].n; /* 0: none yet, along open axes */
-    }
-}
-
-void
-hs_cell_table_free(hs_cell_table *table)
-{
-    hs_free(NULL, table->cell);
-    hs_free(NULL, table->size);
-    hs_free(NULL, table->index);
-    hash_free(&table->hash);
-    table->cell = NULL;
-    table->size = NULL;
-    table->index = NULL;
-    table->n = table->capacity = table->n_empty = 0;
-}
-
-uint32_t
-hs_cell_table_find(const hs_cell_table *table, const int64_t *index)
-{
-    uint64_t sum = 0;
-    for (int k = 0; k < table->ndim; k++) {
-        if (table->dense) {
-            const int64_t along = index[k] - table->lowest[k];
-            if (table->n == 0 || along < 0 || along >= table->shape[k]) {
-                return HS_NO_CELL;
-            }
-            sum += (uint64_t)(along * table->stride[k]);
-        } else {
-            sum += hs_cell_part(k, index[k]);
-        }
-    }
-    return table->dense ? (uint32_t)sum : hs_cell_table_probe(table, index, hs_cell_mark(sum));
-}
-
-hs_status
-hs_cell_table_add(hs_cell_table *table, hs_entries *entries, const int64_t *index, uint32_t *number,
-                  hs_failure *failure)
-{
-    *number = hs_cell_table_find(table, index);
-    for (int k = 0; k < table->ndim && !table->dense; k++) {
-        table->is_wide = table->is_wide || index[k] < INT32_MIN || index[k] > INT32_MAX;
-    }
-    if (*number != HS_NO_CELL) {
-        return HS_OK;
-    }
-    const hs_status status = hs_cell_table_reserve(table, entries, index, index, 1, failure);
-    if (status == HS_OK && table->dense) {
-        *number = hs_cell_table_find(table, index);
-    } else if (status == HS_OK) {
-        *number = (uint32_t)table->n++;
-        table->n_empty++;
-        table->cell[*number] = (hs_cell){0, 0};
-        table->size[*number] = HS_NO_BLOCK;
-        for (int k = 0; k < table->ndim; k++) {
-            table->index[(int64_t)*number * table->ndim + k] = (int32_t)(uint32_t)index[k];
-        }
-        put_cell(table, *number);
-    }
-    return status;
-}
-
-void
-hs_cell_table_index(const hs_cell_table *table, uint32_t cell, int64_t *index)
-{
-    int64_t rest = cell;
-    for (int k = 0; k < table->ndim; k++) {
-        if (table->dense) {
-            index[k] = table->lowest[k] + rest / table->stride[k];
-            rest %= table->stride[k];
-        } else {
-            index[k] = table->index[(int64_t)cell * table->ndim + k];
-        }
-    }
-}
-
-int64_t
-hs_cell_table_bytes(const hs_cell_table *table)
-{
-    const size_t of_index = table->dense ? 0 : (size_t)table->ndim * sizeof *table->index;
-    return table->capacity * (int64_t)(DENSE_CELL_BYTES + of_index) + hs_hash_bytes(&table->hash);
-}
-
-/* Dense tables reach farther by being copied into larger ones. */
-
-#define MOST_DENSE_CELLS 0x1p31
 
 /* The shape that holds the present range along each axis and that from `first` to `last`, grown by
  * half of the present one where it grows at all, or `tight`; returns the number of cells. Periodic
@@ -601,32 +431,12 @@ join(const hs_cell_table *table, const int64_t *first, const int64_t *last, bool
     return n;
 }
 
-/* Moves the cells of a dense table to their places in a larger one. */
-static void
-transfer(const hs_cell_table *table, hs_entries *entries, const hs_cell_table *larger)
-{
-    for (int64_t c = 0; c < table->n; c++) {
-        int64_t index[HS_MAX_DIM];
-        if (table->size[c] == HS_NO_BLOCK) {
-            continue;
-        }
-        hs_cell_table_index(table, (uint32_t)c, index);
-        const uint32_t number = hs_cell_table_find(larger, index);
-        larger->cell[number] = table->cell[c];
-        larger->size[number] = table->size[c];
-        for (uint32_t e = 0; e < table->cell[c].count; e++) {
-            hs_entry_tail_at(entries, table->cell[c].start + e)->cell = number;
-        }
-    }
-}
-
 static hs_status
 reserve_dense(hs_cell_table *table, hs_entries *entries, const int64_t *first, const int64_t *last,
               hs_failure *failure)
 {
     hs_cell_table larger = *table;
-    if (hs_cell_table_find(table, first) != HS_NO_CELL &&
-        hs_cell_table_find(table, last) != HS_NO_CELL) {
+    if (find_cell(table, first) != HS_NO_CELL && find_cell(table, last) != HS_NO_CELL) {
         return HS_OK;
     }
     double n = join(table, first, last, false, &larger);
@@ -648,136 +458,452 @@ reserve_dense(hs_cell_table *table, hs_entries *entries, const int64_t *first, c
     }
     memset(larger.cell, 0, (size_t)n * sizeof *larger.cell);
     memset(larger.size, HS_NO_BLOCK, (size_t)n * sizeof *larger.size);
-    transfer(table, entries, &larger);
-    hs_cell_table_free(table);
+    for (int64_t c = 0; c < table->n; c++) {
+        int64_t index[HS_MAX_DIM];
+        if (table->size[c] == HS_NO_BLOCK) {
+            continue;
+        }
+        index_of(table, (uint32_t)c, index);
+        const uint32_t number = find_cell(&larger, index);
+        larger.cell[number] = table->cell[c];
+        larger.size[number] = table->size[c];
+        for (uint32_t e = 0; e < table->cell[c].count; e++) {
+            hs_entry_tail_at(entries, table->cell[c].start + e)->cell = number;
+        }
+    }
+    hs_free(NULL, table->cell);
+    hs_free(NULL, table->size);
     *table = larger;
     return HS_OK;
 }
 
-hs_status
-hs_cell_table_reserve(hs_cell_table *table, hs_entries *entries, const int64_t *first,
-                      const int64_t *last, int64_t more, hs_failure *failure)
+/*
+ * Makes room for cells to come; the numbers of others may change, and entries get those of theirs.
+ * Sparse: for so many more. Dense: makes the table reach from `first` to `last` along open axes;
+ * farther than that by half of what it was, if its most bytes allow it. HS_ERR_MEMORY, or
+ * HS_ERR_CAPACITY, which sets expected_bytes and limit_bytes: then nothing has changed.
+ */
+static hs_status
+reserve_cells(hs_dynamic *list, const int64_t *first, const int64_t *last, int64_t more,
+              hs_failure *failure)
 {
-    return table->dense ? reserve_dense(table, entries, first, last, failure)
-                        : reserve_sparse(table, entries, more);
+    return list->cells.dense ? reserve_dense(&list->cells, &list->entries, first, last, failure)
+                             : reserve_sparse(&list->cells, &list->entries, more);
 }
 
-/* The cube of offsets, sorted once when the list is made. */
+/* The number of the cell with these indices; where there is none, it is added. Statuses and effects
+ * of reserve_cells. */
+static hs_status
+add_cell(hs_dynamic *list, const int64_t *index, uint32_t *number, hs_failure *failure)
+{
+    hs_cell_table *table = &list->cells;
+    *number = find_cell(table, index);
+    for (int k = 0; k < table->ndim && !table->dense; k++) {
+        table->is_wide = table->is_wide || index[k] < INT32_MIN || index[k] > INT32_MAX;
+    }
+    if (*number != HS_NO_CELL) {
+        return HS_OK;
+    }
+    const hs_status status = reserve_cells(list, index, index, 1, failure);
+    if (status == HS_OK && table->dense) {
+        *number = find_cell(table, index);
+    } else if (status == HS_OK) {
+        *number = (uint32_t)table->n++;
+        table->n_empty++;
+        table->cell[*number] = (hs_cell){0, 0};
+        table->size[*number] = HS_NO_BLOCK;
+        for (int k = 0; k < table->ndim; k++) {
+            table->index[(int64_t)*number * table->ndim + k] = (int32_t)(uint32_t)index[k];
+        }
+        put_cell(table, *number);
+    }
+    return status;
+}
 
-/* An offset and what it is sorted by. */
-typedef struct item {
-    double  least, centre;
-    uint8_t slot[HS_MAX_DIM];
-} item;
+/* The size of the smallest block for so many entries: it has 2^size. */
+static int
+block_size(int64_t count)
+{
+    int size = 0;
+    while (INT64_C(1) << size < count) {
+        size++;
+    }
+    return size;
+}
+
+/* Makes room for `more` entries in a cell; those that are there move to a larger block. False when
+ * memory is refused: then nothing has changed. */
+static bool
+reserve_in_cell(hs_dynamic *list, uint32_t number, int64_t more)
+{
+    hs_cell *const cell = &list->cells.cell[number];
+    uint8_t *const size = &list->cells.size[number];
+    const int      larger = block_size((int64_t)cell->count + more);
+    if (*size != HS_NO_BLOCK && larger <= *size) {
+        return true;
+    }
+    const uint32_t place = larger < HS_ENTRY_SIZES ? take_block(&list->entries, larger)
+                                                   : HS_NO_PLACE;
+    if (place == HS_NO_PLACE) {
+        return false;
+    }
+    for (uint32_t e = 0; e < cell->count; e++) {
+        copy_entries(&list->entries, cell->start + e, &list->entries, place + e, 1);
+        tell_moved(list, cell->start + e, place + e);
+    }
+    if (*size != HS_NO_BLOCK) {
+        give_block(&list->entries, *size, cell->start);
+    }
+    cell->start = place;
+    *size = (uint8_t)larger;
+    return true;
+}
+
+int64_t
+hs_stored_bytes(const hs_dynamic *list)
+{
+    const size_t place =
+        list->entries.stride +
+        (list->entries.keeps_given ? (size_t)list->lattice.ndim * sizeof(double) : 0);
+    const size_t cell =
+        DENSE_CELL_BYTES + (list->cells.dense ? 0 : (size_t)list->lattice.ndim * sizeof(int32_t));
+    return (int64_t)list->entries.capacity * (int64_t)place + list->cells.capacity * (int64_t)cell +
+           (list->map.n_rows + list->cells.hash.n_rows) * (int64_t)sizeof(hs_hash_row);
+}
+
+/*
+ * ---- a point comes into a cell, goes out of it or moves on, once there is room: nothing here can
+ * fail. A point that stays in its cell is written over; else it is appended to its new cell and
+ * taken out of the old one ----
+ */
+
+/* In line: a call of memcpy for two or three numbers takes longer than they do. */
+HS_ALWAYS_INLINE void
+copy_numbers(double *to, const double *from, int n)
+{
+    for (int k = 0; k < n; k++) {
+        to[k] = from[k];
+    }
+}
+
+/* The position of an entry. placed: NULL for a key without one. */
+static void
+write_entry(hs_dynamic *list, uint32_t place, const hs_placed *placed)
+{
+    const int     d = list->lattice.ndim;
+    double *const x = hs_entry_at(&list->entries, place);
+    if (placed == NULL) {
+        for (int k = 0; k < d; k++) {
+            x[k] = NAN;
+        }
+        return;
+    }
+    copy_numbers(x, placed->x, d);
+    if (list->entries.keeps_given) {
+        copy_numbers(hs_entry_given(&list->entries, place), placed->given, d);
+    }
+    if (!list->lattice.aligned) {
+        list->magnitude = hs_larger(placed->magnitude, list->magnitude);
+    }
+}
+
+/* Takes an entry out of its cell: the last one takes its place. A cell that is left empty gives its
+ * block back. */
+HS_ALWAYS_INLINE void
+take_out(hs_dynamic *list, uint32_t place)
+{
+    const uint32_t number = hs_entry_tail_at(&list->entries, place)->cell;
+    hs_cell *const cell = &list->cells.cell[number];
+    const uint32_t last = cell->start + cell->count - 1;
+    if (last != place) {
+        copy_entries(&list->entries, last, &list->entries, place, 1);
+        tell_moved(list, last, place);
+    }
+    cell->count--;
+    list->cells.n_empty += cell->count == 0;
+    if (cell->count == 0 && !list->cells.keeps_empty) {
+        give_block(&list->entries, list->cells.size[number], cell->start);
+        list->cells.size[number] = HS_NO_BLOCK;
+    }
+}
+
+HS_ALWAYS_INLINE bool
+has_position(const hs_dynamic *list, uint32_t place)
+{
+    return !isnan(hs_entry_at(&list->entries, place)[0]);
+}
+
+/* The point of a key, which is at `place`, or HS_NO_PLACE; its cell has room for it, if it is not
+ * there already. */
+HS_ALWAYS_INLINE void
+put_point(hs_dynamic *list, hs_key key, uint32_t place, uint32_t number, const hs_placed *placed)
+{
+    const bool is_new = place == HS_NO_PLACE;
+    list->n_without += (placed == NULL) - (!is_new && !has_position(list, place));
+    if (!is_new && hs_entry_tail_at(&list->entries, place)->cell == number) {
+        write_entry(list, place, placed);
+        return;
+    }
+    hs_cell *const cell = &list->cells.cell[number];
+    const uint32_t to = cell->start + cell->count++;
+    list->cells.n_empty -= cell->count == 1;
+    *hs_entry_tail_at(&list->entries, to) = (hs_entry_tail){key.id, key.tag, number};
+    write_entry(list, to, placed);
+    if (is_new) {
+        hash_put(&list->map, (hs_hash_row){to, key_mark(key)});
+    } else {
+        tell_moved(list, place, to);
+        take_out(list, place);
+    }
+}
+
+hs_status
+hs_stored_put(hs_dynamic *list, hs_key key, uint32_t place, const hs_placed *placed,
+              hs_failure *failure)
+{
+    static const int64_t nowhere[HS_MAX_DIM] = {0};
+    uint32_t             number;
+    const hs_status      status =
+        add_cell(list, placed != NULL ? placed->index : nowhere, &number, failure);
+    if (status != HS_OK) {
+        return status;
+    }
+    const bool is_new = place == HS_NO_PLACE;
+    const bool comes = is_new || hs_entry_tail_at(&list->entries, place)->cell != number;
+    if ((is_new && !reserve_rows(&list->map, list->map.n + 1)) ||
+        (comes && !reserve_in_cell(list, number, 1))) {
+        return HS_ERR_MEMORY;
+    }
+    put_point(list, key, place, number, placed);
+    list->changes++;
+    return HS_OK;
+}
+
+bool
+hs_stored_remove(hs_dynamic *list, hs_key key)
+{
+    const uint32_t place = hs_stored_find(list, key);
+    if (place == HS_NO_PLACE) {
+        return false;
+    }
+    list->n_without -= !has_position(list, place);
+    forget_key(&list->map, key, place);
+    take_out(list, place);
+    list->changes++;
+    return true;
+}
+
+/*
+ * Many points at once. First each has the number of its cell, then each cell gets room for all that
+ * comes into it, as if all were new, and at last each point is put where it belongs. Rows are
+ * placed anew each time: to store what comes of it would cost more than to do it again.
+ */
+
+#define POINTS_A_CELL 4  /* or more: else a hash table grows meanwhile */
+#define FEW_ROWS      16 /* where there are more cells for each row, not all are looked at */
+#define ROWS_AHEAD    32 /* whose memory is fetched before they are written */
+
+/* Row i made ready. given: receives its numbers, which `placed` borrows. Statuses of
+ * hs_dynamic_place, with failure->row. */
+static hs_status
+place_row(const hs_dynamic *list, double *const *x, int64_t i, double *given, hs_placed *placed,
+          hs_failure *failure)
+{
+    for (int k = 0; k < list->lattice.ndim; k++) {
+        given[k] = x[k][i];
+    }
+    const hs_status status = hs_dynamic_place(list, given, placed, failure);
+    failure->row = status == HS_OK ? failure->row : i;
+    return status;
+}
+
+/* Makes a range of cells hold one more, which may be the first. */
+static void
+widen(const hs_dynamic *list, const int64_t *index, bool is_first, int64_t *first, int64_t *last)
+{
+    for (int k = 0; k < list->lattice.ndim; k++) {
+        first[k] = is_first || index[k] < first[k] ? index[k] : first[k];
+        last[k] = is_first || index[k] > last[k] ? index[k] : last[k];
+    }
+}
+
+/* The cell of each row, as long as the list is as it was. Dense cells are made to reach all rows
+ * first, for which they are looked at where an axis is open. HS_ERR_INTERRUPTED, and statuses of
+ * hs_dynamic_place and reserve_cells. */
+static hs_status
+number_rows(hs_dynamic *list, int64_t n, double *const *x, uint32_t *numbers, hs_failure *failure)
+{
+    int64_t   first[HS_MAX_DIM] = {0}, last[HS_MAX_DIM] = {0};
+    double    given[HS_MAX_DIM];
+    hs_placed placed;
+    hs_status status = HS_OK;
+    int       pass = list->cells.dense && list->lattice.n_periodic < list->lattice.ndim ? 0 : 1;
+    for (; pass < 2 && status == HS_OK; pass++) {
+        if (pass == 1) {
+            status =
+                reserve_cells(list, first, last, list->map.n == 0 ? n / POINTS_A_CELL : n, failure);
+        }
+        list->cells.keeps_empty = true;
+        for (int64_t i = 0; i < n && status == HS_OK; i++) {
+            if ((i + 1) % HS_POLL_POINTS == 0 && list->hooks.poll != NULL &&
+                !list->hooks.poll(NULL, 0.0)) {
+                return HS_ERR_INTERRUPTED;
+            }
+            status = place_row(list, x, i, given, &placed, failure);
+            if (status == HS_OK && pass == 0) {
+                widen(list, placed.index, i == 0, first, last);
+            } else if (status == HS_OK) {
+                status = add_cell(list, placed.index, &numbers[i], failure);
+            }
+        }
+    }
+    return status;
+}
 
 static int
-compare(const void *one, const void *other)
+compare_cells(const void *one, const void *other)
 {
-    const item *a = one, *b = other;
-    if (a->least != b->least) {
-        return a->least < b->least ? -1 : 1;
-    }
-    if (a->centre != b->centre) {
-        return a->centre < b->centre ? -1 : 1;
-    }
-    return memcmp(a->slot, b->slot, HS_MAX_DIM);
+    const uint32_t a = *(const uint32_t *)one, b = *(const uint32_t *)other;
+    return (a > b) - (a < b);
 }
 
-/* Distances in units of the widest cell, so that their squares are ordinary numbers. In skewed
- * boxes the least distance is the sum of squares of those between faces: an order, not a bound. */
+/* Room in each cell for all rows that go there, as if they were all new; in the order of the cells,
+ * so that the blocks of neighbours lie side by side. */
+static bool
+reserve_blocks(hs_dynamic *list, const uint32_t *numbers, int64_t n)
+{
+    const bool    few = n < list->cells.n / FEW_ROWS; /* sorted, else counted */
+    const int64_t n_scratch = few ? n : list->cells.n;
+    uint32_t     *scratch = hs_alloc(NULL, HS_FOR_CELLS, n_scratch, sizeof *scratch);
+    bool          fits = scratch != NULL;
+    if (fits && few) {
+        memcpy(scratch, numbers, (size_t)n * sizeof *scratch);
+        qsort(scratch, (size_t)n, sizeof *scratch, compare_cells);
+        for (int64_t i = 0, begin = 0; fits && i < n; begin = i) {
+            while (i < n && scratch[i] == scratch[begin]) {
+                i++;
+            }
+            fits = reserve_in_cell(list, scratch[begin], i - begin);
+        }
+    } else if (fits) {
+        memset(scratch, 0, (size_t)n_scratch * sizeof *scratch);
+        for (int64_t i = 0; i < n; i++) {
+            scratch[numbers[i]]++;
+        }
+        for (int64_t c = 0; fits && c < n_scratch; c++) {
+            fits = scratch[c] == 0 || reserve_in_cell(list, (uint32_t)c, scratch[c]);
+        }
+    }
+    hs_free(NULL, scratch);
+    return fits;
+}
+
+/* Puts the rows into their cells, which have room; numbers: receives the cells that they were in,
+ * or are in if they are new. */
 static void
-measure(const hs_axes *axes, const hs_lattice *lattice, double unit, item *of)
+put_rows(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n, double *const *x,
+         uint32_t *numbers, hs_failure *failure)
 {
-    double centre[HS_MAX_DIM] = {0};
-    of->least = of->centre = 0.0;
-    for (int k = 0; k < axes->ndim; k++) {
-        const int    offset = of->slot[k] - HS_MOST_REACH;
-        const int    between = offset > 1 ? offset - 1 : offset < -1 ? -offset - 1 : 0;
-        const double width = isfinite(axes->axis[k].width) ? axes->axis[k].width / unit : 0.0;
-        of->least += between * width * (between * width);
-        for (int c = 0; c < axes->ndim; c++) {
-            centre[c] += offset * width * lattice->direction[k][c];
-        }
-    }
-    for (int c = 0; c < axes->ndim; c++) {
-        of->centre += centre[c] * centre[c];
-    }
-}
-
-/* The offsets of the list of this reach, in order; `unit` is the widest cell's width. */
-static void
-fill(const hs_axes *axes, const hs_lattice *lattice, double unit, int reach, item *items,
-     const hs_offsets *offsets)
-{
-    const int     d = axes->ndim, side = 2 * reach + 1;
-    const int64_t n = offsets->n[reach];
+    const bool are_new = list->map.n == 0;
+    double     given[HS_MAX_DIM];
+    hs_placed  placed;
     for (int64_t i = 0; i < n; i++) {
-        int64_t rest = i;
-        memset(items[i].slot, 0, sizeof items[i].slot);
-        for (int k = d - 1; k >= 0; k--) {
-            items[i].slot[k] = (uint8_t)(rest % side + HS_MOST_REACH - reach);
-            rest /= side;
+        const hs_key   key = key_at(ids, tags, i);
+        const uint32_t number = numbers[i];
+        if (i + ROWS_AHEAD < n) { /* the points of a cell come from anywhere among the rows */
+            const int64_t ahead = i + ROWS_AHEAD;
+            const hs_cell cell = list->cells.cell[numbers[ahead]];
+            HS_PREFETCH_WRITE(hs_entry_at(&list->entries, cell.start + cell.count));
+            HS_PREFETCH_WRITE(hs_entry_given(&list->entries, cell.start + cell.count));
+            HS_PREFETCH_WRITE(&list->map.rows[key_mark(key_at(ids, tags, ahead)) &
+                                              (uint64_t)(list->map.n_rows - 1)]);
         }
-        measure(axes, lattice, unit, &items[i]);
-    }
-    qsort(items, (size_t)n, sizeof *items, compare);
-    for (int64_t i = 0; i < n; i++) {
-        memcpy(offsets->slot + offsets->at[reach] + i * d, items[i].slot, (size_t)d);
+        const uint32_t place = are_new ? HS_NO_PLACE : hs_stored_find(list, key);
+        (void)place_row(list, x, i, given, &placed, failure); /* it can be had: number_rows */
+        if (place != HS_NO_PLACE) {
+            numbers[i] = hs_entry_tail_at(&list->entries, place)->cell;
+        }
+        put_point(list, key, place, number, &placed);
     }
 }
 
-bool
-hs_offsets_init(hs_offsets *offsets, const hs_axes *axes, const hs_lattice *lattice,
-                double max_radius)
+hs_status
+hs_stored_put_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n,
+                   double *const *x, hs_failure *failure)
 {
-    double needed = 0.0, unit = 0.0; /* cells to a side, and one more for rounding; widest cell */
-    memset(offsets, 0, sizeof *offsets);
-    for (int k = 0; k < axes->ndim; k++) {
-        if (isfinite(axes->axis[k].width)) {
-            needed = hs_larger(ceil(max_radius / axes->axis[k].width) + 1.0, needed);
-            unit = hs_larger(axes->axis[k].width, unit);
+    if (n == 0) {
+        return HS_OK;
+    }
+    if (list->map.n == 0) { /* what memory it has may not be where these points are */
+        hs_stored_free(list);
+    }
+    uint32_t  *numbers = hs_alloc(NULL, HS_FOR_CELLS, n, sizeof *numbers);
+    hs_status  status = numbers != NULL ? number_rows(list, n, x, numbers, failure) : HS_ERR_MEMORY;
+    const bool numbered = status == HS_OK;
+    if (numbered &&
+        !(reserve_rows(&list->map, list->map.n + n) && reserve_blocks(list, numbers, n))) {
+        status = HS_ERR_MEMORY;
+    }
+    if (status == HS_OK) {
+        put_rows(list, ids, tags, n, x, numbers, failure);
+        list->changes++;
+    }
+    list->cells.keeps_empty = false;
+    for (int64_t i = 0; numbered && i < n; i++) { /* the blocks of cells that are empty */
+        const uint32_t c = numbers[i];
+        if (list->cells.cell[c].count == 0 && list->cells.size[c] != HS_NO_BLOCK) {
+            give_block(&list->entries, list->cells.size[c], list->cells.cell[c].start);
+            list->cells.size[c] = HS_NO_BLOCK;
         }
     }
-    for (int r = 0; r <= HS_MOST_REACH && r <= needed; r++) {
-        double n = 1.0;
-        for (int k = 0; k < axes->ndim; k++) {
-            n *= 2 * r + 1;
-        }
-        if (n > HS_MOST_OFFSETS) {
-            break;
-        }
-        offsets->reach = r;
-        offsets->n[r] = (int64_t)n;
-        offsets->at[r + 1] = offsets->at[r] + (int64_t)n * axes->ndim;
+    if (list->map.n == 0) {
+        hs_stored_free(list);
     }
-    const int last = offsets->reach;
-    offsets->slot = hs_alloc(NULL, HS_FOR_STENCIL, offsets->at[last + 1], 1);
-    item *items = hs_alloc(NULL, HS_FOR_STENCIL, offsets->n[last], sizeof *items);
-    for (int r = 0; r <= last && offsets->slot != NULL && items != NULL; r++) {
-        fill(axes, lattice, unit > 0.0 ? unit : 1.0, r, items, offsets);
-    }
-    hs_free(NULL, items);
-    if (items == NULL) {
-        hs_offsets_free(offsets);
-    }
-    return offsets->slot != NULL;
+    hs_free(NULL, numbers);
+    return status;
 }
 
-bool
-hs_offsets_copy(const hs_offsets *offsets, hs_offsets *copy)
+/* First the memory, and then the points, cell after cell. */
+hs_status
+hs_stored_copy(const hs_dynamic *list, hs_dynamic *copy)
 {
-    const int64_t bytes = offsets->at[offsets->reach + 1];
-    *copy = *offsets;
-    copy->slot = hs_alloc(NULL, HS_FOR_STENCIL, bytes, 1);
-    if (copy->slot != NULL) {
-        memcpy(copy->slot, offsets->slot, (size_t)bytes);
+    int64_t    first[HS_MAX_DIM], last[HS_MAX_DIM], index[HS_MAX_DIM];
+    int64_t    n_entries = 0, n_cells = 0;
+    uint32_t   number;
+    hs_failure ignored;
+    for (int64_t c = 0; c < list->cells.n; c++) {
+        if (list->cells.cell[c].count > 0) {
+            index_of(&list->cells, (uint32_t)c, index);
+            widen(list, index, n_cells == 0, first, last);
+            n_entries += INT64_C(1) << block_size(list->cells.cell[c].count);
+            n_cells++;
+        }
     }
-    return copy->slot != NULL;
-}
-
-void
-hs_offsets_free(hs_offsets *offsets)
-{
-    hs_free(NULL, offsets->slot);
-    offsets->slot = NULL;
+    if (n_cells > 0 &&
+        !(reserve_rows(&copy->map, list->map.n) && reserve_entries(&copy->entries, n_entries) &&
+          reserve_cells(copy, first, last, n_cells, &ignored) == HS_OK)) {
+        return HS_ERR_MEMORY;
+    }
+    for (int64_t c = 0; c < list->cells.n; c++) {
+        const hs_cell cell = list->cells.cell[c];
+        if (cell.count == 0) {
+            continue;
+        }
+        index_of(&list->cells, (uint32_t)c, index);
+        (void)add_cell(copy, index, &number, &ignored); /* the memory is there */
+        (void)reserve_in_cell(copy, number, cell.count);
+        const uint32_t start = copy->cells.cell[number].start;
+        copy_entries(&list->entries, cell.start, &copy->entries, start, cell.count);
+        copy->cells.cell[number].count = cell.count;
+        copy->cells.n_empty--;
+        for (uint32_t e = 0; e < cell.count; e++) {
+            hs_entry_tail *tail = hs_entry_tail_at(&copy->entries, start + e);
+            tail->cell = number;
+            hash_put(&copy->map, (hs_hash_row){start + e, key_mark((hs_key){tail->id, tail->tag})});
+        }
+    }
+    copy->cells.is_wide = list->cells.is_wide;
+    copy->n_without = list->n_without;
+    copy->magnitude = list->magnitude;
+    return HS_OK;
 }

@@ -55,13 +55,6 @@ hs_fast_two_sum(double a, double b)
     return (hs_dw){sum, b - (sum - a)};
 }
 
-/* hi + lo == a - b exactly. [K] */
-HS_ALWAYS_INLINE hs_dw
-hs_two_difference(double a, double b)
-{
-    return hs_two_sum(a, -b);
-}
-
 #if !HS_FAST_FMA
 /* hi + lo == a exactly, of at most 26 bits each, so that their products are exact. Veltkamp, [D] */
 HS_ALWAYS_INLINE hs_dw

@@ -115,7 +115,7 @@ is_triple_definite(const double *entries, const size_range *diagonal)
     const double beside = entries[hs_support_at(k, l)],
                  sign = (kp < 0.0) == (lp < 0.0) ? 1.0 : -1.0;
     const size_range pivot = diagonal[p];
-    HS_ASSERT(pivot.low > 0.0); /* differences of what is not below SMALLEST_SCALED */
+    HS_ASSERT(pivot.low > 0.0); /* differences of what is not below HS_SMALLEST_SCALED */
     const size_range cross = quotient_of(kp, lp, pivot);
     const double     first = diagonal[k].low - quotient_of(kp, kp, pivot).high;
     const double     second = diagonal[l].low - quotient_of(lp, lp, pivot).high;

@@ -665,12 +665,14 @@ hs_metric_within_sum(const hs_metric *metric, hs_dw limit, const double *p, cons
  */
 
 /*
- * d terms, each a product of two differences, are rounded three times each, and their sum d - 1
- * times: with v = 2^-53 and m the sum of their sizes as it is computed, the error is less than
- * (d + 2) v m (1 + 2 (d + 2) v), for d <= 8 below 11 v m. Numbers that underflow change it by less
- * than 2^-1071, which is below v m where m is at least 2^-1000.
+ * A component of x - p, images included, has a rounded difference and n <= 6 rounded products, none
+ * of which underflows, for whole numbers multiply, and n sums. With A the sum of the sizes of these
+ * as it is computed and v = 2^-53, its error is less than (n + 2) v A (1 + 2 (n + 2) v); so is that
+ * of q - p with its B, and that of the product less than (2 n + 6) v A B. With the sum of d <= 8
+ * terms that is 27 v m, where m is the computed sum of all A B. Products that underflow change it
+ * by less than 2^-1071, which is below v m where m is at least 2^-1000.
  */
-#define FOOT_ERROR   (12.0 * 0x1p-53)
+#define FOOT_ERROR   (30.0 * 0x1p-53)
 #define LEAST_SIZE   0x1p-1000
 #define LARGEST_SIZE 0x1p1020
 
@@ -695,37 +697,6 @@ sign_by_integers(const hs_metric *images, const double *x, const int64_t *of_x, 
     return hs_integer_compare_two(&metric, &(hs_span){p, x, sum}, &(hs_span){q, x, difference});
 }
 
-HS_ALWAYS_INLINE bool
-is_forward(const double *x, const double *p, const double *q, int ndim)
-{
-    double product = 0.0, size = 0.0;
-    for (int k = 0; k < ndim; k++) {
-        const double term = (x[k] - p[k]) * (q[k] - p[k]);
-        product += term;
-        size += fabs(term);
-    }
-    if (size >= LEAST_SIZE && size <= LARGEST_SIZE && fabs(product) > FOOT_ERROR * size) {
-        return product > 0.0;
-    }
-    const hs_metric plain = {.ndim = ndim};
-    return sign_by_integers(&plain, x, NULL, p, q, NULL) >= 0;
-}
-
-bool
-hs_foot_is_between(const double *x, const double *p, const double *q, int ndim)
-{
-    return is_forward(x, p, q, ndim) && is_forward(x, q, p, ndim);
-}
-
-/*
- * Of images, a component of x - p has a rounded difference and n <= 6 rounded products, none of
- * which underflows, for whole numbers multiply, and n sums. With A the sum of the sizes of these as
- * it is computed, its error is less than (n + 2) v A (1 + 2 (n + 2) v); so is that of q - p with
- * its B, and that of the product less than (2 n + 6) v A B. With the sum of d <= 8 terms that is 27
- * v m, where m is the computed sum of all A B.
- */
-#define IMAGE_FOOT_ERROR (30.0 * 0x1p-53)
-
 /* Component k of q - p + shift * rows; *size: the sum of the sizes of its terms. */
 HS_ALWAYS_INLINE double
 component_of(const hs_metric *images, const double *p, const double *q, const int64_t *shift, int k,
@@ -742,8 +713,8 @@ component_of(const hs_metric *images, const double *p, const double *q, const in
 }
 
 static bool
-is_forward_image(const hs_metric *images, const double *x, const int64_t *of_x, const double *p,
-                 const double *q, const int64_t *of_q)
+is_forward(const hs_metric *images, const double *x, const int64_t *of_x, const double *p,
+           const double *q, const int64_t *of_q)
 {
     double product = 0.0, size = 0.0;
     for (int k = 0; k < images->ndim; k++) {
@@ -752,15 +723,15 @@ is_forward_image(const hs_metric *images, const double *x, const int64_t *of_x, 
             component_of(images, p, x, of_x, k, &of_a) * component_of(images, p, q, of_q, k, &of_b);
         size += of_a * of_b;
     }
-    if (size >= LEAST_SIZE && size <= LARGEST_SIZE && fabs(product) > IMAGE_FOOT_ERROR * size) {
+    if (size >= LEAST_SIZE && size <= LARGEST_SIZE && fabs(product) > FOOT_ERROR * size) {
         return product > 0.0;
     }
     return sign_by_integers(images, x, of_x, p, q, of_q) >= 0;
 }
 
 bool
-hs_foot_is_between_images(const hs_metric *images, const double *x, const int64_t *of_x,
-                          const double *p, const double *q, const int64_t *of_q)
+hs_foot_is_between(const hs_metric *images, const double *x, const int64_t *of_x, const double *p,
+                   const double *q, const int64_t *of_q)
 {
     int64_t from_q[HS_MAX_DIM], back[HS_MAX_DIM];
     HS_ASSERT(images->n_rows <= HS_MAX_DIM - 2);
@@ -768,6 +739,5 @@ hs_foot_is_between_images(const hs_metric *images, const double *x, const int64_
         from_q[l] = of_x[l] - of_q[l];
         back[l] = -of_q[l];
     }
-    return is_forward_image(images, x, of_x, p, q, of_q) &&
-           is_forward_image(images, x, from_q, q, p, back);
+    return is_forward(images, x, of_x, p, q, of_q) && is_forward(images, x, from_q, q, p, back);
 }

@@ -122,7 +122,7 @@ hs_difference_plain(hs_difference *difference, const double *p, const double *q,
 {
     int k = 0; /* ndim is at least 1: compilers warn without this */
     do
-        difference->component[k] = hs_two_difference(q[k], p[k]);
+        difference->component[k] = hs_two_sum(q[k], -p[k]);
     while (++k < ndim);
     difference->error = 0.0;
     difference->lost = 0.0;
@@ -146,7 +146,7 @@ hs_difference_shifted(hs_difference *difference, const hs_metric *metric, const 
     }
     int k = 0;
     do {
-        hs_dw  sum = hs_two_difference(q[k], p[k]);
+        hs_dw  sum = hs_two_sum(q[k], -p[k]);
         double size = fabs(q[k]) + fabs(p[k]);
         double sums = 0.0;
         for (int l = 0; l < metric->n_rows; l++) {
@@ -349,12 +349,10 @@ bool hs_metric_within_sum(const hs_metric *metric, hs_dw limit, const double *p,
  * are? */
 
 /* Whether 0 <= (x - p).(q - p) <= |q - p|^2: the foot of the perpendicular from x on the line
- * through p and q lies on the closed segment between them. True where p and q are one point. */
-bool hs_foot_is_between(const double *x, const double *p, const double *q, int ndim);
-
-/* The same for x + of_x * rows and q + of_q * rows. images: ndim, and up to HS_MAX_DIM - 2 rows;
- * shifts have n_rows numbers, of at most 33 bits. */
-bool hs_foot_is_between_images(const hs_metric *images, const double *x, const int64_t *of_x,
-                               const double *p, const double *q, const int64_t *of_q);
+ * through p and q lies on the closed segment between them, for x + of_x * rows and q + of_q * rows.
+ * True where p and q are one point. images: ndim, and up to HS_MAX_DIM - 2 rows; shifts have n_rows
+ * numbers, of at most 33 bits, and may be NULL if there are none. */
+bool hs_foot_is_between(const hs_metric *images, const double *x, const int64_t *of_x,
+                        const double *p, const double *q, const int64_t *of_q);
 
 #endif

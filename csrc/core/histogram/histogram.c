@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "histogram.h"
 #include "../collect/parallel.h"
+#include "../exact/arithmetic.h"
 #include "../exact/filter.h"
+#include "../memory/memory.h"
+#include "../search/scan.h"
 
 #include <float.h>
 #include <math.h>
@@ -10,8 +13,50 @@
 /* histogram.c: edges and their bands become a table, pairs are counted by it, weights are summed
  * without rounding, and threads' counts are joined. */
 
-/* Bands are the filter's thresholds at each edge; the table is made as fine as keeps most
- * bands apart. */
+/*
+ * From float32 squares to bins. Around each edge there is a band of squares that cannot tell on
+ * which side of it a pair is (filter.h); between two bands the bin is sure. A table, indexed by the
+ * leading bits of the square, knows for each of its cells which bands reach into it.
+ *
+ * A slot is 2 k for "k edges are reached, surely", and odd for pairs that must be decided exactly.
+ */
+
+/* The edges of a histogram; shared by all threads. */
+typedef struct histogram_edges {
+    int64_t n;
+    bool    inclusive, last_inclusive; /* edges, the last edge, belong to the bin below */
+    double *at;                        /* owned; as the scene's metric takes them; n */
+    double *lower;                     /* at most, ... */
+    double *upper; /* ... and at least the scaled edge; both in the memory of `at` */
+    int     ndim;
+    double  filter_error; /* of the search: bound on each component before rounding to float32 */
+} histogram_edges;
+
+/* Squares of one cell of the table: with s < in `slot`, with s > out two more, else one more. in
+ * and out are the bits of floats, which order like these. */
+typedef struct edge_cell {
+    int32_t in, out;
+    int32_t slot;
+    int32_t n_bands; /* that reach into it; of several, in and out leave all to be looked at */
+} edge_cell;
+
+/* The table for neighbourhoods up to some extent; belongs to one thread. */
+typedef struct edge_table {
+    double     extent; /* 0 when there is no table yet */
+    float     *in;     /* owned, n: the band of each edge; ascending */
+    float     *out;    /* in the memory of `in` */
+    edge_cell *cells;  /* owned; NULL where squares may overflow: then nothing is sure */
+    int        shift;  /* bits of a square that do not choose the cell */
+    int32_t    first;  /* leading bits of the squares of cell 0 */
+    int32_t    last;   /* number of the last cell */
+} edge_table;
+
+/* Whether a pair at exactly edge k is below it. */
+HS_ALWAYS_INLINE bool
+is_inclusive(const histogram_edges *edges, int64_t k)
+{
+    return k == edges->n - 1 ? edges->last_inclusive : edges->inclusive;
+}
 
 /* Bits of a float32 that do not choose its cell, in the order in which they are tried. For each
  * power of two there are 128 cells, which tell a hundred bins apart, or 2048 for a thousand, or
@@ -24,41 +69,38 @@
 /* Edges of the histogram in the unit of the scene. */
 static hs_status
 edges_init(hs_account *account, const hs_scene *scene, double filter_error,
-           const hs_histogram *histogram, hs_edges *edges)
+           const hs_histogram *histogram, histogram_edges *edges)
 {
     const int64_t n = histogram->n_edges;
-    *edges = (hs_edges){.n = n,
-                        .inclusive = histogram->inclusive,
-                        .last_inclusive = histogram->last_inclusive,
-                        .ndim = scene->ndim,
-                        .filter_error = filter_error};
-    edges->at = hs_alloc(account, HS_FOR_CANDIDATES, scene->extreme ? 3 * n : n, sizeof(double));
+    *edges = (histogram_edges){.n = n,
+                               .inclusive = histogram->inclusive,
+                               .last_inclusive = histogram->last_inclusive,
+                               .ndim = scene->ndim,
+                               .filter_error = filter_error};
+    edges->at = hs_alloc(account, HS_FOR_CANDIDATES, 3 * n, sizeof(double));
     if (edges->at == NULL) {
         return HS_ERR_MEMORY;
     }
-    edges->lower = edges->upper = edges->at;
-    if (scene->extreme) {
-        edges->lower = edges->at + n;
-        edges->upper = edges->lower + n;
-    }
+    edges->lower = edges->at + n;
+    edges->upper = edges->lower + n;
     for (int64_t k = 0; k < n; k++) {
         const double given = histogram->edges[k], scaled = hs_scale_apply(scene->scale, given);
+        /* Scaling may have rounded or flushed it. */
+        const double loss = scene->extreme && given > 0.0 ? HS_SCALING_LOSS : 0.0;
         edges->at[k] = scene->extreme ? given : scaled;
-        if (scene->extreme) { /* scaling may have rounded or flushed it */
-            edges->lower[k] = given > 0.0 ? scaled - HS_SCALING_LOSS : 0.0;
-            edges->upper[k] = given > 0.0 ? scaled + HS_SCALING_LOSS : 0.0;
-        }
+        edges->lower[k] = scaled - loss;
+        edges->upper[k] = scaled + loss;
     }
     return HS_OK;
 }
 
 /* Sets the band of every edge. */
 static void
-set_bands(const hs_edges *edges, double extent, hs_edge_table *table)
+set_bands(const histogram_edges *edges, double extent, edge_table *table)
 {
     for (int64_t k = 0; k < edges->n; k++) {
         const double lower = edges->lower[k], upper = edges->upper[k];
-        if (edges->at[k] == 0.0 && !hs_edge_is_inclusive(edges, k)) {
+        if (edges->at[k] == 0.0 && !is_inclusive(edges, k)) {
             table->in[k] = table->out[k] = -1.0f; /* no distance is below zero */
             continue;
         }
@@ -76,7 +118,7 @@ set_bands(const hs_edges *edges, double extent, hs_edge_table *table)
 
 /* The cell of a square that is not negative, and no larger than the end of the last band. */
 static int32_t
-cell_of(const hs_edge_table *table, float square)
+cell_of(const edge_table *table, float square)
 {
     const int32_t cell = (int32_t)(hs_bits_of_float(square) >> table->shift) - table->first;
     HS_ASSERT(square >= 0.0f && cell <= table->last);
@@ -86,7 +128,7 @@ cell_of(const hs_edge_table *table, float square)
 /* Makes cells of 2^shift neighbouring floats each, from the first band that ends above zero to the
  * last. Returns how many pairs of bands share a cell although they do not overlap. */
 static int64_t
-set_cells(const hs_edges *edges, int shift, hs_edge_table *table)
+set_cells(const histogram_edges *edges, int shift, edge_table *table)
 {
     int64_t k = 0, shared = 0;
     while (k < edges->n - 1 && table->out[k] < 0.0f) {
@@ -109,7 +151,7 @@ set_cells(const hs_edges *edges, int shift, hs_edge_table *table)
 }
 
 static void
-fill_cells(const hs_edges *edges, hs_edge_table *table)
+fill_cells(const histogram_edges *edges, edge_table *table)
 {
     int64_t below = 0, reached = 0; /* bands that end before the cell, or begin before its end */
     for (int32_t c = 0; c <= table->last; c++) {
@@ -122,7 +164,7 @@ fill_cells(const hs_edges *edges, hs_edge_table *table)
         while (reached < edges->n && (c == table->last || table->in[reached] <= most)) {
             reached++;
         }
-        hs_edge_cell *cell = &table->cells[c];
+        edge_cell *cell = &table->cells[c];
         cell->slot = (int32_t)(2 * below);
         cell->n_bands = (int32_t)(reached - below);
         cell->in = cell->n_bands == 0 ? INT32_MAX : 0;
@@ -134,53 +176,55 @@ fill_cells(const hs_edges *edges, hs_edge_table *table)
     }
 }
 
-hs_status
-hs_edge_table_build(const hs_edges *edges, double extent, hs_edge_table *table)
+static void
+free_table(edge_table *table)
 {
-    hs_edge_table_free(table);
+    hs_free(NULL, table->cells);
+    hs_free(NULL, table->in);
+    *table = (edge_table){0};
+}
+
+/* Replaces the table by one for this extent (the sum of the largest |y_k| and |q_k|). Called by
+ * threads as they go, so no account is charged for its memory: at most 8 bytes an edge, and a
+ * megabyte. */
+static hs_status
+build_table(const histogram_edges *edges, double extent, edge_table *table)
+{
+    free_table(table);
     table->in = hs_alloc(NULL, HS_FOR_CANDIDATES, 2 * edges->n, sizeof(float));
     if (table->in == NULL) {
         return HS_ERR_MEMORY;
     }
     table->out = table->in + edges->n;
     set_bands(edges, extent, table);
-    table->extent = extent;
     if (!(4.0 * edges->ndim * extent * extent <= FLT_MAX)) { /* four times the largest square */
+        table->extent = extent;
         return HS_OK;
     }
     const int64_t few = edges->n / 64; /* the last bins share first, and have the most pairs */
     if (set_cells(edges, FEW_CELLS, table) > few && set_cells(edges, MANY_CELLS, table) > few) {
         (void)set_cells(edges, ALL_CELLS, table); /* as few cells as keep most bands apart */
     }
-    table->cells =
-        hs_alloc(NULL, HS_FOR_CANDIDATES, (int64_t)table->last + 1, sizeof(hs_edge_cell));
+    table->cells = hs_alloc(NULL, HS_FOR_CANDIDATES, (int64_t)table->last + 1, sizeof(edge_cell));
     if (table->cells == NULL) {
-        hs_edge_table_free(table);
         return HS_ERR_MEMORY;
     }
     fill_cells(edges, table);
+    table->extent = extent;
     return HS_OK;
 }
 
-void
-hs_edge_table_free(hs_edge_table *table)
-{
-    hs_free(NULL, table->cells);
-    hs_free(NULL, table->in);
-    *table = (hs_edge_table){0};
-}
-
 HS_ALWAYS_INLINE bool
-find_slots(const hs_edge_table *table, const float *squares, int32_t n, int32_t *slots,
+find_slots(const edge_table *table, const float *squares, int32_t n, int32_t *slots,
            const int shift)
 {
-    const hs_edge_cell *cells = table->cells;
-    const int32_t       first = table->first;
-    int32_t             odd = 0;
+    const edge_cell *cells = table->cells;
+    const int32_t    first = table->first;
+    int32_t          odd = 0;
     for (int32_t h = 0; h < n; h++) {
-        const int32_t       bits = (int32_t)hs_bits_of_float(squares[h]);
-        const int32_t       at = (bits >> shift) - first;
-        const hs_edge_cell *cell = &cells[at < 0 ? 0 : at];
+        const int32_t    bits = (int32_t)hs_bits_of_float(squares[h]);
+        const int32_t    at = (bits >> shift) - first;
+        const edge_cell *cell = &cells[at < 0 ? 0 : at];
         /* Differences of these do not overflow; their sign bits count. */
         const uint32_t below = (uint32_t)(bits - cell->in) >> 31;
         const uint32_t above = (uint32_t)(cell->out - bits) >> 31;
@@ -190,8 +234,10 @@ find_slots(const hs_edge_table *table, const float *squares, int32_t n, int32_t 
     return (odd & 1) != 0;
 }
 
-bool
-hs_edge_slots(const hs_edge_table *table, const float *squares, int32_t n, int32_t *slots)
+/* The slots of n squares, all of them from neighbourhoods up to the table's extent and !(s > out)
+ * for the last edge there. Returns whether any is odd. */
+static bool
+find_all_slots(const edge_table *table, const float *squares, int32_t n, int32_t *slots)
 {
     if (table->cells == NULL) {
         for (int32_t h = 0; h < n; h++) {
@@ -221,23 +267,48 @@ first_not_below(const float *limits, int32_t low, int32_t high, float square)
     return low;
 }
 
-void
-hs_edge_range(const hs_edge_table *table, const hs_edges *edges, float square, int32_t *low,
-              int32_t *high)
+/* For a square whose slot is odd: at least *low edges are reached, and at most *high. */
+static void
+find_range_of_edges(const edge_table *table, const histogram_edges *edges, float square,
+                    int32_t *low, int32_t *high)
 {
     if (table->cells == NULL) {
         *low = 0;
         *high = (int32_t)edges->n;
         return;
     }
-    const hs_edge_cell *cell = &table->cells[cell_of(table, square)];
-    const int32_t       first = cell->slot / 2, end = first + cell->n_bands;
+    const edge_cell *cell = &table->cells[cell_of(table, square)];
+    const int32_t    first = cell->slot / 2, end = first + cell->n_bands;
     *low = first_not_below(table->out, first, end, square);
     /* Edges with in <= s: up to the first with in > s. */
     *high = first_not_below(table->in, *low, end, nextafterf(square, INFINITY));
 }
 
-/* Weights to integers, carries between limbs, and the one rounding at the end. */
+/*
+ * Exact sums of products of two floats, rounded once at the end, so that neither the order of the
+ * terms nor the threads that add them can change a bit.
+ *
+ * A weight is an integer times a power of two. Each sum is a long integer in steps of 32 bits, kept
+ * in limbs of 64: what is carried stays where it arose until 2^30 products have been added.
+ */
+
+/* The weights of a set of points: value[i] * 2^(place[i] + exponent). */
+typedef struct point_weights {
+    int64_t *value; /* owned, n; below 2^62 in size. NULL: all weights are 1 */
+    int32_t *place; /* owned, n; from 0 on. NULL: all 0 */
+    int      exponent;
+    int      bits;       /* at least the number of bits of every value, ... */
+    int      most_place; /* ... and the largest place */
+} point_weights;
+
+/* n sums; owned by one thread. */
+typedef struct exact_sums {
+    int64_t  n;
+    int32_t  n_limbs;
+    int      exponent; /* of their lowest bit */
+    int64_t *limbs;    /* owned; n_limbs of each, lowest first */
+    int64_t  n_added;  /* products added since carries were last passed on */
+} exact_sums;
 
 #define VALUE_BITS 62    /* of a weight, at most */
 #define SUM_BITS   64    /* that 2^62 terms and a sign add to those of a term */
@@ -254,34 +325,10 @@ odd_part(double x, int *exponent)
     return whole / (INT64_C(1) << zeros);
 }
 
-/* Exponents of the lowest and of the highest bit of any; 0 where all are zero. */
-static hs_status
-find_range(const double *weights, int64_t n, int *lowest, int *highest, hs_failure *failure)
-{
-    bool any = false;
-    *lowest = *highest = 0;
-    for (int64_t i = 0; i < n; i++) {
-        int exponent, above;
-        if (!isfinite(weights[i])) {
-            failure->row = i;
-            failure->value = weights[i];
-            return HS_ERR_WEIGHTS;
-        }
-        if (weights[i] != 0.0) {
-            (void)odd_part(weights[i], &exponent);
-            (void)frexp(weights[i], &above);
-            *lowest = any && *lowest < exponent ? *lowest : exponent;
-            *highest = any && *highest > above ? *highest : above;
-            any = true;
-        }
-    }
-    return HS_OK;
-}
-
 /* Takes weights as integers of one exponent where 62 bits hold them, else each with a place of its
  * own. Another thread may write to the weights meanwhile: places are kept in range. */
 static void
-take_weights(const double *weights, const int32_t *order, int64_t n, hs_weights *taken)
+take_weights(const double *weights, const int32_t *order, int64_t n, point_weights *taken)
 {
     for (int64_t i = 0; i < n; i++) {
         const double weight = weights[order[i]];
@@ -301,18 +348,31 @@ take_weights(const double *weights, const int32_t *order, int64_t n, hs_weights 
     }
 }
 
-hs_status
-hs_weights_init(hs_account *account, const double *weights, const int32_t *order, int64_t n,
-                hs_weights *taken, hs_failure *failure)
+/* Weight order[i] of the caller, finite or HS_ERR_WEIGHTS, becomes number i. NULL: all are 1. */
+static hs_status
+init_weights(hs_account *account, const double *weights, const int32_t *order, int64_t n,
+             point_weights *taken, hs_failure *failure)
 {
-    int lowest, highest;
-    *taken = (hs_weights){.bits = 1};
+    int  lowest = 0, highest = 0; /* exponents of the lowest and of the highest bit of any */
+    bool any = false;
+    *taken = (point_weights){.bits = 1};
+    for (int64_t i = 0; weights != NULL && i < n; i++) {
+        int exponent, above;
+        if (!isfinite(weights[i])) {
+            failure->row = i;
+            failure->value = weights[i];
+            return HS_ERR_WEIGHTS;
+        }
+        if (weights[i] != 0.0) {
+            (void)odd_part(weights[i], &exponent);
+            (void)frexp(weights[i], &above);
+            lowest = any && lowest < exponent ? lowest : exponent;
+            highest = any && highest > above ? highest : above;
+            any = true;
+        }
+    }
     if (weights == NULL) {
         return HS_OK;
-    }
-    const hs_status status = find_range(weights, n, &lowest, &highest, failure);
-    if (status != HS_OK) {
-        return status;
     }
     const bool one_place = highest - lowest <= VALUE_BITS;
     taken->exponent = lowest;
@@ -321,7 +381,6 @@ hs_weights_init(hs_account *account, const double *weights, const int32_t *order
     taken->value = hs_alloc(account, HS_FOR_POINTS, n, sizeof(int64_t));
     taken->place = one_place ? NULL : hs_alloc(account, HS_FOR_POINTS, n, sizeof(int32_t));
     if (taken->value == NULL || (!one_place && taken->place == NULL)) {
-        hs_weights_free(account, taken);
         return HS_ERR_MEMORY;
     }
     take_weights(weights, order, n, taken);
@@ -331,28 +390,17 @@ hs_weights_init(hs_account *account, const double *weights, const int32_t *order
     return HS_OK;
 }
 
-void
-hs_weights_free(hs_account *account, hs_weights *weights)
-{
-    hs_free(account, weights->value);
-    hs_free(account, weights->place);
-    weights->value = NULL;
-    weights->place = NULL;
-}
-
-hs_status
-hs_sums_init(hs_account *account, int64_t n, const hs_weights *a, const hs_weights *b,
-             hs_sums *sums)
+/* Zeros, for products of these two. As many counts have been allocated: no product overflows. */
+static hs_status
+init_sums(hs_account *account, int64_t n, const point_weights *a, const point_weights *b,
+          exact_sums *sums)
 {
     const int most_place = a->most_place + b->most_place;
     const int for_bits = (a->bits + b->bits + most_place + SUM_BITS) / 32 + 1;
-    const int for_place = most_place / 32 + 5; /* what hs_sums_add writes to */
-    *sums = (hs_sums){.n = n,
-                      .n_limbs = for_bits > for_place ? for_bits : for_place,
-                      .exponent = a->exponent + b->exponent};
-    if (n > INT64_MAX / sums->n_limbs) {
-        return HS_ERR_MEMORY;
-    }
+    const int for_place = most_place / 32 + 5; /* what add_product writes to */
+    *sums = (exact_sums){.n = n,
+                         .n_limbs = for_bits > for_place ? for_bits : for_place,
+                         .exponent = a->exponent + b->exponent};
     sums->limbs = hs_alloc(account, HS_FOR_CANDIDATES, n * sums->n_limbs, sizeof(int64_t));
     if (sums->limbs == NULL) {
         return HS_ERR_MEMORY;
@@ -361,16 +409,10 @@ hs_sums_init(hs_account *account, int64_t n, const hs_weights *a, const hs_weigh
     return HS_OK;
 }
 
-void
-hs_sums_free(hs_account *account, hs_sums *sums)
-{
-    hs_free(account, sums->limbs);
-    sums->limbs = NULL;
-}
-
-/* Limbs of 32 bits but for the highest one, which has the sign. */
-void
-hs_sums_carry(hs_sums *sums)
+/* Passes on what was carried in every sum: limbs are of 32 bits then but for the highest one, which
+ * has the sign. */
+static void
+carry_sums(exact_sums *sums)
 {
     for (int64_t k = 0; k < sums->n; k++) {
         int64_t *limbs = sums->limbs + k * sums->n_limbs;
@@ -383,67 +425,100 @@ hs_sums_carry(hs_sums *sums)
     sums->n_added = 0;
 }
 
-void
-hs_sums_join(hs_sums *sums, hs_sums *more)
+#ifdef HS_TESTING
+#define MOST_ADDED INT64_C(50) /* so that small scenes have as many */
+#else
+#define MOST_ADDED (INT64_C(1) << 30)
+#endif
+
+/* Call before n products are added: passes on carries in time. */
+HS_ALWAYS_INLINE void
+expect_products(exact_sums *sums, int64_t n)
 {
-    hs_sums_carry(sums);
-    hs_sums_carry(more);
+    if (HS_UNLIKELY(sums->n_added + n > MOST_ADDED)) {
+        carry_sums(sums);
+    }
+    sums->n_added += n;
+}
+
+/* Adds a * b * 2^place to a sum, given by its limbs; below 2^62 in size each. */
+HS_ALWAYS_INLINE void
+add_product(int64_t *limbs, int64_t a, int64_t b, const int32_t place)
+{
+    const int64_t  sign = (a ^ b) >> 63; /* 0 or -1 */
+    const uint64_t size_a = a < 0 ? 0 - (uint64_t)a : (uint64_t)a;
+    const uint64_t size_b = b < 0 ? 0 - (uint64_t)b : (uint64_t)b;
+    const int      shift = place & 31;
+    uint64_t       high = 0;
+    const uint64_t low = hs_multiply_add(size_a, size_b, 0, &high);
+    const uint64_t lowest = low << shift, middle = high << shift | (low >> 1) >> (63 - shift);
+    const uint64_t highest = (high >> 1) >> (63 - shift);
+    limbs += place >> 5;
+    limbs[0] += ((int64_t)(lowest & UINT32_MAX) ^ sign) - sign;
+    limbs[1] += ((int64_t)(lowest >> 32) ^ sign) - sign;
+    limbs[2] += ((int64_t)(middle & UINT32_MAX) ^ sign) - sign;
+    limbs[3] += ((int64_t)(middle >> 32) ^ sign) - sign;
+    if (place > 0) {
+        limbs[4] += ((int64_t)highest ^ sign) - sign;
+    }
+}
+
+/* Adds *more, of the same form, to *sums. */
+static void
+join_sums(exact_sums *sums, exact_sums *more)
+{
+    carry_sums(sums);
+    carry_sums(more);
     for (int64_t e = 0; e < sums->n * sums->n_limbs; e++) {
         sums->limbs[e] += more->limbs[e];
     }
-    hs_sums_carry(sums);
+    carry_sums(sums);
 }
 
-/* top * 2^exponent, 2^63 <= top, and if `more` a little more, as a float64. */
+/* Limbs of a sum, at most: for weights of 53 bits with places up to 2 * 2098 together. */
+#define MOST_LIMBS 144
+
+/* Sum k, rounded to nearest, ties to even; infinite beyond the range of float64. Call carry_sums
+ * first. */
 static double
-round_top(uint64_t top, bool more, int exponent)
-{
-    const int lowest = exponent + 11 > LOWEST ? exponent + 11 : LOWEST; /* 53 bits, or fewer */
-    const int shift = lowest - exponent;
-    if (shift > 64) {
-        return 0.0; /* below half of the smallest number */
-    }
-    const uint64_t half = UINT64_C(1) << (shift - 1);
-    const uint64_t rest = shift < 64 ? top & (2 * half - 1) : top;
-    uint64_t       kept = shift < 64 ? top >> shift : 0;
-    kept += rest > half || (rest == half && (more || (kept & 1)));
-    return ldexp((double)kept, lowest);
-}
-
-double
-hs_sums_round(const hs_sums *sums, int64_t k)
+round_sum(const exact_sums *sums, int64_t k)
 {
     const int64_t *limbs = sums->limbs + k * sums->n_limbs;
     const bool     negative = limbs[sums->n_limbs - 1] < 0;
-    uint64_t       carry = negative, high = 0, low = 0; /* the last three digits so far */
-    uint64_t       top_high = 0, top_low = 0;           /* the highest one that is not zero, and the
-                                                           two below it */
-    bool           any = false, any_below_top = false;  /* digits below these */
+    uint64_t       digit[MOST_LIMBS + 2] = {0}, carry = negative; /* two zeros below the lowest */
     int32_t        top = 0;
-    for (int32_t e = 0; e < sums->n_limbs; e++) {
-        /* Bits [32 e, 32 e + 32) of |sum|: of two's complement, negated, and what is carried. */
-        const uint32_t limb = (uint32_t)limbs[e];
+    bool           more = false;
+    HS_ASSERT(sums->n_limbs <= MOST_LIMBS);
+    for (int32_t e = 2; e < sums->n_limbs + 2; e++) {
+        /* Bits of |sum|: of two's complement, negated, and what is carried. */
+        const uint32_t limb = (uint32_t)limbs[e - 2];
         const uint64_t next = (negative ? ~limb : limb) + carry;
-        const uint32_t digit = (uint32_t)next;
+        digit[e] = next & UINT32_MAX;
         carry = next >> 32;
-        any = any || (low & UINT32_MAX) != 0;
-        low = low >> 32 | high << 32;
-        high = digit;
-        if (digit != 0) {
-            top = e;
-            top_high = high;
-            top_low = low;
-            any_below_top = any;
-        }
+        top = digit[e] != 0 ? e : top;
     }
-    if (top_high == 0) {
+    if (top == 0) {
         return 0.0;
     }
-    const int      dropped = hs_bit_length(top_high); /* of the 96 bits, to have 64 */
-    const uint64_t leading = top_high << (64 - dropped) | top_low >> dropped;
-    const bool     more = any_below_top || (top_low & ((UINT64_C(1) << dropped) - 1)) != 0;
-    const double   size = round_top(leading, more, sums->exponent + 32 * (top - 2) + dropped);
-    return negative ? -size : size;
+    for (int32_t e = 0; e < top - 2; e++) {
+        more = more || digit[e] != 0;
+    }
+    /* 64 bits of the three highest digits, the highest one set, and where they begin. */
+    const int      dropped = hs_bit_length(digit[top]);
+    const uint64_t low = digit[top - 1] << 32 | digit[top - 2];
+    const uint64_t leading = digit[top] << (64 - dropped) | low >> dropped;
+    const int      exponent = sums->exponent + 32 * (top - 4) + dropped;
+    more = more || (low & ((UINT64_C(1) << dropped) - 1)) != 0;
+    const int lowest = exponent + 11 > LOWEST ? exponent + 11 : LOWEST; /* 53 bits, or fewer */
+    const int shift = lowest - exponent;
+    if (shift > 64) {
+        return negative ? -0.0 : 0.0; /* below half of the smallest number */
+    }
+    const uint64_t half = UINT64_C(1) << (shift - 1);
+    const uint64_t rest = shift < 64 ? leading & (2 * half - 1) : leading;
+    uint64_t       kept = shift < 64 ? leading >> shift : 0;
+    kept += rest > half || (rest == half && (more || (kept & 1)));
+    return ldexp(negative ? -(double)kept : (double)kept, lowest);
 }
 
 /*
@@ -453,8 +528,8 @@ hs_sums_round(const hs_sums *sums, int64_t k)
 
 /* Types and weights of one set of points, in cell order. */
 typedef struct marked_set {
-    int32_t   *type; /* owned; NULL: all 0 */
-    hs_weights weights;
+    int32_t      *type; /* owned; NULL: all 0 */
+    point_weights weights;
 } marked_set;
 
 #define TALLY_TABLES 4    /* extents that a walk may meet again; each a power of two */
@@ -470,27 +545,27 @@ typedef struct open_pair {
 
 typedef struct thread_tally {
     const struct tally_plan *plan;                 /* borrowed */
-    hs_edge_table            tables[TALLY_TABLES]; /* owned; place: exponent of the extent */
+    edge_table               tables[TALLY_TABLES]; /* owned; place: exponent of the extent */
     int64_t                  n_slots;              /* of one group */
     int                      n_copies;
-    int64_t                 *counts; /* owned; n_copies * n_groups * n_slots */
-    hs_sums                  sums;   /* owned; n_groups * (edges + 1) */
-    int32_t                 *slots;  /* owned; of the hits of a visit */
-    int32_t                 *type;   /* owned; of each candidate of the block; or NULL */
-    int64_t                 *value;  /* owned; of each candidate: its weight; or NULL */
-    int32_t                 *place; /* owned; of each candidate: the place of its weight; or NULL */
-    int64_t                  block; /* number of the block that these are of */
-    open_pair               *open;  /* owned; TALLY_OPEN */
-    int32_t                  n_open;
-    int32_t                 *waiting; /* owned; for each edge the first open pair, or -1 */
-    int32_t                 *asked;   /* owned; edges that pairs wait for, TALLY_OPEN */
-    int32_t                  n_asked;
+    int64_t                 *counts;  /* owned; n_copies * n_groups * n_slots */
+    exact_sums               sums;    /* owned; n_groups * (edges + 1) */
+    void                    *arrays;  /* owned; in it: */
+    int32_t                 *slots;   /* of the hits of a visit */
+    int32_t                 *type;    /* of each candidate of the block; or NULL */
+    int64_t                 *value;   /* of each candidate: its weight; or NULL */
+    int32_t                 *place;   /* of each candidate: the place of its weight; or NULL */
+    open_pair               *open;    /* TALLY_OPEN */
+    int32_t                 *waiting; /* for each edge the first open pair, or -1 */
+    int32_t                 *asked;   /* edges that pairs wait for, TALLY_OPEN */
+    int32_t                  n_open, n_asked;
+    int64_t                  block; /* number of the block that types and weights are of */
 } thread_tally;
 
 /* What all threads count by, only read while they do. */
 typedef struct tally_plan {
     hs_search        *search;          /* borrowed */
-    hs_edges          edges;           /* owned */
+    histogram_edges   edges;           /* owned */
     marked_set        points, queries; /* owned */
     const marked_set *asking;          /* one of these two */
     bool              has_types, sums; /* whether types matter; whether weights are summed */
@@ -509,8 +584,8 @@ marked_init(hs_account *account, const hs_set *known, const int32_t *order, int6
 {
     const hs_set set = hs_set_with(NULL, known);
     *marked = (marked_set){.type = NULL};
-    hs_status status = hs_weights_init(account, plan->sums ? set.weights : NULL, order, n,
-                                       &marked->weights, failure);
+    hs_status status =
+        init_weights(account, plan->sums ? set.weights : NULL, order, n, &marked->weights, failure);
     if (status != HS_OK || set.types == NULL || !plan->has_types) {
         return status;
     }
@@ -529,46 +604,11 @@ marked_init(hs_account *account, const hs_set *known, const int32_t *order, int6
     return HS_OK;
 }
 
-static void
-marked_free(hs_account *account, marked_set *marked)
-{
-    hs_free(account, marked->type);
-    hs_weights_free(account, &marked->weights);
-}
-
 /* Slots of all hits by table; hits that stay unsure wait for the edge that halves their
  * range, and a batch decides them. */
 
 /* Slots up to which a histogram has copies: together they stay in the first-level cache. */
 #define FEW_SLOTS 1024
-
-static bool
-allocate(thread_tally *tally, const hs_block *block)
-{
-    const tally_plan *plan = tally->plan;
-    hs_account       *account = &plan->search->call->account;
-    const int64_t     n_slots = tally->n_copies * plan->n_groups * tally->n_slots;
-    tally->counts = hs_alloc(account, HS_FOR_CANDIDATES, n_slots, sizeof(int64_t));
-    tally->slots = hs_alloc(account, HS_FOR_CANDIDATES, block->most_hits, sizeof(int32_t));
-    tally->open = hs_alloc(account, HS_FOR_CANDIDATES, TALLY_OPEN, sizeof(open_pair));
-    tally->asked = hs_alloc(account, HS_FOR_CANDIDATES, TALLY_OPEN, sizeof(int32_t));
-    tally->waiting = hs_alloc(account, HS_FOR_CANDIDATES, plan->edges.n, sizeof(int32_t));
-    bool complete = tally->counts != NULL && tally->slots != NULL && tally->open != NULL &&
-                    tally->asked != NULL && tally->waiting != NULL;
-    if (complete && plan->has_types) {
-        tally->type = hs_alloc(account, HS_FOR_CANDIDATES, block->capacity, sizeof(int32_t));
-        complete = tally->type != NULL;
-    }
-    if (complete && plan->sums) {
-        tally->value = hs_alloc(account, HS_FOR_CANDIDATES, block->capacity, sizeof(int64_t));
-        tally->place = hs_alloc(account, HS_FOR_CANDIDATES, block->capacity, sizeof(int32_t));
-        complete = tally->value != NULL && tally->place != NULL &&
-                   hs_sums_init(account, plan->n_groups * (plan->edges.n + 1),
-                                &plan->asking->weights, &plan->points.weights,
-                                &tally->sums) == HS_OK;
-    }
-    return complete;
-}
 
 static hs_status
 open_tally(void *context, void *state, const hs_walker *walker)
@@ -577,11 +617,31 @@ open_tally(void *context, void *state, const hs_walker *walker)
     thread_tally     *tally = state;
     *tally = (thread_tally){.plan = plan, .n_slots = 2 * plan->edges.n + 1, .block = -1};
     tally->n_copies = !plan->has_types && tally->n_slots <= FEW_SLOTS ? TALLY_COPIES : 1;
-    if (!allocate(tally, &walker->scanner.block)) {
+    const hs_block *block = &walker->scanner.block;
+    hs_account     *account = &plan->search->call->account;
+    const int64_t   n_counts = tally->n_copies * plan->n_groups * tally->n_slots;
+    hs_parts        parts;
+    hs_parts_begin(&parts);
+    hs_parts_add(&parts, (void **)&tally->slots, block->most_hits, sizeof(int32_t));
+    hs_parts_add(&parts, (void **)&tally->open, TALLY_OPEN, sizeof(open_pair));
+    hs_parts_add(&parts, (void **)&tally->asked, TALLY_OPEN, sizeof(int32_t));
+    hs_parts_add(&parts, (void **)&tally->waiting, plan->edges.n, sizeof(int32_t));
+    if (plan->has_types) {
+        hs_parts_add(&parts, (void **)&tally->type, block->capacity, sizeof(int32_t));
+    }
+    if (plan->sums) {
+        hs_parts_add(&parts, (void **)&tally->value, block->capacity, sizeof(int64_t));
+        hs_parts_add(&parts, (void **)&tally->place, block->capacity, sizeof(int32_t));
+    }
+    tally->counts = hs_alloc(account, HS_FOR_CANDIDATES, n_counts, sizeof(int64_t));
+    tally->arrays = hs_parts_alloc(account, HS_FOR_CANDIDATES, &parts);
+    if (tally->counts == NULL || tally->arrays == NULL ||
+        (plan->sums &&
+         init_sums(account, plan->n_groups * (plan->edges.n + 1), &plan->asking->weights,
+                   &plan->points.weights, &tally->sums) != HS_OK)) {
         return HS_ERR_MEMORY;
     }
-    memset(tally->counts, 0,
-           (size_t)(tally->n_copies * plan->n_groups * tally->n_slots) * sizeof(int64_t));
+    memset(tally->counts, 0, (size_t)n_counts * sizeof(int64_t));
     for (int64_t k = 0; k < plan->edges.n; k++) {
         tally->waiting[k] = -1;
     }
@@ -592,17 +652,11 @@ static void
 free_tally(hs_account *account, thread_tally *tally)
 {
     for (int e = 0; e < TALLY_TABLES; e++) {
-        hs_edge_table_free(&tally->tables[e]);
+        free_table(&tally->tables[e]);
     }
     hs_free(account, tally->counts);
-    hs_free(account, tally->slots);
-    hs_free(account, tally->open);
-    hs_free(account, tally->asked);
-    hs_free(account, tally->waiting);
-    hs_free(account, tally->type);
-    hs_free(account, tally->value);
-    hs_free(account, tally->place);
-    hs_sums_free(account, &tally->sums);
+    hs_free(account, tally->arrays);
+    hs_free(account, tally->sums.limbs);
 }
 
 /* Adds what the thread has counted to what those before have. */
@@ -621,13 +675,13 @@ close_tally(void *context, void *state)
         all->counts[e] += tally->counts[e];
     }
     if (all->sums.limbs != NULL && tally->sums.limbs != NULL) {
-        hs_sums_join(&all->sums, &tally->sums);
+        join_sums(&all->sums, &tally->sums);
     }
     free_tally(&plan->search->call->account, tally);
 }
 
 /* The table for groups up to this extent, rounded up to a power of two so that there are few. */
-static const hs_edge_table *
+static const edge_table *
 table_for(thread_tally *tally, double extent)
 {
     int exponent = 0;
@@ -636,9 +690,8 @@ table_for(thread_tally *tally, double extent)
     } else if (frexp(extent, &exponent) > 0.5) {
         extent = ldexp(1.0, exponent);
     }
-    hs_edge_table *table = &tally->tables[(unsigned)exponent % TALLY_TABLES];
-    if (table->extent != extent &&
-        hs_edge_table_build(&tally->plan->edges, extent, table) != HS_OK) {
+    edge_table *table = &tally->tables[(unsigned)exponent % TALLY_TABLES];
+    if (table->extent != extent && build_table(&tally->plan->edges, extent, table) != HS_OK) {
         return NULL;
     }
     return table;
@@ -648,8 +701,8 @@ table_for(thread_tally *tally, double extent)
 static void
 load_block(thread_tally *tally, const hs_scanner *scanner)
 {
-    const hs_block   *block = &scanner->block;
-    const hs_weights *weights = &tally->plan->points.weights;
+    const hs_block      *block = &scanner->block;
+    const point_weights *weights = &tally->plan->points.weights;
     if (tally->block == scanner->n_blocks || (tally->type == NULL && tally->value == NULL)) {
         return;
     }
@@ -664,25 +717,21 @@ load_block(thread_tally *tally, const hs_scanner *scanner)
     }
 }
 
-/* The groups of pairs of point si, by the type of the other point. */
-static const int32_t *
-groups_of(const thread_tally *tally, int32_t si)
-{
-    const tally_plan *plan = tally->plan;
-    return plan->group + (int64_t)plan->asking->type[si] * plan->n_types;
-}
-
+/* The group of pairs of point si and this candidate, by their types. */
 static int64_t
 group_of(const thread_tally *tally, int32_t si, int32_t place)
 {
-    return tally->plan->has_types ? groups_of(tally, si)[tally->type[place]] : 0;
+    const tally_plan *plan = tally->plan;
+    return plan->has_types
+               ? plan->group[(int64_t)plan->asking->type[si] * plan->n_types + tally->type[place]]
+               : 0;
 }
 
 /* The weight of point si. */
 static int64_t
 weight_of(const thread_tally *tally, int32_t si, int32_t *place)
 {
-    const hs_weights *weights = &tally->plan->asking->weights;
+    const point_weights *weights = &tally->plan->asking->weights;
     *place = weights->place != NULL ? weights->place[si] : 0;
     return weights->value != NULL ? weights->value[si] : 1;
 }
@@ -695,31 +744,22 @@ limbs_of(const thread_tally *tally, int64_t group, int32_t n_reached)
     return tally->sums.limbs + (group * n_bins + n_reached) * tally->sums.n_limbs;
 }
 
+/* Counts hits [begin, end) of point si; without types those of all points. */
 static void
-count_plain(thread_tally *tally, int32_t n)
+count_hits(thread_tally *tally, int32_t si, const int32_t *places, int32_t begin, int32_t end)
 {
     const int32_t *slots = tally->slots;
     const int64_t  n_slots = tally->n_slots;
     int64_t       *counts = tally->counts;
-    int32_t        h = 0;
-    for (; tally->n_copies == TALLY_COPIES && h + TALLY_COPIES <= n; h += TALLY_COPIES) {
+    int32_t        h = begin;
+    for (; tally->n_copies == TALLY_COPIES && h + TALLY_COPIES <= end; h += TALLY_COPIES) {
         counts[slots[h]]++;
         counts[n_slots + slots[h + 1]]++;
         counts[2 * n_slots + slots[h + 2]]++;
         counts[3 * n_slots + slots[h + 3]]++;
     }
-    for (; h < n; h++) {
-        counts[slots[h]]++;
-    }
-}
-
-/* Counts hits [begin, end) of point si. */
-static void
-count_typed(thread_tally *tally, int32_t si, const int32_t *places, int32_t begin, int32_t end)
-{
-    const int32_t *groups = groups_of(tally, si), *type = tally->type;
-    for (int32_t h = begin; h < end; h++) {
-        tally->counts[groups[type[places[h]]] * tally->n_slots + tally->slots[h]]++;
+    for (; h < end; h++) {
+        counts[group_of(tally, si, places[h]) * n_slots + slots[h]]++;
     }
 }
 
@@ -734,14 +774,14 @@ sum_hits(thread_tally *tally, int32_t si, const int32_t *places, int32_t begin, 
     const int64_t  n_limbs = tally->sums.n_limbs;
     const int32_t *slots = tally->slots;
     int64_t       *first = tally->sums.limbs;
-    hs_sums_expect(&tally->sums, end - begin);
+    expect_products(&tally->sums, end - begin);
     for (int32_t h = begin; h < end; h++) {
         const int32_t place = has_places ? own_place + tally->place[places[h]] : 0;
         if (!(slots[h] & 1)) {
             int64_t *limbs = tally->plan->has_types
                                  ? limbs_of(tally, group_of(tally, si, places[h]), slots[h] / 2)
                                  : first + slots[h] / 2 * n_limbs;
-            hs_sums_add(limbs, own, value[places[h]], place);
+            add_product(limbs, own, value[places[h]], place);
         }
     }
 }
@@ -764,8 +804,8 @@ count_or_wait(thread_tally *tally, int32_t u)
     if (tally->plan->sums) {
         int32_t       place;
         const int64_t value = weight_of(tally, pair->si, &place);
-        hs_sums_expect(&tally->sums, 1);
-        hs_sums_add(limbs_of(tally, group, pair->low), value, tally->value[pair->place],
+        expect_products(&tally->sums, 1);
+        add_product(limbs_of(tally, group, pair->low), value, tally->value[pair->place],
                     place + tally->place[pair->place]);
     }
     tally->counts[group * tally->n_slots + 2 * pair->low]++;
@@ -775,15 +815,15 @@ count_or_wait(thread_tally *tally, int32_t u)
 static hs_status
 decide_edge(thread_tally *tally, hs_scanner *scanner, int32_t edge)
 {
-    const hs_metric *given = &scanner->search->scene.metric;
-    const hs_edges  *edges = &tally->plan->edges;
-    hs_pair_batch   *pair_batch = &scanner->pair_batch;
-    hs_metric        metric;
-    uint8_t          within[HS_BATCH];
-    int32_t          u = tally->waiting[edge], end;
+    const hs_metric       *given = &scanner->search->scene.metric;
+    const histogram_edges *edges = &tally->plan->edges;
+    hs_pair_batch         *pair_batch = &scanner->pair_batch;
+    hs_metric              metric;
+    uint8_t                within[HS_BATCH];
+    int32_t                u = tally->waiting[edge], end;
     tally->waiting[edge] = -1;
     hs_metric_init(&metric, given->ndim, given->n_rows, (const double(*)[HS_MAX_DIM])given->rows,
-                   edges->at[edge], hs_edge_is_inclusive(edges, edge));
+                   edges->at[edge], is_inclusive(edges, edge));
     while (u >= 0) {
         hs_pair_batch_clear(pair_batch);
         for (end = u; end >= 0 && pair_batch->n < HS_BATCH; end = tally->open[end].next) {
@@ -827,7 +867,7 @@ decide_open(thread_tally *tally, hs_scanner *scanner)
 
 /* Looks again at hits with odd slots. */
 static hs_status
-look_again(thread_tally *tally, hs_scanner *scanner, const hs_edge_table *table, int32_t first,
+look_again(thread_tally *tally, hs_scanner *scanner, const edge_table *table, int32_t first,
            const hs_hits *hits)
 {
     hs_status status = HS_OK;
@@ -838,8 +878,8 @@ look_again(thread_tally *tally, hs_scanner *scanner, const hs_edge_table *table,
             }
             open_pair *pair = &tally->open[tally->n_open];
             *pair = (open_pair){.si = first + t, .place = hits->label[h]};
-            hs_edge_range(table, &tally->plan->edges, scanner->block.squares[h], &pair->low,
-                          &pair->high);
+            find_range_of_edges(table, &tally->plan->edges, scanner->block.squares[h], &pair->low,
+                                &pair->high);
             if (pair->low == pair->high) { /* of a cell with several bands, but in none of these */
                 count_or_wait(tally, tally->n_open);
             } else if (++tally->n_open == TALLY_OPEN) {
@@ -857,23 +897,23 @@ look_again(thread_tally *tally, hs_scanner *scanner, const hs_edge_table *table,
 static hs_status
 tally_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    thread_tally        *tally = context;
-    const hs_edge_table *table = table_for(tally, scanner->form->extent);
-    const int32_t        n = hits->end[hits->n - 1];
+    thread_tally     *tally = context;
+    const edge_table *table = table_for(tally, scanner->form->extent);
+    const int32_t     n = hits->end[hits->n - 1];
     if (table == NULL) {
         return HS_ERR_MEMORY;
     }
     load_block(tally, scanner);
     const bool has_places = tally->plan->points.weights.place != NULL ||
                             tally->plan->asking->weights.place != NULL;
-    const bool is_open = hs_edge_slots(table, scanner->block.squares, n, tally->slots);
+    const bool is_open = find_all_slots(table, scanner->block.squares, n, tally->slots);
     if (!tally->plan->has_types) {
-        count_plain(tally, n);
+        count_hits(tally, first, hits->label, 0, n);
     }
     for (int32_t t = 0, begin = 0; t < hits->n; t++) {
         const int32_t end = hits->end[t];
         if (tally->plan->has_types) {
-            count_typed(tally, first + t, hits->label, begin, end);
+            count_hits(tally, first + t, hits->label, begin, end);
         }
         if (tally->plan->sums && has_places) {
             sum_hits(tally, first + t, hits->label, begin, end, true);
@@ -954,8 +994,7 @@ write_group(const thread_tally *all, int64_t group, int64_t to, const hs_histogr
             histogram->counts[to + k] = count;
         }
         if (histogram->sums != NULL) {
-            histogram->sums[to + k] =
-                hs_sums_round(&all->sums, group * (histogram->n_edges + 1) + k);
+            histogram->sums[to + k] = round_sum(&all->sums, group * (histogram->n_edges + 1) + k);
         }
         n_pairs += count;
     }
@@ -980,7 +1019,7 @@ hs_histogram_fill(hs_search *search, const hs_histogram *histogram, const hs_set
         status = hs_parallel_visit(search, &visitor, NULL, failure);
     }
     if (status == HS_OK && plan.sums) {
-        hs_sums_carry(&plan.all.sums);
+        carry_sums(&plan.all.sums);
     }
     for (int64_t at = 0; status == HS_OK && at < n_types * n_types; at++) {
         const bool    again = !search->has_queries && at % n_types < at / n_types;
@@ -990,8 +1029,12 @@ hs_histogram_fill(hs_search *search, const hs_histogram *histogram, const hs_set
     }
     free_tally(account, &plan.all);
     hs_free(account, plan.edges.at);
-    marked_free(account, &plan.points);
-    marked_free(account, &plan.queries);
+    for (int s = 0; s < 2; s++) {
+        marked_set *set = s == 0 ? &plan.points : &plan.queries;
+        hs_free(account, set->type);
+        hs_free(account, set->weights.value);
+        hs_free(account, set->weights.place);
+    }
     hs_free(account, plan.group);
     return status;
 }

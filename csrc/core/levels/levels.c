@@ -13,26 +13,6 @@
 /* levels.c: supports are read and checked, points divided into levels, and steps planned between
  * these; a level as others see it is a set of points by itself. */
 
-/* The lower triangle, each number of the matrix read once. False if one is not finite or differs
- * from its mirror image, which is *wrong then; NaN differs. */
-static bool
-read_entries(const double *matrix, int ndim, double *entries, double *wrong)
-{
-    bool right = true;
-    for (int k = 0; k < ndim; k++) {
-        for (int l = 0; l <= k; l++) {
-            const double lower = matrix[k * ndim + l] + 0.0; /* and no -0 */
-            const double upper = l < k ? matrix[l * ndim + k] : lower;
-            entries[hs_support_at(k, l)] = lower;
-            if (right && (!isfinite(lower) || lower != upper)) {
-                *wrong = isfinite(lower) ? upper : lower;
-                right = false;
-            }
-        }
-    }
-    return right;
-}
-
 /* How far pairs of a step can be apart along an axis of the grid, by their supports: cells go by
  * that, so that needles along an axis have few candidates across it. The largest width of all
  * points is told by a few where they are round or turned in all ways. */
@@ -224,14 +204,24 @@ read_types(const division *by, level_input *set, hs_slice part, hs_failure *fail
     return HS_OK;
 }
 
-/* Support `row`: checked, and how far it reaches. */
+/* Support `row`: the lower triangle, each number of the matrix read once, and how far it reaches.
+ * Numbers must be finite and equal to their mirror image, of which NaN differs. */
 static hs_status
 read_support(division *by, level_input *set, int64_t row, hs_failure *failure)
 {
-    const int ndim = set->points->ndim;
-    double   *numbers = set->read.numbers + row * hs_support_numbers(ndim), wrong = 0.0;
-    if (!read_entries(set->supports + row * ndim * ndim, ndim, numbers, &wrong)) {
-        return refuse_input(HS_ERR_SUPPORTS, set, row, wrong, failure);
+    const int     ndim = set->points->ndim;
+    const double *matrix = set->supports + row * ndim * ndim;
+    double       *numbers = set->read.numbers + row * hs_support_numbers(ndim);
+    for (int k = 0; k < ndim; k++) {
+        for (int l = 0; l <= k; l++) {
+            const double lower = matrix[k * ndim + l] + 0.0; /* and no -0 */
+            const double upper = l < k ? matrix[l * ndim + k] : lower;
+            numbers[hs_support_at(k, l)] = lower;
+            if (!isfinite(lower) || lower != upper) {
+                return refuse_input(HS_ERR_SUPPORTS, set, row, isfinite(lower) ? upper : lower,
+                                    failure);
+            }
+        }
     }
     numbers[hs_support_entries(ndim)] = hs_support_size(ndim, numbers);
     switch (hs_support_reach(ndim, numbers, by->reach->extent, &set->copy[row])) {
@@ -242,13 +232,20 @@ read_support(division *by, level_input *set, int64_t row, hs_failure *failure)
     }
 }
 
-/* Supports, if there are any; then what the reach goes by, and the points. */
+/* Reads a set: supports, if there are any, then what the reach goes by, and the points; counts its
+ * types or finds the largest of its radii. On failure as well, it is to be freed. */
 static hs_status
-read_all(division *by, level_input *set, hs_failure *failure)
+read_input(division *by, level_input *set, hs_failure *failure)
 {
     const int64_t n = set->points->n;
     hs_slice      next = {0, 0};
     hs_status     status = HS_OK;
+    set->rows = hs_alloc(by->account, HS_FOR_POINTS, n * set->points->ndim, sizeof *set->rows);
+    set->copy = hs_alloc(by->account, HS_FOR_POINTS, n, sizeof *set->copy);
+    set->size = hs_alloc(by->account, HS_FOR_ORDER, n, sizeof *set->size);
+    if (set->rows == NULL || set->copy == NULL || set->size == NULL) {
+        return HS_ERR_MEMORY;
+    }
     if (set->supports != NULL) {
         set->read.numbers = hs_alloc(by->account, HS_FOR_SUPPORTS,
                                      n * hs_support_numbers(set->points->ndim), sizeof(double));
@@ -276,44 +273,14 @@ read_all(division *by, level_input *set, hs_failure *failure)
     return status;
 }
 
-/* Reads a set, and counts its types or finds the largest of its radii. On failure as well, it is to
- * be freed. */
-static hs_status
-read_input(division *by, level_input *set, hs_failure *failure)
-{
-    const int64_t n = set->points->n;
-    set->rows = hs_alloc(by->account, HS_FOR_POINTS, n * set->points->ndim, sizeof *set->rows);
-    set->copy = hs_alloc(by->account, HS_FOR_POINTS, n, sizeof *set->copy);
-    set->size = hs_alloc(by->account, HS_FOR_ORDER, n, sizeof *set->size);
-    return set->rows != NULL && set->copy != NULL && set->size != NULL ? read_all(by, set, failure)
-                                                                       : HS_ERR_MEMORY;
-}
-
-static void
-free_input(hs_account *account, level_input *set)
-{
-    hs_free(account, set->rows);
-    hs_free(account, set->copy);
-    hs_free(account, set->size);
-    hs_free(account, set->read.numbers);
-}
-
 /* One pass finds the level of each point, a counting sort puts the levels in order. */
 
 /* Sizes count the binary orders of a radius below the largest one, and zero as the smallest. */
 #define LEAST_EXPONENT (-1074)
 #define N_SIZES        (1 - LEAST_EXPONENT)
 
-/* Ascends with the radius: the largest size are radii above half of the largest one, and so on, so
- * that radii which differ little are of one or two sizes. */
-static int32_t
-size_of(double radius, double largest)
-{
-    const double part = radius > 0.0 ? radius / largest : 0.0;
-    return part == 0.0 ? 0 : part == 1.0 ? N_SIZES - 1 : ilogb(part) - LEAST_EXPONENT + 1;
-}
-
-/* Once the largest radius is known. Sets without any are of one size. */
+/* Once the largest radius is known: the largest size are radii above half of it, and so on, so that
+ * radii which differ little are of one or two sizes. Sets without any are of one size. */
 static hs_status
 find_sizes(const division *by, level_input *set)
 {
@@ -321,7 +288,11 @@ find_sizes(const division *by, level_input *set)
     hs_status status = HS_OK;
     while (division_go_on(by, set->points->n, &next, &status)) {
         for (int64_t i = next.first; i < next.end; i++) {
-            set->size[i] = has_radii(set) ? size_of(set->copy[i], by->largest) : 0;
+            const double radius = has_radii(set) ? set->copy[i] : 0.0;
+            const double part = radius > 0.0 ? radius / by->largest : 0.0;
+            set->size[i] = part == 0.0   ? 0
+                           : part == 1.0 ? N_SIZES - 1
+                                         : ilogb(part) - LEAST_EXPONENT + 1;
             by->count[set->size[i]]++;
         }
     }
@@ -439,20 +410,6 @@ divide(division *by, level_input *inputs, hs_levels *levels, hs_failure *failure
     return status;
 }
 
-/* A set, which may be NULL, as far as the reach goes by it. */
-static level_input
-input_of(const hs_set *set, const hs_reach *reach, bool are_queries)
-{
-    level_input input = {.are_queries = are_queries};
-    if (set != NULL) {
-        input.points = &set->at;
-        input.radii = reach->n_types == 0 && !reach->has_supports ? set->radii : NULL;
-        input.types = reach->n_types > 0 ? set->types : NULL;
-        input.supports = reach->has_supports ? set->supports : NULL;
-    }
-    return input;
-}
-
 hs_status
 hs_levels_divide(hs_account *account, const hs_options *options, const hs_set *points,
                  const hs_set *queries, const hs_reach *reach, hs_levels *levels,
@@ -461,15 +418,28 @@ hs_levels_divide(hs_account *account, const hs_options *options, const hs_set *p
     const bool   has_own = reach->n_types == 0 && !reach->has_supports; /* radii */
     const double factor = has_own && reach->extent != 0.0 ? reach->extent : 1.0;
     division     by = {.account = account, .options = options, .reach = reach, .factor = factor};
-    level_input  inputs[] = {input_of(points, reach, false), input_of(queries, reach, true)};
+    level_input  inputs[2] = {{.are_queries = false}, {.are_queries = true}};
+    for (int n = 0; n < 2; n++) { /* as far as the reach goes by it */
+        const hs_set *set = n == 0 ? points : queries;
+        if (set != NULL) {
+            inputs[n].points = &set->at;
+            inputs[n].radii = has_own ? set->radii : NULL;
+            inputs[n].types = reach->n_types > 0 ? set->types : NULL;
+            inputs[n].supports = reach->has_supports ? set->supports : NULL;
+        }
+    }
     *levels = (hs_levels){.rule = reach->rule,
                           .factor = factor,
                           .has_queries = queries != NULL,
                           .has_supports = reach->has_supports,
                           .extent = reach->extent};
     const hs_status status = divide(&by, inputs, levels, failure);
-    free_input(account, &inputs[0]);
-    free_input(account, &inputs[1]);
+    for (int n = 0; n < 2; n++) {
+        hs_free(account, inputs[n].rows);
+        hs_free(account, inputs[n].copy);
+        hs_free(account, inputs[n].size);
+        hs_free(account, inputs[n].read.numbers);
+    }
     hs_free(account, by.count);
     if (status != HS_OK) {
         hs_levels_free(account, levels);
@@ -564,18 +534,6 @@ add_below(hs_level_plan *plan, int32_t l, int32_t apart)
     }
 }
 
-/* Level l with itself and with all above it, which look among its points. */
-static void
-add_above(hs_level_plan *plan, int32_t l)
-{
-    const hs_slice own = {l, l + 1}, rest = {l + 1, plan->levels->n};
-    add_step(plan, own, own, plan->is_half);
-    add_step(plan, rest, own, false);
-    if (!plan->is_half) {
-        add_step(plan, own, rest, false);
-    }
-}
-
 /*
  * Whether all types are searched at once, with the largest cutoff, and not in pairs. These test
  * fewer candidates, in proportion to the volumes of their cutoffs, but sort every type into cells
@@ -590,13 +548,22 @@ count_of(const hs_level_set *set, hs_slice levels)
     return (double)(set->first[levels.end] - set->first[levels.first]);
 }
 
-/* By how much the candidates of all pairs of types are fewer than those of all at once. */
-static double
-share_of_paired(const hs_levels *levels)
+/* Whether there is one search, as far as that does not depend on where the points are. */
+static bool
+takes_all(const hs_level_plan *plan)
 {
+    const hs_levels    *levels = plan->levels;
     const hs_level_set *asking = hs_levels_asking(levels), *points = &levels->points;
+    const bool          has_types = levels->cutoffs != NULL;
     const int32_t       n = levels->n;
     double              largest = 0.0, share = 0.0;
+    if (n < 2 || plan->algorithm == HS_HIERARCHY || (has_types && n > HS_TABLE_TYPES)) {
+        return false;
+    }
+    if (plan->algorithm != HS_AUTO || !has_types) {
+        return plan->algorithm != HS_AUTO;
+    }
+    /* By how much the candidates of all pairs of types are fewer than those of all at once. */
     for (int32_t e = 0; e < n * n; e++) {
         largest = hs_larger(largest, levels->cutoffs[e]);
     }
@@ -606,20 +573,7 @@ share_of_paired(const hs_levels *levels)
         const hs_slice a = {e / n, e / n + 1}, b = {e % n, e % n + 1};
         share += count_of(asking, a) * count_of(points, b) / all * volume;
     }
-    return share;
-}
-
-/* Whether there is one search, as far as that does not depend on where the points are. */
-static bool
-takes_all(const hs_level_plan *plan)
-{
-    const hs_levels   *levels = plan->levels;
-    const hs_algorithm algorithm = plan->algorithm;
-    const bool         has_types = levels->cutoffs != NULL;
-    if (levels->n < 2 || algorithm == HS_HIERARCHY || (has_types && levels->n > HS_TABLE_TYPES)) {
-        return false;
-    }
-    return algorithm != HS_AUTO || (has_types && share_of_paired(levels) > SHARE_OF_PAIRED);
+    return share > SHARE_OF_PAIRED;
 }
 
 static void
@@ -645,23 +599,6 @@ add_all(hs_level_plan *plan)
     }
     step.cutoff = hs_smaller(step.cutoff, plan->bound);
     plan->steps[plan->n++] = step;
-}
-
-static void
-add_level(hs_level_plan *plan, int32_t l)
-{
-    const hs_slice own = {l, l + 1}, all = {0, plan->levels->n};
-    if (plan->levels->cutoffs != NULL) {
-        add_below(plan, l, l);
-        return;
-    }
-    switch (plan->levels->rule) {
-    case HS_RULE_MAX: add_below(plan, l, 0); break;
-    case HS_RULE_MIN: add_above(plan, l); break;
-    case HS_RULE_GATHER: add_step(plan, own, all, false); break;
-    case HS_RULE_SCATTER: add_step(plan, all, own, false); break;
-    default: add_below(plan, l, APART);
-    }
 }
 
 bool
@@ -713,65 +650,36 @@ typedef struct spread {
     double asking[MOST_JOINED][HS_MAX_DIM], points[MOST_JOINED][HS_MAX_DIM];
 } spread;
 
+/* Of the levels of a set. A box that repeats along all its vectors wraps its points into it. */
 static hs_status
-find_extents(const hs_options *options, const hs_level_set *set, int32_t level,
-             const double *longest, double *extent)
+find_extents(const hs_options *options, const hs_level_set *set, int32_t n_levels,
+             const hs_box *box, double extent[][HS_MAX_DIM])
 {
     const int d = set->ndim;
-    double    low[HS_MAX_DIM], high[HS_MAX_DIM];
-    for (int k = 0; k < d; k++) {
-        low[k] = HUGE_VAL;
-        high[k] = -HUGE_VAL;
-    }
-    for (int64_t i = set->first[level]; i < set->first[level + 1]; i++) {
+    for (int32_t level = 0; level < n_levels; level++) {
+        double low[HS_MAX_DIM], high[HS_MAX_DIM];
         for (int k = 0; k < d; k++) {
-            low[k] = hs_smaller(set->rows[i * d + k], low[k]);
-            high[k] = hs_larger(set->rows[i * d + k], high[k]);
+            low[k] = HUGE_VAL;
+            high[k] = -HUGE_VAL;
         }
-        if ((i + 1) % HS_POLL_POINTS == 0 && hs_poll(options, 0.0) != HS_OK) {
-            return HS_ERR_INTERRUPTED;
+        for (int64_t i = set->first[level]; i < set->first[level + 1]; i++) {
+            for (int k = 0; k < d; k++) {
+                low[k] = hs_smaller(set->rows[i * d + k], low[k]);
+                high[k] = hs_larger(set->rows[i * d + k], high[k]);
+            }
+            if ((i + 1) % HS_POLL_POINTS == 0 && hs_poll(options, 0.0) != HS_OK) {
+                return HS_ERR_INTERRUPTED;
+            }
         }
-    }
-    for (int k = 0; k < d; k++) {
-        extent[k] = hs_smaller(high[k] - low[k], longest[k]);
+        for (int k = 0; k < d; k++) {
+            double longest = box != NULL ? 0.0 : HUGE_VAL;
+            for (int l = 0; box != NULL && l < box->ndim; l++) {
+                longest += box->periodic[l] ? fabs(box->rows[l][k]) : HUGE_VAL;
+            }
+            extent[level][k] = hs_smaller(high[k] - low[k], longest);
+        }
     }
     return HS_OK;
-}
-
-/* Points of a box that repeats along all its vectors are wrapped into it. */
-static hs_status
-find_spread(const hs_options *options, const hs_levels *levels, const hs_box *box, spread *of)
-{
-    hs_status status = HS_OK;
-    double    longest[HS_MAX_DIM];
-    for (int k = 0; k < levels->points.ndim; k++) {
-        longest[k] = box != NULL ? 0.0 : HUGE_VAL;
-        for (int l = 0; box != NULL && l < box->ndim; l++) {
-            longest[k] += box->periodic[l] ? fabs(box->rows[l][k]) : HUGE_VAL;
-        }
-    }
-    for (int32_t l = 0; status == HS_OK && l < levels->n; l++) {
-        status = find_extents(options, &levels->points, l, longest, of->points[l]);
-        if (status == HS_OK && levels->has_queries) {
-            status = find_extents(options, &levels->queries, l, longest, of->asking[l]);
-        } else {
-            memcpy(of->asking[l], of->points[l], sizeof of->asking[l]);
-        }
-    }
-    return status;
-}
-
-/* The part of all pairs of two levels' points that is within the side of a cube, for boxes one of
- * which lies in the other. */
-static double
-part_within(const double *extent, const double *other, int ndim, double side)
-{
-    double part = 1.0;
-    for (int k = 0; k < ndim; k++) {
-        const double longer = hs_larger(extent[k], other[k]);
-        part *= side < longer ? side / longer : 1.0;
-    }
-    return part;
 }
 
 /* In tests of one candidate. Levels with themselves are half lists. */
@@ -784,13 +692,17 @@ cost_of_step(const hs_levels *levels, const spread *of, const hs_level_step *ste
     const int           d = points->ndim;
     /* of a cube as large as the ball of the cutoff */
     const double side = step->cutoff * pow(hs_ball_volume(d, 1.0), 1.0 / d);
-    double       pairs = 0.0;
+    double       pairs = 0.0; /* within it, for boxes of levels one of which lies in the other */
     for (int64_t a = asked.first; a < asked.end; a++) {
         for (int64_t b = step->points.first; b < step->points.end; b++) {
             const double *extent = step->is_own ? of->points[a] : of->asking[a];
+            double        part = 1.0;
+            for (int k = 0; k < d; k++) {
+                const double longer = hs_larger(extent[k], of->points[b][k]);
+                part *= side < longer ? side / longer : 1.0;
+            }
             pairs += count_of(asking, (hs_slice){a, a + 1}) *
-                     count_of(points, (hs_slice){b, b + 1}) *
-                     part_within(extent, of->points[b], d, side);
+                     count_of(points, (hs_slice){b, b + 1}) * part;
         }
     }
     return TESTS_PER_POINT *
@@ -822,7 +734,22 @@ hs_level_plan_make(hs_account *account, const hs_options *options, const hs_leve
         return HS_OK;
     }
     for (int32_t l = 0; l < n; l++) {
-        add_level(plan, l);
+        const hs_slice own = {l, l + 1}, above = {l + 1, n};
+        const int32_t apart = levels->cutoffs != NULL ? l : levels->rule == HS_RULE_MAX ? 0 : APART;
+        const hs_rule rule = levels->cutoffs != NULL ? HS_RULE_SUM : levels->rule;
+        if (rule == HS_RULE_GATHER) {
+            add_step(plan, own, each, false);
+        } else if (rule == HS_RULE_SCATTER) {
+            add_step(plan, each, own, false);
+        } else if (rule != HS_RULE_MIN) {
+            add_below(plan, l, apart);
+        } else { /* with itself and with all above it, which look among its points */
+            add_step(plan, own, own, plan->is_half);
+            add_step(plan, above, own, false);
+            if (!plan->is_half) {
+                add_step(plan, own, above, false);
+            }
+        }
     }
     HS_ASSERT(plan->n <= n * most);
     if (!joins || algorithm != HS_AUTO || levels->cutoffs != NULL || plan->n < 2 ||
@@ -832,7 +759,11 @@ hs_level_plan_make(hs_account *account, const hs_options *options, const hs_leve
     hs_level_plan one = {.levels = levels, .steps = &all, .is_half = plan->is_half, .bound = bound};
     add_step(&one, each, each, plan->is_half);
     HS_ASSERT(one.n == 1);
-    const hs_status status = find_spread(options, levels, box, &of);
+    hs_status status = find_extents(options, &levels->points, n, box, of.points);
+    memcpy(of.asking, of.points, sizeof of.asking);
+    if (status == HS_OK && levels->has_queries) {
+        status = find_extents(options, &levels->queries, n, box, of.asking);
+    }
     if (status != HS_OK) {
         hs_level_plan_free(account, plan);
         return status;
@@ -854,23 +785,27 @@ hs_level_plan_make(hs_account *account, const hs_options *options, const hs_leve
  * larger than these. */
 #define BEYOND_ALL 0x1p600
 
-/* The radii of a set's points in the order of the cells, in one block, which is returned; NULL
- * where there are none, or when memory is short. */
-static void *
-arrange_radii(const hs_search *search, const hs_bins *bins, const double *radii, hs_radii *to)
+/* The radii of a slice in the order of the cells, in one block, which is *owned; nothing where set
+ * has none, or is NULL. */
+static hs_status
+arrange_radii(const hs_search *search, const hs_bins *bins, const hs_level_set *set, hs_slice slice,
+              hs_radii *to, void **owned)
 {
     const double  factor = search->limits->factor;
     const bool    in_caller_unit = search->scene.extreme; /* as the metric's then */
     const int64_t size = sizeof(double) + sizeof(float);
-    double       *exact = NULL;
+    float         most = 0.0f;
     *to = (hs_radii){.exact = NULL};
-    if (radii != NULL) {
-        exact = hs_alloc(&search->call->account, HS_FOR_POINTS, bins->n + HS_PADDING, size);
+    if (set == NULL || set->radii == NULL) {
+        return HS_OK;
     }
+    const double *radii = set->radii + set->first[slice.first];
+    double *exact = hs_alloc(&search->call->account, HS_FOR_POINTS, bins->n + HS_PADDING, size);
+    *owned = exact;
     if (exact == NULL) {
-        return NULL;
+        return HS_ERR_MEMORY;
     }
-    float *near = (float *)(exact + bins->n + HS_PADDING), most = 0.0f;
+    float *near = (float *)(exact + bins->n + HS_PADDING);
     for (int64_t si = 0; si < bins->n; si++) {
         const double radius = radii[bins->order[si]];
         const double scaled = hs_smaller(hs_scale_apply(search->scene.scale, radius), BEYOND_ALL);
@@ -880,7 +815,7 @@ arrange_radii(const hs_search *search, const hs_bins *bins, const double *radii,
     }
     memset(near + bins->n, 0, HS_PADDING * sizeof *near);
     *to = (hs_radii){exact, near, most};
-    return exact;
+    return HS_OK;
 }
 
 /* The types of a set's points, which are their levels, in the order of the cells; NULL when memory
@@ -901,18 +836,19 @@ arrange_types(hs_account *account, const hs_bins *bins, const hs_level_set *set,
 
 /* Limits by the types of both points, for a search of all of them. */
 static hs_status
-set_table(const hs_levels *levels, hs_search *search, hs_level_limits *own)
+set_table(const hs_levels *levels, hs_level_search *own)
 {
-    hs_account   *account = &search->call->account;
-    const int32_t n = levels->n, size = n * n;
-    double       *exact = hs_alloc(account, HS_FOR_CELLS, size, sizeof(double) + sizeof(float));
+    const hs_search *search = &own->search;
+    hs_account      *account = &search->call->account;
+    const int32_t    n = levels->n, size = n * n;
+    double          *exact = hs_alloc(account, HS_FOR_CELLS, size, sizeof(double) + sizeof(float));
     own->table = exact;
     own->of_points = arrange_types(account, &search->bins, &levels->points, n);
     if (search->has_queries) {
         own->of_asking = arrange_types(account, &search->query_bins, &levels->queries, n);
     }
-    if (exact == NULL || own->of_points == NULL ||
-        (search->has_queries && own->of_asking == NULL)) {
+    const int32_t *of_asking = search->has_queries ? own->of_asking : own->of_points;
+    if (exact == NULL || own->of_points == NULL || of_asking == NULL) {
         return HS_ERR_MEMORY;
     }
     float *near = (float *)(exact + size);
@@ -923,27 +859,14 @@ set_table(const hs_levels *levels, hs_search *search, hs_level_limits *own)
         near[e] = cutoff < 0.0 ? -1.0f : (float)scaled;
     }
     own->limits.rule = HS_RULE_SCATTER;
-    own->limits.table = (hs_limit_table){
-        .n_types = n,
-        .of_points = own->of_points,
-        .of_asking = search->has_queries ? own->of_asking : own->of_points,
-        .exact = exact,
-        .near = near,
-    };
+    own->limits.table = (hs_limit_table){n, of_asking, own->of_points, exact, near};
     return HS_OK;
 }
 
-/* Where the radii of a slice begin. */
-static const double *
-radii_of(const hs_level_set *set, hs_slice levels)
-{
-    return set->radii != NULL ? set->radii + set->first[levels.first] : NULL;
-}
-
-/* As kernels read them, once the points have the caller's numbers; set: NULL where the rule needs
- * none. *owned: what is to be freed, or NULL. */
+/* The supports of a set as kernels read them, once the points have the caller's numbers; nothing
+ * where set is NULL. *owned: what is to be freed. */
 static hs_status
-arrange_supports(const hs_search *search, const hs_bins *bins, const hs_support_set *set,
+arrange_supports(const hs_search *search, const hs_bins *bins, const hs_level_set *set,
                  double cutoff, hs_support_side *to, void **owned)
 {
     const int    ndim = search->scene.ndim;
@@ -956,8 +879,10 @@ arrange_supports(const hs_search *search, const hs_bins *bins, const hs_support_
     float *near = hs_alloc(&search->call->account, HS_FOR_SUPPORTS,
                            bins->n * hs_support_numbers(ndim), sizeof *near);
     *owned = near;
-    *to = (hs_support_side){
-        .numbers = set->numbers, .first = set->first, .order = bins->order, .near = near};
+    *to = (hs_support_side){.numbers = set->supports.numbers,
+                            .first = set->supports.first,
+                            .order = bins->order,
+                            .near = near};
     if (near == NULL) {
         return HS_ERR_MEMORY;
     }
@@ -969,33 +894,6 @@ arrange_supports(const hs_search *search, const hs_bins *bins, const hs_support_
     return status;
 }
 
-static hs_status
-set_supports(const hs_levels *levels, const hs_level_step *step, double bound, hs_search *search,
-             hs_level_limits *own)
-{
-    const hs_scene       *scene = &search->scene;
-    hs_supports          *supports = &own->supports;
-    const double         *cutoff = &supports->metric.limit.cutoff;
-    const hs_support_set *of_points = hs_rule_needs_other(levels->rule) ? &levels->points.supports
-                                                                        : NULL;
-    const hs_support_set *of_asking =
-        hs_rule_needs_asking(levels->rule) ? &hs_levels_asking(levels)->supports : NULL;
-    const int exponent = scene->extreme ? 0 : -scene->scale.exponent;
-    *supports = (hs_supports){.rule = levels->rule, .is_bounded = bound <= step->cutoff};
-    hs_support_metric_init(scene->ndim, levels->extent, scene->metric.inclusive, exponent,
-                           &supports->metric);
-    own->limits = (hs_limits){.rule = levels->rule, .supports = supports};
-    HS_ASSERT(search->has_queries || of_points != NULL); /* directed rules ask as queries do */
-    hs_status status = arrange_supports(search, &search->bins, of_points, *cutoff,
-                                        &supports->of_points, &own->of_points);
-    supports->of_asking = supports->of_points;
-    if (status == HS_OK && search->has_queries) {
-        status = arrange_supports(search, &search->query_bins, of_asking, *cutoff,
-                                  &supports->of_asking, &own->of_asking);
-    }
-    return status;
-}
-
 /*
  * For the cells of this search. With radii and types, the points are numbered by their places in
  * the slices of the step; with supports, as the caller numbers them. HS_ERR_MEMORY, or
@@ -1003,34 +901,46 @@ set_supports(const hs_levels *levels, const hs_level_step *step, double bound, h
  */
 static hs_status
 level_limits_set(const hs_levels *levels, const hs_level_step *step, double bound,
-                 hs_search *search, hs_level_limits *own)
+                 hs_level_search *own)
 {
+    const hs_search    *search = &own->search;
     const hs_scene     *scene = &search->scene;
-    const hs_level_set *asking = hs_levels_asking(levels);
-    const double       *of_points =
-        hs_rule_needs_other(levels->rule) ? radii_of(&levels->points, step->points) : NULL;
-    const double *of_asking = hs_rule_needs_asking(levels->rule) ? radii_of(asking, step->asking)
-                                                                 : NULL;
-    const double  near_bound = hs_scale_apply(scene->scale, bound);
-    if (levels->has_supports) {
-        return set_supports(levels, step, bound, search, own);
+    const hs_rule       rule = levels->rule; /* NULL: it looks at nothing of these */
+    const hs_level_set *points = hs_rule_needs_other(rule) ? &levels->points : NULL;
+    const hs_level_set *asking = hs_rule_needs_asking(rule) ? hs_levels_asking(levels) : NULL;
+    const double        near_bound = hs_scale_apply(scene->scale, bound);
+    hs_supports        *supports = &own->supports;
+    hs_status           status;
+    if (!levels->has_supports) {
+        own->limits = (hs_limits){.rule = levels->rule,
+                                  .factor = levels->factor,
+                                  .bound = scene->extreme ? bound : near_bound,
+                                  .near_bound = (float)near_bound};
+        if (step->by_table) {
+            return set_table(levels, own);
+        }
+        status = arrange_radii(search, &search->bins, points, step->points, &own->limits.of_points,
+                               &own->of_points);
+        own->limits.of_asking = own->limits.of_points;
+        if (status == HS_OK && search->has_queries) {
+            status = arrange_radii(search, &search->query_bins, asking, step->asking,
+                                   &own->limits.of_asking, &own->of_asking);
+        }
+        return status;
     }
-    own->limits = (hs_limits){.rule = levels->rule,
-                              .factor = levels->factor,
-                              .bound = scene->extreme ? bound : near_bound,
-                              .near_bound = (float)near_bound};
-    if (step->by_table) {
-        return set_table(levels, search, own);
+    const double *cutoff = &supports->metric.limit.cutoff;
+    *supports = (hs_supports){.rule = levels->rule, .is_bounded = bound <= step->cutoff};
+    hs_support_metric_init(scene->ndim, levels->extent, scene->metric.inclusive,
+                           scene->extreme ? 0 : -scene->scale.exponent, &supports->metric);
+    own->limits = (hs_limits){.rule = levels->rule, .supports = supports};
+    status = arrange_supports(search, &search->bins, points, *cutoff, &supports->of_points,
+                              &own->of_points);
+    supports->of_asking = supports->of_points;
+    if (status == HS_OK && search->has_queries) {
+        status = arrange_supports(search, &search->query_bins, asking, *cutoff,
+                                  &supports->of_asking, &own->of_asking);
     }
-    own->of_points = arrange_radii(search, &search->bins, of_points, &own->limits.of_points);
-    own->limits.of_asking = own->limits.of_points;
-    if (search->has_queries) {
-        own->of_asking =
-            arrange_radii(search, &search->query_bins, of_asking, &own->limits.of_asking);
-    }
-    const bool lacks = (of_points != NULL && own->of_points == NULL) ||
-                       (search->has_queries && of_asking != NULL && own->of_asking == NULL);
-    return lacks ? HS_ERR_MEMORY : HS_OK;
+    return status;
 }
 
 /* Opens the search of two slices, has its limits set, and gives its points the caller's numbers. */
@@ -1048,22 +958,6 @@ static const int32_t *
 numbers_of(const hs_level_set *set, hs_slice levels)
 {
     return set->number + set->first[levels.first];
-}
-
-static void
-name_row(const hs_levels *levels, const hs_level_step *step, hs_failure *failure)
-{
-    const hs_level_set *set = &levels->points;
-    hs_slice            slice = step->points;
-    if (failure->row < 0) {
-        return;
-    }
-    if (failure->in_queries) {
-        set = hs_levels_asking(levels);
-        slice = step->asking;
-        failure->in_queries = levels->has_queries;
-    }
-    failure->row = numbers_of(set, slice)[failure->row];
 }
 
 /* Asking points that meet all points of a step sooner than these are sorted into cells. */
@@ -1091,24 +985,27 @@ hs_level_open(const hs_level_plan *plan, int64_t number, const hs_box *box, bool
                                  .keeps_none = keeps_none,
                                  .least_cutoff = hs_choice_least_length(call->choice, step->least),
                                  .narrowing = levels->has_supports ? &narrowing : NULL};
-    open->own.of_asking = open->own.of_points = open->own.table = NULL;
-    open->own.limits.table.n_types = step->by_table ? levels->n : 0;
-    open->own.limits.supports = levels->has_supports ? &open->own.supports : NULL;
+    open->of_asking = open->of_points = open->table = NULL;
+    open->limits.table.n_types = step->by_table ? levels->n : 0;
+    open->limits.supports = levels->has_supports ? &open->supports : NULL;
     call->options.cutoff = step->cutoff;
-    call->options.algorithm =
-        plan->algorithm; /* without cells, where the caller leaves that open: */
+    call->options.algorithm = plan->algorithm;
+    /* Without cells, where the caller leaves that open: */
     if ((plan->algorithm == HS_AUTO || plan->algorithm == HS_HIERARCHY) && !step->is_own &&
         queries.n <= FEW_ASKING) {
         call->options.algorithm = HS_ALL_PAIRS;
     }
     hs_search_begin(call, search);
-    search->limits = step->has_limits ? &open->own.limits : NULL;
+    search->limits = step->has_limits ? &open->limits : NULL;
     hs_status status = hs_search_build(&sets, box, search, failure);
-    if (status != HS_OK) {
-        name_row(levels, step, failure);
+    if (status != HS_OK && failure->row >= 0) {
+        failure->row = failure->in_queries
+                           ? numbers_of(asking, step->asking)[failure->row]
+                           : numbers_of(&levels->points, step->points)[failure->row];
+        failure->in_queries = failure->in_queries && levels->has_queries;
     }
     if (status == HS_OK && step->has_limits && !levels->has_supports) {
-        status = level_limits_set(levels, step, plan->bound, search, &open->own);
+        status = level_limits_set(levels, step, plan->bound, open);
     }
     if (status == HS_OK) {
         search->is_half = plan->is_half;
@@ -1118,7 +1015,7 @@ hs_level_open(const hs_level_plan *plan, int64_t number, const hs_box *box, bool
         renumber(numbers_of(asking, step->asking), &search->query_bins);
     }
     if (status == HS_OK && levels->has_supports) {
-        status = level_limits_set(levels, step, plan->bound, search, &open->own);
+        status = level_limits_set(levels, step, plan->bound, open);
     }
     if (status != HS_OK) {
         hs_level_close(open);
@@ -1133,11 +1030,10 @@ hs_level_open(const hs_level_plan *plan, int64_t number, const hs_box *box, bool
 void
 hs_level_close(hs_level_search *open)
 {
-    hs_account      *account = &open->search.call->account;
-    hs_level_limits *own = &open->own;
-    hs_free(account, own->of_asking);
-    hs_free(account, own->of_points);
-    hs_free(account, own->table);
-    own->of_asking = own->of_points = own->table = NULL;
+    hs_account *account = &open->search.call->account;
+    hs_free(account, open->of_asking);
+    hs_free(account, open->of_points);
+    hs_free(account, open->table);
+    open->of_asking = open->of_points = open->table = NULL;
     hs_search_close(&open->search);
 }

@@ -3,7 +3,6 @@
 #define HS_LEVELS_LEVELS_H
 
 #include "../base/os.h"
-#include "../exact/ellipsoid.h"
 #include "../memory/memory.h"
 #include "../scene/scene.h"
 #include "../search/limits.h"
@@ -115,12 +114,10 @@ bool hs_level_plan_is_single(const hs_level_plan *plan);
 void hs_level_plan_free(hs_account *account, hs_level_plan *plan);
 
 /*
- * One search of all levels in place of several, where that is quicker. Searches of a few levels
- * each sort their points and walk over them again; one search tests more candidates, each with a
- * limit of its own. Points of few sizes, all of them common, are better searched at once.
- */
-
-/*
+ * One search of all levels takes the place of several where that is quicker. Searches of a few
+ * levels each sort their points and walk over them again; one search tests more candidates, each
+ * with a limit of its own. Points of few sizes, all of them common, are better searched at once.
+ *
  * Without queries, rules that are the same both ways give the half list; else every asking point
  * meets all that it can. algorithm: HS_HIERARCHY is levels in any case, HS_AUTO what is expected to
  * be quickest, and any other one search of all, with the largest reach; but types are searched in
@@ -138,27 +135,17 @@ bool hs_test_join_levels(bool on);
 #endif
 
 /*
- * The lengths that the pairs of one step are compared with: by radii, by the types of both points,
- * or by supports, in the order of the cells of an open search.
+ * An open step of a plan: a search like any other, of two sets of points, or of one, with the
+ * caller's numbers; and where pairs have lengths of their own, limits by radii, by the types of
+ * both points or by supports, in the order of its cells. It must not move: the search has a pointer
+ * to its limits.
  */
-
-/* It must not move: the search has a pointer to its limits. */
-typedef struct hs_level_limits {
-    hs_limits   limits;
+typedef struct hs_level_search {
+    hs_search   search;
+    hs_limits   limits;                /* where the step has any */
     hs_supports supports;              /* those of limits, if it has any */
     void       *of_asking, *of_points; /* owned: the radii of limits, the types, or the supports */
     void       *table;                 /* owned: that of limits */
-} hs_level_limits;
-
-/*
- * One step of a plan as a search like any other: of two sets of points, or of one, with the
- * caller's numbers, and with limits where pairs have lengths of their own.
- */
-
-/* An open step; it must not move. */
-typedef struct hs_level_search {
-    hs_search       search;
-    hs_level_limits own; /* where the step has any */
 } hs_level_search;
 
 /*

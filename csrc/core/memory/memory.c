@@ -7,7 +7,6 @@
 #include "../base/os_thread.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* memory.c: accounts, blocks and arenas. Each block is a chunk (results.h), or lies in the arena
@@ -15,9 +14,7 @@
 
 #ifdef HS_TESTING
 #include <stdatomic.h>
-#endif
 
-#ifdef HS_TESTING
 static _Atomic int64_t fail_countdown;
 static _Atomic int64_t live_blocks;
 static bool            arena_is_used;
@@ -63,6 +60,13 @@ hs_test_use_arena(bool on)
 }
 #else
 enum { arena_is_used = 1 };
+#endif
+
+/* In tests new blocks are not zero by chance, unless a sanitizer watches them. */
+#if defined(HS_TESTING) && !HS_WATCHED_MALLOC
+#define hs_test_fill(block, bytes) memset(block, 0x7f, bytes)
+#else
+#define hs_test_fill(block, bytes) ((void)0)
 #endif
 
 /* Larger blocks fill an arena too soon. */
@@ -163,7 +167,7 @@ static void *
 take_from_arena(hs_account *account, size_t bytes)
 {
     if (account->arena == NULL) {
-        account->arena = account->is_kept ? NULL : hs_pool_take_arena();
+        account->arena = account->is_kept ? NULL : hs_pool_take(HS_POOL_SCRATCH, true);
         if (account->arena == NULL) {
             account->arena = hs_chunk_new(HS_ARENA_BYTES);
         }
@@ -186,32 +190,6 @@ take_from_arena(hs_account *account, size_t bytes)
     return block;
 }
 
-/* An aligned block with its header filled, but for the bytes. NULL when refused. */
-static void *
-take_block(hs_account *account, size_t bytes)
-{
-    if (HS_HAVE_ARENA && arena_is_used && account != NULL && bytes < LARGEST_IN_ARENA) {
-        void *block = take_from_arena(account, bytes);
-        if (block != NULL) {
-            return block;
-        }
-    }
-    /* A tail of a quarter and more becomes a whole huge page: quicker to fill than small ones. */
-    const size_t tail = bytes % HS_PAGES_FROM;
-    const bool   fills_tail = bytes >= HS_PAGES_FROM && tail >= HS_PAGES_FROM / 4;
-    const size_t room = bytes + (fills_tail ? HS_PAGES_FROM - tail : 0) + HS_GUARD_BYTES;
-    void        *block = hs_chunk_new(room);
-    if (block == NULL) {
-        return NULL;
-    }
-    if (hs_chunk_of(block)->length > 0) {
-        hs_chunk_expect(block, room);
-    } else {
-        hs_guard_new(block, bytes);
-    }
-    return block;
-}
-
 void *
 hs_alloc(hs_account *account, hs_purpose purpose, int64_t count, size_t size)
 {
@@ -229,9 +207,25 @@ hs_alloc(hs_account *account, hs_purpose purpose, int64_t count, size_t size)
     if (hs_test_allocation_fails()) {
         return NULL;
     }
-    void *block = take_block(account, bytes);
+    void *block = NULL;
+    if (HS_HAVE_ARENA && arena_is_used && account != NULL && bytes < LARGEST_IN_ARENA) {
+        block = take_from_arena(account, bytes);
+    }
     if (block == NULL) {
-        return NULL;
+        /* A tail of a quarter and more becomes a whole huge page: quicker to fill than small
+         * ones. */
+        const size_t tail = bytes % HS_PAGES_FROM;
+        const bool   fills_tail = bytes >= HS_PAGES_FROM && tail >= HS_PAGES_FROM / 4;
+        const size_t room = bytes + (fills_tail ? HS_PAGES_FROM - tail : 0);
+        block = hs_chunk_new(room);
+        if (block == NULL) {
+            return NULL;
+        }
+        if (hs_chunk_of(block)->length > 0) {
+            hs_chunk_expect(block, room);
+        } else {
+            hs_test_fill(block, bytes);
+        }
     }
     hs_test_count_block(1);
     hs_chunk_of(block)->bytes = (int64_t)bytes;
@@ -294,9 +288,6 @@ hs_free(hs_account *account, void *block)
             account->arena_next = block;
         }
         return;
-    }
-    if (header->length == 0) {
-        hs_guard_check(block, (size_t)header->bytes);
     }
     hs_chunk_free(block);
 }

@@ -19,9 +19,9 @@
 /* Address space is given back in steps of this: a multiple of the page size of every Linux. */
 #define PAGES_STEP ((size_t)65536)
 
-/* What malloc gave is not shrunk by less than this part of it: lists are a little shorter than was
- * foreseen, and a chunk that was cut has no room for the next such list. */
-#define WORTH_CUTTING 8
+/* What malloc gave keeps this part of its data as room behind them: lists are a little shorter than
+ * was foreseen, and a chunk without it could not serve the next such list. */
+#define SPARE_PART 8
 
 /* malloc's memory: the header, up to one alignment of padding, the data. */
 #define OVERHEAD (sizeof(hs_chunk) + HS_ALIGNMENT)
@@ -86,14 +86,8 @@ map_aligned(size_t bytes, void **mapping, size_t *length)
 static void
 advise(void *from, void *to, bool huge)
 {
-#if defined(MADV_HUGEPAGE) && defined(MADV_NOHUGEPAGE)
     (void)madvise(from, (size_t)((char *)to - (char *)from),
                   huge ? MADV_HUGEPAGE : MADV_NOHUGEPAGE);
-#else
-    (void)from;
-    (void)to;
-    (void)huge;
-#endif
 }
 
 /* Gives [from, to) back; both are multiples of PAGES_STEP from the mapping. False: the range is
@@ -379,10 +373,8 @@ hs_chunk_cut(void *data, size_t bytes, void **rest)
         cut_in_pages(data, bytes, rest);
         return data;
     }
-    if (chunk->capacity - bytes <= chunk->capacity / WORTH_CUTTING) {
-        return data;
-    }
-    void *shrunk = resize_in_malloc(data, bytes, bytes);
+    const size_t kept = bytes + bytes / SPARE_PART;
+    void        *shrunk = kept < chunk->capacity ? resize_in_malloc(data, kept, bytes) : NULL;
     return shrunk != NULL ? shrunk : data;
 }
 
@@ -476,53 +468,53 @@ free_all(void **chunks, int n)
     }
 }
 
+/* A number of the pool, 0 where its lock does not come free. */
+static size_t
+read_pool(const size_t *number)
+{
+    size_t found = 0;
+    if (lock_patiently()) {
+        found = *number;
+        unlock();
+    }
+    return found;
+}
+
 size_t
 hs_pool_limit(void)
 {
-    if (!lock_patiently()) {
-        return 0;
-    }
-    const size_t limit = pool.limit;
-    unlock();
-    return limit;
+    return read_pool(&pool.limit);
 }
 
 size_t
 hs_pool_held(void)
 {
-    if (!lock_patiently()) {
-        return 0;
-    }
-    const size_t held = pool.held;
-    unlock();
-    return held;
+    return read_pool(&pool.held);
 }
 
 void
 hs_pool_set_limit(size_t bytes)
 {
     void *removed[HS_POOL_CHUNKS];
-    if (!lock_patiently()) {
-        return;
+    if (lock_patiently()) {
+        pool.limit = bytes;
+        /* Limit 0 is off: then not even a chunk without touched memory stays. */
+        const int n = remove_oldest(0, bytes == 0 ? HS_POOL_CHUNKS : 0, removed);
+        unlock();
+        free_all(removed, n);
     }
-    pool.limit = bytes;
-    /* Limit 0 is off: then not even a chunk without touched memory stays. */
-    const int n = remove_oldest(bytes == 0 ? 1 : 0, 0, removed);
-    unlock();
-    free_all(removed, n);
 }
 
 void
 hs_pool_clear(void)
 {
     void *removed[HS_POOL_CHUNKS];
-    if (!lock_patiently()) {
-        return;
+    if (lock_patiently()) {
+        /* Room for as many chunks as there can be: those without touched memory go as well. */
+        const int n = remove_oldest(0, HS_POOL_CHUNKS, removed);
+        unlock();
+        free_all(removed, n);
     }
-    /* Room for as many chunks as there can be: those without touched memory go as well. */
-    const int n = remove_oldest(0, HS_POOL_CHUNKS, removed);
-    unlock();
-    free_all(removed, n);
 }
 
 /*
@@ -535,7 +527,7 @@ hs_pool_clear(void)
  * before, and not the next larger one, which another column had.
  */
 void *
-hs_pool_take(size_t expected)
+hs_pool_take(size_t expected, bool is_arena)
 {
     int      best = -1;
     uint64_t least = UINT64_MAX;
@@ -549,28 +541,15 @@ hs_pool_take(size_t expected)
                                     : (uint64_t)2 * (expected - chunk->touched);
         const bool      has_room = chunk->capacity >= expected &&
                               (expected <= HS_POOL_SCRATCH || chunk->capacity / 2 <= expected);
-        if (!chunk->is_arena && (chunk->length > 0 || has_room) && waste < least) {
+        if (is_arena && chunk->is_arena) {
+            best = k; /* the last one is still in caches */
+        } else if (is_arena == chunk->is_arena && (chunk->length > 0 || has_room) &&
+                   waste < least) {
             best = k;
             least = waste;
         }
     }
     void *data = best >= 0 ? remove_entry(best) : NULL;
-    unlock();
-    return data;
-}
-
-void *
-hs_pool_take_arena(void)
-{
-    void *data = NULL;
-    if (!try_lock()) {
-        return NULL;
-    }
-    for (int k = pool.n - 1; k >= 0 && data == NULL; k--) { /* the last one is still in caches */
-        if (hs_chunk_of(pool.data[k])->is_arena) {
-            data = remove_entry(k);
-        }
-    }
     unlock();
     return data;
 }
@@ -626,7 +605,7 @@ hs_region_reserve(hs_region *region, size_t expected)
     if (hs_test_allocation_fails()) {
         return false;
     }
-    void *data = hs_pool_take(expected);
+    void *data = hs_pool_take(expected, false);
     if (data != NULL && hs_chunk_of(data)->capacity < expected) {
         /* It is in pages: those from malloc have the room. */
         void *grown = chunk_grow(data, expected, 0);
@@ -637,9 +616,6 @@ hs_region_reserve(hs_region *region, size_t expected)
     }
     if (data == NULL) {
         data = hs_chunk_new(expected > LEAST_NEW ? expected : LEAST_NEW);
-    }
-    if (data == NULL) {
-        data = hs_chunk_new(expected);
     }
     if (data == NULL) { /* what the pool holds may be what is missing */
         hs_pool_clear();

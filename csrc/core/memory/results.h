@@ -49,8 +49,9 @@ void  hs_chunk_free(void *data);
 void hs_chunk_expect(void *data, size_t bytes);
 
 /*
- * Gives back what lies beyond `bytes`, if that is much; one from malloc may move. *rest, if not
- * NULL: what was touched beyond, if that is large enough for a chunk of its own, else NULL.
+ * Gives back what lies beyond `bytes`, but for an eighth of them in a chunk from malloc, which may
+ * move. *rest, if not NULL: what was touched beyond, if that is large enough for a chunk of its
+ * own, else NULL.
  */
 void *hs_chunk_cut(void *data, size_t bytes, void **rest);
 
@@ -79,13 +80,10 @@ void *hs_chunk_cut(void *data, size_t bytes, void **rest);
 enum { HS_POOL_CHUNKS = 16 }; /* chunks kept; few, since all are looked at for each request */
 
 /*
- * A chunk for a request of `expected` bytes, with recycled memory in it; owned by the caller. It
- * may have less room than that if it can be grown. NULL: there is none.
+ * A chunk for a request of `expected` bytes, with recycled memory in it, or one that is an arena;
+ * owned by the caller. It may have less room than that if it can be grown. NULL: there is none.
  */
-void *hs_pool_take(size_t expected);
-
-/* A chunk that is an arena; owned by the caller. NULL: there is none. */
-void *hs_pool_take_arena(void);
+void *hs_pool_take(size_t expected, bool is_arena);
 
 /* Keeps a chunk; the least recently kept ones make room. False: the caller still owns it. */
 bool hs_pool_give(void *data);
@@ -99,13 +97,6 @@ void hs_test_pool_hold(bool hold);
  * The memory that results are written to. A region is reserved for what is expected, written from
  * the front, grown if that was too little, and at the end either detached, with what was not needed
  * given back, or released. Memory that is no longer used goes to the pool.
- *
- * Usage:
- *     hs_region region = {0};
- *     if (!hs_region_reserve(&region, expected)) { ... }
- *     ... write to region.data, keep region.used; hs_region_grow when capacity is reached ...
- *     array = hs_region_detach(&region, region.used);      (freed by hs_buffer_free)
- *     or hs_region_release(&region);
  */
 
 /* Owned by one thread at a time. All zero: empty. */

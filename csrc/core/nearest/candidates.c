@@ -3,7 +3,6 @@
 #include "../base/status.h"
 #include "../base/os.h"
 #include "../exact/bounds.h"
-#include "../search/choice.h"
 
 #include <math.h>
 #include <string.h>
@@ -20,15 +19,13 @@
 /* Standard deviations of their number that a first radius makes room for. Measured: with 3 the time
  * differs by less than the noise. */
 #define SPREAD 3.5
-/* Points whose labels say how many more are to be looked at. */
-#define MOST_LABELS 512
 /* Candidates of a group, in points of the group and wanted ones, beyond which the guess was bad:
  * some three times as many as there are where points are evenly spread, ... */
 #define MOST_CANDIDATES 24.0
 /* ... and so many times more for each axis beyond the third. */
 #define MOST_PER_AXIS 3.0
-/* What is in reach of a group, by what it would be if reach were a cube. */
-#define CUBE_OF_BALL 4.0
+/* What a group looks at may be as large as what one of its points does, so many times for each. */
+#define BALLS_A_POINT 2.0
 
 /* Range of t_k of points [first, last), which are in order; none: from infinity to -infinity. */
 static void
@@ -95,64 +92,10 @@ hs_nearest_farthest(const hs_nearest *near, const hs_nearest_group *group)
     return hs_smaller(limit, all * (1.0 + RADIUS_ROOM));
 }
 
-/* Sides of a region, base 2 logarithms, and what it holds. */
-typedef struct near_region {
-    int    ndim;
-    double side[HS_MAX_DIM];
-    bool   repeats[HS_MAX_DIM]; /* the region goes on along this side */
-    double n_points;
-} near_region;
-
-/* log2 of the volume of a ball of radius 1. */
-static double
-ball_volume(int ndim)
-{
-    static const double volume[HS_MAX_DIM + 1] = {1.0,    2.0,    3.1416, 4.1888, 4.9348,
-                                                  5.2638, 5.1677, 4.7248, 4.0587};
-    return log2(volume[ndim]);
-}
-
-/*
- * log2 of the radius of a ball with `wanted` points in it, if the region is filled evenly. Sides
- * that are shorter than the ball is wide do not count: points on a line or in a plane have the
- * density of their line or plane.
- */
-static double
-radius_of(const near_region *region, double wanted)
-{
-    const double width = ball_volume(region->ndim) / region->ndim; /* of the ball, as a cube */
-    bool         counts[HS_MAX_DIM];
-    double       longest = -INFINITY;
-    for (int k = 0; k < region->ndim; k++) {
-        counts[k] = region->side[k] > -INFINITY;
-        longest = hs_larger(region->side[k], longest);
-    }
-    for (;;) {
-        double sum = log2(wanted / region->n_points);
-        int    n = 0;
-        for (int k = 0; k < region->ndim; k++) {
-            sum += counts[k] ? region->side[k] : 0.0;
-            n += counts[k];
-        }
-        const double radius = n > 0 ? sum / n - width : longest - width;
-        bool         changed = false;
-        for (int k = 0; n > 0 && k < region->ndim; k++) {
-            if (counts[k] && !region->repeats[k] && region->side[k] < radius + width) {
-                counts[k] = false;
-                changed = true;
-            }
-        }
-        if (!changed) {
-            return radius;
-        }
-    }
-}
-
 /* The node around the group with at least so many points, and its sides; *away: how far from it
  * the group is. */
-static int32_t
-find_node(const hs_tree *tree, const hs_nearest_group *group, double least, double *sides,
-          double *away)
+static const hs_tree_node *
+find_node(const hs_tree *tree, const double *middle, double least, double *sides, double *away)
 {
     const int d = tree->ndim;
     int32_t   number = 0;
@@ -166,16 +109,15 @@ find_node(const hs_tree *tree, const hs_nearest_group *group, double least, doub
         const double *bounds = left != 0 ? hs_tree_bounds(tree, left, d) : NULL;
         HS_PREFETCH(&tree->nodes[left]); /* comes with the bounds, not after them */
         for (int k = 0; left != 0 && k < d; k++) {
-            const double middle = group->lower[k] + 0.5 * (group->upper[k] - group->lower[k]);
             for (int side = 0; side < 2; side++) {
-                const double below = bounds[4 * k + side] - middle;
-                gap[side] += hs_larger(hs_larger(below, middle - bounds[4 * k + 2 + side]), 0.0);
+                const double below = bounds[4 * k + side] - middle[k];
+                gap[side] += hs_larger(hs_larger(below, middle[k] - bounds[4 * k + 2 + side]), 0.0);
             }
         }
         const int     side = gap[1] < gap[0];
         const int32_t next = left + side;
-        if (left == 0 || tree->nodes[next].end - tree->nodes[next].first < least) {
-            return number;
+        if (left == 0 || hs_tree_points(&tree->nodes[next]) < least) {
+            return &tree->nodes[number];
         }
         *away = gap[side];
         number = next;
@@ -185,102 +127,62 @@ find_node(const hs_tree *tree, const hs_nearest_group *group, double least, doub
     }
 }
 
-/* The whole box counts as the region when points are too few for a part of it. */
-static void
-take_box(const hs_lattice *lattice, near_region *region)
+void
+hs_nearest_guess(const hs_nearest *near, double scale, hs_nearest_group *group)
 {
-    const double side =
-        (log2(lattice->volume_mantissa) + lattice->volume_exponent) / lattice->n_periodic;
-    for (int k = 0; k < region->ndim; k++) {
-        if (lattice->row_of_axis[k] >= 0) {
-            region->side[k] = side;
-            region->repeats[k] = true;
+    /* The volume of a ball of radius 1. */
+    static const double volume[HS_MAX_DIM + 1] = {1.0,    2.0,    3.1416, 4.1888, 4.9348,
+                                                  5.2638, 5.1677, 4.7248, 4.0587};
+    const hs_tree      *tree = &near->tree;
+    const hs_lattice   *lattice = &near->search->scene.lattice;
+    const int           d = tree->ndim;
+    const double        k = (double)near->k + near->omits_self, wanted = k + SPREAD * sqrt(k) + 1.0;
+    double              middle[HS_MAX_DIM], sides[HS_MAX_DIM], away, outside = 0.0;
+    bool                whole[HS_MAX_DIM]; /* the node goes on along this side */
+    for (int c = 0; c < d; c++) {
+        middle[c] = group->lower[c] + 0.5 * (group->upper[c] - group->lower[c]);
+    }
+    const hs_tree_node *node =
+        find_node(tree, middle, POINTS_PER_WANTED * hs_larger(wanted, 16.0), sides, &away);
+    for (int c = 0; c < d; c++) {
+        whole[c] = node == tree->nodes && lattice->row_of_axis[c] >= 0;
+        sides[c] = whole[c] ? lattice->period[c] : sides[c];
+    }
+    /* Sides that are shorter than the ball is wide do not count: points on a line or in a plane
+     * have the density of their line or plane. Base 2 logarithms, as products might overflow. */
+    const double width = exp2(log2(volume[d]) / d);
+    double       radius = 0.0, before;
+    do {
+        double sum = log2(wanted / hs_tree_points(node));
+        int    n = 0;
+        before = radius;
+        for (int c = 0; c < d; c++) {
+            if (sides[c] > 0.0 && (whole[c] || sides[c] >= before * width)) {
+                sum += log2(sides[c]);
+                n++;
+            }
+        }
+        radius = n > 0 ? hs_larger(exp2(sum / n) / width, before) : before;
+    } while (radius > before);
+    if (near->least > 0.0) { /* a shell around a ball holds as many as are wanted */
+        const double ratio = pow(near->least / radius, d);
+        const double wider = radius * pow(1.0 + ratio, 1.0 / d);
+        group->more = wanted * ratio;
+        radius = wider < INFINITY ? wider : near->least;
+    }
+    /* A ball that sticks out of all points along open axes holds fewer. */
+    for (int c = 0; c < d; c++) {
+        const double below = hs_smaller(middle[c] - tree->lower[c], radius);
+        const double above = hs_smaller(tree->upper[c] - middle[c], radius);
+        if (lattice->n_periodic < d && (!lattice->aligned || lattice->row_of_axis[c] < 0)) {
+            outside -= log2(fmin(fmax((below + above) / (2.0 * radius), 0.5), 1.0));
         }
     }
-}
-
-/* A ball that sticks out of all points along open axes holds fewer. */
-static double
-widen_at_edges(const hs_nearest *near, const hs_nearest_group *group, double radius)
-{
-    const hs_tree *tree = &near->tree;
-    double         part = 1.0;
-    for (int k = 0; k < tree->ndim; k++) {
-        const double middle = group->lower[k] + 0.5 * (group->upper[k] - group->lower[k]);
-        const double below = hs_smaller(middle - tree->lower[k], radius);
-        const double above = hs_smaller(tree->upper[k] - middle, radius);
-        const bool   repeats = near->search->scene.lattice.aligned &&
-                             near->search->scene.lattice.row_of_axis[k] >= 0;
-        part *= repeats ? 1.0 : fmin(fmax((below + above) / (2.0 * radius), 0.5), 1.0);
-    }
-    return part < 1.0 ? radius * pow(part, -1.0 / tree->ndim) : radius;
-}
-
-/* How many points of the node, or of as many as are looked at, do not count by their labels: for a
- * point of the group. */
-static int32_t
-count_left_out(const hs_nearest *near, const hs_nearest_group *group, const hs_tree_node *node)
-{
-    const int32_t *order = near->search->bins.order;
-    const int32_t  end = node->end - node->first < MOST_LABELS ? node->end
-                                                               : node->first + MOST_LABELS;
-    hs_chooser     chooser;
-    int32_t        n = 0;
-    hs_chooser_set(near->search->call->choice,
-                   hs_search_asking(near->search)->order[(group->first + group->last) / 2],
-                   &chooser);
-    for (int32_t sj = node->first; sj < end; sj++) {
-        n += !hs_chooser_is_of_group(&chooser, order[sj]) ||
-             hs_chooser_excludes(&chooser, order[sj]);
-    }
-    return n;
-}
-
-void
-hs_nearest_guess(const hs_nearest *near, hs_nearest_group *group)
-{
-    const hs_tree    *tree = &near->tree;
-    const hs_lattice *lattice = &near->search->scene.lattice;
-    const double      k = (double)near->k + near->omits_self;
-    double            wanted = k + SPREAD * sqrt(k) + 1.0;
-    double            away, sides[HS_MAX_DIM];
-    const int32_t     number =
-        find_node(tree, group, POINTS_PER_WANTED * hs_larger(wanted, 16.0), sides, &away);
-    const hs_tree_node *node = &tree->nodes[number];
-    group->more = near->search->call->choice != NULL ? count_left_out(near, group, node) : 0.0;
-    wanted += group->more;
-    near_region region = {.ndim = tree->ndim, .n_points = (double)(node->end - node->first)};
-    for (int axis = 0; axis < tree->ndim; axis++) {
-        region.side[axis] = log2(sides[axis]);
-    }
-    if (lattice->n_periodic > 0 && number == 0) {
-        take_box(lattice, &region);
-    }
+    radius = scale * (radius * exp2(outside / d) + away);
     const double farthest = hs_nearest_farthest(near, group);
-    double       inside = exp2(radius_of(&region, wanted));
-    if (near->least > 0.0) { /* a shell around a ball holds as many as are wanted */
-        const double ratio = pow(near->least / inside, tree->ndim);
-        const double wider = inside * pow(1.0 + ratio, 1.0 / tree->ndim);
-        group->more += wanted * ratio;
-        inside = wider < INFINITY ? wider : near->least;
-    }
-    group->radius = hs_larger(widen_at_edges(near, group, inside) + away, HS_NEAREST_LEAST_RADIUS);
-    group->is_complete = group->radius >= farthest ||
+    group->is_complete = radius >= farthest ||
                          (lattice->n_periodic == 0 && (double)tree->nodes[0].end <= k);
-    if (group->is_complete) {
-        group->radius = hs_larger(farthest, HS_NEAREST_LEAST_RADIUS);
-    }
-}
-
-/* How many times as large as for one of its points what the group looks at is, about. */
-static double
-balls_of(const hs_nearest_group *group, int ndim)
-{
-    double balls = 1.0;
-    for (int k = 0; k < ndim; k++) {
-        balls *= 1.0 + (group->upper[k] - group->lower[k]) / (2.0 * group->radius);
-    }
-    return balls;
+    group->radius = hs_larger(group->is_complete ? farthest : radius, HS_NEAREST_LEAST_RADIUS);
 }
 
 double
@@ -294,9 +196,11 @@ hs_nearest_most_candidates(const hs_nearest *near, const hs_nearest_group *group
 bool
 hs_nearest_is_scattered(const hs_nearest *near, const hs_nearest_group *group)
 {
-    const double k = (double)near->k, in_ball = k + SPREAD * sqrt(k) + group->more;
-    return CUBE_OF_BALL * in_ball * balls_of(group, near->tree.ndim) >
-           hs_nearest_most_candidates(near, group);
+    double balls = 1.0;
+    for (int k = 0; k < near->tree.ndim; k++) {
+        balls *= 1.0 + (group->upper[k] - group->lower[k]) / (2.0 * group->radius);
+    }
+    return balls > BALLS_A_POINT * (group->last - group->first);
 }
 
 /* Which images of the points can be near a group, by the range of its t_k along each periodic
@@ -315,32 +219,6 @@ hs_nearest_is_scattered(const hs_nearest *near, const hs_nearest_group *group)
  * may be images of one point. A box around a ball in 8 dimensions is 63 times as large. */
 #define MOST_IMAGES        0x1p24
 #define IMAGES_A_NEIGHBOUR 1024.0
-
-void
-hs_nearest_measure_drift(hs_nearest *near)
-{
-    const hs_lattice *lattice = &near->search->scene.lattice;
-    const int         d = lattice->ndim;
-    near->smallest_period = INFINITY;
-    for (int k = 0; k < d; k++) {
-        if (lattice->row_of_axis[k] >= 0) {
-            near->smallest_period = hs_smaller(lattice->period[k], near->smallest_period);
-        }
-        for (int r = 0; r < lattice->n_periodic; r++) {
-            double along = 0.0, largest = 0.0;
-            for (int c = 0; !lattice->aligned && c < d; c++) {
-                along += lattice->normal[k][c] * lattice->rows[r][c];
-                largest = hs_larger(fabs(lattice->rows[r][c]), largest);
-            }
-            if (!lattice->aligned && lattice->row_of_axis[k] == r) {
-                along -= lattice->period[k];
-            }
-            near->drift[k][r] = lattice->aligned ? 0.0
-                                                 : fabs(along) + (d + 2) * d * UNIT * largest +
-                                                       d * lattice->row_error[r];
-        }
-    }
-}
 
 /* Whether unit normals of axes that repeat are at right angles to those of open ones, as nearly as
  * rounding lets them. */
@@ -363,12 +241,32 @@ is_upright(const hs_lattice *lattice)
 }
 
 void
-hs_nearest_measure_layer(hs_nearest *near)
+hs_nearest_measure(hs_nearest *near)
 {
     const hs_lattice *lattice = &near->search->scene.lattice;
     const hs_bins    *bins = &near->search->bins;
+    const int         d = lattice->ndim;
+    near->smallest_period = INFINITY;
+    for (int k = 0; k < d; k++) {
+        if (lattice->row_of_axis[k] >= 0) {
+            near->smallest_period = hs_smaller(lattice->period[k], near->smallest_period);
+        }
+        for (int r = 0; r < lattice->n_periodic; r++) {
+            double along = 0.0, largest = 0.0;
+            for (int c = 0; !lattice->aligned && c < d; c++) {
+                along += lattice->normal[k][c] * lattice->rows[r][c];
+                largest = hs_larger(fabs(lattice->rows[r][c]), largest);
+            }
+            if (!lattice->aligned && lattice->row_of_axis[k] == r) {
+                along -= lattice->period[k];
+            }
+            near->drift[k][r] = lattice->aligned ? 0.0
+                                                 : fabs(along) + (d + 2) * d * UNIT * largest +
+                                                       d * lattice->row_error[r];
+        }
+    }
     near->has_layer = bins->n > 0 && is_upright(lattice);
-    for (int k = 0; near->has_layer && k < lattice->ndim; k++) {
+    for (int k = 0; near->has_layer && k < d; k++) {
         const int64_t n = lattice->row_of_axis[k] < 0 ? bins->n : 0;
         range_of(lattice, bins, k, 0, n, &near->layer_lower[k], &near->layer_upper[k]);
     }
@@ -429,24 +327,15 @@ bound_error(const hs_scene *scene, const double *most)
     return error + 2.0 * scene->x_error;
 }
 
-void
-hs_nearest_images_home(const hs_nearest *near, hs_nearest_images *images)
-{
-    *images = (hs_nearest_images){.lattice = &near->search->scene.lattice,
-                                  .count = 1.0,
-                                  .error = 2.0 * near->search->scene.x_error,
-                                  .is_first = true};
-}
-
 hs_status
 hs_nearest_images_start(const hs_nearest *near, const hs_nearest_group *group,
                         hs_nearest_images *images)
 {
     const hs_lattice *lattice = &near->search->scene.lattice;
     double            most[HS_MAX_DIM] = {0.0};
-    hs_nearest_images_home(near, images);
+    *images = (hs_nearest_images){.lattice = lattice, .count = 1.0, .is_first = true};
     /* The drift depends on the largest shifts, and these a little on the drift. */
-    for (int pass = 0; pass < 3; pass++) {
+    for (int pass = 0; group != NULL && pass < (lattice->aligned ? 1 : 3); pass++) {
         for (int k = 0; k < lattice->ndim; k++) {
             if (lattice->row_of_axis[k] >= 0 && !set_range(near, group, k, most, images)) {
                 return HS_ERR_MEMORY;
@@ -455,7 +344,6 @@ hs_nearest_images_start(const hs_nearest *near, const hs_nearest_group *group,
         for (int r = 0; r < lattice->n_periodic; r++) {
             most[r] = hs_larger(fabs((double)images->low[r]), fabs((double)images->high[r]));
         }
-        pass += lattice->aligned ? 2 : 0;
     }
     for (int r = 0; r < lattice->n_periodic; r++) {
         images->next.shift[r] = (int32_t)images->low[r];
@@ -515,10 +403,6 @@ hs_nearest_frame_set(int ndim, double unit, double error, double reach, hs_neare
 
 #define MOST_LEAVES      4096 /* with more, each point walks down the tree by itself */
 #define MOST_LEAF_IMAGES 512
-/* Groups that look so many times as far as others do get leaves by themselves. */
-#define FARTHEST 2.0
-/* So do all, where the box around them is so many times as large as they are themselves. */
-#define MOSTLY_EMPTY 4.0
 /* In units, where the radius is between 1 and 2: floats tell leaves apart, and relative to the
  * centre of a group, distances. */
 #define WIDEST_LEAF 128.0
@@ -574,36 +458,6 @@ open_leaves(const hs_nearest *near, hs_nearest_leaves *leaves)
     return HS_OK;
 }
 
-/* One group around all that do not look much further than others. */
-static hs_nearest_group
-unite(const hs_nearest_group *groups, int32_t n, int ndim)
-{
-    double least = INFINITY;
-    for (int32_t g = 0; g < n; g++) {
-        least = hs_smaller(groups[g].radius, least);
-    }
-    hs_nearest_group all = {.last = 0, .away = INFINITY};
-    for (int32_t g = 0; g < n; g++) {
-        const hs_nearest_group *one = &groups[g];
-        const bool              is_first = all.last == 0;
-        if (one->radius > FARTHEST * least) {
-            continue;
-        }
-        for (int k = 0; k < ndim; k++) {
-            all.lower[k] = is_first ? one->lower[k] : hs_smaller(one->lower[k], all.lower[k]);
-            all.upper[k] = is_first ? one->upper[k] : hs_larger(one->upper[k], all.upper[k]);
-            all.t_lower[k] = is_first ? one->t_lower[k]
-                                      : hs_smaller(one->t_lower[k], all.t_lower[k]);
-            all.t_upper[k] = is_first ? one->t_upper[k]
-                                      : hs_larger(one->t_upper[k], all.t_upper[k]);
-        }
-        all.last = one->last;
-        all.away = hs_smaller(one->away, all.away);
-        all.radius = hs_larger(one->radius, all.radius);
-    }
-    return all;
-}
-
 /* Number x in units, from the centre, and no further than the extent, which nothing in reach is. */
 HS_ALWAYS_INLINE float
 clamped(double x, double centre, double unit, double extent)
@@ -625,10 +479,12 @@ add_leaf(const hs_nearest *near, int32_t number, hs_nearest_leaves *leaves)
     const hs_tree_node *node = &near->tree.nodes[number];
     const int           d = near->tree.ndim, side = (number + 1) % 2;
     const double       *moved = leaves->images[leaves->n_images - 1].moved;
-    for (int k = 0; leaves->are_shared && k < d; k++) { /* the tree is more than one leaf then */
+    for (int k = 0; k < d; k++) {
         const double *bounds = hs_tree_bounds(&near->tree, number - side, d) + 4 * k + side;
-        leaves->low[k][leaves->n] = relative(leaves, k, bounds[0] + moved[k]);
-        leaves->high[k][leaves->n] = relative(leaves, k, bounds[2] + moved[k]);
+        const double  low = number > 0 ? bounds[0] : near->tree.lower[k];
+        const double  high = number > 0 ? bounds[2] : near->tree.upper[k];
+        leaves->low[k][leaves->n] = relative(leaves, k, low + moved[k]);
+        leaves->high[k][leaves->n] = relative(leaves, k, high + moved[k]);
     }
     leaves->runs[leaves->n] =
         (hs_nearest_run){0, hs_nearest_of_leaf(near, node), node->first, leaves->n_images - 1};
@@ -638,8 +494,8 @@ add_leaf(const hs_nearest *near, int32_t number, hs_nearest_leaves *leaves)
 /* Adds the leaves of the last image whose squared distance is within `limit`; false when there are
  * too many. */
 HS_ALWAYS_INLINE bool
-find_leaves_in_image(const hs_nearest *near, const hs_nearest_group *all, double limit, double most,
-                     hs_nearest_leaves *leaves, const int ndim)
+find_leaves_in_image(const hs_nearest *near, const hs_nearest_group *group, double limit,
+                     double most, hs_nearest_leaves *leaves, const int ndim)
 {
     const hs_tree *tree = &near->tree;
     const double  *moved = leaves->images[leaves->n_images - 1].moved;
@@ -647,8 +503,8 @@ find_leaves_in_image(const hs_nearest *near, const hs_nearest_group *all, double
     int64_t        n_waiting = 0;
     int32_t        number = 0;
     for (int k = 0; k < ndim; k++) {
-        low[k] = all->lower[k] - moved[k];
-        high[k] = all->upper[k] - moved[k];
+        low[k] = group->lower[k] - moved[k];
+        high[k] = group->upper[k] - moved[k];
     }
     if (hs_tree_gap(tree, low, high, leaves->unit) > limit) {
         return true;
@@ -670,73 +526,50 @@ find_leaves_in_image(const hs_nearest *near, const hs_nearest_group *all, double
     }
 }
 
-/* Finds the leaves of all images within reach; false when there are too many. */
-static bool
-find_leaves(const hs_nearest *near, const hs_nearest_group *all, double most,
-            hs_nearest_images *images, hs_nearest_leaves *leaves)
-{
-    const int    d = near->tree.ndim;
-    const double reach = all->radius * leaves->unit * (1.0 + LEAF_ROOM) +
-                         4.0 * sqrt(d) * images->error * leaves->unit;
-    const double limit = reach * reach;
-    bool         fit = true;
-    leaves->n = leaves->n_images = 0;
-    leaves->n_points = 0;
-    while (fit && hs_nearest_images_next(images)) {
-        const int32_t n = leaves->n;
-        leaves->images[leaves->n_images++] = images->next;
-        switch (d) {
-        case 2: fit = find_leaves_in_image(near, all, limit, most, leaves, 2); break;
-        case 3: fit = find_leaves_in_image(near, all, limit, most, leaves, 3); break;
-        default: fit = find_leaves_in_image(near, all, limit, most, leaves, d);
-        }
-        leaves->n_images -= leaves->n == n; /* nothing there */
-    }
-    return fit;
-}
-
 hs_status
-hs_nearest_leaves_find(const hs_nearest *near, const hs_nearest_group *groups, int32_t n,
-                       double most, hs_nearest_leaves *leaves)
+hs_nearest_leaves_find(const hs_nearest *near, const hs_nearest_group *group, double most,
+                       hs_nearest_leaves *leaves)
 {
     hs_nearest_images images;
     const int         d = near->tree.ndim;
-    double            widest = 0.0, balls = 0.0;
+    double            widest = 0.0;
+    bool              fit = true;
     leaves->radius = 0.0;
-    leaves->are_shared = n > 1 && near->tree.n_nodes > 1;
-    if (n == 0) {
-        return HS_OK;
-    }
     if (open_leaves(near, leaves) != HS_OK) {
         return HS_ERR_MEMORY;
     }
-    const hs_nearest_group all = unite(groups, n, d);
-    for (int32_t g = 0; g < n; g++) {
-        balls += balls_of(&groups[g], d);
-    }
-    if (balls_of(&all, d) > MOSTLY_EMPTY * balls) {
-        return HS_OK;
-    }
-    leaves->unit = hs_power_of_two(-hs_nearest_exponent(all.radius));
+    leaves->unit = hs_power_of_two(-hs_nearest_exponent(group->radius));
     for (int k = 0; k < d; k++) {
-        const double width = all.upper[k] - all.lower[k];
-        leaves->centre[k] = all.lower[k] + 0.5 * width;
+        const double width = group->upper[k] - group->lower[k];
+        leaves->centre[k] = group->lower[k] + 0.5 * width;
         widest = hs_larger(width * leaves->unit, widest);
     }
     leaves->extent = 0.5 * widest + 4.0;
-    if (!(widest < WIDEST_LEAF) || hs_nearest_images_start(near, &all, &images) != HS_OK ||
+    if (!(widest < WIDEST_LEAF) || hs_nearest_images_start(near, group, &images) != HS_OK ||
         images.count > MOST_LEAF_IMAGES || images.error * leaves->unit > LEAF_ROOM) {
         return HS_OK;
     }
     leaves->error = images.error;
-    if (find_leaves(near, &all, most, &images, leaves)) {
-        leaves->radius = all.radius;
+    const double reach = group->radius * leaves->unit * (1.0 + LEAF_ROOM) +
+                         4.0 * sqrt(d) * images.error * leaves->unit;
+    const double limit = reach * reach;
+    leaves->n = leaves->n_images = 0;
+    leaves->n_points = 0;
+    while (fit && hs_nearest_images_next(&images)) {
+        const int32_t n = leaves->n;
+        leaves->images[leaves->n_images++] = images.next;
+        switch (d) {
+        case 2: fit = find_leaves_in_image(near, group, limit, most, leaves, 2); break;
+        case 3: fit = find_leaves_in_image(near, group, limit, most, leaves, 3); break;
+        default: fit = find_leaves_in_image(near, group, limit, most, leaves, d);
+        }
+        leaves->n_images -= leaves->n == n; /* nothing there */
     }
+    leaves->radius = fit ? group->radius : 0.0;
     return HS_OK;
 }
 
-/* Lists the leaves within the radius of one of these groups in leaves->hits, ascending; returns how
- * many. */
+/* Lists the leaves within the radius of a group in leaves->hits, ascending; returns how many. */
 static int32_t
 list_leaves(const hs_nearest *near, const hs_nearest_group *group, const hs_nearest_leaves *leaves)
 {
@@ -813,11 +646,10 @@ static hs_status
 find_runs(const hs_nearest *near, const hs_nearest_group *group, double most,
           const hs_nearest_leaves *leaves, hs_nearest_block *block)
 {
-    const int32_t  n = leaves->are_shared ? list_leaves(near, group, leaves) : leaves->n;
-    const int32_t *which = leaves->are_shared ? leaves->hits : leaves->label;
+    const int32_t n = list_leaves(near, group, leaves);
     block->n = block->n_runs = 0;
     for (int32_t l = 0; l < n; l++) {
-        const hs_nearest_run *leaf = &leaves->runs[which[l]];
+        const hs_nearest_run *leaf = &leaves->runs[leaves->hits[l]];
         hs_nearest_run       *last = block->n_runs > 0 ? &block->runs[block->n_runs - 1] : NULL;
         if (last != NULL && last->image == leaf->image && last->si + last->n == leaf->si) {
             last->n += leaf->n;
@@ -948,12 +780,13 @@ hs_nearest_block_scan(const hs_nearest *near, const hs_nearest_group *group,
     /* rank.c decides: no hit is unsure here. */
     scan.direct = hs_thresholds_of(d, reach, extent, block->frame.error);
     if (block->has_squares) {
+        scan.form = HS_SCAN_SQUARES;
         scan.squares = block->squares;
-        return kernel->squares(&scan, first);
+        return kernel->scan(&scan, first);
     }
     scan.expanded = hs_expanded_of(d, reach, extent, block->frame.error);
     scan.direct.in = INFINITY;
     scan.expanded.in = INFINITY;
-    return hs_expanded_pays(reach, extent) ? kernel->list(&scan, first)
-                                           : kernel->list_direct(&scan, first);
+    scan.form = hs_expanded_pays(reach, extent) ? HS_SCAN_EXPANDED : HS_SCAN_DIRECT;
+    return kernel->scan(&scan, first);
 }

@@ -18,7 +18,7 @@ typedef struct hs_nearest_group {
     double  t_upper[HS_MAX_DIM];
     double  away;        /* no point is nearer than this, for the open axes alone */
     double  radius;      /* everything up to here is looked at */
-    double  more;        /* points there that do not count, by a first guess */
+    double  more;        /* points there that are too near to count, about */
     bool    is_complete; /* and beyond there is nothing that could be wanted */
 } hs_nearest_group;
 
@@ -29,25 +29,23 @@ typedef struct hs_nearest_group {
 void hs_nearest_group_set(const hs_nearest *near, int32_t first, int32_t last,
                           hs_nearest_group *group);
 
-/* Sets the radius: one within which about as many points are expected as are wanted, and a few
- * more; in any case not more than can be of use. */
-void hs_nearest_guess(const hs_nearest *near, hs_nearest_group *group);
+/* Sets the radius, so many times one within which about as many points are expected as are wanted,
+ * and a few more; in any case not more than can be of use. */
+void hs_nearest_guess(const hs_nearest *near, double scale, hs_nearest_group *group);
 
 /* A distance beyond which nothing is of use: that of all points, or the largest distance. In
  * periodic boxes infinity, unless there is a largest distance. */
 double hs_nearest_farthest(const hs_nearest *near, const hs_nearest_group *group);
 
-/* Candidates of a group beyond which its guess was bad. */
+/* Candidates of a group with more of which each of its points is better off alone. */
 double hs_nearest_most_candidates(const hs_nearest *near, const hs_nearest_group *group);
 
-/* Whether its points lie so far apart, by how many points each one wants, that they are no group.
- */
+/* Whether its points lie so far apart, by how far they look, that they are no group. */
 bool hs_nearest_is_scattered(const hs_nearest *near, const hs_nearest_group *group);
 
-/* Measures `drift`, of the rows of B, and once they are in tree order, the range of points along
- * open axes. */
-void hs_nearest_measure_drift(hs_nearest *near);
-void hs_nearest_measure_layer(hs_nearest *near);
+/* Measures the drift of the rows of B and, of points that are in tree order, their range along open
+ * axes. */
+void hs_nearest_measure(hs_nearest *near);
 
 /* Images of all points, within `reach` of a group along each periodic axis. */
 typedef struct hs_nearest_images {
@@ -60,10 +58,8 @@ typedef struct hs_nearest_images {
     bool              is_first;
 } hs_nearest_images;
 
-/* The points where they are. */
-void hs_nearest_images_home(const hs_nearest *near, hs_nearest_images *images);
-
-/* HS_ERR_MEMORY when there are more images than memory could hold points. */
+/* Those that are near a group; of NULL, the points where they are. HS_ERR_MEMORY when there are
+ * more than memory could hold points. */
 hs_status hs_nearest_images_start(const hs_nearest *near, const hs_nearest_group *group,
                                   hs_nearest_images *images);
 
@@ -101,15 +97,14 @@ hs_nearest_of_leaf(const hs_nearest *near, const hs_tree_node *node)
     return node->is_spot && n > near->of_spot ? near->of_spot : n;
 }
 
-/* The leaves that any of some neighbouring groups may need, found by one walk down the tree, so
- * that each group has only a list of boxes to go through. */
+/* The leaves that a group may need, found by one walk down the tree. Groups that are parts of it
+ * and look no further have only a list of boxes to go through. */
 
 /* Owned by a thread; zeros at first. */
 typedef struct hs_nearest_leaves {
     void             *memory; /* owned: of all arrays */
     int32_t           n;
     int64_t           n_points;
-    bool              are_shared;      /* each group looks for its own among them */
     float            *low[HS_MAX_DIM]; /* ranges of X, moved, less the centre, in units; clamped */
     float            *high[HS_MAX_DIM];
     hs_nearest_run   *runs;   /* their points; places are of no meaning */
@@ -126,10 +121,10 @@ typedef struct hs_nearest_leaves {
     double            radius; /* for groups up to this one; 0: for none */
 } hs_nearest_leaves;
 
-/* Finds leaves for groups with first guesses, unless they hold more than `most` points. Sets
- * leaves->radius to 0 where a list would save nothing. HS_ERR_MEMORY. */
-hs_status hs_nearest_leaves_find(const hs_nearest *near, const hs_nearest_group *groups, int32_t n,
-                                 double most, hs_nearest_leaves *leaves);
+/* Finds the leaves of a group, unless they hold more than `most` points. Sets leaves->radius to 0
+ * where there are none to be used. HS_ERR_MEMORY. */
+hs_status hs_nearest_leaves_find(const hs_nearest *near, const hs_nearest_group *group, double most,
+                                 hs_nearest_leaves *leaves);
 
 /* What a group may be near to, gathered from all images as float32 relative to the group. */
 

@@ -108,12 +108,11 @@ build_tree(hs_nearest *near, int32_t leaf_points)
     hs_scene        *scene = &search->scene;
     const hs_metric *metric = &scene->metric;
     hs_metric_init(&near->order, scene->ndim, metric->n_rows, metric->rows, 1.0, true);
-    hs_nearest_measure_drift(near);
     const hs_status status = hs_tree_build(&search->call->account, search->call->team,
                                            &search->call->options, scene, leaf_points,
                                            &search->bins, &near->tree);
     if (status == HS_OK) {
-        hs_nearest_measure_layer(near);
+        hs_nearest_measure(near);
     }
     return status;
 }
@@ -287,24 +286,30 @@ hs_nearest_release(hs_nearest *near)
 /*
  * Asking points are taken in groups, subtrees of a few points. What lies within a radius guessed
  * from the local density is gathered once for the group, and each of its points ranks its hits.
- * Points that found too few, and groups for which the guess is of no use, are searched one by one:
- * so the cost follows n and k, however unevenly points lie. Threads take ranges of groups.
+ * Points that found too few, and those of groups for which the guess is of no use, are searched one
+ * by one: so the cost follows n and k, however unevenly points lie. Threads take ranges of groups.
  */
 
 /* Points of a group. Measured: from 32 to 64 the time falls by some 10 % where vectors are wide. */
 #define GROUP_POINTS 48
-/* A point that is a group of its own walks down the tree by itself where it wants fewer. Measured:
- * of 4 that takes three quarters of the time of a block, of 8 as long, of 16 up to a quarter
- * more. */
-#define FEW_WANTED 8
-#define AHEAD      8 /* points from prefetching a row to writing it */
+/* Where the guess was of no use to most points of a group, or the nearest of all of them were
+ * within this part of it, later guesses in the range are scaled so that they would have been this
+ * part, ... */
+#define TOO_FAR   0.5
+#define WELL_SEEN 0.9
+/* ... but not to less than the density says, by which points may coincide. */
+#define MOST_SCALE 0x1p20
+/* Groups share the leaves of their range unless they look so many times as far as is expected in
+ * it. */
+#define FARTHEST 1.25
+#define AHEAD    8 /* points from prefetching a row to writing it */
 /* A thread takes subtrees at a time whose groups share a walk down the tree: at most a so many-th
  * part of all points, so that there is enough for all threads, within these bounds. Measured: with
  * more points the walk is a smaller part of the work. */
 #define RANGES       32
 #define LEAST_RANGE  640
 #define MOST_RANGE   2560
-#define RANGE_GROUPS 160 /* groups of one, at most; three times as many as there usually are */
+#define RANGE_GROUPS 160 /* of a leaf that is larger than a range */
 
 /* Groups, as nodes of the tree of asking points; spots are cut into several. */
 typedef struct near_part {
@@ -318,18 +323,18 @@ typedef struct nearest_job {
     int64_t     n_parts;
     int64_t    *ranges; /* the first part of each, and behind the last one n_parts */
     int64_t     n_ranges;
-    int64_t     most_groups; /* of a range */
 } nearest_job;
 
 /* What one thread works with; rows are written where they belong, not committed. */
 typedef struct nearest_worker {
     hs_committer       committer;
     const nearest_job *job;
-    hs_nearest_group  *groups; /* owned; of one range */
-    hs_nearest_leaves  leaves;
+    hs_nearest_leaves  shared, own; /* leaves of a range, and of one of its groups */
     hs_nearest_block   block;
     hs_nearest_ranker  ranker;
     hs_nearest_writer  writer;
+    double             scale;   /* of the next guess */
+    double             longest; /* distance of a k-th nearest in this group; 0: none */
     int64_t            n_groups, n_candidates;
 } nearest_worker;
 
@@ -338,12 +343,18 @@ typedef struct nearest_worker {
 static hs_status
 write_row(nearest_worker *worker, int64_t count, hs_status status)
 {
-    const hs_search *search = worker->job->near->search;
+    const hs_nearest        *near = worker->job->near;
+    const hs_search         *search = near->search;
+    const hs_nearest_ranker *ranker = &worker->ranker;
+    if (status == HS_OK && count == near->k) {
+        const double distance = sqrt(ranker->keys[count - 1].square) / ranker->frame.unit;
+        worker->longest = hs_larger(distance, worker->longest);
+    }
     if (status == HS_OK) {
         status = hs_nearest_write(&worker->writer, &worker->ranker, count);
     }
     if (status == HS_ERR_SHIFT_RANGE) {
-        worker->committer.failure.row = hs_search_asking(search)->order[worker->ranker.si];
+        worker->committer.failure.row = hs_search_asking(search)->order[ranker->si];
         worker->committer.failure.in_queries = search->has_queries;
     }
     return status;
@@ -383,29 +394,19 @@ search_point(nearest_worker *worker, int32_t si)
     return write_row(worker, count, status);
 }
 
-/* Does a group from leaves that were found for it, and by themselves the points for which these do
- * not suffice. */
+/* Ranks the hits of the group's points in its block. Sets bits of those for which they do not
+ * suffice: *left, bit t of point t. */
 static hs_status
-search_group(nearest_worker *worker, const hs_nearest_group *group)
+search_block(nearest_worker *worker, const hs_nearest_group *group, uint64_t *left)
 {
     const hs_nearest *near = worker->job->near;
     hs_nearest_block *block = &worker->block;
     const int32_t     n_points = group->last - group->first;
     int32_t           end[HS_GROUP_POINTS];
-    uint64_t          left = 0; /* bit t: point t of the group is not done */
-    hs_status         status = hs_nearest_block_fill(near, worker->committer.options, group,
-                                                     hs_nearest_most_candidates(near, group),
-                                                     &worker->leaves, block);
-    int32_t           first = 0;
-    if (status == HS_TRY_OTHER) {
-        left = UINT64_MAX;
-        first = n_points;
-        status = HS_OK;
-    } else {
-        worker->n_groups++;
-        worker->n_candidates += (int64_t)n_points * block->n;
-    }
-    for (int32_t next; first < n_points && status == HS_OK; first = next) {
+    hs_status         status = HS_OK;
+    worker->n_groups++;
+    worker->n_candidates += (int64_t)n_points * block->n;
+    for (int32_t first = 0, next; first < n_points && status == HS_OK; first = next) {
         next = hs_nearest_block_scan(near, group, block, first, end);
         for (int32_t t = first; t < next && status == HS_OK; t++) {
             const int32_t begin = t > first ? end[t - 1] : 0;
@@ -417,55 +418,86 @@ search_group(nearest_worker *worker, const hs_nearest_group *group)
             status = hs_nearest_rank(&worker->ranker, block, block->hits + begin,
                                      block->has_squares ? block->squares + begin : NULL,
                                      end[t] - begin, group->is_complete, &count);
-            left |= (uint64_t)(count < 0) << t;
+            *left |= (uint64_t)(count < 0) << t;
             if (count >= 0 || status != HS_OK) {
                 status = write_row(worker, count, status);
             }
         }
     }
+    return status;
+}
+
+/* Does the points of a part, those that lie apart or do not find enough within the radius by
+ * themselves. */
+static hs_status
+search_part(nearest_worker *worker, const near_part *part)
+{
+    const hs_nearest  *near = worker->job->near;
+    hs_nearest_leaves *leaves = &worker->shared;
+    const int32_t      n_points = part->last - part->first;
+    hs_nearest_group   group;
+    uint64_t           left = 0;
+    int32_t            n_left = 0;
+    if (n_points == 1) {
+        return search_point(worker, part->first);
+    }
+    worker->longest = 0.0;
+    hs_nearest_group_set(near, part->first, part->last, &group);
+    hs_nearest_guess(near, worker->scale, &group);
+    hs_status status = HS_TRY_OTHER;
+    if (!hs_nearest_is_scattered(near, &group)) {
+        const double most = hs_nearest_most_candidates(near, &group);
+        status = HS_OK;
+        if (group.radius > leaves->radius) {
+            leaves = &worker->own;
+            status = hs_nearest_leaves_find(near, &group, most, leaves);
+        }
+        if (status == HS_OK) {
+            status = hs_nearest_block_fill(near, worker->committer.options, &group, most, leaves,
+                                           &worker->block);
+        }
+    }
+    if (status == HS_OK) {
+        status = search_block(worker, &group, &left);
+    } else if (status == HS_TRY_OTHER) {
+        left = UINT64_MAX;
+        status = HS_OK;
+    }
     for (int32_t t = 0; t < n_points && status == HS_OK && left != 0; t++) {
         if (left >> t & 1) {
-            status = search_point(worker, group->first + t);
+            n_left++;
+            status = search_point(worker, part->first + t);
         }
+    }
+    const double seen = worker->longest / group.radius;
+    if (seen > 0.0 && (n_left > n_points / 2 || seen < TOO_FAR)) {
+        const double scale = worker->scale * (seen / WELL_SEEN);
+        worker->scale = hs_smaller(hs_larger(scale, 1.0), MOST_SCALE);
     }
     return status;
 }
 
-/* A hs_range_fn. Groups that look further than most others, or lie apart, get leaves of their own,
- * after the others. */
+/* A hs_range_fn. */
 static hs_status
 search_range(void *context, int64_t range)
 {
     nearest_worker    *worker = context;
     const nearest_job *job = worker->job;
-    const hs_nearest  *near = job->near;
-    hs_nearest_group  *groups = worker->groups;
-    int32_t            n = 0;
+    const near_part   *part = &job->parts[job->ranges[range]];
+    const near_part   *end = &job->parts[job->ranges[range + 1]];
     hs_status          status = HS_OK;
-    for (int64_t p = job->ranges[range]; p < job->ranges[range + 1] && status == HS_OK; p++) {
-        const near_part *part = &job->parts[p];
-        if (part->last - part->first == 1 && near->k < FEW_WANTED) {
-            status = search_point(worker, part->first);
-        } else {
-            hs_nearest_group_set(near, part->first, part->last, &groups[n]);
-            hs_nearest_guess(near, &groups[n++]);
+    worker->scale = 1.0;
+    worker->shared.radius = 0.0;
+    if (end - part > 1) {
+        hs_nearest_group all;
+        hs_nearest_group_set(job->near, part->first, end[-1].last, &all);
+        hs_nearest_guess(job->near, FARTHEST, &all);
+        if (!hs_nearest_is_scattered(job->near, &all)) {
+            status = hs_nearest_leaves_find(job->near, &all, INFINITY, &worker->shared);
         }
     }
-    if (status == HS_OK) {
-        status = hs_nearest_leaves_find(near, groups, n, INFINITY, &worker->leaves);
-    }
-    const double shared = worker->leaves.radius;
-    for (int32_t g = 0; g < n && status == HS_OK; g++) {
-        if (groups[g].radius <= shared) {
-            status = search_group(worker, &groups[g]);
-        }
-    }
-    for (int32_t g = 0; g < n && status == HS_OK; g++) {
-        if (groups[g].radius > shared) {
-            status = hs_nearest_leaves_find(
-                near, &groups[g], 1, hs_nearest_most_candidates(near, &groups[g]), &worker->leaves);
-            status = status == HS_OK ? search_group(worker, &groups[g]) : status;
-        }
+    for (; part < end && status == HS_OK; part++) {
+        status = search_part(worker, part);
     }
     if (status == HS_OK) {
         status =
@@ -484,10 +516,7 @@ open_worker(void *context, void *place)
     worker->ranker.near = near;
     worker->ranker.options = worker->committer.options;
     hs_nearest_writer_init(near, &worker->writer);
-    return hs_shared_resize(near->shared, (void **)&worker->groups, 0, job->most_groups,
-                            sizeof *worker->groups)
-               ? hs_nearest_ranker_init(&worker->ranker)
-               : HS_ERR_MEMORY;
+    return hs_nearest_ranker_init(&worker->ranker);
 }
 
 static void
@@ -505,17 +534,17 @@ close_worker(void *context, void *place)
     hs_nearest_flush(&worker->writer);
     hs_call_add_counters(job->near->search->call, &walked);
     hs_nearest_ranker_free(&worker->ranker);
-    hs_shared_release(job->near->shared, (void **)&worker->groups);
-    hs_shared_release(job->near->shared, &worker->leaves.memory);
+    hs_shared_release(job->near->shared, &worker->shared.memory);
+    hs_shared_release(job->near->shared, &worker->own.memory);
     hs_shared_release(job->near->shared, &worker->block.memory);
 }
 
-/* Adds the points of a node, in groups of at most `most`, to the present range and new ones. */
+/* Adds the points of a node, in groups, to the present range and new ones. */
 static void
-add_parts(nearest_job *job, const hs_tree_node *node, int32_t most)
+add_parts(nearest_job *job, const hs_tree_node *node)
 {
-    for (int32_t first = node->first; first < node->end; first += most) {
-        const int32_t last = node->end - first < most ? node->end : first + most;
+    for (int32_t first = node->first; first < node->end; first += GROUP_POINTS) {
+        const int32_t last = node->end - first < GROUP_POINTS ? node->end : first + GROUP_POINTS;
         if (job->n_parts - job->ranges[job->n_ranges - 1] == RANGE_GROUPS) {
             job->ranges[job->n_ranges++] = job->n_parts;
         }
@@ -523,21 +552,8 @@ add_parts(nearest_job *job, const hs_tree_node *node, int32_t most)
     }
 }
 
-/* Whether queries lie so far apart, by how many points each one wants, that they are no group. */
-static bool
-is_scattered(const hs_nearest *near, const hs_tree_node *node)
-{
-    hs_nearest_group group;
-    if (near->asking == &near->tree || hs_tree_points(node) == 1) {
-        return false;
-    }
-    hs_nearest_group_set(near, node->first, node->end, &group);
-    hs_nearest_guess(near, &group);
-    return hs_nearest_is_scattered(near, &group);
-}
-
-/* Cuts the tree into groups, the largest subtrees of at most GROUP_POINTS that are not scattered,
- * and these into ranges, which are larger subtrees. A larger leaf becomes several groups. */
+/* Cuts the tree into groups, the largest subtrees of at most GROUP_POINTS, and these into ranges,
+ * which are larger subtrees. A larger leaf becomes several groups. */
 static void
 list_parts(nearest_job *job, const hs_tree *tree, int32_t *stack)
 {
@@ -555,10 +571,8 @@ list_parts(nearest_job *job, const hs_tree *tree, int32_t *stack)
             job->ranges[job->n_ranges++] = job->n_parts;
             range_end = node->end;
         }
-        const bool is_small = points <= GROUP_POINTS || is_leaf;
-        const bool apart = is_small && is_scattered(job->near, node);
-        if (is_small && (is_leaf || !apart)) {
-            add_parts(job, node, apart ? 1 : GROUP_POINTS);
+        if (points <= GROUP_POINTS || is_leaf) {
+            add_parts(job, node);
             number = stack[--n_waiting];
         } else {
             stack[n_waiting++] = node->left + 1;
@@ -566,10 +580,6 @@ list_parts(nearest_job *job, const hs_tree *tree, int32_t *stack)
         }
     }
     job->ranges[job->n_ranges] = job->n_parts;
-    for (int64_t r = 0; r < job->n_ranges; r++) {
-        const int64_t n_groups = job->ranges[r + 1] - job->ranges[r];
-        job->most_groups = n_groups > job->most_groups ? n_groups : job->most_groups;
-    }
 }
 
 hs_status
@@ -589,9 +599,7 @@ hs_nearest_search(hs_nearest *near, hs_failure *failure)
     if (near->tree.n_nodes == 0 || near->asking->n_nodes == 0) {
         return HS_OK;
     }
-    const int64_t most_parts = near->asking == &near->tree
-                                   ? near->asking->n_nodes + n / GROUP_POINTS + 1
-                                   : n; /* queries may be scattered */
+    const int64_t most_parts = near->asking->n_nodes + n / GROUP_POINTS + 1;
     int32_t      *stack = hs_alloc(account, HS_FOR_STENCIL, near->asking->depth + 3, sizeof *stack);
     job.parts = hs_alloc(account, HS_FOR_STENCIL, most_parts, sizeof *job.parts);
     job.ranges = hs_alloc(account, HS_FOR_STENCIL, most_parts + 1, sizeof *job.ranges);

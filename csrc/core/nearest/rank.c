@@ -17,6 +17,8 @@
  * more than so many are wanted. */
 #define MOST_INSERTED 64
 #define FEW           24 /* up to here keys are sorted by insertion */
+/* What deciding whether a point counts may take, in points: images of it are compared. */
+#define STEPS_OF_CHOICE 16
 
 hs_status
 hs_nearest_ranker_init(hs_nearest_ranker *ranker)
@@ -227,10 +229,14 @@ is_too_near(hs_nearest_ranker *ranker, const hs_nearest_key *key)
 }
 
 /* Whether the call's choice lets a key count, decided exactly. The point itself does, unless it is
- * of another group. Any status of hs_choice_is_nearest. */
+ * of another group. HS_ERR_INTERRUPTED, and any status of hs_choice_is_nearest. */
 static hs_status
 key_counts(hs_nearest_ranker *ranker, const hs_nearest_key *key, bool *counts)
 {
+    if (ranker->near->search->call->choice == NULL) {
+        *counts = true;
+        return HS_OK;
+    }
     const int32_t number = ranker->near->search->bins.order[key->number];
     bool          excluded = false;
     hs_status     status = HS_OK;
@@ -239,7 +245,7 @@ key_counts(hs_nearest_ranker *ranker, const hs_nearest_key *key, bool *counts)
         status = is_excluded_here(ranker, key, &excluded);
     }
     *counts = *counts && !excluded && !is_too_near(ranker, key);
-    return status;
+    return status == HS_OK && !goes_on(ranker, STEPS_OF_CHOICE) ? ranker->status : status;
 }
 
 /* ---- which is nearer ---- */
@@ -445,8 +451,6 @@ order_keys(hs_nearest_ranker *ranker, bool is_complete, int64_t *count)
 
 /* Relative room, far more than roundings take. */
 #define WALK_ROOM 0x1p-36
-/* What deciding whether a point counts may take, in points: images of it are compared. */
-#define STEPS_OF_CHOICE 16
 /* Squares below this are near underflow: another unit is needed. */
 #define LEAST_SQUARE 0x1p-600
 #define UNIT_STEP    400
@@ -479,15 +483,10 @@ static hs_status
 take_key(near_walk *walk, hs_nearest_key key)
 {
     hs_nearest_ranker *ranker = walk->ranker;
-    bool               counts = key.number != walk->self;
-    if (counts && ranker->near->search->call->choice != NULL) {
-        const hs_status status = key_counts(ranker, &key, &counts);
-        if (status != HS_OK || !goes_on(ranker, STEPS_OF_CHOICE)) {
-            return status != HS_OK ? status : ranker->status;
-        }
-    }
-    if (!counts) {
-        return HS_OK;
+    bool               counts = false;
+    const hs_status status = key.number != walk->self ? key_counts(ranker, &key, &counts) : HS_OK;
+    if (!counts || status != HS_OK) {
+        return status;
     }
     if (ranker->n == ranker->capacity) {
         drop_far_keys(ranker, walk->bound);
@@ -612,7 +611,7 @@ walk_images(hs_nearest_ranker *ranker, const hs_nearest_group *point, double uni
     hs_nearest_images images;
     int64_t           low[HS_MAX_DIM], high[HS_MAX_DIM]; /* images walked through before */
     double            along = 0.5 * near->smallest_period;
-    hs_nearest_images_home(near, &images);
+    hs_nearest_images_start(near, NULL, &images);
     group.radius = near->search->scene.lattice.n_periodic == 0 ? INFINITY : -1.0;
     ranker->n = ranker->n_least = ranker->n_walked = 0;
     for (int round = 0;; round++) {
@@ -690,7 +689,8 @@ hs_nearest_walk(hs_nearest_ranker *ranker, int64_t *count)
 
 /* ---- the keys of hits of a block ---- */
 
-/* Squares of the hits that are not beyond the reach. */
+/* Squares of the hits that are not beyond the reach, but for the point itself where it is left
+ * out. */
 HS_ALWAYS_INLINE void
 fill_keys(hs_nearest_ranker *ranker, const hs_nearest_block *block, const int32_t *hits, int64_t n,
           const int ndim)
@@ -699,9 +699,10 @@ fill_keys(hs_nearest_ranker *ranker, const hs_nearest_block *block, const int32_
     hs_nearest_key *HS_RESTRICT keys = ranker->keys;
     const double               *x[HS_MAX_DIM], unit = block->frame.unit;
     const double                reach = block->frame.reach * block->frame.reach;
-    const double limit = reach * (1.0 + 0x1p-40) + hs_nearest_error(&block->frame, ndim, reach);
-    double       at[HS_MAX_DIM];
-    int64_t      n_keys = 0;
+    const double  limit = reach * (1.0 + 0x1p-40) + hs_nearest_error(&block->frame, ndim, reach);
+    const int32_t self = ranker->near->omits_self ? ranker->si : -1;
+    double        at[HS_MAX_DIM];
+    int64_t       n_keys = 0;
     for (int k = 0; k < ndim; k++) {
         at[k] = asking->x[k][ranker->si];
         x[k] = ranker->near->search->bins.x[k];
@@ -715,23 +716,9 @@ fill_keys(hs_nearest_ranker *ranker, const hs_nearest_block *block, const int32_
             square += along * along;
         }
         keys[n_keys] = (hs_nearest_key){square, sj, image};
-        n_keys += square <= limit;
+        n_keys += square <= limit && !(sj == self && block->images[image].is_home);
     }
     ranker->n = n_keys;
-}
-
-/* Drops the key of the point itself: one of those whose distance is about 0. */
-static void
-drop_self(hs_nearest_ranker *ranker)
-{
-    for (int64_t e = 0; e < ranker->n; e++) {
-        const hs_nearest_key *key = &ranker->keys[e];
-        if (key->square <= ranker->frame.flat_error && key->number == ranker->si &&
-            image_of(ranker, key)->is_home) {
-            ranker->keys[e] = ranker->keys[--ranker->n];
-            return;
-        }
-    }
 }
 
 /* Drops the keys that do not count. */
@@ -742,8 +729,8 @@ choose_keys(hs_nearest_ranker *ranker)
     for (int64_t e = 0; e < ranker->n; e++) {
         bool            counts;
         const hs_status status = key_counts(ranker, &ranker->keys[e], &counts);
-        if (status != HS_OK || !goes_on(ranker, 1)) {
-            return status != HS_OK ? status : ranker->status;
+        if (status != HS_OK) {
+            return status;
         }
         ranker->keys[kept] = ranker->keys[e];
         kept += counts;
@@ -811,9 +798,6 @@ hs_nearest_rank(hs_nearest_ranker *ranker, const hs_nearest_block *block, const 
     case 3: fill_keys(ranker, block, hits, n, 3); break;
     default: fill_keys(ranker, block, hits, n, ranker->near->tree.ndim);
     }
-    if (ranker->near->omits_self) {
-        drop_self(ranker);
-    }
     if (ranker->near->search->call->choice != NULL) {
         const hs_status status = choose_keys(ranker);
         if (status != HS_OK) {
@@ -875,79 +859,50 @@ hs_nearest_write_nothing(const hs_nearest_writer *writer, int64_t row, int64_t f
     }
 }
 
-/* Rows ascend in exact order; a distance, known to a unit in the last place, may be lifted to the
- * one before it, which is then no further from the true one than that. */
-static void
-put_distances(hs_nearest_writer *writer, double *to)
-{
-    const hs_search *search = writer->near->search;
-    hs_measured     *pairs = &writer->pairs;
-    hs_restore_distances(pairs->distance, pairs->n, hs_measures_unscale(&search->scene));
-    if (search->call->options.cutoff < INFINITY) {
-        hs_keep_all_within(pairs->distance, pairs->n, search->call->options.cutoff,
-                           search->call->options.inclusive);
-    }
-    double before = pairs->n > 0 && !writer->is_first[0] ? to[writer->at[0] - 1] : 0.0;
-    for (int32_t e = 0; e < pairs->n; e++) {
-        before = hs_larger(pairs->distance[e], writer->is_first[e] ? 0.0 : before);
-        to[writer->at[e]] = before;
-    }
-}
-
-static void
-put_vectors(hs_nearest_writer *writer, double *to)
-{
-    const hs_search *search = writer->near->search;
-    hs_measured     *pairs = &writer->pairs;
-    const int        d = search->scene.ndim;
-    double          *vector[HS_MAX_DIM], sign[HS_BATCH], packed[HS_BATCH * HS_MAX_DIM];
-    for (int k = 0; k < d; k++) {
-        vector[k] = pairs->vector[k];
-    }
-    for (int32_t e = 0; e < pairs->n; e++) {
-        sign[e] = 1.0;
-    }
-    hs_restore_vectors(packed, vector, sign, pairs->n, d, hs_measures_unscale(&search->scene));
-    for (int32_t e = 0; e < pairs->n; e++) {
-        memcpy(to + writer->at[e] * d, packed + (int64_t)e * d, (size_t)d * sizeof *to);
-    }
-}
-
 void
 hs_nearest_flush(hs_nearest_writer *writer)
 {
-    hs_measured *pairs = &writer->pairs;
+    const hs_search *search = writer->near->search;
+    const hs_scale   unscale = hs_measures_unscale(&search->scene);
+    hs_measured     *pairs = &writer->pairs;
+    const int        d = search->scene.ndim;
     if (pairs->n > 0 && (writer->d != NULL || writer->D != NULL)) {
-        hs_measured_find(writer->near->search->call->kernel, &writer->near->order,
-                         writer->D != NULL, pairs);
+        hs_measured_find(search->call->kernel, &writer->near->order, writer->D != NULL, pairs);
     }
     if (writer->d != NULL) {
-        put_distances(writer, writer->d);
+        hs_restore_distances(pairs->distance, pairs->n, unscale);
+        if (search->call->options.cutoff < INFINITY) {
+            hs_keep_all_within(pairs->distance, pairs->n, search->call->options.cutoff,
+                               search->call->options.inclusive);
+        }
+        /* Rows ascend in exact order; a distance, known to a unit in the last place, may be lifted
+         * to the one before it, which is then no further from the true one than that. */
+        double before = pairs->n > 0 && !writer->is_first[0] ? writer->d[writer->at[0] - 1] : 0.0;
+        for (int32_t e = 0; e < pairs->n; e++) {
+            before = hs_larger(pairs->distance[e], writer->is_first[e] ? 0.0 : before);
+            writer->d[writer->at[e]] = before;
+        }
     }
     if (writer->D != NULL) {
-        put_vectors(writer, writer->D);
+        double *vector[HS_MAX_DIM], sign[HS_BATCH], packed[HS_BATCH * HS_MAX_DIM];
+        for (int k = 0; k < d; k++) {
+            vector[k] = pairs->vector[k];
+        }
+        for (int32_t e = 0; e < pairs->n; e++) {
+            sign[e] = 1.0;
+        }
+        hs_restore_vectors(packed, vector, sign, pairs->n, d, unscale);
+        for (int32_t e = 0; e < pairs->n; e++) {
+            memcpy(writer->D + writer->at[e] * d, packed + (int64_t)e * d,
+                   (size_t)d * sizeof(double));
+        }
     }
-    if (pairs->is_shifted) {
-        memset(pairs->times, 0, sizeof pairs->times);
-        memset(pairs->shift, 0, sizeof pairs->shift);
+    for (int r = 0; pairs->is_shifted && r < search->bins.n_periodic; r++) {
+        memset(pairs->times[r], 0, (size_t)pairs->n * sizeof(double));
+        memset(pairs->shift[r], 0, (size_t)pairs->n * sizeof(int64_t));
     }
     pairs->n = 0;
     pairs->is_shifted = pairs->is_wide = false;
-}
-
-/* S over all box vectors; false when it does not fit int32. */
-static bool
-put_shift(const hs_nearest *near, const int64_t *given, int32_t *to)
-{
-    const hs_lattice *lattice = &near->search->scene.lattice;
-    const int         d = lattice->ndim;
-    bool              fits = true;
-    memset(to, 0, (size_t)d * sizeof *to);
-    for (int l = 0; l < lattice->n_periodic; l++) {
-        fits = fits && given[l] >= INT32_MIN && given[l] <= INT32_MAX;
-        to[lattice->vector_of_row[l]] = fits ? (int32_t)given[l] : 0;
-    }
-    return fits;
 }
 
 /* n entries of the ranker's row, from `at` on; the batch has room for them. */
@@ -956,6 +911,7 @@ put_entries(hs_nearest_writer *writer, const hs_nearest_ranker *ranker, const hs
             int32_t n, int64_t at, bool is_first)
 {
     const hs_bins *bins = &writer->near->search->bins;
+    const int     *vector_of_row = writer->near->search->scene.lattice.vector_of_row;
     hs_measured   *pairs = &writer->pairs;
     const bool needs_given = bins->n_periodic > 0 && (bins->keeps_originals || writer->S != NULL);
     int32_t    j[HS_BATCH];
@@ -976,23 +932,26 @@ put_entries(hs_nearest_writer *writer, const hs_nearest_ranker *ranker, const hs
             pairs->q[k][pairs->n + e] = from[keys[e].number];
         }
     }
+    if (writer->S != NULL) {
+        memset(writer->S + at * bins->ndim, 0, (size_t)n * (size_t)bins->ndim * sizeof *writer->S);
+    }
     for (int32_t e = 0; e < n && bins->n_periodic > 0; e++) {
         double  q[HS_MAX_DIM];
         int64_t shift[HS_MAX_DIM], given[HS_MAX_DIM];
         if (!needs_given && image_of(ranker, &keys[e])->is_home) { /* as it was before */
             continue;
         }
-        if (!pair_of(ranker, &keys[e], q, shift, needs_given ? given : NULL) ||
-            (writer->S != NULL &&
-             !put_shift(writer->near, given, writer->S + (at + e) * bins->ndim))) {
+        if (!pair_of(ranker, &keys[e], q, shift, needs_given ? given : NULL)) {
             return HS_ERR_SHIFT_RANGE;
         }
         for (int r = 0; r < bins->n_periodic; r++) {
             hs_measured_shift(pairs, pairs->n + e, r, shift[r]);
+            if (writer->S != NULL && given[r] >= INT32_MIN && given[r] <= INT32_MAX) {
+                writer->S[(at + e) * bins->ndim + vector_of_row[r]] = (int32_t)given[r];
+            } else if (writer->S != NULL) {
+                return HS_ERR_SHIFT_RANGE;
+            }
         }
-    }
-    if (bins->n_periodic == 0 && writer->S != NULL) {
-        memset(writer->S + at * bins->ndim, 0, (size_t)n * (size_t)bins->ndim * sizeof *writer->S);
     }
     pairs->n += n;
     return HS_OK;

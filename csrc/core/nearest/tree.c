@@ -43,37 +43,52 @@ sort_numbers(double *numbers, int n)
     }
 }
 
-/* Finds where to split, by a sample picked evenly from the node; false when it is all in one
- * place. */
-static bool
-cut_by_sample(const tree_splitter *splitter, const hs_tree_node *node, tree_cut *cut)
+/* The axis along which these points lie widest; sets their range there. */
+static int
+widest_axis(const hs_bins *bins, const int32_t *points, int32_t n, double *lowest, double *highest)
 {
+    int axis = 0;
+    *lowest = *highest = 0.0;
+    for (int k = 0; k < bins->ndim; k++) {
+        const double *x = bins->x[k];
+        double        low = x[points[0]], high = low;
+        for (int32_t e = 1; e < n; e++) {
+            low = hs_smaller(x[points[e]], low);
+            high = hs_larger(x[points[e]], high);
+        }
+        if (high - low > *highest - *lowest) {
+            *lowest = low;
+            *highest = high;
+            axis = k;
+        }
+    }
+    return axis;
+}
+
+/* Finds where to split, by a sample picked evenly from the node, or where that is all in one place
+ * by all points; false when these are too. */
+static bool
+find_cut(const tree_splitter *splitter, const hs_tree_node *node, tree_cut *cut)
+{
+    const hs_bins *bins = splitter->bins;
     const int32_t  n = hs_tree_points(node);
     const int      m = n > LARGE_NODE ? LARGE_SAMPLE : n > SMALL_NODE ? SAMPLE : FEW_SAMPLE;
     const int32_t *order = splitter->order + node->first;
     int32_t        picked[LARGE_SAMPLE];
-    double         numbers[LARGE_SAMPLE], widest = 0.0;
+    double         numbers[LARGE_SAMPLE], low, high;
     HS_ASSERT(n >= m); /* leaves hold as many as the smallest sample */
     for (int s = 0; s < m; s++) {
         picked[s] = order[(int64_t)n * (2 * s + 1) / (2 * m)];
     }
-    for (int k = 0; k < splitter->bins->ndim; k++) {
-        const double *x = splitter->bins->x[k];
-        double        low = x[picked[0]], high = low;
-        for (int s = 1; s < m; s++) {
-            low = hs_smaller(x[picked[s]], low);
-            high = hs_larger(x[picked[s]], high);
-        }
-        if (high - low > widest) {
-            widest = high - low;
-            cut->axis = k;
-        }
-    }
-    if (widest == 0.0) {
-        return false;
+    cut->axis = widest_axis(bins, picked, m, &low, &high);
+    if (low == high) {
+        cut->axis = widest_axis(bins, order, n, &low, &high);
+        const double halfway = low + 0.5 * (high - low);
+        cut->pivot = halfway > low ? halfway : high;
+        return low < high;
     }
     for (int s = 0; s < m; s++) {
-        numbers[s] = splitter->bins->x[cut->axis][picked[s]];
+        numbers[s] = bins->x[cut->axis][picked[s]];
     }
     sort_numbers(numbers, m);
     int middle = m / 2;
@@ -82,27 +97,6 @@ cut_by_sample(const tree_splitter *splitter, const hs_tree_node *node, tree_cut 
     }
     cut->pivot = numbers[middle];
     return true;
-}
-
-/* Finds where to split, by all points; false when they are all in one place. */
-static bool
-cut_by_range(const tree_splitter *splitter, const hs_tree_node *node, tree_cut *cut)
-{
-    double widest = 0.0;
-    for (int k = 0; k < splitter->bins->ndim; k++) {
-        const double *x = splitter->bins->x[k];
-        double        low = x[splitter->order[node->first]], high = low;
-        for (int32_t at = node->first + 1; at < node->end; at++) {
-            low = hs_smaller(x[splitter->order[at]], low);
-            high = hs_larger(x[splitter->order[at]], high);
-        }
-        if (high - low > widest) {
-            const double middle = low + 0.5 * (high - low);
-            widest = high - low;
-            *cut = (tree_cut){k, middle > low ? middle : high};
-        }
-    }
-    return widest > 0.0;
 }
 
 /* Points whose X are equal: are they equal as given? */
@@ -155,11 +149,218 @@ tree_split(const tree_splitter *splitter, hs_tree_node *node)
     if (hs_tree_points(node) <= splitter->leaf_points) {
         return 0;
     }
-    if (!cut_by_sample(splitter, node, &cut) && !cut_by_range(splitter, node, &cut)) {
+    if (!find_cut(splitter, node, &cut)) {
         node->is_spot = is_spot(splitter, node);
         return 0;
     }
     return partition(splitter, node, &cut);
+}
+
+/*
+ * Builds the tree by all threads, a round of nodes at a time. A node of many points is split once,
+ * and its children are for the next round. One of few points is split to its leaves by one thread,
+ * the smaller half first, as its points fit a cache. Each has memory of its own while it is split,
+ * so that nodes need no lock, and what it becomes is appended in order: the tree is the same for
+ * any number of threads.
+ */
+
+/* Points of a node that is split to its leaves at most: few enough for even work, and enough to be
+ * worth a task. */
+#define SUBTREE_POINTS 8192
+/* The work of that, in points that are split once. */
+#define SUBTREE_SPLITS 10
+/* Nodes that wait: the smaller half is always split first, so they are fewer than bits of n. */
+#define MOST_WAITING  64
+#define NODES_AT_ONCE 1024 /* whose ranges a task sets */
+
+/* A node of the tree and all below it, as far as it has been split. */
+typedef struct subtree {
+    hs_tree_node *nodes; /* of the builder's shared account; the first stands for the root */
+    int32_t       root;
+    int32_t       n_nodes, capacity;
+    bool          is_large; /* split once */
+    hs_status     status;
+} subtree;
+
+typedef struct tree_builder {
+    hs_account       *account;
+    hs_shared        *shared;
+    hs_team          *team;
+    const hs_options *options;
+    tree_splitter     splitter;
+    hs_tree          *tree;
+    subtree          *round;          /* owned; those of the present round */
+    int32_t           n_round, first; /* the first of those that are split now */
+    int64_t           work;           /* since the last poll, in points that are split once */
+} tree_builder;
+
+/* Room for two nodes more; for half full leaves and as many other nodes at first, then for twice as
+ * many as before. */
+static bool
+make_room(const tree_builder *builder, subtree *sub, int32_t n_points)
+{
+    const int32_t first = sub->is_large ? 3 : 4 * n_points / builder->splitter.leaf_points + 4;
+    const int32_t capacity = sub->capacity > 0 ? 2 * sub->capacity : first;
+    if (sub->n_nodes + 2 <= sub->capacity) {
+        return true;
+    }
+    if (!hs_shared_resize(builder->shared, (void **)&sub->nodes, sub->n_nodes, capacity,
+                          sizeof *sub->nodes)) {
+        return false;
+    }
+    sub->capacity = capacity;
+    return true;
+}
+
+/* A task for hs_team_run: splits one node of the round. */
+static void
+split_subtree(void *context, int64_t task)
+{
+    const tree_builder *builder = context;
+    subtree            *sub = &builder->round[builder->first + task];
+    const hs_tree_node  root = builder->tree->nodes[sub->root];
+    int32_t             waiting[MOST_WAITING];
+    int                 n_waiting = 1;
+    sub->status = HS_ERR_MEMORY;
+    if (!make_room(builder, sub, hs_tree_points(&root))) {
+        return;
+    }
+    sub->nodes[sub->n_nodes++] = root;
+    waiting[0] = 0;
+    while (n_waiting > 0) {
+        const int32_t number = waiting[--n_waiting], left = sub->n_nodes;
+        const int32_t middle = tree_split(&builder->splitter, &sub->nodes[number]);
+        if (middle == 0) {
+            continue;
+        }
+        if (!make_room(builder, sub, 0)) {
+            return;
+        }
+        hs_tree_node *node = &sub->nodes[number];
+        node->left = left;
+        sub->nodes[left] = (hs_tree_node){.first = node->first, .end = middle};
+        sub->nodes[left + 1] = (hs_tree_node){.first = middle, .end = node->end};
+        sub->n_nodes += 2;
+        if (!sub->is_large) {
+            const bool left_is_larger = middle - node->first > node->end - middle;
+            waiting[n_waiting++] = left_is_larger ? left : left + 1;
+            waiting[n_waiting++] = left_is_larger ? left + 1 : left;
+        }
+    }
+    sub->status = HS_OK;
+}
+
+/* Splits the nodes of a round, some at a time; the caller is polled once in HS_POLL_POINTS points
+ * of each thread. */
+static hs_status
+split_round(tree_builder *builder)
+{
+    const int64_t most = HS_POLL_POINTS * (int64_t)hs_team_size(builder->team);
+    hs_status     status = HS_OK;
+    for (int32_t next = 0; next < builder->n_round && status == HS_OK;) {
+        builder->first = next;
+        while (next < builder->n_round && builder->work < most) {
+            const subtree *sub = &builder->round[next++];
+            const int64_t  n = hs_tree_points(&builder->tree->nodes[sub->root]);
+            builder->work += sub->is_large ? n : SUBTREE_SPLITS * n;
+        }
+        hs_team_run(builder->team, next - builder->first, split_subtree, builder);
+        for (int32_t s = builder->first; s < next && status == HS_OK; s++) {
+            status = builder->round[s].status;
+        }
+        if (status == HS_OK && builder->work >= most) {
+            builder->work = 0;
+            status = hs_poll(builder->options, 0.0);
+        }
+    }
+    return status;
+}
+
+/* Room for n nodes in the tree; those that it has are kept. */
+static hs_status
+reserve(tree_builder *builder, int64_t n)
+{
+    hs_tree      *tree = builder->tree;
+    hs_tree_node *nodes = n > INT32_MAX ? NULL
+                                        : hs_grow(builder->account, HS_FOR_CELLS, tree->nodes,
+                                                  tree->n_nodes, n, sizeof *nodes);
+    if (nodes == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    tree->nodes = nodes;
+    return HS_OK;
+}
+
+/* Appends what the nodes of the round became to the tree; *next: those of the next round, for all
+ * of which there is room. */
+static hs_status
+append_round(tree_builder *builder, subtree *next, int32_t *n_next)
+{
+    hs_tree *tree = builder->tree;
+    int64_t  n = tree->n_nodes;
+    for (int32_t s = 0; s < builder->n_round; s++) {
+        n += builder->round[s].n_nodes - 1;
+    }
+    if (reserve(builder, n) != HS_OK) {
+        return HS_ERR_MEMORY;
+    }
+    for (int32_t s = 0; s < builder->n_round; s++) {
+        const subtree *sub = &builder->round[s];
+        const int32_t  begin = tree->n_nodes;
+        for (int32_t number = 0; number < sub->n_nodes; number++) {
+            hs_tree_node *to = &tree->nodes[number == 0 ? sub->root : tree->n_nodes++];
+            *to = sub->nodes[number];
+            to->left += to->left != 0 ? begin - 1 : 0; /* node 1 of the subtree is `begin` */
+        }
+        for (int32_t child = begin; sub->is_large && child < tree->n_nodes; child++) {
+            const int32_t n_points = hs_tree_points(&tree->nodes[child]);
+            next[(*n_next)++] = (subtree){.root = child, .is_large = n_points > SUBTREE_POINTS};
+        }
+    }
+    return HS_OK;
+}
+
+/* Splits the round, and sets the next one; without nodes at the end. */
+static hs_status
+take_round(tree_builder *builder)
+{
+    subtree *next =
+        hs_alloc(builder->account, HS_FOR_CELLS, 2 * (int64_t)builder->n_round, sizeof *next);
+    int32_t   n_next = 0;
+    hs_status status = next != NULL ? split_round(builder) : HS_ERR_MEMORY;
+    if (status == HS_OK) {
+        status = append_round(builder, next, &n_next);
+    }
+    for (int32_t s = 0; s < builder->n_round; s++) {
+        hs_shared_release(builder->shared, (void **)&builder->round[s].nodes);
+    }
+    hs_free(builder->account, builder->round);
+    builder->round = next;
+    builder->n_round = n_next;
+    return status;
+}
+
+static hs_status
+build_nodes(tree_builder *builder)
+{
+    hs_tree      *tree = builder->tree;
+    const int32_t n = (int32_t)builder->splitter.bins->n;
+    hs_status     status = reserve(builder, 1);
+    builder->round = hs_alloc(builder->account, HS_FOR_CELLS, 1, sizeof *builder->round);
+    builder->shared = hs_shared_new(builder->account, HS_FOR_CELLS);
+    if (builder->round == NULL || builder->shared == NULL) {
+        status = HS_ERR_MEMORY;
+    }
+    if (status == HS_OK) {
+        tree->nodes[tree->n_nodes++] = (hs_tree_node){.first = 0, .end = n};
+        builder->round[builder->n_round++] = (subtree){.is_large = n > SUBTREE_POINTS};
+    }
+    while (status == HS_OK && builder->n_round > 0) {
+        status = take_round(builder);
+    }
+    hs_free(builder->account, builder->round);
+    hs_shared_free(builder->shared);
+    return status;
 }
 
 /* The range of each node, from the leaves up, and the depth of a tree. */
@@ -184,328 +385,47 @@ measure_depth(hs_tree *tree)
 /* Sets the range of a leaf from its points, which are in tree order by now; of another node, from
  * its children. */
 static void
-bound_axis(const hs_bins *bins, const hs_tree *tree, int32_t number, int k, double *range)
+set_range(const tree_builder *builder, int32_t number)
 {
+    hs_tree            *tree = builder->tree;
     const hs_tree_node *node = &tree->nodes[number];
-    if (node->left != 0) {
-        const double *of = hs_tree_bounds(tree, node->left, tree->ndim) + 4 * k;
-        range[0] = hs_smaller(of[0], of[1]);
-        range[1] = hs_larger(of[2], of[3]);
-        return;
-    }
-    const double *x = bins->x[k];
-    double        low = x[node->first], high = low;
-    for (int32_t si = node->first + 1; si < node->end; si++) {
-        low = hs_smaller(x[si], low);
-        high = hs_larger(x[si], high);
-    }
-    range[0] = low;
-    range[1] = high;
-}
-
-/* Of nodes [first, last), from the last to the first: children come after their parents. The first
- * node of the tree is not among them. */
-static void
-bound_nodes(const hs_bins *bins, hs_tree *tree, int32_t first, int32_t last)
-{
-    const int d = tree->ndim;
-    double    range[2];
-    for (int32_t number = last - 1; number >= first; number--) {
-        const int side = (number - 1) % 2;
-        double   *of = tree->bounds + (int64_t)(number - 1 - side) * 2 * d;
-        for (int k = 0; k < d; k++) {
-            bound_axis(bins, tree, number, k, range);
-            of[4 * k + side] = range[0];
-            of[4 * k + 2 + side] = range[1];
-        }
-    }
-}
-
-/*
- * Builds the tree by all threads. At the top there are too few subtrees for them, so the first
- * nodes are split level by level, those of a level at once. Each subtree of few points is then
- * split to its leaves by one thread, the smaller half first, in memory of its own: its points fit a
- * cache, and its nodes need no lock. The subtrees are appended at the end. The tree is the same for
- * any number of threads.
- */
-
-/* Points of a subtree at most: few enough for even work, and enough to be worth a task. */
-#define SUBTREE_POINTS 8192
-/* Subtrees for each thread between two polls. */
-#define SUBTREES_AT_ONCE 4
-/* Nodes that wait: the smaller half is always split first, so they are fewer than bits of n. */
-#define MOST_WAITING 64
-
-/* Node `root` of the tree and all below it. */
-typedef struct subtree {
-    hs_tree_node *nodes; /* of the builder's shared account; the first stands for the root */
-    int32_t       root;
-    int32_t       n_nodes, capacity;
-    hs_status     status;
-} subtree;
-
-typedef struct tree_builder {
-    hs_account       *account;
-    hs_shared        *shared; /* while subtrees are split and appended */
-    hs_team          *team;
-    const hs_options *options;
-    tree_splitter     splitter;
-    hs_tree          *tree;
-    subtree          *subtrees; /* owned */
-    int32_t           n_subtrees;
-    int32_t *begins; /* owned: where the nodes of each subtree begin in the tree, and end */
-    int32_t  first_node, first_subtree; /* of the tasks that run */
-} tree_builder;
-
-/* Gives a node two children, for which there is room after the n_nodes nodes. */
-static void
-append_children(hs_tree_node *nodes, int32_t *n_nodes, int32_t number, int32_t middle)
-{
-    hs_tree_node *node = &nodes[number], *left = &nodes[*n_nodes];
-    node->left = *n_nodes;
-    left[0] = (hs_tree_node){.first = node->first, .end = middle};
-    left[1] = (hs_tree_node){.first = middle, .end = node->end};
-    *n_nodes += 2;
-}
-
-/* ---- the first nodes ---- */
-
-/* Splits one node. Until its children are appended, its `left` is the first point of the right
- * one. */
-static void
-split_large(void *context, int64_t task)
-{
-    const tree_builder *builder = context;
-    hs_tree_node       *node = &builder->tree->nodes[builder->first_node + task];
-    if (hs_tree_points(node) > SUBTREE_POINTS) {
-        node->left = tree_split(&builder->splitter, node);
-    }
-}
-
-/* Room for n nodes in the tree; those that it has are kept. */
-static hs_status
-reserve(tree_builder *builder, int64_t n)
-{
-    hs_tree      *tree = builder->tree;
-    hs_tree_node *nodes = n > INT32_MAX ? NULL
-                                        : hs_grow(builder->account, HS_FOR_CELLS, tree->nodes,
-                                                  tree->n_nodes, n, sizeof *nodes);
-    if (nodes == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    tree->nodes = nodes;
-    return HS_OK;
-}
-
-/* Splits nodes [first, end) of a level, some at a time; the caller is polled once in HS_POLL_POINTS
- * points of each thread, *work those since the last time. */
-static hs_status
-split_level(tree_builder *builder, int32_t first, int32_t end, int64_t *work)
-{
-    const int64_t most = HS_POLL_POINTS * (int64_t)hs_team_size(builder->team);
-    hs_status     status = HS_OK;
-    for (int32_t next = first; status == HS_OK && next < end;) {
-        int64_t n_points = 0;
-        builder->first_node = next;
-        while (next < end && *work + n_points < most) {
-            const int32_t n = hs_tree_points(&builder->tree->nodes[next++]);
-            n_points += n > SUBTREE_POINTS ? n : 0;
-        }
-        if (n_points > 0) {
-            hs_team_run(builder->team, next - builder->first_node, split_large, builder);
-        }
-        *work += n_points;
-        if (*work >= most) {
-            *work = 0;
-            status = hs_poll(builder->options, 0.0);
-        }
-    }
-    return status;
-}
-
-static hs_status
-split_levels(tree_builder *builder)
-{
-    hs_tree  *tree = builder->tree;
-    int64_t   work = 0;
-    int32_t   first = 0;
-    hs_status status = HS_OK;
-    while (status == HS_OK && first < tree->n_nodes) {
-        const int32_t end = tree->n_nodes;
-        status = split_level(builder, first, end, &work);
-        if (status == HS_OK) {
-            status = reserve(builder, end + 2 * (int64_t)(end - first));
-        }
-        for (int32_t number = first; status == HS_OK && number < end; number++) {
-            const int32_t middle = tree->nodes[number].left;
-            if (middle != 0) {
-                append_children(tree->nodes, &tree->n_nodes, number, middle);
+    const int           d = tree->ndim, side = (number + 1) % 2;
+    for (int k = 0; k < d; k++) {
+        const double *x = builder->splitter.bins->x[k];
+        double        low = x[node->first], high = low;
+        if (node->left != 0) {
+            const double *of = hs_tree_bounds(tree, node->left, d) + 4 * k;
+            low = hs_smaller(of[0], of[1]);
+            high = hs_larger(of[2], of[3]);
+        } else {
+            for (int32_t si = node->first + 1; si < node->end; si++) {
+                low = hs_smaller(x[si], low);
+                high = hs_larger(x[si], high);
             }
         }
-        first = end;
+        if (number == 0) {
+            tree->lower[k] = low;
+            tree->upper[k] = high;
+        } else {
+            double *to = tree->bounds + (int64_t)(number - 1 - side) * 2 * d + 4 * k + side;
+            to[0] = low;
+            to[2] = high;
+        }
     }
-    return status;
 }
 
-/* ---- subtrees, each split by one thread ---- */
-
-/* A node that may have children, and was not split yet. */
-static bool
-is_root(const tree_builder *builder, const hs_tree_node *node)
-{
-    return node->left == 0 && hs_tree_points(node) <= SUBTREE_POINTS &&
-           hs_tree_points(node) > builder->splitter.leaf_points;
-}
-
-/* Room for half full leaves and as many other nodes at first, then for twice as many as before. */
-static bool
-grow(const tree_builder *builder, subtree *sub)
-{
-    const int32_t n = hs_tree_points(&builder->tree->nodes[sub->root]);
-    const int32_t capacity = sub->capacity > 0 ? 2 * sub->capacity
-                                               : 4 * n / builder->splitter.leaf_points + 4;
-    if (!hs_shared_resize(builder->shared, (void **)&sub->nodes, sub->n_nodes, capacity,
-                          sizeof *sub->nodes)) {
-        return false;
-    }
-    sub->capacity = capacity;
-    return true;
-}
-
+/* A task for hs_team_run: ranges of the leaves among some nodes. */
 static void
-split_subtree(void *context, int64_t task)
+set_leaves(void *context, int64_t task)
 {
     const tree_builder *builder = context;
-    subtree            *sub = &builder->subtrees[builder->first_subtree + task];
-    int32_t             waiting[MOST_WAITING];
-    int                 n_waiting = 1;
-    sub->status = HS_ERR_MEMORY;
-    if (!grow(builder, sub)) {
-        return;
-    }
-    sub->nodes[sub->n_nodes++] = builder->tree->nodes[sub->root];
-    waiting[0] = 0;
-    while (n_waiting > 0) {
-        const int32_t number = waiting[--n_waiting], left = sub->n_nodes;
-        if (hs_tree_points(&sub->nodes[number]) > builder->splitter.leaf_points &&
-            left + 2 > sub->capacity && !grow(builder, sub)) {
-            return;
-        }
-        const int32_t middle = tree_split(&builder->splitter, &sub->nodes[number]);
-        if (middle != 0) {
-            append_children(sub->nodes, &sub->n_nodes, number, middle);
-            const bool left_is_larger = hs_tree_points(&sub->nodes[left]) >
-                                        hs_tree_points(&sub->nodes[left + 1]);
-            waiting[n_waiting++] = left_is_larger ? left : left + 1;
-            waiting[n_waiting++] = left_is_larger ? left + 1 : left;
+    const hs_tree      *tree = builder->tree;
+    const int64_t       first = task * NODES_AT_ONCE, rest = tree->n_nodes - first;
+    for (int64_t e = first; e < first + (rest < NODES_AT_ONCE ? rest : NODES_AT_ONCE); e++) {
+        if (tree->nodes[e].left == 0) {
+            set_range(builder, (int32_t)e);
         }
     }
-    sub->status = HS_OK;
-}
-
-static hs_status
-split_subtrees(tree_builder *builder)
-{
-    const int32_t at_once = SUBTREES_AT_ONCE * hs_team_size(builder->team);
-    hs_status     status = HS_OK;
-    for (int32_t first = 0; status == HS_OK && first < builder->n_subtrees; first += at_once) {
-        const int32_t rest = builder->n_subtrees - first, n = rest < at_once ? rest : at_once;
-        builder->first_subtree = first;
-        hs_team_run(builder->team, n, split_subtree, builder);
-        for (int32_t s = first; s < first + n && status == HS_OK; s++) {
-            status = builder->subtrees[s].status;
-        }
-        if (status == HS_OK && n < rest) {
-            status = hs_poll(builder->options, 0.0);
-        }
-    }
-    return status;
-}
-
-/* Appends the nodes of all subtrees to those of the tree. */
-static hs_status
-append_subtrees(tree_builder *builder)
-{
-    hs_tree *tree = builder->tree;
-    int64_t  n = tree->n_nodes;
-    for (int32_t s = 0; s < builder->n_subtrees; s++) {
-        n += builder->subtrees[s].n_nodes - 1;
-    }
-    if (reserve(builder, n) != HS_OK) {
-        return HS_ERR_MEMORY;
-    }
-    for (int32_t s = 0; s < builder->n_subtrees; s++) {
-        const subtree *sub = &builder->subtrees[s];
-        const int32_t  begin = builder->begins[s] = tree->n_nodes;
-        for (int32_t number = 0; number < sub->n_nodes; number++) {
-            hs_tree_node *to = &tree->nodes[number == 0 ? sub->root : tree->n_nodes++];
-            *to = sub->nodes[number];
-            to->left += to->left != 0 ? begin - 1 : 0; /* node 1 of the subtree is `begin` */
-        }
-    }
-    builder->begins[builder->n_subtrees] = tree->n_nodes;
-    return HS_OK;
-}
-
-/* Subtrees have memory while they are split, and until they are appended. */
-static hs_status
-build_subtrees(tree_builder *builder)
-{
-    const hs_tree *tree = builder->tree;
-    int32_t        n = 0;
-    for (int32_t number = 0; number < tree->n_nodes; number++) {
-        n += is_root(builder, &tree->nodes[number]);
-    }
-    builder->subtrees = hs_alloc(builder->account, HS_FOR_CELLS, n, sizeof *builder->subtrees);
-    builder->begins = hs_alloc(builder->account, HS_FOR_CELLS, n + 1, sizeof *builder->begins);
-    builder->shared = hs_shared_new(builder->account, HS_FOR_CELLS);
-    if (builder->subtrees == NULL || builder->begins == NULL || builder->shared == NULL) {
-        hs_shared_free(builder->shared);
-        return HS_ERR_MEMORY;
-    }
-    for (int32_t number = 0; number < tree->n_nodes; number++) {
-        if (is_root(builder, &tree->nodes[number])) {
-            builder->subtrees[builder->n_subtrees++] = (subtree){.root = number};
-        }
-    }
-    hs_status status = split_subtrees(builder);
-    if (status == HS_OK) {
-        status = append_subtrees(builder);
-    }
-    for (int32_t s = 0; s < n; s++) {
-        hs_shared_release(builder->shared, (void **)&builder->subtrees[s].nodes);
-    }
-    hs_shared_free(builder->shared);
-    return status;
-}
-
-/* A task for hs_team_run: bounds of the nodes below the root of one subtree; roots and what is
- * above them come before. */
-static void
-bound_subtree(void *context, int64_t task)
-{
-    const tree_builder *builder = context;
-    bound_nodes(builder->splitter.bins, builder->tree, builder->begins[task],
-                builder->begins[task + 1]);
-}
-
-static hs_status
-build_nodes(tree_builder *builder)
-{
-    hs_tree       *tree = builder->tree;
-    const hs_bins *bins = builder->splitter.bins;
-    for (int64_t i = 0; i < bins->n; i++) {
-        bins->order[i] = (int32_t)i;
-    }
-    if (bins->n == 0) {
-        return HS_OK;
-    }
-    hs_status status = reserve(builder, 1);
-    if (status == HS_OK) {
-        tree->nodes[tree->n_nodes++] = (hs_tree_node){.first = 0, .end = (int32_t)bins->n};
-        status = split_levels(builder);
-    }
-    return status == HS_OK ? build_subtrees(builder) : status;
 }
 
 hs_status
@@ -522,7 +442,10 @@ hs_tree_build(hs_account *account, hs_team *team, const hs_options *options, hs_
                             .tree = tree};
     *tree = (hs_tree){.ndim = scene->ndim};
     hs_bins_take(scene, bins);
-    hs_status status = build_nodes(&builder);
+    for (int64_t i = 0; i < bins->n; i++) {
+        bins->order[i] = (int32_t)i;
+    }
+    hs_status status = bins->n > 0 ? build_nodes(&builder) : HS_OK;
     if (status == HS_OK) {
         status = hs_bins_arrange(account, team, options, scene, bins);
     }
@@ -533,17 +456,13 @@ hs_tree_build(hs_account *account, hs_team *team, const hs_options *options, hs_
     }
     if (status == HS_OK && tree->n_nodes > 0) {
         tree->depth = measure_depth(tree);
-        hs_team_run(team, builder.n_subtrees, bound_subtree, &builder);
-        bound_nodes(bins, tree, 1, builder.begins[0]);
-        for (int k = 0; k < tree->ndim; k++) {
-            double range[2];
-            bound_axis(bins, tree, 0, k, range);
-            tree->lower[k] = range[0];
-            tree->upper[k] = range[1];
+        hs_team_run(team, (tree->n_nodes - 1) / NODES_AT_ONCE + 1, set_leaves, &builder);
+        for (int32_t number = tree->n_nodes - 1; number >= 0; number--) {
+            if (tree->nodes[number].left != 0) { /* children come after their parents */
+                set_range(&builder, number);
+            }
         }
     }
-    hs_free(account, builder.subtrees);
-    hs_free(account, builder.begins);
     return status;
 }
 

@@ -2,8 +2,6 @@
 #include "table.h"
 #include "../base/status.h"
 #include "../collect/parallel.h"
-#include "../memory/results.h"
-#include "../base/os.h"
 #include "../search/walk.h"
 
 #include <string.h>
@@ -15,9 +13,18 @@
 /* Bytes of rows that wait for their places. */
 #define MOST_KEPT (6 << 20)
 
+/* A table that is being made. */
+typedef struct table {
+    hs_search       *search; /* borrowed, as are the next two */
+    hs_output       *entries;
+    int64_t         *offsets;
+    hs_neighbourhood most; /* the largest neighbourhood */
+    hs_output        kept; /* owned; rows in cell order, until they have places */
+} table;
+
 /* What one thread fills rows with; the context of put_rows. */
 typedef struct row_filler {
-    hs_table   *table;
+    table      *all;
     hs_output  *to;       /* borrowed; the rows of one visit, or all that are kept */
     hs_output   visit;    /* owned */
     hs_recorder recorder; /* owned; of `to` */
@@ -44,32 +51,6 @@ own_place(const hs_scanner *scanner)
     return -1;
 }
 
-/* Which of a point's n hits, which are places, is the point itself. */
-static int32_t
-find_place(const int32_t *places, int32_t n, int32_t own)
-{
-    int32_t at = 0;
-    for (int32_t h = 0; h < n; h++) { /* all of them: a branch costs more */
-        at |= places[h] == own ? h : 0;
-    }
-    HS_ASSERT(at < n && places[at] == own);
-    return at;
-}
-
-/* The same where hits are numbers, ascending: as many images of the point are before it as behind
- * it. */
-static int32_t
-find_number(const int32_t *numbers, int32_t n, int32_t point)
-{
-    int32_t below = 0, equal = 0;
-    for (int32_t h = 0; h < n; h++) {
-        below += numbers[h] < point;
-        equal += numbers[h] == point;
-    }
-    HS_ASSERT(equal % 2 == 1);
-    return below + equal / 2;
-}
-
 /* The hits that the rows of a visit have: no point itself, and where each pair is listed once,
  * none that is before it. end: receives where those of each point end. */
 static hs_hits
@@ -85,8 +66,20 @@ hits_of_rows(hs_scanner *scanner, int32_t first, const hs_hits *hits, int32_t *e
     const int32_t own = by_place ? own_place(scanner) + first - scanner->group.first : 0;
     for (int32_t t = 0, from = 0; t < hits->n; t++) {
         const int32_t *of = label + from, n = hits->end[t] - from;
-        const int32_t  at = by_place ? find_place(of, n, own + t)
-                                     : find_number(of, n, hits->point[t]);
+        const int32_t  itself = by_place ? own + t : hits->point[t];
+        int32_t        below = 0, equal = 0, at = 0;  /* at: which hit is the point itself */
+        for (int32_t h = 0; by_place && h < n; h++) { /* all of them: a branch costs more */
+            at |= of[h] == itself ? h : 0;
+        }
+        for (int32_t h = 0; !by_place && h < n; h++) {
+            below += of[h] < itself;
+            equal += of[h] == itself;
+        }
+        if (!by_place) { /* they ascend: as many images of it are before it as behind it */
+            HS_ASSERT(equal % 2 == 1);
+            at = below + equal / 2;
+        }
+        HS_ASSERT(at < n && of[at] == itself);
         if (!search->is_half) {
             memmove(label + to, of, (size_t)at * sizeof *of);
             to += at;
@@ -100,14 +93,14 @@ hits_of_rows(hs_scanner *scanner, int32_t first, const hs_hits *hits, int32_t *e
     return rows;
 }
 
-/* A hs_visit_fn of ordered walkers: whole rows, to their places by table->offsets; or kept, one
+/* A hs_visit_fn of ordered walkers: whole rows, to their places by the offsets; or kept, one
  * behind another, and their lengths as offsets. HS_TRY_OTHER when more than MOST_KEPT are kept. */
 static hs_status
 put_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     row_filler     *fill = context;
     hs_output      *to = fill->to;
-    int64_t        *offsets = fill->table->offsets;
+    int64_t        *offsets = fill->all->offsets;
     int32_t         end[HS_GROUP_POINTS];
     const hs_hits   rows = hits_of_rows(scanner, first, hits, end);
     const int32_t   n = rows.end[rows.n - 1];
@@ -121,56 +114,56 @@ put_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
         }
         return to->n_pairs * hs_output_bytes_per_pair(to) > MOST_KEPT ? HS_TRY_OTHER : HS_OK;
     }
-    hs_output_place(fill->table->entries, offsets, to, rows.point, rows.n,
+    hs_output_place(fill->all->entries, offsets, to, rows.point, rows.n,
                     hs_search_asking(scanner->search)->n - first);
     to->n_pairs = 0;
     return HS_OK;
 }
 
-/* After hs_table_prepare. On failure filler_close. */
+/* to: NULL, or where all rows are kept. most_hits: of a visit. */
 static hs_status
-filler_open(hs_table *table, hs_output *to, row_filler *fill)
+filler_open(table *all, hs_output *to, int32_t most_hits, row_filler *fill)
 {
-    const hs_output *entries = table->entries;
-    const int32_t    most_hits = hs_block_most_hits((int32_t)table->most.candidates + 1);
-    *fill = (row_filler){.table = table, .to = to != NULL ? to : &fill->visit};
+    const hs_output *entries = all->entries;
+    *fill = (row_filler){.all = all, .to = to != NULL ? to : &fill->visit};
     hs_output_init(NULL, entries->ndim, entries->columns, entries->index_bytes, &fill->visit);
-    return hs_recorder_init(&table->search->call->account, fill->to, most_hits, &fill->recorder);
+    return hs_recorder_init(&all->search->call->account, fill->to, most_hits, &fill->recorder);
+}
+
+/* A hs_visitor's open. */
+static hs_status
+open_filler(void *all, void *filler, const hs_walker *walker)
+{
+    return filler_open(all, NULL, walker->scanner.block.most_hits, filler);
 }
 
 /* Idempotent, also of one that is all zeros. A hs_visitor's close. */
 static void
-filler_close(void *table, void *filler)
+close_filler(void *all, void *filler)
 {
     row_filler *fill = filler;
-    hs_recorder_free(&((hs_table *)table)->search->call->account, &fill->recorder);
+    hs_recorder_free(&((table *)all)->search->call->account, &fill->recorder);
     hs_output_free(&fill->visit);
 }
 
 #define MOST_EXPECTED_KEPT (4 << 20) /* bytes; rows are kept when no more than these are expected */
 
-/* Of n hits, those with a higher number than the point, twice, and those with its own, which are
- * the point itself and images of it on either side. */
-static int32_t
-count_twice(const int32_t *numbers, int32_t n, int32_t point)
-{
-    int32_t twice = 0;
-    for (int32_t h = 0; h < n; h++) {
-        twice += (numbers[h] >= point) + (numbers[h] > point);
-    }
-    return twice;
-}
-
-/* A hs_visit_fn; each point belongs to one thread. */
+/* A hs_visit_fn; each point belongs to one thread. Listed hits with a higher number than the point
+ * count twice, and so do those with its own: the point itself, and images of it on either side. */
 static hs_status
 count_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    int64_t *counts = context;
+    int64_t   *counts = context;
+    const bool is_listed = scanner->use != HS_BLOCK_COUNTS;
     (void)first;
     for (int32_t t = 0, begin = 0; t < hits->n; begin = hits->end[t++]) {
-        const int32_t point = hits->point[t], n = hits->end[t] - begin;
-        counts[point] +=
-            scanner->use == HS_BLOCK_COUNTS ? n : count_twice(hits->label + begin, n, point);
+        const int32_t  point = hits->point[t], n = hits->end[t] - begin;
+        const int32_t *of = hits->label + begin;
+        int32_t        twice = 0;
+        for (int32_t h = 0; h < n && is_listed; h++) {
+            twice += (of[h] >= point) + (of[h] > point);
+        }
+        counts[point] += is_listed ? twice : n;
     }
     return HS_OK;
 }
@@ -194,124 +187,145 @@ hs_table_count(hs_search *search, int64_t *counts, hs_failure *failure)
     return status;
 }
 
-/* In a small scene a bound on the largest neighbourhood does, which is small as well. */
 /* Where the walks that prepare a table and count its entries end, as parts of the work. */
 #define PREPARED 0.1
 #define COUNTED  0.4
 
-hs_status
-hs_table_prepare(hs_table *table, hs_failure *failure)
+/* Whether such a neighbourhood has a chance to be put in order; *bytes: what it would take. */
+static bool
+fits(hs_search *search, const hs_neighbourhood *most, double *bytes)
 {
-    const hs_visitor sizes = {.use = HS_BLOCK_SIZES};
-    hs_status        status = HS_OK;
-    if (!hs_walker_bound(table->search, &table->most)) {
-        const hs_stretch whole = hs_call_begin_part(table->search->call, 0.0, PREPARED);
-        status = hs_parallel_visit(table->search, &sizes, &table->most, failure);
-        hs_call_end_part(table->search->call, whole);
+    /* Bytes that each candidate takes at least, gathered and sorted. */
+    const double each = (double)(sizeof(hs_unsure) + 2 * sizeof(uint64_t) + 4 * sizeof(int32_t)) +
+                        (double)(search->scene.ndim + 1) * sizeof(float);
+    const double all = (double)most->candidates * each;
+    if (most->candidates <= HS_ORDER_CANDIDATES && hs_account_allows(&search->call->account, all)) {
+        return true;
     }
+    *bytes = all;
+    return false;
+}
+
+/* One walk, by this thread, whose rows are kept. HS_TRY_OTHER: there were too many entries, and
+ * none is kept. */
+static hs_status
+keep_all(table *all, hs_failure *failure)
+{
+    hs_search    *search = all->search;
+    const int64_t n = hs_search_asking(search)->n;
+    hs_walker     walker;
+    row_filler    fill = {.all = all};
+    memset(all->offsets, 0, (size_t)n * sizeof *all->offsets);
+    hs_output_reserve_hint(&all->kept, search->grid.expected_pairs * search->pairs_per_half);
+    hs_status status = hs_walker_init(search, hs_record_use(all->kept.columns), &all->most,
+                                      put_rows, &fill, &walker);
+    if (status == HS_OK) {
+        status = filler_open(all, &all->kept, walker.scanner.block.most_hits, &fill);
+    }
+    if (status == HS_OK) {
+        status = hs_walk(&walker, 0, (int32_t)n, failure);
+    }
+    close_filler(all, &fill);
+    hs_walker_close(search, &walker);
     return status;
 }
 
-/* Offsets that hold the number of each row's entries: where it begins. */
-static void
-table_sum(hs_table *table)
+/* Sets the offsets. Where few entries are expected, one walk finds them, and keeps them. */
+static hs_status
+measure(table *all, hs_failure *failure)
 {
-    const int64_t n = hs_search_asking(table->search)->n;
-    int64_t      *offsets = table->offsets, sum = 0;
-    for (int64_t i = 0; i < n; i++) {
+    hs_search    *search = all->search;
+    hs_call      *call = search->call;
+    int64_t      *offsets = all->offsets, sum = 0;
+    const int64_t n = hs_search_asking(search)->n;
+    const double  expected = search->grid.expected_pairs * search->pairs_per_half;
+    hs_status     status = HS_TRY_OTHER;
+    hs_output_init(&call->account, all->entries->ndim, all->entries->columns,
+                   all->entries->index_bytes, &all->kept);
+    const double bytes = expected * (double)hs_output_bytes_per_pair(&all->kept);
+    if (call->team == NULL && bytes < MOST_EXPECTED_KEPT &&
+        hs_account_allows(&call->account, 2.0 * MOST_KEPT)) {
+        const hs_stretch whole = hs_call_begin_part(call, PREPARED, 1.0);
+        status = keep_all(all, failure);
+        call->part = whole;
+    }
+    if (status == HS_TRY_OTHER) {
+        const hs_stretch whole = hs_call_begin_part(call, PREPARED, COUNTED);
+        hs_output_free(&all->kept);
+        all->kept.columns = 0;
+        status = hs_table_count(search, offsets, failure);
+        call->part = whole;
+    }
+    for (int64_t i = 0; i < n; i++) { /* from the number of each row's entries to its beginning */
         const int64_t count = offsets[i];
         offsets[i] = sum;
         sum += count;
     }
     offsets[n] = sum;
-}
-
-/* Whether one walk, by this thread, shall do: its rows are kept for a while. */
-static bool
-will_keep(hs_table *table)
-{
-    hs_search       *search = table->search;
-    const hs_output *entries = table->entries;
-    const double     n = search->grid.expected_pairs * search->pairs_per_half;
-    hs_output_init(&search->call->account, entries->ndim, entries->columns, entries->index_bytes,
-                   &table->kept);
-    const double bytes = n * (double)hs_output_bytes_per_pair(&table->kept);
-    return search->call->team == NULL && bytes < MOST_EXPECTED_KEPT &&
-           hs_account_allows(&search->call->account, 2.0 * MOST_KEPT);
-}
-
-/* HS_TRY_OTHER: there were too many entries, and none is kept. */
-static hs_status
-keep_all(hs_table *table, hs_failure *failure)
-{
-    hs_search    *search = table->search;
-    const int64_t n = hs_search_asking(search)->n;
-    hs_walker     walker;
-    row_filler    fill;
-    memset(table->offsets, 0, (size_t)n * sizeof *table->offsets);
-    hs_output_reserve_hint(&table->kept, search->grid.expected_pairs * search->pairs_per_half);
-    hs_status status = filler_open(table, &table->kept, &fill);
-    if (status == HS_OK) {
-        status = hs_walker_init_ordered(search, hs_record_use(table->kept.columns), &table->most,
-                                        put_rows, &fill, &walker);
-    }
-    if (status == HS_OK) {
-        status = hs_walk_or_tell(&walker, 0, (int32_t)n, failure);
-        hs_walker_close(search, &walker);
-    }
-    filler_close(table, &fill);
     return status;
 }
 
-hs_status
-hs_table_measure(hs_table *table, hs_failure *failure)
-{
-    hs_call   *call = table->search->call;
-    hs_stretch whole = hs_call_begin_part(call, PREPARED, 1.0);
-    hs_status  status = will_keep(table) ? keep_all(table, failure) : HS_TRY_OTHER;
-    hs_call_end_part(call, whole);
-    if (status == HS_TRY_OTHER) {
-        hs_table_free(table);
-        whole = hs_call_begin_part(call, PREPARED, COUNTED);
-        status = hs_table_count(table->search, table->offsets, failure);
-        hs_call_end_part(call, whole);
-    }
-    table_sum(table);
-    return status;
-}
-
+/* Fills the entries. */
 static hs_status
-open_filler(void *table, void *filler, const hs_walker *walker)
+fill(table *all, hs_failure *failure)
 {
-    (void)walker;
-    return filler_open(table, NULL, filler);
-}
-
-hs_status
-hs_table_fill(hs_table *table, hs_failure *failure)
-{
-    const hs_bins *asking = hs_search_asking(table->search);
-    if (table->kept.columns != 0) {
-        hs_output_place(table->entries, table->offsets, &table->kept, asking->order, asking->n,
+    const hs_bins   *asking = hs_search_asking(all->search);
+    const hs_visitor filler = {.use = hs_record_use(all->entries->columns),
+                               .most = &all->most,
+                               .visit = put_rows,
+                               .shared = all,
+                               .state_size = sizeof(row_filler),
+                               .open = open_filler,
+                               .close = close_filler};
+    if (all->kept.columns != 0) {
+        hs_output_place(all->entries, all->offsets, &all->kept, asking->order, asking->n,
                         asking->n);
         return HS_OK;
     }
-    const hs_stretch whole = hs_call_begin_part(table->search->call, COUNTED, 1.0);
-    const hs_visitor filler = {.use = hs_record_use(table->entries->columns),
-                               .most = &table->most,
-                               .visit = put_rows,
-                               .shared = table,
-                               .state_size = sizeof(row_filler),
-                               .open = open_filler,
-                               .close = filler_close};
-    const hs_status  status = hs_parallel_visit(table->search, &filler, NULL, failure);
-    hs_call_end_part(table->search->call, whole);
+    const hs_stretch whole = hs_call_begin_part(all->search->call, COUNTED, 1.0);
+    const hs_status  status = hs_parallel_visit(all->search, &filler, NULL, failure);
+    all->search->call->part = whole;
     return status;
 }
 
-void
-hs_table_free(hs_table *table)
+hs_status
+hs_table_find(hs_search *search, hs_output *entries, hs_output *offsets, hs_failure *failure)
 {
-    hs_output_free(&table->kept);
-    table->kept.columns = 0;
+    hs_call         *call = search->call;
+    const hs_visitor sizes = {.use = HS_BLOCK_SIZES};
+    table            all = {.search = search, .entries = entries};
+    hs_status        status = hs_estimate_by_sample(search, failure);
+    if (status == HS_OK) {
+        status = hs_output_open_offsets(&call->account, hs_search_asking(search)->n + 1, offsets,
+                                        &all.offsets);
+    }
+    /* In a small scene a bound on the largest neighbourhood does, which is small as well. */
+    if (status == HS_OK && !hs_walker_bound(search, &all.most)) {
+        const hs_stretch whole = hs_call_begin_part(call, 0.0, PREPARED);
+        status = hs_parallel_visit(search, &sizes, &all.most, failure);
+        call->part = whole;
+    }
+    if (status == HS_OK && !fits(search, &all.most, &failure->search_bytes)) {
+        status = HS_ERR_MEMORY; /* refused before anything is counted */
+    }
+    if (status == HS_OK) {
+        status = measure(&all, failure);
+    }
+    const int64_t n = status == HS_OK ? all.offsets[hs_search_asking(search)->n] : 0;
+    if (status == HS_OK &&
+        (entries->fixed ? n > entries->capacity : hs_output_reserve(entries, n, 0.0) != HS_OK)) {
+        failure->expected_pairs = (double)n;
+        failure->expected_bytes =
+            entries->fixed ? 0.0 : (double)n * (double)hs_output_bytes_per_pair(entries);
+        status = entries->fixed ? HS_ERR_CAPACITY : HS_ERR_MEMORY;
+    }
+    if (status == HS_OK) {
+        entries->n_pairs = n;
+        status = hs_touch_output(call->team, &call->options, entries);
+    }
+    if (status == HS_OK) {
+        status = fill(&all, failure);
+    }
+    hs_output_free(&all.kept);
+    return status;
 }

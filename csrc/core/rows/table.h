@@ -2,8 +2,8 @@
 #ifndef HS_ROWS_TABLE_H
 #define HS_ROWS_TABLE_H
 
-#include "../collect/record.h"
-#include "../memory/memory.h"
+#include "../search/search.h"
+#include "../collect/columns.h"
 
 /*
  * table.h: all neighbours of each asking point, one row a point, in the order of the caller's
@@ -12,29 +12,14 @@
  * and nothing is held but the result. A small table is found by one walk, and its rows are moved.
  */
 
-/* A table that is being made, of a full search. */
-typedef struct hs_table {
-    hs_search       *search;  /* borrowed */
-    int64_t         *offsets; /* borrowed; where each row begins, rows + 1 */
-    hs_output       *entries; /* borrowed; columns for what is wanted */
-    hs_neighbourhood most;    /* set by hs_table_prepare */
-    hs_output        kept;    /* owned; rows in cell order, until they have places */
-} hs_table;
-
 /* Neighbours of each asking point, not counting itself, to counts[0 ... n - 1]. HS_ERR_SHIFT_RANGE
  * sets failure->row. */
 hs_status hs_table_count(hs_search *search, int64_t *counts, hs_failure *failure);
 
-/* Call first: finds the largest neighbourhood. */
-hs_status hs_table_prepare(hs_table *table, hs_failure *failure);
-
-/* Fills offsets. Where few entries are expected, one walk finds them, and keeps them. */
-hs_status hs_table_measure(hs_table *table, hs_failure *failure);
-
-/* Call last: fills the entries, which have room for offsets[rows]. */
-hs_status hs_table_fill(hs_table *table, hs_failure *failure);
-
-/* Idempotent. */
-void hs_table_free(hs_table *table);
+/* The rows of a full search, as the entries of an empty output with columns for what is wanted, and
+ * where each row begins, rows + 1, as i of `offsets`, which it opens. HS_ERR_MEMORY where the
+ * result, or one neighbourhood, is too large; HS_ERR_CAPACITY. */
+hs_status hs_table_find(hs_search *search, hs_output *entries, hs_output *offsets,
+                        hs_failure *failure);
 
 #endif

@@ -1,120 +1,81 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "points.h"
+#include "../box/wrap.h"
 
 #include <math.h>
 #include <string.h>
 
 /* points.c: slabs of points are copied to columns, and the range of each column is kept. */
 
-#if defined(__SSE2__) || defined(_M_X64)
-#include <emmintrin.h>
-#define HAS_SSE2 1
-#else
-#define HAS_SSE2 0
-#endif
-
+/* Most bytes from one end of an array to the other: a little less than addresses allow, because the
+ * sum that is compared with it is rounded. */
+#define MOST_EXTENT    (0.99 * (double)PTRDIFF_MAX)
 #define MAGNITUDE_BITS UINT64_C(0x7fffffffffffffff)
 /* Points copied before their range is looked at: their columns are still in the nearest cache. */
 #define TILE 512
-/* Ranges kept side by side, so that the loops over them can be vectors. */
-#define LANES 8
 
-#define REAL    float
-#define NAME(x) x##_f32
-#include "points_template.h"
-
-#define REAL    double
-#define NAME(x) x##_f64
-#include "points_template.h"
-
-/* Range of a column. */
-typedef struct range {
-    double lower, upper;
-    double poison; /* 0, or NaN once an entry was infinite or NaN */
-} range;
-
-static const range no_range = {INFINITY, -INFINITY, 0.0};
+hs_status
+hs_check_points(const hs_points *points, hs_failure *failure)
+{
+    if (points == NULL || points->ndim < 1 || points->ndim > HS_MAX_DIM || points->n < 0 ||
+        (points->real != HS_FLOAT32 && points->real != HS_FLOAT64)) {
+        return HS_ERR_ARGUMENT;
+    }
+    if (points->n > INT32_MAX) {
+        failure->value = (double)points->n;
+        return HS_ERR_TOO_MANY;
+    }
+    /* Entries are there, if any, no further apart than addresses can be. */
+    const double rows = (double)(points->n - 1) * (double)points->row_stride;
+    const double columns = (double)(points->ndim - 1) * (double)points->column_stride;
+    return points->n == 0 || (points->data != NULL && fabs(rows) + fabs(columns) <= MOST_EXTENT)
+               ? HS_OK
+               : HS_ERR_ARGUMENT;
+}
 
 typedef struct loading {
     const hs_points *points;
     hs_cloud        *cloud;
-    range            found[HS_SLABS][HS_MAX_DIM]; /* of slabs that have points */
+    hs_range         found[HS_SLABS][HS_MAX_DIM]; /* of slabs that have points */
 } loading;
 
-HS_ALWAYS_INLINE void
-join_range(double lower, double upper, double poison, range *found)
+/* The number at any address; memcpy compiles to one load. */
+HS_ALWAYS_INLINE double
+read_entry(const char *entry, hs_real real)
 {
-    found->lower = hs_smaller(lower, found->lower);
-    found->upper = hs_larger(upper, found->upper);
-    found->poison += poison;
+    float  narrow;
+    double x;
+    if (real == HS_FLOAT32) {
+        memcpy(&narrow, entry, sizeof narrow);
+        return (double)narrow;
+    }
+    memcpy(&x, entry, sizeof x);
+    return x;
 }
 
-#if HAS_SSE2
-/* What `join_range` does of each of LANES entries or more, written out: compilers do not find it.
- * The last LANES are looked at together, even if some have been before. */
-HS_ALWAYS_INLINE void
-widen_lanes(const double *x, int64_t n, range *found)
+/* Coordinate k of point i. */
+static double
+entry_at(const hs_points *points, int64_t i, int k)
 {
-    __m128d lower[LANES / 2], upper[LANES / 2], poison[LANES / 2];
-    double  ends[3][2];
-    for (int pair = 0; pair < LANES / 2; pair++) {
-        lower[pair] = _mm_set1_pd(INFINITY);
-        upper[pair] = _mm_set1_pd(-INFINITY);
-        poison[pair] = _mm_setzero_pd();
-    }
-    for (int64_t i = 0; i < n; i += LANES) {
-        const double *from = x + (i + LANES <= n ? i : n - LANES);
-        for (int pair = 0; pair < LANES / 2; pair++) {
-            const __m128d entries = _mm_loadu_pd(from + 2 * pair);
-            lower[pair] = _mm_min_pd(entries, lower[pair]); /* the second of them if one is NaN */
-            upper[pair] = _mm_max_pd(entries, upper[pair]);
-            poison[pair] = _mm_add_pd(poison[pair], _mm_sub_pd(entries, entries));
-        }
-    }
-    for (int pair = 1; pair < LANES / 2; pair++) {
-        lower[0] = _mm_min_pd(lower[pair], lower[0]);
-        upper[0] = _mm_max_pd(upper[pair], upper[0]);
-        poison[0] = _mm_add_pd(poison[0], poison[pair]);
-    }
-    _mm_storeu_pd(ends[0], lower[0]);
-    _mm_storeu_pd(ends[1], upper[0]);
-    _mm_storeu_pd(ends[2], poison[0]);
-    join_range(ends[0][0], ends[1][0], ends[2][0], found);
-    join_range(ends[0][1], ends[1][1], ends[2][1], found);
+    return read_entry((const char *)points->data + i * points->row_stride +
+                          k * points->column_stride,
+                      points->real);
 }
-#else
-HS_ALWAYS_INLINE void
-widen_lanes(const double *x, int64_t n, range *found)
-{
-    double lower[LANES], upper[LANES], poison[LANES] = {0.0};
-    for (int lane = 0; lane < LANES; lane++) {
-        lower[lane] = INFINITY;
-        upper[lane] = -INFINITY;
-    }
-    for (int64_t i = 0; i < n; i += LANES) {
-        const double *from = x + (i + LANES <= n ? i : n - LANES);
-        for (int lane = 0; lane < LANES; lane++) {
-            const double entry = from[lane];
-            lower[lane] = entry < lower[lane] ? entry : lower[lane];
-            upper[lane] = entry > upper[lane] ? entry : upper[lane];
-            poison[lane] += entry - entry;
-        }
-    }
-    for (int lane = 0; lane < LANES; lane++) {
-        join_range(lower[lane], upper[lane], poison[lane], found);
-    }
-}
-#endif
 
-static void
-find_range(const double *x, int64_t n, range *found)
+/* Copies points [first, last). Inlined with constants for the type, ndim and column_stride. */
+HS_ALWAYS_INLINE void
+copy_rows(const hs_points *points, const hs_real real, int ndim, ptrdiff_t column_stride,
+          int64_t first, int64_t last, double *const *x)
 {
-    if (n >= LANES) {
-        widen_lanes(x, n, found);
-        return;
+    double *to[HS_MAX_DIM];
+    for (int k = 0; k < ndim; k++) {
+        to[k] = x[k];
     }
-    for (int64_t i = 0; i < n; i++) {
-        join_range(x[i], x[i], x[i] - x[i], found);
+    for (int64_t i = first; i < last; i++) { /* no address behind the last point: it may overflow */
+        const char *row = (const char *)points->data + i * points->row_stride;
+        for (int k = 0; k < ndim; k++) {
+            to[k][i] = read_entry(row + k * column_stride, real);
+        }
     }
 }
 
@@ -124,34 +85,28 @@ load_slab(void *context, int slab, int64_t first, int64_t last)
     loading         *load = context;
     const hs_points *points = load->points;
     double *const   *x = load->cloud->x;
+    const int        d = points->ndim;
+    const ptrdiff_t  narrow = (ptrdiff_t)sizeof(float), wide = (ptrdiff_t)sizeof(double);
+    const ptrdiff_t  stride = points->column_stride;
     for (int64_t begin = first; begin < last; begin += TILE) {
         const int64_t end = last - begin < TILE ? last : begin + TILE;
-        if (points->real == HS_FLOAT32) {
-            load_rows_f32(points, begin, end, x);
+        /* The common shapes apart, so that their loops have no inner loop. */
+        if (points->real == HS_FLOAT64 && d == 3 && stride == wide) {
+            copy_rows(points, HS_FLOAT64, 3, wide, begin, end, x);
+        } else if (points->real == HS_FLOAT64 && d == 2 && stride == wide) {
+            copy_rows(points, HS_FLOAT64, 2, wide, begin, end, x);
+        } else if (points->real == HS_FLOAT64) {
+            copy_rows(points, HS_FLOAT64, d, stride, begin, end, x);
+        } else if (d == 3 && stride == narrow) {
+            copy_rows(points, HS_FLOAT32, 3, narrow, begin, end, x);
         } else {
-            load_rows_f64(points, begin, end, x);
+            copy_rows(points, HS_FLOAT32, d, stride, begin, end, x);
         }
-        for (int k = 0; k < points->ndim; k++) {
-            find_range(x[k] + begin, end - begin, &load->found[slab][k]);
+        for (int k = 0; k < d; k++) {
+            hs_range_widen(x[k] + begin, end - begin, &load->found[slab][k]);
         }
     }
     return HS_OK;
-}
-
-/* Coordinate k of point i. */
-static double
-entry_at(const hs_points *points, int64_t i, int k)
-{
-    const char *entry =
-        (const char *)points->data + i * points->row_stride + k * points->column_stride;
-    float  narrow;
-    double x;
-    if (points->real == HS_FLOAT32) {
-        memcpy(&narrow, entry, sizeof narrow);
-        return (double)narrow;
-    }
-    memcpy(&x, entry, sizeof x);
-    return x;
 }
 
 hs_status
@@ -171,26 +126,6 @@ hs_points_check_finite(const hs_points *points, hs_failure *failure)
     return HS_OK;
 }
 
-static bool
-allocate(hs_account *account, hs_cloud *cloud)
-{
-    const int64_t pitch = hs_column_pitch(cloud->n, sizeof(double));
-    const int64_t for_order = hs_column_pitch(cloud->n, sizeof(int32_t)) / 2;
-    const int64_t n_entries = for_order + (cloud->ndim + 1) * pitch + HS_PADDING;
-    cloud->block = hs_alloc(account, HS_FOR_POINTS, n_entries, sizeof(double));
-    if (cloud->block == NULL) {
-        return false;
-    }
-    hs_account_reassign(account, HS_FOR_POINTS, HS_FOR_ORDER,
-                        (for_order + pitch) * (int64_t)sizeof(double));
-    cloud->order = cloud->block;
-    cloud->spare = (double *)cloud->block + for_order;
-    for (int k = 0; k < cloud->ndim; k++) {
-        cloud->x[k] = cloud->spare + (k + 1) * pitch;
-    }
-    return true;
-}
-
 hs_status
 hs_cloud_load(hs_account *account, hs_team *team, const hs_points *points,
               const hs_options *options, hs_cloud *cloud, hs_failure *failure)
@@ -201,34 +136,44 @@ hs_cloud_load(hs_account *account, hs_team *team, const hs_points *points,
                             : HS_SLABS;
     HS_ASSERT(points->n <= INT32_MAX); /* hs_check_points */
     *cloud = (hs_cloud){.n = points->n, .ndim = points->ndim};
-    if (!allocate(account, cloud)) {
+    const int64_t pitch = hs_column_pitch(cloud->n, sizeof(double));
+    const int64_t for_order = hs_column_pitch(cloud->n, sizeof(int32_t)) / 2;
+    const int64_t n_entries = for_order + (cloud->ndim + 1) * pitch + HS_PADDING;
+    cloud->block = hs_alloc(account, HS_FOR_POINTS, n_entries, sizeof(double));
+    if (cloud->block == NULL) {
         return HS_ERR_MEMORY;
+    }
+    hs_account_reassign(account, HS_FOR_POINTS, HS_FOR_ORDER,
+                        (for_order + pitch) * (int64_t)sizeof(double));
+    cloud->order = cloud->block;
+    cloud->spare = (double *)cloud->block + for_order;
+    for (int k = 0; k < cloud->ndim; k++) {
+        cloud->x[k] = cloud->spare + (k + 1) * pitch;
     }
     load.points = points;
     load.cloud = cloud;
     for (int slab = 0; slab < n_slabs; slab++) {
         for (int k = 0; k < cloud->ndim; k++) {
-            load.found[slab][k] = no_range;
+            load.found[slab][k] = HS_NO_RANGE;
         }
     }
     hs_status status = hs_walk_slabs(team, options, points->n, load_slab, &load);
     double    poison = 0.0; /* of all slabs */
     for (int k = 0; status == HS_OK && k < cloud->ndim; k++) {
-        range all = no_range;
+        cloud->lower[k] = INFINITY;
+        cloud->upper[k] = -INFINITY;
         for (int slab = 0; slab < n_slabs; slab++) {
-            const range *found = &load.found[slab][k];
-            join_range(found->lower, found->upper, found->poison, &all);
+            const hs_range *found = &load.found[slab][k];
+            cloud->lower[k] = hs_smaller(found->lower, cloud->lower[k]);
+            cloud->upper[k] = hs_larger(found->upper, cloud->upper[k]);
+            poison += found->poison;
         }
-        cloud->lower[k] = all.lower;
-        cloud->upper[k] = all.upper;
-        cloud->largest = hs_larger(hs_larger(-all.lower, all.upper), cloud->largest);
-        poison += all.poison;
+        cloud->largest = hs_larger(hs_larger(-cloud->lower[k], cloud->upper[k]), cloud->largest);
     }
     if (status == HS_OK && poison != 0.0) {
-        const hs_points columns = {
-            cloud->x[0],    cloud->n,
-            cloud->ndim,    HS_FLOAT64,
-            sizeof(double), hs_column_pitch(cloud->n, sizeof(double)) * (ptrdiff_t)sizeof(double)};
+        const ptrdiff_t size = (ptrdiff_t)sizeof(double);
+        const hs_points columns = {cloud->x[0], cloud->n, cloud->ndim,
+                                   HS_FLOAT64,  size,     pitch * size};
         status = hs_points_check_finite(&columns, failure);
     }
     if (status != HS_OK) {

@@ -41,6 +41,9 @@ hs_column_pitch(int64_t n, size_t size)
     return (n + per_line - 1) / per_line * per_line;
 }
 
+/* HS_OK, HS_ERR_ARGUMENT, or HS_ERR_TOO_MANY for 2^31 points or more. points: or NULL. */
+hs_status hs_check_points(const hs_points *points, hs_failure *failure);
+
 /* Copies and checks, polling now and then. HS_ERR_NOT_FINITE names the first bad row and column;
  * HS_ERR_TOO_MANY from 2^31 points on. On failure the cloud holds nothing. */
 hs_status hs_cloud_load(hs_account *account, hs_team *team, const hs_points *points,

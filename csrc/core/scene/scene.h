@@ -20,7 +20,6 @@ typedef struct hs_scene {
     int64_t    n;
     hs_scale   scale;
     hs_scale   unscale; /* the way back */
-    hs_scale   pending; /* scale, less what closing gaps has already scaled */
     hs_lattice lattice;
     double     sought;         /* the caller's cutoff, not scaled; less if no two points are so far
                                * apart */
@@ -28,7 +27,7 @@ typedef struct hs_scene {
     double     cutoff_low;     /* at most the true one */
     double     radius;         /* candidates are sought up to here; cutoff, or a little more */
     double less[HS_MAX_DIM];   /* so much less than the radius can t_k of a pair differ; mostly 0 */
-    bool   is_ordinary;        /* of open space, and searched as the points were given */
+    bool   is_ordinary;        /* searched as the points were given: no number is far */
     bool   extreme;            /* scaling lost digits: pairs are decided on the originals */
     hs_metric metric;          /* decides on X, or on the originals if there are any */
     hs_cloud  cloud;           /* its columns are X, in the caller's order, once that is known */
@@ -46,13 +45,6 @@ typedef struct hs_scene {
     bool      is_kept;               /* the bounds above hold for queries that come later, too */
     bool      in_one_cell;           /* kept, but no scale holds it (scene_put_in_one_cell) */
     bool      is_untested;           /* only cells are wanted: bounds for these alone will do */
-    bool      is_plain;              /* the cutoff is taken as it is; gaps are closed only if
-                                       * need be */
-    bool      is_wide;               /* X is not made float32 */
-    double    least_cutoff;          /* smallest positive length that pairs are compared with;
-                                       * 0: the cutoff */
-    double    within;                /* where is_wide: farther pairs do not matter; 0: all pairs
-                                       * do */
 } hs_scene;
 
 /* The points to search among, and the points whose neighbours are sought; borrowed. */
@@ -123,14 +115,15 @@ hs_status hs_scene_make(hs_account *account, hs_team *team, const hs_sets *sets,
                         const hs_options *options, hs_scene *scene, hs_scene *asking,
                         hs_failure *failure);
 
-/* Whether a scene that was kept can take this cloud as it was loaded: no larger numbers, none that
- * its scale would round unless only cells are wanted. */
-bool hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud);
-
 /* Names, of queries whose cells are wanted, row, column and value of the first coordinate that a
  * kept scene does not take; if each alone would do, the largest. Names none where no query would
  * do. */
 void hs_scene_name_refused(const hs_scene *kept, const hs_points *queries, hs_failure *failure);
+
+/* For a box whose short vectors float64 does not tell points along (HS_ERR_BOX_SKEWED): names the
+ * farthest point or query, where it is to blame, since it lies far outside along an open axis.
+ * asking: NULL without queries. */
+void hs_scene_name_outlier(const hs_scene *scene, const hs_scene *asking, hs_failure *failure);
 
 /*
  * Queries that meet the points of a scene that was made to be kept, as a scene of their own.
@@ -143,13 +136,6 @@ hs_status hs_scene_from_kept(hs_account *account, hs_team *team, const hs_scene 
 
 /* Sets cutoff, radius and metric for another cutoff of a scene that is not extreme. */
 void hs_scene_set_cutoff(hs_scene *scene, const hs_options *options);
-
-/* Wraps columns that scaling would make infinite, or that lie more box vectors away than turns can
- * tell, in the caller's unit. For scenes whose S is not wanted, before they are scaled. */
-void hs_scene_fold_far(hs_scene *scene);
-
-/* Sets the range of the grid coordinates: the points' own where open, one period where periodic. */
-void hs_scene_scale_ranges(hs_scene *scene);
 
 /* Sets what decides: X and B where they hold every digit, else points and box vectors as given. */
 void hs_scene_init_metric(hs_scene *scene, const hs_options *options);
@@ -174,37 +160,12 @@ void hs_scene_free(hs_account *account, hs_scene *scene);
 /* The power of two that a scene is scaled by, so that the search has ordinary numbers. */
 
 /*
- * How far is far? So many powers of two beyond a length, each for a reason of its own. hs_is_far
- * tells.
- */
-/* Beyond so many cutoffs gaps between the points are closed: float64 numbers are multiples of four
- * cutoffs there. */
-#define HS_FAR_EXPONENT 54
-/*
- * Beyond so many largest distances they are in a bounded search for the nearest. Wrapped into a
- * coupled box, coordinates err by 2^-52 of the largest one. The radius that is looked at is 2^10
- * times the error of two at least (candidates.c), so it passes the largest distance from here
+ * Beyond so many largest distances gaps are closed in a bounded search for the nearest. Wrapped
+ * into a coupled box, coordinates err by 2^-52 of the largest one. The radius that is looked at is
+ * 2^10 times the error of two at least (candidates.c), so it passes the largest distance from here
  * on, and soon spans many images.
  */
 #define HS_FAR_BOUNDED_EXPONENT 40
-/* Points may be 2^51 box vectors away, where turns are integers that float64 holds; there is one
- * order to spare. What is further away is refused or wrapped before it is scaled. */
-#define HS_FAR_TURNS_EXPONENT 52
-/*
- * Scaled coordinates and box entries stay below 2^57, so that squares of sums of a few are finite
- * in float32. Closing gaps keeps to that along open and aligned axes; what remains, coupled by a
- * skewed box, is known to within 2^-53 of the largest only, so that a cutoff may well be smaller
- * than 1 then.
- */
-#define HS_LARGEST_EXPONENT 56
-/* So many vectors of the box in a cutoff have more images than any memory holds. */
-#define HS_FAR_IMAGES_EXPONENT 64
-/* Open axes that are so many times as long leave less than 2^-10 of a coupled box certain: wrapping
- * errs by some 2^-99 of the largest coordinate (wrap.h). */
-#define HS_FAR_DROWNING_EXPONENT 88
-/* Where no float32 is made of scaled numbers they stay below 2^901, so that sums of a few are
- * finite. */
-#define HS_LARGEST_WIDE_EXPONENT 900
 
 /* x = m 2^e with 1 <= m < 2: e. Of zero a very small number, of infinity a very large one. */
 int hs_exponent_of(double x);
@@ -228,9 +189,8 @@ hs_box_size hs_box_size_of(const hs_box *box);
  * outlives the call (pair_list.h) compares and decides with. */
 
 typedef struct hs_frame {
-    hs_points points; /* one point behind another, of the caller's type */
+    hs_points points; /* in the store: one point behind another, of the caller's type */
     hs_store  store;
-    void     *rows;    /* in it; what points.data is */
     double    largest; /* largest |x| of all coordinates, 0 without points */
     bool      has_box;
     hs_box    box;

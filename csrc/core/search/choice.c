@@ -7,15 +7,6 @@
 /* choice.c: what the caller selects is checked; points, box and labels are kept where they are
  * needed. */
 
-/* Idempotent. */
-static void
-partners_free(hs_account *account, hs_partners *rows)
-{
-    hs_free(account, rows->first);
-    hs_free(account, rows->number);
-    *rows = (hs_partners){NULL, NULL};
-}
-
 /*
  * Excluded partners of each asking point, in CSR form: each way round, or from queries to points
  * alone. HS_ERR_ARGUMENT for numbers that are no point's (failure->row), or HS_ERR_MEMORY. To be
@@ -60,7 +51,7 @@ partners_open(const hs_selection *selection, int64_t n_asking, int64_t n_points,
         }
         hs_starts_of_ends(first, n_asking + 1);
         for (int64_t r = 0; r < n_asking; r++) {
-            hs_sort_numbers(others + first[r], first[r + 1] - first[r], others + n);
+            hs_sort_numbers(others + first[r], first[r + 1] - first[r], 0, others + n);
         }
         for (int64_t e = 0; e < n; e++) {
             number[e] = (int32_t)others[e];
@@ -106,17 +97,6 @@ hs_choice_keep_points(const hs_sets *sets, hs_call *call, hs_failure *failure)
     return status;
 }
 
-/* Copies an array, if it is there, to `*to`, which moves on by its length. */
-static void
-copy_labels(const int64_t **labels, int64_t n, int64_t **to)
-{
-    if (*labels != NULL) {
-        memcpy(*to, *labels, (size_t)n * sizeof **labels);
-        *labels = *to;
-        *to += n;
-    }
-}
-
 hs_status
 hs_choice_keep_labels(const hs_sets *sets, hs_call *call)
 {
@@ -130,9 +110,12 @@ hs_choice_keep_labels(const hs_sets *sets, hs_call *call)
     if (choice->copies == NULL) {
         return HS_ERR_MEMORY;
     }
-    int64_t *to = choice->copies;
-    copy_labels(&choice->group, n, &to);
-    copy_labels(&choice->label, n, &to);
+    const int64_t **kept[] = {&choice->group, &choice->label};
+    for (int64_t k = 0; k < 2; k++) {
+        if (*kept[k] != NULL) {
+            *kept[k] = memcpy(choice->copies + k * n, *kept[k], (size_t)n * sizeof **kept[k]);
+        }
+    }
     choice->asking_group = choice->group;
     choice->asking_label = choice->label;
     return HS_OK;
@@ -164,30 +147,21 @@ has_labels(const hs_selection *selection, const hs_points *points, const hs_set 
                              (set.labels != NULL || !selection->has_labels));
 }
 
-/* Whether all queries have the number of a point, if they have one at all. */
-static bool
-are_numbers(const int64_t *numbers, const hs_sets *sets)
-{
-    const int64_t n = numbers != NULL && sets->queries != NULL ? sets->queries->n : 0;
-    int64_t       outside = 0;
-    for (int64_t t = 0; t < n; t++) {
-        outside += numbers[t] < 0 || numbers[t] >= sets->points->n;
-    }
-    return outside == 0;
-}
-
 static bool
 is_sound(const hs_selection *selection, const hs_sets *sets, const hs_options *options)
 {
-    const int64_t n = selection->n_excluded;
-    const bool    are_points = selection->query_numbers != NULL;
+    const int64_t n = selection->n_excluded, *numbers = selection->query_numbers;
+    const int64_t n_queries = sets->queries != NULL ? sets->queries->n : 0;
+    int64_t       outside = 0; /* queries that are points, but have no point's number */
+    for (int64_t t = 0; numbers != NULL && t < n_queries; t++) {
+        outside += numbers[t] < 0 || numbers[t] >= sets->points->n;
+    }
     return selection->within >= 0 && n >= 0 && n <= INT64_MAX / 1024 &&
            (n == 0 || selection->excluded != NULL) && selection->min_distance >= 0.0 &&
            isfinite(selection->min_distance) &&
-           (selection->min_distance == 0.0 || options->precision != HS_SINGLE) &&
-           are_numbers(selection->query_numbers, sets) &&
+           (selection->min_distance == 0.0 || options->precision != HS_SINGLE) && outside == 0 &&
            has_labels(selection, sets->points, sets->of_points) &&
-           (are_points || sets->queries == NULL ||
+           (numbers != NULL || sets->queries == NULL ||
             has_labels(selection, sets->queries, sets->of_queries));
 }
 
@@ -243,7 +217,8 @@ hs_choice_close(hs_call *call)
     hs_cloud_free(account, &choice->asking_cloud);
     hs_cloud_free(account, &choice->cloud);
     hs_free(account, choice->copies);
-    partners_free(account, &choice->partners);
+    hs_free(account, choice->partners.first);
+    hs_free(account, choice->partners.number);
     hs_free(account, choice);
     call->choice = NULL;
 }
@@ -276,58 +251,32 @@ hs_choice_cut(const hs_choice *all, int64_t first_point, int64_t first_query, hs
 /* One loop without branches for each test; it writes each hit, and goes on behind those that
  * stay. */
 
-static bool
-has_partner(const hs_asking *asking, int32_t number)
+HS_ALWAYS_INLINE bool
+is_left_out(const hs_asking *asking, int32_t id, const hs_label_test test)
 {
-    const int32_t *partner = asking->partner;
-    int64_t        first = 0, n = asking->n_partners;
+    const int64_t one = test != HS_OF_PARTNER ? asking->label[id] : 0, own = asking->own;
+    if (test == HS_OF_OTHER_GROUP) {
+        return one != own;
+    }
+    if (test == HS_OF_EQUAL_LABEL) {
+        return one == own && id != asking->itself;
+    }
+    if (test == HS_OF_NEAR_LABEL) { /* their difference may pass int64 */
+        const uint64_t more = one > own ? (uint64_t)one - (uint64_t)own
+                                        : (uint64_t)own - (uint64_t)one;
+        return more <= asking->within && id != asking->itself;
+    }
+    const int32_t number = id + asking->origin, *partner = asking->partner;
+    int64_t       first = 0, n = asking->n_partners;
+    if (!(asking->bits >> (number & 63) & 1) || id == asking->itself) {
+        return false;
+    }
     while (n > 1) { /* it is at first or behind it, if at all */
         const int64_t half = n / 2;
         first += partner[first + half] <= number ? half : 0;
         n -= half;
     }
     return partner[first] == number;
-}
-
-/* Whether labels differ by at most so much; their difference may pass int64. */
-HS_ALWAYS_INLINE bool
-are_near(int64_t one, int64_t other, uint64_t within)
-{
-    const uint64_t more = one > other ? (uint64_t)one - (uint64_t)other
-                                      : (uint64_t)other - (uint64_t)one;
-    return more <= within;
-}
-
-HS_ALWAYS_INLINE bool
-is_left_out(const hs_asking *asking, int32_t id, const hs_label_test test)
-{
-    switch (test) {
-    case HS_OF_OTHER_GROUP: return asking->label[id] != asking->own;
-    case HS_OF_EQUAL_LABEL: return asking->label[id] == asking->own && id != asking->itself;
-    case HS_OF_NEAR_LABEL:
-        return are_near(asking->label[id], asking->own, asking->within) && id != asking->itself;
-    default:
-        return (asking->bits >> ((id + asking->origin) & 63) & 1) &&
-               has_partner(asking, id + asking->origin) && id != asking->itself;
-    }
-}
-
-/* The partners that pairs of the chooser's point are excluded with; false where it has none. */
-static bool
-find_partners(const hs_choice *choice, hs_chooser *chooser)
-{
-    const hs_partners *partners = &choice->partners;
-    hs_asking         *asking = &chooser->excluding;
-    if (partners->first == NULL) {
-        return false;
-    }
-    asking->partner = partners->number + partners->first[chooser->point];
-    asking->n_partners = partners->first[chooser->point + 1] - partners->first[chooser->point];
-    asking->origin = (int32_t)choice->origin;
-    for (int64_t p = 0; p < asking->n_partners && asking->bits != UINT64_MAX; p++) {
-        asking->bits |= UINT64_C(1) << (asking->partner[p] & 63);
-    }
-    return asking->n_partners > 0;
 }
 
 void
@@ -347,25 +296,32 @@ hs_chooser_set(const hs_choice *choice, int32_t asking, hs_chooser *chooser)
         chooser->excluding.within = choice->within;
         chooser->test = choice->within == 0 ? HS_OF_EQUAL_LABEL : HS_OF_NEAR_LABEL;
         chooser->excludes = true;
-    } else {
-        chooser->excludes = find_partners(choice, chooser);
+    } else if (choice->partners.first != NULL) {
+        const int64_t *first = choice->partners.first + point;
+        hs_asking     *by = &chooser->excluding;
+        by->partner = choice->partners.number + first[0];
+        by->n_partners = first[1] - first[0];
+        by->origin = (int32_t)choice->origin;
+        for (int64_t p = 0; p < by->n_partners && by->bits != UINT64_MAX; p++) {
+            by->bits |= UINT64_C(1) << (by->partner[p] & 63);
+        }
+        chooser->excludes = by->n_partners > 0;
     }
 }
 
 HS_ALWAYS_INLINE int32_t
 keep_chosen(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, int32_t from,
-            int32_t end, int32_t to, const hs_label_test test, const bool by_id)
+            int32_t end, int32_t to, const hs_label_test test)
 {
     int32_t *hits = scan->hits;
     float   *squares = scan->squares;
     for (int32_t h = from; h < end; h++) {
         const int32_t hit = hits[h];
-        const int32_t id = by_id ? hit : hs_hit_number(scanner, hit);
         hits[to] = hit;
         if (squares != NULL) {
             squares[to] = squares[h];
         }
-        to += !is_left_out(asking, id, test);
+        to += !is_left_out(asking, hs_hit_number(scanner, hit), test);
     }
     return to;
 }
@@ -392,44 +348,20 @@ hs_chooser_excludes(const hs_chooser *chooser, int32_t number)
 }
 
 /* Moves hits [from, end) that the test does not leave out to `to`, which is not behind them;
- * returns where they end. Hits are numbers where these are scanned for, else as scans list them. */
+ * returns where they end. */
 static int32_t
 keep_by_label(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, int32_t from,
               int32_t end, int32_t to, hs_label_test test)
 {
-    const bool by_id = scanner->scans == HS_BLOCK_LISTS_IDS;
     switch (test) {
     case HS_OF_OTHER_GROUP:
-        return by_id ? keep_chosen(scanner, scan, asking, from, end, to, HS_OF_OTHER_GROUP, true)
-                     : keep_chosen(scanner, scan, asking, from, end, to, HS_OF_OTHER_GROUP, false);
+        return keep_chosen(scanner, scan, asking, from, end, to, HS_OF_OTHER_GROUP);
     case HS_OF_EQUAL_LABEL:
-        return by_id ? keep_chosen(scanner, scan, asking, from, end, to, HS_OF_EQUAL_LABEL, true)
-                     : keep_chosen(scanner, scan, asking, from, end, to, HS_OF_EQUAL_LABEL, false);
+        return keep_chosen(scanner, scan, asking, from, end, to, HS_OF_EQUAL_LABEL);
     case HS_OF_NEAR_LABEL:
-        return by_id ? keep_chosen(scanner, scan, asking, from, end, to, HS_OF_NEAR_LABEL, true)
-                     : keep_chosen(scanner, scan, asking, from, end, to, HS_OF_NEAR_LABEL, false);
-    default:
-        return by_id ? keep_chosen(scanner, scan, asking, from, end, to, HS_OF_PARTNER, true)
-                     : keep_chosen(scanner, scan, asking, from, end, to, HS_OF_PARTNER, false);
+        return keep_chosen(scanner, scan, asking, from, end, to, HS_OF_NEAR_LABEL);
+    default: return keep_chosen(scanner, scan, asking, from, end, to, HS_OF_PARTNER);
     }
-}
-
-/* The same by the point's group; without groups all are moved. */
-static int32_t
-keep_by_group(const hs_scanner *scanner, hs_scan *scan, const hs_chooser *chooser, int32_t from,
-              int32_t end, int32_t to)
-{
-    const size_t n = (size_t)(end - from);
-    if (chooser->of_group.label != NULL) {
-        return keep_by_label(scanner, scan, &chooser->of_group, from, end, to, HS_OF_OTHER_GROUP);
-    }
-    if (to < from) {
-        memmove(scan->hits + to, scan->hits + from, n * sizeof *scan->hits);
-        if (scan->squares != NULL) {
-            memmove(scan->squares + to, scan->squares + from, n * sizeof *scan->squares);
-        }
-    }
-    return to + (int32_t)n;
 }
 
 /* Labels are compared for all hits, one point after the other. Where that leaves images or
@@ -450,14 +382,6 @@ typedef struct hit_batch {
     uint8_t     drop[HS_BATCH];  /* 0 or 1 */
 } hit_batch;
 
-static void
-add_hit(const hs_scan *scan, int32_t h, hit_batch *batch)
-{
-    batch->hit[batch->n] = h;
-    batch->place[batch->n] = hs_hit_place(batch->scanner, scan->hits[h]);
-    batch->id[batch->n++] = hs_hit_number(batch->scanner, scan->hits[h]);
-}
-
 /* Looks up the pairs of the batch. */
 static hs_status
 look_up_batch(hit_batch *batch, bool metric)
@@ -467,15 +391,6 @@ look_up_batch(hit_batch *batch, bool metric)
     (void)hs_pair_batch_add(&scanner->pair_batch, scanner->group.first + batch->t, batch->place,
                             batch->n);
     return hs_pair_batch_look_up(&scanner->pair_batch, metric, &scanner->failed_point);
-}
-
-/* Shift e of the pair batch over the periodic box vectors, from a point to a candidate. */
-static void
-given_shift(const hs_pair_batch *pair_batch, int32_t e, int64_t *shift)
-{
-    for (int r = 0; r < pair_batch->search->scene.lattice.n_periodic; r++) {
-        shift[r] = pair_batch->of.is_narrow ? pair_batch->shift[r][e] : pair_batch->given[r][e];
-    }
 }
 
 static void
@@ -515,7 +430,9 @@ drop_nearest(const hs_choice *choice, hit_batch *batch)
     scanner->work_since_poll += WORK_OF_IMAGE * (int64_t)batch->n;
     for (int32_t e = 0; status == HS_OK && e < batch->n; e++) {
         bool nearest;
-        given_shift(&scanner->pair_batch, e, shift);
+        for (int r = 0; r < scanner->pair_batch.n_rows; r++) {
+            shift[r] = scanner->pair_batch.given[r][e];
+        }
         status = hs_choice_is_nearest(choice, batch->point, batch->id[e], shift, &nearest);
         if (status != HS_OK) {
             scanner->failed_point = batch->point;
@@ -523,18 +440,6 @@ drop_nearest(const hs_choice *choice, hit_batch *batch)
         batch->drop[e] = nearest;
     }
     return status;
-}
-
-/* Whether pair e of the pair batch, of a point with itself, is in the image S = 0. */
-static bool
-is_itself(const hs_pair_batch *pair_batch, int32_t e)
-{
-    int moved = 0;
-    for (int r = 0; r < pair_batch->search->scene.lattice.n_periodic && pair_batch->is_shifted;
-         r++) {
-        moved += pair_batch->times[r][e] != 0.0;
-    }
-    return moved == 0;
 }
 
 /* Drops the pairs of the batch that are nearer than the least distance. */
@@ -553,40 +458,39 @@ drop_near(const hs_choice *choice, hit_batch *batch)
                    false);
     hs_decide_pair_batch(scanner, &nearer, batch->drop);
     for (int32_t e = 0; e < batch->n; e++) {
-        const bool own = !choice->has_queries && batch->id[e] == batch->point;
-        batch->drop[e] = batch->drop[e] && !(own && is_itself(&scanner->pair_batch, e));
+        const hs_pair_batch *pairs = &scanner->pair_batch;
+        bool                 is_itself = !choice->has_queries && batch->id[e] == batch->point;
+        for (int r = 0; r < pairs->n_rows && pairs->is_shifted; r++) {
+            is_itself = is_itself && pairs->times[r][e] == 0.0;
+        }
+        batch->drop[e] = batch->drop[e] && !is_itself;
     }
     return HS_OK;
 }
 
 #define DROPPED (-1) /* in place of a hit */
 
-/* Whether float32 cannot tell that a hit is as far as the least distance; out: beyond this square
- * it is. */
-HS_ALWAYS_INLINE bool
-may_be_near(const hs_scanner *scanner, int32_t t, int32_t hit, float out)
-{
-    float square = 0.0f;
-    for (int k = 0; k < scanner->search->scene.ndim; k++) {
-        const float along = scanner->block.y[k][hit] - scanner->group.q[k][t];
-        square += along * along;
-    }
-    return !(square > out);
-}
-
 /* Drops those of hits [from, end) of a point that are excluded and in their nearest image,
- * by_image, or nearer than the least distance; *left: where the others end. */
+ * by_image, or nearer than the least distance: float32 squares beyond `out` are not. *left: where
+ * the others end. */
 static hs_status
 drop_hits(const hs_chooser *chooser, bool by_image, float out, int32_t from, int32_t end,
           hit_batch *batch, hs_scan *scan, int32_t *left)
 {
-    hs_status status = HS_OK;
+    const hs_scanner *scanner = batch->scanner;
+    hs_status         status = HS_OK;
     batch->n = 0;
     for (int32_t h = from; status == HS_OK && h < end; h++) {
-        const int32_t hit = scan->hits[h];
-        if (by_image ? hs_chooser_excludes(chooser, hs_hit_number(batch->scanner, hit))
-                     : may_be_near(batch->scanner, batch->t, hit, out)) {
-            add_hit(scan, h, batch);
+        const int32_t hit = scan->hits[h], id = hs_hit_number(scanner, hit);
+        float         square = 0.0f;
+        for (int k = 0; !by_image && k < scanner->search->scene.ndim; k++) {
+            const float along = scanner->block.y[k][hit] - scanner->group.q[k][batch->t];
+            square += along * along;
+        }
+        if (by_image ? hs_chooser_excludes(chooser, id) : !(square > out)) {
+            batch->hit[batch->n] = h;
+            batch->place[batch->n] = hs_hit_place(scanner, hit);
+            batch->id[batch->n++] = id;
         }
         if (batch->n == 0 || (batch->n < HS_BATCH && h + 1 < end)) {
             continue;
@@ -612,17 +516,6 @@ drop_hits(const hs_chooser *chooser, bool by_image, float out, int32_t from, int
     return status;
 }
 
-/* Squares beyond this are those of pairs that are at least the least distance apart. */
-static float
-surely_far(const hs_scanner *scanner, const hs_choice *choice)
-{
-    const hs_scene *scene = &scanner->search->scene;
-    return scene->extreme ? INFINITY
-                          : hs_thresholds_of(scene->ndim, hs_choice_least(choice, scene),
-                                             scanner->form->extent, scanner->search->filter_error)
-                                .out;
-}
-
 /* Chooses among hits [from, scan->end[t]) of a point, and moves those that count to `to`; *end:
  * where they end. */
 static hs_status
@@ -631,8 +524,18 @@ choose_of_point(const hs_chooser *chooser, hit_batch *batch, hs_scan *scan, floa
 {
     const hs_scanner *scanner = batch->scanner;
     const hs_choice  *choice = chooser->choice;
+    const size_t      n = (size_t)(scan->end[batch->t] - from);
     hs_status         status = HS_OK;
-    *end = keep_by_group(scanner, scan, chooser, from, scan->end[batch->t], to);
+    *end = to + (int32_t)n;
+    if (chooser->of_group.label != NULL) {
+        *end = keep_by_label(scanner, scan, &chooser->of_group, from, scan->end[batch->t], to,
+                             HS_OF_OTHER_GROUP);
+    } else if (to < from) { /* without groups all are moved */
+        memmove(scan->hits + to, scan->hits + from, n * sizeof *scan->hits);
+        if (scan->squares != NULL) {
+            memmove(scan->squares + to, scan->squares + from, n * sizeof *scan->squares);
+        }
+    }
     const bool compares = hs_choice_compares(choice, scanner->options.cutoff);
     if (chooser->excludes && !compares) {
         *end = keep_by_label(scanner, scan, &chooser->excluding, to, *end, to, chooser->test);
@@ -645,33 +548,21 @@ choose_of_point(const hs_chooser *chooser, hit_batch *batch, hs_scan *scan, floa
     return status;
 }
 
-/* Hits as the visitor gets them. */
-static void
-restore_hits(const hs_scanner *scanner, hs_scan *scan)
-{
-    if (scanner->scans != HS_BLOCK_LISTS_PLACES) {
-        return;
-    }
-    if (scanner->use == HS_BLOCK_LISTS_IDS) {
-        for (int64_t h = 0; h < scan->n_hits; h++) {
-            scan->hits[h] = hs_hit_number(scanner, scan->hits[h]);
-        }
-    } else if (scanner->is_ordered) {
-        for (int64_t h = 0; h < scan->n_hits; h++) {
-            scan->hits[h] = hs_hit_place(scanner, scan->hits[h]);
-        }
-    }
-}
-
 hs_status
 hs_choose(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
 {
-    const hs_choice *choice = scanner->search->call->choice;
-    const hs_bins   *asking = hs_search_asking(scanner->search);
-    const float      out = choice->min_distance > 0.0 ? surely_far(scanner, choice) : 0.0f;
+    const hs_search *search = scanner->search;
+    const hs_choice *choice = search->call->choice;
+    const hs_bins   *asking = hs_search_asking(search);
     hit_batch        batch = {.scanner = scanner};
     int32_t          kept = 0, from = 0;
     hs_status        status = HS_OK;
+    float            out = INFINITY; /* squares beyond this are at least the least distance apart */
+    if (choice->min_distance > 0.0 && !search->scene.extreme) {
+        out = hs_thresholds_of(search->scene.ndim, hs_choice_least(choice, &search->scene),
+                               scanner->form->extent, search->filter_error)
+                  .out;
+    }
     for (int32_t t = first; status == HS_OK && t < next; t++) {
         const int32_t end = scan->end[t];
         hs_chooser    chooser;
@@ -683,6 +574,13 @@ hs_choose(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
         scan->end[t] = kept;
     }
     scan->n_hits = kept;
-    restore_hits(scanner, scan);
+    /* Hits as the visitor gets them. */
+    for (int32_t h = 0; scanner->use == HS_BLOCK_LISTS_IDS && h < kept; h++) {
+        scan->hits[h] = hs_hit_number(scanner, scan->hits[h]);
+    }
+    for (int32_t h = 0; scanner->use == HS_BLOCK_LISTS_PLACES && scanner->is_ordered && h < kept;
+         h++) {
+        scan->hits[h] = hs_hit_place(scanner, scan->hits[h]);
+    }
     return status;
 }

@@ -3,7 +3,6 @@
 #define HS_SEARCH_CHOICE_H
 
 #include "../../halfshell.h"
-#include "../memory/memory.h"
 #include "../box/wrap.h"
 #include "../scene/scene.h"
 #include "../threads/call.h"
@@ -184,7 +183,7 @@ hs_hit_place(const hs_scanner *scanner, int32_t hit)
 HS_ALWAYS_INLINE int32_t
 hs_hit_number(const hs_scanner *scanner, int32_t hit)
 {
-    return scanner->search->bins.order[scanner->block.number[hs_hit_place(scanner, hit)]];
+    return scanner->block.id[hs_hit_place(scanner, hit)];
 }
 
 #endif

@@ -25,21 +25,6 @@ number_of(const hs_scanner *scanner, int32_t c)
     return block->number[scanner->is_ordered ? block->origin[c] : c];
 }
 
-/* The limits of each type with the candidates, a row a type. */
-static void
-lay_out_table(const hs_limit_table *table, const hs_scanner *scanner)
-{
-    const hs_block *block = &scanner->block;
-    for (int32_t row = 0; row < table->n_types; row++) {
-        const float *limits = table->near + row * table->n_types;
-        float       *to = block->radius + row * block->pitch;
-        for (int32_t c = 0; c < block->n; c++) {
-            to[c] = limits[table->of_points[number_of(scanner, c)]];
-        }
-        hs_pad_lanes(to, block->n);
-    }
-}
-
 void
 hs_limits_set(const hs_scanner *scanner, const hs_limit_form *form, hs_limit_scan *scan)
 {
@@ -57,9 +42,15 @@ hs_limits_set(const hs_scanner *scanner, const hs_limit_form *form, hs_limit_sca
         .row = has_table ? table->of_asking + scanner->group.first : NULL,
         .stride = block->pitch,
     };
-    if (has_table) {
-        lay_out_table(table, scanner);
-    } else if (of_points != NULL) {
+    for (int32_t row = 0; row < table->n_types && has_table; row++) { /* with each type */
+        const float *with = table->near + row * table->n_types;
+        float       *to = block->radius + row * block->pitch;
+        for (int32_t c = 0; c < block->n; c++) {
+            to[c] = with[table->of_points[number_of(scanner, c)]];
+        }
+        hs_pad_lanes(to, block->n);
+    }
+    if (!has_table && of_points != NULL) {
         for (int32_t c = 0; c < block->n; c++) {
             block->radius[c] = of_points[number_of(scanner, c)];
         }
@@ -80,20 +71,6 @@ hs_limits_set(const hs_scanner *scanner, const hs_limit_form *form, hs_limit_sca
 /* More than float64 and float32 round down. */
 #define UPWARDS (1.0 + 0x1p-23)
 
-/* One support. Those that float32 does not hold are zeros of infinite size, of which thresholds
- * make nothing sure. */
-static void
-lay_out_one(const double *numbers, int n_entries, double times, float *near)
-{
-    const double size = numbers[n_entries] * times;
-    const bool   fits = times >= LEAST_FACTOR && size >= (double)HS_LEAST_NEAR_SIZE &&
-                      size <= LARGEST_NEAR; /* not NaN either */
-    for (int e = 0; e < n_entries; e++) {
-        near[e] = fits ? (float)(numbers[e] * times) : 0.0f;
-    }
-    near[n_entries] = fits ? (float)(size * UPWARDS) : INFINITY;
-}
-
 /* Of the point in this place of the cells, of a side that the rule looks at. */
 static const double *
 support_of(const hs_support_side *side, int64_t si, int n_entries)
@@ -101,32 +78,24 @@ support_of(const hs_support_side *side, int64_t si, int n_entries)
     return side->numbers + (side->order[si] - side->first) * (n_entries + 1);
 }
 
+/* Those that float32 does not hold are zeros of infinite size, of which thresholds make nothing
+ * sure. */
 void
 hs_supports_lay_out(const hs_support_side *side, int64_t first, int64_t end, int ndim,
                     double extent, double unscale, float *near)
 {
-    const int    n_numbers = hs_support_numbers(ndim);
+    const int    n = hs_support_entries(ndim);
     const double times = unscale / extent;
     for (int64_t si = first; si < end; si++) {
-        lay_out_one(support_of(side, si, n_numbers - 1), n_numbers - 1, times,
-                    near + si * n_numbers);
-    }
-}
-
-/* The numbers of the candidates, a row for each. */
-static void
-lay_out_block(const float *near, const hs_scanner *scanner)
-{
-    const hs_block *block = &scanner->block;
-    const int       n_numbers = hs_support_numbers(scanner->search->scene.ndim);
-    for (int32_t c = 0; c < block->n; c++) {
-        const float *numbers = near + (int64_t)number_of(scanner, c) * n_numbers;
-        for (int e = 0; e < n_numbers; e++) {
-            block->radius[e * block->pitch + c] = numbers[e];
+        const double *numbers = support_of(side, si, n);
+        const double  size = numbers[n] * times;
+        const bool    fits = times >= LEAST_FACTOR && size >= (double)HS_LEAST_NEAR_SIZE &&
+                          size <= LARGEST_NEAR; /* not NaN either */
+        float *to = near + si * (n + 1);
+        for (int e = 0; e < n; e++) {
+            to[e] = fits ? (float)(numbers[e] * times) : 0.0f;
         }
-    }
-    for (int e = 0; e < n_numbers; e++) {
-        hs_pad_lanes(block->radius + e * block->pitch, block->n);
+        to[n] = fits ? (float)(size * UPWARDS) : INFINITY;
     }
 }
 
@@ -135,44 +104,28 @@ hs_supports_set(const hs_scanner *scanner, hs_scan *scan)
 {
     const hs_supports *supports = scanner->search->limits->supports;
     const int64_t      first = scanner->group.first;
+    const hs_block    *block = &scanner->block;
     const int          n_numbers = hs_support_numbers(scan->ndim);
-    const float       *asking = supports->of_asking.near;
+    const float       *asking = supports->of_asking.near, *points = supports->of_points.near;
     scan->supports = (hs_support_scan){
         .rule = supports->rule,
         .form = scanner->form->limits,
         .of_point = asking != NULL ? asking + first * n_numbers : NULL,
-        .of_block = scanner->block.radius,
-        .pitch = scanner->block.pitch,
+        .of_block = block->radius,
+        .pitch = block->pitch,
     };
     if (!supports->is_bounded) {
         scan->direct.in = INFINITY; /* no support reaches that far */
     }
-    if (supports->of_points.near != NULL) {
-        lay_out_block(supports->of_points.near, scanner);
+    for (int32_t c = 0; points != NULL && c < block->n; c++) { /* a row for each number */
+        const float *numbers = points + (int64_t)number_of(scanner, c) * n_numbers;
+        for (int e = 0; e < n_numbers; e++) {
+            block->radius[e * block->pitch + c] = numbers[e];
+        }
     }
-}
-
-/* The supports of pair e of the batch; NULL where the rule does not look at one. */
-typedef struct two_supports {
-    const double *asking, *point;
-    int           n_entries;
-} two_supports;
-
-static two_supports
-supports_of(const hs_scanner *scanner, int32_t e)
-{
-    const hs_supports   *supports = scanner->search->limits->supports;
-    const hs_pair_batch *pair_batch = &scanner->pair_batch;
-    const int            n_entries = hs_support_entries(scanner->search->scene.ndim);
-    const int32_t        sj = scanner->block.number[pair_batch->place[e]];
-    two_supports         of = {NULL, NULL, n_entries};
-    if (hs_rule_needs_asking(supports->rule)) {
-        of.asking = support_of(&supports->of_asking, pair_batch->si[e], n_entries);
+    for (int e = 0; points != NULL && e < n_numbers; e++) {
+        hs_pad_lanes(block->radius + e * block->pitch, block->n);
     }
-    if (hs_rule_needs_other(supports->rule)) {
-        of.point = support_of(&supports->of_points, sj, n_entries);
-    }
-    return of;
 }
 
 /* What two verdicts come to by the rule; a support that it does not look at is neither way. */
@@ -188,27 +141,40 @@ combine(hs_rule rule, hs_verdict one, hs_verdict other)
                                                         : HS_WITHIN;
 }
 
-/* One pair exactly; it counts once, by the stage that it took. */
+/* One pair, with the supports that the rule looks at or NULL; it counts once, by the stage that it
+ * took. Rounded, precision="double" and "single": one comparison of rounded numbers for each. */
 static bool
-decide_exactly(hs_scanner *scanner, const two_supports *of, const hs_span *span)
+decide_pair(hs_scanner *scanner, const double *const *numbers, const hs_span *span)
 {
     const hs_supports *supports = scanner->search->limits->supports;
     const hs_metric   *measure = &scanner->search->scene.metric;
     const hs_rule      rule = supports->rule;
-    const double      *numbers[2] = {of->asking, of->point};
+    const bool         is_exact = scanner->options.precision == HS_EXACT;
+    const bool         is_single = scanner->options.precision == HS_SINGLE;
+    const int          size_at = hs_support_entries(measure->ndim);
     /* Of a support that the rule does not look at, a verdict that changes nothing. */
     const hs_verdict neutral = rule == HS_RULE_MIN ? HS_WITHIN : HS_BEYOND;
     hs_verdict       verdict[2] = {neutral, neutral};
     hs_stages        stages = {0, 0, 0};
     hs_support_span  measured;
-    hs_support_span_of(measure, span, &measured);
+    if (is_exact) {
+        hs_support_span_of(measure, span, &measured);
+    }
     for (int n = 0; n < 2; n++) {
-        if (numbers[n] != NULL) {
+        if (numbers[n] != NULL && is_exact) {
             verdict[n] = hs_support_decide_double(&supports->metric, numbers[n],
-                                                  numbers[n][of->n_entries], &measured, &stages);
+                                                  numbers[n][size_at], &measured, &stages);
+        } else if (numbers[n] != NULL) {
+            verdict[n] =
+                hs_support_within_rounded(&supports->metric, numbers[n], measure, span, is_single)
+                    ? HS_WITHIN
+                    : HS_BEYOND;
         }
     }
     hs_verdict all = combine(rule, verdict[0], verdict[1]);
+    if (!is_exact) {
+        return all == HS_WITHIN;
+    }
     scanner->stages.by_integers += all == HS_UNDECIDED;
     scanner->stages.by_double_word += all != HS_UNDECIDED && stages.by_double_word > 0;
     scanner->stages.by_float64 += all != HS_UNDECIDED && stages.by_double_word == 0;
@@ -223,42 +189,22 @@ decide_exactly(hs_scanner *scanner, const two_supports *of, const hs_span *span)
     return all == HS_WITHIN;
 }
 
-/* precision="double" and "single": one comparison of rounded numbers for each support. */
-static bool
-decide_rounded(hs_scanner *scanner, const two_supports *of, const hs_span *span)
-{
-    const hs_supports *supports = scanner->search->limits->supports;
-    const hs_metric   *measure = &scanner->search->scene.metric;
-    const double      *numbers[2] = {of->asking, of->point};
-    const bool         is_single = scanner->options.precision == HS_SINGLE;
-    const hs_verdict   neutral = supports->rule == HS_RULE_MIN ? HS_WITHIN : HS_BEYOND;
-    hs_verdict         verdict[2] = {neutral, neutral};
-    for (int n = 0; n < 2; n++) {
-        if (numbers[n] != NULL) {
-            verdict[n] =
-                hs_support_within_rounded(&supports->metric, numbers[n], measure, span, is_single)
-                    ? HS_WITHIN
-                    : HS_BEYOND;
-        }
-    }
-    return combine(supports->rule, verdict[0], verdict[1]) == HS_WITHIN;
-}
-
-static bool
-decide_pair(hs_scanner *scanner, int32_t e)
-{
-    double             p[HS_MAX_DIM], q[HS_MAX_DIM];
-    int64_t            shift[HS_MAX_DIM];
-    const two_supports of = supports_of(scanner, e);
-    const hs_span      span = {p, q, hs_pair_batch_pair(&scanner->pair_batch, e, p, q, shift)};
-    return scanner->options.precision == HS_EXACT ? decide_exactly(scanner, &of, &span)
-                                                  : decide_rounded(scanner, &of, &span);
-}
-
 void
 hs_supports_decide(hs_scanner *scanner, uint8_t *within)
 {
-    for (int32_t e = 0; e < scanner->pair_batch.n; e++) {
-        within[e] = decide_pair(scanner, e);
+    const hs_supports   *supports = scanner->search->limits->supports;
+    const hs_pair_batch *pair_batch = &scanner->pair_batch;
+    const int            n_entries = hs_support_entries(scanner->search->scene.ndim);
+    for (int32_t e = 0; e < pair_batch->n; e++) {
+        double        p[HS_MAX_DIM], q[HS_MAX_DIM];
+        int64_t       shift[HS_MAX_DIM];
+        const int32_t si = pair_batch->si[e], sj = scanner->block.number[pair_batch->place[e]];
+        const hs_span span = {p, q, hs_pair_batch_pair(pair_batch, e, p, q, shift)};
+        const double *numbers[2] = {
+            hs_rule_needs_asking(supports->rule) ? support_of(&supports->of_asking, si, n_entries)
+                                                 : NULL,
+            hs_rule_needs_other(supports->rule) ? support_of(&supports->of_points, sj, n_entries)
+                                                : NULL};
+        within[e] = decide_pair(scanner, numbers, &span);
     }
 }

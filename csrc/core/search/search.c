@@ -25,24 +25,6 @@
 #define ROUNDING             1e-9   /* relative; far more than coordinates along axes are rounded */
 #define SURE_ERRORS          3.0    /* standard errors below the mean: sure enough to refuse */
 
-/*
- * A bound on the number of pairs. Each stencil offset pairs every cell with at most one other, so
- * by the Cauchy-Schwarz inequality it contributes at most the sum of squared occupancies; for two
- * sets, the root of the product of both sums.
- */
-static double
-bound_pairs(const hs_search *search)
-{
-    double squares = search->bins.squares, offsets = 0.0;
-    if (search->has_queries) {
-        squares = sqrt(squares * search->query_bins.squares);
-    }
-    for (int64_t s = 0; s < search->stencil.n_rows; s++) {
-        offsets += (double)search->stencil.rows[s].last - search->stencil.rows[s].first + 1.0;
-    }
-    return squares * offsets;
-}
-
 /* Bytes that one pair of the result takes at the worst moment: the caller's arrays, and what the
  * search still holds beside them. 0 when nothing is wanted but the count. */
 static double
@@ -59,40 +41,25 @@ bytes_per_pair_of(const hs_options *options, int ndim)
     return (double)bytes;
 }
 
-/* Bytes that one pair of this search's result takes, or 0 when none is kept. */
-static double
-find_bytes_per_pair(const hs_search *search)
-{
-    return search->keeps_none ? 0.0 : bytes_per_pair_of(&search->call->options, search->scene.ndim);
-}
-
-/* Volume of the space that a search covers: of the periodic part, times the extents along the
- * coordinate axes that have none. */
-static double
-occupied_volume(const hs_points *points, const hs_box *box, double cutoff)
-{
-    hs_lattice lattice;
-    double     lower[HS_MAX_DIM], upper[HS_MAX_DIM];
-    hs_lattice_init(box, points->ndim, hs_scale_of(0), &lattice);
-    hs_points_range(points, lower, upper);
-    double volume = hs_lattice_volume(&lattice, 0);
-    for (int k = 0; k < points->ndim; k++) {
-        volume *= lattice.row_of_axis[k] >= 0 ? 1.0 : hs_larger(upper[k] - lower[k], cutoff);
-    }
-    return volume;
-}
-
 void
 hs_shortage_add(const hs_sets *sets, const hs_box *box, double cutoff, hs_shortage *shortage)
 {
     const hs_points *points = sets->points;
     const double     n = (double)points->n, all = 0.5 * n * (n - 1.0);
     const double     n_asking = sets->queries != NULL ? (double)sets->queries->n : n;
+    hs_lattice       lattice;
+    double           lower[HS_MAX_DIM], upper[HS_MAX_DIM];
     hs_failure       ignored;
     if (points->n == 0 || !(cutoff >= 0.0) || hs_box_check(box, &ignored) != HS_OK) {
         return;
     }
-    const double volume = occupied_volume(points, box, cutoff);
+    hs_lattice_init(box, points->ndim, hs_scale_of(0), &lattice);
+    hs_points_range(points, lower, upper);
+    /* Of the periodic part, times the extents along the coordinate axes that have none. */
+    double volume = hs_lattice_volume(&lattice, 0);
+    for (int k = 0; k < points->ndim; k++) {
+        volume *= lattice.row_of_axis[k] >= 0 ? 1.0 : hs_larger(upper[k] - lower[k], cutoff);
+    }
     const double pairs = 0.5 * n * n * hs_ball_volume(points->ndim, cutoff) / volume;
     /* Numbers near the ends of the range leave no volume: all pairs then. */
     shortage->pairs += (box == NULL && !(pairs < all) ? all
@@ -114,6 +81,13 @@ hs_shortage_tell(const hs_shortage *shortage, const hs_options *options, int ndi
     }
 }
 
+/* The same of this search's result: 0 when none is kept. */
+static double
+bytes_of_search(const hs_search *search)
+{
+    return search->keeps_none ? 0.0 : bytes_per_pair_of(&search->call->options, search->scene.ndim);
+}
+
 static hs_status
 refuse(const hs_search *search, double pairs, double bytes_per_pair, hs_failure *failure)
 {
@@ -124,18 +98,25 @@ refuse(const hs_search *search, double pairs, double bytes_per_pair, hs_failure 
 }
 
 /*
- * Pairs that a periodic box must have. Along the open axes no two points are further apart than the
- * diagonal of what the points span there; what is left of the radius spans a ball in the space of
- * the periodic axes. One of radius R holds at least as many lattice points as copies of the cell
- * cover a ball of radius R less the cell's diameter.
+ * Before any work: HS_ERR_MEMORY when even the least number of pairs passes the limit,
+ * HS_ERR_TOO_MANY when int64 cannot count it. Along the open axes no two points are further apart
+ * than the diagonal of what the points span there; what is left of the radius spans a ball in the
+ * space of the periodic axes. One of radius R holds at least as many lattice points as copies of
+ * the cell cover a ball of radius R less the cell's diameter.
  */
-static double
-least_pairs(const hs_search *search)
+static hs_status
+estimate_by_density(hs_search *search, hs_failure *failure)
 {
     const hs_scene   *scene = &search->scene;
     const hs_lattice *lattice = &scene->lattice;
     const double      n = (double)scene->n;
+    const double      bytes_per_pair = bytes_of_search(search);
     double            diameter = 0.0, across = 0.0;
+    if (search->limits != NULL ||   /* the cutoff is that of few pairs */
+        lattice->n_periodic == 0) { /* nothing tells the density; a scene without points has no
+                                     * box either */
+        return HS_OK;
+    }
     for (int r = 0; r < lattice->n_periodic; r++) {
         double square = 0.0;
         for (int k = 0; k < scene->ndim; k++) {
@@ -151,29 +132,13 @@ least_pairs(const hs_search *search)
     }
     const double radius = sqrt(hs_larger(1.0 - across, 0.0)) * scene->cutoff - diameter;
     if (!(radius > 0.0)) {
-        return 0.0;
+        return HS_OK;
     }
     const double ball = hs_ball_volume(lattice->n_periodic, radius);
     const double around = n * ball / hs_lattice_volume(lattice, 0); /* points in that ball */
     /* Half a pair of each point would be the one with itself. */
-    return 0.5 * n * (around - (search->has_queries ? 0.0 : 1.0)) * search->pairs_per_half;
-}
-
-/*
- * Before any work: a box has at least so many pairs as its density along the periodic axes says,
- * less what a cell's diameter and the extent along the open axes can hide. HS_ERR_MEMORY when even
- * these pass the limit, HS_ERR_TOO_MANY when int64 cannot count them.
- */
-static hs_status
-estimate_by_density(hs_search *search, hs_failure *failure)
-{
-    const double bytes_per_pair = find_bytes_per_pair(search);
-    if (search->limits != NULL ||                /* the cutoff is that of few pairs */
-        search->scene.lattice.n_periodic == 0) { /* nothing tells the density; a scene without
-                                                  * points has no box either */
-        return HS_OK;
-    }
-    const double least = least_pairs(search);
+    const double least =
+        0.5 * n * (around - (search->has_queries ? 0.0 : 1.0)) * search->pairs_per_half;
     if (bytes_per_pair == 0.0 && least > MOST_PAIRS) {
         failure->value = least;
         return HS_ERR_TOO_MANY;
@@ -181,7 +146,7 @@ estimate_by_density(hs_search *search, hs_failure *failure)
     if (!(least > 0.0) || hs_account_allows(&search->call->account, least * bytes_per_pair)) {
         return HS_OK;
     }
-    const bool   has_density = search->scene.lattice.n_periodic == search->scene.ndim;
+    const bool   has_density = lattice->n_periodic == scene->ndim;
     const double dense = search->grid.expected_pairs * search->pairs_per_half;
     return refuse(search, has_density ? dense : least, bytes_per_pair, failure);
 }
@@ -205,7 +170,7 @@ take_sample(hs_search *search, int64_t most, int64_t step, sample *taken)
     double        work = 0.0;
     hs_walker     walker;
     *taken = (sample){0.0, 0.0, 0, false};
-    hs_status status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
+    hs_status status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, NULL, &walker);
     if (status != HS_OK) {
         return status;
     }
@@ -248,11 +213,21 @@ hs_status
 hs_estimate_by_sample(hs_search *search, hs_failure *failure)
 {
     hs_account   *account = &search->call->account;
-    const double  bytes_per_pair = find_bytes_per_pair(search);
+    const double  bytes_per_pair = bytes_of_search(search);
     const int64_t n = hs_search_asking(search)->n;
-    const double  bound = n > 0 ? bound_pairs(search) * bytes_per_pair : 0.0;
-    const double  by_density = search->grid.expected_pairs * search->pairs_per_half;
-    sample        taken;
+    double        squares = search->bins.squares, offsets = 0.0;
+    /* Each stencil offset pairs every cell with at most one other, so by the Cauchy-Schwarz
+     * inequality it contributes at most the sum of squared occupancies; for two sets, the root of
+     * the product of both sums. */
+    if (search->has_queries) {
+        squares = sqrt(squares * search->query_bins.squares);
+    }
+    for (int64_t s = 0; s < search->stencil.n_rows; s++) {
+        offsets += (double)search->stencil.rows[s].last - search->stencil.rows[s].first + 1.0;
+    }
+    const double bound = n > 0 ? squares * offsets * bytes_per_pair : 0.0;
+    const double by_density = search->grid.expected_pairs * search->pairs_per_half;
+    sample       taken;
     /* The limit is looked up, which takes longer than a sample, unless the result may be too large
      * to do without and does not seem to be. */
     const bool samples_first = account->find_limit != NULL && bound > HS_LIMIT_FREE &&
@@ -347,19 +322,6 @@ fill_cells(const hs_shells *shells)
     }
 }
 
-/* The edges of the options, in both units, and their bands. */
-static void
-set_edges(const hs_scene *scene, const hs_options *options, hs_shells *shells)
-{
-    for (int64_t k = 0; k < shells->n; k++) {
-        const double edge = options->shells[k], width = edge * BAND + LEAST_BAND;
-        shells->edge[k] = edge;
-        shells->at[k] = scene->extreme ? edge : hs_scale_apply(scene->scale, edge);
-        shells->low[k] = edge - width;
-        shells->high[k] = edge + width;
-    }
-}
-
 hs_status
 hs_shells_open(hs_account *account, const hs_scene *scene, const hs_options *options,
                hs_shells *shells)
@@ -377,7 +339,13 @@ hs_shells_open(hs_account *account, const hs_scene *scene, const hs_options *opt
     shells->at = shells->edge + n;
     shells->low = shells->at + n;
     shells->high = shells->low + n;
-    set_edges(scene, options, shells);
+    for (int64_t k = 0; k < n; k++) { /* in both units, and their bands */
+        const double edge = options->shells[k], width = edge * BAND + LEAST_BAND;
+        shells->edge[k] = edge;
+        shells->at[k] = scene->extreme ? edge : hs_scale_apply(scene->scale, edge);
+        shells->low[k] = edge - width;
+        shells->high[k] = edge + width;
+    }
     for (size_t b = 0; b < sizeof cell_bits / sizeof *cell_bits; b++) {
         if (set_cells(options->cutoff, cell_bits[b], shells) == 0) {
             break;
@@ -461,14 +429,6 @@ search_set_asking(const hs_sets *sets, hs_search *search)
                                              : 2.0 * (double)search->n_in_all / (double)n;
 }
 
-/* From scene and grid. */
-static void
-set_filter_error(hs_search *search)
-{
-    search->filter_error =
-        search->scene.x_error + search->grid.shift_error + search->scene.formula_error;
-}
-
 bool
 hs_search_repeats_images(const hs_search *search)
 {
@@ -479,14 +439,6 @@ hs_search_repeats_images(const hs_search *search)
         }
     }
     return false;
-}
-
-void
-hs_search_renumber(int64_t first_point, hs_search *search)
-{
-    for (int64_t si = 0; si < search->bins.n; si++) {
-        search->bins.order[si] += (int32_t)first_point;
-    }
 }
 
 void
@@ -575,28 +527,19 @@ build_bins(hs_search *search, bool of_queries, hs_scene *scene)
                                              grid, of_queries, bins);
 }
 
-/* Grid, stencil and bins. */
+/* What a grid, chosen or narrowed, is followed by: bounds, an estimate, and the stencil. */
 static hs_status
-build_cells(hs_search *search, hs_scene *asking, hs_failure *failure)
+build_stencil(hs_search *search, hs_failure *failure)
 {
-    hs_scene *scene = &search->scene;
-    hs_status status = choose_grid(search, failure);
+    search->filter_error =
+        search->scene.x_error + search->grid.shift_error + search->scene.formula_error;
+    hs_status status = estimate_by_density(search, failure);
     if (status == HS_OK) {
-        set_filter_error(search);
-        status = estimate_by_density(search, failure);
-    }
-    if (status == HS_OK) {
-        status = hs_stencil_build(&search->call->account, &search->call->options, scene,
+        status = hs_stencil_build(&search->call->account, &search->call->options, &search->scene,
                                   &search->grid, search->is_full, &search->stencil);
         if (status == HS_ERR_MEMORY) {
             failure->search_bytes = hs_stencil_bytes(&search->grid, search->is_full);
         }
-    }
-    if (status == HS_OK) {
-        status = build_bins(search, false, scene);
-    }
-    if (status == HS_OK && asking != NULL) {
-        status = build_bins(search, true, asking);
     }
     return status;
 }
@@ -619,7 +562,15 @@ hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_fa
     call->options.want = want;
     if (status == HS_OK) {
         status = hs_scene_narrow(&search->scene, sets->narrowing);
-        status = status == HS_OK ? build_cells(search, asking, failure) : status;
+        status = status == HS_OK ? choose_grid(search, failure) : status;
+        if (status == HS_ERR_BOX_SKEWED) {
+            hs_scene_name_outlier(&search->scene, asking, failure);
+        }
+        status = status == HS_OK ? build_stencil(search, failure) : status;
+        status = status == HS_OK ? build_bins(search, false, &search->scene) : status;
+        if (status == HS_OK && asking != NULL) {
+            status = build_bins(search, true, asking);
+        }
         if (asking != NULL) {
             hs_scene_free(&call->account, asking);
         }
@@ -655,30 +606,6 @@ serves(const hs_search *built, const hs_options *options, double least_cutoff)
            (cutoff == before || (cutoff >= 0.0 && cutoff < before && keeps_digits(built, cutoff)));
 }
 
-/* Makes cells serve the cutoff of the options, and sorts the queries into them. */
-static hs_status
-adapt(const hs_sets *sets, hs_search *search, hs_failure *failure)
-{
-    const hs_options *options = &search->call->options;
-    const double      before = search->scene.cutoff;
-    hs_status         status = HS_OK;
-    if (options->cutoff != sets->built->call->options.cutoff) {
-        hs_scene_set_cutoff(&search->scene, options);
-        status = hs_grid_narrow(&search->scene, search->is_sparse, before, &search->grid);
-    }
-    hs_scene_init_metric(&search->scene, options);
-    search_set_asking(sets, search);
-    set_filter_error(search);
-    if (status == HS_OK) {
-        status = estimate_by_density(search, failure);
-    }
-    if (status == HS_OK) {
-        status = hs_stencil_build(&search->call->account, options, &search->scene, &search->grid,
-                                  search->is_full, &search->stencil);
-    }
-    return status;
-}
-
 hs_status
 hs_search_reuse(const hs_sets *sets, hs_call *call, hs_search *search, hs_failure *failure)
 {
@@ -696,7 +623,17 @@ hs_search_reuse(const hs_sets *sets, hs_call *call, hs_search *search, hs_failur
     search->is_sparse = built->is_sparse;
     search->is_borrowed = true; /* not to be freed */
     hs_call_gather(call, n_asking);
-    hs_status status = call->kernel == NULL ? HS_ERR_KERNEL : adapt(sets, search, failure);
+    hs_status status = call->kernel == NULL ? HS_ERR_KERNEL : HS_OK;
+    if (status == HS_OK && call->options.cutoff != built->call->options.cutoff) {
+        hs_scene_set_cutoff(&search->scene, &call->options);
+        status =
+            hs_grid_narrow(&search->scene, search->is_sparse, built->scene.cutoff, &search->grid);
+    }
+    if (status == HS_OK) {
+        hs_scene_init_metric(&search->scene, &call->options);
+        search_set_asking(sets, search);
+        status = build_stencil(search, failure);
+    }
     if (status == HS_OK && sets->queries != NULL) {
         hs_scene asking;
         status = hs_scene_from_kept(&call->account, call->team, &search->scene, sets->queries,

@@ -86,9 +86,6 @@ typedef struct hs_search {
 /* An empty search; the call must outlive it. */
 void hs_search_begin(hs_call *call, hs_search *search);
 
-/* Points that are part of more: their numbers begin here. */
-void hs_search_renumber(int64_t first_point, hs_search *search);
-
 /* How much of all points lies behind when so many of the asking points do, those before the
  * search's own included: for progress and guesses. */
 HS_ALWAYS_INLINE double

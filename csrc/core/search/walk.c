@@ -34,27 +34,12 @@ asking_sparse(const hs_search *search)
     return search->has_queries ? &search->query_sparse : &search->sparse;
 }
 
+/* How many rows there are. */
 static int64_t
 row_count(const hs_search *search)
 {
     return search->is_sparse ? asking_sparse(search)->n_rows
                              : search->grid.n_cells / search->grid.shape[0];
-}
-
-/* The first query in this cell of a dense grid or a later one. */
-static int32_t
-first_query(const hs_bins *queries, int64_t cell)
-{
-    int64_t low = 0, high = queries->n;
-    while (low < high) {
-        const int64_t middle = low + (high - low) / 2;
-        if (queries->cells[middle] < cell) {
-            low = middle + 1;
-        } else {
-            high = middle;
-        }
-    }
-    return (int32_t)low;
 }
 
 /* The first point of a row; of the row after the last, the number of points. */
@@ -64,12 +49,24 @@ first_point(const hs_search *search, int64_t number)
     const hs_bins *asking = hs_search_asking(search);
     const int64_t  cell = search->is_sparse ? asking_sparse(search)->row_cell[number]
                                             : number * search->grid.shape[0];
-    return asking->cells != NULL ? first_query(asking, cell) : asking->start[cell];
+    int64_t        low = 0, high = asking->n;
+    if (asking->cells == NULL) {
+        return asking->start[cell];
+    }
+    while (low < high) { /* the first query in this cell of a dense grid or a later one */
+        const int64_t middle = low + (high - low) / 2;
+        if (asking->cells[middle] < cell) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    return (int32_t)low;
 }
 
 /* The last row that begins at or before point si. */
 static int64_t
-hs_row_of(const hs_search *search, int32_t si)
+row_of(const hs_search *search, int32_t si)
 {
     const hs_bins *asking = hs_search_asking(search);
     int64_t        low = 0, high = row_count(search);
@@ -109,114 +106,63 @@ row_open(const hs_search *search, int64_t number, hs_row *row)
 }
 
 void
-hs_row_open_at(const hs_search *search, int32_t si, hs_row *row, hs_row_group *group)
+hs_row_open_at(const hs_search *search, int32_t si, hs_row *row, hs_sparse_group *group)
 {
     double x[HS_MAX_DIM];
     for (int k = 0; k < search->scene.ndim; k++) {
         x[k] = hs_search_asking(search)->x[k][si];
     }
     const double t = hs_lattice_coordinate(&search->scene.lattice, x, 0);
-    row_open(search, hs_row_of(search, si), row);
+    row_open(search, row_of(search, si), row);
     group->first = si;
     group->last = si + 1;
     group->x_first = group->x_last = search->is_sparse ? hs_sparse_index(&search->grid, 0, t)
                                                        : hs_grid_index(&search->grid, 0, t);
 }
 
-/* Points that consecutive cells of a dense row are put together for, by walkers that put their
- * candidates in order (scan.h) or others. */
-static int32_t
-row_target(const hs_search *search, bool is_ordered)
-{
-    const hs_grid *grid = &search->grid;
-    if (!is_ordered || search->is_sparse) {
-        return TARGET_POINTS;
-    }
-    const double in_cell = (double)hs_search_asking(search)->n / (double)grid->n_cells;
-    const double target = sqrt(SHARED_PER_POINT * in_cell * (double)grid->reach[0] + SHARED);
-    return target < HS_GROUP_POINTS ? (int32_t)target : HS_GROUP_POINTS;
-}
-
-/* hs_row_next for queries in a dense grid: while they are few, and their windows meet. */
+/* The next group, with this target; false after the last. Groups depend on the scene and the target
+ * alone. */
 static bool
-next_queries(const hs_search *search, int32_t target, hs_row *row, hs_row_group *group)
+row_next(const hs_search *search, int32_t target, hs_row *row, hs_sparse_group *group)
 {
-    const uint32_t *cells = hs_search_asking(search)->cells;
-    const int64_t   apart = 2 * search->grid.reach[0] + 1;
-    const int32_t   first = row->next;
-    int32_t         last = first;
-    if (first >= row->end) {
-        return false;
-    }
-    while (last + 1 < row->end && last + 1 - first < target &&
-           cells[last + 1] - cells[last] <= apart) {
-        last++;
-    }
-    *group = (hs_row_group){first, last + 1, cells[first] - row->base, cells[last] - row->base};
-    row->next = last + 1;
-    return true;
-}
-
-bool
-hs_row_next(const hs_search *search, int32_t target, hs_row *row, hs_row_group *group)
-{
-    if (hs_search_asking(search)->cells != NULL) {
-        return next_queries(search, target, row, group);
-    }
+    const hs_bins *asking = hs_search_asking(search);
     if (search->is_sparse) {
         const bool found =
             hs_sparse_next_group(asking_sparse(search), row->base, HS_GROUP_POINTS, &row->taken);
-        *group = (hs_row_group){row->taken.first, row->taken.last, row->taken.x_first,
-                                row->taken.x_last};
+        *group = row->taken;
         return found;
     }
-    const int32_t *start = hs_search_asking(search)->start + row->base;
-    const int64_t  n_x = search->grid.shape[0];
-    if (row->next >= row->end) {
+    const int32_t first = row->next;
+    if (first >= row->end) {
         return false;
     }
-    while (start[row->x + 1] <= row->next) {
+    if (asking->cells != NULL) { /* queries, while they are few, and their windows meet */
+        const uint32_t *cells = asking->cells;
+        const int64_t   apart = 2 * search->grid.reach[0] + 1;
+        int32_t         last = first;
+        while (last + 1 < row->end && last + 1 - first < target &&
+               cells[last + 1] - cells[last] <= apart) {
+            last++;
+        }
+        *group = (hs_sparse_group){.first = first,
+                                   .last = last + 1,
+                                   .x_first = cells[first] - row->base,
+                                   .x_last = cells[last] - row->base};
+        row->next = last + 1;
+        return true;
+    }
+    const int32_t *start = asking->start + row->base;
+    while (start[row->x + 1] <= first) {
         row->x++;
     }
     int64_t last = row->x;
     /* A cell more, while they are few; none beside the rest of a crowded one. */
-    while (last + 1 < n_x && start[last + 2] - row->next <= target) {
+    while (last + 1 < search->grid.shape[0] && start[last + 2] - first <= target) {
         last++;
     }
     const int32_t end = start[last + 1];
-    group->first = row->next;
-    group->last = end - row->next > HS_GROUP_POINTS ? row->next + HS_GROUP_POINTS : end;
-    group->x_first = row->x;
-    group->x_last = last;
-    row->next = group->last;
-    return true;
-}
-
-/* The row at this offset from a row, wrapped into the box; false when there is none. */
-static bool
-link_at_offset(const hs_search *search, const hs_row *row, const hs_stencil_row *offset,
-               hs_link *link, int64_t *target)
-{
-    const hs_lattice *lattice = &search->scene.lattice;
-    const hs_grid    *grid = &search->grid;
-    *link = (hs_link){.first = offset->first, .last = offset->last};
-    for (int k = 1; k < grid->ndim; k++) {
-        int64_t   cell = row->index[k] + offset->offset[k];
-        const int b = lattice->row_of_axis[k];
-        if (cell < 0 || cell >= grid->shape[k]) {
-            if (b < 0) {
-                return false;
-            }
-            const int64_t turn = hs_floor_divide(cell, grid->shape[k]);
-            cell -= turn * grid->shape[k];
-            link->image[b] = (int32_t)turn;
-            for (int c = 0; c < grid->ndim; c++) {
-                link->shift[c] += (double)turn * lattice->rows[b][c];
-            }
-        }
-        target[k] = cell;
-        link->base += cell * grid->stride[k];
-    }
+    row->next = end - first > HS_GROUP_POINTS ? first + HS_GROUP_POINTS : end;
+    *group = (hs_sparse_group){first, row->next, row->x, last, 0};
     return true;
 }
 
@@ -225,26 +171,46 @@ hs_row_links(const hs_search *search, const hs_options *options, const hs_row *r
              int64_t *hints, int64_t *found)
 {
     const hs_stencil *stencil = &search->stencil;
+    const hs_lattice *lattice = &search->scene.lattice;
+    const hs_grid    *grid = &search->grid;
     int64_t           n_links = 0;
     for (int64_t s = 0; s < stencil->n_rows; s++) {
-        hs_link *link = &links[n_links];
-        int64_t  target[HS_MAX_DIM];
+        const hs_stencil_row *offset = &stencil->rows[s];
+        hs_link              *link = &links[n_links];
+        int64_t               target[HS_MAX_DIM];
+        bool                  is_there = true; /* in the box, or wrapped into it */
         if (s % POLL_LINKS == POLL_LINKS - 1 && hs_poll(options, 0.0) != HS_OK) {
             return HS_ERR_INTERRUPTED;
         }
-        if (!link_at_offset(search, row, &stencil->rows[s], link, target)) {
-            continue;
+        *link = (hs_link){.first = offset->first, .last = offset->last};
+        for (int k = 1; k < grid->ndim; k++) {
+            int64_t   cell = row->index[k] + offset->offset[k];
+            const int b = lattice->row_of_axis[k];
+            if (cell < 0 || cell >= grid->shape[k]) {
+                const int64_t turn = hs_floor_divide(cell, grid->shape[k]);
+                if (b < 0) {
+                    is_there = false;
+                    break;
+                }
+                cell -= turn * grid->shape[k];
+                link->image[b] = (int32_t)turn;
+                for (int c = 0; c < grid->ndim; c++) {
+                    link->shift[c] += (double)turn * lattice->rows[b][c];
+                }
+            }
+            target[k] = cell;
+            link->base += cell * grid->stride[k];
         }
-        if (search->is_sparse) {
+        if (is_there && search->is_sparse) {
             link->base = hs_sparse_find_row(&search->sparse, target, &hints[s]);
             if (link->base >= 0) {
                 link->cursor.low = link->cursor.high = search->sparse.row_cell[link->base];
                 n_links++;
             }
-        } else {
+        } else if (is_there) {
             const int32_t *start = search->bins.start + link->base;
             /* The own row of the half list leads them all. */
-            n_links += (s == 0 && !search->is_full) || start[0] < start[search->grid.shape[0]];
+            n_links += (s == 0 && !search->is_full) || start[0] < start[grid->shape[0]];
         }
     }
     *found = n_links;
@@ -303,7 +269,7 @@ gather_link(hs_walker *walker, hs_link *link, int64_t low, int64_t high, int32_t
 
 /* Visit a group of the row that the links belong to. */
 static hs_status
-visit_group(hs_walker *walker, const hs_row_group *group)
+visit_group(hs_walker *walker, const hs_sparse_group *group)
 {
     hs_cursor *cursor = &walker->cursor;
     walker->scanner.work_since_poll += cursor->n_links; /* windows may be empty */
@@ -330,32 +296,6 @@ set_links(hs_walker *walker, const hs_row *row)
                         &cursor->n_links);
 }
 
-static void
-find_next(const hs_search *search, hs_cursor *cursor)
-{
-    cursor->has_next = hs_row_next(search, cursor->target, &cursor->row, &cursor->next);
-}
-
-/* Takes up a row at its first group. */
-static hs_status
-open_row(hs_walker *walker, int64_t number)
-{
-    hs_cursor *cursor = &walker->cursor;
-    row_open(walker->search, number, &cursor->row);
-    cursor->row_number = -1; /* until it has its links */
-    cursor->last_first = -1;
-    cursor->has_next = cursor->row.first < cursor->row.end;
-    if (cursor->has_next) {
-        const hs_status status = set_links(walker, &cursor->row);
-        if (status != HS_OK) {
-            return status;
-        }
-        find_next(walker->search, cursor);
-    }
-    cursor->row_number = number;
-    return HS_OK;
-}
-
 /*
  * Groups of the row, as far as their first point is in [from, to). Goes on where the last range of
  * this row ended, so that many ranges in a long row do not step through it again and again.
@@ -363,15 +303,25 @@ open_row(hs_walker *walker, int64_t number)
 static hs_status
 walk_row(hs_walker *walker, int64_t number, int32_t from, int32_t to)
 {
-    hs_cursor *cursor = &walker->cursor;
-    hs_status  status = HS_OK;
-    if (cursor->row_number != number || from <= cursor->last_first) {
-        status = open_row(walker, number);
+    const hs_search *search = walker->search;
+    hs_cursor       *cursor = &walker->cursor;
+    hs_status        status = HS_OK;
+    if (cursor->row_number != number || from <= cursor->last_first) { /* from its first group on */
+        row_open(search, number, &cursor->row);
+        cursor->row_number = -1; /* until it has its links */
+        cursor->last_first = -1;
+        cursor->has_next = cursor->row.first < cursor->row.end;
+        if (cursor->has_next) {
+            status = set_links(walker, &cursor->row);
+            cursor->has_next = status == HS_OK &&
+                               row_next(search, cursor->target, &cursor->row, &cursor->next);
+        }
+        cursor->row_number = status == HS_OK ? number : -1;
     }
     while (status == HS_OK && cursor->has_next && cursor->next.first < to) {
-        const hs_row_group group = cursor->next;
+        const hs_sparse_group group = cursor->next;
         cursor->last_first = group.first;
-        find_next(walker->search, cursor);
+        cursor->has_next = row_next(search, cursor->target, &cursor->row, &cursor->next);
         if (group.first >= from) {
             status = visit_group(walker, &group);
         }
@@ -380,7 +330,7 @@ walk_row(hs_walker *walker, int64_t number, int32_t from, int32_t to)
 }
 
 hs_status
-hs_walk(hs_walker *walker, int32_t first, int32_t end)
+hs_walk(hs_walker *walker, int32_t first, int32_t end, hs_failure *failure)
 {
     const hs_search  *search = walker->search;
     const hs_options *options = &walker->scanner.options;
@@ -388,36 +338,29 @@ hs_walk(hs_walker *walker, int32_t first, int32_t end)
     if (first >= end || (!options->inclusive && options->cutoff == 0.0)) {
         return HS_OK; /* no distance is below zero */
     }
-    const int64_t last_row = hs_row_of(search, end - 1);
-    for (int64_t row = hs_row_of(search, first); row < n_rows && row <= last_row;) {
+    const int64_t last_row = row_of(search, end - 1);
+    for (int64_t row = row_of(search, first); row < n_rows && row <= last_row;) {
         const hs_status status = walk_row(walker, row, first, end);
         const int32_t   next = walker->cursor.row.end;
+        if (status == HS_ERR_SHIFT_RANGE) {
+            failure->row = walker->scanner.failed_point;
+            failure->in_queries = search->has_queries;
+        }
         if (status != HS_OK) {
             return status;
         }
         /* Between few queries there are many rows without one. */
-        row = hs_search_asking(search)->cells != NULL && next < end ? hs_row_of(search, next)
+        row = hs_search_asking(search)->cells != NULL && next < end ? row_of(search, next)
                                                                     : row + 1;
     }
     return HS_OK;
 }
 
 hs_status
-hs_walk_or_tell(hs_walker *walker, int32_t first, int32_t end, hs_failure *failure)
-{
-    const hs_status status = hs_walk(walker, first, end);
-    if (status == HS_ERR_SHIFT_RANGE) {
-        failure->row = walker->scanner.failed_point;
-        failure->in_queries = walker->search->has_queries;
-    }
-    return status;
-}
-
-hs_status
 hs_walk_point(hs_walker *walker, int32_t si)
 {
-    hs_row       row;
-    hs_row_group group;
+    hs_row          row;
+    hs_sparse_group group;
     hs_row_open_at(walker->search, si, &row, &group);
     walker->cursor.row_number = -1; /* its links are overwritten */
     const hs_status status = set_links(walker, &row);
@@ -438,14 +381,6 @@ most_candidates(const hs_search *search)
     return most;
 }
 
-int32_t
-hs_walker_capacity(const hs_search *search)
-{
-    /* A small scene gets a small block. No larger one than others have: where a block ends decides
-     * the order of pairs, and a walker may have been opened for another search. */
-    return (int32_t)hs_smaller(most_candidates(search) + HS_GROUP_POINTS, HS_BLOCK_CANDIDATES);
-}
-
 bool
 hs_walker_bound(const hs_search *search, hs_neighbourhood *most)
 {
@@ -460,105 +395,90 @@ hs_walker_bound(const hs_search *search, hs_neighbourhood *most)
     return candidates < HS_BLOCK_CANDIDATES;
 }
 
-bool
-hs_walker_fits(hs_search *search, const hs_neighbourhood *most, double *bytes)
-{
-    const int ndim = search->scene.ndim, m = search->scene.lattice.n_periodic;
-    /* Bytes that each candidate takes at least, gathered, sorted and looked up. */
-    const double each = (double)(sizeof(hs_unsure) + 2 * sizeof(uint64_t) + 4 * sizeof(int32_t)) +
-                        (double)(ndim + 1) * sizeof(float) + (double)ndim * sizeof(double) +
-                        (double)m * sizeof(int64_t);
-    const double all = (double)most->candidates * each;
-    if (most->candidates <= HS_ORDER_CANDIDATES && hs_account_allows(&search->call->account, all)) {
-        return true;
-    }
-    *bytes = all;
-    return false;
-}
-
-static hs_status
-init_links(hs_search *search, hs_cursor *cursor)
-{
-    hs_account   *account = &search->call->account;
-    const int64_t n = search->stencil.n_rows;
-    cursor->links = hs_alloc(account, HS_FOR_STENCIL, n, sizeof(hs_link));
-    if (cursor->links == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    cursor->most_links = n;
-    if (search->is_sparse) {
-        cursor->hints = hs_alloc(account, HS_FOR_STENCIL, n, sizeof(int64_t));
-        if (cursor->hints == NULL) {
-            return HS_ERR_MEMORY;
-        }
-        memset(cursor->hints, 0, (size_t)n * sizeof(int64_t));
-    }
-    return HS_OK;
-}
-
-/* In front of the first row. */
+/* Candidates and runs that a block has room for. A small scene gets a small block. No larger one
+ * than others have: where a block ends decides the order of pairs, and a walker may have been
+ * opened for another search. */
 static void
-set_out(const hs_search *search, bool is_ordered, hs_cursor *cursor)
-{
-    cursor->target = row_target(search, is_ordered);
-    cursor->row_number = -1;
-}
-
-static hs_status
-init_walker(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_runs,
-            bool is_ordered, hs_walker *walker)
-{
-    memset(&walker->cursor, 0, sizeof walker->cursor);
-    walker->search = search;
-    set_out(search, is_ordered || use == HS_BLOCK_SIZES, &walker->cursor);
-    const hs_status status =
-        hs_scanner_init(search, use, capacity, most_runs, is_ordered, &walker->scanner);
-    return status == HS_OK ? init_links(search, &walker->cursor) : status;
-}
-
-/* Sets the visitor, or closes what could not be opened. */
-static hs_status
-set_visitor_or_close(hs_search *search, hs_status status, hs_visit_fn visit, void *context,
-                     hs_walker *walker)
-{
-    walker->scanner.visit = visit;
-    walker->scanner.visit_context = context;
-    if (status != HS_OK) {
-        hs_walker_close(search, walker);
-    }
-    return status;
-}
-
-/* Runs that a block has room for. */
-static int32_t
-run_capacity(const hs_search *search)
+find_capacities(const hs_search *search, int32_t *candidates, int32_t *runs)
 {
     hs_neighbourhood most;
     (void)hs_walker_bound(search, &most);
-    return most.runs < HS_BLOCK_RUNS ? (int32_t)most.runs + 1 : HS_BLOCK_RUNS;
+    *candidates =
+        (int32_t)hs_smaller(most_candidates(search) + HS_GROUP_POINTS, HS_BLOCK_CANDIDATES);
+    *runs = most.runs < HS_BLOCK_RUNS ? (int32_t)most.runs + 1 : HS_BLOCK_RUNS;
+}
+
+/* Puts the cursor in front of the first row. Its target: points that consecutive cells of a dense
+ * row are put together for, by walkers that put their candidates in order (scan.h) or others. */
+static void
+set_out(const hs_search *search, bool is_ordered, hs_cursor *cursor)
+{
+    cursor->target = TARGET_POINTS;
+    cursor->row_number = -1;
+    if (is_ordered && !search->is_sparse) {
+        const double in_cell = (double)hs_search_asking(search)->n / (double)search->grid.n_cells;
+        const double target =
+            sqrt(SHARED_PER_POINT * in_cell * (double)search->grid.reach[0] + SHARED);
+        cursor->target = target < HS_GROUP_POINTS ? (int32_t)target : HS_GROUP_POINTS;
+    }
 }
 
 hs_status
-hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
-               hs_walker *walker)
+hs_walker_init(hs_search *search, hs_block_use use, const hs_neighbourhood *most, hs_visit_fn visit,
+               void *context, hs_walker *walker)
 {
-    const hs_status status =
-        init_walker(search, use, hs_walker_capacity(search), run_capacity(search), false, walker);
-    return set_visitor_or_close(search, status, visit, context, walker);
+    hs_account   *account = &search->call->account;
+    hs_cursor    *cursor = &walker->cursor;
+    const int64_t n = search->stencil.n_rows;
+    int32_t       capacity, most_runs;
+    if (most != NULL && most->candidates > HS_ORDER_CANDIDATES) {
+        memset(walker, 0, sizeof *walker);
+        return HS_ERR_MEMORY;
+    }
+    find_capacities(search, &capacity, &most_runs);
+    if (most != NULL) { /* one more of each, because a full block is scanned before the next run */
+        capacity = (int32_t)most->candidates + 1;
+        most_runs = (int32_t)most->runs + 1;
+    }
+    memset(cursor, 0, sizeof *cursor);
+    walker->search = search;
+    set_out(search, most != NULL || use == HS_BLOCK_SIZES, cursor);
+    hs_status status =
+        hs_scanner_init(search, use, capacity, most_runs, most != NULL, &walker->scanner);
+    walker->scanner.visit = visit;
+    walker->scanner.visit_context = context;
+    if (status == HS_OK) {
+        cursor->links = hs_alloc(account, HS_FOR_STENCIL, n, sizeof(hs_link));
+        cursor->most_links = n;
+        status = cursor->links != NULL ? HS_OK : HS_ERR_MEMORY;
+    }
+    if (status == HS_OK && search->is_sparse) {
+        cursor->hints = hs_alloc(account, HS_FOR_STENCIL, n, sizeof(int64_t));
+        status = cursor->hints != NULL ? HS_OK : HS_ERR_MEMORY;
+    }
+    if (status != HS_OK) {
+        hs_walker_close(search, walker);
+    } else if (search->is_sparse) {
+        memset(cursor->hints, 0, (size_t)n * sizeof(int64_t));
+    }
+    return status;
 }
 
 hs_status
 hs_walker_renew(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
                 hs_walker *walker)
 {
+    int32_t capacity, most_runs;
+    find_capacities(search, &capacity, &most_runs);
     if (search->stencil.n_rows <= walker->cursor.most_links && hs_search_keeps_walker(search) &&
-        hs_scanner_renew(search, use, hs_walker_capacity(search), run_capacity(search),
-                         &walker->scanner)) {
+        hs_scanner_renew(search, use, capacity, most_runs, &walker->scanner)) {
         set_out(search, use == HS_BLOCK_SIZES, &walker->cursor);
-        return set_visitor_or_close(search, HS_OK, visit, context, walker);
+        walker->scanner.visit = visit;
+        walker->scanner.visit_context = context;
+        return HS_OK;
     }
     hs_walker_close(search, walker);
-    const hs_status status = hs_walker_init(search, use, visit, context, walker);
+    const hs_status status = hs_walker_init(search, use, NULL, visit, context, walker);
     if (hs_search_keeps_walker(search)) {
         hs_account_keep(&search->call->account);
     }
@@ -572,20 +492,6 @@ hs_walker_flush_counters(hs_search *search, hs_walker *walker)
     if (!hs_search_keeps_walker(search)) {
         hs_walker_close(search, walker);
     }
-}
-
-hs_status
-hs_walker_init_ordered(hs_search *search, hs_block_use use, const hs_neighbourhood *most,
-                       hs_visit_fn visit, void *context, hs_walker *walker)
-{
-    if (most->candidates > HS_ORDER_CANDIDATES) {
-        memset(walker, 0, sizeof *walker);
-        return HS_ERR_MEMORY;
-    }
-    /* One more of each, because a full block is scanned before the next run. */
-    const hs_status status = init_walker(search, use, (int32_t)most->candidates + 1,
-                                         (int32_t)most->runs + 1, true, walker);
-    return set_visitor_or_close(search, status, visit, context, walker);
 }
 
 void

@@ -18,12 +18,6 @@
  * window of cells.
  */
 
-/* Consecutive points of a row, at most HS_GROUP_POINTS, and the cells along it that they are in. */
-typedef struct hs_row_group {
-    int32_t first, last; /* [first, last) in cell order */
-    int64_t x_first, x_last;
-} hs_row_group;
-
 /* One row, and how far its groups have been taken. */
 typedef struct hs_row {
     int64_t         index[HS_MAX_DIM]; /* of its cells along axes 1, 2 ... */
@@ -44,11 +38,7 @@ typedef struct hs_link {
 } hs_link;
 
 /* The row and the cell along it of point si, taken as a group of its own. */
-void hs_row_open_at(const hs_search *search, int32_t si, hs_row *row, hs_row_group *group);
-
-/* The next group, with this target; false after the last. Groups depend on the scene and the target
- * alone. */
-bool hs_row_next(const hs_search *search, int32_t target, hs_row *row, hs_row_group *group);
+void hs_row_open_at(const hs_search *search, int32_t si, hs_row *row, hs_sparse_group *group);
 
 /*
  * Settles which rows neighbour this one, for half lists its own first, and how many. links: room
@@ -79,15 +69,15 @@ typedef struct hs_bookmark {
 
 /* Where in the rows of cells a walk is. */
 typedef struct hs_cursor {
-    int32_t      target;     /* of groups, for hs_row_next */
-    hs_row       row;        /* being walked: */
-    int64_t      row_number; /* its number, or -1 */
-    int32_t      last_first; /* first point of the last group that was taken, or -1 */
-    bool         has_next;
-    hs_row_group next;
-    hs_link     *links;               /* owned; of the row being walked */
-    int64_t      n_links, most_links; /* there are, and there is room for */
-    int64_t     *hints;               /* owned; for hs_row_links, NULL unless the grid is sparse */
+    int32_t         target;     /* of groups, for row_next */
+    hs_row          row;        /* being walked: */
+    int64_t         row_number; /* its number, or -1 */
+    int32_t         last_first; /* first point of the last group that was taken, or -1 */
+    bool            has_next;
+    hs_sparse_group next;
+    hs_link        *links;               /* owned; of the row being walked */
+    int64_t         n_links, most_links; /* there are, and there is room for */
+    int64_t        *hints; /* owned; for hs_row_links, NULL unless the grid is sparse */
 } hs_cursor;
 
 /* Belongs to one thread. */
@@ -97,45 +87,34 @@ typedef struct hs_walker {
     hs_scanner       scanner;
 } hs_walker;
 
-/* Candidates that a block of hs_walker_init has room for. */
-int32_t hs_walker_capacity(const hs_search *search);
-
 /* A bound on the neighbourhood of any group. False where it is larger than one block has room for:
  * then a walk with HS_BLOCK_SIZES can tell. */
 bool hs_walker_bound(const hs_search *search, hs_neighbourhood *most);
 
-/* Whether hs_walker_init_ordered has a chance with it; *bytes: what it would take at least. */
-bool hs_walker_fits(hs_search *search, const hs_neighbourhood *most, double *bytes);
-
-/* `visit` NULL: hits are only counted, in n_found; with HS_BLOCK_SIZES not even that, but `most` is
- * found, for the groups of hs_walker_init_ordered. */
-hs_status hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
-                         hs_walker *walker);
+/*
+ * most NULL: hits come block by block, as they are found. Else of a full search that lists: each
+ * point's hits come in one visit, ascending by the candidate's number and then by S; it is the
+ * largest neighbourhood, as hs_walker_bound says or a walk with HS_BLOCK_SIZES over all groups has
+ * found it. `visit` NULL: hits are only counted, in n_found; with HS_BLOCK_SIZES not even that, but
+ * the largest neighbourhood is found.
+ */
+hs_status hs_walker_init(hs_search *search, hs_block_use use, const hs_neighbourhood *most,
+                         hs_visit_fn visit, void *context, hs_walker *walker);
 
 /*
- * hs_walker_init for what the search of this walker has become, or for the first one: then the
- * walker is all zeros. It is the same object, of the same call, with as many axes, and with the
- * same kernel and options but for the cutoff. Memory that will do is kept, in the account's arena
- * too (hs_account_keep). Between two searches hs_walker_flush_counters tells the call what was
- * done; a walker that is not for others (hs_search_keeps_walker) ends there.
+ * hs_walker_init without an order, for what the search of this walker has become, or for the first
+ * one: then the walker is all zeros. It is the same object, of the same call, with as many axes,
+ * and with the same kernel and options but for the cutoff. Memory that will do is kept, in the
+ * account's arena too (hs_account_keep). Between two searches hs_walker_flush_counters tells the
+ * call what was done; a walker that is not for others (hs_search_keeps_walker) ends there.
  */
 hs_status hs_walker_renew(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
                           hs_walker *walker);
 void      hs_walker_flush_counters(hs_search *search, hs_walker *walker);
 
-/*
- * hs_walker_init for a full search that lists: each point's hits come in one visit, ascending by
- * the candidate's number and then by S. most: the largest neighbourhood, as a walk with
- * HS_BLOCK_SIZES over all groups has found it.
- */
-hs_status hs_walker_init_ordered(hs_search *search, hs_block_use use, const hs_neighbourhood *most,
-                                 hs_visit_fn visit, void *context, hs_walker *walker);
-
-/* Visit the groups whose first point is in [first, end), in cell order. */
-hs_status hs_walk(hs_walker *walker, int32_t first, int32_t end);
-
-/* hs_walk; on HS_ERR_SHIFT_RANGE the failure names the point. */
-hs_status hs_walk_or_tell(hs_walker *walker, int32_t first, int32_t end, hs_failure *failure);
+/* Visit the groups whose first point is in [first, end), in cell order. On HS_ERR_SHIFT_RANGE the
+ * failure names the point. */
+hs_status hs_walk(hs_walker *walker, int32_t first, int32_t end, hs_failure *failure);
 
 /* Visit one point, as a group of its own. */
 hs_status hs_walk_point(hs_walker *walker, int32_t si);

@@ -36,7 +36,7 @@ static void
 do_tasks(hs_team *team, const job *doing)
 {
     for (;;) {
-        const int64_t task = hs_fetch_increment(&team->next);
+        const int64_t task = hs_atomic_add(&team->next, 1);
         if (task >= doing->n_tasks) {
             return;
         }
@@ -171,12 +171,6 @@ hs_call_begin_part(hs_call *call, double from, double to)
     call->part.from = outer.from + outer.share * from;
     call->part.share = outer.share * (to - from);
     return outer;
-}
-
-void
-hs_call_end_part(hs_call *call, hs_stretch outer)
-{
-    call->part = outer;
 }
 
 void
@@ -356,27 +350,22 @@ typedef struct pass {
     hs_status  status[HS_SLABS];
 } pass;
 
+/* A slab; or part `round` of n_rounds nearly equal parts of a strip. The products fit: n * n / 2^17
+ * is below 2^63 up to 2^40 pairs, whose i and j take 9 TB. */
 static void
-do_slab(void *context, int64_t slab)
+do_part(void *context, int64_t slab)
 {
-    pass         *doing = context;
-    const int64_t first = doing->round * HS_POLL_POINTS + slab * HS_SLAB_POINTS;
-    const int64_t left = doing->n - first;
-    const int64_t n = left < HS_SLAB_POINTS ? left : HS_SLAB_POINTS;
-    doing->status[slab] = doing->run(doing->context, (int)slab, first, first + n);
-}
-
-/* Part `round` of n_rounds nearly equal parts of strip `slab`. The products fit: n * n / 2^17 is
- * below 2^63 up to 2^40 pairs, whose i and j take 9 TB. */
-static void
-do_strip(void *context, int64_t slab)
-{
-    pass         *doing = context;
-    const int64_t begin = doing->n * slab / doing->n_strips;
-    const int64_t length = doing->n * (slab + 1) / doing->n_strips - begin;
-    const int64_t first = begin + length * doing->round / doing->n_rounds;
-    const int64_t last = begin + length * (doing->round + 1) / doing->n_rounds;
-    doing->status[slab] = doing->run(doing->context, (int)slab, first, last);
+    pass   *doing = context;
+    int64_t first = doing->round * HS_POLL_POINTS + slab * HS_SLAB_POINTS, end = doing->n;
+    if (doing->n_strips > 0) {
+        const int64_t begin = doing->n * slab / doing->n_strips;
+        const int64_t length = doing->n * (slab + 1) / doing->n_strips - begin;
+        first = begin + length * doing->round / doing->n_rounds;
+        end = begin + length * (doing->round + 1) / doing->n_rounds;
+    } else if (end - first > HS_SLAB_POINTS) {
+        end = first + HS_SLAB_POINTS;
+    }
+    doing->status[slab] = doing->run(doing->context, (int)slab, first, end);
 }
 
 static hs_status
@@ -388,7 +377,7 @@ walk(hs_team *team, const hs_options *options, pass *doing)
         const int64_t now = left < HS_POLL_POINTS ? left : HS_POLL_POINTS;
         const int64_t n_tasks = doing->n_strips > 0 ? doing->n_strips
                                                     : (now + HS_SLAB_POINTS - 1) / HS_SLAB_POINTS;
-        hs_team_run(team, n_tasks, doing->n_strips > 0 ? do_strip : do_slab, doing);
+        hs_team_run(team, n_tasks, do_part, doing);
         for (int64_t task = 0; task < n_tasks; task++) {
             if (doing->status[task] != HS_OK) {
                 return doing->status[task];

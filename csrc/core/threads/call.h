@@ -84,9 +84,8 @@ hs_failure *hs_call_enter(const hs_options *options, hs_failure *failure, hs_cal
 void hs_call_leave(hs_call *call, int64_t n_pairs);
 
 /* What follows is the work from `from` to `to` of the call, or of its present part, which is
- * returned. hs_call_end_part makes that the present one again. */
+ * returned, to be call->part again when that is done. */
 hs_stretch hs_call_begin_part(hs_call *call, double from, double to);
-void       hs_call_end_part(hs_call *call, hs_stretch outer);
 
 /* Calls this in place of the options' poll; NULL: nothing. */
 void hs_call_set_poll(hs_poll_fn poll, void *context, hs_call *call);

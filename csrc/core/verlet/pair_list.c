@@ -12,114 +12,35 @@
 /* pair_list.c: finds the pairs of a list, lists them in bundles, and follows the motion of the
  * points: how much of the skin it leaves. */
 
-/* A hash table with open addressing. */
-
-#define FIRST_CAPACITY 64 /* the 26 images next to a box, and some room */
-
-/* Idempotent. */
-static void
-images_free(hs_images *images)
-{
-    hs_free(NULL, images->of);
-    hs_free(NULL, images->slots);
-    *images = (hs_images){.width = images->width};
-}
-
-/* Where the shift is, or the empty slot where it belongs. */
-static int64_t
-find_slot(const hs_images *images, const int32_t *shift)
-{
-    const uint64_t mask = 2 * (uint64_t)images->capacity - 1;
-    uint64_t       hash = 0;
-    for (int k = 0; k < images->width; k++) { /* Fibonacci hashing of one number after the other */
-        hash = (hash ^ (uint32_t)shift[k]) * UINT64_C(0x9e3779b97f4a7c15);
-        hash ^= hash >> 29;
-    }
-    const size_t size = (size_t)images->width * sizeof *shift;
-    for (uint64_t slot = hash & mask;; slot = (slot + 1) & mask) {
-        const int32_t number = images->slots[slot];
-        if (number < 0 || memcmp(images->of + (int64_t)number * images->width, shift, size) == 0) {
-            return (int64_t)slot;
-        }
-    }
-}
-
-static bool
-grow(hs_images *images)
-{
-    hs_images larger = {.width = images->width, .n = images->n};
-    larger.capacity = images->capacity > 0 ? 2 * images->capacity : FIRST_CAPACITY;
-    if (larger.capacity > INT32_MAX / 2) {
-        return false;
-    }
-    larger.of = hs_alloc(NULL, HS_FOR_SHIFTS, larger.capacity * larger.width, sizeof(int32_t));
-    larger.slots = hs_alloc(NULL, HS_FOR_SHIFTS, 2 * larger.capacity, sizeof(int32_t));
-    if (larger.of == NULL || larger.slots == NULL) {
-        images_free(&larger);
-        return false;
-    }
-    memset(larger.slots, -1, 2 * (size_t)larger.capacity * sizeof(int32_t));
-    for (int64_t number = 0; number < larger.n; number++) {
-        const int32_t *shift = images->of + number * images->width;
-        memcpy(larger.of + number * larger.width, shift, (size_t)images->width * sizeof(int32_t));
-        larger.slots[find_slot(&larger, shift)] = (int32_t)number;
-    }
-    images_free(images);
-    *images = larger;
-    return true;
-}
-
-int32_t
-hs_images_number(hs_images *images, const int32_t *shift)
-{
-    const size_t size = (size_t)images->width * sizeof *shift;
-    if (images->n > 0 &&
-        memcmp(images->of + (int64_t)images->last * images->width, shift, size) == 0) {
-        return images->last;
-    }
-    if (images->n == images->capacity && !grow(images)) {
-        return -1;
-    }
-    const int64_t slot = find_slot(images, shift);
-    if (images->slots[slot] < 0) {
-        memcpy(images->of + images->n * images->width, shift, size);
-        images->slots[slot] = (int32_t)images->n++;
-    }
-    images->last = images->slots[slot];
-    return images->last;
-}
-
 /*
  * The pairs of a search in pieces, one for each range of its points, by several threads. Which
  * pieces there are depends on the number of threads, what follows from one to the next does not.
  * Points are told by their places in cell order. Few pairs have a shift, those that are in
  * different images once the points are wrapped, and each piece keeps them apart. Each thread has a
- * walker; shifts are looked up once for each run of a block.
+ * walker. Until all are found, images have numbers by where they lie over the rows of B.
  */
 
 #define PIECES_A_THREAD 4 /* so that none waits long for the others */
 #define FIRST_BUNDLES   256
 
-/* Some pairs of a piece, as in a hs_listing. */
+/* Some pairs of a search, as in a hs_listing. */
 typedef struct some_pairs {
     hs_output  pairs;   /* b of each, in its column j; counted by no account */
-    hs_bundle *bundles; /* owned; ends are places in this part, images those of the piece */
+    hs_bundle *bundles; /* owned; ends are places in this part */
     int64_t    n_bundles, capacity;
     int64_t    first_pair, first_bundle; /* of it, in the listing */
 } some_pairs;
 
-typedef struct piece {
-    some_pairs plain, shifted;
-    hs_images  images; /* over the box vectors that repeat, as given */
-} piece;
-
 /* A search, and what it has found in cell order. */
 typedef struct building {
-    hs_call     call;
-    hs_search   search;
-    int64_t     n;       /* pieces */
-    piece      *pieces;  /* owned */
+    hs_call   call;
+    hs_search search;
+    int64_t   n; /* pieces */
+    some_pairs
+        *parts; /* owned; of each piece pairs without an image, then of each those with one */
     hs_listing *listing; /* borrowed: what it becomes; its stores are those of the list in use */
+    /* Images over row r of B are from -most to most of it. Number home + sum of image * stride: */
+    int64_t most[HS_MAX_DIM], stride[HS_MAX_DIM], home, n_images;
 } building;
 
 /* What one thread works with. */
@@ -127,64 +48,34 @@ typedef struct worker {
     hs_committer committer;
     building    *built; /* borrowed */
     hs_walker    walker;
-    piece       *piece; /* that it is working on */
+    some_pairs  *plain, *shifted; /* of the piece that it is working on */
     /* Of the block that was looked at last: */
     int64_t  block; /* candidates tested before it, which tells blocks apart; -1: none */
     bool     has_images;
-    int32_t *image; /* owned; number in the piece of that of each run; -1: none */
+    int32_t *image; /* owned; number of that of each run */
 } worker;
 
-/* The shift of a run over the box vectors as given. */
-static bool
-shift_of_run(const hs_search *search, const hs_run *run, int32_t *shift)
-{
-    const hs_lattice *lattice = &search->scene.lattice;
-    int64_t           reduced[HS_MAX_DIM], given[HS_MAX_DIM];
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        reduced[r] = run->image[r];
-    }
-    if (!hs_lattice_shift(lattice, reduced, given)) {
-        return false;
-    }
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        shift[r] = (int32_t)given[r];
-        if (given[r] > INT32_MAX || given[r] < -INT32_MAX) { /* so that it can be negated */
-            return false;
-        }
-    }
-    return true;
-}
-
-/* Finds the images of the runs of a block, once. HS_ERR_SHIFT_RANGE, HS_ERR_MEMORY. */
-static hs_status
+/* Finds the images of the runs of a block, once. */
+static void
 look_at_block(worker *me)
 {
     const hs_scanner *scanner = &me->walker.scanner;
     const hs_block   *block = &scanner->block;
+    const building   *built = me->built;
     const int         m = scanner->search->bins.n_periodic;
     if (me->block == scanner->n_candidates) {
-        return HS_OK;
+        return;
     }
     me->block = scanner->n_candidates;
     me->has_images = false;
     for (int32_t r = 0; m > 0 && block->runs[r].at < block->n; r++) {
-        int32_t shift[HS_MAX_DIM], any = 0;
+        int64_t number = built->home;
         for (int k = 0; k < m; k++) {
-            any |= block->runs[r].image[k];
+            number += block->runs[r].image[k] * built->stride[k];
         }
-        me->image[r] = -1;
-        if (any != 0) {
-            if (!shift_of_run(scanner->search, &block->runs[r], shift)) {
-                return HS_ERR_SHIFT_RANGE;
-            }
-            me->has_images = true;
-            me->image[r] = hs_images_number(&me->piece->images, shift);
-            if (me->image[r] < 0) {
-                return HS_ERR_MEMORY;
-            }
-        }
+        me->image[r] = (int32_t)number;
+        me->has_images = me->has_images || number != built->home;
     }
-    return HS_OK;
 }
 
 /* n hits of one run to a part: in its last bundle if that is of this point and image, else in a new
@@ -217,72 +108,76 @@ add_pairs(worker *me, some_pairs *part, int32_t si, int32_t image, const int32_t
     return true;
 }
 
+/* The image with this number over the box vectors as given. False beyond int32, also of its
+ * opposite. */
+static bool
+shift_of(const building *built, int64_t number, int32_t *shift)
+{
+    const hs_lattice *lattice = &built->search.scene.lattice;
+    int64_t           image[HS_MAX_DIM], given[HS_MAX_DIM];
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        image[r] = number / built->stride[r] % (2 * built->most[r] + 1) - built->most[r];
+    }
+    bool fits = hs_lattice_shift(lattice, image, given);
+    for (int r = 0; fits && r < lattice->n_periodic; r++) {
+        shift[r] = (int32_t)given[r];
+        fits = given[r] <= INT32_MAX && given[r] >= -INT32_MAX;
+    }
+    return fits;
+}
+
 /* Hits of one run that is in another image. A point that is its own neighbour has a first shift
  * that is positive. */
 static bool
 add_run(worker *me, int32_t si, const int32_t *labels, int32_t n, int32_t image)
 {
-    hs_images     *images = &me->piece->images;
-    const int32_t *id = me->walker.scanner.block.id;
-    const int32_t *shift = images->of + (int64_t)image * images->width;
-    int32_t        opposite[HS_MAX_DIM], first = 0;
-    for (int r = images->width - 1; r >= 0; r--) {
-        opposite[r] = -shift[r];
-        first = shift[r] != 0 ? shift[r] : first;
-    }
-    for (int32_t h = 0, next; h < n; h = next) {
-        const bool    turned = first < 0 && id[labels[h]] == si;
-        const int32_t number = turned ? hs_images_number(images, opposite) : image;
-        for (next = h + 1; next < n && (first < 0 && id[labels[next]] == si) == turned; next++) {
+    const building *built = me->built;
+    const int32_t  *id = me->walker.scanner.block.id;
+    bool            fits = true;
+    for (int32_t h = 0, next; h < n && fits; h = next) {
+        int32_t shift[HS_MAX_DIM], number = image, first = 0;
+        for (next = h + 1; next < n && id[labels[h]] != si && id[labels[next]] != si; next++) {
         }
-        if (number < 0 || !add_pairs(me, &me->piece->shifted, si, number, labels + h, next - h)) {
-            return false;
+        if (id[labels[h]] == si && shift_of(built, image, shift)) {
+            for (int r = built->search.scene.lattice.n_periodic - 1; r >= 0; r--) {
+                first = shift[r] != 0 ? shift[r] : first;
+            }
+            number = first < 0 ? (int32_t)(2 * built->home - image) : image;
         }
-    }
-    return true;
-}
-
-/* The hits of one point, whose places in the block ascend, as do its runs. */
-static bool
-add_row(worker *me, int32_t si, const int32_t *labels, int32_t n)
-{
-    const hs_run *runs = me->walker.scanner.block.runs;
-    bool          fits = true;
-    if (!me->has_images) {
-        return n == 0 || add_pairs(me, &me->piece->plain, si, 0, labels, n);
-    }
-    for (int32_t h = 0, next, r = 0; h < n && fits; h = next) {
-        while (runs[r + 1].at <= labels[h]) {
-            r++;
-        }
-        for (next = h + 1; next < n && labels[next] < runs[r + 1].at; next++) {
-        }
-        fits = me->image[r] < 0 ? add_pairs(me, &me->piece->plain, si, 0, labels + h, next - h)
-                                : add_run(me, si, labels + h, next - h, me->image[r]);
+        fits = add_pairs(me, me->shifted, si, number, labels + h, next - h);
     }
     return fits;
 }
 
-/* A hs_visit_fn. */
+/* A hs_visit_fn. Places of a point's hits in the block ascend, as do its runs. */
 static hs_status
 take_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     worker       *me = context;
-    const int32_t n = hits->end[hits->n - 1];
-    hs_status     status = look_at_block(me);
-    if (status == HS_ERR_SHIFT_RANGE) {
-        scanner->failed_point = first;
-    }
-    if (status == HS_OK) {
-        status = hs_output_reserve(&me->piece->plain.pairs, n, 0.0);
-    }
+    const hs_run *runs = scanner->block.runs;
+    const int32_t n = hits->end[hits->n - 1], home = (int32_t)me->built->home;
+    look_at_block(me);
+    hs_status status = hs_output_reserve(&me->plain->pairs, n, 0.0);
     if (status == HS_OK && me->has_images) {
-        status = hs_output_reserve(&me->piece->shifted.pairs, n, 0.0);
+        status = hs_output_reserve(&me->shifted->pairs, n, 0.0);
     }
-    for (int32_t row = 0, begin = 0; status == HS_OK && row < hits->n; begin = hits->end[row++]) {
-        if (!add_row(me, first + row, hits->label + begin, hits->end[row] - begin)) {
-            status = HS_ERR_MEMORY;
+    for (int32_t row = 0, h = 0; status == HS_OK && row < hits->n; row++) {
+        const int32_t end = hits->end[row], si = first + row;
+        bool          fits = true;
+        for (int32_t next = end, r = 0; h < end && fits; h = next, next = end) {
+            int32_t image = home;
+            if (me->has_images) {
+                while (runs[r + 1].at <= hits->label[h]) {
+                    r++;
+                }
+                for (next = h + 1; next < end && hits->label[next] < runs[r + 1].at; next++) {
+                }
+                image = me->image[r];
+            }
+            fits = image == home ? add_pairs(me, me->plain, si, 0, hits->label + h, next - h)
+                                 : add_run(me, si, hits->label + h, next - h, image);
         }
+        status = fits ? HS_OK : HS_ERR_MEMORY;
     }
     return status;
 }
@@ -294,11 +189,11 @@ search_piece(void *context, int64_t number)
     worker          *me = context;
     const hs_search *search = &me->built->search;
     const int64_t    n = search->bins.n, n_pieces = me->built->n;
-    me->piece = &me->built->pieces[number];
-    me->block = -1; /* its images have other numbers */
-    hs_output_reserve_hint(&me->piece->plain.pairs, search->grid.expected_pairs / (double)n_pieces);
-    return hs_walk_or_tell(&me->walker, (int32_t)(n * number / n_pieces),
-                           (int32_t)(n * (number + 1) / n_pieces), &me->committer.failure);
+    me->plain = &me->built->parts[number];
+    me->shifted = &me->built->parts[n_pieces + number];
+    hs_output_reserve_hint(&me->plain->pairs, search->grid.expected_pairs / (double)n_pieces);
+    return hs_walk(&me->walker, (int32_t)(n * number / n_pieces),
+                   (int32_t)(n * (number + 1) / n_pieces), &me->committer.failure);
 }
 
 static hs_status
@@ -309,8 +204,9 @@ open_worker(void *context, void *place)
     worker    *me = place;
     me->committer.options = &me->walker.scanner.options;
     me->built = built;
+    me->block = -1;
     const hs_status status =
-        hs_walker_init(search, HS_BLOCK_LISTS_PLACES, take_hits, me, &me->walker);
+        hs_walker_init(search, HS_BLOCK_LISTS_PLACES, NULL, take_hits, me, &me->walker);
     if (status != HS_OK) {
         return status;
     }
@@ -329,22 +225,36 @@ close_worker(void *context, void *place)
 }
 
 /* All pairs. search->bins.order must be 0, 1, 2, ... HS_ERR_SHIFT_RANGE sets failure->row, a
- * place. */
+ * place; HS_ERR_MEMORY also where there are more images than numbers. */
 static hs_status
 find_pieces(building *built, hs_failure *failure)
 {
-    hs_call  *call = &built->call;
-    const int d = built->search.scene.ndim, m = built->search.scene.lattice.n_periodic;
+    hs_call          *call = &built->call;
+    const hs_grid    *grid = &built->search.grid;
+    const hs_lattice *lattice = &built->search.scene.lattice;
+    double            n_images = 1.0;
+    built->home = 0;
+    for (int k = 0; k < lattice->ndim; k++) {
+        const int r = lattice->row_of_axis[k];
+        if (r >= 0) {
+            built->most[r] = grid->reach[k] / grid->shape[k] + 1;
+            built->stride[r] = (int64_t)n_images;
+            built->home += built->most[r] * built->stride[r];
+            n_images *= 2.0 * (double)built->most[r] + 1.0;
+            if (n_images > INT32_MAX) {
+                return HS_ERR_MEMORY;
+            }
+        }
+    }
+    built->n_images = (int64_t)n_images;
     built->n = call->team == NULL ? 1 : PIECES_A_THREAD * hs_team_size(call->team);
-    built->pieces = hs_alloc(&call->account, HS_FOR_CANDIDATES, built->n, sizeof *built->pieces);
-    if (built->pieces == NULL) {
+    built->parts = hs_alloc(&call->account, HS_FOR_CANDIDATES, 2 * built->n, sizeof *built->parts);
+    if (built->parts == NULL) {
         return HS_ERR_MEMORY;
     }
-    memset(built->pieces, 0, (size_t)built->n * sizeof *built->pieces);
-    for (int64_t p = 0; p < built->n; p++) {
-        hs_output_init(NULL, d, HS_WANT_J, 4, &built->pieces[p].plain.pairs);
-        hs_output_init(NULL, d, HS_WANT_J, 4, &built->pieces[p].shifted.pairs);
-        built->pieces[p].images.width = m;
+    for (int64_t p = 0; p < 2 * built->n; p++) {
+        built->parts[p] = (some_pairs){.bundles = NULL};
+        hs_output_init(NULL, lattice->ndim, HS_WANT_J, 4, &built->parts[p].pairs);
     }
     hs_crew crew = {.call = call,
                     .job = built,
@@ -354,13 +264,6 @@ find_pieces(building *built, hs_failure *failure)
                     .n_ranges = built->n,
                     .search = search_piece};
     return hs_crew_run(&crew, failure);
-}
-
-static void
-free_part(some_pairs *part)
-{
-    hs_output_free(&part->pairs);
-    hs_free(NULL, part->bundles);
 }
 
 /*
@@ -378,7 +281,7 @@ hs_listing_free(hs_listing *listing)
         hs_store_free(&listing->for_order[turn]);
         hs_store_free(&listing->for_counts[turn]);
     }
-    images_free(&listing->images);
+    hs_free(NULL, listing->images);
     *listing = (hs_listing){0};
 }
 
@@ -422,78 +325,85 @@ renumber(hs_search *search, hs_listing *listing, hs_failure *failure)
     return HS_OK;
 }
 
+/* A hs_task_fn: one part to the listing. */
 static void
-place_part(const some_pairs *part, hs_listing *listing)
+place_part(void *context, int64_t p)
 {
-    if (part->pairs.n_pairs == 0) {
-        return;
+    const building   *built = context;
+    const some_pairs *part = &built->parts[p];
+    hs_listing       *listing = built->listing;
+    if (part->pairs.n_pairs > 0) {
+        memcpy(listing->j + part->first_pair, hs_output_column(&part->pairs, HS_WANT_J),
+               (size_t)part->pairs.n_pairs * sizeof *listing->j);
     }
-    memcpy(listing->j + part->first_pair, hs_output_column(&part->pairs, HS_WANT_J),
-           (size_t)part->pairs.n_pairs * sizeof *listing->j);
     for (int64_t b = 0; b < part->n_bundles; b++) {
         listing->bundles[part->first_bundle + b] = part->bundles[b];
         listing->bundles[part->first_bundle + b].end += part->first_pair;
     }
 }
 
-/* A hs_task_fn: the pairs of one piece to the listing. */
-static void
-place_piece(void *context, int64_t p)
-{
-    const building *built = context;
-    place_part(&built->pieces[p].plain, built->listing);
-    place_part(&built->pieces[p].shifted, built->listing);
-}
-
-/* Where a part goes, behind what has been counted so far. */
-static void
-count_part(some_pairs *part, hs_listing *listing)
-{
-    part->first_pair = listing->n_pairs;
-    part->first_bundle = listing->n_bundles;
-    listing->n_pairs += part->pairs.n_pairs;
-    listing->n_bundles += part->n_bundles;
-}
-
-/* Counts pairs and bundles, those with an image behind all others, and gives the images their
- * numbers in the listing. */
-static bool
-count_pairs(building *built)
+/* Counts pairs and bundles, those with an image behind all others, and gives the images that they
+ * have their numbers in the listing, in the order in which they first come. HS_ERR_MEMORY;
+ * HS_ERR_SHIFT_RANGE sets failure->row, a place. */
+static hs_status
+count_pairs(building *built, hs_failure *failure)
 {
     hs_listing *listing = built->listing;
+    const int   m = built->search.scene.lattice.n_periodic;
+    hs_status   status = HS_ERR_MEMORY;
+    int64_t     n_plain = 0;
     listing->n_pairs = listing->n_bundles = 0;
-    for (int64_t p = 0; p < built->n; p++) {
-        count_part(&built->pieces[p].plain, listing);
-    }
-    listing->n_plain = listing->n_pairs;
-    for (int64_t p = 0; p < built->n; p++) {
-        const hs_images *images = &built->pieces[p].images;
-        some_pairs      *shifted = &built->pieces[p].shifted;
-        count_part(shifted, listing);
-        for (int64_t b = 0; b < shifted->n_bundles; b++) {
-            const int32_t *shift = images->of + (int64_t)shifted->bundles[b].image * images->width;
-            shifted->bundles[b].image = hs_images_number(&listing->images, shift);
-            if (shifted->bundles[b].image < 0) {
-                return false;
-            }
+    for (int64_t p = 0; p < 2 * built->n; p++) {
+        some_pairs *part = &built->parts[p];
+        part->first_pair = listing->n_pairs;
+        part->first_bundle = listing->n_bundles;
+        listing->n_pairs += part->pairs.n_pairs;
+        listing->n_bundles += part->n_bundles;
+        if (p + 1 == built->n) {
+            listing->n_plain = listing->n_pairs;
+            n_plain = listing->n_bundles;
         }
     }
+    const int64_t most = listing->n_bundles - n_plain; /* images that there can be */
+    const int64_t n = most < built->n_images ? most : built->n_images;
+    int32_t *number = hs_alloc(NULL, HS_FOR_SHIFTS, most > 0 ? built->n_images : 0, sizeof *number);
+    listing->images = hs_alloc(NULL, HS_FOR_SHIFTS, n * m, sizeof *listing->images);
+    if (number != NULL && listing->images != NULL) {
+        status = HS_OK;
+        memset(number, -1, most > 0 ? (size_t)built->n_images * sizeof *number : 0);
+    }
+    for (int64_t p = built->n; status == HS_OK && p < 2 * built->n; p++) {
+        some_pairs *shifted = &built->parts[p];
+        for (int64_t b = 0; status == HS_OK && b < shifted->n_bundles; b++) {
+            int32_t *const own = &number[shifted->bundles[b].image];
+            if (*own < 0) {
+                *own = (int32_t)listing->n_images;
+                if (!shift_of(built, shifted->bundles[b].image, listing->images + *own * m)) {
+                    failure->row = shifted->bundles[b].point;
+                    status = HS_ERR_SHIFT_RANGE;
+                }
+                listing->n_images++;
+            }
+            shifted->bundles[b].image = *own;
+        }
+    }
+    hs_free(NULL, number);
     /* The pieces, which the account is not charged for, and the listing. */
-    return hs_account_allows(&built->call.account,
-                             (double)(2 * sizeof *listing->j) * (double)listing->n_pairs +
-                                 (double)(3 * sizeof *listing->bundles) *
-                                     (double)listing->n_bundles);
+    const double bytes = (double)(2 * sizeof *listing->j) * (double)listing->n_pairs +
+                         (double)(3 * sizeof *listing->bundles) * (double)listing->n_bundles;
+    return status == HS_OK && !hs_account_allows(&built->call.account, bytes) ? HS_ERR_MEMORY
+                                                                              : status;
 }
 
 /* Writes what was found to the listing. */
 static hs_status
-write_listing(building *built)
+write_listing(building *built, hs_failure *failure)
 {
-    hs_listing *listing = built->listing;
-    hs_store    larger = {0}; /* in place of listing->for_j, if that is too small */
-    listing->images.width = built->search.scene.lattice.n_periodic;
-    if (!count_pairs(built)) {
-        return HS_ERR_MEMORY;
+    hs_listing     *listing = built->listing;
+    hs_store        larger = {0}; /* in place of listing->for_j, if that is too small */
+    const hs_status status = count_pairs(built, failure);
+    if (status != HS_OK) {
+        return status;
     }
     /* The list in use keeps its arrays until the last step that can fail. */
     const int64_t n_j = listing->n_pairs + HS_PADDING;
@@ -512,57 +422,19 @@ write_listing(building *built)
     listing->j = listing->for_j.data;
     listing->bundles = listing->for_bundles.data;
     memset(listing->j + listing->n_pairs, 0, HS_PADDING * sizeof *listing->j);
-    hs_team_run(built->call.team, built->n, place_piece, built);
+    hs_team_run(built->call.team, 2 * built->n, place_part, built);
     return HS_OK;
-}
-
-static hs_status
-build(const hs_frame *frame, building *built, hs_failure *failure)
-{
-    hs_call      *call = &built->call;
-    hs_listing   *listing = built->listing;
-    const hs_sets sets = {.points = &frame->points, .is_plain = true};
-    hs_status  status = hs_search_open(&sets, hs_frame_box(frame), call, &built->search, failure);
-    const bool opened = status == HS_OK;
-    if (status == HS_OK) {
-        status = hs_estimate_by_sample(&built->search, failure);
-    }
-    if (status == HS_OK) {
-        status = renumber(&built->search, listing, failure);
-    }
-    if (status == HS_OK) {
-        status = find_pieces(built, failure);
-        if (failure->row >= 0) {
-            failure->row = listing->order[failure->row];
-        }
-    }
-    if (status == HS_OK) {
-        status = write_listing(built);
-    }
-    if (status == HS_ERR_MEMORY) {
-        failure->expected_pairs = fmax(failure->expected_pairs, (double)listing->n_pairs);
-    }
-    hs_call_tell_limit(call, status, failure);
-    for (int64_t p = 0; built->pieces != NULL && p < built->n; p++) {
-        free_part(&built->pieces[p].plain);
-        free_part(&built->pieces[p].shifted);
-        images_free(&built->pieces[p].images);
-    }
-    hs_free(&call->account, built->pieces);
-    if (opened) {
-        hs_search_close(&built->search);
-    }
-    return status;
 }
 
 hs_status
 hs_listing_build(const hs_frame *frame, const hs_options *options, double radius,
                  hs_listing *listing, hs_failure *failure)
 {
-    int        row[HS_MAX_DIM];
-    hs_options searching = *options;
-    hs_listing next = *listing; /* with its stores */
-    building  *built = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *built);
+    int           row[HS_MAX_DIM];
+    const hs_sets sets = {.points = &frame->points, .is_plain = true};
+    hs_options    searching = *options;
+    hs_listing    next = *listing; /* with its stores */
+    building     *built = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *built);
     if (built == NULL) {
         return HS_ERR_MEMORY;
     }
@@ -580,20 +452,50 @@ hs_listing_build(const hs_frame *frame, const hs_options *options, double radius
     next.n_pairs = 0; /* not known */
     next.radius = radius;
     next.counts = NULL;
-    next.images = (hs_images){.width = 0};
+    next.images = NULL;
+    next.n_images = 0;
     next.turn = 1 - listing->turn;
     built->listing = &next;
-    built->pieces = NULL;
-    hs_call_begin(&searching, &built->call);
-    const hs_status status = build(frame, built, failure);
-    hs_call_dismiss(&built->call);
-    hs_account_close(&built->call.account);
+    built->parts = NULL;
+    hs_call *const call = &built->call;
+    hs_call_begin(&searching, call);
+    hs_status  status = hs_search_open(&sets, hs_frame_box(frame), call, &built->search, failure);
+    const bool opened = status == HS_OK;
+    if (status == HS_OK) {
+        status = hs_estimate_by_sample(&built->search, failure);
+    }
+    if (status == HS_OK) {
+        status = renumber(&built->search, &next, failure);
+    }
+    if (status == HS_OK) {
+        status = find_pieces(built, failure);
+        if (status == HS_OK) {
+            status = write_listing(built, failure);
+        }
+        if (failure->row >= 0) {
+            failure->row = next.order[failure->row];
+        }
+    }
+    if (status == HS_ERR_MEMORY) {
+        failure->expected_pairs = fmax(failure->expected_pairs, (double)next.n_pairs);
+    }
+    hs_call_tell_limit(call, status, failure);
+    for (int64_t p = 0; built->parts != NULL && p < 2 * built->n; p++) {
+        hs_output_free(&built->parts[p].pairs);
+        hs_free(NULL, built->parts[p].bundles);
+    }
+    hs_free(&call->account, built->parts);
+    if (opened) {
+        hs_search_close(&built->search);
+    }
+    hs_call_dismiss(call);
+    hs_account_close(&call->account);
     hs_free(NULL, built);
     if (status == HS_OK) {
-        images_free(&listing->images);
+        hs_free(NULL, listing->images);
         *listing = next;
     } else { /* stores that are not in use may have grown */
-        images_free(&next.images);
+        hs_free(NULL, next.images);
         listing->for_order[next.turn] = next.for_order[next.turn];
         listing->for_counts[next.turn] = next.for_counts[next.turn];
     }
@@ -651,7 +553,7 @@ may_be_jump(const tracking *track, const tile *t, int p)
 HS_ALWAYS_INLINE void
 subtract(const tracking *track, tile *t, const hs_real real, const int d, const bool deformed)
 {
-    const void   *now = track->motion->now->rows, *built = track->motion->built->rows;
+    const void   *now = track->motion->now->points.data, *built = track->motion->built->points.data;
     const int64_t first = t->first * d, step = t->step * d;
     for (int p = 0; p < t->n; p++) {
         for (int k = 0; k < d; k++) {
@@ -837,54 +739,40 @@ find_base(tracking *track)
     }
 }
 
-/* Displacements of the points of a sample without jumps: their sum and range in the first pass,
- * and the longest less drift. */
-typedef struct sample {
-    double sum[HS_MAX_DIM], lower[HS_MAX_DIM], upper[HS_MAX_DIM];
-    double count, square, component;
-} sample;
-
-static void
-take_sample(tracking *track, const double *drift, sample *found)
-{
-    const int64_t n = track->motion->now->points.n, step = (n + SAMPLE - 1) / SAMPLE;
-    const int     d = track->motion->now->points.ndim;
-    double        square, component;
-    tile          t;
-    *found = (sample){.count = 0.0};
-    for (int64_t i = 0; i < n; i += TILE * step) {
-        const bool any = look_at_tile(track, i, step, &t, &square, &component);
-        for (int p = 0; p < t.n; p++) {
-            if (any && may_be_jump(track, &t, p)) {
-                int64_t given[HS_MAX_DIM];
-                (void)take_jump(track, &t, p, given); /* a failure shows again in the full pass */
-            }
-            for (int k = 0; k < d; k++) {
-                const double u = t.u[k][p];
-                found->sum[k] += u;
-                found->lower[k] = i + p == 0 ? u : hs_smaller(u, found->lower[k]);
-                found->upper[k] = i + p == 0 ? u : hs_larger(u, found->upper[k]);
-            }
-        }
-        found->count += t.n;
-        measure_tile(&t, d, drift, &found->square, &found->component);
-    }
-}
-
-/* The drift of a sample: the mean, or where the sample is all there is the middle of the range. */
+/* The drift of a sample, whose jumps are taken away: the mean, or where the sample is all there is
+ * the middle of the range. A second pass finds how much shorter that makes the longest. */
 static void
 guess_drift(tracking *track)
 {
-    sample    all, rest;
-    double    drift[HS_MAX_DIM] = {0.0};
-    const int d = track->motion->now->points.ndim;
-    take_sample(track, drift, &all);
-    for (int k = 0; all.count > 0.0 && k < d; k++) {
-        drift[k] = track->motion->now->points.n <= SAMPLE ? 0.5 * all.lower[k] + 0.5 * all.upper[k]
-                                                          : all.sum[k] / all.count;
+    const int64_t n = track->motion->now->points.n, step = (n + SAMPLE - 1) / SAMPLE;
+    const int     d = track->motion->now->points.ndim;
+    double        sum[HS_MAX_DIM] = {0.0}, lower[HS_MAX_DIM] = {0.0}, upper[HS_MAX_DIM] = {0.0};
+    double        drift[HS_MAX_DIM] = {0.0}, longest[2] = {0.0}, count = 0.0, square, component;
+    tile          t;
+    for (int pass = 0; pass < 2; pass++) {
+        for (int64_t i = 0; i < n; i += TILE * step) {
+            const bool any = look_at_tile(track, i, step, &t, &square, &component);
+            for (int p = 0; p < t.n; p++) {
+                if (any && may_be_jump(track, &t, p)) {
+                    int64_t given[HS_MAX_DIM];
+                    (void)take_jump(track, &t, p,
+                                    given); /* a failure shows again in the full pass */
+                }
+                for (int k = 0; pass == 0 && k < d; k++) {
+                    const double u = t.u[k][p];
+                    sum[k] += u;
+                    lower[k] = i + p == 0 ? u : hs_smaller(u, lower[k]);
+                    upper[k] = i + p == 0 ? u : hs_larger(u, upper[k]);
+                }
+            }
+            count += pass == 0 ? t.n : 0;
+            measure_tile(&t, d, drift, &longest[pass], &component);
+        }
+        for (int k = 0; pass == 0 && count > 0.0 && k < d; k++) {
+            drift[k] = n <= SAMPLE ? 0.5 * lower[k] + 0.5 * upper[k] : sum[k] / count;
+        }
     }
-    take_sample(track, drift, &rest);
-    if (rest.square < WORTHWHILE * WORTHWHILE * all.square) {
+    if (longest[1] < WORTHWHILE * WORTHWHILE * longest[0]) {
         track->has_drift = true;
         memcpy(track->drift, drift, sizeof drift);
     }

@@ -2,33 +2,14 @@
 #ifndef HS_VERLET_PAIR_LIST_H
 #define HS_VERLET_PAIR_LIST_H
 
-#include "../base/base.h"
 #include "../scene/scene.h"
 #include "../../kernels/slab.h"
 #include "../collect/columns.h"
-#include "../search/search.h"
-#include "../box/lattice.h"
-#include "../box/wrap.h"
-
-#include <math.h>
 
 /*
  * pair_list.h: a list of pairs that is used for many steps: what it holds, and how much of its skin
  * the motion of the points leaves.
  */
-
-/* The distinct shifts among many, numbered in the order in which they first come. */
-typedef struct hs_images {
-    int      width; /* numbers of a shift */
-    int32_t *of;    /* owned; n shifts of `width` numbers */
-    int64_t  n;
-    int64_t  capacity; /* shifts */
-    int32_t *slots;    /* owned; -1, or the number of a shift; twice the capacity, a power of two */
-    int32_t  last;     /* number of the last shift: most often the next has it, too */
-} hs_images;
-
-/* The number of this shift, a new one if it was not there. -1: out of memory. */
-int32_t hs_images_number(hs_images *images, const int32_t *shift);
 
 /*
  * The pairs within `radius` of one step, in bundles: those of one point a with all that are in the
@@ -46,11 +27,12 @@ typedef struct hs_listing {
     int32_t   *j;       /* b of each pair, and HS_PADDING places more */
     hs_bundle *bundles; /* first those without an image */
     int64_t    n_bundles;
-    hs_images  images;
+    int64_t    n_images;
+    int32_t   *images; /* owned; m numbers of each, over the box vectors that repeat, as given */
     int32_t   *order;  /* the caller's number of each place */
     int64_t   *counts; /* m for each place, when it was built; NULL: all zero */
     double     radius;
-    /* Where the arrays above are. Pairs are written when nothing can fail any more; the others are
+    /* Where the other arrays are. Pairs are written when nothing can fail any more; the others are
      * made beside those in use, and `turn` says which are in use. */
     hs_store for_j, for_bundles, for_order[2], for_counts[2];
     int      turn;
@@ -96,5 +78,15 @@ typedef struct hs_motion {
  */
 hs_status hs_motion_margin(const hs_motion *motion, const hs_options *options, double *margin,
                            bool *jumped, hs_store *jumps);
+
+/*
+ * recheck.c: the pairs of a list that are within the cutoff now, decided as a search decides them:
+ * in float32 (kernels/slab.h), and by the exact metric where float32 cannot tell. A slab of the
+ * list at a time; threads work on one each, and what they find is written in the order of the list.
+ */
+
+/* The pairs of the last step, into a result whose call has begun. Its options are checked and have
+ * the cutoff of the list. Any status of hs_verlet_find. */
+hs_status hs_recheck_find(const hs_verlet *list, hs_pairs *pairs, hs_failure *failure);
 
 #endif

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-#include "recheck.h"
+#include "pair_list.h"
 #include "../exact/metric.h"
 #include "../collect/record.h"
-#include "../base/status.h"
 #include "../base/os.h"
 #include "../collect/parallel.h"
 #include "../collect/sort_pairs.h"
@@ -42,7 +41,7 @@ typedef struct checking {
      * The metric's shift from a to b is image + lead_a - lead_b. */
     hs_scene         scene;
     const hs_metric *metric;
-    double          *x;                /* of the points; NULL: they are read where they are */
+    double *const   *columns;          /* of the points; NULL: they are read where they are */
     int64_t         *image;            /* m for each image */
     int64_t         *lead;             /* or `counts`; m a point; NULL: all are zero */
     uint8_t         *leads;            /* whether those of a point are not; NULL: they may be */
@@ -55,13 +54,9 @@ typedef struct checking {
 
 /* Consecutive pairs, all with or all without an image, and their hits. */
 typedef struct slab_hits {
-    int64_t          first; /* pair of the list */
-    int32_t          n;
-    bool             has_images;
-    const hs_bundle *bundles; /* the first is that of pair `first` */
-    int32_t          n_bundles;
-    int32_t          n_hits, n_open;
-    hs_stages        stages;
+    hs_slab   of;
+    bool      has_images;
+    hs_stages stages;
     /* Places b, or where recheck->numbers says so the caller's numbers of them, and those of a for
      * each bundle; and where the hits of each bundle end. */
     int32_t      hits[HS_SLAB + HS_PADDING], point[HS_SLAB], hits_end[HS_SLAB];
@@ -74,8 +69,8 @@ typedef struct slab_hits {
     int32_t turns[HS_WRITE_MOST_DIM][HS_SLAB];
 } slab_hits;
 
-/* The points of a step in the order of the list, as floats, and the thresholds
- * that hold for them. */
+/* The points of a step in the order of the list, as floats, and the thresholds that hold for
+ * them. */
 
 #define UNIT 0x1p-53
 /* Points that the middle of all is guessed from. */
@@ -113,35 +108,13 @@ place_of(const checking *recheck, const hs_real real, int64_t a, const int d, co
 {
     const int64_t i = recheck->list->listing.order[a];
     for (int k = 0; k < d; k++) {
-        z[k] = hs_frame_entry(recheck->now->rows, real, i * d + k);
+        z[k] = hs_frame_entry(recheck->now->points.data, real, i * d + k);
     }
     for (int r = 0; r < m; r++) {
         const double count = (double)recheck->counts[a * m + r];
         for (int k = 0; k < d; k++) {
             z[k] -= count * recheck->given.rows[r][k];
         }
-    }
-}
-
-/* The middle of some points: floats lose least around it. */
-static void
-find_centre(const checking *recheck, double *centre)
-{
-    const int     m = recheck->counts != NULL ? recheck->m : 0;
-    const int64_t n = recheck->now->points.n, step = (n + SAMPLE - 1) / SAMPLE;
-    double        lower[HS_MAX_DIM], upper[HS_MAX_DIM], z[HS_MAX_DIM];
-    for (int k = 0; k < recheck->d; k++) {
-        lower[k] = upper[k] = 0.0;
-    }
-    for (int64_t a = 0; a < n; a += step) {
-        place_of(recheck, recheck->now->points.real, a, recheck->d, m, z);
-        for (int k = 0; k < recheck->d; k++) {
-            lower[k] = a == 0 ? z[k] : hs_smaller(z[k], lower[k]);
-            upper[k] = a == 0 ? z[k] : hs_larger(z[k], upper[k]);
-        }
-    }
-    for (int k = 0; k < recheck->d; k++) {
-        centre[k] = 0.5 * lower[k] + 0.5 * upper[k];
     }
 }
 
@@ -158,7 +131,7 @@ put_floats(const checking *recheck, hs_scale scale, const double *centre, const 
         double z[HS_MAX_DIM];
         float *y = recheck->y + a * stride;
         if (a + POINTS_AHEAD < n) {
-            HS_PREFETCH((const char *)recheck->now->rows +
+            HS_PREFETCH((const char *)recheck->now->points.data +
                         order[a + POINTS_AHEAD] * recheck->now->points.row_stride);
         }
         place_of(recheck, real, a, d, m, z);
@@ -183,11 +156,23 @@ put_floats(const checking *recheck, hs_scale scale, const double *centre, const 
 
 /* put_floats, with constants where that pays. */
 static double
-put_points(const checking *recheck, hs_scale scale, const double *centre)
+put_points(const checking *recheck, hs_scale scale)
 {
     const hs_real real = recheck->now->points.real;
     const int     d = recheck->d, m = recheck->counts != NULL ? recheck->m : 0;
     const bool    narrow = real == HS_FLOAT32;
+    const int64_t n = recheck->now->points.n, step = (n + SAMPLE - 1) / SAMPLE;
+    double        lower[HS_MAX_DIM] = {0.0}, upper[HS_MAX_DIM] = {0.0}, centre[HS_MAX_DIM];
+    for (int64_t a = 0; a < n; a += step) { /* floats lose least around the middle */
+        place_of(recheck, real, a, d, m, centre);
+        for (int k = 0; k < d; k++) {
+            lower[k] = a == 0 ? centre[k] : hs_smaller(centre[k], lower[k]);
+            upper[k] = a == 0 ? centre[k] : hs_larger(centre[k], upper[k]);
+        }
+    }
+    for (int k = 0; k < d; k++) {
+        centre[k] = 0.5 * lower[k] + 0.5 * upper[k];
+    }
     if (d == 3 && m == 0) {
         return narrow ? put_floats(recheck, scale, centre, HS_FLOAT32, 3, 0)
                       : put_floats(recheck, scale, centre, HS_FLOAT64, 3, 0);
@@ -199,43 +184,21 @@ put_points(const checking *recheck, hs_scale scale, const double *centre)
     return put_floats(recheck, scale, centre, real, d, m);
 }
 
-/* Images as floats. *largest: their largest component; *size: at least the sum of absolute terms of
- * any. */
-static void
-put_offsets(const checking *recheck, hs_scale scale, double *largest, double *size)
-{
-    const hs_images *images = &recheck->list->listing.images;
-    const int        stride = hs_slab_stride(recheck->d);
-    *largest = *size = 0.0;
-    for (int64_t image = 0; image < images->n; image++) {
-        for (int k = 0; k < stride; k++) {
-            double sum = 0.0, terms = 0.0;
-            for (int r = 0; k < recheck->d && r < recheck->m; r++) {
-                const double term = images->of[image * recheck->m + r] *
-                                    hs_scale_apply(scale, recheck->given.rows[r][k]);
-                sum += term;
-                terms += fabs(term);
-            }
-            const float offset = (float)sum;
-            recheck->offset[image * stride + k] = offset;
-            *largest = hs_larger(fabs((double)offset), *largest);
-            *size = hs_larger(terms, *size);
-        }
-    }
-}
-
 /*
  * Thresholds of filter.h, whose direct form has a candidate y_j and a point q = y_i - offset, which
  * it knows to be rounded to a float. Before that, y_i and the offset were rounded, too (u of each),
- * and the offset was summed in float64.
+ * and the offset was summed in float64. Images become floats here.
  */
 static void
 set_thresholds(checking *recheck, hs_scale scale, double largest)
 {
-    const double cutoff = hs_scale_apply(scale, recheck->given.cutoff);
-    const double u = 0x1p-24, tiny = 0x1p-100; /* more than scaling and flushing lose */
-    const int    m = recheck->m;
-    double       error = tiny, rows = 0.0, offset, size;
+    const hs_listing *listing = &recheck->list->listing;
+    const int         stride = hs_slab_stride(recheck->d);
+    const double      cutoff = hs_scale_apply(scale, recheck->given.cutoff);
+    const double      u = 0x1p-24, tiny = 0x1p-100; /* more than scaling and flushing lose */
+    const int         m = recheck->m;
+    double            error = tiny, rows = 0.0;
+    double            offset = 0.0, size = 0.0; /* largest component; sum of absolute terms */
     for (int r = 0; r < m; r++) {
         double longest = 0.0;
         for (int k = 0; k < recheck->d; k++) {
@@ -249,24 +212,23 @@ set_thresholds(checking *recheck, hs_scale scale, double largest)
                   recheck->most_counts * hs_scale_apply(scale, rows));
     }
     recheck->plain = hs_thresholds_of(recheck->d, cutoff, 2.0 * largest, error);
-    put_offsets(recheck, scale, &offset, &size);
+    for (int64_t image = 0; image < listing->n_images; image++) {
+        for (int k = 0; k < stride; k++) {
+            double sum = 0.0, terms = 0.0;
+            for (int r = 0; k < recheck->d && r < m; r++) {
+                const double term = listing->images[image * m + r] *
+                                    hs_scale_apply(scale, recheck->given.rows[r][k]);
+                sum += term;
+                terms += fabs(term);
+            }
+            recheck->offset[image * stride + k] = (float)sum;
+            offset = hs_larger(fabs((double)(float)sum), offset);
+            size = hs_larger(terms, size);
+        }
+    }
     const double more = u * (largest + offset) * (1.0 + 0x1p-20) + (2 * m + 2) * UNIT * size;
     const double extent = (2.0 * largest + offset) * (1.0 + 0x1p-20);
     recheck->shifted = hs_thresholds_of(recheck->d, cutoff, extent, error + more);
-}
-
-/* The points as floats, their counts and thresholds. */
-static void
-prepare(checking *recheck)
-{
-    const double   cutoff = recheck->given.cutoff;
-    const int      exponent = cutoff > 0.0 ? ilogb(cutoff) : 0;
-    const bool     ordinary = exponent >= -ORDINARY_EXPONENT && exponent <= ORDINARY_EXPONENT;
-    const hs_scale scale = hs_scale_of(ordinary ? 0 : exponent);
-    double         centre[HS_MAX_DIM];
-    add_counts(recheck);
-    find_centre(recheck, centre);
-    set_thresholds(recheck, scale, put_points(recheck, scale, centre));
 }
 
 /*
@@ -274,23 +236,20 @@ prepare(checking *recheck)
  * cannot tell, and measured as a search does it, so that d and D have its bits.
  */
 
-/* Coordinate k of a point, for the metric. in_order: there is a recheck->x. */
+/* Coordinate k of a point, for the metric. */
 HS_ALWAYS_INLINE double
-coordinate_of(const checking *recheck, int64_t a, int k, const int d, const bool in_order)
+coordinate_of(const checking *recheck, int64_t a, int k, const int d)
 {
     const hs_frame *now = recheck->now;
-    const int64_t   i = in_order ? 0 : recheck->list->listing.order[a];
-    if (in_order) {
-        return recheck->x[a * d + k];
-    }
-    return recheck->measures ? recheck->scene.cloud.x[k][i]
-                             : hs_frame_entry(now->rows, now->points.real, i * d + k);
+    const int64_t   i = recheck->list->listing.order[a];
+    return recheck->columns != NULL ? recheck->columns[k][i]
+                                    : hs_frame_entry(now->points.data, now->points.real, i * d + k);
 }
 
 /* n pairs to the batch: of these bundles, and with the points at these places. */
 HS_ALWAYS_INLINE void
 fill_in(const checking *recheck, slab_hits *slab, const int32_t *bundle, const int32_t *place,
-        int32_t n, const int d, const bool in_order)
+        int32_t n, const int d)
 {
     hs_measured   *batch = &slab->batch;
     const uint8_t *leads = recheck->leads;
@@ -298,17 +257,17 @@ fill_in(const checking *recheck, slab_hits *slab, const int32_t *bundle, const i
     unsigned       any = slab->has_images;
     for (int32_t e = 0; e < n;) {
         const int32_t t = bundle[e];
-        const int64_t a = slab->bundles[t].point;
+        const int64_t a = slab->of.bundles[t].point;
         double        p[HS_MAX_DIM];
         for (int k = 0; k < d; k++) {
-            p[k] = coordinate_of(recheck, a, k, d, in_order);
+            p[k] = coordinate_of(recheck, a, k, d);
         }
         any |= leads != NULL ? leads[a] : recheck->lead != NULL;
         for (; e < n && bundle[e] == t; e++) {
             const int64_t b = place[e];
             for (int k = 0; k < d; k++) {
                 batch->p[k][e] = p[k];
-                batch->q[k][e] = coordinate_of(recheck, b, k, d, in_order);
+                batch->q[k][e] = coordinate_of(recheck, b, k, d);
             }
             any |= leads != NULL ? leads[b] : 0u;
         }
@@ -316,7 +275,7 @@ fill_in(const checking *recheck, slab_hits *slab, const int32_t *bundle, const i
     batch->n = n;
     batch->is_shifted = batch->is_wide = false;
     for (int32_t e = 0; any != 0 && e < n; e++) {
-        const hs_bundle *of = &slab->bundles[bundle[e]];
+        const hs_bundle *of = &slab->of.bundles[bundle[e]];
         for (int r = 0; r < m; r++) { /* modulo 2^64: exact, for the sum fits */
             const int64_t image = (int64_t)of->image * m + r;
             uint64_t      shift = slab->has_images ? (uint64_t)recheck->image[image] : 0;
@@ -339,11 +298,10 @@ static void
 fill(const checking *recheck, slab_hits *slab, const int32_t *bundle, const int32_t *place,
      int32_t n)
 {
-    const bool in_order = recheck->x != NULL;
-    switch (in_order ? recheck->d : 0) {
-    case 2: fill_in(recheck, slab, bundle, place, n, 2, true); break;
-    case 3: fill_in(recheck, slab, bundle, place, n, 3, true); break;
-    default: fill_in(recheck, slab, bundle, place, n, recheck->d, in_order);
+    switch (recheck->d) {
+    case 2: fill_in(recheck, slab, bundle, place, n, 2); break;
+    case 3: fill_in(recheck, slab, bundle, place, n, 3); break;
+    default: fill_in(recheck, slab, bundle, place, n, recheck->d);
     }
 }
 
@@ -387,34 +345,15 @@ decide_batch(const checking *recheck, slab_hits *slab, uint8_t *within)
     }
 }
 
-/* Takes the hits whose numbers are in `gone`, ascending, from a slab. */
-static void
-drop_hits(slab_hits *slab, const int32_t *gone, int32_t n)
-{
-    int32_t to = gone[0], before = 0;
-    for (int32_t g = 0; g < n; g++) {
-        const int32_t from = gone[g] + 1, end = g + 1 < n ? gone[g + 1] : slab->n_hits;
-        memmove(slab->hits + to, slab->hits + from, (size_t)(end - from) * sizeof *slab->hits);
-        to += end - from;
-    }
-    for (int32_t t = 0; t < slab->n_bundles; t++) {
-        while (before < n && gone[before] < slab->hits_end[t]) {
-            before++;
-        }
-        slab->hits_end[t] -= before;
-    }
-    slab->n_hits -= n;
-}
-
 /* Decides the hits of a slab that float32 cannot tell, of which there are some, and takes those
  * that are beyond the cutoff from the hits. */
 static void
 decide_unsure(const checking *recheck, slab_hits *slab)
 {
-    const int32_t *j = recheck->list->listing.j + slab->first;
+    const int32_t *j = recheck->list->listing.j + slab->of.first;
     int32_t        gone[HS_SLAB], n_gone = 0;
-    for (int32_t u = 0; u < slab->n_open; u += HS_BATCH) {
-        const int32_t n = slab->n_open - u < HS_BATCH ? slab->n_open - u : HS_BATCH;
+    for (int32_t u = 0; u < slab->of.n_open; u += HS_BATCH) {
+        const int32_t n = slab->of.n_open - u < HS_BATCH ? slab->of.n_open - u : HS_BATCH;
         int32_t       bundle[HS_BATCH], place[HS_BATCH];
         uint8_t       within[HS_BATCH];
         for (int32_t e = 0; e < n; e++) {
@@ -428,9 +367,18 @@ decide_unsure(const checking *recheck, slab_hits *slab)
             n_gone += !within[e];
         }
     }
-    if (n_gone > 0) {
-        drop_hits(slab, gone, n_gone);
+    for (int32_t g = 0, to = gone[0]; g < n_gone; g++) {
+        const int32_t from = gone[g] + 1, end = g + 1 < n_gone ? gone[g + 1] : slab->of.n_hits;
+        memmove(slab->hits + to, slab->hits + from, (size_t)(end - from) * sizeof *slab->hits);
+        to += end - from;
     }
+    for (int32_t t = 0, before = 0; t < slab->of.n_bundles; t++) {
+        while (before < n_gone && gone[before] < slab->hits_end[t]) {
+            before++;
+        }
+        slab->hits_end[t] -= before;
+    }
+    slab->of.n_hits -= n_gone;
 }
 
 /* d and D of all hits, which are the next pairs of the output. */
@@ -449,8 +397,8 @@ measure(const checking *recheck, slab_hits *slab, const hs_output *output)
     for (int k = 0; k < d; k++) {
         vector[k] = batch->vector[k];
     }
-    for (int32_t first = 0; first < slab->n_hits; first += batch->n) {
-        const int32_t  left = slab->n_hits - first, n = left < HS_BATCH ? left : HS_BATCH;
+    for (int32_t first = 0; first < slab->of.n_hits; first += batch->n) {
+        const int32_t  left = slab->of.n_hits - first, n = left < HS_BATCH ? left : HS_BATCH;
         const int32_t *hits = slab->hits + first;
         for (int32_t e = 0; e < n; e++) {
             while (slab->hits_end[of] <= first + e) {
@@ -460,7 +408,7 @@ measure(const checking *recheck, slab_hits *slab, const hs_output *output)
         }
         for (int32_t e = 0; vectors != NULL && e < n; e++) {
             /* -1 where b has the lower number: a branch would be mispredicted. */
-            const int32_t below = order[hits[e]] - order[slab->bundles[bundle[e]].point];
+            const int32_t below = order[hits[e]] - order[slab->of.bundles[bundle[e]].point];
             sign[e] = 1 - 2 * (int)((uint32_t)below >> 31);
         }
         fill(recheck, slab, bundle, hits, n);
@@ -495,19 +443,6 @@ integer_of(double x)
     return exponent < 64 ? (int64_t)((uint64_t)significand << exponent) : 0;
 }
 
-/* over[l][r]: given box vector l is made of so many times row r of B. B is diagonal here, so that
- * is a given entry over a period: a quotient of doubles that is an integer, hence a double. */
-static void
-divide_rows(const hs_lattice *lattice, int64_t over[][HS_MAX_DIM])
-{
-    for (int k = 0; k < lattice->ndim; k++) {
-        const int r = lattice->row_of_axis[k];
-        for (int l = 0; r >= 0 && l < lattice->n_periodic; l++) {
-            over[l][r] = integer_of(lattice->scaled[l][k] / lattice->rows[r][k]);
-        }
-    }
-}
-
 /* A shift over the given box vectors to one over B, modulo 2^64. */
 HS_ALWAYS_INLINE void
 reduce_shift(int m, const int64_t over[][HS_MAX_DIM], const int64_t *shift, int64_t *reduced)
@@ -525,22 +460,27 @@ reduce_shift(int m, const int64_t over[][HS_MAX_DIM], const int64_t *shift, int6
 static void
 set_shifts(checking *recheck)
 {
-    const hs_scene  *scene = &recheck->scene;
-    const hs_images *images = &recheck->list->listing.images;
-    const bool       as_given = recheck->leads == NULL;
-    const int        m = recheck->m;
-    const int64_t    n = recheck->now->points.n;
-    int64_t          over[HS_MAX_DIM][HS_MAX_DIM] = {{0}}, shift[HS_MAX_DIM];
-    int64_t          any = 0;
+    const hs_scene   *scene = &recheck->scene;
+    const hs_listing *listing = &recheck->list->listing;
+    const bool        as_given = recheck->leads == NULL;
+    const int         m = recheck->m;
+    const int64_t     n = recheck->now->points.n;
+    int64_t           over[HS_MAX_DIM][HS_MAX_DIM] = {{0}}, shift[HS_MAX_DIM];
+    int64_t           any = 0;
+    /* over[l][r]: how many times row r of B is in given box vector l. B is diagonal here, so that
+     * this is an entry over a period: a quotient of doubles that is an integer, hence a double. */
     for (int r = 0; r < m; r++) {
         over[r][r] = 1;
     }
-    if (!as_given) {
-        divide_rows(&scene->lattice, over);
+    for (int k = 0; !as_given && k < recheck->d; k++) {
+        const int r = scene->lattice.row_of_axis[k];
+        for (int l = 0; r >= 0 && l < m; l++) {
+            over[l][r] = integer_of(scene->lattice.scaled[l][k] / scene->lattice.rows[r][k]);
+        }
     }
-    for (int64_t number = 0; number < images->n; number++) {
+    for (int64_t number = 0; number < listing->n_images; number++) {
         for (int r = 0; r < m; r++) {
-            shift[r] = images->of[number * m + r];
+            shift[r] = listing->images[number * m + r];
         }
         reduce_shift(m, (const int64_t(*)[HS_MAX_DIM])over, shift, recheck->image + number * m);
     }
@@ -594,8 +534,7 @@ can_write(const checking *recheck)
     const hs_metric *metric = &scene->metric;
     const int        d = recheck->d, m = recheck->m;
     if (recheck->call->kernel->write == NULL || d < 2 || d > HS_WRITE_MOST_DIM ||
-        (recheck->output->columns & HS_WANT_BOTH) || scene->keeps_originals ||
-        !metric->floats_usable) {
+        scene->keeps_originals || !metric->floats_usable) {
         return false;
     }
     for (int r = 0; r < m; r++) {
@@ -632,19 +571,6 @@ set_candidate(const checking *recheck, hs_halving by, int64_t a)
     return is_fine && moved.is_fine;
 }
 
-/* The scene that hits are measured in. */
-static hs_status
-open_scene(checking *recheck, hs_failure *failure)
-{
-    hs_call      *call = recheck->call;
-    hs_options    options = call->options;
-    const hs_sets sets = {.points = &recheck->now->points};
-    options.want |= HS_WANT_SHIFT; /* the turns by which points were wrapped are needed */
-    recheck->metric = &recheck->scene.metric;
-    return hs_scene_make(&call->account, call->team, &sets, hs_frame_box(recheck->now), &options,
-                         &recheck->scene, NULL, failure);
-}
-
 /* All arrays. */
 static bool
 allocate(checking *recheck)
@@ -655,15 +581,13 @@ allocate(checking *recheck)
     hs_parts          parts;
     hs_parts_begin(&parts);
     hs_parts_add(&parts, (void **)&recheck->y, n * stride, sizeof(float));
-    hs_parts_add(&parts, (void **)&recheck->offset, listing->images.n * stride, sizeof(float));
-    hs_parts_add(&parts, (void **)&recheck->image, listing->images.n * m, sizeof(int64_t));
+    hs_parts_add(&parts, (void **)&recheck->offset, listing->n_images * stride, sizeof(float));
+    hs_parts_add(&parts, (void **)&recheck->image, listing->n_images * m, sizeof(int64_t));
     if (listing->counts != NULL || recheck->list->jumps_now >= 0) {
         hs_parts_add(&parts, (void **)&recheck->counts, n * m, sizeof(int64_t));
     }
     if (recheck->measures && can_write(recheck)) {
         hs_parts_add(&parts, (void **)&recheck->candidates, n, sizeof(hs_candidate));
-    } else if (recheck->measures) {
-        hs_parts_add(&parts, (void **)&recheck->x, n * d, sizeof(double));
     }
     if (recheck->measures && !recheck->scene.keeps_originals && m > 0) {
         hs_parts_add(&parts, (void **)&recheck->lead, n * m, sizeof(int64_t));
@@ -673,31 +597,24 @@ allocate(checking *recheck)
     return recheck->memory != NULL;
 }
 
-/* The points of the scene in the order of the list, or as candidates. */
+/* The points of the scene, and as candidates in the order of the list. */
 static void
 set_points(checking *recheck)
 {
     const hs_scene  *scene = &recheck->scene;
     const int32_t   *order = recheck->list->listing.order;
     const int64_t    n = recheck->now->points.n;
-    const int        d = recheck->d, m = recheck->m;
-    double *const   *x = scene->keeps_originals ? scene->originals : scene->cloud.x;
+    const int        m = recheck->m;
     const hs_halving by = hs_write_halving(scene->metric.cutoff);
+    recheck->columns = scene->keeps_originals ? scene->originals : scene->cloud.x;
     recheck->writes = recheck->candidates != NULL && are_small(recheck->lead, n * m) &&
-                      are_small(recheck->image, recheck->list->listing.images.n * m);
+                      are_small(recheck->image, recheck->list->listing.n_images * m);
     recheck->are_fine = true;
-    for (int64_t a = 0; a < n; a++) {
-        for (int k = 0; k < d; k++) {
-            if (a + POINTS_AHEAD < n) {
-                HS_PREFETCH(x[k] + order[a + POINTS_AHEAD]);
-            }
-            if (recheck->x != NULL) {
-                recheck->x[a * d + k] = x[k][order[a]];
-            }
+    for (int64_t a = 0; recheck->writes && a < n; a++) {
+        for (int k = 0; a + POINTS_AHEAD < n && k < recheck->d; k++) {
+            HS_PREFETCH(recheck->columns[k] + order[a + POINTS_AHEAD]);
         }
-        if (recheck->writes) {
-            recheck->are_fine &= set_candidate(recheck, by, a);
-        }
+        recheck->are_fine &= set_candidate(recheck, by, a);
     }
 }
 
@@ -730,10 +647,10 @@ write_hits(const checking *recheck, slab_hits *slab, const hs_output *output)
           .vector = hs_output_next(output, HS_WANT_VECTOR),
     };
     const hs_hits hits = {
-        .n = slab->n_bundles, .point = slab->point, .end = slab->hits_end, .label = slab->hits};
+        .n = slab->of.n_bundles, .point = slab->point, .end = slab->hits_end, .label = slab->hits};
     hs_measures_tell(&recheck->scene, &recheck->call->options, &write);
-    for (int32_t t = 0; t < slab->n_bundles; t++) {
-        const hs_bundle *bundle = &slab->bundles[t];
+    for (int32_t t = 0; t < slab->of.n_bundles; t++) {
+        const hs_bundle *bundle = &slab->of.bundles[t];
         const int64_t    a = bundle->point;
         slab->point[t] = recheck->list->listing.order[a];
         for (int k = 0; k < recheck->d; k++) {
@@ -754,7 +671,7 @@ write_hits(const checking *recheck, slab_hits *slab, const hs_output *output)
         write.turns[r] = slab->turns[r];
         write.column[r] = r; /* S itself is not written */
     }
-    memset(slab->hits + slab->n_hits, 0, HS_PADDING * sizeof *slab->hits);
+    memset(slab->hits + slab->of.n_hits, 0, HS_PADDING * sizeof *slab->hits);
     return recheck->call->kernel->write(&write, &hits);
 }
 
@@ -765,27 +682,27 @@ put_indices(const checking *recheck, slab_hits *slab, const hs_output *output)
     const int32_t   *order = recheck->list->listing.order;
     const int        bytes = output->index_bytes;
     char            *both = hs_output_next(output, HS_WANT_BOTH);
-    const hs_hits    hits = {.n = slab->n_bundles,
+    const hs_hits    hits = {.n = slab->of.n_bundles,
                              .point = slab->point,
                              .end = slab->hits_end,
                              .label = recheck->numbers ? slab->hits : slab->number};
     if (!(output->columns & (HS_WANT_I | HS_WANT_J | HS_WANT_BOTH))) {
         return;
     }
-    for (int32_t t = 0; !recheck->numbers && t < slab->n_bundles; t++) {
-        slab->point[t] = order[slab->bundles[t].point];
+    for (int32_t t = 0; !recheck->numbers && t < slab->of.n_bundles; t++) {
+        slab->point[t] = order[slab->of.bundles[t].point];
     }
-    for (int32_t h = 0; !recheck->numbers && h < slab->n_hits; h++) {
+    for (int32_t h = 0; !recheck->numbers && h < slab->of.n_hits; h++) {
         slab->number[h] = order[slab->hits[h]];
     }
     if (output->columns & (HS_WANT_I | HS_WANT_J)) {
-        (bytes == 8 ? kernel->emit_int64 : kernel->emit_int32)(
-            &hits, hs_output_next(output, HS_WANT_I), hs_output_next(output, HS_WANT_J));
+        kernel->emit(&hits, bytes, hs_output_next(output, HS_WANT_I),
+                     hs_output_next(output, HS_WANT_J));
     }
     if (both != NULL) {
-        kernel->emit_int32(&hits, slab->ends[0], slab->ends[1]);
-        hs_put_indices(both, bytes, 2, slab->ends[0], 1, slab->n_hits);
-        hs_put_indices(both + bytes, bytes, 2, slab->ends[1], 1, slab->n_hits);
+        kernel->emit(&hits, 4, slab->ends[0], slab->ends[1]);
+        hs_put_indices(both, bytes, 2, slab->ends[0], 1, slab->of.n_hits);
+        hs_put_indices(both + bytes, bytes, 2, slab->ends[1], 1, slab->of.n_hits);
     }
 }
 
@@ -797,13 +714,13 @@ put_of_bundle(const checking *recheck, const slab_hits *slab, int32_t t, int32_t
 {
     const hs_listing *listing = &recheck->list->listing;
     const int32_t    *order = listing->order;
-    const int64_t     a = slab->bundles[t].point;
+    const int64_t     a = slab->of.bundles[t].point;
     const int32_t     number = order[a];
-    const int64_t     image = (int64_t)slab->bundles[t].image * m;
+    const int64_t     image = (int64_t)slab->of.bundles[t].image * m;
     uint64_t          of_a[HS_MAX_DIM] = {0};
     int64_t           beyond = 0;
     for (int r = 0; r < m; r++) { /* modulo 2^64: exact, for the sum fits */
-        of_a[r] = slab->has_images ? (uint64_t)(int64_t)listing->images.of[image + r] : 0;
+        of_a[r] = slab->has_images ? (uint64_t)(int64_t)listing->images[image + r] : 0;
         of_a[r] += counts == NULL ? 0 : (uint64_t)counts[a * m + r];
     }
     for (int32_t h = begin; h < end; h++) {
@@ -832,9 +749,9 @@ put_shifts(const checking *recheck, const slab_hits *slab, const hs_output *outp
     const int      d = recheck->d, m = recheck->m;
     int32_t       *to = hs_output_next(output, HS_WANT_SHIFT);
     if (m < d || !any) {
-        memset(to, 0, (size_t)slab->n_hits * (size_t)d * sizeof *to);
+        memset(to, 0, (size_t)slab->of.n_hits * (size_t)d * sizeof *to);
     }
-    for (int32_t t = 0, h = 0; any && t < slab->n_bundles; h = slab->hits_end[t++]) {
+    for (int32_t t = 0, h = 0; any && t < slab->of.n_bundles; h = slab->hits_end[t++]) {
         const int32_t end = slab->hits_end[t];
         const bool    beyond = d == 3 && m == 3
                                    ? put_of_bundle(recheck, slab, t, h, end, counts, 3, 3, to)
@@ -844,7 +761,7 @@ put_shifts(const checking *recheck, const slab_hits *slab, const hs_output *outp
                 h++;
             }
             const int32_t *order = recheck->list->listing.order;
-            const int32_t  one = order[slab->bundles[t].point], other = order[slab->hits[h]];
+            const int32_t  one = order[slab->of.bundles[t].point], other = order[slab->hits[h]];
             failure->row = one < other ? one : other;
             return HS_ERR_SHIFT_RANGE;
         }
@@ -876,27 +793,25 @@ find_hits(const checking *recheck, int64_t s, slab_hits *slab)
     const bool        plain = s < recheck->n_plain;
     const int64_t     last = plain ? listing->n_plain : listing->n_pairs;
     int64_t           bundle = 0, end = listing->n_bundles;
-    slab->first = plain ? s * HS_SLAB : listing->n_plain + (s - recheck->n_plain) * HS_SLAB;
-    slab->n = (int32_t)(last - slab->first < HS_SLAB ? last - slab->first : HS_SLAB);
-    slab->has_images = !plain;
+    const int64_t first = plain ? s * HS_SLAB : listing->n_plain + (s - recheck->n_plain) * HS_SLAB;
     while (bundle < end) { /* the first that ends behind the slab's first pair */
         const int64_t middle = bundle + (end - bundle) / 2;
-        if (listing->bundles[middle].end <= slab->first) {
+        if (listing->bundles[middle].end <= first) {
             bundle = middle + 1;
         } else {
             end = middle;
         }
     }
-    slab->bundles = listing->bundles + bundle;
+    slab->has_images = !plain;
     slab->stages = (hs_stages){0};
-    hs_slab listed = {
+    slab->of = (hs_slab){
         .ndim = recheck->d,
         .y = recheck->y,
         .offset = plain ? NULL : recheck->offset,
         .j = listing->j,
-        .bundles = slab->bundles,
-        .first = slab->first,
-        .end = slab->first + slab->n,
+        .bundles = listing->bundles + bundle,
+        .first = first,
+        .end = last - first < HS_SLAB ? last : first + HS_SLAB,
         .numbers = recheck->numbers,
         .limit = plain ? recheck->plain : recheck->shifted,
         .hits = slab->hits,
@@ -904,11 +819,8 @@ find_hits(const checking *recheck, int64_t s, slab_hits *slab)
         .hits_end = slab->hits_end,
         .open = slab->open,
     };
-    recheck->call->kernel->recheck(&listed);
-    slab->n_bundles = listed.n_bundles;
-    slab->n_hits = listed.n_hits;
-    slab->n_open = listed.n_open;
-    if (slab->n_open > 0) {
+    recheck->call->kernel->recheck(&slab->of);
+    if (slab->of.n_open > 0) {
         decide_unsure(recheck, slab);
     }
 }
@@ -921,26 +833,27 @@ do_slab(worker *me, int64_t s)
     hs_output      *output = me->output;
     slab_hits      *slab = me->slab;
     find_hits(recheck, s, slab);
-    me->done.candidates += slab->n;
-    me->done.ambiguous += slab->n_open;
+    me->done.candidates += slab->of.end - slab->of.first;
+    me->done.ambiguous += slab->of.n_open;
     me->done.by_float64 += slab->stages.by_float64;
     me->done.by_double_word += slab->stages.by_double_word;
     me->done.by_integers += slab->stages.by_integers;
-    me->work += slab->n + INTEGER_WORK * slab->stages.by_integers +
-                (recheck->measures ? MEASURE_WORK * (int64_t)slab->n_hits : 0);
-    const double done = (double)(slab->first + slab->n) / (double)recheck->list->listing.n_pairs;
-    hs_status    status = hs_output_reserve(output, slab->n_hits, recheck->shared ? 0.0 : done);
-    if (status == HS_OK && slab->n_hits > 0) {
-        if (!(recheck->writes && write_hits(recheck, slab, output))) {
+    me->work += slab->of.end - slab->of.first + INTEGER_WORK * slab->stages.by_integers +
+                (recheck->measures ? MEASURE_WORK * (int64_t)slab->of.n_hits : 0);
+    const double done = (double)slab->of.end / (double)recheck->list->listing.n_pairs;
+    hs_status    status = hs_output_reserve(output, slab->of.n_hits, recheck->shared ? 0.0 : done);
+    if (status == HS_OK && slab->of.n_hits > 0) {
+        const bool written = recheck->writes && write_hits(recheck, slab, output);
+        if (!written || (output->columns & HS_WANT_BOTH)) {
             put_indices(recheck, slab, output);
-            if (recheck->measures) {
-                measure(recheck, slab, output);
-            }
+        }
+        if (!written && recheck->measures) {
+            measure(recheck, slab, output);
         }
         if (output->columns & HS_WANT_SHIFT) {
             status = put_shifts(recheck, slab, output, &me->committer.failure);
         }
-        output->n_pairs += status == HS_OK ? slab->n_hits : 0;
+        output->n_pairs += status == HS_OK ? slab->of.n_hits : 0;
     }
     if (status == HS_OK && me->work > POLL_WORK) {
         me->work = 0;
@@ -986,12 +899,6 @@ close_worker(void *context, void *place)
     hs_free(&call->account, me->slab);
 }
 
-static int64_t
-slabs_of(int64_t n_pairs)
-{
-    return (n_pairs + HS_SLAB - 1) / HS_SLAB;
-}
-
 /* Writes all pairs within the cutoff to the output. */
 static hs_status
 run(checking *recheck, hs_failure *failure)
@@ -999,8 +906,9 @@ run(checking *recheck, hs_failure *failure)
     const hs_listing *listing = &recheck->list->listing;
     const unsigned    columns = recheck->output->columns;
     hs_account       *account = &recheck->call->account;
-    recheck->n_plain = slabs_of(listing->n_plain);
-    recheck->n_slabs = recheck->n_plain + slabs_of(listing->n_pairs - listing->n_plain);
+    recheck->n_plain = (listing->n_plain + HS_SLAB - 1) / HS_SLAB;
+    recheck->n_slabs =
+        recheck->n_plain + (listing->n_pairs - listing->n_plain + HS_SLAB - 1) / HS_SLAB;
     recheck->in_range =
         1 + HS_RANGE_BYTES / (1 + HS_SLAB * hs_output_bytes_per_pair(recheck->output));
     /* The kernels write a little beyond the last pair, where the caller's arrays may end. */
@@ -1008,12 +916,25 @@ run(checking *recheck, hs_failure *failure)
                       (recheck->call->team != NULL && recheck->n_slabs > recheck->in_range);
     recheck->numbers = !recheck->measures && !(columns & HS_WANT_SHIFT) &&
                        hs_slab_has_numbers(recheck->d);
-    hs_status status = recheck->measures ? open_scene(recheck, failure) : HS_OK;
+    hs_status status = HS_OK;
+    if (recheck->measures) {
+        hs_options    options = recheck->call->options;
+        const hs_sets sets = {.points = &recheck->now->points};
+        options.want |= HS_WANT_SHIFT; /* the turns by which points were wrapped are needed */
+        recheck->metric = &recheck->scene.metric;
+        status = hs_scene_make(account, recheck->call->team, &sets, hs_frame_box(recheck->now),
+                               &options, &recheck->scene, NULL, failure);
+    }
     if (status == HS_OK && !allocate(recheck)) {
         status = HS_ERR_MEMORY;
     }
     if (status == HS_OK) {
-        prepare(recheck);
+        const double   cutoff = recheck->given.cutoff;
+        const int      exponent = cutoff > 0.0 ? ilogb(cutoff) : 0;
+        const bool     ordinary = exponent >= -ORDINARY_EXPONENT && exponent <= ORDINARY_EXPONENT;
+        const hs_scale scale = hs_scale_of(ordinary ? 0 : exponent);
+        add_counts(recheck);
+        set_thresholds(recheck, scale, put_points(recheck, scale));
         set_shifts(recheck);
     }
     if (status == HS_OK && recheck->measures) {
@@ -1040,7 +961,7 @@ static hs_status
 run_sorted(checking *recheck, hs_output *output, hs_failure *failure)
 {
     hs_call       *call = recheck->call;
-    const bool     images = recheck->list->listing.images.n > 0;
+    const bool     images = recheck->list->listing.n_images > 0;
     const unsigned columns = (call->options.want & ~(unsigned)HS_WANT_BOTH) | HS_WANT_I |
                              HS_WANT_J | (images ? HS_WANT_SHIFT : 0);
     hs_output found;

@@ -11,6 +11,8 @@ types, supports, groups and exclusions but the search for one cutoff.
 from __future__ import annotations
 
 import math
+import operator
+from copy import copy
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +27,7 @@ from halfshell._functions.pairs import pairs_between as find_between
 from halfshell._objects.exact import is_definite
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from halfshell._convert.types import FloatArray
 
@@ -65,9 +67,13 @@ class Right:
             self.table = np.array([[call.cutoff]])
             self.marks = tuple(np.zeros(len(one), np.int8) for one in (self.asking, self.points))
         elif self.extent is not None:
-            _refuse_indefinite(call)
+            quiet = copy(call)  # a search, which refuses supports that are none
+            quiet.progress = quiet.bar = None
+            quiet.run(_core.coordination, call.query_set, call.pairing, "auto")
             self.supports, extent = known["supports"], self.extent
-            self.marks = tuple(None if H is None else spheres_of(H, extent) for H in self.supports)
+            judging = {side for side, _ in self._judging()}
+            self.marks = tuple(spheres_of(H, extent) if side in judging else None
+                               for side, H in enumerate(self.supports))  # fmt: skip
         self.groups, self.labels = known["groups"], known["labels"]
         self.within, self.least = pairing.within or 0, pairing.least
         self.excluded = None if pairing.excluded is None else self._keys(*pairing.excluded.T)
@@ -154,13 +160,18 @@ class Right:
         else:
             i, j, *more = find_between(self.asking[askers], self.points[members], cutoff, **how)
         rows = np.column_stack((askers[i], members[j], *more[:1])).astype(np.int64, copy=False)
-        keep = np.ones(len(rows), bool) if self.groups[1] is None else self._are_together(rows)
+        keep = np.ones(len(rows), bool)
+        if self.groups[1] is not None:
+            keep = np.asarray(self.groups[0][rows[:, 0]] == self.groups[1][rows[:, 1]])
         if measured:
             d = more[1]
             if self.is_one_set and self.is_directed:
                 keep &= (rows[:, 0] != rows[:, 1]) | rows[:, 2:].any(axis=1)
             if self.least > 0.0:
-                keep &= self._are_apart(rows, d)
+                apart = d >= self.least  # d is within 1 ulp of theirs
+                for k in np.flatnonzero(_are_near(d, self.least)):
+                    apart[k] = self._square(rows[k]) >= Fraction(self.least) ** 2
+                keep &= apart
             if is_excluding:
                 keep[self._nearest_excluded(rows, d)] = False
             if self.table is None:
@@ -180,7 +191,7 @@ class Right:
         row = np.array([[i, j, *shift]])
         if not self._reaches(i, j, shift) or self._square(row[0]) < Fraction(self.least) ** 2:
             return False
-        if self.groups[1] is not None and not self._are_together(row)[0]:
+        if self.groups[1] is not None and self.groups[0][i] != self.groups[1][j]:
             return False
         return not self._are_excluded(row)[0] or shift != self._nearest(i, j, shift)
 
@@ -190,10 +201,11 @@ class Right:
         if self.extent is None:
             limit = self.limit(i, j)
             return limit is not None and self._is_below(_square(vector), limit)
-        judged = [
-            self._is_below(exact_norm(H[(i, j)[side]], vector), Fraction(self.extent))
-            for side, H in self._judging()
-        ]
+        judged = []
+        for side, H in self._judging():
+            rows = [map(Fraction, row) for row in H[(i, j)[side]].tolist()]
+            moved = [sum(map(operator.mul, row, vector), Fraction(0)) for row in rows]
+            judged.append(self._is_below(_square(moved), Fraction(self.extent)))
         return all(judged) if self.rule == "min" else any(judged)
 
     def _is_below(self, square: Fraction, limit: Fraction) -> bool:
@@ -240,18 +252,6 @@ class Right:
 
     # ---- which of them count ---------------------------------------------------------------
 
-    def _are_together(self, rows: IntArray) -> _Bools:
-        """Whether both are of one group."""
-        asking, own = self.groups
-        return np.asarray(asking[rows[:, 0]] == own[rows[:, 1]])
-
-    def _are_apart(self, rows: IntArray, d: FloatArray) -> _Bools:
-        """Whether they are not nearer than the least distance; d is within 1 ulp of theirs."""
-        apart = d >= self.least
-        for k in np.flatnonzero(_are_near(d, self.least)):
-            apart[k] = self._square(rows[k]) >= Fraction(self.least) ** 2
-        return np.asarray(apart)
-
     def _are_excluded(self, rows: IntArray) -> _Bools:
         """Whether two points are excluded, in their nearest image."""
         i, j = rows[:, 0], rows[:, 1]
@@ -286,14 +286,11 @@ class Right:
         starts, counts = _runs(rows[order])
         found = order[starts]
         for k in np.flatnonzero(counts > 1):
-            equal = order[starts[k] : starts[k] + counts[k]]
-            found[k] = min(equal, key=lambda place: self._rank(rows[place]))
+            equal = order[starts[k] : starts[k] + counts[k]]  # by S as i < j sees it
+            back = -1 if self.is_one_set and rows[equal[0], 0] > rows[equal[0], 1] else 1
+            ranks = [(self._square(row), (back * row[2:]).tolist()) for row in rows[equal]]
+            found[k] = equal[ranks.index(min(ranks))]
         return found
-
-    def _rank(self, row: IntArray) -> tuple[Fraction, list[int]]:
-        """What comes first of the images of two points: the nearest, then by S as i < j sees it."""
-        is_back = self.is_one_set and row[0] > row[1]
-        return self._square(row), (-row[2:] if is_back else row[2:]).tolist()
 
     # ---- which are within their reach ------------------------------------------------------
 
@@ -315,8 +312,10 @@ class Right:
         within = np.zeros(len(rows), dtype=bool)
         for first in range(0, len(rows), 1 << 18):
             part = rows[first : first + (1 << 18)]
-            sides = [self._compare(H[part[:, side]], part) for side, H in self._judging()]
-            sure_in, sure_out = (self._combined([s[k] for s in sides], k == 1) for k in (0, 1))
+            every, some = np.logical_and.reduce, np.logical_or.reduce
+            surely_in, surely_out = zip(*self._compare(part), strict=True)
+            sure_in = every(surely_in) if self.rule == "min" else some(surely_in)
+            sure_out = some(surely_out) if self.rule == "min" else every(surely_out)
             for k in np.flatnonzero(~(sure_in | sure_out)):
                 i, j, *shift = part[k].tolist()
                 sure_in[k] = self._reaches(i, j, tuple(shift))
@@ -328,13 +327,8 @@ class Right:
         wanted = {"gather": (0,), "scatter": (1,)}.get(self.rule, (0, 1))
         return [(side, self.supports[side]) for side in wanted]
 
-    def _combined(self, sides: list[Any], beyond: bool) -> Any:
-        """Whether surely within by the rule, or surely beyond."""
-        every = (self.rule == "min") != beyond
-        return np.logical_and.reduce(sides) if every else np.logical_or.reduce(sides)
-
-    def _compare(self, matrices: FloatArray, rows: IntArray) -> tuple[Any, Any]:
-        """Whether each pair is surely within the support, and whether surely beyond."""
+    def _compare(self, rows: IntArray) -> Iterator[tuple[_Bools, _Bools]]:
+        """For each support that the rule looks at, which pairs are surely within, surely beyond."""
         assert self.extent is not None
         p, q = self.asking[rows[:, 0]], self.points[rows[:, 1]]
         p, q = p.astype(np.float64), q.astype(np.float64)
@@ -343,13 +337,13 @@ class Right:
             moved = rows[:, 2:].astype(np.float64)
             D = D + moved @ self.box
             size = size + np.abs(moved) @ np.abs(self.box)
-        with np.errstate(all="ignore"):
-            z = np.sqrt((np.einsum("kab,kb->ka", matrices, D) ** 2).sum(axis=1))
-            doubt = _DOUBT * np.einsum("kab,kb->k", np.abs(matrices), size) + 2.0**-500
-            return (
-                z + doubt < self.extent * (1.0 - _DOUBT),  # squares may overflow
-                np.isfinite(z) & (z - doubt > self.extent * (1.0 + _DOUBT)),
-            )
+        for side, H in self._judging():
+            matrices = H[rows[:, side]]
+            with np.errstate(all="ignore"):  # squares may overflow
+                z = np.sqrt((np.einsum("kab,kb->ka", matrices, D) ** 2).sum(axis=1))
+                doubt = _DOUBT * np.einsum("kab,kb->k", np.abs(matrices), size) + 2.0**-500
+                within = z + doubt < self.extent * (1.0 - _DOUBT)
+                yield within, np.isfinite(z) & (z - doubt > self.extent * (1.0 + _DOUBT))
 
 
 def _are_near(lengths: Any, other: Any) -> _Bools:
@@ -370,30 +364,7 @@ def _square(vector: list[Fraction]) -> Fraction:
     return sum((x * x for x in vector), Fraction(0))
 
 
-def exact_norm(matrix: Any, vector: list[Fraction]) -> Fraction:
-    """The square of the length of ``matrix @ vector``, exactly."""
-    rows = [[Fraction(x) for x in row] for row in np.asarray(matrix).tolist()]
-    return _square([sum((a * b for a, b in zip(row, vector)), Fraction(0)) for row in rows])
-
-
 # ---- spheres around supports ---------------------------------------------------------------
-
-def _refuse_indefinite(call: Call) -> None:
-    """What the core says of supports that are not positive definite or reach too far.
-
-    It looks at them before it looks for pairs, of which no queries have none.
-    """
-    ndim = call.array.shape[1]
-    none = np.empty((0, ndim, ndim))
-    by = Pairing(RULES.index("max"), call.pairing and call.pairing.extent)  # looks at all
-    for own, other in ((call.known.supports, none), (none, call.known_of_queries.supports)):
-        if own is not None and other is not None:
-            points, queries = (
-                (np.zeros((len(H), ndim)), *Known(supports=H), None) for H in (own, other)
-            )
-            arguments: Any = (points, np.inf, None, 0, *call.rest, by, "auto", queries)
-            _core.count_pairs(*arguments)
-
 
 def spheres_of(matrices: FloatArray, extent: float) -> FloatArray:
     """For each positive definite matrix a radius that no D with ``|H @ D| <= extent`` exceeds."""
@@ -403,27 +374,17 @@ def spheres_of(matrices: FloatArray, extent: float) -> FloatArray:
     scaled = np.ldexp(matrices, -exponents[:, None, None])
     values = np.linalg.eigvalsh(scaled)
     least = values[:, 0] - _SURE * values[:, -1]
-    poor = ~(least > 0.5 * values[:, 0])
     radii = np.zeros(len(matrices))
-    for k in np.flatnonzero(~poor):
-        radii[k] = _above(Fraction(extent) / Fraction(float(least[k])), int(exponents[k]))
-    for k in np.flatnonzero(poor):
-        radii[k] = _above(Fraction(extent) / _least_eigenvalue(matrices[k]), 0)
+    for k, sure in enumerate(least > 0.5 * values[:, 0]):
+        if sure:
+            smallest = Fraction(float(least[k])) * Fraction(2) ** int(exponents[k])
+        else:  # half of the smallest eigenvalue at least, and not more than it
+            rows = [[Fraction(x) for x in row] for row in matrices[k].tolist()]
+            smallest = min(row[a] for a, row in enumerate(rows))
+            while not is_definite(
+                [[x - smallest * (a == b) for b, x in enumerate(row)] for a, row in enumerate(rows)]
+            ):
+                smallest /= 2
+        length = Fraction(extent) / smallest
+        radii[k] = math.nextafter(float(length), math.inf) if length else 0.0
     return radii
-
-
-def _above(quotient: Fraction, exponent: int) -> float:
-    """At least quotient / 2**exponent, but for what passes float64."""
-    length = quotient / Fraction(2) ** exponent
-    return math.nextafter(float(length), math.inf) if length else 0.0
-
-
-def _least_eigenvalue(matrix: FloatArray) -> Fraction:
-    """Half of the smallest eigenvalue at least, and not more than it."""
-    rows = [[Fraction(x) for x in row] for row in matrix.tolist()]
-    x = min(row[k] for k, row in enumerate(rows))
-    while not is_definite(
-        [[a - x if k == m else a for m, a in enumerate(row)] for k, row in enumerate(rows)]
-    ):
-        x /= 2
-    return x

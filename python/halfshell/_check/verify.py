@@ -16,7 +16,6 @@ from halfshell._convert.call import DIRECTED, Call, each_system, part_of, take
 from halfshell._convert.foreign import is_a
 from halfshell._convert.memory import SMALL
 from halfshell._convert.options import as_flag
-from halfshell._functions.pairs import pairs
 from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._search import search
 from halfshell._settings import settings
@@ -101,7 +100,7 @@ def cause_of(missed: IntArray, spurious: IntArray) -> str:
     return ""
 
 
-@search(like=pairs)
+@search()
 def verify(
     points: PointsLike,
     cutoff: CutoffLike,
@@ -183,7 +182,16 @@ def verify(
         if j is not None or S is not None or full:
             raise TypeError("a table has j, S and both directions itself: leave j, S and full out")
         table = cast("NeighborTable", i)
-        _check_table(table, call, is_directed)
+        if table.n_points != len(call.points):
+            raise ValueError(
+                f"i is a table of {table.n_points} points, got {len(call.points)} points"
+            )
+        if call.indices is None and not is_directed:
+            table._refuse_queries("verify without queries")
+        askers = {"queries": call.queries, "indices": call.indices, "points": call.points}
+        what, wanted = next((name, len(one)) for name, one in askers.items() if one is not None)
+        if table.n_rows != wanted:
+            raise ValueError(f"i is a table of {table.n_rows} rows, got {wanted} {what}")
         full = not is_directed
         i, j, *shifts = table.to_pairs(quantities="ijS" if "S" in table.quantities else "ij")
         i, S = i if call.indices is None else call.indices[i], shifts[0] if shifts else None
@@ -243,33 +251,8 @@ def compare(
             expected = expected[times[expected[:, :2]].any(axis=1)]
         else:
             expected = np.repeat(expected, times[expected[:, 0]], axis=0)
-    missed, surplus = _differences(expected, given)
-    known = {tuple(row) for row in expected.tolist()} if len(surplus) else set()
-    twice = np.array([tuple(row) in known for row in surplus.tolist()], dtype=bool)
-    return Verdict(
-        n_expected=len(expected),
-        n_given=len(given),
-        missed=missed,
-        spurious=surplus[~twice],
-        duplicate=surplus[twice],
-        is_full=kind == "full",
-    )
-
-
-def _check_table(table: NeighborTable, call: Call, is_directed: bool) -> None:
-    """ValueError unless rows and points of a table are as many as those of the call."""
-    n = len(call.points)
-    if table.n_points != n:
-        raise ValueError(f"i is a table of {table.n_points} points, got {n} points")
-    if call.indices is None and not is_directed:
-        table._refuse_queries("verify without queries")
-    what, wanted = "points", n
-    if call.queries is not None:
-        what, wanted = "queries", len(call.queries)
-    elif call.indices is not None:
-        what, wanted = "indices", len(call.indices)
-    if table.n_rows != wanted:
-        raise ValueError(f"i is a table of {table.n_rows} rows, got {wanted} {what}")
+    wrong = _differences(expected, given)
+    return Verdict(len(expected), len(given), *wrong, is_full=kind == "full")
 
 
 def _reversed(rows: IntArray) -> IntArray:
@@ -290,18 +273,20 @@ def _as_half(rows: IntArray) -> IntArray:
     return np.where(backward[:, None], _reversed(rows), rows)
 
 
-def _differences(expected: IntArray, given: IntArray) -> tuple[IntArray, IntArray]:
-    """Rows that are expected more often than given, and given more often than expected."""
+def _differences(expected: IntArray, given: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Rows that are given less often than expected; that are not expected at all; or more often."""
     every = np.concatenate([expected, given])
     if not len(every):
-        return every, every
+        return every, every, every
     unique, inverse = np.unique(every, axis=0, return_inverse=True)
     inverse = inverse.reshape(-1)
     wanted = np.bincount(inverse[: len(expected)], minlength=len(unique))
-    present = np.bincount(inverse[len(expected) :], minlength=len(unique))
-    missed = np.repeat(unique, np.maximum(wanted - present, 0), axis=0)
-    surplus = np.repeat(unique, np.maximum(present - wanted, 0), axis=0)
-    return missed, surplus
+    surplus = np.bincount(inverse[len(expected) :], minlength=len(unique)) - wanted
+    return (
+        np.repeat(unique, np.maximum(-surplus, 0), axis=0),
+        np.repeat(unique, np.where(wanted == 0, surplus, 0), axis=0),
+        np.repeat(unique, np.where(wanted > 0, np.maximum(surplus, 0), 0), axis=0),
+    )
 
 
 class _RightOfAll:

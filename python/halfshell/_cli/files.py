@@ -1,22 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Read a scene from a file that the command line names.
 
-What reads a file is decided by one rule. Each reader that may know the format is tried, and the
-first that yields sensible points wins: at least one point, finite coordinates, a box of the same
-dimensions. A box that is a placeholder is left out, and elements that a residue cannot have are
-told from the names of its atoms instead. The summary names the reader, and what it took for
-coordinates or left out. If no reader wins, the error says what each of them said.
-
-=========================================  ====================================================
-file                                       readers, in this order
-=========================================  ====================================================
-NumPy's, by name, or without one content   NumPy
-.csv, .tsv, .pts, or with --columns        text, by columns
-.ply; .pcd; .vtk, .vtp, .vtu ...           plyfile, pyvista; pypcd4; pyvista
-.txt, .dat, or a name without a suffix     text, ASE, MDAnalysis
-any other; --format is for these two       ASE, MDAnalysis, then text if neither knows the format
-                                           (or if it is .xyz, as clouds are named too)
-=========================================  ====================================================
+What reads a file is decided by one rule, with the table of docs/command-line.md. Each reader that
+may know the format is tried, and the first that yields sensible points wins: at least one point,
+finite coordinates, a box of the same dimensions. A box that is a placeholder is left out, and
+elements that a residue cannot have are told from the names of its atoms instead. The summary names
+the reader, and what it took for coordinates or left out. If no reader wins, the error says what
+each of them said.
 
 What stands in a header is compared with the size of the file before any of them demands memory.
 Standard input, ``-``, and pipes are copied to a file first.
@@ -53,66 +43,44 @@ from halfshell._cli.structure_files import Frames, Scene, UnknownFormat, by_ase,
 from halfshell._cli.text_files import kind_of_file, read_points
 
 _TEXT_ALONE, _TEXT_FIRST = (".csv", ".tsv", ".pts"), (".txt", ".dat", "")
-ROWS_CHECKED = 1 << 16  # at a time: some megabytes
 
 _LAST = "as text"  # the reader of text, where it is tried last
-
 _Reader = Callable[[str], Iterable[Scene]]  # the frames of a file, one by one
 
 
-def read_scene(
-    file: str | None,
-    *,
-    index: int | None = None,
-    box: NDArray[np.float64] | None = None,
-    periodic: tuple[bool, ...] | None = None,
-    **how: Any,
-) -> Scene:
-    """Read points and box from a file, by the rule above; without one, those of alpha-quartz.
+def read_scene(file: str | None, index: int | None = None, **how: Any) -> Scene:
+    """Read one frame of a file, as `read_frames` does; without a file, alpha-quartz."""
+    if file is not None:
+        (scene,) = read_frames(file, index, **how)
+        return scene
+    box, periodic = how.pop("box", None), how.pop("periodic", None)
+    for name, value in {"index": index, **how}.items():
+        if value is not None:
+            raise InputError(f"--{name.removeprefix('file_')} needs a file: give one")
+    from halfshell.structures import alpha_quartz
 
-    index, and how: what the options --index, --format, --columns and --trajectory say. box,
-    periodic: take the place of the file's; with a box all axes repeat unless `periodic` says
-    otherwise.
-    """
-    if file is None:
-        for name, value in {"index": index, **how}.items():
-            if value is not None:
-                raise InputError(f"--{name.removeprefix('file_')} needs a file: give one")
-        from halfshell.structures import alpha_quartz
-
-        positions, rows, species = alpha_quartz()
-        source = "alpha-quartz (ships with halfshell)"
-        scene = Scene(positions, rows, (True,) * 3, source, species, "angstrom")
-    else:
-        (scene,) = _read(file, index, **how)
+    positions, rows, species = alpha_quartz()
+    source = "alpha-quartz (ships with halfshell)"
+    scene = Scene(positions, rows, (True,) * 3, source, species, "angstrom")
     return _with_overrides(scene, box, periodic)
 
 
 def read_frames(
     file: str,
-    frames: slice,
+    frames: Frames,
     *,
     box: NDArray[np.float64] | None = None,
     periodic: tuple[bool, ...] | None = None,
-    **how: Any,
-) -> Iterator[Scene]:
-    """Read some frames of a file one by one, at least one, as `read_scene` reads one.
-
-    None is kept. The reader is chosen by the first; one that fails later is an error that names
-    the frame.
-    """
-    for scene in _read(file, frames, **how):
-        yield _with_overrides(scene, box, periodic)
-
-
-def _read(
-    file: str,
-    frames: Frames,
     file_format: str | None = None,
     columns: Sequence[str] | None = None,
     trajectory: str | None = None,
 ) -> Iterator[Scene]:
-    """The frames of the first reader that yields a sensible one."""
+    """Read frames of a file one by one, at least one, by the rule above; none is kept.
+
+    The reader is chosen by the first; one that fails later is an error that names the frame. What
+    follows are the options --index, --box, --periodic, --format, --columns and --trajectory. With a
+    box all axes repeat unless `periodic` says otherwise.
+    """
     with _as_path(file, file_format) as (path, name_of_path):
         source = name_of_path
         claimed = _refuse_claims(path, source)
@@ -138,13 +106,13 @@ def _read(
             try:
                 for scene in read(path):
                     scene = replace(scene, source=source)
-                    _check(scene)
+                    _check(scene, box is None and periodic is None)
                     is_chosen = True
                     if len(scene.points) < claimed:
                         were = f"{len(scene.points):,} were read"
                         remark = f"its header says {claimed:,} points, {were}"
                         scene = replace(scene, remarks=(*scene.remarks, remark))
-                    yield scene
+                    yield _with_overrides(scene, box, periodic)
                 if is_chosen:
                     return
                 raise InputError("has none of these frames")
@@ -152,7 +120,10 @@ def _read(
                 unknown.append(name)
             except (Exception, SystemExit) as error:  # a reader may fail in any way
                 said[name] = _reason(error).replace(path, name_of_path)
-                _forget(error)
+                # What is left, half made, may fail to end, which Python would print.
+                hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+                traceback.clear_frames(error.__traceback__)
+                sys.unraisablehook = hook
                 if is_chosen or isinstance(error, MemoryError):
                     raise InputError(f"{source}: {said[name]}") from None
     if kind_of_file(path) == "" and len(said) > 1:
@@ -168,15 +139,6 @@ def _reason(error: BaseException) -> str:
         return one_line(error)
     kind = "" if isinstance(error, OSError) else f"{type(error).__name__}: "
     return f"cannot be read: {kind}{one_line(error)}"
-
-
-def _forget(error: BaseException) -> None:
-    """Drop what a reader left behind; Python would print how that, half made, fails to end."""
-    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
-    try:
-        traceback.clear_frames(error.__traceback__)
-    finally:
-        sys.unraisablehook = hook
 
 
 def _refusal(said: dict[str, str], unknown: list[str], file_format: str | None) -> str:
@@ -249,8 +211,6 @@ def _by_numpy(path: str) -> list[Scene]:
         held = ", ".join(map(printable, names)) or "nothing"
         raise InputError(f"has no array 'points' (it holds {held})")
     points, box = content["points"], content.get("box")
-    if points.ndim != 2:
-        raise InputError(f"points have shape {points.shape}; they must be (n, d)")
     periodic = np.asarray(content.get("periodic", box is not None))
     if periodic.dtype.kind != "b" or periodic.shape not in ((), (points.shape[1],)):
         raise InputError("'periodic' must be one bool, or one for each column of points")
@@ -317,31 +277,15 @@ def _claim_of_dcd(head: bytes) -> int:
     return int(struct.unpack_from(f"{order}i", head, at + width)[0])
 
 
-def _check(scene: Scene) -> None:
-    """Say what is wrong with points or box before anything is computed from them."""
-    points, frame = scene.points, scene.frame and f"{scene.frame}: "
-    if points.dtype.kind not in "fiub":
-        raise InputError(f"{frame}points are of type {points.dtype}; they must be numbers")
-    if not len(points):
+def _check(scene: Scene, with_box: bool) -> None:
+    """InputError where points, or points in their box, cannot be searched."""
+    frame = scene.frame and f"{scene.frame}: "
+    if not len(scene.points):
         raise InputError(f"{frame}holds no points")
-    if points.shape[1] == 0:
-        raise InputError(f"{frame}points have shape {points.shape}; they must be (n, d)")
-    for first in range(0, len(points), ROWS_CHECKED):
-        block = points[first : first + ROWS_CHECKED]
-        if not np.isfinite(block).all():
-            row, column = (int(k) for k in np.argwhere(~np.isfinite(block))[0])
-            value = block[row, column]
-            raise InputError(f"{frame}point {first + row}, coordinate {column} is {value}")
-    if scene.box is None:
-        return
-    ndim = points.shape[1]
-    if scene.box.dtype.kind not in "fiu" or not np.isfinite(scene.box).all():
-        raise InputError(f"{frame}the box must be finite numbers, it is {scene.box.tolist()}")
-    if scene.box.shape not in ((ndim,), (ndim, ndim)):
-        raise InputError(
-            f"{frame}the box has shape {scene.box.shape}; "
-            f"it must be ({ndim},) or ({ndim}, {ndim})"
-        )
+    try:
+        _ = scene.known if with_box else hs.Points(scene.points)
+    except (ValueError, TypeError, OverflowError) as error:
+        raise InputError(f"{frame}{one_line(error)}") from None
 
 
 def _with_overrides(
@@ -372,7 +316,8 @@ def _with_overrides(
             )
         scene = replace(scene, periodic=periodic * (ndim // len(periodic)))
     if scene.box is None and any(scene.periodic):
-        raise InputError(f"{scene.where}: has periodic axes but no box (give --box)")
+        frame = scene.frame and f"{scene.frame}: "
+        raise InputError(f"{frame}has periodic axes but no box (give --box)")
     return scene
 
 
@@ -381,24 +326,17 @@ def _with_overrides(
 
 def _by_plyfile(library: Any, file: str) -> NDArray[Any]:
     vertices = library.PlyData.read(file)["vertex"]
-    return np.stack([np.asarray(vertices[axis]) for axis in "xyz"], axis=1)
-
-
-def _by_pypcd4(library: Any, file: str) -> NDArray[Any]:
-    return np.asarray(library.PointCloud.from_path(file).numpy(("x", "y", "z")))
-
-
-def _by_pyvista(library: Any, file: str) -> NDArray[Any]:
-    return np.array(library.read(file).points)
+    return np.stack([vertices[axis] for axis in "xyz"], axis=1)
 
 
 _Cloud = tuple[str, Callable[[Any, str], NDArray[Any]]]
-_PLYFILE, _PYPCD4, _PYVISTA = (
-    ("plyfile", _by_plyfile), ("pypcd4", _by_pypcd4), ("pyvista", _by_pyvista)
+_PYVISTA: _Cloud = ("pyvista", lambda library, file: np.array(library.read(file).points))
+_PYPCD4: _Cloud = (
+    "pypcd4", lambda library, file: library.PointCloud.from_path(file).numpy(("x", "y", "z"))
 )  # fmt: skip
 # The libraries that read a format, the lighter one first.
 CLOUDS: dict[str, tuple[_Cloud, ...]] = {
-    ".ply": (_PLYFILE, _PYVISTA), ".pcd": (_PYPCD4,),
+    ".ply": (("plyfile", _by_plyfile), _PYVISTA), ".pcd": (_PYPCD4,),
     **dict.fromkeys((".obj", ".stl", ".vtk", ".vtp", ".vtu", ".vts", ".vti", ".vtr"), (_PYVISTA,)),
 }  # fmt: skip
 

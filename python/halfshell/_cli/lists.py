@@ -6,6 +6,7 @@ Each finds its columns, says in a few lines what they are, and writes them where
 
 from __future__ import annotations
 
+import itertools
 import json
 import time
 from argparse import Namespace
@@ -24,6 +25,7 @@ from halfshell._cli.errors import InputError, printable
 from halfshell._cli.files import read_scene
 from halfshell._cli.outputs import check_size, open_output, write_columns
 from halfshell._cli.scene import (
+    cutoff_for,
     describe_box,
     describe_points,
     describe_source,
@@ -162,13 +164,10 @@ def run_coordination(args: Namespace) -> int:
 
 def run_nearest(args: Namespace) -> int:
     """Carry out ``halfshell nearest``."""
-    scene = read_points(args)
-    asking = _asking(args, scene)
-    letters = "jdS" if any(scene.periodic) else "jd"
 
-    def find() -> Found:
-        queries = None if asking is scene else asking.points
-        found = hs.nearest(scene.known, args.k, queries=queries, quantities=letters)
+    def find(scene: Scene, _: Any, asking: Scene, how: dict[str, Any]) -> Found:
+        letters = "jdS" if any(scene.periodic) else "jd"
+        found = hs.nearest(scene.known, args.k, queries=how["queries"], quantities=letters)
         n, k = found[0].shape
         columns = {"i": np.repeat(np.arange(n), k), "rank": np.tile(np.arange(1, k + 1), n)}
         for letter, array in zip(letters, found, strict=True):
@@ -184,7 +183,7 @@ def run_nearest(args: Namespace) -> int:
         ]
         return Found(columns, facts, lines)
 
-    return _run_loaded(args, scene, None, "", find)
+    return _run(args, find)
 
 
 def run_rdf(args: Namespace) -> int:
@@ -210,7 +209,11 @@ def run_rdf(args: Namespace) -> int:
         columns: Columns = {"r": result.r}
         peaks = {}
         pairs = 0
-        for name, part in _parts(result).items():
+        parts = {"": result}  # g(r) of all points, or of each two types
+        if result.types is not None:
+            both = itertools.combinations_with_replacement(result.types, 2)
+            parts = {f"_{one}-{other}": result[one, other] for one, other in both}
+        for name, part in parts.items():
             columns[f"g{name}"], columns[f"counts{name}"] = part.g, part.counts
             highest = int(part.g.argmax())
             peaks[name[1:]] = [float(part.r[highest]), float(part.g[highest])]
@@ -236,19 +239,9 @@ def run_rdf(args: Namespace) -> int:
         draw = partial(result.plot, unit="Å" if first.unit else None)
         return Found(columns, facts, lines, draw=draw)
 
-    first, frames, cutoff, reason = load_frames(args)
+    first, frames = load_frames(args)
+    cutoff, reason = cutoff_for(first, args)
     return _run_loaded(args, first, cutoff, reason, find)
-
-
-def _parts(result: Any) -> dict[str, Any]:
-    """g(r) of all points, or of each two types, by what its columns are called."""
-    if result.types is None:
-        return {"": result}
-    return {
-        f"_{one}-{other}": result[one, other]
-        for k, one in enumerate(result.types)
-        for other in result.types[k:]
-    }
 
 
 # ---- what they share -------------------------------------------------------------------------
@@ -262,11 +255,19 @@ def _refuse_without_output(args: Namespace, *names: str) -> None:
 
 
 def _run(args: Namespace, find: Callable[[Scene, Any, Scene, dict[str, Any]], Found]) -> int:
-    """A command with a cutoff."""
-    scene, cutoff, reason = load_scene(args)
-    asking = _asking(args, scene)
-    queries = None if asking is scene else hs.Points(asking.points, types=asking.species)
-    how = {"queries": queries, "inclusive": not args.strict}
+    """A command with rows: of the points of --queries, or of the points themselves."""
+    scene = asking = read_points(args)
+    cutoff, reason = cutoff_for(scene, args) if hasattr(args, "cutoff") else (None, "")
+    how: dict[str, Any] = {"queries": None, "inclusive": not getattr(args, "strict", False)}
+    if args.queries is not None:
+        asking = read_scene(args.queries)
+        n_dims = asking.points.shape[1], scene.points.shape[1]
+        if n_dims[0] != n_dims[1]:
+            raise InputError(
+                f"{args.queries}: has {n_dims[0]} coordinates a point, {scene.source} "
+                f"has {n_dims[1]}"
+            )
+        how["queries"] = hs.Points(asking.points, types=asking.species)
     return _run_loaded(args, scene, cutoff, reason, lambda: find(scene, cutoff, asking, how))
 
 
@@ -275,11 +276,11 @@ def _run_loaded(
     what: str = "",
 ) -> int:  # fmt: skip
     """Open the outputs, find, write, and sum up; `what` the columns are called."""
+    target, queries = getattr(args, "plot", None), getattr(args, "queries", None)
     with ExitStack() as stack:
         output = open_output(args.output, args.file, stack, json=args.json)
-        plot = None
-        if getattr(args, "plot", None):
-            plot = open_output(args.plot, args.file, stack, (".png", ".pdf", ".svg"))
+        plot = open_output(target, args.file, stack, (".png", ".pdf", ".svg"))
+        if plot:
             require_matplotlib()
         start = time.perf_counter()
         with searching(scene, args):
@@ -296,28 +297,34 @@ def _run_loaded(
             name = printable(Path(scene.source).name)
             axes.set_title(name, fontsize=10, parse_math=False)
             figure.savefig(plot, format=Path(args.plot).suffix[1:], dpi=150)
-    facts, lines = {"seconds": seconds, **found.facts}, list(found.lines)
+    if args.output == "-":  # in place of the summary
+        return 0
+    if args.json:
+        facts = describe_source(scene)
+        if scene.no_box:
+            facts["no_box"] = scene.no_box
+        if queries is not None:
+            facts["queries"] = queries
+        if cutoff is not None:
+            facts |= {"cutoff": named_cutoff(cutoff), "cutoff_chosen": args.cutoff is None}
+        facts |= {"seconds": seconds, **found.facts, "output": args.output}
+        print(json.dumps(facts, indent=2))
+        return 0
+    lines = describe_points(scene)
+    if queries is not None:
+        lines.append(("queries", queries))
+    lines.append(("box", describe_box(scene)))
+    if cutoff is not None:
+        lines.append(("cutoff", shown_cutoff(cutoff, scene, reason)))
+    lines += found.lines
     if "seconds" not in found.facts:
         lines.append(("time", _duration(seconds)))
-    if cutoff is not None:
-        chosen = {"cutoff": named_cutoff(cutoff), "cutoff_chosen": args.cutoff is None}
-        facts = {**chosen, **facts}
-        lines.insert(0, ("cutoff", shown_cutoff(cutoff, scene, reason)))
-    _print(args, scene, facts, lines, what)
+    for name, path in ((what, args.output), ("plot ", target)):
+        if path:
+            lines.append((f"{name}written to", path))
+    text = [scene.source, *(f"  {name:<18}{value}" for name, value in lines)]
+    print("\n".join(map(printable, text)))
     return 0
-
-
-def _asking(args: Namespace, scene: Scene) -> Scene:
-    """The points whose neighbours are wanted: those of --queries, or the points themselves."""
-    if getattr(args, "queries", None) is None:
-        return scene
-    queries = read_scene(args.queries)
-    if queries.points.shape[1] != scene.points.shape[1]:
-        raise InputError(
-            f"{args.queries}: has {queries.points.shape[1]} coordinates a point, {scene.source} "
-            f"has {scene.points.shape[1]}"
-        )
-    return queries
 
 
 def _of_counts(
@@ -354,31 +361,6 @@ def _means(counts: NDArray[np.int64], asking: Scene) -> dict[str, float]:
         return {"all": float(counts.mean())}
     names = np.unique(asking.species).tolist()
     return {name: float(counts[asking.species == name].mean()) for name in names}
-
-
-def _print(
-    args: Namespace, scene: Scene, facts: dict[str, Any], lines: list[tuple[str, str]],
-    what: str = "",
-) -> None:  # fmt: skip
-    """The summary, unless the columns, which are called `what`, went to standard output."""
-    if args.output == "-":
-        return
-    queries = getattr(args, "queries", None)
-    if args.json:
-        first = describe_source(scene) | ({"no_box": scene.no_box} if scene.no_box else {})
-        if queries is not None:
-            first["queries"] = queries
-        print(json.dumps({**first, **facts, "output": args.output}, indent=2))
-        return
-    shown = describe_points(scene)
-    if queries is not None:
-        shown.append(("queries", queries))
-    shown += [("box", describe_box(scene)), *lines]
-    for name, target in ((what, args.output), ("plot ", getattr(args, "plot", None))):
-        if target:
-            shown.append((f"{name}written to", target))
-    text = [scene.source, *(f"  {name:<18}{value}" for name, value in shown)]
-    print("\n".join(map(printable, text)))
 
 
 def _duration(seconds: float) -> str:

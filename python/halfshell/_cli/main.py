@@ -10,19 +10,22 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import platform
 import re
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from importlib import import_module
 from typing import Any, NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 
 import halfshell as hs
-from halfshell._cli import values
 from halfshell._cli.errors import InputError, one_line, printable
+from halfshell._convert.options import LETTERS, are_letters
 from halfshell._machine import cpu_name, unknown_kernel, usable_cpus
 from halfshell._unknown import nearest_word
 
@@ -35,9 +38,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         parser = _parser()
         args = parser.parse_args(argv)
-        status = 0 if args.run is None else int(args.run(args))
         if args.run is None:
             parser.print_help()
+            return 0
+        module, _, name = args.run.partition(":")  # imported when it is called
+        status = int(getattr(import_module(module), name)(args))
         sys.stdout.flush()
         return status
     except (InputError, MemoryError) as error:
@@ -51,8 +56,107 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 1
 
 
-# Options -----------------------------------------------------------------------------------
+# ---- values of options, from their text ------------------------------------------------------
 
+def cutoff(text: str) -> float:
+    value = number(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text} is negative")
+    return value
+
+
+def cutoffs(text: str) -> float | dict[tuple[str, str], float]:
+    """A cutoff, or one for each two elements, as in ``Si-O=1.8,*-*=3``."""
+    if "=" not in text:
+        return cutoff(text)
+    found: dict[tuple[str, str], float] = {}
+    for part in text.split(","):
+        names, _, length = part.partition("=")
+        one, between, other = (word.strip() for word in names.partition("-"))
+        if not (one and between and other and length):
+            raise argparse.ArgumentTypeError(f"{part!r} is not like Si-O=1.8, or *-*=3")
+        found[one, other] = cutoff(length)
+    return found
+
+
+def number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text} is not a finite number")
+    return value
+
+
+def box(text: str) -> NDArray[np.float64]:
+    return np.array([number(part) for part in text.replace(",", " ").split()])
+
+
+def columns(text: str) -> tuple[str, ...]:
+    names = tuple(part.strip() for part in text.split(","))
+    if not all(names):
+        raise argparse.ArgumentTypeError(f"{text!r} is not made of names or numbers of columns")
+    return names
+
+
+def periodic(text: str) -> tuple[bool, ...]:
+    if not text or set(text.upper()) - set("TF"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not made of the letters T and F")
+    return tuple(letter == "T" for letter in text.upper())
+
+
+def quantities(text: str) -> str:
+    if not are_letters(text):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not some of the letters {' '.join(LETTERS)}, each at most once"
+        )
+    return text
+
+
+def count(text: str, least: int = 1) -> int:
+    if not text.isdecimal() or int(text) < least:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from {least} on")
+    return int(text)
+
+
+def size(text: str) -> float:
+    """Bytes, of a number with kB, MB, GB or TB behind it, or with none."""
+    number = text.strip().upper().removesuffix("B")
+    power = "KMGT".find(number[-1:]) + 1 if number[-1:] else 0
+    try:
+        value = float(number[:-1] if power else number) * 1000.0**power
+    except ValueError:
+        value = 0.0
+    if not (math.isfinite(value) and value > 0.0):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a size such as 500MB or 4GB")
+    return value
+
+
+def frame(text: str) -> int:
+    number = frames(text)
+    if isinstance(number, slice):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not the number of a frame; only rdf reads several frames"
+        )
+    return number
+
+
+def frames(text: str) -> int | slice:
+    """The number of a frame, or a range as in ``frames[first:end:step]``."""
+    parts = text.split(":")
+    try:
+        numbers = [int(part) if part.strip() else None for part in parts]
+    except ValueError:
+        numbers = [None]
+    if len(parts) == 1 and numbers[0] is not None:
+        return numbers[0]
+    if not 2 <= len(parts) <= 3 or numbers[2:] == [0]:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a frame, nor frames such as 10:, ::5")
+    return slice(*numbers)
+
+
+# ---- options ---------------------------------------------------------------------------------
 
 class _Parser(argparse.ArgumentParser):
     """An argument parser whose complaints are one line, and which guesses no option.
@@ -104,21 +208,21 @@ _OPTIONS: dict[str, dict[str, Any]] = {
         "MDAnalysis reads; - for standard input; default: alpha-quartz",
     },
     "--cutoff": {
-        "type": values.cutoffs, "metavar": "R",
+        "type": cutoffs, "metavar": "R",
         "help": "largest distance of a pair, or of each two elements: Si-O=1.8,*-*=3; default: one "
         "with about 50 neighbours",
     },
     "--box": {
-        "type": values.box, "metavar": "LX,LY,LZ",
+        "type": box, "metavar": "LX,LY,LZ",
         "help": "edge lengths, or one length for all edges; lengths and angles (six numbers); or "
         "all components of the edge vectors",
     },
     "--periodic": {
-        "type": values.periodic, "metavar": "TTF",
+        "type": periodic, "metavar": "TTF",
         "help": "which axes are periodic, T or F for each, or one letter for all",
     },
     "--columns": {
-        "type": values.columns, "metavar": "X,Y,Z",
+        "type": columns, "metavar": "X,Y,Z",
         "help": "of text, the coordinates: names of columns, or numbers from 1 on",
     },
     "--trajectory": {
@@ -128,22 +232,22 @@ _OPTIONS: dict[str, dict[str, Any]] = {
     "--format": {
         "metavar": "NAME", "help": "format of ASE or MDAnalysis, if it is not recognised"
     },
-    "--index": {"type": values.frame, "metavar": "N", "help": "frame; default: the last"},
+    "--index": {"type": frame, "metavar": "N", "help": "frame; default: the last"},
     "--json": {"action": "store_true", "help": "print JSON for machines"},
     "--strict": {"action": "store_true", "help": "d < cutoff; default: d <= cutoff"},
-    "--kernel": {"type": values.kernel, "metavar": "NAME", "help": "see `halfshell info`"},
+    "--kernel": {"choices": hs.kernels(), "metavar": "NAME", "help": "see `halfshell info`"},
     "--threads": {
-        "type": values.count, "metavar": "N", "help": "maximum number; default: as many as pay"
+        "type": count, "metavar": "N", "help": "maximum number; default: as many as pay"
     },
     "--output": {
         "metavar": "OUT", "help": "write the columns: .npz, .csv, .parquet, or - for CSV here"
     },
     "--quantities": {
-        "type": values.quantities, "metavar": "LETTERS",
+        "type": quantities, "metavar": "LETTERS",
         "help": "columns of OUT, any of i j d D S; default: ijdS, or ijd without a box",
     },
     "--max-output": {
-        "type": values.size, "metavar": "SIZE",
+        "type": size, "metavar": "SIZE",
         "help": "largest output, such as 500MB or 4GB; default: 1GB",
     },
     "--plot": {"metavar": "PNG", "help": "draw g(r): .png, .pdf or .svg"},
@@ -164,7 +268,7 @@ _SCENE = (
 )  # fmt: skip
 _SEARCH = (*_SCENE, "--kernel", "--threads")
 _COLUMNS = (*_SEARCH, "--output")
-_ONE_CUTOFF = {"type": values.cutoff, "help": "largest distance of a pair; default: one with about "
+_ONE_CUTOFF = {"type": cutoff, "help": "largest distance of a pair; default: one with about "
                "50 neighbours"}  # fmt: skip
 
 
@@ -185,16 +289,12 @@ def _parser() -> _Parser:
     parser.set_defaults(run=None)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND")
 
-    def command(name: str, words: str, run: Callable[[argparse.Namespace], int], **how: Any) -> Any:
+    def command(name: str, words: str, run: str = "", **how: Any) -> Any:
         made = commands.add_parser(name, help=words, **how)
-        made.set_defaults(run=run)
+        made.set_defaults(run=run or f"halfshell._cli.lists:run_{name}")
         return made
 
-    lists = "halfshell._cli.lists"
-    pairs = command(
-        "pairs", "find the pairs of a file, summarise them, save them, plot g(r)",
-        _later(lists, "run_pairs"),
-    )  # fmt: skip
+    pairs = command("pairs", "find the pairs of a file, summarise them, save them, plot g(r)")
     _add(
         pairs, *_COLUMNS, "--strict", "--quantities", "--max-output", "--plot", "--no-progress",
         output={"help": "write the pairs: .npz, .csv, .parquet, or - for CSV on standard output"},
@@ -207,39 +307,31 @@ def _parser() -> _Parser:
         help="how a pair near the cutoff is decided; default: exact",
     )  # fmt: skip
 
-    neighbors = command(
-        "neighbors", "find all neighbours of each point", _later(lists, "run_neighbors")
-    )
+    neighbors = command("neighbors", "find all neighbours of each point")
     _add(neighbors, *_COLUMNS, "--strict", "--queries", "--quantities", "--max-output")
 
-    counts = command(
-        "coordination", "count the neighbours of each point", _later(lists, "run_coordination")
-    )
+    counts = command("coordination", "count the neighbours of each point")
     _add(counts, *_COLUMNS, "--strict", "--queries", "--by-type")
 
-    nearest = command(
-        "nearest", "find the nearest neighbours of each point", _later(lists, "run_nearest")
-    )
+    nearest = command("nearest", "find the nearest neighbours of each point")
     _add(nearest, *[name for name in _COLUMNS if name != "--cutoff"], "--queries")
-    nearest.add_argument("-k", type=values.count, default=1, help="how many; default: 1")
+    nearest.add_argument("-k", type=count, default=1, help="how many; default: 1")
 
-    rdf = command(
-        "rdf", "the radial distribution function g(r), up to the cutoff", _later(lists, "run_rdf")
-    )
+    rdf = command("rdf", "the radial distribution function g(r), up to the cutoff")
     _add(
         rdf, *_COLUMNS, "--plot", "--by-type", cutoff=_ONE_CUTOFF,
-        index={"type": values.frames,
+        index={"type": frames,
                "help": "frame, or frames to average: : for all, 100:, ::10; default: the last"},
     )  # fmt: skip
-    rdf.add_argument("--bins", type=values.count, default=100, metavar="N", help="default: 100")
+    rdf.add_argument("--bins", type=count, default=100, metavar="N", help="default: 100")
     rdf.add_argument(
-        "--density", type=values.number, metavar="RHO",
+        "--density", type=number, metavar="RHO",
         help="points per unit of volume, where the box has none or is not the whole",
     )  # fmt: skip
 
     verify = command(
         "verify", "check a list of pairs, of halfshell or another library, exactly",
-        _later("halfshell._cli.verify"),
+        "halfshell._cli.verify:run",
     )  # fmt: skip
     _add(verify, *_SEARCH, "--strict", "--no-progress")
     verify.add_argument(
@@ -252,7 +344,7 @@ def _parser() -> _Parser:
         "our own",
     )  # fmt: skip
     verify.add_argument(
-        "--sample", type=values.sample, metavar="N",
+        "--sample", type=partial(count, least=0), metavar="N",
         help="most points to check by integers, 0 for all; default: 400, or what takes seconds",
     )  # fmt: skip
 
@@ -261,39 +353,26 @@ def _parser() -> _Parser:
         _add(parser, *_SCENE, "--strict", cutoff=_ONE_CUTOFF)
         import_module("halfshell_report.cli").add_peers(parser)
 
-    def fill_report(parser: argparse.ArgumentParser) -> None:
-        import_module("halfshell_report.cli").add_options(parser)
-
     command(
         "bench", "run times on a file, ours and other libraries', whose answers come first",
-        _later("halfshell_report.cli", "run_bench"), fill=fill_bench,
+        "halfshell_report.cli:run_bench", fill=fill_bench,
     )  # fmt: skip
     command(
         "report", "error against run time, of halfshell and other libraries, on hard scenes",
-        _later("halfshell_report.cli"), fill=fill_report,
+        "halfshell_report.cli:run",
+        fill=lambda parser: import_module("halfshell_report.cli").add_options(parser),
     )  # fmt: skip
-    info = command("info", "what this installation consists of", _run_info)
+    info = command("info", "what this installation consists of", "halfshell._cli.main:run_info")
     info.add_argument("--json", action="store_true", help="the same for machines")
     command(
         "selftest", "check every kernel of this CPU against integers (under 5 s)",
-        lambda args: import_module("halfshell.selftest").main(),
+        "halfshell._cli.main:run_selftest",
     )  # fmt: skip
     return parser
 
 
-# Commands ----------------------------------------------------------------------------------
-
-
-def _later(module: str, name: str = "run") -> Callable[[argparse.Namespace], int]:
-    """What carries out a command: a function that is imported when it is called."""
-
-    def run(args: argparse.Namespace) -> int:
-        return int(getattr(import_module(module), name)(args))
-
-    return run
-
-
-def _run_info(args: argparse.Namespace) -> int:
+def run_info(args: argparse.Namespace) -> int:
+    """Carry out ``halfshell info``."""
     from halfshell import _core
 
     build = dict(_core.build_info())
@@ -318,3 +397,8 @@ def _run_info(args: argparse.Namespace) -> int:
     if unknown is not None:
         raise InputError(f"{unknown}; searches that name none are refused")
     return 0
+
+
+def run_selftest(_: argparse.Namespace) -> int:
+    """Carry out ``halfshell selftest``."""
+    return int(import_module("halfshell.selftest").main())

@@ -11,7 +11,6 @@ import io
 import math
 import os
 import warnings
-import zipfile
 from collections.abc import Sequence
 from typing import IO, Any
 
@@ -71,64 +70,36 @@ def _read(file: str, wanted: Sequence[str]) -> tuple[dict[str, NDArray[Any]], li
         loaded = np.load(stream, allow_pickle=False, max_header_size=MOST_HEADER)
         if isinstance(loaded, np.ndarray):
             return {alone: loaded}, [alone]
-        names = list(loaded.files)
-        held = [name for name in wanted if name in names]
-        return {name: loaded[name] for name in held if _is_array(name, loaded.zip)}, names
-
-
-def _is_array(name: str, archive: zipfile.ZipFile) -> bool:
-    """Whether a member is a NumPy file: then with `_check_header`, else it is not read."""
-    member = name if name in archive.namelist() else f"{name}.npy"
-    with archive.open(member) as part:
-        if part.read(len(_MAGIC)) != _MAGIC:
-            return False
-    with archive.open(member) as part:
-        _check_header(name, part, archive.getinfo(member).file_size)
-    return True
+        arrays, members = {}, loaded.zip.namelist()
+        for name in [name for name in wanted if name in loaded.files]:
+            member = name if name in members else f"{name}.npy"
+            with loaded.zip.open(member) as part:
+                if not part.peek(len(_MAGIC)).startswith(_MAGIC):
+                    continue
+                _check_header(name, part, loaded.zip.getinfo(member).file_size)
+            arrays[name] = loaded[name]
+        return arrays, list(loaded.files)
 
 
 def _check_header(name: str, stream: IO[bytes], n_bytes: int) -> None:
     """Refuse an array that cannot be used, or of which its `n_bytes` do not hold all."""
-    header = _read_header(stream)
-    if header is None or header[1].hasobject:
+    start = io.BytesIO(stream.read(MOST_HEADER))
+    is_old = np.lib.format.read_magic(start) == (1, 0)
+    read = np.lib.format.read_array_header_1_0 if is_old else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(start)
+    if dtype.hasobject:
         return  # NumPy refuses it
-    shape, dtype, n_header = header
-    n_bytes -= n_header
     if min(shape, default=0) < 0:
         raise InputError(f"{name!r} has shape {shape}; no length is negative")
-    needed = math.prod(shape) * dtype.itemsize
+    if name in ("box", "periodic") and math.prod(shape) > MAX_DIM**2:
+        raise InputError(f"{name!r} has shape {shape}, more than a box has")
+    if name == "points":
+        if len(shape) != 2 or shape[1] > MAX_DIM:
+            raise InputError(f"points have shape {shape}; they must be (n, d) with d <= {MAX_DIM}")
+        if shape[0] > MAX_POINTS:
+            raise InputError(f"points have shape {shape}; fewer than 2**31 points can be searched")
+    needed, n_bytes = math.prod(shape) * dtype.itemsize, n_bytes - start.tell()
     what = f"{name!r} of shape {shape} and dtype {dtype}"
-    if name in ("box", "periodic"):
-        if math.prod(shape) > MAX_DIM**2:
-            raise InputError(f"{name!r} has shape {shape}, more than a box has")
-    elif name != "points":
-        pass
-    elif len(shape) != 2:
-        raise InputError(f"points have shape {shape}; they must be (n, d)")
-    elif shape[1] > MAX_DIM:
-        raise InputError(f"points have shape {shape}; they must be (n, d) with d <= {MAX_DIM}")
-    elif shape[0] > MAX_POINTS:
-        raise InputError(f"points have shape {shape}; fewer than 2**31 points can be searched")
     if needed > n_bytes:
         raise InputError(f"{what} is cut off: that is {needed:,} bytes, there are {n_bytes:,}")
     refuse_unavailable(_COPIES * needed, f"{what}, read and searched,")
-
-
-def _read_header(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any], int] | None:
-    """Shape and type of an array, and the bytes before its data; None if the header is none."""
-    start = stream.read(12)
-    if len(start) < 12 or not start.startswith(_MAGIC):
-        return None
-    is_old = start[6] == 1
-    length = int.from_bytes(start[8:10] if is_old else start[8:12], "little")
-    if length > MOST_HEADER:
-        raise InputError(f"its header of {length:,} bytes is too long")
-    whole = io.BytesIO(start + stream.read(length))
-    try:
-        np.lib.format.read_magic(whole)
-        read = (np.lib.format.read_array_header_1_0 if is_old
-                else np.lib.format.read_array_header_2_0)  # fmt: skip
-        shape, _, dtype = read(whole)
-    except ValueError:
-        return None
-    return shape, dtype, length + (10 if is_old else 12)

@@ -124,27 +124,12 @@ def write_columns(
     if target.lower().endswith(".npz"):
         np.savez(stream, **columns, **extra)  # type: ignore[arg-type]
     elif target.lower().endswith(".parquet"):
-        write_parquet(stream, columns)
+        pyarrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
+        series = {name: np.ascontiguousarray(values) for name, values in _series(columns)}
+        parquet.write_table(pyarrow.table(series), stream, row_group_size=_PARQUET_ROWS)
     else:
         write_csv(stream, columns)
     stream.flush()
-
-
-def write_parquet(stream: IO[bytes], columns: dict[str, NDArray[Any]]) -> None:
-    """Write columns of their own types, vectors as in `write_csv`, in row groups."""
-    pyarrow: Any = import_module("pyarrow")
-    parquet: Any = import_module("pyarrow.parquet")
-
-    series = dict(_series(columns))
-    n_rows = len(next(iter(series.values())))
-
-    def rows(first: int) -> Any:
-        some = {name: values[first : first + _PARQUET_ROWS] for name, values in series.items()}
-        return pyarrow.table({name: np.ascontiguousarray(one) for name, one in some.items()})
-
-    with parquet.ParquetWriter(stream, rows(0).schema) as writer:
-        for first in range(0, n_rows, _PARQUET_ROWS):
-            writer.write_table(rows(first))
 
 
 def _series(columns: dict[str, NDArray[Any]]) -> Iterator[tuple[str, NDArray[Any]]]:

@@ -9,19 +9,20 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from halfshell._cli.errors import InputError, missing_extra, one_line
 from halfshell._cli.numpy_files import read_arrays
-from halfshell._cli.text_files import shown_names
+from halfshell._cli.text_files import open_text, shown_names
 
 # Names of the two points, in lower case and without anything but letters and digits.
 _WORDS = (
@@ -43,16 +44,28 @@ _OTHERS = ("cutoff", "inclusive", "n")  # what an archive of ours tells besides
 _TEXT, _NUMPY = (".csv", ".txt", ".dat", ".tsv"), (".npy", ".npz")
 
 
-class ListFile(NamedTuple):
-    """What a file tells of pairs; S, cutoff and inclusive are None where it does not."""
+@dataclass(frozen=True)
+class PairList:
+    """A list of pairs that is to be checked; what is None is not known."""
 
+    author: str  # whose it is
     i: NDArray[np.int64]
     j: NDArray[np.int64]
     S: NDArray[np.int64] | None
-    cutoff: float | None
-    inclusive: bool | None
-    columns: tuple[str, ...]  # those that were read
-    counts_from: int
+    inclusive: bool | None = None  # the rule of its author: d <= cutoff, or d < cutoff
+    full: bool | None = None  # whether it has both directions of every pair
+    cutoff: float | None = None
+
+    def among(self, rows: NDArray[np.intp] | None, n: int) -> PairList:
+        """Return the pairs among some of n points, numbered by their place among these."""
+        if rows is None:
+            return self
+        place = np.full(n, -1, dtype=np.int64)
+        place[rows] = np.arange(len(rows))
+        i, j = place[self.i], place[self.j]
+        kept = (i >= 0) & (j >= 0)
+        shifts = None if self.S is None else self.S[kept]
+        return replace(self, i=i[kept], j=j[kept], S=shifts)
 
 
 def refuse_list(file: str, source: str) -> None:
@@ -65,7 +78,8 @@ def refuse_list(file: str, source: str) -> None:
         return
     try:
         if suffix in _TEXT:
-            names = _header(file)[0] or []
+            with open_text(file, _has_endpoints) as text:
+                names = text.names or []
         elif suffix == ".npz":
             names = read_arrays(file, ())[1]
         elif suffix == ".parquet":
@@ -74,19 +88,19 @@ def refuse_list(file: str, source: str) -> None:
             return
     except Exception:
         return
-    plain = [_plain(name) for name in names]
-    if {"points", "x", "k"} & set(plain):  # coordinates may be beside i and j, or be i, j and k
+    if {"points", "x", "k"} & set(map(_plain, names)):  # coordinates beside i and j, or i, j and k
         return
-    if suffix == ".npz":  # a name may stand for both columns
-        plain += [name + end for name in plain for end in "01"]
-    if _endpoints(plain) is not None:
+    columns = names  # in an archive one name may stand for both columns
+    if suffix == ".npz":
+        columns = [*names, *(_plain(name) + end for name in names for end in "01")]
+    if _has_endpoints(columns):
         raise InputError(
             f"{source}: is a list of pairs ({shown_names(names)}), not points; "
             "halfshell verify STRUCTURE LIST checks one"
         )
 
 
-def read_list(file: str, n: int, ndim: int) -> ListFile:
+def read_list(file: str, n: int, ndim: int) -> PairList:
     """Read a list of pairs of `n` points with `ndim` coordinates.
 
     Text, ``.npz`` and ``.parquet`` have names of columns. Without names, those of text and of a
@@ -96,15 +110,13 @@ def read_list(file: str, n: int, ndim: int) -> ListFile:
         return _read(file, n, ndim)
     except InputError as error:
         raise InputError(f"{file}: {error}") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{file}: is not text") from None
     except MemoryError:
         raise
     except Exception as error:  # a broken file may fail in any part of its library
         raise InputError(f"{file}: cannot be read: {one_line(error)}") from None
 
 
-def _read(file: str, n: int, ndim: int) -> ListFile:
+def _read(file: str, n: int, ndim: int) -> PairList:
     suffix = Path(file).suffix.lower()
     others: dict[str, Any] = {}
     if suffix in _TEXT:
@@ -126,9 +138,12 @@ def _read(file: str, n: int, ndim: int) -> ListFile:
     shift = np.column_stack(whole[2:]) if whole[2:] else None
     if others.get("n", n) != n:
         raise InputError(f"is a list for {others['n']} points; there are {n}")
-    return ListFile(
-        i - counts_from, j - counts_from, shift, others.get("cutoff"), others.get("inclusive"),
-        tuple(names), counts_from,
+    author = f"{file}, columns {', '.join(names)}"
+    if counts_from:
+        author += f", which counts points from {counts_from}"
+    return PairList(
+        author, i - counts_from, j - counts_from, shift, others.get("inclusive"),
+        cutoff=others.get("cutoff"),
     )  # fmt: skip
 
 
@@ -136,6 +151,10 @@ def _read(file: str, n: int, ndim: int) -> ListFile:
 
 def _plain(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def _has_endpoints(names: Sequence[str]) -> bool:
+    return _endpoints([_plain(name) for name in names]) is not None
 
 
 def _endpoints(plain: Sequence[str]) -> tuple[int, int] | None:
@@ -180,48 +199,15 @@ def _unnamed(n_columns: int, ndim: int) -> list[str]:
 
 # ---- formats ---------------------------------------------------------------------------------
 
-def _header(file: str) -> tuple[list[str] | None, str | None, int]:
-    """Names of the columns of a text, what is between them, and lines before the first of numbers.
-
-    A line of names may be a remark, as NumPy writes it. Without one the names are None.
-    """
-    with open(file, encoding="utf-8-sig") as lines:
-        for number, line in enumerate(lines):
-            text = line.strip()
-            is_remark = text.startswith("#")
-            text = text.lstrip("# ")
-            if not text:
-                continue
-            between = next((one for one in ",;\t" if one in text), None)
-            words = [word.strip().strip("\"'") for word in text.split(between)]
-            if not any(re.match(r"[-+.]?\d", word) for word in words):
-                if not is_remark or _endpoints([_plain(word) for word in words]) is not None:
-                    return words, between, number + 1
-            elif not is_remark:
-                return None, between, number
-    return None, None, 0
-
-
 def _read_text(file: str, ndim: int) -> tuple[list[str], dict[str, NDArray[Any]]]:
-    names, between, n_lines = _header(file)
-    if names is None:
-        with open(file, encoding="utf-8-sig") as lines:
-            row = next((line for k, line in enumerate(lines) if k >= n_lines), "")
-        found = _unnamed(len(row.partition("#")[0].split(between)), ndim)
-        places = list(range(len(found)))
-    else:
-        found = _wanted(names, ndim)
-        places = [names.index(name) for name in found]
-    with open(file, encoding="utf-8-sig") as lines:
-        for _ in range(n_lines):
-            next(lines)
-        first = next((line for line in lines if line.partition("#")[0].strip()), None)
-        rows = np.empty((0, len(places)))
-        if first is not None:
-            rows = np.loadtxt(
-                chain([first], lines), delimiter=between, usecols=places, ndmin=2, quotechar='"'
-            )
-    return found, {name: rows[:, k] for k, name in enumerate(found)}
+    with open_text(file, _has_endpoints) as text:
+        if text.names is None:
+            found = _unnamed(text.width, ndim)
+            places = list(range(len(found)))
+        else:
+            found = _wanted(text.names, ndim)
+            places = [text.names.index(name) for name in found]
+        return found, dict(zip(found, text.read(places).T, strict=True))
 
 
 def _read_numpy(
@@ -244,7 +230,7 @@ def _read_numpy(
     if names == ["alone"]:
         found = _unnamed(len(columns), ndim)
         return found, dict(zip(found, columns.values(), strict=True)), others
-    if _endpoints([_plain(name) for name in columns]) is None:
+    if not _has_endpoints(list(columns)):
         _wanted(names, ndim)  # which says what the file holds
     return _wanted(list(columns), ndim), columns, others
 
@@ -258,9 +244,6 @@ def _parquet(file: str) -> tuple[list[str], Any]:
     if find_spec("polars") is not None:
         library = import_module("polars")
         return list(library.read_parquet_schema(file)), partial(library.read_parquet, file)
-    if find_spec("fastparquet") is not None and find_spec("pandas") is not None:
-        library = import_module("pandas")
-        return list(library.read_parquet(file).columns), partial(library.read_parquet, file)
     raise missing_extra("reading Parquet", "pyarrow")
 
 

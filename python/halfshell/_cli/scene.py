@@ -17,30 +17,51 @@ from numpy.typing import NDArray
 from halfshell._cli.errors import InputError, missing_extra, one_line, printable
 from halfshell._cli.files import read_frames, read_scene
 from halfshell._cli.structure_files import Scene
-from halfshell._convert.memory import refuse_unavailable
+from halfshell._functions.neighbors import nearest
 from halfshell._functions.rdf import rdf, unit_ball
 from halfshell._settings import settings
 
 NEIGHBORS_WANTED = 50  # what a chosen cutoff aims at: two or three shells of a dense system
-_COPIES = 5  # of the points, while a cutoff is chosen
 BINS = 200  # of g(r): a percent of the cutoff is two bins
 
 
 def load_scene(args: Namespace) -> tuple[Scene, Any, str]:
     """Return the scene that the options name, the cutoff, and how it was chosen if it was."""
     scene = read_points(args)
-    _check_elements(scene, args)
+    return scene, *cutoff_for(scene, args)
+
+
+def cutoff_for(scene: Scene, args: Namespace) -> tuple[Any, str]:
+    """Return the cutoff, and how it was chosen if it was."""
     if args.cutoff is not None:
-        return scene, args.cutoff, ""
-    return scene, *choose_cutoff(scene)
+        return args.cutoff, ""
+    with searching(scene, args):
+        return choose_cutoff(scene)
 
 
-def _check_elements(scene: Scene, args: Namespace) -> None:
-    """InputError where a file has no elements, and an option goes by them."""
-    by_elements = isinstance(args.cutoff, dict)
-    if scene.species is None and (by_elements or getattr(args, "by_type", False)):
+def read_points(args: Namespace) -> Scene:
+    """Return the scene that the options name; what its reader warned of is said."""
+    return load_frames(args)[0]
+
+
+def load_frames(args: Namespace) -> tuple[Scene, Iterator[Scene]]:
+    """Return the first frame that --index names, and all, which are read when they are wanted."""
+    how = {name: getattr(args, name) for name in ("columns", "trajectory", "box", "periodic")}
+    how["file_format"] = args.format
+    if not isinstance(args.index, slice):
+        frames = iter([read_scene(args.file, args.index, **how)])
+    elif args.file is None:
+        raise InputError("--index names frames: give a file that has some")
+    else:
+        frames = read_frames(args.file, args.index, **how)
+    first = next(frames)
+    for remark in first.remarks:
+        print(printable(f"halfshell: warning: {first.source}: {remark}"), file=sys.stderr)
+    by_elements = isinstance(getattr(args, "cutoff", None), dict)
+    if first.species is None and (by_elements or getattr(args, "by_type", False)):
         option = "--cutoff of elements" if by_elements else "--by-type"
-        raise InputError(f"{scene.where}: has no elements, which {option} goes by")
+        raise InputError(f"{first.where}: has no elements, which {option} goes by")
+    return first, chain([first], frames)
 
 
 def shown_cutoff(cutoff: Any, scene: Scene, reason: str = "") -> str:
@@ -59,87 +80,30 @@ def named_cutoff(cutoff: Any) -> Any:
     return {"-".join(names): length for names, length in cutoff.items()}
 
 
-def load_frames(args: Namespace) -> tuple[Scene, Iterator[Scene], float, str]:
-    """Return the first frame that --index names, and all, which are read when they are wanted.
-
-    Then the cutoff as `load_scene` does, of the first.
-    """
-    if not isinstance(args.index, slice):
-        scene, cutoff, reason = load_scene(args)
-        return scene, iter([scene]), cutoff, reason
-    if args.file is None:
-        raise InputError("--index names frames: give a file that has some")
-    frames = read_frames(args.file, args.index, **_how_to_read(args))
-    first = next(frames)
-    _tell_remarks(first)
-    _check_elements(first, args)
-    cutoff, reason = (args.cutoff, "") if args.cutoff is not None else choose_cutoff(first)
-    return first, chain([first], frames), cutoff, reason
-
-
-def read_points(args: Namespace) -> Scene:
-    """Return the scene that the options name; what its reader warned of is said."""
-    scene = read_scene(args.file, index=args.index, **_how_to_read(args))
-    _tell_remarks(scene)
-    return scene
-
-
-def _how_to_read(args: Namespace) -> dict[str, Any]:
-    names = ("columns", "trajectory", "box", "periodic")
-    return {"file_format": args.format, **{name: getattr(args, name) for name in names}}
-
-
-def _tell_remarks(scene: Scene) -> None:
-    for remark in scene.remarks:
-        print(printable(f"halfshell: warning: {scene.source}: {remark}"), file=sys.stderr)
-
-
 def choose_cutoff(scene: Scene) -> tuple[float, str]:
     """Return a cutoff at which a point has about fifty neighbours, and how it was chosen.
 
-    The density is that of the box along periodic axes and of the points' extent along the
-    others, which is left out where it is zero (points in a plane or on a line). Of few points
-    in open space all are neighbours. InputError if the scene has no length to choose by.
+    It is that of the density where all axes are periodic, otherwise the median distance of the
+    fiftieth neighbour of some points. Of few points in open space all are neighbours. InputError if
+    the scene has no length to choose by.
     """
     n, ndim = scene.points.shape
-    refuse_unavailable(_COPIES * 8 * n * ndim, f"choosing a cutoff for {n:,} points")
-    points = np.asarray(scene.points, dtype=np.float64)
-    rows = scene.box_rows
-    repeating = rows[list(scene.periodic)] if rows is not None else np.empty((0, ndim))
-    n_repeating = len(repeating)
-    with np.errstate(all="ignore"):
-        basis, triangle = np.linalg.qr(repeating.T, mode="complete")
-        sides = [abs(float(triangle[k, k])) for k in range(n_repeating)]
-        sides += _extents(points @ basis[:, n_repeating:], max(sides, default=0.0))
-    k = len(sides)
-    if not n_repeating and n <= NEIGHBORS_WANTED + 1:
+    reason = f"about {NEIGHBORS_WANTED} neighbours at this density"
+    if not any(scene.periodic) and n <= NEIGHBORS_WANTED + 1:
+        sides = np.ptp(scene.known.positions.astype(np.float64), axis=0)
         cutoff = 1.01 * math.hypot(*sides)  # more than any distance, once rounded
         reason = "all points are neighbours"
+    elif scene.box_rows is not None and all(scene.periodic):
+        volume_each = np.linalg.slogdet(scene.box_rows)[1] - math.log(n)
+        logarithm = volume_each + math.log(NEIGHBORS_WANTED / unit_ball(ndim))
+        cutoff = float(np.exp(logarithm / ndim))
     else:
-        with np.errstate(all="ignore"):
-            logs = np.log(np.array([NEIGHBORS_WANTED, 1 / n, 1 / unit_ball(k), *sides]))
-            cutoff = float(np.exp(logs.sum() / max(k, 1)))
-        reason = f"about {NEIGHBORS_WANTED} neighbours at this density"
-    if not sides or not 0 < cutoff < math.inf:
+        some = np.arange(0, n, 1 + n // 1000)
+        d = nearest(scene.known, NEIGHBORS_WANTED, indices=some, quantities="d")
+        cutoff = float(np.median(d[:, -1]))
+    if not 0 < cutoff < math.inf:
         raise InputError(f"{scene.source}: has no density to choose a cutoff by; give --cutoff")
     return float(f"{cutoff:.3g}"), reason
-
-
-def _extents(points: NDArray[np.float64], longest: float) -> list[float]:
-    """Return the sides of a box round points, along the axes or the principal axes.
-
-    The box with fewer sides other than zero is taken, or else that of the smaller volume.
-    """
-    points = points - points.mean(axis=0)
-    size = np.abs(points).max(initial=0.0) or 1.0
-    unit = np.nan_to_num(points / size)  # so that squares neither overflow nor vanish
-    _, axes = np.linalg.eigh(unit.T @ unit)
-    boxes = []
-    for turned in (points, points @ axes):
-        sides = np.ptp(turned, axis=0).tolist()
-        floor = 1e-9 * max([longest, *sides])
-        boxes.append([side for side in sides if side > floor])
-    return min(boxes, key=lambda sides: (len(sides), math.prod(sides)))
 
 
 @contextmanager

@@ -7,10 +7,10 @@ import io
 import itertools
 import re
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -113,29 +113,30 @@ def by_ase(file: str, file_format: str | None, frames: Frames) -> Iterator[Scene
             detail = f" ({one_line(error)})" if str(error) else ""
             raise InputError(what + detail) from None
     reader = f"ASE {ase.__version__}, {name}"
-    for frame, atoms in _each(found, frames, remarks):
-        if len(atoms):
-            one = _of_atoms(atoms, tuple(remarks), reader, "lammps" in name)
-            yield replace(one, frame=frame)
-        elif isinstance(frames, slice) and min(frames.start or 0, frames.stop or 0) < 0:
-            raise InputError(f"{frame} holds no atoms: count frames from the first on")
-
-
-def _of_atoms(atoms: Any, remarks: tuple[str, ...], reader: str, is_lammps: bool) -> Scene:
-    names, residues = (atoms.arrays.get(part) for part in ("atomtypes", "residuenames"))
-    species, how = _species(atoms.get_chemical_symbols(), names, residues)
-    if is_lammps and np.array_equal(atoms.arrays.get("type", ()), atoms.numbers):
-        species, how = None, ": types, not elements"
-    box = atoms.cell.array if atoms.cell.rank > 0 else None
-    no_box = placeholder(atoms.cell.array, residues is not None) if atoms.pbc.any() else ""
-    periodic = tuple(bool(flag) for flag in atoms.pbc)
-    if no_box:
-        box, periodic = None, (False,) * 3
-    unit = "" if is_lammps else "angstrom"
-    return Scene(
-        atoms.positions, box, periodic, species=species, unit=unit, remarks=remarks,
-        reader=reader + how, no_box=no_box,
-    )  # fmt: skip
+    names: Iterable[str] = [""]
+    if isinstance(frames, slice):
+        start, step = frames.start or 0, frames.step or 1
+        names = (f"frame {number}" for number in itertools.count(start, step))
+        if start < 0 or step < 0:
+            where = "counted from the first that --index names"
+            names = (f"frame {number}, {where}" for number in itertools.count())
+    for frame, atoms in _each(found, names, remarks):
+        if not len(atoms):
+            if isinstance(frames, slice) and min(frames.start or 0, frames.stop or 0) < 0:
+                raise InputError(f"{frame} holds no atoms: count frames from the first on")
+            continue
+        labels, residues = (atoms.arrays.get(part) for part in ("atomtypes", "residuenames"))
+        species, how = _species(atoms.get_chemical_symbols(), labels, residues)
+        is_lammps = "lammps" in name
+        if is_lammps and np.array_equal(atoms.arrays.get("type", ()), atoms.numbers):
+            species, how = None, ": types, not elements"
+        box = atoms.cell.array if atoms.cell.rank > 0 else None
+        no_box = placeholder(atoms.cell.array, residues is not None) if atoms.pbc.any() else ""
+        yield Scene(
+            atoms.positions, None if no_box else box, tuple((atoms.pbc & (not no_box)).tolist()),
+            species=species, unit="" if is_lammps else "angstrom", remarks=tuple(remarks),
+            reader=reader + how, no_box=no_box, frame=frame,
+        )  # fmt: skip
 
 
 def _ase_needs_help(file: str) -> tuple[str, Callable[[], list[Any]]] | None:
@@ -151,18 +152,12 @@ def _ase_needs_help(file: str) -> tuple[str, Callable[[], list[Any]]] | None:
         return "proteindatabank", partial(_of_pdb_without_cell, file)
     lines = head.splitlines()[:8]
     counts = lines[5].split() if len(lines) == 8 else ()
-    vectors = [_numbers_of(line) for line in lines[1:5]]
+    vectors = [len(line.split()) for line in lines[1:5]]
     if counts and all(map(bytes.isdigit, counts)) and vectors == [1, 3, 3, 3]:
-        return "vasp 4", partial(_of_vasp4, file)
+        with suppress(ValueError):
+            _ = [float(word) for line in lines[1:5] for word in line.split()]
+            return "vasp 4", partial(_of_vasp4, file)
     return None
-
-
-def _numbers_of(line: bytes) -> int:
-    """How many numbers a line holds; -1 if it holds anything else."""
-    try:
-        return len([float(word) for word in line.split()])
-    except ValueError:
-        return -1
 
 
 def _of_lammps(file: str) -> list[Any]:
@@ -185,17 +180,31 @@ def _of_mmcif(file: str) -> list[Any]:
     """The models of an mmCIF file, whose coordinates are Cartesian; ASE's parser takes minutes."""
     from ase import Atoms
 
-    cell, sites = _mmcif_tables(file)
-    keys = ["type_symbol", "cartn_x", "cartn_y", "cartn_z"]
+    with open_bytes(file) as stream:
+        lines = io.TextIOWrapper(stream, "utf-8").readlines()
+    items = (line.split(maxsplit=1) for line in lines if line.startswith("_cell."))
+    cell = {name.lower(): value.strip() for name, value in items}
+    names = [(k, line) for k, line in enumerate(lines) if line.startswith("_atom_site.")]
+    rows = []
+    for line in itertools.takewhile(
+        lambda line: line[:1] not in "#_\n" and line[:5] not in ("loop_", "data_"),
+        lines[names[-1][0] + 1 :] if names else (),
+    ):
+        words = [quoted or double or word for quoted, double, word in _CIF_WORD.findall(line)]
+        if len(words) != len(names):
+            raise InputError(f"an atom has {len(words)} values, not {len(names)}")
+        rows.append(words)
+    sites = dict(zip((line.split()[0].lower() for _, line in names), zip(*rows, strict=True)))
+    keys = [f"_atom_site.{key}" for key in ("type_symbol", "cartn_x", "cartn_y", "cartn_z")]
     if not all(sites.get(key) for key in keys):
         raise InputError("holds no atoms")
     symbols, *axes = (np.array(sites[key]) for key in keys)
     points = np.stack(axes, axis=1).astype(np.float64)
     species = ["H" if s == "D" else s.capitalize() for s in symbols.tolist()]
     species = [s if s in SYMBOLS else "X" for s in species]
-    known = [cell.get(part, "?") for part in _CELL_OF_MMCIF]
+    known = [cell.get(f"_cell.{part}", "?") for part in _CELL_OF_MMCIF]
     has_cell = all(re.fullmatch(r"[\d.]+", value) for value in known)
-    models = np.array(sites.get("pdbx_pdb_model_num") or [""] * len(points))
+    models = np.array(sites.get("_atom_site.pdbx_pdb_model_num") or [""] * len(points))
     frames = []
     for model in dict.fromkeys(models.tolist()):
         part = models == model
@@ -205,33 +214,6 @@ def _of_mmcif(file: str) -> list[Any]:
         atoms.arrays["residuenames"] = np.full(len(atoms), "?")  # as of a PDB file
         frames.append(atoms)
     return frames
-
-
-def _mmcif_tables(file: str) -> tuple[dict[str, str], dict[str, list[str]]]:
-    """Values of ``_cell`` and columns of ``_atom_site``, by names in small letters."""
-    cell: dict[str, str] = {}
-    sites: dict[str, list[str]] = {}
-    in_rows = False
-    with open_bytes(file) as stream:
-        for line in io.TextIOWrapper(stream, "utf-8"):
-            if line.startswith("_atom_site."):
-                sites[line.split()[0][len("_atom_site.") :].lower()] = []
-                in_rows = True
-            elif in_rows and line[:1] not in "#_\n" and line[:5] not in ("loop_", "data_"):
-                words = line.split()
-                if "'" in line or '"' in line:
-                    words = [quoted or double or word for quoted, double, word
-                             in _CIF_WORD.findall(line)]  # fmt: skip
-                if len(words) != len(sites):
-                    raise InputError(f"an atom has {len(words)} values, not {len(sites)}")
-                for column, word in zip(sites.values(), words):
-                    column.append(word)
-            else:
-                in_rows = False
-                if line.startswith("_cell."):
-                    name, _, value = line[len("_cell.") :].strip().partition(" ")
-                    cell[name.lower()] = value.strip()
-    return cell, sites
 
 
 def _of_pdb_without_cell(file: str) -> list[Any]:
@@ -290,10 +272,24 @@ def by_mdanalysis(
     if kind not in parsers and kind not in readers:
         raise UnknownFormat
     with _warnings() as remarks:
-        if kind in parsers or trajectory is not None:
-            universe = _of_topology(file, kind, trajectory)
+        if kind in parsers or trajectory is not None:  # a file that says which atoms there are
+            files = [file] if trajectory is None else [file, trajectory]
+            formats = {"topology_format": kind} if kind in parsers else {}
+            if trajectory is None and kind in readers:
+                formats["format"] = kind
+            try:
+                universe = MDAnalysis.Universe(*files, to_guess=("elements",), **formats)
+            except (ValueError, TypeError, NotImplementedError):  # no names to guess by
+                universe = MDAnalysis.Universe(*files, to_guess=(), **formats)
         else:
-            universe = _of_coordinates(file, kind)
+            try:
+                universe = MDAnalysis.Universe.empty(readers[kind].parse_n_atoms(file))
+            except NotImplementedError:
+                raise InputError(
+                    "holds coordinates alone, which are read with a topology: give that as FILE, "
+                    "and this with --trajectory"
+                ) from None
+            universe.load_new(file, format=kind)
         try:
             steps = universe.trajectory
         except AttributeError:
@@ -309,50 +305,16 @@ def by_mdanalysis(
         parts = (getattr(universe.atoms, one, None) for one in ("elements", "names", "resnames"))
         species, how = _species(*parts)
         reader = f"MDAnalysis {MDAnalysis.__version__}, {kind}{how}"
-    found = (_of_frame(steps[k], species, reader) for k in chosen)
-    for frame, one in _each(found, frames, remarks, chosen):
+    names = (f"frame {k}" if isinstance(frames, slice) else "" for k in chosen)
+    for frame, step in _each((steps[k] for k in chosen), names, remarks):
         told = tuple(remark for remark in remarks if not _NOT_OF_POINTS.search(remark))
-        yield replace(one, remarks=told, frame=frame)
-
-
-def _of_topology(file: str, kind: str, trajectory: str | None) -> Any:
-    """The universe of a file that says which atoms there are, with frames of its own or another."""
-    import MDAnalysis
-
-    formats = {"topology_format": kind} if kind in MDAnalysis._PARSERS else {}
-    parts = [file] if trajectory is None else [file, trajectory]
-    if trajectory is None and kind in MDAnalysis._READERS:
-        formats["format"] = kind
-    try:
-        return MDAnalysis.Universe(*parts, to_guess=("elements",), **formats)
-    except (ValueError, TypeError, NotImplementedError):  # there may be no names to guess by
-        return MDAnalysis.Universe(*parts, to_guess=(), **formats)
-
-
-def _of_coordinates(file: str, kind: str) -> Any:
-    """The universe of a file that has nothing but coordinates."""
-    import MDAnalysis
-
-    try:
-        n_atoms = MDAnalysis._READERS[kind].parse_n_atoms(file)
-    except NotImplementedError:
-        raise InputError(
-            "holds coordinates alone, which are read with a topology: give that as FILE, and this "
-            "with --trajectory"
-        ) from None
-    universe = MDAnalysis.Universe.empty(n_atoms)
-    universe.load_new(file, format=kind)
-    return universe
-
-
-def _of_frame(frame: Any, species: NDArray[np.str_] | None, reader: str) -> Scene:
-    box = None if frame.dimensions is None else frame.triclinic_dimensions.astype(np.float64)
-    no_box = "" if box is None else placeholder(box, False)
-    box = None if no_box else box
-    points, periodic = frame.positions.copy(), (box is not None,) * 3
-    return Scene(
-        points, box, periodic, species=species, unit="angstrom", reader=reader, no_box=no_box
-    )
+        box = None if step.dimensions is None else step.triclinic_dimensions.astype(np.float64)
+        no_box = "" if box is None else placeholder(box, False)
+        box = None if no_box else box
+        yield Scene(
+            step.positions.copy(), box, (box is not None,) * 3, species=species, unit="angstrom",
+            remarks=told, reader=reader, no_box=no_box, frame=frame,
+        )  # fmt: skip
 
 
 @contextmanager
@@ -368,15 +330,14 @@ def _warnings() -> Iterator[list[str]]:
 
 
 def _each(
-    found: Iterable[Any], frames: Frames, remarks: list[str], numbers: Sequence[int] = ()
+    found: Iterable[Any], names: Iterable[str], remarks: list[str]
 ) -> Iterator[tuple[str, Any]]:
-    """Frames one by one, with words for which it is of several, read when they are wanted.
+    """Frames one by one with their names, read when they are wanted.
 
     What is warned of is put to the remarks. InputError names the frame at which reading fails.
     """
     iterator = iter(found)
-    for count in itertools.count():
-        frame = _words_for(count, frames, numbers)
+    for count, frame in enumerate(itertools.chain(names, [""])):
         with _warnings() as more:
             try:
                 one = next(iterator, None)
@@ -391,17 +352,6 @@ def _each(
         if one is None:
             return
         yield frame, one
-
-
-def _words_for(count: int, frames: Frames, numbers: Sequence[int]) -> str:
-    if not isinstance(frames, slice):
-        return ""
-    if count < len(numbers):
-        return f"frame {numbers[count]}"
-    start, step = frames.start or 0, frames.step or 1
-    if start < 0 or step < 0:
-        return f"frame {count}, counted from the first that --index names"
-    return f"frame {start + count * step}"
 
 
 # ---- elements ----------------------------------------------------------------------------------
@@ -426,21 +376,15 @@ def _species(symbols: Any, names: Any, residues: Any) -> tuple[NDArray[np.str_] 
         kinds = set(zip(species.tolist(), map(str, residues)))
         known = [s for s, residue in kinds if residue.strip().upper() in _RESIDUES]
         if not _LIGHT.issuperset(known):  # no amino acid, nucleotide or water has that element
-            species, how = _elements(names, residues), ": elements by names of atoms"
+            pairs = zip(map(str, names), map(str, residues), strict=True)
+            species = np.array([_element(*pair) for pair in pairs])
+            how = ": elements by names of atoms"
     return None if (species == "X").all() else species, how
 
 
-def _elements(names: Sequence[Any], residues: Sequence[Any]) -> NDArray[np.str_]:
-    """Elements by the names of atoms, as they are usual in residues; ``X`` where none is meant."""
-    known: dict[tuple[str, str], str] = {}
-    pairs = [(str(name), str(residue)) for name, residue in zip(names, residues, strict=True)]
-    for pair in pairs:
-        if pair not in known:
-            known[pair] = _element(*pair)
-    return np.array([known[pair] for pair in pairs])
-
-
+@cache
 def _element(name: str, residue: str) -> str:
+    """The element by the name of an atom, as is usual in residues; ``X`` where none is meant."""
     letters = re.sub(r"[^A-Z]", "", name.upper())
     residue = residue.strip().upper()
     if residue not in _RESIDUES:

@@ -12,8 +12,10 @@ import io
 import math
 import re
 from array import array
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
+from itertools import chain, islice
 from pathlib import Path
 from typing import IO
 
@@ -72,103 +74,138 @@ def read_points(
 ) -> tuple[NDArray[np.float64], str]:
     """Read the points of a text file, and say of which columns.
 
-    Empty lines, and what is behind ``#``, are left out. A first line that holds no number is one of
-    names; so is a remark right before the first point whose words name its columns. A first line
-    that holds one whole number, where others hold more, says how many points there are.
-
     columns: names, or numbers from 1 on, of those that are coordinates; default: told from the
     names. is_pts: columns without names are those of a PTS file: x y z, intensity, colours. least:
     of coordinates, in a file that its name does not tell to be text.
     """
-    with open_bytes(file) as stream:
-        lines = io.TextIOWrapper(stream, encoding="utf-8-sig")
+    with open_text(file, _groups) as text:
+        names, width = text.names, text.width
+        if names is None and is_pts:
+            names = _PTS.get(width)
+        picked = _choose(names, width, columns, text)
+        if len(picked) > _MOST_AXES:
+            raise InputError(
+                f"has {len(picked)} columns of coordinates; at most {_MOST_AXES} can be"
+            )
+        points = text.read(picked)
+    if len(points) and points.shape[1] < least:
+        raise InputError(f"has {points.shape[1]} column of numbers")
+    if names:
+        what = "columns " + ", ".join(names[k] or f"number {k + 1}" for k in picked)
+        what += f" of {width}" if len(picked) < width else ""
+    else:
+        what = f"{len(picked)} columns without names"
+        if len(picked) < width:
+            what += f" ({', '.join(str(k + 1) for k in picked)} of {width})"
+    return points, what + (", decimal commas" if text.mark == "," else "")
+
+
+@contextmanager
+def open_text(file: str, are_names: Callable[[Sequence[str]], object]) -> Iterator[Text]:
+    """Open a text file with columns for reading; see `Text`."""
+    with io.TextIOWrapper(open_bytes(file), encoding="utf-8-sig") as stream:
         try:
-            points, what = _read(_Lines(lines), columns, is_pts)
+            yield Text(stream, are_names)
         except UnicodeDecodeError:
             raise InputError("is not text") from None
-    if points.shape[1] < least:
-        raise InputError(f"has {points.shape[1]} column of numbers")
-    return points, what
 
 
-class _Lines:
-    """Lines that hold something, numbered, and the last remark before the first of them."""
+class Text:
+    """Text with columns: how many, what separates them, and their names, from its first lines.
 
-    def __init__(self, stream: Iterable[str]) -> None:
-        self._all = enumerate(stream, 1)
+    Empty lines, and what is behind ``#``, are left out. A first line that holds no number is one of
+    names; so is a remark right before the first row if `are_names` finds some in its words. A first
+    line that holds one whole number, where others hold more, says how many rows there are.
+    """
+
+    def __init__(self, stream: Iterable[str], are_names: Callable[[Sequence[str]], object]) -> None:
         self.remark = ""
-        self._again: list[tuple[int, str]] = []
+        self.promised: tuple[int, int] | None = None  # the line that says how many rows, and these
+        self.mark = ""  # before the decimals of all numbers, once there are some
+        lines = self._numbered(stream)
+        head = list(islice(lines, 2))
+        if len(head) == 2 and head[0][1].isdecimal():
+            if len(_split(head[1][1], _separator(*head[1]))) > 1:
+                number, count = head.pop(0)
+                self.promised = number, int(count)
+        self.line, text = head[0] if head else (0, "")
+        self.separator = _separator(self.line, text or self.remark)
+        first = _split(text, self.separator)
+        self.width, self.names = len(first), _names_of(first)
+        if self.names is not None:
+            head.pop(0)
+        else:
+            told = _split(self.remark, self.separator)
+            if (len(told) == self.width or not head) and are_names(told):
+                self.names, self.width = told, len(told)
+        self._lines = chain(head, lines)
 
-    def __iter__(self) -> Iterator[tuple[int, str]]:
-        while self._again:
-            yield self._again.pop()
-        for number, line in self._all:
+    def _numbered(self, stream: Iterable[str]) -> Iterator[tuple[int, str]]:
+        """Lines that hold something, with their numbers."""
+        for number, line in enumerate(stream, 1):
             text, _, remark = line.partition("#")
             if text.strip():
                 yield number, text.strip(" \r\n")
             else:
                 self.remark = remark.strip() or self.remark
 
-    def give_back(self, *lines: tuple[int, str]) -> None:
-        self._again += reversed(lines)
+    def read(self, picked: Sequence[int]) -> NDArray[np.float64]:
+        """The numbers in some of the columns, one row a line."""
+        values, n_rows = array("d"), 0
+        has_marks = self.separator in (";", "\t")  # decimal commas, or points
+        for number, text in self._lines:
+            fields = _split(text, self.separator)
+            if len(fields) != self.width:
+                said = f"has {len(fields)} fields, the first line has {self.width}"
+                hint = self.hint() if len(fields) > self.width else ""
+                raise InputError(f"line {number}: {said}{hint}")
+            try:
+                row = [float(fields[k]) for k in picked]
+            except ValueError:
+                row = [math.nan]
+            is_plain = text.isascii() and "_" not in text and all(map(math.isfinite, row))
+            if has_marks or not is_plain:
+                row = [self._number(fields[k], f"line {number}, field {k + 1}") for k in picked]
+            values.extend(row)
+            n_rows += 1
+        if self.promised is not None and self.promised[1] != n_rows:
+            line, count = self.promised
+            raise InputError(f"line {line}: says {count} points, there are {n_rows}")
+        return np.frombuffer(values, dtype=np.float64).reshape(n_rows, len(picked))
+
+    def hint(self) -> str:
+        """What to do about too many fields."""
+        commas = self.separator == ","
+        return "; with decimal commas, separate the columns by ;" if commas else ""
+
+    def _number(self, word: str, where: str) -> float:
+        """A field as a number; decimals are behind commas or points, in one file all the same."""
+        text = word
+        if self.separator in (";", "\t") and ("," in word or "." in word):
+            mark = "," if "," in word else "."
+            if (self.mark or mark) != mark:
+                raise InputError(
+                    f"{where}: {word!r}: the file has decimal commas and decimal points"
+                )
+            self.mark = mark
+            if _DECIMAL_COMMA.fullmatch(word):
+                text = word.replace(",", ".")
+        if _NUMBER.fullmatch(text) and math.isfinite(value := float(text)):
+            return value
+        if not word:
+            raise InputError(f"{where}: is empty")
+        if _NUMBER.fullmatch(text) or _NOT_FINITE.fullmatch(word):
+            raise InputError(f"{where}: {word} is not a finite number")
+        raise InputError(f"{where}: {word!r} is not a number")
 
 
-def _read(
-    lines: _Lines, columns: Sequence[str], is_pts: bool
-) -> tuple[NDArray[np.float64], str]:
-    some = iter(lines)
-    head = [line for line in (next(some, None), next(some, None)) if line is not None]
-    if not head:
-        return np.empty((0, 3)), "no line"
-    number, text = head.pop(0)
-    promised, counted = None, number
-    if head and text.isdecimal() and len(_split(head[0][1], _separator(head[0]))) > 1:
-        promised, (number, text) = int(text), head.pop(0)  # how many there are
-    separator = _separator((number, text))
-    first = _split(text, separator)
-    names = _names_of(first)
-    if names is None:
-        head.insert(0, (number, text))
-        told = _split(lines.remark, separator)
-        if len(told) == len(first) and _groups(told):
-            names = told
-        elif is_pts:
-            names = _PTS.get(len(first))
-    lines.give_back(*head)
-    picked = _choose(names, len(first), columns, number, separator)
-    if len(picked) > _MOST_AXES:
-        raise InputError(f"has {len(picked)} columns of coordinates; at most {_MOST_AXES} can be")
-    values, commas = array("d"), _Commas(separator)
-    for number, text in lines:
-        fields = _split(text, separator)
-        if len(fields) != len(first):
-            hint = _of_commas(separator) if len(fields) > len(first) else ""
-            raise InputError(
-                f"line {number}: has {len(fields)} fields, the first line has {len(first)}{hint}"
-            )
-        for k in picked:
-            values.append(_number(fields[k], number, k, commas))
-    n_points = len(values) // len(picked)
-    if promised is not None and promised != n_points:
-        raise InputError(f"line {counted}: says {promised} points, there are {n_points}")
-    what = ", ".join(names[k] or f"number {k + 1}" for k in picked) if names else ""
-    what = f"columns {what}" if names else f"{len(picked)} columns without names"
-    if len(picked) < len(first):
-        what += f" of {len(first)}" if names else f" ({_numbers(picked)} of {len(first)})"
-    what += ", decimal commas" if commas.seen == "," else ""
-    return np.frombuffer(values, dtype=np.float64).reshape(n_points, len(picked)), what
-
-
-# ---- fields ------------------------------------------------------------------------------------
-
-def _separator(line: tuple[int, str]) -> str | None:
+def _separator(line: int, text: str) -> str | None:
     """What separates the fields of a line; None for white space."""
-    number, text = line
     found = next((one for one in (";", "\t", ",") if one in text), None)
     words = text.split()
     if found == "," and len(words) > 1 and all(map(_DECIMAL_COMMA.fullmatch, words)):
         raise InputError(
-            f"line {number}: {words[0]!r} has a decimal comma; with these, columns must be "
+            f"line {line}: {words[0]!r} has a decimal comma; with these, columns must be "
             "separated by ; or tabs"
         )
     return found
@@ -178,40 +215,6 @@ def _split(text: str, separator: str | None) -> list[str]:
     if separator is None:
         return text.split()
     return [field.strip().strip('"').strip() for field in text.split(separator)]
-
-
-def _of_commas(separator: str | None) -> str:
-    return "; with decimal commas, separate the columns by ;" if separator == "," else ""
-
-
-class _Commas:
-    """Whether numbers have commas or points before their decimals: in one file all the same."""
-
-    def __init__(self, separator: str | None) -> None:
-        self.may_be = separator in (";", "\t")
-        self.seen = ""
-
-
-def _number(word: str, line: int, k: int, commas: _Commas) -> float:
-    where = f"line {line}, field {k + 1}"
-    text = word
-    if commas.may_be and ("," in word or "." in word):
-        mark = "," if "," in word else "."
-        if (commas.seen or mark) != mark:
-            raise InputError(f"{where}: {word!r}: the file has decimal commas and decimal points")
-        commas.seen = mark
-        if _DECIMAL_COMMA.fullmatch(word):
-            text = word.replace(",", ".")
-    if _NUMBER.fullmatch(text):
-        value = float(text)
-        if math.isfinite(value):
-            return value
-        raise InputError(f"{where}: {word} is not a finite number")
-    if not word:
-        raise InputError(f"{where}: is empty")
-    if _NOT_FINITE.fullmatch(word):
-        raise InputError(f"{where}: {word} is not a finite number")
-    raise InputError(f"{where}: {word!r} is not a number")
 
 
 # ---- columns -----------------------------------------------------------------------------------
@@ -228,7 +231,7 @@ def _names_of(fields: list[str]) -> list[str] | None:
 
 
 def _choose(
-    names: list[str] | None, count: int, columns: Sequence[str], line: int, separator: str | None
+    names: list[str] | None, count: int, columns: Sequence[str], text: Text
 ) -> list[int]:
     """Which columns are coordinates."""
     what = f"{count} columns" if names is None else "columns " + shown_names(map(repr, names))
@@ -248,18 +251,18 @@ def _choose(
     if names is None:
         if count > _MOST_UNNAMED:
             raise InputError(
-                f"line {line}: has {count} numbers without names; --columns 1,2,3 says which are "
-                f"coordinates{_of_commas(separator)}"
+                f"line {text.line}: has {count} numbers without names; --columns 1,2,3 says which "
+                f"are coordinates{text.hint()}"
             )
         return list(range(count))
     groups = _groups(names)
     if len(groups) == 1 or "xyz" in groups:
         return groups.get("xyz") or next(iter(groups.values()))
     if groups:
-        raise InputError(f"line {line}: {what}: several may be coordinates; choose with --columns")
-    raise InputError(
-        f"line {line}: {what}: none are known as coordinates; --columns says which are"
-    )
+        why = "several may be coordinates; choose with --columns"
+    else:
+        why = "none are known as coordinates; --columns says which are"
+    raise InputError(f"line {text.line}: {what}: {why}")
 
 
 def _groups(names: Sequence[str]) -> dict[str, list[int]]:
@@ -283,10 +286,6 @@ def _groups(names: Sequence[str]) -> dict[str, list[int]]:
             if stem.endswith("xyz") or len(group) > 1:
                 groups[stem] = [group[axis] for axis in sorted(group)]
     return groups
-
-
-def _numbers(picked: Sequence[int]) -> str:
-    return ", ".join(str(k + 1) for k in picked)
 
 
 def shown_names(names: Iterable[str]) -> str:

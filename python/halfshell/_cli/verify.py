@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 from argparse import Namespace
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from decimal import Decimal, localcontext
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ import halfshell as hs
 from halfshell._check.reference import exact_square, reach_by_types, reference_pairs
 from halfshell._check.verify import LIST, cause_of, compare
 from halfshell._cli.errors import InputError, printable
-from halfshell._cli.pair_files import read_list
+from halfshell._cli.pair_files import PairList, read_list
 from halfshell._cli.scene import (
     describe_points,
     describe_source,
@@ -36,28 +36,6 @@ BLOCKS = 4  # neighbourhoods that a sample is made of
 EXAMPLES = 5  # wrong pairs that are shown
 POINTS_BY_INTEGERS = 400  # some 80,000 pairs of points: a few seconds in Python
 SEARCH_ROWS = 2_000_000  # rows that are compared with the search: some seconds
-
-
-@dataclass(frozen=True)
-class PairList:
-    """A list of pairs that is to be checked."""
-
-    i: NDArray[np.int64]
-    j: NDArray[np.int64]
-    S: NDArray[np.int64] | None  # None of a file that has no shifts
-    inclusive: bool  # the rule of its author: d <= cutoff, or d < cutoff
-    full: bool | None  # whether it has both directions of every pair; None: not yet known
-
-    def among(self, rows: NDArray[np.intp] | None, n: int) -> PairList:
-        """Return the pairs among some of n points, numbered by their place among these."""
-        if rows is None:
-            return self
-        place = np.full(n, -1, dtype=np.int64)
-        place[rows] = np.arange(len(rows))
-        i, j = place[self.i], place[self.j]
-        kept = (i >= 0) & (j >= 0)
-        shifts = None if self.S is None else self.S[kept]
-        return PairList(i[kept], j[kept], shifts, self.inclusive, self.full)
 
 
 # Two checks --------------------------------------------------------------------------------
@@ -82,13 +60,15 @@ def check_by_search(pairs: PairList, scene: Scene, cutoff: Any) -> tuple[Check, 
     Also returns whether the list is full, as `verify` finds.
     """
     n = len(scene.points)
-    rows = sample_points(scene, max(1, n * SEARCH_ROWS // max(SEARCH_ROWS, len(pairs.i))))
-    part = pairs.among(rows, n)
-    points = scene.known if rows is None else scene.known[rows]
-    verdict = hs.verify(
-        points, cutoff, part.i, part.j, part.S, inclusive=pairs.inclusive, full=bool(pairs.full)
-    )
-    return _check("search", verdict, rows, len(points)), verdict.is_full
+
+    def judge(points: hs.Points, part: PairList) -> hs.Verdict:
+        return hs.verify(
+            points, cutoff, part.i, part.j, part.S,
+            inclusive=bool(pairs.inclusive), full=bool(pairs.full),
+        )  # fmt: skip
+
+    limit = max(1, n * SEARCH_ROWS // max(SEARCH_ROWS, len(pairs.i)))
+    return _check("search", pairs, scene, limit, judge)
 
 
 def check_by_integers(
@@ -107,43 +87,42 @@ def check_by_integers(
     if limit is None:
         images = len(pairs.i) / (1 if pairs.full else 0.5) / n**2
         limit = max(BLOCKS, round(POINTS_BY_INTEGERS / max(1.0, images) ** 0.5))
-    rows = sample_points(scene, limit)
-    part = pairs.among(rows, n)
-    points = scene.points if rows is None else scene.points[rows]
-    reach = cutoff
-    if isinstance(cutoff, dict):
-        types, table = _types_of(scene, cutoff)
-        reach = reach_by_types(types if rows is None else [types[row] for row in rows], table)
-    periodic = scene.periodic if scene.box is not None else None
-    truth = reference_pairs(
-        points, reach, scene.box, periodic, pairs.inclusive, progress=progress
-    )
-    rows_of_truth = [(i, j, *shift) for i, j, shift in truth]
-    columns = (part.i, part.j) if part.S is None else (part.i, part.j, part.S)
-    given = np.column_stack(columns)
-    verdict = compare(
-        np.array(rows_of_truth, dtype=np.int64).reshape(-1, 2 + ndim)[:, : given.shape[1]],
-        given,
-        LIST[bool(pairs.full)],
-    )
-    return _check("integers", verdict, rows, len(points))
+
+    def judge(points: hs.Points, part: PairList) -> hs.Verdict:
+        reach = reach_by_types(*_types_of(points, cutoff)) if isinstance(cutoff, dict) else cutoff
+        periodic = scene.periodic if scene.box is not None else None
+        inclusive = bool(pairs.inclusive)
+        truth = reference_pairs(
+            points.positions, reach, scene.box, periodic, inclusive, progress=progress
+        )
+        rows = np.array([(i, j, *S) for i, j, S in truth], np.int64).reshape(-1, 2 + ndim)
+        given = np.column_stack((part.i, part.j) if part.S is None else (part.i, part.j, part.S))
+        return compare(rows[:, : given.shape[1]], given, LIST[bool(pairs.full)])
+
+    return _check("integers", pairs, scene, limit, judge)[0]
 
 
-def _types_of(scene: Scene, cutoff: Any) -> tuple[list[int], list[list[float]]]:
+def _types_of(points: hs.Points, cutoff: Any) -> tuple[list[int], list[list[float]]]:
     """The type of each point, and the cutoff of each two, negative if they form no pairs."""
-    call = take(scene.known, cutoff)
+    call = take(points, cutoff)
     types, table = call.known.types, call.pairing and call.pairing.table
     assert types is not None and table is not None
     return types.tolist(), table.tolist()
 
 
-def _check(by: str, verdict: hs.Verdict, rows: NDArray[np.intp] | None, n: int) -> Check:
-    """The verdict on some points, numbered as in the file again."""
+def _check(
+    by: str, pairs: PairList, scene: Scene, limit: int,
+    judge: Callable[[hs.Points, PairList], hs.Verdict],
+) -> tuple[Check, bool]:  # fmt: skip
+    """The verdict on some points, numbered as in the file again, and whether the list is full."""
+    rows = sample_points(scene, limit)
+    points = scene.known if rows is None else scene.known[rows]
+    verdict = judge(points, pairs.among(rows, len(scene.points)))
     faults = {name: getattr(verdict, name) for name in ("missed", "spurious", "duplicate")}
     if rows is not None:
         for name, found in faults.items():
             faults[name] = np.concatenate([rows[found[:, :2]], found[:, 2:]], axis=1)
-    return Check(by, n, faults)
+    return Check(by, len(points), faults), verdict.is_full
 
 
 def sample_points(scene: Scene, limit: int) -> NDArray[np.intp] | None:
@@ -188,33 +167,48 @@ def run(args: Namespace) -> int:
 
         peer = find_peer(args.against)
     if args.list:
-        author, pairs, scene, cutoff = _saved_list(args)
+        pairs, scene, cutoff = _saved_list(args)
     else:
         scene, cutoff, _ = load_scene(args)
     checks = []
     with searching(scene, args):
         if peer:
-            author, pairs = peer.name_and_version(), PairList(*ask_peer(peer, scene, cutoff))
+            pairs = PairList(peer.name_and_version(), *ask_peer(peer, scene, cutoff))
         elif not args.list:
             author, inclusive = f"halfshell {hs.__version__}", not args.strict
             i, j, S = hs.pairs(scene.known, cutoff, quantities="ijS", inclusive=inclusive)
-            pairs = PairList(i, j, S.astype(np.int64), inclusive, full=False)
+            pairs = PairList(author, i, j, S.astype(np.int64), inclusive, full=False)
         if args.list or peer:
             check, full = check_by_search(pairs, scene, cutoff)
             pairs = replace(pairs, full=full)
             checks.append(check)
         with progress_bar(args.progress and not args.json, "checking by integers") as advance:
             checks.append(check_by_integers(pairs, scene, cutoff, args.sample, advance))
-    if args.json:
-        print(_json(author, pairs, scene, cutoff, checks))
-    else:
-        print(_text(author, pairs, scene, cutoff, checks))
-    return 0 if all(check.ok for check in checks) else 1
+    ok = all(check.ok for check in checks)
+    if not args.json:
+        print(_text(pairs, scene, cutoff, checks))
+        return 0 if ok else 1
+    told = [
+        {
+            "by": check.by,
+            "points": check.points,
+            **{name: len(found) for name, found in check.faults.items()},
+            "examples": {name: found[:EXAMPLES].tolist() for name, found in check.faults.items()},
+        }
+        for check in checks
+    ]
+    report = {
+        **describe_source(scene), "list": pairs.author, "cutoff": named_cutoff(cutoff),
+        "inclusive": pairs.inclusive, "full": pairs.full, "rows": len(pairs.i), "ok": ok,
+        "checks": told,
+    }  # fmt: skip
+    print(json.dumps(report, indent=2))
+    return 0 if ok else 1
 
 
-def _saved_list(args: Namespace) -> tuple[str, PairList, Scene, Any]:
-    """A list in a file: what it is, its pairs, the points that it is for, and the cutoff."""
-    scene = load_scene(args)[0] if args.cutoff is not None else read_points(args)
+def _saved_list(args: Namespace) -> tuple[PairList, Scene, Any]:
+    """A list in a file, the points that it is for, and the cutoff."""
+    scene = read_points(args)
     found = read_list(args.list, *scene.points.shape)
     cutoff = found.cutoff if args.cutoff is None else args.cutoff
     if cutoff is None:
@@ -222,54 +216,25 @@ def _saved_list(args: Namespace) -> tuple[str, PairList, Scene, Any]:
     if found.cutoff not in (None, cutoff):
         wanted = named_cutoff(cutoff)
         raise InputError(f"{args.list}: is a list for a cutoff of {found.cutoff}, not {wanted}")
-    inclusive = not args.strict
-    if found.inclusive is False:
-        inclusive = False
-    elif found.inclusive and args.strict:
+    if found.inclusive and args.strict:
         raise InputError(f"{args.list}: is a list for d <= cutoff: leave out --strict")
     S = found.S
     if S is None and not any(scene.periodic):
         S = np.zeros((len(found.i), scene.points.shape[1]), dtype=np.int64)
-    told = f"{args.list}, columns {', '.join(found.columns)}"
-    if found.counts_from:
-        told += f", which counts points from {found.counts_from}"
-    return told, PairList(found.i, found.j, S, inclusive, None), scene, cutoff
+    inclusive = found.inclusive is not False and not args.strict
+    return replace(found, S=S, inclusive=inclusive), scene, cutoff
 
 
 # The report --------------------------------------------------------------------------------
 
 
-def _json(author: str, pairs: PairList, scene: Scene, cutoff: Any, checks: list[Check]) -> str:
-    report: dict[str, Any] = {
-        **describe_source(scene),
-        "list": author,
-        "cutoff": named_cutoff(cutoff),
-        "inclusive": pairs.inclusive,
-        "full": pairs.full,
-        "rows": len(pairs.i),
-        "ok": all(check.ok for check in checks),
-        "checks": [
-            {
-                "by": check.by,
-                "points": check.points,
-                **{name: len(found) for name, found in check.faults.items()},
-                "examples": {
-                    name: found[:EXAMPLES].tolist() for name, found in check.faults.items()
-                },
-            }
-            for check in checks
-        ],
-    }
-    return json.dumps(report, indent=2)
-
-
-def _text(author: str, pairs: PairList, scene: Scene, cutoff: Any, checks: list[Check]) -> str:
+def _text(pairs: PairList, scene: Scene, cutoff: Any, checks: list[Check]) -> str:
     rule = "d <= cutoff" if pairs.inclusive else "d < cutoff"
     kind = "both directions of each pair" if pairs.full else "each pair once"
     n = len(scene.points)
     lines = [
         *describe_points(scene),
-        ("list of", author),
+        ("list of", pairs.author),
         ("cutoff", f"{shown_cutoff(cutoff, scene)}   ({rule})"),
         ("rows", f"{len(pairs.i):,}   ({kind})"),
     ]
@@ -301,7 +266,7 @@ def _text(author: str, pairs: PairList, scene: Scene, cutoff: Any, checks: list[
 def _excess(scene: Scene, cutoff: Any, i: int, j: int, shift: list[int]) -> Decimal | None:
     """Return distance - cutoff of a pair, from exact arithmetic, never 0 unless it is 0."""
     if isinstance(cutoff, dict):
-        types, table = _types_of(scene, cutoff)
+        types, table = _types_of(scene.known, cutoff)
         cutoff = table[types[i]][types[j]]
         if cutoff < 0.0:
             return None

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from copy import copy
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,7 +18,7 @@ from halfshell._convert.foreign import is_a, kind_of, shown, told, whole_number
 from halfshell._convert.lengths import as_length, as_number, check_ascending, check_lengths
 from halfshell._convert.memory import refuse_large
 from halfshell._convert.objects import SYMBOLS
-from halfshell._convert.options import SHELL, as_choice, as_flag
+from halfshell._convert.options import LETTERS, SHELL, as_choice, as_flag, as_threads, check_letters
 from halfshell._convert.points import Labels, Points
 from halfshell._errors import shorten
 from halfshell._settings import Settings, current
@@ -111,7 +112,8 @@ class Call:
         """The first ten arguments of every search of the core."""
         if self.cells is not None and not self.has_reach:
             return ((self.cells, *self.known, None), self.cutoff, None, 0, *self.rest)
-        return ((self.array, *self.known, self.points.batch), *self.scene, *self.rest)
+        firsts = self.firsts(self.points.batch)
+        return ((self.array, *self.known, firsts), *self.scene, *self.rest)
 
     @property
     def scene(self) -> tuple[Any, ...]:
@@ -132,14 +134,57 @@ class Call:
     def query_set(self) -> tuple[Any, ...] | None:
         """The queries as the core takes them."""
         one = self.queries
-        return None if one is None else (one.positions, *self.known_of_queries, one.batch)
+        if one is None:
+            return None
+        return one.positions, *self.known_of_queries, self.firsts(one.batch)
+
+    @cached_property
+    def systems(self) -> npt.NDArray[np.int64]:
+        """Numbers of the systems: all, if each has something of its own, or of those with points.
+
+        So numbers may be as far apart as users like.
+        """
+        points = self.points.batch
+        queries = None if self.queries is None else self.queries.batch
+        own = [] if self.system_cutoffs is None else [len(self.system_cutoffs)]
+        if isinstance(self.points._axes, np.ndarray):
+            own.append(len(self.points._axes))
+        if self.points.box is not None and self.points.box.ndim == 3:
+            own.append(len(self.points.box))
+        if not own:
+            both = [one for one in (points, queries) if one is not None]
+            every = both[0] if len(both) == 1 else np.sort(np.concatenate(both))
+            return every[np.diff(every, prepend=-1) > 0]
+        if len(set(own)) > 1:
+            raise ValueError("cutoffs, boxes and axes are of as many systems")
+        for name, batch in (("batch", points), ("query_batch", queries)):
+            if batch is not None and len(batch) and batch[-1] >= own[0]:
+                k = int(np.searchsorted(batch, own[0]))
+                raise ValueError(
+                    f"{name} must be less than the number of systems that box, periodic or cutoff "
+                    f"is given for, {own[0]}, got {name}[{k}] = {batch[k]}"
+                )
+        return np.arange(own[0])
+
+    def firsts(self, batch: npt.NDArray[np.int64] | None) -> npt.NDArray[np.int64] | None:
+        """Where each system begins, and the last one ends; None for one system."""
+        if batch is None:
+            return None
+        return np.append(np.searchsorted(batch, self.systems), len(batch))
+
+    def by_number(self, found: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """What was found of each system, in the place of its number; 0 elsewhere."""
+        n = int(self.systems[-1]) + 1 if len(self.systems) else 0
+        whole = np.zeros((n, *found.shape[1:]), found.dtype)
+        whole[self.systems] = found
+        return whole
 
     def as_queries(self, numbers: npt.NDArray[np.int64]) -> tuple[tuple[Any, ...], Pairing | None]:
         """Some of the points as queries too, and how they pair."""
         batch = self.points.batch
         return (
             (self.array[numbers], *self.known.some(numbers),
-             None if batch is None else np.ascontiguousarray(batch[numbers])),
+             self.firsts(None if batch is None else batch[numbers])),
             self.pairing and self.pairing._replace(numbers=numbers),
         )  # fmt: skip
 
@@ -159,14 +204,15 @@ class Call:
             raise ValueError(f"{function} cannot be combined with batch: {reason}")
 
 
-def shells_of(quantities: Any) -> str:
-    """The argument `several` of `take`: "shells" if the letter k is wanted."""
-    return "shells" if is_a(quantities, str) and SHELL in quantities else ""
+def shells_of(quantities: Any, letters: str = LETTERS) -> str:
+    """The argument `several` of `take`: "shells" if the letter k is wanted, beside these."""
+    check_letters(quantities, letters + SHELL)
+    return "shells" if SHELL in quantities else ""
 
 
 def check_shells(call: Call, quantities: Any) -> None:
     """ValueError for the letter k without several cutoffs, or where they are not decided."""
-    if not shells_of(quantities):
+    if SHELL not in quantities:
         return
     if call.points.batch is not None:
         raise ValueError("the letter k in quantities cannot be combined with a batch")
@@ -287,7 +333,7 @@ def take(
         call.points = Points._of(points, "points", box, periodic, ndim=ndim)
         call.queries = _queries_of(queries, call.points)
         call.inclusive = inclusive if type(inclusive) is bool else as_flag(inclusive, "inclusive")
-        call.threads = call.settings.threads if threads is None else threads
+        call.threads = call.settings.threads if threads is None else as_threads(threads)
         if progress is not None and progress is not False:
             from halfshell._convert.progress import ProgressBar, as_progress  # few calls need it
 

@@ -88,7 +88,7 @@ def cache_info() -> CacheInfo:
     >>> hs.cache_info().held
     0
     """
-    return CacheInfo(_core.cache_held(), _core.cache_limit())
+    return CacheInfo(*_core.cache_info())
 
 
 def clear_cache() -> None:

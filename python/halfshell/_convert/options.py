@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from halfshell import _core
-from halfshell._convert.foreign import exact_number, is_a, kind_of, read, shown
+from halfshell._convert.foreign import exact_number, is_a, kind_of, read, shown, whole_number
 
 # The default of `algorithm`: what is this string itself needs no conversion.
 AUTO = "auto"
@@ -57,6 +57,19 @@ def as_count(value: Any, name: str) -> int:
     number = as_whole(value, name)
     if number < 1:
         raise ValueError(f"{name} must be 1 or more, got {shown(number)}")
+    return number
+
+
+def as_threads(value: Any) -> int | None:
+    """A number of threads, or None."""
+    must = "threads must be a whole number from 1 to 1024 or None"
+    if value is None or (type(value) is int and 1 <= value <= 1024):
+        return value
+    number = None if is_a(value, (bool, np.bool_)) else whole_number(value, "threads")
+    if number is None:
+        raise TypeError(f"{must}, got {kind_of(value)}")
+    if not 1 <= number <= 1024:
+        raise ValueError(f"{must}, got {shown(value)}")
     return number
 
 
@@ -117,13 +130,17 @@ def are_letters(text: str, letters: str = LETTERS) -> bool:
 
 
 def check_letters(quantities: Any, letters: str = LETTERS) -> None:
-    """Raise unless these are some of the letters, those of `pairs`, each at most once."""
+    """Raise unless these are some of the letters, those of `pairs`, each at most once.
+
+    Letters with j and without i are those of rows.
+    """
     if not is_a(quantities, str):
         raise TypeError(f"quantities must be a string of letters, got {kind_of(quantities)}")
     quantities = str.__str__(quantities)
     if not are_letters(quantities, letters):
         raise ValueError(
-            f"quantities must be some of the letters {' '.join(letters)}, each at most once, got "
+            f"quantities must be some of the letters {' '.join(letters)}, each at most once"
+            f"{' (i is the row itself)' * ('i' not in letters and 'j' in letters)}, got "
             f"{shown(quantities)}"
         )
 

@@ -700,26 +700,32 @@ def _hint_of_shape(shape: tuple[int, ...], name: str) -> str:
 
 
 @brief
-def as_box(values: Any, ndim: int) -> FloatArray:
-    """Box vectors as the rows of a float64 array (ndim, ndim).
+def as_box(values: Any, ndim: int, has_batch: bool = False) -> FloatArray:
+    """Box vectors as the rows of a float64 array (ndim, ndim), or of one for each system.
 
-    values: rows, lengths, the length of all edges, or a Box.
+    values: rows, lengths, the length of all edges, or a Box; of a batch also rows of each system.
     """
 
     def check(shape: tuple[int, ...]) -> None:
-        if shape not in ((), (ndim,), (ndim, ndim)):
-            hint = f": {LENGTHS_AND_ANGLES}" if shape == (6,) else ""
-            if shape == (ndim * ndim,):
-                hint = f": one row for each vector, as in reshape({ndim}, {ndim})"
-            if len(shape) == 3:
-                hint = ": a box for each system needs Points with a batch"
-            raise ValueError(
-                f"box must have shape ({ndim},) or ({ndim}, {ndim}), or be one length, for points "
-                f"in {ndim} dimensions, got {shape}{hint}"
-            )
+        square = (ndim, ndim)
+        of_systems = has_batch and len(shape) == 3
+        if shape in ((), (ndim,), square) or (of_systems and shape[1:] == square):
+            return
+        hint = f": {LENGTHS_AND_ANGLES}" if shape == (6,) else ""
+        if shape == (ndim * ndim,):
+            hint = f": one row for each vector, as in reshape({ndim}, {ndim})"
+        if len(shape) == 3 and not has_batch:
+            hint = ": a box for each system needs Points with a batch"
+        raise ValueError(
+            f"box must have shape ({ndim},) or {square}, or "
+            f"{f'one for each system (s, {ndim}, {ndim})' if of_systems else 'be one length'}, "
+            f"for points in {ndim} dimensions, got {shape}{hint}"
+        )
 
     array = as_real_array(vectors_of(values, "box", ndim), "box", "be lengths or vectors", check)
-    if array.ndim == 2:
+    if array.ndim == 3:
+        refuse_large(8 * array.size, array, "box")
+    if array.ndim >= 2:
         return in_order(array, np.float64)
     if array.ndim == 1:
         return np.diag(array.astype(np.float64))
@@ -728,8 +734,10 @@ def as_box(values: Any, ndim: int) -> FloatArray:
     return np.diag(np.full(ndim, array, np.float64))
 
 
-def as_periodic_bits(values: Any, ndim: int, default: bool) -> int:
-    """Which axes repeat, as an integer with bit l set for box vector l."""
+def as_periodic_bits(
+    values: Any, ndim: int, default: bool, has_batch: bool = False
+) -> int | npt.NDArray[np.uint8]:
+    """Which axes repeat, as an integer with bit l set for box vector l; or that of each system."""
     if values is None:
         return (1 << ndim) - 1 if default else 0
     if is_a(values, (bool, np.bool_)):
@@ -737,6 +745,8 @@ def as_periodic_bits(values: Any, ndim: int, default: bool) -> int:
     if is_a(values, (str, bytes)):
         raise TypeError(f"periodic must be a bool or {ndim} bools, got {shown(values)}")
     array = as_array(values, "periodic")
+    if has_batch and array.ndim == 2:
+        return _as_many_bits(array, ndim)
     if array.shape not in ((), (ndim,)) and array.dtype.kind in "biu":
         raise ValueError(f"periodic must be a bool or {ndim} bools, got shape {array.shape}")
     _check_bools(array, f"be a bool or {ndim} bools", values)
@@ -751,22 +761,15 @@ def as_boxes(
     """Vectors and bits of the axes that repeat, of all systems or of each one."""
     rows: FloatArray | None = None
     if box is not None:
-        rows = _as_many_boxes(box, ndim) if has_batch else None
-        rows = as_box(box, ndim) if rows is None else rows
+        rows = as_box(box, ndim, has_batch)
         periodic = periodic_of(box, periodic, ndim)
-    axes: int | npt.NDArray[np.uint8]
-    many = None
-    if has_batch and periodic is not None and not is_a(periodic, (bool, str, bytes)):
-        many = as_array(periodic, "periodic")
-    if many is not None and many.ndim == 2:
-        axes = _as_many_bits(many, ndim)
-        if rows is not None and rows.ndim == 3 and len(rows) != len(axes):
+    axes = as_periodic_bits(periodic, ndim, box is not None, has_batch)
+    if isinstance(axes, np.ndarray) and rows is not None and rows.ndim == 3:
+        if len(rows) != len(axes):
             raise ValueError(
                 "box and periodic must be given for the same number of systems, got "
                 f"{len(rows)} and {len(axes)}"
             )
-    else:
-        axes = as_periodic_bits(periodic, ndim, default=box is not None)
     if box is None:
         if np.any(axes):
             raise ValueError("periodic needs a box: give box, or leave periodic out")
@@ -803,21 +806,7 @@ def as_box_alone(box: Any, periodic: Any) -> tuple[int, FloatArray | None, int]:
     ndim = counts[0]
     vectors = None if box is None else as_box(box, ndim)
     periodic = periodic_of(box, periodic, ndim)
-    return ndim, vectors, as_periodic_bits(periodic, ndim, default=box is not None)
-
-
-def _as_many_boxes(box: Any, ndim: int) -> FloatArray | None:
-    """Vectors of each system, or None for those of all."""
-    array = as_real_array(vectors_of(box, "box", ndim), "box", "be lengths or vectors")
-    if array.ndim != 3:
-        return None
-    if array.shape[1:] != (ndim, ndim):
-        raise ValueError(
-            f"box must have shape ({ndim},) or ({ndim}, {ndim}), or one for each system "
-            f"(s, {ndim}, {ndim}), for points in {ndim} dimensions, got {array.shape}"
-        )
-    refuse_large(8 * array.size, array, "box")
-    return in_order(array, np.float64)
+    return ndim, vectors, int(as_periodic_bits(periodic, ndim, default=box is not None))
 
 
 def _as_many_bits(flags: npt.NDArray[Any], ndim: int) -> npt.NDArray[np.uint8]:

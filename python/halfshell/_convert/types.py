@@ -7,7 +7,7 @@ Modules that `import halfshell` loads import this one, and `numpy.typing`, for t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal, Protocol, TypedDict, TypeVar
+from typing import Any, Literal, Protocol, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -184,14 +184,3 @@ class NearestOptions(TypedDict, total=False):
     index_dtype: npt.DTypeLike
     threads: int | None
     progress: ProgressLike
-
-
-Block = TypeVar("Block", covariant=True)
-
-
-class PairBlocks(Protocol[Block]):
-    """The iterator that `iter_pairs` returns."""
-
-    def __iter__(self) -> PairBlocks[Block]: ...
-    def __next__(self) -> Block: ...
-    def close(self) -> None: ...

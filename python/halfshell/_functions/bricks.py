@@ -12,7 +12,7 @@ import math
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, Unpack, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +22,7 @@ from halfshell._convert.call import Call, take
 from halfshell._convert.foreign import is_a
 from halfshell._convert.options import as_brick_count
 from halfshell._convert.points import Points
-from halfshell._convert.types import BoxLike, CutoffLike, FloatArray, PeriodicLike, PointsLike, Rule
+from halfshell._convert.types import CutoffLike, FloatArray, Options, PointsLike, Rule
 from halfshell._objects.brick import Brick, Bricks, Columns, Numbers, Scope, aligned, labels_of
 from halfshell._search import search
 
@@ -34,22 +34,14 @@ Bits = npt.NDArray[np.bool_]
 
 #: Points of each piece, and of all pieces, by which bricks are cut: not many more than these.
 _SAMPLE, _SAMPLES = 1 << 13, 1 << 22
-#: Points whose places along the axes stay in a cache.
-_TILE = 1 << 16
+#: Points that are placed in one call of the core.
+_AT_A_TIME = 1 << 16
 #: Of what the smallest eigenvalue may be wrong by, in units of the norm.
 _UNSURE = 256.0 * np.finfo(np.float64).eps
 
 
-@search()
-def bricks(
-    points: PointsLike,
-    cutoff: CutoffLike,
-    n: int,
-    *,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    rule: Rule | None = None,
-) -> Bricks:
+@search(lacks="exclude min_distance indices inclusive threads progress")
+def bricks(points: PointsLike, cutoff: CutoffLike, n: int, **search: Unpack[Options]) -> Bricks:
     """Divide points into bricks for other threads or machines; their pairs are always exact.
 
     Parameters
@@ -106,7 +98,7 @@ def bricks(
     2099
     """
     _refuse_endless(cutoff)
-    call = take(points, cutoff, None, box, periodic, rule, directed=True)
+    call = take(points, cutoff, directed=True, **search)
     call.refuse_batch("bricks", "its systems are apart already")
     n_bricks, array = as_brick_count(n), call.array
     largest = float(max(array.max(initial=0.0), -array.min(initial=0.0)))
@@ -215,24 +207,21 @@ class Axes(NamedTuple):
 
     def places(self, points: Array) -> FloatArray:
         """Places of shape (d, n), 0 along axes where the reach is infinite."""
-        return _places(points, self.scene)[0]
+        box, *rest = self.scene
+        own: Any = (None if box is None else aligned(box), *rest)
+        parts = range(0, max(1, len(points)), _AT_A_TIME)  # Ctrl-C works in between
+        return np.concatenate(
+            [_core.box_places(aligned(points[k : k + _AT_A_TIME]), *own)[0] for k in parts], axis=1
+        )
 
 
 def axes_of(scope: Scope, ndim: int, largest: float) -> Axes:
     """Axes of a box, for coordinates up to `largest`."""
     scene = (scope.box, scope.axes, min(scope.reach, sys.float_info.max), largest)
-    _, repeats, reach, widths = _places(np.empty((0, ndim)), scene)
+    _, repeats, reach, widths = _core.box_places(np.empty((0, ndim)), *scene)
     if math.isinf(scope.reach):
         reach = (math.inf,) * ndim
     return Axes(scene, repeats, reach, np.array(widths))
-
-
-def _places(
-    points: Array, scene: tuple[FloatArray | None, int, float, float]
-) -> tuple[FloatArray, tuple[bool, ...], tuple[float, ...], tuple[float, ...]]:
-    box, periodic, cutoff, largest = scene
-    given = None if box is None else aligned(box)
-    return _core.box_places(aligned(points), given, periodic, cutoff, largest)
 
 
 def _within(places: FloatArray, low: float, high: float, repeats: bool) -> Bits:
@@ -334,8 +323,15 @@ def divide(terms: Terms, n_bricks: int, *summaries: Summary) -> Division:
     for one, first in zip(summaries, ends, strict=False):
         if one.error is not None:
             raise renumbered(one.error, range(first, first + one.n_points))
+    every: dict[str, tuple[str, ...] | None] = {}  # the names of all pieces, ascending
+    for field, names in [pair for one in summaries for pair in one.names.items()]:
+        known = every.setdefault(field, names)
+        if (known is None) != (names is None):
+            raise TypeError(f"{field} of all points must be numbers, or of all be names")
+        if known is not None and names is not None:
+            every[field] = tuple(sorted({*known, *names}))
     widest = max((one.widest for one in summaries), default=0.0)
-    scope = _scope(terms.call(), terms.cutoff, _common_names(summaries), ends[-1], widest)
+    scope = _scope(terms.call(), terms.cutoff, every, ends[-1], widest)
     axes = axes_of(scope, terms.ndim, max((one.largest for one in summaries), default=0.0))
     samples = [one.sample for one in summaries if len(one.sample)]
     places = axes.places(np.concatenate(samples)) if samples else np.empty((terms.ndim, 0))
@@ -344,19 +340,6 @@ def divide(terms: Terms, n_bricks: int, *summaries: Summary) -> Division:
     high = np.where(axes.repeats, 1.0, np.inf)
     cuts = _cut(places, weights, n_bricks, (low, high), axes.widths, iter(range(n_bricks)))
     return Division(cuts, n_bricks, axes, tuple(ends[:-1]), scope)
-
-
-def _common_names(summaries: Iterable[Summary]) -> dict[str, tuple[str, ...] | None]:
-    """The names of all pieces, ascending."""
-    every: dict[str, tuple[str, ...] | None] = {}
-    for one in summaries:
-        for field, names in one.names.items():
-            known = every.setdefault(field, names)
-            if (known is None) != (names is None):
-                raise TypeError(f"{field} of all points must be numbers, or of all be names")
-            if known is not None and names is not None:
-                every[field] = tuple(sorted({*known, *names}))
-    return every
 
 
 def _cut(
@@ -387,60 +370,27 @@ def _cut(
     )  # fmt: skip
 
 
-def renumbered(error: Exception, points: Any, queries: Any = None) -> Exception:
-    """An error that names points by their numbers among all, which `points` and `queries` hold."""
-    own = "points|positions|radii|types|supports|groups|labels"
+def renumbered(error: Exception, numbers: Any) -> Exception:
+    """An error that names points by their numbers among all, which `numbers` holds."""
+    own = r"\b(points|positions|radii|types|supports|groups|labels)\[(\d+)"
 
     def other(found: re.Match[str]) -> str:
-        name, numbers = found[1], points
-        if name == "queries":
-            numbers = queries
-        if numbers is None or int(found[2]) >= len(numbers):
-            return found[0]
-        name = "points" if name in ("queries", "positions") else name
-        return f"{name}[{numbers[int(found[2])]}"
+        name, place = found[1].replace("positions", "points"), int(found[2])
+        return f"{name}[{numbers[place]}" if place < len(numbers) else found[0]
 
-    return type(error)(re.sub(rf"\b({own}|queries)\[(\d+)", other, str(error)))
+    return type(error)(re.sub(own, other, str(error)))
 
 
 # ---- what each piece gives to every brick --------------------------------------------------
 
-class Piece:
-    """What one piece of the points gives to one brick.
+class Piece(NamedTuple):
+    """What one piece of the points gives to one brick."""
 
-    Until it is sent it holds the whole piece, of which nothing is copied.
-    """
-
-    def __init__(
-        self, first: int, places: tuple[Array, ...], columns: Columns, is_whole: bool = True
-    ) -> None:
-        self.first = first  # number of the first point of the piece
-        # Where points are in the piece, ascending: those that the brick owns, and those it needs,
-        # which later bricks own, or earlier ones.
-        self.places = places
-        self.columns = columns  # of all of the piece, or of those at these places
-        self.is_whole = is_whole
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        columns = self.columns
-        if self.is_whole:
-            rows = np.concatenate(self.places)
-            columns = {name: one.take(rows, axis=0) for name, one in columns.items()}
-        return Piece, (self.first, self.places, columns, False)
-
-    def __sizeof__(self) -> int:
-        row = self.places[0].itemsize
-        row += sum(one[:1].nbytes for one in self.columns.values())
-        return int(row * sum(map(len, self.places)))
-
-    def put(self, name: str, which: int, target: Array) -> None:
-        """The rows of a column at places of one kind."""
-        column = self.columns[name]
-        if self.is_whole:
-            column.take(self.places[which], axis=0, out=target, mode="clip")  # without a buffer
-        else:
-            first = sum(map(len, self.places[:which]))
-            target[:] = column[first : first + len(target)]
+    first: int  # number of the first point of the piece
+    # Where points are in the piece, ascending: those that the brick owns, and those it needs,
+    # which later bricks own, or earlier ones.
+    places: tuple[Array, ...]
+    columns: Columns  # of the points at these places
 
 
 class Part(NamedTuple):
@@ -448,51 +398,35 @@ class Part(NamedTuple):
 
     columns: Columns
     sizes: tuple[int, ...]
-    places: list[tuple[int, tuple[Array, ...]]]  # `first` and `places` of each piece
+    numbers: Numbers
     scope: Scope
 
-    def numbers(self) -> Numbers:
-        return np.concatenate(
-            [first + places[k].astype(np.int64) for k in range(3) for first, places in self.places]
-        )
-
-    def points(self, rows: Any) -> Points:
-        return self.scope.points_of({name: one[rows] for name, one in self.columns.items()})
-
-    def in_order(self) -> tuple[Brick, Points]:
-        members = self.numbers()
-        order = np.argsort(members)
-        brick = Brick(members.take(order), order < self.sizes[0], self.scope)
-        return brick, self.points(order)
+    def in_order(self, first: int = 0, last: int = 3) -> tuple[Brick, Points]:
+        """The points of these kinds, ascending, and the brick that has no others."""
+        low, high = sum(self.sizes[:first]), sum(self.sizes[:last])
+        order = low + np.argsort(self.numbers[low:high])
+        brick = Brick(self.numbers[order], order < self.sizes[0], self.scope)
+        return brick, self.scope.points_of({k: one[order] for k, one in self.columns.items()})
 
 
 def split(points: Points, division: Division, place: int) -> list[Piece]:
     """What a piece gives to each brick: points of its region, and those within reach of it."""
-    columns = {
-        name: np.ascontiguousarray(one) for name, one in division.scope.columns_of(points).items()
-    }
-    array = columns["positions"]
-    kind = np.int32 if len(array) <= 1 << 31 else np.int64
-    found: list[tuple[list[Array], ...]] = [([], [], []) for _ in range(division.n_bricks)]
-    for first in range(0, max(1, len(array)), _TILE):
-        places = division.axes.places(array[first : first + _TILE])
-        every = np.arange(places.shape[1])
-        owners = np.zeros(len(every), np.int64)
-        needed = []
-        for brick, (numbers, is_owned) in enumerate(
-            _leaves(division.cuts, places, division.axes, every, np.ones(len(every), bool))
-        ):
-            owned = numbers.take(np.flatnonzero(is_owned))
-            owners[owned] = brick
-            found[brick][0].append((owned + first).astype(kind))
-            needed.append(numbers.take(np.flatnonzero(~is_owned)))
-        for brick, numbers in enumerate(needed):
-            is_later = owners.take(numbers) > brick
-            found[brick][1].append((numbers[is_later] + first).astype(kind))
-            found[brick][2].append((numbers[~is_later] + first).astype(kind))
-    return [
-        Piece(division.firsts[place], tuple(map(np.concatenate, kinds)), columns) for kinds in found
-    ]
+    columns, n = division.scope.columns_of(points), len(points)
+    places = division.axes.places(points.positions)
+    everything = np.arange(n), np.ones(n, bool)
+    leaves = list(_leaves(division.cuts, places, division.axes, *everything))
+    owners = np.empty(n, np.int64)
+    for brick, (numbers, is_owned) in enumerate(leaves):
+        owners[numbers[is_owned]] = brick
+    pieces = []
+    for brick, (numbers, is_owned) in enumerate(leaves):
+        is_later = owners[numbers] > brick
+        kinds = is_owned, is_later, ~(is_owned | is_later)
+        chosen = tuple(numbers[kind].astype(np.int32) for kind in kinds)
+        rows = np.concatenate(chosen)
+        given = {name: one.take(rows, axis=0) for name, one in columns.items()}
+        pieces.append(Piece(division.firsts[place], chosen, given))
+    return pieces
 
 
 def _leaves(
@@ -515,13 +449,15 @@ def _leaves(
 
 def part_of(division: Division, *pieces: Piece) -> Part:
     """A brick of what all pieces give to it."""
+    kinds = []  # of points: numbers, and where they are in each piece
+    for k in range(3):
+        for piece in pieces:
+            first = sum(map(len, piece.places[:k]))
+            kinds.append((piece, slice(first, first + len(piece.places[k]))))
+    columns = {
+        name: np.concatenate([piece.columns[name][some] for piece, some in kinds])
+        for name in pieces[0].columns
+    }
+    numbers = [piece.first + np.concatenate(piece.places)[some] for piece, some in kinds]
     sizes = tuple(sum(len(piece.places[k]) for piece in pieces) for k in range(3))
-    columns: Columns = {}
-    for name, like in pieces[0].columns.items():
-        columns[name] = column = np.empty((sum(sizes), *like.shape[1:]), like.dtype)
-        end = 0
-        for which in range(3):
-            for piece in pieces:
-                first, end = end, end + len(piece.places[which])
-                piece.put(name, which, column[first:end])
-    return Part(columns, sizes, [(one.first, one.places) for one in pieces], division.scope)
+    return Part(columns, sizes, np.concatenate(numbers, dtype=np.int64), division.scope)

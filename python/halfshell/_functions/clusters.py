@@ -13,7 +13,7 @@ from halfshell._convert.arrays import entries_of
 from halfshell._convert.call import Call, take
 from halfshell._convert.options import as_count
 from halfshell._convert.points import flags_of
-from halfshell._functions.pairs import pairs, pairs_wanted
+from halfshell._functions.pairs import pairs_wanted
 from halfshell._search import search
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from halfshell._convert.types import CutoffLike, FloatArray, Options, PointsLike
 
 
-@search(like=pairs, lacks="indices")
+@search(lacks="indices")
 def clusters(
     points: PointsLike, cutoff: CutoffLike = None, *, min_points: int = 1, **search: Unpack[Options]
 ) -> Clusters:

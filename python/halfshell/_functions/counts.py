@@ -15,7 +15,6 @@ from halfshell._convert.lengths import as_edges
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import as_flag
 from halfshell._functions.indices import named_once, pairs_of_some, within_and_beyond
-from halfshell._functions.pairs import pairs
 from halfshell._search import search
 
 if TYPE_CHECKING:
@@ -54,7 +53,7 @@ def count_pairs(
 def count_pairs(
     points: PointsLike, cutoff: CutoffLike = None, **options: Unpack[CountOptions]
 ) -> int | npt.NDArray[np.int64]: ...
-@search("count_pairs", like=pairs)
+@search("count_pairs")
 def count_pairs(
     points: PointsLike,
     cutoff: CutoffLike = None,
@@ -134,13 +133,13 @@ def _count(call: Call) -> int | npt.NDArray[np.int64]:
             return len(i)
         own = call.system_cutoffs
         return np.bincount(batch[i], minlength=points.n_systems if own is None else len(own))
-    how = (call.pairing, call.settings.algorithm, call.query_set)
-    return cast("int | npt.NDArray[np.int64]", call.run(_core.count_pairs, *how))
+    found = call.run(_core.count_pairs, call.pairing, call.settings.algorithm, call.query_set)
+    return cast("int", found) if batch is None else call.by_number(found)
 
 
 # ---- by distance ---------------------------------------------------------------------------
 
-@search(like=pairs, lacks="rule indices inclusive")
+@search(lacks="rule indices inclusive")
 def pair_histogram(
     points: PointsLike,
     edges: npt.ArrayLike,
@@ -308,4 +307,4 @@ def binned(
     end = call.settings.algorithm, call.pairing
     with of_argument(name):
         found = call.run(_core.histogram, edges, last, call.query_set, marks.n_types, *end)
-    return cast("npt.NDArray[Any]", found)
+    return cast("npt.NDArray[Any]", found) if call.points.batch is None else call.by_number(found)

@@ -11,7 +11,6 @@ import numpy as np
 from halfshell import _core, _show
 from halfshell._convert.call import Call, check_shells, shells_of, take
 from halfshell._convert.options import as_flag, as_index_bytes
-from halfshell._functions.pairs import pairs
 from halfshell._search import search
 
 if TYPE_CHECKING:
@@ -115,7 +114,7 @@ class Explanation:
         return "\n".join(lines)
 
 
-@search(like=pairs, lacks="indices")
+@search(lacks="indices")
 def explain(
     points: PointsLike,
     cutoff: CutoffLike = None,

@@ -18,7 +18,6 @@ from halfshell._convert.call import Call, each_system, part_of, take
 from halfshell._convert.foreign import shown
 from halfshell._convert.options import as_count, as_whole, check_letters
 from halfshell._convert.points import Points, refuse_infinite
-from halfshell._functions.pairs import pairs
 from halfshell._objects.pictures import (
     MOST_LINES,
     axes_for,
@@ -86,7 +85,7 @@ def measure(
     quantities: str,
     **options: Unpack[_MeasureOptions],
 ) -> Arrays: ...
-@search(like=pairs, lacks="rule exclude min_distance indices inclusive")
+@search(lacks="rule exclude min_distance indices inclusive")
 def measure(
     points: PointsLike,
     i: ArrayLike,

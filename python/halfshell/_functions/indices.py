@@ -15,7 +15,6 @@ from halfshell import _core
 from halfshell._convert.arrays import entries_of, rows_of, starts_of
 from halfshell._convert.call import Call, Known, part_of
 from halfshell._convert.foreign import is_a
-from halfshell._convert.options import check_letters
 from halfshell._errors import CapacityError
 
 if TYPE_CHECKING:
@@ -40,7 +39,6 @@ class Rows(NamedTuple):
 
 def rows_of_some(call: Call, quantities: str, index_bytes: int) -> Rows:
     """The rows of `call.indices`, each ascending by (j, S)."""
-    check_letters(quantities, "jdDSk")
     numbers = call.indices
     assert numbers is not None
     letters = quantities if "j" in quantities else "j" + quantities
@@ -76,7 +74,6 @@ def pairs_of_some(
     call: Call, quantities: str, sort: bool, index_bytes: int, out: Any
 ) -> Arrays:
     """Pairs with one of `call.indices`, as a half list."""
-    check_letters(quantities, "ijdDSPk")
     asked = named_once(call)
     if out is not None:  # its types and shapes, before anything is searched for
         least = 0.0 if call.shells is None else call.cutoff
@@ -93,7 +90,6 @@ def pairs_of_some(
 
 def blocks_of_some(call: Call, quantities: str, index_bytes: int) -> Iterator[tuple[Array, ...]]:
     """Pairs with one of `call.indices`, not sorted: those of some of these points at a time."""
-    check_letters(quantities, "ijdDSPk")
     asked = named_once(call)
     whole = copy(call)
     call.progress = call.bar = None
@@ -134,6 +130,7 @@ def within_and_beyond(
     for own, asking in ((numbers, None), (rest, numbers)):
         one = copy(call)
         one.cells = one.indices = None
+        one.__dict__.pop("systems", None)  # not those of all points
         one.points = call.points[own]
         one.queries = None if asking is None else call.points[asking]
         one.known = call.known.some(own)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast, overload
 import numpy as np
 
 from halfshell import _core
+from halfshell._convert.arrays import rows_of
 from halfshell._convert.call import DIRECTED, Call, check_shells, each_cutoff, shells_of, take
 from halfshell._convert.lengths import as_k, check_max_distances, in_rows
 from halfshell._convert.memory import refuse_unavailable
@@ -57,7 +58,7 @@ def _as_table(arrays: Any, points: Any, cutoff: Any = None, **options: Any) -> N
     return NeighborTable(arrays, quantities, len(points), queries is None, origin=origin)
 
 
-@search("neighbors", finish=_as_table, like=pairs)
+@search("neighbors", finish=_as_table)
 def neighbors(
     points: PointsLike,
     cutoff: CutoffLike = None,
@@ -132,7 +133,7 @@ def neighbors(
     [[(1, 0), (2, 1)], [(0, 0), (2, 1)], [(0, 1), (1, 1)]]
     """
     call = take(
-        points, cutoff, queries, directed=True, several=shells_of(quantities), **search
+        points, cutoff, queries, directed=True, several=shells_of(quantities, "jdDS"), **search
     )
     check_shells(call, quantities)
     index_bytes = as_index_bytes(index_dtype)
@@ -149,7 +150,7 @@ def listed(call: Call, quantities: str, index_bytes: int) -> Any:
     )  # fmt: skip
 
 
-@search("neighbors", like=pairs)
+@search("neighbors")
 def arrays_of_rows(
     points: Any,
     cutoff: Any,
@@ -198,7 +199,7 @@ def _origin_of(
     points, is_own = call.points, call.cells is not None  # cells own their points
     # The caller's arrays may change; the table keeps positions itself.
     known, known_of_queries, scene, pairing = copied(
-        ((*call.known, points.batch), queries and queries[1:], call.scene,
+        ((*call.known, call.firsts(points.batch)), queries and queries[1:], call.scene,
          pairing and tuple(pairing))
     )  # fmt: skip
     rest: Any = list(call.rest)
@@ -220,7 +221,7 @@ def _origin_of(
     assert flags is not None
     boxes = np.broadcast_to(points.box, (points.n_systems, *points.box.shape[-2:]))
     boxes = boxes * np.broadcast_to(flags, boxes.shape[:2])[:, :, None]
-    asked_in = known[-1] if known_of_queries is None else known_of_queries[-1]
+    asked_in = rows_of(known[-1] if known_of_queries is None else known_of_queries[-1])
     if order is not None:
         asked_in = asked_in[np.argsort(order)]
     bits = (1 << boxes.shape[1]) - 1
@@ -243,7 +244,7 @@ def entries_of(
 
 # ---- the lengths of its rows ---------------------------------------------------------------
 
-@search("coordination", like=pairs)
+@search("coordination")
 def coordination(
     points: PointsLike,
     cutoff: CutoffLike = None,
@@ -359,7 +360,7 @@ def nearest(
 def nearest(
     points: PointsLike, k: int, *, quantities: str, **options: Unpack[NearestOptions]
 ) -> Arrays: ...
-@search("nearest", finish=_as_ranks, like=pairs, lacks="rule")
+@search("nearest", finish=_as_ranks, lacks="rule")
 def nearest(
     points: PointsLike,
     k: int,
@@ -452,6 +453,7 @@ def nearest(
     ([[0, 2]], [[0.5, 0.5]], [[[1, 0], [0, 0]]])
     """
     k = as_k(k)
+    check_letters(quantities, "jdDS")
     call = take(points, 0.0, queries, by_reach=False, **search)
     distances = check_max_distances(max_distance)
     if isinstance(distances, float):
@@ -472,7 +474,6 @@ def nearest(
 
 def _nearest_of_some(call: Call, k: int, quantities: str, index_bytes: int) -> Arrays:
     """Rows of some points, found as those of queries, of which each finds itself too."""
-    check_letters(quantities, "jdDS")  # others are added, and left out again
     numbers = call.indices
     assert numbers is not None
     order = np.arange(len(numbers))

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast, overload
+from _thread import allocate_lock
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast, overload
 
 import numpy as np
 
@@ -20,20 +21,14 @@ if TYPE_CHECKING:
 
     from halfshell._convert.call import Call
     from halfshell._convert.types import (
-        ArrayLike,
         Arrays,
-        BoxLike,
         CutoffLike,
         Letter,
         ListOptions,
         Options,
         OptionsOfPoints,
         Out,
-        PairBlocks,
-        PeriodicLike,
         PointsLike,
-        ProgressLike,
-        Rule,
     )
 
     class _PairOptions(OptionsOfPoints, ListOptions, total=False):
@@ -83,19 +78,11 @@ def pairs(
     points: PointsLike,
     cutoff: CutoffLike = None,
     *,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    rule: Rule | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
-    indices: npt.ArrayLike | None = None,
-    inclusive: bool = True,
     quantities: str = "ij",
     index_dtype: npt.DTypeLike = np.int64,
     sort: bool = False,
     out: Out | None = None,
-    threads: int | None = None,
-    progress: ProgressLike = None,
+    **search: Any,
 ) -> Arrays:
     """Find every pair of points within a cutoff, each once.
 
@@ -223,11 +210,9 @@ def pairs(
     """
     from halfshell._convert.call import check_shells, shells_of, take  # for what C does not convert
 
-    check_apart(out, points=points, cutoff=cutoff, box=box, exclude=exclude, indices=indices)
-    call = take(
-        points, cutoff, None, box, periodic, rule, exclude, min_distance, indices, inclusive,
-        threads, progress, several=shells_of(quantities),
-    )  # fmt: skip
+    several = shells_of(quantities)
+    check_apart(out, quantities, points=points, cutoff=cutoff, **search)
+    call = take(points, cutoff, several=several, **search)
     check_shells(call, quantities)
     wanted = quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out
     if call.indices is not None:
@@ -246,19 +231,14 @@ def pairs_wanted(
     return cast("Arrays", call.run(_core.pairs, *wanted, *end))
 
 
-def check_apart(out: Any, **inputs: Any) -> None:
+def check_apart(out: Any, quantities: str, **inputs: Any) -> None:
     """ValueError if an array of `out` may share memory with an input, which it names."""
-    if out is None:
-        return
     outputs = out if is_a(out, tuple) else (out,)
     for name, values in inputs.items():
-        for array in outputs:
-            if (
-                is_a(array, np.ndarray)
-                and is_a(values, np.ndarray)
-                and np.may_share_memory(array, values)
-            ):
-                raise ValueError(f"out must not share memory with {name}")
+        for letter, array in zip(str.__str__(quantities), outputs, strict=False):
+            both = is_a(array, np.ndarray) and is_a(values, np.ndarray)
+            if both and np.may_share_memory(array, values):
+                raise ValueError(f"out for {letter!r} must not share memory with {name}")
 
 
 # ---- pairs of two sets ---------------------------------------------------------------------
@@ -290,23 +270,16 @@ def pairs_between(
     quantities: str,
     **options: Unpack[_BetweenOptions],
 ) -> Arrays: ...
-@search("pairs_between")
+@search("pairs_between", lacks="indices")
 def pairs_between(
     queries: PointsLike,
     points: PointsLike,
     cutoff: CutoffLike = None,
     *,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    rule: Rule | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
-    inclusive: bool = True,
     quantities: str = "ij",
     index_dtype: npt.DTypeLike = np.int64,
     out: Out | None = None,
-    threads: int | None = None,
-    progress: ProgressLike = None,
+    **search: Any,
 ) -> Arrays:
     """Find every pair of a query and a point within a cutoff.
 
@@ -362,13 +335,9 @@ def pairs_between(
     """
     from halfshell._convert.call import check_shells, shells_of, take  # as above
 
-    check_apart(
-        out, queries=queries, points=points, cutoff=cutoff, box=box, exclude=exclude
-    )
-    call = take(
-        points, cutoff, queries, box, periodic, rule, exclude, min_distance, None, inclusive,
-        threads, progress, directed=True, several=shells_of(quantities),
-    )  # fmt: skip
+    several = shells_of(quantities)
+    check_apart(out, quantities, queries=queries, points=points, cutoff=cutoff, **search)
+    call = take(points, cutoff, queries, directed=True, several=several, **search)
     check_shells(call, quantities)
     found = call.run(
         _core.pairs_between, quantities, True, as_index_bytes(index_dtype), out, call.query_set,
@@ -378,6 +347,44 @@ def pairs_between(
 
 
 # ---- none or few of them held --------------------------------------------------------------
+
+Block = TypeVar("Block", covariant=True)
+
+
+class PairBlocks(Generic[Block]):
+    """The iterator that `iter_pairs` returns."""
+
+    def __init__(self, stream: Any, progress: Any) -> None:
+        self._stream, self._progress, self._lock = stream, progress, allocate_lock()
+
+    def __iter__(self) -> PairBlocks[Block]:
+        return self
+
+    def __next__(self) -> Block:
+        return cast("Block", self._take(False))
+
+    def close(self) -> None:
+        """Give back all memory; no block follows."""
+        self._take(True)
+
+    def __reduce__(self) -> Any:
+        raise TypeError("a search that goes on cannot be copied or pickled: call iter_pairs again")
+
+    def _take(self, closes: bool) -> Any:
+        if not self._lock.acquire(blocking=False):  # a hook that asks, or another thread
+            raise ValueError("iter_pairs is already looking for the next block")
+        try:
+            block = None
+            if self._stream is not None and not closes:
+                block = _core.next_block(self._stream, self._progress)
+            if block is None:
+                self._stream = self._progress = None
+        finally:
+            self._lock.release()
+        if block is None and not closes:
+            raise StopIteration
+        return block
+
 
 @overload
 def iter_pairs(
@@ -403,23 +410,15 @@ def iter_pairs(
     quantities: str,
     **options: Unpack[_BlockOptions],
 ) -> PairBlocks[Arrays]: ...
-@search("iter_pairs")
+@search("iter_pairs", finish=lambda found, *_, **__: PairBlocks(*found))
 def iter_pairs(
     points: PointsLike,
     cutoff: CutoffLike = None,
     *,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    rule: Rule | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
-    indices: npt.ArrayLike | None = None,
-    inclusive: bool = True,
     quantities: str = "ij",
     index_dtype: npt.DTypeLike = np.int64,
     max_pairs: int = 1 << 20,
-    threads: int | None = None,
-    progress: ProgressLike = None,
+    **search: Any,
 ) -> PairBlocks[Any]:
     """Iterate over all pairs of points within a cutoff, in blocks of bounded size.
 
@@ -481,10 +480,7 @@ def iter_pairs(
     from halfshell._convert.call import check_shells, shells_of, take  # as above
 
     most = most_pairs(max_pairs)
-    call = take(
-        points, cutoff, None, box, periodic, rule, exclude, min_distance, indices, inclusive,
-        threads, progress, several=shells_of(quantities),
-    )  # fmt: skip
+    call = take(points, cutoff, several=shells_of(quantities), **search)
     check_shells(call, quantities)
     index_bytes = as_index_bytes(index_dtype)
     if call.indices is not None:
@@ -500,7 +496,7 @@ def iter_pairs(
         return cast("PairBlocks[Any]", _in_blocks(parts, quantities, most))
     own = quantities, index_bytes, most, call.pairing, call.settings.algorithm, call.shells
     arguments: Any = (*call.core, *own)
-    return cast("PairBlocks[Any]", _core.iter_pairs(*arguments))
+    return PairBlocks(*_core.iter_pairs(*arguments))
 
 
 def _in_blocks(parts: Iterator[Any], quantities: str, most: int) -> Iterator[Any]:
@@ -525,21 +521,15 @@ def _as_block(columns: list[npt.NDArray[Any]]) -> Any:
     return columns[0] if len(columns) == 1 else tuple(columns)
 
 
-@search()
+@search(lacks="indices progress")
 def for_each_pair(
     points: PointsLike,
     cutoff: CutoffLike,
     callback: Any,
     *,
     user_data: Any = None,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    rule: Rule | None = None,
-    exclude: ArrayLike | int | None = None,
-    min_distance: float | None = None,
-    inclusive: bool = True,
     thread_safe: bool = False,
-    threads: int | None = None,
+    **search: Unpack[Options],
 ) -> int:
     """Call a function for each pair of points within a cutoff, storing none of them.
 
@@ -611,9 +601,7 @@ def for_each_pair(
     from halfshell._convert.callbacks import target_of  # few calls need it
 
     target = target_of(callback, user_data)
-    call = take(
-        points, cutoff, None, box, periodic, rule, exclude, min_distance, None, inclusive, threads
-    )
+    call = take(points, cutoff, **search)
     own = target.function, target.user, as_flag(thread_safe, "thread_safe")
     n_pairs: int = call.run(_core.for_each_pair, *own, call.pairing, call.settings.algorithm)
     return n_pairs

@@ -22,7 +22,6 @@ from halfshell._convert.lengths import as_edges, as_positive
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import as_choice, as_count, as_flag
 from halfshell._functions.counts import Marks, binned, marks_of
-from halfshell._functions.pairs import pairs
 from halfshell._objects.pictures import axes_of
 from halfshell._search import document, search
 
@@ -41,7 +40,7 @@ _COLUMNS = 12  # of a result without types, and what makes them
 _OF_TYPES = 6  # of g(r) of each two types, and what makes it
 
 
-@search(like=pairs, lacks="rule indices inclusive")
+@search(lacks="rule indices inclusive")
 def rdf(
     points: PointsLike,
     cutoff: Number | None = None,

@@ -74,7 +74,7 @@ def trajectory_pairs(
 def trajectory_pairs(
     frames: _Frames, cutoff: CutoffLike = None, *, quantities: str, **options: Unpack[_FrameOptions]
 ) -> Generator[Arrays, None, None]: ...
-@search(like=pairs)
+@search()
 def trajectory_pairs(
     frames: _Frames,
     cutoff: CutoffLike = None,
@@ -83,7 +83,7 @@ def trajectory_pairs(
     quantities: str = "ij",
     index_dtype: npt.DTypeLike = np.int64,
     sort: bool = False,
-    **which: Any,
+    **search: Any,
 ) -> Generator[Any, None, None]:
     """Find the pairs of each frame of a trajectory, one frame after the other; always exact.
 
@@ -161,10 +161,10 @@ def trajectory_pairs(
         "index_dtype": np.dtype(f"i{as_index_bytes(index_dtype)}"),
     }  # fmt: skip
     own = ("box", "periodic", "threads", "progress")
-    box, periodic, threads, progress = (which.pop(name, None) for name in own)
-    inclusive = as_flag(which.setdefault("inclusive", True), "inclusive")
+    box, periodic, threads, progress = (search.pop(name, None) for name in own)
+    inclusive = as_flag(search.setdefault("inclusive", True), "inclusive")
     is_plain = is_a(cutoff, (float, int, np.floating, np.integer)) and not any(
-        value is not None for name, value in which.items() if name != "inclusive"
+        value is not None for name, value in search.items() if name != "inclusive"
     )
     if not (is_plain or cutoff is None or is_a(cutoff, Mapping)):
         as_real_array(cutoff, "cutoff", "be a number")  # refused before the first frame
@@ -184,7 +184,7 @@ def trajectory_pairs(
     def find(points: Points) -> Arrays:
         count = 1 if is_shared else threads
         with settings(**how):
-            found: Arrays = pairs(points, cutoff, threads=count, **which, **wanted)
+            found: Arrays = pairs(points, cutoff, threads=count, **search, **wanted)
         return found
 
     def follow(points: Points) -> Arrays:

@@ -289,7 +289,7 @@ class Box:
             raise ValueError(f"points must have shape (n, {ndim}) for this box, got {array.shape}")
         refuse_large(16 * array.size, array, "points")
         return _core.box_wrap(
-            array, self.vectors, as_periodic_bits(periodic, ndim, default=True)
+            array, self.vectors, int(as_periodic_bits(periodic, ndim, default=True))
         )
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> npt.NDArray[Any]:

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from inspect import signature
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,7 @@ from halfshell._convert.points import Labels, Points
 from halfshell._functions.neighbors import neighbors as find_neighbors
 from halfshell._functions.pairs import pairs as find_pairs
 from halfshell._objects.neighbor_table import NeighborTable
+from halfshell._search import spell_out
 
 if TYPE_CHECKING:
     from halfshell._convert.types import ArrayLike, Arrays, FloatArray, PointsLike, Rule
@@ -28,6 +30,15 @@ Columns = dict[str, Array]
 
 _AT_A_TIME = 1 << 14  # points whose pairs are counted
 _NAMED = ("types", "groups", "labels")
+
+
+class Search(TypedDict, total=False):
+    """The keywords that a brick takes, as `pairs` has them."""
+
+    exclude: ArrayLike | int | None
+    min_distance: float | None
+    inclusive: bool
+    threads: int | None
 
 
 class Scope(NamedTuple):
@@ -138,14 +149,7 @@ class Brick:
         return self._scope.n_points
 
     def pairs(
-        self,
-        points: PointsLike,
-        *,
-        exclude: ArrayLike | int | None = None,
-        min_distance: float | None = None,
-        inclusive: bool = True,
-        quantities: str = "ij",
-        threads: int | None = None,
+        self, points: PointsLike, *, quantities: str = "ij", **search: Unpack[Search]
     ) -> Arrays:
         """Find the pairs whose lower number is a point of this brick.
 
@@ -168,11 +172,10 @@ class Brick:
         # All pairs of the members are found sooner than those of half of them.
         some = None if 2 * len(places) >= len(self.members) else places
         letters = quantities if "i" in quantities else "i" + quantities
+        how = self._how(search)
         found: Any = find_pairs(
-            own, self.cutoff, rule=self._scope.rule, exclude=self._excluded(exclude),
-            min_distance=min_distance, indices=some, inclusive=inclusive, quantities=letters,
-            sort=True, threads=threads,
-        )  # fmt: skip
+            own, self.cutoff, indices=some, quantities=letters, sort=True, **how
+        )
         columns = dict(zip(letters, found if isinstance(found, tuple) else (found,), strict=True))
         kept = self.is_owned[columns["i"]]
         arrays = []
@@ -181,15 +184,7 @@ class Brick:
             arrays.append(self.members[array] if letter in "ijP" else array)
         return tuple(arrays) if len(arrays) > 1 else arrays[0]
 
-    def count_pairs(
-        self,
-        points: PointsLike,
-        *,
-        exclude: ArrayLike | int | None = None,
-        min_distance: float | None = None,
-        inclusive: bool = True,
-        threads: int | None = None,
-    ) -> int:
+    def count_pairs(self, points: PointsLike, **search: Unpack[Search]) -> int:
         """Count the pairs whose lower number is a point of this brick.
 
         Parameters
@@ -197,30 +192,20 @@ class Brick:
         points, exclude, min_distance, inclusive, threads
             As in `Brick.pairs`. Memory is that of the pairs of a few thousand points.
         """
-        rule, excluded = self._scope.rule, self._excluded(exclude)
-        if rule in DIRECTED:
-            raise ValueError(f"rule {rule!r} has a direction, and these pairs have none")
+        how = self._how(search)
+        if how["rule"] in DIRECTED:
+            raise ValueError(f"rule {how['rule']!r} has a direction, and these pairs have none")
         own, places, count = self._of_members(points), np.flatnonzero(self.is_owned), 0
         for first in range(0, max(1, len(places)), _AT_A_TIME):
             some = places[first : first + _AT_A_TIME]
-            table = find_neighbors(
-                own, self.cutoff, rule=rule, exclude=excluded, min_distance=min_distance,
-                indices=some, inclusive=inclusive, threads=threads,
-            )  # fmt: skip
+            table = find_neighbors(own, self.cutoff, indices=some, **how)
             row = np.repeat(some, table.counts)
             # An image of a point itself is there in both directions.
             count += int((table.indices > row).sum()) + int((table.indices == row).sum()) // 2
         return count
 
     def neighbors(
-        self,
-        points: PointsLike,
-        *,
-        exclude: ArrayLike | int | None = None,
-        min_distance: float | None = None,
-        inclusive: bool = True,
-        quantities: str = "j",
-        threads: int | None = None,
+        self, points: PointsLike, *, quantities: str = "j", **search: Unpack[Search]
     ) -> NeighborTable:
         """Find all neighbours of the points of this brick.
 
@@ -236,16 +221,19 @@ class Brick:
         NeighborTable
             Row k belongs to point ``owned[k]``, with indices among all points.
         """
+        own, places = self._of_members(points), np.flatnonzero(self.is_owned)
         table = find_neighbors(
-            self._of_members(points), self.cutoff, rule=self._scope.rule,
-            exclude=self._excluded(exclude), min_distance=min_distance,
-            indices=np.flatnonzero(self.is_owned), inclusive=inclusive, quantities=quantities,
-            threads=threads,
-        )  # fmt: skip
+            own, self.cutoff, indices=places, quantities=quantities, **self._how(search)
+        )
         arrays = [table._column(letter) for letter in quantities]
         if "j" in quantities:
             arrays[quantities.index("j")] = self.members[table.indices]
         return NeighborTable((table.offsets, *arrays), quantities, self.n_points, False)
+
+    def _how(self, search: Any) -> dict[str, Any]:
+        """The keywords of a search of the members."""
+        excluded = self._excluded(search.get("exclude"))
+        return {**search, "rule": self._scope.rule, "exclude": excluded}
 
     def _excluded(self, exclude: ArrayLike | int | None) -> Any:
         """Pairs of members that do not count, by their places among them."""
@@ -279,6 +267,10 @@ class Brick:
         if len(given) == self.n_points:
             columns = {name: one[self.members] for name, one in columns.items()}
         return scope.points_of(columns)
+
+
+for _method in (Brick.pairs, Brick.count_pairs, Brick.neighbors):
+    spell_out(_method, [signature(find_pairs).parameters[name] for name in Search.__annotations__])
 
 
 class Bricks(tuple[Brick, ...]):

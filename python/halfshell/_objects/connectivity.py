@@ -14,7 +14,7 @@ from halfshell import _core, _show
 from halfshell._convert.arrays import as_array, as_real_array, in_order, starts_of
 from halfshell._convert.call import DIRECTED, RULES_OF_SUPPORTS
 from halfshell._convert.foreign import is_a, kind_of, shown
-from halfshell._convert.options import as_choice, as_flag, as_list, as_whole
+from halfshell._convert.options import as_choice, as_flag, as_list, as_threads, as_whole
 from halfshell._convert.points import as_box_alone, as_own_box, as_points
 from halfshell._objects import node_links, pictures
 from halfshell._objects.node_links import How, Links, Rows
@@ -173,7 +173,7 @@ class Connectivity:
             *as_own_box(box, periodic, d), as_flag(ghosts, "ghosts"), as_flag(overlap, "overlap"),
             as_flag(intersection, "intersection"),
             as_choice(order, "order", ("index", "morton")) == "morton", _as_corners(morton_box),
-            threads,
+            as_threads(threads),
         )  # fmt: skip
         if how.morton_box is not None and not how.morton:
             raise ValueError("morton_box needs order='morton'")

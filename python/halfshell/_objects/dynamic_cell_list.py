@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from halfshell import _core, _show
 from halfshell._convert.arrays import as_array, as_real_array, in_order, of_shape
-from halfshell._convert.foreign import shown
-from halfshell._convert.lengths import as_positive
+from halfshell._convert.foreign import is_a, shown, whole_number
+from halfshell._convert.lengths import as_number, as_positive
 from halfshell._convert.options import as_choice, as_flag, as_whole
 from halfshell._convert.points import MAX_DIM, as_own_box, as_points
 from halfshell._search import search
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from halfshell._convert.types import (
         ArrayLike,
         BoxLike,
-        FloatArray,
         Number,
         PeriodicLike,
         PointArray,
@@ -126,7 +125,7 @@ class DynamicCellList:
             ndim, as_positive(cell_size, "cell_size"), vectors, bits, kind,
             radius, as_flag(inclusive, "inclusive"), as_flag(tagged, "tagged"),
         )  # fmt: skip
-        self._cells = _core.dynamic_new(*self._given, _as_position)
+        self._cells = _core.dynamic_new(*self._given, _converted)
 
     @property
     def dim(self) -> int:
@@ -206,11 +205,11 @@ class DynamicCellList:
         >>> points.cell(7)
         (-21, 9)
         """
-        self._cells.insert(key, position)
+        self._cells.put(key, position, False)
 
     def move(self, key: Key, position: ArrayLike | None) -> None:
         """Move a point; KeyError if the key does not exist. Otherwise as `insert`."""
-        self._cells.move(key, position)
+        self._cells.put(key, position, True)
 
     def remove(self, key: Key) -> bool:
         """Remove a point. Returns whether there was one; TypeError for a key of the wrong kind."""
@@ -258,7 +257,8 @@ class DynamicCellList:
             Each key once, however many of its images are near. No distance is computed.
 
         """
-        return self._cells.near(position, radius)
+        keys: npt.NDArray[np.int64] = self._cells.within(position, radius, None)
+        return keys
 
     def within(self, position: ArrayLike, radius: Number, *, shifts: bool = False) -> Any:
         """Keys of the points within a ball, decided exactly.
@@ -329,12 +329,12 @@ class DynamicCellList:
             If a key is repeated; else as `insert`. The list is then unchanged.
         """
         ids, tags = _as_keys(keys, self.tagged)
-        self._cells.insert_many(ids, tags, _as_positions(positions, self.dim, len(ids)))
+        self._cells.put_many(ids, tags, _as_positions(positions, self.dim, len(ids)), False)
 
     def move_many(self, keys: ArrayLike, positions: PointsLike) -> None:
         """Move many points, all or none. As `insert_many`, but KeyError for an absent key."""
         ids, tags = _as_keys(keys, self.tagged)
-        self._cells.move_many(ids, tags, _as_positions(positions, self.dim, len(ids)))
+        self._cells.put_many(ids, tags, _as_positions(positions, self.dim, len(ids)), True)
 
     def remove_many(self, keys: ArrayLike) -> npt.NDArray[np.bool_]:
         """Remove many points. Returns which of them existed; ValueError if a key is repeated."""
@@ -392,12 +392,12 @@ class DynamicCellList:
 
     def __iter__(self) -> Iterator[Any]:
         """The keys, in no order; RuntimeError if the list changes meanwhile."""
-        return self._walk(self._cells.changes())
+        return self._walk(self._cells.look()["changes"])
 
     def _walk(self, changes: int) -> Iterator[Any]:
         cursor, keys = 0, list[Any]()
         while True:
-            if self._cells.changes() != changes:
+            if self._cells.look()["changes"] != changes:
                 raise RuntimeError("DynamicCellList changed during iteration")
             if not keys:
                 cursor, block = self._cells.keys(cursor, _BLOCK)
@@ -426,7 +426,7 @@ def _unpickled(version: int, given: _Given, keys: Any, positions: Any) -> Dynami
         raise ValueError(f"this DynamicCellList was pickled by another version ({version!r})")
     made = object.__new__(DynamicCellList)
     made._given = given
-    made._cells = _core.dynamic_new(*given, _as_position)
+    made._cells = _core.dynamic_new(*given, _converted)
     placed = ~np.isnan(positions[:, 0])
     made.insert_many(keys[placed], positions[placed])
     for key in keys[~placed].tolist():
@@ -434,10 +434,33 @@ def _unpickled(version: int, given: _Given, keys: Any, positions: Any) -> Dynami
     return made
 
 
-def _as_position(position: Any, dim: int) -> FloatArray:
-    """One position; the core calls this for what is not plain."""
-    check = of_shape(f"position must have shape ({dim},)", (dim,))
-    return in_order(as_real_array(position, "position", check_shape=check), np.float64)
+def _converted(value: Any, name: str, dim: int, tagged: bool) -> Any:
+    """One position, radius or key; the core calls this for what is not plain."""
+    if name == "position":
+        check = of_shape(f"position must have shape ({dim},)", (dim,))
+        return in_order(as_real_array(value, name, check_shape=check), np.float64)
+    if name == "radius" and not is_a(value, (bool, np.bool_)):
+        return as_number(value, name)
+    if name == "radius":
+        raise TypeError(f"radius must be a number, got {shown(value)}")
+    if not tagged:
+        return _as_integer(value, name, f"{name} must be an integer")
+    must = f"{name} must be a tuple (tag, integer) of integers"
+    if not is_a(value, tuple) or len(value) != 2:
+        raise TypeError(f"{must}, got {shown(value)}")
+    tag, number = (_as_integer(part, name, must) for part in value)
+    if not -(2**31) <= tag < 2**31:
+        raise OverflowError(f"the tag of {name} must fit int32, got {shown(value)}")
+    return tag, number
+
+
+def _as_integer(value: Any, name: str, must: str) -> int:
+    number = None if is_a(value, (bool, np.bool_, np.ndarray)) else whole_number(value, name)
+    if number is None:
+        raise TypeError(f"{must}, got {shown(value)}")
+    if not -(2**63) <= number < 2**63:
+        raise OverflowError(f"{name} must fit int64, got {shown(value)}")
+    return number
 
 
 def _as_positions(positions: Any, dim: int, n: int | None = None) -> PointArray:

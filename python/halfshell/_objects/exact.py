@@ -2,9 +2,8 @@
 """What Python decides exactly: rows by distance, in integers; small matrices, in fractions.
 
 A distance is within 1 ulp of the true one. Entries of a row whose distances differ by a few ulps at
-most are a group; in it the squares of the true distances are worked out as whole numbers, for the
-coordinates, box vectors and shifts as they are. Such numbers are columns of int64, one for each of
-their digits, so that NumPy works on all entries of a group, and of many groups, at once.
+most are a group; in it the squares of the true distances are worked out as whole numbers of Python,
+for the coordinates, box vectors and shifts as they are.
 """
 
 from __future__ import annotations
@@ -26,8 +25,7 @@ Floats = npt.NDArray[np.float64]
 FindShifts = Callable[["Origin"], Array]
 
 CLOSE = 4  # ulps: more than two distances lose together
-BITS = 24  # of a digit: sums of the products of two fit int64, for 8 axes and any exponents
-AT_A_TIME = 1 << 21  # int64s, 16 MB: but a group is never cut
+AT_A_TIME = 1 << 24  # bytes, but a group is never cut
 SORTED_AT_A_TIME = 1 << 17  # entries: some milliseconds
 
 
@@ -174,32 +172,72 @@ def settle(
     grouped[:-1] |= close
     places = np.flatnonzero(grouped)
     groups = np.cumsum(begins)[places]
-    for part in _parts(groups, max(1, AT_A_TIME // (8 * points.shape[1]))):
+    for part in _parts(groups, max(1, AT_A_TIME // (64 * points.shape[1]))):
         place, entries = places[part], order[places[part]]
-        p = asking[rows[place]].astype(np.float64)
-        q = points[indices[entries]].astype(np.float64)
+        ends = (asking, rows[place]), (points, indices[entries])
         steps = None if shifts is None else shifts[entries]
         of_each = vectors if vectors.ndim == 2 else vectors[:, rows[place]]
-        order[place] = entries[_exact(groups[part], entries, p, q, steps, of_each)]
+        order[place] = entries[_exact(groups[part], entries, ends, steps, of_each)]
 
 
 def _exact(
-    groups: Integers, entries: Integers, p: Array, q: Array, shifts: Array | None, vectors: Array
-) -> Integers:
-    """What sorts whole groups by |q - p + S @ vectors|, and equal ones by their entries."""
-    scale = _range([p, q] if shifts is None else [p, q, vectors])
-    # Digits of points twice, as they are and shortened, of squares twice, as sums and carried.
-    of_each = scale[1] * (2 * p.shape[1] + 4) + 4 * p.shape[1] + 16
+    groups: Integers, entries: Integers, ends: tuple[tuple[Array, Array], ...],
+    shifts: Array | None, vectors: Array,
+) -> Integers:  # fmt: skip
+    """What sorts whole groups by |q - p + S @ vectors|, and equal ones by their entries.
+
+    ends: points, and which of them are p; points, and which of them are q.
+    """
+    (some_p, own), (some_q, other) = (np.unique(at, return_inverse=True) for _, at in ends)
+    p, q = ends[0][0][some_p].astype(np.float64), ends[1][0][some_q].astype(np.float64)
+    arrays = [p, q] if shifts is None else [p, q, vectors]
+    unit, n_bits = _range(np.concatenate([array[array != 0.0] for array in arrays]))
+    d, most = p.shape[1], 0 if shifts is None else int(np.abs(shifts.astype(np.int64)).max())
+    kind: Any = np.int64 if d * (2 + d * most) ** 2 << 2 * n_bits < 2**63 else object
+    of_each = 5 * d * (44 + n_bits // 7)  # a number of Python, and where
+    whole_p, whole_q = _whole(p, unit, kind), _whole(q, unit, kind)
     order = np.arange(len(groups))
     for part in _parts(groups, max(1, AT_A_TIME // of_each)):
         n = part.stop - part.start
-        what = f"{n} neighbours at the same distance, compared exactly,"
-        refuse_unavailable(8 * of_each * n, what)
-        steps = None if shifts is None else shifts[part]
-        rows = vectors if vectors.ndim == 2 else vectors[:, part]
-        keys = _squares(p[part], q[part], steps, rows, scale)
-        order[part] = order[part][np.lexsort((entries[part], *keys, groups[part]))]
+        refuse_unavailable(of_each * n, f"{n} neighbours at the same distance, compared exactly,")
+        squares = np.zeros(n, kind)
+        for axis in range(d):
+            D = whole_q[other[part], axis] - whole_p[own[part], axis]
+            for k, steps in enumerate(() if shifts is None else shifts[part].T):
+                at = np.flatnonzero(steps)
+                along = vectors[k, axis] if vectors.ndim == 2 else vectors[k, part, axis][at]
+                if len(at) and along.any():
+                    D[at] += steps[at].astype(kind) * _whole(along, unit, kind)
+            squares += D * D
+        keys = squares
+        if kind is object:
+            ranks = {square: rank for rank, square in enumerate(sorted({*squares}))}
+            keys = np.fromiter(map(ranks.__getitem__, squares), np.int64, n)
+        order[part] = order[part][np.lexsort((entries[part], keys, groups[part]))]
     return order
+
+
+def _range(values: Array) -> tuple[int, int]:
+    """The exponent of the lowest bit that these have, and how many bits from there on."""
+    if len(values) == 0:
+        return 0, 0
+    fractions, exponents = np.frexp(values)
+    whole = np.ldexp(fractions, 53).astype(np.int64)
+    trailing = np.frexp((whole & -whole).astype(np.float64))[1] - 1
+    unit = int((exponents - 53 + trailing).min())
+    return unit, int(exponents.max()) - unit
+
+
+def _whole(x: Array, unit: int, kind: Any) -> Array:
+    """x in units of 2**unit, of which all numbers are whole multiples, as int64 or Python's."""
+    if kind is np.int64:
+        small: Array = np.ldexp(x, -unit).astype(np.int64)
+        return small
+    fractions, exponents = np.frexp(x)
+    lowest = min(int(exponents.min(initial=unit + 53)) - 53, unit)
+    whole: Array = np.ldexp(fractions, 53).astype(np.int64).astype(object)
+    whole <<= np.maximum(exponents - 53 - lowest, 0).astype(object)  # 0 for zeros
+    return whole >> (unit - lowest)
 
 
 def _parts(groups: Integers, n: int) -> Iterator[slice]:
@@ -207,81 +245,6 @@ def _parts(groups: Integers, n: int) -> Iterator[slice]:
     offsets = np.concatenate(([0], np.flatnonzero(np.diff(groups)) + 1, [len(groups)]))
     for first, end in whole_rows(offsets, n):
         yield slice(int(offsets[first]), int(offsets[end]))
-
-
-def _squares(
-    p: Array, q: Array, shifts: Array | None, vectors: Array, scale: tuple[int, int]
-) -> list[Integers]:
-    """|q - p + S @ vectors|**2 in some unit, as digits that are not negative, lowest first."""
-    short = _short(_differences(p, q, shifts, vectors, scale))
-    sums: list[Integers] = [np.zeros(len(p), np.int64) for _ in range(2 * len(short) - 1)]
-    for a, one in enumerate(short):
-        sums[2 * a] += (one * one).sum(axis=1)
-        for b in range(a):
-            sums[a + b] += 2 * (one * short[b]).sum(axis=1)
-    return _carried(sums, 0)
-
-
-def _differences(
-    p: Array, q: Array, shifts: Array | None, vectors: Array, scale: tuple[int, int]
-) -> list[Integers]:
-    """q - p + S @ vectors, as digits of any sign, lowest first."""
-    bottom, n_digits = scale
-    digits = _digits(q, bottom, n_digits)
-    digits -= _digits(p, bottom, n_digits)
-    if shifts is not None:
-        for column, vector in zip(shifts.T, vectors, strict=True):
-            if column.any():
-                steps = column.astype(np.int64)[:, None]
-                for digit, of_vector in zip(digits, _digits(vector, bottom, n_digits), strict=True):
-                    digit += steps * of_vector
-    return list(digits)
-
-
-def _range(arrays: list[Array]) -> tuple[int, int]:
-    """Of the bits that these numbers have: the exponent of the lowest, digits from there on."""
-    values = np.concatenate([array[array != 0.0] for array in arrays])
-    if len(values) == 0:
-        return 0, 1
-    fractions, exponents = np.frexp(values)
-    whole = np.ldexp(fractions, 53).astype(np.int64)
-    trailing = np.frexp((whole & -whole).astype(np.float64))[1] - 1
-    bottom = int((exponents - 53 + trailing).min())
-    return bottom, -(-(int(exponents.max()) - bottom) // BITS)
-
-
-def _digits(x: Array, bottom: int, n_digits: int) -> Integers:
-    """x over 2**bottom, digit by digit, lowest first, each with the sign of x."""
-    digits = np.empty((n_digits, *x.shape), np.int64)
-    rest = x.copy()
-    for k in reversed(range(n_digits)):
-        digit = np.trunc(np.ldexp(rest, -(bottom + BITS * k)))
-        rest -= np.ldexp(digit, bottom + BITS * k)
-        digits[k] = digit
-    return digits
-
-
-def _short(digits: list[Integers]) -> list[Integers]:
-    """The same numbers by digits of at most half the base, without those that are zero in all."""
-    carried = _carried(digits, 1 << (BITS - 1))
-    while len(carried) > 1 and not carried[-1].any():
-        carried.pop()
-    while len(carried) > 1 and not carried[0].any():
-        carried.pop(0)
-    return carried
-
-
-def _carried(digits: list[Integers], half: int) -> list[Integers]:
-    """The same numbers by digits from -half to base - half."""
-    result = []
-    carry = np.zeros_like(digits[0])
-    k = 0
-    while k < len(digits) or carry.any():
-        digit = carry + digits[k] if k < len(digits) else carry
-        carry = (digit + half) >> BITS
-        result.append(digit - (carry << BITS))
-        k += 1
-    return result
 
 
 # ---- order of entries, and parts of them ---------------------------------------------------

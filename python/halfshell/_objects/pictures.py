@@ -182,7 +182,7 @@ def draw_cells(cells: Any, ax: Axes | None, unit: str | None) -> Axes:
         x = _core.box_wrap(x, vectors, bits)[0]
     colours = _colours(rows_of(cells.cell_start), cells)
     if ndim < 3:
-        _raster(ax, cells, *_extent(x, vectors, bits))
+        _raster(ax, cells, x, vectors, bits)
     elif len(x):
         starts = cells.cell_start[:-1][np.diff(cells.cell_start) > 0][:MOST_CELLS]
         sorted_points = x[cells.order]
@@ -209,18 +209,14 @@ def _colours(numbers: npt.NDArray[Any], cells: Any) -> npt.NDArray[Any]:
     return found
 
 
-def _extent(x: _Floats, vectors: _Floats | None, bits: int) -> tuple[_Floats, _Floats]:
-    """Lowest and highest coordinates of what is drawn."""
+def _raster(ax: Any, cells: Any, x: _Floats, vectors: _Floats | None, bits: int) -> None:
+    """Cells as areas of pale colours, as `cell_of` finds them, round all that is drawn."""
     every = x if len(x) else np.zeros((1, x.shape[1]))
     if vectors is not None and bits:
         every = np.concatenate((x, *box_lines(vectors)))
     low, high = every.min(axis=0), every.max(axis=0)
     room = np.where(high > low, 0.03 * (high - low), 0.5)
-    return low - room, high + room
-
-
-def _raster(ax: Any, cells: Any, low: _Floats, high: _Floats) -> None:
-    """Cells as areas of pale colours, as `cell_of` finds them."""
+    low, high = low - room, high + room
     sides = [a + (b - a) * (np.arange(RASTER) + 0.5) / RASTER for a, b in zip(low, high)]
     flat = len(sides) == 1
     grid = np.meshgrid(*sides) if not flat else [sides[0][None]]

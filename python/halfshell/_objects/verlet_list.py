@@ -18,7 +18,7 @@ import numpy.typing as npt
 from halfshell import _core, _show
 from halfshell._convert.foreign import attribute, is_a, of_argument, shown
 from halfshell._convert.lengths import as_length, as_number
-from halfshell._convert.options import as_flag, as_index_bytes, check_letters
+from halfshell._convert.options import as_flag, as_index_bytes, as_threads, check_letters
 from halfshell._convert.points import Points, as_box_alone
 from halfshell._convert.types import (
     Arrays,
@@ -115,7 +115,7 @@ class VerletList:
         self._given = box, periodic  # until `update` brings others
         self._inclusive = as_flag(inclusive, "inclusive")
         self._tracks = as_flag(track_changes, "track_changes")
-        self._threads = threads
+        self._threads = as_threads(threads)
         ndim, vectors, bits = as_box_alone(box, periodic)
         with suppress(MemoryError):  # each step says whether it fits
             _core.count_pairs(
@@ -335,6 +335,7 @@ class VerletList:
         >>> i.tolist(), j.tolist(), S.tolist()
         ([0, 0], [1, 2], [[0, 0], [-1, 0]])
         """
+        check_letters(quantities)
         with self._alone():
             return self._find(quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out)
 
@@ -383,12 +384,7 @@ class VerletList:
         >>> [row.tolist() for row in pair_list.neighbors()]
         [[1, 2], [0], [0]]
         """
-        check_letters(quantities)
-        if not set(quantities) <= set("jdDS"):
-            raise ValueError(
-                "quantities must be some of the letters j d D S, each at most once (i is the row "
-                f"itself), got {quantities!r}"
-            )
+        check_letters(quantities, "jdDS")
         index_bytes = as_index_bytes(index_dtype)
         letters = "ij" + quantities.replace("j", "")
         with self._alone():

@@ -15,7 +15,7 @@ linearly dependent. `max_nbins` is accepted and has no effect.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from numbers import Real
 from typing import Any
@@ -41,13 +41,7 @@ __all__ = [
     "primitive_neighbor_list",
 ]
 
-_EMPTY: dict[str, tuple[type, tuple[int, ...]]] = {
-    "i": (int, (0,)),
-    "j": (int, (0,)),
-    "d": (float, (0,)),
-    "D": (float, (0, 3)),
-    "S": (int, (0, 3)),
-}
+_TYPES = {"i": int, "j": int, "d": float, "D": float, "S": int}
 
 
 def neighbor_list(
@@ -104,40 +98,57 @@ def primitive_neighbor_list(
     [[-1, 0, 0], [1, 0, 0]]
     """
     letters = list(quantities)
-    if not _EMPTY.keys() >= set(letters):
+    if not _TYPES.keys() >= set(letters):
         raise ValueError(f"quantities must be of the letters i j d D S, got {quantities!r}")
-    found: dict[str, npt.NDArray[Any]]
-    if len(positions) == 0:
-        found = {one: np.empty(shape, dtype) for one, (dtype, shape) in _EMPTY.items()}
-    else:
-        if use_scaled_positions:
-            positions = np.dot(positions, cell)
-        length, each = reach_of(cutoff, numbers)
-        box: dict[str, Any] = {"box": np.asarray(cell), "periodic": pbc}
-        points = positions
-        if each:
-            points, box = hs.Points(positions, **box, **each), {}
-        wanted = "".join(one for one in dict.fromkeys(letters) if one != "i") or "j"
-        # As a query each point finds itself, if its reach is above zero.
-        try:
-            offsets, *columns = arrays_of_rows(
-                points, length, queries=points if self_interaction else None, inclusive=False,
-                quantities=wanted, **box,
-            )  # fmt: skip
-        except (TypeError, ValueError):
-            hs.Points(points, **box)  # which says by their names what is wrong with these
-            raise
-        found = {  # in ASE's type, and the caller's to write to
-            one: np.array(array, _EMPTY[one][0]) for one, array in zip(wanted, columns, strict=True)
-        }
-        if "i" in letters:
-            found["i"] = np.repeat(np.arange(len(positions)), offsets[1:] - offsets[:-1])
-    arrays = tuple(found[letter] for letter in letters)
+    if use_scaled_positions and len(positions):
+        positions = np.dot(positions, cell)
+    arrays = listed(letters, pbc, cell, positions, cutoff, numbers, self_interaction, _TYPES)
     return arrays[0] if len(arrays) == 1 else arrays
+
+
+def listed(
+    letters: Sequence[str],
+    pbc: Any,
+    cell: Any,
+    positions: Any,
+    cutoff: Any,
+    numbers: Any,
+    self_interaction: bool,
+    types: Mapping[str, type],
+) -> tuple[npt.NDArray[Any], ...]:
+    """The arrays of these letters, in these types, and the caller's to write to."""
+    n = len(positions)
+    if n == 0:
+        return tuple(np.empty((0, 3) if one in "DS" else 0, types[one]) for one in letters)
+    length, each = reach_of(cutoff, numbers)
+    box: dict[str, Any] = {"box": np.asarray(cell), "periodic": pbc}
+    points = positions
+    if each:
+        points, box = hs.Points(positions, **box, **each), {}
+    wanted = [*dict.fromkeys(letters)]
+    if "i" in wanted:
+        wanted.remove("i")
+    # As a query each point finds itself, if its reach is above zero.
+    try:
+        offsets, *columns = arrays_of_rows(
+            points, length, queries=points if self_interaction else None, inclusive=False,
+            quantities="".join(wanted) or "j", **box,
+        )  # fmt: skip
+    except (TypeError, ValueError):
+        hs.Points(points, **box)  # which says by their names what is wrong with these
+        raise
+    found: dict[str, npt.NDArray[Any]] = {
+        one: np.array(array, types[one]) for one, array in zip(wanted, columns)
+    }
+    if "i" in letters:
+        found["i"] = np.arange(n, dtype=types["i"]).repeat(offsets[1:] - offsets[:-1])
+    return tuple([found[letter] for letter in letters])
 
 
 def reach_of(cutoff: Any, numbers: Any) -> tuple[Any, dict[str, Any]]:
     """The cutoff of halfshell, and what `halfshell.Points` are to know of each atom."""
+    if type(cutoff) is float:
+        return _not_negative(cutoff), {}
     if isinstance(cutoff, Mapping):
         if numbers is None:
             raise TypeError("numbers must be given if cutoff is a dict")
@@ -157,7 +168,8 @@ def reach_of(cutoff: Any, numbers: Any) -> tuple[Any, dict[str, Any]]:
 def _not_negative(length: Any) -> Any:
     """0 for what is less, within which there are no pairs; all else is for halfshell to judge."""
     length = length[()] if isinstance(length, np.ndarray) else length
-    return 0.0 if isinstance(length, Real) and float(length) < 0.0 else length
+    is_number = type(length) is float or isinstance(length, Real)
+    return 0.0 if is_number and float(length) < 0.0 else length
 
 
 class NewPrimitiveNeighborList(_owner.NewPrimitiveNeighborList):

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from ase.data import atomic_numbers
 
 import halfshell as hs
-from halfshell.compat.ase import primitive_neighbor_list, reach_of
+from halfshell.compat.ase import listed, reach_of
 
 __all__ = [
     "coordination",
@@ -35,7 +35,7 @@ __all__ = [
     "triplet_list",
 ]
 
-_TYPES = {"i": np.int32, "j": np.int32, "S": np.int32}
+_TYPES = {"i": np.int32, "j": np.int32, "d": float, "D": float, "S": np.int32}
 
 
 def neighbour_list(
@@ -64,15 +64,10 @@ def neighbour_list(
     if not isinstance(quantities, str):
         raise TypeError(f"quantities must be a string, got {type(quantities).__name__}")
     scene, cutoff = _scene(atoms, cutoff, positions, cell, pbc, numbers, cell_origin)
-    if not set(quantities) <= set("ijdDS"):
+    if not _TYPES.keys() >= set(quantities):
         raise ValueError("Unsupported quantity specified.")
-    found = primitive_neighbor_list(quantities, cutoff=cutoff, **scene)
-    arrays = found if isinstance(found, tuple) else (found,)
-    typed = tuple(
-        array.astype(_TYPES.get(letter, array.dtype), copy=False)
-        for letter, array in zip(quantities, arrays, strict=True)
-    )
-    return typed[0] if len(typed) == 1 else typed
+    arrays = listed(quantities, **scene, cutoff=cutoff, self_interaction=False, types=_TYPES)
+    return arrays[0] if len(arrays) == 1 else arrays
 
 
 def _scene(
@@ -84,10 +79,11 @@ def _scene(
         raise ValueError("Please provide a value for the cutoff radius.")
     if atoms is not None:
         parts = {"positions": positions, "cell": cell, "pbc": pbc, "numbers": numbers}
-        for name, value in {**parts, "cell_origin": cell_origin}.items():
+        parts["cell_origin"] = cell_origin
+        for name, value in parts.items():
             if value is not None:
                 raise ValueError(f"You cannot provide an ASE Atoms object and {name} as well.")
-        positions, cell, pbc, numbers = (getattr(atoms, name) for name in parts)
+        positions, cell, pbc, numbers = atoms.positions, atoms.cell, atoms.pbc, atoms.numbers
     if positions is None:
         raise ValueError("Please provide atoms or positions.")
     n = len(positions)
@@ -99,11 +95,14 @@ def _scene(
     numbers = np.ones(n, dtype=int) if numbers is None else np.asarray(numbers)
     if len(numbers) != n:
         raise TypeError(f"There must be a number for each of {n} atoms, got {len(numbers)}.")
-    scene = {"positions": positions if n else np.empty((0, 3)), "cell": cell, "pbc": pbc}
-    return scene | {"numbers": numbers}, _cutoff(cutoff, numbers)
+    positions = positions if n else np.empty((0, 3))
+    scene = {"positions": positions, "cell": cell, "pbc": pbc, "numbers": numbers}
+    return scene, _cutoff(cutoff, numbers)
 
 
 def _cutoff(cutoff: Any, numbers: npt.NDArray[Any]) -> Any:
+    if type(cutoff) is float:
+        return cutoff
     if isinstance(cutoff, defaultdict):
         cutoff = cutoff.default_factory()  # type: ignore[misc]
     if isinstance(cutoff, Mapping):

@@ -26,30 +26,30 @@ _KEPT = {"enforce_copy": False, "reduce_result_if_single": False, "allow_atomgro
 
 
 #: Axes that are not longer are open in MDAnalysis.
-_SHORTEST = np.finfo(np.float32).eps
+_SHORTEST = float(np.finfo(np.float32).eps)
+_OPEN: dict[str, Any] = {"box": None}
 
 
-def _box(box: Any) -> dict[str, Any]:
-    """Box and periodicity; open axes where MDAnalysis has them."""
+def _box(box: Any) -> tuple[dict[str, Any], list[float]]:
+    """Box and periodicity, and along each axis the length of a box with right angles or of a lower
+    triangle; both open where MDAnalysis has it so."""
     if box is None:
-        return {"box": None}
+        return _OPEN, [0.0] * 3
     kind, form = check_box(box)
-    if np.isnan(np.asarray(box, np.float32)).any():
+    given = np.asarray(box, np.float32).reshape(-1)
+    if math.isnan(given.dot(given)):
         raise ValueError(f"box must be lengths and angles, which NaN is not, got {box!r}")
     form = form.astype(np.float64)
-    lengths = form if kind == "ortho" else form.diagonal()  # zeros, if no triclinic box is like it
-    periodic = lengths > _SHORTEST
+    # Zeros, if no triclinic box is like it.
+    lengths: list[float] = (form if kind == "ortho" else form.diagonal()).tolist()
+    if min(lengths) > _SHORTEST:
+        return {"box": form}, lengths
+    periodic = np.array([length > _SHORTEST for length in lengths])
     if not periodic.any():
-        return {"box": None}
+        return _OPEN, [0.0] * 3
     if kind == "ortho":
         form[~periodic] = 0.0
-    return {"box": form, "periodic": periodic}
-
-
-def _lengths(box: dict[str, Any]) -> list[float]:
-    """The lengths of a box with right angles, or along the axes of a lower triangle."""
-    lengths: list[float] = (box["box"] if box["box"].ndim == 1 else box["box"].diagonal()).tolist()
-    return lengths
+    return {"box": form, "periodic": periodic}, np.where(periodic, lengths, 0.0).tolist()
 
 
 def _check(method: str | None, backend: str) -> None:
@@ -59,35 +59,34 @@ def _check(method: str | None, backend: str) -> None:
         raise ValueError(f"backend must be one of {_BACKENDS}, got {backend!r}")
 
 
-def _within(max_cutoff: Any, box: dict[str, Any], *sets: Any) -> Any:
+def _within(max_cutoff: Any, lengths: list[float], *sets: Any) -> Any:
     """The cutoff, or if it is less a length that no nearest image exceeds.
 
     The vectors of the box are rows of a lower triangle, so some image of each point is as near as
     half of the diagonal is long; on open axes points are as far apart as their coordinates.
     """
-    halves = [0.0] * 3 if box["box"] is None else [length / 2.0 for length in _lengths(box)]
-    if math.isfinite(max_cutoff) and (box["box"] is None or max_cutoff <= max(halves)):
+    spans = [length / 2.0 for length in lengths]
+    if math.isfinite(max_cutoff) and (max_cutoff <= max(spans) or not any(spans)):
         return max_cutoff
-    spans = halves
-    if box["box"] is None or not box["periodic"].all():
+    if not all(spans):
         low = np.min([points.min(axis=0) for points in sets], axis=0).astype(np.float64)
         far = np.max([points.max(axis=0) for points in sets], axis=0) - low
-        spans = np.where(box.get("periodic", False), halves, far).tolist()
+        spans = [span or other for span, other in zip(spans, far.tolist())]
     most = math.hypot(*spans) * (1.0 + 1e-9)
     if not math.isfinite(most):
         return 0.0  # enough to find out which of the points is not finite
     return most if max_cutoff > most else max_cutoff
 
 
-def _has_images(box: dict[str, Any], cutoff: float) -> bool:
+def _has_images(box: dict[str, Any], lengths: list[float], cutoff: float) -> bool:
     """Whether pairs may have several images within the cutoff."""
     if box["box"] is None:
         return False
-    heights, periodic = box["box"], box["periodic"]
-    if heights.ndim == 2:
-        whole = np.where(periodic, heights, np.eye(3))
-        heights = hs.Box.from_matrix(whole).perpendicular_heights
-    nearest = min(h for h, repeats in zip(heights.tolist(), periodic.tolist()) if repeats)
+    heights = lengths
+    if box["box"].ndim == 2:
+        whole = np.where(np.array(lengths) > 0.0, box["box"], np.eye(3))
+        heights = hs.Box.from_matrix(whole).perpendicular_heights.tolist()
+    nearest = min(height for height, length in zip(heights, lengths) if length)
     return bool(2.0 * cutoff >= nearest * (1.0 - 1e-9))  # which is rounded
 
 
@@ -99,21 +98,24 @@ def _nearest_images(i: Any, j: Any, d: Any, selves: bool) -> Entries:
     if len(first):
         i, j, d = i[first], j[first], np.minimum.reduceat(d, first)
     if selves:
-        kept = i != j
+        (kept,) = (i != j).nonzero()
         i, j, d = i[kept], j[kept], d[kept]
-    return np.stack((i, j), axis=1), d
+    both = np.empty((len(d), 2), np.intp)
+    both[:, 0], both[:, 1] = i, j
+    return both, d
 
 
 def _answer(
-    search: Any, max_cutoff: Any, min_cutoff: Any, box: dict[str, Any], sets: Any, distances: bool
+    search: Any, max_cutoff: Any, min_cutoff: Any, given: Any, sets: Any, distances: bool
 ) -> Any:
     """Pairs that `search` finds in these sets, in the nearest image, beyond the lesser cutoff."""
+    box, lengths = _box(given)
     if not all(len(points) for points in sets) or max_cutoff < 0.0:
         entries = np.empty((0, 2), np.intp), np.empty(0)
     else:
-        cutoff = _within(max_cutoff, box, *sets)
+        cutoff = _within(max_cutoff, lengths, *sets)
         is_one = len(sets) == 1
-        if _has_images(box, cutoff):
+        if _has_images(box, lengths, cutoff):
             how = {"sort": True} if is_one else {}  # pairs of two sets are
             i, j, d = search(*sets, cutoff, quantities="ijd", **how, **box)
             entries = _nearest_images(i, j, d, is_one)
@@ -162,7 +164,7 @@ def capped_distance(
     """
     _check(method, backend)
     sets = reference, configuration
-    return _answer(hs.pairs_between, max_cutoff, min_cutoff, _box(box), sets, return_distances)
+    return _answer(hs.pairs_between, max_cutoff, min_cutoff, box, sets, return_distances)
 
 
 @check_coords("reference", **_KEPT)
@@ -191,4 +193,4 @@ def self_capped_distance(
     _check(method, backend)
     if len(reference) < 2 and (box is None or np.shape(box) == (6,)):
         box = None  # there is no pair
-    return _answer(hs.pairs, max_cutoff, min_cutoff, _box(box), (reference,), return_distances)
+    return _answer(hs.pairs, max_cutoff, min_cutoff, box, (reference,), return_distances)

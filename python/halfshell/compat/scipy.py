@@ -333,7 +333,7 @@ class _Searches:
             closer = hs.coordination(points, bound, inclusive=False, **scene)
             kept = np.arange(d.shape[1]) < closer[:, None]
             i[ties], d[ties] = np.where(kept, i[ties], -1), np.where(kept, d[ties], np.inf)
-        if within < np.inf and len(i) and i[:, -1].min() < 0:
+        if within < np.inf and not math.isfinite(np.vdot(d, d)):  # some are missing, or far away
             rest = np.flatnonzero(i[:, -1] < 0) if within < bound else ()
             i[i < 0] = self.n
             if len(rest):  # images half a period away, or more

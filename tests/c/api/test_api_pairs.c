@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_api_pairs.c: pairs, rows, clusters and plans are those of the brute force. */
-#include "../../../csrc/core/collect/components.h"
 #include "../../../csrc/core/levels/levels.h"
 #include "../support/among.h"
 #include "../support/block_checks.h"

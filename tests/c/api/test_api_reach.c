@@ -1,13 +1,10 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_api_reach.c: pairs by reach: radii, types and supports, in every call that takes them. */
-#include "../../../csrc/core/levels/levels.h"
 #include "../support/block_checks.h"
 #include "../support/calls.h"
 #include "../support/pair_checks.h"
 #include "../support/poll_checks.h"
 #include "../support/random_scenes.h"
-
-#include <limits.h>
 
 void test_api_reach(void);
 

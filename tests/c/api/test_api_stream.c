@@ -6,8 +6,6 @@
 #include "../support/poll_checks.h"
 #include "../support/random_scenes.h"
 
-#include <fenv.h>
-
 void test_api_stream(void);
 
 /* ---- blocks are the pairs of one search, cut up, whoever looks for them ---- */

@@ -11,6 +11,7 @@
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
 
+#include <fenv.h>
 #include <float.h>
 #include <math.h>
 
@@ -758,6 +759,62 @@ places_need_a_largest_coordinate(void)
     CHECK(axes.reach[0] >= 0.0 && axes.reach[0] < 1e-10);
 }
 
+#ifdef FE_UPWARD
+static bool
+rounds_up(void)
+{
+    volatile double one = 1.0, little = 0x1p-80;
+    return one + little > 1.0;
+}
+#endif
+
+/* Whatever the caller rounds to, numbers are those of rounding to nearest, and the caller's mode
+ * comes back: from calls that do their work, that end early, and that fail in the middle. */
+static void
+calls_round_to_nearest_and_give_the_mode_back(void)
+{
+#ifdef FE_UPWARD
+    const double    x[2] = {3.1, -5.3}, bad[2] = {0.0, NAN};
+    const hs_box    box = {.ndim = 1, .periodic = {true}, .rows = {{0.7}}};
+    const hs_points points = {x, 2, 1, HS_FLOAT64, 8, 8}, none = {bad, 2, 1, HS_FLOAT64, 8, 8};
+    hs_options      options = hs_options_default();
+    hs_verlet      *list = hs_verlet_new();
+    double          places[2][2], wrapped[2][2], volume[2];
+    for (int up = 0; up < 2; up++) {
+        const hs_status ok = HS_OK, no = HS_ERR_NOT_FINITE;
+        hs_box_axes     axes;
+        hs_pairs       *found = NULL;
+        bool            rebuilt;
+        const int64_t   i = 0, j = 1;
+        hs_pair_numbers pairs = {.n = 1, .i = &i, .j = &j};
+        CHECK(fesetround(up ? FE_UPWARD : FE_TONEAREST) == 0);
+        const hs_status statuses[][2] = {
+            {hs_box_places(&box, &points, 0.3, 6.0, places[up], 2, &axes, NULL), ok},
+            {hs_box_places(&box, &points, 0.3, 4.0, places[up], 2, &axes, NULL), HS_ERR_ARGUMENT},
+            {hs_box_places(&box, &none, 0.3, 6.0, NULL, 2, &axes, NULL), no},
+            {hs_box_places(&box, &points, -1.0, 6.0, NULL, 2, &axes, NULL), HS_ERR_CUTOFF},
+            {hs_box_measure(&box, NULL, &volume[up], NULL), ok},
+            {hs_box_measure(NULL, NULL, NULL, NULL), HS_ERR_ARGUMENT},
+            {hs_box_wrap(&box, &points, wrapped[up], NULL, NULL), ok},
+            {hs_box_wrap(&box, &none, NULL, NULL, NULL), no},
+            {hs_verlet_update(list, &points, &box, &options, 0.1, true, &rebuilt, NULL), ok},
+            {hs_verlet_update(list, &none, &box, &options, 0.1, true, &rebuilt, NULL), no},
+            {hs_verlet_update(list, &points, &box, &options, -0.1, true, &rebuilt, NULL),
+             HS_ERR_CUTOFF},
+            {hs_measure(&points, &box, &pairs, &options, &found, NULL), ok},
+        };
+        CHECK(rounds_up() == (up == 1));
+        CHECK(fesetround(FE_TONEAREST) == 0);
+        for (size_t s = 0; s < sizeof statuses / sizeof statuses[0]; s++)
+            CHECK(statuses[s][0] == statuses[s][1]);
+        hs_pairs_free(found);
+    }
+    CHECK(memcmp(places[0], places[1], sizeof places[0]) == 0);
+    CHECK(memcmp(wrapped[0], wrapped[1], sizeof wrapped[0]) == 0 && volume[0] == volume[1]);
+    hs_verlet_free(list);
+#endif
+}
+
 void
 test_api_verlet(void)
 {
@@ -778,4 +835,5 @@ test_api_verlet(void)
     RUN(it_can_be_stopped);
     RUN(places_of_pairs_are_within_reach);
     RUN(places_need_a_largest_coordinate);
+    RUN(calls_round_to_nearest_and_give_the_mode_back);
 }

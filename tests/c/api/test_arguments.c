@@ -2,7 +2,7 @@
 /* test_arguments.c: arguments that are wrong are refused, in every call of the table, and nothing
  * is changed. */
 #include "../../../csrc/core/base/status.h"
-#include "../../../csrc/core/search/search.h"
+#include "../../../csrc/core/threads/call.h"
 #include "../support/among.h"
 #include "../support/call_table.h"
 #include "../support/harness.h"

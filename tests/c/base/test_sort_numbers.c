@@ -57,7 +57,8 @@ keys_ascend_and_equal_ones_keep_their_order(void)
     }
 }
 
-/* ---- few and many numbers, spread evenly, crowded or equal, are put in order ---- */
+/* ---- few and many numbers, spread evenly, crowded or equal, are put in order; those that agree
+ * in the bits that count keep theirs ---- */
 
 static int
 compare(const void *a, const void *b)
@@ -88,11 +89,16 @@ numbers_are_put_in_order(void)
     harness_random  random = {2718};
     for (int trial = 0; trial < 600; trial++) {
         const int64_t n = trial < 300 ? trial / 6 : (int64_t)(random_bits(&random) % MOST);
-        for (int64_t e = 0; e < n; e++)
-            numbers[e] = number(&random, trial % 6);
-        memcpy(sorted, numbers, sizeof numbers);
+        const int     from = trial / 6 % 2 == 0 ? 0 : 32; /* then what is below goes down */
+        for (int64_t e = 0; e < n; e++) {
+            const uint64_t key = number(&random, trial % 6) << from;
+            numbers[e] = from > 0 ? key | (uint64_t)(n - e) : key;
+            sorted[e] = from > 0 ? key | (uint64_t)e : key;
+        }
         qsort(sorted, (size_t)n, sizeof *sorted, compare);
-        hs_sort_numbers(numbers, n, spare);
+        for (int64_t e = 0; e < n && from > 0; e++)
+            sorted[e] = sorted[e] >> 32 << 32 | (uint64_t)(n - (int64_t)(sorted[e] & UINT32_MAX));
+        hs_sort_numbers(numbers, n, from, spare);
         CHECK(memcmp(numbers, sorted, (size_t)n * sizeof *sorted) == 0);
     }
 }

@@ -45,7 +45,7 @@ quantities_have_the_widths_of_their_arrays(void)
                 CHECK(hs_want_bytes(want, ndim, bytes) == (int64_t)sum);
             }
             for (int k = 0; k < HS_QUANTITIES; k++)
-                CHECK(hs_want_width(1u << k, ndim, bytes) == widths[k]);
+                CHECK(hs_want_bytes(1u << k, ndim, bytes) == (int64_t)widths[k]);
         }
     }
 }

@@ -5,7 +5,6 @@
 #include "../support/harness.h"
 #include "../support/random_scenes.h"
 
-#include <float.h>
 #include <math.h>
 
 void test_wrap(void);
@@ -33,25 +32,6 @@ what_does_not_settle_is_as_many_rows_away(void)
         lattice.period[0] = 1.0;
         CHECK(hs_wrap_point(&lattice, &r, &inside, &turns, &magnitude));
         CHECK(inside == r - (double)turns && fabs(inside) <= 0.5);
-    }
-}
-
-/* Of parts that are joined in any order, the lowest point that failed. */
-static void
-the_lowest_failure_is_told(void)
-{
-    const int64_t failed[4] = {-1, 0, 3, 5};
-    for (int a = 0; a < 4; a++) {
-        for (int b = 0; b < 4; b++) {
-            hs_wrap_range       joined = hs_wrap_range_none();
-            const hs_wrap_range none = hs_wrap_range_none();
-            hs_wrap_range       parts[2] = {none, none};
-            parts[0].failed = failed[a];
-            parts[1].failed = failed[b];
-            hs_wrap_range_join(&joined, &parts[0]);
-            hs_wrap_range_join(&joined, &parts[1]);
-            CHECK(joined.failed == (a == 0 || b == 0 ? failed[a + b] : failed[a < b ? a : b]));
-        }
     }
 }
 
@@ -132,7 +112,6 @@ rows_may_be_long_along_any_axis(void)
 void
 test_wrap(void)
 {
-    RUN(the_lowest_failure_is_told);
     RUN(what_does_not_settle_is_as_many_rows_away);
     RUN(coordinates_are_summed_in_one_order);
     RUN(points_that_stay_have_a_magnitude);

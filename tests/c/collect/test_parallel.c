@@ -182,10 +182,10 @@ a_failing_allocation_ends_all_threads(void)
             options.threads = 3;
             options.out = NULL;
             hs_pairs *expected = find(&options);
-            CHECK(fail_each(&options, expected, 1 + variant % 3) > 20);
+            CHECK(fail_each(&options, expected, 1 + variant % 3) > 15);
             make_arrays(options.want, 3, 8, hs_pairs_length(expected), &c);
             options.out = &c.arrays;
-            CHECK(fail_each(&options, expected, 1 + (variant + 1) % 3) > 20);
+            CHECK(fail_each(&options, expected, 1 + (variant + 1) % 3) > 15);
             free_arrays(&c);
             hs_pairs_free(expected);
         }

@@ -28,12 +28,12 @@ record_all(search_unit *unit, unsigned columns, int index_bytes, int32_t *failed
     hs_account *account = &unit->call.account;
     hs_walker   walker;
     hs_output_init(account, unit->points.ndim, columns, index_bytes, &recorded->output);
-    hs_status status = hs_walker_init(search, hs_record_use(columns), hs_record_hits,
+    hs_status status = hs_walker_init(search, hs_record_use(columns), NULL, hs_record_hits,
                                       &recorded->recorder, &walker);
     CHECK(status == HS_OK);
     CHECK(hs_recorder_init(account, &recorded->output, walker.scanner.block.most_hits,
                            &recorded->recorder) == HS_OK);
-    status = hs_walk(&walker, 0, (int32_t)search->bins.n);
+    status = hs_walk(&walker, 0, (int32_t)search->bins.n, &(hs_failure){.row = -1});
     *failed_point = status == HS_ERR_SHIFT_RANGE ? (int32_t)walker.scanner.failed_point : -1;
     hs_walker_close(search, &walker);
     return status;
@@ -160,17 +160,18 @@ large_blocks_can_be_stopped(void)
     n_visits = 0;
     search_unit_points(41, N_WRITE, 2, 1.0, &unit_record);
     search_unit_open(&box, 22.0, true, HS_WANT_DISTANCE, &unit_record);
-    CHECK(hs_walker_init(&unit_record.search, HS_BLOCK_SIZES, NULL, NULL, &walker) == HS_OK);
-    CHECK(hs_walk(&walker, 0, N_WRITE) == HS_OK);
+    CHECK(hs_walker_init(&unit_record.search, HS_BLOCK_SIZES, NULL, NULL, NULL, &walker) == HS_OK);
+    CHECK(hs_walk(&walker, 0, N_WRITE, &(hs_failure){.row = -1}) == HS_OK);
     most = walker.scanner.most;
     hs_walker_close(&unit_record.search, &walker);
     CHECK(most.candidates > HS_POLL_CANDIDATES);
     hs_output_init(&unit_record.call.account, 2, HS_WANT_DISTANCE, 8, &at_once.output);
-    CHECK(hs_walker_init_ordered(&unit_record.search, HS_BLOCK_LISTS_PLACES, &most, record_unwanted,
-                                 &at_once.recorder, &walker) == HS_OK);
+    CHECK(hs_walker_init(&unit_record.search, HS_BLOCK_LISTS_PLACES, &most, record_unwanted,
+                         &at_once.recorder, &walker) == HS_OK);
     CHECK(hs_recorder_init(&unit_record.call.account, &at_once.output,
                            walker.scanner.block.most_hits, &at_once.recorder) == HS_OK);
-    CHECK(hs_walk(&walker, 0, N_WRITE) == HS_ERR_INTERRUPTED && n_visits == 1);
+    CHECK(hs_walk(&walker, 0, N_WRITE, &(hs_failure){.row = -1}) == HS_ERR_INTERRUPTED &&
+          n_visits == 1);
     hs_walker_close(&unit_record.search, &walker);
     record_unit_free(&unit_record, &at_once);
     search_unit_close(&unit_record);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_overlap.c: overlaps and intersections of neighbourhoods. */
-#include "../../../csrc/core/connectivity/overlap.h"
+#include "../../../csrc/core/connectivity/connectivity.h"
 #include "../support/harness.h"
 #include "../support/node_scenes.h"
 #include "../support/poll_checks.h"

@@ -11,6 +11,98 @@
 void test_ball(void);
 
 /*
+ * ---- cell axes ----
+ *
+ * The cells of a ball hold every coordinate within it, and gaps are no larger than distances, at
+ * any width, radius and distance from the origin.
+ */
+
+static hs_axes
+axes_of(double length, double cell_size, double radius)
+{
+    hs_box     box = {.ndim = 1, .periodic = {length > 0.0}, .rows = {{length}}};
+    hs_lattice lattice;
+    hs_axes    axes;
+    hs_lattice_init(length > 0.0 ? &box : NULL, 1, hs_scale_of(0), &lattice);
+    hs_axes_init(&axes, &lattice, cell_size, false, radius);
+    return axes;
+}
+
+/* A number of ordinary size, often with few digits. */
+static double
+some_number(harness_random *random)
+{
+    const double x = ldexp(random_unit(random) - 0.5, (int)(random_bits(random) % 40) - 10);
+    return random_bits(random) % 2 == 0 ? x : rint(x * 8.0) / 8.0;
+}
+
+static void
+open_balls_hold_what_is_within(void)
+{
+    harness_random random = {7};
+    for (int trial = 0; trial < TRIALS(200000); trial++) {
+        const double   width = fabs(some_number(&random)) + 0x1p-20;
+        const int      times = (int)(random_bits(&random) % 5);
+        const double   radius = trial % 2 == 0 ? width * times : width * 5.0 * random_unit(&random);
+        const hs_axes  axes = axes_of(0.0, width, radius);
+        const hs_axis *axis = &axes.axis[0];
+        const double   t = some_number(&random);
+        hs_span_of_cells span;
+        hs_axis_span(axis, t, hs_axis_cell(axis, t), radius, 0.0, &span);
+        for (int side = -1; side <= 1; side += 2) {
+            double y = t + side * radius;
+            while (fabs(y - t) > radius) /* not beyond, for the numbers as rounded */
+                y = nextafter(y, t);
+            const int64_t cell = hs_axis_cell(axis, y);
+            CHECK(cell >= span.first && cell <= span.last);
+            CHECK(sqrt(hs_axis_gap(axis, t, cell, span.centre)) <= fabs(y - t) * (1.0 + 0x1p-50));
+        }
+        CHECK(span.first <= span.centre && span.centre <= span.last);
+    }
+}
+
+/* x + image * length, rounded up or down, by exact sums of what is rounded. */
+static double
+image_of(double x, double image, double length, double towards)
+{
+    const double shift = image * length, rest = fma(image, length, -shift);
+    const double sum = shift + x, back = sum - shift;
+    const double error = (shift - (sum - back)) + (x - back) + rest;
+    const bool   is_passed = towards > 0.0 ? error > 0.0 : error < 0.0;
+    return is_passed ? nextafter(sum, towards) : sum;
+}
+
+/* Periods whose multiples are rounded: the end of a ball that is the image of a number next to an
+ * edge of its cell still has this cell, on either side. */
+static void
+ends_in_far_images_are_held(void)
+{
+    harness_random random = {9};
+    for (int trial = 0; trial < TRIALS(20000); trial++) {
+        const double     length = 0.5 + 8.0 * random_unit(&random);
+        const int        n = 2 + (int)(random_bits(&random) % 9);
+        const hs_axes    axes = axes_of(length, length / (n + 0.25), 1.0);
+        const hs_axis   *axis = &axes.axis[0];
+        const int64_t    cell = 1 + (int64_t)(random_bits(&random) % (uint64_t)(n - 1));
+        const int64_t    image = (trial % 2 ? 1 : -1) * (2 + trial / 2 % 300);
+        const double     step = ldexp(1.0, ilogb(length) - 53); /* no coordinate has finer ones */
+        double           x = (double)cell * axis->width - axis->half;
+        hs_span_of_cells span;
+        for (int n_steps = 0; n_steps < 1000 && hs_axis_cell(axis, x) >= cell; n_steps++)
+            x -= step;
+        for (int n_steps = 0; n_steps < 1000 && hs_axis_cell(axis, x + step) < cell; n_steps++)
+            x += step;
+        const double low = image_of(x, (double)image, length, -HUGE_VAL);
+        hs_axis_images(axis, low, low + length, 0.0, &span);
+        CHECK(axis->n == n && span.first <= hs_axis_cell(axis, x) + image * n);
+        x += step;
+        const double high = image_of(x, (double)image, length, HUGE_VAL);
+        hs_axis_images(axis, high - length, high, 0.0, &span);
+        CHECK(span.last >= hs_axis_cell(axis, x) + image * n);
+    }
+}
+
+/*
  * ---- ball ----
  *
  * What the thresholds call sure is what the exact metric says of the positions as given, for points
@@ -36,7 +128,7 @@ nothing_is_surely_within_less_than_the_error(void)
         options.cell_size = units[u];
         options.max_radius = 2.0 * units[u];
         hs_dynamic *list = NULL;
-        CHECK(hs_list_new(&options, &list, &failure) == HS_OK);
+        CHECK(hs_dynamic_new(&options, &list, &failure) == HS_OK);
         if (u == 0) {
             CHECK(hs_ball_init(&ball, list, centre, 1e-17, &failure) == HS_OK);
             CHECK(ball.home.in == -1.0 && ball.home.out > 0.0 && ball.home.out < 1e-20);
@@ -44,7 +136,7 @@ nothing_is_surely_within_less_than_the_error(void)
             CHECK(hs_ball_init(&ball, list, centre, 0x1p300, &failure) == HS_OK);
             CHECK(ball.home.in == -1.0 && ball.home.out == INFINITY);
         }
-        hs_list_free(list);
+        hs_dynamic_free(list);
     }
 }
 
@@ -63,7 +155,7 @@ balls_reach_as_far_as_errors_may(void)
     options.box = &box;
     options.max_radius = 9.0;
     options.cell_size = 2.0;
-    CHECK(hs_list_new(&options, &list, &failure) == HS_OK);
+    CHECK(hs_dynamic_new(&options, &list, &failure) == HS_OK);
     for (int trial = 0; trial < 400; trial++) {
         const hs_axis *axis = &list->axes.axis[trial % 2];
         double         centre[2];
@@ -87,7 +179,7 @@ balls_reach_as_far_as_errors_may(void)
         n_tried++;
     }
     CHECK(n_tried > 100);
-    hs_list_free(list);
+    hs_dynamic_free(list);
 }
 
 /* A far point hardly matters to others; a list that was emptied is as exact as a new one. */
@@ -99,20 +191,18 @@ emptied_lists_are_as_exact_as_new_ones(void)
     hs_dynamic_options options = hs_dynamic_options_default();
     hs_dynamic        *list = NULL;
     hs_failure         failure;
-    hs_placed          placed;
     hs_ball            at_first, with_far, emptied;
     options.ndim = 2;
     options.box = &box;
-    CHECK(hs_list_new(&options, &list, &failure) == HS_OK);
+    CHECK(hs_dynamic_new(&options, &list, &failure) == HS_OK);
     CHECK(hs_ball_init(&at_first, list, centre, 1.0, &failure) == HS_OK);
-    CHECK(hs_dynamic_place(list, far, &placed, &failure) == HS_OK);
-    CHECK(hs_update_insert(list, (hs_key){0, 0}, &placed, &failure) == HS_OK);
+    CHECK(hs_dynamic_insert(list, (hs_key){0, 0}, far, &failure) == HS_OK);
     CHECK(hs_ball_init(&with_far, list, centre, 1.0, &failure) == HS_OK);
     CHECK(with_far.error < 1.5 * at_first.error && list->magnitude > 0.0);
-    hs_list_clear(list);
+    hs_dynamic_clear(list);
     CHECK(hs_ball_init(&emptied, list, centre, 1.0, &failure) == HS_OK);
     CHECK(emptied.error == at_first.error && list->magnitude == 0.0);
-    hs_list_free(list);
+    hs_dynamic_free(list);
 }
 
 /* ---- a list does only what its scene needs, as its counters show ---- */
@@ -265,6 +355,8 @@ void
 test_ball(void)
 {
     const hs_fpenv env = hs_fpenv_enter();
+    RUN(open_balls_hold_what_is_within);
+    RUN(ends_in_far_images_are_held);
     RUN(nothing_is_surely_within_less_than_the_error);
     RUN(balls_reach_as_far_as_errors_may);
     RUN(emptied_lists_are_as_exact_as_new_ones);

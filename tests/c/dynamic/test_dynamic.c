@@ -35,7 +35,7 @@ crowded(void)
 static uint32_t
 place_of(const hs_dynamic *list, int64_t id)
 {
-    return hs_key_map_find(&list->map, &list->entries, (hs_key){id, 3});
+    return hs_stored_find(list, (hs_key){id, 3});
 }
 
 static void
@@ -51,19 +51,23 @@ check_points(const hs_dynamic *list, uint32_t number)
     }
 }
 
+/* No block is so large, or there are no numbers for more entries. */
 static void
 refused_room_changes_nothing(void)
 {
     hs_dynamic    *list = crowded();
     const uint32_t number = hs_entry_tail_at(&list->entries, place_of(list, 0))->cell;
-    CHECK(!hs_cell_reserve(list, number, INT64_C(1) << 33)); /* no block is so large */
-    for (int nth = 1; nth <= 2; nth++) {
-        hs_test_fail_allocation(nth);
-        CHECK(!hs_cell_reserve(list, number, 1000));
-        hs_test_fail_allocation(0);
-        CHECK(list->cells.size[number] == 3);
-        check_points(list, number);
-    }
+    const double   x = 8.2;
+    const uint32_t n_used = list->entries.n_used;
+    list->cells.cell[number].count = UINT32_MAX;
+    CHECK(hs_dynamic_insert(list, (hs_key){9, 3}, &x, NULL) == HS_ERR_MEMORY);
+    list->cells.cell[number].count = 8;
+    list->entries.n_used = list->entries.capacity = UINT32_C(0xFFFFFFF0);
+    CHECK(hs_dynamic_insert(list, (hs_key){9, 3}, &x, NULL) == HS_ERR_MEMORY);
+    list->cells.cell[number].count = 5;
+    list->entries.n_used = list->entries.capacity = n_used;
+    CHECK(hs_dynamic_length(list) == 5 && list->cells.size[number] == 3);
+    check_points(list, number);
     hs_dynamic_free(list);
 }
 
@@ -77,7 +81,7 @@ list_of(const hs_box *box)
     hs_failure         failure;
     options.ndim = 2;
     options.box = box;
-    CHECK(hs_list_new(&options, &list, &failure) == HS_OK);
+    CHECK(hs_dynamic_new(&options, &list, &failure) == HS_OK);
     return list;
 }
 
@@ -93,8 +97,8 @@ what_cannot_be_wrapped_is_refused(void)
     CHECK(hs_dynamic_place(open, far, &placed, &failure) == HS_OK);
     CHECK(hs_dynamic_place(open, bad, &placed, &failure) == HS_ERR_NOT_FINITE);
     CHECK(failure.column == 1 && failure.value == -INFINITY);
-    hs_list_free(list);
-    hs_list_free(open);
+    hs_dynamic_free(list);
+    hs_dynamic_free(open);
 }
 
 /* Along two axes: the first of them is not forgotten when the second one is wrapped. */
@@ -108,7 +112,7 @@ both_axes_may_be_too_far(void)
     hs_failure   failure;
     for (int f = 0; f < 3; f++)
         CHECK(hs_dynamic_place(list, far[f], &placed, &failure) == HS_ERR_SHIFT_RANGE);
-    hs_list_free(list);
+    hs_dynamic_free(list);
 }
 
 /* ---- copies are lists of their own ---- */
@@ -156,7 +160,6 @@ typedef struct rows_fill {
     int64_t ids[N];
     int32_t tags[N];
     double  columns[HS_MAX_DIM][N];
-    double *x[HS_MAX_DIM];
 } rows_fill;
 
 /* Crowded and lone ones, in no order; twice the same id with another tag. */
@@ -169,11 +172,22 @@ make_rows(rows_fill *of)
         of->tags[i] = (i * 77) % N % 2;
     }
     for (int k = 0; k < HS_MAX_DIM; k++) {
-        of->x[k] = of->columns[k];
         for (int i = 0; i < N; i++)
             of->columns[k][i] = i < N / 3 ? 0.25 * random_unit(&random)
                                           : 9.0 * random_unit(&random) - 4.5;
     }
+}
+
+static hs_status
+put_fill(hs_dynamic *list, const rows_fill *of, hs_failure *failure)
+{
+    const hs_points points = {.data = of->columns,
+                              .n = N,
+                              .ndim = list->lattice.ndim,
+                              .real = HS_FLOAT64,
+                              .row_stride = sizeof(double),
+                              .column_stride = sizeof of->columns[0]};
+    return hs_dynamic_insert_many(list, of->ids, of->tags, &points, failure);
 }
 
 static hs_dynamic *
@@ -193,15 +207,15 @@ list_of_fill(box_kind kind, int ndim, hs_storage storage)
     options.box = kind == OPEN ? NULL : &box;
     options.storage = storage;
     options.cell_size = ndim > 4 ? 3.0 : 1.0;
-    CHECK(hs_list_new(&options, &list, &failure) == HS_OK);
+    CHECK(hs_dynamic_new(&options, &list, &failure) == HS_OK);
     return list;
 }
 
 static void
 check_point(const hs_dynamic *list, const hs_dynamic *other, hs_key key)
 {
-    const uint32_t place = hs_key_map_find(&list->map, &list->entries, key);
-    const uint32_t like = hs_key_map_find(&other->map, &other->entries, key);
+    const uint32_t place = hs_stored_find(list, key);
+    const uint32_t like = hs_stored_find(other, key);
     const size_t   width = (size_t)list->lattice.ndim * sizeof(double);
     CHECK(place != HS_NO_PLACE && like != HS_NO_PLACE);
     CHECK(memcmp(hs_entry_at(&list->entries, place), hs_entry_at(&other->entries, like), width) ==
@@ -227,15 +241,13 @@ filled_lists_are_those_of_single_points(void)
                 hs_dynamic *list = list_of_fill((box_kind)kind, ndim, (hs_storage)storage);
                 hs_dynamic *single = list_of_fill((box_kind)kind, ndim, (hs_storage)storage);
                 hs_failure  failure = HS_NO_FAILURE;
-                CHECK(hs_update_insert_many(list, of.ids, of.tags, N, of.x, &failure) == HS_OK);
+                CHECK(put_fill(list, &of, &failure) == HS_OK);
                 for (int64_t i = 0; i < N; i++) {
-                    double    given[HS_MAX_DIM];
-                    hs_placed placed;
+                    double given[HS_MAX_DIM];
                     for (int k = 0; k < ndim; k++)
-                        given[k] = of.x[k][i];
-                    CHECK(hs_dynamic_place(single, given, &placed, &failure) == HS_OK);
-                    CHECK(hs_update_insert(single, (hs_key){of.ids[i], of.tags[i]}, &placed,
-                                           &failure) == HS_OK);
+                        given[k] = of.columns[k][i];
+                    CHECK(hs_dynamic_insert(single, (hs_key){of.ids[i], of.tags[i]}, given,
+                                            &failure) == HS_OK);
                 }
                 CHECK(list->map.n == N && list->n_without == 0);
                 CHECK(list->cells.dense || list->cells.n_empty == 0);
@@ -243,10 +255,10 @@ filled_lists_are_those_of_single_points(void)
                 for (int64_t i = 0; i < N; i++)
                     check_point(list, single, (hs_key){of.ids[i], of.tags[i]});
                 for (int64_t i = 0; i < N; i++)
-                    CHECK(hs_update_remove(list, (hs_key){of.ids[i], of.tags[i]}));
+                    CHECK(hs_dynamic_remove(list, (hs_key){of.ids[i], of.tags[i]}));
                 CHECK(list->map.n == 0);
-                hs_list_free(single);
-                hs_list_free(list);
+                hs_dynamic_free(single);
+                hs_dynamic_free(list);
             }
         }
     }
@@ -262,12 +274,11 @@ what_cannot_be_had_leaves_an_empty_list(void)
             hs_dynamic *list = list_of_fill((box_kind)kind, 2, (hs_storage)storage);
             hs_failure  failure = HS_NO_FAILURE;
             make_rows(&of);
-            CHECK(hs_update_insert_many(list, of.ids, of.tags, N, of.x, &failure) == HS_OK);
+            CHECK(put_fill(list, &of, &failure) == HS_OK);
             for (int64_t i = 0; i < N; i++)
-                CHECK(hs_update_remove(list, (hs_key){of.ids[i], of.tags[i]}));
+                CHECK(hs_dynamic_remove(list, (hs_key){of.ids[i], of.tags[i]}));
             of.columns[1][7] = 1e200;
-            const hs_status status =
-                hs_update_insert_many(list, of.ids, of.tags, N, of.x, &failure);
+            const hs_status status = put_fill(list, &of, &failure);
             if (kind == OPEN) {
                 CHECK(status == (storage == HS_STORE_DENSE ? HS_ERR_CAPACITY : HS_OK));
                 CHECK(status == HS_OK || failure.expected_bytes > failure.limit_bytes);
@@ -275,11 +286,10 @@ what_cannot_be_had_leaves_an_empty_list(void)
                 CHECK(status == HS_ERR_SHIFT_RANGE && failure.row == 7);
             }
             CHECK(status == HS_OK || (list->map.n == 0 && list->entries.n_used == 0));
-            hs_list_clear(list);
+            hs_dynamic_clear(list);
             make_rows(&of);
-            CHECK(hs_update_insert_many(list, of.ids, of.tags, N, of.x, &failure) == HS_OK &&
-                  list->map.n == N);
-            hs_list_free(list);
+            CHECK(put_fill(list, &of, &failure) == HS_OK && list->map.n == N);
+            hs_dynamic_free(list);
         }
     }
 }
@@ -291,9 +301,9 @@ fill_once(void *context)
     static rows_fill of;
     hs_failure       failure;
     make_rows(&of);
-    const hs_status status = hs_update_insert_many(list, of.ids, of.tags, N, of.x, &failure);
+    const hs_status status = put_fill(list, &of, &failure);
     CHECK(list->map.n == (status == HS_OK ? N : 0));
-    hs_list_clear(list);
+    hs_dynamic_clear(list);
     return status;
 }
 
@@ -303,11 +313,11 @@ refused_memory_leaves_an_empty_list(void)
     for (int storage = 0; storage < 3; storage++) {
         hs_dynamic *list = list_of_fill(SKEWED, 3, (hs_storage)storage);
         CHECK(fail_each_allocation(fill_once, list, 100) > 4);
-        hs_list_free(list);
+        hs_dynamic_free(list);
     }
     hs_dynamic *wide = list_of_fill(OPEN, 2, HS_STORE_HASH); /* whose table grows meanwhile */
     CHECK(fail_each_allocation(fill_once, wide, 100) > 8);
-    hs_list_free(wide);
+    hs_dynamic_free(wide);
 }
 
 /* ---- whatever memory is refused, a call does all or nothing, one point or many ---- */
@@ -627,10 +637,10 @@ skewed_positions_are_those_of_wrap_point(void)
         CHECK(hs_dynamic_place(list, given, &placed, &failure) == HS_OK);
         CHECK(memcmp(placed.x, inside, sizeof inside) == 0);
         CHECK(memcmp(placed.turns, turns, sizeof turns) == 0);
-        CHECK(hs_update_insert(list, (hs_key){0, 0}, &placed, &failure) == HS_OK);
+        CHECK(hs_dynamic_insert(list, (hs_key){0, 0}, given, &failure) == HS_OK);
         CHECK(list->magnitude >= magnitude);
     }
-    hs_list_free(list);
+    hs_dynamic_free(list);
 }
 
 void

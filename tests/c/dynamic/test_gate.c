@@ -32,18 +32,18 @@ read_and_write(void *context)
     shared *of = context;
     for (int round = 0; round < ROUNDS; round++) {
         if (round % 4 == 0) {
-            hs_gate_write(&of->gate);
+            hs_gate_enter(&of->gate, true);
             of->one++;
             of->other++;
-            hs_gate_write_end(&of->gate);
+            hs_gate_leave(&of->gate, true);
         } else {
-            hs_gate_read(&of->gate);
+            hs_gate_enter(&of->gate, false);
             const bool same = of->one == of->other;
-            hs_gate_read_end(&of->gate);
+            hs_gate_leave(&of->gate, false);
             if (!same) {
-                hs_gate_write(&of->gate);
+                hs_gate_enter(&of->gate, true);
                 of->differed = true;
-                hs_gate_write_end(&of->gate);
+                hs_gate_leave(&of->gate, true);
             }
         }
     }
@@ -68,9 +68,9 @@ static hs_thread_result HS_THREAD_CALL
 read_one(void *context)
 {
     shared *of = context;
-    hs_gate_read(&of->gate);
+    hs_gate_enter(&of->gate, false);
     of->differed = of->one != of->other;
-    hs_gate_read_end(&of->gate);
+    hs_gate_leave(&of->gate, false);
     return (hs_thread_result)0;
 }
 
@@ -81,14 +81,14 @@ a_reader_waits_for_a_writer(void)
     shared    of = {.differed = true};
     hs_thread reader;
     hs_gate_init(&of.gate);
-    hs_gate_write(&of.gate);
+    hs_gate_enter(&of.gate, true);
     of.one = 1;
     CHECK(hs_thread_start(&reader, read_one, &of));
     while (hs_atomic_load(&hs_n_waiting) == 0)
         hs_nap();
     CHECK(hs_atomic_load(&of.gate.state) == WRITER && of.differed);
     of.other = 1;
-    hs_gate_write_end(&of.gate);
+    hs_gate_leave(&of.gate, true);
     hs_thread_join(reader);
     CHECK(!of.differed && of.gate.state == EMPTY && hs_n_waiting == 0);
 }
@@ -98,14 +98,14 @@ readers_are_many(void)
 {
     hs_gate gate;
     hs_gate_init(&gate);
-    hs_gate_read(&gate);
-    hs_gate_read(&gate);
+    hs_gate_enter(&gate, false);
+    hs_gate_enter(&gate, false);
     CHECK(gate.state == EMPTY + 2);
-    hs_gate_read_end(&gate);
-    hs_gate_read_end(&gate);
-    hs_gate_write(&gate);
+    hs_gate_leave(&gate, false);
+    hs_gate_leave(&gate, false);
+    hs_gate_enter(&gate, true);
     CHECK(gate.state == WRITER);
-    hs_gate_write_end(&gate);
+    hs_gate_leave(&gate, true);
 }
 
 #if !defined(_WIN32) && !defined(HS_COVERAGE) && !defined(__SANITIZE_THREAD__) && \
@@ -117,8 +117,8 @@ enter_in_child(hs_gate *gate)
 {
     shared    of = {.gate = *gate};
     hs_thread threads[2];
-    hs_gate_write(gate);
-    hs_gate_write_end(gate);
+    hs_gate_enter(gate, true);
+    hs_gate_leave(gate, true);
     for (int t = 0; t < 2; t++)
         if (!hs_thread_start(&threads[t], read_and_write, &of))
             return 1;
@@ -130,8 +130,8 @@ enter_in_child(hs_gate *gate)
 static hs_thread_result HS_THREAD_CALL
 write_nothing(void *context)
 {
-    hs_gate_write(context);
-    hs_gate_write_end(context);
+    hs_gate_enter(context, true);
+    hs_gate_leave(context, true);
     return (hs_thread_result)0;
 }
 
@@ -142,7 +142,7 @@ children_do_not_wait_for_the_parent(void)
     hs_thread writer;
     int       status = 1;
     hs_gate_init(&gate);
-    hs_gate_read(&gate);
+    hs_gate_enter(&gate, false);
     CHECK(hs_thread_start(&writer, write_nothing, &gate));
     while (hs_atomic_load(&hs_n_waiting) == 0)
         hs_nap();
@@ -152,7 +152,7 @@ children_do_not_wait_for_the_parent(void)
             _exit(enter_in_child(&gate));
         CHECK(waitpid(child, &status, 0) == child && status == 0);
     }
-    hs_gate_read_end(&gate);
+    hs_gate_leave(&gate, false);
     hs_thread_join(writer);
     CHECK(gate.state == EMPTY && hs_n_waiting == 0);
 }
@@ -166,16 +166,16 @@ those_inside_another_process_are_forgotten(void)
 {
     hs_gate gate;
     hs_gate_init(&gate);
-    hs_gate_read(&gate);
+    hs_gate_enter(&gate, false);
     hs_test_fork();
-    hs_gate_read(&gate);
+    hs_gate_enter(&gate, false);
     CHECK(gate.state == EMPTY + 1);
-    hs_gate_read_end(&gate);
-    hs_gate_write(&gate);
+    hs_gate_leave(&gate, false);
+    hs_gate_enter(&gate, true);
     hs_test_fork();
-    hs_gate_write(&gate);
+    hs_gate_enter(&gate, true);
     CHECK(gate.state == WRITER);
-    hs_gate_write_end(&gate);
+    hs_gate_leave(&gate, true);
     CHECK(gate.state == EMPTY);
 }
 
@@ -184,9 +184,9 @@ static hs_thread_result HS_THREAD_CALL
 write_one(void *context)
 {
     shared *of = context;
-    CHECK(!hs_gate_is_mine(&of->gate) && hs_gate_write(&of->gate));
+    CHECK(!hs_gate_is_mine(&of->gate) && hs_gate_enter(&of->gate, true));
     of->one = of->other;
-    hs_gate_write_end(&of->gate);
+    hs_gate_leave(&of->gate, true);
     return (hs_thread_result)0;
 }
 
@@ -197,7 +197,8 @@ who_holds_the_gate_is_inside_and_others_wait(void)
     hs_thread reader, writer;
     hs_gate_init(&of.gate);
     CHECK(!hs_gate_is_mine(&of.gate) && hs_gate_hold(&of.gate) && hs_gate_is_mine(&of.gate));
-    CHECK(!hs_gate_hold(&of.gate) && !hs_gate_read(&of.gate) && !hs_gate_write(&of.gate));
+    CHECK(!hs_gate_hold(&of.gate) && !hs_gate_enter(&of.gate, false) &&
+          !hs_gate_enter(&of.gate, true));
     CHECK(hs_thread_start(&writer, write_one, &of));
     CHECK(hs_thread_start(&reader, read_one, &of));
     while (hs_atomic_load(&hs_n_waiting) < 2)
@@ -217,7 +218,7 @@ static int              token;
 static void *
 count_pause(void)
 {
-    (void)hs_fetch_increment(&n_pauses);
+    (void)hs_atomic_add(&n_pauses, 1);
     return &token;
 }
 
@@ -225,7 +226,7 @@ static void
 count_resume(void *paused)
 {
     CHECK(paused == &token);
-    (void)hs_fetch_increment(&n_resumes);
+    (void)hs_atomic_add(&n_resumes, 1);
 }
 
 /* Around each wait, and not when it goes in. */
@@ -237,22 +238,22 @@ writers_that_wait_pause(void)
     hs_gate_init(&of.gate);
     of.gate.pause = count_pause;
     of.gate.resume = count_resume;
-    hs_gate_write(&of.gate);
-    hs_gate_write_end(&of.gate);
+    hs_gate_enter(&of.gate, true);
+    hs_gate_leave(&of.gate, true);
     CHECK(hs_atomic_load(&n_pauses) == 0);
-    hs_gate_read(&of.gate);
+    hs_gate_enter(&of.gate, false);
     CHECK(hs_thread_start(&thread, write_one, &of));
     while (hs_atomic_load(&n_pauses) == 0)
         hs_nap();
-    hs_gate_read_end(&of.gate);
+    hs_gate_leave(&of.gate, false);
     hs_thread_join(thread);
     CHECK(hs_atomic_load(&n_pauses) == hs_atomic_load(&n_resumes));
-    hs_gate_write(&of.gate);
+    hs_gate_enter(&of.gate, true);
     const int64_t before = hs_atomic_load(&n_pauses);
     CHECK(hs_thread_start(&thread, read_one, &of)); /* readers do not */
     while (hs_atomic_load(&hs_n_waiting) == 0)
         hs_nap();
-    hs_gate_write_end(&of.gate);
+    hs_gate_leave(&of.gate, true);
     hs_thread_join(thread);
     CHECK(hs_atomic_load(&n_pauses) == before);
 }

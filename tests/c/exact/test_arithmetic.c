@@ -65,11 +65,10 @@ transformations_lose_nothing(void)
     for (int trial = 0; trial < 20000; trial++) {
         const double a = random_double_word(&random, 200).hi;
         const double b = random_double_word(&random, 200).hi;
-        const hs_dw  sum = hs_two_sum(a, b), difference = hs_two_difference(a, b);
+        const hs_dw  sum = hs_two_sum(a, b);
         const hs_dw  product = hs_two_product(a, b), square = hs_two_square(a);
         const big    big_a = big_from_double(a), big_b = big_from_double(b);
         CHECK(relative_error(sum, big_sum(big_a, big_b), 1) == 0.0);
-        CHECK(relative_error(difference, big_difference(big_a, big_b), 1) == 0.0);
         CHECK(relative_error(product, big_product(big_a, big_b), 2) == 0.0);
         CHECK(relative_error(square, big_product(big_a, big_a), 2) == 0.0);
         CHECK(is_double_word(sum) && is_double_word(product) && is_double_word(square));

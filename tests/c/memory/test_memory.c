@@ -111,9 +111,9 @@ arenas_are_not_waited_for(void)
     hs_pool_clear();
     if (hs_pool_give(arena)) {
         hs_test_pool_hold(true);
-        CHECK(hs_pool_take_arena() == NULL);
+        CHECK(hs_pool_take(HS_POOL_SCRATCH, true) == NULL);
         hs_test_pool_hold(false);
-        CHECK(hs_pool_take_arena() == arena);
+        CHECK(hs_pool_take(HS_POOL_SCRATCH, true) == arena);
     }
     hs_chunk_free(arena);
 }

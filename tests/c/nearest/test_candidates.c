@@ -86,14 +86,14 @@ layers_are_upright(void)
     lattice->aligned = false;
     memcpy(lattice->normal[0], normals[0], sizeof normals[0]);
     memcpy(lattice->normal[1], normals[1], sizeof normals[1]);
-    hs_nearest_measure_layer(&unit.near);
+    hs_nearest_measure(&unit.near);
     CHECK(unit.near.has_layer);
     CHECK(unit.near.layer_lower[1] == -1.0 && unit.near.layer_upper[1] == 2.0);
     lattice->normal[1][0] = 0x1p-39;
-    hs_nearest_measure_layer(&unit.near);
+    hs_nearest_measure(&unit.near);
     CHECK(!unit.near.has_layer);
     lattice->normal[1][0] = 0x1p-41;
-    hs_nearest_measure_layer(&unit.near);
+    hs_nearest_measure(&unit.near);
     CHECK(unit.near.has_layer);
     nearest_unit_close(&unit);
 }
@@ -136,53 +136,64 @@ group_from(int32_t first, int32_t n, double radius)
     return group;
 }
 
-/* The radius up to which leaves that are found for two groups serve. */
+/* The radius up to which leaves serve that are found for points around a group. */
 static double
-shared_radius(const hs_nearest_group *groups)
+served(const hs_nearest_group *group)
 {
-    CHECK(hs_nearest_leaves_find(&unit.near, groups, 2, INFINITY, &leaves) == HS_OK);
+    CHECK(hs_nearest_leaves_find(&unit.near, group, INFINITY, &leaves) == HS_OK);
     return leaves.radius;
 }
 
-/* Groups that are far apart, or far wider than their radius, too many leaves, points or images. */
+/* Groups that are far wider than their radius, too many leaves, points or images. */
 static void
 where_nothing_is_saved_there_is_no_list(void)
 {
-    const hs_box     box = {.ndim = 2, .periodic = {true, true}, .rows = {{4.0}, {0.0, 4.0}}};
-    hs_nearest_group groups[2];
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{4.0}, {0.0, 4.0}}};
     open_points(100, 2, 4.0, NULL, 4);
-    groups[0] = group_from(0, GROUP, 1.0);
-    groups[1] = group_from(GROUP, GROUP, 1.0);
-    CHECK(shared_radius(groups) == 1.0 && leaves.are_shared);
-    CHECK(hs_nearest_leaves_find(&unit.near, groups, 0, 99.0, &leaves) == HS_OK);
-    CHECK(leaves.radius == 0.0);
-    CHECK(hs_nearest_leaves_find(&unit.near, groups, 1, 99.0, &leaves) == HS_OK);
-    CHECK(leaves.radius == 1.0 && !leaves.are_shared);
+    hs_nearest_group group = group_from(0, 2 * GROUP, 1.0);
+    CHECK(served(&group) == 1.0 && !hs_nearest_is_scattered(&unit.near, &group));
     const int64_t n_points = leaves.n_points;
-    CHECK(hs_nearest_leaves_find(&unit.near, groups, 1, n_points - 9.0, &leaves) == HS_OK);
+    CHECK(hs_nearest_leaves_find(&unit.near, &group, n_points - 9.0, &leaves) == HS_OK);
     CHECK(leaves.radius == 0.0);
-    groups[0].radius = groups[1].radius = 1.0;
-    groups[1].upper[0] = groups[0].lower[0] + 127.0;
-    CHECK(shared_radius(groups) == 1.0);
-    groups[1].upper[0] = groups[0].lower[0] + 128.01;
-    CHECK(shared_radius(groups) == 0.0);
+    group.upper[0] = group.lower[0] + 127.0;
+    CHECK(served(&group) == 1.0 && hs_nearest_is_scattered(&unit.near, &group));
+    group.upper[0] = group.lower[0] + 128.01;
+    CHECK(served(&group) == 0.0);
     close_points();
     open_points(8, 2, 4.0, NULL, 4); /* all in one leaf */
-    groups[0] = group_from(0, 4, 1.0);
-    groups[1] = group_from(4, 4, 1.0);
-    CHECK(shared_radius(groups) == 1.0 && !leaves.are_shared && leaves.n == 1);
+    group = group_from(0, 8, 1.0);
+    CHECK(served(&group) == 1.0 && leaves.n == 1);
     close_points();
     open_points(MOST * 3 / 2, 2, 4.0, NULL, 4);
-    groups[0] = group_from(0, GROUP, 8.0);
-    groups[1] = group_from(GROUP, GROUP, 8.0);
-    CHECK(shared_radius(groups) == 0.0);
+    group = group_from(0, GROUP, 8.0);
+    CHECK(served(&group) == 0.0);
     close_points();
     open_points(10, 2, 4.0, &box, 4);
-    groups[0] = group_from(0, 1, 48.0);
-    groups[1] = group_from(1, 1, 48.0);
-    CHECK(shared_radius(groups) == 0.0);
-    groups[0].radius = groups[1].radius = 6.0;
-    CHECK(shared_radius(groups) == 6.0);
+    group = group_from(0, 2, 48.0);
+    CHECK(served(&group) == 0.0);
+    group.radius = 6.0;
+    CHECK(served(&group) == 6.0);
+    close_points();
+}
+
+/* The guess is scaled, and ends where all points are within the radius. */
+static void
+guesses_follow_the_density(void)
+{
+    open_points(10000, 2, 100.0, NULL, 4); /* one in a square of 1 */
+    hs_nearest_group group = group_from(5000, GROUP, 0.0);
+    hs_nearest_guess(&unit.near, 1.0, &group);
+    const double radius = group.radius;
+    CHECK(radius > 1.5 && radius < 3.0 && !group.is_complete);
+    hs_nearest_guess(&unit.near, 2.0, &group);
+    CHECK(group.radius == 2.0 * radius && !group.is_complete);
+    hs_nearest_guess(&unit.near, 1000.0, &group);
+    CHECK(group.radius < 210.0 && group.is_complete);
+    close_points();
+    open_points(5, 2, 4.0, NULL, 4); /* all of them are wanted */
+    group = group_from(0, 5, 0.0);
+    hs_nearest_guess(&unit.near, 0x1p-10, &group);
+    CHECK(group.radius > 4.0 && group.is_complete);
     close_points();
 }
 
@@ -304,25 +315,24 @@ leaves_that_are_shared_hold_all_that_is_near(void)
     harness_random random = {577};
     int64_t        n_near = 0, n_shared = 0, n_candidates = 0;
     for (int trial = 0; trial < 24; trial++) {
-        const int        d = 1 + trial % 3;
-        hs_nearest_group groups[3];
-        hs_box           box = {.ndim = d};
+        const int d = 1 + trial % 3;
+        hs_box    box = {.ndim = d};
         for (int l = 0; l < d; l++) {
             box.periodic[l] = trial % 4 == 0 || l == trial % d;
             for (int k = 0; k < d; k++)
                 box.rows[l][k] = k == l ? 4.0 : trial % 2 ? random_unit(&random) - 0.5 : 0.0;
         }
         open_scene(&random, d, trial % 5 ? &box : NULL);
-        const int32_t first = (int32_t)(random_unit(&random) * (N - 3 * GROUP_BLOCK));
-        const double  radius = d == 1 ? 0.05 : d == 2 ? 0.3 : 0.8;
-        for (int g = 0; g < 3; g++)
-            groups[g] = group_from_block(first + g * GROUP_BLOCK, radius * (1.0 + 0.6 * g));
-        for (int g = 0; g < 6; g++) { /* of three groups, and of one */
-            const hs_nearest_group *group = &groups[g / 2];
-            CHECK(hs_nearest_leaves_find(&unit.near, g % 2 ? group : groups, g % 2 ? 1 : 3, 1e9,
-                                         &leaves) == HS_OK);
-            CHECK(g % 2 ? leaves.radius == group->radius
-                        : leaves.radius == 0.0 || leaves.radius == groups[1].radius);
+        const int32_t    first = (int32_t)(random_unit(&random) * (N - 3 * GROUP_BLOCK));
+        const double     radius = d == 1 ? 0.05 : d == 2 ? 0.3 : 0.8;
+        hs_nearest_group all;
+        hs_nearest_group_set(&unit.near, first, first + 3 * GROUP_BLOCK, &all);
+        all.radius = 1.6 * radius;
+        for (int g = 0; g < 6; g++) { /* leaves of all, and of one of the groups */
+            const hs_nearest_group of_block =
+                group_from_block(first + g / 2 * GROUP_BLOCK, radius * (1.0 + 0.6 * (g / 2)));
+            const hs_nearest_group *group = &of_block;
+            CHECK(served(g % 2 ? group : &all) == (g % 2 ? group->radius : all.radius));
             if (group->radius > leaves.radius) {
                 CHECK(fill(group, 1e9) == HS_TRY_OTHER);
                 continue;
@@ -347,19 +357,18 @@ uncertain_leaves_are_not_taken(void)
 {
     harness_random random = {31};
     open_scene(&random, 2, NULL);
-    const hs_nearest_group groups[2] = {group_from_block(0, 0.5),
-                                        group_from_block(GROUP_BLOCK, 0.5)};
-    CHECK(shared_radius(groups) == 0.5 && leaves.n > 0);
-    CHECK(fill(&groups[0], 1e9) == HS_OK && block.n >= GROUP_BLOCK);
-    check_block(&groups[0]);
+    const hs_nearest_group group = group_from_block(0, 0.5);
+    CHECK(served(&group) == 0.5 && leaves.n > 0);
+    CHECK(fill(&group, 1e9) == HS_OK && block.n >= GROUP_BLOCK);
+    check_block(&group);
     leaves.error = 0.5 / 1024.0;
-    CHECK(fill(&groups[0], 1e9) == HS_OK);
+    CHECK(fill(&group, 1e9) == HS_OK);
     leaves.error = nextafter(0.5 / 1024.0, 1.0);
-    CHECK(fill(&groups[0], 1e9) == HS_TRY_OTHER);
+    CHECK(fill(&group, 1e9) == HS_TRY_OTHER);
     unit.search.scene.x_error = 0x1p-20; /* 2^-19 of a difference, 2^-18 in units of 1/2 */
-    CHECK(shared_radius(groups) == 0.5 && leaves.error == 0x1p-19);
+    CHECK(served(&group) == 0.5 && leaves.error == 0x1p-19);
     unit.search.scene.x_error = 0x1.001p-20;
-    CHECK(shared_radius(groups) == 0.0);
+    CHECK(served(&group) == 0.0);
     close_scene();
 }
 
@@ -370,6 +379,7 @@ test_candidates(void)
     RUN(more_images_than_can_be_counted_are_refused);
     RUN(layers_are_upright);
     RUN(where_nothing_is_saved_there_is_no_list);
+    RUN(guesses_follow_the_density);
     RUN(leaves_that_are_shared_hold_all_that_is_near);
     RUN(uncertain_leaves_are_not_taken);
 }

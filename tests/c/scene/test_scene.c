@@ -96,6 +96,8 @@ errors_are_bounded_and_small(void)
     for (int k = 0; k < 2; k++) {
         CHECK(one_scene.t_error[k] >= 4.0 * 0x1p-53 * 1.7 && one_scene.t_error[k] < 0x1p-48);
         CHECK(one_scene.x_error >= 2.0 * 0x1p-53 * 1.7 && one_scene.x_error < 0x1p-48);
+        CHECK(one_scene.upper[k] == 0.5 * one_scene.lattice.period[k]);
+        CHECK(one_scene.lower[k] == -one_scene.upper[k]);
     }
     finish();
 }
@@ -218,58 +220,37 @@ what_is_refused_is_named(void)
     hs_scene_free(&account, &kept);
 }
 
-/* Two points on the ends of a range along each axis. */
-static void
-put_range(double low, double high, hs_scene *scene)
-{
-    memset(scene, 0, sizeof *scene);
-    scene->ndim = scene->cloud.ndim = 2;
-    scene->n = scene->cloud.n = 2;
-    for (int k = 0; k < 2; k++) {
-        scene->cloud.lower[k] = scene->lower[k] = low - k;
-        scene->cloud.upper[k] = scene->upper[k] = high + k;
-        scene->x_largest[k] = fmax(-low, high) + k;
-    }
-    scene->cloud.largest = fmax(-low, high) + 1.0;
-}
-
 /* What is larger, or what scaling would round, is not taken; for cells alone it is. */
 static void
 queries_that_fit_are_taken(void)
 {
-    double   x[2] = {0x1p-1000, 2.0};
-    hs_scene scene;
-    hs_cloud cloud = {.ndim = 1, .n = 2, .x = {x}, .largest = 2.0, .lower = {0.0}, .upper = {2.0}};
-    put_range(-1.0, 1.0, &scene); /* the largest is 2 */
-    scene.scale = hs_scale_of(0);
-    CHECK(hs_scene_takes(&scene, &cloud));
-    cloud.largest = nextafter(2.0, 3.0);
-    CHECK(!hs_scene_takes(&scene, &cloud));
-    cloud.largest = 2.0;
-    scene.scale = hs_scale_of(22); /* smallest normal number */
-    CHECK(hs_scene_takes(&scene, &cloud));
-    scene.scale = hs_scale_of(23);
-    CHECK(!hs_scene_takes(&scene, &cloud));
-    scene.is_untested = true;
-    CHECK(hs_scene_takes(&scene, &cloud));
-    scene.is_untested = false;
-    cloud.largest = x[1] = cloud.upper[0] = 0.0;
-    x[0] = 0.0;
-    CHECK(hs_scene_takes(&scene, &cloud)); /* nothing to lose */
-    scene.scale = hs_scale_of(0);
-    scene.is_untested = scene.lattice.aligned = true;
-    cloud.largest = 0x1p900;
-    CHECK(hs_scene_takes(&scene, &cloud));
-    cloud.largest = 0x1.1p900;
-    CHECK(!hs_scene_takes(&scene, &cloud));
-    scene.lattice.aligned = false;
-    cloud.largest = 3.0;
-    CHECK(!hs_scene_takes(&scene, &cloud));
-    scene.n = 0;
-    CHECK(hs_scene_takes(&scene, &cloud));
-    scene.scale = hs_scale_of(-2000);
-    cloud.largest = 0x1p1000;
-    CHECK(!hs_scene_takes(&scene, &cloud));
+    const hs_box aligned = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
+    const hs_box skewed = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0, 0.0}, {0.25, 1.0}}};
+    const struct {
+        int    exponent; /* of the scale */
+        bool   is_untested, is_skewed, is_empty, taken;
+        double small, large; /* coordinates of the query */
+    } cases[] = {{0, false, false, false, true, 0x1p-1000, 1024.0},
+                 {0, false, false, false, false, 0x1p-1000, 0x1.0000000000001p10},
+                 {22, false, false, false, true, 0x1p-1000, 2.0}, /* the least normal number */
+                 {23, false, false, false, false, 0x1p-1000, 2.0},
+                 {23, false, false, false, true, 0.0, 0.0}, /* nothing to lose */
+                 {23, true, false, false, true, 0x1p-1000, 2.0},
+                 {0, true, false, false, true, 0.0, 0x1p900},
+                 {0, true, false, false, false, 0.0, 0x1.1p900},
+                 {0, true, true, false, false, 0.0, 2048.0},
+                 {0, false, true, true, true, 0.0, 2048.0},
+                 {-2000, false, true, true, false, 0.0, 0x1p1000}};
+    const double x[4] = {0.25, 0.5, 0.25, 0.5};
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        const double q[2] = {cases[c].small, cases[c].large};
+        hs_failure   failure;
+        keep(x, cases[c].is_empty ? 0 : 2, cases[c].is_skewed ? &skewed : &aligned);
+        kept.scale = hs_scale_of(cases[c].exponent);
+        kept.is_untested = cases[c].is_untested;
+        CHECK(ask(q, 1, HS_WANT_J, &failure) == (cases[c].taken ? HS_OK : HS_REBUILD));
+        hs_scene_free(&account, &kept);
+    }
 }
 
 /*
@@ -314,32 +295,6 @@ put_scene(hs_scene *scene)
     scene->ndim = 2;
     scene->scale = scene->unscale = hs_scale_of(0);
     hs_lattice_init(&box, 2, hs_scale_of(0), &scene->lattice);
-}
-
-/* The grid covers the whole period. What rounding left outside is put on the face. */
-static void
-ranges_become_periods(void)
-{
-    hs_scene scene;
-    put_scene(&scene);
-    scene.lower[0] = -1.0;
-    scene.upper[0] = 2.0 + 0x1p-50;
-    scene.lower[1] = -7.0;
-    scene.upper[1] = 9.0;
-    scene.t_error[0] = 0x1p-52;
-    scene.t_error[1] = 0x1p-51;
-    hs_scene_scale_ranges(&scene);
-    CHECK(scene.lower[0] == -2.0 && scene.upper[0] == 2.0);
-    CHECK(scene.lower[1] == -7.0 && scene.upper[1] == 9.0);
-    CHECK(scene.t_error[0] == 0x1p-52 + 0x1p-50 && scene.t_error[1] == 0x1p-51);
-    scene.lower[0] = -2.0 - 0x1p-49;
-    scene.upper[0] = 2.0 + 0x1p-50;
-    scene.t_error[0] = 0.0;
-    hs_scene_scale_ranges(&scene);
-    CHECK(scene.t_error[0] == 0x1p-49 && scene.lower[0] == -2.0);
-    scene.t_error[0] = 0.0;
-    hs_scene_scale_ranges(&scene);
-    CHECK(scene.t_error[0] == 0.0);
 }
 
 static double widths[2], asked_enough;
@@ -393,75 +348,87 @@ scenes_are_narrowed_by_what_is_sure(void)
 /*
  * ---- scene wrap ----
  *
- * Points are wrapped axis by axis where that will do, their turns counted, and those that are too
- * far away wrapped before they are scaled.
+ * Points too far away for their turns to be counted, or to be scaled, are wrapped first where S is
+ * not wanted, if it is known what their coordinates repeat after; S they cannot have.
  */
 
-/* Numbers that overflow when they are scaled, on columns of which the lattice knows the period
- * though rows have several entries there; and on one that nothing repeats. */
 static void
-columns_are_wrapped_where_their_period_is_known(void)
+far_points_are_wrapped_where_their_period_is_known(void)
 {
-    enum { N = 3 };
-    double   x[3][N] = {{0x1p1000, 0.25, -0x1p1000}, {0x1p1000, 2.5, 0.5}, {0x1p1000, 0.5, 0.0}};
-    hs_scene scene;
-    memset(&scene, 0, sizeof scene);
-    scene.ndim = scene.cloud.ndim = scene.lattice.ndim = 3;
-    scene.n = scene.cloud.n = N;
-    scene.pending = scene.scale = hs_scale_of(-100);
-    scene.unscale = hs_scale_of(100);
-    scene.lattice.n_periodic = 2;
-    scene.lattice.aligned = true;
-    scene.lattice.given[0][0] = 1.0; /* the second column has two entries */
-    scene.lattice.given[1][0] = scene.lattice.given[1][1] = 1.0;
-    for (int k = 0; k < 3; k++) {
-        scene.cloud.x[k] = x[k];
-        scene.cloud.lower[k] = k == 0 ? -0x1p1000 : 0.0;
-        scene.cloud.upper[k] = 0x1p1000;
-        scene.lattice.row_of_axis[k] = k < 2 ? k : -1;
-        scene.lattice.period[k] = k < 2 ? 0x1p100 : 0.0;
+    const struct {
+        hs_box    box;
+        double    x, y, cutoff; /* of the first point; the second one is at 0.5, 0.25 cutoffs */
+        hs_status status;
+    } cases[] = {
+        /* Three columns, of which one is by itself: its turns pass 2^51. */
+        {{3, {true, true, true}, {{1.0, 0.0, 0.0}, {0.25, 1.0, 0.0}, {0.0, 0.0, 1.0}}},
+         0x1p52 + 0.0,
+         0.25,
+         0.5,
+         HS_OK},
+        {{3, {true, true, true}, {{1.0, 0.0, 0.0}, {0.25, 1.0, 0.0}, {0.0, 0.0, 1.0}}},
+         -0x1p70,
+         0.25,
+         0.5,
+         HS_OK},
+        /* Sheared by whole widths: the short basis is aligned, and tells the period. */
+        {{3, {true, true, true}, {{0.0, 0.0, 0x1p-200}, {0.0, 0x1p-200, 0x1p-200}, {0x1p-200}}},
+         0x1p1000,
+         0x1p-202,
+         0x1p-201,
+         HS_OK},
+        /* A column that two box vectors move, and no period that is known. */
+        {{3, {true, true, true}, {{1.0, 0.0, 0.25}, {0.25, 1.0, 0.0}, {0.0, 0.0, 1.0}}},
+         0x1p70,
+         0.25,
+         0.5,
+         HS_ERR_SHIFT_RANGE},
+    };
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        const double    near = cases[c].y;
+        const double    x[6] = {0.0, near, cases[c].x, 0.0, near, 0.0};
+        const hs_points points = {x, 2, 3, HS_FLOAT64, 24, 8};
+        hs_options      options = options_for(cases[c].cutoff, HS_WANT_J, HS_EXACT);
+        int64_t         n = -1, folded = -2;
+        hs_pairs       *pairs = NULL;
+        hs_failure      failure = HS_NO_FAILURE;
+        CHECK(hs_pairs_count(AMONG(&points, &cases[c].box), &options, &n, &failure) ==
+              cases[c].status);
+        if (cases[c].status == HS_OK) { /* a whole number of periods away */
+            const double    same[6] = {0.0, near, 0.0, 0.0, near, 0.0};
+            const hs_points at_home = {same, 2, 3, HS_FLOAT64, 24, 8};
+            CHECK(hs_pairs_count(AMONG(&at_home, &cases[c].box), &options, &folded, NULL) == HS_OK);
+            CHECK(n == folded && n > 0);
+        }
+        options.want |= HS_WANT_SHIFT;
+        CHECK(hs_pairs_find(AMONG(&points, &cases[c].box), &options, &pairs, &failure) ==
+              HS_ERR_SHIFT_RANGE);
+        CHECK(failure.row == 0);
     }
-    hs_scene_fold_far(&scene);
-    for (int k = 0; k < 2; k++) {
-        CHECK(scene.cloud.lower[k] == -0.5 && scene.cloud.upper[k] == 0.5);
-        CHECK(x[k][0] == 0.0 && x[k][1] == (k == 0 ? 0.25 : 0.5));
-        CHECK(x[k][2] == (k == 0 ? 0.0 : 0.5));
-    }
-    CHECK(x[2][0] == 0x1p1000 && scene.cloud.upper[2] == 0x1p1000);
-    /* Where scaling loses digits only what is given counts: nothing tells. */
-    x[0][0] = scene.cloud.upper[0] = 0x1p1000;
-    scene.extreme = true;
-    hs_scene_fold_far(&scene);
-    CHECK(x[0][0] == 0x1p1000 && scene.cloud.upper[0] == 0x1p1000);
 }
 
-/* Originals are wrapped from where their turns cannot be counted, and no sooner. */
+/* Points are wrapped slab by slab: of those that cannot be the first is named. */
 static void
-originals_too_far_to_count_are_wrapped(void)
+the_first_that_cannot_be_wrapped_is_named(void)
 {
-    double   x[1] = {0x1p50 + 0.25};
-    hs_scene scene;
-    memset(&scene, 0, sizeof scene);
-    scene.ndim = scene.cloud.ndim = scene.lattice.ndim = scene.lattice.n_periodic = 1;
-    scene.n = scene.cloud.n = 1;
-    scene.pending = scene.scale = scene.unscale = hs_scale_of(0);
-    scene.lattice.given[0][0] = scene.lattice.period[0] = 1.0;
-    scene.cloud.x[0] = x;
-    scene.cloud.lower[0] = scene.cloud.upper[0] = x[0];
-    scene.keeps_originals = true;
-    hs_scene_fold_far(&scene);
-    CHECK(x[0] == 0x1p50 + 0.25);
-    scene.cloud.lower[0] = scene.cloud.upper[0] = x[0] = 0x1p51 + 0.5;
-    scene.keeps_originals = false;
-    hs_scene_fold_far(&scene);
-    CHECK(x[0] == 0x1p51 + 0.5);
-    scene.keeps_originals = true;
-    hs_scene_fold_far(&scene);
-    CHECK(fabs(x[0]) == 0.5 && scene.cloud.lower[0] == -0.5 && scene.cloud.upper[0] == 0.5);
-    x[0] = scene.cloud.lower[0] = -0x1p53; /* the far end may be the lower one */
-    scene.cloud.upper[0] = 0.0;
-    hs_scene_fold_far(&scene);
-    CHECK(x[0] == 0.0);
+    enum { SOME = 2 * HS_SLAB_POINTS + 100 };
+    const hs_box    box = {1, {true}, {{1.0}}};
+    const int64_t   far[3] = {HS_SLAB_POINTS + 7, 2 * HS_SLAB_POINTS + 3, 40};
+    static double   x[SOME];
+    const hs_points points = {x, SOME, 1, HS_FLOAT64, 8, 8};
+    const hs_sets   sets = {.points = &points, .is_plain = true};
+    for (int i = 0; i < SOME; i++)
+        x[i] = 0.25;
+    for (int k = 0; k < 3; k++) {
+        const hs_options options = options_for(0.25, HS_WANT_SHIFT, HS_EXACT);
+        hs_failure       failure = HS_NO_FAILURE;
+        x[far[k]] = 0x1p52;
+        hs_account_init(&account, &options);
+        CHECK(hs_scene_make(&account, NULL, &sets, &box, &options, &one_scene, NULL, &failure) ==
+              HS_ERR_SHIFT_RANGE);
+        CHECK(failure.row == far[k == 2 ? 2 : 0]);
+        finish();
+    }
 }
 
 /* ---- the power of two that a scene is scaled by, and how far far is ---- */
@@ -547,7 +514,7 @@ any_layout_is_copied(void)
             for (int k = 0; k < d; k++) {
                 const int64_t from = first + i * layouts[l % 9].row + k * layouts[l % 9].column;
                 const double  expected = narrow ? f[from] : x[from];
-                CHECK(hs_frame_entry(frame.rows, points.real, i * d + k) == expected);
+                CHECK(hs_frame_entry(frame.points.data, points.real, i * d + k) == expected);
                 largest = fmax(largest, fabs(expected));
             }
         }
@@ -608,7 +575,7 @@ large_frames_can_be_stopped(void)
     CHECK(hs_frame_take(&points, NULL, &options, &frame, &failure) == HS_ERR_INTERRUPTED);
     polls = 2;
     CHECK(hs_frame_take(&points, NULL, &options, &frame, &failure) == HS_OK && polls == 0);
-    CHECK(frame.largest == 2.5 && hs_frame_entry(frame.rows, HS_FLOAT32, n - 1) == -2.5);
+    CHECK(frame.largest == 2.5 && hs_frame_entry(frame.points.data, HS_FLOAT32, n - 1) == -2.5);
     hs_frame_free(&frame);
 }
 
@@ -731,10 +698,9 @@ test_scene(void)
     RUN(queries_too_far_to_count_get_another_scene);
     RUN(scenes_that_hold_nothing_take_nothing);
     RUN(endless_images_are_refused_for_their_number);
-    RUN(ranges_become_periods);
     RUN(scenes_are_narrowed_by_what_is_sure);
-    RUN(columns_are_wrapped_where_their_period_is_known);
-    RUN(originals_too_far_to_count_are_wrapped);
+    RUN(far_points_are_wrapped_where_their_period_is_known);
+    RUN(the_first_that_cannot_be_wrapped_is_named);
     RUN(cutoffs_beyond_everything_become_smaller);
     RUN(any_layout_is_copied);
     RUN(the_first_that_is_not_finite_is_named);

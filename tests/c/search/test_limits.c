@@ -127,12 +127,12 @@ count_step(const question *ask, hs_search *search, hs_stages *stages)
     search->filter_error += ask->error;
     if (ask->is_ordered) {
         CHECK(hs_walker_bound(search, &most));
-        CHECK(hs_walker_init_ordered(search, HS_BLOCK_LISTS_PLACES, &most, count_pairs, &found,
-                                     &walker) == HS_OK);
+        CHECK(hs_walker_init(search, HS_BLOCK_LISTS_PLACES, &most, count_pairs, &found, &walker) ==
+              HS_OK);
     } else {
-        CHECK(hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker) == HS_OK);
+        CHECK(hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, NULL, &walker) == HS_OK);
     }
-    CHECK(hs_walk(&walker, 0, n) == HS_OK);
+    CHECK(hs_walk(&walker, 0, n, &(hs_failure){.row = -1}) == HS_OK);
     CHECK(!ask->is_ordered || walker.scanner.n_found == found);
     found = walker.scanner.n_found;
     add_stages(&walker.scanner.stages, stages);
@@ -173,7 +173,7 @@ count_with(const question *ask, hs_stages *stages)
     plan.is_half = plan.is_half && !ask->is_ordered;
     for (int64_t s = 0; s < plan.n; s++) {
         CHECK(hs_level_open(&plan, s, NULL, false, &call, &open, &failure) == HS_OK);
-        CHECK(open.search.limits != NULL && open.search.limits->supports == &open.own.supports);
+        CHECK(open.search.limits != NULL && open.search.limits->supports == &open.supports);
         n += count_step(ask, &open.search, stages);
         hs_level_close(&open);
     }

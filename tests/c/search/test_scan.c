@@ -8,122 +8,9 @@
 #include "../support/poll_checks.h"
 #include "../support/search_unit.h"
 
-#include <math.h>
-
 void test_scan(void);
 
-/* ---- a block has room for what its header promises ---- */
-
-enum { N = 300, D = 3 };
-
-static double  group_x[D][N + HS_PADDING];
-static int32_t order[N + HS_PADDING];
-
-static hs_bins
-some_bins(uint64_t seed, int ndim)
-{
-    harness_random random = {seed};
-    hs_bins        bins = {.n = N, .ndim = ndim, .order = order};
-    for (int i = 0; i < N + HS_PADDING; i++) {
-        order[i] = 7 * i;
-        for (int k = 0; k < ndim; k++)
-            group_x[k][i] = i < N ? 8.0 * random_unit(&random) - 3.0 : NAN;
-    }
-    for (int k = 0; k < ndim; k++)
-        bins.x[k] = group_x[k];
-    return bins;
-}
-
-static void
-hits_are_twice_the_candidates_where_int32_holds_that(void)
-{
-    const int32_t half = INT32_MAX / 2;
-    CHECK(hs_block_most_hits(1) == 1 + HS_BURST);
-    CHECK(hs_block_most_hits(HS_BURST) == 2 * HS_BURST &&
-          hs_block_most_hits(half - 1) == 2 * (half - 1));
-    CHECK(hs_block_most_hits(half) == half && hs_block_most_hits(INT32_MAX) == INT32_MAX);
-}
-
-/* The middle point is the centre; the largest number is that of any axis and sign. */
-static void
-groups_know_their_extent(void)
-{
-    static hs_group group;
-    for (int trial = 0; trial < 60; trial++) {
-        const int     ndim = 1 + trial % D;
-        const int32_t first = trial, last = first + 1 + trial * 7 % HS_GROUP_POINTS;
-        hs_bins       bins = some_bins(40 + (uint64_t)trial, ndim);
-        float         largest = 0.0f;
-        group.near.out = 1.0f;
-        hs_group_start(&bins, first, last, &group);
-        CHECK(group.first == first && group.last == last && group.largest == 0);
-        CHECK(group.near.out == INFINITY);
-        CHECK(hs_group_bound(&bins, &group) >= 0.0f);
-        for (int k = 0; k < ndim; k++) {
-            float low = INFINITY, high = -INFINITY;
-            CHECK(group.centre[k] == group_x[k][(first + last) / 2]);
-            for (int32_t t = 0; t < last - first; t++) {
-                const float q = (float)(group_x[k][first + t] - group.centre[k]);
-                CHECK(group.q[k][t] == q);
-                low = fminf(low, q);
-                high = fmaxf(high, q);
-            }
-            CHECK(group.near.low[k] == low && group.near.high[k] == high);
-            largest = fmaxf(largest, fmaxf(-low, high));
-        }
-        CHECK(hs_group_bound(&bins, &group) == largest);
-        CHECK(group.largest == hs_bits_of_float(largest + 0.0f)); /* 0 has no sign then */
-    }
-}
-
-/* ---- thresholds that were kept are those of the extent that asks ---- */
-
 static search_unit unit;
-
-static void
-open_walker(double side, double cutoff, hs_walker *walker)
-{
-    search_unit_points(271828, 1500, 3, side, &unit);
-    search_unit_open(NULL, cutoff, false, HS_WANT_I, &unit);
-    CHECK(hs_walker_init(&unit.search, HS_BLOCK_COUNTS, NULL, NULL, walker) == HS_OK);
-}
-
-static void
-close_walker(hs_walker *walker)
-{
-    hs_walker_close(&unit.search, walker);
-    search_unit_close(&unit);
-}
-
-/* What a walker has found out serves the next search, of the same cutoff and errors only. */
-static void
-thresholds_are_kept_for_the_next_search(void)
-{
-    hs_walker walker;
-    open_walker(8.0, 1.0, &walker);
-    hs_scene *scene = &unit.search.scene;
-    walker.scanner.group.largest = hs_bits_of_float(1.5f);
-    hs_form_set(&walker.scanner);
-    hs_form *form = &walker.scanner.forms[walker.scanner.form - walker.scanner.forms];
-    for (int turn = 0; turn < 5; turn++) {
-        form->direct.in = 0.5f; /* it is left like that */
-        scene->cutoff = turn == 1 ? 1.25 : scene->cutoff;
-        unit.search.filter_error += turn == 2 ? 1e-9 : 0.0;
-        scene->extreme = turn >= 3;
-        scene->cutoff_low = turn == 4 ? 1.0 : scene->cutoff; /* the same cutoff, known less well */
-        hs_form_set(&walker.scanner);
-        const double        cutoff = scene->cutoff, error = unit.search.filter_error;
-        const hs_thresholds direct = hs_thresholds_of(3, cutoff, form->extent, error);
-        const hs_thresholds low = hs_thresholds_of(3, scene->cutoff_low, form->extent, error);
-        CHECK(walker.scanner.form == form && form->direct.out == direct.out);
-        CHECK(form->direct.in == (turn == 0 ? 0.5f : low.in));
-        CHECK(hs_expanded_pays(cutoff, form->extent));
-        CHECK(form->expanded.out == hs_expanded_of(3, cutoff, form->extent, error).out);
-        CHECK(form->expanded.in == hs_expanded_of(3, scene->cutoff_low, form->extent, error).in);
-    }
-    scene->extreme = false;
-    close_walker(&walker);
-}
 
 /*
  * ---- decide ----
@@ -162,11 +49,11 @@ every_pair_is_tested_once(void)
     CHECK(unit.search.grid.n_cells == 1);
     for (int times = 1; times <= 4; times *= 2) {
         polls = 0;
-        CHECK(hs_walker_init(&unit.search, HS_BLOCK_COUNTS, NULL, NULL, &walker) == HS_OK);
+        CHECK(hs_walker_init(&unit.search, HS_BLOCK_COUNTS, NULL, NULL, NULL, &walker) == HS_OK);
         walker.scanner.options.poll = count_polls;
         walker.scanner.options.poll_context = &polls;
         for (int t = 0; t < times; t++)
-            CHECK(hs_walk(&walker, 0, MANY) == HS_OK);
+            CHECK(hs_walk(&walker, 0, MANY, &(hs_failure){.row = -1}) == HS_OK);
         CHECK(walker.scanner.n_found == (int64_t)times * MANY * (MANY - 1) / 2);
         CHECK(walker.scanner.n_candidates == walker.scanner.n_found);
         CHECK(walker.scanner.n_ambiguous == 0);
@@ -187,13 +74,9 @@ every_pair_is_tested_once(void)
 static bool
 is_narrow(void)
 {
-    hs_walker     walker;
-    hs_pair_batch pair_batch;
-    CHECK(hs_walker_init(&unit.search, HS_BLOCK_COUNTS, NULL, NULL, &walker) == HS_OK);
-    CHECK(hs_pair_batch_init(&unit.search, &walker.scanner.block, &walker.scanner.options, true,
-                             &pair_batch) == HS_OK);
-    const bool narrow = pair_batch.of.is_narrow;
-    hs_pair_batch_free(&unit.call.account, &pair_batch);
+    hs_walker walker;
+    CHECK(hs_walker_init(&unit.search, HS_BLOCK_LISTS_PLACES, NULL, NULL, NULL, &walker) == HS_OK);
+    const bool narrow = walker.scanner.pair_batch.of.is_narrow;
     hs_walker_close(&unit.search, &walker);
     return narrow;
 }
@@ -321,9 +204,6 @@ many_runs_can_be_stopped(void)
 void
 test_scan(void)
 {
-    RUN(hits_are_twice_the_candidates_where_int32_holds_that);
-    RUN(groups_know_their_extent);
-    RUN(thresholds_are_kept_for_the_next_search);
     RUN(every_pair_is_tested_once);
     RUN(shifts_are_int32_where_they_are_known_to_be_few);
     RUN(shifts_beyond_the_integers_are_told);

@@ -76,7 +76,7 @@ static inline hs_status
 nearest_unit_fill(nearest_unit *unit, const hs_nearest_group *group, double most,
                   hs_nearest_leaves *leaves, hs_nearest_block *block)
 {
-    CHECK(hs_nearest_leaves_find(&unit->near, group, 1, most, leaves) == HS_OK);
+    CHECK(hs_nearest_leaves_find(&unit->near, group, most, leaves) == HS_OK);
     return hs_nearest_block_fill(&unit->near, &unit->call.options, group, most, leaves, block);
 }
 

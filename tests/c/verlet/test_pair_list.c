@@ -342,23 +342,27 @@ a_jump_of_one_costs_a_difference_and_its_wrapping(void)
     free_all();
 }
 
-/*
- * ---- shift table ----
- *
- * Shifts are numbered in the order in which they first come, however many there are, and stay so
- * when memory is refused.
- */
+/* ---- images of the listed pairs have numbers, in the order in which they first come ---- */
 
 /* Numbers are int32. */
 static void
-no_more_shifts_are_numbered_than_can_be(void)
+more_images_than_numbers_are_refused(void)
 {
-    int32_t   of[2] = {1, 2}, slots[4] = {-1, -1, -1, -1};
-    hs_images images = {.width = 1, .of = of, .slots = slots};
-    images.n = images.capacity = INT32_MAX / 2 + 1;
-    CHECK(hs_images_number(&images, of) == 0);
-    CHECK(hs_images_number(&images, of + 1) == -1);
-    CHECK(images.n == INT32_MAX / 2 + 1 && images.of == of);
+    const double x[3] = {0.25, 0.25, 0.25};
+    const hs_box box = {
+        .ndim = 3, .periodic = {true, true, true}, .rows = {{1.0}, {0.0, 1.0}, {0.0, 0.0, 1.0}}};
+    const hs_points points = {x, 1, 3, HS_FLOAT64, 24, 8};
+    hs_options      options = hs_options_default();
+    hs_verlet      *list = hs_verlet_new();
+    bool            rebuilt;
+    options.cutoff = 645.0; /* 2 * 645 + 1 to the third power are more than 2^31 */
+    CHECK(hs_verlet_update(list, &points, &box, &options, 0.0, false, &rebuilt, NULL) ==
+          HS_ERR_MEMORY);
+    CHECK(!hs_verlet_look(list).has_list);
+    options.cutoff = 1.25;
+    CHECK(hs_verlet_update(list, &points, &box, &options, 0.0, false, &rebuilt, NULL) == HS_OK);
+    CHECK(hs_verlet_look(list).n_listed == 3);
+    hs_verlet_free(list);
 }
 
 /* A point and its own images, in a box whose vector points down: half of them are numbered where
@@ -488,7 +492,7 @@ limits_leave_the_list_as_it_was(void)
 static void
 shifts_that_do_not_fit_name_a_point(void)
 {
-    static const double tilts[] = {0x1p31, -0x1p31, 0x1p40, -0x1p50, 0x1p60, 0x1p60};
+    static const double tilts[] = {0x1p31 + 2.0, -0x1p31 - 2.0, 0x1p40, -0x1p50, 0x1p60, 0x1p60};
     for (int t = 0; t < 6; t++) {
         double      x[6] = {0.0, 0.0, 3.5, 3.75, -3.5, -3.75};
         hs_box      box = {.ndim = 2, .periodic = {true, true}, .rows = {{8.0, 0.0}, {0.0, 8.0}}};
@@ -533,7 +537,7 @@ test_pair_list(void)
     RUN(nothing_is_promised_beyond_the_numbers);
     RUN(it_stops_when_told_to_or_without_memory);
     RUN(a_jump_of_one_costs_a_difference_and_its_wrapping);
-    RUN(no_more_shifts_are_numbered_than_can_be);
+    RUN(more_images_than_numbers_are_refused);
     RUN(memory_of_images_may_be_refused);
     RUN(other_scenes_get_lists_of_their_own);
     RUN(limits_leave_the_list_as_it_was);

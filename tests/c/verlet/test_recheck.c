@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_recheck.c: pairs of a list are checked again at new positions. */
-#include "../../../csrc/core/verlet/recheck.h"
+#include "../../../csrc/core/verlet/pair_list.h"
 #include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/list_checks.h"

@@ -37,7 +37,7 @@ RAISED = {
     "HS_ERR_NOT_FINITE": (ValueError, "points must be finite, got points[3, 1] = 0.5"),
     "HS_ERR_BOX_FINITE": (ValueError, "box must be finite, got box[3, 1] = 0.5"),
     "HS_ERR_BOX_DEPENDENT": (ValueError, "vector 3 of box is zero; make that axis not periodic"),
-    "HS_ERR_BOX_SKEWED": (ValueError, "box is too skewed, or its vectors differ too much"),
+    "HS_ERR_BOX_SKEWED": (ValueError, "points[3] lies so far from box, along a direction"),
     "HS_ERR_TOO_MANY": (OverflowError, "fewer than 2**31 points and systems and 2**62 pairs"),
     "HS_ERR_SHIFT_RANGE": (OverflowError, "points[3] lies too many box vectors away"),
     "HS_ERR_ROUNDING": (OverflowError, "points[3] lies so far from the box"),

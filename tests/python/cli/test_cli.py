@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The run line: what it reads, prints, writes, and how it refuses."""
+"""The command line: what it reads, prints, writes, and how it refuses."""
 
+import contextlib
 import csv
 import io
 import json
@@ -8,7 +9,6 @@ import os
 import signal
 import subprocess
 import sys
-import types
 from functools import partial
 
 import numpy as np
@@ -21,27 +21,10 @@ from halfshell._cli import verify as cli_verify
 from halfshell._cli.errors import InputError
 from halfshell._cli.files import Scene, read_scene
 from halfshell._cli.outputs import replacing, write_csv
-from halfshell._convert import progress as bar
 from halfshell_report import against as cli_peers
 
 POINTS = np.random.default_rng(5).random((60, 3)) * 8
 BOX = np.array([[8.0, 0.0, 0.0], [1.0, 7.5, 0.0], [-0.5, 2.0, 9.0]])
-
-
-@pytest.fixture
-def refusal(run):
-    """Run a run that must be refused in one line; return that line."""
-
-    def call(*args):
-        status, out, err = run(*args)
-        assert status == 2
-        assert out == ""
-        assert err.count("\n") == 1
-        assert err.startswith("halfshell: error: ")
-        assert "Traceback" not in err
-        return err
-
-    return call
 
 
 @pytest.fixture
@@ -343,68 +326,52 @@ def test_unreadable_files_are_refused(refusal, tmp_path):
     assert "Is a directory" in refusal("pairs", tmp_path / "folder.npy")
 
 
-def test_broken_and_empty_structure_files_are_refused(refusal, tmp_path):
-    pytest.importorskip("ase")
-    files = {
-        "broken.cif": "data_x\n_cell_length_a abc\n",
-        "broken.xyz": "3\n\nH 0 0 0\n",
-        "letters.xyz": "1\n\nH a b c\n",
-        "empty.xyz": "",
-        "none.xyz": "0\n\n",
-        "POSCAR": "x\n1.0\n1 0 0\n",
-    }
-    for name, content in files.items():
-        (tmp_path / name).write_text(content)
-        assert f"{tmp_path / name}: " in refusal("pairs", tmp_path / name)
+SPOILED = POINTS.copy()
+SPOILED[7, 1] = np.nan
+DEPENDENT = np.array([[1.0, 0, 0], [2.0, 0, 0], [0, 0, 1.0]])
+WRONG_CONTENT = [
+    ("positions must be finite, got positions[7, 1] = nan", {"points": SPOILED}, ""),
+    ("holds no points", {"points": np.empty((0, 3))}, ""),
+    ("shape (60,)", {"points": POINTS[:, 0]}, ""),
+    ("must hold real numbers", {"points": np.array([["a", "b"]])}, ""),
+    ("must hold real numbers", {"points": POINTS * 1j}, ""),
+    ("must hold real numbers", {"points": np.zeros((2, 3), "M8[s]")}, ""),
+    ("(n, d)", {"points": np.zeros(3, "f8,f8")}, ""),
+    ("would be rounded", {"points": np.zeros((2, 3), np.longdouble)}, ""),
+    ("is not a float64", {"points": np.array([[2**53 + 1, 0]])}, ""),
+    ("shape (3, 9)", {"points": np.zeros((3, 9))}, ""),
+    ("no array 'points' (it holds positions)", {"positions": POINTS}, ""),
+    ("box must have shape (3,) or (3, 3)", {"points": POINTS, "box": [1.0, 2.0]}, ""),
+    ("box must be finite", {"points": POINTS, "box": [1.0, 2.0, np.inf]}, ""),
+    ("'periodic' must be", {"points": POINTS, "box": np.ones(3), "periodic": "TTF"}, ""),
+    ("no box", {"points": POINTS, "periodic": True}, ""),
+    ("no box", {"points": POINTS}, "--periodic TTT"),
+    ("scene.npz: ", {"points": POINTS, "box": DEPENDENT}, "--cutoff 1"),
+    ("scene.npz: ", {"points": POINTS, "box": DEPENDENT}, ""),
+    ("--box has 4 numbers", {"points": POINTS}, "--box 1,2,3,4"),
+    ("--periodic has 2 letters", {"points": POINTS, "box": BOX}, "--periodic TF"),
+    ("--index", {"points": POINTS}, "--index 0"),
+]
 
 
 def test_wrong_content_is_refused_with_its_place(refusal, tmp_path):
-    def line(*options, **arrays):
+    for words, arrays, options in WRONG_CONTENT:
         np.savez(tmp_path / "scene.npz", **arrays)
-        return refusal("pairs", tmp_path / "scene.npz", *options)
-
-    spoiled = POINTS.copy()
-    spoiled[7, 1] = np.nan
-    assert "point 7, coordinate 1 is nan" in line(points=spoiled)
-    assert "holds no points" in line(points=np.empty((0, 3)))
-    assert "shape (60,)" in line(points=POINTS[:, 0])
-    assert "must be numbers" in line(points=np.array([["a", "b"]]))
-    assert "must be numbers" in line(points=POINTS * 1j)
-    assert "no array 'points' (it holds positions)" in line(positions=POINTS)
-    assert "box has shape (2,)" in line(points=POINTS, box=[1.0, 2.0])
-    assert "finite" in line(points=POINTS, box=[1.0, 2.0, np.inf])
-    assert "'periodic' must be" in line(points=POINTS, box=np.ones(3), periodic="TTF")
-    assert "no box" in line(points=POINTS, periodic=True)
-    assert "no box" in line("--periodic", "TTT", points=POINTS)
-    dependent = np.array([[1.0, 0, 0], [2.0, 0, 0], [0, 0, 1.0]])
-    assert "scene.npz: " in line("--cutoff", "1", points=POINTS, box=dependent)
-    assert "scene.npz: " in line(points=POINTS, box=dependent)
-    assert "--box has 4 numbers" in line("--box", "1,2,3,4", points=POINTS)
-    assert "--periodic has 2 letters" in line("--periodic", "TF", points=POINTS, box=BOX)
-    assert "--index" in line("--index", "0", points=POINTS)
+        assert words in refusal("pairs", tmp_path / "scene.npz", *options.split())
 
 
-def test_wrong_options_are_refused(refusal):
-    for args in (
-        ["unheard-of"],
-        ["pairs", "--unheard-of"],
-        ["pairs", "--cutoff"],
-        ["pairs", "--cutoff", "-1"],
-        ["pairs", "--cutoff", "1e999"],
-        ["pairs", "--box", "1,x,3"],
-        ["pairs", "--periodic", "yes"],
-        ["pairs", "--quantities", "ijx"],
-        ["pairs", "--kernel", "abacus"],
-        ["pairs", "--index", "last"],
-        ["pairs", "--plot", "g.png", "--cutoff", "0"],
-        ["pairs", "--cut", "3"],
-        ["verify", "--sample", "few"],
-        ["verify", "--against", "oracle"],
-        ["verify", "--against", "ase", "--strict"],
-        ["verify", "--against", "ase", "--kernel", "scalar"],
-        ["info", "file"],
-    ):
-        refusal(*args)
+@pytest.mark.parametrize("arguments", [
+    "unheard-of", "pairs --unheard-of", "pairs --cutoff", "pairs --cutoff -1",
+    "pairs --cutoff 1e999", "pairs --box 1,x,3", "pairs --periodic yes", "pairs --quantities ijx",
+    "pairs --kernel abacus", "pairs --index last", "pairs --plot g.png --cutoff 0", "pairs --cut 3",
+    "verify --sample few", "verify --against oracle", "verify --against ase --strict",
+    "verify --against ase --kernel scalar", "info file", "nearest --cutoff 3", "nearest --strict",
+    "rdf --strict", "rdf --bins 0", "nearest -k 0", "nearest -k x", "pairs --threads 0",
+    "verify --threads 0", "neighbors --quantities ijP", "coordination -o out.txt",
+    "pairs -o - --json", "coordination -o - --json", "rdf --cutoff 0",
+])  # fmt: skip
+def test_wrong_options_are_refused(refusal, arguments):
+    refusal(*arguments.split())
 
 
 def test_what_is_not_installed_is_named(monkeypatch, refusal, npz, tmp_path):
@@ -642,62 +609,18 @@ def test_ctrl_c_is_one_line_and_status_130(tmp_path):
     assert (out, err) == ("", "halfshell: interrupted\n")
 
 
-# The progress bar --------------------------------------------------------------------------
-
-
-class Terminal(io.StringIO):
-    def isatty(self):
-        return True
-
-
-def searching(seconds, clock):
-    """A search that takes some seconds of a clock and tells its progress every 10 ms."""
-    search = hs.pairs
-
-    def pairs(*args, progress=None, **options):
-        for k in range(round(seconds * 100)):
-            clock.now += 0.01
-            if progress is not None:
-                progress(k / (seconds * 100))
-        return search(*args, **options)
-
-    return pairs
-
-
 @pytest.mark.parametrize(
-    ("seconds", "terminal", "options", "shown"),
-    [
-        (2.0, True, [], True),
-        (0.4, True, [], False),
-        (2.0, False, [], False),
-        (2.0, True, ["--no-progress"], False),
-        (2.0, True, ["--json"], False),
-    ],
+    "command, words", [("pairs", "searching"), ("verify", "checking by integers")]
 )
-def test_progress_bar_only_for_long_work_on_a_terminal(
-    monkeypatch, npy, seconds, terminal, options, shown
-):
-    pytest.importorskip("rich")
-    clock = types.SimpleNamespace(now=0.0)
-    time = types.SimpleNamespace(monotonic=lambda: clock.now, perf_counter=lambda: clock.now)
-    screen = Terminal() if terminal else io.StringIO()
-    monkeypatch.setattr(sys, "stderr", screen)
-    monkeypatch.setattr(bar, "time", time)
-    monkeypatch.setattr(hs, "pairs", searching(seconds, clock))
-    monkeypatch.setenv("TERM", "xterm")
-    assert cli.main(["pairs", str(npy), "--cutoff", "2", *options]) == 0
-    assert ("searching" in screen.getvalue()) == shown
+def test_a_progress_bar_unless_it_is_in_the_way(monkeypatch, run, npz, command, words):
+    shown = []
 
+    def bar(wanted, what):
+        shown.append((wanted, what))
+        return contextlib.nullcontext()
 
-def test_progress_of_a_check_by_integers(monkeypatch, npz):
-    pytest.importorskip("rich")
-    screen, seconds = Terminal(), iter(range(1000))
-    clock = types.SimpleNamespace(monotonic=lambda: float(next(seconds)))
-    monkeypatch.setattr(bar, "time", clock)
-    monkeypatch.setattr(sys, "stderr", screen)
-    monkeypatch.setenv("TERM", "xterm")
-    assert cli.main(["verify", str(npz), "--cutoff", "2", "--sample", "20"]) == 0
-    assert "checking by integers" in screen.getvalue()
-    before = screen.getvalue()
-    assert cli.main(["verify", str(npz), "--cutoff", "2", "--no-progress"]) == 0
-    assert screen.getvalue() == before
+    for module in ("lists", "verify"):
+        monkeypatch.setattr(f"halfshell._cli.{module}.progress_bar", bar)
+    for options, wanted in (([], True), (["--no-progress"], False), (["--json"], False)):
+        assert run(command, npz, "--cutoff", "2", *options)[0] == 0
+        assert shown.pop() == (wanted, words)

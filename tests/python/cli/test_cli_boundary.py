@@ -98,6 +98,8 @@ JUNK = {
     "xyz with NaN": b"2\nprops\nH 0 0 nan\nH 0 0 1\n",
     "xyz that lies": b"1000000\nprops\nH 0 0 0\n",
     "newlines": b"\n" * 100,
+    "xyz of letters": b"1\n\nH a b c\n",
+    "cif without a cell": b"data_x\n_cell_length_a abc\n",
     "zip of nothing": b"PK\x05\x06" + bytes(18),
     "latin": "\xe9\xe8".encode("latin-1") * 30,
 }
@@ -109,38 +111,6 @@ def test_junk(tmp_path, name, suffix):
     path = tmp_path / (f"junk.{suffix}" if suffix else "junk")
     path.write_bytes(JUNK[name])
     refused("pairs", path, "--cutoff", "1.0")
-
-
-CONTENTS = {
-    "strings": np.array(["a", "b"]),
-    "number": np.array(1.0),
-    "flat": np.zeros(5),
-    "cube": np.zeros((2, 2, 2)),
-    "none": np.zeros((0, 3)),
-    "no columns": np.zeros((3, 0)),
-    "nine columns": np.zeros((3, 9)),
-    "complex": np.zeros((2, 3), complex),
-    "dates": np.zeros((2, 3), "M8[s]"),
-    "structured": np.zeros(3, "f8,f8"),
-    "long double": np.zeros((2, 3), np.longdouble),
-    "NaN": np.array([[0.0, np.nan]]),
-    "infinite": np.array([[0.0, -np.inf]], np.float16),
-    "big integers": np.array([[2**53 + 1, 0]]),
-    "objects": np.array([[None, 1.0]], object),
-}
-
-
-@pytest.mark.parametrize("content", CONTENTS.values(), ids=CONTENTS)
-def test_arrays_that_are_no_points(tmp_path, content):
-    np.save(tmp_path / "points.npy", content)
-    np.savez(tmp_path / "points.npz", points=content)
-    np.savez(tmp_path / "box.npz", points=POINTS, box=content)
-    for name in ("points.npy", "points.npz", "box.npz"):
-        assert name in refused("pairs", tmp_path / name, "--cutoff", "1.0")
-    if content.dtype.kind == "O":
-        return
-    np.savez(tmp_path / "periodic.npz", points=POINTS, box=np.full(3, 7.0), periodic=content)
-    assert "periodic" in refused("pairs", tmp_path / "periodic.npz", "--cutoff", "1.0")
 
 
 def test_places_that_are_no_files(tmp_path):

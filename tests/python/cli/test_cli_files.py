@@ -8,7 +8,6 @@ import zipfile
 import numpy as np
 import pytest
 
-from halfshell._cli import files
 from halfshell._cli.errors import InputError
 from halfshell._cli.files import read_scene
 from halfshell._convert import memory
@@ -112,7 +111,7 @@ def test_long_headers_are_refused(tmp_path, kind):
     else:
         npz_of(path, points=long)
         del long
-    assert "its header of 50,000," in refused(path) and "is too long" in refused(path)
+    assert "reading array header, expected 50000060 bytes" in refused(path)
 
 
 def test_boxes_are_small(tmp_path):
@@ -148,12 +147,3 @@ def test_every_version_of_the_format_is_read(tmp_path, version):
     assert np.array_equal(read_scene(str(tmp_path / "file.npy")).points, POINTS)
     path = npz_of(tmp_path / "file.npz", points=content.getvalue())
     assert np.array_equal(read_scene(path).points, POINTS)
-
-
-def test_a_coordinate_that_is_not_finite_is_named_by_its_place(tmp_path, monkeypatch):
-    monkeypatch.setattr(files, "ROWS_CHECKED", 7)
-    points = POINTS.copy()
-    points[38, 1] = np.nan
-    points[50, 0] = np.inf
-    np.save(tmp_path / "file.npy", points)
-    assert "point 38, coordinate 1 is nan" in refused(tmp_path / "file.npy")

@@ -91,7 +91,7 @@ def test_nearest(told, text, tmp_path):
     assert told("nearest", few)["largest_distance"] is None
 
 
-def test_rdf(told, run, text, tmp_path):
+def test_rdf(told, refusal, text, tmp_path):
     out = tmp_path / "g.csv"
     facts = told("rdf", text, "--cutoff", 3, "--bins", 30, "--box", "8 7.5 9", "-o", out)
     result = hs.rdf(POINTS, 3.0, 30, box=LENGTHS)
@@ -99,8 +99,7 @@ def test_rdf(told, run, text, tmp_path):
     assert numbers(found["g"]) == result.g.tolist() and numbers(found["r"]) == result.r.tolist()
     assert numbers(found["counts"]) == result.counts.tolist()
     assert facts["pairs"] == int(result.counts.sum()) and facts["bins"] == 30
-    status, out, err = run("rdf", text, "--cutoff", "3")
-    assert (status, out) == (2, "") and "needs a box that is periodic" in err
+    assert "needs a box that is periodic" in refusal("rdf", text, "--cutoff", "3")
 
 
 def test_cutoffs_and_counts_by_elements(told, run, tmp_path):
@@ -144,9 +143,8 @@ def test_cutoffs_and_counts_by_elements(told, run, tmp_path):
         (["rdf", "--plot", "g.gif"], "the name must end in"),
     ],
 )
-def test_elements_that_cannot_be(run, text, words, said):
-    status, out, err = run(*[text if word == "TEXT" else word for word in words])
-    assert (status, out) == (2, "") and said in err and err.count("\n") == 1
+def test_elements_that_cannot_be(refusal, text, words, said):
+    assert said in refusal(*[text if word == "TEXT" else word for word in words])
 
 
 def test_partial_distributions_and_their_picture(told, text, tmp_path):
@@ -203,25 +201,23 @@ def test_forms_of_text(told, tmp_path):
             assert told("pairs", path, "--cutoff", 1)["points"] == rows
 
 
-def test_text_that_is_none(run, tmp_path):
+def test_text_that_is_none(run, refusal, tmp_path):
     path = tmp_path / "points.txt"
     path.write_bytes(b"\xff\xfe\x00\x01")
     status, _, err = run("pairs", path, "--cutoff", "1")
     assert status == 2 and err.count("\n") == 1
     (tmp_path / "points.csv").write_text("1,2,3\n")
-    status, _, err = run("pairs", tmp_path / "points.csv", "--index", "0")
-    assert status == 2 and "--index is for formats with several frames" in err
+    line = refusal("pairs", tmp_path / "points.csv", "--index", "0")
+    assert "--index is for formats with several frames" in line
 
 
-def test_lengths_and_angles(told, run, text):
+def test_lengths_and_angles(told, refusal, text):
     box = hs.Box.from_dimensions([9.0, 8.0, 10.0, 80.0, 75.0, 100.0])
     found = told("pairs", text, "--cutoff", 2, "--box", "9,8,10,80,75,100")
     assert np.allclose(found["box"], box.vectors, rtol=0.0, atol=0.0)
     assert found["pairs"] == hs.count_pairs(POINTS, 2.0, box=box)
-    status, _, err = run("pairs", text, "--box", "9,8,10,80,75,300")
-    assert status == 2 and "--box" in err
-    status, _, err = run("pairs", text, "--box", "9,8")
-    assert status == 2 and "or 6 (lengths and angles)" in err
+    assert "--box" in refusal("pairs", text, "--box", "9,8,10,80,75,300")
+    assert "or 6 (lengths and angles)" in refusal("pairs", text, "--box", "9,8")
 
 
 def test_without_a_command_there_is_help(run):
@@ -229,21 +225,7 @@ def test_without_a_command_there_is_help(run):
     assert (status, err) == (0, "") and "commands:" in out
 
 
-def test_options_that_cannot_be(run):
-    for args in (
-        ["nearest", "--cutoff", "3"], ["nearest", "--strict"], ["rdf", "--strict"],
-        ["rdf", "--bins", "0"], ["nearest", "-k", "0"], ["nearest", "-k", "x"],
-        ["pairs", "--threads", "0"], ["verify", "--threads", "0"],
-        ["neighbors", "--quantities", "ijP"], ["coordination", "-o", "out.txt"],
-        ["pairs", "-o", "-", "--json"], ["coordination", "-o", "-", "--json"],
-        ["rdf", "--cutoff", "0"],
-    ):  # fmt: skip
-        status, out, err = run(*args)
-        assert (status, out) == (2, "") and err.startswith("halfshell: error: ")
-        assert err.count("\n") == 1
-
-
-def test_large_outputs_are_told_beforehand(run, tmp_path):
+def test_large_outputs_are_told_beforehand(run, refusal, tmp_path):
     points = tmp_path / "points.npy"
     np.save(points, np.random.default_rng(0).random((400, 3)))
     for name in ("all.npz", "all.csv"):
@@ -260,16 +242,16 @@ def test_large_outputs_are_told_beforehand(run, tmp_path):
         assert output.stat().st_size > 1_000_000
     for wrong in ("0", "many", "-3GB", "1XB", "inf", ""):
         limit = f"--max-output={wrong}"
-        status, _, err = run("pairs", points, "--cutoff", "1", "-o", "x.csv", limit)
-        assert status == 2 and "is not a size such as 500MB or 4GB" in err
+        line = refusal("pairs", points, "--cutoff", "1", "-o", "x.csv", limit)
+        assert "is not a size such as 500MB or 4GB" in line
 
 
-def test_large_rows_are_told_beforehand(run, tmp_path):
+def test_large_rows_are_told_beforehand(run, refusal, tmp_path):
     points, output = tmp_path / "points.npy", tmp_path / "all.npz"
     np.save(points, np.random.default_rng(0).random((400, 3)))
     search = ("neighbors", points, "--cutoff", "2", "-o", output, "--quantities", "jd")
-    status, _, err = run(*search, "--max-output", "1MB")
-    assert status == 2 and "would have 159,600 pairs in about 2.55 MB, more than" in err
+    line = refusal(*search, "--max-output", "1MB")
+    assert "would have 159,600 pairs in about 2.55 MB, more than" in line
     assert not output.exists() and run(*search)[0] == 0 and output.exists()
 
 
@@ -288,18 +270,17 @@ MEANT = [
     (["pairs", "--cuttoff", "2"], "unrecognized arguments: --cuttoff; did you mean --cutoff?"),
     (["pears"], "did you mean pairs?"),
     (["pairs", "x.npy", "--box", "10", "10", "10"], "10 10; numbers of one option are separated"),
-    (["verify", "--sample", "-3"], "argument --sample: -3 is negative"),
-    (["pairs", "--index", ":"], "is not a whole number, the number of a frame; only rdf reads"),
+    (["verify", "--sample", "-3"], "argument --sample: '-3' is not a whole number from 0 on"),
+    (["pairs", "--index", ":"], "is not the number of a frame; only rdf reads several"),
     (["report", "--methods", "exat"], "choose from exact, verlet, double, single, float32, stale"),
     (["report", "--peers", "vessin"], "choose from vesin, cKDTree, neighborlist-rs,"),
     (["report", "--scenes", "zzz"], "space-8d, sc-shell, fcc-shell, ... (86 in all)"),
 ]  # fmt: skip
 
 
-def test_what_is_probably_meant(run):
+def test_what_is_probably_meant(refusal):
     for args, words in MEANT:
-        status, out, err = run(*args)
-        assert (status, out) == (2, "") and words in err and err.count("\n") == 1, args
+        assert words in refusal(*args)
 
 
 def test_a_folder_is_no_file(run, tmp_path):
@@ -331,16 +312,14 @@ def test_queries_have_their_own_rows(told, text, queries, tmp_path):
     assert np.load(out)["d"].tolist() == d.ravel().tolist()
 
 
-def test_queries_that_cannot_be_searched(run, text, tmp_path):
+def test_queries_that_cannot_be_searched(refusal, text, tmp_path):
     np.save(tmp_path / "flat.npy", POINTS[:, :2])
     for options, words in (
         (["--queries", tmp_path / "flat.npy"], "has 2 coordinates a point"),
         (["--queries", tmp_path / "none.npy"], "no such file"),
     ):
-        status, _, err = run("coordination", text, "--cutoff", 1, *options)
-        assert status == 2 and words in err and err.count("\n") == 1
-    status, _, err = run("rdf", text, "--queries", text)
-    assert status == 2 and "unrecognized arguments: --queries" in err
+        assert words in refusal("coordination", text, "--cutoff", 1, *options)
+    assert "unrecognized arguments: --queries" in refusal("rdf", text, "--queries", text)
 
 
 @pytest.fixture
@@ -370,7 +349,7 @@ def test_g_of_r_is_averaged_over_frames(told, trajectory, tmp_path, index, chose
     assert np.allclose(np.load(tmp_path / "g.npz")["g"], whole.g)
 
 
-def test_frames_that_are_not_there(run, trajectory, text):
+def test_frames_that_are_not_there(refusal, trajectory, text):
     path, _ = trajectory
     for arguments, words in (
         (["rdf", path, "--index", "9:"], "has none of these frames"),
@@ -384,8 +363,7 @@ def test_frames_that_are_not_there(run, trajectory, text):
         (["rdf", "--index", ":"], "give a file that has some"),
         (["pairs", path, "--index", ":"], "only rdf reads several frames"),
     ):
-        status, _, err = run(*arguments)
-        assert status == 2 and words in err and err.count("\n") == 1, arguments
+        assert words in refusal(*arguments)
 
 
 def test_parquet_has_the_columns_of_the_archive(told, text, tmp_path, monkeypatch):
@@ -405,8 +383,8 @@ def test_parquet_has_the_columns_of_the_archive(told, text, tmp_path, monkeypatc
     assert parquet.read_table(tmp_path / "none.parquet").num_rows == 0
 
 
-def test_without_pyarrow_one_line_says_what_is_missing(run, text, tmp_path, monkeypatch):
+def test_without_pyarrow_one_line_says_what_is_missing(refusal, text, tmp_path, monkeypatch):
     monkeypatch.setattr("halfshell._cli.outputs.find_spec", lambda name: None)
-    status, _, err = run("pairs", text, "--cutoff", 1, "-o", tmp_path / "pairs.parquet")
-    assert status == 2 and "needs pyarrow" in err and err.count("\n") == 1
+    line = refusal("pairs", text, "--cutoff", 1, "-o", tmp_path / "pairs.parquet")
+    assert "needs pyarrow" in line
     assert not (tmp_path / "pairs.parquet").exists()

@@ -17,6 +17,7 @@ from halfshell import cli
 from halfshell._cli import files
 from halfshell._cli.errors import InputError
 from halfshell._cli.files import read_frames, read_scene
+from structure_writers import write_by_mdanalysis
 
 POINTS = np.array([[0.5, 0.25, 0.0], [1.0, 0.25, 0.0], [4.0, 4.5, 2.0], [4.0, 4.5, 2.75]])
 
@@ -322,25 +323,10 @@ def test_what_ase_writes_is_read(tmp_path, form):
         assert hs.count_pairs(found.points, 2.9, box=box) == 24
 
 
-def mdanalysis_file(folder, form):
-    import MDAnalysis
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        universe = MDAnalysis.Universe.empty(4, trajectory=True)
-        named = {"names": ["OW", "HW1", "HW2", "NA"], "resnames": ["SOL"], "resids": [1]}
-        for name, values in (*named.items(), ("charges", [0.0] * 4), ("radii", [1.0] * 4)):
-            universe.add_TopologyAttr(name, values)
-        universe.atoms.positions = POINTS
-        universe.dimensions = [10, 11, 12, 90, 90, 90]
-        universe.atoms.write(str(folder / f"a.{form}"))
-    return folder / f"a.{form}"
-
-
 @pytest.mark.parametrize("form", ["gro", "pdb", "crd", "xyz", "dcd", "xtc", "trr", "ncdf", "pqr"])
 def test_what_mdanalysis_writes_is_read(tmp_path, form):
     need("MDAnalysis", "ase", "scipy")
-    found = read_scene(str(mdanalysis_file(tmp_path, form)))
+    found = read_scene(str(write_by_mdanalysis([(POINTS, [10, 11, 12])], tmp_path / f"a.{form}")))
     np.testing.assert_allclose(found.points, POINTS, atol=0.011)
     if form in ("gro", "pdb", "dcd", "xtc", "trr", "ncdf"):
         np.testing.assert_allclose(found.box, np.diag([10, 11, 12]), atol=1e-4)
@@ -566,7 +552,7 @@ def test_clouds_that_have_the_suffix_of_another_format(scene):
 def test_frames_of_what_ase_does_not_know(tmp_path):
     """A CHARMM coordinate file."""
     need("MDAnalysis", "ase")
-    path = str(mdanalysis_file(tmp_path, "crd"))
+    path = str(write_by_mdanalysis([(POINTS, [10, 11, 12])], tmp_path / "a.crd"))
     assert len(list(read_frames(path, slice(None)))) == 1
     with pytest.raises(InputError, match="has no frame 3"):
         read_scene(path, index=3)

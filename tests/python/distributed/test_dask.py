@@ -2,21 +2,17 @@
 """`halfshell.dask`: for any chunks and workers the answer is that of one search."""
 
 import contextlib
-import doctest
 import functools
 import os
 import pickle
-import re
 import signal
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
 import halfshell as hs
-from brick_scenes import LETTERS, in_order, known_scenes, same, scenes, serial
-from checkout import ROOT
+from brick_scenes import LETTERS, every_scene, in_order, same, scenes, serial, without_rule
+from halfshell._functions.bricks import Terms, divide, part_of, split, summary
 from refused_calls import check_refusals
 
 dask = pytest.importorskip("dask", reason="dask is not installed")
@@ -25,9 +21,8 @@ da = pytest.importorskip("dask.array", reason="dask.array is not installed")
 distributed = pytest.importorskip("distributed", reason="distributed is not installed")
 hd = pytest.importorskip("halfshell.dask", reason="dask is not installed")
 
-CHUNKS = {"one": -1, "some": 100, "uneven": "uneven"}
-# test_brick_tasks.py has the same parts of all scenes: of those of any size here half.
-NAMES = [name for name in scenes() if not name.startswith("upright")]
+CHUNKS = [-1, 50, "uneven"]
+SCENES = every_scene()
 
 
 def collection(points, chunks):
@@ -37,72 +32,51 @@ def collection(points, chunks):
     return da.from_array(points, chunks=chunks)
 
 
-def check_all(points, cutoff, scene, chunks, n=None, **how):
+def check_all(name, chunks, n=None, in_other_chunks=False):
     """All functions against one search, by bytes."""
-    given, how = collection(points, chunks), {"n": n, **scene}
-    edges, cutoffs = [0.0, cutoff / 2.0, cutoff], [cutoff / 2.0, cutoff]
-    rows = hd.neighbors(given, cutoff, quantities="jdS", sort=True, **how)
+    known, cutoff, scene, which = SCENES[name]
+    points, fields, rest = hs.Points(**known, **scene), dict(known), without_rule(which)
+    positions = collection(fields.pop("positions"), chunks)
+    if in_other_chunks:
+        fields = {key: da.from_array(one, chunks=7) for key, one in fields.items()}
+    given = hd.Points(positions, **fields, **scene)
+    largest = cutoff if isinstance(cutoff, float) else 1.0
+    edges, cutoffs = [0.0, largest / 2.0, largest], [largest / 2.0, largest]
+    rows = hd.neighbors(given, cutoff, n=n, quantities="jdS", sort=True, **which)
     found = dask.compute(
-        hd.pairs(given, cutoff, quantities=LETTERS, **how),
-        hd.pairs(given, cutoff, quantities=LETTERS, sort=True, **how),
-        hd.coordination(given, cutoff, **how),
-        hd.count_pairs(given, cutoff, **how), hd.count_pairs(given, cutoffs, **how),
-        hd.pair_histogram(given, edges, **how),
+        hd.pairs(given, cutoff, n=n, quantities=LETTERS, **which),
+        hd.pairs(given, cutoff, n=n, quantities=LETTERS, sort=True, **which),
+        hd.coordination(given, cutoff, n=n, **which),
+        hd.count_pairs(given, cutoff, n=n, **which),
+        hd.pair_histogram(given, edges, n=n, **rest),
         (rows.points, rows.counts, *rows.columns),
     )  # fmt: skip
-    table, parts = dask.compute(rows.table, hd.bricks(given, cutoff, **how))
-    expected = serial(points, cutoff, scene)
+    table, parts = dask.compute(rows.table, hd.bricks(given, cutoff, n=n, **which))
+    expected = hs.pairs(points, cutoff, quantities=LETTERS, sort=True, **which)
     assert same(in_order(found[0]), expected) and same(found[1], expected)
-    counts = hs.coordination(points, cutoff, **scene)
+    counts = hs.coordination(points, cutoff, **which)
     assert same([found[2]], [counts])
     assert found[3].dtype == np.int64 and found[3].shape == () and found[3] == len(expected[0])
-    assert same([found[4]], [hs.count_pairs(points, cutoffs, **scene)])
-    assert same([found[5]], [hs.pair_histogram(points, edges, **scene)])
-    whole = hs.neighbors(points, cutoff, quantities="jdS", **scene)
+    assert same([found[4]], [hs.pair_histogram(points, edges, **rest)])
+    if known.keys() == {"positions"} and not which:
+        several = hd.count_pairs(given, cutoffs, n=n).compute()
+        assert same([several], [hs.count_pairs(points, cutoffs)])
+    whole = hs.neighbors(points, cutoff, quantities="jdS", **which)
     columns = (whole.indices, whole.distances, whole.shifts)
-    assert same(found[6], (np.arange(len(points)), counts, *columns))
+    assert same(found[5], (np.arange(len(points)), counts, *columns))
     assert same((table.indices, table.distances, table.shifts), columns)
     assert same([table.offsets], [whole.offsets])
-    assert len(parts) == (given.numblocks[0] if n is None else n)
+    assert np.array_equal(table.reverse(), whole.reverse())
+    assert len(parts) == (positions.numblocks[0] if n is None else n)
     assert sum(parts.sizes) == len(points)
 
 
-@pytest.mark.parametrize("number, name", [*enumerate(NAMES)])
+@pytest.mark.parametrize("number, name", [*enumerate(SCENES)])
 def test_it_is_one_search(number, name):
-    chunks = list(CHUNKS)[number % 3]
-    with dask.config.set(scheduler="threads", num_workers=2):
-        check_all(*scenes()[name], CHUNKS[chunks], n=5 if chunks == "one" else None)
-
-
-@pytest.mark.parametrize("number, name", [*enumerate(known_scenes())])
-def test_what_is_known_of_points_goes_with_them(number, name):
-    known, cutoff, scene, which = known_scenes()[name]
-    points = hs.Points(**known, **scene)
-    fields = dict(known)
-    positions = collection(fields.pop("positions"), [40, -1, "uneven"][number % 3])
-    if number % 2:  # in other chunks
-        fields = {key: da.from_array(one, chunks=7) for key, one in fields.items()}
-    given = hd.Points(positions, **fields, **scene)
-    rest = {key: value for key, value in which.items() if key != "rule"}
-    with dask.config.set(scheduler=at_odd_addresses()):
-        for n in (None, 3):
-            rows = hd.neighbors(given, cutoff, n=n, quantities="jd", **which)
-            found = dask.compute(
-                *hd.pairs(given, cutoff, n=n, quantities=LETTERS, sort=True, **which),
-                hd.coordination(given, cutoff, n=n, **which),
-                hd.count_pairs(given, cutoff, n=n, **which),
-                hd.pair_histogram(given, [0.0, 0.5, 1.0], n=n, **rest),
-            )
-            table = rows.table.compute()
-            expected = hs.pairs(points, cutoff, quantities=LETTERS, sort=True, **which)
-            assert same(found[:6], expected) and len(expected[0])
-            assert same([found[6]], [hs.coordination(points, cutoff, **which)])
-            assert found[7] == len(expected[0])
-            assert same([found[8]], [hs.pair_histogram(points, [0.0, 0.5, 1.0], **rest)])
-            whole = hs.neighbors(points, cutoff, quantities="jd", **which)
-            columns = ("offsets", "indices", "distances")
-            assert same([getattr(table, c) for c in columns], [getattr(whole, c) for c in columns])
-            assert np.array_equal(table.reverse(), whole.reverse())
+    chunks = CHUNKS[number % 3]
+    scheduler = at_odd_addresses() if number % 2 else "threads"
+    with dask.config.set(scheduler=scheduler, num_workers=2):
+        check_all(name, chunks, 5 if chunks == -1 else None, in_other_chunks=number % 2)
 
 
 def test_rules_with_a_direction_have_rows_and_no_pairs():
@@ -148,7 +122,7 @@ def test_what_is_known_has_the_rows_of_the_points():
 @pytest.mark.parametrize("workers", [1, 2, 4])
 def test_processes(workers):
     with dask.config.set(scheduler="processes", num_workers=workers):
-        check_all(*scenes()["mixed"], 60)
+        check_all("mixed", 60)
 
 
 @contextlib.contextmanager
@@ -179,12 +153,6 @@ def at_odd_addresses():
         dask.local.get_async, dask.local.SynchronousExecutor().submit, 1, dumps=packed,
         loads=unpacked,
     )  # fmt: skip
-
-
-@pytest.mark.parametrize("name", NAMES[:12] + NAMES[12::3])
-def test_what_a_task_receives_may_be_at_any_address(name):
-    with dask.config.set(scheduler=at_odd_addresses()):
-        check_all(*scenes()[name], 50)
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -237,6 +205,40 @@ def test_chunks_far_apart_and_chunks_of_nothing():
         found = hd.pairs(given, 0.2, n=n, quantities=LETTERS, sort=True)
         assert same(dask.compute(*found), serial(points, 0.2, {}))
         assert hd.bricks(given, 0.2, n=n).compute().sizes != [0] * n
+
+
+def test_chunks_are_what_the_whole_says():
+    def pieces(*arrays, shape=(2, 3), dtype=float):
+        chunks = [da.from_delayed(dask.delayed(one, traverse=False), shape, dtype)
+                  for one in arrays]  # fmt: skip
+        return da.concatenate(chunks)
+
+    good, hidden = np.ones((2, 3)), np.ma.masked_array(np.ones((2, 3)))
+    assert hd.count_pairs(pieces(good, hidden), 1.0).compute() == 6
+    hidden[1, 1] = np.ma.masked
+    names = pieces(np.zeros(2, int), np.array(["A", "B"]), shape=(2,))
+    for given, cutoff, kind, words in (
+        (pieces(good, good[:, :2]), 1.0, ValueError, "3 columns in every chunk; chunk 1 has"),
+        (pieces(good, good.astype(int)), 1.0, TypeError, "float64 in every chunk.*1 is of int64"),
+        (pieces(good, good * [[1.0], [np.nan]]), 1.0, ValueError, r"points\[3, 0\]"),
+        (pieces(good, hidden), 1.0, ValueError, "masked"),
+        (hd.Points(pieces(good, good), types=names), {("*", "*"): 1.0}, TypeError,
+         "types of all points must be numbers, or of all be names"),
+    ):  # fmt: skip
+        with pytest.raises(kind, match=words):
+            hd.count_pairs(given, cutoff).compute()
+
+
+def test_what_is_sent_are_the_points_of_a_brick_alone():
+    points = hs.Points(np.arange(60.0).reshape(20, 3), radii=np.full(20, 0.5))
+    division = divide(Terms(1.0, None, None, None, 3, ("radii",)), 4, summary(points, 1))
+    for piece in split(points, division, 0):
+        part = part_of(division, pickle.loads(pickle.dumps(piece)))
+        brick, own = part.in_order()
+        assert {len(one) for one in piece.columns.values()} == {len(brick.members)}
+        assert len(brick.members) < len(points)
+        assert same([own.positions, own.radii], [points.positions[brick.members],
+                                                 points.radii[brick.members]])  # fmt: skip
 
 
 def test_errors_of_a_search_name_points_among_all():
@@ -351,23 +353,6 @@ def test_bad_collections_are_refused_at_once():
         hd.neighbors(da.zeros((3, 3)), 1.0, quantities="ij")
 
 
-def test_examples_run():
-    result = doctest.testmod(hd)
-    assert result.attempted > 10 and result.failed == 0
-    names = {}
-    for code in re.findall(r"```python\n(.*?)```", (ROOT / "docs/dask.md").read_text(), re.DOTALL):
-        exec(compile(code, "dask.md", "exec"), names)
-    assert names["n_pairs"] == names["histogram"].sum()
-
-
-def test_without_the_package_one_line_names_the_extra():
-    script = "import sys; sys.modules['dask'] = None\nimport halfshell.dask"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
-    last = done.stderr.splitlines()[-1]
-    assert last.startswith("ImportError: halfshell.dask needs dask[array]: pip install")
-    assert "halfshell[distributed]" in last
-    script = "import sys, halfshell; sys.exit('dask' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", script]).returncode == 0
 def test_columns_in_chunks():
     points, cutoff, scene = scenes()["mixed"]
     given = da.from_array(points, chunks=(70, 2))

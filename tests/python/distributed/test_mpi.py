@@ -35,7 +35,7 @@ def mpiexec():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("what", ["answers", "known", "refusals"])
+@pytest.mark.parametrize("what", ["answers", "refusals"])
 @pytest.mark.parametrize("ranks", [1, 2, 4])
 def test_ranks(ranks, what):
     start(ranks, SUPPORT / "ranks.py", what)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The pages on PyTorch and JAX run, and say in one line what is missing where that is so."""
+"""The pages on PyTorch, JAX and dask run; where these are missing, one line says so."""
 
 import ast
 import doctest
@@ -13,9 +13,11 @@ import pytest
 from checkout import ROOT
 from frameworks import framework
 
+NAMES = ["torch", "jax", "dask"]
+
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["torch", "jax"])
+@pytest.mark.parametrize("name", NAMES)
 def test_examples_run(name):
     module = framework(name)
     if name == "torch":
@@ -28,12 +30,14 @@ def test_examples_run(name):
         assert names["forces"].shape == (500, 3) and names["by_box"].isfinite().all()
         assert names["edge_index"].shape[1] > 500 and len(names["of_queries"]) > 20
         assert names["again"] > 0.0
+    elif name == "dask":
+        assert names["n_pairs"] == names["histogram"].sum()
     else:
         assert names["gradient"].shape == (500, 3) and names["found"].needed > 100
         assert names["lists"].i.shape == (5, 2000) and not names["lists"].overflow.any()
 
 
-@pytest.mark.parametrize("name", ["torch", "jax"])
+@pytest.mark.parametrize("name", NAMES)
 def test_examples_in_docstrings_run(name):
     framework(name)
     module = importlib.import_module(f"halfshell.{name}")
@@ -41,16 +45,17 @@ def test_examples_in_docstrings_run(name):
     assert result.attempted > 5 and result.failed == 0
 
 
-@pytest.mark.parametrize("name", ["torch", "jax"])
+@pytest.mark.parametrize("name", NAMES)
 def test_without_the_package_one_line_names_the_extra(name):
     script = f"import sys; sys.modules[{name!r}] = None\nimport halfshell.{name}"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     last = done.stderr.splitlines()[-1]
-    assert last.startswith(f"ImportError: halfshell.{name} needs {name}: pip install {name}")
-    assert f"halfshell[{name}]" in last
+    package = name.replace("dask", "dask[array]")
+    assert f"ImportError: halfshell.{name} needs {package}: pip install" in last
+    assert f"halfshell[{name.replace('dask', 'distributed')}]" in last
 
 
-@pytest.mark.parametrize("name", ["torch", "jax"])
+@pytest.mark.parametrize("name", NAMES)
 def test_it_is_imported_by_name_only(name):
     script = f"import sys, halfshell; sys.exit({name!r} in sys.modules)"
     assert subprocess.run([sys.executable, "-c", script]).returncode == 0

@@ -178,14 +178,12 @@ def test_inductor_gives_the_same(points):
     torch.testing.assert_close(compiled(points), energy(points))
 
 
-@pytest.mark.parametrize("name", ["neighbor_list", "radius_graph", "radius"])
-def test_operators_are_what_pytorch_expects(name, points):
-    arguments = {
-        "neighbor_list": (points, 1.1, tensor(SKEWED), [True, True, False], None, False, True),
-        "radius_graph": (points, 1.1, None, True, None),
-        "radius": (points, points[:4], 1.1, None, None, None),
-    }
-    torch.library.opcheck(getattr(torch.ops.halfshell, name).default, arguments[name])
+def test_operators_are_what_pytorch_expects(points):
+    operators = torch.ops.halfshell
+    whole = (points, 1.1, tensor(SKEWED), [True, True, False], None, False, True)
+    torch.library.opcheck(operators.neighbor_list.default, whole)
+    for y, loop in ((None, True), (points[:4], False)):
+        torch.library.opcheck(operators.radius.default, (points, y, 1.1, None, None, loop, None))
 
 
 @pytest.mark.parametrize("flow", ["source_to_target", "target_to_source"])

@@ -93,26 +93,6 @@ def test_a_shift_that_fits_one_way_only():
 POINTS = np.zeros((3, 2))
 
 
-@pytest.mark.parametrize(
-    ("indices", "error", "message"),
-    [
-        ([3], ValueError, "indices must be numbers of points, from 0 to 2"),
-        ([-1], ValueError, "indices must be numbers of points, from 0 to 2"),
-        (np.array([2**64 - 1], np.uint64), ValueError, "indices must be numbers of points"),
-        ([1, 0, 1], ValueError, "indices must name each point once, got 1 twice"),
-        ([1.0], TypeError, "indices must hold integers, got dtype float64"),
-        (1, ValueError, r"indices must have shape \(m,\), got \(\)"),
-    ],
-)
-def test_bad_numbers(indices, error, message):
-    with pytest.raises(error, match=message):
-        hs.pairs(POINTS, 1.0, indices=indices)
-    with pytest.raises(error, match=message):
-        hs.CellList(POINTS, 1.0).pairs(indices=indices)
-    with pytest.raises(ValueError, match="some of the letters i j d D S P k, each at most"):
-        hs.pairs(POINTS, 1.0, indices=[0], quantities="x")
-
-
 def test_some_points_of_systems_with_groups_and_exclusions(rng):
     points = hs.Points(
         rng.integers(0, 3, (20, 2)).astype(float), box=3.0, periodic=[True, False],

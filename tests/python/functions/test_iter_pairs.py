@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`iter_pairs` gives the arrays of `pairs` in blocks, and holds and leaves behind little."""
 
+import copy
 import gc
 import itertools
+import pickle
 import weakref
 
 import numpy as np
@@ -239,10 +241,16 @@ print(json.dumps([peak - before, n]))
 
 
 def test_close_ends_it(rng):
-    with pytest.raises(TypeError, match="progress must be callable or a bool, got int"):
-        hs.iter_pairs(rng.random((500, 3)), 0.3, progress=1)
     blocks = hs.iter_pairs(rng.random((500, 3)), 0.3, max_pairs=10)
     next(blocks)
     blocks.close()
     blocks.close()
     assert list(blocks) == []
+
+
+def test_a_search_that_goes_on_is_not_copied():
+    blocks = hs.iter_pairs(np.arange(5.0)[:, None], 1.5, max_pairs=2)
+    for copied in (copy.copy, copy.deepcopy, pickle.dumps):
+        with pytest.raises(TypeError, match="a search that goes on cannot be copied or pickled"):
+            copied(blocks)
+    assert sum(len(i) for i, _ in blocks) == 4

@@ -224,6 +224,7 @@ WRONG[5] = np.nan
     ({"types": [0.0] * 12}, TypeError, "types must hold integers or names, got dtype float64"),
     ({"types": "A"}, TypeError, "types must hold integers or names"),
     ({"types": [2**31 - 1] * 12}, ValueError, r"types must be .* below 2\*\*31 - 1"),
+    ({"types": [0, -1] * 6}, ValueError, r"types\[1\] = -1"),
     ({"supports": np.ones((12, 2))}, ValueError, r"supports must have shape \(12, 2, 2\)"),
     ({"positions": np.zeros((2, 4)), "supports": [np.eye(4)] * 2}, ValueError, "to 3 dimensions"),
     ({"supports": np.tile(np.eye(2), (12, 1, 1)), "radii": [1.0] * 12}, ValueError, "together"),
@@ -344,16 +345,6 @@ def test_a_table_has_a_row_for_each_name():
     assert hs.count_pairs(points[:0], table) == 0
     numbered = points.replace(types=[0, 1, 0])
     assert hs.count_pairs(numbered, table) == 2
-
-
-def test_a_verlet_list_refuses_what_it_does_not_look_at():
-    pair_list = hs.VerletList(1.0)
-    for known in ({"radii": [1.0]}, {"groups": [0]}, {"supports": [np.eye(2)]}, {"batch": [0]}):
-        with pytest.raises(ValueError, match=next(iter(known))):
-            pair_list.update(hs.Points([[0.0, 0.0]], **known))
-    with pytest.raises(ValueError, match="points must be one system, and have a batch of 2"):
-        pair_list.update([[[0.0, 0.0]], [[1.0, 0.0]]])
-    assert pair_list.update(hs.Points([[0.0, 0.0]], types=[0], labels=[1], weights=[1.0]))
 
 
 def test_the_last_systems_of_a_list_may_be_empty():

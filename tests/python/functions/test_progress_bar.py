@@ -2,6 +2,7 @@
 """The bar of ``progress=True``: on a terminal, in a notebook, nowhere else, and gone at the end."""
 
 import io
+import itertools
 import sys
 import types
 
@@ -90,6 +91,14 @@ def test_nothing_is_shown_in_a_file(points, slow, monkeypatch):
     monkeypatch.setattr(sys, "stderr", file)
     hs.pairs(points, 0.08, progress=True)
     assert file.getvalue() == ""
+
+
+def test_short_searches_show_none(points, terminal, monkeypatch):
+    moments = itertools.count(step=1e-6)
+    monkeypatch.setattr(bar, "time", types.SimpleNamespace(monotonic=lambda: next(moments)))
+    screen = terminal()
+    hs.pairs(points, 0.08, progress=True)
+    assert screen.getvalue() == ""
 
 
 def test_errors_leave_no_bar(points, slow, terminal):

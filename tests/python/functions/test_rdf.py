@@ -3,7 +3,6 @@
 its pictures."""
 
 import math
-import sys
 
 import numpy as np
 import pytest
@@ -337,9 +336,3 @@ def test_names_and_coordination(pyplot, points):
     assert axes.get_lines()[2].get_xdata().tolist() == result.edges.tolist()
     part = result["Si", "O"].plot()
     assert part.get_legend() is None and len(part.get_lines()) == 2
-
-
-def test_without_matplotlib_an_error_names_it(monkeypatch):
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(ImportError, match=r"plot needs matplotlib: pip install matplotlib$"):
-        hs.rdf([[0.0], [0.5]], 0.4, bins=2, box=[1.0]).plot()

@@ -212,18 +212,19 @@ def turned_box(rng, aspect):
 # ---- boxes that are refused ----------------------------------------------------------------
 
 
-def searches(points, cutoff, box):
+def searches(points, cutoff, box, **keywords):
     """Every function that takes a box, as (name, call)."""
+    keywords["box"] = box
     edges = [0.0, cutoff]
-    yield "pairs", lambda: hs.pairs(points, cutoff, box=box)
-    yield "neighbors", lambda: hs.neighbors(points, cutoff, box=box)
-    yield "queries", lambda: hs.neighbors(points, cutoff, queries=points[:5], box=box)
-    yield "pairs_between", lambda: hs.pairs_between(points, points[:5], cutoff, box=box)
-    yield "coordination", lambda: hs.coordination(points, cutoff, box=box)
-    yield "pair_histogram", lambda: hs.pair_histogram(points, edges, box=box)
-    yield "iter_pairs", lambda: list(hs.iter_pairs(points, cutoff, box=box))
-    yield "CellList", lambda: hs.CellList(points, cutoff, box=box)
-    yield "VerletList", lambda: hs.VerletList(cutoff, skin=0.1 * cutoff, box=box).update(points)
+    yield "pairs", lambda: hs.pairs(points, cutoff, **keywords)
+    yield "neighbors", lambda: hs.neighbors(points, cutoff, **keywords)
+    yield "queries", lambda: hs.neighbors(points, cutoff, queries=points[:5], **keywords)
+    yield "pairs_between", lambda: hs.pairs_between(points, points[:5], cutoff, **keywords)
+    yield "coordination", lambda: hs.coordination(points, cutoff, **keywords)
+    yield "pair_histogram", lambda: hs.pair_histogram(points, edges, **keywords)
+    yield "iter_pairs", lambda: list(hs.iter_pairs(points, cutoff, **keywords))
+    yield "CellList", lambda: hs.CellList(points, cutoff, **keywords)
+    yield "VerletList", lambda: hs.VerletList(cutoff, skin=0.1 * cutoff, **keywords).update(points)
 
 
 def test_every_search_refuses_boxes_that_float64_does_not_place_points_in(rng):
@@ -233,6 +234,25 @@ def test_every_search_refuses_boxes_that_float64_does_not_place_points_in(rng):
             with pytest.raises(ValueError, match=SKEWED):
                 search()
                 raise AssertionError(name)
+
+
+def test_a_point_too_far_out_along_an_open_direction_is_named(rng):
+    # The vectors that repeat have parts along the third axis: wrapping moves points along it.
+    box = hs.Box([[1.0, 0, 0.2], [0.3, 1, 0.1], [0, 0, 1]])
+    points = rng.random((20, 3))
+    far = points.copy()
+    far[7, 2] += 1e15
+    keywords = {"box": box, "periodic": [True, True, False]}
+    beyond = r"\[7\] lies so far from box, along a direction that does not repeat, that float64"
+    for name, search in searches(far, 0.4, **keywords):
+        if name != "queries":
+            with pytest.raises(ValueError, match="(points|queries)" + beyond):
+                search()
+                raise AssertionError(name)
+    with pytest.raises(ValueError, match="queries" + beyond):
+        hs.neighbors(points, 0.4, queries=far, **keywords)
+    with pytest.raises(ValueError, match="points" + beyond):
+        hs.neighbors(far, 0.4, queries=points, **keywords)
 
 
 def test_cells_for_a_large_cutoff_refuse_what_is_smaller_than_rounding(rng):

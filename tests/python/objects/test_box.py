@@ -129,32 +129,18 @@ BAD = [
     (lambda: hs.Box.from_matrix(np.ones(3)), ValueError, "shape"),
     (lambda: hs.Box.from_matrix(np.ones((3, 3))), ValueError, "box"),
     (lambda: hs.Box.from_matrix(np.eye(9)), ValueError, "shape"),
-    (lambda: hs.Box.from_matrix([[1.0, math.nan], [0.0, 1.0]]), ValueError, "nan"),
-    (lambda: hs.Box.from_matrix([["a", "b"], ["c", "d"]]), TypeError, "box|matrix"),
     (lambda: hs.Box.orthorhombic(1.0, 0.0, 1.0), ValueError, "box"),
-    (lambda: hs.Box.orthorhombic(1.0, math.inf), ValueError, "inf"),
     (lambda: hs.Box.orthorhombic(), ValueError, "shape"),
     (lambda: hs.Box.from_lengths_angles((1, 2), (90, 90, 90)), ValueError, "lengths and angles"),
-    (lambda: hs.Box.from_lengths_angles((1, 2, 0), (90, 90, 90)), ValueError, "lengths"),
     (lambda: hs.Box.from_lengths_angles((1, 2, -3), (90, 90, 90)), ValueError, "lengths"),
     (lambda: hs.Box.from_lengths_angles((1, 2, 3), (90, 90, 180)), ValueError, "angles"),
-    (lambda: hs.Box.from_lengths_angles((1, 2, 3), (90, math.nan, 90)), ValueError, "angles"),
     (lambda: hs.Box.from_lengths_angles((1, 2, 3), (30, 30, 90)), ValueError, "angles"),
-    (lambda: hs.Box.from_lengths_angles("abc", (90, 90, 90)), TypeError, "lengths"),
     (lambda: hs.Box.orthorhombic(1.0, 1.0).wrap(np.zeros((3, 3))), ValueError, "points"),
-    (lambda: hs.Box.orthorhombic(1.0).wrap([[math.nan]]), ValueError, "points.*nan|nan.*points"),
-    (lambda: hs.Box.orthorhombic(1.0).wrap([[1.0]], periodic="T"), TypeError, "periodic"),
     (lambda: hs.Box.orthorhombic(1.0).wrap([[1e300]]), OverflowError, "point"),
-    (lambda: hs.pairs([[1.0]], 1.0, box=hs.Box.orthorhombic(1.0, 2.0)), ValueError, "box"),
     (lambda: hs.Box.from_dimensions((1, 2, 3)), ValueError, "six numbers"),
     (lambda: hs.Box.from_dimensions(np.ones((6, 1))), ValueError, "dimensions"),
     (lambda: hs.Box.from_dimensions(np.zeros(6)), ValueError, "lengths must be finite and positi"),
-    (lambda: hs.Box.from_dimensions((1, 2, math.inf, 90, 90, 90)), ValueError, "lengths"),
-    (lambda: hs.Box.from_dimensions((1, 2, 3, 90, 90, math.nan)), ValueError, "angles"),
     (lambda: hs.Box.from_dimensions((1, 2, 3, 30, 30, 90)), ValueError, "angles"),
-    (lambda: hs.Box.from_dimensions("abcdef"), TypeError, "dimensions"),
-    (lambda: hs.Box.from_dimensions(None), TypeError, "dimensions"),
-    (lambda: hs.Box.from_dimensions([1j] * 6), TypeError, "dimensions"),
 ]
 
 
@@ -250,9 +236,6 @@ def test_one_number_is_a_cube(ndim, rng):
         points = rng.random((80, ndim)) * 6.0
         for box in (1.5, np.float32(1.5), np.array(1.5), 2):
             assert same_arrays(asked(points, box), asked(points, [float(box)] * ndim))
-        for wrong in ("2", True, np.nan, 0.0):
-            with pytest.raises((TypeError, ValueError), match="box"):
-                asked(points, wrong)
 
 
 @pytest.mark.parametrize(

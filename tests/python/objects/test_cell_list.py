@@ -447,18 +447,10 @@ def test_bad_input_is_named():
     build, query, counts = hs.CellList, CELLS.query, CELLS.count_pairs
     nearest, histogram = CELLS.nearest, CELLS.pair_histogram
     check_refusals([
-        (lambda: build([[0.0, np.nan]], 1.0), ValueError, r"points\[0, 1\]"),
-        (lambda: build([[0.0]], -1.0), ValueError, "cutoff"),
         (lambda: build([[0.0]], 1.0, periodic=True), ValueError, "periodic needs a box"),
-        (lambda: build("ab", 1.0), TypeError, "points"),
         (lambda: query([[0.0]]), ValueError, "(must have 2|same number of) columns"),
-        (lambda: query([[0.0, np.inf]]), ValueError, r"queries\[0, 1\]"),
-        (lambda: query([[0.0, 0.0]], -1.0), ValueError, "radius .* got -1.0"),
-        (lambda: query([[0.0, 0.0]], np.nan), ValueError, "radius .* got nan"),
-        (lambda: query([[0.0, 0.0]], 10**400), OverflowError, "radius"),
         (lambda: query([[0.0, 0.0]], [1.0, 2.0]), ValueError, r"shape \(1,\)"),
         (lambda: query([[0.0, 0.0]], [-1.0]), ValueError, r"radius\[0\]"),
-        (lambda: query([[0.0, 0.0]], "a"), TypeError, "radius"),
         *((
             lambda radius=radius: PERIODIC.query(np.zeros((2, 3)), radius), MemoryError,
             "radius spans more images.*smaller radius",
@@ -466,16 +458,12 @@ def test_bad_input_is_named():
         (lambda: CELLS.candidates([[0, 0], [0, -1e300]]), ValueError, r"queries\[1, 1\] = -1e"),
         (lambda: CELLS.cell_of([[1.0, 2.0, 3.0]]), ValueError, "(2|number of) columns"),
         (lambda: CELLS.iter_pairs(sort=True), TypeError, "sort"),
-        (lambda: counts(kernel="none"), TypeError, r"hs.settings\(kernel="),
         (lambda: counts([1.0, 0.5]), ValueError, r"cutoff\[0\] = 1.0 before"),
         (lambda: counts([0.5, 1.0], queries=[[1.0]]), ValueError, "number of columns"),
         (lambda: nearest(1, queries=[[0.0]]), ValueError, "number of columns"),
-        (lambda: nearest(1, rule="max"), TypeError, "rule"),
-        (lambda: nearest(1, inclusive=3), TypeError, "inclusive"),
         (lambda: call(nearest, 1, memory_limit=10.0), MemoryError, "would not fit"),
         (lambda: histogram([0.0, 2.0, 1.0]), ValueError, r"edges\[1\]"),
         (lambda: histogram(EDGES, queries=[[1.0]]), ValueError, "number of columns"),
-        (lambda: histogram(EDGES, types=[0, 1]), TypeError, r"hs.Points\(points, types="),
         (lambda: histogram(EDGES, by_type=True), ValueError, "by_type needs types"),
         (
             lambda: build(TYPED, 1.0).pair_histogram(EDGES, queries=[[0.0, 0.0]], by_type=True),

@@ -2,6 +2,8 @@
 """What is refused, with a message that says what, and leaves everything as it was; what is asked
 for and was not built; what is not built does not take any memory."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -19,11 +21,9 @@ def three():
 
 NODE_LISTS = {
     "n_ghost must be from 0 to 1": lambda: hs.NodeList("a", [[0.0]], [1.0], 2),
-    "n_ghost must be from 0": lambda: hs.NodeList("a", [[0.0]], [1.0], -1),
     "H must have shape": lambda: hs.NodeList("a", [[0.0]], [1.0, 2.0]),
     "H must be finite": lambda: hs.NodeList("a", [[0.0]], [-1.0]),
     "H must be 0 or from": lambda: hs.NodeList("a", [[0.0]], [1e-200]),
-    "positions must be finite": lambda: hs.NodeList("a", [[np.nan]], [1.0]),
     "ids must have shape": lambda: hs.NodeList("a", [[0.0]], [1.0], ids=[1, 2]),
 }
 CONNECTIVITIES = {
@@ -37,7 +37,6 @@ CONNECTIVITIES = {
     "extent must be from": lambda: hs.Connectivity(three(), 2.0**65),
     r"got extent\[1\] = 0.0": lambda: hs.Connectivity(three(), [1.0, 0.0]),
     "one for each list": lambda: hs.Connectivity(three(), [1.0, 2.0, 3.0]),
-    "rule must be": lambda: hs.Connectivity(three(), rule="sum"),
     "names a node that does not exist": lambda: hs.Connectivity(three(), exclude=[(3, 0, 0, 1)]),
     r"does not exist: \[0, 0, 9223372036854775807, 0\]": lambda: hs.Connectivity(
         three(), exclude=np.array([(0, 0, 2**64 - 1, 0)], np.uint64)
@@ -49,7 +48,6 @@ CONNECTIVITIES = {
     "low must not be above": lambda: hs.Connectivity(
         three(), order="morton", morton_box=[[1.0], [0.0]]
     ),
-    "order must be": lambda: hs.Connectivity(three(), order="hilbert"),
     "periodic needs a box": lambda: hs.Connectivity(three(), periodic=True),
 }
 
@@ -57,26 +55,8 @@ CONNECTIVITIES = {
 def test_bad_values_are_refused():
     cases = (NODE_LISTS | CONNECTIVITIES).items()
     check_refusals([(call, ValueError, message) for message, call in cases])
-
-
-WRONG_KINDS = [
-    lambda: hs.NodeList(3, [[0.0]], [1.0]),
-    lambda: hs.NodeList("a", [[0.0]], [1.0], 0.5),
-    lambda: hs.NodeList("a", [[0.0]], [1.0], ids=["x"]),
-    lambda: hs.Connectivity([[0.0]]),
-    lambda: hs.Connectivity(None),
-    lambda: hs.Connectivity(three()).rebuild(3),
-    lambda: hs.Connectivity(three()).patch(None),
-    lambda: hs.Connectivity(three()).patch([[True] * 3, [True]], 5),
-    lambda: hs.Connectivity(hs.NodeList("a", [], [])),
-    lambda: hs.Connectivity(three(), ghosts="yes"),
-    lambda: hs.Connectivity(three(), exclude=[(0.0, 0, 1, 0)]),
-    lambda: hs.PairField([1, 2]),
-]
-
-
-def test_wrong_kinds_are_refused():
-    check_refusals([(call, TypeError, "^(?!.*iterable)") for call in WRONG_KINDS])
+    alone = partial(hs.Connectivity, hs.NodeList("a", [], []))
+    check_refusals([(alone, TypeError, "^(?!.*iterable)")])
 
 
 CHANGES = {

@@ -148,9 +148,9 @@ def wide_ties(n_rows, n_points):
 
 
 def test_a_long_tie_that_does_not_fit_is_refused(monkeypatch):
-    table = wide_ties(1, 30_000)
+    table = wide_ties(1, 60_000)
     monkeypatch.setattr(_core, "available_memory", lambda: 50e6)
-    with pytest.raises(MemoryError, match=r"30000 neighbours .* exactly, would take 0\.08"):
+    with pytest.raises(MemoryError, match=r"60000 neighbours .* exactly, would take 0\.1"):
         table.sort()
 
 
@@ -161,6 +161,8 @@ def test_what_sorting_needs_is_named():
         bare.sort()
     with pytest.raises(AttributeError, match="'j' in quantities"):
         hs.neighbors(SCENE, 0.25, quantities="d").sort()
+    with pytest.raises(ValueError, match="'distance', got 'index'"):
+        table.sort(by="index")
 
 
 def test_rows_are_sorted_a_few_at_a_time(monkeypatch):

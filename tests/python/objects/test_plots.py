@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pictures of pairs, tables, cells and boxes, by what they hold."""
+"""Pictures of pairs, tables, cells, boxes and a connectivity, by what they hold."""
 
 import sys
 
@@ -210,7 +210,59 @@ def test_without_matplotlib_an_error_names_it(monkeypatch):
     table = hs.neighbors(points, 1.0, quantities="D")
     for draw in (
         table.plot, hs.CellList(points, 1.0).plot, hs.Box([1.0, 1.0]).plot,
-        lambda: hs.plot_pairs(points, [0], [1]),
+        lambda: hs.plot_pairs(points, [0], [1]), hs.rdf(points, 0.4, 2, box=2.0).plot,
     ):  # fmt: skip
         with pytest.raises(ImportError, match=r"plot needs matplotlib: pip install matplotlib$"):
             draw()
+
+
+# ---- a connectivity ------------------------------------------------------------------------
+
+
+def lists_of(d, matrices=False):
+    rng = np.random.default_rng(d)
+    x = rng.random((30, d))
+    H = np.tile(np.eye(d) * 4.0, (30, 1, 1)) if matrices else np.full(30, 0.15)
+    return [
+        hs.NodeList("water & ice", x[:20], H[:20], 5), hs.NodeList("<wall>", x[20:], H[20:]),
+        hs.NodeList("none", [], []),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+@pytest.mark.parametrize("matrices", [False, True])
+def test_all_nodes_and_pairs_are_drawn(pyplot, d, matrices):
+    axes = pyplot.subplots()[1]
+    from matplotlib.collections import EllipseCollection, LineCollection
+
+    lists = lists_of(d, matrices)
+    c = hs.Connectivity(lists)
+    assert c.plot(ax=axes, axes=(0, d - 1) if d > 1 else (0, 1)) is axes
+    lines = next(one for one in axes.collections if isinstance(one, LineCollection))
+    assert len(lines.get_segments()) == len(c.pairs)
+    drawn = [one for one in axes.collections if not isinstance(one, LineCollection)]
+    supports = [one for one in drawn if isinstance(one, EllipseCollection)]
+    dots = [one for one in drawn if not isinstance(one, EllipseCollection)]
+    assert [len(one.get_offsets()) for one in dots] == [15, 5, 10, 0, 0, 0]
+    assert [len(one.get_offsets()) for one in supports] == [20, 10]
+    assert np.allclose(dots[0].get_offsets()[:, 0], lists[0].positions[:15, 0])
+    if d > 1:
+        assert np.allclose(supports[0].get_widths(), 1.0 if matrices else 0.6)
+
+
+def test_pairs_in_a_box_are_drawn_to_the_image(pyplot):
+    axes = pyplot.subplots()[1]
+    c = hs.Connectivity([hs.NodeList("a", [[0.1, 0.5], [0.9, 0.5]], [0.2] * 2)], box=1.0)
+    c.plot(ax=axes)
+    (start, end), *_ = axes.collections[0].get_segments()
+    assert abs(start[0] - end[0]) == pytest.approx(0.2)
+
+
+def test_a_notebook_shows_a_row_for_each_list():
+    c = hs.Connectivity(lists_of(2), overlap=True)
+    html = c._repr_html_()
+    assert html.count("<tr>") == 4
+    assert "water &amp; ice" in html
+    assert "&lt;wall&gt;" in html
+    assert "with overlap" in html
+    assert "0 pairs" in hs.Connectivity([])._repr_html_()

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell import _core
 
 POINTS = np.random.RandomState(3).rand(20000, 3) * 20.0
 
@@ -31,10 +30,23 @@ def test_deleted_results_are_kept_and_cleared():
     assert size > 4_000_000
     del found
     gc.collect()
-    assert _core.cache_held() >= size // 2
-    assert hs.cache_info() == (_core.cache_held(), 256 << 20)
+    assert hs.cache_info().held >= size // 2
+    assert hs.cache_info() == (hs.cache_info().held, 256 << 20)
     hs.clear_cache()
-    assert _core.cache_held() == 0
+    assert hs.cache_info().held == 0
+
+
+@pytest.mark.parametrize("n", [300, 1000, 3000, 10_000])
+def test_the_next_call_finds_the_memory_of_the_last_one(n):
+    """Nothing is taken from the system again: no page is met for the first time."""
+    resource = pytest.importorskip("resource")  # of Unix
+    side = (10.0 * n) ** (1 / 3)
+    points = np.random.RandomState(n).rand(n, 3) * side
+    for call in range(30):
+        if call == 10:
+            before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+        hs.pairs(points, 5.0, box=[side] * 3, quantities="ijdDS", threads=1)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before < 500
 
 
 def test_results_that_live_are_not_touched_by_later_ones():
@@ -52,15 +64,15 @@ def test_a_limit_of_zero_keeps_nothing():
     hs.set_cache_limit(0)
     search()
     gc.collect()
-    assert _core.cache_held() == 0
+    assert hs.cache_info().held == 0
 
 
 def test_lowering_the_limit_gives_back_at_once():
     search()
     gc.collect()
-    assert _core.cache_held() > 1_000_000
+    assert hs.cache_info().held > 1_000_000
     hs.set_cache_limit(1_000_000)
-    assert _core.cache_held() <= 1_000_000
+    assert hs.cache_info().held <= 1_000_000
     assert hs.set_cache_limit(256 << 20) == 1_000_000
 
 

@@ -157,6 +157,16 @@ def test_bonds_of_the_page_are_those_of_ase():
     assert found == {(a, b) for a, b in zip(i.tolist(), j.tolist()) if a < b}
 
 
+def test_pages_name_tests_that_there_are():
+    paths = [path for path in (ROOT / "tests").rglob("test_*.*") if path.suffix in (".c", ".py")]
+    sources = "".join(f"{path.name}\n{path.read_text()}" for path in paths)
+    named = [word for page in (ROOT / "docs" / "systems").glob("*.md")
+             for word in re.findall(r"\btest_\w+|\bTest\w+", page.read_text())]  # fmt: skip
+    exactness = (ROOT / "docs" / "exactness.md").read_text()
+    named += re.findall(r"\| `(\w+)(?:\.\.\.)?` \|$", exactness, re.M)
+    assert len(named) > 40 and [word for word in named if word not in sources] == []
+
+
 def test_stub_and_module_name_the_same_functions():
     core = importlib.import_module("halfshell._core")
     stub = ast.parse((ROOT / "python/halfshell/_core.pyi").read_text())

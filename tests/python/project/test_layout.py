@@ -86,7 +86,7 @@ def test_only_the_binding_knows_python():
 
 def test_every_module_of_the_core_is_on_the_map():
     text = (CSRC / "README.md").read_text()
-    modules = {path.stem for path in (CSRC / "core").rglob("*.[ch]")} - {"points_template"}
+    modules = {path.stem for path in (CSRC / "core").rglob("*.[ch]")}
     assert [name for name in sorted(modules) if f"`{name}`" not in text] == []
 
 
@@ -105,21 +105,3 @@ def test_every_source_names_its_license():
     for path in sources:
         if not any(part.startswith("build") for part in path.parts):
             assert "SPDX-License-Identifier" in path.read_text()[:200], path
-
-
-def test_the_primes_of_the_lattice_are_the_largest_below_2_to_62():
-    """By the bases of Miller and Rabin that decide every number below 3.3e24."""
-    text = (CSRC / "core" / "box" / "lattice.c").read_text()
-    table = re.search(r"prime_gaps\[PRIMES\] = \{([^}]+)\}", text)
-    assert table is not None
-    prime = 2**62
-    for gap in map(int, re.findall(r"\d+", table[1])):
-        prime -= gap
-        assert gap % 2 == 0 or prime == 2**62 - 57
-        odd = (prime - 1) // 2
-        halvings = 1
-        while odd % 2 == 0:
-            odd, halvings = odd // 2, halvings + 1
-        for base in (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37):
-            powers = [pow(base, odd << k, prime) for k in range(halvings)]
-            assert powers[0] == 1 or prime - 1 in powers

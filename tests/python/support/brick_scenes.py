@@ -137,6 +137,17 @@ def known_scenes():
     }  # fmt: skip
 
 
+def every_scene():
+    """Name -> what is known of each point, cutoff, box, and which pairs count."""
+    plain = {name: ({"positions": points}, cutoff, scene, {})
+             for name, (points, cutoff, scene) in scenes().items()}  # fmt: skip
+    return plain | {f"{name}, known": scene for name, scene in known_scenes().items()}
+
+
+def without_rule(which):
+    return {key: value for key, value in which.items() if key != "rule"}
+
+
 def rows_of(known, some):
     """What is known of some of the points."""
     return {name: values[some] for name, values in known.items()}

@@ -7,7 +7,7 @@ import numpy as np
 from mpi4py import MPI
 
 import halfshell as hs
-from brick_scenes import LETTERS, in_order, known_scenes, rows_of, same, scenes, serial
+from brick_scenes import LETTERS, every_scene, in_order, rows_of, same, without_rule
 from halfshell.mpi import exchange
 
 COMM = MPI.COMM_WORLD
@@ -15,42 +15,26 @@ RANK, SIZE = COMM.rank, COMM.size
 
 
 def answers():
-    """Every scene, spread unevenly; rank 0 compares."""
-    for name, (points, cutoff, scene) in scenes().items():
-        places = [len(points) * k * k // SIZE**2 for k in range(SIZE + 1)]
-        own = points[places[RANK] : places[RANK + 1]]
-        assert sum(COMM.allgather(len(own))) == len(points)
-        brick, held = exchange(COMM, own, cutoff, **scene)
-        found = COMM.gather(brick.pairs(held, quantities=LETTERS))
-        counts = COMM.allreduce(brick.count_pairs(held))
-        rows = COMM.gather((brick.owned, brick.neighbors(held).counts))
+    """Every scene, spread unevenly, with what is known of its points; rank 0 compares."""
+    for name, (known, cutoff, scene, which) in every_scene().items():
+        n, rest = len(known["positions"]), without_rule(which)
+        places = [n * k * k // SIZE**2 for k in range(SIZE + 1)]
+        own = hs.Points(**rows_of(known, slice(places[RANK], places[RANK + 1])), **scene)
+        assert sum(COMM.allgather(len(own))) == n
+        brick, held = exchange(COMM, own, cutoff, rule=which.get("rule"))
+        found = COMM.gather(brick.pairs(held, quantities=LETTERS, **rest))
+        counts = COMM.allreduce(brick.count_pairs(held, **rest))
+        rows = COMM.gather((brick.owned, brick.neighbors(held, **rest).counts))
         if RANK == 0:
-            expected = serial(points, cutoff, scene)
+            points = hs.Points(**known, **scene)
+            expected = hs.pairs(points, cutoff, quantities=LETTERS, sort=True, **which)
             columns = [np.concatenate(column) for column in zip(*found, strict=True)]
             assert same(in_order(columns), expected), name
             assert counts == len(expected[0]), name
-            of_each = np.zeros(len(points), np.int64)
+            of_each = np.zeros(n, np.int64)
             for owned, row in rows:
                 of_each[owned] = row
-            assert np.array_equal(of_each, hs.coordination(points, cutoff, **scene)), name
-
-
-def known():
-    """Radii, types and so on go with their points."""
-    for name, (fields, cutoff, scene, which) in known_scenes().items():
-        n = len(fields["positions"])
-        own = rows_of(fields, slice(n * RANK // SIZE, n * (RANK + 1) // SIZE))
-        rest = {key: value for key, value in which.items() if key != "rule"}
-        brick, held = exchange(
-            COMM, hs.Points(**own, **scene), cutoff, rule=which.get("rule")
-        )
-        found = COMM.gather(brick.pairs(held, quantities=LETTERS, **rest))
-        if RANK == 0:
-            expected = hs.pairs(
-                hs.Points(**fields, **scene), cutoff, quantities=LETTERS, sort=True, **which
-            )
-            columns = [np.concatenate(column) for column in zip(*found, strict=True)]
-            assert same(in_order(columns), expected) and len(expected[0]), name
+            assert np.array_equal(of_each, hs.coordination(points, cutoff, **which)), name
 
 
 def refusals():
@@ -97,7 +81,7 @@ def refusals():
 
 if __name__ == "__main__":
     try:
-        {"answers": answers, "known": known, "refusals": refusals}[sys.argv[1]]()
+        {"answers": answers, "refusals": refusals}[sys.argv[1]]()
     except BaseException:
         sys.excepthook(*sys.exc_info())
         sys.stderr.flush()
