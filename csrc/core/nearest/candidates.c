@@ -130,15 +130,12 @@ find_node(const hs_tree *tree, const double *middle, double least, double *sides
 void
 hs_nearest_guess(const hs_nearest *near, double scale, hs_nearest_group *group)
 {
-    /* The volume of a ball of radius 1. */
-    static const double volume[HS_MAX_DIM + 1] = {1.0,    2.0,    3.1416, 4.1888, 4.9348,
-                                                  5.2638, 5.1677, 4.7248, 4.0587};
-    const hs_tree      *tree = &near->tree;
-    const hs_lattice   *lattice = &near->search->scene.lattice;
-    const int           d = tree->ndim;
-    const double        k = (double)near->k + near->omits_self, wanted = k + SPREAD * sqrt(k) + 1.0;
-    double              middle[HS_MAX_DIM], sides[HS_MAX_DIM], away, outside = 0.0;
-    bool                whole[HS_MAX_DIM]; /* the node goes on along this side */
+    const hs_tree    *tree = &near->tree;
+    const hs_lattice *lattice = &near->search->scene.lattice;
+    const int         d = tree->ndim;
+    const double      k = (double)near->k + near->omits_self, wanted = k + SPREAD * sqrt(k) + 1.0;
+    double            middle[HS_MAX_DIM], sides[HS_MAX_DIM], away, outside = 0.0;
+    bool              whole[HS_MAX_DIM]; /* the node goes on along this side */
     for (int c = 0; c < d; c++) {
         middle[c] = group->lower[c] + 0.5 * (group->upper[c] - group->lower[c]);
     }
@@ -150,7 +147,7 @@ hs_nearest_guess(const hs_nearest *near, double scale, hs_nearest_group *group)
     }
     /* Sides that are shorter than the ball is wide do not count: points on a line or in a plane
      * have the density of their line or plane. Base 2 logarithms, as products might overflow. */
-    const double width = exp2(log2(volume[d]) / d);
+    const double width = exp2(log2(hs_ball_volume(d, 1.0)) / d);
     double       radius = 0.0, before;
     do {
         double sum = log2(wanted / hs_tree_points(node));
