@@ -25,8 +25,6 @@
 
 #define BIGGEST_INTEGER (INT64_C(1) << 53) /* up to here float64 holds every integer */
 
-#define FIRST_MUST_BE "where systems begin must be an int64 array with one number more than these"
-
 #define MOST_COUNT (INT64_C(1) << 56) /* more than fits in any memory */
 
 /* ---- arrays as the core takes them -------------------------------------------------------- */
@@ -41,7 +39,7 @@ hs_is_array(PyObject *object, int type, int n_axes)
 
 bool
 hs_entries_of(PyObject *object, int type, int n_axes, int64_t length, int64_t width,
-              const char *must, const void **entries)
+              const void **entries)
 {
     PyArrayObject *array = (PyArrayObject *)object;
     *entries = NULL;
@@ -53,12 +51,8 @@ hs_entries_of(PyObject *object, int type, int n_axes, int64_t length, int64_t wi
     for (int k = 1; fits && k < n_axes; k++) {
         fits = PyArray_DIM(array, k) == width;
     }
-    if (!fits) {
-        PyErr_SetString(PyExc_TypeError, must);
-        return false;
-    }
-    *entries = PyArray_DATA(array);
-    return true;
+    *entries = fits ? PyArray_DATA(array) : NULL;
+    return fits;
 }
 
 int64_t
@@ -68,21 +62,14 @@ hs_length_of(PyObject *object)
 }
 
 bool
-hs_points_of(PyObject *object, const char *name, hs_points *points)
+hs_points_of(PyObject *object, hs_points *points)
 {
-    if (!PyArray_Check(object)) {
-        PyErr_Format(PyExc_TypeError, "%s must be an array, got %s", name,
-                     Py_TYPE(object)->tp_name);
-        return false;
-    }
     PyArrayObject *array = (PyArrayObject *)object;
-    const int      type = PyArray_TYPE(array);
-    const npy_intp d = PyArray_NDIM(array) == 2 ? PyArray_DIM(array, 1) : 0;
+    const bool     has_rows = PyArray_Check(object) && PyArray_NDIM(array) == 2;
+    const int      type = has_rows ? PyArray_TYPE(array) : NPY_NOTYPE;
+    const npy_intp d = has_rows ? PyArray_DIM(array, 1) : 0;
     if ((type != NPY_FLOAT && type != NPY_DOUBLE) || PyArray_ISBYTESWAPPED(array) || d < 1 ||
         d > HS_MAX_DIM) {
-        PyErr_Format(PyExc_TypeError,
-                     "%s must be native float32 or float64 of shape (n, d) with 1 <= d <= %d", name,
-                     HS_MAX_DIM);
         return false;
     }
     *points = (hs_points){.data = PyArray_DATA(array),
@@ -109,17 +96,12 @@ hs_repeats_of(PyObject *periodic, unsigned long *repeats)
 }
 
 bool
-hs_box_of(PyObject *object, unsigned long repeats, int ndim, hs_box *box, bool *given)
+hs_box_of(PyObject *object, unsigned long repeats, int ndim, hs_box *box)
 {
-    *given = object != Py_None;
-    if (!*given) {
-        return true;
-    }
     PyArrayObject *array = (PyArrayObject *)object;
     const bool     has_rows = hs_is_array(object, NPY_DOUBLE, 2);
     if ((!has_rows && !hs_is_array(object, NPY_DOUBLE, 1)) || PyArray_DIM(array, 0) != ndim ||
         (has_rows && PyArray_DIM(array, 1) != ndim)) {
-        PyErr_Format(PyExc_ValueError, "box must be a float64 array of shape (%d, %d)", ndim, ndim);
         return false;
     }
     const double *entries = PyArray_DATA(array);
@@ -304,7 +286,7 @@ native_of(hs_py_call *call, PyObject **object, bool is_box)
     }
     if ((type != NPY_DOUBLE && type != NPY_FLOAT && type != NPY_HALF && type != NPY_BOOL &&
          !PyTypeNum_ISINTEGER(type)) ||
-        PyArray_SIZE(array) > SMALL / (npy_intp)sizeof(double)) {
+        (is_box && type == NPY_BOOL) || PyArray_SIZE(array) > SMALL / (npy_intp)sizeof(double)) {
         return false;
     }
     const bool is_wide = PyTypeNum_ISINTEGER(type) && PyArray_ITEMSIZE(array) > 4;
@@ -339,14 +321,13 @@ plain_points(hs_py_call *call, PyObject **object)
 }
 
 static bool
-take_points(hs_py_call *call, PyObject *object, const char *name, hs_points *points,
-            PyObject **array)
+take_points(hs_py_call *call, PyObject *object, hs_points *points, PyObject **array)
 {
     if (call->is_of_users && !plain_points(call, &object)) {
         return false;
     }
     *array = object;
-    return hs_points_of(object, name, points);
+    return hs_points_of(object, points);
 }
 
 /* ---- the box, and axes that repeat -------------------------------------------------------- */
@@ -367,10 +348,9 @@ take_plain_box(hs_py_call *call, PyObject *object, double (*rows)[HS_MAX_DIM])
     if (PyArray_CheckExact(object)) {
         PyArrayObject *array = (PyArrayObject *)object;
         const int      n_axes = PyArray_NDIM(array);
-        bool           given;
         return (n_axes == 1 || n_axes == 2) && PyArray_DIM(array, 0) == d &&
                PyArray_DIM(array, n_axes - 1) == d && native_of(call, &object, true) &&
-               hs_box_of(object, 0, d, &call->box, &given);
+               hs_box_of(object, 0, d, &call->box);
     }
     const bool is_one = hs_number_of(object, &length);
     memset(rows, 0, (size_t)d * sizeof *rows);
@@ -393,7 +373,6 @@ take_box(hs_py_call *call, PyObject *object)
 {
     PyArrayObject *array = (PyArrayObject *)object;
     const int      d = call->points.at.ndim;
-    bool           given;
     if (object == Py_None) {
         return true;
     }
@@ -405,15 +384,13 @@ take_box(hs_py_call *call, PyObject *object)
     } else if (PyArray_Check(object) && PyArray_NDIM(array) == 3) {
         if (!hs_is_array(object, NPY_DOUBLE, 3) || PyArray_DIM(array, 1) != d ||
             PyArray_DIM(array, 2) != d) {
-            PyErr_Format(PyExc_ValueError, "box must be a float64 array of shape (s, %d, %d)", d,
-                         d);
             return false;
         }
         call->each.rows = PyArray_DATA(array);
         for (int l = 0; l < d * HS_MAX_DIM; l++) {
             call->box.rows[l / HS_MAX_DIM][l % HS_MAX_DIM] = l % (HS_MAX_DIM + 1) == 0 ? 1.0 : 0.0;
         }
-    } else if (!hs_box_of(object, 0, d, &call->box, &given)) {
+    } else if (!hs_box_of(object, 0, d, &call->box)) {
         return false;
     }
     call->box.ndim = d;
@@ -464,7 +441,6 @@ take_periodic(hs_py_call *call, PyObject *object, bool has_box)
         return hs_repeats_of(object, &call->repeats);
     }
     if (!hs_is_array(object, NPY_UINT8, 1)) {
-        PyErr_SetString(PyExc_TypeError, "periodic must be bits, or a uint8 array of them");
         return false;
     }
     /* In open space the axes only tell how many systems there are. */
@@ -685,7 +661,6 @@ parts_of(PyObject **object, PyObject *const **known)
         return true;
     }
     if (PyTuple_GET_SIZE(*object) != N_PARTS) {
-        PyErr_Format(PyExc_TypeError, "a set of points is a tuple of %d", N_PARTS);
         return false;
     }
     *known = &PyTuple_GET_ITEM(*object, 1);
@@ -699,7 +674,6 @@ take_known(PyObject *const *known, hs_set *set)
     for (int k = 0; known != NULL && k < N_KNOWN; k++) {
         const void *entries;
         if (!hs_entries_of(known[k], KNOWN[k].type, KNOWN[k].n_axes, set->at.n, set->at.ndim,
-                           "what is known of points must be arrays of an entry for each",
                            &entries)) {
             return false;
         }
@@ -719,17 +693,8 @@ take_reach(PyObject *const *of, hs_py_call *call)
         return true;
     }
     const long rule = PyLong_CheckExact(of[0]) ? PyLong_AsLong(of[0]) : -1;
-    if (rule < 0 || rule >= HS_RULE_END) {
-        PyErr_Clear(); /* of a number that is no long */
-        PyErr_SetString(PyExc_ValueError, "there is no such rule");
-        return false;
-    }
-    if (of[1] != Py_None && !PyFloat_CheckExact(of[1])) {
-        PyErr_SetString(PyExc_TypeError, "extent must be a float");
-        return false;
-    }
-    if (!hs_entries_of(of[2], NPY_DOUBLE, 2, n_types, n_types,
-                       "the table of cutoffs must be a square float64 array", &table)) {
+    if (rule < 0 || rule >= HS_RULE_END || (of[1] != Py_None && !PyFloat_CheckExact(of[1])) ||
+        !hs_entries_of(of[2], NPY_DOUBLE, 2, n_types, n_types, &table)) {
         return false;
     }
     call->among.reach = &call->reach;
@@ -749,19 +714,9 @@ take_selection(PyObject *const *of, hs_py_call *call)
     const hs_set   *points = &call->points, *queries = &call->queries;
     const void     *numbers, *excluded;
     const long long within = PyLong_CheckExact(of[0]) ? PyLong_AsLongLong(of[0]) : 0;
-    if ((of[0] != Py_None && !PyLong_CheckExact(of[0])) || !PyFloat_CheckExact(of[3])) {
-        PyErr_SetString(PyExc_TypeError, "a pairing has an int or None, and a float");
-        return false;
-    }
-    if (within < 0) {
-        PyErr_Clear(); /* of a number that is no long long */
-        PyErr_SetString(PyExc_ValueError, "labels cannot differ by so much");
-        return false;
-    }
-    if (!hs_entries_of(of[1], NPY_INT64, 2, -1, 2, "excluded must be an int64 array of two columns",
-                       &excluded) ||
-        !hs_entries_of(of[2], NPY_INT64, 1, queries->at.n, 0,
-                       "numbers must be an int64 array of one for each query", &numbers)) {
+    if ((of[0] != Py_None && !PyLong_CheckExact(of[0])) || within < 0 ||
+        !PyFloat_CheckExact(of[3]) || !hs_entries_of(of[1], NPY_INT64, 2, -1, 2, &excluded) ||
+        !hs_entries_of(of[2], NPY_INT64, 1, queries->at.n, 0, &numbers)) {
         return false;
     }
     call->selection =
@@ -783,7 +738,6 @@ static bool
 take_pairing(PyObject *object, hs_py_call *call)
 {
     if (!PyTuple_Check(object) || PyTuple_GET_SIZE(object) != 7) {
-        PyErr_SetString(PyExc_TypeError, "a pairing is None or a tuple of seven");
         return false;
     }
     PyObject *const *of = &PyTuple_GET_ITEM(object, 0);
@@ -837,7 +791,7 @@ hs_py_call_scene(hs_py_call *call, PyObject *points, PyObject *box, PyObject *pe
         return true;
     }
     return (!call->is_of_users || open_points(call, &points, &box, &periodic)) &&
-           take_points(call, points, "points", &call->points.at, &call->positions) &&
+           take_points(call, points, &call->points.at, &call->positions) &&
            (periodic == NULL || take_periodic(call, periodic, box != Py_None)) &&
            take_box(call, box);
 }
@@ -847,7 +801,7 @@ take_queries(hs_py_call *call, PyObject *object)
 {
     const hs_points *points = &call->points.at, *queries = &call->queries.at;
     call->among.queries = &call->queries;
-    return take_points(call, object, "queries", &call->queries.at, &call->asked) &&
+    return take_points(call, object, &call->queries.at, &call->asked) &&
            queries->ndim == points->ndim;
 }
 
@@ -875,16 +829,8 @@ static bool
 take_shells(PyObject *object, hs_options *options)
 {
     const bool is_wanted = options->want & HS_WANT_SHELL;
-    if (object == NULL) {
-        if (is_wanted) {
-            PyErr_SetString(PyExc_ValueError,
-                            "the letter k in quantities needs several cutoffs, got one");
-        }
-        return !is_wanted;
-    }
-    if (!is_wanted || !hs_is_array(object, NPY_DOUBLE, 1)) {
-        PyErr_SetString(PyExc_TypeError, "several cutoffs must be a float64 array, with letter k");
-        return false;
+    if (object == NULL || !is_wanted || !hs_is_array(object, NPY_DOUBLE, 1)) {
+        return object == NULL && !is_wanted;
     }
     options->n_shells = PyArray_DIM((PyArrayObject *)object, 0);
     options->shells = PyArray_DATA((PyArrayObject *)object);
@@ -922,12 +868,7 @@ take_systems(PyObject *const *known, PyObject *const *known_of_queries, hs_py_ca
         if (!PyArray_Check(call->of[k]) || (k == 2 && PyArray_NDIM(own) != 3)) {
             continue;
         }
-        if (k == 1 && !hs_is_array(call->of[k], NPY_DOUBLE, 1)) {
-            PyErr_SetString(PyExc_TypeError, "cutoffs of systems must be a float64 array");
-            return false;
-        }
-        if (PyArray_DIM(own, 0) != n) {
-            PyErr_SetString(PyExc_ValueError, "cutoffs, boxes and axes are of as many systems");
+        if ((k == 1 && !hs_is_array(call->of[k], NPY_DOUBLE, 1)) || PyArray_DIM(own, 0) != n) {
             return false;
         }
         call->each.cutoffs = k == 1 ? PyArray_DATA(own) : call->each.cutoffs;
@@ -935,15 +876,8 @@ take_systems(PyObject *const *known, PyObject *const *known_of_queries, hs_py_ca
     if (first == Py_None) {
         return true;
     }
-    if (call->among.cells != NULL) {
-        PyErr_SetString(PyExc_TypeError, "cells are of one system");
-        return false;
-    }
-    if (n < 0) {
-        PyErr_SetString(PyExc_TypeError, FIRST_MUST_BE);
-        return false;
-    }
-    if (!hs_entries_of(first_query, NPY_INT64, 1, n + 1, 0, FIRST_MUST_BE, &begins_of_queries)) {
+    if (call->among.cells != NULL || n < 0 || /* cells are of one system */
+        !hs_entries_of(first_query, NPY_INT64, 1, n + 1, 0, &begins_of_queries)) {
         return false;
     }
     call->among.each = &call->each;
@@ -980,12 +914,12 @@ count_points(const hs_py_call *call)
 }
 
 bool
-hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected)
+hs_expect(const char *name, bool are_right)
 {
-    if (n_arguments != expected) {
-        PyErr_Format(PyExc_TypeError, "%s takes %d arguments", name, expected);
+    if (!are_right && !PyErr_Occurred()) {
+        PyErr_Format(PyExc_TypeError, "%s takes other arguments", name);
     }
-    return n_arguments == expected;
+    return are_right;
 }
 
 /* How many arguments of its own a call has: those at the end may be left out. A wrong number is
@@ -1046,8 +980,7 @@ hs_py_call_take(hs_py_call *call, Py_ssize_t n_arguments)
     PyObject   *of[HS_KINDS] = {NULL};
     hs_options *options = &call->options;
     call->own = call->of + HS_CALL_ARGUMENTS;
-    if (!hs_expect_arguments(function->name, n_arguments, n) || !take_numbers(call, n, of) ||
-        !take_views(of, call)) {
+    if (n_arguments != n || !take_numbers(call, n, of) || !take_views(of, call)) {
         return false;
     }
     if (options->threads == 0) {

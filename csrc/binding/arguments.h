@@ -70,41 +70,43 @@ void hs_py_call_acquire(hs_py_call *call);
 /* Gives back what the arguments took. */
 void hs_py_call_end(hs_py_call *call);
 
-/* Whether a function got as many arguments as it takes; false with an exception set. */
-bool hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected);
+/* Whether a function got what it takes; if not, and no exception is set, sets one that says that it
+ * takes other arguments. Only the Python layer calls, which gives right ones. */
+bool hs_expect(const char *name, bool are_right);
+
+/* Below, false or NULL comes without an exception unless something else is said: functions of the
+ * table need not set one, see hs_py_call_take. */
 
 /* Whether it is a native, C-contiguous array of this type of NumPy with so many axes. */
 bool hs_is_array(PyObject *object, int type, int n_axes);
 
 /* The entries of such an array, of which axis 0 has this length (-1: any) and the others `width`,
- * or NULL for None. False with a TypeError, `must`. */
+ * or NULL for None. */
 bool hs_entries_of(PyObject *object, int type, int n_axes, int64_t length, int64_t width,
-                   const char *must, const void **entries);
+                   const void **entries);
 
 /* The length of axis 0 of an array, 0 for None. */
 int64_t hs_length_of(PyObject *object);
 
 /* n numbers of a list, tuple or array of so many, whose conversion runs no code of others and loses
- * nothing; false, without an exception unless memory was refused, for all else. */
+ * nothing; false, with an exception if memory was refused, for all else. */
 bool hs_numbers_of(PyObject *object, npy_intp n, double *values);
 
-/* A float or a small integer of Python or NumPy; false, without an exception, for all else. */
+/* A float or a small integer of Python or NumPy. */
 bool hs_number_of(PyObject *object, double *value);
 
-/* A native float32 or float64 array of shape (n, d), 1 <= d <= 8. The view borrows from it. `name`
- * is that of the argument, for messages. */
-bool hs_points_of(PyObject *object, const char *name, hs_points *points);
+/* A native float32 or float64 array of shape (n, d), 1 <= d <= 8. The view borrows from it. */
+bool hs_points_of(PyObject *object, hs_points *points);
 
-/* The cells in an object of _core.cells_build, borrowed; NULL, without an exception, for others. */
+/* The cells in an object of _core.cells_build, borrowed; NULL for others. */
 hs_cells *hs_cells_of(PyObject *object);
 #define HS_CELLS_NAME "halfshell.cells"
 
-/* periodic: int, bit l set when box vector l repeats. */
+/* periodic: int, bit l set when box vector l repeats; false with an exception set. */
 bool hs_repeats_of(PyObject *periodic, unsigned long *repeats);
 
-/* box: None, or a C-contiguous float64 array: rows (d, d), or edge lengths (d,). *given tells
- * whether there is a box at all. */
-bool hs_box_of(PyObject *object, unsigned long repeats, int ndim, hs_box *box, bool *given);
+/* A C-contiguous float64 array: rows (d, d), or edge lengths (d,). */
+bool hs_box_of(PyObject *object, unsigned long repeats, int ndim, hs_box *box);
 
 /* By number of the algorithm. */
 extern const char *const hs_algorithm_names[HS_ALGORITHM_END];

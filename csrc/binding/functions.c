@@ -57,10 +57,7 @@ static PyObject *
 search(PyObject *self, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     PyObject *result = run(self, arguments, n_arguments, false);
-    if (result == NULL && !PyErr_Occurred()) {
-        PyErr_Format(PyExc_TypeError, "%s takes arguments of other types",
-                     row_of(self)->function->name);
-    }
+    hs_expect(row_of(self)->function->name, result != NULL);
     return result;
 }
 
@@ -204,7 +201,7 @@ PyObject *
 hs_py_scene(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     hs_py_call call;
-    if (!hs_expect_arguments("scene", n_arguments, 3)) {
+    if (!hs_expect("scene", n_arguments == 3)) {
         return NULL;
     }
     hs_py_call_begin(&call, module, true);
@@ -390,7 +387,7 @@ hs_py_know(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
                                         [HS_CELLS_TYPE] = "CellList",
                                         [HS_SETTINGS] = "settings"};
     PyObject               **known = PyModule_GetState(module);
-    if (!hs_expect_arguments("know", n_arguments, 2)) {
+    if (!hs_expect("know", n_arguments == 2)) {
         return NULL;
     }
     for (int k = HS_BOX_TYPE; k <= HS_SETTINGS && PyUnicode_Check(arguments[0]); k++) {

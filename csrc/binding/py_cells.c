@@ -21,8 +21,7 @@ hs_py_cells_build(hs_py_call *call)
     hs_cells *cells = NULL;
     call->options.cell_size = call->real;
     const void *domain;
-    if (!hs_entries_of(call->own[1], NPY_DOUBLE, 2, 2, call->points.at.ndim,
-                       "domain must be None or an array of two rows", &domain)) {
+    if (!hs_entries_of(call->own[1], NPY_DOUBLE, 2, 2, call->points.at.ndim, &domain)) {
         return NULL;
     }
     call->options.domain = domain;
@@ -76,15 +75,6 @@ indices_of(const hs_cells *cells, const hs_layout *layout)
     return array;
 }
 
-static bool
-expect_cells(const hs_cells *cells)
-{
-    if (cells == NULL) {
-        PyErr_SetString(PyExc_TypeError, "expected what cells_build returns");
-    }
-    return cells != NULL;
-}
-
 PyObject *
 hs_py_cells_layout(PyObject *module, PyObject *capsule)
 {
@@ -92,7 +82,7 @@ hs_py_cells_layout(PyObject *module, PyObject *capsule)
     hs_layout       layout;
     hs_points       points;
     (void)module;
-    if (!expect_cells(cells)) {
+    if (!hs_expect("cells_layout", cells != NULL)) {
         return NULL;
     }
     hs_cells_layout(cells, &layout);
@@ -114,13 +104,11 @@ hs_py_cells_find(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argu
     hs_points       points, own;
     hs_failure      failure;
     (void)module;
-    if (!expect_cells(cells) || !hs_points_of(arguments[1], "points", &points)) {
-        return NULL;
+    if (cells != NULL) {
+        hs_cells_points(cells, &own);
     }
-    hs_cells_points(cells, &own);
-    if (points.ndim != own.ndim) {
-        PyErr_Format(PyExc_ValueError, "points must have %d columns, got %d", own.ndim,
-                     points.ndim);
+    if (!hs_expect("cells_find", cells != NULL && hs_points_of(arguments[1], &points) &&
+                                     points.ndim == own.ndim)) {
         return NULL;
     }
     npy_intp  n = (npy_intp)points.n;
@@ -143,7 +131,7 @@ PyObject *
 hs_py_cells_candidates(hs_py_call *call)
 {
     hs_pairs *ranges = NULL;
-    if (!expect_cells(call->among.cells)) {
+    if (call->among.cells == NULL) {
         return NULL;
     }
     hs_py_call_release(call);
@@ -205,7 +193,6 @@ hs_py_verlet_pairs(hs_py_call *call)
     }
     const hs_verlet_state state = hs_verlet_look(list);
     if (call->points.at.ndim != state.ndim) {
-        PyErr_Format(PyExc_ValueError, "points must have %d dimensions here", state.ndim);
         return NULL;
     }
     call->points.at.n = state.n_points; /* those given are none: the list has its own */
@@ -237,16 +224,17 @@ hs_py_verlet_look(PyObject *module, PyObject *capsule)
 /* Points between two looks for Ctrl-C: some hundredths of a second in the most skewed box. */
 #define POINTS_PER_CALL 32768
 
-/* Points, the box, or NULL where there may be none, and the axes that repeat, of a function that
- * takes so many arguments, these first. */
+/* Points, the box, unless it is None, and the axes that repeat, of a function that takes so many
+ * arguments, these first. */
 static bool
 take_scene(const char *name, PyObject *const *arguments, Py_ssize_t n_arguments, int expected,
-           hs_points *points, hs_box *box, bool *given)
+           hs_points *points, hs_box *box)
 {
     unsigned long repeats;
-    return hs_expect_arguments(name, n_arguments, expected) &&
-           hs_repeats_of(arguments[2], &repeats) && hs_points_of(arguments[0], "points", points) &&
-           hs_box_of(arguments[1], repeats, points->ndim, box, given);
+    return hs_expect(
+        name, n_arguments == expected && hs_points_of(arguments[0], points) &&
+                  hs_repeats_of(arguments[2], &repeats) &&
+                  (arguments[1] == Py_None || hs_box_of(arguments[1], repeats, points->ndim, box)));
 }
 
 PyObject *
@@ -254,20 +242,15 @@ hs_py_box_measure(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
 {
     hs_box        box;
     hs_failure    failure;
-    bool          given;
     unsigned long repeats;
     double        heights[HS_MAX_DIM] = {0}, volume;
     (void)module;
     npy_intp ndim = n_arguments == 2 && hs_is_array(arguments[0], NPY_DOUBLE, 2)
                         ? (npy_intp)hs_length_of(arguments[0])
                         : 0;
-    if (ndim < 1 || ndim > HS_MAX_DIM) {
-        return PyErr_Format(PyExc_TypeError,
-                            "box_measure takes a box (d, d), with 1 <= d <= %d, and periodic bits",
-                            HS_MAX_DIM);
-    }
-    if (!hs_repeats_of(arguments[1], &repeats) ||
-        !hs_box_of(arguments[0], repeats, (int)ndim, &box, &given)) {
+    if (!hs_expect("box_measure", ndim >= 1 && ndim <= HS_MAX_DIM &&
+                                      hs_repeats_of(arguments[1], &repeats) &&
+                                      hs_box_of(arguments[0], repeats, (int)ndim, &box))) {
         return NULL;
     }
     const hs_status status = hs_box_measure(&box, heights, &volume, &failure);
@@ -311,13 +294,9 @@ hs_py_box_wrap(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argume
 {
     hs_points points;
     hs_box    box;
-    bool      given;
     (void)module;
-    if (!take_scene("box_wrap", arguments, n_arguments, 3, &points, &box, &given)) {
-        return NULL;
-    }
-    if (!given) {
-        PyErr_SetString(PyExc_TypeError, "box_wrap needs a box");
+    if (!take_scene("box_wrap", arguments, n_arguments, 3, &points, &box) ||
+        !hs_expect("box_wrap", arguments[1] != Py_None)) {
         return NULL;
     }
     npy_intp   shape[2] = {(npy_intp)points.n, points.ndim};
@@ -337,9 +316,8 @@ hs_py_box_places(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argu
 {
     hs_points points;
     hs_box    box;
-    bool      given;
     (void)module;
-    if (!take_scene("box_places", arguments, n_arguments, 5, &points, &box, &given)) {
+    if (!take_scene("box_places", arguments, n_arguments, 5, &points, &box)) {
         return NULL;
     }
     const double cutoff = PyFloat_AsDouble(arguments[3]);
@@ -353,7 +331,7 @@ hs_py_box_places(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argu
     hs_failure  failure;
     hs_status   status;
     Py_BEGIN_ALLOW_THREADS
-    status = hs_box_places(given ? &box : NULL, &points, cutoff, largest,
+    status = hs_box_places(arguments[1] != Py_None ? &box : NULL, &points, cutoff, largest,
                            PyArray_DATA((PyArrayObject *)places), points.n, &axes, &failure);
     Py_END_ALLOW_THREADS
     PyObject *repeats = status == HS_OK ? PyTuple_New(points.ndim)

@@ -17,7 +17,7 @@
 typedef struct py_dynamic {
     PyObject_HEAD
     hs_dynamic *list;    /* owned */
-    PyObject   *convert; /* owned: see converted() */
+    PyObject   *convert; /* owned: see take_argument */
     int         ndim;
     bool        tagged;
     double      max_radius;
@@ -29,24 +29,6 @@ static bool
 is_to_be_made_again(hs_status status)
 {
     return status == HS_ERR_INTERRUPTED && PyErr_CheckSignals() == 0;
-}
-
-/* An argument of this name that is not plain, as one that is; a new reference or NULL. */
-static PyObject *
-converted(const py_dynamic *self, PyObject *object, const char *name)
-{
-    return PyObject_CallFunction(self->convert, "Osii", object, name, self->ndim, self->tagged);
-}
-
-/* The same after `is_plain`, whether it has been read; takes the reference to it. */
-static bool
-end_converted(PyObject *plain, const char *name, bool is_plain)
-{
-    if (plain != NULL && !is_plain) {
-        PyErr_Format(PyExc_TypeError, "%s was not converted", name);
-    }
-    Py_XDECREF(plain);
-    return is_plain;
 }
 
 /* An integer of Python or NumPy that fits int64; false, without an exception, for all else. */
@@ -80,36 +62,36 @@ plain_key_of(const py_dynamic *self, PyObject *object, hs_key *key)
     return true;
 }
 
-/* name: "key" or "skip". This and the next ones return false with an exception set. */
-static bool
-key_of(const py_dynamic *self, PyObject *object, const char *name, hs_key *key)
-{
-    if (plain_key_of(self, object, key)) {
-        return true;
-    }
-    PyObject *plain = converted(self, object, name);
-    return end_converted(plain, name, plain != NULL && plain_key_of(self, plain, key));
-}
+/* What the argument is that is called so; where it is taken to depends on that. */
+typedef enum { KEY, SKIP, RADIUS, POSITION } argument_kind;
 
 static bool
-radius_of(const py_dynamic *self, PyObject *object, double *radius)
+take_plain(const py_dynamic *self, PyObject *object, argument_kind what, void *to)
 {
-    if (hs_number_of(object, radius)) {
-        return true;
-    }
-    PyObject *plain = converted(self, object, "radius");
-    return end_converted(plain, "radius", plain != NULL && hs_number_of(plain, radius));
+    return what == RADIUS     ? hs_number_of(object, to)
+           : what == POSITION ? hs_numbers_of(object, self->ndim, to)
+                              : plain_key_of(self, object, to);
 }
 
+/* Takes a key, number or position, which `convert` makes plain where it is not; false with an
+ * exception set. */
 static bool
-position_of(const py_dynamic *self, PyObject *object, double *position)
+take_argument(const py_dynamic *self, PyObject *object, argument_kind what, void *to)
 {
-    if (hs_numbers_of(object, self->ndim, position)) {
+    static const char *const names[] = {"key", "skip", "radius", "position"};
+    if (take_plain(self, object, what, to)) {
         return true;
     }
-    PyObject *plain = PyErr_Occurred() ? NULL : converted(self, object, "position");
-    return end_converted(plain, "position",
-                         plain != NULL && hs_numbers_of(plain, self->ndim, position));
+    PyObject  *plain = PyErr_Occurred()
+                           ? NULL
+                           : PyObject_CallFunction(self->convert, "Osii", object, names[what],
+                                                   self->ndim, self->tagged);
+    const bool is_taken = plain != NULL && take_plain(self, plain, what, to);
+    if (plain != NULL && !is_taken) {
+        PyErr_Format(PyExc_TypeError, "%s was not converted", names[what]);
+    }
+    Py_XDECREF(plain);
+    return is_taken;
 }
 
 /* An array of a key for each row: (n,), or (n, 2) with tags. */
@@ -230,9 +212,8 @@ put_many(PyObject *object, PyObject *const *arguments, Py_ssize_t n_arguments)
     int64_t           n;
     hs_points         positions;
     hs_failure        failure = {.row = -1};
-    if (!hs_expect_arguments("put_many", n_arguments, 4) ||
-        !take_keys(arguments, &ids, &tags, &n) ||
-        !hs_points_of(arguments[2], "positions", &positions)) {
+    if (!hs_expect("put_many", n_arguments == 4) || !take_keys(arguments, &ids, &tags, &n) ||
+        !hs_expect("put_many", hs_points_of(arguments[2], &positions))) {
         return NULL;
     }
     if (positions.n != n || positions.ndim != self->ndim) {
@@ -259,8 +240,7 @@ remove_many(PyObject *object, PyObject *const *arguments, Py_ssize_t n_arguments
     const int32_t    *tags;
     int64_t           n;
     hs_failure        failure = {.row = -1};
-    if (!hs_expect_arguments("remove_many", n_arguments, 2) ||
-        !take_keys(arguments, &ids, &tags, &n)) {
+    if (!hs_expect("remove_many", n_arguments == 2) || !take_keys(arguments, &ids, &tags, &n)) {
         return NULL;
     }
     npy_intp  shape = (npy_intp)n;
@@ -277,13 +257,14 @@ remove_many(PyObject *object, PyObject *const *arguments, Py_ssize_t n_arguments
     return removed;
 }
 
-/* cursor, most keys -> the next cursor, keys. */
+/* cursor, most keys, whether positions are wanted -> the next cursor, keys, and (n, ndim)
+ * positions, NaN for those that have none, or None. */
 static PyObject *
 next_keys(PyObject *object, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     const py_dynamic *self = (const py_dynamic *)object;
-    int64_t           cursor = n_arguments == 2 ? PyLong_AsLongLong(arguments[0]) : -1;
-    const int64_t     most = n_arguments == 2 ? PyLong_AsLongLong(arguments[1]) : -1;
+    int64_t           cursor = n_arguments == 3 ? PyLong_AsLongLong(arguments[0]) : -1;
+    const int64_t     most = n_arguments == 3 ? PyLong_AsLongLong(arguments[1]) : -1;
     if (PyErr_Occurred() || cursor < 0 || most < 1) {
         return PyErr_Occurred() ? NULL : PyErr_Format(PyExc_ValueError, "keys: bad arguments");
     }
@@ -292,37 +273,21 @@ next_keys(PyObject *object, PyObject *const *arguments, Py_ssize_t n_arguments)
         return PyErr_NoMemory();
     }
     const int64_t n = hs_dynamic_keys(self->list, &cursor, keys, most);
-    PyObject     *result = Py_BuildValue("(LN)", (long long)cursor, keys_array(self, keys, n));
+    npy_intp      shape[2] = {(npy_intp)n, self->ndim};
+    PyObject     *positions = arguments[2] == Py_True ? PyArray_SimpleNew(2, shape, NPY_DOUBLE)
+                                                      : Py_NewRef(Py_None);
+    for (int64_t e = 0; positions != NULL && positions != Py_None && e < n; e++) {
+        double *row = (double *)PyArray_DATA((PyArrayObject *)positions) + e * self->ndim;
+        if (hs_dynamic_position(self->list, keys[e], row) != HS_OK) {
+            for (int k = 0; k < self->ndim; k++) {
+                row[k] = NAN;
+            }
+        }
+    }
+    PyObject *result =
+        Py_BuildValue("(LNN)", (long long)cursor, keys_array(self, keys, n), positions);
     free(keys);
     return result;
-}
-
-/* Keys as an array of this list -> (n, ndim) positions, NaN for those that have none. */
-static PyObject *
-positions_of_keys(PyObject *object, PyObject *argument)
-{
-    const py_dynamic *self = (const py_dynamic *)object;
-    if (!hs_is_array(argument, NPY_INT64, self->tagged ? 2 : 1)) {
-        PyErr_SetString(PyExc_TypeError, "keys must be an array of int64");
-        return NULL;
-    }
-    const int64_t *data = PyArray_DATA((PyArrayObject *)argument);
-    npy_intp       shape[2] = {PyArray_DIM((PyArrayObject *)argument, 0), self->ndim};
-    PyObject      *array = PyArray_SimpleNew(2, shape, NPY_DOUBLE);
-    double        *rows = array != NULL ? PyArray_DATA((PyArrayObject *)array) : NULL;
-    for (npy_intp e = 0; array != NULL && e < shape[0]; e++) {
-        const hs_key    key = self->tagged ? (hs_key){data[2 * e + 1], (int32_t)data[2 * e]}
-                                           : (hs_key){data[e], 0};
-        const hs_status status = hs_dynamic_position(self->list, key, rows + e * self->ndim);
-        for (int k = 0; status == HS_ERR_ARGUMENT && k < self->ndim; k++) {
-            rows[e * self->ndim + k] = NAN;
-        }
-        if (status == HS_ERR_KEY) {
-            Py_CLEAR(array);
-            PyErr_SetString(PyExc_RuntimeError, "the list changed meanwhile");
-        }
-    }
-    return array;
 }
 
 /* The GIL is taken, to look for signals, so often; the clock is read after so many rows. */
@@ -453,8 +418,8 @@ within(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
     double            position[HS_MAX_DIM], radius;
     hs_failure        failure;
     hs_status         status;
-    if (!hs_expect_arguments("within", n, 3) || !radius_of(self, arguments[1], &radius) ||
-        !position_of(self, arguments[0], position)) {
+    if (!hs_expect("within", n == 3) || !take_argument(self, arguments[1], RADIUS, &radius) ||
+        !take_argument(self, arguments[0], POSITION, position)) {
         return NULL;
     }
     found.with_shift = arguments[2] == Py_True;
@@ -514,7 +479,7 @@ within_many(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
         PyErr_SetString(PyExc_TypeError, "within_many takes positions, a radius and a bool");
         return NULL;
     }
-    if (!radius_of(self, arguments[1], &radius)) {
+    if (!take_argument(self, arguments[1], RADIUS, &radius)) {
         return NULL;
     }
     PyArrayObject *positions = (PyArrayObject *)arguments[0];
@@ -541,11 +506,11 @@ put(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
     double            position[HS_MAX_DIM];
     hs_key            key;
     hs_failure        failure;
-    if (!hs_expect_arguments("put", n, 3) || !key_of(self, arguments[0], "key", &key)) {
+    if (!hs_expect("put", n == 3) || !take_argument(self, arguments[0], KEY, &key)) {
         return NULL;
     }
     const bool has_position = arguments[1] != Py_None;
-    if (has_position && !position_of(self, arguments[1], position)) {
+    if (has_position && !take_argument(self, arguments[1], POSITION, position)) {
         return NULL;
     }
     const hs_status status = (arguments[2] == Py_True ? hs_dynamic_move : hs_dynamic_insert)(
@@ -566,37 +531,39 @@ remove_key(PyObject *object, PyObject *argument)
 {
     const py_dynamic *self = (const py_dynamic *)object;
     hs_key            key;
-    return key_of(self, argument, "key", &key) ? PyBool_FromLong(hs_dynamic_remove(self->list, key))
-                                               : NULL;
+    return take_argument(self, argument, KEY, &key)
+               ? PyBool_FromLong(hs_dynamic_remove(self->list, key))
+               : NULL;
+}
+
+/* The position of a key, or the cell that it is in. */
+static PyObject *
+look_up(const py_dynamic *self, PyObject *argument, bool cell)
+{
+    double   position[HS_MAX_DIM];
+    int64_t  index[HS_MAX_DIM];
+    npy_intp shape = self->ndim;
+    hs_key   key;
+    if (!take_argument(self, argument, KEY, &key)) {
+        return NULL;
+    }
+    const hs_status status = cell ? hs_dynamic_cell(self->list, key, index)
+                                  : hs_dynamic_position(self->list, key, position);
+    return status != HS_OK ? raise_dynamic(self, status, NULL, argument)
+           : cell          ? hs_tuple_of_integers(index, self->ndim)
+                           : hs_array_like(position, 1, &shape, NPY_DOUBLE);
 }
 
 static PyObject *
 position_of_key(PyObject *object, PyObject *argument)
 {
-    const py_dynamic *self = (const py_dynamic *)object;
-    double            position[HS_MAX_DIM];
-    npy_intp          shape = self->ndim;
-    hs_key            key;
-    if (!key_of(self, argument, "key", &key)) {
-        return NULL;
-    }
-    const hs_status status = hs_dynamic_position(self->list, key, position);
-    return status == HS_OK ? hs_array_like(position, 1, &shape, NPY_DOUBLE)
-                           : raise_dynamic(self, status, NULL, argument);
+    return look_up((const py_dynamic *)object, argument, false);
 }
 
 static PyObject *
 cell_of_key(PyObject *object, PyObject *argument)
 {
-    const py_dynamic *self = (const py_dynamic *)object;
-    int64_t           cell[HS_MAX_DIM];
-    hs_key            key;
-    if (!key_of(self, argument, "key", &key)) {
-        return NULL;
-    }
-    const hs_status status = hs_dynamic_cell(self->list, key, cell);
-    return status == HS_OK ? hs_tuple_of_integers(cell, self->ndim)
-                           : raise_dynamic(self, status, NULL, argument);
+    return look_up((const py_dynamic *)object, argument, true);
 }
 
 static PyObject *
@@ -606,7 +573,7 @@ cell_of_position(PyObject *object, PyObject *argument)
     double            position[HS_MAX_DIM];
     int64_t           cell[HS_MAX_DIM];
     hs_failure        failure;
-    if (!position_of(self, argument, position)) {
+    if (!take_argument(self, argument, POSITION, position)) {
         return NULL;
     }
     const hs_status status = hs_dynamic_cell_of(self->list, position, cell, &failure);
@@ -623,9 +590,9 @@ any_within(PyObject *object, PyObject *const *arguments, Py_ssize_t n)
     hs_key            skip;
     hs_failure        failure;
     bool              any = false;
-    if (!hs_expect_arguments("any_within", n, 3) || !radius_of(self, arguments[1], &radius) ||
-        (arguments[2] != Py_None && !key_of(self, arguments[2], "skip", &skip)) ||
-        !position_of(self, arguments[0], position)) {
+    if (!hs_expect("any_within", n == 3) || !take_argument(self, arguments[1], RADIUS, &radius) ||
+        (arguments[2] != Py_None && !take_argument(self, arguments[2], SKIP, &skip)) ||
+        !take_argument(self, arguments[0], POSITION, position)) {
         return NULL;
     }
     const bool skips = arguments[2] != Py_None;
@@ -708,7 +675,7 @@ contains(PyObject *object, PyObject *argument)
 {
     const py_dynamic *self = (const py_dynamic *)object;
     hs_key            key;
-    return key_of(self, argument, "key", &key) ? hs_dynamic_has(self->list, key) : -1;
+    return take_argument(self, argument, KEY, &key) ? hs_dynamic_has(self->list, key) : -1;
 }
 
 static int
@@ -745,7 +712,6 @@ static PyMethodDef methods[] = {
     {"within_many", FASTCALL(within_many), METH_FASTCALL, NULL},
     {"remove_many", FASTCALL(remove_many), METH_FASTCALL, NULL},
     {"keys", FASTCALL(next_keys), METH_FASTCALL, NULL},
-    {"positions", positions_of_keys, METH_O, NULL},
     {"clear", clear, METH_NOARGS, NULL},
     {"shrink_to_fit", shrink, METH_NOARGS, NULL},
     {"copy", copy, METH_NOARGS, NULL},
@@ -804,8 +770,7 @@ hs_py_dynamic_new(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     hs_dynamic        *list;
     hs_box             box;
     unsigned long      repeats;
-    bool               given;
-    if (!hs_expect_arguments("dynamic_new", n_arguments, 9)) {
+    if (!hs_expect("dynamic_new", n_arguments == 9)) {
         return NULL;
     }
     options.ndim = (int)PyLong_AsLong(arguments[0]);
@@ -814,10 +779,11 @@ hs_py_dynamic_new(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     options.cell_size = PyFloat_AsDouble(arguments[1]);
     options.max_radius = PyFloat_AsDouble(arguments[5]);
     if (PyErr_Occurred() || !hs_repeats_of(arguments[3], &repeats) ||
-        !hs_box_of(arguments[2], repeats, options.ndim, &box, &given)) {
+        !hs_expect("dynamic_new", arguments[2] == Py_None ||
+                                      hs_box_of(arguments[2], repeats, options.ndim, &box))) {
         return NULL;
     }
-    options.box = given ? &box : NULL;
+    options.box = arguments[2] != Py_None ? &box : NULL;
     const hs_status status = hs_dynamic_new(&options, &list, &failure);
     if (status != HS_OK) {
         return raise_new(status, &failure);

@@ -14,17 +14,14 @@
 /* The bits of `flags`. */
 enum { GHOST_ROWS = 1, GHOST_PAIRS = 2, ROWS_ONLY = 4, DIRECTED = 8 };
 
-#define MUST "expected arrays of the types and lengths of node lists"
-
 /* The entries of a C-contiguous array of this type with n entries, or with any number where n is
- * -1; *length, unless NULL, is that number. NULL with an exception set. */
+ * -1; *length, unless NULL, is that number. NULL, without an exception, for all else. */
 static const void *
 entries_of(PyObject *object, int type, int64_t n, int64_t *length)
 {
     const void *entries = NULL;
-    if (object == Py_None) {
-        PyErr_SetString(PyExc_TypeError, MUST);
-    } else if (hs_entries_of(object, type, 1, n, 0, MUST, &entries) && length != NULL) {
+    hs_entries_of(object, type, 1, n, 0, &entries);
+    if (entries != NULL && length != NULL) {
         *length = hs_length_of(object);
     }
     return entries;
@@ -42,7 +39,6 @@ take_shifts(PyObject *object, int64_t n, const int32_t **shift, int *ndim)
     }
     if (!hs_is_array(object, NPY_INT32, 2) || PyArray_DIM(array, 0) != n ||
         PyArray_DIM(array, 1) < 1 || PyArray_DIM(array, 1) > HS_MAX_DIM) {
-        PyErr_SetString(PyExc_TypeError, "shifts must be an int32 array of a row for each pair");
         return false;
     }
     *shift = PyArray_DATA(array);
@@ -69,12 +65,8 @@ take_rows(PyObject *const *arguments, int64_t n_lists, hs_list_rows *rows)
     rows->offsets = entries_of(arguments[0], NPY_INT64, -1, &n_offsets);
     rows->indices =
         rows->offsets != NULL ? entries_of(arguments[1], NPY_INT32, -1, &rows->n_indices) : NULL;
-    if (rows->indices == NULL) {
-        return false;
-    }
-    if (n_lists < 0 || n_lists > INT32_MAX || n_offsets < 1 ||
+    if (rows->indices == NULL || n_lists < 0 || n_lists > INT32_MAX || n_offsets < 1 ||
         (n_lists > 0 ? (n_offsets - 1) % n_lists != 0 : n_offsets != 1)) {
-        PyErr_SetString(PyExc_TypeError, "offsets must have an entry for each row and list");
         return false;
     }
     rows->n = n_lists > 0 ? (n_offsets - 1) / n_lists : 0;
@@ -92,17 +84,13 @@ take_lists(PyObject *const *arguments, const hs_py_call *call, hs_node_lists *li
                              .rows_only = (call->integer & ROWS_ONLY) != 0,
                              .directed = (call->integer & DIRECTED) != 0};
     lists->n_nodes = entries_of(arguments[0], NPY_INT64, -1, &n_lists);
-    if (lists->n_nodes == NULL) {
-        return false;
-    }
-    if (n_lists > INT32_MAX) {
-        PyErr_SetString(PyExc_OverflowError, "there must be fewer than 2**31 lists");
+    if (lists->n_nodes == NULL || n_lists > INT32_MAX) {
         return false;
     }
     lists->n_lists = (int32_t)n_lists;
     lists->n_ghosts = entries_of(arguments[1], NPY_INT64, n_lists, NULL);
     if (lists->n_ghosts == NULL ||
-        !hs_entries_of(arguments[2], NPY_INT32, 1, call->points.at.n, 0, MUST, &number)) {
+        !hs_entries_of(arguments[2], NPY_INT32, 1, call->points.at.n, 0, &number)) {
         return false;
     }
     lists->number = number;
@@ -259,13 +247,12 @@ of_each_point(PyObject *const *arguments, Py_ssize_t n_arguments, const char *na
     hs_failure    failure;
     hs_status     status;
     const double *two[2];
-    if (!hs_expect_arguments(name, n_arguments, 3) ||
-        !hs_points_of(arguments[0], "points", &points)) {
+    if (!hs_expect(name, n_arguments == 3 && hs_points_of(arguments[0], &points))) {
         return NULL;
     }
     for (int k = 0; k < 2; k++) {
         two[k] = entries_of(arguments[k + 1], NPY_DOUBLE, points.ndim, NULL);
-        if (two[k] == NULL) {
+        if (!hs_expect(name, two[k] != NULL)) {
             return NULL;
         }
     }
@@ -324,7 +311,7 @@ take_change(PyObject *n_nodes, PyObject *target, PyObject *places, hs_node_chang
     *change = (hs_node_change){.n_lists = 0};
     change->n_nodes = entries_of(n_nodes, NPY_INT64, -1, &n_lists);
     change->target = change->n_nodes != NULL ? entries_of(target, NPY_INT32, -1, &n) : NULL;
-    if (change->target == NULL || !hs_entries_of(places, NPY_INT32, 1, n, 0, MUST, &place)) {
+    if (change->target == NULL || !hs_entries_of(places, NPY_INT32, 1, n, 0, &place)) {
         return false;
     }
     for (int64_t l = 0; l < n_lists; l++) {
@@ -335,7 +322,6 @@ take_change(PyObject *n_nodes, PyObject *target, PyObject *places, hs_node_chang
         }
     }
     if (n_lists > INT32_MAX || n != 0) {
-        PyErr_SetString(PyExc_TypeError, "target must have an entry for each node");
         return false;
     }
     change->place = place;

@@ -49,7 +49,12 @@ raise_memory_of_rows(const hs_failure *failure)
 {
     char text[320], needed[32], limit[48];
     hs_format_limit(failure->limit_bytes, limit, sizeof limit);
-    if (failure->expected_bytes > 0.0 && !isinf(failure->expected_bytes)) {
+    if (isinf(failure->expected_bytes) && failure->row >= 0) {
+        snprintf(text, sizeof text,
+                 "too many images are about as near to %s[%lld] for any search to compare: it is "
+                 "too far from the points, or the box is too small; use a cutoff or a smaller k",
+                 failure->in_queries ? "queries" : "points", (long long)failure->row);
+    } else if (failure->expected_bytes > 0.0 && !isinf(failure->expected_bytes)) {
         hs_format_bytes(failure->expected_bytes, needed, sizeof needed);
         snprintf(text, sizeof text,
                  "the result would not fit: %.3g entries (%s), %s%s; use a smaller k, fewer "
@@ -57,10 +62,7 @@ raise_memory_of_rows(const hs_failure *failure)
                  failure->expected_pairs, needed, limit,
                  hs_took_more(failure) ? " for them and the search" : "");
     } else {
-        snprintf(text, sizeof text,
-                 "no memory for the search: %s; perhaps a point is so far from the others, or "
-                 "the box so small, that too many images are about as near",
-                 limit);
+        snprintf(text, sizeof text, "no memory for the search: %s", limit);
     }
     PyErr_SetString(PyExc_MemoryError, text);
     return NULL;
@@ -139,12 +141,8 @@ hs_py_histogram(hs_py_call *call)
     const void *edges;
     const bool  sums = call->points.weights != NULL || call->queries.weights != NULL;
     const int   type = sums ? NPY_DOUBLE : NPY_INT64;
-    if (!hs_entries_of(call->own[0], NPY_DOUBLE, 1, -1, 0, "edges must be a float64 array",
-                       &edges)) {
-        return NULL;
-    }
-    if (edges == NULL || call->integer < 1 || call->integer > INT32_MAX) {
-        PyErr_SetString(PyExc_ValueError, "edges and a number of types are expected");
+    if (!hs_entries_of(call->own[0], NPY_DOUBLE, 1, -1, 0, &edges) || edges == NULL ||
+        call->integer < 1 || call->integer > INT32_MAX) {
         return NULL;
     }
     const npy_intp n = (npy_intp)call->integer;
@@ -177,8 +175,7 @@ hs_py_clusters(hs_py_call *call)
     const void *core;
     int64_t     n_clusters = 0;
     PyObject   *result = NULL;
-    if (!hs_entries_of(call->own[0], NPY_BOOL, 1, call->points.at.n, 0,
-                       "core is no array of a bool for each point", &core)) {
+    if (!hs_entries_of(call->own[0], NPY_BOOL, 1, call->points.at.n, 0, &core)) {
         return NULL;
     }
     npy_intp  n = (npy_intp)call->points.at.n;
@@ -228,22 +225,12 @@ raise_of_pair(hs_status status, hs_py_call *call)
 static bool
 take_numbers(const hs_py_call *call, hs_pair_numbers *pairs)
 {
-    static const char *const        must = "i and j must be int64 arrays of one length",
-                             *const must_be_rows =
-                                 "S must be an int64 array of a row for each pair";
     PyObject *const *own = call->own + 1;
     const void      *i, *j, *shift;
-    if (!hs_entries_of(own[0], NPY_INT64, 1, -1, 0, must, &i)) {
-        return false;
-    }
-    pairs->n = hs_length_of(own[0]);
-    if (!hs_entries_of(own[1], NPY_INT64, 1, pairs->n, 0, must, &j) ||
-        !hs_entries_of(own[2], NPY_INT64, 2, pairs->n, call->points.at.ndim, must_be_rows,
-                       &shift)) {
-        return false;
-    }
-    if (i == NULL || j == NULL) {
-        PyErr_SetString(PyExc_TypeError, must);
+    pairs->n = PyArray_Check(own[0]) ? hs_length_of(own[0]) : 0;
+    if (!hs_entries_of(own[0], NPY_INT64, 1, pairs->n, 0, &i) || i == NULL ||
+        !hs_entries_of(own[1], NPY_INT64, 1, pairs->n, 0, &j) || j == NULL ||
+        !hs_entries_of(own[2], NPY_INT64, 2, pairs->n, call->points.at.ndim, &shift)) {
         return false;
     }
     pairs->i = i;
@@ -257,11 +244,8 @@ hs_py_measure(hs_py_call *call)
 {
     hs_pair_numbers pairs;
     hs_pairs       *measured = NULL;
-    if (!take_numbers(call, &pairs)) {
-        return NULL;
-    }
-    if (call->among.cells != NULL || call->options.want & HS_WANT_J) {
-        PyErr_SetString(PyExc_TypeError, "measure takes points, and quantities of d D S");
+    if (!take_numbers(call, &pairs) || call->among.cells != NULL ||
+        call->options.want & HS_WANT_J) {
         return NULL;
     }
     if (call->of[9] == Py_None && pairs.n >= HS_POINTS_FOR_THREADS) { /* however few points */

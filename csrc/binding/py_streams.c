@@ -48,7 +48,7 @@ hs_py_next_block(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argu
 {
     hs_pairs *block = NULL;
     (void)module;
-    pair_stream *self = hs_expect_arguments("next_block", n_arguments, 2)
+    pair_stream *self = hs_expect("next_block", n_arguments == 2)
                             ? PyCapsule_GetPointer(arguments[0], STREAM)
                             : NULL;
     if (self == NULL || PyErr_CheckSignals() != 0) {

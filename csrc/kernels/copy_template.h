@@ -26,7 +26,6 @@ largest_of(const float *y, int32_t n, integers largest)
 /* LANES candidates: points from number si on. */
 typedef struct gathered {
     floats   y[HS_MAX_DIM];
-    floats   norm;
     integers id, number;
 } gathered;
 
@@ -34,10 +33,8 @@ HS_ALWAYS_INLINE gathered
 gather_lanes(const hs_gather *gather, const hs_run *run, int64_t si, const int ndim)
 {
     gathered these;
-    these.norm = broadcast(0.0f);
     for (int k = 0; k < ndim; k++) {
         these.y[k] = load_relative(gather->x[k] + si, run->moved[k], 0.0, 1.0);
-        these.norm = multiply_add(these.y[k], these.y[k], these.norm);
     }
     these.id = load_integers(gather->order + si);
     these.number = add_integers(lane_numbers(), broadcast_integer((int32_t)si));
@@ -64,7 +61,6 @@ store_lanes(const hs_gather *gather, int32_t at, const gathered *these, const in
     for (int k = 0; k < ndim; k++) {
         store(gather->y[k] + at, these->y[k]);
     }
-    store(gather->norm + at, these->norm);
     store_integers(gather->id + at, these->id);
     store_integers(gather->number + at, these->number);
 }
@@ -76,7 +72,6 @@ append_lanes(const hs_gather *gather, int32_t at, const gathered *these, mask m,
     for (int k = 0; k < ndim; k++) {
         append_floats(gather->y[k] + at, these->y[k], m);
     }
-    append_floats(gather->norm + at, these->norm, m);
     (void)append(gather->id + at, these->id, m);
     return append(gather->number + at, these->number, m);
 }

@@ -15,11 +15,9 @@
  * between the two thresholds of filter.h; every such hit is decided again by the caller, so results
  * do not depend on the kernel.
  *
- * What is compared is, with c_k = -2 q_k,
- *
- *   expanded   s = (...((norm[c] + c_0 y_0) + c_1 y_1) + ...), |y - q|^2 less |q|^2: one fused
- *              multiply-add an axis where there is one, but errors go with the size of the block
- *   direct     s = (...((y_0 - q_0)^2 + (y_1 - q_1)^2) + ...), each operation rounded once
+ * What is compared is s = (...((y_0 - q_0)^2 + (y_1 - q_1)^2) + ...), each operation rounded once.
+ * The expanded form, |y|^2 - 2 q y with fused operations, has fewer of them, but thresholds for
+ * each point: lists took 1.04 to 1.23 times as long with it, counts 0.92 to 1.07 (AVX2, AVX-512).
  */
 #ifndef HS_KERNEL_H
 #define HS_KERNEL_H
@@ -66,17 +64,6 @@ hs_prefetch_later(const void *to, size_t bytes)
     }
 }
 
-/* The thresholds of one point in the expanded form. */
-HS_ALWAYS_INLINE hs_thresholds
-hs_expanded_thresholds(hs_expanded expanded, const float *centre, const int ndim)
-{
-    double norm = 0.0;
-    for (int k = 0; k < ndim; k++) {
-        norm += (double)centre[k] * (double)centre[k];
-    }
-    return (hs_thresholds){(float)(expanded.in - norm), (float)(expanded.out - norm)};
-}
-
 /* A hit between the thresholds. */
 typedef struct hs_unsure {
     int32_t t;     /* point of the group */
@@ -84,10 +71,9 @@ typedef struct hs_unsure {
     int32_t at;    /* its entry of hits; of no meaning when counting */
 } hs_unsure;
 
-/* What a scan compares with what: all but the second are of the direct form. */
+/* What a scan compares with what. */
 typedef enum hs_scan_form {
     HS_SCAN_DIRECT,
-    HS_SCAN_EXPANDED,
     /* The thresholds of each pair are from scan->limits. */
     HS_SCAN_LIMITS,
     /* Candidates must not be surely beyond by the rule and the supports either, of which
@@ -163,14 +149,12 @@ typedef struct hs_scan {
     bool            counts; /* and lists none; not of HS_SCAN_SQUARES */
     int             ndim;
     const float    *y[HS_MAX_DIM]; /* candidates, n + HS_PADDING each, those past n of any value */
-    const float    *norm;          /* sum of y_k^2, n + HS_PADDING */
     const int32_t  *label;         /* what a hit is listed as; n + HS_PADDING */
     int32_t         n;             /* candidates */
     const float    *q[HS_MAX_DIM]; /* points, n_points each */
     int32_t         n_points;      /* at most HS_GROUP_POINTS */
     bool            triangular;    /* point t meets only the candidates after place t */
-    hs_thresholds   direct;        /* thresholds of the direct form */
-    hs_expanded     expanded;      /* and of the expanded one */
+    hs_thresholds   direct;        /* of s */
     hs_limit_scan   limits;        /* for HS_SCAN_LIMITS only */
     hs_support_scan supports;      /* for HS_SCAN_SUPPORTS only */
     int32_t        *hits;          /* receives labels; most_hits + HS_PADDING */
@@ -212,7 +196,6 @@ typedef struct hs_gather {
     const double  *x[HS_MAX_DIM]; /* points in cell order; HS_PADDING more may be read */
     const int32_t *order;         /* their numbers; HS_PADDING more may be read */
     float         *y[HS_MAX_DIM]; /* room for all candidates and HS_PADDING more */
-    float         *norm;          /* room for all candidates and HS_PADDING more */
     int32_t       *id;            /* room for all candidates and HS_PADDING more */
     int32_t       *number;        /* in cell order; room as in id */
     hs_nearest_box near;          /* candidates that are not near it are left out */
@@ -222,7 +205,7 @@ typedef struct hs_gather {
 
 /*
  * Appends n runs, points runs[0].at to runs[n].at of all that are to be gathered: y_k = (float)(x_k
- * + moved_k), each operation rounded once, norm = sum of y_k^2, fused or not, and id = order.
+ * + moved_k), each operation rounded once, and id = order.
  * Points with s > near.out are left out, s = sum of max(low_k - y_k, y_k - high_k, 0)^2 with each
  * operation rounded once; those with NaN are not. `at` of each run becomes the place of its first
  * candidate, or of the next. Entries past the last may be overwritten.
@@ -251,13 +234,12 @@ typedef struct hs_relative_keys {
     double                  unit; /* a power of two: lengths times this */
     double                  extent;
     float                  *y[HS_MAX_DIM]; /* room for all candidates and HS_PADDING more */
-    float                  *norm;          /* room for all candidates and HS_PADDING more */
     int32_t                *number;        /* room for all candidates and HS_PADDING more */
 } hs_relative_keys;
 
 /* Copies n runs, each of at least one point: y_k = (float)(((x_k + moved_k) - centre_k) * unit),
- * but no further from 0 than extent, each operation rounded once; norm = sum of y_k^2, fused or
- * not; number = that in tree order. Entries past the last may be overwritten. */
+ * but no further from 0 than extent, each operation rounded once; number = that in tree order.
+ * Entries past the last may be overwritten. */
 typedef void (*hs_gather_relative_fn)(const hs_relative_keys *keys, const hs_nearest_run *runs,
                                       int32_t n);
 

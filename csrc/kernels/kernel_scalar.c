@@ -26,7 +26,7 @@ typedef struct scalar_own {
 
 /* What depends on the point that is compared. */
 typedef struct scalar_scan {
-    float         centre[HS_MAX_DIM]; /* q_k, or -2 q_k for the expanded form */
+    float         centre[HS_MAX_DIM];
     hs_thresholds thresholds;
     float         radius; /* for limits: of the point ... */
     const float  *others; /* ... and of the candidates */
@@ -40,11 +40,7 @@ set_point(const hs_scan *scan, int32_t t, const int ndim, const hs_scan_form for
     for (int k = 0; k < ndim; k++) {
         v.centre[k] = scan->q[k][t];
     }
-    v.thresholds = form == HS_SCAN_EXPANDED ? hs_expanded_thresholds(scan->expanded, v.centre, ndim)
-                                            : scan->direct;
-    for (int k = 0; k < ndim; k++) {
-        v.centre[k] *= form == HS_SCAN_EXPANDED ? -2.0f : 1.0f;
-    }
+    v.thresholds = scan->direct;
     if (form == HS_SCAN_LIMITS) {
         v.radius = scan->limits.of_point != NULL ? scan->limits.of_point[t] : 0.0f;
         v.others = hs_limit_row(&scan->limits, t);
@@ -59,17 +55,12 @@ set_point(const hs_scan *scan, int32_t t, const int ndim, const hs_scan_form for
 
 /* s of candidate c. */
 HS_ALWAYS_INLINE float
-square(const float *const *y, const float *norm, const float *centre, int32_t c, const int ndim,
-       const hs_scan_form form)
+square(const float *const *y, const float *centre, int32_t c, const int ndim)
 {
-    float s = form == HS_SCAN_EXPANDED ? norm[c] : 0.0f;
+    float s = 0.0f;
     for (int k = 0; k < ndim; k++) {
-        if (form == HS_SCAN_EXPANDED) {
-            s = s + centre[k] * y[k][c];
-        } else {
-            const float along = y[k][c] - centre[k];
-            s = k == 0 ? along * along : s + along * along;
-        }
+        const float along = y[k][c] - centre[k];
+        s = k == 0 ? along * along : s + along * along;
     }
     return s;
 }
@@ -97,7 +88,7 @@ meet_support(const float *entries, int64_t stride, hs_thresholds thresholds, con
     return (scalar_verdict){!(s > thresholds.out), s < thresholds.in};
 }
 
-/* Candidate c and the point at `centre`, by the direct form and by both supports, as the rule
+/* Candidate c and the point at `centre`, by the cutoff and by both supports, as the rule
  * says. */
 HS_ALWAYS_INLINE scalar_verdict
 meet_supports(const hs_scan *scan, const float *centre, const scalar_own *own, int32_t c,
@@ -132,7 +123,6 @@ test_chunk(const hs_scan *scan, const scalar_scan *v, int32_t begin, int32_t n, 
            const hs_scan_form form, int32_t *HS_RESTRICT near, float *HS_RESTRICT s)
 {
     float        in = v->thresholds.in, out = v->thresholds.out;
-    const float *norm = scan->norm + begin;
     const float *y[HS_MAX_DIM];
     float        centre[HS_MAX_DIM];
     int32_t      unsure = 0;
@@ -147,7 +137,7 @@ test_chunk(const hs_scan *scan, const scalar_scan *v, int32_t begin, int32_t n, 
             unsure |= found.near & !found.sure;
             continue;
         }
-        const float sum = square(y, norm, centre, c, ndim, form);
+        const float sum = square(y, centre, c, ndim);
         if (form == HS_SCAN_LIMITS) {
             const hs_thresholds own = thresholds_of(scan, v, begin + c);
             in = own.in;
@@ -170,7 +160,7 @@ is_sure(const hs_scan *scan, const scalar_scan *v, int32_t c, const int ndim, hs
     if (form == HS_SCAN_SUPPORTS) {
         return meet_supports(scan, v->centre, &v->own, c, ndim).sure;
     }
-    const float s = square(scan->y, scan->norm, v->centre, c, ndim, form);
+    const float s = square(scan->y, v->centre, c, ndim);
     return s < (form == HS_SCAN_LIMITS ? thresholds_of(scan, v, c).in : v->thresholds.in);
 }
 
@@ -225,18 +215,6 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form for
 
 #include "scan_forms.h"
 
-/* One axis of n points: y, and its part of norm. */
-HS_ALWAYS_INLINE void
-gather_axis(const double *HS_RESTRICT x, double moved, int32_t n, const bool is_first,
-            float *HS_RESTRICT y, float *HS_RESTRICT norm)
-{
-    for (int32_t c = 0; c < n; c++) {
-        const float place = (float)(x[c] + moved);
-        y[c] = place;
-        norm[c] = is_first ? place * place : norm[c] + place * place;
-    }
-}
-
 /* Appends n points from number si on, all of them. */
 static void
 gather_points(const hs_gather *gather, const hs_run *run, int32_t at, int32_t n)
@@ -244,10 +222,13 @@ gather_points(const hs_gather *gather, const hs_run *run, int32_t at, int32_t n)
     const int32_t *HS_RESTRICT order = gather->order + run->si;
     int32_t *HS_RESTRICT       id = gather->id + at;
     int32_t *HS_RESTRICT       number = gather->number + at;
-    float                     *norm = gather->norm + at;
-    gather_axis(gather->x[0] + run->si, run->moved[0], n, true, gather->y[0] + at, norm);
-    for (int k = 1; k < gather->ndim; k++) {
-        gather_axis(gather->x[k] + run->si, run->moved[k], n, false, gather->y[k] + at, norm);
+    for (int k = 0; k < gather->ndim; k++) {
+        const double *HS_RESTRICT x = gather->x[k] + run->si;
+        float *HS_RESTRICT        y = gather->y[k] + at;
+        const double              moved = run->moved[k];
+        for (int32_t c = 0; c < n; c++) {
+            y[c] = (float)(x[c] + moved);
+        }
     }
     for (int32_t c = 0; c < n; c++) {
         id[c] = order[c];
@@ -280,7 +261,6 @@ keep_near(const hs_gather *gather, int32_t at, int32_t n)
         for (int k = 0; k < gather->ndim; k++) {
             gather->y[k][to] = gather->y[k][c];
         }
-        gather->norm[to] = gather->norm[c];
         gather->id[to] = gather->id[c];
         gather->number[to] = gather->number[c];
         to += near;
@@ -354,7 +334,6 @@ gather_relative(const hs_relative_keys *keys, const hs_nearest_run *runs, int32_
     const float extent = (float)keys->extent;
     for (int32_t r = 0; r < n_runs; r++) {
         const hs_nearest_run *run = &runs[r];
-        float *HS_RESTRICT    norm = keys->norm + run->at;
         int32_t *HS_RESTRICT  number = keys->number + run->at;
         for (int k = 0; k < keys->ndim; k++) {
             const double *HS_RESTRICT x = keys->x[k] + run->si;
@@ -363,7 +342,6 @@ gather_relative(const hs_relative_keys *keys, const hs_nearest_run *runs, int32_
             for (int32_t c = 0; c < run->n; c++) {
                 const float place = (float)((x[c] + moved - keys->centre[k]) * keys->unit);
                 y[c] = place > extent ? extent : place < -extent ? -extent : place;
-                norm[c] = (k > 0 ? norm[c] : 0.0f) + y[c] * y[c];
             }
         }
         for (int32_t c = 0; c < run->n; c++) {

@@ -18,15 +18,11 @@ gather_relative_runs(const hs_relative_keys *keys, const hs_nearest_run *runs, i
         const double         *moved = keys->images[run->image].moved;
         for (int32_t c = 0; c < run->n; c += LANES) {
             const int32_t to = run->at + c, si = run->si + c;
-            floats        sum = broadcast(0.0f);
             for (int k = 0; k < ndim; k++) {
                 const double *x = keys->x[k] + si;
                 const floats  y = load_relative(x, moved[k], keys->centre[k], unit);
-                const floats  place = larger_of(smaller_of(y, most), least);
-                store(keys->y[k] + to, place);
-                sum = multiply_add(place, place, sum);
+                store(keys->y[k] + to, larger_of(smaller_of(y, most), least));
             }
-            store(keys->norm + to, sum);
             store_integers(keys->number + to, add_integers(lanes, broadcast_integer(si)));
         }
     }

@@ -34,12 +34,6 @@ scan_direct(hs_scan *scan, int32_t first)
 }
 
 static HS_NO_INLINE int32_t
-scan_expanded(hs_scan *scan, int32_t first)
-{
-    return scan_form(scan, first, HS_SCAN_EXPANDED);
-}
-
-static HS_NO_INLINE int32_t
 scan_limits(hs_scan *scan, int32_t first)
 {
     return scan_form(scan, first, HS_SCAN_LIMITS);
@@ -61,7 +55,6 @@ static int32_t
 scan_any(hs_scan *scan, int32_t first)
 {
     switch (scan->form) {
-    case HS_SCAN_EXPANDED: return scan_expanded(scan, first);
     case HS_SCAN_LIMITS: return scan_limits(scan, first);
     case HS_SCAN_SUPPORTS: return scan_supports(scan, first);
     case HS_SCAN_SQUARES: return scan_squares(scan, first);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * slab.h: the contract of the float32 test of listed pairs: the direct form of filter.h, between
+ * slab.h: the contract of the float32 test of listed pairs: that of filter.h, between
  * points that lie anywhere in memory. Pairs come in bundles, so that one point of each stays in
  * registers and the list has one number a pair; a point is one vector of four floats, the last of
  * which is its number, so that one load brings all that is needed of it.

@@ -10,6 +10,7 @@ Nothing is computed for it, and no colour is set: a notebook's own are used.
 from __future__ import annotations
 
 from dataclasses import fields, is_dataclass
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,11 @@ def shown(kind: Any) -> Any:
     """Decorate a named tuple, to show itself so."""
     kind.__repr__, kind._repr_html_ = line, html
     return kind
+
+
+def attribute(path: str, doc: str | None = None) -> Any:
+    """An attribute that can only be read: what the object has at this path, as "_links.pairs"."""
+    return property(attrgetter(path), doc=doc)
 
 
 def facts(value: Any) -> list[tuple[str, str]]:

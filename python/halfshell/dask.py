@@ -198,9 +198,7 @@ def bricks(points: Collection | Points, cutoff: CutoffLike, **search: Unpack[Sea
     Bricks(2 of 8 points, overhead 1.25)
     """
     parts = _Parts(points, cutoff, directed=True, **search)
-    return _task(_bricks_of)(
-        parts.division, *[_task(_brick_of)(part) for part in parts.parts]
-    )
+    return _task(Bricks)([part.in_order()[0] for part in parts.parts])
 
 
 def pairs(
@@ -551,14 +549,6 @@ def _pieces_of(
     chunk: Any, ndim: int, dtype: np.dtype[Any], place: int, known: Known, division: Division
 ) -> list[Piece]:
     return split(_of_chunk(chunk, ndim, dtype, place, known), division, place)
-
-
-def _brick_of(part: Part) -> Brick:
-    return part.in_order()[0]
-
-
-def _bricks_of(division: Division, *made: Brick) -> Bricks:
-    return Bricks(made)
 
 
 def _pairs_of(part: Part, how: dict[str, Any], options: dict[str, Any]) -> tuple[Group, ...]:

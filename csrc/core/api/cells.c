@@ -13,25 +13,6 @@
 /* cells.c: the public functions of cells: points that are copied, sorted once and searched many
  * times. */
 
-/* The points in memory of the cells: the caller cannot change them between searches. */
-static hs_status
-keep_points(const hs_points *points, hs_cells *cells)
-{
-    const int64_t width = points->ndim * (int64_t)sizeof(double);
-    cells->copy = hs_alloc(&cells->call.account, HS_FOR_ORIGINALS, points->n, (size_t)width);
-    if (cells->copy == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    hs_points_copy(points, cells->copy);
-    cells->points = (hs_points){.data = cells->copy,
-                                .n = points->n,
-                                .ndim = points->ndim,
-                                .real = HS_FLOAT64,
-                                .row_stride = (ptrdiff_t)width,
-                                .column_stride = sizeof(double)};
-    return HS_OK;
-}
-
 /* Whether all ends are finite, where something is fixed, and those of axes that do not matter. */
 static bool
 is_domain(const double *domain, int ndim)
@@ -63,9 +44,19 @@ build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
         status = HS_ERR_ARGUMENT;
     }
     if (status == HS_OK) {
-        status = keep_points(points, cells);
+        /* The points in memory of the cells: the caller cannot change them between searches. */
+        const int64_t width = points->ndim * (int64_t)sizeof(double);
+        cells->copy = hs_alloc(&call->account, HS_FOR_ORIGINALS, points->n, (size_t)width);
+        status = cells->copy != NULL ? HS_OK : HS_ERR_MEMORY;
+        cells->points = (hs_points){.data = cells->copy,
+                                    .n = points->n,
+                                    .ndim = points->ndim,
+                                    .real = HS_FLOAT64,
+                                    .row_stride = (ptrdiff_t)width,
+                                    .column_stride = sizeof(double)};
     }
     if (status == HS_OK) {
+        hs_points_copy(points, cells->copy);
         /* keeps_none: no pairs are kept by this call */
         const hs_sets sets = {.points = &cells->points,
                               .is_kept = true,
@@ -170,32 +161,29 @@ hs_cells_layout(const hs_cells *cells, hs_layout *layout)
     hs_fpenv_leave(saved);
 }
 
-/* The occupied cell with these indices, or -1. */
-static int64_t
-find_occupied(const hs_sparse *sparse, const int64_t *index, int64_t *hint)
-{
-    const int64_t    row = hs_sparse_find_row(sparse, index, hint);
-    hs_sparse_cursor cursor = {0, 0};
-    int32_t          first, end;
-    if (row < 0) {
-        return -1;
-    }
-    cursor.low = cursor.high = sparse->row_cell[row];
-    hs_sparse_window(sparse, row, index[0], index[0], &cursor, &first, &end);
-    return end > first ? cursor.low : -1;
-}
-
+/* -1 where only occupied cells are stored and that one is not. */
 static int64_t
 cell_of_point(const hs_search *search, const hs_scene *scene, int64_t i, int64_t *hint)
 {
-    int64_t index[HS_MAX_DIM], cell = 0;
+    const hs_sparse *sparse = &search->sparse;
+    int64_t          index[HS_MAX_DIM], cell = 0;
     for (int k = 0; k < scene->ndim; k++) {
         const double t = hs_scene_coordinate(scene, i, k);
         index[k] = search->is_sparse ? hs_sparse_index(&search->grid, k, t)
                                      : hs_grid_index(&search->grid, k, t);
         cell += index[k] * search->grid.stride[k];
     }
-    return search->is_sparse ? find_occupied(&search->sparse, index, hint) : cell;
+    if (!search->is_sparse) {
+        return cell;
+    }
+    hs_sparse_cursor cursor = {0, 0};
+    int32_t          first, end;
+    const int64_t    row = hs_sparse_find_row(sparse, index, hint);
+    if (row < 0) {
+        return -1;
+    }
+    hs_sparse_window(sparse, row, index[0], index[0], &cursor, &first, &end);
+    return end > first ? cursor.low : -1;
 }
 
 hs_status
@@ -264,18 +252,6 @@ typedef struct range_list {
     int64_t          si, unpolled; /* the query, in cell order; work since the last poll */
 } range_list;
 
-static void
-add_range(range_list *list, int64_t query, int32_t first, int32_t end)
-{
-    if (first < end) {
-        const int64_t at = list->counts[query]++;
-        if (list->offsets != NULL) {
-            list->first[list->offsets[query] + at] = first;
-            list->end[list->offsets[query] + at] = end;
-        }
-    }
-}
-
 /* Polls after so much more work: rows of cells, of which there may be thousands for one query, and
  * images of them, of which there may be millions. */
 static hs_status
@@ -303,7 +279,13 @@ add_window(range_list *list, int64_t query, hs_link *link, int64_t low, int64_t 
     do {
         int32_t first, end;
         hs_link_window(search, link, low - turn * n_x, high - turn * n_x, &first, &end);
-        add_range(list, query, first, end);
+        if (first < end) {
+            const int64_t at = list->counts[query]++;
+            if (list->offsets != NULL) {
+                list->first[list->offsets[query] + at] = first;
+                list->end[list->offsets[query] + at] = end;
+            }
+        }
         status = poll_sometimes(list, 1);
         turn++;
     } while (status == HS_OK && repeats && turn * n_x <= high);
@@ -402,16 +384,26 @@ list_ranges(hs_search *search, hs_pairs *rows, hs_failure *failure)
     return status;
 }
 
-static hs_status
-find_candidates(const hs_cells *cells, const hs_points *queries, hs_pairs *rows,
-                hs_failure *failure)
+hs_status
+hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_options *options,
+                    hs_pairs **result, hs_failure *failure)
 {
-    hs_search search;
-    hs_call  *call = &rows->call;
-    hs_sets   sets = {
-          .points = &cells->points, .queries = queries, .built = &cells->search, .is_full = true};
-    sets.is_untested = true;
-    sets.keeps_none = true; /* no pairs; the ranges are allocated when their number is known */
+    if (!hs_can_return(result, options) || cells == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
+    hs_pairs *rows = hs_pairs_begin(options, &failure);
+    if (rows == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    hs_search     search;
+    hs_call      *call = &rows->call;
+    const hs_sets sets = {.points = &cells->points,
+                          .queries = queries,
+                          .built = &cells->search,
+                          .is_full = true,
+                          .is_untested = true,
+                          /* no pairs; the ranges are allocated when their number is known */
+                          .keeps_none = true};
     hs_status status = hs_check_arguments(&cells->points, queries, NULL, &call->options, failure);
     if (status == HS_OK) {
         call->options.precision = cells->call.options.precision; /* no pair is decided on */
@@ -436,20 +428,5 @@ find_candidates(const hs_cells *cells, const hs_points *queries, hs_pairs *rows,
     if (status != HS_OK) {
         failure->limit_bytes = status == HS_ERR_MEMORY ? call->account.limit : 0.0;
     }
-    return status;
-}
-
-hs_status
-hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_options *options,
-                    hs_pairs **result, hs_failure *failure)
-{
-    if (!hs_can_return(result, options) || cells == NULL) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    hs_pairs *rows = hs_pairs_begin(options, &failure);
-    if (rows == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    const hs_status status = find_candidates(cells, queries, rows, failure);
     return hs_pairs_finish(rows, status, 0, result);
 }

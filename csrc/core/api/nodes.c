@@ -6,55 +6,31 @@
 #include "../threads/call.h"
 
 #include <math.h>
+#include <string.h>
 
 /* nodes.c: the public functions of node lists: rows and pairs, of a search or of a half list, and
  * what is made of them. */
 
-/* How many nodes there are; HS_ERR_TOO_MANY from 2^31 on. */
-static hs_status
-count_nodes(const hs_node_lists *lists, int64_t *n)
-{
-    *n = 0;
-    if (lists == NULL || lists->n_lists < 0 || (lists->n_lists > 0 && lists->n_nodes == NULL)) {
-        return HS_ERR_ARGUMENT;
-    }
-    for (int32_t l = 0; l < lists->n_lists; l++) {
-        const int64_t more = lists->n_nodes[l];
-        if (more < 0) {
-            return HS_ERR_ARGUMENT;
-        }
-        if (more > INT32_MAX - *n) {
-            return HS_ERR_TOO_MANY;
-        }
-        *n += more;
-    }
-    return HS_OK;
-}
-
-/* Begins a call that makes a connectivity of the nodes of these lists, if `has_input`: *failure
- * becomes where the failure goes, *n how many nodes there are. connectivity_end must follow. NULL,
- * with *status, where the call has ended. */
+/* Begins a call that makes a connectivity, if `has_input`: *failure becomes where the failure goes.
+ * connectivity_end must follow. NULL, with *status, where the call has ended. */
 static hs_connectivity *
-connectivity_begin(bool has_input, const hs_node_lists *lists, const hs_options *options,
-                   hs_connectivity **result, int64_t *n, hs_failure **failure, hs_status *status)
+connectivity_begin(bool has_input, const hs_options *options, hs_connectivity **result,
+                   hs_failure **failure, hs_status *status)
 {
     hs_connectivity *made = NULL;
     if (result != NULL) {
         *result = NULL;
     }
-    *status = count_nodes(lists, n);
-    if (*status == HS_OK && (result == NULL || options == NULL || !has_input)) {
-        *status = HS_ERR_ARGUMENT;
+    *status = result != NULL && options != NULL && has_input ? HS_ERR_MEMORY : HS_ERR_ARGUMENT;
+    if (*status == HS_ERR_MEMORY) {
+        made = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *made);
     }
-    if (*status == HS_OK) {
-        made = hs_connectivity_new();
-        *status = made == NULL ? HS_ERR_MEMORY : HS_OK;
-    }
-    if (*status != HS_OK) {
+    if (made == NULL) {
         (void)hs_end_early(*status, options, *failure);
         return NULL;
     }
-    *failure = hs_call_enter(options, *failure, &made->call);
+    memset(made, 0, sizeof *made);
+    *failure = hs_call_enter(options, *failure, &made->rows.call);
     *status = hs_check_resources(options);
     return made;
 }
@@ -68,9 +44,10 @@ connectivity_end(hs_connectivity *made, hs_status status, hs_connectivity **resu
     if (made == NULL) {
         return status;
     }
-    hs_call_tell_limit(&made->call, status, failure);
-    hs_call_leave(&made->call, hs_pairs_length(made->nodes));
-    hs_call_detach(&made->call);
+    hs_call *const call = &made->rows.call;
+    hs_call_tell_limit(call, status, failure);
+    hs_call_leave(call, hs_pairs_length(&made->nodes));
+    hs_call_detach(call);
     if (status == HS_OK) {
         *result = made;
     } else {
@@ -110,29 +87,31 @@ hs_status
 hs_connectivity_link(const hs_half_list *pairs, const hs_node_lists *lists,
                      const hs_options *options, hs_connectivity **result, hs_failure *failure)
 {
-    int64_t          n;
-    hs_status        status;
-    hs_output        half = {.n_pairs = 0};
-    hs_pairs        *rows = NULL;
-    hs_connectivity *made =
-        connectivity_begin(pairs != NULL, lists, options, result, &n, &failure, &status);
+    hs_status         status;
+    hs_node_map       map = {.n = 0};
+    hs_output         half = {.n_pairs = 0}, offsets = half, rows = half;
+    hs_connectivity  *made = connectivity_begin(pairs != NULL, options, result, &failure, &status);
+    hs_account *const account = made != NULL ? &made->rows.call.account : NULL;
     if (status == HS_OK) {
-        status = hs_half_list_copy(&made->call.account, pairs, n, lists->directed, &half, failure);
+        status = hs_node_map_make(account, lists, -1, &map);
+    }
+    if (status == HS_OK) {
+        status = hs_half_list_copy(account, pairs, map.n, lists->directed, &half, failure);
     }
     if (status == HS_OK) {
         status = hs_output_check_opposites(&half, failure);
     }
     if (status == HS_OK) {
-        rows = hs_part_new();
-        status = rows != NULL ? hs_half_list_rows(&made->call, &half, n, lists->directed,
-                                                  &rows->offsets, &rows->output)
-                              : HS_ERR_MEMORY;
+        status =
+            hs_half_list_rows(&made->rows.call, &half, map.n, lists->directed, &offsets, &rows);
     }
     if (status == HS_OK) {
-        status = hs_connectivity_fill(made, lists, &half, &rows);
+        status = hs_connectivity_fill(made, &map, &half, &offsets, &rows);
     }
     hs_output_free(&half);
-    hs_pairs_free(rows);
+    hs_output_free(&offsets);
+    hs_output_free(&rows);
+    hs_node_map_free(account, &map);
     return connectivity_end(made, status, result, failure);
 }
 
@@ -140,14 +119,13 @@ hs_status
 hs_connectivity_build(const hs_among *among, const hs_node_lists *lists, const hs_options *options,
                       hs_connectivity **result, hs_failure *failure)
 {
-    int64_t   n = 0;
-    hs_pairs *found = NULL;
-    hs_status status = count_nodes(lists, &n);
+    hs_pairs   *found = NULL;
+    hs_node_map map = {.n = 0};
     if (result != NULL) {
         *result = NULL;
     }
-    if (status != HS_OK || result == NULL || options == NULL || among == NULL) {
-        return hs_end_early(status != HS_OK ? status : HS_ERR_ARGUMENT, options, failure);
+    if (result == NULL || options == NULL || among == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     hs_options    search = *options; /* for all neighbours */
     const hs_box *box = among->cells != NULL ? hs_cells_box(among->cells) : among->box;
@@ -159,22 +137,28 @@ hs_connectivity_build(const hs_among *among, const hs_node_lists *lists, const h
     }
     /* Only to look at the points; a half list, so that queries are refused. */
     const hs_query query = hs_query_among(among, HS_HALF_LIST, &search);
-    if (query.among != NULL || query.sets.points == NULL || query.sets.points->n != n) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    hs_status      status = query.among != NULL || query.sets.points == NULL
+                                ? HS_ERR_ARGUMENT
+                                : hs_node_map_make(NULL, lists, query.sets.points->n, &map);
+    if (status != HS_OK) {
+        return hs_end_early(status, options, failure);
     }
     status = hs_neighbors_find(among, &search, &found, failure);
-    if (status != HS_OK) {
-        return status;
-    }
-    hs_options linking = *options; /* its counters are those of the search */
-    linking.counters = NULL;
-    hs_connectivity *made =
-        connectivity_begin(true, lists, &linking, result, &n, &failure, &status);
     if (status == HS_OK) {
-        status = hs_connectivity_fill(made, lists, NULL, &found);
+        hs_options linking = *options; /* its counters are those of the search */
+        linking.counters = NULL;
+        hs_connectivity *made = connectivity_begin(true, &linking, result, &failure, &status);
+        hs_output        half = {.n_pairs = 0};
+        if (status == HS_OK) { /* the search has ended: its account is closed */
+            found->offsets.account = found->output.account = NULL;
+            status = hs_connectivity_fill(made, &map, &half, &found->offsets, &found->output);
+        }
+        hs_output_free(&half);
+        status = connectivity_end(made, status, result, failure);
     }
     hs_pairs_free(found);
-    return connectivity_end(made, status, result, failure);
+    hs_node_map_free(NULL, &map);
+    return status;
 }
 
 hs_status
@@ -229,12 +213,17 @@ hs_status
 hs_connectivity_pair(const hs_list_rows *rows, const hs_node_lists *lists,
                      const hs_options *options, hs_connectivity **result, hs_failure *failure)
 {
-    int64_t          n;
     hs_status        status;
-    hs_connectivity *made =
-        connectivity_begin(rows != NULL, lists, options, result, &n, &failure, &status);
+    hs_node_map      map = {.n = 0};
+    hs_connectivity *made = connectivity_begin(rows != NULL, options, result, &failure, &status);
     if (status == HS_OK) {
-        status = hs_connectivity_fill_pairs(made, lists, n, rows);
+        status = hs_node_map_make(&made->rows.call.account, lists, -1, &map);
+    }
+    if (status == HS_OK) {
+        status = hs_connectivity_fill_pairs(made, &map, rows);
+    }
+    if (made != NULL) {
+        hs_node_map_free(&made->rows.call.account, &map);
     }
     return connectivity_end(made, status, result, failure);
 }

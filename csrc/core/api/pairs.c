@@ -13,20 +13,13 @@
 
 /* The public searches: find and count. */
 
-/* What a thread that searches several systems keeps from one to the next, or NULL. */
-static hs_keeper *
-keeper_of(const hs_query_run *run)
-{
-    return run->kept != NULL ? &run->kept->keeper : NULL;
-}
-
 /* A hs_use_fn: pairs of the step that is open, behind those of an output; NULL: that of the run. */
 static hs_status
 record_step(void *context, hs_query_run *run)
 {
     hs_output      *output = context != NULL ? context : run->output;
     const hs_status status = hs_estimate_by_sample(run->search, run->failure);
-    return status == HS_OK ? hs_parallel_record(run->search, keeper_of(run), output, run->failure)
+    return status == HS_OK ? hs_parallel_record(run->search, run->keeper, output, run->failure)
                            : status;
 }
 
@@ -51,22 +44,15 @@ columns_of(const hs_query_run *run)
     return columns | HS_WANT_I | HS_WANT_J;
 }
 
-/* Empties an output of pairs that are to be sorted; `found` may have been used before. */
-static void
-open_found(const hs_query_run *run, unsigned columns, hs_output *found)
-{
-    if (found->columns != columns) { /* systems with images need more of them */
-        hs_output_free(found);
-        hs_output_init(&run->call->account, run->query->sets.points->ndim, columns, 4, found);
-    }
-    found->n_pairs = 0;
-}
-
-/* A hs_use_fn, for the one step of a search without a reach, which tells the columns. */
+/* A hs_use_fn: pairs that are to be sorted. A search without a reach, which has one step, tells the
+ * columns itself. */
 static hs_status
-record_to_sort(void *found, hs_query_run *run)
+record_to_sort(void *context, hs_query_run *run)
 {
-    open_found(run, hs_sort_columns(run->search), found);
+    hs_output *found = context;
+    if (!run->has_levels) {
+        found->columns = hs_sort_columns(run->search);
+    }
     return record_step(found, run);
 }
 
@@ -75,20 +61,18 @@ record_to_sort(void *found, hs_query_run *run)
 static hs_status
 find_sorted(hs_query_run *run)
 {
-    hs_output own = {.columns = 0}, *found = run->kept != NULL ? &run->kept->found : &own;
-    if (run->has_levels) {
-        open_found(run, columns_of(run), found);
-    }
-    hs_status status =
-        hs_query_each_step(run, run->has_levels ? record_step : record_to_sort, found);
-    if (status == HS_OK && found->n_pairs > 0) {
+    hs_output found;
+    hs_output_init(&run->call->account, run->query->sets.points->ndim,
+                   run->has_levels ? columns_of(run) : 0, 4, &found);
+    hs_status status = hs_query_each_step(run, record_to_sort, &found);
+    if (status == HS_OK && found.n_pairs > 0) {
         status = hs_sort_pairs(run->call, (int32_t)run->first_point, hs_query_asking(run->query),
-                               found, run->output);
+                               &found, run->output);
     }
     if (status == HS_ERR_MEMORY) {
-        run->failure->expected_pairs = (double)found->n_pairs;
+        run->failure->expected_pairs = (double)found.n_pairs;
     }
-    hs_output_free(&own);
+    hs_output_free(&found);
     return status;
 }
 
@@ -97,7 +81,7 @@ static hs_status
 count_step(void *context, hs_query_run *run)
 {
     (void)context;
-    return hs_parallel_count(run->search, keeper_of(run), &run->n_pairs, run->failure);
+    return hs_parallel_count(run->search, run->keeper, &run->n_pairs, run->failure);
 }
 
 /* A hs_use_fn; context: a count of each system. */
@@ -349,20 +333,14 @@ find_nearest(void *context, hs_query_run *run)
     const double   n = (double)n_asking * (double)*k;
     sets.is_plain = sets.is_wide = true;
     hs_search_begin(run->call, search);
-    hs_nearest near = {.search = search,
-                       .k = *k,
-                       .of_spot = *k < INT32_MAX - 1 && run->query->selection == NULL
-                                      ? (int32_t)*k + 1
-                                      : INT32_MAX,
-                       .omits_self = sets.queries == NULL,
-                       .rows = run->output};
-    hs_status  status = HS_OK;
+    hs_nearest near = {
+        .search = search, .k = *k, .omits_self = sets.queries == NULL, .rows = run->output};
+    hs_status status = HS_OK;
     if (n < 0x1p62 && hs_output_reserve(near.rows, n_asking * near.k, 0.0) == HS_OK) {
         near.rows->n_pairs = n_asking * near.k;
     } else {
         failure->expected_pairs = n;
         failure->expected_bytes = n * (double)hs_output_bytes_per_pair(near.rows);
-        failure->limit_bytes = run->call->account.limit;
         status = HS_ERR_MEMORY;
     }
     if (status == HS_OK) {
@@ -520,19 +498,12 @@ plan_step(void *context, hs_query_run *run)
     return status;
 }
 
-/* A hs_use_fn. */
-static hs_status
-plan_search(void *context, hs_query_run *run)
-{
-    return hs_query_each_step(run, plan_step, context);
-}
-
 hs_status
 hs_plan_make(const hs_among *among, const hs_options *options, hs_plan *plan, hs_failure *failure)
 {
     hs_plan         made = {.ndim = 0};
     planning        now = {.plan = &made};
-    const hs_finder finder = {.find = plan_search, .context = &now};
+    const hs_finder finder = {.step = plan_step, .context = &now};
     hs_query        query = hs_query_among(among, HS_HALF_LIST, options);
     if (options == NULL || plan == NULL || query.selection != NULL || query.among != NULL) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);

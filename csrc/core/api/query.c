@@ -321,7 +321,7 @@ hs_query_plan(hs_query_run *run)
         if (is_numbered(run)) {
             hs_levels_renumber((int32_t)run->first_point, &run->levels);
         }
-        status = hs_level_plan_make(&call->account, &call->options, &run->levels, query->box,
+        status = hs_level_plan_make(&call->account, &run->levels, query->box,
                                     query->options->cutoff, query->options->algorithm, &run->plan);
     } else if (is_numbered(run)) {
         hs_query_name_point(run, status);
@@ -412,7 +412,7 @@ hs_query_open_step(hs_query_run *run, int64_t number)
         }
         sets.least_cutoff = hs_choice_least_length(call->choice, sets.least_cutoff);
         sets.follows = run->has_scene;
-        if (run->kept == NULL) {
+        if (run->keeper == NULL) {
             status = hs_search_open(&sets, query->box, call, search, run->failure);
         } else { /* a thread that searches several systems has begun it */
             status = hs_search_build(&sets, query->box, search, run->failure);
@@ -465,6 +465,14 @@ hs_query_each_step(hs_query_run *run, hs_use_fn use, void *context)
     return status;
 }
 
+hs_status
+hs_query_find(hs_query_run *run)
+{
+    const hs_finder *finder = run->finder;
+    return finder->find != NULL ? finder->find(finder->context, run)
+                                : hs_query_each_step(run, finder->step, finder->context);
+}
+
 hs_pairs *
 hs_pairs_begin(const hs_options *options, hs_failure **failure)
 {
@@ -508,12 +516,10 @@ hs_query_answer(const hs_query *query, const hs_finder *finder, hs_pairs **resul
         run.offsets = &pairs->offsets;
     }
     if (status == HS_OK) {
-        status = query->among != NULL ? hs_systems_find(&run) : finder->find(finder->context, &run);
+        status = query->among != NULL ? hs_systems_find(&run) : hs_query_find(&run);
     }
     hs_query_close(&run);
-    if (status == HS_ERR_MEMORY) {
-        failure->limit_bytes = call->account.limit;
-    }
+    hs_call_tell_limit(call, status, failure);
     if (status == HS_ERR_MEMORY && !query->sets.keeps_none && query->reach == NULL &&
         !finder->is_nearest) { /* else the number of pairs is not the reason */
         hs_shortage shortage = {0.0, 0.0};
@@ -525,8 +531,7 @@ hs_query_answer(const hs_query *query, const hs_finder *finder, hs_pairs **resul
         } else {
             hs_shortage_add(&query->sets, query->box, query->options->cutoff, &shortage);
         }
-        hs_shortage_tell(&shortage, &call->options, query->sets.points->ndim, call->account.limit,
-                         failure);
+        hs_shortage_tell(&shortage, &call->options, query->sets.points->ndim, failure);
     }
     if (pairs != NULL) {
         status = hs_pairs_conclude(&pairs->output, status, failure);

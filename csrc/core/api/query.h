@@ -86,7 +86,8 @@ typedef hs_status (*hs_use_fn)(void *context, hs_query_run *run);
 
 /* What a search is for: how the pairs of one system are found, and what is done with them. */
 typedef struct hs_finder {
-    hs_use_fn find;
+    hs_use_fn find; /* of all steps of a system; NULL: each is used by `step` */
+    hs_use_fn step;
     void     *context;     /* borrowed; threads share it */
     bool      has_rows;    /* offsets come with the output */
     bool      is_numbered; /* finds numbers among all systems: else they are added afterwards */
@@ -94,24 +95,18 @@ typedef struct hs_finder {
     bool      one_thread;  /* several systems are searched by the caller's thread */
 } hs_finder;
 
-/* What a thread that searches several systems keeps from one to the next; zeros at first. */
-typedef struct hs_kept {
-    hs_keeper keeper;
-    hs_output found; /* pairs of one system before they are sorted */
-} hs_kept;
-
 /*
  * A query at work, of one system; a thread that searches several has one run for all of them. It
  * must not move while a step is open.
  */
 struct hs_query_run {
-    hs_call         *call; /* borrowed, as are all up to what is kept */
+    hs_call         *call; /* borrowed, as are all up to the keeper */
     const hs_query  *query;
     const hs_finder *finder;
     hs_failure      *failure;
     hs_output       *output;  /* pairs go behind those that it has; NULL: only counting */
     hs_output       *offsets; /* of rows */
-    hs_kept         *kept;    /* of a thread that searches several systems; else NULL */
+    hs_keeper       *keeper;  /* of a thread that searches several systems; else NULL */
     bool             is_part; /* one of several systems, which share a choice: */
     int64_t          system, first_point, first_asking; /* its number, and what lies before it */
     int64_t          n_in_all;   /* points or queries that ask, of all systems */
@@ -151,6 +146,9 @@ void hs_query_close(hs_query_run *run);
 hs_status hs_query_open_step(hs_query_run *run, int64_t number);
 void      hs_query_close_step(hs_query_run *run);
 
+/* What the finder finds in one system. */
+hs_status hs_query_find(hs_query_run *run);
+
 /* Uses each step in turn, as long as that gives HS_OK. */
 hs_status hs_query_each_step(hs_query_run *run, hs_use_fn use, void *context);
 
@@ -172,9 +170,9 @@ hs_status hs_systems_check(const hs_query *query, hs_failure *failure);
 hs_status hs_systems_find(hs_query_run *run);
 void      hs_systems_add_shortage(const hs_query *query, hs_shortage *shortage);
 
-/* What all cuts of a query have; that of `run`, which has begun, becomes that of the system. */
-void hs_system_begin(const hs_query *all, const hs_options *options, hs_system *system,
-                     hs_query_run *run);
+/* What all cuts of a query have, and a run of such a cut. */
+void hs_system_begin(const hs_query *all, const hs_finder *finder, hs_call *call,
+                     hs_failure *failure, hs_system *system, hs_query_run *run);
 
 /* System s of all: cuts it, in place of another, and plans its steps; to be closed in any case.
  * `choice` is that of all, or NULL. On failure that names it. */

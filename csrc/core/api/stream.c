@@ -293,8 +293,7 @@ open_systems(hs_stream *stream, const hs_query *all, const hs_finder *finder, hs
     for (int64_t s = 0; status == HS_OK && s < n; s++) {
         source *one = &stream->sources[stream->n_sources++];
         one->n_steps = 0;
-        hs_query_begin(all, finder, call, failure, &one->run);
-        hs_system_begin(all, all->options, &one->system, &one->run);
+        hs_system_begin(all, finder, call, failure, &one->system, &one->run);
         status = hs_system_open(all, s, stream->choice, &one->system, &one->run);
         status = status == HS_OK ? open_source(one) : status;
         failure->system = status == HS_OK ? -1 : s;
@@ -460,13 +459,6 @@ visit_step(void *context, hs_query_run *run)
     return hs_parallel_visit(run->search, &all, NULL, run->failure);
 }
 
-/* A hs_use_fn. */
-static hs_status
-visit_pairs(void *context, hs_query_run *run)
-{
-    return hs_query_each_step(run, visit_step, context);
-}
-
 /* hs_pairs_visit with options->want and ->index_bytes heeded, by visit->pairs where that leaves a
  * column out; all but `among` is there. */
 static hs_status
@@ -474,7 +466,7 @@ visit_columns(const hs_among *among, const hs_options *options, const hs_visit *
               int64_t *n_visited, hs_failure *failure)
 {
     visiting shared = {.visit = visit, .want = options->want, .index_bytes = options->index_bytes};
-    const hs_finder finder = {.find = visit_pairs,
+    const hs_finder finder = {.step = visit_step,
                               .context = &shared,
                               .is_numbered = true,
                               .one_thread = !visit->thread_safe};

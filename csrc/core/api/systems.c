@@ -133,20 +133,20 @@ cut_system(const hs_query *all, int64_t s, hs_system *system)
 }
 
 static void
-begin_cuts(const hs_query *all, const hs_options *options, hs_system *system)
+begin_cuts(const hs_query *all, hs_system *system)
 {
     system->query = *all;
-    system->options = *options;
+    system->options = *all->options;
     system->query.options = &system->options;
 }
 
 void
-hs_system_begin(const hs_query *all, const hs_options *options, hs_system *system,
-                hs_query_run *run)
+hs_system_begin(const hs_query *all, const hs_finder *finder, hs_call *call, hs_failure *failure,
+                hs_system *system, hs_query_run *run)
 {
     const hs_among *among = all->among;
-    begin_cuts(all, options, system);
-    run->query = &system->query;
+    begin_cuts(all, system);
+    hs_query_begin(&system->query, finder, call, failure, run);
     run->is_part = true;
     run->n_in_all = (among->queries != NULL ? among->queries : among->points)->at.n;
 }
@@ -168,10 +168,8 @@ hs_system_open(const hs_query *all, int64_t s, const hs_choice *choice, hs_syste
         hs_choice_cut(choice, is_numbered ? 0 : run->first_point,
                       is_numbered ? 0 : run->first_asking, &system->choice);
         if (hs_choice_excludes(choice)) {
-            status = hs_box_check(system->query.box, run->failure);
-            status = status == HS_OK ? hs_choice_set_box(system->query.box, among->points->at.ndim,
-                                                         &system->choice)
-                                     : status;
+            status = hs_choice_set_box(system->query.box, among->points->at.ndim, &system->choice,
+                                       run->failure);
         }
     }
     return status == HS_OK ? hs_query_plan(run) : status;
@@ -181,7 +179,7 @@ void
 hs_systems_add_shortage(const hs_query *query, hs_shortage *shortage)
 {
     hs_system cut;
-    begin_cuts(query, query->options, &cut);
+    begin_cuts(query, &cut);
     for (int64_t s = 0; s < query->among->points->n_systems; s++) {
         cut_system(query, s, &cut);
         hs_shortage_add(&cut.query.sets, cut.query.box, cut.options.cutoff, shortage);
@@ -206,7 +204,7 @@ typedef struct worker {
     systems_job *job;
     hs_call      call;
     hs_system    system; /* the present one */
-    hs_kept      kept;
+    hs_keeper    keeper;
     hs_output   *target;           /* that of all, or the backlog */
     hs_output    entries, offsets; /* owned; of one system, which are numbered afterwards */
     int64_t      work;             /* since the last poll */
@@ -290,7 +288,7 @@ search_system(worker *me, int64_t s)
     }
     hs_status status = hs_system_open(job->all->query, s, job->all->call->choice, &me->system, run);
     if (status == HS_OK) {
-        status = finder->find(finder->context, run);
+        status = hs_query_find(run);
     }
     hs_query_close(run);
     call->part = whole;
@@ -357,14 +355,11 @@ open_worker(void *context, void *place)
     if (options->poll != NULL) { /* which counts already, for the whole call */
         hs_call_set_poll(poll_for_all, me, &me->call);
     }
-    run->call = &me->call; /* all else is zero */
-    run->finder = all->finder;
-    run->failure = &me->committer.failure;
-    run->kept = &me->kept;
-    hs_system_begin(all->query, &me->call.options, &me->system, run);
+    hs_system_begin(all->query, all->finder, &me->call, &me->committer.failure, &me->system, run);
+    run->keeper = &me->keeper;
     hs_search_begin(&me->call, &run->step.search);
     if (all->output != NULL) {
-        me->kept.keeper.committer = &me->committer;
+        me->keeper.committer = &me->committer;
         me->target = job->is_direct ? all->output : me->committer.pairs;
         run->output = all->finder->is_numbered ? me->target : &me->entries;
         run->offsets = &me->offsets;
@@ -380,8 +375,7 @@ close_worker(void *context, void *place)
     worker      *me = place;
     hs_account  *account = &me->call.account;
     hs_call     *total = job->all->call;
-    hs_keeper_close(&me->run.step.search, &me->kept.keeper);
-    hs_output_free(&me->kept.found);
+    hs_keeper_close(&me->run.step.search, &me->keeper);
     me->call.done.polls = 0; /* counted by the call */
     hs_call_add_counters(total, &me->call.done);
     for (int p = 0; p < HS_PURPOSE_END; p++) {

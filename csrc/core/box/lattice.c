@@ -158,32 +158,23 @@ combine(const short_basis *b, const int64_t coefficients[], int c, double *error
     return value / scale;
 }
 
-/* out = row - multiple * other; false when an entry passes 2^61. */
-static bool
-subtract_integers(int n, const int64_t row[], int64_t multiple, const int64_t other[],
-                  int64_t out[])
-{
-    for (int i = 0; i < n; i++) {
-        double rough = (double)row[i] - (double)multiple * (double)other[i];
-        if (fabs(rough) > 2.0 * (double)MAX_COEFFICIENT) {
-            return false; /* else the integers below do not overflow */
-        }
-        out[i] = row[i] - multiple * other[i];
-        if (out[i] > MAX_COEFFICIENT || out[i] < -MAX_COEFFICIENT) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/* Row k less a multiple of row l. False, and nothing done, where numbers would get too large. */
+/* Row k less a multiple of row l. False, and nothing done, where numbers would get too large: a
+ * coefficient passes 2^61, or an entry the range. */
 static bool
 subtract(short_basis *b, int k, int l, int64_t multiple)
 {
     int64_t    coefficients[HS_MAX_DIM];
     double     entries[HS_MAX_DIM];
     scaled_row row;
-    bool       fits = subtract_integers(b->n_rows, b->U[k], multiple, b->U[l], coefficients);
+    bool       fits = true;
+    for (int i = 0; fits && i < b->n_rows; i++) {
+        const double rough = (double)b->U[k][i] - (double)multiple * (double)b->U[l][i];
+        fits = fabs(rough) <= 2.0 * (double)MAX_COEFFICIENT;
+        if (fits) { /* then the integers do not overflow */
+            coefficients[i] = b->U[k][i] - multiple * b->U[l][i];
+            fits = coefficients[i] <= MAX_COEFFICIENT && coefficients[i] >= -MAX_COEFFICIENT;
+        }
+    }
     for (int c = 0; fits && c < b->ndim; c++) {
         entries[c] = combine(b, coefficients, c, NULL);
     }
@@ -236,42 +227,35 @@ coefficient(const short_basis *b, int k, int j)
     return ldexp(mu, row->exponent - star->exponent);
 }
 
-/*
- * Bring the coefficients of the k-th row to one half or less. One sweep does unless the row is
- * very long: then each takes off what double precision can see, and the next sees more. A
- * coefficient beyond 2^61 is left, and so is one that drowns in the rounding of a long row.
- */
-static void
-size_reduce(short_basis *b, int k)
-{
-    bool again = true;
-    for (int sweep = 0; again && sweep < MAX_SWEEPS; sweep++) {
-        again = false;
-        for (int j = k - 1; j >= 0; j--) {
-            int    from = b->order[k], what = b->order[j];
-            double mu = coefficient(b, k, j);
-            double noise = ldexp(0x1p-45, b->row[from].exponent - b->star[j].exponent);
-            if (fabs(mu) > 0.5 + 0x1p-20 + noise && fabs(mu) <= (double)MAX_COEFFICIENT) {
-                again = subtract(b, from, what, (int64_t)rint(mu)) || again;
-            }
-        }
-    }
-}
-
 static void
 reduce_lll(short_basis *b)
 {
     int k = 1;
     project(b, 0);
     for (int step = 0; step < MAX_STEPS && k < b->n_rows && b->n_refused < MAX_REFUSED; step++) {
-        size_reduce(b, k);
+        /* Bring the coefficients of the k-th row to one half or less. One sweep does unless the row
+         * is very long: then each takes off what double precision can see, and the next sees more.
+         * A coefficient beyond 2^61 is left, and so is one that drowns in the rounding of a long
+         * row. */
+        bool again = true;
+        for (int sweep = 0; again && sweep < MAX_SWEEPS; sweep++) {
+            again = false;
+            for (int j = k - 1; j >= 0; j--) {
+                const int    from = b->order[k], what = b->order[j];
+                const double mu = coefficient(b, k, j);
+                const double noise = ldexp(0x1p-45, b->row[from].exponent - b->star[j].exponent);
+                if (fabs(mu) > 0.5 + 0x1p-20 + noise && fabs(mu) <= (double)MAX_COEFFICIENT) {
+                    again = subtract(b, from, what, (int64_t)rint(mu)) || again;
+                }
+            }
+        }
         project(b, k);
-        double mu = coefficient(b, k, k - 1);
+        const double mu = coefficient(b, k, k - 1);
         if (!(norm_ratio(&b->star[k], &b->star[k - 1]) < LOVASZ - mu * mu)) {
             k++;
             continue;
         }
-        int other = b->order[k];
+        const int other = b->order[k];
         b->order[k] = b->order[k - 1];
         b->order[k - 1] = other;
         project(b, 0);
@@ -315,34 +299,6 @@ shorten(short_basis *b, int k)
     return first || second;
 }
 
-static void
-descend(short_basis *b)
-{
-    int k = 1;
-    sort_rows(b);
-    for (int step = 0; step < MAX_STEPS && k < b->n_rows; step++) {
-        if (shorten(b, k)) {
-            sort_rows(b);
-            k = 1;
-        } else {
-            k++;
-        }
-    }
-}
-
-/* Compares the products of the lengths, which bound how flat a basis is. */
-static bool
-is_shorter(const short_basis *a, const short_basis *b)
-{
-    double ratio = 1.0;
-    int    exponent = 0;
-    for (int k = 0; k < a->n_rows; k++) {
-        ratio *= a->row[k].norm2 / b->row[k].norm2;
-        exponent += a->row[k].exponent - b->row[k].exponent;
-    }
-    return ldexp(ratio, 2 * exponent) < NOTABLY_LESS;
-}
-
 /*
  * B from the scaled box vectors, which are linearly independent, finite, of any scale, 1e-300 to
  * 1e300, and of very different length. U has determinant +1 or -1, so that both span the same
@@ -377,9 +333,23 @@ reduce(hs_lattice *lattice)
         sort_rows(&trial);
         reduce_lll(&trial);
         if (n_rows <= 3) {
-            descend(&trial);
+            sort_rows(&trial);
         }
-        promising = trial.changed && is_shorter(&trial, &best);
+        for (int step = 0, k = 1; n_rows <= 3 && step < MAX_STEPS && k < n_rows; step++) {
+            if (shorten(&trial, k)) {
+                sort_rows(&trial);
+                k = 1;
+            } else {
+                k++;
+            }
+        }
+        double ratio = 1.0; /* of the products of the lengths, which bound how flat a basis is */
+        int    exponent = 0;
+        for (int k = 0; k < n_rows; k++) {
+            ratio *= trial.row[k].norm2 / best.row[k].norm2;
+            exponent += trial.row[k].exponent - best.row[k].exponent;
+        }
+        promising = trial.changed && ldexp(ratio, 2 * exponent) < NOTABLY_LESS;
         if (promising) {
             best = trial;
         }
@@ -428,48 +398,22 @@ prime_below(uint64_t p)
     return p;
 }
 
-/* A row as integers, mantissa * 2^exponent. */
-typedef struct integer_row {
-    int64_t mantissa[HS_MAX_DIM];
-    int     exponent[HS_MAX_DIM]; /* not negative, least 0 */
-} integer_row;
-
-/* Returns bits enough for every integer of the row, or -1 if all are zero. */
-static int
-load_row(int ndim, const double row[], integer_row *integers)
-{
-    int least = INT32_MAX, most = INT32_MIN;
-    for (int k = 0; k < ndim; k++) {
-        int exponent;
-        integers->mantissa[k] = (int64_t)ldexp(frexp(row[k], &exponent), 53);
-        integers->exponent[k] = exponent;
-        if (row[k] != 0.0) {
-            least = exponent < least ? exponent : least;
-            most = exponent > most ? exponent : most;
-        }
-    }
-    for (int k = 0; k < ndim; k++) {
-        integers->exponent[k] = row[k] != 0.0 ? integers->exponent[k] - least : 0;
-    }
-    return most < least ? -1 : most - least + 53;
-}
-
 /*
- * Elimination without division: what is left of a row is multiplied by the pivot instead. For
- * the rank a row's factor is of no account.
+ * The rows as integers, times 2^-least, modulo p. Elimination without division: what is left of a
+ * row is multiplied by the pivot instead. For the rank a row's factor is of no account.
  */
 static bool
-full_rank(uint64_t p, int ndim, int n_rows, const integer_row rows[])
+full_rank(uint64_t p, int ndim, int n_rows, const double rows[][HS_MAX_DIM], int least)
 {
-    uint64_t a[HS_MAX_DIM][HS_MAX_DIM]; /* modulo p */
+    uint64_t a[HS_MAX_DIM][HS_MAX_DIM];
     for (int r = 0; r < n_rows; r++) {
         for (int k = 0; k < ndim; k++) {
-            const int64_t  mantissa = rows[r].mantissa[k];
-            const uint64_t size = (uint64_t)(mantissa < 0 ? -mantissa : mantissa) % p;
-            a[r][k] = mantissa < 0 && size > 0 ? p - size : size;
-            for (int left = rows[r].exponent[k]; left > 0; left -= 32) {
+            int exponent;
+            a[r][k] = (uint64_t)ldexp(frexp(fabs(rows[r][k]), &exponent), 53) % p;
+            for (int left = a[r][k] > 0 ? exponent - least : 0; left > 0; left -= 32) {
                 a[r][k] = (a[r][k] << (left < 32 ? left : 32)) % p;
             }
+            a[r][k] = rows[r][k] < 0.0 && a[r][k] > 0 ? p - a[r][k] : a[r][k];
         }
     }
     for (int k = 0; k < n_rows; k++) {
@@ -540,9 +484,8 @@ rows_are_aligned(int ndim, int n_rows, const double rows[][HS_MAX_DIM], int *col
 hs_status
 hs_box_check(const hs_box *box, hs_failure *failure)
 {
-    double      rows[HS_MAX_DIM][HS_MAX_DIM];
-    int         vector_of_row[HS_MAX_DIM], column[HS_MAX_DIM];
-    integer_row integers[HS_MAX_DIM];
+    double rows[HS_MAX_DIM][HS_MAX_DIM];
+    int    vector_of_row[HS_MAX_DIM], column[HS_MAX_DIM];
     if (box == NULL) {
         return HS_OK;
     }
@@ -557,24 +500,57 @@ hs_box_check(const hs_box *box, hs_failure *failure)
         }
     }
     const int n_periodic = collect_periodic_rows(box, rows, vector_of_row);
-    int       bound_bits = 0;
+    int       least = INT32_MAX, most = INT32_MIN; /* exponents of all entries */
     if (rows_are_aligned(box->ndim, n_periodic, rows, column)) {
         return HS_OK;
     }
     failure->row = -1; /* unless one of them is zero */
     for (int r = n_periodic - 1; r >= 0; r--) {
-        const int bits = load_row(box->ndim, rows[r], &integers[r]);
-        failure->row = bits < 0 ? vector_of_row[r] : failure->row;
-        bound_bits += bits + 2; /* a minor's row is no longer than sqrt(8) 2^bits */
+        bool is_zero = true;
+        for (int k = 0; k < box->ndim; k++) {
+            if (rows[r][k] != 0.0) {
+                int exponent;
+                (void)frexp(rows[r][k], &exponent);
+                least = exponent < least ? exponent : least;
+                most = exponent > most ? exponent : most;
+                is_zero = false;
+            }
+        }
+        failure->row = is_zero ? vector_of_row[r] : failure->row;
     }
-    uint64_t p = LARGEST_PRIME;
-    for (int bits = 0; failure->row < 0 && bits <= bound_bits; bits += PRIME_BITS) {
-        if (full_rank(p, box->ndim, n_periodic, integers)) { /* 8 * 2102 bits at most */
+    /* A minor's row is no longer than sqrt(8) times its largest integer: 8 * 2154 bits at most. */
+    const int64_t bound_bits = n_periodic * ((int64_t)most - least + 53 + 2);
+    uint64_t      p = LARGEST_PRIME;
+    for (int64_t bits = 0; failure->row < 0 && bits <= bound_bits; bits += PRIME_BITS) {
+        if (full_rank(p, box->ndim, n_periodic, rows, least)) {
             return HS_OK;
         }
         p = prime_below(p);
     }
     return HS_ERR_BOX_DEPENDENT;
+}
+
+void
+hs_orthogonal_rows(const double rows[][HS_MAX_DIM], const int *order, int n, int ndim,
+                   double unit[][HS_MAX_DIM], double parts[][HS_MAX_DIM])
+{
+    for (int r = 0; r < n; r++) {
+        memcpy(unit[r], rows[order != NULL ? order[r] : r], (size_t)ndim * sizeof(double));
+        memset(parts[r], 0, (size_t)n * sizeof(double));
+        for (int pass = 0; pass < 2; pass++) {
+            for (int k = 0; k < r; k++) {
+                const double part = dot(ndim, unit[r], unit[k]);
+                parts[r][k] += part;
+                for (int c = 0; c < ndim; c++) {
+                    unit[r][c] -= part * unit[k][c];
+                }
+            }
+        }
+        parts[r][r] = sqrt(dot(ndim, unit[r], unit[r]));
+        for (int c = 0; c < ndim; c++) {
+            unit[r][c] = parts[r][r] > 0.0 ? unit[r][c] / parts[r][r] : 0.0;
+        }
+    }
 }
 
 /* Remove from v what lies along n_basis orthonormal vectors (twice: the first pass rounds), then
@@ -626,97 +602,53 @@ orthonormal_row(const hs_lattice *lattice, int r, int n_basis, double basis[][HS
     return orthonormalise(lattice->ndim, n_basis, basis, v);
 }
 
-/* The unit vector that is orthogonal to all rows of B but row r. */
+/* Along each row of B the unit vector that is orthogonal to all others; for each open grid axis one
+ * that is orthogonal to all rows and to those before it, from the coordinate axis that these cover
+ * least. */
 static void
-set_periodic_normal(hs_lattice *lattice, int r, double *normal)
-{
-    double basis[HS_MAX_DIM][HS_MAX_DIM];
-    int    n_basis = 0, exponent;
-    for (int other = 0; other < lattice->n_periodic; other++) {
-        if (other != r) {
-            (void)orthonormal_row(lattice, other, n_basis, basis, basis[n_basis], &exponent);
-            n_basis++;
-        }
-    }
-    (void)orthonormal_row(lattice, r, n_basis, basis, normal, &exponent);
-}
-
-/* Orthonormal vectors that are orthogonal to all rows of B, one for each open grid axis. Each
- * starts from the coordinate axis that the vectors so far cover least. */
-static void
-set_open_normals(hs_lattice *lattice)
+set_general_axes(hs_lattice *lattice)
 {
     double    basis[HS_MAX_DIM][HS_MAX_DIM];
-    const int ndim = lattice->ndim;
-    int       n_basis = lattice->n_periodic, exponent;
-    for (int r = 0; r < n_basis; r++) {
+    const int ndim = lattice->ndim, m = lattice->n_periodic;
+    int       n_basis = m, exponent;
+    for (int r = 0; r < m; r++) {
+        const int k = lattice->vector_of_row[r];
+        double   *normal = lattice->normal[k];
+        int       n_others = 0;
+        for (int other = 0; other < m; other++) {
+            if (other != r) {
+                (void)orthonormal_row(lattice, other, n_others, basis, basis[n_others], &exponent);
+                n_others++;
+            }
+        }
+        (void)orthonormal_row(lattice, r, n_others, basis, normal, &exponent);
+        const double height = dot(ndim, normal, lattice->rows[r]);
+        for (int c = 0; c < ndim; c++) {
+            normal[c] = height < 0.0 ? -normal[c] : normal[c];
+            lattice->direction[k][c] = fabs(height) > 0.0 ? lattice->rows[r][c] / fabs(height)
+                                                          : 0.0;
+        }
+        lattice->row_of_axis[k] = r;
+        lattice->period[k] = fabs(height);
+    }
+    for (int r = 0; r < m; r++) {
         const double length = orthonormal_row(lattice, r, r, basis, basis[r], &exponent);
         multiply_volume(lattice, length, exponent);
     }
     for (int k = 0; k < ndim; k++) {
-        if (lattice->row_of_axis[k] >= 0) {
-            continue;
-        }
         double best_length = -1.0;
-        for (int a = 0; a < ndim; a++) {
+        for (int a = 0; lattice->row_of_axis[k] < 0 && a < ndim; a++) {
             double trial[HS_MAX_DIM] = {0};
             trial[a] = 1.0;
             const double length = orthonormalise(ndim, n_basis, basis, trial);
             if (length > best_length) {
                 best_length = length;
-                memcpy(basis[n_basis], trial, sizeof trial);
+                memcpy(lattice->normal[k], trial, sizeof trial);
+                memcpy(lattice->direction[k], trial, sizeof trial);
             }
         }
-        memcpy(lattice->normal[k], basis[n_basis], sizeof basis[n_basis]);
-        memcpy(lattice->direction[k], basis[n_basis], sizeof basis[n_basis]);
-        n_basis++;
-    }
-}
-
-static void
-set_general_axes(hs_lattice *lattice)
-{
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        lattice->row_of_axis[lattice->vector_of_row[r]] = r;
-    }
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        const int k = lattice->vector_of_row[r];
-        double   *normal = lattice->normal[k];
-        set_periodic_normal(lattice, r, normal);
-        double height = dot(lattice->ndim, normal, lattice->rows[r]);
-        if (height < 0.0) {
-            height = -height;
-            for (int c = 0; c < lattice->ndim; c++) {
-                normal[c] = -normal[c];
-            }
-        }
-        lattice->period[k] = height;
-        for (int c = 0; c < lattice->ndim; c++) {
-            lattice->direction[k][c] = height > 0.0 ? lattice->rows[r][c] / height : 0.0;
-        }
-    }
-    set_open_normals(lattice);
-}
-
-/* B diagonal: make the entries positive and let the grid axes be the coordinate axes. */
-static void
-set_aligned_axes(hs_lattice *lattice, const int *column)
-{
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        const int c = column[r];
-        if (lattice->rows[r][c] < 0.0) {
-            lattice->rows[r][c] = -lattice->rows[r][c];
-            for (int l = 0; l < lattice->n_periodic; l++) {
-                lattice->U[r][l] = -lattice->U[r][l];
-            }
-        }
-        lattice->row_of_axis[c] = r;
-        lattice->period[c] = lattice->rows[r][c];
-        multiply_volume(lattice, lattice->rows[r][c], 0);
-    }
-    for (int k = 0; k < lattice->ndim; k++) {
-        for (int c = 0; c < lattice->ndim; c++) {
-            lattice->normal[k][c] = lattice->direction[k][c] = k == c ? 1.0 : 0.0;
+        if (lattice->row_of_axis[k] < 0) {
+            memcpy(basis[n_basis++], lattice->normal[k], sizeof basis[0]);
         }
     }
 }
@@ -762,10 +694,26 @@ hs_lattice_init(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice
         lattice->aligned = exact &&
                            rows_are_aligned(ndim, lattice->n_periodic, lattice->rows, column);
     }
-    if (lattice->aligned) {
-        set_aligned_axes(lattice, column);
-    } else {
+    if (!lattice->aligned) {
         set_general_axes(lattice);
+        return;
+    }
+    for (int r = 0; r < lattice->n_periodic; r++) { /* entries become positive */
+        const int c = column[r];
+        if (lattice->rows[r][c] < 0.0) {
+            lattice->rows[r][c] = -lattice->rows[r][c];
+            for (int l = 0; l < lattice->n_periodic; l++) {
+                lattice->U[r][l] = -lattice->U[r][l];
+            }
+        }
+        lattice->row_of_axis[c] = r;
+        lattice->period[c] = lattice->rows[r][c];
+        multiply_volume(lattice, lattice->rows[r][c], 0);
+    }
+    for (int k = 0; k < ndim; k++) {
+        for (int c = 0; c < ndim; c++) {
+            lattice->normal[k][c] = lattice->direction[k][c] = k == c ? 1.0 : 0.0;
+        }
     }
 }
 
@@ -936,95 +884,64 @@ smallest_stretch(int d, const double F[][HS_MAX_DIM])
     return sqrt(least) * (1.0 - 0x1p-48); /* more than its rounding */
 }
 
-/* F = 1 + sum_r g_r^T (h_r - h0_r), g_r being the vectors dual to h0: a first guess. */
-static bool
-guess_strain(const hs_lattice *lattice, const double now[][HS_MAX_DIM], hs_strain *strain)
+bool
+hs_strain_find(const hs_box *before, const hs_box *now, hs_strain *strain)
 {
-    const int d = lattice->ndim;
+    const int  d = before->ndim;
+    hs_lattice lattice;
+    double     dual[HS_MAX_DIM][HS_MAX_DIM]; /* a right inverse of h0, rounded */
+    double     product[HS_MAX_DIM][HS_MAX_DIM], inverse = 0.0, error = 0.0, residual = 0.0;
+    hs_lattice_init_given(before, hs_scale_of(0), &lattice);
+    const int m = lattice.n_periodic;
     for (int c = 0; c < d; c++) {
         for (int k = 0; k < d; k++) {
             strain->F[c][k] = c == k;
         }
     }
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        const int axis = lattice->vector_of_row[r];
-        if (!(lattice->period[axis] > 0.0)) {
+    /* F = 1 + sum_r g_r^T (h_r - h0_r), g_r being the vectors dual to h0: a first guess. */
+    for (int r = 0; r < m; r++) {
+        const int axis = lattice.vector_of_row[r];
+        if (!(lattice.period[axis] > 0.0)) {
             return false;
         }
         for (int c = 0; c < d; c++) {
-            const double dual = lattice->normal[axis][c] / lattice->period[axis];
+            dual[c][r] = lattice.normal[axis][c] / lattice.period[axis];
+            inverse += fabs(dual[c][r]);
             for (int k = 0; k < d; k++) {
-                strain->F[c][k] += dual * (now[r][k] - lattice->given[r][k]);
+                strain->F[c][k] += dual[c][r] * (now->rows[axis][k] - lattice.given[r][k]);
             }
         }
     }
-    return true;
-}
-
-/* |g| (Frobenius) of a right inverse of h0, from a rounded one that is within `error` of one. */
-static double
-bound_inverse(const hs_lattice *lattice)
-{
-    const int d = lattice->ndim, m = lattice->n_periodic;
-    double    g[HS_MAX_DIM][HS_MAX_DIM], product[HS_MAX_DIM][HS_MAX_DIM];
-    double    norm = 0.0, error = 0.0;
-    for (int r = 0; r < m; r++) {
-        const int axis = lattice->vector_of_row[r];
+    strain->column_sum = 0.0;
+    for (int k = 0; k < d; k++) {
+        double sum = 0.0;
         for (int c = 0; c < d; c++) {
-            g[c][r] = lattice->normal[axis][c] / lattice->period[axis];
-            norm += fabs(g[c][r]);
+            sum += fabs(strain->F[c][k]);
         }
+        strain->column_sum = hs_larger(sum * GROW, strain->column_sum);
     }
-    const double off =
-        multiply_matrices(m, d, m, lattice->given, (const double(*)[HS_MAX_DIM])g, product);
+    /* |g| (Frobenius) of an exact right inverse of h0, by how far the rounded one is from one. */
+    double off = multiply_matrices(m, d, m, (const double(*)[HS_MAX_DIM])lattice.given,
+                                   (const double(*)[HS_MAX_DIM])dual, product);
     for (int r = 0; r < m; r++) {
         for (int s = 0; s < m; s++) {
             error += fabs(product[r][s] - (r == s)) * (1.0 + 0x1p-52) + off;
         }
     }
     error *= GROW;
-    return error < 0.5 ? norm / (1.0 - error) * GROW : INFINITY;
-}
-
-/* |h0 F - h|, the sum over all entries. */
-static double
-bound_residual(const hs_lattice *lattice, const double now[][HS_MAX_DIM], const hs_strain *strain)
-{
-    const int    d = lattice->ndim, m = lattice->n_periodic;
-    double       product[HS_MAX_DIM][HS_MAX_DIM], sum = 0.0;
-    const double off = multiply_matrices(m, d, d, lattice->given, strain->F, product);
+    inverse = error < 0.5 ? inverse / (1.0 - error) * GROW : INFINITY;
+    /* |h0 F - h|, the sum over all entries. */
+    off = multiply_matrices(m, d, d, (const double(*)[HS_MAX_DIM])lattice.given,
+                            (const double(*)[HS_MAX_DIM])strain->F, product);
     for (int r = 0; r < m; r++) {
         for (int k = 0; k < d; k++) {
-            sum += fabs(product[r][k] - now[r][k]) * (1.0 + 0x1p-52) + off;
+            residual +=
+                fabs(product[r][k] - now->rows[lattice.vector_of_row[r]][k]) * (1.0 + 0x1p-52) +
+                off;
         }
     }
-    return sum * GROW;
-}
-
-bool
-hs_strain_find(const hs_box *before, const hs_box *now, hs_strain *strain)
-{
-    hs_lattice lattice;
-    double     rows[HS_MAX_DIM][HS_MAX_DIM];
-    hs_lattice_init_given(before, hs_scale_of(0), &lattice);
-    for (int r = 0; r < lattice.n_periodic; r++) {
-        memcpy(rows[r], now->rows[lattice.vector_of_row[r]], sizeof rows[r]);
-    }
-    if (!guess_strain(&lattice, (const double(*)[HS_MAX_DIM])rows, strain)) {
-        return false;
-    }
-    strain->column_sum = 0.0;
-    for (int k = 0; k < before->ndim; k++) {
-        double sum = 0.0;
-        for (int c = 0; c < before->ndim; c++) {
-            sum += fabs(strain->F[c][k]);
-        }
-        strain->column_sum = hs_larger(sum * GROW, strain->column_sum);
-    }
-    strain->residual = bound_inverse(&lattice) *
-                       bound_residual(&lattice, (const double(*)[HS_MAX_DIM])rows, strain) * GROW;
-    strain->shrink =
-        smallest_stretch(before->ndim, (const double(*)[HS_MAX_DIM])strain->F) - strain->residual;
+    strain->residual = inverse * (residual * GROW) * GROW;
+    strain->shrink = smallest_stretch(d, (const double(*)[HS_MAX_DIM])strain->F) - strain->residual;
     /* The difference is rounded by at most 2^-53 of itself, and so is the next one. */
     strain->shrink -= 0x1p-52 * fabs(strain->shrink);
     strain->shrink = hs_smaller(strain->shrink, 1.0);

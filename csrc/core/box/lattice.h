@@ -84,6 +84,26 @@ double hs_lattice_volume(const hs_lattice *lattice, int exponent);
 /* S over the periodic box vectors as given, from a shift over B; false when it passes 2^62. */
 bool hs_lattice_shift(const hs_lattice *lattice, const int64_t *reduced, int64_t *given);
 
+/* The same of numbers that are known to be few: no sum passes int32. given may be reduced. */
+HS_ALWAYS_INLINE void
+hs_lattice_few(const hs_lattice *lattice, const int32_t *reduced, int32_t *given)
+{
+    int32_t sums[HS_MAX_DIM] = {0};
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        for (int l = 0; l < lattice->n_periodic; l++) {
+            sums[l] += reduced[r] * (int32_t)lattice->U[r][l];
+        }
+    }
+    for (int l = 0; l < lattice->n_periodic; l++) {
+        given[l] = sums[l];
+    }
+}
+
+/* Gram and Schmidt, twice, so that the n unit vectors are at right angles to rounding: row order[r]
+ * is the sum of parts[r][k] unit[k] over k <= r. order: NULL for rows in order. */
+void hs_orthogonal_rows(const double rows[][HS_MAX_DIM], const int *order, int n, int ndim,
+                        double unit[][HS_MAX_DIM], double parts[][HS_MAX_DIM]);
+
 /* Whether reduction has failed: rows of B nearly depend on each other, or have coefficients over
  * the given box vectors that no shift may have. */
 bool hs_skew_is_left(const hs_lattice *lattice);

@@ -78,36 +78,28 @@ subtract_product(double factor, double entry, double *sum, double *low, double *
     *absolute += fabs(product.hi);
 }
 
-/* X = r - sum_l given_turns[l] * scaled box vector l. Turns of more than 52 bits are split into two
- * doubles. */
-static void
-subtract_rows(const hs_lattice *lattice, const double *r, const int64_t *given_turns,
-              double *inside, double *magnitude)
+bool
+hs_wrap_by(const hs_lattice *lattice, const double *r, const int64_t *turns, double *inside,
+           double *magnitude)
 {
+    int64_t given[HS_MAX_DIM];
+    if (!hs_lattice_shift(lattice, turns, given)) {
+        return false;
+    }
     for (int k = 0; k < lattice->ndim; k++) {
         double sum = r[k];
         double low = 0.0;
         double absolute = fabs(r[k]);
         for (int l = 0; l < lattice->n_periodic; l++) {
+            /* Turns of more than 52 bits are split into two doubles. */
             const double  entry = lattice->scaled[l][k];
-            const int64_t tail = given_turns[l] % TURNS_TAIL;
-            subtract_product((double)(given_turns[l] - tail), entry, &sum, &low, &absolute);
+            const int64_t tail = given[l] % TURNS_TAIL;
+            subtract_product((double)(given[l] - tail), entry, &sum, &low, &absolute);
             subtract_product((double)tail, entry, &sum, &low, &absolute);
         }
         inside[k] = sum + low;
         *magnitude = hs_larger(absolute, *magnitude);
     }
-}
-
-bool
-hs_wrap_by(const hs_lattice *lattice, const double *r, const int64_t *turns, double *inside,
-           double *magnitude)
-{
-    int64_t given_turns[HS_MAX_DIM];
-    if (!hs_lattice_shift(lattice, turns, given_turns)) {
-        return false;
-    }
-    subtract_rows(lattice, r, given_turns, inside, magnitude);
     return true;
 }
 
@@ -190,27 +182,21 @@ hs_range_widen(const double *x, int64_t n, hs_range *range)
     }
 }
 
-/* At most one turn each way. Written so that compilers vectorise it: 1 and 0 for true and false,
- * and n * length instead of a branch. */
+/* At most one turn each way, counted in turns unless that is NULL. Written so that compilers
+ * vectorise it: 1 and 0 for true and false, and n * length instead of a branch. */
 static void
-fold_once(double *HS_RESTRICT x, int64_t n, double length)
+fold_once(double *HS_RESTRICT x, int64_t n, double length, int32_t *HS_RESTRICT turns)
 {
     const double half = 0.5 * length;
+    for (int64_t i = 0; turns != NULL && i < n; i++) {
+        const double above = x[i] > half ? 1.0 : 0.0;
+        const double below = x[i] < -half ? 1.0 : 0.0;
+        turns[i] = (int32_t)(above - below);
+    }
     for (int64_t i = 0; i < n; i++) {
         const double above = x[i] > half ? 1.0 : 0.0;
         const double below = x[i] < -half ? 1.0 : 0.0;
         x[i] -= (above - below) * length;
-    }
-}
-
-static void
-count_once(const double *HS_RESTRICT x, int64_t n, double length, int32_t *HS_RESTRICT turns)
-{
-    const double half = 0.5 * length;
-    for (int64_t i = 0; i < n; i++) {
-        const double above = x[i] > half ? 1.0 : 0.0;
-        const double below = x[i] < -half ? 1.0 : 0.0;
-        turns[i] = (int32_t)(above - below);
     }
 }
 
@@ -224,10 +210,7 @@ hs_fold_axis(const hs_lattice *lattice, int k, double *x, int64_t first, int64_t
     for (int64_t begin = first; begin < last; begin += TILE) {
         const int64_t n = last - begin < TILE ? last - begin : TILE;
         if (once && (turns == NULL || turns->narrow[row] != NULL)) {
-            if (turns != NULL) {
-                count_once(x + begin, n, length, turns->narrow[row] + begin);
-            }
-            fold_once(x + begin, n, length);
+            fold_once(x + begin, n, length, turns != NULL ? turns->narrow[row] + begin : NULL);
         } else {
             for (int64_t i = begin; i < begin + n; i++) {
                 int64_t turned;
@@ -347,80 +330,42 @@ count_turns(const hs_lattice *lattice, const double *const *x, tile *work)
     }
 }
 
-/* A given box vector with a component along the present axis, and the turns over it. */
-typedef struct term {
-    const double *turns;
-    double        entry;
-    double        high_part, low_part; /* of the entry: Veltkamp's halves. Their products with less
-                                        * than 2^26 turns are exact */
-} term;
-
-/* At most this many terms at a time; more need a second loop. */
-#define TERMS 3
-
-/* sum + low -= turns * entry for each of n_terms terms, by the steps of subtract_product.
- * Inlined with constant n_terms. */
-HS_ALWAYS_INLINE void
-subtract_terms(const term *terms, int n_terms, tile *work)
-{
-    const term a = terms[0], b = n_terms > 1 ? terms[1] : a, c = n_terms > 2 ? terms[2] : a;
-    const term each[TERMS] = {a, b, c};
-    for (int i = 0; i < work->n; i++) {
-        double sum = work->sum[i], low = work->low[i], absolute = work->absolute[i];
-        for (int e = 0; e < n_terms; e++) {
-            const double factor = -each[e].turns[i];
-            const double product = factor * each[e].entry;
-            const double error = (factor * each[e].high_part - product) + factor * each[e].low_part;
-            const hs_dw  partial = hs_two_sum(sum, product);
-            sum = partial.hi;
-            low += partial.lo + error;
-            absolute += fabs(product);
-        }
-        work->sum[i] = sum;
-        work->low[i] = low;
-        work->absolute[i] = absolute;
-    }
-}
-
+/* By the steps of hs_wrap_by. With less than 2^26 turns products with Veltkamp's halves of an entry
+ * are exact. */
 static void
 move_inside(const hs_lattice *lattice, int k, const double *HS_RESTRICT x, tile *work,
             hs_wrap_range *folded)
 {
-    double *HS_RESTRICT inside = work->inside[k];
-    term                terms[HS_MAX_DIM];
-    int                 n_terms = 0;
+    double *HS_RESTRICT inside = work->inside[k], *HS_RESTRICT sum = work->sum;
+    double *HS_RESTRICT low = work->low, *HS_RESTRICT absolute = work->absolute;
+    for (int i = 0; i < work->n; i++) {
+        sum[i] = x[i];
+        low[i] = 0.0;
+        absolute[i] = fabs(x[i]);
+    }
     for (int l = 0; l < lattice->n_periodic; l++) {
-        const double entry = lattice->scaled[l][k];
-        if (entry != 0.0) {
-            const double scaled = 0x1.0000002p27 * entry;
-            const double high_part = scaled - (scaled - entry);
-            terms[n_terms++] = (term){work->given[l], entry, high_part, entry - high_part};
+        const double *HS_RESTRICT given = work->given[l];
+        const double              entry = lattice->scaled[l][k], scaled = 0x1.0000002p27 * entry;
+        const double high_part = scaled - (scaled - entry), low_part = entry - high_part;
+        for (int i = 0; entry != 0.0 && i < work->n; i++) {
+            const double factor = -given[i], product = factor * entry;
+            const double error = (factor * high_part - product) + factor * low_part;
+            const hs_dw  partial = hs_two_sum(sum[i], product);
+            sum[i] = partial.hi;
+            low[i] += partial.lo + error;
+            absolute[i] += fabs(product);
         }
     }
     for (int i = 0; i < work->n; i++) {
-        work->sum[i] = x[i];
-        work->low[i] = 0.0;
-        work->absolute[i] = fabs(x[i]);
-    }
-    for (int e = 0; e < n_terms; e += TERMS) {
-        if (n_terms - e >= 3) {
-            subtract_terms(terms + e, 3, work);
-        } else if (n_terms - e == 2) {
-            subtract_terms(terms + e, 2, work);
-        } else {
-            subtract_terms(terms + e, 1, work);
-        }
-    }
-    for (int i = 0; i < work->n; i++) {
-        inside[i] = work->sum[i] + work->low[i];
+        inside[i] = sum[i] + low[i];
     }
     for (int i = 0; i < work->n; i++) { /* a point that stays keeps its -0; no branch this way */
         const double given = x[i], moved = inside[i];
         inside[i] = work->moved[i] != 0.0 ? moved : given;
     }
-    hs_range absolute = HS_NO_RANGE;
-    hs_range_widen(work->absolute, work->n, &absolute);
-    folded->magnitude = hs_larger(absolute.upper, folded->magnitude);
+    hs_range range = HS_NO_RANGE;
+    hs_range_widen(absolute, work->n, &range);
+    folded->magnitude = hs_larger(range.upper, folded->magnitude);
 }
 
 /* Ranges of the coordinates t_k of the points inside, joined to *folded. Returns whether along any
@@ -447,59 +392,6 @@ find_ranges(const hs_lattice *lattice, tile *work, hs_wrap_range *folded)
     return beyond;
 }
 
-/* Wraps every point by hs_wrap_point. Returns the first point that fails, or -1. */
-static int
-fold_one_by_one(const hs_lattice *lattice, const double *const *x, const hs_turns *turns,
-                int64_t begin, tile *work, hs_wrap_range *folded)
-{
-    for (int i = 0; i < work->n; i++) {
-        double  r[HS_MAX_DIM], inside[HS_MAX_DIM];
-        int64_t turned[HS_MAX_DIM];
-        for (int k = 0; k < lattice->ndim; k++) {
-            r[k] = x[k][i];
-        }
-        if (!hs_wrap_point(lattice, r, inside, turned, &folded->magnitude)) {
-            return i;
-        }
-        for (int k = 0; k < lattice->ndim; k++) {
-            work->inside[k][i] = inside[k];
-        }
-        for (int row = 0; row < lattice->n_periodic; row++) {
-            hs_turns_set(turns, row, begin + i, turned[row]);
-        }
-    }
-    return -1;
-}
-
-/* The quick way. Returns false where some points have too many turns or may need a second pass. */
-static bool
-fold_tile(const hs_lattice *lattice, double most, const double *const *x, const hs_turns *turns,
-          int64_t begin, tile *work, hs_wrap_range *folded)
-{
-    hs_wrap_range found = *folded;
-    count_turns(lattice, x, work);
-    int many = 0; /* turns of a point, over all rows of B together */
-    for (int i = 0; i < work->n; i++) {
-        many |= !(work->moved[i] <= most); /* also where overflow has left no number */
-    }
-    if (many) {
-        return false;
-    }
-    for (int k = 0; k < lattice->ndim; k++) {
-        move_inside(lattice, k, x[k], work, &found);
-    }
-    if (find_ranges(lattice, work, &found)) {
-        return false;
-    }
-    *folded = found;
-    for (int row = 0; row < lattice->n_periodic; row++) {
-        for (int i = 0; i < work->n; i++) {
-            hs_turns_set(turns, row, begin + i, (int64_t)work->turned[row][i]);
-        }
-    }
-    return true;
-}
-
 void
 hs_fold_points(const hs_lattice *lattice, bool few_turns, double *const *r, int64_t first,
                int64_t last, double *const *x, const hs_turns *turns, hs_wrap_range *folded)
@@ -514,17 +406,46 @@ hs_fold_points(const hs_lattice *lattice, bool few_turns, double *const *r, int6
     const double most = few_turns ? INFINITY : HS_FOLD_TURNS / largest;
     for (int64_t begin = first; begin < last; begin += TILE) {
         const double *from[HS_MAX_DIM];
+        hs_wrap_range found = *folded;
         work.n = (int)(last - begin < TILE ? last - begin : TILE);
         for (int k = 0; k < lattice->ndim; k++) {
             from[k] = r[k] + begin;
         }
-        if (!fold_tile(lattice, most, from, turns, begin, &work, folded)) {
-            const int failed = fold_one_by_one(lattice, from, turns, begin, &work, folded);
-            if (failed >= 0) {
-                folded->failed = begin + failed;
+        count_turns(lattice, from, &work);
+        int many = 0; /* turns of a point, over all rows of B together */
+        for (int i = 0; i < work.n; i++) {
+            many |= !(work.moved[i] <= most); /* also where overflow has left no number */
+        }
+        for (int k = 0; !many && k < lattice->ndim; k++) {
+            move_inside(lattice, k, from[k], &work, &found);
+        }
+        const bool one_by_one = many || find_ranges(lattice, &work, &found);
+        for (int i = 0; one_by_one && i < work.n; i++) {
+            double  point[HS_MAX_DIM], inside[HS_MAX_DIM];
+            int64_t turned[HS_MAX_DIM];
+            for (int k = 0; k < lattice->ndim; k++) {
+                point[k] = from[k][i];
+            }
+            if (!hs_wrap_point(lattice, point, inside, turned, &folded->magnitude)) {
+                folded->failed = begin + i;
                 return;
             }
+            for (int k = 0; k < lattice->ndim; k++) {
+                work.inside[k][i] = inside[k];
+            }
+            for (int row = 0; row < lattice->n_periodic; row++) {
+                hs_turns_set(turns, row, begin + i, turned[row]);
+            }
+        }
+        if (one_by_one) {
             (void)find_ranges(lattice, &work, folded);
+        } else {
+            *folded = found;
+        }
+        for (int row = 0; row < lattice->n_periodic && !one_by_one; row++) {
+            for (int i = 0; i < work.n; i++) {
+                hs_turns_set(turns, row, begin + i, (int64_t)work.turned[row][i]);
+            }
         }
         for (int k = 0; k < lattice->ndim; k++) {
             memcpy(x[k] + begin, work.inside[k], (size_t)work.n * sizeof(double));
@@ -565,67 +486,36 @@ typedef struct image_list {
     int8_t              shift[MOST_IMAGES][HS_MAX_DIM];
 } image_list;
 
-static double
-length_of(const double *x, int n)
-{
-    double square = 0.0;
-    for (int k = 0; k < n; k++) {
-        square += x[k] * x[k];
-    }
-    return sqrt(square);
-}
-
-/* Images are listed along long rows first: along short ones few are then left. */
-static void
-sort_rows(hs_image_box *to)
-{
-    const hs_lattice *lattice = &to->lattice;
-    for (int r = 1; r < lattice->n_periodic; r++) {
-        const int    row = to->order[r];
-        const double length = length_of(lattice->rows[row], lattice->ndim);
-        int          at = r;
-        while (at > 0 && length_of(lattice->rows[to->order[at - 1]], lattice->ndim) > length) {
-            to->order[at] = to->order[at - 1];
-            at--;
-        }
-        to->order[at] = row;
-    }
-}
-
-/* Gram and Schmidt, twice, so that the unit vectors are at right angles to rounding. */
+/* Images are listed along long rows first, for along short ones few are then left: sorts the
+ * rows. */
 static hs_status
 set_unit_vectors(hs_image_box *to)
 {
     const hs_lattice *lattice = &to->lattice;
     const int         d = lattice->ndim, m = lattice->n_periodic;
-    double            least = 1.0;
-    sort_rows(to);
+    double            least = 1.0, whole[HS_MAX_DIM];
     for (int r = 0; r < m; r++) {
-        double       *unit = to->along[r];
-        const double *row = lattice->rows[to->order[r]];
-        const double  whole = length_of(row, d);
-        memcpy(unit, row, (size_t)d * sizeof *row);
-        for (int pass = 0; pass < 2; pass++) {
-            for (int k = 0; k < r; k++) {
-                double part = 0.0;
-                for (int c = 0; c < d; c++) {
-                    part += unit[c] * to->along[k][c];
-                }
-                to->R[r][k] += part;
-                for (int c = 0; c < d; c++) {
-                    unit[c] -= part * to->along[k][c];
-                }
-            }
+        double square = 0.0;
+        int    at = r;
+        for (int c = 0; c < d; c++) {
+            square += lattice->rows[r][c] * lattice->rows[r][c];
         }
-        const double height = length_of(unit, d);
-        to->R[r][r] = height;
-        if (!(whole >= LEAST_ROW)) {
+        whole[r] = sqrt(square);
+        for (; at > 0 && whole[to->order[at - 1]] > whole[r]; at--) {
+            to->order[at] = to->order[at - 1];
+        }
+        to->order[at] = r;
+    }
+    hs_orthogonal_rows((const double(*)[HS_MAX_DIM])lattice->rows, to->order, m, d, to->along,
+                       to->R);
+    for (int r = 0; r < m; r++) {
+        const int row = to->order[r];
+        if (!(whole[row] >= LEAST_ROW)) {
             return HS_ERR_BOX_SKEWED;
         }
-        least = hs_smaller(height / whole, least);
+        least = hs_smaller(to->R[r][r] / whole[row], least);
         for (int c = 0; c < d; c++) {
-            unit[c] /= height;
-            to->is_spanned[c] = to->is_spanned[c] || row[c] != 0.0;
+            to->is_spanned[c] = to->is_spanned[c] || lattice->rows[row][c] != 0.0;
         }
         to->row_error += MOST_TIMES * d * lattice->row_error[r];
     }
@@ -661,18 +551,6 @@ hs_image_box_init(const hs_box *box, int ndim, hs_image_box *to)
     return hs_skew_is_left(&to->lattice) ? HS_ERR_BOX_SKEWED : set_unit_vectors(to);
 }
 
-static void
-add_image(image_list *list, const int8_t *shift, double length)
-{
-    if (!list->is_kept) {
-        list->limit = hs_smaller(length + list->slack, list->limit);
-    } else if (list->n < MOST_IMAGES) {
-        memcpy(list->shift[list->n++], shift, sizeof list->shift[0]);
-    } else {
-        list->is_full = true;
-    }
-}
-
 /* Shifts along rows r, r - 1, ..., 0, for those along the others; `square` is that of the parts
  * along unit vectors beyond r. */
 static void
@@ -703,8 +581,12 @@ list_images(image_list *list, int r, int8_t *shift, double square)
         shift[r] = (int8_t)times;
         if (r > 0) {
             list_images(list, r - 1, shift, square + z * z);
+        } else if (!list->is_kept) {
+            list->limit = hs_smaller(length + list->slack, list->limit);
+        } else if (list->n < MOST_IMAGES) {
+            memcpy(list->shift[list->n++], shift, sizeof list->shift[0]);
         } else {
-            add_image(list, shift, length);
+            list->is_full = true;
         }
     }
 }
@@ -790,29 +672,6 @@ wrap(const hs_image_box *box, const double *x, double *inside, int64_t *turns, d
     return lattice->aligned || hs_wrap_point(lattice, scaled, inside, turns, magnitude);
 }
 
-static bool
-is_less(const int64_t *one, const int64_t *other, int n)
-{
-    int l = 0;
-    while (l < n - 1 && one[l] == other[l]) {
-        l++;
-    }
-    return one[l] < other[l];
-}
-
-/* S of image e; false when it passes 2^62. */
-static bool
-shift_of(const image_list *list, int e, const int64_t *from, int64_t *shift)
-{
-    const hs_lattice *lattice = &list->box->lattice;
-    int64_t           over[HS_MAX_DIM];
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        const int row = list->box->order[r];
-        over[row] = from[row] + list->shift[e][r];
-    }
-    return hs_lattice_shift(lattice, over, shift);
-}
-
 hs_status
 hs_near_image(const hs_image_box *box, const double *p, const double *q, int64_t *shift)
 {
@@ -835,14 +694,21 @@ hs_near_image(const hs_image_box *box, const double *p, const double *q, int64_t
         turns[0][r] -= turns[1][r];
     }
     for (int e = 0; status == HS_OK && e < list.n; e++) {
-        int64_t   other[HS_MAX_DIM];
+        int64_t   over[HS_MAX_DIM], other[HS_MAX_DIM]; /* S of the image, over B and as given */
         hs_stages stages = {0};
-        if (!shift_of(&list, e, turns[0], other)) {
+        for (int r = 0; r < m; r++) {
+            over[box->order[r]] = turns[0][box->order[r]] + list.shift[e][r];
+        }
+        if (!hs_lattice_shift(&box->lattice, over, other)) {
             return HS_ERR_SHIFT_RANGE;
         }
         const hs_span spans[2] = {{p, q, shift}, {p, q, other}};
         const int sign = e > 0 ? hs_metric_compare(&box->metric, &spans[0], &spans[1], &stages) : 1;
-        if (sign > 0 || (sign == 0 && is_less(other, shift, m))) {
+        int       l = 0; /* where two that are equally near differ */
+        while (sign == 0 && l < m - 1 && other[l] == shift[l]) {
+            l++;
+        }
+        if (sign > 0 || (sign == 0 && other[l] < shift[l])) {
             memcpy(shift, other, (size_t)m * sizeof *shift);
         }
     }

@@ -4,7 +4,6 @@
 #include "../base/sort.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 /*
  * bins.c: a stable counting sort, O(n + cells).
@@ -93,25 +92,6 @@ count_strip(void *context, int strip, int64_t first, int64_t last)
     return HS_OK;
 }
 
-/* Turns numbers of points into places: cell by cell, and in each cell strip by strip. Returns the
- * sum of the squared numbers of each cell. */
-static double
-accumulate(const sorting *sort)
-{
-    int64_t squares = 0;
-    int32_t place = 0;
-    for (int64_t c = 0; c < sort->grid->n_cells; c++) {
-        const int64_t before = place;
-        for (int strip = 0; strip < sort->n_strips; strip++) {
-            const int32_t count = sort->counts[strip][c];
-            sort->counts[strip][c] = place;
-            place += count;
-        }
-        squares += (place - before) * (place - before);
-    }
-    return (double)squares;
-}
-
 static hs_status
 order_strip(void *context, int strip, int64_t first, int64_t last)
 {
@@ -123,41 +103,6 @@ order_strip(void *context, int strip, int64_t first, int64_t last)
         order[next[cells[i]]++] = (int32_t)i;
     }
     return HS_OK;
-}
-
-/* Sorts the point numbers into bins->order, and fills `start`. */
-static hs_status
-sort_numbers(hs_account *account, hs_team *team, const hs_options *options, sorting *sort,
-             hs_bins *bins, int32_t *start)
-{
-    const int64_t n_cells = sort->grid->n_cells, n = bins->n;
-    int32_t      *others = NULL;
-    /* Strips for this team: each with points enough, and no more further counts than points. */
-    sort->n_strips = hs_team_size(team) < HS_SLABS ? hs_team_size(team) : HS_SLABS;
-    while (sort->n_strips > 1 &&
-           (n < sort->n_strips * STRIP_POINTS || (sort->n_strips - 1) * n_cells > n)) {
-        sort->n_strips--;
-    }
-    if (sort->n_strips > 1) {
-        others = hs_alloc(account, HS_FOR_CELLS, (sort->n_strips - 1) * n_cells, sizeof *others);
-        sort->n_strips = others == NULL ? 1 : sort->n_strips;
-    }
-    memset(start, 0, (size_t)n_cells * sizeof *start);
-    sort->counts[0] = start;
-    for (int strip = 1; strip < sort->n_strips; strip++) {
-        sort->counts[strip] = others + (strip - 1) * n_cells;
-        memset(sort->counts[strip], 0, (size_t)n_cells * sizeof *others);
-    }
-    hs_status status = hs_walk_strips(team, options, n, sort->n_strips, count_strip, sort);
-    if (status == HS_OK) {
-        bins->squares = accumulate(sort);
-        status = hs_walk_strips(team, options, n, sort->n_strips, order_strip, sort);
-    }
-    /* The last strip's place in a cell has moved up to where the next cell starts. */
-    memmove(start + 1, sort->counts[sort->n_strips - 1], (size_t)n_cells * sizeof *start);
-    start[0] = 0;
-    hs_free(account, others);
-    return status;
 }
 
 /* A column on its way to cell order. */
@@ -206,14 +151,13 @@ hs_bins_arrange(hs_account *account, hs_team *team, const hs_options *options,
                 const hs_scene *scene, hs_bins *bins)
 {
     /* In the order in which they lie behind the free column, the wide ones before the narrow ones.
-     * Where X is beside, the originals lie behind the free column, and X apart. */
-    double  **first = scene->x_is_beside ? bins->originals : bins->x;
-    double  **second = scene->x_is_beside ? bins->x : bins->originals;
+     * Where originals are kept they lie behind the free column, and X apart. */
+    double  **first = bins->keeps_originals ? bins->originals : bins->x;
     void     *free_column = scene->cloud.spare;
     const int n = bins->keeps_originals ? 2 * bins->ndim : bins->ndim;
     hs_status status = HS_OK;
     for (int c = 0; c < n && status == HS_OK; c++) {
-        double **at = c < bins->ndim ? &first[c] : &second[c - bins->ndim];
+        double **at = c < bins->ndim ? &first[c] : &bins->x[c - bins->ndim];
         void    *column = *at;
         status = gather_column(team, options, bins, sizeof(double), &column, &free_column);
         *at = column;
@@ -259,21 +203,64 @@ sort_few(hs_account *account, const sorting *sort, uint64_t *numbers, hs_bins *b
     return HS_OK;
 }
 
-/* Sorts many numbers into bins->order, and fills bins->cells. */
+/* Sorts the point numbers into bins->order, and fills `start`; of queries bins->cells. */
 static hs_status
 sort_many(hs_account *account, hs_team *team, const hs_options *options, sorting *sort,
           hs_bins *bins)
 {
-    int32_t *start = hs_alloc(account, HS_FOR_CELLS, sort->grid->n_cells + 1, sizeof *start);
+    const int64_t n_cells = sort->grid->n_cells, n = bins->n;
+    int32_t      *others = NULL, *start = bins->start;
     if (start == NULL) {
-        return HS_ERR_MEMORY;
+        start = hs_alloc(account, HS_FOR_CELLS, n_cells + 1, sizeof *start);
+        if (start == NULL) {
+            return HS_ERR_MEMORY;
+        }
     }
-    hs_status status = sort_numbers(account, team, options, sort, bins, start);
-    hs_free(account, start);
+    /* Strips for this team: each with points enough, and no more further counts than points. */
+    sort->n_strips = hs_team_size(team) < HS_SLABS ? hs_team_size(team) : HS_SLABS;
+    while (sort->n_strips > 1 &&
+           (n < sort->n_strips * STRIP_POINTS || (sort->n_strips - 1) * n_cells > n)) {
+        sort->n_strips--;
+    }
+    if (sort->n_strips > 1) {
+        others = hs_alloc(account, HS_FOR_CELLS, (sort->n_strips - 1) * n_cells, sizeof *others);
+        sort->n_strips = others == NULL ? 1 : sort->n_strips;
+    }
+    memset(start, 0, (size_t)n_cells * sizeof *start);
+    sort->counts[0] = start;
+    for (int strip = 1; strip < sort->n_strips; strip++) {
+        sort->counts[strip] = others + (strip - 1) * n_cells;
+        memset(sort->counts[strip], 0, (size_t)n_cells * sizeof *others);
+    }
+    hs_status status = hs_walk_strips(team, options, n, sort->n_strips, count_strip, sort);
     if (status == HS_OK) {
-        moving move = {bins->order, sort->cells, bins->cells, sizeof *bins->cells};
-        status = hs_walk_slabs(team, options, bins->n, gather_slab, &move);
+        /* From numbers of points to places: cell by cell, and in each cell strip by strip. */
+        int64_t squares = 0;
+        int32_t place = 0;
+        for (int64_t c = 0; c < n_cells; c++) {
+            const int64_t before = place;
+            for (int strip = 0; strip < sort->n_strips; strip++) {
+                const int32_t count = sort->counts[strip][c];
+                sort->counts[strip][c] = place;
+                place += count;
+            }
+            squares += (place - before) * (place - before);
+        }
+        bins->squares = (double)squares;
+        status = hs_walk_strips(team, options, n, sort->n_strips, order_strip, sort);
     }
+    if (bins->start != NULL) {
+        /* The last strip's place in a cell has moved up to where the next cell starts. */
+        memmove(start + 1, sort->counts[sort->n_strips - 1], (size_t)n_cells * sizeof *start);
+        start[0] = 0;
+    } else {
+        moving move = {bins->order, sort->cells, bins->cells, sizeof *bins->cells};
+        hs_free(account, start);
+        if (status == HS_OK) {
+            status = hs_walk_slabs(team, options, n, gather_slab, &move);
+        }
+    }
+    hs_free(account, others);
     return status;
 }
 
@@ -322,9 +309,8 @@ hs_bins_build(hs_account *account, hs_team *team, const hs_options *options, hs_
         void      *spare = scene->cloud.spare;
         sorting    sort = {.grid = grid, .lattice = &scene->lattice, .bins = bins, .x = bins->x};
         sort.cells = of_queries && is_few ? bins->cells : spare;
-        status = !of_queries ? sort_numbers(account, team, options, &sort, bins, bins->start)
-                 : is_few    ? sort_few(account, &sort, spare, bins)
-                             : sort_many(account, team, options, &sort, bins);
+        status = of_queries && is_few ? sort_few(account, &sort, spare, bins)
+                                      : sort_many(account, team, options, &sort, bins);
         if (status == HS_OK) {
             status = hs_bins_arrange(account, team, options, scene, bins);
         }
@@ -391,19 +377,6 @@ choose_pitch(const hs_grid *grid, int k, double extent, double width)
     return fmax(grid->range[k] * (1.0 + margin) / split, floor_of_pitch);
 }
 
-static void
-set_open_axis(const hs_scene *scene, int k, double pitch, int64_t reach, hs_grid *grid)
-{
-    const double lower = scene->lower[k], upper = scene->upper[k];
-    grid->lower[k] = lower > 0.0 ? lower : upper < 0.0 ? upper : 0.0;
-    grid->cell_size[k] = pitch;
-    grid->cells_per_length[k] = 1.0 / pitch;
-    grid->skipped[k] = hs_sparse_number((lower - grid->lower[k]) * grid->cells_per_length[k]);
-    grid->shape[k] = INT64_MAX;
-    grid->shape[k] = hs_sparse_index(grid, k, upper) + 1;
-    grid->reach[k] = reach < grid->shape[k] ? reach : grid->shape[k] - 1;
-}
-
 void
 hs_sparse_grid(const hs_scene *scene, const hs_grid *dense, double width, hs_grid *grid)
 {
@@ -423,8 +396,16 @@ hs_sparse_grid(const hs_scene *scene, const hs_grid *dense, double width, hs_gri
             (void)status;
             continue;
         }
-        const double reach = k == 0 ? fmax(1.0, HS_SPARSE_SPLIT / width) : 1.0;
-        set_open_axis(scene, k, pitch, (int64_t)reach, grid);
+        const double  lower = scene->lower[k], upper = scene->upper[k];
+        const int64_t reach = k == 0 && HS_SPARSE_SPLIT > width ? (int64_t)(HS_SPARSE_SPLIT / width)
+                                                                : 1;
+        grid->lower[k] = lower > 0.0 ? lower : upper < 0.0 ? upper : 0.0;
+        grid->cell_size[k] = pitch;
+        grid->cells_per_length[k] = 1.0 / pitch;
+        grid->skipped[k] = hs_sparse_number((lower - grid->lower[k]) * grid->cells_per_length[k]);
+        grid->shape[k] = INT64_MAX;
+        grid->shape[k] = hs_sparse_index(grid, k, upper) + 1;
+        grid->reach[k] = reach < grid->shape[k] ? reach : grid->shape[k] - 1;
     }
 }
 
@@ -460,13 +441,6 @@ mix(uint64_t bits)
     return bits ^ bits >> 33;
 }
 
-static int
-compare_names(const void *a, const void *b)
-{
-    const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
-    return (x > y) - (x < y);
-}
-
 /* Other points in the cell of an average point, from how often samples share a cell. The short
  * cells of a sparse grid count together, as cubes. */
 static double
@@ -487,7 +461,7 @@ mean_company(const hs_scene *scene, const hs_grid *grid, bool sparse)
             names[s] = mix(names[s] ^ (uint64_t)index);
         }
     }
-    qsort(names, (size_t)samples, sizeof *names, compare_names);
+    hs_sort_numbers(names, samples, 0, (uint64_t *)(void *)scene->cloud.spare);
     for (int64_t s = 1, run = 0; s < samples; s++) {
         run = names[s] == names[s - 1] ? run + 1 : 0;
         shared += 2.0 * (double)run;
@@ -495,45 +469,12 @@ mean_company(const hs_scene *scene, const hs_grid *grid, bool sparse)
     return shared / ((double)samples * (double)(samples - 1)) * (double)scene->n;
 }
 
-/* Tests per point, all costs counted as tests, for cells that hold `company` others. */
-static double
-cost_of(double company, int ndim)
-{
-    /* Of the cells around a point half are visited, in half of the rows. Points in clumps have
-     * fewer full ones: 2^d of 3^d / 2. */
-    const double rows = 0.5 * pow(3.0, ndim - 1);
-    return ldexp(company, ndim) + (TESTS_PER_GROUP + TESTS_PER_ROW * rows) / (1.0 + company);
-}
-
 double
-hs_sparse_width(const hs_scene *scene, const hs_grid *dense, double *cost)
+hs_sparse_choose(const hs_scene *scene, const hs_grid *dense, bool always)
 {
-    double best = 1.0;
-    *cost = INFINITY;
-    if (scene->n < 2) {
-        return best;
-    }
-    for (double width = 1.0; width <= WIDEST; width *= 2.0) {
-        hs_grid grid;
-        hs_sparse_grid(scene, dense, width, &grid);
-        const double company = mean_company(scene, &grid, true);
-        const double found = cost_of(company, scene->ndim);
-        if (found < *cost) {
-            *cost = found;
-            best = width;
-        } else if (company > 1.0) { /* wider only gets worse */
-            break;
-        }
-    }
-    return best;
-}
-
-double
-hs_sparse_choose(const hs_scene *scene, const hs_grid *dense)
-{
-    double larger = 1.0, widest = 1.0, cost;
-    if ((double)scene->n < CROWDED) {
-        return 0.0;
+    double larger = 1.0, widest = 1.0, best = 1.0, least = INFINITY, crowd = INFINITY;
+    if ((double)scene->n < (always ? 2.0 : CROWDED)) {
+        return always ? best : 0.0;
     }
     for (int k = 0; k < scene->ndim; k++) {
         if (dense->cell_size[k] > dense->range[k]) {
@@ -542,19 +483,34 @@ hs_sparse_choose(const hs_scene *scene, const hs_grid *dense)
             widest = fmax(widest, wider);
         }
     }
-    if (!(larger > WORTH_A_LOOK)) {
-        return 0.0;
+    if (!always) {
+        if (!(larger > WORTH_A_LOOK)) {
+            return 0.0;
+        }
+        /* At least half of a point's company is tested, whatever its neighbours hold. */
+        const double of_each = widest > FILTER_FAILS ? TESTS_PER_DECISION : 1.0;
+        crowd = of_each * mean_company(scene, dense, false);
+        if (!(crowd > CROWDED)) {
+            return 0.0;
+        }
     }
-    /* At least half of a point's company is tested, whatever its neighbours hold. */
-    double crowd = mean_company(scene, dense, false);
-    if (widest > FILTER_FAILS) {
-        crowd *= TESTS_PER_DECISION;
+    for (double width = 1.0; width <= WIDEST; width *= 2.0) {
+        hs_grid grid;
+        hs_sparse_grid(scene, dense, width, &grid);
+        const double company = mean_company(scene, &grid, true);
+        /* Tests per point, all costs counted as tests. Of the cells around a point half are
+         * visited, in half of the rows. Points in clumps have fewer full ones: 2^d of 3^d / 2. */
+        const double rows = 0.5 * pow(3.0, scene->ndim - 1);
+        const double cost = ldexp(company, scene->ndim) +
+                            (TESTS_PER_GROUP + TESTS_PER_ROW * rows) / (1.0 + company);
+        if (cost < least) {
+            least = cost;
+            best = width;
+        } else if (company > 1.0) { /* wider only gets worse */
+            break;
+        }
     }
-    if (!(crowd > CROWDED)) {
-        return 0.0;
-    }
-    const double width = hs_sparse_width(scene, dense, &cost);
-    return 0.5 * crowd > cost ? width : 0.0;
+    return 0.5 * crowd > least ? best : 0.0;
 }
 
 /* Sorts the points into rows of cells; finds rows, windows and groups by steps that double, then by
@@ -720,32 +676,6 @@ sort_by_axis(build *b, int64_t first, int64_t end, int k)
     return status;
 }
 
-/* Lists rows and cells, and shortens the keys to one for each cell. */
-static void
-list_cells(const build *b, int64_t n, int32_t *start, hs_sparse *sparse)
-{
-    int64_t *keys = sparse->cell_x; /* read ahead of where it is written */
-    int64_t  row = 0, cell = 0, x = 0;
-    for (int64_t si = 0; si < n; si++) {
-        const bool    begins_row = keys[si] < 0;
-        const int64_t own = begins_row ? ~keys[si] : keys[si];
-        if (begins_row) {
-            const int64_t i = b->sort.ids[si];
-            for (int k = 1; k < sparse->ndim; k++) {
-                sparse->row_index[row * (sparse->ndim - 1) + k - 1] = index_of(b, i, k);
-            }
-            sparse->row_cell[row++] = (int32_t)cell;
-        }
-        if (begins_row || own != x) {
-            x = own;
-            start[cell] = (int32_t)si;
-            keys[cell++] = x;
-        }
-    }
-    sparse->row_cell[row] = (int32_t)cell;
-    start[cell] = (int32_t)n;
-}
-
 hs_status
 hs_sparse_build(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
                 hs_grid *grid, hs_sparse *sparse, hs_bins *bins)
@@ -784,7 +714,26 @@ hs_sparse_build(hs_account *account, hs_team *team, const hs_options *options, h
     }
     if (status == HS_OK) {
         sparse->cell_start = bins->start;
-        list_cells(&b, n, bins->start, sparse);
+        int64_t *keys = sparse->cell_x; /* shortened to one for each cell, read ahead of that */
+        int64_t  row = 0, cell = 0, x = 0;
+        for (int64_t si = 0; si < n; si++) {
+            const bool    begins_row = keys[si] < 0;
+            const int64_t own = begins_row ? ~keys[si] : keys[si];
+            for (int k = 1; begins_row && k < sparse->ndim; k++) {
+                sparse->row_index[row * (sparse->ndim - 1) + k - 1] =
+                    index_of(&b, b.sort.ids[si], k);
+            }
+            if (begins_row) {
+                sparse->row_cell[row++] = (int32_t)cell;
+            }
+            if (begins_row || own != x) {
+                x = own;
+                bins->start[cell] = (int32_t)si;
+                keys[cell++] = x;
+            }
+        }
+        sparse->row_cell[row] = (int32_t)cell;
+        bins->start[cell] = (int32_t)n;
         for (int64_t c = 0; c < sparse->n_cells; c++) {
             const double here = bins->start[c + 1] - bins->start[c];
             bins->squares += here * here;

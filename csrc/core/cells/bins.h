@@ -99,14 +99,11 @@ hs_sparse_index(const hs_grid *grid, int k, double t)
 
 /*
  * Whether storing occupied cells only is quicker than the grid `dense`: 0 if not, else the `width`
- * for hs_sparse_grid. A judgement from the scene alone; costs nothing where the dense grid has the
- * cells it wants, some microseconds where it has not, and more only where points crowd.
+ * for hs_sparse_grid that is expected to be quickest. A judgement from the scene alone, not sorted
+ * yet; costs nothing where the dense grid has the cells it wants, some microseconds where it has
+ * not, and more only where points crowd. always: a width whatever the dense grid is.
  */
-double hs_sparse_choose(const hs_scene *scene, const hs_grid *dense);
-
-/* The `width` for hs_sparse_grid that is expected to be quickest, for a scene of any number of
- * points; *cost: tests per point, all costs counted as tests. dense: any grid of it. */
-double hs_sparse_width(const hs_scene *scene, const hs_grid *dense, double *cost);
+double hs_sparse_choose(const hs_scene *scene, const hs_grid *dense, bool always);
 
 /*
  * The occupied cells of a sparse grid, in rows. A row is a line of cells along the
@@ -115,23 +112,9 @@ double hs_sparse_width(const hs_scene *scene, const hs_grid *dense, double *cost
  * hashed: targets of neighbouring rows come in nearly ascending order, so that a hint finds them in
  * O(1), and no input makes a search slower than O(log n).
  *
- * How to walk (hs_sparse_grid, hs_stencil_build and hs_sparse_build first):
- *
- *     for each row
- *         for each row of the stencil, with a hint of its own that starts at 0
- *             target = index of the row + offset; along periodic axes wrapped into 0 ... shape - 1,
- *             which gives image and shift as in a dense grid
- *             hs_sparse_find_row(target, &hint); if there is one: a link, with a cursor of its own
- *         for each group of the row (hs_sparse_next_group)
- *             for each link
- *                 window of cells: group.x_first + link.first ... group.x_last + link.last; along a
- *                 periodic first axis cut into turns of `shape` cells, a cursor for each turn
- *                 or a fresh one
- *                 hs_sparse_window: points [first, end); in the own row and image 0 from
- *                 group.first on, where each point meets only those that follow it
- *
- * Each pair is met once: a group may see cells that are too far from some of its points, but always
- * along the row offset by which they see each other, and only forward (grid.h).
+ * hs_sparse_grid, hs_stencil_build and hs_sparse_build come first; walk.h walks. Each pair is met
+ * once: a group may see cells that are too far from some of its points, but always along the row
+ * offset by which they see each other, and only forward (grid.h).
  */
 
 typedef struct hs_sparse {

@@ -9,7 +9,7 @@
 
 /*
  * grid.c: how far apart the coordinates of a pair can be, then one cell or several, whichever makes
- * a search cheaper; grid_choose_counts says how many.
+ * a search cheaper.
  *
  * Why no pair is lost: rounding is monotone, so cell indices are a monotone function of t; `range`
  * bounds how far apart the computed coordinates of a pair can be, every rounding and the whole
@@ -20,8 +20,8 @@
  * searches with them took 1.00 to 1.04 times the instructions (AVX2).
  */
 
-/* How many cells there are along each axis, unless the caller sets their width. Any cells find all
- * pairs: what is chosen here is speed alone. */
+/* How many cells there are along each axis, unless the caller sets their width: any cells find all
+ * pairs, and these make a search quickest. */
 
 /* Cells per axis that int32 windows and doubles tell apart. */
 #define CELLS_PER_AXIS 0x1p31
@@ -45,32 +45,6 @@ static double
 pitch_of(const hs_grid *grid, int k, double parts)
 {
     return grid->range[k] * (1.0 + 0x1p-20) / parts;
-}
-
-/*
- * How many cells along each axis: those that make a search quickest, `finer` of them to a range;
- * along the first axis so many that a cell holds some twelve points of this density.
- */
-static void
-grid_choose_counts(const hs_scene *scene, const hs_grid *grid, int finer, double density,
-                   double *counts)
-{
-    double area = 1.0; /* of one row's cross-section */
-    for (int k = scene->ndim - 1; k >= 0; k--) {
-        const double extent = scene->upper[k] - scene->lower[k];
-        double       parts = finer;
-        if (k == 0 && scene->ndim > 1) {
-            /* A whole fraction of the range: otherwise windows are longer than need be. */
-            const double points = density * area * grid->range[0];
-            parts = fmin(fmax(nearbyint(points / POINTS_PER_CELL), 1.0), 4.0);
-        }
-        const double pitch = pitch_of(grid, k, parts);
-        counts[k] = 1.0;
-        if (extent > pitch) { /* never for a zero extent, also with cutoff 0 */
-            counts[k] = floor(fmin(extent / pitch, CELLS_PER_AXIS));
-        }
-        area *= fmax(extent, grid->range[k]) / counts[k]; /* flat scenes count as this thick */
-    }
 }
 
 /* In proportion to the points. */
@@ -141,95 +115,6 @@ shorten_cells(const hs_scene *scene, const hs_grid *grid, double *counts)
 #define SLACK HS_GRID_SLACK
 /* Cost of sorting a point into its cell, in candidates. */
 #define SORTING_COST 40.0
-
-/* Sets the largest number of images per row of B that a pair can be apart; drift: of
- * measure_drift. */
-static void
-bound_images(const hs_scene *scene, const double *drift, double *images)
-{
-    const hs_lattice *lattice = &scene->lattice;
-    for (int k = 0; k < scene->ndim; k++) {
-        const int r = lattice->row_of_axis[k];
-        if (r >= 0) {
-            const double along = hs_scene_radius_along(scene, k) * (1.0 + SLACK);
-            images[r] =
-                ceil((along + drift[k] + 2.0 * scene->t_error[k]) / lattice->period[k]) + 2.0;
-        }
-    }
-}
-
-/*
- * How far adding one row of B can move t_k beyond whole periods, because normals are rounded:
- * measured, not assumed.
- */
-static void
-measure_drift(const hs_scene *scene, double drift_of_row[][HS_MAX_DIM])
-{
-    const hs_lattice *lattice = &scene->lattice;
-    for (int k = 0; k < scene->ndim; k++) {
-        for (int r = 0; r < lattice->n_periodic; r++) {
-            double along = 0.0, rounding = 0.0;
-            for (int c = 0; c < scene->ndim; c++) {
-                const double term = lattice->normal[k][c] * lattice->rows[r][c];
-                along += term;
-                rounding += (scene->ndim + 2) * UNIT * fabs(term) +
-                            fabs(lattice->normal[k][c]) * lattice->row_error[r];
-            }
-            if (lattice->row_of_axis[k] == r) {
-                along -= lattice->period[k];
-                rounding += UNIT * lattice->period[k];
-            }
-            drift_of_row[k][r] = fabs(along) + rounding * (1.0 + SLACK);
-        }
-    }
-}
-
-/* Bounds the drift, which is 0 so far, over as many images as a pair can be apart, a number that
- * depends on the drift. */
-static void
-bound_drift(const hs_scene *scene, double *images, double *drift)
-{
-    double drift_of_row[HS_MAX_DIM][HS_MAX_DIM];
-    bound_images(scene, drift, images);
-    if (scene->lattice.aligned) {
-        return;
-    }
-    measure_drift(scene, drift_of_row);
-    for (int pass = 0;; pass++) {
-        for (int k = 0; k < scene->ndim; k++) {
-            drift[k] = 0.0;
-            for (int r = 0; r < scene->lattice.n_periodic; r++) {
-                drift[k] += images[r] * drift_of_row[k][r];
-            }
-        }
-        if (pass == 2) {
-            return;
-        }
-        bound_images(scene, drift, images);
-    }
-}
-
-/* T = shift * B - centre is rounded; open coordinates subtract exactly enough without it. */
-static double
-bound_shift_error(const hs_scene *scene, const double *images)
-{
-    const hs_lattice *lattice = &scene->lattice;
-    double            error = 0.0;
-    for (int c = 0; c < scene->ndim; c++) {
-        double moved = 0.0, row_errors = 0.0;
-        for (int r = 0; r < lattice->n_periodic; r++) {
-            moved += images[r] * fabs(lattice->rows[r][c]);
-            row_errors += images[r] * lattice->row_error[r];
-        }
-        if (moved > 0.0) {
-            error = hs_larger((2 * lattice->n_periodic + 3) * UNIT *
-                                      (moved + 2.0 * scene->x_largest[c]) +
-                                  row_errors,
-                              error);
-        }
-    }
-    return error;
-}
 
 double
 hs_ball_volume(int ndim, double radius)
@@ -304,28 +189,72 @@ cost_per_point(const hs_scene *scene, const hs_grid *grid)
 static hs_status
 set_ranges(const hs_scene *scene, hs_grid *grid)
 {
+    const hs_lattice *lattice = &scene->lattice;
+    const int         m = lattice->aligned ? 0 : lattice->n_periodic; /* rows that may be inexact */
+    double            drift_of_row[HS_MAX_DIM][HS_MAX_DIM];
+    /* The largest number of images per row of B that a pair can be apart, and how far so many rows
+     * can move t_k beyond whole periods, because normals are rounded: measured, not assumed. Each
+     * of the two depends on the other. */
     double images[HS_MAX_DIM], drift[HS_MAX_DIM] = {0.0};
-    if (scene->lattice.n_periodic > 0) {
-        bound_drift(scene, images, drift);
+    for (int k = 0; k < scene->ndim; k++) {
+        for (int r = 0; r < m; r++) {
+            double along = 0.0, rounding = 0.0;
+            for (int c = 0; c < scene->ndim; c++) {
+                const double term = lattice->normal[k][c] * lattice->rows[r][c];
+                along += term;
+                rounding += (scene->ndim + 2) * UNIT * fabs(term) +
+                            fabs(lattice->normal[k][c]) * lattice->row_error[r];
+            }
+            if (lattice->row_of_axis[k] == r) {
+                along -= lattice->period[k];
+                rounding += UNIT * lattice->period[k];
+            }
+            drift_of_row[k][r] = fabs(along) + rounding * (1.0 + SLACK);
+        }
+    }
+    for (int pass = 0; pass < (lattice->aligned ? 1 : 3); pass++) {
+        for (int k = 0; k < scene->ndim; k++) {
+            if (lattice->row_of_axis[k] >= 0) {
+                const double along = hs_scene_radius_along(scene, k) * (1.0 + SLACK);
+                images[lattice->row_of_axis[k]] =
+                    ceil((along + drift[k] + 2.0 * scene->t_error[k]) / lattice->period[k]) + 2.0;
+            }
+        }
+        for (int k = 0; k < scene->ndim; k++) {
+            drift[k] = 0.0;
+            for (int r = 0; r < m; r++) {
+                drift[k] += images[r] * drift_of_row[k][r];
+            }
+        }
     }
     for (int k = 0; k < scene->ndim; k++) {
         /* Rounding moves points across half a period and more than the cutoff: a box vector is so
          * long that along the short ones every point would meet many images of every other. */
         const double blur = drift[k] + 2.0 * scene->t_error[k];
-        if (scene->lattice.row_of_axis[k] >= 0 && blur > scene->radius &&
-            !(blur <= 0.5 * scene->lattice.period[k])) {
+        if (lattice->row_of_axis[k] >= 0 && blur > scene->radius &&
+            !(blur <= 0.5 * lattice->period[k])) {
             return HS_ERR_BOX_SKEWED;
         }
     }
+    grid->shift_error = 0.0;
     for (int k = 0; k < scene->ndim; k++) {
-        const int    r = scene->lattice.row_of_axis[k];
+        const int    row = lattice->row_of_axis[k];
         const double along = hs_scene_radius_along(scene, k);
+        double       moved = 0.0, row_errors = 0.0;
         grid->range[k] = (along + drift[k] + 2.0 * scene->t_error[k]) * (1.0 + SLACK);
-        if (r >= 0 && !(grid->range[k] / scene->lattice.period[k] + 1.0 <= images[r])) {
-            return hs_skew_or_memory(&scene->lattice);
+        if (row >= 0 && !(grid->range[k] / lattice->period[k] + 1.0 <= images[row])) {
+            return hs_skew_or_memory(lattice);
         }
+        /* T = shift * B - centre is rounded; coordinates that no row moves subtract exactly enough
+         * without it. */
+        for (int r = 0; r < lattice->n_periodic; r++) {
+            moved += images[r] * fabs(lattice->rows[r][k]);
+            row_errors += images[r] * lattice->row_error[r];
+        }
+        const double error =
+            (2 * lattice->n_periodic + 3) * UNIT * (moved + 2.0 * scene->x_largest[k]) + row_errors;
+        grid->shift_error = moved > 0.0 ? hs_larger(error, grid->shift_error) : grid->shift_error;
     }
-    grid->shift_error = bound_shift_error(scene, images);
     return HS_OK;
 }
 
@@ -380,7 +309,22 @@ hs_grid_init(const hs_scene *scene, hs_grid_kind kind, hs_grid *grid, hs_failure
         /* Narrower rows cost more rows to visit, and leave out candidates that else are gathered
          * first (scan.h). */
         const int finer = neighbours < 600.0 ? 1 : neighbours < 3000.0 ? 2 : 3;
-        grid_choose_counts(scene, grid, finer, density, counts);
+        double    area = 1.0; /* of one row's cross-section */
+        for (int k = scene->ndim - 1; k >= 0; k--) {
+            const double extent = scene->upper[k] - scene->lower[k];
+            double       parts = finer; /* of the range: cells */
+            if (k == 0 && scene->ndim > 1) {
+                /* A whole fraction of the range: otherwise windows are longer than need be. */
+                const double points = density * area * grid->range[0];
+                parts = fmin(fmax(nearbyint(points / POINTS_PER_CELL), 1.0), 4.0);
+            }
+            const double pitch = pitch_of(grid, k, parts);
+            counts[k] = 1.0;
+            if (extent > pitch) { /* never for a zero extent, also with cutoff 0 */
+                counts[k] = floor(fmin(extent / pitch, CELLS_PER_AXIS));
+            }
+            area *= fmax(extent, grid->range[k]) / counts[k]; /* flat scenes count as this thick */
+        }
         const bool capped = cap_counts(scene->ndim, grid_most_cells(scene), counts);
         if (capped && counts[0] < FEW_CELLS) {
             const double rows = fmax((double)scene->n / POINTS_PER_ROW, 1.0);
@@ -411,10 +355,8 @@ hs_grid_narrow(const hs_scene *scene, bool is_sparse, double cutoff_before, hs_g
     const double    ratio = scene->cutoff / cutoff_before;
     const hs_status status = set_ranges(scene, grid);
     for (int k = 0; status == HS_OK && k < scene->ndim; k++) {
-        const double cells = grid->range[k] * grid->cells_per_length[k] * (1.0 + SLACK) +
-                             0x1p-50 * (double)grid->shape[k];
-        if (!is_sparse && cells < (double)grid->reach[k]) {
-            grid->reach[k] = (int64_t)cells + 1;
+        if (!is_sparse) { /* no reach becomes longer */
+            (void)hs_grid_set_axis(scene, k, (double)grid->shape[k], grid);
         }
         grid->expected_pairs *= ratio;
     }
@@ -442,24 +384,6 @@ typedef struct frame {
     double lower[HS_MAX_DIM][HS_MAX_DIM]; /* direction k = sum_{c <= k} lower[k][c] q_c */
 } frame;
 
-/* Is v = sum_k (normal_k . v) direction_k, for every v? */
-static bool
-axes_are_dual(const hs_lattice *lattice)
-{
-    for (int a = 0; a < lattice->ndim; a++) {
-        for (int b = 0; b < lattice->ndim; b++) {
-            double sum = a == b ? -1.0 : 0.0;
-            for (int k = 0; k < lattice->ndim; k++) {
-                sum += lattice->normal[k][a] * lattice->direction[k][b];
-            }
-            if (!(fabs(sum) <= DUALITY_DEFECT)) {
-                return false;
-            }
-        }
-    }
-    return true;
-}
-
 /* Gram-Schmidt on the directions, first axis first; checked, not trusted. Those of an aligned
  * lattice are the coordinate axes. */
 static void
@@ -467,40 +391,20 @@ set_frame(const hs_lattice *lattice, frame *axes)
 {
     double    q[HS_MAX_DIM][HS_MAX_DIM];
     const int d = lattice->ndim;
-    axes->usable = lattice->aligned || axes_are_dual(lattice);
+    axes->usable = true;
     axes->diagonal = lattice->aligned;
-    for (int k = 0; k < d; k++) {
-        if (lattice->aligned) {
-            memset(axes->lower[k], 0, (size_t)d * sizeof(double));
-            axes->lower[k][k] = 1.0;
-            continue;
-        }
-        memcpy(q[k], lattice->direction[k], sizeof q[k]);
-        memset(axes->lower[k], 0, (size_t)d * sizeof(double));
-        for (int pass = 0; pass < 2; pass++) {
-            for (int c = 0; c < k; c++) {
-                double along = 0.0;
-                for (int a = 0; a < d; a++) {
-                    along += q[k][a] * q[c][a];
-                }
-                for (int a = 0; a < d; a++) {
-                    q[k][a] -= along * q[c][a];
-                }
-                axes->lower[k][c] += along;
+    for (int a = 0; a < d && !lattice->aligned; a++) {
+        for (int b = 0; b < d; b++) { /* is v = sum_k (normal_k . v) direction_k, for every v? */
+            double sum = a == b ? -1.0 : 0.0;
+            for (int k = 0; k < d; k++) {
+                sum += lattice->normal[k][a] * lattice->direction[k][b];
             }
+            axes->usable = axes->usable && fabs(sum) <= DUALITY_DEFECT;
         }
-        double square = 0.0;
-        for (int a = 0; a < d; a++) {
-            square += q[k][a] * q[k][a];
-        }
-        axes->lower[k][k] = sqrt(square);
-        if (!(axes->lower[k][k] > 1e-3)) {
-            axes->usable = false; /* nearly flat: the frame would be all rounding */
-            return;
-        }
-        for (int a = 0; a < d; a++) {
-            q[k][a] /= axes->lower[k][k];
-        }
+    }
+    hs_orthogonal_rows((const double(*)[HS_MAX_DIM])lattice->direction, NULL, d, d, q, axes->lower);
+    for (int k = 0; k < d; k++) { /* nearly flat: the frame would be all rounding */
+        axes->usable = axes->usable && axes->lower[k][k] > 1e-3;
     }
 }
 
@@ -527,39 +431,6 @@ range_of_component(const frame *axes, const double *low, const double *high, int
     }
 }
 
-/* Narrows the range of t_0 in which points of the row at `offset` can be within the radius. Returns
- * false when none can. */
-static bool
-narrow_by_frame(const hs_scene *scene, const hs_grid *grid, const frame *axes,
-                const int32_t *offset, double *low, double *high)
-{
-    const double radius = scene->radius * (1.0 + FRAME_SLACK);
-    const double unit = radius > 0.0 ? radius : 1.0; /* squares of tiny lengths would vanish */
-    double       left = radius > 0.0 ? 1.0 : 0.0; /* of the square, for the components still open */
-    double       least, most, t_low[HS_MAX_DIM], t_high[HS_MAX_DIM];
-    /* Differences of points of these cells, with roundings. */
-    for (int k = 1; k < grid->ndim; k++) {
-        const double slack = slack_along(scene, grid, k);
-        const double along = hs_scene_radius_along(scene, k) * (1.0 + FRAME_SLACK);
-        t_low[k] = hs_larger((offset[k] - 1) * grid->cell_size[k] - slack, -along - slack);
-        t_high[k] = hs_smaller((offset[k] + 1) * grid->cell_size[k] + slack, along + slack);
-    }
-    for (int c = grid->ndim - 1; c >= 1; c--) {
-        range_of_component(axes, t_low, t_high, grid->ndim, c, &least, &most);
-        const double gap = hs_larger(hs_larger(least, -most), 0.0) / unit;
-        left -= gap * gap;
-        if (left < 0.0) {
-            return false;
-        }
-    }
-    range_of_component(axes, t_low, t_high, grid->ndim, 0, &least, &most);
-    const double rest = sqrt(left) * unit;
-    const double slack = slack_along(scene, grid, 0);
-    *low = hs_larger((-rest - most) / axes->lower[0][0] - slack, *low);
-    *high = hs_smaller((rest - least) / axes->lower[0][0] + slack, *high);
-    return true;
-}
-
 /*
  * Cells of the row at `offset` that a pair within the radius can reach. Returns false when there
  * are none.
@@ -567,10 +438,33 @@ narrow_by_frame(const hs_scene *scene, const hs_grid *grid, const frame *axes,
 static bool
 reach_along_row(const hs_scene *scene, const hs_grid *grid, const frame *axes, hs_stencil_row *row)
 {
-    double low = -grid->range[0], high = grid->range[0];
-    if (axes->usable && grid->ndim > 1 &&
-        !narrow_by_frame(scene, grid, axes, row->offset, &low, &high)) {
-        return false;
+    double low = -grid->range[0], high = grid->range[0]; /* of t_0 */
+    if (axes->usable && grid->ndim > 1) {
+        const double radius = scene->radius * (1.0 + FRAME_SLACK);
+        const double unit = radius > 0.0 ? radius : 1.0; /* squares of tiny lengths would vanish */
+        double       left = radius > 0.0 ? 1.0 : 0.0; /* of the square, for components still open */
+        double       least, most, t_low[HS_MAX_DIM], t_high[HS_MAX_DIM];
+        /* Differences of points of these cells, with roundings. */
+        for (int k = 1; k < grid->ndim; k++) {
+            const double slack = slack_along(scene, grid, k);
+            const double along = hs_scene_radius_along(scene, k) * (1.0 + FRAME_SLACK);
+            t_low[k] = hs_larger((row->offset[k] - 1) * grid->cell_size[k] - slack, -along - slack);
+            t_high[k] =
+                hs_smaller((row->offset[k] + 1) * grid->cell_size[k] + slack, along + slack);
+        }
+        for (int c = grid->ndim - 1; c >= 1; c--) {
+            range_of_component(axes, t_low, t_high, grid->ndim, c, &least, &most);
+            const double gap = hs_larger(hs_larger(least, -most), 0.0) / unit;
+            left -= gap * gap;
+            if (left < 0.0) {
+                return false;
+            }
+        }
+        range_of_component(axes, t_low, t_high, grid->ndim, 0, &least, &most);
+        const double rest = sqrt(left) * unit;
+        const double slack = slack_along(scene, grid, 0);
+        low = hs_larger((-rest - most) / axes->lower[0][0] - slack, low);
+        high = hs_smaller((rest - least) / axes->lower[0][0] + slack, high);
     }
     const double cells = grid->cells_per_length[0];
     const double reach = (double)grid->reach[0];
@@ -582,20 +476,6 @@ reach_along_row(const hs_scene *scene, const hs_grid *grid, const frame *axes, h
     row->first = (int32_t)first;
     row->last = (int32_t)last;
     return true;
-}
-
-/* The next offset in the order of the axes, the last axis slowest; false after the last one. */
-static bool
-advance(const hs_grid *grid, int32_t *offset)
-{
-    for (int k = 1; k < grid->ndim; k++) {
-        if (offset[k] < grid->reach[k]) {
-            offset[k]++;
-            return true;
-        }
-        offset[k] = (int32_t)-grid->reach[k];
-    }
-    return false;
 }
 
 /* Number of rows that hs_stencil_build would look at, before it drops those out of reach. */
@@ -643,45 +523,47 @@ hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene 
         !hs_account_allows(account, hs_stencil_bytes(grid, is_full))) {
         return HS_ERR_MEMORY; /* refused now, not after as much has been written */
     }
-    int64_t capacity = (int64_t)hs_smaller(bound, FIRST_CAPACITY);
-    stencil->rows = hs_alloc(account, HS_FOR_STENCIL, capacity, sizeof(hs_stencil_row));
-    if (stencil->rows == NULL) {
-        return HS_ERR_MEMORY;
-    }
+    int64_t        capacity = 0;
     hs_stencil_row row = {{0}, 0, 0};
-    bool           more = true; /* rows from this one on, in the order of the axes */
-    if (is_full) {
-        for (int k = 1; k < grid->ndim; k++) {
-            row.offset[k] = (int32_t)-grid->reach[k];
-        }
-    } else {
-        (void)reach_along_row(scene, grid, &axes, &row);
-        row.first = 0; /* in the own row only what lies ahead */
-        row.last = row.last > 0 ? row.last : 0;
-        stencil->rows[stencil->n_rows++] = row;
-        more = advance(grid, row.offset); /* counting up visits exactly the forward half */
+    for (int k = 1; is_full && k < grid->ndim; k++) {
+        row.offset[k] = (int32_t)-grid->reach[k];
     }
-    for (int64_t tried = 1; more; tried++) {
+    /* Counting up from the own row visits exactly the forward half. */
+    for (int64_t tried = 1;; tried++) {
         if (tried % POLL_ROWS == 0 && hs_poll(options, 0.0) != HS_OK) {
             hs_stencil_free(account, stencil);
             return HS_ERR_INTERRUPTED;
         }
         if (stencil->n_rows == capacity) {
-            hs_stencil_row *grown = hs_grow(account, HS_FOR_STENCIL, stencil->rows, capacity,
-                                            2 * capacity, sizeof(hs_stencil_row));
+            const int64_t   more = capacity > 0 ? 2 * capacity
+                                                : (int64_t)hs_smaller(bound, FIRST_CAPACITY);
+            hs_stencil_row *grown = hs_grow(account, HS_FOR_STENCIL, stencil->rows, capacity, more,
+                                            sizeof(hs_stencil_row));
             if (grown == NULL) {
                 hs_stencil_free(account, stencil);
                 return HS_ERR_MEMORY;
             }
             stencil->rows = grown;
-            capacity *= 2;
+            capacity = more;
         }
-        if (reach_along_row(scene, grid, &axes, &row)) {
+        bool is_in_reach = reach_along_row(scene, grid, &axes, &row);
+        if (!is_full && tried == 1) { /* in the own row only what lies ahead */
+            row.first = 0;
+            row.last = row.last > 0 ? row.last : 0;
+            is_in_reach = true;
+        }
+        if (is_in_reach) {
             stencil->rows[stencil->n_rows++] = row;
         }
-        more = advance(grid, row.offset);
+        int k = 1; /* the next offset in the order of the axes, the last axis slowest */
+        for (; k < grid->ndim && row.offset[k] == grid->reach[k]; k++) {
+            row.offset[k] = (int32_t)-grid->reach[k];
+        }
+        if (k == grid->ndim) {
+            return HS_OK;
+        }
+        row.offset[k]++;
     }
-    return HS_OK;
 }
 
 void
@@ -698,16 +580,6 @@ hs_stencil_free(hs_account *account, hs_stencil *stencil)
  * of points. In eight dimensions the nearest ones alone are half of 3^7 = 2187. */
 #define MOST_ROWS 2048.0
 
-/* Where the range is a whole number of cells it would reach one cell further, for it is a little
- * more than the cutoff: such cells are as much wider. */
-static double
-wide_enough(double range, double width)
-{
-    const double parts = fmax(nearbyint(range / width), 1.0);
-    const double part = range * (1.0 + 0x1p-20) / parts;
-    return part > width && part <= width * (1.0 + 0x1p-18) ? part : width;
-}
-
 hs_status
 hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_wider,
                   hs_failure *failure)
@@ -719,7 +591,10 @@ hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_w
     }
     for (int k = 0; k < scene->ndim; k++) {
         const double extent = scene->upper[k] - scene->lower[k];
-        const double pitch = wide_enough(grid->range[k], width);
+        /* Where the range is a whole number of cells it would reach one cell further, for it is a
+         * little more than the cutoff: such cells are as much wider. */
+        const double part = pitch_of(grid, k, fmax(nearbyint(grid->range[k] / width), 1.0));
+        const double pitch = part > width && part <= width * (1.0 + 0x1p-18) ? part : width;
         /* Not for a zero extent, also with a width that scaling brought to zero. */
         counts[k] = extent > pitch ? floor(fmin(extent / pitch, CELLS_PER_AXIS)) : 1.0;
     }

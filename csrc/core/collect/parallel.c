@@ -309,6 +309,8 @@ hs_crew_run(hs_crew *crew, hs_failure *failure)
         status = commits->status;
         if (status != HS_OK) {
             *failure = commits->failure;
+        } else { /* the others may have come last */
+            status = hs_poll(&crew->call->options, crew->output == NULL ? 1.0 : commits->done);
         }
     }
     for (int w = 0; w < n_open; w++) {

@@ -335,26 +335,33 @@ hs_restore_vectors(double *HS_RESTRICT to, double *const *vector, const double *
  * shifted and measured while they are written, without the arrays of a batch in between: the time
  * goes into passes over these, not into arithmetic. */
 
+/* Whether each pair has a length of its own that it is within. */
+static bool
+has_lengths(const hs_search *search)
+{
+    return search->limits != NULL && search->limits->supports == NULL;
+}
+
 /* Whether hits of this search can be written so, to these columns. */
 static bool
 can_write(const hs_recorder *recorder, const hs_scanner *scanner)
 {
     const hs_search *search = scanner->search;
-    return scanner->pair_batch.of.candidates != NULL && !(recorder->columns & HS_WANT_BOTH) &&
+    return scanner->block.candidates != NULL && !(recorder->columns & HS_WANT_BOTH) &&
            (!(recorder->columns & HS_MEASURED) ||
-            (search->limits == NULL && !search->scene.extreme &&
-             search->scene.metric.floats_usable));
+            (!search->scene.extreme && search->scene.metric.floats_usable));
 }
 
-/* What candidates and points are, of the hits of points from `first` on. */
+/* What candidates and points are, of the hits of n points from `first` on. turns: room for those of
+ * these points, over the box vectors as given. */
 static void
-describe(const hs_scanner *scanner, int32_t first, hs_write *write)
+describe(const hs_scanner *scanner, int32_t first, int32_t n,
+         int32_t turns[HS_WRITE_MOST_DIM][HS_GROUP_POINTS], hs_write *write)
 {
-    const hs_search     *search = scanner->search;
-    const hs_pair_batch *pair_batch = &scanner->pair_batch;
-    const hs_bins       *asking = hs_search_asking(search), *bins = &search->bins;
-    const hs_lattice    *lattice = &search->scene.lattice;
-    write->candidates = pair_batch->of.candidates;
+    const hs_search  *search = scanner->search;
+    const hs_bins    *asking = hs_search_asking(search), *bins = &search->bins;
+    const hs_lattice *lattice = &search->scene.lattice;
+    write->candidates = scanner->block.candidates;
     write->place = scanner->block.number;
     write->x_width = 1;
     for (int k = 0; k < search->scene.ndim; k++) {
@@ -366,6 +373,22 @@ describe(const hs_scanner *scanner, int32_t first, hs_write *write)
         write->turns[r] = asking->turns.known ? asking->turns.narrow[r] + first : NULL;
         write->turned[r] = bins->turns.known ? bins->turns.narrow[r] : NULL;
         write->base[r] = asking->turns.known ? asking->turns.narrow[r][scanner->group.first] : 0;
+    }
+    if (!scanner->pair_batch.is_plain && asking->turns.known) {
+        hs_lattice_few(lattice, write->base, write->base);
+        for (int32_t t = 0; t < n; t++) {
+            int32_t of_point[HS_WRITE_MOST_DIM];
+            for (int r = 0; r < lattice->n_periodic; r++) {
+                of_point[r] = write->turns[r][t];
+            }
+            hs_lattice_few(lattice, of_point, of_point);
+            for (int r = 0; r < lattice->n_periodic; r++) {
+                turns[r][t] = of_point[r];
+            }
+        }
+        for (int r = 0; r < lattice->n_periodic; r++) {
+            write->turns[r] = turns[r];
+        }
     }
 }
 
@@ -394,19 +417,22 @@ write_hits(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_h
     if (!can_write(recorder, scanner)) {
         return HS_OK;
     }
-    hs_records *records = &scanner->pair_batch.of;
-    hs_write    write = {.ndim = search->scene.ndim,
-                         .is_half = search->is_half,
-                         .is_measured = recorder->columns & HS_MEASURED,
-                         .by_S = search->bins.keeps_originals,
-                         .metric = &search->scene.metric};
-    write.is_shifted = write.by_S || hs_records_has_images(records);
+    int32_t  turns[HS_WRITE_MOST_DIM][HS_GROUP_POINTS];
+    hs_write write = {.ndim = search->scene.ndim,
+                      .is_half = search->is_half,
+                      .is_measured = recorder->columns & HS_MEASURED,
+                      .by_S = search->bins.keeps_originals,
+                      .metric = &search->scene.metric};
+    write.is_shifted = write.by_S || scanner->block.has_images;
     hs_measures_tell(&search->scene, &search->call->options, &write);
-    describe(scanner, first, &write);
-    if (hs_records_load_candidates(records, write.base) != HS_OK) {
+    if (has_lengths(search)) { /* keep_within_lengths, once all is written */
+        write.cutoff = write.largest = INFINITY;
+    }
+    describe(scanner, first, hits->n, turns, &write);
+    if (hs_scanner_load_candidates(scanner, write.base) != HS_OK) {
         return HS_ERR_INTERRUPTED;
     }
-    write.is_fine = records->are_fine;
+    write.is_fine = scanner->block.are_fine;
     memset(scanner->block.hits + hits->end[hits->n - 1], 0, HS_PADDING * sizeof(int32_t));
     direct(recorder, &write);
     *written = search->call->kernel->write(&write, hits);
@@ -465,17 +491,6 @@ measure(hs_recorder *recorder, hs_pair_batch *pair_batch)
                   vector);
 }
 
-/* Distances of the batch, none beyond the limit of its pair, or what that is rounded to. */
-static void
-keep_within_limits(const hs_scanner *scanner, double *distance, hs_scale unscale)
-{
-    for (int32_t e = 0; e < scanner->pair_batch.n; e++) {
-        const hs_dw limit = hs_limit_of_pair(scanner, e);
-        distance[e] = hs_keep_within(distance[e], hs_scale_apply(unscale, limit.hi),
-                                     scanner->options.inclusive || limit.lo > 0.0);
-    }
-}
-
 static void
 put_distances(hs_recorder *recorder, const hs_scanner *scanner, int32_t first)
 {
@@ -485,10 +500,7 @@ put_distances(hs_recorder *recorder, const hs_scanner *scanner, int32_t first)
     const hs_scale    unscale = hs_measures_unscale(&search->scene);
     double           *to = hs_recorder_distances(recorder);
     hs_restore_distances(recorder->distance, n, unscale);
-    if (options->precision == HS_EXACT && search->limits != NULL &&
-        search->limits->supports == NULL) {
-        keep_within_limits(scanner, recorder->distance, unscale);
-    } else if (options->precision == HS_EXACT) {
+    if (options->precision == HS_EXACT && !has_lengths(search)) {
         hs_keep_all_within(recorder->distance, n, options->cutoff, options->inclusive);
     }
     memcpy(to + first, recorder->distance, (size_t)n * sizeof *to);
@@ -701,6 +713,25 @@ put_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_h
     return status == HS_OK ? put_shells(recorder, scanner, first, hits) : status;
 }
 
+/* Distances that have been written, in an exact search: none is left beyond the length of its pair,
+ * or beyond the float64 nearest to that. */
+static void
+keep_within_lengths(const hs_recorder *recorder, const hs_scanner *scanner, int32_t first,
+                    const hs_hits *hits)
+{
+    const hs_limits *limits = scanner->search->limits;
+    const hs_scale   unscale = hs_measures_unscale(&scanner->search->scene);
+    double          *distance = hs_recorder_distances(recorder);
+    for (int32_t t = 0, h = 0; distance != NULL && t < hits->n; t++) {
+        for (; h < hits->end[t]; h++) {
+            const int32_t sj = scanner->block.number[hits->label[h]];
+            const hs_dw   limit = hs_limit_of(limits, first + t, sj);
+            distance[h] = hs_keep_within(distance[h], hs_scale_apply(unscale, limit.hi),
+                                         scanner->options.inclusive || limit.lo > 0.0);
+        }
+    }
+}
+
 /* Distances of pairs that are this far apart or further are not below that. */
 static void
 keep_apart(const hs_output *output, int32_t n, double least)
@@ -716,7 +747,11 @@ hs_record_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, cons
 {
     const hs_choice *choice = scanner->search->call->choice;
     const hs_status  status = put_places(recorder, scanner, first, hits);
-    if (status == HS_OK && choice != NULL && scanner->options.precision == HS_EXACT) {
+    const bool       is_exact = scanner->options.precision == HS_EXACT;
+    if (status == HS_OK && is_exact && has_lengths(scanner->search)) {
+        keep_within_lengths(recorder, scanner, first, hits);
+    }
+    if (status == HS_OK && choice != NULL && is_exact) {
         keep_apart(recorder->output, hits->end[hits->n - 1], choice->min_distance);
     }
     return status;

@@ -23,13 +23,13 @@ copy_shift(int32_t *to, const int32_t *from, int d, bool turned)
 
 /* ---- which node a point is ------------------------------------------------------------------ */
 
-/* Fills the map, list after list. False where the counts are not those of n nodes, or some node is
- * not one point. */
+/* Fills the map, list after list. False where some node is not one point, or ghosts are none. */
 static bool
-fill_map(const hs_node_lists *lists, hs_node_map *map)
+fill_map(hs_node_map *map)
 {
-    const int32_t *number = lists->number;
-    int64_t        end = 0;
+    const hs_node_lists *lists = map->lists;
+    const int32_t       *number = lists->number;
+    int64_t              end = 0;
     for (int32_t k = 0; k < map->n; k++) {
         map->point[k] = number != NULL ? -1 : k;
     }
@@ -41,9 +41,9 @@ fill_map(const hs_node_lists *lists, hs_node_map *map)
         map->point[node] = p;
     }
     for (int32_t l = 0; l < map->n_lists; l++) {
-        const int64_t first = end, count = lists->n_nodes[l];
+        const int64_t first = end, count = map->end[l];
         const int64_t ghosts = lists->n_ghosts != NULL ? lists->n_ghosts[l] : 0;
-        if (count < 0 || count > map->n - first || ghosts < 0 || ghosts > count) {
+        if (ghosts < 0 || ghosts > count) {
             return false;
         }
         map->end[l] = end = first + count;
@@ -55,28 +55,39 @@ fill_map(const hs_node_lists *lists, hs_node_map *map)
             map->row[p] = map->is_ghost[p] && !lists->ghost_rows ? -1 : (int32_t)map->n_rows++;
         }
     }
-    return end == map->n;
+    return true;
 }
 
 hs_status
 hs_node_map_make(hs_account *account, const hs_node_lists *lists, int64_t n, hs_node_map *map)
 {
-    *map = (hs_node_map){.n = n};
+    *map = (hs_node_map){.lists = lists};
     if (lists == NULL || lists->n_lists < 0 || (lists->n_lists > 0 && lists->n_nodes == NULL)) {
         return HS_ERR_ARGUMENT;
     }
     map->n_lists = lists->n_lists;
     map->is_plain = lists->number == NULL;
-    map->directed = lists->directed;
-    map->list = hs_alloc(account, HS_FOR_ORDER, n, 4 * sizeof *map->list + sizeof(bool));
     map->end = hs_alloc(account, HS_FOR_ORDER, map->n_lists, sizeof *map->end);
-    hs_status status = HS_ERR_MEMORY;
-    if (map->list != NULL && map->end != NULL) {
+    hs_status status = map->end != NULL ? HS_OK : HS_ERR_MEMORY;
+    for (int32_t l = 0; l < map->n_lists && status == HS_OK; l++) {
+        const int64_t count = map->end[l] = lists->n_nodes[l];
+        status = count < 0 ? HS_ERR_ARGUMENT : count > INT32_MAX - map->n ? HS_ERR_TOO_MANY : HS_OK;
+        map->n += status == HS_OK ? count : 0;
+    }
+    if (status == HS_OK && n >= 0 && n != map->n) {
+        status = HS_ERR_ARGUMENT;
+    }
+    if (status == HS_OK) {
+        n = map->n;
+        map->list = hs_alloc(account, HS_FOR_ORDER, n, 4 * sizeof *map->list + sizeof(bool));
+        status = map->list != NULL ? HS_OK : HS_ERR_MEMORY;
+    }
+    if (status == HS_OK) {
         map->node = map->list + n;
         map->row = map->node + n;
         map->point = map->row + n;
         map->is_ghost = (bool *)(map->point + n);
-        status = fill_map(lists, map) ? HS_OK : HS_ERR_ARGUMENT;
+        status = fill_map(map) ? HS_OK : HS_ERR_ARGUMENT;
     }
     if (status != HS_OK) {
         hs_node_map_free(account, map);
@@ -311,9 +322,9 @@ add_pairs(const hs_node_map *map, const hs_list_rows *rows, int32_t p, int32_t b
             return false;
         }
         const int32_t q = point != NULL ? point[node] : base + node;
-        const bool    turned = q < p && !map->directed;
+        const bool    turned = q < p && !map->lists->directed;
         if (turned ? all_mirror || map->row[q] >= 0
-                   : q == p && !map->directed &&
+                   : q == p && !map->lists->directed &&
                          (shift == NULL || hs_compare_shifts(rows->shift + e * d, NULL, d) <= 0)) {
             continue; /* the other entry of the pair begins it */
         }
@@ -338,7 +349,7 @@ static hs_status
 find_pairs(hs_call *call, const hs_node_map *map, const hs_list_rows *rows, bool of_points,
            hs_output *half)
 {
-    const bool    all_mirror = !map->directed && (of_points || map->n_rows == map->n);
+    const bool    all_mirror = !map->lists->directed && (of_points || map->n_rows == map->n);
     const int64_t room = all_mirror ? rows->n_indices / 2 : rows->n_indices;
     int64_t       looked = 0;
     half_list_init(&call->account, rows->shift != NULL, rows->ndim, half);
@@ -365,27 +376,26 @@ find_pairs(hs_call *call, const hs_node_map *map, const hs_list_rows *rows, bool
     return status;
 }
 
-/* Fills columns I, J and, where the half list has shifts, S of `nodes`, with it and in its place,
- * and I and J of `lists`: numbers of nodes in their lists, and the lists. Pairs keep their order,
- * but for those that do not count. */
+/* Fills columns I, J and, where the half list has shifts, S of the nodes, with it and in its place,
+ * and I and J of the lists. Pairs keep their order, but for those that do not count. */
 static hs_status
-fill_table(hs_call *call, const hs_node_map *map, bool ghost_pairs, hs_output *half,
-           hs_pairs *nodes, hs_pairs *lists)
+fill_table(const hs_node_map *map, hs_output *half, hs_connectivity *made)
 {
-    half_list_init(&call->account, false, 1, &lists->output);
-    if (hs_output_reserve(&lists->output, half->n_pairs, 0.0) != HS_OK) {
+    hs_output *const lists = &made->lists.output;
+    half_list_init(&made->rows.call.account, false, 1, lists);
+    if (hs_output_reserve(lists, half->n_pairs, 0.0) != HS_OK) {
         return HS_ERR_MEMORY;
     }
     int32_t *const i = hs_output_column(half, HS_WANT_I);
     int32_t *const j = hs_output_column(half, HS_WANT_J);
     int32_t *const shift = hs_output_column(half, HS_WANT_SHIFT);
-    int32_t *const i_list = hs_output_column(&lists->output, HS_WANT_I);
-    int32_t *const j_list = hs_output_column(&lists->output, HS_WANT_J);
+    int32_t *const i_list = hs_output_column(lists, HS_WANT_I);
+    int32_t *const j_list = hs_output_column(lists, HS_WANT_J);
     const int      d = half->ndim;
     int64_t        at = 0;
     for (int64_t e = 0; e < half->n_pairs; e++) {
         bool turned;
-        if (hs_node_pair_counts(map, ghost_pairs, i[e], j[e], &turned)) {
+        if (hs_node_pair_counts(map, i[e], j[e], &turned)) {
             const int32_t first = turned ? j[e] : i[e], second = turned ? i[e] : j[e];
             i[at] = map->node[first];
             j[at] = map->node[second];
@@ -397,118 +407,74 @@ fill_table(hs_call *call, const hs_node_map *map, bool ghost_pairs, hs_output *h
             at++;
         }
     }
-    nodes->output = *half;
+    made->nodes.output = *half;
     *half = (hs_output){.n_pairs = 0};
-    nodes->output.n_pairs = lists->output.n_pairs = at;
+    made->nodes.output.n_pairs = lists->n_pairs = at;
     return HS_OK;
 }
 
 /* ---- three results of one call --------------------------------------------------------------- */
 
-hs_pairs *
-hs_part_new(void)
-{
-    hs_pairs *part = hs_pairs_new();
-    if (part != NULL) {
-        memset(&part->call, 0, sizeof part->call);
-    }
-    return part;
-}
-
-hs_connectivity *
-hs_connectivity_new(void)
-{
-    hs_connectivity *made = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *made);
-    if (made == NULL) {
-        return NULL;
-    }
-    memset(made, 0, sizeof *made);
-    made->rows = hs_part_new();
-    made->nodes = hs_part_new();
-    made->lists = hs_part_new();
-    if (made->rows == NULL || made->nodes == NULL || made->lists == NULL) {
-        hs_connectivity_free(made);
-        return NULL;
-    }
-    return made;
-}
-
 hs_status
-hs_connectivity_fill(hs_connectivity *made, const hs_node_lists *lists, hs_output *half,
-                     hs_pairs **found)
+hs_connectivity_fill(hs_connectivity *made, const hs_node_map *map, hs_output *half,
+                     hs_output *offsets, hs_output *rows)
 {
-    hs_call           *call = &made->call;
-    const hs_list_rows rows = hs_rows_of(&(*found)->offsets, &(*found)->output, 1);
-    hs_output          of_rows = {.n_pairs = 0};
-    hs_node_map        map;
-    hs_status          status = hs_node_map_make(&call->account, lists, rows.n, &map);
-    if (status == HS_OK && !lists->rows_only) {
-        if (half == NULL) {
-            half = &of_rows;
-            status = find_pairs(call, &map, &rows, true, half);
-        }
-        if (status == HS_OK) {
-            status = fill_table(call, &map, lists->ghost_pairs, half, made->nodes, made->lists);
-        }
+    hs_call           *call = &made->rows.call;
+    const hs_list_rows found = hs_rows_of(offsets, rows, 1);
+    hs_status          status = HS_OK;
+    if (!map->lists->rows_only && half->columns == 0) {
+        status = find_pairs(call, map, &found, true, half);
     }
-    if (status == HS_OK && map.is_plain && map.n_lists == 1 && map.n_rows == map.n) {
-        hs_pairs_free(made->rows); /* rows of points are those of nodes */
-        made->rows = *found;
-        *found = NULL;
+    if (!map->lists->rows_only && status == HS_OK) {
+        status = fill_table(map, half, made);
+    }
+    if (status == HS_OK && map->is_plain && map->n_lists == 1 && map->n_rows == map->n) {
+        made->rows.offsets = *offsets; /* rows of points are those of nodes */
+        made->rows.output = *rows;
+        *offsets = *rows = (hs_output){.n_pairs = 0};
     } else if (status == HS_OK) {
-        status = hs_row_split_fill(call, &map, &rows, NULL, made->rows);
+        status = hs_row_split_fill(call, map, &found, NULL, &made->rows);
     }
-    hs_output_free(&of_rows);
-    hs_node_map_free(&call->account, &map);
     return status;
 }
 
 hs_status
-hs_connectivity_fill_pairs(hs_connectivity *made, const hs_node_lists *lists, int64_t n,
-                           const hs_list_rows *rows)
+hs_connectivity_fill_pairs(hs_connectivity *made, const hs_node_map *map, const hs_list_rows *rows)
 {
-    hs_call    *call = &made->call;
-    hs_output   found = {.n_pairs = 0}, half = {.n_pairs = 0};
-    hs_node_map map;
-    hs_status   status = hs_node_map_make(&call->account, lists, n, &map);
-    if (status == HS_OK && (rows->n != map.n_rows || rows->n_lists != map.n_lists)) {
-        status = HS_ERR_ARGUMENT;
-    }
-    if (status == HS_OK) {
-        status = find_pairs(call, &map, rows, false, &found);
-    }
-    if (status == HS_OK && map.is_plain && (map.directed || map.n_rows == n)) { /* they ascend */
-        half = found;
-        found = (hs_output){.n_pairs = 0};
-    } else if (status == HS_OK) {
+    hs_call   *call = &made->rows.call;
+    hs_output  found = {.n_pairs = 0}, half = {.n_pairs = 0};
+    hs_status  status = rows->n == map->n_rows && rows->n_lists == map->n_lists
+                            ? find_pairs(call, map, rows, false, &found)
+                            : HS_ERR_ARGUMENT;
+    const bool ascends = map->is_plain && (map->lists->directed || map->n_rows == map->n);
+    if (status == HS_OK && !ascends) {
         half_list_init(&call->account, rows->shift != NULL, rows->ndim, &half);
-        status = hs_sort_pairs(call, 0, n, &found, &half);
+        status = hs_sort_pairs(call, 0, map->n, &found, &half);
     }
     if (status == HS_OK) {
-        status = fill_table(call, &map, lists->ghost_pairs, &half, made->nodes, made->lists);
+        status = fill_table(map, ascends ? &found : &half, made);
     }
     hs_output_free(&found);
     hs_output_free(&half);
-    hs_node_map_free(&call->account, &map);
     return status;
 }
 
 hs_pairs *
 hs_connectivity_rows(hs_connectivity *connectivity)
 {
-    return connectivity != NULL ? connectivity->rows : NULL;
+    return connectivity != NULL ? &connectivity->rows : NULL;
 }
 
 hs_pairs *
 hs_connectivity_pairs(hs_connectivity *connectivity)
 {
-    return connectivity != NULL ? connectivity->nodes : NULL;
+    return connectivity != NULL ? &connectivity->nodes : NULL;
 }
 
 hs_pairs *
 hs_connectivity_lists(hs_connectivity *connectivity)
 {
-    return connectivity != NULL ? connectivity->lists : NULL;
+    return connectivity != NULL ? &connectivity->lists : NULL;
 }
 
 void
@@ -517,10 +483,11 @@ hs_connectivity_free(hs_connectivity *connectivity)
     if (connectivity == NULL) {
         return;
     }
-    hs_pairs_free(connectivity->rows);
-    hs_pairs_free(connectivity->nodes);
-    hs_pairs_free(connectivity->lists);
-    hs_account_close(&connectivity->call.account);
+    hs_output_free(&connectivity->rows.offsets);
+    hs_output_free(&connectivity->rows.output);
+    hs_output_free(&connectivity->nodes.output);
+    hs_output_free(&connectivity->lists.output);
+    hs_account_close(&connectivity->rows.call.account);
     hs_free(NULL, connectivity);
 }
 

@@ -18,11 +18,11 @@
 
 /* Which list each point is of, which node of it, and which row it has. Arrays are owned. */
 typedef struct hs_node_map {
-    int64_t  n;
-    int32_t  n_lists;
+    const hs_node_lists *lists; /* borrowed */
+    int64_t              n;
+    int32_t              n_lists;
     int64_t  n_rows;   /* nodes that have rows: of list 0, of list 1, ..., ascending in each */
     bool     is_plain; /* points come in the order of lists and nodes */
-    bool     directed; /* as that of the lists */
     int64_t *end;      /* n_lists: where each list ends, among all nodes */
     int32_t *list;     /* n, as all below, which are parts of this block */
     int32_t *node;
@@ -32,9 +32,9 @@ typedef struct hs_node_map {
 } hs_node_map;
 
 /*
- * The map of n points, which are all nodes of these lists. HS_ERR_ARGUMENT where the counts do not
- * fit that number or each other, or `number` is no permutation. Reads each number once; on failure
- * holds nothing.
+ * The map of the points that are all nodes of these lists; n >= 0: so many. HS_ERR_ARGUMENT where
+ * the counts do not fit that number or each other, or `number` is no permutation; HS_ERR_TOO_MANY
+ * from 2^31 nodes on. Reads each number once; on failure holds nothing.
  */
 hs_status hs_node_map_make(hs_account *account, const hs_node_lists *lists, int64_t n,
                            hs_node_map *map);
@@ -79,10 +79,11 @@ hs_list_rows hs_rows_of(const hs_output *offsets, const hs_output *rows, int32_t
  * is a ghost; not where points have an order of their own. Of directed lists i decides.
  */
 HS_ALWAYS_INLINE bool
-hs_node_pair_counts(const hs_node_map *map, bool ghost_pairs, int32_t i, int32_t j, bool *turned)
+hs_node_pair_counts(const hs_node_map *map, int32_t i, int32_t j, bool *turned)
 {
-    *turned = map->is_plain && !map->directed && map->is_ghost[i] && !map->is_ghost[j];
-    return ghost_pairs || !map->is_ghost[i] || (!map->directed && !map->is_ghost[j]);
+    const bool directed = map->lists->directed;
+    *turned = map->is_plain && !directed && map->is_ghost[i] && !map->is_ghost[j];
+    return map->lists->ghost_pairs || !map->is_ghost[i] || (!directed && !map->is_ghost[j]);
 }
 
 /*
@@ -94,29 +95,21 @@ hs_node_pair_counts(const hs_node_map *map, bool ghost_pairs, int32_t i, int32_t
 hs_status hs_row_split_fill(hs_call *call, const hs_node_map *map, const hs_list_rows *from,
                             const int32_t *place, hs_pairs *rows);
 
-/* All parts are charged to the call, which has ended when the caller gets the object. */
 struct hs_connectivity {
-    hs_call   call;
-    hs_pairs *rows;          /* owned; offsets, J and S */
-    hs_pairs *nodes, *lists; /* owned; of the pairs: I, J and S; I and J. Empty without a table */
+    hs_pairs rows;         /* offsets, J and S; all is charged to its call */
+    hs_pairs nodes, lists; /* of the pairs: I, J and S; I and J. Empty without a table */
 };
 
-/* An empty result of no call of its own. NULL when memory is short. */
-hs_pairs *hs_part_new(void);
+/* Fills the rows from those of all points, which become those of the object where they need no
+ * change: then there are none of them any more; and the pairs, unless rows alone are wanted, from a
+ * half list, which is used up, or where that is empty from the rows. */
+hs_status hs_connectivity_fill(hs_connectivity *connectivity, const hs_node_map *map,
+                               hs_output *half, hs_output *offsets, hs_output *rows);
 
-/* An empty object, whose call must be begun next. NULL when memory is short. */
-hs_connectivity *hs_connectivity_new(void);
-
-/* Fills the rows from those of all points, *found, which become those of the object where they need
- * no change; and the pairs, unless rows alone are wanted, from a half list, which is used up, or
- * NULL: from the rows. */
-hs_status hs_connectivity_fill(hs_connectivity *connectivity, const hs_node_lists *lists,
-                               hs_output *half, hs_pairs **found);
-
-/* Fills the pairs alone, from rows of the n nodes, which are given. HS_ERR_ARGUMENT where these are
+/* Fills the pairs alone, from rows of the nodes, which are given. HS_ERR_ARGUMENT where these are
  * none of these lists. */
-hs_status hs_connectivity_fill_pairs(hs_connectivity *connectivity, const hs_node_lists *lists,
-                                     int64_t n, const hs_list_rows *rows);
+hs_status hs_connectivity_fill_pairs(hs_connectivity *connectivity, const hs_node_map *map,
+                                     const hs_list_rows *rows);
 
 /*
  * Each of these fills offsets and column J and, where `rows` has shifts, S of `result`, empty, laid

@@ -57,7 +57,6 @@ typedef struct merging {
     hs_node_map      map;
     double          *points; /* owned */
     const hs_metric *images;
-    bool             ghost_pairs;
     hs_half_list     half;
     hs_list_rows     rows;
     int64_t          longest; /* row */
@@ -234,7 +233,7 @@ merge_range(void *context, int64_t range)
     for (int64_t e = first; e < last && status == HS_OK; e++) {
         const int32_t i = all->half.i[e], j = all->half.j[e];
         bool          turned;
-        if (!hs_node_pair_counts(&all->map, all->ghost_pairs, i, j, &turned)) {
+        if (!hs_node_pair_counts(&all->map, i, j, &turned)) {
             continue;
         }
         if (i != marked) {
@@ -277,8 +276,7 @@ merge_all(merging *doing, const hs_output *half, hs_pairs *result, hs_failure *f
         if (e % RANGE_PAIRS == 0) {
             doing->before[e / RANGE_PAIRS] = n;
         }
-        n += hs_node_pair_counts(&doing->map, doing->ghost_pairs, doing->half.i[e],
-                                 doing->half.j[e], &turned);
+        n += hs_node_pair_counts(&doing->map, doing->half.i[e], doing->half.j[e], &turned);
     }
     if (doing->before != NULL) {
         n = n * doing->map.n_lists + 1;
@@ -324,10 +322,7 @@ hs_intersection_fill(hs_call *call, const hs_points *points, const hs_metric *im
                      hs_failure *failure)
 {
     hs_account *account = &call->account;
-    merging     doing = {.call = call,
-                         .images = images,
-                         .ghost_pairs = lists->ghost_pairs,
-                         .half = hs_half_list_columns(half)};
+    merging     doing = {.call = call, .images = images, .half = hs_half_list_columns(half)};
     hs_output_init(account, doing.half.ndim, wanted_of(doing.half.shift), 4, &result->output);
     hs_status status = hs_node_map_make(account, lists, points->n, &doing.map);
     if (status == HS_OK) {

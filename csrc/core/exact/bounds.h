@@ -84,18 +84,6 @@
 #define HS_SUPPORT_FILTER_ROUNDINGS_PER_AXIS 1.0
 #endif
 
-/* The expanded form. All its roundings together, per square of the number of axes, in units of
- * u m^2 where m bounds every component: d squares, d products of up to 2 m^2, and the partial sums
- * of both, up to (3 d - 2) m^2, but for the last. */
-#ifndef HS_EXPANDED_ROUNDINGS
-#define HS_EXPANDED_ROUNDINGS 3.0
-#endif
-
-/* Flushes per axis: once in the norm, and then the product or the sum that it goes to. */
-#ifndef HS_EXPANDED_FLUSHES
-#define HS_EXPANDED_FLUSHES 2.0
-#endif
-
 /* ---- float64 stage (metric.h) ---- */
 
 /* Roundings of |D|^2 in float64: the difference, twice as it is squared, and per axis one (the

@@ -6,8 +6,7 @@
 
 /*
  * filter.h: the two thresholds of a gathered neighbourhood. A kernel computes, in float32, an s of
- * candidates y and points q given relative to a common centre: the direct form
- * s = sum_k fl(y_k - q_k)^2, or the expanded form s = |y|^2 - 2 q y, which is |q|^2 less. With
+ * candidates y and points q given relative to a common centre: s = sum_k fl(y_k - q_k)^2. With
  * s > out the pair is surely beyond the cutoff, with s < in surely within it; what lies between is
  * decided by metric.h. docs/exactness.md derives the bounds.
  */
@@ -16,13 +15,6 @@ typedef struct hs_thresholds {
     float in;  /* rounded down; -1 when nothing is sure */
     float out; /* rounded up; +infinity when nothing is sure */
 } hs_thresholds;
-
-/* The thresholds of the expanded form. A kernel compares with (float)(in - |q|^2) and (float)(out -
- * |q|^2), where |q|^2 is summed in float64. */
-typedef struct hs_expanded {
-    double in;  /* -infinity when nothing is sure */
-    double out; /* +infinity when nothing is sure */
-} hs_expanded;
 
 /*
  * ndim     number of squares in the sum
@@ -42,7 +34,7 @@ void hs_threshold_bounds(int ndim, double cutoff, double extent, double error, d
                          double tiny, double *in, double *out);
 
 /*
- * Thresholds of the direct form for a cutoff R that kernels have as a float r, the sum of two radii
+ * Thresholds for a cutoff R that kernels have as a float r, the sum of two radii
  * or one of them: in = (r * in_factor - in_less)^2, 0 where that would be negative, and
  * out = (r * out_factor + out_more)^2, fused or not.
  */
@@ -71,19 +63,5 @@ double hs_reach_extent(double cutoff, double largest, double error);
 
 /* The bounds of hs_reach_extent for other arithmetic, as in hs_threshold_bounds. */
 double hs_reach_bound(double cutoff, double largest, double error, double unit, double tiny);
-
-/* The thresholds of the expanded form. Its extent is twice the largest of all |y_k| and |q_k|. */
-hs_expanded hs_expanded_of(int ndim, double cutoff, double extent, double error);
-void        hs_expanded_bounds(int ndim, double cutoff, double extent, double error, double unit,
-                               double tiny, double *in, double *out);
-
-/* Errors of the expanded form grow with extent^2, those of the direct form with extent * cutoff:
- * worth it where this holds, which is wherever cells are about as wide as the cutoff. Without it
- * counts take 1.16 to 1.34 times as long (AVX-512, AVX2; 52 and 419 neighbours), lists the same. */
-HS_ALWAYS_INLINE bool
-hs_expanded_pays(double cutoff, double extent)
-{
-    return extent <= 16.0 * cutoff;
-}
 
 #endif

@@ -607,8 +607,9 @@ marked_init(hs_account *account, const hs_set *known, const int32_t *order, int6
 /* Slots of all hits by table; hits that stay unsure wait for the edge that halves their
  * range, and a batch decides them. */
 
-/* Slots up to which a histogram has copies: together they stay in the first-level cache. */
-#define FEW_SLOTS 1024
+/* Slots up to which a histogram has copies: those of ten bins. With three bins they take 0.82 to
+ * 0.88 of the time, with a hundred or more 0.99 to 1.07 (AVX-512; 52 and 419 neighbours). */
+#define FEW_SLOTS 24
 
 static hs_status
 open_tally(void *context, void *state, const hs_walker *walker)

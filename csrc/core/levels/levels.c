@@ -38,7 +38,7 @@ width_of(const support_step *of, const hs_level_set *set, hs_slice levels, const
         const double own = hs_support_width(set->ndim, numbers, numbers[size_at],
                                             of->levels->extent, set->radii[at], normal);
         *width = hs_larger(*width, own);
-        if ((at + 1 - first) % HS_POLL_SUPPORTS == 0 && hs_poll(of->options, 0.0) != HS_OK) {
+        if ((at + 1 - first) % HS_POLL_LEVELS == 0 && hs_poll(of->options, 0.0) != HS_OK) {
             return HS_ERR_INTERRUPTED;
         }
     }
@@ -132,10 +132,10 @@ typedef struct level_input {
     const int32_t   *types;
     const double    *supports;
     bool             are_queries;
-    double          *rows; /* owned, in the caller's order, as are all of these */
-    double          *copy; /* of the radii, or how far supports reach */
-    int32_t         *size; /* of each point; read where there are types, else to be found */
-    hs_support_set   read; /* of the supports */
+    double        *copy; /* owned, in the caller's order, as are all of these; of the radii, or how
+                            * far supports reach */
+    int32_t       *size; /* of each point; read where there are types, else to be found */
+    hs_support_set read; /* of the supports */
 } level_input;
 
 static bool
@@ -159,7 +159,7 @@ refuse_input(hs_status status, const level_input *set, int64_t row, double value
     return status;
 }
 
-/* Passes go over HS_POLL_POINTS at a time and poll in between. The next ones of n; false where
+/* Passes go over HS_POLL_LEVELS at a time and poll in between. The next ones of n; false where
  * there are none, after a failure, or where the caller wants to stop, which *status says. */
 static bool
 division_go_on(const division *by, int64_t n, hs_slice *next, hs_status *status)
@@ -168,7 +168,7 @@ division_go_on(const division *by, int64_t n, hs_slice *next, hs_status *status)
         *status = hs_poll(by->options, 0.0);
     }
     next->first = next->end;
-    next->end = n - next->first < HS_POLL_POINTS ? n : next->first + HS_POLL_POINTS;
+    next->end = n - next->first < HS_POLL_LEVELS ? n : next->first + HS_POLL_LEVELS;
     return *status == HS_OK && next->first < n;
 }
 
@@ -232,48 +232,40 @@ read_support(division *by, level_input *set, int64_t row, hs_failure *failure)
     }
 }
 
-/* Reads a set: supports, if there are any, then what the reach goes by, and the points; counts its
- * types or finds the largest of its radii. On failure as well, it is to be freed. */
+/* Reads what the reach of a set goes by; counts its types, or finds the largest of its radii. On
+ * failure as well, it is to be freed. */
 static hs_status
 read_input(division *by, level_input *set, hs_failure *failure)
 {
     const int64_t n = set->points->n;
     hs_slice      next = {0, 0};
     hs_status     status = HS_OK;
-    set->rows = hs_alloc(by->account, HS_FOR_POINTS, n * set->points->ndim, sizeof *set->rows);
     set->copy = hs_alloc(by->account, HS_FOR_POINTS, n, sizeof *set->copy);
     set->size = hs_alloc(by->account, HS_FOR_ORDER, n, sizeof *set->size);
-    if (set->rows == NULL || set->copy == NULL || set->size == NULL) {
-        return HS_ERR_MEMORY;
-    }
     if (set->supports != NULL) {
         set->read.numbers = hs_alloc(by->account, HS_FOR_SUPPORTS,
                                      n * hs_support_numbers(set->points->ndim), sizeof(double));
-        status = set->read.numbers != NULL ? HS_OK : HS_ERR_MEMORY;
-        failure->in_queries = set->are_queries;
     }
-    for (int64_t i = 0; status == HS_OK && set->supports != NULL && i < n; i++) {
-        status = read_support(by, set, i, failure);
-        if (status == HS_OK && (i + 1) % HS_POLL_SUPPORTS == 0) {
-            status = hs_poll(by->options, 0.0);
-        }
+    if (set->copy == NULL || set->size == NULL ||
+        (set->supports != NULL && set->read.numbers == NULL)) {
+        return HS_ERR_MEMORY;
     }
     while (division_go_on(by, n, &next, &status)) {
-        hs_points part = *set->points;
-        part.data = (const char *)part.data + next.first * part.row_stride;
-        part.n = next.end - next.first;
-        status = by->reach->n_types > 0 ? read_types(by, set, next, failure)
-                                        : read_radii(by, set, next, failure);
-        if (status == HS_OK) {
-            status = hs_points_copy_finite(&part, set->rows + next.first * part.ndim, failure);
-            failure->row += status == HS_OK ? 0 : next.first;
-            failure->in_queries = set->are_queries && status != HS_OK;
+        for (int64_t i = next.first; set->supports != NULL && status == HS_OK && i < next.end;
+             i++) {
+            status = read_support(by, set, i, failure);
+        }
+        if (status == HS_OK && by->reach->n_types > 0) {
+            status = read_types(by, set, next, failure);
+        } else if (status == HS_OK) {
+            status = read_radii(by, set, next, failure);
         }
     }
     return status;
 }
 
-/* One pass finds the level of each point, a counting sort puts the levels in order. */
+/* One pass finds the level of each point, a counting sort puts the levels in order and reads the
+ * points. */
 
 /* Sizes count the binary orders of a radius below the largest one, and zero as the smallest. */
 #define LEAST_EXPONENT (-1074)
@@ -299,13 +291,16 @@ find_sizes(const division *by, level_input *set)
     return status;
 }
 
-/* Puts the points in the order of their levels. */
+/* Reads the points in the order of their levels. */
 static hs_status
-arrange(const division *by, level_input *from, int32_t n_levels, hs_level_set *to)
+arrange(const division *by, level_input *from, int32_t n_levels, hs_level_set *to,
+        hs_failure *failure)
 {
     const int64_t n = from->points->n;
+    hs_points     one = *from->points;
+    one.n = 1;
     to->n = n;
-    to->ndim = from->points->ndim;
+    to->ndim = one.ndim;
     to->rows = hs_alloc(by->account, HS_FOR_POINTS, n * to->ndim, sizeof *to->rows);
     to->number = hs_alloc(by->account, HS_FOR_ORDER, n, sizeof *to->number);
     to->first = hs_alloc(by->account, HS_FOR_CELLS, (int64_t)n_levels + 1, sizeof *to->first);
@@ -322,19 +317,30 @@ arrange(const division *by, level_input *from, int32_t n_levels, hs_level_set *t
     for (int32_t l = 0; to->range != NULL && l < n_levels; l++) {
         to->range[l] = (hs_radii_range){HUGE_VAL, 0.0, HUGE_VAL};
     }
-    const size_t bytes = (size_t)to->ndim * sizeof(double);
-    hs_slice     part = {0, 0};
-    hs_status    status = HS_OK;
-    int64_t *next = to->first; /* where each level goes on; then, where the one before it ends */
+    for (int k = 0; k < to->ndim; k++) {
+        to->lower[k] = HUGE_VAL;
+        to->upper[k] = -HUGE_VAL;
+    }
+    hs_slice  part = {0, 0};
+    hs_status status = HS_OK;
+    int64_t  *next = to->first; /* where each level goes on; then, where the one before it ends */
     memset(next, 0, ((size_t)n_levels + 1) * sizeof *next);
     for (int64_t i = 0; i < to->n; i++) {
         next[by->count[from->size[i]] + 1]++;
     }
     hs_starts_of_lengths(next, (int64_t)n_levels + 1);
     while (division_go_on(by, to->n, &part, &status)) {
-        for (int64_t i = part.first; i < part.end; i++) {
+        for (int64_t i = part.first; status == HS_OK && i < part.end; i++) {
             const int64_t level = by->count[from->size[i]], at = next[level]++;
-            memcpy(to->rows + at * to->ndim, from->rows + i * to->ndim, bytes);
+            double       *row = to->rows + at * to->ndim;
+            one.data = (const char *)from->points->data + i * one.row_stride;
+            status = hs_points_copy_finite(&one, row, failure);
+            failure->row = status == HS_OK ? failure->row : i;
+            failure->in_queries = from->are_queries && status != HS_OK;
+            for (int k = 0; k < to->ndim; k++) {
+                to->lower[k] = hs_smaller(row[k], to->lower[k]);
+                to->upper[k] = hs_larger(row[k], to->upper[k]);
+            }
             to->number[at] = (int32_t)i;
             if (to->radii != NULL) {
                 hs_radii_range *range = &to->range[level];
@@ -405,7 +411,7 @@ divide(division *by, level_input *inputs, hs_levels *levels, hs_failure *failure
         status = read_cutoffs(by, levels, failure);
     }
     for (int s = 0; s < n && status == HS_OK; s++) {
-        status = arrange(by, &inputs[s], levels->n, to[s]);
+        status = arrange(by, &inputs[s], levels->n, to[s], failure);
     }
     return status;
 }
@@ -435,7 +441,6 @@ hs_levels_divide(hs_account *account, const hs_options *options, const hs_set *p
                           .extent = reach->extent};
     const hs_status status = divide(&by, inputs, levels, failure);
     for (int n = 0; n < 2; n++) {
-        hs_free(account, inputs[n].rows);
         hs_free(account, inputs[n].copy);
         hs_free(account, inputs[n].size);
         hs_free(account, inputs[n].read.numbers);
@@ -617,8 +622,8 @@ hs_level_plan_free(hs_account *account, hs_level_plan *plan)
     *plan = (hs_level_plan){.n = 0};
 }
 
-/* Points are taken to be spread evenly over the box of their level. Where they are not, both plans
- * test more than that, and the one with fewer tests is favoured too little. */
+/* Points are taken to be spread evenly over the box of all. Where they are not, both plans test
+ * more than that, and the one with fewer tests is favoured too little. */
 
 #ifdef HS_TESTING
 static bool joins = false;
@@ -645,80 +650,39 @@ enum { joins = true };
 /* A test with a limit of its own, over one with the cutoff. */
 #define TEST_OF_LIMITS 1.3
 
-/* How long the box of each level's points is along the coordinate axes. */
-typedef struct spread {
-    double asking[MOST_JOINED][HS_MAX_DIM], points[MOST_JOINED][HS_MAX_DIM];
-} spread;
-
-/* Of the levels of a set. A box that repeats along all its vectors wraps its points into it. */
-static hs_status
-find_extents(const hs_options *options, const hs_level_set *set, int32_t n_levels,
-             const hs_box *box, double extent[][HS_MAX_DIM])
-{
-    const int d = set->ndim;
-    for (int32_t level = 0; level < n_levels; level++) {
-        double low[HS_MAX_DIM], high[HS_MAX_DIM];
-        for (int k = 0; k < d; k++) {
-            low[k] = HUGE_VAL;
-            high[k] = -HUGE_VAL;
-        }
-        for (int64_t i = set->first[level]; i < set->first[level + 1]; i++) {
-            for (int k = 0; k < d; k++) {
-                low[k] = hs_smaller(set->rows[i * d + k], low[k]);
-                high[k] = hs_larger(set->rows[i * d + k], high[k]);
-            }
-            if ((i + 1) % HS_POLL_POINTS == 0 && hs_poll(options, 0.0) != HS_OK) {
-                return HS_ERR_INTERRUPTED;
-            }
-        }
-        for (int k = 0; k < d; k++) {
-            double longest = box != NULL ? 0.0 : HUGE_VAL;
-            for (int l = 0; box != NULL && l < box->ndim; l++) {
-                longest += box->periodic[l] ? fabs(box->rows[l][k]) : HUGE_VAL;
-            }
-            extent[level][k] = hs_smaller(high[k] - low[k], longest);
-        }
-    }
-    return HS_OK;
-}
-
-/* In tests of one candidate. Levels with themselves are half lists. */
+/* In tests of one candidate. Levels with themselves are half lists. A box that repeats along all
+ * its vectors wraps its points into it. */
 static double
-cost_of_step(const hs_levels *levels, const spread *of, const hs_level_step *step)
+cost_of_step(const hs_levels *levels, const hs_box *box, const hs_level_step *step)
 {
-    const hs_level_set *points = &levels->points;
-    const hs_level_set *asking = step->is_own ? points : hs_levels_asking(levels);
-    const hs_slice      asked = step->is_own ? step->points : step->asking;
+    const hs_level_set *points = &levels->points, *asking = hs_levels_asking(levels);
     const int           d = points->ndim;
     /* of a cube as large as the ball of the cutoff */
     const double side = step->cutoff * pow(hs_ball_volume(d, 1.0), 1.0 / d);
-    double       pairs = 0.0; /* within it, for boxes of levels one of which lies in the other */
-    for (int64_t a = asked.first; a < asked.end; a++) {
-        for (int64_t b = step->points.first; b < step->points.end; b++) {
-            const double *extent = step->is_own ? of->points[a] : of->asking[a];
-            double        part = 1.0;
-            for (int k = 0; k < d; k++) {
-                const double longer = hs_larger(extent[k], of->points[b][k]);
-                part *= side < longer ? side / longer : 1.0;
-            }
-            pairs += count_of(asking, (hs_slice){a, a + 1}) *
-                     count_of(points, (hs_slice){b, b + 1}) * part;
+    const double n_asking = count_of(asking, step->asking);
+    const double n_points = step->is_own ? 0.0 : count_of(points, step->points);
+    double       pairs = n_asking * (step->is_own ? 0.5 * n_asking : n_points); /* within it */
+    for (int k = 0; k < d; k++) {
+        double longest = box != NULL ? 0.0 : HUGE_VAL;
+        for (int l = 0; box != NULL && l < d; l++) {
+            longest += box->periodic[l] ? fabs(box->rows[l][k]) : HUGE_VAL;
         }
+        const double extent =
+            hs_larger(points->upper[k] - points->lower[k], asking->upper[k] - asking->lower[k]);
+        longest = hs_smaller(extent, longest);
+        pairs *= side < longest ? side / longest : 1.0;
     }
-    return TESTS_PER_POINT *
-               (count_of(asking, asked) + (step->is_own ? 0.0 : count_of(points, step->points))) +
-           TESTS_PER_PAIR * (step->has_limits ? TEST_OF_LIMITS : 1.0) * (step->is_own ? 0.5 : 1.0) *
-               pairs;
+    return TESTS_PER_POINT * (n_asking + n_points) +
+           TESTS_PER_PAIR * (step->has_limits ? TEST_OF_LIMITS : 1.0) * pairs;
 }
 
 hs_status
-hs_level_plan_make(hs_account *account, const hs_options *options, const hs_levels *levels,
-                   const hs_box *box, double bound, hs_algorithm algorithm, hs_level_plan *plan)
+hs_level_plan_make(hs_account *account, const hs_levels *levels, const hs_box *box, double bound,
+                   hs_algorithm algorithm, hs_level_plan *plan)
 {
     const int64_t  n = levels->n, most = levels->cutoffs != NULL ? 2 * n : MOST_STEPS;
     const bool     is_directed = levels->cutoffs == NULL && hs_rule_is_directed(levels->rule);
     const hs_slice each = {0, n};
-    spread         of;
     double         cost = 0.0;
     hs_level_step  all = {.cutoff = 0.0};
     *plan = (hs_level_plan){.levels = levels,
@@ -759,19 +723,10 @@ hs_level_plan_make(hs_account *account, const hs_options *options, const hs_leve
     hs_level_plan one = {.levels = levels, .steps = &all, .is_half = plan->is_half, .bound = bound};
     add_step(&one, each, each, plan->is_half);
     HS_ASSERT(one.n == 1);
-    hs_status status = find_extents(options, &levels->points, n, box, of.points);
-    memcpy(of.asking, of.points, sizeof of.asking);
-    if (status == HS_OK && levels->has_queries) {
-        status = find_extents(options, &levels->queries, n, box, of.asking);
-    }
-    if (status != HS_OK) {
-        hs_level_plan_free(account, plan);
-        return status;
-    }
     for (int64_t s = 0; s < plan->n; s++) {
-        cost += cost_of_step(levels, &of, &plan->steps[s]);
+        cost += cost_of_step(levels, box, &plan->steps[s]);
     }
-    if (cost_of_step(levels, &of, &all) < cost) {
+    if (cost_of_step(levels, box, &all) < cost) {
         plan->steps[0] = all;
         plan->n = 1;
     }
@@ -886,8 +841,8 @@ arrange_supports(const hs_search *search, const hs_bins *bins, const hs_level_se
     if (near == NULL) {
         return HS_ERR_MEMORY;
     }
-    for (int64_t first = 0; status == HS_OK && first < bins->n; first += HS_POLL_SUPPORTS) {
-        const int64_t end = first + HS_POLL_SUPPORTS < bins->n ? first + HS_POLL_SUPPORTS : bins->n;
+    for (int64_t first = 0; status == HS_OK && first < bins->n; first += HS_POLL_LEVELS) {
+        const int64_t end = first + HS_POLL_LEVELS < bins->n ? first + HS_POLL_LEVELS : bins->n;
         hs_supports_lay_out(to, first, end, ndim, cutoff, unscale, near);
         status = end < bins->n ? hs_poll(&search->call->options, 0.0) : HS_OK;
     }
@@ -967,6 +922,25 @@ numbers_of(const hs_level_set *set, hs_slice levels)
 #define FEW_ASKING 32
 #endif
 
+#define PAIRS_SAMPLED 64
+
+/* The part of the pairs within the cutoff that are within their own length, about: from pairs of
+ * arbitrary points, each weighed by the ball of its length over that of the cutoff. 64 tell it to
+ * some per cent, and it only foresees memory. 37 is odd: sj takes all 64 places, mixed. */
+static double
+part_within(const hs_search *search)
+{
+    const int64_t n_asking = hs_search_asking(search)->n, n = search->bins.n;
+    double        sum = 0.0;
+    for (int64_t e = 0; e < PAIRS_SAMPLED && n_asking > 0 && n > 0; e++) {
+        const int32_t si = (int32_t)(e * n_asking / PAIRS_SAMPLED);
+        const int32_t sj = (int32_t)(e * 37 % PAIRS_SAMPLED * n / PAIRS_SAMPLED);
+        const double  length = hs_limit_of(search->limits, si, sj).hi / search->scene.metric.cutoff;
+        sum += length > 0.0 ? pow(hs_smaller(length, 1.0), search->scene.ndim) : 0.0;
+    }
+    return sum / PAIRS_SAMPLED;
+}
+
 hs_status
 hs_level_open(const hs_level_plan *plan, int64_t number, const hs_box *box, bool keeps_none,
               hs_call *call, hs_level_search *open, hs_failure *failure)
@@ -1020,6 +994,9 @@ hs_level_open(const hs_level_plan *plan, int64_t number, const hs_box *box, bool
     if (status != HS_OK) {
         hs_level_close(open);
         return status;
+    }
+    if (search->limits != NULL && !levels->has_supports) {
+        search->grid.expected_pairs *= part_within(search);
     }
     /* Fractions done are those of all asking points of all steps, as far as these are equal. */
     search->n_before = number * hs_search_asking(search)->n;

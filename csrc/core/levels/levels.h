@@ -14,8 +14,8 @@
  * set of points by itself.
  */
 
-/* Supports that are read, or looked at, between two polls: some milliseconds. */
-#define HS_POLL_SUPPORTS (HS_POLL_POINTS / 16)
+/* Points of levels that are read, or looked at, between two polls: with supports, milliseconds. */
+#define HS_POLL_LEVELS (HS_POLL_POINTS / 16)
 
 /* The supports of a set of points, read once and checked: hs_support_numbers for each point. */
 typedef struct hs_support_set {
@@ -41,9 +41,10 @@ typedef struct hs_level_set {
     int32_t *number; /* n: the caller's number of each */
     double  *radii; /* n, halved for HS_RULE_MEAN; of supports, how far they reach; NULL where there
                       * are none */
-    hs_radii_range *range;    /* of each level; NULL where there are no radii */
-    int64_t        *first;    /* of each level, and n */
-    hs_support_set  supports; /* in the caller's order */
+    hs_radii_range *range; /* of each level; NULL where there are no radii */
+    double          lower[HS_MAX_DIM], upper[HS_MAX_DIM]; /* range of the coordinates */
+    int64_t        *first;                                /* of each level, and n */
+    hs_support_set  supports;                             /* in the caller's order */
 } hs_level_set;
 
 typedef struct hs_levels {
@@ -122,11 +123,10 @@ void hs_level_plan_free(hs_account *account, hs_level_plan *plan);
  * meets all that it can. algorithm: HS_HIERARCHY is levels in any case, HS_AUTO what is expected to
  * be quickest, and any other one search of all, with the largest reach; but types are searched in
  * pairs where there are more of them than a table of limits holds. box: of the points, borrowed, or
- * NULL. options: to poll by. HS_OK, or HS_ERR_MEMORY or HS_ERR_INTERRUPTED, without a plan.
+ * NULL. HS_OK, or HS_ERR_MEMORY, without a plan.
  */
-hs_status hs_level_plan_make(hs_account *account, const hs_options *options,
-                             const hs_levels *levels, const hs_box *box, double bound,
-                             hs_algorithm algorithm, hs_level_plan *plan);
+hs_status hs_level_plan_make(hs_account *account, const hs_levels *levels, const hs_box *box,
+                             double bound, hs_algorithm algorithm, hs_level_plan *plan);
 
 #ifdef HS_TESTING
 /* Whether plans are replaced; off at first, so that few points have several searches. Returns what

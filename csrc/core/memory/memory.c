@@ -162,34 +162,6 @@ hs_account_keep(hs_account *account)
     account->arena_first = account->arena_next;
 }
 
-/* The next block of the arena, or NULL when it has no room for that. */
-static void *
-take_from_arena(hs_account *account, size_t bytes)
-{
-    if (account->arena == NULL) {
-        account->arena = account->is_kept ? NULL : hs_pool_take(HS_POOL_SCRATCH, true);
-        if (account->arena == NULL) {
-            account->arena = hs_chunk_new(HS_ARENA_BYTES);
-        }
-        if (account->arena == NULL) {
-            return NULL;
-        }
-        hs_test_count_block(1);
-        account->arena_end = account->arena + hs_chunk_of(account->arena)->capacity;
-        account->arena_first = account->arena_next = account->arena + arena_step(0);
-    }
-    char *block = account->arena_next;
-    if (arena_step(bytes) > (size_t)(account->arena_end - block)) {
-        const bool is_pooled = hs_chunk_of(account->arena)->capacity >= HS_POOL_SCRATCH;
-        account->arena_was_small = !is_pooled && !account->is_kept;
-        return NULL;
-    }
-    account->arena_next = block + arena_step(bytes);
-    hs_chunk_of(block)->raw = NULL;
-    hs_chunk_of(block)->length = 0;
-    return block;
-}
-
 void *
 hs_alloc(hs_account *account, hs_purpose purpose, int64_t count, size_t size)
 {
@@ -209,7 +181,23 @@ hs_alloc(hs_account *account, hs_purpose purpose, int64_t count, size_t size)
     }
     void *block = NULL;
     if (HS_HAVE_ARENA && arena_is_used && account != NULL && bytes < LARGEST_IN_ARENA) {
-        block = take_from_arena(account, bytes);
+        if (account->arena == NULL) {
+            account->arena = account->is_kept ? NULL : hs_pool_take(HS_POOL_SCRATCH, true);
+            account->arena = account->arena != NULL ? account->arena : hs_chunk_new(HS_ARENA_BYTES);
+            if (account->arena != NULL) {
+                hs_test_count_block(1);
+                account->arena_end = account->arena + hs_chunk_of(account->arena)->capacity;
+                account->arena_first = account->arena_next = account->arena + arena_step(0);
+            }
+        }
+        if (arena_step(bytes) <= (size_t)(account->arena_end - account->arena_next)) {
+            block = account->arena_next;
+            account->arena_next += arena_step(bytes);
+            hs_chunk_of(block)->raw = NULL;
+            hs_chunk_of(block)->length = 0;
+        } else if (account->arena != NULL && !account->is_kept) {
+            account->arena_was_small = hs_chunk_of(account->arena)->capacity < HS_POOL_SCRATCH;
+        }
     }
     if (block == NULL) {
         /* A tail of a quarter and more becomes a whole huge page: quicker to fill than small

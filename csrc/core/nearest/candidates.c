@@ -19,6 +19,9 @@
 /* Standard deviations of their number that a first radius makes room for. Measured: with 3 the time
  * differs by less than the noise. */
 #define SPREAD 3.5
+/* Products of unit vectors at right angles, and the room that this takes beside squares. */
+#define UPRIGHT    0x1p-40
+#define LAYER_ROOM 0x1p-36
 /* Candidates of a group, in points of the group and wanted ones, beyond which the guess was bad:
  * some three times as many as there are where points are evenly spread, ... */
 #define MOST_CANDIDATES 24.0
@@ -69,10 +72,11 @@ hs_nearest_group_set(const hs_nearest *near, int32_t first, int32_t last, hs_nea
         if (lattice->row_of_axis[k] < 0) {
             const double apart = hs_larger(near->layer_lower[k] - group->t_upper[k],
                                            group->t_lower[k] - near->layer_upper[k]);
-            group->away = hs_larger(
-                apart * (1.0 - RADIUS_ROOM) - 4.0 * near->search->scene.t_error[k], group->away);
+            const double surely = apart - 4.0 * near->search->scene.t_error[k];
+            group->away = hypot(hs_larger(surely, 0.0), group->away);
         }
     }
+    group->away *= 1.0 - LAYER_ROOM;
 }
 
 double
@@ -197,7 +201,8 @@ hs_nearest_is_scattered(const hs_nearest *near, const hs_nearest_group *group)
     for (int k = 0; k < near->tree.ndim; k++) {
         balls *= 1.0 + (group->upper[k] - group->lower[k]) / (2.0 * group->radius);
     }
-    return balls > BALLS_A_POINT * (group->last - group->first);
+    const int n = group->last - group->first;
+    return balls > BALLS_A_POINT * n || group->more > (double)near->k + n;
 }
 
 /* Which images of the points can be near a group, by the range of its t_k along each periodic
@@ -208,17 +213,14 @@ hs_nearest_is_scattered(const hs_nearest *near, const hs_nearest_group *group)
 #define SLACK 0x1p-20
 /* ... and of the quotient itself where it is large. */
 #define RELATIVE_SLACK 0x1p-40
-/* Products of unit vectors at right angles, and the room that this takes beside squares. */
-#define UPRIGHT     0x1p-40
-#define LAYER_ROOM  0x1p-36
-#define MOST_SHIFTS 0x1p30 /* they are int32, with room for sums of two */
+#define MOST_SHIFTS    0x1p30 /* they are int32, with room for sums of two */
 /* More images than these take minutes: they are refused, unless k is so large that all neighbours
  * may be images of one point. A box around a ball in 8 dimensions is 63 times as large. */
 #define MOST_IMAGES        0x1p24
 #define IMAGES_A_NEIGHBOUR 1024.0
 
-/* Whether unit normals of axes that repeat are at right angles to those of open ones, as nearly as
- * rounding lets them. */
+/* Whether unit normals of open axes are at right angles to all others, as nearly as rounding lets
+ * them. */
 static bool
 is_upright(const hs_lattice *lattice)
 {
@@ -228,8 +230,7 @@ is_upright(const hs_lattice *lattice)
             for (int c = 0; c < lattice->ndim; c++) {
                 product += lattice->normal[k][c] * lattice->normal[open][c];
             }
-            if (lattice->row_of_axis[k] >= 0 && lattice->row_of_axis[open] < 0 &&
-                fabs(product) > UPRIGHT) {
+            if (open != k && lattice->row_of_axis[open] < 0 && fabs(product) > UPRIGHT) {
                 return false;
             }
         }
@@ -335,7 +336,7 @@ hs_nearest_images_start(const hs_nearest *near, const hs_nearest_group *group,
     for (int pass = 0; group != NULL && pass < (lattice->aligned ? 1 : 3); pass++) {
         for (int k = 0; k < lattice->ndim; k++) {
             if (lattice->row_of_axis[k] >= 0 && !set_range(near, group, k, most, images)) {
-                return HS_ERR_MEMORY;
+                return HS_TRY_OTHER;
             }
         }
         for (int r = 0; r < lattice->n_periodic; r++) {
@@ -348,7 +349,7 @@ hs_nearest_images_start(const hs_nearest *near, const hs_nearest_group *group,
     }
     images->error = bound_error(&near->search->scene, most);
     return images->count < fmax(MOST_IMAGES, IMAGES_A_NEIGHBOUR * (double)near->k) ? HS_OK
-                                                                                   : HS_ERR_MEMORY;
+                                                                                   : HS_TRY_OTHER;
 }
 
 bool
@@ -470,11 +471,21 @@ relative(const hs_nearest_leaves *leaves, int k, double x)
     return clamped(x, leaves->centre[k], leaves->unit, leaves->extent);
 }
 
+/* Whether a leaf may have more points than can be of use, and it is not known which: of a spot, k
+ * of those that count, where not all do. */
+static bool
+is_vast_spot(const hs_nearest *near, const hs_tree_node *node)
+{
+    return node->is_spot && near->search->call->choice != NULL && hs_tree_points(node) > near->k;
+}
+
+/* Adds a leaf, of a spot no more points than can be of use: k of them, and the asking one. */
 static void
 add_leaf(const hs_nearest *near, int32_t number, hs_nearest_leaves *leaves)
 {
     const hs_tree_node *node = &near->tree.nodes[number];
     const int           d = near->tree.ndim, side = (number + 1) % 2;
+    const int64_t       n = hs_tree_points(node), most = node->is_spot ? near->k + 1 : n;
     const double       *moved = leaves->images[leaves->n_images - 1].moved;
     for (int k = 0; k < d; k++) {
         const double *bounds = hs_tree_bounds(&near->tree, number - side, d) + 4 * k + side;
@@ -484,7 +495,7 @@ add_leaf(const hs_nearest *near, int32_t number, hs_nearest_leaves *leaves)
         leaves->high[k][leaves->n] = relative(leaves, k, high + moved[k]);
     }
     leaves->runs[leaves->n] =
-        (hs_nearest_run){0, hs_nearest_of_leaf(near, node), node->first, leaves->n_images - 1};
+        (hs_nearest_run){0, (int32_t)(n < most ? n : most), node->first, leaves->n_images - 1};
     leaves->n_points += leaves->runs[leaves->n++].n;
 }
 
@@ -512,7 +523,8 @@ find_leaves_in_image(const hs_nearest *near, const hs_nearest_group *group, doub
         HS_PREFETCH(&tree->nodes[left]);
         if (left != 0) {
             hs_tree_gaps(hs_tree_bounds(tree, left, ndim), low, high, leaves->unit, ndim, gap);
-        } else if (leaves->n == MOST_LEAVES || (double)leaves->n_points > most) {
+        } else if (leaves->n == MOST_LEAVES || (double)leaves->n_points > most ||
+                   is_vast_spot(near, &tree->nodes[number])) {
             return false;
         } else {
             add_leaf(near, number, leaves);
@@ -620,7 +632,6 @@ reserve(const hs_nearest *near, hs_nearest_block *block, int64_t n)
     for (int k = 0; k < near->tree.ndim; k++) {
         hs_parts_add(&parts, (void **)&block->y[k], room, sizeof(float));
     }
-    hs_parts_add(&parts, (void **)&block->norm, room, sizeof(float));
     hs_parts_add(&parts, (void **)&block->number, room, sizeof(int32_t));
     hs_parts_add(&parts, (void **)&block->image_of, room, sizeof(int32_t));
     hs_parts_add(&parts, (void **)&block->place, room, sizeof(int32_t));
@@ -696,7 +707,6 @@ gather(const hs_nearest *near, const hs_nearest_group *group, hs_nearest_block *
                              .images = block->images,
                              .unit = block->frame.unit,
                              .extent = block->extent,
-                             .norm = block->norm,
                              .number = block->number};
     for (int k = 0; k < near->tree.ndim; k++) {
         keys.x[k] = near->search->bins.x[k];
@@ -711,7 +721,6 @@ gather(const hs_nearest *near, const hs_nearest_group *group, hs_nearest_block *
     for (int k = 0; k < near->tree.ndim; k++) {
         hs_pad_lanes(block->y[k], block->n);
     }
-    hs_pad_lanes(block->norm, block->n);
     for (int32_t r = 0; r < block->n_runs; r++) {
         int32_t *image_of = block->image_of + block->runs[r].at;
         for (int32_t c = 0; c < block->runs[r].n; c++) {
@@ -761,7 +770,6 @@ hs_nearest_block_scan(const hs_nearest *near, const hs_nearest_group *group,
     const int        d = near->tree.ndim;
     const double     extent = scan_extent(block), reach = block->frame.reach;
     hs_scan          scan = {.ndim = d,
-                             .norm = block->norm,
                              .label = block->place,
                              .n = block->n,
                              .n_points = group->last - group->first,
@@ -781,9 +789,7 @@ hs_nearest_block_scan(const hs_nearest *near, const hs_nearest_group *group,
         scan.squares = block->squares;
         return kernel->scan(&scan, first);
     }
-    scan.expanded = hs_expanded_of(d, reach, extent, block->frame.error);
     scan.direct.in = INFINITY;
-    scan.expanded.in = INFINITY;
-    scan.form = hs_expanded_pays(reach, extent) ? HS_SCAN_EXPANDED : HS_SCAN_DIRECT;
+    scan.form = HS_SCAN_DIRECT;
     return kernel->scan(&scan, first);
 }

@@ -58,8 +58,8 @@ typedef struct hs_nearest_images {
     bool              is_first;
 } hs_nearest_images;
 
-/* Those that are near a group; of NULL, the points where they are. HS_ERR_MEMORY when there are
- * more than memory could hold points. */
+/* Those that are near a group; of NULL, the points where they are. HS_TRY_OTHER when there are more
+ * than a search could look at. */
 hs_status hs_nearest_images_start(const hs_nearest *near, const hs_nearest_group *group,
                                   hs_nearest_images *images);
 
@@ -87,14 +87,6 @@ hs_nearest_error(const hs_nearest_frame *frame, int ndim, double square)
 {
     /* Per axis: two roundings of the difference, one of the square, one of the sum; twice that. */
     return (ndim + 4) * 0x1p-51 * square + frame->flat_error;
-}
-
-/* How many points of a leaf can be of use in one image. */
-HS_ALWAYS_INLINE int32_t
-hs_nearest_of_leaf(const hs_nearest *near, const hs_tree_node *node)
-{
-    const int32_t n = node->end - node->first;
-    return node->is_spot && n > near->of_spot ? near->of_spot : n;
 }
 
 /* The leaves that a group may need, found by one walk down the tree. Groups that are parts of it
@@ -133,7 +125,6 @@ typedef struct hs_nearest_block {
     void                   *memory; /* owned: of all arrays but runs and images */
     int32_t                 n, capacity;
     float                  *y[HS_MAX_DIM]; /* X, moved, less the centre, in units; clamped */
-    float                  *norm;          /* sum of y^2 */
     int32_t                *number;        /* in tree order */
     int32_t                *image_of;      /* which of the images */
     int32_t                *place;         /* 0, 1, 2, ... */

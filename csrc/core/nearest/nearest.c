@@ -50,24 +50,8 @@ hs_nearest_kept_free(hs_nearest_kept *kept)
 #define PAIRS_PER_POINT 200.0
 /* Lengths that distances are compared with scale the scene by themselves below this. */
 #define SMALL_LIMIT 0x1p-800
-/* Periods below this do. */
-#define SMALL_BOX 0x1p-500
-
-/* Which cutoff lets the scene keep every digit: one that leaves ordinary numbers as they are, but
- * for a box that is too small. */
-static double
-scene_cutoff(const hs_box *box)
-{
-    double shortest = INFINITY;
-    for (int l = 0; box != NULL && l < box->ndim; l++) {
-        double largest = 0.0;
-        for (int k = 0; box->periodic[l] && k < box->ndim; k++) {
-            largest = hs_larger(fabs(box->rows[l][k]), largest);
-        }
-        shortest = box->periodic[l] ? hs_smaller(largest, shortest) : shortest;
-    }
-    return shortest < SMALL_BOX ? 0.0 : 1.0;
-}
+/* A cutoff that leaves ordinary numbers as they are. */
+#define SCENE_CUTOFF 1.0
 
 /* Sets the largest and the least distance, in the scene's unit and for the metrics. */
 static void
@@ -141,6 +125,7 @@ prepare_anew(hs_nearest *near, const hs_sets *sets, const hs_box *box, double li
     const int32_t leaf_points = near->k < 4 * LEAF_POINTS ? LEAF_POINTS : 2 * LEAF_POINTS;
     hs_sets       bounded = *sets;
     bounded.within = limit < INFINITY ? limit : 0.0;
+    bounded.least_cutoff = hs_choice_least_length(search->call->choice, bounded.within);
     options.cutoff = cutoff;
     hs_call_gather(search->call, sets->points->n + (asking != NULL ? sets->queries->n : 0));
     near->asking = &near->tree;
@@ -172,7 +157,7 @@ build_kept(const hs_nearest *near, const hs_sets *sets, const hs_box *box, hs_ne
                              .is_full = true,
                              .is_plain = sets->is_plain,
                              .is_wide = sets->is_wide};
-    options.cutoff = scene_cutoff(box);
+    options.cutoff = SCENE_CUTOFF;
     options.want = HS_WANT_SHIFT;
     options.counters = NULL;
     kept->near = (hs_nearest){.search = search};
@@ -238,7 +223,6 @@ prepare_from_kept(hs_nearest *near, const hs_sets *sets, const hs_box *box, doub
     *near = kept->near; /* with what it must not free marked as borrowed */
     near->search = search;
     near->k = own.k;
-    near->of_spot = own.of_spot;
     near->omits_self = own.omits_self;
     near->rows = own.rows;
     near->asking = &near->tree;
@@ -269,7 +253,7 @@ hs_nearest_prepare(hs_nearest *near, const hs_sets *sets, const hs_box *box, dou
         status = prepare_from_kept(near, sets, box, limit, failure);
     }
     return status == HS_REBUILD
-               ? prepare_anew(near, sets, box, limit, is_small ? least : scene_cutoff(box), failure)
+               ? prepare_anew(near, sets, box, limit, is_small ? least : SCENE_CUTOFF, failure)
                : status;
 }
 
@@ -338,8 +322,8 @@ typedef struct nearest_worker {
     int64_t            n_groups, n_candidates;
 } nearest_worker;
 
-/* Writes the row of the ranker's point, unless something failed, and names the point where its
- * shift is too long. */
+/* Writes the row of the ranker's point, unless something failed, and names the point where that is
+ * how far it is: its shift is too long, or it is near too many images. */
 static hs_status
 write_row(nearest_worker *worker, int64_t count, hs_status status)
 {
@@ -353,11 +337,13 @@ write_row(nearest_worker *worker, int64_t count, hs_status status)
     if (status == HS_OK) {
         status = hs_nearest_write(&worker->writer, &worker->ranker, count);
     }
-    if (status == HS_ERR_SHIFT_RANGE) {
-        worker->committer.failure.row = hs_search_asking(search)->order[ranker->si];
-        worker->committer.failure.in_queries = search->has_queries;
+    if (status == HS_ERR_SHIFT_RANGE || status == HS_TRY_OTHER) {
+        hs_failure *failure = &worker->committer.failure;
+        failure->row = hs_search_asking(search)->order[ranker->si];
+        failure->in_queries = search->has_queries;
+        failure->expected_bytes = status == HS_TRY_OTHER ? INFINITY : 0.0;
     }
-    return status;
+    return status == HS_TRY_OTHER ? HS_ERR_MEMORY : status;
 }
 
 /* Whether points repeat without end and none of them is of the asking one's group. */

@@ -18,8 +18,6 @@ typedef struct hs_nearest {
     hs_tree        asking_tree; /* owned; of the queries, if there are any */
     const hs_tree *asking;      /* the tree of the asking points */
     int64_t        k;           /* points wanted for each */
-    int32_t        of_spot;     /* of one spot, in one image, no more points than this can be of
-                                 * use */
     bool           omits_self;  /* without queries: a point is not its own neighbour */
     double         limit;       /* largest distance in the scene's unit; infinity: none */
     hs_metric      within;      /* decides on the largest distance, if there is one */
@@ -37,8 +35,8 @@ typedef struct hs_nearest {
 
 /*
  * A scene and trees, made anew or borrowed from cells that keep them: everything of `near` but k,
- * of_spot, omits_self and rows, which are set already, as is its search but for scene, bins, kernel
- * and threads. sets->trees: NULL, or what keeps a tree of the points. `limit`: the largest
+ * omits_self and rows, which are set already, as is its search but for scene, bins, kernel and
+ * threads. sets->trees: NULL, or what keeps a tree of the points. `limit`: the largest
  * distance. Which points count is the call's choice, if it has one. hs_nearest_release in any
  * case.
  */

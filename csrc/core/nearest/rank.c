@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "rank.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -323,14 +324,18 @@ is_listed_before(const hs_nearest_ranker *ranker, const hs_nearest_key *b, const
 static bool
 is_before(hs_nearest_ranker *ranker, const hs_nearest_key *b, const hs_nearest_key *a)
 {
-    double  p[HS_MAX_DIM], q[2][HS_MAX_DIM];
-    int64_t shift[2][HS_MAX_DIM];
-    int     sign = 0;
+    const hs_metric *order = &ranker->near->order;
+    const size_t     d = (size_t)ranker->near->tree.ndim, m = (size_t)order->n_rows;
+    double           p[HS_MAX_DIM], q[2][HS_MAX_DIM];
+    int64_t          shift[2][HS_MAX_DIM];
+    int              sign = 0;
     take_origin(ranker, p);
     ranker->n_compared++;
     /* Shifts that pass their range are found when the pair is written; here any order will do. */
-    if (pair_of(ranker, b, q[0], shift[0], NULL) && pair_of(ranker, a, q[1], shift[1], NULL)) {
-        sign = hs_metric_compare(&ranker->near->order, &(hs_span){p, q[0], shift[0]},
+    if (pair_of(ranker, b, q[0], shift[0], NULL) && pair_of(ranker, a, q[1], shift[1], NULL) &&
+        (memcmp(q[0], q[1], d * sizeof **q) != 0 ||
+         memcmp(shift[0], shift[1], m * sizeof **shift) != 0)) {
+        sign = hs_metric_compare(order, &(hs_span){p, q[0], shift[0]},
                                  &(hs_span){p, q[1], shift[1]}, &ranker->stages);
     }
     return sign < 0 || (sign == 0 && is_listed_before(ranker, b, a));
@@ -461,20 +466,23 @@ typedef struct near_walk {
     hs_nearest_ranker *ranker;
     double             at[HS_MAX_DIM]; /* the point's X less the image's displacement */
     int32_t            self;           /* the point itself is left out; -1 in other images */
-    double             within; /* what has a larger square is beyond the largest distance ... */
-    double             bound;  /* ... or surely not among the nearest */
-    double             slack;  /* for errors that do not fall with the square */
-    bool               takes;  /* some key is in this image */
+    double             within;  /* what has a larger square is beyond the largest distance ... */
+    double             bound;   /* ... or surely not among the nearest */
+    double             slack;   /* for errors that do not fall with the square */
+    double             least;   /* what has a smaller square is surely too near */
+    int64_t            n_taken; /* keys in this image */
 } near_walk;
 
-/* With room for what is too close to tell from the last one: two closenesses for a reach of twice
- * its distance, in which distances times errors are no more than part of the square of either. */
+/* With room for what is too close to tell from the last one: two closenesses, for a reach of twice
+ * its distance. */
 HS_ALWAYS_INLINE void
 set_bound(near_walk *walk)
 {
     const hs_nearest_ranker *ranker = walk->ranker;
     if (ranker->n_least == ranker->near->k) {
-        walk->bound = hs_smaller(ranker->least[0] * (1.0 + 0x1p-16) + walk->slack, walk->within);
+        const double last = ranker->least[0];
+        const double room = walk->slack * (sqrt(last) + walk->slack);
+        walk->bound = hs_smaller(last * (1.0 + WALK_ROOM) + room + 0x1p-990, walk->within);
     }
 }
 
@@ -495,20 +503,22 @@ take_key(near_walk *walk, hs_nearest_key key)
         return HS_ERR_MEMORY;
     }
     ranker->keys[ranker->n++] = key;
-    walk->takes = true;
+    walk->n_taken++;
     set_bound(walk);
     return HS_OK;
 }
 
+/* Of a spot, points that come behind k others at the same place are of no use. */
 HS_ALWAYS_INLINE hs_status
 walk_leaf(near_walk *walk, const hs_tree_node *node, const int ndim)
 {
     hs_nearest_ranker *ranker = walk->ranker;
     const hs_nearest  *near = ranker->near;
     const double       unit = ranker->frame.unit;
-    const int32_t      end = node->first + hs_nearest_of_leaf(near, node);
-    ranker->n_met += end - node->first;
-    for (int32_t first = node->first, next; first < end; first = next) {
+    const int64_t      most = node->is_spot ? walk->n_taken + near->k : INT64_MAX;
+    const int32_t      end = node->end;
+    int32_t            next;
+    for (int32_t first = node->first; first < end && walk->n_taken < most; first = next) {
         double squares[LEAF_CHUNK] = {0.0};
         next = end - first < LEAF_CHUNK ? end : first + LEAF_CHUNK;
         for (int k = 0; k < ndim; k++) {
@@ -518,6 +528,7 @@ walk_leaf(near_walk *walk, const hs_tree_node *node, const int ndim)
                 squares[e] += along * along;
             }
         }
+        ranker->n_met += next - first;
         for (int32_t e = 0; e < next - first; e++) {
             if (squares[e] <= walk->bound) {
                 const hs_status status =
@@ -531,6 +542,27 @@ walk_leaf(near_walk *walk, const hs_tree_node *node, const int ndim)
     return HS_OK;
 }
 
+/* Whether all points of a node, whose ranges are `stride` numbers apart, are nearer than the least
+ * distance, and none is the asking one, which counts; gap: the squared distance to them. */
+static bool
+are_too_near(const near_walk *walk, const double *lower, const double *upper, int stride,
+             double gap)
+{
+    const hs_nearest_ranker *ranker = walk->ranker;
+    double                   square = 0.0;
+    if (gap <= walk->slack * walk->slack && walk->self < 0 &&
+        ranker->chooser.excluding.itself >= 0) {
+        return false;
+    }
+    for (int k = 0; k < ranker->near->tree.ndim; k++) {
+        const double below = walk->at[k] - lower[k * stride];
+        const double above = upper[k * stride] - walk->at[k];
+        const double along = hs_larger(below, above) * ranker->frame.unit;
+        square += along * along;
+    }
+    return square < walk->least;
+}
+
 HS_ALWAYS_INLINE hs_status
 walk_tree(near_walk *walk, const int ndim)
 {
@@ -539,24 +571,35 @@ walk_tree(near_walk *walk, const int ndim)
     const double       unit = ranker->frame.unit;
     int32_t           *stack = ranker->stack;
     double            *gaps = ranker->gaps;
+    const bool         has_least = walk->least > 0.0;
     int64_t            n_waiting = 1;
     stack[0] = 0;
     gaps[0] = hs_tree_gap(tree, walk->at, walk->at, unit);
+    if (has_least && are_too_near(walk, tree->lower, tree->upper, 1, gaps[0])) {
+        return HS_OK;
+    }
     while (n_waiting > 0) {
         const hs_tree_node *node = &tree->nodes[stack[--n_waiting]];
-        if (gaps[n_waiting] > walk->bound) {
-            continue;
-        }
-        while (node->left != 0) { /* down to the leaf that is nearest */
-            double gap[2];
-            HS_PREFETCH(&tree->nodes[node->left]);
-            hs_tree_gaps(hs_tree_bounds(tree, node->left, ndim), walk->at, walk->at, unit, ndim,
-                         gap);
-            const int nearer = gap[1] < gap[0];
-            stack[n_waiting] = node->left + 1 - nearer;
+        double              gap[2] = {gaps[n_waiting], INFINITY};
+        int                 nearer = 0;
+        while (gap[nearer] <= walk->bound && node->left != 0) { /* down to the nearest leaf */
+            const int32_t left = node->left;
+            const double *bounds = hs_tree_bounds(tree, left, ndim);
+            HS_PREFETCH(&tree->nodes[left]);
+            hs_tree_gaps(bounds, walk->at, walk->at, unit, ndim, gap);
+            for (int side = 0; has_least && side < 2; side++) {
+                if (are_too_near(walk, bounds + side, bounds + 2 + side, 4, gap[side])) {
+                    gap[side] = INFINITY;
+                }
+            }
+            nearer = gap[1] < gap[0];
+            stack[n_waiting] = left + 1 - nearer;
             gaps[n_waiting] = gap[1 - nearer];
             n_waiting += gap[1 - nearer] <= walk->bound;
-            node = &tree->nodes[node->left + nearer];
+            node = &tree->nodes[left + nearer];
+        }
+        if (gap[nearer] > walk->bound) {
+            continue;
         }
         const hs_status status = walk_leaf(walk, node, ndim);
         if (status != HS_OK || !goes_on(ranker, FEW)) {
@@ -584,7 +627,7 @@ walk_image(near_walk *walk, const hs_nearest_image *image)
     }
     ranker->walked[ranker->n_walked++] = *image;
     ranker->images = ranker->walked;
-    walk->takes = false;
+    walk->n_taken = 0;
     walk->self = near->omits_self && image->is_home ? ranker->si : -1;
     for (int k = 0; k < asking->ndim; k++) {
         walk->at[k] = asking->x[k][ranker->si] - image->moved[k];
@@ -594,7 +637,7 @@ walk_image(near_walk *walk, const hs_nearest_image *image)
     case 3: status = walk_tree(walk, 3); break;
     default: status = walk_tree(walk, asking->ndim);
     }
-    ranker->n_walked -= !walk->takes; /* nothing there */
+    ranker->n_walked -= walk->n_taken == 0; /* nothing there */
     return status;
 }
 
@@ -618,10 +661,12 @@ walk_images(hs_nearest_ranker *ranker, const hs_nearest_group *point, double uni
         const double error = images.error * unit, room = 8.0 * root * error;
         const double within = (near->limit * unit + room) * (1.0 + WALK_ROOM);
         hs_status    status = HS_OK;
-        walk.within = walk.bound = within * within;
-        walk.slack = near->tree.ndim * error * error * 0x1p24 + 0x1p-990;
+        walk.within = walk.bound = hs_smaller(within * within, DBL_MAX);
+        walk.slack = 32.0 * root * error;
         ranker->frame.unit = unit;
         ranker->frame.error = error;
+        const double least = hs_smaller(near->least * unit, 0x1p500); /* a square is finite */
+        walk.least = least * least - square_error(ranker, least * least);
         set_bound(&walk);
         while (status == HS_OK && hs_nearest_images_next(&images)) {
             bool is_new = round < 2 && images.next.is_home == (round == 0);
@@ -648,7 +693,7 @@ walk_images(hs_nearest_ranker *ranker, const hs_nearest_group *point, double uni
         memcpy(low, images.low, sizeof low);
         memcpy(high, images.high, sizeof high);
         along *= 2.0;
-        group.radius = is_full ? enough : hs_smaller(hypot(group.away, along), farthest);
+        group.radius = hs_smaller(hypot(group.away, along), is_full ? enough : farthest);
         group.radius = hs_larger(group.radius, HS_NEAREST_LEAST_RADIUS);
         status = hs_nearest_images_start(near, &group, &images);
         if (status != HS_OK) {

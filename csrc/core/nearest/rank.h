@@ -54,7 +54,8 @@ void      hs_nearest_ranker_free(hs_nearest_ranker *ranker);
 void hs_nearest_ranker_set(hs_nearest_ranker *ranker, int32_t si);
 
 /* Ranks the nearest of all, and finds what is too close to tell from them. Sets keys and count as
- * hs_nearest_rank, but that *count is not -1; some may be beyond the largest distance. */
+ * hs_nearest_rank, but that *count is not -1; some may be beyond the largest distance.
+ * HS_TRY_OTHER: too many images may be as near. */
 hs_status hs_nearest_walk(hs_nearest_ranker *ranker, int64_t *count);
 
 /*

@@ -2,13 +2,16 @@
 #include "table.h"
 #include "../base/status.h"
 #include "../collect/parallel.h"
+#include "../collect/sort_pairs.h"
 #include "../search/walk.h"
 
+#include <math.h>
 #include <string.h>
 
 /* table.c: lengths of table rows by a counting walk, or by the one walk that keeps them; their sums
  * are the offsets. Hits come in the order of the table; the point itself is left out, the others
- * are recorded as those of any list, and each column of a row is copied to its place. */
+ * are recorded as those of any list, and each column of a row is copied to its place. Where pairs
+ * are few and candidates many, a list of pairs is found and sorted instead. */
 
 /* Bytes of rows that wait for their places. */
 #define MOST_KEPT (6 << 20)
@@ -206,6 +209,17 @@ fits(hs_search *search, const hs_neighbourhood *most, double *bytes)
     return false;
 }
 
+/* Whether one walk is to find all rows, which are kept until they have places. */
+static bool
+keeps_all(const table *all)
+{
+    hs_search   *search = all->search;
+    const double expected = search->grid.expected_pairs * search->pairs_per_half;
+    return search->call->team == NULL &&
+           expected * (double)hs_output_bytes_per_pair(all->entries) < MOST_EXPECTED_KEPT &&
+           hs_account_allows(&search->call->account, 2.0 * MOST_KEPT);
+}
+
 /* One walk, by this thread, whose rows are kept. HS_TRY_OTHER: there were too many entries, and
  * none is kept. */
 static hs_status
@@ -238,13 +252,10 @@ measure(table *all, hs_failure *failure)
     hs_call      *call = search->call;
     int64_t      *offsets = all->offsets, sum = 0;
     const int64_t n = hs_search_asking(search)->n;
-    const double  expected = search->grid.expected_pairs * search->pairs_per_half;
     hs_status     status = HS_TRY_OTHER;
     hs_output_init(&call->account, all->entries->ndim, all->entries->columns,
                    all->entries->index_bytes, &all->kept);
-    const double bytes = expected * (double)hs_output_bytes_per_pair(&all->kept);
-    if (call->team == NULL && bytes < MOST_EXPECTED_KEPT &&
-        hs_account_allows(&call->account, 2.0 * MOST_KEPT)) {
+    if (keeps_all(all)) {
         const hs_stretch whole = hs_call_begin_part(call, PREPARED, 1.0);
         status = keep_all(all, failure);
         call->part = whole;
@@ -288,6 +299,96 @@ fill(table *all, hs_failure *failure)
     return status;
 }
 
+/*
+ * What either way costs for each asking point, in units of a candidate that is tested, about a
+ * nanosecond. Fitted to 2 to 6 dimensions with 5 to 50 neighbours, within a third; so sorting must
+ * seem clearly cheaper.
+ */
+#define COST_OF_ROW    8.0  /* a row of cells that a group looks through */
+#define COST_OF_ORDER  3.0  /* a candidate that a group puts in order */
+#define COST_OF_ENTRY  12.0 /* an entry that is sorted ... */
+#define COST_OF_CACHED 0.3 /* ... and a byte of what is measured of it, in the second-level cache */
+#define COST_OF_BYTE   0.5 /* or beyond that */
+#define COST_OF_PLACE  3.0 /* an entry that is copied to its place ... */
+#define COST_OF_COPIED 0.15 /* ... and a byte of it */
+#define KEPT_WALKS     1.5  /* walks over all neighbours in any order: one that orders and keeps, */
+#define COUNTED_WALKS  2.0  /* or one that counts and one that orders */
+#define CLEARLY        0.7
+
+#define LEAST_SORTED 256       /* asking points: below, walks cost little */
+#define CACHED       (1 << 20) /* bytes that the second-level cache holds */
+#define SORTED_BYTES (5 << 20) /* most bytes for what is found and sorted, and so many ... */
+#define SORTED_BY_N  8         /* ... for each asking point */
+
+/* Whether pairs, each once, are found and sorted in less time, within these bytes. */
+static bool
+sorts(const table *all)
+{
+    const hs_search *search = all->search;
+    const hs_grid   *grid = &search->grid;
+    const hs_call   *call = search->call;
+    const hs_bins   *asking = hs_search_asking(search), *bins = &search->bins;
+    const unsigned   columns = hs_sort_columns(search);
+    const int        ndim = search->scene.ndim;
+    const double     n = (double)asking->n, n_points = (double)bins->n;
+    if (search->limits != NULL || call->choice != NULL || call->options.precision != HS_EXACT ||
+        n < LEAST_SORTED || n_points < 1.0) {
+        return false;
+    }
+    /* Entries of a row: as many as in an even scene, times what points are closer together. Where
+     * they lie at random, each finds one more in its cell than there are on average: itself. Sparse
+     * cells do not tell: then the ball's part of three cells a side, which are about a cutoff wide.
+     * */
+    const double candidates = hs_search_candidates(search) / n;
+    const double crowd = (bins->squares / n_points - 1.0) * (double)grid->n_cells / n_points;
+    const double part = hs_ball_volume(ndim, 1.0) / pow(3.0, ndim);
+    const double entries =
+        search->pairs_per_half *
+        (search->is_sparse ? part * candidates : grid->expected_pairs / n * hs_larger(crowd, 1.0));
+    const double pairs = search->has_queries || search->is_half ? entries : 0.5 * entries;
+    const double measures = (double)hs_want_bytes(columns & ~(HS_WANT_I | HS_WANT_J), ndim, 4);
+    const double found = n * pairs * (double)hs_want_bytes(columns, ndim, 4);
+    const double bytes = found + n * entries * (double)sizeof(uint64_t);
+    const double in_group = asking->squares / n;
+    const double walk =
+        candidates + COST_OF_ROW * ((double)search->stencil.n_rows + 2.0) / in_group;
+    const double once = search->has_queries ? walk : 0.5 * walk;
+    const double rows = (keeps_all(all) ? KEPT_WALKS : COUNTED_WALKS) * walk +
+                        COST_OF_ORDER * candidates / in_group +
+                        entries * (COST_OF_PLACE + COST_OF_COPIED * measures);
+    const double of_byte = found < CACHED ? COST_OF_CACHED : COST_OF_BYTE;
+    const double sorting = entries * (COST_OF_ENTRY + of_byte * measures);
+    return sorting < CLEARLY * (rows - once) && bytes < SORTED_BYTES + SORTED_BY_N * n &&
+           hs_account_allows(&search->call->account, 2.0 * bytes);
+}
+
+/* The table, from a list of pairs: each once, but for those of queries. */
+static hs_status
+sort_list(table *all, hs_failure *failure)
+{
+    hs_search    *search = all->search;
+    hs_call      *call = search->call;
+    hs_output    *entries = all->entries, *found = &all->kept;
+    const int64_t n = hs_search_asking(search)->n;
+    const bool    is_once = search->is_half, both_ways = !is_once && !search->has_queries;
+    hs_output_init(&call->account, entries->ndim, hs_sort_columns(search), 4, found);
+    hs_status status = search->has_queries ? HS_OK : hs_search_halve(search);
+    if (status == HS_OK) {
+        status = hs_parallel_record(search, NULL, found, failure);
+    }
+    if (status == HS_OK && both_ways && (entries->columns & HS_WANT_SHIFT)) {
+        status = hs_output_check_opposites(found, failure);
+    }
+    if (status == HS_OK) {
+        status = is_once ? hs_sort_pairs(call, 0, n, found, entries)
+                         : hs_sort_rows(call, n, found, both_ways, all->offsets, entries);
+    }
+    if (status == HS_ERR_MEMORY) {
+        failure->expected_pairs = (both_ways ? 2.0 : 1.0) * (double)found->n_pairs;
+    }
+    return status;
+}
+
 hs_status
 hs_table_find(hs_search *search, hs_output *entries, hs_output *offsets, hs_failure *failure)
 {
@@ -298,6 +399,11 @@ hs_table_find(hs_search *search, hs_output *entries, hs_output *offsets, hs_fail
     if (status == HS_OK) {
         status = hs_output_open_offsets(&call->account, hs_search_asking(search)->n + 1, offsets,
                                         &all.offsets);
+    }
+    if (status == HS_OK && sorts(&all)) {
+        status = sort_list(&all, failure);
+        hs_output_free(&all.kept);
+        return status;
     }
     /* In a small scene a bound on the largest neighbourhood does, which is small as well. */
     if (status == HS_OK && !hs_walker_bound(search, &all.most)) {

@@ -17,8 +17,9 @@
 hs_status hs_table_count(hs_search *search, int64_t *counts, hs_failure *failure);
 
 /* The rows of a full search, as the entries of an empty output with columns for what is wanted, and
- * where each row begins, rows + 1, as i of `offsets`, which it opens. HS_ERR_MEMORY where the
- * result, or one neighbourhood, is too large; HS_ERR_CAPACITY. */
+ * where each row begins, rows + 1, as i of `offsets`, which it opens; where each pair is listed
+ * once these numbers may be left unset. The search may be made one for each pair once on the way.
+ * HS_ERR_MEMORY where the result, or one neighbourhood, is too large; HS_ERR_CAPACITY. */
 hs_status hs_table_find(hs_search *search, hs_output *entries, hs_output *offsets,
                         hs_failure *failure);
 

@@ -224,16 +224,6 @@ join_ranges(int ndim, const double *lower, const double *upper, double *to_lower
     }
 }
 
-/* Gives both clouds the range of both. */
-static void
-scene_join_clouds(hs_scene *scene, hs_scene *asking)
-{
-    hs_cloud *a = &scene->cloud, *b = &asking->cloud;
-    join_ranges(scene->ndim, b->lower, b->upper, a->lower, a->upper);
-    join_ranges(scene->ndim, a->lower, a->upper, b->lower, b->upper);
-    a->largest = b->largest = hs_larger(a->largest, b->largest);
-}
-
 /* Clears what is added to or freed, and what is a scene's own. The rest is large, and set before it
  * is read. */
 static void
@@ -241,7 +231,7 @@ start_scene(int ndim, int64_t n, hs_scene *scene)
 {
     scene->ndim = ndim;
     scene->n = n;
-    scene->keeps_originals = scene->x_is_beside = scene->is_kept = scene->is_ordinary = false;
+    scene->keeps_originals = scene->is_kept = scene->is_ordinary = false;
     scene->in_one_cell = scene->is_untested = false;
     scene->cloud.block = scene->beside = NULL;
     scene->turns = (hs_turns){.known = false};
@@ -336,19 +326,6 @@ scene_takes(const hs_scene *kept, const hs_cloud *cloud)
            hs_scale_apply(scale, hs_cloud_smallest(cloud)) >= 0x1p-1022;
 }
 
-/* Whether the bounds of a scene that was kept hold for queries that have been wrapped. */
-static bool
-scene_covers(const hs_scene *kept, const hs_scene *asking)
-{
-    const bool is_tested = kept->n > 0 && !kept->is_untested;
-    bool       covers = !is_tested || asking->x_error <= kept->x_error;
-    for (int k = 0; kept->n > 0 && k < kept->ndim; k++) {
-        covers = covers && asking->t_error[k] <= kept->t_error[k] &&
-                 (!is_tested || asking->x_largest[k] <= kept->x_largest[k]);
-    }
-    return covers;
-}
-
 void
 hs_scene_name_refused(const hs_scene *kept, const hs_points *queries, hs_failure *failure)
 {
@@ -389,6 +366,8 @@ hs_scene_name_refused(const hs_scene *kept, const hs_points *queries, hs_failure
 /* Where no float32 is made of scaled numbers they stay below 2^901, so that sums of a few are
  * finite. */
 #define LARGEST_WIDE_EXPONENT 900
+/* With lengths up to 2^400, and down to 2^-400, squares of distances are ordinary numbers. */
+#define WIDE_ORDINARY_EXPONENT 400
 
 /* Cutoffs between 2^-20 and 2^20 are left alone: the float32 filter has room for their squares. */
 #define ORDINARY_EXPONENT 20
@@ -448,28 +427,26 @@ mover_of(const hs_box *box, int column)
                                      box->ndim, box->ndim, column);
 }
 
-static const hs_box_size NO_BOX_SIZE = {0.0, INFINITY, INFINITY, 0, false};
-
 hs_box_size
 hs_box_size_of(const hs_box *box)
 {
-    hs_box_size found = NO_BOX_SIZE;
+    hs_box_size found = {0.0, INFINITY, INFINITY, 0, false};
     for (int l = 0; box != NULL && l < box->ndim; l++) {
         double row_largest = 0.0;
+        int    in_row = 0; /* entries that are not zero */
         for (int k = 0; box->periodic[l] && k < box->ndim; k++) {
             const double size = fabs(box->rows[l][k]);
-            row_largest = hs_larger(size, row_largest);
-            found.smallest = size > 0.0 ? hs_smaller(size, found.smallest) : found.smallest;
+            if (size > 0.0) {
+                in_row++;
+                found.is_coupled = found.is_coupled || in_row > 1 || (found.moved >> k & 1u);
+                found.moved |= 1u << k;
+                found.smallest = hs_smaller(size, found.smallest);
+                row_largest = hs_larger(size, row_largest);
+            }
         }
         found.largest = hs_larger(row_largest, found.largest);
-        if (box->periodic[l]) {
-            found.short_row = hs_smaller(row_largest, found.short_row);
-        }
-    }
-    for (int k = 0; box != NULL && k < box->ndim; k++) {
-        const int mover = mover_of(box, k);
-        found.moved |= (unsigned)(mover != OPEN) << k;
-        found.is_coupled = found.is_coupled || mover == COUPLED;
+        found.short_row = box->periodic[l] ? hs_smaller(row_largest, found.short_row)
+                                           : found.short_row;
     }
     return found;
 }
@@ -482,13 +459,6 @@ unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
     return hs_exponent_of(cutoff > 0.0                 ? cutoff
                           : box->short_row != INFINITY ? box->short_row
                                                        : cloud->largest);
-}
-
-/* Whether all numbers are at most so many powers of two above a length of this exponent. */
-static bool
-fits_one_scale(const hs_cloud *cloud, const hs_box_size *box, int unit, int powers)
-{
-    return !hs_is_far(hs_larger(box->largest, cloud->largest), unit, powers);
 }
 
 /* The largest coordinate that wrapping leaves as it is. */
@@ -634,17 +604,6 @@ close_column(closing *doing, int k, double from, double *half)
     return status;
 }
 
-/* Copies the columns of a cloud, one behind another; NULL when memory is short. */
-static double *
-copy_columns(hs_account *account, const hs_cloud *cloud)
-{
-    double *copy = hs_alloc(account, HS_FOR_ORIGINALS, cloud->n * cloud->ndim, sizeof *copy);
-    for (int k = 0; copy != NULL && k < cloud->ndim; k++) {
-        memcpy(copy + k * cloud->n, cloud->x[k], (size_t)cloud->n * sizeof *copy);
-    }
-    return copy;
-}
-
 /* Wraps the far numbers of a column into the box. HS_ERR_SHIFT_RANGE, with the row, where turns
  * are to be known and cannot be. */
 static hs_status
@@ -699,8 +658,13 @@ close_gaps(hs_account *account, const hs_options *options, int unit, int powers,
                                .spare_ids = ids + n + 1};
     }
     for (int set = 0; status == HS_OK && counts && set < doing.n_sets; set++) {
-        far->given[set] = copy_columns(account, doing.of[set]);
-        status = far->given[set] != NULL ? HS_OK : HS_ERR_MEMORY;
+        const hs_cloud *of = doing.of[set];
+        double         *copy = hs_alloc(account, HS_FOR_ORIGINALS, of->n * of->ndim, sizeof *copy);
+        for (int k = 0; copy != NULL && k < of->ndim; k++) {
+            memcpy(copy + k * of->n, of->x[k], (size_t)of->n * sizeof *copy);
+        }
+        far->given[set] = copy;
+        status = copy != NULL ? HS_OK : HS_ERR_MEMORY;
     }
     if (changes_rows) {
         far->closed = *far->box;
@@ -755,21 +719,34 @@ add_turns(const far_numbers *far, int set, hs_scene *scene)
     }
 }
 
+/* Whether a scene without a length of its own is scaled by its box or its points, beside which
+ * squares of distances are no ordinary numbers. Lengths that pairs are compared with must not
+ * vanish. */
+static bool
+goes_by_itself(const hs_sets *sets, const hs_cloud *cloud, const hs_box_size *size, double sought)
+{
+    const int exponent = unit_exponent(cloud, size, 0.0);
+    return abs(hs_exponent_of(sought)) <= ORDINARY_EXPONENT &&
+           (exponent < -WIDE_ORDINARY_EXPONENT ||
+            (exponent > WIDE_ORDINARY_EXPONENT && sets->least_cutoff == 0.0));
+}
+
 /* Sets cutoff and scale of a scene with far numbers, and closes their gaps where that is to be
  * done. asking: NULL, or the queries' scene. */
 static hs_status
 bring_near(hs_account *account, const hs_options *options, const hs_sets *sets, hs_scene *scene,
            hs_scene *asking, far_numbers *far, hs_failure *failure)
 {
-    hs_cloud *cloud = &scene->cloud, *queries = asking != NULL ? &asking->cloud : NULL;
-    hs_status status = HS_OK;
-    far->size = hs_box_size_of(far->box);
-    const bool is_bounded = sets->within > 0.0 &&
-                            !fits_one_scale(cloud, &far->size,
-                                            unit_exponent(cloud, &far->size, sets->within),
-                                            HS_FAR_BOUNDED_EXPONENT);
+    hs_cloud    *cloud = &scene->cloud, *queries = asking != NULL ? &asking->cloud : NULL;
+    hs_status    status = HS_OK;
+    const double largest = hs_larger(far->size.largest, cloud->largest);
+    const bool   is_bounded =
+        sets->within > 0.0 &&
+        hs_is_far(largest, unit_exponent(cloud, &far->size, sets->within), HS_FAR_BOUNDED_EXPONENT);
     if (is_bounded) {
         scene->sought = sets->within;
+    } else if (sets->is_wide && goes_by_itself(sets, cloud, &far->size, scene->sought)) {
+        scene->sought = 0.0;
     } else if (!sets->is_kept && !sets->is_plain && cloud->largest > 0.0 &&
                far->size.largest == 0.0 && options->cutoff > ENOUGH_CUTOFF * cloud->largest) {
         /* A smaller one that is beyond all distances as well. */
@@ -785,7 +762,7 @@ bring_near(hs_account *account, const hs_options *options, const hs_sets *sets, 
     const bool may_close = !sets->is_kept && (!sets->is_wide || is_bounded) &&
                            (sets->is_wide || (asking == NULL && !sets->is_plain) ||
                             open_drowns_box(cloud, &far->size, scene->sought) ||
-                            !fits_one_scale(cloud, &far->size, unit, LARGEST_WIDE_EXPONENT));
+                            hs_is_far(largest, unit, LARGEST_WIDE_EXPONENT));
     if (may_close && scene->n > 0 && (asking == NULL || asking->n > 0) &&
         hs_is_far(hs_larger(0.5 * far->size.largest, cloud->largest), unit, powers)) {
         status = close_gaps(account, options, unit, powers, cloud, queries, far, failure);
@@ -860,27 +837,37 @@ fold_far(hs_scene *scene)
         }
         if (length > 0.0 &&
             (overflows || (scene->keeps_originals && reach / length >= HS_WRAP_LIMIT))) {
-            for (int64_t i = 0; i < cloud->n; i++) {
-                int64_t turned;
-                cloud->x[k][i] = hs_wrap_axis(cloud->x[k][i], length, &turned);
-            }
+            (void)wrap_far(cloud, k, 0.0, length, false, NULL);
             cloud->lower[k] = -0.5 * length;
             cloud->upper[k] = 0.5 * length;
         }
     }
 }
 
+/* Scales points [first, last), beside what is kept of them, and wraps them. */
 static hs_status
-wrap_slab(void *context, int slab, int64_t first, int64_t last)
+move_slab(void *context, int slab, int64_t first, int64_t last)
 {
     wrapping         *wrap = context;
     hs_scene         *scene = wrap->scene;
     const hs_lattice *lattice = &scene->lattice;
     const hs_turns   *turns = scene->turns.known ? &scene->turns : NULL;
     hs_wrap_range    *folded = &wrap->folded[slab];
+    /* Originals are scaled too, unless that loses digits. */
+    double *const *from = scene->keeps_originals ? scene->originals : scene->cloud.x;
+    double *const *scaled = scene->extreme ? scene->cloud.x : from;
+    for (int k = 0; k < scene->ndim; k++) {
+        double *x = scene->cloud.x[k];
+        for (int64_t i = first; scene->scale.exponent != 0 && i < last; i++) {
+            scaled[k][i] = hs_scale_apply(scene->scale, from[k][i]);
+        }
+        if (lattice->aligned && scaled[k] != x) {
+            memcpy(x + first, scaled[k] + first, (size_t)(last - first) * sizeof *x);
+        }
+    }
     if (!lattice->aligned) {
-        double *const *r = scene->x_is_beside ? scene->originals : scene->cloud.x;
-        hs_fold_points(lattice, wrap->few_turns, r, first, last, scene->cloud.x, turns, folded);
+        hs_fold_points(lattice, wrap->few_turns, scaled, first, last, scene->cloud.x, turns,
+                       folded);
     }
     for (int k = 0; lattice->aligned && k < scene->ndim; k++) {
         const int row = lattice->row_of_axis[k];
@@ -896,7 +883,8 @@ wrap_slab(void *context, int slab, int64_t first, int64_t last)
     return folded->failed < 0 ? HS_OK : HS_ERR_SHIFT_RANGE;
 }
 
-/* Allocates columns for the originals and the turns, in this order, where they are kept. */
+/* Allocates columns for X, where the originals stay where they are, and for the turns, and sets
+ * which columns are which. */
 static bool
 allocate_beside(hs_account *account, hs_scene *scene)
 {
@@ -915,36 +903,14 @@ allocate_beside(hs_account *account, hs_scene *scene)
                         m * turns_pitch + (d == 0 ? HS_COLUMN_PADDING : 0));
     char *column = scene->beside;
     for (int k = 0; k < d; k++, column += pitch) {
-        scene->originals[k] = (double *)(void *)column;
+        scene->originals[k] = scene->cloud.x[k];
+        scene->cloud.x[k] = (double *)(void *)column;
     }
     for (int r = 0; r < m; r++, column += turns_pitch) {
         scene->turns.narrow[r] = narrow ? (int32_t *)(void *)column : NULL;
         scene->turns.wide[r] = narrow ? NULL : (int64_t *)(void *)column;
     }
     return true;
-}
-
-/* Scales points [first, last), and copies them to the originals before or after that. */
-static hs_status
-scale_slab(void *context, int slab, int64_t first, int64_t last)
-{
-    hs_scene    *scene = context;
-    const size_t n_bytes = (size_t)(last - first) * sizeof(double);
-    const bool   copies = scene->keeps_originals && !scene->x_is_beside;
-    (void)slab;
-    for (int k = 0; k < scene->ndim; k++) {
-        double *x = scene->cloud.x[k];
-        if (copies && scene->extreme) {
-            memcpy(scene->originals[k] + first, x + first, n_bytes);
-        }
-        for (int64_t i = first; scene->scale.exponent != 0 && i < last; i++) {
-            x[i] = hs_scale_apply(scene->scale, x[i]);
-        }
-        if (copies && !scene->extreme) {
-            memcpy(scene->originals[k] + first, x + first, n_bytes);
-        }
-    }
-    return HS_OK;
 }
 
 /* Scales the points and wraps them into the box. Sets x_largest, the range of t_k of the points in
@@ -978,17 +944,7 @@ wrap_points(hs_account *account, hs_team *team, const hs_options *options, hs_sc
     if ((scene->keeps_originals || scene->turns.known) && !allocate_beside(account, scene)) {
         return HS_ERR_MEMORY;
     }
-    scene->x_is_beside = scene->keeps_originals && !scene->extreme && !lattice->aligned;
-    if ((scene->keeps_originals && !scene->x_is_beside) || scene->scale.exponent != 0) {
-        const hs_options silent = {.poll = NULL}; /* the caller was polled when this was copied */
-        (void)hs_walk_slabs(team, &silent, scene->n, scale_slab, scene);
-    }
-    for (int k = 0; scene->x_is_beside && k < scene->ndim; k++) {
-        double *beside = scene->originals[k]; /* wrapping moves the points there */
-        scene->originals[k] = cloud->x[k];
-        cloud->x[k] = beside;
-    }
-    if (is_periodic) {
+    if (is_periodic || scene->scale.exponent != 0) {
         wrap.scene = scene;
         wrap.few_turns = !lattice->aligned &&
                          hs_fold_turns(lattice, cloud->largest) <= HS_FOLD_TURNS;
@@ -996,7 +952,7 @@ wrap_points(hs_account *account, hs_team *team, const hs_options *options, hs_sc
         for (int64_t slab = 0; slab < n_slabs && slab < HS_SLABS; slab++) {
             wrap.folded[slab] = folded;
         }
-        status = hs_walk_slabs(team, options, scene->n, wrap_slab, &wrap);
+        status = hs_walk_slabs(team, options, scene->n, move_slab, &wrap);
         for (int64_t slab = 0; slab < n_slabs && slab < HS_SLABS; slab++) {
             const hs_wrap_range *of = &wrap.folded[slab];
             join_ranges(scene->ndim, of->lower, of->upper, folded.lower, folded.upper);
@@ -1060,28 +1016,19 @@ hs_scene_from_kept(hs_account *account, hs_team *team, const hs_scene *kept,
     }
     failure->in_queries = !for_cells && status != HS_OK && status != HS_REBUILD;
     if (status == HS_OK && !for_cells) {
+        const bool is_tested = kept->n > 0 && !kept->is_untested;
         scene_set_bounds(asking, magnitude);
-        status = scene_covers(kept, asking) ? HS_OK : HS_REBUILD;
+        bool covers = !is_tested || asking->x_error <= kept->x_error;
+        for (int k = 0; kept->n > 0 && k < kept->ndim; k++) {
+            covers = covers && asking->t_error[k] <= kept->t_error[k] &&
+                     (!is_tested || asking->x_largest[k] <= kept->x_largest[k]);
+        }
+        status = covers ? HS_OK : HS_REBUILD;
     }
     if (status != HS_OK) {
         hs_scene_free(account, asking);
     }
     return status;
-}
-
-/* The range of the points becomes that of a domain, or reaches further: as if queries lay at its
- * ends. */
-static void
-widen_cloud(const double *domain, hs_cloud *cloud)
-{
-    for (int k = 0; k < cloud->ndim && cloud->n > 0; k++) {
-        const double low = domain[k], high = domain[cloud->ndim + k];
-        if (low <= high) {
-            cloud->lower[k] = hs_smaller(low, cloud->lower[k]);
-            cloud->upper[k] = hs_larger(high, cloud->upper[k]);
-            cloud->largest = hs_larger(hs_larger(-low, high), cloud->largest);
-        }
-    }
 }
 
 /* Sets lattice and radius, wraps the points, and sets the bounds. asking: NULL, or the queries'
@@ -1169,32 +1116,6 @@ fill_scene(hs_account *account, hs_team *team, const hs_options *options, const 
     return HS_OK;
 }
 
-/*
- * Whether the numbers of a scene, once its points have been read, are searched as they were given:
- * the cutoff is not shortened, nothing is scaled, no gap is closed, and no point lies so many box
- * vectors away that turns could not tell.
- */
-static bool
-numbers_are_ordinary(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                     const hs_scene *scene)
-{
-    const double cutoff = options->cutoff;
-    double       largest = scene->cloud.largest, shortest = INFINITY;
-    if (box == NULL && cutoff > ENOUGH_CUTOFF * largest) {
-        return false;
-    }
-    for (int l = 0; box != NULL && l < box->ndim; l++) {
-        double of_row = 0.0;
-        for (int k = 0; box->periodic[l] && k < box->ndim; k++) {
-            of_row = hs_larger(fabs(box->rows[l][k]), of_row);
-        }
-        largest = hs_larger(of_row, largest);
-        shortest = box->periodic[l] ? hs_smaller(of_row, shortest) : shortest;
-    }
-    return cutoff >= LEAST_ORDINARY && cutoff <= MOST_ORDINARY && !(sets->within > 0.0) &&
-           largest <= LARGEST_ORDINARY && shortest >= SHORTEST_ORDINARY;
-}
-
 hs_status
 hs_scene_make(hs_account *account, hs_team *team, const hs_sets *sets, const hs_box *box,
               const hs_options *options, hs_scene *scene, hs_scene *asking, hs_failure *failure)
@@ -1204,7 +1125,6 @@ hs_scene_make(hs_account *account, hs_team *team, const hs_sets *sets, const hs_
     far_numbers far; /* large, and seldom used: `closed` is not cleared */
     start_scene(sets->points->ndim, sets->points->n, scene);
     scene->is_kept = sets->is_kept;
-    far.size = NO_BOX_SIZE;
     far.box = far.given_box = box;
     far.given[0] = far.given[1] = NULL;
     if (asking != NULL) {
@@ -1222,14 +1142,33 @@ hs_scene_make(hs_account *account, hs_team *team, const hs_sets *sets, const hs_
         status = hs_cloud_load(account, team, sets->queries, options, &asking->cloud, failure);
         failure->in_queries = status != HS_OK;
     }
-    if (status == HS_OK && sets->domain != NULL) {
-        widen_cloud(sets->domain, &scene->cloud);
+    /* The range of the points reaches as far as a domain: as if queries lay at its ends. */
+    for (int k = 0; status == HS_OK && sets->domain != NULL && scene->n > 0 && k < scene->ndim;
+         k++) {
+        const double low = sets->domain[k], high = sets->domain[scene->ndim + k];
+        hs_cloud    *cloud = &scene->cloud;
+        if (low <= high) {
+            cloud->lower[k] = hs_smaller(low, cloud->lower[k]);
+            cloud->upper[k] = hs_larger(high, cloud->upper[k]);
+            cloud->largest = hs_larger(hs_larger(-low, high), cloud->largest);
+        }
     }
-    if (status == HS_OK && asking != NULL) {
-        scene_join_clouds(scene, asking);
+    if (status == HS_OK && asking != NULL) { /* both clouds get the range of both */
+        hs_cloud *a = &scene->cloud, *b = &asking->cloud;
+        join_ranges(scene->ndim, b->lower, b->upper, a->lower, a->upper);
+        join_ranges(scene->ndim, a->lower, a->upper, b->lower, b->upper);
+        a->largest = b->largest = hs_larger(a->largest, b->largest);
     }
     if (status == HS_OK) {
-        scene->is_ordinary = numbers_are_ordinary(sets, box, options, scene);
+        far.size = hs_box_size_of(box);
+        const double largest = scene->cloud.largest, cutoff = options->cutoff;
+        /* Searched as it was given: the cutoff is not shortened, nothing is scaled, no gap is
+         * closed, and no point lies so many box vectors away that turns could not tell. */
+        scene->is_ordinary = (box != NULL || cutoff <= ENOUGH_CUTOFF * largest) &&
+                             cutoff >= LEAST_ORDINARY && cutoff <= MOST_ORDINARY &&
+                             !(sets->within > 0.0) &&
+                             hs_larger(far.size.largest, largest) <= LARGEST_ORDINARY &&
+                             far.size.short_row >= SHORTEST_ORDINARY;
         scene->scale = scene->unscale = hs_scale_of(0);
         scene->sought = scene->cutoff = scene->cutoff_low = options->cutoff;
         scene->extreme = false;
@@ -1264,49 +1203,6 @@ hs_scene_free(hs_account *account, hs_scene *scene)
     scene->beside = NULL;
 }
 
-/* One pass that copies each point, then finds the largest coordinate in the copy. */
-
-/* Points [first, last), one behind another. */
-static void
-copy_rows(const hs_points *points, int64_t first, int64_t last, char *to)
-{
-    const size_t size = points->real == HS_FLOAT32 ? sizeof(float) : sizeof(double);
-    const size_t row_size = size * (size_t)points->ndim;
-    const bool   packed = points->column_stride == (ptrdiff_t)size || points->ndim == 1;
-    to += (size_t)first * row_size;
-    if (packed && points->row_stride == (ptrdiff_t)row_size) {
-        memcpy(to, (const char *)points->data + first * points->row_stride,
-               (size_t)(last - first) * row_size);
-        return;
-    }
-    for (int64_t i = first; i < last; i++) { /* no address behind the last point: it may overflow */
-        const char *row = (const char *)points->data + i * points->row_stride;
-        for (int k = 0; k < points->ndim; k++, to += size) {
-            memcpy(to, row + k * points->column_stride, size);
-        }
-    }
-}
-
-/* Largest |x| of entries [first, last), or NaN if one is not finite. */
-static double
-find_largest(const void *rows, hs_real real, int64_t first, int64_t last)
-{
-    enum { TILE = 512 };
-    hs_range range = HS_NO_RANGE;
-    double   wide[TILE];
-    if (real == HS_FLOAT64) {
-        hs_range_widen((const double *)rows + first, last - first, &range);
-    }
-    for (int64_t e = first; real == HS_FLOAT32 && e < last; e += TILE) {
-        const int n = last - e < TILE ? (int)(last - e) : TILE;
-        for (int at = 0; at < n; at++) {
-            wide[at] = (double)((const float *)rows)[e + at];
-        }
-        hs_range_widen(wide, n, &range);
-    }
-    return hs_larger(hs_larger(-range.lower, range.upper), 0.0) + range.poison;
-}
-
 hs_status
 hs_frame_take(const hs_points *points, const hs_box *box, const hs_options *options,
               hs_frame *frame, hs_failure *failure)
@@ -1328,21 +1224,43 @@ hs_frame_take(const hs_points *points, const hs_box *box, const hs_options *opti
     if (box != NULL) {
         frame->box = *box;
     }
+    enum { TILE = 512 };
     const int64_t d = points->ndim;
-    frame->largest = 0.0;
+    const bool    packed = (points->column_stride == (ptrdiff_t)size || d == 1) &&
+                        points->row_stride == (ptrdiff_t)row_size;
+    hs_range range = HS_NO_RANGE;
     for (int64_t first = 0; first < points->n; first += HS_POLL_POINTS) {
         const int64_t left = points->n - first;
         const int64_t last = first + (left < HS_POLL_POINTS ? left : HS_POLL_POINTS);
-        copy_rows(points, first, last, rows);
-        const double largest = find_largest(rows, points->real, first * d, last * d);
-        if (!isfinite(largest)) {
+        const char   *from = (const char *)points->data + first * points->row_stride;
+        char         *to = (char *)rows + (size_t)first * row_size;
+        if (packed) {
+            memcpy(to, from, (size_t)(last - first) * row_size);
+        }
+        for (int64_t i = 0; !packed && i < last - first; i++) {
+            for (int k = 0; k < d; k++, to += size) {
+                memcpy(to, from + i * points->row_stride + k * points->column_stride, size);
+            }
+        }
+        if (points->real == HS_FLOAT64) {
+            hs_range_widen((const double *)rows + first * d, (last - first) * d, &range);
+        }
+        for (int64_t e = first * d; points->real == HS_FLOAT32 && e < last * d; e += TILE) {
+            double    wide[TILE];
+            const int n = last * d - e < TILE ? (int)(last * d - e) : TILE;
+            for (int at = 0; at < n; at++) {
+                wide[at] = (double)((const float *)rows)[e + at];
+            }
+            hs_range_widen(wide, n, &range);
+        }
+        if (range.poison != 0.0) {
             return hs_points_check_finite(&frame->points, failure);
         }
-        frame->largest = hs_larger(largest, frame->largest);
         if (left > HS_POLL_POINTS && hs_poll(options, 0.0) != HS_OK) {
             return HS_ERR_INTERRUPTED;
         }
     }
+    frame->largest = hs_larger(hs_larger(-range.lower, range.upper), 0.0);
     return HS_OK;
 }
 

@@ -32,10 +32,9 @@ typedef struct hs_scene {
     hs_metric metric;          /* decides on X, or on the originals if there are any */
     hs_cloud  cloud;           /* its columns are X, in the caller's order, once that is known */
     bool      keeps_originals; /* X does not hold every digit */
-    double   *originals[HS_MAX_DIM]; /* n each: the points as given */
-    bool      x_is_beside;           /* the originals stayed in cloud.block, X is in `beside` */
+    double   *originals[HS_MAX_DIM]; /* n each, in cloud.block: the points as given. X is beside */
     hs_turns  turns;                 /* known if shifts or originals need them */
-    void     *beside;            /* owned; the columns of originals and turns, one behind another */
+    void     *beside; /* owned; the columns of such an X and of turns, one behind another */
     double    lower[HS_MAX_DIM]; /* range of t_k that the grid covers: the points, the period */
     double    upper[HS_MAX_DIM];
     double    x_largest[HS_MAX_DIM]; /* at least the largest |X_k| */

@@ -62,11 +62,12 @@ partners_open(const hs_selection *selection, int64_t n_asking, int64_t n_points,
 }
 
 hs_status
-hs_choice_set_box(const hs_box *box, int ndim, hs_choice *choice)
+hs_choice_set_box(const hs_box *box, int ndim, hs_choice *choice, hs_failure *failure)
 {
-    const hs_status   status = hs_image_box_init(box, ndim, &choice->images);
     const hs_lattice *lattice = &choice->images.lattice;
     double            shortest = INFINITY;
+    hs_status         status = hs_box_check(box, failure);
+    status = status == HS_OK ? hs_image_box_init(box, ndim, &choice->images) : status;
     if (status != HS_OK) {
         return status;
     }
@@ -129,10 +130,7 @@ hs_choice_set_scene(const hs_sets *sets, const hs_box *box, double cutoff, hs_ca
     if (choice == NULL || !hs_choice_excludes(choice)) {
         return HS_OK;
     }
-    hs_status status = hs_box_check(box, failure);
-    if (status == HS_OK) {
-        status = hs_choice_set_box(box, sets->points->ndim, choice);
-    }
+    const hs_status status = hs_choice_set_box(box, sets->points->ndim, choice, failure);
     return status == HS_OK && hs_choice_compares(choice, cutoff)
                ? hs_choice_keep_points(sets, call, failure)
                : status;
@@ -248,23 +246,12 @@ hs_choice_cut(const hs_choice *all, int64_t first_point, int64_t first_query, hs
     cut_cloud(first_point, &part->cloud);
 }
 
-/* One loop without branches for each test; it writes each hit, and goes on behind those that
- * stay. */
-
 HS_ALWAYS_INLINE bool
-is_left_out(const hs_asking *asking, int32_t id, const hs_label_test test)
+is_left_out(const hs_asking *asking, int32_t id)
 {
-    const int64_t one = test != HS_OF_PARTNER ? asking->label[id] : 0, own = asking->own;
-    if (test == HS_OF_OTHER_GROUP) {
-        return one != own;
-    }
-    if (test == HS_OF_EQUAL_LABEL) {
-        return one == own && id != asking->itself;
-    }
-    if (test == HS_OF_NEAR_LABEL) { /* their difference may pass int64 */
-        const uint64_t more = one > own ? (uint64_t)one - (uint64_t)own
-                                        : (uint64_t)own - (uint64_t)one;
-        return more <= asking->within && id != asking->itself;
+    if (asking->label != NULL) {
+        const uint64_t more = (uint64_t)asking->label[id] - asking->least;
+        return (more <= asking->width) & (id != asking->itself);
     }
     const int32_t number = id + asking->origin, *partner = asking->partner;
     int64_t       first = 0, n = asking->n_partners;
@@ -284,17 +271,22 @@ hs_chooser_set(const hs_choice *choice, int32_t asking, hs_chooser *chooser)
 {
     const int32_t point =
         choice->number != NULL ? (int32_t)(choice->number[asking] - choice->origin) : asking;
-    *chooser = (hs_chooser){.choice = choice, .point = point, .test = HS_OF_PARTNER};
+    *chooser = (hs_chooser){.choice = choice, .point = point};
     chooser->excluding.itself = choice->has_queries ? -1 : point;
     if (choice->group != NULL) {
+        const uint64_t own = (uint64_t)choice->asking_group[point];
+        chooser->of_group.itself = -1;
         chooser->of_group.label = choice->group;
-        chooser->of_group.own = choice->asking_group[point];
+        chooser->of_group.least = own + 1; /* and all others */
+        chooser->of_group.width = UINT64_MAX - 1;
     }
     if (choice->label != NULL) {
+        const int64_t own = choice->asking_label[point], within = (int64_t)choice->within;
+        const int64_t least = own < INT64_MIN + within ? INT64_MIN : own - within;
+        const int64_t most = own > INT64_MAX - within ? INT64_MAX : own + within;
         chooser->excluding.label = choice->label;
-        chooser->excluding.own = choice->asking_label[point];
-        chooser->excluding.within = choice->within;
-        chooser->test = choice->within == 0 ? HS_OF_EQUAL_LABEL : HS_OF_NEAR_LABEL;
+        chooser->excluding.least = (uint64_t)least;
+        chooser->excluding.width = (uint64_t)most - (uint64_t)least;
         chooser->excludes = true;
     } else if (choice->partners.first != NULL) {
         const int64_t *first = choice->partners.first + point;
@@ -309,89 +301,52 @@ hs_chooser_set(const hs_choice *choice, int32_t asking, hs_chooser *chooser)
     }
 }
 
-HS_ALWAYS_INLINE int32_t
-keep_chosen(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, int32_t from,
-            int32_t end, int32_t to, const hs_label_test test)
+bool
+hs_chooser_is_of_group(const hs_chooser *chooser, int32_t number)
 {
-    int32_t *hits = scan->hits;
-    float   *squares = scan->squares;
+    return chooser->of_group.label == NULL || !is_left_out(&chooser->of_group, number);
+}
+
+bool
+hs_chooser_excludes(const hs_chooser *chooser, int32_t number)
+{
+    return chooser->excludes && is_left_out(&chooser->excluding, number);
+}
+
+/* The number of a hit in the caller's order. */
+HS_ALWAYS_INLINE int32_t
+number_of(const hs_scanner *scanner, int32_t hit)
+{
+    const hs_block *block = &scanner->block;
+    return block->id[scanner->is_ordered ? block->origin[hit] : hit];
+}
+
+/* Moves hits [from, end) that are not left out to `to`, which is not behind them; returns where
+ * they end. Writes each hit, and goes on behind those that stay. */
+static int32_t
+keep_by_label(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, int32_t from,
+              int32_t end, int32_t to)
+{
+    const hs_asking by = *asking; /* which no store to hits changes */
+    int32_t        *hits = scan->hits;
+    float          *squares = scan->squares;
     for (int32_t h = from; h < end; h++) {
         const int32_t hit = hits[h];
         hits[to] = hit;
         if (squares != NULL) {
             squares[to] = squares[h];
         }
-        to += !is_left_out(asking, hs_hit_number(scanner, hit), test);
+        to += !is_left_out(&by, number_of(scanner, hit));
     }
     return to;
 }
 
-bool
-hs_chooser_is_of_group(const hs_chooser *chooser, int32_t number)
-{
-    return chooser->of_group.label == NULL ||
-           !is_left_out(&chooser->of_group, number, HS_OF_OTHER_GROUP);
-}
-
-bool
-hs_chooser_excludes(const hs_chooser *chooser, int32_t number)
-{
-    const hs_asking *asking = &chooser->excluding;
-    if (!chooser->excludes) {
-        return false;
-    }
-    switch (chooser->test) {
-    case HS_OF_EQUAL_LABEL: return is_left_out(asking, number, HS_OF_EQUAL_LABEL);
-    case HS_OF_NEAR_LABEL: return is_left_out(asking, number, HS_OF_NEAR_LABEL);
-    default: return is_left_out(asking, number, HS_OF_PARTNER);
-    }
-}
-
-/* Moves hits [from, end) that the test does not leave out to `to`, which is not behind them;
- * returns where they end. */
-static int32_t
-keep_by_label(const hs_scanner *scanner, hs_scan *scan, const hs_asking *asking, int32_t from,
-              int32_t end, int32_t to, hs_label_test test)
-{
-    switch (test) {
-    case HS_OF_OTHER_GROUP:
-        return keep_chosen(scanner, scan, asking, from, end, to, HS_OF_OTHER_GROUP);
-    case HS_OF_EQUAL_LABEL:
-        return keep_chosen(scanner, scan, asking, from, end, to, HS_OF_EQUAL_LABEL);
-    case HS_OF_NEAR_LABEL:
-        return keep_chosen(scanner, scan, asking, from, end, to, HS_OF_NEAR_LABEL);
-    default: return keep_chosen(scanner, scan, asking, from, end, to, HS_OF_PARTNER);
-    }
-}
-
 /* Labels are compared for all hits, one point after the other. Where that leaves images or
- * distances open, a batch of hits is looked up: of distances, those that float32 cannot tell. */
+ * distances open, these hits are decided: of distances, those that float32 cannot tell. */
 
 /* Candidates that could be tested while the nearest image of a pair is found: a microsecond, some
  * of them in many dimensions. */
 #define WORK_OF_IMAGE 1024
-
-/* Hits of one point that are looked up together. */
-typedef struct hit_batch {
-    hs_scanner *scanner;
-    int32_t     t, point; /* the asking point: of the group, and as the caller numbers it */
-    int32_t     n;
-    int32_t     hit[HS_BATCH];   /* where among the scan's hits */
-    int32_t     place[HS_BATCH]; /* of the candidates */
-    int32_t     id[HS_BATCH];    /* and their numbers */
-    uint8_t     drop[HS_BATCH];  /* 0 or 1 */
-} hit_batch;
-
-/* Looks up the pairs of the batch. */
-static hs_status
-look_up_batch(hit_batch *batch, bool metric)
-{
-    hs_scanner *scanner = batch->scanner;
-    hs_pair_batch_clear(&scanner->pair_batch);
-    (void)hs_pair_batch_add(&scanner->pair_batch, scanner->group.first + batch->t, batch->place,
-                            batch->n);
-    return hs_pair_batch_look_up(&scanner->pair_batch, metric, &scanner->failed_point);
-}
 
 static void
 point_of(const hs_cloud *cloud, int32_t point, double *x)
@@ -420,132 +375,84 @@ hs_choice_is_nearest(const hs_choice *choice, int32_t point, int32_t number, int
     return status;
 }
 
-/* Drops the pairs of the batch, which are excluded, that are in their nearest image. */
-static hs_status
-drop_nearest(const hs_choice *choice, hit_batch *batch)
+/* The asking point of pair e of the scanner's batch, and the other one, as the choice numbers
+ * them. */
+static int32_t
+asking_of(const hs_scanner *scanner, int32_t e)
 {
-    hs_scanner *scanner = batch->scanner;
-    int64_t     shift[HS_MAX_DIM];
-    hs_status   status = look_up_batch(batch, false);
-    scanner->work_since_poll += WORK_OF_IMAGE * (int64_t)batch->n;
-    for (int32_t e = 0; status == HS_OK && e < batch->n; e++) {
-        bool nearest;
-        for (int r = 0; r < scanner->pair_batch.n_rows; r++) {
-            shift[r] = scanner->pair_batch.given[r][e];
+    const hs_choice *choice = scanner->search->call->choice;
+    const int32_t    asking = hs_search_asking(scanner->search)->order[scanner->pair_batch.si[e]];
+    return choice->number != NULL ? (int32_t)(choice->number[asking] - choice->origin) : asking;
+}
+
+static int32_t
+other_of(const hs_scanner *scanner, int32_t e)
+{
+    return scanner->block.id[scanner->pair_batch.place[e]];
+}
+
+/* A hs_decide_fn: excluded pairs stay unless they are in their nearest image. */
+static hs_status
+decide_images(hs_scanner *scanner, uint8_t *stays)
+{
+    const hs_pair_batch *pairs = &scanner->pair_batch;
+    hs_status            status = HS_OK;
+    scanner->work_since_poll += WORK_OF_IMAGE * (int64_t)pairs->n;
+    for (int32_t e = 0; status == HS_OK && e < pairs->n; e++) {
+        int64_t shift[HS_MAX_DIM];
+        bool    nearest;
+        for (int r = 0; r < pairs->n_rows; r++) {
+            shift[r] = pairs->given[r][e];
         }
-        status = hs_choice_is_nearest(choice, batch->point, batch->id[e], shift, &nearest);
+        status = hs_choice_is_nearest(scanner->search->call->choice, asking_of(scanner, e),
+                                      other_of(scanner, e), shift, &nearest);
         if (status != HS_OK) {
-            scanner->failed_point = batch->point;
+            scanner->failed_point = hs_search_asking(scanner->search)->order[pairs->si[e]];
         }
-        batch->drop[e] = nearest;
+        stays[e] = !nearest;
     }
     return status;
 }
 
-/* Drops the pairs of the batch that are nearer than the least distance. */
+/* A hs_decide_fn: pairs stay that are not nearer than the least distance, and the point itself. */
 static hs_status
-drop_near(const hs_choice *choice, hit_batch *batch)
+decide_nearness(hs_scanner *scanner, uint8_t *stays)
 {
-    hs_scanner     *scanner = batch->scanner;
-    const hs_scene *scene = &scanner->search->scene;
-    const hs_status status = look_up_batch(batch, true);
-    hs_metric       nearer;
-    if (status != HS_OK) {
-        return status;
-    }
+    const hs_scene      *scene = &scanner->search->scene;
+    const hs_choice     *choice = scanner->search->call->choice;
+    const hs_pair_batch *pairs = &scanner->pair_batch;
+    hs_metric            nearer;
     hs_metric_init(&nearer, scene->metric.ndim, scene->metric.n_rows,
                    (const double(*)[HS_MAX_DIM])scene->metric.rows, hs_choice_least(choice, scene),
                    false);
-    hs_decide_pair_batch(scanner, &nearer, batch->drop);
-    for (int32_t e = 0; e < batch->n; e++) {
-        const hs_pair_batch *pairs = &scanner->pair_batch;
-        bool                 is_itself = !choice->has_queries && batch->id[e] == batch->point;
+    hs_decide_pair_batch(scanner, &nearer, stays);
+    for (int32_t e = 0; e < pairs->n; e++) {
+        bool is_itself = !choice->has_queries && other_of(scanner, e) == asking_of(scanner, e);
         for (int r = 0; r < pairs->n_rows && pairs->is_shifted; r++) {
             is_itself = is_itself && pairs->times[r][e] == 0.0;
         }
-        batch->drop[e] = batch->drop[e] && !is_itself;
+        stays[e] = !stays[e] || is_itself;
     }
     return HS_OK;
 }
 
-#define DROPPED (-1) /* in place of a hit */
-
-/* Drops those of hits [from, end) of a point that are excluded and in their nearest image,
- * by_image, or nearer than the least distance: float32 squares beyond `out` are not. *left: where
- * the others end. */
-static hs_status
-drop_hits(const hs_chooser *chooser, bool by_image, float out, int32_t from, int32_t end,
-          hit_batch *batch, hs_scan *scan, int32_t *left)
+/* Which hits of a point, from `from` on, are to be decided: with `excluding` those that it leaves
+ * out, whose images are compared; without it those whose float32 squares are not beyond `out`. */
+static void
+look_for_open(const hs_scanner *scanner, const hs_asking *excluding, float out, int32_t from,
+              int32_t t, hs_scan *scan)
 {
-    const hs_scanner *scanner = batch->scanner;
-    hs_status         status = HS_OK;
-    batch->n = 0;
-    for (int32_t h = from; status == HS_OK && h < end; h++) {
-        const int32_t hit = scan->hits[h], id = hs_hit_number(scanner, hit);
+    for (int32_t h = from; h < scan->end[t]; h++) {
+        const int32_t hit = scan->hits[h];
         float         square = 0.0f;
-        for (int k = 0; !by_image && k < scanner->search->scene.ndim; k++) {
-            const float along = scanner->block.y[k][hit] - scanner->group.q[k][batch->t];
+        for (int k = 0; excluding == NULL && k < scan->ndim; k++) {
+            const float along = scan->y[k][hit] - scan->q[k][t];
             square += along * along;
         }
-        if (by_image ? hs_chooser_excludes(chooser, id) : !(square > out)) {
-            batch->hit[batch->n] = h;
-            batch->place[batch->n] = hs_hit_place(scanner, hit);
-            batch->id[batch->n++] = id;
-        }
-        if (batch->n == 0 || (batch->n < HS_BATCH && h + 1 < end)) {
-            continue;
-        }
-        status = by_image ? drop_nearest(chooser->choice, batch)
-                          : drop_near(chooser->choice, batch);
-        for (int32_t e = 0; status == HS_OK && e < batch->n; e++) {
-            if (batch->drop[e]) {
-                scan->hits[batch->hit[e]] = DROPPED;
-            }
-        }
-        batch->n = 0;
-    }
-    *left = from;
-    for (int32_t h = from; h < end; h++) {
-        const int32_t hit = scan->hits[h];
-        scan->hits[*left] = hit;
-        if (scan->squares != NULL) {
-            scan->squares[*left] = scan->squares[h];
-        }
-        *left += hit != DROPPED;
-    }
-    return status;
-}
-
-/* Chooses among hits [from, scan->end[t]) of a point, and moves those that count to `to`; *end:
- * where they end. */
-static hs_status
-choose_of_point(const hs_chooser *chooser, hit_batch *batch, hs_scan *scan, float out, int32_t from,
-                int32_t to, int32_t *end)
-{
-    const hs_scanner *scanner = batch->scanner;
-    const hs_choice  *choice = chooser->choice;
-    const size_t      n = (size_t)(scan->end[batch->t] - from);
-    hs_status         status = HS_OK;
-    *end = to + (int32_t)n;
-    if (chooser->of_group.label != NULL) {
-        *end = keep_by_label(scanner, scan, &chooser->of_group, from, scan->end[batch->t], to,
-                             HS_OF_OTHER_GROUP);
-    } else if (to < from) { /* without groups all are moved */
-        memmove(scan->hits + to, scan->hits + from, n * sizeof *scan->hits);
-        if (scan->squares != NULL) {
-            memmove(scan->squares + to, scan->squares + from, n * sizeof *scan->squares);
+        if (excluding != NULL ? is_left_out(excluding, number_of(scanner, hit)) : !(square > out)) {
+            scan->unsure[scan->n_unsure++] = (hs_unsure){t, hit, h};
         }
     }
-    const bool compares = hs_choice_compares(choice, scanner->options.cutoff);
-    if (chooser->excludes && !compares) {
-        *end = keep_by_label(scanner, scan, &chooser->excluding, to, *end, to, chooser->test);
-    } else if (chooser->excludes) {
-        status = drop_hits(chooser, true, out, to, *end, batch, scan, end);
-    }
-    if (status == HS_OK && choice->min_distance > 0.0) {
-        status = drop_hits(chooser, false, out, to, *end, batch, scan, end);
-    }
-    return status;
 }
 
 hs_status
@@ -553,34 +460,57 @@ hs_choose(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
 {
     const hs_search *search = scanner->search;
     const hs_choice *choice = search->call->choice;
-    const hs_bins   *asking = hs_search_asking(search);
-    hit_batch        batch = {.scanner = scanner};
+    const bool       compares = hs_choice_compares(choice, scanner->options.cutoff);
     int32_t          kept = 0, from = 0;
-    hs_status        status = HS_OK;
-    float            out = INFINITY; /* squares beyond this are at least the least distance apart */
-    if (choice->min_distance > 0.0 && !search->scene.extreme) {
-        out = hs_thresholds_of(search->scene.ndim, hs_choice_least(choice, &search->scene),
-                               scanner->form->extent, search->filter_error)
-                  .out;
-    }
-    for (int32_t t = first; status == HS_OK && t < next; t++) {
-        const int32_t end = scan->end[t];
-        hs_chooser    chooser;
-        hs_chooser_set(choice, asking->order[scanner->group.first + t], &chooser);
-        batch.t = t;
-        batch.point = chooser.point;
-        status = choose_of_point(&chooser, &batch, scan, out, from, kept, &kept);
-        from = end;
-        scan->end[t] = kept;
+    scan->n_unsure = 0;
+    for (int32_t t = first, end; t < next; t++, from = end) {
+        int32_t    at = from, left = end = scan->end[t]; /* its hits, before they are moved */
+        hs_chooser chooser;
+        hs_chooser_set(choice, hs_search_asking(search)->order[scanner->group.first + t], &chooser);
+        if (chooser.of_group.label != NULL) {
+            left = keep_by_label(scanner, scan, &chooser.of_group, at, left, kept);
+            at = kept;
+        }
+        if (chooser.excludes && !compares) {
+            left = keep_by_label(scanner, scan, &chooser.excluding, at, left, kept);
+            at = kept;
+        }
+        if (at > kept) {
+            const size_t n = (size_t)(left - at);
+            memmove(scan->hits + kept, scan->hits + at, n * sizeof *scan->hits);
+            if (scan->squares != NULL) {
+                memmove(scan->squares + kept, scan->squares + at, n * sizeof *scan->squares);
+            }
+        }
+        scan->end[t] = kept + left - at;
+        if (chooser.excludes && compares) {
+            look_for_open(scanner, &chooser.excluding, 0.0f, kept, t, scan);
+        }
+        kept = scan->end[t];
     }
     scan->n_hits = kept;
-    /* Hits as the visitor gets them. */
-    for (int32_t h = 0; scanner->use == HS_BLOCK_LISTS_IDS && h < kept; h++) {
-        scan->hits[h] = hs_hit_number(scanner, scan->hits[h]);
+    hs_status status = hs_scanner_decide(scanner, scan, first, next, decide_images);
+    if (status == HS_OK && choice->min_distance > 0.0) {
+        float out = INFINITY; /* squares beyond this are at least the least distance apart */
+        if (!search->scene.extreme) {
+            out = hs_thresholds_of(search->scene.ndim, hs_choice_least(choice, &search->scene),
+                                   scanner->form->extent, search->filter_error)
+                      .out;
+        }
+        scan->n_unsure = 0;
+        for (int32_t t = first; t < next; t++) {
+            look_for_open(scanner, NULL, out, t > first ? scan->end[t - 1] : 0, t, scan);
+        }
+        status = hs_scanner_decide(scanner, scan, first, next, decide_nearness);
     }
-    for (int32_t h = 0; scanner->use == HS_BLOCK_LISTS_PLACES && scanner->is_ordered && h < kept;
-         h++) {
-        scan->hits[h] = hs_hit_place(scanner, scan->hits[h]);
+    /* Hits as the visitor gets them. */
+    for (int32_t h = 0; scanner->use == HS_BLOCK_LISTS_IDS && h < scan->n_hits; h++) {
+        scan->hits[h] = number_of(scanner, scan->hits[h]);
+    }
+    if (scanner->use == HS_BLOCK_LISTS_PLACES && scanner->is_ordered) {
+        for (int32_t h = 0; h < scan->n_hits; h++) {
+            scan->hits[h] = scanner->block.origin[scan->hits[h]];
+        }
     }
     return status;
 }

@@ -62,8 +62,9 @@ hs_choice_excludes(const hs_choice *choice)
     return choice->label != NULL || choice->partners.first != NULL;
 }
 
-/* The box of a choice that excludes pairs, in place of one before: HS_OK or HS_ERR_BOX_SKEWED. */
-hs_status hs_choice_set_box(const hs_box *box, int ndim, hs_choice *choice);
+/* The box of a choice that excludes pairs, in place of one before: HS_ERR_BOX_SKEWED, or a status
+ * of hs_box_check. */
+hs_status hs_choice_set_box(const hs_box *box, int ndim, hs_choice *choice, hs_failure *failure);
 
 /* The part of a choice for points from first_point on and queries from first_query on, which are
  * numbered from 0; it borrows all that it has. */
@@ -125,23 +126,15 @@ hs_choice_least(const hs_choice *choice, const hs_scene *scene)
 hs_status hs_choose(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next);
 
 /*
- * Which hits of a point their labels leave out: those of another group; those whose label is equal
- * or near, or that are among the point's partners, for excluded pairs.
+ * Which hits of a point their labels leave out: those of another group; for excluded pairs those
+ * whose label is in a range around the point's, or that are among its partners.
  */
 
-/* By what hits of a point are left out. */
-typedef enum hs_label_test {
-    HS_OF_OTHER_GROUP,
-    HS_OF_EQUAL_LABEL,
-    HS_OF_NEAR_LABEL,
-    HS_OF_PARTNER
-} hs_label_test;
-
+/* What one asking point leaves out: labels from `least` on to `width` more, modulo 2^64. */
 typedef struct hs_asking {
     int32_t        itself; /* its number, where it may be among its hits; else -1 */
-    const int64_t *label;  /* of all points: groups, or what excludes */
-    int64_t        own;
-    uint64_t       within;
+    const int64_t *label;  /* of all points: groups, or what excludes; NULL: partners exclude */
+    uint64_t       least, width;
     const int32_t *partner; /* ascending */
     int32_t        origin;  /* that partners count from */
     int64_t        n_partners;
@@ -154,8 +147,7 @@ typedef struct hs_chooser {
     int32_t          point;     /* the asking one: its number among the points, or the queries */
     hs_asking        of_group;  /* label NULL: there are no groups */
     hs_asking        excluding; /* if `excludes` */
-    hs_label_test    test;
-    bool             excludes; /* some pairs of this point are excluded, in their nearest image */
+    bool             excludes;  /* some pairs of this point are excluded, in their nearest image */
 } hs_chooser;
 
 /* asking: in the order of the call. */
@@ -171,19 +163,5 @@ bool hs_chooser_excludes(const hs_chooser *chooser, int32_t number);
  * choice that compares. Any status of hs_near_image. */
 hs_status hs_choice_is_nearest(const hs_choice *choice, int32_t point, int32_t number,
                                int64_t *shift, bool *nearest);
-
-/* The candidate that a hit is: its place in the block as it was gathered. */
-HS_ALWAYS_INLINE int32_t
-hs_hit_place(const hs_scanner *scanner, int32_t hit)
-{
-    return scanner->is_ordered ? scanner->block.origin[hit] : hit;
-}
-
-/* Its number in the caller's order. */
-HS_ALWAYS_INLINE int32_t
-hs_hit_number(const hs_scanner *scanner, int32_t hit)
-{
-    return scanner->block.id[hs_hit_place(scanner, hit)];
-}
 
 #endif

@@ -22,27 +22,31 @@
  * fewer candidates than a burst have room for one hit each and a burst. */
 #define HITS_PER_CANDIDATE 2
 
-/* Room for so many candidates and runs at a time, with n_radii numbers of each candidate that its
- * pairs are compared with, and room to sort them in where they are put in order. */
+/* Room for so many candidates and runs at a time: with numbers of each candidate that its pairs are
+ * compared with, and room to sort them in where they are put in order. */
 static hs_status
-block_init(hs_account *account, int ndim, hs_block_use use, int32_t most, int32_t most_runs,
-           int32_t n_radii, bool is_ordered, hs_block *block)
+block_init(hs_scanner *scanner, int32_t most, int32_t most_runs)
 {
-    const int64_t capacity = (int64_t)most + HS_PADDING;
-    const bool    has_squares = use == HS_BLOCK_LISTS_SQUARES;
-    hs_order     *order = &block->order;
-    hs_parts      parts;
+    const hs_search   *search = scanner->search;
+    hs_account        *account = &search->call->account;
+    const hs_block_use use = scanner->scans;
+    const int64_t      capacity = (int64_t)most + HS_PADDING;
+    const int64_t      n_radii = search->limits != NULL ? hs_limits_rows(search) : 0;
+    const bool         has_squares = use == HS_BLOCK_LISTS_SQUARES;
+    hs_block          *block = &scanner->block;
+    hs_order          *order = &block->order;
+    hs_parts           parts;
     *block = (hs_block){.capacity = most, .most_runs = most_runs, .pitch = capacity};
     block->most_hits = most < HS_BURST ? most + HS_BURST : HITS_PER_CANDIDATE * most;
     const int64_t hits = (int64_t)block->most_hits + HS_PADDING;
     hs_parts_begin(&parts);
-    for (int k = 0; k < ndim; k++) {
+    for (int k = 0; k < search->scene.ndim; k++) {
         hs_parts_add(&parts, (void **)&block->y[k], capacity, sizeof(float));
     }
-    hs_parts_add(&parts, (void **)&block->norm, capacity, sizeof(float));
     hs_parts_add(&parts, (void **)&block->id, capacity, sizeof(int32_t));
     hs_parts_add(&parts, (void **)&block->number, capacity, sizeof(int32_t));
-    hs_parts_add(&parts, (void **)&block->unsure, capacity, sizeof(hs_unsure));
+    hs_parts_add(&parts, (void **)&block->unsure, scanner->chooses ? hits : capacity,
+                 sizeof(hs_unsure));
     hs_parts_add(&parts, (void **)&block->runs, (int64_t)most_runs + 1, sizeof(hs_run));
     if (use != HS_BLOCK_COUNTS) {
         hs_parts_add(&parts, (void **)&block->hits, hits, sizeof(int32_t));
@@ -57,7 +61,7 @@ block_init(hs_account *account, int ndim, hs_block_use use, int32_t most, int32_
         hs_parts_add(&parts, (void **)&block->radius, n_radii * capacity, sizeof(float));
     }
     block->memory = hs_parts_alloc(account, HS_FOR_CANDIDATES, &parts);
-    if (block->memory == NULL || !is_ordered) {
+    if (block->memory == NULL || !scanner->is_ordered) {
         return block->memory != NULL ? HS_OK : HS_ERR_MEMORY;
     }
     hs_parts_begin(&parts);
@@ -191,8 +195,8 @@ order_block(hs_scanner *scanner)
     for (int32_t c = 0; scanner->scans == HS_BLOCK_LISTS_IDS && c < n; c++) {
         block->id[c] = (int32_t)(sorted[c] >> 32);
     }
-    for (int k = 0; k <= lattice->ndim; k++) {
-        float *values = k < lattice->ndim ? block->y[k] : block->norm;
+    for (int k = 0; k < lattice->ndim; k++) {
+        float *values = block->y[k];
         for (int32_t c = 0; c < n; c++) {
             column[c] = values[origin[c]];
         }
@@ -221,115 +225,138 @@ has_plain_shifts(const hs_lattice *lattice)
     return true;
 }
 
-/* Whether every S of the scene is the sum of an image and of turns that are known to be few. */
+/* Whether every S of the scene is the sum of an image and of turns that are known to be few, over B
+ * and over the box vectors as given. Where these differ, writers measure by S alone. */
 static bool
 has_narrow_shifts(const hs_search *search)
 {
-    const hs_scene *scene = &search->scene;
+    const hs_scene   *scene = &search->scene;
+    const hs_lattice *lattice = &scene->lattice;
+    double            most = MOST_FEW;
+    for (int l = 0; l < lattice->n_periodic; l++) {
+        double sum = 0.0;
+        for (int r = 0; r < lattice->n_periodic; r++) {
+            sum += fabs((double)lattice->U[r][l]);
+        }
+        most = hs_smaller(most, MOST_FEW / sum); /* no row of zeros: B is a basis */
+    }
     for (int k = 0; k < scene->ndim; k++) {
-        if (scene->lattice.row_of_axis[k] >= 0 &&
-            search->grid.reach[k] / search->grid.shape[k] >= MOST_FEW) {
+        if (lattice->row_of_axis[k] >= 0 &&
+            !((double)(search->grid.reach[k] / search->grid.shape[k]) < most)) {
             return false;
         }
     }
-    return has_plain_shifts(&scene->lattice) &&
-           (!search->bins.turns.known ||
-            hs_fold_turns(&scene->lattice, scene->cloud.largest) < MOST_FEW);
+    return (has_plain_shifts(lattice) || search->bins.keeps_originals) &&
+           (!search->bins.turns.known || hs_fold_turns(lattice, scene->cloud.largest) < most);
 }
 
-/* Looks at the runs of the block once. */
-bool
-hs_records_has_images(hs_records *records)
+/* hs_candidates_fn in two or three dimensions. */
+HS_ALWAYS_INLINE bool
+load_moved(const hs_search *search, const hs_candidate_run *run, hs_candidate *to)
 {
-    int32_t any = 0;
-    if (!records->knows_images) {
-        for (const hs_run *run = records->block->runs; run->at < records->block->n; run++) {
-            for (int r = 0; r < records->search->bins.n_periodic; r++) {
-                any |= run->image[r];
-            }
-        }
-        records->knows_images = true;
-        records->has_images = any != 0;
+    const int d = search->bins.ndim;
+    bool      are_fine = run->moved.is_fine;
+    if (d == HS_WRITE_MOST_DIM) {
+        return search->call->kernel->candidates(run, to) && are_fine;
     }
-    return records->has_images;
-}
-
-/* Candidates of one run. Returns whether they are fine. */
-static bool
-load_halved(hs_records *records, const hs_run *run, int32_t n, const int32_t *base, hs_halving by)
-{
-    const hs_search *search = records->search;
-    const hs_bins   *bins = &search->bins;
-    const hs_metric *metric = &search->scene.metric;
-    const bool       by_S = bins->keeps_originals;
-    const int        d = bins->ndim, m = bins->n_periodic;
-    const int       *column = search->scene.lattice.vector_of_row;
-    hs_candidate    *to = records->candidates + run->at;
-    hs_candidate_run whole = {.n = n,
-                              .by = by,
-                              .place = records->block->number + run->at,
-                              .number = records->block->id + run->at};
-    int32_t          shift[HS_WRITE_MOST_DIM];
-    bool             are_fine = true;
-    for (int k = 0; k < d; k++) {
-        whole.x[k] = by_S ? bins->originals[k] : bins->x[k];
-    }
-    for (int r = 0; r < m; r++) {
-        whole.turns[column[r]] = bins->turns.known ? bins->turns.narrow[r] : NULL;
-        whole.image[column[r]] = shift[r] = run->image[r];
-    }
-    (void)hs_write_move(metric, by, shift, &whole.moved);
-    if (d == 3 && !by_S) {
-        return search->call->kernel->candidates(&whole, to) && whole.moved.is_fine;
-    }
-    for (int32_t c = 0; c < n; c++) {
-        const int32_t si = whole.place[c];
-        double        q[HS_WRITE_MOST_DIM] = {0.0};
-        int32_t       S[HS_WRITE_MOST_DIM] = {0}, any = 0;
+    for (int32_t c = 0; c < run->n; c++) {
+        double  q[HS_WRITE_MOST_DIM] = {0.0};
+        int32_t S[HS_WRITE_MOST_DIM] = {0};
         for (int k = 0; k < d; k++) {
-            q[k] = whole.x[k][si];
-            S[k] = whole.image[k] - (whole.turns[k] != NULL ? whole.turns[k][si] : 0);
+            q[k] = run->x[k][run->place[c]];
+            S[k] = run->image[k] - (run->turns[k] != NULL ? run->turns[k][run->place[c]] : 0);
         }
-        for (int r = 0; by_S && r < m; r++) {
-            any |= S[column[r]] + base[r] - shift[r];
-        }
-        if (any != 0) { /* from one candidate to the next they seldom differ */
-            for (int r = 0; r < m; r++) {
-                shift[r] = S[column[r]] + base[r];
-            }
-            are_fine = are_fine && whole.moved.is_fine;
-            (void)hs_write_move(metric, by, shift, &whole.moved);
-        }
-        are_fine &= hs_candidate_set(&to[c], q, by, &whole.moved, whole.number[c], S);
+        are_fine &= hs_candidate_set(&to[c], q, run->by, &run->moved, run->number[c], S);
     }
-    return are_fine && whole.moved.is_fine;
+    return are_fine;
+}
+
+/* Whether a point has these turns; m <= HS_WRITE_MOST_DIM. */
+HS_ALWAYS_INLINE bool
+has_same_turns(int32_t *const *turns, int m, int32_t si, const int32_t *own)
+{
+    int32_t any = m > 0 ? turns[0][si] ^ own[0] : 0;
+    any |= m > 1 ? turns[1][si] ^ own[1] : 0;
+    any |= m > 2 ? turns[2][si] ^ own[2] : 0;
+    return any == 0;
+}
+
+/* Candidates of one run; where they are moved by S, those with the same turns at a time: from one
+ * to the next these seldom differ. Returns whether they are fine. */
+static bool
+load_halved(const hs_scanner *scanner, const hs_run *run, int32_t n, const int32_t *base,
+            hs_halving by)
+{
+    const hs_search  *search = scanner->search;
+    const hs_bins    *bins = &search->bins;
+    const hs_lattice *lattice = &search->scene.lattice;
+    const hs_metric  *metric = &search->scene.metric;
+    const int         d = bins->ndim, m = bins->n_periodic, *column = lattice->vector_of_row;
+    int32_t *const   *turns = bins->turns.narrow;
+    const int32_t    *place = scanner->block.number + run->at;
+    bool              are_fine = true;
+    hs_candidate_run  part = {.n = n, .by = by};
+    for (int k = 0; k < d; k++) {
+        part.x[k] = bins->keeps_originals ? bins->originals[k] : bins->x[k];
+    }
+    for (int32_t from = 0, end = n; from < n; from = end) {
+        int32_t shift[HS_WRITE_MOST_DIM] = {0}, own[HS_WRITE_MOST_DIM] = {0};
+        for (int r = 0; r < m; r++) {
+            shift[r] = run->image[r];
+            part.turns[column[r]] = bins->turns.known ? turns[r] : NULL;
+        }
+        if (bins->keeps_originals) {
+            end = from + 1;
+            for (int r = 0; r < m; r++) {
+                own[r] = turns[r][place[from]];
+                shift[r] -= own[r];
+                part.turns[column[r]] = NULL;
+            }
+            while (end < n && has_same_turns(turns, m, place[end], own)) {
+                end++;
+            }
+        }
+        if (!scanner->pair_batch.is_plain) {
+            hs_lattice_few(lattice, shift, shift);
+        }
+        for (int r = 0; r < m; r++) {
+            part.image[column[r]] = shift[r];
+            shift[r] += bins->keeps_originals ? base[r] : 0;
+        }
+        part.n = end - from;
+        part.place = place + from;
+        part.number = scanner->block.id + run->at + from;
+        (void)hs_write_move(metric, by, shift, &part.moved);
+        are_fine &= load_moved(search, &part, scanner->block.candidates + run->at + from);
+    }
+    return are_fine;
 }
 
 hs_status
-hs_records_load_candidates(hs_records *records, const int32_t *base)
+hs_scanner_load_candidates(hs_scanner *scanner, const int32_t *base)
 {
-    const hs_halving by = hs_write_halving(records->search->scene.metric.cutoff);
-    bool             are_fine = true;
+    const hs_halving by = hs_write_halving(scanner->search->scene.metric.cutoff);
+    hs_block        *block = &scanner->block;
     int32_t          unpolled = 0;
-    if (records->has_candidates) {
+    if (block->has_candidates) {
         return HS_OK;
     }
-    for (const hs_run *run = records->block->runs; run->at < records->block->n; run++) {
+    block->are_fine = true;
+    for (const hs_run *run = block->runs; run->at < block->n; run++) {
         const int32_t n = run[1].at - run->at;
         if (n == 0) { /* all of it was left out */
             continue;
         }
-        are_fine &= load_halved(records, run, n, base, by);
+        block->are_fine &= load_halved(scanner, run, n, base, by);
         unpolled += n;
         if (unpolled > HS_POLL_CANDIDATES) {
             unpolled = 0;
-            if (hs_poll(records->polls, 0.0) != HS_OK) {
+            if (hs_poll(&scanner->options, 0.0) != HS_OK) {
                 return HS_ERR_INTERRUPTED;
             }
         }
     }
-    records->has_candidates = true;
-    records->are_fine = are_fine;
+    block->has_candidates = true;
     return HS_OK;
 }
 
@@ -354,22 +381,18 @@ pair_batch_begin(const hs_scanner *scanner, hs_pair_batch *pair_batch)
     pair_batch->n_rows = search->scene.lattice.n_periodic;
     pair_batch->needs_given = needs_shifts(scanner) || search->bins.keeps_originals;
     pair_batch->is_plain = has_plain_shifts(&search->scene.lattice);
-    pair_batch->of = (hs_records){.search = search,
-                                  .block = &scanner->block,
-                                  .polls = &scanner->options,
-                                  .candidates = pair_batch->of.candidates,
-                                  .is_narrow = has_narrow_shifts(search)};
+    pair_batch->block = &scanner->block;
+    pair_batch->is_narrow = has_narrow_shifts(search);
     hs_pair_batch_clear(pair_batch);
 }
 
 static hs_status
-pair_batch_init(const hs_scanner *scanner, hs_pair_batch *pair_batch)
+pair_batch_init(hs_scanner *scanner, hs_pair_batch *pair_batch)
 {
     const hs_search *search = scanner->search;
     const int        d = search->scene.ndim;
     const int64_t    batch = HS_BATCH + HS_BATCH_PADDING;
     hs_parts         parts;
-    pair_batch->of.candidates = NULL;
     pair_batch_begin(scanner, pair_batch);
     hs_parts_begin(&parts);
     hs_parts_add(&parts, (void **)&pair_batch->place, HS_BATCH, sizeof(int32_t));
@@ -385,9 +408,9 @@ pair_batch_init(const hs_scanner *scanner, hs_pair_batch *pair_batch)
             hs_parts_add(&parts, (void **)&pair_batch->given[r], HS_BATCH, sizeof(int64_t));
         }
     }
-    if (needs_shifts(scanner) && pair_batch->of.is_narrow && search->call->kernel->write != NULL &&
+    if (needs_shifts(scanner) && pair_batch->is_narrow && search->call->kernel->write != NULL &&
         d >= 2 && d <= HS_WRITE_MOST_DIM) {
-        hs_parts_add(&parts, (void **)&pair_batch->of.candidates, scanner->block.capacity,
+        hs_parts_add(&parts, (void **)&scanner->block.candidates, scanner->block.capacity,
                      sizeof(hs_candidate));
     }
     pair_batch->memory = hs_parts_alloc(&search->call->account, HS_FOR_CANDIDATES, &parts);
@@ -459,10 +482,10 @@ look_up_given(hs_pair_batch *pair_batch, const int32_t *number)
 hs_status
 hs_pair_batch_look_up(hs_pair_batch *pair_batch, bool metric, int64_t *failed_point)
 {
-    const hs_block *block = pair_batch->of.block;
+    const hs_block *block = pair_batch->block;
     const hs_bins *bins = &pair_batch->search->bins, *asking = hs_search_asking(pair_batch->search);
     const bool     as_given = bins->keeps_originals;
-    const bool     has_images = hs_records_has_images(&pair_batch->of);
+    const bool     has_images = block->has_images;
     const int32_t  n = pair_batch->n, *place = pair_batch->place, *si = pair_batch->si;
     int32_t        number[HS_BATCH];
     int64_t        any = 0, wide = 0;
@@ -579,7 +602,6 @@ set_form(const hs_scanner *scanner, hs_form *form)
     const double     extent = form->extent, error = scanner->search->filter_error;
     const double     low = scene->cutoff_low; /* a scaled cutoff may be known between bounds only */
     const int        d = scene->ndim;
-    form->expanded = (hs_expanded){0.0, 0.0}; /* unless it pays */
     form->kind = by_supports ? HS_SCAN_SUPPORTS : limits != NULL ? HS_SCAN_LIMITS : HS_SCAN_DIRECT;
     /* Supports are decided alike in all precisions: what the filter leaves, by a fixed formula. */
     if (scanner->options.precision == HS_SINGLE && !by_supports) {
@@ -599,12 +621,6 @@ set_form(const hs_scanner *scanner, hs_form *form)
         form->limits = hs_limit_form_of(d, extent, error);
     } else if (scanner->scans == HS_BLOCK_LISTS_SQUARES) {
         form->kind = HS_SCAN_SQUARES;
-    } else if (hs_expanded_pays(scene->cutoff, extent)) {
-        form->kind = HS_SCAN_EXPANDED;
-        form->expanded = hs_expanded_of(d, scene->cutoff, extent, error);
-        if (scene->extreme) {
-            form->expanded.in = low > 0.0 ? hs_expanded_of(d, low, extent, error).in : -INFINITY;
-        }
     }
 }
 
@@ -703,14 +719,12 @@ hs_status
 hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_runs,
                 bool is_ordered, hs_scanner *scanner)
 {
-    const int32_t n_radii = search->limits != NULL ? hs_limits_rows(search) : 0;
     begin(search, use, is_ordered, scanner);
     for (int f = 0; f < HS_FORMS; f++) { /* none is known yet */
         scanner->forms[f].extent = -1.0;
     }
     scanner->pair_batch.memory = NULL; /* freed also when never set */
-    const hs_status status = block_init(&search->call->account, search->scene.ndim, scanner->scans,
-                                        capacity, most_runs, n_radii, is_ordered, &scanner->block);
+    const hs_status status = block_init(scanner, capacity, most_runs);
     return status == HS_OK ? pair_batch_init(scanner, &scanner->pair_batch) : status;
 }
 
@@ -718,20 +732,20 @@ bool
 hs_scanner_renew(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_runs,
                  hs_scanner *scanner)
 {
-    const hs_block    *block = &scanner->block;
-    hs_pair_batch     *pair_batch = &scanner->pair_batch;
-    const int          n_rows = pair_batch->n_rows;
-    const hs_block_use scans = scanner->scans;
-    const bool         has_given = pair_batch->needs_given, was_narrow = pair_batch->of.is_narrow;
-    if (block->memory == NULL || block->radius != NULL || search->limits != NULL ||
-        scanner->search != search || scanner->is_ordered || scanner->use != use ||
-        capacity > block->capacity || most_runs > block->most_runs) {
+    const hs_block *block = &scanner->block;
+    hs_pair_batch  *pair_batch = &scanner->pair_batch;
+    const int       n_rows = pair_batch->n_rows;
+    const bool      has_given = pair_batch->needs_given, was_narrow = pair_batch->is_narrow;
+    if (block->memory == NULL || capacity > block->capacity || most_runs > block->most_runs) {
         return false;
     }
+    HS_ASSERT(scanner->search == search && scanner->use == use && !scanner->is_ordered &&
+              scanner->chooses == (search->call->choice != NULL));
+    HS_ASSERT(search->limits == NULL && block->radius == NULL);
     begin(search, use, false, scanner);
     pair_batch_begin(scanner, pair_batch);
-    return scanner->scans == scans && pair_batch->n_rows == n_rows &&
-           pair_batch->needs_given == has_given && pair_batch->of.is_narrow == was_narrow;
+    return pair_batch->n_rows == n_rows && pair_batch->needs_given == has_given &&
+           pair_batch->is_narrow == was_narrow;
 }
 
 void
@@ -777,13 +791,18 @@ remove_hits(hs_scan *scan, int32_t n, int32_t first, int32_t next, bool are_list
         if (are_listed) {
             const int32_t from = scan->unsure[r].at + 1;
             const int32_t to = r + 1 < n ? scan->unsure[r + 1].at : (int32_t)scan->n_hits;
-            memmove(scan->hits + from - r - 1, scan->hits + from,
-                    (size_t)(to - from) * sizeof *scan->hits);
+            const size_t  between = (size_t)(to - from);
+            memmove(scan->hits + from - r - 1, scan->hits + from, between * sizeof *scan->hits);
+            if (scan->squares != NULL) {
+                memmove(scan->squares + from - r - 1, scan->squares + from,
+                        between * sizeof *scan->squares);
+            }
         }
     }
     for (; t < next; t++) {
         scan->end[t] -= n;
     }
+    scan->n_hits -= n;
 }
 
 /*
@@ -906,15 +925,27 @@ decide_by_supports(hs_scanner *scanner, uint8_t *within)
     }
 }
 
-/* Decides scan->unsure, of the points [first, next) of the group, and takes those that are beyond
- * the cutoff from the hits; the order stays. */
+/* A hs_decide_fn: whether pairs are within what they are compared with. */
 static hs_status
-decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
+decide_within(hs_scanner *scanner, uint8_t *within)
 {
     const hs_limits *limits = scanner->search->limits;
-    hs_pair_batch   *pair_batch = &scanner->pair_batch;
-    int32_t          n_beyond = 0;
-    uint8_t          within[HS_BATCH];
+    if (limits != NULL && limits->supports != NULL) {
+        decide_by_supports(scanner, within);
+    } else if (limits != NULL) {
+        decide_by_limits(scanner, within);
+    } else {
+        hs_decide_pair_batch(scanner, &scanner->search->scene.metric, within);
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_scanner_decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next, hs_decide_fn by)
+{
+    hs_pair_batch *pair_batch = &scanner->pair_batch;
+    int32_t        n_gone = 0;
+    uint8_t        stays[HS_BATCH];
     for (int32_t u = 0, end = 0; u < scan->n_unsure; u = end) {
         hs_pair_batch_clear(pair_batch);
         for (; end < scan->n_unsure && pair_batch->n < HS_BATCH; end++) {
@@ -923,27 +954,19 @@ decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
                               scanner->is_ordered ? scanner->block.origin[unsure.place]
                                                   : unsure.place);
         }
-        const hs_status status = hs_pair_batch_look_up(pair_batch, true, &scanner->failed_point);
+        hs_status status = hs_pair_batch_look_up(pair_batch, true, &scanner->failed_point);
+        status = status == HS_OK ? by(scanner, stays) : status;
         if (status != HS_OK) {
             return status;
         }
-        if (limits != NULL && limits->supports != NULL) {
-            decide_by_supports(scanner, within);
-        } else if (limits != NULL) {
-            decide_by_limits(scanner, within);
-        } else {
-            hs_decide_pair_batch(scanner, &scanner->search->scene.metric, within);
-        }
         for (int32_t e = 0; e < end - u; e++) {
-            scan->unsure[n_beyond] = scan->unsure[u + e]; /* those beyond gather in front */
-            n_beyond += !within[e];
+            scan->unsure[n_gone] = scan->unsure[u + e]; /* those that go gather in front */
+            n_gone += !stays[e];
         }
     }
-    scanner->n_ambiguous += scan->n_unsure;
-    if (n_beyond > 0) {
-        remove_hits(scan, n_beyond, first, next, scanner->scans != HS_BLOCK_COUNTS);
+    if (n_gone > 0) {
+        remove_hits(scan, n_gone, first, next, scanner->scans != HS_BLOCK_COUNTS);
     }
-    scan->n_hits -= n_beyond;
     return HS_OK;
 }
 
@@ -977,9 +1000,7 @@ set_scan(const hs_scanner *scanner, hs_scan *scan)
     scan->n = block->n;
     scan->n_points = scanner->group.last - scanner->group.first;
     scan->triangular = scanner->block_is_first;
-    scan->norm = block->norm;
     scan->direct = scanner->form->direct;
-    scan->expanded = scanner->form->expanded;
     scan->hits = block->hits;
     if (limits != NULL && limits->supports != NULL) {
         hs_supports_set(scanner, scan);
@@ -1010,7 +1031,6 @@ gather_block(hs_scanner *scanner)
     hs_group      *group = &scanner->group;
     hs_gather      gather = {.ndim = bins->ndim,
                              .order = bins->order,
-                             .norm = block->norm,
                              .id = block->id,
                              .number = block->number,
                              .near = group->near,
@@ -1033,7 +1053,6 @@ gather_block(hs_scanner *scanner)
     for (int k = 0; k < bins->ndim; k++) {
         hs_pad_lanes(block->y[k], block->n);
     }
-    hs_pad_lanes(block->norm, block->n);
     const int32_t n_places = block->place != NULL ? block->n + HS_PADDING : 0;
     for (; block->n_places < n_places; block->n_places++) {
         block->place[block->n_places] = block->n_places;
@@ -1068,7 +1087,7 @@ fill_block(hs_scanner *scanner)
     if (status != HS_OK) {
         return status;
     }
-    hs_records_reset(&scanner->pair_batch.of);
+    scanner->block.has_candidates = false;
     scanner->form = form_of(scanner, scanner->group.largest);
     if (scanner->is_ordered) {
         status = order_block(scanner);
@@ -1085,6 +1104,7 @@ end_block(hs_scanner *scanner)
 {
     scanner->block.n = 0;
     scanner->block.n_runs = 0;
+    scanner->block.has_images = false;
     scanner->block_is_first = false;
     scanner->blocks++;
     if (scanner->n_candidates > scanner->candidate_limit || scanner->leaves) {
@@ -1137,7 +1157,8 @@ scan_block(hs_scanner *scanner)
         }
         if (scan.n_unsure > 0 &&
             (scanner->options.precision != HS_SINGLE || search->limits != NULL)) {
-            status = decide(scanner, &scan, first, next);
+            scanner->n_ambiguous += scan.n_unsure;
+            status = hs_scanner_decide(scanner, &scan, first, next, decide_within);
         }
         if (HS_UNLIKELY(scanner->chooses) && status == HS_OK) {
             status = hs_choose(scanner, &scan, first, next);
@@ -1178,6 +1199,7 @@ hs_scanner_start(hs_scanner *scanner, int32_t first, int32_t last)
     scanner->blocks = 0;
     scanner->block.n = 0;
     scanner->block.n_runs = 0;
+    scanner->block.has_images = false;
     scanner->block_is_first = !search->is_full;
     scanner->of_group = (hs_neighbourhood){0, 0};
     group->first = first;
@@ -1212,6 +1234,9 @@ hs_scanner_append(hs_scanner *scanner, int32_t si, int32_t end, const double *sh
         run->at = block->n;
         run->si = si;
         memcpy(run->image, image, sizeof run->image);
+        for (int r = 0; r < scanner->search->bins.n_periodic; r++) {
+            block->has_images |= image[r] != 0;
+        }
         for (int k = 0; k < scanner->search->scene.ndim; k++) {
             /* One rounding here and one for the sum: hs_grid.shift_error bounds the first, filter.h
              * counts on the second. */

@@ -38,7 +38,6 @@ typedef struct hs_order {
 typedef struct hs_block {
     void      *memory; /* owned: of all arrays but those of `order` */
     float     *y[HS_MAX_DIM];
-    float     *norm;    /* sum of y_k^2 */
     int32_t   *id;      /* point numbers of the candidates */
     int32_t   *number;  /* their numbers in cell order, as they were gathered */
     int32_t   *place;   /* 0, 1, 2, ..., set as far as needed; NULL unless hits are places */
@@ -48,13 +47,18 @@ typedef struct hs_block {
     float     *squares; /* of the hits, as many; NULL without HS_BLOCK_LISTS_SQUARES */
     float     *radius;  /* rows of the candidates' radii; NULL without limits */
     int64_t    pitch;   /* from one row to the next */
-    hs_unsure *unsure;  /* capacity */
+    hs_unsure *unsure;  /* as many as candidates, or hits, where pairs are chosen (choice.h) */
     hs_run    *runs;    /* most_runs + 1; runs[n_runs].at is the number of candidates */
     hs_order   order;
     int32_t    capacity, most_hits, most_runs;
     int32_t    n_runs;
-    int32_t    n;        /* candidates, of all runs */
-    int32_t    n_places; /* entries of `place` that are set */
+    int32_t    n;          /* candidates, of all runs */
+    int32_t    n_places;   /* entries of `place` that are set */
+    bool       has_images; /* some run is in another image */
+    /* As writers take them: */
+    hs_candidate *candidates;     /* in the memory of the pair batch; NULL where there are none */
+    bool          has_candidates; /* they are those of the present block */
+    bool          are_fine;       /* hs_write.is_fine, if so */
 } hs_block;
 
 /* What a block has room for. */
@@ -78,37 +82,14 @@ typedef struct hs_group {
 /* Candidates that can be sorted, and places told apart: more fit no memory that results fit. */
 #define HS_ORDER_CANDIDATES (INT64_C(1) << 28)
 
-/* What is known of the candidates of a block besides, once it is looked at. */
-typedef struct hs_records {
-    const hs_search  *search; /* borrowed, as are the next two */
-    const hs_block   *block;
-    const hs_options *polls;       /* polled while a large block is loaded */
-    bool              is_narrow;   /* all S of the scene are few */
-    bool has_images, knows_images; /* some candidate is in another image; valid if knows_images */
-    hs_candidate *candidates;      /* as writers take them; NULL where there are none */
-    bool          has_candidates, are_fine; /* hs_write.is_fine; valid if has_candidates */
-} hs_records;
-
-/* Call when the block has new candidates: they will be looked up again. */
-HS_ALWAYS_INLINE void
-hs_records_reset(hs_records *records)
-{
-    records->knows_images = records->has_candidates = false;
-}
-
-/* Fills candidates, moved as hs_write says, unless that is done. HS_OK or HS_ERR_INTERRUPTED. */
-hs_status hs_records_load_candidates(hs_records *records, const int32_t *base);
-
-/* Whether some candidate is in another image. */
-bool hs_records_has_images(hs_records *records);
-
 /* A batch of pairs: from places in the gathered block back to the numbers that were given, as the
  * exact decision and the measuring want them. Arrays have one entry for each pair, HS_BATCH and
  * some more of doubles; those of shifts are one for each row of B. */
 typedef struct hs_pair_batch {
     const hs_search *search;      /* borrowed */
+    const hs_block  *block;       /* borrowed */
     void            *memory;      /* owned: of the arrays, and of the candidates' */
-    hs_records       of;          /* the candidates */
+    bool             is_narrow;   /* all S of the scene are few */
     int              n_rows;      /* of B */
     bool             needs_given; /* S is wanted, or the metric measures between points as given */
     bool             is_plain;    /* shifts over B are those over the box vectors as given */
@@ -184,7 +165,6 @@ typedef struct hs_form {
     bool          is_extreme;
     hs_scan_form  kind;
     hs_thresholds direct;
-    hs_expanded   expanded;
     hs_limit_form limits; /* for pairs with limits of their own */
 } hs_form;
 
@@ -238,8 +218,9 @@ hs_scanner_fraction(const hs_scanner *scanner)
 hs_status hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_runs,
                           bool is_ordered, hs_scanner *scanner);
 
-/* Makes it ready for what its search has become, as hs_scanner_init without an order would, if its
- * memory will do: false where it will not, or where it has none. */
+/* Makes it ready for what its search has become, without limits, as hs_scanner_init without an
+ * order would for the same use, if its memory will do: false where it will not, or where it has
+ * none. */
 bool hs_scanner_renew(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_runs,
                       hs_scanner *scanner);
 
@@ -262,6 +243,20 @@ hs_status hs_scanner_append(hs_scanner *scanner, int32_t si, int32_t end, const 
 
 /* Tests the last block of the group; likewise. */
 hs_status hs_scanner_finish(hs_scanner *scanner);
+
+/* Fills the block's candidates, moved as hs_write says, unless that is done. HS_OK or
+ * HS_ERR_INTERRUPTED. */
+hs_status hs_scanner_load_candidates(hs_scanner *scanner, const int32_t *base);
+
+/* Whether each pair of the scanner's pair batch, which has been looked up, stays among the hits:
+ * HS_BATCH of them. Any status ends the walk. */
+typedef hs_status (*hs_decide_fn)(hs_scanner *scanner, uint8_t *stays);
+
+/* Decides scan->unsure, which are hits of points [first, next) of the group, and takes those that
+ * do not stay from the hits; the order of the others stays. Any status of hs_pair_batch_look_up and
+ * of `by`, with the asking point in scanner->failed_point. */
+hs_status hs_scanner_decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next,
+                            hs_decide_fn by);
 
 /* Whether each pair of the pair batch is within the metric's cutoff, which need not be the scene's.
  * within: HS_BATCH of them. */

@@ -24,6 +24,9 @@
 #define MOST_PAIRS           0x1p62 /* close to the most that int64 counts */
 #define ROUNDING             1e-9   /* relative; far more than coordinates along axes are rounded */
 #define SURE_ERRORS          3.0    /* standard errors below the mean: sure enough to refuse */
+#define EVEN                 1.5    /* times the candidates of an even scene: crowds meet more */
+#define LARGE_RESULT         0x1p23 /* bytes, by candidates: room for more is better foreseen */
+#define BYTES_OF_INDICES     16.0   /* a pair of more than these takes its time to write anyway */
 
 /* Bytes that one pair of the result takes at the worst moment: the caller's arrays, and what the
  * search still holds beside them. 0 when nothing is wanted but the count. */
@@ -70,10 +73,9 @@ hs_shortage_add(const hs_sets *sets, const hs_box *box, double cutoff, hs_shorta
 }
 
 void
-hs_shortage_tell(const hs_shortage *shortage, const hs_options *options, int ndim, double limit,
+hs_shortage_tell(const hs_shortage *shortage, const hs_options *options, int ndim,
                  hs_failure *failure)
 {
-    failure->limit_bytes = limit;
     if (failure->expected_bytes == 0.0) {
         failure->expected_pairs = hs_larger(shortage->pairs, failure->expected_pairs);
         failure->expected_bytes = failure->expected_pairs * bytes_per_pair_of(options, ndim);
@@ -215,24 +217,21 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     hs_account   *account = &search->call->account;
     const double  bytes_per_pair = bytes_of_search(search);
     const int64_t n = hs_search_asking(search)->n;
-    double        squares = search->bins.squares, offsets = 0.0;
-    /* Each stencil offset pairs every cell with at most one other, so by the Cauchy-Schwarz
-     * inequality it contributes at most the sum of squared occupancies; for two sets, the root of
-     * the product of both sums. */
-    if (search->has_queries) {
-        squares = sqrt(squares * search->query_bins.squares);
-    }
-    for (int64_t s = 0; s < search->stencil.n_rows; s++) {
-        offsets += (double)search->stencil.rows[s].last - search->stencil.rows[s].first + 1.0;
-    }
-    const double bound = n > 0 ? squares * offsets * bytes_per_pair : 0.0;
-    const double by_density = search->grid.expected_pairs * search->pairs_per_half;
-    sample       taken;
+    const double  candidates = n > 0 ? hs_search_candidates(search) : 0.0;
+    const double  bound = candidates * bytes_per_pair;
+    const double  by_density = search->grid.expected_pairs * search->pairs_per_half;
+    const double  crowd =
+        (search->bins.squares - (double)search->bins.n) * (double)search->grid.n_cells;
+    const bool is_uneven = search->is_sparse ||
+                           crowd > EVEN * (double)search->bins.n * (double)search->bins.n;
+    const bool is_large = bytes_per_pair > BYTES_OF_INDICES && bound > LARGE_RESULT;
+    sample     taken;
     /* The limit is looked up, which takes longer than a sample, unless the result may be too large
      * to do without and does not seem to be. */
     const bool samples_first = account->find_limit != NULL && bound > HS_LIMIT_FREE &&
                                by_density * bytes_per_pair < SEEMS_SMALL * HS_LIMIT_FREE;
-    if (n == 0 || (!samples_first && hs_account_allows(account, bound))) {
+    if (n == 0 ||
+        (!samples_first && !(is_large && is_uneven) && hs_account_allows(account, bound))) {
         return HS_OK;
     }
     const hs_status status = take_sample(search, SAMPLES, 1, &taken);
@@ -241,6 +240,12 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     }
     const double many = (double)taken.taken;
     const double mean = taken.sum / many;
+    if (is_large && is_uneven && !taken.is_cut) { /* as many are foreseen as there are */
+        search->grid.expected_pairs = mean * (double)n / search->pairs_per_half;
+    }
+    if (!samples_first && hs_account_allows(account, bound)) {
+        return HS_OK;
+    }
     const double variance = fmax(0.0, taken.squares / many - mean * mean);
     const double error = taken.taken < n ? sqrt(variance / many) : 0.0;
     const double least = (mean - SURE_ERRORS * error) * (double)n;
@@ -260,85 +265,43 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
 /* Eight of the smallest numbers there are. */
 #define LEAST_BAND 0x1p-1071
 
-/* Bits of a distance that choose its cell, of the 52 within a power of two: so that few edges share
- * a cell. The first is tried first. */
-static const int cell_bits[] = {3, 6, 9};
-#define MOST_CELLS 4096 /* some 100 kB; distances below these share cell 0 */
+/* Cells of an edge, and of all edges at most: some 16 kB. */
+#define CELLS_PER_EDGE 8
+#define MOST_CELLS     4096
 
-/* The bits of a number that is not negative. */
+/* The cell of a distance, which may be beyond the cutoff. */
 HS_ALWAYS_INLINE int64_t
-bits_of(double x)
+cell_of(const hs_shells *shells, double distance)
 {
-    return (int64_t)hs_bits_of_double(x);
-}
-
-/* Cells from the one before the first edge above zero to that of the cutoff. Returns how many
- * edges share a cell with the one before, though their bands are apart. */
-static int64_t
-set_cells(double cutoff, int bits, hs_shells *shells)
-{
-    const int64_t n = shells->n;
-    int64_t       k = 0, shared = 0;
-    while (k < n - 1 && !(shells->low[k] > 0.0)) {
-        k++;
-    }
-    shells->shift = 52 - bits;
-    shells->first = (bits_of(hs_larger(shells->low[k], 0.0)) >> shells->shift) - 1;
-    shells->last = (bits_of(cutoff) >> shells->shift) - shells->first;
-    if (shells->last >= MOST_CELLS) {
-        shells->first += shells->last - (MOST_CELLS - 1);
-        shells->last = MOST_CELLS - 1;
-    }
-    for (k++; k < n; k++) {
-        const int64_t at = bits_of(shells->low[k]) >> shells->shift;
-        const int64_t before = bits_of(shells->high[k - 1]) >> shells->shift;
-        shared += shells->low[k] > shells->high[k - 1] && (at <= before || at <= shells->first);
-    }
-    return shared;
-}
-
-static void
-fill_cells(const hs_shells *shells)
-{
-    int64_t below = 0, reached = 0; /* bands that end before the cell, or begin before its end */
-    for (int64_t c = 0; c <= shells->last; c++) {
-        const double least =
-            c == 0 ? 0.0 : hs_double_of_bits((uint64_t)(shells->first + c) << shells->shift);
-        const double end = hs_double_of_bits((uint64_t)(shells->first + c + 1) << shells->shift);
-        while (below < shells->n && shells->high[below] < least) {
-            below++;
-        }
-        while (reached < shells->n && (c == shells->last || shells->low[reached] < end)) {
-            reached++;
-        }
-        hs_shell_cell *cell = &shells->cells[c];
-        *cell = (hs_shell_cell){.low = INT64_MAX, .high = INT64_MAX, .below = (int32_t)below};
-        if (reached - below == 1) {
-            cell->low = bits_of(hs_larger(shells->low[below], 0.0));
-            cell->high = bits_of(shells->high[below]);
-        } else if (reached > below) {
-            cell->low = 0; /* all of them are looked at again */
-        }
-    }
+    const double at = distance * shells->per_length;
+    return at < (double)shells->last ? (int64_t)at : shells->last;
 }
 
 hs_status
 hs_shells_open(hs_account *account, const hs_scene *scene, const hs_options *options,
                hs_shells *shells)
 {
-    const int64_t n = options->want & HS_WANT_SHELL ? options->n_shells - 1 : 0;
     *shells = (hs_shells){.inclusive = options->inclusive};
-    if (n == 0) {
+    if (!(options->want & HS_WANT_SHELL)) {
         return HS_OK;
     }
-    shells->edge = hs_alloc(account, HS_FOR_CANDIDATES, 4 * n, sizeof(double));
-    if (shells->edge == NULL) {
+    const int64_t n = options->n_shells - 1;
+    const int64_t last = CELLS_PER_EDGE * n < MOST_CELLS ? CELLS_PER_EDGE * n : MOST_CELLS;
+    const double  per_length = (double)last / options->cutoff;
+    hs_parts      parts;
+    hs_parts_begin(&parts);
+    hs_parts_add(&parts, (void **)&shells->edge, n, sizeof(double));
+    hs_parts_add(&parts, (void **)&shells->at, n, sizeof(double));
+    hs_parts_add(&parts, (void **)&shells->low, n + 1, sizeof(double));
+    hs_parts_add(&parts, (void **)&shells->high, n + 1, sizeof(double));
+    hs_parts_add(&parts, (void **)&shells->start, last + 1, sizeof(int32_t));
+    shells->memory = hs_parts_alloc(account, HS_FOR_CANDIDATES, &parts);
+    if (shells->memory == NULL) {
         return HS_ERR_MEMORY;
     }
     shells->n = n;
-    shells->at = shells->edge + n;
-    shells->low = shells->at + n;
-    shells->high = shells->low + n;
+    shells->last = last;
+    shells->per_length = isfinite(per_length) ? per_length : 0.0;
     for (int64_t k = 0; k < n; k++) { /* in both units, and their bands */
         const double edge = options->shells[k], width = edge * BAND + LEAST_BAND;
         shells->edge[k] = edge;
@@ -346,60 +309,43 @@ hs_shells_open(hs_account *account, const hs_scene *scene, const hs_options *opt
         shells->low[k] = edge - width;
         shells->high[k] = edge + width;
     }
-    for (size_t b = 0; b < sizeof cell_bits / sizeof *cell_bits; b++) {
-        if (set_cells(options->cutoff, cell_bits[b], shells) == 0) {
-            break;
+    shells->low[n] = shells->high[n] = INFINITY;
+    for (int64_t c = 0, k = 0; c <= last; c++) {
+        while (k < n && cell_of(shells, shells->high[k]) < c) {
+            k++;
         }
+        shells->start[c] = (int32_t)k;
     }
-    shells->cells = hs_alloc(account, HS_FOR_CANDIDATES, shells->last + 1, sizeof(hs_shell_cell));
-    if (shells->cells == NULL) {
-        hs_shells_free(account, shells);
-        return HS_ERR_MEMORY;
-    }
-    fill_cells(shells);
     return HS_OK;
 }
 
 void
 hs_shells_free(hs_account *account, hs_shells *shells)
 {
-    hs_free(account, shells->cells);
-    hs_free(account, shells->edge);
+    hs_free(account, shells->memory);
     *shells = (hs_shells){.n = 0};
 }
 
 bool
 hs_shells_find(const hs_shells *shells, const double *distance, int32_t n, int32_t *shell)
 {
-    const hs_shell_cell *cells = shells->cells;
-    const int64_t        first = shells->first;
-    const int            shift = shells->shift;
-    int64_t              sure = -1;
-    if (shells->n == 0) {
-        memset(shell, 0, (size_t)n * sizeof *shell);
-        return false;
-    }
+    bool is_open = false;
     for (int32_t h = 0; h < n; h++) {
-        const int64_t        bits = bits_of(distance[h]), at = (bits >> shift) - first;
-        const hs_shell_cell *cell = &cells[at < 0 ? 0 : at];
-        /* Differences of these do not overflow; their sign bits count. */
-        const int64_t above = cell->high - bits;
-        shell[h] = cell->below + (int32_t)((uint64_t)above >> 63);
-        sure &= above | (bits - cell->low);
+        int32_t k = shells->start[cell_of(shells, distance[h])];
+        k += shells->high[k] < distance[h];
+        shell[h] = k;
+        is_open |= shells->low[k] <= distance[h];
     }
-    return sure >= 0;
+    return is_open;
 }
 
 void
 hs_shells_range(const hs_shells *shells, double distance, int32_t *low, int32_t *high)
 {
-    const int32_t n = (int32_t)shells->n;
-    while (*low < n && shells->high[*low] < distance) {
+    while (shells->high[*low] < distance) {
         ++*low;
     }
-    *high = *low;
-    while (*high < n && shells->low[*high] <= distance) {
-        ++*high;
+    for (*high = *low; shells->low[*high] <= distance; ++*high) {
     }
 }
 
@@ -450,6 +396,35 @@ hs_search_begin(hs_call *call, hs_search *search)
     search->call = call;
 }
 
+/* Each stencil offset pairs every cell with at most one other, so by the Cauchy-Schwarz inequality
+ * it contributes at most the sum of squared occupancies; for two sets, the root of the product of
+ * both sums. */
+double
+hs_search_candidates(const hs_search *search)
+{
+    double squares = search->bins.squares, offsets = 0.0;
+    if (search->has_queries) {
+        squares = sqrt(squares * search->query_bins.squares);
+    }
+    for (int64_t s = 0; s < search->stencil.n_rows; s++) {
+        offsets += (double)search->stencil.rows[s].last - search->stencil.rows[s].first + 1.0;
+    }
+    return squares * offsets;
+}
+
+hs_status
+hs_search_halve(hs_search *search)
+{
+    hs_call *call = search->call;
+    HS_ASSERT(!search->has_queries);
+    search->is_full = false;
+    search->is_half = true;
+    search->pairs_per_half = 1.0;
+    hs_stencil_free(&call->account, &search->stencil);
+    return hs_stencil_build(&call->account, &call->options, &search->scene, &search->grid, false,
+                            &search->stencil);
+}
+
 void
 hs_search_close(hs_search *search)
 {
@@ -489,8 +464,7 @@ choose_grid(hs_search *search, hs_failure *failure)
     if (algorithm == HS_ALL_PAIRS || algorithm == HS_HASH) {
         status = hs_grid_init(scene, HS_GRID_SINGLE, grid, failure);
         if (status == HS_OK && algorithm == HS_HASH) {
-            double cost;
-            width = hs_sparse_width(scene, grid, &cost);
+            width = hs_sparse_choose(scene, grid, true);
         }
     } else {
         if (options->cell_size > 0.0) {
@@ -501,7 +475,7 @@ choose_grid(hs_search *search, hs_failure *failure)
             status = hs_grid_init(scene, is_dense ? HS_GRID_CELLS : HS_GRID_ANY, grid, failure);
         }
         if (status == HS_OK && may_be_sparse && !is_dense) {
-            width = hs_sparse_choose(scene, grid);
+            width = hs_sparse_choose(scene, grid, false);
         }
     }
     search->is_sparse = width > 0.0;
@@ -682,6 +656,5 @@ hs_search_open(const hs_sets *sets, const hs_box *box, hs_call *call, hs_search 
             hs_search_close(search);
         }
     }
-    hs_call_tell_limit(call, status, failure);
     return status;
 }

@@ -14,29 +14,23 @@
 
 /*
  * Several cutoffs of one search, and for each but the last the float64 distances that do not tell
- * on which side of it a pair is. The last one is that of the search itself. A table, indexed by the
- * leading bits of a distance, knows for each of its cells which edges are in it.
+ * on which side of it a pair is. The last one is that of the search itself. Cells of equal length
+ * tell where among the edges to look for a distance.
  */
 
-/* Distances of one cell of the table: `below` edges are below them; above `high`, one more. From
- * `low` to `high` they do not tell. These two are the bits of doubles, which order like them. */
-typedef struct hs_shell_cell {
-    int64_t low, high;
-    int32_t below;
-} hs_shell_cell;
-
-/* Shared by all threads. Arrays have n entries and do not descend. */
+/* Shared by all threads. Arrays have n entries and do not descend; behind low and high there is an
+ * infinity. */
 typedef struct hs_shells {
-    int64_t        n;         /* edges: cutoffs but the last; 0 also where shells are not wanted */
-    bool           inclusive; /* an edge belongs to the shell below it */
-    double        *edge;      /* owned; in the caller's unit */
-    double        *at; /* in the memory of `edge`, like those below; as the scene's metric has it */
-    double        *low;   /* a distance below this, as it is returned, is below the edge, ... */
-    double        *high;  /* ... and one above this is above it */
-    hs_shell_cell *cells; /* owned; last + 1 */
-    int            shift; /* bits of a distance that do not choose the cell */
-    int64_t        first; /* leading bits of the distances of cell 0; lower ones are there too */
-    int64_t        last;  /* number of the last cell; that of the largest cutoff */
+    int64_t  n;         /* edges: cutoffs but the last; 0 also where shells are not wanted */
+    bool     inclusive; /* an edge belongs to the shell below it */
+    void    *memory;    /* owned: of all arrays */
+    double  *edge;      /* in the caller's unit */
+    double  *at;        /* as the scene's metric has it */
+    double  *high;      /* a distance above this, as it is returned, is above the edge, ... */
+    double  *low;       /* ... and one below this is below it */
+    int32_t *start;     /* of each cell: edges that are below all distances in it; last + 1 */
+    int64_t  last;
+    double   per_length; /* cells of a unit of length */
 } hs_shells;
 
 /* Those of the options, if they are wanted; HS_OK or HS_ERR_MEMORY. */
@@ -46,8 +40,8 @@ hs_status hs_shells_open(hs_account *account, const hs_scene *scene, const hs_op
 /* Idempotent. */
 void hs_shells_free(hs_account *account, hs_shells *shells);
 
-/* How many edges each of n distances, which are not negative, is surely above; for one that its
- * cell does not tell at least so many are. Returns whether there is such a one. */
+/* How many edges each of n distances, which are not negative, is surely above; where edges crowd,
+ * at least so many. Returns whether one of them may be above more. */
 bool hs_shells_find(const hs_shells *shells, const double *distance, int32_t n, int32_t *shell);
 
 /* For a distance that is above *low edges or more: *low that it is surely above, and *high that it
@@ -112,6 +106,14 @@ hs_search_asking(const hs_search *search)
 /* Whether a pair of points can occur in several images, so that these are to be told apart. */
 bool hs_search_repeats_images(const hs_search *search);
 
+/* Points that the asking points meet as candidates, in all, counted for each that asks. Of crowded
+ * cells no fewer than there are. */
+double hs_search_candidates(const hs_search *search);
+
+/* From the neighbours of each point to the half list. For a search among one set of points; HS_OK,
+ * or a status of hs_stencil_build. */
+hs_status hs_search_halve(hs_search *search);
+
 /* Frees what it has; idempotent. The call goes on. */
 void hs_search_close(hs_search *search);
 
@@ -154,7 +156,7 @@ typedef struct hs_shortage {
 /* Adds one search, from the caller's numbers: nothing else need have been read yet. */
 void hs_shortage_add(const hs_sets *sets, const hs_box *box, double cutoff, hs_shortage *shortage);
 void hs_shortage_tell(const hs_shortage *shortage, const hs_options *options, int ndim,
-                      double limit, hs_failure *failure);
+                      hs_failure *failure);
 
 /*
  * After sorting into cells: HS_OK when a result is expected to fit the account's limit, and always

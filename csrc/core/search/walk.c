@@ -287,15 +287,6 @@ visit_group(hs_walker *walker, const hs_sparse_group *group)
     return hs_scanner_finish(&walker->scanner);
 }
 
-static hs_status
-set_links(hs_walker *walker, const hs_row *row)
-{
-    hs_cursor *cursor = &walker->cursor;
-    walker->scanner.work_since_poll += walker->search->stencil.n_rows;
-    return hs_row_links(walker->search, &walker->scanner.options, row, cursor->links, cursor->hints,
-                        &cursor->n_links);
-}
-
 /*
  * Groups of the row, as far as their first point is in [from, to). Goes on where the last range of
  * this row ended, so that many ranges in a long row do not step through it again and again.
@@ -312,7 +303,9 @@ walk_row(hs_walker *walker, int64_t number, int32_t from, int32_t to)
         cursor->last_first = -1;
         cursor->has_next = cursor->row.first < cursor->row.end;
         if (cursor->has_next) {
-            status = set_links(walker, &cursor->row);
+            walker->scanner.work_since_poll += search->stencil.n_rows;
+            status = hs_row_links(search, &walker->scanner.options, &cursor->row, cursor->links,
+                                  cursor->hints, &cursor->n_links);
             cursor->has_next = status == HS_OK &&
                                row_next(search, cursor->target, &cursor->row, &cursor->next);
         }
@@ -359,39 +352,31 @@ hs_walk(hs_walker *walker, int32_t first, int32_t end, hs_failure *failure)
 hs_status
 hs_walk_point(hs_walker *walker, int32_t si)
 {
-    hs_row          row;
+    hs_cursor      *cursor = &walker->cursor;
     hs_sparse_group group;
-    hs_row_open_at(walker->search, si, &row, &group);
-    walker->cursor.row_number = -1; /* its links are overwritten */
-    const hs_status status = set_links(walker, &row);
+    hs_row_open_at(walker->search, si, &cursor->row, &group);
+    cursor->row_number = -1; /* the next walk begins anew */
+    const hs_status status = hs_row_links(walker->search, &walker->scanner.options, &cursor->row,
+                                          cursor->links, cursor->hints, &cursor->n_links);
     return status == HS_OK ? visit_group(walker, &group) : status;
 }
 
-/* A bound on the candidates of a group: all points in every image that the stencil can reach. */
-static double
-most_candidates(const hs_search *search)
-{
-    const hs_grid *grid = &search->grid;
-    double         most = (double)search->bins.n;
-    for (int k = 0; k < grid->ndim && most < HS_BLOCK_CANDIDATES; k++) {
-        if (search->scene.lattice.row_of_axis[k] >= 0) {
-            most *= 2.0 * (double)(grid->reach[k] / grid->shape[k]) + 3.0;
-        }
-    }
-    return most;
-}
-
+/* All points in every image that the stencil can reach, and a run for each row of the stencil and
+ * each image along the first axis. */
 bool
 hs_walker_bound(const hs_search *search, hs_neighbourhood *most)
 {
     const hs_grid *grid = &search->grid;
-    const double   candidates = most_candidates(search);
-    const bool     turns = search->scene.lattice.row_of_axis[0] >= 0;
-    /* A run for each row of the stencil and each image along the first axis. */
-    const double runs = (double)search->stencil.n_rows *
-                        (turns ? 2.0 * (double)(grid->reach[0] / grid->shape[0]) + 3.0 : 1.0);
-    most->candidates = candidates < HS_BLOCK_CANDIDATES ? (int64_t)candidates : 0;
-    most->runs = (int64_t)hs_smaller(runs, candidates);
+    double         candidates = (double)search->bins.n, runs = (double)search->stencil.n_rows;
+    for (int k = 0; k < grid->ndim; k++) {
+        if (search->scene.lattice.row_of_axis[k] >= 0) {
+            const double images = 2.0 * (double)(grid->reach[k] / grid->shape[k]) + 3.0;
+            candidates *= images;
+            runs *= k == 0 ? images : 1.0;
+        }
+    }
+    most->candidates = (int64_t)hs_smaller(candidates, HS_BLOCK_CANDIDATES);
+    most->runs = (int64_t)hs_smaller(runs, (double)most->candidates);
     return candidates < HS_BLOCK_CANDIDATES;
 }
 
@@ -403,8 +388,9 @@ find_capacities(const hs_search *search, int32_t *candidates, int32_t *runs)
 {
     hs_neighbourhood most;
     (void)hs_walker_bound(search, &most);
-    *candidates =
-        (int32_t)hs_smaller(most_candidates(search) + HS_GROUP_POINTS, HS_BLOCK_CANDIDATES);
+    *candidates = (int32_t)(most.candidates < HS_BLOCK_CANDIDATES - HS_GROUP_POINTS
+                                ? most.candidates + HS_GROUP_POINTS
+                                : HS_BLOCK_CANDIDATES);
     *runs = most.runs < HS_BLOCK_RUNS ? (int32_t)most.runs + 1 : HS_BLOCK_RUNS;
 }
 

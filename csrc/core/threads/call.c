@@ -223,7 +223,13 @@ void
 hs_call_leave(hs_call *call, int64_t n_pairs)
 {
     hs_call_dismiss(call);
-    hs_call_report(call, n_pairs);
+    hs_counters *counters = call->options.counters;
+    if (counters != NULL) {
+        *counters = call->done;
+        memcpy(counters->bytes, call->account.total.bytes, sizeof counters->bytes);
+        counters->bytes_peak = call->account.total.bytes_peak;
+        counters->pairs = n_pairs;
+    }
     hs_leave(&call->entry);
 }
 
@@ -301,19 +307,6 @@ hs_call_add_counters(hs_call *call, const hs_counters *done)
     sum->by_double_word += done->by_double_word;
     sum->by_integers += done->by_integers;
     sum->polls += done->polls;
-}
-
-void
-hs_call_report(const hs_call *call, int64_t n_pairs)
-{
-    hs_counters *counters = call->options.counters;
-    if (counters == NULL) {
-        return;
-    }
-    *counters = call->done;
-    memcpy(counters->bytes, call->account.total.bytes, sizeof counters->bytes);
-    counters->bytes_peak = call->account.total.bytes_peak;
-    counters->pairs = n_pairs;
 }
 
 void

@@ -115,9 +115,6 @@ void hs_call_dismiss(hs_call *call);
 /* Adds what a walker, or another call, has done. */
 void hs_call_add_counters(hs_call *call, const hs_counters *done);
 
-/* Writes the counters, if the options want them. */
-void hs_call_report(const hs_call *call, int64_t n_pairs);
-
 /* How much memory the call was allowed, if the lack of it is the failure. */
 void hs_call_tell_limit(const hs_call *call, hs_status status, hs_failure *failure);
 

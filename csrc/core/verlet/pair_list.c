@@ -13,42 +13,30 @@
  * points: how much of the skin it leaves. */
 
 /*
- * The pairs of a search in pieces, one for each range of its points, by several threads. Which
- * pieces there are depends on the number of threads, what follows from one to the next does not.
- * Points are told by their places in cell order. Few pairs have a shift, those that are in
- * different images once the points are wrapped, and each piece keeps them apart. Each thread has a
- * walker. Until all are found, images have numbers by where they lie over the rows of B.
+ * A list is a search whose points are numbered in cell order, so that neighbours lie close together
+ * in memory when it is used, and whose shifts are those of the wrapped points, so that few of them
+ * are not zero. Several threads find its pieces, each with a walker. Until all are found, images
+ * have numbers by where they lie over the rows of B.
  */
 
 #define PIECES_A_THREAD 4 /* so that none waits long for the others */
 #define FIRST_BUNDLES   256
 
-/* Some pairs of a search, as in a hs_listing. */
-typedef struct some_pairs {
-    hs_output  pairs;   /* b of each, in its column j; counted by no account */
-    hs_bundle *bundles; /* owned; ends are places in this part */
-    int64_t    n_bundles, capacity;
-    int64_t    first_pair, first_bundle; /* of it, in the listing */
-} some_pairs;
-
 /* A search, and what it has found in cell order. */
 typedef struct building {
-    hs_call   call;
-    hs_search search;
-    int64_t   n; /* pieces */
-    some_pairs
-        *parts; /* owned; of each piece pairs without an image, then of each those with one */
-    hs_listing *listing; /* borrowed: what it becomes; its stores are those of the list in use */
+    hs_call    call;
+    hs_search  search;
+    hs_listing listing; /* owned */
     /* Images over row r of B are from -most to most of it. Number home + sum of image * stride: */
     int64_t most[HS_MAX_DIM], stride[HS_MAX_DIM], home, n_images;
 } building;
 
 /* What one thread works with. */
 typedef struct worker {
-    hs_committer committer;
-    building    *built; /* borrowed */
-    hs_walker    walker;
-    some_pairs  *plain, *shifted; /* of the piece that it is working on */
+    hs_committer  committer;
+    building     *built; /* borrowed */
+    hs_walker     walker;
+    hs_list_part *plain, *shifted; /* of the piece that it is working on */
     /* Of the block that was looked at last: */
     int64_t  block; /* candidates tested before it, which tells blocks apart; -1: none */
     bool     has_images;
@@ -81,7 +69,8 @@ look_at_block(worker *me)
 /* n hits of one run to a part: in its last bundle if that is of this point and image, else in a new
  * one. False when memory is refused. */
 static bool
-add_pairs(worker *me, some_pairs *part, int32_t si, int32_t image, const int32_t *labels, int32_t n)
+add_pairs(worker *me, hs_list_part *part, int32_t si, int32_t image, const int32_t *labels,
+          int32_t n)
 {
     const int32_t *id = me->walker.scanner.block.id;
     hs_bundle     *last = part->n_bundles > 0 ? &part->bundles[part->n_bundles - 1] : NULL;
@@ -99,7 +88,7 @@ add_pairs(worker *me, some_pairs *part, int32_t si, int32_t image, const int32_t
         last = &part->bundles[part->n_bundles++];
         *last = (hs_bundle){.point = si, .image = image};
     }
-    int32_t *to = hs_output_next(&part->pairs, HS_WANT_J);
+    int32_t *to = (int32_t *)hs_output_column(&part->pairs, HS_WANT_J) + part->pairs.n_pairs;
     for (int32_t h = 0; h < n; h++) {
         to[h] = id[labels[h]];
     }
@@ -188,9 +177,9 @@ search_piece(void *context, int64_t number)
 {
     worker          *me = context;
     const hs_search *search = &me->built->search;
-    const int64_t    n = search->bins.n, n_pieces = me->built->n;
-    me->plain = &me->built->parts[number];
-    me->shifted = &me->built->parts[n_pieces + number];
+    const int64_t    n = search->bins.n, n_pieces = me->built->listing.n_pieces;
+    me->plain = &me->built->listing.parts[number];
+    me->shifted = &me->built->listing.parts[n_pieces + number];
     hs_output_reserve_hint(&me->plain->pairs, search->grid.expected_pairs / (double)n_pieces);
     return hs_walk(&me->walker, (int32_t)(n * number / n_pieces),
                    (int32_t)(n * (number + 1) / n_pieces), &me->committer.failure);
@@ -230,6 +219,7 @@ static hs_status
 find_pieces(building *built, hs_failure *failure)
 {
     hs_call          *call = &built->call;
+    hs_listing       *listing = &built->listing;
     const hs_grid    *grid = &built->search.grid;
     const hs_lattice *lattice = &built->search.scene.lattice;
     double            n_images = 1.0;
@@ -247,133 +237,103 @@ find_pieces(building *built, hs_failure *failure)
         }
     }
     built->n_images = (int64_t)n_images;
-    built->n = call->team == NULL ? 1 : PIECES_A_THREAD * hs_team_size(call->team);
-    built->parts = hs_alloc(&call->account, HS_FOR_CANDIDATES, 2 * built->n, sizeof *built->parts);
-    if (built->parts == NULL) {
+    const int64_t n = call->team == NULL ? 1 : PIECES_A_THREAD * hs_team_size(call->team);
+    listing->parts = hs_alloc(NULL, HS_FOR_INDICES, 2 * n, sizeof *listing->parts);
+    if (listing->parts == NULL) {
         return HS_ERR_MEMORY;
     }
-    for (int64_t p = 0; p < 2 * built->n; p++) {
-        built->parts[p] = (some_pairs){.bundles = NULL};
-        hs_output_init(NULL, lattice->ndim, HS_WANT_J, 4, &built->parts[p].pairs);
+    listing->n_pieces = n;
+    for (int64_t p = 0; p < 2 * n; p++) {
+        listing->parts[p] = (hs_list_part){.bundles = NULL};
+        hs_output_init(NULL, lattice->ndim, HS_WANT_J, 4, &listing->parts[p].pairs);
     }
     hs_crew crew = {.call = call,
                     .job = built,
                     .worker_size = sizeof(worker),
                     .open = open_worker,
                     .close = close_worker,
-                    .n_ranges = built->n,
+                    .n_ranges = n,
                     .search = search_piece};
     return hs_crew_run(&crew, failure);
 }
 
-/*
- * The list of one step. It is a search whose points are numbered in cell order, so that neighbours
- * lie close together in memory when the list is used, and whose shifts are those of the wrapped
- * points, so that few of them are not zero.
- */
-
 void
 hs_listing_free(hs_listing *listing)
 {
-    hs_store_free(&listing->for_j);
-    hs_store_free(&listing->for_bundles);
-    for (int turn = 0; turn < 2; turn++) {
-        hs_store_free(&listing->for_order[turn]);
-        hs_store_free(&listing->for_counts[turn]);
+    for (int64_t p = 0; p < 2 * listing->n_pieces; p++) {
+        hs_output_free(&listing->parts[p].pairs);
+        hs_free(NULL, listing->parts[p].bundles);
     }
+    hs_free(NULL, listing->parts);
     hs_free(NULL, listing->images);
+    hs_free(NULL, listing->order);
+    hs_free(NULL, listing->counts);
     *listing = (hs_listing){0};
 }
 
 /* Renumbers the points by their places in cell order, and stores by how many given box vectors each
- * was wrapped, or nothing where none was: shifts are images alone from here on. */
+ * was wrapped: shifts are images alone from here on. */
 static hs_status
 renumber(hs_search *search, hs_listing *listing, hs_failure *failure)
 {
     hs_bins  *bins = &search->bins;
     const int m = bins->n_periodic;
-    int64_t   any = 0;
-    listing->order = hs_store_reserve(&listing->for_order[listing->turn], HS_FOR_ORDER, bins->n,
-                                      sizeof *listing->order);
-    if (m > 0) {
-        HS_ASSERT(bins->turns.known);
-        listing->counts = hs_store_reserve(&listing->for_counts[listing->turn], HS_FOR_WRAPS,
-                                           bins->n * m, sizeof *listing->counts);
-    }
-    if (listing->order == NULL || (m > 0 && listing->counts == NULL)) {
+    listing->order = hs_alloc(NULL, HS_FOR_ORDER, bins->n, sizeof *listing->order);
+    listing->counts = hs_alloc(NULL, HS_FOR_WRAPS, bins->n * m, sizeof *listing->counts);
+    if (listing->order == NULL || listing->counts == NULL) {
         return HS_ERR_MEMORY;
     }
+    HS_ASSERT(m == 0 || bins->turns.known);
     for (int64_t si = 0; si < bins->n; si++) {
-        int64_t turns[HS_MAX_DIM], *counts = m > 0 ? listing->counts + si * m : NULL;
+        int64_t turns[HS_MAX_DIM];
         for (int r = 0; r < m; r++) {
             turns[r] = hs_turns_get(&bins->turns, r, si);
         }
-        if (m > 0 && !hs_lattice_shift(&search->scene.lattice, turns, counts)) {
+        if (!hs_lattice_shift(&search->scene.lattice, turns, listing->counts + si * m)) {
             failure->row = bins->order[si];
             return HS_ERR_SHIFT_RANGE;
-        }
-        for (int r = 0; r < m; r++) {
-            any |= counts[r];
         }
         listing->order[si] = bins->order[si];
         bins->order[si] = (int32_t)si;
     }
-    listing->counts = any != 0 ? listing->counts : NULL;
     if (!bins->keeps_originals) {
         bins->turns.known = false; /* they are not needed any more */
     }
     return HS_OK;
 }
 
-/* A hs_task_fn: one part to the listing. */
-static void
-place_part(void *context, int64_t p)
-{
-    const building   *built = context;
-    const some_pairs *part = &built->parts[p];
-    hs_listing       *listing = built->listing;
-    if (part->pairs.n_pairs > 0) {
-        memcpy(listing->j + part->first_pair, hs_output_column(&part->pairs, HS_WANT_J),
-               (size_t)part->pairs.n_pairs * sizeof *listing->j);
-    }
-    for (int64_t b = 0; b < part->n_bundles; b++) {
-        listing->bundles[part->first_bundle + b] = part->bundles[b];
-        listing->bundles[part->first_bundle + b].end += part->first_pair;
-    }
-}
-
-/* Counts pairs and bundles, those with an image behind all others, and gives the images that they
- * have their numbers in the listing, in the order in which they first come. HS_ERR_MEMORY;
- * HS_ERR_SHIFT_RANGE sets failure->row, a place. */
+/* Counts pairs and slabs, and gives the images that pairs have their numbers in the listing, in the
+ * order in which they first come. HS_ERR_MEMORY; HS_ERR_SHIFT_RANGE sets failure->row, a place. */
 static hs_status
 count_pairs(building *built, hs_failure *failure)
 {
-    hs_listing *listing = built->listing;
-    const int   m = built->search.scene.lattice.n_periodic;
-    hs_status   status = HS_ERR_MEMORY;
-    int64_t     n_plain = 0;
-    listing->n_pairs = listing->n_bundles = 0;
-    for (int64_t p = 0; p < 2 * built->n; p++) {
-        some_pairs *part = &built->parts[p];
-        part->first_pair = listing->n_pairs;
-        part->first_bundle = listing->n_bundles;
+    hs_listing   *listing = &built->listing;
+    const int64_t n = listing->n_pieces;
+    const int     m = built->search.scene.lattice.n_periodic;
+    hs_status     status = HS_ERR_MEMORY;
+    int64_t       n_bundles = 0, n_plain = 0;
+    for (int64_t p = 0; p < 2 * n; p++) {
+        hs_list_part *part = &listing->parts[p];
+        part->first_slab = listing->n_slabs;
+        n_plain += p < n ? part->n_bundles : 0;
+        n_bundles += part->n_bundles;
         listing->n_pairs += part->pairs.n_pairs;
-        listing->n_bundles += part->n_bundles;
-        if (p + 1 == built->n) {
-            listing->n_plain = listing->n_pairs;
-            n_plain = listing->n_bundles;
+        listing->n_slabs += (part->pairs.n_pairs + HS_SLAB - 1) / HS_SLAB;
+        if (part->pairs.n_pairs > 0) { /* what is behind the last one is read, too */
+            memset(hs_output_next(&part->pairs, HS_WANT_J), 0, HS_PADDING * sizeof(int32_t));
         }
     }
-    const int64_t most = listing->n_bundles - n_plain; /* images that there can be */
-    const int64_t n = most < built->n_images ? most : built->n_images;
+    const int64_t most = n_bundles - n_plain; /* images that there can be */
     int32_t *number = hs_alloc(NULL, HS_FOR_SHIFTS, most > 0 ? built->n_images : 0, sizeof *number);
-    listing->images = hs_alloc(NULL, HS_FOR_SHIFTS, n * m, sizeof *listing->images);
+    listing->images = hs_alloc(NULL, HS_FOR_SHIFTS,
+                               (most < built->n_images ? most : built->n_images) * m,
+                               sizeof *listing->images);
     if (number != NULL && listing->images != NULL) {
         status = HS_OK;
         memset(number, -1, most > 0 ? (size_t)built->n_images * sizeof *number : 0);
     }
-    for (int64_t p = built->n; status == HS_OK && p < 2 * built->n; p++) {
-        some_pairs *shifted = &built->parts[p];
+    for (int64_t p = n; status == HS_OK && p < 2 * n; p++) {
+        const hs_list_part *shifted = &listing->parts[p];
         for (int64_t b = 0; status == HS_OK && b < shifted->n_bundles; b++) {
             int32_t *const own = &number[shifted->bundles[b].image];
             if (*own < 0) {
@@ -388,42 +348,11 @@ count_pairs(building *built, hs_failure *failure)
         }
     }
     hs_free(NULL, number);
-    /* The pieces, which the account is not charged for, and the listing. */
-    const double bytes = (double)(2 * sizeof *listing->j) * (double)listing->n_pairs +
-                         (double)(3 * sizeof *listing->bundles) * (double)listing->n_bundles;
+    /* What the account is not charged for; half of it may be room. */
+    const double bytes = 2.0 * sizeof(int32_t) * (double)listing->n_pairs +
+                         2.0 * sizeof(hs_bundle) * (double)n_bundles;
     return status == HS_OK && !hs_account_allows(&built->call.account, bytes) ? HS_ERR_MEMORY
                                                                               : status;
-}
-
-/* Writes what was found to the listing. */
-static hs_status
-write_listing(building *built, hs_failure *failure)
-{
-    hs_listing     *listing = built->listing;
-    hs_store        larger = {0}; /* in place of listing->for_j, if that is too small */
-    const hs_status status = count_pairs(built, failure);
-    if (status != HS_OK) {
-        return status;
-    }
-    /* The list in use keeps its arrays until the last step that can fail. */
-    const int64_t n_j = listing->n_pairs + HS_PADDING;
-    const bool    fits = listing->for_j.data != NULL &&
-                      n_j * (int64_t)sizeof *listing->j <= listing->for_j.capacity;
-    if ((!fits && hs_store_reserve(&larger, HS_FOR_INDICES, n_j, sizeof *listing->j) == NULL) ||
-        hs_store_reserve(&listing->for_bundles, HS_FOR_INDICES, listing->n_bundles,
-                         sizeof *listing->bundles) == NULL) {
-        hs_store_free(&larger);
-        return HS_ERR_MEMORY;
-    }
-    if (!fits) {
-        hs_store_free(&listing->for_j);
-        listing->for_j = larger;
-    }
-    listing->j = listing->for_j.data;
-    listing->bundles = listing->for_bundles.data;
-    memset(listing->j + listing->n_pairs, 0, HS_PADDING * sizeof *listing->j);
-    hs_team_run(built->call.team, 2 * built->n, place_part, built);
-    return HS_OK;
 }
 
 hs_status
@@ -433,7 +362,6 @@ hs_listing_build(const hs_frame *frame, const hs_options *options, double radius
     int           row[HS_MAX_DIM];
     const hs_sets sets = {.points = &frame->points, .is_plain = true};
     hs_options    searching = *options;
-    hs_listing    next = *listing; /* with its stores */
     building     *built = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *built);
     if (built == NULL) {
         return HS_ERR_MEMORY;
@@ -449,14 +377,7 @@ hs_listing_build(const hs_frame *frame, const hs_options *options, double radius
     searching.want = HS_WANT_I | HS_WANT_J;
     searching.want |= hs_frame_periodic(frame, row) > 0 ? HS_WANT_SHIFT : 0;
     searching.index_bytes = 4;
-    next.n_pairs = 0; /* not known */
-    next.radius = radius;
-    next.counts = NULL;
-    next.images = NULL;
-    next.n_images = 0;
-    next.turn = 1 - listing->turn;
-    built->listing = &next;
-    built->parts = NULL;
+    built->listing = (hs_listing){.radius = radius};
     hs_call *const call = &built->call;
     hs_call_begin(&searching, call);
     hs_status  status = hs_search_open(&sets, hs_frame_box(frame), call, &built->search, failure);
@@ -465,46 +386,39 @@ hs_listing_build(const hs_frame *frame, const hs_options *options, double radius
         status = hs_estimate_by_sample(&built->search, failure);
     }
     if (status == HS_OK) {
-        status = renumber(&built->search, &next, failure);
+        status = renumber(&built->search, &built->listing, failure);
     }
     if (status == HS_OK) {
         status = find_pieces(built, failure);
         if (status == HS_OK) {
-            status = write_listing(built, failure);
+            status = count_pairs(built, failure);
         }
         if (failure->row >= 0) {
-            failure->row = next.order[failure->row];
+            failure->row = built->listing.order[failure->row];
         }
     }
     if (status == HS_ERR_MEMORY) {
-        failure->expected_pairs = fmax(failure->expected_pairs, (double)next.n_pairs);
+        failure->expected_pairs = fmax(failure->expected_pairs, (double)built->listing.n_pairs);
     }
     hs_call_tell_limit(call, status, failure);
-    for (int64_t p = 0; built->parts != NULL && p < 2 * built->n; p++) {
-        hs_output_free(&built->parts[p].pairs);
-        hs_free(NULL, built->parts[p].bundles);
-    }
-    hs_free(&call->account, built->parts);
     if (opened) {
         hs_search_close(&built->search);
     }
     hs_call_dismiss(call);
     hs_account_close(&call->account);
-    hs_free(NULL, built);
     if (status == HS_OK) {
-        hs_free(NULL, listing->images);
-        *listing = next;
-    } else { /* stores that are not in use may have grown */
-        hs_free(NULL, next.images);
-        listing->for_order[next.turn] = next.for_order[next.turn];
-        listing->for_counts[next.turn] = next.for_counts[next.turn];
+        const hs_listing before = *listing;
+        *listing = built->listing;
+        built->listing = before;
     }
+    hs_listing_free(&built->listing);
+    hs_free(NULL, built);
     return status;
 }
 
 /*
- * How far points have moved, a tile at a time: u_i = r_i - r0_i F - k_i h - c, what is left when
- * the deformation of the box, whole box vectors and what all points share are taken away.
+ * How far points have moved, a tile at a time: u_i = r_i - r0_i F - c - k_i h, what is left when
+ * the deformation of the box, what all points share and whole box vectors are taken away.
  */
 
 #define TILE 64 /* points whose displacements are held at a time; whole chains of a maximum */
@@ -516,9 +430,6 @@ typedef struct tracking {
     hs_lattice       lattice; /* of the box now */
     int              m;
     double           jump; /* longer displacements are looked at; infinity: none */
-    bool             has_base;
-    double           base[HS_MAX_DIM];
-    bool             has_drift;
     double           drift[HS_MAX_DIM];
     hs_store        *jumps;
     int64_t         *jump_of;   /* in it, m a point; NULL: there is none yet */
@@ -527,23 +438,12 @@ typedef struct tracking {
     double           magnitude; /* of the terms of wrapping */
 } tracking;
 
-/* u of the points of one tile, one array for each axis, without drift. */
+/* u of the points of one tile, one array for each axis. */
 typedef struct tile {
     int64_t first, step; /* points first, first + step, ... */
     int     n;
     double  u[HS_MAX_DIM][TILE];
 } tile;
-
-/* Whether a displacement is so long that it may be a jump. */
-static bool
-may_be_jump(const tracking *track, const tile *t, int p)
-{
-    double longest = 0.0;
-    for (int k = 0; k < track->lattice.ndim; k++) {
-        longest = hs_larger(fabs(t->u[k][p]), longest);
-    }
-    return !(longest < track->jump);
-}
 
 /* One loop for each common type and number of dimensions; maxima in several chains, for one would
  * wait for itself. */
@@ -563,7 +463,7 @@ subtract(const tracking *track, tile *t, const hs_real real, const int d, const 
                 before += hs_frame_entry(built, real, e - k + c) * track->strain.F[c][k];
             }
             before = deformed ? before : hs_frame_entry(built, real, e);
-            t->u[k][p] = hs_frame_entry(now, real, e) - before;
+            t->u[k][p] = hs_frame_entry(now, real, e) - before - track->drift[k];
         }
     }
 }
@@ -583,36 +483,11 @@ find_displacements(const tracking *track, tile *t)
     case 15: subtract(track, t, HS_FLOAT32, 3, true); break;
     default: subtract(track, t, real, d, track->deformed);
     }
-    for (int k = 0; track->has_base && k < d; k++) {
-        for (int p = 0; p < t->n; p++) {
-            t->u[k][p] -= track->base[k];
-        }
-    }
 }
 
-/* Takes whole box vectors from u of point p. Returns whether that is known to have worked; sets
- * `given`, over the box vectors as given. */
-static bool
-take_jump(tracking *track, tile *t, int p, int64_t *given)
-{
-    double  u[HS_MAX_DIM], inside[HS_MAX_DIM];
-    int64_t turns[HS_MAX_DIM];
-    for (int k = 0; k < track->lattice.ndim; k++) {
-        u[k] = t->u[k][p];
-    }
-    if (!hs_wrap_point(&track->lattice, u, inside, turns, &track->magnitude)) {
-        return false;
-    }
-    (void)hs_lattice_shift(&track->lattice, turns, given); /* these fit: hs_wrap_point found it */
-    for (int k = 0; k < track->lattice.ndim; k++) {
-        t->u[k][p] = inside[k];
-    }
-    return true;
-}
-
-/* The longest of the tile, less drift, to *square and *component. */
+/* The longest of the tile to *square and *component. */
 HS_ALWAYS_INLINE void
-find_longest(tile *t, const int d, const double *drift, double *square, double *component)
+find_longest(tile *t, const int d, double *square, double *component)
 {
     double most[CHAINS] = {0.0}, longest[CHAINS] = {0.0};
     for (int p = t->n; p % CHAINS != 0; p++) { /* the last one again */
@@ -624,7 +499,7 @@ find_longest(tile *t, const int d, const double *drift, double *square, double *
         double sum[CHAINS] = {0.0};
         for (int k = 0; k < d; k++) {
             for (int c = 0; c < CHAINS; c++) {
-                const double u = t->u[k][p + c] - drift[k];
+                const double u = t->u[k][p + c];
                 sum[c] += u * u;
                 longest[c] = hs_larger(fabs(u), longest[c]);
             }
@@ -633,56 +508,50 @@ find_longest(tile *t, const int d, const double *drift, double *square, double *
             most[c] = hs_larger(sum[c], most[c]);
         }
     }
+    *square = *component = 0.0;
     for (int c = 0; c < CHAINS; c++) {
         *square = hs_larger(most[c], *square);
         *component = hs_larger(longest[c], *component);
     }
 }
 
-/* The longest of the tile, less drift, to *square and *component, which are not lowered. */
+/* find_longest, with constants where that pays. */
 static void
-measure_tile(tile *t, int d, const double *drift, double *square, double *component)
+measure(tile *t, int d, double *square, double *component)
 {
     switch (d) {
-    case 2: find_longest(t, 2, drift, square, component); break;
-    case 3: find_longest(t, 3, drift, square, component); break;
-    default: find_longest(t, d, drift, square, component);
+    case 2: find_longest(t, 2, square, component); break;
+    case 3: find_longest(t, 3, square, component); break;
+    default: find_longest(t, d, square, component);
     }
 }
 
-/* Displacements of up to TILE points from `first` on; their longest to *square and *component.
- * Returns whether some point may have jumped. */
-static bool
-look_at_tile(const tracking *track, int64_t first, int64_t step, tile *t, double *square,
-             double *component)
-{
-    const double  none[HS_MAX_DIM] = {0.0};
-    const int64_t left = (track->motion->now->points.n - first + step - 1) / step;
-    t->first = first;
-    t->step = step;
-    t->n = left < TILE ? (int)left : TILE;
-    *square = *component = 0.0;
-    find_displacements(track, t);
-    measure_tile(t, track->motion->now->points.ndim, none, square, component);
-    return track->m > 0 && !(*component < track->jump);
-}
-
-/* Takes and keeps the jumps of the points of a tile. HS_REBUILD: some point went too far to
- * tell. */
+/* Takes whole box vectors from the longest of the tile, and if `keeps` says by how many of those
+ * given each point has jumped. HS_REBUILD: some point went too far to tell. */
 static hs_status
-take_jumps(tracking *track, tile *t)
+take_jumps(tracking *track, tile *t, bool keeps)
 {
-    const int m = track->m;
+    const int d = track->lattice.ndim, m = track->m;
     for (int p = 0; p < t->n; p++) {
-        int64_t  given[HS_MAX_DIM];
+        double   u[HS_MAX_DIM], inside[HS_MAX_DIM], longest = 0.0;
+        int64_t  turns[HS_MAX_DIM], given[HS_MAX_DIM];
         uint64_t any = 0;
-        if (!may_be_jump(track, t, p)) {
+        for (int k = 0; k < d; k++) {
+            u[k] = t->u[k][p];
+            longest = hs_larger(fabs(u[k]), longest);
+        }
+        if (longest < track->jump) {
             continue;
         }
-        if (!take_jump(track, t, p, given)) {
+        if (!hs_wrap_point(&track->lattice, u, inside, turns, &track->magnitude)) {
             return HS_REBUILD;
         }
-        for (int r = 0; r < m; r++) {
+        (void)hs_lattice_shift(&track->lattice, turns,
+                               given); /* these fit: hs_wrap_point found it */
+        for (int k = 0; k < d; k++) {
+            t->u[k][p] = inside[k];
+        }
+        for (int r = 0; keeps && r < m; r++) {
             any |= (uint64_t)given[r];
         }
         if (any != 0 && track->jump_of == NULL) { /* no jumps yet */
@@ -700,10 +569,32 @@ take_jumps(tracking *track, tile *t)
     return HS_OK;
 }
 
+/* Displacements of up to TILE points from `first` on, with the longest of all so far. Statuses of
+ * take_jumps. */
+static hs_status
+look_at_tile(tracking *track, int64_t first, int64_t step, bool keeps, tile *t)
+{
+    const hs_points *points = &track->motion->now->points;
+    const int64_t    left = (points->n - first + step - 1) / step;
+    double           square, component;
+    hs_status        status = HS_OK;
+    t->first = first;
+    t->step = step;
+    t->n = left < TILE ? (int)left : TILE;
+    find_displacements(track, t);
+    measure(t, points->ndim, &square, &component);
+    if (track->m > 0 && !(component < track->jump)) {
+        status = take_jumps(track, t, keeps);
+        measure(t, points->ndim, &square, &component);
+    }
+    track->square = hs_larger(square, track->square);
+    track->component = hs_larger(component, track->component);
+    return status;
+}
+
 /*
  * Chooses F, k and c, and finds what the longest displacement leaves of the skin. Any F, k and c
- * are right; good ones make displacements small. c is `base`, taken away before box vectors are
- * looked for, and `drift`, taken away behind that.
+ * are right; good ones make displacements small. c is `drift`.
  */
 
 #define UNIT   0x1p-53
@@ -714,31 +605,6 @@ take_jumps(tracking *track, tile *t)
 /* A displacement of this share of the box's smallest height may be a jump. */
 #define JUMP 0.25
 
-/* Points that all went far share that, or most of it: the displacement of one of them. */
-static void
-find_base(tracking *track)
-{
-    const int64_t n = track->motion->now->points.n, step = (n + SAMPLE - 1) / SAMPLE;
-    int64_t       count = 0, far = 0;
-    double        base[HS_MAX_DIM] = {0.0}, square, component;
-    tile          t;
-    for (int64_t i = 0; track->m > 0 && i < n; i += TILE * step, count += t.n) {
-        const bool any = look_at_tile(track, i, step, &t, &square, &component);
-        for (int p = 0; any && p < t.n; p++) {
-            if (may_be_jump(track, &t, p)) {
-                for (int k = 0; far == 0 && k < track->lattice.ndim; k++) {
-                    base[k] = t.u[k][p];
-                }
-                far++;
-            }
-        }
-    }
-    if (2 * far > count) {
-        track->has_base = true;
-        memcpy(track->base, base, sizeof base);
-    }
-}
-
 /* The drift of a sample, whose jumps are taken away: the mean, or where the sample is all there is
  * the middle of the range. A second pass finds how much shorter that makes the longest. */
 static void
@@ -747,34 +613,28 @@ guess_drift(tracking *track)
     const int64_t n = track->motion->now->points.n, step = (n + SAMPLE - 1) / SAMPLE;
     const int     d = track->motion->now->points.ndim;
     double        sum[HS_MAX_DIM] = {0.0}, lower[HS_MAX_DIM] = {0.0}, upper[HS_MAX_DIM] = {0.0};
-    double        drift[HS_MAX_DIM] = {0.0}, longest[2] = {0.0}, count = 0.0, square, component;
+    double        longest[2], count = 0.0;
     tile          t;
     for (int pass = 0; pass < 2; pass++) {
         for (int64_t i = 0; i < n; i += TILE * step) {
-            const bool any = look_at_tile(track, i, step, &t, &square, &component);
-            for (int p = 0; p < t.n; p++) {
-                if (any && may_be_jump(track, &t, p)) {
-                    int64_t given[HS_MAX_DIM];
-                    (void)take_jump(track, &t, p,
-                                    given); /* a failure shows again in the full pass */
-                }
-                for (int k = 0; pass == 0 && k < d; k++) {
+            (void)look_at_tile(track, i, step, false, &t); /* a failure shows again later */
+            for (int p = 0; pass == 0 && p < t.n; p++, count++) {
+                for (int k = 0; k < d; k++) {
                     const double u = t.u[k][p];
                     sum[k] += u;
-                    lower[k] = i + p == 0 ? u : hs_smaller(u, lower[k]);
-                    upper[k] = i + p == 0 ? u : hs_larger(u, upper[k]);
+                    lower[k] = count == 0.0 ? u : hs_smaller(u, lower[k]);
+                    upper[k] = count == 0.0 ? u : hs_larger(u, upper[k]);
                 }
             }
-            count += pass == 0 ? t.n : 0;
-            measure_tile(&t, d, drift, &longest[pass], &component);
         }
         for (int k = 0; pass == 0 && count > 0.0 && k < d; k++) {
-            drift[k] = n <= SAMPLE ? 0.5 * lower[k] + 0.5 * upper[k] : sum[k] / count;
+            track->drift[k] = n <= SAMPLE ? 0.5 * lower[k] + 0.5 * upper[k] : sum[k] / count;
         }
+        longest[pass] = track->square;
+        track->square = track->component = 0.0;
     }
-    if (longest[1] < WORTHWHILE * WORTHWHILE * longest[0]) {
-        track->has_drift = true;
-        memcpy(track->drift, drift, sizeof drift);
+    if (!(longest[1] < WORTHWHILE * WORTHWHILE * longest[0])) {
+        memset(track->drift, 0, sizeof track->drift);
     }
 }
 
@@ -806,10 +666,7 @@ bound_rounding(const tracking *track)
     if (track->deformed) { /* d products, d sums and a difference of these sizes */
         bound += (2 * d + 4) * UNIT * sizes + 0x1p-1050;
     }
-    for (int k = 0; track->has_base && k < d; k++) { /* two differences */
-        bound += 2.0 * UNIT * (sizes + fabs(track->base[k]));
-    }
-    if (track->jump_of != NULL) { /* a difference, wrapped: hs_wrap_point bounds its error */
+    if (track->jump_of != NULL) { /* differences, wrapped: hs_wrap_point bounds its error */
         const double terms = 2 * track->m + 2;
         bound += 2.0 * UNIT * (sizes + track->magnitude) +
                  terms * terms * 0x1p-104 * track->magnitude + 0x1p-1050;
@@ -864,18 +721,9 @@ hs_motion_margin(const hs_motion *motion, const hs_options *options, double *mar
             return HS_OK;
         }
     }
-    find_base(&track);
     guess_drift(&track);
     for (int64_t first = 0; status == HS_OK && first < n; first += TILE) {
-        double     square, component;
-        const bool any = look_at_tile(&track, first, 1, &t, &square, &component);
-        status = any ? take_jumps(&track, &t) : HS_OK;
-        if (status == HS_OK && (any || track.has_drift)) {
-            measure_tile(&t, now->points.ndim, track.drift, &track.square, &track.component);
-        } else {
-            track.square = hs_larger(square, track.square);
-            track.component = hs_larger(component, track.component);
-        }
+        status = look_at_tile(&track, first, 1, true, &t);
         if (status == HS_OK && (first + TILE) % HS_POLL_POINTS == 0) {
             status = hs_poll(options, 0.0);
         }

@@ -11,6 +11,14 @@
  * the motion of the points leaves.
  */
 
+/* Consecutive pairs, all without an image or all with one. */
+typedef struct hs_list_part {
+    hs_output  pairs;   /* b of each, in its column j; counted by no account */
+    hs_bundle *bundles; /* owned; ends are places in this part */
+    int64_t    n_bundles, capacity;
+    int64_t    first_slab; /* of all slabs: its pairs are in so many as they fill */
+} hs_list_part;
+
 /*
  * The pairs within `radius` of one step, in bundles: those of one point a with all that are in the
  * same image of it. Points are told by their places in the cell order of that step. The shift from
@@ -18,24 +26,22 @@
  *
  *     S = image + count_a - count_b      over the box vectors that repeat, as given
  *
- * Points keep their image of each other while they move; their counts follow their jumps. The first
- * n_plain pairs have the image 0. Which of a and b is i, the lower number of the caller's, is seen
- * when the pair is written; where both are one point, image has it the right way round.
+ * Points keep their image of each other while they move; their counts follow their jumps. Few pairs
+ * have an image that is not 0, those that are in different ones once the points are wrapped. Which
+ * of a and b is i, the lower number of the caller's, is seen when the pair is written; where both
+ * are one point, image has it the right way round. All arrays are owned.
  */
 typedef struct hs_listing {
-    int64_t    n_pairs, n_plain;
-    int32_t   *j;       /* b of each pair, and HS_PADDING places more */
-    hs_bundle *bundles; /* first those without an image */
-    int64_t    n_bundles;
-    int64_t    n_images;
-    int32_t   *images; /* owned; m numbers of each, over the box vectors that repeat, as given */
-    int32_t   *order;  /* the caller's number of each place */
-    int64_t   *counts; /* m for each place, when it was built; NULL: all zero */
-    double     radius;
-    /* Where the other arrays are. Pairs are written when nothing can fail any more; the others are
-     * made beside those in use, and `turn` says which are in use. */
-    hs_store for_j, for_bundles, for_order[2], for_counts[2];
-    int      turn;
+    double  radius;
+    int64_t n_pairs, n_slabs;
+    /* Ranges of points, each by one thread: how many there are depends on the number of threads,
+     * what follows from one to the next does not. */
+    int64_t       n_pieces;
+    hs_list_part *parts; /* of each piece the pairs with image 0, then of each the others */
+    int64_t       n_images;
+    int32_t      *images; /* m numbers of each, over the box vectors that repeat, as given */
+    int32_t      *order;  /* the caller's number of each place */
+    int64_t      *counts; /* m for each place, when it was built */
 } hs_listing;
 
 struct hs_verlet {

@@ -30,7 +30,7 @@ typedef struct checking {
     int              vector_of_row[HS_MAX_DIM];
     hs_metric        given;  /* on points and box vectors as given */
     void            *memory; /* owned; of all arrays below: in whole pages where there is much */
-    int64_t         *counts; /* m a point, as those of the list, jumps included; or NULL */
+    int64_t         *counts; /* m a point, as those of the list, jumps included */
     double           most_counts;    /* the largest of them, of either sign */
     float           *y;              /* kernels/slab.h */
     float           *offset;         /* of each image */
@@ -41,15 +41,13 @@ typedef struct checking {
      * The metric's shift from a to b is image + lead_a - lead_b. */
     hs_scene         scene;
     const hs_metric *metric;
-    double *const   *columns;          /* of the points; NULL: they are read where they are */
-    int64_t         *image;            /* m for each image */
-    int64_t         *lead;             /* or `counts`; m a point; NULL: all are zero */
-    uint8_t         *leads;            /* whether those of a point are not; NULL: they may be */
-    bool             writes;           /* d and D are written by the kernel's writer. Then: */
-    hs_candidate    *candidates;       /* the points, moved by -lead */
-    bool             are_fine;         /* hs_write.is_fine */
-    int64_t          n_plain, n_slabs; /* slabs: each ends where images begin, or is full */
-    int64_t          in_range;         /* of them */
+    double *const   *columns;    /* of the points; NULL: they are read where they are */
+    int64_t         *image;      /* m for each image */
+    int64_t         *lead;       /* or `counts`; m a point; NULL: all are zero */
+    bool             writes;     /* d and D are written by the kernel's writer. Then: */
+    hs_candidate    *candidates; /* the points, moved by -lead */
+    bool             are_fine;   /* hs_write.is_fine */
+    int64_t          in_range;   /* slabs */
 } checking;
 
 /* Consecutive pairs, all with or all without an image, and their hits. */
@@ -87,14 +85,13 @@ add_counts(checking *recheck)
     const int64_t     n = recheck->now->points.n;
     const int         m = recheck->m;
     const int64_t    *jumps = list->jumps_now >= 0 ? list->jumps[list->jumps_now].data : NULL;
-    for (int64_t a = 0; recheck->counts != NULL && a < n; a++) {
+    for (int64_t a = 0; a < n; a++) {
         const int64_t *jump = jumps != NULL ? jumps + (int64_t)listing->order[a] * m : NULL;
         if (jumps != NULL && a + POINTS_AHEAD < n) {
             HS_PREFETCH(jumps + (int64_t)listing->order[a + POINTS_AHEAD] * m);
         }
         for (int r = 0; r < m; r++) {
-            const int64_t count = (listing->counts != NULL ? listing->counts[a * m + r] : 0) +
-                                  (jump != NULL ? jump[r] : 0);
+            const int64_t count = listing->counts[a * m + r] + (jump != NULL ? jump[r] : 0);
             recheck->counts[a * m + r] = count;
             recheck->most_counts = hs_larger(fabs((double)count), recheck->most_counts);
         }
@@ -159,7 +156,7 @@ static double
 put_points(const checking *recheck, hs_scale scale)
 {
     const hs_real real = recheck->now->points.real;
-    const int     d = recheck->d, m = recheck->counts != NULL ? recheck->m : 0;
+    const int     d = recheck->d, m = recheck->m;
     const bool    narrow = real == HS_FLOAT32;
     const int64_t n = recheck->now->points.n, step = (n + SAMPLE - 1) / SAMPLE;
     double        lower[HS_MAX_DIM] = {0.0}, upper[HS_MAX_DIM] = {0.0}, centre[HS_MAX_DIM];
@@ -185,7 +182,7 @@ put_points(const checking *recheck, hs_scale scale)
 }
 
 /*
- * Thresholds of filter.h, whose direct form has a candidate y_j and a point q = y_i - offset, which
+ * Thresholds of filter.h, where a candidate is y_j and a point is q = y_i - offset, which
  * it knows to be rounded to a float. Before that, y_i and the offset were rounded, too (u of each),
  * and the offset was summed in float64. Images become floats here.
  */
@@ -206,7 +203,7 @@ set_thresholds(checking *recheck, hs_scale scale, double largest)
         }
         rows += longest;
     }
-    if (recheck->counts != NULL) { /* coordinates are counted off by m products and sums */
+    if (m > 0) { /* coordinates are counted off by m products and sums */
         error += (2 * m + 4) * UNIT *
                  (hs_scale_apply(scale, recheck->now->largest) +
                   recheck->most_counts * hs_scale_apply(scale, rows));
@@ -232,8 +229,8 @@ set_thresholds(checking *recheck, hs_scale scale, double largest)
 }
 
 /*
- * Pairs of a slab, a batch at a time: they are decided as a search decides them, where float32
- * cannot tell, and measured as a search does it, so that d and D have its bits.
+ * Pairs of a slab: they are decided as a search decides them, where float32 cannot tell, and
+ * measured as a search does it, a batch at a time, so that d and D have its bits.
  */
 
 /* Coordinate k of a point, for the metric. */
@@ -246,44 +243,45 @@ coordinate_of(const checking *recheck, int64_t a, int k, const int d)
                                     : hs_frame_entry(now->points.data, now->points.real, i * d + k);
 }
 
+/* The metric's shift along row r, from the point of a bundle to that at place b. */
+HS_ALWAYS_INLINE int64_t
+shift_between(const checking *recheck, const slab_hits *slab, const hs_bundle *of, int64_t b, int r)
+{
+    const int m = recheck->m;
+    uint64_t  shift = 0; /* modulo 2^64: exact, for the sum fits */
+    if (slab->has_images) {
+        shift += (uint64_t)recheck->image[(int64_t)of->image * m + r];
+    }
+    if (recheck->lead != NULL) {
+        shift += (uint64_t)recheck->lead[(int64_t)of->point * m + r] -
+                 (uint64_t)recheck->lead[b * m + r];
+    }
+    return (int64_t)shift;
+}
+
 /* n pairs to the batch: of these bundles, and with the points at these places. */
 HS_ALWAYS_INLINE void
 fill_in(const checking *recheck, slab_hits *slab, const int32_t *bundle, const int32_t *place,
         int32_t n, const int d)
 {
-    hs_measured   *batch = &slab->batch;
-    const uint8_t *leads = recheck->leads;
-    const int      m = recheck->m;
-    unsigned       any = slab->has_images;
-    for (int32_t e = 0; e < n;) {
-        const int32_t t = bundle[e];
-        const int64_t a = slab->of.bundles[t].point;
-        double        p[HS_MAX_DIM];
-        for (int k = 0; k < d; k++) {
-            p[k] = coordinate_of(recheck, a, k, d);
-        }
-        any |= leads != NULL ? leads[a] : recheck->lead != NULL;
-        for (; e < n && bundle[e] == t; e++) {
-            const int64_t b = place[e];
-            for (int k = 0; k < d; k++) {
-                batch->p[k][e] = p[k];
-                batch->q[k][e] = coordinate_of(recheck, b, k, d);
-            }
-            any |= leads != NULL ? leads[b] : 0u;
-        }
-    }
+    hs_measured *batch = &slab->batch;
     batch->n = n;
     batch->is_shifted = batch->is_wide = false;
-    for (int32_t e = 0; any != 0 && e < n; e++) {
-        const hs_bundle *of = &slab->of.bundles[bundle[e]];
-        for (int r = 0; r < m; r++) { /* modulo 2^64: exact, for the sum fits */
-            const int64_t image = (int64_t)of->image * m + r;
-            uint64_t      shift = slab->has_images ? (uint64_t)recheck->image[image] : 0;
-            if (recheck->lead != NULL) {
-                shift += (uint64_t)recheck->lead[(int64_t)of->point * m + r] -
-                         (uint64_t)recheck->lead[(int64_t)place[e] * m + r];
+    for (int32_t e = 0; e < n;) {
+        const int32_t    t = bundle[e];
+        const hs_bundle *of = &slab->of.bundles[t];
+        double           p[HS_MAX_DIM];
+        for (int k = 0; k < d; k++) {
+            p[k] = coordinate_of(recheck, of->point, k, d);
+        }
+        for (; e < n && bundle[e] == t; e++) {
+            for (int k = 0; k < d; k++) {
+                batch->p[k][e] = p[k];
+                batch->q[k][e] = coordinate_of(recheck, place[e], k, d);
             }
-            hs_measured_shift(batch, e, r, (int64_t)shift);
+            for (int r = 0; r < recheck->m; r++) {
+                hs_measured_shift(batch, e, r, shift_between(recheck, slab, of, place[e], r));
+            }
         }
     }
     const size_t padding = HS_BATCH_PADDING * sizeof(double); /* which kernels read */
@@ -305,67 +303,28 @@ fill(const checking *recheck, slab_hits *slab, const int32_t *bundle, const int3
     }
 }
 
-/* Whether each pair of the batch is within the cutoff: by the kernel, and what that leaves one by
- * one. */
-static void
-decide_batch(const checking *recheck, slab_hits *slab, uint8_t *within)
-{
-    const hs_metric   *metric = recheck->metric;
-    const hs_measured *pairs = &slab->batch;
-    uint8_t            verdict[HS_IN_BATCH] = {0};
-    hs_batch           batch = {.n = pairs->n};
-    for (int k = 0; k < recheck->d; k++) {
-        batch.p[k] = pairs->p[k];
-        batch.q[k] = pairs->q[k];
-    }
-    for (int r = 0; pairs->is_shifted && r < recheck->m; r++) {
-        batch.shift[r] = pairs->times[r];
-    }
-    if (!pairs->is_wide) {
-        recheck->call->kernel->decide_batch(metric, &batch, verdict, &slab->stages);
-    }
-    for (int32_t e = 0; e < pairs->n; e++) {
-        double  p[HS_MAX_DIM], q[HS_MAX_DIM];
-        int64_t of_pair[HS_MAX_DIM];
-        if (verdict[e] != HS_UNDECIDED) {
-            within[e] = verdict[e] == HS_WITHIN;
-            continue;
-        }
-        for (int k = 0; k < recheck->d; k++) {
-            p[k] = pairs->p[k][e];
-            q[k] = pairs->q[k][e];
-        }
-        for (int r = 0; pairs->is_shifted && r < recheck->m; r++) {
-            of_pair[r] = pairs->shift[r][e];
-        }
-        const int64_t *shift = pairs->is_shifted ? of_pair : NULL;
-        within[e] = pairs->is_wide
-                        ? hs_metric_within(metric, p, q, shift, &slab->stages)
-                        : hs_metric_decide_by_integers(metric, p, q, shift, &slab->stages);
-    }
-}
-
 /* Decides the hits of a slab that float32 cannot tell, of which there are some, and takes those
  * that are beyond the cutoff from the hits. */
 static void
 decide_unsure(const checking *recheck, slab_hits *slab)
 {
-    const int32_t *j = recheck->list->listing.j + slab->of.first;
-    int32_t        gone[HS_SLAB], n_gone = 0;
-    for (int32_t u = 0; u < slab->of.n_open; u += HS_BATCH) {
-        const int32_t n = slab->of.n_open - u < HS_BATCH ? slab->of.n_open - u : HS_BATCH;
-        int32_t       bundle[HS_BATCH], place[HS_BATCH];
-        uint8_t       within[HS_BATCH];
-        for (int32_t e = 0; e < n; e++) {
-            bundle[e] = slab->open[u + e].bundle;
-            place[e] = j[slab->open[u + e].pair];
+    const int d = recheck->d;
+    int32_t   gone[HS_SLAB], n_gone = 0;
+    for (int32_t u = 0; u < slab->of.n_open; u++) {
+        const hs_open_pair *open = &slab->open[u];
+        const hs_bundle    *of = &slab->of.bundles[open->bundle];
+        const int64_t       b = slab->of.j[slab->of.first + open->pair];
+        double              p[HS_MAX_DIM], q[HS_MAX_DIM];
+        int64_t             shift[HS_MAX_DIM];
+        for (int k = 0; k < d; k++) {
+            p[k] = coordinate_of(recheck, of->point, k, d);
+            q[k] = coordinate_of(recheck, b, k, d);
         }
-        fill(recheck, slab, bundle, place, n);
-        decide_batch(recheck, slab, within);
-        for (int32_t e = 0; e < n; e++) {
-            gone[n_gone] = slab->open[u + e].at;
-            n_gone += !within[e];
+        for (int r = 0; r < recheck->m; r++) {
+            shift[r] = shift_between(recheck, slab, of, b, r);
         }
+        gone[n_gone] = open->at;
+        n_gone += !hs_metric_within(recheck->metric, p, q, shift, &slab->stages);
     }
     for (int32_t g = 0, to = gone[0]; g < n_gone; g++) {
         const int32_t from = gone[g] + 1, end = g + 1 < n_gone ? gone[g + 1] : slab->of.n_hits;
@@ -462,7 +421,7 @@ set_shifts(checking *recheck)
 {
     const hs_scene   *scene = &recheck->scene;
     const hs_listing *listing = &recheck->list->listing;
-    const bool        as_given = recheck->leads == NULL;
+    const bool        as_given = recheck->lead == NULL;
     const int         m = recheck->m;
     const int64_t     n = recheck->now->points.n;
     int64_t           over[HS_MAX_DIM][HS_MAX_DIM] = {{0}}, shift[HS_MAX_DIM];
@@ -485,23 +444,17 @@ set_shifts(checking *recheck)
         reduce_shift(m, (const int64_t(*)[HS_MAX_DIM])over, shift, recheck->image + number * m);
     }
     if (as_given) {
-        recheck->lead = recheck->counts;
+        recheck->lead = m > 0 ? recheck->counts : NULL;
         return;
     }
-    memset(shift, 0, sizeof shift);
     for (int64_t a = 0; a < n; a++) {
-        int64_t *lead = recheck->lead + a * m, of_point = 0;
-        if (recheck->counts != NULL) {
-            memcpy(shift, recheck->counts + a * m, (size_t)m * sizeof *shift);
-        }
-        reduce_shift(m, (const int64_t(*)[HS_MAX_DIM])over, shift, lead);
+        int64_t *lead = recheck->lead + a * m;
+        reduce_shift(m, (const int64_t(*)[HS_MAX_DIM])over, recheck->counts + a * m, lead);
         for (int r = 0; r < m; r++) {
             const int64_t turns = hs_turns_get(&scene->turns, r, recheck->list->listing.order[a]);
             lead[r] = (int64_t)((uint64_t)lead[r] - (uint64_t)turns);
-            of_point |= lead[r];
+            any |= lead[r];
         }
-        recheck->leads[a] = of_point != 0;
-        any |= of_point;
     }
     if (any == 0) {
         recheck->lead = NULL;
@@ -583,15 +536,12 @@ allocate(checking *recheck)
     hs_parts_add(&parts, (void **)&recheck->y, n * stride, sizeof(float));
     hs_parts_add(&parts, (void **)&recheck->offset, listing->n_images * stride, sizeof(float));
     hs_parts_add(&parts, (void **)&recheck->image, listing->n_images * m, sizeof(int64_t));
-    if (listing->counts != NULL || recheck->list->jumps_now >= 0) {
-        hs_parts_add(&parts, (void **)&recheck->counts, n * m, sizeof(int64_t));
-    }
+    hs_parts_add(&parts, (void **)&recheck->counts, n * m, sizeof(int64_t));
     if (recheck->measures && can_write(recheck)) {
         hs_parts_add(&parts, (void **)&recheck->candidates, n, sizeof(hs_candidate));
     }
     if (recheck->measures && !recheck->scene.keeps_originals && m > 0) {
         hs_parts_add(&parts, (void **)&recheck->lead, n * m, sizeof(int64_t));
-        hs_parts_add(&parts, (void **)&recheck->leads, n, 1);
     }
     recheck->memory = hs_parts_alloc(&recheck->call->account, HS_FOR_POINTS, &parts);
     return recheck->memory != NULL;
@@ -650,11 +600,13 @@ write_hits(const checking *recheck, slab_hits *slab, const hs_output *output)
         .n = slab->of.n_bundles, .point = slab->point, .end = slab->hits_end, .label = slab->hits};
     hs_measures_tell(&recheck->scene, &recheck->call->options, &write);
     for (int32_t t = 0; t < slab->of.n_bundles; t++) {
-        const hs_bundle *bundle = &slab->of.bundles[t];
-        const int64_t    a = bundle->point;
-        slab->point[t] = recheck->list->listing.order[a];
-        for (int k = 0; k < recheck->d; k++) {
-            slab->p[k][t] = recheck->scene.cloud.x[k][slab->point[t]];
+        const hs_bundle    *bundle = &slab->of.bundles[t];
+        const int64_t       a = bundle->point;
+        const hs_candidate *own = &recheck->candidates[a];
+        slab->point[t] = own->number;
+        for (int k = 0; k < recheck->d; k++) { /* halves that have not been moved are at hand */
+            slab->p[k][t] = recheck->lead == NULL ? own->large[k] + own->small[k]
+                                                  : recheck->scene.cloud.x[k][own->number];
         }
         for (int r = 0; shifted && r < m; r++) {
             const int64_t image = slab->has_images ? recheck->image[(int64_t)bundle->image * m + r]
@@ -789,14 +741,17 @@ typedef struct worker {
 static void
 find_hits(const checking *recheck, int64_t s, slab_hits *slab)
 {
-    const hs_listing *listing = &recheck->list->listing;
-    const bool        plain = s < recheck->n_plain;
-    const int64_t     last = plain ? listing->n_plain : listing->n_pairs;
-    int64_t           bundle = 0, end = listing->n_bundles;
-    const int64_t first = plain ? s * HS_SLAB : listing->n_plain + (s - recheck->n_plain) * HS_SLAB;
+    const hs_listing   *listing = &recheck->list->listing;
+    const hs_list_part *part = listing->parts + 2 * listing->n_pieces - 1;
+    while (part->first_slab > s) {
+        part--;
+    }
+    const bool    plain = part - listing->parts < listing->n_pieces;
+    const int64_t first = (s - part->first_slab) * HS_SLAB, left = part->pairs.n_pairs - first;
+    int64_t       bundle = 0, end = part->n_bundles;
     while (bundle < end) { /* the first that ends behind the slab's first pair */
         const int64_t middle = bundle + (end - bundle) / 2;
-        if (listing->bundles[middle].end <= first) {
+        if (part->bundles[middle].end <= first) {
             bundle = middle + 1;
         } else {
             end = middle;
@@ -808,10 +763,10 @@ find_hits(const checking *recheck, int64_t s, slab_hits *slab)
         .ndim = recheck->d,
         .y = recheck->y,
         .offset = plain ? NULL : recheck->offset,
-        .j = listing->j,
-        .bundles = listing->bundles + bundle,
+        .j = hs_output_column(&part->pairs, HS_WANT_J),
+        .bundles = part->bundles + bundle,
         .first = first,
-        .end = last - first < HS_SLAB ? last : first + HS_SLAB,
+        .end = first + (left < HS_SLAB ? left : HS_SLAB),
         .numbers = recheck->numbers,
         .limit = plain ? recheck->plain : recheck->shifted,
         .hits = slab->hits,
@@ -840,7 +795,7 @@ do_slab(worker *me, int64_t s)
     me->done.by_integers += slab->stages.by_integers;
     me->work += slab->of.end - slab->of.first + INTEGER_WORK * slab->stages.by_integers +
                 (recheck->measures ? MEASURE_WORK * (int64_t)slab->of.n_hits : 0);
-    const double done = (double)slab->of.end / (double)recheck->list->listing.n_pairs;
+    const double done = (double)(s + 1) / (double)recheck->list->listing.n_slabs;
     hs_status    status = hs_output_reserve(output, slab->of.n_hits, recheck->shared ? 0.0 : done);
     if (status == HS_OK && slab->of.n_hits > 0) {
         const bool written = recheck->writes && write_hits(recheck, slab, output);
@@ -868,14 +823,15 @@ do_range(void *context, int64_t range)
 {
     worker         *me = context;
     const checking *recheck = me->recheck;
-    const int64_t   first = range * recheck->in_range, left = recheck->n_slabs - first;
-    const int64_t   end = first + (left < recheck->in_range ? left : recheck->in_range);
-    hs_status       status = HS_OK;
+    const int64_t first = range * recheck->in_range, left = recheck->list->listing.n_slabs - first;
+    const int64_t end = first + (left < recheck->in_range ? left : recheck->in_range);
+    hs_status     status = HS_OK;
     for (int64_t s = first; s < end && status == HS_OK; s++) {
         status = do_slab(me, s);
     }
     return status == HS_OK && recheck->shared
-               ? hs_commit(&me->committer, (double)end / (double)recheck->n_slabs, true)
+               ? hs_commit(&me->committer, (double)end / (double)recheck->list->listing.n_slabs,
+                           true)
                : status;
 }
 
@@ -903,17 +859,14 @@ close_worker(void *context, void *place)
 static hs_status
 run(checking *recheck, hs_failure *failure)
 {
-    const hs_listing *listing = &recheck->list->listing;
-    const unsigned    columns = recheck->output->columns;
-    hs_account       *account = &recheck->call->account;
-    recheck->n_plain = (listing->n_plain + HS_SLAB - 1) / HS_SLAB;
-    recheck->n_slabs =
-        recheck->n_plain + (listing->n_pairs - listing->n_plain + HS_SLAB - 1) / HS_SLAB;
+    const int64_t  n_slabs = recheck->list->listing.n_slabs;
+    const unsigned columns = recheck->output->columns;
+    hs_account    *account = &recheck->call->account;
     recheck->in_range =
         1 + HS_RANGE_BYTES / (1 + HS_SLAB * hs_output_bytes_per_pair(recheck->output));
     /* The kernels write a little beyond the last pair, where the caller's arrays may end. */
     recheck->shared = recheck->output->fixed ||
-                      (recheck->call->team != NULL && recheck->n_slabs > recheck->in_range);
+                      (recheck->call->team != NULL && n_slabs > recheck->in_range);
     recheck->numbers = !recheck->measures && !(columns & HS_WANT_SHIFT) &&
                        hs_slab_has_numbers(recheck->d);
     hs_status status = HS_OK;
@@ -946,7 +899,7 @@ run(checking *recheck, hs_failure *failure)
                         .worker_size = sizeof(worker),
                         .open = open_worker,
                         .close = close_worker,
-                        .n_ranges = (recheck->n_slabs + recheck->in_range - 1) / recheck->in_range,
+                        .n_ranges = (n_slabs + recheck->in_range - 1) / recheck->in_range,
                         .search = do_range,
                         .output = recheck->shared ? recheck->output : NULL};
         status = hs_crew_run(&crew, failure);

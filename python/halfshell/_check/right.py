@@ -334,16 +334,19 @@ class Right:
         p, q = p.astype(np.float64), q.astype(np.float64)
         D, size = q - p, np.abs(p) + np.abs(q)
         if self.box is not None:
-            moved = rows[:, 2:].astype(np.float64)
-            D = D + moved @ self.box
-            size = size + np.abs(moved) @ np.abs(self.box)
+            shifts = rows[:, 2:].astype(np.float64)
+            D = D + shifts @ self.box
+            size = size + np.abs(shifts) @ np.abs(self.box)
+        extent, exponent = math.frexp(self.extent)
         for side, H in self._judging():
             matrices = H[rows[:, side]]
-            with np.errstate(all="ignore"):  # squares may overflow
-                z = np.sqrt((np.einsum("kab,kb->ka", matrices, D) ** 2).sum(axis=1))
-                doubt = _DOUBT * np.einsum("kab,kb->k", np.abs(matrices), size) + 2.0**-500
-                within = z + doubt < self.extent * (1.0 - _DOUBT)
-                yield within, np.isfinite(z) & (z - doubt > self.extent * (1.0 + _DOUBT))
+            with np.errstate(all="ignore"):  # squares, in units of the extent, may overflow
+                moved = np.einsum("kab,kb->ka", matrices, D)
+                doubt = _DOUBT * np.einsum("kab,kb->k", np.abs(matrices), size) + 2.0**-1060
+                z = np.sqrt((np.ldexp(moved, -exponent) ** 2).sum(axis=1))
+                doubt = np.ldexp(doubt, -exponent) + 2.0**-500
+                within = z + doubt < extent * (1.0 - _DOUBT)
+                yield within, np.isfinite(z) & (z - doubt > extent * (1.0 + _DOUBT))
 
 
 def _are_near(lengths: Any, other: Any) -> _Bools:

@@ -168,6 +168,13 @@ def _endpoints(plain: Sequence[str]) -> tuple[int, int] | None:
 def _wanted(names: Sequence[str], ndim: int) -> list[str]:
     """The names of i, j and, as far as there are some, the components of the shift."""
     plain = [_plain(name) for name in names]
+
+    def picked(places: Sequence[int]) -> list[str]:
+        for k in places:
+            if plain.count(plain[k]) > 1:
+                raise InputError(f"has more than one column {names[k]}")
+        return [names[k] for k in places]
+
     ends = _endpoints(plain)
     if ends is None:
         raise InputError(
@@ -183,8 +190,8 @@ def _wanted(names: Sequence[str], ndim: int) -> list[str]:
                     raise InputError(
                         f"has shifts of {len(found)} axes ({held}); points have {ndim} coordinates"
                     )
-                return [names[k] for k in (*ends, *map(plain.index, found))]
-    return [names[k] for k in ends]
+                return picked([*ends, *map(plain.index, found)])
+    return picked(ends)
 
 
 def _unnamed(n_columns: int, ndim: int) -> list[str]:
@@ -258,7 +265,9 @@ def _whole(name: str, column: NDArray[Any]) -> NDArray[np.int64]:
         wrong = np.flatnonzero(whole != column)
     if len(wrong):
         row = int(wrong[0])
-        raise InputError(f"{name} of row {row} is {column[row]}, not a whole number")
+        value = column[row].item()
+        what = "not a whole number" if value % 1 else "too large for an int64"
+        raise InputError(f"{name} of row {row} is {value}, {what}")
     return whole
 
 

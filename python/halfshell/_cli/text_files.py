@@ -8,6 +8,7 @@ is refused with the line and the field: an index, a mass or a list of pairs is n
 
 from __future__ import annotations
 
+import csv
 import io
 import math
 import re
@@ -15,7 +16,7 @@ from array import array
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
-from itertools import chain, islice
+from itertools import islice
 from pathlib import Path
 from typing import IO
 
@@ -27,7 +28,9 @@ from halfshell._cli.errors import InputError
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
+_QUOTED = re.compile(r'"[^"]*"')
 _MOST_UNNAMED = 3
+_AT_ONCE = 4096  # lines
 _MOST_AXES = 8
 MOST_SHOWN = 12  # names of columns in a message
 _PTS = {n: "x y z intensity r g b".split()[:n] for n in (3, 4, 7)} | {6: "x y z r g b".split()}
@@ -122,27 +125,27 @@ class Text:
         self.remark = ""
         self.promised: tuple[int, int] | None = None  # the line that says how many rows, and these
         self.mark = ""  # before the decimals of all numbers, once there are some
-        lines = self._numbered(stream)
-        head = list(islice(lines, 2))
+        self._lines = enumerate(stream, 1)
+        head = list(islice(self._filled(self._lines), 2))
         if len(head) == 2 and head[0][1].isdecimal():
             if len(_split(head[1][1], _separator(*head[1]))) > 1:
                 number, count = head.pop(0)
                 self.promised = number, int(count)
         self.line, text = head[0] if head else (0, "")
         self.separator = _separator(self.line, text or self.remark)
-        first = _split(text, self.separator)
-        self.width, self.names = len(first), _names_of(first)
+        self.first = _split(text, self.separator)  # the fields of the first line
+        self.width, self.names = len(self.first), _names_of(self.first)
         if self.names is not None:
             head.pop(0)
         else:
             told = _split(self.remark, self.separator)
             if (len(told) == self.width or not head) and are_names(told):
                 self.names, self.width = told, len(told)
-        self._lines = chain(head, lines)
+        self._head = head
 
-    def _numbered(self, stream: Iterable[str]) -> Iterator[tuple[int, str]]:
+    def _filled(self, lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
         """Lines that hold something, with their numbers."""
-        for number, line in enumerate(stream, 1):
+        for number, line in lines:
             text, _, remark = line.partition("#")
             if text.strip():
                 yield number, text.strip(" \r\n")
@@ -151,32 +154,57 @@ class Text:
 
     def read(self, picked: Sequence[int]) -> NDArray[np.float64]:
         """The numbers in some of the columns, one row a line."""
-        values, n_rows = array("d"), 0
-        has_marks = self.separator in (";", "\t")  # decimal commas, or points
-        for number, text in self._lines:
-            fields = _split(text, self.separator)
-            if len(fields) != self.width:
-                said = f"has {len(fields)} fields, the first line has {self.width}"
-                hint = self.hint() if len(fields) > self.width else ""
-                raise InputError(f"line {number}: {said}{hint}")
-            try:
-                row = [float(fields[k]) for k in picked]
-            except ValueError:
-                row = [math.nan]
-            is_plain = text.isascii() and "_" not in text and all(map(math.isfinite, row))
-            if has_marks or not is_plain:
-                row = [self._number(fields[k], f"line {number}, field {k + 1}") for k in picked]
-            values.extend(row)
-            n_rows += 1
-        if self.promised is not None and self.promised[1] != n_rows:
+        values = array("d")
+        while lines := self._head or list(islice(self._lines, _AT_ONCE)):
+            self._head = []
+            found = self._read_plain(lines, picked)
+            if found is None:
+                for number, text in self._filled(lines):
+                    values.extend(self._row(number, text, picked))
+            else:
+                values.frombytes(found.tobytes())
+        points = np.frombuffer(values, dtype=np.float64).reshape(-1, max(1, len(picked)))
+        if self.promised is not None and self.promised[1] != len(points):
             line, count = self.promised
-            raise InputError(f"line {line}: says {count} points, there are {n_rows}")
-        return np.frombuffer(values, dtype=np.float64).reshape(n_rows, len(picked))
+            raise InputError(f"line {line}: says {count} points, there are {len(points)}")
+        return points
 
-    def hint(self) -> str:
-        """What to do about too many fields."""
-        commas = self.separator == ","
-        return "; with decimal commas, separate the columns by ;" if commas else ""
+    def _read_plain(
+        self, lines: list[tuple[int, str]], picked: Sequence[int]
+    ) -> NDArray[np.float64] | None:
+        """The numbers in lines that NumPy reads as `_row` does; None for all others."""
+        texts = [text for _, text in lines]
+        if self.separator is None:
+            widths = {len(text.split()) for text in texts}
+        else:
+            widths = {text.count(self.separator) + 1 for text in texts}
+        has_marks = self.separator in (";", "\t") and self.mark != "."  # which are to be compared
+        if widths != {self.width} or (has_marks and (self.mark or "." in "".join(texts))):
+            return None
+        try:
+            found = np.loadtxt(texts, delimiter=self.separator, comments=None, usecols=picked,
+                               ndmin=2)  # fmt: skip
+        except ValueError:
+            return None
+        return found if np.isfinite(found).all() else None
+
+    def _row(self, number: int, text: str, picked: Sequence[int]) -> list[float]:
+        """The numbers in one line."""
+        fields = _split(text, self.separator)
+        if len(fields) != self.width:
+            said = f"has {len(fields)} fields, the first line has {self.width}"
+            hint = self.hint(fields) if len(fields) > self.width else ""
+            raise InputError(f"line {number}: {said}{hint}")
+        return [self._number(fields[k], f"line {number}, field {k + 1}") for k in picked]
+
+    def hint(self, fields: Sequence[str]) -> str:
+        """What may be wrong with a line that has too many fields."""
+        if len(fields) == self.width + 1 and not fields[-1]:
+            return f"; it ends with {self.separator!r}, which the first line does not"
+        is_whole = all(field.lstrip("+-").isdecimal() for field in fields)
+        if self.separator == "," and is_whole and len(fields) > _MOST_UNNAMED:
+            return "; with decimal commas, separate the columns by ;"
+        return ""
 
     def _number(self, word: str, where: str) -> float:
         """A field as a number; decimals are behind commas or points, in one file all the same."""
@@ -201,7 +229,8 @@ class Text:
 
 def _separator(line: int, text: str) -> str | None:
     """What separates the fields of a line; None for white space."""
-    found = next((one for one in (";", "\t", ",") if one in text), None)
+    plain = _QUOTED.sub("", text)
+    found = next((one for one in (";", "\t", ",") if one in plain), None)
     words = text.split()
     if found == "," and len(words) > 1 and all(map(_DECIMAL_COMMA.fullmatch, words)):
         raise InputError(
@@ -214,7 +243,10 @@ def _separator(line: int, text: str) -> str | None:
 def _split(text: str, separator: str | None) -> list[str]:
     if separator is None:
         return text.split()
-    return [field.strip().strip('"').strip() for field in text.split(separator)]
+    fields = text.split(separator)
+    if '"' in text:  # quoted fields may hold what separates others
+        (fields,) = csv.reader([text], delimiter=separator, skipinitialspace=True)
+    return [field.strip().strip('"').strip() for field in fields]
 
 
 # ---- columns -----------------------------------------------------------------------------------
@@ -252,7 +284,7 @@ def _choose(
         if count > _MOST_UNNAMED:
             raise InputError(
                 f"line {text.line}: has {count} numbers without names; --columns 1,2,3 says which "
-                f"are coordinates{text.hint()}"
+                f"are coordinates{text.hint(text.first)}"
             )
         return list(range(count))
     groups = _groups(names)

@@ -39,15 +39,20 @@ def as_real_array(
     name: str,
     single: str = "hold real numbers",
     check_shape: Callable[[tuple[int, ...]], None] | None = None,
+    flags: bool = False,
 ) -> npt.NDArray[Any]:
     """An array of native float32 or float64 with exactly the given values.
 
     Raises TypeError for kinds that are no real numbers and ValueError, with the place, for values
     that float64 cannot hold. `single` is what a message says that a value without a shape must do.
     `check_shape` raises for shapes that are refused, before anything is copied: views may be huge.
+    flags: whether True and False count as 1 and 0.
     """
     array = as_array(values, name, single)
     kind, size = array.dtype.kind, array.dtype.itemsize
+    if kind == "b" and not flags:
+        must = "hold real numbers" if array.ndim else single
+        raise TypeError(f"{name} must {must}, got {'bools' if array.ndim else shown(values)}")
     if kind == "O" and array.ndim == 0:  # what it is comes before what shape it has not
         array = _from_objects(array, name, single)
         kind, size = "f", 8

@@ -442,24 +442,22 @@ def _take_cutoff(call: Call, cutoff: Any, directed: bool, several: str) -> None:
         _take_radii(call, cutoff)
     elif has_supports:
         _take_supports(call)
-    elif not call.has_reach and call.cells is None and call.cutoff == math.inf:
-        call.cutoff = _beyond_all(both)
+    elif not call.has_reach and call.cutoff == math.inf:
+        call.cutoff = _beyond_all(call)
 
 
-def _beyond_all(sets: list[Points]) -> float:
+def _beyond_all(call: Call) -> float:
     """A cutoff that is larger than any distance, for an infinite one."""
-    box, axes = sets[0].box, sets[0].periodic
-    if box is not None and np.any(axes):
+    if call.points.box is not None and np.any(call.points.periodic):
         raise ValueError(
             "cutoff must be finite where box vectors repeat, got inf: there is no end of images"
         )
-    arrays = [one.positions for one in sets if len(one)]
-    if not arrays:
-        return 0.0
+    sets = (call.points, call.queries)
+    arrays = [one.positions for one in sets if one is not None and len(one)]
+    if not all(np.isfinite(array).all() for array in arrays) or not arrays:
+        return 2.0**1023  # the search names the coordinate
     low = np.min([array.min(axis=0) for array in arrays], axis=0).tolist()
     high = np.max([array.max(axis=0) for array in arrays], axis=0).tolist()
-    if not all(map(math.isfinite, low + high)):
-        return 0.0  # the search names the coordinate
     farthest = math.nextafter(math.dist(low, high) * (1.0 + 2.0**-40), math.inf)
     if farthest == math.inf:
         raise OverflowError("points lie so far apart that some distances do not fit float64")
@@ -476,7 +474,7 @@ def _take_cutoffs(call: Call, cutoff: Any, several: str) -> None:
                 "cutoff must be a number; several are for counts and the letter k in quantities, "
                 f"a radius for each point is one of Points(radii=...), got shape {shape}"
             )
-        if len(shape) == 1 and not has_batch and shape[0] == 0 and several != "counts":
+        if len(shape) == 1 and not has_batch and shape[0] == 0:
             raise ValueError(
                 f"several cutoffs must have shape (k,), with one at least, got {shape}"
             )
@@ -492,6 +490,10 @@ def _take_cutoffs(call: Call, cutoff: Any, several: str) -> None:
         return
     refuse_large(8 * array.size, array, "cutoff")
     values = in_order(array, np.float64)
+    endless = values == math.inf
+    if endless.any():  # others may be beyond all distances as well
+        most = np.max(values, where=~endless, initial=_beyond_all(call))
+        values = np.where(endless, most, values)
     if array.ndim == 2:
         _take_table(call, *_table_of_types(values, call))
     elif has_batch:
@@ -507,16 +509,14 @@ def _take_cutoffs(call: Call, cutoff: Any, several: str) -> None:
         check_lengths(values, "cutoff")
         check_ascending(values, "cutoff", "several cutoffs")
         call.shells = values
-        call.cutoff = float(values[-1]) if len(values) else 0.0
+        call.cutoff = float(values[-1])
 
 
 def _take_radii(call: Call, cutoff: Any) -> None:
     """A reach by radii, within the cutoff as a further limit."""
     rule = "sum" if call.rule is None else call.rule
-    if cutoff is not None and not (math.isfinite(call.cutoff) and call.cutoff >= 0.0):
-        raise ValueError(
-            f"cutoff must be finite and not negative, or None, got {call.cutoff}"
-        )
+    if not call.cutoff >= 0.0:  # without an end it is no further limit
+        raise ValueError(f"cutoff must not be negative or NaN, got {call.cutoff}")
     own, asking = _sides(call, rule, "radii")
     for radii in (own, asking):
         if rule == "mean" and radii is not None:
@@ -566,14 +566,6 @@ def _sides(call: Call, rule: str, what: str) -> tuple[Any, Any]:
 
 # ---- cutoffs by type -----------------------------------------------------------------------
 
-class _Kinds(NamedTuple):
-    """The types of both sets as numbers of one list of names, if they are names."""
-
-    own: npt.NDArray[np.int32]
-    asking: npt.NDArray[np.int32] | None
-    names: tuple[str, ...] | None
-
-
 def _take_table(
     call: Call, own: npt.NDArray[Any], asking: npt.NDArray[Any] | None, table: FloatArray
 ) -> None:
@@ -584,14 +576,12 @@ def _take_table(
     call.pairing = Pairing(0, table=table)  # the core needs no rule
 
 
-def kinds_of(call: Call, reason: str) -> _Kinds:
-    """The types of both sets. reason: what needs them."""
+def _kinds_of(call: Call, reason: str) -> tuple[Any, Any, tuple[str, ...] | None]:
+    """The types of both sets, as `numbers_of_both` has them. reason: what needs them."""
     for name, one in (("points", call.points), ("queries", call.queries)):
         if one is not None and one._kinds is None:
             raise ValueError(f"{reason} needs types, and {name} have none: Points(types=...)")
-    own, asking, names = numbers_of_both(call, "_kinds", "types")
-    assert own is not None
-    return _Kinds(own, asking, names)
+    return numbers_of_both(call, "_kinds", "types")
 
 
 def numbers_of_both(
@@ -638,7 +628,7 @@ def _table_of_types(
             f"cutoff must be symmetric, got cutoff[{a}, {b}] = {table[a, b]} and "
             f"cutoff[{b}, {a}] = {table[b, a]}"
         )
-    own, asking, names = kinds_of(call, "a table of cutoffs")
+    own, asking, names = _kinds_of(call, "a table of cutoffs")
     if names and len(names) != len(table):
         raise ValueError(
             f"cutoff must have a row for each type, {', '.join(map(shown, names[:8]))}"
@@ -663,9 +653,9 @@ def _table_of_pairs(
 
     A key with fewer stars wins. Types that no key names pair as "*" and "*" do, or not at all.
     """
-    own, asking, names = kinds_of(call, "a dict of cutoffs")
+    own, asking, names = _kinds_of(call, "a dict of cutoffs")
     present = [types for types in (own, asking) if types is not None and len(types)]
-    lengths = _lengths(cutoff, names, present) if present else {}
+    lengths = _lengths(cutoff, names, call) if present else {}
     rows = sorted({part for pair in lengths for part in pair if part != "*"})
     place = {part: row for row, part in enumerate(rows)}
     last = len(rows)
@@ -701,7 +691,7 @@ def _places(types: npt.NDArray[Any], numbers: list[int]) -> npt.NDArray[np.int32
 
 
 def _lengths(
-    cutoff: Mapping[Any, Any], names: tuple[str, ...] | None, present: list[npt.NDArray[Any]]
+    cutoff: Mapping[Any, Any], names: tuple[str, ...] | None, call: Call
 ) -> dict[tuple[Any, Any], float]:
     """The cutoff of each pair of types, in one order of the two; "*" comes first."""
     try:
@@ -719,7 +709,8 @@ def _lengths(
             raise TypeError(
                 f"cutoff must have pairs of types as keys, such as ('Si', 'O'), got {shown(key)}"
             )
-        length = as_length(as_number(value, where), where)
+        length = as_number(value, where)
+        length = _beyond_all(call) if length == math.inf else as_length(length, where)
         one, other = (_type_of(part, where, names) for part in key)
         if "*" in (one, other):
             pair = ("*", other if one == "*" else one)

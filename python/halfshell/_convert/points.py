@@ -680,7 +680,7 @@ def as_points(values: Any, name: str = "points", ndim: int = 3) -> npt.NDArray[A
                     "is no place here"
                 )
             values = parts.positions
-    array = as_real_array(values, name, check_shape=check)
+    array = as_real_array(values, name, check_shape=check, flags=True)
     return np.empty((0, ndim)) if array.shape == (0,) else array
 
 
@@ -729,8 +729,6 @@ def as_box(values: Any, ndim: int, has_batch: bool = False) -> FloatArray:
         return in_order(array, np.float64)
     if array.ndim == 1:
         return np.diag(array.astype(np.float64))
-    if is_a(values, (bool, np.bool_)):
-        raise TypeError(f"box must be lengths or vectors, got {values}; see periodic")
     return np.diag(np.full(ndim, array, np.float64))
 
 
@@ -898,7 +896,7 @@ def as_supports(values: Any, n: int, d: int, name: str = "supports") -> FloatArr
 
 
 def _as_weights(values: Any, n: int) -> FloatArray:
-    array = as_real_array(values, "weights", check_shape=one_each("weights", n))
+    array = as_real_array(values, "weights", check_shape=one_each("weights", n), flags=True)
     weights = np.ascontiguousarray(array, dtype=np.float64)
     refuse_infinite(weights, "weights")
     return weights

@@ -170,17 +170,11 @@ class MethodOptions(OptionsOfCells, total=False):
     thread_safe: bool
 
 
-class NearestOptions(TypedDict, total=False):
+class NearestOptions(OptionsOfBins, total=False):
     """Of `nearest`, without `quantities`."""
 
     max_distance: ArrayLike
     queries: PointsLike | None
-    box: BoxLike | None
-    periodic: PeriodicLike | None
-    exclude: ArrayLike | int | None
-    min_distance: float | None
     indices: npt.ArrayLike | None
     inclusive: bool
     index_dtype: npt.DTypeLike
-    threads: int | None
-    progress: ProgressLike

@@ -97,7 +97,6 @@ def bricks(points: PointsLike, cutoff: CutoffLike, n: int, **search: Unpack[Opti
     >>> hs.count_pairs(points, 0.1, box=[1.0, 1.0, 1.0])
     2099
     """
-    _refuse_endless(cutoff)
     call = take(points, cutoff, directed=True, **search)
     call.refuse_batch("bricks", "its systems are apart already")
     n_bricks, array = as_brick_count(n), call.array
@@ -154,13 +153,6 @@ def _near(
 
 # ---- how far pairs reach, and where points are ---------------------------------------------
 
-def _refuse_endless(cutoff: Any) -> None:
-    """Bricks reach beyond themselves by the cutoff, whatever points come later."""
-    is_number = is_a(cutoff, (float, np.floating, np.ndarray)) and np.ndim(cutoff) == 0
-    if is_number and cutoff == np.inf:
-        raise ValueError("cutoff must be finite for bricks, got inf")
-
-
 def _scope(
     call: Call, cutoff: Any, names: dict[str, tuple[str, ...] | None], n: int, widest: float
 ) -> Scope:
@@ -176,7 +168,9 @@ def _scope(
             lengths = cutoff.values() if is_a(cutoff, Mapping) else np.ravel(cutoff)
             reach = max([0.0, *map(float, lengths)])
     kept: Any = call.cutoff
-    if is_a(cutoff, Mapping):
+    if not call.has_reach and np.ndim(cutoff) == 0 and cutoff == np.inf:
+        reach = kept = math.inf  # points that come later may be further apart
+    elif is_a(cutoff, Mapping):
         kept = dict(cutoff)
     elif call.has_reach:
         kept = None if cutoff is None else np.array(cutoff, np.float64)
@@ -294,7 +288,6 @@ class Terms(NamedTuple):
 
     def call(self, directed: bool = True) -> Call:
         """A search of no points; raises what is wrong with it."""
-        _refuse_endless(self.cutoff)
         call = take(self.of_none(), self.cutoff, rule=self.rule, directed=directed)
         call.run(_core.coordination, None, call.pairing, "auto")
         return call

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, cast, overload
+from typing import TYPE_CHECKING, Any, cast, overload
 
 import numpy as np
 
@@ -112,11 +112,9 @@ def counted(call: Call) -> int | npt.NDArray[np.int64]:
     is_exact = call.settings.precision == "exact" and not call.has_reach and call.indices is None
     if is_exact and len(cutoffs) > 1:
         edges = np.ascontiguousarray(cutoffs)
-        between = binned(call, edges, _NO_MARKS, last=call.inclusive, name="cutoff")
+        between = binned(call, edges, last=call.inclusive, name="cutoff")
         return np.cumsum(between[0, 0])
     counts = [_count(one) for one in each_cutoff(call)]
-    if not counts:
-        _count(call)  # all else is checked as ever
     return np.array(counts, dtype=np.int64)
 
 
@@ -214,80 +212,52 @@ def pair_histogram(
     call = take(
         points, 0.0, queries, indices=indices, inclusive=False, by_reach=False, **search
     )
-    return histogram_of(call, as_edges(edges), as_flag(by_type, "by_type"))
-
-
-def histogram_of(
-    call: Call, edges: FloatArray, by_type: bool
-) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
-    """The histogram of a call."""
-    marks = marks_of(call, by_type)
-    found = binned(call, edges, marks) if call.indices is None else _of_some(call, edges, marks)
+    limits, by_type = as_edges(edges), as_flag(by_type, "by_type")
+    n_types, _ = use_types(call) if by_type else (1, None)
+    call.known = call.known._replace(weights=call.points.weights)
+    if call.queries is not None:
+        call.known_of_queries = call.known_of_queries._replace(weights=call.queries.weights)
+    count = binned if call.indices is None else _of_some
+    found = count(call, limits, n_types)
     # What the core counts first are the pairs closer than the first edge.
     return np.ascontiguousarray(found[..., 1:] if by_type else found[..., 0, 0, 1:])
 
 
-def _of_some(call: Call, edges: FloatArray, marks: Marks) -> npt.NDArray[Any]:
+def _of_some(call: Call, edges: FloatArray, n_types: int) -> npt.NDArray[Any]:
     """Counts of the pairs that have one of some points: those of two, and those with another."""
-    if marks.weights is not None:
+    if call.known.weights is not None:
         raise ValueError(
             "indices cannot be combined with weights: their sums are rounded once, and these are "
             "sums of two parts"
         )
     numbers = named_once(call)
     parts = within_and_beyond(call, numbers)
-    types, n_systems = marks.types, call.points.n_systems
-    sums = np.zeros((n_systems, marks.n_types, marks.n_types, len(edges)), np.int64)
-    for k, (one, own, asking) in enumerate(parts):
+    sums = np.zeros((call.points.n_systems, n_types, n_types, len(edges)), np.int64)
+    for k, one in enumerate(parts):
         one.progress, one.bar = part_of(call.progress, k, len(parts)), None
-        of_part = marks._replace(
-            types=None if types is None else types[own],
-            query_types=None if types is None or asking is None else types[asking],
-        )
-        found = binned(one, edges, of_part)
-        found = found.reshape(-1, *sums.shape[1:])
-        if asking is not None:  # either may come first
+        found = binned(one, edges, n_types).reshape(-1, *sums.shape[1:])
+        if one.queries is not None:  # either may come first
             found = found + found.swapaxes(1, 2)
-            same = np.arange(marks.n_types)
+            same = np.arange(n_types)
             found[:, same, same] //= 2
         sums[: len(found)] += found
     call.close()
     return sums if call.points.batch is not None else sums[0]
 
 
-class Marks(NamedTuple):
-    """Types and weights of the points and of the queries, as the core takes them, and names."""
-
-    n_types: int
-    types: npt.NDArray[Any] | None
-    weights: npt.NDArray[Any] | None
-    query_types: npt.NDArray[Any] | None
-    query_weights: npt.NDArray[Any] | None
-    names: tuple[str, ...] | None = None
-
-
-_NO_MARKS = Marks(1, None, None, None, None)
-
-
-def marks_of(call: Call, by_type: bool, with_weights: bool = True) -> Marks:
-    """The types and the weights that a histogram uses."""
-    types = query_types = names = None
-    n_types = 1
-    if by_type:
-        if call.points._kinds is None:
-            raise ValueError("by_type needs types, and points have none: Points(types=...)")
-        types, query_types, names = numbers_of_both(call, "_kinds", "types")
-        largest = max(int(t.max(initial=0)) for t in (types, query_types) if t is not None)
-        n_types = 1 + largest if names is None else max(len(names), 1)
-    weights = query_weights = None
-    if with_weights:
-        weights = call.points.weights
-        query_weights = None if call.queries is None else call.queries.weights
-    return Marks(n_types, types, weights, query_types, query_weights, names)
+def use_types(call: Call) -> tuple[int, tuple[str, ...] | None]:
+    """Let a histogram go by types: their number, and their names, if they have some."""
+    if call.points._kinds is None:
+        raise ValueError("by_type needs types, and points have none: Points(types=...)")
+    types, of_queries, names = numbers_of_both(call, "_kinds", "types")
+    call.known = call.known._replace(types=types)
+    call.known_of_queries = call.known_of_queries._replace(types=of_queries)
+    largest = max(int(t.max(initial=0)) for t in (types, of_queries) if t is not None)
+    return 1 + largest if names is None else max(len(names), 1), names
 
 
 def binned(
-    call: Call, edges: FloatArray, marks: Marks, last: bool = True, name: str = "edges[-1]"
+    call: Call, edges: FloatArray, n_types: int = 1, last: bool = True, name: str = "edges[-1]"
 ) -> npt.NDArray[Any]:
     """Counts or sums by system, if it is a batch, types and bin; the first bin is below all edges.
 
@@ -296,15 +266,11 @@ def binned(
     call.settings = call.settings._replace(precision="exact")
     n_systems = call.points.n_systems
     refuse_unavailable(
-        _COPIES * 8 * n_systems * marks.n_types**2 * len(edges),
-        f"counts for {len(edges) - 1} bins between edges and {marks.n_types}**2 pairs of types"
+        _COPIES * 8 * n_systems * n_types**2 * len(edges),
+        f"counts for {len(edges) - 1} bins between edges and {n_types}**2 pairs of types"
         + ("" if call.points.batch is None else f" of {n_systems} systems"),
-    )
-    call.known = call.known._replace(types=marks.types, weights=marks.weights)
-    call.known_of_queries = call.known_of_queries._replace(
-        types=marks.query_types, weights=marks.query_weights
     )
     end = call.settings.algorithm, call.pairing
     with of_argument(name):
-        found = call.run(_core.histogram, edges, last, call.query_set, marks.n_types, *end)
+        found = call.run(_core.histogram, edges, last, call.query_set, n_types, *end)
     return cast("npt.NDArray[Any]", found) if call.points.batch is None else call.by_number(found)

@@ -116,17 +116,15 @@ def named_once(call: Call) -> npt.NDArray[np.int64]:
     return ascending
 
 
-def within_and_beyond(
-    call: Call, numbers: npt.NDArray[np.int64]
-) -> list[tuple[Call, npt.NDArray[np.int64], npt.NDArray[np.int64] | None]]:
-    """Calls for pairs of two of these points, and of one as a query with another point; with the
-    numbers of their points and queries. They have no reach."""
+def within_and_beyond(call: Call, numbers: npt.NDArray[np.int64]) -> list[Call]:
+    """Calls for pairs of two of these points, and of one as a query with another point. They have
+    no reach."""
     is_named = np.zeros(len(call.points), bool)
     is_named[numbers] = True
     rest = np.flatnonzero(~is_named)
     place = np.empty(len(call.points), np.int64)
     place[numbers], place[rest] = np.arange(len(numbers)), np.arange(len(rest))
-    found: list[Any] = []
+    found = []
     for own, asking in ((numbers, None), (rest, numbers)):
         one = copy(call)
         one.cells = one.indices = None
@@ -143,7 +141,7 @@ def within_and_beyond(
                 pairs = np.concatenate([pairs, pairs[:, ::-1]])
                 pairs = pairs[is_named[pairs[:, 0]] & ~is_named[pairs[:, 1]]]
             one.pairing = call.pairing._replace(excluded=np.ascontiguousarray(place[pairs]))
-        found.append((one, own, asking))
+        found.append(one)
     return found
 
 

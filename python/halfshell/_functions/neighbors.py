@@ -300,8 +300,7 @@ def coordination(
     is_by_type = as_flag(by_type, "by_type")
     if call.shells is None:
         return _lengths(call, is_by_type)
-    counts = [_lengths(one, is_by_type) for one in each_cutoff(call)]
-    return np.stack(counts) if counts else _lengths(call, is_by_type)[None][:0]
+    return np.stack([_lengths(one, is_by_type) for one in each_cutoff(call)])
 
 
 def _lengths(call: Call, by_type: bool) -> npt.NDArray[np.int64]:

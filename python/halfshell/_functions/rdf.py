@@ -21,7 +21,7 @@ from halfshell._convert.foreign import exact_number, is_a, shown
 from halfshell._convert.lengths import as_edges, as_positive
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import as_choice, as_count, as_flag
-from halfshell._functions.counts import Marks, binned, marks_of
+from halfshell._functions.counts import binned, use_types
 from halfshell._objects.pictures import axes_of
 from halfshell._search import document, search
 
@@ -140,16 +140,14 @@ def rdf(
     by_type, finite = as_flag(by_type, "by_type"), as_flag(finite_size, "finite_size")
     dense = None if density is None else as_positive(density, "density")
     shares = _shares_of(call, edges, dense, 0)
-    marks = marks_of(call, by_type, with_weights=False)
+    n_types, names = use_types(call) if by_type else (1, None)
     if by_type:
-        refuse_unavailable(
-            _OF_TYPES * 8 * marks.n_types**2 * (len(edges) - 1), "g(r) of all types"
-        )
-    counts = binned(call, edges, marks, name="cutoff").astype(np.int64, copy=False)
+        refuse_unavailable(_OF_TYPES * 8 * n_types**2 * (len(edges) - 1), "g(r) of all types")
+    counts = binned(call, edges, n_types, name="cutoff").astype(np.int64, copy=False)
     counts = counts[..., 1:] if by_type else counts[..., 0, 0, 1:]
     n_frames = 1
     if call.points.batch is None:
-        expected = _expected(call, marks, finite, shares, None)
+        expected = _expected(call, n_types, finite, shares, None)
     else:
         counts = counts.sum(axis=0, dtype=np.int64)
         batches = [call.points.batch]
@@ -159,16 +157,16 @@ def rdf(
         expected = np.zeros(counts.shape)
         for s in occupied.tolist():
             shares = _shares_of(call, edges, dense, s)
-            expected += _expected(call, marks, finite, shares, s)
+            expected += _expected(call, n_types, finite, shares, s)
         n_frames = max(len(occupied), 1)
-    names: _Names | None = None
-    centers = _centers(call, marks)
+    types: _Names | None = None
+    centers = _centers(call, n_types)
     if by_type:
-        names = tuple(range(marks.n_types)) if marks.names is None else marks.names
-        t = len(names)  # less than n_types where there is no point and so no name
+        types = tuple(range(n_types)) if names is None else names
+        t = len(types)  # less than n_types where there is no point and so no name
         counts, expected, centers = counts[:t, :t], expected[:t, :t], centers[:t]
     return RadialDistribution(
-        np.ascontiguousarray(counts), edges, names, expected, centers, n_frames,
+        np.ascontiguousarray(counts), edges, types, expected, centers, n_frames,
         call.queries is None,
     )  # fmt: skip
 
@@ -238,7 +236,7 @@ def _in_shells(partners: FloatArray, shares: FloatArray) -> FloatArray:
 
 
 def _expected(
-    call: Call, marks: Marks, finite_size: bool, shares: FloatArray, system: int | None
+    call: Call, n_types: int, finite_size: bool, shares: FloatArray, system: int | None
 ) -> FloatArray:
     """Pairs of an ideal gas in each shell, of one system or of all; with types, of each two."""
     mine, theirs = (
@@ -247,28 +245,29 @@ def _expected(
         for one in (call.points, call.queries)
     )  # fmt: skip
     n = len(call.array[mine])
-    if marks.types is None:
+    types, of_queries = call.known.types, call.known_of_queries.types
+    if types is None:
         if call.asking is not None:
             pairs = float(len(call.asking[theirs])) * n
         else:
             pairs = 0.5 * n * (n - 1 if finite_size else n)
         return _in_shells(np.array([pairs]), shares)
-    of_points = np.bincount(marks.types[mine], minlength=marks.n_types).astype(np.float64)
-    if marks.query_types is not None:
-        of_queries = np.bincount(marks.query_types[theirs], minlength=marks.n_types)
-        return _in_shells(np.outer(of_queries, of_points)[:, :, np.newaxis], shares)
+    of_points = np.bincount(types[mine], minlength=n_types).astype(np.float64)
+    if of_queries is not None:
+        asking = np.bincount(of_queries[theirs], minlength=n_types)
+        return _in_shells(np.outer(asking, of_points)[:, :, np.newaxis], shares)
     table: FloatArray = np.outer(of_points, of_points)
     own = np.diag_indices(len(of_points))
     table[own] = 0.5 * of_points * (of_points - finite_size)
     return _in_shells(table[:, :, np.newaxis], shares)
 
 
-def _centers(call: Call, marks: Marks) -> npt.NDArray[np.int64]:
+def _centers(call: Call, n_types: int) -> npt.NDArray[np.int64]:
     """How many points, or queries, have neighbours that are counted; with types, of each."""
-    asking = marks.types if call.queries is None else marks.query_types
+    asking = (call.known if call.queries is None else call.known_of_queries).types
     if asking is None:
         return np.array(len(call.points if call.queries is None else call.queries))
-    return np.bincount(asking, minlength=marks.n_types)
+    return np.bincount(asking, minlength=n_types)
 
 
 # ---- the result ----------------------------------------------------------------------------

@@ -163,7 +163,8 @@ def trajectory_pairs(
     own = ("box", "periodic", "threads", "progress")
     box, periodic, threads, progress = (search.pop(name, None) for name in own)
     inclusive = as_flag(search.setdefault("inclusive", True), "inclusive")
-    is_plain = is_a(cutoff, (float, int, np.floating, np.integer)) and not any(
+    is_number = is_a(cutoff, (float, int, np.floating, np.integer)) and cutoff != np.inf
+    is_plain = is_number and not any(
         value is not None for name, value in search.items() if name != "inclusive"
     )
     if not (is_plain or cutoff is None or is_a(cutoff, Mapping)):

@@ -140,13 +140,8 @@ class Brick:
     def needed(self) -> Numbers:
         return self.members[~self.is_owned]
 
-    @property
-    def cutoff(self) -> Any:
-        return self._scope.cutoff
-
-    @property
-    def n_points(self) -> int:
-        return self._scope.n_points
+    cutoff: Any = _show.attribute("_scope.cutoff")
+    n_points: int = _show.attribute("_scope.n_points")
 
     def pairs(
         self, points: PointsLike, *, quantities: str = "ij", **search: Unpack[Search]

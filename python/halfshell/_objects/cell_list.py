@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar, cast
 
 import numpy as np
@@ -211,8 +212,8 @@ class CellList:
         call = take(points, self._cutoff, threads=self._threads, by_reach=False)
         call.refuse_batch("CellList", "cells are those of one system")
         self._cells = call.run(_core.cells_build, self._cell_size, self._domain)
-        self._layout = _core.cells_layout(self._cells)
-        self._take_points(points._over(self._layout["points"]))
+        self._layout = SimpleNamespace(**_core.cells_layout(self._cells))
+        self._take_points(points._over(self._layout.points))
 
     def _take_points(self, points: Points) -> None:
         self.points = points
@@ -244,29 +245,12 @@ class CellList:
     def _given(self) -> tuple[Any, ...]:
         return self._cutoff, self._cell_size, self._domain, self._threads
 
-    @property
-    def cutoff(self) -> float:
-        return self._cutoff
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return cast("tuple[int, ...]", self._layout["shape"])
-
-    @property
-    def cell_sizes(self) -> tuple[float, ...]:
-        return cast("tuple[float, ...]", self._layout["cell_sizes"])
-
-    @property
-    def cell_start(self) -> npt.NDArray[np.int32]:
-        return cast("npt.NDArray[np.int32]", self._layout["cell_start"])
-
-    @property
-    def order(self) -> npt.NDArray[np.int32]:
-        return cast("npt.NDArray[np.int32]", self._layout["order"])
-
-    @property
-    def cell_ids(self) -> npt.NDArray[np.int64] | None:
-        return cast("npt.NDArray[np.int64] | None", self._layout["cell_ids"])
+    cutoff: float = _show.attribute("_cutoff")
+    shape: tuple[int, ...] = _show.attribute("_layout.shape")
+    cell_sizes: tuple[float, ...] = _show.attribute("_layout.cell_sizes")
+    cell_start: npt.NDArray[np.int32] = _show.attribute("_layout.cell_start")
+    order: npt.NDArray[np.int32] = _show.attribute("_layout.order")
+    cell_ids: npt.NDArray[np.int64] | None = _show.attribute("_layout.cell_ids")
 
     # ---- searches --------------------------------------------------------------------------
 

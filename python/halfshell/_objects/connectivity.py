@@ -262,9 +262,7 @@ class Connectivity:
 
     # ---- all of it ---------------------------------------------------------------------------
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self._links.nodes.names
+    names: tuple[str, ...] = _show.attribute("_links.nodes.names")
 
     @property
     def n_nodes(self) -> tuple[int, ...]:
@@ -274,49 +272,21 @@ class Connectivity:
     def n_ghosts(self) -> tuple[int, ...]:
         return tuple(self._links.nodes.ghosts.tolist())
 
-    @property
-    def pairs(self) -> PairTable:
-        return self._links.pairs
-
-    @property
-    def offsets(self) -> Offsets:
-        return self._links.rows.offsets
-
-    @property
-    def indices(self) -> Ints:
-        return self._links.rows.indices
-
-    @property
-    def shifts(self) -> Ints:
-        return _shifts_of(self._links.rows)
+    pairs: PairTable = _show.attribute("_links.pairs")
+    offsets: Offsets = _show.attribute("_links.rows.offsets")
+    indices: Ints = _show.attribute("_links.rows.indices")
+    shifts: Ints = _show.attribute("_links.rows.images")
 
     @property
     def row_start(self) -> Offsets:
         return starts_of(self._how.with_rows(self._links.nodes))
 
-    @property
-    def overlap_offsets(self) -> Offsets:
-        return self._part("overlap").offsets
-
-    @property
-    def overlap_indices(self) -> Ints:
-        return self._part("overlap").indices
-
-    @property
-    def overlap_shifts(self) -> Ints:
-        return _shifts_of(self._part("overlap"))
-
-    @property
-    def intersection_offsets(self) -> Offsets:
-        return self._part("intersection").offsets
-
-    @property
-    def intersection_indices(self) -> Ints:
-        return self._part("intersection").indices
-
-    @property
-    def intersection_shifts(self) -> Ints:
-        return _shifts_of(self._part("intersection"))
+    overlap_offsets: Offsets = _show.attribute("_overlap.offsets")
+    overlap_indices: Ints = _show.attribute("_overlap.indices")
+    overlap_shifts: Ints = _show.attribute("_overlap.images")
+    intersection_offsets: Offsets = _show.attribute("_intersection.offsets")
+    intersection_indices: Ints = _show.attribute("_intersection.indices")
+    intersection_shifts: Ints = _show.attribute("_intersection.images")
 
     @property
     def nbytes(self) -> dict[str, int]:
@@ -348,7 +318,7 @@ class Connectivity:
         tuple of ndarray of bool, each of shape (n,)
         """
         nodes = self._links.nodes
-        i, j = nodes.ranks_of(self.pairs._all())
+        i, j = nodes.ranks_of(self.pairs._made)
         flags = ~nodes.is_ghost(np.arange(nodes.n))  # by rank
         flags[np.concatenate((i[flags[j]], j[flags[i]]))] = True
         return tuple(np.split(flags[nodes.rank(np.arange(nodes.n))], nodes.first[1:-1]))
@@ -459,7 +429,7 @@ class Connectivity:
 
         As in `neighbors`; ValueError if `overlap` was not built.
         """
-        return self._row(self._part("overlap"), self._row_of(list, node))
+        return self._row(self._overlap, self._row_of(list, node))
 
     def intersection(self, pair: int | npt.ArrayLike) -> tuple[Ints, ...]:
         """The nodes in each list between the two of a pair, and these.
@@ -487,7 +457,7 @@ class Connectivity:
         >>> hs.Connectivity([a], intersection=True).intersection((0, 0, 2, 0))
         (array([1, 0, 2], dtype=int32),)
         """
-        part = self._part("intersection")
+        part = self._intersection
         is_one = as_array(pair, "pair", "be a number or four").ndim == 0
         k = self.pairs._number(pair) if is_one else self.pairs.index(pair)
         return self._row(part, k)
@@ -571,6 +541,14 @@ class Connectivity:
 
     # ---- how rows are found ------------------------------------------------------------------
 
+    @property
+    def _overlap(self) -> Rows:
+        return self._part("overlap")
+
+    @property
+    def _intersection(self) -> Rows:
+        return self._part("intersection")
+
     def _part(self, name: str) -> Rows:
         part: Rows | None = getattr(self._links, name)
         if part is None:
@@ -622,12 +600,6 @@ class Connectivity:
             (first, self._node_of(first, four[1], "i_node")),
             (second, self._node_of(second, four[3], "j_node")),
         )
-
-
-def _shifts_of(rows: Rows) -> Ints:
-    if rows.shifts is None:
-        raise AttributeError("these rows have no shifts: there is no periodic box")
-    return rows.shifts
 
 
 def _as_lists(lists: Any) -> list[NodeList]:

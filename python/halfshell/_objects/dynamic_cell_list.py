@@ -165,7 +165,7 @@ class DynamicCellList:
     @property
     def keys(self) -> npt.NDArray[np.int64]:
         """All keys, in the order of iteration: a new array, shape (n,), or (n, 2) with `tagged`."""
-        return self._all()[0]
+        return self._all(False)[0]
 
     @property
     def positions(self) -> npt.NDArray[np.float64]:
@@ -173,13 +173,12 @@ class DynamicCellList:
 
         NaN for keys that have none.
         """
-        keys, cells = self._all()
-        found: npt.NDArray[np.float64] = cells.positions(keys)
+        found: npt.NDArray[np.float64] = self._all(True)[1]
         return found
 
-    def _all(self) -> tuple[npt.NDArray[np.int64], Any]:
+    def _all(self, with_positions: bool) -> tuple[npt.NDArray[np.int64], Any]:
         cells = self._cells.copy()
-        return cells.keys(0, max(len(cells), 1))[1], cells
+        return cells.keys(0, max(len(cells), 1), with_positions)[1:]
 
     def insert(self, key: Key, position: ArrayLike | None) -> None:
         """Add a point, or move the one that has this key.
@@ -400,7 +399,7 @@ class DynamicCellList:
             if self._cells.look()["changes"] != changes:
                 raise RuntimeError("DynamicCellList changed during iteration")
             if not keys:
-                cursor, block = self._cells.keys(cursor, _BLOCK)
+                cursor, block, _ = self._cells.keys(cursor, _BLOCK, False)
                 keys = block.tolist()[::-1]
                 if not keys:
                     return
@@ -408,8 +407,7 @@ class DynamicCellList:
             yield tuple(key) if self.tagged else key
 
     def __reduce__(self) -> tuple[Any, ...]:
-        keys, cells = self._all()
-        return _unpickled, (_PICKLE_VERSION, self._given, keys, cells.positions(keys))
+        return _unpickled, (_PICKLE_VERSION, self._given, *self._all(True))
 
     _repr_html_ = _show.html
 
@@ -439,10 +437,8 @@ def _converted(value: Any, name: str, dim: int, tagged: bool) -> Any:
     if name == "position":
         check = of_shape(f"position must have shape ({dim},)", (dim,))
         return in_order(as_real_array(value, name, check_shape=check), np.float64)
-    if name == "radius" and not is_a(value, (bool, np.bool_)):
-        return as_number(value, name)
     if name == "radius":
-        raise TypeError(f"radius must be a number, got {shown(value)}")
+        return as_number(value, name)
     if not tagged:
         return _as_integer(value, name, f"{name} must be an integer")
     must = f"{name} must be a tuple (tag, integer) of integers"
@@ -477,8 +473,9 @@ def _as_keys(keys: Any, tagged: bool) -> tuple[npt.NDArray[np.int64], npt.NDArra
     if array.shape == (0,):
         array = np.empty((0, 2) if tagged else 0, np.int64)
     if array.dtype.kind not in "iu":
-        if array.dtype.kind == "O" and all(type(key) is int for key in array.flat):
-            raise OverflowError("keys must fit int64")
+        for key in array.flat if array.dtype.kind == "O" else ():
+            if type(key) is int and not -(2**63) <= key < 2**63:
+                raise OverflowError(f"keys must fit int64, got {shown(key)}")
         raise TypeError(f"keys must be integers, got dtype {array.dtype}")
     if array.ndim != (2 if tagged else 1) or (tagged and array.shape[1] != 2):
         form = "(n, 2), of tags and integers" if tagged else "(n,)"

@@ -85,6 +85,11 @@ class Graph(NamedTuple):
     distances: npt.NDArray[np.float64] | None
 
 
+def _held(letter: str) -> Any:
+    """The attribute of a quantity."""
+    return property(lambda table: table._column(letter))
+
+
 class NeighborTable:
     """All neighbours of each point, or of each query, row after row.
 
@@ -417,37 +422,19 @@ class NeighborTable:
     def counts(self) -> npt.NDArray[np.int64]:
         return _read_only(np.diff(self._arrays[0]))
 
-    @property
-    def indices(self) -> Array:
-        return self._column("j")
+    indices: Array = _held("j")
+    distances: npt.NDArray[np.float64] = _held("d")
+    vectors: npt.NDArray[np.float64] = _held("D")
+    shifts: npt.NDArray[np.int32] = _held("S")
+    shells: npt.NDArray[np.int32] = _held("k")
 
-    @property
-    def distances(self) -> npt.NDArray[np.float64]:
-        return self._column("d")
-
-    @property
-    def vectors(self) -> npt.NDArray[np.float64]:
-        return self._column("D")
-
-    @property
-    def shifts(self) -> npt.NDArray[np.int32]:
-        return self._column("S")
-
-    @property
-    def shells(self) -> npt.NDArray[np.int32]:
-        return self._column("k")
-
-    @property
-    def quantities(self) -> str:
-        return self._quantities
+    quantities: str = _show.attribute("_quantities")
 
     @property
     def n_rows(self) -> int:
         return len(self._arrays[0]) - 1
 
-    @property
-    def n_points(self) -> int:
-        return self._n_points
+    n_points: int = _show.attribute("_n_points")
 
     @property
     def n_entries(self) -> int:

@@ -103,6 +103,13 @@ class Rows(NamedTuple):
         offsets, indices, *shifts = made
         return cls(offsets, indices, shifts[0] if shifts else None)
 
+    @property
+    def images(self) -> Ints:
+        """The shifts, which there must be."""
+        if self.shifts is None:
+            raise AttributeError("these rows have no shifts: there is no periodic box")
+        return self.shifts
+
 
 class Half(NamedTuple):
     """Pairs of ranks, each once; a half list if they ascend. Of directed rules j is in i's row."""
@@ -287,7 +294,7 @@ def removed(links: Links, which: Any) -> Links:
         one_each("which", len(pairs), "one for each pair")(mask.shape)
         mask = np.array(mask)  # another thread may change the caller's
         places = np.flatnonzero(mask)
-        gone = _half_of_pairs(nodes, [one if one is None else one[places] for one in pairs._all()])
+        gone = _half_of_pairs(nodes, [one if one is None else one[places] for one in pairs._made])
         cut = _cut_of_half(gone, nodes)
     rows, gathered = _without(nodes, how, links.rows, links.gathered, gone, cut)
     made = _completed(nodes, how, links.points, rows, gathered, cut, links.cut)
@@ -396,7 +403,7 @@ def patched(links: Links, keep: Any, old2new: Any) -> tuple[Links, list[Offsets]
         cut = half.keep((half.i >= 0) & (half.j >= 0)).forward()
     stays = None
     if (is_sorted and links.intersection is not None) or links.pairs._coupling is not None:
-        columns = links.pairs._all()
+        columns = links.pairs._made
         i, j = (rank[one] for one in old.ranks_of(columns))
         half = Half(i, j, columns.shifts)
         stays = np.flatnonzero((half.i >= 0) & (half.j >= 0))
@@ -501,7 +508,7 @@ def check(links: Links) -> None:
     for name in ("rows", "pairs", "overlap", "intersection"):
         one, other = getattr(links, name), getattr(again, name)
         if name == "pairs":
-            one, other = one._all(), other._all()
+            one, other = one._made, other._made
         if one is not None and not all(map(np.array_equal, one, other)):
             raise ValueError(f"{name} are not what the rows say")
     if nodes.number is not None and (np.sort(nodes.number) != np.arange(nodes.n)).any():

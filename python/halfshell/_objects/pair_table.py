@@ -101,7 +101,8 @@ class PairTable:
         self._keys: npt.NDArray[np.int64] | None = None
         self._outdated: str | None = None  # by what
 
-    def _all(self) -> Columns:
+    @property
+    def _made(self) -> Columns:
         """The columns, which are made when they are first looked at."""
         make = self._make  # before the columns are looked at, which come before it goes
         columns = self._columns
@@ -111,25 +112,14 @@ class PairTable:
             self._make = None
         return columns
 
-    @property
-    def i_node(self) -> Ints:
-        return self._all().i_node
-
-    @property
-    def i_list(self) -> Ints:
-        return self._all().i_list
-
-    @property
-    def j_node(self) -> Ints:
-        return self._all().j_node
-
-    @property
-    def j_list(self) -> Ints:
-        return self._all().j_list
+    i_node: Ints = _show.attribute("_made.i_node")
+    i_list: Ints = _show.attribute("_made.i_list")
+    j_node: Ints = _show.attribute("_made.j_node")
+    j_list: Ints = _show.attribute("_made.j_list")
 
     @property
     def shifts(self) -> Ints:
-        shifts = self._all().shifts
+        shifts = self._made.shifts
         if shifts is None:
             raise AttributeError("these pairs have no shifts: there is no periodic box")
         return shifts
@@ -143,7 +133,7 @@ class PairTable:
 
     @coupling.setter
     def coupling(self, values: npt.ArrayLike) -> None:
-        array = as_real_array(values, "coupling", "be a number")
+        array = as_real_array(values, "coupling", "be a number", flags=True)
         must = f"coupling must be a number or have shape ({len(self)},)"
         of_shape(must, (), (len(self),))(array.shape)
         self._coupling = np.array(np.broadcast_to(array, (len(self),)), np.float64)
@@ -153,7 +143,7 @@ class PairTable:
 
     def __getitem__(self, k: int) -> Pair:
         k = self._number(k)
-        return Pair(*(int(column[k]) for column in self._all()[:4]))
+        return Pair(*(int(column[k]) for column in self._made[:4]))
 
     def __iter__(self) -> Iterator[Pair]:
         return (self[k] for k in range(len(self)))
@@ -201,7 +191,7 @@ class PairTable:
         if not nodes.exist(rows).all():
             raise KeyError(f"there is no such node: {pair!r}")
         if self._keys is None:
-            self._keys = nodes.keys_of(*nodes.ranks_of(self._all()))
+            self._keys = nodes.keys_of(*nodes.ranks_of(self._made))
         wanted = nodes.keys_of(*nodes.ranks_of(rows.T))
         first = np.searchsorted(self._keys, wanted)
         end = np.searchsorted(self._keys, wanted, side="right")
@@ -216,7 +206,7 @@ class PairTable:
 
     def _index_of_image(self, first: int, end: int, rows: npt.NDArray[Any], shift: Any) -> int:
         """The place, from first to end, of a pair and a shift."""
-        given, shifts = as_array(shift, "shift"), self._all().shifts
+        given, shifts = as_array(shift, "shift"), self._made.shifts
         if shifts is None:
             raise ValueError("shift is for periodic boxes: these pairs have none")
         if given.dtype.kind not in "iu" or given.shape != shifts.shape[1:] or len(rows) != 1:

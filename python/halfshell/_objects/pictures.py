@@ -270,7 +270,7 @@ def draw_nodes(links: Links, seen: Sequence[Seen], axes: tuple[int, int], ax: Ax
     ]  # in one dimension each list has a line of its own
     if 0 < len(pairs) <= _MOST_PAIRS:
         every = np.concatenate(places)
-        start, end = (every[nodes.numbers(rank)] for rank in nodes.ranks_of(pairs._all()))
+        start, end = (every[nodes.numbers(rank)] for rank in nodes.ranks_of(pairs._made))
         if how.bits and how.box is not None and d > 1:
             end = end + (pairs.shifts @ how.box)[:, list(axes)]
         draw_lines(ax, start, end, colors="0.7", linewidths=0.5)

@@ -462,15 +462,10 @@ class VerletList:
 
         return PairChanges(rows(new, formed), rows(old, broken))
 
-    @property
-    def cutoff(self) -> float:
-        """Largest distance of a pair."""
-        return self._cutoff
-
-    @property
-    def skin(self) -> float:
-        """How far the list extends beyond the cutoff: as given, or as last chosen."""
-        return self._skin
+    cutoff: float = _show.attribute("_cutoff", "Largest distance of a pair.")
+    skin: float = _show.attribute(
+        "_skin", "How far the list extends beyond the cutoff: as given, or as last chosen."
+    )
 
     @property
     def margin(self) -> float:
@@ -489,15 +484,8 @@ class VerletList:
             return len(self._searched[0])
         return int(_core.verlet_look(self._list)["n_points"])
 
-    @property
-    def n_builds(self) -> int:
-        """Number of times that the list was built."""
-        return self._n_builds
-
-    @property
-    def n_updates(self) -> int:
-        """Number of steps taken."""
-        return self._n_updates
+    n_builds: int = _show.attribute("_n_builds", "Number of times that the list was built.")
+    n_updates: int = _show.attribute("_n_updates", "Number of steps taken.")
 
     def _state(self) -> dict[str, Any]:
         state = _core.verlet_look(self._list)

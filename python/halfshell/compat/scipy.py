@@ -31,8 +31,8 @@ import scipy.spatial as _owner
 from scipy.sparse import coo_matrix
 
 import halfshell as hs
-from halfshell._convert.call import take
-from halfshell._functions.counts import Marks, binned
+from halfshell._convert.call import Known, take
+from halfshell._functions.counts import binned
 from halfshell._functions.neighbors import arrays_of_rows
 
 __all__ = ["KDTree", "cKDTree"]
@@ -152,7 +152,8 @@ class _Searches:
                 found = np.diff(found, prepend=0)
             return found.reshape(np.shape(r)) if np.ndim(r) else int(found[0])
         call = take(other.data, 0.0, self.data, **self._box, by_reach=False)
-        bins = binned(call, within, Marks(1, None, marks[1], None, marks[0]))[0, 0]
+        call.known, call.known_of_queries = Known(weights=marks[1]), Known(weights=marks[0])
+        bins = binned(call, within)[0, 0]
         if cumulative:
             found = np.cumsum(bins)[places]
         else:  # an edge that is repeated has nothing between it and itself

@@ -2,7 +2,7 @@
 /* test_os.c: the environment of floats is the core's in a call and the caller's after it. */
 #include "../../../csrc/core/base/os.h"
 #include "../../../csrc/core/exact/metric.h"
-#include "../support/among.h"
+#include "../support/call_scenes.h"
 #include "../support/harness.h"
 
 #include <fenv.h>
@@ -195,116 +195,35 @@ mask_traps(uint64_t before)
 #endif
 }
 
-enum { N_TRAPPED = 200 };
-
-typedef struct trapped_scene {
-    double     x[3 * N_TRAPPED];
-    hs_points  points;
-    hs_box     box;
-    hs_options options;
-} trapped_scene;
-
-static void
-make_trapped_scene(trapped_scene *s)
-{
-    harness_random random = {17};
-    for (int e = 0; e < 3 * N_TRAPPED; e++)
-        s->x[e] = ldexp(floor(random_unit(&random) * 1e6), -1074);
-    s->points = (hs_points){s->x, N_TRAPPED, 3, HS_FLOAT64, 3 * sizeof(double), sizeof(double)};
-    s->box = (hs_box){.ndim = 3};
-    for (int k = 0; k < 3; k++) {
-        s->box.rows[k][k] = 0x1p-1054;
-        s->box.periodic[k] = k < 2;
-    }
-    s->options = hs_options_default();
-    s->options.cutoff = 0x1p-1056;
-    s->options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
-}
-
-/* One of each family of entries; returns what it found, or -1. */
-static int64_t
-search_by(int family, const trapped_scene *s, hs_cells *cells, hs_verlet *list)
-{
-    const double       edges[] = {0.0, 0x1p-1070, 0x1p-1056};
-    int64_t            count = -1, bins[3] = {0}, rows[N_TRAPPED];
-    hs_pairs          *pairs = NULL;
-    hs_status          status = HS_OK;
-    hs_layout          layout;
-    hs_plan            plan;
-    bool               rebuilt;
-    const hs_histogram histogram = {
-        .n_edges = 3, .edges = edges, .last_inclusive = true, .n_types = 1, .counts = bins};
-    switch (family) {
-    case 0: status = hs_pairs_find(AMONG(&s->points, &s->box), &s->options, &pairs, NULL); break;
-    case 1: status = hs_pairs_count(AMONG(&s->points, &s->box), &s->options, &count, NULL); break;
-    case 2:
-        status =
-            hs_neighbors_find(QUERIED(&s->points, &s->points, &s->box), &s->options, &pairs, NULL);
-        break;
-    case 3: status = hs_neighbors_count(AMONG(&s->points, &s->box), &s->options, rows, NULL); break;
-    case 4:
-        status = hs_pairs_histogram(AMONG(&s->points, &s->box), &s->options, &histogram, NULL);
-        count = bins[0] + bins[1] + bins[2];
-        break;
-    case 5:
-        status = hs_nearest_find(AMONG(&s->points, &s->box), 3, &s->options, &pairs, NULL);
-        break;
-    case 6: status = hs_pairs_find(IN_CELLS(cells), &s->options, &pairs, NULL); break;
-    case 7:
-        status = hs_neighbors_find(QUERIED_CELLS(cells, &s->points), &s->options, &pairs, NULL);
-        break;
-    case 8:
-        status = hs_nearest_find(QUERIED_CELLS(cells, &s->points), 2, &s->options, &pairs, NULL);
-        break;
-    case 9: status = hs_cells_find(cells, &s->points, rows, NULL); break;
-    case 10: status = hs_cells_candidates(cells, NULL, &s->options, &pairs, NULL); break;
-    case 11:
-        hs_cells_layout(cells, &layout);
-        count = layout.n_cells;
-        break;
-    case 12:
-        status = hs_verlet_update(list, &s->points, &s->box, &s->options, 0x1p-1060, true, &rebuilt,
-                                  NULL);
-        break;
-    case 13: status = hs_verlet_find(list, &s->options, &pairs, NULL); break;
-    case 14: status = hs_plan_make(AMONG(&s->points, &s->box), &s->options, &plan, NULL); break;
-    case 15: status = hs_box_measure(&s->box, NULL, NULL, NULL); break;
-    case 16: status = hs_box_wrap(&s->box, &s->points, NULL, NULL, NULL); break;
-    default: {
-        hs_stream *stream = NULL;
-        status = hs_stream_open(AMONG(&s->points, &s->box), &s->options, 50, &stream, NULL);
-        if (status == HS_OK)
-            status = hs_stream_next(stream, NULL, NULL, &pairs, NULL);
-        hs_stream_free(stream);
-    }
-    }
-    count = pairs != NULL ? hs_pairs_length(pairs) : count;
-    hs_pairs_free(pairs);
-    return status == HS_OK ? count : -2;
-}
-
 /* A comparison of subnormal numbers would end the process here. */
 static void
 no_entry_meets_the_callers_traps(void)
 {
-    static trapped_scene s;
-    hs_cells            *cells = NULL;
-    hs_verlet           *list = hs_verlet_new();
-    make_trapped_scene(&s);
-    CHECK(hs_cells_build(&s.points, &s.box, &s.options, &cells, NULL) == HS_OK);
-    for (int threads = 1; threads <= 2; threads++) {
-        s.options.threads = threads;
-        for (int family = 0; family <= 17; family++) {
-            const int64_t  plain = search_by(family, &s, cells, list);
-            const uint64_t before = unmask_traps();
-            const int64_t  trapped = search_by(family, &s, cells, list);
-            const bool     is_left = mask_traps(before);
-            CHECK(plain != -2 && trapped == plain);
-            CHECK(is_left);
+    for (int f = 0; f < 2 * CALL_KINDS; f++) {
+        const call_kind     *function = &call_kinds[f / 2];
+        const scene_of_calls kind = {.box = SCENE_ALIGNED,
+                                     .n = 200,
+                                     .cutoff = 1.0,
+                                     .want = ALL,
+                                     .exponent = -1060,
+                                     .threads = 1 + f % 2};
+        hs_status            status[2];
+        uint64_t             answer[2];
+        bool                 is_left = true;
+        for (int trapped = 0; trapped < 2; trapped++) {
+            hs_failure failure;
+            hs_layout  layout;
+            make_call(&kind);
+            call_make_objects(&s.c, function->uses);
+            const uint64_t before = trapped ? unmask_traps() : 0;
+            status[trapped] = function->run(&s.c, &failure);
+            hs_cells_layout(s.c.cells, &layout);
+            is_left = trapped ? mask_traps(before) : is_left;
+            answer[trapped] = s.c.answer;
+            call_free_objects(&s.c);
         }
+        CHECK(is_left && status[0] == HS_OK && status[1] == HS_OK && answer[0] == answer[1]);
     }
-    hs_cells_free(cells);
-    hs_verlet_free(list);
 }
 
 void

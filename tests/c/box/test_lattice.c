@@ -32,80 +32,29 @@ is_within_error(const hs_lattice *r, matrix a, int k, int c)
     return big_compare_magnitude(&difference, &error) <= 0;
 }
 
-/* Determinants are taken modulo primes enough to tell 1 and -1 from every other value. */
-enum { N_PRIMES = 18 }; /* 2^(18 * 30.9) exceeds twice (sqrt(8) 2^61)^8 */
-
-static uint64_t
-prime_number(int k)
-{
-    static uint64_t primes[N_PRIMES];
-    uint64_t        p = (UINT64_C(1) << 31) + 1;
-    for (int found = 0; primes[0] == 0 && found < N_PRIMES;) {
-        bool is_prime = true;
-        p -= 2;
-        for (uint64_t d = 3; is_prime && d * d <= p; d += 2) {
-            is_prime = p % d != 0;
-        }
-        if (is_prime) {
-            if (++found == N_PRIMES) {
-                primes[0] = p; /* last, for it marks the table as complete */
-            } else {
-                primes[found] = p;
-            }
-        }
-    }
-    return primes[k];
-}
-
-static uint64_t
-determinant_modulo(uint64_t p, const hs_lattice *r)
-{
-    uint64_t a[HS_MAX_DIM][HS_MAX_DIM], determinant = 1;
-    int      n = r->n_periodic;
-    for (int i = 0; i < n; i++) {
-        for (int j = 0; j < n; j++) {
-            int64_t residue = r->U[i][j] % (int64_t)p;
-            a[i][j] = (uint64_t)(residue < 0 ? residue + (int64_t)p : residue);
-        }
-    }
-    for (int k = 0; k < n; k++) {
-        int pivot = k;
-        while (pivot < n && a[pivot][k] == 0) {
-            pivot++;
-        }
-        if (pivot == n) {
-            return 0;
-        }
-        for (int c = 0; pivot != k && c < n; c++) {
-            uint64_t other = a[k][c];
-            a[k][c] = a[pivot][c];
-            a[pivot][c] = p - other; /* so that the sign stays; may be p itself, which is 0 */
-        }
-        determinant = determinant * a[k][k] % p;
-        uint64_t inverse = 1, power = a[k][k];
-        for (uint64_t e = p - 2; e != 0; e >>= 1, power = power * power % p) {
-            inverse = e & 1 ? inverse * power % p : inverse;
-        }
-        for (int i = k + 1; i < n; i++) {
-            uint64_t factor = a[i][k] % p * inverse % p;
-            for (int c = k; c < n; c++) {
-                a[i][c] = (a[i][c] % p + (p - factor) * (a[k][c] % p)) % p;
-            }
-        }
-    }
-    return determinant;
-}
-
+/* Whether the determinant is 1 or -1, by minors of the first rows in all sets of columns. */
 static bool
 is_unimodular(const hs_lattice *r)
 {
-    bool is_one = true, is_minus_one = true;
-    for (int k = 0; k < N_PRIMES; k++) {
-        uint64_t p = prime_number(k), value = determinant_modulo(p, r);
-        is_one = is_one && value == 1;
-        is_minus_one = is_minus_one && value == p - 1;
+    static big minors[1 << HS_MAX_DIM];
+    const int  n = r->n_periodic;
+    const big  one = big_from_int(1);
+    minors[0] = one;
+    for (unsigned columns = 1; columns < 1u << n; columns++) {
+        int row = -1, sign = 1;
+        for (int c = 0; c < n; c++)
+            row += columns >> c & 1;
+        minors[columns] = big_from_int(0);
+        for (int c = n - 1; c >= 0; c--) {
+            if (columns >> c & 1) {
+                const big entry = big_from_int(sign * r->U[row][c]);
+                const big term = big_product(entry, minors[columns & ~(1u << c)]);
+                minors[columns] = big_sum(minors[columns], term);
+                sign = -sign;
+            }
+        }
     }
-    return is_one || is_minus_one;
+    return big_compare_magnitude(&minors[(1u << n) - 1], &one) == 0;
 }
 
 /* Product of the lengths over the volume: 1 when orthogonal. */

@@ -289,7 +289,7 @@ sparse_pays_where_points_crowd(void)
         CHECK(hs_scene_make(&account, NULL, &(hs_sets){.points = &points}, NULL, &options, &read,
                             NULL, &failure) == HS_OK);
         CHECK(hs_grid_init(&read, HS_GRID_ANY, &dense, &failure) == HS_OK);
-        CHECK((hs_sparse_choose(&read, &dense) > 0.0) == pays[kind]);
+        CHECK((hs_sparse_choose(&read, &dense, false) > 0.0) == pays[kind]);
         hs_scene_free(&account, &read);
     }
 }

@@ -133,18 +133,16 @@ static int n_visits;
 static hs_status
 record_unwanted(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    hs_recorder      *recorder = context;
-    const hs_options *polls = scanner->pair_batch.of.polls;
-    refusal           once = {.nth = 1};
-    hs_options        refusing = *polls;
-    refusing.poll = refuse_once;
-    refusing.poll_context = &once;
+    hs_recorder     *recorder = context;
+    const hs_options polls = scanner->options;
+    refusal          once = {.nth = 1};
     CHECK(scanner->block.n > HS_POLL_CANDIDATES);
     CHECK(hs_output_reserve(recorder->output, hits->end[hits->n - 1], 0.0) == HS_OK);
-    scanner->pair_batch.of.polls = &refusing;
-    hs_records_reset(&scanner->pair_batch.of); /* as if float32 had told all pairs */
+    scanner->options.poll = refuse_once;
+    scanner->options.poll_context = &once;
+    scanner->block.has_candidates = false; /* as if float32 had told all pairs */
     const hs_status status = hs_record_places(recorder, scanner, first, hits);
-    scanner->pair_batch.of.polls = polls;
+    scanner->options = polls;
     CHECK(status == HS_ERR_INTERRUPTED && once.n == 1 && recorder->output->n_pairs == 0);
     n_visits++;
     return HS_ERR_INTERRUPTED;

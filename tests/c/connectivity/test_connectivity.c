@@ -627,7 +627,9 @@ fill_found(void *context)
     const hs_among       among = {.points = SET(&points)};
     const hs_node_lists  lists = {.n_lists = 2, .n_nodes = counts, .n_ghosts = context};
     hs_pairs            *found = NULL;
-    hs_connectivity     *made = hs_connectivity_new();
+    hs_connectivity     *made = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *made);
+    hs_node_map          map;
+    hs_output            half = {.n_pairs = 0};
     for (int k = 0; k < 60; k++)
         x[k] = random_unit(&random);
     options.cutoff = 0.4;
@@ -635,11 +637,16 @@ fill_found(void *context)
     options.index_bytes = 4;
     CHECK(hs_neighbors_find(&among, &options, &found, NULL) == HS_OK);
     options.memory_limit = limit;
-    (void)hs_call_enter(&options, NULL, &made->call);
-    const hs_status status = hs_connectivity_fill(made, &lists, NULL, &found);
-    hs_call_leave(&made->call, 0);
-    hs_pairs_free(found);
+    memset(made, 0, sizeof *made);
+    (void)hs_call_enter(&options, NULL, &made->rows.call);
+    hs_status status = hs_node_map_make(&made->rows.call.account, &lists, 30, &map);
+    if (status == HS_OK)
+        status = hs_connectivity_fill(made, &map, &half, &found->offsets, &found->output);
+    hs_output_free(&half);
+    hs_node_map_free(&made->rows.call.account, &map);
+    hs_call_leave(&made->rows.call, 0);
     hs_connectivity_free(made);
+    hs_pairs_free(found);
     return status;
 }
 

@@ -174,7 +174,7 @@ lattice_pairs_are_all_at_an_edge(void)
     for (int i = 0; i < N; i++) {
         x[i] = i;
     }
-    for (int few = 0; few < 2; few++) { /* N edges have copies, 700 have not */
+    for (int few = 0; few < 2; few++) {
         const int n_edges = few ? N : EDGES;
         for (int k = 0; k < n_edges; k++) {
             edges[k] = few ? k : k / 7 + 1e-9 * (k % 7);

@@ -248,28 +248,37 @@ fork_in_the_middle(void)
 
 #endif
 
+#if !defined(HS_EMULATED)
+static uint64_t
+word_at(size_t k)
+{
+    return (uint64_t)k * UINT64_C(0x9e3779b97f4a7c15) + 1;
+}
+
+static void
+fill(void *data, size_t bytes)
+{
+    uint64_t *words = data;
+    for (size_t k = 0; k < bytes / 8; k++)
+        words[k] = word_at(k);
+}
+
+static bool
+holds(const void *data, size_t bytes)
+{
+    const uint64_t *words = data;
+    for (size_t k = 0; k < bytes / 8; k++)
+        if (words[k] != word_at(k))
+            return false;
+    return true;
+}
+
+#endif
+
 /* ---- blocks from the system, and what is left of them when the system refuses ---- */
 
 #if !defined(HS_EMULATED) && CAN_LIMIT_ADDRESSES
 #define TOO_MUCH ((size_t)1 << 61)
-
-static void
-fill(char *block, size_t bytes)
-{
-    for (size_t b = 0; b < bytes; b += 997) {
-        block[b] = (char)(b % 251);
-    }
-}
-
-static bool
-holds(const char *block, size_t bytes)
-{
-    bool same = true;
-    for (size_t b = 0; b < bytes; b += 997) {
-        same = same && block[b] == (char)(b % 251);
-    }
-    return same;
-}
 
 /* As many mappings as a process may have, in pages from `start` on; 0: more than are worth
  * making. */
@@ -402,32 +411,6 @@ chunks_that_cannot_grow_stay(void)
 #if !defined(HS_EMULATED)
 #define GB ((size_t)1 << 30)
 
-static uint64_t
-word_at(size_t k)
-{
-    return (uint64_t)k * UINT64_C(0x9e3779b97f4a7c15) + 1;
-}
-
-/* Writes words from the used bytes on, up to `bytes`. */
-static void
-fill_region(hs_region *region, size_t bytes)
-{
-    uint64_t *words = (uint64_t *)region->data;
-    for (size_t k = region->used / 8; k < bytes / 8; k++)
-        words[k] = word_at(k);
-    region->used = bytes;
-}
-
-static bool
-holds_region(const void *data, size_t bytes)
-{
-    const uint64_t *words = data;
-    for (size_t k = 0; k < bytes / 8; k++)
-        if (words[k] != word_at(k))
-            return false;
-    return true;
-}
-
 static bool
 is_aligned(const void *data, size_t alignment)
 {
@@ -468,15 +451,16 @@ detach_keeps_the_front(void)
             hs_region region = {0};
             CHECK(hs_region_reserve(&region, from * 10 * MB));
             CHECK(hs_region_grow(&region, 12 * MB));
-            fill_region(&region, 12 * MB);
+            fill(region.data, 12 * MB);
+            region.used = 12 * MB;
             void *data = hs_region_detach(&region, kept[k]);
-            CHECK(data != NULL && holds_region(data, kept[k]) && is_aligned(data, HS_ALIGNMENT));
+            CHECK(data != NULL && holds(data, kept[k]) && is_aligned(data, HS_ALIGNMENT));
             CHECK(region.data == NULL && hs_region_detach(&region, 0) == NULL);
             /* What the pool got of it is another's to write to. */
             hs_region other = {0};
             CHECK(hs_region_reserve(&other, 8 * MB));
             memset(other.data, 0x77, 8 * MB);
-            CHECK(holds_region(data, kept[k]));
+            CHECK(holds(data, kept[k]));
             hs_region_release(&other);
             hs_buffer_free(data);
         }
@@ -514,15 +498,16 @@ failures_lose_nothing(void)
     CHECK(region.data == NULL && hs_test_live_blocks() == before);
     CHECK(hs_region_reserve(&region, 3 * MB));
     CHECK(hs_test_live_blocks() == before + 1);
-    fill_region(&region, 3 * MB);
+    fill(region.data, 3 * MB);
+    region.used = 3 * MB;
     const hs_region unchanged = region;
     hs_test_fail_allocation(1);
     CHECK(!hs_region_grow(&region, region.capacity + 1));
     hs_test_fail_allocation(0);
-    CHECK(memcmp(&region, &unchanged, sizeof region) == 0 && holds_region(region.data, 3 * MB));
+    CHECK(memcmp(&region, &unchanged, sizeof region) == 0 && holds(region.data, 3 * MB));
     CHECK(!hs_region_grow(&region, PTRDIFF_MAX)); /* the system refuses */
     CHECK(!hs_region_grow(&region, SIZE_MAX));
-    CHECK(memcmp(&region, &unchanged, sizeof region) == 0 && holds_region(region.data, 3 * MB));
+    CHECK(memcmp(&region, &unchanged, sizeof region) == 0 && holds(region.data, 3 * MB));
     hs_test_fail_allocation(1);
     void *data = hs_region_detach(&region, 1000); /* asks for nothing */
     hs_buffer_free(data);

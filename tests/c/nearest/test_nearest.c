@@ -52,7 +52,7 @@ borrows(hs_nearest_kept *kept, double limit)
     hs_call_begin(&options, &unit.call);
     hs_search_begin(&unit.call, &unit.search);
     unit.call.team = hs_team_create(2);
-    unit.near = (hs_nearest){.search = &unit.search, .k = 1, .of_spot = 2, .omits_self = true};
+    unit.near = (hs_nearest){.search = &unit.search, .k = 1, .omits_self = true};
     CHECK(hs_nearest_prepare(&unit.near, &sets, NULL, limit, &failure) == HS_OK);
     CHECK(unit.near.tree.n_nodes == 1 && unit.near.limit > 0.0);
     const bool borrowed = unit.search.is_borrowed;
@@ -446,28 +446,100 @@ many_images_can_be_stopped(void)
  * was found before does: few points are searched one by one.
  */
 
-static void
-guesses_are_corrected(void)
+enum { POINTS = 9000 };
+
+/* Calls that take no more candidates for each point than `most`, however their points lie. */
+static const struct even_call {
+    enum { CUBE, PLANE, SLANTED, SPOT, CLUMPS, LONG_BOX, FAR_ASKING, FAR_POINT, TINY, HUGE } kind;
+    int64_t k, most;
+    int     exclude; /* a pair */
+    double  apart;   /* the least distance */
+} even_calls[] = {
+    {CUBE, 8, 500, 0, 0.0},       {PLANE, 8, 500, 0, 0.0},     {SLANTED, 8, 500, 0, 0.0},
+    {SPOT, 2, 20, 1, 0.0},        {SPOT, 64, 80, 1, 0.0},      {SPOT, 2, 0, 0, 0.5},
+    {CLUMPS, 2, 50, 0, 0.5},      {CUBE, 2, 1500, 0, 0.5},     {LONG_BOX, 64, 2000, 0, 0.0},
+    {FAR_ASKING, 8, 300, 0, 0.0}, {FAR_POINT, 8, 200, 0, 0.0}, {TINY, 8, 500, 0, 0.0},
+    {HUGE, 8, 500, 0, 0.0},
+};
+
+/* A coordinate in such a scene, from a number between 0 and 1 and the coordinate before. */
+static double
+even_coordinate(int kind, int axis, double number, double before)
 {
-    enum { POINTS = 9000, K = 8 };
-    static double   x[3 * POINTS];
-    harness_random  random = {342};
-    const hs_points points = {x, POINTS, 3, HS_FLOAT64, 24, 8};
-    for (int kind = 0; kind < 3; kind++) { /* in a cube, in a plane, on a slanting line */
-        hs_options  options = hs_options_default();
-        hs_counters counters;
-        hs_pairs   *rows = NULL;
-        for (int e = 0; e < 3 * POINTS; e++)
-            x[e] = kind == 2 && e % 3 > 0    ? x[e - 1]
-                   : kind == 1 && e % 3 == 0 ? 2.0
-                                             : random_unit(&random);
+    switch (kind) {
+    case PLANE: return axis == 0 ? 2.0 : number;
+    case SLANTED: return axis > 0 ? before : number;
+    case SPOT: return 0.25;
+    case CLUMPS: return 1e-3 * number;
+    case LONG_BOX: return axis == 0 ? 1e6 * number : number;
+    case TINY: return ldexp(number, -1000);
+    case HUGE: return ldexp(number, 1000);
+    default: return number;
+    }
+}
+
+static void
+no_scene_takes_much_more_than_others(void)
+{
+    static double  x[3 * POINTS], q[3 * POINTS];
+    harness_random random = {342};
+    const int64_t  pair[2] = {0, 1};
+    const hs_box   box = {
+          .ndim = 3, .periodic = {true, true, true}, .rows = {{1e6}, {0, 1.0}, {0, 0, 1.0}}};
+    for (size_t c = 0; c < sizeof even_calls / sizeof *even_calls; c++) {
+        const struct even_call *call = &even_calls[c];
+        const hs_set            points = {.at = {x, POINTS, 3, HS_FLOAT64, 24, 8}};
+        const hs_set            asking = {.at = {q, POINTS, 3, HS_FLOAT64, 24, 8}};
+        const bool              asks = call->kind == FAR_ASKING || call->kind == FAR_POINT;
+        const hs_selection      selection = {
+                 .n_excluded = call->exclude, .excluded = pair, .min_distance = call->apart};
+        const hs_among among = {.points = &points,
+                                .queries = asks ? &asking : NULL,
+                                .box = call->kind == LONG_BOX ? &box : NULL,
+                                .selection = call->exclude || call->apart > 0.0 ? &selection
+                                                                                : NULL};
+        hs_options     options = hs_options_default();
+        hs_counters    counters;
+        hs_pairs      *rows = NULL;
+        for (int e = 0; e < 3 * POINTS; e++) {
+            x[e] = even_coordinate(call->kind, e % 3, random_unit(&random), e > 0 ? x[e - 1] : 0.0);
+            x[e] += call->kind == CLUMPS && e / 3 % 2 != 0 ? 1.0 : 0.0;
+            q[e] = (call->kind == FAR_POINT ? 1e6 : 1e4) * (1.0 + random_unit(&random));
+        }
+        x[0] = call->kind == FAR_POINT ? 3e6 : x[0];
         options.cutoff = INFINITY;
-        options.want = HS_WANT_J;
+        options.want = HS_WANT_J | HS_WANT_DISTANCE;
         options.counters = &counters;
-        CHECK(hs_nearest_find(AMONG(&points, NULL), K, &options, &rows, NULL) == HS_OK);
-        CHECK(counters.groups < POINTS / 6 && counters.candidates < 500 * POINTS);
+        CHECK(hs_nearest_find(&among, call->k, &options, &rows, NULL) == HS_OK);
+        CHECK(counters.candidates <= call->most * POINTS);
+        CHECK(call->kind > SLANTED || call->apart > 0.0 || counters.groups < POINTS / 6);
+        CHECK(counters.by_integers == 0);
         hs_pairs_free(rows);
     }
+}
+
+/* Queries that are points find themselves, even in the midst of what is too near. */
+static void
+no_point_is_too_near_to_itself(void)
+{
+    enum { SPOT_POINTS = 40 };
+    static double      x[SPOT_POINTS + 1];
+    static int64_t     numbers[SPOT_POINTS + 1];
+    const hs_set       points = {.at = points_on_line(x, SPOT_POINTS + 1)};
+    const hs_selection selection = {.query_numbers = numbers, .min_distance = 0.5};
+    const hs_among     among = {.points = &points, .queries = &points, .selection = &selection};
+    hs_options         options = hs_options_default();
+    hs_pairs          *rows = NULL;
+    for (int64_t i = 0; i <= SPOT_POINTS; i++)
+        numbers[i] = i;
+    x[SPOT_POINTS] = 1.0;
+    options.cutoff = INFINITY;
+    options.want = HS_WANT_J;
+    CHECK(hs_nearest_find(&among, 2, &options, &rows, NULL) == HS_OK);
+    const int64_t *j = hs_pairs_array(rows, HS_WANT_J);
+    for (int64_t i = 0; i < SPOT_POINTS; i++)
+        CHECK(j[2 * i] == i && j[2 * i + 1] == SPOT_POINTS);
+    hs_pairs_free(rows);
 }
 
 /* ---- the search for a radius that surely suffices ends when it is told to ---- */
@@ -574,7 +646,8 @@ test_nearest(void)
     RUN(long_boxes_have_many_images);
     RUN(many_points_can_be_stopped);
     RUN(many_images_can_be_stopped);
-    RUN(guesses_are_corrected);
+    RUN(no_scene_takes_much_more_than_others);
+    RUN(no_point_is_too_near_to_itself);
     RUN(one_refusal_ends_the_search);
     RUN(shifts_may_be_too_large);
 }

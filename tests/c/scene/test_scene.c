@@ -24,9 +24,9 @@ static hs_account account;
 static hs_scene   one_scene;
 
 static hs_points
-points_in(const double *data, int64_t n)
+points_in(const double *x, int64_t n, int ndim)
 {
-    return (hs_points){data, n, 2, HS_FLOAT64, 16, 8};
+    return (hs_points){x, n, ndim, HS_FLOAT64, ndim * 8, 8};
 }
 
 static hs_options
@@ -53,7 +53,7 @@ lost_digits_are_kept(void)
     const double tiny[2 * N_POINTS] = {0x1.8p-1070, 1.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0};
     const hs_options options = options_for(0x1p40, HS_WANT_J, HS_EXACT);
     hs_failure       failure;
-    const hs_points  points = points_in(tiny, N_POINTS);
+    const hs_points  points = points_in(tiny, N_POINTS, 2);
     const hs_sets    sets = {.points = &points, .is_plain = true};
     hs_account_init(&account, &options);
     CHECK(hs_scene_make(&account, NULL, &sets, NULL, &options, &one_scene, NULL, &failure) ==
@@ -72,7 +72,7 @@ digits_are_lost_from_the_subnormal_numbers_on(void)
     for (int below = 0; below < 4; below++) {
         const double    least = ldexp(1.0, -722 - below), ulp = ldexp(least, -52);
         const double    x[2 * 2] = {0.0, least + ulp, 0x1p300, least};
-        const hs_points points = points_in(x, 2);
+        const hs_points points = points_in(x, 2, 2);
         hs_options      options = options_for(0x1p300, HS_WANT_J, HS_EXACT);
         int64_t         n = -1;
         options.inclusive = true;
@@ -88,7 +88,7 @@ errors_are_bounded_and_small(void)
     const double     x[4] = {1.9, 0.3, -1.7, 1.1};
     const hs_options options = options_for(0.5, HS_WANT_J, HS_EXACT);
     hs_failure       failure;
-    const hs_points  points = points_in(x, 2);
+    const hs_points  points = points_in(x, 2, 2);
     const hs_sets    sets = {.points = &points};
     hs_account_init(&account, &options);
     CHECK(hs_scene_make(&account, NULL, &sets, &box, &options, &one_scene, NULL, &failure) ==
@@ -111,17 +111,11 @@ errors_are_bounded_and_small(void)
 
 static hs_scene kept;
 
-static hs_points
-points_in_queries(const double *x, int64_t n, int ndim)
-{
-    return (hs_points){x, n, ndim, HS_FLOAT64, ndim * 8, 8};
-}
-
 /* A scene for queries to come, which knows the turns. */
 static void
 keep(const double *x, int64_t n, const hs_box *box)
 {
-    const hs_points points = points_in_queries(x, n, box->ndim);
+    const hs_points points = points_in(x, n, box->ndim);
     const hs_sets   sets = {
           .points = &points, .is_kept = true, .is_full = true, .is_plain = true, .is_wide = true};
     hs_options options = hs_options_default();
@@ -135,7 +129,7 @@ keep(const double *x, int64_t n, const hs_box *box)
 static hs_status
 ask(const double *q, int64_t n, unsigned want, hs_failure *failure)
 {
-    const hs_points queries = points_in_queries(q, n, kept.ndim);
+    const hs_points queries = points_in(q, n, kept.ndim);
     hs_options      options = hs_options_default();
     hs_scene        asking;
     options.cutoff = 1.0;
@@ -201,7 +195,7 @@ what_is_refused_is_named(void)
     const hs_box    box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
     const double    x[4] = {0.25, 0.5, 0.75, 0.5}, q[6] = {1.0, -2.0, 3.0, -4.0, 2.0, 0.0};
     const double    far[6] = {1.0, 0x1p1000, 0x1p1020, 0.0, 0.0, 0.0};
-    const hs_points queries = points_in_queries(q, 3, 2), too_far = points_in_queries(far, 3, 2);
+    const hs_points queries = points_in(q, 3, 2), too_far = points_in(far, 3, 2);
     hs_failure      failure = HS_NO_FAILURE;
     keep(x, 2, &box);
     hs_scene_name_refused(&kept, &queries, &failure);
@@ -265,7 +259,7 @@ static void
 endless_images_are_refused_for_their_number(void)
 {
     const double    x[6] = {0.0, 0.0, 0.0, 0.25, 0.0, 0.25};
-    const hs_points points = {x, 2, 3, HS_FLOAT64, 24, 8};
+    const hs_points points = points_in(x, 2, 3);
     for (int tilted = 0; tilted < 2; tilted++) {
         for (int is_short = 0; is_short < 2; is_short++) {
             const double     least = is_short ? 0x1p-950 : 1.0;
@@ -387,7 +381,7 @@ far_points_are_wrapped_where_their_period_is_known(void)
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
         const double    near = cases[c].y;
         const double    x[6] = {0.0, near, cases[c].x, 0.0, near, 0.0};
-        const hs_points points = {x, 2, 3, HS_FLOAT64, 24, 8};
+        const hs_points points = points_in(x, 2, 3);
         hs_options      options = options_for(cases[c].cutoff, HS_WANT_J, HS_EXACT);
         int64_t         n = -1, folded = -2;
         hs_pairs       *pairs = NULL;

@@ -168,8 +168,7 @@ count_with(const question *ask, hs_stages *stages)
     hs_call_begin(&options, &call);
     CHECK(hs_levels_divide(&call.account, &options, &points, ask->has_queries ? &queries : NULL,
                            &reach, &levels, &failure) == HS_OK);
-    CHECK(hs_level_plan_make(&call.account, &call.options, &levels, NULL, ask->bound, HS_AUTO,
-                             &plan) == HS_OK);
+    CHECK(hs_level_plan_make(&call.account, &levels, NULL, ask->bound, HS_AUTO, &plan) == HS_OK);
     plan.is_half = plan.is_half && !ask->is_ordered;
     for (int64_t s = 0; s < plan.n; s++) {
         CHECK(hs_level_open(&plan, s, NULL, false, &call, &open, &failure) == HS_OK);

@@ -76,7 +76,7 @@ is_narrow(void)
 {
     hs_walker walker;
     CHECK(hs_walker_init(&unit.search, HS_BLOCK_LISTS_PLACES, NULL, NULL, NULL, &walker) == HS_OK);
-    const bool narrow = walker.scanner.pair_batch.of.is_narrow;
+    const bool narrow = walker.scanner.pair_batch.is_narrow;
     hs_walker_close(&unit.search, &walker);
     return narrow;
 }

@@ -86,6 +86,7 @@ call_make_objects(call *c, unsigned uses)
     bool rebuilt;
     c->in_cells = uses & USES_CELLS;
     c->by_reach = uses & USES_REACH;
+    c->in_systems = uses & USES_SYSTEMS;
     if (uses & USES_CELLS)
         CHECK(hs_cells_build(c->points, c->box, c->options, &c->cells, NULL) == HS_OK);
     if (uses & USES_STREAM)
@@ -197,12 +198,6 @@ call_measure(call *c, hs_failure *failure)
     return call_take_pairs(c, status, pairs);
 }
 
-static inline hs_status
-call_systems_clusters(call *c, hs_failure *failure)
-{
-    return call_in_systems(c, call_clusters, failure);
-}
-
 #define OF_VERLET \
     (OF_SCENE | USES_OPTIONS | USES_CUTOFF | NEEDS_FINITE | USES_KERNEL | USES_RESULT | USES_LIST)
 
@@ -250,23 +245,23 @@ static const call_kind call_kinds[] = {
     {"pairs_visit in cells", call_visit, USES_CELLS | OF_SEARCH | USES_VISIT},
     {"cells_find", call_cells_find, USES_CELLS | USES_QUERIES | NEEDS_QUERIES | USES_RESULT},
     {"cells_candidates", call_cells_candidates, USES_CELLS | USES_QUERIES | OF_SEARCH | OF_ARRAYS},
-    {"systems_find", call_systems_find, OF_SCENE | USES_SYSTEMS | OF_SEARCH | OF_ARRAYS},
-    {"systems_count", call_systems_count, OF_SCENE | USES_SYSTEMS | OF_SEARCH},
-    {"systems_neighbors", call_systems_neighbors,
+    {"systems_find", call_find, OF_SCENE | USES_SYSTEMS | OF_SEARCH | OF_ARRAYS},
+    {"systems_count", call_count, OF_SCENE | USES_SYSTEMS | OF_SEARCH},
+    {"systems_neighbors", call_neighbors,
      OF_SCENE | USES_SYSTEMS | USES_QUERIES | OF_SEARCH | OF_ARRAYS},
-    {"systems_coordination", call_systems_coordination,
+    {"systems_coordination", call_neighbors_count,
      OF_SCENE | USES_SYSTEMS | USES_QUERIES | OF_SEARCH},
-    {"systems_nearest", call_systems_nearest,
+    {"systems_nearest", call_nearest,
      OF_SCENE | USES_SYSTEMS | USES_QUERIES | (OF_SEARCH & ~(NEEDS_FINITE | USES_PRECISION)) |
          USES_INDEX_BYTES | USES_K},
-    {"systems_histogram", call_systems_histogram,
+    {"systems_histogram", call_histogram,
      OF_SCENE | USES_SYSTEMS | USES_QUERIES | USES_OPTIONS | USES_CELL_SIZE | USES_KERNEL |
          USES_COUNTERS | USES_HISTOGRAM},
-    {"systems_stream", call_systems_stream,
+    {"systems_stream", call_stream,
      OF_SCENE | USES_SYSTEMS | (OF_SEARCH & ~USES_COUNTERS) | USES_WANT | USES_INDEX_BYTES |
          USES_MAX_PAIRS},
-    {"systems_visit", call_systems_visit, OF_SCENE | USES_SYSTEMS | OF_SEARCH | USES_VISIT},
-    {"systems_clusters", call_systems_clusters, OF_SCENE | USES_SYSTEMS | OF_SEARCH},
+    {"systems_visit", call_visit, OF_SCENE | USES_SYSTEMS | OF_SEARCH | USES_VISIT},
+    {"systems_clusters", call_clusters, OF_SCENE | USES_SYSTEMS | OF_SEARCH},
     {"verlet_update", call_verlet_update, OF_VERLET | USES_SKIN},
     {"verlet_find", call_verlet_find,
      USES_LIST | USES_OPTIONS | USES_CELL_SIZE | OF_ARRAYS | USES_KERNEL | USES_COUNTERS |

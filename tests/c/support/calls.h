@@ -214,13 +214,15 @@ call_find(call *c, hs_failure *failure)
     return call_take_pairs(c, status, pairs);
 }
 
+/* One number, or one for each system. */
 static inline hs_status
 call_count(call *c, hs_failure *failure)
 {
-    const hs_among  among = call_among(c, c->queries);
-    int64_t         count = -7;
-    const hs_status status = hs_pairs_count(&among, c->options, RESULT(count), failure);
-    return call_take_count(c, status, count);
+    const hs_among  among = call_among(c, c->in_systems ? NULL : c->queries);
+    int64_t         counts[CALL_ROOM] = {-7};
+    const hs_status status = hs_pairs_count(&among, c->options, RESULT(counts[0]), failure);
+    return c->in_systems ? call_take_counts(c, status, counts, status == HS_OK ? c->systems->n : 0)
+                         : call_take_count(c, status, counts[0]);
 }
 
 static inline hs_status
@@ -241,7 +243,7 @@ call_neighbors_count(call *c, hs_failure *failure)
     return call_take_counts(c, status, counts, c->queries != NULL ? c->queries->n : c->n_points);
 }
 
-/* Of a histogram whose arrays have CALL_ROOM entries, or are NULL. */
+/* Of a histogram whose arrays have CALL_ROOM entries, or are NULL; of systems, the first one. */
 static inline hs_status
 call_take_histogram(call *c, hs_status status)
 {
@@ -348,70 +350,6 @@ call_visit(call *c, hs_failure *failure)
     const hs_status status =
         hs_pairs_visit(&among, c->options, c->visit, RESULT(n_visited), failure);
     return call_take_visits(c, status, n_visited);
-}
-
-/* Of several systems. */
-static inline hs_status
-call_in_systems(call *c, hs_status (*run)(call *c, hs_failure *failure), hs_failure *failure)
-{
-    c->in_systems = true;
-    const hs_status status = run(c, failure);
-    c->in_systems = false;
-    return status;
-}
-
-static inline hs_status
-call_systems_find(call *c, hs_failure *failure)
-{
-    return call_in_systems(c, call_find, failure);
-}
-
-static inline hs_status
-call_systems_count(call *c, hs_failure *failure)
-{
-    int64_t counts[CALL_ROOM];
-    c->in_systems = true;
-    const hs_among  among = call_among(c, NULL);
-    const hs_status status = hs_pairs_count(&among, c->options, RESULT(counts[0]), failure);
-    c->in_systems = false;
-    return call_take_counts(c, status, counts, status == HS_OK ? c->systems->n : 0);
-}
-
-static inline hs_status
-call_systems_neighbors(call *c, hs_failure *failure)
-{
-    return call_in_systems(c, call_neighbors, failure);
-}
-
-static inline hs_status
-call_systems_coordination(call *c, hs_failure *failure)
-{
-    return call_in_systems(c, call_neighbors_count, failure);
-}
-
-static inline hs_status
-call_systems_nearest(call *c, hs_failure *failure)
-{
-    return call_in_systems(c, call_nearest, failure);
-}
-
-/* Condenses the histogram of the first system. */
-static inline hs_status
-call_systems_histogram(call *c, hs_failure *failure)
-{
-    return call_in_systems(c, call_histogram, failure);
-}
-
-static inline hs_status
-call_systems_stream(call *c, hs_failure *failure)
-{
-    return call_in_systems(c, call_stream, failure);
-}
-
-static inline hs_status
-call_systems_visit(call *c, hs_failure *failure)
-{
-    return call_in_systems(c, call_visit, failure);
 }
 
 #endif

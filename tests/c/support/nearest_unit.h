@@ -30,11 +30,8 @@ nearest_unit_open_by(int threads, const hs_points *points, const hs_points *quer
     options.threads = threads;
     hs_call_begin(&options, &unit->call);
     hs_search_begin(&unit->call, &unit->search);
-    unit->near = (hs_nearest){.search = &unit->search,
-                              .k = k,
-                              .of_spot = (int32_t)k + 1,
-                              .omits_self = queries == NULL,
-                              .rows = &unit->rows};
+    unit->near = (hs_nearest){
+        .search = &unit->search, .k = k, .omits_self = queries == NULL, .rows = &unit->rows};
     hs_output_init(&unit->call.account, points->ndim, want, 8, &unit->rows);
     CHECK(hs_nearest_prepare(&unit->near, &sets, box, limit, &failure) == HS_OK);
     unit->near.shared = hs_shared_new(&unit->call.account, HS_FOR_CANDIDATES);

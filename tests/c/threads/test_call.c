@@ -27,18 +27,18 @@ what_was_done_adds_up(void)
     hs_options        options = hs_options_default();
     hs_call           call;
     options.counters = &counters;
-    hs_call_begin(&options, &call);
+    (void)hs_call_enter(&options, NULL, &call);
     hs_call_add_counters(&call, &done);
     hs_call_add_counters(&call, &done);
     void *block = hs_alloc(&call.account, HS_FOR_CELLS, 100, 10);
     hs_free(&call.account, block);
-    hs_call_report(&call, 0);
+    hs_call_leave(&call, 0);
     CHECK(counters.groups == 2 && counters.candidates == 4 && counters.ambiguous == 6);
     CHECK(counters.by_float64 == 8 && counters.by_double_word == 10 && counters.by_integers == 12);
     CHECK(counters.polls == 14 && counters.pairs == 0);
     CHECK(counters.bytes[HS_FOR_CELLS] >= 1000 && counters.bytes_peak >= 1000);
     hs_call_restart(&call);
-    hs_call_report(&call, 0);
+    hs_call_leave(&call, 0);
     CHECK(counters.groups == 0 && counters.bytes[HS_FOR_CELLS] == 0 && counters.bytes_peak == 0);
     hs_account_close(&call.account);
 }

@@ -211,6 +211,27 @@ what_goes_with_the_box_uses_little_in_both_types(void)
     CHECK(margin[0] == margin[1]);
 }
 
+/* What all points share uses no more than roundings of the skin, however far that is. */
+static void
+a_common_displacement_uses_next_to_nothing(void)
+{
+    static const double shares[] = {0.125, 0.375, -0.4375, 0.75, 3.25, -1000.3125};
+    harness_random      random = {43};
+    const hs_box        box = {.ndim = 2, .periodic = {true, true}, .rows = {{8.0}, {3.0, 8.0}}};
+    double              x[2 * POINTS], y[2 * POINTS];
+    brute_scene         before = {.ndim = 2, .n = POINTS, .x = x}, behind = before;
+    behind.x = y;
+    for (int trial = 0; trial < 12; trial++) {
+        before.box = behind.box = trial % 2 ? &box : NULL;
+        for (int e = 0; e < 2 * POINTS; e++) {
+            x[e] = 8.0 * random_unit(&random);
+            y[e] = x[e] + 8.0 * shares[trial / 2];
+        }
+        const double margin = margin_between(&before, &behind, 2.0, 1.5);
+        CHECK(margin < 0.5 && margin > 0.5 - 1e-10);
+    }
+}
+
 /* Too far, too large, too small or too flat to tell: nothing is promised. */
 static void
 nothing_is_promised_beyond_the_numbers(void)
@@ -534,6 +555,7 @@ test_pair_list(void)
 {
     RUN(margins_are_promises);
     RUN(what_goes_with_the_box_uses_little_in_both_types);
+    RUN(a_common_displacement_uses_next_to_nothing);
     RUN(nothing_is_promised_beyond_the_numbers);
     RUN(it_stops_when_told_to_or_without_memory);
     RUN(a_jump_of_one_costs_a_difference_and_its_wrapping);

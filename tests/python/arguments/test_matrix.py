@@ -82,7 +82,8 @@ NOT_FINITE = {"nan": NAN, "inf": INF, "-inf": -INF, "float32 nan": np.float32(NA
 NUMBER = {
     **OBJECTS, **NOT_FINITE, "negative": -1.0, "least negative": -5e-324, "three axes": WRONG,
     "huge": 10**400, "not held": 2**53 + 1, "masked": np.ma.array(1.0, mask=True),
-    "dict": {"H": 1.0}, "list of words": ["1.0"],
+    "dict": {"H": 1.0}, "list of words": ["1.0"], "flag": True, "flag of NumPy": np.True_,
+    "empty": [], "flags": [True, True],
 }  # fmt: skip
 if np.dtype(np.longdouble).itemsize > 8:  # it would be rounded
     NUMBER["long double"] = np.longdouble(1.0)
@@ -114,7 +115,7 @@ IDS = {
 REALS = {
     **OBJECTS, "nan": [NAN] * 4, "inf": [INF] * 4, "three axes": WRONG, "dict of words": {"x": "y"},
     "huge": [10**400] * 4, "not held": [2**53 + 1] * 4, "text": ["1.0"] * 4,
-    "masked": np.ma.array([0.5] * 4, mask=True), "none in it": [None] * 4,
+    "masked": np.ma.array([0.5] * 4, mask=True), "none in it": [None] * 4, "flags": [True] * 4,
 }  # fmt: skip
 LABELS = {
     **OBJECTS, "nan": [NAN] * 4, "floats": [0.5] * 4, "three axes": WRONG, "wrong length": [0],
@@ -177,12 +178,12 @@ RIGHT = {
     ("VerletList", "box"): ("two", "six"), ("PairField", "dtype"): ("date", "void"),
     ("Connectivity", "exclude"): ("function",), ("Connectivity.remove", "which"): ("function",),
     ("Connectivity.patch", "keep"): ("iteration raises",),
-    ("Connectivity.patch", "old2new"): ("iteration raises",),
+    ("Connectivity.patch", "old2new"): ("iteration raises",), ("Points", "weights"): ("flags",),
 } | {  # all pairs, in open space
     (name, "cutoff"): ("inf",)
     for name in (
-        "coordination", "count_pairs", "explain", "for_each_pair", "iter_pairs",
-        "neighbors", "pairs", "pairs_between", "verify",
+        "bricks", "coordination", "count_pairs", "explain", "for_each_pair", "iter_pairs",
+        "neighbors", "pairs", "pairs_between", "trajectory_pairs", "verify",
     )
 }  # fmt: skip
 BAD = {name: bad for words, bad in KINDS.items() for name in words.split()}

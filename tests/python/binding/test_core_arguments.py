@@ -2,8 +2,6 @@
 """The functions of _core refuse what the Python layer never gives them: there is no other check
 between them and memory."""
 
-import re
-
 import numpy as np
 import pytest
 
@@ -14,6 +12,7 @@ POINTS = np.random.default_rng(3).uniform(0.0, 3.0, (12, 3))
 FIRST = np.array([0, 4, 8, 12])
 CUTOFFS = np.full(3, 1.5)
 BOXES = np.stack([3.0 * np.eye(3)] * 3)
+OTHERS = "takes other arguments$"
 
 NO_ARRAYS = [None, 3, 1.5, "points", b"points", POINTS.tolist(), memoryview(POINTS), object()]
 
@@ -31,15 +30,14 @@ def batch(name, first, cutoffs=1.5, boxes=None, periodic=0):
 
 
 def refuse_points(points):
-    message = f"points must be an array, got {type(points).__name__}"
-    with pytest.raises(TypeError, match=re.escape(message)):
+    with pytest.raises(TypeError, match=f"count_pairs {OTHERS}"):
         count(points)
     if points is not None:
-        with pytest.raises(TypeError, match="queries must be an array, got"):
+        with pytest.raises(TypeError, match=f"coordination {OTHERS}"):
             _core.coordination(
                 POINTS, 1.5, None, 0, True, "exact", None, None, None, None, points
             )  # fmt: skip
-    with pytest.raises(TypeError, match="points must be an array, got"):
+    with pytest.raises(TypeError, match=f"box_wrap {OTHERS}"):
         _core.box_wrap(points, np.eye(3), 7)
 
 
@@ -50,13 +48,13 @@ def test_points_are_an_array():
 
 def test_points_are_native_floats():
     for dtype in ("i8", "f2", "c16", "O", ">f8", "f16"):
-        with pytest.raises(TypeError, match="points must be native float32 or float64"):
+        with pytest.raises(TypeError, match=OTHERS):
             count(POINTS.astype(dtype))
 
 
 def test_points_are_rows_of_1_to_8_numbers():
     for shape in ((), (3,), (2, 2, 3), (4, 0), (4, 9)):
-        with pytest.raises(TypeError, match=r"points must be native .* of shape \(n, d\)"):
+        with pytest.raises(TypeError, match=OTHERS):
             count(np.zeros(shape))
 
 
@@ -66,7 +64,7 @@ def test_a_box_is_an_array_of_its_size():
         np.eye(3).astype(">f8"), np.tri(3).T, np.ones(2), np.ones((3, 2)), np.ones((2, 3)),
         np.float64(3.0), np.ones(()), np.ones((1, 3, 2)), np.ones((1, 3, 3), np.float32),
     ):  # fmt: skip
-        with pytest.raises(ValueError, match=r"box must be a float64 array of shape \(.*3, 3\)"):
+        with pytest.raises(TypeError, match=OTHERS):
             count(POINTS, box, 7)
 
 
@@ -75,26 +73,26 @@ def test_what_is_measured_is_a_square_box_and_bits():
         (), (np.eye(3),), (np.eye(3), 7, 7), (None, 7), (np.eye(3).tolist(), 7),
         (np.ones(3), 7), (np.ones((1, 3, 3)), 7), (np.ones(()), 7), (np.eye(0), 1), (np.eye(9), 1),
     ):  # fmt: skip
-        with pytest.raises(TypeError, match=r"box_measure takes a box \(d, d\), with 1 <= d <= 8"):
+        with pytest.raises(TypeError, match=f"box_measure {OTHERS}"):
             _core.box_measure(*arguments)
 
 
 @pytest.mark.parametrize("arguments", [(), (POINTS, np.eye(3)), (POINTS, np.eye(3), 7, None)])
 def test_wrapping_takes_three_arguments(arguments):
-    with pytest.raises(TypeError, match="box_wrap takes 3 arguments"):
+    with pytest.raises(TypeError, match=f"box_wrap {OTHERS}"):
         _core.box_wrap(*arguments)
-    with pytest.raises(TypeError, match="box_wrap needs a box"):
+    with pytest.raises(TypeError, match=f"box_wrap {OTHERS}"):
         _core.box_wrap(POINTS, None, 0)
 
 
 @pytest.mark.parametrize(
     ("arguments", "kind", "words"),
     [
-        ((), TypeError, "box_places takes 5 arguments"),
+        ((), TypeError, f"box_places {OTHERS}"),
         ((POINTS, None, 0, "1", 9.0), TypeError, "must be real number"),
         ((POINTS, None, 0, 1.0, None), TypeError, "must be real number"),
-        ((POINTS.tolist(), None, 0, 1.0, 9.0), TypeError, "points must be an array"),
-        ((POINTS, np.eye(2), 7, 1.0, 9.0), ValueError, "box must be a float64 array"),
+        ((POINTS.tolist(), None, 0, 1.0, 9.0), TypeError, OTHERS),
+        ((POINTS, np.eye(2), 7, 1.0, 9.0), TypeError, OTHERS),
         ((POINTS, None, 0, -1.0, 9.0), ValueError, "cutoff must be"),
         ((POINTS, None, 0, 1.0, np.inf), ValueError, "argument"),
         ((POINTS + 10.0, None, 0, 1.0, 9.0), ValueError, "argument"),
@@ -119,14 +117,14 @@ def test_systems_begin_where_int64_says(name):
         FIRST.tolist(), FIRST.astype(np.int32), FIRST.astype(float), FIRST.astype(">i8"),
         np.repeat(FIRST, 2)[::2], FIRST[:0],
     ):  # fmt: skip
-        with pytest.raises(TypeError, match="where systems begin must be an int64 array"):
+        with pytest.raises(TypeError, match=OTHERS):
             batch(name, first)
     for first in (FIRST[:-1], FIRST[::-1].copy(), FIRST + 1, FIRST * 2**60):
         with pytest.raises(ValueError, match="argument"):
             batch(name, first)
-    with pytest.raises(ValueError, match="cutoffs, boxes and axes are of as many systems"):
+    with pytest.raises(TypeError, match=OTHERS):
         batch(name, None, CUTOFFS)
-    with pytest.raises(TypeError, match="a set of points is a tuple of 8"):
+    with pytest.raises(TypeError, match=OTHERS):
         count((POINTS, FIRST))
 
 
@@ -136,23 +134,23 @@ def test_cutoffs_are_float64(name):
         CUTOFFS.astype(np.float32), CUTOFFS.astype(int), CUTOFFS.astype(">f8"), CUTOFFS[:, None],
         np.repeat(CUTOFFS, 2)[::2],
     ):  # fmt: skip
-        with pytest.raises(TypeError, match="cutoffs of systems must be a float64 array"):
+        with pytest.raises(TypeError, match=OTHERS):
             batch(name, FIRST, cutoffs)
     for cutoff in (CUTOFFS.tolist(), "1.5", None):
-        with pytest.raises(TypeError, match=f"{name} takes arguments of other types"):
+        with pytest.raises(TypeError, match=f"{name} {OTHERS}"):
             batch(name, FIRST, cutoff)
 
 
 @pytest.mark.parametrize("name", ["pairs", "count_pairs"])
 def test_boxes_and_axes_fit(name):
     for boxes in (BOXES.astype(np.float32), np.tri(3) + BOXES.T, BOXES[:, ::-1], BOXES[:, :2, :2]):
-        with pytest.raises(ValueError, match="box must be a float64 array"):
+        with pytest.raises(TypeError, match=OTHERS):
             batch(name, FIRST, boxes=boxes, periodic=7)
     for axes in (np.full(3, 7), np.full((3, 1), 7, np.uint8), np.full(6, 7, np.uint8)[::2]):
-        with pytest.raises(TypeError, match="periodic must be bits, or a uint8 array"):
+        with pytest.raises(TypeError, match=OTHERS):
             batch(name, FIRST, boxes=BOXES, periodic=axes)
     for axes in (7, np.full(3, 7, np.uint8), np.full(2, 7, np.uint8)):
-        with pytest.raises(ValueError, match="cutoffs, boxes and axes are of as many systems"):
+        with pytest.raises(TypeError, match=OTHERS):
             batch(name, FIRST, CUTOFFS[:2], BOXES, axes)
     assert len(batch(name, FIRST, CUTOFFS, BOXES, 7)) > 0
 
@@ -209,6 +207,6 @@ OF_PYTHON = {
 @pytest.mark.parametrize("name", OF_PYTHON)
 def test_numbers_are_those_of_python(name):
     points = POINTS.copy()
-    with pytest.raises(TypeError, match=f"{name} takes arguments of other types"):
+    with pytest.raises(TypeError, match=f"{name} {OTHERS}"):
         OF_PYTHON[name](points, Shrinks(points, 1))
     assert len(points) == len(POINTS)

@@ -45,7 +45,7 @@ CALLS = {
 ARRAYS = arrays_among(CALLS)
 # Arrays of any length: their values say what they must go with, and the core looks at these.
 ANY_LENGTH = {"indices", "gone indices", "source"}
-REFUSED = "^(expected arrays of|shifts must be|offsets must have|target must have)"
+REFUSED = "takes other arguments$"
 
 
 def call(name, **changed):
@@ -81,5 +81,5 @@ def test_arrays_that_go_together_have_their_lengths():
 
 def test_an_array_has_at_most_8_shifts_a_row():
     for width in (0, 9):
-        with pytest.raises(TypeError, match="shifts must be an int32 array of a row for each"):
+        with pytest.raises(TypeError, match=REFUSED):
             call("connect", shifts=np.zeros((2, width), np.int32))

@@ -23,6 +23,7 @@ PAIRING = Pairing(
 KINDS = {
     "radii": Pairing(0), "supports": Pairing(2, 1.0), "types": Pairing(0, table=np.ones((2, 2))),
 }  # fmt: skip
+OTHERS = "^coordination takes other arguments$"
 
 
 def search(pairing, known=None, known_of_queries=None):
@@ -54,31 +55,31 @@ def test_a_pairing_that_fits_is_taken():
 def test_arrays_of_a_set_have_an_entry_for_each():
     for n, name in arrays_among(SETS):
         for wrong in other_arrays(SETS[n][name]):
-            with pytest.raises(TypeError, match="what is known of points must be arrays"):
+            with pytest.raises(TypeError, match=OTHERS):
                 search(None, *({name: wrong} if n == m else None for m in (12, 4)))
 
 
 def test_a_support_has_as_many_rows_and_columns_as_there_are_dimensions():
     for shape in ((12, 3, 2), (12, 2, 3), (12, 2, 2), (12, 4, 4), (12, 9)):
-        with pytest.raises(TypeError, match="what is known of points must be arrays"):
+        with pytest.raises(TypeError, match=OTHERS):
             search(None, {"supports": np.ones(shape)})
 
 
 def test_a_pairing_is_seven_values():
     for wrong in ((), PAIRING[:-1], (*PAIRING, None), list(PAIRING), 3):
-        with pytest.raises(TypeError, match="a pairing is None or a tuple of seven"):
+        with pytest.raises(TypeError, match=OTHERS):
             search(wrong)
     for rule in (-1, 6, 2**31, 2**64, -(2**64), "sum"):
-        with pytest.raises(ValueError, match="there is no such rule"):
+        with pytest.raises((TypeError, OverflowError), match=f"{OTHERS}|too large to convert"):
             search(Pairing(rule), {"radii": np.ones(12)})
     for extent in (1, "1", np.float32(1.0)):
-        with pytest.raises(TypeError, match="extent must be a float"):
+        with pytest.raises(TypeError, match=OTHERS):
             search(Pairing(2, extent))
     for wrong in ({"within": 1.0}, {"least": 0}, {"least": None}):
-        with pytest.raises(TypeError, match="a pairing has an int or None, and a float"):
+        with pytest.raises(TypeError, match=OTHERS):
             search(PAIRING._replace(**wrong))
     for within in (-1, 2**63, -(2**63) - 1):
-        with pytest.raises(ValueError, match="labels cannot differ by so much"):
+        with pytest.raises((TypeError, OverflowError), match=f"{OTHERS}|too (large|big)"):
             search(PAIRING._replace(within=within))
 
 
@@ -88,14 +89,14 @@ def test_arrays_of_a_pairing_have_their_types_and_lengths():
         square.tolist(), square.astype(np.float32), np.ones((2, 3)), np.ones((1, 2, 2)), square[:1],
         np.ones(4), square.astype(">f8"), np.ones((4, 4))[::2, ::2], 3.0,
     ):  # fmt: skip
-        with pytest.raises(TypeError, match="the table of cutoffs must be a square float64 array"):
+        with pytest.raises(TypeError, match=OTHERS):
             search(Pairing(0, table=wrong))
     for wrong in (
         [[0, 1]], np.ones((2, 2)), np.ones(2, int), np.ones((2, 3), int), np.ones((2, 1), int),
         np.ones((2, 2), np.int32), np.ones((2, 2), int).T[:, ::-1],
     ):  # fmt: skip
-        with pytest.raises(TypeError, match="excluded must be an int64 array of two columns"):
+        with pytest.raises(TypeError, match=OTHERS):
             search(PAIRING._replace(excluded=wrong))
     for wrong in other_arrays(PAIRING.numbers):
-        with pytest.raises(TypeError, match="numbers must be an int64 array of one for each query"):
+        with pytest.raises(TypeError, match=OTHERS):
             search(PAIRING._replace(numbers=wrong))

@@ -357,7 +357,7 @@ def test_one_scene_for_all_functions():
         assert same(points, np.asarray(WHOLE, np.float64)) and bits == (box is not None) * 7
         assert rows is None if box is None else np.array_equal(rows, expected.box)
     assert _core.scene("points", None, None) is NotImplemented
-    with pytest.raises(TypeError, match="scene takes 3 arguments"):
+    with pytest.raises(TypeError, match="scene takes other arguments"):
         _core.scene(POINTS)
 
 
@@ -404,7 +404,7 @@ def test_names():
         ATTEMPTS["pairs"]([POINTS, 1.5], {})
     with pytest.raises(ValueError, match="know takes"):
         _core.know("box", hs.Box)
-    with pytest.raises(TypeError, match="know takes 2 arguments"):
+    with pytest.raises(TypeError, match="know takes other arguments"):
         _core.know("Box")
     key = "".join(["b", "o", "x"])  # not interned
     assert attempt("count_pairs", POINTS, 1.5, **{key: 4.0}) == hs.count_pairs(POINTS, 1.5, box=4.0)

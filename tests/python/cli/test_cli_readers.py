@@ -458,7 +458,8 @@ BAD_TEXT = [
     ("0 0 0\n\n1 2\n", "line 3: has 2 fields, the first line has 3"),
     ("x y\nz w\n1 2\n", "line 2, field 1: 'z' is not a number"),
     ("0 y z\n", "line 1, field 2: 'y' is not a number"),
-    ("# nothing\n", "holds no points"),
+    ("# nothing\n", "holds no points"), ("\n\n", "holds no points"),
+    ("3\nx y z\n1 2 3\n", "line 1: says 3 points, there are 1"),
     *((f"# three points\n0 0 0\n1 {word} 0\n", f"line 3, field 2: {word} is not a finite number")
       for word in ("nan", "inf", "-Infinity")),
     ("x,y,z\n1,,3\n4,5,\n", "line 2, field 2: is empty"),
@@ -481,12 +482,37 @@ BAD_TEXT = [
     ("x,x,y\n1,2,3\n", "none are known"), ("3\n1 2 3\n", "line 1: says 3 points, there are 1"),
     ("x y z\n1e999 0 0\n", "field 1: 1e999 is not a finite number"),
     ("x y z\n\uff11 0 0\n", "is not a number"), ("x,y,z\n", "holds no points"),
+    ("x,y,z\n0,0,0,\n", "line 2: has 4 fields, the first line has 3; it ends with ',', which"),
+    ("name,x,y\na,b,0,0.5\n", "line 2: has 4 fields, the first line has 3"),
+    *(("x;y\n" + "0;1\n" * n + f"0{a}5;1\n" + "0;1\n" * 5000 + f"0{b}5;1\n",
+       f"line {n + 5003}, field 1: '0{b}5': the file has decimal commas and decimal points")
+      for n in (3, 4090, 9000) for a, b in (",.", ".,")),
+    *(("x,y\n" + "0,1\n" * n + f"0,{word}\n" + "0,1\n" * 9, f"line {n + 2}, field 2: {said}")
+      for n in (3, 4095, 4096, 9000)
+      for word, said in (("nan", "nan is not a finite"), ("1_0", "'1_0'"), ("", "is empty"))),
 ]  # fmt: skip
 
 
 def test_text_that_is_refused_says_where(refused):
     for content, words in BAD_TEXT:
         assert words in refused("points.csv", content), content
+
+
+def test_quoted_fields_hold_separators(scene):
+    for between in ",;\t":
+        content = f'"a{between}b"{between}"x"{between}y\n'
+        content += f'"c{between}{between}d"{between}"1"{between}2.5\n' * 2
+        found = scene("points.csv", content)
+        assert found.points.tolist() == [[1.0, 2.5]] * 2
+
+
+def test_rows_that_numpy_reads_are_those_of_python(scene, rng):
+    values = (rng.normal(size=(9000, 3)) * 10.0 ** rng.integers(-300, 300, (9000, 3))).tolist()
+    for between in (",", ";", "\t", " ", " , "):
+        lines = [between.join(map(repr, row)) for row in values]
+        lines[5000] += "  # a remark"
+        lines[8500:8500] = ["", "# another", "   "]
+        assert scene("points.csv", "\n".join(lines)).points.tolist() == values
 
 
 NO_COLUMNS = [

@@ -315,7 +315,7 @@ def test_numbers_of_one_letter_and_of_strict_cutoffs():
 def test_bad_arguments_are_refused_at_once():
     cases = [
         ((4, 3), {"cutoff": -1.0}, ValueError, "cutoff"),
-        ((4, 3), {"cutoff": np.inf}, ValueError, "cutoff"),
+        ((4, 3), {"cutoff": np.inf, "box": 1.0}, ValueError, "cutoff"),
         ((4, 3), {"cutoff": "1"}, TypeError, "cutoff"),
         ((4, 3), {"box": [1.0, 0.0, 1.0]}, ValueError, "box"),
         ((4, 3), {"box": [1.0, 1.0]}, ValueError, "box"),

@@ -7,33 +7,10 @@ import pytest
 
 import halfshell as hs
 from calls import call
-from oracles import same_arrays
 from refused_calls import assert_refused
 
 RNG = np.random.default_rng(43)
 POINTS = RNG.random((40, 3)) * 4.0
-QUERIES = RNG.random((15, 3)) * 5.0 - 0.5
-
-
-# ---- forms of input and output -------------------------------------------------------------
-
-
-def test_own_arrays_are_filled():
-    found = hs.pairs_between(QUERIES, POINTS, 1.5, quantities="ijd")
-    m = len(found[0])
-    for room in (m, m + 7):
-        out = (np.full(room, -5), np.full(room, -5), np.full(room, -5.0))
-        views = hs.pairs_between(QUERIES, POINTS, 1.5, quantities="ijd", out=out)
-        assert same_arrays(views, found)
-        for view, array in zip(views, out):
-            assert np.shares_memory(view, array) and (array[m:] == -5).all()
-    small = (np.empty(m - 1, np.int64), np.empty(m, np.int64))
-    with pytest.raises(hs.CapacityError, match=f"there are {m} pairs") as caught:
-        hs.pairs_between(QUERIES, POINTS, 1.5, out=small)
-    assert caught.value.needed == m
-    both = np.empty((m, 2), np.int32)
-    view = hs.pairs_between(QUERIES, POINTS, 1.5, quantities="P", index_dtype=np.int32, out=both)
-    assert np.array_equal(view, np.stack(found[:2], axis=1))
 
 
 # ---- errors --------------------------------------------------------------------------------

@@ -70,19 +70,6 @@ def spanned(points, members, cutoff, rows, axes):
 
 
 @pytest.mark.parametrize("name", BOXES)
-def test_components_are_scipys(name, rng):
-    for n, cutoff in [(40, 0.15), (300, 0.09), (2000, 0.06)]:
-        points = rng.uniform(-1.0, 2.0, (n, 3))
-        expected = components(n, *call(hs.pairs, points, cutoff, **BOXES[name]))
-        for kernel, threads in itertools.product(hs.kernels(), (1, 2)):
-            found = call(hs.clusters, points, cutoff, kernel=kernel, threads=threads, **BOXES[name])
-            assert np.array_equal(found.labels, expected)
-            assert np.array_equal(found.sizes, np.bincount(expected))
-            assert found.core.all()
-            assert found.labels.dtype == found.sizes.dtype == np.int64
-
-
-@pytest.mark.parametrize("name", BOXES)
 def test_core_points_are_those_of_the_definition(name, rng):
     for n, cutoff, least in [(60, 0.2, 2), (300, 0.12, 4), (300, 0.12, 9), (50, 0.1, 1000)]:
         points = rng.random((n, 3))

@@ -7,7 +7,6 @@ import pytest
 
 import halfshell as hs
 from calls import call
-from oracles import random_scene, same_arrays
 
 
 def test_counting_needs_no_memory_for_the_list(rng):
@@ -17,28 +16,6 @@ def test_counting_needs_no_memory_for_the_list(rng):
 
 
 # ---- by distance -------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("box", [None, [1.0, 1.0, 1.0]])
-def test_nothing_depends_on_kernels_and_threads(box, rng):
-    points = rng.random((30_000, 3))
-    how = {"types": rng.integers(0, 3, 30_000), "weights": rng.normal(size=30_000)}
-    edges = np.linspace(0.0, 0.08, 81)
-    results = [
-        call(hs.pair_histogram, points, edges, box=box, kernel=kernel, threads=threads, **how)
-        for kernel in hs.kernels()
-        for threads in (1, 2, 5)
-    ]
-    assert all(same_arrays(results[0], other) for other in results)
-    order = rng.permutation(30_000)
-    again = call(
-        hs.pair_histogram,
-        points[order],
-        edges,
-        box=box,
-        **{name: values[order] for name, values in how.items()},
-    )
-    assert same_arrays(results[0], again)
 
 
 def test_scenes_without_pairs():
@@ -101,21 +78,3 @@ def test_results_beyond_memory_are_refused_at_once():
         hs.pair_histogram(points, np.broadcast_to(1.0, 2**40))
     with pytest.raises(ValueError, match="edges must have shape"):  # before it is copied
         hs.pair_histogram(points, np.broadcast_to(1.0, (2**30, 2**10)))
-
-
-def test_without_cutoffs_all_else_is_checked():
-    assert hs.count_pairs([[0.0], [1.0]], []).tolist() == []
-    with pytest.raises(ValueError, match=r"points\[0, 0\]"):
-        hs.count_pairs([[np.nan]], [])
-
-
-@pytest.mark.parametrize(("dtype", "bins"), [(np.float64, 7), (np.float32, 3000)])
-def test_away_from_edges_numpy_finds_the_same(dtype, bins, rng):
-    points, cutoff, box, _ = random_scene(rng, 3000, neighbours=60)
-    points = points.astype(dtype)
-    d = hs.pairs(points, cutoff, box=box, quantities="d")
-    for edges in (np.linspace(0.0, cutoff, bins + 1), np.geomspace(1e-3 * cutoff, cutoff, bins)):
-        for kernel in hs.kernels():
-            found = call(hs.pair_histogram, points, edges, box=box, kernel=kernel)
-            assert found.dtype == np.int64
-            assert np.array_equal(found, np.histogram(d, edges)[0])

@@ -6,7 +6,6 @@ import pytest
 
 import halfshell as hs
 from calls import call
-from oracles import random_scene
 
 
 def same(table, whole, numbers):
@@ -36,49 +35,6 @@ def test_what_does_not_go_with_indices():
 # ---- pairs -------------------------------------------------------------------------------------
 
 
-LETTERS = "ijdDSP"
-
-
-def test_same_bytes_for_each_kernel_number_of_threads_and_algorithm(rng):
-    for kernel in hs.kernels():
-        points, box, numbers = rng.random((3000, 3)), np.ones(3), rng.permutation(3000)[:500]
-        wanted = hs.pairs(points, 0.1, box=box, quantities=LETTERS, indices=numbers, threads=1)
-        for threads in (1, 2, 3):
-            for algorithm in ("auto", "grid", "hash", "all-pairs"):
-                found = call(hs.pairs,
-                    points, 0.1, box=box, quantities=LETTERS, indices=numbers, threads=threads,
-                    kernel=kernel, algorithm=algorithm,
-                )  # fmt: skip
-                for one, other in zip(found, wanted, strict=True):
-                    assert one.tobytes() == other.tobytes()
-
-
-@pytest.mark.parametrize("index_dtype", [np.int32, np.int64])
-def test_any_letters_and_arrays_of_the_caller(index_dtype, rng):
-    for quantities in ("i", "P", "S", "D", "dj", "SPd", "Di"):
-        points, cutoff, box, _ = random_scene(rng, 100)
-        options = {"box": box, "indices": [5, 9, 0], "index_dtype": index_dtype}
-        whole = dict(zip(LETTERS, call(hs.pairs, points, cutoff, quantities=LETTERS, **options)))
-        found = call(hs.pairs, points, cutoff, quantities=quantities, **options)
-        assert isinstance(found, tuple) == (len(quantities) > 1)
-        found = found if isinstance(found, tuple) else (found,)
-        for letter, array in zip(quantities, found, strict=True):
-            assert array.dtype == whole[letter].dtype
-            assert array.tobytes() == whole[letter].tobytes()
-        m = len(found[0])
-        out = tuple(np.empty((m + 2, *a.shape[1:]), a.dtype) for a in found)
-        filled = call(hs.pairs, points, cutoff, quantities=quantities, out=out, **options)
-        filled = filled if isinstance(filled, tuple) else (filled,)
-        for view, array, wanted in zip(filled, out, found, strict=True):
-            assert view.base is array
-            assert view.tobytes() == wanted.tobytes()
-        small = tuple(array[: m - 1] for array in out)
-        with pytest.raises(hs.CapacityError, match=f"there are {m} pairs") as error:
-            call(hs.pairs, points, cutoff, quantities=quantities, out=small, **options)
-        assert error.value.needed == m
-        wrong = tuple(array.astype("c16") for array in out)
-        with pytest.raises(TypeError, match="out for"):
-            call(hs.pairs, points, cutoff, quantities=quantities, out=wrong, **options)
 
 
 def test_a_shift_that_fits_one_way_only():

@@ -12,7 +12,7 @@ import pytest
 
 import halfshell as hs
 from calls import call
-from stream_scenes import BOX, SCENES
+from stream_scenes import SCENES
 from subprocesses import RESIDENT, run
 
 
@@ -47,19 +47,6 @@ def test_blocks_are_the_pairs_in_their_order(scene):
         for max_pairs in (7, 1009, 1 << 20, 10**30) if quantities != "P" else (1,):
             blocks = list(call(hs.iter_pairs, points, cutoff, max_pairs=max_pairs, **options))
             assert_same(blocks, expected, quantities, max_pairs)
-
-
-@pytest.mark.parametrize("index_dtype", [np.int32, np.int64])
-def test_any_kernel_and_any_number_of_threads(index_dtype, rng):
-    points = rng.random((6000, 3))
-    options = {"box": BOX, "index_dtype": index_dtype, "quantities": "jSd"}
-    expected = call(hs.pairs, points, 0.14, **options)
-    assert len(expected[0]) > 200_000
-    for kernel, threads in zip([*hs.kernels(), None], (1, 2, 3, 2)):
-        how = {"kernel": kernel, "threads": threads, **options}
-        for max_pairs in (65_536, 99_991):
-            blocks = list(call(hs.iter_pairs, points, 0.14, max_pairs=max_pairs, **how))
-            assert_same(blocks, expected, "jSd", max_pairs)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The k nearest points: order and ties by rational arithmetic, images, clusters, bad arguments."""
 
-import math
 from fractions import Fraction
 
 import numpy as np
@@ -10,65 +9,37 @@ from scipy.spatial import cKDTree
 
 import halfshell as hs
 from calls import call
-from halfshell._check.reference import exact_vector, ulp_error
+from definition import measured_pairs
+from halfshell._check.reference import ulp_error
 from oracles import BOX_KINDS, lattice, random_box, same_arrays
-from rational_images import Images, between, dot, exact
-
-
-def expected_rows(points, k, queries=None, box=None, periodic=None, max_distance=math.inf):
-    """Rows of (square, j, S) in order, by fractions: of images up to a radius that grows."""
-    images = Images(points.shape[1], box, periodic)
-    rows = [exact(row) for row in points.tolist()]
-    asking = rows if queries is None else [exact(row) for row in queries.tolist()]
-    limit = None if math.isinf(max_distance) else Fraction(max_distance) ** 2
-    result = []
-    for i, point in enumerate(asking):
-        apart = [between(point, other) for other in rows]
-        square = limit
-        if limit is None and images.rows:
-            square = min(dot(row, row) for row in images.rows)
-        elif limit is None:
-            square = max((dot(D, D) for D in apart), default=Fraction(0))
-        found = []
-        while rows:
-            found = [
-                (length, j, S)
-                for j, D in enumerate(apart)
-                for S, _, length in images.within(D, square)
-                if queries is not None or i != j or any(S)
-            ]
-            if limit is not None or len(found) >= k or not images.rows:
-                break
-            square *= 2
-        result.append(sorted(found)[:k])
-    return result
 
 
 def check(points, k, **how):
     """Assert that all four quantities are those of the definition; and the same by each kernel."""
-    points = np.asarray(points)
-    if "queries" in how:
-        how["queries"] = np.asarray(how["queries"])
-    limit, expected = how.get("max_distance", math.inf), expected_rows(points, k, **how)
+    points, queries = np.asarray(points), how.get("queries")
     arrays, *others = (
         call(hs.nearest, points, k, quantities="jdDS", kernel=kernel, **how)
         for kernel in hs.kernels()
     )
     assert all(same_arrays(arrays, other) for other in others)
     j, d, D, S = arrays
-    assert j.shape == d.shape == (len(expected), k)
-    assert D.shape == S.shape == (len(expected), k, points.shape[1])
+    asking = None if queries is None else hs.Points(queries)
+    n, n_others = len(points if asking is None else asking), len(points) - (asking is None)
+    assert j.shape == d.shape == (n, k) and D.shape == S.shape == (n, k, points.shape[1])
     assert d.dtype == D.dtype == np.float64 and S.dtype == np.int32
-    for i, row in enumerate(expected):
+    known = hs.Points(points, box=how.get("box"), periodic=how.get("periodic"))
+    reach = np.nextafter(np.nextafter(d[np.isfinite(d)].max(initial=0.0), np.inf), np.inf)
+    every = measured_pairs(known, reach, asking, None, None, None, True)
+    for i in range(n):
+        row = sorted((square, other, T, true) for a, other, T, square, true in every if a == i)[:k]
         m = len(row)
-        assert list(zip(j[i, :m].tolist(), map(tuple, S[i, :m].tolist()))) == [r[1:] for r in row]
-        assert (np.diff(d[i, :m]) >= 0).all() and (d[i, :m] <= limit).all()
+        assert m == (k if known.box is not None else min(k, n_others))
+        assert list(zip(j[i, :m].tolist(), map(tuple, S[i, :m].tolist()))) == [r[1:3] for r in row]
+        assert (np.diff(d[i, :m]) >= 0).all()
         assert (j[i, m:] == -1).all() and (d[i, m:] == np.inf).all()
         assert np.isnan(D[i, m:]).all() and (S[i, m:] == 0).all()
-        point = how.get("queries", points)[i]
-        for e, (square, other, shift) in enumerate(row):
+        for e, (square, _, _, true) in enumerate(row):
             assert ulp_error(d[i, e], square) <= 1
-            true = exact_vector((point, points[other]), 0, 1, shift, how.get("box"))
             unit = Fraction(float(np.spacing(d[i, e])))
             assert all(abs(Fraction(x) - y) <= unit for x, y in zip(D[i, e].tolist(), true))
 
@@ -152,7 +123,7 @@ def scenes_of_all_densities(rng, n):
 
 def test_distances_are_those_of_a_tree(rng):
     for kernel in hs.kernels():
-        for name, points in scenes_of_all_densities(rng, 4000).items():
+        for name, points in scenes_of_all_densities(rng, 1500).items():
             j, d = call(hs.nearest, points, 9, kernel=kernel)
             rest = np.abs(points).max(axis=1) < 1e200
             near = points[rest]
@@ -161,18 +132,6 @@ def test_distances_are_those_of_a_tree(rng):
             # Each coordinate is exact; the tree's distances have a few roundings.
             np.testing.assert_allclose(d[rest], expected, rtol=1e-14, err_msg=name)
             assert (j >= 0).all() and (j != np.arange(len(points))[:, None]).all()
-
-
-def test_the_same_bits_for_any_kernel_and_number_of_threads(rng):
-    points, box = rng.random((6000, 3)), random_box(rng, "rotated")
-    points[:500] = np.round(points[:500], 1)
-    one = call(hs.nearest, points, 12, box=box, quantities="jdDS", kernel="scalar", threads=1)
-    for name in hs.kernels():
-        for threads in (1, 2, 3):
-            other = call(
-                hs.nearest, points, 12, box=box, quantities="jdDS", kernel=name, threads=threads
-            )
-            assert same_arrays(one, other)
 
 
 @pytest.mark.slow
@@ -189,6 +148,38 @@ def test_cost_follows_the_points_not_their_distances(rng):
 # ---- forms and errors ----------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("how", [
+    {}, {"box": [4.0] * 3}, {"box": [[4, 0, 0], [1, 4, 0], [0, 2, 4.0]]},
+    {"box": [4.0] * 3, "periodic": [True, False, True]},
+])  # fmt: skip
+def test_choices_among_many_that_coincide(how, rng):
+    """Spots of some 11 points, and of 90: what does not count stands between those that do."""
+    of_few, of_many = rng.integers(0, 3, (300, 3)), rng.integers(0, 2, (300, 3)) * [2, 0, 1]
+    for at in (of_few, np.concatenate([of_many[:180], of_few[:40]])):
+        n, by = len(at), {"groups": rng.integers(0, 3, len(at)), "labels": np.arange(len(at)) // 5}
+        for kept, choice in (
+            (by, {"exclude": 0}), ({"labels": by["labels"]}, {"exclude": 30}),
+            ({"groups": by["groups"]}, {}), ({}, {"exclude": [[0, 1], [2, n - 1]]}),
+            ({}, {"min_distance": 1.0}), ({}, {"min_distance": 1.5}), (by, {"min_distance": 0.5}),
+            (by, {"exclude": 1, "min_distance": 2.0}),
+        ):  # fmt: skip
+            points = hs.Points(at.astype(float), **how, **kept)
+            table = hs.neighbors(points, 5.0, quantities="jdS", **choice)
+            for k in (1, 3, 40):
+                j, d, S = hs.nearest(points, k, quantities="jdS", **choice)
+                for i in rng.integers(0, n, 12).tolist():
+                    rows = [getattr(table, name)[table.offsets[i] : table.offsets[i + 1]]
+                            for name in ("indices", "distances", "shifts")]  # fmt: skip
+                    order = np.lexsort([*rows[2].T[::-1], rows[0], rows[1]])[:k]
+                    assert len(order) == k or not how
+                    m = len(order)
+                    assert np.array_equal(j[i, :m], rows[0][order]) and (j[i, m:] == -1).all()
+                    assert np.array_equal(S[i, :m], rows[2][order])
+                some = rng.integers(0, n, 5)
+                found = hs.nearest(points, k, quantities="jdS", indices=some, **choice)
+                assert same_arrays(found, (j[some], d[some], S[some]))
+
+
 def test_shifts_that_do_not_fit_are_refused():
     far = [[2.0**40, 0.0], [0.0, 0.0]]
     assert hs.nearest(far, 1, box=[1.0, 1.0])[1].tolist() == [[0.0], [0.0]]
@@ -202,11 +193,28 @@ def test_more_images_than_memory_are_refused():
     with pytest.raises(MemoryError, match="images"):
         hs.nearest([[0.0, 0.0]], 1, queries=[[0.0, 1e300]], box=[1.0, 1.0], periodic=[True, False])
     # Memory would do, but not the time: some 1e8 images are about as near.
-    with pytest.raises(MemoryError, match="images"):
+    with pytest.raises(MemoryError, match=r"too many images are about as near to queries\[1\]"):
         hs.nearest(
-            np.zeros((2, 3)), 1, queries=[[0.0, 0.0, 1e10]], box=np.ones(3),
+            np.zeros((2, 3)), 1, queries=[[0.0, 0.0, 1.0], [0.0, 0.0, 1e10]], box=np.ones(3),
             periodic=[True, True, False],
         )  # fmt: skip
+
+
+def test_the_way_through_all_open_axes_leaves_few_images(rng):
+    """From 40 periods away along both of two open axes, of eight."""
+    points, box = rng.random((20, 8)), np.eye(8) + np.tril(rng.random((8, 8)), -1) / 2
+    periodic = ~np.isin(np.arange(8), [3, 6])
+    A = box[periodic]
+    far = points[:3] + 40.0 * np.linalg.qr(A.T, mode="complete")[0][:, 6:].sum(axis=1)
+    j, d = hs.nearest(points, 4, queries=far, quantities="jd", box=box, periodic=periodic)
+    images = np.array(list(np.ndindex(*[5] * 6))) - 2
+    for row, query in enumerate(far):
+        D = points - query
+        D = (D - np.rint(D @ np.linalg.pinv(A)) @ A)[:, None] + images @ A
+        lengths = np.linalg.norm(D, axis=2)
+        order = np.argsort(lengths, axis=None)[:4]
+        assert np.array_equal(j[row], order // len(images))
+        assert np.allclose(d[row], lengths.flat[order], rtol=1e-14)
 
 
 @pytest.mark.parametrize("d", [1, 2, 3, 8])

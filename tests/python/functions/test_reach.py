@@ -12,26 +12,11 @@ import pytest
 import halfshell as hs
 from calls import call
 from definition import RULES, SYMMETRIC, check
-from full_lists import same_tables
 from halfshell._check.right import Right
 from oracles import random_box, same_arrays
 from refused_calls import assert_refused
 
 SHEARED = [[3.0, 0.0], [0.5, 2.5]]
-
-
-@pytest.mark.parametrize("rule", RULES)
-def test_equal_radii_are_one_cutoff(rule, rng):
-    points, cutoff = rng.random((60, 3)) * 2.0 - 0.5, 0.5 if rule == "sum" else 0.25
-    marks = {"radii": np.full(60, 0.25), "rule": rule}
-    for kernel in hs.kernels():
-        how = {"box": random_box(rng, "triclinic"), "kernel": kernel}
-        table = call(hs.neighbors, points, None, quantities="jSdD", **marks, **how)
-        assert same_tables(table, call(hs.neighbors, points, cutoff, quantities="jSdD", **how))
-        if rule in SYMMETRIC:
-            how |= {"quantities": "ijSdD", "sort": True}
-            found = call(hs.pairs, points, None, **marks, **how)
-            assert same_arrays(found, call(hs.pairs, points, cutoff, **how))
 
 
 @pytest.mark.parametrize("rule", RULES)

@@ -164,9 +164,7 @@ def test_counts_of_several_cutoffs(rng):
     assert np.array_equal(by_type.sum(axis=2), hs.coordination(points, edges))
     for k, cutoff in enumerate(edges):
         assert np.array_equal(by_type[k], hs.coordination(points, cutoff, by_type=True))
-    assert hs.coordination(points, []).shape == (0, 60)
     assert hs.coordination(points, [0.3]).shape == (1, 60)
-    assert hs.coordination(points, [], by_type=True, indices=[3]).shape == (0, 1, 3)
     balls = points.replace(types=None, radii=rng.random(60))
     for k, cutoff in enumerate(edges):
         assert np.array_equal(hs.coordination(balls, edges)[k], hs.coordination(balls, cutoff))
@@ -181,13 +179,3 @@ def test_shells_are_refused_where_they_do_not_fit():
         call(hs.pairs, points, [1.0, 2.0], quantities="k", memory_limit=1e6)
     with pytest.raises(MemoryError):
         call(hs.pairs, POINTS, np.linspace(0, 1, 10**6), quantities="k", memory_limit=1e6)
-
-
-def test_arrays_of_the_caller_are_filled(rng):
-    points, edges = rng.random((300, 3)), [0.1, 0.2]
-    for quantities in ("k", "ijdDSPk"):
-        found = hs.pairs(points, edges, box=1.0, quantities=quantities)
-        found = found if isinstance(found, tuple) else (found,)
-        out = tuple(np.empty((len(a) + 9, *a.shape[1:]), a.dtype) for a in found)
-        filled = hs.pairs(points, edges, box=1.0, quantities=quantities, out=out)
-        assert same_arrays(filled, found)

@@ -106,7 +106,6 @@ def test_the_rule_at_the_cutoff_is_that_of_the_list():
     assert hs.verify(points, 1.0, [], [], nothing, box=box, inclusive=False).ok
 
 
-POINTS = np.arange(12.0).reshape(4, 3)
 # Tables -------------------------------------------------------------------------------------
 
 
@@ -203,6 +202,14 @@ def test_supports_of_any_unit(unit):
     for rule in ("min", "scatter"):
         table = hs.neighbors(points, unit, rule=rule, quantities="jS")
         assert table.n_entries == 8 and hs.verify(points, unit, table, rule=rule)
+
+
+@pytest.mark.parametrize("unit", [2.0**-700, 2.0**-300, 1.0, 2.0**700])
+def test_supports_of_any_unit_are_compared_in_float64(unit, rng, monkeypatch):
+    points = hs.Points(unit * rng.random((100, 3)), supports=np.eye(3) * rng.random((100, 1, 1)))
+    pairs = hs.pairs(points, 0.1 * unit, quantities="ijS")
+    monkeypatch.setattr("halfshell._check.right.exact_vector", None)  # no rational arithmetic
+    assert len(pairs[0]) > 100 and hs.verify(points, 0.1 * unit, *pairs)
 
 
 # Lists that leave pairs out: groups, exclusions, a least distance, rows, systems ---------------

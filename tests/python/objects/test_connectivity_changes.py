@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 import halfshell as hs
-from node_oracle import check, random_lists
+from node_oracle import Nodes, check, random_lists
 
 PARTS = ("offsets", "indices", "overlap_offsets", "overlap_indices", "intersection_offsets",
          "intersection_indices")  # fmt: skip
@@ -99,7 +99,8 @@ def test_pairs_that_are_excluded_by_number_count_nowhere():
         label = [(i, 0) for i in range(9)] + [(i, 2) for i in range(7)]
         rows = [(*label[b], *label[a]) if (a + b) % 2 else (*label[a], *label[b]) for a, b in gone]
         c = hs.Connectivity(lists, overlap=True, intersection=True, exclude=rows)
-        check(c, lists, gone=gone)
+        nodes = Nodes(lists, gone=gone)
+        check(c, nodes)
         masked = hs.Connectivity(lists, ghosts=True)
         mask = np.zeros(len(masked.pairs), bool)
         for row in rows:
@@ -108,7 +109,7 @@ def test_pairs_that_are_excluded_by_number_count_nowhere():
             except KeyError:
                 continue
         masked.remove(mask)
-        check(masked, lists, ghosts=True, gone=gone)
+        check(masked, nodes, ghosts=True)
 
 
 def test_removing_twice_does_not_bring_back_what_was_removed():

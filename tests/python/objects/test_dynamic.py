@@ -44,7 +44,7 @@ class History(RuleBasedStateMachine):
     def begin(self, storage, box, tagged, inclusive, cell_size):
         vectors, periodic = BOXES[box]
         self.tagged = tagged
-        self.model = Model(2, vectors, periodic, inclusive, 12 if box == "small" else 4)
+        self.model = Model(2, vectors, periodic, inclusive)
         self.cells = hs.DynamicCellList(
             2, cell_size, box=vectors, periodic=periodic, storage=storage, max_radius=1.5,
             inclusive=inclusive, tagged=tagged,
@@ -323,6 +323,13 @@ def test_keys_of_the_other_kind_and_size():
         tagged.insert((2**31, 0), [0.0])
     with pytest.raises(OverflowError, match="must fit int64"):
         tagged.insert((0, 2**63), [0.0])
+    for keys, error, message in (
+        ([1], TypeError, "must be integers, got dtype object"),
+        ([2, "a", 2**63], OverflowError, "must fit int64, got 9223372036854775808"),
+        ([None], TypeError, "must be integers, got dtype object"),
+    ):
+        with pytest.raises(error, match=message):
+            hs.DynamicCellList(1, 1.0).insert_many(np.array(keys, object), [[0.0]] * len(keys))
     tagged.insert((np.int8(-1), np.uint64(5)), [0.0])
     assert list(tagged) == [(-1, 5)]
     with pytest.raises(ValueError, match="keys must have shape"):
@@ -406,7 +413,7 @@ def test_every_dimension(rng, storage):
     for dim in (1, 2, 3, 5, 8):
         cells = hs.DynamicCellList(dim, 0.5, storage=storage, max_radius=1.0, box=[2.0] * dim,
                                    periodic=[True] + [False] * (dim - 1))  # fmt: skip
-        model = Model(dim, [2.0] * dim, [True] + [False] * (dim - 1), reach=4)
+        model = Model(dim, [2.0] * dim, [True] + [False] * (dim - 1))
         for key in range(60):
             position = rng.integers(-8, 9, dim) / 8.0
             cells.insert(key, position)

@@ -50,7 +50,7 @@ SHOWN = {
     "Candidates": CELLS.candidates(POINTS),
     "CellList": CELLS,
     "Clusters": hs.clusters(POINTS, 0.1, box=BOX),
-    "Columns": LINKS.pairs._all(),
+    "Columns": LINKS.pairs._made,
     "Connectivity": LINKS,
     "DynamicCellList": _dynamic(),
     "Explanation": hs.explain(POINTS, 0.2, box=BOX, measure=True),

@@ -123,24 +123,6 @@ def test_ties_at_the_cutoff(inclusive):
         assert check(pair_list, points, [4.0] * 3, inclusive=inclusive) == 192 * inclusive
 
 
-def test_order_is_that_of_the_list_and_of_no_thread_or_kernel(rng):
-    points = rng.random((12_000, 3)) * 15.0
-    lists = [
-        (settings(kernel=kernel), hs.VerletList(1.0, 0.2, box=[15.0] * 3, threads=threads))
-        for kernel in hs.kernels()
-        for threads in (1, 2, 5)
-    ]
-    for _ in range(3):
-        found = []
-        for how, pair_list in lists:
-            with how:
-                pair_list.update(points)
-                found.append(pair_list.pairs(quantities="ijdDSP"))
-        assert all(same_arrays(found[0], other) for other in found[1:])
-        points = (points + rng.normal(0.0, 0.01, points.shape)) % 15.0
-    assert {pair_list.n_builds for _, pair_list in lists} == {1}
-
-
 # ---- how far points may come ---------------------------------------------------------------
 
 
@@ -365,22 +347,6 @@ def test_a_box_that_is_given_when_the_list_is_made_or_later():
         pair_list = hs.VerletList(0.5, **scene)
         assert pair_list.update(points)
         assert len(pair_list.pairs(quantities="i")) == hs.count_pairs(points, 0.5, **scene) == 1
-
-
-def test_out(rng):
-    points = rng.random((200, 3))
-    pair_list = hs.VerletList(0.3, 0.1, box=[1.0] * 3)
-    pair_list.update(points)
-    expected = pair_list.pairs(quantities="iD")
-    n = len(expected[0])
-    for sort in (False, True):
-        out = np.full(n + 5, -7), np.full((n + 9, 3), -7.0)
-        found = pair_list.pairs(quantities="iD", out=out, sort=sort)
-        assert same_arrays(found, pair_list.pairs(quantities="iD", sort=sort))
-        assert np.shares_memory(found[0], out[0]) and (out[0][n:] == -7).all()
-        with pytest.raises(hs.CapacityError) as caught:
-            pair_list.pairs(quantities="i", out=np.empty(n - 1, np.int64), sort=sort)
-        assert caught.value.needed == n
 
 
 def test_threads_take_turns(rng):

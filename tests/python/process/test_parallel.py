@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Several threads give the arrays of one, leave nothing running, and survive fork and pools."""
 
+import itertools
 import os
 import subprocess
 import sys
@@ -51,6 +52,48 @@ def test_arrays_do_not_depend_on_the_number_of_threads(name):
                 assert same_arrays(together, alone), (kernel, quantities, sort, threads)
             n = len(alone[0] if len(quantities) > 1 else alone)
             assert call(hs.count_pairs, points, cutoff, box=box, kernel=kernel, threads=4) == n
+
+
+KNOWN = hs.Points(CLOUD, box=TRICLINIC, types=np.arange(10500) % 3, weights=CLOUD[:, 0])
+SOME = RNG.permutation(10500)[:2000]
+
+
+def kept_for_some_steps():
+    pair_list, found = hs.VerletList(1.5, 0.3, box=30.0), ()
+    for step in range(3):
+        pair_list.update((CLOUD + 0.02 * step * CLOUD[::-1] / 30.0) % 30.0)
+        found += pair_list.pairs(quantities="ijdDSP")
+    assert pair_list.n_builds == 1
+    return found
+
+
+FUNCTIONS = {
+    "rows": lambda: tuple(hs.neighbors(KNOWN, 2.0, quantities="jdDS")._arrays),
+    "open rows": lambda: tuple(hs.neighbors(CLOUD, 2.0, quantities="jdDS")._arrays),
+    "coordination": lambda: hs.coordination(KNOWN, 2.0, by_type=True),
+    "histogram": lambda: hs.pair_histogram(KNOWN, np.linspace(0.0, 2.0, 81), by_type=True),
+    "open histogram": lambda: hs.pair_histogram(CLOUD, np.linspace(0.0, 2.0, 81)),
+    "nearest": lambda: hs.nearest(np.round(CLOUD[:6000], 1), 12, box=TRICLINIC, quantities="jdDS"),
+    "blocks": lambda: tuple(map(np.concatenate, zip(*hs.iter_pairs(
+        KNOWN, 3.0, quantities="jSd", max_pairs=65_536)))),
+    "clusters": lambda: hs.clusters(KNOWN, 1.0).labels,
+    "list": kept_for_some_steps,
+    "some points": lambda: hs.pairs(KNOWN, 2.0, quantities="ijdDSP", indices=SOME),
+    "systems": lambda: hs.pairs([CLOUD[:4000], CLOUD[4000:]], 2.0, quantities="ijd"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_each_function_gives_the_same_bytes_by_any_kernel_and_number_of_threads(name):
+    ways = itertools.product(hs.kernels(), (1, 2, 3), ("auto",))
+    if name == "some points":
+        ways = [*ways, *((None, 2, algorithm) for algorithm in ("grid", "hash", "all-pairs"))]
+    first = None
+    for kernel, threads, algorithm in ways:
+        with hs.settings(kernel=kernel, threads=threads, algorithm=algorithm):
+            found = FUNCTIONS[name]()
+        first = found if first is None else first
+        assert same_arrays(found, first), (kernel, threads, algorithm)
 
 
 def test_small_scenes_use_one_thread_and_large_ones_what_is_allowed(monkeypatch):

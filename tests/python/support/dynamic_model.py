@@ -1,44 +1,32 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A dict of keys and positions that answers as a DynamicCellList must, in whole numbers."""
+"""A dict of keys and positions that answers as a DynamicCellList must, in fractions."""
 
 import itertools
+from fractions import Fraction
 
 import numpy as np
 
-from oracles import whole
+from rational_images import Images, between, exact
 
 
 class Model:
     """Keys and positions; box vectors as rows, or None."""
 
-    def __init__(self, dim, box=None, periodic=None, inclusive=True, reach=3):
+    def __init__(self, dim, box=None, periodic=None, inclusive=True):
         self.dim, self.inclusive, self.points = dim, inclusive, {}
-        rows = np.zeros((0, dim)) if box is None else np.asarray(box, float)
-        rows = np.diag(rows) if rows.ndim == 1 else rows
-        repeats = np.broadcast_to(True if periodic is None else periodic, dim)
-        self.axes = [axis for axis in range(len(rows)) if repeats[axis]]
-        rows = [[whole(x) for x in rows[axis]] for axis in self.axes]
-        self.images = {}  # how far each is from the points themselves
-        for image in itertools.product(range(-reach, reach + 1), repeat=len(self.axes)):
-            steps = (sum(s * row[k] for s, row in zip(image, rows)) for k in range(dim))
-            self.images[image] = list(steps)
+        self.images = Images(dim, box, periodic)
 
     def insert(self, key, position):
-        self.points[key] = [whole(x) for x in position]
+        self.points[key] = np.array(position, np.float64)
 
     def within(self, position, radius):
         """The set of (key, S)."""
-        centre, square = [whole(x) for x in position], whole(radius) ** 2
-        found = set()
-        for (key, point), image in itertools.product(self.points.items(), self.images):
-            steps = self.images[image]
-            distance = sum((p - c + step) ** 2 for p, c, step in zip(point, centre, steps))
-            if distance < square or (self.inclusive and distance == square):
-                shift = [0] * self.dim
-                for axis, s in zip(self.axes, image):
-                    shift[axis] = s
-                found.add((key, tuple(shift)))
-        return found
+        centre, square = exact(position), Fraction(radius) ** 2
+        return {
+            (key, S)
+            for key, point in self.points.items()
+            for S, _, _ in self.images.within(between(centre, exact(point)), square, self.inclusive)
+        }
 
 
 def keys_of(array):
@@ -77,5 +65,6 @@ def check_points(cells, model):
     positions = dict(zip(cells, cells.positions.tolist(), strict=True))
     for key, point in model.points.items():
         assert key in cells
-        assert cells.position(key).tolist() == positions[key] == [x / (1 << 1074) for x in point]
+        assert cells.position(key).tobytes() == point.tobytes()
+        assert positions[key] == point.tolist()
         assert cells.cell_of(positions[key]) == cells.cell(key)
