@@ -337,7 +337,7 @@ arrange(const division *by, level_input *from, int32_t n_levels, hs_level_set *t
             status = hs_points_copy_finite(&one, row, failure);
             failure->row = status == HS_OK ? failure->row : i;
             failure->in_queries = from->are_queries && status != HS_OK;
-            for (int k = 0; k < to->ndim; k++) {
+            for (int k = 0; k < to->ndim && status == HS_OK; k++) {
                 to->lower[k] = hs_smaller(row[k], to->lower[k]);
                 to->upper[k] = hs_larger(row[k], to->upper[k]);
             }

@@ -325,26 +325,23 @@ static bool
 sorts(const table *all)
 {
     const hs_search *search = all->search;
-    const hs_grid   *grid = &search->grid;
     const hs_call   *call = search->call;
-    const hs_bins   *asking = hs_search_asking(search), *bins = &search->bins;
+    const hs_bins   *asking = hs_search_asking(search);
     const unsigned   columns = hs_sort_columns(search);
     const int        ndim = search->scene.ndim;
-    const double     n = (double)asking->n, n_points = (double)bins->n;
+    const double     n = (double)asking->n;
     if (search->limits != NULL || call->choice != NULL || call->options.precision != HS_EXACT ||
-        n < LEAST_SORTED || n_points < 1.0) {
+        n < LEAST_SORTED || search->bins.n == 0) {
         return false;
     }
-    /* Entries of a row: as many as in an even scene, times what points are closer together. Where
-     * they lie at random, each finds one more in its cell than there are on average: itself. Sparse
-     * cells do not tell: then the ball's part of three cells a side, which are about a cutoff wide.
-     * */
+    /* Entries of a row: as many as in an even scene, times what points are closer together. Sparse
+     * cells do not tell: then the ball's part of three cells a side, each as wide as the cutoff. */
     const double candidates = hs_search_candidates(search) / n;
-    const double crowd = (bins->squares / n_points - 1.0) * (double)grid->n_cells / n_points;
+    const double crowd = hs_larger(hs_search_crowd(search), 1.0);
     const double part = hs_ball_volume(ndim, 1.0) / pow(3.0, ndim);
     const double entries =
         search->pairs_per_half *
-        (search->is_sparse ? part * candidates : grid->expected_pairs / n * hs_larger(crowd, 1.0));
+        (search->is_sparse ? part * candidates : search->grid.expected_pairs / n * crowd);
     const double pairs = search->has_queries || search->is_half ? entries : 0.5 * entries;
     const double measures = (double)hs_want_bytes(columns & ~(HS_WANT_I | HS_WANT_J), ndim, 4);
     const double found = n * pairs * (double)hs_want_bytes(columns, ndim, 4);

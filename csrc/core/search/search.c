@@ -220,12 +220,9 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     const double  candidates = n > 0 ? hs_search_candidates(search) : 0.0;
     const double  bound = candidates * bytes_per_pair;
     const double  by_density = search->grid.expected_pairs * search->pairs_per_half;
-    const double  crowd =
-        (search->bins.squares - (double)search->bins.n) * (double)search->grid.n_cells;
-    const bool is_uneven = search->is_sparse ||
-                           crowd > EVEN * (double)search->bins.n * (double)search->bins.n;
-    const bool is_large = bytes_per_pair > BYTES_OF_INDICES && bound > LARGE_RESULT;
-    sample     taken;
+    const bool    is_uneven = search->is_sparse || hs_search_crowd(search) > EVEN;
+    const bool    is_large = bytes_per_pair > BYTES_OF_INDICES && bound > LARGE_RESULT;
+    sample        taken;
     /* The limit is looked up, which takes longer than a sample, unless the result may be too large
      * to do without and does not seem to be. */
     const bool samples_first = account->find_limit != NULL && bound > HS_LIMIT_FREE &&
@@ -410,6 +407,13 @@ hs_search_candidates(const hs_search *search)
         offsets += (double)search->stencil.rows[s].last - search->stencil.rows[s].first + 1.0;
     }
     return squares * offsets;
+}
+
+double
+hs_search_crowd(const hs_search *search)
+{
+    const double n = (double)search->bins.n;
+    return n > 0.0 ? (search->bins.squares / n - 1.0) * (double)search->grid.n_cells / n : 0.0;
 }
 
 hs_status

@@ -110,6 +110,11 @@ bool hs_search_repeats_images(const hs_search *search);
  * cells no fewer than there are. */
 double hs_search_candidates(const hs_search *search);
 
+/* How many times as many points there are in a point's cell as in an even scene, itself left out:
+ * where points lie at random it finds as many others there as cells have on average. Not of sparse
+ * cells. */
+double hs_search_crowd(const hs_search *search);
+
 /* From the neighbours of each point to the half list. For a search among one set of points; HS_OK,
  * or a status of hs_stencil_build. */
 hs_status hs_search_halve(hs_search *search);
