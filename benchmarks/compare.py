@@ -19,8 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
-from pages.report import Table, duration, render
-from pages.results import Row, is_ours, is_reference, read_csv
+from pages import Row, Table, duration, is_ours, is_reference, read_csv, render
 
 __all__ = ["Change", "changes", "main", "table_of_changes"]
 

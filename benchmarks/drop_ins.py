@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Drop-ins against the functions that they stand in for, by the same calls.
 
-    python benchmarks/drop_ins.py [--points 10000] [--turns 7] [--neighbours 50] [--queries 1 100]
+    python benchmarks/drop_ins.py [--points 1 10 100 10000] [--turns 7] [--neighbours 50] [--open]
+        [--queries 1 100] [--only KDTree]
 
-Points are uniform in a periodic cube. The calls take turns, and results are dropped at once. Owners
-that are not installed are left out. With --queries trees that are there already answer so many of
-them, in many turns, of which the shortest counts.
+Points are uniform in a periodic cube, at least so large that no other image of a pair is within the
+cutoff; or in open space. Calls take turns, short ones are repeated in each, results are dropped at
+once, and the shortest turn counts. Trees, atoms and estimators are made beforehand. Owners that are
+not installed are left out. With --queries they have so many of them, in place of the points.
 """
 
 from __future__ import annotations
@@ -15,7 +17,6 @@ import importlib
 import importlib.util
 import sys
 from collections.abc import Callable, Sequence
-from statistics import median
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -23,163 +24,224 @@ import numpy as np
 
 __all__ = ["CALLS", "Scene", "main"]
 
+#: A turn of calls takes about so many seconds at least.
+_TURN = 1e-3
+
 
 class Scene(NamedTuple):
-    """Points in a periodic cube, as each owner takes them."""
+    """Points in a cube, which may be periodic, as each owner takes them."""
 
     points: Any
+    queries: Any
     edge: float
     cutoff: float
+    is_open: bool
 
     @property
     def atoms(self) -> Any:
         from ase import Atoms
 
-        return Atoms(np.full(len(self.points), 6), self.points, cell=[self.edge] * 3, pbc=True)
+        numbers = np.full(len(self.points), 6)
+        return Atoms(numbers, self.points, cell=[self.edge] * 3, pbc=not self.is_open)
 
     @property
     def dimensions(self) -> Any:
-        return np.array([self.edge] * 3 + [90.0] * 3, np.float32)
+        return None if self.is_open else np.array([self.edge] * 3 + [90.0] * 3, np.float32)
+
+    def tree(self, module: Any, points: Any = None) -> Any:
+        boxsize = None if self.is_open else self.edge
+        return module.KDTree(self.points if points is None else points, boxsize=boxsize)
 
 
-def _ase(letters: str) -> Callable[[Any, Scene], int]:
-    def call(module: Any, scene: Scene) -> int:
-        return len(module.neighbor_list(letters, scene.atoms, scene.cutoff)[0])
+Call = Callable[[], Any]
+
+
+def _ase(letters: str) -> Callable[[Any, Scene], Call]:
+    def make(module: Any, scene: Scene) -> Call:
+        atoms = scene.atoms
+        return lambda: module.neighbor_list(letters, atoms, scene.cutoff)
+
+    return make
+
+
+def _object(module: Any, scene: Scene) -> Call:
+    atoms = scene.atoms
+    radii = [scene.cutoff / 2] * len(atoms)
+
+    def call() -> Any:
+        nl = module.NeighborList(radii, skin=0.0, self_interaction=False)
+        nl.update(atoms)
+        return [nl.get_neighbors(k)[0] for k in range(len(atoms))]
 
     return call
 
 
-def _object(module: Any, scene: Scene) -> int:
+def _matscipy(module: Any, scene: Scene) -> Call:
     atoms = scene.atoms
-    nl = module.NeighborList([scene.cutoff / 2] * len(atoms), skin=0.0, self_interaction=False)
-    nl.update(atoms)
-    return sum(len(nl.get_neighbors(k)[0]) for k in range(len(atoms)))
+    return lambda: module.neighbour_list("ijdDS", atoms, scene.cutoff)
 
 
-def _matscipy(module: Any, scene: Scene) -> int:
-    return len(module.neighbour_list("ijdDS", scene.atoms, scene.cutoff)[0])
-
-
-def _triplets(module: Any, scene: Scene) -> int:
+def _triplets(module: Any, scene: Scene) -> Call:
     i = module.neighbour_list("i", scene.atoms, 0.5 * scene.cutoff)
-    return len(module.triplet_list(module.first_neighbours(len(scene.points), i))[0])
+    first = module.first_neighbours(len(scene.points), i)
+    return lambda: module.triplet_list(first)
 
 
-def _query_pairs(module: Any, scene: Scene) -> int:
-    tree = module.KDTree(scene.points, boxsize=scene.edge)
-    return len(tree.query_pairs(scene.cutoff, output_type="ndarray"))
+def _tree(method: str, *arguments: Any, **options: Any) -> Callable[[Any, Scene], Call]:
+    """A method of a tree: of the cutoff, of queries, or of another tree of these."""
+
+    def make(module: Any, scene: Scene) -> Call:
+        call = getattr(scene.tree(module), method)
+        tree = scene.tree(module, scene.queries)
+        known = {"queries": scene.queries, "cutoff": scene.cutoff, "tree": tree}
+        known |= {"one": scene.queries[0], "cutoffs": np.linspace(0.1, 1.0, 10) * scene.cutoff}
+        given = [known.get(one, one) if isinstance(one, str) else one for one in arguments]
+        return lambda: call(*given, **options)
+
+    return make
 
 
-def _query(module: Any, scene: Scene) -> int:
-    return len(module.KDTree(scene.points, boxsize=scene.edge).query(scene.points, 8)[0])
+def _capped(of_two: bool) -> Callable[[Any, Scene], Call]:
+    def make(module: Any, scene: Scene) -> Call:
+        sets = [scene.points.astype(np.float32)]
+        sets += [scene.queries.astype(np.float32)] if of_two else []
+        call = module.capped_distance if of_two else module.self_capped_distance
+        return lambda: call(*sets, scene.cutoff, box=scene.dimensions)
+
+    return make
 
 
-def _capped(module: Any, scene: Scene) -> int:
-    points = scene.points.astype(np.float32)
-    return len(module.self_capped_distance(points, scene.cutoff, box=scene.dimensions)[0])
-
-
-def _radius_graph(module: Any, scene: Scene) -> int:
+def _radius_graph(module: Any, scene: Scene) -> Call:
     made = module.RadiusNeighborsTransformer(radius=scene.cutoff)
-    return int(made.fit_transform(scene.points).nnz)
+    return lambda: made.fit_transform(scene.points)
 
 
-def _nearest_graph(module: Any, scene: Scene) -> int:
-    return int(module.KNeighborsTransformer(n_neighbors=8).fit_transform(scene.points).nnz)
+def _nearest_graph(module: Any, scene: Scene) -> Call:
+    made = module.KNeighborsTransformer(n_neighbors=min(8, max(len(scene.points) - 2, 0)))
+    return lambda: made.fit_transform(scene.points)
 
 
-def _spheres(module: Any, scene: Scene) -> int:
-    pbc, lattice = np.ones(3, np.int64), np.eye(3) * scene.edge
-    found = module.find_points_in_spheres(scene.points, scene.points, scene.cutoff, pbc, lattice)
-    return len(found[0])
+def _radius_neighbors(module: Any, scene: Scene) -> Call:
+    made = module.RadiusNeighborsTransformer(radius=scene.cutoff).fit(scene.points)
+    return lambda: made.radius_neighbors(scene.queries)[1]
 
 
-#: Name of a call -> drop-in, owner, and what the call does with either, which returns the number
-#: of entries.
-CALLS: dict[str, tuple[str, str, Callable[[Any, Scene], int]]] = {
+def _spheres(module: Any, scene: Scene) -> Call:
+    pbc, lattice = np.full(3, not scene.is_open, np.int64), np.eye(3) * scene.edge
+    return lambda: module.find_points_in_spheres(
+        scene.points, scene.queries, scene.cutoff, pbc, lattice
+    )
+
+
+_SCIPY = "scipy", "scipy.spatial"
+_SKLEARN = "sklearn", "sklearn.neighbors"
+_MDANALYSIS = "mdanalysis", "MDAnalysis.lib.distances"
+
+#: Name of a call -> drop-in, owner, and what makes the call from a module and a scene.
+CALLS: dict[str, tuple[str, str, Callable[[Any, Scene], Call]]] = {
     'ase.neighbor_list("ij")': ("ase", "ase.neighborlist", _ase("ij")),
     'ase.neighbor_list("ijdDS")': ("ase", "ase.neighborlist", _ase("ijdDS")),
     "ase.NeighborList": ("ase", "ase.neighborlist", _object),
     'matscipy.neighbour_list("ijdDS")': ("matscipy", "matscipy.neighbours", _matscipy),
     "matscipy.triplet_list": ("matscipy", "matscipy.neighbours", _triplets),
-    "scipy.KDTree.query_pairs": ("scipy", "scipy.spatial", _query_pairs),
-    "scipy.KDTree.query, k=8": ("scipy", "scipy.spatial", _query),
-    "MDAnalysis.self_capped_distance": ("mdanalysis", "MDAnalysis.lib.distances", _capped),
-    "sklearn.RadiusNeighborsTransformer": ("sklearn", "sklearn.neighbors", _radius_graph),
-    "sklearn.KNeighborsTransformer": ("sklearn", "sklearn.neighbors", _nearest_graph),
+    "KDTree.query_pairs": (*_SCIPY, _tree("query_pairs", "cutoff")),
+    "KDTree.query_pairs, ndarray": (
+        *_SCIPY, _tree("query_pairs", "cutoff", output_type="ndarray"),
+    ),
+    "KDTree.query_ball_point": (*_SCIPY, _tree("query_ball_point", "queries", "cutoff")),
+    "KDTree.query_ball_point of one": (*_SCIPY, _tree("query_ball_point", "one", "cutoff")),
+    "KDTree.query_ball_point, lengths": (
+        *_SCIPY, _tree("query_ball_point", "queries", "cutoff", return_length=True),
+    ),
+    "KDTree.query_ball_tree": (*_SCIPY, _tree("query_ball_tree", "tree", "cutoff")),
+    "KDTree.count_neighbors": (*_SCIPY, _tree("count_neighbors", "tree", "cutoff")),
+    "KDTree.count_neighbors, 10 radii": (*_SCIPY, _tree("count_neighbors", "tree", "cutoffs")),
+    **{
+        f"KDTree.sparse_..., {kind}": (
+            *_SCIPY, _tree("sparse_distance_matrix", "tree", "cutoff", output_type=kind),
+        ) for kind in ("dict", "ndarray", "coo_matrix", "dok_matrix")
+    },
+    "KDTree.query, k=1": (*_SCIPY, _tree("query", "queries")),
+    "KDTree.query, k=8": (*_SCIPY, _tree("query", "queries", 8)),
+    "KDTree.query of one, k=1": (*_SCIPY, _tree("query", "one")),
+    "MDAnalysis.self_capped_distance": (*_MDANALYSIS, _capped(False)),
+    "MDAnalysis.capped_distance": (*_MDANALYSIS, _capped(True)),
+    "sklearn.RadiusNeighborsTransformer": (*_SKLEARN, _radius_graph),
+    "sklearn.KNeighborsTransformer": (*_SKLEARN, _nearest_graph),
+    "sklearn...radius_neighbors": (*_SKLEARN, _radius_neighbors),
     "pymatgen.find_points_in_spheres": (
         "pymatgen", "pymatgen.optimization.neighbors", _spheres,
     ),
 }  # fmt: skip
 
 
-#: Searches of a tree that has been made, for the points of a scene and its cutoff.
-KEPT: dict[str, Callable[[Any, Scene], int]] = {
-    "KDTree.query, k=1": lambda tree, scene: len(tree.query(scene.points)[0]),
-    "KDTree.query, k=8": lambda tree, scene: len(tree.query(scene.points, 8)[0]),
-    "KDTree.query_ball_point": lambda tree, scene: sum(
-        map(len, tree.query_ball_point(scene.points, scene.cutoff))
-    ),
-}  # fmt: skip
+def _count(result: Any) -> int:
+    """The number of entries of a result: of all lists that it has, or of its first array."""
+    if isinstance(result, tuple):
+        return _count(result[0])
+    if isinstance(result, list) or getattr(result, "dtype", None) == np.dtype(object):
+        return sum(len(one) if np.ndim(one) else 1 for one in result)
+    if hasattr(result, "nnz"):
+        return int(result.nnz)
+    return int(result) if np.isscalar(result) else len(result)
 
 
-def _few_queries(scene: Scene, numbers: Sequence[int], turns: int) -> bool:
-    """Print a row for each search of kept trees and each number of queries; whether any differ."""
-    from scipy import spatial
-
-    from halfshell.compat import scipy as ours
-
-    trees = [module.KDTree(scene.points, boxsize=scene.edge) for module in (ours, spatial)]
-    rng, different = np.random.default_rng(1), False
-    for n in numbers:
-        asking = scene._replace(points=rng.random((n, 3)) * scene.edge)
-        for name, search in KEPT.items():
-            seconds, counts = _times(search, trees, asking, turns * max(1, 1000 // n))
-            mine, others = (1e6 * min(one) for one in seconds)
-            ratio = f"{mine:9.1f} us, owner {others:9.1f} us: {others / mine:.1f} times"
-            print(f"{n} queries of {name:24} {ratio}")
-            different |= counts[0] != counts[1]
-    return different
+def _seconds(call: Call, n: int) -> float:
+    start = perf_counter()
+    for _ in range(n):
+        call()
+    return (perf_counter() - start) / n
 
 
-def _times(call: Any, modules: Sequence[Any], scene: Scene, turns: int) -> tuple[Any, Any]:
-    """Seconds of each turn, and the number of entries, of each module."""
-    seconds: list[list[float]] = [[] for _ in modules]
-    counts = [0] * len(modules)
-    for _ in range(turns):
-        for k, module in enumerate(modules):
-            start = perf_counter()
-            counts[k] = call(module, scene)
-            seconds[k].append(perf_counter() - start)
-    return seconds, counts
+def _times(calls: Sequence[Call], turns: int) -> list[float]:
+    """Seconds of the shortest turn of each."""
+    numbers = [max(1, int(_TURN / max(_seconds(call, 1) for _ in range(2)))) for call in calls]
+    turn = [[_seconds(call, n) for call, n in zip(calls, numbers)] for _ in range(turns)]
+    return [min(one) for one in zip(*turn)]
+
+
+def _compare(name: str, scene: Scene, turns: int) -> bool:
+    """Print a row for a call; whether the two have different numbers of entries."""
+    drop_in, owner, make = CALLS[name]
+    if importlib.util.find_spec(owner.partition(".")[0]) is None:
+        print(f"{name:34} {owner} is not installed")
+        return False
+    ours = make(importlib.import_module(f"halfshell.compat.{drop_in}"), scene)
+    theirs = make(importlib.import_module(owner), scene)
+    try:
+        count = _count(theirs())
+    except Exception as error:  # of few points, in matscipy and scikit-learn
+        print(f"{name:34} {owner} raises {type(error).__name__}")
+        return False
+    difference = abs(_count(ours()) - count)
+    mine, others = (1e6 * one for one in _times((ours, theirs), turns))
+    print(f"{name:34} {mine:11.1f} us, owner {others:11.1f} us: {others / mine:5.2f} times")
+    # MDAnalysis rounds the box to float32, and differs by a pair of many.
+    return difference > (count // 10**5 if drop_in == "mdanalysis" else 0)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print a row for each call; 1 if the two have different numbers of entries."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--points", type=int, default=10_000)
+    parser.add_argument("--points", type=int, nargs="+", default=[10_000])
     parser.add_argument("--neighbours", type=float, default=50.0, help="of a point, on average")
     parser.add_argument("--turns", type=int, default=7)
-    parser.add_argument("--queries", type=int, nargs="+", help="of trees that are there already")
+    parser.add_argument("--open", action="store_true", help="in open space")
+    parser.add_argument("--queries", type=int, nargs="+", help="in place of as many as points")
+    parser.add_argument("--only", default="", help="calls with this in their names")
     options = parser.parse_args(arguments)
-    n, cutoff = options.points, 5.0
-    edge = cutoff * (n * 4.0 / 3.0 * np.pi / options.neighbours) ** (1.0 / 3.0)
-    scene = Scene(np.random.default_rng(0).random((n, 3)) * edge, edge, cutoff)
-    if options.queries:
-        return int(_few_queries(scene, options.queries, options.turns))
-    different = False
-    print(f"{n} points, about {options.neighbours:g} neighbours each, {options.turns} turns")
-    for name, (drop_in, owner, call) in CALLS.items():
-        if importlib.util.find_spec(owner.partition(".")[0]) is None:
-            print(f"{name:34} {owner} is not installed")
-            continue
-        ours = importlib.import_module(f"halfshell.compat.{drop_in}")
-        theirs = importlib.import_module(owner)
-        seconds, counts = _times(call, (ours, theirs), scene, options.turns)
-        mine, others = (1e3 * median(one) for one in seconds)
-        print(f"{name:34} {mine:9.2f} ms, owner {others:9.2f} ms: {others / mine:.1f} times")
-        # MDAnalysis rounds the box to float32, and differs by a pair of many.
-        different |= abs(counts[0] - counts[1]) > (counts[1] // 10**5 if owner[0] == "M" else 0)
+    cutoff, rng, different = 5.0, np.random.default_rng(0), False
+    for n in options.points:
+        edge = cutoff * (n * 4.0 / 3.0 * np.pi / options.neighbours) ** (1.0 / 3.0)
+        edge = max(edge, 2.01 * cutoff)
+        points = rng.random((n, 3)) * edge
+        for n_queries in options.queries or [n]:
+            queries = rng.random((n_queries, 3)) * edge
+            scene = Scene(points, queries, edge, cutoff, options.open)
+            print(f"{n} points, {n_queries} queries, {options.turns} turns")
+            for name in CALLS:
+                if options.only in name:
+                    different |= _compare(name, scene, options.turns)
     return int(different)
 
 

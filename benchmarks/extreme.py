@@ -14,7 +14,6 @@ dropped at once.
 from __future__ import annotations
 
 import argparse
-import csv
 import math
 import sys
 from collections.abc import Sequence
@@ -28,7 +27,8 @@ import halfshell as hs
 from halfshell_report import scenes as extreme
 from measure.machine import facts, pin_to_cores, usable_cores
 from measure.turns import Timing, Turn, plan_turn, take_turns
-from scenes.make import uniform
+from pages import write_rows
+from scenes.named import uniform
 
 __all__ = ["COLUMNS", "main", "measure", "twin"]
 
@@ -106,11 +106,7 @@ def main(given: Sequence[str] | None = None) -> int:
         rows.append({**about, "size": options.size, **row})
         print(_LINE.format(*(row[key] for key in _SHOWN)), flush=True)
     if options.output:
-        with options.output.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, [*about, "size", *COLUMNS], lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows)
-        print(f"wrote {options.output}")
+        write_rows(options.output, [*about, "size", *COLUMNS], rows)
     return 0
 
 

@@ -15,9 +15,19 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
-from pages.marks import EMPTY, Lines, fill, table
-from pages.report import OURS, duration, limit_rows, ratio_rows
-from pages.results import Row, is_ours, read_csv
+from pages import (
+    EMPTY,
+    OURS,
+    Lines,
+    Row,
+    duration,
+    fill,
+    is_ours,
+    limit_rows,
+    ratio_rows,
+    read_csv,
+    table,
+)
 from scenes import GROUPS, SCENES, Limit, load
 
 __all__ = ["EMPTY", "SECTIONS", "fill", "main"]

@@ -24,7 +24,7 @@ from halfshell_report.findings import (
     summary_cells,
 )
 from halfshell_report.rows import ReportRow, read_csv
-from pages.marks import Lines, fill, table
+from pages import Lines, fill, table
 
 __all__ = ["SECTIONS", "fill_page", "main"]
 

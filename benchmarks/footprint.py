@@ -9,7 +9,6 @@ Each figure comes from new processes. Memory needs Linux (it is read from /proc)
 from __future__ import annotations
 
 import argparse
-import csv
 import importlib.metadata
 import json
 import subprocess
@@ -21,8 +20,9 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from measure.machine import available_bytes, facts
-from pages.report import duration, render
+from halfshell import _core
+from measure.machine import facts
+from pages import duration, render, write_rows
 from scenes import SCENES, Scene, load
 
 __all__ = ["COLUMNS", "allowance", "main", "parse_case"]
@@ -135,7 +135,7 @@ def _measure_memory(name: str, quantities: str) -> dict[str, Any] | None:
     if quantities:
         scene = replace(scene, quantities=quantities)
     # Points, result and search must fit, with room to spare.
-    if 2 * scene.bytes_of_output() + 200 * scene.n > available_bytes():
+    if 2 * scene.bytes_of_output() + 200 * scene.n > _core.available_memory():
         return None
     before, peak, after, output = _python(
         _MEMORY.format(here=str(_HERE), scene=name, quantities=quantities)
@@ -183,12 +183,7 @@ def _write(path: Path, rows: Sequence[dict[str, Any]]) -> None:
     import halfshell as hs
 
     about = {key: value for key, value in facts(simd=hs.kernels()[0]).items() if key in COLUMNS}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows({**about, **row} for row in rows)
-    print(f"wrote {path}")
+    write_rows(path, COLUMNS, ({**about, **row} for row in rows))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -21,8 +21,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from libraries.contestant import Halfshell
-from libraries.full_peers import ours_for
-from pages.report import render
+from libraries.peers import ours_for
+from pages import render
 from scenes import SCENES, load
 
 __all__ = ["count", "main"]

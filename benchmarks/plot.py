@@ -18,8 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pages.report import OURS
-from pages.results import Row, is_ours, is_reference, read_csv
+from pages import OURS, Row, is_ours, is_reference, read_csv
 
 __all__ = ["main", "series"]
 

@@ -18,12 +18,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import pages
+from halfshell import _core
 from libraries.contestant import Halfshell, pin_threads
 from libraries.peers import PEERS
 from measure import machine
 from measure.runner import Patience, measure_scene
-from pages import report
-from pages.report import Measurement
 from scenes import GROUPS, QUICK, SCENES, TITLES, Limit, load
 
 
@@ -51,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     patience = _patience(options)
     machine.touch_memory(min(patience.hold, 1 << 28) if options.quick else patience.hold)
 
-    measured: list[Measurement] = []
+    measured: list[pages.Measurement] = []
     wanted: dict[str, float | None] = {}
     limits: dict[str, tuple[Limit, ...]] = {}
     correct = True
@@ -67,16 +67,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
             machine.pin_to_cores(cores)
         wanted[name], limits[name] = scene.want, scene.limits
         if options.output and rows:
-            report.write_csv(options.output, facts, rows, wanted)
+            pages.write_csv(options.output, facts, rows, wanted)
         measured += rows
         correct &= good
     for table in (
-        report.table_of_contestants(measured),
-        report.table_of_ratios(report.ratio_rows(measured, wanted)),
-        report.table_of_limits(report.limit_rows(measured, limits)),
-        report.table_of_single_calls(measured),
+        pages.table_of_contestants(measured),
+        pages.table_of_ratios(pages.ratio_rows(measured, wanted)),
+        pages.table_of_limits(pages.limit_rows(measured, limits)),
+        pages.table_of_single_calls(measured),
     ):
-        report.render(table, rich=not options.plain)
+        pages.render(table, rich=not options.plain)
     if options.output:
         print(f"wrote {options.output}")
     if not correct:
@@ -120,7 +120,7 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _patience(options: argparse.Namespace) -> Patience:
-    available = machine.available_bytes()
+    available = _core.available_memory()
     return Patience(
         repeats=min(options.repeats, 3) if options.quick else options.repeats,
         seconds=min(options.patience, 0.3) if options.quick else options.patience,
@@ -146,8 +146,6 @@ def _compiler(ours: Halfshell | None) -> str:
     """Name the compiler that built our extension."""
     if ours is None:
         return ""
-    from halfshell import _core
-
     return str(_core.build_info().get("compiler", ""))
 
 

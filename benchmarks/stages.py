@@ -11,7 +11,6 @@ they show whether a scene takes the path that it is meant to take. Nothing is ti
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from pages.report import render
+from pages import render, write_rows
 from scenes import SCENES, Scene, load
 
 __all__ = ["COLUMNS", "main", "shares"]
@@ -92,11 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for line in sizes:
         print("  " + ", ".join(line))
     if options.output:
-        with options.output.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows)
-        print(f"wrote {options.output}")
+        write_rows(options.output, COLUMNS, rows)
     return 0
 
 

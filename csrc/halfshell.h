@@ -340,9 +340,9 @@ typedef struct hs_each_system {
  * the first hs_nearest_find builds a tree of the points, which stays with the cells and is not
  * counted as memory of the call.
  *
- * Several systems are for all searches but hs_stream_open and hs_plan_make, and not for cells: they
- * are searched one after the other, and the result is that of so many calls, one behind the other,
- * with numbers among all points and queries; so are clusters. Threads share the systems out. A
+ * Several systems are for all searches but hs_plan_make, and not for cells: the result is that of
+ * so many calls, one behind the other, with numbers among all points and queries; so are clusters
+ * and the blocks of a stream. Threads share the systems out. A
  * failure names the point among all, and the system where that says more; failure.system is also
  * where `first` descends. options->counters: bytes_peak is the sum of what each thread held at
  * most.
@@ -400,6 +400,29 @@ hs_status hs_neighbors_find(const hs_among *among, const hs_options *options, hs
 /* The length of each row only. counts: one for each query, or point; unspecified on failure. */
 hs_status hs_neighbors_count(const hs_among *among, const hs_options *options, int64_t *counts,
                              hs_failure *failure);
+
+/* A search takes longer to begin than to look at all pairs of so few points, one by one. */
+#define HS_FEW_PAIRS 1024
+
+typedef struct hs_few {
+    int           ndim;
+    int64_t       n_points, n_queries;
+    const double *points, *queries; /* in rows without gaps, borrowed; queries NULL: none */
+    const double *period;           /* of each axis, 0 where it does not repeat; NULL: open space */
+    double        cutoff;
+} hs_few;
+
+/*
+ * Pairs of hs_pairs_find as i < j, or with queries those of hs_neighbors_find, both ascending by
+ * (i, j), with the same d: inclusive, for cutoffs below half of each period. No memory is taken.
+ *
+ * i, j, d    room for HS_FEW_PAIRS; d may be NULL
+ *
+ * Returns how many there are, or -1 if a search is to find them, or to refuse: of more points, or
+ * pairs of points, than HS_FEW_PAIRS; of a cutoff that is larger, or half of a period up to
+ * rounding, or below 2^-400; of points more than 1.5 periods apart; of what is not finite.
+ */
+int hs_few_pairs(const hs_few *few, int32_t *i, int32_t *j, double *d);
 
 /* Pairs by distance, and where the numbers go. Everything is borrowed. */
 typedef struct hs_histogram {

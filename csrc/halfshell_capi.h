@@ -176,6 +176,7 @@ typedef struct hs_capi {
                             hs_failure *failure);
     hs_status (*dynamic_cell_of)(const hs_dynamic *list, const double *position, int64_t *cell,
                                  hs_failure *failure);
+    int (*few_pairs)(const hs_few *few, int32_t *i, int32_t *j, double *d);
 } hs_capi;
 
 /* The table, or NULL with an ImportError (also that of halfshell itself) when halfshell is not

@@ -32,7 +32,8 @@ RETURNS = {
     "count_pairs": "int | _Ints", "neighbors": "tuple[_Array, ...]", "coordination": "_Ints",
     "iter_pairs": "Any", "for_each_pair": "int", "histogram": "_Array",
     "clusters": "tuple[int, _Ints, npt.NDArray[np.uint8] | None]", "explain": "dict[str, Any]",
-    "cells_build": "Any", "cells_candidates": "tuple[_Ints, ...]", "verlet_update": "bool",
+    "cells_build": "Any", "cells_find": "_Ints", "cells_candidates": "tuple[_Ints, ...]",
+    "verlet_update": "bool",
 } | dict.fromkeys(
     ("connect", "connect_search", "overlap", "intersect", "pair_rows", "keep_rows",
      "rows_without"), "Any",

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Whether two answers are the same, and who is right where they are not.
 
-A result becomes one sorted array of integers, a key for each pair, so that lists of millions
-of pairs are compared in a second or two. Every pair on which two lists differ is then judged
-in rational arithmetic, so that a difference is never put down to the wrong side.
+A result becomes one sorted array of integers, a row for each pair; rows are compared by a number
+for each, so that lists of millions of pairs take a second or two. Every pair on which two lists
+differ is then judged in rational arithmetic, so that a difference is never put down to the wrong
+side.
 """
 
 from __future__ import annotations
@@ -15,14 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from halfshell._convert.arrays import are_backward, row_keys
 from scenes import Scene
 
-__all__ = ["Verdict", "compare", "compare_counts", "compare_nearest", "half_keys", "is_pair"]
+__all__ = ["Verdict", "compare", "compare_counts", "compare_nearest", "half_rows", "is_pair"]
 
-Keys = NDArray[np.int64]
+Rows = NDArray[np.int64]
 
-# Shifts between -_REACH and _REACH have a key of their own.
-_REACH = 31
 _JUDGED = 500  # of each kind are judged one by one; rational arithmetic is slow
 
 
@@ -52,8 +52,8 @@ class Verdict:
         return ", ".join(f"{count} {word}" for word, count in words.items() if count) or "same"
 
 
-def half_keys(scene: Scene, i: Any, j: Any, shift: Any = None, full: bool = False) -> Keys:
-    """Turn pairs into sorted keys of the half list.
+def half_rows(i: Any, j: Any, shift: Any = None, full: bool = False) -> Rows:
+    """Turn pairs into the sorted rows (i, j, *S) of the half list.
 
     Parameters
     ----------
@@ -61,41 +61,27 @@ def half_keys(scene: Scene, i: Any, j: Any, shift: Any = None, full: bool = Fals
         Point numbers, of any integer type.
     shift : array_like, shape (m, d), optional
         Shifts. Without them pairs are told apart by their point numbers alone, which is
-        enough wherever `scene.has_images` is false.
+        enough wherever no pair of points has several images.
     full : bool, default False
         Whether each pair is present in both directions.
 
     Returns
     -------
-    numpy.ndarray of int64, shape (m,) or (m / 2,)
+    numpy.ndarray of int64, shape (m, 2 + d) or (m, 2), half as long for a full list
     """
-    i = np.asarray(i).astype(np.int64)
-    j = np.asarray(j).astype(np.int64)
-    if shift is None:
-        low, high = np.minimum(i, j), np.maximum(i, j)
-        keys = np.sort(low * scene.n + high)
-    else:
-        s = np.asarray(shift).astype(np.int64)
-        if s.size and np.abs(s).max() > _REACH:
-            raise ValueError(f"a shift beyond {_REACH} has no key")
-        leading = np.zeros(len(i), dtype=np.int64)
-        for axis in range(s.shape[1]):
-            leading = np.where(leading == 0, s[:, axis], leading)
-        turn = (i > j) | ((i == j) & (leading < 0))
-        low, high = np.minimum(i, j), np.maximum(i, j)
-        s = np.where(turn[:, None], -s, s)
-        keys = low * scene.n + high
-        for axis in range(s.shape[1]):
-            keys = keys * (2 * _REACH + 1) + (s[:, axis] + _REACH)
-        keys.sort()
-    # A full list holds every key twice, so every other one is the half list; what is present
+    i, j = (np.asarray(one).astype(np.int64) for one in (i, j))
+    shift = None if shift is None else np.asarray(shift).astype(np.int64)
+    turned = are_backward(i, j, shift)
+    columns = [np.minimum(i, j), np.maximum(i, j)]
+    columns += [] if shift is None else [*np.where(turned[:, None], -shift, shift).T]
+    # A full list holds every pair twice, so every other one is the half list; what is present
     # once or three times shows up as missing or duplicate.
-    return keys[::2] if full else keys
+    order = np.argsort(row_keys(columns)[0])[:: 2 if full else 1]
+    return np.column_stack(columns)[order]
 
 
-def compare(scene: Scene, ours: Keys, theirs: Keys, inclusive: bool, band: float,
-            shifts: bool) -> Verdict:  # fmt: skip
-    """Compare two half lists of keys.
+def compare(scene: Scene, ours: Rows, theirs: Rows, inclusive: bool, band: float) -> Verdict:
+    """Compare the rows of two half lists.
 
     Parameters
     ----------
@@ -104,20 +90,18 @@ def compare(scene: Scene, ours: Keys, theirs: Keys, inclusive: bool, band: float
     band : float
         Differences are the peer's rounding where the distance is within this fraction of the
         cutoff.
-    shifts : bool
-        Whether the keys were made with shifts.
     """
-    if np.array_equal(ours, theirs) and bool((theirs[1:] > theirs[:-1]).all()):
+    own, other = row_keys(ours.T, theirs.T)
+    if np.array_equal(own, other) and bool((other[1:] > other[:-1]).all()):
         return Verdict()  # nearly always, and sets of millions of keys take half a minute
-    unique = np.unique(theirs)
-    missed = np.setdiff1d(ours, unique, assume_unique=True)
-    spurious = np.setdiff1d(unique, ours, assume_unique=True)
+    unique, first = np.unique(other, return_index=True)
+    missed = ours[np.isin(own, unique, invert=True)]
+    spurious = theirs[first[np.isin(unique, own, invert=True)]]
     beyond = ours_wrong = 0
-    sample = [(key, True) for key in missed[:_JUDGED]]
-    sample += [(key, False) for key in spurious[:_JUDGED]]
-    for key, in_ours in sample:
-        i, j, shift = _decode(scene, int(key), shifts)
-        inside, relative = is_pair(scene, i, j, shift, inclusive)
+    sample = [(row, True) for row in missed[:_JUDGED].tolist()]
+    sample += [(row, False) for row in spurious[:_JUDGED].tolist()]
+    for (i, j, *shift), in_ours in sample:
+        inside, relative = is_pair(scene, i, j, tuple(shift) or None, inclusive)
         ours_wrong += inside != in_ours
         beyond += abs(relative) > band
     return Verdict(
@@ -196,14 +180,3 @@ def _moved(between: list[Fraction], rows: NDArray[np.float64], shift: Any) -> li
         part + sum(int(s) * Fraction(row[axis]) for s, row in zip(shift, rows, strict=True))
         for axis, part in enumerate(between)
     ]
-
-
-def _decode(scene: Scene, key: int, shifts: bool) -> tuple[int, int, tuple[int, ...] | None]:
-    """Undo `half_keys` for one key."""
-    if not shifts:
-        return (*divmod(key, scene.n), None)
-    parts: list[int] = []
-    for _ in range(scene.dim):
-        key, part = divmod(key, 2 * _REACH + 1)
-        parts.insert(0, part - _REACH)
-    return (*divmod(key, scene.n), tuple(parts))

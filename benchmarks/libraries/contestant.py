@@ -2,41 +2,23 @@
 """What every measured library is to the runner, and our own search as one of them.
 
 How a library is called is said in `halfshell_report.peers`; here is what the runner needs besides:
-keys to compare answers by, counts, batches, and how far rounding may lead it astray.
+rows to compare answers by, counts, batches, and how far rounding may lead it astray.
 """
 
 from __future__ import annotations
 
 import importlib
-import os
 from collections.abc import Mapping
 from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
 
-from halfshell_report.peers import Call, Library
-from libraries.agreement import Keys, half_keys
+from halfshell_report.peers import Call, Library, pin_threads
+from libraries.agreement import Rows, half_rows
 from scenes import Scene
 
 __all__ = ["Call", "Contestant", "Halfshell", "Looped", "pin_threads"]
-
-_THREAD_VARIABLES = (
-    "OMP_NUM_THREADS",
-    "RAYON_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "NUMEXPR_NUM_THREADS",
-    "NUMBA_NUM_THREADS",
-    "TBB_NUM_THREADS",
-)
-
-
-def pin_threads() -> None:
-    """Hold every library to one thread. To be called before any of them is imported."""
-    for name in _THREAD_VARIABLES:
-        os.environ[name] = "1"
-
 
 class Contestant(Library):
     """What the runner needs to know about a library."""
@@ -50,10 +32,10 @@ class Contestant(Library):
             return "too many pairs for its speed"
         return reason
 
-    def keys(self, scene: Scene, result: Any) -> Keys:
-        """Turn a result into keys that can be compared."""
+    def rows(self, scene: Scene, result: Any) -> Rows:
+        """Turn a result into rows that can be compared."""
         shift = self.shifts(result) if scene.has_images else None
-        return half_keys(scene, *self.indices(result), shift, self.full)
+        return half_rows(*self.indices(result), shift, self.full)
 
     def count(self, scene: Scene, result: Any) -> int:
         """Return the number of pairs of a result, each counted once."""
@@ -100,7 +82,7 @@ class Looped(Contestant):
         calls = [self.one.prepare(system) for system in scene.systems()]
         return lambda: [call() for call in calls]
 
-    def keys(self, scene: Scene, result: Any) -> Keys:
+    def rows(self, scene: Scene, result: Any) -> Rows:
         """Number the points of all systems through, and join the lists."""
         sizes = [system.n for system in scene.systems()]
         starts = np.cumsum([0, *sizes[:-1]])
@@ -110,7 +92,7 @@ class Looped(Contestant):
         shift = None
         if scene.has_images:
             shift = np.concatenate([self.one.shifts(part) for part in result])
-        return half_keys(scene, i, j, shift, self.one.full)
+        return half_rows(i, j, shift, self.one.full)
 
     def count(self, scene: Scene, result: Any) -> int:
         """Return the number of pairs in all systems."""

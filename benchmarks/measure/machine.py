@@ -16,7 +16,7 @@ import numpy as np
 
 from halfshell._machine import cpu_name
 
-__all__ = ["available_bytes", "facts", "pin_to_cores", "touch_memory", "usable_cores"]
+__all__ = ["facts", "pin_to_cores", "touch_memory", "usable_cores"]
 
 
 def pin_to_cores(cores: Sequence[int]) -> bool:
@@ -32,14 +32,6 @@ def usable_cores() -> list[int]:
     if not hasattr(os, "sched_getaffinity"):
         return list(range(os.cpu_count() or 1))[::-1]
     return sorted(os.sched_getaffinity(0), reverse=True)
-
-
-def available_bytes() -> int:
-    """Return how much memory may be used without swapping, 2 GiB where it is not known."""
-    for line in _read("/proc/meminfo").splitlines():
-        if line.startswith("MemAvailable:"):
-            return int(line.split()[1]) * 1024
-    return 2 << 30
 
 
 def touch_memory(n_bytes: int) -> None:

@@ -12,9 +12,9 @@ import numpy as np
 
 from libraries.agreement import Verdict, compare, compare_counts, compare_nearest
 from libraries.contestant import Call, Contestant, Halfshell
-from libraries.full_peers import for_scene, ours_for
+from libraries.peers import for_scene, ours_for
 from measure.turns import Turn, plan_turn, single_calls, take_turns
-from pages.report import OURS, Measurement
+from pages import OURS, Measurement
 from scenes import Scene, load
 
 __all__ = ["Patience", "measure_scene"]
@@ -139,8 +139,8 @@ def _check(
             contestant.float_bits,
         )  # fmt: skip
     verdict = compare(
-        scene, same_rule.keys(plain, answer), contestant.keys(scene, result),
-        contestant.inclusive, contestant.band(scene), scene.has_images,
+        scene, same_rule.rows(plain, answer), contestant.rows(scene, result),
+        contestant.inclusive, contestant.band(scene),
     )  # fmt: skip
     if verdict.ours_wrong:
         print(f"  {contestant.name} is right on {verdict.ours_wrong} pairs, halfshell wrong")

@@ -23,7 +23,8 @@ from typing import Any
 
 import numpy as np
 
-from measure.machine import available_bytes, touch_memory
+from halfshell import _core
+from measure.machine import touch_memory
 
 __all__ = ["Timing", "Turn", "bytes_held", "plan_turn", "single_calls", "take_turns"]
 
@@ -122,7 +123,7 @@ def take_turns(turns: Mapping[str, Turn], keep: bool, budget: int = 1 << 30, see
             if keep:
                 # A virtual machine hands pages that lie idle back to its host; the search and
                 # its result must find theirs in place.
-                touch_memory(min(3 * turns[name].n_bytes, available_bytes() // 2))
+                touch_memory(min(3 * turns[name].n_bytes, int(_core.available_memory()) // 2))
             seconds, results = _time(turns[name], keep)
             timings[name].seconds.append(seconds)
             if not keep:

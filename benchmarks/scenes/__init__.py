@@ -10,11 +10,8 @@ Coordinates are the same bits on every machine, so `Scene.digest` may be compare
 machines.
 """
 
-# In this order they are run and listed.
-from scenes import main, small, crystals, uniform, sparse  # noqa: F401, I001
-from scenes import contacts, sets, histograms, order, nearest, reach  # noqa: F401
-from scenes.registry import GROUPS, SCENES, TITLES, known, load
-from scenes.scene import Limit, Scene
+from scenes import named  # noqa: F401 - whose scenes are added
+from scenes.scene import GROUPS, SCENES, TITLES, Limit, Scene, known, load
 
 __all__ = ["GROUPS", "QUICK", "SCENES", "TITLES", "Limit", "Scene", "known", "load"]
 

@@ -993,16 +993,6 @@ hs_py_call_take(hs_py_call *call, Py_ssize_t n_arguments)
     return true;
 }
 
-PyObject *
-hs_py_call_raise(hs_py_call *call, hs_status status)
-{
-    const hs_each_system *each = &call->each;
-    if (each->rows == NULL && each->cutoffs == NULL && each->periodic == NULL) {
-        call->failure.system = -1; /* systems are named where each has something of its own */
-    }
-    return hs_raise(status, &call->failure, &call->options);
-}
-
 void
 hs_py_call_end(hs_py_call *call)
 {
@@ -1026,4 +1016,19 @@ hs_py_call_acquire(hs_py_call *call)
         PyEval_RestoreThread(call->thread);
         call->thread = NULL;
     }
+}
+
+bool
+hs_py_call_done(hs_py_call *call, hs_status status)
+{
+    const hs_each_system *each = &call->each;
+    hs_py_call_acquire(call);
+    if (status == HS_OK) {
+        return true;
+    }
+    if (each->rows == NULL && each->cutoffs == NULL && each->periodic == NULL) {
+        call->failure.system = -1; /* systems are named where each has something of its own */
+    }
+    (void)hs_raise(status, &call->failure, &call->options);
+    return false;
 }

@@ -59,13 +59,13 @@ bool hs_py_call_take(hs_py_call *call, Py_ssize_t n_arguments);
 /* Takes points, box and axes that repeat, and nothing else, in the same way. */
 bool hs_py_call_scene(hs_py_call *call, PyObject *points, PyObject *box, PyObject *periodic);
 
-/* The exception for a status other than HS_OK; NULL. */
-PyObject *hs_py_call_raise(hs_py_call *call, hs_status status);
-
 /* Release and take the GIL around a call of the core; poll() takes it in between. With few points
  * it stays taken until the first poll: handing it over costs a tenth of a small search. */
 void hs_py_call_release(hs_py_call *call);
 void hs_py_call_acquire(hs_py_call *call);
+
+/* Takes the GIL, if it is free. False with an exception set for a status other than HS_OK. */
+bool hs_py_call_done(hs_py_call *call, hs_status status);
 
 /* Gives back what the arguments took. */
 void hs_py_call_end(hs_py_call *call);

@@ -93,6 +93,7 @@ static const hs_capi table = {
     .dynamic_hook = hs_dynamic_hook,
     .box_places = hs_box_places,
     .dynamic_cell_of = hs_dynamic_cell_of,
+    .few_pairs = hs_few_pairs,
 };
 
 int

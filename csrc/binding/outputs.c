@@ -279,9 +279,8 @@ out_filled(PyObject *out, const char *letters, int64_t n_pairs)
 PyObject *
 hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs, bool is_table)
 {
-    hs_py_call_acquire(call);
-    if (status != HS_OK) {
-        return hs_py_call_raise(call, status);
+    if (!hs_py_call_done(call, status)) {
+        return NULL;
     }
     PyObject *arrays = call->out != NULL
                            ? out_filled(call->out, call->letters, hs_pairs_length(pairs))
@@ -289,6 +288,15 @@ hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs, bool is_ta
                                           call->options.index_bytes, is_table);
     hs_pairs_free(pairs);
     return arrays;
+}
+
+PyObject *
+hs_py_call_filled(hs_py_call *call, hs_status status, PyObject *array)
+{
+    if (!hs_py_call_done(call, status)) {
+        Py_CLEAR(array);
+    }
+    return array;
 }
 
 PyObject *

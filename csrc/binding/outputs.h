@@ -29,6 +29,9 @@ PyObject *hs_read_only(PyObject *arrays);
  * `out`; NULL with an exception set for a status other than HS_OK. */
 PyObject *hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs, bool is_table);
 
+/* The same for an array that the core has filled, or has failed to; takes the reference. */
+PyObject *hs_py_call_filled(hs_py_call *call, hs_status status, PyObject *array);
+
 /* An array with a copy of what is there; a new reference or NULL. */
 PyObject *hs_array_like(const void *data, int n_dimensions, npy_intp *shape, int type);
 

@@ -28,9 +28,8 @@ hs_py_cells_build(hs_py_call *call)
     hs_py_call_release(call);
     const hs_status status =
         hs_cells_build(&call->points.at, call->among.box, &call->options, &cells, &call->failure);
-    hs_py_call_acquire(call);
-    if (status != HS_OK) {
-        return hs_py_call_raise(call, status);
+    if (!hs_py_call_done(call, status)) {
+        return NULL;
     }
     PyObject *capsule = PyCapsule_New(cells, HS_CELLS_NAME, free_cells);
     if (capsule == NULL) {
@@ -98,33 +97,17 @@ hs_py_cells_layout(PyObject *module, PyObject *capsule)
 }
 
 PyObject *
-hs_py_cells_find(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+hs_py_cells_find(hs_py_call *call)
 {
-    const hs_cells *cells = n_arguments == 2 ? hs_cells_of(arguments[0]) : NULL;
-    hs_points       points, own;
-    hs_failure      failure;
-    (void)module;
-    if (cells != NULL) {
-        hs_cells_points(cells, &own);
-    }
-    if (!hs_expect("cells_find", cells != NULL && hs_points_of(arguments[1], &points) &&
-                                     points.ndim == own.ndim)) {
-        return NULL;
-    }
-    npy_intp  n = (npy_intp)points.n;
-    PyObject *found = PyArray_SimpleNew(1, &n, NPY_INT64);
+    npy_intp  n = (npy_intp)call->queries.at.n;
+    PyObject *found = call->among.cells != NULL ? PyArray_SimpleNew(1, &n, NPY_INT64) : NULL;
     if (found == NULL) {
         return NULL;
     }
-    hs_status status;
-    Py_BEGIN_ALLOW_THREADS
-    status = hs_cells_find(cells, &points, PyArray_DATA((PyArrayObject *)found), &failure);
-    Py_END_ALLOW_THREADS
-    if (status != HS_OK) {
-        Py_DECREF(found);
-        return hs_raise(status, &failure, NULL);
-    }
-    return found;
+    hs_py_call_release(call);
+    const hs_status status = hs_cells_find(call->among.cells, &call->queries.at,
+                                           PyArray_DATA((PyArrayObject *)found), &call->failure);
+    return hs_py_call_filled(call, status, found);
 }
 
 PyObject *
@@ -179,8 +162,7 @@ hs_py_verlet_update(hs_py_call *call)
     const hs_status status = hs_verlet_update(list, &call->points.at, call->among.box,
                                               &call->options, call->real, call->flag, &rebuilt,
                                               &call->failure);
-    hs_py_call_acquire(call);
-    return status == HS_OK ? PyBool_FromLong(rebuilt) : hs_py_call_raise(call, status);
+    return hs_py_call_done(call, status) ? PyBool_FromLong(rebuilt) : NULL;
 }
 
 PyObject *

@@ -62,11 +62,10 @@ hs_py_search hs_py_iter_pairs, hs_py_for_each_pair;
 PyObject *hs_py_next_block(PyObject *module, PyObject *const *arguments, Py_ssize_t n);
 
 /* py_cells.c */
-hs_py_search hs_py_cells_build, hs_py_cells_candidates, hs_py_verlet_update, hs_py_verlet_pairs;
+hs_py_search hs_py_cells_build, hs_py_cells_find, hs_py_cells_candidates, hs_py_verlet_update,
+    hs_py_verlet_pairs;
 /* cells -> dict of what is visible of them; the arrays are read-only and borrow from the cells. */
 PyObject *hs_py_cells_layout(PyObject *module, PyObject *cells);
-/* cells, points -> the cell of each point. */
-PyObject *hs_py_cells_find(PyObject *module, PyObject *const *arguments, Py_ssize_t n);
 /* A new list; a list -> dict of its state. */
 PyObject *hs_py_verlet_new(PyObject *module, PyObject *ignored);
 PyObject *hs_py_verlet_look(PyObject *module, PyObject *list);
@@ -83,6 +82,18 @@ hs_py_search hs_py_connect, hs_py_connect_search, hs_py_overlap, hs_py_intersect
 /* points, p, q -> bools; points, low, high -> keys. */
 PyObject *hs_py_feet_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n);
 PyObject *hs_py_morton_keys(PyObject *module, PyObject *const *arguments, Py_ssize_t n);
+
+/* py_containers.c */
+/* offsets or None, i or None, j, d or None -> lists of the numbers in each row; or pairs (i, j) in
+ * a set, or with d in a dictionary. */
+PyObject *hs_py_contain(PyObject *module, PyObject *const *arguments, Py_ssize_t n);
+/* Where rows begin, int32 -> each entry and each other one of its row, arrays of int32; None for
+ * very many, and for what is no such array. */
+PyObject *hs_py_triplets(PyObject *module, PyObject *starts);
+/* points, queries or None, periods or None, cutoff, p, eps, letter -> what hs_few_pairs finds; by
+ * its letter "n" how many, "s" a set, "d" a dictionary, "l" lists, "P" an array of pairs, "b" this
+ * and d, "a" arrays i, j, d. None if it is for a search, or for SciPy, with p or eps of its own. */
+PyObject *hs_py_few(PyObject *module, PyObject *const *arguments, Py_ssize_t n);
 
 /* py_dynamic.c: dim, cell_size, box or None, periodic (bits), storage (a number), max_radius or 0,
  * inclusive, tagged, what makes arrays of positions -> a list. */

@@ -132,9 +132,8 @@ pairs_of(hs_connectivity *made, int ndim)
 static PyObject *
 give_rows(hs_py_call *call, hs_status status, hs_pairs *rows, int ndim)
 {
-    hs_py_call_acquire(call);
-    if (status != HS_OK) {
-        return hs_py_call_raise(call, status);
+    if (!hs_py_call_done(call, status)) {
+        return NULL;
     }
     PyObject *arrays = rows_of(rows, ndim);
     hs_pairs_free(rows);
@@ -146,9 +145,8 @@ enum { ROWS_WANTED = 1, PAIRS_WANTED = 2 };
 static PyObject *
 give_parts(hs_py_call *call, hs_status status, hs_connectivity *made, int wanted, int ndim)
 {
-    hs_py_call_acquire(call);
-    if (status != HS_OK) {
-        return hs_py_call_raise(call, status);
+    if (!hs_py_call_done(call, status)) {
+        return NULL;
     }
     PyObject *rows = wanted & ROWS_WANTED ? rows_of(hs_connectivity_rows(made), ndim)
                                           : Py_NewRef(Py_None);

@@ -75,24 +75,14 @@ hs_py_nearest(hs_py_call *call)
     hs_py_call_release(call);
     const hs_status status =
         hs_nearest_find(&call->among, call->integer, &call->options, &rows, &call->failure);
-    hs_py_call_acquire(call);
-    return status == HS_ERR_MEMORY ? raise_memory_of_rows(&call->failure)
-                                   : hs_py_call_pairs(call, status, rows, false);
+    if (status == HS_ERR_MEMORY) {
+        hs_py_call_acquire(call);
+        return raise_memory_of_rows(&call->failure);
+    }
+    return hs_py_call_pairs(call, status, rows, false);
 }
 
 /* ---- counts ------------------------------------------------------------------------------- */
-
-/* What the core has filled, or has failed to; takes the reference. */
-static PyObject *
-filled(hs_py_call *call, hs_status status, PyObject *array)
-{
-    hs_py_call_acquire(call);
-    if (status != HS_OK) {
-        Py_DECREF(array);
-        return hs_py_call_raise(call, status);
-    }
-    return array;
-}
 
 /* A number, or that of each system. */
 PyObject *
@@ -110,10 +100,9 @@ hs_py_count_pairs(hs_py_call *call)
                                             is_batch ? PyArray_DATA((PyArrayObject *)counts) : &n,
                                             &call->failure);
     if (is_batch) {
-        return filled(call, status, counts);
+        return hs_py_call_filled(call, status, counts);
     }
-    hs_py_call_acquire(call);
-    return status == HS_OK ? PyLong_FromLongLong(n) : hs_py_call_raise(call, status);
+    return hs_py_call_done(call, status) ? PyLong_FromLongLong(n) : NULL;
 }
 
 PyObject *
@@ -128,7 +117,7 @@ hs_py_coordination(hs_py_call *call)
     hs_py_call_release(call);
     const hs_status status = hs_neighbors_count(
         &call->among, &call->options, PyArray_DATA((PyArrayObject *)counts), &call->failure);
-    return filled(call, status, counts);
+    return hs_py_call_filled(call, status, counts);
 }
 
 /* ---- pairs by distance -------------------------------------------------------------------- */
@@ -164,7 +153,7 @@ hs_py_histogram(hs_py_call *call)
     hs_py_call_release(call);
     const hs_status status =
         hs_pairs_histogram(&call->among, &call->options, &wanted, &call->failure);
-    return filled(call, status, array);
+    return hs_py_call_filled(call, status, array);
 }
 
 /* ---- clusters ----------------------------------------------------------------------------- */
@@ -187,9 +176,9 @@ hs_py_clusters(hs_py_call *call)
         hs_py_call_release(call);
         const hs_status status = hs_clusters_find(&call->among, &call->options, core, to, bits,
                                                   &n_clusters, &call->failure);
-        hs_py_call_acquire(call);
-        result = status == HS_OK ? Py_BuildValue("LOO", (long long)n_clusters, labels, winding)
-                                 : hs_py_call_raise(call, status);
+        if (hs_py_call_done(call, status)) {
+            result = Py_BuildValue("LOO", (long long)n_clusters, labels, winding);
+        }
     }
     Py_XDECREF(labels);
     Py_XDECREF(winding);
@@ -200,9 +189,10 @@ hs_py_clusters(hs_py_call *call)
 
 /* What is said of a pair, and not of a point. */
 static PyObject *
-raise_of_pair(hs_status status, hs_py_call *call)
+raise_of_pair(hs_py_call *call, hs_status status)
 {
     const long long row = (long long)call->failure.row;
+    hs_py_call_acquire(call);
     if (row >= 0 && status == HS_ERR_SHIFT_RANGE) {
         PyErr_Format(PyExc_OverflowError,
                      "pair %lld: a point lies too many box vectors away: they are counted up to "
@@ -216,7 +206,7 @@ raise_of_pair(hs_status status, hs_py_call *call)
                      "2**62, 0 along axes that do not repeat",
                      row);
     } else {
-        return hs_py_call_raise(call, status);
+        (void)hs_py_call_done(call, status);
     }
     return NULL;
 }
@@ -254,8 +244,7 @@ hs_py_measure(hs_py_call *call)
     hs_py_call_release(call);
     const hs_status status = hs_measure(&call->points.at, call->among.box, &pairs, &call->options,
                                         &measured, &call->failure);
-    hs_py_call_acquire(call);
-    return status != HS_OK ? raise_of_pair(status, call)
+    return status != HS_OK ? raise_of_pair(call, status)
                            : hs_py_call_pairs(call, status, measured, false);
 }
 
@@ -335,8 +324,7 @@ hs_py_explain(hs_py_call *call)
         call->options.counters = &counters;
         status = hs_pairs_find(&call->among, &call->options, &pairs, &call->failure);
     }
-    hs_py_call_acquire(call);
     hs_pairs_free(pairs);
-    return status == HS_OK ? dictionary_of(&plan, call->flag ? &counters : NULL)
-                           : hs_py_call_raise(call, status);
+    return hs_py_call_done(call, status) ? dictionary_of(&plan, call->flag ? &counters : NULL)
+                                         : NULL;
 }

@@ -89,10 +89,9 @@ hs_py_iter_pairs(hs_py_call *call)
     hs_py_call_release(call);
     const hs_status status =
         hs_stream_open(&call->among, &call->options, call->integer, &self->stream, &call->failure);
-    hs_py_call_acquire(call);
-    if (status != HS_OK) {
+    if (!hs_py_call_done(call, status)) {
         Py_DECREF(capsule);
-        return hs_py_call_raise(call, status);
+        return NULL;
     }
     self->call = *call;
     self->call.n_made = 0; /* what is made is the caller's again */
@@ -198,41 +197,14 @@ call_python(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user
     return stops;
 }
 
-/* A compiled function, which several threads may call. */
-typedef struct compiled {
-    hs_pair_fn pair;
-    void      *user;
-    int        ndim;
-} compiled;
-
-/* An hs_pairs_fn. */
-static int
-call_compiled(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user)
-{
-    compiled      *to_call = user;
-    const int64_t *i = pairs->i, *j = pairs->j;
-    const int      ndim = to_call->ndim;
-    for (int64_t e = 0; e < n; e++) {
-        const double d = pairs->distance[e];
-        if (to_call->pair(i[e], j[e], pairs->shift + e * ndim, pairs->vector + e * ndim, d * d,
-                          to_call->user) != 0) {
-            *n_taken = e + 1;
-            return 1;
-        }
-    }
-    return 0;
-}
-
 /* What shall be called, by the address of a function or a callable. */
 static bool
-take_function(PyObject *const *arguments, callable *to_call, compiled *to_run, hs_visit *visit)
+take_function(PyObject *const *arguments, callable *to_call, hs_visit *visit)
 {
     if (PyLong_Check(arguments[0])) {
         const uintptr_t address = (uintptr_t)PyLong_AsVoidPtr(arguments[0]);
-        to_run->pair = (hs_pair_fn)address;
-        to_run->user = PyLong_AsVoidPtr(arguments[1]);
-        visit->pairs = call_compiled;
-        visit->user = to_run;
+        visit->pair = (hs_pair_fn)address;
+        visit->user = PyLong_AsVoidPtr(arguments[1]);
     } else {
         visit->pairs = call_python;
         visit->user = to_call;
@@ -244,15 +216,14 @@ PyObject *
 hs_py_for_each_pair(hs_py_call *call)
 {
     callable to_call = {0};
-    compiled to_run = {0};
     hs_visit visit = {0};
     int64_t  n = 0;
-    if (!take_function(call->own, &to_call, &to_run, &visit)) {
+    if (!take_function(call->own, &to_call, &visit)) {
         return NULL;
     }
     visit.thread_safe = call->flag;
     to_call.function = call->own[0];
-    to_call.ndim = to_run.ndim = call->points.at.ndim;
+    to_call.ndim = call->points.at.ndim;
     call->thread = PyEval_SaveThread(); /* also with few points: other threads may need it */
     const hs_status status =
         hs_pairs_visit(&call->among, &call->options, &visit, &n, &call->failure);
@@ -264,5 +235,5 @@ hs_py_for_each_pair(hs_py_call *call)
     Py_XDECREF(to_call.type);
     Py_XDECREF(to_call.value);
     Py_XDECREF(to_call.traceback);
-    return status == HS_OK ? PyLong_FromLongLong(n) : hs_py_call_raise(call, status);
+    return hs_py_call_done(call, status) ? PyLong_FromLongLong(n) : NULL;
 }

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from halfshell._check.verify import Verdict, verify
     from halfshell._convert.memory import CacheInfo, cache_info, clear_cache, set_cache_limit
     from halfshell._convert.points import Points
-    from halfshell._functions.bricks import bricks
+    from halfshell._functions.bricks import Brick, Bricks, bricks
     from halfshell._functions.clusters import Clusters, clusters
     from halfshell._functions.counts import count_pairs, pair_histogram
     from halfshell._functions.explain import Explanation, explain
@@ -51,7 +51,6 @@ if TYPE_CHECKING:
     from halfshell._functions.trajectory import trajectory_pairs
     from halfshell._machine import get_include
     from halfshell._objects.box import Box
-    from halfshell._objects.brick import Brick, Bricks
     from halfshell._objects.cell_list import CellList
     from halfshell._objects.connectivity import Connectivity
     from halfshell._objects.dynamic_cell_list import DynamicCellList
@@ -115,7 +114,7 @@ _LATER = {
     "_check.verify": "Verdict verify",
     "_convert.memory": "CacheInfo cache_info clear_cache set_cache_limit",
     "_convert.points": "Points",
-    "_functions.bricks": "bricks",
+    "_functions.bricks": "Brick Bricks bricks",
     "_functions.clusters": "Clusters clusters",
     "_functions.counts": "count_pairs pair_histogram",
     "_functions.explain": "Explanation explain",
@@ -125,7 +124,6 @@ _LATER = {
     "_functions.trajectory": "trajectory_pairs",
     "_machine": "get_include",
     "_objects.box": "Box",
-    "_objects.brick": "Brick Bricks",
     "_objects.cell_list": "CellList",
     "_objects.connectivity": "Connectivity",
     "_objects.dynamic_cell_list": "DynamicCellList",

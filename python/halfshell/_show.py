@@ -9,7 +9,6 @@ Nothing is computed for it, and no colour is set: a notebook's own are used.
 
 from __future__ import annotations
 
-from dataclasses import fields, is_dataclass
 from operator import attrgetter
 from typing import Any
 
@@ -56,9 +55,8 @@ def attribute(path: str, doc: str | None = None) -> Any:
 def facts(value: Any) -> list[tuple[str, str]]:
     """The attributes to show, by name, as text; none for a class without `_shown` and fields."""
     kind = type(value)
-    names = getattr(kind, "_shown", None) or getattr(kind, "_fields", None)
-    if names is None:
-        names = [field.name for field in fields(value)] if is_dataclass(value) else []
+    of_kind = ("_shown", "_fields", "__dataclass_fields__")
+    names = next((list(getattr(kind, one)) for one in of_kind if hasattr(kind, one)), [])
     told = ((name, getattr(value, name)) for name in names)
     return [
         (name, _brief(each)) for name, each in told

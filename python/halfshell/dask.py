@@ -26,6 +26,8 @@ from halfshell._convert.points import MAX_DIM
 from halfshell._convert.points import Points as _Points
 from halfshell._errors import needs
 from halfshell._functions.bricks import (
+    Brick,
+    Bricks,
     Division,
     Part,
     Piece,
@@ -40,7 +42,6 @@ from halfshell._functions.bricks import (
 from halfshell._functions.counts import count_pairs as _count_pairs
 from halfshell._functions.counts import pair_histogram as _pair_histogram
 from halfshell._functions.neighbors import coordination as _coordination
-from halfshell._objects.brick import Brick, Bricks
 from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._search import document, spell_out
 from halfshell._settings import current, settings

@@ -13,6 +13,7 @@ from halfshell._convert.points import Points
 from halfshell._convert.types import BoxLike, CutoffLike, PeriodicLike, PointsLike, Rule
 from halfshell._functions.bricks import (
     FIELDS,
+    Brick,
     Division,
     Summary,
     Terms,
@@ -21,7 +22,6 @@ from halfshell._functions.bricks import (
     split,
     summary,
 )
-from halfshell._objects.brick import Brick
 
 __all__ = ["Exchanged", "exchange"]
 

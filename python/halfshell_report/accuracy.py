@@ -3,24 +3,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from halfshell._convert.arrays import are_backward, row_keys
 from halfshell_report.integers import nearest_float, nearest_root
 from halfshell_report.truth import Pairs, Truth, exact_vectors
 
 __all__ = [
-    "Answer", "PairErrors", "Sample", "pair_errors", "quantity_errors", "row_keys", "sample_of",
+    "Answer", "PairErrors", "Sample", "pair_errors", "quantity_errors", "sample_of",
 ]  # fmt: skip
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
-
-_KEY_SIZE = 2**62  # a key is less than this, so that twice a key fits int64
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,50 +64,10 @@ class Halved:
     def of(cls, i: NDArray[Any], j: NDArray[Any], S: NDArray[Any] | None) -> Halved:
         """Turn what has to be turned."""
         i, j = i.astype(np.int64), j.astype(np.int64)
-        turned = i > j
-        shifts: Sequence[NDArray[Any]] = ()
-        if S is not None:
-            same = i == j
-            for column in S.T:
-                turned |= same & (column < 0)
-                same = same & (column == 0)
-            sign = np.where(turned, -1, 1)
-            shifts = [sign * column for column in S.T]
+        turned = are_backward(i, j, S)
+        sign = np.where(turned, -1, 1)
+        shifts = [] if S is None else [sign * column for column in S.T]
         return cls([np.minimum(i, j), np.maximum(i, j), *shifts], turned)
-
-
-def row_keys(*tables: Sequence[NDArray[Any]]) -> list[Ints]:
-    """Number the rows of tables with the same columns: equal rows have equal keys.
-
-    Examples
-    --------
-    >>> first, second = row_keys([np.array([1, 2]), np.array([0, 9])],
-    ...                          [np.array([2]), np.array([9])])
-    >>> bool(first[1] == second[0]), bool(first[0] == second[0])
-    (True, False)
-    """
-    ends = np.cumsum([len(table[0]) for table in tables])
-    keys = np.zeros(int(ends[-1]), dtype=np.int64)
-    size = 1
-    for parts in zip(*tables, strict=True):
-        column = np.concatenate(parts)
-        if not len(column):
-            continue
-        low = column.min()
-        span = int(column.max()) - int(low) + 1
-        if size * span >= _KEY_SIZE:
-            keys, size = _renumbered(keys)
-        if size * span >= _KEY_SIZE:
-            column, span = _renumbered(column)
-            low = 0
-        keys = keys * span + (column - low).astype(np.int64)
-        size *= span
-    return np.split(keys, ends[:-1])
-
-
-def _renumbered(values: NDArray[Any]) -> tuple[Ints, int]:
-    unique, numbers = np.unique(values, return_inverse=True)
-    return numbers.reshape(-1).astype(np.int64), len(unique)
 
 
 SAMPLED = 2000  # pairs whose distance is worked out in rational arithmetic

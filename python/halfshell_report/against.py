@@ -5,9 +5,6 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +14,7 @@ from halfshell._cli.structure_files import Scene
 from halfshell._errors import how_to_install
 from halfshell_report.peers import LIBRARIES, Library, Question, wrapped
 
-__all__ = ["PEERS", "Peer", "ask_peer", "find_peer"]
+__all__ = ["PEERS", "ask_peer", "find_peer", "name_and_version"]
 
 Ints = NDArray[np.int64]
 #: i, j and S; whether pairs at exactly the cutoff count, and whether both directions are there.
@@ -59,59 +56,44 @@ def _question(scene: Scene, cutoff: float, quantities: str) -> Question:
                     quantities)  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Peer:
-    """Another library: what to import, what to install, how to ask it."""
-
-    modules: tuple[str, ...]
-    package: str
-    ask: Callable[[Scene, float], Rows]
-
-    def name_and_version(self) -> str:
-        """Return the name of the package with its version, if it has one."""
-        try:
-            return f"{self.package} {importlib.metadata.version(self.package)}"
-        except importlib.metadata.PackageNotFoundError:
-            return self.package
-
-
-def _peer(name: str, ask: Callable[[Library, Scene, float], Rows]) -> Peer:
-    library = LIBRARIES[name]
-    return Peer((library.module,), library.distribution, partial(ask, library))
-
-
+#: What can be asked for a list, by the names that users know.
 PEERS = {
-    "ase": _peer("ase", _ask),
-    "matscipy": _peer("matscipy", _ask),
-    "matscipy-neighbours": _peer("matscipy-neighbours", _ask),
-    "scipy": _peer("cKDTree", _ask_scipy),
-    "vesin": _peer("vesin", _ask),
+    "scipy" if name == "cKDTree" else name: LIBRARIES[name]
+    for name in ("ase", "matscipy", "matscipy-neighbours", "cKDTree", "vesin")
 }
 
 
-def find_peer(name: str) -> Peer:
+def find_peer(name: str) -> Library:
     """Return a library by its name, or say how to install it."""
     if name not in PEERS:
         raise InputError(f"--against {name}: is not one of {', '.join(PEERS)}")
-    peer = PEERS[name]
+    library = PEERS[name]
     try:
-        for module in peer.modules:
-            importlib.import_module(module)
+        importlib.import_module(library.module)
     except ImportError:
         raise InputError(
-            f"--against {name}: is not installed: {how_to_install(peer.package)}"
+            f"--against {name}: is not installed: {how_to_install(library.distribution)}"
         ) from None
-    return peer
+    return library
 
 
-def ask_peer(peer: Peer, scene: Scene, cutoff: float) -> Rows:
-    """Return the list of a library for a scene."""
+def name_and_version(library: Library) -> str:
+    """Return the name of the package with its version, if it has one."""
     try:
-        return peer.ask(scene, cutoff)
+        return f"{library.distribution} {importlib.metadata.version(library.distribution)}"
+    except importlib.metadata.PackageNotFoundError:
+        return library.distribution
+
+
+def ask_peer(library: Library, scene: Scene, cutoff: float) -> Rows:
+    """Return the list of a library for a scene."""
+    ask = _ask if "S" in library.quantities else _ask_scipy
+    try:
+        return ask(library, scene, cutoff)
     except (InputError, MemoryError):
         raise
     except Exception as error:  # a library may refuse a scene in any way
         raise InputError(
-            f"{scene.source}: {peer.package} returned no list: "
+            f"{scene.source}: {library.distribution} returned no list: "
             f"{type(error).__name__}: {one_line(error)}"
         ) from None

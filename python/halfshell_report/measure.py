@@ -39,7 +39,7 @@ from halfshell import _core
 from halfshell._errors import how_to_install
 from halfshell._machine import cpu_name, usable_cpus
 from halfshell_report.accuracy import Answer
-from halfshell_report.peers import LIBRARIES, Question, wrapped
+from halfshell_report.peers import LIBRARIES, Question, pin_threads, wrapped
 
 __all__ = [
     "METHODS", "PRECISIONS", "REUSE", "Patience", "PeerProcess", "Timing", "answer_of",
@@ -207,11 +207,9 @@ def _limit_memory() -> None:
     try:
         import resource
 
-        with open("/proc/meminfo", encoding="ascii") as lines:
-            free = next(line for line in lines if line.startswith("MemAvailable:"))
-        limit = int(_MEMORY_SHARE * int(free.split()[1]) * 1024)
+        limit = int(_MEMORY_SHARE * _core.available_memory())
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    except (ImportError, OSError, StopIteration, ValueError):
+    except (ImportError, OSError, ValueError):
         return  # not on every system
 
 
@@ -269,9 +267,7 @@ def _timed(call: Callable[[], Any]) -> tuple[float, Any]:
 
 def serve(name: str) -> int:
     """Answer requests until the other side closes; return the exit status."""
-    # To be set before any library is imported.
-    for variable in ("OMP", "RAYON", "OPENBLAS", "MKL", "NUMEXPR", "NUMBA", "TBB"):
-        os.environ[f"{variable}_NUM_THREADS"] = "1"
+    pin_threads()
     replies = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     requests = sys.stdin.buffer

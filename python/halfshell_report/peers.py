@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -24,7 +25,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["LIBRARIES", "Call", "Library", "Question", "in_space", "wrapped"]
+__all__ = ["LIBRARIES", "Call", "Library", "Question", "in_space", "pin_threads", "wrapped"]
 
 Call = Callable[[], Any]
 Floats = NDArray[np.float64]
@@ -169,6 +170,12 @@ class Library(ABC):
         return result[3]
 
 
+def pin_threads() -> None:
+    """Hold every library to one thread. To be called before any of them is imported."""
+    for name in ("OMP", "RAYON", "OPENBLAS", "MKL", "NUMEXPR", "NUMBA", "TBB"):
+        os.environ[f"{name}_NUM_THREADS"] = "1"
+
+
 def in_space(question: Any) -> tuple[Floats, Floats | None, list[bool]]:
     """Points, rows of the box and periodic axes, what is flat laid at 0 in a slab open there."""
     rows, periodic = question.rows, list(question.periodic) or [False] * question.dim
@@ -242,15 +249,17 @@ class CKDTree(Library):
     supports = True
     remark_on_supports = "all pairs within the largest reach, then |H D| in float64"
 
-    def prepare(self, question: Any) -> Call:
-        """Build the cheaper, unbalanced tree and query it."""
+    def tree(self, question: Any, points: Any) -> Call:
+        """Return what builds the cheaper, unbalanced tree of points."""
         tree = importlib.import_module("scipy.spatial").cKDTree
         lengths = None
         if question.rows is not None:
             lengths = np.where(question.periodic, np.diag(question.rows), 0.0)
-        build = partial(
-            tree, question.points, boxsize=lengths, balanced_tree=False, compact_nodes=False
-        )
+        return partial(tree, points, boxsize=lengths, balanced_tree=False, compact_nodes=False)
+
+    def prepare(self, question: Any) -> Call:
+        """Build a tree and query it."""
+        build = self.tree(question, question.points)
         if question.task == "count":
 
             def count() -> int:
@@ -404,10 +413,15 @@ class Freud(Library):
     quantities = "ijdD"
     remark = "computes in float32; without a box its points are centred in one beforehand"
 
-    def prepare(self, question: Any) -> Call:
-        """Use its tree, faster than its cell list; open space is a wide box round the origin."""
+    def library(self) -> Any:
+        """Return the library, told to use one thread."""
         freud = importlib.import_module("freud")
         freud.parallel.set_num_threads(1)
+        return freud
+
+    def prepare(self, question: Any) -> Call:
+        """Use its tree, faster than its cell list; open space is a wide box round the origin."""
+        freud = self.library()
         given, rows = question.points, question.rows
         if rows is None:
             low, high = given.min(axis=0), given.max(axis=0)

@@ -4,16 +4,15 @@
 from __future__ import annotations
 
 import csv
-import math
 import types
 import typing
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from typing import IO, Any
 
 from halfshell import _show
 
-__all__ = ["STATUSES", "ReportRow", "read_csv", "write_csv"]
+__all__ = ["STATUSES", "ReportRow", "parsed", "read_csv", "write_csv"]
 
 #: What can become of a method on a scene.
 STATUSES = (
@@ -162,17 +161,20 @@ def read_csv(stream: IO[str]) -> tuple[dict[str, str], list[ReportRow]]:
     rows = []
     for line in csv.DictReader(stream):
         facts = {name: text for name, text in line.items() if name not in _TYPES}
-        rows.append(ReportRow(**{name: _parsed(name, line[name]) for name in _TYPES}))
+        rows.append(ReportRow(**{name: parsed(kind, line[name]) for name, kind in _TYPES.items()}))
     return facts, rows
 
 
-def _parsed(name: str, text: str) -> Any:
-    kinds: Sequence[type] = (_TYPES[name],)
-    if isinstance(_TYPES[name], types.UnionType):
-        kinds = typing.get_args(_TYPES[name])
+def parsed(kind: Any, text: str) -> Any:
+    """Return the value of a field of this type; None where there is none, and the type allows it.
+
+    Raises ValueError for what is no number.
+    """
+    kinds = typing.get_args(kind) if isinstance(kind, types.UnionType) else (kind,)
     if str in kinds:
         return text
-    if not text:
+    if not text and types.NoneType in kinds:
         return None
-    value = float(text) if float in kinds else int(text)
-    return math.inf if value == math.inf else value
+    if bool in kinds:
+        return text == "True"
+    return float(text) if float in kinds else int(text)

@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -263,9 +264,10 @@ class _Stage:
                 self._forces[answer.inclusive] = reference_forces(
                     self.truth, answer.inclusive, self.sigma
                 )
-            energy, force = force_errors(
-                self._forces[answer.inclusive], answer, _Plain(self.scene, self.rows_of_box)
+            plain = SimpleNamespace(
+                points=self.scene.points, rows=self.rows_of_box, periodic=self.scene.periodic
             )
+            energy, force = force_errors(self._forces[answer.inclusive], answer, plain)
         return replace(
             row, rule="<=" if answer.inclusive else "<",
             compared_by="i j" if answer.S is None else "i j S",
@@ -273,13 +275,6 @@ class _Stage:
             missed=errors.missed, spurious=errors.spurious, duplicate=errors.duplicate,
             energy_error=energy, force_error=force, **found,
         )  # fmt: skip
-
-
-class _Plain:
-    """A scene as `physics.vectors_of` wants it."""
-
-    def __init__(self, scene: Any, rows: Any) -> None:
-        self.points, self.rows, self.periodic = scene.points, rows, scene.periodic
 
 
 def _rows_of(scene: Any, cutoff: float) -> Any:

@@ -388,12 +388,10 @@ hs_status
 hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_options *options,
                     hs_pairs **result, hs_failure *failure)
 {
-    if (!hs_can_return(result, options) || cells == NULL) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    hs_pairs *rows = hs_pairs_begin(options, &failure);
+    hs_status status;
+    hs_pairs *rows = hs_result_begin(cells != NULL, options, result, &failure, &status);
     if (rows == NULL) {
-        return HS_ERR_MEMORY;
+        return status;
     }
     hs_search     search;
     hs_call      *call = &rows->call;
@@ -404,7 +402,7 @@ hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_op
                           .is_untested = true,
                           /* no pairs; the ranges are allocated when their number is known */
                           .keeps_none = true};
-    hs_status status = hs_check_arguments(&cells->points, queries, NULL, &call->options, failure);
+    status = hs_check_arguments(&cells->points, queries, NULL, &call->options, failure);
     if (status == HS_OK) {
         call->options.precision = cells->call.options.precision; /* no pair is decided on */
         status = hs_search_reuse(&sets, call, &search, failure);

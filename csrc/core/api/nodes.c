@@ -61,26 +61,12 @@ static hs_pairs *
 rows_begin(bool has_input, const hs_points *points, const hs_options *options, hs_pairs **result,
            hs_failure **failure, hs_status *status)
 {
-    if (!hs_can_return(result, options) || !has_input) {
-        *status = hs_end_early(HS_ERR_ARGUMENT, options, *failure);
-        return NULL;
-    }
-    hs_pairs *made = hs_pairs_begin(options, failure);
-    *status = made != NULL ? hs_check_resources(options) : HS_ERR_MEMORY;
+    hs_pairs *made = hs_result_begin(has_input, options, result, failure, status);
+    *status = made != NULL ? hs_check_resources(options) : *status;
     if (*status == HS_OK && points != NULL) {
         *status = hs_check_points(points, *failure);
     }
     return made;
-}
-
-static hs_status
-rows_end(hs_pairs *made, hs_status status, hs_pairs **result, hs_failure *failure)
-{
-    if (made == NULL) {
-        return status;
-    }
-    hs_call_tell_limit(&made->call, status, failure);
-    return hs_pairs_finish(made, status, made->output.n_pairs, result);
 }
 
 hs_status
@@ -172,7 +158,7 @@ hs_connectivity_overlap(const hs_points *points, const hs_index_rows *gather,
     if (status == HS_OK) {
         status = hs_overlap_fill(&made->call, points, gather, lists, made, failure);
     }
-    return rows_end(made, status, rows, failure);
+    return hs_result_end(made, status, rows, failure);
 }
 
 hs_status
@@ -204,7 +190,7 @@ hs_connectivity_intersect(const hs_points *points, const hs_box *box, const hs_h
         status = hs_intersection_fill(&made->call, points, &images, lists, &half, made, failure);
     }
     hs_output_free(&half);
-    return rows_end(made, status, result, failure);
+    return hs_result_end(made, status, result, failure);
 }
 
 /* ---- rows and pairs out of others ------------------------------------------------------------ */
@@ -238,7 +224,7 @@ hs_rows_keep(const hs_list_rows *rows, const hs_node_change *change, const int64
     if (status == HS_OK) {
         status = hs_kept_rows_fill(&made->call, rows, change, source, n, made);
     }
-    return rows_end(made, status, result, failure);
+    return hs_result_end(made, status, result, failure);
 }
 
 hs_status
@@ -251,7 +237,7 @@ hs_rows_without(const hs_list_rows *rows, const hs_list_rows *without, bool asce
     if (status == HS_OK) {
         status = hs_rows_without_fill(&made->call, rows, without, ascend, made);
     }
-    return rows_end(made, status, result, failure);
+    return hs_result_end(made, status, result, failure);
 }
 
 /* ---- single nodes: points are looked at one by one; nothing is allocated --------------------- */

@@ -7,11 +7,12 @@
 #include "../search/choice.h"
 #include "../histogram/histogram.h"
 
+#include <math.h>
 #include <string.h>
 
 /* pairs.c: the public searches of one call: pairs, rows, nearest points, histograms and plans. */
 
-/* The public searches: find and count. */
+/* ---- the steps of a plan: their pairs recorded, or counted ----------------------------------- */
 
 /* A hs_use_fn: pairs of the step that is open, behind those of an output; NULL: that of the run. */
 static hs_status
@@ -21,6 +22,95 @@ record_step(void *context, hs_query_run *run)
     const hs_status status = hs_estimate_by_sample(run->search, run->failure);
     return status == HS_OK ? hs_parallel_record(run->search, run->keeper, output, run->failure)
                            : status;
+}
+
+/* A hs_use_fn: the number of pairs, each once; with queries, of all neighbours of each. */
+static hs_status
+count_step(void *context, hs_query_run *run)
+{
+    (void)context;
+    return hs_parallel_count(run->search, run->keeper, &run->n_pairs, run->failure);
+}
+
+/* A hs_use_fn; context: a count of each system. */
+static hs_status
+count_pairs(void *context, hs_query_run *run)
+{
+    int64_t        *counts = context;
+    const int64_t   before = run->n_pairs;
+    const hs_status status = hs_query_each_step(run, count_step, NULL);
+    if (status == HS_OK) {
+        counts[run->system] = run->n_pairs - before;
+    }
+    return status;
+}
+
+hs_status
+hs_pairs_count(const hs_among *among, const hs_options *options, int64_t *count,
+               hs_failure *failure)
+{
+    const hs_finder finder = {.find = count_pairs, .context = count};
+    hs_query        query = hs_query_among(among, HS_HALF_OR_QUERIES, options);
+    hs_query_want_none(&query);
+    query.is_incomplete = query.is_incomplete || count == NULL;
+    return hs_query_answer(&query, &finder, NULL, failure);
+}
+
+/* ---- pairs, and rows of all neighbours of each point or query -------------------------------- */
+
+/* A hs_use_fn: the rows of a single step. */
+static hs_status
+fill_rows(void *context, hs_query_run *run)
+{
+    (void)context;
+    return hs_table_find(run->search, run->output, run->offsets, run->failure);
+}
+
+/* A hs_use_fn; counts those of a single step, to an array of all rows. */
+static hs_status
+count_rows_of_step(void *context, hs_query_run *run)
+{
+    int64_t        *counts = (int64_t *)context + run->first_asking;
+    const int64_t   n = hs_search_asking(run->search)->n;
+    const hs_status status = hs_table_count(run->search, counts, run->failure);
+    for (int64_t i = 0; status == HS_OK && i < n; i++) {
+        run->n_pairs += counts[i];
+    }
+    return status;
+}
+
+/* Rows of several steps are made of their pairs in ascending order: where the rule is the same both
+ * ways, each pair is in two of them. */
+
+/* Whether a point meets itself: in rows of one set that are not made of a half list. */
+static bool
+meets_itself(const hs_query_run *run)
+{
+    return run->has_levels && !run->levels.has_queries && !run->plan.is_half;
+}
+
+/* Whether rows are those of a single step. It goes over all points twice: where pairs have limits
+ * by radii, whose scans take long, sorting them is quicker. */
+static bool
+is_single(const hs_query_run *run)
+{
+    const hs_levels  *levels = &run->levels;
+    const hs_options *options = &run->call->options;
+    if (!run->has_levels) {
+        return true;
+    }
+    if (!hs_level_plan_is_single(&run->plan) || meets_itself(run)) {
+        return false;
+    }
+    if (!run->plan.steps[0].has_limits || (levels->cutoffs != NULL && levels->has_queries)) {
+        return true;
+    }
+    /* The rows of one search count on each point being within its limit of itself. */
+    bool has_selves = options->inclusive && options->precision == HS_EXACT;
+    for (int32_t l = 0; levels->cutoffs != NULL && l < levels->n; l++) {
+        has_selves = has_selves && levels->cutoffs[l * levels->n + l] >= 0.0;
+    }
+    return levels->cutoffs != NULL && has_selves;
 }
 
 /* Columns that put pairs of several steps in order and have all that is wanted: S where two points
@@ -56,154 +146,12 @@ record_to_sort(void *context, hs_query_run *run)
     return record_step(found, run);
 }
 
-/* Writes all pairs sorted. They are found in an output of their own, with the columns that sorting
- * needs besides. */
-static hs_status
-find_sorted(hs_query_run *run)
-{
-    hs_output found;
-    hs_output_init(&run->call->account, run->query->sets.points->ndim,
-                   run->has_levels ? columns_of(run) : 0, 4, &found);
-    hs_status status = hs_query_each_step(run, record_to_sort, &found);
-    if (status == HS_OK && found.n_pairs > 0) {
-        status = hs_sort_pairs(run->call, (int32_t)run->first_point, hs_query_asking(run->query),
-                               &found, run->output);
-    }
-    if (status == HS_ERR_MEMORY) {
-        run->failure->expected_pairs = (double)found.n_pairs;
-    }
-    hs_output_free(&found);
-    return status;
-}
-
-/* A hs_use_fn: the number of pairs, each once; with queries, of all neighbours of each. */
-static hs_status
-count_step(void *context, hs_query_run *run)
-{
-    (void)context;
-    return hs_parallel_count(run->search, run->keeper, &run->n_pairs, run->failure);
-}
-
-/* A hs_use_fn; context: a count of each system. */
-static hs_status
-count_pairs(void *context, hs_query_run *run)
-{
-    int64_t        *counts = context;
-    const int64_t   before = run->n_pairs;
-    const hs_status status = hs_query_each_step(run, count_step, NULL);
-    if (status == HS_OK) {
-        counts[run->system] = run->n_pairs - before;
-    }
-    return status;
-}
-
-hs_status
-hs_pairs_count(const hs_among *among, const hs_options *options, int64_t *count,
-               hs_failure *failure)
-{
-    const hs_finder finder = {.find = count_pairs, .context = count};
-    if (count == NULL || options == NULL) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    const hs_options counting = hs_options_of_count(options);
-    const hs_query   query = hs_query_among(among, HS_HALF_OR_QUERIES, &counting);
-    return hs_query_answer(&query, &finder, NULL, failure);
-}
-
-/* The public searches for all neighbours of each point, or of each query. */
-
-/* A hs_use_fn: the rows of a single step. */
-static hs_status
-fill_rows(void *context, hs_query_run *run)
-{
-    (void)context;
-    return hs_table_find(run->search, run->output, run->offsets, run->failure);
-}
-
-/* A hs_use_fn. */
-static hs_status
-find_pairs(void *context, hs_query_run *run)
-{
-    (void)context;
-    if (run->query->sets.is_once) { /* rows that list each pair once, without their beginnings */
-        const hs_status status = hs_query_each_step(run, fill_rows, NULL);
-        hs_output_free(run->offsets);
-        return status;
-    }
-    return run->call->options.sorted ? find_sorted(run)
-                                     : hs_query_each_step(run, record_step, NULL);
-}
-
-hs_status
-hs_pairs_find(const hs_among *among, const hs_options *options, hs_pairs **result,
-              hs_failure *failure)
-{
-    const hs_finder finder = {.find = find_pairs, .is_numbered = true};
-    if (!hs_can_return(result, options)) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    hs_options of_pairs = *options;
-    hs_query   query = hs_query_among(among, HS_HALF_LIST, &of_pairs);
-    if (options->sorted && query.reach == NULL && query.among == NULL) {
-        query.sets.is_full = query.sets.is_once = true;
-        of_pairs.sorted = false; /* table rows have an order of their own */
-    }
-    return hs_query_answer(&query, &finder, result, failure);
-}
-
-/* A hs_use_fn; counts those of a single step, to an array of all rows. */
-static hs_status
-count_rows_of_step(void *context, hs_query_run *run)
-{
-    int64_t        *counts = (int64_t *)context + run->first_asking;
-    const int64_t   n = hs_search_asking(run->search)->n;
-    const hs_status status = hs_table_count(run->search, counts, run->failure);
-    for (int64_t i = 0; status == HS_OK && i < n; i++) {
-        run->n_pairs += counts[i];
-    }
-    return status;
-}
-
-/* Rows of several steps are made of their pairs in ascending order: where the rule is the same both
- * ways, each pair is in two of them. */
-
-/* Whether a point meets itself: in rows of one set that are not made of a half list. */
-static bool
-meets_itself(const hs_query_run *run)
-{
-    return !run->levels.has_queries && !run->plan.is_half;
-}
-
-/* Whether rows are those of a single step. It goes over all points twice: where pairs have limits
- * by radii, whose scans take long, sorting them is quicker. */
-static bool
-is_single(const hs_query_run *run)
-{
-    const hs_levels  *levels = &run->levels;
-    const hs_options *options = &run->call->options;
-    if (!run->has_levels) {
-        return true;
-    }
-    if (!hs_level_plan_is_single(&run->plan) || meets_itself(run)) {
-        return false;
-    }
-    if (!run->plan.steps[0].has_limits || (levels->cutoffs != NULL && levels->has_queries)) {
-        return true;
-    }
-    /* The rows of one search count on each point being within its limit of itself. */
-    bool has_selves = options->inclusive && options->precision == HS_EXACT;
-    for (int32_t l = 0; levels->cutoffs != NULL && l < levels->n; l++) {
-        has_selves = has_selves && levels->cutoffs[l * levels->n + l] >= 0.0;
-    }
-    return levels->cutoffs != NULL && has_selves;
-}
-
 /* Pairs of all steps, in an output that is opened; without (i, i, S = 0). */
 static hs_status
-find_of_rows(hs_query_run *run, unsigned columns, hs_output *found)
+find_all(hs_query_run *run, unsigned columns, hs_output *found)
 {
-    hs_output_init(&run->call->account, run->levels.points.ndim, columns, 4, found);
-    const hs_status status = hs_query_each_step(run, record_step, found);
+    hs_output_init(&run->call->account, run->query->sets.points->ndim, columns, 4, found);
+    const hs_status status = hs_query_each_step(run, record_to_sort, found);
     const int32_t  *i = hs_output_column(found, HS_WANT_I), *j = hs_output_column(found, HS_WANT_J);
     const int32_t  *shift = hs_output_column(found, HS_WANT_SHIFT);
     int64_t         kept = 0;
@@ -228,47 +176,80 @@ find_of_rows(hs_query_run *run, unsigned columns, hs_output *found)
     return HS_OK;
 }
 
+/* Writes the pairs of all steps in ascending order; as rows, in both of its rows a pair that was
+ * found once. */
+static hs_status
+find_in_order(hs_query_run *run)
+{
+    const int64_t n = hs_query_asking(run->query);
+    const bool    has_rows = run->finder->has_rows, both_ways = has_rows && run->plan.is_half;
+    int64_t      *offsets = NULL;
+    hs_output     found;
+    hs_status     status = find_all(run, run->has_levels ? columns_of(run) : 0, &found);
+    if (status == HS_OK && both_ways && (run->call->options.want & HS_WANT_SHIFT)) {
+        status = hs_output_check_opposites(&found, run->failure);
+    }
+    if (status == HS_OK && has_rows) {
+        status = hs_output_open_offsets(&run->call->account, n + 1, run->offsets, &offsets);
+    }
+    if (status == HS_OK) {
+        /* In rows of systems numbers are added afterwards. */
+        const int32_t first = has_rows ? 0 : (int32_t)run->first_point;
+        status = hs_sort_pairs(run->call, first, n, &found, both_ways, offsets, run->output);
+    }
+    if (status == HS_ERR_MEMORY) {
+        run->failure->expected_pairs =
+            fmax(run->failure->expected_pairs, (both_ways ? 2.0 : 1.0) * (double)found.n_pairs);
+    }
+    hs_output_free(&found);
+    return status;
+}
+
 /* A hs_use_fn. */
 static hs_status
 find_rows(void *context, hs_query_run *run)
 {
-    const int64_t n = hs_query_asking(run->query);
-    const bool    is_half = run->plan.is_half;
-    int64_t      *offsets = NULL;
-    hs_output     found;
-    if (is_single(run)) {
-        run->plan.is_half = false; /* all neighbours of each point */
-        return hs_query_each_step(run, fill_rows, context);
+    if (!is_single(run)) {
+        return find_in_order(run);
     }
-    hs_status status = find_of_rows(run, columns_of(run), &found);
-    if (status == HS_OK && is_half && (run->call->options.want & HS_WANT_SHIFT)) {
-        status = hs_output_check_opposites(&found, run->failure);
+    run->plan.is_half = false; /* all neighbours of each point */
+    return hs_query_each_step(run, fill_rows, context);
+}
+
+/* A hs_use_fn. */
+static hs_status
+find_pairs(void *context, hs_query_run *run)
+{
+    (void)context;
+    if (run->query->sets.is_once) { /* rows that list each pair once, without their beginnings */
+        const hs_status status = hs_query_each_step(run, fill_rows, NULL);
+        hs_output_free(run->offsets);
+        return status;
     }
-    if (status == HS_OK) {
-        status = hs_output_open_offsets(&run->call->account, n + 1, run->offsets, &offsets);
+    return run->call->options.sorted ? find_in_order(run)
+                                     : hs_query_each_step(run, record_step, NULL);
+}
+
+hs_status
+hs_pairs_find(const hs_among *among, const hs_options *options, hs_pairs **result,
+              hs_failure *failure)
+{
+    const hs_finder finder = {.find = find_pairs, .has_result = true, .is_numbered = true};
+    hs_query        query = hs_query_among(among, HS_HALF_LIST, options);
+    if (query.options.sorted && query.reach == NULL && query.among == NULL) {
+        query.sets.is_full = query.sets.is_once = true;
+        query.options.sorted = false; /* table rows have an order of their own */
     }
-    if (status == HS_OK) {
-        status = hs_sort_rows(run->call, n, &found, is_half, offsets, run->output);
-    }
-    if (status == HS_ERR_MEMORY) {
-        run->failure->expected_pairs =
-            fmax(run->failure->expected_pairs, (is_half ? 2.0 : 1.0) * (double)found.n_pairs);
-    }
-    hs_output_free(&found);
-    return status;
+    return hs_query_answer(&query, &finder, result, failure);
 }
 
 hs_status
 hs_neighbors_find(const hs_among *among, const hs_options *options, hs_pairs **result,
                   hs_failure *failure)
 {
-    const hs_finder finder = {.find = find_rows, .has_rows = true};
-    if (!hs_can_return(result, options)) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    hs_options of_rows = *options;
-    of_rows.sorted = false; /* table rows have an order of their own */
-    const hs_query query = hs_query_among(among, HS_FULL_LIST, &of_rows);
+    const hs_finder finder = {.find = find_rows, .has_result = true, .has_rows = true};
+    hs_query        query = hs_query_among(among, HS_FULL_LIST, options);
+    query.options.sorted = false; /* table rows have an order of their own */
     return hs_query_answer(&query, &finder, result, failure);
 }
 
@@ -283,7 +264,7 @@ count_rows(void *context, hs_query_run *run)
         return hs_query_each_step(run, count_rows_of_step, context);
     }
     const unsigned  columns = meets_itself(run) ? columns_of(run) : HS_WANT_I | HS_WANT_J;
-    const hs_status status = find_of_rows(run, columns, &found);
+    const hs_status status = find_all(run, columns, &found);
     if (status == HS_OK) {
         const int32_t *i = hs_output_column(&found, HS_WANT_I);
         const int32_t *j = hs_output_column(&found, HS_WANT_J);
@@ -306,19 +287,16 @@ hs_neighbors_count(const hs_among *among, const hs_options *options, int64_t *co
 {
     int64_t         none; /* where there are no points, there may be no counts */
     const hs_finder finder = {.find = count_rows, .context = counts != NULL ? counts : &none};
-    if (options == NULL) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    const hs_options counting = hs_options_of_count(options);
-    const hs_query   query = hs_query_among(among, HS_FULL_LIST, &counting);
-    const hs_sets   *sets = &query.sets;
+    hs_query        query = hs_query_among(among, HS_FULL_LIST, options);
+    const hs_sets  *sets = &query.sets;
+    hs_query_want_none(&query);
     if (!hs_has_entries(counts, sets->queries != NULL ? sets->queries : sets->points)) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+        query.is_incomplete = true;
     }
     return hs_query_answer(&query, &finder, NULL, failure);
 }
 
-/* The public search for the k nearest points: prepares trees, then searches group by group. */
+/* ---- the k nearest points: prepares trees, then searches group by group ---------------------- */
 
 /* A hs_use_fn; context: k. */
 static hs_status
@@ -361,20 +339,19 @@ hs_status
 hs_nearest_find(const hs_among *among, int64_t k, const hs_options *options, hs_pairs **result,
                 hs_failure *failure)
 {
-    const hs_finder finder = {.find = find_nearest, .context = &k, .is_nearest = true};
-    if (!hs_can_return(result, options) || k < 1) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    hs_options of_rows = *options;
-    of_rows.sorted = false;
-    of_rows.out = NULL;
-    of_rows.precision = HS_EXACT;
-    of_rows.want &= HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
-    const hs_query query = hs_query_among(among, HS_FULL_LIST, &of_rows);
+    const hs_finder finder = {
+        .find = find_nearest, .context = &k, .has_result = true, .is_nearest = true};
+    hs_query query = hs_query_among(among, HS_FULL_LIST, options);
+    query.is_incomplete = query.is_incomplete || k < 1;
+    query.options.sorted = false;
+    query.options.out = NULL;
+    query.options.precision = HS_EXACT;
+    query.is_by_length = false;
+    query.options.want &= HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
     return hs_query_answer(&query, &finder, result, failure);
 }
 
-/* The public histogram of all pairs, which stores none of them. */
+/* ---- the histogram of all pairs, which stores none of them ----------------------------------- */
 
 /* A hs_use_fn; context: the histogram. */
 static hs_status
@@ -394,53 +371,44 @@ find_histogram(void *context, hs_query_run *run)
     return hs_query_each_step(run, fill_histogram, &own);
 }
 
-/* The search goes up to the largest edge. Enters the floating-point environment itself, because
- * edges are compared before the search does. */
 hs_status
 hs_pairs_histogram(const hs_among *among, const hs_options *options, const hs_histogram *histogram,
                    hs_failure *failure)
 {
-    hs_entry        entry;
-    hs_among        without;
+    const hs_finder finder = {.find = find_histogram, .context = (void *)(uintptr_t)histogram};
+    hs_query        query = hs_query_among(among, HS_HALF_OR_QUERIES, options);
     hs_each_system  each;
-    hs_histogram    all;
-    const hs_finder finder = {.find = find_histogram, .context = &all};
-    hs_status       status = HS_ERR_ARGUMENT;
-    if (options == NULL || histogram == NULL || histogram->edges == NULL ||
-        histogram->n_types < 1 || (among != NULL && among->reach != NULL)) {
+    hs_among        without;
+    if (query.is_incomplete || histogram == NULL || histogram->edges == NULL ||
+        histogram->n_types < 1 || query.reach != NULL) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    if (among != NULL && among->each != NULL) { /* cutoffs of their own do not count */
-        each = *among->each;
-        each.cutoffs = NULL;
-        without = *among;
-        without.each = &each;
-        among = &without;
-    }
-    failure = hs_enter(failure, &entry);
-    hs_clear_counters(options);
-    status = hs_check_lengths(histogram->edges, histogram->n_edges, failure);
-    if (status == HS_OK) {
-        all = *histogram;
-        hs_options of_search = hs_options_of_count(options);
-        of_search.cutoff = histogram->edges[histogram->n_edges - 1];
-        of_search.inclusive = histogram->last_inclusive;
-        of_search.precision = HS_EXACT;
-        hs_query     query = hs_query_among(among, HS_HALF_OR_QUERIES, &of_search);
+    const double *const edges = histogram->edges;
+    const int64_t       n_edges = histogram->n_edges;
+    const bool          has_edges = n_edges > 0 && n_edges < HS_MOST_LENGTHS; /* else refused */
+    if (query.among != NULL) {
         const double n = (double)histogram->n_types;
-        query.sets.is_plain = true;
-        query.sets.keeps_none = true;
-        query.sets.least_cutoff = hs_least_length(histogram->edges, histogram->n_edges);
-        /* Counts of many systems might pass int64. */
-        status = query.among != NULL && !(n * n * (double)histogram->n_edges < 0x1p31)
-                     ? HS_ERR_MEMORY
-                     : hs_query_answer(&query, &finder, NULL, failure);
+        if (has_edges && !(n * n * (double)n_edges < 0x1p31)) { /* counts might pass int64 */
+            return hs_end_early(HS_ERR_MEMORY, options, failure);
+        }
+        without = *among; /* cutoffs of systems do not count */
+        each = among->each != NULL ? *among->each : (hs_each_system){.rows = NULL};
+        each.cutoffs = NULL;
+        without.each = &each;
+        query.among = &without;
     }
-    hs_leave(&entry);
-    return status;
+    hs_query_want_none(&query);
+    query.sets.keeps_none = true;
+    query.is_by_length = true;
+    query.options.shells = edges;
+    query.options.n_shells = n_edges;
+    query.options.cutoff = has_edges ? edges[n_edges - 1] : 0.0;
+    query.options.inclusive = histogram->last_inclusive;
+    query.options.precision = HS_EXACT;
+    return hs_query_answer(&query, &finder, NULL, failure);
 }
 
-/* What a search of a scene would do, read from the structures that would do it. */
+/* ---- plans: what a search would do, read from the structures that would do it ---------------- */
 
 /* A plan while searches are added to it. */
 typedef struct planning {
@@ -505,21 +473,20 @@ hs_plan_make(const hs_among *among, const hs_options *options, hs_plan *plan, hs
     planning        now = {.plan = &made};
     const hs_finder finder = {.step = plan_step, .context = &now};
     hs_query        query = hs_query_among(among, HS_HALF_LIST, options);
-    if (options == NULL || plan == NULL || query.selection != NULL || query.among != NULL) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    now.wanted = options->algorithm;
+    query.is_incomplete = query.is_incomplete || plan == NULL || query.selection != NULL ||
+                          query.among != NULL;
+    now.wanted = query.options.algorithm;
     hs_status status = hs_query_answer(&query, &finder, NULL, failure);
     if (status == HS_OK && made.n_searches == 0) {
         /* Where no two points can be a pair: what the cells would be for a cutoff of 0. */
-        hs_options without = *options;
-        without.cutoff = 0.0;
-        query.options = &without;
+        query.options.cutoff = 0.0;
         query.reach = NULL;
         status = hs_query_answer(&query, &finder, NULL, failure);
         made.n_searches = 0;
         made.expected_pairs = 0.0;
     }
-    *plan = status == HS_OK ? made : *plan;
+    if (status == HS_OK) {
+        *plan = made;
+    }
     return status;
 }

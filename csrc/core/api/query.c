@@ -12,31 +12,16 @@
 /* query.c: counts and pointers first, then what they lead to: nothing is read before it is known
  * to be there. Then checks, plans, finds and closes, in this order for every search. */
 
-void
-hs_clear_counters(const hs_options *options)
-{
-    if (options != NULL && options->counters != NULL) {
-        *options->counters = (hs_counters){.pairs = 0};
-    }
-}
-
 hs_status
 hs_end_early(hs_status status, const hs_options *options, hs_failure *failure)
 {
     if (failure != NULL) {
         *failure = HS_NO_FAILURE;
     }
-    hs_clear_counters(options);
-    return status;
-}
-
-bool
-hs_can_return(hs_pairs **result, const hs_options *options)
-{
-    if (result != NULL) {
-        *result = NULL;
+    if (options != NULL && options->counters != NULL) {
+        *options->counters = (hs_counters){.pairs = 0};
     }
-    return result != NULL && options != NULL;
+    return status;
 }
 
 bool
@@ -88,13 +73,11 @@ hs_check_options(const hs_options *options, unsigned known)
                : HS_ERR_ARGUMENT;
 }
 
-/* Most lengths that distances are sorted by: twice as many are int32. */
-#define MOST_LENGTHS (INT64_C(1) << 30)
-
-hs_status
-hs_check_lengths(const double *lengths, int64_t n, hs_failure *failure)
+/* HS_OK, or HS_ERR_EDGES unless there are some, finite, not negative and not descending. */
+static hs_status
+check_lengths(const double *lengths, int64_t n, hs_failure *failure)
 {
-    if (n < 1 || n >= MOST_LENGTHS) {
+    if (n < 1 || n >= HS_MOST_LENGTHS) {
         return HS_ERR_EDGES;
     }
     for (int64_t k = 0; k < n; k++) {
@@ -107,8 +90,9 @@ hs_check_lengths(const double *lengths, int64_t n, hs_failure *failure)
     return HS_OK;
 }
 
-double
-hs_least_length(const double *lengths, int64_t n)
+/* The first that is above 0, or 0. */
+static double
+least_length(const double *lengths, int64_t n)
 {
     for (int64_t k = 0; k < n; k++) {
         if (lengths[k] > 0.0) {
@@ -191,7 +175,9 @@ check_reach(const hs_query *query, hs_failure *failure)
 hs_query
 hs_query_among(const hs_among *among, hs_list_kind kind, const hs_options *options)
 {
-    hs_query query = {.options = options};
+    hs_query query = {.options = options != NULL ? *options : hs_options_default(),
+                      .is_incomplete = options == NULL};
+    query.is_by_length = query.options.want & HS_WANT_SHELL;
     if (among == NULL || (kind == HS_HALF_LIST && among->queries != NULL)) {
         return query;
     }
@@ -223,7 +209,7 @@ hs_query_among(const hs_among *among, hs_list_kind kind, const hs_options *optio
 static hs_status
 check_cutoff(const hs_query *query, const hs_finder *finder, hs_failure *failure)
 {
-    const double cutoff = query->options->cutoff;
+    const double cutoff = query->options.cutoff;
     const bool   may_be_infinite = finder->is_nearest ||
                                  (query->reach != NULL && query->reach->n_types == 0);
     if (!(cutoff >= 0.0) || !(isfinite(cutoff) || may_be_infinite)) {
@@ -247,16 +233,16 @@ check_query(const hs_query *query, const hs_finder *finder, const hs_call *call,
             hs_failure *failure)
 {
     const hs_sets    *sets = &query->sets;
-    const hs_options *options = query->options;
+    const hs_options *options = &query->options;
     const bool        has_shells = query->reach == NULL && query->among == NULL;
     hs_status         status = check_sets(sets->points, sets->queries, query->box, failure);
     if (status == HS_OK) {
         status = hs_check_options(options, HS_WANT_ALL | (has_shells ? HS_WANT_SHELL : 0));
     }
-    if (status == HS_OK && (options->want & HS_WANT_SHELL)) {
+    if (status == HS_OK && query->is_by_length) {
         /* Shells are those of an exact search, up to its cutoff. */
         status = options->shells != NULL && options->precision == HS_EXACT
-                     ? hs_check_lengths(options->shells, options->n_shells, failure)
+                     ? check_lengths(options->shells, options->n_shells, failure)
                      : HS_ERR_ARGUMENT;
         if (status == HS_OK && options->shells[options->n_shells - 1] != options->cutoff) {
             status = HS_ERR_ARGUMENT;
@@ -274,13 +260,6 @@ check_query(const hs_query *query, const hs_finder *finder, const hs_call *call,
     return call->kernel == NULL  ? HS_ERR_KERNEL
            : have_cutoffs(query) ? HS_OK
                                  : check_cutoff(query, finder, failure);
-}
-
-/* Whether the search itself takes numbers among all systems. */
-static bool
-is_numbered(const hs_query_run *run)
-{
-    return run->is_part && run->finder->is_numbered;
 }
 
 hs_status
@@ -318,12 +297,12 @@ hs_query_plan(hs_query_run *run)
                               run->failure);
     if (status == HS_OK) {
         run->has_levels = true;
-        if (is_numbered(run)) {
+        if (run->is_numbered) {
             hs_levels_renumber((int32_t)run->first_point, &run->levels);
         }
-        status = hs_level_plan_make(&call->account, &run->levels, query->box,
-                                    query->options->cutoff, query->options->algorithm, &run->plan);
-    } else if (is_numbered(run)) {
+        status = hs_level_plan_make(&call->account, &run->levels, query->box, query->options.cutoff,
+                                    query->options.algorithm, &run->plan);
+    } else if (run->is_numbered) {
         hs_query_name_point(run, status);
     }
     return status;
@@ -369,7 +348,7 @@ hs_query_open(const hs_query *query, const hs_finder *finder, hs_call *call, hs_
         if (status == HS_OK && call->choice != NULL) {
             /* None that are further apart than the cutoff. */
             status = hs_choice_set_scene(&query->sets, query->box,
-                                         query->reach != NULL ? INFINITY : query->options->cutoff,
+                                         query->reach != NULL ? INFINITY : query->options.cutoff,
                                          call, failure);
         }
     }
@@ -406,9 +385,9 @@ hs_query_open_step(hs_query_run *run, int64_t number)
         status = hs_level_open(&run->plan, number, query->box, sets.keeps_none, call, &run->step,
                                run->failure);
     } else {
-        if (call->options.want & HS_WANT_SHELL) {
+        if (query->is_by_length) {
             sets.is_plain = true;
-            sets.least_cutoff = hs_least_length(call->options.shells, call->options.n_shells);
+            sets.least_cutoff = least_length(query->options.shells, query->options.n_shells);
         }
         sets.least_cutoff = hs_choice_least_length(call->choice, sets.least_cutoff);
         sets.follows = run->has_scene;
@@ -421,10 +400,10 @@ hs_query_open_step(hs_query_run *run, int64_t number)
                 hs_search_close(search);
             }
         }
-        for (int64_t si = 0; is_numbered(run) && status == HS_OK && si < search->bins.n; si++) {
+        for (int64_t si = 0; run->is_numbered && status == HS_OK && si < search->bins.n; si++) {
             search->bins.order[si] += (int32_t)run->first_point;
         }
-        if (is_numbered(run) && status != HS_OK) {
+        if (run->is_numbered && status != HS_OK) {
             hs_query_name_point(run, status);
         }
     }
@@ -432,7 +411,7 @@ hs_query_open_step(hs_query_run *run, int64_t number)
         return status;
     }
     run->search = search;
-    if (is_numbered(run)) { /* all that is found is a part of the same */
+    if (run->is_numbered) { /* all that is found is a part of the same */
         search->n_before = run->first_asking;
         search->n_in_all = run->n_in_all;
     }
@@ -474,40 +453,62 @@ hs_query_find(hs_query_run *run)
 }
 
 hs_pairs *
-hs_pairs_begin(const hs_options *options, hs_failure **failure)
+hs_result_begin(bool has_input, const hs_options *options, hs_pairs **result, hs_failure **failure,
+                hs_status *status)
 {
-    hs_pairs *pairs = hs_pairs_new();
-    if (pairs == NULL) {
-        (void)hs_end_early(HS_ERR_MEMORY, options, *failure);
+    const bool can_begin = has_input && result != NULL && options != NULL;
+    hs_pairs  *made = can_begin ? hs_pairs_new() : NULL;
+    if (result != NULL) {
+        *result = NULL;
+    }
+    if (made == NULL) {
+        *status = can_begin ? HS_ERR_MEMORY : HS_ERR_ARGUMENT;
+        (void)hs_end_early(*status, options, *failure);
         return NULL;
     }
-    *failure = hs_call_enter(options, *failure, &pairs->call);
-    return pairs;
+    *failure = hs_call_enter(options, *failure, &made->call);
+    *status = HS_OK;
+    return made;
 }
 
-hs_options
-hs_options_of_count(const hs_options *options)
+hs_status
+hs_result_end(hs_pairs *made, hs_status status, hs_pairs **result, hs_failure *failure)
 {
-    hs_options counting = *options;
-    counting.want = 0;
-    counting.sorted = false;
-    counting.out = NULL;
-    return counting;
+    if (made == NULL) {
+        return status;
+    }
+    hs_call_tell_limit(&made->call, status, failure);
+    return hs_pairs_finish(made, status, made->output.n_pairs, result);
+}
+
+void
+hs_query_want_none(hs_query *query)
+{
+    query->options.want = 0;
+    query->is_by_length = false;
+    query->options.sorted = false;
+    query->options.out = NULL;
 }
 
 hs_status
 hs_query_answer(const hs_query *query, const hs_finder *finder, hs_pairs **result,
                 hs_failure *failure)
 {
-    hs_query_run run;
-    hs_call      own, *call = &own;
-    hs_pairs    *pairs = result != NULL ? hs_pairs_begin(query->options, &failure) : NULL;
-    if (result == NULL) {
-        failure = hs_call_enter(query->options, failure, call);
-    } else if (pairs != NULL) {
+    const hs_options *options = &query->options;
+    hs_query_run      run;
+    hs_call           own, *call = &own;
+    hs_pairs         *pairs = NULL;
+    if (finder->has_result) {
+        hs_status early;
+        pairs = hs_result_begin(!query->is_incomplete, options, result, &failure, &early);
+        if (pairs == NULL) {
+            return early;
+        }
         call = &pairs->call;
+    } else if (query->is_incomplete) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     } else {
-        return HS_ERR_MEMORY;
+        failure = hs_call_enter(options, failure, call);
     }
     hs_status status = hs_query_open(query, finder, call, &run, failure);
     if (status == HS_OK && pairs != NULL) {
@@ -529,7 +530,7 @@ hs_query_answer(const hs_query *query, const hs_finder *finder, hs_pairs **resul
         if (query->among != NULL) {
             hs_systems_add_shortage(query, &shortage);
         } else {
-            hs_shortage_add(&query->sets, query->box, query->options->cutoff, &shortage);
+            hs_shortage_add(&query->sets, query->box, options->cutoff, &shortage);
         }
         hs_shortage_tell(&shortage, &call->options, query->sets.points->ndim, failure);
     }

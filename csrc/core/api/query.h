@@ -22,15 +22,9 @@
  * the options and the failure that are given to a function hs_check_*.
  */
 
-/* Ends such a call: returns the status. *failure, unless NULL, has no details. */
+/* Ends such a call, with counters of nothing: returns the status. *failure, unless NULL, has no
+ * details. */
 hs_status hs_end_early(hs_status status, const hs_options *options, hs_failure *failure);
-
-/* The counters, if any, of a call that ends before its search begins. */
-void hs_clear_counters(const hs_options *options);
-
-/* Whether a call that returns an object has these two, without which it cannot begin. *result,
- * unless NULL, is NULL afterwards. */
-bool hs_can_return(hs_pairs **result, const hs_options *options);
 
 /* Whether an array is there that has one entry for each of these points, if there are any. */
 bool hs_has_entries(const void *array, const hs_points *points);
@@ -44,31 +38,32 @@ hs_status hs_check_resources(const hs_options *options);
 /* `known`: the HS_WANT_ bits that there may be. */
 hs_status hs_check_options(const hs_options *options, unsigned known);
 
-/* The first of ascending lengths that is above 0, or 0. */
-double hs_least_length(const double *lengths, int64_t n);
-
-/* HS_OK, or HS_ERR_EDGES unless there are some, finite, not negative and not descending. */
-hs_status hs_check_lengths(const double *lengths, int64_t n, hs_failure *failure);
-
 /* Points, queries, box and options; failure->in_queries tells queries from points. */
 hs_status hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_box *box,
                              const hs_options *options, hs_failure *failure);
 
-/* What to search for, all borrowed. */
+/* Lengths that distances are sorted by are fewer: twice as many are int32. */
+#define HS_MOST_LENGTHS (INT64_C(1) << 30)
+
+/* What to search for. All is borrowed but for the options: a copy, in which each function sets what
+ * it does not leave to the caller. */
 typedef struct hs_query {
     hs_sets             sets;
     const hs_box       *box;
-    const hs_options   *options;
+    hs_options          options;
     const hs_reach     *reach;     /* NULL: the cutoff holds for all pairs */
     const hs_selection *selection; /* NULL: all pairs within reach count */
-    const hs_among     *among;     /* several systems, of which the above are all; NULL: one */
+    const hs_among     *among; /* several systems, whose points are all above; NULL: one system */
+    bool is_incomplete;        /* an argument is missing without which the call cannot begin */
+    bool is_by_length; /* distances are sorted by the shells, which are the edges of a histogram */
 } hs_query;
 
 /* Which pairs a search is for: each once, among the points alone; every neighbour of each point or
  * query; or the first without queries and the second with them. */
 typedef enum hs_list_kind { HS_HALF_LIST, HS_FULL_LIST, HS_HALF_OR_QUERIES } hs_list_kind;
 
-/* `among` may be NULL or contradict itself: then no points are set, which is refused later. */
+/* `among` may be NULL or contradict itself: then no points are set, which is refused later. Without
+ * options the query is incomplete. */
 hs_query hs_query_among(const hs_among *among, hs_list_kind kind, const hs_options *options);
 
 /* How many points or queries ask. */
@@ -89,7 +84,8 @@ typedef struct hs_finder {
     hs_use_fn find; /* of all steps of a system; NULL: each is used by `step` */
     hs_use_fn step;
     void     *context;     /* borrowed; threads share it */
-    bool      has_rows;    /* offsets come with the output */
+    bool      has_result;  /* pairs are returned */
+    bool      has_rows;    /* offsets come with them */
     bool      is_numbered; /* finds numbers among all systems: else they are added afterwards */
     bool      is_nearest;  /* the cutoff may be infinite, and there is no reach */
     bool      one_thread;  /* several systems are searched by the caller's thread */
@@ -104,10 +100,11 @@ struct hs_query_run {
     const hs_query  *query;
     const hs_finder *finder;
     hs_failure      *failure;
-    hs_output       *output;  /* pairs go behind those that it has; NULL: only counting */
-    hs_output       *offsets; /* of rows */
-    hs_keeper       *keeper;  /* of a thread that searches several systems; else NULL */
-    bool             is_part; /* one of several systems, which share a choice: */
+    hs_output       *output;      /* pairs go behind those that it has; NULL: only counting */
+    hs_output       *offsets;     /* of rows */
+    hs_keeper       *keeper;      /* of a thread that searches several systems; else NULL */
+    bool             is_part;     /* one of several systems, which share a choice */
+    bool             is_numbered; /* the search itself takes numbers among all of them: */
     int64_t          system, first_point, first_asking; /* its number, and what lies before it */
     int64_t          n_in_all;   /* points or queries that ask, of all systems */
     int64_t          n_pairs;    /* that were counted, of all of them */
@@ -121,8 +118,7 @@ struct hs_query_run {
 
 /*
  * A call of a public function: checks the query, plans and finds. failure: NULL, or what was wrong.
- * The caller has seen that the options are there, and where the result goes. *result, unless result
- * is NULL, becomes the pairs, to be freed by hs_pairs_free; NULL on failure.
+ * *result becomes the pairs, if there are to be any, to be freed by hs_pairs_free; NULL on failure.
  */
 hs_status hs_query_answer(const hs_query *query, const hs_finder *finder, hs_pairs **result,
                           hs_failure *failure);
@@ -157,11 +153,10 @@ void hs_query_name_point(const hs_query_run *run, hs_status status);
 
 /* One of several systems, cut from all; it must not move. */
 typedef struct hs_system {
-    hs_query   query;
-    hs_set     points, queries;
-    hs_box     own_box;
-    hs_options options; /* with its own cutoff */
-    hs_choice  choice;  /* as all have it, in its box */
+    hs_query  query; /* with its own cutoff */
+    hs_set    points, queries;
+    hs_box    own_box;
+    hs_choice choice; /* as all have it, in its box */
 } hs_system;
 
 /* Several systems (systems.c): checks what they share; finds in each of them, by the threads of the
@@ -179,11 +174,17 @@ void hs_system_begin(const hs_query *all, const hs_finder *finder, hs_call *call
 hs_status hs_system_open(const hs_query *all, int64_t s, const hs_choice *choice, hs_system *system,
                          hs_query_run *run);
 
-/* A result whose call, with these options, has been entered; *failure becomes where the failure
- * goes. hs_pairs_finish must follow. NULL when memory is short: then the call has ended. */
-hs_pairs *hs_pairs_begin(const hs_options *options, hs_failure **failure);
+/* A call that makes a result, if it has its input, options and a place for it. *result becomes
+ * NULL, *failure where the failure goes, and the call is entered: hs_result_end must follow. NULL
+ * where it has ended, with *status. */
+hs_pairs *hs_result_begin(bool has_input, const hs_options *options, hs_pairs **result,
+                          hs_failure **failure, hs_status *status);
 
-/* These options for a search that only counts. */
-hs_options hs_options_of_count(const hs_options *options);
+/* Leaves the call, if there is one. *result becomes what was made, or that is freed. Returns the
+ * status. */
+hs_status hs_result_end(hs_pairs *made, hs_status status, hs_pairs **result, hs_failure *failure);
+
+/* Takes out of the options what is about columns, for a search that gives none. */
+void hs_query_want_none(hs_query *query);
 
 #endif

@@ -142,7 +142,7 @@ take_up(hs_stream *stream, int64_t at)
 {
     source *one = &stream->sources[at];
     stream->at = at;
-    stream->call.options.cutoff = one->system.options.cutoff;
+    stream->call.options.cutoff = one->system.query.options.cutoff;
     if (stream->choice != NULL) {
         stream->call.choice = &one->system.choice;
     }
@@ -265,8 +265,6 @@ open_alone(hs_stream *stream, const hs_query *query, const hs_finder *finder, hs
     source *one = stream->sources = &stream->own;
     one->n_steps = 0;
     one->system.query = *query;
-    one->system.options = *query->options;
-    one->system.query.options = &one->system.options;
     hs_status status = hs_query_open(&one->system.query, finder, &stream->call, &one->run, failure);
     stream->n_sources = 1;
     if (status == HS_OK) {
@@ -315,18 +313,17 @@ hs_stream_open(const hs_among *among, const hs_options *options, int64_t max_pai
     if (result == NULL || options == NULL || max_pairs < 1) {
         return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
     }
-    hs_options of_stream = *options; /* without what the caller lends for one call */
-    of_stream.sorted = false;
-    of_stream.out = NULL;
-    of_stream.counters = NULL;
     hs_stream *stream = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *stream);
     if (stream == NULL) {
         return hs_end_early(HS_ERR_MEMORY, NULL, failure);
     }
     hs_call *call = &stream->call;
-    hs_query query = hs_query_among(among, HS_HALF_LIST, &of_stream);
+    hs_query query = hs_query_among(among, HS_HALF_LIST, options);
     query.sets.keeps_none = true;
-    failure = hs_call_enter(&of_stream, failure, call);
+    query.options.sorted = false; /* nor has it what the caller lends for one call */
+    query.options.out = NULL;
+    query.options.counters = NULL;
+    failure = hs_call_enter(&query.options, failure, call);
     stream->n_sources = stream->at = stream->begin = 0;
     stream->choice = NULL;
     stream->max_pairs = max_pairs;
@@ -459,37 +456,26 @@ visit_step(void *context, hs_query_run *run)
     return hs_parallel_visit(run->search, &all, NULL, run->failure);
 }
 
-/* hs_pairs_visit with options->want and ->index_bytes heeded, by visit->pairs where that leaves a
- * column out; all but `among` is there. */
-static hs_status
-visit_columns(const hs_among *among, const hs_options *options, const hs_visit *visit,
-              int64_t *n_visited, hs_failure *failure)
+/* For a visit by the caller's thread alone: others only make the search ready. */
+static void
+spare_threads(hs_query *query)
 {
-    visiting shared = {.visit = visit, .want = options->want, .index_bytes = options->index_bytes};
-    const hs_finder finder = {.step = visit_step,
-                              .context = &shared,
-                              .is_numbered = true,
-                              .one_thread = !visit->thread_safe};
-    hs_counters     done;
-    hs_options      of_visit = *options;
-    hs_query        query = hs_query_among(among, HS_HALF_LIST, &of_visit);
-    of_visit.sorted = false;
-    of_visit.out = NULL;
-    of_visit.counters = options->counters != NULL ? options->counters : &done;
-    if (!visit->thread_safe && options->threads > 1) { /* others only make the search ready */
-        const double n = (double)(hs_query_asking(&query) / HS_POINTS_MADE_READY);
-        of_visit.threads = hs_call_threads(n, options) > 1 ? options->threads : 1;
+    const double n = (double)(hs_query_asking(query) / HS_POINTS_MADE_READY);
+    if (query->options.threads > 1 && hs_call_threads(n, &query->options) == 1) {
+        query->options.threads = 1;
     }
-    query.sets.keeps_none = true;
-    const hs_status status = hs_query_answer(&query, &finder, NULL, failure);
-    *n_visited = of_visit.counters->pairs;
-    return status == HS_ENOUGH ? HS_OK : status;
 }
 
 hs_status
 hs_pairs_visit(const hs_among *among, const hs_options *options, const hs_visit *visit,
                int64_t *n_visited, hs_failure *failure)
 {
+    visiting    shared = {.visit = visit,
+                          .want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR |
+                                  HS_WANT_SHIFT,
+                          .index_bytes = 8};
+    hs_finder   finder = {.step = visit_step, .context = &shared, .is_numbered = true};
+    hs_counters done;
     if (n_visited != NULL) {
         *n_visited = 0;
     }
@@ -497,19 +483,30 @@ hs_pairs_visit(const hs_among *among, const hs_options *options, const hs_visit 
         (visit->pair == NULL && visit->pairs == NULL)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    hs_options of_visit = *options;
-    of_visit.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
-    of_visit.index_bytes = 8;
-    return visit_columns(among, &of_visit, visit, n_visited, failure);
+    hs_query query = hs_query_among(among, HS_HALF_LIST, options);
+    hs_query_want_none(&query);
+    query.sets.keeps_none = true;
+    query.options.want = shared.want;
+    query.options.index_bytes = shared.index_bytes;
+    query.options.counters = options->counters != NULL ? options->counters : &done;
+    finder.one_thread = !visit->thread_safe;
+    if (finder.one_thread) {
+        spare_threads(&query);
+    }
+    const hs_status status = hs_query_answer(&query, &finder, NULL, failure);
+    *n_visited = query.options.counters->pairs;
+    return status == HS_ENOUGH ? HS_OK : status;
 }
 
 /* Clusters of points, joined pair by pair while these are found. */
 
-/* What the pairs are for. */
+/* What the pairs are for: clusters of all systems, or of one. */
 typedef struct clustering {
-    hs_components  components; /* owned */
+    hs_components  components; /* owned; of one */
     const uint8_t *core;       /* borrowed, or NULL */
     int64_t       *labels;     /* borrowed */
+    uint8_t       *winding;    /* borrowed, or NULL */
+    int64_t        n_found;
 } clustering;
 
 /* A hs_pairs_fn: core points that are a pair belong together. */
@@ -547,72 +544,70 @@ adopt_points(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *use
     return 0;
 }
 
-/* Whether anything repeats, in any system. */
-static bool
-is_periodic(const hs_query *query)
+/* A hs_use_fn; context: the clustering of all systems. */
+static hs_status
+find_clusters(void *context, hs_query_run *run)
 {
-    const hs_box         *box = query->box;
-    const hs_each_system *each = query->among != NULL ? query->among->each : NULL;
-    bool                  any = false;
-    if (box == NULL || each == NULL || each->periodic == NULL) {
-        for (int l = 0; box != NULL && l < box->ndim; l++) {
-            any = any || box->periodic[l];
-        }
-        return any;
+    clustering      *all = context, doing = *all;
+    hs_account      *account = &run->call->account;
+    const hs_visit   join = {.pairs = join_pairs, .user = &doing};
+    const hs_visit   adopt = {.pairs = adopt_points, .user = &doing};
+    visiting         shared = {.visit = &join, .want = HS_WANT_I | HS_WANT_J, .index_bytes = 4};
+    const hs_points *points = run->query->sets.points;
+    const hs_box    *box = run->query->box;
+    int              n_axes = 0;
+    doing.core = all->core != NULL ? all->core + run->first_point : NULL;
+    doing.labels = all->labels + run->first_point;
+    doing.winding = all->winding != NULL ? all->winding + all->n_found : NULL;
+    for (int l = 0; doing.winding != NULL && box != NULL && l < box->ndim; l++) {
+        n_axes = box->periodic[l] ? points->ndim : n_axes;
     }
-    for (int64_t s = 0; s < query->among->points->n_systems; s++) {
-        any = any || each->periodic[s] != 0;
+    shared.want |= n_axes > 0 ? HS_WANT_SHIFT : 0;
+    hs_status status = hs_components_open(account, points->n, n_axes, &doing.components);
+    if (status == HS_OK) {
+        status = hs_query_each_step(run, visit_step, &shared);
     }
-    return any;
+    if (status == HS_OK) {
+        doing.n_found =
+            hs_components_label(&doing.components, doing.core, doing.labels, doing.winding);
+    }
+    hs_components_close(account, &doing.components);
+    if (status == HS_OK && doing.core != NULL && points->n > 0 &&
+        memchr(doing.core, 0, (size_t)points->n) != NULL) {
+        /* Some point is near enough to a cluster only. The counters leave this out. */
+        const hs_counters done = run->call->done;
+        const int64_t     n_pairs = run->n_pairs;
+        shared.visit = &adopt;
+        shared.want = HS_WANT_I | HS_WANT_J;
+        status = hs_query_each_step(run, visit_step, &shared);
+        run->call->done = done;
+        run->n_pairs = n_pairs;
+    }
+    for (int64_t i = 0; status == HS_OK && all->n_found > 0 && i < points->n; i++) {
+        doing.labels[i] += doing.labels[i] >= 0 ? all->n_found : 0;
+    }
+    all->n_found += status == HS_OK ? doing.n_found : 0;
+    return status;
 }
 
 hs_status
 hs_clusters_find(const hs_among *among, const hs_options *options, const uint8_t *core,
                  int64_t *labels, uint8_t *winding, int64_t *n_clusters, hs_failure *failure)
 {
-    const hs_query   query = hs_query_among(among, HS_HALF_LIST, options);
-    const hs_points *points = query.sets.points;
-    clustering       doing = {.core = core, .labels = labels};
-    hs_visit         visit = {.pairs = join_pairs, .user = &doing};
-    hs_entry         entry;
-    hs_account       account;
-    int64_t          n_pairs, found = 0;
-    if (options == NULL || n_clusters == NULL || !hs_has_entries(labels, points)) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    int64_t    none; /* where there are no points, there may be no labels */
+    clustering all = {.core = core, .labels = labels != NULL ? labels : &none, .winding = winding};
+    const hs_finder finder = {.find = find_clusters, .context = &all, .one_thread = true};
+    hs_query        query = hs_query_among(among, HS_HALF_LIST, options);
+    query.is_incomplete = query.is_incomplete || n_clusters == NULL ||
+                          !hs_has_entries(labels, query.sets.points);
+    hs_query_want_none(&query);
+    query.sets.keeps_none = true;
+    query.options.want = HS_WANT_I | HS_WANT_J | (winding != NULL ? HS_WANT_SHIFT : 0);
+    query.options.index_bytes = 4;
+    spare_threads(&query);
+    const hs_status status = hs_query_answer(&query, &finder, NULL, failure);
+    if (status == HS_OK) {
+        *n_clusters = all.n_found;
     }
-    failure = hs_enter(failure, &entry);
-    hs_options of_search = hs_options_of_count(options);
-    of_search.index_bytes = 4;
-    hs_clear_counters(options);
-    hs_status status = hs_check_arguments(points, NULL, query.box, &of_search, failure);
-    if (status != HS_OK) {
-        hs_leave(&entry);
-        return status;
-    }
-    const int n_axes = winding != NULL && is_periodic(&query) ? points->ndim : 0;
-    hs_account_init(&account, &of_search);
-    status = hs_components_open(&account, points->n, n_axes, &doing.components);
-    failure->limit_bytes = status != HS_OK ? account.limit : 0.0;
-    if (status == HS_OK) { /* the rest of the memory limit is what the search may take */
-        of_search.memory_limit -= (double)account.held;
-        of_search.want = HS_WANT_I | HS_WANT_J | (n_axes > 0 ? HS_WANT_SHIFT : 0);
-        status = visit_columns(among, &of_search, &visit, &n_pairs, failure);
-        if (status == HS_OK) {
-            found = hs_components_label(&doing.components, core, labels, winding);
-        }
-        if (status == HS_OK && core != NULL && points->n > 0 &&
-            memchr(core, 0, (size_t)points->n) != NULL) {
-            /* some point is near enough to a cluster only */
-            visit.pairs = adopt_points;
-            of_search.want = HS_WANT_I | HS_WANT_J;
-            of_search.counters = NULL;
-            status = visit_columns(among, &of_search, &visit, &n_pairs, failure);
-        }
-        failure->limit_bytes += status == HS_ERR_MEMORY ? (double)account.held : 0.0;
-    }
-    *n_clusters = status == HS_OK ? found : *n_clusters;
-    hs_components_close(&account, &doing.components);
-    hs_account_close(&account);
-    hs_leave(&entry);
     return status;
 }

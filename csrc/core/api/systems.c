@@ -128,16 +128,8 @@ cut_system(const hs_query *all, int64_t s, hs_system *system)
         }
     }
     if (each != NULL && each->cutoffs != NULL) {
-        system->options.cutoff = each->cutoffs[s];
+        system->query.options.cutoff = each->cutoffs[s];
     }
-}
-
-static void
-begin_cuts(const hs_query *all, hs_system *system)
-{
-    system->query = *all;
-    system->options = *all->options;
-    system->query.options = &system->options;
 }
 
 void
@@ -145,9 +137,10 @@ hs_system_begin(const hs_query *all, const hs_finder *finder, hs_call *call, hs_
                 hs_system *system, hs_query_run *run)
 {
     const hs_among *among = all->among;
-    begin_cuts(all, system);
+    system->query = *all;
     hs_query_begin(&system->query, finder, call, failure, run);
     run->is_part = true;
+    run->is_numbered = finder->is_numbered;
     run->n_in_all = (among->queries != NULL ? among->queries : among->points)->at.n;
 }
 
@@ -156,17 +149,16 @@ hs_system_open(const hs_query *all, int64_t s, const hs_choice *choice, hs_syste
                hs_query_run *run)
 {
     const hs_among *among = all->among;
-    const bool      is_numbered = run->finder->is_numbered;
     hs_status       status = HS_OK;
     cut_system(all, s, system);
     run->system = s;
     run->first_point = among->points->first[s];
     run->first_asking = (among->queries != NULL ? among->queries : among->points)->first[s];
-    run->call->options.cutoff = system->options.cutoff;
+    run->call->options.cutoff = system->query.options.cutoff;
     if (choice != NULL) {
         run->call->choice = &system->choice;
-        hs_choice_cut(choice, is_numbered ? 0 : run->first_point,
-                      is_numbered ? 0 : run->first_asking, &system->choice);
+        hs_choice_cut(choice, run->is_numbered ? 0 : run->first_point,
+                      run->is_numbered ? 0 : run->first_asking, &system->choice);
         if (hs_choice_excludes(choice)) {
             status = hs_choice_set_box(system->query.box, among->points->at.ndim, &system->choice,
                                        run->failure);
@@ -178,11 +170,10 @@ hs_system_open(const hs_query *all, int64_t s, const hs_choice *choice, hs_syste
 void
 hs_systems_add_shortage(const hs_query *query, hs_shortage *shortage)
 {
-    hs_system cut;
-    begin_cuts(query, &cut);
+    hs_system cut = {.query = *query};
     for (int64_t s = 0; s < query->among->points->n_systems; s++) {
         cut_system(query, s, &cut);
-        hs_shortage_add(&cut.query.sets, cut.query.box, cut.options.cutoff, shortage);
+        hs_shortage_add(&cut.query.sets, cut.query.box, cut.query.options.cutoff, shortage);
     }
 }
 

@@ -176,21 +176,17 @@ hs_status
 hs_verlet_find(const hs_verlet *list, const hs_options *options, hs_pairs **result,
                hs_failure *failure)
 {
-    if (!hs_can_return(result, options) || list == NULL) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    hs_status status;
+    hs_pairs *pairs = hs_result_begin(list != NULL, options, result, &failure, &status);
+    if (pairs != NULL) {
+        pairs->call.options.cutoff = list->cutoff;
+        pairs->call.options.precision = HS_EXACT;
+        status = hs_check_options(&pairs->call.options, HS_WANT_ALL);
     }
-    hs_options of_list = *options;
-    of_list.cutoff = list->cutoff;
-    of_list.precision = HS_EXACT;
-    if (hs_check_options(&of_list, HS_WANT_ALL) != HS_OK) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    if (status == HS_OK) {
+        status = hs_recheck_find(list, pairs, failure);
     }
-    hs_pairs *pairs = hs_pairs_begin(&of_list, &failure);
-    if (pairs == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    const hs_status status = hs_recheck_find(list, pairs, failure);
-    return hs_pairs_finish(pairs, status, pairs->output.n_pairs, result);
+    return hs_result_end(pairs, status, result, failure);
 }
 
 /* The public functions of a box alone: measure, wrap and places. */
@@ -526,26 +522,24 @@ hs_status
 hs_measure(const hs_points *points, const hs_box *box, const hs_pair_numbers *pairs,
            const hs_options *options, hs_pairs **result, hs_failure *failure)
 {
-    if (!hs_can_return(result, options)) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    hs_options of_pairs = *options;
-    of_pairs.cutoff = 0.0;
-    of_pairs.cell_size = 0.0;
-    of_pairs.sorted = false;
-    of_pairs.out = NULL;
-    of_pairs.precision = HS_EXACT;
-    of_pairs.algorithm = HS_AUTO;
-    of_pairs.index_bytes = 8;
-    of_pairs.want &= HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
-    hs_pairs *measured = hs_pairs_begin(&of_pairs, &failure);
+    hs_status status;
+    hs_pairs *measured = hs_result_begin(true, options, result, &failure, &status);
     if (measured == NULL) {
-        return HS_ERR_MEMORY;
+        return status;
     }
     hs_call     *call = &measured->call;
+    hs_options  *of_pairs = &call->options;
     hs_cloud     cloud;
     hs_image_box images;
-    hs_status    status = hs_check_arguments(points, NULL, box, &of_pairs, failure);
+    of_pairs->cutoff = 0.0;
+    of_pairs->cell_size = 0.0;
+    of_pairs->sorted = false;
+    of_pairs->out = NULL;
+    of_pairs->precision = HS_EXACT;
+    of_pairs->algorithm = HS_AUTO;
+    of_pairs->index_bytes = 8;
+    of_pairs->want &= HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
+    status = hs_check_arguments(points, NULL, box, of_pairs, failure);
     if (status == HS_OK && (pairs == NULL || pairs->n < 0 || pairs->n > INT64_MAX / 1024 ||
                             (pairs->n > 0 && (pairs->i == NULL || pairs->j == NULL)))) {
         status = HS_ERR_ARGUMENT;
@@ -565,7 +559,7 @@ hs_measure(const hs_points *points, const hs_box *box, const hs_pair_numbers *pa
     }
     if (status == HS_OK) {
         hs_call_gather(call, points->n + pairs->n / PAIRS_A_POINT);
-        status = hs_cloud_load(&call->account, call->team, points, &call->options, &cloud, failure);
+        status = hs_cloud_load(&call->account, call->team, points, of_pairs, &cloud, failure);
     }
     if (status == HS_OK) {
         const hs_given_pairs given = {pairs, &cloud, &images, &measured->output};
@@ -580,6 +574,5 @@ hs_measure(const hs_points *points, const hs_box *box, const hs_pair_numbers *pa
         }
         hs_cloud_free(&call->account, &cloud);
     }
-    hs_call_tell_limit(call, status, failure);
-    return hs_pairs_finish(measured, status, measured->output.n_pairs, result);
+    return hs_result_end(measured, status, result, failure);
 }

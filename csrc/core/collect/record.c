@@ -208,13 +208,11 @@ put_shells(const hs_recorder *recorder, hs_scanner *scanner, int32_t first, cons
 /* Kernels first, one pair at a time where they decline; then to the caller's unit, in
  * loops without branches, which compilers turn into vectors. */
 
-/* Pair e of the batch, by itself. */
-static void
-measure_one(const hs_metric *metric, const hs_batch *batch, int64_t *const *shift, int32_t e,
-            double *distance, double *const *vector)
+/* Takes pair e out of the batch; returns its shift, which is NULL if `shift` is. */
+static const int64_t *
+pair_of(const hs_metric *metric, const hs_batch *batch, int64_t *const *shift, int32_t e, double *p,
+        double *q, int64_t *of_pair)
 {
-    double  p[HS_MAX_DIM], q[HS_MAX_DIM], along[HS_MAX_DIM];
-    int64_t of_pair[HS_MAX_DIM];
     for (int k = 0; k < metric->ndim; k++) {
         p[k] = batch->p[k][e];
         q[k] = batch->q[k][e];
@@ -222,7 +220,18 @@ measure_one(const hs_metric *metric, const hs_batch *batch, int64_t *const *shif
     for (int r = 0; shift != NULL && r < metric->n_rows; r++) {
         of_pair[r] = shift[r][e];
     }
-    distance[e] = hs_metric_measure(metric, p, q, shift != NULL ? of_pair : NULL, along);
+    return shift != NULL ? of_pair : NULL;
+}
+
+/* Pair e of the batch, by itself. */
+static void
+measure_one(const hs_metric *metric, const hs_batch *batch, int64_t *const *shift, int32_t e,
+            double *distance, double *const *vector)
+{
+    double         p[HS_MAX_DIM], q[HS_MAX_DIM], along[HS_MAX_DIM];
+    int64_t        of_pair[HS_MAX_DIM];
+    const int64_t *own = pair_of(metric, batch, shift, e, p, q, of_pair);
+    distance[e] = hs_metric_measure(metric, p, q, own, along);
     for (int k = 0; vector != NULL && k < metric->ndim; k++) {
         vector[k][e] = along[k];
     }
@@ -246,23 +255,56 @@ measure_pairs(const hs_kernel *kernel, const hs_metric *metric, const hs_batch *
     }
 }
 
+/* Pairs as kernels see them. shift: room for HS_MAX_DIM arrays. Returns it, or NULL if no pair is
+ * shifted. */
+static int64_t *const *
+view(const hs_metric *metric, hs_measured *pairs, hs_batch *batch, int64_t **shift)
+{
+    *batch = (hs_batch){.n = pairs->n};
+    for (int k = 0; k < metric->ndim; k++) {
+        batch->p[k] = pairs->p[k];
+        batch->q[k] = pairs->q[k];
+    }
+    for (int r = 0; pairs->is_shifted && r < metric->n_rows; r++) {
+        batch->shift[r] = pairs->times[r];
+        shift[r] = pairs->shift[r];
+    }
+    return pairs->is_shifted ? shift : NULL;
+}
+
 void
 hs_measured_find(const hs_kernel *kernel, const hs_metric *metric, bool vectors, hs_measured *pairs)
 {
-    hs_batch batch = {.n = pairs->n};
-    double  *vector[HS_MAX_DIM];
-    int64_t *shift[HS_MAX_DIM];
+    hs_batch              batch;
+    int64_t              *of[HS_MAX_DIM];
+    int64_t *const *const shift = view(metric, pairs, &batch, of);
+    double               *vector[HS_MAX_DIM];
     for (int k = 0; k < metric->ndim; k++) {
-        batch.p[k] = pairs->p[k];
-        batch.q[k] = pairs->q[k];
         vector[k] = pairs->vector[k];
     }
-    for (int r = 0; pairs->is_shifted && r < metric->n_rows; r++) {
-        batch.shift[r] = pairs->times[r];
-        shift[r] = pairs->shift[r];
+    measure_pairs(kernel, metric, &batch, shift, pairs->is_wide, pairs->distance,
+                  vectors ? vector : NULL);
+}
+
+void
+hs_measured_decide(const hs_kernel *kernel, const hs_metric *metric, hs_measured *pairs,
+                   uint8_t *within, hs_stages *stages)
+{
+    hs_batch              batch;
+    int64_t              *of[HS_MAX_DIM], of_pair[HS_MAX_DIM];
+    int64_t *const *const shift = view(metric, pairs, &batch, of);
+    double                p[HS_MAX_DIM], q[HS_MAX_DIM];
+    if (!pairs->is_wide) {
+        kernel->decide_batch(metric, &batch, within, stages);
     }
-    measure_pairs(kernel, metric, &batch, pairs->is_shifted ? shift : NULL, pairs->is_wide,
-                  pairs->distance, vectors ? vector : NULL);
+    for (int32_t e = 0; e < pairs->n; e++) {
+        if (!pairs->is_wide && within[e] != HS_UNDECIDED) {
+            within[e] = within[e] == HS_WITHIN;
+        } else {
+            const int64_t *own = pair_of(metric, &batch, shift, e, p, q, of_pair);
+            within[e] = hs_metric_within(metric, p, q, own, stages);
+        }
+    }
 }
 
 hs_scale
@@ -732,13 +774,14 @@ keep_within_lengths(const hs_recorder *recorder, const hs_scanner *scanner, int3
     }
 }
 
-/* Distances of pairs that are this far apart or further are not below that. */
+/* Distances of pairs that are this far apart or further are not below that; only a point that asks
+ * for its own neighbours is at 0 from itself. */
 static void
 keep_apart(const hs_output *output, int32_t n, double least)
 {
     double *distance = hs_output_next(output, HS_WANT_DISTANCE);
     for (int32_t h = 0; distance != NULL && h < n; h++) {
-        distance[h] = hs_larger(distance[h], least);
+        distance[h] = distance[h] > 0.0 ? hs_larger(distance[h], least) : 0.0;
     }
 }
 

@@ -88,6 +88,10 @@ hs_measured_shift(hs_measured *pairs, int32_t e, int r, int64_t shift)
 void hs_measured_find(const hs_kernel *kernel, const hs_metric *metric, bool vectors,
                       hs_measured *pairs);
 
+/* Sets within[e], HS_IN_BATCH of them, to whether pair e is within the cutoff of the metric. */
+void hs_measured_decide(const hs_kernel *kernel, const hs_metric *metric, hs_measured *pairs,
+                        uint8_t *within, hs_stages *stages);
+
 /* From the unit of the scene's metric to the caller's. */
 hs_scale hs_measures_unscale(const hs_scene *scene);
 

@@ -534,46 +534,41 @@ poll_when_found(void *context, double fraction)
     return callers->poll(callers->poll_context, 1.0);
 }
 
-static hs_status
-sort(hs_sorting *all, hs_output *sorted)
+hs_status
+hs_sort_pairs(hs_call *call, int32_t first_point, int64_t n_rows, const hs_output *found,
+              bool both_ways, int64_t *offsets, hs_output *sorted)
 {
-    hs_options *options = &all->call->options, callers = *options;
+    hs_options *options = &call->options, callers = *options;
+    hs_sorting  all = {.call = call,
+                       .first_point = first_point,
+                       .n_points = n_rows,
+                       .found = found,
+                       .i = hs_output_column(found, HS_WANT_I),
+                       .j = hs_output_column(found, HS_WANT_J),
+                       .shift = hs_output_column(found, HS_WANT_SHIFT),
+                       .both_ways = both_ways,
+                       .end = offsets};
+    hs_status   status = HS_OK;
     if (callers.poll != NULL) {
         options->poll = poll_when_found;
         options->poll_context = &callers;
     }
-    all->i = hs_output_column(all->found, HS_WANT_I);
-    all->j = hs_output_column(all->found, HS_WANT_J);
-    all->shift = hs_output_column(all->found, HS_WANT_SHIFT);
-    hs_status status = deal_out(all);
-    if (status == HS_OK) {
-        status = put_all(all, sorted);
+    if (offsets == NULL) {
+        all.end = hs_alloc(&call->account, HS_FOR_SORTING, n_rows, sizeof *all.end);
+        status = all.end != NULL ? HS_OK : HS_ERR_MEMORY;
     }
-    hs_free(&all->call->account, all->entries);
+    if (status == HS_OK) {
+        status = deal_out(&all);
+    }
+    if (status == HS_OK) {
+        status = put_all(&all, sorted);
+    }
+    hs_free(&call->account, all.entries);
+    if (offsets != NULL) {
+        hs_starts_of_ends(offsets, n_rows + 1);
+    } else {
+        hs_free(&call->account, all.end);
+    }
     *options = callers;
-    return status;
-}
-
-hs_status
-hs_sort_pairs(hs_call *call, int32_t first_point, int64_t n_points, const hs_output *found,
-              hs_output *sorted)
-{
-    hs_sorting all = {
-        .call = call, .first_point = first_point, .n_points = n_points, .found = found};
-    all.end = hs_alloc(&call->account, HS_FOR_SORTING, n_points, sizeof *all.end);
-    const hs_status status = all.end != NULL ? sort(&all, sorted) : HS_ERR_MEMORY;
-    hs_free(&call->account, all.end);
-    return status;
-}
-
-hs_status
-hs_sort_rows(hs_call *call, int64_t n_rows, const hs_output *found, bool both_ways,
-             int64_t *offsets, hs_output *sorted)
-{
-    hs_sorting all = {
-        .call = call, .n_points = n_rows, .found = found, .both_ways = both_ways, .end = offsets};
-    const hs_status status = sort(&all, sorted);
-    memmove(offsets + 1, offsets, (size_t)n_rows * sizeof *offsets);
-    offsets[0] = 0;
     return status;
 }

@@ -183,7 +183,7 @@ hs_half_list_rows(hs_call *call, const hs_output *half, int64_t n, bool directed
     int64_t        *first;
     const hs_status status = hs_output_open_offsets(&call->account, n + 1, offsets, &first);
     hs_output_init(&call->account, half->ndim, half->columns & ~(unsigned)HS_WANT_I, 4, rows);
-    return status == HS_OK ? hs_sort_rows(call, n, half, !directed, first, rows) : status;
+    return status == HS_OK ? hs_sort_pairs(call, 0, n, half, !directed, first, rows) : status;
 }
 
 /* ---- rows of nodes --------------------------------------------------------------------------- */
@@ -449,7 +449,7 @@ hs_connectivity_fill_pairs(hs_connectivity *made, const hs_node_map *map, const 
     const bool ascends = map->is_plain && (map->lists->directed || map->n_rows == map->n);
     if (status == HS_OK && !ascends) {
         half_list_init(&call->account, rows->shift != NULL, rows->ndim, &half);
-        status = hs_sort_pairs(call, 0, map->n, &found, &half);
+        status = hs_sort_pairs(call, 0, map->n, &found, false, NULL, &half);
     }
     if (status == HS_OK) {
         status = fill_table(map, ascends ? &found : &half, made);

@@ -296,10 +296,15 @@ hs_status
 hs_ball_init(hs_ball *ball, const hs_dynamic *list, const double *position, double radius,
              hs_failure *failure)
 {
+    const double least = hs_larger(radius, LEAST_BALL);
     ball->list = list;
     ball->radius = radius;
+    ball->limit = least * least * (1.0 + 0x1p-30); /* above the square by more than all rounding */
     ball->skip = HS_NO_PLACE;
     ball->status = HS_OK;
+    ball->cut = 0;
+    ball->has_turned = ball->meets_images = ball->filters = false;
+    ball->work = 0;
     if (!(radius >= 0.0 && radius <= list->max_radius)) {
         failure->value = radius;
         return HS_ERR_CUTOFF;
@@ -412,14 +417,6 @@ ball_decide_unsure(hs_ball *ball, const hs_ball_image *image, uint32_t place)
                             shift, &stages);
 }
 
-/* What to do with each entry. */
-typedef struct hs_ball_visit {
-    hs_dynamic_fn fn; /* NULL: the first one is enough */
-    void         *user;
-    bool          with_shift;
-    bool          is_near; /* no distances: entries of all cells of the ball, each once */
-} hs_ball_visit;
-
 /* One cell of a ball: whether it is in reach, which image of it is meant, and its entries. */
 
 /* One cell index along one axis: its least distance from the centre of the ball. */
@@ -430,30 +427,18 @@ typedef struct part {
     int64_t  image;
 } part;
 
-typedef struct ball_walk {
-    hs_ball             *ball;
-    const hs_ball_visit *visit;
-    double               limit;   /* cells with larger gaps are beyond the radius */
-    bool                 filters; /* cells may hold entries that are none of the ball's cells */
-    unsigned             cut;     /* bit k: each cell in one image, where it is nearest */
-    int64_t              work;    /* entries and cells since the last poll */
-    bool                 meets_images;
-    hs_ball_image        turned; /* the last image but home, if there is one */
-    bool                 has_turned;
-} ball_walk;
-
 /* At most the square of the distance to cell u along axis k. */
 HS_ALWAYS_INLINE double
-gap_of(const ball_walk *walk, int k, int64_t u)
+gap_of(const hs_ball *ball, int k, int64_t u)
 {
-    const hs_axis *axis = &walk->ball->list->axes.axis[k];
-    const double   t = walk->ball->centre.t[k];
-    const int64_t  centre = walk->ball->span[k].centre;
-    if (!walk->ball->list->lattice.aligned) {
+    const hs_axis *axis = &ball->list->axes.axis[k];
+    const double   t = ball->centre.t[k];
+    const int64_t  centre = ball->span[k].centre;
+    if (!ball->list->lattice.aligned) {
         return 0.0;
     }
     double gap = hs_axis_gap(axis, t, u, centre);
-    if (HS_UNLIKELY(walk->cut >> k & 1u)) {
+    if (HS_UNLIKELY(ball->cut >> k & 1u)) {
         gap = hs_smaller(hs_axis_gap(axis, t, u - axis->n, centre), gap);
         gap = hs_smaller(hs_axis_gap(axis, t, u + axis->n, centre), gap);
     }
@@ -461,13 +446,13 @@ gap_of(const ball_walk *walk, int k, int64_t u)
 }
 
 HS_ALWAYS_INLINE part
-part_of(const ball_walk *walk, int k, int64_t u)
+part_of(const hs_ball *ball, int k, int64_t u)
 {
-    const hs_dynamic *list = walk->ball->list;
+    const hs_dynamic *list = ball->list;
     const hs_axis    *axis = &list->axes.axis[k];
     part              p = {.image = hs_axis_image(axis, u)};
     p.index = u - p.image * axis->n;
-    p.gap = gap_of(walk, k, u);
+    p.gap = gap_of(ball, k, u);
     if (!list->cells.dense) {
         p.number = hs_cell_part(k, p.index);
     } else { /* the span of the ball has been cut to the table's */
@@ -479,65 +464,64 @@ part_of(const ball_walk *walk, int k, int64_t u)
 /* Whether the cell of an entry is one that the ball meets: sparse cells may hold those of others,
  * whose indices are the same modulo 2^32. */
 static bool
-is_met(const ball_walk *walk, uint32_t place)
+is_met(const hs_ball *ball, uint32_t place)
 {
-    const hs_dynamic *list = walk->ball->list;
+    const hs_dynamic *list = ball->list;
     const double     *x = hs_entry_at(&list->entries, place);
     double            gap = 0.0;
     for (int k = 0; k < list->lattice.ndim; k++) {
         const hs_axis          *axis = &list->axes.axis[k];
-        const hs_span_of_cells *span = &walk->ball->span[k];
+        const hs_span_of_cells *span = &ball->span[k];
         int64_t                 u = hs_axis_cell(axis, hs_lattice_coordinate(&list->lattice, x, k));
         u += axis->n * hs_axis_image(axis, span->first - u + axis->n - 1);
         if (u < span->first || u > span->last) {
             return false;
         }
-        gap += gap_of(walk, k, u);
+        gap += gap_of(ball, k, u);
     }
-    return gap <= walk->limit;
+    return gap <= ball->limit;
 }
 
 /* Whether to go on, after so much more work. */
 HS_ALWAYS_INLINE bool
-goes_on(ball_walk *walk, int64_t work)
+goes_on(hs_ball *ball, int64_t work)
 {
-    const hs_dynamic *list = walk->ball->list;
-    walk->work += work;
-    if (HS_UNLIKELY(walk->work > HS_POLL_POINTS)) {
-        walk->work = 0;
-        if (list->hooks.poll != NULL && !list->hooks.poll(walk->visit->user, 0.0)) {
-            walk->ball->status = HS_ERR_INTERRUPTED;
+    const hs_dynamic *list = ball->list;
+    ball->work += work;
+    if (HS_UNLIKELY(ball->work > HS_POLL_POINTS)) {
+        ball->work = 0;
+        if (list->hooks.poll != NULL && !list->hooks.poll(ball->visit->user, 0.0)) {
+            ball->status = HS_ERR_INTERRUPTED;
         }
     }
-    return walk->ball->status == HS_OK;
+    return ball->status == HS_OK;
 }
 
 HS_ALWAYS_INLINE bool
-tell(const ball_walk *walk, const hs_ball_image *image, uint32_t place)
+tell(hs_ball *ball, const hs_ball_image *image, uint32_t place)
 {
-    const hs_dynamic    *list = walk->ball->list;
+    const hs_dynamic    *list = ball->list;
     const hs_entry_tail *tail = hs_entry_tail_at(&list->entries, place);
     const double        *given = hs_entry_given(&list->entries, place);
     const hs_lattice    *lattice = &list->lattice;
     int64_t              over_rows[HS_MAX_DIM], shift[HS_MAX_DIM] = {0};
-    if (walk->visit->with_shift) {
-        if (!find_shift(walk->ball, image, place, over_rows)) {
+    if (ball->visit->with_shift) {
+        if (!find_shift(ball, image, place, over_rows)) {
             return true;
         }
         for (int l = 0; l < lattice->n_periodic; l++) {
             shift[lattice->vector_of_row[l]] = over_rows[l];
         }
     }
-    return walk->visit->fn((hs_key){tail->id, tail->tag}, isnan(given[0]) ? NULL : given,
-                           walk->visit->with_shift ? shift : NULL, walk->visit->user) != 0;
+    return ball->visit->fn((hs_key){tail->id, tail->tag}, isnan(given[0]) ? NULL : given,
+                           ball->visit->with_shift ? shift : NULL, ball->visit->user) != 0;
 }
 
 /* One entry in one image; whether to stop. Loops over axes are of the do-while form here, as there
  * is always one: compilers that do not know ndim then need no test before the first. */
 HS_ALWAYS_INLINE bool
-scan_entry(const ball_walk *walk, const hs_ball_image *image, uint32_t place, const int ndim)
+scan_entry(hs_ball *ball, const hs_ball_image *image, uint32_t place, const int ndim)
 {
-    hs_ball      *ball = walk->ball;
     const double *x = hs_entry_at(&ball->list->entries, place);
     double        square = 0.0;
     int           k = 0;
@@ -554,58 +538,58 @@ scan_entry(const ball_walk *walk, const hs_ball_image *image, uint32_t place, co
     if (!(square < image->in) && !ball_decide_unsure(ball, image, place)) {
         return ball->status != HS_OK;
     }
-    return walk->visit->fn == NULL || tell(walk, image, place);
+    return ball->visit->fn == NULL || tell(ball, image, place);
 }
 
 /* Entries of one cell in one image; whether to stop. */
 HS_ALWAYS_INLINE bool
-scan_cell(ball_walk *walk, const hs_ball_image *image, hs_cell cell, const int ndim)
+scan_cell(hs_ball *ball, const hs_ball_image *image, hs_cell cell, const int ndim)
 {
     for (uint32_t place = cell.start; place < cell.start + cell.count; place++) {
-        if (walk->visit->is_near
-                ? !(walk->filters && !is_met(walk, place)) && tell(walk, image, place)
-                : scan_entry(walk, image, place, ndim)) {
+        if (ball->visit->is_near
+                ? !(ball->filters && !is_met(ball, place)) && tell(ball, image, place)
+                : scan_entry(ball, image, place, ndim)) {
             return true;
         }
     }
-    return !goes_on(walk, 1 + (int64_t)cell.count);
+    return !goes_on(ball, 1 + (int64_t)cell.count);
 }
 
 /* The image of these parts. */
 HS_ALWAYS_INLINE const hs_ball_image *
-image_of(ball_walk *walk, const int64_t *along, const int ndim)
+image_of(hs_ball *ball, const int64_t *along, const int ndim)
 {
     int64_t  image[HS_MAX_DIM];
     uint64_t turns = 0;
-    bool     same = walk->has_turned;
+    bool     same = ball->has_turned;
     int      k = 0;
     do
         turns |= (uint64_t)along[k];
     while (++k < ndim);
     if (turns == 0) {
-        return &walk->ball->home;
+        return &ball->home;
     }
     for (k = 0; k < ndim; k++) {
-        const int r = walk->ball->list->axes.axis[k].row;
+        const int r = ball->list->axes.axis[k].row;
         if (r >= 0) {
             image[r] = along[k];
-            same = same && walk->turned.image[r] == along[k];
+            same = same && ball->turned.image[r] == along[k];
         }
     }
     if (!same) {
-        ball_turn(walk->ball, image, &walk->turned);
-        walk->has_turned = true;
+        ball_turn(ball, image, &ball->turned);
+        ball->has_turned = true;
     }
-    return &walk->turned;
+    return &ball->turned;
 }
 
 /* A cell that is in reach, if there is one; whether to stop. number: the sum of its parts. */
 HS_ALWAYS_INLINE bool
-scan_number(ball_walk *walk, uint64_t number, const int64_t *index, const int64_t *along,
+scan_number(hs_ball *ball, uint64_t number, const int64_t *index, const int64_t *along,
             const int ndim)
 {
-    const hs_dynamic    *list = walk->ball->list;
-    const hs_ball_image *image = &walk->ball->home;
+    const hs_dynamic    *list = ball->list;
+    const hs_ball_image *image = &ball->home;
     if (!list->cells.dense) {
         number = hs_cell_table_probe(&list->cells, index, hs_cell_mark(number));
         if (number == HS_NO_CELL) {
@@ -616,15 +600,15 @@ scan_number(ball_walk *walk, uint64_t number, const int64_t *index, const int64_
     if (HS_UNLIKELY(list->counters != NULL)) {
         list->counters->cells++;
         list->counters->lookups += !list->cells.dense;
-        list->counters->candidates += walk->visit->is_near ? 0 : cell.count;
+        list->counters->candidates += ball->visit->is_near ? 0 : cell.count;
     }
     if (cell.count == 0) {
         return false;
     }
-    if (walk->meets_images && !walk->visit->is_near) {
-        image = image_of(walk, along, ndim);
+    if (ball->meets_images && !ball->visit->is_near) {
+        image = image_of(ball, along, ndim);
     }
-    return scan_cell(walk, image, cell, ndim);
+    return scan_cell(ball, image, cell, ndim);
 }
 
 /*
@@ -639,11 +623,11 @@ scan_number(ball_walk *walk, uint64_t number, const int64_t *index, const int64_
 
 /* Cells nearest first. */
 HS_ALWAYS_INLINE bool
-walk_listed(ball_walk *walk, int reach, part parts[][HS_SLOTS], const int ndim)
+walk_listed(hs_ball *ball, int reach, part parts[][HS_SLOTS], const int ndim)
 {
     int64_t           index[HS_MAX_DIM] = {0}, along[HS_MAX_DIM] = {0};
-    const bool        needs_index = !walk->ball->list->cells.dense || walk->meets_images;
-    const hs_offsets *offsets = &walk->ball->list->offsets;
+    const bool        needs_index = !ball->list->cells.dense || ball->meets_images;
+    const hs_offsets *offsets = &ball->list->offsets;
     const uint8_t    *end = offsets->slot + offsets->at[reach + 1];
     for (const uint8_t *slot = offsets->slot + offsets->at[reach]; slot < end; slot += ndim) {
         double   gap = 0.0;
@@ -652,7 +636,7 @@ walk_listed(ball_walk *walk, int reach, part parts[][HS_SLOTS], const int ndim)
         do
             gap += parts[k][slot[k]].gap;
         while (++k < ndim);
-        if (gap > walk->limit) {
+        if (gap > ball->limit) {
             continue;
         }
         k = 0;
@@ -664,7 +648,7 @@ walk_listed(ball_walk *walk, int reach, part parts[][HS_SLOTS], const int ndim)
                 along[k] = of->image;
             }
         } while (++k < ndim);
-        if (scan_number(walk, number, index, along, ndim)) {
+        if (scan_number(ball, number, index, along, ndim)) {
             return true;
         }
     }
@@ -677,15 +661,15 @@ walk_listed(ball_walk *walk, int reach, part parts[][HS_SLOTS], const int ndim)
  * would take most of the time. False: a cell is too full, or there are too many; nothing was done.
  */
 HS_ALWAYS_INLINE bool
-walk_gathered(ball_walk *walk, int reach, part parts[][HS_SLOTS], bool *stopped, const int ndim)
+walk_gathered(hs_ball *ball, int reach, part parts[][HS_SLOTS], bool *stopped, const int ndim)
 {
     uint32_t          places[MOST_GATHERED * CROWD];
-    const hs_dynamic *list = walk->ball->list;
+    const hs_dynamic *list = ball->list;
     const int64_t     n_offsets = list->offsets.n[reach];
     const uint8_t    *slot = list->offsets.slot + list->offsets.at[reach];
     uint32_t          fullest = 0;
     int               n = 0;
-    if (!list->cells.dense || walk->meets_images || walk->visit->is_near ||
+    if (!list->cells.dense || ball->meets_images || ball->visit->is_near ||
         n_offsets > MOST_GATHERED || list->counters != NULL) {
         return false;
     }
@@ -697,7 +681,7 @@ walk_gathered(ball_walk *walk, int reach, part parts[][HS_SLOTS], bool *stopped,
             number += parts[k][slot[k]].number;
         }
         const hs_cell  cell = list->cells.cell[number];
-        const uint32_t count = gap <= walk->limit ? cell.count : 0;
+        const uint32_t count = gap <= ball->limit ? cell.count : 0;
         fullest = count > fullest ? count : fullest;
         for (uint32_t e = 0; e < CROWD; e++) {
             places[n + (int)e] = cell.start + e;
@@ -709,7 +693,7 @@ walk_gathered(ball_walk *walk, int reach, part parts[][HS_SLOTS], bool *stopped,
     }
     *stopped = false;
     for (int e = 0; e < n && !*stopped; e++) {
-        *stopped = scan_entry(walk, &walk->ball->home, places[e], ndim);
+        *stopped = scan_entry(ball, &ball->home, places[e], ndim);
     }
     return true;
 }
@@ -717,25 +701,25 @@ walk_gathered(ball_walk *walk, int reach, part parts[][HS_SLOTS], bool *stopped,
 /* Takes the parts of all cells up to `reach` to a side; those that the ball does not meet are out
  * of reach, and add nothing to a number. */
 HS_ALWAYS_INLINE bool
-walk_few(ball_walk *walk, int reach, const int ndim)
+walk_few(hs_ball *ball, int reach, const int ndim)
 {
     part parts[HS_MAX_DIM][HS_SLOTS];
     bool stopped;
     int  k = 0;
     do {
-        const hs_span_of_cells *span = &walk->ball->span[k];
+        const hs_span_of_cells *span = &ball->span[k];
         for (int o = -reach; o <= reach; o++) {
             const int64_t u = span->centre + o;
             if (u < span->first || u > span->last) {
                 parts[k][o + HS_MOST_REACH] = (part){.gap = INFINITY};
             } else {
-                parts[k][o + HS_MOST_REACH] = part_of(walk, k, u);
+                parts[k][o + HS_MOST_REACH] = part_of(ball, k, u);
             }
         }
     } while (++k < ndim);
-    return walk_gathered(walk, reach, parts, &stopped, ndim)
+    return walk_gathered(ball, reach, parts, &stopped, ndim)
                ? stopped
-               : walk_listed(walk, reach, parts, ndim);
+               : walk_listed(ball, reach, parts, ndim);
 }
 
 /* Moves to the next of all cells, or images, of a ball, the last axis fastest. Returns the first
@@ -755,10 +739,10 @@ go_to_next(const hs_span_of_cells *span, int ndim, bool is_image, int64_t *u)
 
 /* Cells by index. */
 static bool
-walk_by_index(ball_walk *walk)
+walk_by_index(hs_ball *ball)
 {
-    const hs_span_of_cells *span = walk->ball->span;
-    const int               d = walk->ball->list->lattice.ndim;
+    const hs_span_of_cells *span = ball->span;
+    const int               d = ball->list->lattice.ndim;
     int64_t                 u[HS_MAX_DIM], index[HS_MAX_DIM] = {0}, along[HS_MAX_DIM] = {0};
     part                    parts[HS_MAX_DIM];
     for (int k = 0; k < d; k++) {
@@ -768,14 +752,14 @@ walk_by_index(ball_walk *walk)
         double   gap = 0.0;
         uint64_t number = 0;
         for (int k = 0; k < d; k++) {
-            parts[k] = k >= moved ? part_of(walk, k, u[k]) : parts[k];
+            parts[k] = k >= moved ? part_of(ball, k, u[k]) : parts[k];
             gap += parts[k].gap;
             number += parts[k].number;
             index[k] = parts[k].index;
             along[k] = parts[k].image;
         }
-        if ((gap <= walk->limit && scan_number(walk, number, index, along, d)) ||
-            !goes_on(walk, 1)) {
+        if ((gap <= ball->limit && scan_number(ball, number, index, along, d)) ||
+            !goes_on(ball, 1)) {
             return true;
         }
     }
@@ -784,34 +768,33 @@ walk_by_index(ball_walk *walk)
 
 /* All cells there are, in each image; of a near walk once. */
 static bool
-walk_all(ball_walk *walk)
+walk_all(hs_ball *ball)
 {
-    const hs_span_of_cells *span = walk->ball->span;
-    const hs_dynamic       *list = walk->ball->list;
+    const hs_span_of_cells *span = ball->span;
+    const hs_dynamic       *list = ball->list;
     const int               d = list->lattice.ndim;
     int64_t                 along[HS_MAX_DIM];
-    walk->filters = list->storage != HS_STORE_ALL_PAIRS;
+    ball->filters = list->storage != HS_STORE_ALL_PAIRS;
     for (int k = 0; k < d; k++) {
         along[k] = span[k].least;
     }
     do {
-        const hs_ball_image *image = walk->visit->is_near ? &walk->ball->home
-                                                          : image_of(walk, along, d);
+        const hs_ball_image *image = ball->visit->is_near ? &ball->home : image_of(ball, along, d);
         for (int64_t c = 0; c < list->cells.n; c++) {
-            if (scan_cell(walk, image, list->cells.cell[c], d)) {
+            if (scan_cell(ball, image, list->cells.cell[c], d)) {
                 return true;
             }
         }
-    } while (!walk->visit->is_near && go_to_next(span, d, true, along) >= 0);
+    } while (!ball->visit->is_near && go_to_next(span, d, true, along) >= 0);
     return false;
 }
 
 /* The cells that there are of a ball: those of an open dense table end where it does. */
 static bool
-take_cells(ball_walk *walk)
+take_cells(hs_ball *ball)
 {
-    const hs_dynamic *list = walk->ball->list;
-    hs_span_of_cells *span = walk->ball->span;
+    const hs_dynamic *list = ball->list;
+    hs_span_of_cells *span = ball->span;
     double            wanted = 1.0, stored = (double)list->cells.n;
     int64_t           reach = 0;
     for (int k = 0; k < list->lattice.ndim; k++, span++) {
@@ -825,21 +808,21 @@ take_cells(ball_walk *walk)
         }
         const int64_t below = span->centre - span->first, above = span->last - span->centre;
         wanted *= (double)(span->last - span->first) + 1.0;
-        stored *= walk->visit->is_near ? 1.0 : (double)(span->most - span->least) + 1.0;
-        walk->meets_images = walk->meets_images || span->least != 0 || span->most != 0;
+        stored *= ball->visit->is_near ? 1.0 : (double)(span->most - span->least) + 1.0;
+        ball->meets_images = ball->meets_images || span->least != 0 || span->most != 0;
         reach = below > reach ? below : reach;
         reach = above > reach ? above : reach;
     }
     if (reach > 1 && wanted > stored) {
-        return walk_all(walk);
+        return walk_all(ball);
     }
-    if (reach > list->offsets.reach || walk->cut != 0) {
-        return walk_by_index(walk);
+    if (reach > list->offsets.reach || ball->cut != 0) {
+        return walk_by_index(ball);
     }
     switch (list->lattice.ndim) {
-    case 2: return walk_few(walk, (int)reach, 2);
-    case 3: return walk_few(walk, (int)reach, 3);
-    default: return walk_few(walk, (int)reach, list->lattice.ndim);
+    case 2: return walk_few(ball, (int)reach, 2);
+    case 3: return walk_few(ball, (int)reach, 3);
+    default: return walk_few(ball, (int)reach, list->lattice.ndim);
     }
 }
 
@@ -849,9 +832,7 @@ static bool
 walk_ball(hs_ball *ball, const hs_ball_visit *visit)
 {
     const hs_dynamic *list = ball->list;
-    const double      least = hs_larger(ball->radius, LEAST_BALL);
-    /* The limit is above the square of the radius by more than all rounding. */
-    ball_walk walk = {.ball = ball, .visit = visit, .limit = least * least * (1.0 + 0x1p-30)};
+    ball->visit = visit;
     if (visit->is_near) {
         bool is_wide = list->cells.is_wide;
         for (int k = 0; k < list->lattice.ndim; k++) {
@@ -860,16 +841,16 @@ walk_ball(hs_ball *ball, const hs_ball_visit *visit)
             if (n > 0 && span->last - span->first >= n) { /* each cell once, around the centre's */
                 span->first = span->centre - n / 2;
                 span->last = span->first + n - 1;
-                walk.cut |= 1u << k;
+                ball->cut |= 1u << k;
             }
             is_wide = is_wide || span->first < INT32_MIN || span->last > INT32_MAX;
         }
-        walk.filters = !list->cells.dense && is_wide;
+        ball->filters = !list->cells.dense && is_wide;
         if (list->storage == HS_STORE_ALL_PAIRS) {
-            return walk_all(&walk);
+            return walk_all(ball);
         }
     }
-    return take_cells(&walk);
+    return take_cells(ball);
 }
 
 /* Visits the points that a query finds: those near the ball, or exactly within it, for which every

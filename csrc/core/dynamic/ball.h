@@ -97,15 +97,30 @@ typedef struct hs_ball_image {
     double  in, out; /* a square below `in` is surely within, one above `out` surely not */
 } hs_ball_image;
 
+/* What to do with each entry. */
+typedef struct hs_ball_visit {
+    hs_dynamic_fn fn; /* NULL: the first one is enough */
+    void         *user;
+    bool          with_shift;
+    bool          is_near; /* no distances: entries of all cells of the ball, each once */
+} hs_ball_visit;
+
 typedef struct hs_ball {
-    const hs_dynamic *list;
-    double            radius;
-    hs_placed         centre;
-    double            error;  /* of each coordinate of X and P together; 0 in aligned boxes */
-    uint32_t          skip;   /* place of an entry, or HS_NO_PLACE */
-    hs_status         status; /* of the walk: HS_ERR_SHIFT_RANGE, HS_ERR_INTERRUPTED */
-    hs_span_of_cells  span[HS_MAX_DIM];
-    hs_ball_image     home; /* no image */
+    const hs_dynamic    *list;
+    const hs_ball_visit *visit; /* borrowed; set before the walk */
+    double               radius;
+    double               limit; /* cells with larger gaps are beyond the radius */
+    hs_placed            centre;
+    double               error;  /* of each coordinate of X and P together; 0 in aligned boxes */
+    uint32_t             skip;   /* place of an entry, or HS_NO_PLACE */
+    hs_status            status; /* of the walk: HS_ERR_SHIFT_RANGE, HS_ERR_INTERRUPTED */
+    hs_span_of_cells     span[HS_MAX_DIM];
+    unsigned             cut;    /* bit k: each cell in one image, where it is nearest */
+    hs_ball_image        home;   /* no image */
+    hs_ball_image        turned; /* the last image but home, if there is one */
+    bool                 has_turned, meets_images;
+    bool                 filters; /* cells may hold entries that are none of the ball's cells */
+    int64_t              work;    /* entries and cells since the last poll */
 } hs_ball;
 
 /* position: borrowed while the ball is in use. HS_ERR_CUTOFF, HS_ERR_NOT_FINITE,

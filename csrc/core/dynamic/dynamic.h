@@ -15,10 +15,11 @@
 /*
  * dynamic.h: a list of points that come, go and move, each under a key.
  *
- * Each point is an entry: wrapped position, key and cell side by side, so that a query reads cells
- * only. The entries of a cell lie in one block of a power of two; a block that is full is replaced
- * by one of twice the size. A map leads from keys to entries. Removal moves the last entry of the
- * cell into the gap and tells the map: it takes the same time however crowded the cell is.
+ * Each point is an entry: its wrapped position, key, cell and position as given, side by side, so
+ * that a query reads nothing but the entries of cells. The entries of a cell lie in one block of a
+ * power of two; a block that is full is replaced by one of twice the size. A map leads from keys to
+ * entries. Removal moves the last entry of the cell into the gap and tells the map: it takes the
+ * same time however crowded the cell is.
  */
 
 /*
@@ -30,7 +31,8 @@
 #define HS_NO_PLACE    UINT32_MAX
 #define HS_ENTRY_SIZES 32 /* blocks of 2^0 ... 2^31 entries */
 
-/* What follows the coordinates of an entry. */
+/* What follows the coordinates of an entry. The position as given comes behind it, where positions
+ * are wrapped. */
 typedef struct hs_entry_tail {
     int64_t  id;
     int32_t  tag;
@@ -39,11 +41,10 @@ typedef struct hs_entry_tail {
 
 typedef struct hs_entries {
     int            ndim;
-    size_t         stride; /* bytes of an entry: ndim doubles, then the tail */
-    unsigned char *data;   /* owned */
-    double        *given; /* owned: positions as given, ndim each; NULL: they are the coordinates */
-    bool           keeps_given;
-    uint32_t       n_used, capacity;      /* entries in blocks, past or present; that fit */
+    size_t         stride;           /* bytes of an entry: coordinates, tail, position as given */
+    bool           keeps_given;      /* else the coordinates are the position as given */
+    unsigned char *data;             /* owned */
+    uint32_t       n_used, capacity; /* entries in blocks, past or present; that fit */
     uint32_t       spare[HS_ENTRY_SIZES]; /* first free block of each size, or HS_NO_PLACE */
 } hs_entries;
 
@@ -63,7 +64,7 @@ hs_entry_tail_at(const hs_entries *entries, uint32_t place)
 HS_ALWAYS_INLINE double *
 hs_entry_given(const hs_entries *entries, uint32_t place)
 {
-    return entries->keeps_given ? entries->given + (size_t)place * (size_t)entries->ndim
+    return entries->keeps_given ? (double *)(void *)(hs_entry_tail_at(entries, place) + 1)
                                 : hs_entry_at(entries, place);
 }
 

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "dynamic.h"
+#include "../base/sort.h"
 #include "../memory/memory.h"
-
-#include <stdlib.h>
 
 /* storage.c: points in their cells: blocks of entries, the map from keys to these, and tables of
  * cells that are dense, or hold occupied cells only. */
@@ -13,10 +12,11 @@
 void
 hs_stored_init(hs_dynamic *list, bool dense, double most_bytes)
 {
-    const int ndim = list->lattice.ndim;
-    list->entries = (hs_entries){.ndim = ndim,
-                                 .stride = (size_t)ndim * sizeof(double) + sizeof(hs_entry_tail),
-                                 .keeps_given = list->lattice.n_periodic > 0};
+    const int    ndim = list->lattice.ndim;
+    const bool   keeps_given = list->lattice.n_periodic > 0;
+    const size_t numbers = (size_t)ndim * (keeps_given ? 2 : 1) * sizeof(double);
+    list->entries = (hs_entries){
+        .ndim = ndim, .stride = numbers + sizeof(hs_entry_tail), .keeps_given = keeps_given};
     for (int size = 0; size < HS_ENTRY_SIZES; size++) {
         list->entries.spare[size] = HS_NO_PLACE;
     }
@@ -32,9 +32,8 @@ hs_stored_init(hs_dynamic *list, bool dense, double most_bytes)
 void
 hs_stored_free(hs_dynamic *list)
 {
-    void *const owned[] = {list->entries.data,   list->entries.given, list->map.rows,
-                           list->cells.cell,     list->cells.size,    list->cells.index,
-                           list->cells.hash.rows};
+    void *const owned[] = {list->entries.data, list->map.rows,    list->cells.cell,
+                           list->cells.size,   list->cells.index, list->cells.hash.rows};
     for (size_t k = 0; k < sizeof owned / sizeof owned[0]; k++) {
         hs_free(NULL, owned[k]);
     }
@@ -60,15 +59,6 @@ reserve_entries(hs_entries *entries, int64_t more)
     capacity = capacity > MOST_ENTRIES ? MOST_ENTRIES : capacity;
     if (needed > capacity) {
         return false;
-    }
-    if (entries->keeps_given) {
-        double *given = hs_grow(NULL, HS_FOR_ORIGINALS, entries->given,
-                                (int64_t)entries->n_used * entries->ndim, capacity * entries->ndim,
-                                sizeof(double));
-        if (given == NULL) {
-            return false;
-        }
-        entries->given = given; /* larger than it must be if the next is refused */
     }
     unsigned char *data =
         hs_grow(NULL, HS_FOR_POINTS, entries->data, entries->n_used, capacity, entries->stride);
@@ -109,10 +99,6 @@ static void
 copy_entries(const hs_entries *source, uint32_t from, hs_entries *entries, uint32_t to, uint32_t n)
 {
     memcpy(hs_entry_at(entries, to), hs_entry_at(source, from), n * entries->stride);
-    if (entries->keeps_given) {
-        memcpy(hs_entry_given(entries, to), hs_entry_given(source, from),
-               (size_t)n * (size_t)entries->ndim * sizeof(double));
-    }
 }
 
 /* ---- hash tables: rows stand as near behind the one that their mark names as others allow ---- */
@@ -562,12 +548,10 @@ reserve_in_cell(hs_dynamic *list, uint32_t number, int64_t more)
 int64_t
 hs_stored_bytes(const hs_dynamic *list)
 {
-    const size_t place =
-        list->entries.stride +
-        (list->entries.keeps_given ? (size_t)list->lattice.ndim * sizeof(double) : 0);
     const size_t cell =
         DENSE_CELL_BYTES + (list->cells.dense ? 0 : (size_t)list->lattice.ndim * sizeof(int32_t));
-    return (int64_t)list->entries.capacity * (int64_t)place + list->cells.capacity * (int64_t)cell +
+    return (int64_t)list->entries.capacity * (int64_t)list->entries.stride +
+           list->cells.capacity * (int64_t)cell +
            (list->map.n_rows + list->cells.hash.n_rows) * (int64_t)sizeof(hs_hash_row);
 }
 
@@ -700,7 +684,6 @@ hs_stored_remove(hs_dynamic *list, hs_key key)
  */
 
 #define POINTS_A_CELL 4  /* or more: else a hash table grows meanwhile */
-#define FEW_ROWS      16 /* where there are more cells for each row, not all are looked at */
 #define ROWS_AHEAD    32 /* whose memory is fetched before they are written */
 
 /* Row i made ready. given: receives its numbers, which `placed` borrows. Statuses of
@@ -760,41 +743,26 @@ number_rows(hs_dynamic *list, int64_t n, double *const *x, uint32_t *numbers, hs
     return status;
 }
 
-static int
-compare_cells(const void *one, const void *other)
-{
-    const uint32_t a = *(const uint32_t *)one, b = *(const uint32_t *)other;
-    return (a > b) - (a < b);
-}
-
 /* Room in each cell for all rows that go there, as if they were all new; in the order of the cells,
  * so that the blocks of neighbours lie side by side. */
 static bool
 reserve_blocks(hs_dynamic *list, const uint32_t *numbers, int64_t n)
 {
-    const bool    few = n < list->cells.n / FEW_ROWS; /* sorted, else counted */
-    const int64_t n_scratch = few ? n : list->cells.n;
-    uint32_t     *scratch = hs_alloc(NULL, HS_FOR_CELLS, n_scratch, sizeof *scratch);
-    bool          fits = scratch != NULL;
-    if (fits && few) {
-        memcpy(scratch, numbers, (size_t)n * sizeof *scratch);
-        qsort(scratch, (size_t)n, sizeof *scratch, compare_cells);
-        for (int64_t i = 0, begin = 0; fits && i < n; begin = i) {
-            while (i < n && scratch[i] == scratch[begin]) {
-                i++;
-            }
-            fits = reserve_in_cell(list, scratch[begin], i - begin);
-        }
-    } else if (fits) {
-        memset(scratch, 0, (size_t)n_scratch * sizeof *scratch);
-        for (int64_t i = 0; i < n; i++) {
-            scratch[numbers[i]]++;
-        }
-        for (int64_t c = 0; fits && c < n_scratch; c++) {
-            fits = scratch[c] == 0 || reserve_in_cell(list, (uint32_t)c, scratch[c]);
-        }
+    uint64_t *sorted = hs_alloc(NULL, HS_FOR_CELLS, 2 * n, sizeof *sorted);
+    bool      fits = sorted != NULL;
+    for (int64_t i = 0; fits && i < n; i++) {
+        sorted[i] = numbers[i];
     }
-    hs_free(NULL, scratch);
+    if (fits) {
+        hs_sort_numbers(sorted, n, 0, sorted + n);
+    }
+    for (int64_t i = 0, begin = 0; fits && i < n; begin = i) {
+        while (i < n && sorted[i] == sorted[begin]) {
+            i++;
+        }
+        fits = reserve_in_cell(list, (uint32_t)sorted[begin], i - begin);
+    }
+    hs_free(NULL, sorted);
     return fits;
 }
 
@@ -814,7 +782,6 @@ put_rows(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n, d
             const int64_t ahead = i + ROWS_AHEAD;
             const hs_cell cell = list->cells.cell[numbers[ahead]];
             HS_PREFETCH_WRITE(hs_entry_at(&list->entries, cell.start + cell.count));
-            HS_PREFETCH_WRITE(hs_entry_given(&list->entries, cell.start + cell.count));
             HS_PREFETCH_WRITE(&list->map.rows[key_mark(key_at(ids, tags, ahead)) &
                                               (uint64_t)(list->map.n_rows - 1)]);
         }

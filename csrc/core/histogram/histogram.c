@@ -60,7 +60,7 @@ is_inclusive(const histogram_edges *edges, int64_t k)
 
 /* Bits of a float32 that do not choose its cell, in the order in which they are tried. For each
  * power of two there are 128 cells, which tell a hundred bins apart, or 2048 for a thousand, or
- * 32768. Constants make the loop quicker. */
+ * 32768. */
 #define FEW_CELLS  16
 #define MANY_CELLS 12
 #define ALL_CELLS  8
@@ -214,14 +214,19 @@ build_table(const histogram_edges *edges, double extent, edge_table *table)
     return HS_OK;
 }
 
-HS_ALWAYS_INLINE bool
-find_slots(const edge_table *table, const float *squares, int32_t n, int32_t *slots,
-           const int shift)
+/* The slots of n squares, all of them from neighbourhoods up to the table's extent and !(s > out)
+ * for the last edge there. Returns whether any is odd. */
+static bool
+find_slots(const edge_table *table, const float *squares, int32_t n, int32_t *slots)
 {
     const edge_cell *cells = table->cells;
     const int32_t    first = table->first;
-    int32_t          odd = 0;
-    for (int32_t h = 0; h < n; h++) {
+    const int        shift = table->shift;
+    int32_t          odd = cells == NULL;
+    for (int32_t h = 0; cells == NULL && h < n; h++) {
+        slots[h] = 1;
+    }
+    for (int32_t h = 0; cells != NULL && h < n; h++) {
         const int32_t    bits = (int32_t)hs_bits_of_float(squares[h]);
         const int32_t    at = (bits >> shift) - first;
         const edge_cell *cell = &cells[at < 0 ? 0 : at];
@@ -232,24 +237,6 @@ find_slots(const edge_table *table, const float *squares, int32_t n, int32_t *sl
         odd |= slots[h];
     }
     return (odd & 1) != 0;
-}
-
-/* The slots of n squares, all of them from neighbourhoods up to the table's extent and !(s > out)
- * for the last edge there. Returns whether any is odd. */
-static bool
-find_all_slots(const edge_table *table, const float *squares, int32_t n, int32_t *slots)
-{
-    if (table->cells == NULL) {
-        for (int32_t h = 0; h < n; h++) {
-            slots[h] = 1;
-        }
-        return true;
-    }
-    switch (table->shift) {
-    case FEW_CELLS: return find_slots(table, squares, n, slots, FEW_CELLS);
-    case MANY_CELLS: return find_slots(table, squares, n, slots, MANY_CELLS);
-    default: return find_slots(table, squares, n, slots, ALL_CELLS);
-    }
 }
 
 /* The first edge of [low, high) whose limit is not below the square. */
@@ -907,7 +894,7 @@ tally_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hit
     load_block(tally, scanner);
     const bool has_places = tally->plan->points.weights.place != NULL ||
                             tally->plan->asking->weights.place != NULL;
-    const bool is_open = find_all_slots(table, scanner->block.squares, n, tally->slots);
+    const bool is_open = find_slots(table, scanner->block.squares, n, tally->slots);
     if (!tally->plan->has_types) {
         count_hits(tally, first, hits->label, 0, n);
     }

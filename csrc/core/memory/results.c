@@ -257,8 +257,7 @@ static void *
 place(void *raw, size_t bytes)
 {
     char *data = (char *)round_up((uintptr_t)raw + sizeof(hs_chunk), HS_ALIGNMENT);
-    *hs_chunk_of(data) = (hs_chunk){
-        .raw = raw, .lead = (size_t)(data - (char *)raw), .capacity = bytes, .touched = bytes};
+    *hs_chunk_of(data) = (hs_chunk){.raw = raw, .capacity = bytes, .touched = bytes};
     return data;
 }
 
@@ -287,24 +286,6 @@ hs_chunk_free(void *data)
     }
 }
 
-/* A chunk from malloc with another size, the first `kept` bytes of it as they were. */
-static void *
-resize_in_malloc(void *data, size_t bytes, size_t kept)
-{
-    const size_t before = hs_chunk_of(data)->lead;
-    char        *raw = realloc(hs_chunk_of(data)->raw, bytes + OVERHEAD);
-    if (raw == NULL) {
-        return NULL;
-    }
-    /* The data first: the header may come to lie where they are now. */
-    const size_t lead =
-        (size_t)(round_up((uintptr_t)raw + sizeof(hs_chunk), HS_ALIGNMENT) - (uintptr_t)raw);
-    if (lead != before) {
-        memmove(raw + lead, raw + before, kept);
-    }
-    return place(raw, bytes);
-}
-
 /* The first `used` bytes have been written. */
 static void
 chunk_touch(void *data, size_t used)
@@ -322,33 +303,32 @@ chunk_touch(void *data, size_t used)
     }
 }
 
+/* A new chunk of `bytes` bytes, of the same kind or in pages, with the first `used` of this one,
+ * which is freed. NULL when refused: this one stays as it was. */
+static void *
+chunk_copy(void *data, size_t bytes, size_t used)
+{
+    const bool in_pages = hs_chunk_of(data)->length > 0;
+    void      *copy = in_pages ? new_in_pages(bytes) : hs_chunk_new(bytes);
+    if (copy != NULL) {
+        memcpy(copy, data, used);
+        chunk_touch(copy, used);
+        hs_chunk_free(data);
+    }
+    return copy;
+}
+
 /* Room for `bytes` bytes, more than before, the first `used` of them kept. May move; NULL when
  * refused: the chunk stays as it was. */
 static void *
 chunk_grow(void *data, size_t bytes, size_t used)
 {
-    const bool in_pages = hs_chunk_of(data)->length > 0;
-    if (bytes > PTRDIFF_MAX / 2) {
-        return NULL;
+    void *grown = NULL;
+    if (hs_chunk_of(data)->length > 0 && bytes <= PTRDIFF_MAX / 2) {
+        grown = grow_in_pages(data, bytes);
     }
-    if (in_pages) {
-        void *grown = grow_in_pages(data, bytes);
-        if (grown != NULL) {
-            return grown;
-        }
-    }
-    if (in_pages || bytes >= HS_PAGES_FROM) {
-        /* From malloc to pages; or Linux cannot move a mapping in one piece, as in a process forked
-         * from the one that made it. */
-        void *copy = new_in_pages(bytes);
-        if (copy != NULL) {
-            memcpy(copy, data, used);
-            chunk_touch(copy, used);
-            hs_chunk_free(data);
-            return copy;
-        }
-    }
-    return in_pages ? NULL : resize_in_malloc(data, bytes, used);
+    /* Linux cannot move a mapping in one piece in a process forked from the one that made it. */
+    return grown != NULL ? grown : chunk_copy(data, bytes, used);
 }
 
 void
@@ -374,7 +354,7 @@ hs_chunk_cut(void *data, size_t bytes, void **rest)
         return data;
     }
     const size_t kept = bytes + bytes / SPARE_PART;
-    void        *shrunk = kept < chunk->capacity ? resize_in_malloc(data, kept, bytes) : NULL;
+    void        *shrunk = kept < chunk->capacity ? chunk_copy(data, kept, bytes) : NULL;
     return shrunk != NULL ? shrunk : data;
 }
 

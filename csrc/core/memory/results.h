@@ -26,7 +26,6 @@
 typedef struct hs_chunk {
     void   *raw;      /* the mapping, or what malloc returned */
     size_t  length;   /* of the mapping; 0 for malloc */
-    size_t  lead;     /* bytes before the data, for malloc */
     size_t  capacity; /* bytes of data that may be written */
     size_t  touched;  /* bytes of data that are taken to be resident */
     size_t  huge;     /* bytes of data advised for huge pages; small ones follow */

@@ -107,7 +107,6 @@ build_asking_tree(hs_nearest *near, hs_scene *asking)
 {
     hs_search *search = near->search;
     search->has_queries = true;
-    near->asking = &near->asking_tree;
     const hs_status status = hs_tree_build(&search->call->account, search->call->team,
                                            &search->call->options, asking, LEAF_POINTS,
                                            &search->query_bins, &near->asking_tree);
@@ -128,7 +127,6 @@ prepare_anew(hs_nearest *near, const hs_sets *sets, const hs_box *box, double li
     bounded.least_cutoff = hs_choice_least_length(search->call->choice, bounded.within);
     options.cutoff = cutoff;
     hs_call_gather(search->call, sets->points->n + (asking != NULL ? sets->queries->n : 0));
-    near->asking = &near->tree;
     hs_status status = hs_scene_make(&search->call->account, search->call->team, &bounded, box,
                                      &options, &search->scene, asking, failure);
     if (status != HS_OK) {
@@ -225,7 +223,6 @@ prepare_from_kept(hs_nearest *near, const hs_sets *sets, const hs_box *box, doub
     near->k = own.k;
     near->omits_self = own.omits_self;
     near->rows = own.rows;
-    near->asking = &near->tree;
     search->scene = *scene;
     search->bins = kept->search.bins;
     search->is_borrowed = true;
@@ -287,6 +284,10 @@ hs_nearest_release(hs_nearest *near)
  * it. */
 #define FARTHEST 1.25
 #define AHEAD    8 /* points from prefetching a row to writing it */
+/* A point with more hits than so many for each wanted one, and a few, walks down the tree by
+ * itself, which is quicker: from far away, nearly all points may be within the radius. */
+#define HITS_PER_WANTED 32.0
+#define FEW_HITS        256.0
 /* A thread takes subtrees at a time whose groups share a walk down the tree: at most a so many-th
  * part of all points, so that there is enough for all threads, within these bounds. Measured: with
  * more points the walk is a smaller part of the work. */
@@ -380,23 +381,33 @@ search_point(nearest_worker *worker, int32_t si)
     return write_row(worker, count, status);
 }
 
-/* Ranks the hits of the group's points in its block. Sets bits of those for which they do not
- * suffice: *left, bit t of point t. */
+/* Ranks the hits of the group's points in its block. Sets bit t of *left where point t is to walk
+ * by itself: its hits do not suffice, or are too many. */
 static hs_status
 search_block(nearest_worker *worker, const hs_nearest_group *group, uint64_t *left)
 {
     const hs_nearest *near = worker->job->near;
     hs_nearest_block *block = &worker->block;
     const int32_t     n_points = group->last - group->first;
-    int32_t           end[HS_GROUP_POINTS];
+    const double      wanted = near->search->call->choice == NULL ? (double)near->k : INFINITY;
+    int32_t           end[HS_GROUP_POINTS], n_many = 0;
     hs_status         status = HS_OK;
     worker->n_groups++;
     worker->n_candidates += (int64_t)n_points * block->n;
     for (int32_t first = 0, next; first < n_points && status == HS_OK; first = next) {
+        if (first > 0 && n_many == first) { /* all so far: the others, too, probably */
+            *left = UINT64_MAX;
+            break;
+        }
         next = hs_nearest_block_scan(near, group, block, first, end);
         for (int32_t t = first; t < next && status == HS_OK; t++) {
             const int32_t begin = t > first ? end[t - 1] : 0;
             int64_t       count;
+            if (end[t] - begin > HITS_PER_WANTED * wanted + FEW_HITS) {
+                *left |= UINT64_C(1) << t;
+                n_many++;
+                continue;
+            }
             if (t + AHEAD < n_points) {
                 hs_nearest_prefetch(&worker->writer, group->first + t + AHEAD);
             }
@@ -571,10 +582,11 @@ list_parts(nearest_job *job, const hs_tree *tree, int32_t *stack)
 hs_status
 hs_nearest_search(hs_nearest *near, hs_failure *failure)
 {
-    hs_search    *search = near->search;
-    hs_account   *account = &search->call->account;
-    nearest_job   job = {.near = near};
-    const int64_t n = hs_search_asking(search)->n;
+    hs_search     *search = near->search;
+    hs_account    *account = &search->call->account;
+    const hs_tree *asking = search->has_queries ? &near->asking_tree : &near->tree;
+    nearest_job    job = {.near = near};
+    const int64_t  n = hs_search_asking(search)->n;
     if (near->tree.n_nodes == 0) {
         hs_nearest_writer writer;
         hs_nearest_writer_init(near, &writer);
@@ -582,17 +594,17 @@ hs_nearest_search(hs_nearest *near, hs_failure *failure)
             hs_nearest_write_nothing(&writer, row, 0);
         }
     }
-    if (near->tree.n_nodes == 0 || near->asking->n_nodes == 0) {
+    if (near->tree.n_nodes == 0 || asking->n_nodes == 0) {
         return HS_OK;
     }
-    const int64_t most_parts = near->asking->n_nodes + n / GROUP_POINTS + 1;
-    int32_t      *stack = hs_alloc(account, HS_FOR_STENCIL, near->asking->depth + 3, sizeof *stack);
+    const int64_t most_parts = asking->n_nodes + n / GROUP_POINTS + 1;
+    int32_t      *stack = hs_alloc(account, HS_FOR_STENCIL, asking->depth + 3, sizeof *stack);
     job.parts = hs_alloc(account, HS_FOR_STENCIL, most_parts, sizeof *job.parts);
     job.ranges = hs_alloc(account, HS_FOR_STENCIL, most_parts + 1, sizeof *job.ranges);
     near->shared = hs_shared_new(account, HS_FOR_CANDIDATES);
     hs_status status = HS_ERR_MEMORY;
     if (stack != NULL && job.parts != NULL && job.ranges != NULL && near->shared != NULL) {
-        list_parts(&job, near->asking, stack);
+        list_parts(&job, asking, stack);
         hs_crew crew = {.call = search->call,
                         .job = &job,
                         .worker_size = sizeof(nearest_worker),

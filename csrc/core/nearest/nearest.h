@@ -13,24 +13,23 @@
  */
 
 typedef struct hs_nearest {
-    hs_search     *search;      /* borrowed: scene, bins, call */
-    hs_tree        tree;        /* of the points; owned unless the search is borrowed */
-    hs_tree        asking_tree; /* owned; of the queries, if there are any */
-    const hs_tree *asking;      /* the tree of the asking points */
-    int64_t        k;           /* points wanted for each */
-    bool           omits_self;  /* without queries: a point is not its own neighbour */
-    double         limit;       /* largest distance in the scene's unit; infinity: none */
-    hs_metric      within;      /* decides on the largest distance, if there is one */
-    double         least;       /* and the least one that counts; 0: none */
-    hs_metric      nearer;      /* decides on that */
-    hs_metric      order;       /* decides which is nearer */
-    double         drift[HS_MAX_DIM][HS_MAX_DIM]; /* [k][r]: how far row r of B moves t_k beyond
+    hs_search *search;      /* borrowed: scene, bins, call */
+    hs_tree    tree;        /* of the points; owned unless the search is borrowed */
+    hs_tree    asking_tree; /* owned; of the queries, if there are any */
+    int64_t    k;           /* points wanted for each */
+    bool       omits_self;  /* without queries: a point is not its own neighbour */
+    double     limit;       /* largest distance in the scene's unit; infinity: none */
+    hs_metric  within;      /* decides on the largest distance, if there is one */
+    double     least;       /* and the least one that counts; 0: none */
+    hs_metric  nearer;      /* decides on that */
+    hs_metric  order;       /* decides which is nearer */
+    double     drift[HS_MAX_DIM][HS_MAX_DIM]; /* [k][r]: how far row r of B moves t_k beyond
                                                    * whole periods */
-    double         smallest_period;               /* infinity without one */
-    bool           has_layer; /* some axes repeat, others, upright on them, are open: */
-    double         layer_lower[HS_MAX_DIM], layer_upper[HS_MAX_DIM]; /* t_k of points along these */
-    hs_output     *rows;                                             /* borrowed */
-    hs_shared     *shared; /* owned; for what threads need more of */
+    double     smallest_period;               /* infinity without one */
+    bool       has_layer; /* some axes repeat, others, upright on them, are open: */
+    double     layer_lower[HS_MAX_DIM], layer_upper[HS_MAX_DIM]; /* t_k of points along these */
+    hs_output *rows;                                             /* borrowed */
+    hs_shared *shared; /* owned; for what threads need more of */
 } hs_nearest;
 
 /*

@@ -26,8 +26,8 @@ hs_nearest_ranker_init(hs_nearest_ranker *ranker)
 {
     const hs_nearest *near = ranker->near;
     const int64_t     room = near->tree.depth + 2;
-    return hs_shared_resize(near->shared, (void **)&ranker->stack, 0, room, sizeof(int32_t)) &&
-                   hs_shared_resize(near->shared, (void **)&ranker->gaps, 0, room, sizeof(double))
+    return hs_shared_resize(near->shared, (void **)&ranker->waiting, 0, room,
+                            sizeof *ranker->waiting)
                ? HS_OK
                : HS_ERR_MEMORY;
 }
@@ -40,8 +40,7 @@ hs_nearest_ranker_free(hs_nearest_ranker *ranker)
     hs_shared_release(shared, (void **)&ranker->spare);
     hs_shared_release(shared, (void **)&ranker->least);
     hs_shared_release(shared, (void **)&ranker->walked);
-    hs_shared_release(shared, (void **)&ranker->stack);
-    hs_shared_release(shared, (void **)&ranker->gaps);
+    hs_shared_release(shared, (void **)&ranker->waiting);
 }
 
 void
@@ -566,21 +565,19 @@ are_too_near(const near_walk *walk, const double *lower, const double *upper, in
 HS_ALWAYS_INLINE hs_status
 walk_tree(near_walk *walk, const int ndim)
 {
-    hs_nearest_ranker *ranker = walk->ranker;
-    const hs_tree     *tree = &ranker->near->tree;
-    const double       unit = ranker->frame.unit;
-    int32_t           *stack = ranker->stack;
-    double            *gaps = ranker->gaps;
-    const bool         has_least = walk->least > 0.0;
-    int64_t            n_waiting = 1;
-    stack[0] = 0;
-    gaps[0] = hs_tree_gap(tree, walk->at, walk->at, unit);
-    if (has_least && are_too_near(walk, tree->lower, tree->upper, 1, gaps[0])) {
+    hs_nearest_ranker  *ranker = walk->ranker;
+    const hs_tree      *tree = &ranker->near->tree;
+    const double        unit = ranker->frame.unit;
+    hs_nearest_waiting *waiting = ranker->waiting;
+    const bool          has_least = walk->least > 0.0;
+    int64_t             n_waiting = 1;
+    waiting[0] = (hs_nearest_waiting){hs_tree_gap(tree, walk->at, walk->at, unit), 0};
+    if (has_least && are_too_near(walk, tree->lower, tree->upper, 1, waiting[0].gap)) {
         return HS_OK;
     }
     while (n_waiting > 0) {
-        const hs_tree_node *node = &tree->nodes[stack[--n_waiting]];
-        double              gap[2] = {gaps[n_waiting], INFINITY};
+        const hs_tree_node *node = &tree->nodes[waiting[--n_waiting].number];
+        double              gap[2] = {waiting[n_waiting].gap, INFINITY};
         int                 nearer = 0;
         while (gap[nearer] <= walk->bound && node->left != 0) { /* down to the nearest leaf */
             const int32_t left = node->left;
@@ -593,8 +590,7 @@ walk_tree(near_walk *walk, const int ndim)
                 }
             }
             nearer = gap[1] < gap[0];
-            stack[n_waiting] = left + 1 - nearer;
-            gaps[n_waiting] = gap[1 - nearer];
+            waiting[n_waiting] = (hs_nearest_waiting){gap[1 - nearer], left + 1 - nearer};
             n_waiting += gap[1 - nearer] <= walk->bound;
             node = &tree->nodes[left + nearer];
         }

@@ -19,6 +19,12 @@ typedef struct hs_nearest_key {
     int32_t number, image;
 } hs_nearest_key;
 
+/* A node of the tree, and the squared distance to it. */
+typedef struct hs_nearest_waiting {
+    double  gap;
+    int32_t number;
+} hs_nearest_waiting;
+
 /* Steps between two polls: some milliseconds, even of exact comparisons. */
 #define HS_NEAREST_POLL_STEPS (INT64_C(1) << 15)
 
@@ -37,13 +43,12 @@ typedef struct hs_nearest_ranker {
     hs_stages               stages;
     int64_t                 n_compared;
     /* Of a walk. */
-    double           *least; /* owned: a heap of the least squares so far, the largest first */
-    int64_t           n_least, least_capacity;
-    hs_nearest_image *walked; /* owned: images in which keys are */
-    int32_t           n_walked, walked_capacity;
-    int32_t          *stack; /* owned: nodes that are left to look at, and how far they are */
-    double           *gaps;
-    int64_t           n_met; /* points so far */
+    double             *least; /* owned: a heap of the least squares so far, the largest first */
+    int64_t             n_least, least_capacity;
+    hs_nearest_image   *walked; /* owned: images in which keys are */
+    int32_t             n_walked, walked_capacity;
+    hs_nearest_waiting *waiting; /* owned: nodes that are left to look at */
+    int64_t             n_met;   /* points so far */
 } hs_nearest_ranker;
 
 /* For the near and options that are set. hs_nearest_ranker_free in any case. */

@@ -315,7 +315,8 @@ fill(table *all, hs_failure *failure)
 #define COUNTED_WALKS  2.0  /* or one that counts and one that orders */
 #define CLEARLY        0.7
 
-#define LEAST_SORTED 256       /* asking points: below, walks cost little */
+#define LEAST_SORTED 256       /* asking points: of fewer, walks over many entries cost little: */
+#define FEW_ENTRIES  12.0      /* so these must have no more in a row */
 #define CACHED       (1 << 20) /* bytes that the second-level cache holds */
 #define SORTED_BYTES (5 << 20) /* most bytes for what is found and sorted, and so many ... */
 #define SORTED_BY_N  8         /* ... for each asking point */
@@ -331,17 +332,21 @@ sorts(const table *all)
     const int        ndim = search->scene.ndim;
     const double     n = (double)asking->n;
     if (search->limits != NULL || call->choice != NULL || call->options.precision != HS_EXACT ||
-        n < LEAST_SORTED || search->bins.n == 0) {
+        search->bins.n == 0 || asking->n == 0) {
         return false;
     }
     /* Entries of a row: as many as in an even scene, times what points are closer together. Sparse
      * cells do not tell: then the ball's part of three cells a side, each as wide as the cutoff. */
-    const double candidates = hs_search_candidates(search) / n;
     const double crowd = hs_larger(hs_search_crowd(search), 1.0);
-    const double part = hs_ball_volume(ndim, 1.0) / pow(3.0, ndim);
-    const double entries =
-        search->pairs_per_half *
-        (search->is_sparse ? part * candidates : search->grid.expected_pairs / n * crowd);
+    double       entries = search->pairs_per_half * search->grid.expected_pairs / n * crowd;
+    if (n < LEAST_SORTED && entries > FEW_ENTRIES) {
+        return false;
+    }
+    const double candidates = hs_search_candidates(search) / n;
+    if (search->is_sparse) {
+        const double part = hs_ball_volume(ndim, 1.0) / pow(3.0, ndim);
+        entries = search->pairs_per_half * part * candidates;
+    }
     const double pairs = search->has_queries || search->is_half ? entries : 0.5 * entries;
     const double measures = (double)hs_want_bytes(columns & ~(HS_WANT_I | HS_WANT_J), ndim, 4);
     const double found = n * pairs * (double)hs_want_bytes(columns, ndim, 4);
@@ -377,8 +382,7 @@ sort_list(table *all, hs_failure *failure)
         status = hs_output_check_opposites(found, failure);
     }
     if (status == HS_OK) {
-        status = is_once ? hs_sort_pairs(call, 0, n, found, entries)
-                         : hs_sort_rows(call, n, found, both_ways, all->offsets, entries);
+        status = hs_sort_pairs(call, 0, n, found, both_ways, all->offsets, entries);
     }
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = (both_ways ? 2.0 : 1.0) * (double)found->n_pairs;

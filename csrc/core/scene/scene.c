@@ -206,11 +206,12 @@ hs_scene_name_outlier(const hs_scene *scene, const hs_scene *asking, hs_failure 
 
 /* Points and queries in one scene, at once or one after the other: bounds must hold for both. */
 
-/* How much further from the box than the points queries may be that come later, and how many box
- * vectors at least, before they need bounds of their own. Bounds that are so much wider cost next
- * to nothing: they are some units in the last place. */
-#define FURTHER     4.0
-#define BOX_VECTORS 1024.0
+/* Queries that come later share the bounds of the points up to so many times their distance from
+ * the box, and so many box vectors at least. Bounds that are so much wider cost next to nothing:
+ * they are some units in the last place, and in open space no bound depends on it. */
+#define FURTHER               4.0
+#define FURTHER_IN_OPEN_SPACE 1024.0
+#define BOX_VECTORS           1024.0
 /* Along coordinate axes cells are found for any number, as long as sums of a few are finite. */
 #define MOST_FOR_CELLS 0x1p900
 
@@ -275,14 +276,15 @@ static void
 scene_make_room(hs_scene *scene, double *magnitude)
 {
     const hs_lattice *lattice = &scene->lattice;
+    const double      further = lattice->n_periodic > 0 ? FURTHER : FURTHER_IN_OPEN_SPACE;
     double            away = 0.0;
     for (int r = 0; r < lattice->n_periodic; r++) {
         for (int k = 0; k < lattice->ndim; k++) {
             away = hs_larger(BOX_VECTORS * fabs(lattice->rows[r][k]), away);
         }
     }
-    scene->cloud.largest = hs_larger(FURTHER * scene->cloud.largest, away);
-    *magnitude = hs_larger(FURTHER * *magnitude, away);
+    scene->cloud.largest = hs_larger(further * scene->cloud.largest, away);
+    *magnitude = hs_larger(further * *magnitude, away);
     for (int k = 0; k < scene->ndim; k++) {
         double across = 0.0; /* what is wrapped lies within half of each row of B */
         for (int r = 0; r < lattice->n_periodic; r++) {
@@ -290,7 +292,7 @@ scene_make_room(hs_scene *scene, double *magnitude)
         }
         scene->x_largest[k] = 2.0 * hs_larger(scene->x_largest[k], across);
         if (across == 0.0) { /* queries stay wherever they are along this axis */
-            scene->x_largest[k] = hs_larger(2.0 * scene->x_largest[k], away);
+            scene->x_largest[k] = hs_larger(further * scene->x_largest[k], away);
         }
     }
 }

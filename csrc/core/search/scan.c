@@ -712,7 +712,7 @@ begin(hs_search *search, hs_block_use use, bool is_ordered, hs_scanner *scanner)
         scanner->scans = HS_BLOCK_LISTS_PLACES;
     }
     scanner->is_ordered = is_ordered;
-    scanner->candidate_limit = INT64_MAX;
+    scanner->gather_limit = INT64_MAX;
 }
 
 hs_status
@@ -1073,6 +1073,7 @@ fill_block(hs_scanner *scanner)
 {
     hs_block *block = &scanner->block;
     scanner->n_blocks++;
+    scanner->n_gathered += block->n;
     scanner->work_since_poll += WORK_OF_BLOCK + block->n;
     if (!(scanner->group.near.out < INFINITY)) {
         form_prune(scanner);
@@ -1107,7 +1108,7 @@ end_block(hs_scanner *scanner)
     scanner->block.has_images = false;
     scanner->block_is_first = false;
     scanner->blocks++;
-    if (scanner->n_candidates > scanner->candidate_limit || scanner->leaves) {
+    if (scanner->n_gathered > scanner->gather_limit || scanner->leaves) {
         return HS_STOPPED;
     }
     if (scanner->work_since_poll > POLL_WORK) {
@@ -1119,7 +1120,7 @@ end_block(hs_scanner *scanner)
 
 /*
  * Tests every point of the group against what has been appended to the block, unless it is one to
- * skip, then empties it. HS_STOPPED past the candidate limit, or when a visitor leaves; what the
+ * skip, then empties it. HS_STOPPED past the gather limit, or when a visitor leaves; what the
  * visitor or the poll say.
  */
 static hs_status

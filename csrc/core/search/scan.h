@@ -193,11 +193,12 @@ struct hs_scanner {
     bool             block_is_first; /* of its group: candidate t is group point t; half lists */
     hs_neighbourhood of_group, most; /* of the present group, of any so far */
     int64_t          n_found;
-    bool             leaves;          /* set by a visitor: HS_STOPPED once the block is done */
-    int32_t          blocks;          /* of the present group, scanned or skipped so far */
-    int32_t          blocks_to_skip;  /* of the next group; they were scanned before */
-    int64_t          candidate_limit; /* the walk ends with HS_STOPPED when it has tested more */
-    int64_t          failed_point;    /* whose shift passed its range, for HS_ERR_SHIFT_RANGE */
+    bool             leaves;         /* set by a visitor: HS_STOPPED once the block is done */
+    int32_t          blocks;         /* of the present group, scanned or skipped so far */
+    int32_t          blocks_to_skip; /* of the next group; they were scanned before */
+    int64_t          n_gathered;     /* candidates in blocks, tested or left out */
+    int64_t          gather_limit;   /* the walk ends with HS_STOPPED when they are more */
+    int64_t          failed_point;   /* whose shift passed its range, for HS_ERR_SHIFT_RANGE */
     hs_stages        stages;
     int64_t          n_groups, n_blocks, n_candidates, n_ambiguous;
     int64_t          work_since_poll;
@@ -236,7 +237,7 @@ void hs_scanner_start(hs_scanner *scanner, int32_t first, int32_t last);
 /*
  * Appends points [si, end) of one image to the neighbourhood; a full block is tested first. shift:
  * the image's displacement, ndim doubles; image: that displacement over the rows of B. HS_STOPPED
- * past the candidate limit, or when a visitor leaves; what the visitor or the poll say.
+ * past the gather limit, or when a visitor leaves; what the visitor or the poll say.
  */
 hs_status hs_scanner_append(hs_scanner *scanner, int32_t si, int32_t end, const double *shift,
                             const int32_t *image);

@@ -178,14 +178,14 @@ take_sample(hs_search *search, int64_t most, int64_t step, sample *taken)
     }
     for (; status == HS_OK && taken->taken < samples && work < SAMPLE_WORK; taken->taken++) {
         const int64_t s = samples == n ? taken->taken : taken->taken * step % samples;
-        const int64_t before = walker.scanner.n_candidates;
+        const int64_t before = walker.scanner.n_gathered;
         walker.scanner.n_found = 0;
-        walker.scanner.candidate_limit = before + (int64_t)SAMPLE_WORK;
+        walker.scanner.gather_limit = before + (int64_t)SAMPLE_WORK;
         status = hs_walk_point(&walker, (int32_t)((2 * s + 1) * n / (2 * samples)));
         HS_ASSERT(status != HS_ERR_SHIFT_RANGE); /* counting needs no S */
         taken->sum += (double)walker.scanner.n_found;
         taken->squares += (double)walker.scanner.n_found * (double)walker.scanner.n_found;
-        work += (double)(walker.scanner.n_candidates - before) +
+        work += (double)(walker.scanner.n_gathered - before) +
                 WORK_OF_ROW * (double)search->stencil.n_rows;
     }
     hs_walker_close(search, &walker);
@@ -208,6 +208,22 @@ hs_estimate_pairs(hs_search *search, double *pairs)
     return status;
 }
 
+/* At least as many pairs as there are: of each two points, those images that the range along all
+ * axes holds at once, and no more than all candidates. */
+static double
+most_pairs(const hs_search *search)
+{
+    const hs_lattice *lattice = &search->scene.lattice;
+    double            most = (double)search->bins.n * (double)hs_search_asking(search)->n;
+    most *= search->is_half && !search->has_queries ? 0.5 : 1.0;
+    for (int k = 0; k < lattice->ndim; k++) {
+        if (lattice->row_of_axis[k] >= 0) {
+            most *= floor(2.0 * search->grid.range[k] / lattice->period[k]) + 1.0;
+        }
+    }
+    return most > 0.0 ? hs_smaller(hs_search_candidates(search), most) : 0.0;
+}
+
 /* The part of what is free that a result may seem to need: its density may be off by a third. */
 #define SEEMS_SMALL 0.75
 
@@ -217,8 +233,7 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     hs_account   *account = &search->call->account;
     const double  bytes_per_pair = bytes_of_search(search);
     const int64_t n = hs_search_asking(search)->n;
-    const double  candidates = n > 0 ? hs_search_candidates(search) : 0.0;
-    const double  bound = candidates * bytes_per_pair;
+    const double  bound = most_pairs(search) * bytes_per_pair;
     const double  by_density = search->grid.expected_pairs * search->pairs_per_half;
     const bool    is_uneven = search->is_sparse || hs_search_crowd(search) > EVEN;
     const bool    is_large = bytes_per_pair > BYTES_OF_INDICES && bound > LARGE_RESULT;

@@ -308,23 +308,23 @@ fill(const checking *recheck, slab_hits *slab, const int32_t *bundle, const int3
 static void
 decide_unsure(const checking *recheck, slab_hits *slab)
 {
-    const int d = recheck->d;
-    int32_t   gone[HS_SLAB], n_gone = 0;
-    for (int32_t u = 0; u < slab->of.n_open; u++) {
-        const hs_open_pair *open = &slab->open[u];
-        const hs_bundle    *of = &slab->of.bundles[open->bundle];
-        const int64_t       b = slab->of.j[slab->of.first + open->pair];
-        double              p[HS_MAX_DIM], q[HS_MAX_DIM];
-        int64_t             shift[HS_MAX_DIM];
-        for (int k = 0; k < d; k++) {
-            p[k] = coordinate_of(recheck, of->point, k, d);
-            q[k] = coordinate_of(recheck, b, k, d);
+    const int32_t n_open = slab->of.n_open;
+    int32_t       gone[HS_SLAB], bundle[HS_BATCH], place[HS_BATCH], n_gone = 0;
+    uint8_t       within[HS_IN_BATCH];
+    for (int32_t first = 0; first < n_open; first += HS_BATCH) {
+        const hs_open_pair *open = slab->open + first;
+        const int32_t       n = n_open - first < HS_BATCH ? n_open - first : HS_BATCH;
+        for (int32_t e = 0; e < n; e++) {
+            bundle[e] = open[e].bundle;
+            place[e] = slab->of.j[slab->of.first + open[e].pair];
         }
-        for (int r = 0; r < recheck->m; r++) {
-            shift[r] = shift_between(recheck, slab, of, b, r);
+        fill(recheck, slab, bundle, place, n);
+        hs_measured_decide(recheck->call->kernel, recheck->metric, &slab->batch, within,
+                           &slab->stages);
+        for (int32_t e = 0; e < n; e++) {
+            gone[n_gone] = open[e].at;
+            n_gone += !within[e];
         }
-        gone[n_gone] = open->at;
-        n_gone += !hs_metric_within(recheck->metric, p, q, shift, &slab->stages);
     }
     for (int32_t g = 0, to = gone[0]; g < n_gone; g++) {
         const int32_t from = gone[g] + 1, end = g + 1 < n_gone ? gone[g + 1] : slab->of.n_hits;
@@ -922,7 +922,7 @@ run_sorted(checking *recheck, hs_output *output, hs_failure *failure)
     recheck->output = &found;
     hs_status status = run(recheck, failure);
     if (status == HS_OK) {
-        status = hs_sort_pairs(call, 0, recheck->now->points.n, &found, output);
+        status = hs_sort_pairs(call, 0, recheck->now->points.n, &found, false, NULL, output);
     }
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = (double)found.n_pairs;

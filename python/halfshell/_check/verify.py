@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _show
-from halfshell._convert.arrays import as_listed
+from halfshell._convert.arrays import are_backward, as_listed
 from halfshell._convert.call import DIRECTED, Call, each_system, part_of, take
 from halfshell._convert.foreign import is_a
 from halfshell._convert.memory import SMALL
@@ -264,12 +264,7 @@ def _reversed(rows: IntArray) -> IntArray:
 
 def _as_half(rows: IntArray) -> IntArray:
     """Each row turned so that i < j, or i == j with the first nonzero component of S positive."""
-    backward = rows[:, 0] > rows[:, 1]
-    same = rows[:, 0] == rows[:, 1]
-    undecided = same
-    for column in range(2, rows.shape[1]):
-        backward |= undecided & (rows[:, column] < 0)
-        undecided = undecided & (rows[:, column] == 0)
+    backward = are_backward(rows[:, 0], rows[:, 1], rows[:, 2:])
     return np.where(backward[:, None], _reversed(rows), rows)
 
 

@@ -28,11 +28,12 @@ from halfshell._cli.errors import InputError
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
-_QUOTED = re.compile(r'"[^"]*"')
+_QUOTED = re.compile(r"\"[^\"]*\"|(?<![^\s;|,])'[^']*'")  # single ones where a field begins
 _MOST_UNNAMED = 3
 _AT_ONCE = 4096  # lines
 _MOST_AXES = 8
 MOST_SHOWN = 12  # names of columns in a message
+_NOT_COMMA = (";", "\t", "|")  # what separates fields that may have decimal commas
 _PTS = {n: "x y z intensity r g b".split()[:n] for n in (3, 4, 7)} | {6: "x y z r g b".split()}
 
 # What may stand beside the letter or the number of an axis.
@@ -178,7 +179,7 @@ class Text:
             widths = {len(text.split()) for text in texts}
         else:
             widths = {text.count(self.separator) + 1 for text in texts}
-        has_marks = self.separator in (";", "\t") and self.mark != "."  # which are to be compared
+        has_marks = self.separator in _NOT_COMMA and self.mark != "."  # which are to be compared
         if widths != {self.width} or (has_marks and (self.mark or "." in "".join(texts))):
             return None
         try:
@@ -209,7 +210,7 @@ class Text:
     def _number(self, word: str, where: str) -> float:
         """A field as a number; decimals are behind commas or points, in one file all the same."""
         text = word
-        if self.separator in (";", "\t") and ("," in word or "." in word):
+        if self.separator in _NOT_COMMA and ("," in word or "." in word):
             mark = "," if "," in word else "."
             if (self.mark or mark) != mark:
                 raise InputError(
@@ -230,7 +231,7 @@ class Text:
 def _separator(line: int, text: str) -> str | None:
     """What separates the fields of a line; None for white space."""
     plain = _QUOTED.sub("", text)
-    found = next((one for one in (";", "\t", ",") if one in plain), None)
+    found = next((one for one in (";", "\t", "|", ",") if one in plain), None)
     words = text.split()
     if found == "," and len(words) > 1 and all(map(_DECIMAL_COMMA.fullmatch, words)):
         raise InputError(
@@ -241,12 +242,14 @@ def _separator(line: int, text: str) -> str | None:
 
 
 def _split(text: str, separator: str | None) -> list[str]:
-    if separator is None:
-        return text.split()
+    """The fields of a line, without quotes around them, which are double or single ones."""
     fields = text.split(separator)
-    if '"' in text:  # quoted fields may hold what separates others
-        (fields,) = csv.reader([text], delimiter=separator, skipinitialspace=True)
-    return [field.strip().strip('"').strip() for field in fields]
+    quotes = [one for one in "\"'" if any(field.strip().startswith(one) for field in fields)]
+    for quote in quotes[:1]:  # quoted fields may hold what separates others
+        (fields,) = csv.reader([text] if separator else [" ".join(fields)],
+                               delimiter=separator or " ", quotechar=quote,
+                               skipinitialspace=True)  # fmt: skip
+    return [field.strip().strip("".join(quotes)).strip() for field in fields]
 
 
 # ---- columns -----------------------------------------------------------------------------------

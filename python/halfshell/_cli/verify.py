@@ -163,7 +163,7 @@ def run(args: Namespace) -> int:
     if args.against and isinstance(args.cutoff, dict):
         raise InputError("--against takes one cutoff for all pairs")
     if args.against:
-        from halfshell_report.against import ask_peer, find_peer
+        from halfshell_report.against import ask_peer, find_peer, name_and_version
 
         peer = find_peer(args.against)
     if args.list:
@@ -173,7 +173,7 @@ def run(args: Namespace) -> int:
     checks = []
     with searching(scene, args):
         if peer:
-            pairs = PairList(peer.name_and_version(), *ask_peer(peer, scene, cutoff))
+            pairs = PairList(name_and_version(peer), *ask_peer(peer, scene, cutoff))
         elif not args.list:
             author, inclusive = f"halfshell {hs.__version__}", not args.strict
             i, j, S = hs.pairs(scene.known, cutoff, quantities="ijS", inclusive=inclusive)

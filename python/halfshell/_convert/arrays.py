@@ -7,7 +7,7 @@ Types and shapes are settled here: an array is converted only when no value chan
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     IntArray = npt.NDArray[np.int64]
 
 _BIGGEST_INTEGER = 2**53  # from here on float64 does not hold every integer
+MOST_KEYS = 2**62  # keys of rows are less than this, so that twice a key fits int64
 
 
 @brief
@@ -250,6 +251,57 @@ def whole_rows(offsets: npt.NDArray[Any], most: int) -> Iterator[tuple[int, int]
         end = max(first + 1, int(np.searchsorted(offsets, limit, side="right")) - 1)
         yield first, end
         first = end
+
+
+# ---- rows of pairs, (i, j, *S) ---------------------------------------------------------------
+
+def are_backward(
+    i: npt.NDArray[Any], j: npt.NDArray[Any], S: npt.NDArray[Any] | None
+) -> npt.NDArray[np.bool_]:
+    """Which pairs a half list has the other way round: i > j, or i == j and S begins with a
+    negative number."""
+    backward: npt.NDArray[np.bool_] = i > j
+    undecided = i == j
+    for column in () if S is None else S.T:
+        backward |= undecided & (column < 0)
+        undecided &= column == 0
+    return backward
+
+
+def row_keys(*tables: Sequence[npt.NDArray[Any]]) -> list[IntArray]:
+    """A number for each row of some tables, which are given as columns: equal rows have equal ones,
+    and they ascend as rows do.
+
+    Examples
+    --------
+    >>> first, second = row_keys([np.array([1, 2]), np.array([0, 9])],
+    ...                          [np.array([2]), np.array([9])])
+    >>> bool(first[1] == second[0]), bool(first[0] == second[0])
+    (True, False)
+    """
+    ends = np.cumsum([len(table[0]) for table in tables])
+    keys, size = np.zeros(int(ends[-1]), np.int64), 1
+    for parts in zip(*tables, strict=True):
+        column = np.concatenate(parts)
+        if not len(column):
+            continue
+        low = int(column.min())
+        span = int(column.max()) - low + 1
+        if size * span >= MOST_KEYS:
+            keys, size = _renumbered(keys)
+        if size * span >= MOST_KEYS:
+            column, span = _renumbered(column)
+            low = 0
+        if column.dtype != object:
+            column = column.astype(np.int64)
+        keys = keys * span + (column - low).astype(np.int64, copy=False)
+        size *= span
+    return np.split(keys, ends[:-1])
+
+
+def _renumbered(values: npt.NDArray[Any]) -> tuple[IntArray, int]:
+    unique, numbers = np.unique(values, return_inverse=True)
+    return numbers.reshape(-1).astype(np.int64), len(unique)
 
 
 # ---- numbers of points -----------------------------------------------------------------------

@@ -606,13 +606,7 @@ def numbers_of_both(
         return own.numbers, asking.numbers, own.names
     assert asking.names is not None
     every = sorted({*own.names, *asking.names})
-    places = {one: k for k, one in enumerate(every)}
-    mapped = [
-        np.array([places[one] for one in labels.names or ()], labels.numbers.dtype)[labels.numbers]
-        if len(labels.numbers) else labels.numbers
-        for labels in (own, asking)
-    ]  # fmt: skip
-    return mapped[0], mapped[1], tuple(every)
+    return own.among(every), asking.among(every), tuple(every)
 
 
 def _table_of_types(

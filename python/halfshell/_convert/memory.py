@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from halfshell import _core
+from halfshell import _core, _show
 from halfshell._convert.foreign import exact_number, is_a, kind_of, shown, whole_number
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ def refuse_large(needed: int, array: npt.NDArray[Any], name: str) -> None:
         refuse_unavailable(needed, what)
 
 
+@_show.shown
 class CacheInfo(NamedTuple):
     """What `cache_info` returns.
 
@@ -55,11 +56,6 @@ class CacheInfo(NamedTuple):
 
     held: int
     limit: int
-
-    def _repr_html_(self) -> str:
-        from halfshell import _show
-
-        return _show.html(self)
 
 
 def cache_info() -> CacheInfo:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from halfshell import _core
+from halfshell import _core, _show
 from halfshell._convert.arrays import (
     as_array,
     as_real_array,
@@ -31,7 +31,7 @@ from halfshell._convert.objects import (
     without_placeholder,
 )
 from halfshell._convert.options import as_list
-from halfshell._errors import brief, shorten
+from halfshell._errors import brief
 from halfshell._search import search
 
 if TYPE_CHECKING:
@@ -59,10 +59,26 @@ class Labels(NamedTuple):
     def __getitem__(self, places: Any) -> Any:
         return Labels(self.numbers[places], self.names)
 
+    def among(self, every: Iterable[str]) -> npt.NDArray[Any]:
+        """The numbers that these names have among others."""
+        places = {one: k for k, one in enumerate(every)}
+        own = np.array([places[one] for one in self.names or ()], self.numbers.dtype)
+        return own[self.numbers] if len(self.numbers) else self.numbers
+
     def as_given(self) -> npt.NDArray[Any]:
         if self.names is None:
             return self.numbers
         return np.array(self.names, np.str_)[self.numbers] if self.names else np.array([], np.str_)
+
+
+def _as_given(name: str) -> Any:
+    """An attribute that has these labels as they were given, if there are any."""
+
+    def given(points: Points) -> npt.NDArray[Any] | None:
+        labels: Labels | None = getattr(points, name)
+        return None if labels is None else labels.as_given()
+
+    return property(given)
 
 
 class Points:
@@ -177,28 +193,24 @@ class Points:
         weights: ArrayLike | None = None,
         batch: npt.ArrayLike | None = None,
     ) -> None:
-        try:
-            found = Points._of(positions, "positions", box, periodic, batch)
-            for name in Points.__slots__:
-                setattr_(self, name, getattr(found, name))
-            n, d = self.positions.shape
-            if types is not None and (self._types or self._elements):
-                raise ValueError(_twice("types", positions))
-            for name, values in (("types", types), ("groups", groups), ("labels", labels)):
-                if values is not None:
-                    setattr_(self, f"_{name}", _as_labels(values, name, n, name == "types"))
-            if supports is not None:
-                if radii is not None:
-                    raise ValueError("radii and supports cannot be given together")
-                setattr_(self, "supports", as_supports(supports, n, d))
+        found = Points._of(positions, "positions", box, periodic, batch)
+        for name in Points.__slots__:
+            setattr_(self, name, getattr(found, name))
+        n, d = self.positions.shape
+        if types is not None and (self._types or self._elements):
+            raise ValueError(_twice("types", positions))
+        for name, values in (("types", types), ("groups", groups), ("labels", labels)):
+            if values is not None:
+                setattr_(self, f"_{name}", _as_labels(values, name, n, name == "types"))
+        if supports is not None:
             if radii is not None:
-                setattr_(self, "radii", self._as_radii(radii))
-            if weights is not None:
-                setattr_(self, "weights", _as_weights(weights, n))
-            self._own_all()
-        except Exception as error:
-            shorten(error)
-            raise
+                raise ValueError("radii and supports cannot be given together")
+            setattr_(self, "supports", as_supports(supports, n, d))
+        if radii is not None:
+            setattr_(self, "radii", self._as_radii(radii))
+        if weights is not None:
+            setattr_(self, "weights", _as_weights(weights, n))
+        self._own_all()
 
     # ---- how they are made -----------------------------------------------------------------
 
@@ -420,9 +432,7 @@ class Points:
             raise ValueError(f"points must be one system, and have a batch of {self.n_systems}")
         return self.positions, self._box, self._axes
 
-    @property
-    def box(self) -> FloatArray | None:
-        return self._box
+    box: FloatArray | None = _show.attribute("_box")
 
     @property
     def periodic(self) -> npt.NDArray[np.bool_] | None:
@@ -431,18 +441,9 @@ class Points:
         flags = flags_of(np.atleast_1d(np.asarray(self._axes, np.uint8)), self.positions.shape[1])
         return flags if np.ndim(self._axes) else flags[0]
 
-    @property
-    def types(self) -> npt.NDArray[Any] | None:
-        kinds = self._kinds
-        return None if kinds is None else kinds.as_given()
-
-    @property
-    def groups(self) -> npt.NDArray[Any] | None:
-        return None if self._groups is None else self._groups.as_given()
-
-    @property
-    def labels(self) -> npt.NDArray[Any] | None:
-        return None if self._labels is None else self._labels.as_given()
+    types: npt.NDArray[Any] | None = _as_given("_kinds")
+    groups: npt.NDArray[Any] | None = _as_given("_groups")
+    labels: npt.NDArray[Any] | None = _as_given("_labels")
 
     @property
     def _kinds(self) -> Labels | None:
@@ -559,10 +560,7 @@ class Points:
         more = ["  ..."] if n > _SHOWN_ROWS else []
         return "\n".join([f"Points({', '.join(words)})", *rows, *more])
 
-    def _repr_html_(self) -> str:
-        from halfshell import _show  # few calls need it
-
-        return _show.html(self)
+    _repr_html_ = _show.html
 
     def _shown_box(self) -> str:
         box, d = self._box, self.positions.shape[1]
@@ -668,11 +666,7 @@ def as_points(values: Any, name: str = "points", ndim: int = 3) -> npt.NDArray[A
             raise OverflowError(f"fewer than 2**31 {name} can be searched, got {shape[0]}")
 
     if type(values) not in (np.ndarray, list, tuple):
-        try:
-            parts = values if type(values) is Points else parts_of(values, name)
-        except Exception as error:
-            shorten(error)
-            raise
+        parts = values if type(values) is Points else parts_of(values, name)
         if parts is not None:
             if parts.box is not None:
                 raise ValueError(

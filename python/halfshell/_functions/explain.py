@@ -164,6 +164,8 @@ def explain(
         algorithm, call.shells,
     )  # fmt: skip
     ndim = plan["ndim"]
+    one = index_bytes
+    sizes = {"i": one, "j": one, "P": 2 * one, "d": 8, "D": 8 * ndim, "S": 4 * ndim, "k": 4}
     reason = _reason(plan, algorithm == "auto")
     if call.has_reach:
         reason = _reason_of_reach(plan, call, reason)
@@ -171,7 +173,7 @@ def explain(
         **{name: plan[name] for name in _PLANNED},
         reason=reason,
         n=len(call.points),
-        expected_bytes=plan["expected_pairs"] * _bytes_per_pair(quantities, ndim, index_bytes),
+        expected_bytes=plan["expected_pairs"] * sum(sizes[letter] for letter in quantities),
         leaves_out=_left_out(plan, quantities, sort),
         measured={key: plan[key] for key in _MEASURED if key in plan},
     )
@@ -214,12 +216,6 @@ def _reason_of_reach(plan: dict[str, Any], call: Call, reason: str) -> str:
     what = "types" if call.known.types is not None else what
     searches = "search" if plan["n_searches"] == 1 else "searches"
     return f"by {what}, with cells of their own size, in {plan['n_searches']} {searches}"
-
-
-def _bytes_per_pair(quantities: str, ndim: int, index_bytes: int) -> int:
-    one = index_bytes
-    sizes = {"i": one, "j": one, "P": 2 * one, "d": 8, "D": 8 * ndim, "S": 4 * ndim, "k": 4}
-    return sum(sizes[letter] for letter in quantities)
 
 
 def _left_out(plan: dict[str, Any], quantities: str, sort: bool) -> tuple[str, ...]:

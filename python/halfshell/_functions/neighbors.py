@@ -165,6 +165,24 @@ def arrays_of_rows(
     return listed(call, quantities, as_index_bytes(index_dtype))
 
 
+@search("pairs_of_rows")
+def pairs_of_rows(
+    points: Any,
+    cutoff: Any,
+    *,
+    queries: Any = None,
+    quantities: str = "ij",
+    index_dtype: npt.DTypeLike = np.int64,
+    **search: Any,
+) -> Any:
+    """Columns of `neighbors`, i being the number of the row; the arrays are the caller's."""
+    call = take(points, cutoff, queries, directed=True, **search)
+    return call.run(
+        _core.pairs_of_rows, quantities, as_index_bytes(index_dtype), call.query_set,
+        call.pairing, call.settings.algorithm,
+    )  # fmt: skip
+
+
 def _table_of(call: Call, arrays: Any, quantities: str) -> NeighborTable:
     is_full = call.queries is None and call.rule not in DIRECTED
     origin = _origin_of(call, call.asking, call.query_set, call.pairing, quantities)
@@ -469,6 +487,24 @@ def nearest(
         _core.nearest, quantities, index_bytes, call.query_set, k, call.pairing
     )
     return in_rows(result, len(call.points if call.queries is None else call.queries), k)
+
+
+@search("nearest", lacks="rule")
+def columns_of_nearest(
+    points: Any,
+    k: int,
+    *,
+    max_distance: Any = np.inf,
+    queries: Any = None,
+    quantities: str = "jd",
+    index_dtype: npt.DTypeLike = np.int64,
+    **search: Any,
+) -> Any:
+    """Columns of `nearest`, whose rows may stand one behind another: the caller reshapes them."""
+    return nearest(
+        points, k, max_distance=max_distance, queries=queries, quantities=quantities,
+        index_dtype=index_dtype, **search,
+    )  # fmt: skip
 
 
 def _nearest_of_some(call: Call, k: int, quantities: str, index_bytes: int) -> Arrays:

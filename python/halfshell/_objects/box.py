@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from halfshell import _core
+from halfshell import _core, _show
 from halfshell._convert.arrays import as_real_array, of_shape
 from halfshell._convert.memory import refuse_large
 from halfshell._convert.objects import vectors_of
@@ -229,17 +229,9 @@ class Box:
         of_shape(must, (6,))(array.shape)
         return cls.from_lengths_angles(array[:3], array[3:])
 
-    @property
-    def vectors(self) -> npt.NDArray[np.float64]:
-        return self._vectors
-
-    @property
-    def volume(self) -> float:
-        return self._volume
-
-    @property
-    def perpendicular_heights(self) -> npt.NDArray[np.float64]:
-        return self._heights
+    vectors: npt.NDArray[np.float64] = _show.attribute("_vectors")
+    volume: float = _show.attribute("_volume")
+    perpendicular_heights: npt.NDArray[np.float64] = _show.attribute("_heights")
 
     def wrap(
         self, points: PointsLike, periodic: PeriodicLike | None = None
@@ -313,10 +305,7 @@ class Box:
         edges = " x ".join(f"{math.hypot(*row):.6g}" for row in self.vectors.tolist())
         return f"box with edges {edges}, volume {self.volume:.6g}"
 
-    def _repr_html_(self) -> str:
-        from halfshell import _show
-
-        return _show.html(self)
+    _repr_html_ = _show.html
 
     @document
     def plot(self, ax: Axes | None = None, *, unit: str | None = None) -> Axes:

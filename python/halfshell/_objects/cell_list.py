@@ -306,10 +306,10 @@ class CellList:
         if type(radii) is not float or not 0.0 <= radii < np.inf:
             asking = self._asking(queries)
             radii = as_radii(radius, len(asking))
-        cells = self._without_reach()
+        cells = self if self._plain is not None else self._without_reach()
         try:
             if isinstance(radii, float):
-                return cells.neighbors(radii, queries=asking, **cast("Any", options))
+                return _rows.neighbors(cells, radii, queries=asking, **cast("Any", options))
             return query_each(cells, asking, radii, cast("Any", options))
         except MemoryError as error:
             if radius is None:
@@ -365,7 +365,11 @@ class CellList:
         ...     for i, c in enumerate(found))
         True
         """
-        return _core.cells_find(self._cells, self._asking(points, "points").positions)
+        asking = self._asking(points, "points").positions
+        found: npt.NDArray[np.int64] = take(self, self._cutoff, by_reach=False).run(
+            _core.cells_find, asking
+        )
+        return found
 
     def candidates(self, queries: PointsLike | None = None) -> Candidates:
         """The raw block of cells around each query, without a distance test.

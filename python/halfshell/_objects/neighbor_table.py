@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from halfshell import _show
 from halfshell._convert.arrays import (
+    are_backward,
     as_array,
     as_listed,
     as_real_array,
@@ -165,11 +166,6 @@ class NeighborTable:
     this table has no shifts: request them with an 'S' in quantities, got 'jd'
     """
 
-    __slots__ = (
-        "_arrays", "_entries", "_is_complete", "_is_in_order", "_is_of_one_set", "_n_points",
-        "_origin", "_quantities", "_rows",
-    )  # fmt: skip
-
     _arrays: tuple[Array, ...]  # offsets, then one for each quantity
     _quantities: str
     _n_points: int
@@ -179,6 +175,8 @@ class NeighborTable:
     _origin: Origin | None  # None: exact comparisons are not possible
     _rows: slice | Array  # which of all rows of the search they are
     _entries: slice | Array  # which of all entries of the search
+
+    __slots__ = tuple(__annotations__)
 
     def __init__(
         self, arrays: tuple[Array, ...] = (), quantities: str = "", n_points: int = 0,
@@ -726,11 +724,8 @@ class NeighborTable:
             self._refuse_queries("half=True")
             keep = rows < self.indices
             own = np.flatnonzero(rows == self.indices)
-            if len(own) > 0:  # those whose first nonzero component is positive
-                sign = np.zeros(len(own), np.int32)
-                for column in self.shifts[own].T[::-1]:
-                    sign = np.where(column != 0, column, sign)
-                keep[own] = sign > 0
+            if len(own) > 0:
+                keep[own] = ~are_backward(own, own, self.shifts[own])
             columns = {letter: column[keep] for letter, column in columns.items()}
         arrays = tuple(columns[letter] for letter in quantities)
         return arrays if len(arrays) > 1 else arrays[0]
@@ -823,7 +818,9 @@ class NeighborTable:
         as_choice(quantity, "quantity", tuple(_NAMES))
         column, counts = self._column(quantity), np.diff(self.offsets)
         needed = int(counts.max(initial=0))
-        length = needed if capacity is None else _as_capacity(capacity)
+        length = needed if capacity is None else as_whole(capacity, "capacity")
+        if length < 0:
+            raise ValueError(f"capacity must not be negative, got {shown(length)}")
         if length < needed:
             raise CapacityError(
                 f"capacity is too small: row {int(counts.argmax())} has {needed} entries, got "
@@ -1072,13 +1069,6 @@ def _refused(kind: str) -> TypeError:
         "a row is chosen by a whole number, rows by a slice, an array of whole numbers or a mask, "
         f"got {kind}"
     )
-
-
-def _as_capacity(value: Any) -> int:
-    capacity = as_whole(value, "capacity")
-    if capacity < 0:
-        raise ValueError(f"capacity must not be negative, got {shown(capacity)}")
-    return capacity
 
 
 def _as_fill(value: Any, dtype: np.dtype[Any]) -> Any:

@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from halfshell import _core
-from halfshell._convert.arrays import as_array, of_shape, one_each, rows_of, starts_of
+from halfshell._convert.arrays import (
+    are_backward,
+    as_array,
+    of_shape,
+    one_each,
+    row_keys,
+    rows_of,
+    starts_of,
+)
 from halfshell._convert.call import DIRECTED, RULES, Pairing
 from halfshell._convert.foreign import kind_of
 from halfshell._convert.options import as_list
@@ -125,11 +133,8 @@ class Half(NamedTuple):
 
     def forward(self) -> Half:
         """With the lower rank first, and forward images of one node."""
-        back: Any = self.i > self.j
-        shifts = self.shifts
+        back, shifts = are_backward(self.i, self.j, self.shifts), self.shifts
         if shifts is not None:
-            first = shifts[np.arange(len(shifts)), np.argmax(shifts != 0, axis=1)]
-            back |= (self.i == self.j) & (first < 0)
             shifts = np.where(back[:, None], -shifts, shifts)
         return Half(np.where(back, self.j, self.i), np.where(back, self.i, self.j), shifts)
 
@@ -356,9 +361,7 @@ def _cut_of_half(some: Half, nodes: Nodes) -> Cut:
     def cut(half: Half) -> Bools:
         keys, others = (nodes.keys_of(one.i, one.j) for one in (half, some))
         if half.shifts is not None and some.shifts is not None:
-            images = (np.column_stack(two) for two in ((keys, half.shifts), (others, some.shifts)))
-            number = np.unique(np.concatenate([*images]), axis=0, return_inverse=True)[1]
-            keys, others = np.split(number.reshape(-1), [len(half.i)])
+            keys, others = row_keys([keys, *half.shifts.T], [others, *some.shifts.T])
         return np.isin(keys, others)
 
     return cut

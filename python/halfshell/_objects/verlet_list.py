@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _show
+from halfshell._convert.arrays import are_backward, row_keys
 from halfshell._convert.foreign import attribute, is_a, of_argument, shown
 from halfshell._convert.lengths import as_length, as_number
 from halfshell._convert.options import as_flag, as_index_bytes, as_threads, check_letters
@@ -619,7 +620,6 @@ Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 Columns = tuple[npt.NDArray[Any], ...]
 
-MOST_KEYS = 2**62  # i, j and the image of a pair are one number where there are fewer
 PLAIN = (2.0**-400, 2.0**400)  # between these products of numbers are ordinary ones
 MOST_TURNS = 2**60  # more than any pair goes on by: S is int32
 
@@ -691,7 +691,7 @@ def compare(before: Step, old: Columns, now: Step, new: Columns) -> tuple[Intege
     return np.flatnonzero(alone[: len(was.i)]), np.flatnonzero(alone[len(was.i) :])
 
 
-def _keys_of_both(before: Step, was: _Pairs, now: Step, then: _Pairs) -> tuple[Integers, Integers]:
+def _keys_of_both(before: Step, was: _Pairs, now: Step, then: _Pairs) -> list[Integers]:
     """Numbers of pairs, the same for one that goes on."""
     axes = sorted(before.axes & now.axes)
     if not axes:
@@ -710,7 +710,7 @@ def _keys_of_both(before: Step, was: _Pairs, now: Step, then: _Pairs) -> tuple[I
     goes_on = (then.i < moves.n) & (then.j < moves.n)
     turns = moves.apart(then.i[goes_on], then.j[goes_on])
     new[np.ix_(np.flatnonzero(goes_on), np.array(axes))] += turns
-    return _keys(was, _upright(was.S, was), then, _upright(new, then))
+    return _keys(was, _upright(was, was.S), then, _upright(then, new))
 
 
 class _Moves:
@@ -818,37 +818,13 @@ def _largest(x: Floats) -> Floats:
     return np.array([np.abs(column).max(initial=0.0) for column in x.T])
 
 
-def _upright(images: Integers, pairs: _Pairs) -> Integers:
+def _upright(pairs: _Pairs, images: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """A pair of a point and its own image has two, opposite ones: the first number not 0 > 0."""
-    is_own = pairs.i == pairs.j
-    rows = images[is_own]
-    first = (rows != 0).argmax(axis=1)
-    images = images.copy()
-    images[is_own] *= np.sign(rows[np.arange(len(rows)), first])[:, None]
-    return images
+    return np.where(are_backward(pairs.i, pairs.j, images)[:, None], -images, images)
 
 
 def _keys(
     was: _Pairs, old: npt.NDArray[Any], then: _Pairs, new: npt.NDArray[Any]
-) -> tuple[Integers, Integers]:
-    """A number for each pair from i, j and its image, in their order unless they are many."""
-    low = np.minimum(old.min(axis=0, initial=0), new.min(axis=0, initial=0)).astype(np.int64)
-    high = np.maximum(old.max(axis=0, initial=0), new.max(axis=0, initial=0)).astype(np.int64)
-    widths = [int(width) for width in high - low + 1]
-    n = int(max(was.j.max(initial=0), then.j.max(initial=0))) + 1
-    if n * n * math.prod(widths) > MOST_KEYS:
-        rows = [np.column_stack([was.i, was.j, old]), np.column_stack([then.i, then.j, new])]
-        found = np.unique(np.concatenate(rows), axis=0, return_inverse=True)[1].reshape(-1)
-        return found[: len(old)], found[len(old) :]
-
-    def number(pairs: _Pairs, images: npt.NDArray[Any]) -> Integers:
-        keys = pairs.i.astype(np.int64) * n
-        keys += pairs.j
-        for axis, width in enumerate(widths):
-            if width > 1:
-                keys *= width
-                keys += images[:, axis]
-                keys -= low[axis]
-        return keys
-
-    return number(was, old), number(then, new)
+) -> list[Integers]:
+    """A number for each pair from i, j and its image, in their order."""
+    return row_keys([was.i, was.j, *old.T], [then.i, then.j, *new.T])

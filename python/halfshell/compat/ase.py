@@ -28,7 +28,7 @@ from ase.data import atomic_numbers
 from ase.neighborlist import first_neighbors, natural_cutoffs
 
 import halfshell as hs
-from halfshell._functions.neighbors import arrays_of_rows
+from halfshell._functions.neighbors import pairs_of_rows
 
 __all__ = [
     "NeighborList",
@@ -125,30 +125,29 @@ def listed(
     points = positions
     if each:
         points, box = hs.Points(positions, **box, **each), {}
-    wanted = [*dict.fromkeys(letters)]
-    if "i" in wanted:
-        wanted.remove("i")
+    wanted = "".join(letters if len({*letters}) == len(letters) else dict.fromkeys(letters)) or "j"
     # As a query each point finds itself, if its reach is above zero.
     try:
-        offsets, *columns = arrays_of_rows(
+        found = pairs_of_rows(
             points, length, queries=points if self_interaction else None, inclusive=False,
-            quantities="".join(wanted) or "j", **box,
+            quantities=wanted, index_dtype=np.int32 if types["j"] is np.int32 else np.int64, **box,
         )  # fmt: skip
     except (TypeError, ValueError):
         hs.Points(points, **box)  # which says by their names what is wrong with these
         raise
-    found: dict[str, npt.NDArray[Any]] = {
-        one: np.array(array, types[one]) for one, array in zip(wanted, columns)
-    }
-    if "i" in letters:
-        found["i"] = np.arange(n, dtype=types["i"]).repeat(offsets[1:] - offsets[:-1])
-    return tuple([found[letter] for letter in letters])
+    columns = (found,) if len(wanted) == 1 else found
+    if types["S"] is not np.int32:
+        columns = [one.astype(types[k], copy=False) for k, one in zip(wanted, columns)]
+    if len(wanted) == len(letters):
+        return tuple(columns)  # in their order
+    arrays = dict(zip(wanted, columns))
+    return tuple([arrays[letter] for letter in letters])
 
 
 def reach_of(cutoff: Any, numbers: Any) -> tuple[Any, dict[str, Any]]:
     """The cutoff of halfshell, and what `halfshell.Points` are to know of each atom."""
     if type(cutoff) is float:
-        return _not_negative(cutoff), {}
+        return max(cutoff, 0.0), {}
     if isinstance(cutoff, Mapping):
         if numbers is None:
             raise TypeError("numbers must be given if cutoff is a dict")

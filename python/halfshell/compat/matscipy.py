@@ -23,6 +23,7 @@ import numpy.typing as npt
 from ase.data import atomic_numbers
 
 import halfshell as hs
+from halfshell import _core
 from halfshell.compat.ase import listed, reach_of
 
 __all__ = [
@@ -78,12 +79,13 @@ def _scene(
     if cutoff is None:
         raise ValueError("Please provide a value for the cutoff radius.")
     if atoms is not None:
-        parts = {"positions": positions, "cell": cell, "pbc": pbc, "numbers": numbers}
-        parts["cell_origin"] = cell_origin
+        parts = {"positions": positions, "cell": cell, "pbc": pbc, "numbers": numbers,
+                 "cell_origin": cell_origin}  # fmt: skip
         for name, value in parts.items():
             if value is not None:
                 raise ValueError(f"You cannot provide an ASE Atoms object and {name} as well.")
-        positions, cell, pbc, numbers = atoms.positions, atoms.cell, atoms.pbc, atoms.numbers
+        positions, pbc, numbers = atoms.positions, atoms.pbc, atoms.numbers
+        cell = getattr(atoms.cell, "array", atoms.cell)  # itself, not a copy
     if positions is None:
         raise ValueError("Please provide atoms or positions.")
     n = len(positions)
@@ -275,6 +277,11 @@ def triplet_list(
     >>> ij.tolist(), ik.tolist()
     ([0, 1], [1, 0])
     """
+    if (abs_dr_p is None or cutoff is None) and (i_p is None or j_p is None):
+        found = _core.triplets(first_neighbours)
+        if found is not None:
+            return found
+
     from halfshell._convert.arrays import starts_of
     from halfshell._objects.neighbor_table import triplets_of
 

@@ -9,13 +9,14 @@ the exact values of the float32 numbers decide. The order of the pairs is not sp
 from __future__ import annotations
 
 import math
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from MDAnalysis.lib.util import check_box, check_coords
 
 import halfshell as hs
+from halfshell import _core
 
 __all__ = ["capped_distance", "self_capped_distance"]
 
@@ -27,6 +28,8 @@ _KEPT = {"enforce_copy": False, "reduce_result_if_single": False, "allow_atomgro
 
 #: Axes that are not longer are open in MDAnalysis.
 _SHORTEST = float(np.finfo(np.float32).eps)
+#: The most products of points of two sets that `_core.few` looks at: HS_FEW_PAIRS.
+_FEW_PAIRS = 1024
 _OPEN: dict[str, Any] = {"box": None}
 
 
@@ -105,14 +108,26 @@ def _nearest_images(i: Any, j: Any, d: Any, selves: bool) -> Entries:
     return both, d
 
 
+def _of_few(sets: Any, cutoff: Any, box: Any) -> Entries | None:
+    """Pairs of few points in their nearest images, without a search; None where there are more."""
+    if len(sets[0]) * len(sets[-1]) > _FEW_PAIRS or (box is not None and box.ndim == 2):
+        return None
+    points = sets[-1].astype(np.float64)
+    queries = sets[0].astype(np.float64) if len(sets) == 2 else None
+    found: Entries | None = _core.few(points, queries, box, cutoff, 2, 0, "b")
+    return found
+
+
 def _answer(
     search: Any, max_cutoff: Any, min_cutoff: Any, given: Any, sets: Any, distances: bool
 ) -> Any:
     """Pairs that `search` finds in these sets, in the nearest image, beyond the lesser cutoff."""
     box, lengths = _box(given)
-    if not all(len(points) for points in sets) or max_cutoff < 0.0:
-        entries = np.empty((0, 2), np.intp), np.empty(0)
+    if not len(sets[0]) or not len(sets[-1]) or max_cutoff < 0.0:
+        entries: Entries | None = (np.empty((0, 2), np.intp), np.empty(0))
     else:
+        entries = _of_few(sets, max_cutoff, box["box"])
+    if entries is None:
         cutoff = _within(max_cutoff, lengths, *sets)
         is_one = len(sets) == 1
         if _has_images(box, lengths, cutoff):
@@ -120,7 +135,7 @@ def _answer(
             i, j, d = search(*sets, cutoff, quantities="ijd", **how, **box)
             entries = _nearest_images(i, j, d, is_one)
         else:
-            entries = cast("Entries", search(*sets, cutoff, quantities="Pd", **box))
+            entries = search(*sets, cutoff, quantities="Pd", **box)
     both, d = entries
     if min_cutoff is not None:
         kept = d > min_cutoff

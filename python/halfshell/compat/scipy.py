@@ -8,7 +8,8 @@ floats, while SciPy compares rounded squares. So the answers differ if rounding 
 
 With `boxsize` the nearest image of a point counts, as there. SciPy itself answers what is not
 decided here: `p` other than 2, `eps` above 0, more than 8 dimensions, radii that are negative or
-infinite, and, with `boxsize`, distances of half a period or more.
+infinite, and, with `boxsize`, all of a call one of whose radii is half a period or more, and of the
+nearest the points that lack some within half a period.
 
 Lists of neighbours ascend, also where SciPy's have no order; among neighbours at the same distance
 `query` has the lowest numbers. `workers` is the number of threads; methods without it use as many
@@ -21,7 +22,6 @@ import math
 import operator
 import os
 from functools import cached_property
-from itertools import pairwise
 from numbers import Real
 from typing import Any
 
@@ -31,9 +31,10 @@ import scipy.spatial as _owner
 from scipy.sparse import coo_matrix
 
 import halfshell as hs
+from halfshell import _core
 from halfshell._convert.call import Known, take
 from halfshell._functions.counts import binned
-from halfshell._functions.neighbors import arrays_of_rows
+from halfshell._functions.neighbors import arrays_of_rows, columns_of_nearest
 
 __all__ = ["KDTree", "cKDTree"]
 
@@ -41,9 +42,20 @@ _ENTRY = np.dtype([("i", np.intp), ("j", np.intp), ("v", np.float64)], align=Tru
 _Points = npt.NDArray[np.float64]
 _FLOAT = np.dtype(np.float64)
 _FIRST = np.zeros(1, np.intp)
+_TREE = _owner.cKDTree
+
+#: Pairs of few points, without a search; None where a search, or SciPy, is to answer.
+_few = _core.few
+#: Lists, sets or dictionaries made of columns of pairs.
+_contain = _core.contain
+#: The most products of points and queries that `_few` looks at: HS_FEW_PAIRS.
+_FEW_PAIRS = 1024
+
+#: What `_few` makes for each output of a matrix.
+_LETTERS = {"dict": "d", "ndarray": "a", "coo_matrix": "a", "dok_matrix": "a"}
 
 #: From so many points on they are sorted into cells once, and these are kept; it takes less time to
-#: search fewer anew.
+#: search fewer anew, but for the nearest of them, from the second time on.
 _MANY = 500
 #: A tree of more than so many times the points of another one is searched with those as queries.
 _FEWER = 8
@@ -64,6 +76,7 @@ class _Searches:
     n: int
     m: int
     _index: type = int
+    _is_asked_again = False  # for the nearest
 
     def query(
         self,
@@ -103,40 +116,55 @@ class _Searches:
         """As SciPy's; lists ascend, whatever `return_sorted` is."""
         asked, shape = self._asked(x, p, eps)
         threads = _as_threads(workers)
-        radii = None if asked is None else self._radii(r, shape)
-        if asked is None or threads is None or radii is None:
-            return super().query_ball_point(  # type: ignore[misc]
-                x, r, p, eps, workers, return_sorted, return_length
-            )
-        offsets, j = self._balls(asked, radii, threads or None)
+        lists: Any = None
+        if asked is not None and threads is not None:
+            lists = _few(self.data, asked, self.boxsize, r, p, eps, "l")
+        if lists is None:
+            radii = None if asked is None else self._radii(r, shape)
+            if asked is None or threads is None or radii is None:
+                return super().query_ball_point(  # type: ignore[misc]
+                    x, r, p, eps, workers, True, return_length
+                )
+            offsets, j = self._balls(asked, radii, threads or None)
+            if not return_length:
+                lists = _contain(offsets, None, j, None)
         if return_length:
-            lengths = np.diff(offsets).astype(np.intp).reshape(shape)
-            return lengths if shape else lengths[()]
-        lists = _as_lists(offsets, j)
+            lengths = np.diff(offsets) if lists is None else np.fromiter(map(len, lists), np.intp)
+            return lengths.astype(np.intp, copy=False).reshape(shape)[()]
         if not shape:
             return lists[0]
-        result = np.empty(len(lists), object)
+        result: npt.NDArray[Any] = np.empty(len(lists), object)
         result[:] = lists
         return result.reshape(shape)
 
     def query_ball_tree(self, other: Any, r: Any, p: Any = 2.0, eps: Any = 0.0) -> Any:
         """As SciPy's; lists ascend."""
+        if type(other) is type(self) and other._period == self._period:
+            lists = _few(other.data, self.data, self.boxsize, r, p, eps, "l")
+            if lists is not None:
+                return lists
         if not self._is_for(p, eps) or not self._fits(other) or not self._is_near(r):
-            return super().query_ball_tree(other, r, p, eps)  # type: ignore[misc]
+            return list(map(sorted, super().query_ball_tree(other, r, p, eps)))  # type: ignore[misc]
         points, box = self._searched(float(r), other)
-        return _as_lists(*arrays_of_rows(points, float(r), queries=self.data, **box))
+        offsets, j = arrays_of_rows(
+            points, float(r), queries=self.data, index_dtype=np.int32, **box
+        )
+        return _contain(offsets, None, j, None)
 
     def query_pairs(self, r: Any, p: Any = 2.0, eps: Any = 0.0, output_type: Any = "set") -> Any:
         """As SciPy's."""
-        known = output_type in ("set", "ndarray")
-        if not known or not self._is_for(p, eps) or not self._is_near(r):
+        letter = "s" if output_type == "set" else "P" if output_type == "ndarray" else None
+        found = _few(self.data, None, self.boxsize, r, p, eps, letter) if letter else None
+        if found is not None:
+            return found
+        if letter is None or not self._is_for(p, eps) or not self._is_near(r):
             return super().query_pairs(r, p, eps, output_type)  # type: ignore[misc]
         points, box = self._searched(float(r))
-        if output_type == "ndarray":
+        if letter == "P":
             both = hs.pairs(points, float(r), quantities="P", **box)
             return both.astype(np.intp, copy=False)
-        i, j = hs.pairs(points, float(r), **box)
-        return set(zip(i.tolist(), j.tolist()))
+        i, j = hs.pairs(points, float(r), index_dtype=np.int32, **box)
+        return _contain(None, i, j, None)
 
     def count_neighbors(
         self, other: Any, r: Any, p: Any = 2.0, weights: Any = None, cumulative: Any = True
@@ -165,15 +193,22 @@ class _Searches:
         self, other: Any, max_distance: Any, p: Any = 2.0, output_type: Any = "dok_matrix"
     ) -> Any:
         """As SciPy's, with distances within 1 ulp; the array ascends by i and j."""
-        known = output_type in ("dok_matrix", "coo_matrix", "dict", "ndarray")
-        is_ours = known and self._is_for(p, 0.0) and self._fits(other)
-        if not is_ours or not self._is_near(max_distance):
-            return super().sparse_distance_matrix(  # type: ignore[misc]
-                other, max_distance, p, output_type
-            )
-        i, j, d = self._between(other, float(max_distance))
-        if output_type == "dict":
-            return dict(zip(zip(i.tolist(), j.tolist()), d.tolist()))
+        letter = _LETTERS.get(output_type) if type(output_type) is str else None
+        found = None
+        if letter is not None and type(other) is type(self) and other._period == self._period:
+            found = _few(other.data, self.data, self.boxsize, max_distance, p, 0.0, letter)
+        if found is None:
+            is_ours = letter is not None and self._is_for(p, 0.0) and self._fits(other)
+            if not is_ours or not self._is_near(max_distance):
+                return super().sparse_distance_matrix(  # type: ignore[misc]
+                    other, max_distance, p, output_type
+                )
+            found = self._between(other, float(max_distance))
+            if letter == "d":
+                found = _contain(None, *found)
+        if letter == "d":
+            return found
+        i, j, d = found
         if output_type == "ndarray":
             entries = np.empty(len(i), _ENTRY)
             entries["i"], entries["j"], entries["v"] = i, j, d
@@ -203,11 +238,15 @@ class _Searches:
     def _fits(self, other: Any) -> bool:
         if other is self:
             return True
-        if not isinstance(other, _owner.cKDTree) or other.m != self.m:
+        if not isinstance(other, _TREE) or other.m != self.m:
             return False
         if self.boxsize is None or other.boxsize is None:
             return self.boxsize is None and other.boxsize is None
         return np.array_equal(self.boxsize, other.boxsize)
+
+    @cached_property
+    def _period(self) -> list[float] | None:
+        return None if self.boxsize is None else self.boxsize.tolist()
 
     @cached_property
     def _box(self) -> dict[str, Any]:
@@ -224,6 +263,11 @@ class _Searches:
         if self.boxsize is None:
             return np.inf
         return float(np.min(self.boxsize, where=self.boxsize > 0.0, initial=np.inf)) / 2.0
+
+    @cached_property
+    def _farthest(self) -> float:
+        """The largest distance that is below half a period."""
+        return self._half if self._half == np.inf else math.nextafter(self._half, 0.0)
 
     def _is_near(self, r: Any) -> bool:
         return _is_number(r) and 0.0 <= float(r) < self._half
@@ -253,6 +297,9 @@ class _Searches:
             return None
         if not (radii < self._half).all():
             return None
+        radii = radii.reshape(-1)
+        if (radii[1:] > radii[:-1]).all():
+            return radii, np.arange(len(radii))
         within, places = np.unique(radii, return_inverse=True)
         if not cumulative and (np.diff(places.reshape(-1)) < 0).any():
             return None
@@ -264,7 +311,10 @@ class _Searches:
         """The points of this tree or another one, as searches up to this radius, or for the nearest
         ones, take them, with their box."""
         tree = self if tree is None else tree
-        if tree.n < _MANY or not isinstance(tree, _Searches):
+        if not isinstance(tree, _Searches):
+            return tree.data, self._box
+        if tree.n < _MANY and (radius is not None or not tree._is_asked_again):
+            tree._is_asked_again = tree._is_asked_again or radius is None
             return tree.data, self._box
         return tree._kept(radius), {}
 
@@ -292,19 +342,26 @@ class _Searches:
 
     def _balls(self, asked: _Points, radii: Any, threads: int | None) -> Any:
         """Offsets and numbers of all points within these radii."""
-        how: dict[str, Any] = {"queries": asked, "threads": threads}
+        how: dict[str, Any] = {"queries": asked, "threads": threads, "index_dtype": np.int32}
         if isinstance(radii, float):
             points, box = self._searched(radii)
             return arrays_of_rows(points, radii, **how, **box)
         points, box = self._searched(float(radii.max(initial=0.0)))
         if isinstance(points, hs.CellList):
-            rows = points.query(asked, radii, threads=threads)
+            rows = points.query(asked, radii, threads=threads, index_dtype=np.int32)
             return rows.offsets, rows.indices
         how["queries"] = hs.Points(asked, radii=radii)
         return arrays_of_rows(points, None, rule="gather", **how, **box)
 
     def _count(self, other: Any, radii: _Points) -> npt.NDArray[np.int64]:
         """How many pairs of the points of both trees are within each of ascending radii."""
+        if self.n * other.n <= _FEW_PAIRS:
+            few = [
+                _few(other.data, self.data, self.boxsize, radius, 2.0, 0.0, "n")
+                for radius in radii.tolist()
+            ]
+            if None not in few:
+                return np.array(few)
         large, small = (self, other) if self.n >= other.n else (other, self)
         points, box = self._searched(float(radii[-1]), large)
         within = float(radii[0]) if len(radii) == 1 else radii
@@ -312,30 +369,34 @@ class _Searches:
 
     def _between(self, other: Any, radius: float) -> Any:
         """Numbers in both trees, ascending, and distances of pairs."""
+        columns: Any = {"quantities": "ijd", "index_dtype": np.int32}
         if self.n <= _FEWER * other.n:
             points, box = self._searched(radius, other)
-            return hs.pairs_between(self.data, points, radius, quantities="ijd", **box)
+            return hs.pairs_between(self.data, points, radius, **columns, **box)
         points, box = self._searched(radius)
-        j, i, d = hs.pairs_between(other.data, points, radius, quantities="ijd", **box)
+        j, i, d = hs.pairs_between(other.data, points, radius, **columns, **box)
         order = np.argsort(i, kind="stable")
         return i[order], j[order], d[order]
 
     def _nearest(self, asked: _Points, k: int, bound: float, threads: int) -> tuple[Any, Any]:
         """Numbers and distances, with n and infinity where there are none."""
         points, box = self._searched(None)
-        is_open = self._half == np.inf
-        within = bound if is_open else min(bound, math.nextafter(self._half, 0.0))
+        within = bound if bound <= self._half else self._farthest
         scene: dict[str, Any] = {"queries": asked, "threads": threads or None, **box}
-        i, d = hs.nearest(points, min(k, self.n), max_distance=within, **scene)
-        near = math.nextafter(math.nextafter(bound, 0.0), 0.0)
-        ties = np.flatnonzero((d >= near).any(axis=1)) if bound < np.inf else ()
+        k = min(k, self.n)
+        i, d = columns_of_nearest(points, k, max_distance=within, **scene)
+        i, d = i.reshape(-1, k), d.reshape(-1, k)
+        ties: Any = ()
+        if bound < np.inf:
+            near = math.nextafter(math.nextafter(bound, 0.0), 0.0)
+            ties = np.flatnonzero((d >= near).any(axis=1))
         if len(ties):  # closer, in real numbers?
             scene["queries"] = asked[ties]
             closer = hs.coordination(points, bound, inclusive=False, **scene)
-            kept = np.arange(d.shape[1]) < closer[:, None]
+            kept = np.arange(k) < closer[:, None]
             i[ties], d[ties] = np.where(kept, i[ties], -1), np.where(kept, d[ties], np.inf)
         if within < np.inf and not math.isfinite(np.vdot(d, d)):  # some are missing, or far away
-            rest = np.flatnonzero(i[:, -1] < 0) if within < bound else ()
+            rest = np.flatnonzero(i[:, -1] < 0) if self._half < bound else ()
             i[i < 0] = self.n
             if len(rest):  # images half a period away, or more
                 each = np.arange(1, d.shape[1] + 1)
@@ -418,11 +479,6 @@ def _columns_of(found: npt.NDArray[Any], ranks: Any, missing: float) -> Any:
     there = ranks <= width
     result[:, there] = found[:, ranks[there] - 1]
     return result
-
-
-def _as_lists(offsets: npt.NDArray[Any], j: npt.NDArray[Any]) -> list[list[int]]:
-    numbers, ends = j.tolist(), offsets.tolist()
-    return [numbers[a:b] for a, b in pairwise(ends)]
 
 
 def _as_weights(weights: Any, tree: Any, other: Any) -> tuple[Any, Any] | None:

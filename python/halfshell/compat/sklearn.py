@@ -11,6 +11,7 @@ and more features go on to scikit-learn.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -64,12 +65,45 @@ class _Graphs:
             return own, None
         return own, validate_data(self, X, dtype=own.dtype, reset=False, order="C")
 
+    def _within(self: Any, X: Any, radius: Any, quantities: str) -> Any:
+        """The table of samples within the radius, or None where scikit-learn is to search."""
+        samples = self._samples(X)
+        radius = self.radius if radius is None else radius
+        if samples is None or not radius >= 0.0:  # there it has no neighbours
+            return None
+        own, asking = samples
+        return hs.neighbors(
+            own, float(radius), queries=asking, quantities=quantities,
+            threads=effective_n_jobs(self.n_jobs),
+        )  # fmt: skip
+
+    def _nearest(self: Any, X: Any, n_neighbors: Any) -> tuple[Any, Any] | None:
+        """Numbers and distances of the nearest samples, or None where scikit-learn is to search."""
+        samples = self._samples(X)
+        k = self.n_neighbors if n_neighbors is None else n_neighbors
+        most = self.n_samples_fit_ - (X is None) if samples is not None else 0
+        if samples is None or not isinstance(k, int | np.integer) or not 0 < k <= most:
+            return None
+        own, asking = samples
+        found: tuple[Any, Any] = hs.nearest(
+            own, int(k), queries=asking, quantities="jd", threads=effective_n_jobs(self.n_jobs)
+        )
+        return found
+
     def _graph(self: Any, data: Any, indices: Any, starts: Any) -> Any:
         # Copies: matrices are the caller's to change.
         data = np.ones(len(indices)) if data is None else np.array(data)
         shape = (len(starts) - 1, self.n_samples_fit_)
         columns = data, np.array(indices), np.array(starts)
         return _as_configured(sparse.csr_array(columns, shape=shape))
+
+
+def _in_rows(column: Any, starts: Any) -> Any:
+    """An array of arrays, which are the caller's to change."""
+    column, ends = np.array(column), starts.tolist()
+    rows = np.empty(len(ends) - 1, object)
+    rows[:] = [column[a:b] for a, b in pairwise(ends)]
+    return rows
 
 
 class RadiusNeighborsTransformer(_Graphs, _owner.RadiusNeighborsTransformer):
@@ -94,21 +128,33 @@ class RadiusNeighborsTransformer(_Graphs, _owner.RadiusNeighborsTransformer):
         sort_results: bool = False,
     ) -> Any:
         """The graph of samples within the radius, as scikit-learn documents it."""
-        samples = self._samples(X) if mode in ("distance", "connectivity") else None
-        if samples is None:
+        letters = {"distance": "jd", "connectivity": "j"}.get(mode)
+        table = self._within(X, radius, letters) if letters is not None else None
+        if table is None:
             return super().radius_neighbors_graph(X, radius, mode, sort_results)
-        radius = self.radius if radius is None else radius
-        if not radius >= 0.0:  # there it has no neighbours
-            return super().radius_neighbors_graph(X, radius, mode, sort_results)
-        own, asking = samples
-        table = hs.neighbors(
-            own, float(radius), queries=asking, quantities="jd" if mode == "distance" else "j",
-            threads=effective_n_jobs(self.n_jobs),
-        )  # fmt: skip
         if sort_results and mode == "distance":
             table = table.sort(by="distance")
         data = table.distances if mode == "distance" else None
         return self._graph(data, table.indices, table.offsets)
+
+    def radius_neighbors(
+        self,
+        X: Any = None,
+        radius: float | None = None,
+        return_distance: bool = True,
+        sort_results: bool = False,
+    ) -> Any:
+        """Neighbours within the radius, as scikit-learn documents it; rows ascend by number."""
+        is_usual = return_distance or not sort_results
+        table = self._within(X, radius, "jd" if return_distance else "j") if is_usual else None
+        if table is None:
+            return super().radius_neighbors(X, radius, return_distance, sort_results)
+        if sort_results:
+            table = table.sort(by="distance")
+        starts = table.offsets
+        if not return_distance:
+            return _in_rows(table.indices, starts)
+        return _in_rows(table.distances, starts), _in_rows(table.indices, starts)
 
 
 class KNeighborsTransformer(_Graphs, _owner.KNeighborsTransformer):
@@ -128,14 +174,19 @@ class KNeighborsTransformer(_Graphs, _owner.KNeighborsTransformer):
         self, X: Any = None, n_neighbors: int | None = None, mode: str = "connectivity"
     ) -> Any:
         """The graph of the nearest samples, as scikit-learn documents it."""
-        samples = self._samples(X) if mode in ("distance", "connectivity") else None
-        k = self.n_neighbors if n_neighbors is None else n_neighbors
-        most = self.n_samples_fit_ - (X is None) if samples is not None else 0
-        if samples is None or not isinstance(k, int | np.integer) or not 0 < k <= most:
+        found = self._nearest(X, n_neighbors) if mode in ("distance", "connectivity") else None
+        if found is None:
             return super().kneighbors_graph(X, n_neighbors, mode)  # also for its errors
-        own, asking = samples
-        j, d = hs.nearest(
-            own, int(k), queries=asking, quantities="jd", threads=effective_n_jobs(self.n_jobs)
-        )
-        starts = np.arange(0, j.size + 1, k)
+        j, d = found
+        starts = np.arange(0, j.size + 1, j.shape[1])
         return self._graph(d.ravel() if mode == "distance" else None, j.ravel(), starts)
+
+    def kneighbors(
+        self, X: Any = None, n_neighbors: int | None = None, return_distance: bool = True
+    ) -> Any:
+        """The nearest samples, as scikit-learn documents it."""
+        found = self._nearest(X, n_neighbors)
+        if found is None:
+            return super().kneighbors(X, n_neighbors, return_distance)
+        j, d = found
+        return (d, j) if return_distance else j

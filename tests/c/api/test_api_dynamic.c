@@ -2,6 +2,7 @@
 /* test_api_dynamic.c: dynamic lists, through the public interface, against plain arrays. */
 #include "../../../csrc/core/dynamic/dynamic.h"
 #include "../../../csrc/halfshell_dynamic.h"
+#include "../support/among.h"
 #include "../support/dynamic_brute.h"
 #include "../support/harness.h"
 
@@ -373,12 +374,7 @@ no_list_is_an_argument_error(void)
     const double    x[3] = {0.0, 0.0, 0.0};
     const int64_t   id = 1;
     const hs_key    key = {1, 0};
-    const hs_points points = {.data = x,
-                              .n = 1,
-                              .ndim = 3,
-                              .real = HS_FLOAT64,
-                              .row_stride = sizeof x,
-                              .column_stride = sizeof *x};
+    const hs_points points = points_in_rows(x, 1, 3);
     double          back[3];
     int64_t         cell[3], cursor = 0;
     hs_dynamic     *copy;
@@ -408,12 +404,7 @@ missing_arguments_change_nothing(void)
     double          x[3] = {0.0, 0.0, 0.0};
     const int64_t   id = 1;
     const hs_key    key = {1, 0};
-    const hs_points good = {.data = x,
-                            .n = 1,
-                            .ndim = 3,
-                            .real = HS_FLOAT64,
-                            .row_stride = sizeof x,
-                            .column_stride = sizeof *x};
+    const hs_points good = points_in_rows(x, 1, 3);
     hs_points       flat = good, bad = good;
     hs_failure      failure;
     hs_dynamic     *list = list_with_two();

@@ -233,12 +233,7 @@ large_tables_fail_cleanly(void)
     static double   x[3 * N];
     harness_random  random = {77};
     hs_options      options = hs_options_default();
-    const hs_points points = {.data = x,
-                              .n = N,
-                              .ndim = 3,
-                              .real = HS_FLOAT64,
-                              .row_stride = 3 * sizeof(double),
-                              .column_stride = sizeof(double)};
+    const hs_points points = points_in_rows(x, N, 3);
     bool            disturbed = true;
     int             n_failed = 0, nth = 0;
     for (int e = 0; e < 3 * N; e++)

@@ -454,12 +454,7 @@ static hs_status
 measure_two(int ndim, const double *x, const hs_box *box, const int64_t *shift, unsigned want,
             hs_failure *failure)
 {
-    const hs_points points = {.data = x,
-                              .n = 2,
-                              .ndim = ndim,
-                              .real = HS_FLOAT64,
-                              .row_stride = ndim * (ptrdiff_t)sizeof(double),
-                              .column_stride = sizeof(double)};
+    const hs_points points = points_in_rows(x, 2, ndim);
     hs_pairs       *found = NULL;
     first[0] = 0;
     second[0] = 1;
@@ -544,12 +539,7 @@ what_is_too_far_is_refused(void)
     CHECK(measure_two(2, apart, NULL, NULL, HS_WANT_DISTANCE, &failure) == HS_ERR_FAR);
     CHECK(failure.row == 0);
     CHECK(measure_two(2, apart, NULL, NULL, HS_WANT_SHIFT, NULL) == HS_OK);
-    const hs_points both = {.data = apart,
-                            .n = 2,
-                            .ndim = 2,
-                            .real = HS_FLOAT64,
-                            .row_stride = 2 * sizeof(double),
-                            .column_stride = sizeof(double)};
+    const hs_points both = points_in_rows(apart, 2, 2);
     hs_pairs       *found = NULL;
     first[0] = second[0] = first[1] = second[2] = 0; /* pairs 1 and 2 */
     second[1] = first[2] = 1;
@@ -590,12 +580,7 @@ arguments_are_checked(void)
     const int64_t large = INT64_C(1) << 62;
     const int64_t bad[4][2] = {{large, 0}, {0, -large}, {0, 1}, {1, 0}};
     hs_box        mixed = box;
-    hs_points     points = {.data = x,
-                            .n = 2,
-                            .ndim = 2,
-                            .real = HS_FLOAT64,
-                            .row_stride = 2 * sizeof(double),
-                            .column_stride = sizeof(double)};
+    hs_points     points = points_in_rows(x, 2, 2);
     const int64_t numbers[4][2] = {{-1, 0}, {2, 0}, {0, -1}, {0, 2}};
     hs_pairs     *found = NULL;
     hs_options    options = hs_options_default();

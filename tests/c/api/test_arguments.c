@@ -21,12 +21,7 @@ static const double numbers[16] = {0.0, 0.0, 0.0, 0.5, 0.5, 0.5};
 static hs_points
 good_points(void)
 {
-    return (hs_points){.data = numbers,
-                       .n = 2,
-                       .ndim = 3,
-                       .real = HS_FLOAT64,
-                       .row_stride = 3 * sizeof(double),
-                       .column_stride = sizeof(double)};
+    return points_in_rows(numbers, 2, 3);
 }
 
 /* All that are wanted, of the arrays that the caller brings. */
@@ -148,8 +143,8 @@ call_fill_scene(call_scene *s)
 {
     memset(s, 0, sizeof *s);
     call_fill_numbers(s);
-    s->points = points_in_space(s->x, N_OF_CALL);
-    s->queries = points_in_space(s->q, N_QUERIES_OF_CALL);
+    s->points = points_in_rows(s->x, N_OF_CALL, 3);
+    s->queries = points_in_rows(s->q, N_QUERIES_OF_CALL, 3);
     s->box = (hs_box){.ndim = 3,
                       .periodic = {true, true, false},
                       .rows = {{2.0, 0.1, 0.0}, {0.3, 2.0, 0.0}, {0.0, 0.0, 2.0}}};

@@ -4,6 +4,7 @@
 #include "../../../csrc/core/cells/bins.h"
 #include "../../../csrc/core/memory/memory.h"
 #include "../../../csrc/core/threads/call.h"
+#include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
@@ -92,12 +93,7 @@ open_scene(int ndim, int64_t n, double cutoff, const hs_box *box, sorted *s)
     s->x = malloc((size_t)(n * ndim) * sizeof *s->x);
     for (int64_t e = 0; e < n * ndim; e++)
         s->x[e] = 2.0 * random_unit(&random) - 1.0;
-    const hs_points points = {.data = s->x,
-                              .n = n,
-                              .ndim = ndim,
-                              .real = HS_FLOAT64,
-                              .row_stride = ndim * (ptrdiff_t)sizeof(double),
-                              .column_stride = sizeof(double)};
+    const hs_points points = points_in_rows(s->x, n, ndim);
     s->options = hs_options_default();
     s->options.cutoff = cutoff;
     s->options.want = HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT;

@@ -68,7 +68,7 @@ all_pairs_are_there_in_order(void)
         fill_pairs(&random, n, trial % 3 == 0 ? 2 : 1000, has_shift, &found);
         const int bits = hs_test_sort_place_bits(trial % 4 < 2 ? 63 : 3); /* too few for j */
         hs_output_init(&unit.call.account, 2, found.columns, 8, &sorted);
-        CHECK(hs_sort_pairs(&unit.call, 0, POINTS, &found, &sorted) == HS_OK);
+        CHECK(hs_sort_pairs(&unit.call, 0, POINTS, &found, false, NULL, &sorted) == HS_OK);
         CHECK(hs_test_sort_place_bits(bits) == (trial % 4 < 2 ? 63 : 3));
         CHECK(sorted.n_pairs == n);
         const int64_t *i = hs_output_column(&sorted, HS_WANT_I);
@@ -129,9 +129,9 @@ rows_have_each_pair_both_ways(void)
         const int bits = hs_test_sort_place_bits(trial % 4 < 2 ? 63 : 3);
         hs_output_init(&unit.call.account, 2, found.columns, 4, &rows);
         hs_output_init(&unit.call.account, 2, found.columns, 4, &sorted);
-        CHECK(hs_sort_rows(&unit.call, POINTS, &found, true, offsets, &rows) == HS_OK);
+        CHECK(hs_sort_pairs(&unit.call, 0, POINTS, &found, true, offsets, &rows) == HS_OK);
         (void)hs_test_sort_place_bits(bits);
-        CHECK(hs_sort_pairs(&unit.call, 0, POINTS, &twice, &sorted) == HS_OK);
+        CHECK(hs_sort_pairs(&unit.call, 0, POINTS, &twice, false, NULL, &sorted) == HS_OK);
         CHECK(rows.n_pairs == 2 * n && offsets[0] == 0);
         for (int row = 0; row < POINTS; row++) {
             pairs_of[row + 1] += pairs_of[row];
@@ -161,7 +161,7 @@ sort_by(int threads, const hs_output *found, hs_output *sorted)
     const int64_t held = unit.call.account.held;
     unit.call.team = hs_team_create(threads);
     hs_output_init(NULL, 2, found->columns, 4, sorted);
-    CHECK(hs_sort_pairs(&unit.call, 0, POINTS, found, sorted) == HS_OK);
+    CHECK(hs_sort_pairs(&unit.call, 0, POINTS, found, false, NULL, sorted) == HS_OK);
     CHECK(unit.call.account.held == held);
     const int64_t most = unit.call.account.total.bytes_peak - held;
     search_unit_close(&unit);

@@ -62,86 +62,58 @@ what_is_no_map_is_refused(void)
     CHECK(hs_node_map_make(NULL, NULL, 0, &map) == HS_ERR_ARGUMENT);
 }
 
-/* Half list: pairs are copied as they are. */
-
-/* The row of the failure, -1 for none. */
-static int64_t
-first_wrong(const hs_half_list *pairs, int64_t n)
-{
-    hs_failure      failure = {.row = -1};
-    hs_output       copy;
-    const hs_status status = hs_half_list_copy(NULL, pairs, n, false, &copy, &failure);
-    if (status == HS_OK) {
-        const hs_half_list columns = hs_half_list_columns(&copy);
-        const size_t       bytes = (size_t)pairs->n * sizeof(int32_t);
-        CHECK(columns.n == pairs->n && (columns.shift != NULL) == (pairs->shift != NULL));
-        CHECK(bytes == 0 ||
-              (memcmp(columns.i, pairs->i, bytes) == 0 && memcmp(columns.j, pairs->j, bytes) == 0));
-        CHECK(pairs->shift == NULL ||
-              memcmp(columns.shift, pairs->shift, bytes * (size_t)pairs->ndim) == 0);
-    }
-    hs_output_free(&copy);
-    CHECK((status == HS_OK) == (failure.row < 0));
-    return failure.row;
-}
+/* Half lists, and directed ones, of which pairs may be turned and are both there: they are copied as
+ * they are, or the first pair that is wrong is named. */
 
 static void
-pairs_in_images_ascend_by_shift(void)
+what_is_no_list_is_refused(void)
 {
-    static const int32_t i[4] = {0, 0, 0, 1}, j[4] = {0, 1, 1, 1};
+    static const int32_t i[4] = {0, 0, 1, 2}, j[4] = {1, 3, 2, 3}, turned[4] = {0, 3, 1, 2};
+    static const int32_t unsorted[4] = {0, 1, 0, 2}, below[4] = {-1, 0, 1, 2}, twice[4] = {1, 1};
+    static const int32_t lower[4] = {1, 0, 2, 3}, falling[4] = {3, 1, 2, 3}, far[4] = {0, 4, 5, 6};
+    static const int32_t a[4] = {0, 0, 0, 1}, b[4] = {0, 1, 1, 1}; /* in images, by their shifts */
     static const int32_t good[8] = {0, 1, -1, 4, -1, 5, 2, -7};
     static const int32_t equal[8] = {0, 1, -1, 4, -1, 4, 2, -7};
     static const int32_t back[8] = {0, 1, -1, 4, -1, 3, 2, -7};
     static const int32_t self[8] = {0, 0, -1, 4, -1, 5, 2, -7};
     static const int32_t behind[8] = {0, 1, -1, 4, -1, 5, -2, 7};
-    hs_half_list         half = {.n = 4, .i = i, .j = j, .shift = good, .ndim = 2};
-    CHECK(first_wrong(&half, 2) == -1);
-    half.shift = equal;
-    CHECK(first_wrong(&half, 2) == 2);
-    half.shift = back;
-    CHECK(first_wrong(&half, 2) == 2);
-    half.shift = self;
-    CHECK(first_wrong(&half, 2) == 0);
-    half.shift = behind;
-    CHECK(first_wrong(&half, 2) == 3);
-    half.shift = NULL;
-    CHECK(first_wrong(&half, 2) == 0);
-}
-
-static void
-what_is_no_half_list_is_refused(void)
-{
-    static const int32_t i[4] = {0, 0, 1, 2}, j[4] = {1, 3, 2, 3};
-    hs_half_list         half = {.n = 4, .i = i, .j = j};
-    CHECK(first_wrong(&half, 4) == -1);
-    CHECK(first_wrong(&half, 3) == 1);
-    static const int32_t turned[4] = {0, 3, 1, 2}, unsorted[4] = {0, 1, 0, 2}, twice[4] = {1, 1};
-    static const int32_t below[4] = {-1, 0, 1, 2};
-    half.i = turned;
-    CHECK(first_wrong(&half, 4) == 1);
-    half.i = unsorted;
-    CHECK(first_wrong(&half, 4) == 2);
-    static const int32_t lower[4] = {1, 0, 2, 3}, falling[4] = {3, 1, 2, 3};
-    half.j = lower;
-    CHECK(first_wrong(&half, 4) == 1);
-    half.i = i;
-    half.j = falling;
-    CHECK(first_wrong(&half, 4) == 1);
-    half.j = j;
-    half.i = below;
-    CHECK(first_wrong(&half, 4) == 0);
-    half = (hs_half_list){.n = 2, .i = i, .j = twice};
-    CHECK(first_wrong(&half, 4) == 1);
-    hs_failure         failure;
-    hs_output          copy;
-    hs_account         account;
-    hs_options         options = hs_options_default();
-    const hs_half_list good = {.n = 4, .i = i, .j = j};
-    options.memory_limit = 1.0;
-    hs_account_init(&account, &options);
-    CHECK(hs_half_list_copy(&account, &good, 4, false, &copy, &failure) == HS_ERR_MEMORY);
-    hs_output_free(&copy);
-    hs_account_close(&account);
+    static const int32_t from[4] = {0, 1, 1, 1}, to[4] = {1, 0, 1, 1}, shift[4] = {3, -3, -2, 2};
+    static const int32_t zero[4] = {3, -3, 0, 2}, one_way[4] = {3, 3, 2, 1};
+    static const struct {
+        hs_half_list list;
+        int64_t      n_points, row; /* -1: none is wrong */
+        bool         directed;
+    } cases[] = {
+        {{4, i, j, NULL, 0}, 4, -1, false},      {{4, i, j, NULL, 0}, 3, 1, false},
+        {{4, turned, j, NULL, 0}, 4, 1, false},  {{4, unsorted, j, NULL, 0}, 4, 2, false},
+        {{4, i, falling, NULL, 0}, 4, 1, false}, {{4, unsorted, lower, NULL, 0}, 4, 1, false},
+        {{4, below, j, NULL, 0}, 4, 0, false},   {{2, i, twice, NULL, 0}, 4, 1, false},
+        {{4, i, below, NULL, 0}, 4, 0, false},   {{4, far, j, NULL, 0}, 4, 1, false},
+        {{4, a, b, good, 2}, 2, -1, false},      {{4, a, b, equal, 2}, 2, 2, false},
+        {{4, a, b, back, 2}, 2, 2, false},       {{4, a, b, self, 2}, 2, 0, false},
+        {{4, a, b, behind, 2}, 2, 3, false},     {{4, a, b, NULL, 2}, 2, 0, false},
+        {{4, from, to, shift, 1}, 2, -1, true},  {{4, from, to, zero, 1}, 2, 2, true},
+        {{4, from, to, one_way, 1}, 2, 3, true}, {{4, from, to, NULL, 1}, 2, 2, true},
+        {{4, from, to, shift, 1}, 1, 0, true},
+    };
+    hs_output copy;
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        const hs_half_list *list = &cases[k].list;
+        hs_failure          failure = {.row = -1};
+        const hs_status     status =
+            hs_half_list_copy(NULL, list, cases[k].n_points, cases[k].directed, &copy, &failure);
+        CHECK(status == (cases[k].row < 0 ? HS_OK : HS_ERR_ARGUMENT));
+        CHECK(failure.row == cases[k].row);
+        if (status == HS_OK) {
+            const hs_half_list columns = hs_half_list_columns(&copy);
+            const size_t       bytes = (size_t)list->n * sizeof(int32_t);
+            CHECK(columns.n == list->n && (columns.shift != NULL) == (list->shift != NULL));
+            CHECK(memcmp(columns.i, list->i, bytes) == 0 && memcmp(columns.j, list->j, bytes) == 0);
+            CHECK(list->shift == NULL ||
+                  memcmp(columns.shift, list->shift, bytes * (size_t)list->ndim) == 0);
+        }
+        hs_output_free(&copy);
+    }
     const hs_half_list wrong[] = {
         {.n = -1, .i = i, .j = j},
         {.n = 1, .j = j},
@@ -150,32 +122,16 @@ what_is_no_half_list_is_refused(void)
         {.n = 1, .i = i, .j = j, .shift = j, .ndim = HS_MAX_DIM + 1},
     };
     for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
-        CHECK(hs_half_list_copy(NULL, &wrong[k], 4, false, &copy, &failure) == HS_ERR_ARGUMENT);
+        CHECK(hs_half_list_copy(NULL, &wrong[k], 4, false, &copy, NULL) == HS_ERR_ARGUMENT);
         hs_output_free(&copy);
     }
-}
-
-/* Of directed lists pairs may be turned, and there are both. */
-static void
-what_is_no_directed_list_is_refused(void)
-{
-    static const int32_t i[4] = {0, 1, 1, 1}, j[4] = {1, 0, 1, 1};
-    static const int32_t shift[4] = {3, -3, -2, 2}, zero[4] = {3, -3, 0, 2}, back[4] = {3, 3, 2, 1};
-    hs_half_list         half = {.n = 4, .i = i, .j = j, .shift = shift, .ndim = 1};
-    hs_output            copy;
-    hs_failure           failure = {.row = -1};
-    CHECK(hs_half_list_copy(NULL, &half, 2, true, &copy, &failure) == HS_OK && failure.row == -1);
+    hs_account account;
+    hs_options options = hs_options_default();
+    options.memory_limit = 1.0;
+    hs_account_init(&account, &options);
+    CHECK(hs_half_list_copy(&account, &cases[0].list, 4, false, &copy, NULL) == HS_ERR_MEMORY);
     hs_output_free(&copy);
-    const struct {
-        const int32_t *shift;
-        int64_t        n, row;
-    } wrong[] = {{zero, 2, 2}, {back, 2, 3}, {NULL, 2, 2}, {shift, 1, 0}};
-    for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
-        half.shift = wrong[k].shift;
-        CHECK(hs_half_list_copy(NULL, &half, wrong[k].n, true, &copy, &failure) == HS_ERR_ARGUMENT);
-        CHECK(failure.row == wrong[k].row);
-        hs_output_free(&copy);
-    }
+    hs_account_close(&account);
 }
 
 /* Pairs of rows: of all nodes or of those that are no ghosts, in any order, with and without
@@ -428,50 +384,47 @@ images_keep_their_shifts(void)
 static void
 what_are_no_rows_of_all_is_refused(void)
 {
-    static const int64_t counts[1] = {2}, good[3] = {0, 1, 2}, descending[3] = {1, 0, 2};
+    static const int64_t two[1] = {2}, one[1] = {1}, none[1] = {0}, three[2] = {2, 1};
+    static const int64_t ghosts[2] = {2, 0}, good[3] = {0, 1, 2}, descending[3] = {1, 0, 2};
     static const int64_t late[3] = {0, 1, 3}, below[3] = {-1, 1, 2}, one_row[2] = {0, 2};
-    static const int64_t ghosts[1] = {1};
-    static const int32_t index[2] = {1, 0}, high[2] = {1, 5};
-    const hs_options     options = hs_options_default();
-    hs_node_lists        lists = {.n_lists = 1, .n_nodes = counts, .ghost_rows = true};
-    hs_list_rows         rows = {2, 1, good, 2, index, NULL, 1};
-    hs_connectivity     *made;
-    CHECK(hs_connectivity_pair(&rows, &lists, &options, &made, NULL) == HS_OK);
-    CHECK(hs_pairs_length(hs_connectivity_pairs(made)) == 1);
-    hs_connectivity_free(made);
-    const int64_t *const wrong[] = {descending, late, below};
-    for (int k = 0; k < 3; k++) {
-        rows.offsets = wrong[k];
-        CHECK(hs_connectivity_pair(&rows, &lists, &options, &made, NULL) == HS_ERR_ARGUMENT);
-        CHECK(made == NULL);
+    static const int64_t ends[7] = {0, 0, 1, 2, 2, 2, 2}, more_ends[7] = {0, 0, 1, 1, 2, 2, 2};
+    static const int32_t index[2] = {1, 0}, high[2] = {1, 5}, zeros[2] = {0, 0};
+    const hs_node_lists  all = {.n_lists = 1, .n_nodes = two, .ghost_rows = true};
+    const hs_node_lists  with_pairs = {
+         .n_lists = 1, .n_nodes = two, .n_ghosts = two, .ghost_rows = true, .ghost_pairs = true};
+    const hs_node_lists of_two = {
+        .n_lists = 2, .n_nodes = three, .n_ghosts = ghosts, .ghost_rows = true};
+    const hs_node_lists half = {.n_lists = 1, .n_nodes = two, .n_ghosts = one};
+    const hs_node_lists plain = {.n_lists = 1, .n_nodes = two};
+    const hs_node_lists empty = {.n_lists = 1, .n_nodes = none};
+    const struct {
+        hs_list_rows         rows;
+        const hs_node_lists *lists;
+        int64_t              n_pairs; /* -1: they are refused */
+    } cases[] = {
+        {{2, 1, good, 2, index, NULL, 1}, &all, 1},
+        {{2, 1, descending, 2, index, NULL, 1}, &all, -1},
+        {{2, 1, late, 2, index, NULL, 1}, &all, -1},
+        {{2, 1, below, 2, index, NULL, 1}, &all, -1},
+        {{2, 1, good, 2, high, NULL, 1}, &all, -1},        /* two pairs of two entries */
+        {{2, 1, good, 2, high, NULL, 1}, &with_pairs, -1}, /* and of ghosts */
+        {{3, 2, ends, 2, zeros, NULL, 1}, &of_two, 1},
+        {{3, 2, more_ends, 2, zeros, NULL, 1}, &of_two, -1},
+        {{2, 1, good, 2, index, NULL, 1}, &half, -1},
+        {{1, 1, one_row, 2, index, NULL, 1}, &plain, -1},
+        {{2, 2, ends, 2, index, NULL, 1}, &plain, -1},
+        {{2, 1, good, 2, index, NULL, 1}, &empty, -1},
+    };
+    const hs_options options = hs_options_default();
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        hs_connectivity *made;
+        const hs_status  status =
+            hs_connectivity_pair(&cases[k].rows, cases[k].lists, &options, &made, NULL);
+        CHECK(status == (cases[k].n_pairs < 0 ? HS_ERR_ARGUMENT : HS_OK));
+        CHECK(made == NULL ? cases[k].n_pairs < 0
+                           : hs_pairs_length(hs_connectivity_pairs(made)) == cases[k].n_pairs);
+        hs_connectivity_free(made);
     }
-    rows.offsets = good;
-    rows.indices = high; /* two pairs of two entries */
-    CHECK(hs_connectivity_pair(&rows, &lists, &options, &made, NULL) == HS_ERR_ARGUMENT);
-    lists.n_ghosts = counts; /* as pairs of two ghosts, and of a ghost and an internal node */
-    lists.ghost_pairs = true;
-    CHECK(hs_connectivity_pair(&rows, &lists, &options, &made, NULL) == HS_ERR_ARGUMENT);
-    static const int64_t ends[7] = {0, 0, 1, 2, 2, 2, 2};
-    static const int32_t zeros[2] = {0, 0};
-    static const int64_t two_counts[2] = {2, 1}, two_ghosts[2] = {2, 0};
-    const hs_node_lists  two = {
-         .n_lists = 2, .n_nodes = two_counts, .n_ghosts = two_ghosts, .ghost_rows = true};
-    const hs_list_rows turned = {3, 2, ends, 2, zeros, NULL, 1};
-    CHECK(hs_connectivity_pair(&turned, &two, &options, &made, NULL) == HS_OK);
-    hs_connectivity_free(made);
-    static const int64_t more_ends[7] = {0, 0, 1, 1, 2, 2, 2};
-    const hs_list_rows   unmatched = {3, 2, more_ends, 2, zeros, NULL, 1};
-    CHECK(hs_connectivity_pair(&unmatched, &two, &options, &made, NULL) == HS_ERR_ARGUMENT);
-    lists = (hs_node_lists){.n_lists = 1, .n_nodes = counts, .n_ghosts = ghosts};
-    rows.indices = index;
-    CHECK(hs_connectivity_pair(&rows, &lists, &options, &made, NULL) == HS_ERR_ARGUMENT);
-    lists = (hs_node_lists){.n_lists = 1, .n_nodes = counts};
-    const hs_list_rows few = {1, 1, one_row, 2, index, NULL, 1};
-    CHECK(hs_connectivity_pair(&few, &lists, &options, &made, NULL) == HS_ERR_ARGUMENT);
-    const hs_list_rows halves = {2, 2, ends, 2, index, NULL, 1};
-    CHECK(hs_connectivity_pair(&halves, &lists, &options, &made, NULL) == HS_ERR_ARGUMENT);
-    lists.n_nodes = good; /* no node */
-    CHECK(hs_connectivity_pair(&rows, &lists, &options, &made, NULL) == HS_ERR_ARGUMENT);
 }
 
 static hs_status
@@ -1079,9 +1032,7 @@ void
 test_connectivity(void)
 {
     RUN(what_is_no_map_is_refused);
-    RUN(pairs_in_images_ascend_by_shift);
-    RUN(what_is_no_half_list_is_refused);
-    RUN(what_is_no_directed_list_is_refused);
+    RUN(what_is_no_list_is_refused);
     RUN(pairs_of_rows_are_those_of_links);
     RUN(pairs_of_rows_that_are_none_are_refused);
     RUN(many_pairs_ask_the_caller);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_overlap.c: overlaps and intersections of neighbourhoods. */
 #include "../../../csrc/core/connectivity/connectivity.h"
+#include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/node_scenes.h"
 #include "../support/poll_checks.h"
@@ -53,12 +54,7 @@ rows_given(void)
 static hs_points
 points_given(void)
 {
-    return (hs_points){.data = scene.x,
-                       .n = scene.n,
-                       .ndim = 2,
-                       .real = HS_FLOAT64,
-                       .row_stride = 2 * sizeof(double),
-                       .column_stride = sizeof(double)};
+    return points_in_rows(scene.x, scene.n, 2);
 }
 
 static void
@@ -104,7 +100,7 @@ rows_that_are_none_are_refused(void)
 {
     static const int64_t descending[3] = {0, 2, 1}, late[3] = {1, 1, 1}, good[3] = {0, 1, 1};
     static const int32_t one[2] = {1, 1}, own[2] = {0, 0}, outside[2] = {2, 2}, below[2] = {-1, 0};
-    static const int64_t both[3] = {0, 2, 2};
+    static const int64_t both[3] = {0, 2, 2}, falling[3] = {0, -1, 1}, none[3] = {0, 0, 0};
     scene = (node_scene){.n = 2, .n_lists = 1, .n_nodes = {2}};
     const hs_index_rows wrong[] = {
         {.n = 2, .offsets = descending, .n_indices = 1, .indices = one},
@@ -117,9 +113,13 @@ rows_that_are_none_are_refused(void)
         {.n = 1, .offsets = good, .n_indices = 1, .indices = one},
         {.n = -1, .offsets = good, .n_indices = 1, .indices = one},
         {.n = 2, .n_indices = 1, .indices = one},
+        {.n = 2, .offsets = falling, .n_indices = 1, .indices = one},
+        {.n = 2, .offsets = good, .n_indices = -1, .indices = one},
         {.n = 2, .offsets = good, .n_indices = 1},
     };
     hs_index_rows fine = {.n = 2, .offsets = good, .n_indices = 1, .indices = one};
+    CHECK(find(&fine) == HS_OK);
+    fine = (hs_index_rows){.n = 2, .offsets = none};
     CHECK(find(&fine) == HS_OK);
     for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
         hs_index_rows rows = wrong[k];
@@ -240,12 +240,7 @@ find_intersection(bool shuffled, bool ghost_pairs, hs_pairs **result, hs_failure
     const hs_half_list  half = node_half_of(&scene);
     const hs_node_lists lists = node_lists_of(&scene, shuffled, true, ghost_pairs);
     hs_options          options = hs_options_default();
-    const hs_points     points = {.data = scene.x,
-                                  .n = scene.n,
-                                  .ndim = DIM,
-                                  .real = HS_FLOAT64,
-                                  .row_stride = DIM * sizeof(double),
-                                  .column_stride = sizeof(double)};
+    const hs_points     points = points_in_rows(scene.x, scene.n, DIM);
     options.memory_limit = limit;
     return hs_connectivity_intersect(&points, NULL, &half, &lists, &options, result, failure);
 }

@@ -5,6 +5,7 @@
 #include "../../../csrc/core/dynamic/dynamic.h"
 #include "../../../csrc/core/memory/memory.h"
 #include "../../../csrc/halfshell_dynamic.h"
+#include "../support/among.h"
 #include "../support/dynamic_brute.h"
 #include "../support/harness.h"
 #include "../support/poll_checks.h"
@@ -375,12 +376,7 @@ make_rows_update(int64_t *ids, double rows[][2])
 static hs_status
 put_rows(hs_dynamic *list, const int64_t *ids, double rows[][2], hs_failure *failure)
 {
-    const hs_points points = {.data = rows,
-                              .n = ROWS,
-                              .ndim = 2,
-                              .real = HS_FLOAT64,
-                              .row_stride = 2 * sizeof(double),
-                              .column_stride = sizeof(double)};
+    const hs_points points = points_in_rows(rows, ROWS, 2);
     return hs_dynamic_insert_many(list, ids, NULL, &points, failure);
 }
 
@@ -504,13 +500,8 @@ few_rows_among_many_cells(void)
     enum { SOME = 6, MANY = 400 };
     static brute_list brute;
     int64_t           ids[MANY];
-    double            rows[MANY][2];
-    hs_points         points = {.data = rows,
-                                .n = MANY,
-                                .ndim = 2,
-                                .real = HS_FLOAT64,
-                                .row_stride = 2 * sizeof(double),
-                                .column_stride = sizeof(double)};
+    double            rows[MANY][2] = {{0.0}};
+    hs_points         points = points_in_rows(rows, MANY, 2);
     for (int storage = 0; storage < 2; storage++) {
         for (int64_t nth = 1;; nth++) {
             hs_dynamic *list = new_list((hs_storage)storage, false, &brute);
@@ -560,12 +551,7 @@ rows_have_tags(void)
     bool              removed[ROWS];
     hs_failure        failure;
     hs_dynamic       *list = new_list(HS_STORE_HASH, true, &brute);
-    const hs_points   points = {.data = rows,
-                                .n = ROWS,
-                                .ndim = 2,
-                                .real = HS_FLOAT64,
-                                .row_stride = 2 * sizeof(double),
-                                .column_stride = sizeof(double)};
+    const hs_points   points = points_in_rows(rows, ROWS, 2);
     make_rows_update(ids, rows);
     for (int r = 0; r < ROWS; r++) {
         tags[r] = r % 2 == 0 ? 7 : -7;

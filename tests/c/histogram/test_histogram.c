@@ -255,7 +255,7 @@ check_bins(const double (*x)[3], const hs_histogram *wanted)
 {
     static int64_t     meant[MOST_EDGES + 1];
     const hs_options   options = hs_options_default();
-    const hs_points    points = points_in_space(x[0], CLOUD);
+    const hs_points    points = points_in_rows(x[0], CLOUD, 3);
     const hs_histogram found = *wanted;
     memset(meant, 0, sizeof meant);
     for (int i = 0; i < CLOUD; i++) {
@@ -403,7 +403,7 @@ threads_add_up_to_the_same(void)
     const double    edges[EDGES] = {0.02, 0.03, 0.05};
     harness_random  random = {1414};
     hs_options      options = hs_options_default();
-    const hs_points points = points_in_space(x, N);
+    const hs_points points = points_in_rows(x, N, 3);
     int64_t         counts[2][EDGES];
     double          sums[2][EDGES];
     for (int e = 0; e < 3 * N; e++) {

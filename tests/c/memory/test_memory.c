@@ -141,8 +141,8 @@ give_all(void *last)
     }
 }
 
-/* A call ends well where memory is left for none, or one, of what it wants to leave behind; the next
- * one gets no arena and no block. */
+/* A call ends well where memory is left for none, or one, of what it wants to leave behind; the
+ * next one gets no arena and no block. */
 static void
 calls_end_without_any_memory(void)
 {

@@ -531,8 +531,7 @@ chunk_from_malloc(size_t bytes)
     CHECK(raw != NULL);
     char *data = raw + sizeof(hs_chunk);
     data += (64 - (uintptr_t)data % 64) % 64;
-    *hs_chunk_of(data) =
-        (hs_chunk){.raw = raw, .lead = (size_t)(data - raw), .capacity = bytes, .touched = bytes};
+    *hs_chunk_of(data) = (hs_chunk){.raw = raw, .capacity = bytes, .touched = bytes};
     return data;
 }
 

@@ -24,15 +24,15 @@ set_with(const hs_points *points, hs_set *set)
     return points != NULL ? set : NULL;
 }
 
-/* n points in space, one after the other. */
+/* n points, one after the other. */
 static inline hs_points
-points_in_space(const double *x, int64_t n)
+points_in_rows(const void *x, int64_t n, int ndim)
 {
     return (hs_points){.data = x,
                        .n = n,
-                       .ndim = 3,
+                       .ndim = ndim,
                        .real = HS_FLOAT64,
-                       .row_stride = 3 * sizeof(double),
+                       .row_stride = ndim * (ptrdiff_t)sizeof(double),
                        .column_stride = sizeof(double)};
 }
 

@@ -12,7 +12,7 @@
 
 #include <stdio.h>
 
-enum { ANSWER_POINTS = 400, ANSWER_TYPES = 3, ANSWER_EDGES = 12 };
+enum { ANSWER_POINTS = 400, ANSWER_TYPES = 3, ANSWER_EDGES = 12, ANSWER_EXCLUDED = 40 };
 
 /* A scene, its pairs, and what is chosen for it by `salt`. */
 typedef struct asked {
@@ -34,7 +34,7 @@ typedef struct asked {
     double             radii[ANSWER_POINTS], weights[ANSWER_POINTS], ellipsoids[ANSWER_POINTS * 9];
     double             table[ANSWER_TYPES * ANSWER_TYPES];
     int32_t            types[ANSWER_POINTS];
-    int64_t            labels[ANSWER_POINTS], groups[ANSWER_POINTS];
+    int64_t            labels[ANSWER_POINTS], groups[ANSWER_POINTS], excluded[2 * ANSWER_EXCLUDED];
 } asked;
 
 static hs_counters answer_counters; /* of the last search of a check */
@@ -241,9 +241,18 @@ is_selected(const asked *a, const brute_pair *pair)
         return false;
     if (least > 0.0 && is_within_sum(a, pair, 1, least, 0.0, false))
         return false;
-    const bool excluded = of->has_labels && pair->i != pair->j &&
-                          llabs(a->labels[pair->i] - a->labels[pair->j]) <= of->within;
-    return !excluded || !is_nearest_image(a, pair);
+    bool excluded = of->has_labels && llabs(a->labels[pair->i] - a->labels[pair->j]) <= of->within;
+    for (int64_t e = 0; e < of->n_excluded; e++) {
+        const int64_t i = a->excluded[2 * e], j = a->excluded[2 * e + 1];
+        excluded = excluded || (i == pair->i && j == pair->j) || (i == pair->j && j == pair->i);
+    }
+    return !excluded || pair->i == pair->j || !is_nearest_image(a, pair);
+}
+
+TRUTH bool
+is_selected_within_radii(const asked *a, const brute_pair *pair)
+{
+    return is_within_radii(a, pair) && is_selected(a, pair);
 }
 
 static inline int64_t
@@ -668,51 +677,67 @@ check_systems(asked *a)
                          0);
 }
 
-/* Points from this one on, with what their reach goes by. */
-#define set_within_reach(a, points, from)     \
-    SET(points, .radii = (a)->radii + (from), \
-        .supports = (a)->ellipsoids + (from) * (a)->d * (a)->d, .types = (a)->types + (from))
+/* Points from this one on, with what their reach and a selection go by. */
+#define known_from(a, points, from)                                                           \
+    SET(points, .radii = (a)->radii + (from),                                                 \
+        .supports = (a)->ellipsoids + (from) * (a)->d * (a)->d, .types = (a)->types + (from), \
+        .groups = (a)->groups + (from), .labels = (a)->labels + (from))
 
 /* Of the points before `split` among the others. */
 static inline const char *
-reach_across(asked *a, kept_fn kept)
+known_across(asked *a, const hs_reach *reach, const hs_selection *selection, kept_fn kept)
 {
-    const hs_among   among = {.points = set_within_reach(a, &a->rest, a->split),
-                              .queries = set_within_reach(a, &a->first, 0),
-                              .box = a->scene->box,
-                              .reach = &a->reach};
-    brute_list       across = pairs_kept(a, a->half, is_asked_across, false, false);
+    static int64_t excluded[2 * ANSWER_EXCLUDED];
+    hs_selection   between = a->selection;
+    const hs_among among = {.points = known_from(a, &a->rest, a->split),
+                            .queries = known_from(a, &a->first, 0),
+                            .box = a->scene->box,
+                            .reach = reach,
+                            .selection = selection != NULL ? &between : NULL};
+    between.excluded = excluded;
+    between.n_excluded = 0;
+    for (int64_t e = 0; e < a->selection.n_excluded; e++) {
+        const int64_t i = a->excluded[2 * e], j = a->excluded[2 * e + 1];
+        if ((i < a->split) == (j < a->split))
+            continue;
+        excluded[2 * between.n_excluded] = i < j ? i : j;
+        excluded[2 * between.n_excluded++ + 1] = (i < j ? j : i) - a->split;
+    }
+    brute_list       all = pairs_kept(a, a->half, kept, false, false);
+    const brute_list expected = pairs_kept(a, &all, is_asked_across, false, false);
     int64_t          n = -1;
-    const brute_list expected = pairs_kept(a, &across, kept, false, false);
-    brute_free(&across);
+    brute_free(&all);
     const hs_status counted = hs_pairs_count(&among, &a->options, &n, NULL);
     if (counted == HS_OK && n != expected.n)
-        return "another count within reach between two sets";
+        return "another count between two sets";
     return rows_difference(a, &among, expected, a->split);
 }
 
-/* Pairs, or rows, by `reach`, and their number; by one search or several. */
+/* Pairs, or rows, by reach and selection, and their number; by one search or several. */
 static inline const char *
-reach_difference(asked *a, kept_fn kept)
+known_difference(asked *a, const hs_reach *reach, const hs_selection *selection, kept_fn kept)
 {
-    const hs_among among = {
-        .points = set_within_reach(a, &a->points, 0), .box = a->scene->box, .reach = &a->reach};
-    const bool  by_rows = a->reach.rule >= HS_RULE_GATHER && a->reach.n_types == 0;
-    const bool  joins = hs_test_join_levels(chosen(a, 2) == 0);
-    const char *difference = NULL;
-    hs_pairs   *pairs = NULL;
-    int64_t     n = -1;
+    const hs_among among = {.points = known_from(a, &a->points, 0),
+                            .box = a->scene->box,
+                            .reach = reach,
+                            .selection = selection};
+    const bool     directed = reach != NULL && reach->rule >= HS_RULE_GATHER && reach->n_types == 0;
+    const bool     joins = hs_test_join_levels(chosen(a, 2) == 0);
+    const char    *difference = NULL;
+    hs_pairs      *pairs = NULL;
+    int64_t        n = -1;
     if (chosen(a, 3) == 0) {
-        difference = reach_across(a, kept);
-    } else if (by_rows || chosen(a, 3) == 0) {
-        difference = rows_difference(a, &among, pairs_kept(a, &a->both, kept, false, false), 0);
+        difference = known_across(a, reach, selection, kept);
+    } else if (directed || chosen(a, 3) == 0) {
+        const brute_list *from = directed ? &a->both : a->half;
+        difference = rows_difference(a, &among, pairs_kept(a, from, kept, !directed, false), 0);
     } else {
         brute_list      expected = pairs_kept(a, a->half, kept, false, false);
         const hs_status counted = hs_pairs_count(&among, &a->options, &n, NULL);
         const hs_status status = hs_pairs_find(&among, &a->options, &pairs, NULL);
         const bool      is_other = counted == HS_OK && n != expected.n;
         difference = difference_of(a, status, pairs, expected, 0);
-        difference = is_other ? "another count within reach" : difference;
+        difference = is_other ? "another count" : difference;
     }
     (void)hs_test_join_levels(joins);
     return difference;
@@ -748,7 +773,8 @@ check_radii(asked *a)
         const double length = some_length(a);
         a->radii[i] = length < least ? 0.0 : length;
     }
-    return a->scene->cutoff > 0x1p1020 ? NULL : reach_difference(a, is_within_radii);
+    return a->scene->cutoff > 0x1p1020 ? NULL
+                                       : known_difference(a, &a->reach, NULL, is_within_radii);
 }
 
 static inline const char *
@@ -760,7 +786,7 @@ check_table(asked *a)
             a->table[s * ANSWER_TYPES + t] = a->table[t * ANSWER_TYPES + s] =
                 chosen(a, 6) == 0 ? -1.0 : some_length(a);
     }
-    return reach_difference(a, is_within_table);
+    return known_difference(a, &a->reach, NULL, is_within_table);
 }
 
 static inline const char *
@@ -783,45 +809,148 @@ check_supports(asked *a)
     a->reach = (hs_reach){.rule = (hs_rule)(HS_RULE_MAX + chosen(a, 4)),
                           .has_supports = true,
                           .extent = unit * (1.0 + (double)chosen(a, 5)) * some_length(a)};
-    return reach_difference(a, is_within_supports);
+    return known_difference(a, &a->reach, NULL, is_within_supports);
 }
 
-/* Pairs and rows of those that are selected; a stream keeps what it chooses by. */
+/* Labels, or a list of pairs, to leave out; groups; a least distance. */
+static inline void
+choose_selection(asked *a)
+{
+    const uint64_t which = 1 + chosen(a, 7);
+    const bool     has_list = which & 2 && a->half->n > 0 && chosen(a, 2);
+    a->selection = (hs_selection){.has_groups = which & 1,
+                                  .has_labels = which & 2 && !has_list,
+                                  .within = which & 2 ? (int64_t)chosen(a, 3) : 0,
+                                  .n_excluded = has_list ? (int64_t)chosen(a, ANSWER_EXCLUDED) : 0,
+                                  .excluded = a->excluded,
+                                  .min_distance = which & 4 ? some_length(a) : 0.0};
+    for (int64_t e = 0; e < a->selection.n_excluded; e++) {
+        const brute_pair *pair = &a->half->pairs[chosen(a, (uint64_t)a->half->n)];
+        const uint64_t    turn = chosen(a, 2);
+        a->excluded[2 * e + (int64_t)turn] = pair->i;
+        a->excluded[2 * e + 1 - (int64_t)turn] = pair->j;
+    }
+}
+
+/* Of queries that are points themselves, which find each its own point too, and of systems. */
+static inline const char *
+selected_otherwise(asked *a, const brute_list *selected)
+{
+    const int64_t  first[] = {0, a->split, a->split, a->n};
+    int64_t        numbers[ANSWER_POINTS];
+    hs_selection   numbered = a->selection;
+    hs_pairs      *pairs = NULL;
+    const hs_among own = {.points = known_from(a, &a->points, 0),
+                          .queries = SET(&a->first),
+                          .box = a->scene->box,
+                          .selection = &numbered};
+    numbered.query_numbers = numbers;
+    for (int64_t i = 0; i < a->split; i++)
+        numbers[i] = i;
+    brute_list  both = pairs_kept(a, selected, NULL, true, false);
+    const char *difference = rows_difference(a, &own, pairs_kept(a, &both, asks, false, true), 0);
+    brute_free(&both);
+    if (difference != NULL)
+        return difference;
+    hs_set set = *known_from(a, &a->points, 0);
+    set.n_systems = 3;
+    set.first = first;
+    const hs_among  systems = {.points = &set, .box = a->scene->box, .selection = &a->selection};
+    const hs_status status = hs_pairs_find(&systems, &a->options, &pairs, NULL);
+    return difference_of(a, status, pairs, pairs_kept(a, selected, is_of_one_system, false, false),
+                         0);
+}
+
+/* The nearest of those that are selected. */
+static inline const char *
+selected_nearest(asked *a, const brute_list *selected)
+{
+    const int64_t  k = 1 + (int64_t)chosen(a, chosen(a, 4) ? 4 : 60);
+    const hs_among among = {
+        .points = known_from(a, &a->points, 0), .box = a->scene->box, .selection = &a->selection};
+    hs_options options = a->options;
+    hs_pairs  *rows = NULL;
+    if (!a->scene->inclusive)
+        return NULL;
+    options.index_bytes = 8;
+    const hs_status status = hs_nearest_find(&among, k, &options, &rows, NULL);
+    const char     *difference = hs_status_text(status);
+    if (status == HS_OK)
+        difference = nearest_difference(a, rows, k, pairs_kept(a, selected, NULL, true, false), 0);
+    hs_pairs_free(rows);
+    return difference;
+}
+
+/* How many are in each bin. */
+static inline const char *
+selected_histogram(asked *a, const brute_list *selected)
+{
+    int64_t        counts[ANSWER_EDGES] = {0};
+    const hs_among among = {
+        .points = known_from(a, &a->points, 0), .box = a->scene->box, .selection = &a->selection};
+    hs_histogram    histogram = {.n_edges = a->n_edges,
+                                 .edges = a->edges,
+                                 .inclusive = a->scene->inclusive,
+                                 .last_inclusive = a->scene->inclusive,
+                                 .n_types = 1,
+                                 .counts = counts};
+    const hs_status status = hs_pairs_histogram(&among, &a->options, &histogram, NULL);
+    for (int64_t e = 0; e < selected->n; e++)
+        counts[bin_of(a, &selected->pairs[e], a->scene->inclusive)]--;
+    for (int k = 0; status == HS_OK && k < a->n_edges; k++) {
+        if (counts[k] != 0)
+            return "another histogram of what is selected";
+    }
+    return status != HS_OK ? hs_status_text(status) : NULL;
+}
+
+/* A stream keeps what it chooses by. */
+static inline const char *
+selected_stream(asked *a, const hs_reach *reach, const brute_list *selected)
+{
+    const hs_among among = {.points = known_from(a, &a->points, 0),
+                            .box = a->scene->box,
+                            .reach = reach,
+                            .selection = &a->selection};
+    hs_stream     *stream = NULL;
+    hs_pairs      *block = NULL;
+    hs_status      status = hs_stream_open(&among, &a->options, INT64_MAX, &stream, NULL);
+    memset(a->groups, 0, sizeof a->groups);
+    memset(a->labels, 0, sizeof a->labels);
+    memset(a->excluded, 0, sizeof a->excluded);
+    if (status == HS_OK)
+        status = hs_stream_next(stream, NULL, NULL, &block, NULL);
+    const int64_t n = block != NULL ? hs_pairs_length(block) : 0;
+    hs_pairs_free(block);
+    hs_stream_free(stream);
+    return status != HS_OK    ? hs_status_text(status)
+           : n != selected->n ? "another stream of what is selected"
+                              : NULL;
+}
+
+/* All, and by radii, each pair of which has a limit of its own, too. */
 static inline const char *
 check_selection(asked *a)
 {
-    static int64_t groups[ANSWER_POINTS], labels[ANSWER_POINTS];
-    const uint64_t which = 1 + chosen(a, 7);
-    a->selection = (hs_selection){.has_groups = which & 1,
-                                  .has_labels = which & 2,
-                                  .within = which & 2 ? (int64_t)chosen(a, 3) : 0,
-                                  .min_distance = which & 4 ? some_length(a) : 0.0};
-    memcpy(groups, a->groups, sizeof groups);
-    memcpy(labels, a->labels, sizeof labels);
-    const hs_among among = {.points = SET(&a->points, .groups = groups, .labels = labels),
-                            .box = a->scene->box,
-                            .selection = &a->selection};
-    hs_stream     *stream = NULL;
-    hs_pairs      *pairs = NULL, *block = NULL;
-    const char    *difference =
-        rows_difference(a, &among, pairs_kept(a, a->half, is_selected, true, false), 0);
-    brute_list expected = pairs_kept(a, a->half, is_selected, false, false);
-    hs_status  status = hs_stream_open(&among, &a->options, INT64_MAX, &stream, NULL);
-    if (status == HS_OK)
-        status = hs_pairs_find(&among, &a->options, &pairs, NULL);
-    memset(groups, 0, sizeof groups);
-    memset(labels, 0, sizeof labels);
-    if (status == HS_OK)
-        status = hs_stream_next(stream, NULL, NULL, &block, NULL);
-    if (difference == NULL && status == HS_OK &&
-        (block != NULL ? hs_pairs_length(block) : 0) != expected.n)
-        difference = "another stream of what is selected";
-    hs_pairs_free(block);
-    hs_stream_free(stream);
+    const bool      has_radii = chosen(a, 4) == 0 && a->scene->cutoff < 0x1p1020;
+    const hs_reach *reach = has_radii ? &a->reach : NULL;
+    const kept_fn   kept = has_radii ? is_selected_within_radii : is_selected;
+    choose_selection(a);
+    a->reach.rule = HS_RULE_MAX;
+    a->quarters = 4;
+    for (int64_t i = 0; i < a->n; i++)
+        a->radii[i] = some_length(a);
+    brute_list  selected = pairs_kept(a, a->half, kept, false, false);
+    const char *difference = known_difference(a, reach, &a->selection, kept);
+    if (difference == NULL && !has_radii)
+        difference = selected_otherwise(a, &selected);
+    if (difference == NULL && !has_radii)
+        difference = selected_histogram(a, &selected);
+    if (difference == NULL && !has_radii)
+        difference = selected_nearest(a, &selected);
     if (difference == NULL)
-        return difference_of(a, status, pairs, expected, 0);
-    hs_pairs_free(pairs);
-    brute_free(&expected);
+        difference = selected_stream(a, reach, &selected);
+    brute_free(&selected);
     return difference;
 }
 

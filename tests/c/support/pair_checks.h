@@ -19,12 +19,7 @@ typedef struct found_pairs {
 static inline hs_points
 points_of(const brute_scene *scene)
 {
-    return (hs_points){.data = scene->x,
-                       .n = scene->n,
-                       .ndim = scene->ndim,
-                       .real = HS_FLOAT64,
-                       .row_stride = scene->ndim * (ptrdiff_t)sizeof(double),
-                       .column_stride = sizeof(double)};
+    return points_in_rows(scene->x, scene->n, scene->ndim);
 }
 
 /* The kernel that is checked; NULL: the best of this CPU. */

@@ -7,6 +7,7 @@
 #include <math.h>
 
 #include "../../../csrc/halfshell.h"
+#include "among.h"
 #include "harness.h"
 
 enum { REACH_POINTS = 400, REACH_TYPES = 6 };
@@ -58,12 +59,7 @@ reach_fill(harness_random *random, int64_t n, int ndim, double side, int spread,
 static inline hs_points
 reach_points(const reach_set *set)
 {
-    return (hs_points){.data = set->x,
-                       .n = set->n,
-                       .ndim = set->ndim,
-                       .real = HS_FLOAT64,
-                       .row_stride = set->ndim * (ptrdiff_t)sizeof(double),
-                       .column_stride = sizeof(double)};
+    return points_in_rows(set->x, set->n, set->ndim);
 }
 
 /* With all that is known of them. */

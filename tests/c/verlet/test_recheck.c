@@ -319,7 +319,7 @@ threads_stop_at_shifts_that_do_not_fit(void)
 {
     enum { POINTS = 3000 };
     static double   x[3 * POINTS];
-    const hs_points points = points_in_space(x, POINTS);
+    const hs_points points = points_in_rows(x, POINTS, 3);
     hs_box          box = {.ndim = 3};
     harness_random  random = {12};
     for (int k = 0; k < 3; k++) {

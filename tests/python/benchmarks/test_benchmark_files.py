@@ -36,7 +36,7 @@ def test_a_result_file_reads_back_as_it_was(bench: SimpleNamespace, tmp_path: Pa
         measurement(bench, "fast", 0.05, systems=3, threads=2, complete=False),
     ]
     path = write_results(bench, tmp_path / "a.csv", rows)
-    read = bench.results.read_csv(path)
+    read = bench.pages.read_csv(path)
     assert [row.one for row in read] == rows
     assert (read[0].kernel, read[0].facts["machine"], read[0].facts["want"]) == (
         "avx2", "lab", "25.0",

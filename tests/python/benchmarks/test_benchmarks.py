@@ -24,13 +24,12 @@ pytestmark = [pytest.mark.slow, only_in_a_checkout]
 
 
 def test_keys_do_not_depend_on_the_form_of_a_list(bench: SimpleNamespace) -> None:
-    scene = bench.scenes.load("images-64")
     i, j = np.array([0, 3, 5]), np.array([2, 1, 5])
     shift = np.array([[0, 1, 0], [0, 0, -1], [0, -1, 2]])
-    half = bench.agreement.half_keys(scene, i, j, shift)
-    again = bench.agreement.half_keys(scene, j[::-1], i[::-1].astype(np.uint32), -shift[::-1])
-    full = bench.agreement.half_keys(
-        scene, np.append(i, j), np.append(j, i), np.concatenate([shift, -shift]), full=True
+    half = bench.agreement.half_rows(i, j, shift)
+    again = bench.agreement.half_rows(j[::-1], i[::-1].astype(np.uint32), -shift[::-1])
+    full = bench.agreement.half_rows(
+        np.append(i, j), np.append(j, i), np.concatenate([shift, -shift]), full=True
     )
     assert np.array_equal(half, again)
     assert np.array_equal(half, full)
@@ -41,22 +40,22 @@ def test_differences_are_counted_and_judged(bench: SimpleNamespace) -> None:
     square = np.sum((scene.points[None] - scene.points[:, None]) ** 2, axis=-1)
     i, j = np.nonzero(np.triu(square <= scene.cutoff**2, 1))
     far = np.argwhere(np.triu(square > scene.cutoff**2, 1))[0]
-    ours = bench.agreement.half_keys(scene, i, j)
-    theirs = bench.agreement.half_keys(
-        scene, np.append(i[2:], [i[4], far[0]]), np.append(j[2:], [j[4], far[1]])
+    ours = bench.agreement.half_rows(i, j)
+    theirs = bench.agreement.half_rows(
+        np.append(i[2:], [i[4], far[0]]), np.append(j[2:], [j[4], far[1]])
     )
-    verdict = bench.agreement.compare(scene, ours, theirs, True, 1e-12, False)
+    verdict = bench.agreement.compare(scene, ours, theirs, True, 1e-12)
     assert (verdict.missed, verdict.spurious, verdict.duplicate) == (2, 1, 1)
     assert (verdict.judged, verdict.ours_wrong, verdict.beyond) == (3, 0, 3)
     assert not verdict.complete
     assert str(verdict) == "2 missed, 1 spurious, 1 duplicate, 3 beyond rounding"
-    swapped = bench.agreement.compare(scene, theirs, ours, True, 1e-12, False)
+    swapped = bench.agreement.compare(scene, theirs, ours, True, 1e-12)
     assert swapped.ours_wrong == 3
-    assert str(bench.agreement.compare(scene, ours, ours, True, 0.0, False)) == "same"
+    assert str(bench.agreement.compare(scene, ours, ours, True, 0.0)) == "same"
 
 
 def test_ratios_are_peer_over_ours_for_the_fastest_complete_peer(bench: SimpleNamespace) -> None:
-    rows = bench.report.ratio_rows(
+    rows = bench.pages.ratio_rows(
         [
             measurement(bench, "halfshell", 0.002),
             measurement(bench, "halfshell [precision=single]", 0.001),
@@ -71,7 +70,7 @@ def test_ratios_are_peer_over_ours_for_the_fastest_complete_peer(bench: SimpleNa
     assert rows[0].peer.contestant == "fast"
     assert (rows[0].fresh, rows[0].recycled) == pytest.approx((25.0, 25.0))
     assert rows[0].state == "short"
-    title, head, body = bench.report.table_of_ratios(rows)
+    title, head, body = bench.pages.table_of_ratios(rows)
     assert len(body[0]) == len(head)
     assert body[0][5:] == ["25.0", "25.0", "30", "short"]
     assert "fastest peer" in title
@@ -79,7 +78,7 @@ def test_ratios_are_peer_over_ours_for_the_fastest_complete_peer(bench: SimpleNa
 
 def test_limits_compare_as_a_whole_by_pair_or_by_point(bench: SimpleNamespace) -> None:
     limit = bench.scenes.Limit
-    rows = bench.report.limit_rows(
+    rows = bench.pages.limit_rows(
         [
             measurement(bench, "halfshell", 0.004),
             measurement(bench, "halfshell [precision=single]", 0.002),
@@ -110,11 +109,11 @@ def test_result_files_name_machine_kernel_commit_and_versions(
     path = tmp_path / "cpu" / "today.csv"
     rows = [measurement(bench, "halfshell", 0.004), measurement(bench, "fast", 0.05)]
     facts = bench.machine.facts("lab", "avx2", "gcc 1")
-    bench.report.write_csv(path, facts, rows, {"pairs-1e4-k52": 30.0})
-    bench.report.write_csv(path, facts, rows[:1], {"pairs-1e4-k52": 30.0})
+    bench.pages.write_csv(path, facts, rows, {"pairs-1e4-k52": 30.0})
+    bench.pages.write_csv(path, facts, rows[:1], {"pairs-1e4-k52": 30.0})
     with path.open(newline="") as file:
         read = list(csv.DictReader(file))
-    assert tuple(read[0]) == bench.report.COLUMNS
+    assert tuple(read[0]) == bench.pages.COLUMNS
     assert {"date", "machine", "cpu", "kernel", "commit", "numpy", "version"} <= set(read[0])
     assert len(read) == 3
     assert (read[1]["machine"], read[1]["kernel"]) == ("lab", "avx2")
@@ -159,5 +158,7 @@ def test_the_benchmark_of_drop_ins_compares_equal_lists() -> None:
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "ase.NeighborList" in done.stdout
-    done = subprocess.run([*command, "--queries", "1", "3"], capture_output=True, text=True)
-    assert done.returncode == 0 and "3 queries of KDTree.query, k=8" in done.stdout, done.stderr
+    few = ["--points", "1", "30", "--queries", "3", "--open", "--only", "KDTree"]
+    done = subprocess.run([*command, *few], capture_output=True, text=True)
+    assert done.returncode == 0 and "30 points, 3 queries" in done.stdout, done.stderr
+    assert "KDTree.query_pairs" in done.stdout and "ase" not in done.stdout

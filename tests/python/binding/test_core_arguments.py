@@ -2,11 +2,14 @@
 """The functions of _core refuse what the Python layer never gives them: there is no other check
 between them and memory."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 import halfshell as hs
 from halfshell import _core
+from refused_calls import check_refusals
 
 POINTS = np.random.default_rng(3).uniform(0.0, 3.0, (12, 3))
 FIRST = np.array([0, 4, 8, 12])
@@ -29,65 +32,39 @@ def batch(name, first, cutoffs=1.5, boxes=None, periodic=0):
     return getattr(_core, name)(*shared, *(("ij", False, 8, None) if name == "pairs" else ()))
 
 
-def refuse_points(points):
-    with pytest.raises(TypeError, match=f"count_pairs {OTHERS}"):
-        count(points)
-    if points is not None:
-        with pytest.raises(TypeError, match=f"coordination {OTHERS}"):
-            _core.coordination(
-                POINTS, 1.5, None, 0, True, "exact", None, None, None, None, points
-            )  # fmt: skip
-    with pytest.raises(TypeError, match=f"box_wrap {OTHERS}"):
-        _core.box_wrap(points, np.eye(3), 7)
+def points_that_are_none():
+    for points in (
+        *NO_ARRAYS, *(POINTS.astype(dtype) for dtype in ("i8", "f2", "c16", "O", ">f8", "f16")),
+        *(np.zeros(shape) for shape in ((), (3,), (2, 2, 3), (4, 0), (4, 9))),
+    ):  # fmt: skip
+        yield partial(count, points), TypeError, f"count_pairs {OTHERS}"
+        yield partial(_core.box_wrap, points, np.eye(3), 7), TypeError, f"box_wrap {OTHERS}"
+        if points is not None:
+            queries = (POINTS, 1.5, None, 0, True, "exact", None, None, None, None, points)
+            yield partial(_core.coordination, *queries), TypeError, f"coordination {OTHERS}"
 
 
-def test_points_are_an_array():
-    for points in NO_ARRAYS:
-        refuse_points(points)
-
-
-def test_points_are_native_floats():
-    for dtype in ("i8", "f2", "c16", "O", ">f8", "f16"):
-        with pytest.raises(TypeError, match=OTHERS):
-            count(POINTS.astype(dtype))
-
-
-def test_points_are_rows_of_1_to_8_numbers():
-    for shape in ((), (3,), (2, 2, 3), (4, 0), (4, 9)):
-        with pytest.raises(TypeError, match=OTHERS):
-            count(np.zeros(shape))
-
-
-def test_a_box_is_an_array_of_its_size():
+def boxes_that_are_none():
     for box in (
         3.0, "box", np.eye(3).tolist(), np.eye(3, dtype=np.float32), np.eye(3, dtype=int),
         np.eye(3).astype(">f8"), np.tri(3).T, np.ones(2), np.ones((3, 2)), np.ones((2, 3)),
         np.float64(3.0), np.ones(()), np.ones((1, 3, 2)), np.ones((1, 3, 3), np.float32),
     ):  # fmt: skip
-        with pytest.raises(TypeError, match=OTHERS):
-            count(POINTS, box, 7)
-
-
-def test_what_is_measured_is_a_square_box_and_bits():
+        yield partial(count, POINTS, box, 7), TypeError, OTHERS
     for arguments in (
         (), (np.eye(3),), (np.eye(3), 7, 7), (None, 7), (np.eye(3).tolist(), 7),
         (np.ones(3), 7), (np.ones((1, 3, 3)), 7), (np.ones(()), 7), (np.eye(0), 1), (np.eye(9), 1),
     ):  # fmt: skip
-        with pytest.raises(TypeError, match=f"box_measure {OTHERS}"):
-            _core.box_measure(*arguments)
+        yield partial(_core.box_measure, *arguments), TypeError, f"box_measure {OTHERS}"
+    for arguments in ((), (POINTS, np.eye(3)), (POINTS, np.eye(3), 7, None), (POINTS, None, 0)):
+        yield partial(_core.box_wrap, *arguments), TypeError, f"box_wrap {OTHERS}"
+    for bits in (-1, 1 << 64):
+        yield partial(count, POINTS, np.eye(3), bits), OverflowError, ""
+    yield partial(count, POINTS, np.eye(3), "7"), TypeError, ""
 
 
-@pytest.mark.parametrize("arguments", [(), (POINTS, np.eye(3)), (POINTS, np.eye(3), 7, None)])
-def test_wrapping_takes_three_arguments(arguments):
-    with pytest.raises(TypeError, match=f"box_wrap {OTHERS}"):
-        _core.box_wrap(*arguments)
-    with pytest.raises(TypeError, match=f"box_wrap {OTHERS}"):
-        _core.box_wrap(POINTS, None, 0)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "kind", "words"),
-    [
+def places_that_are_none():
+    for arguments, kind, words in (
         ((), TypeError, f"box_places {OTHERS}"),
         ((POINTS, None, 0, "1", 9.0), TypeError, "must be real number"),
         ((POINTS, None, 0, 1.0, None), TypeError, "must be real number"),
@@ -96,63 +73,50 @@ def test_wrapping_takes_three_arguments(arguments):
         ((POINTS, None, 0, -1.0, 9.0), ValueError, "cutoff must be"),
         ((POINTS, None, 0, 1.0, np.inf), ValueError, "argument"),
         ((POINTS + 10.0, None, 0, 1.0, 9.0), ValueError, "argument"),
-    ],
+    ):
+        yield partial(_core.box_places, *arguments), kind, words
+
+
+def systems_that_are_none():
+    """Where they begin is int64, cutoffs and boxes are float64, axes bits; as many of each."""
+    eights, one = np.full((3, 1), 7, np.uint8), {"boxes": BOXES, "periodic": 7}
+    for name in ("pairs", "count_pairs"):
+        for first in (
+            FIRST.tolist(), FIRST.astype(np.int32), FIRST.astype(float), FIRST.astype(">i8"),
+            np.repeat(FIRST, 2)[::2], FIRST[:0],
+        ):  # fmt: skip
+            yield partial(batch, name, first), TypeError, OTHERS
+        for first in (FIRST[:-1], FIRST[::-1].copy(), FIRST + 1, FIRST * 2**60):
+            yield partial(batch, name, first), ValueError, "argument"
+        yield partial(batch, name, None, CUTOFFS), TypeError, OTHERS
+        for cutoffs in (
+            CUTOFFS.astype(np.float32), CUTOFFS.astype(int), CUTOFFS.astype(">f8"),
+            CUTOFFS[:, None], np.repeat(CUTOFFS, 2)[::2], CUTOFFS.tolist(), "1.5", None,
+        ):  # fmt: skip
+            yield partial(batch, name, FIRST, cutoffs), TypeError, OTHERS
+        for boxes in (
+            BOXES.astype(np.float32), np.tri(3) + BOXES.T, BOXES[:, ::-1], BOXES[:, :2, :2],
+        ):  # fmt: skip
+            yield partial(batch, name, FIRST, **(one | {"boxes": boxes})), TypeError, OTHERS
+        for axes in (np.full(3, 7), eights, np.full(6, 7, np.uint8)[::2]):
+            yield partial(batch, name, FIRST, **(one | {"periodic": axes})), TypeError, OTHERS
+        for axes in (7, np.full(3, 7, np.uint8), np.full(2, 7, np.uint8)):
+            yield partial(batch, name, FIRST, CUTOFFS[:2], BOXES, axes), TypeError, OTHERS
+    yield partial(count, (POINTS, FIRST)), TypeError, OTHERS
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [points_that_are_none, boxes_that_are_none, places_that_are_none, systems_that_are_none],
+    ids=lambda kind: kind.__name__,
 )
-def test_what_places_are_told_by(arguments, kind, words):
-    with pytest.raises(kind, match=words):
-        _core.box_places(*arguments)
+def test_what_has_another_type_or_shape_is_refused(kind):
+    check_refusals(list(kind()))
 
 
-@pytest.mark.parametrize("periodic", [-1, 1 << 64])
-def test_periodic_is_bits(periodic):
-    with pytest.raises(OverflowError):
-        count(POINTS, np.eye(3), periodic)
-    with pytest.raises(TypeError):
-        count(POINTS, np.eye(3), "7")
-
-
-@pytest.mark.parametrize("name", ["pairs", "count_pairs"])
-def test_systems_begin_where_int64_says(name):
-    for first in (
-        FIRST.tolist(), FIRST.astype(np.int32), FIRST.astype(float), FIRST.astype(">i8"),
-        np.repeat(FIRST, 2)[::2], FIRST[:0],
-    ):  # fmt: skip
-        with pytest.raises(TypeError, match=OTHERS):
-            batch(name, first)
-    for first in (FIRST[:-1], FIRST[::-1].copy(), FIRST + 1, FIRST * 2**60):
-        with pytest.raises(ValueError, match="argument"):
-            batch(name, first)
-    with pytest.raises(TypeError, match=OTHERS):
-        batch(name, None, CUTOFFS)
-    with pytest.raises(TypeError, match=OTHERS):
-        count((POINTS, FIRST))
-
-
-@pytest.mark.parametrize("name", ["pairs", "count_pairs"])
-def test_cutoffs_are_float64(name):
-    for cutoffs in (
-        CUTOFFS.astype(np.float32), CUTOFFS.astype(int), CUTOFFS.astype(">f8"), CUTOFFS[:, None],
-        np.repeat(CUTOFFS, 2)[::2],
-    ):  # fmt: skip
-        with pytest.raises(TypeError, match=OTHERS):
-            batch(name, FIRST, cutoffs)
-    for cutoff in (CUTOFFS.tolist(), "1.5", None):
-        with pytest.raises(TypeError, match=f"{name} {OTHERS}"):
-            batch(name, FIRST, cutoff)
-
-
-@pytest.mark.parametrize("name", ["pairs", "count_pairs"])
-def test_boxes_and_axes_fit(name):
-    for boxes in (BOXES.astype(np.float32), np.tri(3) + BOXES.T, BOXES[:, ::-1], BOXES[:, :2, :2]):
-        with pytest.raises(TypeError, match=OTHERS):
-            batch(name, FIRST, boxes=boxes, periodic=7)
-    for axes in (np.full(3, 7), np.full((3, 1), 7, np.uint8), np.full(6, 7, np.uint8)[::2]):
-        with pytest.raises(TypeError, match=OTHERS):
-            batch(name, FIRST, boxes=BOXES, periodic=axes)
-    for axes in (7, np.full(3, 7, np.uint8), np.full(2, 7, np.uint8)):
-        with pytest.raises(TypeError, match=OTHERS):
-            batch(name, FIRST, CUTOFFS[:2], BOXES, axes)
-    assert len(batch(name, FIRST, CUTOFFS, BOXES, 7)) > 0
+def test_systems_that_fit_are_taken():
+    for name in ("pairs", "count_pairs"):
+        assert len(batch(name, FIRST, CUTOFFS, BOXES, 7)) > 0
 
 
 class Shrinks:

@@ -22,6 +22,7 @@ from halfshell._cli.errors import InputError
 from halfshell._cli.files import Scene, read_scene
 from halfshell._cli.outputs import replacing, write_csv
 from halfshell_report import against as cli_peers
+from halfshell_report.peers import Library
 
 POINTS = np.random.default_rng(5).random((60, 3)) * 8
 BOX = np.array([[8.0, 0.0, 0.0], [1.0, 7.5, 0.0], [-0.5, 2.0, 9.0]])
@@ -474,14 +475,16 @@ def test_wrong_rows_are_found_both_ways(monkeypatch, run, npz):
     i, j = j, i  # either way round is right
     S = -S.astype(np.int64)
 
-    def ask(_scene, _cutoff):
-        wrong_i = np.r_[i[1:], i[5], 3]  # the first missed, one twice, one invented
-        wrong_j = np.r_[j[1:], j[5], 3]
-        shifts = np.r_[S[1:], S[5:6], [[9, 9, 9]]]
-        return wrong_i, wrong_j, shifts, True, False
+    class Oracle(Library):
+        name = distribution = module = "json"
+        inclusive, quantities = True, "ijS"
 
-    peer = cli_peers.Peer((), "oracle", ask)
-    monkeypatch.setitem(cli_peers.PEERS, "oracle", peer)
+        def prepare(self, question):
+            wrong_i = np.r_[i[1:], i[5], 3]  # the first missed, one twice, one invented
+            wrong_j = np.r_[j[1:], j[5], 3]
+            return lambda: (wrong_i, wrong_j, np.r_[S[1:], S[5:6], [[9, 9, 9]]])
+
+    monkeypatch.setitem(cli_peers.PEERS, "oracle", Oracle())
     status, out, _ = run("verify", npz, "--cutoff", "3", "--against", "oracle", "--json")
     assert status == 1
     for check in json.loads(out)["checks"]:
@@ -495,12 +498,16 @@ def test_wrong_rows_are_found_both_ways(monkeypatch, run, npz):
 
 
 def test_a_peer_that_fails_is_an_error_in_one_line(monkeypatch, refusal, npz):
-    def ask(_scene, _cutoff):
-        raise RuntimeError("no\nlist")
+    class Oracle(Library):
+        name = distribution = module = "json"
+        quantities = "ijS"
 
-    monkeypatch.setitem(cli_peers.PEERS, "oracle", cli_peers.Peer((), "oracle", ask))
+        def prepare(self, question):
+            raise RuntimeError("no\nlist")
+
+    monkeypatch.setitem(cli_peers.PEERS, "oracle", Oracle())
     line = refusal("verify", npz, "--against", "oracle")
-    assert "oracle returned no list: RuntimeError: no list" in line
+    assert "json returned no list: RuntimeError: no list" in line
 
 
 def test_sample_is_points_near_one_another(npz):

@@ -498,12 +498,27 @@ def test_text_that_is_refused_says_where(refused):
         assert words in refused("points.csv", content), content
 
 
-def test_quoted_fields_hold_separators(scene):
-    for between in ",;\t":
+@pytest.mark.parametrize("quote", ['"', "'"])
+def test_quoted_fields_hold_separators(scene, quote):
+    for between in ",;\t|":
         content = f'"a{between}b"{between}"x"{between}y\n'
         content += f'"c{between}{between}d"{between}"1"{between}2.5\n' * 2
-        found = scene("points.csv", content)
+        found = scene("points.csv", content.replace('"', quote))
         assert found.points.tolist() == [[1.0, 2.5]] * 2
+    found = scene("points.txt", '"a b" "x" y\n"c d" "1" 2.5\n'.replace('"', quote))
+    assert found.points.tolist() == [[1.0, 2.5]]
+
+
+def test_primes_are_no_quotes(scene):
+    for between in (",", " "):
+        content = f"x'{between}y'{between}x{between}y\n1{between}2{between}3{between}4\n"
+        assert scene("points.csv", content).points.tolist() == [[3.0, 4.0]]
+
+
+def test_bars_separate_columns(scene):
+    assert scene("points.csv", "x|y|z\n1|2|3\n4,5|6|7\n").points.tolist() == [
+        [1.0, 2.0, 3.0], [4.5, 6.0, 7.0]
+    ]
 
 
 def test_rows_that_numpy_reads_are_those_of_python(scene, rng):

@@ -75,7 +75,7 @@ def alike(found, expected):
 
 
 # Each box and number of points with one of the two classes.
-SCENES = [(n, TREES[(k + m) % 2], box) for k, n in enumerate((0, 1, 60, 3000))
+SCENES = [(n, TREES[(k + m) % 2], box) for k, n in enumerate((0, 1, 7, 60, 3000))
           for m, box in enumerate(BOXES)]  # fmt: skip
 
 
@@ -303,3 +303,36 @@ def test_few_queries_of_a_lattice_are_decided_exactly():
         i = tree.query(query, 40)[1]
         close = sorted(range(len(points)), key=lambda k: (square(query, points[k]), k))
         assert i.tolist() == close[:40]
+
+
+def _corners() -> np.ndarray:
+    """Points at the corners of a box of two, many at each."""
+    return np.random.default_rng(0).integers(0, 2, (40, 2)).astype(float)
+
+
+@pytest.mark.parametrize("return_sorted", [None, False, True])
+def test_lists_ascend_where_scipy_answers(return_sorted):
+    tree = ours.cKDTree(_corners(), boxsize=2.0)  # from half a period on
+    lists = [
+        tree.query_ball_point([0.0, 0.0], 1.0, return_sorted=return_sorted),
+        *tree.query_ball_point(_corners(), 1.0, return_sorted=return_sorted),
+        *tree.query_ball_tree(tree, 1.0),
+    ]
+    assert all(row == sorted(row) for row in lists)
+
+
+def test_ties_ascend_up_to_a_bound_of_half_a_period():
+    tree = ours.cKDTree(_corners(), boxsize=2.0)
+    d, j = tree.query([[0.0, 0.0]], 40, distance_upper_bound=1.0)
+    there = j[d == 0.0]
+    assert len(there) > 5
+    assert there.tolist() == sorted(there)
+    assert (j[d > 0.0] == 40).all()
+
+
+def test_what_is_just_below_half_a_period_is_closer_than_that():
+    points = [[0.0, 0.0], [3.0, 4.0 - 2.0**-51]]  # less than 5 apart, but that is what it rounds to
+    tree = ours.KDTree(points, boxsize=10.0)
+    d, j = tree.query([[0.0, 0.0]], 2, distance_upper_bound=5.0)
+    assert j.tolist() == [[0, 1]]
+    assert d[0, 1] <= 5.0

@@ -103,6 +103,33 @@ def test_errors_are_those_of_the_owner(rng):
             owner.RadiusNeighborsTransformer().fit(fitted).transform([[np.nan, 0.0]])
 
 
+def test_neighbours_in_rows(rng):
+    points, queries = rng.random((300, 3)), rng.random((20, 3))
+    owner, mine = (m.RadiusNeighborsTransformer(radius=0.3).fit(points) for m in (theirs, ours))
+    for X in (None, queries):
+        far, near = (m.radius_neighbors(X, sort_results=True) for m in (owner, mine))
+        for a, b in zip(far, near):
+            assert (a.dtype, a.shape) == (b.dtype, b.shape)
+            for one, other in zip(a, b):
+                assert one.dtype == other.dtype and other.flags.writeable
+                np.testing.assert_allclose(other, one, rtol=1e-7)
+        alone = mine.radius_neighbors(X, 0.2, return_distance=False)
+        for one, other in zip(owner.radius_neighbors(X, 0.2, return_distance=False), alone):
+            assert np.array_equal(np.sort(one), other)
+    for one in (owner, mine):
+        with pytest.raises(ValueError, match="return_distance must be True"):
+            one.radius_neighbors(queries, return_distance=False, sort_results=True)
+    owner, mine = (m.KNeighborsTransformer(n_neighbors=4).fit(points) for m in (theirs, ours))
+    for X in (None, queries):
+        for a, b in zip(owner.kneighbors(X), mine.kneighbors(X)):
+            assert a.dtype == b.dtype
+            np.testing.assert_allclose(b, a, rtol=1e-7)
+        assert np.array_equal(mine.kneighbors(X, 2, False), owner.kneighbors(X, 2, False))
+    for one in (owner, mine):
+        with pytest.raises(ValueError, match="n_neighbors"):
+            one.kneighbors(queries, 301)
+
+
 def test_ties_are_decided_exactly():
     """0.1 and 0.2 are 0.1 apart as floats say; 0.3 and 0.2 a little less."""
     graph = ours.RadiusNeighborsTransformer(radius=0.1).fit_transform([[0.1], [0.2], [0.3]])

@@ -278,33 +278,6 @@ def test_vectors_of_axes_that_do_not_repeat_are_not_looked_at():
         call(hs.rdf, points, 2.0, 5, **how, periodic=flags)
 
 
-def test_bad_input_of_two_sets_is_named():
-    points, boxes = hs.Points(np.zeros((4, 3)), batch=[0, 0, 1, 2]), np.array([np.eye(3)] * 3)
-    queries = hs.Points(np.zeros((2, 3)), batch=[0, 2])
-    cases = [
-        (points.positions, queries, "queries have a batch, and points"),
-        (points, queries.positions, "points have a batch, and queries have none"),
-        (points, hs.Points(np.zeros((2, 2)), batch=[0, 2]), "same number of columns"),
-        (points.replace(box=boxes), queries.replace(batch=[0, 3]), "batch must be less than the"),
-    ]
-    for given, asked, message in cases:
-        for search in (
-            lambda p, **how: hs.neighbors(p, 1.0, **how),
-            lambda p, **how: hs.coordination(p, 1.0, **how),
-            lambda p, **how: hs.nearest(p, 2, **how),
-            lambda p, **how: hs.pair_histogram(p, [0.0, 1.0], **how),
-        ):
-            with pytest.raises(ValueError, match=message):
-                search(given, queries=asked)
-    for limit, message in (([1.0, -1.0, 1.0], r"\[1\] = -1"), (np.ones((2, 2)), "a number or")):
-        with pytest.raises(ValueError, match=f"max_distance.*{message}"):
-            hs.nearest(points, 2, max_distance=limit)
-    with pytest.raises(ValueError, match="max_distance must be a number, got shape"):
-        hs.nearest(points.positions, 2, max_distance=[1.0, 2.0])
-    with pytest.raises(MemoryError):
-        hs.pair_histogram(points.replace(batch=[0, 0, 1, 2**40]), [0.0, 1.0])
-
-
 def test_a_bad_coordinate_is_named_by_its_row_among_all(rng):
     points, batch = rng.random((60, 3)) * 3.0, np.repeat([0, 1, 2], [10, 20, 30])
     points[37, 1] = np.nan

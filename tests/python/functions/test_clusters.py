@@ -21,13 +21,6 @@ BOXES = {
 }
 
 
-def components(n, i, j):
-    """SciPy's, which are numbered by their lowest points."""
-    count, labels = connected_components(coo_matrix((np.ones(len(i)), (i, j)), (n, n)), False)
-    first = np.array([np.argmax(labels == k) for k in range(count)])
-    return np.argsort(np.argsort(first))[labels]
-
-
 def dbscan(points, cutoff, least, **options):
     """From the definition, by sets of neighbours."""
     n = len(points)

@@ -36,8 +36,3 @@ def test_nothing_to_count():
         hs.coordination([[0.0]], 1.0, by_type="yes")
     with pytest.raises(ValueError, match="by_type needs types"):
         hs.coordination([[0.0]], 1.0, by_type=True)
-
-
-def test_counts_beyond_memory_are_refused():
-    with pytest.raises(MemoryError, match="types would take"):
-        call(hs.coordination, [[0.0], [0.5]], 1.0, types=[0, 2**31 - 2], by_type=True)

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from calls import call
 
 
 def same(table, whole, numbers):
@@ -15,35 +14,7 @@ def same(table, whole, numbers):
             assert ours.dtype == theirs.dtype and ours.tobytes() == theirs.tobytes()
 
 
-def test_what_does_not_go_with_indices():
-    points = np.zeros((3, 2))
-    with pytest.raises(ValueError, match="do not give queries as well"):
-        hs.neighbors(points, 1.0, indices=[0], queries=points)
-    with pytest.raises(ValueError, match="cannot be combined with precision 'single'"):
-        call(hs.coordination, points, 1.0, indices=[0], precision="single")
-    with pytest.raises(ValueError, match="letters"):
-        hs.neighbors(points, 1.0, indices=[0], quantities="jj")
-    with pytest.raises(ValueError, match="letters"):
-        hs.neighbors(points, 1.0, indices=[0], quantities="i")
-    table = hs.neighbors(points, 1.0, indices=[0], quantities="jd")
-    with pytest.raises(ValueError, match="one set of points"):
-        table.reverse()
-    with pytest.raises(ValueError, match="read-only"):
-        table.indices[0] = 7
-
-
 # ---- pairs -------------------------------------------------------------------------------------
-
-
-
-
-def test_a_shift_that_fits_one_way_only():
-    points, box = np.array([[0.0], [2.0**31]]), [1.0]
-    with pytest.raises(OverflowError):
-        hs.pairs(points, 0.25, box=box, quantities="S", indices=[1])
-    with pytest.raises(OverflowError, match=r"-2\*\*31 has no opposite"):
-        hs.pairs(points[::-1], 0.25, box=box, quantities="S", indices=[1])
-    assert hs.pairs(points, 0.25, box=box, indices=[1])[0].tolist() == [0]
 
 
 POINTS = np.zeros((3, 2))
@@ -124,13 +95,3 @@ def test_blocks_of_some_points_are_of_what_was_given(rng):
 
 
 # ---- counted by distance ---------------------------------------------------------------------
-
-
-def test_histograms_of_some_points_that_are_refused():
-    points = hs.Points(POINTS, weights=np.ones(len(POINTS)))
-    with pytest.raises(ValueError, match="indices cannot be combined with weights"):
-        hs.pair_histogram(points, [0.0, 1.0], indices=[0])
-    with pytest.raises(ValueError, match="indices must name each point once"):
-        hs.pair_histogram(POINTS, [0.0, 1.0], indices=[0, 0])
-    with pytest.raises(ValueError, match="do not give queries as well"):
-        hs.pair_histogram(POINTS, [0.0, 1.0], indices=[0], queries=POINTS)

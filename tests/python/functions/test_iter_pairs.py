@@ -56,10 +56,12 @@ def test_progress_never_falls_and_ends_at_one(rng, threads, max_pairs):
     seen = []
     points = rng.random((20_000, 3))
     options = {"quantities": "d", "max_pairs": max_pairs, "threads": threads}
-    n = sum(len(d) for d in call(hs.iter_pairs, points, 0.12, progress=seen.append, **options))
-    assert n == hs.count_pairs(points, 0.12)
-    assert seen == sorted(seen) and seen[0] >= 0.0 and seen[-1] == 1.0
-    assert len(set(seen)) >= min(n // max_pairs, 5)
+    for of in (points, hs.CellList(points, 0.12)):
+        seen.clear()
+        n = sum(len(d) for d in call(hs.iter_pairs, of, 0.12, progress=seen.append, **options))
+        assert n == hs.count_pairs(points, 0.12)
+        assert seen == sorted(seen) and seen[0] >= 0.0 and seen[-1] == 1.0
+        assert len(set(seen)) >= min(n // max_pairs, 5)
 
 
 @pytest.mark.parametrize("threads", [1, 2])
@@ -94,10 +96,13 @@ def test_progress_of_a_batch_is_that_of_one_search(rng):
     assert sum(0.0 < fraction < 0.75 for fraction in seen) > 5
 
 
-@pytest.mark.parametrize("batch", [None, np.repeat([0, 1, 5], 1000)])
-def test_an_exception_of_the_hook_arrives_and_the_iterator_goes_on(rng, batch):
-    points = hs.Points(rng.random((3000, 3)), batch=batch)
-    failing = itertools.count()
+@pytest.mark.parametrize("of", ["points", "systems", "cells"])
+def test_an_exception_of_the_hook_arrives_and_the_iterator_goes_on(rng, of):
+    points, failing = rng.random((3000, 3)), itertools.count()
+    if of == "systems":
+        points = hs.Points(points, batch=np.repeat([0, 1, 5], 1000))
+    elif of == "cells":
+        points = hs.CellList(points, 0.4)
 
     def hook(fraction):
         if next(failing) % 3 == 1:

@@ -180,26 +180,6 @@ def test_choices_among_many_that_coincide(how, rng):
                 assert same_arrays(found, (j[some], d[some], S[some]))
 
 
-def test_shifts_that_do_not_fit_are_refused():
-    far = [[2.0**40, 0.0], [0.0, 0.0]]
-    assert hs.nearest(far, 1, box=[1.0, 1.0])[1].tolist() == [[0.0], [0.0]]
-    with pytest.raises(OverflowError, match=r"points\["):
-        hs.nearest(far, 1, box=[1.0, 1.0], quantities="S")
-    with pytest.raises(OverflowError, match=r"queries\[0\]"):
-        hs.nearest(far[1:], 1, queries=far[:1], box=[1.0, 1.0], quantities="S")
-
-
-def test_more_images_than_memory_are_refused():
-    with pytest.raises(MemoryError, match="images"):
-        hs.nearest([[0.0, 0.0]], 1, queries=[[0.0, 1e300]], box=[1.0, 1.0], periodic=[True, False])
-    # Memory would do, but not the time: some 1e8 images are about as near.
-    with pytest.raises(MemoryError, match=r"too many images are about as near to queries\[1\]"):
-        hs.nearest(
-            np.zeros((2, 3)), 1, queries=[[0.0, 0.0, 1.0], [0.0, 0.0, 1e10]], box=np.ones(3),
-            periodic=[True, True, False],
-        )  # fmt: skip
-
-
 def test_the_way_through_all_open_axes_leaves_few_images(rng):
     """From 40 periods away along both of two open axes, of eight."""
     points, box = rng.random((20, 8)), np.eye(8) + np.tril(rng.random((8, 8)), -1) / 2

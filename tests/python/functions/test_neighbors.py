@@ -8,10 +8,6 @@ import pytest
 import halfshell as hs
 from calls import call
 from oracles import BOX_KINDS, exact_pairs, random_scene
-from refused_calls import assert_refused
-
-POINTS = np.random.default_rng(41).random((40, 3)) * 4.0
-
 
 # ---- against rational arithmetic -----------------------------------------------------------
 
@@ -61,15 +57,6 @@ def test_far_more_rows_than_the_density_foretells(rng, quantities):
     if "d" in quantities:
         assert one.distances.tobytes() == two.distances.tobytes()
         assert one.vectors.tobytes() == two.vectors.tobytes()
-
-
-def test_shifts_that_do_not_fit(rng):
-    points = rng.random((5, 1))
-    points[3] = 1e12
-    assert_refused(
-        lambda: hs.neighbors(points, 0.5, box=[1.0], quantities="jS"), OverflowError, "points"
-    )
-    assert hs.neighbors(points, 0.5, box=[1.0]).n_rows == 5
 
 
 def few_and_many():

@@ -41,6 +41,13 @@ def test_index_dtype(scene):
         assert same_arrays(found, tuple(array.astype(dtype) for array in wide))
 
 
+def test_lists_without_elements_have_the_dimensions_of_the_others():
+    some = np.zeros((4, 2))
+    assert hs.pairs_between(some, [], 1.0, quantities="D").shape == (0, 2)
+    assert hs.pairs_between([], some, 1.0, quantities="D").shape == (0, 2)
+    assert hs.pairs_between([], [], 1.0, quantities="D").shape == (0, 3)
+
+
 def test_distances_never_contradict_the_decision(rng):
     for inclusive in (True, False):
         for kernel in hs.kernels():

@@ -51,28 +51,6 @@ def test_shells_that_float64_does_not_hold_are_0_or_infinite():
     assert result.counts.tolist() == [1, 0] and result.g.tolist() == [math.inf, 0.0]
 
 
-REFUSED = {
-    "no box": ({}, ValueError, "periodic along every axis"),
-    "a slab": ({"box": [1.0] * 2, "periodic": [True, False]}, ValueError, "along every axis"),
-    "a cutoff of zero": ({"box": [1.0] * 2, "cutoff": 0.0}, ValueError, "cutoff"),
-    "types with queries": (
-        {"box": [1.0] * 2, "types": [0, 0], "queries": [[0.0, 0.0]]}, ValueError, "have none",
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("how, error, text", REFUSED.values(), ids=REFUSED)
-def test_what_has_no_density_is_refused(how, error, text):
-    with pytest.raises(error, match=text):
-        call(hs.rdf, [[0.0, 0.0], [0.5, 0.5]], **{"cutoff": 0.5, **how})
-
-
-@pytest.mark.parametrize("bins", [2**40, 2**63, 10**400])
-def test_bins_beyond_memory_are_refused_at_once(bins):
-    with pytest.raises(MemoryError, match="so many bins"):
-        hs.rdf([[0.0]], 1.0, bins, box=[2.0])
-
-
 @pytest.mark.parametrize("power", [-600, -300, 300, 600])
 @pytest.mark.filterwarnings("error")
 def test_the_unit_of_length_changes_nothing(power):

@@ -84,30 +84,6 @@ def test_radii_that_cannot_be_halved():
         assert call(hs.count_pairs, POINTS, None, radii=with_radius(7, small), rule=rule) == 0
 
 
-# ---- rules and what goes together ----------------------------------------------------------
-
-
-def test_radii_of_two_sets():
-    queries, both = {"queries": POINTS[:4]}, "both sets need them, or rule 'gather' or 'scatter'"
-    for given, fragment in (
-        ({"radii": RADII}, "queries have no radii: " + both),
-        ({"query_radii": RADII[:4]}, "points have no radii: " + both),
-        ({"radii": RADII, "rule": "gather"}, "'gather' goes by the radii of queries"),
-        ({"query_radii": RADII[:4], "rule": "scatter"}, "'scatter' goes by the radii of points"),
-    ):
-        for search in (hs.neighbors, hs.count_pairs, hs.coordination):
-            assert_refused(
-                lambda search=search, given=given: call(search, POINTS, None, **given, **queries),
-                ValueError, fragment,
-            )  # fmt: skip
-    given = {"radii": RADII, "query_radii": RADII[:4], **queries}  # one of them has no say
-    for rule, other in (("gather", "radii"), ("scatter", "query_radii")):
-        one = {name: values for name, values in given.items() if name != other}
-        assert call(hs.count_pairs, POINTS, None, rule=rule, **given) == (
-            call(hs.count_pairs, POINTS, None, rule=rule, **one)
-        )
-
-
 # ---- a cutoff for each two types ---------------------------------------------------------------
 
 
@@ -134,58 +110,6 @@ def test_a_dict_counts_both_ways_and_may_have_names():
         (by_name, labels.astype(object)), (by_name, labels.astype("U20")), (absent, labels),
     ):  # fmt: skip
         assert same_arrays(call(hs.pairs, FEW, cutoffs, types=types, sort=True), expected)
-
-
-# ---- what is refused -----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "cutoff, types, exception, fragments",
-    [
-        ({(0, 1): 1.0, (1, 0): 2.0}, TYPES, ValueError, ["contradicts", r"\(1, 0\)"]),
-        ({(0, 1): -1.0}, TYPES, ValueError, ["not negative", r"\(0, 1\)"]),
-        ({(0, 1): "far"}, TYPES, TypeError, [r"cutoff\[\(0, 1\)\]"]),
-        ({(0, 1, 2): 1.0}, TYPES, TypeError, ["pairs of types"]),
-        ({(0, 1.5): 1.0}, TYPES, TypeError, ["1.5"]),
-        ({(0, -1): 1.0}, TYPES, ValueError, ["-1"]),
-        ({("H", "O"): 1.0}, TYPES, ValueError, ["names.*types are numbers"]),
-        ({(0, 1): 1.0}, ["H"] * 20, ValueError, ["numbers.*types are names"]),
-        ({("H", "Hx"): 1.0}, ["H"] * 20, ValueError, ["'Hx' is neither an element"]),
-        ({(0, 1): 1.0}, None, ValueError, ["a dict of cutoffs needs types"]),
-        ({(0, 1): 1.0}, [0, 1], ValueError, [r"types.*\(20,\).*\(2,\)"]),
-        (TABLE, TYPES + 2, ValueError, [r"types must be less than 4.*type 4 of points\[2\]"]),
-        (TABLE, None, ValueError, ["a table of cutoffs needs types"]),
-        ([[1.0, 2.0], [2.5, 1.0]], TYPES, ValueError,
-         [r"symmetric.*cutoff\[0, 1\] = 2.0.*cutoff\[1, 0\] = 2.5"]),
-        ([[1.0, 2.0]], TYPES, ValueError, [r"\(t, t\)", r"\(1, 2\)"]),
-        ([[1.0, -2.0], [-2.0, 1.0]], TYPES, ValueError, [r"not negative.*cutoff\[0, 1\] = -2"]),
-    ],
-)
-def test_types_and_dicts_that_do_not_fit(cutoff, types, exception, fragments):
-    for search in (hs.pairs, hs.coordination, hs.iter_pairs):
-        assert_refused(
-            lambda search=search: call(search, FEW, cutoff, types=types), exception, *fragments
-        )
-
-
-def test_types_of_two_sets_go_together():
-    queries = {"queries": FEW[:4]}
-    for given, fragments in (
-        ({"types": TYPES}, ["a table of cutoffs needs types, and queries have none"]),
-        ({"query_types": TYPES[:4]}, ["a table of cutoffs needs types, and points have none"]),
-        ({"types": TYPES, "query_types": TYPES}, [r"types.*\(4,\).*\(20,\)"]),
-        ({"types": TYPES, "query_types": TYPES[:4] + 9}, [r"less than 4.*type 9 of queries\[0\]"]),
-    ):
-        assert_refused(
-            lambda given=given: call(hs.count_pairs, FEW, TABLE, **given, **queries),
-            ValueError, *fragments,
-        )  # fmt: skip
-    assert_refused(
-        lambda: call(hs.count_pairs,
-            FEW, {(0, 1): 1.0}, types=TYPES, query_types=["H"] * 4, **queries
-        ),
-        TypeError, "both be numbers",
-    )  # fmt: skip
 
 
 # ---- stars ---------------------------------------------------------------------------------

@@ -64,76 +64,6 @@ def test_same_bytes_for_each_kernel_number_of_threads_and_way(rng):
                 assert joined.tobytes() == unsorted[column].tobytes()
 
 
-POINTS = [[0.0, 0.0], [1.0, 0.0]]
-
-
-@pytest.mark.parametrize(
-    ("how", "error", "message"),
-    [
-        ({"cutoff": 1.0}, ValueError, "k in quantities needs several cutoffs, got one"),
-        ({"cutoff": []}, ValueError, r"shape \(k,\), with one at least, got \(0,\)"),
-        ({"cutoff": [[1.0]]}, ValueError, r"a table of cutoffs needs types"),
-        ({"cutoff": [2.0, 1.0]}, ValueError, r"ascending, got cutoff\[0\] = 2.0 before"),
-        ({"cutoff": [-1.0, 1.0]}, ValueError, r"finite and not negative, got cutoff\[0\]"),
-        (
-            {"cutoff": {(0, 0): 1.0}, "types": [0, 0]},
-            ValueError,
-            "with radii, supports or cutoffs by",
-        ),
-        ({"radii": [1.0, 1.0]}, ValueError, "several cutoffs cannot be combined with radii"),
-        ({"supports": [np.eye(2)] * 2}, ValueError, "combined with supports"),
-        ({"batch": [0, 0]}, ValueError, "cannot be combined with a batch"),
-        ({"precision": "double"}, ValueError, "needs precision 'exact', got 'double'"),
-    ],
-)
-def test_what_does_not_go_together(how, error, message):
-    with pytest.raises(error, match=message):
-        call(hs.pairs, POINTS, **{"cutoff": [1.0, 2.0], "quantities": "ijk", **how})
-
-
-def test_several_cutoffs_need_the_letter():
-    message = "cutoff must be a number; several are for counts and the letter k in quantities"
-    cells = hs.CellList(POINTS, 2.0)
-    for cutoffs in ([1.0, 2.0], (1.0,), np.array([1.0, 2.0])):
-        for search in (
-            lambda c: hs.pairs(POINTS, c),
-            lambda c: hs.iter_pairs(POINTS, c),
-            lambda c: hs.neighbors(POINTS, c),
-            lambda c: hs.pairs_between(POINTS, POINTS, c),
-            lambda c: list(hs.trajectory_pairs([POINTS], c)),
-            lambda c: hs.clusters(POINTS, c),
-            lambda c: hs.for_each_pair(POINTS, c, print),
-            lambda c: hs.verify(POINTS, c, [], []),
-            lambda c: hs.explain(POINTS, c),
-            cells.pairs,
-            cells.iter_pairs,
-        ):
-            with pytest.raises(TypeError, match=message):
-                search(cutoffs)
-    for search in (cells.pairs, cells.iter_pairs):
-        with pytest.raises(ValueError, match="needs several cutoffs, got one"):
-            search(1.0, quantities="k")
-        with pytest.raises(ValueError, match="needs several cutoffs, got one"):
-            search(quantities="k")
-
-
-def test_the_letter_needs_several_cutoffs_everywhere():
-    for search in (
-        lambda: hs.neighbors(POINTS, 1.0, quantities="jk"),
-        lambda: hs.neighbors(POINTS, 1.0, quantities="jk", indices=[0]),
-        lambda: hs.pairs_between(POINTS, POINTS, 1.0, quantities="ijk"),
-        lambda: hs.explain(POINTS, 1.0, quantities="ijk"),
-        lambda: list(hs.trajectory_pairs([POINTS], 1.0, quantities="ijk")),
-    ):
-        with pytest.raises(ValueError, match="k in quantities needs several cutoffs, got one"):
-            search()
-    with pytest.raises(ValueError, match="some of the letters j d D S, each"):
-        hs.nearest(POINTS, 1, quantities="jk")
-    for known in ({"radii": [1.0, 1.0]}, {"supports": [np.eye(2)] * 2}):
-        with pytest.raises(ValueError, match="several cutoffs cannot be combined with"):
-            hs.neighbors(hs.Points(POINTS, **known), [1.0, 2.0], quantities="jk")
-
-
 def test_tables_keep_their_shells(rng):
     points, edges = rng.random((50, 3)), np.array([0.2, 0.3, 0.5])
     table = hs.neighbors(points, edges, box=1.0, quantities="jdSk")
@@ -171,11 +101,3 @@ def test_counts_of_several_cutoffs(rng):
     told = []
     hs.coordination(points, edges, progress=told.append)
     assert told == sorted(told) and (not told or told[-1] == 1.0)
-
-
-def test_shells_are_refused_where_they_do_not_fit():
-    points = np.zeros((3000, 2))
-    with pytest.raises(MemoryError):
-        call(hs.pairs, points, [1.0, 2.0], quantities="k", memory_limit=1e6)
-    with pytest.raises(MemoryError):
-        call(hs.pairs, POINTS, np.linspace(0, 1, 10**6), quantities="k", memory_limit=1e6)

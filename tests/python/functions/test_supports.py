@@ -98,9 +98,6 @@ def test_other_precisions_are_those_of_any_kernel():
         assert len(exact ^ set(answers[0])) <= 2
 
 
-SKEWED = np.array([[1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.25, -0.375, 1.25]])
-
-
 # ---- what is refused ---------------------------------------------------------------------------
 
 
@@ -190,19 +187,6 @@ def test_a_large_scene_is_refused_before_it_is_searched():
     with pytest.raises(ValueError, match=rf"supports\[{n - 1}\] is not"):
         call(hs.pairs, x, None, supports=matrices, extent=1.0, box=1.0)
     assert time.perf_counter() - begun < 1.0
-
-
-def singular(kind):
-    """Singular in exact arithmetic, and the entry that makes it otherwise."""
-    if kind == "two":  # of thirds: 1/3 * 3 is rounded to 1
-        a, b = 1.0 / 3.0, 1.0
-        return np.array([[a * a, a * b], [a * b, b * b]]), (0, 0)
-    if kind == "exact":
-        return np.array([[1.0, 3.0], [3.0, 9.0]]), (1, 1)
-    if kind == "tiny":
-        return np.array([[2.0**-600, 2.0**-300], [2.0**-300, 1.0]]), (0, 0)
-    v = np.array([1.0, 3.0, 5.0])
-    return np.outer(v, v) + np.outer([2.0, 1.0, 0.0], [2.0, 1.0, 0.0]), (2, 2)
 
 
 def is_definite(matrix):

@@ -136,12 +136,6 @@ def test_work_follows_points_and_pairs(rng, scene):
         assert by_integers < 0.01
 
 
-def test_many_coincident_points_are_refused_at_once():
-    points = np.full((100_000, 3), 0.3)
-    with pytest.raises(MemoryError, match=r"about 5e\+09 pairs \(80 GB\) are expected, 1 GB"):
-        call(hs.pairs, points, 0.1, memory_limit=1e9)
-
-
 # ---- refusals ------------------------------------------------------------------------------
 
 

@@ -327,29 +327,6 @@ def test_an_iterator_keeps_its_cells(rng):
     assert len(others[0].pairs(quantities="P")) != len(expected)
 
 
-def test_progress_is_told_and_may_stop_a_block():
-    points = np.random.default_rng(2).random((60_000, 3))
-    cells = hs.CellList(points, 0.03, box=[1.0] * 3, threads=1)
-    told = []
-    n = sum(len(i) for i, _ in cells.iter_pairs(max_pairs=200_000, progress=told.append))
-    assert n == cells.count_pairs()
-    assert told == sorted(told) and told[-1] == 1.0 and len(told) >= 2
-
-    fails = [False]
-
-    def stop(fraction):
-        if fails[0]:
-            raise KeyError(fraction)
-
-    blocks = cells.iter_pairs(max_pairs=200_000, progress=stop)
-    m = len(next(blocks)[0])
-    fails[0] = True
-    with pytest.raises(KeyError):
-        next(blocks)
-    fails[0] = False
-    assert m + sum(len(i) for i, _ in blocks) == n  # it goes on where it was
-
-
 # ---- what is given, and what stays as it is ------------------------------------------------------
 
 

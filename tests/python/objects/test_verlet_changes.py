@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell._objects import verlet_list
+from halfshell._convert import arrays
 from oracles import BOX_KINDS, random_box, same_arrays
 
 
@@ -189,7 +189,7 @@ def test_another_number_of_dimensions_breaks_all(rng):
 
 @pytest.mark.parametrize("limit", [0, 2**62])
 def test_pairs_with_too_many_images_for_one_number(rng, monkeypatch, limit):
-    monkeypatch.setattr(verlet_list, "MOST_KEYS", limit)
+    monkeypatch.setattr(arrays, "MOST_KEYS", limit)
     box = random_box(rng, "triclinic")
     pair_list = hs.VerletList(0.4, 0.1, box=box, track_changes=True)
     points = rng.random((40, 3))

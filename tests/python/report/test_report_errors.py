@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from halfshell._check.reference import exact_vector
+from halfshell._convert.arrays import row_keys
 from halfshell_report import scenes
 from halfshell_report.accuracy import (
     Answer,
     pair_errors,
     quantity_errors,
-    row_keys,
     sample_of,
 )
 from halfshell_report.physics import (

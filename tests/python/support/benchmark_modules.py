@@ -15,17 +15,14 @@ import pytest
 from checkout import BENCHMARKS
 
 PACKAGES = {
-    "libraries": (
-        "agreement", "contestant", "full_peers", "histogram_peers", "nearest_peers", "peers",
-    ),
+    "libraries": ("agreement", "contestant", "peers"),
     "measure": ("machine", "runner", "turns"),
-    "pages": ("marks", "report", "results"),
-}  # fmt: skip
+}
 COMMANDS = (
     "check_scenes", "compare", "extreme", "fill_docs", "fill_errors", "footprint", "plot",
     "reproduce", "run", "stages",
 )  # fmt: skip
-MODULES = {name: name for name in ("scenes", *COMMANDS)}
+MODULES = {name: name for name in ("scenes", "pages", *COMMANDS)}
 MODULES |= {name: f"{folder}.{name}" for folder, names in PACKAGES.items() for name in names}
 
 only_in_a_checkout = pytest.mark.skipif(not BENCHMARKS.exists(), reason="only in a checkout")
@@ -55,11 +52,11 @@ def measurement(bench: SimpleNamespace, contestant: str, seconds: float, **other
         "fresh_min": seconds, "recycled_median": seconds / 2.0, "recycled_min": seconds / 2.0,
         "all_held": True, "complete": True, "agreement": "same",
     }  # fmt: skip
-    return bench.report.Measurement(**{**values, **other})
+    return bench.pages.Measurement(**{**values, **other})
 
 
 def write_results(bench: SimpleNamespace, path: Path, rows: list[Any], **facts: Any) -> Path:
     """A result file of made-up rows."""
     about = {**bench.machine.facts("lab", "avx2", "gcc"), **facts}
-    bench.report.write_csv(path, about, rows, {"pairs-1e4-k52": 25.0})
+    bench.pages.write_csv(path, about, rows, {"pairs-1e4-k52": 25.0})
     return path

@@ -9,9 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from checkout import CSRC
-
-CORE = sorted(str(path) for part in ("core/*/*.c", "kernels/*.c") for path in CSRC.glob(part))
 STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror"]
 
 C_COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")

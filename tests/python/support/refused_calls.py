@@ -33,13 +33,17 @@ def assert_refused(call, exceptions, *fragments):
 
 
 def check_refusals(cases):
-    """Each call of {name: (call, error, pattern)}, or of a list of these, is refused so."""
+    """Each call of {name: (call, error, pattern)}, or of a list of these, is refused so at once."""
     wrong = {}
     cases = cases if isinstance(cases, dict) else dict(enumerate(cases))
     for name, (call, kind, pattern) in cases.items():
+        start = time.process_time()
         try:
             wrong[name] = f"gives {call()!r}"
         except kind as error:
+            elapsed = time.process_time() - start
+            if elapsed > LIMIT:
+                wrong[name] = f"takes {elapsed:.2f} s"
             if not re.search(pattern, str(error)):
                 wrong[name] = f"says: {error}"
     assert wrong == {}, wrong

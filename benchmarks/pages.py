@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From timings to ratios, tables and a CSV file."""
+"""What is made of times: ratios, tables, result files and their rows, and the sections of a page.
+
+A section stands between ``<!-- begin: NAME -->`` and ``<!-- end: NAME -->``. One for which no
+figures are given says so, so that a page never shows figures of another version.
+"""
 
 from __future__ import annotations
 
@@ -7,24 +11,17 @@ import csv
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
+from halfshell_report.rows import parsed
 from scenes import Limit
 
 __all__ = [
-    "COLUMNS",
-    "OURS",
-    "Measurement",
-    "Ratio",
-    "limit_rows",
-    "ratio_rows",
-    "render",
-    "table_of_contestants",
-    "table_of_limits",
-    "table_of_ratios",
-    "table_of_single_calls",
-    "write_csv",
-]
+    "COLUMNS", "EMPTY", "OURS", "Lines", "Measurement", "Ratio", "Row", "Table", "duration", "fill",
+    "is_ours", "is_reference", "limit_rows", "ratio_rows", "read_csv", "render", "table",
+    "table_of_contestants", "table_of_limits", "table_of_ratios", "table_of_single_calls",
+    "write_csv", "write_rows",
+]  # fmt: skip
 
 OURS = "halfshell"
 
@@ -257,6 +254,16 @@ def render(table: Table, rich: bool = True) -> None:
         print("  ".join(cells).rstrip())
 
 
+def write_rows(path: Path, columns: Iterable[str], rows: Iterable[Mapping[str, Any]]) -> None:
+    """Write a table of its own to a new file, and say so."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(columns), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    print(f"wrote {path}")
+
+
 def write_csv(
     path: Path,
     facts: Mapping[str, Any],
@@ -288,3 +295,78 @@ def write_csv(
             for key in _TIMES:
                 row[key] = "" if row[key] is None else f"{row[key]:.6g}"
             writer.writerow(row)
+
+
+# ---- rows of result files ---------------------------------------------------------------------
+
+# What plain numbers are compared with that are not searches: they show the machine.
+_REFERENCES = ("writing the output", "rewriting the output")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of a result file: what was measured, where and with which kernel."""
+
+    facts: dict[str, str]
+    one: Measurement
+
+    @property
+    def kernel(self) -> str:
+        """The kernel that our calls used."""
+        return self.facts.get("kernel", "")
+
+
+def is_ours(contestant: str) -> bool:
+    """Whether a row is of our own search, a variant of it included."""
+    return contestant.startswith(OURS) and not is_reference(contestant)
+
+
+def is_reference(contestant: str) -> bool:
+    """Whether a row is the time to write memory, which no search can beat."""
+    return any(contestant == f"{OURS} [{name}]" for name in _REFERENCES)
+
+
+def read_csv(path: Path) -> list[Row]:
+    """Read every row. Raises ValueError where a column is missing or a cell is no number."""
+    kinds = get_type_hints(Measurement)
+    rows = []
+    with path.open(newline="", encoding="utf-8") as file:
+        for number, line in enumerate(csv.DictReader(file), start=2):
+            lacking = [name for name in kinds if line.get(name) is None]
+            if lacking:
+                raise ValueError(f"{path}, line {number}: no column {', '.join(lacking)}")
+            try:
+                values = {name: parsed(kind, line[name]) for name, kind in kinds.items()}
+            except ValueError as error:
+                raise ValueError(f"{path}, line {number}: {error}") from error
+            facts = {key: text for key, text in line.items() if key not in kinds}
+            rows.append(Row(facts, Measurement(**values)))
+    return rows
+
+
+# ---- sections of a page -----------------------------------------------------------------------
+
+EMPTY = "Not measured for this version yet."
+
+Lines = list[str]
+
+
+def table(head: Sequence[str], body: Sequence[Sequence[str]]) -> Lines:
+    """Lay out a table in Markdown, nothing where there are no rows."""
+    if not body:
+        return []
+    rule = ["---"] * len(head)
+    return [f"| {' | '.join(row)} |" for row in (head, rule, *body)]
+
+
+def fill(page: str, sections: Mapping[str, Sequence[str]]) -> str:
+    """Put lines between the marks of each section. Raises ValueError for a missing mark."""
+    for name, lines in sections.items():
+        begin, end = f"<!-- begin: {name} -->", f"<!-- end: {name} -->"
+        head, found, rest = page.partition(begin)
+        tail = rest.partition(end)[2]
+        if not found or end not in rest:
+            raise ValueError(f"no marks of the section {name}")
+        body = "\n".join(lines) or EMPTY
+        page = f"{head}{begin}\n{body}\n{end}{tail}"
+    return page
