@@ -401,7 +401,7 @@ hs_status hs_neighbors_find(const hs_among *among, const hs_options *options, hs
 hs_status hs_neighbors_count(const hs_among *among, const hs_options *options, int64_t *counts,
                              hs_failure *failure);
 
-/* A search takes longer to begin than to look at all pairs of so few points, one by one. */
+/* A search takes longer to begin than to look at all pairs of so few points. */
 #define HS_FEW_PAIRS 1024
 
 typedef struct hs_few {

@@ -549,7 +549,7 @@ take_threads(PyObject *object, hs_options *options)
 /* A length. An infinite cutoff of users is left to Python, which finds a finite one that holds all
  * pairs. The Python layer may also give an array of one for each system, see take_systems. */
 static bool
-take_cutoff(hs_py_call *call, PyObject *object, bool is_largest)
+take_cutoff(hs_py_call *call, PyObject *object)
 {
     const double endless = (double)INFINITY;
     double      *cutoff = &call->options.cutoff;
@@ -564,7 +564,8 @@ take_cutoff(hs_py_call *call, PyObject *object, bool is_largest)
     }
     /* Bits are compared, as a subnormal number may be a trap. */
     return !call->is_of_users ||
-           (is_largest ? *cutoff >= 0.0 : memcmp(cutoff, &endless, sizeof endless) != 0);
+           (call->function->is_by_rank ? *cutoff >= 0.0
+                                       : memcmp(cutoff, &endless, sizeof endless) != 0);
 }
 
 /* numpy.int32 or numpy.int64, a dtype of these, or a name of them. */
@@ -616,8 +617,7 @@ take_number(hs_py_call *call, const hs_argument *argument, PyObject *object)
 {
     hs_options *options = &call->options;
     switch (argument->kind) {
-    case HS_ARG_CUTOFF: return take_cutoff(call, object, false);
-    case HS_ARG_MAX_DISTANCE: return take_cutoff(call, object, true);
+    case HS_ARG_CUTOFF: return take_cutoff(call, object);
     case HS_ARG_INCLUSIVE: return truth_of(object, &options->inclusive);
     case HS_ARG_PRECISION: return take_precision(object, &options->precision);
     case HS_ARG_KERNEL: return take_kernel(object, &options->kernel);
@@ -947,9 +947,7 @@ take_numbers(hs_py_call *call, int n, PyObject **of)
             return false;
         }
         if (given != Py_None || kind < HS_ARG_OUT || kind == HS_ARG_OTHER_POINTS) {
-            of[kind == HS_ARG_MAX_DISTANCE   ? HS_ARG_CUTOFF
-               : kind == HS_ARG_OTHER_POINTS ? HS_ARG_QUERIES
-                                             : kind] = given;
+            of[kind == HS_ARG_OTHER_POINTS ? HS_ARG_QUERIES : kind] = given;
         }
     }
     return true;

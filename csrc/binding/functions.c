@@ -236,6 +236,9 @@ static int
 place_of(const hs_function *function, const char *name)
 {
     const hs_argument *argument;
+    if (function->is_by_rank && strcmp(name, "max_distance") == 0) {
+        name = "cutoff";
+    }
     for (int k = 0; (argument = hs_argument_at(function, k)) != NULL; k++) {
         if (strcmp(argument->name, name) == 0) {
             return k;
@@ -345,38 +348,6 @@ hs_py_quick(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments
         row->n_positional = (int)PyLong_AsLong(arguments[2]);
     }
     return made;
-}
-
-/* Name of each argument in the order of the core, and whether it may be left out with all that
- * follow. */
-static PyObject *
-arguments_of(const hs_function *function)
-{
-    PyObject          *list = PyList_New(0);
-    const hs_argument *argument;
-    for (int k = 0; list != NULL && (argument = hs_argument_at(function, k)) != NULL; k++) {
-        PyObject *entry = Py_BuildValue("(sN)", argument->name,
-                                        PyBool_FromLong(argument->kind >= HS_ARG_FIRST_OPTIONAL));
-        if (entry == NULL || PyList_Append(list, entry) < 0) {
-            Py_CLEAR(list);
-        }
-        Py_XDECREF(entry);
-    }
-    return list;
-}
-
-PyObject *
-hs_py_table(PyObject *module, PyObject *ignored)
-{
-    PyObject *dict = PyDict_New();
-    (void)module;
-    (void)ignored;
-    for (const hs_function *one = hs_functions; dict != NULL && one->name != NULL; one++) {
-        if (!hs_dict_put(dict, one->name, arguments_of(one))) {
-            Py_CLEAR(dict);
-        }
-    }
-    return dict;
 }
 
 PyObject *

@@ -17,8 +17,6 @@ const hs_argument HS_EVERY_SEARCH[HS_CALL_ARGUMENTS] = {
     {"threads", HS_ARG_THREADS, NULL},
 };
 
-const hs_argument HS_MAX_DISTANCE = {"max_distance", HS_ARG_MAX_DISTANCE, NULL};
-
 /* What several take; letters of rows are none that say what the row is. */
 static const hs_argument OF_SHELL_ROWS = {"quantities", HS_ARG_QUANTITIES, "jdDSk"},
                          OF_ROWS = {"quantities", HS_ARG_QUANTITIES, "jdDS"},

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * The table of the interface: what each function that searches takes. By it arguments.h reads the
- * arguments of a call, functions.c makes the functions, and tests/core_stub.py writes the stub.
+ * arguments of a call, and functions.c makes the functions.
  *
  * The Python layer gives a set of points, and queries, as an array or as a tuple (positions, radii,
  * supports, types, weights, groups, labels, where systems begin), of which all but the first may be
@@ -38,8 +38,7 @@ typedef enum hs_kind {
     HS_ARG_FLAG,         /* `flag`, `integer` and `real` of the call */
     HS_ARG_INTEGER,
     HS_ARG_REAL,
-    HS_ARG_MAX_DISTANCE, /* what a cutoff is to users of `nearest` */
-    HS_ARG_OWN,          /* left to the function, which runs no Python code for it */
+    HS_ARG_OWN, /* left to the function, which runs no Python code for it */
     /* Of some: None, or what may be left out with all that follow. */
     HS_ARG_QUERIES,   /* a set */
     HS_ARG_PAIRING,   /* a tuple: number of a rule, or None for the cutoff alone; how many times
@@ -75,19 +74,19 @@ typedef struct hs_function {
     const char        *name;
     hs_py_search      *body;
     const hs_argument *own[HS_MOST_OWN]; /* beyond HS_EVERY_SEARCH, until NULL */
-    /* Whether the cutoff is the largest distance of what is near, decided exactly in any case. */
+    /* Whether the cutoff is the largest distance of what is near, max_distance to users, decided
+     * exactly in any case. */
     bool is_by_rank;
 } hs_function;
 
-extern const hs_argument HS_EVERY_SEARCH[HS_CALL_ARGUMENTS], HS_MAX_DISTANCE;
+extern const hs_argument HS_EVERY_SEARCH[HS_CALL_ARGUMENTS];
 
 /* The argument at this place in the order of the core; NULL behind the last. */
 static inline const hs_argument *
 hs_argument_at(const hs_function *function, int place)
 {
-    return place >= HS_CALL_ARGUMENTS           ? function->own[place - HS_CALL_ARGUMENTS]
-           : place == 1 && function->is_by_rank ? &HS_MAX_DISTANCE
-                                                : &HS_EVERY_SEARCH[place];
+    return place < HS_CALL_ARGUMENTS ? &HS_EVERY_SEARCH[place]
+                                     : function->own[place - HS_CALL_ARGUMENTS];
 }
 
 extern const hs_function hs_functions[]; /* until one without a name */

@@ -116,7 +116,6 @@ static PyMethodDef others[] = {
     {"quick", FASTCALL(hs_py_quick), METH_FASTCALL, NULL},
     {"scene", FASTCALL(hs_py_scene), METH_FASTCALL, NULL},
     {"know", FASTCALL(hs_py_know), METH_FASTCALL, NULL},
-    {"table", hs_py_table, METH_NOARGS, NULL},
     {"next_block", FASTCALL(hs_py_next_block), METH_FASTCALL, NULL},
     {"cells_layout", hs_py_cells_layout, METH_O, NULL},
     {"feet_between", FASTCALL(hs_py_feet_between), METH_FASTCALL, NULL},
@@ -150,7 +149,8 @@ module_exec(PyObject *module)
         return -1;
     }
     types[HS_DYNAMIC_TYPE] = hs_py_dynamic_type(module);
-    return types[HS_DYNAMIC_TYPE] == NULL || hs_py_add_capi(module) < 0
+    return types[HS_DYNAMIC_TYPE] == NULL || hs_py_add_capi(module) < 0 ||
+                   PyModule_AddIntConstant(module, "FEW_PAIRS", HS_FEW_PAIRS) < 0
                ? -1
                : hs_py_add_functions(module);
 }

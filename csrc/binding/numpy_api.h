@@ -15,10 +15,4 @@
 #endif
 #include <numpy/arrayobject.h>
 
-/* Builds of Python without a global lock have these, and need them. */
-#if PY_VERSION_HEX < 0x030d0000
-#define Py_BEGIN_CRITICAL_SECTION(object) {
-#define Py_END_CRITICAL_SECTION()         }
-#endif
-
 #endif

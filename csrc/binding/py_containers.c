@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* py_containers.c: what drop-ins return: sets, dictionaries and lists of Python, made from columns
- * of pairs; triplets; and the pairs of few points, without a search. */
+ * of pairs; and the pairs of few points, without a search. */
 #include "arguments.h"
 #include "errors.h"
 #include "outputs.h"
@@ -157,60 +157,6 @@ hs_py_contain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argumen
     from.j = j;
     from.d = d;
     return container_of(&from);
-}
-
-/* ---- triplets ----------------------------------------------------------------------------- */
-
-/* More are for the Python layer, which asks first what the machine has left. */
-#define MOST_TRIPLETS (INT64_C(1) << 23)
-
-/* How many ordered pairs of entries all rows have; -1 for too many, or where starts descend. */
-static int64_t
-count_triplets(const int32_t *starts, npy_intp n_starts)
-{
-    int64_t total = 0;
-    for (npy_intp row = 0; row + 1 < n_starts && total <= MOST_TRIPLETS; row++) {
-        const int64_t first = starts[row] > 0 ? starts[row] : 0;
-        const int64_t n = (starts[row + 1] > 0 ? starts[row + 1] : 0) - first;
-        if (n < 0) {
-            return -1;
-        }
-        total += n * (n - 1);
-    }
-    return total <= MOST_TRIPLETS ? total : -1;
-}
-
-PyObject *
-hs_py_triplets(PyObject *module, PyObject *starts)
-{
-    (void)module;
-    const bool     are_starts = hs_is_array(starts, NPY_INT32, 1);
-    const int32_t *start = are_starts ? PyArray_DATA((PyArrayObject *)starts) : NULL;
-    const npy_intp n_starts = are_starts ? (npy_intp)hs_length_of(starts) : 0;
-    npy_intp       n = are_starts ? (npy_intp)count_triplets(start, n_starts) : -1;
-    if (n < 0) {
-        Py_RETURN_NONE;
-    }
-    PyObject *one = PyArray_SimpleNew(1, &n, NPY_INT32),
-             *other = PyArray_SimpleNew(1, &n, NPY_INT32);
-    if (one == NULL || other == NULL) {
-        Py_XDECREF(one);
-        Py_XDECREF(other);
-        return NULL;
-    }
-    int32_t *ij = PyArray_DATA((PyArrayObject *)one), *ik = PyArray_DATA((PyArrayObject *)other);
-    for (npy_intp row = 0; row + 1 < n_starts; row++) {
-        const int32_t first = start[row] > 0 ? start[row] : 0;
-        for (int32_t j = first; j < start[row + 1]; j++) {
-            for (int32_t k = first; k < start[row + 1]; k++) {
-                if (j != k) {
-                    *ij++ = j;
-                    *ik++ = k;
-                }
-            }
-        }
-    }
-    return Py_BuildValue("(NN)", one, other);
 }
 
 /* ---- few points --------------------------------------------------------------------------- */

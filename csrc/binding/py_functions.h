@@ -46,10 +46,6 @@ int hs_py_add_functions(PyObject *module);
  * and "settings", a context variable with its usual value. */
 PyObject *hs_py_know(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 
-/* table() -> the arguments of each function, by its name: of each argument its name, and whether it
- * may be left out with all that follow. */
-PyObject *hs_py_table(PyObject *module, PyObject *ignored);
-
 /* py_searches.c */
 hs_py_search hs_py_pairs, hs_py_count_pairs, hs_py_pairs_between, hs_py_neighbors,
     hs_py_coordination, hs_py_nearest, hs_py_histogram, hs_py_clusters, hs_py_measure,
@@ -82,14 +78,14 @@ hs_py_search hs_py_connect, hs_py_connect_search, hs_py_overlap, hs_py_intersect
 /* points, p, q -> bools; points, low, high -> keys. */
 PyObject *hs_py_feet_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n);
 PyObject *hs_py_morton_keys(PyObject *module, PyObject *const *arguments, Py_ssize_t n);
+/* Where rows begin, int32 -> each entry and each other one of its row, arrays of int32; None for
+ * very many, and for what is no such array. */
+PyObject *hs_py_triplets(PyObject *module, PyObject *starts);
 
 /* py_containers.c */
 /* offsets or None, i or None, j, d or None -> lists of the numbers in each row; or pairs (i, j) in
  * a set, or with d in a dictionary. */
 PyObject *hs_py_contain(PyObject *module, PyObject *const *arguments, Py_ssize_t n);
-/* Where rows begin, int32 -> each entry and each other one of its row, arrays of int32; None for
- * very many, and for what is no such array. */
-PyObject *hs_py_triplets(PyObject *module, PyObject *starts);
 /* points, queries or None, periods or None, cutoff, p, eps, letter -> what hs_few_pairs finds; by
  * its letter "n" how many, "s" a set, "d" a dictionary, "l" lists, "P" an array of pairs, "b" this
  * and d, "a" arrays i, j, d. None if it is for a search, or for SciPy, with p or eps of its own. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* py_nodes.c: rows and pairs of node lists, and what is made of them or left of them when nodes or
- * pairs go. The Python layer keeps the arrays, and puts what it gives in here together from them.
- */
+ * pairs go; and triplets of rows. The Python layer keeps the arrays, and puts what it gives in here
+ * together from them. */
 #include "py_functions.h"
 
 #include "errors.h"
@@ -12,7 +12,7 @@
 /* ---- arguments and results ---------------------------------------------------------------- */
 
 /* The bits of `flags`. */
-enum { GHOST_ROWS = 1, GHOST_PAIRS = 2, ROWS_ONLY = 4, DIRECTED = 8 };
+enum { GHOST_ROWS = 1, GHOST_PAIRS = 2, DIRECTED = 4 };
 
 /* The entries of a C-contiguous array of this type with n entries, or with any number where n is
  * -1; *length, unless NULL, is that number. NULL, without an exception, for all else. */
@@ -81,7 +81,6 @@ take_lists(PyObject *const *arguments, const hs_py_call *call, hs_node_lists *li
     const void *number = NULL;
     *lists = (hs_node_lists){.ghost_rows = (call->integer & GHOST_ROWS) != 0,
                              .ghost_pairs = (call->integer & GHOST_PAIRS) != 0,
-                             .rows_only = (call->integer & ROWS_ONLY) != 0,
                              .directed = (call->integer & DIRECTED) != 0};
     lists->n_nodes = entries_of(arguments[0], NPY_INT64, -1, &n_lists);
     if (lists->n_nodes == NULL || n_lists > INT32_MAX) {
@@ -126,9 +125,8 @@ pairs_of(hs_connectivity *made, int ndim)
     return Py_BuildValue("(NN)", of_nodes, of_lists);
 }
 
-/* What a function returns from a result that is freed; NULL with an exception set for a status
- * other than HS_OK. Of rows offsets and indices, and shifts of ndim components where there are any;
- * of a connectivity (rows, (nodes, lists)), None for what is not wanted. */
+/* What a function returns from a result that is freed: offsets and indices of rows, and shifts of
+ * ndim components where there are any. NULL with an exception set for a status other than HS_OK. */
 static PyObject *
 give_rows(hs_py_call *call, hs_status status, hs_pairs *rows, int ndim)
 {
@@ -140,34 +138,19 @@ give_rows(hs_py_call *call, hs_status status, hs_pairs *rows, int ndim)
     return arrays;
 }
 
-enum { ROWS_WANTED = 1, PAIRS_WANTED = 2 };
-
+/* The same of a connectivity; its rows, or nodes and lists of its pairs. */
 static PyObject *
-give_parts(hs_py_call *call, hs_status status, hs_connectivity *made, int wanted, int ndim)
+give_part(hs_py_call *call, hs_status status, hs_connectivity *made, bool pairs, int ndim)
 {
     if (!hs_py_call_done(call, status)) {
         return NULL;
     }
-    PyObject *rows = wanted & ROWS_WANTED ? rows_of(hs_connectivity_rows(made), ndim)
-                                          : Py_NewRef(Py_None);
-    PyObject *pairs = wanted & PAIRS_WANTED ? pairs_of(made, ndim) : Py_NewRef(Py_None);
+    PyObject *part = pairs ? pairs_of(made, ndim) : rows_of(hs_connectivity_rows(made), ndim);
     hs_connectivity_free(made);
-    if (rows == NULL || pairs == NULL) {
-        Py_XDECREF(rows);
-        Py_XDECREF(pairs);
-        return NULL;
-    }
-    return Py_BuildValue("(NN)", rows, pairs);
+    return part;
 }
 
 /* ---- functions ---------------------------------------------------------------------------- */
-
-/* What the caller wants of a connectivity. */
-static int
-wanted_of(const hs_node_lists *lists)
-{
-    return lists->rows_only ? ROWS_WANTED : ROWS_WANTED | PAIRS_WANTED;
-}
 
 PyObject *
 hs_py_connect(hs_py_call *call)
@@ -178,10 +161,11 @@ hs_py_connect(hs_py_call *call)
     if (!take_lists(call->own + 3, call, &lists) || !take_half(call->own, call->own[2], &half)) {
         return NULL;
     }
+    lists.rows_only = true;
     hs_py_call_release(call);
     const hs_status status =
         hs_connectivity_link(&half, &lists, &call->options, &made, &call->failure);
-    return give_parts(call, status, made, wanted_of(&lists), half.ndim);
+    return give_part(call, status, made, false, half.ndim);
 }
 
 PyObject *
@@ -192,10 +176,11 @@ hs_py_connect_search(hs_py_call *call)
     if (!take_lists(call->own, call, &lists)) {
         return NULL;
     }
+    lists.rows_only = true;
     hs_py_call_release(call);
     const hs_status status =
         hs_connectivity_build(&call->among, &lists, &call->options, &made, &call->failure);
-    return give_parts(call, status, made, wanted_of(&lists), call->points.at.ndim);
+    return give_part(call, status, made, false, call->points.at.ndim);
 }
 
 PyObject *
@@ -297,7 +282,7 @@ hs_py_pair_rows(hs_py_call *call)
     hs_py_call_release(call);
     const hs_status status =
         hs_connectivity_pair(&rows, &lists, &call->options, &made, &call->failure);
-    return give_parts(call, status, made, PAIRS_WANTED, rows.ndim);
+    return give_part(call, status, made, true, rows.ndim);
 }
 
 /* n_nodes, target, place or None. */
@@ -365,4 +350,56 @@ hs_py_rows_without(hs_py_call *call)
     const hs_status status =
         hs_rows_without(&rows, &without, call->flag, &call->options, &result, &call->failure);
     return give_rows(call, status, result, rows.ndim);
+}
+
+/* More are for the Python layer, which asks first what the machine has left. */
+#define MOST_TRIPLETS (INT64_C(1) << 23)
+
+/* How many ordered pairs of entries all rows have; -1 for too many, or where starts descend. */
+static int64_t
+count_triplets(const int32_t *starts, npy_intp n_starts)
+{
+    int64_t total = 0;
+    for (npy_intp row = 0; row + 1 < n_starts && total <= MOST_TRIPLETS; row++) {
+        const int64_t first = starts[row] > 0 ? starts[row] : 0;
+        const int64_t n = (starts[row + 1] > 0 ? starts[row + 1] : 0) - first;
+        if (n < 0) {
+            return -1;
+        }
+        total += n * (n - 1);
+    }
+    return total <= MOST_TRIPLETS ? total : -1;
+}
+
+PyObject *
+hs_py_triplets(PyObject *module, PyObject *starts)
+{
+    (void)module;
+    const bool     are_starts = hs_is_array(starts, NPY_INT32, 1);
+    const int32_t *start = are_starts ? PyArray_DATA((PyArrayObject *)starts) : NULL;
+    const npy_intp n_starts = are_starts ? (npy_intp)hs_length_of(starts) : 0;
+    npy_intp       n = are_starts ? (npy_intp)count_triplets(start, n_starts) : -1;
+    if (n < 0) {
+        Py_RETURN_NONE;
+    }
+    PyObject *one = PyArray_SimpleNew(1, &n, NPY_INT32),
+             *other = PyArray_SimpleNew(1, &n, NPY_INT32);
+    if (one == NULL || other == NULL) {
+        Py_XDECREF(one);
+        Py_XDECREF(other);
+        return NULL;
+    }
+    int32_t *ij = PyArray_DATA((PyArrayObject *)one), *ik = PyArray_DATA((PyArrayObject *)other);
+    for (npy_intp row = 0; row + 1 < n_starts; row++) {
+        const int32_t first = start[row] > 0 ? start[row] : 0;
+        for (int32_t j = first; j < start[row + 1]; j++) {
+            for (int32_t k = first; k < start[row + 1]; k++) {
+                if (j != k) {
+                    *ij++ = j;
+                    *ik++ = k;
+                }
+            }
+        }
+    }
+    return Py_BuildValue("(NN)", one, other);
 }

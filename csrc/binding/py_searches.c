@@ -250,22 +250,6 @@ hs_py_measure(hs_py_call *call)
 
 /* ---- what would be done, and what was done ------------------------------------------------ */
 
-/* A new dictionary, or NULL. */
-static PyObject *
-plan_as_dict(const hs_plan *plan)
-{
-    const int d = plan->ndim;
-    return Py_BuildValue(
-        "{sisisNsNsssLsLsNsNsNsNsNsLsdsiss}", "ndim", d, "n_periodic", plan->n_periodic, "aligned",
-        PyBool_FromLong(plan->aligned), "keeps_originals", PyBool_FromLong(plan->keeps_originals),
-        "algorithm", hs_algorithm_names[plan->algorithm], "n_searches", (long long)plan->n_searches,
-        "n_cells", (long long)plan->n_cells, "all_pairs", PyBool_FromLong(plan->all_pairs),
-        "sparse", PyBool_FromLong(plan->sparse), "shape", hs_tuple_of_integers(plan->shape, d),
-        "cell_sizes", hs_tuple_of_reals(plan->cell_size, d), "images",
-        hs_tuple_of_integers(plan->images, d), "stencil_rows", (long long)plan->stencil_rows,
-        "expected_pairs", plan->expected_pairs, "threads", plan->threads, "kernel", plan->kernel);
-}
-
 /* The bytes that a search took, by purpose; a new dictionary, or NULL. */
 static PyObject *
 bytes_as_dict(const hs_counters *counters)
@@ -288,14 +272,14 @@ bytes_as_dict(const hs_counters *counters)
     return dict;
 }
 
-/* What is planned, and what was counted, if it was. */
+/* What is planned, and what was counted: nothing for NULL. A new dictionary, or NULL. */
 static PyObject *
-dictionary_of(const hs_plan *plan, const hs_counters *counted)
+plan_as_dict(const hs_plan *plan, const hs_counters *counted)
 {
-    PyObject *dict = plan_as_dict(plan);
-    PyObject *counters =
-        dict == NULL || counted == NULL
-            ? NULL
+    const int d = plan->ndim;
+    PyObject *measured =
+        counted == NULL
+            ? PyDict_New()
             : Py_BuildValue("{sNsLsLsLsLsLsLsLsL}", "bytes", bytes_as_dict(counted), "bytes_peak",
                             (long long)counted->bytes_peak, "groups", (long long)counted->groups,
                             "candidates", (long long)counted->candidates, "pairs",
@@ -303,11 +287,16 @@ dictionary_of(const hs_plan *plan, const hs_counters *counted)
                             "by_float64", (long long)counted->by_float64, "by_double_word",
                             (long long)counted->by_double_word, "by_integers",
                             (long long)counted->by_integers);
-    if (counted != NULL && (counters == NULL || PyDict_Update(dict, counters) < 0)) {
-        Py_CLEAR(dict);
-    }
-    Py_XDECREF(counters);
-    return dict;
+    return Py_BuildValue(
+        "{sisisNsNsssLsLsNsNsNsNsNsLsdsisssN}", "ndim", d, "n_periodic", plan->n_periodic,
+        "aligned", PyBool_FromLong(plan->aligned), "keeps_originals",
+        PyBool_FromLong(plan->keeps_originals), "algorithm", hs_algorithm_names[plan->algorithm],
+        "n_searches", (long long)plan->n_searches, "n_cells", (long long)plan->n_cells, "all_pairs",
+        PyBool_FromLong(plan->all_pairs), "sparse", PyBool_FromLong(plan->sparse), "shape",
+        hs_tuple_of_integers(plan->shape, d), "cell_sizes", hs_tuple_of_reals(plan->cell_size, d),
+        "images", hs_tuple_of_integers(plan->images, d), "stencil_rows",
+        (long long)plan->stencil_rows, "expected_pairs", plan->expected_pairs, "threads",
+        plan->threads, "kernel", plan->kernel, "measured", measured);
 }
 
 PyObject *
@@ -325,6 +314,6 @@ hs_py_explain(hs_py_call *call)
         status = hs_pairs_find(&call->among, &call->options, &pairs, &call->failure);
     }
     hs_pairs_free(pairs);
-    return hs_py_call_done(call, status) ? dictionary_of(&plan, call->flag ? &counters : NULL)
+    return hs_py_call_done(call, status) ? plan_as_dict(&plan, call->flag ? &counters : NULL)
                                          : NULL;
 }

@@ -19,6 +19,16 @@ if TYPE_CHECKING:
 
 Function = TypeVar("Function", bound="Callable[..., Any]")
 
+_CUTOFF = """
+    cutoff : float, array_like of float, shape (k,), (s,) or (t, t), dict or None
+        Largest distance of a pair, in the unit of `points`; not negative; it may be larger than the
+        box, and infinite where no axis is periodic. One for each system of a batch, shape (s,). By
+        type: a dict such as ``{("H", "O"): 1.2, ("*", "*"): 2.0}``, in which a key with fewer stars
+        wins and two types without a key form no pairs, or a symmetric table with a row for each
+        type. With radii a further limit, or left out. With supports the extent, finite: ``|H @
+        D| <= cutoff``. Of a `CellList` its own, if it is left out.
+    """
+
 #: Descriptions of arguments that mean the same everywhere, and of what functions that draw return.
 SHARED = {
     "points": """
@@ -27,23 +37,9 @@ SHARED = {
         which bring what they know: box, periodicity, types, radii, ... Several systems are a
         list of these.
     """,
-    "cutoff": """
-    cutoff : float, array_like of float, shape (k,), (s,) or (t, t), dict or None
-        Largest distance of a pair, in the unit of `points`; not negative; it may be larger than the
-        box, and infinite where no axis is periodic. One for each system of a batch, shape (s,). By
-        type: a dict such as ``{("H", "O"): 1.2, ("*", "*"): 2.0}``, in which a key with fewer stars
-        wins and two types without a key form no pairs, or a symmetric table with a row for each
-        type. With radii a further limit, or left out. With supports the extent, finite: ``|H @
-        D| <= cutoff``. Of a `CellList` its own, if it is left out.
-    """,
-    "shells": """
-    cutoff : float, array_like of float, shape (k,), (s,) or (t, t), dict or None
-        Largest distance of a pair, in the unit of `points`; not negative; it may be larger than the
-        box, and infinite where no axis is periodic. Several ascending ones, shape (k,), go with the
-        letter ``k``. One for each system of a batch, shape (s,). By type: a dict such as
-        ``{("H", "O"): 1.2, ("*", "*"): 2.0}``, in which a key with fewer stars wins and two types
-        without a key form no pairs, or a symmetric table with a row for each type. With radii a
-        further limit, or None. With supports the extent, finite: ``|H @ D| <= cutoff``.
+    "cutoff": _CUTOFF,
+    "shells": f"""{_CUTOFF.rstrip()}
+        Several ascending ones, shape (k,), go with the letter ``k``.
     """,
     "queries": """
     queries : array_like of float, shape (q, d), or Points, optional

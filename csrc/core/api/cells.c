@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-#include "cells.h"
 #include "query.h"
 #include "../scene/points.h"
 #include "../cells/bins.h"
@@ -13,35 +12,40 @@
 /* cells.c: the public functions of cells: points that are copied, sorted once and searched many
  * times. */
 
-/* Whether all ends are finite, where something is fixed, and those of axes that do not matter. */
-static bool
-is_domain(const double *domain, int ndim)
+hs_status
+hs_cells_build(const hs_points *points, const hs_box *box, const hs_options *options,
+               hs_cells **result, hs_failure *failure)
 {
-    for (int k = 0; domain != NULL && k < ndim; k++) {
-        const double low = domain[k], high = domain[ndim + k];
-        if (!(low > high) && !(low <= high && isfinite(low) && isfinite(high))) {
-            return false;
-        }
+    if (result != NULL) {
+        *result = NULL;
     }
-    return true;
-}
-
-static hs_status
-build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
-            hs_failure *failure)
-{
+    if (result == NULL || options == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
+    hs_cells *cells = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *cells);
+    if (cells == NULL) {
+        return hs_end_early(HS_ERR_MEMORY, options, failure);
+    }
     hs_options of_cells = *options;
     hs_call   *call = &cells->call;
+    cells->copy = NULL;
+    cells->trees = hs_nearest_kept_new();
+    cells->has_box = box != NULL;
+    if (box != NULL) {
+        cells->box = *box;
+    }
     of_cells.want = HS_WANT_SHIFT; /* they keep all that a later search may want */
     of_cells.out = NULL;
     of_cells.domain = NULL; /* borrowed for this call */
     failure = hs_call_enter(&of_cells, failure, call);
     call->account.is_kept = true;
     hs_search_begin(call, &cells->search);
-    hs_status status =
-        hs_check_arguments(points, NULL, cells->has_box ? &cells->box : NULL, &of_cells, failure);
-    if (status == HS_OK && !is_domain(options->domain, points->ndim)) {
-        status = HS_ERR_ARGUMENT;
+    hs_status status = hs_check_arguments(points, NULL, hs_cells_box(cells), &of_cells, failure);
+    for (int k = 0; status == HS_OK && options->domain != NULL && k < points->ndim; k++) {
+        const double low = options->domain[k], high = options->domain[points->ndim + k];
+        if (!(low > high) && !(low <= high && isfinite(low) && isfinite(high))) {
+            status = HS_ERR_ARGUMENT; /* low > high: an axis that does not matter */
+        }
     }
     if (status == HS_OK) {
         /* The points in memory of the cells: the caller cannot change them between searches. */
@@ -63,8 +67,7 @@ build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
                               .keeps_none = true,
                               .domain = options->domain};
         hs_call_gather(call, points->n / HS_POINTS_MADE_READY);
-        status =
-            hs_search_build(&sets, cells->has_box ? &cells->box : NULL, &cells->search, failure);
+        status = hs_search_build(&sets, hs_cells_box(cells), &cells->search, failure);
     }
     if (status == HS_OK && cells->trees == NULL) {
         status = HS_ERR_MEMORY;
@@ -72,36 +75,12 @@ build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
     hs_call_tell_limit(call, status, failure);
     hs_call_leave(call, 0);
     hs_call_detach(call);
-    return status;
-}
-
-hs_status
-hs_cells_build(const hs_points *points, const hs_box *box, const hs_options *options,
-               hs_cells **result, hs_failure *failure)
-{
-    if (result != NULL) {
-        *result = NULL;
-    }
-    if (result == NULL || options == NULL) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    hs_cells *cells = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *cells);
-    if (cells == NULL) {
-        return hs_end_early(HS_ERR_MEMORY, options, failure);
-    }
-    cells->copy = NULL;
-    cells->trees = hs_nearest_kept_new();
-    cells->has_box = box != NULL;
-    if (box != NULL) {
-        cells->box = *box;
-    }
-    const hs_status status = build_cells(points, options, cells, failure);
-    if (status != HS_OK) {
+    if (status == HS_OK) {
+        *result = cells;
+    } else {
         hs_cells_free(cells);
-        return status;
     }
-    *result = cells;
-    return HS_OK;
+    return status;
 }
 
 void
@@ -423,8 +402,6 @@ hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_op
             hs_scene_name_refused(&cells->search.scene, queries, failure);
         }
     }
-    if (status != HS_OK) {
-        failure->limit_bytes = status == HS_ERR_MEMORY ? call->account.limit : 0.0;
-    }
+    hs_call_tell_limit(call, status, failure);
     return hs_pairs_finish(rows, status, 0, result);
 }

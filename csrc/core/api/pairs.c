@@ -1,10 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "query.h"
-#include "../collect/parallel.h"
 #include "../collect/sort_pairs.h"
 #include "../rows/table.h"
-#include "../nearest/nearest.h"
-#include "../search/choice.h"
 #include "../histogram/histogram.h"
 
 #include <math.h>
@@ -141,7 +138,9 @@ record_to_sort(void *context, hs_query_run *run)
 {
     hs_output *found = context;
     if (!run->has_levels) {
-        found->columns = hs_sort_columns(run->search);
+        /* What is kept from system to system is for the same columns. */
+        found->columns = hs_sort_columns(run->search) |
+                         (run->keeper != NULL ? (unsigned)HS_WANT_SHIFT : 0);
     }
     return record_step(found, run);
 }
@@ -412,9 +411,8 @@ hs_pairs_histogram(const hs_among *among, const hs_options *options, const hs_hi
 
 /* A plan while searches are added to it. */
 typedef struct planning {
-    hs_plan     *plan;
-    double       largest; /* reach of a search so far */
-    hs_algorithm wanted;  /* by the caller */
+    hs_plan plan;
+    double  largest; /* reach of a search so far */
 } planning;
 
 /* A hs_use_fn: adds a search to the plan, which is about the one with the largest reach. */
@@ -422,7 +420,7 @@ static hs_status
 plan_step(void *context, hs_query_run *run)
 {
     planning       *now = context;
-    hs_plan        *plan = now->plan;
+    hs_plan        *plan = &now->plan;
     const double    cutoff = run->call->options.cutoff;
     const int64_t   n_before = plan->n_searches;
     const double    expected_before = plan->expected_pairs;
@@ -458,35 +456,34 @@ plan_step(void *context, hs_query_run *run)
     }
     plan->n_searches = n_before + 1;
     plan->expected_pairs = expected_before + expected;
-    if (now->wanted != HS_AUTO) {
-        plan->algorithm = now->wanted;
-    } else if (plan->n_searches > 1) {
-        plan->algorithm = HS_HIERARCHY;
-    }
     return status;
 }
 
 hs_status
 hs_plan_make(const hs_among *among, const hs_options *options, hs_plan *plan, hs_failure *failure)
 {
-    hs_plan         made = {.ndim = 0};
-    planning        now = {.plan = &made};
+    planning        now = {.largest = 0.0};
+    hs_plan *const  made = &now.plan;
     const hs_finder finder = {.step = plan_step, .context = &now};
     hs_query        query = hs_query_among(among, HS_HALF_LIST, options);
     query.is_incomplete = query.is_incomplete || plan == NULL || query.selection != NULL ||
                           query.among != NULL;
-    now.wanted = query.options.algorithm;
     hs_status status = hs_query_answer(&query, &finder, NULL, failure);
-    if (status == HS_OK && made.n_searches == 0) {
+    if (status == HS_OK && made->n_searches == 0) {
         /* Where no two points can be a pair: what the cells would be for a cutoff of 0. */
         query.options.cutoff = 0.0;
         query.reach = NULL;
         status = hs_query_answer(&query, &finder, NULL, failure);
-        made.n_searches = 0;
-        made.expected_pairs = 0.0;
+        made->n_searches = 0;
+        made->expected_pairs = 0.0;
+    }
+    if (query.options.algorithm != HS_AUTO) {
+        made->algorithm = query.options.algorithm;
+    } else if (made->n_searches > 1) {
+        made->algorithm = HS_HIERARCHY;
     }
     if (status == HS_OK) {
-        *plan = made;
+        *plan = *made;
     }
     return status;
 }

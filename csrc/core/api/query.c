@@ -2,7 +2,6 @@
 #include "query.h"
 #include "../base/status.h"
 #include "../exact/ellipsoid.h"
-#include "cells.h"
 
 #include <limits.h>
 #include <math.h>
@@ -88,18 +87,6 @@ check_lengths(const double *lengths, int64_t n, hs_failure *failure)
         }
     }
     return HS_OK;
-}
-
-/* The first that is above 0, or 0. */
-static double
-least_length(const double *lengths, int64_t n)
-{
-    for (int64_t k = 0; k < n; k++) {
-        if (lengths[k] > 0.0) {
-            return lengths[k];
-        }
-    }
-    return 0.0;
 }
 
 /* Points, queries and box. */
@@ -387,7 +374,9 @@ hs_query_open_step(hs_query_run *run, int64_t number)
     } else {
         if (query->is_by_length) {
             sets.is_plain = true;
-            sets.least_cutoff = least_length(query->options.shells, query->options.n_shells);
+            for (int64_t k = 0; sets.least_cutoff <= 0.0 && k < query->options.n_shells; k++) {
+                sets.least_cutoff = query->options.shells[k]; /* the first above 0, or 0 */
+            }
         }
         sets.least_cutoff = hs_choice_least_length(call->choice, sets.least_cutoff);
         sets.follows = run->has_scene;
@@ -462,8 +451,7 @@ hs_result_begin(bool has_input, const hs_options *options, hs_pairs **result, hs
         *result = NULL;
     }
     if (made == NULL) {
-        *status = can_begin ? HS_ERR_MEMORY : HS_ERR_ARGUMENT;
-        (void)hs_end_early(*status, options, *failure);
+        *status = hs_end_early(can_begin ? HS_ERR_MEMORY : HS_ERR_ARGUMENT, options, *failure);
         return NULL;
     }
     *failure = hs_call_enter(options, *failure, &made->call);

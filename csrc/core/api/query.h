@@ -6,6 +6,7 @@
 #include "../base/base.h"
 #include "../collect/parallel.h"
 #include "../levels/levels.h"
+#include "../nearest/nearest.h"
 #include "../search/choice.h"
 #include "../search/search.h"
 
@@ -41,6 +42,17 @@ hs_status hs_check_options(const hs_options *options, unsigned known);
 /* Points, queries, box and options; failure->in_queries tells queries from points. */
 hs_status hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_box *box,
                              const hs_options *options, hs_failure *failure);
+
+/* Cells that are kept between calls. */
+struct hs_cells {
+    hs_call   call;   /* that built them; its account holds them */
+    hs_search search; /* open, never walked itself: calls borrow from it */
+    hs_points points; /* of `copy` */
+    hs_box    box;
+    bool      has_box;
+    double   *copy; /* owned; points as given, for cutoffs and queries that need other cells */
+    hs_nearest_kept *trees; /* owned; a search for the nearest needs a tree, not cells */
+};
 
 /* Lengths that distances are sorted by are fewer: twice as many are int32. */
 #define HS_MOST_LENGTHS (INT64_C(1) << 30)

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "query.h"
-#include "../search/choice.h"
 #include "../base/os.h"
 #include "../base/status.h"
 #include "../collect/components.h"
@@ -35,8 +34,8 @@ struct hs_stream {
     int         ndim;
     hs_output   held; /* pairs from `begin` on wait to be handed out */
     int64_t     begin;
-    int64_t     max_pairs;
-    hs_bookmark next; /* where to go on looking */
+    int64_t     max_pairs, enough; /* pairs of a block; that are looked for at a time */
+    hs_bookmark next;              /* where to go on looking */
 };
 
 static int64_t
@@ -79,12 +78,6 @@ copy_waiting(const hs_stream *stream, int64_t first, int64_t n, hs_output *to)
     return status;
 }
 
-static int64_t
-fill_of(const hs_stream *stream)
-{
-    return stream->max_pairs > LEAST_FILL ? stream->max_pairs : LEAST_FILL;
-}
-
 /* The pairs from `first` on in an output of their own, with room for what comes. */
 static hs_status
 move_waiting(hs_stream *stream, int64_t first, hs_output *moved)
@@ -92,7 +85,7 @@ move_waiting(hs_stream *stream, int64_t first, hs_output *moved)
     const hs_search *search = present(stream)->run.search; /* or none is left */
     const double     all = search != NULL ? search->grid.expected_pairs : 0.0;
     open_output(stream, &stream->call.account, moved);
-    hs_output_reserve_hint(moved, fmin(fmin((double)fill_of(stream), all), MOST_EXPECTED));
+    hs_output_reserve_hint(moved, fmin(fmin((double)stream->enough, all), MOST_EXPECTED));
     const hs_status status = copy_waiting(stream, first, stream->held.n_pairs - first, moved);
     if (status != HS_OK) {
         hs_output_free(moved);
@@ -118,7 +111,7 @@ fill(hs_stream *stream, hs_failure *failure)
     const int64_t before = stream->held.n_pairs;
     hs_call_gather(search->call, search->bins.n);
     const hs_status status =
-        hs_parallel_record_on(search, &stream->held, fill_of(stream), &stream->next, failure);
+        hs_parallel_record_on(search, &stream->held, stream->enough, &stream->next, failure);
     hs_call_dismiss(search->call);
     if (status != HS_OK) {
         stream->held.n_pairs = before;
@@ -201,21 +194,18 @@ hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **blo
     hs_call_set_poll(poll, context, &stream->call);
     while (status == HS_OK && waiting(stream) < stream->max_pairs && stream->n_sources > 0) {
         source *one = present(stream);
-        if (is_over(stream) && stream->at == stream->n_sources - 1 &&
-            one->n_steps == one->run.plan.n) {
-            break; /* all is found */
-        }
         one->run.failure = failure;
         if (!is_over(stream)) {
             status = fill(stream, failure);
             continue;
         }
-        /* The next search; that of another system may be open already. */
         if (one->n_steps < one->run.plan.n) {
             status = open_step(one);
-        } else {
+        } else if (stream->at < stream->n_sources - 1) { /* whose search may be open already */
             hs_query_close(&one->run);
             take_up(stream, stream->at + 1);
+        } else {
+            break; /* all is found */
         }
         stream->next = status == HS_OK ? (hs_bookmark){.point = 0} : stream->next;
     }
@@ -226,22 +216,6 @@ hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **blo
     hs_call_set_poll(NULL, NULL, &stream->call);
     hs_leave(entry);
     return status;
-}
-
-static void
-free_sources(hs_stream *stream)
-{
-    hs_call *call = &stream->call;
-    for (int64_t s = 0; s < stream->n_sources; s++) {
-        hs_query_close(&stream->sources[s].run);
-    }
-    if (stream->choice != NULL) {
-        call->choice = stream->choice;
-        hs_choice_close(call);
-    }
-    if (stream->sources != &stream->own) {
-        hs_free(&call->account, stream->sources);
-    }
 }
 
 /* Opens what the caller's arrays are needed for, of a run whose query is its system's: the one
@@ -263,7 +237,6 @@ static hs_status
 open_alone(hs_stream *stream, const hs_query *query, const hs_finder *finder, hs_failure *failure)
 {
     source *one = stream->sources = &stream->own;
-    one->n_steps = 0;
     one->system.query = *query;
     hs_status status = hs_query_open(&one->system.query, finder, &stream->call, &one->run, failure);
     stream->n_sources = 1;
@@ -323,27 +296,23 @@ hs_stream_open(const hs_among *among, const hs_options *options, int64_t max_pai
     query.options.sorted = false; /* nor has it what the caller lends for one call */
     query.options.out = NULL;
     query.options.counters = NULL;
+    memset(stream, 0, sizeof *stream);
     failure = hs_call_enter(&query.options, failure, call);
-    stream->n_sources = stream->at = stream->begin = 0;
-    stream->choice = NULL;
     stream->max_pairs = max_pairs;
-    stream->next = (hs_bookmark){.point = 0};
-    stream->sources = NULL;
+    stream->enough = max_pairs > LEAST_FILL ? max_pairs : LEAST_FILL;
     const hs_status status = query.among != NULL ? open_systems(stream, &query, &of_pairs, failure)
                                                  : open_alone(stream, &query, &of_pairs, failure);
     hs_call_tell_limit(call, status, failure);
     hs_call_leave(call, 0);
     hs_call_detach(call);
-    if (status != HS_OK) {
-        free_sources(stream);
-        hs_account_close(&call->account);
-        hs_free(NULL, stream);
-        return status;
+    if (status == HS_OK) {
+        stream->ndim = query.sets.points->ndim;
+        open_output(stream, &call->account, &stream->held);
+        *result = stream;
+    } else {
+        hs_stream_free(stream);
     }
-    stream->ndim = query.sets.points->ndim;
-    open_output(stream, &call->account, &stream->held);
-    *result = stream;
-    return HS_OK;
+    return status;
 }
 
 void
@@ -352,9 +321,19 @@ hs_stream_free(hs_stream *stream)
     if (stream == NULL) {
         return;
     }
+    hs_call *call = &stream->call;
     hs_output_free(&stream->held);
-    free_sources(stream);
-    hs_account_close(&stream->call.account);
+    for (int64_t s = 0; s < stream->n_sources; s++) {
+        hs_query_close(&stream->sources[s].run);
+    }
+    if (stream->choice != NULL) {
+        call->choice = stream->choice;
+        hs_choice_close(call);
+    }
+    if (stream->sources != &stream->own) {
+        hs_free(&call->account, stream->sources);
+    }
+    hs_account_close(&call->account);
     hs_free(NULL, stream);
 }
 
@@ -476,25 +455,24 @@ hs_pairs_visit(const hs_among *among, const hs_options *options, const hs_visit 
                           .index_bytes = 8};
     hs_finder   finder = {.step = visit_step, .context = &shared, .is_numbered = true};
     hs_counters done;
-    if (n_visited != NULL) {
-        *n_visited = 0;
-    }
-    if (n_visited == NULL || options == NULL || visit == NULL ||
-        (visit->pair == NULL && visit->pairs == NULL)) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    hs_query query = hs_query_among(among, HS_HALF_LIST, options);
+    hs_query    query = hs_query_among(among, HS_HALF_LIST, options);
+    query.is_incomplete = query.is_incomplete || n_visited == NULL || visit == NULL ||
+                          (visit->pair == NULL && visit->pairs == NULL);
     hs_query_want_none(&query);
     query.sets.keeps_none = true;
     query.options.want = shared.want;
     query.options.index_bytes = shared.index_bytes;
-    query.options.counters = options->counters != NULL ? options->counters : &done;
-    finder.one_thread = !visit->thread_safe;
+    if (query.options.counters == NULL) {
+        query.options.counters = &done;
+    }
+    finder.one_thread = !query.is_incomplete && !visit->thread_safe;
     if (finder.one_thread) {
         spare_threads(&query);
     }
     const hs_status status = hs_query_answer(&query, &finder, NULL, failure);
-    *n_visited = query.options.counters->pairs;
+    if (n_visited != NULL) {
+        *n_visited = query.options.counters->pairs;
+    }
     return status == HS_ENOUGH ? HS_OK : status;
 }
 

@@ -2,8 +2,6 @@
 #include "query.h"
 #include "../base/os.h"
 #include "../base/sort.h"
-#include "../collect/parallel.h"
-#include "../search/choice.h"
 
 #include <math.h>
 #include <string.h>

@@ -51,7 +51,7 @@ insert(uint64_t *keys, int32_t *ids, int64_t n, int from)
 }
 
 /* By two digits of keys that are less than 2^bits, above the lowest: without the branches of an
- * insertion. */
+ * insertion, with which sorted lists of 200 neighbours take 1.5 times as long. */
 static void
 sort_two_digits(uint64_t *numbers, int64_t n, int from, uint64_t lowest, int bits, uint64_t *spare)
 {

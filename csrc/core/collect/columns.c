@@ -62,7 +62,11 @@ hs_output_check_opposites(const hs_output *output, hs_failure *failure)
 {
     const int32_t *shift = hs_output_column(output, HS_WANT_SHIFT);
     const int32_t *j = hs_output_column(output, HS_WANT_J);
+    int32_t        least = 0;
     for (int64_t e = 0; shift != NULL && e < output->n_pairs * output->ndim; e++) {
+        least = shift[e] < least ? shift[e] : least;
+    }
+    for (int64_t e = 0; least == INT32_MIN; e++) {
         if (shift[e] == INT32_MIN) {
             failure->row = j[e / output->ndim];
             return HS_ERR_SHIFT_RANGE;

@@ -7,174 +7,108 @@
 #include <string.h>
 
 /*
- * sort_pairs.c: a counting sort by i, then each point's few pairs by (j, S). A pair is one number
- * while it is sorted, j before its place, so that nothing is looked up but the S of images of one
- * pair, which is one number too as a rule. deal_out is the counting sort; then threads put rows in
- * order and write them.
+ * sort_pairs.c: a counting sort by j, then one by i, which keeps that order; where few pairs have
+ * numbers j far apart, the sort by i alone, then each row by itself. Images of one pair are sorted
+ * by S. A pair is one number meanwhile, its place behind j or i, so that nothing is looked up but
+ * the S of images. deal_out makes the rows; then threads write them.
  */
 
-HS_ALWAYS_INLINE uint64_t
-place_of(const hs_sorting *all, uint64_t entry)
-{
-    return all->has_j ? entry & ((UINT64_C(1) << all->place_bits) - 1) : entry;
-}
-
-HS_ALWAYS_INLINE bool
-is_turned(const hs_sorting *all, uint64_t entry)
-{
-    return all->both_ways && entry % 2 != 0;
-}
+/*
+ * What is put in order. An entry is the place of a pair among those found and, where both fit into
+ * 64 bits, as they do up to 2^33 entries, a number in front of that. With both ways, a place is
+ * twice that, and one more for (j, i, -S).
+ */
+typedef struct sorting {
+    hs_call         *call;
+    const hs_output *found;
+    const int32_t   *i, *j, *shift; /* its columns; shift NULL where it is not kept */
+    int32_t          first_point;
+    int64_t          n_rows;
+    int              both_ways;  /* 0 or 1 */
+    bool             has_number; /* in front of the place */
+    int              place_bits;
+    uint64_t         place_mask;
+    bool             ascends;   /* rows were dealt in the order of j */
+    int64_t          n_entries; /* of all rows */
+    int64_t          longest;   /* row that is still to be sorted, or whose images are */
+    int64_t         *end;       /* n_rows; end[i - first_point]: where row i ends */
+    uint64_t        *entries;   /* of each row together, j in front; ascending in the end */
+} sorting;
 
 /* The pair of an entry, among those found. */
 HS_ALWAYS_INLINE int64_t
-pair_of(const hs_sorting *all, uint64_t entry)
+pair_of(const sorting *all, uint64_t entry)
 {
-    return (int64_t)(place_of(all, entry) >> all->both_ways);
+    return (int64_t)((entry & all->place_mask) >> all->both_ways);
 }
 
-HS_ALWAYS_INLINE int32_t
-second_of(const hs_sorting *all, uint64_t entry)
+/* 1 if it is (j, i, -S), else 0. */
+HS_ALWAYS_INLINE int
+is_turned(const sorting *all, uint64_t entry)
 {
-    if (all->has_j) {
+    return (int)entry & all->both_ways;
+}
+
+/* The number in front of the place of an entry: j; or i, where that is looked for. */
+HS_ALWAYS_INLINE int32_t
+number_of(const sorting *all, uint64_t entry, bool is_i)
+{
+    if (all->has_number) {
         return (int32_t)(entry >> all->place_bits);
     }
-    return is_turned(all, entry) ? all->i[pair_of(all, entry)] : all->j[pair_of(all, entry)];
+    return (is_turned(all, entry) != is_i ? all->i : all->j)[pair_of(all, entry)];
 }
 
-/* Component k of S; -S wraps around, which orders images no less. */
+/* Component k of S, or of -S, where the least int32 stays what it is. */
 HS_ALWAYS_INLINE int32_t
-shift_of(const hs_sorting *all, uint64_t entry, int k)
+shift_of(const sorting *all, uint64_t entry, int k)
 {
     const int32_t shift = all->shift[pair_of(all, entry) * all->found->ndim + k];
     return is_turned(all, entry) ? (int32_t)(0u - (uint32_t)shift) : shift;
 }
 
 HS_ALWAYS_INLINE uint64_t
-entry_of(const hs_sorting *all, int32_t j, int64_t place)
+entry_of(const sorting *all, int32_t number, uint64_t place)
 {
-    return all->has_j ? (uint64_t)j << all->place_bits | (uint64_t)place : (uint64_t)place;
+    return all->has_number ? (uint64_t)number << all->place_bits | place : place;
 }
 
 /* The entry that a row begins at. */
 HS_ALWAYS_INLINE int64_t
-row_begin(const hs_sorting *all, int64_t row)
+row_begin(const sorting *all, int64_t row)
 {
     return row > 0 ? all->end[row - 1] : 0;
 }
 
-/* Pairs of two points that insertion sorts in less time than a heap. */
-#define FEW 48
-
-static bool
-is_before(const hs_sorting *all, uint64_t a, uint64_t b)
-{
-    const int32_t ja = second_of(all, a), jb = second_of(all, b);
-    if (ja != jb) {
-        return ja < jb;
-    }
-    for (int k = 0; all->shift != NULL && k < all->found->ndim; k++) {
-        const int32_t sa = shift_of(all, a, k), sb = shift_of(all, b, k);
-        if (sa != sb) {
-            return sa < sb;
-        }
-    }
-    return false;
-}
-
+/* Sorts n images of one pair by S, its last component first: each sort keeps the order of those
+ * that agree. spare: room for 2 n numbers. */
 static void
-sift_down(const hs_sorting *all, uint64_t *heap, int64_t root, int64_t n)
+sort_images(const sorting *all, uint64_t *row, int64_t n, uint64_t *spare)
 {
-    const uint64_t moving = heap[root];
-    for (int64_t child; (child = 2 * root + 1) < n; root = child) {
-        if (child + 1 < n && is_before(all, heap[child], heap[child + 1])) {
-            child++;
+    uint64_t *keys = spare + n;
+    for (int k = all->found->ndim; k-- > 0;) {
+        for (int64_t e = 0; e < n; e++) {
+            const uint32_t shift = (uint32_t)shift_of(all, row[e], k) ^ UINT32_C(0x80000000);
+            keys[e] = (uint64_t)shift << 32 | (uint64_t)e;
         }
-        if (!is_before(all, moving, heap[child])) {
-            break;
+        hs_sort_numbers(keys, n, 32, spare);
+        memcpy(spare, row, (size_t)n * sizeof *row);
+        for (int64_t e = 0; e < n; e++) {
+            row[e] = spare[(uint32_t)keys[e]];
         }
-        heap[root] = heap[child];
     }
-    heap[root] = moving;
 }
 
-/* Sorts by (j, S), whatever these are: insertion sort for a few, heap sort for a crowd. */
+/* Puts n entries of one row in the order of (j, S). spare: room for twice as many. */
 static void
-sort_any(const hs_sorting *all, uint64_t *row, int64_t n)
+sort_row(const sorting *all, uint64_t *row, int64_t n, uint64_t *spare)
 {
-    if (n <= FEW) {
-        for (int64_t e = 1; e < n; e++) {
-            const uint64_t moving = row[e];
-            int64_t        at = e;
-            for (; at > 0 && is_before(all, moving, row[at - 1]); at--) {
-                row[at] = row[at - 1];
-            }
-            row[at] = moving;
-        }
-        return;
+    if (!all->ascends) {
+        hs_sort_numbers(row, n, all->place_bits, spare);
     }
-    for (int64_t root = n / 2; root-- > 0;) {
-        sift_down(all, row, root, n);
-    }
-    for (int64_t end = n - 1; end > 0; end--) {
-        const uint64_t largest = row[0];
-        row[0] = row[end];
-        row[end] = largest;
-        sift_down(all, row, 0, end);
-    }
-}
-
-/* S as one number that orders images; false where it does not fit. */
-static bool
-image_key(const hs_sorting *all, uint64_t entry, uint64_t *key)
-{
-    const int     d = all->found->ndim, width = d > 1 ? 64 / d : 32;
-    const int64_t middle = INT64_C(1) << (width - 1);
-    *key = 0;
-    for (int k = 0; k < d; k++) {
-        const int64_t shift = shift_of(all, entry, k) + middle;
-        if (shift < 0 || shift >> width != 0) {
-            return false;
-        }
-        *key = *key << width | (uint64_t)shift;
-    }
-    return true;
-}
-
-/* Sorts pairs of two points by S. */
-static void
-sort_images(const hs_sorting *all, uint64_t *row, int64_t n, uint64_t *keys)
-{
-    bool fit = n <= FEW;
-    for (int64_t e = 0; e < n && fit; e++) {
-        fit = image_key(all, row[e], &keys[e]);
-    }
-    for (int64_t e = 1; e < n && fit; e++) {
-        const uint64_t moving = row[e], key = keys[e];
-        int64_t        at = e;
-        for (; at > 0 && keys[at - 1] > key; at--) {
-            row[at] = row[at - 1];
-            keys[at] = keys[at - 1];
-        }
-        row[at] = moving;
-        keys[at] = key;
-    }
-    if (!fit) {
-        sort_any(all, row, n);
-    }
-}
-
-/* Puts n entries of one row in the order of (j, S). spare: room for as many. */
-static void
-hs_sort_row(const hs_sorting *all, uint64_t *row, int64_t n, uint64_t *spare)
-{
-    if (!all->has_j) {
-        sort_any(all, row, n);
-        return;
-    }
-    hs_sort_numbers(row, n, all->place_bits, spare);
     for (int64_t first = 0, end; all->shift != NULL && first < n; first = end) {
-        const uint64_t j = row[first] >> all->place_bits;
-        for (end = first + 1; end < n && row[end] >> all->place_bits == j;) {
+        const int32_t j = number_of(all, row[first], false);
+        for (end = first + 1; end < n && number_of(all, row[end], false) == j;) {
             end++;
         }
         if (end - first > 1) {
@@ -183,14 +117,14 @@ hs_sort_row(const hs_sorting *all, uint64_t *row, int64_t n, uint64_t *spare)
     }
 }
 
-/* The first row that begins at this entry or behind it. */
+/* The first of n rows, which end there, that begins at this entry or behind it. */
 static int64_t
-row_from(const hs_sorting *all, int64_t entry)
+row_from(const int64_t *ends, int64_t n, int64_t entry)
 {
-    int64_t first = 0, end = all->n_points;
+    int64_t first = 0, end = n;
     while (first < end) {
         const int64_t middle = first + (end - first) / 2;
-        if (row_begin(all, middle) < entry) {
+        if ((middle > 0 ? ends[middle - 1] : 0) < entry) {
             first = middle + 1;
         } else {
             end = middle;
@@ -199,10 +133,15 @@ row_from(const hs_sorting *all, int64_t entry)
     return first;
 }
 
-/* Two passes over the pairs. Threads count strips of them, each strip the pairs of
- * every row; the sums say where those of each strip go, and then they are dealt out at once. */
+/* Threads count strips of what is dealt, each strip the entries of every row; the sums say where
+ * those of each strip go, and then they are dealt out at once. */
 
-#define STRIP_PAIRS (INT64_C(1) << 15) /* of a strip, at least: fewer are no work for a thread */
+/* Pairs of a strip, at least: fewer are no work for a thread. */
+#define STRIP_PAIRS (INT64_C(1) << 15)
+
+/* Numbers j for each entry, and so many more, beyond which pairs are not dealt by j. */
+#define MOST_APART 4
+#define ALSO_APART 64
 
 #ifdef HS_TESTING
 static int most_place_bits = 63;
@@ -218,123 +157,203 @@ hs_test_sort_place_bits(int bits)
 enum { most_place_bits = 63 };
 #endif
 
-/* Two passes over the pairs, by strips that each have numbers of their own for each row. */
-typedef struct strips {
-    hs_sorting *all;
-    int         n;
-    int64_t    *next[HS_SLABS]; /* how many, then the place of the next; the last are all->end */
-    int32_t     any[HS_SLABS];  /* the bits of all numbers j */
-} strips;
+/* A counting sort of pairs, by one of their two numbers, from `least` on; or of entries that have
+ * been sorted by j before, by i. */
+typedef struct dealing {
+    const sorting  *all;
+    const int32_t  *key, *other; /* of pairs; the other is put in front of their places */
+    const uint64_t *from;        /* NULL, or the entries by j ... */
+    const int64_t  *from_end;    /* ... from its least on, where those of each end */
+    uint64_t       *to;          /* the rows */
+    int32_t         least, from_least;
+    int64_t         n_from; /* numbers from from_least on */
+    int64_t         n_rows;
+    int             n_strips;
+    int64_t        *next[HS_SLABS]; /* how many, then the place of the next */
+} dealing;
 
 /* A hs_slab_fn. */
 static hs_status
 count_strip(void *context, int strip, int64_t first, int64_t last)
 {
-    strips           *doing = context;
-    const hs_sorting *all = doing->all;
-    int64_t          *counts = doing->next[strip];
-    int32_t           any = 0;
-    for (int64_t p = first; p < last; p++) {
-        counts[all->i[p] - all->first_point]++;
-        any |= all->j[p];
-        if (all->both_ways) {
-            counts[all->j[p] - all->first_point]++;
-            any |= all->i[p];
+    const dealing  *deal = context;
+    const sorting   all = *deal->all;
+    const int32_t  *key = deal->key, *other = deal->other;
+    const uint64_t *from = deal->from;
+    const int32_t   least = deal->least;
+    int64_t        *counts = deal->next[strip];
+    for (int64_t e = first; from != NULL && e < last; e++) {
+        counts[number_of(&all, from[e], true) - least]++;
+    }
+    for (int64_t p = first; from == NULL && p < last; p++) {
+        counts[key[p] - least]++;
+        if (all.both_ways) {
+            counts[other[p] - least]++;
         }
     }
-    doing->any[strip] |= any;
     return HS_OK;
 }
 
-/* From numbers of pairs to places: row by row, and in each row strip by strip. */
-static void
-accumulate(const strips *doing)
-{
-    hs_sorting *all = doing->all;
-    int64_t     place = 0;
-    int32_t     any = 0;
-    for (int64_t row = 0; row < all->n_points; row++) {
-        const int64_t begin = place;
-        for (int strip = 0; strip < doing->n; strip++) {
-            const int64_t count = doing->next[strip][row];
-            doing->next[strip][row] = place;
-            place += count;
-        }
-        all->longest = place - begin > all->longest ? place - begin : all->longest;
-    }
-    for (int strip = 0; strip < doing->n; strip++) {
-        any |= doing->any[strip];
-    }
-    HS_ASSERT(place == all->n);
-    all->place_bits = 64 - hs_count_bits((uint64_t)any | 1);
-    all->has_j =
-        all->n >> (all->place_bits < most_place_bits ? all->place_bits : most_place_bits) == 0;
-}
-
-/* A hs_slab_fn: puts the entries in rows. */
+/* A hs_slab_fn: puts entries in rows. */
 static hs_status
 deal_strip(void *context, int strip, int64_t first, int64_t last)
 {
-    const strips     *doing = context;
-    const hs_sorting *all = doing->all;
-    int64_t          *next = doing->next[strip];
-    for (int64_t p = first; p < last; p++) {
-        const int32_t i = all->i[p], j = all->j[p];
-        if (all->both_ways) {
-            all->entries[next[i - all->first_point]++] = entry_of(all, j, 2 * p);
-            all->entries[next[j - all->first_point]++] = entry_of(all, i, 2 * p + 1);
-        } else {
-            all->entries[next[i - all->first_point]++] = entry_of(all, j, p);
+    const dealing  *deal = context;
+    const sorting   all = *deal->all;
+    const int32_t  *key = deal->key, *other = deal->other;
+    const uint64_t *from = deal->from;
+    const int32_t   least = deal->least;
+    int64_t        *next = deal->next[strip];
+    uint64_t       *to = deal->to;
+    if (from != NULL) {
+        int64_t row = row_from(deal->from_end, deal->n_from, first + 1) - 1;
+        for (int64_t e = first; e < last; row++) {
+            const int32_t j = deal->from_least + (int32_t)row;
+            const int64_t end = deal->from_end[row] < last ? deal->from_end[row] : last;
+            for (; e < end; e++) {
+                const uint64_t entry = from[e];
+                to[next[number_of(&all, entry, true) - least]++] =
+                    entry_of(&all, j, entry & all.place_mask);
+            }
         }
+        return HS_OK;
+    }
+    for (int64_t p = first; all.both_ways && p < last; p++) {
+        const int32_t a = key[p], b = other[p];
+        to[next[a - least]++] = entry_of(&all, b, (uint64_t)p * 2);
+        to[next[b - least]++] = entry_of(&all, a, (uint64_t)p * 2 + 1);
+    }
+    for (int64_t p = first; !all.both_ways && p < last; p++) {
+        to[next[key[p] - least]++] = entry_of(&all, other[p], (uint64_t)p);
     }
     return HS_OK;
 }
 
-/* Strips for this team: each with pairs enough, and no more further numbers than pairs. */
+/* Strips of n_items for this team: each with enough, and no more further numbers than items. */
 static int
-choose_strips(const hs_sorting *all)
+choose_strips(const dealing *deal, int64_t n_items)
 {
-    const int64_t n_pairs = all->found->n_pairs;
-    const int     size = hs_team_size(all->call->team);
-    int           n = size < HS_SLABS ? size : HS_SLABS;
-    while (n > 1 && (n_pairs < n * STRIP_PAIRS || (n - 1) * all->n_points > n_pairs)) {
+    const int size = hs_team_size(deal->all->call->team);
+    int       n = size < HS_SLABS ? size : HS_SLABS;
+    while (n > 1 && (n_items < n * STRIP_PAIRS || (n - 1) * deal->n_rows > n_items)) {
         n--;
     }
     return n;
 }
 
-/* Sets end, n, longest, has_j, place_bits and entries, which the caller frees, also on failure: the
- * entries of each row together, in no order yet. i, j and what describes the pairs are there
- * already. */
+/* Sorts n_items. end: receives where each row ends. */
 static hs_status
-deal_out(hs_sorting *all)
+deal_rows(dealing *deal, int64_t n_items, int64_t *end)
 {
-    hs_call      *call = all->call;
+    hs_call  *call = deal->all->call;
+    int64_t  *others = NULL, place = 0;
+    hs_status status = HS_OK;
+    deal->n_strips = choose_strips(deal, n_items);
+    if (deal->n_strips > 1) { /* without memory for these there is one strip */
+        others = hs_alloc(&call->account, HS_FOR_SORTING, (deal->n_strips - 1) * deal->n_rows,
+                          sizeof *others);
+        deal->n_strips = others == NULL ? 1 : deal->n_strips;
+    }
+    for (int strip = 0; strip < deal->n_strips; strip++) {
+        deal->next[strip] = strip == deal->n_strips - 1 ? end : others + strip * deal->n_rows;
+        memset(deal->next[strip], 0, (size_t)deal->n_rows * sizeof *end);
+    }
+    /* With both ways there are as many by i as by j. */
+    if (deal->from != NULL && deal->all->both_ways && deal->n_strips == 1) {
+        for (int64_t row = 0; row < deal->n_rows; row++) {
+            end[row] = deal->from_end[row] - (row > 0 ? deal->from_end[row - 1] : 0);
+        }
+    } else {
+        status =
+            hs_walk_strips(call->team, &call->options, n_items, deal->n_strips, count_strip, deal);
+    }
+    for (int64_t row = 0; row < deal->n_rows; row++) { /* from counts to places, row by row */
+        for (int strip = 0; strip < deal->n_strips; strip++) {
+            const int64_t count = deal->next[strip][row];
+            deal->next[strip][row] = place;
+            place += count;
+        }
+    }
+    if (status == HS_OK) {
+        status =
+            hs_walk_strips(call->team, &call->options, n_items, deal->n_strips, deal_strip, deal);
+    }
+    hs_free(&call->account, others);
+    return status;
+}
+
+/* Sets the least of all j, and returns the number from it to the largest. */
+static int64_t
+range_of_second(const sorting *all, int32_t *least)
+{
     const int64_t n_pairs = all->found->n_pairs;
-    const size_t  size = (size_t)all->n_points * sizeof *all->end;
-    strips        doing = {.all = all, .n = choose_strips(all)};
-    int64_t      *others = NULL;
-    all->n = all->both_ways ? 2 * n_pairs : n_pairs;
-    all->entries = hs_alloc(&call->account, HS_FOR_SORTING, all->n, sizeof *all->entries);
+    int32_t       lowest = INT32_MAX, highest = 0;
+    if (all->both_ways || n_pairs == 0) {
+        *least = all->first_point;
+        return all->n_rows;
+    }
+    for (int64_t p = 0; p < n_pairs; p++) {
+        lowest = all->j[p] < lowest ? all->j[p] : lowest;
+        highest = all->j[p] > highest ? all->j[p] : highest;
+    }
+    *least = lowest;
+    return (int64_t)highest - lowest + 1;
+}
+
+/* Finds the entries of each row, which the caller frees, also on failure; sets all members but
+ * those of the pairs found and of the rows. */
+static hs_status
+deal_out(sorting *all)
+{
+    hs_account   *account = &all->call->account;
+    const int64_t n_pairs = all->found->n_pairs;
+    int32_t       least;
+    const int64_t n_seconds = range_of_second(all, &least), most_i = all->first_point + all->n_rows;
+    const int64_t most = least + n_seconds > most_i ? least + n_seconds : most_i;
+    dealing       by_i = {.all = all,
+                          .key = all->i,
+                          .other = all->j,
+                          .least = all->first_point,
+                          .n_rows = all->n_rows};
+    dealing       by_j = {
+              .all = all, .key = all->j, .other = all->i, .least = least, .n_rows = n_seconds};
+    int64_t  *end = NULL;
+    hs_status status = HS_OK;
+    all->n_entries = n_pairs << all->both_ways;
+    all->place_bits = 64 - hs_count_bits((uint64_t)most | 1);
+    all->has_number = all->n_entries >>
+                          (all->place_bits < most_place_bits ? all->place_bits : most_place_bits) ==
+                      0;
+    all->place_mask = all->has_number ? (UINT64_C(1) << all->place_bits) - 1 : UINT64_MAX;
+    all->entries = hs_alloc(account, HS_FOR_SORTING, all->n_entries, sizeof *all->entries);
     if (all->entries == NULL) {
         return HS_ERR_MEMORY;
     }
-    if (doing.n > 1) { /* last: without memory for these there is one strip */
-        others =
-            hs_alloc(&call->account, HS_FOR_SORTING, (doing.n - 1) * all->n_points, sizeof *others);
-        doing.n = others == NULL ? 1 : doing.n;
+    by_i.to = all->entries;
+    if (n_seconds <= MOST_APART * all->n_entries + ALSO_APART || !all->has_number) {
+        by_j.to = hs_alloc(account, HS_FOR_SORTING, all->n_entries, sizeof *by_j.to);
+        end = hs_alloc(account, HS_FOR_SORTING, n_seconds, sizeof *end);
+        all->ascends = by_j.to != NULL && end != NULL;
     }
-    for (int strip = 0; strip < doing.n; strip++) {
-        doing.next[strip] = strip == doing.n - 1 ? all->end : others + strip * all->n_points;
-        memset(doing.next[strip], 0, size);
+    if (!all->ascends && !all->has_number) { /* otherwise it is done row by row */
+        status = HS_ERR_MEMORY;
+    } else if (all->ascends) {
+        status = deal_rows(&by_j, n_pairs, end);
+        by_i.from = by_j.to;
+        by_i.from_end = end;
+        by_i.from_least = least;
+        by_i.n_from = n_seconds;
     }
-    hs_status status =
-        hs_walk_strips(call->team, &call->options, n_pairs, doing.n, count_strip, &doing);
     if (status == HS_OK) {
-        accumulate(&doing);
-        status = hs_walk_strips(call->team, &call->options, n_pairs, doing.n, deal_strip, &doing);
+        status = deal_rows(&by_i, all->ascends ? all->n_entries : n_pairs, all->end);
     }
-    hs_free(&call->account, others);
+    const bool is_done = status != HS_OK || (all->ascends && all->shift == NULL);
+    for (int64_t row = 0; !is_done && row < all->n_rows; row++) {
+        const int64_t n = all->end[row] - row_begin(all, row);
+        all->longest = n > all->longest ? n : all->longest;
+    }
+    hs_free(account, by_j.to);
+    hs_free(account, end);
     return status;
 }
 
@@ -349,67 +368,82 @@ hs_sort_columns(const hs_search *search)
     return wanted | HS_WANT_I | HS_WANT_J | (hs_search_repeats_images(search) ? HS_WANT_SHIFT : 0);
 }
 
-/* The other quantities of n entries, at most PUT. */
-static void
-put_measures(const hs_sorting *all, const uint64_t *entries, int64_t n, hs_output *sorted)
+/* S and D of n entries, of d components each; turned: 1 or 0. Inlined with a constant for d. */
+HS_ALWAYS_INLINE void
+put_components(const sorting *all, const int64_t *pair, const int32_t *turned, int64_t n, int d,
+               hs_output *sorted)
 {
-    const int      d = all->found->ndim;
-    const double  *distances = hs_output_column(all->found, HS_WANT_DISTANCE);
-    const double  *vectors = hs_output_column(all->found, HS_WANT_VECTOR);
-    double        *distance = hs_output_next(sorted, HS_WANT_DISTANCE);
-    double        *vector = hs_output_next(sorted, HS_WANT_VECTOR);
-    int32_t       *shift = hs_output_next(sorted, HS_WANT_SHIFT);
-    int32_t       *shell = hs_output_next(sorted, HS_WANT_SHELL);
-    const int32_t *shells = hs_output_column(all->found, HS_WANT_SHELL);
-    for (int64_t e = 0; e < n && distance != NULL; e++) {
-        distance[e] = distances[pair_of(all, entries[e])];
-    }
-    for (int64_t e = 0; e < n && shell != NULL; e++) {
-        shell[e] = shells[pair_of(all, entries[e])];
-    }
+    const double        *vectors = hs_output_column(all->found, HS_WANT_VECTOR);
+    const int32_t       *shifts = all->shift;
+    double *HS_RESTRICT  vector = hs_output_next(sorted, HS_WANT_VECTOR);
+    int32_t *HS_RESTRICT shift = hs_output_next(sorted, HS_WANT_SHIFT);
     for (int64_t e = 0; e < n && vector != NULL; e++) {
-        const double *from = vectors + pair_of(all, entries[e]) * d;
-        const bool    turned = is_turned(all, entries[e]);
         for (int k = 0; k < d; k++) {
-            *vector++ = turned ? -from[k] + 0.0 : from[k]; /* a zero has no sign */
+            const double component = vectors[pair[e] * d + k];
+            vector[e * d + k] = (turned[e] ? -component : component) + 0.0; /* no -0.0 */
         }
     }
     for (int64_t e = 0; e < n && shift != NULL; e++) {
         for (int k = 0; k < d; k++) {
-            *shift++ = shift_of(all, entries[e], k);
+            const uint32_t minus = 0u - (uint32_t)turned[e];
+            shift[e * d + k] = (int32_t)(((uint32_t)shifts[pair[e] * d + k] ^ minus) - minus);
         }
     }
 }
 
-/* The next n entries, of row *row and those behind it. */
+/* The next n entries, at most PUT, of row *row and those behind it. */
 static void
-put_some(const hs_sorting *all, int64_t first, int64_t n, int64_t *row, hs_output *sorted)
+put_some(const sorting *rows, int64_t first, int64_t n, int64_t *row, hs_output *sorted)
 {
-    const uint64_t *entries = all->entries + first;
-    const int       bytes = sorted->index_bytes;
-    char           *both = hs_output_next(sorted, HS_WANT_BOTH);
-    int32_t         i[PUT], j[PUT];
-    for (int64_t e = 0; e < n; e++) {
-        while (all->end[*row] <= first + e) {
+    const sorting        all = *rows;
+    const uint64_t      *entries = all.entries + first;
+    const int            bytes = sorted->index_bytes, d = all.found->ndim;
+    const double        *distances = hs_output_column(all.found, HS_WANT_DISTANCE);
+    const int32_t       *shells = hs_output_column(all.found, HS_WANT_SHELL);
+    char                *both = hs_output_next(sorted, HS_WANT_BOTH);
+    double *HS_RESTRICT  distance = hs_output_next(sorted, HS_WANT_DISTANCE);
+    int32_t *HS_RESTRICT shell = hs_output_next(sorted, HS_WANT_SHELL);
+    const bool           has_i = sorted->columns & (HS_WANT_I | HS_WANT_BOTH);
+    int32_t              i[PUT], j[PUT], turned[PUT];
+    int64_t              pair[PUT];
+    for (int64_t e = 0; has_i && e < n;) { /* rows may be empty */
+        while (all.end[*row] <= first + e) {
             ++*row;
         }
-        i[e] = all->first_point + (int32_t)*row;
-        j[e] = second_of(all, entries[e]);
+        const int64_t left = all.end[*row] - first;
+        for (const int64_t end = left < n ? left : n; e < end; e++) {
+            i[e] = all.first_point + (int32_t)*row;
+        }
+    }
+    for (int64_t e = 0; e < n; e++) {
+        pair[e] = pair_of(&all, entries[e]);
+        turned[e] = is_turned(&all, entries[e]);
+        j[e] = number_of(&all, entries[e], false);
     }
     hs_put_indices(hs_output_next(sorted, HS_WANT_I), bytes, 1, i, 1, n);
     hs_put_indices(hs_output_next(sorted, HS_WANT_J), bytes, 1, j, 1, n);
     hs_put_indices(both, bytes, 2, i, 1, n);
     hs_put_indices(both == NULL ? NULL : both + bytes, bytes, 2, j, 1, n);
-    put_measures(all, entries, n, sorted);
+    for (int64_t e = 0; e < n && distance != NULL; e++) {
+        distance[e] = distances[pair[e]];
+    }
+    for (int64_t e = 0; e < n && shell != NULL; e++) {
+        shell[e] = shells[pair[e]];
+    }
+    if (d == 3) {
+        put_components(rows, pair, turned, n, 3, sorted);
+    } else {
+        put_components(rows, pair, turned, n, d, sorted);
+    }
     sorted->n_pairs += n;
 }
 
 /* Rows are put in order and written. */
 typedef struct row_job {
-    const hs_sorting *all;
-    hs_output        *sorted;
-    int64_t           before; /* pairs that it has already */
-    int64_t           n_ranges;
+    const sorting *all;
+    hs_output     *sorted;
+    int64_t        before; /* pairs that it has already */
+    int64_t        n_ranges;
 } row_job;
 
 /* What one thread works with. */
@@ -436,20 +470,20 @@ note_work(worker *me, int64_t entries)
 static hs_status
 do_range(void *context, int64_t range)
 {
-    worker           *me = context;
-    const hs_sorting *all = me->job->all;
-    const int64_t     first_row = row_from(all, range * RANGE_ENTRIES);
-    const int64_t     end_row = row_from(all, (range + 1) * RANGE_ENTRIES);
-    const int64_t     begin = row_begin(all, first_row);
-    const int64_t     end = row_begin(all, end_row);
-    hs_status         status = HS_OK;
+    worker        *me = context;
+    const sorting *all = me->job->all;
+    const int64_t  first_row = row_from(all->end, all->n_rows, range * RANGE_ENTRIES);
+    const int64_t  end_row = row_from(all->end, all->n_rows, (range + 1) * RANGE_ENTRIES);
+    const int64_t  begin = row_begin(all, first_row);
+    const int64_t  end = row_begin(all, end_row);
+    hs_status      status = HS_OK;
     me->sorted.n_pairs = me->job->before + begin;
     if (all->call->team != NULL) { /* before the ranges behind this one write to its last pages */
         hs_output_touch(&me->sorted, me->sorted.n_pairs, end - begin);
     }
     for (int64_t row = first_row; row < end_row && status == HS_OK; row++) {
         const int64_t first = row_begin(all, row), n = all->end[row] - first;
-        hs_sort_row(all, all->entries + first, n, me->spare);
+        sort_row(all, all->entries + first, n, me->spare);
         status = note_work(me, n);
     }
     for (int64_t first = begin, row = first_row; first < end && status == HS_OK; first += PUT) {
@@ -468,8 +502,9 @@ open_worker(void *context, void *place)
     hs_call *call = job->all->call;
     me->job = job;
     me->sorted = *job->sorted;
-    me->spare = hs_alloc(&call->account, HS_FOR_SORTING, job->all->longest, sizeof *me->spare);
-    return me->spare != NULL ? HS_OK : HS_ERR_MEMORY;
+    me->spare = hs_alloc(&call->account, HS_FOR_SORTING, 2 * job->all->longest, sizeof *me->spare);
+    /* In a row, images are told apart by 32 bits. */
+    return me->spare != NULL && job->all->longest <= UINT32_MAX ? HS_OK : HS_ERR_MEMORY;
 }
 
 static void
@@ -485,7 +520,7 @@ do_ranges(row_job *job)
     hs_call *call = job->all->call;
     /* Each thread has room for the longest row: where that is much of all, one thread sorts. */
     if (call->team != NULL && job->n_ranges > 1 &&
-        job->all->longest <= job->all->n / hs_team_size(call->team)) {
+        job->all->longest <= job->all->n_entries / hs_team_size(call->team)) {
         hs_failure ignored;
         hs_crew    crew = {.call = call,
                            .job = job,
@@ -507,20 +542,20 @@ do_ranges(row_job *job)
 
 /* Once all entries are in their rows. */
 static hs_status
-put_all(const hs_sorting *all, hs_output *sorted)
+put_all(const sorting *all, hs_output *sorted)
 {
-    if (sorted->fixed && all->n > sorted->capacity) {
-        sorted->n_pairs = all->n; /* tells hs_pairs_conclude that they do not fit */
+    if (sorted->fixed && all->n_entries > sorted->capacity) {
+        sorted->n_pairs = all->n_entries; /* tells hs_pairs_conclude that they do not fit */
         return HS_OK;
     }
     row_job   job = {.all = all,
                      .sorted = sorted,
                      .before = sorted->n_pairs,
-                     .n_ranges = (all->n + RANGE_ENTRIES - 1) / RANGE_ENTRIES};
-    hs_status status = sorted->fixed ? HS_OK : hs_output_reserve(sorted, all->n, 1.0);
+                     .n_ranges = (all->n_entries + RANGE_ENTRIES - 1) / RANGE_ENTRIES};
+    hs_status status = sorted->fixed ? HS_OK : hs_output_reserve(sorted, all->n_entries, 1.0);
     if (status == HS_OK) {
         status = do_ranges(&job);
-        sorted->n_pairs += status == HS_OK ? all->n : 0;
+        sorted->n_pairs += status == HS_OK ? all->n_entries : 0;
     }
     return status;
 }
@@ -539,14 +574,14 @@ hs_sort_pairs(hs_call *call, int32_t first_point, int64_t n_rows, const hs_outpu
               bool both_ways, int64_t *offsets, hs_output *sorted)
 {
     hs_options *options = &call->options, callers = *options;
-    hs_sorting  all = {.call = call,
+    sorting     all = {.call = call,
                        .first_point = first_point,
-                       .n_points = n_rows,
+                       .n_rows = n_rows,
                        .found = found,
                        .i = hs_output_column(found, HS_WANT_I),
                        .j = hs_output_column(found, HS_WANT_J),
                        .shift = hs_output_column(found, HS_WANT_SHIFT),
-                       .both_ways = both_ways,
+                       .both_ways = both_ways ? 1 : 0,
                        .end = offsets};
     hs_status   status = HS_OK;
     if (callers.poll != NULL) {

@@ -8,25 +8,6 @@
 
 /* sort_pairs.h: the ascending order of pairs. */
 
-/*
- * What is put in order. An entry is the place of a pair among those found and, where both fit into
- * 64 bits, as they do up to 2^33 pairs, its j in front of that. With both ways, a place is twice
- * that, and one more for (j, i, -S).
- */
-typedef struct hs_sorting {
-    hs_call         *call;
-    const hs_output *found;
-    const int32_t   *i, *j, *shift; /* its columns; shift NULL where it is not kept */
-    int32_t          first_point;
-    int64_t          n_points;
-    bool             both_ways;
-    bool             has_j; /* in front of the place */
-    int              place_bits;
-    int64_t          n, longest; /* entries, of all rows and of one */
-    int64_t         *end;        /* n_points; end[i - first_point]: where row i ends */
-    uint64_t        *entries;    /* ascending in the end */
-} hs_sorting;
-
 #ifdef HS_TESTING
 /* How many bits a place may have at most. Returns what it was before. */
 int hs_test_sort_place_bits(int bits);

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "connectivity.h"
+#include "../api/query.h"
 #include "../collect/sort_pairs.h"
 #include "../base/sort.h"
 #include "../base/os.h"
 
 #include <string.h>
 
-/* connectivity.c: which node each point is, half lists, rows of nodes and the pairs in them, and
- * what is left of rows when nodes go. */
+/* connectivity.c: which node each point is, half lists, rows of nodes and the pairs in them, of a
+ * search or of a half list, and what is left of rows when nodes go. */
 
 /* Entries between two calls of poll(). */
 #define POLL_ENTRIES (INT64_C(1) << 21)
@@ -115,12 +116,11 @@ hs_half_list_columns(const hs_output *half)
                           .ndim = half->ndim};
 }
 
-/* An empty output of I, J and, where there are shifts, S. */
-static void
-half_list_init(hs_account *account, bool has_shift, int ndim, hs_output *half)
+void
+hs_links_init(hs_account *account, unsigned columns, bool has_shift, int ndim, hs_output *links)
 {
-    const unsigned shift = has_shift ? (unsigned)HS_WANT_SHIFT : 0u;
-    hs_output_init(account, has_shift ? ndim : 1, HS_WANT_I | HS_WANT_J | shift, 4, half);
+    columns |= has_shift ? (unsigned)HS_WANT_SHIFT : 0u;
+    hs_output_init(account, has_shift ? ndim : 1, columns, 4, links);
 }
 
 /* Whether pair e is one of n points and comes behind the one before. */
@@ -149,7 +149,7 @@ hs_status
 hs_half_list_copy(hs_account *account, const hs_half_list *pairs, int64_t n, bool directed,
                   hs_output *copy, hs_failure *failure)
 {
-    half_list_init(account, pairs->shift != NULL, pairs->ndim, copy);
+    hs_links_init(account, HS_WANT_I | HS_WANT_J, pairs->shift != NULL, pairs->ndim, copy);
     if (pairs->n < 0 || copy->ndim < 1 || copy->ndim > HS_MAX_DIM ||
         (pairs->n > 0 && (pairs->i == NULL || pairs->j == NULL))) {
         return HS_ERR_ARGUMENT;
@@ -215,10 +215,8 @@ static hs_status
 open_rows(hs_call *call, int64_t n, int32_t n_lists, int64_t room, const hs_list_rows *like,
           hs_pairs *rows, new_rows *to)
 {
-    const unsigned shift = like->shift != NULL ? (unsigned)HS_WANT_SHIFT : 0u;
-    const int      d = like->shift != NULL ? like->ndim : 1;
-    hs_output_init(&call->account, d, HS_WANT_J | shift, 4, &rows->output);
-    *to = (new_rows){.room = room, .ndim = d};
+    hs_links_init(&call->account, HS_WANT_J, like->shift != NULL, like->ndim, &rows->output);
+    *to = (new_rows){.room = room, .ndim = rows->output.ndim};
     hs_status status =
         hs_output_open_offsets(&call->account, n * n_lists + 1, &rows->offsets, &to->offsets);
     if (status == HS_OK) {
@@ -243,7 +241,7 @@ put_entry(const new_rows *to, int64_t at, int32_t number, const hs_list_rows *fr
 }
 
 /* The entries [first, last) of a row of points, which are in the order of lists and nodes: it is
- * cut where lists end. */
+ * cut where lists end. To deal these as well takes 1.3 times as long, with the search. */
 static void
 cut_row(const hs_node_map *map, const hs_list_rows *from, int64_t first, int64_t last, new_rows *to)
 {
@@ -303,76 +301,66 @@ hs_row_split_fill(hs_call *call, const hs_node_map *map, const hs_list_rows *fro
 
 /* ---- pairs of rows --------------------------------------------------------------------------- */
 
-/* Adds the pairs that entries [first, last) of the row of p begin, as the first with the second or
- * turned; or, of directed lists, all. The n nodes of their list are points from `base` on, or those
- * of `point`, unless that is NULL. False where a node is none, or there is no room for a pair. */
-static bool
-add_pairs(const hs_node_map *map, const hs_list_rows *rows, int32_t p, int32_t base,
-          const int32_t *point, int64_t n, int64_t first, int64_t last, bool all_mirror,
-          int64_t room, hs_output *half)
-{
-    int32_t *const i = hs_output_column(half, HS_WANT_I);
-    int32_t *const j = hs_output_column(half, HS_WANT_J);
-    int32_t *const shift = hs_output_column(half, HS_WANT_SHIFT);
-    const int      d = rows->ndim;
-    int64_t        at = half->n_pairs;
-    for (int64_t e = first; e < last; e++) {
-        const int32_t node = rows->indices[e];
-        if (node < 0 || node >= n) {
-            return false;
-        }
-        const int32_t q = point != NULL ? point[node] : base + node;
-        const bool    turned = q < p && !map->lists->directed;
-        if (turned ? all_mirror || map->row[q] >= 0
-                   : q == p && !map->lists->directed &&
-                         (shift == NULL || hs_compare_shifts(rows->shift + e * d, NULL, d) <= 0)) {
-            continue; /* the other entry of the pair begins it */
-        }
-        if (at == room) {
-            return false;
-        }
-        i[at] = turned ? q : p;
-        j[at] = turned ? p : q;
-        if (shift != NULL) {
-            copy_shift(shift + at * d, rows->shift + e * d, d, turned);
-        }
-        at++;
-    }
-    half->n_pairs = at;
-    return true;
-}
-
-/* Fills an empty output with the pairs of rows of points, or of nodes, in the order of points. It
- * ascends where the rows do, unless pairs are turned. HS_ERR_ARGUMENT where offsets or numbers are
- * none, or there are more pairs than rows can have that mirror each other. */
+/* Fills an empty output with the pairs of rows of points, or of nodes, in the order of points: each
+ * once, in whichever of its two rows begins it, or, of directed lists, all. It ascends where the
+ * rows do, unless pairs are turned. HS_ERR_ARGUMENT where offsets or numbers are none, or there are
+ * more pairs than rows can have that mirror each other. */
 static hs_status
 find_pairs(hs_call *call, const hs_node_map *map, const hs_list_rows *rows, bool of_points,
            hs_output *half)
 {
-    const bool    all_mirror = !map->lists->directed && (of_points || map->n_rows == map->n);
+    const bool    directed = map->lists->directed;
+    const bool    all_mirror = !directed && (of_points || map->n_rows == map->n);
     const int64_t room = all_mirror ? rows->n_indices / 2 : rows->n_indices;
-    int64_t       looked = 0;
-    half_list_init(&call->account, rows->shift != NULL, rows->ndim, half);
-    hs_status status = hs_output_reserve(half, room, 0.0);
+    const int     d = rows->ndim;
+    int64_t       looked = 0, at = 0;
+    hs_links_init(&call->account, HS_WANT_I | HS_WANT_J, rows->shift != NULL, d, half);
+    hs_status      status = hs_output_reserve(half, room, 0.0);
+    int32_t *const i = hs_output_column(half, HS_WANT_I);
+    int32_t *const j = hs_output_column(half, HS_WANT_J);
+    int32_t *const shift = hs_output_column(half, HS_WANT_SHIFT);
     for (int32_t p = 0; status == HS_OK && p < map->n; p++) {
         const int64_t row = of_points ? p : map->row[p];
         for (int32_t l = 0; status == HS_OK && row >= 0 && l < rows->n_lists; l++) {
-            const int64_t *at = rows->offsets + row * rows->n_lists + l;
-            const int64_t  begin = l > 0 ? map->end[l - 1] : 0;
-            const int64_t  n = of_points ? map->n : map->end[l] - begin;
-            if (at[0] < 0 || at[0] > at[1] || at[1] > rows->n_indices ||
-                !add_pairs(map, rows, p, (int32_t)begin,
-                           of_points || map->is_plain ? NULL : map->point + begin, n, at[0], at[1],
-                           all_mirror, room, half)) {
-                status = HS_ERR_ARGUMENT;
+            const int64_t *ends = rows->offsets + row * rows->n_lists + l;
+            const int64_t  base = l > 0 ? map->end[l - 1] : 0;
+            const int64_t  n = of_points ? map->n : map->end[l] - base;
+            bool           fits = ends[0] >= 0 && ends[0] <= ends[1] && ends[1] <= rows->n_indices;
+            for (int64_t e = ends[0]; fits && e < ends[1]; e++) {
+                const int32_t node = rows->indices[e];
+                if (node < 0 || node >= n) {
+                    fits = false;
+                    break;
+                }
+                const int32_t q = of_points       ? node
+                                  : map->is_plain ? (int32_t)base + node
+                                                  : map->point[base + node];
+                const bool    turned = q < p && !directed;
+                if (turned ? all_mirror || map->row[q] >= 0
+                           : q == p && !directed &&
+                                 (shift == NULL ||
+                                  hs_compare_shifts(rows->shift + e * d, NULL, d) <= 0)) {
+                    continue; /* the other entry of the pair begins it */
+                }
+                fits = at < room;
+                if (fits) {
+                    i[at] = turned ? q : p;
+                    j[at] = turned ? p : q;
+                    if (shift != NULL) {
+                        copy_shift(shift + at * d, rows->shift + e * d, d, turned);
+                    }
+                    at++;
+                }
             }
-            looked += at[1] - at[0];
+            status = fits ? HS_OK : HS_ERR_ARGUMENT;
+            looked += fits ? ends[1] - ends[0] : 0;
         }
         if (status == HS_OK && looked >= POLL_ENTRIES) {
             looked = 0;
             status = hs_poll(&call->options, (double)p / (double)map->n);
         }
     }
+    half->n_pairs = at;
     return status;
 }
 
@@ -382,7 +370,7 @@ static hs_status
 fill_table(const hs_node_map *map, hs_output *half, hs_connectivity *made)
 {
     hs_output *const lists = &made->lists.output;
-    half_list_init(&made->rows.call.account, false, 1, lists);
+    hs_links_init(&made->rows.call.account, HS_WANT_I | HS_WANT_J, false, 1, lists);
     if (hs_output_reserve(lists, half->n_pairs, 0.0) != HS_OK) {
         return HS_ERR_MEMORY;
     }
@@ -438,27 +426,6 @@ hs_connectivity_fill(hs_connectivity *made, const hs_node_map *map, hs_output *h
     return status;
 }
 
-hs_status
-hs_connectivity_fill_pairs(hs_connectivity *made, const hs_node_map *map, const hs_list_rows *rows)
-{
-    hs_call   *call = &made->rows.call;
-    hs_output  found = {.n_pairs = 0}, half = {.n_pairs = 0};
-    hs_status  status = rows->n == map->n_rows && rows->n_lists == map->n_lists
-                            ? find_pairs(call, map, rows, false, &found)
-                            : HS_ERR_ARGUMENT;
-    const bool ascends = map->is_plain && (map->lists->directed || map->n_rows == map->n);
-    if (status == HS_OK && !ascends) {
-        half_list_init(&call->account, rows->shift != NULL, rows->ndim, &half);
-        status = hs_sort_pairs(call, 0, map->n, &found, false, NULL, &half);
-    }
-    if (status == HS_OK) {
-        status = fill_table(map, ascends ? &found : &half, made);
-    }
-    hs_output_free(&found);
-    hs_output_free(&half);
-    return status;
-}
-
 hs_pairs *
 hs_connectivity_rows(hs_connectivity *connectivity)
 {
@@ -489,6 +456,172 @@ hs_connectivity_free(hs_connectivity *connectivity)
     hs_output_free(&connectivity->lists.output);
     hs_account_close(&connectivity->rows.call.account);
     hs_free(NULL, connectivity);
+}
+
+/* Begins a call that makes a connectivity, if `has_input`: *failure becomes where the failure goes.
+ * connectivity_end must follow. NULL, with *status, where the call has ended. */
+static hs_connectivity *
+connectivity_begin(bool has_input, const hs_options *options, hs_connectivity **result,
+                   hs_failure **failure, hs_status *status)
+{
+    const bool       can_begin = has_input && result != NULL && options != NULL;
+    hs_connectivity *made = can_begin ? hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *made) : NULL;
+    if (result != NULL) {
+        *result = NULL;
+    }
+    if (made == NULL) {
+        *status = hs_end_early(can_begin ? HS_ERR_MEMORY : HS_ERR_ARGUMENT, options, *failure);
+        return NULL;
+    }
+    memset(made, 0, sizeof *made);
+    *failure = hs_call_enter(options, *failure, &made->rows.call);
+    *status = hs_check_resources(options);
+    return made;
+}
+
+/* Leaves the call. *result becomes the object, or that is freed. Returns the status. */
+static hs_status
+connectivity_end(hs_connectivity *made, hs_status status, hs_connectivity **result,
+                 hs_failure *failure)
+{
+    hs_call *const call = &made->rows.call;
+    hs_call_tell_limit(call, status, failure);
+    hs_call_leave(call, hs_pairs_length(&made->nodes));
+    hs_call_detach(call);
+    if (status == HS_OK) {
+        *result = made;
+    } else {
+        hs_connectivity_free(made);
+    }
+    return status;
+}
+
+hs_status
+hs_connectivity_link(const hs_half_list *pairs, const hs_node_lists *lists,
+                     const hs_options *options, hs_connectivity **result, hs_failure *failure)
+{
+    hs_status        status;
+    hs_node_map      map = {.n = 0};
+    hs_output        half = {.n_pairs = 0}, offsets = half, rows = half;
+    hs_connectivity *made = connectivity_begin(pairs != NULL, options, result, &failure, &status);
+    if (made == NULL) {
+        return status;
+    }
+    hs_account *const account = &made->rows.call.account;
+    if (status == HS_OK) {
+        status = hs_node_map_make(account, lists, -1, &map);
+    }
+    if (status == HS_OK) {
+        status = hs_half_list_copy(account, pairs, map.n, lists->directed, &half, failure);
+    }
+    if (status == HS_OK) {
+        status = hs_output_check_opposites(&half, failure);
+    }
+    if (status == HS_OK) {
+        status =
+            hs_half_list_rows(&made->rows.call, &half, map.n, lists->directed, &offsets, &rows);
+    }
+    if (status == HS_OK) {
+        status = hs_connectivity_fill(made, &map, &half, &offsets, &rows);
+    }
+    hs_output_free(&half);
+    hs_output_free(&offsets);
+    hs_output_free(&rows);
+    hs_node_map_free(account, &map);
+    return connectivity_end(made, status, result, failure);
+}
+
+hs_status
+hs_connectivity_build(const hs_among *among, const hs_node_lists *lists, const hs_options *options,
+                      hs_connectivity **result, hs_failure *failure)
+{
+    hs_pairs   *found = NULL;
+    hs_node_map map = {.n = 0};
+    if (result != NULL) {
+        *result = NULL;
+    }
+    if (result == NULL || options == NULL || among == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
+    hs_options    search = *options; /* for all neighbours */
+    const hs_box *box = among->cells != NULL ? hs_cells_box(among->cells) : among->box;
+    search.want = HS_WANT_J;
+    search.index_bytes = 4;
+    search.out = NULL;
+    for (int l = 0; box != NULL && l < box->ndim && l < HS_MAX_DIM; l++) {
+        search.want |= box->periodic[l] ? (unsigned)HS_WANT_SHIFT : 0u;
+    }
+    /* Only to look at the points; a half list, so that queries are refused. */
+    const hs_query query = hs_query_among(among, HS_HALF_LIST, &search);
+    hs_status      status = query.among != NULL || query.sets.points == NULL
+                                ? HS_ERR_ARGUMENT
+                                : hs_node_map_make(NULL, lists, query.sets.points->n, &map);
+    if (status != HS_OK) {
+        return hs_end_early(status, options, failure);
+    }
+    status = hs_neighbors_find(among, &search, &found, failure);
+    if (status == HS_OK) {
+        hs_options linking = *options; /* its counters are those of the search */
+        linking.counters = NULL;
+        hs_connectivity *made = connectivity_begin(true, &linking, result, &failure, &status);
+        hs_output        half = {.n_pairs = 0};
+        if (status == HS_OK) { /* the search has ended: its account is closed */
+            found->offsets.account = found->output.account = NULL;
+            status = hs_connectivity_fill(made, &map, &half, &found->offsets, &found->output);
+        }
+        hs_output_free(&half);
+        status = made != NULL ? connectivity_end(made, status, result, failure) : status;
+    }
+    hs_pairs_free(found);
+    hs_node_map_free(NULL, &map);
+    return status;
+}
+
+hs_status
+hs_connectivity_pair(const hs_list_rows *rows, const hs_node_lists *lists,
+                     const hs_options *options, hs_connectivity **result, hs_failure *failure)
+{
+    hs_status        status;
+    hs_node_map      map = {.n = 0};
+    hs_output        found = {.n_pairs = 0}, half = found;
+    hs_connectivity *made = connectivity_begin(rows != NULL, options, result, &failure, &status);
+    if (made == NULL) {
+        return status;
+    }
+    hs_call *call = &made->rows.call;
+    if (status == HS_OK) {
+        status = hs_node_map_make(&call->account, lists, -1, &map);
+    }
+    if (status == HS_OK) {
+        status = rows->n == map.n_rows && rows->n_lists == map.n_lists
+                     ? find_pairs(call, &map, rows, false, &found)
+                     : HS_ERR_ARGUMENT;
+    }
+    const bool ascends = status == HS_OK && map.is_plain &&
+                         (lists->directed || map.n_rows == map.n);
+    if (status == HS_OK && !ascends) {
+        hs_output_init(&call->account, found.ndim, found.columns, 4, &half);
+        status = hs_sort_pairs(call, 0, map.n, &found, false, NULL, &half);
+    }
+    if (status == HS_OK) {
+        status = fill_table(&map, ascends ? &found : &half, made);
+    }
+    hs_output_free(&found);
+    hs_output_free(&half);
+    hs_node_map_free(&call->account, &map);
+    return connectivity_end(made, status, result, failure);
+}
+
+hs_pairs *
+hs_rows_begin(bool has_input, const hs_points *points, const hs_options *options, hs_pairs **result,
+              hs_failure **failure, hs_status *status)
+{
+    hs_pairs *made = hs_result_begin(has_input, options, result, failure, status);
+    *status = made != NULL ? hs_check_resources(options) : *status;
+    if (*status == HS_OK && points != NULL) {
+        *status = hs_check_points(points, *failure);
+    }
+    return made;
 }
 
 /* ---- what is left of rows: each entry is read once and written where the new row goes on ----- */
@@ -598,18 +731,27 @@ keep_entries(const keeping *doing, int32_t l, int64_t first, int64_t last, new_r
 }
 
 hs_status
-hs_kept_rows_fill(hs_call *call, const hs_list_rows *rows, const hs_node_change *change,
-                  const int64_t *source, int64_t n, hs_pairs *result)
+hs_rows_keep(const hs_list_rows *rows, const hs_node_change *change, const int64_t *source,
+             int64_t n, const hs_options *options, hs_pairs **result, hs_failure *failure)
 {
     keeping   doing = {.rows = rows, .change = change};
     new_rows  to = {.n = 0};
-    hs_status status = HS_ERR_ARGUMENT;
-    if (are_rows(rows) && n >= 0 && n <= rows->n && change->n_lists == rows->n_lists &&
-        (change->n_lists == 0 || (change->n_nodes != NULL && change->target != NULL))) {
-        status = open_keeping(&call->account, &doing);
+    hs_status status;
+    hs_pairs *made =
+        hs_rows_begin(rows != NULL && change != NULL, NULL, options, result, &failure, &status);
+    if (made == NULL) {
+        return status;
+    }
+    hs_call *call = &made->call;
+    if (status == HS_OK) {
+        status =
+            are_rows(rows) && n >= 0 && n <= rows->n && change->n_lists == rows->n_lists &&
+                    (change->n_lists == 0 || (change->n_nodes != NULL && change->target != NULL))
+                ? open_keeping(&call->account, &doing)
+                : HS_ERR_ARGUMENT;
     }
     if (status == HS_OK) {
-        status = open_rows(call, n, rows->n_lists, rows->n_indices, rows, result, &to);
+        status = open_rows(call, n, rows->n_lists, rows->n_indices, rows, made, &to);
     }
     for (int64_t k = 0; status == HS_OK && k < n; k++) {
         const int64_t row = source != NULL ? source[k] : k;
@@ -623,10 +765,10 @@ hs_kept_rows_fill(hs_call *call, const hs_list_rows *rows, const hs_node_change 
                          : HS_ERR_ARGUMENT;
         }
     }
-    result->output.n_pairs = status == HS_OK ? to.n : 0;
+    made->output.n_pairs = status == HS_OK ? to.n : 0;
     hs_free(&call->account, doing.first);
     hs_free(&call->account, doing.entries);
-    return status;
+    return hs_result_end(made, status, result, failure);
 }
 
 /* The sign of entry e of rows, with its shift, less entry w of those that go. */
@@ -662,21 +804,30 @@ drop_entries(const hs_list_rows *rows, const hs_list_rows *without, bool ascend,
 }
 
 hs_status
-hs_rows_without_fill(hs_call *call, const hs_list_rows *rows, const hs_list_rows *without,
-                     bool ascend, hs_pairs *result)
+hs_rows_without(const hs_list_rows *rows, const hs_list_rows *without, bool ascend,
+                const hs_options *options, hs_pairs **result, hs_failure *failure)
 {
     new_rows  to = {.n = 0};
-    hs_status status = HS_ERR_ARGUMENT;
-    if (are_rows(rows) && are_rows(without) && rows->n == without->n &&
-        rows->n_lists == without->n_lists && (rows->shift == NULL) == (without->shift == NULL) &&
-        (rows->shift == NULL || rows->ndim == without->ndim)) {
-        status = open_rows(call, rows->n, rows->n_lists, rows->n_indices, rows, result, &to);
+    hs_status status;
+    hs_pairs *made =
+        hs_rows_begin(rows != NULL && without != NULL, NULL, options, result, &failure, &status);
+    if (made == NULL) {
+        return status;
+    }
+    hs_call *call = &made->call;
+    if (status == HS_OK) {
+        status = are_rows(rows) && are_rows(without) && rows->n == without->n &&
+                         rows->n_lists == without->n_lists &&
+                         (rows->shift == NULL) == (without->shift == NULL) &&
+                         (rows->shift == NULL || rows->ndim == without->ndim)
+                     ? open_rows(call, rows->n, rows->n_lists, rows->n_indices, rows, made, &to)
+                     : HS_ERR_ARGUMENT;
     }
     for (int64_t k = 0; status == HS_OK && k < rows->n * rows->n_lists; k++) {
         status = drop_entries(rows, without, ascend, k, &to)
                      ? end_entry(call, rows->offsets[k + 1] - rows->offsets[k], &to)
                      : HS_ERR_ARGUMENT;
     }
-    result->output.n_pairs = status == HS_OK ? to.n : 0;
-    return status;
+    made->output.n_pairs = status == HS_OK ? to.n : 0;
+    return hs_result_end(made, status, result, failure);
 }

@@ -55,6 +55,10 @@ hs_compare_shifts(const int32_t *shift, const int32_t *other, int ndim)
     return 0;
 }
 
+/* An empty output of these columns and, if there are shifts, S. */
+void hs_links_init(hs_account *account, unsigned columns, bool has_shift, int ndim,
+                   hs_output *links);
+
 /* A copy of these pairs of n points, which nothing can change. HS_ERR_ARGUMENT where they are no
  * half list, or none of directed lists: failure->row is the first pair that is wrong. On failure
  * *copy can still be freed. */
@@ -106,60 +110,9 @@ struct hs_connectivity {
 hs_status hs_connectivity_fill(hs_connectivity *connectivity, const hs_node_map *map,
                                hs_output *half, hs_output *offsets, hs_output *rows);
 
-/* Fills the pairs alone, from rows of the nodes, which are given. HS_ERR_ARGUMENT where these are
- * none of these lists. */
-hs_status hs_connectivity_fill_pairs(hs_connectivity *connectivity, const hs_node_map *map,
-                                     const hs_list_rows *rows);
-
-/*
- * Each of these fills offsets and column J and, where `rows` has shifts, S of `result`, empty, laid
- * out as the rows that it is given. HS_ERR_ARGUMENT where these are no rows: offsets that descend
- * or end elsewhere, numbers of nodes that there are not.
- */
-
-/* Row k is row source[k], each of them at most once: those of its nodes that stay, under their new
- * numbers. source: NULL for all rows, n of them, in their order. */
-hs_status hs_kept_rows_fill(hs_call *call, const hs_list_rows *rows, const hs_node_change *change,
-                            const int64_t *source, int64_t n, hs_pairs *result);
-
-/* All rows, without the entries that are in `without`, which has as many rows and lists. `ascend`:
- * rows of both ascend, and those of `without` may have what `rows` have not; else they must have
- * them, in the same order: HS_ERR_ARGUMENT. */
-hs_status hs_rows_without_fill(hs_call *call, const hs_list_rows *rows, const hs_list_rows *without,
-                               bool ascend, hs_pairs *result);
-
-/*
- * overlap.c: points that gather a common point, from the rows of what each point gathers; and what
- * is between the two of each pair.
- */
-
-/*
- * With G the matrix of these rows and of the diagonal, for each point is in its own support, row i
- * of the pattern of G G^T has the points that gather a point that i gathers: neighbours, where this
- * is one of the two, and those further apart. With shifts, entry (k, T) of row i and (k, U) of row
- * j give (j, T - U).
- *
- * Fills offsets and columns J and S of `rows`, empty, as hs_row_split_fill does, for all points of
- * these lists. HS_ERR_ARGUMENT where `gather` has a row that is not ascending, has its own number
- * (with shifts: and S zero) or one that is no point. Coordinates only say what is near, and need
- * not be finite.
- */
-hs_status hs_overlap_fill(hs_call *call, const hs_points *points, const hs_index_rows *gather,
-                          const hs_node_lists *lists, hs_pairs *rows, hs_failure *failure);
-
-/*
- * For each pair of the table the points that are neighbours of both of its ends and whose foot on
- * the line through them lies between them, and the ends.
- *
- * Fills offsets and columns J and S of `result`, empty: entry l of pair number p, [offsets[p *
- * n_lists + l], next), has the numbers in list l of the common neighbours, in the order of the
- * points, and then those of the first and the second end that are of this list; S is that of each
- * from the first end. images: the dimensions, and the rows that the half list's shifts multiply.
- * HS_ERR_NOT_FINITE for coordinates that are not.
- */
-hs_status hs_intersection_fill(hs_call *call, const hs_points *points, const hs_metric *images,
-                               const hs_node_lists *lists, const hs_output *half, hs_pairs *result,
-                               hs_failure *failure);
+/* hs_result_begin, of rows. points: NULL, or checked as well. */
+hs_pairs *hs_rows_begin(bool has_input, const hs_points *points, const hs_options *options,
+                        hs_pairs **result, hs_failure **failure, hs_status *status);
 
 /*
  * The place of a point on the Z curve through a box: the bits of its coordinates, as fractions of

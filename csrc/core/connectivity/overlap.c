@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "connectivity.h"
+#include "../api/query.h"
 #include "../base/sort.h"
 #include "../base/os.h"
 #include "../collect/parallel.h"
@@ -8,8 +9,8 @@
 #include <string.h>
 #include <math.h>
 
-/* overlap.c: the Z curve through a box; what is between the two of a pair, from marks on
- * neighbours; and points that gather a common point, from sets of bits. */
+/* overlap.c: the Z curve through a box, and feet on a line; what is between the two of a pair, from
+ * marks on neighbours; and points that gather a common point, from sets of bits. */
 
 /* ---- the Z curve ----------------------------------------------------------------------------- */
 
@@ -37,9 +38,72 @@ hs_morton_key(const double *x, const double *low, const double *high, int ndim)
     return key;
 }
 
+/* ---- points that are looked at one by one; nothing is allocated ------------------------------ */
+
+/* hs_morton_keys, or hs_feet_between with p and q in place of low and high: both are copied, and
+ * nothing can change them then. */
+static hs_status
+of_each_point(const hs_points *points, const double *p, const double *q, uint64_t *keys,
+              bool *between, bool finds_keys, hs_failure *failure)
+{
+    const void *entries = finds_keys ? (const void *)keys : between;
+    hs_metric   plain = {.n_rows = 0};
+    hs_entry    entry;
+    double      two[2][HS_MAX_DIM] = {{0.0}}, x[HS_MAX_DIM];
+    failure = hs_enter(failure, &entry);
+    hs_status status = hs_check_points(points, failure);
+    if (status == HS_OK && (p == NULL || q == NULL || !hs_has_entries(entries, points))) {
+        status = HS_ERR_ARGUMENT;
+    }
+    for (int k = 0; status == HS_OK && k < points->ndim; k++) {
+        two[0][k] = p[k];
+        two[1][k] = q[k];
+        if (!isfinite(two[0][k]) || !isfinite(two[1][k]) || (finds_keys && two[0][k] > two[1][k])) {
+            failure->column = k;
+            status = finds_keys ? HS_ERR_BOX_FINITE : HS_ERR_ARGUMENT;
+        }
+    }
+    plain.ndim = status == HS_OK ? points->ndim : 0;
+    for (int64_t i = 0; status == HS_OK && i < points->n; i++) {
+        hs_points one = *points;
+        one.data = (const char *)points->data + i * points->row_stride;
+        one.n = 1;
+        status = hs_points_copy_finite(&one, x, failure);
+        for (int k = 0; finds_keys && status == HS_OK && k < points->ndim; k++) {
+            status = x[k] < two[0][k] || x[k] > two[1][k] ? HS_ERR_FAR : HS_OK;
+        }
+        failure->row = status != HS_OK ? i : failure->row;
+        if (status == HS_OK && finds_keys) {
+            keys[i] = hs_morton_key(x, two[0], two[1], points->ndim);
+        } else if (status == HS_OK) {
+            between[i] = hs_foot_is_between(&plain, x, NULL, two[0], two[1], NULL);
+        }
+    }
+    hs_leave(&entry);
+    return status;
+}
+
+hs_status
+hs_feet_between(const hs_points *points, const double *p, const double *q, bool *between,
+                hs_failure *failure)
+{
+    return of_each_point(points, p, q, NULL, between, false, failure);
+}
+
+hs_status
+hs_morton_keys(const hs_points *points, const double *low, const double *high, uint64_t *keys,
+               hs_failure *failure)
+{
+    return of_each_point(points, low, high, keys, NULL, true, failure);
+}
+
 /* ---- between the two of a pair --------------------------------------------------------------- */
 
 /*
+ * The points that are neighbours of both ends of a pair and whose foot on the line through them
+ * lies between them, and the ends. They are in the order of the points, and then the first and the
+ * second end, each in its list; S is that of each from the first end.
+ *
  * The neighbours of the first point of a pair are marked once for all pairs that it begins; those
  * of the second that are marked are common. With shifts, a mark says that there is some image, and
  * the row of the first point which. Threads take ranges of pairs, whose entries are written in the
@@ -73,13 +137,6 @@ typedef struct intersection_worker {
     int64_t       *next;   /* owned; where each list goes on, and one more */
     int64_t        looked;
 } intersection_worker;
-
-/* The columns of what is written. */
-static unsigned
-wanted_of(const int32_t *shift)
-{
-    return HS_WANT_J | (shift != NULL ? (unsigned)HS_WANT_SHIFT : 0u);
-}
 
 static hs_status
 open_intersection_worker(void *context, void *place)
@@ -317,34 +374,64 @@ merge_all(merging *doing, const hs_output *half, hs_pairs *result, hs_failure *f
 }
 
 hs_status
-hs_intersection_fill(hs_call *call, const hs_points *points, const hs_metric *images,
-                     const hs_node_lists *lists, const hs_output *half, hs_pairs *result,
-                     hs_failure *failure)
+hs_connectivity_intersect(const hs_points *points, const hs_box *box, const hs_half_list *pairs,
+                          const hs_node_lists *lists, const hs_options *options, hs_pairs **result,
+                          hs_failure *failure)
 {
-    hs_account *account = &call->account;
-    merging     doing = {.call = call, .images = images, .half = hs_half_list_columns(half)};
-    hs_output_init(account, doing.half.ndim, wanted_of(doing.half.shift), 4, &result->output);
-    hs_status status = hs_node_map_make(account, lists, points->n, &doing.map);
+    hs_status  status;
+    hs_output  half = {.n_pairs = 0};
+    const bool has_input = points != NULL && pairs != NULL && lists != NULL && !lists->directed &&
+                           (box == NULL) == (pairs->shift == NULL);
+    hs_pairs *made = hs_rows_begin(has_input, points, options, result, &failure, &status);
+    if (made == NULL) {
+        return status;
+    }
+    /* What the shifts multiply; axes that do not repeat have rows of zeros. */
+    const int   d = points->ndim;
+    hs_account *account = &made->call.account;
+    hs_metric   images = {.ndim = d, .n_rows = box != NULL ? d : 0};
+    merging     doing = {.call = &made->call, .images = &images};
+    if (status == HS_OK && box != NULL) {
+        status = hs_check_box(box, d) == HS_OK && pairs->ndim == d && d <= HS_MAX_DIM - 2
+                     ? hs_box_check(box, failure)
+                     : HS_ERR_ARGUMENT;
+    }
     if (status == HS_OK) {
-        doing.points =
-            hs_alloc(account, HS_FOR_POINTS, points->n * points->ndim, sizeof *doing.points);
+        status = hs_half_list_copy(account, pairs, points->n, false, &half, failure);
+    }
+    if (status == HS_OK) {
+        for (int e = 0; e < images.n_rows * d; e++) {
+            images.rows[e / d][e % d] = box->periodic[e / d] ? box->rows[e / d][e % d] : 0.0;
+        }
+        doing.half = hs_half_list_columns(&half);
+        hs_links_init(account, HS_WANT_J, doing.half.shift != NULL, half.ndim, &made->output);
+        status = hs_node_map_make(account, lists, points->n, &doing.map);
+    }
+    if (status == HS_OK) {
+        doing.points = hs_alloc(account, HS_FOR_POINTS, points->n * d, sizeof *doing.points);
         status = doing.points != NULL ? hs_points_copy_finite(points, doing.points, failure)
                                       : HS_ERR_MEMORY;
     }
     if (status == HS_OK) {
-        status = merge_all(&doing, half, result, failure);
+        status = merge_all(&doing, &half, made, failure);
     }
     if (status == HS_ERR_MEMORY) {
-        failure->expected_pairs = (double)result->output.n_pairs;
+        failure->expected_pairs = (double)made->output.n_pairs;
     }
     hs_free(account, doing.points);
     hs_node_map_free(account, &doing.map);
-    return status;
+    hs_output_free(&half);
+    return hs_result_end(made, status, result, failure);
 }
 
 /* ---- points that gather a common point ------------------------------------------------------- */
 
 /*
+ * With G the matrix of these rows and of the diagonal, for each point is in its own support, row i
+ * of the pattern of G G^T has the points that gather a point that i gathers: neighbours, where this
+ * is one of the two, and those further apart. With shifts, entry (k, T) of row i and (k, U) of row
+ * j give (j, T - U). Coordinates only say what is near, and need not be finite.
+ *
  * Row i is the union, over all k that i gathers, of the points that gather k. All these are met in
  * turn, and each sets a bit, so that they come out in order. Without shifts bits are of places in
  * the order of space, that of the Z curve through the points: few words, which are met as a whole,
@@ -737,24 +824,34 @@ turn_rows(hs_account *account, product *doing)
 }
 
 hs_status
-hs_overlap_fill(hs_call *call, const hs_points *points, const hs_index_rows *gather,
-                const hs_node_lists *lists, hs_pairs *rows, hs_failure *failure)
+hs_connectivity_overlap(const hs_points *points, const hs_index_rows *gather,
+                        const hs_node_lists *lists, const hs_options *options, hs_pairs **rows,
+                        hs_failure *failure)
 {
+    hs_node_map map = {.n = 0};
+    int64_t    *offsets;
+    hs_status   status;
+    const bool  has_input = points != NULL && gather != NULL && lists != NULL;
+    hs_pairs   *made = hs_rows_begin(has_input, points, options, rows, &failure, &status);
+    if (made == NULL) {
+        return status;
+    }
+    hs_call      *call = &made->call;
     hs_account   *account = &call->account;
     product       doing = {.call = call, .n = gather->n};
     hs_node_lists of_all = *lists;
-    hs_node_map   map;
-    int64_t      *offsets;
-    if (gather->n != points->n || gather->offsets == NULL || gather->n_indices < 0 ||
-        (gather->indices == NULL && gather->n_indices > 0) ||
-        (gather->shift != NULL && (gather->ndim < 1 || gather->ndim > HS_MAX_DIM))) {
-        return HS_ERR_ARGUMENT;
-    }
     of_all.ghost_rows = true;
     doing.ndim = gather->shift != NULL ? gather->ndim : 0;
-    hs_output_init(account, doing.ndim > 0 ? doing.ndim : 1, wanted_of(gather->shift), 4,
-                   &doing.all);
-    hs_status status = hs_node_map_make(account, &of_all, points->n, &map);
+    hs_links_init(account, HS_WANT_J, doing.ndim > 0, doing.ndim, &doing.all);
+    if (status == HS_OK &&
+        (gather->n != points->n || gather->offsets == NULL || gather->n_indices < 0 ||
+         (gather->indices == NULL && gather->n_indices > 0) ||
+         (gather->shift != NULL && (gather->ndim < 1 || gather->ndim > HS_MAX_DIM)))) {
+        status = HS_ERR_ARGUMENT;
+    }
+    if (status == HS_OK) {
+        status = hs_node_map_make(account, &of_all, points->n, &map);
+    }
     if (status == HS_OK) {
         status = copy_rows(account, gather, &doing);
     }
@@ -789,7 +886,7 @@ hs_overlap_fill(hs_call *call, const hs_points *points, const hs_index_rows *gat
     }
     if (status == HS_OK) {
         const hs_list_rows found = hs_rows_of(&doing.offsets, &doing.all, 1);
-        status = hs_row_split_fill(call, &map, &found, doing.place, rows);
+        status = hs_row_split_fill(call, &map, &found, doing.place, made);
     }
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = (double)doing.all.n_pairs;
@@ -802,5 +899,5 @@ hs_overlap_fill(hs_call *call, const hs_points *points, const hs_index_rows *gat
     hs_output_free(&doing.offsets);
     hs_output_free(&doing.all);
     hs_node_map_free(account, &map);
-    return status;
+    return hs_result_end(made, status, rows, failure);
 }

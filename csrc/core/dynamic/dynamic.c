@@ -5,11 +5,10 @@
 #include "dynamic.h"
 #include "../base/os_thread.h"
 #include "../memory/memory.h"
-#include "../scene/points.h"
 #include "ball.h"
 
-/* dynamic.c: the functions of halfshell_dynamic.h (docs/dynamic.md) but for queries: points come,
- * go and move, lists are made, copied and looked at; and the gate that readers and writers pass. */
+/* dynamic.c: the functions of halfshell_dynamic.h (docs/dynamic.md) but for queries: lists are
+ * made and held, keys looked up; and the gate that readers and writers pass. */
 
 /* The way in is one compare-and-swap; threads that do not get in sleep until one leaves. */
 
@@ -142,32 +141,24 @@ hs_dynamic_place(const hs_dynamic *list, const double *given, hs_placed *placed,
     }
 }
 
-/* The largest sum of absolute terms that a coordinate is wrapped by, of those that the box moves:
- * others are what was given. */
-static double
-terms_of_wrapping(const hs_dynamic *list, const hs_placed *placed)
-{
-    const hs_lattice *lattice = &list->lattice;
-    int64_t           given_turns[HS_MAX_DIM];
-    double            largest = 0.0;
-    (void)hs_lattice_shift(lattice, placed->turns, given_turns); /* as when it was wrapped */
-    for (int c = 0; c < lattice->ndim; c++) {
-        double terms = list->moves[c] ? fabs(placed->given[c]) : 0.0;
-        for (int l = 0; l < lattice->n_periodic; l++) {
-            terms += fabs((double)given_turns[l] * lattice->given[l][c]);
-        }
-        largest = hs_larger(terms, largest);
-    }
-    return largest;
-}
-
 bool
 hs_dynamic_is_known(const hs_dynamic *list, hs_placed *placed)
 {
     const hs_lattice *lattice = &list->lattice;
     bool              known = true;
     if (placed->magnitude > 0x1p-50 * list->most_terms) {
-        placed->magnitude = terms_of_wrapping(list, placed);
+        /* The largest sum of absolute terms that a coordinate is wrapped by, of those that the box
+         * moves: others are what was given. */
+        int64_t turns[HS_MAX_DIM];
+        (void)hs_lattice_shift(lattice, placed->turns, turns); /* as when it was wrapped */
+        placed->magnitude = 0.0;
+        for (int c = 0; c < lattice->ndim; c++) {
+            double terms = list->moves[c] ? fabs(placed->given[c]) : 0.0;
+            for (int l = 0; l < lattice->n_periodic; l++) {
+                terms += fabs((double)turns[l] * lattice->given[l][c]);
+            }
+            placed->magnitude = hs_larger(terms, placed->magnitude);
+        }
         known = placed->magnitude <= list->most_terms;
     }
     for (int k = 0; k < lattice->ndim; k++) {
@@ -315,42 +306,6 @@ hs_dynamic_free(hs_dynamic *list)
     }
 }
 
-/* hs_dynamic_copy, of a list that is entered. */
-static hs_status
-make_copy(const hs_dynamic *list, hs_dynamic **copy)
-{
-    const int64_t bytes = list->offsets.at[list->offsets.reach + 1];
-    *copy = NULL;
-    hs_dynamic *made = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *made);
-    if (made == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    memset(made, 0, sizeof *made);
-    memcpy(made, list, offsetof(hs_dynamic, changes)); /* others may be at its gate */
-    hs_gate_init(&made->gate);
-    hs_stored_init(made, list->cells.dense, list->cells.most_bytes);
-    made->offsets.slot = hs_alloc(NULL, HS_FOR_STENCIL, bytes, 1);
-    if (made->offsets.slot == NULL || hs_stored_copy(list, made) != HS_OK) {
-        hs_dynamic_free(made);
-        return HS_ERR_MEMORY;
-    }
-    memcpy(made->offsets.slot, list->offsets.slot, (size_t)bytes);
-    *copy = made;
-    return HS_OK;
-}
-
-hs_status
-hs_dynamic_copy(const hs_dynamic *list, hs_dynamic **copy)
-{
-    if (list == NULL || copy == NULL) {
-        return HS_ERR_ARGUMENT;
-    }
-    const hs_dynamic_call call = hs_dynamic_enter(list, false);
-    const hs_status       status = make_copy(list, copy);
-    hs_dynamic_leave(list, call);
-    return status;
-}
-
 void
 hs_dynamic_clear(hs_dynamic *list)
 {
@@ -360,33 +315,6 @@ hs_dynamic_clear(hs_dynamic *list)
         list->changes++;
         hs_dynamic_leave(list, call);
     }
-}
-
-/* Keeps the points of a copy. On failure the list is as it was. */
-hs_status
-hs_dynamic_shrink_to_fit(hs_dynamic *list)
-{
-    hs_dynamic *copy;
-    if (list == NULL) {
-        return HS_ERR_ARGUMENT;
-    }
-    const hs_dynamic_call call = hs_dynamic_enter(list, true);
-    const hs_status       status = make_copy(list, &copy);
-    if (status == HS_OK) {
-        const hs_entries    entries = list->entries; /* others may be at its gate */
-        const hs_hash       map = list->map;
-        const hs_cell_table cells = list->cells;
-        list->entries = copy->entries;
-        list->map = copy->map;
-        list->cells = copy->cells;
-        list->changes++;
-        copy->entries = entries;
-        copy->map = map;
-        copy->cells = cells;
-        hs_dynamic_free(copy);
-    }
-    hs_dynamic_leave(list, call);
-    return status;
 }
 
 int64_t
@@ -449,30 +377,6 @@ hs_dynamic_hook(hs_dynamic *list, const hs_dynamic_hooks *hooks)
     }
 }
 
-hs_dynamic_state
-hs_dynamic_look(const hs_dynamic *list)
-{
-    hs_dynamic_state state = {.ndim = 0};
-    if (list == NULL) {
-        return state;
-    }
-    const hs_dynamic_call call = hs_dynamic_enter(list, false);
-    state.ndim = list->lattice.ndim;
-    state.n_points = list->map.n;
-    state.n_without = list->n_without;
-    state.n_cells = list->cells.n;
-    state.n_empty = list->cells.dense ? 0 : list->cells.n_empty;
-    state.bytes =
-        (int64_t)sizeof *list + list->offsets.at[list->offsets.reach + 1] + hs_stored_bytes(list);
-    state.changes = list->changes;
-    state.max_radius = list->max_radius;
-    for (int k = 0; k < state.ndim; k++) {
-        state.cell_size[k] = list->axes.axis[k].width;
-    }
-    hs_dynamic_leave(list, call);
-    return state;
-}
-
 void
 hs_dynamic_count(hs_dynamic *list, hs_dynamic_counters *counters)
 {
@@ -484,121 +388,7 @@ hs_dynamic_count(hs_dynamic *list, hs_dynamic_counters *counters)
     }
 }
 
-/* ---- points come, go and move ---- */
-
-/* hs_dynamic_insert and hs_dynamic_move. */
-static hs_status
-put(hs_dynamic *list, hs_key key, const double *position, bool must_be_there, hs_failure *failure)
-{
-    hs_failure ignored;
-    hs_placed  placed;
-    double     own[HS_MAX_DIM];
-    failure = hs_failure_or(failure, &ignored);
-    if (list == NULL || (position == NULL && list->storage != HS_STORE_ALL_PAIRS)) {
-        return HS_ERR_ARGUMENT;
-    }
-    const hs_dynamic_call call = hs_dynamic_enter(list, true);
-    const uint32_t        place = hs_stored_find(list, key);
-    hs_status             status = must_be_there && place == HS_NO_PLACE ? HS_ERR_KEY : HS_OK;
-    if (status == HS_OK && position != NULL) {
-        hs_read_position(list, position, own);
-        status = hs_dynamic_place(list, own, &placed, failure);
-    }
-    if (status == HS_OK) {
-        status = hs_stored_put(list, key, place, position != NULL ? &placed : NULL, failure);
-    }
-    hs_dynamic_leave(list, call);
-    return status;
-}
-
-hs_status
-hs_dynamic_insert(hs_dynamic *list, hs_key key, const double *position, hs_failure *failure)
-{
-    return put(list, key, position, false, failure);
-}
-
-hs_status
-hs_dynamic_move(hs_dynamic *list, hs_key key, const double *position, hs_failure *failure)
-{
-    return put(list, key, position, true, failure);
-}
-
-bool
-hs_dynamic_remove(hs_dynamic *list, hs_key key)
-{
-    if (list == NULL) {
-        return false;
-    }
-    const hs_dynamic_call call = hs_dynamic_enter(list, true);
-    const bool            was_there = hs_stored_remove(list, key);
-    hs_dynamic_leave(list, call);
-    return was_there;
-}
-
-static hs_status
-put_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags, const hs_points *positions,
-         bool must_be_there, hs_failure *failure)
-{
-    const hs_options options = hs_options_default();
-    hs_failure       ignored;
-    hs_cloud         cloud;
-    failure = hs_failure_or(failure, &ignored);
-    if (list == NULL || positions == NULL || positions->ndim != list->lattice.ndim ||
-        (ids == NULL && positions->n != 0)) {
-        return HS_ERR_ARGUMENT;
-    }
-    hs_status status = hs_check_points(positions, failure);
-    if (status != HS_OK) {
-        return status;
-    }
-    const hs_dynamic_call call = hs_dynamic_enter(list, true);
-    status = hs_stored_check(list, ids, tags, positions->n, must_be_there, failure);
-    if (status == HS_OK) {
-        status = hs_cloud_load(NULL, NULL, positions, &options, &cloud, failure);
-        if (status == HS_OK) {
-            status = hs_stored_put_many(list, ids, tags, positions->n, cloud.x, failure);
-            hs_cloud_free(NULL, &cloud);
-        }
-    }
-    hs_dynamic_leave(list, call);
-    return status;
-}
-
-hs_status
-hs_dynamic_insert_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags,
-                       const hs_points *positions, hs_failure *failure)
-{
-    return put_many(list, ids, tags, positions, false, failure);
-}
-
-hs_status
-hs_dynamic_move_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags,
-                     const hs_points *positions, hs_failure *failure)
-{
-    return put_many(list, ids, tags, positions, true, failure);
-}
-
-hs_status
-hs_dynamic_remove_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n,
-                       bool *removed, hs_failure *failure)
-{
-    hs_failure ignored;
-    failure = hs_failure_or(failure, &ignored);
-    if (list == NULL || n < 0 || (ids == NULL && n > 0)) {
-        return HS_ERR_ARGUMENT;
-    }
-    const hs_dynamic_call call = hs_dynamic_enter(list, true);
-    const hs_status       status = hs_stored_check(list, ids, tags, n, false, failure);
-    for (int64_t i = 0; status == HS_OK && i < n; i++) {
-        const hs_key key = {ids[i], tags != NULL ? tags[i] : 0};
-        const bool   was_there = hs_stored_remove(list, key);
-        if (removed != NULL) {
-            removed[i] = was_there;
-        }
-    }
-    hs_dynamic_leave(list, call);
-    return status;
-}
+/* ---- points are looked up ---- */
 
 bool
 hs_dynamic_has(const hs_dynamic *list, hs_key key)
@@ -612,67 +402,25 @@ hs_dynamic_has(const hs_dynamic *list, hs_key key)
     return has;
 }
 
-/* The position of a key: borrowed until the list changes. */
-static hs_status
-look_up(const hs_dynamic *list, hs_key key, const double **given)
-{
-    const uint32_t place = hs_stored_find(list, key);
-    if (place == HS_NO_PLACE) {
-        return HS_ERR_KEY;
-    }
-    *given = hs_entry_given(&list->entries, place);
-    return isnan(hs_entry_at(&list->entries, place)[0]) ? HS_ERR_ARGUMENT : HS_OK;
-}
-
 hs_status
 hs_dynamic_position(const hs_dynamic *list, hs_key key, double *position)
 {
-    const double *given;
     if (list == NULL || position == NULL) {
         return HS_ERR_ARGUMENT;
     }
     const hs_dynamic_call call = hs_dynamic_enter(list, false);
-    const hs_status       status = look_up(list, key, &given);
-    if (status == HS_OK) {
-        memcpy(position, given, (size_t)list->lattice.ndim * sizeof *given);
-    }
-    hs_dynamic_leave(list, call);
-    return status;
-}
-
-/* The cell of a position of the caller's, or where that is NULL of a key. */
-static hs_status
-cell_at(const hs_dynamic *list, const hs_key *key, const double *position, int64_t *cell,
-        hs_failure *failure)
-{
-    double        own[HS_MAX_DIM];
-    const double *given = own;
-    hs_placed     placed;
-    hs_status     status = HS_OK;
-    if (list == NULL || (key == NULL && position == NULL) || cell == NULL) {
-        return HS_ERR_ARGUMENT;
-    }
-    const hs_dynamic_call call = hs_dynamic_enter(list, false);
-    if (key != NULL) {
-        status = look_up(list, *key, &given);
+    const uint32_t        place = hs_stored_find(list, key);
+    hs_status             status = HS_OK;
+    if (place == HS_NO_PLACE) {
+        status = HS_ERR_KEY;
+    } else if (isnan(hs_entry_at(&list->entries, place)[0])) {
+        status = HS_ERR_ARGUMENT;
     } else {
-        hs_read_position(list, position, own);
-    }
-    if (status == HS_OK) {
-        status = hs_dynamic_place(list, given, &placed, failure);
-    }
-    if (status == HS_OK) {
-        memcpy(cell, placed.index, (size_t)list->lattice.ndim * sizeof *cell);
+        memcpy(position, hs_entry_given(&list->entries, place),
+               (size_t)list->lattice.ndim * sizeof *position);
     }
     hs_dynamic_leave(list, call);
     return status;
-}
-
-hs_status
-hs_dynamic_cell(const hs_dynamic *list, hs_key key, int64_t *cell)
-{
-    hs_failure ignored;
-    return cell_at(list, &key, NULL, cell, &ignored);
 }
 
 hs_status
@@ -680,5 +428,28 @@ hs_dynamic_cell_of(const hs_dynamic *list, const double *position, int64_t *cell
                    hs_failure *failure)
 {
     hs_failure ignored;
-    return cell_at(list, NULL, position, cell, hs_failure_or(failure, &ignored));
+    hs_placed  placed;
+    double     own[HS_MAX_DIM];
+    failure = hs_failure_or(failure, &ignored);
+    if (list == NULL || position == NULL || cell == NULL) {
+        return HS_ERR_ARGUMENT;
+    }
+    const hs_dynamic_call call = hs_dynamic_enter(list, false);
+    hs_read_position(list, position, own);
+    const hs_status status = hs_dynamic_place(list, own, &placed, failure);
+    if (status == HS_OK) {
+        memcpy(cell, placed.index, (size_t)list->lattice.ndim * sizeof *cell);
+    }
+    hs_dynamic_leave(list, call);
+    return status;
+}
+
+/* Which cell a position is in never changes: the list may, once that is known. */
+hs_status
+hs_dynamic_cell(const hs_dynamic *list, hs_key key, int64_t *cell)
+{
+    double          position[HS_MAX_DIM];
+    const hs_status status = cell != NULL ? hs_dynamic_position(list, key, position)
+                                          : HS_ERR_ARGUMENT;
+    return status == HS_OK ? hs_dynamic_cell_of(list, position, cell, NULL) : status;
 }

@@ -435,10 +435,7 @@ hs_read_position(const hs_dynamic *list, const double *position, double *own)
     }
 }
 
-/*
- * storage.c: points in their cells. What changes them either does all that it is for, or returns a
- * status and leaves the list as it was, but for memory that waits for the next point.
- */
+/* storage.c */
 
 /* No points, and no memory of them, in a list that has its lattice and axes; gives it back. */
 void hs_stored_init(hs_dynamic *list, bool dense, double most_bytes);
@@ -446,27 +443,5 @@ void hs_stored_free(hs_dynamic *list);
 
 /* The place of a key's entry, or HS_NO_PLACE. */
 uint32_t hs_stored_find(const hs_dynamic *list, hs_key key);
-
-/* Adds the point or moves the one of this key, which is at `place`, or HS_NO_PLACE. placed: NULL
- * for a key without a position. */
-hs_status hs_stored_put(hs_dynamic *list, hs_key key, uint32_t place, const hs_placed *placed,
-                        hs_failure *failure);
-
-/* The same for n keys that differ from each other; positions are columns x[k][i], finite. */
-hs_status hs_stored_put_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n,
-                             double *const *x, hs_failure *failure);
-
-/* Removes a key; false: it was not there. */
-bool hs_stored_remove(hs_dynamic *list, hs_key key);
-
-/* Puts the points of a list into a copy of it without any, in no more memory than they need. */
-hs_status hs_stored_copy(const hs_dynamic *list, hs_dynamic *copy);
-
-int64_t hs_stored_bytes(const hs_dynamic *list);
-
-/* HS_ERR_KEY for a key that comes twice among n, or must be there and is not; HS_ERR_MEMORY. tags:
- * or NULL. */
-hs_status hs_stored_check(const hs_dynamic *list, const int64_t *ids, const int32_t *tags,
-                          int64_t n, bool must_be_there, hs_failure *failure);
 
 #endif

@@ -2,9 +2,12 @@
 #include "dynamic.h"
 #include "../base/sort.h"
 #include "../memory/memory.h"
+#include "../scene/points.h"
 
 /* storage.c: points in their cells: blocks of entries, the map from keys to these, and tables of
- * cells that are dense, or hold occupied cells only. */
+ * cells that are dense, or hold occupied cells only; and the functions of halfshell_dynamic.h that
+ * let points come, go and move, and copy them. What changes them either does all that it is for, or
+ * returns a status and leaves the list as it was, but for memory that waits for the next point. */
 
 #define FIRST_CAPACITY 16
 #define MOST_ENTRIES   INT64_C(0xFFFFFFF0) /* places are below HS_NO_PLACE */
@@ -207,41 +210,24 @@ tell_moved(hs_dynamic *list, uint32_t from, uint32_t to)
     list->map.rows[row_of(&list->map, mark, from)].number = to;
 }
 
-/* Takes the key whose entry is at `place` from the map. */
-static void
-forget_key(hs_hash *map, hs_key key, uint32_t place)
+/* HS_ERR_KEY for a key that comes twice among n, or must be there and is not; HS_ERR_MEMORY. tags:
+ * or NULL. */
+static hs_status
+check_keys(const hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n,
+           bool must_be_there, hs_failure *failure)
 {
-    hs_hash_row *const rows = map->rows;
-    const int64_t      last = map->n_rows - 1;
-    int64_t            gap = row_of(map, key_mark(key), place);
-    for (int64_t r = (gap + 1) & last; rows[r].number != HS_NO_NUMBER; r = (r + 1) & last) {
-        const int64_t home = rows[r].mark & (uint64_t)last;
-        if (((r - home) & last) >= ((r - gap) & last)) { /* it may stand in the gap */
-            rows[gap] = rows[r];
-            gap = r;
-        }
-    }
-    rows[gap].number = HS_NO_NUMBER;
-    map->n--;
-}
-
-/* The first of n keys that came before among them, or -1; -2: out of memory. */
-static int64_t
-find_repeated(const int64_t *ids, const int32_t *tags, int64_t n)
-{
-    hs_hash seen = {0};
-    int64_t repeated = -1, i = 1;
+    hs_hash   seen = {0};
+    hs_status status = HS_OK;
+    int64_t   i = 1;
     while (i < n && (ids[i] > ids[i - 1] ||
                      (ids[i] == ids[i - 1] && tags != NULL && tags[i] > tags[i - 1]))) {
         i++;
     }
-    if (i >= n) { /* each key is above the one before: no table is needed */
-        return -1;
+    const bool ascend = i >= n; /* each key is above the one before: no table is needed */
+    if (!ascend && !reserve_rows(&seen, n)) {
+        return HS_ERR_MEMORY;
     }
-    if (!reserve_rows(&seen, n)) {
-        return -2;
-    }
-    for (i = 0; i < n && repeated < 0; i++) {
+    for (i = 0; !ascend && status == HS_OK && i < n; i++) {
         const uint32_t mark = key_mark(key_at(ids, tags, i));
         int64_t        r = mark;
         uint32_t       other = hs_hash_next(&seen, mark, &r);
@@ -249,31 +235,22 @@ find_repeated(const int64_t *ids, const int32_t *tags, int64_t n)
                (ids[other] != ids[i] || (tags != NULL && tags[other] != tags[i]))) {
             other = hs_hash_next(&seen, mark, &r);
         }
-        repeated = other != HS_NO_NUMBER ? i : -1;
+        if (other != HS_NO_NUMBER) {
+            failure->row = i;
+            failure->column = HS_KEY_REPEATED;
+            status = HS_ERR_KEY;
+        }
         hash_put(&seen, (hs_hash_row){(uint32_t)i, mark});
     }
     hs_free(NULL, seen.rows);
-    return repeated;
-}
-
-hs_status
-hs_stored_check(const hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n,
-                bool must_be_there, hs_failure *failure)
-{
-    const int64_t repeated = find_repeated(ids, tags, n);
-    if (repeated != -1) {
-        failure->row = repeated >= 0 ? repeated : -1;
-        failure->column = repeated >= 0 ? HS_KEY_REPEATED : -1;
-        return repeated >= 0 ? HS_ERR_KEY : HS_ERR_MEMORY;
-    }
-    for (int64_t i = 0; must_be_there && i < n; i++) {
+    for (i = 0; must_be_there && status == HS_OK && i < n; i++) {
         if (hs_stored_find(list, key_at(ids, tags, i)) == HS_NO_PLACE) {
             failure->row = i;
             failure->column = HS_KEY_ABSENT;
-            return HS_ERR_KEY;
+            status = HS_ERR_KEY;
         }
     }
-    return HS_OK;
+    return status;
 }
 
 /* ---- cells: sparse tables keep the numbers of their cells when they grow, and close the gaps when
@@ -545,16 +522,6 @@ reserve_in_cell(hs_dynamic *list, uint32_t number, int64_t more)
     return true;
 }
 
-int64_t
-hs_stored_bytes(const hs_dynamic *list)
-{
-    const size_t cell =
-        DENSE_CELL_BYTES + (list->cells.dense ? 0 : (size_t)list->lattice.ndim * sizeof(int32_t));
-    return (int64_t)list->entries.capacity * (int64_t)list->entries.stride +
-           list->cells.capacity * (int64_t)cell +
-           (list->map.n_rows + list->cells.hash.n_rows) * (int64_t)sizeof(hs_hash_row);
-}
-
 /*
  * ---- a point comes into a cell, goes out of it or moves on, once there is room: nothing here can
  * fail. A point that stays in its cell is written over; else it is appended to its new cell and
@@ -641,40 +608,92 @@ put_point(hs_dynamic *list, hs_key key, uint32_t place, uint32_t number, const h
     }
 }
 
-hs_status
-hs_stored_put(hs_dynamic *list, hs_key key, uint32_t place, const hs_placed *placed,
-              hs_failure *failure)
+/* hs_dynamic_insert and hs_dynamic_move. */
+static hs_status
+put(hs_dynamic *list, hs_key key, const double *position, bool must_be_there, hs_failure *failure)
 {
     static const int64_t nowhere[HS_MAX_DIM] = {0};
+    hs_failure           ignored;
+    hs_placed            placed;
+    double               own[HS_MAX_DIM];
     uint32_t             number;
-    const hs_status      status =
-        add_cell(list, placed != NULL ? placed->index : nowhere, &number, failure);
-    if (status != HS_OK) {
-        return status;
+    failure = hs_failure_or(failure, &ignored);
+    if (list == NULL || (position == NULL && list->storage != HS_STORE_ALL_PAIRS)) {
+        return HS_ERR_ARGUMENT;
     }
-    const bool is_new = place == HS_NO_PLACE;
-    const bool comes = is_new || hs_entry_tail_at(&list->entries, place)->cell != number;
-    if ((is_new && !reserve_rows(&list->map, list->map.n + 1)) ||
-        (comes && !reserve_in_cell(list, number, 1))) {
-        return HS_ERR_MEMORY;
+    const hs_dynamic_call call = hs_dynamic_enter(list, true);
+    const uint32_t        place = hs_stored_find(list, key);
+    const bool            is_new = place == HS_NO_PLACE;
+    hs_status             status = must_be_there && is_new ? HS_ERR_KEY : HS_OK;
+    if (status == HS_OK && position != NULL) {
+        hs_read_position(list, position, own);
+        status = hs_dynamic_place(list, own, &placed, failure);
     }
-    put_point(list, key, place, number, placed);
-    list->changes++;
-    return HS_OK;
+    if (status == HS_OK) {
+        status = add_cell(list, position != NULL ? placed.index : nowhere, &number, failure);
+    }
+    if (status == HS_OK) {
+        const bool comes = is_new || hs_entry_tail_at(&list->entries, place)->cell != number;
+        if ((is_new && !reserve_rows(&list->map, list->map.n + 1)) ||
+            (comes && !reserve_in_cell(list, number, 1))) {
+            status = HS_ERR_MEMORY;
+        } else {
+            put_point(list, key, place, number, position != NULL ? &placed : NULL);
+            list->changes++;
+        }
+    }
+    hs_dynamic_leave(list, call);
+    return status;
 }
 
-bool
-hs_stored_remove(hs_dynamic *list, hs_key key)
+hs_status
+hs_dynamic_insert(hs_dynamic *list, hs_key key, const double *position, hs_failure *failure)
+{
+    return put(list, key, position, false, failure);
+}
+
+hs_status
+hs_dynamic_move(hs_dynamic *list, hs_key key, const double *position, hs_failure *failure)
+{
+    return put(list, key, position, true, failure);
+}
+
+/* False: the key was not there. */
+static bool
+remove_key(hs_dynamic *list, hs_key key)
 {
     const uint32_t place = hs_stored_find(list, key);
     if (place == HS_NO_PLACE) {
         return false;
     }
+    hs_hash_row *const rows = list->map.rows;
+    const int64_t      last = list->map.n_rows - 1;
+    int64_t            gap = row_of(&list->map, key_mark(key), place);
+    for (int64_t r = (gap + 1) & last; rows[r].number != HS_NO_NUMBER; r = (r + 1) & last) {
+        const int64_t home = rows[r].mark & (uint64_t)last;
+        if (((r - home) & last) >= ((r - gap) & last)) { /* it may stand in the gap */
+            rows[gap] = rows[r];
+            gap = r;
+        }
+    }
+    rows[gap].number = HS_NO_NUMBER;
+    list->map.n--;
     list->n_without -= !has_position(list, place);
-    forget_key(&list->map, key, place);
     take_out(list, place);
     list->changes++;
     return true;
+}
+
+bool
+hs_dynamic_remove(hs_dynamic *list, hs_key key)
+{
+    if (list == NULL) {
+        return false;
+    }
+    const hs_dynamic_call call = hs_dynamic_enter(list, true);
+    const bool            was_there = remove_key(list, key);
+    hs_dynamic_leave(list, call);
+    return was_there;
 }
 
 /*
@@ -794,9 +813,9 @@ put_rows(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n, d
     }
 }
 
-hs_status
-hs_stored_put_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n,
-                   double *const *x, hs_failure *failure)
+static hs_status
+put_columns(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n, double *const *x,
+            hs_failure *failure)
 {
     if (n == 0) {
         return HS_OK;
@@ -830,9 +849,74 @@ hs_stored_put_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags, in
     return status;
 }
 
-/* First the memory, and then the points, cell after cell. */
+static hs_status
+put_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags, const hs_points *positions,
+         bool must_be_there, hs_failure *failure)
+{
+    const hs_options options = hs_options_default();
+    hs_failure       ignored;
+    hs_cloud         cloud;
+    failure = hs_failure_or(failure, &ignored);
+    if (list == NULL || positions == NULL || positions->ndim != list->lattice.ndim ||
+        (ids == NULL && positions->n != 0)) {
+        return HS_ERR_ARGUMENT;
+    }
+    hs_status status = hs_check_points(positions, failure);
+    if (status != HS_OK) {
+        return status;
+    }
+    const hs_dynamic_call call = hs_dynamic_enter(list, true);
+    status = check_keys(list, ids, tags, positions->n, must_be_there, failure);
+    if (status == HS_OK) {
+        status = hs_cloud_load(NULL, NULL, positions, &options, &cloud, failure);
+        if (status == HS_OK) {
+            status = put_columns(list, ids, tags, positions->n, cloud.x, failure);
+            hs_cloud_free(NULL, &cloud);
+        }
+    }
+    hs_dynamic_leave(list, call);
+    return status;
+}
+
 hs_status
-hs_stored_copy(const hs_dynamic *list, hs_dynamic *copy)
+hs_dynamic_insert_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags,
+                       const hs_points *positions, hs_failure *failure)
+{
+    return put_many(list, ids, tags, positions, false, failure);
+}
+
+hs_status
+hs_dynamic_move_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags,
+                     const hs_points *positions, hs_failure *failure)
+{
+    return put_many(list, ids, tags, positions, true, failure);
+}
+
+hs_status
+hs_dynamic_remove_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n,
+                       bool *removed, hs_failure *failure)
+{
+    hs_failure ignored;
+    failure = hs_failure_or(failure, &ignored);
+    if (list == NULL || n < 0 || (ids == NULL && n > 0)) {
+        return HS_ERR_ARGUMENT;
+    }
+    const hs_dynamic_call call = hs_dynamic_enter(list, true);
+    const hs_status       status = check_keys(list, ids, tags, n, false, failure);
+    for (int64_t i = 0; status == HS_OK && i < n; i++) {
+        const bool was_there = remove_key(list, key_at(ids, tags, i));
+        if (removed != NULL) {
+            removed[i] = was_there;
+        }
+    }
+    hs_dynamic_leave(list, call);
+    return status;
+}
+
+/* Puts the points of a list into a copy of it without any, in no more memory than they need: first
+ * the memory, and then the points, cell after cell. */
+static hs_status
+copy_points(const hs_dynamic *list, hs_dynamic *copy)
 {
     int64_t    first[HS_MAX_DIM], last[HS_MAX_DIM], index[HS_MAX_DIM];
     int64_t    n_entries = 0, n_cells = 0;
@@ -873,4 +957,94 @@ hs_stored_copy(const hs_dynamic *list, hs_dynamic *copy)
     copy->n_without = list->n_without;
     copy->magnitude = list->magnitude;
     return HS_OK;
+}
+
+/* hs_dynamic_copy, of a list that is entered. */
+static hs_status
+make_copy(const hs_dynamic *list, hs_dynamic **copy)
+{
+    const int64_t bytes = list->offsets.at[list->offsets.reach + 1];
+    *copy = NULL;
+    hs_dynamic *made = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *made);
+    if (made == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    memset(made, 0, sizeof *made);
+    memcpy(made, list, offsetof(hs_dynamic, changes)); /* others may be at its gate */
+    hs_gate_init(&made->gate);
+    hs_stored_init(made, list->cells.dense, list->cells.most_bytes);
+    made->offsets.slot = hs_alloc(NULL, HS_FOR_STENCIL, bytes, 1);
+    if (made->offsets.slot == NULL || copy_points(list, made) != HS_OK) {
+        hs_dynamic_free(made);
+        return HS_ERR_MEMORY;
+    }
+    memcpy(made->offsets.slot, list->offsets.slot, (size_t)bytes);
+    *copy = made;
+    return HS_OK;
+}
+
+hs_status
+hs_dynamic_copy(const hs_dynamic *list, hs_dynamic **copy)
+{
+    if (list == NULL || copy == NULL) {
+        return HS_ERR_ARGUMENT;
+    }
+    const hs_dynamic_call call = hs_dynamic_enter(list, false);
+    const hs_status       status = make_copy(list, copy);
+    hs_dynamic_leave(list, call);
+    return status;
+}
+
+/* Keeps the points of a copy. On failure the list is as it was. */
+hs_status
+hs_dynamic_shrink_to_fit(hs_dynamic *list)
+{
+    hs_dynamic *copy;
+    if (list == NULL) {
+        return HS_ERR_ARGUMENT;
+    }
+    const hs_dynamic_call call = hs_dynamic_enter(list, true);
+    const hs_status       status = make_copy(list, &copy);
+    if (status == HS_OK) {
+        const hs_entries    entries = list->entries; /* others may be at its gate */
+        const hs_hash       map = list->map;
+        const hs_cell_table cells = list->cells;
+        list->entries = copy->entries;
+        list->map = copy->map;
+        list->cells = copy->cells;
+        list->changes++;
+        copy->entries = entries;
+        copy->map = map;
+        copy->cells = cells;
+        hs_dynamic_free(copy);
+    }
+    hs_dynamic_leave(list, call);
+    return status;
+}
+
+hs_dynamic_state
+hs_dynamic_look(const hs_dynamic *list)
+{
+    hs_dynamic_state state = {.ndim = 0};
+    if (list == NULL) {
+        return state;
+    }
+    const hs_dynamic_call call = hs_dynamic_enter(list, false);
+    const int64_t indices = list->cells.dense ? 0 : list->lattice.ndim * (int64_t)sizeof(int32_t);
+    state.ndim = list->lattice.ndim;
+    state.n_points = list->map.n;
+    state.n_without = list->n_without;
+    state.n_cells = list->cells.n;
+    state.n_empty = list->cells.dense ? 0 : list->cells.n_empty;
+    state.bytes = (int64_t)sizeof *list + list->offsets.at[list->offsets.reach + 1] +
+                  (int64_t)list->entries.capacity * (int64_t)list->entries.stride +
+                  list->cells.capacity * ((int64_t)DENSE_CELL_BYTES + indices) +
+                  (list->map.n_rows + list->cells.hash.n_rows) * (int64_t)sizeof(hs_hash_row);
+    state.changes = list->changes;
+    state.max_radius = list->max_radius;
+    for (int k = 0; k < state.ndim; k++) {
+        state.cell_size[k] = list->axes.axis[k].width;
+    }
+    hs_dynamic_leave(list, call);
+    return state;
 }

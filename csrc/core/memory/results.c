@@ -183,7 +183,8 @@ expect_in_pages(void *data, size_t bytes)
 }
 
 /* The part of a chunk from `from` on, a multiple of PAGES_STEP from the mapping, becomes a
- * chunk of its own if what was touched of it deserves that. The rest of it is unmapped. */
+ * chunk of its own if what was touched of it deserves that. The rest of it is unmapped. Calls whose
+ * lists differ in length take 1.2 times as long without that. */
 static void *
 split(void *data, char *from)
 {
@@ -251,16 +252,6 @@ cut_in_pages(void *data, size_t bytes, void **rest)
 /* Small chunks come from malloc, large ones are pages. A small one that grows large is copied from
  * the first to the second. */
 
-/* A chunk of `bytes` bytes in what malloc returned: its data. No part of it can be given back, so
- * all of it counts as touched. */
-static void *
-place(void *raw, size_t bytes)
-{
-    char *data = (char *)round_up((uintptr_t)raw + sizeof(hs_chunk), HS_ALIGNMENT);
-    *hs_chunk_of(data) = (hs_chunk){.raw = raw, .capacity = bytes, .touched = bytes};
-    return data;
-}
-
 void *
 hs_chunk_new(size_t bytes)
 {
@@ -272,7 +263,11 @@ hs_chunk_new(size_t bytes)
         return data;
     }
     void *raw = malloc(bytes + OVERHEAD);
-    return raw != NULL ? place(raw, bytes) : NULL;
+    if (raw != NULL) { /* no part of it can be given back: all of it counts as touched */
+        data = (void *)round_up((uintptr_t)raw + sizeof(hs_chunk), HS_ALIGNMENT);
+        *hs_chunk_of(data) = (hs_chunk){.raw = raw, .capacity = bytes, .touched = bytes};
+    }
+    return data;
 }
 
 void

@@ -513,7 +513,8 @@ open_worker(void *context, void *place)
     worker->ranker.near = near;
     worker->ranker.options = worker->committer.options;
     hs_nearest_writer_init(near, &worker->writer);
-    return hs_nearest_ranker_init(&worker->ranker);
+    const hs_status status = hs_nearest_ranker_init(&worker->ranker);
+    return status == HS_OK ? hs_nearest_writer_open(&worker->writer) : status;
 }
 
 static void
@@ -528,9 +529,12 @@ close_worker(void *context, void *place)
                                  .by_float64 = stages->by_float64,
                                  .by_double_word = stages->by_double_word,
                                  .by_integers = stages->by_integers};
-    hs_nearest_flush(&worker->writer);
+    if (worker->writer.pairs != NULL) { /* all of it was opened */
+        hs_nearest_flush(&worker->writer);
+    }
     hs_call_add_counters(job->near->search->call, &walked);
     hs_nearest_ranker_free(&worker->ranker);
+    hs_shared_release(job->near->shared, (void **)&worker->writer.pairs);
     hs_shared_release(job->near->shared, &worker->shared.memory);
     hs_shared_release(job->near->shared, &worker->own.memory);
     hs_shared_release(job->near->shared, &worker->block.memory);

@@ -84,12 +84,14 @@ typedef struct hs_nearest_writer {
     int32_t          *S;
     int64_t           at[HS_BATCH];       /* entry of the output */
     bool              is_first[HS_BATCH]; /* of its row */
-    hs_measured       pairs;              /* shifts are zero from the first entry that is free on */
+    hs_measured      *pairs; /* owned; shifts are zero from the first entry that is free on */
 } hs_nearest_writer;
 
-/* A writer of zeros, as kernels read a little beyond the last entry; or of anything, where nothing
- * is measured. */
+/* A writer of zeros; without `pairs`, where nothing is measured. */
 void hs_nearest_writer_init(const hs_nearest *near, hs_nearest_writer *writer);
+
+/* Its pairs, as far as kernels read them: a little beyond the last entry. HS_ERR_MEMORY. */
+hs_status hs_nearest_writer_open(hs_nearest_writer *writer);
 
 /* The row of the ranker's point: the first `count` of its keys, as far as they are within the
  * largest distance, and then entries that stand for no neighbour. HS_ERR_SHIFT_RANGE. */

@@ -306,19 +306,19 @@ fill(table *all, hs_failure *failure)
  */
 #define COST_OF_ROW    8.0  /* a row of cells that a group looks through */
 #define COST_OF_ORDER  3.0  /* a candidate that a group puts in order */
-#define COST_OF_ENTRY  12.0 /* an entry that is sorted ... */
-#define COST_OF_CACHED 0.3 /* ... and a byte of what is measured of it, in the second-level cache */
-#define COST_OF_BYTE   0.5 /* or beyond that */
-#define COST_OF_PLACE  3.0 /* an entry that is copied to its place ... */
+#define COST_OF_ENTRY  4.0  /* an entry that is sorted ... */
+#define COST_OF_CACHED 0.2  /* ... and a byte of it and its measures, in the second-level cache */
+#define COST_OF_BYTE   0.5  /* or beyond that */
+#define COST_OF_PLACE  3.0  /* an entry that is copied to its place ... */
 #define COST_OF_COPIED 0.15 /* ... and a byte of it */
 #define KEPT_WALKS     1.5  /* walks over all neighbours in any order: one that orders and keeps, */
 #define COUNTED_WALKS  2.0  /* or one that counts and one that orders */
 #define CLEARLY        0.7
 
 #define LEAST_SORTED 256       /* asking points: of fewer, walks over many entries cost little: */
-#define FEW_ENTRIES  12.0      /* so these must have no more in a row */
+#define FEW_ENTRIES  30.0      /* so these must have no more in a row */
 #define CACHED       (1 << 20) /* bytes that the second-level cache holds */
-#define SORTED_BYTES (5 << 20) /* most bytes for what is found and sorted, and so many ... */
+#define SORTED_BYTES (6 << 20) /* most bytes for what is found and sorted, and so many ... */
 #define SORTED_BY_N  8         /* ... for each asking point */
 
 /* Whether pairs, each once, are found and sorted in less time, within these bytes. */
@@ -350,7 +350,8 @@ sorts(const table *all)
     const double pairs = search->has_queries || search->is_half ? entries : 0.5 * entries;
     const double measures = (double)hs_want_bytes(columns & ~(HS_WANT_I | HS_WANT_J), ndim, 4);
     const double found = n * pairs * (double)hs_want_bytes(columns, ndim, 4);
-    const double bytes = found + n * entries * (double)sizeof(uint64_t);
+    const double dealt = 2.0 * (double)sizeof(uint64_t); /* of an entry, by j and in its row */
+    const double bytes = found + dealt * n * entries;
     const double in_group = asking->squares / n;
     const double walk =
         candidates + COST_OF_ROW * ((double)search->stencil.n_rows + 2.0) / in_group;
@@ -358,8 +359,8 @@ sorts(const table *all)
     const double rows = (keeps_all(all) ? KEPT_WALKS : COUNTED_WALKS) * walk +
                         COST_OF_ORDER * candidates / in_group +
                         entries * (COST_OF_PLACE + COST_OF_COPIED * measures);
-    const double of_byte = found < CACHED ? COST_OF_CACHED : COST_OF_BYTE;
-    const double sorting = entries * (COST_OF_ENTRY + of_byte * measures);
+    const double of_byte = bytes < CACHED ? COST_OF_CACHED : COST_OF_BYTE;
+    const double sorting = entries * (COST_OF_ENTRY + of_byte * (measures + dealt));
     return sorting < CLEARLY * (rows - once) && bytes < SORTED_BYTES + SORTED_BY_N * n &&
            hs_account_allows(&search->call->account, 2.0 * bytes);
 }

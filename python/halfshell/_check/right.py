@@ -234,7 +234,9 @@ class Right:
             return tuple(-s for s in back)
         pair = (self.asking[i], self.points[j])
         square = min(self._square(np.array([i, j, *S])) for S in (shift, self._wrapped(i, j)))
-        root = math.isqrt(square.numerator * square.denominator) + 1  # and more
+        product = square.numerator * square.denominator
+        root = math.isqrt(product)
+        root += root * root < product  # no less than the root; and no length where points coincide
         reach = [[None, Fraction(root, square.denominator)], [None, None]]
         images = reference_pairs(pair, reach, self.box, self.periodic)
         return min((self._square(np.array([i, j, *S])), S) for _, _, S in images)[1]

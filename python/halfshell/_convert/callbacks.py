@@ -12,7 +12,6 @@ import importlib
 import re
 import sys
 from _ctypes import CFuncPtr
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,15 +43,18 @@ _MOST_ADDRESS = 2 * sys.maxsize + 1
 
 @dataclass(frozen=True)
 class Target:
-    """What the core is to call: an address, or a Python callable; and the address of its data."""
+    """What the core is to call: the address of a function, and that of its data."""
 
-    function: int | Callable[..., object]
+    function: int
     user: int = 0
     keeps: object = None  # alive as long as this is
 
 
-def target_of(callback: Any, user_data: Any) -> Target:
-    """TypeError for what cannot be called, or would be called with the wrong arguments."""
+def target_of(callback: Any, user_data: Any) -> Target | None:
+    """A compiled function; None for a Python callable.
+
+    TypeError for what cannot be called, or would be called with the wrong arguments.
+    """
     if is_a(callback, tuple) and _is_from(callback, "scipy"):
         return _of_low_level(callback, user_data)
     user, keeps = _address_of_data(user_data)
@@ -73,7 +75,7 @@ def target_of(callback: Any, user_data: Any) -> Target:
         )
     if user_data is not None:
         raise TypeError("user_data is for compiled functions: a Python callable has its own")
-    return Target(callback)
+    return None
 
 
 def _is_from(value: Any, package: str) -> bool:

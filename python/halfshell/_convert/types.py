@@ -22,13 +22,8 @@ PointArray = npt.NDArray[np.float32] | FloatArray
 Arrays = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
 Letter = Literal["i", "j", "d", "D", "S", "P", "k"]
 
-Progress = Callable[[float], object] | None
-
 # By what a pair of radii is compared; the last two go from i to j.
 Rule = Literal["sum", "mean", "max", "min", "gather", "scatter"]
-
-# What the core takes from `inclusive` to `threads`.
-Rest = tuple[bool, Precision, str | None, float | None, Progress, int | None]
 
 
 class _HandsOver(Protocol):

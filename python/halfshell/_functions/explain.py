@@ -175,17 +175,12 @@ def explain(
         n=len(call.points),
         expected_bytes=plan["expected_pairs"] * sum(sizes[letter] for letter in quantities),
         leaves_out=_left_out(plan, quantities, sort),
-        measured={key: plan[key] for key in _MEASURED if key in plan},
     )
 
 
 _PLANNED = (
     "algorithm", "ndim", "shape", "n_cells", "cell_sizes", "images", "expected_pairs", "kernel",
-    "threads",
-)  # fmt: skip
-_MEASURED = (
-    "bytes", "bytes_peak", "groups", "candidates", "pairs", "ambiguous", "by_float64",
-    "by_double_word", "by_integers",
+    "threads", "measured",
 )  # fmt: skip
 
 

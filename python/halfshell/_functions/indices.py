@@ -77,11 +77,10 @@ def pairs_of_some(
     asked = named_once(call)
     if out is not None:  # its types and shapes, before anything is searched for
         least = 0.0 if call.shells is None else call.cutoff
-        arguments: Any = (
+        _core.pairs(
             np.empty((0, call.array.shape[1])), least, None, 0, *call.rest[:4], None, call.threads,
             quantities, sort, index_bytes, out, None, "auto", call.shells,
         )  # fmt: skip
-        _core.pairs(*arguments)
     arrays = _pairs_of_part(call, asked, slice(None), quantities, sort, index_bytes)
     if out is not None:
         arrays = _filled(arrays, out if is_a(out, tuple) else (out,))

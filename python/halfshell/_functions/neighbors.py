@@ -150,19 +150,13 @@ def listed(call: Call, quantities: str, index_bytes: int) -> Any:
     )  # fmt: skip
 
 
-@search("neighbors")
-def arrays_of_rows(
-    points: Any,
-    cutoff: Any,
-    *,
-    queries: Any = None,
-    quantities: str = "j",
-    index_dtype: npt.DTypeLike = np.int64,
-    **search: Any,
-) -> Any:
-    """Offsets and columns of `neighbors`, without a table of them."""
-    call = take(points, cutoff, queries, directed=True, **search)
-    return listed(call, quantities, as_index_bytes(index_dtype))
+_rows = search("neighbors")(cast("Any", neighbors).__wrapped__)
+
+
+def arrays_of_rows(*arguments: Any, **options: Any) -> Any:
+    """Offsets and columns of `neighbors`: where C answers, without a table of them."""
+    found = _rows(*arguments, **options)
+    return found if type(found) is tuple else found._arrays
 
 
 @search("pairs_of_rows")
@@ -227,9 +221,9 @@ def _origin_of(
         places: Any = origin.queries
         places = places if order is None else places[order]
         asked = None if places is None else (places, *known_of_queries)
-        search: Any = ((origin.points, *known), *scene, *rest)
-        arguments: Any = (*search, "S", 8, asked, pairing, AUTO)
-        return _core.neighbors(*arguments)[1]
+        search = (origin.points, *known), *scene, *rest
+        _, shifts = _core.neighbors(*search, "S", 8, asked, pairing, AUTO)
+        return cast("npt.NDArray[Any]", shifts)
 
     if points.box is None or (points.box.ndim == 2 and not np.ndim(points._axes)):
         asking = asking.copy() if is_own and asking is not None else asking
@@ -489,22 +483,8 @@ def nearest(
     return in_rows(result, len(call.points if call.queries is None else call.queries), k)
 
 
-@search("nearest", lacks="rule")
-def columns_of_nearest(
-    points: Any,
-    k: int,
-    *,
-    max_distance: Any = np.inf,
-    queries: Any = None,
-    quantities: str = "jd",
-    index_dtype: npt.DTypeLike = np.int64,
-    **search: Any,
-) -> Any:
-    """Columns of `nearest`, whose rows may stand one behind another: the caller reshapes them."""
-    return nearest(
-        points, k, max_distance=max_distance, queries=queries, quantities=quantities,
-        index_dtype=index_dtype, **search,
-    )  # fmt: skip
+#: Columns of `nearest`, whose rows may stand one behind another: the caller reshapes them.
+columns_of_nearest = search("nearest", lacks="rule")(cast("Any", nearest).__wrapped__)
 
 
 def _nearest_of_some(call: Call, k: int, quantities: str, index_bytes: int) -> Arrays:

@@ -348,6 +348,9 @@ def pairs_between(
 
 # ---- none or few of them held --------------------------------------------------------------
 
+#: Pairs that are made into Python objects at a time, for a Python callable.
+_CALLED_AT_A_TIME = 512
+
 Block = TypeVar("Block", covariant=True)
 
 
@@ -495,8 +498,7 @@ def iter_pairs(
         parts = blocks_of_some(call, quantities, index_bytes)
         return cast("PairBlocks[Any]", _in_blocks(parts, quantities, most))
     own = quantities, index_bytes, most, call.pairing, call.settings.algorithm, call.shells
-    arguments: Any = (*call.core, *own)
-    return PairBlocks(*_core.iter_pairs(*arguments))
+    return PairBlocks(*_core.iter_pairs(*call.core, *own))
 
 
 def _in_blocks(parts: Iterator[Any], quantities: str, most: int) -> Iterator[Any]:
@@ -552,10 +554,11 @@ def for_each_pair(
         `LowLevelCallable`. Not for Python callables.
     {box, periodic, rule, exclude, min_distance, inclusive}
     thread_safe : bool, default False
-        Whether several threads may call the function at once. Then the order of the pairs
+        Whether several threads may call a compiled function at once. Then the order of the pairs
         is unspecified, and its writes to shared memory must be atomic or locked.
     threads : int, optional
-        As in `pairs`. Without `thread_safe` they only sort the points.
+        As in `pairs`. For a Python callable, which one thread calls, they find the pairs. For
+        others they only sort the points, unless `thread_safe`.
 
     Returns
     -------
@@ -602,6 +605,18 @@ def for_each_pair(
 
     target = target_of(callback, user_data)
     call = take(points, cutoff, **search)
-    own = target.function, target.user, as_flag(thread_safe, "thread_safe")
-    n_pairs: int = call.run(_core.for_each_pair, *own, call.pairing, call.settings.algorithm)
+    is_safe, end = as_flag(thread_safe, "thread_safe"), (call.pairing, call.settings.algorithm)
+    if target is not None:
+        found = call.run(_core.for_each_pair, target.function, target.user, is_safe, *end)
+        return cast("int", found)
+    own = "ijSDd", 8, _CALLED_AT_A_TIME
+    blocks: PairBlocks[Any] = PairBlocks(*_core.iter_pairs(*call.core, *own, *end, None))
+    n_pairs = 0
+    for i, j, S, D, d in blocks:
+        squares = [length * length for length in d.tolist()]
+        vectors = zip(*S.T.tolist(), strict=True), zip(*D.T.tolist(), strict=True)
+        for pair in zip(i.tolist(), j.tolist(), *vectors, squares, strict=True):
+            n_pairs += 1
+            if callback(*pair):
+                return n_pairs
     return n_pairs

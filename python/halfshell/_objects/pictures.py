@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from halfshell._objects.node_links import Links
-
     #: Positions and supports of a list.
     Seen = tuple[npt.NDArray[Any], npt.NDArray[Any]]
 
@@ -231,7 +229,7 @@ def _raster(ax: Any, cells: Any, x: _Floats, vectors: _Floats | None, bits: int)
 
 # ---- nodes ----------------------------------------------------------------------------------
 
-def html_of(links: Links) -> str:
+def html_of(links: Any) -> str:
     """What a notebook shows: a row for each list, and what the parts take."""
     nodes = links.nodes
     rows = links.how.with_rows(nodes)
@@ -252,7 +250,7 @@ def html_of(links: Links) -> str:
     )
 
 
-def draw_nodes(links: Links, seen: Sequence[Seen], axes: tuple[int, int], ax: Axes | None) -> Axes:
+def draw_nodes(links: Any, seen: Sequence[Seen], axes: tuple[int, int], ax: Axes | None) -> Axes:
     """Nodes by list, ghosts hollow, their supports, and the pairs."""
     d = next((x.shape[1] for x, _ in seen if len(x)), 2)
     if d > 1:

@@ -30,7 +30,6 @@ from halfshell._convert.types import (
     Out,
     PeriodicLike,
     PointsLike,
-    Rest,
 )
 from halfshell._objects.exact import as_fractions, determinant, product, solved, transposed
 from halfshell._objects.neighbor_table import NeighborTable
@@ -140,7 +139,7 @@ class VerletList:
         self._skin = auto.skin if given is None else given
         self._updates = False  # in the middle of one
 
-    def _how(self) -> Rest:
+    def _how(self) -> tuple[Any, ...]:
         how = current()
         threads = how.threads if self._threads is None else self._threads
         return self._inclusive, "exact", how.kernel, how.memory_limit, None, threads
@@ -253,7 +252,7 @@ class VerletList:
         change = auto is not None and auto.wants_change(array.shape[1])
         skin = auto.chosen if auto is not None else self._skin
         with of_argument("cutoff + skin" if skin > 0.0 and auto is None else "cutoff"):
-            rebuilt = _core.verlet_update(
+            rebuilt: bool = _core.verlet_update(
                 array, self._cutoff, vectors, bits, *self._how(), self._list, skin, change
             )
         self._searched = None
@@ -279,10 +278,11 @@ class VerletList:
         self, scene: Step, quantities: str, sort: bool, index_bytes: int, out: Any
     ) -> Arrays:
         points, vectors, bits = scene
-        return _core.pairs(
+        found: Arrays = _core.pairs(
             points, self._cutoff, vectors, bits, *self._how(), quantities, sort, index_bytes, out,
             None, current().algorithm, None,
         )  # fmt: skip
+        return found
 
     # ---- pairs -----------------------------------------------------------------------------
 
@@ -343,10 +343,11 @@ class VerletList:
     def _find(self, quantities: str, sort: bool, index_bytes: int, out: Any) -> Arrays:
         if self._searched is not None:
             return self._search(self._searched, quantities, sort, index_bytes, out)
-        return _core.verlet_pairs(
+        found: Arrays = _core.verlet_pairs(
             np.empty((0, self._state()["ndim"])), self._cutoff, None, 0, *self._how(), self._list,
             quantities, sort, index_bytes, out,
         )  # fmt: skip
+        return found
 
     def neighbors(
         self, *, quantities: str = "j", index_dtype: npt.DTypeLike = np.int64

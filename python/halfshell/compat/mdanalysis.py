@@ -28,8 +28,6 @@ _KEPT = {"enforce_copy": False, "reduce_result_if_single": False, "allow_atomgro
 
 #: Axes that are not longer are open in MDAnalysis.
 _SHORTEST = float(np.finfo(np.float32).eps)
-#: The most products of points of two sets that `_core.few` looks at: HS_FEW_PAIRS.
-_FEW_PAIRS = 1024
 _OPEN: dict[str, Any] = {"box": None}
 
 
@@ -110,7 +108,7 @@ def _nearest_images(i: Any, j: Any, d: Any, selves: bool) -> Entries:
 
 def _of_few(sets: Any, cutoff: Any, box: Any) -> Entries | None:
     """Pairs of few points in their nearest images, without a search; None where there are more."""
-    if len(sets[0]) * len(sets[-1]) > _FEW_PAIRS or (box is not None and box.ndim == 2):
+    if len(sets[0]) * len(sets[-1]) > _core.FEW_PAIRS or (box is not None and box.ndim == 2):
         return None
     points = sets[-1].astype(np.float64)
     queries = sets[0].astype(np.float64) if len(sets) == 2 else None

@@ -48,8 +48,11 @@ _TREE = _owner.cKDTree
 _few = _core.few
 #: Lists, sets or dictionaries made of columns of pairs.
 _contain = _core.contain
-#: The most products of points and queries that `_few` looks at: HS_FEW_PAIRS.
-_FEW_PAIRS = 1024
+#: The most products of points and queries that `_few` looks at.
+_FEW_PAIRS = _core.FEW_PAIRS
+#: A little less and more than a number, which is not among the smallest floats.
+_AROUND = np.array([[1.0 - 2.0**-50], [1.0 + 2.0**-50]])
+_ORDINARY = 1e-300
 
 #: What `_few` makes for each output of a matrix.
 _LETTERS = {"dict": "d", "ndarray": "a", "coo_matrix": "a", "dok_matrix": "a"}
@@ -356,6 +359,12 @@ class _Searches:
     def _count(self, other: Any, radii: _Points) -> npt.NDArray[np.int64]:
         """How many pairs of the points of both trees are within each of ascending radii."""
         if self.n * other.n <= _FEW_PAIRS:
+            if len(radii) > 1 and radii[0] > _ORDINARY:
+                found = _few(other.data, self.data, self.boxsize, float(radii[-1]), 2.0, 0.0, "a")
+                if found is not None:
+                    below, above = np.searchsorted(np.sort(found[2]), _AROUND * radii)
+                    if (below == above).all():  # or else distances are near a radius, and rounded
+                        return np.asarray(above)
             few = [
                 _few(other.data, self.data, self.boxsize, radius, 2.0, 0.0, "n")
                 for radius in radii.tolist()

@@ -128,6 +128,11 @@ what_is_for_a_search(void)
     CHECK(hs_few_pairs(&few, i, j, NULL) == -1);
     few.cutoff = 1.0;
     CHECK(hs_few_pairs(&few, i, j, NULL) == 0);
+    few.period = NULL;
+    two[1] = 0x1p-600; /* whose square is zero */
+    CHECK(hs_few_pairs(&few, i, j, many) == 1 && many[0] == two[1]);
+    many[0] = 0.0;
+    few.period = period;
     two[1] = 6.5;
     CHECK(hs_few_pairs(&few, i, j, NULL) == -1);
     const double strange[] = {NAN, -1.0, INFINITY, 0x1p600, 0x1p-401, 0.0};

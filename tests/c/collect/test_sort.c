@@ -178,13 +178,14 @@ one_thread_sorts_a_crowd(void)
     search_unit_points(6, POINTS, 2, 1.0, &unit);
     for (int64_t crowd = HALF; crowd <= HALF + 1; crowd++) {
         hs_output found, alone, sorted;
-        fill_pairs(&random, N, 1000, false, &found);
+        fill_pairs(&random, N, 1000, true, &found);
         int32_t *i = hs_output_column(&found, HS_WANT_I);
         for (int64_t p = 0; p < N; p++)
             i[p] = p < crowd ? 3 : 4 + (int32_t)(p % (POINTS - 4));
-        CHECK(sort_by(1, &found, &alone) < (N + crowd) * WORD + OTHERS);
+        CHECK(sort_by(1, &found, &alone) < (N + 2 * crowd) * WORD + OTHERS);
         const int64_t most = sort_by(2, &found, &sorted);
-        CHECK(crowd == HALF ? most >= (N + 2 * crowd) * WORD : most < (N + crowd) * WORD + OTHERS);
+        CHECK(crowd == HALF ? most >= (N + 4 * crowd) * WORD
+                            : most < (N + 2 * crowd) * WORD + OTHERS);
         CHECK(sorted.n_pairs == N);
         for (unsigned column = HS_WANT_I; column <= HS_WANT_DISTANCE; column <<= 1) {
             CHECK(!(found.columns & column) ||
@@ -197,10 +198,130 @@ one_thread_sorts_a_crowd(void)
     }
 }
 
+/* Random pairs, and how they are sorted. */
+typedef struct sort_case {
+    int64_t n;
+    int32_t most_j;
+    bool    has_shift, both_ways;
+    int     threads, place_bits;
+} sort_case;
+
+typedef struct entry {
+    int32_t i, j, shift[2];
+    double  place; /* among the pairs */
+} entry;
+
+static int
+order_of_entries(const void *a, const void *b)
+{
+    const entry *p = a, *q = b;
+    const double keys[] = {p->i, p->j, p->shift[0], p->shift[1], p->place};
+    const double others[] = {q->i, q->j, q->shift[0], q->shift[1], q->place};
+    int          k = 0;
+    while (k < 4 && keys[k] == others[k])
+        k++;
+    return (keys[k] > others[k]) - (keys[k] < others[k]);
+}
+
+/* What is to come out, in the order in which qsort puts it; to be freed. */
+static entry *
+entries_in_order(const sort_case *c, const hs_output *found)
+{
+    const int      ways = 1 + c->both_ways;
+    const int32_t *i = hs_output_column(found, HS_WANT_I), *j = hs_output_column(found, HS_WANT_J);
+    const int32_t *shift = hs_output_column(found, HS_WANT_SHIFT);
+    entry         *entries = calloc((size_t)(c->n * ways), sizeof *entries);
+    for (int64_t e = 0; e < c->n * ways; e++) {
+        const int64_t p = e / ways;
+        const bool    turned = e % ways;
+        entries[e] = (entry){turned ? j[p] : i[p], turned ? i[p] : j[p], {0}, (double)p};
+        for (int k = 0; c->has_shift && k < 2; k++)
+            entries[e].shift[k] = turned ? -shift[2 * p + k] : shift[2 * p + k];
+    }
+    qsort(entries, (size_t)(c->n * ways), sizeof *entries, order_of_entries);
+    return entries;
+}
+
+/* Whether these n are what came out, and the offsets of rows are right. */
+static bool
+are_entries(const entry *entries, int64_t n, int64_t n_rows, const int64_t *offsets,
+            const hs_output *sorted)
+{
+    const int32_t *i = hs_output_column(sorted, HS_WANT_I);
+    const int32_t *j = hs_output_column(sorted, HS_WANT_J);
+    const int32_t *shift = hs_output_column(sorted, HS_WANT_SHIFT);
+    const double  *d = hs_output_column(sorted, HS_WANT_DISTANCE);
+    int64_t        row = 0;
+    bool           right = sorted->n_pairs == n;
+    for (int64_t e = 0; right && e < n; e++) {
+        for (; row <= entries[e].i; row++)
+            right = right && offsets[row] == e;
+        right = right && i[e] == entries[e].i && j[e] == entries[e].j && d[e] == entries[e].place;
+        right = right && (shift == NULL || memcmp(shift + 2 * e, entries[e].shift, 8) == 0);
+    }
+    for (; row <= n_rows; row++)
+        right = right && offsets[row] == n;
+    return right;
+}
+
+/* Row by row where numbers j lie far apart, in strips of several threads, with places that do not
+ * fit behind j; and while allocation after allocation is refused, so many of which are spared. */
+static void
+every_way_of_sorting_agrees(void)
+{
+    enum { FAR = 100000, MANY = 100000 };
+    static const struct {
+        sort_case of;
+        int       spared;
+    } cases[] = {
+        {{300, FAR, false, false, 1, 63}, 0}, {{300, FAR, true, false, 1, 63}, 0},
+        {{9000, FAR, true, false, 3, 63}, 0}, {{300, FAR, false, true, 1, 63}, 0},
+        {{9000, FAR, true, true, 3, 63}, 0},  {{300, FAR, true, true, 1, 3}, 0},
+        {{300, 50, true, true, 1, 63}, 2},    {{300, 50, true, false, 1, 3}, 0},
+        {{MANY, 50, false, false, 3, 63}, 4}, {{MANY, 50, false, true, 3, 63}, 4},
+        {{MANY, 50, false, true, 3, 3}, 2},   {{MANY, FAR, true, false, 3, 3}, 2},
+    };
+    harness_random random = {369};
+    int64_t       *offsets = calloc(FAR + 1, sizeof *offsets);
+    search_unit_points(6, POINTS, 2, 1.0, &unit);
+    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        const sort_case c = cases[k].of;
+        const int       before = hs_test_sort_place_bits(c.place_bits);
+        const int64_t   n = c.n << c.both_ways, n_rows = c.both_ways ? c.most_j : POINTS;
+        int             n_spared = 0;
+        bool            is_over = false;
+        hs_output       found, sorted;
+        fill_pairs(&random, c.n, c.most_j, c.has_shift, &found);
+        entry *entries = entries_in_order(&c, &found);
+        for (int64_t refused = 0; !is_over; refused++) { /* none, the first, the second ... */
+            search_unit_open(NULL, 0.5, false, HS_WANT_I, &unit);
+            unit.call.team = hs_team_create(c.threads);
+            hs_output_init(NULL, 2, found.columns, 4, &sorted);
+            CHECK(hs_output_reserve(&sorted, n, 1.0) == HS_OK);
+            hs_test_fail_allocation(refused);
+            const hs_status status =
+                hs_sort_pairs(&unit.call, 0, n_rows, &found, c.both_ways, offsets, &sorted);
+            is_over = hs_test_failure_is_due();
+            hs_test_fail_allocation(0);
+            CHECK(status == HS_OK || (status == HS_ERR_MEMORY && refused > 0 && !is_over));
+            CHECK(status != HS_OK || are_entries(entries, n, n_rows, offsets, &sorted));
+            n_spared += status == HS_OK && refused > 0 && !is_over;
+            hs_output_free(&sorted);
+            search_unit_close(&unit);
+        }
+        free(entries);
+        CHECK(n_spared == cases[k].spared);
+        CHECK(hs_test_sort_place_bits(before) == c.place_bits);
+        hs_output_free(&found);
+    }
+    free(offsets);
+}
+
 void
 test_sort(void)
 {
     RUN(all_pairs_are_there_in_order);
     RUN(rows_have_each_pair_both_ways);
     RUN(one_thread_sorts_a_crowd);
+    RUN(every_way_of_sorting_agrees);
 }

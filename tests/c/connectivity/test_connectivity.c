@@ -507,6 +507,21 @@ shifts_are_opposite_in_the_other_row(void)
     const hs_half_list   far = {.n = 1, .i = zero, .j = one, .shift = least, .ndim = 2};
     CHECK(hs_connectivity_link(&far, &lists, &options, &made, &failure) == HS_ERR_SHIFT_RANGE);
     CHECK(made == NULL && failure.row == 1);
+    /* Three axes: the nodes of a pair exchange their numbers. */
+    static const int32_t turn[3] = {3, -2, 1}, both[6] = {-3, 2, -1, 3, -2, 1};
+    static const int32_t exchanged[2] = {1, 0};
+    static const int64_t two[1] = {2}, from[2] = {1, 0};
+    const hs_half_list   one_pair = {.n = 1, .i = zero, .j = one, .shift = turn, .ndim = 3};
+    lists = (hs_node_lists){.n_lists = 1, .n_nodes = two};
+    CHECK(hs_connectivity_link(&one_pair, &lists, &options, &made, NULL) == HS_OK);
+    const hs_list_rows   given = rows_of(made, 1, 3);
+    const hs_node_change change = {.n_lists = 1, .n_nodes = two, .target = exchanged};
+    hs_pairs            *kept;
+    CHECK(hs_rows_keep(&given, &change, from, 2, &options, &kept, NULL) == HS_OK);
+    CHECK(hs_pairs_length(kept) == 2);
+    CHECK(memcmp(hs_pairs_array(kept, HS_WANT_SHIFT), both, sizeof both) == 0);
+    hs_pairs_free(kept);
+    hs_connectivity_free(made);
 }
 
 /* One list, or rows alone, of all points or of those that are no ghosts. */

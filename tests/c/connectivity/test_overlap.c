@@ -357,12 +357,13 @@ enum { FEW = 9, REACH = 4, WIDE = 2 * REACH + 1, MOST_IMAGES = FEW * FEW * WIDE 
 
 static bool    has[FEW][FEW][WIDE]; /* row i has j at shift S - REACH */
 static int64_t ends_of_images[FEW + 1], counts_of_images[2], ghosts_of_images[2];
-static int32_t index_of_images[MOST_IMAGES], shift_of_images[2 * MOST_IMAGES];
+static int32_t index_of_images[MOST_IMAGES], shift_of_images[3 * MOST_IMAGES];
 static int32_t i_of_images[MOST_IMAGES];
-static double  x_of_images[2 * FEW];
+static double  x_of_images[3 * FEW];
+static int     image_axes = 2;
 static bool    turned_order;
 
-/* Shifts of up to `most`; both ways: with each (i, j, S) there is (j, i, -S). The second axis does
+/* Shifts of up to `most`; both ways: with each (i, j, S) there is (j, i, -S). The other axes do
  * not repeat. */
 static void
 fill_images(harness_random *random, int most, bool both_ways)
@@ -381,7 +382,7 @@ fill_images(harness_random *random, int most, bool both_ways)
     counts_of_images[1] = FEW - counts_of_images[0];
     for (int l = 0; l < 2; l++)
         ghosts_of_images[l] = (int64_t)(random_bits(random) % (uint64_t)(counts_of_images[l] + 1));
-    for (int k = 0; k < 2 * FEW; k++)
+    for (int k = 0; k < 3 * FEW; k++)
         x_of_images[k] = (double)(random_bits(random) % 4);
     turned_order = random_bits(random) & 1;
 }
@@ -398,8 +399,9 @@ list_images(bool once)
                 if (has[i][j][REACH + s]) {
                     i_of_images[n] = i;
                     index_of_images[n] = j;
-                    shift_of_images[2 * n] = s;
-                    shift_of_images[2 * n++ + 1] = 0;
+                    for (int k = 0; k < image_axes; k++)
+                        shift_of_images[image_axes * n + k] = k == 0 ? s : 0;
+                    n++;
                 }
     }
     ends_of_images[FEW] = n;
@@ -409,7 +411,7 @@ list_images(bool once)
 static hs_points
 image_points(void)
 {
-    return (hs_points){x_of_images, FEW, 2, HS_FLOAT64, 16, 8};
+    return (hs_points){x_of_images, FEW, image_axes, HS_FLOAT64, 8 * image_axes, 8};
 }
 
 static hs_node_lists
@@ -449,7 +451,8 @@ overlap_images(void *context)
     const hs_points     points = image_points();
     const hs_node_lists lists = image_lists();
     const int64_t       n = list_images(false);
-    const hs_index_rows gather = {FEW, ends_of_images, n, index_of_images, shift_of_images, 2};
+    const hs_index_rows gather = {FEW,       ends_of_images, n, index_of_images, shift_of_images,
+                                  image_axes};
     hs_options          options = hs_options_default();
     hs_pairs           *made = NULL;
     options.memory_limit = limit;
@@ -483,6 +486,7 @@ overlaps_have_every_image(void)
     harness_random random = {91};
     for (int trial = 0; trial < TRIALS(60); trial++) {
         hs_pairs *made;
+        image_axes = 2 + trial % 2;
         fill_images(&random, 2, false);
         CHECK(overlap_images(&made) == HS_OK);
         const int64_t *first = hs_pairs_offsets(made);
@@ -496,8 +500,9 @@ overlaps_have_every_image(void)
                 for (int32_t q = 0; q < FEW; q++)
                     for (int t = -REACH; is_of_list(q, l) && t <= REACH; t++)
                         if ((q != i || t != 0) && have_common(i, q, t)) {
-                            right = right && j[at] == number_of(q) && s[2 * at] == t;
-                            right = right && s[2 * at++ + 1] == 0;
+                            const int32_t *own = s + image_axes * at;
+                            right = right && j[at++] == number_of(q) && own[0] == t;
+                            right = right && own[1] == 0 && own[image_axes - 1] == 0;
                         }
                 right = right && at == first[2 * node + l + 1];
             }
@@ -505,6 +510,7 @@ overlaps_have_every_image(void)
         CHECK(right);
         hs_pairs_free(made);
     }
+    image_axes = 2;
     fill_images(&random, 2, false);
     CHECK(fail_each_allocation(overlap_images, NULL, 200) > 8);
     check_arena(overlap_images, NULL);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_histogram.c: pairs are counted in the right bin, with their weights. */
+#include "../../../csrc/core/memory/memory.h"
 #include "../support/among.h"
 #include "../support/bigint.h"
 #include "../support/harness.h"
@@ -120,6 +121,24 @@ each_pair_is_in_its_bin(void)
         CHECK(find_line(&made, split, NULL) == HS_OK);
         CHECK(line_is_right(&made, split));
     }
+}
+
+/* Weights of sizes so far apart take two arrays. */
+static void
+memory_for_weights_may_be_refused(void)
+{
+    static line    made;
+    harness_random random = {1600};
+    hs_status      status = HS_ERR_MEMORY;
+    make_line(&random, 480, &made);
+    made.known.weights = made.weights;
+    for (int refused = 1; status != HS_OK; refused++) {
+        hs_test_fail_allocation(refused);
+        status = find_line(&made, 0, NULL);
+        CHECK(status == HS_ERR_MEMORY || (status == HS_OK && refused > 5));
+        hs_test_fail_allocation(0);
+    }
+    CHECK(line_is_right(&made, 0));
 }
 
 /* Weights where nothing is summed, and types where there is one. */
@@ -412,8 +431,12 @@ threads_add_up_to_the_same(void)
     }
     for (int threads = 1; threads <= 4; threads++) {
         const int          t = threads > 1;
-        const hs_histogram wanted = {
-            .n_edges = EDGES, .edges = edges, .n_types = 1, .counts = counts[t], .sums = sums[t]};
+        const hs_histogram wanted = {.n_edges = EDGES,
+                                     .edges = edges,
+                                     .n_types = 1,
+                                     .counts = threads == 4 ? NULL : counts[t],
+                                     .sums = sums[t]};
+        memset(sums[t], 0, sizeof sums[t]);
         const hs_among among = {.points = SET(&points, .weights = weights)};
         options.threads = threads;
         CHECK(hs_pairs_histogram(&among, &options, &wanted, NULL) == HS_OK);
@@ -423,10 +446,64 @@ threads_add_up_to_the_same(void)
     CHECK(counts[0][EDGES - 1] > 10000);
 }
 
+/* Sizes so far apart that no scale holds the edges: bands have the room of both roundings. */
+static void
+edges_may_be_of_any_size(void)
+{
+    enum { EDGES = 53 };
+    static const double x[] = {0.0, 0x1p-1060, 0x1p1020, 0x1p1022};
+    double              edges[EDGES];
+    const hs_points     points = points_in_rows(x, 4, 1);
+    const hs_options    options = hs_options_default();
+    for (int k = 0; k < EDGES - 1; k++)
+        edges[k] = ldexp(1.0, 40 * k - 1060);
+    edges[EDGES - 2] = 0x1p1020;
+    edges[EDGES - 1] = 0x1p1021;
+    for (int inclusive = 0; inclusive < 2; inclusive++) {
+        int64_t            counts[EDGES];
+        const hs_histogram wanted = {.n_edges = EDGES,
+                                     .edges = edges,
+                                     .inclusive = inclusive,
+                                     .n_types = 1,
+                                     .counts = counts};
+        CHECK(hs_pairs_histogram(AMONG(&points, NULL), &options, &wanted, NULL) == HS_OK);
+        CHECK(counts[0] == inclusive && counts[1] == !inclusive);
+        for (int k = 2; k < EDGES - 2; k++)
+            CHECK(counts[k] == 0);
+        CHECK(counts[EDGES - 2] == 1 + inclusive && counts[EDGES - 1] == !inclusive);
+    }
+}
+
+/* No distance is below zero, and those that are zero are below the next edge. */
+static void
+an_edge_at_zero_may_be_exclusive(void)
+{
+    static const double x[] = {0.0, 0.0, 1.0, 1.0, 3.0}, edges[] = {0.0, 1.0, 3.0};
+    static const struct {
+        int     n_edges;
+        bool    last_inclusive;
+        int64_t counts[3];
+    } cases[] = {{3, true, {0, 2, 8}}, {3, false, {0, 2, 6}}, {1, true, {2}}, {1, false, {0}}};
+    const hs_points  points = points_in_rows(x, 5, 1);
+    const hs_options options = hs_options_default();
+    for (int k = 0; k < 4; k++) {
+        int64_t            counts[3] = {-1, -1, -1};
+        const hs_histogram wanted = {.n_edges = cases[k].n_edges,
+                                     .edges = edges,
+                                     .last_inclusive = cases[k].last_inclusive,
+                                     .n_types = 1,
+                                     .counts = counts};
+        CHECK(hs_pairs_histogram(AMONG(&points, NULL), &options, &wanted, NULL) == HS_OK);
+        for (int e = 0; e < cases[k].n_edges; e++)
+            CHECK(counts[e] == cases[k].counts[e]);
+    }
+}
+
 void
 test_histogram(void)
 {
     RUN(each_pair_is_in_its_bin);
+    RUN(memory_for_weights_may_be_refused);
     RUN(what_is_not_needed_is_not_looked_at);
     RUN(either_side_may_have_the_odd_weights);
     RUN(lattice_pairs_are_all_at_an_edge);
@@ -434,4 +511,6 @@ test_histogram(void)
     RUN(bins_are_those_of_exact_distances);
     RUN(sums_are_rounded_once);
     RUN(threads_add_up_to_the_same);
+    RUN(edges_may_be_of_any_size);
+    RUN(an_edge_at_zero_may_be_exclusive);
 }

@@ -123,6 +123,7 @@ rows_end_at_the_largest_distance(void)
         }
         memset(&writer, 0, sizeof writer);
         hs_nearest_writer_init(&unit.near, &writer);
+        CHECK(hs_nearest_writer_open(&writer) == HS_OK);
         CHECK(hs_nearest_write(&writer, &ranker, count) == HS_OK);
         hs_nearest_flush(&writer);
         const int64_t *j = hs_output_column(&unit.rows, HS_WANT_J);
@@ -131,6 +132,7 @@ rows_end_at_the_largest_distance(void)
             CHECK(j[e] == (e < within[l] ? e + 1 : -1));
             CHECK(d[e] == (e < within[l] ? line[e + 1] : INFINITY));
         }
+        hs_shared_release(unit.near.shared, (void **)&writer.pairs);
         hs_nearest_ranker_free(&ranker);
         nearest_unit_clear(&unit, &leaves, &block);
         nearest_unit_close(&unit);
@@ -523,13 +525,13 @@ static void
 no_point_is_too_near_to_itself(void)
 {
     enum { SPOT_POINTS = 40 };
-    static double      x[SPOT_POINTS + 1];
-    static int64_t     numbers[SPOT_POINTS + 1];
-    const hs_set       points = {.at = points_on_line(x, SPOT_POINTS + 1)};
-    const hs_selection selection = {.query_numbers = numbers, .min_distance = 0.5};
-    const hs_among     among = {.points = &points, .queries = &points, .selection = &selection};
-    hs_options         options = hs_options_default();
-    hs_pairs          *rows = NULL;
+    static double  x[SPOT_POINTS + 1];
+    static int64_t numbers[SPOT_POINTS + 1];
+    const hs_set   points = {.at = points_on_line(x, SPOT_POINTS + 1)};
+    hs_selection   selection = {.query_numbers = numbers, .min_distance = 0.5};
+    const hs_among among = {.points = &points, .queries = &points, .selection = &selection};
+    hs_options     options = hs_options_default();
+    hs_pairs      *rows = NULL;
     for (int64_t i = 0; i <= SPOT_POINTS; i++)
         numbers[i] = i;
     x[SPOT_POINTS] = 1.0;
@@ -539,6 +541,13 @@ no_point_is_too_near_to_itself(void)
     const int64_t *j = hs_pairs_array(rows, HS_WANT_J);
     for (int64_t i = 0; i < SPOT_POINTS; i++)
         CHECK(j[2 * i] == i && j[2 * i + 1] == SPOT_POINTS);
+    hs_pairs_free(rows);
+    selection.query_numbers = NULL; /* queries that are no points are, even in their place */
+    CHECK(hs_nearest_find(&among, 2, &options, &rows, NULL) == HS_OK);
+    j = hs_pairs_array(rows, HS_WANT_J);
+    for (int64_t i = 0; i < SPOT_POINTS; i++)
+        CHECK(j[2 * i] == SPOT_POINTS && j[2 * i + 1] == -1);
+    CHECK(j[2 * SPOT_POINTS] == 0 && j[2 * SPOT_POINTS + 1] == 1);
     hs_pairs_free(rows);
 }
 

@@ -105,6 +105,12 @@ float32_tells_only_what_it_can(void)
     CHECK(ranks_fast(si, squares, 4, &count));
     block.square_error = 0.0249;
     CHECK(!ranks_fast(si, squares, 4, &count));
+    /* In float64, too: others may be as far as the radius. */
+    const double radii[] = {0.75, 1.0, 1.0 + 0x1p-20};
+    for (int e = 0; e < 3; e++) {
+        block.frame.reach = radii[e] * block.frame.unit;
+        CHECK(!ranks_fast(si, NULL, 4, &count) && count == (e < 2 ? -1 : 2));
+    }
     close_scene();
 }
 
@@ -166,6 +172,18 @@ ranking_can_be_stopped_anywhere(void)
         n_stopped += status != HS_OK;
     }
     CHECK(n_stopped > 40 && asked == n_stopped);
+    rank_options.poll = NULL;
+    hs_status status = HS_ERR_MEMORY;
+    for (int refused = 1; status != HS_OK; refused++) { /* memory, by a ranker without any */
+        hs_nearest_ranker_free(&ranker);
+        ranker = (hs_nearest_ranker){.near = &unit.near, .options = &rank_options};
+        hs_nearest_ranker_set(&ranker, si);
+        hs_test_fail_allocation(refused);
+        status = hs_nearest_rank(&ranker, &block, hits, NULL, N, false, &count);
+        CHECK(status == (hs_test_failure_is_due() ? HS_OK : HS_ERR_MEMORY));
+        CHECK(status != HS_OK || (refused > 2 && count == 1));
+        hs_test_fail_allocation(0);
+    }
     close_scene();
 }
 

@@ -425,6 +425,22 @@ find(double min_distance, hs_pairs **pairs, hs_failure *failure)
     return status;
 }
 
+/* Likewise the nearest, far enough that some are other images of excluded pairs. */
+static hs_status
+find_nearest(const hs_points *queries, const hs_selection *selection, hs_pairs **rows,
+             hs_failure *failure)
+{
+    const hs_points points = {far_x, N, 2, HS_FLOAT64, 16, 8};
+    const hs_among  among = {.points = SET(&points, .labels = far_labels),
+                             .queries = SET(queries),
+                             .box = &far_box,
+                             .selection = selection};
+    hs_options      options = hs_options_default();
+    options.cutoff = INFINITY;
+    options.want = HS_WANT_J;
+    return hs_nearest_find(&among, 4, &options, rows, failure);
+}
+
 static bool
 same_pairs(const hs_pairs *one, const hs_pairs *other)
 {
@@ -439,6 +455,7 @@ same_pairs(const hs_pairs *one, const hs_pairs *other)
 static void
 shifts_that_are_not_known_are_told(void)
 {
+    const hs_selection labelled = {.has_labels = true};
     for (int every = 1; every < N; every *= 7) {
         hs_pairs  *near, *far;
         hs_failure failure;
@@ -447,6 +464,8 @@ shifts_that_are_not_known_are_told(void)
             move(i, 0x1p42);
         CHECK(find(0.0, &far, &failure) == HS_ERR_SHIFT_RANGE && far == NULL);
         CHECK(failure.row >= 0 && failure.row < N);
+        CHECK(find_nearest(NULL, &labelled, &far, &failure) == HS_ERR_SHIFT_RANGE);
+        CHECK(far == NULL && failure.row >= 0 && failure.row < N);
         for (int i = every; i < N; i += 2 * every)
             far_labels[i] = -i;
         CHECK(find(0.0, &far, NULL) == HS_OK);
@@ -456,6 +475,70 @@ shifts_that_are_not_known_are_told(void)
         CHECK(same_pairs(near, far) && hs_pairs_length(near) > N);
         hs_pairs_free(near);
         hs_pairs_free(far);
+    }
+}
+
+/* Queries that are points find themselves at S = 0 only, however large S is, and others no nearer
+ * than the least distance. */
+static void
+numbered_queries_may_be_far_away(void)
+{
+    static double      x[2 * N];
+    static int64_t     numbers[N];
+    const hs_points    queries = {x, N, 2, HS_FLOAT64, 16, 8};
+    const hs_selection selection = {.query_numbers = numbers, .min_distance = 1.0 / 16.0};
+    hs_pairs          *rows, *moved[2];
+    make_far_points();
+    memcpy(x, far_x, sizeof x);
+    for (int i = 0; i < N; i++)
+        numbers[i] = i;
+    CHECK(find_nearest(&queries, &selection, &rows, NULL) == HS_OK);
+    const int64_t *j = hs_pairs_array(rows, HS_WANT_J);
+    for (int i = 0; i < N; i++) /* itself */
+        CHECK(j[4 * i] == i);
+    hs_pairs_free(rows);
+    for (int k = 0; k < 2; k++) {
+        for (int i = 0; i < N; i++)
+            x[2 * i + 1] = far_x[2 * i + 1] + SIDE * (k == 0 ? 1.0 : 0x1p42);
+        CHECK(find_nearest(&queries, &selection, &moved[k], NULL) == HS_OK);
+    }
+    j = hs_pairs_array(moved[0], HS_WANT_J);
+    for (int i = 0; i < N; i++) /* itself, but an image that is too near */
+        CHECK(j[4 * i] != i);
+    CHECK(memcmp(j, hs_pairs_array(moved[1], HS_WANT_J), 4 * N * sizeof *j) == 0);
+    hs_pairs_free(moved[0]);
+    hs_pairs_free(moved[1]);
+}
+
+/* Labels at the ends of their range: no difference of two overflows. */
+static void
+labels_may_be_of_any_size(void)
+{
+    static const int64_t labels[] = {INT64_MIN, INT64_MIN + 3, -1, 0, 4, INT64_MAX - 5, INT64_MAX};
+    static const int64_t withins[] = {0, 3, 4, 5, INT64_MAX - 5, INT64_MAX};
+    enum { LABELS = sizeof labels / sizeof *labels };
+    const double    x[LABELS] = {0.0};
+    const hs_points points = points_in_rows(x, LABELS, 1);
+    hs_options      options = hs_options_default();
+    options.cutoff = 1.0;
+    options.sorted = true;
+    for (int k = 0; k < 6; k++) {
+        const hs_selection selection = {.has_labels = true, .within = withins[k]};
+        const hs_among among = {.points = SET(&points, .labels = labels), .selection = &selection};
+        hs_pairs      *pairs = NULL;
+        int64_t        n = 0;
+        CHECK(hs_pairs_find(&among, &options, &pairs, NULL) == HS_OK);
+        const int64_t *i = hs_pairs_array(pairs, HS_WANT_I), *j = hs_pairs_array(pairs, HS_WANT_J);
+        for (int a = 0; a < LABELS; a++) {
+            for (int b = a + 1; b < LABELS; b++) { /* labels ascend */
+                if ((uint64_t)labels[b] - (uint64_t)labels[a] <= (uint64_t)withins[k])
+                    continue;
+                CHECK(n < hs_pairs_length(pairs) && i[n] == a && j[n] == b);
+                n++;
+            }
+        }
+        CHECK(n == hs_pairs_length(pairs));
+        hs_pairs_free(pairs);
     }
 }
 
@@ -474,4 +557,6 @@ test_choice(void)
     RUN(searches_leave_out_what_integers_say);
     RUN(refused_memory_leaves_nothing);
     RUN(shifts_that_are_not_known_are_told);
+    RUN(numbered_queries_may_be_far_away);
+    RUN(labels_may_be_of_any_size);
 }

@@ -299,8 +299,10 @@ neighbourhoods_of_many_rows_can_be_stopped(void)
         hs_status status = HS_ERR_INTERRUPTED;
         options.memory_limit = limited ? 1e9 : INFINITY;
         box.ndim = limited ? 5 : 4;
+        int64_t polls = 0; /* each of the first few, then fewer, of the walk over rows */
         for (n = 0; status == HS_ERR_INTERRUPTED; n++) {
-            left = n;
+            left = polls;
+            polls = polls < 6 ? polls + 1 : 4 * polls;
             status = limited ? hs_pairs_find(AMONG(&many, &box), &options, &pairs, NULL)
                              : hs_pairs_count(AMONG(&one, &box), &options, &count, NULL);
         }

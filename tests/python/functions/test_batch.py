@@ -325,3 +325,13 @@ def test_sorted_pairs_of_a_reach_are_those_of_each_system(reach, algorithm, rng)
             for k, column in enumerate(got):
                 own = [one[k] + 40 * s * (letters[k] != "S") for s, one in enumerate(each)]
                 assert np.array_equal(column, np.concatenate(own))
+
+
+def test_sorted_pairs_of_a_system_with_images_behind_one_without():
+    """What a thread keeps from system to system serves both, though the first needs no S."""
+    positions = [[0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.5, 0.0], [0.0, 0.5]]
+    points = hs.Points(positions, batch=[0, 0, 1, 1, 1], box=[np.eye(2) * 9.0, np.eye(2)])
+    for ours, all_of_them in zip(
+        hs.pairs(points, 1.2, sort=True), hs.pairs(points, 1.2, sort=True, quantities="ijS")
+    ):
+        assert np.array_equal(ours, all_of_them)

@@ -227,6 +227,16 @@ def test_a_pair_that_does_not_count_is_spurious():
     assert hs.verify(apart, 2.0, [0], [2]) and not hs.verify(points, 2.0, [0], [2])
 
 
+@pytest.mark.parametrize("exponent", [8, 30, 500])
+def test_excluded_points_that_coincide_in_a_small_box(exponent):
+    edge = 2.0**-exponent
+    points = hs.Points([[-edge], [-edge]], box=[edge], labels=[0, 0])
+    i, j, S = hs.pairs(points, 2 * edge, exclude=0, quantities="ijS")
+    rest = np.arange(len(i)) != np.nonzero(i != j)[0][0]
+    verdict = hs.verify(points, 2 * edge, i[rest], j[rest], S[rest], exclude=0)
+    assert len(verdict.missed) == 1 and not len(verdict.spurious)
+
+
 def test_excluded_pairs_of_many_images(rng):
     box = [[1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.3, 0.4, 1.0]]
     points = hs.Points(rng.random((4, 3)) * 3.0, box=box)

@@ -32,29 +32,6 @@ def test_searches_in_threads_overlap(rng):
     assert during >= 5
 
 
-@pytest.mark.skipif(
-    not getattr(sys, "_is_gil_enabled", lambda: True)(), reason="callbacks run at the same time"
-)
-def test_threads_that_wait_for_their_turn_do_not_call_after_an_exception(rng):
-    calls = []
-
-    def callback(*pair):
-        calls.append(pair)
-        end = time.perf_counter() + 0.2  # others come as far as their first call
-        while time.perf_counter() < end:
-            pass
-        raise LookupError
-
-    interval = sys.getswitchinterval()
-    sys.setswitchinterval(1000.0)  # no thread gives way to another in between
-    try:
-        with pytest.raises(LookupError):
-            hs.for_each_pair(rng.random((8000, 3)), 0.1, callback, threads=4, thread_safe=True)
-    finally:
-        sys.setswitchinterval(interval)
-    assert len(calls) == 1
-
-
 @pytest.mark.slow
 def test_points_that_change_during_the_search_never_crash():
     # Any answer is allowed, or an exception; the process must survive and work afterwards.

@@ -13,7 +13,7 @@ FILES = sorted(CSRC.rglob("*.[ch]"))
 ORDER = [
     {"base"}, {"memory"}, {"exact"}, {"kernels"}, {"threads"}, {"box"}, {"scene"}, {"cells"},
     {"search"}, {"levels"}, {"collect"},
-    {"rows", "histogram", "nearest", "verlet", "connectivity", "dynamic"}, {"api"},
+    {"rows", "histogram", "nearest", "verlet", "dynamic"}, {"api"}, {"connectivity"},
 ]  # fmt: skip
 PUBLIC = ("halfshell.h", "halfshell_dynamic.h", "halfshell_nodes.h")
 PLACE = {folder: place for place, folders in enumerate(ORDER) for folder in folders}
