@@ -57,17 +57,6 @@ find_moves(moves *moving, const hs_metric *metric, const hs_batch *batch, int32_
     }
 }
 
-/* Pairs that no row moves: their difference is exact, however large. */
-HS_ALWAYS_INLINE unsigned
-resting_pairs(const moves *moving)
-{
-    unsigned resting = EVERY_LANE;
-    for (int m = 0; m < moving->n; m++) {
-        resting &= bits(moving->resting[m]);
-    }
-    return resting;
-}
-
 /*
  * q - p + shift * rows of the pairs from e on. A pair that a row does not move keeps its sum.
  * Adding zero would change little, but not nothing: the sign of a zero, and infinity to NaN.
@@ -172,7 +161,11 @@ decide_loop(const hs_metric *metric, const hs_batch *batch, const int ndim, cons
         const reals slack = multiply(multiply(broadcast(2.0), d.error), add(cutoff, d.error));
         unsigned    usable = bits(d.usable);
         if (shifted && HS_UNLIKELY((usable & present) != present)) {
-            usable |= resting_pairs(&moving);
+            unsigned resting = EVERY_LANE; /* moved by no row: exact, however large */
+            for (int m = 0; m < moving.n; m++) {
+                resting &= bits(moving.resting[m]);
+            }
+            usable |= resting;
         }
         usable &= present;
         unsigned       within = bits(is_at_least(subtract(sure_in, square), slack)) & usable;

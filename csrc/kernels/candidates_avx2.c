@@ -34,13 +34,6 @@ load_S(const hs_candidate_run *run, const int32_t *place, int k, const bool whol
                                                        turns[place[2]], turns[place[3]]));
 }
 
-HS_ALWAYS_INLINE __m256d
-load_x(const double *x, const int32_t *place, const bool whole)
-{
-    return whole ? _mm256_loadu_pd(x + place[0])
-                 : _mm256_setr_pd(x[place[0]], x[place[1]], x[place[2]], x[place[3]]);
-}
-
 /* Two int32 of each of four, as the bits of one double. */
 HS_ALWAYS_INLINE __m256d
 pair_up(__m128i a, __m128i b)
@@ -55,13 +48,15 @@ load(const hs_candidate_run *run, hs_candidate *to, const bool whole)
     const __m256d grid = _mm256_set1_pd(run->by.grid), fine = _mm256_set1_pd(run->by.fine);
     __m256d       coarse = _mm256_setzero_pd();
     int32_t       c = 0;
-    bool          are_fine = true;
     for (; c + 4 <= run->n; c += 4) {
         const int32_t *place = run->place + c;
         const __m128i  number = _mm_loadu_si128((const __m128i *)(run->number + c));
         __m256d        large[3], small[3];
         for (int k = 0; k < 3; k++) {
-            const __m256d q = load_x(run->x[k], place, whole);
+            const double *x = run->x[k];
+            const __m256d q =
+                whole ? _mm256_loadu_pd(x + place[0])
+                      : _mm256_setr_pd(x[place[0]], x[place[1]], x[place[2]], x[place[3]]);
             const __m256d most = _mm256_sub_pd(_mm256_add_pd(q, grid), grid);
             const __m256d left = _mm256_sub_pd(q, most);
             const __m256d rounded = _mm256_sub_pd(_mm256_add_pd(left, fine), fine);
@@ -74,16 +69,7 @@ load(const hs_candidate_run *run, hs_candidate *to, const bool whole)
         store_four(to[c].small, small[0], small[1], small[2],
                    pair_up(load_S(run, place, 1, whole), load_S(run, place, 2, whole)));
     }
-    for (; c < run->n; c++) {
-        double  q[3];
-        int32_t S[3];
-        for (int k = 0; k < 3; k++) {
-            q[k] = run->x[k][run->place[c]];
-            S[k] = run->image[k] - (run->turns[k] != NULL ? run->turns[k][run->place[c]] : 0);
-        }
-        are_fine &= hs_candidate_set(&to[c], q, run->by, &run->moved, run->number[c], S);
-    }
-    return are_fine && _mm256_movemask_pd(coarse) == 0;
+    return hs_candidates_from(run, 3, c, to) && _mm256_movemask_pd(coarse) == 0;
 }
 
 bool

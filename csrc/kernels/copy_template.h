@@ -12,34 +12,11 @@ magnitudes(floats a)
     return bits_in_both(bits_of(a), broadcast_integer(0x7fffffff));
 }
 
-/* Largest magnitude of n floats. */
-HS_ALWAYS_INLINE integers
-largest_of(const float *y, int32_t n, integers largest)
-{
-    int32_t c = 0;
-    for (; c + LANES <= n; c += LANES) {
-        largest = larger(largest, magnitudes(load(y + c)));
-    }
-    return c < n ? larger(largest, keep_lanes(magnitudes(load(y + c)), n - c)) : largest;
-}
-
 /* LANES candidates: points from number si on. */
 typedef struct gathered {
     floats   y[HS_MAX_DIM];
     integers id, number;
 } gathered;
-
-HS_ALWAYS_INLINE gathered
-gather_lanes(const hs_gather *gather, const hs_run *run, int64_t si, const int ndim)
-{
-    gathered these;
-    for (int k = 0; k < ndim; k++) {
-        these.y[k] = load_relative(gather->x[k] + si, run->moved[k], 0.0, 1.0);
-    }
-    these.id = load_integers(gather->order + si);
-    these.number = add_integers(lane_numbers(), broadcast_integer((int32_t)si));
-    return these;
-}
 
 /* Those that are not surely far from the box. Never fused: every kernel leaves out the same. */
 HS_ALWAYS_INLINE mask
@@ -55,16 +32,6 @@ near_lanes(const gathered *these, const hs_nearest_box *box, const int ndim)
     return not_greater(s, broadcast(box->out));
 }
 
-HS_ALWAYS_INLINE void
-store_lanes(const hs_gather *gather, int32_t at, const gathered *these, const int ndim)
-{
-    for (int k = 0; k < ndim; k++) {
-        store(gather->y[k] + at, these->y[k]);
-    }
-    store_integers(gather->id + at, these->id);
-    store_integers(gather->number + at, these->number);
-}
-
 /* Stores those in m; returns how many. */
 HS_ALWAYS_INLINE int32_t
 append_lanes(const hs_gather *gather, int32_t at, const gathered *these, mask m, const int ndim)
@@ -74,17 +41,6 @@ append_lanes(const hs_gather *gather, int32_t at, const gathered *these, mask m,
     }
     (void)append(gather->id + at, these->id, m);
     return append(gather->number + at, these->number, m);
-}
-
-/* The larger of `largest` and the magnitudes of the first n lanes, or of all if n is no less. */
-HS_ALWAYS_INLINE integers
-largest_gathered(const gathered *these, int32_t n, integers largest, const int ndim)
-{
-    for (int k = 0; k < ndim; k++) {
-        const integers sizes = magnitudes(these->y[k]);
-        largest = larger(largest, n < LANES ? keep_lanes(sizes, n) : sizes);
-    }
-    return largest;
 }
 
 HS_ALWAYS_INLINE void
@@ -100,10 +56,21 @@ gather_runs(hs_gather *gather, hs_run *runs, int32_t n_runs, const int ndim, con
         from = runs[r + 1].at;
         runs[r].at = at;
         for (int32_t c = 0; c < n; c += LANES) {
-            const gathered these = gather_lanes(&own, run, (int64_t)run->si + c, ndim);
+            const int64_t si = (int64_t)run->si + c;
+            gathered      these;
+            for (int k = 0; k < ndim; k++) {
+                these.y[k] = load_relative(own.x[k] + si, run->moved[k], 0.0, 1.0);
+            }
+            these.id = load_integers(own.order + si);
+            these.number = add_integers(lane_numbers(), broadcast_integer((int32_t)si));
+            for (int k = 0; !prunes && k < ndim; k++) {
+                const integers sizes = magnitudes(these.y[k]);
+                store(own.y[k] + at + c, these.y[k]);
+                largest = larger(largest, n - c < LANES ? keep_lanes(sizes, n - c) : sizes);
+            }
             if (!prunes) {
-                store_lanes(&own, at + c, &these, ndim);
-                largest = largest_gathered(&these, n - c, largest, ndim);
+                store_integers(own.id + at + c, these.id);
+                store_integers(own.number + at + c, these.number);
                 continue;
             }
             mask near = near_lanes(&these, &own.near, ndim);
@@ -116,7 +83,13 @@ gather_runs(hs_gather *gather, hs_run *runs, int32_t n_runs, const int ndim, con
     }
     /* What was left out does not count, so that what was kept is read again. */
     for (int k = 0; prunes && k < ndim; k++) {
-        largest = largest_of(own.y[k] + first, at - first, largest);
+        int32_t c = first;
+        for (; c + LANES <= at; c += LANES) {
+            largest = larger(largest, magnitudes(load(own.y[k] + c)));
+        }
+        if (c < at) {
+            largest = larger(largest, keep_lanes(magnitudes(load(own.y[k] + c)), at - c));
+        }
     }
     gather->largest = (uint32_t)largest_lane(largest);
     gather->n = at;

@@ -44,46 +44,10 @@ cpuid(uint32_t leaf)
     return r;
 }
 
-/* Register sets that the operating system saves; 0 when it does not say. */
-static uint64_t
-saved_registers(void)
-{
-    if (!(cpuid(1).c >> 27 & 1)) { /* OSXSAVE: xgetbv may be used */
-        return 0;
-    }
-#if defined(_MSC_VER)
-    return _xgetbv(0);
-#else
-    uint32_t low, high;
-    __asm__ __volatile__("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
-    return (uint64_t)high << 32 | low;
-#endif
-}
-
 static bool
 has_bits(uint64_t word, uint64_t bits)
 {
     return (word & bits) == bits;
-}
-
-static int
-detect_features(void)
-{
-    const uint32_t fma_popcnt_avx = 1u << 12 | 1u << 23 | 1u << 28;        /* leaf 1, ecx */
-    const uint32_t avx2 = 1u << 5;                                         /* leaf 7, ebx */
-    const uint32_t f_dq_bw_vl = 1u << 16 | 1u << 17 | 1u << 30 | 1u << 31; /* leaf 7, ebx */
-    const uint64_t saved = saved_registers();
-    const uint32_t extended = cpuid(7).b;
-    int            found = DETECTED;
-    if (has_bits(saved, 0x6) && /* xmm, ymm */
-        has_bits(cpuid(1).c, fma_popcnt_avx) && has_bits(extended, avx2)) {
-        found |= HS_CPU_AVX2;
-        found |= has_bits(saved, 0xe6) && /* and opmask, zmm */
-                         has_bits(extended, f_dq_bw_vl)
-                     ? HS_CPU_AVX512
-                     : 0;
-    }
-    return found;
 }
 
 /* Found once in a process: in a virtual machine every cpuid calls the host, which takes tens of
@@ -92,10 +56,29 @@ int
 hs_cpu_features(void)
 {
     static ATOMIC_INT known;
-    if (known == 0) {
-        known = detect_features();
+    if (known != 0) {
+        return (int)known;
     }
-    return (int)known;
+    const uint32_t basic = cpuid(1).c, extended = cpuid(7).b;
+    const uint32_t osxsave_fma_popcnt_avx = 1u << 27 | 1u << 12 | 1u << 23 | 1u << 28;
+    const uint32_t avx2 = 1u << 5, f_dq_bw_vl = 1u << 16 | 1u << 17 | 1u << 30 | 1u << 31;
+    int            found = DETECTED;
+    if (has_bits(basic, osxsave_fma_popcnt_avx) && has_bits(extended, avx2)) {
+        /* Register sets that the operating system saves. */
+#if defined(_MSC_VER)
+        const uint64_t saved = _xgetbv(0);
+#else
+        uint32_t low, high;
+        __asm__ __volatile__("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
+        const uint64_t saved = (uint64_t)high << 32 | low;
+#endif
+        found |= has_bits(saved, 0x6) ? HS_CPU_AVX2 : 0;               /* xmm, ymm */
+        if (has_bits(saved, 0xe6) && has_bits(extended, f_dq_bw_vl)) { /* and opmask, zmm */
+            found |= HS_CPU_AVX512;
+        }
+    }
+    known = found;
+    return found;
 }
 
 #else

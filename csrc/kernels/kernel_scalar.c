@@ -153,24 +153,21 @@ test_chunk(const hs_scan *scan, const scalar_scan *v, int32_t begin, int32_t n, 
     return unsure != 0;
 }
 
-/* Whether candidate c, a hit, is surely within. */
-HS_ALWAYS_INLINE bool
-is_sure(const hs_scan *scan, const scalar_scan *v, int32_t c, const int ndim, hs_scan_form form)
-{
-    if (form == HS_SCAN_SUPPORTS) {
-        return meet_supports(scan, v->centre, &v->own, c, ndim).sure;
-    }
-    const float s = square(scan->y, v->centre, c, ndim);
-    return s < (form == HS_SCAN_LIMITS ? thresholds_of(scan, v, c).in : v->thresholds.in);
-}
-
 /* Notes the unsure ones of a tile, by computing its sums again. */
 HS_ALWAYS_INLINE void
 note_unsure(hs_scan *scan, const scalar_scan *v, int32_t t, int32_t begin, int32_t n,
             const int ndim, const hs_scan_form form, const int32_t *near, int32_t at)
 {
     for (int32_t c = begin; c < begin + n; c++) {
-        if (near[c - begin] && !is_sure(scan, v, c, ndim, form)) {
+        bool is_sure;
+        if (form == HS_SCAN_SUPPORTS) {
+            is_sure = meet_supports(scan, v->centre, &v->own, c, ndim).sure;
+        } else {
+            const float in = form == HS_SCAN_LIMITS ? thresholds_of(scan, v, c).in
+                                                    : v->thresholds.in;
+            is_sure = square(scan->y, v->centre, c, ndim) < in;
+        }
+        if (near[c - begin] && !is_sure) {
             scan->unsure[scan->n_unsure++] = (hs_unsure){t, c, at};
         }
         at += near[c - begin];
@@ -236,34 +233,25 @@ gather_points(const hs_gather *gather, const hs_run *run, int32_t at, int32_t n)
     }
 }
 
-static bool
-is_near(const hs_gather *gather, int32_t c)
-{
-    const hs_nearest_box *box = &gather->near;
-    float                 s = 0.0f;
-    for (int k = 0; k < gather->ndim; k++) {
-        const float below = box->low[k] - gather->y[k][c], above = gather->y[k][c] - box->high[k];
-        const float most = below > above ? below : above;
-        const float gap = most <= 0.0f ? 0.0f : most; /* NaN is kept */
-        s = s + gap * gap;
-    }
-    return !(s > box->out);
-}
-
 /* Of n candidates from `at` on, those that are not surely far from the box, packed; returns how
  * many. */
 static int32_t
 keep_near(const hs_gather *gather, int32_t at, int32_t n)
 {
-    int32_t to = at;
+    const hs_nearest_box *box = &gather->near;
+    int32_t               to = at;
     for (int32_t c = at; c < at + n; c++) {
-        const bool near = is_near(gather, c);
+        float s = 0.0f;
         for (int k = 0; k < gather->ndim; k++) {
-            gather->y[k][to] = gather->y[k][c];
+            const float y = gather->y[k][c], below = box->low[k] - y, above = y - box->high[k];
+            const float most = below > above ? below : above;
+            const float gap = most <= 0.0f ? 0.0f : most; /* NaN is kept */
+            s = s + gap * gap;
+            gather->y[k][to] = y;
         }
         gather->id[to] = gather->id[c];
         gather->number[to] = gather->number[c];
-        to += near;
+        to += !(s > box->out);
     }
     return to - at;
 }

@@ -7,15 +7,13 @@
 #include "wide_avx512.h"
 #include "write.h"
 
+/* One operation a line. */
+/* clang-format off */
+
 typedef __m256i  places; /* int32, as many as there are reals */
 typedef __mmask8 marks;  /* truth about places */
 
-HS_ALWAYS_INLINE places
-broadcast_place(int32_t a)
-{
-    return _mm256_set1_epi32(a);
-}
-
+HS_ALWAYS_INLINE places broadcast_place(int32_t a) { return _mm256_set1_epi32(a); }
 /* Of two of them. */
 HS_ALWAYS_INLINE reals
 load_two_records(const double *from, int32_t first, int32_t second)
@@ -24,7 +22,6 @@ load_two_records(const double *from, int32_t first, int32_t second)
     const __m256d high = _mm256_loadu_pd(from + (int64_t)second * 2 * HS_RECORD);
     return _mm512_insertf64x4(_mm512_castpd256_pd512(low), high, 1);
 }
-
 /* Four entries of each of LANES hs_candidate, from the first or the fifth on. */
 HS_ALWAYS_INLINE void
 load_records(const double *from, const int32_t *at, reals *entries)
@@ -42,114 +39,48 @@ load_records(const double *from, const int32_t *at, reals *entries)
     entries[2] = _mm512_permutex2var_pd(ab_even, high, cd_even);
     entries[3] = _mm512_permutex2var_pd(ab_odd, high, cd_odd);
 }
-
 /* The first, and the second, of the two places that each lane has the bits of. */
 HS_ALWAYS_INLINE places
 even_places(reals a)
 {
     return _mm512_cvtepi64_epi32(_mm512_castpd_si512(a));
 }
-
 HS_ALWAYS_INLINE places
 odd_places(reals a)
 {
     return _mm512_cvtepi64_epi32(_mm512_srli_epi64(_mm512_castpd_si512(a), 32));
 }
-
-HS_ALWAYS_INLINE places
-add_places(places a, places b)
-{
-    return _mm256_add_epi32(a, b);
-}
-
-HS_ALWAYS_INLINE places
-lower_place(places a, places b)
-{
-    return _mm256_min_epi32(a, b);
-}
-
-HS_ALWAYS_INLINE places
-higher_place(places a, places b)
-{
-    return _mm256_max_epi32(a, b);
-}
-
-HS_ALWAYS_INLINE marks
-place_below(places a, places b)
-{
-    return _mm256_cmplt_epi32_mask(a, b);
-}
-
-HS_ALWAYS_INLINE marks
-place_equal(places a, places b)
-{
-    return _mm256_cmpeq_epi32_mask(a, b);
-}
-
-HS_ALWAYS_INLINE marks
-both_marks(marks a, marks b)
-{
-    return a & b;
-}
-
-HS_ALWAYS_INLINE marks
-either_mark(marks a, marks b)
-{
-    return a | b;
-}
-
+HS_ALWAYS_INLINE places add_places(places a, places b) { return _mm256_add_epi32(a, b); }
+HS_ALWAYS_INLINE places lower_place(places a, places b) { return _mm256_min_epi32(a, b); }
+HS_ALWAYS_INLINE places higher_place(places a, places b) { return _mm256_max_epi32(a, b); }
+HS_ALWAYS_INLINE marks place_below(places a, places b) { return _mm256_cmplt_epi32_mask(a, b); }
+HS_ALWAYS_INLINE marks place_equal(places a, places b) { return _mm256_cmpeq_epi32_mask(a, b); }
+HS_ALWAYS_INLINE marks both_marks(marks a, marks b) { return a & b; }
+HS_ALWAYS_INLINE marks either_mark(marks a, marks b) { return a | b; }
 /* One bit a lane. */
-HS_ALWAYS_INLINE unsigned
-mark_bits(marks m)
-{
-    return m;
-}
-
-HS_ALWAYS_INLINE truth
-widen_marks(marks m)
-{
-    return m;
-}
-
+HS_ALWAYS_INLINE unsigned mark_bits(marks m) { return m; }
+HS_ALWAYS_INLINE truth widen_marks(marks m) { return m; }
 /* -a where m. */
 HS_ALWAYS_INLINE places
 negate_places(marks m, places a)
 {
     return _mm256_mask_sub_epi32(a, m, _mm256_setzero_si256(), a);
 }
-
 /* a b + c, and c - a b, rounded once. */
-HS_ALWAYS_INLINE reals
-add_product(reals a, reals b, reals c)
-{
-    return _mm512_fmadd_pd(a, b, c);
-}
-
+HS_ALWAYS_INLINE reals add_product(reals a, reals b, reals c) { return _mm512_fmadd_pd(a, b, c); }
 HS_ALWAYS_INLINE reals
 subtract_product(reals a, reals b, reals c)
 {
     return _mm512_fnmadd_pd(a, b, c);
 }
-
 /* About 1 / sqrt(a): within 2^-11 of it, of itself, for a from 2^-120 to 2^120. */
-HS_ALWAYS_INLINE reals
-guess_inverse_root(reals a)
-{
-    return _mm512_rsqrt14_pd(a);
-}
-
-HS_ALWAYS_INLINE void
-put_places(int32_t *to, places a)
-{
-    _mm256_storeu_si256((__m256i *)to, a);
-}
-
+HS_ALWAYS_INLINE reals guess_inverse_root(reals a) { return _mm512_rsqrt14_pd(a); }
+HS_ALWAYS_INLINE void put_places(int32_t *to, places a) { _mm256_storeu_si256((__m256i *)to, a); }
 HS_ALWAYS_INLINE void
 put_wide_places(int64_t *to, places a)
 {
     _mm512_storeu_si512(to, _mm512_cvtepi32_epi64(a));
 }
-
 /* x y, x y, ... */
 HS_ALWAYS_INLINE void
 put_two_reals(double *to, reals x, reals y)
@@ -159,7 +90,6 @@ put_two_reals(double *to, reals x, reals y)
     _mm512_storeu_pd(to, _mm512_permutex2var_pd(x, first, y));
     _mm512_storeu_pd(to + 8, _mm512_permutex2var_pd(x, second, y));
 }
-
 /* x y z, x y z, ... */
 HS_ALWAYS_INLINE void
 put_three_reals(double *to, reals x, reals y, reals z)
@@ -174,7 +104,6 @@ put_three_reals(double *to, reals x, reals y, reals z)
     _mm512_storeu_pd(to + 8, _mm512_permutex2var_pd(_mm512_permutex2var_pd(x, xy1, y), z1, z));
     _mm512_storeu_pd(to + 16, _mm512_permutex2var_pd(_mm512_permutex2var_pd(x, xy2, y), z2, z));
 }
-
 HS_ALWAYS_INLINE void
 put_two_places(int32_t *to, places x, places y)
 {
@@ -182,7 +111,6 @@ put_two_places(int32_t *to, places x, places y)
     const __m512i order = _mm512_setr_epi32(0, 8, 1, 9, 2, 10, 3, 11, 4, 12, 5, 13, 6, 14, 7, 15);
     _mm512_storeu_si512(to, _mm512_permutexvar_epi32(order, both));
 }
-
 HS_ALWAYS_INLINE void
 put_three_places(int32_t *to, places x, places y, places z)
 {

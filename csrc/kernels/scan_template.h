@@ -33,23 +33,6 @@ typedef struct vector_scan {
     floats       support_in, support_out;
 } vector_scan;
 
-/* The support of a point; zeros where the rule does not look at it. */
-HS_ALWAYS_INLINE void
-set_support(const hs_support_scan *supports, int32_t t, const int ndim, vector_scan *v)
-{
-    const float         none[HS_SUPPORT_ENTRIES + 1] = {0.0f};
-    const int           n = hs_support_entries(ndim);
-    const float        *numbers = hs_rule_needs_asking(supports->rule)
-                                      ? supports->of_point + (int64_t)t * hs_support_numbers(ndim)
-                                      : none;
-    const hs_thresholds thresholds = hs_support_thresholds(supports->form, numbers[n]);
-    for (int e = 0; e < n; e++) {
-        v->support[e] = broadcast(numbers[e]);
-    }
-    v->support_in = broadcast(thresholds.in);
-    v->support_out = broadcast(thresholds.out);
-}
-
 /* Sets what depends on the point. */
 HS_ALWAYS_INLINE void
 set_point(const hs_scan *scan, int32_t t, const int ndim, const hs_scan_form form, vector_scan *v)
@@ -64,29 +47,32 @@ set_point(const hs_scan *scan, int32_t t, const int ndim, const hs_scan_form for
         v->radius = broadcast(radii != NULL ? radii[t] : 0.0f);
         v->others = hs_limit_row(&scan->limits, t);
     }
-    if (form == HS_SCAN_SUPPORTS) {
-        set_support(&scan->supports, t, ndim, v);
+    if (form == HS_SCAN_SUPPORTS) { /* zeros where the rule does not look at that of the point */
+        const hs_support_scan *supports = &scan->supports;
+        const float            none[HS_SUPPORT_ENTRIES + 1] = {0.0f};
+        const int              n = hs_support_entries(ndim);
+        const int64_t          at = (int64_t)t * hs_support_numbers(ndim);
+        const float        *numbers = hs_rule_needs_asking(supports->rule) ? supports->of_point + at
+                                                                           : none;
+        const hs_thresholds thresholds = hs_support_thresholds(supports->form, numbers[n]);
+        for (int e = 0; e < n; e++) {
+            v->support[e] = broadcast(numbers[e]);
+        }
+        v->support_in = broadcast(thresholds.in);
+        v->support_out = broadcast(thresholds.out);
     }
 }
 
-/* The limits of LANES candidates from c on, as floats. */
-HS_ALWAYS_INLINE floats
-limits_of(const hs_limit_scan *limits, const hs_rule rule, floats radius, const float *others,
-          int32_t c)
-{
-    const floats other = others != NULL ? load(others + c) : broadcast(0.0f);
-    const floats limit = rule == HS_RULE_MAX   ? larger_of(radius, other)
-                         : rule == HS_RULE_MIN ? smaller_of(radius, other)
-                                               : add(radius, other);
-    return smaller_of(limit, broadcast(limits->bound));
-}
-
-/* Thresholds of these candidates, for HS_SCAN_LIMITS. */
+/* Thresholds of LANES candidates from c on, for HS_SCAN_LIMITS. */
 HS_ALWAYS_INLINE void
 set_limits(const hs_scan *scan, const hs_rule rule, int32_t c, vector_scan *v)
 {
     const hs_limit_form form = scan->limits.form;
-    const floats        limit = limits_of(&scan->limits, rule, v->radius, v->others, c);
+    const floats        other = v->others != NULL ? load(v->others + c) : broadcast(0.0f);
+    const floats        made = rule == HS_RULE_MAX   ? larger_of(v->radius, other)
+                               : rule == HS_RULE_MIN ? smaller_of(v->radius, other)
+                                                     : add(v->radius, other);
+    const floats        limit = smaller_of(made, broadcast(scan->limits.bound));
     const floats        less = broadcast(-form.in_less), more = broadcast(form.out_more);
     const floats        in =
         larger_of(multiply_add(limit, broadcast(form.in_factor), less), broadcast(0.0f));

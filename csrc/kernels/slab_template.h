@@ -23,19 +23,6 @@ note_open(hs_slab *slab, int32_t bundle, int32_t pair, unsigned near, unsigned m
     }
 }
 
-/* q of a bundle. */
-HS_ALWAYS_INLINE void
-set_centre(const hs_slab *slab, const hs_bundle *bundle, const int ndim, const bool shifted,
-           floats *centre)
-{
-    const int    stride = hs_slab_stride(ndim);
-    const float *y = slab->y + (int64_t)bundle->point * stride;
-    for (int k = 0; k < ndim; k++) {
-        const float offset = shifted ? slab->offset[(int64_t)bundle->image * stride + k] : 0.0f;
-        centre[k] = broadcast(shifted ? y[k] - offset : y[k]);
-    }
-}
-
 /* The squares of LANES pairs from `e` on; what is in the last entries of their points to *last. */
 HS_ALWAYS_INLINE floats
 squares_of_pairs(const hs_slab *slab, int64_t e, const floats *centre, const int ndim, floats *last)
@@ -65,8 +52,12 @@ recheck_bundles(hs_slab *slab, const int ndim, const bool shifted, const bool nu
     for (int64_t e = slab->first; e < slab->end; t++) {
         const hs_bundle *bundle = &slab->bundles[t];
         const int64_t    end = bundle->end < slab->end ? bundle->end : slab->end;
+        const float     *y = slab->y + (int64_t)bundle->point * stride;
         floats           centre[HS_MAX_DIM];
-        set_centre(slab, bundle, ndim, shifted, centre);
+        for (int k = 0; k < ndim; k++) {
+            const float offset = shifted ? slab->offset[(int64_t)bundle->image * stride + k] : 0.0f;
+            centre[k] = broadcast(shifted ? y[k] - offset : y[k]);
+        }
         for (; e < end; e += LANES) {
             const int32_t pair = (int32_t)(e - slab->first);
             floats        last;
@@ -86,8 +77,7 @@ recheck_bundles(hs_slab *slab, const int ndim, const bool shifted, const bool nu
         e = end;
         slab->hits_end[t] = at;
         if (numbers) {
-            memcpy(&slab->point[t], slab->y + (int64_t)bundle->point * stride + stride - 1,
-                   sizeof(int32_t));
+            memcpy(&slab->point[t], y + stride - 1, sizeof(int32_t));
         }
     }
     slab->n_bundles = t;
@@ -97,16 +87,16 @@ recheck_bundles(hs_slab *slab, const int ndim, const bool shifted, const bool nu
 HS_ALWAYS_INLINE void
 recheck_dimension(hs_slab *slab, const int ndim)
 {
-    if (slab->offset == NULL) {
-        if (slab->numbers && hs_slab_has_numbers(ndim)) {
-            recheck_bundles(slab, ndim, false, true);
-        } else {
-            recheck_bundles(slab, ndim, false, false);
-        }
-    } else if (slab->numbers && hs_slab_has_numbers(ndim)) {
+    const bool shifted = slab->offset != NULL;
+    const bool numbers = slab->numbers && hs_slab_has_numbers(ndim);
+    if (shifted && numbers) {
         recheck_bundles(slab, ndim, true, true);
-    } else {
+    } else if (shifted) {
         recheck_bundles(slab, ndim, true, false);
+    } else if (numbers) {
+        recheck_bundles(slab, ndim, false, true);
+    } else {
+        recheck_bundles(slab, ndim, false, false);
     }
 }
 

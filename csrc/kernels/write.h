@@ -84,7 +84,27 @@ typedef struct hs_candidate_run {
     hs_moved       moved;
 } hs_candidate_run;
 
-/* hs_candidate_set for all of them, S being image - turns. Returns whether they are fine. */
+/* hs_candidate_set for those from `first` on, S being image - turns. Returns whether they are
+ * fine. */
+HS_ALWAYS_INLINE bool
+hs_candidates_from(const hs_candidate_run *run, const int ndim, int32_t first, hs_candidate *to)
+{
+    bool are_fine = true;
+    for (int32_t c = first; c < run->n; c++) {
+        const int32_t place = run->place[c];
+        double        q[HS_WRITE_MOST_DIM];
+        int32_t       S[HS_WRITE_MOST_DIM];
+        for (int k = 0; k < HS_WRITE_MOST_DIM; k++) {
+            q[k] = k < ndim ? run->x[k][place] : 0.0;
+            S[k] = k < ndim ? run->image[k] : 0;
+            S[k] -= k < ndim && run->turns[k] != NULL ? run->turns[k][place] : 0;
+        }
+        are_fine &= hs_candidate_set(&to[c], q, run->by, &run->moved, run->number[c], S);
+    }
+    return are_fine;
+}
+
+/* The same for all of them, in three dimensions. */
 typedef bool (*hs_candidates_fn)(const hs_candidate_run *run, hs_candidate *to);
 
 /*

@@ -34,14 +34,6 @@ typedef struct tile {
     double  square[TILE + LANES], rest[TILE + LANES];
 } tile;
 
-/* Ordinary numbers behind those of hits before `end`. */
-HS_ALWAYS_INLINE void
-pad_tile(tile *of, int32_t end)
-{
-    store(of->square + (end - of->first), broadcast(1.0));
-    store(of->rest + (end - of->first), broadcast(0.0));
-}
-
 /* False where the caller's unit is out of reach. */
 HS_ALWAYS_INLINE bool
 set_scales(const hs_write *write, scales *by)

@@ -124,14 +124,6 @@ find_vectors(const hs_write *write, const asking *point, int32_t t, const int32_
     }
 }
 
-HS_ALWAYS_INLINE void
-put_distances(double *to, reals unit, reals cutoff, reals largest, reals distance)
-{
-    const reals d = multiply(distance, unit);
-    store(to, choose(is_below(d, cutoff), d, largest));
-    hs_prefetch_later(to, LANES * sizeof(double));
-}
-
 /* Plus zero: a zero has no sign, which would tell where the search met the pair. */
 HS_ALWAYS_INLINE void
 put_vectors(const hs_write *write, int64_t e, reals unit, const lanes *of, const reals *D,
@@ -254,12 +246,15 @@ finish_tile(const hs_write *write, const hs_hits *hits, const scales *scale, til
     const reals  cutoff = broadcast(write->cutoff), largest = broadcast(write->largest);
     double      *distance = write->distance;
     unsigned     measured = 0;
-    pad_tile(of, end);
+    store(of->square + (end - of->first), broadcast(1.0)); /* ordinary numbers behind the last */
+    store(of->rest + (end - of->first), broadcast(0.0));
     for (int32_t e = of->first, at = 0; e < end; e += LANES, at += LANES) {
         reals    d;
         unsigned left = ~find_distances(&by, load(of->square + at), load(of->rest + at), &d);
         if (distance != NULL) {
-            put_distances(distance + e, unit, cutoff, largest, d);
+            const reals own = multiply(d, unit);
+            store(distance + e, choose(is_below(own, cutoff), own, largest));
+            hs_prefetch_later(distance + e, LANES * sizeof(double));
         }
         left &= end - e < LANES ? (1u << (end - e)) - 1 : EVERY_LANE;
         measured += count(left);

@@ -33,6 +33,7 @@ from halfshell._functions.bricks import (
     Piece,
     Summary,
     Terms,
+    check_precision,
     divide,
     part_of,
     renumbered,
@@ -402,8 +403,7 @@ class _Parts:
         for name, value in (("box", box), ("periodic", periodic)):
             if given is points and value is not None:
                 raise ValueError(f"Points bring their own {name}: leave {name} out")
-        if current().precision != "exact":
-            raise ValueError(f"bricks need precision 'exact', got {current().precision!r}")
+        check_precision()
         n_bricks = max(1, len(given.chunks)) if n is None else as_brick_count(n)
         scene = _Points(np.empty((0, given.ndim)), box=given.box, periodic=given.periodic)
         # Radii and supports do not matter for a histogram, nor whether the cutoff counts.

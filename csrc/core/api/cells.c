@@ -140,31 +140,6 @@ hs_cells_layout(const hs_cells *cells, hs_layout *layout)
     hs_fpenv_leave(saved);
 }
 
-/* -1 where only occupied cells are stored and that one is not. */
-static int64_t
-cell_of_point(const hs_search *search, const hs_scene *scene, int64_t i, int64_t *hint)
-{
-    const hs_sparse *sparse = &search->sparse;
-    int64_t          index[HS_MAX_DIM], cell = 0;
-    for (int k = 0; k < scene->ndim; k++) {
-        const double t = hs_scene_coordinate(scene, i, k);
-        index[k] = search->is_sparse ? hs_sparse_index(&search->grid, k, t)
-                                     : hs_grid_index(&search->grid, k, t);
-        cell += index[k] * search->grid.stride[k];
-    }
-    if (!search->is_sparse) {
-        return cell;
-    }
-    hs_sparse_cursor cursor = {0, 0};
-    int32_t          first, end;
-    const int64_t    row = hs_sparse_find_row(sparse, index, hint);
-    if (row < 0) {
-        return -1;
-    }
-    hs_sparse_window(sparse, row, index[0], index[0], &cursor, &first, &end);
-    return end > first ? cursor.low : -1;
-}
-
 hs_status
 hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t *cell, hs_failure *failure)
 {
@@ -174,16 +149,33 @@ hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t *cell, hs_
     if (cells == NULL || points == NULL || !hs_has_entries(cell, points)) {
         return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
     }
+    const hs_search *search = &cells->search;
     failure = hs_call_enter(&options, failure, &call);
     hs_status status = hs_check_arguments(&cells->points, points, NULL, &options, failure);
     if (status == HS_OK) {
-        status = hs_scene_from_kept(&call.account, NULL, &cells->search.scene, points, &options,
-                                    true, &scene, failure);
+        status = hs_scene_from_kept(&call.account, NULL, &search->scene, points, &options, true,
+                                    &scene, failure);
     }
     if (status == HS_OK) {
         int64_t hint = 0;
         for (int64_t i = 0; i < points->n; i++) {
-            cell[i] = cell_of_point(&cells->search, &scene, i, &hint);
+            int64_t index[HS_MAX_DIM];
+            cell[i] = 0;
+            for (int k = 0; k < scene.ndim; k++) {
+                const double t = hs_scene_coordinate(&scene, i, k);
+                index[k] = search->is_sparse ? hs_sparse_index(&search->grid, k, t)
+                                             : hs_grid_index(&search->grid, k, t);
+                cell[i] += index[k] * search->grid.stride[k];
+            }
+            if (search->is_sparse) {
+                hs_sparse_cursor cursor = {0, 0};
+                int32_t          first = 0, end = 0;
+                const int64_t    row = hs_sparse_find_row(&search->bins, index, &hint);
+                if (row >= 0) {
+                    hs_sparse_window(&search->bins, row, index[0], index[0], &cursor, &first, &end);
+                }
+                cell[i] = end > first ? cursor.low : -1; /* -1: empty cells are not stored */
+            }
         }
         hs_scene_free(&call.account, &scene);
     }
@@ -199,13 +191,13 @@ hs_cells_indices(const hs_cells *cells, int64_t *indices)
         return;
     }
     const hs_search *search = &cells->search;
-    const hs_sparse *sparse = &search->sparse;
+    const hs_bins   *bins = &search->bins;
     const int        d = search->grid.ndim;
     if (search->is_sparse) {
-        for (int64_t row = 0; row < sparse->n_rows; row++) {
-            for (int64_t c = sparse->row_cell[row]; c < sparse->row_cell[row + 1]; c++) {
-                indices[c * d] = sparse->cell_x[c];
-                memcpy(indices + c * d + 1, sparse->row_index + row * (d - 1),
+        for (int64_t row = 0; row < bins->n_rows; row++) {
+            for (int64_t c = bins->row_cell[row]; c < bins->row_cell[row + 1]; c++) {
+                indices[c * d] = bins->cell_x[c];
+                memcpy(indices + c * d + 1, bins->row_index + row * (d - 1),
                        (size_t)(d - 1) * sizeof *indices);
             }
         }
@@ -387,9 +379,7 @@ hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_op
         status = hs_search_reuse(&sets, call, &search, failure);
     }
     if (status == HS_OK) {
-        const int d = cells->points.ndim;
-        hs_output_init(&call->account, d, HS_WANT_I | HS_WANT_J, 8, &rows->output);
-        hs_output_init(&call->account, d, HS_WANT_I, 8, &rows->offsets);
+        hs_output_init(&call->account, cells->points.ndim, HS_WANT_I | HS_WANT_J, 8, &rows->output);
         status = list_ranges(&search, rows, failure);
         hs_search_close(&search);
     } else if (status == HS_REBUILD) {

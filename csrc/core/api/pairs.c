@@ -49,7 +49,7 @@ hs_pairs_count(const hs_among *among, const hs_options *options, int64_t *count,
     const hs_finder finder = {.find = count_pairs, .context = count};
     hs_query        query = hs_query_among(among, HS_HALF_OR_QUERIES, options);
     hs_query_want_none(&query);
-    query.is_incomplete = query.is_incomplete || count == NULL;
+    query.is_incomplete |= count == NULL;
     return hs_query_answer(&query, &finder, NULL, failure);
 }
 
@@ -139,8 +139,7 @@ record_to_sort(void *context, hs_query_run *run)
     hs_output *found = context;
     if (!run->has_levels) {
         /* What is kept from system to system is for the same columns. */
-        found->columns = hs_sort_columns(run->search) |
-                         (run->keeper != NULL ? (unsigned)HS_WANT_SHIFT : 0);
+        found->columns = hs_sort_columns(run->search) | HS_WANT_SHIFT;
     }
     return record_step(found, run);
 }
@@ -289,9 +288,8 @@ hs_neighbors_count(const hs_among *among, const hs_options *options, int64_t *co
     hs_query        query = hs_query_among(among, HS_FULL_LIST, options);
     const hs_sets  *sets = &query.sets;
     hs_query_want_none(&query);
-    if (!hs_has_entries(counts, sets->queries != NULL ? sets->queries : sets->points)) {
-        query.is_incomplete = true;
-    }
+    query.is_incomplete |=
+        !hs_has_entries(counts, sets->queries != NULL ? sets->queries : sets->points);
     return hs_query_answer(&query, &finder, NULL, failure);
 }
 
@@ -341,7 +339,7 @@ hs_nearest_find(const hs_among *among, int64_t k, const hs_options *options, hs_
     const hs_finder finder = {
         .find = find_nearest, .context = &k, .has_result = true, .is_nearest = true};
     hs_query query = hs_query_among(among, HS_FULL_LIST, options);
-    query.is_incomplete = query.is_incomplete || k < 1;
+    query.is_incomplete |= k < 1;
     query.options.sorted = false;
     query.options.out = NULL;
     query.options.precision = HS_EXACT;
@@ -376,8 +374,6 @@ hs_pairs_histogram(const hs_among *among, const hs_options *options, const hs_hi
 {
     const hs_finder finder = {.find = find_histogram, .context = (void *)(uintptr_t)histogram};
     hs_query        query = hs_query_among(among, HS_HALF_OR_QUERIES, options);
-    hs_each_system  each;
-    hs_among        without;
     if (query.is_incomplete || histogram == NULL || histogram->edges == NULL ||
         histogram->n_types < 1 || query.reach != NULL) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
@@ -385,16 +381,9 @@ hs_pairs_histogram(const hs_among *among, const hs_options *options, const hs_hi
     const double *const edges = histogram->edges;
     const int64_t       n_edges = histogram->n_edges;
     const bool          has_edges = n_edges > 0 && n_edges < HS_MOST_LENGTHS; /* else refused */
-    if (query.among != NULL) {
-        const double n = (double)histogram->n_types;
-        if (has_edges && !(n * n * (double)n_edges < 0x1p31)) { /* counts might pass int64 */
-            return hs_end_early(HS_ERR_MEMORY, options, failure);
-        }
-        without = *among; /* cutoffs of systems do not count */
-        each = among->each != NULL ? *among->each : (hs_each_system){.rows = NULL};
-        each.cutoffs = NULL;
-        without.each = &each;
-        query.among = &without;
+    const double        n = (double)histogram->n_types;
+    if (query.among != NULL && has_edges && !(n * n * (double)n_edges < 0x1p31)) {
+        return hs_end_early(HS_ERR_MEMORY, options, failure); /* counts might pass int64 */
     }
     hs_query_want_none(&query);
     query.sets.keeps_none = true;
@@ -466,8 +455,7 @@ hs_plan_make(const hs_among *among, const hs_options *options, hs_plan *plan, hs
     hs_plan *const  made = &now.plan;
     const hs_finder finder = {.step = plan_step, .context = &now};
     hs_query        query = hs_query_among(among, HS_HALF_LIST, options);
-    query.is_incomplete = query.is_incomplete || plan == NULL || query.selection != NULL ||
-                          query.among != NULL;
+    query.is_incomplete |= plan == NULL || query.selection != NULL || query.among != NULL;
     hs_status status = hs_query_answer(&query, &finder, NULL, failure);
     if (status == HS_OK && made->n_searches == 0) {
         /* Where no two points can be a pair: what the cells would be for a cutoff of 0. */

@@ -72,24 +72,29 @@ hs_check_options(const hs_options *options, unsigned known)
                : HS_ERR_ARGUMENT;
 }
 
-/* HS_OK, or HS_ERR_EDGES unless there are some, finite, not negative and not descending. */
+/* Shells are those of an exact search, up to its cutoff: some, finite, not negative and not
+ * descending. */
 static hs_status
-check_lengths(const double *lengths, int64_t n, hs_failure *failure)
+check_shells(const hs_options *options, hs_failure *failure)
 {
+    const double *at = options->shells;
+    const int64_t n = options->n_shells;
+    if (at == NULL || options->precision != HS_EXACT) {
+        return HS_ERR_ARGUMENT;
+    }
     if (n < 1 || n >= HS_MOST_LENGTHS) {
         return HS_ERR_EDGES;
     }
     for (int64_t k = 0; k < n; k++) {
-        if (!isfinite(lengths[k]) || lengths[k] < 0.0 || (k > 0 && lengths[k] < lengths[k - 1])) {
+        if (!isfinite(at[k]) || at[k] < 0.0 || (k > 0 && at[k] < at[k - 1])) {
             failure->row = k;
-            failure->value = lengths[k];
+            failure->value = at[k];
             return HS_ERR_EDGES;
         }
     }
-    return HS_OK;
+    return at[n - 1] == options->cutoff ? HS_OK : HS_ERR_ARGUMENT;
 }
 
-/* Points, queries and box. */
 static hs_status
 check_sets(const hs_points *points, const hs_points *queries, const hs_box *box,
            hs_failure *failure)
@@ -211,7 +216,7 @@ static bool
 have_cutoffs(const hs_query *query)
 {
     return query->among != NULL && query->among->each != NULL &&
-           query->among->each->cutoffs != NULL;
+           query->among->each->cutoffs != NULL && !query->is_by_length;
 }
 
 /* Arguments, and what all systems share of the limit of pairs. */
@@ -227,13 +232,7 @@ check_query(const hs_query *query, const hs_finder *finder, const hs_call *call,
         status = hs_check_options(options, HS_WANT_ALL | (has_shells ? HS_WANT_SHELL : 0));
     }
     if (status == HS_OK && query->is_by_length) {
-        /* Shells are those of an exact search, up to its cutoff. */
-        status = options->shells != NULL && options->precision == HS_EXACT
-                     ? check_lengths(options->shells, options->n_shells, failure)
-                     : HS_ERR_ARGUMENT;
-        if (status == HS_OK && options->shells[options->n_shells - 1] != options->cutoff) {
-            status = HS_ERR_ARGUMENT;
-        }
+        status = check_shells(options, failure);
     }
     if (status == HS_OK && query->among != NULL) {
         status = hs_systems_check(query, failure);
@@ -321,23 +320,19 @@ hs_query_open(const hs_query *query, const hs_finder *finder, hs_call *call, hs_
 {
     hs_query_begin(query, finder, call, failure, run);
     hs_status status = check_query(query, finder, call, failure);
-    if (status == HS_OK && query->among != NULL) {
-        status = hs_choice_open(query->selection, &query->sets, call, failure);
-        if (status == HS_OK && call->choice != NULL && query->box != NULL &&
-            hs_choice_excludes(call->choice)) { /* boxes are looked at with their systems */
-            status = hs_choice_keep_points(&query->sets, call, failure);
-        }
-    } else if (status == HS_OK) {
+    if (status == HS_OK && query->among == NULL) {
         status = hs_query_plan(run);
-        if (status == HS_OK && query->selection != NULL) {
-            status = hs_choice_open(query->selection, &query->sets, call, failure);
-        }
-        if (status == HS_OK && call->choice != NULL) {
-            /* None that are further apart than the cutoff. */
-            status = hs_choice_set_scene(&query->sets, query->box,
-                                         query->reach != NULL ? INFINITY : query->options.cutoff,
-                                         call, failure);
-        }
+    }
+    if (status == HS_OK && query->selection != NULL) {
+        status = hs_choice_open(query->selection, &query->sets, call, failure);
+    }
+    if (status == HS_OK && call->choice != NULL && query->among == NULL) {
+        /* None that are further apart than the cutoff. */
+        const double cutoff = query->reach != NULL ? INFINITY : query->options.cutoff;
+        status = hs_choice_set_scene(&query->sets, query->box, cutoff, call, failure);
+    } else if (status == HS_OK && call->choice != NULL && query->box != NULL &&
+               hs_choice_excludes(call->choice)) { /* boxes are looked at with their systems */
+        status = hs_choice_keep_points(&query->sets, call, failure);
     }
     if (status != HS_OK) {
         hs_query_close(run);

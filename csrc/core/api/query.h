@@ -67,7 +67,9 @@ typedef struct hs_query {
     const hs_selection *selection; /* NULL: all pairs within reach count */
     const hs_among     *among; /* several systems, whose points are all above; NULL: one system */
     bool is_incomplete;        /* an argument is missing without which the call cannot begin */
-    bool is_by_length; /* distances are sorted by the shells, which are the edges of a histogram */
+    /* Distances are sorted by the shells, which are the edges of a histogram; cutoffs of systems do
+     * not count. */
+    bool is_by_length;
 } hs_query;
 
 /* Which pairs a search is for: each once, among the points alone; every neighbour of each point or

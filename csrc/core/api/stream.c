@@ -31,8 +31,7 @@ struct hs_stream {
     int64_t     n_sources; /* the first ones, which have been opened */
     int64_t     at;        /* the present one */
     hs_choice  *choice;    /* owned: of all, where there are several; or NULL */
-    int         ndim;
-    hs_output   held; /* pairs from `begin` on wait to be handed out */
+    hs_output   held;      /* pairs from `begin` on wait to be handed out */
     int64_t     begin;
     int64_t     max_pairs, enough; /* pairs of a block; that are looked for at a time */
     hs_bookmark next;              /* where to go on looking */
@@ -48,22 +47,6 @@ static source *
 present(const hs_stream *stream)
 {
     return &stream->sources[stream->at];
-}
-
-/* Whether the present search has found all that it can. */
-static bool
-is_over(const hs_stream *stream)
-{
-    const hs_search *search = present(stream)->run.search;
-    return search == NULL || stream->next.point == hs_search_asking(search)->n;
-}
-
-/* An empty output, columns as the options say. */
-static void
-open_output(const hs_stream *stream, hs_account *account, hs_output *output)
-{
-    const hs_options *options = &stream->call.options;
-    hs_output_init(account, stream->ndim, options->want, options->index_bytes, output);
 }
 
 /* Appends the first n pairs that wait. */
@@ -83,10 +66,11 @@ static hs_status
 move_waiting(hs_stream *stream, int64_t first, hs_output *moved)
 {
     const hs_search *search = present(stream)->run.search; /* or none is left */
+    const hs_output *held = &stream->held;
     const double     all = search != NULL ? search->grid.expected_pairs : 0.0;
-    open_output(stream, &stream->call.account, moved);
+    hs_output_init(&stream->call.account, held->ndim, held->columns, held->index_bytes, moved);
     hs_output_reserve_hint(moved, fmin(fmin((double)stream->enough, all), MOST_EXPECTED));
-    const hs_status status = copy_waiting(stream, first, stream->held.n_pairs - first, moved);
+    const hs_status status = copy_waiting(stream, first, held->n_pairs - first, moved);
     if (status != HS_OK) {
         hs_output_free(moved);
     }
@@ -166,7 +150,8 @@ take_block(hs_stream *stream, hs_pairs **result)
             stream->held = rest;
         }
     } else {
-        open_output(stream, NULL, given);
+        hs_output_init(NULL, stream->held.ndim, stream->held.columns, stream->held.index_bytes,
+                       given);
         status = copy_waiting(stream, stream->begin, n, given);
         stream->begin += status == HS_OK ? n : 0;
     }
@@ -193,9 +178,10 @@ hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **blo
     failure = hs_enter(failure, entry);
     hs_call_set_poll(poll, context, &stream->call);
     while (status == HS_OK && waiting(stream) < stream->max_pairs && stream->n_sources > 0) {
-        source *one = present(stream);
+        source          *one = present(stream);
+        const hs_search *search = one->run.search;
         one->run.failure = failure;
-        if (!is_over(stream)) {
+        if (search != NULL && stream->next.point < hs_search_asking(search)->n) {
             status = fill(stream, failure);
             continue;
         }
@@ -306,8 +292,8 @@ hs_stream_open(const hs_among *among, const hs_options *options, int64_t max_pai
     hs_call_leave(call, 0);
     hs_call_detach(call);
     if (status == HS_OK) {
-        stream->ndim = query.sets.points->ndim;
-        open_output(stream, &call->account, &stream->held);
+        hs_output_init(&call->account, query.sets.points->ndim, query.options.want,
+                       query.options.index_bytes, &stream->held);
         *result = stream;
     } else {
         hs_stream_free(stream);
@@ -456,8 +442,8 @@ hs_pairs_visit(const hs_among *among, const hs_options *options, const hs_visit 
     hs_finder   finder = {.step = visit_step, .context = &shared, .is_numbered = true};
     hs_counters done;
     hs_query    query = hs_query_among(among, HS_HALF_LIST, options);
-    query.is_incomplete = query.is_incomplete || n_visited == NULL || visit == NULL ||
-                          (visit->pair == NULL && visit->pairs == NULL);
+    query.is_incomplete |= n_visited == NULL || visit == NULL ||
+                           (visit->pair == NULL && visit->pairs == NULL);
     hs_query_want_none(&query);
     query.sets.keeps_none = true;
     query.options.want = shared.want;
@@ -576,8 +562,7 @@ hs_clusters_find(const hs_among *among, const hs_options *options, const uint8_t
     clustering all = {.core = core, .labels = labels != NULL ? labels : &none, .winding = winding};
     const hs_finder finder = {.find = find_clusters, .context = &all, .one_thread = true};
     hs_query        query = hs_query_among(among, HS_HALF_LIST, options);
-    query.is_incomplete = query.is_incomplete || n_clusters == NULL ||
-                          !hs_has_entries(labels, query.sets.points);
+    query.is_incomplete |= n_clusters == NULL || !hs_has_entries(labels, query.sets.points);
     hs_query_want_none(&query);
     query.sets.keeps_none = true;
     query.options.want = HS_WANT_I | HS_WANT_J | (winding != NULL ? HS_WANT_SHIFT : 0);

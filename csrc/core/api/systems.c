@@ -125,7 +125,7 @@ cut_system(const hs_query *all, int64_t s, hs_system *system)
             }
         }
     }
-    if (each != NULL && each->cutoffs != NULL) {
+    if (each != NULL && each->cutoffs != NULL && !all->is_by_length) {
         system->query.options.cutoff = each->cutoffs[s];
     }
 }
@@ -180,7 +180,6 @@ typedef struct systems_job {
     const hs_query_run *all;      /* of the call, which has the output and sums up what was done */
     const hs_set       *asking;   /* points, or queries */
     double              n_asking; /* at least 1 */
-    int64_t             n_systems;
     int64_t             in_range; /* systems of a range */
     int64_t *lengths;   /* of all rows, each in the entry behind it; NULL: there are none */
     bool     is_direct; /* the one thread writes to the output itself */
@@ -232,32 +231,6 @@ add_to_column(hs_output *output, unsigned bit, int64_t at, int64_t n, int step, 
     }
 }
 
-/* Writes what was found in a system, numbered among all, behind what is there. */
-static hs_status
-append(worker *me)
-{
-    const systems_job  *job = me->job;
-    const hs_query_run *run = &me->run;
-    hs_output          *target = me->target;
-    const int64_t       n = me->entries.n_pairs, at = target->n_pairs;
-    const double        done = job->is_direct ? done_before(job, run->system + 1) : 0.0;
-    if (hs_output_reserve(target, n, done) != HS_OK) {
-        me->committer.failure.expected_pairs = (double)(at + n);
-        return HS_ERR_MEMORY;
-    }
-    hs_output_copy(target, at, &me->entries, 0, n);
-    target->n_pairs = at + n;
-    add_to_column(target, HS_WANT_I, at, n, 1, run->first_asking);
-    add_to_column(target, HS_WANT_J, at, n, 1, run->first_point);
-    add_to_column(target, HS_WANT_BOTH, 2 * at, n, 2, run->first_asking);
-    add_to_column(target, HS_WANT_BOTH, 2 * at + 1, n, 2, run->first_point);
-    const int64_t *offsets = hs_output_column(&me->offsets, HS_WANT_I);
-    for (int64_t r = 0; job->lengths != NULL && r + 1 < me->offsets.n_pairs; r++) {
-        job->lengths[run->first_asking + r + 1] = offsets[r + 1] - offsets[r];
-    }
-    return HS_OK;
-}
-
 static hs_status
 search_system(worker *me, int64_t s)
 {
@@ -282,7 +255,24 @@ search_system(worker *me, int64_t s)
     hs_query_close(run);
     call->part = whole;
     if (status == HS_OK && !finder->is_numbered && run->output != NULL) {
-        status = append(me);
+        /* What was found, numbered among all, goes behind what is there. */
+        hs_output     *target = me->target;
+        const int64_t *offsets = hs_output_column(&me->offsets, HS_WANT_I);
+        const int64_t  n = me->entries.n_pairs, at = target->n_pairs;
+        status = hs_output_reserve(target, n, job->is_direct ? done_before(job, s + 1) : 0.0);
+        if (status == HS_OK) {
+            hs_output_copy(target, at, &me->entries, 0, n);
+            target->n_pairs = at + n;
+            add_to_column(target, HS_WANT_I, at, n, 1, run->first_asking);
+            add_to_column(target, HS_WANT_J, at, n, 1, run->first_point);
+            add_to_column(target, HS_WANT_BOTH, 2 * at, n, 2, run->first_asking);
+            add_to_column(target, HS_WANT_BOTH, 2 * at + 1, n, 2, run->first_point);
+        } else {
+            me->committer.failure.expected_pairs = (double)(at + n);
+        }
+        for (int64_t r = 0; job->lengths != NULL && r + 1 < me->offsets.n_pairs; r++) {
+            job->lengths[run->first_asking + r + 1] = offsets[r + 1] - offsets[r];
+        }
     } else if (status != HS_OK && !finder->is_numbered) {
         hs_query_name_point(run, status);
     }
@@ -310,7 +300,7 @@ search_range(void *context, int64_t range)
     worker            *me = context;
     const systems_job *job = me->job;
     hs_output         *output = job->all->output;
-    const int64_t      first = range * job->in_range, left = job->n_systems - first;
+    const int64_t      first = range * job->in_range, left = job->asking->n_systems - first;
     const int64_t      end = first + (left < job->in_range ? left : job->in_range);
     hs_status          status = HS_OK;
     for (int64_t s = first; s < end && status == HS_OK; s++) {
@@ -385,21 +375,19 @@ hs_systems_find(hs_query_run *all)
     hs_output       *output = all->output;
     const hs_set    *points = query->among->points;
     const hs_set    *asking = query->among->queries != NULL ? query->among->queries : points;
-    systems_job      job = {.all = all,
-                            .asking = asking,
-                            .n_asking = asking->at.n > 0 ? (double)asking->at.n : 1.0,
-                            .n_systems = asking->n_systems};
-    hs_status        status = HS_OK;
+    systems_job   job = {.all = all, .asking = asking, .n_asking = fmax((double)asking->at.n, 1.0)};
+    const int64_t n = asking->n_systems;
+    hs_status     status = HS_OK;
     if (finder->has_rows) {
         status =
             hs_output_open_offsets(&total->account, asking->at.n + 1, all->offsets, &job.lengths);
     }
-    if (status == HS_OK && job.n_systems > 0) {
+    if (status == HS_OK && n > 0) {
         const double  n_points = (double)points->at.n;
         const double  work = finder->is_numbered ? n_points : n_points + job.n_asking;
         const int     n_threads = finder->one_thread ? 1 : hs_call_threads(work, options);
-        const int64_t in_range = (int64_t)(RANGE_POINTS * job.n_systems / (job.n_asking + 1.0));
-        total->team = hs_team_create(job.n_systems < n_threads ? (int)job.n_systems : n_threads);
+        const int64_t in_range = (int64_t)(RANGE_POINTS * n / (job.n_asking + 1.0));
+        total->team = hs_team_create(n < n_threads ? (int)n : n_threads);
         const int team_size = hs_team_size(total->team);
         /* Each thread has an account of its own: together they must not pass the limit of the
          * call. */
@@ -417,7 +405,7 @@ hs_systems_find(hs_query_run *all)
                         .open = open_worker,
                         .close = close_worker,
                         .search = search_range,
-                        .n_ranges = (job.n_systems + job.in_range - 1) / job.in_range,
+                        .n_ranges = (n + job.in_range - 1) / job.in_range,
                         .output = output};
         status = hs_crew_run(&crew, all->failure);
     }

@@ -81,52 +81,6 @@ load(const hs_points *points, const hs_box *box, const hs_options *options, hs_c
     return status == HS_OK ? hs_cloud_load(NULL, NULL, points, options, cloud, failure) : status;
 }
 
-/* The list serves the points of frame `next` as well, or *margin is negative. */
-static hs_status
-try_to_keep(hs_verlet *list, int next, const hs_options *options, double *margin)
-{
-    const hs_motion motion = {.built = &list->frames[list->built],
-                              .now = &list->frames[next],
-                              .radius = list->listing.radius,
-                              .cutoff = list->cutoff};
-    const int       spare = list->jumps_now == 0 ? 1 : 0;
-    bool            jumped = false;
-    if (!list->has_list || options->cutoff != list->cutoff ||
-        !hs_frames_match(motion.built, motion.now)) {
-        return HS_OK;
-    }
-    const hs_status status =
-        hs_motion_margin(&motion, options, margin, &jumped, &list->jumps[spare]);
-    if (status == HS_OK && *margin >= 0.0) {
-        list->now = next;
-        list->margin = *margin;
-        list->jumps_now = jumped ? spare : -1;
-    }
-    return status;
-}
-
-static hs_status
-build(hs_verlet *list, int next, const hs_options *options, double skin, hs_failure *failure)
-{
-    const hs_dw  sum = hs_two_sum(options->cutoff, skin);
-    const double radius = sum.lo > 0.0 ? hs_next_up(sum.hi) : sum.hi; /* rounded up */
-    if (!is_length(skin) || !is_length(radius)) {
-        failure->value = radius;
-        return HS_ERR_CUTOFF;
-    }
-    const hs_status status =
-        hs_listing_build(&list->frames[next], options, radius, &list->listing, failure);
-    if (status == HS_OK) {
-        const double room = radius - options->cutoff;
-        list->has_list = true;
-        list->built = list->now = next;
-        list->jumps_now = -1;
-        list->cutoff = options->cutoff;
-        list->margin = options->cutoff > 0.0 && room > 0.0 ? hs_next_down(room) : room;
-    }
-    return status;
-}
-
 hs_status
 hs_verlet_update(hs_verlet *list, const hs_points *points, const hs_box *box,
                  const hs_options *options, double skin, bool rebuild, bool *rebuilt,
@@ -157,12 +111,38 @@ hs_verlet_update(hs_verlet *list, const hs_points *points, const hs_box *box,
     if (status == HS_OK) {
         status = hs_frame_take(points, box, options, &list->frames[next], failure);
     }
-    if (status == HS_OK && !rebuild) {
-        status = try_to_keep(list, next, options, &margin);
+    const hs_motion motion = {.built = &list->frames[list->built],
+                              .now = &list->frames[next],
+                              .radius = list->listing.radius,
+                              .cutoff = list->cutoff};
+    const int       spare = list->jumps_now == 0 ? 1 : 0;
+    bool            jumped = false;
+    if (status == HS_OK && !rebuild && list->has_list && options->cutoff == list->cutoff &&
+        hs_frames_match(motion.built, motion.now)) {
+        status = hs_motion_margin(&motion, options, &margin, &jumped, &list->jumps[spare]);
     }
     const bool needed = status == HS_OK && !(margin >= 0.0);
     if (needed) {
-        status = build(list, next, options, skin, failure);
+        const hs_dw  sum = hs_two_sum(options->cutoff, skin);
+        const double radius = sum.lo > 0.0 ? hs_next_up(sum.hi) : sum.hi; /* rounded up */
+        const double room = radius - options->cutoff;
+        if (is_length(skin) && is_length(radius)) {
+            status = hs_listing_build(motion.now, options, radius, &list->listing, failure);
+        } else {
+            failure->value = radius;
+            status = HS_ERR_CUTOFF;
+        }
+        if (status == HS_OK) {
+            list->has_list = true;
+            list->built = list->now = next;
+            list->jumps_now = -1;
+            list->cutoff = options->cutoff;
+            list->margin = options->cutoff > 0.0 && room > 0.0 ? hs_next_down(room) : room;
+        }
+    } else if (status == HS_OK) {
+        list->now = next;
+        list->margin = margin;
+        list->jumps_now = jumped ? spare : -1;
     }
     if (status == HS_OK) {
         *rebuilt = needed;
@@ -444,7 +424,6 @@ set_place_axes(const hs_lattice *lattice, int box_exponent, int unit, double cut
     }
 }
 
-/* The places of all points along axis k. */
 static void
 set_places(const place_axes *axes, const hs_cloud *cloud, int k, double *places)
 {

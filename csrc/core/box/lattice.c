@@ -385,19 +385,6 @@ reduce(hs_lattice *lattice)
 #define LARGEST_PRIME UINT64_C(0x7fffffff) /* 2^31 - 1: products of residues fit 64 bits */
 #define PRIME_BITS    30                   /* of a number that each prime used here passes */
 
-/* Primes below 2^31 are some twenty apart. */
-static uint64_t
-prime_below(uint64_t p)
-{
-    uint64_t divisor = 2;
-    do {
-        p -= 2;
-        for (divisor = 3; divisor * divisor <= p && p % divisor != 0; divisor += 2) {
-        }
-    } while (divisor * divisor <= p);
-    return p;
-}
-
 /*
  * The rows as integers, times 2^-least, modulo p. Elimination without division: what is left of a
  * row is multiplied by the pivot instead. For the rank a row's factor is of no account.
@@ -525,9 +512,38 @@ hs_box_check(const hs_box *box, hs_failure *failure)
         if (full_rank(p, box->ndim, n_periodic, rows, least)) {
             return HS_OK;
         }
-        p = prime_below(p);
+        uint64_t divisor = 1;
+        while (divisor * divisor <= p) { /* the next prime below: they are some twenty apart */
+            p -= 2;
+            for (divisor = 3; divisor * divisor <= p && p % divisor != 0; divisor += 2) {
+            }
+        }
     }
     return HS_ERR_BOX_DEPENDENT;
+}
+
+/* Removes from v what lies along n_basis orthonormal vectors (twice: the first pass rounds), then
+ * scales v to length 1. Returns its length before that. parts: NULL, or what lay along each is
+ * added to these. */
+static double
+orthonormalise(int ndim, int n_basis, double basis[][HS_MAX_DIM], double *v, double *parts)
+{
+    for (int pass = 0; pass < 2; pass++) {
+        for (int b = 0; b < n_basis; b++) {
+            const double along = dot(ndim, v, basis[b]);
+            for (int k = 0; k < ndim; k++) {
+                v[k] -= along * basis[b][k];
+            }
+            if (parts != NULL) {
+                parts[b] += along;
+            }
+        }
+    }
+    const double length = sqrt(dot(ndim, v, v));
+    for (int k = 0; k < ndim; k++) {
+        v[k] = length > 0.0 ? v[k] / length : 0.0;
+    }
+    return length;
 }
 
 void
@@ -537,40 +553,8 @@ hs_orthogonal_rows(const double rows[][HS_MAX_DIM], const int *order, int n, int
     for (int r = 0; r < n; r++) {
         memcpy(unit[r], rows[order != NULL ? order[r] : r], (size_t)ndim * sizeof(double));
         memset(parts[r], 0, (size_t)n * sizeof(double));
-        for (int pass = 0; pass < 2; pass++) {
-            for (int k = 0; k < r; k++) {
-                const double part = dot(ndim, unit[r], unit[k]);
-                parts[r][k] += part;
-                for (int c = 0; c < ndim; c++) {
-                    unit[r][c] -= part * unit[k][c];
-                }
-            }
-        }
-        parts[r][r] = sqrt(dot(ndim, unit[r], unit[r]));
-        for (int c = 0; c < ndim; c++) {
-            unit[r][c] = parts[r][r] > 0.0 ? unit[r][c] / parts[r][r] : 0.0;
-        }
+        parts[r][r] = orthonormalise(ndim, r, unit, unit[r], parts[r]);
     }
-}
-
-/* Remove from v what lies along n_basis orthonormal vectors (twice: the first pass rounds), then
- * scale v to length 1. Returns its length before that. */
-static double
-orthonormalise(int ndim, int n_basis, double basis[][HS_MAX_DIM], double *v)
-{
-    for (int pass = 0; pass < 2; pass++) {
-        for (int b = 0; b < n_basis; b++) {
-            const double along = dot(ndim, v, basis[b]);
-            for (int k = 0; k < ndim; k++) {
-                v[k] -= along * basis[b][k];
-            }
-        }
-    }
-    const double length = sqrt(dot(ndim, v, v));
-    for (int k = 0; k < ndim; k++) {
-        v[k] = length > 0.0 ? v[k] / length : 0.0;
-    }
-    return length;
 }
 
 /* Multiplies the volume by length * 2^exponent. */
@@ -599,7 +583,7 @@ orthonormal_row(const hs_lattice *lattice, int r, int n_basis, double basis[][HS
     (void)set_row(lattice->ndim, lattice->rows[r], 0, &row);
     memcpy(v, row.x, (size_t)lattice->ndim * sizeof *v);
     *exponent = row.exponent;
-    return orthonormalise(lattice->ndim, n_basis, basis, v);
+    return orthonormalise(lattice->ndim, n_basis, basis, v, NULL);
 }
 
 /* Along each row of B the unit vector that is orthogonal to all others; for each open grid axis one
@@ -640,7 +624,7 @@ set_general_axes(hs_lattice *lattice)
         for (int a = 0; lattice->row_of_axis[k] < 0 && a < ndim; a++) {
             double trial[HS_MAX_DIM] = {0};
             trial[a] = 1.0;
-            const double length = orthonormalise(ndim, n_basis, basis, trial);
+            const double length = orthonormalise(ndim, n_basis, basis, trial, NULL);
             if (length > best_length) {
                 best_length = length;
                 memcpy(lattice->normal[k], trial, sizeof trial);
@@ -748,7 +732,7 @@ height_of_given(const hs_lattice *reduced, int l, double *normal)
             }
         }
     }
-    const double length = orthonormalise(d, 0, NULL, normal);
+    const double length = orthonormalise(d, 0, NULL, normal, NULL);
     return length > 0.0 ? ldexp(1.0 / length, exponent) : 0.0;
 }
 

@@ -486,47 +486,11 @@ typedef struct image_list {
     int8_t              shift[MOST_IMAGES][HS_MAX_DIM];
 } image_list;
 
-/* Images are listed along long rows first, for along short ones few are then left: sorts the
- * rows. */
-static hs_status
-set_unit_vectors(hs_image_box *to)
-{
-    const hs_lattice *lattice = &to->lattice;
-    const int         d = lattice->ndim, m = lattice->n_periodic;
-    double            least = 1.0, whole[HS_MAX_DIM];
-    for (int r = 0; r < m; r++) {
-        double square = 0.0;
-        int    at = r;
-        for (int c = 0; c < d; c++) {
-            square += lattice->rows[r][c] * lattice->rows[r][c];
-        }
-        whole[r] = sqrt(square);
-        for (; at > 0 && whole[to->order[at - 1]] > whole[r]; at--) {
-            to->order[at] = to->order[at - 1];
-        }
-        to->order[at] = r;
-    }
-    hs_orthogonal_rows((const double(*)[HS_MAX_DIM])lattice->rows, to->order, m, d, to->along,
-                       to->R);
-    for (int r = 0; r < m; r++) {
-        const int row = to->order[r];
-        if (!(whole[row] >= LEAST_ROW)) {
-            return HS_ERR_BOX_SKEWED;
-        }
-        least = hs_smaller(to->R[r][r] / whole[row], least);
-        for (int c = 0; c < d; c++) {
-            to->is_spanned[c] = to->is_spanned[c] || lattice->rows[row][c] != 0.0;
-        }
-        to->row_error += MOST_TIMES * d * lattice->row_error[r];
-    }
-    to->rounding = 16.0 * UNIT * d * m / least;
-    return HS_OK;
-}
-
 hs_status
 hs_image_box_init(const hs_box *box, int ndim, hs_image_box *to)
 {
-    double largest = 0.0;
+    const hs_lattice *lattice = &to->lattice;
+    double            largest = 0.0;
     memset(to, 0, sizeof *to);
     for (int r = 0; r < HS_MAX_DIM; r++) {
         to->order[r] = r;
@@ -539,16 +503,49 @@ hs_image_box_init(const hs_box *box, int ndim, hs_image_box *to)
     /* Along coordinate axes nothing overflows, and no digit may be lost. */
     to->scale = hs_scale_of(0);
     hs_lattice_init(box, ndim, to->scale, &to->lattice);
-    if (!to->lattice.aligned) {
+    if (!lattice->aligned) {
         to->scale = hs_scale_of(ilogb(largest));
         hs_lattice_init(box, ndim, to->scale, &to->lattice);
     }
-    hs_metric_init(&to->metric, ndim, to->lattice.n_periodic,
-                   (const double(*)[HS_MAX_DIM])to->lattice.given, 1.0, true);
-    if (to->lattice.aligned) {
+    hs_metric_init(&to->metric, ndim, lattice->n_periodic,
+                   (const double(*)[HS_MAX_DIM])lattice->given, 1.0, true);
+    if (lattice->aligned) {
         return HS_OK;
     }
-    return hs_skew_is_left(&to->lattice) ? HS_ERR_BOX_SKEWED : set_unit_vectors(to);
+    if (hs_skew_is_left(lattice)) {
+        return HS_ERR_BOX_SKEWED;
+    }
+    /* Unit vectors along the rows, the longest last: images are listed along long rows first, for
+     * along short ones few are then left. */
+    const int m = lattice->n_periodic;
+    double    least = 1.0, whole[HS_MAX_DIM];
+    for (int r = 0; r < m; r++) {
+        double square = 0.0;
+        int    at = r;
+        for (int c = 0; c < ndim; c++) {
+            square += lattice->rows[r][c] * lattice->rows[r][c];
+        }
+        whole[r] = sqrt(square);
+        for (; at > 0 && whole[to->order[at - 1]] > whole[r]; at--) {
+            to->order[at] = to->order[at - 1];
+        }
+        to->order[at] = r;
+    }
+    hs_orthogonal_rows((const double(*)[HS_MAX_DIM])lattice->rows, to->order, m, ndim, to->along,
+                       to->R);
+    for (int r = 0; r < m; r++) {
+        const int row = to->order[r];
+        if (!(whole[row] >= LEAST_ROW)) {
+            return HS_ERR_BOX_SKEWED;
+        }
+        least = hs_smaller(to->R[r][r] / whole[row], least);
+        for (int c = 0; c < ndim; c++) {
+            to->is_spanned[c] = to->is_spanned[c] || lattice->rows[row][c] != 0.0;
+        }
+        to->row_error += MOST_TIMES * ndim * lattice->row_error[r];
+    }
+    to->rounding = 16.0 * UNIT * ndim * m / least;
+    return HS_OK;
 }
 
 /* Shifts along rows r, r - 1, ..., 0, for those along the others; `square` is that of the parts

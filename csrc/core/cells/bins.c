@@ -143,7 +143,7 @@ gather_column(hs_team *team, const hs_options *options, const hs_bins *bins, siz
     moving move = {bins->order, *column, *free_column, size};
     *free_column = *column;
     *column = move.to;
-    return hs_walk_slabs(team, options, bins->n, gather_slab, &move);
+    return hs_walk_points(team, options, bins->n, 0, gather_slab, &move);
 }
 
 hs_status
@@ -216,12 +216,7 @@ sort_many(hs_account *account, hs_team *team, const hs_options *options, sorting
             return HS_ERR_MEMORY;
         }
     }
-    /* Strips for this team: each with points enough, and no more further counts than points. */
-    sort->n_strips = hs_team_size(team) < HS_SLABS ? hs_team_size(team) : HS_SLABS;
-    while (sort->n_strips > 1 &&
-           (n < sort->n_strips * STRIP_POINTS || (sort->n_strips - 1) * n_cells > n)) {
-        sort->n_strips--;
-    }
+    sort->n_strips = hs_strips_for(team, n, STRIP_POINTS, n_cells);
     if (sort->n_strips > 1) {
         others = hs_alloc(account, HS_FOR_CELLS, (sort->n_strips - 1) * n_cells, sizeof *others);
         sort->n_strips = others == NULL ? 1 : sort->n_strips;
@@ -232,7 +227,7 @@ sort_many(hs_account *account, hs_team *team, const hs_options *options, sorting
         sort->counts[strip] = others + (strip - 1) * n_cells;
         memset(sort->counts[strip], 0, (size_t)n_cells * sizeof *others);
     }
-    hs_status status = hs_walk_strips(team, options, n, sort->n_strips, count_strip, sort);
+    hs_status status = hs_walk_points(team, options, n, sort->n_strips, count_strip, sort);
     if (status == HS_OK) {
         /* From numbers of points to places: cell by cell, and in each cell strip by strip. */
         int64_t squares = 0;
@@ -247,7 +242,7 @@ sort_many(hs_account *account, hs_team *team, const hs_options *options, sorting
             squares += (place - before) * (place - before);
         }
         bins->squares = (double)squares;
-        status = hs_walk_strips(team, options, n, sort->n_strips, order_strip, sort);
+        status = hs_walk_points(team, options, n, sort->n_strips, order_strip, sort);
     }
     if (bins->start != NULL) {
         /* The last strip's place in a cell has moved up to where the next cell starts. */
@@ -257,7 +252,7 @@ sort_many(hs_account *account, hs_team *team, const hs_options *options, sorting
         moving move = {bins->order, sort->cells, bins->cells, sizeof *bins->cells};
         hs_free(account, start);
         if (status == HS_OK) {
-            status = hs_walk_slabs(team, options, n, gather_slab, &move);
+            status = hs_walk_points(team, options, n, 0, gather_slab, &move);
         }
     }
     hs_free(account, others);
@@ -324,13 +319,16 @@ hs_bins_build(hs_account *account, hs_team *team, const hs_options *options, hs_
 void
 hs_bins_free(hs_account *account, hs_bins *bins)
 {
+    hs_free(account, bins->row_index);
+    hs_free(account, bins->row_cell);
+    hs_free(account, bins->cell_x);
     hs_free(account, bins->points);
     hs_free(account, bins->beside);
     hs_free(account, bins->start);
     hs_free(account, bins->cells);
-    bins->points = NULL;
-    bins->beside = NULL;
-    bins->start = NULL;
+    bins->points = bins->beside = NULL;
+    bins->start = bins->row_cell = NULL;
+    bins->row_index = bins->cell_x = NULL;
     bins->cells = NULL;
 }
 
@@ -342,7 +340,7 @@ hs_bins_free(hs_account *account, hs_bins *bins)
  * cells follow each other without a gap and none is narrower than 1 (in places); so if two indices
  * are s >= 1 apart, s - 1 whole cells lie between the places. For two points within a range of each
  * other the places are at most range c + 2^-51 p apart, p being the larger one.
- *     p < 2^49: choose_pitch makes range c + 2^-51 p at most the reach r, so s - 1 < r.
+ *     p < 2^49: hs_sparse_grid makes range c + 2^-51 p at most the reach r, so s - 1 < r.
  *     2^e <= p < 2^(e + 1), e >= 49: cells are w = 2^(e - 48) >= 2 wide and rounding moves places
  *     by at most 2^(e - 50) = w / 4, so range c >= w (s - 1) - w / 4 > s - 1 for s >= 2. Again
  *     s <= r.
@@ -363,20 +361,6 @@ hs_bins_free(hs_account *account, hs_bins *bins)
 /* Indices along periodic axes: their places need no other numbering. */
 #define MOST_PER_PERIOD 0x1p31
 
-/* Least width of cells along axis k, `width` ranges to a row. */
-static double
-choose_pitch(const hs_grid *grid, int k, double extent, double width)
-{
-    const double split = k == 0 ? HS_SPARSE_SPLIT / width : 1.0 / width;
-    double       places = HS_SPARSE_LINEAR;
-    if (split * extent < HS_SPARSE_LINEAR * grid->range[k]) {
-        places = split * extent / grid->range[k];
-    }
-    const double margin = LEAST_MARGIN + PLACE_ERROR * places;
-    const double floor_of_pitch = SMALLEST_PITCH * fmax(extent, 1.0);
-    return fmax(grid->range[k] * (1.0 + margin) / split, floor_of_pitch);
-}
-
 void
 hs_sparse_grid(const hs_scene *scene, const hs_grid *dense, double width, hs_grid *grid)
 {
@@ -384,7 +368,12 @@ hs_sparse_grid(const hs_scene *scene, const hs_grid *dense, double width, hs_gri
     grid->n_cells = 0;
     for (int k = 0; k < scene->ndim; k++) {
         const double extent = scene->upper[k] - scene->lower[k];
-        const double pitch = choose_pitch(grid, k, extent, width);
+        const double range = grid->range[k], split = k == 0 ? HS_SPARSE_SPLIT / width : 1.0 / width;
+        const double places = split * extent < HS_SPARSE_LINEAR * range ? split * extent / range
+                                                                        : HS_SPARSE_LINEAR;
+        const double margin = LEAST_MARGIN + PLACE_ERROR * places;
+        const double pitch =
+            fmax(range * (1.0 + margin) / split, SMALLEST_PITCH * fmax(extent, 1.0));
         grid->stride[k] = 0;
         grid->skipped[k] = 0;
         if (scene->lattice.row_of_axis[k] >= 0) {
@@ -516,21 +505,12 @@ hs_sparse_choose(const hs_scene *scene, const hs_grid *dense, bool always)
 /* Sorts the points into rows of cells; finds rows, windows and groups by steps that double, then by
  * halves. */
 
-void
-hs_sparse_free(hs_account *account, hs_sparse *sparse)
-{
-    hs_free(account, sparse->row_index);
-    hs_free(account, sparse->row_cell);
-    hs_free(account, sparse->cell_x);
-    *sparse = (hs_sparse){.ndim = sparse->ndim};
-}
-
 /* Does the row come before these indices? */
 HS_ALWAYS_INLINE bool
-row_is_before(const hs_sparse *sparse, int64_t row, const int64_t *index)
+row_is_before(const hs_bins *bins, int64_t row, const int64_t *index)
 {
-    const int64_t *own = sparse->row_index + row * (sparse->ndim - 1);
-    for (int k = sparse->ndim - 1; k >= 1; k--) {
+    const int64_t *own = bins->row_index + row * (bins->ndim - 1);
+    for (int k = bins->ndim - 1; k >= 1; k--) {
         if (own[k - 1] != index[k]) {
             return own[k - 1] < index[k];
         }
@@ -540,35 +520,34 @@ row_is_before(const hs_sparse *sparse, int64_t row, const int64_t *index)
 
 /* Does the cell come before this index along the first axis? */
 HS_ALWAYS_INLINE bool
-cell_is_before(const hs_sparse *sparse, int64_t cell, const int64_t *x)
+cell_is_before(const hs_bins *bins, int64_t cell, const int64_t *x)
 {
-    return sparse->cell_x[cell] < *x;
+    return bins->cell_x[cell] < *x;
 }
 
 /* The first row or cell of [low, high) that does not come before what is sought, or high: from
  * `hint` on, which is at most high, by steps that double, then by halves. */
 HS_ALWAYS_INLINE int64_t
-seek(const hs_sparse *sparse, bool (*is_before)(const hs_sparse *, int64_t, const int64_t *),
+seek(const hs_bins *bins, bool (*is_before)(const hs_bins *, int64_t, const int64_t *),
      const int64_t *sought, int64_t low, int64_t high, int64_t hint)
 {
     int64_t step = 1; /* the answer is in [low, high] */
     hint = hint < low ? low : hint;
-    if (hint < high && is_before(sparse, hint, sought)) {
-        for (low = hint + 1; low + step <= high && is_before(sparse, low + step - 1, sought);
+    if (hint < high && is_before(bins, hint, sought)) {
+        for (low = hint + 1; low + step <= high && is_before(bins, low + step - 1, sought);
              step *= 2) {
             low += step;
         }
         high = low + step - 1 < high ? low + step - 1 : high;
     } else {
-        for (high = hint; high - step >= low && !is_before(sparse, high - step, sought);
-             step *= 2) {
+        for (high = hint; high - step >= low && !is_before(bins, high - step, sought); step *= 2) {
             high -= step;
         }
         low = high - step >= low ? high - step + 1 : low;
     }
     while (low < high) {
         const int64_t middle = low + (high - low) / 2;
-        if (is_before(sparse, middle, sought)) {
+        if (is_before(bins, middle, sought)) {
             low = middle + 1;
         } else {
             high = middle;
@@ -578,15 +557,15 @@ seek(const hs_sparse *sparse, bool (*is_before)(const hs_sparse *, int64_t, cons
 }
 
 int64_t
-hs_sparse_find_row(const hs_sparse *sparse, const int64_t *index, int64_t *hint)
+hs_sparse_find_row(const hs_bins *bins, const int64_t *index, int64_t *hint)
 {
-    const int64_t row = seek(sparse, row_is_before, index, 0, sparse->n_rows, *hint);
+    const int64_t row = seek(bins, row_is_before, index, 0, bins->n_rows, *hint);
     *hint = row;
-    if (row == sparse->n_rows) {
+    if (row == bins->n_rows) {
         return -1;
     }
-    const int64_t *own = sparse->row_index + row * (sparse->ndim - 1);
-    for (int k = 1; k < sparse->ndim; k++) {
+    const int64_t *own = bins->row_index + row * (bins->ndim - 1);
+    for (int k = 1; k < bins->ndim; k++) {
         if (own[k - 1] != index[k]) {
             return -1;
         }
@@ -595,42 +574,35 @@ hs_sparse_find_row(const hs_sparse *sparse, const int64_t *index, int64_t *hint)
 }
 
 void
-hs_sparse_window(const hs_sparse *sparse, int64_t row, int64_t x_first, int64_t x_last,
+hs_sparse_window(const hs_bins *bins, int64_t row, int64_t x_first, int64_t x_last,
                  hs_sparse_cursor *cursor, int32_t *first, int32_t *end)
 {
-    const int32_t low = sparse->row_cell[row], high = sparse->row_cell[row + 1];
+    const int32_t low = bins->row_cell[row], high = bins->row_cell[row + 1];
     const int64_t beyond = x_last + 1;
-    cursor->low = (int32_t)seek(sparse, cell_is_before, &x_first, low, high, cursor->low);
-    cursor->high = (int32_t)seek(sparse, cell_is_before, &beyond, cursor->low, high, cursor->high);
-    *first = sparse->cell_start[cursor->low];
-    *end = sparse->cell_start[cursor->high];
-}
-
-void
-hs_sparse_first_group(const hs_sparse *sparse, int64_t row, hs_sparse_group *group)
-{
-    const int32_t cell = sparse->row_cell[row], first = sparse->cell_start[cell];
-    *group = (hs_sparse_group){.first = first, .last = first, .cell = cell};
+    cursor->low = (int32_t)seek(bins, cell_is_before, &x_first, low, high, cursor->low);
+    cursor->high = (int32_t)seek(bins, cell_is_before, &beyond, cursor->low, high, cursor->high);
+    *first = bins->start[cursor->low];
+    *end = bins->start[cursor->high];
 }
 
 bool
-hs_sparse_next_group(const hs_sparse *sparse, int64_t row, int32_t most, hs_sparse_group *group)
+hs_sparse_next_group(const hs_bins *bins, int64_t row, int32_t most, hs_sparse_group *group)
 {
-    const int32_t *start = sparse->cell_start;
-    const int32_t  row_end = sparse->row_cell[row + 1];
+    const int32_t *start = bins->start;
+    const int32_t  row_end = bins->row_cell[row + 1];
     int32_t        cell = group->cell;
     cell += cell < row_end && start[cell + 1] == group->last; /* begin where the last one ended */
     if (cell == row_end) {
         return false;
     }
     group->first = group->last;
-    group->x_first = sparse->cell_x[cell];
+    group->x_first = bins->cell_x[cell];
     while (cell + 1 < row_end && start[cell + 1] - group->first < most &&
-           sparse->cell_x[cell + 1] < group->x_first + HS_SPARSE_SPLIT) {
+           bins->cell_x[cell + 1] < group->x_first + HS_SPARSE_SPLIT) {
         cell++;
     }
     group->last = start[cell + 1] - group->first < most ? start[cell + 1] : group->first + most;
-    group->x_last = sparse->cell_x[cell];
+    group->x_last = bins->cell_x[cell];
     group->cell = cell;
     return true;
 }
@@ -678,18 +650,18 @@ sort_by_axis(build *b, int64_t first, int64_t end, int k)
 
 hs_status
 hs_sparse_build(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
-                hs_grid *grid, hs_sparse *sparse, hs_bins *bins)
+                hs_grid *grid, hs_bins *bins)
 {
     const int64_t n = scene->n;
     build         b = {.scene = scene, .grid = grid};
     hs_status     status = HS_ERR_MEMORY;
-    *sparse = (hs_sparse){.ndim = scene->ndim};
     hs_bins_take(scene, bins);
-    sparse->cell_x = hs_alloc(account, HS_FOR_CELLS, n, sizeof(int64_t));
+    grid->n_cells = 0;
+    bins->cell_x = hs_alloc(account, HS_FOR_CELLS, n, sizeof(int64_t));
     int32_t *spare_ids = hs_alloc(account, HS_FOR_ORDER, n, sizeof *spare_ids);
-    b.sort = (hs_keys){sparse->cell_x, bins->order, (int64_t *)(void *)scene->cloud.spare,
-                       spare_ids,      options,     0};
-    if (sparse->cell_x != NULL && spare_ids != NULL) {
+    b.sort = (hs_keys){bins->cell_x, bins->order, (int64_t *)(void *)scene->cloud.spare,
+                       spare_ids,    options,     0};
+    if (bins->cell_x != NULL && spare_ids != NULL) {
         for (int64_t i = 0; i < n; i++) {
             bins->order[i] = (int32_t)i;
         }
@@ -697,34 +669,31 @@ hs_sparse_build(hs_account *account, hs_team *team, const hs_options *options, h
     }
     hs_free(account, spare_ids);
     if (status == HS_OK) {
-        const int64_t *keys = sparse->cell_x; /* complemented where a row begins */
+        const int64_t *keys = bins->cell_x; /* complemented where a row begins */
         for (int64_t si = 0; si < n; si++) {
             const bool begins_row = keys[si] < 0;
-            sparse->n_rows += begins_row;
-            sparse->n_cells += begins_row ||
-                               (keys[si] != keys[si - 1] && keys[si] != ~keys[si - 1]);
+            bins->n_rows += begins_row;
+            grid->n_cells += begins_row || (keys[si] != keys[si - 1] && keys[si] != ~keys[si - 1]);
         }
-        sparse->row_index =
-            hs_alloc(account, HS_FOR_CELLS, sparse->n_rows * (sparse->ndim - 1), sizeof(int64_t));
-        sparse->row_cell = hs_alloc(account, HS_FOR_CELLS, sparse->n_rows + 1, sizeof(int32_t));
-        bins->start = hs_alloc(account, HS_FOR_CELLS, sparse->n_cells + 1, sizeof(int32_t));
-        if (sparse->row_index == NULL || sparse->row_cell == NULL || bins->start == NULL) {
+        bins->row_index =
+            hs_alloc(account, HS_FOR_CELLS, bins->n_rows * (bins->ndim - 1), sizeof(int64_t));
+        bins->row_cell = hs_alloc(account, HS_FOR_CELLS, bins->n_rows + 1, sizeof(int32_t));
+        bins->start = hs_alloc(account, HS_FOR_CELLS, grid->n_cells + 1, sizeof(int32_t));
+        if (bins->row_index == NULL || bins->row_cell == NULL || bins->start == NULL) {
             status = HS_ERR_MEMORY;
         }
     }
     if (status == HS_OK) {
-        sparse->cell_start = bins->start;
-        int64_t *keys = sparse->cell_x; /* shortened to one for each cell, read ahead of that */
+        int64_t *keys = bins->cell_x; /* shortened to one for each cell, read ahead of that */
         int64_t  row = 0, cell = 0, x = 0;
         for (int64_t si = 0; si < n; si++) {
             const bool    begins_row = keys[si] < 0;
             const int64_t own = begins_row ? ~keys[si] : keys[si];
-            for (int k = 1; begins_row && k < sparse->ndim; k++) {
-                sparse->row_index[row * (sparse->ndim - 1) + k - 1] =
-                    index_of(&b, b.sort.ids[si], k);
+            for (int k = 1; begins_row && k < bins->ndim; k++) {
+                bins->row_index[row * (bins->ndim - 1) + k - 1] = index_of(&b, b.sort.ids[si], k);
             }
             if (begins_row) {
-                sparse->row_cell[row++] = (int32_t)cell;
+                bins->row_cell[row++] = (int32_t)cell;
             }
             if (begins_row || own != x) {
                 x = own;
@@ -732,17 +701,15 @@ hs_sparse_build(hs_account *account, hs_team *team, const hs_options *options, h
                 keys[cell++] = x;
             }
         }
-        sparse->row_cell[row] = (int32_t)cell;
+        bins->row_cell[row] = (int32_t)cell;
         bins->start[cell] = (int32_t)n;
-        for (int64_t c = 0; c < sparse->n_cells; c++) {
+        for (int64_t c = 0; c < grid->n_cells; c++) {
             const double here = bins->start[c + 1] - bins->start[c];
             bins->squares += here * here;
         }
         status = hs_bins_arrange(account, team, options, scene, bins);
     }
-    grid->n_cells = sparse->n_cells;
     if (status != HS_OK) {
-        hs_sparse_free(account, sparse);
         hs_bins_free(account, bins);
     }
     return status;

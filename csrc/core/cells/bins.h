@@ -26,6 +26,11 @@ typedef struct hs_bins {
     hs_turns  turns;
     void     *points; /* owned; the columns above lie in these two: the scene's blocks */
     void     *beside; /* owned or NULL */
+    /* Of a sparse grid, whose cells are those that `start` counts; else NULL: */
+    int64_t  n_rows;
+    int64_t *row_index; /* owned; (ndim - 1) per row: its index along axes 1, 2 ... */
+    int32_t *row_cell;  /* owned; n_rows + 1: its first cell */
+    int64_t *cell_x;    /* owned; index of each cell along the first axis */
 } hs_bins;
 
 /*
@@ -117,16 +122,6 @@ double hs_sparse_choose(const hs_scene *scene, const hs_grid *dense, bool always
  * offset by which they see each other, and only forward (grid.h).
  */
 
-typedef struct hs_sparse {
-    int            ndim;
-    int64_t        n_rows;
-    int64_t        n_cells;    /* occupied ones */
-    int64_t       *row_index;  /* owned; (ndim - 1) per row: its index along axes 1, 2 ... */
-    int32_t       *row_cell;   /* owned; n_rows + 1: its first cell */
-    int64_t       *cell_x;     /* owned; index of each cell along the first axis */
-    const int32_t *cell_start; /* bins->start: n_cells + 1, each cell's first point */
-} hs_sparse;
-
 /* Cells where the last window of a link began and ended. Any will do at first, as {0, 0}. */
 typedef struct hs_sparse_cursor {
     int32_t low, high;
@@ -141,27 +136,22 @@ typedef struct hs_sparse_group {
 
 /*
  * Sorts the points by row, cell and the caller's number, polling now and then; takes the scene's
- * arrays over or frees them, as hs_bins_build does. bins->start counts the occupied cells and
- * grid->n_cells is their number. On failure neither holds anything. grid: from hs_sparse_grid.
+ * arrays over or frees them, as hs_bins_build does. grid->n_cells becomes the number of occupied
+ * cells. On failure holds nothing. grid: from hs_sparse_grid.
  */
 hs_status hs_sparse_build(hs_account *account, hs_team *team, const hs_options *options,
-                          hs_scene *scene, hs_grid *grid, hs_sparse *sparse, hs_bins *bins);
+                          hs_scene *scene, hs_grid *grid, hs_bins *bins);
 
 /* The row with these indices (index[0] is not read), or -1. *hint: a row to start from, any in
  * 0 ... n_rows; receives where the row is or would be. */
-int64_t hs_sparse_find_row(const hs_sparse *sparse, const int64_t *index, int64_t *hint);
+int64_t hs_sparse_find_row(const hs_bins *bins, const int64_t *index, int64_t *hint);
 
 /* Points [*first, *end) of the row whose index along the first axis is in [x_first, x_last]. */
-void hs_sparse_window(const hs_sparse *sparse, int64_t row, int64_t x_first, int64_t x_last,
+void hs_sparse_window(const hs_bins *bins, int64_t row, int64_t x_first, int64_t x_last,
                       hs_sparse_cursor *cursor, int32_t *first, int32_t *end);
 
-/* Before the first group of a row. */
-void hs_sparse_first_group(const hs_sparse *sparse, int64_t row, hs_sparse_group *group);
-
-/* The next group, of at most `most` points; false after the row's last. */
-bool hs_sparse_next_group(const hs_sparse *sparse, int64_t row, int32_t most,
-                          hs_sparse_group *group);
-
-void hs_sparse_free(hs_account *account, hs_sparse *sparse);
+/* The next group, of at most `most` points; false after the row's last. Before the first one `cell`
+ * is the first cell of the row, and `last` its first point. */
+bool hs_sparse_next_group(const hs_bins *bins, int64_t row, int32_t most, hs_sparse_group *group);
 
 #endif

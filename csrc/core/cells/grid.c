@@ -30,6 +30,8 @@
 /* Points that a cell along the first axis should hold, if that makes it a quarter of the range or
  * more; walks put cells together where these are fewer. */
 #define POINTS_PER_CELL 12.0
+/* Cells of so much more than a part of the range reach over so many of them. */
+#define PART_SLACK (1.0 + 0x1p-20)
 /* Where cells are wider than need be, rows of few cells hold so many points at least: there is
  * nothing to put together along them. */
 #define FEW_CELLS      4.0
@@ -39,13 +41,6 @@
  * 300 points gain a quarter with 4 to 30; uniform scenes lose with more than 16. */
 #define SHORTER     16.0
 #define ROWS_ACROSS 10.0
-
-/* The least width of cells along axis k of which `parts` shall reach as far as the range. */
-static double
-pitch_of(const hs_grid *grid, int k, double parts)
-{
-    return grid->range[k] * (1.0 + 0x1p-20) / parts;
-}
 
 /* In proportion to the points. */
 static double
@@ -88,7 +83,7 @@ static void
 shorten_cells(const hs_scene *scene, const hs_grid *grid, double *counts)
 {
     const double extent = scene->upper[0] - scene->lower[0]; /* not 0: there are several cells */
-    const double most = fmin(SHORTER * counts[0], floor(extent / pitch_of(grid, 0, 1.0)));
+    const double most = fmin(SHORTER * counts[0], floor(extent / (grid->range[0] * PART_SLACK)));
     double       across = INFINITY, product = counts[0];
     int          n_others = 0;
     for (int k = 1; k < scene->ndim; k++) {
@@ -259,22 +254,24 @@ set_ranges(const hs_scene *scene, hs_grid *grid)
 }
 
 /* Ranges, errors and expected pairs, no cells yet; *density: points in a unit of the volume that
- * they are in. */
+ * they are in; *ball: the volume within reach of one. */
 static hs_status
-grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure *failure)
+grid_begin(const hs_scene *scene, double *density, double *ball, hs_grid *grid, hs_failure *failure)
 {
     /* Volume of the periodic axes, times the open extents. */
     double volume = hs_lattice_volume(&scene->lattice, 0);
     *grid = (hs_grid){.ndim = scene->ndim};
+    *ball = hs_ball_volume(scene->ndim, scene->cutoff);
     hs_status status = set_ranges(scene, grid);
     for (int k = 0; status == HS_OK && k < scene->ndim; k++) {
+        /* Pairs are narrower along some axes. */
+        *ball *= scene->less[k] > 0.0 ? hs_scene_radius_along(scene, k) / scene->radius : 1.0;
         volume *= scene->lattice.row_of_axis[k] >= 0
                       ? 1.0
                       : hs_larger(scene->upper[k] - scene->lower[k], grid->range[k]);
     }
     *density = (double)scene->n / volume;
-    grid->expected_pairs = 0.5 * (double)scene->n * *density *
-                           hs_scene_volume(scene, hs_ball_volume(scene->ndim, scene->cutoff));
+    grid->expected_pairs = 0.5 * (double)scene->n * *density * *ball;
     if (!(volume > 0.0)) { /* points on one spot, cutoff 0 */
         grid->expected_pairs = 0.5 * (double)scene->n * (double)(scene->n - 1);
     }
@@ -287,8 +284,8 @@ grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure *fa
 hs_status
 hs_grid_init(const hs_scene *scene, hs_grid_kind kind, hs_grid *grid, hs_failure *failure)
 {
-    double    counts[HS_MAX_DIM], density, single_cost = INFINITY;
-    hs_status status = grid_begin(scene, &density, grid, failure);
+    double    counts[HS_MAX_DIM], density, ball, single_cost = INFINITY;
+    hs_status status = grid_begin(scene, &density, &ball, grid, failure);
     if (status != HS_OK) {
         return status;
     }
@@ -304,8 +301,7 @@ hs_grid_init(const hs_scene *scene, hs_grid_kind kind, hs_grid *grid, hs_failure
     const bool is_single = kind == HS_GRID_SINGLE ||
                            (kind == HS_GRID_ANY && single_cost <= SORTING_COST);
     if (!is_single) {
-        const double neighbours =
-            density * hs_scene_volume(scene, hs_ball_volume(scene->ndim, scene->cutoff));
+        const double neighbours = density * ball;
         /* Narrower rows cost more rows to visit, and leave out candidates that else are gathered
          * first (scan.h). */
         const int finer = neighbours < 600.0 ? 1 : neighbours < 3000.0 ? 2 : 3;
@@ -318,7 +314,7 @@ hs_grid_init(const hs_scene *scene, hs_grid_kind kind, hs_grid *grid, hs_failure
                 const double points = density * area * grid->range[0];
                 parts = fmin(fmax(nearbyint(points / POINTS_PER_CELL), 1.0), 4.0);
             }
-            const double pitch = pitch_of(grid, k, parts);
+            const double pitch = grid->range[k] * PART_SLACK / parts;
             counts[k] = 1.0;
             if (extent > pitch) { /* never for a zero extent, also with cutoff 0 */
                 counts[k] = floor(fmin(extent / pitch, CELLS_PER_AXIS));
@@ -584,8 +580,8 @@ hs_status
 hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_wider,
                   hs_failure *failure)
 {
-    double          counts[HS_MAX_DIM], density;
-    const hs_status status = grid_begin(scene, &density, grid, failure);
+    double          counts[HS_MAX_DIM], density, ball;
+    const hs_status status = grid_begin(scene, &density, &ball, grid, failure);
     if (status != HS_OK) {
         return status;
     }
@@ -593,7 +589,8 @@ hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_w
         const double extent = scene->upper[k] - scene->lower[k];
         /* Where the range is a whole number of cells it would reach one cell further, for it is a
          * little more than the cutoff: such cells are as much wider. */
-        const double part = pitch_of(grid, k, fmax(nearbyint(grid->range[k] / width), 1.0));
+        const double parts = fmax(nearbyint(grid->range[k] / width), 1.0);
+        const double part = grid->range[k] * PART_SLACK / parts;
         const double pitch = part > width && part <= width * (1.0 + 0x1p-18) ? part : width;
         /* Not for a zero extent, also with a width that scaling brought to zero. */
         counts[k] = extent > pitch ? floor(fmin(extent / pitch, CELLS_PER_AXIS)) : 1.0;

@@ -36,21 +36,6 @@ hs_output_width(const hs_output *output, unsigned bit)
     return (size_t)hs_want_bytes(bit, output->ndim, output->index_bytes);
 }
 
-/* Write to the caller's arrays. */
-static void
-output_fix(hs_output *output, const hs_pair_arrays *arrays)
-{
-    void *const data[HS_QUANTITIES] = {arrays->i,      arrays->j,     arrays->distance,
-                                       arrays->vector, arrays->shift, arrays->both,
-                                       arrays->shell};
-    for (int k = 0; k < HS_QUANTITIES; k++) {
-        output->column[k] = (hs_region){.data = data[k]};
-    }
-    output->fixed = true;
-    output->capacity = arrays->capacity;
-    output->index_bytes = arrays->index_bytes;
-}
-
 void *
 hs_output_column(const hs_output *output, unsigned bit)
 {
@@ -231,15 +216,6 @@ hs_output_touch(hs_output *output, int64_t at, int64_t n)
     }
 }
 
-/* Whether bytes of a column up to `end` are better written past the caches: they will not stay
- * there, and are not there because the system has just cleared new pages. */
-static bool
-bypasses(const hs_output *output, int k, size_t width, size_t end)
-{
-    return (double)output->capacity * (double)width >= LEAST_BYPASSED &&
-           (output->fixed || end <= hs_region_resident(&output->column[k]));
-}
-
 void
 hs_output_copy(hs_output *output, int64_t at, const hs_output *part, int64_t first, int64_t end)
 {
@@ -249,7 +225,11 @@ hs_output_copy(hs_output *output, int64_t at, const hs_output *part, int64_t fir
             const size_t width = hs_output_width(output, 1u << k), n_bytes = (size_t)n * width;
             char        *to = output->column[k].data + (size_t)at * width;
             const char  *from = part->column[k].data + (size_t)first * width;
-            if (bypasses(output, k, width, (size_t)(at + n) * width)) {
+            /* Past the caches where they will not stay there, and are not there because the system
+             * has just cleared new pages. */
+            if ((double)output->capacity * (double)width >= LEAST_BYPASSED &&
+                (output->fixed ||
+                 (size_t)(at + n) * width <= hs_region_resident(&output->column[k]))) {
                 hs_bypass_copy(to, from, n_bytes);
             } else {
                 memcpy(to, from, n_bytes);
@@ -260,18 +240,6 @@ hs_output_copy(hs_output *output, int64_t at, const hs_output *part, int64_t fir
 }
 
 #define ROWS_AHEAD 16 /* rows from prefetching a place to writing there */
-
-/* Prefetches the lines of a row that it shares with others, or all; the others are written whole
- * past the caches. */
-HS_ALWAYS_INLINE void
-expect_row(const char *from, const char *end, bool bypass)
-{
-    for (; from < end && !bypass; from += HS_ALIGNMENT) {
-        HS_PREFETCH_WRITE(from);
-    }
-    HS_PREFETCH_WRITE(from);
-    HS_PREFETCH_WRITE(end);
-}
 
 static void
 place_column(char *column, const char *from, size_t width, bool bypass, const int64_t *offsets,
@@ -286,7 +254,15 @@ place_column(char *column, const char *from, size_t width, bool bypass, const in
         }
         if (t + ROWS_AHEAD < known) {
             const int64_t *next = offsets + row[t + ROWS_AHEAD];
-            expect_row(column + (size_t)next[0] * width, column + (size_t)next[1] * width, bypass);
+            const char    *line = column + (size_t)next[0] * width;
+            const char    *end = column + (size_t)next[1] * width;
+            /* The lines of a row that it shares with others, or all of them; the others are written
+             * whole past the caches. */
+            for (; line < end && !bypass; line += HS_ALIGNMENT) {
+                HS_PREFETCH_WRITE(line);
+            }
+            HS_PREFETCH_WRITE(line);
+            HS_PREFETCH_WRITE(end);
         }
         if (bypass) {
             hs_bypass_copy(to, from, n_bytes);
@@ -442,8 +418,16 @@ hs_pairs_open(hs_pairs *pairs, int ndim)
 {
     const hs_options *options = &pairs->call.options;
     hs_output_init(&pairs->call.account, ndim, options->want, options->index_bytes, &pairs->output);
-    if (options->out != NULL) {
-        output_fix(&pairs->output, options->out);
+    if (options->out != NULL) { /* writes to the caller's arrays */
+        const hs_pair_arrays *out = options->out;
+        void *const data[HS_QUANTITIES] = {out->i,     out->j,    out->distance, out->vector,
+                                           out->shift, out->both, out->shell};
+        for (int k = 0; k < HS_QUANTITIES; k++) {
+            pairs->output.column[k] = (hs_region){.data = data[k]};
+        }
+        pairs->output.fixed = true;
+        pairs->output.capacity = out->capacity;
+        pairs->output.index_bytes = out->index_bytes;
     }
 }
 

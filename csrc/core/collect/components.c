@@ -134,35 +134,6 @@ typedef struct measuring {
     int64_t               failed[HS_SLABS];
 } measuring;
 
-/* S of a pair over the periodic box vectors. */
-static hs_status
-find_shift(const hs_given_pairs *given, int64_t at, const double *p, const double *q,
-           int64_t *shift)
-{
-    const hs_pair_numbers *pairs = given->pairs;
-    const hs_lattice      *lattice = &given->box->lattice;
-    const int              d = lattice->ndim;
-    if (pairs->shift == NULL) {
-        return lattice->n_periodic > 0 ? hs_near_image(given->box, p, q, shift) : HS_OK;
-    }
-    int64_t all[HS_MAX_DIM];
-    memcpy(all, pairs->shift + at * d, (size_t)d * sizeof *all);
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        const int l = lattice->vector_of_row[r];
-        shift[r] = all[l];
-        all[l] = 0;
-        if (shift[r] >= MOST_SHIFT || shift[r] <= -MOST_SHIFT) {
-            return HS_ERR_ARGUMENT;
-        }
-    }
-    for (int l = 0; l < d; l++) {
-        if (all[l] != 0) {
-            return HS_ERR_ARGUMENT;
-        }
-    }
-    return HS_OK;
-}
-
 /* Takes pair `at` into the batch as number e. */
 static hs_status
 take_pair(const hs_given_pairs *given, int64_t at, int32_t e, int32_t *S, hs_measured *batch)
@@ -171,8 +142,9 @@ take_pair(const hs_given_pairs *given, int64_t at, int32_t e, int32_t *S, hs_mea
     const hs_lattice *lattice = &given->box->lattice;
     const int         d = cloud->ndim;
     const int64_t     i = given->pairs->i[at], j = given->pairs->j[at];
+    const int64_t    *known = given->pairs->shift; /* S over all box vectors; NULL: to be found */
     double            p[HS_MAX_DIM], q[HS_MAX_DIM];
-    int64_t           shift[HS_MAX_DIM];
+    int64_t           shift[HS_MAX_DIM]; /* over those that repeat */
     if (i < 0 || i >= cloud->n || j < 0 || j >= cloud->n) {
         return HS_ERR_ARGUMENT;
     }
@@ -180,9 +152,24 @@ take_pair(const hs_given_pairs *given, int64_t at, int32_t e, int32_t *S, hs_mea
         batch->p[k][e] = p[k] = cloud->x[k][i];
         batch->q[k][e] = q[k] = cloud->x[k][j];
     }
-    const hs_status status = find_shift(given, at, p, q, shift);
-    if (status != HS_OK) {
-        return status;
+    if (known == NULL && lattice->n_periodic > 0) {
+        const hs_status status = hs_near_image(given->box, p, q, shift);
+        if (status != HS_OK) {
+            return status;
+        }
+    }
+    for (int r = 0; known != NULL && r < lattice->n_periodic; r++) {
+        shift[r] = known[at * d + lattice->vector_of_row[r]];
+        if (shift[r] >= MOST_SHIFT || shift[r] <= -MOST_SHIFT) {
+            return HS_ERR_ARGUMENT;
+        }
+    }
+    for (int l = 0, r = 0; known != NULL && l < d; l++) {
+        const bool repeats = r < lattice->n_periodic && lattice->vector_of_row[r] == l;
+        if (!repeats && known[at * d + l] != 0) {
+            return HS_ERR_ARGUMENT;
+        }
+        r += repeats;
     }
     if (S != NULL) { /* over all box vectors */
         memset(S + at * d, 0, (size_t)d * sizeof *S);
@@ -199,30 +186,6 @@ take_pair(const hs_given_pairs *given, int64_t at, int32_t e, int32_t *S, hs_mea
     return HS_OK;
 }
 
-/* Measures anew what nearly cancels. */
-static void
-measure_cancelled(const measuring *doing, int32_t e, double largest, hs_measured *batch)
-{
-    const int d = doing->slow.ndim, m = doing->slow.n_rows;
-    double    p[HS_MAX_DIM], q[HS_MAX_DIM], vector[HS_MAX_DIM], terms = largest;
-    int64_t   shift[HS_MAX_DIM];
-    for (int r = 0; r < m; r++) {
-        shift[r] = batch->shift[r][e];
-        terms += fabs((double)shift[r]) * doing->longest;
-    }
-    if (batch->distance[e] >= CANCELLED * terms) {
-        return;
-    }
-    for (int k = 0; k < d; k++) {
-        p[k] = batch->p[k][e];
-        q[k] = batch->q[k][e];
-    }
-    batch->distance[e] = hs_metric_measure(&doing->slow, p, q, shift, vector);
-    for (int k = 0; k < d; k++) {
-        batch->vector[k][e] = vector[k];
-    }
-}
-
 /* Measures the batch, and writes it to the place of its first pair. *failed: the first whose vector
  * is not finite, else -1. */
 static void
@@ -231,16 +194,29 @@ put_batch(const measuring *doing, int64_t first, hs_measured *batch, int32_t *fa
     const hs_output *output = doing->given->output;
     const hs_scale   same = {.exponent = 0, .first = 1.0, .second = 1.0};
     const double     largest = 2.0 * doing->given->cloud->largest;
-    const int        d = output->ndim;
+    const int        d = output->ndim, m = doing->slow.n_rows;
     double          *distance = hs_output_column(output, HS_WANT_DISTANCE);
     double          *vectors = hs_output_column(output, HS_WANT_VECTOR);
     double          *vector[HS_MAX_DIM], sign[HS_BATCH];
     hs_measured_find(doing->kernel, &doing->given->box->metric, vectors != NULL, batch);
     *failed = -1;
     for (int32_t e = 0; e < batch->n; e++) {
+        double  p[HS_MAX_DIM], q[HS_MAX_DIM], along[HS_MAX_DIM], terms = largest;
+        int64_t shift[HS_MAX_DIM];
         sign[e] = 1.0;
-        if (batch->is_shifted) {
-            measure_cancelled(doing, e, largest, batch);
+        for (int r = 0; batch->is_shifted && r < m; r++) {
+            shift[r] = batch->shift[r][e];
+            terms += fabs((double)shift[r]) * doing->longest;
+        }
+        if (batch->is_shifted && !(batch->distance[e] >= CANCELLED * terms)) { /* measured anew */
+            for (int k = 0; k < d; k++) {
+                p[k] = batch->p[k][e];
+                q[k] = batch->q[k][e];
+            }
+            batch->distance[e] = hs_metric_measure(&doing->slow, p, q, shift, along);
+            for (int k = 0; k < d; k++) {
+                batch->vector[k][e] = along[k];
+            }
         }
         if (*failed < 0 && !(batch->distance[e] < INFINITY)) {
             *failed = e;
@@ -304,7 +280,7 @@ hs_given_pairs_measure(const hs_given_pairs *given, hs_call *call, hs_failure *f
         doing.failed[slab] = -1;
     }
     const hs_status status =
-        hs_walk_slabs(call->team, &call->options, given->pairs->n, measure_slab, &doing);
+        hs_walk_points(call->team, &call->options, given->pairs->n, 0, measure_slab, &doing);
     for (int slab = 0; status != HS_OK && slab < HS_SLABS && failure->row < 0; slab++) {
         failure->row = doing.failed[slab];
     }

@@ -365,7 +365,8 @@ search_range(void *context, int64_t range)
     hs_status status = hs_walk(walker, (int32_t)first, (int32_t)end, &me->committer.failure);
     if (status == HS_STOPPED && scanner->leaves) {
         /* The output is full: what the worker has is written, and its place is kept. */
-        status = hs_commit(&me->committer, hs_scanner_fraction(scanner), false);
+        status = hs_commit(&me->committer,
+                           hs_search_fraction(scanner->search, scanner->group.first), false);
         if (status == HS_OK) {
             job->left = (hs_bookmark){.point = scanner->group.first, .blocks = scanner->blocks};
             job->is_left = true;
@@ -387,7 +388,8 @@ collect_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *h
     const hs_status  status = hs_record_hits(&keeper->recorder, scanner, first, hits);
     const int64_t    n_bytes = pairs->n_pairs * hs_output_bytes_per_pair(pairs);
     if (status == HS_OK && n_bytes >= committer->most_bytes) {
-        const hs_status committed = hs_commit(committer, hs_scanner_fraction(scanner), false);
+        const hs_status committed =
+            hs_commit(committer, hs_search_fraction(scanner->search, scanner->group.first), false);
         scanner->leaves = committer->is_full;
         return committed;
     }

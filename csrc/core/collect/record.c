@@ -23,47 +23,32 @@ hs_recorder_init(hs_account *account, hs_output *output, int32_t most_hits, hs_r
 {
     const int64_t  n = most_hits + HS_PADDING, in_batch = HS_BATCH + HS_PADDING;
     const unsigned columns = output->columns;
-    bool           complete = true;
+    hs_parts       parts;
     *recorder = (hs_recorder){.output = output, .columns = columns, .most_hits = most_hits};
+    hs_parts_begin(&parts);
     if (hs_record_use(columns) == HS_BLOCK_LISTS_PLACES) {
-        recorder->ids = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(int32_t));
-        complete = recorder->ids != NULL;
+        hs_parts_add(&parts, (void **)&recorder->ids, n, sizeof(int32_t));
     }
-    if (columns & HS_WANT_BOTH) {
-        recorder->ends[0] = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(int32_t));
-        recorder->ends[1] = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(int32_t));
-        complete = complete && recorder->ends[0] != NULL && recorder->ends[1] != NULL;
+    for (int end = 0; (columns & HS_WANT_BOTH) && end < 2; end++) {
+        hs_parts_add(&parts, (void **)&recorder->ends[end], n, sizeof(int32_t));
     }
     if (columns & HS_MEASURED) {
-        recorder->distance = hs_alloc(account, HS_FOR_CANDIDATES, in_batch, sizeof(double));
-        complete = complete && recorder->distance != NULL;
+        hs_parts_add(&parts, (void **)&recorder->distance, in_batch, sizeof(double));
     }
     for (int k = 0; (columns & HS_WANT_VECTOR) && k < output->ndim; k++) {
-        recorder->vector[k] = hs_alloc(account, HS_FOR_CANDIDATES, in_batch, sizeof(double));
-        complete = complete && recorder->vector[k] != NULL;
+        hs_parts_add(&parts, (void **)&recorder->vector[k], in_batch, sizeof(double));
     }
     if ((columns & HS_WANT_SHELL) && !(columns & HS_WANT_DISTANCE)) {
-        recorder->all_distances = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(double));
-        complete = complete && recorder->all_distances != NULL;
+        hs_parts_add(&parts, (void **)&recorder->all_distances, n, sizeof(double));
     }
-    if (!complete) {
-        hs_recorder_free(account, recorder);
-        return HS_ERR_MEMORY;
-    }
-    return HS_OK;
+    recorder->memory = hs_parts_alloc(account, HS_FOR_CANDIDATES, &parts);
+    return recorder->memory != NULL ? HS_OK : HS_ERR_MEMORY;
 }
 
 void
 hs_recorder_free(hs_account *account, hs_recorder *recorder)
 {
-    hs_free(account, recorder->ids);
-    hs_free(account, recorder->ends[0]);
-    hs_free(account, recorder->ends[1]);
-    hs_free(account, recorder->distance);
-    hs_free(account, recorder->all_distances);
-    for (int k = 0; k < HS_MAX_DIM; k++) {
-        hs_free(account, recorder->vector[k]);
-    }
+    hs_free(account, recorder->memory);
     *recorder = (hs_recorder){0};
 }
 
@@ -86,123 +71,87 @@ typedef struct open_pairs {
     open_pair      pair[HS_BATCH];
 } open_pairs;
 
-/* Traces the open pairs whose next edge is this one; of[e]: which of them is pair e. */
-static hs_status
-batch_at(const open_pairs *open, int32_t edge, int32_t *of)
-{
-    hs_pair_batch *pair_batch = &open->scanner->pair_batch;
-    hs_pair_batch_clear(pair_batch);
-    for (int32_t u = 0; u < open->n; u++) {
-        const open_pair *pair = &open->pair[u];
-        if (pair->low == edge) {
-            of[pair_batch->n] = u;
-            hs_pair_batch_put(pair_batch, pair->si, open->places[pair->hit]);
-        }
-    }
-    return hs_pair_batch_look_up(pair_batch, true, &open->scanner->failed_point);
-}
-
-/* Decides the pairs that are in the batch at this edge. */
-static void
-decide_at(open_pairs *open, int32_t edge, const int32_t *of)
-{
-    const hs_metric *given = &open->scanner->search->scene.metric;
-    const hs_shells *shells = &open->scanner->search->shells;
-    hs_metric        metric;
-    uint8_t          within[HS_BATCH];
-    hs_metric_init(&metric, given->ndim, given->n_rows, (const double(*)[HS_MAX_DIM])given->rows,
-                   shells->at[edge], shells->inclusive);
-    hs_decide_pair_batch(open->scanner, &metric, within);
-    for (int32_t e = 0; e < open->scanner->pair_batch.n; e++) {
-        open_pair *pair = &open->pair[of[e]];
-        if (within[e]) {
-            pair->high = edge;
-        } else {
-            pair->low = edge + 1;
-        }
-    }
-}
-
-/* Writes those that are decided, and keeps the others. */
-static void
-put_decided(open_pairs *open)
-{
-    const hs_shells *shells = &open->scanner->search->shells;
-    int32_t          n = 0;
-    for (int32_t u = 0; u < open->n; u++) {
-        const open_pair pair = open->pair[u];
-        if (pair.low < pair.high) {
-            open->pair[n++] = pair;
-        } else {
-            double *distance = &open->distance[pair.hit];
-            *distance = hs_shells_keep(shells, pair.low, *distance);
-            open->shell[pair.hit] = pair.low;
-        }
-    }
-    open->n = n;
-}
-
+/* Decides the pairs edge by edge, and writes them. */
 static hs_status
 decide_open(open_pairs *open)
 {
-    int32_t of[HS_BATCH];
-    open->scanner->n_ambiguous += open->n;
+    hs_scanner      *scanner = open->scanner;
+    hs_pair_batch   *pair_batch = &scanner->pair_batch;
+    const hs_metric *given = &scanner->search->scene.metric;
+    const hs_shells *shells = &scanner->search->shells;
+    scanner->n_ambiguous += open->n;
     while (open->n > 0) {
-        const int32_t   edge = open->pair[0].low;
-        const hs_status status = batch_at(open, edge, of);
+        const int32_t edge = open->pair[0].low;
+        int32_t       of[HS_BATCH], n = 0; /* of[e]: which of them is pair e of the batch */
+        hs_metric     metric;
+        uint8_t       within[HS_BATCH];
+        hs_pair_batch_clear(pair_batch);
+        for (int32_t u = 0; u < open->n; u++) {
+            if (open->pair[u].low == edge) {
+                of[pair_batch->n] = u;
+                hs_pair_batch_put(pair_batch, open->pair[u].si, open->places[open->pair[u].hit]);
+            }
+        }
+        const hs_status status = hs_pair_batch_look_up(pair_batch, true, &scanner->failed_point);
         if (status != HS_OK) {
             return status;
         }
-        decide_at(open, edge, of);
-        put_decided(open);
+        hs_metric_init(&metric, given->ndim, given->n_rows,
+                       (const double(*)[HS_MAX_DIM])given->rows, shells->at[edge],
+                       shells->inclusive);
+        hs_decide_pair_batch(scanner, &metric, within);
+        for (int32_t e = 0; e < pair_batch->n; e++) {
+            open_pair *pair = &open->pair[of[e]];
+            pair->high = within[e] ? edge : pair->high;
+            pair->low = within[e] ? pair->low : edge + 1;
+        }
+        for (int32_t u = 0; u < open->n; u++) { /* those that are not decided yet stay */
+            const open_pair pair = open->pair[u];
+            if (pair.low < pair.high) {
+                open->pair[n++] = pair;
+            } else {
+                double *distance = &open->distance[pair.hit];
+                *distance = hs_shells_keep(shells, pair.low, *distance);
+                open->shell[pair.hit] = pair.low;
+            }
+        }
+        open->n = n;
     }
     return HS_OK;
 }
 
-/* Looks again at the distances that are too near to an edge. */
-static hs_status
-look_again(open_pairs *open, int32_t first, const hs_hits *hits)
-{
-    const hs_shells *shells = &open->scanner->search->shells;
-    for (int32_t t = 0, h = 0; t < hits->n; t++) {
-        for (; h < hits->end[t]; h++) {
-            int32_t low = open->shell[h], high;
-            hs_shells_range(shells, open->distance[h], &low, &high);
-            open->shell[h] = low;
-            if (low < high) {
-                open->pair[open->n++] = (open_pair){h, first + t, low, high};
-            }
-            if (open->n == HS_BATCH) {
-                const hs_status status = decide_open(open);
-                if (status != HS_OK) {
-                    return status;
-                }
-            }
-        }
-    }
-    return decide_open(open);
-}
-
 /* The shells of the hits of points from `first` on, places in the walker's block whose distances
- * have been written, as the next of the column; nothing where they are not wanted. Distances that
- * rounding has moved across an edge are put right. HS_OK, HS_ERR_SHIFT_RANGE, which sets
- * scanner->failed_point, or HS_ERR_INTERRUPTED. */
+ * have been written, as the next of the column. Distances that rounding has moved across an edge
+ * are put right. HS_OK, HS_ERR_SHIFT_RANGE, which sets scanner->failed_point, or
+ * HS_ERR_INTERRUPTED. */
 static hs_status
 put_shells(const hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     const hs_shells *shells = &scanner->search->shells;
-    const int32_t    n = hits->end[hits->n - 1];
     open_pairs       open; /* large, and seldom used: not cleared */
-    if (!(recorder->columns & HS_WANT_SHELL)) {
-        return HS_OK;
-    }
     open.scanner = scanner;
     open.places = hits->label;
     open.distance = hs_recorder_distances(recorder);
     open.shell = hs_output_next(recorder->output, HS_WANT_SHELL);
     open.n = 0;
-    const bool is_open = hs_shells_find(shells, open.distance, n, open.shell);
-    return is_open ? look_again(&open, first, hits) : HS_OK;
+    if (!hs_shells_find(shells, open.distance, hits->end[hits->n - 1], open.shell)) {
+        return HS_OK;
+    }
+    for (int32_t t = 0, h = 0; t < hits->n; t++) { /* some distances are too near to an edge */
+        for (; h < hits->end[t]; h++) {
+            int32_t low = open.shell[h], high;
+            hs_shells_range(shells, open.distance[h], &low, &high);
+            open.shell[h] = low;
+            if (low < high) {
+                open.pair[open.n++] = (open_pair){h, first + t, low, high};
+            }
+            const hs_status status = open.n == HS_BATCH ? decide_open(&open) : HS_OK;
+            if (status != HS_OK) {
+                return status;
+            }
+        }
+    }
+    return decide_open(&open);
 }
 
 /* Kernels first, one pair at a time where they decline; then to the caller's unit, in
@@ -223,20 +172,6 @@ pair_of(const hs_metric *metric, const hs_batch *batch, int64_t *const *shift, i
     return shift != NULL ? of_pair : NULL;
 }
 
-/* Pair e of the batch, by itself. */
-static void
-measure_one(const hs_metric *metric, const hs_batch *batch, int64_t *const *shift, int32_t e,
-            double *distance, double *const *vector)
-{
-    double         p[HS_MAX_DIM], q[HS_MAX_DIM], along[HS_MAX_DIM];
-    int64_t        of_pair[HS_MAX_DIM];
-    const int64_t *own = pair_of(metric, batch, shift, e, p, q, of_pair);
-    distance[e] = hs_metric_measure(metric, p, q, own, along);
-    for (int k = 0; vector != NULL && k < metric->ndim; k++) {
-        vector[k][e] = along[k];
-    }
-}
-
 /* Measures pairs in the arrays of `batch`. shift: one array for each row of the metric, or NULL if
  * no pair is shifted. is_wide: batch->shift does not hold these numbers. vector: NULL, or one array
  * for each axis. */
@@ -250,7 +185,13 @@ measure_pairs(const hs_kernel *kernel, const hs_metric *metric, const hs_batch *
     }
     for (int32_t e = 0; e < batch->n; e++) {
         if (HS_UNLIKELY(!done[e])) {
-            measure_one(metric, batch, shift, e, distance, vector);
+            double         p[HS_MAX_DIM], q[HS_MAX_DIM], along[HS_MAX_DIM];
+            int64_t        of_pair[HS_MAX_DIM];
+            const int64_t *own = pair_of(metric, batch, shift, e, p, q, of_pair);
+            distance[e] = hs_metric_measure(metric, p, q, own, along);
+            for (int k = 0; vector != NULL && k < metric->ndim; k++) {
+                vector[k][e] = along[k];
+            }
         }
     }
 }
@@ -314,13 +255,6 @@ hs_measures_unscale(const hs_scene *scene)
     return scene->extreme ? same : scene->unscale; /* then the metric has the caller's unit */
 }
 
-/* The largest distance that is within the cutoff. */
-static double
-largest_within(double cutoff, bool inclusive)
-{
-    return inclusive ? cutoff : nextafter(cutoff, 0.0);
-}
-
 void
 hs_measures_tell(const hs_scene *scene, const hs_options *options, hs_write *write)
 {
@@ -329,7 +263,9 @@ hs_measures_tell(const hs_scene *scene, const hs_options *options, hs_write *wri
     write->first = unscale.first;
     write->second = unscale.second;
     write->cutoff = is_exact ? options->cutoff : INFINITY;
-    write->largest = is_exact ? largest_within(options->cutoff, options->inclusive) : INFINITY;
+    write->largest = !is_exact            ? INFINITY
+                     : options->inclusive ? options->cutoff
+                                          : nextafter(options->cutoff, 0.0);
 }
 
 void
@@ -343,7 +279,7 @@ hs_restore_distances(double *distance, int32_t n, hs_scale unscale)
 void
 hs_keep_all_within(double *distance, int32_t n, double cutoff, bool inclusive)
 {
-    const double largest = largest_within(cutoff, inclusive);
+    const double largest = inclusive ? cutoff : nextafter(cutoff, 0.0);
     for (int32_t e = 0; e < n; e++) {
         distance[e] = distance[e] < cutoff ? distance[e] : largest;
     }
@@ -382,16 +318,6 @@ static bool
 has_lengths(const hs_search *search)
 {
     return search->limits != NULL && search->limits->supports == NULL;
-}
-
-/* Whether hits of this search can be written so, to these columns. */
-static bool
-can_write(const hs_recorder *recorder, const hs_scanner *scanner)
-{
-    const hs_search *search = scanner->search;
-    return scanner->block.candidates != NULL && !(recorder->columns & HS_WANT_BOTH) &&
-           (!(recorder->columns & HS_MEASURED) ||
-            (!search->scene.extreme && search->scene.metric.floats_usable));
 }
 
 /* What candidates and points are, of the hits of n points from `first` on. turns: room for those of
@@ -434,19 +360,6 @@ describe(const hs_scanner *scanner, int32_t first, int32_t n,
     }
 }
 
-/* Where the pairs go. */
-static void
-direct(const hs_recorder *recorder, hs_write *write)
-{
-    const hs_output *output = recorder->output;
-    write->index_bytes = output->index_bytes;
-    write->i = hs_output_next(output, HS_WANT_I);
-    write->j = hs_output_next(output, HS_WANT_J);
-    write->distance = hs_recorder_distances(recorder);
-    write->vector = hs_output_next(output, HS_WANT_VECTOR);
-    write->shift = hs_output_next(output, HS_WANT_SHIFT);
-}
-
 /* The hits of points from `first` on, which are places in the walker's block, as the next pairs of
  * the output, but for HS_WANT_BOTH. *written: whether that was possible; if not, nothing is there
  * yet. HS_OK or HS_ERR_INTERRUPTED. */
@@ -455,16 +368,25 @@ write_hits(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_h
            bool *written)
 {
     const hs_search *search = scanner->search;
+    const hs_output *output = recorder->output;
+    const bool       is_measured = recorder->columns & HS_MEASURED;
     *written = false;
-    if (!can_write(recorder, scanner)) {
+    if (scanner->block.candidates == NULL || (recorder->columns & HS_WANT_BOTH) ||
+        (is_measured && (search->scene.extreme || !search->scene.metric.floats_usable))) {
         return HS_OK;
     }
     int32_t  turns[HS_WRITE_MOST_DIM][HS_GROUP_POINTS];
     hs_write write = {.ndim = search->scene.ndim,
                       .is_half = search->is_half,
-                      .is_measured = recorder->columns & HS_MEASURED,
+                      .is_measured = is_measured,
                       .by_S = search->bins.keeps_originals,
-                      .metric = &search->scene.metric};
+                      .metric = &search->scene.metric,
+                      .index_bytes = output->index_bytes,
+                      .i = hs_output_next(output, HS_WANT_I),
+                      .j = hs_output_next(output, HS_WANT_J),
+                      .distance = hs_recorder_distances(recorder),
+                      .vector = hs_output_next(output, HS_WANT_VECTOR),
+                      .shift = hs_output_next(output, HS_WANT_SHIFT)};
     write.is_shifted = write.by_S || scanner->block.has_images;
     hs_measures_tell(&search->scene, &search->call->options, &write);
     if (has_lengths(search)) { /* keep_within_lengths, once all is written */
@@ -476,7 +398,6 @@ write_hits(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_h
     }
     write.is_fine = scanner->block.are_fine;
     memset(scanner->block.hits + hits->end[hits->n - 1], 0, HS_PADDING * sizeof(int32_t));
-    direct(recorder, &write);
     *written = search->call->kernel->write(&write, hits);
     return HS_OK;
 }
@@ -490,20 +411,6 @@ typedef struct batch_part {
     int32_t point[HS_BATCH]; /* number of the point whose hit each one is */
 } batch_part;
 
-/* The first nonzero component of S is negative. */
-static bool
-is_backward(const hs_pair_batch *pair_batch, int32_t e)
-{
-    const int m = pair_batch->search->scene.lattice.n_periodic;
-    for (int l = 0; l < m; l++) {
-        const int64_t shift = pair_batch->given[l][e];
-        if (shift != 0) {
-            return shift < 0;
-        }
-    }
-    return false;
-}
-
 /* 1, or -1 for pairs of a half list that are listed the other way round. */
 static void
 find_signs(const hs_pair_batch *pair_batch, const int32_t *point, const int32_t *id, double *sign)
@@ -514,48 +421,12 @@ find_signs(const hs_pair_batch *pair_batch, const int32_t *point, const int32_t 
         any_own |= id[e] == point[e];
     }
     for (int32_t e = 0; any_own && e < pair_batch->n; e++) {
-        if (id[e] == point[e] && is_backward(pair_batch, e)) {
-            sign[e] = -1.0;
+        int64_t first = 0; /* nonzero component of S */
+        for (int l = 0; id[e] == point[e] && first == 0 && l < pair_batch->n_rows; l++) {
+            first = pair_batch->given[l][e];
         }
+        sign[e] = first < 0 ? -1.0 : sign[e];
     }
-}
-
-/* d and D of the batch to the recorder's arrays, in the unit of the metric. */
-static void
-measure(hs_recorder *recorder, hs_pair_batch *pair_batch)
-{
-    const hs_search *search = pair_batch->search;
-    const hs_batch   batch = hs_pair_batch_view(pair_batch);
-    int64_t *const  *shift = search->bins.keeps_originals ? pair_batch->given : pair_batch->image;
-    double *const   *vector = recorder->columns & HS_WANT_VECTOR ? recorder->vector : NULL;
-    measure_pairs(search->call->kernel, &search->scene.metric, &batch,
-                  pair_batch->is_shifted ? shift : NULL, pair_batch->is_wide, recorder->distance,
-                  vector);
-}
-
-static void
-put_distances(hs_recorder *recorder, const hs_scanner *scanner, int32_t first)
-{
-    const hs_search  *search = scanner->search;
-    const hs_options *options = &search->call->options;
-    const int32_t     n = scanner->pair_batch.n;
-    const hs_scale    unscale = hs_measures_unscale(&search->scene);
-    double           *to = hs_recorder_distances(recorder);
-    hs_restore_distances(recorder->distance, n, unscale);
-    if (options->precision == HS_EXACT && !has_lengths(search)) {
-        hs_keep_all_within(recorder->distance, n, options->cutoff, options->inclusive);
-    }
-    memcpy(to + first, recorder->distance, (size_t)n * sizeof *to);
-}
-
-static void
-put_vectors(const hs_recorder *recorder, const hs_search *search, const double *sign, int32_t first,
-            int32_t n)
-{
-    const int d = recorder->output->ndim;
-    double   *to = hs_output_next(recorder->output, HS_WANT_VECTOR);
-    hs_restore_vectors(to + (int64_t)first * d, recorder->vector, sign, n, d,
-                       hs_measures_unscale(&search->scene));
 }
 
 /* Shifts that only sort the images of one pair may leave out what these images share: the turns by
@@ -588,10 +459,12 @@ put_shifts(const hs_recorder *recorder, const hs_pair_batch *pair_batch, const d
 {
     const hs_lattice *lattice = &pair_batch->search->scene.lattice;
     const int         d = lattice->ndim, m = lattice->n_periodic;
-    const bool        keys_only = !(pair_batch->search->call->options.want & HS_WANT_SHIFT);
-    int64_t           keys[HS_MAX_DIM][HS_BATCH];
-    int32_t *to = (int32_t *)hs_output_next(recorder->output, HS_WANT_SHIFT) + (int64_t)first * d;
-    int32_t  fitting = pair_batch->n;
+    const bool        is_wanted = pair_batch->search->call->options.want & HS_WANT_SHIFT;
+    /* Where all S are small, a writer puts them whole beside those of batches. */
+    const bool keys_only = !is_wanted && !pair_batch->is_narrow;
+    int64_t    keys[HS_MAX_DIM][HS_BATCH];
+    int32_t   *to = (int32_t *)hs_output_next(recorder->output, HS_WANT_SHIFT) + (int64_t)first * d;
+    int32_t    fitting = pair_batch->n;
     if (m < d) {
         memset(to, 0, (size_t)pair_batch->n * (size_t)d * sizeof *to);
     }
@@ -616,12 +489,13 @@ put_shifts(const hs_recorder *recorder, const hs_pair_batch *pair_batch, const d
 static hs_status
 put_batch(hs_recorder *recorder, hs_scanner *scanner, const batch_part *part)
 {
-    hs_pair_batch   *pair_batch = &scanner->pair_batch;
-    const hs_search *search = scanner->search;
-    const bool       measured = recorder->columns & HS_MEASURED;
-    double           sign[HS_BATCH];
-    const hs_status  status =
-        hs_pair_batch_look_up(&scanner->pair_batch, measured, &scanner->failed_point);
+    hs_pair_batch    *pair_batch = &scanner->pair_batch;
+    const hs_search  *search = scanner->search;
+    const hs_options *options = &search->call->options;
+    const hs_scale    unscale = hs_measures_unscale(&search->scene);
+    const bool        measured = recorder->columns & HS_MEASURED;
+    double            sign[HS_BATCH];
+    const hs_status   status = hs_pair_batch_look_up(pair_batch, measured, &scanner->failed_point);
     if (status != HS_OK) {
         return status;
     }
@@ -632,14 +506,29 @@ put_batch(hs_recorder *recorder, hs_scanner *scanner, const batch_part *part)
     } else if (recorder->columns & (HS_WANT_VECTOR | HS_WANT_SHIFT)) {
         find_signs(pair_batch, part->point, recorder->ids + part->first, sign);
     }
-    if (measured) {
-        measure(recorder, pair_batch);
+    if (measured) { /* to the recorder's arrays, in the unit of the metric */
+        const hs_batch  batch = hs_pair_batch_view(pair_batch);
+        int64_t *const *shift = search->bins.keeps_originals ? pair_batch->given
+                                                             : pair_batch->image;
+        measure_pairs(search->call->kernel, &search->scene.metric, &batch,
+                      pair_batch->is_shifted ? shift : NULL, pair_batch->is_wide,
+                      recorder->distance,
+                      recorder->columns & HS_WANT_VECTOR ? recorder->vector : NULL);
     }
     if (recorder->columns & (HS_WANT_DISTANCE | HS_WANT_SHELL)) {
-        put_distances(recorder, scanner, part->first);
+        hs_restore_distances(recorder->distance, pair_batch->n, unscale);
+        if (options->precision == HS_EXACT && !has_lengths(search)) {
+            hs_keep_all_within(recorder->distance, pair_batch->n, options->cutoff,
+                               options->inclusive);
+        }
+        memcpy(hs_recorder_distances(recorder) + part->first, recorder->distance,
+               (size_t)pair_batch->n * sizeof(double));
     }
     if (recorder->columns & HS_WANT_VECTOR) {
-        put_vectors(recorder, search, sign, part->first, pair_batch->n);
+        const int d = recorder->output->ndim;
+        double   *to = hs_output_next(recorder->output, HS_WANT_VECTOR);
+        hs_restore_vectors(to + (int64_t)part->first * d, recorder->vector, sign, pair_batch->n, d,
+                           unscale);
     }
     if (recorder->columns & HS_WANT_SHIFT) {
         const int32_t fitting = put_shifts(recorder, pair_batch, sign, part->first);
@@ -682,34 +571,27 @@ put_measures(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs
 
 #define INDICES (HS_WANT_I | HS_WANT_J | HS_WANT_BOTH)
 
-/* The lower of the two numbers to i, the other to j. */
+/* Of half lists the lower of the two numbers to i, the other to j; else the asking point to i and
+ * what it met to j, whatever their numbers are. */
 static void
-put_ordered(const hs_recorder *recorder, const hs_kernel *kernel, const hs_hits *hits)
-{
-    const hs_output *output = recorder->output;
-    const int        bytes = output->index_bytes;
-    const int32_t    n = hits->end[hits->n - 1];
-    char            *both = hs_output_next(output, HS_WANT_BOTH);
-    if (recorder->columns & (HS_WANT_I | HS_WANT_J)) {
-        kernel->emit(hits, bytes, hs_output_next(output, HS_WANT_I),
-                     hs_output_next(output, HS_WANT_J));
-    }
-    if (both != NULL) {
-        kernel->emit(hits, 4, recorder->ends[0], recorder->ends[1]);
-        hs_put_indices(both, bytes, 2, recorder->ends[0], 1, n);
-        hs_put_indices(both + bytes, bytes, 2, recorder->ends[1], 1, n);
-    }
-}
-
-/* The asking point to i and what it met to j, whatever their numbers are. */
-static void
-put_directed(const hs_recorder *recorder, const hs_hits *hits)
+put_indices(const hs_recorder *recorder, const hs_search *search, const hs_hits *hits)
 {
     const hs_output *output = recorder->output;
     const int        bytes = output->index_bytes;
     const int32_t    n = hits->end[hits->n - 1];
     char            *i = hs_output_next(output, HS_WANT_I), *j = hs_output_next(output, HS_WANT_J);
     char            *both = hs_output_next(output, HS_WANT_BOTH);
+    if (search->is_half && (i != NULL || j != NULL)) {
+        search->call->kernel->emit(hits, bytes, i, j);
+    }
+    if (search->is_half && both != NULL) {
+        search->call->kernel->emit(hits, 4, recorder->ends[0], recorder->ends[1]);
+        hs_put_indices(both, bytes, 2, recorder->ends[0], 1, n);
+        hs_put_indices(both + bytes, bytes, 2, recorder->ends[1], 1, n);
+    }
+    if (search->is_half) {
+        return;
+    }
     hs_put_indices(j, bytes, 1, hits->label, 1, n);
     hs_put_indices(both != NULL ? both + bytes : NULL, bytes, 2, hits->label, 1, n);
     for (int32_t t = 0, h = 0; t < hits->n && (i != NULL || both != NULL); h = hits->end[t++]) {
@@ -717,42 +599,6 @@ put_directed(const hs_recorder *recorder, const hs_hits *hits)
         hs_put_indices(i != NULL ? i + at : NULL, bytes, 1, &hits->point[t], 0, of_point);
         hs_put_indices(both != NULL ? both + 2 * at : NULL, bytes, 2, &hits->point[t], 0, of_point);
     }
-}
-
-static void
-put_indices(const hs_recorder *recorder, const hs_search *search, const hs_hits *hits)
-{
-    if (search->is_half) {
-        put_ordered(recorder, search->call->kernel, hits);
-    } else {
-        put_directed(recorder, hits);
-    }
-}
-
-/* All columns of hits. */
-static hs_status
-put_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
-{
-    const int32_t  n = hits->end[hits->n - 1];
-    const int32_t *id = scanner->block.id;
-    hs_hits        by_id = *hits;
-    bool           written;
-    hs_status      status = write_hits(recorder, scanner, first, hits, &written);
-    if (status != HS_OK) {
-        return status;
-    }
-    if (written) {
-        return put_shells(recorder, scanner, first, hits);
-    }
-    if (scanner->search->is_half || (recorder->columns & INDICES)) {
-        for (int32_t h = 0; h < n; h++) {
-            recorder->ids[h] = id[hits->label[h]];
-        }
-        by_id.label = recorder->ids;
-        put_indices(recorder, scanner->search, &by_id);
-    }
-    status = put_measures(recorder, scanner, first, hits);
-    return status == HS_OK ? put_shells(recorder, scanner, first, hits) : status;
 }
 
 /* Distances that have been written, in an exact search: none is left beyond the length of its pair,
@@ -774,28 +620,40 @@ keep_within_lengths(const hs_recorder *recorder, const hs_scanner *scanner, int3
     }
 }
 
-/* Distances of pairs that are this far apart or further are not below that; only a point that asks
- * for its own neighbours is at 0 from itself. */
-static void
-keep_apart(const hs_output *output, int32_t n, double least)
+/* All columns of hits that are places: at once where that is possible, else in batches. */
+static hs_status
+put_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    double *distance = hs_output_next(output, HS_WANT_DISTANCE);
-    for (int32_t h = 0; distance != NULL && h < n; h++) {
-        distance[h] = distance[h] > 0.0 ? hs_larger(distance[h], least) : 0.0;
-    }
-}
-
-hs_status
-hs_record_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
-{
-    const hs_choice *choice = scanner->search->call->choice;
-    const hs_status  status = put_places(recorder, scanner, first, hits);
+    const hs_search *search = scanner->search;
+    const hs_choice *choice = search->call->choice;
     const bool       is_exact = scanner->options.precision == HS_EXACT;
-    if (status == HS_OK && is_exact && has_lengths(scanner->search)) {
+    const int32_t    n = hits->end[hits->n - 1];
+    hs_hits          by_id = *hits;
+    bool             written;
+    hs_status        status = write_hits(recorder, scanner, first, hits, &written);
+    if (status == HS_OK && !written) {
+        if (search->is_half || (recorder->columns & INDICES)) {
+            for (int32_t h = 0; h < n; h++) {
+                recorder->ids[h] = scanner->block.id[hits->label[h]];
+            }
+            by_id.label = recorder->ids;
+            put_indices(recorder, search, &by_id);
+        }
+        status = put_measures(recorder, scanner, first, hits);
+    }
+    if (status == HS_OK && (recorder->columns & HS_WANT_SHELL)) {
+        status = put_shells(recorder, scanner, first, hits);
+    }
+    if (status == HS_OK && is_exact && has_lengths(search)) {
         keep_within_lengths(recorder, scanner, first, hits);
     }
-    if (status == HS_OK && choice != NULL && is_exact) {
-        keep_apart(recorder->output, hits->end[hits->n - 1], choice->min_distance);
+    if (status == HS_OK && is_exact && choice != NULL) {
+        /* No pair is nearer than that; only a point that asks for its own neighbours is at 0 from
+         * itself. */
+        double *distance = hs_output_next(recorder->output, HS_WANT_DISTANCE);
+        for (int32_t h = 0; distance != NULL && h < n; h++) {
+            distance[h] = distance[h] > 0.0 ? hs_larger(distance[h], choice->min_distance) : 0.0;
+        }
     }
     return status;
 }
@@ -806,9 +664,10 @@ hs_record_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits 
     hs_recorder  *recorder = context;
     hs_output    *output = recorder->output;
     const int32_t n = hits->end[hits->n - 1];
-    hs_status     status = hs_output_reserve(output, n, hs_scanner_fraction(scanner));
+    hs_status     status =
+        hs_output_reserve(output, n, hs_search_fraction(scanner->search, scanner->group.first));
     if (status == HS_OK && scanner->use == HS_BLOCK_LISTS_PLACES) {
-        status = hs_record_places(recorder, scanner, first, hits);
+        status = put_places(recorder, scanner, first, hits);
     } else if (status == HS_OK) {
         put_indices(recorder, scanner->search, hits);
     }

@@ -13,8 +13,9 @@
  * first nonzero component of S positive, with D, d and S of that orientation.
  */
 
-/* Where a walker's hits go, and room to prepare them in: owned arrays, NULL when not needed. */
+/* Where a walker's hits go, and room to prepare them in: arrays, NULL when not needed. */
 typedef struct hs_recorder {
+    void      *memory;             /* owned: of all arrays */
     hs_output *output;             /* borrowed; not fixed */
     unsigned   columns;            /* HS_WANT_ bits of the output */
     int32_t    most_hits;          /* of a visit */
@@ -45,13 +46,8 @@ hs_status hs_recorder_init(hs_account *account, hs_output *output, int32_t most_
                            hs_recorder *recorder);
 void      hs_recorder_free(hs_account *account, hs_recorder *recorder);
 
-/* The hits of points from `first` on, which are places in the walker's block, as the next pairs of
- * the output, which has room for them: at once where that is possible, else in batches.
- * HS_ERR_SHIFT_RANGE sets scanner->failed_point. */
-hs_status hs_record_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first,
-                           const hs_hits *hits);
-
-/* A hs_visit_fn. */
+/* A hs_visit_fn: the hits as the next pairs of the output. HS_ERR_SHIFT_RANGE sets
+ * scanner->failed_point. */
 hs_status hs_record_hits(void *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits);
 
 /*

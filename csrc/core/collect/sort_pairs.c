@@ -59,14 +59,6 @@ number_of(const sorting *all, uint64_t entry, bool is_i)
     return (is_turned(all, entry) != is_i ? all->i : all->j)[pair_of(all, entry)];
 }
 
-/* Component k of S, or of -S, where the least int32 stays what it is. */
-HS_ALWAYS_INLINE int32_t
-shift_of(const sorting *all, uint64_t entry, int k)
-{
-    const int32_t shift = all->shift[pair_of(all, entry) * all->found->ndim + k];
-    return is_turned(all, entry) ? (int32_t)(0u - (uint32_t)shift) : shift;
-}
-
 HS_ALWAYS_INLINE uint64_t
 entry_of(const sorting *all, int32_t number, uint64_t place)
 {
@@ -86,10 +78,12 @@ static void
 sort_images(const sorting *all, uint64_t *row, int64_t n, uint64_t *spare)
 {
     uint64_t *keys = spare + n;
-    for (int k = all->found->ndim; k-- > 0;) {
-        for (int64_t e = 0; e < n; e++) {
-            const uint32_t shift = (uint32_t)shift_of(all, row[e], k) ^ UINT32_C(0x80000000);
-            keys[e] = (uint64_t)shift << 32 | (uint64_t)e;
+    const int d = all->found->ndim;
+    for (int k = d; k-- > 0;) {
+        for (int64_t e = 0; e < n; e++) { /* of -S, where the least int32 stays what it is */
+            const uint32_t shift = (uint32_t)all->shift[pair_of(all, row[e]) * d + k];
+            const uint32_t own = is_turned(all, row[e]) ? 0u - shift : shift;
+            keys[e] = (uint64_t)(own ^ UINT32_C(0x80000000)) << 32 | (uint64_t)e;
         }
         hs_sort_numbers(keys, n, 32, spare);
         memcpy(spare, row, (size_t)n * sizeof *row);
@@ -229,18 +223,6 @@ deal_strip(void *context, int strip, int64_t first, int64_t last)
     return HS_OK;
 }
 
-/* Strips of n_items for this team: each with enough, and no more further numbers than items. */
-static int
-choose_strips(const dealing *deal, int64_t n_items)
-{
-    const int size = hs_team_size(deal->all->call->team);
-    int       n = size < HS_SLABS ? size : HS_SLABS;
-    while (n > 1 && (n_items < n * STRIP_PAIRS || (n - 1) * deal->n_rows > n_items)) {
-        n--;
-    }
-    return n;
-}
-
 /* Sorts n_items. end: receives where each row ends. */
 static hs_status
 deal_rows(dealing *deal, int64_t n_items, int64_t *end)
@@ -248,7 +230,7 @@ deal_rows(dealing *deal, int64_t n_items, int64_t *end)
     hs_call  *call = deal->all->call;
     int64_t  *others = NULL, place = 0;
     hs_status status = HS_OK;
-    deal->n_strips = choose_strips(deal, n_items);
+    deal->n_strips = hs_strips_for(call->team, n_items, STRIP_PAIRS, deal->n_rows);
     if (deal->n_strips > 1) { /* without memory for these there is one strip */
         others = hs_alloc(&call->account, HS_FOR_SORTING, (deal->n_strips - 1) * deal->n_rows,
                           sizeof *others);
@@ -265,7 +247,7 @@ deal_rows(dealing *deal, int64_t n_items, int64_t *end)
         }
     } else {
         status =
-            hs_walk_strips(call->team, &call->options, n_items, deal->n_strips, count_strip, deal);
+            hs_walk_points(call->team, &call->options, n_items, deal->n_strips, count_strip, deal);
     }
     for (int64_t row = 0; row < deal->n_rows; row++) { /* from counts to places, row by row */
         for (int strip = 0; strip < deal->n_strips; strip++) {
@@ -276,28 +258,10 @@ deal_rows(dealing *deal, int64_t n_items, int64_t *end)
     }
     if (status == HS_OK) {
         status =
-            hs_walk_strips(call->team, &call->options, n_items, deal->n_strips, deal_strip, deal);
+            hs_walk_points(call->team, &call->options, n_items, deal->n_strips, deal_strip, deal);
     }
     hs_free(&call->account, others);
     return status;
-}
-
-/* Sets the least of all j, and returns the number from it to the largest. */
-static int64_t
-range_of_second(const sorting *all, int32_t *least)
-{
-    const int64_t n_pairs = all->found->n_pairs;
-    int32_t       lowest = INT32_MAX, highest = 0;
-    if (all->both_ways || n_pairs == 0) {
-        *least = all->first_point;
-        return all->n_rows;
-    }
-    for (int64_t p = 0; p < n_pairs; p++) {
-        lowest = all->j[p] < lowest ? all->j[p] : lowest;
-        highest = all->j[p] > highest ? all->j[p] : highest;
-    }
-    *least = lowest;
-    return (int64_t)highest - lowest + 1;
 }
 
 /* Finds the entries of each row, which the caller frees, also on failure; sets all members but
@@ -307,8 +271,14 @@ deal_out(sorting *all)
 {
     hs_account   *account = &all->call->account;
     const int64_t n_pairs = all->found->n_pairs;
-    int32_t       least;
-    const int64_t n_seconds = range_of_second(all, &least), most_i = all->first_point + all->n_rows;
+    const bool    by_rows = all->both_ways || n_pairs == 0;                    /* so are all j */
+    int32_t       least = by_rows ? all->first_point : INT32_MAX, largest = 0; /* j */
+    for (int64_t p = 0; !by_rows && p < n_pairs; p++) {
+        least = all->j[p] < least ? all->j[p] : least;
+        largest = all->j[p] > largest ? all->j[p] : largest;
+    }
+    const int64_t n_seconds = by_rows ? all->n_rows : (int64_t)largest - least + 1;
+    const int64_t most_i = all->first_point + all->n_rows;
     const int64_t most = least + n_seconds > most_i ? least + n_seconds : most_i;
     dealing       by_i = {.all = all,
                           .key = all->i,
@@ -514,49 +484,44 @@ close_worker(void *context, void *place)
     hs_free(&job->all->call->account, ((worker *)place)->spare);
 }
 
-static hs_status
-do_ranges(row_job *job)
-{
-    hs_call *call = job->all->call;
-    /* Each thread has room for the longest row: where that is much of all, one thread sorts. */
-    if (call->team != NULL && job->n_ranges > 1 &&
-        job->all->longest <= job->all->n_entries / hs_team_size(call->team)) {
-        hs_failure ignored;
-        hs_crew    crew = {.call = call,
-                           .job = job,
-                           .worker_size = sizeof(worker),
-                           .open = open_worker,
-                           .close = close_worker,
-                           .n_ranges = job->n_ranges,
-                           .search = do_range};
-        return hs_crew_run(&crew, &ignored);
-    }
-    worker    me = {.committer = {.options = &call->options}};
-    hs_status status = open_worker(job, &me);
-    for (int64_t range = 0; range < job->n_ranges && status == HS_OK; range++) {
-        status = do_range(&me, range);
-    }
-    close_worker(job, &me);
-    return status;
-}
-
 /* Once all entries are in their rows. */
 static hs_status
 put_all(const sorting *all, hs_output *sorted)
 {
+    hs_call *call = all->call;
+    row_job  job = {.all = all,
+                    .sorted = sorted,
+                    .before = sorted->n_pairs,
+                    .n_ranges = (all->n_entries + RANGE_ENTRIES - 1) / RANGE_ENTRIES};
     if (sorted->fixed && all->n_entries > sorted->capacity) {
         sorted->n_pairs = all->n_entries; /* tells hs_pairs_conclude that they do not fit */
         return HS_OK;
     }
-    row_job   job = {.all = all,
-                     .sorted = sorted,
-                     .before = sorted->n_pairs,
-                     .n_ranges = (all->n_entries + RANGE_ENTRIES - 1) / RANGE_ENTRIES};
     hs_status status = sorted->fixed ? HS_OK : hs_output_reserve(sorted, all->n_entries, 1.0);
-    if (status == HS_OK) {
-        status = do_ranges(&job);
-        sorted->n_pairs += status == HS_OK ? all->n_entries : 0;
+    if (status != HS_OK) {
+        return status;
     }
+    /* Each thread has room for the longest row: where that is much of all, one thread sorts. */
+    if (call->team != NULL && job.n_ranges > 1 &&
+        all->longest <= all->n_entries / hs_team_size(call->team)) {
+        hs_failure ignored;
+        hs_crew    crew = {.call = call,
+                           .job = &job,
+                           .worker_size = sizeof(worker),
+                           .open = open_worker,
+                           .close = close_worker,
+                           .n_ranges = job.n_ranges,
+                           .search = do_range};
+        status = hs_crew_run(&crew, &ignored);
+    } else {
+        worker me = {.committer = {.options = &call->options}};
+        status = open_worker(&job, &me);
+        for (int64_t range = 0; range < job.n_ranges && status == HS_OK; range++) {
+            status = do_range(&me, range);
+        }
+        close_worker(&job, &me);
+    }
+    sorted->n_pairs += status == HS_OK ? all->n_entries : 0;
     return status;
 }
 

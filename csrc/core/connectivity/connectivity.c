@@ -189,10 +189,10 @@ hs_half_list_rows(hs_call *call, const hs_output *half, int64_t n, bool directed
 /* ---- rows of nodes --------------------------------------------------------------------------- */
 
 hs_list_rows
-hs_rows_of(const hs_output *offsets, const hs_output *rows, int32_t n_lists)
+hs_rows_of(const hs_output *offsets, const hs_output *rows)
 {
-    return (hs_list_rows){.n = n_lists > 0 ? (offsets->n_pairs - 1) / n_lists : 0,
-                          .n_lists = n_lists,
+    return (hs_list_rows){.n = offsets->n_pairs - 1,
+                          .n_lists = 1,
                           .offsets = hs_output_column(offsets, HS_WANT_I),
                           .n_indices = rows->n_pairs,
                           .indices = hs_output_column(rows, HS_WANT_J),
@@ -408,7 +408,7 @@ hs_connectivity_fill(hs_connectivity *made, const hs_node_map *map, hs_output *h
                      hs_output *offsets, hs_output *rows)
 {
     hs_call           *call = &made->rows.call;
-    const hs_list_rows found = hs_rows_of(offsets, rows, 1);
+    const hs_list_rows found = hs_rows_of(offsets, rows);
     hs_status          status = HS_OK;
     if (!map->lists->rows_only && half->columns == 0) {
         status = find_pairs(call, map, &found, true, half);

@@ -74,8 +74,8 @@ hs_half_list hs_half_list_columns(const hs_output *half);
 hs_status hs_half_list_rows(hs_call *call, const hs_output *half, int64_t n, bool directed,
                             hs_output *offsets, hs_output *rows);
 
-/* The rows of two such outputs, or of a table; borrowed. */
-hs_list_rows hs_rows_of(const hs_output *offsets, const hs_output *rows, int32_t n_lists);
+/* The rows of two such outputs; borrowed. */
+hs_list_rows hs_rows_of(const hs_output *offsets, const hs_output *rows);
 
 /*
  * Whether a pair of points is one of the table: not if both are ghosts, unless these are wanted.

@@ -117,15 +117,15 @@ hs_morton_keys(const hs_points *points, const double *low, const double *high, u
 
 /* What the threads share. */
 typedef struct merging {
-    hs_call         *call;
-    hs_node_map      map;
-    double          *points; /* owned */
-    const hs_metric *images;
-    hs_half_list     half;
-    hs_list_rows     rows;
-    int64_t          longest; /* row */
-    int64_t         *length;  /* of each pair and list, in the order of the table */
-    int64_t         *before;  /* owned; of each range how many pairs of the table come before */
+    hs_call     *call;
+    hs_node_map  map;
+    double      *points; /* owned */
+    hs_metric    images; /* what shifts multiply; axes that do not repeat have rows of zeros */
+    hs_half_list half;
+    hs_list_rows rows;
+    int64_t      longest; /* row */
+    int64_t     *length;  /* of each pair and list, in the order of the table */
+    int64_t     *before;  /* owned; of each range how many pairs of the table come before */
 } merging;
 
 typedef struct intersection_worker {
@@ -214,7 +214,7 @@ static int64_t
 find_common(intersection_worker *me, int64_t pair, bool turned)
 {
     const merging *all = me->all;
-    const int      d = all->images->ndim;
+    const int      d = all->images.ndim;
     const int32_t  i = all->half.i[pair], j = all->half.j[pair];
     const double  *p = all->points + (int64_t)i * d, *q = all->points + (int64_t)j * d;
     const int32_t *of_j = all->half.shift != NULL ? all->half.shift + pair * d : NULL;
@@ -232,7 +232,7 @@ find_common(intersection_worker *me, int64_t pair, bool turned)
             me->shift[n * d + l] = (int32_t)of_x[l]; /* row i does not have what does not fit */
         }
         if ((of_j == NULL || has_image(&all->rows, i, k, of_x)) &&
-            hs_foot_is_between(all->images, all->points + (int64_t)k * d, of_x, p, q, of_q)) {
+            hs_foot_is_between(&all->images, all->points + (int64_t)k * d, of_x, p, q, of_q)) {
             me->common[n++] = k;
         }
     }
@@ -318,7 +318,6 @@ merge_range(void *context, int64_t range)
                            : status;
 }
 
-/* Has all lengths and entries written. */
 static hs_status
 merge_all(merging *doing, const hs_output *half, hs_pairs *result, hs_failure *failure)
 {
@@ -356,7 +355,7 @@ merge_all(merging *doing, const hs_output *half, hs_pairs *result, hs_failure *f
                         .n_ranges = n_ranges,
                         .search = merge_range,
                         .output = &result->output};
-        doing->rows = hs_rows_of(&offsets, &rows, 1);
+        doing->rows = hs_rows_of(&offsets, &rows);
         for (int64_t i = 0; i < doing->rows.n; i++) {
             const int64_t length = doing->rows.offsets[i + 1] - doing->rows.offsets[i];
             doing->longest = length > doing->longest ? length : doing->longest;
@@ -386,11 +385,9 @@ hs_connectivity_intersect(const hs_points *points, const hs_box *box, const hs_h
     if (made == NULL) {
         return status;
     }
-    /* What the shifts multiply; axes that do not repeat have rows of zeros. */
     const int   d = points->ndim;
     hs_account *account = &made->call.account;
-    hs_metric   images = {.ndim = d, .n_rows = box != NULL ? d : 0};
-    merging     doing = {.call = &made->call, .images = &images};
+    merging     doing = {.call = &made->call, .images = {.ndim = d, .n_rows = box != NULL ? d : 0}};
     if (status == HS_OK && box != NULL) {
         status = hs_check_box(box, d) == HS_OK && pairs->ndim == d && d <= HS_MAX_DIM - 2
                      ? hs_box_check(box, failure)
@@ -400,8 +397,8 @@ hs_connectivity_intersect(const hs_points *points, const hs_box *box, const hs_h
         status = hs_half_list_copy(account, pairs, points->n, false, &half, failure);
     }
     if (status == HS_OK) {
-        for (int e = 0; e < images.n_rows * d; e++) {
-            images.rows[e / d][e % d] = box->periodic[e / d] ? box->rows[e / d][e % d] : 0.0;
+        for (int e = 0; e < doing.images.n_rows * d; e++) {
+            doing.images.rows[e / d][e % d] = box->periodic[e / d] ? box->rows[e / d][e % d] : 0.0;
         }
         doing.half = hs_half_list_columns(&half);
         hs_links_init(account, HS_WANT_J, doing.half.shift != NULL, half.ndim, &made->output);
@@ -538,7 +535,6 @@ clear_bits(const overlap_worker *me, int32_t *to)
     return n;
 }
 
-/* Room for all that point i meets. */
 static hs_status
 make_room(overlap_worker *me, int32_t i)
 {
@@ -621,9 +617,8 @@ add_shift(const int32_t *shift, int ndim, int32_t *to, int64_t n)
     return n + 1;
 }
 
-/* The row of point i. */
 HS_ALWAYS_INLINE hs_status
-write_row_in(overlap_worker *me, int32_t i, const int d, int64_t *length)
+write_row(overlap_worker *me, int32_t i, const int d, int64_t *length)
 {
     hs_output *pairs = me->committer.pairs;
     int64_t    n, at = 0;
@@ -662,16 +657,6 @@ write_row_in(overlap_worker *me, int32_t i, const int d, int64_t *length)
     return HS_OK;
 }
 
-static hs_status
-write_row(overlap_worker *me, int32_t i, int64_t *length)
-{
-    switch (me->all->ndim) {
-    case 0: return write_row_in(me, i, 0, length);
-    case 3: return write_row_in(me, i, 3, length);
-    default: return write_row_in(me, i, me->all->ndim, length);
-    }
-}
-
 /* A hs_range_fn. */
 static hs_status
 multiply_range(void *context, int64_t range)
@@ -681,7 +666,13 @@ multiply_range(void *context, int64_t range)
     const int64_t   n = all->n, first = range * RANGE_POINTS;
     const int64_t   last = first + RANGE_POINTS < n ? first + RANGE_POINTS : n;
     for (int64_t p = first; p < last; p++) {
-        hs_status status = write_row(me, all->order[p], &all->length[p]);
+        const int32_t i = all->order[p];
+        hs_status     status;
+        switch (all->ndim) {
+        case 0: status = write_row(me, i, 0, &all->length[p]); break;
+        case 3: status = write_row(me, i, 3, &all->length[p]); break;
+        default: status = write_row(me, i, all->ndim, &all->length[p]);
+        }
         if (status == HS_OK && me->looked >= POLL_MET) {
             me->looked = 0;
             status = hs_poll(me->committer.options, (double)p / (double)n);
@@ -883,9 +874,7 @@ hs_connectivity_overlap(const hs_points *points, const hs_index_rows *gather,
     }
     if (status == HS_OK) {
         hs_starts_of_lengths(offsets, doing.n + 1);
-    }
-    if (status == HS_OK) {
-        const hs_list_rows found = hs_rows_of(&doing.offsets, &doing.all, 1);
+        const hs_list_rows found = hs_rows_of(&doing.offsets, &doing.all);
         status = hs_row_split_fill(call, &map, &found, doing.place, made);
     }
     if (status == HS_ERR_MEMORY) {

@@ -782,14 +782,33 @@ walk_all(hs_ball *ball)
     return false;
 }
 
-/* The cells that there are of a ball: those of an open dense table end where it does. */
+/* Entries within the ball, in each image, or near it; whether it was left early. The spans of the
+ * ball may be cut. */
 static bool
-take_cells(hs_ball *ball)
+walk_ball(hs_ball *ball, const hs_ball_visit *visit)
 {
     const hs_dynamic *list = ball->list;
     hs_span_of_cells *span = ball->span;
     double            wanted = 1.0, stored = (double)list->cells.n;
     int64_t           reach = 0;
+    ball->visit = visit;
+    if (visit->is_near) {
+        bool is_wide = list->cells.is_wide;
+        for (int k = 0; k < list->lattice.ndim; k++) {
+            const int64_t n = list->axes.axis[k].n;
+            if (n > 0 && span[k].last - span[k].first >= n) {
+                span[k].first = span[k].centre - n / 2; /* each cell once, around the centre's */
+                span[k].last = span[k].first + n - 1;
+                ball->cut |= 1u << k;
+            }
+            is_wide = is_wide || span[k].first < INT32_MIN || span[k].last > INT32_MAX;
+        }
+        ball->filters = !list->cells.dense && is_wide;
+        if (list->storage == HS_STORE_ALL_PAIRS) {
+            return walk_all(ball);
+        }
+    }
+    /* The cells that there are: those of an open dense table end where it does. */
     for (int k = 0; k < list->lattice.ndim; k++, span++) {
         if (list->cells.dense && list->axes.axis[k].n == 0) {
             const int64_t first = list->cells.lowest[k], last = first + list->cells.shape[k] - 1;
@@ -817,33 +836,6 @@ take_cells(hs_ball *ball)
     case 3: return walk_few(ball, (int)reach, 3);
     default: return walk_few(ball, (int)reach, list->lattice.ndim);
     }
-}
-
-/* Entries within the ball, in each image, or near it; whether it was left early. The spans of the
- * ball may be cut. */
-static bool
-walk_ball(hs_ball *ball, const hs_ball_visit *visit)
-{
-    const hs_dynamic *list = ball->list;
-    ball->visit = visit;
-    if (visit->is_near) {
-        bool is_wide = list->cells.is_wide;
-        for (int k = 0; k < list->lattice.ndim; k++) {
-            const int64_t     n = list->axes.axis[k].n;
-            hs_span_of_cells *span = &ball->span[k];
-            if (n > 0 && span->last - span->first >= n) { /* each cell once, around the centre's */
-                span->first = span->centre - n / 2;
-                span->last = span->first + n - 1;
-                ball->cut |= 1u << k;
-            }
-            is_wide = is_wide || span->first < INT32_MIN || span->last > INT32_MAX;
-        }
-        ball->filters = !list->cells.dense && is_wide;
-        if (list->storage == HS_STORE_ALL_PAIRS) {
-            return walk_all(ball);
-        }
-    }
-    return take_cells(ball);
 }
 
 /* Visits the points that a query finds: those near the ball, or exactly within it, for which every

@@ -302,7 +302,7 @@ struct hs_dynamic {
     hs_dynamic_counters *counters; /* borrowed, or NULL */
 };
 
-/* A position, made ready. */
+/* A position as a list stores it: brought into the middle period, and its cell. */
 typedef struct hs_placed {
     const double *given;             /* borrowed; ndim finite numbers */
     double        x[HS_MAX_DIM];     /* X, in the middle period; not rounded in aligned boxes */
@@ -313,8 +313,6 @@ typedef struct hs_placed {
     double        magnitude; /* as hs_wrap_point raises it, of the coordinates that the box moves;
                               * not in aligned boxes */
 } hs_placed;
-
-/* A position as a list stores it: brought into the middle period, and its cell. */
 
 /*
  * X and turns of finite numbers; false beyond HS_WRAP_LIMIT. *magnitude as in hs_wrap_point.

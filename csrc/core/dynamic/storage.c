@@ -177,7 +177,6 @@ key_mark(hs_key key)
     return (uint32_t)(x >> 32);
 }
 
-/* Key i of a caller's. */
 HS_ALWAYS_INLINE hs_key
 key_at(const int64_t *ids, const int32_t *tags, int64_t i)
 {
@@ -768,13 +767,14 @@ static bool
 reserve_blocks(hs_dynamic *list, const uint32_t *numbers, int64_t n)
 {
     uint64_t *sorted = hs_alloc(NULL, HS_FOR_CELLS, 2 * n, sizeof *sorted);
-    bool      fits = sorted != NULL;
-    for (int64_t i = 0; fits && i < n; i++) {
+    if (sorted == NULL) {
+        return false;
+    }
+    bool fits = true;
+    for (int64_t i = 0; i < n; i++) {
         sorted[i] = numbers[i];
     }
-    if (fits) {
-        hs_sort_numbers(sorted, n, 0, sorted + n);
-    }
+    hs_sort_numbers(sorted, n, 0, sorted + n);
     for (int64_t i = 0, begin = 0; fits && i < n; begin = i) {
         while (i < n && sorted[i] == sorted[begin]) {
             i++;
@@ -783,34 +783,6 @@ reserve_blocks(hs_dynamic *list, const uint32_t *numbers, int64_t n)
     }
     hs_free(NULL, sorted);
     return fits;
-}
-
-/* Puts the rows into their cells, which have room; numbers: receives the cells that they were in,
- * or are in if they are new. */
-static void
-put_rows(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n, double *const *x,
-         uint32_t *numbers, hs_failure *failure)
-{
-    const bool are_new = list->map.n == 0;
-    double     given[HS_MAX_DIM];
-    hs_placed  placed;
-    for (int64_t i = 0; i < n; i++) {
-        const hs_key   key = key_at(ids, tags, i);
-        const uint32_t number = numbers[i];
-        if (i + ROWS_AHEAD < n) { /* the points of a cell come from anywhere among the rows */
-            const int64_t ahead = i + ROWS_AHEAD;
-            const hs_cell cell = list->cells.cell[numbers[ahead]];
-            HS_PREFETCH_WRITE(hs_entry_at(&list->entries, cell.start + cell.count));
-            HS_PREFETCH_WRITE(&list->map.rows[key_mark(key_at(ids, tags, ahead)) &
-                                              (uint64_t)(list->map.n_rows - 1)]);
-        }
-        const uint32_t place = are_new ? HS_NO_PLACE : hs_stored_find(list, key);
-        (void)place_row(list, x, i, given, &placed, failure); /* it can be had: number_rows */
-        if (place != HS_NO_PLACE) {
-            numbers[i] = hs_entry_tail_at(&list->entries, place)->cell;
-        }
-        put_point(list, key, place, number, &placed);
-    }
 }
 
 static hs_status
@@ -830,10 +802,27 @@ put_columns(hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n
         !(reserve_rows(&list->map, list->map.n + n) && reserve_blocks(list, numbers, n))) {
         status = HS_ERR_MEMORY;
     }
-    if (status == HS_OK) {
-        put_rows(list, ids, tags, n, x, numbers, failure);
-        list->changes++;
+    const bool are_new = list->map.n == 0;
+    double     given[HS_MAX_DIM];
+    hs_placed  placed;
+    for (int64_t i = 0; status == HS_OK && i < n; i++) {
+        const hs_key   key = key_at(ids, tags, i);
+        const uint32_t number = numbers[i];
+        if (i + ROWS_AHEAD < n) { /* the points of a cell come from anywhere among the rows */
+            const int64_t ahead = i + ROWS_AHEAD;
+            const hs_cell cell = list->cells.cell[numbers[ahead]];
+            HS_PREFETCH_WRITE(hs_entry_at(&list->entries, cell.start + cell.count));
+            HS_PREFETCH_WRITE(&list->map.rows[key_mark(key_at(ids, tags, ahead)) &
+                                              (uint64_t)(list->map.n_rows - 1)]);
+        }
+        const uint32_t place = are_new ? HS_NO_PLACE : hs_stored_find(list, key);
+        (void)place_row(list, x, i, given, &placed, failure); /* it can be had: number_rows */
+        if (place != HS_NO_PLACE) {
+            numbers[i] = hs_entry_tail_at(&list->entries, place)->cell; /* that it was in */
+        }
+        put_point(list, key, place, number, &placed);
     }
+    list->changes += status == HS_OK;
     list->cells.keeps_empty = false;
     for (int64_t i = 0; numbered && i < n; i++) { /* the blocks of cells that are empty */
         const uint32_t c = numbers[i];

@@ -94,7 +94,6 @@ edges_init(hs_account *account, const hs_scene *scene, double filter_error,
     return HS_OK;
 }
 
-/* Sets the band of every edge. */
 static void
 set_bands(const histogram_edges *edges, double extent, edge_table *table)
 {
@@ -312,29 +311,6 @@ odd_part(double x, int *exponent)
     return whole / (INT64_C(1) << zeros);
 }
 
-/* Takes weights as integers of one exponent where 62 bits hold them, else each with a place of its
- * own. Another thread may write to the weights meanwhile: places are kept in range. */
-static void
-take_weights(const double *weights, const int32_t *order, int64_t n, point_weights *taken)
-{
-    for (int64_t i = 0; i < n; i++) {
-        const double weight = weights[order[i]];
-        int          exponent = taken->exponent;
-        int64_t      value = 0;
-        if (weight != 0.0 && isfinite(weight)) {
-            value = odd_part(weight, &exponent);
-        }
-        int place = exponent - taken->exponent;
-        place = place < 0 ? 0 : place > taken->most_place ? taken->most_place : place;
-        if (taken->place != NULL) {
-            taken->value[i] = value;
-            taken->place[i] = place;
-        } else {
-            taken->value[i] = (int64_t)((uint64_t)value << place);
-        }
-    }
-}
-
 /* Weight order[i] of the caller, finite or HS_ERR_WEIGHTS, becomes number i. NULL: all are 1. */
 static hs_status
 init_weights(hs_account *account, const double *weights, const int32_t *order, int64_t n,
@@ -361,18 +337,30 @@ init_weights(hs_account *account, const double *weights, const int32_t *order, i
     if (weights == NULL) {
         return HS_OK;
     }
+    /* As integers of one exponent where 62 bits hold them, else each with a place of its own. */
     const bool one_place = highest - lowest <= VALUE_BITS;
     taken->exponent = lowest;
     taken->bits = one_place ? highest - lowest : 53;
-    taken->most_place = highest - lowest;
+    taken->most_place = one_place ? 0 : highest - lowest;
     taken->value = hs_alloc(account, HS_FOR_POINTS, n, sizeof(int64_t));
     taken->place = one_place ? NULL : hs_alloc(account, HS_FOR_POINTS, n, sizeof(int32_t));
     if (taken->value == NULL || (!one_place && taken->place == NULL)) {
         return HS_ERR_MEMORY;
     }
-    take_weights(weights, order, n, taken);
-    if (one_place) {
-        taken->most_place = 0;
+    for (int64_t i = 0; i < n; i++) {
+        const double weight = weights[order[i]];
+        int          exponent = lowest;
+        int64_t      value = 0;
+        if (weight != 0.0 && isfinite(weight)) {
+            value = odd_part(weight, &exponent);
+        }
+        /* Another thread may write to the weights meanwhile: places are kept in range. */
+        int place = exponent < lowest ? 0 : exponent - lowest;
+        place = place > highest - lowest ? highest - lowest : place;
+        taken->value[i] = one_place ? (int64_t)((uint64_t)value << place) : value;
+        if (!one_place) {
+            taken->place[i] = place;
+        }
     }
     return HS_OK;
 }
@@ -450,18 +438,6 @@ add_product(int64_t *limbs, int64_t a, int64_t b, const int32_t place)
     }
 }
 
-/* Adds *more, of the same form, to *sums. */
-static void
-join_sums(exact_sums *sums, exact_sums *more)
-{
-    carry_sums(sums);
-    carry_sums(more);
-    for (int64_t e = 0; e < sums->n * sums->n_limbs; e++) {
-        sums->limbs[e] += more->limbs[e];
-    }
-    carry_sums(sums);
-}
-
 /* Limbs of a sum, at most: for weights of 53 bits with places up to 2 * 2098 together. */
 #define MOST_LIMBS 144
 
@@ -510,7 +486,8 @@ round_sum(const exact_sums *sums, int64_t k)
 
 /*
  * What one thread counts for a histogram. Hits come with their float32 squares; a table says which
- * slot each belongs to, and those that it cannot tell are decided exactly, edge by edge.
+ * slot each belongs to. Those that it cannot tell wait for the edge that halves their range, and
+ * are decided exactly in batches.
  */
 
 /* Types and weights of one set of points, in cell order. */
@@ -559,8 +536,7 @@ typedef struct tally_plan {
     int32_t           n_types;
     int64_t           n_groups; /* pairs of types that are told apart */
     int32_t          *group;    /* owned; n_types * n_types; when has_types */
-    bool              has_all;
-    thread_tally      all; /* owned: of the threads that have ended */
+    thread_tally      all;      /* owned: of the threads that have ended; its plan is NULL before */
 } tally_plan;
 
 /* Point i of the set has the caller's number order[i]. HS_ERR_TYPES or HS_ERR_WEIGHTS set
@@ -590,9 +566,6 @@ marked_init(hs_account *account, const hs_set *known, const int32_t *order, int6
     }
     return HS_OK;
 }
-
-/* Slots of all hits by table; hits that stay unsure wait for the edge that halves their
- * range, and a batch decides them. */
 
 /* Slots up to which a histogram has copies: those of ten bins. With three bins they take 0.82 to
  * 0.88 of the time, with a hundred or more 0.99 to 1.07 (AVX-512; 52 and 419 neighbours). */
@@ -647,23 +620,27 @@ free_tally(hs_account *account, thread_tally *tally)
     hs_free(account, tally->sums.limbs);
 }
 
-/* Adds what the thread has counted to what those before have. */
+/* Adds what the thread has counted to what those before have: the first one has counts, or there is
+ * no other. */
 static void
 close_tally(void *context, void *state)
 {
     tally_plan   *plan = context;
     thread_tally *tally = state, *all = &plan->all;
-    if (!plan->has_all) {
-        plan->has_all = true;
+    if (all->plan == NULL) {
         *all = *tally;
         return;
     }
     const int64_t n_counts = all->n_copies * plan->n_groups * all->n_slots;
-    for (int64_t e = 0; all->counts != NULL && tally->counts != NULL && e < n_counts; e++) {
+    for (int64_t e = 0; tally->counts != NULL && e < n_counts; e++) {
         all->counts[e] += tally->counts[e];
     }
     if (all->sums.limbs != NULL && tally->sums.limbs != NULL) {
-        join_sums(&all->sums, &tally->sums);
+        carry_sums(&all->sums);
+        carry_sums(&tally->sums);
+        for (int64_t e = 0; e < all->sums.n * all->sums.n_limbs; e++) {
+            all->sums.limbs[e] += tally->sums.limbs[e];
+        }
     }
     free_tally(&plan->search->call->account, tally);
 }
@@ -685,26 +662,6 @@ table_for(thread_tally *tally, double extent)
     return table;
 }
 
-/* Types and weights of the candidates, once for each block. */
-static void
-load_block(thread_tally *tally, const hs_scanner *scanner)
-{
-    const hs_block      *block = &scanner->block;
-    const point_weights *weights = &tally->plan->points.weights;
-    if (tally->block == scanner->n_blocks || (tally->type == NULL && tally->value == NULL)) {
-        return;
-    }
-    tally->block = scanner->n_blocks;
-    for (int32_t c = 0; tally->value != NULL && c < block->n; c++) {
-        const int32_t si = block->number[c];
-        tally->value[c] = weights->value != NULL ? weights->value[si] : 1;
-        tally->place[c] = weights->place != NULL ? weights->place[si] : 0;
-    }
-    for (int32_t c = 0; tally->type != NULL && c < block->n; c++) {
-        tally->type[c] = tally->plan->points.type[block->number[c]];
-    }
-}
-
 /* The group of pairs of point si and this candidate, by their types. */
 static int64_t
 group_of(const thread_tally *tally, int32_t si, int32_t place)
@@ -715,7 +672,6 @@ group_of(const thread_tally *tally, int32_t si, int32_t place)
                : 0;
 }
 
-/* The weight of point si. */
 static int64_t
 weight_of(const thread_tally *tally, int32_t si, int32_t *place)
 {
@@ -799,7 +755,6 @@ count_or_wait(thread_tally *tally, int32_t u)
     tally->counts[group * tally->n_slots + 2 * pair->low]++;
 }
 
-/* Decides all pairs that wait for one edge. */
 static hs_status
 decide_edge(thread_tally *tally, hs_scanner *scanner, int32_t edge)
 {
@@ -837,7 +792,6 @@ decide_edge(thread_tally *tally, hs_scanner *scanner, int32_t edge)
     return HS_OK;
 }
 
-/* Decides all open pairs. */
 static hs_status
 decide_open(thread_tally *tally, hs_scanner *scanner)
 {
@@ -885,16 +839,27 @@ look_again(thread_tally *tally, hs_scanner *scanner, const edge_table *table, in
 static hs_status
 tally_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    thread_tally     *tally = context;
-    const edge_table *table = table_for(tally, scanner->form->extent);
-    const int32_t     n = hits->end[hits->n - 1];
+    thread_tally        *tally = context;
+    const hs_block      *block = &scanner->block;
+    const point_weights *weights = &tally->plan->points.weights;
+    const edge_table    *table = table_for(tally, scanner->form->extent);
+    const int32_t        n = hits->end[hits->n - 1];
+    const bool           is_new = tally->block != scanner->n_blocks;
     if (table == NULL) {
         return HS_ERR_MEMORY;
     }
-    load_block(tally, scanner);
-    const bool has_places = tally->plan->points.weights.place != NULL ||
-                            tally->plan->asking->weights.place != NULL;
-    const bool is_open = find_slots(table, scanner->block.squares, n, tally->slots);
+    /* Types and weights of the candidates, once for each block. */
+    tally->block = scanner->n_blocks;
+    for (int32_t c = 0; is_new && tally->value != NULL && c < block->n; c++) {
+        const int32_t si = block->number[c];
+        tally->value[c] = weights->value != NULL ? weights->value[si] : 1;
+        tally->place[c] = weights->place != NULL ? weights->place[si] : 0;
+    }
+    for (int32_t c = 0; is_new && tally->type != NULL && c < block->n; c++) {
+        tally->type[c] = tally->plan->points.type[block->number[c]];
+    }
+    const bool has_places = weights->place != NULL || tally->plan->asking->weights.place != NULL;
+    const bool is_open = find_slots(table, block->squares, n, tally->slots);
     if (!tally->plan->has_types) {
         count_hits(tally, first, hits->label, 0, n);
     }
@@ -911,33 +876,6 @@ tally_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hit
         begin = end;
     }
     return is_open ? look_again(tally, scanner, table, first, hits) : HS_OK;
-}
-
-/* Which pairs of types are told apart: all, but in the half list (a, b) and (b, a) are one. */
-static hs_status
-plan_groups(hs_account *account, bool has_queries, tally_plan *plan)
-{
-    const int64_t n = plan->n_types;
-    plan->n_groups = has_queries ? n * n : n * (n + 1) / 2;
-    if (!plan->has_types) {
-        plan->n_groups = 1;
-        return HS_OK;
-    }
-    plan->group = plan->n_groups <= INT32_MAX
-                      ? hs_alloc(account, HS_FOR_CANDIDATES, n * n, sizeof(int32_t))
-                      : NULL;
-    if (plan->group == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    int32_t next = 0;
-    for (int64_t a = 0; a < n; a++) {
-        for (int64_t b = 0; b < n; b++) {
-            const bool again = !has_queries && b < a;
-            plan->group[a * n + b] = again ? plan->group[b * n + a] : next;
-            next += !again;
-        }
-    }
-    return HS_OK;
 }
 
 /* Edges, types and weights in the order of the cells, before any thread counts. */
@@ -965,44 +903,44 @@ open_plan(const hs_histogram *histogram, const hs_sets *sets, tally_plan *plan, 
         (plan->points.type == NULL || plan->asking->type == NULL)) {
         status = HS_ERR_TYPES;
     }
-    return status == HS_OK ? plan_groups(account, search->has_queries, plan) : status;
-}
-
-/* What was counted of one group, to entry `to` and on. Returns their number. */
-static int64_t
-write_group(const thread_tally *all, int64_t group, int64_t to, const hs_histogram *histogram)
-{
-    int64_t n_pairs = 0;
-    for (int64_t k = 0; k < histogram->n_edges; k++) {
-        int64_t count = 0;
-        for (int copy = 0; copy < all->n_copies; copy++) {
-            count += all->counts[(copy * all->plan->n_groups + group) * all->n_slots + 2 * k];
-        }
-        if (histogram->counts != NULL) {
-            histogram->counts[to + k] = count;
-        }
-        if (histogram->sums != NULL) {
-            histogram->sums[to + k] = round_sum(&all->sums, group * (histogram->n_edges + 1) + k);
-        }
-        n_pairs += count;
+    /* Which pairs of types are told apart: all, but in the half list (a, b) and (b, a) are one. */
+    const int64_t n = plan->n_types;
+    plan->n_groups = search->has_queries ? n * n : n * (n + 1) / 2;
+    if (status != HS_OK || !plan->has_types) {
+        return status;
     }
-    return n_pairs;
+    plan->group = plan->n_groups <= INT32_MAX
+                      ? hs_alloc(account, HS_FOR_CANDIDATES, n * n, sizeof(int32_t))
+                      : NULL;
+    if (plan->group == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    int32_t next = 0;
+    for (int64_t a = 0; a < n; a++) {
+        for (int64_t b = 0; b < n; b++) {
+            const bool again = !search->has_queries && b < a;
+            plan->group[a * n + b] = again ? plan->group[b * n + a] : next;
+            next += !again;
+        }
+    }
+    return HS_OK;
 }
 
 hs_status
 hs_histogram_fill(hs_search *search, const hs_histogram *histogram, const hs_sets *sets,
                   int64_t *n_pairs, hs_failure *failure)
 {
-    hs_account      *account = &search->call->account;
-    tally_plan       plan = {.search = search};
-    const hs_visitor visitor = {.use = HS_BLOCK_LISTS_SQUARES,
-                                .visit = tally_hits,
-                                .shared = &plan,
-                                .state_size = sizeof(thread_tally),
-                                .open = open_tally,
-                                .close = close_tally};
-    const int64_t    n_types = histogram->n_types;
-    hs_status        status = open_plan(histogram, sets, &plan, failure);
+    hs_account         *account = &search->call->account;
+    tally_plan          plan = {.search = search};
+    const hs_visitor    visitor = {.use = HS_BLOCK_LISTS_SQUARES,
+                                   .visit = tally_hits,
+                                   .shared = &plan,
+                                   .state_size = sizeof(thread_tally),
+                                   .open = open_tally,
+                                   .close = close_tally};
+    const thread_tally *all = &plan.all;
+    const int64_t       n_types = histogram->n_types, n = histogram->n_edges;
+    hs_status           status = open_plan(histogram, sets, &plan, failure);
     if (status == HS_OK) {
         status = hs_parallel_visit(search, &visitor, NULL, failure);
     }
@@ -1011,9 +949,20 @@ hs_histogram_fill(hs_search *search, const hs_histogram *histogram, const hs_set
     }
     for (int64_t at = 0; status == HS_OK && at < n_types * n_types; at++) {
         const bool    again = !search->has_queries && at % n_types < at / n_types;
-        const int64_t found = write_group(&plan.all, plan.has_types ? plan.group[at] : 0,
-                                          at * histogram->n_edges, histogram);
-        *n_pairs += again ? 0 : found;
+        const int64_t group = plan.has_types ? plan.group[at] : 0;
+        for (int64_t k = 0; k < n; k++) {
+            int64_t count = 0;
+            for (int copy = 0; copy < all->n_copies; copy++) {
+                count += all->counts[(copy * plan.n_groups + group) * all->n_slots + 2 * k];
+            }
+            if (histogram->counts != NULL) {
+                histogram->counts[at * n + k] = count;
+            }
+            if (plan.sums) {
+                histogram->sums[at * n + k] = round_sum(&all->sums, group * (n + 1) + k);
+            }
+            *n_pairs += again ? 0 : count;
+        }
     }
     free_tally(account, &plan.all);
     hs_free(account, plan.edges.at);

@@ -172,38 +172,6 @@ division_go_on(const division *by, int64_t n, hs_slice *next, hs_status *status)
     return *status == HS_OK && next->first < n;
 }
 
-/* Of the points of a part. */
-static hs_status
-read_radii(division *by, level_input *set, hs_slice part, hs_failure *failure)
-{
-    const bool   halves = by->reach->rule == HS_RULE_MEAN, extends = by->factor != 1.0;
-    const double largest = extends ? LARGEST_EXTENDED : LARGEST_RADIUS;
-    const double smallest = extends ? SMALLEST_EXTENDED : halves ? SMALLEST_HALVED : 0.0;
-    for (int64_t i = part.first; set->radii != NULL && i < part.end; i++) {
-        const double radius = set->radii[i] + 0.0; /* and no -0 */
-        if (!(radius >= 0.0 && radius <= largest) || (radius > 0.0 && radius < smallest)) {
-            return refuse_input(HS_ERR_RADII, set, i, radius, failure);
-        }
-        set->copy[i] = halves ? 0.5 * radius : radius;
-        by->largest = hs_larger(by->largest, set->copy[i]);
-    }
-    return HS_OK;
-}
-
-static hs_status
-read_types(const division *by, level_input *set, hs_slice part, hs_failure *failure)
-{
-    for (int64_t i = part.first; i < part.end; i++) {
-        const int32_t type = set->types[i];
-        if (type < 0 || type >= by->reach->n_types) {
-            return refuse_input(HS_ERR_TYPES, set, i, type, failure);
-        }
-        set->size[i] = type;
-        by->count[type]++;
-    }
-    return HS_OK;
-}
-
 /* Support `row`: the lower triangle, each number of the matrix read once, and how far it reaches.
  * Numbers must be finite and equal to their mirror image, of which NaN differs. */
 static hs_status
@@ -238,6 +206,9 @@ static hs_status
 read_input(division *by, level_input *set, hs_failure *failure)
 {
     const int64_t n = set->points->n;
+    const bool    halves = by->reach->rule == HS_RULE_MEAN, extends = by->factor != 1.0;
+    const double  largest = extends ? LARGEST_EXTENDED : LARGEST_RADIUS;
+    const double  smallest = extends ? SMALLEST_EXTENDED : halves ? SMALLEST_HALVED : 0.0;
     hs_slice      next = {0, 0};
     hs_status     status = HS_OK;
     set->copy = hs_alloc(by->account, HS_FOR_POINTS, n, sizeof *set->copy);
@@ -251,14 +222,24 @@ read_input(division *by, level_input *set, hs_failure *failure)
         return HS_ERR_MEMORY;
     }
     while (division_go_on(by, n, &next, &status)) {
-        for (int64_t i = next.first; set->supports != NULL && status == HS_OK && i < next.end;
-             i++) {
-            status = read_support(by, set, i, failure);
-        }
-        if (status == HS_OK && by->reach->n_types > 0) {
-            status = read_types(by, set, next, failure);
-        } else if (status == HS_OK) {
-            status = read_radii(by, set, next, failure);
+        for (int64_t i = next.first; status == HS_OK && i < next.end; i++) {
+            if (set->supports != NULL) {
+                status = read_support(by, set, i, failure);
+            } else if (by->reach->n_types > 0) {
+                const int32_t type = set->types[i];
+                if (type < 0 || type >= by->reach->n_types) {
+                    return refuse_input(HS_ERR_TYPES, set, i, type, failure);
+                }
+                set->size[i] = type;
+                by->count[type]++;
+            } else if (set->radii != NULL) {
+                const double radius = set->radii[i] + 0.0; /* and no -0 */
+                if (!(radius >= 0.0 && radius <= largest) || (radius > 0.0 && radius < smallest)) {
+                    return refuse_input(HS_ERR_RADII, set, i, radius, failure);
+                }
+                set->copy[i] = halves ? 0.5 * radius : radius;
+                by->largest = hs_larger(by->largest, set->copy[i]);
+            }
         }
     }
     return status;
@@ -581,31 +562,6 @@ takes_all(const hs_level_plan *plan)
     return share > SHARE_OF_PAIRED;
 }
 
-static void
-add_all(hs_level_plan *plan)
-{
-    const hs_levels *levels = plan->levels;
-    const hs_slice   all = {0, levels->n};
-    if (levels->cutoffs == NULL) {
-        add_step(plan, all, all, plan->is_half);
-        return;
-    }
-    hs_level_step step = {.asking = all,
-                          .points = all,
-                          .is_own = plan->is_half,
-                          .by_table = true,
-                          .has_limits = true};
-    for (int32_t e = 0; e < levels->n * levels->n; e++) {
-        const double cutoff = levels->cutoffs[e];
-        step.cutoff = hs_larger(step.cutoff, cutoff);
-        if (cutoff > 0.0 && !(step.least > 0.0 && step.least <= cutoff)) {
-            step.least = cutoff;
-        }
-    }
-    step.cutoff = hs_smaller(step.cutoff, plan->bound);
-    plan->steps[plan->n++] = step;
-}
-
 bool
 hs_level_plan_is_single(const hs_level_plan *plan)
 {
@@ -693,8 +649,25 @@ hs_level_plan_make(hs_account *account, const hs_levels *levels, const hs_box *b
     if (plan->steps == NULL) {
         return HS_ERR_MEMORY;
     }
-    if (takes_all(plan)) {
-        add_all(plan);
+    const bool is_one = takes_all(plan);
+    if (is_one && levels->cutoffs == NULL) {
+        add_step(plan, each, each, plan->is_half);
+        return HS_OK;
+    }
+    if (is_one) {
+        all = (hs_level_step){.asking = each,
+                              .points = each,
+                              .is_own = plan->is_half,
+                              .by_table = true,
+                              .has_limits = true};
+        for (int64_t e = 0; e < n * n; e++) {
+            const double cutoff = levels->cutoffs[e];
+            all.cutoff = hs_larger(all.cutoff, cutoff);
+            all.least = cutoff > 0.0 && !(all.least > 0.0 && all.least <= cutoff) ? cutoff
+                                                                                  : all.least;
+        }
+        all.cutoff = hs_smaller(all.cutoff, bound);
+        plan->steps[plan->n++] = all;
         return HS_OK;
     }
     for (int32_t l = 0; l < n; l++) {
@@ -741,7 +714,7 @@ hs_level_plan_make(hs_account *account, const hs_levels *levels, const hs_box *b
 #define BEYOND_ALL 0x1p600
 
 /* The radii of a slice in the order of the cells, in one block, which is *owned; nothing where set
- * has none, or is NULL. */
+ * is NULL. */
 static hs_status
 arrange_radii(const hs_search *search, const hs_bins *bins, const hs_level_set *set, hs_slice slice,
               hs_radii *to, void **owned)
@@ -751,7 +724,7 @@ arrange_radii(const hs_search *search, const hs_bins *bins, const hs_level_set *
     const int64_t size = sizeof(double) + sizeof(float);
     float         most = 0.0f;
     *to = (hs_radii){.exact = NULL};
-    if (set == NULL || set->radii == NULL) {
+    if (set == NULL) {
         return HS_OK;
     }
     const double *radii = set->radii + set->first[slice.first];
@@ -924,23 +897,6 @@ numbers_of(const hs_level_set *set, hs_slice levels)
 
 #define PAIRS_SAMPLED 64
 
-/* The part of the pairs within the cutoff that are within their own length, about: from pairs of
- * arbitrary points, each weighed by the ball of its length over that of the cutoff. 64 tell it to
- * some per cent, and it only foresees memory. 37 is odd: sj takes all 64 places, mixed. */
-static double
-part_within(const hs_search *search)
-{
-    const int64_t n_asking = hs_search_asking(search)->n, n = search->bins.n;
-    double        sum = 0.0;
-    for (int64_t e = 0; e < PAIRS_SAMPLED && n_asking > 0 && n > 0; e++) {
-        const int32_t si = (int32_t)(e * n_asking / PAIRS_SAMPLED);
-        const int32_t sj = (int32_t)(e * 37 % PAIRS_SAMPLED * n / PAIRS_SAMPLED);
-        const double  length = hs_limit_of(search->limits, si, sj).hi / search->scene.metric.cutoff;
-        sum += length > 0.0 ? pow(hs_smaller(length, 1.0), search->scene.ndim) : 0.0;
-    }
-    return sum / PAIRS_SAMPLED;
-}
-
 hs_status
 hs_level_open(const hs_level_plan *plan, int64_t number, const hs_box *box, bool keeps_none,
               hs_call *call, hs_level_search *open, hs_failure *failure)
@@ -996,7 +952,20 @@ hs_level_open(const hs_level_plan *plan, int64_t number, const hs_box *box, bool
         return status;
     }
     if (search->limits != NULL && !levels->has_supports) {
-        search->grid.expected_pairs *= part_within(search);
+        /* The part of the pairs within the cutoff that are within their own length, about: from
+         * pairs of arbitrary points, each weighed by the ball of its length over that of the
+         * cutoff. 64 tell it to some per cent, and it only foresees memory. 37 is odd: sj takes all
+         * 64 places, mixed. */
+        const int64_t n_asking = hs_search_asking(search)->n, n = search->bins.n;
+        double        sum = 0.0;
+        for (int64_t e = 0; e < PAIRS_SAMPLED && n_asking > 0 && n > 0; e++) {
+            const int32_t si = (int32_t)(e * n_asking / PAIRS_SAMPLED);
+            const int32_t sj = (int32_t)(e * 37 % PAIRS_SAMPLED * n / PAIRS_SAMPLED);
+            const double  limit = hs_limit_of(search->limits, si, sj).hi;
+            const double  length = limit / search->scene.metric.cutoff;
+            sum += length > 0.0 ? pow(hs_smaller(length, 1.0), search->scene.ndim) : 0.0;
+        }
+        search->grid.expected_pairs *= sum / PAIRS_SAMPLED;
     }
     /* Fractions done are those of all asking points of all steps, as far as these are equal. */
     search->n_before = number * hs_search_asking(search)->n;

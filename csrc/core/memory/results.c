@@ -422,14 +422,13 @@ remove_entry(int k)
     return data;
 }
 
-/* Takes the oldest entries out until `more` bytes in `chunks` more chunks fit. Returns how many;
- * the caller frees them. The lock is held. */
+/* Takes the oldest entries out until `more` bytes, no more than the limit, in `chunks` more chunks
+ * fit. Returns how many; the caller frees them. The lock is held. */
 static int
 remove_oldest(size_t more, int chunks, void **removed)
 {
     int n = 0;
-    while (pool.n > 0 && (pool.n + chunks > HS_POOL_CHUNKS || more > pool.limit ||
-                          pool.held > pool.limit - more)) {
+    while (pool.n > 0 && (pool.n + chunks > HS_POOL_CHUNKS || pool.held > pool.limit - more)) {
         removed[n++] = remove_entry(0);
     }
     return n;

@@ -5,7 +5,6 @@
 #include "../exact/bounds.h"
 
 #include <math.h>
-#include <string.h>
 
 /* candidates.c: how far a group looks, images of the points within that, leaves of the tree in
  * these, and the block of floats that they fill. */
@@ -22,11 +21,6 @@
 /* Products of unit vectors at right angles, and the room that this takes beside squares. */
 #define UPRIGHT    0x1p-40
 #define LAYER_ROOM 0x1p-36
-/* Candidates of a group, in points of the group and wanted ones, beyond which the guess was bad:
- * some three times as many as there are where points are evenly spread, ... */
-#define MOST_CANDIDATES 24.0
-/* ... and so many times more for each axis beyond the third. */
-#define MOST_PER_AXIS 3.0
 /* What a group looks at may be as large as what one of its points does, so many times for each. */
 #define BALLS_A_POINT 2.0
 
@@ -186,14 +180,6 @@ hs_nearest_guess(const hs_nearest *near, double scale, hs_nearest_group *group)
     group->radius = hs_larger(group->is_complete ? farthest : radius, HS_NEAREST_LEAST_RADIUS);
 }
 
-double
-hs_nearest_most_candidates(const hs_nearest *near, const hs_nearest_group *group)
-{
-    const double more = pow(MOST_PER_AXIS, fmax(near->tree.ndim - 3.0, 0.0));
-    const double wanted = (double)near->k + group->more + (group->last - group->first);
-    return more * MOST_CANDIDATES * wanted + 64.0;
-}
-
 bool
 hs_nearest_is_scattered(const hs_nearest *near, const hs_nearest_group *group)
 {
@@ -270,15 +256,6 @@ hs_nearest_measure(hs_nearest *near)
     }
 }
 
-/* How far the group looks along axes that repeat: what the distance to the layer leaves of the
- * radius. */
-static double
-reach_along(const hs_nearest_group *group)
-{
-    const double ratio = hs_smaller(group->away / group->radius, 1.0); /* squares overflow */
-    return group->radius * (sqrt((1.0 - ratio) * (1.0 + ratio) + LAYER_ROOM) + UPRIGHT);
-}
-
 /* Shifts along the row of B of axis k, at most most[r] of them; false when too many. */
 static bool
 set_range(const hs_nearest *near, const hs_nearest_group *group, int k, const double *most,
@@ -287,7 +264,11 @@ set_range(const hs_nearest *near, const hs_nearest_group *group, int k, const do
     const hs_scene   *scene = &near->search->scene;
     const hs_lattice *lattice = &scene->lattice;
     const double      period = lattice->period[k];
-    double            reach = reach_along(group) * (1.0 + RELATIVE_SLACK) + 2.0 * scene->t_error[k];
+    /* What the distance to the layer leaves of the radius. */
+    const double ratio = hs_smaller(group->away / group->radius, 1.0); /* squares overflow */
+    const double along =
+        group->radius * (sqrt((1.0 - ratio) * (1.0 + ratio) + LAYER_ROOM) + UPRIGHT);
+    double reach = along * (1.0 + RELATIVE_SLACK) + 2.0 * scene->t_error[k];
     for (int r = 0; r < lattice->n_periodic; r++) {
         reach += (most[r] + 1.0) * near->drift[k][r];
     }
@@ -304,33 +285,14 @@ set_range(const hs_nearest *near, const hs_nearest_group *group, int k, const do
     return true;
 }
 
-/* Bound on the error of X_j + moved, by the rule of docs/exactness.md for gathered candidates. */
-static double
-bound_error(const hs_scene *scene, const double *most)
-{
-    const hs_lattice *lattice = &scene->lattice;
-    double            error = 0.0;
-    for (int c = 0; c < scene->ndim; c++) {
-        double moved = 0.0, row_errors = 0.0;
-        for (int r = 0; r < lattice->n_periodic; r++) {
-            moved += most[r] * fabs(lattice->rows[r][c]);
-            row_errors += most[r] * lattice->row_error[r];
-        }
-        if (moved > 0.0) {
-            const double roundings = 2 * lattice->n_periodic + 4;
-            error = hs_larger(roundings * UNIT * (moved + 2.0 * scene->x_largest[c]) + row_errors,
-                              error);
-        }
-    }
-    return error + 2.0 * scene->x_error;
-}
-
 hs_status
 hs_nearest_images_start(const hs_nearest *near, const hs_nearest_group *group,
                         hs_nearest_images *images)
 {
-    const hs_lattice *lattice = &near->search->scene.lattice;
-    double            most[HS_MAX_DIM] = {0.0};
+    const hs_scene   *scene = &near->search->scene;
+    const hs_lattice *lattice = &scene->lattice;
+    const double      roundings = 2 * lattice->n_periodic + 4;
+    double            most[HS_MAX_DIM] = {0.0}, error = 0.0;
     *images = (hs_nearest_images){.lattice = lattice, .count = 1.0, .is_first = true};
     /* The drift depends on the largest shifts, and these a little on the drift. */
     for (int pass = 0; group != NULL && pass < (lattice->aligned ? 1 : 3); pass++) {
@@ -347,7 +309,19 @@ hs_nearest_images_start(const hs_nearest *near, const hs_nearest_group *group,
         images->next.shift[r] = (int32_t)images->low[r];
         images->count *= hs_larger((double)(images->high[r] - images->low[r] + 1), 0.0);
     }
-    images->error = bound_error(&near->search->scene, most);
+    /* Of X_j + moved, by the rule of docs/exactness.md for gathered candidates. */
+    for (int c = 0; c < scene->ndim; c++) {
+        double moved = 0.0, row_errors = 0.0;
+        for (int r = 0; r < lattice->n_periodic; r++) {
+            moved += most[r] * fabs(lattice->rows[r][c]);
+            row_errors += most[r] * lattice->row_error[r];
+        }
+        if (moved > 0.0) {
+            error = hs_larger(roundings * UNIT * (moved + 2.0 * scene->x_largest[c]) + row_errors,
+                              error);
+        }
+    }
+    images->error = error + 2.0 * scene->x_error;
     return images->count < fmax(MOST_IMAGES, IMAGES_A_NEIGHBOUR * (double)near->k) ? HS_OK
                                                                                    : HS_TRY_OTHER;
 }
@@ -379,12 +353,6 @@ hs_nearest_images_next(hs_nearest_images *images)
         next->is_home = next->is_home && next->shift[r] == 0;
     }
     return true;
-}
-
-int
-hs_nearest_exponent(double length)
-{
-    return ilogb(hs_larger(length, HS_NEAREST_LEAST_RADIUS));
 }
 
 void
@@ -471,14 +439,6 @@ relative(const hs_nearest_leaves *leaves, int k, double x)
     return clamped(x, leaves->centre[k], leaves->unit, leaves->extent);
 }
 
-/* Whether a leaf may have more points than can be of use, and it is not known which: of a spot, k
- * of those that count, where not all do. */
-static bool
-is_vast_spot(const hs_nearest *near, const hs_tree_node *node)
-{
-    return node->is_spot && near->search->call->choice != NULL && hs_tree_points(node) > near->k;
-}
-
 /* Adds a leaf, of a spot no more points than can be of use: k of them, and the asking one. */
 static void
 add_leaf(const hs_nearest *near, int32_t number, hs_nearest_leaves *leaves)
@@ -518,18 +478,28 @@ find_leaves_in_image(const hs_nearest *near, const hs_nearest_group *group, doub
         return true;
     }
     for (;;) {
-        const int32_t left = tree->nodes[number].left;
-        double        gap[2] = {INFINITY, INFINITY};
+        const hs_tree_node *node = &tree->nodes[number];
+        const int32_t       left = node->left;
+        double              gap[2] = {INFINITY, INFINITY};
         HS_PREFETCH(&tree->nodes[left]);
         if (left != 0) {
             hs_tree_gaps(hs_tree_bounds(tree, left, ndim), low, high, leaves->unit, ndim, gap);
         } else if (leaves->n == MOST_LEAVES || (double)leaves->n_points > most ||
-                   is_vast_spot(near, &tree->nodes[number])) {
-            return false;
+                   (node->is_spot && near->search->call->choice != NULL &&
+                    hs_tree_points(node) > near->k)) {
+            return false; /* too many, or a spot of which it is not known which k points count */
         } else {
             add_leaf(near, number, leaves);
         }
-        if (!hs_tree_step(left, gap, limit, leaves->stack, &n_waiting, &number)) {
+        if (gap[0] <= limit) { /* the first child first */
+            leaves->stack[n_waiting] = left + 1;
+            n_waiting += gap[1] <= limit;
+            number = left;
+        } else if (gap[1] <= limit) {
+            number = left + 1;
+        } else if (n_waiting > 0) {
+            number = leaves->stack[--n_waiting];
+        } else {
             return true;
         }
     }
@@ -547,7 +517,7 @@ hs_nearest_leaves_find(const hs_nearest *near, const hs_nearest_group *group, do
     if (open_leaves(near, leaves) != HS_OK) {
         return HS_ERR_MEMORY;
     }
-    leaves->unit = hs_power_of_two(-hs_nearest_exponent(group->radius));
+    leaves->unit = hs_power_of_two(-ilogb(group->radius));
     for (int k = 0; k < d; k++) {
         const double width = group->upper[k] - group->lower[k];
         leaves->centre[k] = group->lower[k] + 0.5 * width;
@@ -578,28 +548,6 @@ hs_nearest_leaves_find(const hs_nearest *near, const hs_nearest_group *group, do
     return HS_OK;
 }
 
-/* Lists the leaves within the radius of a group in leaves->hits, ascending; returns how many. */
-static int32_t
-list_leaves(const hs_nearest *near, const hs_nearest_group *group, const hs_nearest_leaves *leaves)
-{
-    const int    d = near->tree.ndim;
-    const double reach =
-        group->radius * leaves->unit * (1.0 + LEAF_ROOM) +
-        sqrt(d) * (4.0 * leaves->error * leaves->unit + AXIS_ERROR * leaves->extent);
-    hs_boxes boxes = {.ndim = d,
-                      .n = leaves->n,
-                      .label = leaves->label,
-                      .hits = leaves->hits,
-                      .out = (float)(reach * reach * (1.0 + LEAF_ROOM))};
-    for (int k = 0; k < d; k++) {
-        boxes.low[k] = leaves->low[k];
-        boxes.high[k] = leaves->high[k];
-        boxes.from[k] = relative(leaves, k, group->lower[k]);
-        boxes.to[k] = relative(leaves, k, group->upper[k]);
-    }
-    return near->search->call->kernel->near_boxes(&boxes);
-}
-
 /* The block: runs first, then a unit for which the radius is between 1 and 2, then the kernel
  * copies. */
 
@@ -610,13 +558,6 @@ list_leaves(const hs_nearest *near, const hs_nearest_group *group, const hs_near
 /* With more to be found there are more hits than a kernel puts in order. */
 #define MOST_BY_SQUARES (HS_ORDER_MOST / 2)
 #define LARGEST_SQUARE  0x1p60 /* far from where float32 ends */
-
-/* Polls after a pass over all candidates, if they are many. */
-static hs_status
-poll_if_large(const hs_options *options, const hs_nearest_block *block)
-{
-    return block->n > HS_POLL_POINTS ? hs_poll(options, 0.0) : HS_OK;
-}
 
 /* Makes room for n candidates, and for what kernels read and write beyond. */
 static bool
@@ -648,13 +589,27 @@ reserve(const hs_nearest *near, hs_nearest_block *block, int64_t n)
     return true;
 }
 
-/* Sets runs: points of the leaves in reach, those that follow one another together. HS_TRY_OTHER:
- * they are more than `most`. */
-static hs_status
-find_runs(const hs_nearest *near, const hs_nearest_group *group, double most,
-          const hs_nearest_leaves *leaves, hs_nearest_block *block)
+/* Sets runs: points of the leaves in reach, those that follow one another together. */
+static void
+find_runs(const hs_nearest *near, const hs_nearest_group *group, const hs_nearest_leaves *leaves,
+          hs_nearest_block *block)
 {
-    const int32_t n = list_leaves(near, group, leaves);
+    const int    d = near->tree.ndim;
+    const double reach =
+        group->radius * leaves->unit * (1.0 + LEAF_ROOM) +
+        sqrt(d) * (4.0 * leaves->error * leaves->unit + AXIS_ERROR * leaves->extent);
+    hs_boxes boxes = {.ndim = d,
+                      .n = leaves->n,
+                      .label = leaves->label,
+                      .hits = leaves->hits,
+                      .out = (float)(reach * reach * (1.0 + LEAF_ROOM))};
+    for (int k = 0; k < d; k++) {
+        boxes.low[k] = leaves->low[k];
+        boxes.high[k] = leaves->high[k];
+        boxes.from[k] = relative(leaves, k, group->lower[k]);
+        boxes.to[k] = relative(leaves, k, group->upper[k]);
+    }
+    const int32_t n = near->search->call->kernel->near_boxes(&boxes); /* hits ascend */
     block->n = block->n_runs = 0;
     for (int32_t l = 0; l < n; l++) {
         const hs_nearest_run *leaf = &leaves->runs[leaves->hits[l]];
@@ -667,7 +622,6 @@ find_runs(const hs_nearest *near, const hs_nearest_group *group, double most,
         }
         block->n += leaf->n;
     }
-    return block->n > most ? HS_TRY_OTHER : HS_OK;
 }
 
 /* Largest |y| and |q| together, as floats, which round up. */
@@ -734,7 +688,7 @@ hs_nearest_block_fill(const hs_nearest *near, const hs_options *options,
                       const hs_nearest_group *group, double most, const hs_nearest_leaves *leaves,
                       hs_nearest_block *block)
 {
-    const double unit = hs_power_of_two(-hs_nearest_exponent(group->radius));
+    const double unit = hs_power_of_two(-ilogb(group->radius));
     double       widest = 0.0;
     if (group->radius > leaves->radius || group->radius < LEAST_IN_ERRORS * leaves->error) {
         return HS_TRY_OTHER;
@@ -747,49 +701,41 @@ hs_nearest_block_fill(const hs_nearest *near, const hs_options *options,
     block->extent = 0.5 * widest + 4.0; /* beyond the radius, by more than roundings take */
     block->images = leaves->images;
     block->runs = leaves->joined;
-    hs_status status = find_runs(near, group, most, leaves, block);
-    if (status == HS_OK) {
-        choose_squares(near, group, block);
-        status = poll_if_large(options, block);
+    find_runs(near, group, leaves, block);
+    if (block->n > most) {
+        return HS_TRY_OTHER;
     }
-    if (status == HS_OK && !reserve(near, block, block->n)) {
-        status = HS_ERR_MEMORY;
+    if (!reserve(near, block, block->n)) {
+        return HS_ERR_MEMORY;
     }
-    if (status == HS_OK) {
-        gather(near, group, block);
-        status = poll_if_large(options, block);
-    }
-    return status;
+    choose_squares(near, group, block);
+    gather(near, group, block);
+    return block->n > HS_POLL_POINTS ? hs_poll(options, 0.0) : HS_OK;
 }
 
 int32_t
 hs_nearest_block_scan(const hs_nearest *near, const hs_nearest_group *group,
                       hs_nearest_block *block, int32_t first, int32_t *end)
 {
-    const hs_kernel *kernel = near->search->call->kernel;
-    const int        d = near->tree.ndim;
-    const double     extent = scan_extent(block), reach = block->frame.reach;
-    hs_scan          scan = {.ndim = d,
-                             .label = block->place,
-                             .n = block->n,
-                             .n_points = group->last - group->first,
-                             .hits = block->hits,
-                             .end = end,
-                             .unsure = block->unsure,
-                             .most_hits = 2 * block->capacity,
-                             .most_unsure = block->capacity};
+    const int    d = near->tree.ndim;
+    const double extent = scan_extent(block), reach = block->frame.reach;
+    hs_scan      scan = {.ndim = d,
+                         .form = block->has_squares ? HS_SCAN_SQUARES : HS_SCAN_DIRECT,
+                         .squares = block->squares,
+                         .label = block->place,
+                         .n = block->n,
+                         .n_points = group->last - group->first,
+                         .hits = block->hits,
+                         .end = end,
+                         .unsure = block->unsure,
+                         .most_hits = 2 * block->capacity,
+                         .most_unsure = block->capacity};
     for (int k = 0; k < d; k++) {
         scan.y[k] = block->y[k];
         scan.q[k] = block->q[k];
     }
     /* rank.c decides: no hit is unsure here. */
     scan.direct = hs_thresholds_of(d, reach, extent, block->frame.error);
-    if (block->has_squares) {
-        scan.form = HS_SCAN_SQUARES;
-        scan.squares = block->squares;
-        return kernel->scan(&scan, first);
-    }
     scan.direct.in = INFINITY;
-    scan.form = HS_SCAN_DIRECT;
-    return kernel->scan(&scan, first);
+    return near->search->call->kernel->scan(&scan, first);
 }

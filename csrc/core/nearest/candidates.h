@@ -37,9 +37,6 @@ void hs_nearest_guess(const hs_nearest *near, double scale, hs_nearest_group *gr
  * periodic boxes infinity, unless there is a largest distance. */
 double hs_nearest_farthest(const hs_nearest *near, const hs_nearest_group *group);
 
-/* Candidates of a group with more of which each of its points is better off alone. */
-double hs_nearest_most_candidates(const hs_nearest *near, const hs_nearest_group *group);
-
 /* Whether its points lie so far apart, by how far they look, that they are no group. */
 bool hs_nearest_is_scattered(const hs_nearest *near, const hs_nearest_group *group);
 
@@ -77,9 +74,6 @@ typedef struct hs_nearest_frame {
 void hs_nearest_frame_set(int ndim, double unit, double error, double reach,
                           hs_nearest_frame *frame);
 
-/* Exponent of a length: 2^-exponent is the unit in which it is between 1 and 2. */
-int hs_nearest_exponent(double length);
-
 /* How far |D|^2 in units, as it comes from float64, may be from the true one, for any that is not
  * beyond the reach. */
 HS_ALWAYS_INLINE double
@@ -90,9 +84,8 @@ hs_nearest_error(const hs_nearest_frame *frame, int ndim, double square)
 }
 
 /* The leaves that a group may need, found by one walk down the tree. Groups that are parts of it
- * and look no further have only a list of boxes to go through. */
-
-/* Owned by a thread; zeros at first. */
+ * and look no further have only a list of boxes to go through. Owned by a thread, zeros at
+ * first. */
 typedef struct hs_nearest_leaves {
     void             *memory; /* owned: of all arrays */
     int32_t           n;
@@ -118,9 +111,8 @@ typedef struct hs_nearest_leaves {
 hs_status hs_nearest_leaves_find(const hs_nearest *near, const hs_nearest_group *group, double most,
                                  hs_nearest_leaves *leaves);
 
-/* What a group may be near to, gathered from all images as float32 relative to the group. */
-
-/* Owned by a thread, zeros at first; arrays grow as needed. Places count candidates. */
+/* What a group may be near to, gathered from all images as float32 relative to the group. Owned by
+ * a thread, zeros at first; arrays grow as needed. Places count candidates. */
 typedef struct hs_nearest_block {
     void                   *memory; /* owned: of all arrays but runs and images */
     int32_t                 n, capacity;

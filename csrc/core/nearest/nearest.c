@@ -11,7 +11,6 @@
 #include "rank.h"
 
 #include <math.h>
-#include <string.h>
 
 /* nearest.c: trees that are built once for many calls, how a search gets its own, and the search of
  * groups by threads. */
@@ -114,34 +113,6 @@ build_asking_tree(hs_nearest *near, hs_scene *asking)
     return status;
 }
 
-static hs_status
-prepare_anew(hs_nearest *near, const hs_sets *sets, const hs_box *box, double limit, double cutoff,
-             hs_failure *failure)
-{
-    hs_search    *search = near->search;
-    hs_scene      queries, *asking = sets->queries != NULL ? &queries : NULL;
-    hs_options    options = options_of_scene(near, limit);
-    const int32_t leaf_points = near->k < 4 * LEAF_POINTS ? LEAF_POINTS : 2 * LEAF_POINTS;
-    hs_sets       bounded = *sets;
-    bounded.within = limit < INFINITY ? limit : 0.0;
-    bounded.least_cutoff = hs_choice_least_length(search->call->choice, bounded.within);
-    options.cutoff = cutoff;
-    hs_call_gather(search->call, sets->points->n + (asking != NULL ? sets->queries->n : 0));
-    hs_status status = hs_scene_make(&search->call->account, search->call->team, &bounded, box,
-                                     &options, &search->scene, asking, failure);
-    if (status != HS_OK) {
-        return status;
-    }
-    set_limit(near, limit);
-    status = build_tree(near, leaf_points);
-    if (asking != NULL && status == HS_OK) {
-        status = build_asking_tree(near, asking);
-    } else if (asking != NULL) {
-        hs_scene_free(&search->call->account, asking);
-    }
-    return status;
-}
-
 /* Builds a tree that any later call can use: for any k, largest distance and quantities. */
 static hs_status
 build_kept(const hs_nearest *near, const hs_sets *sets, const hs_box *box, hs_nearest_kept *kept,
@@ -236,9 +207,6 @@ hs_nearest_prepare(hs_nearest *near, const hs_sets *sets, const hs_box *box, dou
 {
     hs_search    *search = near->search;
     const int64_t n_asking = sets->queries != NULL ? sets->queries->n : sets->points->n;
-    if (search->call->kernel == NULL) {
-        return HS_ERR_KERNEL;
-    }
     hs_call_gather_for(search->call, n_asking, PAIRS_PER_POINT * (double)n_asking,
                        sets->trees != NULL);
     search->is_full = true;
@@ -249,9 +217,30 @@ hs_nearest_prepare(hs_nearest *near, const hs_sets *sets, const hs_box *box, dou
     if (sets->trees != NULL && !is_small) {
         status = prepare_from_kept(near, sets, box, limit, failure);
     }
-    return status == HS_REBUILD
-               ? prepare_anew(near, sets, box, limit, is_small ? least : SCENE_CUTOFF, failure)
-               : status;
+    if (status != HS_REBUILD) {
+        return status;
+    }
+    hs_scene      queries, *asking = sets->queries != NULL ? &queries : NULL;
+    hs_options    options = options_of_scene(near, limit);
+    const int32_t leaf_points = near->k < 4 * LEAF_POINTS ? LEAF_POINTS : 2 * LEAF_POINTS;
+    hs_sets       bounded = *sets;
+    bounded.within = limit < INFINITY ? limit : 0.0;
+    bounded.least_cutoff = hs_choice_least_length(search->call->choice, bounded.within);
+    options.cutoff = is_small ? least : SCENE_CUTOFF;
+    hs_call_gather(search->call, sets->points->n + (asking != NULL ? n_asking : 0));
+    status = hs_scene_make(&search->call->account, search->call->team, &bounded, box, &options,
+                           &search->scene, asking, failure);
+    if (status != HS_OK) {
+        return status;
+    }
+    set_limit(near, limit);
+    status = build_tree(near, leaf_points);
+    if (asking != NULL && status == HS_OK) {
+        status = build_asking_tree(near, asking);
+    } else if (asking != NULL) {
+        hs_scene_free(&search->call->account, asking);
+    }
+    return status;
 }
 
 void
@@ -284,6 +273,11 @@ hs_nearest_release(hs_nearest *near)
  * it. */
 #define FARTHEST 1.25
 #define AHEAD    8 /* points from prefetching a row to writing it */
+/* Candidates of a group, in points of the group and wanted ones, beyond which the guess was bad:
+ * some three times as many as there are where points are evenly spread, ... */
+#define MOST_CANDIDATES 24.0
+/* ... and so many times more for each axis beyond the third. */
+#define MOST_PER_AXIS 3.0
 /* A point with more hits than so many for each wanted one, and a few, walks down the tree by
  * itself, which is quicker: from far away, nearly all points may be within the radius. */
 #define HITS_PER_WANTED 32.0
@@ -347,33 +341,24 @@ write_row(nearest_worker *worker, int64_t count, hs_status status)
     return status == HS_TRY_OTHER ? HS_ERR_MEMORY : status;
 }
 
-/* Whether points repeat without end and none of them is of the asking one's group. */
-static bool
-is_endless(const hs_nearest *near, const hs_chooser *chooser)
-{
-    const hs_search *search = near->search;
-    if (search->call->choice == NULL || search->call->choice->group == NULL ||
-        search->scene.lattice.n_periodic == 0 || near->limit < INFINITY) {
-        return false;
-    }
-    for (int64_t j = 0; j < search->bins.n; j++) {
-        if (hs_chooser_is_of_group(chooser, (int32_t)j)) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/* Does one point by a walk down the tree. */
 static hs_status
 search_point(nearest_worker *worker, int32_t si)
 {
+    const hs_nearest  *near = worker->job->near;
+    const hs_search   *search = near->search;
+    const hs_choice   *choice = search->call->choice;
     hs_nearest_ranker *ranker = &worker->ranker;
     const int64_t      n_met = ranker->n_met;
     int64_t            count = 0;
     hs_status          status = HS_OK;
     hs_nearest_ranker_set(ranker, si);
-    if (!is_endless(worker->job->near, &ranker->chooser)) {
+    /* Do points repeat without end, and none of them is of the asking one's group? */
+    bool is_endless = choice != NULL && choice->group != NULL &&
+                      search->scene.lattice.n_periodic > 0 && !(near->limit < INFINITY);
+    for (int64_t j = 0; is_endless && j < search->bins.n; j++) {
+        is_endless = !hs_chooser_is_of_group(&ranker->chooser, (int32_t)j);
+    }
+    if (!is_endless) {
         status = hs_nearest_walk(ranker, &count);
     }
     worker->n_groups++;
@@ -443,7 +428,9 @@ search_part(nearest_worker *worker, const near_part *part)
     hs_nearest_guess(near, worker->scale, &group);
     hs_status status = HS_TRY_OTHER;
     if (!hs_nearest_is_scattered(near, &group)) {
-        const double most = hs_nearest_most_candidates(near, &group);
+        const double more = pow(MOST_PER_AXIS, fmax(near->tree.ndim - 3.0, 0.0));
+        const double most =
+            more * MOST_CANDIDATES * ((double)near->k + group.more + n_points) + 64.0;
         status = HS_OK;
         if (group.radius > leaves->radius) {
             leaves = &worker->own;
@@ -540,19 +527,6 @@ close_worker(void *context, void *place)
     hs_shared_release(job->near->shared, &worker->block.memory);
 }
 
-/* Adds the points of a node, in groups, to the present range and new ones. */
-static void
-add_parts(nearest_job *job, const hs_tree_node *node)
-{
-    for (int32_t first = node->first; first < node->end; first += GROUP_POINTS) {
-        const int32_t last = node->end - first < GROUP_POINTS ? node->end : first + GROUP_POINTS;
-        if (job->n_parts - job->ranges[job->n_ranges - 1] == RANGE_GROUPS) {
-            job->ranges[job->n_ranges++] = job->n_parts;
-        }
-        job->parts[job->n_parts++] = (near_part){first, last};
-    }
-}
-
 /* Cuts the tree into groups, the largest subtrees of at most GROUP_POINTS, and these into ranges,
  * which are larger subtrees. A larger leaf becomes several groups. */
 static void
@@ -572,13 +546,19 @@ list_parts(nearest_job *job, const hs_tree *tree, int32_t *stack)
             job->ranges[job->n_ranges++] = job->n_parts;
             range_end = node->end;
         }
-        if (points <= GROUP_POINTS || is_leaf) {
-            add_parts(job, node);
-            number = stack[--n_waiting];
-        } else {
+        if (points > GROUP_POINTS && !is_leaf) {
             stack[n_waiting++] = node->left + 1;
             number = node->left;
+            continue;
         }
+        for (int32_t first = node->first, last; first < node->end; first = last) {
+            last = node->end - first < GROUP_POINTS ? node->end : first + GROUP_POINTS;
+            if (job->n_parts - job->ranges[job->n_ranges - 1] == RANGE_GROUPS) {
+                job->ranges[job->n_ranges++] = job->n_parts;
+            }
+            job->parts[job->n_parts++] = (near_part){first, last};
+        }
+        number = stack[--n_waiting];
     }
     job->ranges[job->n_ranges] = job->n_parts;
 }

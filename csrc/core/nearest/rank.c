@@ -94,12 +94,6 @@ closeness(const hs_nearest_ranker *ranker, double square)
     return 2.0 * hs_nearest_error(&ranker->frame, ranker->near->tree.ndim, square);
 }
 
-HS_ALWAYS_INLINE const hs_nearest_image *
-image_of(const hs_nearest_ranker *ranker, const hs_nearest_key *key)
-{
-    return &ranker->images[key->image];
-}
-
 /* What the metric measures to, and its shift, of a key's point; also S over the periodic box
  * vectors as given when `given` is not NULL. False when a shift passes its range. */
 static bool
@@ -108,7 +102,7 @@ pair_of(const hs_nearest_ranker *ranker, const hs_nearest_key *key, double *q, i
 {
     const hs_search *search = ranker->near->search;
     const hs_bins   *bins = &search->bins, *asking = hs_search_asking(search);
-    const int32_t   *image = image_of(ranker, key)->shift;
+    const int32_t   *image = ranker->images[key->image].shift;
     const int        m = bins->n_periodic;
     int64_t          turned[HS_MAX_DIM] = {0}, as_given[HS_MAX_DIM];
     for (int k = 0; k < bins->ndim; k++) {
@@ -137,19 +131,13 @@ pair_of(const hs_nearest_ranker *ranker, const hs_nearest_key *key, double *q, i
     return true;
 }
 
-/* Coordinate k of the asking point that the metric measures from, and all of them. */
-HS_ALWAYS_INLINE double
-origin_along(const hs_nearest_ranker *ranker, int k)
-{
-    const hs_bins *asking = hs_search_asking(ranker->near->search);
-    return (asking->keeps_originals ? asking->originals : asking->x)[k][ranker->si];
-}
-
-static void
+/* Coordinates of the asking point that the metric measures from. */
+HS_ALWAYS_INLINE void
 take_origin(const hs_nearest_ranker *ranker, double *p)
 {
-    for (int k = 0; k < ranker->near->tree.ndim; k++) {
-        p[k] = origin_along(ranker, k);
+    const hs_bins *asking = hs_search_asking(ranker->near->search);
+    for (int k = 0; k < asking->ndim; k++) {
+        p[k] = (asking->keeps_originals ? asking->originals : asking->x)[k][ranker->si];
     }
 }
 
@@ -301,12 +289,13 @@ is_listed_before(const hs_nearest_ranker *ranker, const hs_nearest_key *b, const
 {
     const hs_search *search = ranker->near->search;
     const int32_t   *order = search->bins.order;
+    const int32_t   *of_b = ranker->images[b->image].shift, *of_a = ranker->images[a->image].shift;
     int64_t          difference[HS_MAX_DIM] = {0}, given[HS_MAX_DIM];
     if (b->number != a->number) {
         return order[b->number] < order[a->number];
     }
     for (int r = 0; r < search->bins.n_periodic; r++) {
-        difference[r] = (int64_t)image_of(ranker, b)->shift[r] - image_of(ranker, a)->shift[r];
+        difference[r] = (int64_t)of_b[r] - of_a[r];
     }
     if (!hs_lattice_shift(&search->scene.lattice, difference, given)) {
         return false;
@@ -396,7 +385,6 @@ note_square(hs_nearest_ranker *ranker, double square)
     return true;
 }
 
-/* Drops the keys with larger squares. */
 static void
 drop_far_keys(hs_nearest_ranker *ranker, double bound)
 {
@@ -677,7 +665,7 @@ walk_images(hs_nearest_ranker *ranker, const hs_nearest_group *point, double uni
             }
         }
         const double far = ranker->n_least > 0 ? sqrt(ranker->least[0]) : 0.0;
-        const bool   is_full = ranker->n_least == near->k && far < INFINITY;
+        const bool   is_full = ranker->n_least == near->k;
         const double enough =
             hs_smaller(is_full ? (far + room) * (1.0 + WALK_ROOM) / unit : INFINITY, farthest);
         if (status != HS_OK || group.radius >= enough) {
@@ -713,7 +701,7 @@ hs_nearest_walk(hs_nearest_ranker *ranker, int64_t *count)
     /* In this unit no square overflows but those of no use. Where the nearest are so near beside
      * all others that theirs may vanish, it is raised: what was small is ordinary then. */
     widest = hs_smaller(widest, near->limit);
-    for (int exponent = -hs_nearest_exponent(widest);;
+    for (int exponent = -ilogb(hs_larger(widest, HS_NEAREST_LEAST_RADIUS));;
          exponent = exponent + UNIT_STEP < 1000 ? exponent + UNIT_STEP : 1000) {
         const hs_status status = walk_images(ranker, &group, hs_power_of_two(exponent));
         if (status != HS_OK) {
@@ -760,24 +748,6 @@ fill_keys(hs_nearest_ranker *ranker, const hs_nearest_block *block, const int32_
         n_keys += square <= limit && !(sj == self && block->images[image].is_home);
     }
     ranker->n = n_keys;
-}
-
-/* Drops the keys that do not count. */
-static hs_status
-choose_keys(hs_nearest_ranker *ranker)
-{
-    int64_t kept = 0;
-    for (int64_t e = 0; e < ranker->n; e++) {
-        bool            counts;
-        const hs_status status = key_counts(ranker, &ranker->keys[e], &counts);
-        if (status != HS_OK) {
-            return status;
-        }
-        ranker->keys[kept] = ranker->keys[e];
-        kept += counts;
-    }
-    ranker->n = kept;
-    return HS_OK;
 }
 
 HS_ALWAYS_INLINE float
@@ -840,10 +810,17 @@ hs_nearest_rank(hs_nearest_ranker *ranker, const hs_nearest_block *block, const 
     default: fill_keys(ranker, block, hits, n, ranker->near->tree.ndim);
     }
     if (ranker->near->search->call->choice != NULL) {
-        const hs_status status = choose_keys(ranker);
-        if (status != HS_OK) {
-            return status;
+        int64_t kept = 0;
+        for (int64_t e = 0; e < ranker->n; e++) {
+            bool            counts;
+            const hs_status status = key_counts(ranker, &ranker->keys[e], &counts);
+            if (status != HS_OK) {
+                return status;
+            }
+            ranker->keys[kept] = ranker->keys[e];
+            kept += counts;
         }
+        ranker->n = kept;
     }
     return goes_on(ranker, n) ? order_keys(ranker, is_complete, count) : ranker->status;
 }
@@ -976,6 +953,8 @@ put_entries(hs_nearest_writer *writer, const hs_nearest_ranker *ranker, const hs
     hs_measured   *pairs = writer->pairs;
     const bool needs_given = bins->n_periodic > 0 && (bins->keeps_originals || writer->S != NULL);
     int32_t    j[HS_BATCH];
+    double     p[HS_MAX_DIM];
+    take_origin(ranker, p);
     for (int32_t e = 0; e < n; e++) {
         j[e] = bins->order[keys[e].number];
         writer->at[pairs->n + e] = at + e;
@@ -987,9 +966,8 @@ put_entries(hs_nearest_writer *writer, const hs_nearest_ranker *ranker, const hs
     }
     for (int k = 0; k < bins->ndim; k++) {
         const double *from = bins->keeps_originals ? bins->originals[k] : bins->x[k];
-        const double  own = origin_along(ranker, k);
         for (int32_t e = 0; e < n; e++) {
-            pairs->p[k][pairs->n + e] = own;
+            pairs->p[k][pairs->n + e] = p[k];
             pairs->q[k][pairs->n + e] = from[keys[e].number];
         }
     }
@@ -999,7 +977,7 @@ put_entries(hs_nearest_writer *writer, const hs_nearest_ranker *ranker, const hs
     for (int32_t e = 0; e < n && bins->n_periodic > 0; e++) {
         double  q[HS_MAX_DIM];
         int64_t shift[HS_MAX_DIM], given[HS_MAX_DIM];
-        if (!needs_given && image_of(ranker, &keys[e])->is_home) { /* as it was before */
+        if (!needs_given && ranker->images[keys[e].image].is_home) { /* as it was before */
             continue;
         }
         if (!pair_of(ranker, &keys[e], q, shift, needs_given ? given : NULL)) {

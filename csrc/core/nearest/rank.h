@@ -74,9 +74,8 @@ hs_status hs_nearest_rank(hs_nearest_ranker *ranker, const hs_nearest_block *blo
                           int64_t *count);
 
 /* Rows of the nearest, to their places in the output: k entries for each asking point, in the
- * caller's order; what a row lacks is j = -1, d = infinity, D = NaN and S = 0. */
-
-/* Owned by a thread. A batch of entries that are still to be measured. */
+ * caller's order; what a row lacks is j = -1, d = infinity, D = NaN and S = 0. A batch of entries
+ * that are still to be measured. Owned by a thread. */
 typedef struct hs_nearest_writer {
     const hs_nearest *near; /* borrowed */
     void             *j;    /* columns of the output; NULL where they are not wanted */

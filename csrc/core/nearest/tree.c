@@ -16,149 +16,9 @@
 #define LARGE_NODE 4096
 #define SMALL_NODE 32
 
-/* What nodes of one tree are split with; all borrowed. */
-typedef struct tree_splitter {
-    const hs_bins *bins;
-    int32_t       *order; /* numbers of points, of each node those from `first` to `end` */
-    int32_t       *aside; /* room for as many */
-    int32_t        leaf_points;
-} tree_splitter;
-
-/* Where a node is split: what is below the pivot goes left. */
-typedef struct tree_cut {
-    int    axis;
-    double pivot;
-} tree_cut;
-
-static void
-sort_numbers(double *numbers, int n)
-{
-    for (int i = 1; i < n; i++) {
-        const double number = numbers[i];
-        int          at = i;
-        for (; at > 0 && numbers[at - 1] > number; at--) {
-            numbers[at] = numbers[at - 1];
-        }
-        numbers[at] = number;
-    }
-}
-
-/* The axis along which these points lie widest; sets their range there. */
-static int
-widest_axis(const hs_bins *bins, const int32_t *points, int32_t n, double *lowest, double *highest)
-{
-    int axis = 0;
-    *lowest = *highest = 0.0;
-    for (int k = 0; k < bins->ndim; k++) {
-        const double *x = bins->x[k];
-        double        low = x[points[0]], high = low;
-        for (int32_t e = 1; e < n; e++) {
-            low = hs_smaller(x[points[e]], low);
-            high = hs_larger(x[points[e]], high);
-        }
-        if (high - low > *highest - *lowest) {
-            *lowest = low;
-            *highest = high;
-            axis = k;
-        }
-    }
-    return axis;
-}
-
-/* Finds where to split, by a sample picked evenly from the node, or where that is all in one place
- * by all points; false when these are too. */
-static bool
-find_cut(const tree_splitter *splitter, const hs_tree_node *node, tree_cut *cut)
-{
-    const hs_bins *bins = splitter->bins;
-    const int32_t  n = hs_tree_points(node);
-    const int      m = n > LARGE_NODE ? LARGE_SAMPLE : n > SMALL_NODE ? SAMPLE : FEW_SAMPLE;
-    const int32_t *order = splitter->order + node->first;
-    int32_t        picked[LARGE_SAMPLE];
-    double         numbers[LARGE_SAMPLE], low, high;
-    HS_ASSERT(n >= m); /* leaves hold as many as the smallest sample */
-    for (int s = 0; s < m; s++) {
-        picked[s] = order[(int64_t)n * (2 * s + 1) / (2 * m)];
-    }
-    cut->axis = widest_axis(bins, picked, m, &low, &high);
-    if (low == high) {
-        cut->axis = widest_axis(bins, order, n, &low, &high);
-        const double halfway = low + 0.5 * (high - low);
-        cut->pivot = halfway > low ? halfway : high;
-        return low < high;
-    }
-    for (int s = 0; s < m; s++) {
-        numbers[s] = bins->x[cut->axis][picked[s]];
-    }
-    sort_numbers(numbers, m);
-    int middle = m / 2;
-    while (numbers[middle] == numbers[0]) { /* something must be below */
-        middle++;
-    }
-    cut->pivot = numbers[middle];
-    return true;
-}
-
-/* Points whose X are equal: are they equal as given? */
-static bool
-is_spot(const tree_splitter *splitter, const hs_tree_node *node)
-{
-    const hs_bins *bins = splitter->bins;
-    for (int k = 0; bins->keeps_originals && k < bins->ndim; k++) {
-        const double *given = bins->originals[k];
-        const double  first = given[splitter->order[node->first]];
-        for (int32_t at = node->first + 1; at < node->end; at++) {
-            if (given[splitter->order[at]] != first) {
-                return false;
-            }
-        }
-    }
-    return true;
-}
-
-/* Partitions the points of a node, keeping the order on both sides; returns where the right one
- * begins. */
-static int32_t
-partition(const tree_splitter *splitter, const hs_tree_node *node, const tree_cut *cut)
-{
-    const double        *x = splitter->bins->x[cut->axis];
-    int32_t             *order = splitter->order;
-    int32_t *HS_RESTRICT aside = splitter->aside + node->first;
-    int32_t              left = node->first, right = 0;
-    for (int32_t at = node->first; at < node->end; at++) {
-        const int32_t i = order[at];
-        const int32_t below = x[i] < cut->pivot;
-        order[left] = i;
-        aside[right] = i;
-        left += below;
-        right += 1 - below;
-    }
-    memcpy(order + left, aside, (size_t)right * sizeof *order);
-    return left;
-}
-
 /*
- * Divides the points of a node, which keep their order on both sides; returns where those of the
- * right child begin. 0: the node stays a leaf, and is_spot says whether that is because its points
- * are equal. Nodes that share no points can be split at the same time.
- */
-static int32_t
-tree_split(const tree_splitter *splitter, hs_tree_node *node)
-{
-    tree_cut cut;
-    if (hs_tree_points(node) <= splitter->leaf_points) {
-        return 0;
-    }
-    if (!find_cut(splitter, node, &cut)) {
-        node->is_spot = is_spot(splitter, node);
-        return 0;
-    }
-    return partition(splitter, node, &cut);
-}
-
-/*
- * Builds the tree by all threads, a round of nodes at a time. A node of many points is split once,
- * and its children are for the next round. One of few points is split to its leaves by one thread,
+ * The tree is built by all threads, a round of nodes at a time. A node of many points is split
+ * once, and its children are for the next round. One of few is split to its leaves by one thread,
  * the smaller half first, as its points fit a cache. Each has memory of its own while it is split,
  * so that nodes need no lock, and what it becomes is appended in order: the tree is the same for
  * any number of threads.
@@ -187,19 +47,126 @@ typedef struct tree_builder {
     hs_shared        *shared;
     hs_team          *team;
     const hs_options *options;
-    tree_splitter     splitter;
+    const hs_bins    *bins;
+    int32_t          *order; /* numbers of points, of each node those from `first` to `end` */
+    int32_t          *aside; /* room for as many */
+    int32_t           leaf_points;
     hs_tree          *tree;
     subtree          *round;          /* owned; those of the present round */
     int32_t           n_round, first; /* the first of those that are split now */
     int64_t           work;           /* since the last poll, in points that are split once */
 } tree_builder;
 
+/* Where a node is split: what is below the pivot goes left. */
+typedef struct tree_cut {
+    int    axis;
+    double pivot;
+} tree_cut;
+
+/* The axis along which these points lie widest; sets their range there. */
+static int
+widest_axis(const hs_bins *bins, const int32_t *points, int32_t n, double *lowest, double *highest)
+{
+    int axis = 0;
+    *lowest = *highest = 0.0;
+    for (int k = 0; k < bins->ndim; k++) {
+        const double *x = bins->x[k];
+        double        low = x[points[0]], high = low;
+        for (int32_t e = 1; e < n; e++) {
+            low = hs_smaller(x[points[e]], low);
+            high = hs_larger(x[points[e]], high);
+        }
+        if (high - low > *highest - *lowest) {
+            *lowest = low;
+            *highest = high;
+            axis = k;
+        }
+    }
+    return axis;
+}
+
+/* Finds where to split, by a sample picked evenly from the node, or where that is all in one place
+ * by all points; false when these are too. */
+static bool
+find_cut(const tree_builder *builder, const hs_tree_node *node, tree_cut *cut)
+{
+    const hs_bins *bins = builder->bins;
+    const int32_t  n = hs_tree_points(node);
+    const int      m = n > LARGE_NODE ? LARGE_SAMPLE : n > SMALL_NODE ? SAMPLE : FEW_SAMPLE;
+    const int32_t *order = builder->order + node->first;
+    int32_t        picked[LARGE_SAMPLE];
+    double         numbers[LARGE_SAMPLE], low, high;
+    HS_ASSERT(n >= m); /* leaves hold as many as the smallest sample */
+    for (int s = 0; s < m; s++) {
+        picked[s] = order[(int64_t)n * (2 * s + 1) / (2 * m)];
+    }
+    cut->axis = widest_axis(bins, picked, m, &low, &high);
+    if (low == high) {
+        cut->axis = widest_axis(bins, order, n, &low, &high);
+        const double halfway = low + 0.5 * (high - low);
+        cut->pivot = halfway > low ? halfway : high;
+        return low < high;
+    }
+    for (int s = 0; s < m; s++) { /* sorted by insertion */
+        const double number = bins->x[cut->axis][picked[s]];
+        int          at = s;
+        for (; at > 0 && numbers[at - 1] > number; at--) {
+            numbers[at] = numbers[at - 1];
+        }
+        numbers[at] = number;
+    }
+    int middle = m / 2;
+    while (numbers[middle] == numbers[0]) { /* something must be below */
+        middle++;
+    }
+    cut->pivot = numbers[middle];
+    return true;
+}
+
+/* Points whose X are equal: are they equal as given? */
+static bool
+is_spot(const tree_builder *builder, const hs_tree_node *node)
+{
+    const hs_bins *bins = builder->bins;
+    for (int k = 0; bins->keeps_originals && k < bins->ndim; k++) {
+        const double *given = bins->originals[k];
+        const double  first = given[builder->order[node->first]];
+        for (int32_t at = node->first + 1; at < node->end; at++) {
+            if (given[builder->order[at]] != first) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* Partitions the points of a node, keeping the order on both sides; returns where the right one
+ * begins. */
+static int32_t
+partition(const tree_builder *builder, const hs_tree_node *node, const tree_cut *cut)
+{
+    const double        *x = builder->bins->x[cut->axis];
+    int32_t             *order = builder->order;
+    int32_t *HS_RESTRICT aside = builder->aside + node->first;
+    int32_t              left = node->first, right = 0;
+    for (int32_t at = node->first; at < node->end; at++) {
+        const int32_t i = order[at];
+        const int32_t below = x[i] < cut->pivot;
+        order[left] = i;
+        aside[right] = i;
+        left += below;
+        right += 1 - below;
+    }
+    memcpy(order + left, aside, (size_t)right * sizeof *order);
+    return left;
+}
+
 /* Room for two nodes more; for half full leaves and as many other nodes at first, then for twice as
  * many as before. */
 static bool
 make_room(const tree_builder *builder, subtree *sub, int32_t n_points)
 {
-    const int32_t first = sub->is_large ? 3 : 4 * n_points / builder->splitter.leaf_points + 4;
+    const int32_t first = sub->is_large ? 3 : 4 * n_points / builder->leaf_points + 4;
     const int32_t capacity = sub->capacity > 0 ? 2 * sub->capacity : first;
     if (sub->n_nodes + 2 <= sub->capacity) {
         return true;
@@ -229,14 +196,20 @@ split_subtree(void *context, int64_t task)
     waiting[0] = 0;
     while (n_waiting > 0) {
         const int32_t number = waiting[--n_waiting], left = sub->n_nodes;
-        const int32_t middle = tree_split(&builder->splitter, &sub->nodes[number]);
-        if (middle == 0) {
+        hs_tree_node *node = &sub->nodes[number];
+        tree_cut      cut;
+        if (hs_tree_points(node) <= builder->leaf_points) {
             continue;
         }
+        if (!find_cut(builder, node, &cut)) { /* all at one place, as wrapped */
+            node->is_spot = is_spot(builder, node);
+            continue;
+        }
+        const int32_t middle = partition(builder, node, &cut);
         if (!make_room(builder, sub, 0)) {
             return;
         }
-        hs_tree_node *node = &sub->nodes[number];
+        node = &sub->nodes[number];
         node->left = left;
         sub->nodes[left] = (hs_tree_node){.first = node->first, .end = middle};
         sub->nodes[left + 1] = (hs_tree_node){.first = middle, .end = node->end};
@@ -320,31 +293,11 @@ append_round(tree_builder *builder, subtree *next, int32_t *n_next)
     return HS_OK;
 }
 
-/* Splits the round, and sets the next one; without nodes at the end. */
-static hs_status
-take_round(tree_builder *builder)
-{
-    subtree *next =
-        hs_alloc(builder->account, HS_FOR_CELLS, 2 * (int64_t)builder->n_round, sizeof *next);
-    int32_t   n_next = 0;
-    hs_status status = next != NULL ? split_round(builder) : HS_ERR_MEMORY;
-    if (status == HS_OK) {
-        status = append_round(builder, next, &n_next);
-    }
-    for (int32_t s = 0; s < builder->n_round; s++) {
-        hs_shared_release(builder->shared, (void **)&builder->round[s].nodes);
-    }
-    hs_free(builder->account, builder->round);
-    builder->round = next;
-    builder->n_round = n_next;
-    return status;
-}
-
 static hs_status
 build_nodes(tree_builder *builder)
 {
     hs_tree      *tree = builder->tree;
-    const int32_t n = (int32_t)builder->splitter.bins->n;
+    const int32_t n = (int32_t)builder->bins->n;
     hs_status     status = reserve(builder, 1);
     builder->round = hs_alloc(builder->account, HS_FOR_CELLS, 1, sizeof *builder->round);
     builder->shared = hs_shared_new(builder->account, HS_FOR_CELLS);
@@ -356,30 +309,24 @@ build_nodes(tree_builder *builder)
         builder->round[builder->n_round++] = (subtree){.is_large = n > SUBTREE_POINTS};
     }
     while (status == HS_OK && builder->n_round > 0) {
-        status = take_round(builder);
+        const int32_t n_round = builder->n_round;
+        subtree      *next =
+            hs_alloc(builder->account, HS_FOR_CELLS, INT64_C(2) * n_round, sizeof *next);
+        int32_t n_next = 0;
+        status = next != NULL ? split_round(builder) : HS_ERR_MEMORY;
+        if (status == HS_OK) {
+            status = append_round(builder, next, &n_next);
+        }
+        for (int32_t s = 0; s < n_round; s++) {
+            hs_shared_release(builder->shared, (void **)&builder->round[s].nodes);
+        }
+        hs_free(builder->account, builder->round);
+        builder->round = next;
+        builder->n_round = n_next;
     }
     hs_free(builder->account, builder->round);
     hs_shared_free(builder->shared);
     return status;
-}
-
-/* The range of each node, from the leaves up, and the depth of a tree. */
-
-/* Steps down to each node, kept for a moment where the bounds will be. */
-static int
-measure_depth(hs_tree *tree)
-{
-    double *steps = tree->bounds;
-    int     deepest = 0;
-    steps[0] = 0.0;
-    for (int32_t number = 0; number < tree->n_nodes; number++) {
-        const int32_t left = tree->nodes[number].left;
-        deepest = (int)hs_larger(steps[number], (double)deepest);
-        if (left != 0) {
-            steps[left] = steps[left + 1] = steps[number] + 1.0;
-        }
-    }
-    return deepest;
 }
 
 /* Sets the range of a leaf from its points, which are in tree order by now; of another node, from
@@ -391,7 +338,7 @@ set_range(const tree_builder *builder, int32_t number)
     const hs_tree_node *node = &tree->nodes[number];
     const int           d = tree->ndim, side = (number + 1) % 2;
     for (int k = 0; k < d; k++) {
-        const double *x = builder->splitter.bins->x[k];
+        const double *x = builder->bins->x[k];
         double        low = x[node->first], high = low;
         if (node->left != 0) {
             const double *of = hs_tree_bounds(tree, node->left, d) + 4 * k;
@@ -435,10 +382,10 @@ hs_tree_build(hs_account *account, hs_team *team, const hs_options *options, hs_
     tree_builder builder = {.account = account,
                             .team = team,
                             .options = options,
-                            .splitter = {.bins = bins,
-                                         .order = scene->cloud.order,
-                                         .aside = (int32_t *)(void *)scene->cloud.spare,
-                                         .leaf_points = leaf_points},
+                            .bins = bins,
+                            .order = scene->cloud.order,
+                            .aside = (int32_t *)(void *)scene->cloud.spare,
+                            .leaf_points = leaf_points,
                             .tree = tree};
     *tree = (hs_tree){.ndim = scene->ndim};
     hs_bins_take(scene, bins);
@@ -455,7 +402,15 @@ hs_tree_build(hs_account *account, hs_team *team, const hs_options *options, hs_
         status = tree->bounds == NULL ? HS_ERR_MEMORY : HS_OK;
     }
     if (status == HS_OK && tree->n_nodes > 0) {
-        tree->depth = measure_depth(tree);
+        double *steps = tree->bounds; /* down to each node, for a moment */
+        steps[0] = 0.0;
+        for (int32_t number = 0; number < tree->n_nodes; number++) {
+            const int32_t left = tree->nodes[number].left;
+            tree->depth = (int)hs_larger(steps[number], (double)tree->depth);
+            if (left != 0) {
+                steps[left] = steps[left + 1] = steps[number] + 1.0;
+            }
+        }
         hs_team_run(team, (tree->n_nodes - 1) / NODES_AT_ONCE + 1, set_leaves, &builder);
         for (int32_t number = tree->n_nodes - 1; number >= 0; number--) {
             if (tree->nodes[number].left != 0) { /* children come after their parents */

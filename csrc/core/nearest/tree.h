@@ -85,28 +85,6 @@ hs_tree_gap(const hs_tree *tree, const double *low, const double *high, double u
 }
 
 /*
- * One step of a walk to all nodes within a limit, first ones first: from the node whose followers
- * are `left` and left + 1, at these gaps, which are infinite if it has none. False at the end.
- */
-HS_ALWAYS_INLINE bool
-hs_tree_step(int32_t left, const double gap[2], double limit, int32_t *waiting, int64_t *n_waiting,
-             int32_t *number)
-{
-    if (gap[0] <= limit) {
-        waiting[*n_waiting] = left + 1;
-        *n_waiting += gap[1] <= limit;
-        *number = left;
-    } else if (gap[1] <= limit) {
-        *number = left + 1;
-    } else if (*n_waiting > 0) {
-        *number = waiting[--*n_waiting];
-    } else {
-        return false;
-    }
-    return true;
-}
-
-/*
  * Sorts the points of the scene, whose arrays the bins take over, into leaves of at most
  * leaf_points; spots may be larger. In each node points are in the caller's order. The tree is the
  * same for any team. bins->start stays NULL. HS_ERR_MEMORY, HS_ERR_INTERRUPTED; on failure bins and

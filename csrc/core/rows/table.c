@@ -194,21 +194,6 @@ hs_table_count(hs_search *search, int64_t *counts, hs_failure *failure)
 #define PREPARED 0.1
 #define COUNTED  0.4
 
-/* Whether such a neighbourhood has a chance to be put in order; *bytes: what it would take. */
-static bool
-fits(hs_search *search, const hs_neighbourhood *most, double *bytes)
-{
-    /* Bytes that each candidate takes at least, gathered and sorted. */
-    const double each = (double)(sizeof(hs_unsure) + 2 * sizeof(uint64_t) + 4 * sizeof(int32_t)) +
-                        (double)(search->scene.ndim + 1) * sizeof(float);
-    const double all = (double)most->candidates * each;
-    if (most->candidates <= HS_ORDER_CANDIDATES && hs_account_allows(&search->call->account, all)) {
-        return true;
-    }
-    *bytes = all;
-    return false;
-}
-
 /* Whether one walk is to find all rows, which are kept until they have places. */
 static bool
 keeps_all(const table *all)
@@ -413,7 +398,13 @@ hs_table_find(hs_search *search, hs_output *entries, hs_output *offsets, hs_fail
         status = hs_parallel_visit(search, &sizes, &all.most, failure);
         call->part = whole;
     }
-    if (status == HS_OK && !fits(search, &all.most, &failure->search_bytes)) {
+    /* What each candidate of a neighbourhood takes at least, gathered and sorted. */
+    const double each = (double)(sizeof(hs_unsure) + 2 * sizeof(uint64_t) + 4 * sizeof(int32_t)) +
+                        (double)(search->scene.ndim + 1) * sizeof(float);
+    const double needed = (double)all.most.candidates * each;
+    if (status == HS_OK &&
+        (all.most.candidates > HS_ORDER_CANDIDATES || !hs_account_allows(&call->account, needed))) {
+        failure->search_bytes = needed;
         status = HS_ERR_MEMORY; /* refused before anything is counted */
     }
     if (status == HS_OK) {

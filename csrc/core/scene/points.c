@@ -157,7 +157,7 @@ hs_cloud_load(hs_account *account, hs_team *team, const hs_points *points,
             load.found[slab][k] = HS_NO_RANGE;
         }
     }
-    hs_status status = hs_walk_slabs(team, options, points->n, load_slab, &load);
+    hs_status status = hs_walk_points(team, options, points->n, 0, load_slab, &load);
     double    poison = 0.0; /* of all slabs */
     for (int k = 0; status == HS_OK && k < cloud->ndim; k++) {
         cloud->lower[k] = INFINITY;

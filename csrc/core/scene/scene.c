@@ -60,44 +60,42 @@ scene_set_bounds(hs_scene *scene, double magnitude)
 }
 
 /*
+ * Sets formula_error and radius, from the cutoff, the lattice and the largest |x|, scaled.
+ *
  * precision="double" computes D in float64 from the points as given: each of its m + 2 terms is
  * rounded to within 2^-53 of the largest partial sum. Candidates must be sought that much further
  * out.
  */
-static double
-bound_formula(const hs_scene *scene, double farthest)
+static void
+scene_set_radius(hs_scene *scene, const hs_options *options, double farthest)
 {
     const hs_lattice *lattice = &scene->lattice;
-    double            total = 2.0 * farthest;
-    if (lattice->n_periodic == 0) {
+    scene->formula_error = 0.0;
+    if (options->precision == HS_DOUBLE && lattice->n_periodic == 0) {
         /* Differences of floats have a relative error only. */
-        return 4.0 * UNIT * scene->cutoff * scene->ndim;
-    }
-    double turns[HS_MAX_DIM]; /* bound on |shift| over row b of B of any pair in reach */
-    for (int k = 0; k < scene->ndim; k++) {
-        const int b = lattice->row_of_axis[k];
-        if (b >= 0) {
-            turns[b] = (2.0 * scene->ndim * total + scene->cutoff) / lattice->period[k] + 4.0;
+        scene->formula_error = 4.0 * UNIT * scene->cutoff * scene->ndim;
+    } else if (options->precision == HS_DOUBLE) {
+        double total = 2.0 * farthest;
+        double turns[HS_MAX_DIM]; /* bound on |shift| over row b of B of any pair in reach */
+        for (int k = 0; k < scene->ndim; k++) {
+            const int b = lattice->row_of_axis[k];
+            if (b >= 0) {
+                turns[b] = (2.0 * scene->ndim * total + scene->cutoff) / lattice->period[k] + 4.0;
+            }
         }
-    }
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        double given_turns = 0.0, largest = 0.0;
-        for (int b = 0; b < lattice->n_periodic; b++) {
-            given_turns += turns[b] * fabs((double)lattice->U[b][r]);
+        for (int r = 0; r < lattice->n_periodic; r++) {
+            double given_turns = 0.0, largest = 0.0;
+            for (int b = 0; b < lattice->n_periodic; b++) {
+                given_turns += turns[b] * fabs((double)lattice->U[b][r]);
+            }
+            for (int c = 0; c < scene->ndim; c++) {
+                largest = fmax(largest, fabs(lattice->scaled[r][c]));
+            }
+            total += given_turns * largest;
         }
-        for (int c = 0; c < scene->ndim; c++) {
-            largest = fmax(largest, fabs(lattice->scaled[r][c]));
-        }
-        total += given_turns * largest;
+        scene->formula_error =
+            (lattice->n_periodic + 4) * scene->ndim * UNIT * (total + scene->cutoff);
     }
-    return (lattice->n_periodic + 4) * scene->ndim * UNIT * (total + scene->cutoff);
-}
-
-/* Sets formula_error and radius, from the cutoff, the lattice and the largest |x|, scaled. */
-static void
-scene_set_radius(hs_scene *scene, const hs_options *options, double largest)
-{
-    scene->formula_error = options->precision == HS_DOUBLE ? bound_formula(scene, largest) : 0.0;
     scene->radius = scene->cutoff + scene->formula_error;
     memset(scene->less, 0, sizeof scene->less);
 }
@@ -107,7 +105,7 @@ hs_scene_narrow(hs_scene *scene, const hs_narrowing *narrowing)
 {
     /* Less than this is not worth it. */
     const double enough = WORTH_NARROWING * hs_scale_apply(scene->unscale, scene->radius);
-    for (int k = 0; narrowing != NULL && k < scene->ndim; k++) {
+    for (int k = 0; k < scene->ndim; k++) {
         double          width;
         const hs_status status =
             narrowing->find(narrowing->context, scene->lattice.normal[k], enough, &width);
@@ -119,15 +117,6 @@ hs_scene_narrow(hs_scene *scene, const hs_narrowing *narrowing)
         scene->less[k] = width < enough && less > 0.0 ? less : 0.0;
     }
     return HS_OK;
-}
-
-double
-hs_scene_volume(const hs_scene *scene, double ball)
-{
-    for (int k = 0; k < scene->ndim; k++) {
-        ball *= scene->less[k] > 0.0 ? hs_scene_radius_along(scene, k) / scene->radius : 1.0;
-    }
-    return ball;
 }
 
 void
@@ -153,7 +142,6 @@ hs_scene_set_cutoff(hs_scene *scene, const hs_options *options)
     scene->sought = options->cutoff;
     scene->cutoff = scene->cutoff_low = hs_scale_apply(scene->scale, options->cutoff);
     scene_set_radius(scene, options, scene->cloud.largest);
-    hs_scene_init_metric(scene, options);
 }
 
 /* Names the first scaled coordinate beyond `most`, or else the largest, and returns its size; -1
@@ -721,18 +709,6 @@ add_turns(const far_numbers *far, int set, hs_scene *scene)
     }
 }
 
-/* Whether a scene without a length of its own is scaled by its box or its points, beside which
- * squares of distances are no ordinary numbers. Lengths that pairs are compared with must not
- * vanish. */
-static bool
-goes_by_itself(const hs_sets *sets, const hs_cloud *cloud, const hs_box_size *size, double sought)
-{
-    const int exponent = unit_exponent(cloud, size, 0.0);
-    return abs(hs_exponent_of(sought)) <= ORDINARY_EXPONENT &&
-           (exponent < -WIDE_ORDINARY_EXPONENT ||
-            (exponent > WIDE_ORDINARY_EXPONENT && sets->least_cutoff == 0.0));
-}
-
 /* Sets cutoff and scale of a scene with far numbers, and closes their gaps where that is to be
  * done. asking: NULL, or the queries' scene. */
 static hs_status
@@ -745,9 +721,17 @@ bring_near(hs_account *account, const hs_options *options, const hs_sets *sets, 
     const bool   is_bounded =
         sets->within > 0.0 &&
         hs_is_far(largest, unit_exponent(cloud, &far->size, sets->within), HS_FAR_BOUNDED_EXPONENT);
+    /* A scene without a length of its own is scaled by its box or its points, beside which squares
+     * of distances are no ordinary numbers. Lengths that pairs are compared with must
+     * not vanish. */
+    const int  own = unit_exponent(cloud, &far->size, 0.0);
+    const bool goes_by_itself = sets->is_wide &&
+                                abs(hs_exponent_of(scene->sought)) <= ORDINARY_EXPONENT &&
+                                (own < -WIDE_ORDINARY_EXPONENT ||
+                                 (own > WIDE_ORDINARY_EXPONENT && sets->least_cutoff == 0.0));
     if (is_bounded) {
         scene->sought = sets->within;
-    } else if (sets->is_wide && goes_by_itself(sets, cloud, &far->size, scene->sought)) {
+    } else if (goes_by_itself) {
         scene->sought = 0.0;
     } else if (!sets->is_kept && !sets->is_plain && cloud->largest > 0.0 &&
                far->size.largest == 0.0 && options->cutoff > ENOUGH_CUTOFF * cloud->largest) {
@@ -954,7 +938,7 @@ wrap_points(hs_account *account, hs_team *team, const hs_options *options, hs_sc
         for (int64_t slab = 0; slab < n_slabs && slab < HS_SLABS; slab++) {
             wrap.folded[slab] = folded;
         }
-        status = hs_walk_slabs(team, options, scene->n, move_slab, &wrap);
+        status = hs_walk_points(team, options, scene->n, 0, move_slab, &wrap);
         for (int64_t slab = 0; slab < n_slabs && slab < HS_SLABS; slab++) {
             const hs_wrap_range *of = &wrap.folded[slab];
             join_ranges(scene->ndim, of->lower, of->upper, folded.lower, folded.upper);

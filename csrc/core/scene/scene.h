@@ -98,9 +98,6 @@ hs_scene_radius_along(const hs_scene *scene, int k)
     return scene->radius - scene->less[k];
 }
 
-/* The volume that neighbours of a point lie in: of a ball, or less where they are narrower. */
-double hs_scene_volume(const hs_scene *scene, double ball);
-
 /* Sets scene->less, for a scene whose radius is known; the status is that of narrowing. */
 hs_status hs_scene_narrow(hs_scene *scene, const hs_narrowing *narrowing);
 
@@ -133,7 +130,8 @@ hs_status hs_scene_from_kept(hs_account *account, hs_team *team, const hs_scene 
                              const hs_points *queries, const hs_options *options, bool for_cells,
                              hs_scene *asking, hs_failure *failure);
 
-/* Sets cutoff, radius and metric for another cutoff of a scene that is not extreme. */
+/* Sets cutoff and radius for another cutoff of a scene that is not extreme; hs_scene_init_metric is
+ * to follow. */
 void hs_scene_set_cutoff(hs_scene *scene, const hs_options *options);
 
 /* Sets what decides: X and B where they hold every digit, else points and box vectors as given. */

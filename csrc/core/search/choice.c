@@ -127,7 +127,7 @@ hs_choice_set_scene(const hs_sets *sets, const hs_box *box, double cutoff, hs_ca
                     hs_failure *failure)
 {
     hs_choice *choice = call->choice;
-    if (choice == NULL || !hs_choice_excludes(choice)) {
+    if (!hs_choice_excludes(choice)) {
         return HS_OK;
     }
     const hs_status status = hs_choice_set_box(box, sets->points->ndim, choice, failure);
@@ -167,9 +167,6 @@ hs_status
 hs_choice_open(const hs_selection *selection, const hs_sets *sets, hs_call *call,
                hs_failure *failure)
 {
-    if (selection == NULL) {
-        return HS_OK;
-    }
     if (!is_sound(selection, sets, &call->options)) {
         return HS_ERR_ARGUMENT;
     }

@@ -44,10 +44,10 @@ typedef struct hs_choice {
 } hs_choice;
 
 /*
- * Sets call->choice for searches among these sets, to be freed with hs_choice_close; selection NULL
- * leaves it as it is. HS_ERR_MEMORY, or HS_ERR_ARGUMENT for arrays that are missing, numbers that
- * are no point's (failure->row), or a min_distance that is negative or not finite, or not 0 with
- * HS_SINGLE. On failure there is none.
+ * Sets call->choice for searches among these sets, to be freed with hs_choice_close.
+ * HS_ERR_MEMORY, or HS_ERR_ARGUMENT for arrays that are missing, numbers that are no point's
+ * (failure->row), or a min_distance that is negative or not finite, or not 0 with HS_SINGLE. On
+ * failure there is none.
  */
 hs_status hs_choice_open(const hs_selection *selection, const hs_sets *sets, hs_call *call,
                          hs_failure *failure);

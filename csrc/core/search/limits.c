@@ -42,7 +42,7 @@ hs_limits_set(const hs_scanner *scanner, const hs_limit_form *form, hs_limit_sca
         .row = has_table ? table->of_asking + scanner->group.first : NULL,
         .stride = block->pitch,
     };
-    for (int32_t row = 0; row < table->n_types && has_table; row++) { /* with each type */
+    for (int32_t row = 0; row < table->n_types; row++) { /* with each type */
         const float *with = table->near + row * table->n_types;
         float       *to = block->radius + row * block->pitch;
         for (int32_t c = 0; c < block->n; c++) {

@@ -211,66 +211,6 @@ order_block(hs_scanner *scanner)
 /* Turns and images up to here are few: sums of four of them are int32. */
 #define MOST_FEW 0x1p28
 
-/* Whether shifts over B are those over the box vectors as given. */
-static bool
-has_plain_shifts(const hs_lattice *lattice)
-{
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        for (int l = 0; l < lattice->n_periodic; l++) {
-            if (lattice->U[r][l] != (r == l)) {
-                return false;
-            }
-        }
-    }
-    return true;
-}
-
-/* Whether every S of the scene is the sum of an image and of turns that are known to be few, over B
- * and over the box vectors as given. Where these differ, writers measure by S alone. */
-static bool
-has_narrow_shifts(const hs_search *search)
-{
-    const hs_scene   *scene = &search->scene;
-    const hs_lattice *lattice = &scene->lattice;
-    double            most = MOST_FEW;
-    for (int l = 0; l < lattice->n_periodic; l++) {
-        double sum = 0.0;
-        for (int r = 0; r < lattice->n_periodic; r++) {
-            sum += fabs((double)lattice->U[r][l]);
-        }
-        most = hs_smaller(most, MOST_FEW / sum); /* no row of zeros: B is a basis */
-    }
-    for (int k = 0; k < scene->ndim; k++) {
-        if (lattice->row_of_axis[k] >= 0 &&
-            !((double)(search->grid.reach[k] / search->grid.shape[k]) < most)) {
-            return false;
-        }
-    }
-    return (has_plain_shifts(lattice) || search->bins.keeps_originals) &&
-           (!search->bins.turns.known || hs_fold_turns(lattice, scene->cloud.largest) < most);
-}
-
-/* hs_candidates_fn in two or three dimensions. */
-HS_ALWAYS_INLINE bool
-load_moved(const hs_search *search, const hs_candidate_run *run, hs_candidate *to)
-{
-    const int d = search->bins.ndim;
-    bool      are_fine = run->moved.is_fine;
-    if (d == HS_WRITE_MOST_DIM) {
-        return search->call->kernel->candidates(run, to) && are_fine;
-    }
-    for (int32_t c = 0; c < run->n; c++) {
-        double  q[HS_WRITE_MOST_DIM] = {0.0};
-        int32_t S[HS_WRITE_MOST_DIM] = {0};
-        for (int k = 0; k < d; k++) {
-            q[k] = run->x[k][run->place[c]];
-            S[k] = run->image[k] - (run->turns[k] != NULL ? run->turns[k][run->place[c]] : 0);
-        }
-        are_fine &= hs_candidate_set(&to[c], q, run->by, &run->moved, run->number[c], S);
-    }
-    return are_fine;
-}
-
 /* Whether a point has these turns; m <= HS_WRITE_MOST_DIM. */
 HS_ALWAYS_INLINE bool
 has_same_turns(int32_t *const *turns, int m, int32_t si, const int32_t *own)
@@ -327,7 +267,10 @@ load_halved(const hs_scanner *scanner, const hs_run *run, int32_t n, const int32
         part.place = place + from;
         part.number = scanner->block.id + run->at + from;
         (void)hs_write_move(metric, by, shift, &part.moved);
-        are_fine &= load_moved(search, &part, scanner->block.candidates + run->at + from);
+        hs_candidate *to = scanner->block.candidates + run->at + from;
+        are_fine &= part.moved.is_fine &
+                    (d == HS_WRITE_MOST_DIM ? search->call->kernel->candidates(&part, to)
+                                            : hs_candidates_from(&part, 2, 0, to));
     }
     return are_fine;
 }
@@ -376,13 +319,34 @@ needs_shifts(const hs_scanner *scanner)
 static void
 pair_batch_begin(const hs_scanner *scanner, hs_pair_batch *pair_batch)
 {
-    const hs_search *search = scanner->search;
+    const hs_search  *search = scanner->search;
+    const hs_scene   *scene = &search->scene;
+    const hs_lattice *lattice = &scene->lattice;
+    const bool        as_given = search->bins.keeps_originals;
+    double            most = MOST_FEW; /* turns over B, so that those over given vectors are few */
+    bool              is_few = true;
     pair_batch->search = search;
-    pair_batch->n_rows = search->scene.lattice.n_periodic;
-    pair_batch->needs_given = needs_shifts(scanner) || search->bins.keeps_originals;
-    pair_batch->is_plain = has_plain_shifts(&search->scene.lattice);
+    pair_batch->n_rows = lattice->n_periodic;
+    pair_batch->needs_given = needs_shifts(scanner) || as_given;
+    pair_batch->is_plain = true;
+    for (int l = 0; l < lattice->n_periodic; l++) {
+        double sum = 0.0;
+        for (int r = 0; r < lattice->n_periodic; r++) {
+            sum += fabs((double)lattice->U[r][l]);
+            pair_batch->is_plain = pair_batch->is_plain && lattice->U[r][l] == (r == l);
+        }
+        most = hs_smaller(most, MOST_FEW / sum); /* no row of zeros: B is a basis */
+    }
+    for (int k = 0; k < scene->ndim; k++) {
+        const double images = (double)(search->grid.reach[k] / search->grid.shape[k]);
+        is_few = is_few && (lattice->row_of_axis[k] < 0 || images < most);
+    }
+    /* Every S of the scene is the sum of an image and of turns that are known to be few, over B and
+     * over the box vectors as given. Where these differ, writers measure by S alone. */
+    pair_batch->is_narrow =
+        is_few && (pair_batch->is_plain || as_given) &&
+        (!search->bins.turns.known || hs_fold_turns(lattice, scene->cloud.largest) < most);
     pair_batch->block = &scanner->block;
-    pair_batch->is_narrow = has_narrow_shifts(search);
     hs_pair_batch_clear(pair_batch);
 }
 
@@ -592,16 +556,31 @@ hs_pair_batch_pair(const hs_pair_batch *pair_batch, int32_t e, double *p, double
 #define SHORTER      0.85 /* of the cutoff: half of its ball, about */
 #define EXTENT_SHIFT 18   /* bits of the mantissa that extents do without */
 
-/* For the form's extent. */
-static void
-set_form(const hs_scanner *scanner, hs_form *form)
+/* The form for |y_k| and |q_k| up to the float >= 0 of these bits, rounded up to the top five bits
+ * of its mantissa, which adds 1/32 at most; NaN and infinity remain. It was set for this extent,
+ * which NaN never is, and for all else that differs between the searches of a walker. */
+static const hs_form *
+form_of(hs_scanner *scanner, uint32_t bits)
 {
     const hs_scene  *scene = &scanner->search->scene;
     const hs_limits *limits = scanner->search->limits;
     const bool       by_supports = limits != NULL && limits->supports != NULL;
-    const double     extent = form->extent, error = scanner->search->filter_error;
+    const uint32_t   mask = (UINT32_C(1) << EXTENT_SHIFT) - 1;
+    const uint32_t   rounded = bits < UINT32_C(0x7f800000) ? (bits + mask) & ~mask : bits;
+    const double     extent = 2.0 * (double)hs_float_of_bits(rounded);
+    const double     error = scanner->search->filter_error;
     const double     low = scene->cutoff_low; /* a scaled cutoff may be known between bounds only */
     const int        d = scene->ndim;
+    hs_form         *form = &scanner->forms[(rounded >> EXTENT_SHIFT) % HS_FORMS];
+    if (form->extent == extent && form->cutoff == scene->cutoff && form->error == error &&
+        form->cutoff_low == low && form->is_extreme == scene->extreme) {
+        return form;
+    }
+    form->extent = extent;
+    form->cutoff = scene->cutoff;
+    form->cutoff_low = low;
+    form->error = error;
+    form->is_extreme = scene->extreme;
     form->kind = by_supports ? HS_SCAN_SUPPORTS : limits != NULL ? HS_SCAN_LIMITS : HS_SCAN_DIRECT;
     /* Supports are decided alike in all precisions: what the filter leaves, by a fixed formula. */
     if (scanner->options.precision == HS_SINGLE && !by_supports) {
@@ -609,7 +588,7 @@ set_form(const hs_scanner *scanner, hs_form *form)
         form->direct.out = scanner->options.inclusive ? square : nextafterf(square, -1.0f);
         form->direct.in = INFINITY; /* one float32 comparison: no hit is unsure */
         form->limits = (hs_limit_form){1.0f, 0.0f, 1.0f, 0.0f};
-        return;
+        return form;
     }
     form->direct = hs_thresholds_of(d, scene->cutoff, extent, error);
     if (scene->extreme) {
@@ -621,29 +600,6 @@ set_form(const hs_scanner *scanner, hs_form *form)
         form->limits = hs_limit_form_of(d, extent, error);
     } else if (scanner->scans == HS_BLOCK_LISTS_SQUARES) {
         form->kind = HS_SCAN_SQUARES;
-    }
-}
-
-/* The form for |y_k| and |q_k| up to the float >= 0 of these bits, rounded up to the top five bits
- * of its mantissa, which adds 1/32 at most; NaN and infinity remain. It was set for this extent,
- * which NaN never is, and for all else that differs between the searches of a walker. */
-static const hs_form *
-form_of(hs_scanner *scanner, uint32_t bits)
-{
-    const hs_scene *scene = &scanner->search->scene;
-    const uint32_t  low = (UINT32_C(1) << EXTENT_SHIFT) - 1;
-    const uint32_t  rounded = bits < UINT32_C(0x7f800000) ? (bits + low) & ~low : bits;
-    const double    extent = 2.0 * (double)hs_float_of_bits(rounded);
-    const double    error = scanner->search->filter_error;
-    hs_form        *form = &scanner->forms[(rounded >> EXTENT_SHIFT) % HS_FORMS];
-    if (!(form->extent == extent && form->cutoff == scene->cutoff && form->error == error &&
-          form->cutoff_low == scene->cutoff_low && form->is_extreme == scene->extreme)) {
-        form->extent = extent;
-        form->cutoff = scene->cutoff;
-        form->cutoff_low = scene->cutoff_low;
-        form->error = error;
-        form->is_extreme = scene->extreme;
-        set_form(scanner, form);
     }
     return form;
 }
@@ -760,17 +716,6 @@ hs_scanner_flush_counters(hs_search *search, hs_scanner *scanner)
     hs_call_add_counters(search->call, &walked);
     scanner->n_groups = scanner->n_candidates = scanner->n_ambiguous = 0;
     scanner->stages = (hs_stages){0};
-}
-
-void
-hs_scanner_close(hs_search *search, hs_scanner *scanner)
-{
-    hs_account *account = &search->call->account;
-    hs_scanner_flush_counters(search, scanner);
-    hs_free(account, scanner->pair_batch.memory);
-    hs_free(account, scanner->block.order.memory);
-    hs_free(account, scanner->block.memory);
-    scanner->pair_batch.memory = scanner->block.order.memory = scanner->block.memory = NULL;
 }
 
 /* A batch of pairs at a time by the batch kernel; pairs that it leaves, one by one. */
@@ -1067,11 +1012,48 @@ gather_block(hs_scanner *scanner)
     return HS_OK;
 }
 
-/* Makes the block ready to be scanned: gathers it, and sorts it where that is wanted. */
+/* Empties the block; ends the walk if a limit or the visitor says so, else polls now and then. */
 static hs_status
-fill_block(hs_scanner *scanner)
+end_block(hs_scanner *scanner)
 {
-    hs_block *block = &scanner->block;
+    scanner->block.n = 0;
+    scanner->block.n_runs = 0;
+    scanner->block.has_images = false;
+    scanner->block_is_first = false;
+    scanner->blocks++;
+    if (scanner->n_gathered > scanner->gather_limit || scanner->leaves) {
+        return HS_STOPPED;
+    }
+    if (scanner->work_since_poll > POLL_WORK) {
+        scanner->work_since_poll = 0;
+        return hs_poll(&scanner->options,
+                       hs_search_fraction(scanner->search, scanner->group.first));
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_scanner_scan(hs_scanner *scanner)
+{
+    const hs_search *search = scanner->search;
+    const hs_block  *block = &scanner->block;
+    int32_t          end[HS_GROUP_POINTS];
+    hs_scan          scan;
+    const bool       is_skipped = scanner->blocks < scanner->blocks_to_skip;
+    if (!is_skipped && scanner->use == HS_BLOCK_SIZES) { /* its size is all that is wanted */
+        hs_neighbourhood *most = &scanner->most, *of = &scanner->of_group;
+        of->candidates += block->n;
+        of->runs += block->n_runs;
+        most->candidates = of->candidates > most->candidates ? of->candidates : most->candidates;
+        most->runs = of->runs > most->runs ? of->runs : most->runs;
+        scanner->work_since_poll += WORK_OF_RUN * (int64_t)block->n_runs;
+        return end_block(scanner);
+    }
+    if (is_skipped || block->n == (scanner->block_is_first ? 1 : 0)) {
+        /* Nothing else has been appended than, in a half list, the one point of the group. */
+        scanner->work_since_poll += is_skipped ? 0 : WORK_OF_BLOCK;
+        return end_block(scanner);
+    }
     scanner->n_blocks++;
     scanner->n_gathered += block->n;
     scanner->work_since_poll += WORK_OF_BLOCK + block->n;
@@ -1090,59 +1072,10 @@ fill_block(hs_scanner *scanner)
     }
     scanner->block.has_candidates = false;
     scanner->form = form_of(scanner, scanner->group.largest);
-    if (scanner->is_ordered) {
-        status = order_block(scanner);
-    }
+    status = scanner->is_ordered ? order_block(scanner) : HS_OK;
     if (status == HS_ERR_SHIFT_RANGE) {
-        scanner->failed_point = hs_search_asking(scanner->search)->order[scanner->group.first];
+        scanner->failed_point = hs_search_asking(search)->order[scanner->group.first];
     }
-    return status;
-}
-
-/* Empties the block; ends the walk if a limit or the visitor says so, else polls now and then. */
-static hs_status
-end_block(hs_scanner *scanner)
-{
-    scanner->block.n = 0;
-    scanner->block.n_runs = 0;
-    scanner->block.has_images = false;
-    scanner->block_is_first = false;
-    scanner->blocks++;
-    if (scanner->n_gathered > scanner->gather_limit || scanner->leaves) {
-        return HS_STOPPED;
-    }
-    if (scanner->work_since_poll > POLL_WORK) {
-        scanner->work_since_poll = 0;
-        return hs_poll(&scanner->options, hs_scanner_fraction(scanner));
-    }
-    return HS_OK;
-}
-
-/*
- * Tests every point of the group against what has been appended to the block, unless it is one to
- * skip, then empties it. HS_STOPPED past the gather limit, or when a visitor leaves; what the
- * visitor or the poll say.
- */
-static hs_status
-scan_block(hs_scanner *scanner)
-{
-    const hs_search *search = scanner->search;
-    const hs_block  *block = &scanner->block;
-    int32_t          end[HS_GROUP_POINTS];
-    hs_scan          scan;
-    const bool       is_skipped = scanner->blocks < scanner->blocks_to_skip;
-    if (!is_skipped && scanner->use == HS_BLOCK_SIZES) { /* its size is all that is wanted */
-        scanner->of_group.candidates += block->n;
-        scanner->of_group.runs += block->n_runs;
-        scanner->work_since_poll += WORK_OF_RUN * (int64_t)block->n_runs;
-        return end_block(scanner);
-    }
-    if (is_skipped || block->n == (scanner->block_is_first ? 1 : 0)) {
-        /* Nothing else has been appended than, in a half list, the one point of the group. */
-        scanner->work_since_poll += is_skipped ? 0 : WORK_OF_BLOCK;
-        return end_block(scanner);
-    }
-    hs_status status = fill_block(scanner);
     if (status != HS_OK) {
         return status;
     }
@@ -1224,7 +1157,7 @@ hs_scanner_append(hs_scanner *scanner, int32_t si, int32_t end, const double *sh
     hs_block *block = &scanner->block;
     while (si < end) {
         if (block->n == block->capacity || block->n_runs == block->most_runs) {
-            const hs_status status = scan_block(scanner);
+            const hs_status status = hs_scanner_scan(scanner);
             if (status != HS_OK) {
                 return status;
             }
@@ -1246,20 +1179,10 @@ hs_scanner_append(hs_scanner *scanner, int32_t si, int32_t end, const double *sh
         block->n += n;
         si += n;
         if (block->n_runs % RUNS_PER_POLL == 0 &&
-            hs_poll(&scanner->options, hs_scanner_fraction(scanner)) != HS_OK) {
+            hs_poll(&scanner->options, hs_search_fraction(scanner->search, scanner->group.first)) !=
+                HS_OK) {
             return HS_ERR_INTERRUPTED;
         }
     }
     return HS_OK;
-}
-
-hs_status
-hs_scanner_finish(hs_scanner *scanner)
-{
-    const hs_status   status = scan_block(scanner);
-    hs_neighbourhood *most = &scanner->most, of = scanner->of_group;
-    scanner->blocks_to_skip = 0;
-    most->candidates = of.candidates > most->candidates ? of.candidates : most->candidates;
-    most->runs = of.runs > most->runs ? of.runs : most->runs;
-    return status;
 }

@@ -204,17 +204,10 @@ struct hs_scanner {
     int64_t          work_since_poll;
 };
 
-/* hs_search_fraction where the scanner is. */
-HS_ALWAYS_INLINE double
-hs_scanner_fraction(const hs_scanner *scanner)
-{
-    return hs_search_fraction(scanner->search, scanner->group.first);
-}
-
 /*
  * A scanner for blocks of so many candidates and runs; no visitor yet. is_ordered: each point's
  * hits come in one visit, ascending by the candidate's number and then by S, for which the whole
- * neighbourhood must fit the block. On failure it may be closed.
+ * neighbourhood must fit the block. Memory is freed with the walker's, on failure as well.
  */
 hs_status hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_runs,
                           bool is_ordered, hs_scanner *scanner);
@@ -228,9 +221,6 @@ bool hs_scanner_renew(hs_search *search, hs_block_use use, int32_t capacity, int
 /* Adds what was done to that of the call. */
 void hs_scanner_flush_counters(hs_search *search, hs_scanner *scanner);
 
-/* hs_scanner_flush_counters, and frees; idempotent. */
-void hs_scanner_close(hs_search *search, hs_scanner *scanner);
-
 /* Points [first, last) in cell order are the group from here on, with an empty block. */
 void hs_scanner_start(hs_scanner *scanner, int32_t first, int32_t last);
 
@@ -242,8 +232,9 @@ void hs_scanner_start(hs_scanner *scanner, int32_t first, int32_t last);
 hs_status hs_scanner_append(hs_scanner *scanner, int32_t si, int32_t end, const double *shift,
                             const int32_t *image);
 
-/* Tests the last block of the group; likewise. */
-hs_status hs_scanner_finish(hs_scanner *scanner);
+/* Tests every point of the group against what has been appended to the block, unless it is one to
+ * skip, then empties it; likewise. For the last block of a group, which may be empty. */
+hs_status hs_scanner_scan(hs_scanner *scanner);
 
 /* Fills the block's candidates, moved as hs_write says, unless that is done. HS_OK or
  * HS_ERR_INTERRUPTED. */

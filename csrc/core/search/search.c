@@ -83,13 +83,6 @@ hs_shortage_tell(const hs_shortage *shortage, const hs_options *options, int ndi
     }
 }
 
-/* The same of this search's result: 0 when none is kept. */
-static double
-bytes_of_search(const hs_search *search)
-{
-    return search->keeps_none ? 0.0 : bytes_per_pair_of(&search->call->options, search->scene.ndim);
-}
-
 static hs_status
 refuse(const hs_search *search, double pairs, double bytes_per_pair, hs_failure *failure)
 {
@@ -112,8 +105,9 @@ estimate_by_density(hs_search *search, hs_failure *failure)
     const hs_scene   *scene = &search->scene;
     const hs_lattice *lattice = &scene->lattice;
     const double      n = (double)scene->n;
-    const double      bytes_per_pair = bytes_of_search(search);
-    double            diameter = 0.0, across = 0.0;
+    const double      bytes_per_pair =
+        search->keeps_none ? 0.0 : bytes_per_pair_of(&search->call->options, scene->ndim);
+    double diameter = 0.0, across = 0.0;
     if (search->limits != NULL ||   /* the cutoff is that of few pairs */
         lattice->n_periodic == 0) { /* nothing tells the density; a scene without points has no
                                      * box either */
@@ -208,36 +202,32 @@ hs_estimate_pairs(hs_search *search, double *pairs)
     return status;
 }
 
-/* At least as many pairs as there are: of each two points, those images that the range along all
- * axes holds at once, and no more than all candidates. */
-static double
-most_pairs(const hs_search *search)
-{
-    const hs_lattice *lattice = &search->scene.lattice;
-    double            most = (double)search->bins.n * (double)hs_search_asking(search)->n;
-    most *= search->is_half && !search->has_queries ? 0.5 : 1.0;
-    for (int k = 0; k < lattice->ndim; k++) {
-        if (lattice->row_of_axis[k] >= 0) {
-            most *= floor(2.0 * search->grid.range[k] / lattice->period[k]) + 1.0;
-        }
-    }
-    return most > 0.0 ? hs_smaller(hs_search_candidates(search), most) : 0.0;
-}
-
 /* The part of what is free that a result may seem to need: its density may be off by a third. */
 #define SEEMS_SMALL 0.75
 
 hs_status
 hs_estimate_by_sample(hs_search *search, hs_failure *failure)
 {
-    hs_account   *account = &search->call->account;
-    const double  bytes_per_pair = bytes_of_search(search);
+    hs_account       *account = &search->call->account;
+    const hs_lattice *lattice = &search->scene.lattice;
+    const double      bytes_per_pair =
+        search->keeps_none ? 0.0 : bytes_per_pair_of(&search->call->options, search->scene.ndim);
     const int64_t n = hs_search_asking(search)->n;
-    const double  bound = most_pairs(search) * bytes_per_pair;
-    const double  by_density = search->grid.expected_pairs * search->pairs_per_half;
-    const bool    is_uneven = search->is_sparse || hs_search_crowd(search) > EVEN;
-    const bool    is_large = bytes_per_pair > BYTES_OF_INDICES && bound > LARGE_RESULT;
-    sample        taken;
+    /* At least as many pairs as there are: of each two points, those images that the range along
+     * all axes holds at once, and no more than all candidates. */
+    double most = (double)search->bins.n * (double)n;
+    most *= search->is_half && !search->has_queries ? 0.5 : 1.0;
+    for (int k = 0; k < search->scene.ndim; k++) {
+        if (lattice->row_of_axis[k] >= 0) {
+            most *= floor(2.0 * search->grid.range[k] / lattice->period[k]) + 1.0;
+        }
+    }
+    most = most > 0.0 ? hs_smaller(hs_search_candidates(search), most) : 0.0;
+    const double bound = most * bytes_per_pair;
+    const double by_density = search->grid.expected_pairs * search->pairs_per_half;
+    const bool   is_uneven = search->is_sparse || hs_search_crowd(search) > EVEN;
+    const bool   is_large = bytes_per_pair > BYTES_OF_INDICES && bound > LARGE_RESULT;
+    sample       taken;
     /* The limit is looked up, which takes longer than a sample, unless the result may be too large
      * to do without and does not seem to be. */
     const bool samples_first = account->find_limit != NULL && bound > HS_LIMIT_FREE &&
@@ -293,14 +283,11 @@ hs_status
 hs_shells_open(hs_account *account, const hs_scene *scene, const hs_options *options,
                hs_shells *shells)
 {
-    *shells = (hs_shells){.inclusive = options->inclusive};
-    if (!(options->want & HS_WANT_SHELL)) {
-        return HS_OK;
-    }
     const int64_t n = options->n_shells - 1;
     const int64_t last = CELLS_PER_EDGE * n < MOST_CELLS ? CELLS_PER_EDGE * n : MOST_CELLS;
     const double  per_length = (double)last / options->cutoff;
     hs_parts      parts;
+    *shells = (hs_shells){.inclusive = options->inclusive};
     hs_parts_begin(&parts);
     hs_parts_add(&parts, (void **)&shells->edge, n, sizeof(double));
     hs_parts_add(&parts, (void **)&shells->at, n, sizeof(double));
@@ -329,13 +316,6 @@ hs_shells_open(hs_account *account, const hs_scene *scene, const hs_options *opt
         shells->start[c] = (int32_t)k;
     }
     return HS_OK;
-}
-
-void
-hs_shells_free(hs_account *account, hs_shells *shells)
-{
-    hs_free(account, shells->memory);
-    *shells = (hs_shells){.n = 0};
 }
 
 bool
@@ -449,15 +429,14 @@ hs_search_close(hs_search *search)
 {
     hs_account *account = &search->call->account;
     hs_stencil_free(account, &search->stencil);
-    hs_shells_free(account, &search->shells);
+    hs_free(account, search->shells.memory);
+    search->shells.memory = NULL;
     if (!search->is_borrowed) {
         hs_scene_free(account, &search->scene);
         hs_bins_free(account, &search->bins);
-        hs_sparse_free(account, &search->sparse);
     }
     if (search->has_queries) {
         hs_bins_free(account, &search->query_bins);
-        hs_sparse_free(account, &search->query_sparse);
     }
 }
 
@@ -509,15 +488,14 @@ choose_grid(hs_search *search, hs_failure *failure)
 static hs_status
 build_bins(hs_search *search, bool of_queries, hs_scene *scene)
 {
-    hs_call   *call = search->call;
-    hs_grid    counted = search->grid; /* occupied cells of queries are counted by themselves */
-    hs_grid   *grid = of_queries ? &counted : &search->grid;
-    hs_bins   *bins = of_queries ? &search->query_bins : &search->bins;
-    hs_sparse *sparse = of_queries ? &search->query_sparse : &search->sparse;
-    return search->is_sparse ? hs_sparse_build(&call->account, call->team, &call->options, scene,
-                                               grid, sparse, bins)
-                             : hs_bins_build(&call->account, call->team, &call->options, scene,
-                                             grid, of_queries, bins);
+    hs_call *call = search->call;
+    hs_grid  counted = search->grid; /* occupied cells of queries are counted by themselves */
+    hs_grid *grid = of_queries ? &counted : &search->grid;
+    hs_bins *bins = of_queries ? &search->query_bins : &search->bins;
+    return search->is_sparse
+               ? hs_sparse_build(&call->account, call->team, &call->options, scene, grid, bins)
+               : hs_bins_build(&call->account, call->team, &call->options, scene, grid, of_queries,
+                               bins);
 }
 
 /* What a grid, chosen or narrowed, is followed by: bounds, an estimate, and the stencil. */
@@ -554,7 +532,9 @@ hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_fa
                                      &search->scene, asking, failure);
     call->options.want = want;
     if (status == HS_OK) {
-        status = hs_scene_narrow(&search->scene, sets->narrowing);
+        if (sets->narrowing != NULL) {
+            status = hs_scene_narrow(&search->scene, sets->narrowing);
+        }
         status = status == HS_OK ? choose_grid(search, failure) : status;
         if (status == HS_ERR_BOX_SKEWED) {
             hs_scene_name_outlier(&search->scene, asking, failure);
@@ -612,7 +592,6 @@ hs_search_reuse(const hs_sets *sets, hs_call *call, hs_search *search, hs_failur
     search->scene.is_untested = sets->is_untested;
     search->grid = built->grid;
     search->bins = built->bins;
-    search->sparse = built->sparse;
     search->is_sparse = built->is_sparse;
     search->is_borrowed = true; /* not to be freed */
     hs_call_gather(call, n_asking);
@@ -665,15 +644,16 @@ hs_search_open(const hs_sets *sets, const hs_box *box, hs_call *call, hs_search 
             hs_search_close(search);
         }
     }
-    if (status == HS_OK) {
+    if (status == HS_OK && (call->options.want & HS_WANT_SHELL)) {
         status = hs_shells_open(&call->account, &search->scene, &call->options, &search->shells);
-        if (status == HS_OK) { /* threads for the walk, where points alone were not worth them */
-            hs_call_gather_for(call, hs_search_asking(search)->n,
-                               search->grid.expected_pairs * search->pairs_per_half,
-                               search->is_borrowed);
-        } else {
+        if (status != HS_OK) {
             hs_search_close(search);
         }
+    }
+    if (status == HS_OK) { /* threads for the walk, where points alone were not worth them */
+        hs_call_gather_for(call, hs_search_asking(search)->n,
+                           search->grid.expected_pairs * search->pairs_per_half,
+                           search->is_borrowed);
     }
     return status;
 }

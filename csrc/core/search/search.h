@@ -33,12 +33,9 @@ typedef struct hs_shells {
     double   per_length; /* cells of a unit of length */
 } hs_shells;
 
-/* Those of the options, if they are wanted; HS_OK or HS_ERR_MEMORY. */
+/* Those of the options, of which `memory` is to be freed; HS_OK or HS_ERR_MEMORY. */
 hs_status hs_shells_open(hs_account *account, const hs_scene *scene, const hs_options *options,
                          hs_shells *shells);
-
-/* Idempotent. */
-void hs_shells_free(hs_account *account, hs_shells *shells);
 
 /* How many edges each of n distances, which are not negative, is surely above; where edges crowd,
  * at least so many. Returns whether one of them may be above more. */
@@ -60,15 +57,13 @@ typedef struct hs_search {
     hs_call   *call; /* borrowed: memory, threads, what is wanted and what was done */
     hs_stencil stencil;
     hs_bins    bins;
-    hs_sparse  sparse;      /* when is_sparse: the rows and cells that bins follows */
     bool       is_full;     /* every asking point meets all its neighbours, not the half list */
     bool       is_half;     /* each pair is listed once, the lower number first */
     bool       keeps_none;  /* pairs are handed on and not kept: any number will fit */
     bool       is_borrowed; /* the cells and all of the scene belong to another search */
     bool       has_queries; /* the asking points are queries, in the cells of this grid: */
     hs_bins    query_bins;
-    hs_sparse  query_sparse;
-    bool       is_sparse;
+    bool       is_sparse;                   /* the grid, so that bins have rows */
     const struct hs_limits *limits;         /* borrowed; NULL: the cutoff is that of all pairs */
     hs_shells               shells;         /* as the options have them */
     int64_t                 n_before;       /* asking points that were searched with before, ... */

@@ -27,18 +27,11 @@
 
 #define POLL_LINKS (1 << 16) /* rows of the stencil between two polls */
 
-/* The rows and cells of the asking points, in a sparse grid. */
-static const hs_sparse *
-asking_sparse(const hs_search *search)
-{
-    return search->has_queries ? &search->query_sparse : &search->sparse;
-}
-
 /* How many rows there are. */
 static int64_t
 row_count(const hs_search *search)
 {
-    return search->is_sparse ? asking_sparse(search)->n_rows
+    return search->is_sparse ? hs_search_asking(search)->n_rows
                              : search->grid.n_cells / search->grid.shape[0];
 }
 
@@ -47,7 +40,7 @@ static int32_t
 first_point(const hs_search *search, int64_t number)
 {
     const hs_bins *asking = hs_search_asking(search);
-    const int64_t  cell = search->is_sparse ? asking_sparse(search)->row_cell[number]
+    const int64_t  cell = search->is_sparse ? asking->row_cell[number]
                                             : number * search->grid.shape[0];
     int64_t        low = 0, high = asking->n;
     if (asking->cells == NULL) {
@@ -88,15 +81,16 @@ static void
 row_open(const hs_search *search, int64_t number, hs_row *row)
 {
     const hs_grid *grid = &search->grid;
+    const hs_bins *asking = hs_search_asking(search);
     row->first = row->next = first_point(search, number);
     row->end = first_point(search, number + 1);
     row->x = 0;
     if (search->is_sparse) {
         row->base = number;
         for (int k = 1; k < grid->ndim; k++) {
-            row->index[k] = asking_sparse(search)->row_index[number * (grid->ndim - 1) + k - 1];
+            row->index[k] = asking->row_index[number * (grid->ndim - 1) + k - 1];
         }
-        hs_sparse_first_group(asking_sparse(search), number, &row->taken);
+        row->taken = (hs_sparse_group){.last = row->first, .cell = asking->row_cell[number]};
         return;
     }
     row->base = number * grid->shape[0];
@@ -127,8 +121,7 @@ row_next(const hs_search *search, int32_t target, hs_row *row, hs_sparse_group *
 {
     const hs_bins *asking = hs_search_asking(search);
     if (search->is_sparse) {
-        const bool found =
-            hs_sparse_next_group(asking_sparse(search), row->base, HS_GROUP_POINTS, &row->taken);
+        const bool found = hs_sparse_next_group(asking, row->base, HS_GROUP_POINTS, &row->taken);
         *group = row->taken;
         return found;
     }
@@ -202,9 +195,9 @@ hs_row_links(const hs_search *search, const hs_options *options, const hs_row *r
             link->base += cell * grid->stride[k];
         }
         if (is_there && search->is_sparse) {
-            link->base = hs_sparse_find_row(&search->sparse, target, &hints[s]);
+            link->base = hs_sparse_find_row(&search->bins, target, &hints[s]);
             if (link->base >= 0) {
-                link->cursor.low = link->cursor.high = search->sparse.row_cell[link->base];
+                link->cursor.low = link->cursor.high = search->bins.row_cell[link->base];
                 n_links++;
             }
         } else if (is_there) {
@@ -223,7 +216,7 @@ hs_link_window(const hs_search *search, hs_link *link, int64_t low, int64_t high
 {
     const int64_t n_x = search->grid.shape[0];
     if (search->is_sparse) {
-        hs_sparse_window(&search->sparse, link->base, low, high, &link->cursor, first, end);
+        hs_sparse_window(&search->bins, link->base, low, high, &link->cursor, first, end);
         return;
     }
     const int32_t *start = search->bins.start + link->base;
@@ -284,7 +277,9 @@ visit_group(hs_walker *walker, const hs_sparse_group *group)
             return status;
         }
     }
-    return hs_scanner_finish(&walker->scanner);
+    const hs_status status = hs_scanner_scan(&walker->scanner);
+    walker->scanner.blocks_to_skip = 0;
+    return status;
 }
 
 /*
@@ -484,9 +479,15 @@ void
 hs_walker_close(hs_search *search, hs_walker *walker)
 {
     hs_account *account = &search->call->account;
-    hs_free(account, walker->cursor.hints); /* the last block first: the arena has it again */
-    walker->cursor.hints = NULL;
-    hs_free(account, walker->cursor.links);
-    walker->cursor.links = NULL;
-    hs_scanner_close(search, &walker->scanner);
+    hs_cursor  *cursor = &walker->cursor;
+    hs_scanner *scanner = &walker->scanner;
+    hs_scanner_flush_counters(search, scanner);
+    hs_free(account, cursor->hints); /* the last block first: the arena has it again */
+    hs_free(account, cursor->links);
+    hs_free(account, scanner->pair_batch.memory);
+    hs_free(account, scanner->block.order.memory);
+    hs_free(account, scanner->block.memory);
+    cursor->hints = NULL;
+    cursor->links = NULL;
+    scanner->pair_batch.memory = scanner->block.order.memory = scanner->block.memory = NULL;
 }

@@ -230,7 +230,7 @@ hs_call_leave(hs_call *call, int64_t n_pairs)
         counters->bytes_peak = call->account.total.bytes_peak;
         counters->pairs = n_pairs;
     }
-    hs_leave(&call->entry);
+    hs_fpenv_leave(call->entry.saved);
 }
 
 void
@@ -361,19 +361,25 @@ do_part(void *context, int64_t slab)
     doing->status[slab] = doing->run(doing->context, (int)slab, first, end);
 }
 
-static hs_status
-walk(hs_team *team, const hs_options *options, pass *doing)
+hs_status
+hs_walk_points(hs_team *team, const hs_options *options, int64_t n, int n_strips, hs_slab_fn run,
+               void *context)
 {
-    doing->n_rounds = (doing->n + HS_POLL_POINTS - 1) / HS_POLL_POINTS;
-    for (doing->round = 0; doing->round < doing->n_rounds; doing->round++) {
-        const int64_t left = doing->n - doing->round * HS_POLL_POINTS;
+    HS_ASSERT(n_strips >= 0 && n_strips <= HS_SLABS);
+    if (n > 0 && (n_strips == 0 ? n <= HS_SLAB_POINTS : n_strips == 1 && n < HS_POLL_POINTS)) {
+        return run(context, 0, 0, n);
+    }
+    pass doing = {.run = run, .context = context, .n = n, .n_strips = n_strips};
+    doing.n_rounds = (n + HS_POLL_POINTS - 1) / HS_POLL_POINTS;
+    for (; doing.round < doing.n_rounds; doing.round++) {
+        const int64_t left = n - doing.round * HS_POLL_POINTS;
         const int64_t now = left < HS_POLL_POINTS ? left : HS_POLL_POINTS;
-        const int64_t n_tasks = doing->n_strips > 0 ? doing->n_strips
-                                                    : (now + HS_SLAB_POINTS - 1) / HS_SLAB_POINTS;
-        hs_team_run(team, n_tasks, do_part, doing);
+        const int64_t n_tasks = n_strips > 0 ? n_strips
+                                             : (now + HS_SLAB_POINTS - 1) / HS_SLAB_POINTS;
+        hs_team_run(team, n_tasks, do_part, &doing);
         for (int64_t task = 0; task < n_tasks; task++) {
-            if (doing->status[task] != HS_OK) {
-                return doing->status[task];
+            if (doing.status[task] != HS_OK) {
+                return doing.status[task];
             }
         }
         const hs_status status = now == HS_POLL_POINTS ? hs_poll(options, 0.0) : HS_OK;
@@ -384,24 +390,12 @@ walk(hs_team *team, const hs_options *options, pass *doing)
     return HS_OK;
 }
 
-hs_status
-hs_walk_slabs(hs_team *team, const hs_options *options, int64_t n, hs_slab_fn run, void *context)
+int
+hs_strips_for(const hs_team *team, int64_t n, int64_t least, int64_t n_counts)
 {
-    if (n > 0 && n <= HS_SLAB_POINTS) {
-        return run(context, 0, 0, n);
+    int n_strips = hs_team_size(team) < HS_SLABS ? hs_team_size(team) : HS_SLABS;
+    while (n_strips > 1 && (n < n_strips * least || (n_strips - 1) * n_counts > n)) {
+        n_strips--;
     }
-    pass doing = {.run = run, .context = context, .n = n};
-    return walk(team, options, &doing);
-}
-
-hs_status
-hs_walk_strips(hs_team *team, const hs_options *options, int64_t n, int n_strips, hs_slab_fn run,
-               void *context)
-{
-    HS_ASSERT(n_strips >= 1 && n_strips <= HS_SLABS);
-    if (n_strips == 1 && n > 0 && n < HS_POLL_POINTS) {
-        return run(context, 0, 0, n);
-    }
-    pass doing = {.run = run, .context = context, .n = n, .n_strips = n_strips};
-    return walk(team, options, &doing);
+    return n_strips;
 }

@@ -137,14 +137,16 @@ void hs_call_detach(hs_call *call);
  * calls with the same number run at once. */
 typedef hs_status (*hs_slab_fn)(void *context, int slab, int64_t first, int64_t last);
 
-/* Points 0 ... n - 1 in ascending rounds. Ends after a round in which a slab fails, with the status
- * of the lowest that does; HS_ERR_INTERRUPTED when the caller says so. */
-hs_status hs_walk_slabs(hs_team *team, const hs_options *options, int64_t n, hs_slab_fn run,
-                        void *context);
-
-/* Points 0 ... n - 1 in n_strips long ranges, at most HS_SLABS, each in ascending order of its
- * points: `slab` is the strip. Ends as hs_walk_slabs does. */
-hs_status hs_walk_strips(hs_team *team, const hs_options *options, int64_t n, int n_strips,
+/*
+ * Points 0 ... n - 1 in ascending rounds; or with n_strips > 0, at most HS_SLABS, in so many long
+ * ranges, each in ascending order of its points: `slab` is the strip. Ends after a round in which a
+ * slab fails, with the status of the lowest that does; HS_ERR_INTERRUPTED when the caller says so.
+ */
+hs_status hs_walk_points(hs_team *team, const hs_options *options, int64_t n, int n_strips,
                          hs_slab_fn run, void *context);
+
+/* Strips of n points for this team, where each counts in n_counts numbers of its own: with `least`
+ * points or more, and no more further numbers than points. */
+int hs_strips_for(const hs_team *team, int64_t n, int64_t least, int64_t n_counts);
 
 #endif

@@ -43,29 +43,6 @@ typedef struct worker {
     int32_t *image; /* owned; number of that of each run */
 } worker;
 
-/* Finds the images of the runs of a block, once. */
-static void
-look_at_block(worker *me)
-{
-    const hs_scanner *scanner = &me->walker.scanner;
-    const hs_block   *block = &scanner->block;
-    const building   *built = me->built;
-    const int         m = scanner->search->bins.n_periodic;
-    if (me->block == scanner->n_candidates) {
-        return;
-    }
-    me->block = scanner->n_candidates;
-    me->has_images = false;
-    for (int32_t r = 0; m > 0 && block->runs[r].at < block->n; r++) {
-        int64_t number = built->home;
-        for (int k = 0; k < m; k++) {
-            number += block->runs[r].image[k] * built->stride[k];
-        }
-        me->image[r] = (int32_t)number;
-        me->has_images = me->has_images || number != built->home;
-    }
-}
-
 /* n hits of one run to a part: in its last bundle if that is of this point and image, else in a new
  * one. False when memory is refused. */
 static bool
@@ -142,10 +119,23 @@ add_run(worker *me, int32_t si, const int32_t *labels, int32_t n, int32_t image)
 static hs_status
 take_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    worker       *me = context;
-    const hs_run *runs = scanner->block.runs;
-    const int32_t n = hits->end[hits->n - 1], home = (int32_t)me->built->home;
-    look_at_block(me);
+    worker         *me = context;
+    const building *built = me->built;
+    const hs_run   *runs = scanner->block.runs;
+    const int32_t   n = hits->end[hits->n - 1], home = (int32_t)built->home;
+    const int       m = scanner->search->bins.n_periodic;
+    const bool      is_new = me->block != scanner->n_candidates;
+    /* The images of the runs of a block are found once. */
+    me->block = scanner->n_candidates;
+    me->has_images = me->has_images && !is_new;
+    for (int32_t r = 0; is_new && m > 0 && runs[r].at < scanner->block.n; r++) {
+        int64_t number = home;
+        for (int k = 0; k < m; k++) {
+            number += runs[r].image[k] * built->stride[k];
+        }
+        me->image[r] = (int32_t)number;
+        me->has_images = me->has_images || number != home;
+    }
     hs_status status = hs_output_reserve(&me->plain->pairs, n, 0.0);
     if (status == HS_OK && me->has_images) {
         status = hs_output_reserve(&me->shifted->pairs, n, 0.0);
@@ -468,23 +458,6 @@ subtract(const tracking *track, tile *t, const hs_real real, const int d, const 
     }
 }
 
-/* subtract, with constants where that pays. */
-static void
-find_displacements(const tracking *track, tile *t)
-{
-    const hs_real real = track->motion->now->points.real;
-    const int     d = track->motion->now->points.ndim;
-    switch (8 * (real == HS_FLOAT32) + 4 * track->deformed + (d == 2 || d == 3 ? d : 0)) {
-    case 2: subtract(track, t, HS_FLOAT64, 2, false); break;
-    case 3: subtract(track, t, HS_FLOAT64, 3, false); break;
-    case 7: subtract(track, t, HS_FLOAT64, 3, true); break;
-    case 10: subtract(track, t, HS_FLOAT32, 2, false); break;
-    case 11: subtract(track, t, HS_FLOAT32, 3, false); break;
-    case 15: subtract(track, t, HS_FLOAT32, 3, true); break;
-    default: subtract(track, t, real, d, track->deformed);
-    }
-}
-
 /* The longest of the tile to *square and *component. */
 HS_ALWAYS_INLINE void
 find_longest(tile *t, const int d, double *square, double *component)
@@ -575,17 +548,27 @@ static hs_status
 look_at_tile(tracking *track, int64_t first, int64_t step, bool keeps, tile *t)
 {
     const hs_points *points = &track->motion->now->points;
+    const hs_real    real = points->real;
+    const int        d = points->ndim;
     const int64_t    left = (points->n - first + step - 1) / step;
     double           square, component;
     hs_status        status = HS_OK;
     t->first = first;
     t->step = step;
     t->n = left < TILE ? (int)left : TILE;
-    find_displacements(track, t);
-    measure(t, points->ndim, &square, &component);
+    switch (8 * (real == HS_FLOAT32) + 4 * track->deformed + (d == 2 || d == 3 ? d : 0)) {
+    case 2: subtract(track, t, HS_FLOAT64, 2, false); break; /* constants where that pays */
+    case 3: subtract(track, t, HS_FLOAT64, 3, false); break;
+    case 7: subtract(track, t, HS_FLOAT64, 3, true); break;
+    case 10: subtract(track, t, HS_FLOAT32, 2, false); break;
+    case 11: subtract(track, t, HS_FLOAT32, 3, false); break;
+    case 15: subtract(track, t, HS_FLOAT32, 3, true); break;
+    default: subtract(track, t, real, d, track->deformed);
+    }
+    measure(t, d, &square, &component);
     if (track->m > 0 && !(component < track->jump)) {
         status = take_jumps(track, t, keeps);
-        measure(t, points->ndim, &square, &component);
+        measure(t, d, &square, &component);
     }
     track->square = hs_larger(square, track->square);
     track->component = hs_larger(component, track->component);
@@ -638,19 +621,6 @@ guess_drift(tracking *track)
     }
 }
 
-/* At least the longest |u| as computed: 2^-47 is more than the roundings of square and root. */
-static double
-longest_computed(const tracking *track)
-{
-    if (track->component == 0.0) {
-        return 0.0;
-    }
-    if (track->square >= 0x1p-900 && track->square <= 0x1p1000) {
-        return sqrt(track->square) * (1.0 + 0x1p-47);
-    }
-    return hs_next_up(3.0 * track->component); /* sqrt(8) < 3; squares may be lost or infinite */
-}
-
 /* How far a computed u may be from the true one. Zero where nothing was rounded. */
 static double
 bound_rounding(const tracking *track)
@@ -679,8 +649,13 @@ static double
 find_margin(const tracking *track)
 {
     const hs_motion *motion = track->motion;
-    double           reach = motion->radius;
-    double           used = longest_computed(track) + bound_rounding(track);
+    double           reach = motion->radius, longest = 0.0;
+    if (track->square >= 0x1p-900 && track->square <= 0x1p1000) {
+        longest = sqrt(track->square) * (1.0 + 0x1p-47); /* above roundings of square and root */
+    } else if (track->component != 0.0) {
+        longest = hs_next_up(3.0 * track->component); /* sqrt(8) < 3; squares lost or infinite */
+    }
+    double used = longest + bound_rounding(track);
     used = used > 0.0 ? 2.0 * hs_next_up(used) : used; /* nothing is nothing */
     if (track->deformed) {
         /* No two points are farther apart than 2 sqrt(d) times the largest coordinate. */

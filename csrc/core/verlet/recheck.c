@@ -389,19 +389,6 @@ measure(const checking *recheck, slab_hits *slab, const hs_output *output)
  * For points as given, w is 0.
  */
 
-/* A double that is an integer, modulo 2^64. */
-static int64_t
-integer_of(double x)
-{
-    int           exponent;
-    const int64_t significand = (int64_t)ldexp(frexp(x, &exponent), 53);
-    exponent -= 53;
-    if (exponent < 0) { /* -53 at least: it is an integer */
-        return significand / (INT64_C(1) << -exponent);
-    }
-    return exponent < 64 ? (int64_t)((uint64_t)significand << exponent) : 0;
-}
-
 /* A shift over the given box vectors to one over B, modulo 2^64. */
 HS_ALWAYS_INLINE void
 reduce_shift(int m, const int64_t over[][HS_MAX_DIM], const int64_t *shift, int64_t *reduced)
@@ -427,14 +414,18 @@ set_shifts(checking *recheck)
     int64_t           over[HS_MAX_DIM][HS_MAX_DIM] = {{0}}, shift[HS_MAX_DIM];
     int64_t           any = 0;
     /* over[l][r]: how many times row r of B is in given box vector l. B is diagonal here, so that
-     * this is an entry over a period: a quotient of doubles that is an integer, hence a double. */
+     * this is an entry over a period: a quotient of doubles that is an integer, hence a double;
+     * here modulo 2^64. */
     for (int r = 0; r < m; r++) {
         over[r][r] = 1;
     }
     for (int k = 0; !as_given && k < recheck->d; k++) {
         const int r = scene->lattice.row_of_axis[k];
         for (int l = 0; r >= 0 && l < m; l++) {
-            over[l][r] = integer_of(scene->lattice.scaled[l][k] / scene->lattice.rows[r][k]);
+            const double times =
+                fmod(scene->lattice.scaled[l][k] / scene->lattice.rows[r][k], 0x1p64);
+            const uint64_t size = (uint64_t)fabs(times);
+            over[l][r] = (int64_t)(times < 0.0 ? 0 - size : size);
         }
     }
     for (int64_t number = 0; number < listing->n_images; number++) {
@@ -502,51 +493,6 @@ can_write(const checking *recheck)
     return true;
 }
 
-/* Point a as a candidate of the writer; returns whether it is fine. */
-static bool
-set_candidate(const checking *recheck, hs_halving by, int64_t a)
-{
-    double   q[HS_WRITE_MOST_DIM] = {0.0};
-    int32_t  shift[HS_WRITE_MOST_DIM] = {0}, any = 0;
-    hs_moved moved = {.is_fine = true};
-    for (int k = 0; k < recheck->d; k++) {
-        q[k] = recheck->scene.cloud.x[k][recheck->list->listing.order[a]];
-    }
-    for (int r = 0; recheck->lead != NULL && r < recheck->m; r++) {
-        shift[r] = (int32_t)-recheck->lead[a * recheck->m + r];
-        any |= shift[r];
-    }
-    if (any != 0) {
-        (void)hs_write_move(&recheck->scene.metric, by, shift, &moved);
-    }
-    const bool is_fine = hs_candidate_set(&recheck->candidates[a], q, by, &moved,
-                                          recheck->list->listing.order[a], shift);
-    return is_fine && moved.is_fine;
-}
-
-/* All arrays. */
-static bool
-allocate(checking *recheck)
-{
-    const hs_listing *listing = &recheck->list->listing;
-    const int64_t     n = recheck->now->points.n;
-    const int         d = recheck->d, m = recheck->m, stride = hs_slab_stride(d);
-    hs_parts          parts;
-    hs_parts_begin(&parts);
-    hs_parts_add(&parts, (void **)&recheck->y, n * stride, sizeof(float));
-    hs_parts_add(&parts, (void **)&recheck->offset, listing->n_images * stride, sizeof(float));
-    hs_parts_add(&parts, (void **)&recheck->image, listing->n_images * m, sizeof(int64_t));
-    hs_parts_add(&parts, (void **)&recheck->counts, n * m, sizeof(int64_t));
-    if (recheck->measures && can_write(recheck)) {
-        hs_parts_add(&parts, (void **)&recheck->candidates, n, sizeof(hs_candidate));
-    }
-    if (recheck->measures && !recheck->scene.keeps_originals && m > 0) {
-        hs_parts_add(&parts, (void **)&recheck->lead, n * m, sizeof(int64_t));
-    }
-    recheck->memory = hs_parts_alloc(&recheck->call->account, HS_FOR_POINTS, &parts);
-    return recheck->memory != NULL;
-}
-
 /* The points of the scene, and as candidates in the order of the list. */
 static void
 set_points(checking *recheck)
@@ -561,10 +507,25 @@ set_points(checking *recheck)
                       are_small(recheck->image, recheck->list->listing.n_images * m);
     recheck->are_fine = true;
     for (int64_t a = 0; recheck->writes && a < n; a++) {
+        double   q[HS_WRITE_MOST_DIM] = {0.0};
+        int32_t  shift[HS_WRITE_MOST_DIM] = {0}, any = 0;
+        hs_moved moved = {.is_fine = true};
         for (int k = 0; a + POINTS_AHEAD < n && k < recheck->d; k++) {
             HS_PREFETCH(recheck->columns[k] + order[a + POINTS_AHEAD]);
         }
-        recheck->are_fine &= set_candidate(recheck, by, a);
+        for (int k = 0; k < recheck->d; k++) {
+            q[k] = scene->cloud.x[k][order[a]];
+        }
+        for (int r = 0; recheck->lead != NULL && r < m; r++) {
+            shift[r] = (int32_t)-recheck->lead[a * m + r];
+            any |= shift[r];
+        }
+        if (any != 0) {
+            (void)hs_write_move(&scene->metric, by, shift, &moved);
+        }
+        recheck->are_fine &=
+            hs_candidate_set(&recheck->candidates[a], q, by, &moved, order[a], shift);
+        recheck->are_fine &= moved.is_fine;
     }
 }
 
@@ -737,7 +698,6 @@ typedef struct worker {
     hs_counters  done;
 } worker;
 
-/* Finds the hits of slab s. */
 static void
 find_hits(const checking *recheck, int64_t s, slab_hits *slab)
 {
@@ -780,7 +740,6 @@ find_hits(const checking *recheck, int64_t s, slab_hits *slab)
     }
 }
 
-/* Adds the hits of slab s to the thread's output. */
 static hs_status
 do_slab(worker *me, int64_t s)
 {
@@ -859,9 +818,11 @@ close_worker(void *context, void *place)
 static hs_status
 run(checking *recheck, hs_failure *failure)
 {
-    const int64_t  n_slabs = recheck->list->listing.n_slabs;
-    const unsigned columns = recheck->output->columns;
-    hs_account    *account = &recheck->call->account;
+    const hs_listing *listing = &recheck->list->listing;
+    const int64_t     n = recheck->now->points.n, n_slabs = listing->n_slabs;
+    const int         m = recheck->m, stride = hs_slab_stride(recheck->d);
+    const unsigned    columns = recheck->output->columns;
+    hs_account       *account = &recheck->call->account;
     recheck->in_range =
         1 + HS_RANGE_BYTES / (1 + HS_SLAB * hs_output_bytes_per_pair(recheck->output));
     /* The kernels write a little beyond the last pair, where the caller's arrays may end. */
@@ -878,8 +839,21 @@ run(checking *recheck, hs_failure *failure)
         status = hs_scene_make(account, recheck->call->team, &sets, hs_frame_box(recheck->now),
                                &options, &recheck->scene, NULL, failure);
     }
-    if (status == HS_OK && !allocate(recheck)) {
-        status = HS_ERR_MEMORY;
+    if (status == HS_OK) {
+        hs_parts parts;
+        hs_parts_begin(&parts);
+        hs_parts_add(&parts, (void **)&recheck->y, n * stride, sizeof(float));
+        hs_parts_add(&parts, (void **)&recheck->offset, listing->n_images * stride, sizeof(float));
+        hs_parts_add(&parts, (void **)&recheck->image, listing->n_images * m, sizeof(int64_t));
+        hs_parts_add(&parts, (void **)&recheck->counts, n * m, sizeof(int64_t));
+        if (recheck->measures && can_write(recheck)) {
+            hs_parts_add(&parts, (void **)&recheck->candidates, n, sizeof(hs_candidate));
+        }
+        if (recheck->measures && !recheck->scene.keeps_originals && m > 0) {
+            hs_parts_add(&parts, (void **)&recheck->lead, n * m, sizeof(int64_t));
+        }
+        recheck->memory = hs_parts_alloc(account, HS_FOR_POINTS, &parts);
+        status = recheck->memory != NULL ? HS_OK : HS_ERR_MEMORY;
     }
     if (status == HS_OK) {
         const double   cutoff = recheck->given.cutoff;
@@ -909,28 +883,6 @@ run(checking *recheck, hs_failure *failure)
     return status;
 }
 
-/* The pairs in order, which are found first with what that needs beside what is wanted. */
-static hs_status
-run_sorted(checking *recheck, hs_output *output, hs_failure *failure)
-{
-    hs_call       *call = recheck->call;
-    const bool     images = recheck->list->listing.n_images > 0;
-    const unsigned columns = (call->options.want & ~(unsigned)HS_WANT_BOTH) | HS_WANT_I |
-                             HS_WANT_J | (images ? HS_WANT_SHIFT : 0);
-    hs_output found;
-    hs_output_init(&call->account, recheck->d, columns, 4, &found);
-    recheck->output = &found;
-    hs_status status = run(recheck, failure);
-    if (status == HS_OK) {
-        status = hs_sort_pairs(call, 0, recheck->now->points.n, &found, false, NULL, output);
-    }
-    if (status == HS_ERR_MEMORY) {
-        failure->expected_pairs = (double)found.n_pairs;
-    }
-    hs_output_free(&found);
-    return status;
-}
-
 hs_status
 hs_recheck_find(const hs_verlet *list, hs_pairs *pairs, hs_failure *failure)
 {
@@ -952,11 +904,21 @@ hs_recheck_find(const hs_verlet *list, hs_pairs *pairs, hs_failure *failure)
     hs_metric_init(&recheck.given, recheck.d, recheck.m, (const double(*)[HS_MAX_DIM])rows,
                    list->cutoff, call->options.inclusive);
     recheck.metric = &recheck.given;
-    hs_status status = call->options.sorted ? run_sorted(&recheck, &pairs->output, failure)
-                                            : run(&recheck, failure);
-    if (status == HS_ERR_MEMORY) {
-        failure->expected_pairs = fmax(failure->expected_pairs, (double)pairs->output.n_pairs);
+    hs_output found = {.n_pairs = 0};
+    if (call->options.sorted) { /* found first, with the columns that sorting needs as well */
+        const unsigned columns = (call->options.want & ~(unsigned)HS_WANT_BOTH) | HS_WANT_I |
+                                 HS_WANT_J | (list->listing.n_images > 0 ? HS_WANT_SHIFT : 0);
+        hs_output_init(&call->account, recheck.d, columns, 4, &found);
+        recheck.output = &found;
     }
+    hs_status status = run(&recheck, failure);
+    if (status == HS_OK && call->options.sorted) {
+        status = hs_sort_pairs(call, 0, now->points.n, &found, false, NULL, &pairs->output);
+    }
+    if (status == HS_ERR_MEMORY) {
+        failure->expected_pairs = fmax(failure->expected_pairs, (double)recheck.output->n_pairs);
+    }
+    hs_output_free(&found);
     hs_call_tell_limit(call, status, failure);
     return hs_pairs_conclude(&pairs->output, status, failure);
 }

@@ -28,6 +28,7 @@ from halfshell._functions.neighbors import neighbors as find_neighbors
 from halfshell._functions.pairs import pairs as find_pairs
 from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._search import search, spell_out
+from halfshell._settings import current
 
 if TYPE_CHECKING:
     from halfshell._convert.types import (
@@ -172,6 +173,12 @@ def _near(
 
 _COUNTED_AT_A_TIME = 1 << 14  # points whose pairs are counted
 _NAMED = ("types", "groups", "labels")
+
+
+def check_precision() -> None:
+    """Refuse rounded decisions, which may depend on points that a brick does not have."""
+    if current().precision != "exact":
+        raise ValueError(f"bricks need precision 'exact', got {current().precision!r}")
 
 
 class Search(TypedDict, total=False):
@@ -379,6 +386,7 @@ class Brick:
 
     def _how(self, search: Any) -> dict[str, Any]:
         """The keywords of a search of the members."""
+        check_precision()
         excluded = self._excluded(search.get("exclude"))
         return {**search, "rule": self._scope.rule, "exclude": excluded}
 

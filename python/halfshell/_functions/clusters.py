@@ -212,7 +212,7 @@ class Clusters:
         call = self._call
         if call.points.box is None:
             return None
-        i, j, S = pairs_wanted(call, "ijS", False, 8, None)
+        i, j, S = pairs_wanted(call, "ijS", True, 8, None)  # whatever found them
         both = self.core[i] & self.core[j]
         join = both & (i != j)
         core = np.flatnonzero(self.core & (self.labels >= 0))

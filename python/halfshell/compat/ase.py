@@ -68,9 +68,18 @@ def neighbor_list(
     [2, 1]
     """
     return primitive_neighbor_list(
-        quantities, a.pbc, a.get_cell(complete=True), a.positions, cutoff,
+        quantities, a.pbc, _cell_of(a), a.positions, cutoff,
         numbers=a.numbers, self_interaction=self_interaction, max_nbins=max_nbins,
     )  # fmt: skip
+
+
+def _cell_of(atoms: Any) -> Any:
+    """The cell, with ASE's vectors in place of zeros, which would round a vector that is alone."""
+    cell = atoms.get_cell()
+    missing = ~cell.any(axis=1)
+    if missing.any():
+        cell[missing] = atoms.get_cell(complete=True)[missing]
+    return cell
 
 
 def primitive_neighbor_list(
@@ -279,6 +288,11 @@ class NeighborList(_owner.NeighborList):
         primitive: Any = PrimitiveNeighborList,
     ) -> None:
         super().__init__(cutoffs, skin, sorted, self_interaction, bothways, primitive)
+
+    def update(self, atoms: Any) -> bool:
+        """Take the atoms of the next step; see ``ase.neighborlist.NeighborList.update``."""
+        updated: bool = self.nl.update(atoms.pbc, _cell_of(atoms), atoms.positions)
+        return updated
 
 
 def build_neighbor_list(atoms: Any, cutoffs: Any = None, **kwargs: Any) -> NeighborList:

@@ -250,6 +250,25 @@ cells_with_everything_have_no_ranges(void)
     hs_cells_free(cells);
 }
 
+/* A point so far from a skewed box that its turns are not known. */
+static void
+turns_that_are_not_known_are_told(void)
+{
+    const hs_box    box = {2, {true, true}, {{4.0}, {1.0, 4.0}}};
+    const double    x[4] = {0.5, 0.5, 1.5, 2.5}, far[4] = {0.5, 0.5, 1e300, 0.25};
+    const hs_points points = points_in_rows(x, 2, 2), other = points_in_rows(far, 2, 2);
+    hs_options      options = hs_options_default();
+    hs_cells       *cells = NULL;
+    hs_failure      failure;
+    int64_t         cell[2];
+    options.cutoff = 1.0;
+    CHECK(hs_cells_build(&points, &box, &options, &cells, NULL) == HS_OK);
+    CHECK(hs_cells_find(cells, &points, cell, &failure) == HS_OK);
+    CHECK(hs_cells_find(cells, &other, cell, &failure) == HS_ERR_SHIFT_RANGE);
+    CHECK(failure.row == 1 && !failure.in_queries);
+    hs_cells_free(cells);
+}
+
 /* Cells reach from end to end, whatever points lie within; further where points lie beyond; and along
  * axes where nothing is fixed as if there were no domain. */
 static void
@@ -260,6 +279,7 @@ cells_reach_over_their_domain(void)
     const double    nothing[4] = {0.0, NAN, 1.0, 1.0};
     const hs_points points = {x, 3, 2, HS_FLOAT64, 16, 8}, one = {x, 1, 2, HS_FLOAT64, 16, 8};
     const hs_points other = {beyond, 2, 2, HS_FLOAT64, 16, 8};
+    const hs_points nowhere = {x, 0, 2, HS_FLOAT64, 16, 8};
     const hs_points sets[3] = {points, one, other};
     hs_options      options = hs_options_default();
     options.cutoff = 1.0;
@@ -280,6 +300,22 @@ cells_reach_over_their_domain(void)
         hs_cells_free(cells);
     }
     hs_cells *cells = NULL;
+    hs_layout layout;
+    CHECK(hs_cells_build(&nowhere, NULL, &options, &cells, NULL) == HS_OK);
+    hs_cells_layout(cells, &layout);
+    CHECK(layout.n_points == 0);
+    hs_cells_free(cells);
+    const double    large[4] = {0.0, 0.0, 1e300, 1e300}, origin[4] = {0.0};
+    const hs_points spot = {origin, 2, 2, HS_FLOAT64, 16, 8};
+    int64_t         count = -1;
+    options.domain = large;
+    options.cutoff = options.cell_size = 0.0;
+    CHECK(hs_cells_build(&spot, NULL, &options, &cells, NULL) == HS_OK);
+    CHECK(hs_pairs_count(IN_CELLS(cells), &options, &count, NULL) == HS_OK && count == 1);
+    hs_cells_free(cells);
+    cells = NULL;
+    options.cutoff = 1.0;
+    options.cell_size = 2.0;
     options.domain = bad;
     CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_ERR_ARGUMENT);
     options.domain = nothing;
@@ -291,6 +327,7 @@ void
 test_api_cells(void)
 {
     RUN(cells_reach_over_their_domain);
+    RUN(turns_that_are_not_known_are_told);
     RUN(indices_are_where_points_are);
     RUN(empty_cells_have_no_id);
     RUN(ranges_that_are_refused);

@@ -142,6 +142,15 @@ what_is_for_a_search(void)
         CHECK(hs_few_pairs(&few, i, j, NULL) == -1);
     }
     few.cutoff = 1.0;
+    two[1] = 0x1p600; /* whose square is infinite */
+    CHECK(hs_few_pairs(&few, i, j, NULL) == -1);
+    few.ndim = 2;
+    few.n_points = 1;
+    few.period = (const double[]){1.0, 4.0}; /* the second one is long enough */
+    CHECK(hs_few_pairs(&few, i, j, NULL) == -1);
+    few.period = NULL;
+    few.ndim = 1;
+    few.n_points = 2;
     two[0] = NAN;
     CHECK(hs_few_pairs(&few, i, j, NULL) == -1);
     few.n_points = 1;

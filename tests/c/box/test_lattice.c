@@ -238,6 +238,17 @@ sums_of_far_magnitudes_are_dependent(void)
     }
 }
 
+/* Multiples of the first prime, which are zero modulo it, of either sign. */
+static void
+multiples_of_a_prime_are_no_zeros(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        const double p = sign * 0x7fffffffp0;
+        CHECK(independent(2, 2, (matrix){{p, 1.0}, {0.0, 1.0}}));
+        CHECK(!independent(2, 2, (matrix){{p, 2.0 * p}, {1.0, 2.0}}));
+    }
+}
+
 /*
  * ---- box skew ----
  *
@@ -527,6 +538,7 @@ test_lattice(void)
     RUN(extreme_rows_are_survived);
     RUN(coefficients_are_taken_off_from_half_to_the_largest);
     RUN(sums_of_far_magnitudes_are_dependent);
+    RUN(multiples_of_a_prime_are_no_zeros);
     RUN(equivalent_boxes_have_the_same_pairs);
     RUN(shifts_beyond_float64);
     RUN(differences_pass_the_range);

@@ -7,6 +7,7 @@
 #include "../support/among.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
+#include "../support/poll_checks.h"
 #include "../support/random_scenes.h"
 
 void test_bins(void);
@@ -193,6 +194,38 @@ queries_carry_their_cells(void)
     close_scene(&s);
 }
 
+/* More queries than are sorted between two polls: the caller may say no at each. */
+static void
+many_queries_can_be_stopped(void)
+{
+    enum { N = 200, Q = HS_POLL_POINTS + 1000 };
+    double         *x = array_of(2 * N, sizeof *x), *q = array_of(2 * Q, sizeof *q);
+    harness_random  random = {142};
+    const hs_points points = points_in_rows(x, N, 2), queries = points_in_rows(q, Q, 2);
+    hs_options      options = hs_options_default();
+    hs_status       status = HS_ERR_INTERRUPTED;
+    refusal         once = {.nth = 0};
+    for (int e = 0; e < 2 * N; e++)
+        x[e] = random_unit(&random);
+    for (int e = 0; e < 2 * Q; e++)
+        q[e] = random_unit(&random);
+    options.cutoff = 0.01;
+    options.want = HS_WANT_J;
+    options.poll = refuse_once;
+    options.poll_context = &once;
+    for (int64_t nth = 1; status == HS_ERR_INTERRUPTED; nth++) {
+        hs_pairs *rows = NULL;
+        once = (refusal){.nth = nth};
+        status = hs_neighbors_find(QUERIED(&points, &queries, NULL), &options, &rows, NULL);
+        CHECK(status == (once.n < nth ? HS_OK : HS_ERR_INTERRUPTED));
+        CHECK((rows == NULL) == (status != HS_OK) && once.n <= nth && nth < 100);
+        hs_pairs_free(rows);
+    }
+    CHECK(once.n > 3);
+    free(x);
+    free(q);
+}
+
 /* Few cells, and about as many as points: then threads do not count for themselves. */
 static void
 any_team_finds_the_same_order(void)
@@ -296,5 +329,6 @@ test_bins(void)
     RUN(coordinates_and_turns_travel_with_their_point);
     RUN(any_team_finds_the_same_order);
     RUN(queries_carry_their_cells);
+    RUN(many_queries_can_be_stopped);
     RUN(sparse_pays_where_points_crowd);
 }

@@ -124,6 +124,22 @@ endless_ranges_are_refused(void)
     close_scene();
 }
 
+/* Where pairs are narrower along some axes, fewer are expected, in proportion. */
+static void
+narrow_pairs_are_fewer(void)
+{
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 1.0}}};
+    hs_failure   failure = HS_NO_FAILURE;
+    fill_square(1.0);
+    open_scene(N, &box, 0.25);
+    const double expected = grid.expected_pairs;
+    grid_scene.less[0] = 0.125;
+    grid_scene.less[1] = 0.0625;
+    CHECK(hs_grid_init(&grid_scene, HS_GRID_ANY, &grid, &failure) == HS_OK);
+    CHECK(fabs(grid.expected_pairs / expected - 0.5 * 0.75) < 1e-15);
+    close_scene();
+}
+
 /* Directions within 1e-4 of each other say nothing about which rows are out of reach. */
 static void
 flat_frames_prune_nothing(void)
@@ -213,6 +229,7 @@ test_grid(void)
 {
     RUN(endless_images_are_refused_with_any_cells);
     RUN(endless_ranges_are_refused);
+    RUN(narrow_pairs_are_fewer);
     RUN(flat_frames_prune_nothing);
     RUN(long_lists_of_rows_can_be_stopped);
     RUN(too_many_rows_are_refused);

@@ -118,6 +118,44 @@ pairs_come_once_in_every_shape(void)
         check_shape(shape, shape & 4);
 }
 
+/* Numbers so far apart that no scale holds all of their digits, without a box. */
+static void
+indices_need_no_scale(void)
+{
+    const double    x[6] = {0.0, 0.0, 0x1p-1074, 0.0, 0x1p1000, 0.0};
+    const hs_points points = {x, 3, 2, HS_FLOAT64, 16, 8};
+    hs_options      options = hs_options_default();
+    hs_pairs       *pairs;
+    options.cutoff = 0x1p900;
+    options.want = HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT;
+    CHECK(hs_pairs_find(AMONG(&points, NULL), &options, &pairs, NULL) == HS_OK);
+    CHECK(hs_pairs_length(pairs) == 1);
+    CHECK(((const int64_t *)hs_pairs_array(pairs, HS_WANT_I))[0] == 0 &&
+          ((const int64_t *)hs_pairs_array(pairs, HS_WANT_J))[0] == 1);
+    hs_pairs_free(pairs);
+}
+
+/* Rows of distances alone, in more dimensions than are written at once. */
+static void
+distances_need_no_indices(void)
+{
+    search_unit_points(112, N, 4, 2.0, &unit_record);
+    const hs_points points = {unit_record.x, N, 4, HS_FLOAT64, 32, 8};
+    hs_options      options = hs_options_default();
+    hs_pairs       *all, *alone;
+    options.cutoff = 1.0;
+    options.want = HS_WANT_J | HS_WANT_DISTANCE;
+    CHECK(hs_neighbors_find(AMONG(&points, NULL), &options, &all, NULL) == HS_OK);
+    options.want = HS_WANT_DISTANCE;
+    CHECK(hs_neighbors_find(AMONG(&points, NULL), &options, &alone, NULL) == HS_OK);
+    const int64_t n = hs_pairs_length(all);
+    CHECK(n > N && hs_pairs_length(alone) == n && hs_pairs_array(alone, HS_WANT_J) == NULL);
+    CHECK(memcmp(hs_pairs_array(all, HS_WANT_DISTANCE), hs_pairs_array(alone, HS_WANT_DISTANCE),
+                 (size_t)n * sizeof(double)) == 0);
+    hs_pairs_free(all);
+    hs_pairs_free(alone);
+}
+
 /* ---- what is written at once is what is recorded in batches ---- */
 
 enum {
@@ -137,11 +175,10 @@ record_unwanted(void *context, hs_scanner *scanner, int32_t first, const hs_hits
     const hs_options polls = scanner->options;
     refusal          once = {.nth = 1};
     CHECK(scanner->block.n > HS_POLL_CANDIDATES);
-    CHECK(hs_output_reserve(recorder->output, hits->end[hits->n - 1], 0.0) == HS_OK);
     scanner->options.poll = refuse_once;
     scanner->options.poll_context = &once;
     scanner->block.has_candidates = false; /* as if float32 had told all pairs */
-    const hs_status status = hs_record_places(recorder, scanner, first, hits);
+    const hs_status status = hs_record_hits(recorder, scanner, first, hits);
     scanner->options = polls;
     CHECK(status == HS_ERR_INTERRUPTED && once.n == 1 && recorder->output->n_pairs == 0);
     n_visits++;
@@ -428,6 +465,8 @@ void
 test_record(void)
 {
     RUN(pairs_come_once_in_every_shape);
+    RUN(distances_need_no_indices);
+    RUN(indices_need_no_scale);
     RUN(large_blocks_can_be_stopped);
     RUN(pairs_are_in_the_innermost_shell);
     RUN(few_edges_decide_nothing);

@@ -246,7 +246,7 @@ pairs_of_rows_that_are_none_are_refused(void)
     static const int64_t counts[1] = {2}, good[3] = {0, 1, 2};
     static const int64_t low[3] = {-1, 1, 2}, back[3] = {0, 2, 1}, far[3] = {0, 1, 3};
     static const int32_t number[2] = {1, 0}, indices[3] = {1, 0, 0}, none[2] = {-1, 0};
-    static const int32_t beyond[2] = {2, 0};
+    static const int32_t beyond[2] = {2, 0}, own[2] = {0, 1};
     const hs_node_lists  lists = {
          .n_lists = 1, .n_nodes = counts, .number = number, .ghost_rows = true};
     const hs_list_rows wrong[] = {
@@ -255,10 +255,14 @@ pairs_of_rows_that_are_none_are_refused(void)
         {2, 1, good, 2, beyond, NULL, 1},  {1, 1, good, 2, indices, NULL, 1},
         {2, 2, good, 2, indices, NULL, 1},
     };
-    const hs_options options = hs_options_default();
-    hs_connectivity *made;
+    const hs_list_rows selves = {2, 1, good, 2, own, NULL, 1};
+    const hs_options   options = hs_options_default();
+    hs_connectivity   *made;
     for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++)
         CHECK(hs_connectivity_pair(&wrong[k], &lists, &options, &made, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_connectivity_pair(&selves, &lists, &options, &made, NULL) == HS_OK);
+    CHECK(hs_pairs_length(hs_connectivity_pairs(made)) == 0); /* which are no pairs without S */
+    hs_connectivity_free(made);
     double limit_of_pairs = HUGE_VAL;
     CHECK(pair_with_a_ghost(&limit_of_pairs) == HS_OK);
     CHECK(fail_each_allocation(pair_with_a_ghost, &limit_of_pairs, 200) > 8);

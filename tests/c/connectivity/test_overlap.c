@@ -520,7 +520,7 @@ overlaps_have_every_image(void)
 static void
 images_that_are_no_rows_are_refused(void)
 {
-    static const int64_t counts[1] = {2}, all[3] = {0, 2, 2};
+    static const int64_t counts[1] = {2}, all[3] = {0, 2, 2}, fewer[3] = {0, 1, 1};
     static const int32_t index[2] = {1, 1}, falling[2] = {1, 0}, own[2] = {0, 1},
                          beyond[2] = {1, 2};
     static const int32_t below[2] = {-1, 1}, shift[2] = {0, 1}, same[2] = {1, 1};
@@ -536,11 +536,17 @@ images_that_are_no_rows_are_refused(void)
          {2, all, 2, index, same, 1},
          {2, all, 2, index, shift, 0},
          {2, all, 2, index, shift, HS_MAX_DIM + 1},
+         {2, fewer, 2, index, shift, 1},
     };
     hs_pairs *rows;
     for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++)
         CHECK(hs_connectivity_overlap(&points, &wrong[k], &lists, &options, &rows, NULL) ==
               HS_ERR_ARGUMENT);
+    const hs_index_rows late = {0, all + 1, 0, index, shift, 1}; /* no row, which begins at 2 */
+    const hs_node_lists nothing = {.n_lists = 1, .n_nodes = all};
+    const hs_points     nowhere = {x_of_images, 0, 1, HS_FLOAT64, 8, 8};
+    CHECK(hs_connectivity_overlap(&nowhere, &late, &nothing, &options, &rows, NULL) ==
+          HS_ERR_ARGUMENT);
     const hs_index_rows far = {2, all, 2, index, least, 1}; /* their difference is no shift */
     CHECK(hs_connectivity_overlap(&points, &far, &lists, &options, &rows, NULL) ==
           HS_ERR_SHIFT_RANGE);

@@ -280,7 +280,7 @@ failures_name_the_callers_row(void)
     harness_random random = {93};
     for (int in_queries = 0; in_queries < 2; in_queries++) {
         for (int has_queries = in_queries; has_queries < 2; has_queries++) {
-            const hs_reach reach = {.rule = HS_RULE_GATHER};
+            const hs_reach reach = {.rule = has_queries ? HS_RULE_GATHER : HS_RULE_SUM};
             opened_plan    made;
             int            n_failed = 0;
             reach_fill(&random, 60, 1, 1.0, 2, 0.25, &points);

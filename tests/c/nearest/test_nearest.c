@@ -315,6 +315,37 @@ many_leaves_and_few(void)
     free(x);
 }
 
+/* From far away nearly all points are within the radius: too many to be put in order. */
+static void
+crowds_are_far_away(void)
+{
+    enum { N = 700, Q = 200 };
+    static const double far[4] = {1e4, 1e3, 100.0, 10.0}, size[4] = {1.0, 0.25, 0.01, 0.01};
+    double             *x = array_of(N, sizeof *x), *q = array_of(Q, sizeof *q);
+    harness_random      random = {16};
+    hs_options          options = hs_options_default();
+    const hs_points     points = points_on_line(x, N), queries = points_on_line(q, Q);
+    options.cutoff = INFINITY;
+    options.want = HS_WANT_J;
+    for (int kind = 0; kind < 4; kind++) {
+        int32_t   first = 0;
+        hs_pairs *rows = NULL;
+        for (int i = 0; i < N; i++) {
+            x[i] = size[kind] * random_unit(&random);
+            first = x[i] > x[first] ? i : first;
+        }
+        for (int i = 0; i < Q; i++)
+            q[i] = far[kind] + size[kind] * random_unit(&random);
+        CHECK(hs_nearest_find(QUERIED(&points, &queries, NULL), 1, &options, &rows, NULL) == HS_OK);
+        const int64_t *j = hs_pairs_array(rows, HS_WANT_J);
+        for (int i = 0; i < Q; i++)
+            CHECK(j[i] == first);
+        hs_pairs_free(rows);
+    }
+    free(x);
+    free(q);
+}
+
 /* Boxes so long that a ball as large as the density says holds thousands of images of few
  * points. */
 static void
@@ -343,6 +374,8 @@ long_boxes_have_many_images(void)
  * wherever memory ends, with nothing left.
  */
 
+static const hs_selection *selected_until; /* or NULL */
+
 /* Rows of a search that may be asked so often whether it goes on. */
 static hs_status
 find_until(const brute_scene *scene, const hs_points *queries, int64_t k, int64_t polls,
@@ -355,7 +388,11 @@ find_until(const brute_scene *scene, const hs_points *queries, int64_t k, int64_
     options.poll = stop_after;
     options.poll_context = &polls;
     options.counters = counters;
-    return hs_nearest_find(QUERIED(&points, queries, scene->box), k, &options, rows, NULL);
+    const hs_among among = {.points = SET(&points),
+                            .queries = SET(queries),
+                            .box = scene->box,
+                            .selection = selected_until};
+    return hs_nearest_find(&among, k, &options, rows, NULL);
 }
 
 /* Stops at `tries` of its polls, evenly picked, and at the last one. Returns how many there are. */
@@ -402,6 +439,9 @@ many_points_can_be_stopped(void)
     CHECK(wrong == 0 && nearer == K);
     hs_pairs_free(rows);
     CHECK(stop_everywhere(&scene, &query, K, 12) > 12);
+    selected_until = &(hs_selection){.min_distance = 1e-9};
+    CHECK(stop_everywhere(&scene, &query, K, 6) > 6);
+    selected_until = NULL;
     free(x);
 }
 
@@ -551,6 +591,24 @@ no_point_is_too_near_to_itself(void)
     hs_pairs_free(rows);
 }
 
+/* All but so many images of a point that these cannot be counted are too near. */
+static void
+a_least_distance_may_be_too_large(void)
+{
+    const double       x[2] = {0.25, 0.5};
+    const hs_box       box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 1.0}}};
+    const hs_set       points = {.at = points_in_rows(x, 1, 2)};
+    const hs_selection selection = {.min_distance = 1e12};
+    const hs_among     among = {.points = &points, .box = &box, .selection = &selection};
+    hs_options         options = hs_options_default();
+    hs_pairs          *rows = NULL;
+    hs_failure         failure;
+    options.cutoff = INFINITY;
+    CHECK(hs_nearest_find(&among, 1, &options, &rows, &failure) == HS_ERR_MEMORY);
+    CHECK(rows == NULL && failure.row == 0 && !failure.in_queries);
+    CHECK(failure.expected_bytes == INFINITY);
+}
+
 /* ---- the search for a radius that surely suffices ends when it is told to ---- */
 
 enum { N_BOUND = 6000, QUERIES = 400, K_BOUND = 10 };
@@ -593,7 +651,7 @@ one_refusal_ends_the_search(void)
     hs_pairs_free(rows);
     const int64_t polls = once.n;
     CHECK(polls > 2);
-    for (int64_t nth = 1; nth <= polls; nth++) {
+    for (int64_t nth = 1; nth <= polls; nth += IS_SLOW ? 1 + polls / 8 : 1) {
         once = (refusal){.nth = nth};
         CHECK(find_hollow(&once, &rows) == HS_ERR_INTERRUPTED);
         CHECK(rows == NULL && once.n == nth); /* there is no further question */
@@ -652,11 +710,13 @@ test_nearest(void)
     RUN(clusters_of_all_sizes);
     RUN(many_points_on_a_lattice);
     RUN(many_leaves_and_few);
+    RUN(crowds_are_far_away);
     RUN(long_boxes_have_many_images);
     RUN(many_points_can_be_stopped);
     RUN(many_images_can_be_stopped);
     RUN(no_scene_takes_much_more_than_others);
     RUN(no_point_is_too_near_to_itself);
+    RUN(a_least_distance_may_be_too_large);
     RUN(one_refusal_ends_the_search);
     RUN(shifts_may_be_too_large);
 }

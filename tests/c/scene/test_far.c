@@ -278,9 +278,27 @@ points_far_above_a_slab_keep_their_neighbours(void)
     }
 }
 
+/* A query so far that its turns are not known: it is named, as a point would be. */
+static void
+far_queries_are_named(void)
+{
+    const hs_box    box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
+    const double    x[2] = {0.25, 0.5}, q[2] = {0.25, 1e300};
+    const hs_points points = points_in_rows(x, 2, 1), queries = points_in_rows(q, 2, 1);
+    hs_options      options = hs_options_default();
+    hs_pairs       *rows = NULL;
+    hs_failure      failure;
+    options.cutoff = 0.3;
+    options.want = HS_WANT_J | HS_WANT_SHIFT;
+    CHECK(hs_neighbors_find(QUERIED(&points, &queries, &box), &options, &rows, &failure) ==
+          HS_ERR_SHIFT_RANGE);
+    CHECK(rows == NULL && failure.in_queries && failure.row == 1);
+}
+
 void
 test_far(void)
 {
+    RUN(far_queries_are_named);
     RUN(every_search_counts_the_same);
     RUN(subnormal_numbers_in_a_long_box);
     RUN(points_far_above_a_slab_keep_their_neighbours);

@@ -330,10 +330,7 @@ scenes_are_narrowed_by_what_is_sure(void)
                               : scene.less[k] < less && scene.less[k] > less - 1e-9);
             CHECK(hs_scene_radius_along(&scene, k) == 1.0 - scene.less[k]);
         }
-        const double volume = hs_scene_volume(&scene, 3.0);
-        CHECK(volume == 3.0 * (1.0 - scene.less[0]) * (1.0 - scene.less[1]));
     }
-    CHECK(hs_scene_narrow(&scene, NULL) == HS_OK);
     CHECK(scene.less[0] > 0.9);
     widths[1] = HUGE_VAL;
     CHECK(hs_scene_narrow(&scene, &narrowing) == HS_ERR_INTERRUPTED);

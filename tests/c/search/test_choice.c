@@ -510,6 +510,34 @@ numbered_queries_may_be_far_away(void)
     hs_pairs_free(moved[1]);
 }
 
+/* Queries too far for cells that were kept: these are made anew, and the choice stays. */
+static void
+far_queries_of_cells_choose_as_well(void)
+{
+    enum { Q = 3 };
+    static const double  x[4] = {0.25, 0.5, 1.0, 2.5}, far[Q] = {0.5, -1e3, 1e9};
+    static const int64_t groups[4] = {0, 1, 0, 1}, of_queries[Q] = {1, 0, 1};
+    const hs_points      points = points_in_rows(x, 4, 1), queries = points_in_rows(far, Q, 1);
+    const hs_selection   selection = {.has_groups = true};
+    hs_set               known = {.groups = groups};
+    hs_options           options = hs_options_default();
+    hs_cells            *cells;
+    hs_pairs            *of_cells, *rows;
+    options.cutoff = 1.0;
+    CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
+    hs_among among = {.points = SET(&points, .groups = groups),
+                      .queries = SET(&queries, .groups = of_queries),
+                      .selection = &selection};
+    CHECK(hs_neighbors_find(&among, &options, &rows, NULL) == HS_OK);
+    among.cells = cells;
+    among.points = &known;
+    CHECK(hs_neighbors_find(&among, &options, &of_cells, NULL) == HS_OK);
+    CHECK(hs_pairs_length(rows) == 1 && same_pairs(rows, of_cells));
+    hs_pairs_free(of_cells);
+    hs_pairs_free(rows);
+    hs_cells_free(cells);
+}
+
 /* Labels at the ends of their range: no difference of two overflows. */
 static void
 labels_may_be_of_any_size(void)
@@ -558,5 +586,6 @@ test_choice(void)
     RUN(refused_memory_leaves_nothing);
     RUN(shifts_that_are_not_known_are_told);
     RUN(numbered_queries_may_be_far_away);
+    RUN(far_queries_of_cells_choose_as_well);
     RUN(labels_may_be_of_any_size);
 }

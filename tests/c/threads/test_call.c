@@ -193,8 +193,7 @@ walk_points(int64_t n, int n_strips, int64_t failing, int64_t stops_at, walked *
     *of = (walked){.failing = failing, .stops_at = stops_at};
     options.poll = note_poll;
     options.poll_context = of;
-    return n_strips == 0 ? hs_walk_slabs(NULL, &options, n, note_range, of)
-                         : hs_walk_strips(NULL, &options, n, n_strips, note_range, of);
+    return hs_walk_points(NULL, &options, n, n_strips, note_range, of);
 }
 
 static void

@@ -150,6 +150,7 @@ shifts_may_be_as_large_as_jumps_are(void)
         }
         jump_by(INT32_MAX, 0.0, 1.0, names[k], HS_OK);
         jump_by(-3, 0x1p20, 1.0, names[k], HS_OK);
+        jump_by(0, 0x1p30, 1.0, names[k], HS_OK); /* points are listed far from where they are */
         jump_by(INT64_C(1) << 33, 0.0, 1.0, names[k], HS_ERR_SHIFT_RANGE);
         jump_by(-(INT64_C(1) << 33), 0.0, 1.0, names[k], HS_ERR_SHIFT_RANGE);
         jump_by(INT64_C(1) << 34, 0x1p20, 128.0, names[k], HS_ERR_SHIFT_RANGE);

@@ -298,7 +298,7 @@ def check_wild(drawn):
 
 
 def test_any_objects_as_arguments():
-    fuzz(wild(), check_wild, 500)
+    fuzz(wild(), check_wild, 150)
 
 
 @pytest.mark.slow

@@ -486,9 +486,9 @@ BAD_TEXT = [
     ("name,x,y\na,b,0,0.5\n", "line 2: has 4 fields, the first line has 3"),
     *(("x;y\n" + "0;1\n" * n + f"0{a}5;1\n" + "0;1\n" * 5000 + f"0{b}5;1\n",
        f"line {n + 5003}, field 1: '0{b}5': the file has decimal commas and decimal points")
-      for n in (3, 4090, 9000) for a, b in (",.", ".,")),
+      for n in (3, 4090) for a, b in (",.", ".,")),
     *(("x,y\n" + "0,1\n" * n + f"0,{word}\n" + "0,1\n" * 9, f"line {n + 2}, field 2: {said}")
-      for n in (3, 4095, 4096, 9000)
+      for n in (3, 4095, 4096)
       for word, said in (("nan", "nan is not a finite"), ("1_0", "'1_0'"), ("", "is empty"))),
 ]  # fmt: skip
 

@@ -42,6 +42,17 @@ def test_the_tests_of_ase_pass(tmp_path):
     assert " passed" in done.stdout and "skipped" not in done.stdout
 
 
+def test_a_vector_that_is_alone_is_not_rounded():
+    """ASE completes a cell of one vector by an SVD, which makes (2, 1, 2) shorter than 3."""
+    wire = Atoms("H", pbc=[False, True, False], cell=[[0, 0, 0], [2, 1, 2], [0, 0, 0]])
+    assert len(neighborlist.neighbor_list("i", wire, 3.0)) == 2  # not within 3
+    assert len(ours.neighbor_list("i", wire, 3.0)) == 0
+    assert ours.neighbor_list("d", wire, 3.5).tolist() == [3.0, 3.0]
+    for kind in (ours.PrimitiveNeighborList, ours.NewPrimitiveNeighborList):
+        lists = ours.NeighborList([1.5], 0.0, self_interaction=False, primitive=kind)
+        assert lists.update(wire) and len(lists.get_neighbors(0)[0]) == 0
+
+
 def entries(module, *arguments, **options):
     """Sorted rows (i, j, S), and D in that order."""
     i, j, d, D, S = module.primitive_neighbor_list("ijdDS", *arguments, **options)

@@ -18,6 +18,7 @@ from refused_calls import check_refusals
 dask = pytest.importorskip("dask", reason="dask is not installed")
 pytest.importorskip("dask.local", reason="dask is not installed")
 da = pytest.importorskip("dask.array", reason="dask.array is not installed")
+pytest.importorskip("distributed.deploy", reason="distributed is not installed")
 distributed = pytest.importorskip("distributed", reason="distributed is not installed")
 hd = pytest.importorskip("halfshell.dask", reason="dask is not installed")
 

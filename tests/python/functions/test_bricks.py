@@ -88,6 +88,15 @@ def test_bad_boxes_and_other_points():
         part.pairs(np.zeros((10, 1)), quantities="x")
 
 
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_rounded_decisions_are_refused(precision):
+    points = np.arange(10.0)[:, None]
+    part = hs.bricks(points, 1.0, 2)[0]
+    for method in (part.pairs, part.count_pairs, part.neighbors):
+        with hs.settings(precision=precision), pytest.raises(ValueError, match="bricks need prec"):
+            method(points)
+
+
 def test_rules_with_a_direction_have_rows_and_no_pairs():
     rng = np.random.default_rng(8)
     points = hs.Points(rng.random((80, 2)) * 4.0, box=4.0, radii=rng.random(80))

@@ -159,6 +159,23 @@ def test_weights_types_and_points_of_no_cluster():
     assert nothing.unwrap().shape == nothing.centers().shape == (0, 2)
 
 
+def test_where_a_point_between_two_ends_goes_depends_on_nothing_but_the_points(rng):
+    """The last point is no core point, and touches both ends of a chain that spans nothing."""
+    chain = np.append(np.arange(0.0, 6.25, 0.5), 7.1)[:, None]
+    for _ in range(10):
+        points = hs.Points(rng.permutation(chain), box=8.2)
+        first = hs.clusters(points, 1.2, min_points=4)
+        assert first.core.sum() == 13 and not first.spans.any()
+        cells = [hs.CellList(points, 1.2, cell_size=size) for size in (0.4, 1.2, 8.0)]
+        assert all(
+            np.array_equal(one.clusters(min_points=4).unwrap(), first.unwrap()) for one in cells
+        )
+        for algorithm in ("all-pairs", "grid", "hash", "hierarchy"):
+            with hs.settings(algorithm=algorithm):
+                found = hs.clusters(points, 1.2, min_points=4)
+                assert np.array_equal(found.unwrap(), first.unwrap())
+
+
 @pytest.mark.parametrize("least", [1, 3])
 def test_clusters_of_a_batch_are_those_of_each_system(least, rng):
     boxes = [TRICLINIC, np.eye(3), 1.5 * np.eye(3), None]

@@ -41,6 +41,28 @@ def test_index_dtype(scene):
         assert same_arrays(found, tuple(array.astype(dtype) for array in wide))
 
 
+BOXES = [[3, 5], [[3, 0], [1, 5]], [3, 4, 5], [[3, 0, 0], [1, 4, 0], [0, 1, 5]]]
+
+
+@pytest.mark.parametrize("box", BOXES)
+@pytest.mark.parametrize("exclude", [None, [[0, 1], [2, 3]]])
+def test_images_are_in_the_same_order_without_their_shifts(rng, box, exclude):
+    d = len(box)
+    tensors = np.array([np.eye(d), np.eye(d) + 0.5 * (np.eye(d, k=1) + np.eye(d, k=-1))])
+    of_each = [{}, {"radii": rng.integers(1, 4, 30)}, {"supports": tensors[rng.integers(0, 2, 30)]}]
+    for known in of_each:
+        points = hs.Points(rng.integers(-17, 18, (30, d)), box=box, **known)
+        how = {"exclude": exclude, "rule": "max" if known else None}
+        table = hs.neighbors(points, 5.5, quantities="jdDS", **how)
+        distances, vectors, _ = hs.pairs(points, 5.5, quantities="dDS", sort=True, **how)
+        for letter, name, column in (("d", "distances", distances), ("D", "vectors", vectors)):
+            for more in ("", "j"):
+                rows = hs.neighbors(points, 5.5, quantities=more + letter, **how)
+                assert same_arrays(getattr(rows, name), getattr(table, name))
+                found = hs.pairs(points, 5.5, quantities="i" + more + letter, sort=True, **how)
+                assert same_arrays(found[-1], column)
+
+
 def test_lists_without_elements_have_the_dimensions_of_the_others():
     some = np.zeros((4, 2))
     assert hs.pairs_between(some, [], 1.0, quantities="D").shape == (0, 2)

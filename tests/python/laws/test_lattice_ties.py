@@ -130,3 +130,89 @@ def test_scaled_and_displaced_crystals(name, rng):
                 check_large(
                     points * constant + offset, constant * math.sqrt(square), box * constant
                 )
+
+
+# Box vectors that repeat, an equivalent basis as multiples of these, how many box vectors points
+# are away, a power of two for all lengths, and the cutoff before that.
+ANYWHERE = {
+    "line": ([[3]], [[-1]], 1000, -1060, 7),
+    "wire": ([[5, 2, 2]], [[1]], 3, 0, 3),
+    "thin wire": ([[2, 1, 2]], [[-1]], 1, 900, 6),
+    "plane": ([[2, 0], [1, 3]], [[1, 0], [-57, 1]], 40, 500, 5),
+    "half of a period": ([[10, 0, 0], [0, 10, 0], [0, 0, 10]], None, 2, -500, 5),
+    "skewed": ([[4, 1, 0], [0, 3, 1], [1, 0, 5]], [[1, 9, 0], [0, 1, 0], [-4, 2, 1]], 3, 5, 5),
+    "slab": ([[6, 0, 0], [2, 5, 1]], [[1, 0], [100, 1]], 0, 0, 6),
+    "four axes": ([[3, 0, 0, 0], [1, 2, 0, 0], [0, 0, 4, 1]], None, 1, 0, 4),
+    "five axes": ([[4, 0, 0, 0, 0], [0, 0, 5, 0, 1]], [[0, 1], [1, -3]], 2, -3, 3),
+    "seven axes": ([[2, 0, 0, 0, 0, 0, 0], [1, 0, 0, 3, 0, 0, 0]], None, 5, 0, 3),
+    "eight axes": ([[0, 3, 0, 0, 0, 0, 0, 1], [2, 0, 0, 0, 0, 0, 0, 0]], None, 7, 900, 3),
+    "open": ([], None, 0, -900, 4),
+}
+
+
+def full_list(points, vectors, reach):
+    """Rows (i, j, multiples) of integer points within a common reach, and their squares."""
+    m, n = len(vectors), len(points)
+    D = points - points[:, None]
+    steps = np.zeros((1, 0), int)
+    if m:
+        dual = np.linalg.pinv(vectors.astype(float)).T
+        room = np.abs(D @ dual.T).max(axis=(0, 1)) + reach * np.linalg.norm(dual, axis=1) + 0.01
+        steps = np.array(list(itertools.product(*[range(-int(a) - 1, int(a) + 2) for a in room])))
+    squares = ((D + (steps @ vectors)[:, None, None]) ** 2).sum(axis=-1)
+    k, i, j = np.nonzero((squares <= reach**2) & ((np.eye(n) < 1) | steps.any(1)[:, None, None]))
+    return np.column_stack([i, j, steps[k]]), squares[k, i, j]
+
+
+@pytest.mark.parametrize("name", ANYWHERE)
+def test_lattices_of_any_dimension_basis_and_size(name, rng):
+    """Integers decide everything: pairs, exclusion in the nearest image, the nearest points."""
+    vectors, basis, away, exponent, cutoff = ANYWHERE[name]
+    d = len(vectors[0]) if vectors else 3
+    vectors, n = np.array(vectors, int).reshape(-1, d), 9
+    m = len(vectors)
+    basis = np.eye(m, dtype=int) if basis is None else np.array(basis)
+    box = np.zeros((d, d), int)
+    box[:m] = basis @ vectors
+    points, turns = rng.integers(0, 4, (n, d)), rng.integers(-away, away + 1, (n, m))
+    rows, squares = full_list(points, vectors, cutoff)
+    i, j = rows[:, :2].T
+    S = np.zeros((len(rows), d), int)
+    S[:, :m] = np.rint(rows[:, 2:] @ np.linalg.inv(basis)).astype(int) + turns[i] - turns[j]
+    order = np.lexsort([*S.T[::-1], j, i])
+    i, j, S, squares = i[order], j[order], S[order], squares[order]
+    scale, labels = 2.0**exponent, rng.integers(0, 3, n)
+    scene = {"box": box * scale, "periodic": np.arange(d) < m} if m else {}
+    given = hs.Points((points + turns @ box[:m]) * scale, labels=labels, **scene)
+    nearest = np.ones(len(i), bool)  # as seen from the lower number
+    for a, b in itertools.combinations(range(n), 2):
+        at = np.flatnonzero((i == a) & (j == b))
+        best = at[np.argsort(squares[at], kind="stable")[:1]]
+        nearest[np.setdiff1d(at, best)] = False
+        back = (i == b) & (j == a)
+        nearest[back] = (S[back] == -S[best]).all(axis=1) if len(best) else False
+    kept = (i == j) | (labels[i] != labels[j]) | ~nearest
+    half = (i < j) | ((i == j) & (np.array([next(filter(None, s), 0) for s in S.tolist()]) > 0))
+    for how in ({}, {"inclusive": False}, {"exclude": 0}, {"min_distance": (cutoff - 1) * scale}):
+        counts = np.ones(len(i), bool)
+        if "inclusive" in how:
+            counts = squares < cutoff**2
+        elif "exclude" in how:
+            counts = kept
+        elif how:
+            counts = squares >= (cutoff - 1) ** 2
+        for kernel in hs.kernels():
+            with hs.settings(kernel=kernel):
+                table = hs.neighbors(given, cutoff * scale, quantities="jS", **how)
+                pairs = hs.pairs(given, cutoff * scale, quantities="SP", sort=True, **how)
+            assert np.array_equal(table.offsets, np.searchsorted(i[counts], np.arange(n + 1)))
+            assert np.array_equal(table.indices, j[counts])
+            assert np.array_equal(table.shifts, S[counts])
+            assert np.array_equal(pairs[0], S[counts & half])
+            assert np.array_equal(pairs[1], np.column_stack([i, j])[counts & half])
+    order = np.lexsort([*S.T[::-1], j, squares, i])
+    found = hs.nearest(given, 5, max_distance=cutoff * scale, quantities="jS")
+    for a in range(n):
+        first = order[i[order] == a][:5]
+        assert np.array_equal(found[0][a, : len(first)], j[first])
+        assert np.array_equal(found[1][a, : len(first)], S[first])
