@@ -112,11 +112,15 @@ is_single(const hs_query_run *run)
 
 /* Columns that put pairs of several steps in order and have all that is wanted: S where two points
  * may be a pair in several images, or one with itself. Twice the cutoff is shorter than any period
- * where not, by far more than rounding errors. */
+ * where not, by far more than rounding errors. Without a reach there are many systems, and what is
+ * kept from one to the next is for the same columns: S for all of them. */
 static unsigned
 columns_of(const hs_query_run *run)
 {
-    unsigned   columns = run->call->options.want & ~(unsigned)HS_WANT_BOTH;
+    unsigned columns = (run->call->options.want & ~(unsigned)HS_WANT_BOTH) | HS_WANT_I | HS_WANT_J;
+    if (!run->has_levels) {
+        return columns | HS_WANT_SHIFT;
+    }
     hs_lattice lattice;
     double     cutoff = 0.0;
     for (int64_t s = 0; s < run->plan.n; s++) {
@@ -128,20 +132,7 @@ columns_of(const hs_query_run *run)
             columns |= HS_WANT_SHIFT;
         }
     }
-    return columns | HS_WANT_I | HS_WANT_J;
-}
-
-/* A hs_use_fn: pairs that are to be sorted. A search without a reach, which has one step, tells the
- * columns itself. */
-static hs_status
-record_to_sort(void *context, hs_query_run *run)
-{
-    hs_output *found = context;
-    if (!run->has_levels) {
-        /* What is kept from system to system is for the same columns. */
-        found->columns = hs_sort_columns(run->search) | HS_WANT_SHIFT;
-    }
-    return record_step(found, run);
+    return columns;
 }
 
 /* Pairs of all steps, in an output that is opened; without (i, i, S = 0). */
@@ -149,7 +140,7 @@ static hs_status
 find_all(hs_query_run *run, unsigned columns, hs_output *found)
 {
     hs_output_init(&run->call->account, run->query->sets.points->ndim, columns, 4, found);
-    const hs_status status = hs_query_each_step(run, record_to_sort, found);
+    const hs_status status = hs_query_each_step(run, record_step, found);
     const int32_t  *i = hs_output_column(found, HS_WANT_I), *j = hs_output_column(found, HS_WANT_J);
     const int32_t  *shift = hs_output_column(found, HS_WANT_SHIFT);
     int64_t         kept = 0;
@@ -183,7 +174,7 @@ find_in_order(hs_query_run *run)
     const bool    has_rows = run->finder->has_rows, both_ways = has_rows && run->plan.is_half;
     int64_t      *offsets = NULL;
     hs_output     found;
-    hs_status     status = find_all(run, run->has_levels ? columns_of(run) : 0, &found);
+    hs_status     status = find_all(run, columns_of(run), &found);
     if (status == HS_OK && both_ways && (run->call->options.want & HS_WANT_SHIFT)) {
         status = hs_output_check_opposites(&found, run->failure);
     }

@@ -648,8 +648,7 @@ put_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_h
         keep_within_lengths(recorder, scanner, first, hits);
     }
     if (status == HS_OK && is_exact && choice != NULL) {
-        /* No pair is nearer than that; only a point that asks for its own neighbours is at 0 from
-         * itself. */
+        /* No pair is nearer than that; only the distance of a point from itself, in rows, is 0. */
         double *distance = hs_output_next(recorder->output, HS_WANT_DISTANCE);
         for (int32_t h = 0; distance != NULL && h < n; h++) {
             distance[h] = distance[h] > 0.0 ? hs_larger(distance[h], choice->min_distance) : 0.0;
